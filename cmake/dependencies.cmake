@@ -1,0 +1,24 @@
+# Packages of the system; see README.md for their Debian names.
+find_package(Threads REQUIRED)
+find_package(TBB REQUIRED)
+find_package(OpenSSL REQUIRED COMPONENTS Crypto)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(tomlplusplus REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(OpenCV REQUIRED COMPONENTS core imgcodecs imgproc videoio video)
+find_package(Imath REQUIRED)
+find_package(OpenEXR REQUIRED)
+
+# OpenVDB ships a find module instead of a config package, and needs Boost iostreams.
+list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB
+     /usr/lib/x86_64-linux-gnu/cmake/OpenVDB)
+find_package(Boost REQUIRED COMPONENTS iostreams)
+find_package(OpenVDB REQUIRED)
+
+find_package(Torch REQUIRED)
+
+if(CNERF_TESTS)
+  find_package(GTest REQUIRED)
+endif()

@@ -1,0 +1,27 @@
+include(GNUInstallDirs)
+
+# cnerf_add_library(NAME SOURCES … [PUBLIC …] [PRIVATE …])
+# One static library a folder; headers are included by their path from the root.
+function(cnerf_add_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(${name} STATIC ${arg_SOURCES})
+  target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${name} PUBLIC ${arg_PUBLIC} PRIVATE cnerf_options ${arg_PRIVATE})
+endfunction()
+
+# cnerf_add_test(NAME SOURCES … LINK … [LABELS …] [TIMEOUT seconds])
+# One executable of GoogleTest cases; every case is a CTest test of its own.
+function(cnerf_add_test name)
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 120)
+  endif()
+  if(NOT arg_LABELS)
+    set(arg_LABELS unit)
+  endif()
+  add_executable(${name} ${arg_SOURCES})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${name} PRIVATE cnerf_options cnerf_test_support ${arg_LINK})
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
+    PROPERTIES LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT})
+endfunction()

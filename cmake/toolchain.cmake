@@ -1,0 +1,25 @@
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+
+find_program(CNERF_CCACHE ccache)
+if(CNERF_CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CNERF_CCACHE})
+endif()
+
+# Every target of ours links this one; packages' headers are SYSTEM and stay out of it.
+add_library(cnerf_options INTERFACE)
+target_compile_options(cnerf_options INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+                       $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-restrict>)  # GCC 105329
+if(CNERF_WARNINGS_AS_ERRORS)
+  target_compile_options(cnerf_options INTERFACE -Werror)
+endif()
+if(CNERF_SANITIZE)
+  target_compile_options(cnerf_options INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer)
+  target_link_options(cnerf_options INTERFACE -fsanitize=address,undefined)
+endif()

@@ -1,0 +1,82 @@
+#pragma once
+/// What can go wrong, whose fault it is, and the exit code it ends with.
+/// `main` holds the only catch that turns these into messages; nothing else exits.
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+namespace cnerf {
+
+/// Exit codes of the program. The numbers follow sysexits.h where it has a fitting one.
+enum class ExitCode : int {
+  kSuccess = 0,
+  kUsage = 64,         ///< unknown option or config key, value out of range
+  kInput = 65,         ///< a file's content is wrong: poses, images, models
+  kMissingInput = 66,  ///< a file or folder that should exist does not
+  kDevice = 69,        ///< a device that was asked for is not there, or failed
+  kInternal = 70,      ///< our own contract was broken: a bug
+  kOutput = 73,        ///< the output cannot be written: permissions, full disk
+  kColorizer = 76,     ///< a colorizer failed, timed out or answered nonsense
+  kSnapshot = 78,      ///< a snapshot of another version, or cut short
+  kInterrupted = 130,  ///< Ctrl-C; progress was saved
+};
+
+/// Base of every error the user should read.
+class Error : public std::runtime_error {
+ public:
+  Error(ExitCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  [[nodiscard]] ExitCode exit_code() const { return code_; }
+
+ private:
+  ExitCode code_;
+};
+
+/// A command line or config value the program does not accept.
+struct UsageError : Error {
+  explicit UsageError(const std::string& message) : Error(ExitCode::kUsage, message) {}
+};
+
+/// A file whose content is wrong. The message reads `file: field: what was expected, what was found`.
+struct InputError : Error {
+  explicit InputError(const std::string& message) : Error(ExitCode::kInput, message) {}
+  InputError(const std::filesystem::path& file, const std::string& field, const std::string& problem);
+};
+
+/// A file or folder that should exist does not.
+struct MissingInputError : Error {
+  explicit MissingInputError(const std::string& message) : Error(ExitCode::kMissingInput, message) {}
+};
+
+/// A device that is missing, or a driver call that failed.
+struct DeviceError : Error {
+  explicit DeviceError(const std::string& message) : Error(ExitCode::kDevice, message) {}
+};
+
+/// An output that cannot be written. Nothing half-written is left under the final name.
+struct OutputError : Error {
+  explicit OutputError(const std::string& message) : Error(ExitCode::kOutput, message) {}
+};
+
+/// A colorizer that failed, hung or answered with wrong shapes or values.
+struct ColorizerError : Error {
+  explicit ColorizerError(const std::string& message) : Error(ExitCode::kColorizer, message) {}
+};
+
+/// A snapshot this program cannot continue from.
+struct SnapshotError : Error {
+  explicit SnapshotError(const std::string& message) : Error(ExitCode::kSnapshot, message) {}
+};
+
+/// Raised after the state was saved when the user pressed Ctrl-C.
+struct Interrupted : Error {
+  explicit Interrupted(const std::string& message) : Error(ExitCode::kInterrupted, message) {}
+};
+
+/// A broken promise between two parts of this program: always a bug.
+class ContractError : public std::logic_error {
+ public:
+  using std::logic_error::logic_error;
+};
+
+}  // namespace cnerf

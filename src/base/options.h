@@ -1,0 +1,30 @@
+#pragma once
+/// How an option struct tells the config binding, the help text and the tests about its fields: one member template
+///
+///   template <typename Visitor> void visit(Visitor&& v) {
+///     v("levels", levels, Range{1, 16}, "levels of the hash grid");      // a number with its legal range
+///     v("transfer", transfer, Choice{"srgb", "linear"}, "…");            // a string out of a few
+///     v("name", name, "…");                                              // bool, std::string,
+///     std::vector<std::string> v.section("grid", grid);                                           // a nested option
+///     struct
+///   }
+/// The defaults are the struct's member initialisers and stand nowhere else.
+
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+namespace cnerf {
+
+/// Closed range of a numeric option.
+struct Range {
+  double min, max;
+};
+
+/// The values a string option may take.
+struct Choice {
+  std::vector<std::string> values;
+  Choice(std::initializer_list<const char*> list) : values(list.begin(), list.end()) {}
+};
+
+}  // namespace cnerf

@@ -1,0 +1,43 @@
+#include "src/base/parallel.h"
+
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <memory>
+
+namespace cnerf {
+namespace {
+
+std::unique_ptr<tbb::global_control> thread_limit;  // NOLINT: TBB's own setting is global as well
+
+}  // namespace
+
+void set_thread_count(int threads) {
+  thread_limit.reset();
+  if (threads > 0) {
+    thread_limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                         static_cast<std::size_t>(threads));
+  }
+}
+
+int thread_count() {
+  return static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+}
+
+void parallel_tasks(std::size_t tasks, const std::function<void(std::size_t)>& task) {
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, tasks, 1),
+      [&](const auto& range) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) task(i);
+      },
+      tbb::simple_partitioner{});
+}
+
+void parallel_ranges(std::size_t count, std::size_t grain, const std::function<void(std::size_t, std::size_t)>& body) {
+  const std::size_t pieces = (count + grain - 1) / grain;
+  parallel_tasks(pieces, [&](std::size_t i) { body(i * grain, std::min(count, (i + 1) * grain)); });
+}
+
+}  // namespace cnerf

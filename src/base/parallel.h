@@ -1,0 +1,20 @@
+#pragma once
+/// Parallel loops over a fixed partition: tasks are numbered, and what a task computes depends on its number alone.
+/// So results do not depend on the number of threads, as long as tasks write to places of their own.
+
+#include <cstddef>
+#include <functional>
+
+namespace cnerf {
+
+/// Threads that parallel loops use; 0 restores "all cores". Takes effect for loops that start afterwards.
+void set_thread_count(int threads);
+[[nodiscard]] int thread_count();
+
+/// Calls `task(i)` once for each i in [0, tasks), in any order, on any thread. An exception of a task is rethrown here.
+void parallel_tasks(std::size_t tasks, const std::function<void(std::size_t)>& task);
+
+/// Calls `body(begin, end)` over consecutive pieces of [0, count) of at most `grain` elements each.
+void parallel_ranges(std::size_t count, std::size_t grain, const std::function<void(std::size_t, std::size_t)>& body);
+
+}  // namespace cnerf

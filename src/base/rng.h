@@ -1,0 +1,53 @@
+#pragma once
+/// Counter-based random numbers: a value is a pure function of (seed, stream, index), the same on CPU and GPU and for
+/// any number of threads, so a training step can be repeated without replaying the run.
+
+#include <cstdint>
+
+#include "src/base/host_device.h"
+
+namespace cnerf {
+
+/// A well mixed 64-bit hash of one word (the finaliser of SplitMix64, Steele et al. 2014).
+CNERF_HD constexpr std::uint64_t mix_bits(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15ull;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
+  return x ^ (x >> 31);
+}
+
+/// The generator: every draw names its index, there is no hidden state.
+struct CounterRng {
+  std::uint64_t key = 0;
+
+  CNERF_HD constexpr CounterRng(std::uint64_t seed, std::uint64_t stream) : key(mix_bits(seed ^ mix_bits(stream))) {}
+
+  [[nodiscard]] CNERF_HD constexpr std::uint64_t bits(std::uint64_t index) const {
+    return mix_bits(key ^ mix_bits(index));
+  }
+  /// Uniform in [0, 1), 24 bits.
+  [[nodiscard]] CNERF_HD constexpr float uniform(std::uint64_t index) const {
+    return static_cast<float>(bits(index) >> 40) * 0x1p-24f;
+  }
+  /// Uniform integer in [0, n). The bias of at most n / 2^32 is below what any use here could notice.
+  [[nodiscard]] CNERF_HD constexpr std::uint32_t below(std::uint64_t index, std::uint32_t n) const {
+    return static_cast<std::uint32_t>(((bits(index) >> 32) * n) >> 32);
+  }
+};
+
+/// A sequence of draws for host code that only needs "the next one".
+class SequentialRng {
+ public:
+  SequentialRng(std::uint64_t seed, std::uint64_t stream) : rng_(seed, stream) {}
+  float uniform() { return rng_.uniform(next_++); }
+  float uniform(float low, float high) { return low + (high - low) * uniform(); }
+  std::uint32_t below(std::uint32_t n) { return rng_.below(next_++, n); }
+  /// Standard normal (Box and Muller 1958).
+  float normal();
+
+ private:
+  CounterRng rng_;
+  std::uint64_t next_ = 0;
+};
+
+}  // namespace cnerf

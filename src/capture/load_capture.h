@@ -1,0 +1,32 @@
+#pragma once
+/// Turns a folder into a Capture, whatever convention it follows.
+
+#include <string>
+
+#include "src/base/options.h"
+#include "src/capture/capture.h"
+
+namespace cnerf {
+
+struct CaptureOptions {
+  int downscale = 1;              ///< divides image sizes; picks LLFF's images_N or resizes by area averaging
+  std::string transfer = "srgb";  ///< how grey values encode luminance
+  int holdout = 0;  ///< every N-th view of the sorted existing files is held out; 0 = the data set's split
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("downscale", downscale, Range{1, 64}, "divide image sizes by this");
+    v("transfer", transfer, Choice{"srgb", "linear", "gamma22"}, "how grey values encode luminance");
+    v("holdout", holdout, Range{0, 1000},
+      "hold out every N-th view; 0 follows the data set's own split, if it has one");
+  }
+};
+
+/// Recognises the format by its marker file and reads it: `transforms.json` or `transforms_train.json` (NeRF,
+/// instant-ngp, nerfstudio), a COLMAP model (`cameras.bin|txt` here, or in `sparse/`, `sparse/N/`, `colmap/sparse/N/`),
+/// or `poses_bounds.npy` (LLFF). A path to the marker file itself works as well.
+/// @throws MissingInputError  no such folder, or no marker: the message lists what was looked for.
+/// @throws InputError         fewer than 2 usable views, bad poses, truncated files; names file, field and value.
+[[nodiscard]] Capture load_capture(const std::filesystem::path& path, const CaptureOptions& options = {});
+
+}  // namespace cnerf

@@ -1,0 +1,41 @@
+#pragma once
+/// Single-channel images at the depth they came in. No colour ever enters this type.
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace cnerf {
+
+/// How stored values encode linear luminance.
+enum class Transfer {
+  kSrgb,     ///< IEC 61966-2-1
+  kLinear,   ///< value = luminance
+  kGamma22,  ///< value = luminance^(1/2.2)
+};
+
+enum class PixelDepth { kU8, kU16, kF32 };
+
+struct MonoImage {
+  int width = 0, height = 0;
+  PixelDepth depth = PixelDepth::kU8;
+  Transfer transfer = Transfer::kSrgb;
+  std::vector<std::uint8_t> u8;     ///< [H, W] when depth is kU8, else empty
+  std::vector<std::uint16_t> u16;   ///< [H, W] when depth is kU16, else empty
+  std::vector<float> f32;           ///< [H, W] when depth is kF32, else empty; always linear
+  std::vector<std::uint8_t> alpha;  ///< [H, W] coverage 0..255; empty = opaque. Values are premultiplied: over black.
+  std::vector<std::uint8_t> mask;   ///< [H, W] 0 = ignore this pixel; empty = every pixel counts
+
+  [[nodiscard]] std::size_t pixel_count() const { return std::size_t(width) * std::size_t(height); }
+  /// Linear luminance Y, 1 = white, composited over black, of pixel `index = y * width + x`.
+  [[nodiscard]] float luminance(std::size_t index) const;
+  [[nodiscard]] float coverage(std::size_t index) const { return alpha.empty() ? 1.0f : float(alpha[index]) / 255.0f; }
+  [[nodiscard]] bool valid(std::size_t index) const { return mask.empty() || mask[index] != 0; }
+};
+
+/// Linear light of an encoded value in [0, 1], and back.
+[[nodiscard]] float decode_transfer(Transfer transfer, float value);
+[[nodiscard]] float encode_transfer(Transfer transfer, float luminance);
+
+}  // namespace cnerf

@@ -1,0 +1,34 @@
+#pragma once
+/// The embedded sample: a procedural scene, ray-traced by our own code, with exact colour and depth.
+
+#include <filesystem>
+
+#include "src/base/options.h"
+#include "src/base/progress.h"
+
+namespace cnerf {
+
+struct SampleSceneOptions {
+  int views = 40;
+  int width = 320, height = 240;  ///< pixels
+  int samples_per_pixel = 16;     ///< a square number; stratified
+  int seed = 1;
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("views", views, Range{2, 1000}, "camera positions");
+    v("width", width, Range{16, 4096}, "pixels");
+    v("height", height, Range{16, 4096}, "pixels");
+    v("samples_per_pixel", samples_per_pixel, Range{1, 1024}, "square number of stratified samples");
+    v("seed", seed, Range{0, 1e9}, "seed of the sampling pattern");
+  }
+};
+
+/// Writes a capture a user could have made: `images/*.png` (grey), `transforms.json` (with bounds and a train/test
+/// split of every 8th view); beside it `color/*.png` (ground truth, same names), `depth/*.exr` (distance along the
+/// optical axis, world units, 0 = nothing hit) and `reference.png`, one colour view that serves as `reference:`.
+/// Same options, same bytes, on any number of threads.
+void write_sample_scene(const std::filesystem::path& folder, const SampleSceneOptions& options,
+                        const ProgressSink& progress = {});
+
+}  // namespace cnerf

@@ -1,0 +1,41 @@
+#pragma once
+/// The 313 quantised ab colours of Zhang et al. 2016, soft labels over them, and ways back to one colour.
+
+#include <array>
+#include <span>
+#include <vector>
+
+namespace cnerf {
+
+inline constexpr int kAbBinCount = 313;
+inline constexpr float kAbGridStep = 10.0f;  ///< distance of neighbouring bins, in ab units
+
+struct Ab {
+  float a = 0, b = 0;
+};
+
+/// Centres of the bins, ordered by a, then b.
+[[nodiscard]] const std::array<Ab, kAbBinCount>& ab_bin_centres();
+
+/// Five nearest bins with Gaussian weights that sum to 1 (paper, "soft-label operation S"; sigma as Zhang et al. 2016).
+inline constexpr int kSoftLabelBins = 5;
+inline constexpr float kSoftLabelSigma = 5.0f;
+struct SoftLabel {
+  std::array<int, kSoftLabelBins> bin{};
+  std::array<float, kSoftLabelBins> weight{};
+};
+[[nodiscard]] SoftLabel soft_label(Ab color);
+/// Index of the nearest bin.
+[[nodiscard]] int nearest_bin(Ab color);
+
+/// Colour of the most probable bin (paper, Eq. z to y).  @param logits  [313], any scale or offset.
+[[nodiscard]] Ab decode_arg_max(std::span<const float> logits);
+/// Mean of the centres under softmax(log p / temperature) (Zhang et al. 2016, Eq. 5). Temperature 1 is the mean,
+/// towards 0 the mode.
+[[nodiscard]] Ab decode_annealed_mean(std::span<const float> logits, float temperature);
+
+/// Class rebalancing (Zhang et al. 2016, Sec. 2.2): w = 1 / ((1 - lambda) p + lambda / Q), scaled so that sum p w = 1.
+/// @param prior  [313], sums to 1.
+[[nodiscard]] std::vector<float> rebalancing_weights(std::span<const float> prior, float lambda);
+
+}  // namespace cnerf

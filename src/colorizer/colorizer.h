@@ -1,0 +1,57 @@
+#pragma once
+/// What stage 2 asks for colours. Any 2-D colorizer fits behind it; none of its kinds is visible here.
+
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace cnerf {
+
+/// A batch of lightness patches. L* in 0..100.
+struct LightnessBatch {
+  int batch = 0, height = 0, width = 0;
+  std::vector<float> lightness;  ///< [B, H, W]
+};
+
+/// The colorizer's answer; exactly one of the two is filled.
+struct ChromaBatch {
+  int batch = 0, height = 0, width = 0;
+  std::vector<float> ab;      ///< [B, 2, H, W] Lab a and b
+  std::vector<float> logits;  ///< [B, 313, H, W] over the bins of ab_bins.h
+
+  [[nodiscard]] bool has_distribution() const { return !logits.empty(); }
+};
+
+class Colorizer {
+ public:
+  virtual ~Colorizer() = default;
+
+  /// Colours a batch. The answer has the batch's size and finite values; implementations check their own back end.
+  /// @throws ColorizerError  naming the colorizer and what was wrong.
+  [[nodiscard]] virtual ChromaBatch colorize(const LightnessBatch& patches) = 0;
+
+  /// For logs and metadata: "reference:IMG_1.jpg", "exec:python3 ct2.py".
+  [[nodiscard]] virtual std::string name() const = 0;
+};
+
+struct ColorizerOptions {
+  std::string spec;                      ///< "reference:IMAGE…", "torchscript:FILE", "exec:COMMAND", "grey"
+  std::filesystem::path working_folder;  ///< relative files of the spec are looked up here, then as given
+  double timeout_seconds = 60;           ///< for one batch of an exec: colorizer
+  std::uint64_t seed = 1;
+};
+
+/// @throws UsageError         an unknown kind or an empty spec; lists the kinds.
+/// @throws MissingInputError  a file the spec names does not exist.
+/// @throws ColorizerError     the back end could not start.
+[[nodiscard]] std::unique_ptr<Colorizer> make_colorizer(const ColorizerOptions& options);
+
+/// Checks shape and finiteness of an answer.  @throws ColorizerError  naming the colorizer.
+void check_answer(const std::string& colorizer, const LightnessBatch& question, const ChromaBatch& answer);
+
+/// The ab image of entry `index` of an answer, decoding a distribution by annealed mean at `temperature`.  [2, H, W]
+[[nodiscard]] std::vector<float> ab_of(const ChromaBatch& answer, int index, float temperature = 0.38f);
+
+}  // namespace cnerf

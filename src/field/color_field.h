@@ -1,0 +1,34 @@
+#pragma once
+/// What the bake, the viewer and evaluation need of a trained scene: point queries. Engines implement it.
+
+#include <span>
+
+#include "src/base/vec3.h"
+#include "src/field/scene_frame.h"
+
+namespace cnerf {
+
+/// Chromaticity of a sample relative to its luminance: its XYZ is Y * (x, 1, z) relative to the white point.
+/// Grey is (1, 1). Linear in light, so compositing colours of samples composites their XYZ exactly.
+struct Chromaticity {
+  float x = 1, z = 1;
+};
+
+/// All positions are in unit space, [0, 1]^3; arrays of one call have equal sizes. Thread-safe.
+class ColorField {
+ public:
+  virtual ~ColorField() = default;
+
+  [[nodiscard]] virtual const SceneFrame& frame() const = 0;
+  /// False where the occupancy grid knows the cell that holds `position` to be empty.
+  [[nodiscard]] virtual bool may_be_occupied(Vec3f position) const = 0;
+  /// sigma: density, 1/unit-space length, >= 0. Not masked by occupancy.
+  virtual void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const = 0;
+  /// luminance: linear Y seen when looking along `directions` (unit length, away from the camera).
+  virtual void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
+                               std::span<float> luminance) const = 0;
+  /// Grey (1, 1) everywhere when the scene has not been colorized.
+  virtual void query_chromaticity(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const = 0;
+};
+
+}  // namespace cnerf

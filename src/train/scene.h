@@ -1,0 +1,45 @@
+#pragma once
+/// A trained scene, loaded for rendering, evaluation and baking.
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "src/base/options.h"
+#include "src/base/progress.h"
+#include "src/capture/camera.h"
+#include "src/field/color_field.h"
+
+namespace cnerf {
+
+/// One rendered view. Linear light, composited over black; [H, W] each.
+struct RenderedImage {
+  int width = 0, height = 0;
+  std::vector<float> luminance;  ///< linear Y
+  std::vector<float> opacity;    ///< 0..1
+  std::vector<float> depth;      ///< expected distance along the optical axis, world units; 0 where opacity < 0.5
+  std::vector<float> rgb;        ///< [H, W, 3] linear Rec.709 by the paper's per-pixel decode; empty when not colorized
+  std::vector<float> baked_rgb;  ///< [H, W, 3] linear Rec.709 composited from per-sample colour, as a bake shows it
+};
+
+struct RenderOptions {
+  int steps_per_box = 512;          ///< march steps across the innermost cascade
+  double min_transmittance = 1e-3;  ///< a ray ends below this
+  bool color = true;                ///< also rgb, when the scene is colorized
+  bool baked_color = false;         ///< also baked_rgb
+};
+
+class Scene : public ColorField {
+ public:
+  /// @param take_snapshot  of stage 2; empty = luminance only.
+  /// @throws MissingInputError, SnapshotError.
+  static std::unique_ptr<Scene> load(const std::filesystem::path& stage1_snapshot,
+                                     const std::filesystem::path& take_snapshot = {});
+
+  [[nodiscard]] virtual bool is_colorized() const = 0;
+  [[nodiscard]] virtual std::string colorizer() const = 0;  ///< name of the colorizer; empty when not colorized
+  [[nodiscard]] virtual RenderedImage render(const Intrinsics& intrinsics, const Affined& world_from_camera,
+                                             const RenderOptions& options = {}) const = 0;
+};
+
+}  // namespace cnerf

@@ -1,0 +1,87 @@
+#pragma once
+/// Stage 2: chroma by querying a 2-D colorizer (paper, Sec. "Color representation prediction").
+
+#include <filesystem>
+#include <string>
+
+#include "encoding/hash_grid_levels.h"
+#include "src/base/options.h"
+#include "src/base/progress.h"
+#include "src/capture/capture.h"
+#include "src/colorizer/colorizer.h"
+
+namespace cnerf {
+
+/// Histogram-guided purification (paper, Eq. histcomparison and bigh module).
+struct PurifyOptions {
+  bool enabled = true;
+  int base_images = 5;
+  double base_scale = 0.7;       ///< s of the base patches
+  double threshold = 0.80;       ///< T
+  std::string histogram = "ab";  ///< opacity-masked 2-D ab histogram, or 8x8x8 RGB as in the published code
+  std::string picked_bases;      ///< "2,5,7" of the candidates; empty = chosen to cover the views
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("enabled", enabled, "reject outlier answers of the colorizer");
+    v("base_images", base_images, Range{1, 64}, "patches answers are compared with");
+    v("base_scale", base_scale, Range{0.05, 1}, "share of the short side a base patch covers");
+    v("threshold", threshold, Range{-1, 1}, "histogram similarity an answer must exceed");
+    v("histogram", histogram, Choice{"ab", "rgb"},
+      "opacity-masked ab histogram, or 8x8x8 RGB as in the published code");
+    v("picked_bases", picked_bases, "comma-separated candidates to use as bases; empty chooses");
+  }
+};
+
+struct Stage2Options {
+  int patches = 400;                        ///< accepted patches
+  int patch_size = 128;                     ///< K
+  double scale_min = 0.3, scale_max = 0.7;  ///< s: the patch's side as a share of the image's short side
+  int rays_per_patch = 4096;                ///< pixels of a patch that are trained on
+  double learning_rate = 1e-2;
+  double final_learning_rate = 1e-3;
+  int working_resolution = 384;   ///< short side, pixels, at which samples are cached
+  double cached_weight = 0.995;   ///< share of a pixel's weight the cached samples carry
+  double rebalancing = 0;         ///< lambda mixing of class rebalancing; 0 = off
+  double decode_temperature = 0;  ///< annealed-mean temperature; 0 = arg-max
+  int distill_steps = 400;        ///< steps of the fit of per-sample colour for baking
+  int colorizer_batch = 4;        ///< patches a colorizer query
+  int seed = 1;
+  HashGridOptions grid;
+  PurifyOptions purify;
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("patches", patches, Range{1, 1e7}, "accepted patches to train on");
+    v("patch_size", patch_size, Range{16, 512}, "K: pixels along a side of a patch");
+    v("scale_min", scale_min, Range{0.02, 1}, "smallest share of the short side a patch covers");
+    v("scale_max", scale_max, Range{0.02, 1}, "largest share of the short side a patch covers");
+    v("rays_per_patch", rays_per_patch, Range{64, 1 << 20}, "pixels of a patch that are trained on");
+    v("learning_rate", learning_rate, Range{1e-8, 1}, "Adam's step size at the start");
+    v("final_learning_rate", final_learning_rate, Range{1e-8, 1}, "Adam's step size at the end");
+    v("working_resolution", working_resolution, Range{32, 4096}, "short side at which samples are cached, pixels");
+    v("cached_weight", cached_weight, Range{0.5, 1}, "share of a pixel's weight that its cached samples carry");
+    v("rebalancing", rebalancing, Range{0, 1}, "class rebalancing: 0 = off, else the share of the prior");
+    v("decode_temperature", decode_temperature, Range{0, 10}, "annealed-mean temperature; 0 = arg-max");
+    v("distill_steps", distill_steps, Range{0, 1e6}, "steps of the fit of per-sample colour that baking uses");
+    v("colorizer_batch", colorizer_batch, Range{1, 64}, "patches a colorizer query");
+    v("seed", seed, Range{0, 1e9}, "of patches and weights");
+    v.section("grid", grid);
+    v.section("purify", purify);
+  }
+};
+
+struct Stage2Report {
+  int accepted = 0, rejected = 0;  ///< patches
+  double seconds = 0, colorizer_seconds = 0;
+  double bake_ab_distance = 0;  ///< mean ab distance of the baked contract's colour to the per-pixel decode
+};
+
+/// Colorizes a trained scene and leaves the result in `take_snapshot`; galleries of base, accepted and rejected patches
+/// are written beside it as PNG.
+/// @throws ColorizerError, Interrupted, SnapshotError.
+Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
+                          const Stage2Options& options, Colorizer& colorizer,
+                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress = {});
+
+}  // namespace cnerf
