@@ -1,11 +1,13 @@
 #pragma once
 /// What stage 2 asks for colours. Any 2-D colorizer fits behind it; none of its kinds is visible here.
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <span>
 #include <string>
 #include <vector>
+
+#include "src/base/progress.h"
 
 namespace cnerf {
 
@@ -39,16 +41,22 @@ class Colorizer {
 struct ColorizerOptions {
   std::string spec;                      ///< "reference:IMAGE…", "torchscript:FILE", "exec:COMMAND", "grey"
   std::filesystem::path working_folder;  ///< relative files of the spec are looked up here, then as given
+  std::filesystem::path cache_folder;    ///< a fitted reference: network is kept here; empty = refit every time
   double timeout_seconds = 60;           ///< for one batch of an exec: colorizer
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;                ///< of the fit of a reference: network
+  ProgressSink progress;                 ///< watches that fit; may throw Interrupted
 };
+
+/// What may stand before the colon of a spec: "grey", "reference", …
+[[nodiscard]] std::vector<std::string> colorizer_kinds();
 
 /// @throws UsageError         an unknown kind or an empty spec; lists the kinds.
 /// @throws MissingInputError  a file the spec names does not exist.
+/// @throws InputError         a file the spec names cannot be used: not an image, no colour in it.
 /// @throws ColorizerError     the back end could not start.
 [[nodiscard]] std::unique_ptr<Colorizer> make_colorizer(const ColorizerOptions& options);
 
-/// Checks shape and finiteness of an answer.  @throws ColorizerError  naming the colorizer.
+/// Checks shape, size and finiteness of an answer.  @throws ColorizerError  naming the colorizer.
 void check_answer(const std::string& colorizer, const LightnessBatch& question, const ChromaBatch& answer);
 
 /// The ab image of entry `index` of an answer, decoding a distribution by annealed mean at `temperature`.  [2, H, W]

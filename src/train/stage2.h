@@ -9,29 +9,9 @@
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/colorizer/colorizer.h"
+#include "src/colorizer/purify.h"
 
 namespace cnerf {
-
-/// Histogram-guided purification (paper, Eq. histcomparison and bigh module).
-struct PurifyOptions {
-  bool enabled = true;
-  int base_images = 5;
-  double base_scale = 0.7;       ///< s of the base patches
-  double threshold = 0.80;       ///< T
-  std::string histogram = "ab";  ///< opacity-masked 2-D ab histogram, or 8x8x8 RGB as in the published code
-  std::string picked_bases;      ///< "2,5,7" of the candidates; empty = chosen to cover the views
-
-  template <typename Visitor>
-  void visit(Visitor&& v) {
-    v("enabled", enabled, "reject outlier answers of the colorizer");
-    v("base_images", base_images, Range{1, 64}, "patches answers are compared with");
-    v("base_scale", base_scale, Range{0.05, 1}, "share of the short side a base patch covers");
-    v("threshold", threshold, Range{-1, 1}, "histogram similarity an answer must exceed");
-    v("histogram", histogram, Choice{"ab", "rgb"},
-      "opacity-masked ab histogram, or 8x8x8 RGB as in the published code");
-    v("picked_bases", picked_bases, "comma-separated candidates to use as bases; empty chooses");
-  }
-};
 
 struct Stage2Options {
   int patches = 400;                        ///< accepted patches

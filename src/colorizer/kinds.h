@@ -1,0 +1,30 @@
+#pragma once
+/// The kinds behind `make_colorizer`, one factory each. `argument` is what follows the colon of the spec.
+
+#include <memory>
+#include <string>
+
+#include "src/colorizer/colorizer.h"
+
+namespace cnerf {
+
+/// Answers a = b = 0: for tests, and as the baseline every colorizer must beat.
+std::unique_ptr<Colorizer> make_grey_colorizer(const std::string& argument, const ColorizerOptions& options);
+
+/// `IMAGE[,IMAGE…]`: a small network fitted to colour photographs of the scene.
+std::unique_ptr<Colorizer> make_reference_colorizer(const std::string& argument, const ColorizerOptions& options);
+
+/// `FILE`: a scripted LibTorch module, see docs/colorizers.md.
+std::unique_ptr<Colorizer> make_torchscript_colorizer(const std::string& argument, const ColorizerOptions& options);
+
+/// `COMMAND`: any program that speaks the pipe protocol of docs/colorizers.md.
+std::unique_ptr<Colorizer> make_exec_colorizer(const std::string& argument, const ColorizerOptions& options);
+
+/// `[FILE]`: the network whose weights come with the program.
+std::unique_ptr<Colorizer> make_builtin_colorizer(const std::string& argument, const ColorizerOptions& options);
+
+/// Looks `name` up in the working folder, then as given.
+/// @throws MissingInputError  naming both places.
+[[nodiscard]] std::filesystem::path find_spec_file(const std::string& name, const ColorizerOptions& options);
+
+}  // namespace cnerf

@@ -1,0 +1,87 @@
+#pragma once
+/// Histogram-guided purification of a colorizer's answers (paper, Eq. histcomparison and bigh module).
+///
+/// The paper leaves its histogram open. Ours is a 2-D histogram of ab, weighted by opacity, without near-neutral
+/// pixels: grey is in every picture and would make any two of them similar. How much of a patch is neutral is compared
+/// only when there is hardly anything else to compare (see `Purifier::similarity`).
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/base/options.h"
+
+namespace cnerf {
+
+struct PurifyOptions {
+  bool enabled = true;
+  int base_images = 5;
+  double base_scale = 0.7;       ///< s of the base patches
+  double threshold = 0.80;       ///< T
+  std::string histogram = "ab";  ///< opacity-masked 2-D ab histogram, or 8x8x8 RGB as in the published code
+  std::string picked_bases;      ///< "2,5,7" of the candidates; empty = chosen to cover the views
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("enabled", enabled, "reject outlier answers of the colorizer");
+    v("base_images", base_images, Range{1, 64}, "patches answers are compared with");
+    v("base_scale", base_scale, Range{0.05, 1}, "share of the short side a base patch covers");
+    v("threshold", threshold, Range{-1, 1}, "histogram similarity an answer must exceed");
+    v("histogram", histogram, Choice{"ab", "rgb"},
+      "opacity-masked ab histogram, or 8x8x8 RGB as in the published code");
+    v("picked_bases", picked_bases, "comma-separated candidates to use as bases; empty chooses");
+  }
+};
+
+/// A coloured patch that lives elsewhere.
+struct ColorPatchView {
+  int height = 0, width = 0;
+  std::span<const float> ab;         ///< [2, H, W] Lab a and b
+  std::span<const float> lightness;  ///< [H, W] L* 0..100; only the "rgb" histogram needs it, may be empty for "ab"
+  std::span<const float> opacity;    ///< [H, W] in [0, 1]; empty = opaque
+};
+
+/// Colours of one patch as the purification sees them.
+struct ColorHistogram {
+  std::vector<float> bins;  ///< normalised to sum 1; all 0 when no pixel counts
+  double visible = 0;       ///< mean opacity
+  double chromatic = 0;     ///< share of the opacity that is not near neutral, in [0, 1]; always 1 for "rgb"
+};
+
+/// Histogram over an ab grid of step 10. A pixel is split over the four nearest bins, so that a colour on the border of
+/// two bins does not jump, and the result is smeared by a Gaussian of `kHistogramSmear` ab units: neighbouring bins
+/// count as similar. Pixels fade out between chroma 6 and 3.
+inline constexpr float kHistogramSmear = 6.0f;
+inline constexpr float kNeutralChroma = 3.0f, kChromaticChroma = 6.0f;
+[[nodiscard]] ColorHistogram ab_histogram(const ColorPatchView& patch);
+
+/// 8x8x8 histogram of sRGB, as in the published code.
+[[nodiscard]] ColorHistogram rgb_histogram(const ColorPatchView& patch);
+
+/// Compares answers with base patches.
+class Purifier {
+ public:
+  /// @throws UsageError     when the options name an unknown histogram.
+  /// @throws ContractError  when there is no base or sizes disagree.
+  Purifier(const PurifyOptions& options, std::span<const ColorPatchView> bases);
+
+  /// The highest similarity with a base.
+  /// "ab": normalised correlation of the histograms, in [0, 1]. A patch with almost no chromatic pixels (below
+  /// `kFewChromatic`) has no histogram to speak of; the shares of neutral and chromatic pixels are compared by the same
+  /// formula instead, blended in so that nothing jumps: a grey answer passes where the bases are mostly grey and fails
+  /// where they are not.
+  /// "rgb": Pearson correlation, in [-1, 1].
+  /// A patch in which nothing is visible (mean opacity below 1 %) has similarity 0.
+  [[nodiscard]] double similarity(const ColorPatchView& answer) const;
+
+  /// similarity > T; always true when purification is off.
+  [[nodiscard]] bool accepts(const ColorPatchView& answer) const;
+
+  static constexpr double kFewChromatic = 0.05;
+
+ private:
+  PurifyOptions options_;
+  std::vector<ColorHistogram> bases_;
+};
+
+}  // namespace cnerf
