@@ -1,0 +1,76 @@
+#include "src/config/config.h"
+
+#include <algorithm>
+#include <set>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/config/toml_binding.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+
+void read_config_file(const fs::path& file, Config& config) {
+  read_toml(read_text_file(file), file.string(), fields_of(config));
+}
+
+void apply_setting(std::string_view setting, Config& config) {
+  apply_setting(setting, fields_of(config));
+}
+
+std::string to_toml(const Config& config) {
+  Config copy = config;  // `visit` is for reading and writing alike, so it is not const
+  return write_toml(fields_of(copy));
+}
+
+void check_consistency(const Config& config) {
+  const auto require = [](bool holds, const std::string& message) {
+    if (!holds) throw UsageError(message);
+  };
+  require(config.stage2.scale_min <= config.stage2.scale_max,
+          "stage2.scale_min: expected at most stage2.scale_max, got " + std::to_string(config.stage2.scale_min) +
+              " against " + std::to_string(config.stage2.scale_max));
+  const auto check_grid = [&](const std::string& section, const HashGridOptions& grid) {
+    require(grid.coarsest_resolution <= grid.finest_resolution,
+            section + ".coarsest_resolution: expected at most " + section + ".finest_resolution, got " +
+                std::to_string(grid.coarsest_resolution) + " against " + std::to_string(grid.finest_resolution));
+  };
+  check_grid("stage1.grid", config.stage1.grid);
+  check_grid("stage2.grid", config.stage2.grid);
+}
+
+std::vector<fs::path> preset_folders() {
+  std::vector<fs::path> folders;
+  std::error_code failure;
+  const fs::path executable = fs::read_symlink("/proc/self/exe", failure);
+  if (!failure) folders.push_back(executable.parent_path().parent_path() / "share" / "cnerf" / "configs");
+  folders.emplace_back(fs::path(CNERF_SOURCE_DIR) / "configs");
+  return folders;
+}
+
+std::vector<std::string> preset_names() {
+  std::set<std::string> names;
+  for (const fs::path& folder : preset_folders()) {
+    std::error_code failure;
+    for (const auto& entry : fs::directory_iterator(folder, failure)) {
+      if (entry.path().extension() == ".toml") names.insert(entry.path().stem().string());
+    }
+  }
+  return {names.begin(), names.end()};
+}
+
+fs::path preset_file(const std::string& name) {
+  for (const fs::path& folder : preset_folders()) {
+    const fs::path file = folder / (name + ".toml");
+    std::error_code failure;
+    if (fs::is_regular_file(file, failure)) return file;
+  }
+  const std::vector<std::string> names = preset_names();
+  std::string known;
+  for (const std::string& each : names) known += (known.empty() ? "" : ", ") + each;
+  const std::string meant = nearest_name(name, names);
+  throw UsageError("--preset: no preset '" + name + "'" + (meant.empty() ? "" : "; did you mean '" + meant + "'?") +
+                   " (there are: " + known + "; a file of your own goes to --config)");
+}
+
+}  // namespace cnerf

@@ -1,0 +1,88 @@
+#pragma once
+/// Everything a run can be told, in one struct: the option structs of the layers below, under the names that TOML files
+/// and `--set` use. Defaults stand in those structs; a preset holds differences only.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bake/bake_options.h"
+#include "src/capture/load_capture.h"
+#include "src/train/scene.h"
+#include "src/train/stage1.h"
+#include "src/train/stage2.h"
+
+namespace cnerf {
+
+struct ColorizerConfig {
+  std::string spec;  ///< "reference:IMAGE…", "torchscript:FILE", "exec:COMMAND", "grey"; empty = none given
+  double timeout_seconds = 60;  ///< for one batch of an exec: colorizer
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("spec", spec, "reference:IMAGE..., torchscript:FILE, exec:COMMAND or grey; empty = none");
+    v("timeout_seconds", timeout_seconds, Range{0.1, 1e6}, "an exec: colorizer that takes longer for a batch failed");
+  }
+};
+
+/// Pictures and videos.
+struct RenderConfig {
+  int frames = 90;       ///< of a spiral or an orbit
+  int fps = 30;          ///< of videos
+  int short_side = 360;  ///< pixels of a spiral or an orbit; never more than the capture's
+  int steps_per_box = RenderOptions{}.steps_per_box;
+  double min_transmittance = RenderOptions{}.min_transmittance;
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("frames", frames, Range{1, 100000}, "pictures of a spiral or an orbit");
+    v("fps", fps, Range{1, 240}, "pictures a second of a video");
+    v("short_side", short_side, Range{16, 8192}, "pixels of a spiral or an orbit, at most the capture's");
+    v("steps_per_box", steps_per_box, Range{16, 8192}, "march steps across the side of the innermost cascade");
+    v("min_transmittance", min_transmittance, Range{0, 0.5}, "a ray ends below this");
+  }
+};
+
+struct Config {
+  std::string device = "auto";
+  int threads = 0;
+  CaptureOptions capture;
+  Stage1Options stage1;
+  ColorizerConfig colorizer;
+  Stage2Options stage2;
+  BakeOptions bake;
+  RenderConfig render;
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("device", device, Choice{"auto", "cpu", "cuda"}, "where the fields are trained and rendered");
+    v("threads", threads, Range{0, 4096}, "threads to use; 0 = all cores");
+    v.section("capture", capture);
+    v.section("stage1", stage1);
+    v.section("colorizer", colorizer);
+    v.section("stage2", stage2);
+    v.section("bake", bake);
+    v.section("render", render);
+  }
+};
+
+/// Reads a file over `config`.  @throws MissingInputError, UsageError naming file, key, value and what is legal.
+void read_config_file(const std::filesystem::path& file, Config& config);
+
+/// Applies one `key.path=value`.  @throws UsageError.
+void apply_setting(std::string_view setting, Config& config);
+
+/// The whole configuration as TOML. Reading it back gives an equal Config, bit for bit.
+[[nodiscard]] std::string to_toml(const Config& config);
+
+/// Checks what ranges of single options cannot say, such as a minimum above its maximum.  @throws UsageError.
+void check_consistency(const Config& config);
+
+/// The folders presets are looked for in: `../share/cnerf/configs` beside the executable, then the source tree.
+[[nodiscard]] std::vector<std::filesystem::path> preset_folders();
+/// Names of all presets found, sorted.
+[[nodiscard]] std::vector<std::string> preset_names();
+/// The file of a preset.  @throws UsageError  listing the presets there are.
+[[nodiscard]] std::filesystem::path preset_file(const std::string& name);
+
+}  // namespace cnerf

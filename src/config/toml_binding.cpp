@@ -1,0 +1,294 @@
+#include "src/config/toml_binding.h"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <concepts>
+#include <numeric>
+#include <sstream>
+
+#include "src/base/error.h"
+
+namespace cnerf {
+namespace {
+
+/// Where a value came from, for messages.
+struct Origin {
+  std::string source, key;
+
+  [[noreturn]] void refuse(const std::string& problem) const { throw UsageError(source + ": " + key + ": " + problem); }
+};
+
+template <typename Number>
+std::string shortest_text(Number value) {
+  char text[64];
+  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
+  return {text, end};
+}
+
+std::string text_of(const Range& range) {
+  return "[" + shortest_text(range.min) + ", " + shortest_text(range.max) + "]";
+}
+
+std::string text_of(const std::vector<std::string>& values) {
+  std::string text;
+  for (const std::string& value : values) text += (text.empty() ? "" : ", ") + value;
+  return text;
+}
+
+std::string text_of(const toml::node& node) {
+  std::ostringstream text;
+  node.visit([&](const auto& concrete) { text << concrete; });
+  return text.str();
+}
+
+std::string in_range(const Field& field) {
+  return field.range ? " in " + text_of(*field.range) : "";
+}
+
+void check_range(const Field& field, double value, const Origin& origin) {
+  if (!std::isfinite(value))
+    origin.refuse("expected a finite number" + in_range(field) + ", got " + shortest_text(value));
+  if (field.range && (value < field.range->min || value > field.range->max)) {
+    origin.refuse("expected a number" + in_range(field) + ", got " + shortest_text(value));
+  }
+}
+
+void assign(const Field&, bool& target, const toml::node& node, const Origin& origin) {
+  const auto value = node.value_exact<bool>();
+  if (!value) origin.refuse("expected true or false, got " + text_of(node));
+  target = *value;
+}
+
+void assign(const Field& field, int& target, const toml::node& node, const Origin& origin) {
+  const auto value = node.value_exact<std::int64_t>();
+  if (!value) origin.refuse("expected an integer" + in_range(field) + ", got " + text_of(node));
+  check_range(field, static_cast<double>(*value), origin);
+  if (!std::in_range<int>(*value)) origin.refuse("expected a 32-bit integer, got " + text_of(node));
+  target = static_cast<int>(*value);
+}
+
+template <std::floating_point Number>
+void assign(const Field& field, Number& target, const toml::node& node, const Origin& origin) {
+  if (!node.is_number()) origin.refuse("expected a number" + in_range(field) + ", got " + text_of(node));
+  const double value = node.value<double>().value();
+  check_range(field, value, origin);
+  target = static_cast<Number>(value);
+}
+
+void assign(const Field& field, std::string& target, const toml::node& node, const Origin& origin) {
+  const auto value = node.value_exact<std::string>();
+  const bool allowed = value && (field.choices.empty() || std::ranges::count(field.choices, *value) > 0);
+  if (!allowed) {
+    const std::string expected = field.choices.empty() ? "a string" : "one of " + text_of(field.choices);
+    origin.refuse("expected " + expected + ", got " + text_of(node));
+  }
+  target = *value;
+}
+
+void assign(const Field&, std::vector<std::string>& target, const toml::node& node, const Origin& origin) {
+  const toml::array* array = node.as_array();
+  if (array == nullptr) origin.refuse("expected a list of strings, got " + text_of(node));
+  std::vector<std::string> values;
+  for (const toml::node& element : *array) {
+    const auto value = element.value_exact<std::string>();
+    if (!value) origin.refuse("expected a list of strings, got " + text_of(node));
+    values.push_back(*value);
+  }
+  target = std::move(values);
+}
+
+void assign(const Field& field, const toml::node& node, const Origin& origin) {
+  std::visit([&](auto* target) { assign(field, *target, node, origin); }, field.value);
+}
+
+bool is_section(const std::vector<Field>& fields, const std::string& key) {
+  return std::ranges::any_of(fields, [&](const Field& field) { return field.key.starts_with(key + "."); });
+}
+
+/// Every option and section, for "[stag1]" as well as for "stage1.stesp".
+std::vector<std::string> known_keys(const std::vector<Field>& fields) {
+  std::vector<std::string> known;
+  for (const Field& field : fields) {
+    known.push_back(field.key);
+    for (auto dot = field.key.find('.'); dot != std::string::npos; dot = field.key.find('.', dot + 1)) {
+      known.push_back(field.key.substr(0, dot));
+    }
+  }
+  return known;
+}
+
+std::string last_name(const std::string& key) {
+  return key.substr(key.rfind('.') + 1);  // npos + 1 is 0: the whole key
+}
+
+/// The key whose last name is `name`; empty when there is none.
+std::string key_named(const std::vector<Field>& fields, const std::string& name) {
+  const auto match = std::ranges::find_if(fields, [&](const Field& field) { return last_name(field.key) == name; });
+  return match == fields.end() ? "" : match->key;
+}
+
+/// The key that was probably meant. People leave out the section more often than they mistype a name.
+std::string suggestion(const std::vector<Field>& fields, const std::string& key) {
+  if (const std::string exact = key_named(fields, last_name(key)); !exact.empty()) return exact;
+  if (const std::string nearest = nearest_name(key, known_keys(fields)); !nearest.empty()) return nearest;
+  std::vector<std::string> names;
+  for (const Field& field : fields) names.push_back(last_name(field.key));
+  return key_named(fields, nearest_name(last_name(key), names));
+}
+
+[[noreturn]] void refuse_unknown(const std::vector<Field>& fields, const Origin& origin) {
+  const std::string meant = suggestion(fields, origin.key);
+  origin.refuse("unknown key" + (meant.empty() ? std::string() : "; did you mean '" + meant + "'?"));
+}
+
+void assign_key(const std::vector<Field>& fields, const toml::node& node, const Origin& origin) {
+  const auto field = std::ranges::find(fields, origin.key, &Field::key);
+  if (field != fields.end()) return assign(*field, node, origin);
+  if (is_section(fields, origin.key)) origin.refuse("is a section, got " + text_of(node));
+  refuse_unknown(fields, origin);
+}
+
+void read_table(const toml::table& table, const std::string& prefix, const std::string& source,
+                const std::vector<Field>& fields) {
+  for (const auto& [name, node] : table) {
+    const std::string key = prefix + std::string(name.str());
+    if (node.is_table() && is_section(fields, key)) {
+      read_table(*node.as_table(), key + ".", source, fields);
+    } else {
+      assign_key(fields, node, {source, key});
+    }
+  }
+}
+
+toml::table parse(std::string_view text, const std::string& source) {
+  try {
+    return toml::parse(text, source);
+  } catch (const toml::parse_error& error) {
+    std::ostringstream message;
+    message << source << ": line " << error.source().begin.line << ": " << error.description();
+    throw UsageError(message.str());
+  }
+}
+
+std::string toml_string(const std::string& text) {
+  std::ostringstream out;
+  out << toml::value<std::string>(text);
+  return out.str();
+}
+
+template <std::floating_point Number>
+std::string number_text(Number value) {
+  const std::string text = shortest_text(value);
+  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;  // TOML tells 1 from 1.0
+}
+
+std::string value_text(const Field& field) {
+  struct Writer {
+    std::string operator()(const bool* value) const { return *value ? "true" : "false"; }
+    std::string operator()(const int* value) const { return std::to_string(*value); }
+    std::string operator()(const float* value) const { return number_text(*value); }
+    std::string operator()(const double* value) const { return number_text(*value); }
+    std::string operator()(const std::string* value) const { return toml_string(*value); }
+    std::string operator()(const std::vector<std::string>* values) const {
+      std::string text;
+      for (const std::string& value : *values) text += (text.empty() ? "" : ", ") + toml_string(value);
+      return "[" + text + "]";
+    }
+  };
+  return std::visit(Writer{}, field.value);
+}
+
+/// What stands right of `=` on the command line, as TOML.
+std::string setting_as_toml(const Field& field, const std::string& value) {
+  const bool is_toml = value.starts_with('"') || value.starts_with('\'') || value.starts_with('[');
+  if (is_toml) return value;
+  if (std::holds_alternative<std::string*>(field.value)) return toml_string(value);
+  if (!std::holds_alternative<std::vector<std::string>*>(field.value)) return value;
+  std::string list;
+  std::istringstream parts(value);
+  for (std::string part; std::getline(parts, part, ',');) list += (list.empty() ? "" : ", ") + toml_string(part);
+  return "[" + list + "]";
+}
+
+std::string section_of(const std::string& key) {
+  const auto dot = key.rfind('.');
+  return dot == std::string::npos ? "" : key.substr(0, dot);
+}
+
+}  // namespace
+
+void read_toml(std::string_view text, const std::string& source, const std::vector<Field>& fields) {
+  read_table(parse(text, source), "", source, fields);
+}
+
+void apply_setting(std::string_view setting, const std::vector<Field>& fields) {
+  const auto equals = setting.find('=');
+  if (equals == std::string_view::npos) {
+    throw UsageError("--set: expected key.path=value, got '" + std::string(setting) + "'");
+  }
+  const std::string key(setting.substr(0, equals));
+  const std::string value(setting.substr(equals + 1));
+  const Origin origin{"--set", key};
+  const auto field = std::ranges::find(fields, key, &Field::key);
+  if (field == fields.end() && is_section(fields, key)) origin.refuse("is a section, not an option");
+  if (field == fields.end()) refuse_unknown(fields, origin);
+
+  try {
+    const toml::table table = toml::parse("value = " + setting_as_toml(*field, value));
+    if (table.size() != 1) origin.refuse("expected one value, got '" + value + "'");
+    assign(*field, *table.get("value"), origin);
+  } catch (const toml::parse_error&) {
+    origin.refuse("cannot read the value '" + value + "'");
+  }
+}
+
+std::string write_toml(const std::vector<Field>& fields) {
+  // TOML wants the plain keys of a table before its first sub-table; a stable sort by section keeps the given order.
+  std::vector<std::string> sections;
+  for (const Field& field : fields) {
+    if (std::ranges::count(sections, section_of(field.key)) == 0) sections.push_back(section_of(field.key));
+  }
+  std::ranges::stable_sort(sections, [](const auto& a, const auto& b) { return a.empty() && !b.empty(); });
+
+  std::string text;
+  for (const std::string& section : sections) {
+    if (!section.empty()) text += "\n[" + section + "]\n";
+    for (const Field& field : fields) {
+      if (section_of(field.key) != section) continue;
+      const std::string name = section.empty() ? field.key : field.key.substr(section.size() + 1);
+      text += name + " = " + value_text(field) + "  # " + field.help + "\n";
+    }
+  }
+  return text;
+}
+
+std::string nearest_name(std::string_view word, const std::vector<std::string>& candidates) {
+  const auto distance = [&](const std::string& candidate) {
+    std::vector<std::size_t> row(candidate.size() + 1);
+    std::iota(row.begin(), row.end(), std::size_t{0});
+    for (std::size_t i = 1; i <= word.size(); ++i) {
+      std::size_t diagonal = std::exchange(row[0], i);
+      for (std::size_t j = 1; j <= candidate.size(); ++j) {
+        const std::size_t substituted = diagonal + (word[i - 1] == candidate[j - 1] ? 0 : 1);
+        diagonal = row[j];
+        row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
+      }
+    }
+    return row.back();
+  };
+  std::string best;
+  std::size_t best_distance = std::max<std::size_t>(word.size() / 2, 2) + 1;
+  for (const std::string& candidate : candidates) {
+    const std::size_t d = distance(candidate);
+    if (d < best_distance) {
+      best = candidate;
+      best_distance = d;
+    }
+  }
+  return best;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,30 @@
+#pragma once
+/// Strict binding between TOML and fields: no key, type or value passes silently.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "src/config/fields.h"
+
+namespace cnerf {
+
+/// Reads `text` over `fields`: keys that are absent keep their value.
+/// @param source  what errors call the text: a file name.
+/// @throws UsageError  broken TOML, an unknown key (names the nearest known one), a wrong type, a value out of range;
+///                     the message reads `source: key: what was expected, what was found`. Fields read before the
+///                     faulty one keep their new values.
+void read_toml(std::string_view text, const std::string& source, const std::vector<Field>& fields);
+
+/// Applies one `key.path=value` of the command line. Strings need no quotes; lists are TOML arrays or comma-separated.
+/// @throws UsageError  as `read_toml`.
+void apply_setting(std::string_view setting, const std::vector<Field>& fields);
+
+/// All fields as TOML that `read_toml` reads back to equal values, bit for bit.
+[[nodiscard]] std::string write_toml(const std::vector<Field>& fields);
+
+/// The candidate with the smallest edit distance (insertions, deletions, substitutions) to `word`; empty when none is
+/// closer than half of the word's length, or two for short words.
+[[nodiscard]] std::string nearest_name(std::string_view word, const std::vector<std::string>& candidates);
+
+}  // namespace cnerf

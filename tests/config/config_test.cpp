@@ -1,0 +1,113 @@
+#include "src/config/config.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+#include <sstream>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/config/toml_binding.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+std::vector<fs::path> preset_files() {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(fs::path(CNERF_SOURCE_DIR) / "configs"))
+    files.push_back(entry.path());
+  return files;
+}
+
+TEST(Config, EveryPresetIsReadCheckedAndWrittenBack) {
+  ASSERT_GE(preset_files().size(), 3u);
+  for (const fs::path& file : preset_files()) {
+    SCOPED_TRACE(file);
+    Config config;
+    read_config_file(file, config);
+    check_consistency(config);
+    const std::string text = to_toml(config);
+    Config again;
+    read_toml(text, "again.toml", fields_of(again));
+    EXPECT_EQ(to_toml(again), text);
+  }
+}
+
+/// A preset that repeats a default hides which of the two is meant when the default moves.
+TEST(Config, PresetsHoldDifferencesOnlyEachWithItsReason) {
+  Config defaults;
+  const std::string default_text = to_toml(defaults);
+  for (const fs::path& file : preset_files()) {
+    SCOPED_TRACE(file);
+    const std::string text = read_text_file(file);
+    long assignments = 0;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+      const auto equals = line.find(" = ");
+      if (line.starts_with('#') || equals == std::string::npos) continue;
+      ++assignments;
+      EXPECT_THAT(line, HasSubstr("  # ")) << "a value without its reason";
+    }
+    Config config;
+    read_config_file(file, config);
+    const auto changed = fields_of(config);
+    const auto original = fields_of(defaults);
+    long differences = 0;
+    for (std::size_t i = 0; i < changed.size(); ++i) {
+      differences += write_toml({changed[i]}) != write_toml({original[i]});
+    }
+    EXPECT_EQ(differences, assignments) << "a value that equals the default";
+  }
+  EXPECT_EQ(to_toml(Config{}), default_text);
+}
+
+/// Defaults are legal themselves, and no two options share a name.
+TEST(Config, DefaultsAreInTheirRanges) {
+  Config config;
+  Config read;
+  read_toml(to_toml(config), "defaults.toml", fields_of(read));
+  std::set<std::string> keys;
+  for (const Field& field : fields_of(config)) EXPECT_TRUE(keys.insert(field.key).second) << field.key;
+  EXPECT_GT(keys.size(), 40u);
+}
+
+TEST(Config, ErrorsOfAFileNameTheFile) {
+  const test::TempDir folder;
+  write_file(folder / "mine.toml", std::string_view("[stage1]\nsteps = -4\n"));
+  Config config;
+  try {
+    read_config_file(folder / "mine.toml", config);
+    FAIL() << "a negative number of steps was accepted";
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(HasSubstr("mine.toml"), HasSubstr("stage1.steps"), HasSubstr("got -4")));
+  }
+  EXPECT_THROW(read_config_file(folder / "absent.toml", config), MissingInputError);
+}
+
+TEST(Config, RelationsBetweenOptionsAreChecked) {
+  Config config;
+  EXPECT_NO_THROW(check_consistency(config));
+  config.stage2.scale_min = 0.9;
+  EXPECT_THROW(check_consistency(config), UsageError);
+  config = {};
+  config.stage1.grid.finest_resolution = config.stage1.grid.coarsest_resolution - 1;
+  EXPECT_THROW(check_consistency(config), UsageError);
+}
+
+TEST(Config, PresetsAreFoundByName) {
+  EXPECT_THAT(preset_names(), testing::IsSupersetOf({"default", "quality", "quick"}));
+  EXPECT_TRUE(fs::exists(preset_file("quick")));
+  try {
+    (void)preset_file("qick");
+    FAIL() << "an unknown preset was found";
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(HasSubstr("did you mean 'quick'"), HasSubstr("default, quality, quick")));
+  }
+}
+
+}  // namespace
+}  // namespace cnerf
