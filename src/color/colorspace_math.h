@@ -1,7 +1,7 @@
 #pragma once
 /// sRGB, linear Rec.709, XYZ and CIE 1976 L*a*b* (D65, 2 degrees). Own conversions, because a monochrome project needs
-/// grey to give a = b = 0 exactly; greys are exact here since a and b are computed from ratios to the white point that
-/// the matrix rows sum to.
+/// grey to give a = b = 0 exactly: tristimulus is relative to white, so each matrix row sums to 1, and rows are applied
+/// to channel differences, which a grey does not have.
 
 #include <algorithm>
 #include <cmath>
@@ -65,22 +65,31 @@ CNERF_HD Real luminance_from_lightness(Real lightness) {
   return lab_f_inverse((lightness + Real(16)) / Real(116));
 }
 
-/// Rec.709 luma coefficients of linear light: the Y row of the RGB -> XYZ matrix.
+/// Rec.709 luma coefficients of linear light: the Y row of the RGB -> XYZ matrix. Like all rows here it sums to 1 and
+/// is applied to differences from one channel, so that a grey returns its own value, bit for bit, in any precision.
 template <typename Real>
 CNERF_HD Real luminance_of(Vec3<Real> rgb) {
-  return Real(0.2126729) * rgb.x + Real(0.7151522) * rgb.y + Real(0.0721749) * rgb.z;
+  return rgb.y + Real(0.212672851405622476) * (rgb.x - rgb.y) + Real(0.072174993306559576) * (rgb.z - rgb.y);
 }
 
-/// XYZ relative to white, (X/Xn, Y, Z/Zn), of linear Rec.709. Rows sum to 1, so that grey maps to three equal numbers.
+/// XYZ relative to white, (X/Xn, Y, Z/Zn), of linear Rec.709; a grey maps to three equal numbers.
+/// From the primaries (0.64, 0.33), (0.30, 0.60), (0.15, 0.06) and the D65 white (0.95047, 1, 1.08883).
 template <typename Real>
 CNERF_HD Vec3<Real> relative_xyz_from_linear_rgb(Vec3<Real> rgb) {
-  // sRGB/Rec.709 primaries, D65 white (0.95047, 1, 1.08883), each row divided by its sum.
-  return {Real(0.4339530) * rgb.x + Real(0.3762190) * rgb.y + Real(0.1898280) * rgb.z, luminance_of(rgb),
-          Real(0.0177578) * rgb.x + Real(0.1094756) * rgb.y + Real(0.8727666) * rgb.z};
+  const Real red = rgb.x - rgb.y;
+  const Real blue = rgb.z - rgb.y;
+  return {rgb.y + Real(0.433949981682422492) * red + Real(0.189840271935357158) * blue, luminance_of(rgb),
+          rgb.y + Real(0.017756578696701338) * red + Real(0.872775436511087799) * blue};
 }
 /// Inverse of `relative_xyz_from_linear_rgb`.
 template <typename Real>
-CNERF_HD Vec3<Real> linear_rgb_from_relative_xyz(Vec3<Real> xyz);
+CNERF_HD Vec3<Real> linear_rgb_from_relative_xyz(Vec3<Real> xyz) {
+  const Real x = xyz.x - xyz.y;
+  const Real z = xyz.z - xyz.y;
+  return {xyz.y + Real(3.079954467464594003) * x - Real(0.542815954666877154) * z,
+          xyz.y - Real(0.921258284014264905) * x + Real(0.045247438567570818) * z,
+          xyz.y + Real(0.052887411823709742) * x + Real(1.151138501693044214) * z};
+}
 
 template <typename Real>
 struct Lab {
@@ -88,13 +97,49 @@ struct Lab {
 };
 
 template <typename Real>
-CNERF_HD Lab<Real> lab_from_linear_rgb(Vec3<Real> rgb);
+CNERF_HD Lab<Real> lab_from_linear_rgb(Vec3<Real> rgb) {
+  const Vec3<Real> xyz = relative_xyz_from_linear_rgb(rgb);
+  const Real fy = lab_f(xyz.y);
+  return {Real(116) * fy - Real(16), Real(500) * (lab_f(xyz.x) - fy), Real(200) * (fy - lab_f(xyz.z))};
+}
 /// May leave the gamut: components below 0 or above 1.
 template <typename Real>
-CNERF_HD Vec3<Real> linear_rgb_from_lab(Lab<Real> lab);
+CNERF_HD Vec3<Real> linear_rgb_from_lab(Lab<Real> lab) {
+  const Real fy = (lab.lightness + Real(16)) / Real(116);
+  return linear_rgb_from_relative_xyz<Real>(
+      {lab_f_inverse(fy + lab.a / Real(500)), lab_f_inverse(fy), lab_f_inverse(fy - lab.b / Real(200))});
+}
+
 /// Like `linear_rgb_from_lab`, but chroma is scaled down at constant lightness and hue until every component is in
-/// [0, max(1, Y)]; channels are never clipped (that would change the hue).
+/// [0, max(1, Y)]; channels are never clipped (that would change the hue). A lightness below 0 counts as 0.
 template <typename Real>
-CNERF_HD Vec3<Real> gamut_mapped_linear_rgb_from_lab(Lab<Real> lab);
+CNERF_HD Vec3<Real> gamut_mapped_linear_rgb_from_lab(Lab<Real> lab) {
+  lab.lightness = lab.lightness > Real(0) ? lab.lightness : Real(0);
+  const auto with_chroma = [&](Real scale) {
+    return linear_rgb_from_lab<Real>({lab.lightness, lab.a * scale, lab.b * scale});
+  };
+  const Vec3<Real> grey = with_chroma(Real(0));
+  const Real limit = grey.y > Real(1) ? grey.y : Real(1);
+  const auto in_gamut = [&](Vec3<Real> c) {
+    return c.x >= Real(0) && c.y >= Real(0) && c.z >= Real(0) && c.x <= limit && c.y <= limit && c.z <= limit;
+  };
+  const Vec3<Real> wanted = with_chroma(Real(1));
+  if (in_gamut(wanted)) return wanted;
+  // Bisection keeps `inside` in gamut; the steps exhaust the precision that a chroma of 128 needs.
+  Vec3<Real> inside = grey;
+  Real low = 0;
+  Real high = 1;
+  for (int step = 0; step < (sizeof(Real) == 4 ? 22 : 50); ++step) {
+    const Real middle = (low + high) / Real(2);
+    const Vec3<Real> color = with_chroma(middle);
+    if (in_gamut(color)) {
+      inside = color;
+      low = middle;
+    } else {
+      high = middle;
+    }
+  }
+  return inside;
+}
 
 }  // namespace cnerf

@@ -1,0 +1,175 @@
+#include "src/color/ab_bins.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "src/base/check.h"
+
+namespace cnerf {
+namespace {
+
+/// Bins of one value of `a`: a run of `b` in steps of 10 (Zhang et al. 2016, Fig. 3a).
+struct AbRow {
+  int a, b_min, b_max;
+};
+constexpr std::array<AbRow, 20> kRows = {{
+    {-90, 50, 90},   {-80, 20, 90},   {-70, 0, 90},   {-60, -20, 90}, {-50, -30, 100}, {-40, -40, 100}, {-30, -50, 100},
+    {-20, -50, 100}, {-10, -60, 100}, {0, -70, 100},  {10, -80, 90},  {20, -80, 90},   {30, -90, 90},   {40, -100, 90},
+    {50, -100, 80},  {60, -110, 80},  {70, -110, 80}, {80, -110, 70}, {90, -110, 70},  {100, -90, 0},
+}};
+
+std::array<Ab, kAbBinCount> make_centres() {
+  std::array<Ab, kAbBinCount> centres;
+  std::size_t next = 0;
+  for (const AbRow& row : kRows) {
+    for (int b = row.b_min; b <= row.b_max; b += 10) centres.at(next++) = {float(row.a), float(b)};
+  }
+  CNERF_CHECK_EQ(next, centres.size());
+  return centres;
+}
+
+float squared_distance(Ab p, Ab q) {
+  const float a = p.a - q.a;
+  const float b = p.b - q.b;
+  return a * a + b * b;
+}
+
+/// Which bins can be among the nearest of a colour, for each 10 x 10 cell of the ab plane.
+class NearBins {
+ public:
+  NearBins() {
+    std::iota(all_.begin(), all_.end(), 0);
+    for (int i = 0; i < kCells * kCells; ++i) fill(i);
+  }
+  [[nodiscard]] std::span<const int> candidates(Ab color) const {
+    // Cells are centred on grid points. Written so that NaN falls through to all bins.
+    const float a = std::floor((color.a - kOrigin) / kAbGridStep);
+    const float b = std::floor((color.b - kOrigin) / kAbGridStep);
+    if (!(a >= 0 && b >= 0 && a < kCells && b < kCells)) return all_;
+    return cells_[std::size_t(a) * kCells + std::size_t(b)];
+  }
+
+ private:
+  static constexpr int kCells = 29;
+  static constexpr float kOrigin = -145.0f;
+
+  /// A bin is left out of a cell when five others are surely nearer: their farthest corner of the cell is nearer than
+  /// its nearest point of the cell. The margin of 1e-3 covers rounding of colours at the border of a cell.
+  void fill(int index) {
+    const float half = kAbGridStep / 2;
+    const Ab centre = {kOrigin + half + kAbGridStep * float(index / kCells),
+                       kOrigin + half + kAbGridStep * float(index % kCells)};
+    std::array<float, kAbBinCount> nearest{};
+    std::array<float, kAbBinCount> farthest{};
+    for (std::size_t bin = 0; bin < kAbBinCount; ++bin) {
+      const float a = std::abs(ab_bin_centres()[bin].a - centre.a);
+      const float b = std::abs(ab_bin_centres()[bin].b - centre.b);
+      nearest[bin] = std::hypot(std::max(a - half, 0.0f), std::max(b - half, 0.0f));
+      farthest[bin] = std::hypot(a + half, b + half);
+    }
+    std::array<float, kAbBinCount> sorted = farthest;
+    std::nth_element(sorted.begin(), sorted.begin() + (kSoftLabelBins - 1), sorted.end());
+    const float limit = sorted[kSoftLabelBins - 1] + 1e-3f;
+    for (std::size_t bin = 0; bin < kAbBinCount; ++bin) {
+      if (nearest[bin] <= limit) cells_[std::size_t(index)].push_back(int(bin));
+    }
+  }
+
+  std::array<int, kAbBinCount> all_{};
+  std::array<std::vector<int>, kCells * kCells> cells_;
+};
+
+const NearBins& near_bins() {
+  static const NearBins bins;
+  return bins;
+}
+
+/// exp(logit / temperature) up to a common factor, in double: 313 terms of very different size.
+std::array<double, kAbBinCount> tempered_softmax(std::span<const float> logits, float temperature) {
+  const double largest = *std::max_element(logits.begin(), logits.end());
+  std::array<double, kAbBinCount> p{};
+  for (std::size_t i = 0; i < p.size(); ++i) p[i] = std::exp((logits[i] - largest) / temperature);
+  return p;
+}
+
+}  // namespace
+
+const std::array<Ab, kAbBinCount>& ab_bin_centres() {
+  static const std::array<Ab, kAbBinCount> centres = make_centres();
+  return centres;
+}
+
+SoftLabel soft_label(Ab color) {
+  SoftLabel label;
+  std::array<float, kSoftLabelBins> distance;
+  distance.fill(std::numeric_limits<float>::infinity());
+  for (const int bin : near_bins().candidates(color)) {  // insertion into the five best, ties to the lower index
+    const float d = squared_distance(color, ab_bin_centres()[std::size_t(bin)]);
+    if (!(d < distance.back())) continue;
+    std::size_t place = kSoftLabelBins - 1;
+    for (; place > 0 && d < distance[place - 1]; --place) {
+      distance[place] = distance[place - 1];
+      label.bin[place] = label.bin[place - 1];
+    }
+    distance[place] = d;
+    label.bin[place] = bin;
+  }
+  // Relative to the nearest bin, or a colour far outside the bins would have weights of 0 / 0.
+  float sum = 0;
+  for (std::size_t i = 0; i < kSoftLabelBins; ++i) {
+    label.weight[i] = std::exp((distance[0] - distance[i]) / (2 * kSoftLabelSigma * kSoftLabelSigma));
+    sum += label.weight[i];
+  }
+  for (float& weight : label.weight) weight /= sum;
+  return label;
+}
+
+int nearest_bin(Ab color) {
+  int best = 0;
+  float best_distance = std::numeric_limits<float>::infinity();
+  for (const int bin : near_bins().candidates(color)) {
+    const float d = squared_distance(color, ab_bin_centres()[std::size_t(bin)]);
+    if (d < best_distance) {
+      best_distance = d;
+      best = bin;
+    }
+  }
+  return best;
+}
+
+Ab decode_arg_max(std::span<const float> logits) {
+  CNERF_CHECK_EQ(logits.size(), std::size_t(kAbBinCount));
+  return ab_bin_centres()[std::size_t(std::max_element(logits.begin(), logits.end()) - logits.begin())];
+}
+
+Ab decode_annealed_mean(std::span<const float> logits, float temperature) {
+  CNERF_CHECK_EQ(logits.size(), std::size_t(kAbBinCount));
+  CNERF_CHECK(temperature > 0, "the annealed mean needs a positive temperature");
+  const std::array<double, kAbBinCount> p = tempered_softmax(logits, temperature);
+  double sum = 0;
+  double a = 0;
+  double b = 0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    sum += p[i];
+    a += p[i] * double(ab_bin_centres()[i].a);
+    b += p[i] * double(ab_bin_centres()[i].b);
+  }
+  return {float(a / sum), float(b / sum)};
+}
+
+std::vector<float> rebalancing_weights(std::span<const float> prior, float lambda) {
+  CNERF_CHECK_EQ(prior.size(), std::size_t(kAbBinCount));
+  CNERF_CHECK(lambda >= 0 && lambda <= 1, "lambda mixes two distributions");
+  std::vector<float> weights(prior.size());
+  double expectation = 0;
+  for (std::size_t i = 0; i < prior.size(); ++i) {
+    weights[i] = 1.0f / ((1.0f - lambda) * prior[i] + lambda / float(kAbBinCount));
+    expectation += double(prior[i]) * double(weights[i]);
+  }
+  for (float& weight : weights) weight = float(double(weight) / expectation);
+  return weights;
+}
+
+}  // namespace cnerf
