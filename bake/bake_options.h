@@ -1,0 +1,35 @@
+#pragma once
+/// Options of the volume bake.
+
+#include <string>
+
+#include "src/base/options.h"
+
+namespace cnerf {
+
+struct BakeOptions {
+  int resolution = 256;              ///< voxels along the longest axis, dilated margin included
+  double voxel_size = 0;             ///< world units; 0 = from `resolution`
+  std::string aabb;                  ///< "x0,y0,z0,x1,y1,z1", world units; empty = tight box around occupied space
+  double opacity_threshold = 0.01;   ///< on alpha = 1 - exp(-sigma h) of a voxel; fainter ones are dropped
+  int dilation = 2;                  ///< voxels that colour reaches beyond density; renderers interpolate into them
+  int subsamples = 2;                ///< per axis of a voxel, for density
+  int views_per_voxel = 8;           ///< training views that a voxel's luminance is averaged over, at most
+  double seen_transmittance = 1e-3;  ///< from a camera to a voxel, above which the camera sees it
+  bool keep_unseen = false;          ///< keep voxels that no camera sees, with luminance from a set of directions
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("resolution", resolution, Range{16, 4096}, "voxels along the longest axis");
+    v("voxel_size", voxel_size, Range{0, 1e9}, "world units; 0 takes it from the resolution");
+    v("aabb", aabb, "box to bake, x0,y0,z0,x1,y1,z1 in world units; empty = around occupied space");
+    v("opacity_threshold", opacity_threshold, Range{0, 1}, "opacity of a voxel below which it is dropped");
+    v("dilation", dilation, Range{2, 8}, "voxels that colour reaches beyond density");
+    v("subsamples", subsamples, Range{1, 8}, "density samples along each axis of a voxel");
+    v("views_per_voxel", views_per_voxel, Range{1, 256}, "views that a voxel's luminance is averaged over");
+    v("seen_transmittance", seen_transmittance, Range{0, 1}, "share of light that makes a voxel count as seen");
+    v("keep_unseen", keep_unseen, "keep voxels that no camera sees");
+  }
+};
+
+}  // namespace cnerf

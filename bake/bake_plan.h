@@ -1,0 +1,38 @@
+#pragma once
+/// Which voxels a bake works on, decided before any of them is computed.
+
+#include <cstddef>
+
+#include "bake/bake_options.h"
+#include "src/base/aabb.h"
+#include "src/field/color_field.h"
+
+namespace cnerf {
+
+/// The lattice of a bake. Voxel ijk covers [ijk, ijk + 1) * voxel_size + origin, world units.
+struct BakePlan {
+  Aabbd box;              ///< world; what is baked. The lattice reaches `dilation` voxels beyond it
+  Vec3d origin{};         ///< world; corner of voxel (0, 0, 0)
+  double voxel_size = 0;  ///< world units
+  Vec3i resolution{};     ///< voxels along each axis, margin included
+
+  [[nodiscard]] Vec3d world_from_voxel(Vec3d p) const { return p * voxel_size + origin; }
+  [[nodiscard]] std::size_t lattice_voxels() const {
+    return static_cast<std::size_t>(resolution.x) * resolution.y * resolution.z;
+  }
+};
+
+/// @throws UsageError  when `aabb` is not six ordered numbers, lies outside the field's box or the lattice would have
+///                     more than 2^15 voxels along an axis.
+/// @throws InputError  when the field is empty everywhere.
+[[nodiscard]] BakePlan plan_bake(const ColorField& field, const BakeOptions& options);
+
+/// What a bake will need, before it is run.
+struct BakeEstimate {
+  std::size_t voxels = 0;        ///< upper bound on voxels with density: those whose centre may be occupied
+  std::size_t memory_bytes = 0;  ///< working memory, about
+  std::size_t file_bytes = 0;    ///< of a VDB in half precision before compression, about
+};
+[[nodiscard]] BakeEstimate estimate_bake(const ColorField& field, const BakePlan& plan);
+
+}  // namespace cnerf

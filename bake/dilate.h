@@ -1,0 +1,24 @@
+#pragma once
+/// Colour beyond the support of density: renderers interpolate colour and density apart, so at the rim of an object
+/// they would mix its colour with black if colour ended where density does.
+
+#include "bake/baked_volume.h"
+
+namespace cnerf {
+
+/// Adds every missing voxel within `radius` (in each axis) of a voxel with sigma > 0. The new ones have sigma 0 and the
+/// colour of the nearest voxel with density. Voxels that exist stay as they are; the result is sorted. May make voxels
+/// outside [0, resolution). Running it again adds nothing.
+/// @throws ContractError  when two voxels share a place.
+void dilate_colors(BakedVolume& volume, int radius);
+
+/// Sorts voxels by (i, j, k).
+void sort_voxels(std::vector<BakedVoxel>& voxels);
+
+/// First voxel and extent of the box around all voxels; extent 0 when there are none.
+struct VoxelBox {
+  Vec3i min{}, size{};
+};
+[[nodiscard]] VoxelBox bounding_box(const std::vector<BakedVoxel>& voxels);
+
+}  // namespace cnerf

@@ -1,0 +1,118 @@
+#include "bake/view_selection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace cnerf {
+namespace {
+
+constexpr float kGoodTransmittance = 0.5f;  ///< a view with less is replaced when a better one is found
+constexpr std::size_t kSpreadViews = 32;    ///< views picked by spread; the rest follows by distance
+
+/// Steps from t until the ray leaves the brick that holds p = from + t d, at least one. Rays stay on the lattice of
+/// whole steps, so that skipping changes nothing.
+int steps_across_brick(Vec3i brick_min, Vec3f p, Vec3f d) {
+  float exit = std::numeric_limits<float>::max();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (d[axis] == 0) continue;
+    const float face = static_cast<float>(brick_min[axis] + (d[axis] > 0 ? kBrickSide : 0));
+    exit = std::min(exit, (face - p[axis]) / d[axis]);
+  }
+  return std::max(1, static_cast<int>(exit));
+}
+
+}  // namespace
+
+float transmittance_between(const BrickGrid<float>& sigma, double voxel_size, Vec3f from, Vec3f to, float stop_below) {
+  const Vec3f path = to - from;
+  const float distance = length(path);
+  if (!(distance > 1.0f)) return 1.0f;
+  const Vec3f d = path / distance;
+  const auto h = static_cast<float>(voxel_size);
+  const float deepest = -std::log(stop_below);
+  float depth = 0;
+  for (float t = 1; t < distance;) {
+    const Vec3f p = from + d * t;
+    const Vec3i voxel{static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)),
+                      static_cast<int>(std::floor(p.z))};
+    if (!sigma.contains(voxel)) break;  // the box is convex: what left it does not come back
+    const std::size_t brick = sigma.brick_of(voxel);
+    if (!sigma.has_brick(brick)) {
+      t += static_cast<float>(steps_across_brick(sigma.brick_min(brick), p, d));
+      continue;
+    }
+    depth += sigma.at(voxel) * h;
+    if (depth > deepest) return 0;
+    t += 1;
+  }
+  return std::exp(-depth);
+}
+
+ViewSelection::ViewSelection(const std::vector<BakeCamera>& cameras, const BakePlan& plan, const BakeOptions& options)
+    : plan_(plan),
+      views_per_voxel_(options.views_per_voxel),
+      seen_transmittance_(static_cast<float>(std::max(options.seen_transmittance, 1e-8))) {
+  for (const BakeCamera& camera : cameras) {
+    eyes_.push_back({camera.intrinsics, camera.world_from_camera.inverse(), camera.world_from_camera.translation});
+  }
+}
+
+Vec3f ViewSelection::direction_to(int camera, Vec3d world) const {
+  return normalized(world - eyes_[camera].centre).cast<float>();
+}
+
+std::vector<int> ViewSelection::try_order(Vec3d world) const {
+  const std::size_t n = eyes_.size();
+  std::vector<Vec3d> directions(n);
+  std::vector<double> footprint(n);  // size of a pixel there, world units
+  for (std::size_t i = 0; i < n; ++i) {
+    const double distance = std::max(length(world - eyes_[i].centre), 1e-12);
+    directions[i] = (world - eyes_[i].centre) / distance;
+    footprint[i] = distance / eyes_[i].intrinsics.fx;
+  }
+  std::vector<int> order(n);
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return footprint[a] < footprint[b]; });
+
+  std::vector<double> closest(n, -1);  // largest cosine to a camera picked so far
+  for (std::size_t picked = 1; picked < std::min(n, kSpreadViews); ++picked) {
+    for (std::size_t i = picked; i < n; ++i) {
+      closest[order[i]] = std::max(closest[order[i]], dot(directions[order[i]], directions[order[picked - 1]]));
+    }
+    const auto farthest = std::min_element(order.begin() + static_cast<std::ptrdiff_t>(picked), order.end(),
+                                           [&](int a, int b) { return closest[a] < closest[b]; });
+    std::rotate(order.begin() + static_cast<std::ptrdiff_t>(picked), farthest, farthest + 1);
+  }
+  return order;
+}
+
+bool ViewSelection::has_in_picture(const Eye& eye, Vec3d world) const {
+  const auto pixel = project(eye.intrinsics, eye.camera_from_world.point(world));
+  return pixel && pixel->x >= 0 && pixel->y >= 0 && pixel->x <= eye.intrinsics.width &&
+         pixel->y <= eye.intrinsics.height;
+}
+
+std::vector<SeenBy> ViewSelection::seen_by(const BrickGrid<float>& sigma, Vec3d world,
+                                           const std::vector<int>& order) const {
+  const auto in_voxels = [&](Vec3d p) { return ((p - plan_.origin) / plan_.voxel_size).cast<float>(); };
+  std::vector<SeenBy> seen;
+  int good = 0;
+  for (const int camera : order) {
+    const Eye& eye = eyes_[camera];
+    if (!has_in_picture(eye, world)) continue;
+    const float transmittance =
+        transmittance_between(sigma, plan_.voxel_size, in_voxels(world), in_voxels(eye.centre), seen_transmittance_);
+    if (transmittance < seen_transmittance_) continue;
+    seen.push_back({camera, transmittance});
+    good += transmittance >= kGoodTransmittance ? 1 : 0;
+    if (good == views_per_voxel_) break;
+  }
+  std::stable_sort(seen.begin(), seen.end(),
+                   [](const SeenBy& a, const SeenBy& b) { return a.transmittance > b.transmittance; });
+  if (seen.size() > static_cast<std::size_t>(views_per_voxel_)) seen.resize(views_per_voxel_);
+  return seen;
+}
+
+}  // namespace cnerf
