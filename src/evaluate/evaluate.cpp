@@ -1,0 +1,175 @@
+#include "src/evaluate/evaluate.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "src/base/check.h"
+#include "src/base/error.h"
+
+namespace cnerf {
+namespace {
+
+/// Pixels below this opacity have no colour of their own (design: the decode divides by opacity).
+constexpr float kColouredOpacity = 0.01f;
+
+std::vector<float> luminance_of_view(const MonoImage& image) {
+  std::vector<float> luminance(image.pixel_count());
+  for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = image.luminance(i);
+  return luminance;
+}
+
+std::vector<float> channel(std::span<const float> rgb, int index) {
+  std::vector<float> values(rgb.size() / 3);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = rgb[3 * i + index];
+  return values;
+}
+
+std::optional<double> ssim_of_channels(const std::vector<float>& ours, const std::vector<float>& truth, int width,
+                                       int height, std::span<const std::uint8_t> valid) {
+  double sum = 0;
+  for (int c = 0; c < 3; ++c) {
+    const auto one = ssim(channel(ours, c), channel(truth, c), width, height, valid);
+    if (!one) return std::nullopt;
+    sum += *one / 3;
+  }
+  return sum;
+}
+
+std::vector<std::uint8_t> coloured_pixels(const RenderedImage& image, std::span<const std::uint8_t> valid) {
+  std::vector<std::uint8_t> pixels(image.opacity.size());
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    pixels[i] = image.opacity[i] >= kColouredOpacity && (valid.empty() || valid[i] != 0);
+  }
+  return pixels;
+}
+
+void measure_luminance(const EvaluatedView& pictures, ViewMetrics& metrics) {
+  const MonoImage& image = pictures.view.image;
+  const std::vector<float> truth = luminance_of_view(image);
+  metrics.psnr_luminance = psnr_from_mse(encoded_mse(pictures.ours.luminance, truth, 1, image.mask));
+  metrics.ssim = ssim(encoded(pictures.ours.luminance), encoded(truth), image.width, image.height, image.mask);
+}
+
+void measure_colour(const EvaluatedView& pictures, ViewMetrics& metrics) {
+  const std::vector<std::uint8_t>& valid = pictures.view.image.mask;
+  const std::vector<float>& ours = pictures.ours.rgb;
+  const Colourfulness colourful = colourfulness(srgb8_from_linear(ours), valid);
+  metrics.colourfulness = colourful.standard;
+  metrics.colourfulness_magnitude = colourful.magnitude;
+  if (!pictures.truth) return;
+
+  const std::vector<float>& truth = pictures.truth->rgb;
+  const Colourfulness wanted = colourfulness(srgb8_from_linear(truth), valid);
+  metrics.colourfulness_truth = wanted.standard;
+  metrics.colourfulness_magnitude_truth = wanted.magnitude;
+  metrics.colourfulness_difference = colourful.standard - wanted.standard;
+  metrics.colourfulness_magnitude_difference = colourful.magnitude - wanted.magnitude;
+  metrics.psnr_rgb = psnr_from_mse(encoded_mse(ours, truth, 3, valid));
+  metrics.ssim_rgb = ssim_of_channels(encoded(ours), encoded(truth), pictures.ours.width, pictures.ours.height, valid);
+  metrics.ab_error = mean_ab_distance(ours, truth, valid);
+  metrics.ab_error_grey = mean_ab_distance(truth, {}, valid);
+}
+
+/// A number without a pixel behind it is no number.
+void drop_nan(ViewMetrics& metrics) {
+  ViewMetrics::visit(metrics, [](const char*, std::optional<double>& value) {
+    if (value && !std::isfinite(*value)) value.reset();
+  });
+}
+
+ViewMetrics mean_of(const std::vector<ViewMetrics>& views) {
+  struct Sum {
+    double sum = 0;
+    int count = 0;
+  };
+  std::vector<std::pair<std::string, Sum>> sums;
+  for (const ViewMetrics& view : views) {
+    std::size_t index = 0;
+    ViewMetrics::visit(view, [&](const char* name, const std::optional<double>& value) {
+      if (index == sums.size()) sums.emplace_back(name, Sum{});
+      if (value) sums[index].second = {sums[index].second.sum + *value, sums[index].second.count + 1};
+      ++index;
+    });
+  }
+  ViewMetrics mean;
+  std::size_t index = 0;
+  ViewMetrics::visit(mean, [&](const char*, std::optional<double>& value) {
+    if (index < sums.size() && sums[index].second.count > 0) value = sums[index].second.sum / sums[index].second.count;
+    ++index;
+  });
+  return mean;
+}
+
+nlohmann::ordered_json json_of(const ViewMetrics& metrics) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  if (!metrics.view.empty()) json["view"] = metrics.view;
+  ViewMetrics::visit(metrics, [&](const char* name, const std::optional<double>& value) {
+    if (value) json[name] = *value;
+  });
+  return json;
+}
+
+}  // namespace
+
+std::vector<const View*> views_to_evaluate(const Capture& capture, const EvaluateOptions& options) {
+  std::vector<const View*> held_out, all;
+  for (const View& view : capture.views) {
+    all.push_back(&view);
+    if (view.held_out) held_out.push_back(&view);
+  }
+  if (!held_out.empty()) return held_out;
+  std::vector<const View*> some;
+  const std::size_t count = std::min<std::size_t>(all.size(), options.training_views);
+  for (std::size_t i = 0; i < count; ++i) some.push_back(all[i * all.size() / count]);
+  return some;
+}
+
+ViewMetrics measure(const EvaluatedView& pictures) {
+  CNERF_CHECK_EQ(pictures.ours.width, pictures.view.image.width);
+  CNERF_CHECK_EQ(pictures.ours.height, pictures.view.image.height);
+  ViewMetrics metrics;
+  metrics.view = pictures.view.name;
+  measure_luminance(pictures, metrics);
+  if (!pictures.ours.rgb.empty()) measure_colour(pictures, metrics);
+  if (!pictures.ours.rgb.empty() && !pictures.ours.baked_rgb.empty()) {
+    metrics.bake_ab_distance = mean_ab_distance(pictures.ours.baked_rgb, pictures.ours.rgb,
+                                                coloured_pixels(pictures.ours, pictures.view.image.mask));
+  }
+  drop_nan(metrics);
+  return metrics;
+}
+
+Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptions& options,
+                 const std::function<void(const EvaluatedView&)>& watch, const ProgressSink& progress) {
+  const std::vector<const View*> views = views_to_evaluate(capture, options);
+  Metrics metrics;
+  metrics.split = views.front()->held_out ? "held-out" : "train";
+  RenderOptions render = options.render;
+  render.color = render.baked_color = scene.is_colorized();
+  for (const View* view : views) {
+    if (interruption_requested()) throw Interrupted("evaluation stopped; nothing was written");
+    const RenderedImage ours = scene.render(view->intrinsics, view->world_from_camera, render);
+    const std::optional<ColorImage> truth = load_color_truth(*view);
+    metrics.views.push_back(measure({*view, ours, truth}));
+    if (watch) watch({*view, ours, truth});
+    if (progress) {
+      progress({"evaluate",
+                double(metrics.views.size()) / double(views.size()),
+                {{"psnr", metrics.views.back().psnr_luminance.value_or(0)}}});
+    }
+  }
+  metrics.mean = mean_of(metrics.views);
+  return metrics;
+}
+
+std::string to_json(const Metrics& metrics) {
+  nlohmann::ordered_json json;
+  json["schema_version"] = kMetricsSchemaVersion;
+  json["split"] = metrics.split;
+  json["mean"] = json_of(metrics.mean);
+  json["views"] = nlohmann::ordered_json::array();
+  for (const ViewMetrics& view : metrics.views) json["views"].push_back(json_of(view));
+  return json.dump(2) + "\n";
+}
+
+}  // namespace cnerf

@@ -1,0 +1,85 @@
+#pragma once
+/// Compares a trained scene with the photographs it was not trained on, and with their colours where they are known.
+
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "src/base/progress.h"
+#include "src/capture/capture.h"
+#include "src/capture/color_truth.h"
+#include "src/evaluate/metrics.h"
+#include "src/train/scene.h"
+
+namespace cnerf {
+
+inline constexpr int kMetricsSchemaVersion = 1;
+
+/// What one view measures. A number that has no meaning for the view (no colour truth, not colorized) is absent.
+struct ViewMetrics {
+  std::string view;
+  std::optional<double> psnr_luminance;  ///< dB; sRGB-encoded Rec.709 Y, clamped to [0, 1]
+  std::optional<double> psnr_rgb;        ///< dB; sRGB-encoded values of all three channels
+  std::optional<double> ssim;            ///< of encoded luminance
+  std::optional<double> ssim_rgb;        ///< mean of the three encoded channels
+  std::optional<double> colourfulness, colourfulness_truth, colourfulness_difference;  ///< difference: ours - truth
+  std::optional<double> colourfulness_magnitude, colourfulness_magnitude_truth, colourfulness_magnitude_difference;
+  std::optional<double> ab_error;          ///< mean Lab ab distance to the truth
+  std::optional<double> ab_error_grey;     ///< what an all-grey picture would get
+  std::optional<double> bake_ab_distance;  ///< per-pixel decode against composited per-sample colour, opacity >= 0.01
+
+  /// Calls `visitor(name, number)` for each number; the one list of them.
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor("psnr_luminance", self.psnr_luminance);
+    visitor("psnr_rgb", self.psnr_rgb);
+    visitor("ssim", self.ssim);
+    visitor("ssim_rgb", self.ssim_rgb);
+    visitor("colourfulness", self.colourfulness);
+    visitor("colourfulness_truth", self.colourfulness_truth);
+    visitor("colourfulness_difference", self.colourfulness_difference);
+    visitor("colourfulness_magnitude", self.colourfulness_magnitude);
+    visitor("colourfulness_magnitude_truth", self.colourfulness_magnitude_truth);
+    visitor("colourfulness_magnitude_difference", self.colourfulness_magnitude_difference);
+    visitor("ab_error", self.ab_error);
+    visitor("ab_error_grey", self.ab_error_grey);
+    visitor("bake_ab_distance", self.bake_ab_distance);
+  }
+};
+
+struct Metrics {
+  std::string split;  ///< "held-out", or "train" when nothing was held out
+  ViewMetrics mean;   ///< mean over the views that have the number; of dB for PSNR
+  std::vector<ViewMetrics> views;
+};
+
+/// The pictures behind one view's numbers.
+struct EvaluatedView {
+  const View& view;
+  const RenderedImage& ours;
+  const std::optional<ColorImage>& truth;
+};
+
+struct EvaluateOptions {
+  RenderOptions render;
+  int training_views = 8;  ///< at most so many, evenly spread, when nothing was held out
+};
+
+/// The views `evaluate` looks at: the held-out ones, or some training views when there are none.
+[[nodiscard]] std::vector<const View*> views_to_evaluate(const Capture& capture, const EvaluateOptions& options);
+
+/// Renders and measures each view; hands its pictures to `watch` before they are dropped.
+/// @throws Interrupted  when the user asked to stop; nothing is saved.
+[[nodiscard]] Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptions& options,
+                               const std::function<void(const EvaluatedView&)>& watch = {},
+                               const ProgressSink& progress = {});
+
+/// Measures one pair of pictures; `evaluate` is this over all views.
+[[nodiscard]] ViewMetrics measure(const EvaluatedView& pictures);
+
+/// `{"schema_version": 1, "split": ..., "mean": {...}, "views": [...]}`; absent numbers are left out.
+[[nodiscard]] std::string to_json(const Metrics& metrics);
+
+}  // namespace cnerf

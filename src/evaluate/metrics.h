@@ -1,0 +1,46 @@
+#pragma once
+/// Numbers that compare pictures. Free functions over plain arrays; nothing here knows a scene.
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace cnerf {
+
+/// Peak signal-to-noise ratio in dB of values whose peak is 1, from their mean squared error; capped at 100 dB, so that
+/// equal pictures give a number that JSON can hold.
+[[nodiscard]] double psnr_from_mse(double mean_squared_error);
+
+/// Mean squared difference of sRGB-encoded values, each clamped to [0, 1] first.
+/// @param ours, truth  linear light, equal sizes: [N] luminance or [N, 3] RGB, as `channels` says.
+/// @param valid        [N]; pixels that count; empty = all.  NaN when none counts.
+[[nodiscard]] double encoded_mse(std::span<const float> ours, std::span<const float> truth, int channels,
+                                 std::span<const std::uint8_t> valid = {});
+
+/// Structural similarity (Wang et al. 2004): 11x11 Gaussian window of sigma 1.5, K1 = 0.01, K2 = 0.03, mean over the
+/// windows that lie inside the picture (and, where `valid` is given, whose centre is valid).
+/// @param ours, truth  [H, W] encoded values of peak 1.
+/// @return             nothing when no window fits.
+[[nodiscard]] std::optional<double> ssim(std::span<const float> ours, std::span<const float> truth, int width,
+                                         int height, std::span<const std::uint8_t> valid = {});
+
+/// Colourfulness (Hasler and Suesstrunk 2003), from 8-bit sRGB values.
+struct Colourfulness {
+  double standard = 0;   ///< with signed rg and yb, as published
+  double magnitude = 0;  ///< with |rg| and |yb|, as the code of CT2 and ColorNeRF computes it
+};
+/// @param rgb  [N, 3] 8-bit sRGB.
+[[nodiscard]] Colourfulness colourfulness(std::span<const std::uint8_t> rgb, std::span<const std::uint8_t> valid = {});
+
+/// Mean Euclidean distance of Lab a and b.
+/// @param ours, truth  [N, 3] linear Rec.709; `truth` empty compares with grey, i.e. gives the mean chroma of `ours`.
+[[nodiscard]] double mean_ab_distance(std::span<const float> ours, std::span<const float> truth,
+                                      std::span<const std::uint8_t> valid = {});
+
+/// 8-bit sRGB of linear light, clamped and rounded.
+[[nodiscard]] std::vector<std::uint8_t> srgb8_from_linear(std::span<const float> linear);
+/// sRGB-encoded values of linear light, clamped to [0, 1].
+[[nodiscard]] std::vector<float> encoded(std::span<const float> linear);
+
+}  // namespace cnerf

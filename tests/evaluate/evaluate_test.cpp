@@ -1,0 +1,135 @@
+#include "src/evaluate/evaluate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "src/base/check.h"
+#include "src/color/colorspace_math.h"
+
+namespace cnerf {
+namespace {
+
+constexpr int kWidth = 16, kHeight = 12;
+
+/// Renders one picture, whatever the camera; with `colour`, red of the picture's luminance.
+class PaintedScene : public Scene {
+ public:
+  PaintedScene(float luminance, bool colour) : luminance_(luminance), colour_(colour) {}
+  const SceneFrame& frame() const override { return frame_; }
+  bool may_be_occupied(Vec3f) const override { return true; }
+  void query_density(std::span<const Vec3f>, std::span<float>) const override {}
+  void query_luminance(std::span<const Vec3f>, std::span<const Vec3f>, std::span<float>) const override {}
+  void query_chromaticity(std::span<const Vec3f>, std::span<Chromaticity>) const override {}
+  bool is_colorized() const override { return colour_; }
+  std::string colorizer() const override { return colour_ ? "painted" : ""; }
+  RenderedImage render(const Intrinsics& intrinsics, const Affined&, const RenderOptions& options) const override {
+    RenderedImage image{intrinsics.width, intrinsics.height, {}, {}, {}, {}, {}};
+    const std::size_t n = std::size_t(image.width) * image.height;
+    image.luminance.assign(n, luminance_);
+    image.opacity.assign(n, 1.0f);
+    image.depth.assign(n, 1.0f);
+    if (options.color) image.rgb = repeated({luminance_ / 0.2126729f, 0, 0}, n);
+    if (options.baked_color) image.baked_rgb = repeated({luminance_, luminance_, luminance_}, n);
+    return image;
+  }
+
+ private:
+  static std::vector<float> repeated(Vec3f rgb, std::size_t n) {
+    std::vector<float> values;
+    for (std::size_t i = 0; i < n; ++i) values.insert(values.end(), {rgb.x, rgb.y, rgb.z});
+    return values;
+  }
+  SceneFrame frame_;
+  float luminance_;
+  bool colour_;
+};
+
+/// Views of sRGB value 51 (0.2); no image files, hence no colour truth unless `measure` is given one.
+Capture grey_capture(int views, int held_out) {
+  Capture capture;
+  for (int i = 0; i < views; ++i) {
+    View view;
+    view.name = "view" + std::to_string(i);
+    view.intrinsics.width = view.image.width = kWidth;
+    view.intrinsics.height = view.image.height = kHeight;
+    view.image.u8.assign(kWidth * kHeight, 51);
+    view.held_out = i < held_out;
+    capture.views.push_back(view);
+  }
+  return capture;
+}
+
+TEST(Evaluate, HeldOutViewsWinElseSomeTrainingViewsAreTaken) {
+  EXPECT_EQ(views_to_evaluate(grey_capture(20, 3), {}).size(), 3u);
+  const Capture all_trained = grey_capture(20, 0);
+  const auto some = views_to_evaluate(all_trained, {});
+  EXPECT_EQ(some.size(), 8u);
+  EXPECT_EQ(some.front(), &all_trained.views.front());
+  EXPECT_EQ(views_to_evaluate(grey_capture(3, 0), {}).size(), 3u);
+}
+
+TEST(Evaluate, AGreySceneHasNumbersOfLuminanceOnly) {
+  const Capture capture = grey_capture(2, 1);
+  const RenderedImage ours =
+      PaintedScene(linear_from_srgb(0.3f), false).render(capture.views[0].intrinsics, {}, {.color = false});
+  const ViewMetrics metrics = measure({capture.views[0], ours, std::nullopt});
+  EXPECT_NEAR(metrics.psnr_luminance.value(), 20.0, 1e-4) << "0.3 against 0.2";
+  EXPECT_FALSE(metrics.colourfulness.has_value());
+  EXPECT_FALSE(metrics.ab_error.has_value());
+}
+
+TEST(Evaluate, AColouredSceneIsComparedWithTruthAndBake) {
+  const Capture capture = grey_capture(2, 1);
+  const float y = linear_from_srgb(0.2f);
+  const RenderedImage ours =
+      PaintedScene(y, true).render(capture.views[0].intrinsics, {}, {.color = true, .baked_color = true});
+  const std::optional<ColorImage> truth = ColorImage{kWidth, kHeight, ours.rgb};
+  const ViewMetrics metrics = measure({capture.views[0], ours, truth});
+  EXPECT_NEAR(metrics.psnr_rgb.value(), 100, 1e-9);
+  EXPECT_NEAR(metrics.ab_error.value(), 0, 1e-9);
+  EXPECT_GT(metrics.ab_error_grey.value(), 20) << "red is far from grey";
+  EXPECT_NEAR(metrics.bake_ab_distance.value(), metrics.ab_error_grey.value(), 1e-3) << "the bake is grey";
+  EXPECT_NEAR(metrics.colourfulness_difference.value(), 0, 1e-9);
+}
+
+TEST(Evaluate, MaskedPixelsDoNotCount) {
+  Capture capture = grey_capture(2, 1);
+  View& view = capture.views[0];
+  view.image.mask.assign(view.image.pixel_count(), 255);
+  view.image.mask[0] = 0;
+  view.image.u8[0] = 255;
+  const RenderedImage ours = PaintedScene(linear_from_srgb(0.2f), false).render(view.intrinsics, {}, {.color = false});
+  EXPECT_GT(measure({view, ours, std::nullopt}).psnr_luminance.value(), 90);
+  view.image.mask[0] = 1;
+  EXPECT_LT(measure({view, ours, std::nullopt}).psnr_luminance.value(), 30);
+}
+
+TEST(Evaluate, PicturesOfAnotherSizeAreRefused) {
+  const Capture capture = grey_capture(2, 1);
+  Intrinsics other = capture.views[0].intrinsics;
+  other.width += 1;
+  const RenderedImage ours = PaintedScene(0.5f, false).render(other, {}, {});
+  EXPECT_THROW((void)measure({capture.views[0], ours, std::nullopt}), ContractError);
+}
+
+TEST(Evaluate, JsonHoldsWhatWasMeasuredAndNothingElse) {
+  Metrics metrics;
+  metrics.split = "held-out";
+  metrics.mean.psnr_luminance = 26.5;
+  ViewMetrics view;
+  view.view = "a.png";
+  view.psnr_luminance = 26.5;
+  view.ssim = 0.75;
+  metrics.views.push_back(view);
+  const auto json = nlohmann::json::parse(to_json(metrics));
+  EXPECT_EQ(json.at("schema_version"), kMetricsSchemaVersion);
+  EXPECT_EQ(json.at("mean").at("psnr_luminance"), 26.5);
+  EXPECT_FALSE(json.at("mean").contains("psnr_rgb"));
+  EXPECT_EQ(json.at("views").at(0).at("view"), "a.png");
+  EXPECT_EQ(json.at("views").at(0).at("ssim"), 0.75);
+}
+
+}  // namespace
+}  // namespace cnerf

@@ -1,0 +1,113 @@
+#include "src/evaluate/metrics.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/base/check.h"
+#include "src/color/colorspace_math.h"
+
+namespace cnerf {
+namespace {
+
+TEST(Psnr, ClosedForms) {
+  EXPECT_NEAR(psnr_from_mse(0.01), 20, 1e-12);
+  EXPECT_NEAR(psnr_from_mse(1e-3), 30, 1e-12);
+  EXPECT_EQ(psnr_from_mse(0), 100);
+}
+
+TEST(Psnr, ComparesEncodedClampedValues) {
+  const std::vector<float> ours = {linear_from_srgb(0.5f), 7.0f, -3.0f};
+  const std::vector<float> truth = {linear_from_srgb(0.6f), 1.0f, 0.0f};
+  EXPECT_NEAR(encoded_mse(ours, truth, 1), 0.01 / 3, 1e-8) << "only the first differs once clamped";
+  EXPECT_NEAR(encoded_mse(ours, truth, 3), 0.01 / 3, 1e-8);
+}
+
+TEST(Psnr, InvalidPixelsDoNotCount) {
+  const std::vector<float> ours = {1, 1, 1, 0, 0, 0};
+  const std::vector<float> truth = {1, 1, 1, 1, 1, 1};
+  const std::vector<std::uint8_t> first = {1, 0}, none = {0, 0};
+  EXPECT_EQ(encoded_mse(ours, truth, 3, first), 0);
+  EXPECT_EQ(encoded_mse(ours, truth, 3), 0.5);
+  EXPECT_TRUE(std::isnan(encoded_mse(ours, truth, 3, none)));
+  EXPECT_THROW((void)encoded_mse(ours, std::vector<float>{1}, 1), ContractError);
+}
+
+constexpr int kWidth = 23, kHeight = 19;
+
+/// A deterministic texture and a disturbed copy of it.
+std::pair<std::vector<float>, std::vector<float>> textures() {
+  std::vector<float> a, b;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double value = ((x * 7 + y * 13) % 32) / 31.0;
+      a.push_back(static_cast<float>(value));
+      b.push_back(static_cast<float>(std::clamp(value + ((x * x + 3 * y) % 11 - 5) / 40.0, 0.0, 1.0)));
+    }
+  }
+  return {a, b};
+}
+
+/// The value is from a direct evaluation, window by window in double, of the paper's formula in another language.
+TEST(Ssim, EqualsAnIndependentEvaluation) {
+  const auto [a, b] = textures();
+  EXPECT_NEAR(ssim(a, b, kWidth, kHeight).value(), 0.9691785373846896, 1e-9);
+  EXPECT_NEAR(ssim(b, a, kWidth, kHeight).value(), 0.9691785373846896, 1e-9) << "symmetric";
+}
+
+TEST(Ssim, EqualPicturesGiveOneAndUniformOnesTheClosedForm) {
+  const auto [a, b] = textures();
+  EXPECT_NEAR(ssim(a, a, kWidth, kHeight).value(), 1, 1e-12);
+  const std::vector<float> dark(a.size(), 0.25f), light(a.size(), 0.75f);
+  const double c1 = 1e-4;
+  EXPECT_NEAR(ssim(dark, light, kWidth, kHeight).value(), (2 * 0.25 * 0.75 + c1) / (0.25 * 0.25 + 0.75 * 0.75 + c1),
+              1e-9);
+}
+
+TEST(Ssim, NeedsAWindowThatFitsAndCounts) {
+  const auto [a, b] = textures();
+  const std::vector<std::uint8_t> none(a.size(), 0);
+  EXPECT_FALSE(ssim(a, b, kWidth, kHeight, none).has_value());
+  const std::vector<float> small(10 * 40, 0.5f);
+  EXPECT_FALSE(ssim(small, small, 10, 40).has_value());
+}
+
+TEST(ColourfulnessMetric, ClosedForms) {
+  // Half red, half green: rg = +-255 (deviation 255), yb = 127.5 (deviation 0).
+  const std::vector<std::uint8_t> halves = {255, 0, 0, 0, 255, 0};
+  EXPECT_NEAR(colourfulness(halves).standard, 255 + 0.3 * 127.5, 1e-9);
+  EXPECT_NEAR(colourfulness(halves).magnitude, 0.3 * std::hypot(255, 127.5), 1e-9);
+  const std::vector<std::uint8_t> grey = {7, 7, 7, 200, 200, 200};
+  EXPECT_EQ(colourfulness(grey).standard, 0);
+  EXPECT_EQ(colourfulness(grey).magnitude, 0);
+}
+
+TEST(ColourfulnessMetric, EqualsAnIndependentEvaluation) {
+  std::vector<std::uint8_t> rgb;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      for (const int value : {x * 11, y * 13, x * y}) rgb.push_back(static_cast<std::uint8_t>(value % 256));
+    }
+  }
+  EXPECT_NEAR(colourfulness(rgb).standard, 125.63076180222536, 1e-6);
+  EXPECT_NEAR(colourfulness(rgb).magnitude, 100.5214370614793, 1e-6);
+}
+
+TEST(AbDistance, MatchesKnownLabValues) {
+  const std::vector<float> red = {1, 0, 0}, green = {0, 1, 0}, grey = {0.3f, 0.3f, 0.3f};
+  // Lab of sRGB red is (53.241, 80.094, 67.203), of green (87.738, -86.188, 83.172), given to 3 decimals.
+  EXPECT_NEAR(mean_ab_distance(red, green), std::hypot(80.094 + 86.188, 67.203 - 83.172), 2e-2);
+  EXPECT_NEAR(mean_ab_distance(red, grey), std::hypot(80.094, 67.203), 2e-2);
+  EXPECT_NEAR(mean_ab_distance(red, {}), std::hypot(80.094, 67.203), 2e-2);
+  EXPECT_EQ(mean_ab_distance(grey, {}), 0) << "grey is exactly grey";
+}
+
+TEST(Encoding, RoundsAndClamps) {
+  EXPECT_EQ(srgb8_from_linear(std::vector<float>{-1, 0, 0.21404f, 1, 9}),
+            (std::vector<std::uint8_t>{0, 0, 128, 255, 255}));
+  EXPECT_NEAR(encoded(std::vector<float>{0.21404f})[0], 0.5f, 1e-4);
+}
+
+}  // namespace
+}  // namespace cnerf
