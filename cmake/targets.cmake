@@ -25,3 +25,13 @@ function(cnerf_add_test name)
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
     PROPERTIES LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT})
 endfunction()
+
+# cnerf_compile_per_isa(GENERIC AVX2 AVX512): instruction sets of three files that include one kernel text.
+# No contraction: an fma stands where the source says fma, so that back ends can be compared bit by bit.
+function(cnerf_compile_per_isa generic avx2 avx512)
+  set(common -O3 -fno-math-errno -fno-trapping-math -ffp-contract=off)
+  set_source_files_properties(${generic} PROPERTIES COMPILE_OPTIONS "${common}")
+  set_source_files_properties(${avx2} PROPERTIES COMPILE_OPTIONS "${common};-mavx2;-mfma;-mtune=haswell")
+  set_source_files_properties(${avx512} PROPERTIES
+    COMPILE_OPTIONS "${common};-mavx512f;-mavx512dq;-mavx512vl;-mavx512bw;-mfma;-mtune=znver3;-Wno-uninitialized")  # GCC 105593
+endfunction()

@@ -25,9 +25,9 @@ std::string two_values(const A& a, const B& b) {
 
 }  // namespace cnerf::detail
 
-#define CNERF_CHECK(condition, detail)                                                          \
+#define CNERF_CHECK(condition, message)                                                          \
   do {                                                                                          \
-    if (!(condition)) ::cnerf::detail::contract_failed(__FILE__, __LINE__, #condition, detail); \
+    if (!(condition)) ::cnerf::detail::contract_failed(__FILE__, __LINE__, #condition, message); \
   } while (false)
 
 #define CNERF_CHECK_EQ(a, b)                                                                                     \

@@ -10,6 +10,7 @@
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/field/scene_frame.h"
+#include "src/render/occupancy_grid.h"
 
 namespace cnerf {
 
@@ -44,6 +45,7 @@ struct Stage1Options {
   int checkpoint_every = 1000;        ///< steps between snapshots; 0 = only at the end
   int seed = 1;
   HashGridOptions grid;
+  OccupancyOptions occupancy;
   PlacementOptions placement;
 
   template <typename Visitor>
@@ -57,10 +59,10 @@ struct Stage1Options {
     v("learning_rate", learning_rate, Range{1e-8, 1}, "Adam's step size at the start");
     v("final_learning_rate", final_learning_rate, Range{1e-8, 1}, "Adam's step size at the end");
     v("steps_per_box", steps_per_box, Range{16, 8192}, "march steps across the side of the innermost cascade");
-    v("sparsity_weight", sparsity_weight, Range{0, 1}, "weight of the loss that empties half-transparent space");
     v("checkpoint_every", checkpoint_every, Range{0, 1e8}, "steps between snapshots; 0 = only at the end");
     v("seed", seed, Range{0, 1e9}, "of weights, rays and jitter");
     v.section("grid", grid);
+    v.section("occupancy", occupancy);
     v.section("placement", placement);
   }
 };

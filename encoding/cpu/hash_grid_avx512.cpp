@@ -1,0 +1,2 @@
+#define CNERF_ISA avx512
+#include "encoding/cpu/hash_grid_kernels.inl"

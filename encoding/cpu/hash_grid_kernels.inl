@@ -1,0 +1,126 @@
+// The CPU kernels, written once over lanes and compiled once per instruction set. See hash_grid_kernels.h.
+
+#include <cmath>
+
+#include "encoding/cpu/hash_grid_kernels.h"
+#include "encoding/cpu/lanes.h"
+#include "encoding/hash_grid_math.h"
+
+namespace cnerf::CNERF_ISA {
+namespace {
+
+/// Rows and weights of the 8 corners of a group's samples, at one level.
+struct GroupCorners {
+  alignas(64) std::uint32_t row[8][kGroup];
+  alignas(64) float weight[8][kGroup];
+};
+
+inline void find_corners(const GridLevel& level, const float* positions, GroupCorners& corners) {
+  for (int first = 0; first < kGroup; first += kWidth) {
+    const Lanes position[3] = {Lanes::load(positions + first), Lanes::load(positions + kGroup + first),
+                               Lanes::load(positions + 2 * kGroup + first)};
+    for_each_corner<LanesU32>(level, position, [&](std::uint32_t corner, LanesU32 row, Lanes weight) {
+      row.store(&corners.row[corner][first]);
+      weight.store(&corners.weight[corner][first]);
+    });
+  }
+}
+
+void encode(const GridLevel* levels, std::size_t n_levels, const float* table, const float* positions,
+            std::size_t groups, float* encoded, int channels) {
+  GroupCorners corners;
+  for (std::size_t g = 0; g < groups; ++g) {
+    float* out = encoded + g * std::size_t(channels) * kGroup;
+    for (std::size_t l = 0; l < n_levels; ++l) {
+      const GridLevel& level = levels[l];
+      find_corners(level, positions + g * 3 * kGroup, corners);
+      const float* rows = table + 4 * std::size_t(level.first_row);
+      for (int s = 0; s < kGroup; s += 4) {
+        Row4 features[4];
+        for (int i = 0; i < 4; ++i) {
+          Row4 total = Row4::zero();
+          for (int c = 0; c < 8; ++c) {
+            total = fma(corners.weight[c][s + i], Row4::load(rows + 4 * std::size_t(corners.row[c][s + i])), total);
+          }
+          features[i] = total;
+        }
+        transpose(features[0], features[1], features[2], features[3]);
+        for (int f = 0; f < 4; ++f) features[f].store(out + f * kGroup + s);
+      }
+      out += 4 * kGroup;
+    }
+  }
+}
+
+/// Gradients of the corners of one cell, gathered over successive samples in it.
+struct CellRun {
+  Row4 sum[8];
+  std::uint32_t row[8];
+
+  void start(const GroupCorners& corners, int sample) {
+    for (int c = 0; c < 8; ++c) {
+      sum[c] = Row4::zero();
+      row[c] = corners.row[c][sample];
+    }
+  }
+  void write(float* d_rows) const {
+    for (int c = 0; c < 8; ++c) {
+      float* to = d_rows + 4 * std::size_t(row[c]);
+      (Row4::load(to) + sum[c]).store(to);
+    }
+  }
+  /// A cell is known by its lowest and its highest corner's rows: two cells that share both hash alike on them and are
+  /// told apart by a third corner.
+  bool holds(const GroupCorners& corners, int sample) const {
+    return row[0] == corners.row[0][sample] && row[7] == corners.row[7][sample] && row[1] == corners.row[1][sample] &&
+           row[2] == corners.row[2][sample] && row[4] == corners.row[4][sample];
+  }
+};
+
+void scatter_level(const GridLevel& level, const float* positions, const float* d_encoded, std::size_t groups,
+                   int channels, int first_channel, float* d_rows) {
+  if (groups == 0) return;
+  GroupCorners corners;
+  CellRun run;
+  for (std::size_t g = 0; g < groups; ++g) {
+    find_corners(level, positions + g * 3 * kGroup, corners);
+    if (g == 0) run.start(corners, 0);
+    const float* d_group = d_encoded + (g * std::size_t(channels) + std::size_t(first_channel)) * kGroup;
+    for (int s = 0; s < kGroup; s += 4) {
+      Row4 d_features[4];
+      for (int f = 0; f < 4; ++f) d_features[f] = Row4::load(d_group + f * kGroup + s);
+      transpose(d_features[0], d_features[1], d_features[2], d_features[3]);
+      for (int i = 0; i < 4; ++i) {
+        if (!run.holds(corners, s + i)) {
+          run.write(d_rows);
+          run.start(corners, s + i);
+        }
+        for (int c = 0; c < 8; ++c) run.sum[c] = fma(corners.weight[c][s + i], d_features[i], run.sum[c]);
+      }
+    }
+  }
+  run.write(d_rows);
+}
+
+void adam_rows(float* table, float* d_rows, float* moments, std::size_t rows, float step_size, float beta1, float beta2,
+               float epsilon, float second_correction) {
+  for (std::size_t r = 0; r < rows; ++r) {
+    float* d = d_rows + 4 * r;
+    if (d[0] == 0 && d[1] == 0 && d[2] == 0 && d[3] == 0) continue;
+    float* first = moments + 8 * r;
+    float* second = first + 4;
+    float* parameter = table + 4 * r;
+    for (int f = 0; f < 4; ++f) {
+      first[f] = beta1 * first[f] + (1 - beta1) * d[f];
+      second[f] = beta2 * second[f] + (1 - beta2) * d[f] * d[f];
+      parameter[f] -= step_size * first[f] / (std::sqrt(second[f] * second_correction) + epsilon);
+      d[f] = 0;
+    }
+  }
+}
+
+}  // namespace
+
+const HashGridKernels kHashGridKernels = {encode, scatter_level, adam_rows};
+
+}  // namespace cnerf::CNERF_ISA

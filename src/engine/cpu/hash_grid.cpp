@@ -1,0 +1,57 @@
+#include "src/engine/cpu/hash_grid.h"
+
+#include "src/base/parallel.h"
+#include "src/base/rng.h"
+
+namespace cnerf {
+namespace {
+
+constexpr float kInitialReach = 1e-4f;  // uniform in +-1e-4 (Mueller et al. 2022, Sec. 4)
+
+}  // namespace
+
+HashGridCpu::HashGridCpu(const HashGridOptions& options, std::uint64_t seed)
+    : levels_(hash_grid_levels(options)), kernels_(&hash_grid_kernels()) {
+  const std::size_t rows = total_rows(levels_);
+  table_.resize(rows * 4);
+  d_table_.assign(rows * 4, 0.0f);
+  moments_.assign(rows * 8, 0.0f);
+  const CounterRng rng(seed, 0x9a5);
+  parallel_ranges(table_.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) table_[i] = (2.0f * rng.uniform(i) - 1.0f) * kInitialReach;
+  });
+}
+
+void HashGridCpu::backward_and_update(const std::vector<EncodedSamples>& runs, const AdamSettings& adam,
+                                      const AdamStep& step) {
+  // Finest levels first: they take longest.
+  parallel_tasks(levels_.size(), [&](std::size_t task) {
+    const std::size_t l = levels_.size() - 1 - task;
+    const GridLevel& level = levels_[l];
+    float* d_rows = d_table_.data() + 4 * std::size_t(level.first_row);
+    for (const EncodedSamples& run : runs) {
+      kernels_->scatter_level(level, run.positions, run.d_encoded, run.groups, channels(), 4 * int(l), d_rows);
+    }
+    kernels_->adam_rows(table_.data() + 4 * std::size_t(level.first_row), d_rows,
+                        moments_.data() + 8 * std::size_t(level.first_row), level.rows, step.step_size, adam.beta1,
+                        adam.beta2, adam.epsilon, step.second_correction);
+  });
+}
+
+std::vector<float> HashGridCpu::gradient(const std::vector<EncodedSamples>& runs) const {
+  std::vector<float> d_table(table_.size(), 0.0f);
+  for (std::size_t l = 0; l < levels_.size(); ++l) {
+    for (const EncodedSamples& run : runs) {
+      kernels_->scatter_level(levels_[l], run.positions, run.d_encoded, run.groups, channels(), 4 * int(l),
+                              d_table.data() + 4 * std::size_t(levels_[l].first_row));
+    }
+  }
+  return d_table;
+}
+
+void HashGridCpu::append_state(const std::string& prefix, std::vector<StatePiece>& state) {
+  state.push_back(state_piece(prefix + ".table", table_));
+  state.push_back(state_piece(prefix + ".moments", moments_));
+}
+
+}  // namespace cnerf

@@ -1,0 +1,388 @@
+#include "src/engine/cpu/luminance_engine_cpu.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "src/base/check.h"
+#include "src/base/parallel.h"
+#include "src/color/colorspace_math.h"
+#include "src/render/composite_math.h"
+
+namespace cnerf {
+namespace {
+
+constexpr std::size_t kWaveSamples = 16;  // samples a ray adds to one wave of the density-first pass
+constexpr std::size_t kMostSamplesPerRay = 1024;
+constexpr float kTrainingTransmittance = 1e-4f;  // a training ray ends below this
+constexpr int kOccupancyEvery = 16;              // steps
+constexpr int kOccupancyWarmUp = 256;            // steps during which the grid is looked at more densely
+constexpr std::int64_t kMostRays = 1 << 16;
+
+std::size_t groups_of(std::size_t samples) {
+  return (samples + kGroup - 1) / kGroup;
+}
+
+/// Positions must lie in [0, 1]; rounding may carry the last sample of a ray just outside.
+void set_position(float* positions, std::size_t sample, Vec3f p) {
+  float* group = positions + sample / kGroup * 3 * kGroup + sample % kGroup;
+  for (int axis = 0; axis < 3; ++axis) group[axis * kGroup] = std::clamp(p[axis], 0.0f, 1.0f);
+}
+
+/// Fills the unused lanes of the last group with a legal position.
+void pad_positions(AlignedVector<float>& positions, std::size_t samples) {
+  for (std::size_t s = samples; s < groups_of(samples) * kGroup; ++s)
+    set_position(positions.data(), s, {0.5f, 0.5f, 0.5f});
+}
+
+}  // namespace
+
+LuminanceEngineCpu::LuminanceEngineCpu(const LuminanceEngineOptions& options)
+    : options_(options),
+      field_(options.grid, 1.0f / std::ldexp(1.0f, 1 - options.cascades), 1.05f * options.max_luminance, options.seed),
+      occupancy_(options.occupancy, options.cascades),
+      counters_{0, 256},
+      chunks_(kChunks) {}
+
+LuminanceEngineCpu::ObservedRay LuminanceEngineCpu::observe(const std::vector<TrainingView>& views,
+                                                            std::size_t ray) const {
+  const auto step = static_cast<std::uint64_t>(step_count());
+  const PixelSampling sampling = {options_.patch_size, options_.patch_scale_min, options_.patch_scale_max};
+  PickedPixel pixel;
+  std::size_t index = 0;
+  for (int attempt = 0; attempt < 16; ++attempt) {
+    pixel = pick_pixel(views, sampling, options_.seed, step, ray, attempt);
+    index = std::size_t(pixel.y) * std::size_t(views[pixel.view].image->width) + std::size_t(pixel.x);
+    if (views[pixel.view].image->valid(index)) break;
+  }
+  const TrainingView& view = views[pixel.view];
+  const CounterRng rng(options_.seed ^ 0x6a697474ull, step);
+  ObservedRay observed;
+  observed.ray = view.camera.ray({pixel.x + 0.5, pixel.y + 0.5});
+  observed.target = view.image->luminance(index);
+  observed.coverage = view.image->coverage(index);
+  observed.jitter = rng.uniform(2 * ray);
+  // A random background where there is alpha: what is transparent must then be empty, not merely dark.
+  if (!view.image->alpha.empty()) observed.background = luminance_from_lightness(100.0f * rng.uniform(2 * ray + 1));
+  return observed;
+}
+
+void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
+                                 float min_transmittance, Block& block) const {
+  struct Walk {
+    RayMarcher marcher;
+    float transmittance = 1;
+    bool active = true;
+  };
+  std::array<Walk, kBlockRays> walks;
+  block.of_ray.resize(kBlockRays);
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    walks[r].marcher = RayMarcher(occupancy_, march, rays[r], jitter[r]);
+    block.of_ray[r].clear();
+  }
+  block.marched = 0;
+  block.wave_positions.resize(kBlockRays * kWaveSamples * 3);
+  block.wave_sigma.resize(kBlockRays * kWaveSamples);
+
+  bool any_active = true;
+  while (any_active) {
+    std::array<std::size_t, kBlockRays + 1> begin{};
+    std::size_t count = 0;
+    for (std::size_t r = 0; r < rays.size(); ++r) {
+      begin[r] = count;
+      RaySample sample;
+      for (std::size_t i = 0; walks[r].active && i < kWaveSamples; ++i) {
+        if (block.of_ray[r].size() >= kMostSamplesPerRay || !walks[r].marcher.next(sample)) {
+          walks[r].active = false;
+          break;
+        }
+        set_position(block.wave_positions.data(), count++, rays[r].at(sample.t));
+        block.of_ray[r].push_back(sample);
+      }
+    }
+    begin[rays.size()] = count;
+    block.marched += count;
+    if (count == 0) break;
+    pad_positions(block.wave_positions, count);
+    field_.density(block.wave_positions.data(), groups_of(count), block.work, block.wave_sigma.data());
+
+    any_active = false;
+    for (std::size_t r = 0; r < rays.size(); ++r) {
+      std::vector<RaySample>& kept = block.of_ray[r];
+      std::size_t at = kept.size() - (begin[r + 1] - begin[r]);
+      for (std::size_t s = begin[r]; s < begin[r + 1]; ++s, ++at) {
+        walks[r].transmittance *= 1.0f - alpha_of(block.wave_sigma[s], kept[at].dt);
+        if (walks[r].transmittance < min_transmittance) {
+          kept.resize(at + 1);
+          walks[r].active = false;
+          break;
+        }
+      }
+      any_active |= walks[r].active;
+    }
+  }
+
+  block.samples.clear();
+  block.offsets.assign(1, 0);
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    block.samples.insert(block.samples.end(), block.of_ray[r].begin(), block.of_ray[r].end());
+    block.offsets.push_back(block.samples.size());
+  }
+}
+
+void LuminanceEngineCpu::shade(std::span<const Ray> rays, Block& block) const {
+  const std::size_t groups = groups_of(block.samples.size());
+  block.positions.resize(groups * 3 * kGroup);
+  block.work.resize(groups, field_.grid().channels());
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
+      set_position(block.positions.data(), s, rays[r].at(block.samples[s].t));
+      LuminanceFieldCpu::set_direction(block.work, s, rays[r].direction);
+    }
+  }
+  pad_positions(block.positions, block.samples.size());
+  for (std::size_t s = block.samples.size(); s < groups * kGroup; ++s) {
+    LuminanceFieldCpu::set_direction(block.work, s, {0, 0, 1});
+  }
+  field_.forward(block.positions.data(), block.work);
+}
+
+void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gradient_scale, Block& block,
+                                     Chunk& chunk) const {
+  std::array<Ray, kBlockRays> plain_rays;
+  std::array<float, kBlockRays> jitter;
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    plain_rays[r] = rays[r].ray;
+    jitter[r] = rays[r].jitter;
+  }
+  const std::span<const Ray> block_rays(plain_rays.data(), rays.size());
+  collect(block_rays, jitter, options_.march, kTrainingTransmittance, block);
+  shade(block_rays, block);
+
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    Compositor<float> ray;
+    for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
+      ray.add(alpha_of(field_.sigma(block.work, s), block.samples[s].dt), field_.luminance(block.work, s));
+    }
+    const float background = rays[r].background;
+    const float seen = ray.value + ray.transmittance * background;
+    const float wanted = rays[r].target + (1.0f - rays[r].coverage) * background;
+    const float error = (lightness_from_luminance(seen) - lightness_from_luminance(wanted)) / 100.0f;
+    const float encoded_error =
+        srgb_from_linear(std::clamp(ray.value, 0.0f, 1.0f)) - srgb_from_linear(std::clamp(rays[r].target, 0.0f, 1.0f));
+    chunk.loss += error * error;
+    chunk.squared_error += encoded_error * encoded_error;
+
+    const float d_seen = gradient_scale * 2.0f * error * lightness_derivative(seen) / 100.0f;
+    Compositor<float> again;
+    for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
+      const float dt = block.samples[s].dt;
+      const float luminance = field_.luminance(block.work, s);
+      const float weight = again.add(alpha_of(field_.sigma(block.work, s), dt), luminance);
+      const float suffix = seen - again.value;
+      const float d_sigma = d_seen * density_derivative(dt, again.transmittance, luminance, suffix);
+      field_.set_gradient(block.work, s, d_sigma, d_seen * weight);
+    }
+  }
+  for (std::size_t s = block.samples.size(); s < block.work.groups * kGroup; ++s) {
+    field_.set_gradient(block.work, s, 0.0f, 0.0f);
+  }
+
+  const std::size_t group_channels = std::size_t(field_.grid().channels()) * kGroup;
+  chunk.positions.resize((chunk.groups + block.work.groups) * 3 * kGroup);
+  chunk.d_encoded.resize((chunk.groups + block.work.groups) * group_channels);
+  std::copy(block.positions.begin(), block.positions.end(),
+            chunk.positions.begin() + std::ptrdiff_t(chunk.groups * 3 * kGroup));
+  field_.backward(block.work, chunk.d_encoded.data() + chunk.groups * group_channels, chunk.d_weights.data());
+  chunk.groups += block.work.groups;
+  chunk.marched += block.marched;
+  chunk.trained += block.samples.size();
+}
+
+void LuminanceEngineCpu::accumulate(const std::vector<TrainingView>& views) {
+  CNERF_CHECK(!views.empty(), "no training views");
+  const auto rays = static_cast<std::size_t>(counters_[1]);
+  const std::size_t n_blocks = (rays + kBlockRays - 1) / kBlockRays;
+  parallel_tasks(kChunks, [&](std::size_t c) {
+    Chunk& chunk = chunks_[c];
+    chunk.groups = chunk.marched = chunk.trained = 0;
+    chunk.loss = chunk.squared_error = 0;
+    chunk.d_weights.assign(field_.weight_count(), 0.0f);
+    for (std::size_t b = c * n_blocks / kChunks; b < (c + 1) * n_blocks / kChunks; ++b) {
+      std::array<ObservedRay, kBlockRays> observed;
+      const std::size_t first = b * kBlockRays, last = std::min(rays, first + kBlockRays);
+      for (std::size_t r = first; r < last; ++r) observed[r - first] = observe(views, r);
+      train_block({observed.data(), last - first}, 1.0f / static_cast<float>(rays), blocks_.local(), chunk);
+    }
+  });
+}
+
+StepReport LuminanceEngineCpu::report() const {
+  StepReport report;
+  report.rays = static_cast<std::size_t>(counters_[1]);
+  for (const Chunk& chunk : chunks_) {
+    report.loss += chunk.loss / double(report.rays);
+    report.squared_error += chunk.squared_error / double(report.rays);
+    report.marched_samples += chunk.marched;
+    report.trained_samples += chunk.trained;
+  }
+  return report;
+}
+
+StepReport LuminanceEngineCpu::step(const std::vector<TrainingView>& views, float learning_rate) {
+  if (step_count() % kOccupancyEvery == 0) update_occupancy();
+  accumulate(views);
+  const StepReport done = report();
+
+  std::vector<EncodedSamples> runs;
+  std::vector<float> d_weights(field_.weight_count(), 0.0f);
+  for (const Chunk& chunk : chunks_) {
+    runs.push_back({chunk.positions.data(), chunk.d_encoded.data(), chunk.groups});
+    for (std::size_t i = 0; i < d_weights.size(); ++i) d_weights[i] += chunk.d_weights[i];
+  }
+  counters_[0] += 1;
+  field_.update(runs, d_weights, learning_rate, counters_[0]);
+
+  // As many rays next time as fill the wanted number of samples.
+  const double fill = double(options_.samples_per_step) / double(std::max<std::size_t>(done.trained_samples, 64));
+  const auto wanted = static_cast<std::int64_t>(double(done.rays) * std::clamp(fill, 0.5, 2.0));
+  counters_[1] = std::clamp<std::int64_t>(wanted / 16 * 16, 64, kMostRays);
+  return done;
+}
+
+void LuminanceEngineCpu::update_occupancy() {
+  const long update = step_count() / kOccupancyEvery;
+  const std::size_t stride = step_count() == 0 ? 1 : step_count() < kOccupancyWarmUp ? 4 : 16;
+  const std::size_t phase = std::size_t(update) % stride;
+  occupancy_.update(stride, phase, options_.seed ^ mix_bits(std::uint64_t(update)),
+                    [this](std::span<const Vec3f> points, std::span<float> sigma) { query_density(points, sigma); });
+}
+
+LuminanceEngineCpu::Gradients LuminanceEngineCpu::gradients(const std::vector<TrainingView>& views) {
+  accumulate(views);
+  Gradients result;
+  result.report = report();
+  result.weights.assign(field_.weight_count(), 0.0f);
+  std::vector<EncodedSamples> runs;
+  for (const Chunk& chunk : chunks_) {
+    runs.push_back({chunk.positions.data(), chunk.d_encoded.data(), chunk.groups});
+    for (std::size_t i = 0; i < result.weights.size(); ++i) result.weights[i] += chunk.d_weights[i];
+  }
+  result.table = field_.grid().gradient(runs);
+  return result;
+}
+
+void LuminanceEngineCpu::render(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+                                std::span<RayResult> results) const {
+  CNERF_CHECK_EQ(rays.size(), results.size());
+  parallel_ranges(rays.size(), kBlockRays, [&](std::size_t begin, std::size_t end) {
+    Block& block = blocks_.local();
+    const std::span<const Ray> block_rays = rays.subspan(begin, end - begin);
+    constexpr std::array<float, kBlockRays> middle = [] {
+      std::array<float, kBlockRays> jitter{};
+      jitter.fill(0.5f);
+      return jitter;
+    }();
+    collect(block_rays, middle, march, min_transmittance, block);
+    shade(block_rays, block);
+    for (std::size_t r = 0; r < block_rays.size(); ++r) {
+      Compositor<float> ray;
+      float weighted_t = 0;
+      for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
+        const RaySample& sample = block.samples[s];
+        weighted_t +=
+            sample.t * ray.add(alpha_of(field_.sigma(block.work, s), sample.dt), field_.luminance(block.work, s));
+      }
+      const float opacity = 1.0f - ray.transmittance;
+      results[begin + r] = {ray.value, opacity, opacity > 0 ? weighted_t / opacity : 0.0f};
+    }
+  });
+}
+
+void LuminanceEngineCpu::trace(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+                               std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const {
+  const std::size_t n_blocks = (rays.size() + kBlockRays - 1) / kBlockRays;
+  std::vector<std::vector<WeightedSample>> of_block(n_blocks);
+  std::vector<std::array<std::size_t, kBlockRays>> counts(n_blocks);
+  parallel_tasks(n_blocks, [&](std::size_t b) {
+    Block& block = blocks_.local();
+    const std::size_t first = b * kBlockRays;
+    const std::span<const Ray> block_rays = rays.subspan(first, std::min(kBlockRays, rays.size() - first));
+    std::array<float, kBlockRays> middle;
+    middle.fill(0.5f);
+    collect(block_rays, middle, march, min_transmittance, block);
+    shade(block_rays, block);
+    for (std::size_t r = 0; r < block_rays.size(); ++r) {
+      Compositor<float> ray;
+      for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
+        const RaySample& sample = block.samples[s];
+        const float luminance = field_.luminance(block.work, s);
+        of_block[b].push_back(
+            {sample.t, ray.add(alpha_of(field_.sigma(block.work, s), sample.dt), luminance), luminance});
+      }
+      counts[b][r] = block.offsets[r + 1] - block.offsets[r];
+    }
+  });
+  samples.clear();
+  offsets.assign(1, 0);
+  for (std::size_t b = 0; b < n_blocks; ++b) {
+    samples.insert(samples.end(), of_block[b].begin(), of_block[b].end());
+    for (std::size_t r = 0; r < std::min(kBlockRays, rays.size() - b * kBlockRays); ++r) {
+      offsets.push_back(offsets.back() + counts[b][r]);
+    }
+  }
+}
+
+void LuminanceEngineCpu::query_density(std::span<const Vec3f> positions, std::span<float> sigma) const {
+  CNERF_CHECK_EQ(positions.size(), sigma.size());
+  constexpr std::size_t kPiece = 512;
+  Block& block = blocks_.local();
+  for (std::size_t first = 0; first < positions.size(); first += kPiece) {
+    const std::size_t count = std::min(kPiece, positions.size() - first);
+    block.wave_positions.resize(groups_of(count) * 3 * kGroup);
+    block.wave_sigma.resize(groups_of(count) * kGroup);
+    for (std::size_t i = 0; i < count; ++i) set_position(block.wave_positions.data(), i, positions[first + i]);
+    pad_positions(block.wave_positions, count);
+    field_.density(block.wave_positions.data(), groups_of(count), block.work, block.wave_sigma.data());
+    std::copy_n(block.wave_sigma.begin(), count, sigma.begin() + std::ptrdiff_t(first));
+  }
+}
+
+void LuminanceEngineCpu::query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
+                                         std::span<float> luminance) const {
+  CNERF_CHECK_EQ(positions.size(), luminance.size());
+  CNERF_CHECK_EQ(positions.size(), directions.size());
+  constexpr std::size_t kPiece = 512;
+  Block& block = blocks_.local();
+  for (std::size_t first = 0; first < positions.size(); first += kPiece) {
+    const std::size_t count = std::min(kPiece, positions.size() - first);
+    block.positions.resize(groups_of(count) * 3 * kGroup);
+    block.work.resize(groups_of(count), field_.grid().channels());
+    for (std::size_t i = 0; i < groups_of(count) * kGroup; ++i) {
+      const std::size_t from = first + std::min(i, count - 1);
+      set_position(block.positions.data(), i, positions[from]);
+      LuminanceFieldCpu::set_direction(block.work, i, directions[from]);
+    }
+    field_.forward(block.positions.data(), block.work);
+    for (std::size_t i = 0; i < count; ++i) luminance[first + i] = field_.luminance(block.work, i);
+  }
+}
+
+std::vector<StatePiece> LuminanceEngineCpu::state() {
+  std::vector<StatePiece> state;
+  field_.append_state(state);
+  state.push_back(state_piece("occupancy", occupancy_.densities()));
+  state.push_back(state_piece("counters", counters_));
+  return state;
+}
+
+void LuminanceEngineCpu::state_loaded() {
+  field_.state_loaded();
+  occupancy_.refresh_bits();
+}
+
+std::unique_ptr<LuminanceEngine> make_cpu_luminance_engine(const LuminanceEngineOptions& options) {
+  return std::make_unique<LuminanceEngineCpu>(options);
+}
+
+}  // namespace cnerf

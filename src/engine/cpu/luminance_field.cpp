@@ -1,0 +1,124 @@
+#include "src/engine/cpu/luminance_field.h"
+
+namespace cnerf {
+namespace {
+
+constexpr int kFeatureChannels = kGeometryChannels + kSphericalHarmonics;
+constexpr int kLuminanceOutputs = 4;  // one, padded to what the kernels want
+
+/// Place of a sample's value in a grouped array.
+std::size_t at(std::size_t sample, int channels, int channel) {
+  return (sample / kGroup * std::size_t(channels) + std::size_t(channel)) * kGroup + sample % kGroup;
+}
+
+}  // namespace
+
+void LuminanceWorkspace::resize(std::size_t wanted_groups, int encoded_channels) {
+  groups = wanted_groups;
+  const std::size_t lanes = groups * kGroup;
+  d_log_density.resize(lanes);
+  encoded.resize(lanes * std::size_t(encoded_channels));
+  for (auto* buffer : {&hidden, &d_hidden}) buffer->resize(lanes * kHiddenWidth);
+  for (auto* buffer : {&features, &d_features}) buffer->resize(lanes * kFeatureChannels);
+  for (auto* buffer : {&luminance_hidden, &d_luminance_hidden}) buffer->resize(lanes * 2 * kHiddenWidth);
+  for (auto* buffer : {&raw_luminance, &d_raw_luminance}) buffer->resize(lanes * kLuminanceOutputs);
+}
+
+LuminanceFieldCpu::LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float luminance_scale,
+                                     std::uint64_t seed)
+    : grid_(grid, seed),
+      density_net_({{grid_.channels(), kHiddenWidth, kGeometryChannels}}, seed, 1),
+      luminance_net_({{kFeatureChannels, kHiddenWidth, kHiddenWidth, kLuminanceOutputs}}, seed, 2),
+      density_scale_(density_scale),
+      luminance_activation_{luminance_scale} {}
+
+void LuminanceFieldCpu::density(const float* positions, std::size_t groups, LuminanceWorkspace& work,
+                                float* sigma) const {
+  work.resize(groups, grid_.channels());
+  grid_.encode(positions, groups, work.encoded.data());
+  density_net_.forward({{work.encoded.data(), grid_.channels()},
+                        {work.hidden.data(), kHiddenWidth},
+                        {work.features.data(), kFeatureChannels}},
+                       groups);
+  for (std::size_t s = 0; s < groups * kGroup; ++s) sigma[s] = this->sigma(work, s);
+}
+
+void LuminanceFieldCpu::set_direction(LuminanceWorkspace& work, std::size_t sample, Vec3f direction) {
+  spherical_harmonics(direction.x, direction.y, direction.z, [&](int i, float value) {
+    work.features[at(sample, kFeatureChannels, kGeometryChannels + i)] = value;
+  });
+}
+
+void LuminanceFieldCpu::forward(const float* positions, LuminanceWorkspace& work) const {
+  grid_.encode(positions, work.groups, work.encoded.data());
+  density_net_.forward({{work.encoded.data(), grid_.channels()},
+                        {work.hidden.data(), kHiddenWidth},
+                        {work.features.data(), kFeatureChannels}},
+                       work.groups);
+  luminance_net_.forward({{work.features.data(), kFeatureChannels},
+                          {work.luminance_hidden.data(), 2 * kHiddenWidth},
+                          {work.luminance_hidden.data() + kHiddenWidth * kGroup, 2 * kHiddenWidth},
+                          {work.raw_luminance.data(), kLuminanceOutputs}},
+                         work.groups);
+}
+
+float LuminanceFieldCpu::sigma(const LuminanceWorkspace& work, std::size_t sample) const {
+  return density_from_raw(work.features[at(sample, kFeatureChannels, 0)], density_scale_);
+}
+
+float LuminanceFieldCpu::luminance(const LuminanceWorkspace& work, std::size_t sample) const {
+  return luminance_activation_.value(work.raw_luminance[at(sample, kLuminanceOutputs, 0)]);
+}
+
+void LuminanceFieldCpu::set_gradient(LuminanceWorkspace& work, std::size_t sample, float d_sigma,
+                                     float d_luminance) const {
+  const float raw_luminance = work.raw_luminance[at(sample, kLuminanceOutputs, 0)];
+  work.d_raw_luminance[at(sample, kLuminanceOutputs, 0)] =
+      d_luminance * luminance_activation_.derivative(raw_luminance);
+  for (int pad = 1; pad < kLuminanceOutputs; ++pad) work.d_raw_luminance[at(sample, kLuminanceOutputs, pad)] = 0;
+  work.d_log_density[sample] = d_sigma * sigma(work, sample);
+}
+
+void LuminanceFieldCpu::backward(LuminanceWorkspace& work, float* d_encoded, float* d_weights) const {
+  luminance_net_.backward({{work.features.data(), kFeatureChannels},
+                           {work.luminance_hidden.data(), 2 * kHiddenWidth},
+                           {work.luminance_hidden.data() + kHiddenWidth * kGroup, 2 * kHiddenWidth},
+                           {work.raw_luminance.data(), kLuminanceOutputs}},
+                          {{work.d_features.data(), kFeatureChannels},
+                           {work.d_luminance_hidden.data(), 2 * kHiddenWidth},
+                           {work.d_luminance_hidden.data() + kHiddenWidth * kGroup, 2 * kHiddenWidth},
+                           {work.d_raw_luminance.data(), kLuminanceOutputs}},
+                          work.groups, d_weights + density_net_.layout().weight_count());
+  for (std::size_t s = 0; s < work.groups * kGroup; ++s) {
+    work.d_features[at(s, kFeatureChannels, 0)] += work.d_log_density[s];
+  }
+  density_net_.backward(
+      {{work.encoded.data(), grid_.channels()},
+       {work.hidden.data(), kHiddenWidth},
+       {work.features.data(), kFeatureChannels}},
+      {{d_encoded, grid_.channels()}, {work.d_hidden.data(), kHiddenWidth}, {work.d_features.data(), kFeatureChannels}},
+      work.groups, d_weights);
+}
+
+void LuminanceFieldCpu::update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights,
+                               float learning_rate, long step) {
+  const AdamSettings adam;
+  const AdamStep adam_step(adam, learning_rate, step);
+  grid_.backward_and_update(runs, adam, adam_step);
+  const std::size_t split = density_net_.layout().weight_count();
+  density_net_.update({d_weights.begin(), d_weights.begin() + std::ptrdiff_t(split)}, adam, adam_step);
+  luminance_net_.update({d_weights.begin() + std::ptrdiff_t(split), d_weights.end()}, adam, adam_step);
+}
+
+void LuminanceFieldCpu::append_state(std::vector<StatePiece>& state) {
+  grid_.append_state("grid", state);
+  density_net_.append_state("density_net", state);
+  luminance_net_.append_state("luminance_net", state);
+}
+
+void LuminanceFieldCpu::state_loaded() {
+  density_net_.transpose_weights();
+  luminance_net_.transpose_weights();
+}
+
+}  // namespace cnerf

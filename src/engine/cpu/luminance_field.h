@@ -1,0 +1,93 @@
+#pragma once
+/// Stage 1's field on the CPU: hash grid + density net -> density and geometry feature; feature and spherical harmonics
+/// of the direction -> luminance net (paper, Eq. monochromenerf, with the hash grid in place of positional encoding).
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "encoding/spherical_harmonics_math.h"
+#include "src/engine/cpu/hash_grid.h"
+#include "src/engine/cpu/mlp.h"
+#include "src/render/ray.h"
+
+namespace cnerf {
+
+inline constexpr int kGeometryChannels = 16;  ///< outputs of the density net; the first one is log density
+inline constexpr int kHiddenWidth = 64;
+
+/// Density of the density net's first output; 1/unit length. Clamped so that neither sigma nor its gradient overflows.
+template <typename Real>
+Real density_from_raw(Real raw, Real scale) {
+  return std::exp(std::clamp(raw, Real(-15), Real(15))) * scale;
+}
+
+/// Luminance of the luminance net's output: the cube makes L* nearly linear in the sigmoid, so that the loss, which
+/// compares L*, sees a gradient of even size from black to white.
+template <typename Real>
+struct LuminanceActivation {
+  Real scale;  ///< luminance at sigmoid = 1
+
+  [[nodiscard]] Real value(Real raw) const {
+    const Real s = Real(1) / (Real(1) + std::exp(-raw));
+    return scale * s * s * s;
+  }
+  [[nodiscard]] Real derivative(Real raw) const {
+    const Real s = Real(1) / (Real(1) + std::exp(-raw));
+    return Real(3) * scale * s * s * s * (Real(1) - s);
+  }
+};
+
+/// Buffers for a block of samples; grouped arrays [G, C, 16].
+struct LuminanceWorkspace {
+  std::size_t groups = 0;
+  AlignedVector<float> encoded, hidden, features, luminance_hidden, raw_luminance;
+  AlignedVector<float> d_log_density;  ///< [16 G]
+  AlignedVector<float> d_hidden, d_features, d_luminance_hidden, d_raw_luminance;
+
+  void resize(std::size_t wanted_groups, int encoded_channels);
+};
+
+class LuminanceFieldCpu {
+ public:
+  LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float luminance_scale, std::uint64_t seed);
+
+  /// Density only.  @param positions [G, 3, 16]  @param sigma [16 G]
+  void density(const float* positions, std::size_t groups, LuminanceWorkspace& work, float* sigma) const;
+
+  /// Writes the direction's encoding for one sample; to be done for all samples before `forward`.
+  static void set_direction(LuminanceWorkspace& work, std::size_t sample, Vec3f direction);
+  /// Fills the activations in `work`.
+  void forward(const float* positions, LuminanceWorkspace& work) const;
+  [[nodiscard]] float sigma(const LuminanceWorkspace& work, std::size_t sample) const;
+  [[nodiscard]] float luminance(const LuminanceWorkspace& work, std::size_t sample) const;
+
+  /// Sets the loss's gradient with respect to one sample's sigma and luminance; for all samples before `backward`.
+  void set_gradient(LuminanceWorkspace& work, std::size_t sample, float d_sigma, float d_luminance) const;
+  /// @param d_encoded  [G, channels, 16], written
+  /// @param d_weights  [weight_count], added to: the density net's weights, then the luminance net's
+  void backward(LuminanceWorkspace& work, float* d_encoded, float* d_weights) const;
+
+  void update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights, float learning_rate,
+              long step);
+
+  [[nodiscard]] std::size_t weight_count() const {
+    return density_net_.layout().weight_count() + luminance_net_.layout().weight_count();
+  }
+  [[nodiscard]] HashGridCpu& grid() { return grid_; }
+  [[nodiscard]] const HashGridCpu& grid() const { return grid_; }
+  [[nodiscard]] const MlpCpu& density_net() const { return density_net_; }
+  [[nodiscard]] const MlpCpu& luminance_net() const { return luminance_net_; }
+  void append_state(std::vector<StatePiece>& state);
+  void state_loaded();
+
+ private:
+  HashGridCpu grid_;
+  MlpCpu density_net_;    ///< 4 L -> 64 -> 16
+  MlpCpu luminance_net_;  ///< 16 + 16 -> 64 -> 64 -> 1 (padded to 4)
+  float density_scale_;
+  LuminanceActivation<float> luminance_activation_;
+};
+
+}  // namespace cnerf

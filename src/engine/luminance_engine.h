@@ -1,0 +1,77 @@
+#pragma once
+/// Stage 1's inner loop, one implementation a device: march, encode, nets, composite, loss, gradients, Adam, occupancy.
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "encoding/hash_grid_levels.h"
+#include "src/engine/state.h"
+#include "src/render/march.h"
+#include "src/render/occupancy_grid.h"
+#include "src/render/training_views.h"
+
+namespace cnerf {
+
+struct LuminanceEngineOptions {
+  HashGridOptions grid;
+  OccupancyOptions occupancy;
+  int cascades = 1;
+  MarchSettings march;
+  int samples_per_step = 1 << 16;  ///< trained samples a step aims at
+  int patch_size = 0;  ///< 0: independent pixels; K: pixels come as K x K patches (paper, Eq. patch sampling)
+  float patch_scale_min = 0.3f, patch_scale_max = 0.7f;  ///< s, share of the image's short side
+  float max_luminance = 1.0f;                            ///< of the images; the field emits at most a little more
+  std::uint64_t seed = 1;
+};
+
+/// What a step did.
+struct StepReport {
+  double loss = 0;           ///< mean over rays of ((L* - L*_observed) / 100)^2
+  double squared_error = 0;  ///< mean over rays, on sRGB-encoded luminance clamped to [0, 1]
+  std::size_t rays = 0;
+  std::size_t marched_samples = 0, trained_samples = 0;
+};
+
+/// What a ray sees. Linear light, over black.
+struct RayResult {
+  float luminance = 0;
+  float opacity = 0;
+  float depth = 0;  ///< expected t of what is seen, unit space; 0 when nothing is
+};
+
+/// A sample that carries part of a ray's opacity.
+struct WeightedSample {
+  float t = 0;
+  float weight = 0;
+  float luminance = 0;
+};
+
+class LuminanceEngine {
+ public:
+  virtual ~LuminanceEngine() = default;
+
+  /// One optimiser step on pixels drawn from `views`. The same step number draws the same pixels.
+  virtual StepReport step(const std::vector<TrainingView>& views, float learning_rate) = 0;
+  [[nodiscard]] virtual long step_count() const = 0;
+
+  /// @param march  may step otherwise than training did
+  virtual void render(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+                      std::span<RayResult> results) const = 0;
+  /// The samples behind `render`'s results, ray by ray in order; `offsets` has rays + 1 entries.
+  virtual void trace(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+                     std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const = 0;
+
+  virtual void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const = 0;
+  virtual void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
+                               std::span<float> luminance) const = 0;
+  [[nodiscard]] virtual const OccupancyGrid& occupancy() const = 0;
+
+  /// Everything that continues a run bit for bit. After writing into the pieces, call `state_loaded`.
+  [[nodiscard]] virtual std::vector<StatePiece> state() = 0;
+  virtual void state_loaded() = 0;
+};
+
+[[nodiscard]] std::unique_ptr<LuminanceEngine> make_cpu_luminance_engine(const LuminanceEngineOptions& options);
+
+}  // namespace cnerf

@@ -1,0 +1,123 @@
+#include "src/render/occupancy_grid.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+#include "src/base/check.h"
+#include "src/base/parallel.h"
+#include "src/base/rng.h"
+
+namespace cnerf {
+namespace {
+
+constexpr int kBlockSide = 8;
+constexpr float kNeverSeen = 1e9f;  // before its first look, a cell counts as occupied
+
+int clamped_cell(float x01, int resolution) {
+  return std::clamp(static_cast<int>(x01 * static_cast<float>(resolution)), 0, resolution - 1);
+}
+
+}  // namespace
+
+OccupancyGrid::OccupancyGrid(const OccupancyOptions& options, int cascades) : options_(options), cascades_(cascades) {
+  CNERF_CHECK(options.resolution % (2 * kBlockSide) == 0,
+              "occupancy resolution must be a multiple of 16, so that blocks do not straddle cascades");
+  CNERF_CHECK(cascades >= 1, "at least one cascade");
+  for (int k = 0; k < cascades; ++k) side_.push_back(std::ldexp(1.0f, k - cascades + 1));
+  const std::size_t cells = std::size_t(options.resolution) * options.resolution * options.resolution * cascades;
+  density_.assign(cells, kNeverSeen);
+  bits_.assign((cells + 63) / 64, ~std::uint64_t(0));
+  blocks_.assign(cells / (kBlockSide * kBlockSide * kBlockSide), 1);
+}
+
+int OccupancyGrid::cascade_of(Vec3f p) const {
+  const float reach = 2.0f * std::max({std::abs(p.x - 0.5f), std::abs(p.y - 0.5f), std::abs(p.z - 0.5f)});
+  for (int k = 0; k < cascades_; ++k) {
+    if (reach <= side_[k]) return k;
+  }
+  return cascades_ - 1;
+}
+
+std::size_t OccupancyGrid::cell_of(int cascade, Vec3f p) const {
+  const int r = options_.resolution;
+  const float scale = 1.0f / side_[cascade];
+  const int x = clamped_cell((p.x - 0.5f) * scale + 0.5f, r);
+  const int y = clamped_cell((p.y - 0.5f) * scale + 0.5f, r);
+  const int z = clamped_cell((p.z - 0.5f) * scale + 0.5f, r);
+  return ((std::size_t(cascade) * r + z) * r + y) * r + x;
+}
+
+std::size_t OccupancyGrid::block_of(int cascade, Vec3f p) const {
+  const int r = options_.resolution / kBlockSide;
+  const float scale = 1.0f / side_[cascade];
+  const int x = clamped_cell((p.x - 0.5f) * scale + 0.5f, r);
+  const int y = clamped_cell((p.y - 0.5f) * scale + 0.5f, r);
+  const int z = clamped_cell((p.z - 0.5f) * scale + 0.5f, r);
+  return ((std::size_t(cascade) * r + z) * r + y) * r + x;
+}
+
+double OccupancyGrid::occupied_share() const {
+  std::size_t count = 0;
+  for (const std::uint64_t word : bits_) count += static_cast<std::size_t>(std::popcount(word));
+  return double(count) / double(density_.size());
+}
+
+void OccupancyGrid::update(std::size_t stride, std::size_t phase, std::uint64_t jitter_seed,
+                           const std::function<void(std::span<const Vec3f>, std::span<float>)>& density) {
+  const std::size_t looked_at = (density_.size() - phase + stride - 1) / stride;
+  const std::size_t r = std::size_t(options_.resolution);
+  const CounterRng rng(jitter_seed, 0x0cc);
+  constexpr std::size_t kPiece = 4096;
+  parallel_ranges(looked_at, kPiece, [&](std::size_t begin, std::size_t end) {
+    std::vector<Vec3f> points(end - begin);
+    std::vector<float> sigma(end - begin);
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::size_t cell = phase + i * stride;
+      const int cascade = static_cast<int>(cell / (r * r * r));
+      const Vec3f corner = {float(cell % r), float(cell / r % r), float(cell / (r * r) % r)};
+      const Vec3f jitter = {rng.uniform(3 * cell), rng.uniform(3 * cell + 1), rng.uniform(3 * cell + 2)};
+      const Vec3f in_cascade = (corner + jitter) / float(r) - Vec3f{0.5f, 0.5f, 0.5f};
+      points[i - begin] = in_cascade * side_[cascade] + Vec3f{0.5f, 0.5f, 0.5f};
+    }
+    density(points, sigma);
+    for (std::size_t i = begin; i < end; ++i) {
+      float& remembered = density_[phase + i * stride];
+      const float before = remembered == kNeverSeen ? 0.0f : remembered * options_.decay;
+      remembered = std::max(before, sigma[i - begin]);
+    }
+  });
+  refresh_bits();
+}
+
+void OccupancyGrid::refresh_bits() {
+  const std::size_t r = std::size_t(options_.resolution);
+  const std::size_t cells = r * r * r;
+  const std::size_t blocks_a_side = r / kBlockSide;
+  std::fill(blocks_.begin(), blocks_.end(), std::uint8_t(0));
+  parallel_tasks(std::size_t(cascades_), [&](std::size_t k) {
+    const float* density = density_.data() + k * cells;
+    // Early in training nothing reaches the threshold; then the densest half is what is worth sampling.
+    double total = 0;
+    for (std::size_t i = 0; i < cells; ++i) total += std::min(density[i], 1e4f);
+    const float threshold =
+        std::min(options_.optical_thickness / cell_side(int(k)), static_cast<float>(total / double(cells)));
+    for (std::size_t word = 0; word < cells / 64; ++word) {
+      std::uint64_t bits = 0;
+      for (std::size_t bit = 0; bit < 64; ++bit) {
+        if (density[word * 64 + bit] > threshold) bits |= std::uint64_t(1) << bit;
+      }
+      bits_[k * (cells / 64) + word] = bits;
+    }
+    for (std::size_t i = 0; i < cells; i += kBlockSide) {
+      const std::size_t word = (k * cells + i) / 64;
+      if (((bits_[word] >> (i % 64)) & 0xffu) == 0) continue;
+      const std::size_t x = i % r, y = i / r % r, z = i / (r * r);
+      blocks_[((k * blocks_a_side + z / kBlockSide) * blocks_a_side + y / kBlockSide) * blocks_a_side +
+              x / kBlockSide] = 1;
+    }
+  });
+}
+
+}  // namespace cnerf

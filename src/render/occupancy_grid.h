@@ -1,0 +1,72 @@
+#pragma once
+/// Which space is worth sampling: nested grids of bits (cascades) around the middle of the unit cube, as in Mueller et
+/// al. 2022, App. E. Cascade k covers the cube of side 2^(k - cascades + 1) around (0.5, 0.5, 0.5).
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "src/base/options.h"
+#include "src/base/vec3.h"
+
+namespace cnerf {
+
+struct OccupancyOptions {
+  int resolution = 128;             ///< cells along a side of a cascade; a multiple of 8
+  float decay = 0.9f;               ///< of a cell's remembered density, each time it is looked at again
+  float optical_thickness = 0.03f;  ///< of a cell, below which it counts as empty
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("resolution", resolution, Range{16, 512}, "cells along a side of a cascade");
+    v("decay", decay, Range{0, 1}, "of a cell's remembered density at each look");
+    v("optical_thickness", optical_thickness, Range{0, 10}, "of a cell, below which it counts as empty");
+  }
+};
+
+class OccupancyGrid {
+ public:
+  OccupancyGrid(const OccupancyOptions& options, int cascades);
+
+  [[nodiscard]] int cascades() const { return cascades_; }
+  [[nodiscard]] int resolution() const { return options_.resolution; }
+
+  /// The innermost cascade whose box holds `p`, of [0, 1]^3.
+  [[nodiscard]] int cascade_of(Vec3f p) const;
+  [[nodiscard]] bool occupied(int cascade, Vec3f p) const {
+    const std::size_t cell = cell_of(cascade, p);
+    return (bits_[cell / 64] >> (cell % 64)) & 1u;
+  }
+  /// False when all 8^3 cells around `p` are empty as well: a marcher may leave the whole block at once.
+  [[nodiscard]] bool block_occupied(int cascade, Vec3f p) const { return blocks_[block_of(cascade, p)] != 0; }
+
+  /// Side of a cell, and of the 8^3 block, of a cascade; unit space.
+  [[nodiscard]] float cell_side(int cascade) const { return side_[cascade] / static_cast<float>(options_.resolution); }
+  [[nodiscard]] float cascade_side(int cascade) const { return side_[cascade]; }
+  [[nodiscard]] double occupied_share() const;
+
+  /// Looks at every `stride`-th cell, starting with cell `phase`: asks `density` for sigma at a jittered point of each,
+  /// remembers max(decayed, new), and refreshes the bits of the whole grid.
+  /// @param jitter_seed  selects the points; the result is a pure function of the arguments and the state.
+  void update(std::size_t stride, std::size_t phase, std::uint64_t jitter_seed,
+              const std::function<void(std::span<const Vec3f>, std::span<float>)>& density);
+
+  /// The state to save and restore; call `refresh_bits` after changing it.
+  [[nodiscard]] std::vector<float>& densities() { return density_; }
+  [[nodiscard]] const std::vector<float>& densities() const { return density_; }
+  void refresh_bits();
+
+ private:
+  [[nodiscard]] std::size_t cell_of(int cascade, Vec3f p) const;
+  [[nodiscard]] std::size_t block_of(int cascade, Vec3f p) const;
+
+  OccupancyOptions options_;
+  int cascades_;
+  std::vector<float> side_;           ///< [cascades], unit space
+  std::vector<float> density_;        ///< [cascades, R, R, R], sigma; x fastest
+  std::vector<std::uint64_t> bits_;   ///< one bit a cell, same order
+  std::vector<std::uint8_t> blocks_;  ///< [cascades, R/8, R/8, R/8], 1 = some cell is occupied
+};
+
+}  // namespace cnerf

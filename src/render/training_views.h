@@ -1,0 +1,46 @@
+#pragma once
+/// What a training step draws its pixels from: images and poses in unit space. No colour: MonoImage has none.
+
+#include <vector>
+
+#include "src/capture/camera.h"
+#include "src/capture/capture.h"
+#include "src/capture/mono_image.h"
+#include "src/field/scene_frame.h"
+#include "src/render/ray.h"
+
+namespace cnerf {
+
+/// A camera in unit space.
+struct UnitCamera {
+  Intrinsics intrinsics;
+  Mat3d unit_from_camera;  ///< rotation
+  Vec3d origin;            ///< unit space
+
+  UnitCamera() = default;
+  UnitCamera(const Intrinsics& lens, const Affined& world_from_camera, const SceneFrame& frame)
+      : intrinsics(lens),
+        unit_from_camera(world_from_camera.linear),
+        origin(frame.unit_from_world(world_from_camera.translation)) {}
+
+  [[nodiscard]] Ray ray(PixelPosition pixel) const {
+    return {origin.cast<float>(), normalized(unit_from_camera * ray_direction(intrinsics, pixel)).cast<float>()};
+  }
+};
+
+struct TrainingView {
+  UnitCamera camera;
+  const MonoImage* image = nullptr;
+};
+
+/// The views that are not held out. `capture` must outlive the result.
+[[nodiscard]] inline std::vector<TrainingView> training_views(const Capture& capture, const SceneFrame& frame) {
+  std::vector<TrainingView> views;
+  for (const View& view : capture.views) {
+    if (view.held_out) continue;
+    views.push_back({UnitCamera(view.intrinsics, view.world_from_camera, frame), &view.image});
+  }
+  return views;
+}
+
+}  // namespace cnerf

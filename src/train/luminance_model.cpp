@@ -1,0 +1,89 @@
+#include "src/train/luminance_model.h"
+
+#include <algorithm>
+
+#include "src/train/options_json.h"
+
+namespace cnerf {
+namespace {
+
+constexpr const char* kKind = "stage1";
+
+std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stage1Options& options,
+                                             float max_luminance) {
+  LuminanceEngineOptions engine;
+  engine.grid = options.grid;
+  engine.occupancy = options.occupancy;
+  engine.cascades = frame.cascades;
+  engine.march = march_settings(frame.cascades, options.steps_per_box);
+  engine.samples_per_step = options.samples_per_step;
+  engine.patch_size = options.sampling == "patches" ? options.patch_size : 0;
+  engine.max_luminance = max_luminance;
+  engine.seed = static_cast<std::uint64_t>(options.seed);
+  return make_cpu_luminance_engine(engine);
+}
+
+/// White of integer images; floating point ones may be brighter.
+float brightest(const Capture& capture) {
+  float brightest = 1.0f;
+  for (const View& view : capture.views) {
+    if (view.held_out || view.image.depth != PixelDepth::kF32) continue;
+    for (const float value : view.image.f32) brightest = std::max(brightest, value);
+  }
+  return brightest;
+}
+
+}  // namespace
+
+nlohmann::json frame_to_json(const SceneFrame& frame) {
+  return {{"world_centre", {frame.world_centre.x, frame.world_centre.y, frame.world_centre.z}},
+          {"unit_per_world", frame.unit_per_world},
+          {"cascades", frame.cascades}};
+}
+
+SceneFrame frame_from_json(const nlohmann::json& json) {
+  const auto& centre = json.at("world_centre");
+  return {{centre.at(0).get<double>(), centre.at(1).get<double>(), centre.at(2).get<double>()},
+          json.at("unit_per_world").get<double>(),
+          json.at("cascades").get<int>()};
+}
+
+LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options) {
+  LuminanceModel model;
+  model.frame = place_scene(capture, options.placement);
+  model.options = options;
+  model.max_luminance = brightest(capture);
+  model.engine = make_engine(model.frame, options, model.max_luminance);
+  return model;
+}
+
+LuminanceModel LuminanceModel::load(const std::filesystem::path& file) {
+  const Snapshot snapshot(file, kKind);
+  LuminanceModel model;
+  try {
+    model.frame = frame_from_json(snapshot.header().at("frame"));
+    model.options = options_from_json<Stage1Options>(snapshot.header().at("options"));
+  } catch (const nlohmann::json::exception& problem) {
+    throw SnapshotError(file.string() + ": header: " + problem.what());
+  }
+  model.max_luminance = header_field<float>(snapshot, "max_luminance");
+  model.seconds = header_field<double>(snapshot, "seconds");
+  model.trained_samples = header_field<double>(snapshot, "trained_samples");
+  model.engine = make_engine(model.frame, model.options, model.max_luminance);
+  snapshot.restore(model.engine->state());
+  model.engine->state_loaded();
+  return model;
+}
+
+void LuminanceModel::save(const std::filesystem::path& file) const {
+  save_snapshot(file, kKind,
+                {{"frame", frame_to_json(frame)},
+                 {"options", options_to_json(options)},
+                 {"max_luminance", max_luminance},
+                 {"seconds", seconds},
+                 {"trained_samples", trained_samples},
+                 {"step", engine->step_count()}},
+                engine->state());
+}
+
+}  // namespace cnerf

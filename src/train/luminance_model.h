@@ -1,0 +1,32 @@
+#pragma once
+/// Stage 1's result in memory: where the box lies, how to march, and the engine. Both stages and the Scene build on it.
+
+#include <filesystem>
+#include <memory>
+
+#include "src/engine/luminance_engine.h"
+#include "src/train/snapshot.h"
+#include "src/train/stage1.h"
+
+namespace cnerf {
+
+struct LuminanceModel {
+  SceneFrame frame;
+  Stage1Options options;
+  float max_luminance = 1;
+  double seconds = 0;          ///< training time so far
+  double trained_samples = 0;  ///< so far
+  std::unique_ptr<LuminanceEngine> engine;
+
+  /// A fresh model for a capture.
+  static LuminanceModel create(const Capture& capture, const Stage1Options& options);
+  /// @throws MissingInputError, SnapshotError
+  static LuminanceModel load(const std::filesystem::path& snapshot);
+  void save(const std::filesystem::path& snapshot) const;
+};
+
+/// SceneFrame in snapshot headers.
+[[nodiscard]] nlohmann::json frame_to_json(const SceneFrame& frame);
+[[nodiscard]] SceneFrame frame_from_json(const nlohmann::json& json);
+
+}  // namespace cnerf

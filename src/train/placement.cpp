@@ -1,0 +1,133 @@
+// Where the field's box lies: see place_scene in stage1.h.
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/base/parallel.h"
+#include "src/train/stage1.h"
+
+namespace cnerf {
+namespace {
+
+Vec3d optical_axis(const View& view) {
+  return view.world_from_camera.linear.column(2);
+}
+
+/// The point nearest to all optical axes in the least-squares sense; cameras' mean plus a step forward where the axes
+/// are parallel and no such point is well defined.
+Vec3d focus_point(const std::vector<View>& views) {
+  Mat3d normal{};
+  Vec3d right{}, mean_position{}, mean_axis{};
+  for (const View& view : views) {
+    const Vec3d d = normalized(optical_axis(view));
+    const Vec3d o = view.world_from_camera.translation;
+    for (int i = 0; i < 3; ++i) {
+      Vec3d row{};
+      for (int j = 0; j < 3; ++j) row[j] = (i == j ? 1.0 : 0.0) - d[i] * d[j];
+      normal.rows[i] += row;
+      right[i] += dot(row, o);
+    }
+    mean_position += o / double(views.size());
+    mean_axis += d / double(views.size());
+  }
+  if (normal.determinant() < 1e-4 * std::pow(double(views.size()), 3)) return mean_position + mean_axis;
+  return normal.inverse() * right;
+}
+
+double mean_distance(const std::vector<View>& views, Vec3d point) {
+  double total = 0;
+  for (const View& view : views) total += length(view.world_from_camera.translation - point);
+  return total / double(views.size());
+}
+
+SceneFrame cube(Vec3d centre, double side, int cascades) {
+  return {centre, 1.0 / side, cascades};
+}
+
+/// Forward-facing captures: the box reaches from the cameras to behind the far plane. 1.21 times the far distance,
+/// centred half-way, holds what a lens of 60 to 70 degrees sees there.
+SceneFrame place_forward_facing(const Capture& capture) {
+  Vec3d position{}, axis{};
+  for (const View& view : capture.views) {
+    position += view.world_from_camera.translation / double(capture.views.size());
+    axis += optical_axis(view) / double(capture.views.size());
+  }
+  const double far = capture.depth_range->far;
+  return cube(position + normalized(axis) * (0.5 * far), 1.21 * far, 2);
+}
+
+/// Bounds of what no view sees as fully transparent (the visual hull), on a coarse grid over `box`.
+Aabbd visual_hull_bounds(const Capture& capture, const Aabbd& box) {
+  constexpr int kCells = 64;
+  std::vector<Aabbd> of_slice(kCells, Aabbd::empty());
+  const Vec3d cell = box.size() / double(kCells);
+  parallel_tasks(kCells, [&](std::size_t z) {
+    for (int y = 0; y < kCells; ++y) {
+      for (int x = 0; x < kCells; ++x) {
+        const Vec3d corner = box.min + Vec3d{x * cell.x, y * cell.y, double(z) * cell.z};
+        const Vec3d middle = corner + cell * 0.5;
+        const bool inside = std::all_of(capture.views.begin(), capture.views.end(), [&](const View& view) {
+          const auto pixel = project(view.intrinsics, view.world_from_camera.inverse().point(middle));
+          if (!pixel) return true;
+          const int radius =
+              1 + int(0.5 * cell.x * view.intrinsics.fx / length(middle - view.world_from_camera.translation));
+          for (const int dy : {-radius, 0, radius}) {
+            for (const int dx : {-radius, 0, radius}) {
+              const int px = int(pixel->x) + dx, py = int(pixel->y) + dy;
+              if (px < 0 || py < 0 || px >= view.image.width || py >= view.image.height) return true;
+              if (view.image.coverage(std::size_t(py) * view.image.width + px) > 0.02f) return true;
+            }
+          }
+          return false;
+        });
+        if (!inside) continue;
+        of_slice[z].grow(corner);
+        of_slice[z].grow(corner + cell);
+      }
+    }
+  });
+  Aabbd bounds = Aabbd::empty();
+  for (const Aabbd& slice : of_slice) {
+    if (slice.min.x > slice.max.x) continue;
+    bounds.grow(slice.min);
+    bounds.grow(slice.max);
+  }
+  return bounds;
+}
+
+/// Objects with alpha: a cube around the visual hull.
+SceneFrame place_object(const Capture& capture) {
+  const Vec3d focus = focus_point(capture.views);
+  double half = 0;
+  for (const View& view : capture.views) {
+    const double distance = length(view.world_from_camera.translation - focus);
+    half = std::max(
+        half, distance * 0.5 *
+                  std::max(view.intrinsics.width / view.intrinsics.fx, view.intrinsics.height / view.intrinsics.fy));
+  }
+  const Vec3d reach = {half, half, half};
+  const Aabbd hull = visual_hull_bounds(capture, {focus - reach, focus + reach});
+  if (hull.min.x > hull.max.x) return cube(focus, 2 * half, 1);
+  const Vec3d size = hull.size();
+  return cube(hull.centre(), 1.05 * std::max({size.x, size.y, size.z}), 1);
+}
+
+/// All else: nested boxes around what the cameras look at, reaching behind the cameras.
+SceneFrame place_surroundings(const Capture& capture) {
+  const Vec3d focus = focus_point(capture.views);
+  return cube(focus, 3.0 * mean_distance(capture.views, focus), 3);
+}
+
+}  // namespace
+
+SceneFrame place_scene(const Capture& capture, const PlacementOptions& options) {
+  SceneFrame frame = capture.depth_range         ? place_forward_facing(capture)
+                     : capture.is_bounded_object ? place_object(capture)
+                                                 : place_surroundings(capture);
+  if (options.fixed_centre) frame.world_centre = {options.centre_x, options.centre_y, options.centre_z};
+  if (options.scale > 0) frame.unit_per_world = options.scale;
+  if (options.cascades > 0) frame.cascades = options.cascades;
+  return frame;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,51 @@
+#pragma once
+/// Snapshots: a JSON header and named pieces of memory, written whole or not at all.
+///
+/// Layout: "CNERFSNP", u32 format version, u64 header size, header (UTF-8 JSON), the pieces one after another in the
+/// header's order, then 64 hex digits of the SHA-256 of all before. Little-endian.
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "src/base/error.h"
+#include "src/engine/state.h"
+
+namespace cnerf {
+
+inline constexpr std::uint32_t kSnapshotVersion = 1;
+
+/// @param header  gains "kind" and "pieces".
+void save_snapshot(const std::filesystem::path& file, const std::string& kind, nlohmann::json header,
+                   const std::vector<StatePiece>& pieces);
+
+/// A snapshot read from disk and checked; `restore` copies pieces into an engine's memory.
+class Snapshot {
+ public:
+  /// @throws MissingInputError, SnapshotError  not a snapshot, of another kind or version, cut short, or damaged.
+  Snapshot(const std::filesystem::path& file, const std::string& kind);
+
+  [[nodiscard]] const nlohmann::json& header() const { return header_; }
+  /// @throws SnapshotError  when a piece is missing or of another size than the engine's.
+  void restore(const std::vector<StatePiece>& pieces) const;
+  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+
+ private:
+  std::filesystem::path file_;
+  std::vector<std::byte> content_;
+  std::size_t pieces_begin_ = 0;
+  nlohmann::json header_;
+};
+
+/// The value of a header field.  @throws SnapshotError naming file and field when it is missing or of another type.
+template <typename T>
+T header_field(const Snapshot& snapshot, const std::string& field) {
+  try {
+    return snapshot.header().at(field).get<T>();
+  } catch (const nlohmann::json::exception& problem) {
+    throw SnapshotError(snapshot.file().string() + ": header field '" + field + "': " + problem.what());
+  }
+}
+
+}  // namespace cnerf
