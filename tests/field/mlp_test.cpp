@@ -1,0 +1,109 @@
+#include <gtest/gtest.h>
+
+#include "src/base/rng.h"
+#include "src/field/cpu/mlp_kernels.h"
+#include "src/field/mlp_reference.h"
+#include "tests/support/finite_difference.h"
+#include "tests/support/grouped.h"
+#include "tests/support/isa.h"
+
+namespace cnerf {
+namespace {
+
+using test::from_groups;
+using test::groups_of;
+using test::to_groups;
+
+const MlpLayout kLayout = {{12, 20, 16, 4}};
+
+std::vector<double> random_values(std::size_t n, std::uint64_t stream) {
+  const CounterRng rng(99, stream);
+  std::vector<double> values(n);
+  for (std::size_t i = 0; i < n; ++i) values[i] = 2.0 * rng.uniform(i) - 1.0;
+  return values;
+}
+
+MlpReference<double> random_net() {
+  MlpReference<double> net{kLayout, {}};
+  for (const float w : initial_weights(kLayout, 5, 1)) net.weights.push_back(w);
+  return net;
+}
+
+TEST(Mlp, ReferenceGradientMatchesCentralDifference) {
+  const MlpReference<double> net = random_net();
+  const std::vector<double> input = random_values(12, 1), d_out = random_values(4, 2);
+  const auto loss = [&](const MlpReference<double>& at, const std::vector<double>& x) {
+    const std::vector<double> out = at.forward(x).back();
+    double sum = 0;
+    for (std::size_t i = 0; i < out.size(); ++i) sum += out[i] * d_out[i];
+    return sum;
+  };
+  std::vector<double> d_weights(kLayout.weight_count(), 0.0);
+  const std::vector<double> d_input = net.backward(net.forward(input), d_out, d_weights);
+
+  std::vector<std::size_t> all_weights(kLayout.weight_count()), all_inputs(12);
+  for (std::size_t i = 0; i < all_weights.size(); ++i) all_weights[i] = i;
+  for (std::size_t i = 0; i < all_inputs.size(); ++i) all_inputs[i] = i;
+  const auto numeric_weights = test::central_difference(net.weights, all_weights, 1e-6, [&](const auto& w) {
+    return loss({kLayout, w}, input);
+  });
+  const auto numeric_input =
+      test::central_difference(input, all_inputs, 1e-6, [&](const auto& x) { return loss(net, x); });
+  EXPECT_LT(test::worst_relative_error(d_weights, numeric_weights), 1e-6);
+  EXPECT_LT(test::worst_relative_error(d_input, numeric_input), 1e-6);
+  EXPECT_GT(test::worst_relative_error(std::vector<double>(d_weights.size(), 0.0), numeric_weights), 0.5);
+}
+
+class MlpBackends : public testing::TestWithParam<std::tuple<IsaLevel, std::size_t>> {};
+
+/// One layer of 12 -> 20 with ReLU behind it, forward and both gradients, against the double reference.
+TEST_P(MlpBackends, EqualReference) {
+  const auto [isa, n] = GetParam();
+  const test::ScopedIsa scope(isa);
+  constexpr int kIn = 12, kOut = 20;
+  const MlpLayout layer = {{kIn, kOut}};
+  const MlpReference<double> net{layer, random_values(layer.weight_count(), 3)};
+  const std::vector<float> w(net.weights.begin(), net.weights.end());
+  std::vector<float> w_transposed(w.size());
+  for (int o = 0; o < kOut; ++o) {
+    for (int i = 0; i < kIn; ++i) w_transposed[i * kOut + o] = w[o * kIn + i];
+  }
+  const std::vector<double> in = random_values(n * kIn, 4), d_out = random_values(n * kOut, 5);
+  const AlignedVector<float> in_groups = to_groups(in, kIn, 0.0f), d_out_groups = to_groups(d_out, kOut, 0.0f);
+  const std::size_t groups = groups_of(n);
+
+  AlignedVector<float> out(groups * kOut * kGroup), d_in(groups * kIn * kGroup);
+  mlp_kernels().forward(w_transposed.data(), kIn, kOut, in_groups.data(), kIn, out.data(), kOut, groups, true);
+  mlp_kernels().backward_input(w.data(), kIn, kOut, d_out_groups.data(), kOut, d_in.data(), kIn, groups,
+                               in_groups.data(), kIn);
+  std::vector<float> d_w(w.size(), 0.0f);
+  mlp_kernels().backward_weights(in_groups.data(), kIn, d_out_groups.data(), kOut, groups, kIn, kOut, d_w.data());
+
+  std::vector<double> expected_d_w(w.size(), 0.0);
+  const std::vector<float> got_out = from_groups(out, kOut, n), got_d_in = from_groups(d_in, kIn, n);
+  for (std::size_t s = 0; s < n; ++s) {
+    const std::vector<double> x(in.begin() + s * kIn, in.begin() + (s + 1) * kIn);
+    const auto activations = net.forward(x);
+    const std::vector<double> expected_d_in = net.backward(
+        activations, std::vector<double>(d_out.begin() + s * kOut, d_out.begin() + (s + 1) * kOut), expected_d_w);
+    // 20 float multiply-adds of values below 1.
+    for (int o = 0; o < kOut; ++o) {
+      ASSERT_NEAR(got_out[s * kOut + o], std::max(0.0, activations[1][o]), 5e-6);
+    }
+    for (int i = 0; i < kIn; ++i) ASSERT_NEAR(got_d_in[s * kIn + i], x[i] > 0 ? expected_d_in[i] : 0.0, 5e-6);
+  }
+  if (n > 0) {
+    EXPECT_LT(test::relative_distance(d_w, expected_d_w), 2e-6);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, MlpBackends,
+                         testing::Combine(testing::ValuesIn(test::available_isas()),
+                                          testing::Values(0, 1, 15, 16, 17, 1000)),
+                         [](const auto& param_info) {
+                           return to_string(std::get<0>(param_info.param)) + "_" +
+                                  std::to_string(std::get<1>(param_info.param));
+                         });
+
+}  // namespace
+}  // namespace cnerf
