@@ -22,6 +22,9 @@ constexpr Kind kKinds[] = {
 #ifdef CNERF_HAS_BUILTIN_COLORIZER
     {"builtin", "", make_builtin_colorizer, false},
 #endif
+    {"reference", "IMAGE[,IMAGE...]", make_reference_colorizer, true},
+    {"torchscript", "FILE", make_torchscript_colorizer, true},
+    {"exec", "COMMAND", make_exec_colorizer, true},
     {"grey", "", make_grey_colorizer, false},
 };
 
