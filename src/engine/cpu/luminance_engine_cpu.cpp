@@ -41,7 +41,7 @@ LuminanceEngineCpu::LuminanceEngineCpu(const LuminanceEngineOptions& options)
     : options_(options),
       field_(options.grid, 1.0f / std::ldexp(1.0f, 1 - options.cascades), 1.05f * options.max_luminance, options.seed),
       occupancy_(options.occupancy, options.cascades),
-      counters_{0, 256},
+      counters_{0, std::clamp<std::int64_t>(options.samples_per_step / 256, 64, kMostRays)},
       chunks_(kChunks) {}
 
 LuminanceEngineCpu::ObservedRay LuminanceEngineCpu::observe(const std::vector<TrainingView>& views,

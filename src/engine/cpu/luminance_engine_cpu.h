@@ -30,6 +30,17 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   [[nodiscard]] std::vector<StatePiece> state() override;
   void state_loaded() override;
 
+  /// A ray of a training step and what its pixel shows.
+  struct ObservedRay {
+    Ray ray;
+    float target = 0;      ///< linear Y over black
+    float coverage = 1;    ///< alpha of the pixel
+    float background = 0;  ///< linear Y put behind ray and pixel alike
+    float jitter = 0;
+  };
+  /// The rays of the next step: a pure function of the step number.
+  [[nodiscard]] ObservedRay observe(const std::vector<TrainingView>& views, std::size_t ray) const;
+
   /// Gradients of one step without applying them, for tests.
   struct Gradients {
     std::vector<float> table;    ///< [rows, 4]
@@ -44,13 +55,6 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   static constexpr std::size_t kBlockRays = 16;
   static constexpr std::size_t kChunks = 32;  // parts of a step whose sums are added in order, for any thread count
 
-  struct ObservedRay {
-    Ray ray;
-    float target = 0;      // linear Y over black
-    float coverage = 1;    // alpha of the pixel
-    float background = 0;  // linear Y put behind ray and pixel alike
-    float jitter = 0;
-  };
   /// Samples of a block's rays that survive early termination, ray by ray.
   struct Block {
     std::vector<RaySample> samples;
@@ -71,7 +75,6 @@ class LuminanceEngineCpu final : public LuminanceEngine {
     std::size_t marched = 0, trained = 0;
   };
 
-  [[nodiscard]] ObservedRay observe(const std::vector<TrainingView>& views, std::size_t ray) const;
   /// Marches rays together and keeps the samples in front of the point where a ray becomes opaque: densities are
   /// computed in waves of a few samples a ray, so that hidden samples cost next to nothing.
   void collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,

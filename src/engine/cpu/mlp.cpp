@@ -7,8 +7,8 @@
 
 namespace cnerf {
 
-MlpCpu::MlpCpu(MlpLayout layout, std::uint64_t seed, std::uint64_t stream)
-    : layout_(std::move(layout)), kernels_(&mlp_kernels()) {
+MlpCpu::MlpCpu(MlpLayout layout, std::uint64_t seed, std::uint64_t stream, bool relu_output)
+    : layout_(std::move(layout)), relu_output_(relu_output), kernels_(&mlp_kernels()) {
   for (const int width : layout_.widths) CNERF_CHECK(width % 4 == 0, "layer widths are multiples of 4");
   const std::vector<float> initial = initial_weights(layout_, seed, stream);
   weights_.assign(initial.begin(), initial.end());
@@ -30,7 +30,7 @@ void MlpCpu::transpose_weights() {
 
 void MlpCpu::forward(const std::vector<Channels>& activations, std::size_t groups) const {
   for (int l = 0; l < layout_.layers(); ++l) {
-    const bool relu = l + 1 < layout_.layers();
+    const bool relu = l + 1 < layout_.layers() || relu_output_;
     kernels_->forward(transposed_.data() + layout_.weight_offset(l), layout_.widths[l], layout_.widths[l + 1],
                       activations[l].data, activations[l].stride, activations[l + 1].data, activations[l + 1].stride,
                       groups, relu);

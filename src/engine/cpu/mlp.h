@@ -21,13 +21,15 @@ struct Channels {
 
 class MlpCpu {
  public:
-  MlpCpu(MlpLayout layout, std::uint64_t seed, std::uint64_t stream);
+  /// @param relu_output  ReLU behind the last layer as well
+  MlpCpu(MlpLayout layout, std::uint64_t seed, std::uint64_t stream, bool relu_output = false);
 
   [[nodiscard]] const MlpLayout& layout() const { return layout_; }
 
   /// @param activations  layers() + 1 arrays: [0] the input; the others are written, hidden ones after ReLU.
   void forward(const std::vector<Channels>& activations, std::size_t groups) const;
-  /// @param gradients  layers() + 1 arrays beside the activations: the last one is given, the others are written;
+  /// @param gradients  layers() + 1 arrays beside the activations: the last one is given (behind its ReLU, if
+  ///                   it has one, it must be zero where the activation is), the others are written;
   ///                   [0] may have null data when nobody needs the input's gradient.
   /// @param d_weights  [weight_count], added to
   void backward(const std::vector<Channels>& activations, const std::vector<Channels>& gradients, std::size_t groups,
@@ -42,6 +44,7 @@ class MlpCpu {
 
  private:
   MlpLayout layout_;
+  bool relu_output_;
   const MlpKernels* kernels_;
   AlignedVector<float> weights_;     ///< [layer][out, in]
   AlignedVector<float> transposed_;  ///< [layer][in, out]
