@@ -1,0 +1,58 @@
+#pragma once
+/// Stage 2's inner loops on frozen geometry: a distribution over the 313 ab bins a pixel, and the per-sample colour
+/// that a bake needs.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "encoding/hash_grid_levels.h"
+#include "src/color/ab_bins.h"
+#include "src/engine/pixel_samples.h"
+#include "src/engine/state.h"
+#include "src/field/color_field.h"
+
+namespace cnerf {
+
+/// Pixels of less opacity have no colour: a uniform softmax would decode to the first bin, a vivid green.
+inline constexpr float kLeastColoredOpacity = 0.01f;
+
+/// Classification-based injection (paper, Eq. color classification loss, read as KL(Z || Z_hat), mean over pixels).
+/// Hidden features of samples are composited once, a linear head is applied once a pixel: the same as compositing
+/// logits, since the head is linear: W sum(w h) / A + b = sum(w (W h + b)) / A.
+class ChromaEngine {
+ public:
+  virtual ~ChromaEngine() = default;
+  /// One optimiser step; returns the mean loss.
+  /// @param labels         [R] soft labels of the pixels
+  /// @param pixel_weights  [R] factors of the pixels' losses (class rebalancing, opacity); may be empty = all 1
+  virtual double step(const PixelSamples& pixels, std::span<const SoftLabel> labels,
+                      std::span<const float> pixel_weights, float learning_rate) = 0;
+  /// @param logits  [R, 313]; of pixels below kLeastColoredOpacity they mean nothing
+  virtual void logits(const PixelSamples& pixels, std::span<float> logits) const = 0;
+  [[nodiscard]] virtual long step_count() const = 0;
+  [[nodiscard]] virtual std::vector<StatePiece> state() = 0;
+  virtual void state_loaded() = 0;
+};
+
+/// Per-sample chromaticity, fitted so that compositing it reproduces the pixels' decoded colours (what is baked is what
+/// is seen). XYZ of samples composite linearly, so this is exact for every emission-absorption renderer.
+class ChromaticityEngine {
+ public:
+  virtual ~ChromaticityEngine() = default;
+  /// One optimiser step towards target ab values at the pixels' own luminance; returns the mean ab distance.
+  virtual double step(const PixelSamples& pixels, std::span<const Ab> targets, float learning_rate) = 0;
+  /// ab of the composited XYZ of each pixel.
+  virtual void composite(const PixelSamples& pixels, std::span<Ab> colors) const = 0;
+  virtual void query(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const = 0;
+  [[nodiscard]] virtual long step_count() const = 0;
+  [[nodiscard]] virtual std::vector<StatePiece> state() = 0;
+  virtual void state_loaded() = 0;
+};
+
+[[nodiscard]] std::unique_ptr<ChromaEngine> make_cpu_chroma_engine(const HashGridOptions& grid, std::uint64_t seed);
+[[nodiscard]] std::unique_ptr<ChromaticityEngine> make_cpu_chromaticity_engine(const HashGridOptions& grid,
+                                                                               std::uint64_t seed);
+
+}  // namespace cnerf

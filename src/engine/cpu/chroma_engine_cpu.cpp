@@ -1,0 +1,182 @@
+#include <tbb/enumerable_thread_specific.h>
+
+#include <cmath>
+
+#include "src/base/check.h"
+#include "src/engine/chroma_engine.h"
+#include "src/engine/cpu/point_net.h"
+#include "src/engine/cpu/step_chunks.h"
+
+namespace cnerf {
+namespace {
+
+constexpr int kFeatures = 64;                  // hidden features a sample
+constexpr int kHeadInputs = kFeatures + 4;     // features, the bias's constant 1, padding
+constexpr int kHeadOutputs = kAbBinCount + 3;  // padded to a multiple of 4
+constexpr std::size_t kBlockPixels = 64;       // four groups: their logits stay in L2
+
+class ChromaEngineCpu final : public ChromaEngine {
+ public:
+  ChromaEngineCpu(const HashGridOptions& grid, std::uint64_t seed)
+      : features_(grid, kFeatures, /*relu_output=*/true, seed), head_({{kHeadInputs, kHeadOutputs}}, seed, 4) {
+    // The head starts small, so that the first distribution is nearly uniform.
+    std::vector<float> weights(head_.weights().begin(), head_.weights().end());
+    for (float& w : weights) w *= 0.1f;
+    head_.set_weights(weights);
+  }
+
+  double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
+              float learning_rate) override {
+    CNERF_CHECK_EQ(labels.size(), pixels.pixels());
+    const float scale = 1.0f / static_cast<float>(pixels.pixels());
+    chunks_.run(pixels.pixels(), kBlockPixels, features_.weight_count() + head_.layout().weight_count(),
+                [&](StepChunk& chunk, std::size_t begin, std::size_t end) {
+                  Work& work = works_.local();
+                  forward(pixels, begin, end, work);
+                  for (std::size_t p = begin; p < end; ++p) {
+                    const float weight = pixel_weights.empty() ? 1.0f : pixel_weights[p];
+                    chunk.loss += weight * loss_gradient(work, p - begin, labels[p], weight * scale);
+                  }
+                  clear_padding(work, end - begin);
+                  backward(pixels, begin, end, work, chunk);
+                });
+    steps_.front() += 1;
+    const std::vector<float> d_weights = chunks_.d_weights();
+    const auto split = std::ptrdiff_t(features_.weight_count());
+    features_.update(chunks_.runs(), {d_weights.begin(), d_weights.begin() + split}, learning_rate, steps_.front());
+    const AdamSettings adam;
+    head_.update({d_weights.begin() + split, d_weights.end()}, adam, AdamStep(adam, learning_rate, steps_.front()));
+    return chunks_.loss() * scale;
+  }
+
+  void logits(const PixelSamples& pixels, std::span<float> logits) const override {
+    CNERF_CHECK_EQ(logits.size(), pixels.pixels() * kAbBinCount);
+    parallel_ranges(pixels.pixels(), kBlockPixels, [&](std::size_t begin, std::size_t end) {
+      Work& work = works_.local();
+      forward(pixels, begin, end, work);
+      for (std::size_t p = begin; p < end; ++p) {
+        for (int q = 0; q < kAbBinCount; ++q) logits[p * kAbBinCount + q] = work.logits[logit_at(p - begin, q)];
+      }
+    });
+  }
+
+  [[nodiscard]] long step_count() const override { return steps_.front(); }
+  [[nodiscard]] std::vector<StatePiece> state() override {
+    std::vector<StatePiece> state;
+    features_.append_state("features", state);
+    head_.append_state("head", state);
+    state.push_back(state_piece("chroma_steps", steps_));
+    return state;
+  }
+  void state_loaded() override {
+    features_.state_loaded();
+    head_.transpose_weights();
+  }
+
+ private:
+  struct Work {
+    PointWorkspace points;
+    AlignedVector<float> composited, logits, d_composited, d_logits;  // pixels as lanes
+  };
+
+  static std::size_t logit_at(std::size_t pixel, int bin) {
+    return (pixel / kGroup * kHeadOutputs + std::size_t(bin)) * kGroup + pixel % kGroup;
+  }
+  static std::size_t head_input_at(std::size_t pixel, int channel) {
+    return (pixel / kGroup * kHeadInputs + std::size_t(channel)) * kGroup + pixel % kGroup;
+  }
+  /// 1 / A, or 0 for pixels that have no colour.
+  static float inverse_opacity(const PixelSamples& pixels, std::size_t p) {
+    float opacity = 0;
+    for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) opacity += pixels.weights[s];
+    return opacity < kLeastColoredOpacity ? 0.0f : 1.0f / opacity;
+  }
+
+  void forward(const PixelSamples& pixels, std::size_t begin, std::size_t end, Work& work) const {
+    const std::size_t first = pixels.offsets[begin];
+    features_.set_points(std::span(pixels.positions).subspan(first, pixels.offsets[end] - first), work.points);
+    features_.forward(work.points);
+
+    const std::size_t groups = (end - begin + kGroup - 1) / kGroup;
+    work.composited.assign(groups * kHeadInputs * kGroup, 0.0f);
+    for (std::size_t p = begin; p < end; ++p) {
+      const float inverse = inverse_opacity(pixels, p);
+      for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
+        const float weight = pixels.weights[s] * inverse;
+        for (int c = 0; c < kFeatures; ++c) {
+          work.composited[head_input_at(p - begin, c)] +=
+              weight * work.points.output[features_.output_at(s - first, c)];
+        }
+      }
+      work.composited[head_input_at(p - begin, kFeatures)] = 1.0f;
+    }
+    work.logits.resize(groups * kHeadOutputs * kGroup);
+    head_.forward({{work.composited.data(), kHeadInputs}, {work.logits.data(), kHeadOutputs}}, groups);
+  }
+
+  /// KL(label || softmax(logits)) of one pixel; writes its gradient times `scale`.
+  static double loss_gradient(Work& work, std::size_t pixel, const SoftLabel& label, float scale) {
+    work.d_logits.resize(work.logits.size());
+    float largest = work.logits[logit_at(pixel, 0)];
+    for (int q = 1; q < kAbBinCount; ++q) largest = std::max(largest, work.logits[logit_at(pixel, q)]);
+    float sum = 0;
+    for (int q = 0; q < kAbBinCount; ++q) {
+      const float e = std::exp(work.logits[logit_at(pixel, q)] - largest);
+      work.d_logits[logit_at(pixel, q)] = e;
+      sum += e;
+    }
+    for (int q = 0; q < kAbBinCount; ++q) work.d_logits[logit_at(pixel, q)] *= scale / sum;
+    double loss = 0;
+    for (int i = 0; i < kSoftLabelBins; ++i) {
+      const std::size_t at = logit_at(pixel, label.bin[i]);
+      const float z = label.weight[i];
+      if (z <= 0) continue;
+      loss += z * (std::log(z) - (work.logits[at] - largest - std::log(sum)));
+      work.d_logits[at] -= scale * z;
+    }
+    for (int pad = kAbBinCount; pad < kHeadOutputs; ++pad) work.d_logits[logit_at(pixel, pad)] = 0;
+    return loss;
+  }
+
+  static void clear_padding(Work& work, std::size_t pixels) {
+    const std::size_t lanes = work.d_logits.size() / kHeadOutputs;
+    for (std::size_t p = pixels; p < lanes; ++p) {
+      for (int q = 0; q < kHeadOutputs; ++q) work.d_logits[logit_at(p, q)] = 0;
+    }
+  }
+
+  void backward(const PixelSamples& pixels, std::size_t begin, std::size_t end, Work& work, StepChunk& chunk) const {
+    work.d_composited.resize(work.composited.size());
+    head_.backward({{work.composited.data(), kHeadInputs}, {work.logits.data(), kHeadOutputs}},
+                   {{work.d_composited.data(), kHeadInputs}, {work.d_logits.data(), kHeadOutputs}},
+                   (end - begin + kGroup - 1) / kGroup, chunk.d_weights.data() + features_.weight_count());
+    const std::size_t first = pixels.offsets[begin];
+    std::fill(work.points.d_output.begin(), work.points.d_output.end(), 0.0f);
+    for (std::size_t p = begin; p < end; ++p) {
+      const float inverse = inverse_opacity(pixels, p);
+      for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
+        const float weight = pixels.weights[s] * inverse;
+        for (int c = 0; c < kFeatures; ++c) {
+          work.points.d_output[features_.output_at(s - first, c)] =
+              weight * work.d_composited[head_input_at(p - begin, c)];
+        }
+      }
+    }
+    float* d_encoded = chunk.append(work.points.positions, work.points.groups, features_.encoded_channels());
+    features_.backward(work.points, d_encoded, chunk.d_weights.data());
+  }
+
+  PointNetCpu features_;
+  MlpCpu head_;
+  StepChunks chunks_;
+  std::vector<std::int64_t> steps_ = {0};
+  mutable tbb::enumerable_thread_specific<Work> works_;
+};
+
+}  // namespace
+
+std::unique_ptr<ChromaEngine> make_cpu_chroma_engine(const HashGridOptions& grid, std::uint64_t seed) {
+  return std::make_unique<ChromaEngineCpu>(grid, seed);
+}
+
+}  // namespace cnerf

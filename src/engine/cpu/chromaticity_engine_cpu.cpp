@@ -1,0 +1,140 @@
+#include <tbb/enumerable_thread_specific.h>
+
+#include <cmath>
+
+#include "src/base/check.h"
+#include "src/color/colorspace_math.h"
+#include "src/engine/chroma_engine.h"
+#include "src/engine/cpu/point_net.h"
+#include "src/engine/cpu/step_chunks.h"
+
+namespace cnerf {
+namespace {
+
+constexpr int kOutputs = 4;  // log x, log z, padding
+constexpr std::size_t kBlockPixels = 64;
+constexpr float kLogLimit = 3.0f;        // chromaticity ratios stay within e^-3 .. e^3: far beyond Rec.709
+constexpr float kSmoothDistance = 4.0f;  // ab units below which the loss is quadratic
+
+/// XYZ of a pixel relative to white.
+struct PixelXyz {
+  float x = 0, y = 0, z = 0;
+};
+
+Ab ab_of(const PixelXyz& pixel) {
+  return {500.0f * (lab_f(pixel.x) - lab_f(pixel.y)), 200.0f * (lab_f(pixel.y) - lab_f(pixel.z))};
+}
+
+float ratio_of(float log_ratio) {
+  return std::exp(std::clamp(log_ratio, -kLogLimit, kLogLimit));
+}
+
+class ChromaticityEngineCpu final : public ChromaticityEngine {
+ public:
+  ChromaticityEngineCpu(const HashGridOptions& grid, std::uint64_t seed)
+      : field_(grid, kOutputs, /*relu_output=*/false, seed) {}
+
+  double step(const PixelSamples& pixels, std::span<const Ab> targets, float learning_rate) override {
+    CNERF_CHECK_EQ(targets.size(), pixels.pixels());
+    const float scale = 1.0f / static_cast<float>(pixels.pixels());
+    chunks_.run(pixels.pixels(), kBlockPixels, field_.weight_count(),
+                [&](StepChunk& chunk, std::size_t begin, std::size_t end) {
+                  PointWorkspace& work = works_.local();
+                  const std::size_t first = forward(pixels, begin, end, work);
+                  std::fill(work.d_output.begin(), work.d_output.end(), 0.0f);
+                  for (std::size_t p = begin; p < end; ++p) {
+                    chunk.loss += loss_gradient(pixels, p, first, targets[p], scale, work);
+                  }
+                  float* d_encoded = chunk.append(work.positions, work.groups, field_.encoded_channels());
+                  field_.backward(work, d_encoded, chunk.d_weights.data());
+                });
+    steps_.front() += 1;
+    field_.update(chunks_.runs(), chunks_.d_weights(), learning_rate, steps_.front());
+    return chunks_.loss() * scale;
+  }
+
+  void composite(const PixelSamples& pixels, std::span<Ab> colors) const override {
+    CNERF_CHECK_EQ(colors.size(), pixels.pixels());
+    parallel_ranges(pixels.pixels(), kBlockPixels, [&](std::size_t begin, std::size_t end) {
+      PointWorkspace& work = works_.local();
+      const std::size_t first = forward(pixels, begin, end, work);
+      for (std::size_t p = begin; p < end; ++p) colors[p] = ab_of(xyz_of(pixels, p, first, work));
+    });
+  }
+
+  void query(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const override {
+    CNERF_CHECK_EQ(positions.size(), chromaticity.size());
+    constexpr std::size_t kPiece = 512;
+    PointWorkspace& work = works_.local();
+    for (std::size_t first = 0; first < positions.size(); first += kPiece) {
+      const std::size_t count = std::min(kPiece, positions.size() - first);
+      field_.set_points(positions.subspan(first, count), work);
+      field_.forward(work);
+      for (std::size_t i = 0; i < count; ++i) {
+        chromaticity[first + i] = {ratio_of(work.output[field_.output_at(i, 0)]),
+                                   ratio_of(work.output[field_.output_at(i, 1)])};
+      }
+    }
+  }
+
+  [[nodiscard]] long step_count() const override { return steps_.front(); }
+  [[nodiscard]] std::vector<StatePiece> state() override {
+    std::vector<StatePiece> state;
+    field_.append_state("chromaticity", state);
+    state.push_back(state_piece("chromaticity_steps", steps_));
+    return state;
+  }
+  void state_loaded() override { field_.state_loaded(); }
+
+ private:
+  std::size_t forward(const PixelSamples& pixels, std::size_t begin, std::size_t end, PointWorkspace& work) const {
+    const std::size_t first = pixels.offsets[begin];
+    field_.set_points(std::span(pixels.positions).subspan(first, pixels.offsets[end] - first), work);
+    field_.forward(work);
+    return first;
+  }
+
+  [[nodiscard]] PixelXyz xyz_of(const PixelSamples& pixels, std::size_t p, std::size_t first,
+                                const PointWorkspace& work) const {
+    PixelXyz sum;
+    for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
+      const float light = pixels.weights[s] * pixels.luminance[s];
+      sum.x += light * ratio_of(work.output[field_.output_at(s - first, 0)]);
+      sum.y += light;
+      sum.z += light * ratio_of(work.output[field_.output_at(s - first, 1)]);
+    }
+    return sum;
+  }
+
+  /// ab distance of one pixel; adds the gradient of its smooth form (Huber) to the samples' outputs.
+  double loss_gradient(const PixelSamples& pixels, std::size_t p, std::size_t first, Ab target, float scale,
+                       PointWorkspace& work) const {
+    const PixelXyz seen = xyz_of(pixels, p, first, work);
+    const Ab color = ab_of(seen);
+    const float da = color.a - target.a, db = color.b - target.b;
+    const float distance = std::sqrt(da * da + db * db);
+    const float slope = scale / std::max(distance, kSmoothDistance);
+    const float d_x = slope * da * 500.0f * lab_f_derivative(seen.x);
+    const float d_z = -slope * db * 200.0f * lab_f_derivative(seen.z);
+    for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
+      const float light = pixels.weights[s] * pixels.luminance[s];
+      const std::size_t at_x = field_.output_at(s - first, 0), at_z = field_.output_at(s - first, 1);
+      if (std::abs(work.output[at_x]) < kLogLimit) work.d_output[at_x] = d_x * light * ratio_of(work.output[at_x]);
+      if (std::abs(work.output[at_z]) < kLogLimit) work.d_output[at_z] = d_z * light * ratio_of(work.output[at_z]);
+    }
+    return distance;
+  }
+
+  PointNetCpu field_;
+  StepChunks chunks_;
+  std::vector<std::int64_t> steps_ = {0};
+  mutable tbb::enumerable_thread_specific<PointWorkspace> works_;
+};
+
+}  // namespace
+
+std::unique_ptr<ChromaticityEngine> make_cpu_chromaticity_engine(const HashGridOptions& grid, std::uint64_t seed) {
+  return std::make_unique<ChromaticityEngineCpu>(grid, seed);
+}
+
+}  // namespace cnerf

@@ -1,0 +1,63 @@
+#include "src/engine/cpu/point_net.h"
+
+#include <algorithm>
+
+namespace cnerf {
+namespace {
+
+constexpr int kHidden = 64;
+
+}  // namespace
+
+PointNetCpu::PointNetCpu(const HashGridOptions& grid, int outputs, bool relu_output, std::uint64_t seed)
+    : outputs_(outputs),
+      relu_output_(relu_output),
+      grid_(grid, seed),
+      net_({{grid_.channels(), kHidden, outputs}}, seed, 3, relu_output) {}
+
+void PointNetCpu::set_points(std::span<const Vec3f> points, PointWorkspace& work) const {
+  work.groups = (points.size() + kGroup - 1) / kGroup;
+  const std::size_t lanes = work.groups * kGroup;
+  work.positions.resize(lanes * 3);
+  work.encoded.resize(lanes * std::size_t(encoded_channels()));
+  for (auto* buffer : {&work.hidden, &work.d_hidden}) buffer->resize(lanes * kHidden);
+  for (auto* buffer : {&work.output, &work.d_output}) buffer->resize(lanes * std::size_t(outputs_));
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const Vec3f p = i < points.size() ? points[i] : Vec3f{0.5f, 0.5f, 0.5f};
+    float* group = work.positions.data() + i / kGroup * 3 * kGroup + i % kGroup;
+    for (int axis = 0; axis < 3; ++axis) group[axis * kGroup] = std::clamp(p[axis], 0.0f, 1.0f);
+  }
+}
+
+std::vector<Channels> PointNetCpu::activations(PointWorkspace& work) const {
+  return {{work.encoded.data(), encoded_channels()}, {work.hidden.data(), kHidden}, {work.output.data(), outputs_}};
+}
+
+void PointNetCpu::forward(PointWorkspace& work) const {
+  grid_.encode(work.positions.data(), work.groups, work.encoded.data());
+  net_.forward(activations(work), work.groups);
+}
+
+void PointNetCpu::backward(PointWorkspace& work, float* d_encoded, float* d_weights) const {
+  if (relu_output_) {
+    for (std::size_t i = 0; i < work.output.size(); ++i) work.d_output[i] = work.output[i] > 0 ? work.d_output[i] : 0;
+  }
+  net_.backward(activations(work),
+                {{d_encoded, encoded_channels()}, {work.d_hidden.data(), kHidden}, {work.d_output.data(), outputs_}},
+                work.groups, d_weights);
+}
+
+void PointNetCpu::update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights,
+                         float learning_rate, long step) {
+  const AdamSettings adam;
+  const AdamStep adam_step(adam, learning_rate, step);
+  grid_.backward_and_update(runs, adam, adam_step);
+  net_.update(d_weights, adam, adam_step);
+}
+
+void PointNetCpu::append_state(const std::string& prefix, std::vector<StatePiece>& state) {
+  grid_.append_state(prefix + ".grid", state);
+  net_.append_state(prefix + ".net", state);
+}
+
+}  // namespace cnerf

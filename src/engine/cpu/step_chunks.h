@@ -1,0 +1,79 @@
+#pragma once
+/// A fixed partition of a step's pixels: chunks are worked on in parallel, their sums are added in order, so that a
+/// step gives the same bits for any number of threads.
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "src/base/aligned.h"
+#include "src/base/parallel.h"
+#include "src/engine/cpu/hash_grid.h"
+
+namespace cnerf {
+
+/// What one chunk adds up: scattered gradients as runs, weight gradients and a loss.
+struct StepChunk {
+  AlignedVector<float> positions, d_encoded;
+  std::size_t groups = 0;
+  std::vector<float> d_weights;
+  double loss = 0;
+
+  void clear(std::size_t weight_count) {
+    groups = 0;
+    loss = 0;
+    d_weights.assign(weight_count, 0.0f);
+  }
+  /// Appends a block's positions; returns where its gradient belongs.
+  float* append(const AlignedVector<float>& block_positions, std::size_t block_groups, int encoded_channels) {
+    const std::size_t group_size = std::size_t(encoded_channels) * kGroup;
+    positions.resize((groups + block_groups) * 3 * kGroup);
+    d_encoded.resize((groups + block_groups) * group_size);
+    std::copy_n(block_positions.begin(), block_groups * 3 * kGroup,
+                positions.begin() + std::ptrdiff_t(groups * 3 * kGroup));
+    float* target = d_encoded.data() + groups * group_size;
+    groups += block_groups;
+    return target;
+  }
+};
+
+class StepChunks {
+ public:
+  static constexpr std::size_t kCount = 32;
+
+  /// Calls `work(chunk, begin, end)` over blocks of at most `block` of `items` items, chunk by chunk.
+  template <typename Work>
+  void run(std::size_t items, std::size_t block, std::size_t weight_count, Work&& work) {
+    const std::size_t blocks = (items + block - 1) / block;
+    parallel_tasks(kCount, [&](std::size_t c) {
+      chunks_[c].clear(weight_count);
+      for (std::size_t b = c * blocks / kCount; b < (c + 1) * blocks / kCount; ++b) {
+        work(chunks_[c], b * block, std::min(items, (b + 1) * block));
+      }
+    });
+  }
+  [[nodiscard]] std::vector<EncodedSamples> runs() const {
+    std::vector<EncodedSamples> all;
+    for (const StepChunk& chunk : chunks_)
+      all.push_back({chunk.positions.data(), chunk.d_encoded.data(), chunk.groups});
+    return all;
+  }
+  [[nodiscard]] std::vector<float> d_weights() const {
+    std::vector<float> sum(chunks_.front().d_weights.size(), 0.0f);
+    for (const StepChunk& chunk : chunks_) {
+      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += chunk.d_weights[i];
+    }
+    return sum;
+  }
+  [[nodiscard]] double loss() const {
+    double total = 0;
+    for (const StepChunk& chunk : chunks_) total += chunk.loss;
+    return total;
+  }
+
+ private:
+  std::array<StepChunk, kCount> chunks_;
+};
+
+}  // namespace cnerf
