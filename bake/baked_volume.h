@@ -18,6 +18,7 @@ struct BakedVoxel {
   float luminance = 0;  ///< linear Y
   Vec3f rgb{};          ///< linear Rec.709, in gamut
   float a = 0, b = 0;   ///< CIE Lab a and b of `rgb`
+  friend bool operator==(const BakedVoxel&, const BakedVoxel&) = default;
 };
 
 struct BakedVolume {

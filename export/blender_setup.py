@@ -1,0 +1,315 @@
+"""Shows a cnerf bake in Blender the way it was trained: a volume that emits and absorbs, and the capture's cameras.
+
+In Blender:  open this file in the Scripting tab and press Run. It makes a scene of its own and leaves others alone.
+Headless:    blender -b --python blender_setup.py -- --render out.exr --camera 3 --samples 64
+             blender -b --python blender_setup.py -- --save scene.blend
+Works with Blender 3.4 and later. Colours are linear Rec.709; the view transform is set to Standard, because Filmic and
+AgX would change them.
+"""
+
+import argparse
+import json
+import math
+import os
+import sys
+import traceback
+
+import bpy
+from mathutils import Matrix, Vector
+
+BAKE_FOLDER = ""
+
+# Up to some release of 2025 Blender draws voxel i of a VDB at (i + 0.5) h, although OpenVDB says that its value sits at
+# index i: files that follow OpenVDB appear shifted by half a voxel. The fix is Blender's pull request 138449; whether
+# 4.5 or 5.0 was the first release with it is not certain, and this constant is the only place that depends on it.
+FIRST_VERSION_WITHOUT_HALF_VOXEL = (4, 5, 0)
+
+SENSOR_MM = 36.0
+MAX_STEPS_OF_BLENDER = 65536
+
+
+def find_manifest(given):
+    """The manifest given, else the one beside this file, else the one of the folder the bake was written to."""
+    folders = [BAKE_FOLDER]
+    if "__file__" in globals():
+        folders.insert(0, os.path.dirname(os.path.abspath(__file__)))
+    candidates = [given] if given else [os.path.join(folder, "manifest.json") for folder in folders if folder]
+    for candidate in candidates:
+        if os.path.isfile(candidate):
+            return os.path.abspath(candidate)
+    raise FileNotFoundError("no manifest.json at " + " or ".join(candidates) + "; name it with --manifest")
+
+
+def half_voxel_shift(volume):
+    """What to move the volume by, along each axis, so that every voxel's centre is where it was baked."""
+    half = 0.5 * volume["voxel_size"]
+    blender_adds_half = bpy.app.version < FIRST_VERSION_WITHOUT_HALF_VOXEL
+    drawn_too_far = half if volume["voxel_origin"] == "center" else 0.0
+    return half - drawn_too_far - (half if blender_adds_half else 0.0)
+
+
+def make_scene():
+    if bpy.app.background:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        scene = bpy.context.scene
+        scene.name = "cnerf"
+        return scene
+    scene = bpy.data.scenes.new("cnerf")
+    bpy.context.window.scene = scene
+    return scene
+
+
+def make_material():
+    """Absorption and emission, both of the density: exactly c (1 - exp(-tau)). Principled Volume would not multiply
+    emission by density."""
+    material = bpy.data.materials.new("cnerf volume")
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+
+    def node(kind, x, y, **properties):
+        made = nodes.new(kind)
+        made.location = (x, y)
+        for name, value in properties.items():
+            setattr(made, name, value)
+        return made
+
+    density = node("ShaderNodeAttribute", -700, 120, attribute_name="density", label="density")
+    color = node("ShaderNodeAttribute", -700, -120, attribute_name="color", label="color")
+    gain = node("ShaderNodeMath", -480, 120, operation="MULTIPLY", label="density gain")
+    gain.inputs[1].default_value = 1.0
+    absorption = node("ShaderNodeVolumeAbsorption", -240, 120)
+    absorption.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+    emission = node("ShaderNodeEmission", -240, -80)
+    both = node("ShaderNodeAddShader", 0, 40)
+    output = node("ShaderNodeOutputMaterial", 200, 40)
+
+    links.new(density.outputs["Fac"], gain.inputs[0])
+    links.new(gain.outputs[0], absorption.inputs["Density"])
+    links.new(gain.outputs[0], emission.inputs["Strength"])
+    links.new(color.outputs["Color"], emission.inputs["Color"])
+    links.new(absorption.outputs[0], both.inputs[0])
+    links.new(emission.outputs[0], both.inputs[1])
+    links.new(both.outputs[0], output.inputs["Volume"])
+
+    material.cycles.homogeneous_volume = False
+    material.cycles.volume_interpolation = "LINEAR"
+    return material
+
+
+def add_volume(scene, root, volume, folder):
+    data = bpy.data.volumes.new("cnerf volume")
+    data.filepath = os.path.join(folder, volume["file"])
+    data.render.space = "OBJECT"
+    data.render.step_size = 0.0  # automatic: one voxel times the scene's step rate
+    data.render.clipping = 0.0  # the default cuts densities below 0.001 per unit, which large scenes have
+    if hasattr(data.render, "precision"):
+        data.render.precision = "HALF" if volume["half_density"] else "FULL"
+    data.materials.append(make_material())
+    shown = bpy.data.objects.new("cnerf volume", data)
+    shown.parent = root
+    shown.location = (half_voxel_shift(volume),) * 3
+    scene.collection.objects.link(shown)
+    return shown
+
+
+def blender_from_opencv_camera():
+    """Blender's cameras look along -Z with +Y up; the manifest's along +Z with +Y down."""
+    return Matrix(((1, 0, 0, 0), (0, -1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1)))
+
+
+def pixel_aspect(camera):
+    """Blender wants both at least 1."""
+    ratio = camera["fx"] / camera["fy"]
+    return (1.0, ratio) if ratio >= 1.0 else (1.0 / ratio, 1.0)
+
+
+def scene_radius(volume):
+    low, high = Vector(volume["bounds"]["min"]), Vector(volume["bounds"]["max"])
+    return 0.5 * (high - low).length, 0.5 * (high + low)
+
+
+def add_camera(scene, root, camera, volume):
+    data = bpy.data.cameras.new(camera["name"])
+    aspect_x, aspect_y = pixel_aspect(camera)
+    width = camera["width"] * aspect_x
+    data.sensor_fit = "HORIZONTAL"
+    data.sensor_width = SENSOR_MM
+    data.lens = SENSOR_MM * camera["fx"] / camera["width"]
+    data.shift_x = (0.5 * camera["width"] - camera["cx"]) * aspect_x / width
+    data.shift_y = (camera["cy"] - 0.5 * camera["height"]) * aspect_y / width
+
+    world_from_camera = Matrix(camera["world_from_camera"])
+    radius, centre = scene_radius(volume)
+    distance = (world_from_camera.to_translation() - centre).length
+    data.clip_start = 1e-4 * radius
+    data.clip_end = 2.0 * (distance + radius)
+    data.display_size = 0.05 * radius
+
+    placed = bpy.data.objects.new(camera["name"], data)
+    placed.parent = root
+    placed.matrix_basis = world_from_camera @ blender_from_opencv_camera()
+    scene.collection.objects.link(placed)
+    if any(camera["distortion"]):
+        print("cnerf: camera", camera["name"], "has lens distortion, which Blender's camera leaves out")
+    return placed
+
+
+def overview_camera(volume):
+    """A camera for bakes without any: in front of the box, in the manifest's terms."""
+    radius, centre = scene_radius(volume)
+    rows = [[1, 0, 0, centre.x], [0, 0, 1, centre.y - 3.2 * radius], [0, -1, 0, centre.z], [0, 0, 0, 1]]
+    return {"name": "overview", "width": 960, "height": 960, "fx": 1300.0, "fy": 1300.0, "cx": 480.0, "cy": 480.0,
+            "distortion": [], "world_from_camera": rows}
+
+
+def use_camera(scene, camera, placed):
+    """Makes a camera the active one, with the size of its picture."""
+    scene.camera = placed
+    scene.render.resolution_x = camera["width"]
+    scene.render.resolution_y = camera["height"]
+    scene.render.resolution_percentage = 100
+    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = pixel_aspect(camera)
+
+
+def pick_camera(cameras, wanted):
+    """By number or by name."""
+    if wanted.isdigit() and int(wanted) < len(cameras):
+        return int(wanted)
+    names = [camera["name"] for camera in cameras]
+    if wanted in names:
+        return names.index(wanted)
+    raise ValueError("no camera %s; there are %d, the first is %s" % (wanted, len(cameras), names[0]))
+
+
+def blacken_world(scene):
+    world = bpy.data.worlds.new("cnerf black")
+    world.color = (0.0, 0.0, 0.0)
+    world.use_nodes = True
+    for node in world.node_tree.nodes:
+        if node.type == "BACKGROUND":
+            node.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+    scene.world = world
+
+
+def steps_needed(volume, step_rate):
+    low, high = volume["bounds"]["min"], volume["bounds"]["max"]
+    diagonal = math.dist(low, high) / volume["voxel_size"]
+    return min(MAX_STEPS_OF_BLENDER, max(1024, int(1.2 * diagonal / step_rate) + 16))
+
+
+def set_engine(scene, name):
+    """EEVEE has had several names."""
+    wanted = ["CYCLES"] if name == "cycles" else ["BLENDER_EEVEE_NEXT", "BLENDER_EEVEE"]
+    for engine in wanted:
+        try:
+            scene.render.engine = engine
+            return
+        except TypeError:
+            continue
+    raise ValueError("this Blender has none of " + ", ".join(wanted))
+
+
+def set_if_known(settings, name, value):
+    """Settings that only some releases have."""
+    if hasattr(settings, name):
+        setattr(settings, name, value)
+
+
+def set_up_rendering(scene, volume, options):
+    set_engine(scene, options.engine)
+    cycles = scene.cycles
+    cycles.samples = options.samples
+    cycles.use_denoising = False
+    cycles.volume_step_rate = options.step_rate
+    cycles.volume_preview_step_rate = max(1.0, options.step_rate)
+    cycles.volume_max_steps = steps_needed(volume, options.step_rate)
+    cycles.volume_bounces = 0
+    set_if_known(cycles, "volume_biased", True)  # ray marching, where the default is null scattering
+    if options.exact:
+        cycles.use_adaptive_sampling = False
+        cycles.pixel_filter_type = "BOX"
+        cycles.filter_width = 1.0
+        cycles.volume_max_steps = max(4096, cycles.volume_max_steps)
+    scene.render.film_transparent = options.transparent or options.exact
+    scene.display_settings.display_device = "sRGB"
+    scene.view_settings.view_transform = "Standard"
+    scene.view_settings.look = "None"
+    scene.view_settings.exposure = 0.0
+    scene.view_settings.gamma = 1.0
+
+
+def set_up(options):
+    """Builds the scene and returns it."""
+    manifest_file = find_manifest(options.manifest)
+    with open(manifest_file, encoding="utf-8") as file:
+        manifest = json.load(file)
+    volume = manifest["volume"]
+    if volume is None:
+        raise ValueError(manifest_file + " lists no volume")
+
+    scene = make_scene()
+    root = bpy.data.objects.new("cnerf", None)  # move, turn or scale this one: it carries everything
+    root.empty_display_size = 0.1 * scene_radius(volume)[0]
+    scene.collection.objects.link(root)
+    add_volume(scene, root, volume, os.path.dirname(manifest_file))
+    blacken_world(scene)
+    set_up_rendering(scene, volume, options)
+
+    cameras = manifest["cameras"] or [overview_camera(volume)]
+    placed = [add_camera(scene, root, camera, volume) for camera in cameras]
+    picked = pick_camera(cameras, options.camera)
+    use_camera(scene, cameras[picked], placed[picked])
+    return scene
+
+
+def render(scene, file):
+    """EXR: linear 32-bit RGBA, colour premultiplied by opacity. Else: an 8-bit picture through the view transform."""
+    image = scene.render.image_settings
+    scene.render.filepath = os.path.abspath(file)
+    scene.render.use_file_extension = False
+    if file.lower().endswith(".exr"):
+        image.file_format = "OPEN_EXR"
+        image.color_depth = "32"
+        image.exr_codec = "ZIP"
+    else:
+        image.file_format = "PNG"
+        image.color_depth = "8"
+    image.color_mode = "RGBA" if scene.render.film_transparent else "RGB"
+    bpy.ops.render.render(write_still=True, scene=scene.name)
+
+
+def parse_options(arguments):
+    parser = argparse.ArgumentParser(prog="blender_setup.py", description="Shows a cnerf bake in Blender.")
+    parser.add_argument("--manifest", default="", help="manifest.json; default: the one beside this file")
+    parser.add_argument("--camera", default="0", help="number or name of the camera to look through")
+    parser.add_argument("--render", default="", help="picture to render, .exr or .png")
+    parser.add_argument("--save", default="", help=".blend file to save the scene to")
+    parser.add_argument("--engine", choices=("cycles", "eevee"), default="cycles")
+    parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("--step-rate", type=float, default=1.0, help="length of a volume step, in voxels")
+    parser.add_argument("--transparent", action="store_true", help="opacity in the picture's alpha channel")
+    parser.add_argument("--exact", action="store_true", help="box pixel filter, all samples, opacity in alpha")
+    return parser.parse_args(arguments)
+
+
+def main():
+    arguments = sys.argv[sys.argv.index("--") + 1:] if bpy.app.background and "--" in sys.argv else []
+    options = parse_options(arguments)
+    scene = set_up(options)
+    if options.save:
+        bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath(options.save))
+    if options.render:
+        render(scene, options.render)
+
+
+if __name__ == "__main__":
+    if not bpy.app.background:
+        main()
+    else:
+        # Blender itself would go on and end with success.
+        try:
+            main()
+        except Exception:
+            traceback.print_exc()
+            sys.exit(1)

@@ -1,0 +1,208 @@
+#include "export/manifest.h"
+
+#include <nlohmann/json.hpp>
+
+#include "bake/dilate.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+
+namespace cnerf {
+namespace {
+
+using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
+
+Json to_json(Vec3d v) {
+  return {v.x, v.y, v.z};
+}
+Vec3d vec3_from(const Json& j) {
+  return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()};
+}
+
+/// Four rows; applies to column vectors.
+Json to_json(const Affined& map) {
+  Json rows = Json::array();
+  for (int i = 0; i < 3; ++i) {
+    const Vec3d& row = map.linear.rows[i];
+    rows.push_back({row.x, row.y, row.z, map.translation[i]});
+  }
+  rows.push_back({0.0, 0.0, 0.0, 1.0});
+  return rows;
+}
+Affined affine_from(const Json& rows) {
+  Affined map;
+  for (int i = 0; i < 3; ++i) {
+    map.linear.rows[i] = vec3_from(rows.at(i));
+    map.translation[i] = rows.at(i).at(3).get<double>();
+  }
+  return map;
+}
+
+const std::vector<std::pair<LensModel, std::string>> kLensNames{
+    {LensModel::kPinhole, "pinhole"}, {LensModel::kOpenCv, "opencv"}, {LensModel::kOpenCvFisheye, "opencv_fisheye"}};
+
+Json to_json(const BakeCamera& camera) {
+  const Intrinsics& lens = camera.intrinsics;
+  std::string model;
+  for (const auto& [value, name] : kLensNames) {
+    if (value == lens.model) model = name;
+  }
+  return {{"name", camera.name},
+          {"width", lens.width},
+          {"height", lens.height},
+          {"fx", lens.fx},
+          {"fy", lens.fy},
+          {"cx", lens.cx},
+          {"cy", lens.cy},
+          {"model", model},
+          {"distortion", lens.distortion},
+          {"world_from_camera", to_json(camera.world_from_camera)}};
+}
+
+BakeCamera camera_from(const Json& j) {
+  BakeCamera camera;
+  Intrinsics& lens = camera.intrinsics;
+  camera.name = j.at("name").get<std::string>();
+  lens.width = j.at("width").get<int>();
+  lens.height = j.at("height").get<int>();
+  lens.fx = j.at("fx").get<double>();
+  lens.fy = j.at("fy").get<double>();
+  lens.cx = j.at("cx").get<double>();
+  lens.cy = j.at("cy").get<double>();
+  for (const auto& [value, name] : kLensNames) {
+    if (name == j.at("model").get<std::string>()) lens.model = value;
+  }
+  lens.distortion = j.at("distortion").get<std::array<double, 8>>();
+  camera.world_from_camera = affine_from(j.at("world_from_camera"));
+  return camera;
+}
+
+Json to_json(const ManifestVolume& volume) {
+  return {{"file", volume.file},
+          {"bounds", {{"min", to_json(volume.bounds.min)}, {"max", to_json(volume.bounds.max)}}},
+          {"voxel_size", volume.voxel_size},
+          {"resolution", {volume.resolution.x, volume.resolution.y, volume.resolution.z}},
+          {"voxels", volume.voxels},
+          {"max_density", volume.max_density},
+          {"density_unit", "1/world unit"},
+          {"voxel_origin", volume.voxel_origin},
+          {"half_density", volume.half_density}};
+}
+
+ManifestVolume volume_from(const Json& j) {
+  ManifestVolume volume;
+  volume.file = j.at("file").get<std::string>();
+  volume.bounds = {vec3_from(j.at("bounds").at("min")), vec3_from(j.at("bounds").at("max"))};
+  volume.voxel_size = j.at("voxel_size").get<double>();
+  volume.resolution = vec3_from(j.at("resolution")).cast<int>();
+  volume.voxels = j.at("voxels").get<std::size_t>();
+  volume.max_density = j.at("max_density").get<double>();
+  volume.voxel_origin = j.at("voxel_origin").get<std::string>();
+  volume.half_density = j.at("half_density").get<bool>();
+  return volume;
+}
+
+Json to_json(const SceneFrame& frame) {
+  const double scale = frame.unit_per_world;
+  const Affined unit_from_world{Mat3d::identity() * scale, frame.unit_from_world({0, 0, 0})};
+  return {{"name", "source"},
+          {"meaning", "world is the frame the camera poses came in"},
+          {"world_centre", to_json(frame.world_centre)},
+          {"unit_per_world", scale},
+          {"cascades", frame.cascades},
+          {"unit_from_world", to_json(unit_from_world)},
+          {"world_from_unit", to_json(unit_from_world.inverse())}};
+}
+
+SceneFrame frame_from(const Json& j) {
+  return {vec3_from(j.at("world_centre")), j.at("unit_per_world").get<double>(), j.at("cascades").get<int>()};
+}
+
+Json describe_files(const std::vector<std::string>& files, const fs::path& folder) {
+  Json list = Json::array();
+  for (const std::string& name : files) {
+    const std::vector<std::byte> content = read_binary_file(folder / name);
+    list.push_back({{"name", name}, {"bytes", content.size()}, {"sha256", sha256(content)}});
+  }
+  return list;
+}
+
+BakeManifest manifest_from(const Json& j) {
+  BakeManifest manifest;
+  manifest.command_line = j.at("command_line").get<std::vector<std::string>>();
+  for (const Json& file : j.at("files")) manifest.files.push_back(file.at("name").get<std::string>());
+  manifest.units = j.at("units").get<std::string>();
+  manifest.up_axis = j.at("up_axis").get<std::string>();
+  manifest.colorizer = j.at("color").at("colorizer").get<std::string>();
+  manifest.take = j.at("color").at("take").get<std::string>();
+  manifest.frame = frame_from(j.at("frame"));
+  for (const Json& camera : j.at("cameras")) manifest.cameras.push_back(camera_from(camera));
+  if (!j.at("volume").is_null()) manifest.volume = volume_from(j.at("volume"));
+  return manifest;
+}
+
+}  // namespace
+
+ManifestVolume describe_volume(const BakedVolume& volume, const std::string& file, const VdbOptions& options) {
+  std::vector<BakedVoxel> dense;
+  ManifestVolume described;
+  for (const BakedVoxel& voxel : volume.voxels) {
+    if (!(voxel.sigma > 0)) continue;
+    dense.push_back(voxel);
+    described.max_density = std::max<double>(described.max_density, voxel.sigma);
+  }
+  const VoxelBox box = bounding_box(dense);
+  const double h = volume.voxel_size;
+  described.file = file;
+  described.bounds = {volume.origin + box.min.cast<double>() * h,
+                      volume.origin + (box.min + box.size).cast<double>() * h};
+  described.voxel_size = h;
+  described.resolution = volume.resolution;
+  described.voxels = dense.size();
+  described.voxel_origin = options.voxel_origin;
+  described.half_density = options.half && density_fits_half(volume);
+  return described;
+}
+
+fs::path write_manifest(const BakeManifest& manifest, const fs::path& folder) {
+  Json cameras = Json::array();
+  for (const BakeCamera& camera : manifest.cameras) cameras.push_back(to_json(camera));
+  const Json color{{"space", "lin_rec709"},
+                   {"white", "D65"},
+                   {"inferred", !manifest.colorizer.empty()},
+                   {"colorizer", manifest.colorizer},
+                   {"take", manifest.take}};
+  const Json j{{"schema", kManifestSchema},
+               {"program", "cnerf"},
+               {"program_version", CNERF_VERSION},
+               {"command_line", manifest.command_line},
+               {"files", describe_files(manifest.files, folder)},
+               {"units", manifest.units},
+               {"up_axis", manifest.up_axis},
+               {"color", color},
+               {"frame", to_json(manifest.frame)},
+               {"volume", manifest.volume ? to_json(*manifest.volume) : Json(nullptr)},
+               {"camera_axes", "+X right, +Y down, +Z forward; centre of the first pixel at (0.5, 0.5)"},
+               {"cameras", cameras}};
+  const fs::path file = folder / "manifest.json";
+  write_file(file, j.dump(2) + "\n");
+  return file;
+}
+
+BakeManifest read_manifest(const fs::path& file) {
+  const std::string text = read_text_file(file);
+  try {
+    const Json j = Json::parse(text);
+    const int schema = j.at("schema").get<int>();
+    if (schema > kManifestSchema) {
+      throw InputError(file, "schema",
+                       "expected at most " + std::to_string(kManifestSchema) + ", found " + std::to_string(schema) +
+                           ": written by a newer cnerf");
+    }
+    return manifest_from(j);
+  } catch (const nlohmann::json::exception& failure) {
+    throw InputError(file, "", failure.what());
+  }
+}
+
+}  // namespace cnerf

@@ -1,0 +1,51 @@
+#pragma once
+/// manifest.json: what a bake consists of and where it lies. Everything else that reads a bake starts here.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bake/bake_camera.h"
+#include "bake/baked_volume.h"
+#include "export/vdb_writer.h"
+#include "src/base/aabb.h"
+
+namespace cnerf {
+
+inline constexpr int kManifestSchema = 1;
+
+/// The volume of a bake, for programs that set up a scene without reading it.
+struct ManifestVolume {
+  std::string file;          ///< relative to the manifest
+  Aabbd bounds;              ///< world units; around voxels with density
+  double voxel_size = 0;     ///< world units
+  Vec3i resolution{};        ///< voxels along each axis of the baked box
+  std::size_t voxels = 0;    ///< with density
+  double max_density = 0;    ///< 1/world unit
+  std::string voxel_origin;  ///< "center" or "corner", see VdbOptions
+  bool half_density = true;  ///< density is stored in 16 bits
+};
+[[nodiscard]] ManifestVolume describe_volume(const BakedVolume& volume, const std::string& file,
+                                             const VdbOptions& options);
+
+struct BakeManifest {
+  std::vector<std::string> command_line;
+  std::vector<std::string> files;  ///< relative to the manifest; their sizes and SHA-256 are added when writing
+  std::string units = "scene units";
+  std::string up_axis = "z";
+  std::string colorizer;  ///< empty = not colorized
+  std::string take;
+  SceneFrame frame;
+  std::vector<BakeCamera> cameras;  ///< of the capture
+  std::optional<ManifestVolume> volume;
+};
+
+/// Writes `manifest.json` into `folder`, where the listed files already are, and returns its path.
+/// @throws MissingInputError  when a listed file is not there.  @throws OutputError.
+std::filesystem::path write_manifest(const BakeManifest& manifest, const std::filesystem::path& folder);
+
+/// Reads it back.  @throws MissingInputError, InputError  naming the field; also for a newer schema.
+[[nodiscard]] BakeManifest read_manifest(const std::filesystem::path& file);
+
+}  // namespace cnerf

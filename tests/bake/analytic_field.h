@@ -1,0 +1,88 @@
+#pragma once
+/// A field given by formulas, and cameras to look at it with.
+
+#include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "bake/bake_camera.h"
+#include "src/field/color_field.h"
+
+namespace cnerf::test {
+
+/// Everything in unit space. Occupied where density is positive anywhere within `occupancy_margin` along an axis.
+class AnalyticField : public ColorField {
+ public:
+  using Density = std::function<float(Vec3f)>;
+  using Luminance = std::function<float(Vec3f, Vec3f)>;
+
+  AnalyticField(SceneFrame frame, Density density, float luminance = 0.5f, Chromaticity chromaticity = {})
+      : frame_(frame),
+        density_(std::move(density)),
+        luminance_([luminance](Vec3f, Vec3f) { return luminance; }),
+        chromaticity_([chromaticity](Vec3f) { return chromaticity; }) {}
+
+  AnalyticField& with_luminance(Luminance luminance) {
+    luminance_ = std::move(luminance);
+    return *this;
+  }
+  AnalyticField& with_chromaticity(std::function<Chromaticity(Vec3f)> chromaticity) {
+    chromaticity_ = std::move(chromaticity);
+    return *this;
+  }
+
+  [[nodiscard]] const SceneFrame& frame() const override { return frame_; }
+  [[nodiscard]] bool may_be_occupied(Vec3f position) const override {
+    constexpr float kMargin = 1.0f / 128;
+    for (int corner = 0; corner < 27; ++corner) {
+      const Vec3f offset{static_cast<float>(corner / 9 - 1), static_cast<float>(corner / 3 % 3 - 1),
+                         static_cast<float>(corner % 3 - 1)};
+      if (density_(position + offset * kMargin) != 0) return true;  // also for NaN
+    }
+    return false;
+  }
+  void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override {
+    for (std::size_t i = 0; i < positions.size(); ++i) sigma[i] = density_(positions[i]);
+  }
+  void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
+                       std::span<float> luminance) const override {
+    for (std::size_t i = 0; i < positions.size(); ++i) luminance[i] = luminance_(positions[i], directions[i]);
+  }
+  void query_chromaticity(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const override {
+    for (std::size_t i = 0; i < positions.size(); ++i) chromaticity[i] = chromaticity_(positions[i]);
+  }
+
+ private:
+  SceneFrame frame_;
+  Density density_;
+  Luminance luminance_;
+  std::function<Chromaticity(Vec3f)> chromaticity_;
+};
+
+/// Density `sigma` inside a box of unit space.
+inline AnalyticField::Density box_density(Vec3f min, Vec3f max, float sigma) {
+  return [=](Vec3f p) { return Aabbf{min, max}.contains(p) ? sigma : 0.0f; };
+}
+/// Density `sigma` inside a sphere of unit space.
+inline AnalyticField::Density sphere_density(Vec3f centre, float radius, float sigma) {
+  return [=](Vec3f p) { return length(p - centre) < radius ? sigma : 0.0f; };
+}
+
+/// A pinhole camera at `eye` that looks at `target`; `focal` in pixels, principal point in the middle.
+inline BakeCamera camera_at(const std::string& name, Vec3d eye, Vec3d target, int width, int height, double focal) {
+  const Vec3d forward = normalized(target - eye);
+  const Vec3d up = std::abs(forward.z) < 0.9 ? Vec3d{0, 0, 1} : Vec3d{0, 1, 0};
+  const Vec3d right = normalized(cross(forward, up));
+  BakeCamera camera;
+  camera.name = name;
+  camera.intrinsics.width = width;
+  camera.intrinsics.height = height;
+  camera.intrinsics.fx = camera.intrinsics.fy = focal;
+  camera.intrinsics.cx = width / 2.0;
+  camera.intrinsics.cy = height / 2.0;
+  camera.world_from_camera = {Mat3d::from_columns(right, cross(forward, right), forward), eye};
+  return camera;
+}
+
+}  // namespace cnerf::test

@@ -1,0 +1,108 @@
+#include "export/manifest.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "export/volume_export.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "tests/bake/analytic_field.h"
+#include "tests/export/test_volumes.h"
+#include "tests/support/data.h"
+
+namespace cnerf::test {
+namespace {
+
+nlohmann::json exported(const TempDir& folder) {
+  BakeCamera camera = camera_at("images/0001.jpg", {5, 2, 3}, {1, 2, 3}, 64, 48, 100);
+  camera.intrinsics.model = LensModel::kOpenCv;
+  camera.intrinsics.distortion[1] = 0.25;
+  export_volume(block_volume({4, 5, 6}, {12, 13, 14}, 2), {camera}, {"cnerf", "bake", "run"}, folder / "out", "scene");
+  return nlohmann::json::parse(read_text_file(folder / "out" / "manifest.json"));
+}
+
+TEST(Manifest, ListsFilesWithSizesAndHashes) {
+  const TempDir folder;
+  const nlohmann::json j = exported(folder);
+  ASSERT_EQ(j["files"].size(), 2u);
+  for (const auto& file : j["files"]) {
+    const auto content = read_binary_file(folder / "out" / file["name"].get<std::string>());
+    EXPECT_EQ(file["bytes"], content.size());
+    EXPECT_EQ(file["sha256"], sha256(content));
+  }
+}
+
+TEST(Manifest, SaysWhatTheBakeIs) {
+  const TempDir folder;
+  const nlohmann::json j = exported(folder);
+  EXPECT_EQ(j["schema"], kManifestSchema);
+  EXPECT_EQ(j["command_line"], (std::vector<std::string>{"cnerf", "bake", "run"}));
+  EXPECT_EQ(j["color"]["space"], "lin_rec709");
+  EXPECT_EQ(j["color"]["inferred"], true);
+  EXPECT_EQ(j["color"]["colorizer"], "builtin");
+  EXPECT_EQ(j["color"]["take"], "first");
+  EXPECT_NEAR(j["volume"]["bounds"]["min"][0].get<double>(), 1 + 4 * 0.05, 1e-12);
+  EXPECT_NEAR(j["volume"]["bounds"]["max"][2].get<double>(), 3 + 14 * 0.05, 1e-12);
+  EXPECT_EQ(j["volume"]["voxels"], 512);
+  EXPECT_EQ(j["volume"]["voxel_origin"], "center");
+}
+
+TEST(Manifest, TransformsAreInverseAndAgreeWithTheFrame) {
+  const TempDir folder;
+  const nlohmann::json frame = exported(folder)["frame"];
+  const auto apply = [](const nlohmann::json& m, Vec3d p) {
+    Vec3d q;
+    for (int i = 0; i < 3; ++i) {
+      q[i] = m[i][0].get<double>() * p.x + m[i][1].get<double>() * p.y + m[i][2].get<double>() * p.z +
+             m[i][3].get<double>();
+    }
+    return q;
+  };
+  const SceneFrame expected{{1.5, 2.5, 3.5}, 0.125, 2};
+  const Vec3d p{0.3, -4, 7};
+  EXPECT_NEAR(length(apply(frame["unit_from_world"], p) - expected.unit_from_world(p)), 0, 1e-12);
+  EXPECT_NEAR(length(apply(frame["world_from_unit"], apply(frame["unit_from_world"], p)) - p), 0, 1e-12);
+}
+
+TEST(Manifest, ReadsBack) {
+  const TempDir folder;
+  (void)exported(folder);
+  const BakeManifest manifest = read_manifest(folder / "out" / "manifest.json");
+  EXPECT_EQ(manifest.files, (std::vector<std::string>{"scene.vdb", "blender_setup.py"}));
+  EXPECT_EQ(manifest.frame, (SceneFrame{{1.5, 2.5, 3.5}, 0.125, 2}));
+  ASSERT_EQ(manifest.cameras.size(), 1u);
+  const BakeCamera expected = camera_at("images/0001.jpg", {5, 2, 3}, {1, 2, 3}, 64, 48, 100);
+  EXPECT_EQ(manifest.cameras[0].name, expected.name);
+  EXPECT_EQ(manifest.cameras[0].intrinsics.model, LensModel::kOpenCv);
+  EXPECT_EQ(manifest.cameras[0].intrinsics.distortion[1], 0.25);
+  EXPECT_EQ(manifest.cameras[0].world_from_camera, expected.world_from_camera);
+  ASSERT_TRUE(manifest.volume.has_value());
+  EXPECT_EQ(manifest.volume->resolution, (Vec3i{16, 17, 18}));
+}
+
+TEST(Manifest, RefusesNewerSchemasAndBrokenFiles) {
+  const TempDir folder;
+  nlohmann::json j = exported(folder);
+  j["schema"] = kManifestSchema + 1;
+  std::ofstream(folder / "newer.json") << j;
+  EXPECT_THROW((void)read_manifest(folder / "newer.json"), InputError);
+  j["schema"] = kManifestSchema;
+  j.erase("cameras");
+  std::ofstream(folder / "short.json") << j;
+  EXPECT_THROW((void)read_manifest(folder / "short.json"), InputError);
+  std::ofstream(folder / "text.json") << "{";
+  EXPECT_THROW((void)read_manifest(folder / "text.json"), InputError);
+  EXPECT_THROW((void)read_manifest(folder / "none.json"), MissingInputError);
+}
+
+TEST(Manifest, AMissingFileIsNotListed) {
+  const TempDir folder;
+  BakeManifest manifest;
+  manifest.files = {"nowhere.vdb"};
+  EXPECT_THROW(write_manifest(manifest, folder.path()), MissingInputError);
+}
+
+}  // namespace
+}  // namespace cnerf::test

@@ -1,0 +1,251 @@
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+#include <sys/resource.h>
+
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <map>
+#include <tuple>
+
+#include "export/vdb_reader.h"
+#include "export/vdb_writer.h"
+#include "src/base/error.h"
+#include "tests/export/test_volumes.h"
+#include "tests/support/data.h"
+
+namespace cnerf::test {
+namespace {
+namespace fs = std::filesystem;
+
+BakedVolume block(float sigma = 2) {
+  return block_volume({4, 5, 6}, {12, 13, 14}, sigma);
+}
+
+openvdb::GridPtrVec read_grids(const fs::path& path) {
+  openvdb::initialize();
+  openvdb::io::File file(path.string());
+  file.open(false);
+  return *file.getGrids();
+}
+
+openvdb::GridBase::Ptr grid_named(const fs::path& path, const std::string& name) {
+  for (const auto& grid : read_grids(path)) {
+    if (grid->getName() == name) return grid;
+  }
+  return nullptr;
+}
+
+const VdbGridSummary& summary_named(const VdbSummary& summary, const std::string& name) {
+  for (const VdbGridSummary& grid : summary.grids) {
+    if (grid.name == name) return grid;
+  }
+  throw std::runtime_error("no grid " + name);
+}
+
+TEST(Vdb, GridsHaveTheirNamesTypesAndClasses) {
+  const TempDir folder;
+  write_vdb(block(), folder / "a.vdb");
+  std::map<std::string, std::string> types;
+  for (const auto& grid : read_grids(folder / "a.vdb")) {
+    types[grid->getName()] = grid->valueType();
+    EXPECT_EQ(grid->getGridClass(), openvdb::GRID_FOG_VOLUME);
+    EXPECT_TRUE(grid->saveFloatAsHalf());
+    EXPECT_FALSE(grid->getCreator().empty());
+    EXPECT_EQ(grid->getVectorType(), openvdb::VEC_INVARIANT);  // the default for floats
+  }
+  const std::map<std::string, std::string> expected{
+      {"density", "float"}, {"color", "vec3s"}, {"lab_a", "float"}, {"lab_b", "float"}, {"luminance", "float"}};
+  EXPECT_EQ(types, expected);
+}
+
+TEST(Vdb, HoudiniGetsCdAsWell) {
+  const TempDir folder;
+  VdbOptions options;
+  options.houdini = true;
+  write_vdb(block(), folder / "a.vdb", options);
+  ASSERT_NE(grid_named(folder / "a.vdb", "Cd"), nullptr);
+  EXPECT_NE(grid_named(folder / "a.vdb", "color"), nullptr);
+}
+
+TEST(Vdb, AllGridsShareTheTransformAndTheActiveVoxels) {
+  const TempDir folder;
+  write_vdb(block(), folder / "a.vdb");
+  const auto grids = read_grids(folder / "a.vdb");
+  for (const auto& grid : grids) {
+    EXPECT_EQ(grid->transform(), grids.front()->transform());
+    EXPECT_EQ(grid->activeVoxelCount(), grids.front()->activeVoxelCount());
+    EXPECT_EQ(grid->evalActiveVoxelBoundingBox(), grids.front()->evalActiveVoxelBoundingBox());
+  }
+}
+
+TEST(Vdb, CentreRuleAndCornerRule) {
+  const TempDir folder;
+  VdbOptions corner;
+  corner.voxel_origin = "corner";
+  write_vdb(block(), folder / "center.vdb");
+  write_vdb(block(), folder / "corner.vdb", corner);
+  const auto at = [&](const char* file) { return grid_named(folder / file, "density")->indexToWorld(openvdb::Coord(0, 0, 0)); };
+  EXPECT_NEAR((at("center.vdb") - openvdb::Vec3d(1.025, 2.025, 3.025)).length(), 0, 1e-12);
+  EXPECT_NEAR((at("corner.vdb") - openvdb::Vec3d(1, 2, 3)).length(), 0, 1e-12);
+  EXPECT_NEAR(grid_named(folder / "center.vdb", "density")->voxelSize().x(), 0.05, 1e-15);
+}
+
+TEST(Vdb, ColorReachesBeyondDensityAndDensityIsPadded) {
+  const TempDir folder;
+  write_vdb(block(), folder / "a.vdb");
+  const auto density = openvdb::gridPtrCast<openvdb::FloatGrid>(grid_named(folder / "a.vdb", "density"));
+  const auto color = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid_named(folder / "a.vdb", "color"));
+  EXPECT_EQ(density->evalActiveVoxelBoundingBox(), openvdb::CoordBBox(1, 2, 3, 14, 15, 16));
+  for (auto it = density->cbeginValueOn(); it; ++it) {
+    const openvdb::Coord at = it.getCoord();
+    const bool inside = openvdb::CoordBBox(4, 5, 6, 11, 12, 13).isInside(at);
+    EXPECT_EQ(*it, inside ? 2.0f : 0.0f) << at;
+    EXPECT_NEAR(color->tree().getValue(at).z(), 0.8f, 5e-4f) << at;
+  }
+}
+
+TEST(Vdb, ReadsBackWhatWasWritten) {
+  const TempDir folder;
+  BakedVolume volume = block();
+  volume.voxels.push_back({40, 5, 6, 7.25f, 0.1f, {0.1f, 0.11f, 0.12f}, 1, 2});  // apart from the rest
+  write_vdb(volume, folder / "a.vdb");
+  const BakedVolume read = read_vdb(folder / "a.vdb");
+  EXPECT_NEAR(length(read.origin - volume.origin), 0, 1e-12);
+  EXPECT_NEAR(read.voxel_size, volume.voxel_size, 1e-15);
+  EXPECT_EQ(read.resolution, volume.resolution);
+  EXPECT_EQ(read.frame, volume.frame);
+  EXPECT_EQ(read.colorizer, "builtin");
+  EXPECT_EQ(read.take, "first");
+  std::map<std::tuple<int, int, int>, BakedVoxel> found;
+  for (const BakedVoxel& v : read.voxels) found[{v.i, v.j, v.k}] = v;
+  for (const BakedVoxel& v : volume.voxels) {
+    const BakedVoxel& r = found.at({v.i, v.j, v.k});
+    EXPECT_EQ(r.sigma, v.sigma);  // both are halfs
+    EXPECT_NEAR(length(r.rgb - v.rgb), 0, 5e-4);
+    EXPECT_NEAR(r.luminance, v.luminance, 3e-4);
+    EXPECT_NEAR(r.a, v.a, 2e-3);
+    EXPECT_NEAR(r.b, v.b, 2e-2);
+  }
+  EXPECT_EQ(read.voxels.size(), 14u * 14 * 14 + 7u * 7 * 7);
+}
+
+TEST(Vdb, HugeDensitiesStayFinite) {
+  const TempDir folder;
+  write_vdb(block(1e6f), folder / "a.vdb");
+  const VdbSummary summary = summarize_vdb(folder / "a.vdb");
+  const VdbGridSummary& density = summary_named(summary, "density");
+  EXPECT_EQ(density.max_value, std::vector<double>{1e6});
+  EXPECT_FALSE(density.half) << "a half would have been infinite";
+  EXPECT_TRUE(summary_named(summary, "color").half);
+}
+
+TEST(Vdb, TinyDensitiesKeepTheirDigits) {
+  const TempDir folder;
+  write_vdb(block(1.2345e-7f), folder / "a.vdb");
+  EXPECT_EQ(read_vdb(folder / "a.vdb").voxels[14 * 14 * 7 + 14 * 7 + 7].sigma, 1.2345e-7f);
+}
+
+TEST(Vdb, MetadataSaysWhatTheFileIs) {
+  const TempDir folder;
+  write_vdb(block(), folder / "a.vdb");
+  const auto meta = summarize_vdb(folder / "a.vdb").metadata;
+  EXPECT_EQ(meta.at("colorspace"), "lin_rec709");
+  EXPECT_EQ(meta.at("white"), "D65");
+  EXPECT_EQ(meta.at("voxel_origin"), "center");
+  EXPECT_EQ(meta.at("color_origin"), "inferred by a colorizer");
+  EXPECT_EQ(meta.at("colorizer"), "builtin");
+  EXPECT_EQ(meta.at("take"), "first");
+  for (const char* name : {"cnerf_version", "cnerf_world_to_source", "units", "up_axis"}) {
+    EXPECT_TRUE(meta.count(name)) << name;
+  }
+}
+
+TEST(Vdb, SummaryDescribesEveryGrid) {
+  const TempDir folder;
+  write_vdb(block(), folder / "a.vdb");
+  const VdbSummary summary = summarize_vdb(folder / "a.vdb");
+  const VdbGridSummary& color = summary_named(summary, "color");
+  EXPECT_EQ(color.type, "vec3s");
+  EXPECT_EQ(color.grid_class, "fog volume");
+  EXPECT_EQ(color.active_voxels, 14u * 14 * 14);
+  EXPECT_EQ(color.index_min, (Vec3i{1, 2, 3}));
+  EXPECT_EQ(color.index_max, (Vec3i{14, 15, 16}));
+  ASSERT_EQ(color.max_value.size(), 3u);
+  EXPECT_NEAR(color.max_value[1], 0.5, 1e-3);
+  EXPECT_NEAR(summary_named(summary, "lab_b").min_value.at(0), -31.25, 1e-6);
+}
+
+TEST(Vdb, EveryCompressionReadsBack) {
+  const TempDir folder;
+  for (const char* compression : {"blosc", "zip", "none"}) {
+    VdbOptions options;
+    options.compression = compression;
+    write_vdb(block(), folder / "a.vdb", options);
+    EXPECT_EQ(read_vdb(folder / "a.vdb").voxels.size(), 14u * 14 * 14) << compression;
+  }
+}
+
+TEST(Vdb, RefusesValuesThatAreNone) {
+  const TempDir folder;
+  for (const float bad : {std::nanf(""), std::numeric_limits<float>::infinity(), -1.0f}) {
+    EXPECT_THROW(write_vdb(block(bad), folder / "a.vdb"), ContractError) << bad;
+  }
+  BakedVolume volume = block();
+  volume.voxels[3].rgb.y = std::nanf("");
+  EXPECT_THROW(write_vdb(volume, folder / "a.vdb"), ContractError);
+  EXPECT_THROW(write_vdb(BakedVolume{}, folder / "a.vdb"), ContractError);
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+TEST(Vdb, AFolderThatCannotBeWrittenIsAnOutputError) {
+  const TempDir folder;
+  std::ofstream(folder / "file") << "not a folder";
+  EXPECT_THROW(write_vdb(block(), folder / "file" / "a.vdb"), OutputError);
+  EXPECT_THROW(write_vdb(block(), fs::path("/proc/cnerf/a.vdb")), OutputError);
+}
+
+/// Files of this process cannot grow beyond `bytes` while this lives: what a full disk does.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit limit = before_;
+    limit.rlim_cur = bytes;
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = nullptr;
+};
+
+TEST(Vdb, AFullDiskIsAnOutputErrorAndLeavesNothing) {
+  const TempDir folder;
+  for (const rlim_t room : {rlim_t{0}, rlim_t{1000}, rlim_t{9000}}) {
+    const FullDisk full(room);
+    EXPECT_THROW(write_vdb(block(), folder / "a.vdb", {.compression = "none"}), OutputError) << room;
+    EXPECT_TRUE(fs::is_empty(folder.path())) << room;
+  }
+}
+
+TEST(Vdb, ReadingSaysWhatIsWrong) {
+  const TempDir folder;
+  EXPECT_THROW((void)read_vdb(folder / "missing.vdb"), MissingInputError);
+  std::ofstream(folder / "text.vdb") << "hello";
+  EXPECT_THROW((void)read_vdb(folder / "text.vdb"), InputError);
+  EXPECT_THROW((void)summarize_vdb(folder / "text.vdb"), InputError);
+  openvdb::initialize();
+  openvdb::io::File(folder / "other.vdb").write({openvdb::FloatGrid::create()});
+  EXPECT_THROW((void)read_vdb(folder / "other.vdb"), InputError);
+}
+
+}  // namespace
+}  // namespace cnerf::test
