@@ -32,7 +32,8 @@ struct PixelPosition {
 /// Unit direction, in camera axes, of the ray through a pixel position. Inverts the distortion by Newton's method.
 [[nodiscard]] Vec3d ray_direction(const Intrinsics& intrinsics, PixelPosition pixel);
 
-/// Where a point given in camera axes lands; nothing when it is not in front of the camera.
+/// Where a point given in camera axes lands; nothing when it is not in front of the camera, or so far off axis that the
+/// lens model folds back into the image.
 [[nodiscard]] std::optional<PixelPosition> project(const Intrinsics& intrinsics, Vec3d point_in_camera);
 
 /// The same camera for an image resized to `width` x `height`.

@@ -33,9 +33,10 @@ struct Capture {
   std::vector<Vec3d> points;              ///< sparse points of structure from motion, world; may be empty
   std::optional<DepthRange> depth_range;  ///< LLFF's bounds
   std::optional<double> aabb_scale;       ///< hint of instant-ngp's transforms.json: side of its box in its units
-  bool is_bounded_object = false;         ///< every view has alpha: nothing outside the object matters
-  int listed_images = 0;                  ///< images the poses file lists, of which `views.size()` exist
-  std::vector<std::string> notes;         ///< what a user should know: missing images, conversions
+  std::optional<Aabbd> bounds;     ///< the source's own box around its subject ("aabb" of transforms.json), world
+  bool is_bounded_object = false;  ///< every view has alpha: nothing outside the object matters
+  int listed_images = 0;           ///< images the poses file lists, of which `views.size()` exist
+  std::vector<std::string> notes;  ///< what a user should know: missing images, conversions
 };
 
 }  // namespace cnerf

@@ -1,0 +1,55 @@
+#include "src/capture/listing.h"
+
+#include <algorithm>
+#include <cctype>
+#include <sstream>
+
+#include "src/capture/pose.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+
+void make_poses_rigid(CaptureListing& listing, const std::string& matrix_name) {
+  double worst = 0;
+  std::size_t repaired = 0;
+  for (ListedView& view : listing.views) {
+    const double error = orthonormality_error(view.world_from_camera.linear);
+    view.world_from_camera = rigid_pose(view.world_from_camera, view.poses_file,
+                                        view.field + (matrix_name.empty() ? "" : "." + matrix_name));
+    worst = std::max(worst, error);
+    repaired += error > kNotedPoseError ? 1 : 0;
+  }
+  if (repaired == 0) return;
+  std::ostringstream note;
+  note << repaired << " of " << listing.views.size() << " poses were not quite rotations (off by up to " << worst
+       << ") and were replaced by the nearest one";
+  listing.notes.push_back(note.str());
+}
+
+std::optional<fs::path> reduced_copy(const fs::path& image_file, int downscale) {
+  const fs::path folder = image_file.parent_path();
+  const fs::path sibling = folder.parent_path() / (folder.filename().string() + "_" + std::to_string(downscale));
+  if (fs::exists(sibling / image_file.filename())) return sibling / image_file.filename();
+  // LLFF and Mip-NeRF 360 reduce IMG_1.JPG to IMG_1.png.
+  for (const std::string& extension : image_extensions()) {
+    const fs::path other = sibling / (image_file.stem().string() + extension);
+    if (fs::exists(other)) return other;
+  }
+  return std::nullopt;
+}
+
+const std::vector<std::string>& image_extensions() {
+  static const std::vector<std::string> extensions = {".png", ".jpg", ".jpeg", ".JPG",  ".JPEG",
+                                                      ".PNG", ".exr", ".tif",  ".tiff", ".webp"};
+  return extensions;
+}
+
+bool is_image_file(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  const auto& known = image_extensions();
+  return std::find(known.begin(), known.end(), extension) != known.end();
+}
+
+}  // namespace cnerf

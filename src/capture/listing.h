@@ -1,0 +1,66 @@
+#pragma once
+/// What a poses file says, before any image is opened: readers make listings, load_capture turns them into captures.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "src/capture/capture.h"
+
+namespace cnerf {
+
+struct ListedView {
+  std::string name;                  ///< as the poses name it
+  std::string field;                 ///< where in the poses file, e.g. "frames[3]"; for messages
+  std::filesystem::path poses_file;  ///< the file that lists it; for messages
+  std::filesystem::path image_file;  ///< may not exist
+  std::filesystem::path mask_file;   ///< empty: none
+  /// For the stated size. Without one (width 0) it is for the size of the image, and a principal point of
+  /// `kCentred` is its centre; without a focal length (fx 0) that follows from the angles of view.
+  Intrinsics intrinsics;
+  double angle_x = 0, angle_y = 0;  ///< full angles of view, radians; 0: not stated
+  Affined world_from_camera;        ///< rigid, axes of camera.h
+  double downscale = 1;             ///< still to be applied to the image file
+  bool held_out = false;
+};
+/// A principal point that no file states.
+inline constexpr double kCentred = -1e30;
+
+struct CaptureListing {
+  std::filesystem::path source;  ///< the poses file or model folder
+  std::string format;
+  std::vector<ListedView> views;
+  std::vector<Vec3d> points;
+  std::optional<DepthRange> depth_range;
+  std::optional<double> aabb_scale;
+  std::optional<Aabbd> bounds;
+  std::vector<std::string> notes;
+};
+
+/// Makes the poses of a listing rigid and notes how far off they were.
+/// @throws InputError  as `rigid_pose` does, naming the view.
+void make_poses_rigid(CaptureListing& listing, const std::string& matrix_name);
+
+/// transforms.json in the dialects of NeRF, instant-ngp and nerfstudio. `transforms_train.json` brings its siblings for
+/// validation and test along.  @throws InputError.
+[[nodiscard]] CaptureListing read_transforms(const std::filesystem::path& json_file);
+
+/// A COLMAP model, binary or text.  @param root  the capture folder, where images are looked for first.
+/// @throws InputError, MissingInputError.
+[[nodiscard]] CaptureListing read_colmap(const std::filesystem::path& root, const std::filesystem::path& model_folder);
+/// Registered images of a model, to choose between several.
+[[nodiscard]] std::size_t colmap_image_count(const std::filesystem::path& model_folder);
+
+/// LLFF's poses_bounds.npy; `downscale` chooses among images, images_2, ….  @throws InputError, MissingInputError.
+[[nodiscard]] CaptureListing read_llff(const std::filesystem::path& npy_file, int downscale);
+
+/// A copy of the image reduced by `downscale` in a sibling folder `<folder>_<downscale>`; nothing when there is none.
+[[nodiscard]] std::optional<std::filesystem::path> reduced_copy(const std::filesystem::path& image_file, int downscale);
+
+/// True for names of image files that image_io.h reads, in either case.
+[[nodiscard]] bool is_image_file(const std::filesystem::path& file);
+/// The extensions tried for names without one, in order.
+[[nodiscard]] const std::vector<std::string>& image_extensions();
+
+}  // namespace cnerf

@@ -1,0 +1,247 @@
+#include "src/capture/load_capture.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/base/error.h"
+#include "src/base/parallel.h"
+#include "src/capture/image_io.h"
+#include "src/capture/listing.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+// ---- recognising a capture ------------------------------------------------------------------------------------------
+
+enum class Format { kTransforms, kColmap, kLlff };
+struct Source {
+  Format format;
+  fs::path root;  ///< the capture folder
+  fs::path path;  ///< marker file, or model folder
+};
+
+bool is_colmap_model(const fs::path& folder) {
+  return fs::exists(folder / "cameras.bin") || fs::exists(folder / "cameras.txt");
+}
+
+/// All models in the places COLMAP and its users put them.
+std::vector<fs::path> find_colmap_models(const fs::path& root) {
+  std::vector<fs::path> models;
+  for (const fs::path& place : {root, root / "sparse", root / "colmap" / "sparse"}) {
+    if (is_colmap_model(place)) models.push_back(place);
+    if (place == root || !fs::is_directory(place)) continue;
+    for (const auto& entry : fs::directory_iterator(place)) {
+      if (entry.is_directory() && is_colmap_model(entry.path())) models.push_back(entry.path());
+    }
+  }
+  std::sort(models.begin(), models.end());
+  return models;
+}
+
+fs::path largest_model(const std::vector<fs::path>& models) {
+  return *std::max_element(models.begin(), models.end(), [](const fs::path& a, const fs::path& b) {
+    return colmap_image_count(a) < colmap_image_count(b);
+  });
+}
+
+Source find_in_folder(const fs::path& root) {
+  for (const char* marker : {"transforms.json", "transforms_train.json"}) {
+    if (fs::exists(root / marker)) return {Format::kTransforms, root, root / marker};
+  }
+  if (const std::vector<fs::path> models = find_colmap_models(root); !models.empty()) {
+    return {Format::kColmap, root, largest_model(models)};
+  }
+  if (fs::exists(root / "poses_bounds.npy")) return {Format::kLlff, root, root / "poses_bounds.npy"};
+  const std::string state = fs::is_empty(root) ? ": the folder is empty; " : ": no poses found; ";
+  throw MissingInputError(
+      root.string() + state +
+      "looked for transforms.json, transforms_train.json, a COLMAP model (cameras.bin or cameras.txt "
+      "here, in sparse/, sparse/*/ or colmap/sparse/*/) and poses_bounds.npy");
+}
+
+Source recognise(const fs::path& path) {
+  if (!fs::exists(path)) throw MissingInputError(path.string() + ": no such file or folder");
+  if (fs::is_directory(path)) return find_in_folder(path);
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  if (path.extension() == ".json") return {Format::kTransforms, folder, path};
+  if (path.extension() == ".npy") return {Format::kLlff, folder, path};
+  if (is_colmap_model(folder)) return {Format::kColmap, folder, folder};
+  throw InputError(path, "", "expected a folder, a transforms.json, a file of a COLMAP model or a poses_bounds.npy");
+}
+
+/// Takes copies in images_N folders where there are some, and leaves the rest to be resized.
+void apply_downscale(CaptureListing& listing, int downscale) {
+  if (downscale == 1) return;
+  for (ListedView& view : listing.views) {
+    const std::optional<fs::path> copy = reduced_copy(view.image_file, downscale);
+    if (copy) view.image_file = *copy;
+    view.downscale = copy ? 1.0 : double(downscale);
+  }
+}
+
+CaptureListing read_listing(const Source& source, int downscale) {
+  if (source.format == Format::kLlff) return read_llff(source.path, downscale);
+  CaptureListing listing =
+      source.format == Format::kColmap ? read_colmap(source.root, source.path) : read_transforms(source.path);
+  apply_downscale(listing, downscale);
+  return listing;
+}
+
+// ---- which views there are
+// --------------------------------------------------------------------------------------------
+
+/// Drops views whose image does not exist, and says so.
+void drop_missing_images(CaptureListing& listing) {
+  const std::size_t listed = listing.views.size();
+  std::string first;
+  const std::size_t missing = std::erase_if(listing.views, [&](const ListedView& view) {
+    if (fs::is_regular_file(view.image_file)) return false;
+    if (first.empty()) first = view.name;
+    return true;
+  });
+  if (missing == 0) return;
+  listing.notes.push_back(std::to_string(missing) + " of " + std::to_string(listed) +
+                          " listed images do not exist and were skipped, the first: " + first);
+}
+
+void refuse_too_few(const CaptureListing& listing, std::size_t listed) {
+  if (listing.views.size() >= 2) return;
+  throw InputError(listing.source, "views",
+                   "expected at least 2 usable images, found " + std::to_string(listing.views.size()) + " (of " +
+                       std::to_string(listed) + " listed)");
+}
+
+void choose_held_out(std::vector<ListedView>& views, int holdout) {
+  if (holdout > 0) {
+    for (std::size_t i = 0; i < views.size(); ++i) views[i].held_out = i % std::size_t(holdout) == 0;
+  }
+  const auto training = std::count_if(views.begin(), views.end(), [](const ListedView& v) { return !v.held_out; });
+  if (training >= 2) return;
+  const std::string left = "leaves " + std::to_string(training) + " of " + std::to_string(views.size()) +
+                           " views for training; at least 2 are needed";
+  if (holdout > 0) throw UsageError("holdout " + std::to_string(holdout) + " " + left);
+  throw InputError(views.front().poses_file, "split", left);
+}
+
+// ---- images and intrinsics
+// --------------------------------------------------------------------------------------------
+
+Transfer transfer_named(const std::string& name) {
+  if (name == "srgb") return Transfer::kSrgb;
+  if (name == "linear") return Transfer::kLinear;
+  if (name == "gamma22") return Transfer::kGamma22;
+  throw UsageError("transfer: expected srgb, linear or gamma22, found " + name);
+}
+
+std::string size_text(int width, int height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
+/// Intrinsics for the image as stored: what the file leaves out follows from the size, and the numbers are checked.
+Intrinsics complete_intrinsics(const ListedView& view, int width, int height) {
+  Intrinsics out = view.intrinsics;
+  if (out.width == 0) {
+    out.width = width;
+    out.height = height;
+  }
+  if (!same_shape(width, height, out.width, out.height)) {
+    throw InputError(view.image_file, "size",
+                     "expected " + size_text(out.width, out.height) + " as " + view.poses_file.filename().string() +
+                         " says, or the same shape, found " + size_text(width, height));
+  }
+  if (out.fx == 0 && view.angle_x != 0) out.fx = 0.5 * out.width / std::tan(0.5 * view.angle_x);
+  if (out.fy == 0) out.fy = view.angle_y != 0 ? 0.5 * out.height / std::tan(0.5 * view.angle_y) : out.fx;
+  if (out.fx == 0) out.fx = out.fy;
+  if (out.cx == kCentred) out.cx = 0.5 * out.width;
+  if (out.cy == kCentred) out.cy = 0.5 * out.height;
+  const auto is_positive = [](double v) { return std::isfinite(v) && v > 0; };
+  if (!is_positive(out.fx) || !is_positive(out.fy)) {
+    throw InputError(view.poses_file, view.field + ".focal length",
+                     "expected a positive number, found " + std::to_string(is_positive(out.fx) ? out.fy : out.fx));
+  }
+  if (!std::isfinite(out.cx) || !std::isfinite(out.cy) ||
+      !std::all_of(out.distortion.begin(), out.distortion.end(), [](double k) { return std::isfinite(k); })) {
+    throw InputError(view.poses_file, view.field + ".intrinsics", "expected finite numbers, found NaN or infinity");
+  }
+  return resized(out, width, height);
+}
+
+int reduced(int size, double downscale) {
+  return std::max(1, int(std::lround(size / downscale)));
+}
+
+struct LoadedView {
+  View view;
+  bool had_color = false;
+};
+
+LoadedView load_view(const ListedView& listed, Transfer transfer) {
+  LoadedView out;
+  out.view.name = listed.name;
+  out.view.image_file = listed.image_file;
+  out.view.world_from_camera = listed.world_from_camera;
+  out.view.held_out = listed.held_out;
+  LinearImage image = read_linear_image(listed.image_file, transfer);
+  out.view.intrinsics = complete_intrinsics(listed, image.width, image.height);
+  out.had_color = !is_monochrome(image);
+  image = luminance_image(std::move(image));
+  if (listed.downscale > 1) {
+    image = area_resized(image, reduced(image.width, listed.downscale), reduced(image.height, listed.downscale));
+    out.view.intrinsics = resized(out.view.intrinsics, image.width, image.height);
+  }
+  out.view.image = encode_mono(image, transfer);
+  if (!listed.mask_file.empty()) out.view.image.mask = read_mask(listed.mask_file, image.width, image.height);
+  return out;
+}
+
+/// The share of pixels that show nothing from which a view counts as a cut-out object.
+constexpr double kTransparentShare = 0.05;
+
+bool is_cut_out(const View& view) {
+  const std::vector<std::uint8_t>& alpha = view.image.alpha;
+  const auto transparent = std::count(alpha.begin(), alpha.end(), std::uint8_t(0));
+  return double(transparent) > kTransparentShare * double(view.image.pixel_count());
+}
+
+void load_views(const std::vector<ListedView>& listed, Transfer transfer, Capture& capture) {
+  std::vector<LoadedView> loaded(listed.size());
+  parallel_tasks(listed.size(), [&](std::size_t i) { loaded[i] = load_view(listed[i], transfer); });
+  const auto colored = std::count_if(loaded.begin(), loaded.end(), [](const LoadedView& v) { return v.had_color; });
+  if (colored > 0) {
+    capture.notes.push_back(std::to_string(colored) + " of " + std::to_string(loaded.size()) +
+                            " images have colours; only their luminance is used");
+  }
+  for (LoadedView& view : loaded) capture.views.push_back(std::move(view.view));
+}
+
+}  // namespace
+
+Capture load_capture(const fs::path& path, const CaptureOptions& options) {
+  const Transfer transfer = transfer_named(options.transfer);
+  if (options.downscale < 1)
+    throw UsageError("downscale: expected at least 1, found " + std::to_string(options.downscale));
+  const Source source = recognise(path);
+  CaptureListing listing = read_listing(source, options.downscale);
+  const std::size_t listed = listing.views.size();
+  drop_missing_images(listing);
+  refuse_too_few(listing, listed);
+  std::stable_sort(listing.views.begin(), listing.views.end(),
+                   [](const ListedView& a, const ListedView& b) { return a.name < b.name; });
+  choose_held_out(listing.views, options.holdout);
+
+  Capture capture;
+  capture.root = source.root;
+  capture.format = listing.format;
+  capture.points = std::move(listing.points);
+  capture.depth_range = listing.depth_range;
+  capture.aabb_scale = listing.aabb_scale;
+  capture.bounds = listing.bounds;
+  capture.listed_images = int(listed);
+  capture.notes = std::move(listing.notes);
+  load_views(listing.views, transfer, capture);
+  capture.is_bounded_object = std::all_of(capture.views.begin(), capture.views.end(), is_cut_out);
+  return capture;
+}
+
+}  // namespace cnerf

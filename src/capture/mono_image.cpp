@@ -1,0 +1,71 @@
+#include "src/capture/mono_image.h"
+
+#include <array>
+#include <cmath>
+
+#include "src/color/colorspace_math.h"
+
+namespace cnerf {
+namespace {
+
+/// Linear light of the 256 codes of an 8-bit image.
+std::array<float, 256> table_of(Transfer transfer) {
+  std::array<float, 256> table{};
+  for (std::size_t i = 0; i < table.size(); ++i) table[i] = decode_transfer(transfer, float(i) / 255.0f);
+  return table;
+}
+
+const std::array<float, 256>& decode_table(Transfer transfer) {
+  static const std::array<float, 256> srgb = table_of(Transfer::kSrgb);
+  static const std::array<float, 256> linear = table_of(Transfer::kLinear);
+  static const std::array<float, 256> gamma22 = table_of(Transfer::kGamma22);
+  switch (transfer) {
+    case Transfer::kLinear:
+      return linear;
+    case Transfer::kGamma22:
+      return gamma22;
+    case Transfer::kSrgb:
+      break;
+  }
+  return srgb;
+}
+
+}  // namespace
+
+float decode_transfer(Transfer transfer, float value) {
+  switch (transfer) {
+    case Transfer::kLinear:
+      return value;
+    case Transfer::kGamma22:
+      return std::copysign(std::pow(std::abs(value), 2.2f), value);
+    case Transfer::kSrgb:
+      break;
+  }
+  return linear_from_srgb(value);
+}
+
+float encode_transfer(Transfer transfer, float luminance) {
+  switch (transfer) {
+    case Transfer::kLinear:
+      return luminance;
+    case Transfer::kGamma22:
+      return std::copysign(std::pow(std::abs(luminance), 1 / 2.2f), luminance);
+    case Transfer::kSrgb:
+      break;
+  }
+  return srgb_from_linear(luminance);
+}
+
+float MonoImage::luminance(std::size_t index) const {
+  switch (depth) {
+    case PixelDepth::kU8:
+      return decode_table(transfer)[u8[index]];
+    case PixelDepth::kU16:
+      return decode_transfer(transfer, float(u16[index]) / 65535.0f);
+    case PixelDepth::kF32:
+      break;
+  }
+  return f32[index];
+}
+
+}  // namespace cnerf

@@ -1,0 +1,135 @@
+#include "src/capture/npy_reader.h"
+
+#include <cstdint>
+#include <cstring>
+#include <regex>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+struct Header {
+  std::string dtype;
+  bool fortran_order = false;
+  std::vector<std::size_t> shape;
+  std::size_t size = 0;  ///< bytes before the values
+};
+
+/// The part of the file that describes the array: magic, version, length, and a Python dictionary as text.
+std::string header_text(const fs::path& file, std::span<const std::byte> content, std::size_t& header_size) {
+  const auto byte = [&](std::size_t i) { return static_cast<std::size_t>(content[i]); };
+  constexpr std::string_view kMagic = "\x93NUMPY";
+  if (content.size() < 10 || std::memcmp(content.data(), kMagic.data(), kMagic.size()) != 0) {
+    throw InputError(file, "header", "expected a NumPy .npy file, found other bytes");
+  }
+  const std::size_t version = byte(6);
+  if (version < 1 || version > 3) {
+    throw InputError(file, "version", "expected 1 to 3, found " + std::to_string(version));
+  }
+  const std::size_t start = version == 1 ? 10 : 12;
+  if (content.size() < start) throw InputError(file, "header", "the file is cut short");
+  std::size_t length = byte(8) | byte(9) << 8;
+  if (version > 1) length |= byte(10) << 16 | byte(11) << 24;
+  header_size = start + length;
+  if (header_size > content.size()) throw InputError(file, "header", "the file is cut short");
+  return {reinterpret_cast<const char*>(content.data()) + start, length};
+}
+
+std::string match(const fs::path& file, const std::string& text, const char* field, const char* pattern) {
+  std::smatch found;
+  if (!std::regex_search(text, found, std::regex(pattern))) {
+    throw InputError(file, field, "expected in the header, found " + text);
+  }
+  return found[1];
+}
+
+std::vector<std::size_t> parse_shape(const fs::path& file, const std::string& text) {
+  std::vector<std::size_t> shape;
+  const std::regex number("[0-9]+");
+  for (std::sregex_iterator i(text.begin(), text.end(), number), end; i != end; ++i) {
+    if (i->length() > 12) throw InputError(file, "shape", "expected sizes of a file, found (" + text + ")");
+    shape.push_back(std::stoull(i->str()));
+  }
+  return shape;
+}
+
+Header parse_header(const fs::path& file, std::span<const std::byte> content) {
+  Header header;
+  const std::string text = header_text(file, content, header.size);
+  header.dtype = match(file, text, "descr", R"('descr'\s*:\s*'([^']*)')");
+  header.fortran_order = match(file, text, "fortran_order", R"('fortran_order'\s*:\s*(True|False))") == "True";
+  header.shape = parse_shape(file, match(file, text, "shape", R"('shape'\s*:\s*\(([^)]*)\))"));
+  return header;
+}
+
+template <typename T>
+std::vector<double> convert(std::span<const std::byte> bytes, std::size_t count) {
+  std::vector<double> values(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    T value;
+    std::memcpy(&value, bytes.data() + i * sizeof(T), sizeof(T));
+    values[i] = static_cast<double>(value);
+  }
+  return values;
+}
+
+std::size_t element_size(const fs::path& file, const std::string& dtype) {
+  if (dtype == "<f8" || dtype == "<i8") return 8;
+  if (dtype == "<f4" || dtype == "<i4") return 4;
+  throw InputError(file, "descr", "expected <f8, <f4, <i8 or <i4, found " + dtype);
+}
+
+std::vector<double> read_values(const std::string& dtype, std::span<const std::byte> bytes, std::size_t count) {
+  if (dtype == "<f8") return convert<double>(bytes, count);
+  if (dtype == "<f4") return convert<float>(bytes, count);
+  if (dtype == "<i8") return convert<std::int64_t>(bytes, count);
+  return convert<std::int32_t>(bytes, count);
+}
+
+/// Reorders values whose first index runs fastest into the order whose last index does.
+std::vector<double> c_order(const std::vector<double>& values, const std::vector<std::size_t>& shape) {
+  std::vector<double> out(values.size());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    std::size_t rest = i;
+    std::size_t source = 0;
+    std::size_t stride = values.size();
+    for (std::size_t axis = shape.size(); axis-- > 0;) {
+      stride /= shape[axis];
+      source += rest % shape[axis] * stride;
+      rest /= shape[axis];
+    }
+    out[i] = values[source];
+  }
+  return out;
+}
+
+}  // namespace
+
+NpyArray read_npy(const fs::path& file) {
+  const std::vector<std::byte> content = read_binary_file(file);
+  const Header header = parse_header(file, content);
+  const std::size_t size = element_size(file, header.dtype);
+  const std::size_t available = (content.size() - header.size) / size;
+  std::size_t count = 1;
+  for (const std::size_t extent : header.shape) {
+    count *= extent;
+    if (count > available) {  // checked at each step, so that a senseless shape cannot overflow
+      throw InputError(file, "values",
+                       "the shape needs at least " + std::to_string(count) + ", found " + std::to_string(available) +
+                           ": the file is cut short");
+    }
+  }
+  NpyArray array;
+  array.shape = header.shape;
+  array.values = read_values(header.dtype, std::span(content).subspan(header.size), count);
+  if (header.fortran_order) array.values = c_order(array.values, array.shape);
+  return array;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,32 @@
+#pragma once
+/// Rigid poses out of matrices that were rounded, printed or estimated.
+
+#include <filesystem>
+#include <string>
+
+#include "src/base/vec3.h"
+
+namespace cnerf {
+
+/// Largest deviation of R^T R from the identity that counts as rounding and is repaired.
+inline constexpr double kLargestPoseError = 1e-2;
+/// Deviation from which a repair is worth a note to the user.
+inline constexpr double kNotedPoseError = 1e-4;
+
+/// Largest absolute entry of R^T R - I.
+[[nodiscard]] double orthonormality_error(const Mat3d& rotation);
+
+/// The pose with its rotation replaced by the nearest rotation.
+/// @param file, field  for messages
+/// @throws InputError  NaN or infinity, a mirrored or singular matrix, or one that is not a rotation within
+///                     kLargestPoseError.
+[[nodiscard]] Affined rigid_pose(const Affined& pose, const std::filesystem::path& file, const std::string& field);
+
+/// Turns the axes of a camera that looks along -Z with +Y up (OpenGL, Blender, NeRF) into those of camera.h.
+[[nodiscard]] Affined opencv_from_opengl_camera(const Affined& world_from_camera);
+
+/// Rotation of a Hamilton quaternion.  @throws InputError  when its length is not 1 within kLargestPoseError.
+[[nodiscard]] Mat3d rotation_from_quaternion(double w, double x, double y, double z, const std::filesystem::path& file,
+                                             const std::string& field);
+
+}  // namespace cnerf

@@ -1,0 +1,298 @@
+/// transforms.json of NeRF (Blender synthetic), instant-ngp and nerfstudio.
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string_view>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/capture/listing.h"
+#include "src/capture/pose.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+using Json = nlohmann::json;
+
+Json parse_json(const fs::path& file) {
+  const std::string text = read_text_file(file);
+  try {
+    return Json::parse(text, nullptr, /*allow_exceptions=*/true, /*ignore_comments=*/true);
+  } catch (const Json::exception& failure) {
+    throw InputError(file, "", std::string("expected JSON, found ") + failure.what());
+  }
+}
+
+/// Looks fields up in a frame first, then in the whole file: every one of them may stand in either.
+class Fields {
+ public:
+  Fields(const fs::path& file, const Json& top, const Json& frame, std::string prefix)
+      : file_(file), top_(top), frame_(frame), prefix_(std::move(prefix)) {}
+
+  [[nodiscard]] const Json* find(const char* key) const {
+    if (const auto found = frame_.find(key); found != frame_.end() && !found->is_null()) return &*found;
+    if (const auto found = top_.find(key); found != top_.end() && !found->is_null()) return &*found;
+    return nullptr;
+  }
+  [[nodiscard]] double number(const char* key, double fallback) const {
+    const Json* value = find(key);
+    if (value == nullptr) return fallback;
+    if (!value->is_number()) throw error(key, std::string("expected a number, found ") + value->dump());
+    return value->get<double>();
+  }
+  [[nodiscard]] int size(const char* key) const {
+    const double value = number(key, 0);
+    if (value < 0 || value > 1e5 || value != std::floor(value)) {
+      throw error(key, "expected a size in pixels, found " + find(key)->dump());
+    }
+    return int(value);
+  }
+  [[nodiscard]] std::string text(const char* key) const {
+    const Json* value = find(key);
+    if (value == nullptr) return "";
+    if (!value->is_string()) throw error(key, std::string("expected a text, found ") + value->dump());
+    return value->get<std::string>();
+  }
+  [[nodiscard]] bool flag(const char* key) const {
+    const Json* value = find(key);
+    return value != nullptr && value->is_boolean() && value->get<bool>();
+  }
+  [[nodiscard]] InputError error(const char* key, const std::string& problem) const {
+    const bool in_frame = frame_.contains(key);
+    return {file_, in_frame ? prefix_ + "." + key : key, problem};
+  }
+
+ private:
+  const fs::path& file_;
+  const Json& top_;
+  const Json& frame_;
+  std::string prefix_;
+};
+
+bool has_distortion(const Fields& fields) {
+  for (const char* key : {"k1", "k2", "k3", "k4", "p1", "p2"}) {
+    if (fields.number(key, 0) != 0) return true;
+  }
+  return false;
+}
+
+/// Lens model and coefficients; the order of the coefficients is that of LensModel.
+void read_lens(const Fields& fields, Intrinsics& out) {
+  const std::string model = fields.text("camera_model");
+  static const std::set<std::string> kBrown = {"",       "OPENCV",        "PINHOLE",    "SIMPLE_PINHOLE",
+                                               "RADIAL", "SIMPLE_RADIAL", "PERSPECTIVE"};
+  const bool fisheye = model == "OPENCV_FISHEYE" || fields.flag("is_fisheye");
+  if (!fisheye && !kBrown.contains(model)) {
+    throw fields.error("camera_model", "expected OPENCV, OPENCV_FISHEYE, PINHOLE or RADIAL, found " + model);
+  }
+  if (!has_distortion(fields)) {
+    out.model = fisheye ? LensModel::kOpenCvFisheye : LensModel::kPinhole;
+    return;
+  }
+  const auto k = [&](const char* key) { return fields.number(key, 0); };
+  if (fisheye) {
+    out.model = LensModel::kOpenCvFisheye;
+    out.distortion = {k("k1"), k("k2"), k("k3"), k("k4")};
+    return;
+  }
+  // In these files k4 is the next radial coefficient, in OpenCV the first of the denominator: neither is guessed.
+  if (k("k4") != 0) throw fields.error("k4", "expected 0 for this camera model, found " + std::to_string(k("k4")));
+  out.model = LensModel::kOpenCv;
+  out.distortion = {k("k1"), k("k2"), k("p1"), k("p2"), k("k3")};
+}
+
+void read_intrinsics(const Fields& fields, ListedView& view) {
+  Intrinsics& out = view.intrinsics;
+  out.width = fields.size("w");
+  out.height = fields.size("h");
+  if ((out.width == 0) != (out.height == 0)) {
+    throw fields.error(out.width == 0 ? "w" : "h", "expected both w and h, or neither");
+  }
+  out.fx = fields.number("fl_x", 0);
+  out.fy = fields.number("fl_y", out.fx);
+  if (out.fx == 0) out.fx = out.fy;
+  out.cx = fields.number("cx", kCentred);
+  out.cy = fields.number("cy", kCentred);
+  view.angle_x = fields.number("camera_angle_x", 0);
+  view.angle_y = fields.number("camera_angle_y", 0);
+  if (out.fx == 0 && view.angle_x == 0 && view.angle_y == 0) {
+    throw InputError(view.poses_file, view.field,
+                     "expected a focal length (fl_x) or an angle of view (camera_angle_x), found neither");
+  }
+  read_lens(fields, out);
+}
+
+/// The number at a place of a matrix. Not-a-number is not JSON, so the parser has refused it already.
+double entry(const Json& value, const fs::path& file, const std::string& field) {
+  if (!value.is_number()) throw InputError(file, field, "expected numbers, found " + value.dump());
+  return value.get<double>();
+}
+
+Affined read_matrix(const Json& frame, const fs::path& file, const std::string& prefix) {
+  const std::string field = prefix + ".transform_matrix";
+  const auto found = frame.find("transform_matrix");
+  if (found == frame.end()) throw InputError(file, field, "expected 4x4 numbers, found nothing");
+  const Json& rows = *found;
+  const auto is_row = [](const Json& row) { return row.is_array() && row.size() == 4; };
+  if (!rows.is_array() || rows.size() != 4 || !std::all_of(rows.begin(), rows.end(), is_row)) {
+    const bool nested = rows.is_array() && !rows.empty() && rows[0].is_array();
+    throw InputError(file, field,
+                     "expected 4x4, got " + (nested ? std::to_string(rows.size()) + "x" + std::to_string(rows[0].size())
+                                                    : std::string(rows.type_name())));
+  }
+  double m[4][4];
+  for (std::size_t r = 0; r < 4; ++r) {
+    for (std::size_t c = 0; c < 4; ++c) m[r][c] = entry(rows[r][c], file, field);
+  }
+  if (std::abs(m[3][0]) + std::abs(m[3][1]) + std::abs(m[3][2]) + std::abs(m[3][3] - 1) > 1e-6) {
+    throw InputError(file, field, "expected a last row of 0 0 0 1, found " + rows[3].dump());
+  }
+  Affined pose;
+  for (int r = 0; r < 3; ++r) pose.linear.rows[r] = {m[r][0], m[r][1], m[r][2]};
+  pose.translation = {m[0][3], m[1][3], m[2][3]};
+  return pose;
+}
+
+/// The named file; without it, the same name with an extension appended (synthetic sets leave it out).
+fs::path resolve_image(const fs::path& folder, std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');
+  const fs::path plain = (folder / name).lexically_normal();
+  if (fs::exists(plain)) return plain;
+  for (const std::string& extension : image_extensions()) {
+    fs::path with_extension = plain;
+    with_extension += extension;
+    if (fs::exists(with_extension)) return with_extension;
+  }
+  return plain;
+}
+
+ListedView read_frame(const fs::path& file, const Json& top, const Json& frame, std::size_t index) {
+  ListedView view;
+  view.field = "frames[" + std::to_string(index) + "]";
+  view.poses_file = file;
+  if (!frame.is_object())
+    throw InputError(file, view.field, std::string("expected an object, found ") + frame.type_name());
+  const Fields fields(file, top, frame, view.field);
+  view.name = fields.text("file_path");
+  if (view.name.empty()) throw InputError(file, view.field + ".file_path", "expected a file name, found nothing");
+  view.image_file = resolve_image(file.parent_path(), view.name);
+  if (const std::string mask = fields.text("mask_path"); !mask.empty()) {
+    view.mask_file = resolve_image(file.parent_path(), mask);
+  }
+  view.world_from_camera = opencv_from_opengl_camera(read_matrix(frame, file, view.field));
+  read_intrinsics(fields, view);
+  return view;
+}
+
+std::vector<ListedView> read_frames(const fs::path& file, const Json& top) {
+  const auto frames = top.find("frames");
+  if (frames == top.end() || !frames->is_array()) {
+    throw InputError(
+        file, "frames",
+        "expected a list of frames, found " + std::string(frames == top.end() ? "nothing" : frames->type_name()));
+  }
+  std::vector<ListedView> views;
+  for (std::size_t i = 0; i < frames->size(); ++i) views.push_back(read_frame(file, top, (*frames)[i], i));
+  return views;
+}
+
+std::string comparable(const std::string& name) {
+  return fs::path(name).lexically_normal().generic_string();
+}
+
+/// Names of `train_filenames` and its kin; empty when the list is not there.
+std::set<std::string> filename_list(const fs::path& file, const Json& top, const char* key) {
+  std::set<std::string> names;
+  const auto list = top.find(key);
+  if (list == top.end() || list->is_null()) return names;
+  if (!list->is_array()) throw InputError(file, key, std::string("expected a list, found ") + list->type_name());
+  for (const Json& name : *list) {
+    if (!name.is_string()) throw InputError(file, key, "expected file names, found " + name.dump());
+    names.insert(comparable(name.get<std::string>()));
+  }
+  return names;
+}
+
+/// nerfstudio's split. Test views (validation views where no test is named) are held out; with an explicit training
+/// list, views of no list are left out.
+void apply_split_lists(const fs::path& file, const Json& top, CaptureListing& listing) {
+  const std::set<std::string> train = filename_list(file, top, "train_filenames");
+  std::set<std::string> held_out = filename_list(file, top, "test_filenames");
+  if (held_out.empty()) held_out = filename_list(file, top, "val_filenames");
+  const auto is_unused = [&](ListedView& view) {
+    const std::string name = comparable(view.name);
+    view.held_out = held_out.contains(name);
+    return !view.held_out && !train.empty() && !train.contains(name);
+  };
+  const std::size_t unused = std::erase_if(listing.views, is_unused);
+  if (unused > 0) {
+    listing.notes.push_back(std::to_string(unused) + " frames are in neither the training nor the test list of " +
+                            file.filename().string() + " and were left out");
+  }
+}
+
+std::optional<Aabbd> read_bounds(const fs::path& file, const Json& top) {
+  const auto box = top.find("aabb");
+  if (box == top.end() || box->is_null()) return std::nullopt;
+  const auto is_corner = [](const Json& corner) { return corner.is_array() && corner.size() == 3; };
+  if (!box->is_array() || box->size() != 2 || !is_corner((*box)[0]) || !is_corner((*box)[1])) {
+    throw InputError(file, "aabb", "expected [[x, y, z], [x, y, z]], found " + box->dump());
+  }
+  Aabbd bounds;
+  for (int axis = 0; axis < 3; ++axis) {
+    bounds.min[axis] = entry((*box)[0][std::size_t(axis)], file, "aabb");
+    bounds.max[axis] = entry((*box)[1][std::size_t(axis)], file, "aabb");
+    if (!(bounds.min[axis] < bounds.max[axis]))
+      throw InputError(file, "aabb", "expected min < max, found " + box->dump());
+  }
+  return bounds;
+}
+
+void read_hints(const fs::path& file, const Json& top, CaptureListing& listing) {
+  const Fields fields(file, top, Json::object(), "");
+  if (fields.find("aabb_scale") != nullptr) listing.aabb_scale = fields.number("aabb_scale", 1);
+  listing.bounds = read_bounds(file, top);
+  if (fields.find("applied_transform") != nullptr) {
+    listing.notes.emplace_back("the poses carry an applied_transform; results are in the frame of the file, after it");
+  }
+}
+
+/// Appends the frames of one file.
+Json append_file(const fs::path& file, bool held_out, CaptureListing& listing) {
+  Json top = parse_json(file);
+  if (!top.is_object()) throw InputError(file, "", std::string("expected an object, found ") + top.type_name());
+  for (ListedView& view : read_frames(file, top)) {
+    view.held_out = held_out;
+    listing.views.push_back(std::move(view));
+  }
+  return top;
+}
+
+}  // namespace
+
+CaptureListing read_transforms(const fs::path& json_file) {
+  CaptureListing listing;
+  listing.source = json_file;
+  listing.format = "transforms";
+  const Json top = append_file(json_file, false, listing);
+  read_hints(json_file, top, listing);
+  if (json_file.filename() == "transforms_train.json") {
+    const fs::path test = json_file.parent_path() / "transforms_test.json";
+    const fs::path validation = json_file.parent_path() / "transforms_val.json";
+    if (fs::exists(test)) {
+      append_file(test, true, listing);
+      if (fs::exists(validation)) listing.notes.emplace_back("transforms_val.json is not used: there is a test split");
+    } else if (fs::exists(validation)) {
+      append_file(validation, true, listing);
+    }
+  } else {
+    apply_split_lists(json_file, top, listing);
+  }
+  make_poses_rigid(listing, "transform_matrix");
+  return listing;
+}
+
+}  // namespace cnerf
