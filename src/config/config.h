@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bake/bake_options.h"
+#include "export/vdb_writer.h"
 #include "src/capture/load_capture.h"
 #include "src/train/scene.h"
 #include "src/train/stage1.h"
@@ -51,6 +52,7 @@ struct Config {
   ColorizerConfig colorizer;
   Stage2Options stage2;
   BakeOptions bake;
+  VdbOptions vdb;
   RenderConfig render;
 
   template <typename Visitor>
@@ -62,6 +64,7 @@ struct Config {
     v.section("colorizer", colorizer);
     v.section("stage2", stage2);
     v.section("bake", bake);
+    v.section("vdb", vdb);
     v.section("render", render);
   }
 };

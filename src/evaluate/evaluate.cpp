@@ -166,6 +166,8 @@ std::string to_json(const Metrics& metrics) {
   nlohmann::ordered_json json;
   json["schema_version"] = kMetricsSchemaVersion;
   json["split"] = metrics.split;
+  json["take"] = metrics.take;
+  json["colorizer"] = metrics.colorizer;
   json["mean"] = json_of(metrics.mean);
   json["views"] = nlohmann::ordered_json::array();
   for (const ViewMetrics& view : metrics.views) json["views"].push_back(json_of(view));

@@ -50,8 +50,9 @@ struct ViewMetrics {
 };
 
 struct Metrics {
-  std::string split;  ///< "held-out", or "train" when nothing was held out
-  ViewMetrics mean;   ///< mean over the views that have the number; of dB for PSNR
+  std::string split;            ///< "held-out", or "train" when nothing was held out
+  std::string take, colorizer;  ///< filled in by the caller; empty = not colorized
+  ViewMetrics mean;             ///< mean over the views that have the number; of dB for PSNR
   std::vector<ViewMetrics> views;
 };
 
@@ -79,7 +80,7 @@ struct EvaluateOptions {
 /// Measures one pair of pictures; `evaluate` is this over all views.
 [[nodiscard]] ViewMetrics measure(const EvaluatedView& pictures);
 
-/// `{"schema_version": 1, "split": ..., "mean": {...}, "views": [...]}`; absent numbers are left out.
+/// `{"schema_version": 1, "split", "take", "colorizer", "mean": {...}, "views": [...]}`; absent numbers are left out.
 [[nodiscard]] std::string to_json(const Metrics& metrics);
 
 }  // namespace cnerf

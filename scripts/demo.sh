@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# From a bare Debian 12 to a colour volume: installs what is missing, builds, makes the sample capture and runs it.
+#   bash scripts/demo.sh [FOLDER]    results go to FOLDER, else to out/demo
+set -euo pipefail
+cd "$(dirname "$0")/.."
+out="${1:-out/demo}"
+
+bash scripts/install_dependencies.sh
+cmake --preset release -DCNERF_TESTS=OFF > /dev/null
+cmake --build --preset release --target cnerf
+cnerf=build/release/cnerf
+
+rm -rf "$out"
+"$cnerf" sample -o "$out/capture"
+"$cnerf" run "$out/capture" -o "$out/run" --preset quick
+
+echo
+echo "volume (OpenVDB):    $(ls "$out"/run/bakes/*/*.vdb)"
+echo "before and after:    $out/run/contact_sheet.png"
+echo "turntable video:     $(ls "$out"/run/renders/*/turntable.mp4)"
+echo "metrics:             $out/run/metrics.json"

@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# Installs the Debian packages that building and testing need, those that are missing only.
+#   bash scripts/install_dependencies.sh           to build and run
+#   bash scripts/install_dependencies.sh --tests   also what tests look at results with
+set -euo pipefail
+
+packages=(
+  cmake ninja-build g++ pkg-config ccache
+  libtorch-dev
+  libopenblas0-pthread  # without it LibTorch falls back to the reference BLAS, which is many times slower
+  libopenvdb-dev libboost-iostreams-dev libopenvdb-tools
+  libopencv-dev libopenexr-dev libtinygltf-dev libmeshoptimizer-dev
+  libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libfmt-dev libspdlog-dev
+  libtbb-dev libssl-dev libcpp-httplib-dev
+  libgtest-dev libgmock-dev libbenchmark-dev
+)
+if [[ "${1:-}" == "--tests" ]]; then
+  packages+=(blender python3-numpy)
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  if [[ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" != installed ]]; then
+    missing+=("$package")
+  fi
+done
+if [[ ${#missing[@]} -eq 0 ]]; then
+  echo "dependencies: all there"
+  exit 0
+fi
+
+as_root=()
+if [[ $EUID -ne 0 ]]; then
+  command -v sudo >/dev/null || { echo "need root to install: ${missing[*]}" >&2; exit 1; }
+  as_root=(sudo)
+fi
+echo "dependencies: installing ${missing[*]}"
+export DEBIAN_FRONTEND=noninteractive
+"${as_root[@]}" apt-get update -qq
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}"

@@ -1,0 +1,34 @@
+#pragma once
+/// What a command of the program is. Each has a file of its own that declares its options and does its work.
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace cnerf {
+
+/// The work of a command, given the words of the command line for its records.
+using Work = std::function<void(const std::vector<std::string>& command_line)>;
+
+/// Declares the options of a command on `app` and returns its work, to be called once the line is parsed.
+using DeclareCommand = Work (*)(CLI::App& app);
+
+struct Command {
+  const char* name;
+  const char* summary;
+  DeclareCommand declare;
+  bool resumable;  ///< after Ctrl-C, the same line with --resume goes on
+};
+
+Work declare_run(CLI::App& app);
+Work declare_sample(CLI::App& app);
+Work declare_train(CLI::App& app);
+Work declare_colorize(CLI::App& app);
+Work declare_render(CLI::App& app);
+Work declare_eval(CLI::App& app);
+Work declare_bake(CLI::App& app);
+Work declare_info(CLI::App& app);
+Work declare_doctor(CLI::App& app);
+
+}  // namespace cnerf

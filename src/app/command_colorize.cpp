@@ -1,0 +1,38 @@
+/// cnerf colorize: stage 2, one take of colours for a trained run.
+
+#include "src/app/command.h"
+#include "src/app/default_colorizer.h"
+#include "src/app/run_arguments.h"
+
+namespace cnerf {
+namespace {
+
+struct ColorizeArguments {
+  RunFolderArguments run;
+  ExistingOutput existing;
+};
+
+void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
+  Reporter reporter = make_reporter(arguments.run.config);
+  // A take that is gone on with has its own configuration; a new one starts from the run's.
+  const std::string base = arguments.existing.resume ? arguments.run.take : "";
+  RunContext context = open_run(arguments.run, base, command_line, reporter);
+  choose_colorizer(context.capture.root, context.config, reporter);
+  const std::string take = take_to_write(context, arguments.run.take, arguments.existing);
+  colorize_step(context, take, arguments.existing);
+  reporter.next("cnerf bake " + arguments.run.run + " --take " + take);
+}
+
+}  // namespace
+
+Work declare_colorize(CLI::App& app) {
+  auto arguments = std::make_shared<ColorizeArguments>();
+  add_run_folder_options(app, arguments->run);
+  add_short_form(app, arguments->run.config, "--colorizer", "colorizer.spec",
+                 "Who colours: reference:IMAGE..., torchscript:FILE, exec:COMMAND");
+  app.add_flag("--resume", arguments->existing.resume, "Go on with a take that was stopped");
+  app.add_flag("--overwrite", arguments->existing.overwrite, "Start again where a take of this name is finished");
+  return [arguments](const auto& command_line) { colorize(*arguments, command_line); };
+}
+
+}  // namespace cnerf

@@ -1,0 +1,110 @@
+/// cnerf doctor: what this machine and build can do, and what is missing.
+
+#include <ImfVersion.h>
+#include <OpenEXRConfig.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <opencv2/core/version.hpp>
+#include <optional>
+#include <set>
+#include <sstream>
+
+#include "src/app/command.h"
+#include "src/app/version.h"
+#include "src/base/cpu_features.h"
+#include "src/base/parallel.h"
+#include "src/config/config.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+void line(const std::string& name, const std::string& value) {
+  fmt::print("{:<16} {}\n", name + ":", value);
+}
+
+/// Shared libraries of this process whose file name contains `part`, links resolved.
+std::set<std::string> loaded_libraries(const std::string& part) {
+  std::set<std::string> found;
+  std::ifstream maps("/proc/self/maps");
+  for (std::string text; std::getline(maps, text);) {
+    const auto slash = text.find('/');
+    if (slash == std::string::npos) continue;
+    const fs::path file = text.substr(slash);
+    if (file.filename().string().find(part) != std::string::npos) found.insert(file.string());
+  }
+  return found;
+}
+
+/// The BLAS behind Torch decides how fast a colorizer is fitted: the reference one is an order slower.
+std::string blas_text() {
+  for (const char* kind : {"openblas", "mkl_rt", "libblis"}) {
+    if (const auto found = loaded_libraries(kind); !found.empty()) return *found.begin();
+  }
+  for (const std::string& library : loaded_libraries("libblas")) {
+    const bool is_fast = library.find("openblas") != std::string::npos || library.find("atlas") != std::string::npos;
+    return library + (is_fast ? "" : "  (reference BLAS: slow; apt install libopenblas0-pthread)");
+  }
+  return "none found";
+}
+
+std::optional<fs::path> program(const std::string& name) {
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path == nullptr ? "" : path);
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    const fs::path file = fs::path(folder) / name;
+    if (::access(file.c_str(), X_OK) == 0) return file;
+  }
+  return std::nullopt;
+}
+
+void print_program(const std::string& name, const std::string& use) {
+  const auto found = program(name);
+  line(name, found ? found->string() : "not found (" + use + ")");
+}
+
+std::string memory_text() {
+  const double pages = static_cast<double>(::sysconf(_SC_PHYS_PAGES));
+  return fmt::format("{:.1f} GiB", pages * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 30));
+}
+
+std::string disk_text() {
+  std::error_code failure;
+  const fs::space_info space = fs::space(".", failure);
+  if (failure) return "unknown: " + failure.message();
+  return fmt::format("{:.1f} GiB free here", double(space.available) / (1 << 30));
+}
+
+std::string presets_text() {
+  std::string text;
+  for (const std::string& name : preset_names()) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none found" : text + " in " + preset_file(preset_names().front()).parent_path().string();
+}
+
+void doctor() {
+  line("cnerf", version_text());
+  line("processor", fmt::format("{} threads, {}", thread_count(), to_string(detected_isa())));
+  line("memory", memory_text());
+  line("disk", disk_text());
+  line("CUDA", has_cuda_engine() ? "built in" : "not built in; fields are trained on the processor");
+  line("LibTorch", CNERF_TORCH_VERSION);
+  line("BLAS", blas_text());
+  line("OpenCV", CV_VERSION);
+  line("OpenVDB", CNERF_OPENVDB_VERSION);
+  line("OpenEXR", OPENEXR_VERSION_STRING);
+  line("presets", presets_text());
+  print_program("blender", "shows bakes");
+  print_program("colmap", "finds camera poses");
+  print_program("ffmpeg", "cuts videos into pictures");
+}
+
+}  // namespace
+
+Work declare_doctor(CLI::App&) {
+  return [](const auto&) { doctor(); };
+}
+
+}  // namespace cnerf

@@ -1,0 +1,25 @@
+/// cnerf eval: numbers and a contact sheet of a take.
+
+#include "src/app/command.h"
+#include "src/app/run_arguments.h"
+
+namespace cnerf {
+namespace {
+
+void eval(const RunFolderArguments& arguments, const std::vector<std::string>& command_line) {
+  Reporter reporter = make_reporter(arguments.config);
+  const std::string take = RunDirectory::open(arguments.run).choose_take(arguments.take);
+  const RunContext context = open_run(arguments, take, command_line, reporter);
+  evaluate_step(context, take);
+  reporter.next("cnerf render " + arguments.run + " --path turntable");
+}
+
+}  // namespace
+
+Work declare_eval(CLI::App& app) {
+  auto arguments = std::make_shared<RunFolderArguments>();
+  add_run_folder_options(app, *arguments);
+  return [arguments](const auto& command_line) { eval(*arguments, command_line); };
+}
+
+}  // namespace cnerf

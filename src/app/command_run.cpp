@@ -1,0 +1,85 @@
+/// cnerf run: a capture in, a colour volume out.
+
+#include "src/app/command.h"
+#include "src/app/common_options.h"
+#include "src/app/default_colorizer.h"
+#include "src/app/pipeline.h"
+#include "src/base/error.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+struct RunArguments {
+  ConfigArguments config;
+  std::string capture, out;
+  bool grey = false;
+  ExistingOutput existing;
+  std::vector<std::string> command_line;
+};
+
+Config config_of(const RunArguments& arguments) {
+  const RunDirectory directory(arguments.out);
+  const bool goes_on = arguments.existing.resume && directory.exists();
+  return resolve_config(arguments.config, goes_on ? directory.config() : Config{});
+}
+
+/// Outputs of an earlier, interrupted call that need not be made again.
+bool is_done(const RunArguments& arguments, const fs::path& output) {
+  return arguments.existing.resume && fs::exists(output);
+}
+
+void turntable(const RunArguments& arguments, const RunContext& context, const std::string& take) {
+  const fs::path folder = context.directory.renders(take);
+  if (is_done(arguments, folder / "turntable.mp4")) return;
+  RenderOutput output;
+  output.folder = folder;
+  output.mp4 = true;
+  render_step(context, take, turntable_path(context.capture, context.config.render), output);
+}
+
+void run(const RunArguments& arguments) {
+  Reporter reporter = make_reporter(arguments.config);
+  Config config = config_of(arguments);
+  if (!arguments.grey) choose_colorizer(arguments.capture, config, reporter);
+
+  Capture capture = read_capture(arguments.capture, config, reporter);
+  RunContext context{RunDirectory(arguments.out), config, std::move(capture), arguments.command_line, reporter};
+  prepare_run(context, arguments.capture, arguments.existing);
+  train_step(context, arguments.existing.resume);
+
+  std::string take;
+  if (!arguments.grey) {
+    take = take_to_write(context, "", arguments.existing);
+    colorize_step(context, take, arguments.existing);
+  }
+  if (!is_done(arguments, context.directory.metrics_file())) evaluate_step(context, take);
+  if (!is_done(arguments, context.directory.bakes(take) / "manifest.json")) {
+    bake_step(context, take, context.directory.bakes(take));
+  }
+  turntable(arguments, context, take);
+  reporter.next("blender --python " + (context.directory.bakes(take) / "blender_setup.py").string());
+}
+
+}  // namespace
+
+Work declare_run(CLI::App& app) {
+  auto arguments = std::make_shared<RunArguments>();
+  app.add_option("CAPTURE", arguments->capture, "Folder of photographs and camera poses")->required();
+  app.add_option("-o,--out", arguments->out, "Folder of the run, made if needed")->required();
+  add_short_form(app, arguments->config, "--colorizer", "colorizer.spec",
+                 "Who colours: reference:IMAGE..., torchscript:FILE, exec:COMMAND");
+  app.add_flag("--grey", arguments->grey, "Stay grey: no colorizer");
+  add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");
+  add_short_form(app, arguments->config, "--holdout", "capture.holdout", "Keep every N-th view for evaluation");
+  add_short_form(app, arguments->config, "--transfer", "capture.transfer", "How grey values encode luminance");
+  app.add_flag("--resume", arguments->existing.resume, "Go on with a run that was stopped");
+  app.add_flag("--overwrite", arguments->existing.overwrite, "Start again where a run is already");
+  add_config_options(app, arguments->config);
+  return [arguments](const auto& command_line) {
+    arguments->command_line = command_line;
+    run(*arguments);
+  };
+}
+
+}  // namespace cnerf

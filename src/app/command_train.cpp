@@ -1,0 +1,42 @@
+/// cnerf train: stage 1, luminance and density.
+
+#include "src/app/command.h"
+#include "src/app/common_options.h"
+#include "src/app/pipeline.h"
+
+namespace cnerf {
+namespace {
+
+struct TrainArguments {
+  ConfigArguments config;
+  std::string capture, out;
+  ExistingOutput existing;
+};
+
+void train(const TrainArguments& arguments, const std::vector<std::string>& command_line) {
+  Reporter reporter = make_reporter(arguments.config);
+  RunDirectory directory(arguments.out);
+  const bool goes_on = arguments.existing.resume && directory.exists();
+  const Config config = resolve_config(arguments.config, goes_on ? directory.config() : Config{});
+  RunContext context{directory, config, read_capture(arguments.capture, config, reporter), command_line, reporter};
+  prepare_run(context, arguments.capture, arguments.existing);
+  train_step(context, arguments.existing.resume);
+  reporter.next("cnerf colorize " + arguments.out + " --colorizer reference:PHOTO.jpg");
+}
+
+}  // namespace
+
+Work declare_train(CLI::App& app) {
+  auto arguments = std::make_shared<TrainArguments>();
+  app.add_option("CAPTURE", arguments->capture, "Folder of photographs and camera poses")->required();
+  app.add_option("-o,--out", arguments->out, "Folder of the run, made if needed")->required();
+  add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");
+  add_short_form(app, arguments->config, "--holdout", "capture.holdout", "Keep every N-th view for evaluation");
+  add_short_form(app, arguments->config, "--transfer", "capture.transfer", "How grey values encode luminance");
+  app.add_flag("--resume", arguments->existing.resume, "Go on with a run that was stopped");
+  app.add_flag("--overwrite", arguments->existing.overwrite, "Start again where a run is already");
+  add_config_options(app, arguments->config);
+  return [arguments](const auto& command_line) { train(*arguments, command_line); };
+}
+
+}  // namespace cnerf

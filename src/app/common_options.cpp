@@ -1,0 +1,70 @@
+#include "src/app/common_options.h"
+
+#include <algorithm>
+
+#include "src/app/device.h"
+#include "src/base/parallel.h"
+#include "src/config/toml_binding.h"
+
+namespace cnerf {
+namespace {
+
+std::string joined(const std::vector<std::string>& words, const std::string& separator) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : separator) + word;
+  return text;
+}
+
+/// What stands right of `name = ` in TOML.
+std::string default_text(const Field& field) {
+  const std::string line = write_toml({field});
+  const auto begin = line.find(" = ") + 3;
+  return line.substr(begin, line.find("  # ") - begin);
+}
+
+}  // namespace
+
+void add_config_options(CLI::App& app, ConfigArguments& arguments) {
+  app.add_option("--preset", arguments.preset, "Set of options to start from: " + joined(preset_names(), ", "));
+  app.add_option("--config", arguments.file, "TOML file of options, read over the preset");
+  app.add_option("--set", arguments.settings, "One option, key.path=value; may be repeated")
+      ->allow_extra_args(false)
+      ->take_all();
+  add_short_form(app, arguments, "--device", "device", "auto, cpu or cuda");
+  add_short_form(app, arguments, "--threads", "threads", "Threads to use; 0 = all cores");
+  app.add_option("--progress", arguments.progress, "auto, line, plain, json or quiet");
+}
+
+void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
+                    const std::string& help) {
+  app.add_option_function<std::string>(
+      option, [&arguments, key](const std::string& value) { arguments.short_forms.push_back(key + "=" + value); },
+      help + " (" + key + ")");
+}
+
+void add_field_options(CLI::App& app, const std::vector<Field>& fields) {
+  for (const Field& field : fields) {
+    std::string name = "--" + field.key;
+    std::ranges::replace(name, '_', '-');
+    app.add_option_function<std::string>(
+        name, [field](const std::string& value) { apply_setting(field.key + "=" + value, {field}); },
+        field.help + " [" + default_text(field) + "]");
+  }
+}
+
+Config resolve_config(const ConfigArguments& arguments, Config base) {
+  if (!arguments.preset.empty()) read_config_file(preset_file(arguments.preset), base);
+  if (!arguments.file.empty()) read_config_file(arguments.file, base);
+  for (const std::string& setting : arguments.settings) apply_setting(setting, base);
+  for (const std::string& setting : arguments.short_forms) apply_setting(setting, base);
+  check_consistency(base);
+  check_device(base.device);
+  set_thread_count(base.threads);
+  return base;
+}
+
+Reporter make_reporter(const ConfigArguments& arguments) {
+  return Reporter(progress_style(arguments.progress, stdout));
+}
+
+}  // namespace cnerf

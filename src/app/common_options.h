@@ -1,0 +1,39 @@
+#pragma once
+/// Options that several commands share.
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "src/app/reporter.h"
+#include "src/config/config.h"
+#include "src/config/fields.h"
+
+namespace cnerf {
+
+/// Everything on the command line that says something about the configuration. Later ones win: preset, file, --set,
+/// short forms.
+struct ConfigArguments {
+  std::string preset, file;
+  std::vector<std::string> settings;     ///< of --set
+  std::vector<std::string> short_forms;  ///< "--downscale 2" as "capture.downscale=2"
+  std::string progress = "auto";
+};
+
+/// Declares --preset, --config, --set, --device, --threads and --progress.
+void add_config_options(CLI::App& app, ConfigArguments& arguments);
+/// Declares `option` as a short form of the config key `key`.
+void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
+                    const std::string& help);
+/// Declares one option a field, named like the field with `-` for `_`; legal values and defaults go to the help.
+/// @param fields  must outlive the parsing.
+void add_field_options(CLI::App& app, const std::vector<Field>& fields);
+
+/// `base` changed by the arguments, checked; also sets the number of threads and refuses a device that is not there.
+/// @throws UsageError, MissingInputError, DeviceError.
+[[nodiscard]] Config resolve_config(const ConfigArguments& arguments, Config base = {});
+
+[[nodiscard]] Reporter make_reporter(const ConfigArguments& arguments);
+
+}  // namespace cnerf

@@ -1,0 +1,148 @@
+#include "src/app/pipeline.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "src/app/version.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/capture/load_capture.h"
+#include "src/colorizer/colorizer.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+bool holds_something(const fs::path& folder) {
+  std::error_code failure;
+  return fs::exists(folder, failure) && (!fs::is_directory(folder, failure) || !fs::is_empty(folder, failure));
+}
+
+/// "reference:a.png" -> "reference".
+std::string kind_of(const std::string& spec) {
+  return spec.substr(0, spec.find(':'));
+}
+
+std::unique_ptr<Colorizer> colorizer_of(const RunContext& context) {
+  ColorizerOptions options;
+  options.spec = context.config.colorizer.spec;
+  options.working_folder = context.capture.root;
+  options.timeout_seconds = context.config.colorizer.timeout_seconds;
+  options.seed = static_cast<std::uint64_t>(context.config.stage2.seed);
+  return make_colorizer(options);
+}
+
+/// A take that was begun and not finished; empty when there is none.
+std::string unfinished_take(const RunDirectory& directory) {
+  std::vector<std::string> names;
+  std::error_code failure;
+  for (const auto& entry : fs::directory_iterator(directory.root() / "takes", failure)) {
+    const std::string name = entry.path().filename().string();
+    if (!directory.take_record(name)) names.push_back(name);
+  }
+  std::ranges::sort(names);
+  return names.empty() ? "" : names.back();
+}
+
+}  // namespace
+
+Capture read_capture(const fs::path& path, const Config& config, Reporter& reporter) {
+  Capture capture = load_capture(path, config.capture);
+  const auto held_out = std::ranges::count_if(capture.views, [](const View& view) { return view.held_out; });
+  const Intrinsics& first = capture.views.front().intrinsics;
+  reporter.say(fmt::format("capture: {} ({}, {} views of {} x {}, {} held out)", path.string(), capture.format,
+                           capture.views.size(), first.width, first.height, held_out));
+  for (const std::string& note : capture.notes) reporter.say("note: " + note);
+  return capture;
+}
+
+void prepare_run(RunContext& context, const fs::path& capture_path, const ExistingOutput& existing) {
+  const RunDirectory& directory = context.directory;
+  const fs::path& root = directory.root();
+  if (directory.exists()) {
+    if (!existing.resume && !existing.overwrite) {
+      throw UsageError(root.string() +
+                       ": holds a run already; pass --resume to go on with it or --overwrite to start again");
+    }
+    if (existing.resume) return write_file(directory.config_file(), to_toml(context.config));
+    directory.clear();
+  } else if (holds_something(root)) {
+    throw UsageError(root.string() + ": is not empty and holds no run; choose another folder");
+  }
+  write_file(directory.config_file(), to_toml(context.config));
+  RunRecord record;
+  record.capture = fs::absolute(capture_path).lexically_normal();
+  record.program_version = version_text();
+  record.command_line = joined(context.command_line);
+  directory.save(record);
+}
+
+void train_step(RunContext& context, bool resume) {
+  const RunDirectory& directory = context.directory;
+  RunRecord record = directory.record();
+  if (!record.stage1_finished || !resume) {
+    record.stage1 = train_stage1(context.capture, context.config.stage1, directory.stage1_snapshot(), resume,
+                                 context.reporter.sink());
+    record.stage1_finished = true;
+    directory.save(record);
+  }
+  context.reporter.say(fmt::format("stage 1: {} steps in {}, {:.1f} dB on training pixels", record.stage1.steps,
+                                   duration_text(record.stage1.seconds), record.stage1.train_psnr));
+  context.reporter.wrote("snapshot", directory.stage1_snapshot());
+}
+
+std::string take_to_write(const RunContext& context, const std::string& named, const ExistingOutput& existing) {
+  const RunDirectory& directory = context.directory;
+  if (!named.empty()) {
+    check_take_name(named);
+    if (directory.take_record(named) && !existing.resume && !existing.overwrite) {
+      throw UsageError(directory.take_folder(named).string() +
+                       ": this take is finished; pass --overwrite, or choose another --take NAME");
+    }
+    return named;
+  }
+  if (existing.resume) {
+    if (const std::string unfinished = unfinished_take(directory); !unfinished.empty()) return unfinished;
+    if (const std::string current = directory.record().current_take; !current.empty()) return current;
+  }
+  return directory.free_take_name(kind_of(context.config.colorizer.spec));
+}
+
+void colorize_step(RunContext& context, const std::string& take, const ExistingOutput& existing) {
+  const RunDirectory& directory = context.directory;
+  std::optional<TakeRecord> finished = directory.take_record(take);
+  if (!finished || !existing.resume) {
+    const auto colorizer = colorizer_of(context);  // before anything is written: it may refuse
+    if (existing.overwrite) fs::remove_all(directory.take_folder(take));
+    write_file(directory.take_config_file(take), to_toml(context.config));
+    const Stage2Report report =
+        train_stage2(context.capture, directory.stage1_snapshot(), context.config.stage2, *colorizer,
+                     directory.take_snapshot(take), existing.resume, context.reporter.sink());
+    finished = TakeRecord{take, colorizer->name(), report};
+    directory.save(*finished);
+    RunRecord record = directory.record();
+    record.current_take = take;
+    directory.save(record);
+  }
+  const Stage2Report& report = finished->stage2;
+  context.reporter.say(fmt::format(
+      "take {}: {} by {}, {} patches accepted, {} rejected; baked colour is {:.2f} ab from the per-pixel decode", take,
+      duration_text(report.seconds), finished->colorizer, report.accepted, report.rejected, report.bake_ab_distance));
+  context.reporter.wrote("take", directory.take_folder(take));
+}
+
+RenderOptions render_options(const Config& config) {
+  RenderOptions options;
+  options.steps_per_box = config.render.steps_per_box;
+  options.min_transmittance = config.render.min_transmittance;
+  return options;
+}
+
+}  // namespace cnerf

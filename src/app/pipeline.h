@@ -1,0 +1,70 @@
+#pragma once
+/// The steps of a run, each usable alone: what `cnerf run` does one after another and the other commands one by one.
+/// Every step says what it wrote.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "src/app/camera_path.h"
+#include "src/app/picture_files.h"
+#include "src/app/reporter.h"
+#include "src/app/run_directory.h"
+#include "src/capture/capture.h"
+#include "src/config/config.h"
+
+namespace cnerf {
+
+/// What a step works on.
+struct RunContext {
+  RunDirectory directory;
+  Config config;
+  Capture capture;
+  std::vector<std::string> command_line;
+  Reporter& reporter;
+};
+
+/// What to do about output that is already there.
+struct ExistingOutput {
+  bool resume = false;     ///< go on where it stopped; what is finished stays
+  bool overwrite = false;  ///< start again
+};
+
+/// Reads a capture and says what was found, with the reader's notes.
+[[nodiscard]] Capture read_capture(const std::filesystem::path& path, const Config& config, Reporter& reporter);
+
+/// Makes the folder of a run ready: refuses one that is in use, clears it to overwrite, writes config.toml and
+/// run.json.
+/// @throws UsageError  when there is a run and neither is set, or the folder holds something else.
+void prepare_run(RunContext& context, const std::filesystem::path& capture_path, const ExistingOutput& existing);
+
+/// Stage 1, unless it is finished.
+void train_step(RunContext& context, bool resume);
+
+/// The take a colorization goes to: the named one, else a free name after the colorizer's kind; with `resume` the take
+/// that was not finished.  @throws UsageError  when the named take is finished and neither is set.
+[[nodiscard]] std::string take_to_write(const RunContext& context, const std::string& named,
+                                        const ExistingOutput& existing);
+/// Stage 2 into `take`, by `config.colorizer`. Makes it the current take.
+void colorize_step(RunContext& context, const std::string& take, const ExistingOutput& existing);
+
+/// Measures a take (empty: luminance only) and writes metrics.json and the contact sheet.
+void evaluate_step(const RunContext& context, const std::string& take);
+
+/// Bakes a take (empty: grey) to OpenVDB and writes the set-up script and the manifest beside it.
+void bake_step(const RunContext& context, const std::string& take, const std::filesystem::path& folder);
+
+/// File kinds a render leaves.
+struct RenderOutput {
+  std::filesystem::path folder;
+  bool png = false, exr = false, mp4 = false;
+  ShownColor color = ShownColor::kDecoded;
+};
+/// Renders a take along a path.
+void render_step(const RunContext& context, const std::string& take, const CameraPath& path,
+                 const RenderOutput& output);
+
+[[nodiscard]] RenderOptions render_options(const Config& config);
+
+}  // namespace cnerf

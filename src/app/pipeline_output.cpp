@@ -1,0 +1,147 @@
+/// The steps of the pipeline that only look at a trained scene: evaluate, bake, render.
+
+#include <fmt/format.h>
+
+#include "bake/volume_baker.h"
+#include "export/volume_export.h"
+#include "src/app/pipeline.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/evaluate/evaluate.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kSheetRows = 6;
+
+std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::string& take) {
+  return Scene::load(directory.stage1_snapshot(), take.empty() ? fs::path() : directory.take_snapshot(take));
+}
+
+Picture grey_picture(const View& view) {
+  std::vector<float> luminance(view.image.pixel_count());
+  for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = view.image.luminance(i);
+  return picture_from_linear(view.image.width, view.image.height, luminance);
+}
+
+std::string colorizer_name(const RunDirectory& directory, const std::string& take) {
+  const auto record = directory.take_record(take);
+  return record ? record->colorizer : "";
+}
+
+void say_metrics(const Metrics& metrics, Reporter& reporter) {
+  const ViewMetrics& mean = metrics.mean;
+  std::string text = fmt::format("{} views ({}): luminance {:.2f} dB", metrics.views.size(), metrics.split,
+                                 mean.psnr_luminance.value_or(0));
+  if (mean.ssim) text += fmt::format(", SSIM {:.3f}", *mean.ssim);
+  if (mean.psnr_rgb) text += fmt::format(", RGB {:.2f} dB", *mean.psnr_rgb);
+  if (mean.ab_error) text += fmt::format(", ab error {:.2f} (all grey {:.2f})", *mean.ab_error, *mean.ab_error_grey);
+  if (mean.bake_ab_distance) text += fmt::format(", baked colour {:.2f} ab from per-pixel", *mean.bake_ab_distance);
+  reporter.say(text);
+}
+
+std::vector<BakeCamera> cameras_of(const Capture& capture) {
+  std::vector<BakeCamera> cameras;
+  for (const View& view : capture.views) cameras.push_back({view.name, view.intrinsics, view.world_from_camera});
+  return cameras;
+}
+
+/// The files of one render, opened as pictures come.
+class RenderFiles {
+ public:
+  RenderFiles(const RenderOutput& output, const std::string& path_name, int fps, Reporter& reporter)
+      : output_(output),
+        frames_(output.folder / path_name),
+        video_path_(output.folder / (path_name + ".mp4")),
+        video_(video_path_, fps),
+        with_video_(output.mp4),
+        with_png_(output.png),
+        reporter_(reporter) {}
+
+  void add(const std::string& name, const RenderedImage& image) {
+    const Picture picture = picture_of(image, output_.color);
+    if (with_video_ && !video_.add(picture)) give_video_up();
+    if (with_png_) write_png(frames_ / (name + ".png"), picture);
+    if (output_.exr) write_exr(frames_ / (name + ".exr"), image, output_.color);
+  }
+
+  void finish() {
+    if (with_video_) {
+      video_.finish();
+      reporter_.wrote("video", video_path_);
+    }
+    if (with_png_ || output_.exr) reporter_.wrote("pictures", frames_);
+  }
+
+ private:
+  void give_video_up() {
+    reporter_.say("note: this OpenCV has no MPEG-4 encoder; writing PNG pictures instead of a video");
+    with_video_ = false;
+    with_png_ = true;
+  }
+
+  const RenderOutput& output_;
+  fs::path frames_, video_path_;
+  VideoFile video_;
+  bool with_video_, with_png_;
+  Reporter& reporter_;
+};
+
+}  // namespace
+
+void evaluate_step(const RunContext& context, const std::string& take) {
+  const RunDirectory& directory = context.directory;
+  const auto scene = load_scene(directory, take);
+  EvaluateOptions options;
+  options.render = render_options(context.config);
+  ContactSheet sheet({"input", "ours", "truth"});
+  const auto add_to_sheet = [&](const EvaluatedView& view) {
+    if (sheet.rows() >= kSheetRows) return;
+    const Picture truth =
+        view.truth ? picture_from_linear(view.truth->width, view.truth->height, view.truth->rgb) : Picture{};
+    sheet.add_row({grey_picture(view.view), picture_of(view.ours, ShownColor::kDecoded), truth});
+  };
+  Metrics metrics = evaluate(*scene, context.capture, options, add_to_sheet, context.reporter.sink());
+  metrics.take = take;
+  metrics.colorizer = colorizer_name(directory, take);
+
+  const std::string json = to_json(metrics);
+  if (!take.empty()) write_file(directory.take_folder(take) / "metrics.json", json);
+  write_file(directory.metrics_file(), json);
+  write_png(directory.contact_sheet(), sheet.compose());
+  say_metrics(metrics, context.reporter);
+  context.reporter.wrote("metrics", directory.metrics_file());
+  context.reporter.wrote("before and after", directory.contact_sheet());
+}
+
+void bake_step(const RunContext& context, const std::string& take, const fs::path& folder) {
+  const auto scene = load_scene(context.directory, take);
+  const std::vector<BakeCamera> cameras = cameras_of(context.capture);
+  BakedVolume volume = bake_volume(*scene, cameras, context.config.bake, context.reporter.sink());
+  volume.colorizer = colorizer_name(context.directory, take);
+  volume.take = take;
+  const VolumeExport files = export_volume(volume, cameras, context.command_line, folder, "volume", context.config.vdb);
+  context.reporter.say(fmt::format("bake: {} voxels of {:.4g} world units", volume.voxels.size(), volume.voxel_size));
+  context.reporter.wrote("volume", files.vdb);
+  context.reporter.wrote("Blender set-up", files.blender_setup);
+}
+
+void render_step(const RunContext& context, const std::string& take, const CameraPath& path,
+                 const RenderOutput& output) {
+  const auto scene = load_scene(context.directory, take);
+  RenderOptions options = render_options(context.config);
+  options.color = scene->is_colorized() && output.color == ShownColor::kDecoded;
+  options.baked_color = scene->is_colorized() && output.color == ShownColor::kBaked;
+  RenderFiles files(output, path.name, context.config.render.fps, context.reporter);
+  const ProgressSink progress = context.reporter.sink();
+  for (std::size_t i = 0; i < path.cameras.size(); ++i) {
+    if (interruption_requested()) throw Interrupted("rendering stopped; the video was not written");
+    const PathCamera& camera = path.cameras[i];
+    files.add(camera.name, scene->render(camera.intrinsics, camera.world_from_camera, options));
+    progress({"render " + path.name, double(i + 1) / double(path.cameras.size()), {}});
+  }
+  files.finish();
+}
+
+}  // namespace cnerf

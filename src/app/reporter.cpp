@@ -1,0 +1,137 @@
+#include "src/app/reporter.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "src/base/error.h"
+
+namespace cnerf {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Seconds = std::chrono::duration<double>;
+
+/// Time between two lines; the last line of a task is always shown.
+Seconds interval_of(ProgressStyle style) {
+  switch (style) {
+    case ProgressStyle::kLine:
+      return Seconds(0.1);
+    case ProgressStyle::kJson:
+      return Seconds(0.5);
+    default:
+      return Seconds(10);
+  }
+}
+
+/// 27.13, 0.0012, 213k
+std::string figure_text(double value) {
+  if (std::abs(value) >= 1e6) return fmt::format("{:.2f}M", value / 1e6);
+  if (std::abs(value) >= 1e4) return fmt::format("{:.0f}k", value / 1e3);
+  return fmt::format("{:.4g}", value);
+}
+
+}  // namespace
+
+ProgressStyle progress_style(const std::string& name, std::FILE* out) {
+  if (name == "auto") return ::isatty(::fileno(out)) != 0 ? ProgressStyle::kLine : ProgressStyle::kPlain;
+  if (name == "line") return ProgressStyle::kLine;
+  if (name == "plain") return ProgressStyle::kPlain;
+  if (name == "json") return ProgressStyle::kJson;
+  if (name == "quiet") return ProgressStyle::kQuiet;
+  throw UsageError("--progress: expected auto, line, plain, json or quiet, got '" + name + "'");
+}
+
+std::string duration_text(double seconds) {
+  const auto whole = static_cast<long>(std::lround(seconds));
+  if (whole >= 3600) return fmt::format("{} h {:02} min", whole / 3600, whole % 3600 / 60);
+  if (whole >= 60) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+  return fmt::format("{} s", whole);
+}
+
+ProgressSink Reporter::sink() {
+  return [this](const Progress& progress) { report(progress); };
+}
+
+void Reporter::report(const Progress& progress) {
+  if (style_ == ProgressStyle::kQuiet) return;
+  const auto now = Clock::now();
+  const bool is_new = progress.task != task_ || progress.fraction < start_fraction_;
+  if (is_new) {
+    end_line();
+    task_ = progress.task;
+    start_ = now;
+    start_fraction_ = progress.fraction;
+  }
+  const bool finished = progress.fraction >= 1;
+  if (!is_new && !finished && now - last_shown_ < interval_of(style_)) return;
+  last_shown_ = now;
+  print_progress(progress, remaining_seconds(progress));
+  if (finished) end_line();
+}
+
+double Reporter::remaining_seconds(const Progress& progress) const {
+  const double done = progress.fraction - start_fraction_;
+  if (done <= 0) return -1;
+  return Seconds(Clock::now() - start_).count() * (1 - progress.fraction) / done;
+}
+
+void Reporter::print_progress(const Progress& progress, double remaining) {
+  if (style_ == ProgressStyle::kJson) {
+    Json json{{"event", "progress"}, {"task", progress.task}, {"fraction", progress.fraction}};
+    for (const auto& [name, value] : progress.figures) {
+      json["figures"][name] = std::isfinite(value) ? Json(value) : Json();
+    }
+    if (remaining >= 0) json["remaining_seconds"] = remaining;
+    return print_json(json.dump());
+  }
+  std::string text = fmt::format("{} {:3.0f} %", progress.task, 100 * progress.fraction);
+  for (const auto& [name, value] : progress.figures) text += fmt::format("  {} {}", name, figure_text(value));
+  if (remaining >= 0 && progress.fraction < 1) text += "  " + duration_text(remaining) + " left";
+  if (style_ == ProgressStyle::kLine) {
+    fmt::print(out_, "\r{}\x1b[K", text);  // K: erase what a longer line left
+    line_open_ = true;
+  } else {
+    fmt::print(out_, "{}\n", text);
+  }
+  std::fflush(out_);
+}
+
+void Reporter::end_line() {
+  if (line_open_) fmt::print(out_, "\n");
+  line_open_ = false;
+}
+
+void Reporter::print_json(const std::string& json) {
+  fmt::print(out_, "{}\n", json);
+  std::fflush(out_);
+}
+
+void Reporter::say(const std::string& text) {
+  if (style_ == ProgressStyle::kJson) return print_json(Json{{"event", "message"}, {"text", text}}.dump());
+  if (style_ == ProgressStyle::kQuiet) return;
+  end_line();
+  fmt::print(out_, "{}\n", text);
+  std::fflush(out_);
+}
+
+void Reporter::wrote(const std::string& what, const std::filesystem::path& path) {
+  if (style_ == ProgressStyle::kJson) {
+    return print_json(Json{{"event", "wrote"}, {"what", what}, {"path", path.string()}}.dump());
+  }
+  end_line();
+  fmt::print(out_, "{:<18} {}\n", what + ":", path.string());
+  std::fflush(out_);
+}
+
+void Reporter::next(const std::string& text) {
+  if (style_ == ProgressStyle::kJson) return print_json(Json{{"event", "next"}, {"text", text}}.dump());
+  if (style_ == ProgressStyle::kQuiet) return;
+  end_line();
+  fmt::print(out_, "{:<18} {}\n", "next:", text);
+  std::fflush(out_);
+}
+
+}  // namespace cnerf

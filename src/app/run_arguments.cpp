@@ -1,0 +1,34 @@
+#include "src/app/run_arguments.h"
+
+#include "src/base/error.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+
+void add_run_folder_options(CLI::App& app, RunFolderArguments& arguments) {
+  app.add_option("RUN", arguments.run, "Folder of a run")->required();
+  app.add_option("--capture", arguments.capture, "Where the capture lies now, if it was moved");
+  app.add_option("--take", arguments.take, "Name of a colorization; the last one if not given");
+  add_config_options(app, arguments.config);
+}
+
+RunContext open_run(const RunFolderArguments& arguments, const std::string& take, std::vector<std::string> command_line,
+                    Reporter& reporter) {
+  RunDirectory directory = RunDirectory::open(arguments.run);
+  const RunRecord record = directory.record();
+  if (!record.stage1_finished) {
+    throw MissingInputError(arguments.run + ": stage 1 is not finished; go on with: cnerf train " +
+                            record.capture.string() + " -o " + arguments.run + " --resume");
+  }
+  Config config = resolve_config(arguments.config, directory.config(take));
+  Capture capture =
+      read_capture(arguments.capture.empty() ? record.capture : fs::path(arguments.capture), config, reporter);
+  return {std::move(directory), std::move(config), std::move(capture), std::move(command_line), reporter};
+}
+
+void refuse_existing(const fs::path& output, bool overwrite) {
+  if (overwrite || !fs::exists(output)) return;
+  throw UsageError(output.string() + ": exists already; pass --overwrite to replace it, or another folder with -o");
+}
+
+}  // namespace cnerf

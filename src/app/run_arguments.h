@@ -1,0 +1,30 @@
+#pragma once
+/// What the commands that work on an existing run share.
+
+#include <string>
+#include <vector>
+
+#include "src/app/common_options.h"
+#include "src/app/pipeline.h"
+
+namespace cnerf {
+
+struct RunFolderArguments {
+  ConfigArguments config;
+  std::string run;
+  std::string capture;  ///< where the capture lies now; empty = where it was
+  std::string take;     ///< empty = the current one
+};
+
+/// Declares RUN, --capture, --take and the config options.
+void add_run_folder_options(CLI::App& app, RunFolderArguments& arguments);
+
+/// Opens the run, its configuration (of `take` where it has one) changed by the arguments, and its capture.
+/// @throws MissingInputError, SnapshotError, UsageError, InputError; also when stage 1 is not finished.
+[[nodiscard]] RunContext open_run(const RunFolderArguments& arguments, const std::string& take,
+                                  std::vector<std::string> command_line, Reporter& reporter);
+
+/// Refuses `output` that exists unless `overwrite`.  @throws UsageError.
+void refuse_existing(const std::filesystem::path& output, bool overwrite);
+
+}  // namespace cnerf
