@@ -3,7 +3,11 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <fstream>
+#include <limits>
 
 #include "bake/dilate.h"
 #include "src/base/check.h"
@@ -112,6 +116,25 @@ std::uint32_t compression_flags(const std::string& name) {
   return openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK;
 }
 
+/// What openvdb::io::File writes, but to a stream whose failures are seen: File leaves a cut-off file on a full disk
+/// and says nothing.
+class CheckedArchive : public openvdb::io::Archive {
+ public:
+  explicit CheckedArchive(std::uint32_t compression) { setCompression(compression); }
+
+  void save(const std::filesystem::path& file, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& meta) const {
+    errno = 0;
+    std::ofstream out;
+    out.exceptions(std::ios::failbit | std::ios::badbit);
+    out.open(file, std::ios::binary | std::ios::trunc);
+    write(out, grids, /*seekable=*/true, meta);
+    out.close();
+  }
+
+ private:
+  using openvdb::io::Archive::write;
+};
+
 void check_options(const VdbOptions& options) {
   CNERF_CHECK(options.voxel_origin == "center" || options.voxel_origin == "corner", options.voxel_origin);
   CNERF_CHECK(options.compression == "blosc" || options.compression == "zip" || options.compression == "none",
@@ -137,12 +160,9 @@ void write_vdb(const BakedVolume& volume, const std::filesystem::path& path, con
   const openvdb::MetaMap meta = file_metadata(volume, options);
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     try {
-      openvdb::io::File file(temporary.string());
-      file.setCompression(compression_flags(options.compression));
-      file.write(grids, meta);
-      file.close();
+      CheckedArchive(compression_flags(options.compression)).save(temporary, grids, meta);
     } catch (const std::exception& failure) {
-      throw OutputError(path.string() + ": cannot be written: " + failure.what());
+      throw OutputError(path.string() + ": cannot be written: " + (errno != 0 ? std::strerror(errno) : failure.what()));
     }
   });
 }
