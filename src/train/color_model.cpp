@@ -1,0 +1,105 @@
+#include "src/train/color_model.h"
+
+#include <cmath>
+
+#include "src/base/parallel.h"
+#include "src/color/colorspace_math.h"
+#include "src/train/options_json.h"
+
+namespace cnerf {
+namespace {
+
+constexpr const char* kKind = "take";
+
+float pixel_opacity(const PixelSamples& pixels, std::size_t p) {
+  float opacity = 0;
+  for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) opacity += pixels.weights[s];
+  return opacity;
+}
+
+}  // namespace
+
+Ab in_gamut(Ab color, float luminance) {
+  const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness_from_luminance(luminance), color.a, color.b});
+  const Lab<float> lab = lab_from_linear_rgb(rgb);
+  return {lab.a, lab.b};
+}
+
+std::vector<float> pixel_luminance(const PixelSamples& pixels) {
+  std::vector<float> luminance(pixels.pixels(), 0.0f);
+  for (std::size_t p = 0; p < pixels.pixels(); ++p) {
+    for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
+      luminance[p] += pixels.weights[s] * pixels.luminance[s];
+    }
+  }
+  return luminance;
+}
+
+ColorModel ColorModel::create(const Stage2Options& options) {
+  ColorModel model;
+  model.options = options;
+  const auto seed = static_cast<std::uint64_t>(options.seed);
+  model.chroma = make_cpu_chroma_engine(options.grid, seed ^ 0x636872ull);
+  model.chromaticity = make_cpu_chromaticity_engine(options.grid, seed ^ 0x78797aull);
+  return model;
+}
+
+std::vector<StatePiece> ColorModel::state() {
+  std::vector<StatePiece> pieces = chroma->state();
+  for (StatePiece& piece : chromaticity->state()) pieces.push_back(std::move(piece));
+  pieces.push_back(state_piece("queries", queries));
+  return pieces;
+}
+
+ColorModel ColorModel::load(const std::filesystem::path& file) {
+  const Snapshot snapshot(file, kKind);
+  ColorModel model;
+  try {
+    model = create(options_from_json<Stage2Options>(snapshot.header().at("options")));
+    const nlohmann::json& report = snapshot.header().at("report");
+    model.report = {report.at("accepted"), report.at("rejected"), report.at("seconds"), report.at("colorizer_seconds"),
+                    report.at("bake_ab_distance")};
+  } catch (const nlohmann::json::exception& problem) {
+    throw SnapshotError(file.string() + ": header: " + problem.what());
+  }
+  model.colorizer = header_field<std::string>(snapshot, "colorizer");
+  model.stage1_sha256 = header_field<std::string>(snapshot, "stage1_sha256");
+  snapshot.restore(model.state());
+  model.chroma->state_loaded();
+  model.chromaticity->state_loaded();
+  return model;
+}
+
+void ColorModel::save(const std::filesystem::path& file) {
+  save_snapshot(file, kKind,
+                {{"options", options_to_json(options)},
+                 {"colorizer", colorizer},
+                 {"stage1_sha256", stage1_sha256},
+                 {"report",
+                  {{"accepted", report.accepted},
+                   {"rejected", report.rejected},
+                   {"seconds", report.seconds},
+                   {"colorizer_seconds", report.colorizer_seconds},
+                   {"bake_ab_distance", report.bake_ab_distance}}}},
+                state());
+}
+
+std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {
+  std::vector<float> logits(pixels.pixels() * kAbBinCount);
+  chroma->logits(pixels, logits);
+  const std::vector<float> luminance = pixel_luminance(pixels);
+  std::vector<Ab> colors(pixels.pixels());
+  parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      if (pixel_opacity(pixels, p) < kLeastColoredOpacity) continue;
+      const std::span<const float> of_pixel(logits.data() + p * kAbBinCount, kAbBinCount);
+      const Ab decoded = options.decode_temperature > 0
+                             ? decode_annealed_mean(of_pixel, static_cast<float>(options.decode_temperature))
+                             : decode_arg_max(of_pixel);
+      colors[p] = in_gamut(decoded, luminance[p]);
+    }
+  });
+  return colors;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,42 @@
+#pragma once
+/// Stage 2's result in memory: the distribution a pixel decodes from, and the per-sample colour a bake takes.
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "src/engine/chroma_engine.h"
+#include "src/train/snapshot.h"
+#include "src/train/stage2.h"
+
+namespace cnerf {
+
+struct ColorModel {
+  Stage2Options options;
+  std::string colorizer;
+  std::string stage1_sha256;  ///< of the stage 1 snapshot it belongs to
+  Stage2Report report;
+  std::vector<std::int64_t> queries = {0};  ///< patches the colorizer was asked for, and the next patch's index
+  std::unique_ptr<ChromaEngine> chroma;
+  std::unique_ptr<ChromaticityEngine> chromaticity;
+
+  static ColorModel create(const Stage2Options& options);
+  /// @throws MissingInputError, SnapshotError
+  static ColorModel load(const std::filesystem::path& snapshot);
+  void save(const std::filesystem::path& snapshot);
+
+  /// Colours of pixels by the paper's way: decode the composited distribution, then into the gamut at the pixel's own
+  /// luminance. Pixels of hardly any opacity are grey.
+  [[nodiscard]] std::vector<Ab> decode(const PixelSamples& pixels) const;
+
+ private:
+  [[nodiscard]] std::vector<StatePiece> state();
+};
+
+/// ab at a luminance, its chroma reduced until the colour lies in the gamut.
+[[nodiscard]] Ab in_gamut(Ab color, float luminance);
+
+/// Linear Y of each pixel, over black.
+[[nodiscard]] std::vector<float> pixel_luminance(const PixelSamples& pixels);
+
+}  // namespace cnerf

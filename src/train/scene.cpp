@@ -1,0 +1,123 @@
+#include "src/train/scene.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "src/color/colorspace_math.h"
+#include "src/train/color_model.h"
+#include "src/train/luminance_model.h"
+#include "src/train/view_cache.h"
+
+namespace cnerf {
+namespace {
+
+constexpr std::size_t kRaysAtATime = 16384;  // bounds the memory of traced samples
+constexpr double kShownWeight = 0.995;       // share of a pixel's weight whose colours are looked up
+
+/// One result a pixel of an image, three channels interleaved.
+void put_color(std::vector<float>& image, std::size_t pixel, Ab color, float luminance) {
+  const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness_from_luminance(luminance), color.a, color.b});
+  for (int c = 0; c < 3; ++c) image[3 * pixel + std::size_t(c)] = rgb[c];
+}
+
+class TrainedScene final : public Scene {
+ public:
+  TrainedScene(const std::filesystem::path& stage1_snapshot, const std::filesystem::path& take_snapshot)
+      : luminance_(LuminanceModel::load(stage1_snapshot)) {
+    if (!take_snapshot.empty()) color_ = ColorModel::load(take_snapshot);
+  }
+
+  [[nodiscard]] const SceneFrame& frame() const override { return luminance_.frame; }
+  [[nodiscard]] bool may_be_occupied(Vec3f position) const override {
+    const OccupancyGrid& grid = luminance_.engine->occupancy();
+    return grid.occupied(grid.cascade_of(position), position);
+  }
+  void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override {
+    luminance_.engine->query_density(positions, sigma);
+  }
+  void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
+                       std::span<float> luminance) const override {
+    luminance_.engine->query_luminance(positions, directions, luminance);
+  }
+  void query_chromaticity(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const override {
+    if (color_) {
+      color_->chromaticity->query(positions, chromaticity);
+    } else {
+      std::fill(chromaticity.begin(), chromaticity.end(), Chromaticity{});
+    }
+  }
+
+  [[nodiscard]] bool is_colorized() const override { return color_.has_value(); }
+  [[nodiscard]] std::string colorizer() const override { return color_ ? color_->colorizer : ""; }
+
+  [[nodiscard]] RenderedImage render(const Intrinsics& intrinsics, const Affined& world_from_camera,
+                                     const RenderOptions& options) const override {
+    const UnitCamera camera(intrinsics, world_from_camera, luminance_.frame);
+    RenderedImage image;
+    image.width = intrinsics.width;
+    image.height = intrinsics.height;
+    const std::size_t n = std::size_t(image.width) * std::size_t(image.height);
+    for (auto* channel : {&image.luminance, &image.opacity, &image.depth}) channel->resize(n);
+    if (color_ && options.color) image.rgb.resize(3 * n);
+    if (color_ && options.baked_color) image.baked_rgb.resize(3 * n);
+    for (std::size_t first = 0; first < n; first += kRaysAtATime) {
+      render_part(camera, options, first, std::min(n, first + kRaysAtATime), image);
+    }
+    return image;
+  }
+
+ private:
+  void render_part(const UnitCamera& camera, const RenderOptions& options, std::size_t first, std::size_t last,
+                   RenderedImage& image) const {
+    std::vector<Ray> rays;
+    for (std::size_t p = first; p < last; ++p) {
+      rays.push_back(
+          camera.ray({double(p % std::size_t(image.width)) + 0.5, double(p / std::size_t(image.width)) + 0.5}));
+    }
+    std::vector<WeightedSample> samples;
+    std::vector<std::size_t> offsets;
+    luminance_.engine->trace(rays, march_settings(frame().cascades, options.steps_per_box),
+                             static_cast<float>(options.min_transmittance), samples, offsets);
+    const Vec3f axis = camera.unit_from_camera.column(2).cast<float>();
+    for (std::size_t r = 0; r < rays.size(); ++r) {
+      float weighted_t = 0;
+      for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
+        image.luminance[first + r] += samples[s].weight * samples[s].luminance;
+        image.opacity[first + r] += samples[s].weight;
+        weighted_t += samples[s].weight * samples[s].t;
+      }
+      if (image.opacity[first + r] >= 0.5f) {
+        const float t = weighted_t / image.opacity[first + r];
+        image.depth[first + r] = t * dot(rays[r].direction, axis) / static_cast<float>(frame().unit_per_world);
+      }
+    }
+    if (image.rgb.empty() && image.baked_rgb.empty()) return;
+
+    trim_samples(samples, offsets, kShownWeight);
+    const PixelSamples pixels = pixel_samples(rays, samples, offsets);
+    if (!image.rgb.empty()) {
+      const std::vector<Ab> colors = color_->decode(pixels);
+      for (std::size_t r = 0; r < rays.size(); ++r)
+        put_color(image.rgb, first + r, colors[r], image.luminance[first + r]);
+    }
+    if (!image.baked_rgb.empty()) {
+      std::vector<Ab> colors(rays.size());
+      color_->chromaticity->composite(pixels, colors);
+      for (std::size_t r = 0; r < rays.size(); ++r) {
+        put_color(image.baked_rgb, first + r, colors[r], image.luminance[first + r]);
+      }
+    }
+  }
+
+  LuminanceModel luminance_;
+  std::optional<ColorModel> color_;
+};
+
+}  // namespace
+
+std::unique_ptr<Scene> Scene::load(const std::filesystem::path& stage1_snapshot,
+                                   const std::filesystem::path& take_snapshot) {
+  return std::make_unique<TrainedScene>(stage1_snapshot, take_snapshot);
+}
+
+}  // namespace cnerf

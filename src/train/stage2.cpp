@@ -1,0 +1,325 @@
+#include "src/train/stage2.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <sstream>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/base/rng.h"
+#include "src/colorizer/gallery.h"
+#include "src/train/color_model.h"
+#include "src/train/luminance_model.h"
+#include "src/train/options_json.h"
+#include "src/train/patches.h"
+
+namespace cnerf {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int kBaseCandidates = 12;
+constexpr int kDistillPixels = 8192;  // pixels a distillation step
+constexpr std::size_t kGalleryTiles = 20;
+constexpr std::uint64_t kFirstBaseIndex = std::uint64_t(1) << 32;  // patch indices of bases, apart from training's
+constexpr int kMostRejectedInARow = 400;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+float decayed(double from, double to, double fraction) {
+  return static_cast<float>(from * std::pow(to / from, std::clamp(2.0 * fraction - 1.0, 0.0, 1.0)));
+}
+
+/// A patch that was shown to the colorizer, and what came back.
+struct AnsweredPatch {
+  PatchPlace place;
+  RenderedPatch shown;
+  std::vector<float> ab;  // [2, K, K]
+};
+
+/// One run of stage 2.
+class Colorization {
+ public:
+  Colorization(const Capture& capture, const std::filesystem::path& stage1_snapshot, const Stage2Options& options,
+               Colorizer& colorizer, std::filesystem::path take_snapshot, bool resume, const ProgressSink& progress)
+      : options_(options), colorizer_(colorizer), file_(std::move(take_snapshot)), progress_(progress) {
+    const std::string stage1_digest = sha256(read_binary_file(stage1_snapshot));
+    start_or_resume(stage1_digest, resume);
+    cache_views(capture, LuminanceModel::load(stage1_snapshot));
+  }
+
+  Stage2Report run() {
+    start_ = Clock::now();
+    seconds_before_ = model_.report.seconds;
+    const std::vector<AnsweredPatch> bases = choose_bases();
+    std::vector<ColorPatchView> base_views;
+    for (const AnsweredPatch& base : bases) base_views.push_back(view_of(base));
+    const Purifier purifier(options_.purify, base_views);
+    measure_prior(bases);
+    inject(purifier);
+    distill();
+    measure_bake_distance();
+    save();
+    return model_.report;
+  }
+
+ private:
+  void start_or_resume(const std::string& stage1_digest, bool resume) {
+    if (resume && std::filesystem::exists(file_)) {
+      model_ = ColorModel::load(file_);
+      if (model_.stage1_sha256 != stage1_digest) {
+        throw SnapshotError(file_.string() + ": colorizes another stage 1 snapshot; run without --resume");
+      }
+      if (model_.colorizer != colorizer_.name() || options_to_json(model_.options) != options_to_json(options_)) {
+        throw SnapshotError(file_.string() +
+                            ": was made with another colorizer or other stage2 options; run with the "
+                            "same ones, or without --resume");
+      }
+      return;
+    }
+    model_ = ColorModel::create(options_);
+    model_.colorizer = colorizer_.name();
+    model_.stage1_sha256 = stage1_digest;
+  }
+
+  void cache_views(const Capture& capture, const LuminanceModel& luminance) {
+    const std::vector<TrainingView> views = training_views(capture, luminance.frame);
+    if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
+    const MarchSettings march = march_settings(luminance.frame.cascades, luminance.options.steps_per_box);
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      views_.push_back(
+          cache_view(*luminance.engine, march, views[v].camera, options_.working_resolution, options_.cached_weight));
+      tell("stage 2: caching views", double(v + 1) / double(views.size()), {});
+      stop_if_asked();
+    }
+  }
+
+  std::vector<AnsweredPatch> ask(const std::vector<PatchPlace>& places) {
+    const Clock::time_point start = Clock::now();
+    const int k = options_.patch_size;
+    LightnessBatch question{int(places.size()), k, k, {}};
+    std::vector<AnsweredPatch> answered;
+    for (const PatchPlace& place : places) {
+      answered.push_back({place, render_patch(views_[place.view], place, k), {}});
+      const std::vector<float>& lightness = answered.back().shown.lightness;
+      question.lightness.insert(question.lightness.end(), lightness.begin(), lightness.end());
+    }
+    const ChromaBatch answer = colorizer_.colorize(question);
+    check_answer(colorizer_.name(), question, answer);
+    for (std::size_t i = 0; i < answered.size(); ++i) answered[i].ab = ab_of(answer, int(i));
+    model_.report.colorizer_seconds += seconds_since(start);
+    return answered;
+  }
+
+  [[nodiscard]] ColorPatchView view_of(const AnsweredPatch& patch) const {
+    return {options_.patch_size, options_.patch_size, patch.ab, patch.shown.lightness, patch.shown.opacity};
+  }
+
+  /// Base patches (paper: s = 0.7, 5 images), spread evenly over the views so that they cover a 360 capture's
+  /// directions. All candidates go into a gallery, from which a user may pick.
+  std::vector<AnsweredPatch> choose_bases() {
+    const int candidates = std::max(kBaseCandidates, options_.purify.base_images);
+    std::vector<PatchPlace> places;
+    for (int i = 0; i < candidates; ++i) {
+      const std::size_t view = std::size_t(i) * views_.size() / std::size_t(candidates);
+      places.push_back(random_patch(views_, view, options_.purify.base_scale, options_.purify.base_scale,
+                                    std::uint64_t(options_.seed), kFirstBaseIndex + std::uint64_t(i)));
+    }
+    std::vector<AnsweredPatch> answered;
+    for (std::size_t first = 0; first < places.size(); first += std::size_t(options_.colorizer_batch)) {
+      const auto last = std::min(places.size(), first + std::size_t(options_.colorizer_batch));
+      for (AnsweredPatch& patch : ask({places.begin() + long(first), places.begin() + long(last)})) {
+        answered.push_back(std::move(patch));
+      }
+    }
+    std::vector<GalleryTile> tiles;
+    for (std::size_t i = 0; i < answered.size(); ++i)
+      tiles.push_back(tile_of(answered[i], "base " + std::to_string(i)));
+    write_gallery(file_.parent_path() / "bases.png", tiles);
+
+    std::vector<AnsweredPatch> bases;
+    for (const int index : picked_bases(candidates)) bases.push_back(answered[std::size_t(index)]);
+    return bases;
+  }
+
+  [[nodiscard]] std::vector<int> picked_bases(int candidates) const {
+    std::vector<int> picked;
+    if (options_.purify.picked_bases.empty()) {
+      for (int i = 0; i < options_.purify.base_images; ++i)
+        picked.push_back(i * candidates / options_.purify.base_images);
+      return picked;
+    }
+    std::stringstream list(options_.purify.picked_bases);
+    for (std::string item; std::getline(list, item, ',');) {
+      const bool digits = !item.empty() && item.find_first_not_of("0123456789") == std::string::npos;
+      const int index = digits && item.size() < 6 ? std::stoi(item) : -1;
+      if (index < 0 || index >= candidates) {
+        throw UsageError("stage2.purify.picked_bases: '" + item + "' is not a candidate, 0 to " +
+                         std::to_string(candidates - 1));
+      }
+      picked.push_back(index);
+    }
+    return picked;
+  }
+
+  /// Class rebalancing's weights, from the colours of the base patches.
+  void measure_prior(const std::vector<AnsweredPatch>& bases) {
+    if (options_.rebalancing <= 0) return;
+    std::vector<float> prior(kAbBinCount, 1e-6f);
+    const std::size_t n = std::size_t(options_.patch_size) * std::size_t(options_.patch_size);
+    for (const AnsweredPatch& base : bases) {
+      for (std::size_t i = 0; i < n; ++i) {
+        prior[std::size_t(nearest_bin({base.ab[i], base.ab[n + i]}))] += base.shown.opacity[i];
+      }
+    }
+    const float total = std::accumulate(prior.begin(), prior.end(), 0.0f);
+    for (float& p : prior) p /= total;
+    class_weights_ = rebalancing_weights(prior, static_cast<float>(options_.rebalancing));
+  }
+
+  /// Query-based colorization: draw, ask, purify, train on what passes.
+  void inject(const Purifier& purifier) {
+    int rejected_in_a_row = 0;
+    while (model_.chroma->step_count() < options_.patches) {
+      std::vector<PatchPlace> places;
+      for (int i = 0; i < options_.colorizer_batch; ++i) {
+        const auto index = static_cast<std::uint64_t>(model_.queries.front()++);
+        const CounterRng rng(std::uint64_t(options_.seed), index);
+        places.push_back(random_patch(views_, rng.below(0, std::uint32_t(views_.size())), options_.scale_min,
+                                      options_.scale_max, std::uint64_t(options_.seed), index));
+      }
+      for (const AnsweredPatch& patch : ask(places)) {
+        if (!purifier.accepts(view_of(patch))) {
+          model_.report.rejected += 1;
+          remember(rejected_, patch);
+          if (++rejected_in_a_row >= kMostRejectedInARow) {
+            throw ColorizerError(colorizer_.name() + ": " + std::to_string(rejected_in_a_row) +
+                                 " answers in a row were rejected as unlike the base images; see bases.png, lower "
+                                 "stage2.purify.threshold, or pick other bases");
+          }
+          continue;
+        }
+        rejected_in_a_row = 0;
+        model_.report.accepted += 1;
+        remember(accepted_, patch);
+        if (model_.chroma->step_count() < options_.patches) train_on(patch);
+      }
+      after_step(model_.chroma->step_count(), options_.patches);
+    }
+    write_gallery(file_.parent_path() / "accepted.png", accepted_);
+    write_gallery(file_.parent_path() / "rejected.png", rejected_);
+  }
+
+  void train_on(const AnsweredPatch& patch) {
+    const CachedView& view = views_[patch.place.view];
+    const auto step = static_cast<std::uint64_t>(model_.chroma->step_count());
+    const PatchPixels picked = pick_pixels(view, patch.place, options_.patch_size, patch.ab, options_.rays_per_patch,
+                                           std::uint64_t(options_.seed), step);
+    std::vector<SoftLabel> labels;
+    std::vector<float> weights;
+    for (std::size_t i = 0; i < picked.pixels.size(); ++i) {
+      labels.push_back(soft_label(picked.colors[i]));
+      const float of_class = class_weights_.empty() ? 1.0f : class_weights_[std::size_t(nearest_bin(picked.colors[i]))];
+      weights.push_back(of_class * view.opacity[picked.pixels[i]]);
+    }
+    const double fraction = double(step) / options_.patches;
+    loss_ = model_.chroma->step(pixel_samples(view, picked.pixels), labels, weights,
+                                decayed(options_.learning_rate, options_.final_learning_rate, fraction));
+  }
+
+  /// Random visible pixels of all views.
+  [[nodiscard]] PixelSamples random_pixels(int count, std::uint64_t stream) const {
+    const CounterRng rng(std::uint64_t(options_.seed) ^ 0x64697374ull, stream);
+    PixelSamples pixels;
+    for (int i = 0; i < count; ++i) {
+      const CachedView& view = views_[rng.below(2 * std::uint64_t(i), std::uint32_t(views_.size()))];
+      const std::uint32_t pixel = rng.below(2 * std::uint64_t(i) + 1, std::uint32_t(view.width * view.height));
+      if (view.opacity[pixel] >= kLeastColoredOpacity) append(pixels, pixel_samples(view, std::span(&pixel, 1)));
+    }
+    return pixels;
+  }
+
+  /// Fits the per-sample colour to the pixels' decoded colours (what is baked is what is seen).
+  void distill() {
+    while (model_.chromaticity->step_count() < options_.distill_steps) {
+      const long step = model_.chromaticity->step_count();
+      const PixelSamples pixels = random_pixels(kDistillPixels, std::uint64_t(step));
+      if (pixels.pixels() == 0) break;
+      const double fraction = double(step) / options_.distill_steps;
+      loss_ = model_.chromaticity->step(pixels, model_.decode(pixels),
+                                        decayed(options_.learning_rate, options_.final_learning_rate, fraction));
+      after_step(step + 1, options_.distill_steps);
+    }
+  }
+
+  void measure_bake_distance() {
+    const PixelSamples pixels = random_pixels(4 * kDistillPixels, std::uint64_t(1) << 40);
+    const std::vector<Ab> decoded = model_.decode(pixels);
+    std::vector<Ab> baked(pixels.pixels());
+    model_.chromaticity->composite(pixels, baked);
+    double total = 0;
+    for (std::size_t p = 0; p < baked.size(); ++p)
+      total += std::hypot(baked[p].a - decoded[p].a, baked[p].b - decoded[p].b);
+    model_.report.bake_ab_distance = total / double(std::max<std::size_t>(baked.size(), 1));
+  }
+
+  void after_step(long done, int all) {
+    const bool distilling = model_.chromaticity->step_count() > 0;
+    const int asked = model_.report.accepted + model_.report.rejected;
+    tell(distilling ? "stage 2: colour for baking" : "stage 2", double(done) / all,
+         {{distilling ? "ab distance" : "loss", loss_},
+          {"accepted", double(model_.report.accepted) / std::max(asked, 1)},
+          {"colorizer s", model_.report.colorizer_seconds}});
+    stop_if_asked();
+  }
+
+  void tell(const std::string& task, double fraction, std::vector<std::pair<std::string, double>> figures) const {
+    if (progress_) progress_({task, std::min(fraction, 1.0), std::move(figures)});
+  }
+
+  void stop_if_asked() {
+    if (!interruption_requested()) return;
+    save();
+    throw Interrupted("stopped; saved " + file_.string() + ", continue with --resume");
+  }
+
+  void save() {
+    if (start_) model_.report.seconds = seconds_before_ + seconds_since(*start_);
+    model_.save(file_);
+  }
+
+  [[nodiscard]] GalleryTile tile_of(const AnsweredPatch& patch, std::string caption) const {
+    return {options_.patch_size, options_.patch_size, patch.shown.lightness, patch.ab, std::move(caption)};
+  }
+
+  void remember(std::vector<GalleryTile>& tiles, const AnsweredPatch& patch) const {
+    if (tiles.size() < kGalleryTiles) tiles.push_back(tile_of(patch, ""));
+  }
+
+  Stage2Options options_;
+  Colorizer& colorizer_;
+  std::filesystem::path file_;
+  ProgressSink progress_;
+  ColorModel model_;
+  std::vector<CachedView> views_;
+  std::vector<float> class_weights_;  // [313]; empty = all alike
+  std::vector<GalleryTile> accepted_, rejected_;
+  double loss_ = 0;
+  std::optional<Clock::time_point> start_;
+  double seconds_before_ = 0;
+};
+
+}  // namespace
+
+Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
+                          const Stage2Options& options, Colorizer& colorizer,
+                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress) {
+  return Colorization(capture, stage1_snapshot, options, colorizer, take_snapshot, resume, progress).run();
+}
+
+}  // namespace cnerf

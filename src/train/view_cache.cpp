@@ -1,0 +1,122 @@
+#include "src/train/view_cache.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cnerf {
+namespace {
+
+constexpr float kCacheTransmittance = 2e-3f;  // what lies behind is not worth a sample
+
+/// Marks the heaviest samples of [begin, end) until they carry `share` of the total.
+void mark_heaviest(const std::vector<WeightedSample>& samples, std::size_t begin, std::size_t end, double share,
+                   std::vector<std::size_t>& order, std::vector<char>& keep) {
+  double total = 0;
+  order.clear();
+  for (std::size_t s = begin; s < end; ++s) {
+    total += samples[s].weight;
+    order.push_back(s);
+  }
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return samples[a].weight > samples[b].weight || (samples[a].weight == samples[b].weight && a < b);
+  });
+  double carried = 0;
+  for (const std::size_t s : order) {
+    if (carried >= share * total) break;
+    carried += samples[s].weight;
+    keep[s] = 1;
+  }
+}
+
+}  // namespace
+
+void trim_samples(std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets, double share) {
+  std::vector<char> keep(samples.size(), 0);
+  std::vector<std::size_t> order;
+  std::size_t write = 0;
+  for (std::size_t p = 0; p + 1 < offsets.size(); ++p) {
+    const std::size_t begin = offsets[p], end = offsets[p + 1];
+    mark_heaviest(samples, begin, end, share, order, keep);
+    double total = 0, kept = 0;
+    for (std::size_t s = begin; s < end; ++s) {
+      total += samples[s].weight;
+      kept += keep[s] ? samples[s].weight : 0;
+    }
+    offsets[p] = write;
+    const auto scale = static_cast<float>(kept > 0 ? total / kept : 1);
+    for (std::size_t s = begin; s < end; ++s) {
+      if (!keep[s]) continue;
+      samples[write] = samples[s];
+      samples[write++].weight *= scale;
+    }
+  }
+  if (!offsets.empty()) offsets.back() = write;
+  samples.resize(write);
+}
+
+CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march, const UnitCamera& full_size_camera,
+                      int short_side, double share) {
+  CachedView view;
+  view.camera = full_size_camera;
+  const Intrinsics& lens = full_size_camera.intrinsics;
+  const double factor = std::min(1.0, double(short_side) / std::min(lens.width, lens.height));
+  view.width = std::max(1, int(std::lround(lens.width * factor)));
+  view.height = std::max(1, int(std::lround(lens.height * factor)));
+  view.camera.intrinsics = resized(lens, view.width, view.height);
+
+  std::vector<Ray> rays;
+  rays.reserve(std::size_t(view.width) * view.height);
+  for (int y = 0; y < view.height; ++y) {
+    for (int x = 0; x < view.width; ++x) rays.push_back(view.camera.ray({x + 0.5, y + 0.5}));
+  }
+  engine.trace(rays, march, kCacheTransmittance, view.samples, view.offsets);
+  view.luminance.resize(rays.size());
+  view.opacity.resize(rays.size());
+  for (std::size_t p = 0; p < rays.size(); ++p) {
+    for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s) {
+      view.luminance[p] += view.samples[s].weight * view.samples[s].luminance;
+      view.opacity[p] += view.samples[s].weight;
+    }
+  }
+  trim_samples(view.samples, view.offsets, share);
+  view.samples.shrink_to_fit();
+  return view;
+}
+
+PixelSamples pixel_samples(std::span<const Ray> rays, std::span<const WeightedSample> samples,
+                           std::span<const std::size_t> offsets) {
+  PixelSamples pixels;
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
+      pixels.positions.push_back(rays[r].at(samples[s].t));
+      pixels.weights.push_back(samples[s].weight);
+      pixels.luminance.push_back(samples[s].luminance);
+    }
+    pixels.offsets.push_back(pixels.positions.size());
+  }
+  return pixels;
+}
+
+PixelSamples pixel_samples(const CachedView& view, std::span<const std::uint32_t> wanted) {
+  PixelSamples pixels;
+  for (const std::uint32_t p : wanted) {
+    const Ray ray = view.camera.ray({p % std::uint32_t(view.width) + 0.5, p / std::uint32_t(view.width) + 0.5});
+    for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s) {
+      pixels.positions.push_back(ray.at(view.samples[s].t));
+      pixels.weights.push_back(view.samples[s].weight);
+      pixels.luminance.push_back(view.samples[s].luminance);
+    }
+    pixels.offsets.push_back(pixels.positions.size());
+  }
+  return pixels;
+}
+
+void append(PixelSamples& to, const PixelSamples& more) {
+  const std::size_t before = to.positions.size();
+  to.positions.insert(to.positions.end(), more.positions.begin(), more.positions.end());
+  to.weights.insert(to.weights.end(), more.weights.begin(), more.weights.end());
+  to.luminance.insert(to.luminance.end(), more.luminance.begin(), more.luminance.end());
+  for (std::size_t i = 1; i < more.offsets.size(); ++i) to.offsets.push_back(before + more.offsets[i]);
+}
+
+}  // namespace cnerf

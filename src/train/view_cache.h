@@ -1,0 +1,44 @@
+#pragma once
+/// Frozen geometry, cached: what each training view sees at a working resolution, and the few samples behind each
+/// pixel.
+
+#include <span>
+#include <vector>
+
+#include "src/engine/luminance_engine.h"
+#include "src/engine/pixel_samples.h"
+#include "src/render/training_views.h"
+
+namespace cnerf {
+
+/// One view at working resolution. Arrays are [H, W].
+struct CachedView {
+  UnitCamera camera;
+  int width = 0, height = 0;
+  std::vector<float> luminance;  ///< linear Y over black
+  std::vector<float> opacity;
+  std::vector<WeightedSample> samples;  ///< pixel by pixel, front to back
+  std::vector<std::size_t> offsets;     ///< [H W + 1]
+
+  [[nodiscard]] int short_side() const { return std::min(width, height); }
+};
+
+/// Keeps, of each pixel, the fewest samples that carry `share` of its weight, in order, and scales their weights to the
+/// pixel's whole opacity.
+void trim_samples(std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets, double share);
+
+/// Renders a view with its short side at most `short_side` pixels.
+[[nodiscard]] CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
+                                    const UnitCamera& full_size_camera, int short_side, double share);
+
+/// Traced samples as the chroma engines want them.
+[[nodiscard]] PixelSamples pixel_samples(std::span<const Ray> rays, std::span<const WeightedSample> samples,
+                                         std::span<const std::size_t> offsets);
+
+/// Samples of some pixels, given as y * width + x, of a cached view.
+[[nodiscard]] PixelSamples pixel_samples(const CachedView& view, std::span<const std::uint32_t> pixels);
+
+/// Appends the pixels of `more`.
+void append(PixelSamples& to, const PixelSamples& more);
+
+}  // namespace cnerf
