@@ -1,0 +1,231 @@
+/// What Blender shows of our files, against closed formulas and against our own integrator.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "bake/volume_baker.h"
+#include "bake/volume_integrator.h"
+#include "export/volume_export.h"
+#include "src/base/files.h"
+#include "src/color/colorspace_math.h"
+#include "tests/bake/analytic_field.h"
+#include "tests/blender/blender_run.h"
+#include "tests/export/test_volumes.h"
+#include "tests/support/data.h"
+
+namespace cnerf::test {
+namespace {
+
+const Vec3f kColor{0.2f, 0.5f, 0.8f};
+
+Vec3d voxel_position(const BakedVolume& volume, Vec3d voxel) {
+  return volume.origin + voxel * volume.voxel_size;
+}
+
+TEST(Blender, SlabIsBeerAndLambertThroughAnOrthographicCamera) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const BakedVolume volume = block_volume({0, 0, 0}, {40, 40, 10}, 1.0f);  // 2 x 2 x 0.5 world units
+  const Vec3d middle = voxel_position(volume, {20, 20, 5});
+  const BakeCamera camera = camera_at("above", middle + Vec3d{0, 0, 4}, middle, 33, 33, 60);
+  const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "slab");
+
+  std::ofstream(folder / "ortho.py") << "import bpy\n"
+                                        "scene = bpy.context.scene\n"
+                                        "scene.camera.data.type = 'ORTHO'\n"
+                                        "scene.camera.data.ortho_scale = 1.0\n"
+                                        "scene.render.image_settings.file_format = 'OPEN_EXR'\n"
+                                        "scene.render.image_settings.color_depth = '32'\n"
+                                        "scene.render.image_settings.color_mode = 'RGBA'\n"
+                                        "scene.render.filepath = r'" +
+                                            (folder / "ortho.exr").string() +
+                                            "'\n"
+                                            "bpy.ops.render.render(write_still=True)\n";
+  ASSERT_EQ(run_blender(bake.blender_setup, "--exact --step-rate 0.25 --samples 64", folder / "ortho.py"), 0)
+      << read_text_file(folder / "blender.log");
+  const RenderedExr image = read_exr(folder / "ortho.exr");
+  const double opacity = 1 - std::exp(-0.5);  // 0.3935
+  const float* centre = image.pixel(16, 16);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(centre[c], kColor[c] * opacity, 1e-3);
+  EXPECT_NEAR(centre[3], opacity, 1e-3);
+}
+
+TEST(Blender, DenseSphereHasItsColorFromCoreToRim) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const Vec3f xyz = relative_xyz_from_linear_rgb(kColor);
+  const AnalyticField sphere({{0, 0, 0}, 0.5, 1}, sphere_density({0.5f, 0.5f, 0.5f}, 0.2f, 400), xyz.y,
+                             {xyz.x / xyz.y, xyz.z / xyz.y});  // 200 per world unit
+  BakeOptions options;
+  options.voxel_size = 1.0 / 64;
+  const BakedVolume volume = bake_volume(sphere, {}, options);
+  const BakeCamera camera = camera_at("front", {0, -3, 0}, {0, 0, 0}, 96, 96, 300);
+  const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "sphere");
+  const RenderedExr image = render_exact(bake.blender_setup, "--step-rate 0.25 --samples 64");
+
+  int core = 0, rim = 0;
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      const float* p = image.pixel(x, y);
+      if (p[3] < 0.01f) continue;
+      (p[3] > 0.999f ? core : rim) += 1;
+      for (int c = 0; c < 3; ++c) ASSERT_NEAR(p[c] / (p[3] * kColor[c]), 1, 1e-3) << x << ", " << y << ": " << p[3];
+    }
+  }
+  EXPECT_GT(core, 2000);
+  EXPECT_GT(rim, 100);
+}
+
+/// Where optical depth passes half of `inside` along a line of pixels, in pixels; `depth(i)` at pixel centre i + 0.5.
+template <typename Depth>
+double half_crossing(int begin, int step, double inside, const Depth& depth) {
+  for (int i = begin; i >= 0 && i < 1000; i += step) {
+    const double a = depth(i) - inside / 2, b = depth(i + step) - inside / 2;
+    if (a <= 0 && b > 0) return i + 0.5 + step * a / (a - b);
+  }
+  return -1;
+}
+
+struct Edges {
+  double left = 0, right = 0, top = 0, bottom = 0;  ///< pixels
+};
+
+Edges find_edges(const RenderedExr& image, double inside) {
+  const int middle = image.width / 2;
+  const auto depth = [&](int x, int y) { return -std::log1p(-static_cast<double>(image.pixel(x, y)[3])); };
+  const auto across = [&](int i) { return depth(i, middle); };
+  const auto down = [&](int i) { return depth(middle, i); };
+  return {half_crossing(0, 1, inside, across), half_crossing(image.width - 1, -1, inside, across),
+          half_crossing(0, 1, inside, down), half_crossing(image.height - 1, -1, inside, down)};
+}
+
+class VoxelOrigin : public testing::TestWithParam<const char*> {};
+
+TEST_P(VoxelOrigin, EdgesAreWithinATenthOfAVoxel) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const BakedVolume volume = block_volume({2, 3, 4}, {14, 15, 16}, 2.0f);  // 12 voxels of 0.05 along each axis
+  const Vec3d middle = voxel_position(volume, {8, 9, 10});
+  const double far = 500, pixels_per_voxel = 4;
+  const double focal = pixels_per_voxel * far / volume.voxel_size;
+  const std::vector<BakeCamera> cameras{camera_at("z", middle + Vec3d{0, 0, far}, middle, 72, 72, focal),
+                                        camera_at("x", middle + Vec3d{far, 0, 0}, middle, 72, 72, focal)};
+  VdbOptions options;
+  options.voxel_origin = GetParam();
+  const VolumeExport bake = export_volume(volume, cameras, {}, folder.path(), "block", options);
+  const double inside = 2.0 * 12 * volume.voxel_size;
+  const double near_face = 36 - 6 * pixels_per_voxel, far_face = 36 + 6 * pixels_per_voxel;
+  const double tenth = 0.1 * pixels_per_voxel;
+  for (const char* camera : {"z", "x"}) {
+    const RenderedExr image =
+        render_exact(bake.blender_setup, std::string("--step-rate 0.25 --samples 128 --camera ") + camera);
+    const Edges edges = find_edges(image, inside);
+    EXPECT_NEAR(edges.left, near_face, tenth) << camera;
+    EXPECT_NEAR(edges.right, far_face, tenth) << camera;
+    EXPECT_NEAR(edges.top, near_face, tenth) << camera;
+    EXPECT_NEAR(edges.bottom, far_face, tenth) << camera;
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Blender, VoxelOrigin, testing::Values("center", "corner"));
+
+/// Three soft balls of different colours and densities.
+BakedVolume soft_scene() {
+  struct Ball {
+    Vec3f centre;
+    float radius, sigma;
+    Vec3f rgb;
+  };
+  static const std::vector<Ball> balls{{{0.40f, 0.42f, 0.45f}, 0.16f, 60, {0.8f, 0.25f, 0.15f}},
+                                       {{0.62f, 0.50f, 0.55f}, 0.14f, 25, {0.15f, 0.55f, 0.75f}},
+                                       {{0.50f, 0.62f, 0.38f}, 0.12f, 120, {0.35f, 0.7f, 0.2f}}};
+  const auto weight = [](const Ball& ball, Vec3f p) {
+    const float q = length(p - ball.centre) / ball.radius;
+    return q < 1 ? ball.sigma * (1 - q * q) : 0.0f;
+  };
+  const auto color = [weight](Vec3f p) {
+    Vec3f sum{};
+    float total = 1e-6f;
+    for (const Ball& ball : balls) {
+      sum += ball.rgb * weight(ball, p);
+      total += weight(ball, p);
+    }
+    return relative_xyz_from_linear_rgb(sum / total);
+  };
+  AnalyticField field({{2, -1, 0.5}, 0.5, 1}, [weight](Vec3f p) {
+    float sigma = 0;
+    for (const Ball& ball : balls) sigma += weight(ball, p);
+    return sigma;
+  });
+  field.with_luminance([color](Vec3f p, Vec3f) { return color(p).y; });
+  field.with_chromaticity([color](Vec3f p) {
+    const Vec3f xyz = color(p);
+    return xyz.y > 0 ? Chromaticity{xyz.x / xyz.y, xyz.z / xyz.y} : Chromaticity{};
+  });
+  BakeOptions options;
+  options.resolution = 56;
+  return bake_volume(field, {}, options);
+}
+
+struct Comparison {
+  double psnr = 0;  ///< of linear RGB, against 1
+  double worst_opacity = 0;
+  std::size_t pixels = 0;
+};
+
+/// Over the pixels that hold something in either picture.
+Comparison compare(const RenderedExr& cycles, const VolumeImage& ours) {
+  Comparison result;
+  double squared = 0;
+  for (int y = 0; y < ours.height; ++y) {
+    for (int x = 0; x < ours.width; ++x) {
+      const std::size_t at = static_cast<std::size_t>(y) * ours.width + x;
+      const float* p = cycles.pixel(x, y);
+      if (ours.opacity[at] <= 0.01f && p[3] <= 0.01f) continue;
+      ++result.pixels;
+      for (int c = 0; c < 3; ++c) squared += std::pow(static_cast<double>(p[c]) - ours.rgb[3 * at + c], 2);
+      result.worst_opacity = std::max<double>(result.worst_opacity, std::abs(p[3] - ours.opacity[at]));
+    }
+  }
+  result.psnr = -10 * std::log10(squared / static_cast<double>(3 * result.pixels));
+  return result;
+}
+
+TEST(Blender, CyclesAndOurIntegratorAgree) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const BakedVolume volume = soft_scene();
+  BakeCamera camera = camera_at("three quarters", {3.6, -3.4, 1.9}, {2, -1, 0.5}, 160, 120, 260);
+  camera.intrinsics.fy = 234;  // pixels that are not square, axis off the middle
+  camera.intrinsics.cx = 71;
+  camera.intrinsics.cy = 66.5;
+  const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "balls");
+  const RenderedExr cycles = render_exact(bake.blender_setup, "--step-rate 0.25 --samples 256");
+  const VolumeImage ours = integrate_volume(volume, camera.intrinsics, camera.world_from_camera);
+  const Comparison equal = compare(cycles, ours);
+  RecordProperty("psnr_millidecibel", static_cast<int>(1000 * equal.psnr));
+  std::printf("Cycles against our integrator: %.2f dB over %zu pixels, opacity within %.4f\n", equal.psnr, equal.pixels,
+              equal.worst_opacity);
+  EXPECT_GT(equal.pixels, 2000u);
+  EXPECT_GE(equal.psnr, 40);
+
+  // The measure must notice half a voxel.
+  BakedVolume shifted = volume;
+  shifted.origin = shifted.origin + Vec3d{0.5, 0.5, 0.5} * shifted.voxel_size;
+  EXPECT_LT(compare(cycles, integrate_volume(shifted, camera.intrinsics, camera.world_from_camera)).psnr, 40);
+}
+
+TEST(Blender, FailuresEndWithAnExitStatus) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, {}, folder.path(), "block");
+  EXPECT_NE(run_blender(bake.blender_setup, "--camera 7"), 0);
+  EXPECT_NE(run_blender(bake.blender_setup, "--manifest /nowhere/manifest.json"), 0);
+  EXPECT_EQ(run_blender(bake.blender_setup, "--save '" + (folder / "scene.blend").string() + "'"), 0)
+      << read_text_file(folder / "blender.log");
+  EXPECT_TRUE(std::filesystem::exists(folder / "scene.blend"));
+}
+
+}  // namespace
+}  // namespace cnerf::test
