@@ -1,0 +1,170 @@
+#include "src/capture/sample_scene.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <opencv2/imgcodecs.hpp>
+
+#include "src/base/check.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/base/parallel.h"
+#include "src/base/rng.h"
+#include "src/capture/exr_io.h"
+#include "src/capture/sample/scene.h"
+#include "src/color/colorspace_math.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+using sample::PixelColor;
+
+constexpr double kAngleOfView = 42;  ///< degrees, horizontal
+constexpr double kDistance = 3.5;    ///< from the point all cameras look at
+constexpr Vec3d kLookAt = {0, 0, 0.16};
+constexpr std::array<double, 3> kElevations = {20, 36, 53};  ///< degrees above the plate
+constexpr int kTestEvery = 8;
+
+struct RenderedView {
+  std::vector<PixelColor> color;  ///< [H, W]
+  std::vector<float> depth;       ///< [H, W]
+};
+
+Intrinsics camera_of(const SampleSceneOptions& options) {
+  Intrinsics out;
+  out.width = options.width;
+  out.height = options.height;
+  out.fx = out.fy = 0.5 * options.width / std::tan(0.5 * kAngleOfView * std::numbers::pi / 180);
+  out.cx = 0.5 * options.width;
+  out.cy = 0.5 * options.height;
+  return out;
+}
+
+/// Cameras around the plate: azimuths by the golden angle, so that any number of views is spread evenly, at elevations
+/// in turn.
+Affined pose_of(int view) {
+  const double golden_angle = std::numbers::pi * (3 - std::sqrt(5.0));
+  const double azimuth = view * golden_angle - 0.5 * std::numbers::pi;
+  const double elevation = kElevations[std::size_t(view) % kElevations.size()] * std::numbers::pi / 180;
+  const Vec3d outward = {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+                         std::sin(elevation)};
+  const Vec3d forward = -outward;
+  const Vec3d right = normalized(cross(forward, Vec3d{0, 0, 1}));
+  return {Mat3d::from_columns(right, cross(forward, right), forward), kLookAt + outward * kDistance};
+}
+
+std::string file_name(int view, const char* extension) {
+  char name[32];
+  std::snprintf(name, sizeof name, "view_%03d.%s", view, extension);
+  return name;
+}
+
+/// The first view is a test view, then every eighth; a training set of fewer than two views would be none.
+bool is_test_view(int view, int views) {
+  return views > 2 && view % kTestEvery == 0;
+}
+
+RenderedView render_view(const SampleSceneOptions& options, int view) {
+  const Intrinsics intrinsics = camera_of(options);
+  const Affined pose = pose_of(view);
+  const int side = int(std::lround(std::sqrt(double(options.samples_per_pixel))));
+  const CounterRng seeds(std::uint64_t(options.seed), std::uint64_t(view));
+  RenderedView out;
+  out.color.resize(std::size_t(options.width) * std::size_t(options.height));
+  out.depth.resize(out.color.size());
+  parallel_tasks(std::size_t(options.height), [&](std::size_t y) {
+    for (std::size_t x = 0; x < std::size_t(options.width); ++x) {
+      const std::size_t pixel = y * std::size_t(options.width) + x;
+      out.color[pixel] = sample::render_pixel(intrinsics, pose, int(x), int(y), side, seeds.bits(pixel));
+      out.depth[pixel] = sample::depth_of_pixel(intrinsics, pose, int(x), int(y));
+    }
+  });
+  return out;
+}
+
+std::uint8_t byte_of(double value) {
+  return std::uint8_t(std::lround(std::clamp(value, 0.0, 1.0) * 255));
+}
+
+/// B G R A of a pixel. PNG wants colours that are not multiplied by alpha.
+cv::Vec4b stored_pixel(const PixelColor& color, bool grey) {
+  if (color.alpha == 0) return {0, 0, 0, 0};
+  Vec3d rgb = color.rgb / color.alpha;
+  if (grey) rgb = Vec3d{1, 1, 1} * luminance_of(rgb);
+  const auto code = [](double v) { return byte_of(srgb_from_linear(v)); };
+  return {code(rgb.z), code(rgb.y), code(rgb.x), byte_of(color.alpha)};
+}
+
+void write_png(const fs::path& file, const SampleSceneOptions& options, const RenderedView& view, bool grey) {
+  cv::Mat4b image(options.height, options.width);
+  for (int i = 0; i < options.width * options.height; ++i) image(i) = stored_pixel(view.color[std::size_t(i)], grey);
+  std::vector<std::uint8_t> bytes;
+  if (!cv::imencode(".png", image, bytes)) throw OutputError(file.string() + ": cannot be encoded");
+  write_file(file, std::as_bytes(std::span(bytes)));
+}
+
+void write_view(const fs::path& folder, const SampleSceneOptions& options, int index, const RenderedView& view) {
+  write_png(folder / "images" / file_name(index, "png"), options, view, /*grey=*/true);
+  write_png(folder / "color" / file_name(index, "png"), options, view, /*grey=*/false);
+  write_atomically(folder / "depth" / file_name(index, "exr"), [&](const fs::path& temporary) {
+    write_exr_channel(temporary, "Z", options.width, options.height, view.depth);
+  });
+}
+
+/// Rows of the 4x4 matrix in the convention of transforms.json: the camera looks along -Z, +Y is up.
+nlohmann::json matrix_of(const Affined& world_from_camera) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (int i = 0; i < 3; ++i) {
+    const Vec3d r = world_from_camera.linear.rows[i];
+    rows.push_back({r.x, -r.y, -r.z, world_from_camera.translation[i]});
+  }
+  rows.push_back({0.0, 0.0, 0.0, 1.0});
+  return rows;
+}
+
+nlohmann::ordered_json transforms_of(const SampleSceneOptions& options) {
+  const Intrinsics camera = camera_of(options);
+  const Aabbd box = sample::bounds();
+  nlohmann::ordered_json out = {{"camera_model", "PINHOLE"}, {"w", camera.width}, {"h", camera.height},
+                                {"fl_x", camera.fx},         {"fl_y", camera.fy}, {"cx", camera.cx},
+                                {"cy", camera.cy},           {"aabb_scale", 1}};
+  out["aabb"] = {{box.min.x, box.min.y, box.min.z}, {box.max.x, box.max.y, box.max.z}};
+  out["train_filenames"] = nlohmann::json::array();
+  out["test_filenames"] = nlohmann::json::array();
+  for (int view = 0; view < options.views; ++view) {
+    const std::string name = "images/" + file_name(view, "png");
+    out[is_test_view(view, options.views) ? "test_filenames" : "train_filenames"].push_back(name);
+    out["frames"].push_back({{"file_path", name}, {"transform_matrix", matrix_of(pose_of(view))}});
+  }
+  return out;
+}
+
+void check_options(const SampleSceneOptions& options) {
+  const int side = int(std::lround(std::sqrt(double(options.samples_per_pixel))));
+  if (options.samples_per_pixel < 1 || side * side != options.samples_per_pixel) {
+    throw UsageError("samples_per_pixel: expected a square number, found " + std::to_string(options.samples_per_pixel));
+  }
+  if (options.views < 2 || options.views > 1000) {
+    throw UsageError("views: expected 2 to 1000, found " + std::to_string(options.views));
+  }
+  if (options.width < 1 || options.height < 1) throw UsageError("width, height: expected at least one pixel");
+}
+
+}  // namespace
+
+void write_sample_scene(const fs::path& folder, const SampleSceneOptions& options, const ProgressSink& progress) {
+  check_options(options);
+  constexpr int kReferenceView = 1;  // the first training view
+  for (int view = 0; view < options.views; ++view) {
+    const RenderedView rendered = render_view(options, view);
+    write_view(folder, options, view, rendered);
+    if (view == kReferenceView) write_png(folder / "reference.png", options, rendered, /*grey=*/false);
+    if (progress) progress({"sample", double(view + 1) / options.views, {}});
+  }
+  write_file(folder / "transforms.json", transforms_of(options).dump(1) + "\n");
+}
+
+}  // namespace cnerf
