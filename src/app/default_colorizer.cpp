@@ -11,7 +11,7 @@ void choose_colorizer(const fs::path& capture, Config& config, Reporter& reporte
   const fs::path reference = folder / "reference.png";
   if (fs::is_regular_file(reference)) {
     config.colorizer.spec = "reference:" + fs::absolute(reference).lexically_normal().string();
-    reporter.say("no --colorizer given: taking colours from " + reference.string() + ", which the sample brings along");
+    reporter.say("no --colorizer given: colours come from " + reference.string() + ", which lies in the capture");
     return;
   }
   throw UsageError(

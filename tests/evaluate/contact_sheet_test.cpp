@@ -36,8 +36,8 @@ TEST(ContactSheet, ShowsEveryPictureWholeAndLeavesEmptyColumnsOut) {
 
 TEST(ContactSheet, GreyAndColourComeFromLinearLight) {
   EXPECT_EQ(picture_from_linear(1, 2, {1.0f, 0.0f}).rgb, (std::vector<std::uint8_t>{255, 255, 255, 0, 0, 0}));
-  // 0.2140 is the linear light of sRGB 0.5, which rounds to 128.
-  EXPECT_EQ(picture_from_linear(1, 1, {0.21404f, 0.0f, 2.0f}).rgb, (std::vector<std::uint8_t>{128, 0, 255}));
+  // 0.318547 is the linear light of sRGB 0.6, which is 153.
+  EXPECT_EQ(picture_from_linear(1, 1, {0.318547f, 0.0f, 2.0f}).rgb, (std::vector<std::uint8_t>{153, 0, 255}));
 }
 
 TEST(ContactSheet, WritesAPngOrNothing) {
