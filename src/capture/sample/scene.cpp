@@ -57,8 +57,9 @@ std::vector<Object> make_objects() {
 /// lies below all others, cannot be it.
 bool is_blocked(const Ray& ray, double t_max) {
   const std::vector<Object>& all = objects();
-  return std::any_of(all.begin() + 1, all.end(),
-                     [&](const Object& object) { return intersect(object.shape, ray, 0.0, t_max).has_value(); });
+  return std::any_of(all.begin() + 1, all.end(), [&](const Object& object) {
+    return object.shape.may_meet(ray, 0.0, t_max) && intersect(object.shape, ray, 0.0, t_max).has_value();
+  });
 }
 
 /// Two axes across a direction.
@@ -95,14 +96,25 @@ class Stratified {
   double shift_x_, shift_y_;
 };
 
-/// A uniform sample of the unit disc.
+/// A uniform sample of the unit disc, from a table: two samples in each shading would spend their time in sin and cos.
 struct DiscPoint {
   double x, y;
 };
+constexpr int kDiscCells = 64;
+std::vector<DiscPoint> make_disc_table() {
+  std::vector<DiscPoint> table;
+  for (int i = 0; i < kDiscCells; ++i) {
+    for (int j = 0; j < kDiscCells; ++j) {
+      const double radius = std::sqrt((i + 0.5) / kDiscCells);
+      const double angle = 2 * std::numbers::pi * (j + 0.5) / kDiscCells;
+      table.push_back({radius * std::cos(angle), radius * std::sin(angle)});
+    }
+  }
+  return table;
+}
 DiscPoint disc_point(Stratified::Point p) {
-  const double radius = std::sqrt(p.u);
-  const double angle = 2 * std::numbers::pi * p.v;
-  return {radius * std::cos(angle), radius * std::sin(angle)};
+  static const std::vector<DiscPoint> table = make_disc_table();
+  return table[std::size_t(p.u * kDiscCells) * kDiscCells + std::size_t(p.v * kDiscCells)];
 }
 
 /// What the sun sends: its share that is visible times the cosine, and a highlight beside it.
@@ -165,6 +177,7 @@ std::optional<ScenePoint> trace(const Ray& ray) {
   ScenePoint point;
   double nearest = 1e9;
   for (const Object& object : objects()) {
+    if (!object.shape.may_meet(ray, 0.0, nearest)) continue;
     if (const auto hit = intersect(object.shape, ray, 0.0, nearest)) {
       nearest = hit->t;
       point = {&object, hit->t, {}, hit->normal};

@@ -187,7 +187,6 @@ Shape::Shape(ShapeKind kind, Vec3d sizes, Vec3d centre, const Mat3d& world_from_
       radius_(bounding_radius(kind, sizes)) {}
 
 std::optional<SurfaceHit> intersect(const Shape& shape, const Ray& ray, double t_min, double t_max) {
-  if (!shape.may_meet(ray, t_min, t_max)) return std::nullopt;
   std::optional<SurfaceHit> hit =
       hit_local(shape, {shape.local(ray.origin), shape.local_direction(ray.direction)}, {t_min, t_max});
   if (hit) hit->normal = shape.world_direction(hit->normal);

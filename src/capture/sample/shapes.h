@@ -54,7 +54,7 @@ class Shape {
   double radius_;  ///< of a sphere around the centre that holds the shape
 };
 
-/// The nearest entry with t in (t_min, t_max), or nothing.
+/// The nearest entry with t in (t_min, t_max), or nothing. Loops ask `may_meet` before: it is cheap, and inlined there.
 [[nodiscard]] std::optional<SurfaceHit> intersect(const Shape& shape, const Ray& ray, double t_min, double t_max);
 
 }  // namespace cnerf::sample
