@@ -217,7 +217,9 @@ std::string ChildProcess::fate() {
   while (!reap(false) && Clock::now() < patience) std::this_thread::sleep_for(milliseconds(2));
   if (!reaped_) return "is still running";
   if (WIFSIGNALED(status_)) return "was killed by signal " + std::to_string(WTERMSIG(status_));
-  return "exited with " + std::to_string(WEXITSTATUS(status_));
+  const int code = WEXITSTATUS(status_);
+  // 128 + n is how a shell reports that what it ran was killed by signal n.
+  return "exited with " + std::to_string(code) + (code > 128 ? " (signal " + std::to_string(code - 128) + ")" : "");
 }
 
 }  // namespace cnerf

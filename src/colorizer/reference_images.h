@@ -35,10 +35,10 @@ struct PatchDistortion {
   double rotation = 10;                     ///< degrees, either way
   double stretch = 0.15;                    ///< log of the aspect ratio, either way
   bool flip = true;                         ///< left and right
-  double log_gamma = 0.2;                   ///< of lightness, either way
-  double contrast = 0.1;                    ///< of lightness, either way
+  double log_gamma = 0.1;                   ///< of lightness, either way
+  double contrast = 0.05;                   ///< of lightness, either way
   double blur = 1.0;                        ///< largest Gaussian sigma on lightness, pixels; half of the patches
-  double noise = 1.5;                       ///< largest standard deviation on lightness, L* units
+  double noise = 1.0;                       ///< largest standard deviation on lightness, L* units
 };
 
 /// Writes one patch of a random photograph: `lightness` [size, size] in L*, `ab` [2, size, size].

@@ -19,12 +19,12 @@ namespace cnerf {
 struct ReferenceRecipe {
   std::vector<int> channels = {24, 48, 64, 96, 96};  ///< per level; the first is at half the patch's size
   int patch_size = 128;
-  int steps = 600;
-  int batch = 8;
+  int steps = 1200;
+  int batch = 4;
   int shards = 4;  ///< a batch's fixed parts; each is one task, so that results do not depend on the threads
   double learning_rate = 4e-3;
   double weight_decay = 1e-2;
-  bool classify = false;   ///< soft labels over the photographs' bins, instead of ab itself
+  bool classify = true;    ///< soft labels over the photographs' bins, instead of ab itself
   double temperature = 1;  ///< of the annealed mean, when it classifies
   bool local_statistics = true;
   PatchDistortion distortion;

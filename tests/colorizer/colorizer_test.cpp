@@ -1,0 +1,105 @@
+#include "src/colorizer/colorizer.h"
+
+#include <cmath>
+#include <limits>
+
+#include "src/color/ab_bins.h"
+#include "tests/colorizer/questions.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+
+using test::message_of;
+using test::some_question;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::Each;
+using ::testing::HasSubstr;
+
+TEST(Colorizer, GreyAnswersNoChroma) {
+  const auto grey = test::colorizer_of("grey");
+  const LightnessBatch question = some_question();
+  const ChromaBatch answer = grey->colorize(question);
+  EXPECT_NO_THROW(check_answer("grey", question, answer));
+  EXPECT_EQ(answer.ab.size(), 2 * question.lightness.size());
+  EXPECT_THAT(answer.ab, Each(0.0f));
+}
+
+TEST(Colorizer, UnknownKindIsAUsageErrorThatListsTheKinds) {
+  for (const char* spec : {"", "gray", "torch:x", ":x"}) {
+    const std::string message = message_of<UsageError>([&] { test::colorizer_of(spec); });
+    for (const std::string& kind : colorizer_kinds()) EXPECT_THAT(message, HasSubstr(kind)) << spec;
+  }
+  EXPECT_THAT(colorizer_kinds(), Contains("exec"));
+}
+
+TEST(Colorizer, KindsThatNeedAnArgumentSayWhich) {
+  EXPECT_THAT(message_of<UsageError>([] { test::colorizer_of("exec"); }), HasSubstr("exec:COMMAND"));
+  EXPECT_THAT(message_of<UsageError>([] { test::colorizer_of("torchscript:"); }), HasSubstr("torchscript:FILE"));
+  EXPECT_THAT(message_of<UsageError>([] { test::colorizer_of("grey:x"); }), HasSubstr("grey"));
+}
+
+TEST(Colorizer, MissingFilesAreNamed) {
+  for (const char* spec : {"reference:no_such.jpg", "torchscript:no_such.pt"}) {
+    ColorizerOptions options;
+    options.spec = spec;
+    options.working_folder = "/no/such/folder";
+    EXPECT_THAT(message_of<MissingInputError>([&] { (void)make_colorizer(options); }),
+                AllOf(HasSubstr("no_such"), HasSubstr("/no/such/folder")));
+  }
+}
+
+ChromaBatch good_answer(const LightnessBatch& question) {
+  ChromaBatch answer{question.batch, question.height, question.width, {}, {}};
+  answer.ab.assign(2 * question.lightness.size(), 1.0f);
+  return answer;
+}
+
+TEST(CheckAnswer, AcceptsAbAndDistributions) {
+  const LightnessBatch question = some_question();
+  ChromaBatch answer = good_answer(question);
+  EXPECT_NO_THROW(check_answer("x", question, answer));
+  answer.ab.clear();
+  answer.logits.assign(kAbBinCount * question.lightness.size(), 0.0f);
+  EXPECT_NO_THROW(check_answer("x", question, answer));
+}
+
+TEST(CheckAnswer, RefusesWhatIsWrongAndNamesTheColorizer) {
+  const LightnessBatch question = some_question();
+  const auto refused = [&](auto&& spoil) {
+    ChromaBatch answer = good_answer(question);
+    spoil(answer);
+    const std::string message = message_of<ColorizerError>([&] { check_answer("exec:x", question, answer); });
+    EXPECT_THAT(message, HasSubstr("exec:x"));
+  };
+  refused([](ChromaBatch& a) { a.batch = 1; });
+  refused([](ChromaBatch& a) { std::swap(a.height, a.width); });
+  refused([](ChromaBatch& a) { a.ab.pop_back(); });
+  refused([](ChromaBatch& a) { a.ab.clear(); });
+  refused([](ChromaBatch& a) { a.logits.assign(a.ab.size() / 2 * kAbBinCount, 0.0f); });
+  refused([](ChromaBatch& a) { a.ab[3] = std::numeric_limits<float>::quiet_NaN(); });
+  refused([](ChromaBatch& a) { a.ab.back() = std::numeric_limits<float>::infinity(); });
+}
+
+TEST(AbOf, TakesTheEntryAsked) {
+  ChromaBatch answer{2, 1, 2, {1, 2, 3, 4, 5, 6, 7, 8}, {}};
+  EXPECT_THAT(ab_of(answer, 1), ::testing::ElementsAre(5, 6, 7, 8));
+  EXPECT_THROW((void)ab_of(answer, 2), ContractError);
+}
+
+TEST(AbOf, DecodesADistributionPerPixel) {
+  ChromaBatch answer{1, 1, 2, {}, std::vector<float>(2 * kAbBinCount, 0.0f)};
+  const int first = 40, second = 200;
+  answer.logits[std::size_t(2 * first)] = 100;       // pixel 0
+  answer.logits[std::size_t(2 * second + 1)] = 100;  // pixel 1
+  const std::vector<float> ab = ab_of(answer, 0);
+  const auto& centres = ab_bin_centres();
+  EXPECT_NEAR(ab[0], centres[first].a, 1e-3);
+  EXPECT_NEAR(ab[1], centres[second].a, 1e-3);
+  EXPECT_NEAR(ab[2], centres[first].b, 1e-3);
+  EXPECT_NEAR(ab[3], centres[second].b, 1e-3);
+}
+
+}  // namespace
+}  // namespace cnerf

@@ -1,0 +1,44 @@
+#pragma once
+/// Questions and expectations shared by the colorizer tests.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "src/base/error.h"
+#include "src/colorizer/colorizer.h"
+
+namespace cnerf::test {
+
+/// A batch whose lightness is a different number everywhere, in 10..90.
+inline LightnessBatch some_question(int batch = 2, int height = 6, int width = 5) {
+  LightnessBatch question{batch, height, width, {}};
+  const int count = batch * height * width;
+  for (int i = 0; i < count; ++i) question.lightness.push_back(10 + 80 * float(i) / float(count));
+  return question;
+}
+
+inline std::unique_ptr<Colorizer> colorizer_of(const std::string& spec, double timeout_seconds = 20) {
+  ColorizerOptions options;
+  options.spec = spec;
+  options.timeout_seconds = timeout_seconds;
+  return make_colorizer(options);
+}
+
+/// Runs `body`, which must throw `E`, and returns the message.
+template <typename E, typename Body>
+std::string message_of(Body&& body) {
+  try {
+    body();
+  } catch (const E& error) {
+    return error.what();
+  } catch (const std::exception& error) {
+    ADD_FAILURE() << "threw another type: " << error.what();
+    return "";
+  }
+  ADD_FAILURE() << "threw nothing";
+  return "";
+}
+
+}  // namespace cnerf::test

@@ -1,0 +1,214 @@
+// reference: colorizers fitted to a toy scene in which the texture of a thing decides its colour.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+
+#include "src/base/files.h"
+#include "src/base/parallel.h"
+#include "src/color/colorspace_math.h"
+#include "src/colorizer/reference_images.h"
+#include "src/colorizer/reference_network.h"
+#include "tests/colorizer/questions.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+
+using test::message_of;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+/// Discs of fine stripes are red, discs of coarse stripes are blue, the smooth ground is green; mean lightness is the
+/// same everywhere, so nothing but texture tells. `seed` places the discs.
+struct Toy {
+  int side = 192;
+  std::vector<float> linear_rgb;  ///< [H, W, 3]
+  LightnessBatch question;
+  std::vector<float> ab;  ///< [2, H, W]
+};
+
+Toy toy_scene(std::uint64_t seed) {
+  Toy toy;
+  SequentialRng rng(seed, 3);
+  const int side = toy.side;
+  const auto pixels = std::size_t(side * side);
+  std::vector<int> kind(pixels, 0);
+  for (int disc = 0; disc < 10; ++disc) {
+    const float x0 = rng.uniform(0, float(side)), y0 = rng.uniform(0, float(side)), radius = rng.uniform(20, 34);
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < side; ++x) {
+        if (std::hypot(float(x) - x0, float(y) - y0) < radius) kind[std::size_t(y * side + x)] = 1 + disc % 2;
+      }
+    }
+  }
+  constexpr float kColors[3][2] = {{-30, 25}, {40, 25}, {5, -40}};
+  toy.ab.resize(2 * pixels);
+  toy.question = {1, side, side, std::vector<float>(pixels)};
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const float x = float(i % std::size_t(side)), y = float(i / std::size_t(side));
+    const float wave = kind[i] == 1 ? std::sin(x * 1.6f) : kind[i] == 2 ? std::sin((x + y) * 0.45f) : 0.0f;
+    const Lab<float> lab{55 + 8 * wave, kColors[kind[i]][0], kColors[kind[i]][1]};
+    const Vec3<float> rgb = gamut_mapped_linear_rgb_from_lab(lab);
+    for (int c = 0; c < 3; ++c) toy.linear_rgb.push_back(rgb[c]);
+    toy.question.lightness[i] = lab.lightness;
+    toy.ab[i] = lab.a;
+    toy.ab[pixels + i] = lab.b;
+  }
+  return toy;
+}
+
+double mean_distance(const std::vector<float>& p, const std::vector<float>& q) {
+  const std::size_t n = p.size() / 2;
+  double sum = 0;
+  for (std::size_t i = 0; i < n; ++i) sum += std::hypot(p[i] - q[i], p[n + i] - q[n + i]);
+  return sum / double(n);
+}
+
+void save_png(const Toy& toy, const std::filesystem::path& file, bool grey = false) {
+  cv::Mat image(toy.side, toy.side, CV_8UC3);
+  for (std::size_t i = 0; i < toy.linear_rgb.size(); ++i) {
+    const std::size_t channel = i % 3, from = grey ? i - channel + 1 : i;
+    image.data[i - channel + 2 - channel] =
+        static_cast<unsigned char>(std::lround(255 * std::clamp(srgb_from_linear(toy.linear_rgb[from]), 0.0f, 1.0f)));
+  }
+  ASSERT_TRUE(cv::imwrite(file.string(), image));
+}
+
+/// Small enough for a test: fractions of a second for the shortest fits.
+ReferenceRecipe short_recipe(int steps) {
+  ReferenceRecipe recipe;
+  recipe.steps = steps;
+  recipe.channels = {16, 24, 32, 32};
+  recipe.patch_size = 64;
+  recipe.distortion.share_min = 0.3;
+  return recipe;
+}
+
+class ReferenceNetworks : public ::testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Losses, ReferenceNetworks, ::testing::Bool(),
+                         [](const auto& parameter) { return parameter.param ? "Classifying" : "Regressing"; });
+
+TEST_P(ReferenceNetworks, LearnsColourFromTextureAndCarriesItToAnotherView) {
+  const Toy seen = toy_scene(1), unseen = toy_scene(2);
+  const std::vector<ReferenceImage> images{make_reference_image(seen.side, seen.side, seen.linear_rgb)};
+  ReferenceRecipe recipe = short_recipe(250);
+  recipe.classify = GetParam();
+  ReferenceNetwork network(recipe, images, 1);
+  const std::vector<float> grey(unseen.ab.size(), 0.0f);
+  const double of_grey = mean_distance(grey, unseen.ab);
+  EXPECT_GT(mean_distance(network.colorize(unseen.question), unseen.ab), 0.6 * of_grey) << "before the fit";
+  network.fit(images, {});
+  EXPECT_LT(mean_distance(network.colorize(unseen.question), unseen.ab), 0.35 * of_grey);
+}
+
+TEST_P(ReferenceNetworks, TheSameSeedGivesTheSameWeightsWithAnyNumberOfThreads) {
+  const Toy toy = toy_scene(1);
+  const std::vector<ReferenceImage> images{make_reference_image(toy.side, toy.side, toy.linear_rgb)};
+  ReferenceRecipe recipe = short_recipe(4);
+  recipe.classify = GetParam();
+  const auto fitted = [&](int threads, std::uint64_t seed) {
+    set_thread_count(threads);
+    ReferenceNetwork network(recipe, images, seed);
+    network.fit(images, {});
+    set_thread_count(0);
+    return network.weights();
+  };
+  const std::vector<float> once = fitted(1, 5);
+  EXPECT_EQ(once, fitted(2, 5));
+  EXPECT_EQ(once, fitted(4, 5));
+  EXPECT_NE(once, fitted(1, 6));
+}
+
+TEST(ReferenceNetwork, AnswersAnySizeAndWeightsComeBack) {
+  const Toy toy = toy_scene(1);
+  const std::vector<ReferenceImage> images{make_reference_image(toy.side, toy.side, toy.linear_rgb)};
+  ReferenceNetwork network(short_recipe(3), images, 1), other(short_recipe(3), images, 2);
+  network.fit(images, {});
+  for (const auto& question : {test::some_question(3, 64, 64), test::some_question(1, 37, 81)}) {
+    const std::vector<float> answer = network.colorize(question);
+    EXPECT_EQ(answer.size(), 2 * question.lightness.size());
+    other.set_weights(network.weights());
+    EXPECT_EQ(other.colorize(question), answer);
+  }
+}
+
+TEST(ReferenceImages, PatchesKeepColoursAndHoldThePlaceTheyShow) {
+  // Left half red, right half blue, no distortion of tone: colours of a patch are those two.
+  const int width = 400, height = 300;
+  std::vector<float> rgb(std::size_t(width * height * 3), 0.0f);
+  for (int i = 0; i < width * height; ++i) rgb[std::size_t(3 * i + (i % width < width / 2 ? 0 : 2))] = 0.5f;
+  const std::vector<ReferenceImage> images{make_reference_image(width, height, rgb)};
+  const PatchDistortion none{0.9, 1.0, 0, 0, false, 0, 0, 0, 0};
+  std::vector<float> lightness(64 * 64), ab(2 * 64 * 64);
+  SequentialRng rng(1, 1);
+  sample_reference_patch(images, none, 64, rng, lightness, ab);
+  EXPECT_GT(ab[64 * 64 + 32 * 64], 20) << "b of the left border: red";
+  EXPECT_LT(ab[64 * 64 + 32 * 64 + 63], -50) << "b of the right border: blue";
+  PatchDistortion mirrored = none;
+  mirrored.flip = true;
+  int flipped = 0;
+  for (int i = 0; i < 40; ++i) {
+    sample_reference_patch(images, mirrored, 64, rng, lightness, ab);
+    flipped += ab[64 * 64 + 32 * 64] < 0 ? 1 : 0;
+  }
+  EXPECT_GT(flipped, 8);
+  EXPECT_LT(flipped, 32);
+}
+
+TEST(ReferenceColorizer, RefusesWhatIsNoColourPhotograph) {
+  const test::TempDir folder;
+  save_png(toy_scene(1), folder / "grey.png", true);
+  EXPECT_THAT(message_of<InputError>([&] { test::colorizer_of("reference:" + (folder / "grey.png").string()); }),
+              AllOf(HasSubstr("grey.png"), HasSubstr("colour")));
+  write_file(folder / "text.png", "no image");
+  EXPECT_THAT(message_of<InputError>([&] { test::colorizer_of("reference:" + (folder / "text.png").string()); }),
+              HasSubstr("text.png"));
+  write_file(folder / "empty.png", "");
+  EXPECT_THROW(test::colorizer_of("reference:" + (folder / "empty.png").string()), InputError);
+  EXPECT_THROW(test::colorizer_of("reference:,"), UsageError);
+}
+
+TEST(ReferenceColorizer, KeepsWhatItFittedAndFitsAgainWhenThatIsDamaged) {
+  const test::TempDir folder;
+  save_png(toy_scene(1), folder / "one.png");
+  save_png(toy_scene(2), folder / "two.png");
+  // The cache is what is tested: its key covers the photographs, so weights of a network that was not fitted for long
+  // are put where the full fit would be.
+  int reports = 0;
+  struct Stop {};
+  const auto make = [&](const std::string& images, bool stop) {
+    ColorizerOptions options;
+    options.spec = "reference:" + images;
+    options.working_folder = folder.path();
+    options.cache_folder = folder / "cache";
+    options.progress = [&](const Progress&) {
+      ++reports;
+      if (stop) throw Stop{};
+    };
+    return make_colorizer(options);
+  };
+  EXPECT_THROW(make("one.png", true), Stop);
+  EXPECT_EQ(reports, 1) << "it had begun to fit";
+  EXPECT_FALSE(std::filesystem::exists(folder / "cache")) << "a stopped fit leaves nothing";
+
+  const auto first = make("one.png,two.png", false);
+  const int of_fit = reports;
+  EXPECT_GT(of_fit, 10);
+  const auto second = make("one.png,two.png", false);
+  EXPECT_EQ(reports, of_fit) << "fitted again";
+  const LightnessBatch question = test::some_question(2, 48, 48);
+  EXPECT_EQ(first->colorize(question).ab, second->colorize(question).ab);
+
+  const auto cached = std::filesystem::directory_iterator(folder / "cache")->path();
+  std::vector<std::byte> content = read_binary_file(cached);
+  content[content.size() / 2] ^= std::byte{1};
+  write_file(cached, content);
+  EXPECT_THROW(make("one.png,two.png", true), Stop) << "damaged weights were taken";
+  EXPECT_THROW(make("two.png,one.png", true), Stop) << "another order is another fit";
+}
+
+}  // namespace
+}  // namespace cnerf
