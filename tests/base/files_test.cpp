@@ -1,0 +1,103 @@
+#include "src/base/files.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <stdexcept>
+
+#include "src/base/error.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+std::size_t entries(const fs::path& folder) {
+  return std::size_t(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+std::string hash_of(std::string_view text) {
+  return sha256(std::as_bytes(std::span(text.data(), text.size())));
+}
+
+TEST(Files, WritesAndReadsBack) {
+  const test::TempDir folder;
+  write_file(folder / "deep/er/a.txt", "grey\n");
+  EXPECT_EQ(read_text_file(folder / "deep/er/a.txt"), "grey\n");
+  EXPECT_EQ(entries(folder / "deep/er"), 1u);
+}
+
+TEST(Files, BytesSurviveIncludingZeros) {
+  const test::TempDir folder;
+  const std::vector<std::byte> content = {std::byte{0}, std::byte{255}, std::byte{'\n'}, std::byte{0}};
+  write_file(folder / "a.bin", content);
+  EXPECT_EQ(read_binary_file(folder / "a.bin"), content);
+}
+
+TEST(Files, FailureLeavesNothingBehind) {
+  const test::TempDir folder;
+  EXPECT_THROW(write_atomically(folder / "new.txt",
+                                [](const fs::path& temporary) {
+                                  std::ofstream(temporary) << "half";
+                                  throw std::runtime_error("disk full");
+                                }),
+               std::runtime_error);
+  EXPECT_EQ(entries(folder.path()), 0u);
+}
+
+TEST(Files, FailureKeepsTheOldFile) {
+  const test::TempDir folder;
+  write_file(folder / "a.txt", "old");
+  EXPECT_THROW(write_atomically(folder / "a.txt",
+                                [](const fs::path& temporary) {
+                                  std::ofstream(temporary) << "new";
+                                  throw std::runtime_error("disk full");
+                                }),
+               std::runtime_error);
+  EXPECT_EQ(read_text_file(folder / "a.txt"), "old");
+  EXPECT_EQ(entries(folder.path()), 1u);
+}
+
+TEST(Files, TemporaryNameIsAnotherOneWithTheSameExtension) {
+  const test::TempDir folder;
+  write_atomically(folder / "a.exr", [&](const fs::path& temporary) {
+    EXPECT_NE(temporary, folder / "a.exr");
+    EXPECT_EQ(temporary.parent_path(), folder.path());
+    EXPECT_EQ(temporary.extension(), ".exr");
+    std::ofstream(temporary) << "x";
+  });
+}
+
+TEST(Files, WriterThatWritesNothingIsAnOutputError) {
+  const test::TempDir folder;
+  EXPECT_THROW(write_atomically(folder / "a.txt", [](const fs::path&) {}), OutputError);
+}
+
+TEST(Files, FolderThatCannotBeMadeIsAnOutputError) {
+  const test::TempDir folder;
+  write_file(folder / "file", "in the way");
+  EXPECT_THROW(write_file(folder / "file/a.txt", "x"), OutputError);
+}
+
+TEST(Files, MissingFileAndFolderAreNamed) {
+  const test::TempDir folder;
+  try {
+    (void)read_text_file(folder / "none.txt");
+    FAIL() << "no error";
+  } catch (const MissingInputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("none.txt"));
+    EXPECT_EQ(error.exit_code(), ExitCode::kMissingInput);
+  }
+  EXPECT_THROW((void)read_binary_file(folder.path()), InputError);
+}
+
+TEST(Files, Sha256OfKnownVectors) {  // FIPS 180-4, examples
+  EXPECT_EQ(hash_of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(hash_of(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+}
+
+}  // namespace
+}  // namespace cnerf
