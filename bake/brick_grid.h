@@ -1,6 +1,7 @@
 #pragma once
 /// A box of voxels stored in bricks of 8^3, of which only those that were written to exist.
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <memory>
@@ -57,20 +58,26 @@ class BrickGrid {
   /// Number of the brick that holds a voxel of the box.
   [[nodiscard]] std::size_t brick_of(Vec3i voxel) const {
     const Vec3i v = voxel - min_;
-    return brick_at({v.x / kBrickSide, v.y / kBrickSide, v.z / kBrickSide});
+    return brick_at(brick_part(v));
   }
 
   /// Value of any voxel; the background outside the box.
   [[nodiscard]] const T& at(Vec3i voxel) const {
     if (!contains(voxel)) return background_;
     const Vec3i v = voxel - min_;
-    const auto& brick = bricks_[brick_at({v.x / kBrickSide, v.y / kBrickSide, v.z / kBrickSide})];
-    return brick ? (*brick)[brick_offset({v.x % kBrickSide, v.y % kBrickSide, v.z % kBrickSide})] : background_;
+    const auto& brick = bricks_[brick_at(brick_part(v))];
+    return brick ? (*brick)[brick_offset(local_part(v))] : background_;
   }
+  /// For tight loops: values of the brick around a voxel given relative to `min()`, nullptr where there is none.
+  [[nodiscard]] const T* find_brick(Vec3i relative) const {
+    const auto& brick = bricks_[brick_at(brick_part(relative))];
+    return brick ? brick->data() : nullptr;
+  }
+  [[nodiscard]] static int offset_in_brick(Vec3i relative) { return brick_offset(local_part(relative)); }
   void set(Vec3i voxel, const T& value) {
     CNERF_CHECK(contains(voxel), "voxel outside the brick grid");
     const Vec3i v = voxel - min_;
-    make_brick(brick_of(voxel))[brick_offset({v.x % kBrickSide, v.y % kBrickSide, v.z % kBrickSide})] = value;
+    make_brick(brick_of(voxel))[brick_offset(local_part(v))] = value;
   }
   /// The values of a brick, made of background if it did not exist.
   std::array<T, kBrickVoxels>& make_brick(std::size_t brick) {
@@ -84,6 +91,11 @@ class BrickGrid {
   [[nodiscard]] const std::array<T, kBrickVoxels>& brick(std::size_t brick) const { return *bricks_[brick]; }
 
  private:
+  // Of non-negative coordinates, which a signed division would not know.
+  [[nodiscard]] static Vec3i brick_part(Vec3i v) { return {v.x >> 3, v.y >> 3, v.z >> 3}; }
+  [[nodiscard]] static Vec3i local_part(Vec3i v) { return {v.x & 7, v.y & 7, v.z & 7}; }
+  static_assert(kBrickSide == 8);
+
   Vec3i min_, size_, counts_;
   T background_;
   std::vector<std::unique_ptr<std::array<T, kBrickVoxels>>> bricks_;

@@ -9,18 +9,23 @@ namespace cnerf {
 namespace {
 
 constexpr float kGoodTransmittance = 0.5f;  ///< a view with less is replaced when a better one is found
+constexpr int kTriesPerView = 3;            ///< cameras tried for each view wanted, once there are enough dim ones
 constexpr std::size_t kSpreadViews = 32;    ///< views picked by spread; the rest follows by distance
 
-/// Steps from t until the ray leaves the brick that holds p = from + t d, at least one. Rays stay on the lattice of
-/// whole steps, so that skipping changes nothing.
-int steps_across_brick(Vec3i brick_min, Vec3f p, Vec3f d) {
+/// Steps until the ray leaves the brick that starts at `low`, at least one. Rays stay on the lattice of whole steps, so
+/// that skipping changes nothing.
+int steps_across_brick(Vec3i low, Vec3f p, Vec3f inverse_direction) {
   float exit = std::numeric_limits<float>::max();
   for (int axis = 0; axis < 3; ++axis) {
-    if (d[axis] == 0) continue;
-    const float face = static_cast<float>(brick_min[axis] + (d[axis] > 0 ? kBrickSide : 0));
-    exit = std::min(exit, (face - p[axis]) / d[axis]);
+    const float face = static_cast<float>(low[axis] + (inverse_direction[axis] > 0 ? kBrickSide : 0));
+    const float distance = (face - p[axis]) * inverse_direction[axis];
+    if (distance >= 0) exit = std::min(exit, distance);  // not for NaN: parallel to the face and on it
   }
-  return std::max(1, static_cast<int>(exit));
+  return std::max(1, static_cast<int>(std::min(exit, 1e6f)));
+}
+
+bool inside(Vec3f p, Vec3f size) {
+  return p.x >= 0 && p.y >= 0 && p.z >= 0 && p.x < size.x && p.y < size.y && p.z < size.z;
 }
 
 }  // namespace
@@ -30,20 +35,23 @@ float transmittance_between(const BrickGrid<float>& sigma, double voxel_size, Ve
   const float distance = length(path);
   if (!(distance > 1.0f)) return 1.0f;
   const Vec3f d = path / distance;
+  const Vec3f inverse{1 / d.x, 1 / d.y, 1 / d.z};
+  const Vec3f start = from - sigma.min().cast<float>();
+  const Vec3f size = sigma.size().cast<float>();
   const auto h = static_cast<float>(voxel_size);
   const float deepest = -std::log(stop_below);
   float depth = 0;
   for (float t = 1; t < distance;) {
-    const Vec3f p = from + d * t;
-    const Vec3i voxel{static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)),
-                      static_cast<int>(std::floor(p.z))};
-    if (!sigma.contains(voxel)) break;  // the box is convex: what left it does not come back
-    const std::size_t brick = sigma.brick_of(voxel);
-    if (!sigma.has_brick(brick)) {
-      t += static_cast<float>(steps_across_brick(sigma.brick_min(brick), p, d));
+    const Vec3f p = start + d * t;
+    if (!inside(p, size)) break;  // the box is convex: what left it does not come back
+    const Vec3i voxel = p.cast<int>();
+    const float* brick = sigma.find_brick(voxel);
+    if (brick == nullptr) {
+      const Vec3i low{voxel.x & ~(kBrickSide - 1), voxel.y & ~(kBrickSide - 1), voxel.z & ~(kBrickSide - 1)};
+      t += static_cast<float>(steps_across_brick(low, p, inverse));
       continue;
     }
-    depth += sigma.at(voxel) * h;
+    depth += brick[sigma.offset_in_brick(voxel)] * h;
     if (depth > deepest) return 0;
     t += 1;
   }
@@ -98,10 +106,13 @@ std::vector<SeenBy> ViewSelection::seen_by(const BrickGrid<float>& sigma, Vec3d 
                                            const std::vector<int>& order) const {
   const auto in_voxels = [&](Vec3d p) { return ((p - plan_.origin) / plan_.voxel_size).cast<float>(); };
   std::vector<SeenBy> seen;
-  int good = 0;
+  int good = 0, tried = 0;
+  const int enough_tries = kTriesPerView * views_per_voxel_;
   for (const int camera : order) {
     const Eye& eye = eyes_[camera];
     if (!has_in_picture(eye, world)) continue;
+    // Matter just below a surface is seen dimly by many: the cameras tried so far surround it already.
+    if (++tried > enough_tries && static_cast<int>(seen.size()) >= views_per_voxel_) break;
     const float transmittance =
         transmittance_between(sigma, plan_.voxel_size, in_voxels(world), in_voxels(eye.centre), seen_transmittance_);
     if (transmittance < seen_transmittance_) continue;
