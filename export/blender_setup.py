@@ -48,6 +48,12 @@ def half_voxel_shift(volume):
     return half - drawn_too_far - (half if blender_adds_half else 0.0)
 
 
+def set_if_known(settings, name, value):
+    """Settings that only some releases have."""
+    if hasattr(settings, name):
+        setattr(settings, name, value)
+
+
 def make_scene():
     if bpy.app.background:
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -92,8 +98,8 @@ def make_material():
     links.new(emission.outputs[0], both.inputs[1])
     links.new(both.outputs[0], output.inputs["Volume"])
 
-    material.cycles.homogeneous_volume = False
-    material.cycles.volume_interpolation = "LINEAR"
+    set_if_known(material.cycles, "homogeneous_volume", False)
+    set_if_known(material.cycles, "volume_interpolation", "LINEAR")
     return material
 
 
@@ -210,27 +216,21 @@ def set_engine(scene, name):
     raise ValueError("this Blender has none of " + ", ".join(wanted))
 
 
-def set_if_known(settings, name, value):
-    """Settings that only some releases have."""
-    if hasattr(settings, name):
-        setattr(settings, name, value)
-
-
 def set_up_rendering(scene, volume, options):
     set_engine(scene, options.engine)
     cycles = scene.cycles
     cycles.samples = options.samples
     cycles.use_denoising = False
-    cycles.volume_step_rate = options.step_rate
-    cycles.volume_preview_step_rate = max(1.0, options.step_rate)
-    cycles.volume_max_steps = steps_needed(volume, options.step_rate)
+    set_if_known(cycles, "volume_step_rate", options.step_rate)
+    set_if_known(cycles, "volume_preview_step_rate", max(1.0, options.step_rate))
+    set_if_known(cycles, "volume_max_steps", steps_needed(volume, options.step_rate))
     cycles.volume_bounces = 0
     set_if_known(cycles, "volume_biased", True)  # ray marching, where the default is null scattering
     if options.exact:
         cycles.use_adaptive_sampling = False
         cycles.pixel_filter_type = "BOX"
         cycles.filter_width = 1.0
-        cycles.volume_max_steps = max(4096, cycles.volume_max_steps)
+        set_if_known(cycles, "volume_max_steps", max(4096, steps_needed(volume, options.step_rate)))
     scene.render.film_transparent = options.transparent or options.exact
     scene.display_settings.display_device = "sRGB"
     scene.view_settings.view_transform = "Standard"

@@ -201,7 +201,7 @@ TEST(Blender, CyclesAndOurIntegratorAgree) {
   camera.intrinsics.cx = 71;
   camera.intrinsics.cy = 66.5;
   const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "balls");
-  const RenderedExr cycles = render_exact(bake.blender_setup, "--step-rate 0.25 --samples 256");
+  const RenderedExr cycles = render_exact(bake.blender_setup, "--step-rate 0.25 --samples 64");
   const VolumeImage ours = integrate_volume(volume, camera.intrinsics, camera.world_from_camera);
   const Comparison equal = compare(cycles, ours);
   RecordProperty("psnr_millidecibel", static_cast<int>(1000 * equal.psnr));
@@ -214,6 +214,28 @@ TEST(Blender, CyclesAndOurIntegratorAgree) {
   BakedVolume shifted = volume;
   shifted.origin = shifted.origin + Vec3d{0.5, 0.5, 0.5} * shifted.voxel_size;
   EXPECT_LT(compare(cycles, integrate_volume(shifted, camera.intrinsics, camera.world_from_camera)).psnr, 40);
+}
+
+TEST(Blender, PastedIntoTheTextEditorItMakesASceneOfItsOwn) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, {}, folder.path(), "block");
+  // As the text editor runs it: no __file__, and a scene that must not be touched.
+  std::ofstream(folder / "paste.py")
+      << "import bpy, sys\n"
+         "before = [o.name for o in bpy.data.scenes['Scene'].objects]\n"
+         "text = open(r'" +
+             bake.blender_setup.string() +
+             "', encoding='utf-8').read().replace('bpy.app.background', 'False')\n"
+             "exec(compile(text, 'Text', 'exec'), {'__name__': '__main__'})\n"
+             "assert before and before == [o.name for o in bpy.data.scenes['Scene'].objects]\n"
+             "scene = bpy.data.scenes['cnerf']\n"
+             "assert bpy.context.window.scene == scene\n"
+             "assert sorted(o.type for o in scene.objects) == ['CAMERA', 'EMPTY', 'VOLUME']\n"
+             "volume = [o.data for o in scene.objects if o.type == 'VOLUME'][0]\n"
+             "volume.grids.load()\n"
+             "assert 'density' in [g.name for g in volume.grids]\n";
+  EXPECT_EQ(run_blender(folder / "paste.py", ""), 0) << read_text_file(folder / "blender.log");
 }
 
 TEST(Blender, FailuresEndWithAnExitStatus) {
