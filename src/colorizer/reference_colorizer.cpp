@@ -1,15 +1,17 @@
-// reference:IMAGE…, a network fitted to colour photographs of the scene. Fitted weights are kept in the cache folder,
-// so that a resumed run asks the very network the first one fitted.
+// Fitted weights are kept in the cache folder, so that a resumed run asks the very network the first one fitted.
 
+#include "src/colorizer/reference_colorizer.h"
+
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <optional>
+#include <span>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/reference_images.h"
-#include "src/colorizer/reference_network.h"
 
 namespace cnerf {
 namespace {
@@ -91,7 +93,11 @@ class ReferenceColorizer final : public Colorizer {
 }  // namespace
 
 std::unique_ptr<Colorizer> make_reference_colorizer(const std::string& argument, const ColorizerOptions& options) {
-  const ReferenceRecipe recipe;
+  return make_reference_colorizer(argument, options, ReferenceRecipe{});
+}
+
+std::unique_ptr<Colorizer> make_reference_colorizer(const std::string& argument, const ColorizerOptions& options,
+                                                    const ReferenceRecipe& recipe) {
   const std::vector<fs::path> files = reference_files(argument, options);
   std::vector<ReferenceImage> images;
   for (const fs::path& file : files) images.push_back(load_reference_image(file));

@@ -83,7 +83,7 @@ TEST_F(TorchScriptColorizer, SizesAreBroughtBackToTheQuestion) {
   const auto padded = test::colorizer_of(module_of(strided, "multiple_of = 8"));
   EXPECT_NO_THROW(check_answer("x", question, padded->colorize(question)));
   const std::string fixed =
-      "    if x.size(2) != 32 or x.size(3) != 32:\n        raise Exception(\"wrong size\")\n"
+      "    assert x.size(2) == 32 and x.size(3) == 32, \"wrong size\"\n"
       "    return torch.cat([x, x], 1)\n";
   const auto resized = test::colorizer_of(module_of(fixed, "size = 32"));
   const ChromaBatch answer = resized->colorize(question);
@@ -98,8 +98,8 @@ TEST_F(TorchScriptColorizer, AWrongShapeIsExplained) {
 }
 
 TEST_F(TorchScriptColorizer, FailuresOfTheModuleAreNamed) {
-  EXPECT_THAT(failure_of(module_of("    raise Exception(\"no such mood\")\n    return x\n")),
-              AllOf(HasSubstr("module1.pt"), HasSubstr("[2, 1, 6, 5]")));
+  EXPECT_THAT(failure_of(module_of("    assert x.size(1) == 3, \"no such mood\"\n    return x\n")),
+              AllOf(HasSubstr("module1.pt"), HasSubstr("[2, 1, 6, 5]"), HasSubstr("no such mood")));
   EXPECT_THAT(failure_of(module_of("    return torch.cat([x, x / 0.0 * 0.0], 1)\n")), HasSubstr("finite"));
 }
 
