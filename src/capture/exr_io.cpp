@@ -7,6 +7,7 @@
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 
+#include <algorithm>
 #include <string>
 
 #include "src/base/check.h"
@@ -46,19 +47,24 @@ std::string channel_names(const Imf::ChannelList& channels) {
   return names;
 }
 
-LinearImage read_open_exr(Imf::InputFile& input, const fs::path& file) {
-  const Imf::ChannelList& channels = input.header().channels();
-  const bool has_color = channels.findChannel("R") && channels.findChannel("G") && channels.findChannel("B");
-  if (!has_color && channels.findChannel("Y") == nullptr) {
-    throw InputError(file, "channels", "expected Y or R G B, found " + channel_names(channels));
-  }
+LinearImage empty_image(const Imf::InputFile& input, int channels) {
   const Imath::Box2i display = input.header().displayWindow();
   LinearImage image;
   image.width = display.max.x - display.min.x + 1;
   image.height = display.max.y - display.min.y + 1;
   image.depth = PixelDepth::kF32;
-  image.channels = has_color ? 3 : 1;
-  image.values.resize(image.pixel_count() * std::size_t(image.channels));
+  image.channels = channels;
+  image.values.resize(image.pixel_count() * std::size_t(channels));
+  return image;
+}
+
+LinearImage read_picture(Imf::InputFile& input, const fs::path& file) {
+  const Imf::ChannelList& channels = input.header().channels();
+  const bool has_color = channels.findChannel("R") && channels.findChannel("G") && channels.findChannel("B");
+  if (!has_color && channels.findChannel("Y") == nullptr) {
+    throw InputError(file, "channels", "expected Y or R G B, found " + channel_names(channels));
+  }
+  LinearImage image = empty_image(input, has_color ? 3 : 1);
   if (has_color) {
     read_channel(input, "R", image.values.data(), 3);
     read_channel(input, "G", image.values.data() + 1, 3);
@@ -73,18 +79,38 @@ LinearImage read_open_exr(Imf::InputFile& input, const fs::path& file) {
   return image;
 }
 
-}  // namespace
+LinearImage read_single(Imf::InputFile& input, const fs::path& file, const char* channel) {
+  const Imf::ChannelList& channels = input.header().channels();
+  if (channels.findChannel(channel) == nullptr) {
+    throw InputError(file, "channels", std::string("expected ") + channel + ", found " + channel_names(channels));
+  }
+  LinearImage image = empty_image(input, 1);
+  read_channel(input, channel, image.values.data(), 1);
+  return image;
+}
 
-LinearImage read_exr(const fs::path& file) {
+/// Opens a file for `read`, and turns the library's exceptions into ours.
+template <typename Read>
+LinearImage with_open_file(const fs::path& file, Read&& read) {
   if (!fs::exists(file)) throw MissingInputError(file.string() + ": no such file");
   try {
     Imf::InputFile input(file.c_str());
-    return read_open_exr(input, file);
+    return read(input);
   } catch (const Error&) {
     throw;
   } catch (const std::exception& failure) {
     throw InputError(file, "", std::string("cannot be read: ") + failure.what());
   }
+}
+
+}  // namespace
+
+LinearImage read_exr(const fs::path& file) {
+  return with_open_file(file, [&](Imf::InputFile& input) { return read_picture(input, file); });
+}
+
+LinearImage read_exr_channel(const fs::path& file, const char* channel) {
+  return with_open_file(file, [&](Imf::InputFile& input) { return read_single(input, file, channel); });
 }
 
 void write_exr_channel(const fs::path& file, const char* channel, int width, int height,
