@@ -23,7 +23,7 @@ namespace {
 using sample::PixelColor;
 
 constexpr double kAngleOfView = 42;  ///< degrees, horizontal
-constexpr double kDistance = 3.45;   ///< from the point all cameras look at
+constexpr double kDistance = 3.6;    ///< from the point all cameras look at
 constexpr Vec3d kLookAt = {0, 0, 0.12};
 constexpr std::array<double, 3> kElevations = {20, 36, 53};  ///< degrees above the plate
 constexpr int kTestEvery = 8;

@@ -84,9 +84,9 @@ class Stratified {
     double u, v;
   };
   [[nodiscard]] Point operator[](int index) const {
-    const auto draw = std::uint64_t(2 + 2 * index);
-    const double u = (index % side_ + double(rng_.uniform(draw))) / side_ + shift_x_;
-    const double v = (index / side_ + double(rng_.uniform(draw + 1))) / side_ + shift_y_;
+    const std::uint64_t bits = rng_.bits(std::uint64_t(2 + index));  // one draw serves both coordinates
+    const double u = (index % side_ + double(bits >> 32) * 0x1p-32) / side_ + shift_x_;
+    const double v = (index / side_ + double(bits & 0xFFFFFFFFu) * 0x1p-32) / side_ + shift_y_;
     return {u - std::floor(u), v - std::floor(v)};
   }
 
