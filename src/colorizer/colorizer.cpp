@@ -121,7 +121,7 @@ void check_answer(const std::string& colorizer, const LightnessBatch& question, 
 }
 
 std::vector<float> ab_of(const ChromaBatch& answer, int index, float temperature) {
-  CNERF_CHECK_EQ(index >= 0 && index < answer.batch, true);
+  CNERF_CHECK(index >= 0 && index < answer.batch, "entry " + std::to_string(index));
   const std::size_t pixels = std::size_t(answer.height) * std::size_t(answer.width);
   if (!answer.has_distribution()) {
     const float* first = answer.ab.data() + std::size_t(index) * 2 * pixels;

@@ -40,7 +40,7 @@ void write_caption(cv::Mat cell, const std::string& caption) {
 }  // namespace
 
 void write_gallery(const std::filesystem::path& file, std::span<const GalleryTile> tiles, int columns) {
-  CNERF_CHECK_EQ(columns > 0, true);
+  CNERF_CHECK(columns > 0, std::to_string(columns));
   cv::Size cell{1, 1};
   int caption_height = 0;
   for (const GalleryTile& tile : tiles) {

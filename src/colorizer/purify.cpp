@@ -18,7 +18,7 @@ constexpr double kLeastVisible = 0.01;
 
 void check_sizes(const ColorPatchView& patch, bool needs_lightness) {
   const std::size_t pixels = std::size_t(patch.height) * std::size_t(patch.width);
-  CNERF_CHECK_EQ(patch.height > 0 && patch.width > 0, true);
+  CNERF_CHECK(patch.height > 0 && patch.width > 0, "empty patch");
   CNERF_CHECK_EQ(patch.ab.size(), 2 * pixels);
   if (!patch.opacity.empty()) CNERF_CHECK_EQ(patch.opacity.size(), pixels);
   if (needs_lightness || !patch.lightness.empty()) CNERF_CHECK_EQ(patch.lightness.size(), pixels);
@@ -158,7 +158,7 @@ Purifier::Purifier(const PurifyOptions& options, std::span<const ColorPatchView>
   if (options.histogram != "ab" && options.histogram != "rgb") {
     throw UsageError("purify.histogram: expected \"ab\" or \"rgb\", got \"" + options.histogram + "\"");
   }
-  CNERF_CHECK_EQ(bases.empty(), false);
+  CNERF_CHECK(!bases.empty(), "purification needs base patches");
   for (const ColorPatchView& base : bases) {
     bases_.push_back(options_.histogram == "rgb" ? rgb_histogram(base) : ab_histogram(base));
   }

@@ -122,7 +122,7 @@ ReferenceImage load_reference_image(const std::filesystem::path& file) {
 }
 
 ReferenceImage make_reference_image(int width, int height, std::span<const float> linear_rgb) {
-  CNERF_CHECK_EQ(width > 0 && height > 0, true);
+  CNERF_CHECK(width > 0 && height > 0, "empty image");
   CNERF_CHECK_EQ(linear_rgb.size(), std::size_t(width) * std::size_t(height) * 3);
   return pyramid_of(cv::Mat(height, width, CV_32FC3, const_cast<float*>(linear_rgb.data())).clone());
 }

@@ -375,7 +375,7 @@ void ReferenceNetwork::set_weights(std::span<const float> weights) {
   std::size_t at = 0;
   for (Tensor& parameter : parts_->net->parameters()) {
     const auto count = std::size_t(parameter.numel());
-    CNERF_CHECK_EQ(at + count <= weights.size(), true);
+    CNERF_CHECK(at + count <= weights.size(), "too few weights");
     parameter.copy_(torch::from_blob(const_cast<float*>(weights.data()) + at, parameter.sizes()));
     at += count;
   }
