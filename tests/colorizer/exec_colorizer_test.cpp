@@ -52,7 +52,7 @@ class ExecColorizer : public ::testing::Test {
     write_file(folder_ / "program.py", program(answer_lines));
     return "exec:python3 " + (folder_ / "program.py").string();
   }
-  std::string failure_of(const std::string& answer_lines, double timeout_seconds = 20) {
+  std::string failure_of(const std::string& answer_lines, double timeout_seconds = 90) {
     const std::string spec = command(answer_lines);
     return message_of<ColorizerError>(
         [&] { (void)test::colorizer_of(spec, timeout_seconds)->colorize(some_question()); });

@@ -19,7 +19,7 @@ inline LightnessBatch some_question(int batch = 2, int height = 6, int width = 5
   return question;
 }
 
-inline std::unique_ptr<Colorizer> colorizer_of(const std::string& spec, double timeout_seconds = 20) {
+inline std::unique_ptr<Colorizer> colorizer_of(const std::string& spec, double timeout_seconds = 90) {
   ColorizerOptions options;
   options.spec = spec;
   options.timeout_seconds = timeout_seconds;
