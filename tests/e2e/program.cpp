@@ -1,0 +1,128 @@
+#include "tests/e2e/program.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <thread>
+
+#include "src/base/files.h"
+#include "tests/support/data.h"
+
+namespace cnerf::test {
+namespace fs = std::filesystem;
+namespace {
+
+/// Starts the program with its output in files.
+pid_t start(const std::vector<std::string>& arguments, const fs::path& out, const fs::path& err) {
+  std::vector<std::string> words = {CNERF_PROGRAM};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  const pid_t child = ::fork();
+  if (child != 0) return child;
+  ::dup2(::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
+  ::dup2(::open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
+  ::execv(argv[0], argv.data());
+  ::_exit(127);
+}
+
+int exit_code_of(int status) {
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
+}
+
+/// Waits for the end of the program; sends SIGINT when its output holds `signal_at`, if that is given.
+int wait_for(pid_t child, const fs::path& out, const std::string& signal_at) {
+  bool signalled = signal_at.empty();
+  for (;;) {
+    int status = 0;
+    if (::waitpid(child, &status, signalled ? 0 : WNOHANG) == child) return exit_code_of(status);
+    if (read_text_file(out).find(signal_at) != std::string::npos) {
+      ::kill(child, SIGINT);
+      signalled = true;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+ProgramResult run(const std::vector<std::string>& arguments, const std::string& signal_at) {
+  const TempDir folder;
+  const fs::path out = folder / "out", err = folder / "err";
+  write_file(out, std::string_view());
+  const pid_t child = start(arguments, out, err);
+  const int code = wait_for(child, out, signal_at);
+  return {code, read_text_file(out), read_text_file(err)};
+}
+
+}  // namespace
+
+ProgramResult cnerf(const std::vector<std::string>& arguments) {
+  return run(arguments, "");
+}
+
+ProgramResult cnerf_interrupted_at(const std::vector<std::string>& arguments, const std::string& text) {
+  return run(arguments, text);
+}
+
+std::vector<std::string> tiny_options() {
+  std::vector<std::string> options;
+  for (const char* setting : {"stage1.steps=60",
+                              "stage1.samples_per_step=4096",
+                              "stage1.checkpoint_every=20",
+                              "stage1.steps_per_box=64",
+                              "stage1.grid.levels=4",
+                              "stage1.grid.log2_rows=12",
+                              "stage1.grid.finest_resolution=64",
+                              "stage2.patches=6",
+                              "stage2.patch_size=32",
+                              "stage2.rays_per_patch=256",
+                              "stage2.working_resolution=32",
+                              "stage2.distill_steps=10",
+                              "stage2.colorizer_batch=2",
+                              "stage2.grid.levels=4",
+                              "stage2.grid.log2_rows=12",
+                              "stage2.grid.finest_resolution=64",
+                              "stage2.purify.enabled=false",
+                              "stage2.purify.base_images=2",
+                              "bake.resolution=32",
+                              "render.frames=3",
+                              "render.short_side=32",
+                              "render.steps_per_box=64"}) {
+    options.insert(options.end(), {"--set", setting});
+  }
+  return options;
+}
+
+const fs::path& tiny_capture() {
+  static const auto folder = std::make_unique<TempDir>();
+  static const fs::path capture = [] {
+    const ProgramResult made = cnerf({"sample", "-o", (*folder / "capture").string(), "--views", "9", "--width", "48",
+                                      "--height", "36", "--samples-per-pixel", "1"});
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    return *folder / "capture";
+  }();
+  return capture;
+}
+
+std::vector<std::string> files_below(const fs::path& folder) {
+  std::vector<std::string> files;
+  if (!fs::exists(folder)) return files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) files.push_back(fs::relative(entry.path(), folder).generic_string());
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
+std::vector<std::string> concatenated(std::vector<std::string> a, const std::vector<std::string>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+}  // namespace cnerf::test

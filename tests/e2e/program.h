@@ -1,0 +1,34 @@
+#pragma once
+/// Calls the program under test.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace cnerf::test {
+
+struct ProgramResult {
+  int exit_code = 0;
+  std::string out;  ///< standard output
+  std::string err;  ///< standard error
+};
+
+/// Runs cnerf with these arguments and waits for it.
+[[nodiscard]] ProgramResult cnerf(const std::vector<std::string>& arguments);
+
+/// As `cnerf`, and sends SIGINT once standard output holds `text`.
+[[nodiscard]] ProgramResult cnerf_interrupted_at(const std::vector<std::string>& arguments, const std::string& text);
+
+/// Options that make every part of a run as short as it can be and still do its work.
+[[nodiscard]] std::vector<std::string> tiny_options();
+
+/// A sample capture of few, small views, made once for all tests of this process.
+[[nodiscard]] const std::filesystem::path& tiny_capture();
+
+/// All files below a folder, relative, sorted.
+[[nodiscard]] std::vector<std::string> files_below(const std::filesystem::path& folder);
+
+/// `a` followed by `b`.
+[[nodiscard]] std::vector<std::string> concatenated(std::vector<std::string> a, const std::vector<std::string>& b);
+
+}  // namespace cnerf::test

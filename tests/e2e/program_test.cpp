@@ -1,0 +1,69 @@
+/// The program as such: help, version, commands, the sample capture.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "src/base/files.h"
+#include "tests/e2e/program.h"
+#include "tests/support/data.h"
+
+namespace cnerf::test {
+namespace {
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+
+TEST(Program, SaysItsVersion) {
+  const ProgramResult result = cnerf({"--version"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, testing::ContainsRegex("^cnerf [0-9]+\\.[0-9]+\\.[0-9]+"));
+}
+
+TEST(Program, EveryCommandHasHelp) {
+  const ProgramResult all = cnerf({"--help"});
+  EXPECT_EQ(all.exit_code, 0);
+  for (const char* command : {"run", "sample", "train", "colorize", "render", "eval", "bake", "info", "doctor"}) {
+    EXPECT_THAT(all.out, HasSubstr(command));
+    const ProgramResult one = cnerf({command, "--help"});
+    EXPECT_EQ(one.exit_code, 0) << command;
+    EXPECT_THAT(one.out, HasSubstr("--help")) << command;
+  }
+}
+
+TEST(Program, DoctorNamesLibrariesAndPrograms) {
+  const ProgramResult result = cnerf({"doctor"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  for (const char* word : {"LibTorch", "BLAS", "OpenVDB", "OpenCV", "OpenEXR", "CUDA", "blender", "disk", "presets"}) {
+    EXPECT_THAT(result.out, HasSubstr(word));
+  }
+  EXPECT_THAT(result.out, HasSubstr("quick")) << "presets are found from the build tree";
+}
+
+TEST(Program, InfoDescribesACapture) {
+  const ProgramResult result = cnerf({"info", tiny_capture().string()});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, AllOf(HasSubstr("transforms"), HasSubstr("48 x 36"), HasSubstr("9 of 9")));
+}
+
+TEST(Program, SampleRefusesToOverwrite) {
+  const auto before = files_below(tiny_capture());
+  EXPECT_EQ(cnerf({"sample", "-o", tiny_capture().string()}).exit_code, 64);
+  EXPECT_EQ(files_below(tiny_capture()), before);
+}
+
+TEST(Program, JsonProgressIsOneObjectALine) {
+  const TempDir folder;
+  const ProgramResult result = cnerf({"sample", "-o", (folder / "c").string(), "--views", "2", "--width", "16",
+                                      "--height", "16", "--samples-per-pixel", "1", "--progress", "json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  std::istringstream lines(result.out);
+  std::vector<std::string> events;
+  for (std::string line; std::getline(lines, line);) events.push_back(nlohmann::json::parse(line).at("event"));
+  EXPECT_THAT(events, testing::IsSupersetOf({"wrote", "next"}));
+}
+
+}  // namespace
+}  // namespace cnerf::test
