@@ -23,4 +23,11 @@ struct CacheLineAllocator {
 template <typename T>
 using AlignedVector = std::vector<T, CacheLineAllocator<T>>;
 
+/// Makes a scratch buffer hold at least `size` elements. It never shrinks: a vector that is resized up and down would
+/// write zeros each time, which costs more than the work on small blocks.
+template <typename T>
+void ensure_size(AlignedVector<T>& buffer, std::size_t size) {
+  if (buffer.size() < size) buffer.resize(size);
+}
+
 }  // namespace cnerf

@@ -1,6 +1,7 @@
 #pragma once
 /// Stage 1's inner loop, one implementation a device: march, encode, nets, composite, loss, gradients, Adam, occupancy.
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -66,6 +67,8 @@ class LuminanceEngine {
   virtual void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
                                std::span<float> luminance) const = 0;
   [[nodiscard]] virtual const OccupancyGrid& occupancy() const = 0;
+  /// See OccupancyGrid::exclude. To be called before the first step.
+  virtual void exclude(const std::function<bool(Vec3f centre, float radius)>& wanted) = 0;
 
   /// Everything that continues a run bit for bit. After writing into the pieces, call `state_loaded`.
   [[nodiscard]] virtual std::vector<StatePiece> state() = 0;

@@ -16,15 +16,15 @@ struct MarchSettings {
   float dt_min = 0;  ///< unit space
   float dt_max = 0;
   float cone_angle = 0;  ///< 0: constant steps
-  float t_near = 0;      ///< samples start here
 };
 
-/// Settings for a scene of so many cascades; several cascades step proportionally to distance.
-[[nodiscard]] inline MarchSettings march_settings(int cascades, int steps_per_box) {
+/// @param steps_per_box  across the innermost cascade; 1 / dt_min
+/// @param cone_angle     used by scenes of several cascades; a single one has constant steps
+[[nodiscard]] inline MarchSettings march_settings(int cascades, int steps_per_box, double cone_angle) {
   MarchSettings settings;
   settings.dt_min = std::ldexp(1.0f, 1 - cascades) / static_cast<float>(steps_per_box);
   settings.dt_max = cascades > 1 ? 1.0f / 64.0f : settings.dt_min;
-  settings.cone_angle = cascades > 1 ? 1.0f / 256.0f : 0.0f;
+  settings.cone_angle = cascades > 1 ? static_cast<float>(cone_angle) : 0.0f;
   return settings;
 }
 
@@ -37,7 +37,7 @@ class RayMarcher {
       : grid_(&grid), settings_(settings), ray_(ray) {
     const auto inside = intersect(Aabbf{{0, 0, 0}, {1, 1, 1}}, ray.origin, ray.direction);
     if (!inside) return;
-    t_ = std::max(inside->begin, settings.t_near);
+    t_ = inside->begin;
     t_end_ = inside->end;
     t_ += jitter * step(t_);
     for (int axis = 0; axis < 3; ++axis) {

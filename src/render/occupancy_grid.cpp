@@ -84,8 +84,32 @@ void OccupancyGrid::update(std::size_t stride, std::size_t phase, std::uint64_t 
     density(points, sigma);
     for (std::size_t i = begin; i < end; ++i) {
       float& remembered = density_[phase + i * stride];
+      if (remembered == kExcluded) continue;
       const float before = remembered == kNeverSeen ? 0.0f : remembered * options_.decay;
       remembered = std::max(before, sigma[i - begin]);
+    }
+  });
+  refresh_bits();
+}
+
+void OccupancyGrid::exclude(const std::function<bool(Vec3f, float)>& wanted) {
+  constexpr int kSide = 4;
+  const int r = options_.resolution;
+  parallel_tasks(std::size_t(cascades_ * r / kSide), [&](std::size_t slab) {
+    const int k = int(slab) / (r / kSide), z0 = int(slab) % (r / kSide) * kSide;
+    const float radius = 0.5f * std::sqrt(3.0f) * kSide * cell_side(k);
+    for (int y0 = 0; y0 < r; y0 += kSide) {
+      for (int x0 = 0; x0 < r; x0 += kSide) {
+        const Vec3f in_cells = {float(x0) + 0.5f * kSide, float(y0) + 0.5f * kSide, float(z0) + 0.5f * kSide};
+        const Vec3f centre = (in_cells / float(r) - Vec3f{0.5f, 0.5f, 0.5f}) * side_[k] + Vec3f{0.5f, 0.5f, 0.5f};
+        if (wanted(centre, radius)) continue;
+        for (int z = z0; z < z0 + kSide; ++z) {
+          for (int y = y0; y < y0 + kSide; ++y) {
+            float* row = density_.data() + ((std::size_t(k) * r + z) * r + y) * r + x0;
+            std::fill(row, row + kSide, kExcluded);
+          }
+        }
+      }
     }
   });
   refresh_bits();
@@ -100,9 +124,14 @@ void OccupancyGrid::refresh_bits() {
     const float* density = density_.data() + k * cells;
     // Early in training nothing reaches the threshold; then the densest half is what is worth sampling.
     double total = 0;
-    for (std::size_t i = 0; i < cells; ++i) total += std::min(density[i], 1e4f);
+    std::size_t included = 1;
+    for (std::size_t i = 0; i < cells; ++i) {
+      if (density[i] == kExcluded) continue;
+      total += std::min(density[i], 1e4f);
+      ++included;
+    }
     const float threshold =
-        std::min(options_.optical_thickness / cell_side(int(k)), static_cast<float>(total / double(cells)));
+        std::min(options_.optical_thickness / cell_side(int(k)), static_cast<float>(total / double(included)));
     for (std::size_t word = 0; word < cells / 64; ++word) {
       std::uint64_t bits = 0;
       for (std::size_t bit = 0; bit < 64; ++bit) {

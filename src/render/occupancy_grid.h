@@ -14,7 +14,7 @@ namespace cnerf {
 
 struct OccupancyOptions {
   int resolution = 128;             ///< cells along a side of a cascade; a multiple of 8
-  float decay = 0.9f;               ///< of a cell's remembered density, each time it is looked at again
+  float decay = 0.5f;               ///< of a cell's remembered density, each time it is looked at again
   float optical_thickness = 0.03f;  ///< of a cell, below which it counts as empty
 
   template <typename Visitor>
@@ -52,6 +52,10 @@ class OccupancyGrid {
   void update(std::size_t stride, std::size_t phase, std::uint64_t jitter_seed,
               const std::function<void(std::span<const Vec3f>, std::span<float>)>& density);
 
+  /// Declares space empty for good where `wanted(centre, radius)`, asked for the sphere around each 4^3 block of cells,
+  /// says that nothing there can be seen.
+  void exclude(const std::function<bool(Vec3f centre, float radius)>& wanted);
+
   /// The state to save and restore; call `refresh_bits` after changing it.
   [[nodiscard]] std::vector<float>& densities() { return density_; }
   [[nodiscard]] const std::vector<float>& densities() const { return density_; }
@@ -61,10 +65,12 @@ class OccupancyGrid {
   [[nodiscard]] std::size_t cell_of(int cascade, Vec3f p) const;
   [[nodiscard]] std::size_t block_of(int cascade, Vec3f p) const;
 
+  static constexpr float kExcluded = -1.0f;
+
   OccupancyOptions options_;
   int cascades_;
   std::vector<float> side_;           ///< [cascades], unit space
-  std::vector<float> density_;        ///< [cascades, R, R, R], sigma; x fastest
+  std::vector<float> density_;        ///< [cascades, R, R, R], sigma; x fastest; kExcluded where nothing can be
   std::vector<std::uint64_t> bits_;   ///< one bit a cell, same order
   std::vector<std::uint8_t> blocks_;  ///< [cascades, R/8, R/8, R/8], 1 = some cell is occupied
 };

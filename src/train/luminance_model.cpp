@@ -15,7 +15,7 @@ std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stag
   engine.grid = options.grid;
   engine.occupancy = options.occupancy;
   engine.cascades = frame.cascades;
-  engine.march = march_settings(frame.cascades, options.steps_per_box);
+  engine.march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
   engine.samples_per_step = options.samples_per_step;
   engine.patch_size = options.sampling == "patches" ? options.patch_size : 0;
   engine.max_luminance = max_luminance;
@@ -31,6 +31,36 @@ float brightest(const Capture& capture) {
     for (const float value : view.image.f32) brightest = std::max(brightest, value);
   }
   return brightest;
+}
+
+/// Space that no training view sees, or only nearer than the capture says anything is, stays empty: nothing would teach
+/// the field what is there, and it would be baked as fog.
+void exclude_unseen(const Capture& capture, LuminanceModel& model) {
+  struct Eye {
+    Affined camera_from_unit;
+    const Intrinsics* lens;
+  };
+  std::vector<Eye> eyes;
+  const double world_per_unit = 1.0 / model.frame.unit_per_world;
+  for (const View& view : capture.views) {
+    if (view.held_out) continue;
+    const Affined world_from_unit = {Mat3d::identity() * world_per_unit, model.frame.world_from_unit({0, 0, 0})};
+    eyes.push_back({view.world_from_camera.inverse() * world_from_unit, &view.intrinsics});
+  }
+  const double near = capture.depth_range ? 0.9 * capture.depth_range->near : 0.0;
+  model.engine->exclude([&](Vec3f centre, float radius) {
+    const double reach = double(radius) * world_per_unit;
+    return std::any_of(eyes.begin(), eyes.end(), [&](const Eye& eye) {
+      const Vec3d point = eye.camera_from_unit.point(centre.cast<double>());
+      if (point.z + reach < near) return false;
+      if (length(point) < 2 * reach) return true;
+      const auto pixel = project(*eye.lens, point);
+      if (!pixel) return false;
+      const double margin = 1.2 * reach / point.z * eye.lens->fx;
+      return pixel->x > -margin && pixel->y > -margin && pixel->x < eye.lens->width + margin &&
+             pixel->y < eye.lens->height + margin;
+    });
+  });
 }
 
 }  // namespace
@@ -54,6 +84,7 @@ LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Option
   model.options = options;
   model.max_luminance = brightest(capture);
   model.engine = make_engine(model.frame, options, model.max_luminance);
+  exclude_unseen(capture, model);
   return model;
 }
 

@@ -23,6 +23,12 @@ struct LuminanceModel {
   /// @throws MissingInputError, SnapshotError
   static LuminanceModel load(const std::filesystem::path& snapshot);
   void save(const std::filesystem::path& snapshot) const;
+
+  /// How to march; `steps_per_box` = 0 as in training.
+  [[nodiscard]] MarchSettings march(int steps_per_box = 0) const {
+    return march_settings(frame.cascades, steps_per_box > 0 ? steps_per_box : options.steps_per_box,
+                          options.cone_angle);
+  }
 };
 
 /// SceneFrame in snapshot headers.

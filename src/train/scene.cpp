@@ -76,7 +76,7 @@ class TrainedScene final : public Scene {
     }
     std::vector<WeightedSample> samples;
     std::vector<std::size_t> offsets;
-    luminance_.engine->trace(rays, march_settings(frame().cascades, options.steps_per_box),
+    luminance_.engine->trace(rays, luminance_.march(options.steps_per_box),
                              static_cast<float>(options.min_transmittance), samples, offsets);
     const Vec3f axis = camera.unit_from_camera.column(2).cast<float>();
     for (std::size_t r = 0; r < rays.size(); ++r) {

@@ -40,7 +40,8 @@ struct Stage1Options {
   int patch_size = 32;                ///< K of patch sampling
   double learning_rate = 1e-2;        ///< of Adam at the start
   double final_learning_rate = 5e-4;  ///< reached by exponential decay over the last half
-  int steps_per_box = 512;            ///< march steps across the innermost cascade's side
+  int steps_per_box = 256;            ///< march steps across the innermost cascade's side
+  double cone_angle = 1.0 / 128;      ///< march step over distance, where there are several cascades
   double sparsity_weight = 0;         ///< pushes samples towards empty or opaque; 0 = off
   int checkpoint_every = 1000;        ///< steps between snapshots; 0 = only at the end
   int seed = 1;
@@ -59,6 +60,7 @@ struct Stage1Options {
     v("learning_rate", learning_rate, Range{1e-8, 1}, "Adam's step size at the start");
     v("final_learning_rate", final_learning_rate, Range{1e-8, 1}, "Adam's step size at the end");
     v("steps_per_box", steps_per_box, Range{16, 8192}, "march steps across the side of the innermost cascade");
+    v("cone_angle", cone_angle, Range{1e-4, 1}, "march step over distance, in scenes of several cascades");
     v("checkpoint_every", checkpoint_every, Range{0, 1e8}, "steps between snapshots; 0 = only at the end");
     v("seed", seed, Range{0, 1e9}, "of weights, rays and jitter");
     v.section("grid", grid);

@@ -90,7 +90,7 @@ class Colorization {
   void cache_views(const Capture& capture, const LuminanceModel& luminance) {
     const std::vector<TrainingView> views = training_views(capture, luminance.frame);
     if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
-    const MarchSettings march = march_settings(luminance.frame.cascades, luminance.options.steps_per_box);
+    const MarchSettings march = luminance.march();
     for (std::size_t v = 0; v < views.size(); ++v) {
       views_.push_back(
           cache_view(*luminance.engine, march, views[v].camera, options_.working_resolution, options_.cached_weight));

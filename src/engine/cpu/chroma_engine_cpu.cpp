@@ -98,7 +98,8 @@ class ChromaEngineCpu final : public ChromaEngine {
     features_.forward(work.points);
 
     const std::size_t groups = (end - begin + kGroup - 1) / kGroup;
-    work.composited.assign(groups * kHeadInputs * kGroup, 0.0f);
+    ensure_size(work.composited, groups * kHeadInputs * kGroup);
+    std::fill_n(work.composited.begin(), groups * kHeadInputs * kGroup, 0.0f);
     for (std::size_t p = begin; p < end; ++p) {
       const float inverse = inverse_opacity(pixels, p);
       for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
@@ -110,13 +111,13 @@ class ChromaEngineCpu final : public ChromaEngine {
       }
       work.composited[head_input_at(p - begin, kFeatures)] = 1.0f;
     }
-    work.logits.resize(groups * kHeadOutputs * kGroup);
+    ensure_size(work.logits, groups * kHeadOutputs * kGroup);
     head_.forward({{work.composited.data(), kHeadInputs}, {work.logits.data(), kHeadOutputs}}, groups);
   }
 
   /// KL(label || softmax(logits)) of one pixel; writes its gradient times `scale`.
   static double loss_gradient(Work& work, std::size_t pixel, const SoftLabel& label, float scale) {
-    work.d_logits.resize(work.logits.size());
+    ensure_size(work.d_logits, work.logits.size());
     float largest = work.logits[logit_at(pixel, 0)];
     for (int q = 1; q < kAbBinCount; ++q) largest = std::max(largest, work.logits[logit_at(pixel, q)]);
     float sum = 0;
@@ -139,14 +140,14 @@ class ChromaEngineCpu final : public ChromaEngine {
   }
 
   static void clear_padding(Work& work, std::size_t pixels) {
-    const std::size_t lanes = work.d_logits.size() / kHeadOutputs;
+    const std::size_t lanes = (pixels + kGroup - 1) / kGroup * kGroup;
     for (std::size_t p = pixels; p < lanes; ++p) {
       for (int q = 0; q < kHeadOutputs; ++q) work.d_logits[logit_at(p, q)] = 0;
     }
   }
 
   void backward(const PixelSamples& pixels, std::size_t begin, std::size_t end, Work& work, StepChunk& chunk) const {
-    work.d_composited.resize(work.composited.size());
+    ensure_size(work.d_composited, work.composited.size());
     head_.backward({{work.composited.data(), kHeadInputs}, {work.logits.data(), kHeadOutputs}},
                    {{work.d_composited.data(), kHeadInputs}, {work.d_logits.data(), kHeadOutputs}},
                    (end - begin + kGroup - 1) / kGroup, chunk.d_weights.data() + features_.weight_count());

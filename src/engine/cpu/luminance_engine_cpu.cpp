@@ -81,8 +81,8 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
     block.of_ray[r].clear();
   }
   block.marched = 0;
-  block.wave_positions.resize(kBlockRays * kWaveSamples * 3);
-  block.wave_sigma.resize(kBlockRays * kWaveSamples);
+  ensure_size(block.wave_positions, kBlockRays * kWaveSamples * 3);
+  ensure_size(block.wave_sigma, kBlockRays * kWaveSamples);
 
   bool any_active = true;
   while (any_active) {
@@ -132,7 +132,7 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
 
 void LuminanceEngineCpu::shade(std::span<const Ray> rays, Block& block) const {
   const std::size_t groups = groups_of(block.samples.size());
-  block.positions.resize(groups * 3 * kGroup);
+  ensure_size(block.positions, groups * 3 * kGroup);
   block.work.resize(groups, field_.grid().channels());
   for (std::size_t r = 0; r < rays.size(); ++r) {
     for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
@@ -189,10 +189,10 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
   }
 
   const std::size_t group_channels = std::size_t(field_.grid().channels()) * kGroup;
-  chunk.positions.resize((chunk.groups + block.work.groups) * 3 * kGroup);
-  chunk.d_encoded.resize((chunk.groups + block.work.groups) * group_channels);
-  std::copy(block.positions.begin(), block.positions.end(),
-            chunk.positions.begin() + std::ptrdiff_t(chunk.groups * 3 * kGroup));
+  ensure_size(chunk.positions, (chunk.groups + block.work.groups) * 3 * kGroup);
+  ensure_size(chunk.d_encoded, (chunk.groups + block.work.groups) * group_channels);
+  std::copy_n(block.positions.begin(), block.work.groups * 3 * kGroup,
+              chunk.positions.begin() + std::ptrdiff_t(chunk.groups * 3 * kGroup));
   field_.backward(block.work, chunk.d_encoded.data() + chunk.groups * group_channels, chunk.d_weights.data());
   chunk.groups += block.work.groups;
   chunk.marched += block.marched;
@@ -339,8 +339,8 @@ void LuminanceEngineCpu::query_density(std::span<const Vec3f> positions, std::sp
   Block& block = blocks_.local();
   for (std::size_t first = 0; first < positions.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, positions.size() - first);
-    block.wave_positions.resize(groups_of(count) * 3 * kGroup);
-    block.wave_sigma.resize(groups_of(count) * kGroup);
+    ensure_size(block.wave_positions, groups_of(count) * 3 * kGroup);
+    ensure_size(block.wave_sigma, groups_of(count) * kGroup);
     for (std::size_t i = 0; i < count; ++i) set_position(block.wave_positions.data(), i, positions[first + i]);
     pad_positions(block.wave_positions, count);
     field_.density(block.wave_positions.data(), groups_of(count), block.work, block.wave_sigma.data());
@@ -356,7 +356,7 @@ void LuminanceEngineCpu::query_luminance(std::span<const Vec3f> positions, std::
   Block& block = blocks_.local();
   for (std::size_t first = 0; first < positions.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, positions.size() - first);
-    block.positions.resize(groups_of(count) * 3 * kGroup);
+    ensure_size(block.positions, groups_of(count) * 3 * kGroup);
     block.work.resize(groups_of(count), field_.grid().channels());
     for (std::size_t i = 0; i < groups_of(count) * kGroup; ++i) {
       const std::size_t from = first + std::min(i, count - 1);

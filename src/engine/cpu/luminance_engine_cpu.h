@@ -27,6 +27,7 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
                        std::span<float> luminance) const override;
   [[nodiscard]] const OccupancyGrid& occupancy() const override { return occupancy_; }
+  void exclude(const std::function<bool(Vec3f, float)>& wanted) override { occupancy_.exclude(wanted); }
   [[nodiscard]] std::vector<StatePiece> state() override;
   void state_loaded() override;
 

@@ -16,12 +16,12 @@ std::size_t at(std::size_t sample, int channels, int channel) {
 void LuminanceWorkspace::resize(std::size_t wanted_groups, int encoded_channels) {
   groups = wanted_groups;
   const std::size_t lanes = groups * kGroup;
-  d_log_density.resize(lanes);
-  encoded.resize(lanes * std::size_t(encoded_channels));
-  for (auto* buffer : {&hidden, &d_hidden}) buffer->resize(lanes * kHiddenWidth);
-  for (auto* buffer : {&features, &d_features}) buffer->resize(lanes * kFeatureChannels);
-  for (auto* buffer : {&luminance_hidden, &d_luminance_hidden}) buffer->resize(lanes * 2 * kHiddenWidth);
-  for (auto* buffer : {&raw_luminance, &d_raw_luminance}) buffer->resize(lanes * kLuminanceOutputs);
+  ensure_size(d_log_density, lanes);
+  ensure_size(encoded, lanes * std::size_t(encoded_channels));
+  for (auto* buffer : {&hidden, &d_hidden}) ensure_size(*buffer, lanes * kHiddenWidth);
+  for (auto* buffer : {&features, &d_features}) ensure_size(*buffer, lanes * kFeatureChannels);
+  for (auto* buffer : {&luminance_hidden, &d_luminance_hidden}) ensure_size(*buffer, lanes * 2 * kHiddenWidth);
+  for (auto* buffer : {&raw_luminance, &d_raw_luminance}) ensure_size(*buffer, lanes * kLuminanceOutputs);
 }
 
 LuminanceFieldCpu::LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float luminance_scale,

@@ -18,10 +18,10 @@ PointNetCpu::PointNetCpu(const HashGridOptions& grid, int outputs, bool relu_out
 void PointNetCpu::set_points(std::span<const Vec3f> points, PointWorkspace& work) const {
   work.groups = (points.size() + kGroup - 1) / kGroup;
   const std::size_t lanes = work.groups * kGroup;
-  work.positions.resize(lanes * 3);
-  work.encoded.resize(lanes * std::size_t(encoded_channels()));
-  for (auto* buffer : {&work.hidden, &work.d_hidden}) buffer->resize(lanes * kHidden);
-  for (auto* buffer : {&work.output, &work.d_output}) buffer->resize(lanes * std::size_t(outputs_));
+  ensure_size(work.positions, lanes * 3);
+  ensure_size(work.encoded, lanes * std::size_t(encoded_channels()));
+  for (auto* buffer : {&work.hidden, &work.d_hidden}) ensure_size(*buffer, lanes * kHidden);
+  for (auto* buffer : {&work.output, &work.d_output}) ensure_size(*buffer, lanes * std::size_t(outputs_));
   for (std::size_t i = 0; i < lanes; ++i) {
     const Vec3f p = i < points.size() ? points[i] : Vec3f{0.5f, 0.5f, 0.5f};
     float* group = work.positions.data() + i / kGroup * 3 * kGroup + i % kGroup;
@@ -40,7 +40,8 @@ void PointNetCpu::forward(PointWorkspace& work) const {
 
 void PointNetCpu::backward(PointWorkspace& work, float* d_encoded, float* d_weights) const {
   if (relu_output_) {
-    for (std::size_t i = 0; i < work.output.size(); ++i) work.d_output[i] = work.output[i] > 0 ? work.d_output[i] : 0;
+    const std::size_t values = work.groups * kGroup * std::size_t(outputs_);
+    for (std::size_t i = 0; i < values; ++i) work.d_output[i] = work.output[i] > 0 ? work.d_output[i] : 0;
   }
   net_.backward(activations(work),
                 {{d_encoded, encoded_channels()}, {work.d_hidden.data(), kHidden}, {work.d_output.data(), outputs_}},

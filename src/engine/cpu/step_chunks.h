@@ -28,8 +28,8 @@ struct StepChunk {
   /// Appends a block's positions; returns where its gradient belongs.
   float* append(const AlignedVector<float>& block_positions, std::size_t block_groups, int encoded_channels) {
     const std::size_t group_size = std::size_t(encoded_channels) * kGroup;
-    positions.resize((groups + block_groups) * 3 * kGroup);
-    d_encoded.resize((groups + block_groups) * group_size);
+    ensure_size(positions, (groups + block_groups) * 3 * kGroup);
+    ensure_size(d_encoded, (groups + block_groups) * group_size);
     std::copy_n(block_positions.begin(), block_groups * 3 * kGroup,
                 positions.begin() + std::ptrdiff_t(groups * 3 * kGroup));
     float* target = d_encoded.data() + groups * group_size;

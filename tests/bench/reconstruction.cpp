@@ -1,0 +1,135 @@
+// Quality over time of stage 1 on a real capture: trains with the given options and prints the held-out luminance PSNR
+// (decision 1 of docs/decisions.md) at growing training times. Evaluation does not count as training time.
+//
+//   reconstruction CAPTURE [downscale=1] [holdout=8] [seconds=60] [option=value ...]
+//
+// Options are stage 1's by their short names, e.g. grid.log2_rows=16 steps_per_box=512 samples_per_step=65536.
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <map>
+#include <string>
+
+#include "src/capture/load_capture.h"
+#include "src/color/colorspace_math.h"
+#include "src/train/luminance_model.h"
+#include "src/train/options_json.h"
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// Sets the option a dotted path names, in the options' JSON form.
+void set_option(nlohmann::json& options, const std::string& path, const std::string& value) {
+  const std::string pointer = "/" + [&] {
+    std::string text = path;
+    std::replace(text.begin(), text.end(), '.', '/');
+    return text;
+  }();
+  nlohmann::json& target = options.at(nlohmann::json::json_pointer(pointer));
+  if (target.is_string()) {
+    target = value;
+  } else {
+    target = nlohmann::json::parse(value);
+  }
+}
+
+/// Processor seconds of all threads: on a busy machine a fairer clock than the wall's.
+double processor_seconds() {
+  return double(std::clock()) / CLOCKS_PER_SEC;
+}
+
+double held_out_psnr(const cnerf::Capture& capture, const cnerf::LuminanceModel& model, int every) {
+  double total = 0;
+  int views = 0, index = 0;
+  for (const cnerf::View& view : capture.views) {
+    if (!view.held_out || index++ % every != 0) continue;
+    const cnerf::UnitCamera camera(view.intrinsics, view.world_from_camera, model.frame);
+    std::vector<cnerf::Ray> rays;
+    for (int y = 0; y < view.image.height; ++y) {
+      for (int x = 0; x < view.image.width; ++x) rays.push_back(camera.ray({x + 0.5, y + 0.5}));
+    }
+    std::vector<cnerf::RayResult> results(rays.size());
+    model.engine->render(rays, model.march(), 1e-3f, results);
+    double squared = 0;
+    for (std::size_t p = 0; p < rays.size(); ++p) {
+      const float seen = cnerf::srgb_from_linear(std::clamp(results[p].luminance, 0.0f, 1.0f));
+      const float truth = cnerf::srgb_from_linear(std::clamp(view.image.luminance(p), 0.0f, 1.0f));
+      squared += (seen - truth) * (seen - truth);
+    }
+    total += -10 * std::log10(std::max(squared / double(rays.size()), 1e-10));
+    ++views;
+  }
+  return views > 0 ? total / views : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::puts("reconstruction CAPTURE [downscale=N] [holdout=N] [seconds=S] [option=value ...]");
+    return 64;
+  }
+  std::map<std::string, double> own = {{"downscale", 1},  {"holdout", 8}, {"seconds", 60},
+                                       {"eval_every", 1}, {"verbose", 0}, {"first", 0.25}};
+  nlohmann::json json = cnerf::options_to_json(cnerf::Stage1Options{});
+  for (int i = 2; i < argc; ++i) {
+    const std::string argument = argv[i];
+    const std::size_t equals = argument.find('=');
+    const std::string key = argument.substr(0, equals), value = argument.substr(equals + 1);
+    if (own.count(key) > 0) {
+      own[key] = std::stod(value);
+    } else {
+      set_option(json, key, value);
+    }
+  }
+  const auto options = cnerf::options_from_json<cnerf::Stage1Options>(json);
+  cnerf::CaptureOptions capture_options;
+  capture_options.downscale = int(own["downscale"]);
+  capture_options.holdout = int(own["holdout"]);
+  const cnerf::Capture capture = cnerf::load_capture(argv[1], capture_options);
+  cnerf::LuminanceModel model = cnerf::LuminanceModel::create(capture, options);
+  const auto views = cnerf::training_views(capture, model.frame);
+  std::printf("%zu training views of %dx%d, %d cascades, side %.3f world units\n", views.size(), views[0].image->width,
+              views[0].image->height, model.frame.cascades, 1 / model.frame.unit_per_world);
+
+  double trained = 0, marched = 0, rays = 0, elapsed = 0, processor = 0, next_report = own["seconds"] * own["first"];
+  while (elapsed < own["seconds"]) {
+    const Clock::time_point start = Clock::now();
+    const double processor_start = processor_seconds();
+    const double fraction = elapsed / own["seconds"];
+    const double decay = std::clamp(2.0 * fraction - 1.0, 0.0, 1.0);
+    const auto rate =
+        float(options.learning_rate * std::pow(options.final_learning_rate / options.learning_rate, decay));
+    const cnerf::StepReport step = model.engine->step(views, rate);
+    elapsed += seconds_since(start);
+    processor += processor_seconds() - processor_start;
+    trained += double(step.trained_samples);
+    marched += double(step.marched_samples);
+    rays += double(step.rays);
+    if (own["verbose"] > 0 && model.engine->step_count() % int(own["verbose"]) == 0) {
+      std::printf("step %ld  %.2f s  rays %zu  marched %zu  trained %zu  loss %.5f  occupied %.4f\n",
+                  model.engine->step_count(), elapsed, step.rays, step.marched_samples, step.trained_samples, step.loss,
+                  model.engine->occupancy().occupied_share());
+    }
+    if (elapsed < next_report && elapsed < own["seconds"]) continue;
+    next_report *= 2;
+    const Clock::time_point eval_start = Clock::now();
+    const double psnr = held_out_psnr(capture, model, int(own["eval_every"]));
+    std::printf(
+        "%7.1f s  %5ld steps  %7.1f M samples  %5.1f a ray, %.2f marched  %.3f us/sample (%.3f of processor)  occupied "
+        "%.4f  "
+        "PSNR %.2f dB  (eval %.1f s)\n",
+        elapsed, model.engine->step_count(), trained / 1e6, trained / rays, marched / trained, 1e6 * elapsed / trained,
+        1e6 * processor / trained, model.engine->occupancy().occupied_share(), psnr, seconds_since(eval_start));
+    std::fflush(stdout);
+  }
+  return 0;
+}
