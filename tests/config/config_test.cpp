@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <set>
 #include <sstream>
 
@@ -73,6 +74,31 @@ TEST(Config, DefaultsAreInTheirRanges) {
   std::set<std::string> keys;
   for (const Field& field : fields_of(config)) EXPECT_TRUE(keys.insert(field.key).second) << field.key;
   EXPECT_GT(keys.size(), 40u);
+}
+
+/// docs/configuration.md holds a table of every option. Set CNERF_UPDATE_DOCS=1 to write it anew.
+std::string option_table() {
+  Config config;
+  std::string text = "| option | default | legal | what |\n|---|---|---|---|\n";
+  for (const Field& field : fields_of(config)) {
+    const std::string line = write_toml({field});
+    const auto begin = line.find(" = ") + 3;
+    const std::string value = line.substr(begin, line.find("  # ") - begin);
+    std::ostringstream legal;
+    if (field.range) legal << field.range->min << " to " << field.range->max;
+    for (const std::string& choice : field.choices) legal << (choice == field.choices.front() ? "" : ", ") << choice;
+    text += "| `" + field.key + "` | `" + value + "` | " + legal.str() + " | " + field.help + " |\n";
+  }
+  return text;
+}
+
+TEST(Config, TheDocumentedTableIsTheRealOne) {
+  const fs::path file = fs::path(CNERF_SOURCE_DIR) / "docs" / "configuration.md";
+  const std::string text = read_text_file(file);
+  const auto begin = text.find("| option |");
+  ASSERT_NE(begin, std::string::npos);
+  if (std::getenv("CNERF_UPDATE_DOCS") != nullptr) write_file(file, text.substr(0, begin) + option_table());
+  EXPECT_EQ(read_text_file(file).substr(begin), option_table()) << "run this test with CNERF_UPDATE_DOCS=1";
 }
 
 TEST(Config, ErrorsOfAFileNameTheFile) {
