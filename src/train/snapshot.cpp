@@ -12,12 +12,12 @@ constexpr std::size_t kDigestSize = 64;
 constexpr std::size_t kFixedSize = kMagic.size() + sizeof(std::uint32_t) + sizeof(std::uint64_t);
 
 template <typename T>
-void append(std::vector<std::byte>& to, const T& value) {
+void append_value(std::vector<std::byte>& to, const T& value) {
   const auto* bytes = reinterpret_cast<const std::byte*>(&value);
   to.insert(to.end(), bytes, bytes + sizeof value);
 }
 
-void append(std::vector<std::byte>& to, std::string_view text) {
+void append_text(std::vector<std::byte>& to, std::string_view text) {
   const auto* bytes = reinterpret_cast<const std::byte*>(text.data());
   to.insert(to.end(), bytes, bytes + text.size());
 }
@@ -40,12 +40,12 @@ void save_snapshot(const std::filesystem::path& file, const std::string& kind, n
   }
   const std::string text = header.dump();
   std::vector<std::byte> content;
-  append(content, kMagic);
-  append(content, kSnapshotVersion);
-  append(content, static_cast<std::uint64_t>(text.size()));
-  append(content, text);
+  append_text(content, kMagic);
+  append_value(content, kSnapshotVersion);
+  append_value(content, static_cast<std::uint64_t>(text.size()));
+  append_text(content, text);
   for (const StatePiece& piece : pieces) content.insert(content.end(), piece.bytes.begin(), piece.bytes.end());
-  append(content, sha256(content));
+  append_text(content, sha256(content));
   write_file(file, content);
 }
 
