@@ -29,6 +29,12 @@ bool is_done(const RunArguments& arguments, const fs::path& output) {
   return arguments.existing.resume && fs::exists(output);
 }
 
+bool needs_colorizer(const RunArguments& arguments, const RunDirectory& directory) {
+  if (arguments.grey) return false;
+  const bool is_colorized = directory.exists() && !directory.record().current_take.empty();
+  return !(arguments.existing.resume && is_colorized);
+}
+
 void turntable(const RunArguments& arguments, const RunContext& context, const std::string& take) {
   const fs::path folder = context.directory.renders(take);
   if (is_done(arguments, folder / "turntable.mp4")) return;
@@ -45,13 +51,16 @@ void run(const RunArguments& arguments) {
 
   Capture capture = read_capture(arguments.capture, config, reporter);
   RunContext context{RunDirectory(arguments.out), config, std::move(capture), arguments.command_line, reporter};
-  prepare_run(context, arguments.capture, arguments.existing);
+  check_run_folder(context, arguments.existing);
+  // Made before the training: one that cannot be made should not cost an hour.
+  auto colorizer = needs_colorizer(arguments, context.directory) ? colorizer_of(context) : nullptr;
+  begin_run(context, arguments.capture, arguments.existing);
   train_step(context, arguments.existing.resume);
 
   std::string take;
   if (!arguments.grey) {
     take = take_to_write(context, "", arguments.existing);
-    colorize_step(context, take, arguments.existing);
+    colorize_step(context, take, arguments.existing, std::move(colorizer));
   }
   if (!is_done(arguments, context.directory.metrics_file())) evaluate_step(context, take);
   if (!is_done(arguments, context.directory.bakes(take) / "manifest.json")) {

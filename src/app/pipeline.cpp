@@ -8,7 +8,6 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/capture/load_capture.h"
-#include "src/colorizer/colorizer.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -28,15 +27,6 @@ bool holds_something(const fs::path& folder) {
 /// "reference:a.png" -> "reference".
 std::string kind_of(const std::string& spec) {
   return spec.substr(0, spec.find(':'));
-}
-
-std::unique_ptr<Colorizer> colorizer_of(const RunContext& context) {
-  ColorizerOptions options;
-  options.spec = context.config.colorizer.spec;
-  options.working_folder = context.capture.root;
-  options.timeout_seconds = context.config.colorizer.timeout_seconds;
-  options.seed = static_cast<std::uint64_t>(context.config.stage2.seed);
-  return make_colorizer(options);
 }
 
 /// A take that was begun and not finished; empty when there is none.
@@ -63,25 +53,40 @@ Capture read_capture(const fs::path& path, const Config& config, Reporter& repor
   return capture;
 }
 
-void prepare_run(RunContext& context, const fs::path& capture_path, const ExistingOutput& existing) {
-  const RunDirectory& directory = context.directory;
-  const fs::path& root = directory.root();
-  if (directory.exists()) {
-    if (!existing.resume && !existing.overwrite) {
-      throw UsageError(root.string() +
-                       ": holds a run already; pass --resume to go on with it or --overwrite to start again");
-    }
-    if (existing.resume) return write_file(directory.config_file(), to_toml(context.config));
-    directory.clear();
-  } else if (holds_something(root)) {
+void check_run_folder(const RunContext& context, const ExistingOutput& existing) {
+  const fs::path& root = context.directory.root();
+  if (context.directory.exists()) {
+    if (existing.resume || existing.overwrite) return;
+    throw UsageError(root.string() +
+                     ": holds a run already; pass --resume to go on with it or --overwrite to start again");
+  }
+  if (holds_something(root)) {
     throw UsageError(root.string() + ": is not empty and holds no run; choose another folder");
   }
+}
+
+void begin_run(const RunContext& context, const fs::path& capture_path, const ExistingOutput& existing) {
+  const RunDirectory& directory = context.directory;
+  const bool goes_on = directory.exists() && existing.resume;
+  if (directory.exists() && !goes_on) directory.clear();
   write_file(directory.config_file(), to_toml(context.config));
+  if (goes_on) return;
   RunRecord record;
   record.capture = fs::absolute(capture_path).lexically_normal();
   record.program_version = version_text();
   record.command_line = joined(context.command_line);
   directory.save(record);
+}
+
+std::unique_ptr<Colorizer> colorizer_of(const RunContext& context) {
+  ColorizerOptions options;
+  options.spec = context.config.colorizer.spec;
+  options.working_folder = context.capture.root;
+  options.timeout_seconds = context.config.colorizer.timeout_seconds;
+  options.seed = static_cast<std::uint64_t>(context.config.stage2.seed);
+  options.cache_folder = context.directory.colorizer_cache();
+  options.progress = context.reporter.sink();
+  return make_colorizer(options);
 }
 
 void train_step(RunContext& context, bool resume) {
@@ -115,11 +120,12 @@ std::string take_to_write(const RunContext& context, const std::string& named, c
   return directory.free_take_name(kind_of(context.config.colorizer.spec));
 }
 
-void colorize_step(RunContext& context, const std::string& take, const ExistingOutput& existing) {
+void colorize_step(RunContext& context, const std::string& take, const ExistingOutput& existing,
+                   std::unique_ptr<Colorizer> colorizer) {
   const RunDirectory& directory = context.directory;
   std::optional<TakeRecord> finished = directory.take_record(take);
   if (!finished || !existing.resume) {
-    const auto colorizer = colorizer_of(context);  // before anything is written: it may refuse
+    if (!colorizer) colorizer = colorizer_of(context);  // before anything is written: it may refuse
     if (existing.overwrite) fs::remove_all(directory.take_folder(take));
     write_file(directory.take_config_file(take), to_toml(context.config));
     const Stage2Report report =

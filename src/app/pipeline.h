@@ -3,6 +3,7 @@
 /// Every step says what it wrote.
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "src/app/reporter.h"
 #include "src/app/run_directory.h"
 #include "src/capture/capture.h"
+#include "src/colorizer/colorizer.h"
 #include "src/config/config.h"
 
 namespace cnerf {
@@ -34,10 +36,15 @@ struct ExistingOutput {
 /// Reads a capture and says what was found, with the reader's notes.
 [[nodiscard]] Capture read_capture(const std::filesystem::path& path, const Config& config, Reporter& reporter);
 
-/// Makes the folder of a run ready: refuses one that is in use, clears it to overwrite, writes config.toml and
-/// run.json.
+/// Whether a run may go to the context's folder; nothing is changed yet.
 /// @throws UsageError  when there is a run and neither is set, or the folder holds something else.
-void prepare_run(RunContext& context, const std::filesystem::path& capture_path, const ExistingOutput& existing);
+void check_run_folder(const RunContext& context, const ExistingOutput& existing);
+/// Makes the folder of a run ready: clears it to overwrite, writes config.toml and run.json.
+void begin_run(const RunContext& context, const std::filesystem::path& capture_path, const ExistingOutput& existing);
+
+/// The colorizer the configuration names. What it learns is kept in the run's folder, for the next time.
+/// @throws UsageError, MissingInputError, ColorizerError.
+[[nodiscard]] std::unique_ptr<Colorizer> colorizer_of(const RunContext& context);
 
 /// Stage 1, unless it is finished.
 void train_step(RunContext& context, bool resume);
@@ -46,8 +53,10 @@ void train_step(RunContext& context, bool resume);
 /// that was not finished.  @throws UsageError  when the named take is finished and neither is set.
 [[nodiscard]] std::string take_to_write(const RunContext& context, const std::string& named,
                                         const ExistingOutput& existing);
-/// Stage 2 into `take`, by `config.colorizer`. Makes it the current take.
-void colorize_step(RunContext& context, const std::string& take, const ExistingOutput& existing);
+/// Stage 2 into `take`, unless it is finished. Makes it the current take.
+/// @param colorizer  null: `colorizer_of(context)` is made when it is needed.
+void colorize_step(RunContext& context, const std::string& take, const ExistingOutput& existing,
+                   std::unique_ptr<Colorizer> colorizer = nullptr);
 
 /// Measures a take (empty: luminance only) and writes metrics.json and the contact sheet.
 void evaluate_step(const RunContext& context, const std::string& take);

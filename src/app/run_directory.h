@@ -5,6 +5,7 @@
 ///   run.json             capture, program version, how far stage 1 came, the current take
 ///   stage1.snapshot      luminance and density
 ///   takes/NAME/          one colorization each: take.snapshot, take.json, config.toml, galleries, metrics.json
+///   cache/               what a colorizer learnt, by content; may be deleted
 ///   renders/NAME/        pictures and videos of a take ("grey": of none)
 ///   bakes/NAME/          volumes of a take
 ///   metrics.json, contact_sheet.png   of the take evaluated last
@@ -54,6 +55,7 @@ class RunDirectory {
   [[nodiscard]] std::filesystem::path take_snapshot(const std::string& take) const;
   [[nodiscard]] std::filesystem::path take_record_file(const std::string& take) const;
   [[nodiscard]] std::filesystem::path take_config_file(const std::string& take) const;
+  [[nodiscard]] std::filesystem::path colorizer_cache() const { return root_ / "cache"; }
   [[nodiscard]] std::filesystem::path renders(const std::string& take) const;
   [[nodiscard]] std::filesystem::path bakes(const std::string& take) const;
 
@@ -70,7 +72,7 @@ class RunDirectory {
   [[nodiscard]] std::string choose_take(const std::string& wanted) const;
   /// `base`, or `base-2`, `base-3`, … where no take of that name exists.
   [[nodiscard]] std::string free_take_name(const std::string& base) const;
-  /// Removes everything a run writes, and nothing else.
+  /// Removes everything a run writes but the cache, and nothing else.
   void clear() const;
 
  private:

@@ -109,7 +109,7 @@ std::vector<Case> cases() {
        grey,
        65,
        {"poses_bounds.npy"}},
-      {"Failing colorizer", nothing, {"--colorizer", "exec:false"}, 76, {"exec:false"}},
+      {"Missing reference", nothing, {"--colorizer", "reference:absent.jpg"}, 66, {"absent.jpg"}},
   };
 }
 
@@ -129,10 +129,8 @@ TEST_P(BadInput, IsRefusedByNameWithItsExitCode) {
   for (const std::string& file : files_below(out)) {
     EXPECT_THAT(file, testing::Not(HasSubstr("partial"))) << "a half-written file";
     EXPECT_THAT(file, testing::Not(testing::EndsWith(".vdb")));
-    EXPECT_THAT(file, testing::Not(testing::EndsWith("take.json"))) << "a take that was not made";
   }
-  const bool fails_late = bad.exit_code == 76;
-  EXPECT_EQ(fs::exists(out), fails_late) << "what can be refused at once is refused before anything is written";
+  EXPECT_FALSE(fs::exists(out / "run.json")) << "what can be refused at once is refused before the run begins";
 }
 
 std::string case_name(const testing::TestParamInfo<int>& info) {
@@ -142,6 +140,19 @@ std::string case_name(const testing::TestParamInfo<int>& info) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Table, BadInput, testing::Range(0, static_cast<int>(cases().size())), case_name);
+
+TEST(BadColorizer, OneThatFailsLeavesNoTake) {
+  const TempDir folder;
+  const fs::path out = folder / "out";
+  const ProgramResult result = cnerf(
+      concatenated({"run", tiny_capture().string(), "-o", out.string(), "--colorizer", "exec:false"}, tiny_options()));
+  EXPECT_EQ(result.exit_code, 76) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("exec:false"));
+  for (const std::string& file : files_below(out)) {
+    EXPECT_THAT(file, testing::Not(testing::AnyOf(HasSubstr("partial"), testing::EndsWith("take.json"),
+                                                  testing::EndsWith("take.snapshot"), testing::EndsWith(".vdb"))));
+  }
+}
 
 TEST(BadOutput, AnUnwritableFolderIsAnOutputError) {
   const TempDir folder;
