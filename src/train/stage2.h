@@ -14,18 +14,18 @@
 namespace cnerf {
 
 struct Stage2Options {
-  int patches = 400;                        ///< accepted patches
+  int patches = 600;                        ///< accepted patches
   int patch_size = 128;                     ///< K
   double scale_min = 0.3, scale_max = 0.7;  ///< s: the patch's side as a share of the image's short side
   int rays_per_patch = 4096;                ///< pixels of a patch that are trained on
   double learning_rate = 1e-2;
   double final_learning_rate = 1e-3;
-  int working_resolution = 384;   ///< short side, pixels, at which samples are cached
-  double cached_weight = 0.995;   ///< share of a pixel's weight the cached samples carry
-  double rebalancing = 0;         ///< lambda mixing of class rebalancing; 0 = off
-  double decode_temperature = 0;  ///< annealed-mean temperature; 0 = arg-max
-  int distill_steps = 400;        ///< steps of the fit of per-sample colour for baking
-  int colorizer_batch = 4;        ///< patches a colorizer query
+  int working_resolution = 384;      ///< short side, pixels, at which samples are cached
+  double cached_weight = 0.995;      ///< share of a pixel's weight the cached samples carry
+  double rebalancing = 0;            ///< lambda mixing of class rebalancing; 0 = off
+  double decode_temperature = 0.38;  ///< annealed-mean temperature; 0 = arg-max
+  int distill_steps = 1000;          ///< steps of the fit of per-sample colour for baking
+  int colorizer_batch = 4;           ///< patches a colorizer query
   int seed = 1;
   HashGridOptions grid;
   PurifyOptions purify;
