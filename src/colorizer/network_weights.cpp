@@ -1,0 +1,123 @@
+#include "src/colorizer/network_weights.h"
+
+#include <cstring>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+using torch::Tensor;
+
+namespace {
+
+constexpr std::string_view kMagic = "CNERFCW1";
+constexpr std::size_t kChecksumBytes = 64;
+
+template <typename T>
+void append(std::vector<std::byte>& out, const T& value) {
+  const auto bytes = std::as_bytes(std::span(&value, 1));
+  out.insert(out.end(), bytes.begin(), bytes.end());
+}
+
+void append(std::vector<std::byte>& out, const void* data, std::size_t size) {
+  const auto* bytes = static_cast<const std::byte*>(data);
+  out.insert(out.end(), bytes, bytes + size);
+}
+
+/// Reads values in order and refuses to run past the end.
+class Reader {
+ public:
+  Reader(const fs::path& file, std::span<const std::byte> content) : file_(file), rest_(content) {}
+
+  std::span<const std::byte> take(std::size_t size) {
+    if (size > rest_.size()) throw InputError(file_.string() + ": colorizer weights: the file is cut short");
+    const auto taken = rest_.first(size);
+    rest_ = rest_.subspan(size);
+    return taken;
+  }
+  template <typename T>
+  T value() {
+    T result;
+    std::memcpy(&result, take(sizeof result).data(), sizeof result);
+    return result;
+  }
+  std::string text(std::size_t size) {
+    const auto bytes = take(size);
+    return {reinterpret_cast<const char*>(bytes.data()), size};
+  }
+  [[nodiscard]] std::span<const std::byte> rest() const { return rest_; }
+
+ private:
+  const fs::path& file_;
+  std::span<const std::byte> rest_;
+};
+
+void read_parameter(const fs::path& file, Reader& reader, torch::OrderedDict<std::string, Tensor>& parameters) {
+  const std::string name = reader.text(reader.value<std::uint32_t>());
+  std::vector<std::int64_t> shape(std::min<std::uint32_t>(reader.value<std::uint32_t>(), 8));
+  for (auto& size : shape) size = reader.value<std::uint32_t>();
+  Tensor* parameter = parameters.find(name);
+  if (parameter == nullptr || parameter->sizes() != torch::IntArrayRef(shape)) {
+    throw InputError(file, name, "expected the parameters of this program's colorizer network, found another one's");
+  }
+  Tensor half = torch::empty(shape, torch::kHalf);
+  const auto bytes = reader.take(half.nbytes());
+  std::memcpy(half.data_ptr(), bytes.data(), bytes.size());
+  parameter->copy_(half);
+}
+
+}  // namespace
+
+void save_colorizer_weights(const fs::path& file, const ColorizerNet& network, const AbDecoding& decoding) {
+  std::vector<std::byte> payload;
+  append(payload, decoding.temperature);
+  append(payload, decoding.gain);
+  const auto parameters = network->named_parameters();
+  append(payload, static_cast<std::uint32_t>(parameters.size()));
+  for (const auto& item : parameters) {
+    append(payload, static_cast<std::uint32_t>(item.key().size()));
+    append(payload, item.key().data(), item.key().size());
+    const Tensor half = item.value().detach().to(torch::kCPU, torch::kHalf).contiguous();
+    append(payload, static_cast<std::uint32_t>(half.dim()));
+    for (const std::int64_t size : half.sizes()) append(payload, static_cast<std::uint32_t>(size));
+    append(payload, half.data_ptr(), half.nbytes());
+  }
+  std::vector<std::byte> content;
+  append(content, kMagic.data(), kMagic.size());
+  append(content, sha256(payload).data(), kChecksumBytes);
+  append(content, payload.data(), payload.size());
+  write_file(file, content);
+}
+
+ColorizerWeights load_colorizer_weights(const fs::path& file) {
+  const std::vector<std::byte> content = read_binary_file(file);
+  Reader reader(file, content);
+  if (reader.text(kMagic.size()) != kMagic) {
+    throw InputError(file, "header", "expected colorizer weights of version 1 (" + std::string(kMagic) + ")");
+  }
+  ColorizerWeights weights;
+  weights.sha256 = reader.text(kChecksumBytes);
+  if (sha256(reader.rest()) != weights.sha256) {
+    throw InputError(file, "checksum", "expected SHA-256 " + weights.sha256 + ", found " + sha256(reader.rest()));
+  }
+  weights.decoding.temperature = reader.value<double>();
+  weights.decoding.gain = reader.value<double>();
+  weights.network = ColorizerNet(Normalisation::kFolded);
+
+  const torch::NoGradGuard no_grad;
+  auto parameters = weights.network->named_parameters();
+  const auto count = reader.value<std::uint32_t>();
+  if (count != parameters.size()) {
+    throw InputError(file, "parameters",
+                     "expected " + std::to_string(parameters.size()) + ", found " + std::to_string(count));
+  }
+  for (std::uint32_t i = 0; i < count; ++i) read_parameter(file, reader, parameters);
+  weights.network->eval();
+  return weights;
+}
+
+}  // namespace cnerf
