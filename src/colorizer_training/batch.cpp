@@ -1,0 +1,222 @@
+#include "src/colorizer_training/batch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+
+#include "src/base/rng.h"
+#include "src/color/colorspace_math.h"
+
+namespace cnerf {
+namespace F = torch::nn::functional;
+using torch::Tensor;
+
+namespace {
+
+constexpr int kBlurRadius = 4;  // pixels; 2.5 times the largest sigma
+
+float log_uniform(SequentialRng& rng, double largest_ratio) {
+  const float log_ratio = float(std::log(largest_ratio));
+  return std::exp(rng.uniform(-log_ratio, log_ratio));
+}
+
+/// Map from the crop's [-1, 1]^2 to the canvas's, with the photograph's true aspect: six numbers, row-major 2x3.
+void append_crop(const AugmentOptions& o, float aspect, SequentialRng& rng, std::vector<float>& theta) {
+  const float width = std::max(1.0f, aspect), height = std::max(1.0f, 1 / aspect);  // short side 1
+  const bool patch = rng.uniform() < o.patch_share;
+  const float scale =
+      patch ? rng.uniform(float(o.scale_min), float(o.scale_mid)) : rng.uniform(float(o.whole_scale_min), 1);
+  const float stretch = std::sqrt(log_uniform(rng, 1 + o.aspect));
+  const float crop_width = std::min(1.0f, scale * stretch), crop_height = std::min(1.0f, scale / stretch);
+  const float x = rng.uniform(crop_width / 2, width - crop_width / 2);
+  const float y = rng.uniform(crop_height / 2, height - crop_height / 2);
+  const float angle = rng.uniform(-1, 1) * float(o.rotation_degrees * std::numbers::pi / 180);
+  const float flip = rng.uniform() < 0.5f ? -1.0f : 1.0f;
+  const float c = std::cos(angle), s = std::sin(angle);
+  theta.insert(theta.end(), {crop_width * c * flip / width, -crop_height * s / width, 2 * x / width - 1,
+                             crop_width * s * flip / height, crop_height * c / height, 2 * y / height - 1});
+}
+
+/// How one crop's lightness is changed; one row of the tensor that the device works with.
+enum LightnessColumn { kGamma, kContrast, kShift, kBlur, kNoise, kCoarseNoise, kLightnessColumns };
+
+void append_lightness(const AugmentOptions& o, SequentialRng& rng, std::vector<float>& rows) {
+  const float gamma = std::exp(rng.uniform(-1, 1) * float(o.gamma));
+  const float contrast = 1 + rng.uniform(-1, 1) * float(o.contrast);
+  const float shift = rng.uniform(-1, 1) * float(o.shift);
+  const float blur = rng.uniform() < o.blur_share ? rng.uniform(0.2f, float(o.blur_sigma)) : 0.1f;
+  const float noise = rng.uniform() < 0.5f ? rng.uniform() * float(o.noise) : 0;
+  const float coarse = rng.uniform() < 0.3f ? rng.uniform() * float(o.coarse_noise) : 0;
+  rows.insert(rows.end(), {gamma, contrast, shift, blur, noise, coarse});
+}
+
+/// A Gaussian of its own for every image.  @param sigma  [B].
+Tensor blur_each(const Tensor& planes, const Tensor& sigma) {
+  const std::int64_t batch = planes.size(0), side = 2 * kBlurRadius + 1;
+  const Tensor offset = torch::arange(-kBlurRadius, kBlurRadius + 1, planes.options());
+  Tensor kernel = torch::exp(-offset.square().unsqueeze(0) / (2 * sigma.square()).unsqueeze(1));  // [B, side]
+  kernel = kernel / kernel.sum(1, true);
+  const auto border = F::PadFuncOptions({kBlurRadius, kBlurRadius, kBlurRadius, kBlurRadius}).mode(torch::kReplicate);
+  Tensor all = F::pad(planes, border).transpose(0, 1);  // images become channels: [1, B, H, W]
+  all = torch::conv2d(all, kernel.view({batch, 1, 1, side}), /*bias=*/Tensor(), {1}, torch::IntArrayRef{0}, {1}, batch);
+  all = torch::conv2d(all, kernel.view({batch, 1, side, 1}), /*bias=*/Tensor(), {1}, torch::IntArrayRef{0}, {1}, batch);
+  return all.transpose(0, 1);
+}
+
+Tensor change_lightness(const Tensor& lightness, const Tensor& rows) {
+  const auto column = [&](int i) { return rows.select(1, i).view({-1, 1, 1, 1}); };
+  Tensor l = blur_each(lightness, rows.select(1, kBlur));
+  l = 100 * torch::pow((l / 100).clamp(1e-4, 1), column(kGamma));
+  const Tensor mean = l.mean({2, 3}, true);
+  l = (l - mean) * column(kContrast) + mean + column(kShift);
+  l = l + torch::randn_like(l) * column(kNoise);
+  const Tensor coarse = torch::randn({l.size(0), 1, l.size(2) / 8, l.size(3) / 8}, l.options());
+  l = l + column(kCoarseNoise) * F::interpolate(coarse, F::InterpolateFuncOptions()
+                                                            .size(std::vector<std::int64_t>{l.size(2), l.size(3)})
+                                                            .mode(torch::kBilinear)
+                                                            .align_corners(false));
+  return l.clamp(0, 100);
+}
+
+/// CutMix (Yun et al. 2019) inside one source's part of the batch: the next image's rectangle over each image.
+void cut_and_paste(Tensor rgb, int first, int count, const std::int64_t box[4]) {
+  if (count < 2) return;
+  const Tensor part = rgb.slice(0, first, first + count);
+  const Tensor target = part.slice(2, box[0], box[1]).slice(3, box[2], box[3]);
+  target.copy_(target.roll(-1, 0));
+}
+
+Tensor linear_from_srgb_tensor(const Tensor& v) {
+  return torch::where(v <= 0.04045, v / 12.92, torch::pow((v.clamp_min(0.04045) + 0.055) / 1.055, 2.4));
+}
+
+Tensor lab_f_tensor(const Tensor& t) {
+  constexpr double epsilon = LabConstants<double>::epsilon, kappa = LabConstants<double>::kappa;
+  return torch::where(t > epsilon, torch::pow(t.clamp_min(epsilon), 1.0 / 3), (kappa * t + 16) / 116);
+}
+
+}  // namespace
+
+Tensor upload(const Tensor& host, torch::Device device) {
+  return device.is_cuda() ? host.pin_memory().to(device, /*non_blocking=*/true) : host;
+}
+
+ResidentImages::ResidentImages(const TrainingImages& images, torch::Device device)
+    : aspect(images.aspect), label(images.label) {
+  double sum = 0;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    sum += images.weight.empty() ? 1 : images.weight[i];
+    cumulative_.push_back(sum);
+  }
+  const std::int64_t count = std::int64_t(images.size()), side = images.side;
+  auto* bytes = const_cast<std::uint8_t*>(images.rgb.data());
+  rgb_ = torch::from_blob(bytes, {count, side, side, 3}, torch::kUInt8).to(device, torch::kUInt8, false, true);
+}
+
+std::int64_t ResidentImages::draw(float uniform) const {
+  const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), uniform * cumulative_.back());
+  return std::min<std::int64_t>(found - cumulative_.begin(), std::int64_t(cumulative_.size()) - 1);
+}
+
+Tensor ResidentImages::gather(const Tensor& index) const {
+  return rgb_.index_select(0, index).permute({0, 3, 1, 2}).to(torch::kFloat32) / 255;
+}
+
+LabPlanes lab_from_srgb(const Tensor& srgb) {
+  const Tensor linear = linear_from_srgb_tensor(srgb);
+  const Tensor r = linear.slice(1, 0, 1), g = linear.slice(1, 1, 2), b = linear.slice(1, 2, 3);
+  const auto f_of = [&](const Vec3<double>& row) { return lab_f_tensor(r * row.x + g * row.y + b * row.z); };
+  // The columns of the conversion are what it makes of the three primaries.
+  const Vec3<double> red = relative_xyz_from_linear_rgb(Vec3<double>{1, 0, 0});
+  const Vec3<double> green = relative_xyz_from_linear_rgb(Vec3<double>{0, 1, 0});
+  const Vec3<double> blue = relative_xyz_from_linear_rgb(Vec3<double>{0, 0, 1});
+  const Tensor fx = f_of({red.x, green.x, blue.x}), fy = f_of({red.y, green.y, blue.y}),
+               fz = f_of({red.z, green.z, blue.z});
+  return {116 * fy - 16, torch::cat({500 * (fx - fy), 200 * (fy - fz)}, 1)};
+}
+
+Tensor srgb_from_lab(const Tensor& lightness, const Tensor& ab) {
+  constexpr double epsilon = LabConstants<double>::epsilon, kappa = LabConstants<double>::kappa;
+  const auto inverse = [](const Tensor& f) {
+    const Tensor cube = f * f * f;
+    return torch::where(cube > epsilon, cube, (116 * f - 16) / kappa);
+  };
+  const Tensor fy = (lightness + 16) / 116;
+  const Tensor x = inverse(fy + ab.slice(1, 0, 1) / 500), y = inverse(fy), z = inverse(fy - ab.slice(1, 1, 2) / 200);
+  std::vector<Tensor> channels;
+  for (int channel = 0; channel < 3; ++channel) {
+    const auto of = [&](const Vec3<double>& xyz) { return linear_rgb_from_relative_xyz(xyz)[channel]; };
+    channels.push_back(of({1, 0, 0}) * x + of({0, 1, 0}) * y + of({0, 0, 1}) * z);
+  }
+  const Tensor linear = torch::cat(channels, 1).clamp(0, 1);
+  return torch::where(linear <= 0.0031308, linear * 12.92,
+                      1.055 * torch::pow(linear.clamp_min(0.0031308), 1 / 2.4) - 0.055);
+}
+
+RgbImage image_from_lab(const Tensor& lightness, const Tensor& ab) {
+  const Tensor srgb = srgb_from_lab(lightness.unsqueeze(0), ab.unsqueeze(0))[0].permute({1, 2, 0});
+  const Tensor bytes = (srgb * 255).round().to(torch::kCPU, torch::kUInt8).contiguous();
+  RgbImage image{int(bytes.size(1)), int(bytes.size(0)), std::vector<std::uint8_t>(std::size_t(bytes.numel()))};
+  std::memcpy(image.rgb.data(), bytes.data_ptr<std::uint8_t>(), image.rgb.size());
+  return image;
+}
+
+Batch make_batch(const std::vector<const ResidentImages*>& sources, const std::vector<int>& counts, int crop_side,
+                 const AugmentOptions& options, std::uint64_t seed, std::int64_t step, torch::Device device) {
+  const torch::NoGradGuard no_grad;
+  SequentialRng rng(seed, std::uint64_t(step));
+  Batch batch;
+  std::vector<Tensor> crops;
+  std::vector<float> lightness_rows;
+  std::int64_t box[4] = {0, 0, 0, 0};
+  const bool mix = rng.uniform() < options.cutmix;
+  if (mix) {
+    // Borders on the grid of the quarter-resolution targets.
+    const auto span = [&](std::int64_t* out) {
+      const std::int64_t length = 4 * (crop_side / 16 + rng.below(std::uint32_t(crop_side / 8)));
+      out[0] = 4 * rng.below(std::uint32_t((crop_side - length) / 4 + 1));
+      out[1] = out[0] + length;
+    };
+    span(box);
+    span(box + 2);
+    batch.mixed_share = double((box[1] - box[0]) * (box[3] - box[2])) / (double(crop_side) * crop_side);
+  }
+  for (std::size_t s = 0; s < sources.size(); ++s) {
+    if (counts[s] == 0) continue;
+    std::vector<std::int64_t> index;
+    std::vector<float> theta;
+    for (int i = 0; i < counts[s]; ++i) {
+      index.push_back(sources[s]->draw(rng.uniform()));
+      append_crop(options, sources[s]->aspect[std::size_t(index.back())], rng, theta);
+      append_lightness(options, rng, lightness_rows);
+      batch.label.push_back(sources[s]->label[std::size_t(index.back())]);
+    }
+    const Tensor images = sources[s]->gather(upload(torch::tensor(index), device));
+    const Tensor grid = F::affine_grid(upload(torch::tensor(theta).view({counts[s], 2, 3}), device),
+                                       {counts[s], 3, crop_side, crop_side},
+                                       /*align_corners=*/false);
+    crops.push_back(F::grid_sample(
+        images, grid,
+        F::GridSampleFuncOptions().mode(torch::kBilinear).padding_mode(torch::kReflection).align_corners(false)));
+  }
+  batch.rgb = torch::cat(crops);
+  batch.mixed_label = batch.label;
+  int first = 0;
+  for (const int count : counts) {
+    if (mix) {
+      cut_and_paste(batch.rgb, first, count, box);
+      std::rotate(batch.mixed_label.begin() + first, batch.mixed_label.begin() + first + (count > 0),
+                  batch.mixed_label.begin() + first + count);
+    }
+    first += count;
+  }
+  const LabPlanes lab = lab_from_srgb(batch.rgb);
+  batch.ab = torch::avg_pool2d(lab.ab, 4);
+  torch::manual_seed(std::int64_t(mix_bits(seed) ^ std::uint64_t(step)));
+  batch.lightness =
+      change_lightness(lab.lightness, upload(torch::tensor(lightness_rows).view({first, kLightnessColumns}), device));
+  return batch;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,123 @@
+#include "src/colorizer_training/report.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+
+#include "src/colorizer_training/batch.h"
+
+namespace cnerf {
+using torch::Tensor;
+
+namespace {
+
+constexpr const char* kTileSet = "objects";
+constexpr const char* kSceneSets[] = {"bsds500", "cid22", "imagenet1000"};  // whole scenes, not single things
+constexpr std::size_t kMostTiles = 1000;  // enlarged 64-pixel images; more would only take time
+
+std::vector<RgbImage> photographs(const EvaluationSets& sets, bool scenes_only) {
+  std::vector<RgbImage> all;
+  for (const auto& [name, images] : sets) {
+    const bool scene = std::find(std::begin(kSceneSets), std::end(kSceneSets), name) != std::end(kSceneSets);
+    if (name != kTileSet && (scene || !scenes_only)) all.insert(all.end(), images.begin(), images.end());
+  }
+  return all;
+}
+
+SetScore score_set(const std::string& name, const std::vector<RgbImage>& images, ColorizerNet& network,
+                   const AbDecoding& decoding, const SoftLabelTable& table, torch::Device device) {
+  const std::vector<ChromaScore> scores = score_network(network, images, {{0, decoding}}, {}, true, table, device);
+  return {name, int(images.size()), scores[0], score_baselines(images, table, device)};
+}
+
+/// Pastes `image` at (x, y), cut to what fits.
+void paste(RgbImage& sheet, const RgbImage& image, int x, int y) {
+  const int width = std::min(image.width, sheet.width - x), height = std::min(image.height, sheet.height - y);
+  for (int row = 0; row < height; ++row) {
+    std::memcpy(&sheet.rgb[(std::size_t(y + row) * std::size_t(sheet.width) + std::size_t(x)) * 3],
+                &image.rgb[std::size_t(row) * std::size_t(image.width) * 3], std::size_t(width) * 3);
+  }
+}
+
+}  // namespace
+
+DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& validation, const Tensor& log_weights,
+                               const SoftLabelTable& table, torch::Device device) {
+  std::vector<DecodingChoice> choices;
+  for (const double share : {0.0, 0.15, 0.3, 0.45, 0.6}) choices.push_back({share, {1.0, 1.0}});
+  for (const double share : {0.15, 0.45}) choices.push_back({share, {0.7, 1.0}});
+  std::vector<double> merits(choices.size(), 0.0);
+  for (const bool scenes : {false, true}) {
+    const std::vector<RgbImage> images = photographs(validation, scenes);
+    if (images.empty()) continue;
+    const ChromaScore grey = score_baselines(images, table, device).grey;
+    const std::vector<ChromaScore> scores = score_network(network, images, choices, log_weights, true, table, device);
+    for (std::size_t i = 0; i < choices.size(); ++i) {
+      merits[i] += merit(scores[i], grey);
+      std::printf("decoding of %s: prior share %.2f temperature %.2f: raw %+.2f balanced %+.2f rmse %.3f merit %.2f\n",
+                  scenes ? "scenes" : "photographs", choices[i].prior_share, choices[i].decoding.temperature,
+                  scores[i].raw_auc - grey.raw_auc, scores[i].balanced_auc - grey.balanced_auc,
+                  scores[i].rmse / grey.rmse, merit(scores[i], grey));
+    }
+  }
+  return choices[std::size_t(std::max_element(merits.begin(), merits.end()) - merits.begin())];
+}
+
+std::vector<SetScore> score_sets(ColorizerNet& network, const AbDecoding& decoding, const EvaluationSets& sets,
+                                 const SoftLabelTable& table, torch::Device device) {
+  std::vector<SetScore> scores;
+  for (const auto& [name, images] : sets) {
+    const std::vector<RgbImage> some(images.begin(),
+                                     images.begin() + std::ptrdiff_t(std::min(images.size(), kMostTiles)));
+    scores.push_back(score_set(name, some, network, decoding, table, device));
+  }
+  if (sets.size() > 2) {
+    scores.push_back(score_set("all photographs held out", photographs(sets, false), network, decoding, table, device));
+  }
+  return scores;
+}
+
+void write_sample_sheet(const std::filesystem::path& file, ColorizerNet& network, const AbDecoding& decoding,
+                        const EvaluationSets& sets, int images_per_set, torch::Device device) {
+  const torch::NoGradGuard no_grad;
+  std::vector<RgbImage> rows;
+  for (const auto& [name, images] : sets) {
+    for (std::size_t i = 0; i < std::min(images.size(), std::size_t(images_per_set)); ++i) {
+      const RgbImage& truth = images[i * images.size() / std::size_t(images_per_set)];
+      const Tensor bytes = torch::tensor(torch::ArrayRef<std::uint8_t>(truth.rgb), torch::kUInt8);
+      const Tensor srgb =
+          bytes.view({1, truth.height, truth.width, 3}).permute({0, 3, 1, 2}).to(device, torch::kFloat32) / 255;
+      const Tensor lightness = lab_from_srgb(srgb).lightness;
+      const Tensor ab = colorize_with_flips(network, lightness, decoding);
+      RgbImage row{3 * kEvaluationSide * 3 / 2, kEvaluationSide, {}};
+      row.rgb.assign(std::size_t(row.width) * std::size_t(row.height) * 3, 0);
+      paste(row, image_from_lab(lightness[0], torch::zeros_like(ab[0])), 0, 0);
+      paste(row, image_from_lab(lightness[0], ab[0]), row.width / 3, 0);
+      paste(row, truth, 2 * row.width / 3, 0);
+      rows.push_back(std::move(row));
+    }
+  }
+  if (rows.empty()) return;
+  RgbImage sheet{rows[0].width, int(rows.size()) * kEvaluationSide, {}};
+  for (const RgbImage& row : rows) sheet.rgb.insert(sheet.rgb.end(), row.rgb.begin(), row.rgb.end());
+  write_png(file, sheet);
+}
+
+std::string validation_line(ColorizerNet& network, const EvaluationSets& validation, const SoftLabelTable& table,
+                            torch::Device device) {
+  std::string text;
+  for (const bool scenes : {false, true}) {
+    const std::vector<RgbImage> images = photographs(validation, scenes);
+    if (images.empty()) continue;
+    const ChromaScore grey = score_baselines(images, table, device).grey;
+    const ChromaScore score = score_network(network, images, {DecodingChoice{}}, {}, false, table, device)[0];
+    char line[200];
+    std::snprintf(line, sizeof line, "%s raw %+.2f balanced %+.2f rmse %.3f merit %.2f",
+                  scenes ? " | scenes" : "photographs", score.raw_auc - grey.raw_auc,
+                  score.balanced_auc - grey.balanced_auc, score.rmse / grey.rmse, merit(score, grey));
+    text += line;
+  }
+  return text;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,31 @@
+#pragma once
+/// From a trained network to weights that are shipped: choice of the decoding, scores, pictures.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "src/colorizer_training/image_set.h"
+#include "src/colorizer_training/score.h"
+
+namespace cnerf {
+
+/// The decoding with the greatest merit on validation photographs: that of all of them plus that of whole scenes.
+[[nodiscard]] DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& validation,
+                                             const torch::Tensor& log_weights, const SoftLabelTable& table,
+                                             torch::Device device);
+
+/// Scores of every set, and of all photographs together.
+[[nodiscard]] std::vector<SetScore> score_sets(ColorizerNet& network, const AbDecoding& decoding,
+                                               const EvaluationSets& sets, const SoftLabelTable& table,
+                                               torch::Device device);
+
+/// Rows of (grey, answer, truth), a few images of every set, one below the other.
+void write_sample_sheet(const std::filesystem::path& file, ColorizerNet& network, const AbDecoding& decoding,
+                        const EvaluationSets& sets, int images_per_set, torch::Device device);
+
+/// One line for the log: merit, AuCs and RMSE of all validation photographs.
+[[nodiscard]] std::string validation_line(ColorizerNet& network, const EvaluationSets& validation,
+                                          const SoftLabelTable& table, torch::Device device);
+
+}  // namespace cnerf

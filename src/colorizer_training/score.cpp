@@ -1,0 +1,187 @@
+#include "src/colorizer_training/score.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <map>
+
+#include "src/color/ab_bins.h"
+#include "src/colorizer_training/batch.h"
+
+namespace cnerf {
+using torch::Tensor;
+
+namespace {
+
+constexpr std::int64_t kThresholds = 150;
+constexpr std::size_t kImagesPerPass = 16;
+
+/// Calls `visit(lightness [B,1,H,W], ab [B,2,H,W])` over batches of images of one size.
+template <typename Visit>
+void for_each_batch(const std::vector<RgbImage>& images, torch::Device device, const Visit& visit) {
+  std::map<std::pair<int, int>, std::vector<const RgbImage*>> by_size;
+  for (const RgbImage& image : images) by_size[{image.width, image.height}].push_back(&image);
+  for (const auto& [size, group] : by_size) {
+    for (std::size_t first = 0; first < group.size(); first += kImagesPerPass) {
+      const std::size_t count = std::min(kImagesPerPass, group.size() - first);
+      Tensor bytes = torch::empty({std::int64_t(count), size.second, size.first, 3}, torch::kUInt8);
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto& rgb = group[first + i]->rgb;
+        std::memcpy(bytes.data_ptr<std::uint8_t>() + i * rgb.size(), rgb.data(), rgb.size());
+      }
+      const LabPlanes lab = lab_from_srgb(bytes.to(device).permute({0, 3, 1, 2}).to(torch::kFloat32) / 255);
+      visit(lab.lightness, lab.ab);
+    }
+  }
+}
+
+/// Hasler and Suesstrunk's M of every image, on 8-bit values.  [B]
+Tensor colorfulness_of(const Tensor& lightness, const Tensor& ab) {
+  const Tensor rgb = (srgb_from_lab(lightness, ab) * 255).round();
+  const Tensor r = rgb.select(1, 0).flatten(1), g = rgb.select(1, 1).flatten(1), b = rgb.select(1, 2).flatten(1);
+  const Tensor rg = r - g, yb = 0.5 * (r + g) - b;
+  const auto variance = [](const Tensor& x) { return x.square().mean(1) - x.mean(1).square(); };
+  const Tensor spread = (variance(rg) + variance(yb)).clamp_min(0).sqrt();
+  return spread + 0.3 * (rg.mean(1).square() + yb.mean(1).square()).sqrt();
+}
+
+/// AuC from [.., kThresholds + 2] pixels by rounded-up error: thresholds 0..150, each equally weighted.
+Tensor area_under_curve(const Tensor& histogram) {
+  const Tensor total = histogram.sum(-1, true).clamp_min(1e-12);
+  return 100 * (histogram / total).cumsum(-1).slice(-1, 0, kThresholds + 1).mean(-1);
+}
+
+struct AucPair {
+  double raw, balanced;
+};
+
+/// @param histogram  [313, kThresholds + 2]; the last column holds errors above every threshold.
+AucPair auc_of(const Tensor& histogram) {
+  const Tensor present = histogram.sum(1) > 0;
+  return {area_under_curve(histogram.sum(0)).item<double>(),
+          area_under_curve(histogram).masked_select(present).mean().item<double>()};
+}
+
+Tensor error_column(const Tensor& distance) {
+  return distance.ceil().clamp_max(double(kThresholds + 1)).to(torch::kInt64);
+}
+
+constexpr int kGridLimit = 110, kGridSide = 2 * kGridLimit + 1;
+
+/// True colours of all pixels, counted on a grid of one ab unit.  [kGridSide^2] f64
+Tensor color_histogram(const std::vector<RgbImage>& images, torch::Device device) {
+  Tensor counts = torch::zeros({kGridSide * kGridSide}, torch::TensorOptions(torch::kFloat64).device(device));
+  for_each_batch(images, device, [&](const Tensor&, const Tensor& ab) {
+    const Tensor cell = (ab.round().clamp(-kGridLimit, kGridLimit) + kGridLimit).to(torch::kInt64);
+    const Tensor index = (cell.select(1, 0) * kGridSide + cell.select(1, 1)).flatten();
+    counts += torch::bincount(index, {}, kGridSide * kGridSide);
+  });
+  return counts.cpu();
+}
+
+/// Score of one colour for all the pixels counted on the grid.
+ChromaScore score_constant(const Tensor& counts, const Tensor& grid, const Tensor& bins, Ab color) {
+  const Tensor distance = (grid - torch::tensor({color.a, color.b})).square().sum(1).sqrt();
+  const Tensor index = bins * (kThresholds + 2) + error_column(distance);
+  const Tensor histogram =
+      torch::bincount(index, counts, kAbBinCount * (kThresholds + 2)).view({kAbBinCount, kThresholds + 2});
+  const AucPair auc = auc_of(histogram);
+  return {auc.raw, auc.balanced, std::sqrt(((distance.square() * counts).sum() / (2 * counts.sum())).item<double>()), 0,
+          0};
+}
+
+}  // namespace
+
+ChromaScorer::ChromaScorer(const SoftLabelTable& table, torch::Device device) : table_(table) {
+  const auto options = torch::TensorOptions(torch::kFloat64).device(device);
+  histogram_ = torch::zeros({kAbBinCount * (kThresholds + 2)}, options);
+  squared_ = torch::zeros({}, options);
+  colorfulness_ = torch::zeros({}, options);
+  true_colorfulness_ = torch::zeros({}, options);
+}
+
+void ChromaScorer::add(const Tensor& truth, const Tensor& answer, const Tensor& lightness) {
+  const Tensor distance = (answer - truth).square().sum(1).sqrt().flatten();
+  const Tensor bin = table_.look_up(truth).bin.select(1, 0);
+  histogram_ += torch::bincount(bin * (kThresholds + 2) + error_column(distance), {}, kAbBinCount * (kThresholds + 2));
+  squared_ += distance.to(torch::kFloat64).square().sum();
+  pixels_ += double(distance.numel());
+  images_ += double(truth.size(0));
+  colorfulness_ += colorfulness_of(lightness, answer).sum();
+  true_colorfulness_ += colorfulness_of(lightness, truth).sum();
+}
+
+ChromaScore ChromaScorer::score() const {
+  const AucPair auc = auc_of(histogram_.cpu().view({kAbBinCount, kThresholds + 2}));
+  return {auc.raw, auc.balanced, std::sqrt(squared_.item<double>() / (2 * pixels_)),
+          colorfulness_.item<double>() / images_, true_colorfulness_.item<double>() / images_};
+}
+
+std::vector<ChromaScore> score_network(ColorizerNet& network, const std::vector<RgbImage>& images,
+                                       const std::vector<DecodingChoice>& choices, const Tensor& log_weights,
+                                       bool flips, const SoftLabelTable& table, torch::Device device) {
+  const torch::NoGradGuard no_grad;
+  std::vector<ChromaScorer> scorers;
+  for (std::size_t i = 0; i < choices.size(); ++i) scorers.emplace_back(table, device);
+  for_each_batch(images, device, [&](const Tensor& lightness, const Tensor& ab) {
+    const Tensor logits = flips ? logits_with_flips(network, lightness) : network->forward(lightness);
+    for (std::size_t i = 0; i < choices.size(); ++i) {
+      Tensor shifted = logits;
+      if (choices[i].prior_share != 0) shifted = logits - choices[i].prior_share * log_weights.view({1, -1, 1, 1});
+      scorers[i].add(ab, guided_upsample(decode_ab(shifted, choices[i].decoding), lightness), lightness);
+    }
+  });
+  std::vector<ChromaScore> scores;
+  for (const auto& scorer : scorers) scores.push_back(scorer.score());
+  return scores;
+}
+
+Baselines score_baselines(const std::vector<RgbImage>& images, const SoftLabelTable& table, torch::Device device) {
+  const torch::NoGradGuard no_grad;
+  const Tensor all = color_histogram(images, device);
+  const Tensor used = (all > 0).nonzero().squeeze(1);
+  const Tensor counts = all.index_select(0, used);
+  const Tensor grid =
+      torch::stack({used.div(kGridSide, "floor") - kGridLimit, used.remainder(kGridSide) - kGridLimit}, 1)
+          .to(torch::kFloat32);
+  const Tensor bins = table.look_up(grid.t().view({1, 2, -1, 1}).to(device)).bin.select(1, 0).cpu();
+
+  Baselines baselines{score_constant(counts, grid, bins, {0, 0}), {}};
+  ChromaScore& best = baselines.best_constant;
+  best = baselines.grey;
+  for (const Ab& centre : ab_bin_centres()) {
+    const ChromaScore score = score_constant(counts, grid, bins, centre);
+    best.raw_auc = std::max(best.raw_auc, score.raw_auc);
+    best.balanced_auc = std::max(best.balanced_auc, score.balanced_auc);
+    best.rmse = std::min(best.rmse, score.rmse);
+  }
+  return baselines;
+}
+
+double merit(const ChromaScore& network, const ChromaScore& grey) {
+  constexpr double kPointsForRmse = 25;
+  return network.balanced_auc - grey.balanced_auc + network.raw_auc - grey.raw_auc +
+         kPointsForRmse * (1 - network.rmse / grey.rmse);
+}
+
+std::string score_table(const std::vector<SetScore>& sets) {
+  std::string table =
+      "| set | images | answer | raw AuC | balanced AuC | ab-RMSE | share of grey's RMSE | colourfulness ratio |\n"
+      "|---|---|---|---|---|---|---|---|\n";
+  const auto row = [&](const SetScore& set, const char* answer, const ChromaScore& score, double ratio) {
+    char line[256];
+    std::snprintf(line, sizeof line, "| %s | %d | %s | %.2f | %.2f | %.2f | %.3f | %.2f |\n", set.name.c_str(),
+                  set.images, answer, score.raw_auc, score.balanced_auc, score.rmse,
+                  score.rmse / set.baselines.grey.rmse, ratio);
+    table += line;
+  };
+  for (const SetScore& set : sets) {
+    row(set, "all grey", set.baselines.grey, 0);
+    row(set, "best constant", set.baselines.best_constant, 0);
+    row(set, "**built-in**", set.network, set.network.colorfulness / set.network.true_colorfulness);
+  }
+  return table;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,73 @@
+#pragma once
+/// How good colours are, in the measures colorizers are compared by (Zhang et al. 2016, Hasler and Suesstrunk 2003).
+
+#include <torch/torch.h>
+
+#include <string>
+#include <vector>
+
+#include "src/colorizer/network_decode.h"
+#include "src/colorizer_training/image_set.h"
+#include "src/colorizer_training/losses.h"
+
+namespace cnerf {
+
+struct ChromaScore {
+  double raw_auc = 0;       ///< percent: share of pixels with ab error under a threshold, averaged over 0..150
+  double balanced_auc = 0;  ///< the same, every bin of the ground truth counting the same
+  double rmse = 0;          ///< root of the mean square over pixels and the two channels
+  double colorfulness = 0;  ///< mean over the images, of the answer
+  double true_colorfulness = 0;
+};
+
+/// Collects errors of one set of images.
+class ChromaScorer {
+ public:
+  explicit ChromaScorer(const SoftLabelTable& table, torch::Device device);
+  /// @param truth, answer  [B, 2, H, W] ab.  @param lightness [B, 1, H, W].
+  void add(const torch::Tensor& truth, const torch::Tensor& answer, const torch::Tensor& lightness);
+  [[nodiscard]] ChromaScore score() const;
+
+ private:
+  const SoftLabelTable& table_;
+  torch::Tensor histogram_;  ///< [313 * 152] f64: pixels by true bin and by error
+  torch::Tensor squared_;    ///< f64 sum
+  double pixels_ = 0, images_ = 0;
+  torch::Tensor colorfulness_, true_colorfulness_;
+};
+
+/// What an answer of one colour everywhere scores: no colour, and the best colour for each measure by itself.
+struct Baselines {
+  ChromaScore grey, best_constant;
+};
+
+struct SetScore {
+  std::string name;
+  int images = 0;
+  ChromaScore network;
+  Baselines baselines;
+};
+
+/// A way to read the network: what is added to its logits, and how they become a colour.
+struct DecodingChoice {
+  double prior_share = 0;  ///< of the rebalancing that is taken back: logits - share * log w
+  AbDecoding decoding;
+};
+
+/// Scores all `choices` in one pass over the images.
+/// @param log_weights  [313] log of the rebalancing weights used in training; empty where every prior_share is 0.
+/// @param flips        average with the mirror image, as the program does.
+[[nodiscard]] std::vector<ChromaScore> score_network(ColorizerNet& network, const std::vector<RgbImage>& images,
+                                                     const std::vector<DecodingChoice>& choices,
+                                                     const torch::Tensor& log_weights, bool flips,
+                                                     const SoftLabelTable& table, torch::Device device);
+[[nodiscard]] Baselines score_baselines(const std::vector<RgbImage>& images, const SoftLabelTable& table,
+                                        torch::Device device);
+
+/// One number to choose by: balanced and raw AuC above grey's, in points, and 25 points for all of grey's RMSE.
+[[nodiscard]] double merit(const ChromaScore& network, const ChromaScore& grey);
+
+/// The table of the model card (Markdown).
+[[nodiscard]] std::string score_table(const std::vector<SetScore>& sets);
+
+}  // namespace cnerf

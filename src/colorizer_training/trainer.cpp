@@ -1,0 +1,183 @@
+#include "src/colorizer_training/trainer.h"
+
+#include <ATen/autocast_mode.h>
+#include <torch/version.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include "src/base/check.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/base/rng.h"
+#include "src/color/ab_bins.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+using torch::Tensor;
+
+namespace {
+
+constexpr int kPriorBatches = 50;
+constexpr std::uint64_t kCropStream = 0x63726f70;     // the size of each step's crops
+constexpr std::uint64_t kPriorStream = 0x7072696f72;  // batches that only measure the prior
+
+/// bf16 for matrix products and convolutions on CUDA while it lives; weights and losses stay f32.
+class MixedPrecision {
+ public:
+  explicit MixedPrecision(torch::Device device) : active_(device.is_cuda()) { set(active_); }
+  ~MixedPrecision() {
+    set(false);
+    if (active_) at::autocast::clear_cache();
+  }
+  MixedPrecision(const MixedPrecision&) = delete;
+  MixedPrecision& operator=(const MixedPrecision&) = delete;
+
+ private:
+  static void set(bool on) {
+#if TORCH_VERSION_MAJOR >= 2
+    at::autocast::set_autocast_dtype(at::kCUDA, at::kBFloat16);
+    at::autocast::set_autocast_enabled(at::kCUDA, on);
+#else
+    at::autocast::set_autocast_gpu_dtype(at::kBFloat16);
+    at::autocast::set_enabled(on);
+#endif
+  }
+  bool active_;
+};
+
+ColorizerNet make_network(std::uint64_t seed, torch::Device device) {
+  torch::manual_seed(std::int64_t(seed));
+  ColorizerNet network;
+  network->to(device);
+  return network;
+}
+
+AuxiliaryHeads make_heads(const ImageSet& images, bool teacher, torch::Device device) {
+  AuxiliaryHeads heads(std::int64_t(images.classes.names.size()), teacher ? FeatureTeacher::kChannels : 1);
+  heads->to(device);
+  return heads;
+}
+
+}  // namespace
+
+ColorizerTrainer::ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher,
+                                   const TrainerOptions& options, torch::Device device)
+    : options_(options),
+      device_(device),
+      images_(images),
+      teacher_(std::move(teacher)),
+      photos_(images.photos, device),
+      tiles_(images.tiles, device),
+      table_(device),
+      label_loss_(images.classes, device),
+      network_(make_network(options.seed, device)),
+      averaged_(make_network(options.seed, device)),
+      heads_(make_heads(images, teacher_ != nullptr, device)),
+      parameters_({network_.get(), heads_.get()}),
+      averaged_parameters_({averaged_.get()}),
+      optimizer_(parameters_, options.adamw) {
+  if (images.photos.size() == 0) options_.photos_per_step = 0;
+  if (images.tiles.size() == 0) options_.tiles_per_step = 0;
+  CNERF_CHECK(options_.photos_per_step + options_.tiles_per_step > 0, "there are images to train on");
+  averaged_->eval();
+  class_weights_ = measure_class_weights();
+}
+
+Batch ColorizerTrainer::next_batch(std::int64_t step) const {
+  const bool large = CounterRng(options_.seed, kCropStream).uniform(std::uint64_t(step)) < options_.large_crop_share;
+  return make_batch({&photos_, &tiles_}, {options_.photos_per_step, options_.tiles_per_step},
+                    large ? options_.large_crop_side : options_.crop_side, options_.augment, options_.seed, step,
+                    device_);
+}
+
+Tensor ColorizerTrainer::measure_class_weights() const {
+  std::vector<Tensor> samples;
+  for (int i = 0; i < kPriorBatches; ++i) {
+    samples.push_back(make_batch({&photos_, &tiles_}, {options_.photos_per_step, options_.tiles_per_step},
+                                 options_.crop_side, options_.augment, options_.seed ^ kPriorStream, i, device_)
+                          .ab);
+  }
+  const Tensor prior = measure_prior(samples, table_).contiguous();
+  const std::vector<float> weights =
+      rebalancing_weights(std::span(prior.data_ptr<float>(), std::size_t(kAbBinCount)), float(options_.rebalancing));
+  return torch::tensor(weights).to(device_);
+}
+
+double ColorizerTrainer::learning_rate() const {
+  const double warm = std::min(1.0, double(step_ + 1) / options_.warmup_steps);
+  const double done = std::min(1.0, double(step_) / options_.steps);
+  const double cosine = 0.5 * (1 + std::cos(std::numbers::pi * done));
+  return options_.learning_rate * warm * (options_.final_share + (1 - options_.final_share) * cosine);
+}
+
+StepLosses ColorizerTrainer::step() {
+  network_->train();
+  heads_->train();
+  const Batch batch = next_batch(step_);  // also seeds the generators that dropout draws from
+  ColorizerFeatures features;
+  Tensor labels, mixed_labels, predicted, teacher;
+  {
+    const MixedPrecision mixed(device_);
+    features = network_->features(batch.lightness);
+    labels = heads_->classify(features.global);
+    if (teacher_) {
+      predicted = heads_->predict_features(features.semantic);
+      teacher = teacher_->features(batch.rgb, predicted.size(2), predicted.size(3));
+    }
+  }
+  const ColorLoss color = color_loss(features.logits, batch.ab, table_, class_weights_);
+  const Tensor label = (1 - batch.mixed_share) * label_loss_(labels, batch.label) +
+                       batch.mixed_share * label_loss_(labels, batch.mixed_label);
+  const Tensor feature = teacher_ ? feature_loss(predicted, teacher) : torch::zeros({}, batch.ab.options());
+  const Tensor total = color.classification + options_.regression_weight * color.regression +
+                       options_.label_weight * label + options_.feature_weight * feature;
+  total.backward();
+  optimizer_.step(learning_rate(), step_ + 1);
+  average_weights();
+  ++step_;
+  return {color.classification.detach(), color.regression.detach(), label.detach(), feature.detach()};
+}
+
+void ColorizerTrainer::average_weights() {
+  const torch::NoGradGuard no_grad;
+  // Starts short, so that the first weights are soon forgotten.
+  const double decay = std::min(options_.average_decay, double(1 + step_) / double(10 + step_));
+  Tensor& average = averaged_parameters_.values;
+  average.lerp_(parameters_.values.narrow(0, 0, average.numel()), 1 - decay);
+  averaged_parameters_.buffers.lerp_(parameters_.buffers, 1 - decay);
+}
+
+std::vector<Tensor> ColorizerTrainer::state() {
+  return {parameters_.values,          parameters_.buffers,          optimizer_.first_moment, optimizer_.second_moment,
+          averaged_parameters_.values, averaged_parameters_.buffers, class_weights_};
+}
+
+void ColorizerTrainer::save(const fs::path& checkpoint) {
+  std::vector<Tensor> tensors;
+  for (const Tensor& tensor : state()) tensors.push_back(tensor.cpu());
+  tensors.push_back(torch::tensor({step_, std::int64_t(options_.steps)}, torch::kInt64));
+  write_atomically(checkpoint, [&](const fs::path& temporary) { torch::save(tensors, temporary.string()); });
+}
+
+void ColorizerTrainer::load(const fs::path& checkpoint) {
+  if (!fs::exists(checkpoint)) throw MissingInputError(checkpoint.string() + ": no such checkpoint");
+  const torch::NoGradGuard no_grad;
+  std::vector<Tensor> tensors;
+  try {
+    torch::load(tensors, checkpoint.string(), torch::kCPU);
+  } catch (const c10::Error& error) {
+    throw SnapshotError(checkpoint.string() + ": not a checkpoint, or cut short: " + error.what_without_backtrace());
+  }
+  std::vector<Tensor> own = state();
+  bool fits = tensors.size() == own.size() + 1;
+  for (std::size_t i = 0; fits && i < own.size(); ++i) fits = tensors[i].sizes() == own[i].sizes();
+  if (!fits) throw SnapshotError(checkpoint.string() + ": a checkpoint of another network or other classes");
+  for (std::size_t i = 0; i < own.size(); ++i) own[i].copy_(tensors[i]);
+  step_ = tensors.back()[0].item<std::int64_t>();
+  set_total_steps(tensors.back()[1].item<std::int64_t>());
+}
+
+}  // namespace cnerf

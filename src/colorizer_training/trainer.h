@@ -1,0 +1,88 @@
+#pragma once
+/// Trains the built-in colorizer.
+
+#include <torch/torch.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "src/colorizer/network.h"
+#include "src/colorizer_training/batch.h"
+#include "src/colorizer_training/feature_teacher.h"
+#include "src/colorizer_training/flat_parameters.h"
+#include "src/colorizer_training/losses.h"
+
+namespace cnerf {
+
+struct TrainerOptions {
+  int steps = 100000;
+  int photos_per_step = 84, tiles_per_step = 68;
+  int crop_side = 128, large_crop_side = 160;       ///< multiples of 32
+  double large_crop_share = 0.4;                    ///< of the steps
+  double learning_rate = 1e-3, final_share = 0.01;  ///< cosine from the first to first * share
+  int warmup_steps = 500;
+  double rebalancing = 0.5;  ///< lambda
+  double regression_weight = 0.01;
+  double label_weight = 1.0;
+  double feature_weight = 1.0;   ///< of the teacher's features; without a teacher file there is none
+  double average_decay = 0.999;  ///< of the weights that are kept, a step
+  int epoch_steps = 2000;        ///< between checkpoints, scores and pictures
+  std::uint64_t seed = 1;
+  AugmentOptions augment;
+  AdamWOptions adamw;
+};
+
+/// What one step cost, before weights.
+struct StepLosses {
+  torch::Tensor classification, regression, label, feature;  ///< scalars on the device, detached
+};
+
+/// The state of a training run. A step is a pure function of the state and its number, so a run continued from a
+/// checkpoint repeats the uninterrupted one bit for bit on the CPU.
+class ColorizerTrainer {
+ public:
+  /// @param images  must outlive the trainer.  @param teacher  may be null.
+  ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher, const TrainerOptions& options,
+                   torch::Device device);
+
+  StepLosses step();
+  [[nodiscard]] std::int64_t steps_done() const { return step_; }
+  [[nodiscard]] std::int64_t total_steps() const { return options_.steps; }
+  /// Moves the end of the cosine; the checkpoint keeps it.
+  void set_total_steps(std::int64_t steps) { options_.steps = int(steps); }
+
+  /// The averaged network, in evaluation mode, on the training device.
+  [[nodiscard]] ColorizerNet& averaged() { return averaged_; }
+  [[nodiscard]] const SoftLabelTable& table() const { return table_; }
+  /// [313] f32 on the device: the class weights of the loss.
+  [[nodiscard]] const torch::Tensor& class_weights() const { return class_weights_; }
+
+  void save(const std::filesystem::path& checkpoint);
+  /// @throws MissingInputError, SnapshotError  a checkpoint of another network or run.
+  void load(const std::filesystem::path& checkpoint);
+
+ private:
+  [[nodiscard]] Batch next_batch(std::int64_t step) const;
+  [[nodiscard]] double learning_rate() const;
+  [[nodiscard]] torch::Tensor measure_class_weights() const;
+  void average_weights();
+  [[nodiscard]] std::vector<torch::Tensor> state();
+
+  TrainerOptions options_;
+  torch::Device device_;
+  const ImageSet& images_;
+  std::unique_ptr<FeatureTeacher> teacher_;
+  ResidentImages photos_, tiles_;
+  SoftLabelTable table_;
+  LabelLoss label_loss_;
+  ColorizerNet network_, averaged_;
+  AuxiliaryHeads heads_;
+  FlatParameters parameters_, averaged_parameters_;
+  FlatAdamW optimizer_;
+  torch::Tensor class_weights_;
+  std::int64_t step_ = 0;
+};
+
+}  // namespace cnerf
