@@ -122,17 +122,16 @@ std::map<std::string, int> number_labels(const std::vector<DecodedPhoto>& photos
   return numbers;
 }
 
-/// Draws a set of n images sqrt(n) times as often as one of a single image: small sets of whole scenes would drown in
-/// large ones of single things.
+/// Otherwise small sets of whole scenes drown in large ones of single things.
 void weigh_by_set(const std::vector<std::string>& set_of_photo, TrainingImages& photos) {
   std::map<std::string, double> counts;
   for (const std::string& name : set_of_photo) counts[name] += 1;
   for (const std::string& name : set_of_photo) photos.weight.push_back(1 / std::sqrt(counts[name]));
 }
 
-void add_photos(const std::vector<fs::path>& sources, ImageSet& set) {
+void add_photos(const ImageSources& sources, ImageSet& set) {
   set.photos.side = kPhotoCanvas;
-  std::vector<DecodedPhoto> photos = decode_photos(sources);
+  std::vector<DecodedPhoto> photos = decode_photos(sources.photos);
   const std::map<std::string, int> numbers = number_labels(photos, set.classes);
   std::vector<std::string> set_of_photo;
   for (auto& photo : photos) {
@@ -146,7 +145,7 @@ void add_photos(const std::vector<fs::path>& sources, ImageSet& set) {
     set.photos.label.push_back(name.label.empty() ? -1 : numbers.at(name.label));
     set_of_photo.push_back(name.set);
   }
-  weigh_by_set(set_of_photo, set.photos);
+  if (sources.balance_sets) weigh_by_set(set_of_photo, set.photos);
 }
 
 /// One byte a tile: the data of a version 1 .npy file of uint8.
@@ -209,7 +208,7 @@ int ClassList::range_of(int label) const {
 
 ImageSet load_image_set(const ImageSources& sources) {
   ImageSet set;
-  add_photos(sources.photos, set);
+  add_photos(sources, set);
   add_mosaics(sources, set);
   return set;
 }

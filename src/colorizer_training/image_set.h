@@ -41,6 +41,7 @@ struct ImageSources {
   std::vector<std::filesystem::path> mosaics;  ///< tars or folders of mosaics of square tiles, in this order
   std::filesystem::path mosaic_labels;         ///< .npy, uint8, one a tile; empty = no labels
   int tile_side = 64;
+  bool balance_sets = false;  ///< draw a set of n photographs sqrt(n), not n, times as often as one of a single one
 };
 
 struct ImageSet {

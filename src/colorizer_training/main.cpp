@@ -43,6 +43,7 @@ void add_options(CLI::App& app, Options& o) {
   app.add_option("--mosaics", o.sources.mosaics, "tars or folders of mosaics of equal square tiles");
   app.add_option("--mosaic-labels", o.sources.mosaic_labels, ".npy of uint8, one label a tile");
   app.add_option("--tile", o.sources.tile_side, "side of a mosaic's tiles, pixels")->check(CLI::Range(8, 1024));
+  app.add_flag("--balance-sets", o.sources.balance_sets, "draw large photo sets less often, as the root of their size");
   app.add_option("--evaluation", o.evaluation, "tars or folders that are never trained on, only judged");
   app.add_option("--teacher", o.teacher, "LPIPS SqueezeNet weights: predict a classifier's features of the colours");
   app.add_option("-o,--output", o.output, "folder for checkpoint, pictures, scores and weights");

@@ -44,23 +44,25 @@ void paste(RgbImage& sheet, const RgbImage& image, int x, int y) {
 DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& validation, const Tensor& log_weights,
                                const SoftLabelTable& table, torch::Device device) {
   std::vector<DecodingChoice> choices;
-  for (const double share : {0.0, 0.15, 0.3, 0.45, 0.6}) choices.push_back({share, {1.0, 1.0}});
-  for (const double share : {0.15, 0.45}) choices.push_back({share, {0.7, 1.0}});
-  std::vector<double> merits(choices.size(), 0.0);
-  for (const bool scenes : {false, true}) {
-    const std::vector<RgbImage> images = photographs(validation, scenes);
-    if (images.empty()) continue;
-    const ChromaScore grey = score_baselines(images, table, device).grey;
-    const std::vector<ChromaScore> scores = score_network(network, images, choices, log_weights, true, table, device);
-    for (std::size_t i = 0; i < choices.size(); ++i) {
-      merits[i] += merit(scores[i], grey);
-      std::printf("decoding of %s: prior share %.2f temperature %.2f: raw %+.2f balanced %+.2f rmse %.3f merit %.2f\n",
-                  scenes ? "scenes" : "photographs", choices[i].prior_share, choices[i].decoding.temperature,
-                  scores[i].raw_auc - grey.raw_auc, scores[i].balanced_auc - grey.balanced_auc,
-                  scores[i].rmse / grey.rmse, merit(scores[i], grey));
+  for (const double share : {0.0, 0.15, 0.3, 0.45, 0.6, 0.8}) {
+    for (const double temperature : {1.0, 0.7, 0.45}) {
+      for (const double gain : {1.0, 1.15}) choices.push_back({share, {temperature, gain}});
     }
   }
-  return choices[std::size_t(std::max_element(merits.begin(), merits.end()) - merits.begin())];
+  const std::vector<RgbImage> images = photographs(validation, false);
+  if (images.empty()) return {};
+  const ChromaScore grey = score_baselines(images, table, device).grey;
+  const std::vector<ChromaScore> scores = score_network(network, images, choices, log_weights, true, table, device);
+  std::size_t best = 0;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    if (merit(scores[i], grey) > merit(scores[best], grey)) best = i;
+    std::printf(
+        "decoding: prior share %.2f temperature %.2f gain %.2f: raw %+.2f balanced %+.2f rmse %.3f merit %.2f\n",
+        choices[i].prior_share, choices[i].decoding.temperature, choices[i].decoding.gain,
+        scores[i].raw_auc - grey.raw_auc, scores[i].balanced_auc - grey.balanced_auc, scores[i].rmse / grey.rmse,
+        merit(scores[i], grey));
+  }
+  return choices[best];
 }
 
 std::vector<SetScore> score_sets(ColorizerNet& network, const AbDecoding& decoding, const EvaluationSets& sets,

@@ -10,7 +10,7 @@
 
 namespace cnerf {
 
-/// The decoding with the greatest merit on validation photographs: that of all of them plus that of whole scenes.
+/// The decoding with the greatest merit on validation photographs, all sets together.
 [[nodiscard]] DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& validation,
                                              const torch::Tensor& log_weights, const SoftLabelTable& table,
                                              torch::Device device);

@@ -17,8 +17,8 @@
 namespace cnerf {
 
 struct TrainerOptions {
-  int steps = 100000;
-  int photos_per_step = 84, tiles_per_step = 68;
+  int steps = 60000;
+  int photos_per_step = 96, tiles_per_step = 56;
   int crop_side = 128, large_crop_side = 160;       ///< multiples of 32
   double large_crop_share = 0.4;                    ///< of the steps
   double learning_rate = 1e-3, final_share = 0.01;  ///< cosine from the first to first * share

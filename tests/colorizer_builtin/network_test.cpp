@@ -1,0 +1,171 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <torch/torch.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/colorizer/builtin_colorizer.h"
+#include "src/colorizer/network_weights.h"
+#include "src/colorizer_training/score.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+
+using torch::Tensor;
+
+constexpr std::int64_t kMostParameters = 6'500'000;
+constexpr std::uintmax_t kMostBytes = 13'000'000;
+
+Tensor random_lightness(std::int64_t batch, std::int64_t height, std::int64_t width) {
+  torch::manual_seed(3);
+  return 100 * torch::rand({batch, 1, height, width});
+}
+
+/// Batch normalisation with statistics that are not the identity, so that folding has something to do.
+ColorizerNet trained_like_network() {
+  torch::manual_seed(5);
+  ColorizerNet network;
+  const torch::NoGradGuard no_grad;
+  for (auto& item : network->named_buffers()) {
+    if (item.key().ends_with("running_mean")) item.value().normal_(0, 0.1);
+    if (item.key().ends_with("running_var")) item.value().uniform_(0.5, 2);
+  }
+  network->eval();
+  return network;
+}
+
+TEST(ColorizerNet, StaysWithinItsSize) {
+  EXPECT_LE(parameter_count(*ColorizerNet()), kMostParameters);
+  EXPECT_LE(parameter_count(*ColorizerNet(Normalisation::kFolded)), kMostParameters);
+}
+
+TEST(ColorizerNet, AnswersAnySizeAtQuarterResolution) {
+  const torch::NoGradGuard no_grad;
+  ColorizerNet network(Normalisation::kFolded);
+  network->eval();
+  for (const auto& [height, width] : {std::pair{32, 32}, {33, 50}, {7, 129}}) {
+    const Tensor logits = network->forward(random_lightness(2, height, width));
+    EXPECT_EQ(logits.sizes(), (std::vector<std::int64_t>{2, 313, (height + 3) / 4, (width + 3) / 4}));
+    EXPECT_TRUE(torch::isfinite(logits).all().item<bool>());
+  }
+}
+
+TEST(ColorizerNet, FoldingChangesNothing) {
+  const torch::NoGradGuard no_grad;
+  ColorizerNet trained = trained_like_network();
+  ColorizerNet folded = fold_batch_norm(trained);
+  const Tensor input = random_lightness(1, 64, 64);
+  const Tensor expected = trained->forward(input), actual = folded->forward(input);
+  EXPECT_LT((expected - actual).abs().max().item<float>(), 1e-3f * expected.abs().max().item<float>());
+  EXPECT_GT((expected - ColorizerNet(Normalisation::kFolded)->forward(input)).abs().max().item<float>(), 1e-2f)
+      << "the comparison must be able to fail";
+}
+
+TEST(GuidedUpsample, KeepsConstantsAndStopsAtEdges) {
+  Tensor lightness = torch::full({1, 1, 32, 32}, 20.0f);
+  lightness.slice(3, 16, 32).fill_(80);
+  const Tensor flat = torch::full({1, 2, 8, 8}, 7.0f);
+  EXPECT_LT((guided_upsample(flat, lightness) - 7).abs().max().item<float>(), 1e-4f);
+
+  Tensor halves = torch::zeros({1, 2, 8, 8});
+  halves.slice(3, 4, 8).fill_(50);
+  const Tensor full = guided_upsample(halves, lightness);
+  EXPECT_LT(full.slice(3, 0, 16).max().item<float>(), 1.0f);  // a plain bilinear would give 18 beside the edge
+  EXPECT_GT(full.slice(3, 16, 32).min().item<float>(), 49.0f);
+}
+
+TEST(ColorizerWeights, ComeBackAsHalfPrecision) {
+  const torch::NoGradGuard no_grad;
+  const test::TempDir folder;
+  ColorizerNet folded = fold_batch_norm(trained_like_network());
+  save_colorizer_weights(folder / "net.weights", folded, {0.7, 1.15});
+  EXPECT_LE(std::filesystem::file_size(folder / "net.weights"), kMostBytes);
+
+  ColorizerWeights loaded = load_colorizer_weights(folder / "net.weights");
+  EXPECT_EQ(loaded.decoding.temperature, 0.7);
+  EXPECT_EQ(loaded.decoding.gain, 1.15);
+  const Tensor input = random_lightness(1, 32, 32);
+  const Tensor expected = folded->forward(input), actual = loaded.network->forward(input);
+  EXPECT_LT((expected - actual).abs().max().item<float>(), 0.02f * expected.abs().max().item<float>());
+}
+
+TEST(ColorizerWeights, DamageIsRefusedWithTheFileNamed) {
+  const test::TempDir folder;
+  save_colorizer_weights(folder / "net.weights", ColorizerNet(Normalisation::kFolded), {});
+  const std::vector<std::byte> good = read_binary_file(folder / "net.weights");
+  const auto refusal = [&](std::vector<std::byte> content) -> std::string {
+    write_file(folder / "bad.weights", content);
+    try {
+      (void)load_colorizer_weights(folder / "bad.weights");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  std::vector<std::byte> flipped = good;
+  flipped[good.size() / 2] ^= std::byte{1};
+  EXPECT_THAT(refusal(flipped), testing::AllOf(testing::HasSubstr("bad.weights"), testing::HasSubstr("checksum")));
+  EXPECT_THAT(refusal({good.begin(), good.begin() + 1000}), testing::HasSubstr("bad.weights"));
+  EXPECT_THAT(refusal({good.begin(), good.begin() + 4}), testing::HasSubstr("bad.weights"));
+  EXPECT_THAT(refusal({}), testing::HasSubstr("bad.weights"));
+  EXPECT_THROW((void)load_colorizer_weights(folder / "none.weights"), MissingInputError);
+}
+
+LightnessBatch ramp_batch(int batch, int height, int width) {
+  LightnessBatch patches{batch, height, width, {}};
+  for (int i = 0; i < batch * height * width; ++i) patches.lightness.push_back(float((i * 7 + i / width) % 101));
+  return patches;
+}
+
+TEST(BuiltinColorizer, AnswersFiniteColorsOfTheRightShape) {
+  const auto colorizer = load_builtin_colorizer(builtin_weights_file());
+  EXPECT_THAT(colorizer->name(), testing::StartsWith("builtin"));
+  for (const auto& [batch, height, width] : {std::tuple{1, 128, 128}, {9, 32, 48}, {2, 33, 31}}) {
+    const LightnessBatch patches = ramp_batch(batch, height, width);
+    check_answer(colorizer->name(), patches, colorizer->colorize(patches));
+  }
+  EXPECT_TRUE(colorizer->colorize({0, 16, 16, {}}).ab.empty());
+}
+
+TEST(BuiltinColorizer, AnswerDoesNotDependOnTheRestOfTheBatch) {
+  const auto colorizer = load_builtin_colorizer(builtin_weights_file());
+  const LightnessBatch all = ramp_batch(3, 32, 32);
+  LightnessBatch last{1, 32, 32, {all.lightness.begin() + 2 * 32 * 32, all.lightness.end()}};
+  const std::vector<float> together = colorizer->colorize(all).ab, alone = colorizer->colorize(last).ab;
+  for (std::size_t i = 0; i < alone.size(); ++i) ASSERT_NEAR(alone[i], together[4 * 32 * 32 + i], 0.05f);
+}
+
+TEST(BuiltinColorizer, FlatGreyGetsNearlyNoColor) {
+  const auto colorizer = load_builtin_colorizer(builtin_weights_file());
+  const LightnessBatch flat{1, 64, 64, std::vector<float>(64 * 64, 55.0f)};
+  const std::vector<float> ab = colorizer->colorize(flat).ab;
+  for (const float value : ab) ASSERT_LT(std::abs(value), 40.0f);
+}
+
+TEST(BuiltinColorizer, BeatsGreyOnPhotographsItNeverSaw) {
+  CNERF_REQUIRE_DATA(kodak, "colorizer/eval-kodak-384px.tar");
+  std::vector<RgbImage> images = load_evaluation_images(kodak);
+  images.resize(8);
+  const SoftLabelTable table(torch::kCPU);
+  ColorizerWeights weights = load_colorizer_weights(builtin_weights_file());
+  const ChromaScore score =
+      score_network(weights.network, images, {{0, weights.decoding}}, {}, true, table, torch::kCPU)[0];
+  const ChromaScore grey = score_baselines(images, table, torch::kCPU).grey;
+  EXPECT_GT(score.balanced_auc, grey.balanced_auc + 3);
+  EXPECT_LT(score.rmse, 0.9 * grey.rmse);
+}
+
+TEST(Score, GreyOnKodakIsWhatOthersMeasure) {
+  CNERF_REQUIRE_DATA(kodak, "colorizer/eval-kodak-384px.tar");
+  const SoftLabelTable table(torch::kCPU);
+  const ChromaScore grey = score_baselines(load_evaluation_images(kodak), table, torch::kCPU).grey;
+  EXPECT_NEAR(grey.rmse, 15.34, 0.1);  // an independent measurement at the same size
+  EXPECT_NEAR(grey.raw_auc, 88.65, 0.3);
+}
+
+}  // namespace
+}  // namespace cnerf

@@ -1,0 +1,140 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/colorizer_training/tar_reader.h"
+#include "src/colorizer_training/trainer.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+
+/// Two classes that lightness tells apart: dark red pictures with a bright spot, bright blue ones with a dark spot.
+TrainingImages two_class_images(int side, int count) {
+  TrainingImages images;
+  images.side = side;
+  for (int i = 0; i < count; ++i) {
+    const bool red = i % 2 == 0;
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < side; ++x) {
+        const bool spot = (x - side / 2) * (x - side / 2) + (y - side / 2) * (y - side / 2) < side * side / 16;
+        const int shade = (spot == red ? 60 : 0) + i;
+        const std::uint8_t low = std::uint8_t(shade), high = std::uint8_t(120 + shade);
+        images.rgb.insert(images.rgb.end(), {red ? high : low, std::uint8_t(shade + (red ? 0 : 60)), red ? low : high});
+      }
+    }
+    images.aspect.push_back(1);
+    images.label.push_back(i % 2);
+  }
+  return images;
+}
+
+ImageSet tiny_set() {
+  ImageSet set;
+  set.photos = two_class_images(48, 4);
+  set.tiles = two_class_images(32, 4);
+  set.classes.names = {"a/red", "a/blue"};
+  set.classes.set_ranges = {{0, 2}};
+  return set;
+}
+
+TrainerOptions tiny_options() {
+  TrainerOptions options;
+  options.steps = 40;
+  options.photos_per_step = options.tiles_per_step = 2;
+  options.crop_side = options.large_crop_side = 32;
+  options.warmup_steps = 5;
+  return options;
+}
+
+TEST(ColorizerTrainer, LearnsATinySet) {
+  const ImageSet set = tiny_set();
+  ColorizerTrainer trainer(set, nullptr, tiny_options(), torch::kCPU);
+  const auto mean_loss = [&](int steps) {
+    double sum = 0;
+    for (int i = 0; i < steps; ++i) sum += trainer.step().classification.item<double>();
+    return sum / steps;
+  };
+  const double before = mean_loss(4);
+  (void)mean_loss(20);
+  EXPECT_LT(mean_loss(4), 0.8 * before);
+}
+
+TEST(ColorizerTrainer, ContinuesBitForBit) {
+  const test::TempDir folder;
+  const ImageSet set = tiny_set();
+  ColorizerTrainer straight(set, nullptr, tiny_options(), torch::kCPU);
+  for (int i = 0; i < 3; ++i) straight.step();
+  straight.save(folder / "checkpoint.pt");
+  const double expected = (straight.step(), straight.step()).classification.item<double>();
+
+  ColorizerTrainer resumed(set, nullptr, tiny_options(), torch::kCPU);
+  resumed.load(folder / "checkpoint.pt");
+  EXPECT_EQ(resumed.steps_done(), 3);
+  EXPECT_EQ((resumed.step(), resumed.step()).classification.item<double>(), expected);
+  const auto a = straight.averaged()->parameters(), b = resumed.averaged()->parameters();
+  for (std::size_t i = 0; i < a.size(); ++i) ASSERT_TRUE(torch::equal(a[i], b[i]));
+}
+
+TEST(ColorizerTrainer, RefusesOtherCheckpoints) {
+  const test::TempDir folder;
+  const ImageSet set = tiny_set();
+  ColorizerTrainer trainer(set, nullptr, tiny_options(), torch::kCPU);
+  EXPECT_THROW(trainer.load(folder / "none.pt"), MissingInputError);
+  write_file(folder / "short.pt", std::string_view("not a checkpoint"));
+  EXPECT_THROW(trainer.load(folder / "short.pt"), SnapshotError);
+}
+
+TEST(MakeBatch, IsAPureFunctionOfTheStep) {
+  const ImageSet set = tiny_set();
+  const ResidentImages photos(set.photos, torch::kCPU);
+  const auto batch = [&](std::int64_t step) {
+    return make_batch({&photos}, {3}, 32, AugmentOptions{}, 9, step, torch::kCPU);
+  };
+  EXPECT_TRUE(torch::equal(batch(4).lightness, batch(4).lightness));
+  EXPECT_FALSE(torch::equal(batch(4).lightness, batch(5).lightness));
+  EXPECT_EQ(batch(4).ab.sizes(), (std::vector<std::int64_t>{3, 2, 8, 8}));
+}
+
+TEST(LabFromSrgb, GreyHasNoColorAndRedIsRed) {
+  const torch::Tensor grey = lab_from_srgb(torch::full({1, 3, 1, 1}, 0.5)).ab;
+  EXPECT_LT(grey.abs().max().item<float>(), 1e-3f);
+  const LabPlanes red = lab_from_srgb(torch::tensor({1.0f, 0.0f, 0.0f}).view({1, 3, 1, 1}));
+  EXPECT_NEAR(red.lightness.item<float>(), 53.24f, 0.02f);
+  EXPECT_NEAR(red.ab[0][0].item<float>(), 80.09f, 0.05f);
+  const torch::Tensor back = srgb_from_lab(red.lightness, red.ab);
+  EXPECT_NEAR(back[0][0].item<float>(), 1, 1e-3f);
+  EXPECT_NEAR(back[0][1].item<float>(), 0, 1e-2f);
+}
+
+TEST(TarReader, ReadsWhatIsThereAndRefusesTheRest) {
+  const test::TempDir folder;
+  write_file(folder / "bad.tar", std::string(1024, 'x'));
+  EXPECT_THROW((void)read_tar_or_folder(folder / "bad.tar"), InputError);
+  EXPECT_THROW((void)read_tar_or_folder(folder / "none.tar"), MissingInputError);
+  write_file(folder / "set/b.txt", std::string_view("bb"));
+  write_file(folder / "set/a/x.txt", std::string_view("a"));
+  const auto entries = read_tar_or_folder(folder / "set");
+  ASSERT_EQ(entries.size(), 2u);
+  EXPECT_EQ(entries[0].name, "a/x.txt");
+  EXPECT_EQ(entries[1].content.size(), 2u);
+}
+
+TEST(RgbImage, ResizingKeepsTheMean) {
+  RgbImage image{9, 6, {}};
+  for (int i = 0; i < 9 * 6 * 3; ++i) image.rgb.push_back(std::uint8_t((i * 37) % 256));
+  const auto mean = [](const RgbImage& of) {
+    double sum = 0;
+    for (const std::uint8_t value : of.rgb) sum += value;
+    return sum / double(of.rgb.size());
+  };
+  EXPECT_NEAR(mean(resize_image(image, 3, 2)), mean(image), 6);
+  EXPECT_NEAR(mean(resize_image(image, 27, 18)), mean(image), 3);
+  EXPECT_EQ(resize_image(image, 9, 6).rgb, image.rgb);
+}
+
+}  // namespace
+}  // namespace cnerf
