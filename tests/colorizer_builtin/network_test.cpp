@@ -163,7 +163,7 @@ TEST(Score, GreyOnKodakIsWhatOthersMeasure) {
   CNERF_REQUIRE_DATA(kodak, "colorizer/eval-kodak-384px.tar");
   const SoftLabelTable table(torch::kCPU);
   const ChromaScore grey = score_baselines(load_evaluation_images(kodak), table, torch::kCPU).grey;
-  EXPECT_NEAR(grey.rmse, 15.34, 0.1);  // an independent measurement at the same size
+  EXPECT_NEAR(grey.rmse, 15.34, 0.2);  // an independent measurement at the same size, by another resize filter
   EXPECT_NEAR(grey.raw_auc, 88.65, 0.3);
 }
 
