@@ -1,0 +1,153 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "src/base/parallel.h"
+#include "src/base/rng.h"
+#include "src/color/colorspace_math.h"
+#include "src/engine/chroma_engine.h"
+#include "src/engine/cpu/mlp.h"
+
+namespace cnerf {
+namespace {
+
+HashGridOptions small_grid() {
+  HashGridOptions grid;
+  grid.levels = 3;
+  grid.log2_rows = 10;
+  grid.coarsest_resolution = 4;
+  grid.finest_resolution = 32;
+  return grid;
+}
+
+/// Pixels with two samples each; pixel p lies at x = (p + 0.5) / n.
+PixelSamples row_of_pixels(int n, float opacity = 0.9f) {
+  PixelSamples pixels;
+  for (int p = 0; p < n; ++p) {
+    const float x = (float(p) + 0.5f) / float(n);
+    pixels.positions.push_back({x, 0.3f, 0.5f});
+    pixels.positions.push_back({x, 0.7f, 0.5f});
+    pixels.weights.push_back(0.75f * opacity);
+    pixels.weights.push_back(0.25f * opacity);
+    pixels.luminance.push_back(0.4f);
+    pixels.luminance.push_back(0.2f);
+    pixels.offsets.push_back(pixels.positions.size());
+  }
+  return pixels;
+}
+
+PixelSamples single_samples(const PixelSamples& pixels) {
+  PixelSamples split;
+  for (std::size_t s = 0; s < pixels.positions.size(); ++s) {
+    split.positions.push_back(pixels.positions[s]);
+    split.weights.push_back(1.0f);
+    split.luminance.push_back(pixels.luminance[s]);
+    split.offsets.push_back(s + 1);
+  }
+  return split;
+}
+
+std::vector<SoftLabel> two_halves(int n) {
+  std::vector<SoftLabel> labels;
+  for (int p = 0; p < n; ++p) labels.push_back(soft_label(p < n / 2 ? Ab{50, 30} : Ab{-30, -20}));
+  return labels;
+}
+
+TEST(ChromaEngine, CompositingFeaturesEqualsCompositingLogits) {
+  const auto engine = make_cpu_chroma_engine(small_grid(), 3);
+  const PixelSamples pixels = row_of_pixels(40);
+  for (int i = 0; i < 20; ++i) engine->step(pixels, two_halves(40), {}, 1e-2f);
+
+  std::vector<float> composited(40 * kAbBinCount), of_samples(80 * kAbBinCount);
+  engine->logits(pixels, composited);
+  engine->logits(single_samples(pixels), of_samples);
+  for (int p = 0; p < 40; ++p) {
+    for (int q = 0; q < kAbBinCount; ++q) {
+      const float expected =
+          0.75f * of_samples[(2 * p) * kAbBinCount + q] + 0.25f * of_samples[(2 * p + 1) * kAbBinCount + q];
+      EXPECT_NEAR(composited[p * kAbBinCount + q], expected, 1e-3f * (1 + std::abs(expected)));
+    }
+  }
+}
+
+TEST(ChromaEngine, LearnsTwoColours) {
+  const auto engine = make_cpu_chroma_engine(small_grid(), 3);
+  const PixelSamples pixels = row_of_pixels(64);
+  const double first = engine->step(pixels, two_halves(64), {}, 1e-2f);
+  EXPECT_NEAR(first, std::log(double(kAbBinCount)), 1.5);  // nearly uniform, less the label's own entropy
+  double last = first;
+  for (int i = 0; i < 150; ++i) last = engine->step(pixels, two_halves(64), {}, 1e-2f);
+  EXPECT_LT(last, 0.2);
+  std::vector<float> logits(64 * kAbBinCount);
+  engine->logits(pixels, logits);
+  EXPECT_EQ(decode_arg_max(std::span(logits).first(kAbBinCount)).a, 50);
+  EXPECT_EQ(decode_arg_max(std::span(logits).last(kAbBinCount)).a, -30);
+}
+
+/// The gradient of the first step, seen through what Adam makes of it: its first step moves each weight by the rate
+/// against the sign of its gradient, so a small step must lower the loss, and one with the opposite sign raise it.
+TEST(ChromaEngine, GradientPointsDownhill) {
+  const PixelSamples pixels = row_of_pixels(64);
+  const auto loss_after = [&](float rate) {
+    const auto engine = make_cpu_chroma_engine(small_grid(), 5);
+    engine->step(pixels, two_halves(64), {}, rate);
+    return engine->step(pixels, two_halves(64), {}, 1e-9f);
+  };
+  const double before = loss_after(1e-9f);
+  EXPECT_LT(loss_after(1e-4f), before - 1e-4);
+  EXPECT_GT(loss_after(-1e-4f), before + 1e-4);
+}
+
+TEST(ChromaEngine, StepsAreBitEqualForAnyNumberOfThreads) {
+  std::vector<double> losses;
+  for (const int threads : {1, 2, 4}) {
+    set_thread_count(threads);
+    const auto engine = make_cpu_chroma_engine(small_grid(), 3);
+    double loss = 0;
+    for (int i = 0; i < 20; ++i) loss = engine->step(row_of_pixels(300), two_halves(300), {}, 1e-2f);
+    losses.push_back(loss);
+  }
+  set_thread_count(0);
+  EXPECT_EQ(losses[0], losses[1]);
+  EXPECT_EQ(losses[0], losses[2]);
+}
+
+TEST(ChromaticityEngine, StartsGreyAndReachesTheTargets) {
+  const auto engine = make_cpu_chromaticity_engine(small_grid(), 3);
+  const PixelSamples pixels = row_of_pixels(64);
+  std::vector<Ab> seen(64), targets;
+  engine->composite(pixels, seen);
+  for (const Ab& color : seen) EXPECT_NEAR(std::hypot(color.a, color.b), 0, 0.5);
+
+  for (int p = 0; p < 64; ++p) targets.push_back({40.0f - float(p), float(p % 8)});
+  double distance = 0;
+  for (int i = 0; i < 600; ++i) distance = engine->step(pixels, targets, i < 300 ? 1e-2f : 1e-3f);
+  EXPECT_LT(distance, 1.0);
+  engine->composite(pixels, seen);
+  for (int p = 0; p < 64; ++p) EXPECT_NEAR(std::hypot(seen[p].a - targets[p].a, seen[p].b - targets[p].b), 0, 4.0);
+}
+
+/// The contract of the bake: compositing the samples' XYZ in linear light gives the pixel's ab and its luminance.
+TEST(ChromaticityEngine, PixelColourIsTheCompositeOfTheSamplesLight) {
+  const auto engine = make_cpu_chromaticity_engine(small_grid(), 3);
+  const PixelSamples pixels = row_of_pixels(16);
+  const std::vector<Ab> targets(16, Ab{30, -25});
+  for (int i = 0; i < 100; ++i) engine->step(pixels, targets, 1e-2f);
+  std::vector<Chromaticity> chromaticity(pixels.positions.size());
+  engine->query(pixels.positions, chromaticity);
+  std::vector<Ab> seen(16);
+  engine->composite(pixels, seen);
+  for (std::size_t p = 0; p < 16; ++p) {
+    Vec3d light{};
+    for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
+      const double y = double(pixels.weights[s]) * pixels.luminance[s];
+      light += linear_rgb_from_relative_xyz(Vec3d{y * chromaticity[s].x, y, y * chromaticity[s].z});
+    }
+    const Lab<double> lab = lab_from_linear_rgb(light);
+    EXPECT_NEAR(lab.a, seen[p].a, 1e-2);
+    EXPECT_NEAR(lab.b, seen[p].b, 1e-2);
+  }
+}
+
+}  // namespace
+}  // namespace cnerf
