@@ -95,6 +95,7 @@ void train_step(RunContext& context, bool resume) {
   if (!record.stage1_finished || !resume) {
     record.stage1 = train_stage1(context.capture, context.config.stage1, directory.stage1_snapshot(), resume,
                                  context.reporter.sink());
+    context.reporter.sink()({"stage 1", 1.0, {{"psnr", record.stage1.train_psnr}}});
     record.stage1_finished = true;
     directory.save(record);
   }
@@ -131,6 +132,7 @@ void colorize_step(RunContext& context, const std::string& take, const ExistingO
     const Stage2Report report =
         train_stage2(context.capture, directory.stage1_snapshot(), context.config.stage2, *colorizer,
                      directory.take_snapshot(take), existing.resume, context.reporter.sink());
+    context.reporter.sink()({"stage 2", 1.0, {}});
     finished = TakeRecord{take, colorizer->name(), report};
     directory.save(*finished);
     RunRecord record = directory.record();
