@@ -33,7 +33,7 @@ struct PlacementOptions {
 };
 
 struct Stage1Options {
-  int steps = 6000;                   ///< optimiser steps
+  int steps = 5000;                   ///< optimiser steps
   double max_seconds = 0;             ///< stop earlier after this much training time; 0 = no limit
   int samples_per_step = 65536;       ///< trained samples a step aims at; rays a step follow from it
   std::string sampling = "pixels";    ///< independent pixels, or the paper's K x K patches

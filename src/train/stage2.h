@@ -21,7 +21,7 @@ struct Stage2Options {
   double learning_rate = 1e-2;
   double final_learning_rate = 1e-3;
   int working_resolution = 384;      ///< short side, pixels, at which samples are cached
-  double cached_weight = 0.995;      ///< share of a pixel's weight the cached samples carry
+  double cached_weight = 0.99;       ///< share of a pixel's weight the cached samples carry
   double rebalancing = 0;            ///< lambda mixing of class rebalancing; 0 = off
   double decode_temperature = 0.38;  ///< annealed-mean temperature; 0 = arg-max
   int distill_steps = 1000;          ///< steps of the fit of per-sample colour for baking

@@ -6,6 +6,7 @@
 namespace cnerf {
 namespace {
 
+constexpr float kFullScale = 65535.0f;
 constexpr float kCacheTransmittance = 2e-3f;  // what lies behind is not worth a sample
 
 /// Marks the heaviest samples of [begin, end) until they carry `share` of the total.
@@ -25,6 +26,16 @@ void mark_heaviest(const std::vector<WeightedSample>& samples, std::size_t begin
     if (carried >= share * total) break;
     carried += samples[s].weight;
     keep[s] = 1;
+  }
+}
+
+void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
+  view.brightest = 1e-6f;
+  for (const WeightedSample& sample : samples) view.brightest = std::max(view.brightest, sample.luminance);
+  view.samples.reserve(samples.size());
+  for (const WeightedSample& sample : samples) {
+    view.samples.push_back({sample.t, std::uint16_t(std::lround(std::min(sample.weight, 1.0f) * kFullScale)),
+                            std::uint16_t(std::lround(sample.luminance / view.brightest * kFullScale))});
   }
 }
 
@@ -69,17 +80,18 @@ CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
   for (int y = 0; y < view.height; ++y) {
     for (int x = 0; x < view.width; ++x) rays.push_back(view.camera.ray({x + 0.5, y + 0.5}));
   }
-  engine.trace(rays, march, kCacheTransmittance, view.samples, view.offsets);
+  std::vector<WeightedSample> samples;
+  engine.trace(rays, march, kCacheTransmittance, samples, view.offsets);
   view.luminance.resize(rays.size());
   view.opacity.resize(rays.size());
   for (std::size_t p = 0; p < rays.size(); ++p) {
     for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s) {
-      view.luminance[p] += view.samples[s].weight * view.samples[s].luminance;
-      view.opacity[p] += view.samples[s].weight;
+      view.luminance[p] += samples[s].weight * samples[s].luminance;
+      view.opacity[p] += samples[s].weight;
     }
   }
-  trim_samples(view.samples, view.offsets, share);
-  view.samples.shrink_to_fit();
+  trim_samples(samples, view.offsets, share);
+  pack(samples, view);
   return view;
 }
 
@@ -102,9 +114,10 @@ PixelSamples pixel_samples(const CachedView& view, std::span<const std::uint32_t
   for (const std::uint32_t p : wanted) {
     const Ray ray = view.camera.ray({p % std::uint32_t(view.width) + 0.5, p / std::uint32_t(view.width) + 0.5});
     for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s) {
-      pixels.positions.push_back(ray.at(view.samples[s].t));
-      pixels.weights.push_back(view.samples[s].weight);
-      pixels.luminance.push_back(view.samples[s].luminance);
+      const CachedSample& sample = view.samples[s];
+      pixels.positions.push_back(ray.at(sample.t));
+      pixels.weights.push_back(float(sample.weight) / kFullScale);
+      pixels.luminance.push_back(float(sample.luminance) / kFullScale * view.brightest);
     }
     pixels.offsets.push_back(pixels.positions.size());
   }

@@ -2,6 +2,7 @@
 /// Frozen geometry, cached: what each training view sees at a working resolution, and the few samples behind each
 /// pixel.
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -11,14 +12,22 @@
 
 namespace cnerf {
 
+/// A sample in 8 bytes: captures of millions of pixels have hundreds of millions of them.
+struct CachedSample {
+  float t = 0;                  ///< unit space
+  std::uint16_t weight = 0;     ///< of 65535
+  std::uint16_t luminance = 0;  ///< of 65535, times the view's `brightest`
+};
+
 /// One view at working resolution. Arrays are [H, W].
 struct CachedView {
   UnitCamera camera;
   int width = 0, height = 0;
   std::vector<float> luminance;  ///< linear Y over black
   std::vector<float> opacity;
-  std::vector<WeightedSample> samples;  ///< pixel by pixel, front to back
-  std::vector<std::size_t> offsets;     ///< [H W + 1]
+  float brightest = 1;                ///< luminance of the brightest sample
+  std::vector<CachedSample> samples;  ///< pixel by pixel, front to back
+  std::vector<std::size_t> offsets;   ///< [H W + 1]
 
   [[nodiscard]] int short_side() const { return std::min(width, height); }
 };
