@@ -1,0 +1,81 @@
+// A baked run in the real Blender: renders the held-out views of a capture in Cycles (linear EXR, box filter, volume
+// step rate 0.25) and compares them with our own integrator on the same grids and with the capture's colours, over
+// pixels whose opacity is above 0.01.
+//
+//   cycles_comparison BAKE CAPTURE [views=3] [samples=64] [downscale=1] [holdout=0]
+//
+// BAKE is the folder with volume.vdb, manifest.json and blender_setup.py.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <string>
+
+#include "bake/volume_integrator.h"
+#include "export/vdb_reader.h"
+#include "src/capture/color_truth.h"
+#include "src/capture/load_capture.h"
+#include "src/color/colorspace_math.h"
+#include "tests/blender/blender_run.h"
+
+namespace {
+
+double decibels(double squared, std::size_t values) {
+  return -10 * std::log10(std::max(squared / double(values), 1e-12));
+}
+
+double encoded(float linear) {
+  return cnerf::srgb_from_linear(std::clamp(linear, 0.0f, 1.0f));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 3) {
+    std::puts("cycles_comparison BAKE CAPTURE [views=N] [samples=N] [downscale=N] [holdout=N]");
+    return 64;
+  }
+  const std::filesystem::path bake = argv[1];
+  std::map<std::string, int> options = {{"views", 3}, {"samples", 64}, {"downscale", 1}, {"holdout", 0}};
+  for (int i = 3; i < argc; ++i) {
+    const std::string argument = argv[i];
+    const std::size_t equals = argument.find('=');
+    options.at(argument.substr(0, equals)) = std::stoi(argument.substr(equals + 1));
+  }
+  cnerf::CaptureOptions capture_options;
+  capture_options.downscale = options["downscale"];
+  capture_options.holdout = options["holdout"];
+  const cnerf::Capture capture = cnerf::load_capture(argv[2], capture_options);
+  const cnerf::BakedVolume volume = cnerf::read_vdb(bake / "volume.vdb");
+
+  int done = 0;
+  for (const cnerf::View& view : capture.views) {
+    if (!view.held_out || done >= options["views"]) continue;
+    ++done;
+    const cnerf::test::RenderedExr cycles = cnerf::test::render_exact(
+        bake / "blender_setup.py",
+        "--camera '" + view.name + "' --samples " + std::to_string(options["samples"]) + " --step-rate 0.25");
+    const cnerf::VolumeImage ours = cnerf::integrate_volume(volume, view.intrinsics, view.world_from_camera);
+    const auto truth = cnerf::load_color_truth(view);
+    double against_ours = 0, against_truth = 0;
+    std::size_t values = 0;
+    for (int p = 0; p < ours.width * ours.height; ++p) {
+      const float* rgba = &cycles.rgba[4 * std::size_t(p)];
+      if (std::max(rgba[3], ours.opacity[std::size_t(p)]) <= 0.01f) continue;
+      for (int c = 0; c < 3; ++c, ++values) {
+        const double difference = double(rgba[c]) - ours.rgb[3 * std::size_t(p) + c];
+        against_ours += difference * difference;
+        if (!truth) continue;
+        const double error = encoded(rgba[c]) - encoded(truth->rgb[3 * std::size_t(p) + c]);
+        against_truth += error * error;
+      }
+    }
+    std::printf("%s: Cycles against our integrator %.2f dB (linear)", view.name.c_str(),
+                decibels(against_ours, values));
+    if (truth) std::printf(", against the true colours %.2f dB (sRGB)", decibels(against_truth, values));
+    std::printf(", over %zu pixels\n", values / 3);
+    std::fflush(stdout);
+  }
+  return done > 0 ? 0 : 65;
+}
