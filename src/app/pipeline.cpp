@@ -83,6 +83,7 @@ std::unique_ptr<Colorizer> colorizer_of(const RunContext& context) {
   options.spec = context.config.colorizer.spec;
   options.working_folder = context.capture.root;
   options.timeout_seconds = context.config.colorizer.timeout_seconds;
+  options.reference_steps = context.config.colorizer.reference_steps;
   options.seed = static_cast<std::uint64_t>(context.config.stage2.seed);
   options.cache_folder = context.directory.colorizer_cache();
   options.progress = context.reporter.sink();

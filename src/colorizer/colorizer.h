@@ -43,6 +43,7 @@ struct ColorizerOptions {
   std::filesystem::path working_folder;  ///< relative files of the spec are looked up here, then as given
   std::filesystem::path cache_folder;    ///< a fitted reference: network is kept here; empty = refit every time
   double timeout_seconds = 60;           ///< for one batch of an exec: colorizer
+  int reference_steps = 1200;            ///< optimiser steps of that fit
   std::uint64_t seed = 1;                ///< of the fit of a reference: network
   ProgressSink progress;                 ///< watches that fit; may throw Interrupted
 };

@@ -93,7 +93,9 @@ class ReferenceColorizer final : public Colorizer {
 }  // namespace
 
 std::unique_ptr<Colorizer> make_reference_colorizer(const std::string& argument, const ColorizerOptions& options) {
-  return make_reference_colorizer(argument, options, ReferenceRecipe{});
+  ReferenceRecipe recipe;
+  recipe.steps = options.reference_steps;
+  return make_reference_colorizer(argument, options, recipe);
 }
 
 std::unique_ptr<Colorizer> make_reference_colorizer(const std::string& argument, const ColorizerOptions& options,

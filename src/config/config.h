@@ -18,11 +18,13 @@ namespace cnerf {
 struct ColorizerConfig {
   std::string spec;  ///< "reference:IMAGE…", "torchscript:FILE", "exec:COMMAND", "grey"; empty = none given
   double timeout_seconds = 60;  ///< for one batch of an exec: colorizer
+  int reference_steps = 1200;   ///< optimiser steps of a reference: colorizer's fit
 
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("spec", spec, "reference:IMAGE..., torchscript:FILE, exec:COMMAND or grey; empty = none");
     v("timeout_seconds", timeout_seconds, Range{0.1, 1e6}, "an exec: colorizer that takes longer for a batch failed");
+    v("reference_steps", reference_steps, Range{1, 1e6}, "optimiser steps of the fit to a reference: photograph");
   }
 };
 

@@ -81,6 +81,7 @@ std::vector<std::string> tiny_options() {
                               "stage1.grid.levels=4",
                               "stage1.grid.log2_rows=12",
                               "stage1.grid.finest_resolution=64",
+                              "colorizer.reference_steps=20",
                               "stage2.patches=6",
                               "stage2.patch_size=32",
                               "stage2.rays_per_patch=256",
