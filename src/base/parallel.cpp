@@ -5,7 +5,10 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
+#include <exception>
 #include <memory>
+#include <mutex>
 
 namespace cnerf {
 namespace {
@@ -27,12 +30,27 @@ int thread_count() {
 }
 
 void parallel_tasks(std::size_t tasks, const std::function<void(std::size_t)>& task) {
+  // Of several failing tasks the first by number is reported, so that errors do not depend on timing either.
+  std::mutex mutex;
+  std::exception_ptr failure;
+  std::atomic<std::size_t> failed = tasks;
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, tasks, 1),
       [&](const auto& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) task(i);
+        for (std::size_t i = range.begin(); i != range.end() && i < failed; ++i) {
+          try {
+            task(i);
+          } catch (...) {
+            const std::lock_guard lock(mutex);
+            if (i < failed) {
+              failed = i;
+              failure = std::current_exception();
+            }
+          }
+        }
       },
       tbb::simple_partitioner{});
+  if (failure) std::rethrow_exception(failure);
 }
 
 void parallel_ranges(std::size_t count, std::size_t grain, const std::function<void(std::size_t, std::size_t)>& body) {

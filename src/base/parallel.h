@@ -11,7 +11,8 @@ namespace cnerf {
 void set_thread_count(int threads);
 [[nodiscard]] int thread_count();
 
-/// Calls `task(i)` once for each i in [0, tasks), in any order, on any thread. An exception of a task is rethrown here.
+/// Calls `task(i)` once for each i in [0, tasks), in any order, on any thread. If tasks
+/// throw, the exception of the lowest-numbered one is rethrown here; tasks behind it may then be left out.
 void parallel_tasks(std::size_t tasks, const std::function<void(std::size_t)>& task);
 
 /// Calls `body(begin, end)` over consecutive pieces of [0, count) of at most `grain` elements each.
