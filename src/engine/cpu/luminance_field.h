@@ -2,42 +2,17 @@
 /// Stage 1's field on the CPU: hash grid + density net -> density and geometry feature; feature and spherical harmonics
 /// of the direction -> luminance net (paper, Eq. monochromenerf, with the hash grid in place of positional encoding).
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include "encoding/spherical_harmonics_math.h"
 #include "src/engine/cpu/hash_grid.h"
 #include "src/engine/cpu/mlp.h"
+#include "src/field/density_activation.h"
+#include "src/field/luminance_activation.h"
 #include "src/render/ray.h"
 
 namespace cnerf {
-
-inline constexpr int kGeometryChannels = 16;  ///< outputs of the density net; the first one is log density
-inline constexpr int kHiddenWidth = 64;
-
-/// Density of the density net's first output; 1/unit length. Clamped so that neither sigma nor its gradient overflows.
-template <typename Real>
-Real density_from_raw(Real raw, Real scale) {
-  return std::exp(std::clamp(raw, Real(-15), Real(15))) * scale;
-}
-
-/// Luminance of the luminance net's output: the cube makes L* nearly linear in the sigmoid, so that the loss, which
-/// compares L*, sees a gradient of even size from black to white.
-template <typename Real>
-struct LuminanceActivation {
-  Real scale;  ///< luminance at sigmoid = 1
-
-  [[nodiscard]] Real value(Real raw) const {
-    const Real s = Real(1) / (Real(1) + std::exp(-raw));
-    return scale * s * s * s;
-  }
-  [[nodiscard]] Real derivative(Real raw) const {
-    const Real s = Real(1) / (Real(1) + std::exp(-raw));
-    return Real(3) * scale * s * s * s * (Real(1) - s);
-  }
-};
 
 /// Buffers for a block of samples; grouped arrays [G, C, 16].
 struct LuminanceWorkspace {
@@ -51,7 +26,7 @@ struct LuminanceWorkspace {
 
 class LuminanceFieldCpu {
  public:
-  LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float luminance_scale, std::uint64_t seed);
+  LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float max_luminance, std::uint64_t seed);
 
   /// Density only.  @param positions [G, 3, 16]  @param sigma [16 G]
   void density(const float* positions, std::size_t groups, LuminanceWorkspace& work, float* sigma) const;
