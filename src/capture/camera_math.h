@@ -73,12 +73,14 @@ CNERF_HD inline FisheyeRadius fisheye_radius(const std::array<double, 8>& k, dou
 }
 
 CNERF_HD inline double fisheye_angle(const std::array<double, 8>& k, double radius) {
-  double theta = std::min(radius, std::numbers::pi);
+  constexpr double pi = std::numbers::pi;
+  const double most = pi;
+  double theta = std::min(radius, most);
   for (int step = 0; step < kNewtonSteps; ++step) {
     const FisheyeRadius r = fisheye_radius(k, theta);
     if (std::abs(r.slope) < 1e-12) break;
     const double move = (r.value - radius) / r.slope;
-    theta = std::clamp(theta - move, 0.0, std::numbers::pi);
+    theta = std::clamp(theta - move, 0.0, most);
     if (std::abs(move) < kNewtonTolerance) break;
   }
   return theta;
