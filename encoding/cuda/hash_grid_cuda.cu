@@ -7,15 +7,15 @@ namespace cnerf {
 namespace {
 
 constexpr int kThreads = 256;
-constexpr int kRun = 16;   // successive samples of eight threads of the backward kernel
+constexpr int kRun = 16;    // successive samples of eight threads of the backward kernel
 constexpr int kLoaded = 4;  // of them at once
 
 unsigned blocks_for(std::uint32_t items) {
   return (items + kThreads - 1) / kThreads;
 }
 
-__global__ void encode(const __grid_constant__ GridLevels levels, const uint2* __restrict__ table, const float4* __restrict__ places,
-                       const std::uint32_t* count, uint2* __restrict__ encoded) {
+__global__ void encode(const __grid_constant__ GridLevels levels, const uint2* __restrict__ table,
+                       const float4* __restrict__ places, const std::uint32_t* count, uint2* __restrict__ encoded) {
   const std::uint32_t sample = blockIdx.x * kThreads + threadIdx.x;
   if (sample >= *count) return;
   const float4 place = places[sample];
@@ -67,8 +67,9 @@ void encode_cuda(const std::vector<GridLevel>& levels, const void* table, const 
 void encode_backward_cuda(const std::vector<GridLevel>& levels, const float* places, SampleCount samples,
                           const void* d_encoded, float* d_table, cudaStream_t stream) {
   const dim3 grid(blocks_for((samples.most + kRun - 1) / kRun * 8), unsigned(levels.size()));
-  scatter<<<grid, kThreads, 0, stream>>>(GridLevels(levels.data(), levels.size()), reinterpret_cast<const float4*>(places), samples.count,
-                                         samples.most, static_cast<const uint2*>(d_encoded), d_table);
+  scatter<<<grid, kThreads, 0, stream>>>(GridLevels(levels.data(), levels.size()),
+                                         reinterpret_cast<const float4*>(places), samples.count, samples.most,
+                                         static_cast<const uint2*>(d_encoded), d_table);
 }
 
 }  // namespace cnerf

@@ -40,8 +40,8 @@ __device__ inline uint2 halves_of(float4 v) {
   return make_uint2(*reinterpret_cast<const unsigned*>(&low), *reinterpret_cast<const unsigned*>(&high));
 }
 
-/// Features of one position at one level. (Loading neighbours along x together where they share 16 bytes saves a quarter
-/// of the loads, but was a fifth slower.)
+/// Features of one position at one level. (Loading neighbours along x together where they share 16 bytes saves a
+/// quarter of the loads, but was a fifth slower.)
 /// @param table  [rows, 4] halves, of all levels
 __device__ inline float4 gather(const GridLevel& level, const uint2* __restrict__ table, const float position[3]) {
   const uint2* rows = table + level.first_row;
@@ -67,8 +67,9 @@ __device__ inline void add_to_row(float* row, float4 value) {
 #endif
 }
 
-/// The gradient of one corner of a cell, gathered over successive samples in the cell: a ray visits the same one several
-/// times in a row. Eight lanes share a run of samples, a corner each, so that neighbouring rows are written together.
+/// The gradient of one corner of a cell, gathered over successive samples in the cell: a ray visits the same one
+/// several times in a row. Eight lanes share a run of samples, a corner each, so that neighbouring rows are written
+/// together.
 class CornerRun {
  public:
   /// @param corner  0..7, bit 0 = upper in x

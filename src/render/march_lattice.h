@@ -1,6 +1,6 @@
 #pragma once
-/// The points a ray may be sampled at, by number. RayMarcher walks them one after another; a kernel asks for 32 at once.
-/// Steps are dt(t) = clamp(cone_angle t, dt_min, dt_max): constant, then geometric, then constant again.
+/// The points a ray may be sampled at, by number. RayMarcher walks them one after another; a kernel asks for 32 at
+/// once. Steps are dt(t) = clamp(cone_angle t, dt_min, dt_max): constant, then geometric, then constant again.
 
 #include <cmath>
 
@@ -23,7 +23,8 @@ class MarchLattice {
     growing_at_ = first_ >= growing ? 0 : static_cast<int>(std::ceil((growing - first_) / settings.dt_min));
     growing_t_ = first_ + static_cast<float>(growing_at_) * settings.dt_min;
     constant_at_ = growing_at_;
-    if (growing_t_ < constant) constant_at_ += static_cast<int>(std::ceil(std::log2(constant / growing_t_) / log2_growth_));
+    if (growing_t_ < constant)
+      constant_at_ += static_cast<int>(std::ceil(std::log2(constant / growing_t_) / log2_growth_));
     constant_t_ = growing_t_ * std::exp2(static_cast<float>(constant_at_ - growing_at_) * log2_growth_);
   }
 

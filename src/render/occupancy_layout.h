@@ -10,8 +10,8 @@
 
 namespace cnerf {
 
-inline constexpr float kExcludedCell = -1.0f;   ///< density of a cell that is empty for good
-inline constexpr float kNeverSeenCell = 1e9f;   ///< before its first look, a cell counts as occupied
+inline constexpr float kExcludedCell = -1.0f;  ///< density of a cell that is empty for good
+inline constexpr float kNeverSeenCell = 1e9f;  ///< before its first look, a cell counts as occupied
 
 /// Where in a cell an update looks: at 3 cell .. 3 cell + 2.
 [[nodiscard]] CNERF_HD inline CounterRng occupancy_rng(std::uint64_t jitter_seed) {
@@ -28,7 +28,9 @@ struct OccupancyLayout {
       : resolution(cells_a_side), cascades(n_cascades), innermost(std::ldexp(1.0f, 1 - n_cascades)) {}
 
   /// Side of a cascade's cube, unit space.
-  [[nodiscard]] CNERF_HD float side(int cascade) const { return static_cast<float>(1u << unsigned(cascade)) * innermost; }
+  [[nodiscard]] CNERF_HD float side(int cascade) const {
+    return static_cast<float>(1u << unsigned(cascade)) * innermost;
+  }
   [[nodiscard]] CNERF_HD float cell_side(int cascade) const { return side(cascade) / static_cast<float>(resolution); }
 
   /// The innermost cascade whose box holds `p`, of [0, 1]^3.
@@ -40,9 +42,7 @@ struct OccupancyLayout {
     return k;
   }
   /// Index of the cell that holds `p`, over all cascades, x fastest.
-  [[nodiscard]] CNERF_HD std::size_t cell_of(int cascade, Vec3f p) const {
-    return index_of(cascade, p, resolution);
-  }
+  [[nodiscard]] CNERF_HD std::size_t cell_of(int cascade, Vec3f p) const { return index_of(cascade, p, resolution); }
   /// Index of the aligned cube of `8^3` cells that holds `p`.
   [[nodiscard]] CNERF_HD std::size_t block_of(int cascade, Vec3f p) const {
     return index_of(cascade, p, resolution / 8);

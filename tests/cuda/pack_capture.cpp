@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
   int held_out = 0;
   for (const auto& view : packed.capture.views) held_out += view.held_out ? 1 : 0;
   std::printf("%zu views of %dx%d, %d held out, %d cascades\n", packed.capture.views.size(),
-              packed.capture.views[0].image.width, packed.capture.views[0].image.height, held_out, packed.frame.cascades);
+              packed.capture.views[0].image.width, packed.capture.views[0].image.height, held_out,
+              packed.frame.cascades);
   return 0;
 }

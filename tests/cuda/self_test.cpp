@@ -124,7 +124,8 @@ void check_hash_grid(int levels, int log2_rows) {
   }
   const auto d_gradient = uploaded(d_bfloat, "test");
   DeviceBuffer<float> gradient(table.size(), "test");
-  encode_backward_cuda(layout, d_places.data(), {d_count.data(), capacity}, d_gradient.data(), gradient.data(), nullptr);
+  encode_backward_cuda(layout, d_places.data(), {d_count.data(), capacity}, d_gradient.data(), gradient.data(),
+                       nullptr);
   CNERF_CUDA(cudaDeviceSynchronize());
   // Positions as floats on both sides: cells and weights are then the same but for the last bit.
   std::vector<double> exact_positions(positions.begin(), positions.end());
@@ -195,7 +196,8 @@ void check_engine(const Problem& problem) {
   expect_below("trained samples", off(found.report.trained_samples, expected.report.trained_samples), 5e-3);
   expect_below("loss", std::abs(found.report.loss - expected.report.loss) / expected.report.loss, 5e-3);
   expect_below("squared error",
-               std::abs(found.report.squared_error - expected.report.squared_error) / expected.report.squared_error, 5e-3);
+               std::abs(found.report.squared_error - expected.report.squared_error) / expected.report.squared_error,
+               5e-3);
   expect_below("gradient of the table", relative_distance(found.table, expected.table), 3e-2);
   expect_below("gradient of the nets", relative_distance(found.weights, expected.weights), 3e-2);
   std::vector<float> flipped = found.weights;
@@ -265,8 +267,8 @@ void check_engine(const Problem& problem) {
     };
     if (of_cpu[i].name == "counters") continue;
     const bool is_second = of_cpu[i].name.find("moments") != std::string::npos;
-    expect_below(("after a step: " + of_cpu[i].name).c_str(),
-                 relative_distance(floats(of_cuda[i]), floats(of_cpu[i])), is_second ? 3e-2 : 1e-2);
+    expect_below(("after a step: " + of_cpu[i].name).c_str(), relative_distance(floats(of_cuda[i]), floats(of_cpu[i])),
+                 is_second ? 3e-2 : 1e-2);
   }
 
   LuminanceEngineCuda fresh(options);

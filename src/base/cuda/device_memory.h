@@ -35,8 +35,8 @@ class DeviceBuffer {
       std::size_t free = 0, total = 0;
       cudaMemGetInfo(&free, &total);
       const auto mib = [](std::size_t bytes) { return std::to_string((bytes + (1u << 20) - 1) >> 20) + " MiB"; };
-      throw DeviceError("out of GPU memory: " + mib(size * sizeof(T)) + " wanted for " + use + ", " + mib(free) + " of " +
-                        mib(total) + " free");
+      throw DeviceError("out of GPU memory: " + mib(size * sizeof(T)) + " wanted for " + use + ", " + mib(free) +
+                        " of " + mib(total) + " free");
     }
     cuda_check(result, "cudaMalloc");
     CNERF_CUDA(cudaMemset(data_, 0, size * sizeof(T)));

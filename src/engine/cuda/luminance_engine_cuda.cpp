@@ -19,8 +19,8 @@ constexpr float kTrainingTransmittance = 1e-4f;  // a training ray ends below th
 constexpr int kOccupancyEvery = 16;              // steps
 constexpr int kOccupancyWarmUp = 256;            // steps during which the grid is looked at more densely
 constexpr std::uint32_t kMostRays = 1 << 16;
-constexpr std::uint32_t kRaysAtATime = 1 << 18;   // of a rendering
-constexpr std::uint32_t kPointsAtATime = 1 << 20; // of a query
+constexpr std::uint32_t kRaysAtATime = 1 << 18;    // of a rendering
+constexpr std::uint32_t kPointsAtATime = 1 << 20;  // of a query
 constexpr long kMostAhead = kStepRing / 2;
 
 const char* const kGridAdvice = "the hash grid; lower stage1.grid.log2_rows or stage1.grid.levels";
@@ -91,9 +91,9 @@ struct LuminanceEngineCuda::Memory {
     visit(table), visit(d_table), visit(moments), visit(halves), visit(density), visit(density_first),
         visit(density_second), visit(luminance), visit(luminance_first), visit(luminance_second), visit(forward),
         visit(backward), visit(last_layer), visit(d_weights), visit(state), visit(places), visit(gradients),
-        visit(encoded), visit(d_encoded), visit(rays), visit(directions), visit(cells), visit(bits), visit(render_bits), visit(totals),
-        visit(trace_state), visit(plain_rays), visit(trace_rays), visit(trace_directions), visit(results),
-        visit(weighted), visit(traced), visit(points), visit(point_directions), visit(answers);
+        visit(encoded), visit(d_encoded), visit(rays), visit(directions), visit(cells), visit(bits), visit(render_bits),
+        visit(totals), visit(trace_state), visit(plain_rays), visit(trace_rays), visit(trace_directions),
+        visit(results), visit(weighted), visit(traced), visit(points), visit(point_directions), visit(answers);
   }
 };
 
@@ -106,12 +106,11 @@ struct LuminanceEngineCuda::Views {
 
   /// Whether these are the same images and cameras.
   [[nodiscard]] bool holds(const std::vector<TrainingView>& views) const {
-    return std::equal(views.begin(), views.end(), source.begin(), source.end(),
-                      [](const TrainingView& a, const TrainingView& b) {
-                        return a.image == b.image && a.camera.intrinsics == b.camera.intrinsics &&
-                               a.camera.origin == b.camera.origin &&
-                               a.camera.unit_from_camera == b.camera.unit_from_camera;
-                      });
+    return std::equal(
+        views.begin(), views.end(), source.begin(), source.end(), [](const TrainingView& a, const TrainingView& b) {
+          return a.image == b.image && a.camera.intrinsics == b.camera.intrinsics &&
+                 a.camera.origin == b.camera.origin && a.camera.unit_from_camera == b.camera.unit_from_camera;
+        });
   }
 };
 
@@ -238,12 +237,12 @@ void LuminanceEngineCuda::grid_backward(cudaStream_t stream) {
 
 void LuminanceEngineCuda::update_nets(cudaStream_t stream, bool only_pack) {
   const Memory& m = *memory_;
-  field_update({int(levels_.size()), only_pack ? nullptr : m.d_weights.data(), field_backward_blocks(),
-                &m.state.data()->adam, m.density.data(), m.density_first.data(), m.density_second.data(),
-                m.luminance.data(), m.luminance_first.data(), m.luminance_second.data(),
-                reinterpret_cast<uint2*>(m.forward.data()), reinterpret_cast<uint2*>(m.backward.data()),
-                m.last_layer.data()},
-               stream);
+  field_update(
+      {int(levels_.size()), only_pack ? nullptr : m.d_weights.data(), field_backward_blocks(), &m.state.data()->adam,
+       m.density.data(), m.density_first.data(), m.density_second.data(), m.luminance.data(), m.luminance_first.data(),
+       m.luminance_second.data(), reinterpret_cast<uint2*>(m.forward.data()),
+       reinterpret_cast<uint2*>(m.backward.data()), m.last_layer.data()},
+      stream);
 }
 
 void LuminanceEngineCuda::update_table(cudaStream_t stream) {
@@ -503,8 +502,8 @@ void LuminanceEngineCuda::render_view(const UnitCamera& camera, const MarchSetti
   }
   trace_to_results(trace, m.stream);
   if (!results.empty()) {
-    CNERF_CUDA(cudaMemcpyAsync(results.data(), m.results.data(), count * sizeof(RayResult), cudaMemcpyDeviceToHost,
-                               m.stream));
+    CNERF_CUDA(
+        cudaMemcpyAsync(results.data(), m.results.data(), count * sizeof(RayResult), cudaMemcpyDeviceToHost, m.stream));
   }
   m.wait();
 }
@@ -563,8 +562,8 @@ void LuminanceEngineCuda::query_density(std::span<const Vec3f> positions, std::s
   if (m.answers.size() < most) m.answers = {most, "points"};
   for (std::size_t first = 0; first < positions.size(); first += most) {
     const std::size_t count = std::min(most, positions.size() - first);
-    CNERF_CUDA(cudaMemcpyAsync(m.points.data(), positions.data() + first, count * sizeof(Vec3f),
-                               cudaMemcpyHostToDevice, m.stream));
+    CNERF_CUDA(cudaMemcpyAsync(m.points.data(), positions.data() + first, count * sizeof(Vec3f), cudaMemcpyHostToDevice,
+                               m.stream));
     query_field(field(), m.points.data(), nullptr, std::uint32_t(count), m.answers.data(), nullptr, m.stream);
     CNERF_CUDA(cudaMemcpyAsync(sigma.data() + first, m.answers.data(), count * sizeof(float), cudaMemcpyDeviceToHost,
                                m.stream));
@@ -584,8 +583,8 @@ void LuminanceEngineCuda::query_luminance(std::span<const Vec3f> positions, std:
   if (m.answers.size() < most) m.answers = {most, "points"};
   for (std::size_t first = 0; first < positions.size(); first += most) {
     const std::size_t count = std::min(most, positions.size() - first);
-    CNERF_CUDA(cudaMemcpyAsync(m.points.data(), positions.data() + first, count * sizeof(Vec3f),
-                               cudaMemcpyHostToDevice, m.stream));
+    CNERF_CUDA(cudaMemcpyAsync(m.points.data(), positions.data() + first, count * sizeof(Vec3f), cudaMemcpyHostToDevice,
+                               m.stream));
     CNERF_CUDA(cudaMemcpyAsync(m.point_directions.data(), directions.data() + first, count * sizeof(Vec3f),
                                cudaMemcpyHostToDevice, m.stream));
     query_field(field(), m.points.data(), m.point_directions.data(), std::uint32_t(count), nullptr, m.answers.data(),
@@ -598,14 +597,18 @@ void LuminanceEngineCuda::query_luminance(std::span<const Vec3f> positions, std:
 
 // State -------------------------------------------------------------------------------------------------------------
 
+void LuminanceEngineCuda::fetch_occupancy() const {
+  if (!occupancy_is_old_) return;
+  memory_->wait();
+  memory_->cells.download(occupancy_.densities().data(), occupancy_.densities().size());
+  occupancy_.refresh_bits();
+  occupancy_is_old_ = false;
+}
+
 const OccupancyGrid& LuminanceEngineCuda::occupancy() const {
+  if (!occupancy_is_old_) return occupancy_;  // asked for every point of a bake
   const std::lock_guard lock(mutex_);
-  if (occupancy_is_old_) {
-    memory_->wait();
-    memory_->cells.download(occupancy_.densities().data(), occupancy_.densities().size());
-    occupancy_.refresh_bits();
-    occupancy_is_old_ = false;
-  }
+  fetch_occupancy();
   return occupancy_;
 }
 
@@ -619,10 +622,10 @@ void LuminanceEngineCuda::exclude(const std::function<bool(Vec3f, float)>& wante
 }
 
 std::vector<StatePiece> LuminanceEngineCuda::state() {
-  static_cast<void>(occupancy());
   const std::lock_guard lock(mutex_);
   const Memory& m = *memory_;
   m.wait();
+  fetch_occupancy();
   const auto fetch = [](const DeviceBuffer<float>& from, std::vector<float>& to) {
     from.download(to.data(), to.size());
   };

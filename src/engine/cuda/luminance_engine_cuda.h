@@ -3,7 +3,7 @@
 /// its gradient), nets backward, hash grid backward, Adam. The host only says the learning rate and never waits for a
 /// step, except that it keeps no more than a few ahead.
 
-#include <array>
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -71,6 +71,7 @@ class LuminanceEngineCuda final : public LuminanceEngine {
 
   void upload_views(const std::vector<TrainingView>& views);
   void look_at_occupancy(cudaStream_t stream);
+  void fetch_occupancy() const;
   void draw(cudaStream_t stream);
   void follow_rays(cudaStream_t stream);
   void nets_backward(cudaStream_t stream);
@@ -97,7 +98,7 @@ class LuminanceEngineCuda final : public LuminanceEngine {
 
   // What the host knows of the GPU's state, when asked for it.
   mutable OccupancyGrid occupancy_;
-  mutable bool occupancy_is_old_ = false;
+  mutable std::atomic<bool> occupancy_is_old_ = false;
   struct HostState {
     std::vector<float> table, moments, density, density_first, density_second, luminance, luminance_first,
         luminance_second;

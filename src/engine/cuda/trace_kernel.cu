@@ -28,10 +28,11 @@ __device__ Vec3f in_box(Vec3f p) {
 
 /// Optical depths of a run of samples, and with them the light that comes through.
 struct RunOptics {
-  float depth;         ///< sigma dt of this lane's sample; 0 where there is none
-  float depth_through; ///< of everything up to and including it
+  float depth;          ///< sigma dt of this lane's sample; 0 where there is none
+  float depth_through;  ///< of everything up to and including it
 
-  __device__ RunOptics(float depth_before, float own) : depth(own), depth_through(depth_before + warp_prefix_sum(own)) {}
+  __device__ RunOptics(float depth_before, float own)
+      : depth(own), depth_through(depth_before + warp_prefix_sum(own)) {}
   [[nodiscard]] __device__ float transmittance_after() const { return expf(-depth_through); }
   [[nodiscard]] __device__ float weight() const { return expf(depth - depth_through) * alpha_of(depth, 1.0f); }
   [[nodiscard]] __device__ float total() const { return __shfl_sync(~0u, depth_through, 31); }
@@ -40,7 +41,7 @@ struct RunOptics {
 /// What a ray has gathered so far. Runs lie in memory one after another, or wherever there was room; lane r knows where
 /// run r begins.
 struct RayProgress {
-  float depth = 0;                   ///< optical
+  float depth = 0;                      ///< optical
   float luminance = 0, weighted_t = 0;  ///< this lane's share
   int samples = 0, marched = 0;
   std::uint32_t run_begin = 0;
@@ -104,8 +105,8 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
     const float value = job.field.activation.value(stored.y);
     const float weight = optics.weight();
     const float through = composited + warp_prefix_sum(weight * value);
-    const float d_log_density = stored.x * d_seen *
-                                density_derivative(1.0f, optics.transmittance_after(), value, seen - through);
+    const float d_log_density =
+        stored.x * d_seen * density_derivative(1.0f, optics.transmittance_after(), value, seen - through);
     const float d_raw = d_seen * weight * job.field.activation.derivative(stored.y);
     if (mine) job.samples.gradients[at] = make_float2(d_raw, d_log_density);
     depth = optics.total();
@@ -171,8 +172,8 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
 }
 
 template <int KT, Keep kKeep>
-__global__ void __launch_bounds__(kThreads, 2) trace(const __grid_constant__ GridLevels levels,
-                                                     const __grid_constant__ TraceJob job) {
+__global__ void __launch_bounds__(kThreads, 2)
+    trace(const __grid_constant__ GridLevels levels, const __grid_constant__ TraceJob job) {
   extern __shared__ uint4 memory[];
   auto& shared = *reinterpret_cast<TraceShared<KT>*>(memory);
   shared.field.load(job.field.nets);
@@ -335,8 +336,7 @@ void launch_trace(const TraceJob& job, cudaStream_t stream) {
     constexpr int KT = decltype(tiles)::value;
     using Shared = TraceShared<KT>;
     const unsigned blocks = resident_blocks<Shared, trace<KT, kKeep>>();
-    trace<KT, kKeep><<<blocks, kThreads, sizeof(Shared), stream>>>(
-        levels_of(job.field), job);
+    trace<KT, kKeep><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(job.field), job);
     CNERF_CUDA(cudaGetLastError());
   });
 }
@@ -359,8 +359,8 @@ void query_field(const FieldView& field, const Vec3f* positions, const Vec3f* di
     constexpr int KT = decltype(tiles)::value;
     using Shared = QueryShared<KT>;
     const unsigned blocks = std::min(resident_blocks<Shared, query<KT>>(), (count + kThreads - 1) / kThreads);
-    query<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field,
-                                                            positions, directions, count, sigma, luminance);
+    query<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field, positions, directions, count,
+                                                            sigma, luminance);
     CNERF_CUDA(cudaGetLastError());
   });
 }
@@ -372,9 +372,8 @@ void update_occupancy(const FieldView& field, const OccupancyLayout& layout, con
     constexpr int KT = decltype(tiles)::value;
     using Shared = QueryShared<KT>;
     const unsigned blocks = resident_blocks<Shared, look_at_cells<KT>>();
-    look_at_cells<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field,
-                                                                    layout, options.decay, stride, phase,
-                                                                    occupancy_rng(jitter_seed), density);
+    look_at_cells<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field, layout, options.decay,
+                                                                    stride, phase, occupancy_rng(jitter_seed), density);
     CNERF_CUDA(cudaGetLastError());
   });
   refresh_occupancy_bits(layout, options, density, totals, bits, stream);

@@ -1,6 +1,6 @@
 #pragma once
-/// Kernels of the field are compiled for up to 4, 8, 12 and 16 levels: 16 encoded channels are one operand of the tensor
-/// cores.
+/// Kernels of the field are compiled for up to 4, 8, 12 and 16 levels: 16 encoded channels are one operand of the
+/// tensor cores.
 
 #include <type_traits>
 

@@ -13,9 +13,9 @@ namespace {
 // A weight gradient is shared out over the warps and stays in their registers until all tiles are done.
 constexpr int kWarps = 8;
 constexpr int kThreads = 32 * kWarps;
-constexpr int kTiles = 1;                         // of 16 rows a warp
-constexpr int kRows = 16 * kTiles * kWarps;       // of a block's tile
-constexpr int kWide = kHiddenWidth + 8;           // padded: 8 rows fall into different banks
+constexpr int kTiles = 1;                    // of 16 rows a warp
+constexpr int kRows = 16 * kTiles * kWarps;  // of a block's tile
+constexpr int kWide = kHiddenWidth + 8;      // padded: 8 rows fall into different banks
 constexpr int kFeatureStride = 32 + 8;
 
 template <int KT>
@@ -38,7 +38,8 @@ __device__ std::uint32_t positive_bits(const std::uint32_t (&halves)[4][4]) {
   for (int k = 0; k < 4; ++k) {
 #pragma unroll
     for (int r = 0; r < 4; ++r) {
-      const std::uint32_t mask = __hgt2_mask(*reinterpret_cast<const __half2*>(&halves[k][r]), __half2half2(__half(0.0f)));
+      const std::uint32_t mask =
+          __hgt2_mask(*reinterpret_cast<const __half2*>(&halves[k][r]), __half2half2(__half(0.0f)));
       bits |= mask & (0x00010001u << (4 * k + r));
     }
   }
@@ -154,12 +155,12 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
       }
       std::uint32_t hidden[kTiles][4][4];
       dense<Half, kTiles, KT, 4>(in, shared.forward + Shape::kPackedDensity1,
-                                 [&](int m, int i, const float (&s)[2][4]) { pack_relu<Half>(s, hidden[m][i]); });
+                                 [&](int m, int i, const float(&s)[2][4]) { pack_relu<Half>(s, hidden[m][i]); });
       dense<Half, kTiles, 4, 1>(hidden, shared.forward + Shape::kPackedDensity2,
-                                [&](int m, int, const float (&s)[2][4]) { pack_operand<Half>(s, features[m][0]); });
+                                [&](int m, int, const float(&s)[2][4]) { pack_operand<Half>(s, features[m][0]); });
       std::uint32_t first[kTiles][4][4];
       dense<Half, kTiles, 2, 4>(features, shared.forward + Shape::kPackedLuminance1,
-                                [&](int m, int i, const float (&s)[2][4]) { pack_relu<Half>(s, first[m][i]); });
+                                [&](int m, int i, const float(&s)[2][4]) { pack_relu<Half>(s, first[m][i]); });
 #pragma unroll
       for (int m = 0; m < kTiles; ++m) {
         const int row = 16 * (warp * kTiles + m);
@@ -170,20 +171,20 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
         store_halves<kWide, 4>(shared.first, row, first[m]);
       }
       // The last layer has one output, so its gradients are products, not matrices.
-      dense<Half, kTiles, 4, 4>(first, shared.forward + Shape::kPackedLuminance2,
-                                [&](int m, int i, const float (&s)[2][4]) {
+      dense<Half, kTiles, 4, 4>(
+          first, shared.forward + Shape::kPackedLuminance2, [&](int m, int i, const float(&s)[2][4]) {
 #pragma unroll
-        for (int block = 0; block < 2; ++block) {
-          const float2 w = *reinterpret_cast<const float2*>(&shared.last_layer[16 * i + 8 * block + 2 * t]);
+            for (int block = 0; block < 2; ++block) {
+              const float2 w = *reinterpret_cast<const float2*>(&shared.last_layer[16 * i + 8 * block + 2 * t]);
 #pragma unroll
-          for (int half = 0; half < 2; ++half) {
-            const float d = d_raw[m][half].x, left = s[block][2 * half], right = s[block][2 * half + 1];
-            d_last[i][block][0] += d * fmaxf(left, 0.0f);
-            d_last[i][block][1] += d * fmaxf(right, 0.0f);
-            d_second[m][i][2 * block + half] = Bfloat::pack(left > 0 ? d * w.x : 0.0f, right > 0 ? d * w.y : 0.0f);
-          }
-        }
-      });
+              for (int half = 0; half < 2; ++half) {
+                const float d = d_raw[m][half].x, left = s[block][2 * half], right = s[block][2 * half + 1];
+                d_last[i][block][0] += d * fmaxf(left, 0.0f);
+                d_last[i][block][1] += d * fmaxf(right, 0.0f);
+                d_second[m][i][2 * block + half] = Bfloat::pack(left > 0 ? d * w.x : 0.0f, right > 0 ? d * w.y : 0.0f);
+              }
+            }
+          });
     }
 #pragma unroll
     for (int m = 0; m < kTiles; ++m) {
@@ -195,59 +196,61 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
     // Luminance net, second layer.
     std::uint32_t d_first[kTiles][4][4];
     dense<Bfloat, kTiles, 4, 4>(d_second, shared.backward + Shape::kPackedLuminance2,
-                                [&](int m, int i, const float (&s)[2][4]) {
-      pack_operand<Bfloat>(s, d_first[m][i]);
+                                [&](int m, int i, const float(&s)[2][4]) {
+                                  pack_operand<Bfloat>(s, d_first[m][i]);
 #pragma unroll
-      for (int r = 0; r < 4; ++r) d_first[m][i][r] = gate(d_first[m][i][r], first_bits[m], i, r);
-      store_rows(shared.gradient[1], 16 * (warp * kTiles + m), 16 * i, d_first[m][i]);
-    });
+                                  for (int r = 0; r < 4; ++r)
+                                    d_first[m][i][r] = gate(d_first[m][i][r], first_bits[m], i, r);
+                                  store_rows(shared.gradient[1], 16 * (warp * kTiles + m), 16 * i, d_first[m][i]);
+                                });
     add_weight_gradient(d_luminance2, shared.gradient[0], out, shared.first, 32 * part);
     __syncthreads();
 
     // Luminance net, first layer; nothing is wanted of the direction. Log density joins the geometry's gradient.
     std::uint32_t d_geometry[kTiles][1][4];
     dense<Bfloat, kTiles, 4, 1>(d_first, shared.backward + Shape::kPackedLuminance1,
-                                [&](int m, int, const float (&s)[2][4]) {
-      float sums[2][4];
+                                [&](int m, int, const float(&s)[2][4]) {
+                                  float sums[2][4];
 #pragma unroll
-      for (int i = 0; i < 8; ++i) sums[i / 4][i % 4] = s[i / 4][i % 4];
-      if (t == 0) {
-        sums[0][0] += d_raw[m][0].y;
-        sums[0][2] += d_raw[m][1].y;
-      }
-      pack_operand<Bfloat>(sums, d_geometry[m][0]);
-      store_rows(shared.gradient[0], 16 * (warp * kTiles + m), 0, d_geometry[m][0]);
-    });
+                                  for (int i = 0; i < 8; ++i) sums[i / 4][i % 4] = s[i / 4][i % 4];
+                                  if (t == 0) {
+                                    sums[0][0] += d_raw[m][0].y;
+                                    sums[0][2] += d_raw[m][1].y;
+                                  }
+                                  pack_operand<Bfloat>(sums, d_geometry[m][0]);
+                                  store_rows(shared.gradient[0], 16 * (warp * kTiles + m), 0, d_geometry[m][0]);
+                                });
     add_weight_gradient(d_luminance1, shared.gradient[1], out, shared.features, 16 * part);
     __syncthreads();
 
     // Density net, second layer.
     std::uint32_t d_hidden[kTiles][4][4];
     dense<Bfloat, kTiles, 1, 4>(d_geometry, shared.backward + Shape::kPackedDensity2,
-                                [&](int m, int i, const float (&s)[2][4]) {
-      pack_operand<Bfloat>(s, d_hidden[m][i]);
+                                [&](int m, int i, const float(&s)[2][4]) {
+                                  pack_operand<Bfloat>(s, d_hidden[m][i]);
 #pragma unroll
-      for (int r = 0; r < 4; ++r) d_hidden[m][i][r] = gate(d_hidden[m][i][r], hidden_bits[m], i, r);
-      store_rows(shared.gradient[1], 16 * (warp * kTiles + m), 16 * i, d_hidden[m][i]);
-    });
+                                  for (int r = 0; r < 4; ++r)
+                                    d_hidden[m][i][r] = gate(d_hidden[m][i][r], hidden_bits[m], i, r);
+                                  store_rows(shared.gradient[1], 16 * (warp * kTiles + m), 16 * i, d_hidden[m][i]);
+                                });
     add_weight_gradient(d_density2, shared.gradient[0], 0, shared.hidden, 8 * warp);
     __syncthreads();
 
     // Density net, first layer, and what the hash grid's levels receive.
-    dense<Bfloat, kTiles, 4, KT>(d_hidden, shared.backward + Shape::kPackedDensity1,
-                                 [&](int m, int i, const float (&s)[2][4]) {
+    dense<Bfloat, kTiles, 4, KT>(
+        d_hidden, shared.backward + Shape::kPackedDensity1, [&](int m, int i, const float(&s)[2][4]) {
 #pragma unroll
-      for (int block = 0; block < 2; ++block) {
-        const int level = 4 * i + 2 * block + t / 2;  // four channels a level: two lanes
-        if (level >= job.levels) continue;
+          for (int block = 0; block < 2; ++block) {
+            const int level = 4 * i + 2 * block + t / 2;  // four channels a level: two lanes
+            if (level >= job.levels) continue;
 #pragma unroll
-        for (int half = 0; half < 2; ++half) {
-          if (sample[m][half] >= n) continue;
-          d_encoded[(std::size_t(level) * job.samples.most + sample[m][half]) * 2 + t % 2] =
-              Bfloat::pack(s[block][2 * half], s[block][2 * half + 1]);
-        }
-      }
-    });
+            for (int half = 0; half < 2; ++half) {
+              if (sample[m][half] >= n) continue;
+              d_encoded[(std::size_t(level) * job.samples.most + sample[m][half]) * 2 + t % 2] =
+                  Bfloat::pack(s[block][2 * half], s[block][2 * half + 1]);
+            }
+          }
+        });
     add_weight_gradient(d_density1, shared.gradient[1], out, shared.encoded, 8 * KT * part);
     __syncthreads();
   }

@@ -70,7 +70,7 @@ class FieldNets {
   __device__ float density(WarpField<KT>& warp) const {
     std::uint32_t hidden[kTiles][4][4];
     hidden_layer(warp, hidden);
-    geometry(warp, hidden, [](int, const float (&)[2][4]) {});
+    geometry(warp, hidden, [](int, const float(&)[2][4]) {});
     __syncwarp();
     return warp.density[threadIdx.x % 32];
   }
@@ -81,7 +81,7 @@ class FieldNets {
     {
       std::uint32_t hidden[kTiles][4][4];
       hidden_layer(warp, hidden);
-      geometry(warp, hidden, [&](int m, const float (&sums)[2][4]) { pack_operand<Half>(sums, features[m][0]); });
+      geometry(warp, hidden, [&](int m, const float(&sums)[2][4]) { pack_operand<Half>(sums, features[m][0]); });
     }
 #pragma unroll
     for (int m = 0; m < kTiles; ++m) {
@@ -94,9 +94,9 @@ class FieldNets {
     }
     std::uint32_t first[kTiles][4][4], second[kTiles][4][4];
     dense<Half, kTiles, 2, 4>(features, weights_ + Shape::kPackedLuminance1,
-                              [&](int m, int n, const float (&sums)[2][4]) { pack_relu<Half>(sums, first[m][n]); });
+                              [&](int m, int n, const float(&sums)[2][4]) { pack_relu<Half>(sums, first[m][n]); });
     dense<Half, kTiles, 4, 4>(first, weights_ + Shape::kPackedLuminance2,
-                              [&](int m, int n, const float (&sums)[2][4]) { pack_relu<Half>(sums, second[m][n]); });
+                              [&](int m, int n, const float(&sums)[2][4]) { pack_relu<Half>(sums, second[m][n]); });
     luminance(warp, second);
     __syncwarp();
     return {warp.density[lane], warp.luminance[lane]};
@@ -114,12 +114,12 @@ class FieldNets {
       }
     }
     dense<Half, kTiles, KT, 4>(encoded, weights_ + Shape::kPackedDensity1,
-                               [&](int m, int n, const float (&sums)[2][4]) { pack_relu<Half>(sums, hidden[m][n]); });
+                               [&](int m, int n, const float(&sums)[2][4]) { pack_relu<Half>(sums, hidden[m][n]); });
   }
   template <typename Keep>
   __device__ void geometry(WarpField<KT>& warp, const std::uint32_t (&hidden)[kTiles][4][4], Keep&& keep) const {
     const unsigned lane = threadIdx.x % 32, g = lane / 4, t = lane % 4;
-    dense<Half, kTiles, 4, 1>(hidden, weights_ + Shape::kPackedDensity2, [&](int m, int, const float (&sums)[2][4]) {
+    dense<Half, kTiles, 4, 1>(hidden, weights_ + Shape::kPackedDensity2, [&](int m, int, const float(&sums)[2][4]) {
       if (t == 0) {
         warp.density[16 * m + g] = sums[0][0];
         warp.density[16 * m + g + 8] = sums[0][2];

@@ -1,6 +1,6 @@
 #pragma once
-/// Where the weights of stage 1's nets lie on the GPU: as floats for the optimiser, and packed in 16 bits in the order in
-/// which lanes read the tensor cores' right operands.
+/// Where the weights of stage 1's nets lie on the GPU: as floats for the optimiser, and packed in 16 bits in the order
+/// in which lanes read the tensor cores' right operands.
 
 #include <cstdint>
 
@@ -19,8 +19,8 @@ CNERF_HD constexpr int packed_place(int k, int n, int outputs) {
   return (((tile * 32 + lane) * 2) + k % 16 / 8) * 2 + k % 2;
 }
 
-/// The nets' layers in the order of their floats. The luminance net's last layer has one output that counts; it stays in
-/// floats.
+/// The nets' layers in the order of their floats. The luminance net's last layer has one output that counts; it stays
+/// in floats.
 enum class FieldLayer { kDensity1, kDensity2, kLuminance1, kLuminance2, kLuminance3 };
 
 /// @tparam KT  encoded channels / 16, rounded up; the missing ones have weight 0

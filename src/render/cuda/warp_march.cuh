@@ -1,6 +1,6 @@
 #pragma once
-/// Marching by a warp: 32 points of the ray's lattice are looked up at once, what is occupied queues up until there is a
-/// sample for every lane.
+/// Marching by a warp: 32 points of the ray's lattice are looked up at once, what is occupied queues up until there is
+/// a sample for every lane.
 
 #include <cstdint>
 
@@ -29,7 +29,10 @@ class WarpMarcher {
  public:
   __device__ WarpMarcher(const OccupiedSpace& space, const MarchSettings& settings, const RayRecord& record,
                          MarchQueue& queue)
-      : space_(space), queue_(queue), lattice_(settings, record.begin, record.jitter), ray_(record.ray),
+      : space_(space),
+        queue_(queue),
+        lattice_(settings, record.begin, record.jitter),
+        ray_(record.ray),
         end_(record.end) {}
 
   /// Hands out the next samples of the ray, one a lane; returns how many there are, 0 at the ray's end.
