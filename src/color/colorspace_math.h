@@ -50,6 +50,12 @@ CNERF_HD Real lab_f_inverse(Real f) {
   const Real cube = f * f * f;
   return cube > LabConstants<Real>::epsilon ? cube : (Real(116) * f - Real(16)) / LabConstants<Real>::kappa;
 }
+/// The derivative of `lab_f_inverse`.
+template <typename Real>
+CNERF_HD Real lab_f_inverse_derivative(Real f) {
+  const Real square = f * f;
+  return square * f > LabConstants<Real>::epsilon ? Real(3) * square : Real(116) / LabConstants<Real>::kappa;
+}
 
 /// L*, 0..100, of linear luminance Y (white = 1), and its derivative.
 template <typename Real>
@@ -63,6 +69,11 @@ CNERF_HD Real lightness_derivative(Real y) {
 template <typename Real>
 CNERF_HD Real luminance_from_lightness(Real lightness) {
   return lab_f_inverse((lightness + Real(16)) / Real(116));
+}
+/// d Y / d L*.
+template <typename Real>
+CNERF_HD Real luminance_derivative(Real lightness) {
+  return lab_f_inverse_derivative((lightness + Real(16)) / Real(116)) / Real(116);
 }
 
 /// Rec.709 luma coefficients of linear light: the Y row of the RGB -> XYZ matrix. Like all rows here it sums to 1 and

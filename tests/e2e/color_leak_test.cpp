@@ -75,7 +75,7 @@ class ColorLeak : public testing::Test {
     }
     paint(folder_ / "red", palette.red);
     paint(folder_ / "blue", palette.blue);
-    fs::copy_file(tiny_capture() / "reference.png", folder_ / "reference.png");
+    fs::copy_file(tiny_capture() / "references/view_001.png", folder_ / "reference.png");
   }
 
   TempDir folder_;

@@ -57,7 +57,7 @@ class LossInDouble {
     };
     const MlpReference<double> density_net = weights_at(0, density_);
     const MlpReference<double> luminance_net = weights_at(density_.weight_count(), luminance_);
-    const LuminanceActivation<double> activation = {1.05 * max_luminance_};
+    const auto activation = LuminanceActivation<double>::up_to(max_luminance_);
 
     double loss = 0;
     for (std::size_t r = 0; r < rays_.size(); ++r) {

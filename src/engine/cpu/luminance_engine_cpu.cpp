@@ -39,7 +39,7 @@ void pad_positions(AlignedVector<float>& positions, std::size_t samples) {
 
 LuminanceEngineCpu::LuminanceEngineCpu(const LuminanceEngineOptions& options)
     : options_(options),
-      field_(options.grid, 1.0f / std::ldexp(1.0f, 1 - options.cascades), 1.05f * options.max_luminance, options.seed),
+      field_(options.grid, 1.0f / std::ldexp(1.0f, 1 - options.cascades), options.max_luminance, options.seed),
       occupancy_(options.occupancy, options.cascades),
       counters_{0, std::clamp<std::int64_t>(options.samples_per_step / 256, 64, kMostRays)},
       chunks_(kChunks) {}

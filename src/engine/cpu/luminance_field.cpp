@@ -24,13 +24,13 @@ void LuminanceWorkspace::resize(std::size_t wanted_groups, int encoded_channels)
   for (auto* buffer : {&raw_luminance, &d_raw_luminance}) ensure_size(*buffer, lanes * kLuminanceOutputs);
 }
 
-LuminanceFieldCpu::LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float luminance_scale,
+LuminanceFieldCpu::LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float max_luminance,
                                      std::uint64_t seed)
     : grid_(grid, seed),
       density_net_({{grid_.channels(), kHiddenWidth, kGeometryChannels}}, seed, 1),
       luminance_net_({{kFeatureChannels, kHiddenWidth, kHiddenWidth, kLuminanceOutputs}}, seed, 2),
       density_scale_(density_scale),
-      luminance_activation_{luminance_scale} {}
+      luminance_activation_(LuminanceActivation<float>::up_to(max_luminance)) {}
 
 void LuminanceFieldCpu::density(const float* positions, std::size_t groups, LuminanceWorkspace& work,
                                 float* sigma) const {

@@ -10,6 +10,7 @@
 #include "encoding/spherical_harmonics_math.h"
 #include "src/engine/cpu/hash_grid.h"
 #include "src/engine/cpu/mlp.h"
+#include "src/field/luminance_activation.h"
 #include "src/render/ray.h"
 
 namespace cnerf {
@@ -23,22 +24,6 @@ Real density_from_raw(Real raw, Real scale) {
   return std::exp(std::clamp(raw, Real(-15), Real(15))) * scale;
 }
 
-/// Luminance of the luminance net's output: the cube makes L* nearly linear in the sigmoid, so that the loss, which
-/// compares L*, sees a gradient of even size from black to white.
-template <typename Real>
-struct LuminanceActivation {
-  Real scale;  ///< luminance at sigmoid = 1
-
-  [[nodiscard]] Real value(Real raw) const {
-    const Real s = Real(1) / (Real(1) + std::exp(-raw));
-    return scale * s * s * s;
-  }
-  [[nodiscard]] Real derivative(Real raw) const {
-    const Real s = Real(1) / (Real(1) + std::exp(-raw));
-    return Real(3) * scale * s * s * s * (Real(1) - s);
-  }
-};
-
 /// Buffers for a block of samples; grouped arrays [G, C, 16].
 struct LuminanceWorkspace {
   std::size_t groups = 0;
@@ -51,7 +36,7 @@ struct LuminanceWorkspace {
 
 class LuminanceFieldCpu {
  public:
-  LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float luminance_scale, std::uint64_t seed);
+  LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float max_luminance, std::uint64_t seed);
 
   /// Density only.  @param positions [G, 3, 16]  @param sigma [16 G]
   void density(const float* positions, std::size_t groups, LuminanceWorkspace& work, float* sigma) const;
