@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include "bake/bake_plan.h"
 #include "bake/volume_baker.h"
 #include "export/volume_export.h"
 #include "src/app/pipeline.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/usage.h"
 #include "src/evaluate/evaluate.h"
 
 namespace cnerf {
@@ -28,6 +30,12 @@ Picture grey_picture(const View& view) {
 std::string colorizer_name(const RunDirectory& directory, const std::string& take) {
   const auto record = directory.take_record(take);
   return record ? record->colorizer : "";
+}
+
+void note_time(const RunDirectory& directory, const char* step, const Stopwatch& watch) {
+  RunRecord record = directory.record();
+  record.seconds_of_steps[step] = watch.seconds();
+  directory.save(record);
 }
 
 void say_metrics(const Metrics& metrics, Reporter& reporter) {
@@ -92,6 +100,7 @@ class RenderFiles {
 
 void evaluate_step(const RunContext& context, const std::string& take) {
   const RunDirectory& directory = context.directory;
+  const Stopwatch watch;
   const auto scene = load_scene(directory, take);
   EvaluateOptions options;
   options.render = render_options(context.config);
@@ -113,11 +122,18 @@ void evaluate_step(const RunContext& context, const std::string& take) {
   say_metrics(metrics, context.reporter);
   context.reporter.wrote("metrics", directory.metrics_file());
   context.reporter.wrote("before and after", directory.contact_sheet());
+  note_time(directory, "evaluate", watch);
 }
 
 void bake_step(const RunContext& context, const std::string& take, const fs::path& folder) {
+  const Stopwatch watch;
   const auto scene = load_scene(context.directory, take);
   const std::vector<BakeCamera> cameras = cameras_of(context.capture);
+  const BakePlan plan = plan_bake(*scene, context.config.bake);
+  const BakeEstimate estimate = estimate_bake(*scene, plan);
+  context.reporter.say(fmt::format("bake: {} x {} x {} voxels, at most {:.1f} M of them filled; about {:.1f} GiB of memory",
+                                   plan.resolution.x, plan.resolution.y, plan.resolution.z, 1e-6 * double(estimate.voxels),
+                                   double(estimate.memory_bytes) / (1 << 30)));
   BakedVolume volume = bake_volume(*scene, cameras, context.config.bake, context.reporter.sink());
   volume.colorizer = colorizer_name(context.directory, take);
   volume.take = take;
@@ -125,10 +141,12 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   context.reporter.say(fmt::format("bake: {} voxels of {:.4g} world units", volume.voxels.size(), volume.voxel_size));
   context.reporter.wrote("volume", files.vdb);
   context.reporter.wrote("Blender set-up", files.blender_setup);
+  note_time(context.directory, "bake", watch);
 }
 
 void render_step(const RunContext& context, const std::string& take, const CameraPath& path,
                  const RenderOutput& output) {
+  const Stopwatch watch;
   const auto scene = load_scene(context.directory, take);
   RenderOptions options = render_options(context.config);
   options.color = scene->is_colorized() && output.color == ShownColor::kDecoded;
@@ -142,6 +160,7 @@ void render_step(const RunContext& context, const std::string& take, const Camer
     progress({"render " + path.name, double(i + 1) / double(path.cameras.size()), {}});
   }
   files.finish();
+  note_time(context.directory, "render", watch);
 }
 
 }  // namespace cnerf

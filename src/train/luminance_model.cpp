@@ -113,7 +113,7 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file) {
     throw SnapshotError(file.string() + ": header: " + problem.what());
   }
   model.max_luminance = header_field<float>(snapshot, "max_luminance");
-  model.seconds = header_field<double>(snapshot, "seconds");
+  model.seconds = load_times(file)["seconds"];
   model.trained_samples = header_field<double>(snapshot, "trained_samples");
   model.engine = make_engine(model.frame, model.options, model.max_luminance);
   snapshot.restore(model.engine->state());
@@ -126,10 +126,10 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
                 {{"frame", frame_to_json(frame)},
                  {"options", options_to_json(options)},
                  {"max_luminance", max_luminance},
-                 {"seconds", seconds},
                  {"trained_samples", trained_samples},
                  {"step", engine->step_count()}},
                 engine->state());
+  save_times(file, {{"seconds", seconds}});
 }
 
 }  // namespace cnerf

@@ -113,21 +113,6 @@ const fs::path& tiny_capture() {
   return capture;
 }
 
-std::string learnt_state(const fs::path& snapshot) {
-  constexpr std::size_t magic_and_version = 12, digest = 64;
-  const std::string content = read_text_file(snapshot);
-  std::uint64_t header_size = 0;
-  std::memcpy(&header_size, content.data() + magic_and_version, sizeof header_size);
-  const std::size_t header_begin = magic_and_version + sizeof header_size;
-  auto header = nlohmann::json::parse(content.substr(header_begin, header_size));
-  for (const char* clock : {"seconds", "colorizer_seconds", "stage1_sha256"}) {  // the last: of a file with clocks
-    header.erase(clock);
-    if (header.contains("report")) header["report"].erase(clock);
-  }
-  const std::size_t pieces_begin = header_begin + header_size;
-  return header.dump() + content.substr(pieces_begin, content.size() - pieces_begin - digest);
-}
-
 std::vector<std::string> files_below(const fs::path& folder) {
   std::vector<std::string> files;
   if (!fs::exists(folder)) return files;

@@ -25,10 +25,6 @@ struct ProgramResult {
 /// A sample capture of few, small views, made once for all tests of this process.
 [[nodiscard]] const std::filesystem::path& tiny_capture();
 
-/// A snapshot without what a clock wrote into its header (the time trained so far) and the checksum over that: two
-/// snapshots of the same training give the same bytes.
-[[nodiscard]] std::string learnt_state(const std::filesystem::path& snapshot);
-
 /// All files below a folder, relative, sorted.
 [[nodiscard]] std::vector<std::string> files_below(const std::filesystem::path& folder);
 
