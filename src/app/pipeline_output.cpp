@@ -131,9 +131,9 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   const std::vector<BakeCamera> cameras = cameras_of(context.capture);
   const BakePlan plan = plan_bake(*scene, context.config.bake);
   const BakeEstimate estimate = estimate_bake(*scene, plan);
-  context.reporter.say(fmt::format("bake: {} x {} x {} voxels, at most {:.1f} M of them filled; about {:.1f} GiB of memory",
-                                   plan.resolution.x, plan.resolution.y, plan.resolution.z, 1e-6 * double(estimate.voxels),
-                                   double(estimate.memory_bytes) / (1 << 30)));
+  context.reporter.say(fmt::format(
+      "bake: {} x {} x {} voxels, at most {:.1f} M of them filled; about {:.1f} GiB of memory", plan.resolution.x,
+      plan.resolution.y, plan.resolution.z, 1e-6 * double(estimate.voxels), double(estimate.memory_bytes) / (1 << 30)));
   BakedVolume volume = bake_volume(*scene, cameras, context.config.bake, context.reporter.sink());
   volume.colorizer = colorizer_name(context.directory, take);
   volume.take = take;

@@ -204,8 +204,8 @@ bool is_cut_out(const View& view) {
   return double(transparent) > kTransparentShare * double(view.image.pixel_count());
 }
 
-/// Where nothing is cut out, what is transparent was not seen (the border of an undistorted picture): to be ignored, not
-/// learnt as empty space.
+/// Where nothing is cut out, what is transparent was not seen (the border of an undistorted picture): to be ignored,
+/// not learnt as empty space.
 void mask_what_is_transparent(MonoImage& image) {
   if (image.alpha.empty()) return;
   if (image.mask.empty()) image.mask.assign(image.pixel_count(), 255);

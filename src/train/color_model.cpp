@@ -72,15 +72,14 @@ ColorModel ColorModel::load(const std::filesystem::path& file) {
 }
 
 void ColorModel::save(const std::filesystem::path& file) {
-  save_snapshot(file, kKind,
-                {{"options", options_to_json(options)},
-                 {"colorizer", colorizer},
-                 {"stage1_sha256", stage1_sha256},
-                 {"report",
-                  {{"accepted", report.accepted},
-                   {"rejected", report.rejected},
-                   {"bake_ab_distance", report.bake_ab_distance}}}},
-                state());
+  save_snapshot(
+      file, kKind,
+      {{"options", options_to_json(options)},
+       {"colorizer", colorizer},
+       {"stage1_sha256", stage1_sha256},
+       {"report",
+        {{"accepted", report.accepted}, {"rejected", report.rejected}, {"bake_ab_distance", report.bake_ab_distance}}}},
+      state());
   save_times(file, {{"seconds", report.seconds}, {"colorizer_seconds", report.colorizer_seconds}});
 }
 

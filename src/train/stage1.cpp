@@ -84,9 +84,7 @@ Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, 
     if (progress) {
       progress({"stage 1",
                 fraction,
-                {{"psnr", psnr.value()},
-                 {"rays/s", rays / watch.seconds()},
-                 {"samples", model.trained_samples}}});
+                {{"psnr", psnr.value()}, {"rays/s", rays / watch.seconds()}, {"samples", model.trained_samples}}});
     }
     if (interruption_requested()) {
       model.save(snapshot);

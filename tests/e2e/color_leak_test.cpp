@@ -101,7 +101,8 @@ TEST_F(ColorLeak, BothGiveTheSameSnapshotsByteForByte) {
         cnerf({"colorize", run, "--take", "t", "--colorizer", "reference:" + (folder_ / "reference.png").string()});
     ASSERT_EQ(colorized.exit_code, 0) << colorized.err;
   }
-  EXPECT_TRUE(read_binary_file(folder_ / "red-run/stage1.snapshot") == read_binary_file(folder_ / "blue-run/stage1.snapshot"));
+  EXPECT_TRUE(read_binary_file(folder_ / "red-run/stage1.snapshot") ==
+              read_binary_file(folder_ / "blue-run/stage1.snapshot"));
   EXPECT_TRUE(read_binary_file(folder_ / "red-run/takes/t/take.snapshot") ==
               read_binary_file(folder_ / "blue-run/takes/t/take.snapshot"));
 }

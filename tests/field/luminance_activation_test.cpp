@@ -25,8 +25,8 @@ TEST(LuminanceActivation, ReachesALittleBeyondTheBrightestAndDownToBlack) {
   EXPECT_GE(activation.value(-40), 0.0f);
 }
 
-/// The loss compares L*: its gradient with respect to the raw output is that of a plain sigmoid however dark it gets, so
-/// that what starts too bright or overshoots into black comes back.
+/// The loss compares L*: its gradient with respect to the raw output is that of a plain sigmoid however dark it gets,
+/// so that what starts too bright or overshoots into black comes back.
 TEST(LuminanceActivation, LightnessIsASigmoid) {
   const auto activation = LuminanceActivation<double>::up_to(1.0);
   for (double raw = -7; raw <= 7; raw += 0.5) {
