@@ -4,6 +4,7 @@
 #include "bake/density_pass.h"
 #include "bake/mesh/isosurface.h"
 #include "bake/mesh/refine.h"
+#include "bake/mesh/solidify.h"
 #include "bake/mesh/texture_baker.h"
 #include "src/base/error.h"
 
@@ -26,8 +27,8 @@ class MeshProgress {
   const ProgressSink& sink_;
 };
 
-SurfaceMesh make_surface(const DensityPass& density, const BakePlan& plan, const MeshOptions& options) {
-  SurfaceMesh surface = extract_surface(density.sigma, plan.voxel_size, options.surface_depth, options.adaptivity);
+SurfaceMesh make_surface(const BrickGrid<float>& sigma, const BakePlan& plan, const MeshOptions& options) {
+  SurfaceMesh surface = extract_surface(sigma, plan.voxel_size, options.surface_depth, options.adaptivity);
   if (surface.triangles.empty()) {
     throw InputError("mesh: nothing is opaque enough to have a surface; raise mesh.surface_depth, or check --aabb");
   }
@@ -54,7 +55,7 @@ BakedMesh bake_mesh(const ColorField& field, const std::vector<BakeCamera>& came
   const MeshProgress progress(sink);
   const BakePlan plan = plan_bake(field, bake);
   const DensityPass density = bake_density(field, plan, bake, progress.step(0, kDensityShare));
-  const SurfaceMesh surface = make_surface(density, plan, options);
+  const SurfaceMesh surface = make_surface(solidified(density.sigma, cameras, plan, bake), plan, options);
   const UnwrappedMesh unwrapped = unwrap(surface, options.texture_size, options.gutter);
   progress.step(kDensityShare, kSurfaceShare)(1);
 

@@ -12,7 +12,7 @@ struct MeshOptions {
   double smallest_part = 0.03;     ///< diagonal of a loose part, in diagonals of the whole, below which it is dropped
   int smoothing = 4;               ///< rounds of smoothing that keeps the volume, against voxel steps
   int texture_size = 2048;         ///< texels along a side
-  int gutter = 3;                  ///< texels around a chart that belong to no other
+  int gutter = 2;                  ///< texels around a chart that belong to no other
   int views_per_texel = 6;         ///< training views that a texel is averaged over, at most
   double ray_outside = 2.0;        ///< voxels outside the surface where a texel's ray starts
   double ray_inside = 4.0;         ///< voxels inside the surface where it ends

@@ -131,9 +131,7 @@ class ChartMaker {
 
   /// Lays faces into one plane; those that would overlap stay free for later patches.
   void lay_out(const std::vector<std::uint32_t>& faces) {
-    Vec3f sum{};
-    for (const std::uint32_t face : faces) sum += normals_[face] * areas_[face];
-    Patch patch{{}, plane_across(normalized(sum)), PlanarTriangles(cell_)};
+    Patch patch{{}, plane_across(mean_normal(faces)), PlanarTriangles(cell_)};
     const auto index = static_cast<std::uint32_t>(patches_.size());
     // The seed always fits an empty plane of its own.
     if (!faces_plane(faces.front(), patch.plane)) patch.plane = plane_across(normals_[faces.front()]);
@@ -148,17 +146,28 @@ class ChartMaker {
     patches_.push_back(std::move(patch));
   }
 
-  /// Small patches first, each into the neighbour with which it shares most edges and into which it fits.
+  /// Small patches first, each into the neighbour with which it shares most edges and into which it fits; again as
+  /// long as that leaves fewer.
   void merge_patches() {
+    constexpr int kRounds = 8;
+    for (int round = 0; round < kRounds && merge_once(); ++round) {
+    }
+  }
+
+  bool merge_once() {
+    bool merged = false;
     std::vector<std::uint32_t> order(patches_.size());
     std::iota(order.begin(), order.end(), 0u);
     std::stable_sort(order.begin(), order.end(),
                      [&](auto a, auto b) { return patches_[a].faces.size() < patches_[b].faces.size(); });
     for (const std::uint32_t patch : order) {
       for (const std::uint32_t target : neighbours_by_shared_edges(patch)) {
-        if (merge_into(patch, target)) break;
+        if (!merge_into(patch, target)) continue;
+        merged = true;
+        break;
       }
     }
+    return merged;
   }
 
   [[nodiscard]] std::vector<std::uint32_t> neighbours_by_shared_edges(std::uint32_t patch) const {
@@ -174,25 +183,43 @@ class ChartMaker {
     return targets;
   }
 
+  /// Joins two patches in the plane of the second; small ones also in a plane between them.
   [[nodiscard]] bool merge_into(std::uint32_t from, std::uint32_t into) {
-    Patch& source = patches_[from];
+    constexpr std::size_t kSmall = 128;
+    const std::vector<std::uint32_t>& joining = patches_[from].faces;
     Patch& target = patches_[into];
-    for (const std::uint32_t face : source.faces) {
-      if (!faces_plane(face, target.plane) || !target.laid.fits(projected(face, target.plane))) return false;
+    if (!extend(target, joining)) {
+      if (joining.size() + target.faces.size() > kSmall) return false;
+      std::vector<std::uint32_t> all = target.faces;
+      all.insert(all.end(), joining.begin(), joining.end());
+      Patch fresh{{}, plane_across(mean_normal(all)), PlanarTriangles(cell_)};
+      if (!extend(fresh, all)) return false;
+      target = std::move(fresh);
     }
-    // In another plane even faces of one patch may come to overlap each other.
-    std::vector<PlanarTriangle> moved;
-    PlanarTriangles together(cell_);
-    for (const std::uint32_t face : source.faces) {
-      moved.push_back(projected(face, target.plane));
-      if (!together.fits(moved.back())) return false;
-      together.add(moved.back());
-    }
-    for (const PlanarTriangle& triangle : moved) target.laid.add(triangle);
-    for (const std::uint32_t face : source.faces) patch_of_[face] = into;
-    target.faces.insert(target.faces.end(), source.faces.begin(), source.faces.end());
-    source.faces.clear();
+    for (const std::uint32_t face : joining) patch_of_[face] = into;
+    patches_[from].faces.clear();
     return true;
+  }
+
+  /// Adds all of these faces to a patch or, where one is turned away or would overlap, none.
+  [[nodiscard]] bool extend(Patch& patch, const std::vector<std::uint32_t>& faces) const {
+    PlanarTriangles together(cell_);  // in this plane they may come to overlap each other
+    std::vector<PlanarTriangle> laid;
+    for (const std::uint32_t face : faces) {
+      if (!faces_plane(face, patch.plane)) return false;
+      laid.push_back(projected(face, patch.plane));
+      if (!patch.laid.fits(laid.back()) || !together.fits(laid.back())) return false;
+      together.add(laid.back());
+    }
+    for (const PlanarTriangle& triangle : laid) patch.laid.add(triangle);
+    patch.faces.insert(patch.faces.end(), faces.begin(), faces.end());
+    return true;
+  }
+
+  [[nodiscard]] Vec3f mean_normal(const std::vector<std::uint32_t>& faces) const {
+    Vec3f sum{};
+    for (const std::uint32_t face : faces) sum += normals_[face] * areas_[face];
+    return length(sum) > 0 ? normalized(sum) : normals_[faces.front()];
   }
 
   const SurfaceMesh& mesh_;

@@ -10,8 +10,8 @@
 namespace cnerf {
 
 struct ChartOptions {
-  float grow_degrees = 50;   ///< a chart grows over faces whose normal is within this of its own
-  float merge_degrees = 72;  ///< a chart that fits into a neighbour within this is merged: fewer seams, more stretch
+  float grow_degrees = 60;   ///< a chart grows over faces whose normal is within this of its own
+  float merge_degrees = 80;  ///< a chart that fits into a neighbour within this is merged: fewer seams, more stretch
 };
 
 /// A plane with right-handed axes: u x v is the chart's normal.

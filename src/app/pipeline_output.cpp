@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <sstream>
+
+#include "bake/mesh/mesh_baker.h"
 #include "bake/volume_baker.h"
-#include "export/volume_export.h"
+#include "export/bake_folder.h"
 #include "src/app/pipeline.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -115,16 +118,48 @@ void evaluate_step(const RunContext& context, const std::string& take) {
   context.reporter.wrote("before and after", directory.contact_sheet());
 }
 
-void bake_step(const RunContext& context, const std::string& take, const fs::path& folder) {
+BakeFormats parse_bake_formats(const std::string& list) {
+  BakeFormats formats;
+  std::istringstream words(list);
+  for (std::string format; std::getline(words, format, ',');) {
+    bool* flag = format == "vdb"    ? &formats.vdb
+                 : format == "gltf" ? &formats.gltf
+                 : format == "exr"  ? &formats.exr
+                                    : nullptr;
+    if (flag == nullptr) throw UsageError("--format: expected vdb, gltf or exr, got '" + format + "'");
+    *flag = true;
+  }
+  if (!formats.vdb && !formats.gltf && !formats.exr) throw UsageError("--format: expected vdb, gltf or exr, got none");
+  formats.gltf = formats.gltf || formats.exr;
+  return formats;
+}
+
+void bake_step(const RunContext& context, const std::string& take, const fs::path& folder,
+               const BakeFormats& formats) {
   const auto scene = load_scene(context.directory, take);
+  const Config& config = context.config;
   const std::vector<BakeCamera> cameras = cameras_of(context.capture);
-  BakedVolume volume = bake_volume(*scene, cameras, context.config.bake, context.reporter.sink());
-  volume.colorizer = colorizer_name(context.directory, take);
-  volume.take = take;
-  const VolumeExport files = export_volume(volume, cameras, context.command_line, folder, "volume", context.config.vdb);
-  context.reporter.say(fmt::format("bake: {} voxels of {:.4g} world units", volume.voxels.size(), volume.voxel_size));
-  context.reporter.wrote("volume", files.vdb);
-  context.reporter.wrote("Blender set-up", files.blender_setup);
+  BakeFolder bake(folder, cameras, context.command_line, config.vdb.units, config.vdb.up_axis);
+  if (formats.vdb) {
+    BakedVolume volume = bake_volume(*scene, cameras, config.bake, context.reporter.sink());
+    volume.colorizer = colorizer_name(context.directory, take);
+    volume.take = take;
+    const fs::path vdb = bake.add_volume(volume, "volume", config.vdb);
+    context.reporter.say(fmt::format("bake: {} voxels of {:.4g} world units", volume.voxels.size(), volume.voxel_size));
+    context.reporter.wrote("volume", vdb);
+  }
+  if (formats.gltf) {
+    BakedMesh mesh = bake_mesh(*scene, cameras, config.bake, config.mesh, context.reporter.sink());
+    mesh.colorizer = colorizer_name(context.directory, take);
+    mesh.take = take;
+    const GltfFiles files = bake.add_mesh(mesh, "mesh", {formats.exr, config.exr});
+    context.reporter.say(fmt::format("mesh: {} faces, {} charts in {} x {} texels", mesh.triangles.size(), mesh.charts,
+                                     mesh.texture.size, mesh.texture.size));
+    context.reporter.wrote("mesh", files.glb);
+    context.reporter.wrote("mesh", files.gltf);
+  }
+  bake.finish();
+  context.reporter.wrote("Blender set-up", bake.blender_setup());
 }
 
 void render_step(const RunContext& context, const std::string& take, const CameraPath& path,
