@@ -119,8 +119,8 @@ class Skyline {
         bottom = std::max(bottom, y + outline.lower[c]);
       }
       if (bottom > size) continue;
-      // What rises above the skyline costs as well, or charts would be stacked where they match best.
-      const long cost = gap + static_cast<long>(std::max(0, bottom - bottom_)) * outline.width();
+      // High up first, or charts would be stacked where they match best; small gaps among those.
+      const long cost = static_cast<long>(bottom) * outline.width() + gap;
       if (cost >= least) continue;
       least = cost;
       best = {x, y};
@@ -141,12 +141,10 @@ class Skyline {
     for (int c = 0; c < outline.width(); ++c) {
       if (outline.upper[c] > outline.lower[c]) continue;
       taken_[x + c] = y + outline.lower[c];
-      bottom_ = std::max(bottom_, taken_[x + c]);
     }
   }
 
   std::vector<int> taken_;
-  int bottom_ = 0;
 };
 
 std::optional<Atlas> packed_at(float scale, const std::vector<UprightChart>& charts,

@@ -25,8 +25,8 @@ struct Atlas {
 };
 
 /// The largest scale at which all charts go into `size` x `size` texels with `gutter` texels around each that belong to
-/// no other, found by bisection. Every chart is turned to its smallest box and set on the skyline of those before it,
-/// where it leaves the smallest gap; its own lower outline counts, not its box.
+/// no other, found by bisection. Every chart is turned to its smallest box and hung from the skyline of those before it,
+/// as high as it goes and with small gaps; its own outline counts, not its box.
 /// @param charts  triangles of each chart, in its plane.
 /// @throws UsageError  when not even their gutters fit.
 [[nodiscard]] Atlas pack_charts(const std::vector<std::vector<PlanarTriangle>>& charts, int size, int gutter);

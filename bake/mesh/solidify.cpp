@@ -10,6 +10,7 @@ namespace cnerf {
 namespace {
 
 constexpr float kBlocked = 0.05f;  ///< less light than this does not count as a way out
+constexpr int kOpenWays = 5;       ///< as many ways out make a place open
 
 /// Upwards first: most of what is not hidden is open that way.
 std::vector<Vec3f> ways_out() {
@@ -40,7 +41,7 @@ class HiddenVoxels {
       const Vec3i voxel = low + brick_local(offset);
       if (!sigma_.contains(voxel)) continue;
       const Vec3f centre = voxel.cast<float>() + Vec3f{0.5f, 0.5f, 0.5f};
-      if (has_way_out(centre)) continue;
+      if (is_open(centre)) continue;
       const Vec3d world = plan_.world_from_voxel(centre.cast<double>());
       if (order.empty()) order = views_.try_order(world);
       if (views_.seen_by(sigma_, world, order).empty()) hidden.push_back(offset);
@@ -53,12 +54,15 @@ class HiddenVoxels {
     options.views_per_voxel = 1;
     return options;
   }
-  [[nodiscard]] bool has_way_out(Vec3f from) const {
+  [[nodiscard]] bool is_open(Vec3f from) const {
     static const std::vector<Vec3f> kWays = ways_out();
     const auto far = static_cast<float>(2 * (sigma_.size().x + sigma_.size().y + sigma_.size().z));
-    return std::any_of(kWays.begin(), kWays.end(), [&](Vec3f way) {
-      return transmittance_between(sigma_, plan_.voxel_size, from, from + way * far, kBlocked) > 0;
-    });
+    int open = 0;
+    for (const Vec3f way : kWays) {
+      open += transmittance_between(sigma_, plan_.voxel_size, from, from + way * far, kBlocked) > 0 ? 1 : 0;
+      if (open == kOpenWays) return true;
+    }
+    return false;
   }
 
   const BrickGrid<float>& sigma_;

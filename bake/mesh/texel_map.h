@@ -15,7 +15,9 @@ struct SurfaceTexel {
   Vec3f normal{};    ///< unit length
 };
 
-/// Texels whose centre lies in a triangle, row by row. A centre on a shared edge belongs to one of the two.
+/// Texels that triangles reach, row by row: first come those whose centre lies in a triangle (one on a shared edge
+/// belongs to one of the two), then those that a triangle only touches, which show its nearest point. So even a chart
+/// thinner than a texel has some.
 [[nodiscard]] std::vector<SurfaceTexel> surface_texels(const UnwrappedMesh& mesh);
 
 }  // namespace cnerf
