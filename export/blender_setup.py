@@ -125,8 +125,16 @@ def blender_from_gltf():
     return Matrix(((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
 
 
+def restore_numpy_bool():
+    """Blender 3.4's glTF importer says numpy.bool, which NumPy 1.24, its companion on Debian 12, no longer has."""
+    import numpy
+    if not hasattr(numpy, "bool"):
+        numpy.bool = bool
+
+
 def import_mesh(path):
     """The mesh object of a GLB. What else it brings (cameras, without their principal points) is removed."""
+    restore_numpy_bool()
     known = set(bpy.data.objects)
     bpy.ops.import_scene.gltf(filepath=path)
     brought = [made for made in bpy.data.objects if made not in known]

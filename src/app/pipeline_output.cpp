@@ -7,6 +7,7 @@
 #include "bake/mesh/mesh_baker.h"
 #include "bake/volume_baker.h"
 #include "export/bake_folder.h"
+#include "export/color_origin.h"
 #include "src/app/pipeline.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -53,8 +54,10 @@ std::vector<BakeCamera> cameras_of(const Capture& capture) {
 /// The files of one render, opened as pictures come.
 class RenderFiles {
  public:
-  RenderFiles(const RenderOutput& output, const std::string& path_name, int fps, Reporter& reporter)
+  RenderFiles(const RenderOutput& output, const std::string& path_name, const std::string& color_origin, int fps,
+              Reporter& reporter)
       : output_(output),
+        color_origin_(color_origin),
         frames_(output.folder / path_name),
         video_path_(output.folder / (path_name + ".mp4")),
         video_(video_path_, fps),
@@ -66,7 +69,7 @@ class RenderFiles {
     const Picture picture = picture_of(image, output_.color);
     if (with_video_ && !video_.add(picture)) give_video_up();
     if (with_png_) write_png(frames_ / (name + ".png"), picture);
-    if (output_.exr) write_exr(frames_ / (name + ".exr"), image, output_.color);
+    if (output_.exr) write_exr(frames_ / (name + ".exr"), image, output_.color, color_origin_);
   }
 
   void finish() {
@@ -85,6 +88,7 @@ class RenderFiles {
   }
 
   const RenderOutput& output_;
+  std::string color_origin_;
   fs::path frames_, video_path_;
   VideoFile video_;
   bool with_video_, with_png_;
@@ -168,7 +172,8 @@ void render_step(const RunContext& context, const std::string& take, const Camer
   RenderOptions options = render_options(context.config);
   options.color = scene->is_colorized() && output.color == ShownColor::kDecoded;
   options.baked_color = scene->is_colorized() && output.color == ShownColor::kBaked;
-  RenderFiles files(output, path.name, context.config.render.fps, context.reporter);
+  const std::string color_origin = color_origin_text(colorizer_name(context.directory, take), take);
+  RenderFiles files(output, path.name, color_origin, context.config.render.fps, context.reporter);
   const ProgressSink progress = context.reporter.sink();
   for (std::size_t i = 0; i < path.cameras.size(); ++i) {
     if (interruption_requested()) throw Interrupted("rendering stopped; the video was not written");

@@ -1,6 +1,7 @@
 #include "export/exr_writer.h"
 
 #include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
 #include <ImfInputFile.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
@@ -66,7 +67,8 @@ TEST(ExrTextures, HoldTheChannelsThatTheirNamesSay) {
   for (std::size_t i = 0; i < green.size(); ++i) {
     ASSERT_NEAR(green[i], texture.rgb[i].y, 1e-3 * texture.rgb[i].y + 1e-7) << "half";
     ASSERT_FLOAT_EQ(lightness[i], lightness_from_luminance(texture.luminance[i]));
-    if (i / 64 % 2 == 0) ASSERT_TRUE(texture.a[i] == 0 && texture.b[i] == 0) << "grey";
+    const bool is_grey = i / 64 % 2 == 0;
+    ASSERT_TRUE(!is_grey || (texture.a[i] == 0 && texture.b[i] == 0));
   }
 }
 
