@@ -18,10 +18,11 @@ struct TextureCoordinate {
 /// Square texture; [size, size] each, rows from the top.
 struct BakedTexture {
   int size = 0;
-  std::vector<Vec3f> rgb;              ///< linear Rec.709, in gamut; [0, 1] but for highlights
-  std::vector<float> luminance;        ///< linear Y of `rgb`
-  std::vector<float> a, b;             ///< CIE Lab (1976, D65) a and b of `rgb`
-  std::vector<std::uint8_t> coverage;  ///< 1 where a triangle covers the texel's centre; elsewhere colours are filled in
+  std::vector<Vec3f> rgb;        ///< linear Rec.709, in gamut; [0, 1] but for highlights
+  std::vector<float> luminance;  ///< linear Y of `rgb`
+  std::vector<float> a, b;       ///< CIE Lab (1976, D65) a and b of `rgb`
+  std::vector<std::uint8_t>
+      coverage;  ///< 1 where a triangle covers the texel's centre; elsewhere colours are filled in
 };
 
 struct BakedMesh {

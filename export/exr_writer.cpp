@@ -72,7 +72,8 @@ Level next_level(const Level& level) {
       for (int x = 0; x < next.width; ++x) {
         double sum = 0;
         for (int s = 0; s < 4; ++s) {
-          const int from_x = std::min(2 * x + (s & 1), level.width - 1), from_y = std::min(2 * y + s / 2, level.height - 1);
+          const int from_x = std::min(2 * x + (s & 1), level.width - 1),
+                    from_y = std::min(2 * y + s / 2, level.height - 1);
           sum += plane[static_cast<std::size_t>(from_y) * level.width + from_x];
         }
         smaller.push_back(static_cast<float>(sum / 4));

@@ -12,9 +12,9 @@
 namespace cnerf {
 
 struct ExrOptions {
-  bool mip = false;                ///< tiles of 64 x 64 with mip-map levels, for renderers that page textures
-  std::string lab_names = "lab";   ///< "lab": Lab.L, Lab.a, Lab.b; "xyz": Lab.X, Lab.Y, Lab.Z, for Blender up to 3.4,
-                                   ///< which sorts L, a, b the wrong way round
+  bool mip = false;               ///< tiles of 64 x 64 with mip-map levels, for renderers that page textures
+  std::string lab_names = "lab";  ///< "lab": Lab.L, Lab.a, Lab.b; "xyz": Lab.X, Lab.Y, Lab.Z, for Blender up to 3.4,
+                                  ///< which sorts L, a, b the wrong way round
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -28,7 +28,7 @@ struct ExrChannel {
   std::string name;
   std::span<const float> values;  ///< value i of the channel is `values[i * stride]`; rows from the top
   std::size_t stride = 1;
-  bool half = false;              ///< stored in 16 bits; values beyond their range are clamped
+  bool half = false;  ///< stored in 16 bits; values beyond their range are clamped
 };
 
 struct ExrImage {

@@ -77,7 +77,8 @@ class BufferBuilder {
 std::vector<Vec3f> mapped(const std::vector<Vec3f>& values, const Mat3d& rotation) {
   std::vector<Vec3f> result;
   for (const Vec3f& value : values) {
-    CNERF_CHECK(std::isfinite(value.x) && std::isfinite(value.y) && std::isfinite(value.z), "mesh with NaN or infinity");
+    CNERF_CHECK(std::isfinite(value.x) && std::isfinite(value.y) && std::isfinite(value.z),
+                "mesh with NaN or infinity");
     result.push_back((rotation * value.cast<double>()).cast<float>());
   }
   return result;
@@ -99,8 +100,8 @@ void add_mesh(const BakedMesh& mesh, const Mat3d& rotation, BufferBuilder& buffe
       buffer.add_accessor(uv_view, mesh.uvs.size(), TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC2);
   const int index_view = buffer.add_view(mesh.triangles.data(), mesh.triangles.size() * sizeof(Triangle),
                                          TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
-  primitive.indices = buffer.add_accessor(index_view, 3 * mesh.triangles.size(),
-                                          TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, TINYGLTF_TYPE_SCALAR);
+  primitive.indices = buffer.add_accessor(index_view, 3 * mesh.triangles.size(), TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT,
+                                          TINYGLTF_TYPE_SCALAR);
   primitive.material = 0;
   primitive.mode = TINYGLTF_MODE_TRIANGLES;
   tinygltf::Mesh shape;
@@ -148,7 +149,8 @@ std::vector<double> quaternion_of(const Mat3d& m) {
   const double squares[4] = {1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz};  // 4 q^2
   const auto largest = std::max_element(squares, squares + 4) - squares;
   const double s = 2 * std::sqrt(squares[largest]);  // 4 q
-  const double yx = m.rows[1].x, xy = m.rows[0].y, zx = m.rows[2].x, xz = m.rows[0].z, zy = m.rows[2].y, yz = m.rows[1].z;
+  const double yx = m.rows[1].x, xy = m.rows[0].y, zx = m.rows[2].x, xz = m.rows[0].z, zy = m.rows[2].y,
+               yz = m.rows[1].z;
   if (largest == 0) return {s / 4, (xy + yx) / s, (xz + zx) / s, (zy - yz) / s};
   if (largest == 1) return {(xy + yx) / s, s / 4, (yz + zy) / s, (xz - zx) / s};
   if (largest == 2) return {(xz + zx) / s, (yz + zy) / s, s / 4, (yx - xy) / s};
@@ -163,8 +165,9 @@ int camera_index(const Intrinsics& lens, double near, double far, tinygltf::Mode
   camera.perspective.yfov = 2 * std::atan(0.5 * lens.height / lens.fy);
   camera.perspective.znear = near;
   camera.perspective.zfar = far;
-  const Json intrinsics{{"width", lens.width}, {"height", lens.height}, {"fx", lens.fx}, {"fy", lens.fy},
-                        {"cx", lens.cx},       {"cy", lens.cy},         {"distortion", lens.distortion}};
+  const Json intrinsics{
+      {"width", lens.width}, {"height", lens.height},        {"fx", lens.fx}, {"fy", lens.fy}, {"cx", lens.cx},
+      {"cy", lens.cy},       {"distortion", lens.distortion}};
   camera.extras = extras(intrinsics);
   for (std::size_t c = 0; c < model.cameras.size(); ++c) {
     if (model.cameras[c] == camera) return static_cast<int>(c);
@@ -174,7 +177,8 @@ int camera_index(const Intrinsics& lens, double near, double far, tinygltf::Mode
 }
 
 /// Node of a camera: glTF's look along -Z with +Y up, ours along +Z with +Y down.
-void add_cameras(const std::vector<BakeCamera>& cameras, const Affined& from_world, double size, tinygltf::Model& model) {
+void add_cameras(const std::vector<BakeCamera>& cameras, const Affined& from_world, double size,
+                 tinygltf::Model& model) {
   const Affined opencv_from_gltf{{{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}}, {}};
   double farthest = size;
   for (const BakeCamera& camera : cameras) farthest = std::max(farthest, length(camera.world_from_camera.translation));

@@ -17,11 +17,11 @@ namespace cnerf {
 
 /// What goes into the files beside the mesh.
 struct GltfScene {
-  std::vector<BakeCamera> cameras;        ///< of the capture
-  std::vector<std::byte> basecolor_png;   ///< 8-bit sRGB
-  std::string up_axis = "z";              ///< of the world
-  std::string units = "scene units";      ///< what a world unit is; recorded only
-  std::string color_origin;               ///< see color_origin_text
+  std::vector<BakeCamera> cameras;                   ///< of the capture
+  std::vector<std::byte> basecolor_png;              ///< 8-bit sRGB
+  std::string up_axis = "z";                         ///< of the world
+  std::string units = "scene units";                 ///< what a world unit is; recorded only
+  std::string color_origin;                          ///< see color_origin_text
   std::string rgb_exr, luminance_exr, lab_exr, vdb;  ///< names of files beside these, for `extras`; empty = none
 };
 

@@ -32,13 +32,13 @@ struct ManifestVolume {
 
 /// The mesh of a bake. File names are relative to the manifest; empty = not written.
 struct ManifestMesh {
-  std::string gltf, glb, basecolor;         ///< basecolor: sRGB PNG of the .gltf
+  std::string gltf, glb, basecolor;  ///< basecolor: sRGB PNG of the .gltf
   std::string rgb_exr, luminance_exr, lab_exr;
-  Aabbd bounds;                             ///< world units
+  Aabbd bounds;  ///< world units
   std::size_t vertices = 0, faces = 0;
   int texture_size = 0, gutter = 0, charts = 0;
-  double voxel_size = 0;                    ///< world units; of the density it was cut from
-  Affined gltf_from_world;                  ///< a rotation: glTF is Y-up
+  double voxel_size = 0;    ///< world units; of the density it was cut from
+  Affined gltf_from_world;  ///< a rotation: glTF is Y-up
 };
 /// All but the names of files and the rotation.
 [[nodiscard]] ManifestMesh describe_mesh(const BakedMesh& mesh);

@@ -47,7 +47,8 @@ TextureFiles write_exr_textures(const BakedTexture& texture, const std::string& 
   const int size = texture.size;
   const std::span<const float> rgb(&texture.rgb[0].x, 3 * texture.rgb.size());
   write_exr(files.rgb,
-            {size, size,
+            {size,
+             size,
              {{"R", rgb, 3, true}, {"G", rgb.subspan(1), 3, true}, {"B", rgb.subspan(2), 3, true}},
              attributes(color_origin, "lin_rec709")},
             options.mip);
@@ -57,8 +58,10 @@ TextureFiles write_exr_textures(const BakedTexture& texture, const std::string& 
   const bool plain = options.lab_names == "lab";
   const std::vector<float> lightness = lightness_of(texture.luminance);
   write_exr(files.lab,
-            {size, size,
-             {{plain ? "Lab.L" : "Lab.X", lightness}, {plain ? "Lab.a" : "Lab.Y", texture.a},
+            {size,
+             size,
+             {{plain ? "Lab.L" : "Lab.X", lightness},
+              {plain ? "Lab.a" : "Lab.Y", texture.a},
               {plain ? "Lab.b" : "Lab.Z", texture.b}},
              attributes(color_origin, "CIE 1976 L*a*b*, D65, 2 degrees; data, not colour")},
             options.mip);

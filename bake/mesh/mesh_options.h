@@ -6,16 +6,16 @@
 namespace cnerf {
 
 struct MeshOptions {
-  int faces = 60000;               ///< triangles after decimation, about
-  double surface_depth = 1.0;      ///< voxels of matter that halve the light where the surface is drawn
-  double adaptivity = 0.02;        ///< of the extraction: how far flat parts may be merged; 0 = one quad a voxel
-  double smallest_part = 0.03;     ///< diagonal of a loose part, in diagonals of the whole, below which it is dropped
-  int smoothing = 4;               ///< rounds of smoothing that keeps the volume, against voxel steps
-  int texture_size = 2048;         ///< texels along a side
-  int gutter = 2;                  ///< texels around a chart that belong to no other
-  int views_per_texel = 6;         ///< training views that a texel is averaged over, at most
-  double ray_outside = 2.0;        ///< voxels outside the surface where a texel's ray starts
-  double ray_inside = 4.0;         ///< voxels inside the surface where it ends
+  int faces = 60000;            ///< triangles after decimation, about
+  double surface_depth = 0.7;   ///< voxels of matter that halve the light where the surface is drawn
+  double adaptivity = 0.02;     ///< of the extraction: how far flat parts may be merged; 0 = one quad a voxel
+  double smallest_part = 0.03;  ///< diagonal of a loose part, in diagonals of the whole, below which it is dropped
+  int smoothing = 4;            ///< rounds of smoothing that keeps the volume, against voxel steps
+  int texture_size = 2048;      ///< texels along a side
+  int gutter = 2;               ///< texels around a chart that belong to no other
+  int views_per_texel = 6;      ///< training views that a texel is averaged over, at most
+  double ray_outside = 2.0;     ///< voxels outside the surface where a texel's ray starts
+  double ray_inside = 4.0;      ///< voxels inside the surface where it ends
 
   template <typename Visitor>
   void visit(Visitor&& v) {

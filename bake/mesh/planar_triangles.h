@@ -14,10 +14,18 @@ struct Point2 {
 };
 using PlanarTriangle = std::array<Point2, 3>;
 
-[[nodiscard]] inline Point2 operator+(Point2 a, Point2 b) { return {a.x + b.x, a.y + b.y}; }
-[[nodiscard]] inline Point2 operator-(Point2 a, Point2 b) { return {a.x - b.x, a.y - b.y}; }
-[[nodiscard]] inline Point2 operator*(Point2 a, float s) { return {a.x * s, a.y * s}; }
-[[nodiscard]] inline float dot(Point2 a, Point2 b) { return a.x * b.x + a.y * b.y; }
+[[nodiscard]] inline Point2 operator+(Point2 a, Point2 b) {
+  return {a.x + b.x, a.y + b.y};
+}
+[[nodiscard]] inline Point2 operator-(Point2 a, Point2 b) {
+  return {a.x - b.x, a.y - b.y};
+}
+[[nodiscard]] inline Point2 operator*(Point2 a, float s) {
+  return {a.x * s, a.y * s};
+}
+[[nodiscard]] inline float dot(Point2 a, Point2 b) {
+  return a.x * b.x + a.y * b.y;
+}
 
 /// Twice the area, positive when the corners turn counter-clockwise.
 [[nodiscard]] inline float signed_area(const PlanarTriangle& t) {

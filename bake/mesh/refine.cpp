@@ -41,9 +41,8 @@ void relax(SurfaceMesh& mesh, float step) {
 SurfaceMesh without_loose_parts(const SurfaceMesh& mesh, double smallest) {
   const std::vector<SurfaceMesh> parts = connected_parts(mesh);
   const auto least = static_cast<float>(smallest * diagonal(mesh));
-  const auto largest = std::max_element(parts.begin(), parts.end(), [](const SurfaceMesh& a, const SurfaceMesh& b) {
-    return diagonal(a) < diagonal(b);
-  });
+  const auto largest = std::max_element(
+      parts.begin(), parts.end(), [](const SurfaceMesh& a, const SurfaceMesh& b) { return diagonal(a) < diagonal(b); });
   SurfaceMesh kept;
   for (auto part = parts.begin(); part != parts.end(); ++part) {
     const bool is_cavity = signed_volume(*part) < 0;

@@ -13,7 +13,8 @@ namespace cnerf {
 
 /// A copy of the density in which every voxel is opaque that is hidden: light reaches it neither from a camera nor from
 /// outside along more than a few of 26 directions (faces, edges and corners of a cube); a few, since walls that no
-/// camera saw have holes. The shadow below an object is not hidden: it is open to that side. Hollows larger than a brick may stay as closed cavities.
+/// camera saw have holes. The shadow below an object is not hidden: it is open to that side. Hollows larger than a
+/// brick may stay as closed cavities.
 [[nodiscard]] BrickGrid<float> solidified(const BrickGrid<float>& sigma, const std::vector<BakeCamera>& cameras,
                                           const BakePlan& plan, const BakeOptions& options);
 

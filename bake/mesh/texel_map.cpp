@@ -70,7 +70,8 @@ class TexelCollector {
   explicit TexelCollector(const UnwrappedMesh& mesh)
       : mesh_(mesh), taken_(static_cast<std::size_t>(mesh.size) * mesh.size, 0) {}
 
-  /// Texels of a triangle for which `shares_at(x, y)` has an answer; their centres are at most `margin` outside its box.
+  /// Texels of a triangle for which `shares_at(x, y)` has an answer; their centres are at most `margin` outside its
+  /// box.
   template <typename SharesAt>
   void add(std::size_t triangle, float margin, const SharesAt& shares_at) {
     const PlanarTriangle t = mesh_.texture_triangle(triangle);
@@ -103,8 +104,8 @@ class TexelCollector {
   [[nodiscard]] SurfaceTexel texel(int x, int y, std::size_t triangle, const Shares& s) const {
     const Triangle& v = mesh_.mesh.triangles[triangle];
     const auto blended = [&](const std::vector<Vec3f>& values) {
-      const Vec3d sum = values[v[0]].cast<double>() * s.a + values[v[1]].cast<double>() * s.b +
-                        values[v[2]].cast<double>() * s.c;
+      const Vec3d sum =
+          values[v[0]].cast<double>() * s.a + values[v[1]].cast<double>() * s.b + values[v[2]].cast<double>() * s.c;
       return sum.cast<float>();
     };
     const Vec3f normal = blended(mesh_.normals);

@@ -140,7 +140,8 @@ std::vector<SurfaceColor> TexelShader::shade(std::span<const SurfacePoint> point
     if (colors[p].opacity <= 0) continue;
     colors[p].luminance = static_cast<float>(light[p].y / colors[p].opacity);
     if (light[p].y > 0) {
-      colors[p].chromaticity = {static_cast<float>(light[p].x / light[p].y), static_cast<float>(light[p].z / light[p].y)};
+      colors[p].chromaticity = {static_cast<float>(light[p].x / light[p].y),
+                                static_cast<float>(light[p].z / light[p].y)};
     }
   }
   return colors;

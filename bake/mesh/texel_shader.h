@@ -17,9 +17,9 @@ struct SurfacePoint {
 
 /// What is seen at a point, opaque as a mesh is.
 struct SurfaceColor {
-  float luminance = 0;         ///< linear Y
+  float luminance = 0;          ///< linear Y
   Chromaticity chromaticity{};  ///< of the light, relative to luminance
-  float opacity = 0;           ///< that the ray met; the colour is its share of it. 0: nothing there, no colour
+  float opacity = 0;            ///< that the ray met; the colour is its share of it. 0: nothing there, no colour
 };
 
 /// Sends a short ray through the field at each point, from outside along the normal inwards, and composites what it

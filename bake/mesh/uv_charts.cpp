@@ -31,9 +31,8 @@ std::vector<std::array<std::uint32_t, 3>> face_neighbours(const SurfaceMesh& mes
       sides.push_back({std::uint64_t(std::min(a, b)) << 32 | std::max(a, b), f, corner});
     }
   }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return a.edge != b.edge ? a.edge < b.edge : a.face < b.face;
-  });
+  std::sort(sides.begin(), sides.end(),
+            [](const Side& a, const Side& b) { return a.edge != b.edge ? a.edge < b.edge : a.face < b.face; });
   std::vector<std::array<std::uint32_t, 3>> neighbours(mesh.triangles.size(), {kNone, kNone, kNone});
   for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
     while (end < sides.size() && sides[end].edge == sides[begin].edge) ++end;

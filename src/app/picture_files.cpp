@@ -30,14 +30,15 @@ Picture picture_of(const RenderedImage& image, ShownColor color) {
 void write_exr(const fs::path& file, const RenderedImage& image, ShownColor color, const std::string& color_origin) {
   const std::vector<float> values = shown_rgb(image, color);
   const std::span<const float> rgb(values);
-  write_exr(file, {image.width,
-                   image.height,
-                   {{"R", rgb, 3, true},
-                    {"G", rgb.subspan(1), 3, true},
-                    {"B", rgb.subspan(2), 3, true},
-                    {"A", image.opacity, 1, true},
-                    {"Z", image.depth}},
-                   {{"software", "cnerf " CNERF_VERSION}, {"colorOrigin", color_origin}, {"colorSpace", "lin_rec709"}}});
+  write_exr(file,
+            {image.width,
+             image.height,
+             {{"R", rgb, 3, true},
+              {"G", rgb.subspan(1), 3, true},
+              {"B", rgb.subspan(2), 3, true},
+              {"A", image.opacity, 1, true},
+              {"Z", image.depth}},
+             {{"software", "cnerf " CNERF_VERSION}, {"colorOrigin", color_origin}, {"colorSpace", "lin_rec709"}}});
 }
 
 struct VideoFile::Encoder {

@@ -138,8 +138,7 @@ BakeFormats parse_bake_formats(const std::string& list) {
   return formats;
 }
 
-void bake_step(const RunContext& context, const std::string& take, const fs::path& folder,
-               const BakeFormats& formats) {
+void bake_step(const RunContext& context, const std::string& take, const fs::path& folder, const BakeFormats& formats) {
   const auto scene = load_scene(context.directory, take);
   const Config& config = context.config;
   const std::vector<BakeCamera> cameras = cameras_of(context.capture);

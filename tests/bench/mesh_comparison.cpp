@@ -93,7 +93,8 @@ int main(int argc, char** argv) {
   const cnerf::Capture capture = cnerf::load_capture(argv[2], {});
   const auto scene = cnerf::Scene::load(argv[3], take);
   const bool with_volume = options["volume"] != 0 && cnerf::read_manifest(bake / "manifest.json").volume.has_value();
-  const bool any_held_out = std::any_of(capture.views.begin(), capture.views.end(), [](const auto& v) { return v.held_out; });
+  const bool any_held_out =
+      std::any_of(capture.views.begin(), capture.views.end(), [](const auto& v) { return v.held_out; });
   cnerf::RenderOptions render;
   render.color = false;
   render.baked_color = scene->is_colorized();

@@ -41,7 +41,8 @@ std::vector<float> read_channel(const fs::path& file, const std::string& channel
   const auto width = static_cast<std::size_t>(window.max.x + 1);
   std::vector<float> values(width * static_cast<std::size_t>(window.max.y + 1));
   Imf::FrameBuffer frame;
-  frame.insert(channel, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float), sizeof(float) * width));
+  frame.insert(channel,
+               Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float), sizeof(float) * width));
   input.setFrameBuffer(frame);
   input.readPixels(0, window.max.y);
   return values;

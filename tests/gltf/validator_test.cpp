@@ -21,7 +21,8 @@ namespace fs = std::filesystem;
 std::optional<fs::path> node_modules() {
   const char* given = std::getenv("CNERF_NODE_MODULES");
   const fs::path folder = given != nullptr ? fs::path(given) : fs::path(CNERF_SOURCE_DIR) / "build/node/node_modules";
-  if (!fs::exists(folder / "gltf-validator") || std::system("node --version > /dev/null 2>&1") != 0) return std::nullopt;
+  if (!fs::exists(folder / "gltf-validator") || std::system("node --version > /dev/null 2>&1") != 0)
+    return std::nullopt;
   return folder;
 }
 

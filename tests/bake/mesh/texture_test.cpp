@@ -48,7 +48,8 @@ MeshOptions small_texture() {
 
 std::vector<BakeCamera> cameras_around() {
   std::vector<BakeCamera> cameras;
-  for (const Vec3d eye : {Vec3d{6, 2, 3}, Vec3d{-4, 2, 3}, Vec3d{1, 7, 3}, Vec3d{1, -3, 3}, Vec3d{1, 2, 8}, Vec3d{1, 2, -2}}) {
+  for (const Vec3d eye :
+       {Vec3d{6, 2, 3}, Vec3d{-4, 2, 3}, Vec3d{1, 7, 3}, Vec3d{1, -3, 3}, Vec3d{1, 2, 8}, Vec3d{1, 2, -2}}) {
     cameras.push_back(camera_at("view", eye, {1, 2, 3}, 64, 64, 100));
   }
   return cameras;
@@ -57,7 +58,8 @@ std::vector<BakeCamera> cameras_around() {
 TEST(MeshBake, ASphereWearsItsColours) {
   const AnalyticField field = coloured_sphere();
   for (const bool with_cameras : {false, true}) {
-    const BakedMesh mesh = bake_mesh(field, with_cameras ? cameras_around() : std::vector<BakeCamera>{}, coarse(), small_texture());
+    const BakedMesh mesh =
+        bake_mesh(field, with_cameras ? cameras_around() : std::vector<BakeCamera>{}, coarse(), small_texture());
     const BakedTexture& texture = mesh.texture;
     ASSERT_EQ(mesh.positions.size(), mesh.uvs.size());
     double worst = 0;
@@ -119,7 +121,8 @@ TEST(TexelShader, FindsTheSurfaceFromALittleOff) {
   const Vec3f direction = normalized(Vec3f{1, -2, 0.5f});
   const Vec3f expected = sphere_color(kMiddle + direction * 0.3f);
   std::vector<SurfacePoint> points;
-  for (const float off : {-1.5f, -0.5f, 0.0f, 0.5f, 1.5f}) {  // voxels; one sample at the point would miss three of them
+  for (const float off :
+       {-1.5f, -0.5f, 0.0f, 0.5f, 1.5f}) {  // voxels; one sample at the point would miss three of them
     const Vec3d world = kFrame.world_from_unit((kMiddle + direction * 0.3f).cast<double>());
     const Vec3f voxel = ((world - stage.plan.origin) / stage.plan.voxel_size).cast<float>();
     points.push_back({voxel + direction * off, direction});
@@ -144,8 +147,8 @@ TEST(TexelShader, AveragesOverTheViewsThatSeeThePoint) {
     const Vec3d world = kFrame.world_from_unit((kMiddle + direction * 0.3f).cast<double>());
     return SurfacePoint{((world - stage.plan.origin) / stage.plan.voxel_size).cast<float>(), direction};
   };
-  const auto colors = shader.shade(std::vector<SurfacePoint>{
-      at({1, 0, 0}), at({0, 1, 0}), at(normalized(Vec3f{1, 1, 0}))});
+  const auto colors =
+      shader.shade(std::vector<SurfacePoint>{at({1, 0, 0}), at({0, 1, 0}), at(normalized(Vec3f{1, 1, 0}))});
   EXPECT_NEAR(colors[0].luminance, 0.2, 0.02) << "one camera looks at it squarely";
   EXPECT_NEAR(colors[1].luminance, 0.6, 0.02);
   EXPECT_NEAR(colors[2].luminance, 0.4, 0.01) << "both see it alike";

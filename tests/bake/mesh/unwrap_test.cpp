@@ -33,7 +33,9 @@ std::size_t doubly_covered(const UnwrappedMesh& mesh) {
     const PlanarTriangle t = mesh.texture_triangle(f);
     const double area = signed_area(t);
     const auto low = [&](float a, float b, float c) { return std::max(0, int(std::min({a, b, c}) * kFiner) - 1); };
-    const auto high = [&](float a, float b, float c) { return std::min(side - 1, int(std::max({a, b, c}) * kFiner) + 1); };
+    const auto high = [&](float a, float b, float c) {
+      return std::min(side - 1, int(std::max({a, b, c}) * kFiner) + 1);
+    };
     for (int y = low(t[0].y, t[1].y, t[2].y); y <= high(t[0].y, t[1].y, t[2].y); ++y) {
       for (int x = low(t[0].x, t[1].x, t[2].x); x <= high(t[0].x, t[1].x, t[2].x); ++x) {
         const Point2 p{(x + 0.5f) / kFiner, (y + 0.5f) / kFiner};
@@ -115,7 +117,8 @@ TEST(UnwrapChecks, OverlapsAreNoticed) {
   UnwrappedMesh twice = mesh;
   const auto first = static_cast<std::uint32_t>(mesh.texels.size());
   for (const Point2 texel : mesh.texels) twice.texels.push_back(texel + Point2{3, 1});
-  for (const Triangle& t : mesh.mesh.triangles) twice.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  for (const Triangle& t : mesh.mesh.triangles)
+    twice.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
   EXPECT_EQ(doubly_covered(mesh), 0u);
   EXPECT_GT(doubly_covered(twice), 1000u);
 }
