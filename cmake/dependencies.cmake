@@ -10,6 +10,8 @@ find_package(CLI11 REQUIRED)
 find_package(OpenCV REQUIRED COMPONENTS core imgcodecs imgproc videoio video)
 find_package(Imath REQUIRED)
 find_package(OpenEXR REQUIRED)
+find_package(meshoptimizer REQUIRED)
+find_package(TinyGLTF REQUIRED)
 
 # OpenVDB ships a find module instead of a config package, and needs Boost iostreams.
 list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB

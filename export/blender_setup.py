@@ -1,4 +1,5 @@
-"""Shows a cnerf bake in Blender the way it was trained: a volume that emits and absorbs, and the capture's cameras.
+"""Shows a cnerf bake in Blender the way it was trained: a volume that emits and absorbs, the textured mesh at the same
+place, and the capture's cameras.
 
 In Blender:  open this file in the Scripting tab and press Run. It makes a scene of its own and leaves others alone.
 Headless:    blender -b --python blender_setup.py -- --render out.exr --camera 3 --samples 64
@@ -119,6 +120,47 @@ def add_volume(scene, root, volume, folder):
     return shown
 
 
+def blender_from_gltf():
+    """What Blender's importer does to a glTF, which is Y-up: (x, y, z) -> (x, -z, y)."""
+    return Matrix(((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
+
+
+def restore_numpy_bool():
+    """Blender 3.4's glTF importer says numpy.bool, which NumPy 1.24, its companion on Debian 12, no longer has."""
+    import numpy
+    if not hasattr(numpy, "bool"):
+        numpy.bool = bool
+
+
+def import_mesh(path):
+    """The mesh object of a GLB. What else it brings (cameras, without their principal points) is removed."""
+    restore_numpy_bool()
+    known = set(bpy.data.objects)
+    bpy.ops.import_scene.gltf(filepath=path)
+    brought = [made for made in bpy.data.objects if made not in known]
+    meshes = [made for made in brought if made.type == "MESH"]
+    for made in brought:
+        if made not in meshes:
+            bpy.data.objects.remove(made)
+    return meshes[0]
+
+
+def add_mesh(scene, root, mesh, folder, use):
+    """`use`: hidden (from renders), shown, holdout (cuts its shape out), shadow (catches shadows only)."""
+    placed = import_mesh(os.path.join(folder, mesh["glb"]))
+    for collection in list(placed.users_collection):
+        collection.objects.unlink(placed)
+    scene.collection.objects.link(placed)
+    placed.name = "cnerf mesh"
+    placed.parent = root
+    # The volume and the cameras are in the frame of the poses; so is the mesh, once Blender's turn is taken back.
+    placed.matrix_basis = Matrix(mesh["world_from_gltf"]) @ blender_from_gltf().inverted() @ placed.matrix_basis
+    placed.hide_render = use == "hidden"
+    placed.is_holdout = use == "holdout"
+    placed.is_shadow_catcher = use == "shadow"
+    return placed
+
+
 def blender_from_opencv_camera():
     """Blender's cameras look along -Z with +Y up; the manifest's along +Z with +Y down."""
     return Matrix(((1, 0, 0, 0), (0, -1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1)))
@@ -130,8 +172,9 @@ def pixel_aspect(camera):
     return (1.0, ratio) if ratio >= 1.0 else (1.0 / ratio, 1.0)
 
 
-def scene_radius(volume):
-    low, high = Vector(volume["bounds"]["min"]), Vector(volume["bounds"]["max"])
+def scene_radius(bounded):
+    """Of the volume or the mesh: both have bounds."""
+    low, high = Vector(bounded["bounds"]["min"]), Vector(bounded["bounds"]["max"])
     return 0.5 * (high - low).length, 0.5 * (high + low)
 
 
@@ -244,20 +287,26 @@ def set_up(options):
     manifest_file = find_manifest(options.manifest)
     with open(manifest_file, encoding="utf-8") as file:
         manifest = json.load(file)
-    volume = manifest["volume"]
-    if volume is None:
-        raise ValueError(manifest_file + " lists no volume")
+    volume, mesh = manifest["volume"], manifest.get("mesh")
+    bounded = volume or mesh
+    if bounded is None:
+        raise ValueError(manifest_file + " lists neither a volume nor a mesh")
+    mesh_use = options.mesh or ("hidden" if volume else "shown")
 
     scene = make_scene()
     root = bpy.data.objects.new("cnerf", None)  # move, turn or scale this one: it carries everything
-    root.empty_display_size = 0.1 * scene_radius(volume)[0]
+    root.empty_display_size = 0.1 * scene_radius(bounded)[0]
     scene.collection.objects.link(root)
-    add_volume(scene, root, volume, os.path.dirname(manifest_file))
+    folder = os.path.dirname(manifest_file)
+    if volume:
+        add_volume(scene, root, volume, folder).hide_render = mesh_use == "only"
+    if mesh and mesh_use != "none":
+        add_mesh(scene, root, mesh, folder, mesh_use)
     blacken_world(scene)
-    set_up_rendering(scene, volume, options)
+    set_up_rendering(scene, bounded, options)
 
-    cameras = manifest["cameras"] or [overview_camera(volume)]
-    placed = [add_camera(scene, root, camera, volume) for camera in cameras]
+    cameras = manifest["cameras"] or [overview_camera(bounded)]
+    placed = [add_camera(scene, root, camera, bounded) for camera in cameras]
     picked = pick_camera(cameras, options.camera)
     use_camera(scene, cameras[picked], placed[picked])
     return scene
@@ -288,6 +337,8 @@ def parse_options(arguments):
     parser.add_argument("--engine", choices=("cycles", "eevee"), default="cycles")
     parser.add_argument("--samples", type=int, default=64)
     parser.add_argument("--step-rate", type=float, default=1.0, help="length of a volume step, in voxels")
+    parser.add_argument("--mesh", choices=("hidden", "shown", "only", "holdout", "shadow", "none"), default="",
+                        help="how the mesh takes part in renders; default: hidden beside a volume, else shown")
     parser.add_argument("--transparent", action="store_true", help="opacity in the picture's alpha channel")
     parser.add_argument("--exact", action="store_true", help="box pixel filter, all samples, opacity in alpha")
     return parser.parse_args(arguments)

@@ -102,6 +102,45 @@ ManifestVolume volume_from(const Json& j) {
   return volume;
 }
 
+Json to_json(const ManifestMesh& mesh) {
+  const Json textures{{"basecolor", {{"file", mesh.basecolor}, {"space", "sRGB, 8 bit"}}},
+                      {"rgb", {{"file", mesh.rgb_exr}, {"space", "lin_rec709"}}},
+                      {"luminance", {{"file", mesh.luminance_exr}, {"space", "linear luminance, Rec.709 Y"}}},
+                      {"lab", {{"file", mesh.lab_exr}, {"space", "CIE 1976 L*a*b*, D65, 2 degrees; data"}}}};
+  return {{"gltf", mesh.gltf},
+          {"glb", mesh.glb},
+          {"textures", textures},
+          {"bounds", {{"min", to_json(mesh.bounds.min)}, {"max", to_json(mesh.bounds.max)}}},
+          {"vertices", mesh.vertices},
+          {"faces", mesh.faces},
+          {"texture_size", mesh.texture_size},
+          {"gutter", mesh.gutter},
+          {"charts", mesh.charts},
+          {"voxel_size", mesh.voxel_size},
+          {"gltf_from_world", to_json(mesh.gltf_from_world)},
+          {"world_from_gltf", to_json(mesh.gltf_from_world.inverse())}};
+}
+
+ManifestMesh mesh_from(const Json& j) {
+  ManifestMesh mesh;
+  const auto texture = [&](const char* name) { return j.at("textures").at(name).at("file").get<std::string>(); };
+  mesh.gltf = j.at("gltf").get<std::string>();
+  mesh.glb = j.at("glb").get<std::string>();
+  mesh.basecolor = texture("basecolor");
+  mesh.rgb_exr = texture("rgb");
+  mesh.luminance_exr = texture("luminance");
+  mesh.lab_exr = texture("lab");
+  mesh.bounds = {vec3_from(j.at("bounds").at("min")), vec3_from(j.at("bounds").at("max"))};
+  mesh.vertices = j.at("vertices").get<std::size_t>();
+  mesh.faces = j.at("faces").get<std::size_t>();
+  mesh.texture_size = j.at("texture_size").get<int>();
+  mesh.gutter = j.at("gutter").get<int>();
+  mesh.charts = j.at("charts").get<int>();
+  mesh.voxel_size = j.at("voxel_size").get<double>();
+  mesh.gltf_from_world = affine_from(j.at("gltf_from_world"));
+  return mesh;
+}
+
 Json to_json(const SceneFrame& frame) {
   const double scale = frame.unit_per_world;
   const Affined unit_from_world{Mat3d::identity() * scale, frame.unit_from_world({0, 0, 0})};
@@ -138,6 +177,7 @@ BakeManifest manifest_from(const Json& j) {
   manifest.frame = frame_from(j.at("frame"));
   for (const Json& camera : j.at("cameras")) manifest.cameras.push_back(camera_from(camera));
   if (!j.at("volume").is_null()) manifest.volume = volume_from(j.at("volume"));
+  if (j.contains("mesh") && !j.at("mesh").is_null()) manifest.mesh = mesh_from(j.at("mesh"));
   return manifest;
 }
 
@@ -164,6 +204,19 @@ ManifestVolume describe_volume(const BakedVolume& volume, const std::string& fil
   return described;
 }
 
+ManifestMesh describe_mesh(const BakedMesh& mesh) {
+  ManifestMesh described;
+  described.bounds = Aabbd::empty();
+  for (const Vec3f& p : mesh.positions) described.bounds.grow(p.cast<double>());
+  described.vertices = mesh.positions.size();
+  described.faces = mesh.triangles.size();
+  described.texture_size = mesh.texture.size;
+  described.gutter = mesh.gutter;
+  described.charts = mesh.charts;
+  described.voxel_size = mesh.voxel_size;
+  return described;
+}
+
 fs::path write_manifest(const BakeManifest& manifest, const fs::path& folder) {
   Json cameras = Json::array();
   for (const BakeCamera& camera : manifest.cameras) cameras.push_back(to_json(camera));
@@ -182,6 +235,7 @@ fs::path write_manifest(const BakeManifest& manifest, const fs::path& folder) {
                {"color", color},
                {"frame", to_json(manifest.frame)},
                {"volume", manifest.volume ? to_json(*manifest.volume) : Json(nullptr)},
+               {"mesh", manifest.mesh ? to_json(*manifest.mesh) : Json(nullptr)},
                {"camera_axes", "+X right, +Y down, +Z forward; centre of the first pixel at (0.5, 0.5)"},
                {"cameras", cameras}};
   const fs::path file = folder / "manifest.json";

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bake/bake_camera.h"
+#include "bake/baked_mesh.h"
 #include "bake/baked_volume.h"
 #include "export/vdb_writer.h"
 #include "src/base/aabb.h"
@@ -29,6 +30,19 @@ struct ManifestVolume {
 [[nodiscard]] ManifestVolume describe_volume(const BakedVolume& volume, const std::string& file,
                                              const VdbOptions& options);
 
+/// The mesh of a bake. File names are relative to the manifest; empty = not written.
+struct ManifestMesh {
+  std::string gltf, glb, basecolor;  ///< basecolor: sRGB PNG of the .gltf
+  std::string rgb_exr, luminance_exr, lab_exr;
+  Aabbd bounds;  ///< world units
+  std::size_t vertices = 0, faces = 0;
+  int texture_size = 0, gutter = 0, charts = 0;
+  double voxel_size = 0;    ///< world units; of the density it was cut from
+  Affined gltf_from_world;  ///< a rotation: glTF is Y-up
+};
+/// All but the names of files and the rotation.
+[[nodiscard]] ManifestMesh describe_mesh(const BakedMesh& mesh);
+
 struct BakeManifest {
   std::vector<std::string> command_line;
   std::vector<std::string> files;  ///< relative to the manifest; their sizes and SHA-256 are added when writing
@@ -39,6 +53,7 @@ struct BakeManifest {
   SceneFrame frame;
   std::vector<BakeCamera> cameras;  ///< of the capture
   std::optional<ManifestVolume> volume;
+  std::optional<ManifestMesh> mesh;
 };
 
 /// Writes `manifest.json` into `folder`, where the listed files already are, and returns its path.

@@ -18,6 +18,23 @@ if [[ "${1:-}" == "--tests" ]]; then
   packages+=(blender python3-numpy)
 fi
 
+# Khronos' glTF validator, which Debian does not package. Tests that need it skip where it cannot be had.
+install_gltf_validator() {
+  local folder
+  folder="$(dirname "$0")/../build/node"
+  [[ -d "$folder/node_modules/gltf-validator" ]] && return
+  if ! command -v npm >/dev/null; then
+    echo "dependencies: no npm, so no glTF validator; its tests will skip"
+    return
+  fi
+  mkdir -p "$folder"
+  npm install --prefix "$folder" --no-save --no-fund --no-audit --loglevel=error gltf-validator@2.0.0-dev.3.10 ||
+    echo "dependencies: npm cannot get the glTF validator; its tests will skip"
+}
+if [[ "${1:-}" == "--tests" ]]; then
+  install_gltf_validator
+fi
+
 missing=()
 for package in "${packages[@]}"; do
   if [[ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" != installed ]]; then

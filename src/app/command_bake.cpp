@@ -1,4 +1,4 @@
-/// cnerf bake: a take as a volume for other programs.
+/// cnerf bake: a take as a volume, a mesh and textures for other programs.
 
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
@@ -15,14 +15,14 @@ struct BakeArguments {
 };
 
 void bake(const BakeArguments& arguments, const std::vector<std::string>& command_line) {
-  if (arguments.format != "vdb") throw UsageError("--format: expected vdb, got '" + arguments.format + "'");
+  const BakeFormats formats = parse_bake_formats(arguments.format);
   Reporter reporter = make_reporter(arguments.run.config);
   const RunDirectory directory = RunDirectory::open(arguments.run.run);
   const std::string take = directory.choose_take(arguments.run.take);
   const fs::path folder = arguments.out.empty() ? directory.bakes(take) : fs::path(arguments.out);
   refuse_existing(folder / "manifest.json", arguments.overwrite);
   const RunContext context = open_run(arguments.run, take, command_line, reporter);
-  bake_step(context, take, folder);
+  bake_step(context, take, folder, formats);
   reporter.next("blender --python " + (folder / "blender_setup.py").string());
 }
 
@@ -31,7 +31,7 @@ void bake(const BakeArguments& arguments, const std::vector<std::string>& comman
 Work declare_bake(CLI::App& app) {
   auto arguments = std::make_shared<BakeArguments>();
   add_run_folder_options(app, arguments->run);
-  app.add_option("--format", arguments->format, "What to write: vdb");
+  app.add_option("--format", arguments->format, "vdb, gltf, exr or several, comma-separated");
   app.add_option("-o,--out", arguments->out, "Folder to write to; RUN/bakes/TAKE if not given");
   add_short_form(app, arguments->run.config, "--resolution", "bake.resolution", "Voxels along the longest axis");
   add_short_form(app, arguments->run.config, "--voxel-origin", "vdb.voxel_origin",
@@ -39,6 +39,11 @@ Work declare_bake(CLI::App& app) {
   app.add_flag_callback(
       "--houdini", [arguments] { arguments->run.config.short_forms.emplace_back("vdb.houdini=true"); },
       "Also write the colour grid under Houdini's name, Cd");
+  add_short_form(app, arguments->run.config, "--faces", "mesh.faces", "Triangles of the mesh, about");
+  add_short_form(app, arguments->run.config, "--texture-size", "mesh.texture_size", "Texels along a side");
+  app.add_flag_callback(
+      "--exr-mip", [arguments] { arguments->run.config.short_forms.emplace_back("exr.mip=true"); },
+      "EXR textures as tiles with mip-map levels");
   app.add_flag("--overwrite", arguments->overwrite, "Replace a bake that is there");
   return [arguments](const auto& command_line) { bake(*arguments, command_line); };
 }

@@ -12,7 +12,7 @@ namespace {
 
 struct RunArguments {
   ConfigArguments config;
-  std::string capture, out;
+  std::string capture, out, format = "vdb";
   bool grey = false;
   ExistingOutput existing;
   std::vector<std::string> command_line;
@@ -45,6 +45,7 @@ void turntable(const RunArguments& arguments, const RunContext& context, const s
 }
 
 void run(const RunArguments& arguments) {
+  (void)parse_bake_formats(arguments.format);  // a wrong one should not cost an hour
   Reporter reporter = make_reporter(arguments.config);
   Config config = config_of(arguments);
   if (!arguments.grey) choose_colorizer(arguments.capture, config, reporter);
@@ -64,7 +65,7 @@ void run(const RunArguments& arguments) {
   }
   if (!is_done(arguments, context.directory.metrics_file())) evaluate_step(context, take);
   if (!is_done(arguments, context.directory.bakes(take) / "manifest.json")) {
-    bake_step(context, take, context.directory.bakes(take));
+    bake_step(context, take, context.directory.bakes(take), parse_bake_formats(arguments.format));
   }
   turntable(arguments, context, take);
   reporter.next("blender --python " + (context.directory.bakes(take) / "blender_setup.py").string());
@@ -79,6 +80,7 @@ Work declare_run(CLI::App& app) {
   add_short_form(app, arguments->config, "--colorizer", "colorizer.spec",
                  "Who colours: reference:IMAGE..., torchscript:FILE, exec:COMMAND");
   app.add_flag("--grey", arguments->grey, "Stay grey: no colorizer");
+  app.add_option("--format", arguments->format, "What to bake: vdb, gltf, exr or several, comma-separated");
   add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");
   add_short_form(app, arguments->config, "--holdout", "capture.holdout", "Keep every N-th view for evaluation");
   add_short_form(app, arguments->config, "--transfer", "capture.transfer", "How grey values encode luminance");

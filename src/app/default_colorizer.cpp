@@ -8,10 +8,10 @@ namespace fs = std::filesystem;
 void choose_colorizer(const fs::path& capture, Config& config, Reporter& reporter) {
   if (!config.colorizer.spec.empty()) return;
   const fs::path folder = fs::is_directory(capture) ? capture : capture.parent_path();
-  const fs::path reference = folder / "reference.png";
-  if (fs::is_regular_file(reference)) {
-    config.colorizer.spec = "reference:" + fs::absolute(reference).lexically_normal().string();
-    reporter.say("no --colorizer given: colours come from " + reference.string() + ", which lies in the capture");
+  const fs::path references = folder / "references";
+  if (fs::is_directory(references)) {
+    config.colorizer.spec = "reference:" + fs::absolute(references).lexically_normal().string();
+    reporter.say("no --colorizer given: colours come from the photographs in " + references.string());
     return;
   }
   throw UsageError(

@@ -1,60 +1,18 @@
 #include "src/app/picture_files.h"
 
-#include <ImfChannelList.h>
-#include <ImfFrameBuffer.h>
-#include <ImfOutputFile.h>
-#include <ImfStandardAttributes.h>
 #include <unistd.h>
 
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <span>
 
+#include "export/exr_writer.h"
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
-namespace {
-
-constexpr float kLargestHalf = 65504;
-
-struct HalfRgba {
-  half r, g, b, a;
-};
-
-std::vector<HalfRgba> half_rgba(const RenderedImage& image, ShownColor color) {
-  const std::vector<float> rgb = shown_rgb(image, color);
-  std::vector<HalfRgba> pixels(image.opacity.size());
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const auto channel = [&](int c) { return half(std::min(rgb[3 * i + c], kLargestHalf)); };
-    pixels[i] = {channel(0), channel(1), channel(2), half(image.opacity[i])};
-  }
-  return pixels;
-}
-
-void write_exr_to(const fs::path& file, const RenderedImage& image, ShownColor color) {
-  std::vector<HalfRgba> pixels = half_rgba(image, color);
-  std::vector<float> depth = image.depth;
-  Imf::Header header(image.width, image.height);
-  header.compression() = Imf::ZIP_COMPRESSION;
-  Imf::addChromaticities(header, Imf::Chromaticities());  // the default is Rec.709 and D65
-  Imf::FrameBuffer frame;
-  const auto add = [&](const char* name, Imf::PixelType type, void* base, std::size_t stride) {
-    header.channels().insert(name, Imf::Channel(type));
-    frame.insert(name, Imf::Slice(type, static_cast<char*>(base), stride, stride * std::size_t(image.width)));
-  };
-  add("R", Imf::HALF, &pixels[0].r, sizeof(HalfRgba));
-  add("G", Imf::HALF, &pixels[0].g, sizeof(HalfRgba));
-  add("B", Imf::HALF, &pixels[0].b, sizeof(HalfRgba));
-  add("A", Imf::HALF, &pixels[0].a, sizeof(HalfRgba));
-  add("Z", Imf::FLOAT, depth.data(), sizeof(float));
-  Imf::OutputFile out(file.c_str(), header);
-  out.setFrameBuffer(frame);
-  out.writePixels(image.height);
-}
-
-}  // namespace
 
 std::vector<float> shown_rgb(const RenderedImage& image, ShownColor color) {
   if (color == ShownColor::kBaked && !image.baked_rgb.empty()) return image.baked_rgb;
@@ -69,14 +27,18 @@ Picture picture_of(const RenderedImage& image, ShownColor color) {
   return picture_from_linear(image.width, image.height, shown_rgb(image, color));
 }
 
-void write_exr(const fs::path& file, const RenderedImage& image, ShownColor color) {
-  write_atomically(file, [&](const fs::path& temporary) {
-    try {
-      write_exr_to(temporary, image, color);
-    } catch (const Iex::BaseExc& error) {
-      throw OutputError(file.string() + ": cannot be written: " + error.what());
-    }
-  });
+void write_exr(const fs::path& file, const RenderedImage& image, ShownColor color, const std::string& color_origin) {
+  const std::vector<float> values = shown_rgb(image, color);
+  const std::span<const float> rgb(values);
+  write_exr(file,
+            {image.width,
+             image.height,
+             {{"R", rgb, 3, true},
+              {"G", rgb.subspan(1), 3, true},
+              {"B", rgb.subspan(2), 3, true},
+              {"A", image.opacity, 1, true},
+              {"Z", image.depth}},
+             {{"software", "cnerf " CNERF_VERSION}, {"colorOrigin", color_origin}, {"colorSpace", "lin_rec709"}}});
 }
 
 struct VideoFile::Encoder {

@@ -21,8 +21,9 @@ enum class ShownColor {
 [[nodiscard]] Picture picture_of(const RenderedImage& image, ShownColor color);
 
 /// R G B A half (linear Rec.709, premultiplied), Z float (distance along the optical axis, world units, 0 = none), with
-/// the chromaticities attribute.  @throws OutputError.
-void write_exr(const std::filesystem::path& file, const RenderedImage& image, ShownColor color);
+/// the chromaticities attribute and what is said of the colours' origin.  @throws OutputError.
+void write_exr(const std::filesystem::path& file, const RenderedImage& image, ShownColor color,
+               const std::string& color_origin = {});
 
 /// An MPEG-4 video. The file appears under its name when `finish` succeeds.
 class VideoFile {

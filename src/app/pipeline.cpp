@@ -96,7 +96,6 @@ void train_step(RunContext& context, bool resume) {
   if (!record.stage1_finished || !resume) {
     record.stage1 = train_stage1(context.capture, context.config.stage1, directory.stage1_snapshot(), resume,
                                  context.reporter.sink());
-    context.reporter.sink()({"stage 1", 1.0, {{"psnr", record.stage1.train_psnr}}});
     record.stage1_finished = true;
     directory.save(record);
   }

@@ -61,8 +61,18 @@ void colorize_step(RunContext& context, const std::string& take, const ExistingO
 /// Measures a take (empty: luminance only) and writes metrics.json and the contact sheet.
 void evaluate_step(const RunContext& context, const std::string& take);
 
-/// Bakes a take (empty: grey) to OpenVDB and writes the set-up script and the manifest beside it.
-void bake_step(const RunContext& context, const std::string& take, const std::filesystem::path& folder);
+/// What a bake writes.
+struct BakeFormats {
+  bool vdb = false;   ///< the volume
+  bool gltf = false;  ///< a textured mesh, as .gltf and .glb
+  bool exr = false;   ///< the mesh's textures in floating point, beside the mesh
+};
+/// "vdb,gltf,exr" or some of them; exr brings the mesh along.  @throws UsageError.
+[[nodiscard]] BakeFormats parse_bake_formats(const std::string& list);
+
+/// Bakes a take (empty: grey) and writes the set-up script and the manifest beside it.
+void bake_step(const RunContext& context, const std::string& take, const std::filesystem::path& folder,
+               const BakeFormats& formats);
 
 /// File kinds a render leaves.
 struct RenderOutput {

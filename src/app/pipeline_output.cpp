@@ -2,11 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <sstream>
+
+#include "bake/bake_plan.h"
+#include "bake/mesh/mesh_baker.h"
 #include "bake/volume_baker.h"
-#include "export/volume_export.h"
+#include "export/bake_folder.h"
+#include "export/color_origin.h"
 #include "src/app/pipeline.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/usage.h"
 #include "src/evaluate/evaluate.h"
 
 namespace cnerf {
@@ -30,6 +36,12 @@ std::string colorizer_name(const RunDirectory& directory, const std::string& tak
   return record ? record->colorizer : "";
 }
 
+void note_time(const RunDirectory& directory, const char* step, const Stopwatch& watch) {
+  RunRecord record = directory.record();
+  record.seconds_of_steps[step] = watch.seconds();
+  directory.save(record);
+}
+
 void say_metrics(const Metrics& metrics, Reporter& reporter) {
   const ViewMetrics& mean = metrics.mean;
   std::string text = fmt::format("{} views ({}): luminance {:.2f} dB", metrics.views.size(), metrics.split,
@@ -41,6 +53,14 @@ void say_metrics(const Metrics& metrics, Reporter& reporter) {
   reporter.say(text);
 }
 
+void say_estimate(const Scene& scene, const BakeOptions& options, Reporter& reporter) {
+  const BakePlan plan = plan_bake(scene, options);
+  const BakeEstimate estimate = estimate_bake(scene, plan);
+  reporter.say(fmt::format("bake: {} x {} x {} voxels, at most {:.1f} M of them filled; about {:.1f} GiB of memory",
+                           plan.resolution.x, plan.resolution.y, plan.resolution.z, 1e-6 * double(estimate.voxels),
+                           double(estimate.memory_bytes) / (1 << 30)));
+}
+
 std::vector<BakeCamera> cameras_of(const Capture& capture) {
   std::vector<BakeCamera> cameras;
   for (const View& view : capture.views) cameras.push_back({view.name, view.intrinsics, view.world_from_camera});
@@ -50,8 +70,10 @@ std::vector<BakeCamera> cameras_of(const Capture& capture) {
 /// The files of one render, opened as pictures come.
 class RenderFiles {
  public:
-  RenderFiles(const RenderOutput& output, const std::string& path_name, int fps, Reporter& reporter)
+  RenderFiles(const RenderOutput& output, const std::string& path_name, const std::string& color_origin, int fps,
+              Reporter& reporter)
       : output_(output),
+        color_origin_(color_origin),
         frames_(output.folder / path_name),
         video_path_(output.folder / (path_name + ".mp4")),
         video_(video_path_, fps),
@@ -63,7 +85,7 @@ class RenderFiles {
     const Picture picture = picture_of(image, output_.color);
     if (with_video_ && !video_.add(picture)) give_video_up();
     if (with_png_) write_png(frames_ / (name + ".png"), picture);
-    if (output_.exr) write_exr(frames_ / (name + ".exr"), image, output_.color);
+    if (output_.exr) write_exr(frames_ / (name + ".exr"), image, output_.color, color_origin_);
   }
 
   void finish() {
@@ -82,6 +104,7 @@ class RenderFiles {
   }
 
   const RenderOutput& output_;
+  std::string color_origin_;
   fs::path frames_, video_path_;
   VideoFile video_;
   bool with_video_, with_png_;
@@ -92,6 +115,7 @@ class RenderFiles {
 
 void evaluate_step(const RunContext& context, const std::string& take) {
   const RunDirectory& directory = context.directory;
+  const Stopwatch watch;
   const auto scene = load_scene(directory, take);
   EvaluateOptions options;
   options.render = render_options(context.config);
@@ -113,27 +137,64 @@ void evaluate_step(const RunContext& context, const std::string& take) {
   say_metrics(metrics, context.reporter);
   context.reporter.wrote("metrics", directory.metrics_file());
   context.reporter.wrote("before and after", directory.contact_sheet());
+  note_time(directory, "evaluate", watch);
 }
 
-void bake_step(const RunContext& context, const std::string& take, const fs::path& folder) {
+BakeFormats parse_bake_formats(const std::string& list) {
+  BakeFormats formats;
+  std::istringstream words(list);
+  for (std::string format; std::getline(words, format, ',');) {
+    bool* flag = format == "vdb"    ? &formats.vdb
+                 : format == "gltf" ? &formats.gltf
+                 : format == "exr"  ? &formats.exr
+                                    : nullptr;
+    if (flag == nullptr) throw UsageError("--format: expected vdb, gltf or exr, got '" + format + "'");
+    *flag = true;
+  }
+  if (!formats.vdb && !formats.gltf && !formats.exr) throw UsageError("--format: expected vdb, gltf or exr, got none");
+  formats.gltf = formats.gltf || formats.exr;
+  return formats;
+}
+
+void bake_step(const RunContext& context, const std::string& take, const fs::path& folder, const BakeFormats& formats) {
+  const Stopwatch watch;
   const auto scene = load_scene(context.directory, take);
+  const Config& config = context.config;
   const std::vector<BakeCamera> cameras = cameras_of(context.capture);
-  BakedVolume volume = bake_volume(*scene, cameras, context.config.bake, context.reporter.sink());
-  volume.colorizer = colorizer_name(context.directory, take);
-  volume.take = take;
-  const VolumeExport files = export_volume(volume, cameras, context.command_line, folder, "volume", context.config.vdb);
-  context.reporter.say(fmt::format("bake: {} voxels of {:.4g} world units", volume.voxels.size(), volume.voxel_size));
-  context.reporter.wrote("volume", files.vdb);
-  context.reporter.wrote("Blender set-up", files.blender_setup);
+  BakeFolder bake(folder, cameras, context.command_line, config.vdb.units, config.vdb.up_axis);
+  if (formats.vdb) {
+    say_estimate(*scene, config.bake, context.reporter);
+    BakedVolume volume = bake_volume(*scene, cameras, config.bake, context.reporter.sink());
+    volume.colorizer = colorizer_name(context.directory, take);
+    volume.take = take;
+    const fs::path vdb = bake.add_volume(volume, "volume", config.vdb);
+    context.reporter.say(fmt::format("bake: {} voxels of {:.4g} world units", volume.voxels.size(), volume.voxel_size));
+    context.reporter.wrote("volume", vdb);
+  }
+  if (formats.gltf) {
+    BakedMesh mesh = bake_mesh(*scene, cameras, config.bake, config.mesh, context.reporter.sink());
+    mesh.colorizer = colorizer_name(context.directory, take);
+    mesh.take = take;
+    const GltfFiles files = bake.add_mesh(mesh, "mesh", {formats.exr, config.exr});
+    context.reporter.say(fmt::format("mesh: {} faces, {} charts in {} x {} texels", mesh.triangles.size(), mesh.charts,
+                                     mesh.texture.size, mesh.texture.size));
+    context.reporter.wrote("mesh", files.glb);
+    context.reporter.wrote("mesh", files.gltf);
+  }
+  bake.finish();
+  context.reporter.wrote("Blender set-up", bake.blender_setup());
+  note_time(context.directory, "bake", watch);
 }
 
 void render_step(const RunContext& context, const std::string& take, const CameraPath& path,
                  const RenderOutput& output) {
+  const Stopwatch watch;
   const auto scene = load_scene(context.directory, take);
   RenderOptions options = render_options(context.config);
   options.color = scene->is_colorized() && output.color == ShownColor::kDecoded;
   options.baked_color = scene->is_colorized() && output.color == ShownColor::kBaked;
-  RenderFiles files(output, path.name, context.config.render.fps, context.reporter);
+  const std::string color_origin = color_origin_text(colorizer_name(context.directory, take), take);
+  RenderFiles files(output, path.name, color_origin, context.config.render.fps, context.reporter);
   const ProgressSink progress = context.reporter.sink();
   for (std::size_t i = 0; i < path.cameras.size(); ++i) {
     if (interruption_requested()) throw Interrupted("rendering stopped; the video was not written");
@@ -142,6 +203,7 @@ void render_step(const RunContext& context, const std::string& take, const Camer
     progress({"render " + path.name, double(i + 1) / double(path.cameras.size()), {}});
   }
   files.finish();
+  note_time(context.directory, "render", watch);
 }
 
 }  // namespace cnerf

@@ -6,6 +6,7 @@
 #include "src/app/version.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/usage.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -80,6 +81,8 @@ RunRecord RunDirectory::record() const {
     record.program_version = json.at("program_version").get<std::string>();
     record.command_line = json.at("command_line").get<std::string>();
     record.current_take = json.at("current_take").get<std::string>();
+    record.seconds_of_steps = json.at("seconds_of_steps").get<std::map<std::string, double>>();
+    record.peak_memory_bytes = json.at("peak_memory_bytes").get<std::size_t>();
     const Json& stage1 = json.at("stage1");
     record.stage1_finished = stage1.at("finished").get<bool>();
     record.stage1 = {stage1.at("steps").get<int>(), stage1.at("seconds").get<double>(),
@@ -95,6 +98,8 @@ void RunDirectory::save(const RunRecord& record) const {
                   {"command_line", record.command_line},
                   {"capture", record.capture.string()},
                   {"current_take", record.current_take},
+                  {"seconds_of_steps", record.seconds_of_steps},
+                  {"peak_memory_bytes", std::max(record.peak_memory_bytes, peak_memory_bytes())},
                   {"stage1",
                    {{"finished", record.stage1_finished},
                     {"steps", stage1.steps},

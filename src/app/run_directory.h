@@ -11,6 +11,7 @@
 ///   metrics.json, contact_sheet.png   of the take evaluated last
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -28,7 +29,9 @@ struct RunRecord {
   std::string command_line;  ///< that started the run
   bool stage1_finished = false;
   Stage1Report stage1;
-  std::string current_take;  ///< colorized last; empty = none yet
+  std::string current_take;                        ///< colorized last; empty = none yet
+  std::map<std::string, double> seconds_of_steps;  ///< evaluate, bake, render: what each took last
+  std::size_t peak_memory_bytes = 0;               ///< the most any step's process held
 };
 
 /// Content of takes/NAME/take.json; the file exists once the take is finished.

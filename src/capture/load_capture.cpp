@@ -204,6 +204,17 @@ bool is_cut_out(const View& view) {
   return double(transparent) > kTransparentShare * double(view.image.pixel_count());
 }
 
+/// Where nothing is cut out, what is transparent was not seen (the border of an undistorted picture): to be ignored,
+/// not learnt as empty space.
+void mask_what_is_transparent(MonoImage& image) {
+  if (image.alpha.empty()) return;
+  if (image.mask.empty()) image.mask.assign(image.pixel_count(), 255);
+  for (std::size_t i = 0; i < image.pixel_count(); ++i) {
+    if (image.alpha[i] < 255) image.mask[i] = 0;
+  }
+  image.alpha.clear();
+}
+
 void load_views(const std::vector<ListedView>& listed, Transfer transfer, Capture& capture) {
   std::vector<LoadedView> loaded(listed.size());
   parallel_tasks(listed.size(), [&](std::size_t i) { loaded[i] = load_view(listed[i], transfer); });
@@ -241,6 +252,9 @@ Capture load_capture(const fs::path& path, const CaptureOptions& options) {
   capture.notes = std::move(listing.notes);
   load_views(listing.views, transfer, capture);
   capture.is_bounded_object = std::all_of(capture.views.begin(), capture.views.end(), is_cut_out);
+  if (!capture.is_bounded_object) {
+    for (View& view : capture.views) mask_what_is_transparent(view.image);
+  }
   return capture;
 }
 

@@ -27,6 +27,7 @@ constexpr double kDistance = 3.6;    ///< from the point all cameras look at
 constexpr Vec3d kLookAt = {0, 0, 0.12};
 constexpr std::array<double, 3> kElevations = {20, 36, 53};  ///< degrees above the plate
 constexpr int kTestEvery = 8;
+constexpr int kFirstReference = 1, kReferences = 3;  // training views; the golden angle puts them around the scene
 
 struct RenderedView {
   std::vector<PixelColor> color;  ///< [H, W]
@@ -157,11 +158,12 @@ void check_options(const SampleSceneOptions& options) {
 
 void write_sample_scene(const fs::path& folder, const SampleSceneOptions& options, const ProgressSink& progress) {
   check_options(options);
-  constexpr int kReferenceView = 1;  // the first training view
   for (int view = 0; view < options.views; ++view) {
     const RenderedView rendered = render_view(options, view);
     write_view(folder, options, view, rendered);
-    if (view == kReferenceView) write_png(folder / "reference.png", options, rendered, /*grey=*/false);
+    if (view >= kFirstReference && view < kFirstReference + kReferences) {
+      write_png(folder / "references" / file_name(view, "png"), options, rendered, /*grey=*/false);
+    }
     if (progress) progress({"sample", double(view + 1) / options.views, {}});
   }
   write_file(folder / "transforms.json", transforms_of(options).dump(1) + "\n");

@@ -26,8 +26,8 @@ struct SampleSceneOptions {
 
 /// Writes a capture a user could have made: `images/*.png` (grey), `transforms.json` (with bounds and a train/test
 /// split of every 8th view); beside it `color/*.png` (ground truth, same names), `depth/*.exr` (distance along the
-/// optical axis, world units, 0 = nothing hit) and `reference.png`, one colour view that serves as `reference:`.
-/// Same options, same bytes, on any number of threads.
+/// optical axis, world units, 0 = nothing hit) and `references/*.png`, three colour views from around the scene that
+/// serve as `reference:`. Same options, same bytes, on any number of threads.
 void write_sample_scene(const std::filesystem::path& folder, const SampleSceneOptions& options,
                         const ProgressSink& progress = {});
 

@@ -18,10 +18,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// `a.jpg,b.jpg`; a file whose own name holds commas is found before the text is split.
+/// The files of a folder in the order of their names, or the file itself.
+std::vector<fs::path> files_of(const fs::path& place) {
+  if (!fs::is_directory(place)) return {place};
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(place)) {
+    const bool hidden = entry.path().filename().string().front() == '.';
+    if (entry.is_regular_file() && !hidden) files.push_back(entry.path());
+  }
+  if (files.empty()) throw MissingInputError(place.string() + ": holds no reference photographs");
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// `a.jpg,b.jpg` or a folder; a file whose own name holds commas is found before the text is split.
 std::vector<fs::path> reference_files(const std::string& argument, const ColorizerOptions& options) {
   if (fs::exists(argument) || (!options.working_folder.empty() && fs::exists(options.working_folder / argument))) {
-    return {find_spec_file(argument, options)};
+    return files_of(find_spec_file(argument, options));
   }
   std::vector<fs::path> files;
   for (std::size_t begin = 0; begin <= argument.size();) {

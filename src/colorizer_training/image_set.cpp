@@ -42,10 +42,10 @@ void on_all_cores(std::size_t count, const std::function<void(std::size_t)>& tas
   if (failure) std::rethrow_exception(failure);
 }
 
-bool is_held_out(const std::string& name) {
+bool is_held_out(const std::string& name, int parts) {
   std::uint64_t hash = 0xcbf29ce484222325ull;  // FNV-1a
   for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
-  return mix_bits(hash) % kHeldOutOneIn == 0;
+  return int(mix_bits(hash) % kHeldOutParts) < parts;
 }
 
 RgbImage decode_or_throw(const fs::path& source, const NamedBytes& entry) {
@@ -85,7 +85,7 @@ struct DecodedPhoto {
   bool held_out = false;
 };
 
-std::vector<DecodedPhoto> decode_photos(const std::vector<fs::path>& sources) {
+std::vector<DecodedPhoto> decode_photos(const std::vector<fs::path>& sources, int held_out) {
   std::vector<DecodedPhoto> photos;
   for (const fs::path& source : sources) {
     const std::vector<NamedBytes> entries = read_tar_or_folder(source);
@@ -96,7 +96,7 @@ std::vector<DecodedPhoto> decode_photos(const std::vector<fs::path>& sources) {
       DecodedPhoto& photo = photos[first + i];
       photo.name = entries[i].name;
       photo.aspect = float(image.width) / float(image.height);
-      photo.held_out = is_held_out(photo.name);
+      photo.held_out = is_held_out(photo.name, held_out);
       photo.image = photo.held_out ? at_evaluation_size(image) : resize_image(image, kPhotoCanvas, kPhotoCanvas);
     });
   }
@@ -131,7 +131,7 @@ void weigh_by_set(const std::vector<std::string>& set_of_photo, TrainingImages& 
 
 void add_photos(const ImageSources& sources, ImageSet& set) {
   set.photos.side = kPhotoCanvas;
-  std::vector<DecodedPhoto> photos = decode_photos(sources.photos);
+  std::vector<DecodedPhoto> photos = decode_photos(sources.photos, sources.held_out);
   const std::map<std::string, int> numbers = number_labels(photos, set.classes);
   std::vector<std::string> set_of_photo;
   for (auto& photo : photos) {
@@ -160,8 +160,8 @@ std::vector<int> read_labels(const fs::path& file) {
   return labels;
 }
 
-void add_tile(const RgbImage& tile, const std::string& name, int label, ImageSet& set) {
-  if (is_held_out(name)) {
+void add_tile(const RgbImage& tile, const std::string& name, int label, int held_out, ImageSet& set) {
+  if (is_held_out(name, held_out)) {
     set.validation[kTileSet].push_back(at_evaluation_size(tile));
     return;
   }
@@ -186,7 +186,7 @@ void add_mosaics(const ImageSources& sources, ImageSet& set) {
           const bool labelled = std::size_t(tile_number) < labels.size();
           add_tile(crop_image(mosaic, x, y, sources.tile_side, sources.tile_side),
                    std::string(kTileSet) + "/" + std::to_string(tile_number),
-                   labelled ? first_class + labels[std::size_t(tile_number)] : -1, set);
+                   labelled ? first_class + labels[std::size_t(tile_number)] : -1, sources.held_out, set);
         }
       }
     }

@@ -13,7 +13,7 @@ namespace cnerf {
 
 inline constexpr int kPhotoCanvas = 176;     ///< side of a training photograph's square canvas, pixels
 inline constexpr int kEvaluationSide = 160;  ///< short side of images that are judged, pixels
-inline constexpr int kHeldOutOneIn = 20;     ///< a twentieth of every set is for validation, chosen by name
+inline constexpr int kHeldOutParts = 20;     ///< of every set; some of them, chosen by name, are for validation
 
 /// What images are known to be. Classes of different sets are never compared with each other.
 struct ClassList {
@@ -41,6 +41,7 @@ struct ImageSources {
   std::vector<std::filesystem::path> mosaics;  ///< tars or folders of mosaics of square tiles, in this order
   std::filesystem::path mosaic_labels;         ///< .npy, uint8, one a tile; empty = no labels
   int tile_side = 64;
+  int held_out = 1;           ///< of kHeldOutParts
   bool balance_sets = false;  ///< draw a set of n photographs sqrt(n), not n, times as often as one of a single one
 };
 

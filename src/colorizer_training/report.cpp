@@ -1,8 +1,10 @@
 #include "src/colorizer_training/report.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 
 #include "src/colorizer_training/batch.h"
 
@@ -44,14 +46,16 @@ void paste(RgbImage& sheet, const RgbImage& image, int x, int y) {
 DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& validation, const Tensor& log_weights,
                                const SoftLabelTable& table, torch::Device device) {
   std::vector<DecodingChoice> choices;
-  for (const double share : {0.0, 0.15, 0.3, 0.45, 0.6, 0.8}) {
-    for (const double temperature : {1.0, 0.7, 0.45}) {
-      for (const double gain : {1.0, 1.15}) choices.push_back({share, {temperature, gain}});
+  for (const double share : {0.0, 0.1, 0.2, 0.3, 0.45, 0.6}) {
+    for (const double temperature : {1.0, 0.8}) {
+      for (const double gain : {0.9, 1.0, 1.15}) choices.push_back({share, {temperature, gain}});
     }
   }
-  const std::vector<RgbImage> images = photographs(validation, false);
+  // Scenes: the large sets of single things have near duplicates among the training images.
+  std::vector<RgbImage> images = photographs(validation, true);
+  if (images.empty()) images = photographs(validation, false);
   if (images.empty()) return {};
-  const ChromaScore grey = score_baselines(images, table, device).grey;
+  const ChromaScore grey = score_grey(images, table, device);
   const std::vector<ChromaScore> scores = score_network(network, images, choices, log_weights, true, table, device);
   std::size_t best = 0;
   for (std::size_t i = 0; i < choices.size(); ++i) {
@@ -75,6 +79,7 @@ std::vector<SetScore> score_sets(ColorizerNet& network, const AbDecoding& decodi
   }
   if (sets.size() > 2) {
     scores.push_back(score_set("all photographs held out", photographs(sets, false), network, decoding, table, device));
+    scores.push_back(score_set("scenes held out", photographs(sets, true), network, decoding, table, device));
   }
   return scores;
 }
@@ -111,7 +116,7 @@ std::string validation_line(ColorizerNet& network, const EvaluationSets& validat
   for (const bool scenes : {false, true}) {
     const std::vector<RgbImage> images = photographs(validation, scenes);
     if (images.empty()) continue;
-    const ChromaScore grey = score_baselines(images, table, device).grey;
+    const ChromaScore grey = score_grey(images, table, device);
     const ChromaScore score = score_network(network, images, {DecodingChoice{}}, {}, false, table, device)[0];
     char line[200];
     std::snprintf(line, sizeof line, "%s raw %+.2f balanced %+.2f rmse %.3f merit %.2f",
@@ -120,6 +125,20 @@ std::string validation_line(ColorizerNet& network, const EvaluationSets& validat
     text += line;
   }
   return text;
+}
+
+double patch_milliseconds(ColorizerNet& network, const AbDecoding& decoding, torch::Device device) {
+  constexpr int kBatch = 8, kTries = 40;
+  const torch::NoGradGuard no_grad;
+  const Tensor lightness = 100 * torch::rand({kBatch, 1, 128, 128}, device);
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kTries; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    (void)colorize_with_flips(network, lightness, decoding).cpu();
+    const std::chrono::duration<double, std::milli> taken = std::chrono::steady_clock::now() - start;
+    least = std::min(least, taken.count() / kBatch);
+  }
+  return least;
 }
 
 }  // namespace cnerf

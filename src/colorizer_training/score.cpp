@@ -80,10 +80,27 @@ Tensor color_histogram(const std::vector<RgbImage>& images, torch::Device device
   return counts.cpu();
 }
 
+/// The colours that occur.
+struct ColorCounts {
+  Tensor counts;  ///< [N] f64 pixels
+  Tensor grid;    ///< [N, 2] f32 ab
+  Tensor bins;    ///< [N] i64
+};
+ColorCounts count_colors(const std::vector<RgbImage>& images, const SoftLabelTable& table, torch::Device device) {
+  const Tensor all = color_histogram(images, device);
+  const Tensor used = (all > 0).nonzero().squeeze(1);
+  const Tensor grid =
+      torch::stack({used.div(kGridSide, "floor") - kGridLimit, used.remainder(kGridSide) - kGridLimit}, 1)
+          .to(torch::kFloat32);
+  const Tensor bins = table.look_up(grid.t().view({1, 2, -1, 1}).to(device)).bin.select(1, 0).cpu();
+  return {all.index_select(0, used), grid, bins};
+}
+
 /// Score of one colour for all the pixels counted on the grid.
-ChromaScore score_constant(const Tensor& counts, const Tensor& grid, const Tensor& bins, Ab color) {
-  const Tensor distance = (grid - torch::tensor({color.a, color.b})).square().sum(1).sqrt();
-  const Tensor index = bins * (kThresholds + 2) + error_column(distance);
+ChromaScore score_constant(const ColorCounts& colors, Ab color) {
+  const Tensor& counts = colors.counts;
+  const Tensor distance = (colors.grid - torch::tensor({color.a, color.b})).square().sum(1).sqrt();
+  const Tensor index = colors.bins * (kThresholds + 2) + error_column(distance);
   const Tensor histogram =
       torch::bincount(index, counts, kAbBinCount * (kThresholds + 2)).view({kAbBinCount, kThresholds + 2});
   const AucPair auc = auc_of(histogram);
@@ -137,21 +154,19 @@ std::vector<ChromaScore> score_network(ColorizerNet& network, const std::vector<
   return scores;
 }
 
+ChromaScore score_grey(const std::vector<RgbImage>& images, const SoftLabelTable& table, torch::Device device) {
+  const torch::NoGradGuard no_grad;
+  return score_constant(count_colors(images, table, device), {0, 0});
+}
+
 Baselines score_baselines(const std::vector<RgbImage>& images, const SoftLabelTable& table, torch::Device device) {
   const torch::NoGradGuard no_grad;
-  const Tensor all = color_histogram(images, device);
-  const Tensor used = (all > 0).nonzero().squeeze(1);
-  const Tensor counts = all.index_select(0, used);
-  const Tensor grid =
-      torch::stack({used.div(kGridSide, "floor") - kGridLimit, used.remainder(kGridSide) - kGridLimit}, 1)
-          .to(torch::kFloat32);
-  const Tensor bins = table.look_up(grid.t().view({1, 2, -1, 1}).to(device)).bin.select(1, 0).cpu();
-
-  Baselines baselines{score_constant(counts, grid, bins, {0, 0}), {}};
+  const ColorCounts colors = count_colors(images, table, device);
+  Baselines baselines{score_constant(colors, {0, 0}), {}};
   ChromaScore& best = baselines.best_constant;
   best = baselines.grey;
   for (const Ab& centre : ab_bin_centres()) {
-    const ChromaScore score = score_constant(counts, grid, bins, centre);
+    const ChromaScore score = score_constant(colors, centre);
     best.raw_auc = std::max(best.raw_auc, score.raw_auc);
     best.balanced_auc = std::max(best.balanced_auc, score.balanced_auc);
     best.rmse = std::min(best.rmse, score.rmse);
@@ -160,9 +175,9 @@ Baselines score_baselines(const std::vector<RgbImage>& images, const SoftLabelTa
 }
 
 double merit(const ChromaScore& network, const ChromaScore& grey) {
-  constexpr double kPointsForRmse = 25;
-  return network.balanced_auc - grey.balanced_auc + network.raw_auc - grey.raw_auc +
-         kPointsForRmse * (1 - network.rmse / grey.rmse);
+  constexpr double kRmseShare = 0.85, kRawGain = 0.3;
+  return network.balanced_auc - grey.balanced_auc - 100 * std::max(0.0, network.rmse / grey.rmse - kRmseShare) -
+         2 * std::max(0.0, kRawGain - (network.raw_auc - grey.raw_auc));
 }
 
 std::string score_table(const std::vector<SetScore>& sets) {

@@ -20,9 +20,9 @@ using torch::Tensor;
 
 namespace {
 
-constexpr int kPriorBatches = 50;
+constexpr int kPriorBatches = 100, kStatisticsBatches = 60;
 constexpr std::uint64_t kCropStream = 0x63726f70;     // the size of each step's crops
-constexpr std::uint64_t kPriorStream = 0x7072696f72;  // batches that only measure the prior
+constexpr std::uint64_t kPriorStream = 0x7072696f72;  // batches that only measure
 
 /// bf16 for matrix products and convolutions on CUDA while it lives; weights and losses stay f32.
 class MixedPrecision {
@@ -81,24 +81,28 @@ ColorizerTrainer::ColorizerTrainer(const ImageSet& images, std::unique_ptr<Featu
       optimizer_(parameters_, options.adamw) {
   if (images.photos.size() == 0) options_.photos_per_step = 0;
   if (images.tiles.size() == 0) options_.tiles_per_step = 0;
+  if (images.photos.size() == 0 || images.tiles.size() == 0) options_.tile_share = 0;
   CNERF_CHECK(options_.photos_per_step + options_.tiles_per_step > 0, "there are images to train on");
   averaged_->eval();
   class_weights_ = measure_class_weights();
 }
 
-Batch ColorizerTrainer::next_batch(std::int64_t step) const {
-  const bool large = CounterRng(options_.seed, kCropStream).uniform(std::uint64_t(step)) < options_.large_crop_share;
-  return make_batch({&photos_, &tiles_}, {options_.photos_per_step, options_.tiles_per_step},
-                    large ? options_.large_crop_side : options_.crop_side, options_.augment, options_.seed, step,
+Batch ColorizerTrainer::batch_of(std::uint64_t seed, std::int64_t step, double tile_share) const {
+  SequentialRng rng(seed ^ kCropStream, std::uint64_t(step));
+  if (rng.uniform() < tile_share) {
+    return make_batch({&tiles_}, {options_.tiles_per_step}, options_.tile_crop_side, options_.tile_augment, seed, step,
+                      device_);
+  }
+  const int side = options_.crop_sides.at(rng.below(std::uint32_t(options_.crop_sides.size())));
+  const int tiles = options_.tile_share == 0 ? options_.tiles_per_step : 0;
+  return make_batch({&photos_, &tiles_}, {options_.photos_per_step, tiles}, side, options_.augment, seed, step,
                     device_);
 }
 
 Tensor ColorizerTrainer::measure_class_weights() const {
   std::vector<Tensor> samples;
   for (int i = 0; i < kPriorBatches; ++i) {
-    samples.push_back(make_batch({&photos_, &tiles_}, {options_.photos_per_step, options_.tiles_per_step},
-                                 options_.crop_side, options_.augment, options_.seed ^ kPriorStream, i, device_)
-                          .ab);
+    samples.push_back(batch_of(options_.seed ^ kPriorStream, i, options_.tile_share).ab);
   }
   const Tensor prior = measure_prior(samples, table_).contiguous();
   const std::vector<float> weights =
@@ -116,7 +120,8 @@ double ColorizerTrainer::learning_rate() const {
 StepLosses ColorizerTrainer::step() {
   network_->train();
   heads_->train();
-  const Batch batch = next_batch(step_);  // also seeds the generators that dropout draws from
+  // Also seeds the generators that dropout draws from.
+  const Batch batch = batch_of(options_.seed, step_, options_.tile_share);
   ColorizerFeatures features;
   Tensor labels, mixed_labels, predicted, teacher;
   {
@@ -139,6 +144,22 @@ StepLosses ColorizerTrainer::step() {
   average_weights();
   ++step_;
   return {color.classification.detach(), color.regression.detach(), label.detach(), feature.detach()};
+}
+
+void ColorizerTrainer::measure_statistics() {
+  if (options_.tile_share == 0) return;
+  const torch::NoGradGuard no_grad;
+  const MixedPrecision mixed(device_);
+  std::vector<torch::nn::BatchNorm2dImpl*> norms;
+  for (const auto& module : averaged_->modules()) {
+    if (auto* norm = module->as<torch::nn::BatchNorm2dImpl>()) norms.push_back(norm);
+  }
+  for (auto* norm : norms) norm->train();  // nothing else: no dropout, no dropped paths
+  for (int i = 0; i < kStatisticsBatches; ++i) {
+    for (auto* norm : norms) norm->options.momentum(1.0 / (i + 1));  // a plain mean over the batches
+    (void)averaged_->forward(batch_of(options_.seed ^ kPriorStream, i, 0).lightness);
+  }
+  averaged_->eval();
 }
 
 void ColorizerTrainer::average_weights() {

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "src/colorizer/network.h"
 #include "src/colorizer_training/batch.h"
@@ -19,8 +20,9 @@ namespace cnerf {
 struct TrainerOptions {
   int steps = 60000;
   int photos_per_step = 96, tiles_per_step = 56;
-  int crop_side = 128, large_crop_side = 160;       ///< multiples of 32
-  double large_crop_share = 0.4;                    ///< of the steps
+  std::vector<int> crop_sides = {128, 128, 128, 160, 160};  ///< one a step; multiples of 32
+  double tile_share = 0;    ///< of the steps, with tiles alone, at their own size; 0 = some of both in every step
+  int tile_crop_side = 64;  ///< of such steps
   double learning_rate = 1e-3, final_share = 0.01;  ///< cosine from the first to first * share
   int warmup_steps = 500;
   double rebalancing = 0.5;  ///< lambda
@@ -31,6 +33,7 @@ struct TrainerOptions {
   int epoch_steps = 2000;        ///< between checkpoints, scores and pictures
   std::uint64_t seed = 1;
   AugmentOptions augment;
+  AugmentOptions tile_augment{.patch_share = 0, .blur_sigma = 0.8};  ///< of steps with tiles alone
   AdamWOptions adamw;
 };
 
@@ -55,6 +58,9 @@ class ColorizerTrainer {
 
   /// The averaged network, in evaluation mode, on the training device.
   [[nodiscard]] ColorizerNet& averaged() { return averaged_; }
+  /// Where steps held tiles alone: measures the averaged network's normalisation statistics on photographs, which those
+  /// gathered in training are a mixture for. Repeating it changes nothing.
+  void measure_statistics();
   [[nodiscard]] const SoftLabelTable& table() const { return table_; }
   /// [313] f32 on the device: the class weights of the loss.
   [[nodiscard]] const torch::Tensor& class_weights() const { return class_weights_; }
@@ -64,7 +70,7 @@ class ColorizerTrainer {
   void load(const std::filesystem::path& checkpoint);
 
  private:
-  [[nodiscard]] Batch next_batch(std::int64_t step) const;
+  [[nodiscard]] Batch batch_of(std::uint64_t seed, std::int64_t step, double tile_share) const;
   [[nodiscard]] double learning_rate() const;
   [[nodiscard]] torch::Tensor measure_class_weights() const;
   void average_weights();

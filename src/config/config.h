@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "bake/bake_options.h"
+#include "bake/mesh/mesh_options.h"
+#include "export/exr_writer.h"
 #include "export/vdb_writer.h"
 #include "src/capture/load_capture.h"
 #include "src/train/scene.h"
@@ -55,6 +57,8 @@ struct Config {
   Stage2Options stage2;
   BakeOptions bake;
   VdbOptions vdb;
+  MeshOptions mesh;
+  ExrOptions exr;
   RenderConfig render;
 
   template <typename Visitor>
@@ -67,6 +71,8 @@ struct Config {
     v.section("stage2", stage2);
     v.section("bake", bake);
     v.section("vdb", vdb);
+    v.section("mesh", mesh);
+    v.section("exr", exr);
     v.section("render", render);
   }
 };

@@ -49,6 +49,14 @@ struct WeightedSample {
   float luminance = 0;
 };
 
+/// What may be left out of a picture for speed.
+struct RenderEffort {
+  float min_transmittance = 1e-3f;  ///< a ray ends below this
+  /// Of a ray's weight: only the heaviest samples that carry this much are shaded, and their weights are scaled up to
+  /// the ray's whole opacity. Most samples of a ray weigh next to nothing; 1 shades them all.
+  float shaded_share = 1;
+};
+
 class LuminanceEngine {
  public:
   virtual ~LuminanceEngine() = default;
@@ -58,10 +66,10 @@ class LuminanceEngine {
   [[nodiscard]] virtual long step_count() const = 0;
 
   /// @param march  may step otherwise than training did
-  virtual void render(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+  virtual void render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                       std::span<RayResult> results) const = 0;
   /// The samples behind `render`'s results, ray by ray in order; `offsets` has rays + 1 entries.
-  virtual void trace(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+  virtual void trace(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                      std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const = 0;
 
   virtual void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const = 0;

@@ -57,7 +57,8 @@ ColorModel ColorModel::load(const std::filesystem::path& file) {
   try {
     model = create(options_from_json<Stage2Options>(snapshot.header().at("options")));
     const nlohmann::json& report = snapshot.header().at("report");
-    model.report = {report.at("accepted"), report.at("rejected"), report.at("seconds"), report.at("colorizer_seconds"),
+    SnapshotTimes times = load_times(file);
+    model.report = {report.at("accepted"), report.at("rejected"), times["seconds"], times["colorizer_seconds"],
                     report.at("bake_ab_distance")};
   } catch (const nlohmann::json::exception& problem) {
     throw SnapshotError(file.string() + ": header: " + problem.what());
@@ -71,17 +72,15 @@ ColorModel ColorModel::load(const std::filesystem::path& file) {
 }
 
 void ColorModel::save(const std::filesystem::path& file) {
-  save_snapshot(file, kKind,
-                {{"options", options_to_json(options)},
-                 {"colorizer", colorizer},
-                 {"stage1_sha256", stage1_sha256},
-                 {"report",
-                  {{"accepted", report.accepted},
-                   {"rejected", report.rejected},
-                   {"seconds", report.seconds},
-                   {"colorizer_seconds", report.colorizer_seconds},
-                   {"bake_ab_distance", report.bake_ab_distance}}}},
-                state());
+  save_snapshot(
+      file, kKind,
+      {{"options", options_to_json(options)},
+       {"colorizer", colorizer},
+       {"stage1_sha256", stage1_sha256},
+       {"report",
+        {{"accepted", report.accepted}, {"rejected", report.rejected}, {"bake_ab_distance", report.bake_ab_distance}}}},
+      state());
+  save_times(file, {{"seconds", report.seconds}, {"colorizer_seconds", report.colorizer_seconds}});
 }
 
 std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {

@@ -34,33 +34,48 @@ float brightest(const Capture& capture) {
   return brightest;
 }
 
-/// Space that no training view sees, or only nearer than the capture says anything is, stays empty: nothing would teach
-/// the field what is there, and it would be baked as fog.
+/// So many views have to agree on what is in front of what they look at.
+constexpr std::ptrdiff_t kAgreeingViews = 3;
+
+/// Leaves out space about which the training views say nothing, so that no fog is learnt and baked there: what none of
+/// them sees, what is nearer than the capture's near bound, and what only one or two of them see in front of the point
+/// they look at. There each view could hold a picture of its own, just before its lens, and geometry would never form.
+/// Behind that point a single view counts: that is where backgrounds are.
 void exclude_unseen(const Capture& capture, LuminanceModel& model) {
   struct Eye {
     Affined camera_from_unit;
     const Intrinsics* lens;
+    double focus;  ///< distance of what the views look at
   };
-  std::vector<Eye> eyes;
   const double world_per_unit = 1.0 / model.frame.unit_per_world;
+  const Vec3d focus = focus_point(capture.views);
+  std::vector<Eye> eyes;
   for (const View& view : capture.views) {
     if (view.held_out) continue;
     const Affined world_from_unit = {Mat3d::identity() * world_per_unit, model.frame.world_from_unit({0, 0, 0})};
-    eyes.push_back({view.world_from_camera.inverse() * world_from_unit, &view.intrinsics});
+    eyes.push_back({view.world_from_camera.inverse() * world_from_unit, &view.intrinsics,
+                    length(view.world_from_camera.translation - focus)});
   }
+  const auto agreeing = std::min(kAgreeingViews, std::ptrdiff_t(eyes.size()) / 4);
   const double near = capture.depth_range ? 0.9 * capture.depth_range->near : 0.0;
   model.engine->exclude([&](Vec3f centre, float radius) {
     const double reach = double(radius) * world_per_unit;
-    return std::any_of(eyes.begin(), eyes.end(), [&](const Eye& eye) {
+    std::ptrdiff_t in_front = 0;
+    for (const Eye& eye : eyes) {
       const Vec3d point = eye.camera_from_unit.point(centre.cast<double>());
-      if (point.z + reach < near) return false;
-      if (length(point) < 2 * reach) return true;
-      const auto pixel = project(*eye.lens, point);
-      if (!pixel) return false;
-      const double margin = 1.2 * reach / point.z * eye.lens->fx;
-      return pixel->x > -margin && pixel->y > -margin && pixel->x < eye.lens->width + margin &&
-             pixel->y < eye.lens->height + margin;
-    });
+      if (point.z + reach < near) continue;
+      if (length(point) >= 2 * reach) {
+        const auto pixel = project(*eye.lens, point);
+        if (!pixel) continue;
+        const double margin = 1.2 * reach / point.z * eye.lens->fx;
+        if (pixel->x < -margin || pixel->y < -margin || pixel->x > eye.lens->width + margin ||
+            pixel->y > eye.lens->height + margin) {
+          continue;
+        }
+      }
+      if (length(point) + reach > eye.focus || ++in_front >= agreeing) return true;
+    }
+    return false;
   });
 }
 
@@ -99,7 +114,7 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file) {
     throw SnapshotError(file.string() + ": header: " + problem.what());
   }
   model.max_luminance = header_field<float>(snapshot, "max_luminance");
-  model.seconds = header_field<double>(snapshot, "seconds");
+  model.seconds = load_times(file)["seconds"];
   model.trained_samples = header_field<double>(snapshot, "trained_samples");
   model.engine = make_engine(model.frame, model.options, model.max_luminance);
   snapshot.restore(model.engine->state());
@@ -112,10 +127,10 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
                 {{"frame", frame_to_json(frame)},
                  {"options", options_to_json(options)},
                  {"max_luminance", max_luminance},
-                 {"seconds", seconds},
                  {"trained_samples", trained_samples},
                  {"step", engine->step_count()}},
                 engine->state());
+  save_times(file, {{"seconds", seconds}});
 }
 
 }  // namespace cnerf

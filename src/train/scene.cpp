@@ -12,7 +12,7 @@ namespace cnerf {
 namespace {
 
 constexpr std::size_t kRaysAtATime = 16384;  // bounds the memory of traced samples
-constexpr double kShownWeight = 0.995;       // share of a pixel's weight whose colours are looked up
+constexpr float kShadedShare = 0.995f;       // what the rest could change is below a grey level of an 8-bit picture
 
 /// One result a pixel of an image, three channels interleaved.
 void put_color(std::vector<float>& image, std::size_t pixel, Ab color, float luminance) {
@@ -77,7 +77,7 @@ class TrainedScene final : public Scene {
     std::vector<WeightedSample> samples;
     std::vector<std::size_t> offsets;
     luminance_.engine->trace(rays, luminance_.march(options.steps_per_box),
-                             static_cast<float>(options.min_transmittance), samples, offsets);
+                             {static_cast<float>(options.min_transmittance), kShadedShare}, samples, offsets);
     const Vec3f axis = camera.unit_from_camera.column(2).cast<float>();
     for (std::size_t r = 0; r < rays.size(); ++r) {
       float weighted_t = 0;
@@ -93,7 +93,6 @@ class TrainedScene final : public Scene {
     }
     if (image.rgb.empty() && image.baked_rgb.empty()) return;
 
-    trim_samples(samples, offsets, kShownWeight);
     const PixelSamples pixels = pixel_samples(rays, samples, offsets);
     if (!image.rgb.empty()) {
       const std::vector<Ab> colors = color_->decode(pixels);

@@ -101,4 +101,26 @@ void Snapshot::restore(const std::vector<StatePiece>& pieces) const {
   }
 }
 
+namespace {
+
+std::filesystem::path times_file(const std::filesystem::path& snapshot) {
+  return std::filesystem::path(snapshot).replace_extension(".seconds.json");
+}
+
+}  // namespace
+
+void save_times(const std::filesystem::path& snapshot, const SnapshotTimes& times) {
+  write_file(times_file(snapshot), nlohmann::json(times).dump(2) + "\n");
+}
+
+SnapshotTimes load_times(const std::filesystem::path& snapshot) {
+  try {
+    return nlohmann::json::parse(read_text_file(times_file(snapshot))).get<SnapshotTimes>();
+  } catch (const MissingInputError&) {
+    return {};
+  } catch (const nlohmann::json::exception&) {
+    return {};
+  }
+}
+
 }  // namespace cnerf

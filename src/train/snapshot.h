@@ -5,6 +5,7 @@
 /// header's order, then 64 hex digits of the SHA-256 of all before. Little-endian.
 
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -14,7 +15,7 @@
 
 namespace cnerf {
 
-inline constexpr std::uint32_t kSnapshotVersion = 1;
+inline constexpr std::uint32_t kSnapshotVersion = 2;  // 2: the luminance net answers in L*
 
 /// @param header  gains "kind" and "pieces".
 void save_snapshot(const std::filesystem::path& file, const std::string& kind, nlohmann::json header,
@@ -37,6 +38,12 @@ class Snapshot {
   std::size_t pieces_begin_ = 0;
   nlohmann::json header_;
 };
+
+/// Seconds that went into a snapshot, by name, in a file beside it: a snapshot depends on its input alone, bit for bit,
+/// which no clock does. Nothing is read where the file is missing or damaged.
+using SnapshotTimes = std::map<std::string, double>;
+void save_times(const std::filesystem::path& snapshot, const SnapshotTimes& times);
+[[nodiscard]] SnapshotTimes load_times(const std::filesystem::path& snapshot);
 
 /// The value of a header field.  @throws SnapshotError naming file and field when it is missing or of another type.
 template <typename T>

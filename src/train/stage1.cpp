@@ -1,22 +1,16 @@
 #include "src/train/stage1.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <deque>
 
 #include "src/base/error.h"
+#include "src/base/usage.h"
 #include "src/train/luminance_model.h"
 #include "src/train/options_json.h"
 
 namespace cnerf {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// Constant over the first half of the steps, then an exponential decay.
 float learning_rate(const Stage1Options& options, double fraction) {
@@ -71,7 +65,8 @@ Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, 
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
 
   const double seconds_before = model.seconds;
-  const Clock::time_point start = Clock::now();
+  const Stopwatch watch;
+  double rays = 0;
   RunningPsnr psnr;
   while (model.engine->step_count() < options.steps) {
     double fraction = double(model.engine->step_count()) / options.steps;
@@ -81,16 +76,15 @@ Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, 
     }
     const StepReport step = model.engine->step(views, learning_rate(options, fraction));
     model.trained_samples += double(step.trained_samples);
-    model.seconds = seconds_before + seconds_since(start);
+    model.seconds = seconds_before + watch.seconds();
+    rays += double(step.rays);
     psnr.add(step.squared_error);
 
     const long done = model.engine->step_count();
     if (progress) {
       progress({"stage 1",
                 fraction,
-                {{"psnr", psnr.value()},
-                 {"rays/s", double(step.rays) * double(done) / model.seconds},
-                 {"samples", model.trained_samples}}});
+                {{"psnr", psnr.value()}, {"rays/s", rays / watch.seconds()}, {"samples", model.trained_samples}}});
     }
     if (interruption_requested()) {
       model.save(snapshot);
@@ -100,6 +94,7 @@ Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, 
     if (options.checkpoint_every > 0 && done % options.checkpoint_every == 0) model.save(snapshot);
   }
   model.save(snapshot);
+  if (progress) progress({"stage 1", 1.0, {{"psnr", psnr.value()}}});
   return {int(model.engine->step_count()), model.seconds, model.trained_samples, psnr.value()};
 }
 

@@ -1,15 +1,14 @@
 #include "src/train/stage2.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numeric>
-#include <optional>
 #include <sstream>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/rng.h"
+#include "src/base/usage.h"
 #include "src/colorizer/gallery.h"
 #include "src/train/color_model.h"
 #include "src/train/luminance_model.h"
@@ -19,17 +18,11 @@
 namespace cnerf {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr int kBaseCandidates = 12;
 constexpr int kDistillPixels = 8192;  // pixels a distillation step
 constexpr std::size_t kGalleryTiles = 20;
 constexpr std::uint64_t kFirstBaseIndex = std::uint64_t(1) << 32;  // patch indices of bases, apart from training's
 constexpr int kMostRejectedInARow = 400;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 float decayed(double from, double to, double fraction) {
   return static_cast<float>(from * std::pow(to / from, std::clamp(2.0 * fraction - 1.0, 0.0, 1.0)));
@@ -50,12 +43,11 @@ class Colorization {
       : options_(options), colorizer_(colorizer), file_(std::move(take_snapshot)), progress_(progress) {
     const std::string stage1_digest = sha256(read_binary_file(stage1_snapshot));
     start_or_resume(stage1_digest, resume);
+    seconds_before_ = model_.report.seconds;
     cache_views(capture, LuminanceModel::load(stage1_snapshot));
   }
 
   Stage2Report run() {
-    start_ = Clock::now();
-    seconds_before_ = model_.report.seconds;
     const std::vector<AnsweredPatch> bases = choose_bases();
     std::vector<ColorPatchView> base_views;
     for (const AnsweredPatch& base : bases) base_views.push_back(view_of(base));
@@ -100,7 +92,7 @@ class Colorization {
   }
 
   std::vector<AnsweredPatch> ask(const std::vector<PatchPlace>& places) {
-    const Clock::time_point start = Clock::now();
+    const Stopwatch watch;
     const int k = options_.patch_size;
     LightnessBatch question{int(places.size()), k, k, {}};
     std::vector<AnsweredPatch> answered;
@@ -112,7 +104,7 @@ class Colorization {
     const ChromaBatch answer = colorizer_.colorize(question);
     check_answer(colorizer_.name(), question, answer);
     for (std::size_t i = 0; i < answered.size(); ++i) answered[i].ab = ab_of(answer, int(i));
-    model_.report.colorizer_seconds += seconds_since(start);
+    model_.report.colorizer_seconds += watch.seconds();
     return answered;
   }
 
@@ -289,7 +281,7 @@ class Colorization {
   }
 
   void save() {
-    if (start_) model_.report.seconds = seconds_before_ + seconds_since(*start_);
+    model_.report.seconds = seconds_before_ + watch_.seconds();
     model_.save(file_);
   }
 
@@ -310,7 +302,7 @@ class Colorization {
   std::vector<float> class_weights_;  // [313]; empty = all alike
   std::vector<GalleryTile> accepted_, rejected_;
   double loss_ = 0;
-  std::optional<Clock::time_point> start_;
+  Stopwatch watch_;
   double seconds_before_ = 0;
 };
 

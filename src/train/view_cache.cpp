@@ -9,26 +9,6 @@ namespace {
 constexpr float kFullScale = 65535.0f;
 constexpr float kCacheTransmittance = 2e-3f;  // what lies behind is not worth a sample
 
-/// Marks the heaviest samples of [begin, end) until they carry `share` of the total.
-void mark_heaviest(const std::vector<WeightedSample>& samples, std::size_t begin, std::size_t end, double share,
-                   std::vector<std::size_t>& order, std::vector<char>& keep) {
-  double total = 0;
-  order.clear();
-  for (std::size_t s = begin; s < end; ++s) {
-    total += samples[s].weight;
-    order.push_back(s);
-  }
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return samples[a].weight > samples[b].weight || (samples[a].weight == samples[b].weight && a < b);
-  });
-  double carried = 0;
-  for (const std::size_t s : order) {
-    if (carried >= share * total) break;
-    carried += samples[s].weight;
-    keep[s] = 1;
-  }
-}
-
 void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
   view.brightest = 1e-6f;
   for (const WeightedSample& sample : samples) view.brightest = std::max(view.brightest, sample.luminance);
@@ -40,30 +20,6 @@ void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
 }
 
 }  // namespace
-
-void trim_samples(std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets, double share) {
-  std::vector<char> keep(samples.size(), 0);
-  std::vector<std::size_t> order;
-  std::size_t write = 0;
-  for (std::size_t p = 0; p + 1 < offsets.size(); ++p) {
-    const std::size_t begin = offsets[p], end = offsets[p + 1];
-    mark_heaviest(samples, begin, end, share, order, keep);
-    double total = 0, kept = 0;
-    for (std::size_t s = begin; s < end; ++s) {
-      total += samples[s].weight;
-      kept += keep[s] ? samples[s].weight : 0;
-    }
-    offsets[p] = write;
-    const auto scale = static_cast<float>(kept > 0 ? total / kept : 1);
-    for (std::size_t s = begin; s < end; ++s) {
-      if (!keep[s]) continue;
-      samples[write] = samples[s];
-      samples[write++].weight *= scale;
-    }
-  }
-  if (!offsets.empty()) offsets.back() = write;
-  samples.resize(write);
-}
 
 CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march, const UnitCamera& full_size_camera,
                       int short_side, double share) {
@@ -81,7 +37,7 @@ CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
     for (int x = 0; x < view.width; ++x) rays.push_back(view.camera.ray({x + 0.5, y + 0.5}));
   }
   std::vector<WeightedSample> samples;
-  engine.trace(rays, march, kCacheTransmittance, samples, view.offsets);
+  engine.trace(rays, march, {kCacheTransmittance, static_cast<float>(share)}, samples, view.offsets);
   view.luminance.resize(rays.size());
   view.opacity.resize(rays.size());
   for (std::size_t p = 0; p < rays.size(); ++p) {
@@ -90,7 +46,6 @@ CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
       view.opacity[p] += samples[s].weight;
     }
   }
-  trim_samples(samples, view.offsets, share);
   pack(samples, view);
   return view;
 }

@@ -32,11 +32,8 @@ struct CachedView {
   [[nodiscard]] int short_side() const { return std::min(width, height); }
 };
 
-/// Keeps, of each pixel, the fewest samples that carry `share` of its weight, in order, and scales their weights to the
-/// pixel's whole opacity.
-void trim_samples(std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets, double share);
-
-/// Renders a view with its short side at most `short_side` pixels.
+/// Renders a view with its short side at most `short_side` pixels. Of each pixel the heaviest samples are kept that
+/// carry `share` of its weight.
 [[nodiscard]] CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
                                     const UnitCamera& full_size_camera, int short_side, double share);
 

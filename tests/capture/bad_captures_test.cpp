@@ -25,6 +25,9 @@ struct BadCapture {
   ExitCode code;
   std::vector<std::string> says;  ///< parts of the message
 };
+void PrintTo(const BadCapture& bad, std::ostream* out) {
+  *out << bad.name;
+}
 
 /// A good transforms.json, spoiled.
 std::function<void(const fs::path&)> spoiled_json(std::function<void(json&)> spoil) {

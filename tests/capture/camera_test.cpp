@@ -17,6 +17,9 @@ struct Lens {
   const char* name;
   Intrinsics intrinsics;
 };
+void PrintTo(const Lens& lens, std::ostream* out) {
+  *out << lens.name;
+}
 class Lenses : public testing::TestWithParam<Lens> {};
 INSTANTIATE_TEST_SUITE_P(
     All, Lenses,

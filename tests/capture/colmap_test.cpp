@@ -89,6 +89,9 @@ struct Model {
   test::ColmapModel stored;
   Intrinsics expected;
 };
+void PrintTo(const Model& model, std::ostream* out) {
+  *out << model.stored.model_name;
+}
 class ColmapModels : public testing::TestWithParam<Model> {};
 
 TEST_P(ColmapModels, ParametersGoToTheirPlaces) {

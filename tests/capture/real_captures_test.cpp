@@ -67,7 +67,10 @@ TEST(RealCaptures, RobovisionIsMonochromeWithIntrinsicsOfEachFrame) {
   const Capture capture = load_capture(folder, {.downscale = 4});
   EXPECT_EQ(capture.views.size(), 12u);
   EXPECT_NE(capture.views[0].intrinsics.fx, capture.views[1].intrinsics.fx);
-  EXPECT_FALSE(capture.views[0].image.alpha.empty());
+  EXPECT_FALSE(capture.is_bounded_object);
+  const MonoImage& image = capture.views[0].image;
+  EXPECT_FALSE(image.valid(0)) << "alpha hides the border that undistorting left";
+  EXPECT_TRUE(image.valid(image.pixel_count() / 2 + std::size_t(image.width) / 2));
   EXPECT_FALSE(load_color_truth(capture.views[0]));
 }
 

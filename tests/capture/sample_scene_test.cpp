@@ -157,13 +157,17 @@ TEST(SampleScene, StaysInsideItsBoundsAndItsPictures) {
   for (const sample::Object& object : sample::objects()) EXPECT_TRUE(box.contains(object.shape.centre()));
 }
 
-TEST(SampleScene, ReferenceIsAColourTrainingView) {
-  EXPECT_EQ(read_binary_file(small_scene() / "reference.png"), read_binary_file(small_scene() / "color/view_001.png"));
-  EXPECT_FALSE(load_capture(small_scene()).views[1].held_out);
+TEST(SampleScene, ReferencesAreColourTrainingViews) {
+  const Capture capture = load_capture(small_scene());
+  for (const int view : {1, 2, 3}) {
+    const std::string name = "view_00" + std::to_string(view) + ".png";
+    EXPECT_EQ(read_binary_file(small_scene() / "references" / name), read_binary_file(small_scene() / "color" / name));
+    EXPECT_FALSE(capture.views[std::size_t(view)].held_out);
+  }
 }
 
 TEST(SampleScene, ColoursAreNeitherClippedNorDull) {
-  const ColorImage image = load_color_image(small_scene() / "reference.png");
+  const ColorImage image = load_color_image(small_scene() / "references/view_001.png");
   const auto clipped = std::count_if(image.rgb.begin(), image.rgb.end(), [](float v) { return v >= 0.999f; });
   EXPECT_LT(double(clipped), 0.002 * double(image.rgb.size()));
   EXPECT_GT(*std::max_element(image.rgb.begin(), image.rgb.end()), 0.5f);

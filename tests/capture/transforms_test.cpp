@@ -191,7 +191,11 @@ TEST_F(Transforms, TransparencyEverywhereMeansABoundedObject) {
     cv::imwrite(folder_ / ("images/" + std::to_string(i) + ".png"), image);
   };
   for (int i = 0; i < 3; ++i) write_alpha(i);
-  EXPECT_FALSE(load().is_bounded_object);
+  const Capture partly = load();
+  EXPECT_FALSE(partly.is_bounded_object);
+  EXPECT_TRUE(partly.views[0].image.alpha.empty());
+  EXPECT_FALSE(partly.views[0].image.valid(0)) << "what is transparent was not seen";
+  EXPECT_TRUE(partly.views[0].image.valid(5 * test::kWidth));
   write_alpha(3);
   const Capture capture = load();
   EXPECT_TRUE(capture.is_bounded_object);

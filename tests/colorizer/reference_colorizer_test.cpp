@@ -203,10 +203,23 @@ TEST(ReferenceColorizer, KeepsWhatItFittedAndFitsAgainWhenThatIsDamaged) {
 
   const auto cached = std::filesystem::directory_iterator(folder / "cache")->path();
   std::vector<std::byte> content = read_binary_file(cached);
+  const std::vector<std::byte> first_weights = content;
   content[content.size() / 2] ^= std::byte{1};
   write_file(cached, content);
   EXPECT_THROW(make("one.png,two.png", true), Stop) << "damaged weights were taken";
   EXPECT_THROW(make("two.png,one.png", true), Stop) << "another order is another fit";
+
+  // A folder is its files in the order of their names.
+  std::filesystem::create_directory(folder / "photographs");
+  for (const char* name : {"one.png", "two.png"}) {
+    std::filesystem::rename(folder / name, folder / "photographs" / name);
+  }
+  write_file(cached, first_weights);
+  reports = 0;
+  make("photographs", false);
+  EXPECT_EQ(reports, 0) << "the same photographs were fitted again";
+  std::filesystem::create_directory(folder / "none");
+  EXPECT_THROW(make("none", false), MissingInputError);
 }
 
 }  // namespace

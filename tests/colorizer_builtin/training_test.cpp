@@ -5,6 +5,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/colorizer_training/score.h"
 #include "src/colorizer_training/tar_reader.h"
 #include "src/colorizer_training/trainer.h"
 #include "tests/support/data.h"
@@ -45,7 +46,8 @@ TrainerOptions tiny_options() {
   TrainerOptions options;
   options.steps = 40;
   options.photos_per_step = options.tiles_per_step = 2;
-  options.crop_side = options.large_crop_side = 32;
+  options.crop_sides = {32};
+  options.tile_crop_side = 32;
   options.warmup_steps = 5;
   return options;
 }
@@ -79,6 +81,27 @@ TEST(ColorizerTrainer, ContinuesBitForBit) {
   for (std::size_t i = 0; i < a.size(); ++i) ASSERT_TRUE(torch::equal(a[i], b[i]));
 }
 
+TEST(ColorizerTrainer, MeasuresStatisticsWhereTilesCameAlone) {
+  const ImageSet set = tiny_set();
+  const torch::Tensor lightness = 100 * torch::rand({1, 1, 32, 32});
+  const torch::NoGradGuard no_grad;
+  for (const double tile_share : {0.0, 0.5}) {
+    TrainerOptions options = tiny_options();
+    options.tile_share = tile_share;
+    ColorizerTrainer trainer(set, nullptr, options, torch::kCPU);
+    {
+      const torch::AutoGradMode with_gradients(true);
+      for (int i = 0; i < 4; ++i) trainer.step();
+    }
+    const torch::Tensor before = trainer.averaged()->forward(lightness);
+    trainer.measure_statistics();
+    const torch::Tensor measured = trainer.averaged()->forward(lightness);
+    EXPECT_EQ(torch::equal(before, measured), tile_share == 0);
+    trainer.measure_statistics();
+    EXPECT_TRUE(torch::equal(trainer.averaged()->forward(lightness), measured));
+  }
+}
+
 TEST(ColorizerTrainer, RefusesOtherCheckpoints) {
   const test::TempDir folder;
   const ImageSet set = tiny_set();
@@ -86,6 +109,26 @@ TEST(ColorizerTrainer, RefusesOtherCheckpoints) {
   EXPECT_THROW(trainer.load(folder / "none.pt"), MissingInputError);
   write_file(folder / "short.pt", std::string_view("not a checkpoint"));
   EXPECT_THROW(trainer.load(folder / "short.pt"), SnapshotError);
+}
+
+TEST(LoadImageSet, HoldsOutMoreOnRequestAndNeverAnImageTwice) {
+  const test::TempDir folder;
+  constexpr std::size_t kImages = 60;
+  for (std::size_t i = 0; i < kImages; ++i) {
+    std::filesystem::create_directories(folder / "photos/set/class");
+    write_png(folder / ("photos/set/class/" + std::to_string(i) + ".png"), {8, 8, std::vector<std::uint8_t>(192, 99)});
+  }
+  ImageSources sources;
+  sources.photos = {folder / "photos"};
+  std::size_t before = 0;
+  for (const int parts : {3, 8, 19}) {
+    sources.held_out = parts;
+    ImageSet set = load_image_set(sources);
+    const std::size_t held_out = set.validation["set"].size();
+    EXPECT_EQ(set.photos.size() + held_out, kImages);
+    EXPECT_GT(held_out, before);
+    before = held_out;
+  }
 }
 
 TEST(MakeBatch, IsAPureFunctionOfTheStep) {
@@ -97,6 +140,24 @@ TEST(MakeBatch, IsAPureFunctionOfTheStep) {
   EXPECT_TRUE(torch::equal(batch(4).lightness, batch(4).lightness));
   EXPECT_FALSE(torch::equal(batch(4).lightness, batch(5).lightness));
   EXPECT_EQ(batch(4).ab.sizes(), (std::vector<std::int64_t>{3, 2, 8, 8}));
+}
+
+TEST(Merit, IsBalancedAucUnlessRawAucOrRmseFallShort) {
+  const ChromaScore grey{88, 60, 10, 0, 30};
+  EXPECT_DOUBLE_EQ(merit({89, 67, 8, 20, 30}, grey), 7);
+  EXPECT_NEAR(merit({89, 67, 8.7, 20, 30}, grey), 7 - 2, 1e-9);
+  EXPECT_NEAR(merit({87.3, 67, 8, 20, 30}, grey), 7 - 2, 1e-9);
+}
+
+TEST(ScoreGrey, IsTheBaseline) {
+  RgbImage image{16, 16, {}};
+  for (int i = 0; i < 16 * 16 * 3; ++i) image.rgb.push_back(std::uint8_t((i * 37) % 256));
+  const SoftLabelTable table(torch::kCPU);
+  const ChromaScore grey = score_grey({image}, table, torch::kCPU),
+                    baseline = score_baselines({image}, table, torch::kCPU).grey;
+  EXPECT_EQ(grey.rmse, baseline.rmse);
+  EXPECT_EQ(grey.balanced_auc, baseline.balanced_auc);
+  EXPECT_GT(grey.rmse, 0);
 }
 
 TEST(LabFromSrgb, GreyHasNoColorAndRedIsRed) {

@@ -52,7 +52,7 @@ std::vector<Case> cases() {
   const std::vector<std::string> grey = {"--grey"};
   return {
       {"Colorizer missing",
-       [](const fs::path& c) { fs::remove(c / "reference.png"); },
+       [](const fs::path& c) { fs::remove_all(c / "references"); },
        {},
        64,
        {"no colorizer", "--colorizer reference:", "--grey"}},

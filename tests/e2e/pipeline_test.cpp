@@ -30,7 +30,7 @@ TEST(Pipeline, RunLeavesEverythingItSays) {
   const auto arguments = concatenated({"run", tiny_capture().string(), "-o", out.string()}, tiny_options());
   const ProgramResult result = cnerf(arguments);
   ASSERT_EQ(result.exit_code, 0) << result.err << result.out;
-  EXPECT_THAT(result.out, HasSubstr("reference.png")) << "says whose colours were taken";
+  EXPECT_THAT(result.out, HasSubstr("references")) << "says whose colours were taken";
 
   const std::vector<std::string> files = files_below(out);
   for (const char* file :
@@ -125,7 +125,40 @@ TEST(Pipeline, ResumingIsExact) {
   EXPECT_THAT(stopped.err, HasSubstr("--resume"));
   const ProgramResult resumed = cnerf(concatenated(arguments, {"--resume"}));
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
-  EXPECT_TRUE(learnt_state(folder / "parts/stage1.snapshot") == learnt_state(folder / "whole/stage1.snapshot"));
+  EXPECT_TRUE(read_binary_file(folder / "parts/stage1.snapshot") == read_binary_file(folder / "whole/stage1.snapshot"));
+}
+
+TEST(Pipeline, ResumingAColorizationIsExact) {
+  const TempDir folder;
+  const fs::path whole = folder / "whole", parts = folder / "parts";
+  ASSERT_EQ(train(tiny_capture(), whole).exit_code, 0);
+  const auto colorize = [](const fs::path& run) {
+    return std::vector<std::string>{"colorize",    run.string(),           "--take",     "t",
+                                    "--colorizer", "reference:references", "--progress", "json"};
+  };
+  fs::copy(whole, parts, fs::copy_options::recursive);
+  ASSERT_EQ(cnerf(colorize(whole)).exit_code, 0);
+  fs::copy(whole / "cache", parts / "cache");
+  const ProgramResult stopped = cnerf_interrupted_at(colorize(parts), "\"stage 2\"");
+  if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
+  EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
+  EXPECT_FALSE(fs::exists(parts / "takes/t/take.json")) << "only a finished take has one";
+  const ProgramResult resumed = cnerf(concatenated(colorize(parts), {"--resume"}));
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_TRUE(read_binary_file(parts / "takes/t/take.snapshot") == read_binary_file(whole / "takes/t/take.snapshot"));
+}
+
+/// The snapshot does not fit on the disk: named, nothing half-written, and the run goes on once there is room.
+TEST(Pipeline, FullDiskLosesNothing) {
+  const TempDir folder;
+  const fs::path out = folder / "run";
+  const auto arguments = concatenated({"train", tiny_capture().string(), "-o", out.string()}, tiny_options());
+  const ProgramResult full = cnerf_with_file_limit(arguments, 40'000);
+  EXPECT_EQ(full.exit_code, 73) << full.err;
+  EXPECT_THAT(full.err, HasSubstr("stage1.snapshot"));
+  EXPECT_THAT(files_below(out), testing::UnorderedElementsAre("config.toml", "run.json"));
+  const ProgramResult resumed = cnerf(concatenated(arguments, {"--resume"}));
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
 }
 
 TEST(Pipeline, DamagedSnapshotsAreRefusedByName) {

@@ -3,14 +3,13 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <cstring>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "src/base/files.h"
@@ -20,8 +19,11 @@ namespace cnerf::test {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr std::size_t kNoLimit = 0;
+
 /// Starts the program with its output in files.
-pid_t start(const std::vector<std::string>& arguments, const fs::path& out, const fs::path& err) {
+pid_t start(const std::vector<std::string>& arguments, const fs::path& out, const fs::path& err,
+            std::size_t file_limit) {
   std::vector<std::string> words = {CNERF_PROGRAM};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
@@ -31,6 +33,11 @@ pid_t start(const std::vector<std::string>& arguments, const fs::path& out, cons
   if (child != 0) return child;
   ::dup2(::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
   ::dup2(::open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDERR_FILENO);
+  if (file_limit != kNoLimit) {
+    ::signal(SIGXFSZ, SIG_IGN);  // writing then fails instead
+    const rlimit limit{file_limit, file_limit};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
   ::execv(argv[0], argv.data());
   ::_exit(127);
 }
@@ -53,11 +60,12 @@ int wait_for(pid_t child, const fs::path& out, const std::string& signal_at) {
   }
 }
 
-ProgramResult run(const std::vector<std::string>& arguments, const std::string& signal_at) {
+ProgramResult run(const std::vector<std::string>& arguments, const std::string& signal_at,
+                  std::size_t file_limit = kNoLimit) {
   const TempDir folder;
   const fs::path out = folder / "out", err = folder / "err";
   write_file(out, std::string_view());
-  const pid_t child = start(arguments, out, err);
+  const pid_t child = start(arguments, out, err, file_limit);
   const int code = wait_for(child, out, signal_at);
   return {code, read_text_file(out), read_text_file(err)};
 }
@@ -70,6 +78,10 @@ ProgramResult cnerf(const std::vector<std::string>& arguments) {
 
 ProgramResult cnerf_interrupted_at(const std::vector<std::string>& arguments, const std::string& text) {
   return run(arguments, text);
+}
+
+ProgramResult cnerf_with_file_limit(const std::vector<std::string>& arguments, std::size_t bytes) {
+  return run(arguments, "", bytes);
 }
 
 std::vector<std::string> tiny_options() {
@@ -111,21 +123,6 @@ const fs::path& tiny_capture() {
     return *folder / "capture";
   }();
   return capture;
-}
-
-std::string learnt_state(const fs::path& snapshot) {
-  constexpr std::size_t magic_and_version = 12, digest = 64;
-  const std::string content = read_text_file(snapshot);
-  std::uint64_t header_size = 0;
-  std::memcpy(&header_size, content.data() + magic_and_version, sizeof header_size);
-  const std::size_t header_begin = magic_and_version + sizeof header_size;
-  auto header = nlohmann::json::parse(content.substr(header_begin, header_size));
-  for (const char* clock : {"seconds", "colorizer_seconds", "stage1_sha256"}) {  // the last: of a file with clocks
-    header.erase(clock);
-    if (header.contains("report")) header["report"].erase(clock);
-  }
-  const std::size_t pieces_begin = header_begin + header_size;
-  return header.dump() + content.substr(pieces_begin, content.size() - pieces_begin - digest);
 }
 
 std::vector<std::string> files_below(const fs::path& folder) {

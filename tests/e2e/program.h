@@ -1,6 +1,7 @@
 #pragma once
 /// Calls the program under test.
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -19,15 +20,14 @@ struct ProgramResult {
 /// As `cnerf`, and sends SIGINT once standard output holds `text`.
 [[nodiscard]] ProgramResult cnerf_interrupted_at(const std::vector<std::string>& arguments, const std::string& text);
 
+/// As `cnerf`, where no file may grow beyond `bytes`: what a full disk looks like from inside.
+[[nodiscard]] ProgramResult cnerf_with_file_limit(const std::vector<std::string>& arguments, std::size_t bytes);
+
 /// Options that make every part of a run as short as it can be and still do its work.
 [[nodiscard]] std::vector<std::string> tiny_options();
 
 /// A sample capture of few, small views, made once for all tests of this process.
 [[nodiscard]] const std::filesystem::path& tiny_capture();
-
-/// A snapshot without what a clock wrote into its header (the time trained so far) and the checksum over that: two
-/// snapshots of the same training give the same bytes.
-[[nodiscard]] std::string learnt_state(const std::filesystem::path& snapshot);
 
 /// All files below a folder, relative, sorted.
 [[nodiscard]] std::vector<std::string> files_below(const std::filesystem::path& folder);

@@ -181,13 +181,13 @@ TEST(LuminanceEngine, LearnsAndRendersWhatItLearned) {
   std::vector<Ray> rays;
   for (int i = 0; i < 32; ++i) rays.push_back(views[0].camera.ray({i + 0.5, 16.5}));
   std::vector<RayResult> results(rays.size());
-  engine.render(rays, options.march, 1e-3f, results);
+  engine.render(rays, options.march, {}, results);
   EXPECT_LT(results.front().opacity, 0.5f);  // transparent corner
   EXPECT_GT(results[16].opacity, 0.5f);      // the disc
 
   std::vector<WeightedSample> samples;
   std::vector<std::size_t> offsets;
-  engine.trace(rays, options.march, 1e-3f, samples, offsets);
+  engine.trace(rays, options.march, {}, samples, offsets);
   ASSERT_EQ(offsets.size(), rays.size() + 1);
   for (std::size_t r = 0; r < rays.size(); ++r) {
     float luminance = 0, opacity = 0;
@@ -200,6 +200,21 @@ TEST(LuminanceEngine, LearnsAndRendersWhatItLearned) {
     }
     EXPECT_NEAR(luminance, results[r].luminance, 1e-5f);
     EXPECT_NEAR(opacity, results[r].opacity, 1e-5f);
+  }
+
+  // Shading only what weighs something saves samples, keeps each ray's opacity and hardly changes its light.
+  std::vector<WeightedSample> heavy;
+  std::vector<std::size_t> heavy_offsets;
+  engine.trace(rays, options.march, {1e-3f, 0.98f}, heavy, heavy_offsets);
+  EXPECT_LT(heavy.size(), samples.size());
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    float luminance = 0, opacity = 0;
+    for (std::size_t s = heavy_offsets[r]; s < heavy_offsets[r + 1]; ++s) {
+      luminance += heavy[s].weight * heavy[s].luminance;
+      opacity += heavy[s].weight;
+    }
+    EXPECT_NEAR(opacity, results[r].opacity, 1e-5f);
+    EXPECT_NEAR(luminance, results[r].luminance, 0.04f * opacity);
   }
 }
 

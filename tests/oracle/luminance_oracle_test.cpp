@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <torch/torch.h>
 
+#include <cmath>
+
 #include "encoding/torch/hash_grid.h"
 #include "src/base/error.h"
 #include "src/engine/cpu/luminance_engine_cpu.h"
@@ -92,6 +94,11 @@ torch::Tensor lightness(const torch::Tensor& y) {
   return torch::where(y > epsilon, 116 * y.clamp_min(epsilon).pow(1.0 / 3.0) - 16, kappa * y);
 }
 
+torch::Tensor luminance_of_lightness(const torch::Tensor& lightness) {
+  const torch::Tensor cube = ((lightness + 16) / 116).pow(3);
+  return torch::where(lightness > 8, cube, lightness * 27.0 / 24389.0);
+}
+
 torch::Tensor harmonics(Vec3d d) {
   std::vector<double> values(kSphericalHarmonics);
   spherical_harmonics(d.x, d.y, d.z, [&](int i, double value) { values[std::size_t(i)] = value; });
@@ -157,7 +164,8 @@ TEST(TorchOracle, GradientOfAWholeStep) {
       const torch::Tensor tau = features.select(1, 0).clamp(-15, 15).exp() * torch::tensor(dt, f64);
       const torch::Tensor direction = harmonics(ray.ray.direction.cast<double>()).expand({x.size(0), -1});
       const torch::Tensor raw = run(luminance_layers, torch::cat({features, direction}, 1)).select(1, 0);
-      const torch::Tensor y = 1.05 * torch::sigmoid(raw).pow(3);
+      const double brightest = 116 * std::cbrt(1.05) - 16;
+      const torch::Tensor y = luminance_of_lightness(brightest * torch::sigmoid(raw));
       const torch::Tensor behind = torch::exp(-tau.cumsum(0));
       const torch::Tensor before = torch::cat({torch::ones({1}, f64), behind.slice(0, 0, -1)});
       seen = ((before - behind) * y).sum();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <numeric>
 
 #include "src/base/check.h"
 #include "src/base/parallel.h"
@@ -97,7 +99,7 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
           break;
         }
         set_position(block.wave_positions.data(), count++, rays[r].at(sample.t));
-        block.of_ray[r].push_back(sample);
+        block.of_ray[r].push_back({sample, 0.0f});
       }
     }
     begin[rays.size()] = count;
@@ -108,10 +110,12 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
 
     any_active = false;
     for (std::size_t r = 0; r < rays.size(); ++r) {
-      std::vector<RaySample>& kept = block.of_ray[r];
+      std::vector<WeighedSample>& kept = block.of_ray[r];
       std::size_t at = kept.size() - (begin[r + 1] - begin[r]);
       for (std::size_t s = begin[r]; s < begin[r + 1]; ++s, ++at) {
-        walks[r].transmittance *= 1.0f - alpha_of(block.wave_sigma[s], kept[at].dt);
+        const float alpha = alpha_of(block.wave_sigma[s], kept[at].sample.dt);
+        kept[at].weight = walks[r].transmittance * alpha;
+        walks[r].transmittance *= 1.0f - alpha;
         if (walks[r].transmittance < min_transmittance) {
           kept.resize(at + 1);
           walks[r].active = false;
@@ -123,11 +127,49 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
   }
 
   block.samples.clear();
+  block.weights.clear();
   block.offsets.assign(1, 0);
   for (std::size_t r = 0; r < rays.size(); ++r) {
-    block.samples.insert(block.samples.end(), block.of_ray[r].begin(), block.of_ray[r].end());
+    for (const WeighedSample& kept : block.of_ray[r]) {
+      block.samples.push_back(kept.sample);
+      block.weights.push_back(kept.weight);
+    }
     block.offsets.push_back(block.samples.size());
   }
+}
+
+void LuminanceEngineCpu::keep_heaviest(float share, Block& block) {
+  std::size_t write = 0;
+  for (std::size_t r = 0; r + 1 < block.offsets.size(); ++r) {
+    const std::size_t begin = block.offsets[r], end = block.offsets[r + 1];
+    std::vector<float>& sorted = block.sorted_weights;
+    sorted.assign(block.weights.begin() + std::ptrdiff_t(begin), block.weights.begin() + std::ptrdiff_t(end));
+    std::sort(sorted.begin(), sorted.end(), std::greater<>());
+    const float total = std::accumulate(sorted.begin(), sorted.end(), 0.0f);
+    float lightest = 0, carried = 0;
+    for (std::size_t i = 0; i < sorted.size() && carried < share * total; ++i) carried += lightest = sorted[i];
+
+    block.offsets[r] = write;
+    float kept = 0;
+    for (std::size_t s = begin; s < end; ++s) {
+      if (block.weights[s] < lightest || block.weights[s] <= 0) continue;
+      kept += block.weights[s];
+      block.samples[write] = block.samples[s];
+      block.weights[write++] = block.weights[s];
+    }
+    for (std::size_t s = block.offsets[r]; s < write; ++s) block.weights[s] *= total / kept;
+  }
+  block.offsets.back() = write;
+  block.samples.resize(write);
+  block.weights.resize(write);
+}
+
+void LuminanceEngineCpu::collect_for_picture(std::span<const Ray> rays, const MarchSettings& march,
+                                             const RenderEffort& effort, Block& block) const {
+  std::array<float, kBlockRays> middle;
+  middle.fill(0.5f);
+  collect(rays, middle, march, effort.min_transmittance, block);
+  if (effort.shaded_share < 1) keep_heaviest(effort.shaded_share, block);
 }
 
 void LuminanceEngineCpu::shade(std::span<const Ray> rays, Block& block) const {
@@ -272,34 +314,29 @@ LuminanceEngineCpu::Gradients LuminanceEngineCpu::gradients(const std::vector<Tr
   return result;
 }
 
-void LuminanceEngineCpu::render(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+void LuminanceEngineCpu::render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                                 std::span<RayResult> results) const {
   CNERF_CHECK_EQ(rays.size(), results.size());
   parallel_ranges(rays.size(), kBlockRays, [&](std::size_t begin, std::size_t end) {
     Block& block = blocks_.local();
     const std::span<const Ray> block_rays = rays.subspan(begin, end - begin);
-    constexpr std::array<float, kBlockRays> middle = [] {
-      std::array<float, kBlockRays> jitter{};
-      jitter.fill(0.5f);
-      return jitter;
-    }();
-    collect(block_rays, middle, march, min_transmittance, block);
+    collect_for_picture(block_rays, march, effort, block);
     shade(block_rays, block);
     for (std::size_t r = 0; r < block_rays.size(); ++r) {
-      Compositor<float> ray;
-      float weighted_t = 0;
+      RayResult seen;
       for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
-        const RaySample& sample = block.samples[s];
-        weighted_t +=
-            sample.t * ray.add(alpha_of(field_.sigma(block.work, s), sample.dt), field_.luminance(block.work, s));
+        const float weight = block.weights[s];
+        seen.luminance += weight * field_.luminance(block.work, s);
+        seen.opacity += weight;
+        seen.depth += weight * block.samples[s].t;
       }
-      const float opacity = 1.0f - ray.transmittance;
-      results[begin + r] = {ray.value, opacity, opacity > 0 ? weighted_t / opacity : 0.0f};
+      if (seen.opacity > 0) seen.depth /= seen.opacity;
+      results[begin + r] = seen;
     }
   });
 }
 
-void LuminanceEngineCpu::trace(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+void LuminanceEngineCpu::trace(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                                std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const {
   const std::size_t n_blocks = (rays.size() + kBlockRays - 1) / kBlockRays;
   std::vector<std::vector<WeightedSample>> of_block(n_blocks);
@@ -308,20 +345,13 @@ void LuminanceEngineCpu::trace(std::span<const Ray> rays, const MarchSettings& m
     Block& block = blocks_.local();
     const std::size_t first = b * kBlockRays;
     const std::span<const Ray> block_rays = rays.subspan(first, std::min(kBlockRays, rays.size() - first));
-    std::array<float, kBlockRays> middle;
-    middle.fill(0.5f);
-    collect(block_rays, middle, march, min_transmittance, block);
+    collect_for_picture(block_rays, march, effort, block);
     shade(block_rays, block);
-    for (std::size_t r = 0; r < block_rays.size(); ++r) {
-      Compositor<float> ray;
-      for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
-        const RaySample& sample = block.samples[s];
-        const float luminance = field_.luminance(block.work, s);
-        of_block[b].push_back(
-            {sample.t, ray.add(alpha_of(field_.sigma(block.work, s), sample.dt), luminance), luminance});
-      }
-      counts[b][r] = block.offsets[r + 1] - block.offsets[r];
+    of_block[b].reserve(block.samples.size());
+    for (std::size_t s = 0; s < block.samples.size(); ++s) {
+      of_block[b].push_back({block.samples[s].t, block.weights[s], field_.luminance(block.work, s)});
     }
+    for (std::size_t r = 0; r < block_rays.size(); ++r) counts[b][r] = block.offsets[r + 1] - block.offsets[r];
   });
   samples.clear();
   offsets.assign(1, 0);

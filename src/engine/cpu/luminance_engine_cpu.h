@@ -19,9 +19,9 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   StepReport step(const std::vector<TrainingView>& views, float learning_rate) override;
   [[nodiscard]] long step_count() const override { return counters_.front(); }
 
-  void render(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+  void render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
               std::span<RayResult> results) const override;
-  void trace(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+  void trace(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
              std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const override;
   void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override;
   void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
@@ -56,15 +56,22 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   static constexpr std::size_t kBlockRays = 16;
   static constexpr std::size_t kChunks = 32;  // parts of a step whose sums are added in order, for any thread count
 
+  /// A sample and the weight that the density-first pass found.
+  struct WeighedSample {
+    RaySample sample;
+    float weight = 0;
+  };
   /// Samples of a block's rays that survive early termination, ray by ray.
   struct Block {
     std::vector<RaySample> samples;
+    std::vector<float> weights;
     std::vector<std::size_t> offsets;  // [rays + 1]
     std::size_t marched = 0;
     AlignedVector<float> positions;  // [G, 3, 16]
     LuminanceWorkspace work;
     // Scratch of the density-first pass.
-    std::vector<std::vector<RaySample>> of_ray;
+    std::vector<std::vector<WeighedSample>> of_ray;
+    std::vector<float> sorted_weights;
     AlignedVector<float> wave_positions, wave_sigma;
   };
   /// What one chunk of a step adds up.
@@ -80,6 +87,10 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   /// computed in waves of a few samples a ray, so that hidden samples cost next to nothing.
   void collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
                float min_transmittance, Block& block) const;
+  /// `collect` from the middle of each step, and of what it keeps the heaviest samples.
+  void collect_for_picture(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
+                           Block& block) const;
+  static void keep_heaviest(float share, Block& block);
   void shade(std::span<const Ray> rays, Block& block) const;
   void train_block(std::span<const ObservedRay> rays, float gradient_scale, Block& block, Chunk& chunk) const;
   void accumulate(const std::vector<TrainingView>& views);

@@ -453,7 +453,7 @@ void LuminanceEngineCuda::start_trace(std::uint32_t rays) const {
   CNERF_CUDA(cudaMemcpyAsync(m.trace_state.data(), &state, sizeof(state), cudaMemcpyHostToDevice, m.stream));
 }
 
-void LuminanceEngineCuda::render(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+void LuminanceEngineCuda::render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                                  std::span<RayResult> results) const {
   CNERF_CHECK_EQ(rays.size(), results.size());
   const std::lock_guard lock(mutex_);
@@ -468,7 +468,7 @@ void LuminanceEngineCuda::render(std::span<const Ray> rays, const MarchSettings&
                                m.stream));
     auto* directions = reinterpret_cast<DirectionCode*>(m.trace_directions.data());
     prepare_rays(m.plain_rays.data(), count, m.trace_rays.data(), directions, m.stream);
-    TraceJob trace = job(march, min_transmittance);
+    TraceJob trace = job(march, effort.min_transmittance);
     trace.rays = m.trace_rays.data();
     trace.directions = directions;
     trace.state = m.trace_state.data();
@@ -508,7 +508,7 @@ void LuminanceEngineCuda::render_view(const UnitCamera& camera, const MarchSetti
   m.wait();
 }
 
-void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                                 std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const {
   const std::lock_guard lock(mutex_);
   Memory& m = *memory_;
@@ -527,7 +527,7 @@ void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& 
                                m.stream));
     auto* directions = reinterpret_cast<DirectionCode*>(m.trace_directions.data());
     prepare_rays(m.plain_rays.data(), count, m.trace_rays.data(), directions, m.stream);
-    TraceJob trace = job(march, min_transmittance);
+    TraceJob trace = job(march, effort.min_transmittance);
     trace.rays = m.trace_rays.data();
     trace.directions = directions;
     trace.state = m.trace_state.data();

@@ -39,9 +39,10 @@ class LuminanceEngineCuda final : public LuminanceEngine {
   StepReport step(const std::vector<TrainingView>& views, float learning_rate) override;
   [[nodiscard]] long step_count() const override { return steps_; }
 
-  void render(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+  /// Shades every sample whatever `effort.shaded_share` says: a warp has both nets at hand for 32 samples at once.
+  void render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
               std::span<RayResult> results) const override;
-  void trace(std::span<const Ray> rays, const MarchSettings& march, float min_transmittance,
+  void trace(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
              std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const override;
   void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override;
   void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,

@@ -1,0 +1,46 @@
+#pragma once
+/// Planes of floats -> OpenEXR, lossless.
+
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/base/options.h"
+
+namespace cnerf {
+
+struct ExrOptions {
+  bool mip = false;               ///< tiles of 64 x 64 with mip-map levels, for renderers that page textures
+  std::string lab_names = "lab";  ///< "lab": Lab.L, Lab.a, Lab.b; "xyz": Lab.X, Lab.Y, Lab.Z, for Blender up to 3.4,
+                                  ///< which sorts L, a, b the wrong way round
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("mip", mip, "textures as tiles with mip-map levels");
+    v("lab_names", lab_names, Choice{"lab", "xyz"},
+      "channels of Lab textures: Lab.L Lab.a Lab.b, or Lab.X Lab.Y Lab.Z, whose order Blender keeps");
+  }
+};
+
+struct ExrChannel {
+  std::string name;
+  std::span<const float> values;  ///< value i of the channel is `values[i * stride]`; rows from the top
+  std::size_t stride = 1;
+  bool half = false;  ///< stored in 16 bits; values beyond their range are clamped
+};
+
+struct ExrImage {
+  int width = 0, height = 0;
+  std::vector<ExrChannel> channels;
+  std::map<std::string, std::string> attributes;  ///< text, beside the standard ones
+};
+
+/// ZIP-compressed, with the chromaticities of Rec.709 and D65. The file is whole or not there.
+/// Mip-map levels are means of 2 x 2 pixels of the level before, down to one pixel.
+/// @throws ContractError  on a value that is not finite, or sizes that disagree.
+/// @throws OutputError    when the file cannot be written.
+void write_exr(const std::filesystem::path& file, const ExrImage& image, bool mip = false);
+
+}  // namespace cnerf

@@ -1,0 +1,41 @@
+#pragma once
+/// A textured mesh and the capture's cameras -> glTF 2.0.
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bake/bake_camera.h"
+#include "bake/baked_mesh.h"
+
+namespace cnerf {
+
+/// glTF is Y-up. The rotation that turns the poses' up axis ("x", "y" or "z") to +Y; for "z" (x, y, z) -> (x, z, -y),
+/// which Blender's importer undoes.
+[[nodiscard]] Affined gltf_from_world(const std::string& up_axis);
+
+/// What goes into the files beside the mesh.
+struct GltfScene {
+  std::vector<BakeCamera> cameras;                   ///< of the capture
+  std::vector<std::byte> basecolor_png;              ///< 8-bit sRGB
+  std::string up_axis = "z";                         ///< of the world
+  std::string units = "scene units";                 ///< what a world unit is; recorded only
+  std::string color_origin;                          ///< see color_origin_text
+  std::string rgb_exr, luminance_exr, lab_exr, vdb;  ///< names of files beside these, for `extras`; empty = none
+};
+
+struct GltfFiles {
+  std::filesystem::path gltf, buffer, basecolor;  ///< `name`.gltf, `name`.bin, `name`_basecolor.png
+  std::filesystem::path glb;                      ///< all in one
+};
+
+/// Writes both forms into `folder`: an unlit material (KHR_materials_unlit; the light is in the texture), indexed
+/// triangles with normals and texture coordinates, and a node for every camera. A camera's lens distortion and
+/// principal point, which glTF has no place for, stand in its `extras`.
+/// Every file is whole or not there, and a .gltf is written after what it refers to.
+/// @throws ContractError  on an empty mesh or values that are not finite.  @throws OutputError.
+GltfFiles write_gltf(const BakedMesh& mesh, const GltfScene& scene, const std::filesystem::path& folder,
+                     const std::string& name);
+
+}  // namespace cnerf

@@ -1,0 +1,31 @@
+#pragma once
+/// A baked texture -> PNG and OpenEXR.
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bake/baked_mesh.h"
+#include "export/exr_writer.h"
+
+namespace cnerf {
+
+/// The base colour as glTF wants it: 8-bit sRGB PNG, clamped.
+[[nodiscard]] std::vector<std::byte> basecolor_png(const BakedTexture& texture);
+
+/// Names of the float textures beside each other.
+struct TextureFiles {
+  std::filesystem::path rgb;        ///< R G B half, linear Rec.709
+  std::filesystem::path luminance;  ///< Y float, linear
+  std::filesystem::path lab;        ///< L, a, b float: data, not colour; see ExrOptions::lab_names
+};
+
+/// Writes `name`_rgb.exr, `name`_lum.exr and `name`_lab.exr. Grey texels have a = b = 0 exactly.
+/// @param color_origin  see color_origin_text.
+/// @throws ContractError, OutputError  as write_exr.
+TextureFiles write_exr_textures(const BakedTexture& texture, const std::string& color_origin,
+                                const std::filesystem::path& folder, const std::string& name,
+                                const ExrOptions& options = {});
+
+}  // namespace cnerf

@@ -1,0 +1,132 @@
+#include "export/exr_writer.h"
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfInputFile.h>
+#include <ImfStandardAttributes.h>
+#include <ImfStringAttribute.h>
+#include <ImfTiledInputFile.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "export/color_origin.h"
+#include "export/texture_writer.h"
+#include "src/base/error.h"
+#include "tests/export/test_meshes.h"
+#include "tests/support/data.h"
+
+namespace cnerf::test {
+namespace {
+namespace fs = std::filesystem;
+
+std::vector<float> read_level(const fs::path& file, const std::string& channel, int level) {
+  Imf::TiledInputFile input(file.c_str());
+  const int width = input.levelWidth(level), height = input.levelHeight(level);
+  std::vector<float> values(static_cast<std::size_t>(width) * height);
+  Imf::FrameBuffer frame;
+  frame.insert(channel, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float),
+                                   sizeof(float) * static_cast<std::size_t>(width)));
+  input.setFrameBuffer(frame);
+  input.readTiles(0, input.numXTiles(level) - 1, 0, input.numYTiles(level) - 1, level);
+  return values;
+}
+
+std::vector<float> read_channel(const fs::path& file, const std::string& channel) {
+  Imf::InputFile input(file.c_str());
+  EXPECT_NE(input.header().channels().findChannel(channel), nullptr) << channel;
+  const Imath::Box2i window = input.header().dataWindow();
+  const auto width = static_cast<std::size_t>(window.max.x + 1);
+  std::vector<float> values(width * static_cast<std::size_t>(window.max.y + 1));
+  Imf::FrameBuffer frame;
+  frame.insert(channel,
+               Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float), sizeof(float) * width));
+  input.setFrameBuffer(frame);
+  input.readPixels(0, window.max.y);
+  return values;
+}
+
+std::string text_attribute(const Imf::Header& header, const char* name) {
+  const auto* attribute = header.findTypedAttribute<Imf::StringAttribute>(name);
+  return attribute != nullptr ? attribute->value() : "missing";
+}
+
+TEST(ExrTextures, HoldTheChannelsThatTheirNamesSay) {
+  const TempDir folder;
+  const BakedTexture texture = tetrahedron().texture;
+  const TextureFiles files = write_exr_textures(texture, color_origin_text("builtin", "first"), folder.path(), "mesh");
+  EXPECT_EQ(files.rgb.filename(), "mesh_rgb.exr");
+  EXPECT_EQ(files.luminance.filename(), "mesh_lum.exr");
+  EXPECT_EQ(files.lab.filename(), "mesh_lab.exr");
+
+  EXPECT_EQ(read_channel(files.luminance, "Y"), texture.luminance) << "exact";
+  EXPECT_EQ(read_channel(files.lab, "Lab.a"), texture.a) << "exact: data is never lossy";
+  EXPECT_EQ(read_channel(files.lab, "Lab.b"), texture.b);
+  const std::vector<float> lightness = read_channel(files.lab, "Lab.L"), green = read_channel(files.rgb, "G");
+  for (std::size_t i = 0; i < green.size(); ++i) {
+    ASSERT_NEAR(green[i], texture.rgb[i].y, 1e-3 * texture.rgb[i].y + 1e-7) << "half";
+    ASSERT_FLOAT_EQ(lightness[i], lightness_from_luminance(texture.luminance[i]));
+    const bool is_grey = i / 64 % 2 == 0;
+    ASSERT_TRUE(!is_grey || (texture.a[i] == 0 && texture.b[i] == 0));
+  }
+}
+
+TEST(ExrTextures, SayWhatTheyAre) {
+  const TempDir folder;
+  const TextureFiles files =
+      write_exr_textures(tetrahedron().texture, color_origin_text("builtin", "first"), folder.path(), "mesh");
+  for (const fs::path& file : {files.rgb, files.luminance, files.lab}) {
+    const Imf::InputFile input(file.c_str());
+    const Imf::Header& header = input.header();
+    ASSERT_TRUE(Imf::hasChromaticities(header)) << file;
+    EXPECT_EQ(Imf::chromaticities(header).red, Imath::V2f(0.64f, 0.33f));
+    EXPECT_EQ(Imf::chromaticities(header).white, Imath::V2f(0.3127f, 0.3290f));
+    EXPECT_EQ(header.compression(), Imf::ZIP_COMPRESSION);
+    EXPECT_EQ(text_attribute(header, "colorOrigin"), "colour is inferred, by colorizer builtin, take first");
+    EXPECT_NE(text_attribute(header, "colorSpace"), "missing");
+  }
+}
+
+TEST(ExrTextures, LabChannelsMayHaveNamesWhoseOrderBlenderKeeps) {
+  const TempDir folder;
+  const BakedTexture texture = tetrahedron().texture;
+  ExrOptions options;
+  options.lab_names = "xyz";
+  const TextureFiles files = write_exr_textures(texture, "", folder.path(), "mesh", options);
+  EXPECT_EQ(read_channel(files.lab, "Lab.Y"), texture.a);
+}
+
+TEST(ExrWriter, MipMapsAreMeansDownToOnePixel) {
+  const TempDir folder;
+  const int width = 100, height = 70;  // neither powers of two nor whole tiles
+  std::vector<float> values;
+  for (int i = 0; i < width * height; ++i) values.push_back(static_cast<float>(i % width));
+  write_exr(folder / "a.exr", {width, height, {{"Y", values}}, {}}, /*mip=*/true);
+  const Imf::TiledInputFile input((folder / "a.exr").c_str());
+  EXPECT_EQ(input.tileXSize(), 64u);
+  EXPECT_EQ(input.numLevels(), 7) << "100, 50, 25, 12, 6, 3, 1";
+  EXPECT_EQ(read_level(folder / "a.exr", "Y", 0), values);
+  const std::vector<float> half_size = read_level(folder / "a.exr", "Y", 1);
+  ASSERT_EQ(half_size.size(), 50u * 35u);
+  EXPECT_FLOAT_EQ(half_size[0], 0.5f);
+  EXPECT_FLOAT_EQ(half_size[50 + 7], 14.5f);
+  EXPECT_EQ(read_level(folder / "a.exr", "Y", 6).size(), 1u);
+}
+
+TEST(ExrWriter, LargeValuesFitIntoHalfAndBrokenOnesAreRefused) {
+  const TempDir folder;
+  const std::vector<float> bright{1e6f, 0.5f, -1e6f, 2};
+  write_exr(folder / "a.exr", {2, 2, {{"Y", bright, 1, true}}, {}});
+  EXPECT_EQ(read_channel(folder / "a.exr", "Y"), (std::vector<float>{65504, 0.5f, -65504, 2}));
+  const std::vector<float> broken{0, std::numeric_limits<float>::quiet_NaN(), 0, 0};
+  EXPECT_THROW(write_exr(folder / "b.exr", {2, 2, {{"Y", broken}}, {}}), ContractError);
+  EXPECT_THROW(write_exr(folder / "b.exr", {3, 3, {{"Y", bright}}, {}}), ContractError) << "too few values";
+  EXPECT_FALSE(fs::exists(folder / "b.exr"));
+  std::ofstream(folder / "file") << "not a folder";
+  EXPECT_THROW(write_exr(folder / "file" / "a.exr", {2, 2, {{"Y", bright}}, {}}), OutputError);
+}
+
+}  // namespace
+}  // namespace cnerf::test

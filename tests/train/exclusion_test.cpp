@@ -1,0 +1,72 @@
+// Space about which the views say nothing stays out of stage 1.
+
+#include <gtest/gtest.h>
+
+#include "src/train/luminance_model.h"
+#include "tests/support/toy_capture.h"
+
+namespace cnerf {
+namespace {
+
+/// Twelve long lenses around a small thing: no two neighbours see the same just before their lenses.
+Capture long_lenses() {
+  Capture capture = test::toy_capture(12);
+  for (View& view : capture.views) view.intrinsics.fx = view.intrinsics.fy = 3.0 * view.image.width;
+  return capture;
+}
+
+class Exclusion : public testing::Test {
+ protected:
+  explicit Exclusion(const Capture& capture = long_lenses())
+      : capture_(capture), model_(LuminanceModel::create(capture_, small_options())) {}
+
+  static Stage1Options small_options() {
+    Stage1Options options;
+    options.grid.levels = 2;
+    options.grid.log2_rows = 8;
+    options.occupancy.resolution = 64;
+    return options;
+  }
+  /// On the axis of the first camera, `distance` before it.
+  [[nodiscard]] Vec3d before_the_lens(double distance) const {
+    const Affined& pose = capture_.views.front().world_from_camera;
+    return pose.translation + pose.linear.column(2) * distance;
+  }
+  [[nodiscard]] bool is_left_out(Vec3d world) const {
+    const Vec3f p = model_.frame.unit_from_world(world).cast<float>();
+    const OccupancyGrid& grid = model_.engine->occupancy();
+    return !grid.occupied(grid.cascade_of(p), p);  // before the first step, all that is not left out counts as occupied
+  }
+
+  Capture capture_;
+  LuminanceModel model_;
+};
+
+TEST_F(Exclusion, WhatOneViewAloneSeesInFrontOfTheObjectIsLeftOut) {
+  EXPECT_TRUE(is_left_out(before_the_lens(0.6)));
+}
+
+TEST_F(Exclusion, WhatTheViewsLookAtAndWhatIsBehindItStays) {
+  const Vec3d focus = focus_point(capture_.views);
+  EXPECT_NEAR(length(focus), 0, 1e-6);
+  const double distance = length(capture_.views.front().world_from_camera.translation - focus);
+  EXPECT_FALSE(is_left_out(focus));
+  EXPECT_FALSE(is_left_out(before_the_lens(1.1 * distance)));
+  EXPECT_FALSE(is_left_out(before_the_lens(1.4 * distance))) << "one view sees it, as background";
+}
+
+TEST_F(Exclusion, WhatNoViewSeesIsLeftOut) {
+  EXPECT_TRUE(is_left_out({0, 0, 3.5}));
+}
+
+/// With few views there is nobody to agree.
+class FewViews : public Exclusion {
+ protected:
+  FewViews() : Exclusion(test::toy_capture(3)) {}
+};
+TEST_F(FewViews, OneViewIsEnough) {
+  EXPECT_FALSE(is_left_out(before_the_lens(1.5)));
+}
+
+}  // namespace
+}  // namespace cnerf

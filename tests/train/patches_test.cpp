@@ -1,0 +1,90 @@
+// Patches of query-based colorization.
+
+#include "src/train/patches.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "src/color/colorspace_math.h"
+
+namespace cnerf {
+namespace {
+
+/// A view whose luminance grows to the right and whose left quarter is empty.
+CachedView some_view(int width = 80, int height = 60) {
+  CachedView view;
+  view.width = width;
+  view.height = height;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      view.luminance.push_back(float(x) / float(width));
+      view.opacity.push_back(x < width / 4 ? 0.0f : 1.0f);
+    }
+  }
+  return view;
+}
+
+TEST(RandomPatch, LiesInTheViewHasTheAskedSizeAndReachesEveryBorder) {
+  const std::vector<CachedView> views = {some_view()};
+  std::set<int> sides;
+  bool left = false, right = false, top = false, bottom = false;
+  for (std::uint64_t i = 0; i < 3000; ++i) {
+    const PatchPlace place = random_patch(views, 0, 0.3, 0.7, 7, i);
+    sides.insert(place.side);
+    ASSERT_TRUE(place.left >= 0 && place.left + place.side <= 80 && place.top >= 0 && place.top + place.side <= 60);
+    left |= place.left == 0;
+    right |= place.left + place.side == 80;
+    top |= place.top == 0;
+    bottom |= place.top + place.side == 60;
+  }
+  EXPECT_TRUE(left && right && top && bottom);
+  EXPECT_EQ(*sides.begin(), 18) << "0.3 of the short side";
+  EXPECT_EQ(*sides.rbegin(), 42) << "0.7 of the short side";
+}
+
+TEST(RandomPatch, IsAFunctionOfSeedAndIndex) {
+  const std::vector<CachedView> views = {some_view()};
+  const auto text = [&](std::uint64_t seed, std::uint64_t index) {
+    const PatchPlace place = random_patch(views, 0, 0.3, 0.7, seed, index);
+    return std::to_string(place.left) + "," + std::to_string(place.top) + "," + std::to_string(place.side);
+  };
+  EXPECT_EQ(text(1, 5), text(1, 5));
+  EXPECT_NE(text(1, 5), text(1, 6));
+  EXPECT_NE(text(1, 5), text(2, 5));
+}
+
+TEST(RenderPatch, AveragesLightNotLightness) {
+  CachedView view = some_view(8, 8);
+  for (std::size_t i = 0; i < view.luminance.size(); ++i) view.luminance[i] = i % 2 == 0 ? 0.0f : 1.0f;
+  const RenderedPatch patch = render_patch(view, {0, 0, 0, 8}, 4);
+  ASSERT_EQ(patch.lightness.size(), 16u);
+  for (const float value : patch.lightness) EXPECT_NEAR(value, lightness_from_luminance(0.5f), 1e-4);
+}
+
+TEST(PickPixels, TakesVisiblePixelsOfTheSquareWithTheirOwnColours) {
+  const CachedView view = some_view();
+  const PatchPlace place = {0, 10, 5, 32};
+  constexpr int k = 64;
+  std::vector<float> ab(2 * k * k);  // a counts columns of the view, b its rows
+  for (int y = 0; y < k; ++y) {
+    for (int x = 0; x < k; ++x) {
+      ab[std::size_t(y * k + x)] = float(place.left) + (float(x) + 0.5f) * 0.5f - 0.5f;
+      ab[std::size_t(k * k + y * k + x)] = float(place.top) + (float(y) + 0.5f) * 0.5f - 0.5f;
+    }
+  }
+  const PatchPixels picked = pick_pixels(view, place, k, ab, 2000, 3, 4);
+  ASSERT_EQ(picked.pixels.size(), picked.colors.size());
+  EXPECT_GT(picked.pixels.size(), 1000u);
+  for (std::size_t i = 0; i < picked.pixels.size(); ++i) {
+    const int x = int(picked.pixels[i]) % view.width, y = int(picked.pixels[i]) / view.width;
+    ASSERT_GE(x, 20) << "the left quarter is empty";
+    ASSERT_TRUE(x < place.left + place.side && y >= place.top && y < place.top + place.side);
+    EXPECT_NEAR(picked.colors[i].a, x, 1e-3);
+    EXPECT_NEAR(picked.colors[i].b, y, 1e-3);
+  }
+}
+
+}  // namespace
+}  // namespace cnerf
