@@ -35,3 +35,10 @@ function(cnerf_compile_per_isa generic avx2 avx512)
   set_source_files_properties(${avx512} PROPERTIES
     COMPILE_OPTIONS "${common};-mavx512f;-mavx512dq;-mavx512vl;-mavx512bw;-mfma;-mtune=znver3;-Wno-uninitialized")  # GCC 105593
 endfunction()
+
+# cnerf_add_cuda_library(NAME SOURCES … [PUBLIC …]): like cnerf_add_library, of kernels and their launchers.
+function(cnerf_add_cuda_library name)
+  cnerf_add_library(${name} ${ARGN})
+  target_compile_options(${name} PRIVATE $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr>)
+  target_link_libraries(${name} PUBLIC CUDA::cudart_static)
+endfunction()

@@ -14,12 +14,22 @@ endif()
 
 # Every target of ours links this one; packages' headers are SYSTEM and stay out of it.
 add_library(cnerf_options INTERFACE)
-target_compile_options(cnerf_options INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
-                       $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-restrict>)  # GCC 105329
+target_compile_options(cnerf_options INTERFACE
+                       $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wshadow;-Wnon-virtual-dtor;-Woverloaded-virtual>
+                       $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-restrict>)  # GCC 105329
 if(CNERF_WARNINGS_AS_ERRORS)
-  target_compile_options(cnerf_options INTERFACE -Werror)
+  target_compile_options(cnerf_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Werror>)
 endif()
 if(CNERF_SANITIZE)
-  target_compile_options(cnerf_options INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer)
+  target_compile_options(cnerf_options INTERFACE
+                         $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=address,undefined;-fno-omit-frame-pointer>)
   target_link_options(cnerf_options INTERFACE -fsanitize=address,undefined)
+endif()
+
+if(CNERF_CUDA)
+  enable_language(CUDA)
+  set(CMAKE_CUDA_STANDARD 20)
+  set(CMAKE_CUDA_STANDARD_REQUIRED ON)
+  set(CMAKE_CUDA_RUNTIME_LIBRARY Static)  # nothing but a driver is needed to run
+  find_package(CUDAToolkit REQUIRED)
 endif()

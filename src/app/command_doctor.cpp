@@ -17,6 +17,7 @@
 #include "src/base/cpu_features.h"
 #include "src/base/parallel.h"
 #include "src/config/config.h"
+#include "src/engine/select_engine.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -89,7 +90,7 @@ void doctor() {
   line("processor", fmt::format("{} threads, {}", thread_count(), to_string(detected_isa())));
   line("memory", memory_text());
   line("disk", disk_text());
-  line("CUDA", has_cuda_engine() ? "built in" : "not built in; fields are trained on the processor");
+  line("CUDA", cuda_engine_text());
   line("LibTorch", CNERF_TORCH_VERSION);
   line("BLAS", blas_text());
   line("OpenCV", CV_VERSION);

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "src/app/device.h"
 #include "src/base/parallel.h"
 #include "src/config/toml_binding.h"
+#include "src/engine/select_engine.h"
 
 namespace cnerf {
 namespace {
@@ -58,7 +58,7 @@ Config resolve_config(const ConfigArguments& arguments, Config base) {
   for (const std::string& setting : arguments.settings) apply_setting(setting, base);
   for (const std::string& setting : arguments.short_forms) apply_setting(setting, base);
   check_consistency(base);
-  check_device(base.device);
+  select_engine_device(base.device);
   set_thread_count(base.threads);
   return base;
 }

@@ -7,7 +7,5 @@ namespace cnerf {
 
 /// "0.1.0", by semantic versioning.
 [[nodiscard]] std::string version_text();
-/// True when the CUDA engine was compiled in.
-[[nodiscard]] bool has_cuda_engine();
 
 }  // namespace cnerf

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "encoding/hash_grid_levels.h"
@@ -84,5 +85,12 @@ class LuminanceEngine {
 };
 
 [[nodiscard]] std::unique_ptr<LuminanceEngine> make_cpu_luminance_engine(const LuminanceEngineOptions& options);
+/// Steps run behind the caller's back: a report may be of a step shortly before.
+/// @throws DeviceError  without a usable GPU, or when its memory does not suffice
+[[nodiscard]] std::unique_ptr<LuminanceEngine> make_cuda_luminance_engine(const LuminanceEngineOptions& options);
+/// Whether there is a GPU that can be used; false in builds without CNERF_CUDA.
+[[nodiscard]] bool has_cuda_device();
+/// Its name and memory.
+[[nodiscard]] std::string cuda_device_text();
 
 }  // namespace cnerf

@@ -13,49 +13,18 @@ namespace cnerf {
 namespace {
 
 constexpr int kBlockSide = 8;
-constexpr float kNeverSeen = 1e9f;  // before its first look, a cell counts as occupied
-
-int clamped_cell(float x01, int resolution) {
-  return std::clamp(static_cast<int>(x01 * static_cast<float>(resolution)), 0, resolution - 1);
-}
 
 }  // namespace
 
-OccupancyGrid::OccupancyGrid(const OccupancyOptions& options, int cascades) : options_(options), cascades_(cascades) {
+OccupancyGrid::OccupancyGrid(const OccupancyOptions& options, int cascades)
+    : options_(options), layout_(options.resolution, cascades) {
   CNERF_CHECK(options.resolution % (2 * kBlockSide) == 0,
               "occupancy resolution must be a multiple of 16, so that blocks do not straddle cascades");
   CNERF_CHECK(cascades >= 1, "at least one cascade");
-  for (int k = 0; k < cascades; ++k) side_.push_back(std::ldexp(1.0f, k - cascades + 1));
   const std::size_t cells = std::size_t(options.resolution) * options.resolution * options.resolution * cascades;
-  density_.assign(cells, kNeverSeen);
+  density_.assign(cells, kNeverSeenCell);
   bits_.assign((cells + 63) / 64, ~std::uint64_t(0));
   blocks_.assign(cells / (kBlockSide * kBlockSide * kBlockSide), 1);
-}
-
-int OccupancyGrid::cascade_of(Vec3f p) const {
-  const float reach = 2.0f * std::max({std::abs(p.x - 0.5f), std::abs(p.y - 0.5f), std::abs(p.z - 0.5f)});
-  for (int k = 0; k < cascades_; ++k) {
-    if (reach <= side_[k]) return k;
-  }
-  return cascades_ - 1;
-}
-
-std::size_t OccupancyGrid::cell_of(int cascade, Vec3f p) const {
-  const int r = options_.resolution;
-  const float scale = 1.0f / side_[cascade];
-  const int x = clamped_cell((p.x - 0.5f) * scale + 0.5f, r);
-  const int y = clamped_cell((p.y - 0.5f) * scale + 0.5f, r);
-  const int z = clamped_cell((p.z - 0.5f) * scale + 0.5f, r);
-  return ((std::size_t(cascade) * r + z) * r + y) * r + x;
-}
-
-std::size_t OccupancyGrid::block_of(int cascade, Vec3f p) const {
-  const int r = options_.resolution / kBlockSide;
-  const float scale = 1.0f / side_[cascade];
-  const int x = clamped_cell((p.x - 0.5f) * scale + 0.5f, r);
-  const int y = clamped_cell((p.y - 0.5f) * scale + 0.5f, r);
-  const int z = clamped_cell((p.z - 0.5f) * scale + 0.5f, r);
-  return ((std::size_t(cascade) * r + z) * r + y) * r + x;
 }
 
 double OccupancyGrid::occupied_share() const {
@@ -67,25 +36,21 @@ double OccupancyGrid::occupied_share() const {
 void OccupancyGrid::update(std::size_t stride, std::size_t phase, std::uint64_t jitter_seed,
                            const std::function<void(std::span<const Vec3f>, std::span<float>)>& density) {
   const std::size_t looked_at = (density_.size() - phase + stride - 1) / stride;
-  const std::size_t r = std::size_t(options_.resolution);
-  const CounterRng rng(jitter_seed, 0x0cc);
+  const CounterRng rng = occupancy_rng(jitter_seed);
   constexpr std::size_t kPiece = 4096;
   parallel_ranges(looked_at, kPiece, [&](std::size_t begin, std::size_t end) {
     std::vector<Vec3f> points(end - begin);
     std::vector<float> sigma(end - begin);
     for (std::size_t i = begin; i < end; ++i) {
       const std::size_t cell = phase + i * stride;
-      const int cascade = static_cast<int>(cell / (r * r * r));
-      const Vec3f corner = {float(cell % r), float(cell / r % r), float(cell / (r * r) % r)};
       const Vec3f jitter = {rng.uniform(3 * cell), rng.uniform(3 * cell + 1), rng.uniform(3 * cell + 2)};
-      const Vec3f in_cascade = (corner + jitter) / float(r) - Vec3f{0.5f, 0.5f, 0.5f};
-      points[i - begin] = in_cascade * side_[cascade] + Vec3f{0.5f, 0.5f, 0.5f};
+      points[i - begin] = layout_.point_in(cell, jitter);
     }
     density(points, sigma);
     for (std::size_t i = begin; i < end; ++i) {
       float& remembered = density_[phase + i * stride];
-      if (remembered == kExcluded) continue;
-      const float before = remembered == kNeverSeen ? 0.0f : remembered * options_.decay;
+      if (remembered == kExcludedCell) continue;
+      const float before = remembered == kNeverSeenCell ? 0.0f : remembered * options_.decay;
       remembered = std::max(before, sigma[i - begin]);
     }
   });
@@ -95,18 +60,18 @@ void OccupancyGrid::update(std::size_t stride, std::size_t phase, std::uint64_t 
 void OccupancyGrid::exclude(const std::function<bool(Vec3f, float)>& wanted) {
   constexpr int kSide = 4;
   const int r = options_.resolution;
-  parallel_tasks(std::size_t(cascades_ * r / kSide), [&](std::size_t slab) {
+  parallel_tasks(std::size_t(layout_.cascades * r / kSide), [&](std::size_t slab) {
     const int k = int(slab) / (r / kSide), z0 = int(slab) % (r / kSide) * kSide;
     const float radius = 0.5f * std::sqrt(3.0f) * kSide * cell_side(k);
     for (int y0 = 0; y0 < r; y0 += kSide) {
       for (int x0 = 0; x0 < r; x0 += kSide) {
         const Vec3f in_cells = {float(x0) + 0.5f * kSide, float(y0) + 0.5f * kSide, float(z0) + 0.5f * kSide};
-        const Vec3f centre = (in_cells / float(r) - Vec3f{0.5f, 0.5f, 0.5f}) * side_[k] + Vec3f{0.5f, 0.5f, 0.5f};
+        const Vec3f centre = (in_cells / float(r) - Vec3f{0.5f, 0.5f, 0.5f}) * layout_.side(k) + Vec3f{0.5f, 0.5f, 0.5f};
         if (wanted(centre, radius)) continue;
         for (int z = z0; z < z0 + kSide; ++z) {
           for (int y = y0; y < y0 + kSide; ++y) {
             float* row = density_.data() + ((std::size_t(k) * r + z) * r + y) * r + x0;
-            std::fill(row, row + kSide, kExcluded);
+            std::fill(row, row + kSide, kExcludedCell);
           }
         }
       }
@@ -120,13 +85,13 @@ void OccupancyGrid::refresh_bits() {
   const std::size_t cells = r * r * r;
   const std::size_t blocks_a_side = r / kBlockSide;
   std::fill(blocks_.begin(), blocks_.end(), std::uint8_t(0));
-  parallel_tasks(std::size_t(cascades_), [&](std::size_t k) {
+  parallel_tasks(std::size_t(layout_.cascades), [&](std::size_t k) {
     const float* density = density_.data() + k * cells;
     // Early in training nothing reaches the threshold; then the densest half is what is worth sampling.
     double total = 0;
     std::size_t included = 1;
     for (std::size_t i = 0; i < cells; ++i) {
-      if (density[i] == kExcluded) continue;
+      if (density[i] == kExcludedCell) continue;
       total += std::min(density[i], 1e4f);
       ++included;
     }

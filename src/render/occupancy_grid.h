@@ -9,6 +9,7 @@
 
 #include "src/base/options.h"
 #include "src/base/vec3.h"
+#include "src/render/occupancy_layout.h"
 
 namespace cnerf {
 
@@ -29,21 +30,21 @@ class OccupancyGrid {
  public:
   OccupancyGrid(const OccupancyOptions& options, int cascades);
 
-  [[nodiscard]] int cascades() const { return cascades_; }
+  [[nodiscard]] int cascades() const { return layout_.cascades; }
   [[nodiscard]] int resolution() const { return options_.resolution; }
 
   /// The innermost cascade whose box holds `p`, of [0, 1]^3.
-  [[nodiscard]] int cascade_of(Vec3f p) const;
+  [[nodiscard]] int cascade_of(Vec3f p) const { return layout_.cascade_of(p); }
   [[nodiscard]] bool occupied(int cascade, Vec3f p) const {
-    const std::size_t cell = cell_of(cascade, p);
+    const std::size_t cell = layout_.cell_of(cascade, p);
     return (bits_[cell / 64] >> (cell % 64)) & 1u;
   }
   /// False when all 8^3 cells around `p` are empty as well: a marcher may leave the whole block at once.
-  [[nodiscard]] bool block_occupied(int cascade, Vec3f p) const { return blocks_[block_of(cascade, p)] != 0; }
+  [[nodiscard]] bool block_occupied(int cascade, Vec3f p) const { return blocks_[layout_.block_of(cascade, p)] != 0; }
 
   /// Side of a cell, and of the 8^3 block, of a cascade; unit space.
-  [[nodiscard]] float cell_side(int cascade) const { return side_[cascade] / static_cast<float>(options_.resolution); }
-  [[nodiscard]] float cascade_side(int cascade) const { return side_[cascade]; }
+  [[nodiscard]] float cell_side(int cascade) const { return layout_.cell_side(cascade); }
+  [[nodiscard]] float cascade_side(int cascade) const { return layout_.side(cascade); }
   [[nodiscard]] double occupied_share() const;
 
   /// Looks at every `stride`-th cell, starting with cell `phase`: asks `density` for sigma at a jittered point of each,
@@ -62,15 +63,9 @@ class OccupancyGrid {
   void refresh_bits();
 
  private:
-  [[nodiscard]] std::size_t cell_of(int cascade, Vec3f p) const;
-  [[nodiscard]] std::size_t block_of(int cascade, Vec3f p) const;
-
-  static constexpr float kExcluded = -1.0f;
-
   OccupancyOptions options_;
-  int cascades_;
-  std::vector<float> side_;           ///< [cascades], unit space
-  std::vector<float> density_;        ///< [cascades, R, R, R], sigma; x fastest; kExcluded where nothing can be
+  OccupancyLayout layout_;
+  std::vector<float> density_;        ///< [cascades, R, R, R], sigma; x fastest; kExcludedCell where nothing can be
   std::vector<std::uint64_t> bits_;   ///< one bit a cell, same order
   std::vector<std::uint8_t> blocks_;  ///< [cascades, R/8, R/8, R/8], 1 = some cell is occupied
 };

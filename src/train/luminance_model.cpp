@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "src/engine/select_engine.h"
 #include "src/train/options_json.h"
 
 namespace cnerf {
@@ -20,7 +21,7 @@ std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stag
   engine.patch_size = options.sampling == "patches" ? options.patch_size : 0;
   engine.max_luminance = max_luminance;
   engine.seed = static_cast<std::uint64_t>(options.seed);
-  return make_cpu_luminance_engine(engine);
+  return make_luminance_engine(engine);
 }
 
 /// White of integer images; floating point ones may be brighter.

@@ -1,25 +1,16 @@
 #include "src/engine/cpu/hash_grid.h"
 
 #include "src/base/parallel.h"
-#include "src/base/rng.h"
+#include "src/engine/initial_state.h"
 
 namespace cnerf {
-namespace {
-
-constexpr float kInitialReach = 1e-4f;  // uniform in +-1e-4 (Mueller et al. 2022, Sec. 4)
-
-}  // namespace
-
 HashGridCpu::HashGridCpu(const HashGridOptions& options, std::uint64_t seed)
     : levels_(hash_grid_levels(options)), kernels_(&hash_grid_kernels()) {
   const std::size_t rows = total_rows(levels_);
-  table_.resize(rows * 4);
+  const std::vector<float> initial = initial_table(levels_, seed);
+  table_.assign(initial.begin(), initial.end());
   d_table_.assign(rows * 4, 0.0f);
   moments_.assign(rows * 8, 0.0f);
-  const CounterRng rng(seed, 0x9a5);
-  parallel_ranges(table_.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) table_[i] = (2.0f * rng.uniform(i) - 1.0f) * kInitialReach;
-  });
 }
 
 void HashGridCpu::backward_and_update(const std::vector<EncodedSamples>& runs, const AdamSettings& adam,

@@ -8,7 +8,7 @@
 #include "encoding/cpu/hash_grid_kernels.h"
 #include "encoding/hash_grid_levels.h"
 #include "src/base/aligned.h"
-#include "src/engine/cpu/adam.h"
+#include "src/field/adam.h"
 #include "src/engine/state.h"
 
 namespace cnerf {

@@ -1,10 +1,11 @@
 #include "src/engine/cpu/luminance_field.h"
 
+#include "src/engine/initial_state.h"
+
 namespace cnerf {
 namespace {
 
 constexpr int kFeatureChannels = kGeometryChannels + kSphericalHarmonics;
-constexpr int kLuminanceOutputs = 4;  // one, padded to what the kernels want
 
 /// Place of a sample's value in a grouped array.
 std::size_t at(std::size_t sample, int channels, int channel) {
@@ -27,8 +28,8 @@ void LuminanceWorkspace::resize(std::size_t wanted_groups, int encoded_channels)
 LuminanceFieldCpu::LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float max_luminance,
                                      std::uint64_t seed)
     : grid_(grid, seed),
-      density_net_({{grid_.channels(), kHiddenWidth, kGeometryChannels}}, seed, 1),
-      luminance_net_({{kFeatureChannels, kHiddenWidth, kHiddenWidth, kLuminanceOutputs}}, seed, 2),
+      density_net_(density_net_layout(grid_.channels() / 4), seed, kDensityNetStream),
+      luminance_net_(luminance_net_layout(), seed, kLuminanceNetStream),
       density_scale_(density_scale),
       luminance_activation_(LuminanceActivation<float>::up_to(max_luminance)) {}
 

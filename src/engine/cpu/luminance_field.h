@@ -2,27 +2,17 @@
 /// Stage 1's field on the CPU: hash grid + density net -> density and geometry feature; feature and spherical harmonics
 /// of the direction -> luminance net (paper, Eq. monochromenerf, with the hash grid in place of positional encoding).
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include "encoding/spherical_harmonics_math.h"
 #include "src/engine/cpu/hash_grid.h"
 #include "src/engine/cpu/mlp.h"
+#include "src/field/density_activation.h"
 #include "src/field/luminance_activation.h"
 #include "src/render/ray.h"
 
 namespace cnerf {
-
-inline constexpr int kGeometryChannels = 16;  ///< outputs of the density net; the first one is log density
-inline constexpr int kHiddenWidth = 64;
-
-/// Density of the density net's first output; 1/unit length. Clamped so that neither sigma nor its gradient overflows.
-template <typename Real>
-Real density_from_raw(Real raw, Real scale) {
-  return std::exp(std::clamp(raw, Real(-15), Real(15))) * scale;
-}
 
 /// Buffers for a block of samples; grouped arrays [G, C, 16].
 struct LuminanceWorkspace {

@@ -53,11 +53,7 @@ void MlpCpu::backward(const std::vector<Channels>& activations, const std::vecto
 
 void MlpCpu::update(const std::vector<float>& d_weights, const AdamSettings& adam, const AdamStep& step) {
   for (std::size_t i = 0; i < weights_.size(); ++i) {
-    const float d = d_weights[i];
-    first_moments_[i] = adam.beta1 * first_moments_[i] + (1 - adam.beta1) * d;
-    second_moments_[i] = adam.beta2 * second_moments_[i] + (1 - adam.beta2) * d * d;
-    weights_[i] -=
-        step.step_size * first_moments_[i] / (std::sqrt(second_moments_[i] * step.second_correction) + adam.epsilon);
+    step.apply(adam, d_weights[i], first_moments_[i], second_moments_[i], weights_[i]);
   }
   transpose_weights();
 }

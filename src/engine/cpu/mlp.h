@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "src/base/aligned.h"
-#include "src/engine/cpu/adam.h"
+#include "src/field/adam.h"
 #include "src/engine/state.h"
 #include "src/field/cpu/mlp_kernels.h"
 #include "src/field/mlp_layout.h"

@@ -1,0 +1,74 @@
+#include <cuda_bf16.h>
+
+#include "encoding/cuda/hash_grid_cuda.h"
+#include "encoding/cuda/hash_grid_device.cuh"
+
+namespace cnerf {
+namespace {
+
+constexpr int kThreads = 256;
+constexpr int kRun = 16;   // successive samples of eight threads of the backward kernel
+constexpr int kLoaded = 4;  // of them at once
+
+unsigned blocks_for(std::uint32_t items) {
+  return (items + kThreads - 1) / kThreads;
+}
+
+__global__ void encode(const __grid_constant__ GridLevels levels, const uint2* __restrict__ table, const float4* __restrict__ places,
+                       const std::uint32_t* count, uint2* __restrict__ encoded) {
+  const std::uint32_t sample = blockIdx.x * kThreads + threadIdx.x;
+  if (sample >= *count) return;
+  const float4 place = places[sample];
+  const float position[3] = {place.x, place.y, place.z};
+  const int l = static_cast<int>(blockIdx.y);
+  encoded[std::size_t(sample) * levels.count + l] = halves_of(gather(levels.level[l], table, position));
+}
+
+/// Blocks of one level follow one another, so that the gradients of that level stay in L2.
+__global__ void __launch_bounds__(kThreads)
+    scatter(const __grid_constant__ GridLevels levels, const float4* __restrict__ places, const std::uint32_t* count,
+            std::uint32_t most, const uint2* __restrict__ d_encoded, float* __restrict__ d_table) {
+  const std::uint32_t n = min(*count, most);
+  const std::uint32_t first = (blockIdx.x * kThreads + threadIdx.x) / 8 * kRun;
+  if (first >= n) return;
+  const GridLevel& level = levels.level[blockIdx.y];
+  const uint2* d_level = d_encoded + std::size_t(blockIdx.y) * most;
+
+  CornerRun run(level, threadIdx.x % 8, d_table + 4 * std::size_t(level.first_row));
+  for (std::uint32_t begin = first; begin < min(first + kRun, n); begin += kLoaded) {
+    float4 place[kLoaded];
+    uint2 d[kLoaded];
+#pragma unroll
+    for (std::uint32_t i = 0; i < kLoaded; ++i) {
+      place[i] = __ldg(places + min(begin + i, n - 1));
+      d[i] = begin + i < n ? __ldg(d_level + begin + i) : make_uint2(0, 0);
+    }
+#pragma unroll
+    for (std::uint32_t i = 0; i < kLoaded; ++i) {
+      const float2 low = __bfloat1622float2(*reinterpret_cast<const __nv_bfloat162*>(&d[i].x));
+      const float2 high = __bfloat1622float2(*reinterpret_cast<const __nv_bfloat162*>(&d[i].y));
+      const float position[3] = {place[i].x, place[i].y, place[i].z};
+      run.add(position, make_float4(low.x, low.y, high.x, high.y));
+    }
+  }
+  run.write();
+}
+
+}  // namespace
+
+void encode_cuda(const std::vector<GridLevel>& levels, const void* table, const float* places, SampleCount samples,
+                 void* encoded, cudaStream_t stream) {
+  const dim3 grid(blocks_for(samples.most), unsigned(levels.size()));
+  encode<<<grid, kThreads, 0, stream>>>(GridLevels(levels.data(), levels.size()), static_cast<const uint2*>(table),
+                                        reinterpret_cast<const float4*>(places), samples.count,
+                                        static_cast<uint2*>(encoded));
+}
+
+void encode_backward_cuda(const std::vector<GridLevel>& levels, const float* places, SampleCount samples,
+                          const void* d_encoded, float* d_table, cudaStream_t stream) {
+  const dim3 grid(blocks_for((samples.most + kRun - 1) / kRun * 8), unsigned(levels.size()));
+  scatter<<<grid, kThreads, 0, stream>>>(GridLevels(levels.data(), levels.size()), reinterpret_cast<const float4*>(places), samples.count,
+                                         samples.most, static_cast<const uint2*>(d_encoded), d_table);
+}
+
+}  // namespace cnerf

@@ -1,0 +1,108 @@
+#pragma once
+/// Memory of the GPU with owners, and CUDA calls that throw DeviceError.
+
+#include <cuda_runtime_api.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "src/base/error.h"
+
+namespace cnerf {
+
+/// @throws DeviceError  naming the call and the driver's own words.
+inline void cuda_check(cudaError_t result, const char* call) {
+  if (result == cudaSuccess) return;
+  cudaGetLastError();  // otherwise the next, innocent call reports it again
+  throw DeviceError(std::string(call) + ": " + cudaGetErrorString(result));
+}
+#define CNERF_CUDA(call) ::cnerf::cuda_check((call), #call)
+
+/// Plain device memory of trivially copyable elements.
+template <typename T>
+class DeviceBuffer {
+ public:
+  DeviceBuffer() = default;
+  /// Zeroed memory.  @param use  what for, and what to lower when there is not enough, for the error message
+  DeviceBuffer(std::size_t size, const std::string& use) : size_(size) {
+    if (size == 0) return;
+    const cudaError_t result = cudaMalloc(reinterpret_cast<void**>(&data_), size * sizeof(T));
+    if (result == cudaErrorMemoryAllocation) {
+      cudaGetLastError();
+      std::size_t free = 0, total = 0;
+      cudaMemGetInfo(&free, &total);
+      const auto mib = [](std::size_t bytes) { return std::to_string((bytes + (1u << 20) - 1) >> 20) + " MiB"; };
+      throw DeviceError("out of GPU memory: " + mib(size * sizeof(T)) + " wanted for " + use + ", " + mib(free) + " of " +
+                        mib(total) + " free");
+    }
+    cuda_check(result, "cudaMalloc");
+    CNERF_CUDA(cudaMemset(data_, 0, size * sizeof(T)));
+  }
+  DeviceBuffer(DeviceBuffer&& other) noexcept { swap(other); }
+  DeviceBuffer& operator=(DeviceBuffer&& other) noexcept {
+    DeviceBuffer moved(std::move(other));
+    swap(moved);
+    return *this;
+  }
+  ~DeviceBuffer() { cudaFree(data_); }
+
+  [[nodiscard]] T* data() const { return data_; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] std::size_t bytes() const { return size_ * sizeof(T); }
+
+  void upload(const T* from, std::size_t count) const {
+    if (count > 0) CNERF_CUDA(cudaMemcpy(data_, from, count * sizeof(T), cudaMemcpyHostToDevice));
+  }
+  void download(T* to, std::size_t count, std::size_t first = 0) const {
+    if (count > 0) CNERF_CUDA(cudaMemcpy(to, data_ + first, count * sizeof(T), cudaMemcpyDeviceToHost));
+  }
+  [[nodiscard]] std::vector<T> downloaded() const {
+    std::vector<T> values(size_);
+    download(values.data(), size_);
+    return values;
+  }
+
+ private:
+  void swap(DeviceBuffer& other) {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+  }
+  T* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+template <typename T>
+[[nodiscard]] DeviceBuffer<T> uploaded(const std::vector<T>& values, const std::string& use) {
+  DeviceBuffer<T> buffer(values.size(), use);
+  buffer.upload(values.data(), values.size());
+  return buffer;
+}
+
+/// Host memory that kernels may write to.
+template <typename T>
+class MappedBuffer {
+ public:
+  explicit MappedBuffer(std::size_t size) : size_(size) {
+    CNERF_CUDA(cudaHostAlloc(reinterpret_cast<void**>(&data_), size * sizeof(T), cudaHostAllocMapped));
+    CNERF_CUDA(cudaHostGetDevicePointer(reinterpret_cast<void**>(&on_device_), data_, 0));
+    std::fill_n(data_, size, T{});
+  }
+  MappedBuffer(const MappedBuffer&) = delete;
+  MappedBuffer& operator=(const MappedBuffer&) = delete;
+  ~MappedBuffer() { cudaFreeHost(data_); }
+
+  T& operator[](std::size_t i) { return data_[i]; }
+  const T& operator[](std::size_t i) const { return data_[i]; }
+  /// The same memory as kernels address it.
+  [[nodiscard]] T* on_device() const { return on_device_; }
+
+ private:
+  T* data_ = nullptr;
+  T* on_device_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+}  // namespace cnerf

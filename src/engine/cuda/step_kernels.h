@@ -1,0 +1,69 @@
+#pragma once
+/// The small kernels around a training step: its rays, its bookkeeping and the hash table's optimiser.
+
+#include <cuda_runtime_api.h>
+
+#include <cstdint>
+
+#include "src/engine/cuda/step_state.h"
+#include "src/engine/luminance_engine.h"
+#include "src/render/cuda/ray_record.h"
+#include "src/render/pixel_sampler.h"
+
+namespace cnerf {
+
+struct DirectionCode;
+
+/// A training view on the GPU; images keep the depth they came in.
+struct ViewRecord {
+  UnitCamera camera;
+  int width = 0, height = 0;
+  PixelDepth depth = PixelDepth::kU8;
+  const void* pixels = nullptr;
+  const float* decoded = nullptr;       ///< linear luminance of every integer value; null for floats
+  const std::uint8_t* alpha = nullptr;  ///< null: opaque
+  const std::uint8_t* mask = nullptr;   ///< null: every pixel counts
+};
+
+/// What a step reports, in host memory that kernels write to.
+struct StepRecord {
+  double loss = 0, squared_error = 0;
+  unsigned long long rays = 0, marched = 0, trained = 0, dropped = 0;
+};
+
+/// Steps that may be under way at once: places in the rings of learning rates and reports.
+inline constexpr int kStepRing = 8;
+
+/// Sets the state up for the next step, with its learning rate.
+void begin_step(StepState* state, const float* learning_rates, cudaStream_t stream);
+
+struct DrawJob {
+  const StepState* state;
+  const ViewRecord* views;
+  std::uint32_t n_views;
+  PixelSampling sampling;
+  std::uint64_t seed;
+  RayRecord* rays;
+  DirectionCode* directions;
+};
+/// The rays of the step: the same pixels, jitter and backgrounds as the CPU draws.
+void draw_training_rays(const DrawJob& job, std::uint32_t most_rays, cudaStream_t stream);
+/// Plain rays, to be marched from the middle of the first step.
+void prepare_rays(const Ray* rays, std::uint32_t count, RayRecord* records, DirectionCode* directions,
+                  cudaStream_t stream);
+/// The rays of an image's pixels from `first` on, row by row.
+void camera_rays(const UnitCamera& camera, std::uint32_t first, std::uint32_t count, RayRecord* records,
+                 DirectionCode* directions, cudaStream_t stream);
+
+/// Adam on rows of four features whose gradient is not zero; clears the gradient and renews the halves.
+/// @param moments  [rows, 8]: first moments, then second ones
+void update_table(const AdamStep* adam, std::uint32_t rows, float4* table, float4* d_table, float4* moments,
+                  uint2* halves, cudaStream_t stream);
+/// Only the halves.
+void round_table(std::uint32_t rows, const float4* table, uint2* halves, cudaStream_t stream);
+
+/// Reports the step and chooses how many rays fill the wanted number of samples next time, as the CPU does.
+void end_step(StepState* state, std::uint32_t wanted_samples, std::uint32_t capacity, std::uint32_t most_rays,
+              StepRecord* reports, cudaStream_t stream);
+
+}  // namespace cnerf

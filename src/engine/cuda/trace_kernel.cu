@@ -1,0 +1,400 @@
+#include "src/engine/cuda/trace_kernel.h"
+
+#include "src/base/cuda/device_memory.h"
+#include "src/base/cuda/warp.cuh"
+#include "src/color/colorspace_math.h"
+#include "src/field/cuda/channel_tiles.h"
+#include "src/field/cuda/field_forward.cuh"
+#include "src/render/composite_math.h"
+#include "src/render/cuda/warp_march.cuh"
+
+namespace cnerf {
+namespace {
+
+constexpr int kWarps = 8;
+constexpr int kThreads = 32 * kWarps;
+
+enum class Keep { kTraining, kResults, kSamples };
+
+template <int KT>
+struct TraceShared {
+  BlockField<KT, kWarps> field;
+  MarchQueue queue[kWarps];
+};
+
+__device__ Vec3f in_box(Vec3f p) {
+  return {__saturatef(p.x), __saturatef(p.y), __saturatef(p.z)};
+}
+
+/// Optical depths of a run of samples, and with them the light that comes through.
+struct RunOptics {
+  float depth;         ///< sigma dt of this lane's sample; 0 where there is none
+  float depth_through; ///< of everything up to and including it
+
+  __device__ RunOptics(float depth_before, float own) : depth(own), depth_through(depth_before + warp_prefix_sum(own)) {}
+  [[nodiscard]] __device__ float transmittance_after() const { return expf(-depth_through); }
+  [[nodiscard]] __device__ float weight() const { return expf(depth - depth_through) * alpha_of(depth, 1.0f); }
+  [[nodiscard]] __device__ float total() const { return __shfl_sync(~0u, depth_through, 31); }
+};
+
+/// What a ray has gathered so far. Runs lie in memory one after another, or wherever there was room; lane r knows where
+/// run r begins.
+struct RayProgress {
+  float depth = 0;                   ///< optical
+  float luminance = 0, weighted_t = 0;  ///< this lane's share
+  int samples = 0, marched = 0;
+  std::uint32_t run_begin = 0;
+  bool has_room = true;
+};
+
+/// Takes memory for a run's samples; false when there is none left.
+__device__ bool allocate_run(RayProgress& ray, int count, std::uint32_t capacity, std::uint32_t* allocated) {
+  const unsigned lane = threadIdx.x % 32;
+  std::uint32_t begin = 0;
+  if (lane == 0) begin = atomicAdd(allocated, std::uint32_t(count));
+  begin = __shfl_sync(~0u, begin, 0);
+  if (int(lane) == ray.samples / 32) ray.run_begin = begin;
+  return begin + std::uint32_t(count) <= capacity;
+}
+
+template <int KT>
+__device__ void keep_for_training(const SampleArrays& samples, const WarpField<KT>& warp, RayProgress& ray,
+                                  std::uint32_t ray_index, int count, Vec3f place, float depth, float raw_luminance,
+                                  std::uint32_t* allocated) {
+  const unsigned lane = threadIdx.x % 32;
+  ray.has_room = allocate_run(ray, count, samples.capacity, allocated);
+  const std::uint32_t begin = __shfl_sync(~0u, ray.run_begin, ray.samples / 32);
+  const bool mine = int(lane) < count && begin + lane < samples.capacity;
+  if (mine) {
+    samples.places[begin + lane] = make_float4(place.x, place.y, place.z, __uint_as_float(ray_index));
+    samples.gradients[begin + lane] = make_float2(depth, raw_luminance);
+  }
+  constexpr unsigned kParts = 2 * KT;  // 16 bytes each
+  for (unsigned part = lane; part < unsigned(count) * kParts; part += 32) {
+    const unsigned row = part / kParts;
+    if (begin + row >= samples.capacity) break;
+    samples.encoded[std::size_t(begin) * kParts + part] =
+        reinterpret_cast<const uint4*>(warp.encoded[row])[part % kParts];
+  }
+}
+
+/// Loss of a finished training ray and its gradient by what its samples emit and absorb.
+__device__ void train_ray(const TraceJob& job, const RayRecord& record, const RayProgress& ray, std::uint32_t n_rays,
+                          StepState& sums) {
+  const unsigned lane = threadIdx.x % 32;
+  const float luminance = warp_sum(ray.luminance);
+  const float seen = luminance + expf(-ray.depth) * record.background;
+  const float wanted = record.target + (1.0f - record.coverage) * record.background;
+  const float error = (lightness_from_luminance(seen) - lightness_from_luminance(wanted)) / 100.0f;
+  if (lane == 0) {
+    const float encoded_error = srgb_from_linear(__saturatef(luminance)) - srgb_from_linear(__saturatef(record.target));
+    sums.loss += error * error;
+    sums.squared_error += encoded_error * encoded_error;
+    sums.marched += unsigned(ray.marched);
+    sums.dropped += ray.has_room ? 0u : 1u;
+  }
+  const float d_seen =
+      ray.has_room ? 2.0f * error * lightness_derivative(seen) / (100.0f * static_cast<float>(n_rays)) : 0.0f;
+  float depth = 0, composited = 0;
+  for (int first = 0; first < ray.samples; first += 32) {
+    const std::uint32_t at = __shfl_sync(~0u, ray.run_begin, first / 32) + lane;
+    const bool mine = first + int(lane) < ray.samples && at < job.samples.capacity;
+    const float2 stored = mine ? job.samples.gradients[at] : make_float2(0, 0);
+    const RunOptics optics(depth, stored.x);
+    const float value = job.field.activation.value(stored.y);
+    const float weight = optics.weight();
+    const float through = composited + warp_prefix_sum(weight * value);
+    const float d_log_density = stored.x * d_seen *
+                                density_derivative(1.0f, optics.transmittance_after(), value, seen - through);
+    const float d_raw = d_seen * weight * job.field.activation.derivative(stored.y);
+    if (mine) job.samples.gradients[at] = make_float2(d_raw, d_log_density);
+    depth = optics.total();
+    composited = __shfl_sync(~0u, through, 31);
+  }
+}
+
+__device__ void write_result(RayResult& result, const RayProgress& ray) {
+  const float luminance = warp_sum(ray.luminance), weighted_t = warp_sum(ray.weighted_t);
+  const float opacity = 1.0f - expf(-ray.depth);
+  if (threadIdx.x % 32 == 0) result = {luminance, opacity, opacity > 0 ? weighted_t / opacity : 0.0f};
+}
+
+template <int KT, Keep kKeep>
+__device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job, TraceShared<KT>& shared,
+                                  const RayRecord& record, std::uint32_t ray_index) {
+  const unsigned lane = threadIdx.x % 32;
+  WarpField<KT>& warp = shared.field.warp[threadIdx.x / 32];
+  const FieldNets<KT> nets(shared.field.weights, shared.field.last_layer);
+  const OccupiedSpace space = {job.layout, job.occupied};
+  const uint2 direction = job.directions[ray_index].share_of_lane();
+  WarpMarcher marcher(space, job.march, record, shared.queue[threadIdx.x / 32]);
+
+  RayProgress ray;
+  RaySample sample;
+  bool is_open = true;
+  while (is_open && ray.samples < 32 * kMostRuns) {
+    int count = marcher.next(sample);
+    if (count == 0) break;
+    ray.marched += count;
+    const Vec3f place = in_box(record.ray.at(sample.t));
+    warp.encode(levels, job.field.table, place, lane);
+    __syncwarp();
+    const RawField raw = nets(warp, &direction);
+
+    const float depth = density_from_raw(raw.density, job.field.density_scale) * sample.dt;
+    const RunOptics optics(ray.depth, int(lane) < count ? depth : 0.0f);
+    const unsigned opaque = __ballot_sync(~0u, optics.transmittance_after() < job.min_transmittance);
+    if (opaque != 0 && __ffs(opaque) <= count) {
+      count = __ffs(opaque);  // the sample at which the ray becomes opaque is the last one
+      is_open = false;
+    }
+    const float weight = int(lane) < count ? optics.weight() : 0.0f;
+    const float luminance = job.field.activation.value(raw.luminance);
+    ray.luminance += weight * luminance;
+    ray.weighted_t += weight * sample.t;
+    ray.depth = __shfl_sync(~0u, optics.depth_through, count - 1);
+
+    if constexpr (kKeep == Keep::kTraining) {
+      keep_for_training(job.samples, warp, ray, ray_index, count, place, depth, raw.luminance, &job.state->samples);
+      is_open = is_open && ray.has_room;
+    }
+    if constexpr (kKeep == Keep::kSamples) {
+      ray.has_room = allocate_run(ray, count, job.weighted_capacity, &job.state->samples);
+      const std::uint32_t begin = __shfl_sync(~0u, ray.run_begin, ray.samples / 32);
+      if (ray.has_room && int(lane) < count) job.weighted[begin + lane] = {sample.t, weight, luminance};
+      is_open = is_open && ray.has_room;
+    }
+    ray.samples += count;
+    __syncwarp();
+  }
+  return ray;
+}
+
+template <int KT, Keep kKeep>
+__global__ void __launch_bounds__(kThreads, 2) trace(const __grid_constant__ GridLevels levels,
+                                                     const __grid_constant__ TraceJob job) {
+  extern __shared__ uint4 memory[];
+  auto& shared = *reinterpret_cast<TraceShared<KT>*>(memory);
+  shared.field.load(job.field.nets);
+  const unsigned lane = threadIdx.x % 32;
+  const std::uint32_t n_rays = job.state->rays;
+
+  StepState sums;
+  [[maybe_unused]] std::uint32_t round = 0;
+  while (true) {
+    std::uint32_t index = 0;
+    if constexpr (kKeep == Keep::kResults) {
+      // Neighbouring pixels go to one multiprocessor at the same time: they look up the same cells.
+      index = (round++ * gridDim.x + blockIdx.x) * kWarps + threadIdx.x / 32;
+    } else {
+      if (lane == 0) index = atomicAdd(&job.state->next_ray, 1u);
+      index = __shfl_sync(~0u, index, 0);
+    }
+    if (index >= n_rays) break;
+    const RayRecord record = job.rays[index];
+    const RayProgress ray = follow_ray<KT, kKeep>(levels, job, shared, record, index);
+    if constexpr (kKeep == Keep::kTraining) train_ray(job, record, ray, n_rays, sums);
+    if constexpr (kKeep == Keep::kResults) write_result(job.results[index], ray);
+    if constexpr (kKeep == Keep::kSamples) {
+      if (lane < kMostRuns) job.traced[index].run[lane] = ray.run_begin;
+      if (lane == 0) job.traced[index].samples = std::uint32_t(ray.samples);
+    }
+  }
+  if constexpr (kKeep == Keep::kTraining) {
+    if (lane != 0) return;
+    atomicAdd(&job.state->loss, sums.loss);
+    atomicAdd(&job.state->squared_error, sums.squared_error);
+    atomicAdd(&job.state->marched, sums.marched);
+    if (sums.dropped > 0) atomicAdd(&job.state->dropped, sums.dropped);
+  }
+}
+
+template <int KT>
+struct QueryShared {
+  BlockField<KT, kWarps> field;
+};
+
+template <int KT>
+__global__ void __launch_bounds__(kThreads, 2)
+    query(const __grid_constant__ GridLevels levels, const FieldView field, const Vec3f* positions,
+          const Vec3f* directions, std::uint32_t count, float* sigma, float* luminance) {
+  extern __shared__ uint4 memory[];
+  auto& shared = *reinterpret_cast<QueryShared<KT>*>(memory);
+  shared.field.load(field.nets);
+  const unsigned lane = threadIdx.x % 32;
+  WarpField<KT>& warp = shared.field.warp[threadIdx.x / 32];
+  const FieldNets<KT> nets(shared.field.weights, shared.field.last_layer);
+  for (std::uint32_t first = (blockIdx.x * kWarps + threadIdx.x / 32) * 32; first < count;
+       first += gridDim.x * kThreads) {
+    const std::uint32_t i = min(first + lane, count - 1);
+    warp.encode(levels, field.table, in_box(positions[i]), lane);
+    if (directions != nullptr) warp.set_direction(directions[i], lane);
+    __syncwarp();
+    RawField raw;
+    if (directions != nullptr) {
+      raw = nets(warp, nullptr);
+    } else {
+      raw.density = nets.density(warp);
+    }
+    if (first + lane < count) {
+      if (sigma != nullptr) sigma[i] = density_from_raw(raw.density, field.density_scale);
+      if (luminance != nullptr) luminance[i] = field.activation.value(raw.luminance);
+    }
+    __syncwarp();
+  }
+}
+
+template <int KT>
+__global__ void __launch_bounds__(kThreads, 2)
+    look_at_cells(const __grid_constant__ GridLevels levels, const FieldView field, const OccupancyLayout layout,
+                  float decay, std::uint32_t stride, std::uint32_t phase, CounterRng rng, float* density) {
+  extern __shared__ uint4 memory[];
+  auto& shared = *reinterpret_cast<QueryShared<KT>*>(memory);
+  shared.field.load(field.nets);
+  const unsigned lane = threadIdx.x % 32;
+  WarpField<KT>& warp = shared.field.warp[threadIdx.x / 32];
+  const FieldNets<KT> nets(shared.field.weights, shared.field.last_layer);
+  const std::size_t cells = layout.cells_of_cascade() * std::size_t(layout.cascades);
+  const std::size_t count = (cells - phase + stride - 1) / stride;
+  for (std::size_t first = (std::size_t(blockIdx.x) * kWarps + threadIdx.x / 32) * 32; first < count;
+       first += std::size_t(gridDim.x) * kThreads) {
+    const std::size_t cell = phase + min(first + lane, count - 1) * stride;
+    const float remembered = density[cell];
+    if (__all_sync(~0u, remembered == kExcludedCell)) continue;
+    const Vec3f within = {rng.uniform(3 * cell), rng.uniform(3 * cell + 1), rng.uniform(3 * cell + 2)};
+    warp.encode(levels, field.table, in_box(layout.point_in(cell, within)), lane);
+    __syncwarp();
+    const float sigma = density_from_raw(nets.density(warp), field.density_scale);
+    if (first + lane < count && remembered != kExcludedCell) {
+      density[cell] = fmaxf(remembered == kNeverSeenCell ? 0.0f : remembered * decay, sigma);
+    }
+    __syncwarp();
+  }
+}
+
+/// Sum and number of the densities that are not excluded, a cascade a blockIdx.y.
+__global__ void sum_densities(std::size_t cells, const float* density, double* totals) {
+  const float* of_cascade = density + blockIdx.y * cells;
+  float sum = 0, included = 0;
+  for (std::size_t i = blockIdx.x * std::size_t(blockDim.x) + threadIdx.x; i < cells;
+       i += std::size_t(gridDim.x) * blockDim.x) {
+    const float d = of_cascade[i];
+    if (d == kExcludedCell) continue;
+    sum += fminf(d, 1e4f);
+    included += 1;
+  }
+  sum = warp_sum(sum);
+  included = warp_sum(included);
+  if (threadIdx.x % 32 != 0) return;
+  atomicAdd(&totals[2 * blockIdx.y], double(sum));
+  atomicAdd(&totals[2 * blockIdx.y + 1], double(included));
+}
+
+/// Early in training nothing reaches the threshold; then the densest half is what is worth sampling.
+/// @param totals  null: the threshold alone counts
+__global__ void set_bits(OccupancyLayout layout, float optical_thickness, const float* density, const double* totals,
+                         std::uint32_t* bits) {
+  const std::size_t cell = blockIdx.x * std::size_t(blockDim.x) + threadIdx.x;  // cells are a multiple of 32
+  if (cell >= layout.cells_of_cascade() * std::size_t(layout.cascades)) return;
+  const int cascade = int(cell / layout.cells_of_cascade());
+  float threshold = optical_thickness / layout.cell_side(cascade);
+  if (totals != nullptr) {
+    threshold = fminf(threshold, static_cast<float>(totals[2 * cascade] / (1.0 + totals[2 * cascade + 1])));
+  }
+  const unsigned word = __ballot_sync(~0u, density[cell] > threshold);
+  if (threadIdx.x % 32 == 0) bits[cell / 32] = word;
+}
+
+GridLevels levels_of(const FieldView& field) {
+  return {field.levels, std::size_t(field.n_levels)};
+}
+
+int multiprocessors() {
+  int device = 0, count = 0;
+  CNERF_CUDA(cudaGetDevice(&device));
+  CNERF_CUDA(cudaDeviceGetAttribute(&count, cudaDevAttrMultiProcessorCount, device));
+  return count;
+}
+
+/// Blocks that fill the GPU, with as much shared memory as they need.
+template <typename Shared, auto kKernel>
+unsigned resident_blocks() {
+  static const unsigned blocks = [&] {
+    CNERF_CUDA(cudaFuncSetAttribute(reinterpret_cast<const void*>(kKernel), cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                    int(sizeof(Shared))));
+    int of_one = 0;
+    CNERF_CUDA(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&of_one, kKernel, kThreads, sizeof(Shared)));
+    return unsigned(std::max(of_one, 1) * multiprocessors());
+  }();
+  return blocks;
+}
+
+template <Keep kKeep>
+void launch_trace(const TraceJob& job, cudaStream_t stream) {
+  with_channel_tiles(job.field.n_levels, [&](auto tiles) {
+    constexpr int KT = decltype(tiles)::value;
+    using Shared = TraceShared<KT>;
+    const unsigned blocks = resident_blocks<Shared, trace<KT, kKeep>>();
+    trace<KT, kKeep><<<blocks, kThreads, sizeof(Shared), stream>>>(
+        levels_of(job.field), job);
+    CNERF_CUDA(cudaGetLastError());
+  });
+}
+
+}  // namespace
+
+void trace_training_rays(const TraceJob& job, cudaStream_t stream) {
+  launch_trace<Keep::kTraining>(job, stream);
+}
+void trace_to_results(const TraceJob& job, cudaStream_t stream) {
+  launch_trace<Keep::kResults>(job, stream);
+}
+void trace_to_samples(const TraceJob& job, cudaStream_t stream) {
+  launch_trace<Keep::kSamples>(job, stream);
+}
+
+void query_field(const FieldView& field, const Vec3f* positions, const Vec3f* directions, std::uint32_t count,
+                 float* sigma, float* luminance, cudaStream_t stream) {
+  with_channel_tiles(field.n_levels, [&](auto tiles) {
+    constexpr int KT = decltype(tiles)::value;
+    using Shared = QueryShared<KT>;
+    const unsigned blocks = std::min(resident_blocks<Shared, query<KT>>(), (count + kThreads - 1) / kThreads);
+    query<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field,
+                                                            positions, directions, count, sigma, luminance);
+    CNERF_CUDA(cudaGetLastError());
+  });
+}
+
+void update_occupancy(const FieldView& field, const OccupancyLayout& layout, const OccupancyOptions& options,
+                      std::uint32_t stride, std::uint32_t phase, std::uint64_t jitter_seed, float* density,
+                      double* totals, std::uint32_t* bits, cudaStream_t stream) {
+  with_channel_tiles(field.n_levels, [&](auto tiles) {
+    constexpr int KT = decltype(tiles)::value;
+    using Shared = QueryShared<KT>;
+    const unsigned blocks = resident_blocks<Shared, look_at_cells<KT>>();
+    look_at_cells<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field,
+                                                                    layout, options.decay, stride, phase,
+                                                                    occupancy_rng(jitter_seed), density);
+    CNERF_CUDA(cudaGetLastError());
+  });
+  refresh_occupancy_bits(layout, options, density, totals, bits, stream);
+}
+
+void threshold_occupancy(const OccupancyLayout& layout, float optical_thickness, const float* density,
+                         std::uint32_t* bits, cudaStream_t stream) {
+  const unsigned blocks = unsigned((layout.cells_of_cascade() * std::size_t(layout.cascades) + 255) / 256);
+  set_bits<<<blocks, 256, 0, stream>>>(layout, optical_thickness, density, nullptr, bits);
+  CNERF_CUDA(cudaGetLastError());
+}
+
+void refresh_occupancy_bits(const OccupancyLayout& layout, const OccupancyOptions& options, const float* density,
+                            double* totals, std::uint32_t* bits, cudaStream_t stream) {
+  const std::size_t cells = layout.cells_of_cascade();
+  CNERF_CUDA(cudaMemsetAsync(totals, 0, 2 * sizeof(double) * std::size_t(layout.cascades), stream));
+  sum_densities<<<dim3(128, unsigned(layout.cascades)), 256, 0, stream>>>(cells, density, totals);
+  const unsigned blocks = unsigned((cells * std::size_t(layout.cascades) + 255) / 256);
+  set_bits<<<blocks, 256, 0, stream>>>(layout, options.optical_thickness, density, totals, bits);
+  CNERF_CUDA(cudaGetLastError());
+}
+
+}  // namespace cnerf

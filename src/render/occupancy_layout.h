@@ -1,0 +1,72 @@
+#pragma once
+/// Where a point lies in the occupancy grid: the arithmetic of OccupancyGrid, shared with kernels.
+
+#include <cmath>
+#include <cstdint>
+
+#include "src/base/host_device.h"
+#include "src/base/rng.h"
+#include "src/base/vec3.h"
+
+namespace cnerf {
+
+inline constexpr float kExcludedCell = -1.0f;   ///< density of a cell that is empty for good
+inline constexpr float kNeverSeenCell = 1e9f;   ///< before its first look, a cell counts as occupied
+
+/// Where in a cell an update looks: at 3 cell .. 3 cell + 2.
+[[nodiscard]] CNERF_HD inline CounterRng occupancy_rng(std::uint64_t jitter_seed) {
+  return {jitter_seed, 0x0cc};
+}
+
+struct OccupancyLayout {
+  int resolution = 128;
+  int cascades = 1;
+  float innermost = 1;  ///< side of cascade 0's cube, unit space
+
+  OccupancyLayout() = default;
+  OccupancyLayout(int cells_a_side, int n_cascades)
+      : resolution(cells_a_side), cascades(n_cascades), innermost(std::ldexp(1.0f, 1 - n_cascades)) {}
+
+  /// Side of a cascade's cube, unit space.
+  [[nodiscard]] CNERF_HD float side(int cascade) const { return static_cast<float>(1u << unsigned(cascade)) * innermost; }
+  [[nodiscard]] CNERF_HD float cell_side(int cascade) const { return side(cascade) / static_cast<float>(resolution); }
+
+  /// The innermost cascade whose box holds `p`, of [0, 1]^3.
+  [[nodiscard]] CNERF_HD int cascade_of(Vec3f p) const {
+    const float x = std::abs(p.x - 0.5f), y = std::abs(p.y - 0.5f), z = std::abs(p.z - 0.5f);
+    const float reach = 2.0f * (x > y ? (x > z ? x : z) : (y > z ? y : z));
+    int k = 0;
+    while (k + 1 < cascades && reach > side(k)) ++k;
+    return k;
+  }
+  /// Index of the cell that holds `p`, over all cascades, x fastest.
+  [[nodiscard]] CNERF_HD std::size_t cell_of(int cascade, Vec3f p) const {
+    return index_of(cascade, p, resolution);
+  }
+  /// Index of the aligned cube of `8^3` cells that holds `p`.
+  [[nodiscard]] CNERF_HD std::size_t block_of(int cascade, Vec3f p) const {
+    return index_of(cascade, p, resolution / 8);
+  }
+  [[nodiscard]] CNERF_HD std::size_t cells_of_cascade() const {
+    return std::size_t(resolution) * std::size_t(resolution) * std::size_t(resolution);
+  }
+  /// The point of a cell at `within`, in [0, 1)^3 of the cell.
+  [[nodiscard]] CNERF_HD Vec3f point_in(std::size_t cell, Vec3f within) const {
+    const auto r = std::size_t(resolution);
+    const Vec3f corner = {float(cell % r), float(cell / r % r), float(cell / (r * r) % r)};
+    const Vec3f in_cascade = (corner + within) / float(resolution) - Vec3f{0.5f, 0.5f, 0.5f};
+    return in_cascade * side(int(cell / (r * r * r))) + Vec3f{0.5f, 0.5f, 0.5f};
+  }
+
+ private:
+  [[nodiscard]] CNERF_HD std::size_t index_of(int cascade, Vec3f p, int r) const {
+    const float scale = 1.0f / side(cascade);
+    const auto at = [&](float x) {
+      const int cell = static_cast<int>(((x - 0.5f) * scale + 0.5f) * static_cast<float>(r));
+      return std::size_t(cell < 0 ? 0 : cell >= r ? r - 1 : cell);
+    };
+    return ((std::size_t(cascade) * std::size_t(r) + at(p.z)) * std::size_t(r) + at(p.y)) * std::size_t(r) + at(p.x);
+  }
+};
+
+}  // namespace cnerf

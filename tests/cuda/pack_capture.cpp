@@ -1,0 +1,40 @@
+// Packs a capture for cnerf-cuda-check: reads it as `cnerf train` does, places the box, excludes what no view sees.
+//
+//   pack_capture CAPTURE FOLDER [downscale=1] [holdout=8] [option=value of stage 1 ...]
+
+#include <cstdio>
+#include <string>
+
+#include "src/capture/load_capture.h"
+#include "src/train/luminance_model.h"
+#include "tests/cuda/packed_capture.h"
+
+int main(int argc, char** argv) {
+  if (argc < 3) {
+    std::puts("pack_capture CAPTURE FOLDER [downscale=N] [holdout=N]");
+    return 64;
+  }
+  cnerf::CaptureOptions options;
+  options.holdout = 8;
+  for (int i = 3; i < argc; ++i) {
+    const std::string argument = argv[i];
+    const std::size_t equals = argument.find('=');
+    (argument.substr(0, equals) == "downscale" ? options.downscale : options.holdout) =
+        std::stoi(argument.substr(equals + 1));
+  }
+  cnerf::test::PackedCapture packed;
+  packed.capture = cnerf::load_capture(argv[1], options);
+  cnerf::Stage1Options stage1;
+  const auto model = cnerf::LuminanceModel::create(packed.capture, stage1);
+  packed.frame = model.frame;
+  packed.occupancy_resolution = stage1.occupancy.resolution;
+  for (const float density : model.engine->occupancy().densities()) {
+    packed.excluded.push_back(density == cnerf::kExcludedCell ? 1 : 0);
+  }
+  write_packed(packed, argv[2]);
+  int held_out = 0;
+  for (const auto& view : packed.capture.views) held_out += view.held_out ? 1 : 0;
+  std::printf("%zu views of %dx%d, %d held out, %d cascades\n", packed.capture.views.size(),
+              packed.capture.views[0].image.width, packed.capture.views[0].image.height, held_out, packed.frame.cascades);
+  return 0;
+}

@@ -1,0 +1,310 @@
+// Every kernel against the CPU's code on random input. A bound is stated where it is used; weights and activations are
+// rounded to 16 bits on the GPU (half: 5e-4 relative, bfloat16 in the backward pass: 4e-3), sums are floats.
+
+#include <cuda_runtime_api.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+
+#include "encoding/cuda/hash_grid_cuda.h"
+#include "encoding/hash_grid_reference.h"
+#include "src/base/rng.h"
+#include "src/engine/cpu/luminance_engine_cpu.h"
+#include "src/engine/cuda/luminance_engine_cuda.h"
+#include "tests/cuda/check.h"
+#include "tests/support/toy_capture.h"
+
+namespace cnerf::test {
+namespace {
+
+int failures = 0;
+
+void expect(bool holds, const char* what, double value, double bound) {
+  std::printf("%s  %-58s %10.3e  (bound %.1e)\n", holds ? "ok  " : "FAIL", what, value, bound);
+  std::fflush(stdout);
+  if (!holds) ++failures;
+}
+void expect_below(const char* what, double value, double bound) {
+  expect(value < bound, what, value, bound);  // false for NaN
+}
+
+/// |a - b| / |b|
+template <typename A, typename B>
+double relative_distance(const A& a, const B& b) {
+  double difference = 0, size = 0;
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    difference += (double(a[i]) - double(b[i])) * (double(a[i]) - double(b[i]));
+    size += double(b[i]) * double(b[i]);
+  }
+  return std::sqrt(difference / std::max(size, 1e-300));
+}
+
+std::uint16_t half_of(float value) {
+  // Round to nearest even by way of the exponent's unit in the last place; the values here are normal or tiny.
+  const float magnitude = std::abs(value);
+  if (magnitude == 0) return 0;
+  const int exponent = std::max(std::ilogb(magnitude), -14);
+  const float rounded = std::nearbyint(std::ldexp(magnitude, 10 - exponent));
+  const auto code = std::uint16_t(int(rounded) + ((exponent + 14) << 10));
+  return std::uint16_t(code | (value < 0 ? 0x8000 : 0));
+}
+float float_of_half(std::uint16_t half) {
+  const int exponent = (half >> 10) & 31, mantissa = half & 1023;
+  const float magnitude =
+      exponent == 0 ? std::ldexp(float(mantissa), -24) : std::ldexp(float(mantissa + 1024), exponent - 25);
+  return (half & 0x8000) != 0 ? -magnitude : magnitude;
+}
+float float_of_bfloat(std::uint16_t bits) {
+  const std::uint32_t word = std::uint32_t(bits) << 16;
+  float value = 0;
+  std::memcpy(&value, &word, sizeof(value));
+  return value;
+}
+std::uint16_t bfloat_of(float value) {
+  std::uint32_t word = 0;
+  std::memcpy(&word, &value, sizeof(value));
+  return std::uint16_t((word + 0x7fff + ((word >> 16) & 1)) >> 16);
+}
+
+/// Points along random rays through the unit cube, as a step has them.
+std::vector<float> ray_points(std::size_t count, float spacing) {
+  SequentialRng rng(5, 1);
+  std::vector<float> places;
+  while (places.size() < 4 * count) {
+    Vec3f p = {rng.uniform(), rng.uniform(), rng.uniform()};
+    Vec3f d = normalized(Vec3f{rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)});
+    for (int i = 0; i < 40 && places.size() < 4 * count; ++i) {
+      for (int axis = 0; axis < 3; ++axis) places.push_back(std::clamp(p[axis], 0.0f, 1.0f));
+      places.push_back(0.0f);
+      p += d * spacing;
+    }
+  }
+  return places;
+}
+
+void check_hash_grid(int levels, int log2_rows) {
+  HashGridOptions options;
+  options.levels = levels;
+  options.log2_rows = log2_rows;
+  const std::vector<GridLevel> layout = hash_grid_levels(options);
+  const std::uint32_t count = 20011, capacity = 20480;
+  const std::vector<float> places = ray_points(count, 1.0f / 300);
+  std::vector<float> positions, table;
+  for (std::size_t i = 0; i < count; ++i) positions.insert(positions.end(), &places[4 * i], &places[4 * i] + 3);
+  SequentialRng rng(7, 2);
+  std::vector<std::uint16_t> halves;
+  for (std::size_t i = 0; i < std::size_t(total_rows(layout)) * 4; ++i) {
+    halves.push_back(half_of(rng.uniform(-1, 1)));
+    table.push_back(float_of_half(halves.back()));
+  }
+  const auto d_table = uploaded(halves, "test");
+  DeviceBuffer<float> d_places(std::size_t(capacity) * 4, "test");
+  d_places.upload(places.data(), places.size());
+  const auto d_count = uploaded(std::vector<std::uint32_t>{count}, "test");
+  DeviceBuffer<std::uint16_t> encoded(std::size_t(capacity) * 4 * std::size_t(levels), "test");
+  encode_cuda(layout, d_table.data(), d_places.data(), {d_count.data(), capacity}, encoded.data(), nullptr);
+  CNERF_CUDA(cudaDeviceSynchronize());
+  const std::vector<float> reference = encode_reference(layout, table, positions);
+  std::vector<float> seen;
+  for (const std::uint16_t h : encoded.downloaded()) seen.push_back(float_of_half(h));
+  expect_below("hash grid forward", relative_distance(seen, reference), 5e-4);
+
+  std::vector<double> d_encoded(std::size_t(count) * 4 * std::size_t(levels));
+  std::vector<std::uint16_t> d_bfloat(std::size_t(capacity) * 4 * std::size_t(levels), 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (int l = 0; l < levels; ++l) {
+      for (int f = 0; f < 4; ++f) {
+        const std::uint16_t d = bfloat_of(rng.uniform(-1, 1));
+        d_bfloat[(std::size_t(l) * capacity + i) * 4 + std::size_t(f)] = d;
+        d_encoded[(i * std::size_t(levels) + std::size_t(l)) * 4 + std::size_t(f)] = float_of_bfloat(d);
+      }
+    }
+  }
+  const auto d_gradient = uploaded(d_bfloat, "test");
+  DeviceBuffer<float> gradient(table.size(), "test");
+  encode_backward_cuda(layout, d_places.data(), {d_count.data(), capacity}, d_gradient.data(), gradient.data(), nullptr);
+  CNERF_CUDA(cudaDeviceSynchronize());
+  // Positions as floats on both sides: cells and weights are then the same but for the last bit.
+  std::vector<double> exact_positions(positions.begin(), positions.end());
+  const std::vector<float> d_float(d_encoded.begin(), d_encoded.end());
+  const std::vector<float> expected = encode_backward_reference(layout, positions, d_float);
+  std::vector<float> found = gradient.downloaded();
+  expect_below("hash grid backward", relative_distance(found, expected), 1e-5);
+  for (float& value : found) value = -value;
+  expect(relative_distance(found, expected) > 1.0, "  (a flipped gradient is noticed)",
+         relative_distance(found, expected), 1.0);
+}
+
+/// Copies the state of one engine into another.
+void copy_state(LuminanceEngine& from, LuminanceEngine& to) {
+  const std::vector<StatePiece> source = from.state(), target = to.state();
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    if (source[i].name != target[i].name || source[i].bytes.size() != target[i].bytes.size()) {
+      expect(false, ("state piece " + source[i].name).c_str(), 0, 0);
+      continue;
+    }
+    std::copy(source[i].bytes.begin(), source[i].bytes.end(), target[i].bytes.begin());
+  }
+  to.state_loaded();
+}
+
+struct Problem {
+  const char* name;
+  int levels, log2_rows, finest, cascades, patch;
+  bool with_alpha, with_lens;
+};
+
+void check_engine(const Problem& problem) {
+  std::printf("-- %s: %d levels, 2^%d rows, %d cascades\n", problem.name, problem.levels, problem.log2_rows,
+              problem.cascades);
+  Capture capture = toy_capture(6, 48, 40, problem.with_alpha);
+  if (problem.with_lens) {
+    for (View& view : capture.views) {
+      view.intrinsics.model = LensModel::kOpenCv;
+      view.intrinsics.distortion = {-0.1, 0.02, 1e-3, -2e-3, 0, 0, 0, 0};
+      view.image.mask.assign(view.image.pixel_count(), 255);
+      for (std::size_t i = 0; i < view.image.mask.size(); i += 3) view.image.mask[i] = 0;
+    }
+  }
+  SceneFrame frame;
+  frame.unit_per_world = problem.cascades > 1 ? 0.12 : 0.4;
+  frame.cascades = problem.cascades;
+  const std::vector<TrainingView> views = training_views(capture, frame);
+  LuminanceEngineOptions options;
+  options.grid.levels = problem.levels;
+  options.grid.log2_rows = problem.log2_rows;
+  options.grid.coarsest_resolution = 4;
+  options.grid.finest_resolution = problem.finest;
+  options.occupancy.resolution = 32;
+  options.cascades = problem.cascades;
+  options.march = march_settings(problem.cascades, 64, 1.0 / 64);
+  options.samples_per_step = 16384;
+  options.patch_size = problem.patch;
+  LuminanceEngineCpu cpu(options);
+  LuminanceEngineCuda cuda(options);
+  for (int i = 0; i < 40; ++i) cpu.step(views, 1e-2f);
+  copy_state(cpu, cuda);
+
+  const LuminanceEngineCpu::Gradients expected = cpu.gradients(views);
+  const CudaGradients found = cuda.gradients(views);
+  expect_below("rays", std::abs(double(found.report.rays) - double(expected.report.rays)), 0.5);
+  // Lattice points on the face of a cell may fall on either side; a ray may end one sample earlier.
+  const auto off = [](std::size_t a, std::size_t b) { return std::abs(double(a) - double(b)) / double(b); };
+  expect_below("trained samples", off(found.report.trained_samples, expected.report.trained_samples), 5e-3);
+  expect_below("loss", std::abs(found.report.loss - expected.report.loss) / expected.report.loss, 5e-3);
+  expect_below("squared error",
+               std::abs(found.report.squared_error - expected.report.squared_error) / expected.report.squared_error, 5e-3);
+  expect_below("gradient of the table", relative_distance(found.table, expected.table), 3e-2);
+  expect_below("gradient of the nets", relative_distance(found.weights, expected.weights), 3e-2);
+  std::vector<float> flipped = found.weights;
+  for (float& value : flipped) value = -value;
+  expect(relative_distance(flipped, expected.weights) > 1.0, "  (a flipped gradient is noticed)",
+         relative_distance(flipped, expected.weights), 1.0);
+
+  SequentialRng rng(11, 3);
+  std::vector<Vec3f> points, directions;
+  for (int i = 0; i < 5003; ++i) {
+    points.push_back({rng.uniform(), rng.uniform(), rng.uniform()});
+    directions.push_back(normalized(Vec3f{rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)}));
+  }
+  std::vector<float> a(points.size()), b(points.size());
+  cpu.query_density(points, b);
+  cuda.query_density(points, a);
+  expect_below("density of points", relative_distance(a, b), 1e-2);
+  cpu.query_luminance(points, directions, b);
+  cuda.query_luminance(points, directions, a);
+  expect_below("luminance of points", relative_distance(a, b), 5e-3);
+
+  std::vector<Ray> rays;
+  for (int y = 0; y < 40; ++y) {
+    for (int x = 0; x < 48; ++x) rays.push_back(views[1].camera.ray({x + 0.5, y + 0.5}));
+  }
+  std::vector<RayResult> rendered(rays.size()), seen(rays.size()), of_view(rays.size());
+  cpu.render(rays, options.march, 1e-3f, rendered);
+  cuda.render(rays, options.march, 1e-3f, seen);
+  cuda.render_view(views[1].camera, options.march, 1e-3f, of_view);
+  std::vector<double> luminance[3], opacity[2], depth[2];
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    luminance[0].push_back(seen[r].luminance), luminance[1].push_back(rendered[r].luminance);
+    luminance[2].push_back(of_view[r].luminance);
+    opacity[0].push_back(seen[r].opacity), opacity[1].push_back(rendered[r].opacity);
+    depth[0].push_back(seen[r].depth * seen[r].opacity), depth[1].push_back(rendered[r].depth * rendered[r].opacity);
+  }
+  expect_below("rendered luminance", relative_distance(luminance[0], luminance[1]), 1e-2);
+  expect_below("rendered opacity", relative_distance(opacity[0], opacity[1]), 1e-2);
+  expect_below("rendered depth", relative_distance(depth[0], depth[1]), 1e-2);
+  expect_below("view against rays", relative_distance(luminance[2], luminance[0]), 1e-5);
+
+  std::vector<WeightedSample> samples;
+  std::vector<std::size_t> offsets;
+  cuda.trace(rays, options.march, 1e-3f, samples, offsets);
+  std::vector<double> traced(rays.size(), 0.0);
+  bool in_order = offsets.size() == rays.size() + 1 && offsets.back() == samples.size();
+  for (std::size_t r = 0; in_order && r < rays.size(); ++r) {
+    for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
+      traced[r] += double(samples[s].weight) * samples[s].luminance;
+      if (s > offsets[r]) in_order = in_order && samples[s].t > samples[s - 1].t;
+    }
+  }
+  expect(in_order, "traced samples in order", 0, 0);
+  expect_below("traced luminance", relative_distance(traced, luminance[0]), 1e-4);
+
+  // A step: the occupancy's look, then Adam. Where gradients are mostly noise, Adam's step has either sign.
+  copy_state(cpu, cuda);
+  while (cpu.step_count() % 16 != 0) cpu.step(views, 1e-3f);
+  copy_state(cpu, cuda);
+  cpu.step(views, 1e-3f);
+  cuda.step(views, 1e-3f);
+  cuda.finish();
+  const std::vector<StatePiece> of_cpu = cpu.state(), of_cuda = cuda.state();
+  for (std::size_t i = 0; i < of_cpu.size(); ++i) {
+    const auto floats = [](const StatePiece& piece) {
+      return std::span(reinterpret_cast<const float*>(piece.bytes.data()), piece.bytes.size() / sizeof(float));
+    };
+    if (of_cpu[i].name == "counters") continue;
+    const bool is_second = of_cpu[i].name.find("moments") != std::string::npos;
+    expect_below(("after a step: " + of_cpu[i].name).c_str(),
+                 relative_distance(floats(of_cuda[i]), floats(of_cpu[i])), is_second ? 3e-2 : 1e-2);
+  }
+
+  LuminanceEngineCuda fresh(options);
+  const double first = fresh.step(views, 1e-2f).loss;
+  for (int i = 0; i < 300; ++i) fresh.step(views, 1e-2f);
+  const double last = fresh.finish().loss;
+  LuminanceEngineCpu same(options);
+  for (int i = 0; i < 300; ++i) same.step(views, 1e-2f);
+  const double of_same = same.step(views, 1e-2f).loss;
+  expect_below("loss after 300 steps / first loss", last / first, 0.5);
+  expect_below("loss after 300 steps / the CPU's", last / of_same, 1.3);
+}
+
+void check_errors() {
+  std::string message;
+  try {
+    const DeviceBuffer<float> huge(std::size_t(1) << 42, "the hash grid; lower stage1.grid.log2_rows");
+  } catch (const DeviceError& failure) {
+    message = failure.what();
+  }
+  std::printf("      %s\n", message.c_str());
+  expect(message.find("lower stage1.grid.log2_rows") != std::string::npos, "out of memory says what to lower", 0, 0);
+}
+
+}  // namespace
+
+int self_test(const Arguments& arguments) {
+  check_hash_grid(8, 15);
+  check_hash_grid(3, 19);
+  check_engine({"opaque", 8, 14, 64, 1, 0, false, false});
+  if (arguments.number("quick", 0) == 0) {
+    check_engine({"alpha", 3, 12, 20, 1, 0, true, false});
+    check_engine({"cascades, lens, mask", 12, 14, 128, 3, 0, false, true});
+    check_engine({"patches", 16, 13, 128, 2, 8, false, false});
+  }
+  check_errors();
+  std::printf("%d failures\n", failures);
+  return failures;
+}
+
+}  // namespace cnerf::test
