@@ -63,8 +63,9 @@ LuminanceEngineCpu::ObservedRay LuminanceEngineCpu::observe(const std::vector<Tr
   observed.target = view.image->luminance(index);
   observed.coverage = view.image->coverage(index);
   observed.jitter = rng.uniform(2 * ray);
-  // A random background where there is alpha: what is transparent must then be empty, not merely dark.
-  if (!view.image->alpha.empty()) observed.background = luminance_from_lightness(100.0f * rng.uniform(2 * ray + 1));
+  // Another background each time: what is transparent has to become empty and what is opaque solid. Over black, a dark
+  // thing could as well be a hole, and thin fog everywhere explains a dim picture.
+  observed.background = luminance_from_lightness(100.0f * rng.uniform(2 * ray + 1));
   return observed;
 }
 
