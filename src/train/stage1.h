@@ -41,8 +41,7 @@ struct Stage1Options {
   double learning_rate = 1e-2;        ///< of Adam at the start
   double final_learning_rate = 5e-4;  ///< reached by exponential decay over the last half
   int steps_per_box = 256;            ///< march steps across the innermost cascade's side
-  double cone_angle = 1.0 / 128;      ///< march step over distance, where there are several cascades
-  double sparsity_weight = 0;         ///< pushes samples towards empty or opaque; 0 = off
+  double cone_angle = 1.0 / 64;       ///< march step over distance, where there are several cascades
   int checkpoint_every = 1000;        ///< steps between snapshots; 0 = only at the end
   int seed = 1;
   HashGridOptions grid;

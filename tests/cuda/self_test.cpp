@@ -224,9 +224,9 @@ void check_engine(const Problem& problem) {
     for (int x = 0; x < 48; ++x) rays.push_back(views[1].camera.ray({x + 0.5, y + 0.5}));
   }
   std::vector<RayResult> rendered(rays.size()), seen(rays.size()), of_view(rays.size());
-  cpu.render(rays, options.march, {1e-3f, 1}, rendered);
-  cuda.render(rays, options.march, {1e-3f, 1}, seen);
-  cuda.render_view(views[1].camera, options.march, 1e-3f, of_view);
+  cpu.render(rays, options.march, {}, rendered);
+  cuda.render(rays, options.march, {}, seen);
+  cuda.render_view(views[1].camera, options.march, {}, of_view);
   std::vector<double> luminance[3], opacity[2], depth[2];
   for (std::size_t r = 0; r < rays.size(); ++r) {
     luminance[0].push_back(seen[r].luminance), luminance[1].push_back(rendered[r].luminance);
@@ -241,7 +241,7 @@ void check_engine(const Problem& problem) {
 
   std::vector<WeightedSample> samples;
   std::vector<std::size_t> offsets;
-  cuda.trace(rays, options.march, {1e-3f, 1}, samples, offsets);
+  cuda.trace(rays, options.march, {}, samples, offsets);
   std::vector<double> traced(rays.size(), 0.0);
   bool in_order = offsets.size() == rays.size() + 1 && offsets.back() == samples.size();
   for (std::size_t r = 0; in_order && r < rays.size(); ++r) {

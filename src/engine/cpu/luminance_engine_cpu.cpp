@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
-#include <numeric>
 
 #include "src/base/check.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
+#include "src/engine/heaviest_samples.h"
 #include "src/render/composite_math.h"
 
 namespace cnerf {
@@ -64,8 +63,9 @@ LuminanceEngineCpu::ObservedRay LuminanceEngineCpu::observe(const std::vector<Tr
   observed.target = view.image->luminance(index);
   observed.coverage = view.image->coverage(index);
   observed.jitter = rng.uniform(2 * ray);
-  // A random background where there is alpha: what is transparent must then be empty, not merely dark.
-  if (!view.image->alpha.empty()) observed.background = luminance_from_lightness(100.0f * rng.uniform(2 * ray + 1));
+  // Another background each time: what is transparent has to become empty and what is opaque solid. Over black, a dark
+  // thing could as well be a hole, and thin fog everywhere explains a dim picture.
+  observed.background = luminance_from_lightness(100.0f * rng.uniform(2 * ray + 1));
   return observed;
 }
 
@@ -99,7 +99,7 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
           break;
         }
         set_position(block.wave_positions.data(), count++, rays[r].at(sample.t));
-        block.of_ray[r].push_back({sample, 0.0f});
+        block.of_ray[r].push_back({sample.t, sample.dt, 0.0f});
       }
     }
     begin[rays.size()] = count;
@@ -110,10 +110,10 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
 
     any_active = false;
     for (std::size_t r = 0; r < rays.size(); ++r) {
-      std::vector<WeighedSample>& kept = block.of_ray[r];
+      std::vector<MarchedSample>& kept = block.of_ray[r];
       std::size_t at = kept.size() - (begin[r + 1] - begin[r]);
       for (std::size_t s = begin[r]; s < begin[r + 1]; ++s, ++at) {
-        const float alpha = alpha_of(block.wave_sigma[s], kept[at].sample.dt);
+        const float alpha = alpha_of(block.wave_sigma[s], kept[at].dt);
         kept[at].weight = walks[r].transmittance * alpha;
         walks[r].transmittance *= 1.0f - alpha;
         if (walks[r].transmittance < min_transmittance) {
@@ -127,41 +127,11 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
   }
 
   block.samples.clear();
-  block.weights.clear();
   block.offsets.assign(1, 0);
   for (std::size_t r = 0; r < rays.size(); ++r) {
-    for (const WeighedSample& kept : block.of_ray[r]) {
-      block.samples.push_back(kept.sample);
-      block.weights.push_back(kept.weight);
-    }
+    block.samples.insert(block.samples.end(), block.of_ray[r].begin(), block.of_ray[r].end());
     block.offsets.push_back(block.samples.size());
   }
-}
-
-void LuminanceEngineCpu::keep_heaviest(float share, Block& block) {
-  std::size_t write = 0;
-  for (std::size_t r = 0; r + 1 < block.offsets.size(); ++r) {
-    const std::size_t begin = block.offsets[r], end = block.offsets[r + 1];
-    std::vector<float>& sorted = block.sorted_weights;
-    sorted.assign(block.weights.begin() + std::ptrdiff_t(begin), block.weights.begin() + std::ptrdiff_t(end));
-    std::sort(sorted.begin(), sorted.end(), std::greater<>());
-    const float total = std::accumulate(sorted.begin(), sorted.end(), 0.0f);
-    float lightest = 0, carried = 0;
-    for (std::size_t i = 0; i < sorted.size() && carried < share * total; ++i) carried += lightest = sorted[i];
-
-    block.offsets[r] = write;
-    float kept = 0;
-    for (std::size_t s = begin; s < end; ++s) {
-      if (block.weights[s] < lightest || block.weights[s] <= 0) continue;
-      kept += block.weights[s];
-      block.samples[write] = block.samples[s];
-      block.weights[write++] = block.weights[s];
-    }
-    for (std::size_t s = block.offsets[r]; s < write; ++s) block.weights[s] *= total / kept;
-  }
-  block.offsets.back() = write;
-  block.samples.resize(write);
-  block.weights.resize(write);
 }
 
 void LuminanceEngineCpu::collect_for_picture(std::span<const Ray> rays, const MarchSettings& march,
@@ -169,7 +139,7 @@ void LuminanceEngineCpu::collect_for_picture(std::span<const Ray> rays, const Ma
   std::array<float, kBlockRays> middle;
   middle.fill(0.5f);
   collect(rays, middle, march, effort.min_transmittance, block);
-  if (effort.shaded_share < 1) keep_heaviest(effort.shaded_share, block);
+  if (effort.shaded_share < 1) keep_heaviest(effort.shaded_share, block.samples, block.offsets);
 }
 
 void LuminanceEngineCpu::shade(std::span<const Ray> rays, Block& block) const {
@@ -325,7 +295,7 @@ void LuminanceEngineCpu::render(std::span<const Ray> rays, const MarchSettings& 
     for (std::size_t r = 0; r < block_rays.size(); ++r) {
       RayResult seen;
       for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
-        const float weight = block.weights[s];
+        const float weight = block.samples[s].weight;
         seen.luminance += weight * field_.luminance(block.work, s);
         seen.opacity += weight;
         seen.depth += weight * block.samples[s].t;
@@ -349,7 +319,7 @@ void LuminanceEngineCpu::trace(std::span<const Ray> rays, const MarchSettings& m
     shade(block_rays, block);
     of_block[b].reserve(block.samples.size());
     for (std::size_t s = 0; s < block.samples.size(); ++s) {
-      of_block[b].push_back({block.samples[s].t, block.weights[s], field_.luminance(block.work, s)});
+      of_block[b].push_back({block.samples[s].t, block.samples[s].weight, field_.luminance(block.work, s)});
     }
     for (std::size_t r = 0; r < block_rays.size(); ++r) counts[b][r] = block.offsets[r + 1] - block.offsets[r];
   });

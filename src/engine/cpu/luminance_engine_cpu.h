@@ -56,22 +56,19 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   static constexpr std::size_t kBlockRays = 16;
   static constexpr std::size_t kChunks = 32;  // parts of a step whose sums are added in order, for any thread count
 
-  /// A sample and the weight that the density-first pass found.
-  struct WeighedSample {
-    RaySample sample;
-    float weight = 0;
+  /// A step of a ray, and the weight that the density-first pass found.
+  struct MarchedSample {
+    float t = 0, dt = 0, weight = 0;
   };
   /// Samples of a block's rays that survive early termination, ray by ray.
   struct Block {
-    std::vector<RaySample> samples;
-    std::vector<float> weights;
+    std::vector<MarchedSample> samples;
     std::vector<std::size_t> offsets;  // [rays + 1]
     std::size_t marched = 0;
     AlignedVector<float> positions;  // [G, 3, 16]
     LuminanceWorkspace work;
     // Scratch of the density-first pass.
-    std::vector<std::vector<WeighedSample>> of_ray;
-    std::vector<float> sorted_weights;
+    std::vector<std::vector<MarchedSample>> of_ray;
     AlignedVector<float> wave_positions, wave_sigma;
   };
   /// What one chunk of a step adds up.
@@ -90,7 +87,6 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   /// `collect` from the middle of each step, and of what it keeps the heaviest samples.
   void collect_for_picture(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                            Block& block) const;
-  static void keep_heaviest(float share, Block& block);
   void shade(std::span<const Ray> rays, Block& block) const;
   void train_block(std::span<const ObservedRay> rays, float gradient_scale, Block& block, Chunk& chunk) const;
   void accumulate(const std::vector<TrainingView>& views);

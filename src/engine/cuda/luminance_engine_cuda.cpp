@@ -7,6 +7,7 @@
 #include "encoding/cuda/hash_grid_cuda.h"
 #include "src/base/check.h"
 #include "src/base/rng.h"
+#include "src/engine/heaviest_samples.h"
 #include "src/engine/initial_state.h"
 #include "src/field/cuda/field_backward.h"
 #include "src/field/mlp_layout.h"
@@ -551,6 +552,7 @@ void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& 
     }
     first += count;
   }
+  if (effort.shaded_share < 1) keep_heaviest(effort.shaded_share, samples, offsets);
 }
 
 void LuminanceEngineCuda::query_density(std::span<const Vec3f> positions, std::span<float> sigma) const {

@@ -39,7 +39,6 @@ class LuminanceEngineCuda final : public LuminanceEngine {
   StepReport step(const std::vector<TrainingView>& views, float learning_rate) override;
   [[nodiscard]] long step_count() const override { return steps_; }
 
-  /// Shades every sample whatever `effort.shaded_share` says: a warp has both nets at hand for 32 samples at once.
   void render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
               std::span<RayResult> results) const override;
   void trace(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,

@@ -65,10 +65,8 @@ __global__ void draw(const DrawJob job) {
   record.ray = pixel_ray(view.camera, picked.x + 0.5, picked.y + 0.5);
   record.jitter = rng.uniform(2 * std::uint64_t(ray));
   record.target = luminance_of(view, pixel);
-  if (view.alpha != nullptr) {
-    record.coverage = float(view.alpha[pixel]) / 255.0f;
-    record.background = luminance_from_lightness(100.0f * rng.uniform(2 * std::uint64_t(ray) + 1));
-  }
+  if (view.alpha != nullptr) record.coverage = float(view.alpha[pixel]) / 255.0f;
+  record.background = luminance_from_lightness(100.0f * rng.uniform(2 * std::uint64_t(ray) + 1));
   clip(record);
   job.rays[ray] = record;
   job.directions[ray] = encode_direction(record.ray.direction);
