@@ -1,7 +1,5 @@
 #include "src/app/default_colorizer.h"
 
-#include "src/base/error.h"
-
 namespace cnerf {
 namespace fs = std::filesystem;
 
@@ -14,12 +12,10 @@ void choose_colorizer(const fs::path& capture, Config& config, Reporter& reporte
     reporter.say("no --colorizer given: colours come from the photographs in " + references.string());
     return;
   }
-  throw UsageError(
-      "no colorizer: say where colours come from with one of\n"
-      "  --colorizer reference:PHOTO.jpg        a colour photograph of the scene or of one like it\n"
-      "  --colorizer torchscript:MODEL.pt       a colorizing network as TorchScript (runs code of that file)\n"
-      "  --colorizer 'exec:python3 my_model.py' any program that colours patches over a pipe\n"
-      "  --grey                                 none: train and bake without colour");
+  config.colorizer.spec = "builtin";
+  reporter.say(
+      "no --colorizer given: the built-in network guesses colours; --colorizer reference:PHOTO.jpg takes those of a "
+      "photograph");
 }
 
 }  // namespace cnerf

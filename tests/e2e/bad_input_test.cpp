@@ -51,11 +51,6 @@ fs::path first_image(const fs::path& capture) {
 std::vector<Case> cases() {
   const std::vector<std::string> grey = {"--grey"};
   return {
-      {"Colorizer missing",
-       [](const fs::path& c) { fs::remove_all(c / "references"); },
-       {},
-       64,
-       {"no colorizer", "--colorizer reference:", "--grey"}},
       {"Unknown key",
        nothing,
        {"--grey", "--set", "stage1.stesp=3"},
