@@ -63,9 +63,9 @@ TEST_P(MeshBesideVolume, SilhouettesAndColoursAgree) {
   const std::vector<BakeCamera> cameras{camera_at("a", {5.2, -4.4, 2.1}, {2, -1, 0.5}, 160, 120, 330),
                                         camera_at("b", {-0.5, 1.9, 3.2}, {2, -1, 0.5}, 160, 120, 330)};
   BakeOptions options;
-  options.resolution = 64;
+  options.resolution = 128;  // interpolation widens an opaque volume by about half a voxel all around, a mesh not
   MeshOptions mesh_options;
-  mesh_options.faces = 6000;
+  mesh_options.faces = 12000;
   mesh_options.texture_size = 512;
   VdbOptions vdb;
   vdb.up_axis = GetParam();  // turns the glTF, and must not turn what Blender shows
@@ -74,7 +74,7 @@ TEST_P(MeshBesideVolume, SilhouettesAndColoursAgree) {
   bake.add_mesh(bake_mesh(field, cameras, options, mesh_options), "mesh", {});
   bake.finish();
   for (const char* camera : {"a", "b"}) {
-    const std::string look = std::string("--samples 32 --step-rate 0.5 --camera ") + camera;
+    const std::string look = std::string("--samples 16 --camera ") + camera;
     const RenderedExr volume = render_exact(bake.blender_setup(), look);
     const RenderedExr mesh = render_exact(bake.blender_setup(), look + " --mesh only");
     const Silhouettes equal = compare(volume, mesh);
