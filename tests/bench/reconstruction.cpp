@@ -47,7 +47,7 @@ double processor_seconds() {
 }
 
 double held_out_psnr(const cnerf::Capture& capture, const cnerf::LuminanceModel& model, int every,
-                     const cnerf::RenderEffort& effort) {
+                     const cnerf::RenderEffort& effort, std::vector<float>* transmittance = nullptr) {
   double total = 0;
   int views = 0, index = 0;
   for (const cnerf::View& view : capture.views) {
@@ -59,6 +59,9 @@ double held_out_psnr(const cnerf::Capture& capture, const cnerf::LuminanceModel&
     }
     std::vector<cnerf::RayResult> results(rays.size());
     model.engine->render(rays, model.march(), effort, results);
+    if (transmittance != nullptr) {
+      for (const cnerf::RayResult& result : results) transmittance->push_back(1 - result.opacity);
+    }
     double squared = 0;
     for (std::size_t p = 0; p < rays.size(); ++p) {
       const float seen = cnerf::srgb_from_linear(std::clamp(results[p].luminance, 0.0f, 1.0f));
@@ -135,10 +138,14 @@ int main(int argc, char** argv) {
   }
   for (const auto& [name, effort] : {std::pair("every sample shaded", all), std::pair("as pictures are", quick)}) {
     const Clock::time_point start = Clock::now();
-    const double psnr = held_out_psnr(capture, model, 1, effort);
+    std::vector<float> transmittance;
+    const double psnr = held_out_psnr(capture, model, 1, effort, &transmittance);
+    const auto middle = transmittance.begin() + std::ptrdiff_t(transmittance.size() / 2);
+    std::nth_element(transmittance.begin(), middle, transmittance.end());
     const auto held_out =
         std::count_if(capture.views.begin(), capture.views.end(), [](const auto& v) { return v.held_out; });
-    std::printf("rendered, %s: %.3f dB, %.2f s a view\n", name, psnr, seconds_since(start) / double(held_out));
+    std::printf("rendered, %s: %.3f dB, %.2f s a view, median transmittance %.5f\n", name, psnr,
+                seconds_since(start) / double(held_out), *middle);
   }
   return 0;
 }

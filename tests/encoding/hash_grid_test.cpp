@@ -17,12 +17,7 @@ using test::groups_of;
 using test::to_groups;
 
 HashGridOptions small_options() {
-  HashGridOptions options;
-  options.levels = 4;
-  options.log2_rows = 10;
-  options.coarsest_resolution = 4;
-  options.finest_resolution = 61;
-  return options;
+  return {.levels = 4, .log2_rows = 10, .coarsest_resolution = 4, .finest_resolution = 61};
 }
 
 template <typename Real>

@@ -12,12 +12,7 @@ namespace cnerf {
 namespace {
 
 HashGridOptions small_grid() {
-  HashGridOptions grid;
-  grid.levels = 3;
-  grid.log2_rows = 10;
-  grid.coarsest_resolution = 4;
-  grid.finest_resolution = 32;
-  return grid;
+  return {.levels = 3, .log2_rows = 10, .coarsest_resolution = 4, .finest_resolution = 32};
 }
 
 /// Pixels with two samples each; pixel p lies at x = (p + 0.5) / n.

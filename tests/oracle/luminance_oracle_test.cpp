@@ -53,12 +53,7 @@ torch::Tensor encode_by_index_select(const std::vector<GridLevel>& levels, const
 }
 
 HashGridOptions small_grid() {
-  HashGridOptions options;
-  options.levels = 4;
-  options.log2_rows = 9;
-  options.coarsest_resolution = 3;
-  options.finest_resolution = 40;
-  return options;
+  return {.levels = 4, .log2_rows = 9, .coarsest_resolution = 3, .finest_resolution = 40};
 }
 
 TEST(TorchOracle, HashGridModuleForwardAndBackward) {

@@ -454,25 +454,32 @@ void LuminanceEngineCuda::start_trace(std::uint32_t rays) const {
   CNERF_CUDA(cudaMemcpyAsync(m.trace_state.data(), &state, sizeof(state), cudaMemcpyHostToDevice, m.stream));
 }
 
+TraceJob LuminanceEngineCuda::job_of_rays(std::span<const Ray> rays, const MarchSettings& march,
+                                          float min_transmittance) const {
+  Memory& m = *memory_;
+  const auto count = std::uint32_t(rays.size());
+  if (m.plain_rays.size() < count) m.plain_rays = {count, kRayAdvice};
+  start_trace(count);
+  CNERF_CUDA(cudaMemcpyAsync(m.plain_rays.data(), rays.data(), rays.size_bytes(), cudaMemcpyHostToDevice, m.stream));
+  auto* directions = reinterpret_cast<DirectionCode*>(m.trace_directions.data());
+  prepare_rays(m.plain_rays.data(), count, m.trace_rays.data(), directions, m.stream);
+  TraceJob trace = job(march, min_transmittance);
+  trace.rays = m.trace_rays.data();
+  trace.directions = directions;
+  trace.state = m.trace_state.data();
+  return trace;
+}
+
 void LuminanceEngineCuda::render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                                  std::span<RayResult> results) const {
   CNERF_CHECK_EQ(rays.size(), results.size());
   const std::lock_guard lock(mutex_);
   Memory& m = *memory_;
   const auto most = std::uint32_t(std::min<std::size_t>(rays.size(), kRaysAtATime));
-  if (m.plain_rays.size() < most) m.plain_rays = {most, kRayAdvice};
   if (m.results.size() < most) m.results = {most, kRayAdvice};
   for (std::size_t first = 0; first < rays.size(); first += most) {
     const auto count = std::uint32_t(std::min<std::size_t>(most, rays.size() - first));
-    start_trace(count);
-    CNERF_CUDA(cudaMemcpyAsync(m.plain_rays.data(), rays.data() + first, count * sizeof(Ray), cudaMemcpyHostToDevice,
-                               m.stream));
-    auto* directions = reinterpret_cast<DirectionCode*>(m.trace_directions.data());
-    prepare_rays(m.plain_rays.data(), count, m.trace_rays.data(), directions, m.stream);
-    TraceJob trace = job(march, effort.min_transmittance);
-    trace.rays = m.trace_rays.data();
-    trace.directions = directions;
-    trace.state = m.trace_state.data();
+    TraceJob trace = job_of_rays(rays.subspan(first, count), march, effort.min_transmittance);
     trace.results = m.results.data();
     trace_to_results(trace, m.stream);
     CNERF_CUDA(cudaMemcpyAsync(results.data() + first, m.results.data(), count * sizeof(RayResult),
@@ -519,19 +526,10 @@ void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& 
   const std::size_t room = std::size_t(1) << 22;
   if (m.weighted.size() < room) m.weighted = {room, kRayAdvice};
   if (m.traced.size() < most) m.traced = {most, kRayAdvice};
-  if (m.plain_rays.size() < most) m.plain_rays = {most, kRayAdvice};
   std::vector<WeightedSample> found;
   for (std::size_t first = 0; first < rays.size();) {
     const auto count = std::uint32_t(std::min<std::size_t>(most, rays.size() - first));
-    start_trace(count);
-    CNERF_CUDA(cudaMemcpyAsync(m.plain_rays.data(), rays.data() + first, count * sizeof(Ray), cudaMemcpyHostToDevice,
-                               m.stream));
-    auto* directions = reinterpret_cast<DirectionCode*>(m.trace_directions.data());
-    prepare_rays(m.plain_rays.data(), count, m.trace_rays.data(), directions, m.stream);
-    TraceJob trace = job(march, effort.min_transmittance);
-    trace.rays = m.trace_rays.data();
-    trace.directions = directions;
-    trace.state = m.trace_state.data();
+    TraceJob trace = job_of_rays(rays.subspan(first, count), march, effort.min_transmittance);
     trace.weighted = m.weighted.data();
     trace.weighted_capacity = std::uint32_t(m.weighted.size());
     trace.traced = m.traced.data();

@@ -85,6 +85,9 @@ class LuminanceEngineCuda final : public LuminanceEngine {
   [[nodiscard]] FieldView field() const;
   [[nodiscard]] TraceJob job(const MarchSettings& march, float min_transmittance) const;
   void start_trace(std::uint32_t rays) const;
+  /// Uploads rays and makes a job that traces them; what the job answers with is still to be set.
+  [[nodiscard]] TraceJob job_of_rays(std::span<const Ray> rays, const MarchSettings& march,
+                                     float min_transmittance) const;
 
   LuminanceEngineOptions options_;
   std::vector<GridLevel> levels_;
