@@ -32,9 +32,9 @@ struct ColorizerConfig {
 
 /// Pictures and videos.
 struct RenderConfig {
-  int frames = 90;       ///< of a spiral or an orbit
-  int fps = 30;          ///< of videos
-  int short_side = 360;  ///< pixels of a spiral or an orbit; never more than the capture's
+  int frames = 72;       ///< of a spiral or an orbit
+  int fps = 24;          ///< of videos
+  int short_side = 270;  ///< pixels of a spiral or an orbit; never more than the capture's
   int steps_per_box = RenderOptions{}.steps_per_box;
   double min_transmittance = RenderOptions{}.min_transmittance;
 
