@@ -11,11 +11,11 @@ packages=(
   libopenvdb-dev libboost-iostreams-dev libopenvdb-tools
   libopencv-dev libopenexr-dev libtinygltf-dev libmeshoptimizer-dev
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libfmt-dev libspdlog-dev
-  libtbb-dev libssl-dev libcpp-httplib-dev
+  libtbb-dev libssl-dev zlib1g-dev libcpp-httplib-dev
   libgtest-dev libgmock-dev libbenchmark-dev
 )
 if [[ "${1:-}" == "--tests" ]]; then
-  packages+=(blender python3-numpy)
+  packages+=(blender python3-numpy chromium)
 fi
 
 # Khronos' glTF validator, which Debian does not package. Tests that need it skip where it cannot be had.

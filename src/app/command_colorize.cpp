@@ -2,6 +2,7 @@
 
 #include "src/app/command.h"
 #include "src/app/default_colorizer.h"
+#include "src/app/live_session.h"
 #include "src/app/run_arguments.h"
 
 namespace cnerf {
@@ -10,6 +11,8 @@ namespace {
 struct ColorizeArguments {
   RunFolderArguments run;
   ExistingOutput existing;
+  bool view = false;
+  BrowserArguments browser;
 };
 
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
@@ -19,6 +22,12 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
   RunContext context = open_run(arguments.run, base, command_line, reporter);
   choose_colorizer(context.capture.root, context.config, reporter);
   const std::string take = take_to_write(context, arguments.run.take, arguments.existing);
+  std::optional<LiveSession> live;
+  if (arguments.view) {
+    live.emplace("Colorizing " + context.capture.root.filename().string() + ", take " + take, arguments.browser,
+                 reporter);
+    context.watcher = live->watching(reporter.sink());
+  }
   colorize_step(context, take, arguments.existing);
   reporter.next("cnerf bake " + arguments.run.run + " --take " + take);
 }
@@ -32,6 +41,8 @@ Work declare_colorize(CLI::App& app) {
                  "Who colours: reference:IMAGE..., torchscript:FILE, exec:COMMAND");
   app.add_flag("--resume", arguments->existing.resume, "Go on with a take that was stopped");
   app.add_flag("--overwrite", arguments->existing.overwrite, "Start again where a take of this name is finished");
+  app.add_flag("--view", arguments->view, "Show the work in the browser, with buttons to pause and to stop");
+  add_browser_options(app, arguments->browser);
   return [arguments](const auto& command_line) { colorize(*arguments, command_line); };
 }
 

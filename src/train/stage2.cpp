@@ -9,6 +9,7 @@
 #include "src/base/files.h"
 #include "src/base/rng.h"
 #include "src/base/usage.h"
+#include "src/color/colorspace_math.h"
 #include "src/colorizer/gallery.h"
 #include "src/train/color_model.h"
 #include "src/train/luminance_model.h"
@@ -23,6 +24,8 @@ constexpr int kDistillPixels = 8192;  // pixels a distillation step
 constexpr std::size_t kGalleryTiles = 20;
 constexpr std::uint64_t kFirstBaseIndex = std::uint64_t(1) << 32;  // patch indices of bases, apart from training's
 constexpr int kMostRejectedInARow = 400;
+constexpr std::size_t kPreviews = 3;
+constexpr int kPreviewSide = 120;  // pixels of the shorter side
 
 float decayed(double from, double to, double fraction) {
   return static_cast<float>(from * std::pow(to / from, std::clamp(2.0 * fraction - 1.0, 0.0, 1.0)));
@@ -83,12 +86,37 @@ class Colorization {
     const std::vector<TrainingView> views = training_views(capture, luminance.frame);
     if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
     const MarchSettings march = luminance.march();
+    cache_previews(capture, luminance);
     for (std::size_t v = 0; v < views.size(); ++v) {
       views_.push_back(
           cache_view(*luminance.engine, march, views[v].camera, options_.working_resolution, options_.cached_weight));
       tell("stage 2: caching views", double(v + 1) / double(views.size()), {});
       stop_if_asked();
     }
+  }
+
+  /// Held-out views, small: what an observer may want to see.
+  void cache_previews(const Capture& capture, const LuminanceModel& luminance) {
+    for (const View& view : capture.views) {
+      if (!view.held_out || previews_.size() >= kPreviews) continue;
+      const UnitCamera camera(view.intrinsics, view.world_from_camera, luminance.frame);
+      previews_.push_back({view.name, cache_view(*luminance.engine, luminance.march(), camera, kPreviewSide, 0.95)});
+    }
+  }
+
+  [[nodiscard]] PreviewPicture preview(std::size_t index) const {
+    const auto& [name, view] = previews_[index % previews_.size()];
+    PreviewPicture picture{name, view.width, view.height, {}, view.luminance};
+    std::vector<std::uint32_t> all(view.luminance.size());
+    std::iota(all.begin(), all.end(), 0u);
+    const std::vector<Ab> colors = model_.decode(pixel_samples(view, all));
+    for (std::size_t p = 0; p < all.size(); ++p) {
+      const Ab ab = view.opacity[p] < kLeastColoredOpacity ? Ab{} : colors[p];
+      const float lightness = lightness_from_luminance(view.luminance[p]);
+      const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness, ab.a, ab.b});
+      picture.ours.insert(picture.ours.end(), {rgb.x, rgb.y, rgb.z});
+    }
+    return picture;
   }
 
   std::vector<AnsweredPatch> ask(const std::vector<PatchPlace>& places) {
@@ -271,7 +299,12 @@ class Colorization {
   }
 
   void tell(const std::string& task, double fraction, std::vector<std::pair<std::string, double>> figures) const {
-    if (progress_) progress_({task, std::min(fraction, 1.0), std::move(figures)});
+    if (!progress_) return;
+    const auto draw = [this](std::size_t index) { return preview(index); };
+    const Stopwatch telling;
+    progress_({task, std::min(fraction, 1.0), std::move(figures),
+               previews_.empty() ? std::function<PreviewPicture(std::size_t)>() : draw});
+    told_seconds_ += telling.seconds();
   }
 
   void stop_if_asked() {
@@ -281,7 +314,7 @@ class Colorization {
   }
 
   void save() {
-    model_.report.seconds = seconds_before_ + watch_.seconds();
+    model_.report.seconds = seconds_before_ + watch_.seconds() - told_seconds_;
     model_.save(file_);
   }
 
@@ -304,6 +337,8 @@ class Colorization {
   double loss_ = 0;
   Stopwatch watch_;
   double seconds_before_ = 0;
+  mutable double told_seconds_ = 0;  // an observer's pauses and pictures are no training
+  std::vector<std::pair<std::string, CachedView>> previews_;
 };
 
 }  // namespace
