@@ -12,7 +12,7 @@ namespace cnerf {
 std::vector<std::byte> gzip(std::span<const std::uint8_t> bytes) {
   constexpr int kGzip = 15 + 16;  // window of 32 KiB; 16 asks for a gzip header instead of zlib's
   z_stream stream{};
-  CNERF_CHECK(deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, kGzip, 9, Z_DEFAULT_STRATEGY) == Z_OK,
+  CNERF_CHECK(deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, kGzip, 9, Z_FILTERED) == Z_OK,
               "zlib cannot start");
   std::vector<std::byte> packed;
   std::vector<std::byte> block(1 << 18);

@@ -8,7 +8,7 @@
 
 namespace cnerf {
 
-/// One gzip member at the highest level. The same bytes give the same result: no name, no time.
+/// One gzip member at the highest level, tuned for differences of neighbours. The same bytes give the same result: no name, no time.
 [[nodiscard]] std::vector<std::byte> gzip(std::span<const std::uint8_t> bytes);
 
 }  // namespace cnerf

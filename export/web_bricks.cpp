@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <span>
 
 #include "bake/dilate.h"
 #include "src/base/check.h"
@@ -90,13 +92,27 @@ std::vector<std::int32_t> numbers_of(const WebBricks& bricks, std::size_t& store
   return numbers;
 }
 
-/// Voxels nothing was written to take the value before them, which packs to nothing.
-void fill_gaps(std::vector<std::uint8_t>& plane, std::size_t begin, const std::vector<char>& written) {
-  for (std::size_t i = 0; i < written.size(); ++i) {
-    if (written[i]) continue;
+/// How many codes a value may change by to be the one that is predicted. Noise below what is seen packs badly.
+struct Tolerance {
+  std::uint8_t density = 1, lightness = 1, ab = 2;
+};
+constexpr Tolerance kGap{255, 255, 255};
+Tolerance tolerance_of(double optical_depth) {
+  if (optical_depth < 0.02) return {1, 4, 6};  // of the voxel: it adds a fiftieth of a pixel's light at most
+  if (optical_depth > 6) return {4, 1, 2};     // nothing is seen through it
+  return {};
+}
+
+/// Replaces values by those before them, as to_differences takes them, wherever that is within tolerance.
+void simplify(std::span<std::uint8_t> plane, const std::vector<Tolerance>& tolerances, std::uint8_t Tolerance::*which) {
+  for (std::size_t i = 0; i < plane.size(); ++i) {
     const std::size_t local = i % kWebBrickVoxels;
-    const int step = local % kSide ? 1 : local / kSide % kSide ? kSide : local ? kSide * kSide : 0;
-    plane[begin + i] = step ? plane[begin + i - static_cast<std::size_t>(step)] : plane[begin + i];
+    if (local == 0) continue;
+    const std::size_t step = local % kSide ? 1 : local / kSide % kSide ? kSide : kSide * kSide;
+    const std::uint8_t before = plane[i - step];
+    // What has density keeps some: code 0 is for nothing.
+    if (which == &Tolerance::density && (plane[i] == 0) != (before == 0)) continue;
+    if (std::abs(plane[i] - before) <= tolerances[i].*which) plane[i] = before;
   }
 }
 
@@ -116,10 +132,11 @@ WebBricks make_web_bricks(const BakedVolume& volume, const std::string& density)
   const std::size_t plane = stored * kWebBrickVoxels;
   bricks.density.assign(half ? 2 * plane : plane, 0);
   bricks.lab.assign(3 * plane, 128);
-  std::vector<char> written(plane, 0);
+  std::vector<Tolerance> tolerances(plane, kGap);
 
   BakedVolume padded = volume;
-  dilate_colors(padded, 2);  // colour and density are interpolated apart
+  std::erase_if(padded.voxels, [](const BakedVoxel& voxel) { return !(voxel.sigma > 0); });
+  dilate_colors(padded, 1);  // colour and density are interpolated apart: neighbours of density need colour too
   const Vec3i n = bricks.counts;
   for (const BakedVoxel& voxel : padded.voxels) {
     const Vec3i v = Vec3i{voxel.i, voxel.j, voxel.k} - first;
@@ -141,10 +158,13 @@ WebBricks make_web_bricks(const BakedVolume& volume, const std::string& density)
     bricks.lab[at] = byte_of(lightness * 2.55f);
     bricks.lab[plane + at] = byte_of(voxel.a + 128);
     bricks.lab[2 * plane + at] = byte_of(voxel.b + 128);
-    written[at] = 1;
+    tolerances[at] = tolerance_of(voxel.sigma * bricks.voxel_size);
   }
-  for (int channel = 0; channel < 3; ++channel)
-    fill_gaps(bricks.lab, static_cast<std::size_t>(channel) * plane, written);
+  const std::span<std::uint8_t> lab(bricks.lab);
+  simplify(lab.subspan(0, plane), tolerances, &Tolerance::lightness);
+  simplify(lab.subspan(plane, plane), tolerances, &Tolerance::ab);
+  simplify(lab.subspan(2 * plane, plane), tolerances, &Tolerance::ab);
+  if (!half) simplify(bricks.density, tolerances, &Tolerance::density);
   return bricks;
 }
 
@@ -157,15 +177,6 @@ void to_differences(std::vector<std::uint8_t>& bricks) {
       value = static_cast<std::uint8_t>(value - bricks[begin + static_cast<std::size_t>(i - step)]);
     }
   }
-}
-
-WebEstimate estimate_web(const WebBricks& bricks) {
-  // Bricks of real captures pack to a third; textures hold a layer around each brick.
-  constexpr double kPacked = 0.33;
-  constexpr std::size_t kTexels = (kSide + 2) * (kSide + 2) * (kSide + 2);
-  const std::size_t bytes = bricks.density.size() + bricks.lab.size();
-  return {static_cast<std::size_t>(kPacked * double(bytes)) + bricks.distance.size() / 8,
-          bricks.stored() * kTexels * (2 + 4) + 4 * bricks.distance.size()};
 }
 
 }  // namespace cnerf

@@ -90,7 +90,29 @@ Json cameras_json(const WebScene& scene) {
   return cameras;
 }
 
+/// Every sixteenth brick.
+std::vector<std::uint8_t> sample_of(const std::vector<std::uint8_t>& bricks) {
+  std::vector<std::uint8_t> sample;
+  for (std::size_t begin = 0; begin < bricks.size(); begin += 16 * kWebBrickVoxels) {
+    sample.insert(sample.end(), bricks.begin() + static_cast<std::ptrdiff_t>(begin),
+                  bricks.begin() + static_cast<std::ptrdiff_t>(begin + kWebBrickVoxels));
+  }
+  to_differences(sample);
+  return sample;
+}
+
+std::size_t packed_size(const std::vector<std::uint8_t>& bricks) {
+  const std::vector<std::uint8_t> sample = sample_of(bricks);
+  return static_cast<std::size_t>(double(gzip(sample).size()) * double(bricks.size()) / double(sample.size()));
+}
+
 }  // namespace
+
+WebEstimate estimate_web(const WebBricks& bricks) {
+  constexpr std::size_t kTexels = (kWebBrickSide + 2) * (kWebBrickSide + 2) * (kWebBrickSide + 2);  // with neighbours
+  return {packed_size(bricks.density) + packed_size(bricks.lab) + gzip(bricks.distance).size(),
+          bricks.stored() * kTexels * (2 + 4) + 4 * bricks.distance.size()};
+}
 
 WebReport write_web_bundle(const BakedVolume& volume, const WebBricks& bricks, const WebScene& scene,
                            const fs::path& folder, const fs::path& page, const WebOptions& options) {

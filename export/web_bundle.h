@@ -17,6 +17,13 @@ namespace cnerf {
 inline constexpr int kWebSchema = 1;
 inline constexpr const char* kWebManifest = "bundle.json";
 
+/// How large a bundle will be.
+struct WebEstimate {
+  std::size_t download_bytes = 0;  ///< of the volume, from every sixteenth brick
+  std::size_t texture_bytes = 0;   ///< in the browser's graphics memory
+};
+[[nodiscard]] WebEstimate estimate_web(const WebBricks& bricks);
+
 /// What a bundle says besides the volume.
 struct WebScene {
   std::string title;
