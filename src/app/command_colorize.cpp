@@ -27,6 +27,7 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
     live.emplace("Colorizing " + context.capture.root.filename().string() + ", take " + take, arguments.browser,
                  reporter);
     context.watcher = live->watching(reporter.sink());
+    context.previews = live->previews();
   }
   colorize_step(context, take, arguments.existing);
   reporter.next("cnerf bake " + arguments.run.run + " --take " + take);

@@ -27,6 +27,7 @@ void train(const TrainArguments& arguments, const std::vector<std::string>& comm
   if (arguments.view) {
     live.emplace("Training " + context.capture.root.filename().string(), arguments.browser, reporter);
     context.watcher = live->watching(reporter.sink());
+    context.previews = live->previews();
   }
   begin_run(context, arguments.capture, arguments.existing);
   train_step(context, arguments.existing.resume);

@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
+#include "src/base/interruption.h"
 #include "src/base/usage.h"
 #include "src/evaluate/contact_sheet.h"
 #include "viewer/server/page_folder.h"
@@ -72,22 +73,27 @@ void LiveSession::look(const Progress& progress) {
     task_ = progress.task;
     last_shown_ = now;
     feed_.progress(progress);
-    if (progress.preview && now >= next_picture_) draw(progress);
   }
   feed_.wait_while_paused();
   if (feed_.stop_requested()) request_interruption();
 }
 
-void LiveSession::draw(const Progress& progress) {
-  const Stopwatch watch;
-  const PreviewPicture picture = progress.preview(drawn_++);
+PreviewSink LiveSession::previews() {
+  return [this](const DrawPreview& draw) {
+    if (Clock::now() < next_picture_) return;
+    const Stopwatch watch;
+    show(draw(drawn_++));
+    const double pause = std::max(kLeastBetweenPictures, watch.seconds() / kPictureShare);
+    next_picture_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(pause));
+  };
+}
+
+void LiveSession::show(const PreviewPicture& picture) {
   const std::string name = plain_name(picture.name);
   if (!feed_.picture(name + ".input")) {
     feed_.picture(name + ".input", jpeg_of(picture.width, picture.height, picture.input));
   }
   feed_.picture(name + ".ours", jpeg_of(picture.width, picture.height, picture.ours));
-  const double pause = std::max(kLeastBetweenPictures, watch.seconds() / kPictureShare);
-  next_picture_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(pause));
 }
 
 }  // namespace cnerf

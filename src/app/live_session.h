@@ -7,6 +7,7 @@
 #include <string>
 
 #include "src/app/reporter.h"
+#include "src/base/preview.h"
 #include "src/base/progress.h"
 #include "viewer/server/live_feed.h"
 #include "viewer/server/web_server.h"
@@ -34,11 +35,13 @@ class LiveSession {
   /// Reports to `inner` and to the browser, waits while the browser asks for a pause, and asks for an interruption when
   /// it asks to stop. Refers to this object.
   [[nodiscard]] ProgressSink watching(ProgressSink inner);
+  /// Has pictures drawn for the browser, now and then. Refers to this object.
+  [[nodiscard]] PreviewSink previews();
 
  private:
   using Clock = std::chrono::steady_clock;
   void look(const Progress& progress);
-  void draw(const Progress& progress);
+  void show(const PreviewPicture& picture);
 
   LiveFeed feed_;
   WebServer server_;

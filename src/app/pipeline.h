@@ -27,6 +27,7 @@ struct RunContext {
   std::vector<std::string> command_line;
   Reporter& reporter;
   ProgressSink watcher = nullptr;  ///< of the training, instead of the reporter's own sink
+  PreviewSink previews = nullptr;  ///< has pictures of the training drawn
 
   /// Who is told how the training goes.
   [[nodiscard]] ProgressSink training_sink() const { return watcher ? watcher : reporter.sink(); }

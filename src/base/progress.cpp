@@ -3,6 +3,8 @@
 #include <csignal>
 #include <cstdlib>
 
+#include "src/base/interruption.h"
+
 namespace cnerf {
 namespace {
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <functional>
 
 #include "src/base/error.h"
 #include "src/base/usage.h"
@@ -96,7 +95,7 @@ LuminanceModel start_or_resume(const Capture& capture, const Stage1Options& opti
 }  // namespace
 
 Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, const std::filesystem::path& snapshot,
-                          bool resume, const ProgressSink& progress) {
+                          bool resume, const ProgressSink& progress, const PreviewSink& previews) {
   LuminanceModel model = start_or_resume(capture, options, snapshot, resume);
   const std::vector<TrainingView> views = training_views(capture, model.frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
@@ -105,7 +104,7 @@ Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, 
   const Stopwatch watch;
   double told_seconds = 0;  // an observer's pauses and pictures are no training
   const std::vector<const View*> shown = preview_views(capture);
-  const auto preview = [&](std::size_t index) { return preview_of(model, *shown[index % shown.size()]); };
+  const DrawPreview preview = [&](std::size_t index) { return preview_of(model, *shown[index % shown.size()]); };
   double rays = 0;
   RunningPsnr psnr;
   while (model.engine->step_count() < options.steps) {
@@ -128,8 +127,8 @@ Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, 
                 {{"psnr", psnr.value()},
                  {"loss", step.loss},
                  {"rays/s", rays / (watch.seconds() - told_seconds)},
-                 {"samples", model.trained_samples}},
-                std::ref(preview)});
+                 {"samples", model.trained_samples}}});
+      if (previews) previews(preview);
       told_seconds += telling.seconds();
     }
     if (interruption_requested()) {

@@ -42,8 +42,13 @@ struct AnsweredPatch {
 class Colorization {
  public:
   Colorization(const Capture& capture, const std::filesystem::path& stage1_snapshot, const Stage2Options& options,
-               Colorizer& colorizer, std::filesystem::path take_snapshot, bool resume, const ProgressSink& progress)
-      : options_(options), colorizer_(colorizer), file_(std::move(take_snapshot)), progress_(progress) {
+               Colorizer& colorizer, std::filesystem::path take_snapshot, bool resume, const ProgressSink& progress,
+               const PreviewSink& watcher)
+      : options_(options),
+        colorizer_(colorizer),
+        file_(std::move(take_snapshot)),
+        progress_(progress),
+        watcher_(watcher) {
     const std::string stage1_digest = sha256(read_binary_file(stage1_snapshot));
     start_or_resume(stage1_digest, resume);
     seconds_before_ = model_.report.seconds;
@@ -300,10 +305,9 @@ class Colorization {
 
   void tell(const std::string& task, double fraction, std::vector<std::pair<std::string, double>> figures) const {
     if (!progress_) return;
-    const auto draw = [this](std::size_t index) { return preview(index); };
     const Stopwatch telling;
-    progress_({task, std::min(fraction, 1.0), std::move(figures),
-               previews_.empty() ? std::function<PreviewPicture(std::size_t)>() : draw});
+    progress_({task, std::min(fraction, 1.0), std::move(figures)});
+    if (watcher_ && !previews_.empty()) watcher_([this](std::size_t index) { return preview(index); });
     told_seconds_ += telling.seconds();
   }
 
@@ -330,6 +334,7 @@ class Colorization {
   Colorizer& colorizer_;
   std::filesystem::path file_;
   ProgressSink progress_;
+  PreviewSink watcher_;
   ColorModel model_;
   std::vector<CachedView> views_;
   std::vector<float> class_weights_;  // [313]; empty = all alike
@@ -345,8 +350,9 @@ class Colorization {
 
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                           const Stage2Options& options, Colorizer& colorizer,
-                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress) {
-  return Colorization(capture, stage1_snapshot, options, colorizer, take_snapshot, resume, progress).run();
+                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress,
+                          const PreviewSink& previews) {
+  return Colorization(capture, stage1_snapshot, options, colorizer, take_snapshot, resume, progress, previews).run();
 }
 
 }  // namespace cnerf

@@ -6,6 +6,7 @@
 
 #include "encoding/hash_grid_levels.h"
 #include "src/base/options.h"
+#include "src/base/preview.h"
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/colorizer/colorizer.h"
@@ -59,9 +60,11 @@ struct Stage2Report {
 
 /// Colorizes a trained scene and leaves the result in `take_snapshot`; galleries of base, accepted and rejected patches
 /// are written beside it as PNG.
+/// `previews` is offered pictures of held-out views, where there are any.
 /// @throws ColorizerError, Interrupted, SnapshotError.
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                           const Stage2Options& options, Colorizer& colorizer,
-                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress = {});
+                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress = {},
+                          const PreviewSink& previews = {});
 
 }  // namespace cnerf
