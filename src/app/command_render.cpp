@@ -41,14 +41,16 @@ RenderOutput output_of(const RenderArguments& arguments) {
 }
 
 /// Pictures of a bake, straight from its voxels: what every viewer of it should show.
-void render_bake(const RenderArguments& arguments, const RenderOutput& output, Reporter& reporter) {
+void render_bake(const RenderArguments& arguments, Reporter& reporter) {
   const fs::path bake = arguments.run.run;
-  if (!output.png || output.exr || output.mp4) throw UsageError("--format: of a bake only png can be rendered");
+  if (!arguments.format.empty() && arguments.format != "png") {
+    throw UsageError("--format: expected png, as all that is rendered of a bake, got '" + arguments.format + "'");
+  }
   const BakeManifest manifest = read_manifest(bake / "manifest.json");
   if (!manifest.volume)
     throw InputError(bake / "manifest.json", "volume", "this bake has none; bake with --format vdb");
   CameraPath path{"cameras", {}};
-  if (arguments.path == "cameras") {
+  if (arguments.path == "cameras" || arguments.path == RenderArguments{}.path) {
     for (const BakeCamera& camera : manifest.cameras) {
       std::string name = fs::path(camera.name).replace_extension().string();
       std::ranges::replace(name, '/', '_');
@@ -73,11 +75,11 @@ void render_bake(const RenderArguments& arguments, const RenderOutput& output, R
 
 void render(const RenderArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
-  RenderOutput output = output_of(arguments);
   const fs::path folder = arguments.run.run;
   if (!RunDirectory(folder).exists() && fs::exists(folder / "manifest.json")) {
-    return render_bake(arguments, output, reporter);
+    return render_bake(arguments, reporter);
   }
+  RenderOutput output = output_of(arguments);
   const RunDirectory directory = RunDirectory::open(arguments.run.run);
   const std::string take = directory.choose_take(arguments.run.take);
   output.folder = arguments.out.empty() ? directory.renders(take) : fs::path(arguments.out);

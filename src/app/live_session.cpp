@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <exception>
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
@@ -55,7 +56,10 @@ LiveSession::LiveSession(const std::string& title, const BrowserArguments& argum
 }
 
 LiveSession::~LiveSession() {
-  feed_.say(feed_.stop_requested() ? "Stopped and saved. The same command with --resume goes on." : "Finished.", true);
+  feed_.say(interruption_requested()         ? "Stopped and saved. The same command with --resume goes on."
+            : std::uncaught_exceptions() > 0 ? "Ended with an error; the terminal says which."
+                                             : "Finished.",
+            true);
   std::this_thread::sleep_for(std::chrono::milliseconds(700));  // so that tabs hear it
 }
 
