@@ -2,6 +2,7 @@
 
 #include "src/app/command.h"
 #include "src/app/default_colorizer.h"
+#include "src/app/live_session.h"
 #include "src/app/run_arguments.h"
 
 namespace cnerf {
@@ -12,6 +13,8 @@ struct ColorizeArguments {
   ExistingOutput existing;
   std::string bases;
   bool bases_only = false;
+  bool view = false;
+  BrowserArguments browser;
 };
 
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
@@ -26,6 +29,13 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
     return;
   }
   const std::string take = take_to_write(context, arguments.run.take, arguments.existing);
+  std::optional<LiveSession> live;
+  if (arguments.view) {
+    live.emplace("Colorizing " + context.capture.root.filename().string() + ", take " + take, arguments.browser,
+                 reporter);
+    context.watcher = live->watching(reporter.sink());
+    context.previews = live->previews();
+  }
   colorize_step(context, take, arguments.existing);
   reporter.next("cnerf bake " + arguments.run.run + " --take " + take);
 }
@@ -41,6 +51,8 @@ Work declare_colorize(CLI::App& app) {
   app.add_flag("--bases-only", arguments->bases_only, "Only show the candidates of base images, in a minute");
   app.add_flag("--resume", arguments->existing.resume, "Go on with a take that was stopped");
   app.add_flag("--overwrite", arguments->existing.overwrite, "Start again where a take of this name is finished");
+  app.add_flag("--view", arguments->view, "Show the work in the browser, with buttons to pause and to stop");
+  add_browser_options(app, arguments->browser);
   return [arguments](const auto& command_line) { colorize(*arguments, command_line); };
 }
 

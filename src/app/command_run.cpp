@@ -66,11 +66,12 @@ void run(const RunArguments& arguments) {
     colorize_step(context, take, arguments.existing, std::move(colorizer));
   }
   if (!is_done(arguments, context.directory.metrics_file())) evaluate_step(context, take);
-  if (!is_done(arguments, context.directory.bakes(take) / "manifest.json")) {
-    bake_step(context, take, context.directory.bakes(take), parse_bake_formats(arguments.format));
-  }
+  const BakeFormats formats = parse_bake_formats(arguments.format);
+  const fs::path bake = context.directory.bakes(take);
+  if (!is_done(arguments, last_file(bake, formats))) bake_step(context, take, bake, formats);
   turntable(arguments, context, take);
-  reporter.next("blender --python " + (context.directory.bakes(take) / "blender_setup.py").string());
+  reporter.next("cnerf view " + arguments.out);
+  if (formats.vdb || formats.gltf) reporter.next("blender --python " + (bake / "blender_setup.py").string());
 }
 
 }  // namespace
@@ -81,7 +82,7 @@ Work declare_run(CLI::App& app) {
   app.add_option("-o,--out", arguments->out, "Folder of the run, made if needed")->required();
   add_colorizer_options(app, arguments->config);
   app.add_flag("--grey", arguments->grey, "Stay grey: no colorizer");
-  app.add_option("--format", arguments->format, "What to bake: vdb, gltf, exr or several, comma-separated");
+  app.add_option("--format", arguments->format, "What to bake: vdb, gltf, exr, web or several, comma-separated");
   add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");
   add_short_form(app, arguments->config, "--holdout", "capture.holdout", "Keep every N-th view for evaluation");
   add_short_form(app, arguments->config, "--transfer", "capture.transfer", "How grey values encode luminance");

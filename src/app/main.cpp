@@ -23,6 +23,7 @@ constexpr Command kCommands[] = {
     {"render", "Pictures and videos of a run", declare_render, false},
     {"eval", "Numbers against held-out views, and a contact sheet", declare_eval, false},
     {"bake", "A run as an OpenVDB volume for Blender and others", declare_bake, false},
+    {"view", "A bake or a run in the browser", declare_view, false},
     {"info", "What a capture, run, snapshot or VDB holds", declare_info, false},
     {"doctor", "What this machine and build can do", declare_doctor, false},
 };

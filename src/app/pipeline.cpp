@@ -103,7 +103,7 @@ void train_step(RunContext& context, bool resume) {
   RunRecord record = directory.record();
   if (!record.stage1_finished || !resume) {
     record.stage1 = train_stage1(context.capture, context.config.stage1, directory.stage1_snapshot(), resume,
-                                 context.reporter.sink());
+                                 context.training_sink(), context.previews);
     record.stage1_finished = true;
     directory.save(record);
   }
@@ -150,8 +150,8 @@ void colorize_step(RunContext& context, const std::string& take, const ExistingO
     write_file(directory.take_config_file(take), to_toml(context.config));
     const Stage2Report report =
         train_stage2(context.capture, directory.stage1_snapshot(), context.config.stage2, *colorizer, known,
-                     directory.take_snapshot(take), existing.resume, context.reporter.sink());
-    context.reporter.sink()({"stage 2", 1.0, {}});
+                     directory.take_snapshot(take), existing.resume, context.training_sink(), context.previews);
+    context.training_sink()({"stage 2", 1.0, {}});
     finished = TakeRecord{take, colorizer->name() + describe(known), report};
     directory.save(*finished);
     RunRecord record = directory.record();

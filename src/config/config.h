@@ -10,6 +10,7 @@
 #include "bake/mesh/mesh_options.h"
 #include "export/exr_writer.h"
 #include "export/vdb_writer.h"
+#include "export/web_options.h"
 #include "src/capture/load_capture.h"
 #include "src/train/scene.h"
 #include "src/train/stage1.h"
@@ -68,6 +69,7 @@ struct Config {
   VdbOptions vdb;
   MeshOptions mesh;
   ExrOptions exr;
+  WebOptions web;
   RenderConfig render;
 
   template <typename Visitor>
@@ -82,6 +84,7 @@ struct Config {
     v.section("vdb", vdb);
     v.section("mesh", mesh);
     v.section("exr", exr);
+    v.section("web", web);
     v.section("render", render);
   }
 };

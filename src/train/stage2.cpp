@@ -11,6 +11,7 @@
 #include "src/base/files.h"
 #include "src/base/rng.h"
 #include "src/base/usage.h"
+#include "src/color/colorspace_math.h"
 #include "src/colorizer/gallery.h"
 #include "src/train/color_model.h"
 #include "src/train/luminance_model.h"
@@ -25,6 +26,8 @@ constexpr int kDistillPixels = 8192;  // pixels a distillation step
 constexpr std::size_t kGalleryTiles = 20;
 constexpr std::uint64_t kFirstBaseIndex = std::uint64_t(1) << 32;  // patch indices of bases, apart from training's
 constexpr int kMostRejectedInARow = 400;
+constexpr std::size_t kPreviews = 3;
+constexpr int kPreviewSide = 120;  // pixels of the shorter side
 
 float decayed(double from, double to, double fraction) {
   return static_cast<float>(from * std::pow(to / from, std::clamp(2.0 * fraction - 1.0, 0.0, 1.0)));
@@ -54,8 +57,12 @@ struct Answers {
 class Colorization {
  public:
   Colorization(const Stage2Options& options, Colorizer& colorizer, std::filesystem::path take_snapshot,
-               const ProgressSink& progress)
-      : options_(options), colorizer_(colorizer), file_(std::move(take_snapshot)), progress_(progress) {}
+               const ProgressSink& progress, const PreviewSink& watcher = {})
+      : options_(options),
+        colorizer_(colorizer),
+        file_(std::move(take_snapshot)),
+        progress_(progress),
+        watcher_(watcher) {}
 
   Stage2Report run(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                    std::span<const KnownColors> known, bool resume) {
@@ -104,12 +111,37 @@ class Colorization {
     const std::vector<TrainingView> views = training_views(capture, luminance.frame);
     if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
     const MarchSettings march = luminance.march();
+    if (watcher_) cache_previews(capture, luminance);
     for (std::size_t v = 0; v < views.size(); ++v) {
       views_.push_back(
           cache_view(*luminance.engine, march, views[v].camera, options_.working_resolution, options_.cached_weight));
       tell("stage 2: caching views", double(v + 1) / double(views.size()), {});
       stop_if_asked();
     }
+  }
+
+  /// Held-out views, small: what an observer may want to see.
+  void cache_previews(const Capture& capture, const LuminanceModel& luminance) {
+    for (const View& view : capture.views) {
+      if (!view.held_out || previews_.size() >= kPreviews) continue;
+      const UnitCamera camera(view.intrinsics, view.world_from_camera, luminance.frame);
+      previews_.push_back({view.name, cache_view(*luminance.engine, luminance.march(), camera, kPreviewSide, 0.95)});
+    }
+  }
+
+  [[nodiscard]] PreviewPicture preview(std::size_t index) const {
+    const auto& [name, view] = previews_[index % previews_.size()];
+    PreviewPicture picture{name, view.width, view.height, {}, view.luminance};
+    std::vector<std::uint32_t> all(view.luminance.size());
+    std::iota(all.begin(), all.end(), 0u);
+    const std::vector<Ab> colors = model_.decode(pixel_samples(view, all));
+    for (std::size_t p = 0; p < all.size(); ++p) {
+      const Ab ab = view.opacity[p] < kLeastColoredOpacity ? Ab{} : colors[p];
+      const float lightness = lightness_from_luminance(view.luminance[p]);
+      const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness, ab.a, ab.b});
+      picture.ours.insert(picture.ours.end(), {rgb.x, rgb.y, rgb.z});
+    }
+    return picture;
   }
 
   [[nodiscard]] Answers ask(const std::vector<PatchPlace>& places) const {
@@ -348,7 +380,11 @@ class Colorization {
   }
 
   void tell(const std::string& task, double fraction, std::vector<std::pair<std::string, double>> figures) const {
-    if (progress_) progress_({task, std::min(fraction, 1.0), std::move(figures)});
+    if (!progress_) return;
+    const Stopwatch telling;
+    progress_({task, std::min(fraction, 1.0), std::move(figures)});
+    if (watcher_ && !previews_.empty()) watcher_([this](std::size_t index) { return preview(index); });
+    told_seconds_ += telling.seconds();
   }
 
   void stop_if_asked() {
@@ -358,7 +394,7 @@ class Colorization {
   }
 
   void save() {
-    model_.report.seconds = seconds_before_ + watch_.seconds();
+    model_.report.seconds = seconds_before_ + watch_.seconds() - told_seconds_;
     model_.save(file_);
   }
 
@@ -374,6 +410,7 @@ class Colorization {
   Colorizer& colorizer_;
   std::filesystem::path file_;
   ProgressSink progress_;
+  PreviewSink watcher_;
   ColorModel model_;
   std::vector<CachedView> views_;
   KnownColorMap known_;
@@ -382,14 +419,18 @@ class Colorization {
   double loss_ = 0;
   Stopwatch watch_;
   double seconds_before_ = 0;
+  mutable double told_seconds_ = 0;  // an observer's pauses and pictures are no training
+  std::vector<std::pair<std::string, CachedView>> previews_;
 };
 
 }  // namespace
 
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                           const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
-                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress) {
-  return Colorization(options, colorizer, take_snapshot, progress).run(capture, stage1_snapshot, known, resume);
+                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress,
+                          const PreviewSink& previews) {
+  return Colorization(options, colorizer, take_snapshot, progress, previews)
+      .run(capture, stage1_snapshot, known, resume);
 }
 
 void write_base_candidates(const Capture& capture, const std::filesystem::path& stage1_snapshot,

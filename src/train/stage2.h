@@ -6,6 +6,7 @@
 
 #include "encoding/hash_grid_levels.h"
 #include "src/base/options.h"
+#include "src/base/preview.h"
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/colorizer/colorizer.h"
@@ -64,11 +65,13 @@ struct Stage2Report {
 
 /// Colorizes a trained scene and leaves the result in `take_snapshot`; galleries of base, accepted and rejected patches
 /// are written beside it as PNG.
-/// @param known  colours that overrule the colorizer's; with key frames among them, those are the purification's bases
+/// @param known     colours that overrule the colorizer's; key frames among them are the purification's bases
+/// @param previews  is offered pictures of held-out views, where there are any
 /// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                           const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
-                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress = {});
+                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress = {},
+                          const PreviewSink& previews = {});
 
 /// Only asks for the base candidates, twelve patches spread over the views, and writes their gallery: what the whole
 /// scene would be coloured like, in a minute. `stage2.purify.picked_bases` then picks those that are liked.

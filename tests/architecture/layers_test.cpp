@@ -23,7 +23,8 @@ const std::vector<std::string> kLayers = {"src/base",   "src/color",     "src/ca
                                           "encoding",   "src/field",     "src/render",
                                           "src/engine", "src/colorizer", "src/colorizer_training",
                                           "src/train",  "src/evaluate",  "bake",
-                                          "export",     "src/config",    "src/app"};
+                                          "export",     "viewer",        "src/config",
+                                          "src/app"};
 
 constexpr const char* kColorTruth = "color_truth.h";
 const std::vector<std::string> kTrainingFolders = {"src/train", "src/engine", "src/field", "src/render", "encoding"};
@@ -65,7 +66,7 @@ bool is_source(const fs::path& path) {
 std::vector<Include> all_includes() {
   const fs::path root = CNERF_SOURCE_DIR;
   std::vector<Include> all;
-  for (const char* folder : {"src", "encoding", "bake", "export"}) {
+  for (const char* folder : {"src", "encoding", "bake", "export", "viewer/server"}) {
     for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
       if (!entry.is_regular_file() || !is_source(entry.path())) continue;
       const std::string file = fs::relative(entry.path(), root).generic_string();
