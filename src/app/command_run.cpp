@@ -4,6 +4,7 @@
 #include "src/app/common_options.h"
 #include "src/app/default_colorizer.h"
 #include "src/app/pipeline.h"
+#include "src/app/prepare_step.h"
 #include "src/base/error.h"
 
 namespace cnerf {
@@ -44,10 +45,11 @@ void turntable(const RunArguments& arguments, const RunContext& context, const s
   render_step(context, take, turntable_path(context.capture, context.config.render), output);
 }
 
-void run(const RunArguments& arguments) {
+void run(RunArguments arguments) {
   (void)parse_bake_formats(arguments.format);  // a wrong one should not cost an hour
   Reporter reporter = make_reporter(arguments.config);
   Config config = config_of(arguments);
+  arguments.capture = capture_of(arguments.capture, arguments.out, reporter).string();
   if (!arguments.grey) choose_colorizer(arguments.capture, config, reporter);
 
   Capture capture = read_capture(arguments.capture, config, reporter);
@@ -75,7 +77,7 @@ void run(const RunArguments& arguments) {
 
 Work declare_run(CLI::App& app) {
   auto arguments = std::make_shared<RunArguments>();
-  app.add_option("CAPTURE", arguments->capture, "Folder of photographs and camera poses")->required();
+  app.add_option("CAPTURE", arguments->capture, "Folder of photographs and camera poses; without poses, or a film clip, it is prepared first")->required();
   app.add_option("-o,--out", arguments->out, "Folder of the run, made if needed")->required();
   add_short_form(app, arguments->config, "--colorizer", "colorizer.spec",
                  "Who colours: reference:IMAGE..., torchscript:FILE, exec:COMMAND");

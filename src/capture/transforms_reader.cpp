@@ -251,10 +251,25 @@ std::optional<Aabbd> read_bounds(const fs::path& file, const Json& top) {
   return bounds;
 }
 
+/// Our own key, written for captures whose cameras all look one way.
+std::optional<DepthRange> read_depth_range(const fs::path& file, const Json& top) {
+  const auto range = top.find("depth_range");
+  if (range == top.end() || range->is_null()) return std::nullopt;
+  if (!range->is_array() || range->size() != 2) {
+    throw InputError(file, "depth_range", "expected [near, far], found " + range->dump());
+  }
+  const DepthRange out = {entry((*range)[0], file, "depth_range"), entry((*range)[1], file, "depth_range")};
+  if (!(out.near > 0 && out.near < out.far)) {
+    throw InputError(file, "depth_range", "expected 0 < near < far, found " + range->dump());
+  }
+  return out;
+}
+
 void read_hints(const fs::path& file, const Json& top, CaptureListing& listing) {
   const Fields fields(file, top, Json::object(), "");
   if (fields.find("aabb_scale") != nullptr) listing.aabb_scale = fields.number("aabb_scale", 1);
   listing.bounds = read_bounds(file, top);
+  listing.depth_range = read_depth_range(file, top);
   if (fields.find("applied_transform") != nullptr) {
     listing.notes.emplace_back("the poses carry an applied_transform; results are in the frame of the file, after it");
   }
