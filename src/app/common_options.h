@@ -26,7 +26,8 @@ void add_config_options(CLI::App& app, ConfigArguments& arguments);
 /// Declares `option` as a short form of the config key `key`.
 void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
                     const std::string& help);
-/// Declares one option a field, named like the field with `-` for `_`; legal values and defaults go to the help.
+/// Declares one option a field, named like the field with `-` for `_`; legal values and defaults go to the help. A bool
+/// becomes a flag that sets it.
 /// @param fields  must outlive the parsing.
 void add_field_options(CLI::App& app, const std::vector<Field>& fields);
 

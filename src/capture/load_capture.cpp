@@ -191,6 +191,7 @@ LoadedView load_view(const ListedView& listed, Transfer transfer) {
     out.view.intrinsics = resized(out.view.intrinsics, image.width, image.height);
   }
   out.view.image = encode_mono(image, transfer);
+  out.view.image.exposure = float(listed.exposure);
   if (!listed.mask_file.empty()) out.view.image.mask = read_mask(listed.mask_file, image.width, image.height);
   return out;
 }

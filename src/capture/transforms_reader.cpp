@@ -184,6 +184,10 @@ ListedView read_frame(const fs::path& file, const Json& top, const Json& frame, 
   }
   view.world_from_camera = opencv_from_opengl_camera(read_matrix(frame, file, view.field));
   read_intrinsics(fields, view);
+  view.exposure = fields.number("exposure", 1);
+  if (!(view.exposure > 0)) {
+    throw fields.error("exposure", "expected a number above 0, found " + fields.find("exposure")->dump());
+  }
   return view;
 }
 

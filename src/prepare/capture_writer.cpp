@@ -160,8 +160,10 @@ Json transforms_json(const std::vector<View>& views, const std::vector<PreparedI
   out["frames"] = Json::array();
   for (const View& view : views) {
     Json frame = {{"file_path", "images/" + view.name}};
-    if (const auto found = by_name.find(view.name); found != by_name.end() && !found->second->mask.empty()) {
-      frame["mask_path"] = found->second->mask.generic_string();
+    if (const auto found = by_name.find(view.name); found != by_name.end()) {
+      const PreparedImage& image = *found->second;
+      if (!image.mask.empty()) frame["mask_path"] = image.mask.generic_string();
+      if (image.exposure != 1) frame["exposure"] = image.exposure;
     }
     if (!one_lens) frame.update(lens_of(view));
     frame["transform_matrix"] = matrix_of(view.world_from_camera);

@@ -14,7 +14,7 @@ namespace cnerf {
 
 /// transforms.json of views whose `name` is a file below `images/`, in the frame of their poses. Reading it back with
 /// `load_capture` gives the same cameras.
-/// @param images  of the same names; their masks are listed.
+/// @param images  of the same names; their masks and exposures are listed.
 /// @throws InputError  a lens that transforms.json cannot say (the rational model's denominator).
 [[nodiscard]] nlohmann::ordered_json transforms_json(const std::vector<View>& views,
                                                      const std::vector<PreparedImage>& images,

@@ -36,6 +36,7 @@ struct PreparedImage {
   double focal = 0;               ///< pixels, as the notes of the file tell; 0: unknown
   double pixel_aspect = 1;        ///< width of a pixel over its height
   double centre_x = 0, centre_y = 0;  ///< principal point, pixels; 0, 0: the middle
+  double exposure = 1;            ///< see exposure.h
   int frame = -1;                 ///< of a clip: number of the frame in it
   double sharpness = 0;           ///< see sharpness.h; comparable within one capture only
 };

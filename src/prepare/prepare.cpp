@@ -10,6 +10,7 @@
 #include "src/base/files.h"
 #include "src/capture/listing.h"
 #include "src/prepare/capture_writer.h"
+#include "src/prepare/exposure.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -26,6 +27,7 @@ constexpr double kFewFeatures = 500;     ///< an image
 struct Material {
   PhotographSet set;
   std::optional<ClipReport> clip;
+  bool ordered = false;  ///< successive images are neighbours
 };
 
 /// The poses, in whatever frame they came.
@@ -49,9 +51,16 @@ Material read_material(const fs::path& source, const fs::path& capture, const Pr
   }
   if (!fs::exists(source)) throw MissingInputError(source.string() + ": no such file or folder");
   if (!options.masks.empty()) throw UsageError("masks: expected with photographs; frames of a clip have no names yet");
+  if (source.extension() == ".dat") {
+    out.set = import_spikes(source, capture, options.spikes, options.video.frames, progress);
+    out.ordered = true;
+    say(fmt::format("spike stream: {} pictures of {} ticks each", out.set.images.size(), options.spikes.spike_window));
+    return out;
+  }
   ClipImport clip = import_clip(source, capture, options.video, options.sensor, progress);
   out.set = std::move(clip.set);
   out.clip = std::move(clip.report);
+  out.ordered = true;
   const ClipReport& report = *out.clip;
   say(fmt::format("clip: {} frames of {} x {}, {:.3g} a second, {} shot{}", report.frames, report.width, report.height,
                   report.fps, report.shots.size(), report.shots.size() == 1 ? "" : "s"));
@@ -141,7 +150,7 @@ Poses find_poses(const Material& material, const fs::path& capture, const fs::pa
     }
     return out;
   }
-  const bool is_clip = material.clip.has_value();
+  const bool is_clip = material.ordered;
   const PoseRecovery recovery = recover_poses(images, capture, work, is_clip, options.poses, progress);
   Poses out;
   if (!recovery.model.empty()) out = poses_of_model(recovery.model, capture, images);
@@ -185,6 +194,7 @@ Json json_of(const std::vector<PreparedImage>& images, const std::vector<View>& 
     Json one = {{"name", image.name}, {"source", image.source.string()}, {"camera", image.camera},
                 {"sharpness", image.sharpness}};
     if (image.frame >= 0) one["frame"] = image.frame;
+    if (image.exposure != 1) one["exposure"] = image.exposure;
     if (image.focal > 0) one["focal_pixels"] = image.focal;
     one["placed"] = std::ranges::any_of(views, [&](const View& view) { return view.name == image.name; });
     out.push_back(std::move(one));
@@ -247,7 +257,7 @@ bool needs_preparing(const fs::path& source) {
 
 PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, const PrepareOptions& options,
                               const ProgressSink& progress, const Say& say) {
-  const Material material = read_material(source, capture, options, progress, say);
+  Material material = read_material(source, capture, options, progress, say);
   Poses poses = find_poses(material, capture, capture / "work", options, progress, say);
   const FrameChoice frame = choose_frame(poses.views, poses.points, options.frame);
   for (View& view : poses.views) view.world_from_camera = frame.capture_from_poses.pose(view.world_from_camera);
@@ -255,6 +265,11 @@ PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, c
   const auto subject = find_subject(poses.views, poses.points);
   say(fmt::format("frame: Z is up by {}, {}", frame.up_by,
                   frame.metres ? "in metres" : "no known unit (--measure gives metres)"));
+  if (!options.no_exposure) {
+    const double spread = estimate_exposures(material.set.images, capture, poses.model);
+    const bool kept = spread >= kNotedExposure;
+    say(fmt::format("exposures: {:.1f} % apart{}", 100 * spread, kept ? ", evened out when the capture is read" : ""));
+  }
   write_contact_sheet(capture / "contact_sheet.png", capture, poses.views, poses.points, subject);
   write_file(capture / "prepare.json", record_of(source, options, material, poses, frame).dump(1) + "\n");
   write_file(capture / "transforms.json", transforms_json(poses.views, material.set.images, subject).dump(1) + "\n");

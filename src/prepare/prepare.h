@@ -10,6 +10,7 @@
 #include "src/base/progress.h"
 #include "src/prepare/colmap.h"
 #include "src/prepare/photographs.h"
+#include "src/prepare/spike_stream.h"
 #include "src/prepare/upright.h"
 #include "src/prepare/video.h"
 
@@ -18,8 +19,10 @@ namespace cnerf {
 struct PrepareOptions {
   std::string masks;         ///< folder; empty: none
   std::string colmap_model;  ///< a ready model; empty: made by COLMAP
+  bool no_exposure = false;  ///< take all views as equally exposed
   SensorOptions sensor;
   VideoOptions video;
+  SpikeOptions spikes;
   PoseOptions poses;
   FrameOptions frame;
 
@@ -27,8 +30,10 @@ struct PrepareOptions {
   void visit(Visitor&& v) {
     v("masks", masks, "folder of masks named as the photographs, black = ignore");
     v("colmap_model", colmap_model, "folder of a ready COLMAP model, instead of making one");
+    v("no_exposure", no_exposure, "take all views as equally exposed");
     sensor.visit(v);
     video.visit(v);
+    spikes.visit(v);
     poses.visit(v);
     frame.visit(v);
   }

@@ -9,6 +9,7 @@
 #include "src/base/files.h"
 #include "src/base/rng.h"
 #include "src/capture/load_capture.h"
+#include "src/color/colorspace_math.h"
 #include "src/prepare/grey_image.h"
 #include "tests/support/data.h"
 
@@ -37,6 +38,7 @@ std::vector<PreparedImage> write_images(const std::filesystem::path& folder, con
     write_png(folder / "images" / view.name, cv::Mat1b(view.intrinsics.height, view.intrinsics.width, std::uint8_t(90)));
     PreparedImage image;
     image.name = view.name;
+    image.exposure = 1 + 0.25 * double(images.size());
     if (mask) {
       image.mask = std::filesystem::path("masks") / view.name;
       cv::Mat1b black_corner(12, 16, std::uint8_t(255));
@@ -62,6 +64,8 @@ TEST(CaptureWriter, WhatIsWrittenReadsBack) {
         EXPECT_EQ(capture.views[i].intrinsics, views[i].intrinsics);
         const Affined difference = capture.views[i].world_from_camera.inverse() * views[i].world_from_camera;
         EXPECT_LT(rotation_angle(difference.linear) + length(difference.translation), 1e-12);
+        const float light = linear_from_srgb(90 / 255.0f);
+        EXPECT_NEAR(capture.views[i].image.luminance(5), light / (1 + 0.25 * double(i)), 1e-7);
         EXPECT_FALSE(capture.views[i].image.valid(0));
         EXPECT_TRUE(capture.views[i].image.valid(1));
       }
