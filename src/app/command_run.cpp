@@ -49,12 +49,12 @@ void run(RunArguments arguments) {
   (void)parse_bake_formats(arguments.format);  // a wrong one should not cost an hour
   Reporter reporter = make_reporter(arguments.config);
   Config config = config_of(arguments);
-  arguments.capture = capture_of(arguments.capture, arguments.out, reporter).string();
+  check_run_folder(RunDirectory(arguments.out), arguments.existing);
   if (!arguments.grey) choose_colorizer(arguments.capture, config, reporter);
+  arguments.capture = capture_of(arguments.capture, arguments.out, reporter).string();
 
   Capture capture = read_capture(arguments.capture, config, reporter);
   RunContext context{RunDirectory(arguments.out), config, std::move(capture), arguments.command_line, reporter};
-  check_run_folder(context, arguments.existing);
   // Made before the training: one that cannot be made should not cost an hour.
   auto colorizer = needs_colorizer(arguments, context.directory) ? colorizer_of(context) : nullptr;
   begin_run(context, arguments.capture, arguments.existing);
@@ -77,7 +77,9 @@ void run(RunArguments arguments) {
 
 Work declare_run(CLI::App& app) {
   auto arguments = std::make_shared<RunArguments>();
-  app.add_option("CAPTURE", arguments->capture, "Folder of photographs and camera poses; without poses, or a film clip, it is prepared first")->required();
+  app.add_option("CAPTURE", arguments->capture,
+                 "Folder of photographs and camera poses; without poses, or a film clip, it is prepared first")
+      ->required();
   app.add_option("-o,--out", arguments->out, "Folder of the run, made if needed")->required();
   add_short_form(app, arguments->config, "--colorizer", "colorizer.spec",
                  "Who colours: reference:IMAGE..., torchscript:FILE, exec:COMMAND");

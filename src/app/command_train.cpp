@@ -19,7 +19,7 @@ void train(const TrainArguments& arguments, const std::vector<std::string>& comm
   const bool goes_on = arguments.existing.resume && directory.exists();
   const Config config = resolve_config(arguments.config, goes_on ? directory.config() : Config{});
   RunContext context{directory, config, read_capture(arguments.capture, config, reporter), command_line, reporter};
-  check_run_folder(context, arguments.existing);
+  check_run_folder(directory, arguments.existing);
   begin_run(context, arguments.capture, arguments.existing);
   train_step(context, arguments.existing.resume);
   reporter.next("cnerf colorize " + arguments.out + " --colorizer reference:PHOTO.jpg");

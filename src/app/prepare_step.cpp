@@ -34,8 +34,9 @@ void prepare_step(const fs::path& source, const fs::path& out, const PrepareOpti
   if (!is_empty_or_missing(out)) {
     if (!ours) throw UsageError(out.string() + ": is not empty and holds no prepared capture; choose another folder");
     if (!existing.resume && !existing.overwrite) {
-      throw UsageError(out.string() + (finished ? ": holds a capture already; pass --overwrite to make it again"
-                                                : ": was begun already; pass --resume to go on or --overwrite to start again"));
+      throw UsageError(out.string() +
+                       (finished ? ": holds a capture already; pass --overwrite to make it again"
+                                 : ": was begun already; pass --resume to go on or --overwrite to start again"));
     }
     if (existing.overwrite) {
       for (const char* made : {"images", "masks", "work", "transforms.json", "prepare.json", "contact_sheet.png"}) {

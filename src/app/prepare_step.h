@@ -14,8 +14,8 @@ namespace cnerf {
 void prepare_step(const std::filesystem::path& source, const std::filesystem::path& out, const PrepareOptions& options,
                   const ExistingOutput& existing, Reporter& reporter);
 
-/// What a run works on: `source` itself if it is a capture; else the capture that is made of it beside the run's folder,
-/// or was made by an earlier call.  @throws  as `prepare_step`.
+/// What a run works on: `source` itself if it is a capture; else the capture that is made of it beside the run's
+/// folder, or was made by an earlier call.  @throws  as `prepare_step`.
 [[nodiscard]] std::filesystem::path capture_of(const std::filesystem::path& source, const std::filesystem::path& run,
                                                Reporter& reporter);
 

@@ -57,7 +57,8 @@ Source find_in_folder(const fs::path& root) {
   throw MissingInputError(
       root.string() + state +
       "looked for transforms.json, transforms_train.json, a COLMAP model (cameras.bin or cameras.txt "
-      "here, in sparse/, sparse/*/ or colmap/sparse/*/) and poses_bounds.npy");
+      "here, in sparse/, sparse/*/ or colmap/sparse/*/) and poses_bounds.npy; cnerf prepare makes a capture of "
+      "photographs or a film clip");
 }
 
 Source recognise(const fs::path& path) {

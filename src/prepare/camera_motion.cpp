@@ -10,9 +10,9 @@
 namespace cnerf {
 namespace {
 
-constexpr double kStillBelow = 0.005;    ///< of the diagonal
-constexpr double kWithin = 1.0 / 400;    ///< of the diagonal: two pixels of a picture 640 wide
-constexpr double kExplained = 0.85;      ///< of all places; the rest may be wrong or move by themselves
+constexpr double kStillBelow = 0.005;  ///< of the diagonal
+constexpr double kWithin = 1.0 / 400;  ///< of the diagonal: two pixels of a picture 640 wide
+constexpr double kExplained = 0.85;    ///< of all places; the rest may be wrong or move by themselves
 
 /// Focal lengths in diagonals: from a very wide lens to a long one.
 constexpr double kShortest = 0.35, kLongest = 6;
@@ -79,7 +79,8 @@ Turn best_turn(const std::vector<cv::Point2f>& before, const std::vector<cv::Poi
     for (int i = -6; i <= 6; ++i) {
       for (int j = -6; j <= 6; ++j) {
         const double focal = focal_middle + focal_reach * i / 6, zoom = zoom_middle + zoom_reach * j / 6;
-        const Turn turn = fit_rotation(before, after, picture, diagonal * std::exp(focal), diagonal * std::exp(focal + zoom));
+        const Turn turn =
+            fit_rotation(before, after, picture, diagonal * std::exp(focal), diagonal * std::exp(focal + zoom));
         double sum = 0;
         for (const double error : errors_of(turn, before, after, picture)) sum += std::min(error, 0.1 * diagonal);
         if (sum < least) {

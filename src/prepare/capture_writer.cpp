@@ -30,7 +30,8 @@ Json matrix_of(const Affined& world_from_camera) {
 
 Json lens_of(const View& view) {
   const Intrinsics& lens = view.intrinsics;
-  Json out = {{"w", lens.width}, {"h", lens.height}, {"fl_x", lens.fx}, {"fl_y", lens.fy}, {"cx", lens.cx}, {"cy", lens.cy}};
+  Json out = {{"w", lens.width}, {"h", lens.height}, {"fl_x", lens.fx},
+              {"fl_y", lens.fy}, {"cx", lens.cx},    {"cy", lens.cy}};
   const auto& k = lens.distortion;
   switch (lens.model) {
     case LensModel::kPinhole:
@@ -51,8 +52,8 @@ Json lens_of(const View& view) {
 // ---- contact sheet ------------------------------------------------------------------------------------------------
 
 constexpr int kThumbnail = 160, kColumns = 8, kGap = 4, kPlan = 480;
-const cv::Scalar kBackground(24, 24, 24), kBoxColor(60, 200, 255), kCameraColor(255, 180, 80), kPointColor(130, 130, 130),
-    kTextColor(230, 230, 230);
+const cv::Scalar kBackground(24, 24, 24), kBoxColor(60, 200, 255), kCameraColor(255, 180, 80),
+    kPointColor(130, 130, 130), kTextColor(230, 230, 230);
 
 std::array<std::pair<Vec3d, Vec3d>, 12> edges_of(const Aabbd& box) {
   std::array<std::pair<Vec3d, Vec3d>, 12> edges;
@@ -130,7 +131,8 @@ cv::Mat plan_of(const std::string& title, int across, int up, const Aabbd& shown
     const double reach = plan.pixels(14);
     for (const double x : {0.0, double(view.intrinsics.width)}) {
       for (const double y : {0.0, double(view.intrinsics.height)}) {
-        plan.line(eye, eye + (view.world_from_camera.linear * ray_direction(view.intrinsics, {x, y})) * reach, kCameraColor);
+        plan.line(eye, eye + (view.world_from_camera.linear * ray_direction(view.intrinsics, {x, y})) * reach,
+                  kCameraColor);
       }
     }
     cv::circle(plan.picture, plan.at(eye), 2, kCameraColor, cv::FILLED, cv::LINE_AA);
@@ -148,7 +150,8 @@ Json transforms_json(const std::vector<View>& views, const std::vector<PreparedI
                      const std::optional<SubjectBox>& subject) {
   std::map<std::string, const PreparedImage*> by_name;
   for (const PreparedImage& image : images) by_name[image.name] = &image;
-  const bool one_lens = std::ranges::all_of(views, [&](const View& v) { return v.intrinsics == views.front().intrinsics; });
+  const bool one_lens =
+      std::ranges::all_of(views, [&](const View& v) { return v.intrinsics == views.front().intrinsics; });
   Json out;
   out["camera_model"] = views.front().intrinsics.model == LensModel::kOpenCvFisheye ? "OPENCV_FISHEYE" : "OPENCV";
   if (one_lens) out.update(lens_of(views.front()));

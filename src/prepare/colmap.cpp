@@ -24,8 +24,8 @@ namespace cnerf {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::size_t kPairsACall = 40;   ///< matched by one call of COLMAP, at least
-constexpr int kExhaustiveFrames = 40;     ///< of a clip: where neighbours are known, all pairs are soon a waste
+constexpr std::size_t kPairsACall = 40;  ///< matched by one call of COLMAP, at least
+constexpr int kExhaustiveFrames = 40;    ///< of a clip: where neighbours are known, all pairs are soon a waste
 
 /// The number at the start of `text`.
 std::optional<double> leading_number(std::string_view text) {
@@ -42,7 +42,8 @@ class Colmap {
   Colmap(fs::path program, fs::path log) : program_(std::move(program)), log_(std::move(log)) {}
 
   /// The first of `names` that `command` knows: options were renamed over the years.
-  [[nodiscard]] std::optional<std::string> option(const std::string& command, std::initializer_list<const char*> names) {
+  [[nodiscard]] std::optional<std::string> option(const std::string& command,
+                                                  std::initializer_list<const char*> names) {
     std::string& help = help_[command];
     if (help.empty()) help = help_text(command);
     for (const char* name : names) {
@@ -52,8 +53,9 @@ class Colmap {
   }
 
   /// Runs one command, and reports the share its log tells as that of `task`.
-  void run(const std::vector<std::string>& words, const std::string& task, std::size_t images,
-           const ProgressSink& progress) {
+  /// @return  false when it failed with `excuse` among its last words; every other failure throws.
+  bool run(const std::vector<std::string>& words, const std::string& task, std::size_t images,
+           const ProgressSink& progress, const std::string& excuse = "") {
     std::vector<std::string> line = {program_.string()};
     line.insert(line.end(), words.begin(), words.end());
     const std::uintmax_t begin = fs::exists(log_) ? fs::file_size(log_) : 0;
@@ -68,10 +70,12 @@ class Colmap {
     if (progress) progress({task, 0, {}});
     const int status = run_program(line, log_, watch);
     if (status != 0) {
+      if (!excuse.empty() && last_lines(begin).find(excuse) != std::string::npos) return false;
       throw PosesError(fmt::format("{} {} ended with {}; its last words:\n{}\nAll of them: {}", program_.string(),
                                    words.front(), status, last_lines(begin), log_.string()));
     }
     if (progress) progress({task, 1, {}});
+    return true;
   }
 
  private:
@@ -112,8 +116,8 @@ Colmap find_colmap(const PoseOptions& options, const fs::path& work) {
 /// What results depend on: another one means that earlier work is of no use.
 std::string fingerprint(const std::vector<PreparedImage>& images, const fs::path& capture, const PoseOptions& options) {
   std::ostringstream text;
-  text << options.camera_model << ' ' << options.features << ' ' << options.longest_side << ' ' << options.matching << ' '
-       << options.neighbours << ' ' << options.alike << ' ' << options.exhaustive_up_to << '\n';
+  text << options.camera_model << ' ' << options.features << ' ' << options.longest_side << ' ' << options.matching
+       << ' ' << options.neighbours << ' ' << options.alike << ' ' << options.exhaustive_up_to << '\n';
   for (const PreparedImage& image : images) {
     text << image.name << ' ' << image.camera << ' ' << image.focal << ' ' << image.mask.string() << ' '
          << sha256(read_binary_file(capture / "images" / image.name)) << '\n';
@@ -219,12 +223,18 @@ void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, 
     const std::string model = model_of(*members.front(), options);
     const char* command = "feature_extractor";
     std::vector<std::string> words = {command,
-                                      "--database_path", work / "database.db",
-                                      "--image_path", work / "pictures",
-                                      "--image_list_path", list_file,
-                                      "--ImageReader.single_camera", "1",
-                                      "--ImageReader.camera_model", model,
-                                      "--ImageReader.camera_params", first_parameters(*members.front(), model)};
+                                      "--database_path",
+                                      work / "database.db",
+                                      "--image_path",
+                                      work / "pictures",
+                                      "--image_list_path",
+                                      list_file,
+                                      "--ImageReader.single_camera",
+                                      "1",
+                                      "--ImageReader.camera_model",
+                                      model,
+                                      "--ImageReader.camera_params",
+                                      first_parameters(*members.front(), model)};
     if (fs::exists(work / "masks")) words.insert(words.end(), {"--ImageReader.mask_path", work / "masks"});
     const auto add = [&](std::initializer_list<const char*> names, const std::string& value) {
       if (const auto name = colmap.option(command, names)) words.insert(words.end(), {*name, value});
@@ -238,7 +248,7 @@ void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, 
       const double done = double(before) + part.fraction * double(members.size());
       progress({part.task, done / double(images.size()), {}});
     };
-    colmap.run(words, "features", members.size(), scaled);
+    (void)colmap.run(words, "features", members.size(), scaled);
     before += members.size();
   }
 }
@@ -261,8 +271,9 @@ void match_features(Colmap& colmap, const std::vector<PreparedImage>& images,
     }
     write_file(work / "pairs.txt", list);
     const char* command = "matches_importer";
-    std::vector<std::string> words = {command, "--database_path", work / "database.db", "--match_list_path",
-                                      work / "pairs.txt", "--match_type", "pairs"};
+    std::vector<std::string> words = {
+        command, "--database_path", work / "database.db", "--match_list_path", work / "pairs.txt", "--match_type",
+        "pairs"};
     const auto add = [&](std::initializer_list<const char*> names, const std::string& value) {
       if (const auto name = colmap.option(command, names)) words.insert(words.end(), {*name, value});
     };
@@ -272,7 +283,7 @@ void match_features(Colmap& colmap, const std::vector<PreparedImage>& images,
       const double done = double(begin) + part.fraction * double(end - begin);
       if (progress) progress({part.task, done / double(pairs.size()), {}});
     };
-    colmap.run(words, "matches", images.size(), scaled);
+    (void)colmap.run(words, "matches", images.size(), scaled);
   }
 }
 
@@ -281,15 +292,15 @@ void map_images(Colmap& colmap, const std::vector<PreparedImage>& images, const 
   fs::remove_all(work / "sparse");
   fs::create_directories(work / "sparse");
   const char* command = "mapper";
-  std::vector<std::string> words = {command, "--database_path", work / "database.db", "--image_path", work / "pictures",
-                                    "--output_path", work / "sparse"};
+  std::vector<std::string> words = {command,           "--database_path", work / "database.db", "--image_path",
+                                    work / "pictures", "--output_path",   work / "sparse"};
   const auto add = [&](const char* name, const std::string& value) {
     if (const auto found = colmap.option(command, {name})) words.insert(words.end(), {*found, value});
   };
   add("Mapper.num_threads", std::to_string(thread_count()));
   add("Mapper.extract_colors", "0");
   add("Mapper.min_model_size", std::to_string(std::min<std::size_t>(10, std::max<std::size_t>(3, images.size() / 2))));
-  colmap.run(words, "poses", images.size(), progress);
+  (void)colmap.run(words, "poses", images.size(), progress, "failed to create sparse model");  // then there is none
 }
 
 /// Of the lines "Features: 4218" of the log, one an image.
@@ -354,6 +365,7 @@ PoseRecovery recover_poses(const std::vector<PreparedImage>& images, const fs::p
   const auto pairs = pairs_to_match(out.matching, looks, options);
   out.pairs = pairs.size();
   if (!steps.has("features")) {
+    fs::remove(work / "database.db");  // going on in the middle of a camera's images would give it a second lens
     extract_features(colmap, images, work, options, progress);
     steps.finish("features");
   }

@@ -13,14 +13,14 @@
 namespace cnerf {
 
 struct PoseOptions {
-  std::string colmap = "colmap";        ///< program
+  std::string colmap = "colmap";  ///< program
   std::string matching = "auto";
   std::string camera_model = "OPENCV";
-  int exhaustive_up_to = 100;           ///< images
-  int neighbours = 10;                  ///< images matched on each side, where not all pairs are
-  int alike = 20;                       ///< images matched by look, where not all pairs are
-  int features = 8192;                  ///< an image, at most
-  int longest_side = 1600;              ///< pixels at which features are looked for
+  int exhaustive_up_to = 100;  ///< images
+  int neighbours = 10;         ///< images matched on each side, where not all pairs are
+  int alike = 20;              ///< images matched by look, where not all pairs are
+  int features = 8192;         ///< an image, at most
+  int longest_side = 1600;     ///< pixels at which features are looked for
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -43,7 +43,7 @@ struct PoseRecovery {
   std::string matching;                  ///< what was chosen
   std::size_t pairs = 0;                 ///< matched
   double seconds = 0;
-  double median_features = 0;            ///< an image; few mean blur or bare surfaces
+  double median_features = 0;  ///< an image; few mean blur or bare surfaces
 };
 
 /// Extracts features, matches and maps. Works in `work`, which keeps the database, the models and `colmap.log`; what an
@@ -56,7 +56,8 @@ struct PoseRecovery {
                                          const std::filesystem::path& work, bool ordered, const PoseOptions& options,
                                          const ProgressSink& progress);
 
-/// Done share that COLMAP's log tells, from its last line "Processed file [3/50]" or "Registering image #4 (12)".  @param images  in all, for the last.  Public for its test.
+/// Done share that COLMAP's log tells, from its last line "Processed file [3/50]" or "Registering image #4 (12)".
+/// @param images  in all, for the last.  Public for its test.
 [[nodiscard]] double share_in_log(std::string_view log, std::size_t images);
 
 }  // namespace cnerf

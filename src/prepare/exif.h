@@ -8,10 +8,10 @@
 namespace cnerf {
 
 struct ExifFacts {
-  int orientation = 1;          ///< 1 to 8, as EXIF numbers them: how stored pixels have to be turned to stand upright
-  double focal_mm = 0;          ///< 0: not stated
-  double focal_35mm = 0;        ///< focal length of a 36 x 24 mm frame with the same angle of view; 0: not stated
-  std::string camera;           ///< maker and model; empty: not stated
+  int orientation = 1;    ///< 1 to 8, as EXIF numbers them: how stored pixels have to be turned to stand upright
+  double focal_mm = 0;    ///< 0: not stated
+  double focal_35mm = 0;  ///< focal length of a 36 x 24 mm frame with the same angle of view; 0: not stated
+  std::string camera;     ///< maker and model; empty: not stated
 };
 
 /// Reads the EXIF block of a JPEG, PNG (chunk eXIf) or TIFF file held in memory. A file without one, or with a broken

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kRounds = 30;
-constexpr double kSettled = 1e-6;                 ///< largest change of a logarithm in a round
+constexpr double kSettled = 1e-6;                     ///< largest change of a logarithm in a round
 constexpr float kDarkest = 0.004f, kLightest = 0.9f;  ///< luminance between noise and clipping
 
 double median(std::vector<double>& values) {
@@ -38,7 +38,8 @@ cv::Mat1f smoothed(const fs::path& file) {
 std::vector<double> solve_exposures(int views, const std::vector<Sighting>& sightings) {
   int places = 0;
   for (const Sighting& seen : sightings) places = std::max(places, seen.place + 1);
-  std::vector<std::vector<std::size_t>> of_view(static_cast<std::size_t>(views)), of_place(static_cast<std::size_t>(places));
+  std::vector<std::vector<std::size_t>> of_view(static_cast<std::size_t>(views)),
+      of_place(static_cast<std::size_t>(places));
   std::vector<double> logs;
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     of_view[std::size_t(sightings[i].view)].push_back(i);
@@ -68,7 +69,8 @@ std::vector<double> solve_exposures(int views, const std::vector<Sighting>& sigh
     if (!of_view[v].empty()) differences.push_back(exposure[v]);
   }
   const double middle = differences.empty() ? 0 : median(differences);
-  for (std::size_t v = 0; v < of_view.size(); ++v) exposure[v] = of_view[v].empty() ? 1 : std::exp(exposure[v] - middle);
+  for (std::size_t v = 0; v < of_view.size(); ++v)
+    exposure[v] = of_view[v].empty() ? 1 : std::exp(exposure[v] - middle);
   return exposure;
 }
 
@@ -94,8 +96,9 @@ std::vector<Observation> read_observations(const fs::path& model) {
   return out;
 }
 
-double estimate_exposures(std::vector<PreparedImage>& images, const fs::path& capture, const fs::path& model) {
-  if (!fs::exists(model / "images.bin")) return 0;
+std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, const fs::path& capture,
+                                         const fs::path& model) {
+  if (!fs::exists(model / "images.bin")) return std::nullopt;
   std::map<std::string, int> number_of;
   for (std::size_t i = 0; i < images.size(); ++i) {
     number_of[fs::path(images[i].name).stem().string()] = int(i);

@@ -1,8 +1,9 @@
 #pragma once
-/// How much lighter or darker each view was taken than the others: shutter, iris, a flickering film. Told by what several
-/// views show of the same places.
+/// How much lighter or darker each view was taken than the others: shutter, iris, a flickering film. Told by what
+/// several views show of the same places.
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,8 @@ namespace cnerf {
 
 /// The light a view shows of a place.
 struct Sighting {
-  int view = 0;   ///< number
-  int place = 0;  ///< number
+  int view = 0;      ///< number
+  int place = 0;     ///< number
   double light = 0;  ///< linear luminance, above 0
 };
 
@@ -37,8 +38,8 @@ inline constexpr double kNotedExposure = 0.02;
 
 /// Fills `exposure` of the images from what they show of the model's points; leaves 1 where that spreads less than
 /// kNotedExposure.
-/// @return  the spread found.
-double estimate_exposures(std::vector<PreparedImage>& images, const std::filesystem::path& capture,
-                          const std::filesystem::path& model);
+/// @return  the spread found; nothing when the model does not say what it was made of (a text model).
+std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, const std::filesystem::path& capture,
+                                         const std::filesystem::path& model);
 
 }  // namespace cnerf

@@ -9,14 +9,14 @@ namespace cnerf {
 
 /// What is kept of every frame.
 struct FrameFacts {
-  double brightness = 0;       ///< mean linear luminance
-  double sharpness = 0;        ///< see grey_image.h
-  double change = 0;           ///< mean absolute difference to the frame before, codes
-  double likeness = 1;         ///< correlation of its blurred, normalised picture with that of the frame before
-  double comb = 0;             ///< see comb_ratio
-  double grain = 0;            ///< see grain_codes
-  cv::Point2d shift{};         ///< of the picture since the frame before, pixels
-  bool scratched = false;      ///< see has_scratch
+  double brightness = 0;   ///< mean linear luminance
+  double sharpness = 0;    ///< see grey_image.h
+  double change = 0;       ///< mean absolute difference to the frame before, codes
+  double likeness = 1;     ///< correlation of its blurred, normalised picture with that of the frame before
+  double comb = 0;         ///< see comb_ratio
+  double grain = 0;        ///< see grain_codes
+  cv::Point2d shift{};     ///< of the picture since the frame before, pixels
+  bool scratched = false;  ///< see has_scratch
 };
 
 /// Looks at frames one after another.
@@ -60,6 +60,7 @@ class BorderFinder {
   /// The picture without bars that are uniform and unchanged throughout; all of it where there are none, or where less
   /// than a quarter would be left.
   [[nodiscard]] cv::Rect picture() const;
+  [[nodiscard]] cv::Size size() const { return sum_.size(); }
 
  private:
   cv::Mat1f sum_, squares_;

@@ -12,8 +12,8 @@ namespace cnerf {
 /// sRGB codes of a luminance image times `gain`, clamped to 8 bits.
 [[nodiscard]] cv::Mat1b grey_codes(const LinearImage& luminance, float gain = 1);
 
-/// How sharp a picture is: the standard deviation of its Laplacian over that of its codes, at no more than 640 pixels on
-/// the longer side. Does not change with exposure; grain raises it, so compare pictures of one camera only.
+/// How sharp a picture is: the standard deviation of its Laplacian over that of its codes, at no more than 640 pixels
+/// on the longer side. Does not change with exposure; grain raises it, so compare pictures of one camera only.
 [[nodiscard]] double sharpness(const cv::Mat1b& picture);
 
 /// Reduced by area averaging until the longer side is at most `longest`; the picture itself if it is.

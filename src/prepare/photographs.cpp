@@ -44,10 +44,11 @@ void refuse_heic(const fs::path& folder, const std::vector<fs::path>& files) {
   const auto heic = std::ranges::find_if(files, is_heic);
   if (heic == files.end()) return;
   const std::string extension = heic->extension().string();
-  throw InputError(*heic, "format",
-                   "expected JPEG, PNG, TIFF or EXR, found HEIC; convert with (Debian package libheif-examples):\n  cd " +
-                       folder.string() + " && for f in *" + extension + "; do heif-convert -q 95 \"$f\" \"${f%" +
-                       extension + "}.jpg\" && mv \"$f\" \"$f.done\"; done");
+  throw InputError(
+      *heic, "format",
+      "expected JPEG, PNG, TIFF or EXR, found HEIC; convert with (Debian package libheif-examples):\n  cd " +
+          folder.string() + " && for f in *" + extension + "; do heif-convert -q 95 \"$f\" \"${f%" + extension +
+          "}.jpg\" && mv \"$f\" \"$f.done\"; done");
 }
 
 Transfer source_transfer(const std::string& name) {
@@ -87,7 +88,8 @@ LinearImage turned_upright(const LinearImage& stored, const Upright& grid) {
   return out;
 }
 
-/// The luminance image as codes of `T`, with alpha as a colour image where there is some: OpenCV writes no grey + alpha.
+/// The luminance image as codes of `T`, with alpha as a colour image where there is some: OpenCV writes no grey +
+/// alpha.
 template <typename T>
 cv::Mat encoded(const LinearImage& image, int type, double largest) {
   cv::Mat out(image.height, image.width, CV_MAKETYPE(type, image.alpha.empty() ? 1 : 4));
@@ -117,7 +119,8 @@ void write_image(const fs::path& file, const LinearImage& image, bool eight_bit)
       write_exr_channel(temporary, "Y", image.width, image.height, image.values);
     });
   } else {
-    write_png(file, eight_bit ? encoded<std::uint8_t>(image, CV_8U, 255) : encoded<std::uint16_t>(image, CV_16U, 65535));
+    write_png(file,
+              eight_bit ? encoded<std::uint8_t>(image, CV_8U, 255) : encoded<std::uint16_t>(image, CV_16U, 65535));
   }
 }
 
@@ -147,7 +150,8 @@ std::map<std::string, fs::path> masks_in(const fs::path& folder) {
 /// The stem without white space, which COLMAP's lists cannot hold.
 std::string plain_stem(const fs::path& file) {
   std::string stem = file.stem().string();
-  std::ranges::replace_if(stem, [](unsigned char c) { return std::isspace(c) != 0; }, '_');
+  std::ranges::replace_if(
+      stem, [](unsigned char c) { return std::isspace(c) != 0; }, '_');
   return stem;
 }
 
@@ -223,16 +227,38 @@ std::size_t Upright::stored_index(int x, int y) const {
   const int right = width() - 1 - x, bottom = height() - 1 - y;
   int column = x, row = y;
   switch (orientation) {
-    case 2: column = right; break;
-    case 3: column = right, row = bottom; break;
-    case 4: row = bottom; break;
-    case 5: column = y, row = x; break;
-    case 6: column = y, row = right; break;
-    case 7: column = bottom, row = right; break;
-    case 8: column = bottom, row = x; break;
-    default: break;
+    case 2:
+      column = right;
+      break;
+    case 3:
+      column = right, row = bottom;
+      break;
+    case 4:
+      row = bottom;
+      break;
+    case 5:
+      column = y, row = x;
+      break;
+    case 6:
+      column = y, row = right;
+      break;
+    case 7:
+      column = bottom, row = right;
+      break;
+    case 8:
+      column = bottom, row = x;
+      break;
+    default:
+      break;
   }
   return std::size_t(row) * std::size_t(stored_width) + std::size_t(column);
+}
+
+bool holds_photographs(const fs::path& folder) {
+  for (const fs::path& place : {folder, folder / "images"}) {
+    if (fs::is_directory(place) && !photographs_in(place).empty()) return true;
+  }
+  return false;
 }
 
 std::vector<fs::path> list_photographs(const fs::path& folder) {

@@ -1,5 +1,6 @@
 #pragma once
-/// Photographs as a user has them, on their way to images of a capture: upright, one channel, at the depth they came in.
+/// Photographs as a user has them, on their way to images of a capture: upright, one channel, at the depth they came
+/// in.
 
 #include <filesystem>
 #include <string>
@@ -28,22 +29,22 @@ struct SensorOptions {
 
 /// One image of the capture to be.
 struct PreparedImage {
-  std::string name;               ///< file name below `images/`
-  std::filesystem::path source;   ///< photograph, or clip
-  std::filesystem::path mask;     ///< below the capture, "masks/NAME.png"; empty: none
-  int width = 0, height = 0;      ///< pixels, upright
-  int camera = 0;                 ///< number of its camera: same size, same lens
-  double focal = 0;               ///< pixels, as the notes of the file tell; 0: unknown
-  double pixel_aspect = 1;        ///< width of a pixel over its height
+  std::string name;                   ///< file name below `images/`
+  std::filesystem::path source;       ///< photograph, or clip
+  std::filesystem::path mask;         ///< below the capture, "masks/NAME.png"; empty: none
+  int width = 0, height = 0;          ///< pixels, upright
+  int camera = 0;                     ///< number of its camera: same size, same lens
+  double focal = 0;                   ///< pixels, as the notes of the file tell; 0: unknown
+  double pixel_aspect = 1;            ///< width of a pixel over its height
   double centre_x = 0, centre_y = 0;  ///< principal point, pixels; 0, 0: the middle
-  double exposure = 1;            ///< see exposure.h
-  int frame = -1;                 ///< of a clip: number of the frame in it
-  double sharpness = 0;           ///< see sharpness.h; comparable within one capture only
+  double exposure = 1;                ///< see exposure.h
+  int frame = -1;                     ///< of a clip: number of the frame in it
+  double sharpness = 0;               ///< see sharpness.h; comparable within one capture only
 };
 
 struct PhotographSet {
-  std::vector<PreparedImage> images;        ///< sorted by name
-  std::vector<std::string> unreadable;      ///< "FILE: why", left out
+  std::vector<PreparedImage> images;    ///< sorted by name
+  std::vector<std::string> unreadable;  ///< "FILE: why", left out
   std::vector<std::string> notes;
 };
 
@@ -52,9 +53,12 @@ struct PhotographSet {
 /// @throws InputError  HEIC files, with the command that converts them.
 [[nodiscard]] std::vector<std::filesystem::path> list_photographs(const std::filesystem::path& folder);
 
+/// True for a folder that `list_photographs` finds something in, be it only what it refuses.
+[[nodiscard]] bool holds_photographs(const std::filesystem::path& folder);
+
 /// Writes every photograph to `capture/images`: turned upright as its EXIF note says, colours reduced to luminance,
-/// levels applied, never resampled. 8-bit photographs become 8-bit PNG files, deeper ones 16-bit PNG, floats EXR; integer
-/// codes are sRGB-encoded whatever the source was.
+/// levels applied, never resampled. 8-bit photographs become 8-bit PNG files, deeper ones 16-bit PNG, floats EXR;
+/// integer codes are sRGB-encoded whatever the source was.
 /// @param masks  folder of masks named as the photographs (any image extension), black = ignore; empty: none.
 /// @throws MissingInputError  a mask folder without a mask.  @throws InputError  when fewer than 2 can be read, or a
 /// mask does not fit.  @throws Interrupted.
@@ -62,8 +66,8 @@ struct PhotographSet {
                                                const std::filesystem::path& capture, const std::filesystem::path& masks,
                                                const SensorOptions& sensor, const ProgressSink& progress);
 
-/// Turns a pixel grid upright: the size of an image of `width` x `height` after `orientation`, and the stored pixel that
-/// upright pixel (x, y) shows.
+/// Turns a pixel grid upright: the size of an image of `width` x `height` after `orientation`, and the stored pixel
+/// that upright pixel (x, y) shows.
 struct Upright {
   int orientation = 1;
   int stored_width = 0, stored_height = 0;

@@ -18,10 +18,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kGoodShare = 0.8;       ///< of images registered, below which advice is given
-constexpr double kLeastShare = 0.25;     ///< below which the poses are not worth a training
-constexpr double kBlurred = 0.5;         ///< of the median sharpness
-constexpr double kFewFeatures = 500;     ///< an image
+constexpr double kGoodShare = 0.8;    ///< of images registered, below which advice is given
+constexpr double kLeastShare = 0.25;  ///< below which the poses are not worth a training
+constexpr double kBlurred = 0.5;      ///< of the median sharpness
+constexpr double kFewFeatures = 500;  ///< an image
 
 /// Where the images came from.
 struct Material {
@@ -66,9 +66,10 @@ Material read_material(const fs::path& source, const fs::path& capture, const Pr
                   report.fps, report.shots.size(), report.shots.size() == 1 ? "" : "s"));
   for (const std::string& line : shot_lines(report)) say(line);
   const FilmMarks& marks = report.shots[std::size_t(report.shot - 1)].marks;
-  say(fmt::format("shot {} is used, {} frames kept; flicker {:.1f} %, weave {:.2f} pixels, grain up to {:.1f} codes, "
-                  "scratches in {:.0f} % of frames",
-                  report.shot, report.kept.size(), 100 * marks.flicker, marks.weave, marks.grain, 100 * marks.scratched));
+  say(fmt::format(
+      "shot {} is used, {} frames kept; flicker {:.1f} %, weave {:.2f} pixels, grain up to {:.1f} codes, "
+      "scratches in {:.0f} % of frames",
+      report.shot, report.kept.size(), 100 * marks.flicker, marks.weave, marks.grain, 100 * marks.scratched));
   if (report.picture.width != report.width || report.picture.height != report.height) {
     say(fmt::format("borders cropped: {} x {} at {}, {} is left", report.picture.width, report.picture.height,
                     report.picture.x, report.picture.y));
@@ -116,16 +117,22 @@ std::string advice(const std::vector<PreparedImage>& images, const PoseRecovery&
   const auto blurred = std::ranges::count_if(values, [&](double v) { return v < kBlurred * usual; });
   std::string text;
   if (recovery.median_features > 0 && recovery.median_features < kFewFeatures) {
-    text += fmt::format(" Pictures hold few details ({:.0f} features in the median one): more light, less blur, or a "
-                        "patterned cloth under the subject help.", recovery.median_features);
+    text += fmt::format(
+        " Pictures hold few details ({:.0f} features in the median one): more light, less blur, or a "
+        "patterned cloth under the subject help.",
+        recovery.median_features);
   }
-  if (blurred > 0) text += fmt::format(" {} of {} pictures are much less sharp than the others.", blurred, images.size());
+  if (blurred > 0)
+    text += fmt::format(" {} of {} pictures are much less sharp than the others.", blurred, images.size());
   if (recovery.model_sizes.size() > 1) {
-    text += fmt::format(" {} groups of pictures do not connect: pictures in between, with two thirds of overlap, join "
-                        "them.", recovery.model_sizes.size());
+    text += fmt::format(
+        " {} groups of pictures do not connect: pictures in between, with two thirds of overlap, join "
+        "them.",
+        recovery.model_sizes.size());
   }
-  text += is_clip ? " More frames (--frames) overlap more." : " Neighbouring pictures should share two thirds of what they "
-                                                              "show, from places a step apart.";
+  text += is_clip ? " More frames (--frames) overlap more."
+                  : " Neighbouring pictures should share two thirds of what they "
+                    "show, from places a step apart.";
   return text;
 }
 
@@ -158,7 +165,8 @@ Poses find_poses(const Material& material, const fs::path& capture, const fs::pa
   const double share = double(out.views.size()) / double(images.size());
   const std::string found = fmt::format("poses: {} of {} images placed", out.views.size(), images.size());
   if (out.views.size() < 3 || share < kLeastShare) {
-    throw PosesError(found + "." + advice(images, recovery, is_clip) + " COLMAP's log: " + (work / "colmap.log").string());
+    throw PosesError(found + "." + advice(images, recovery, is_clip) +
+                     " COLMAP's log: " + (work / "colmap.log").string());
   }
   say(found + fmt::format(" ({} matching, {} pairs)", recovery.matching, recovery.pairs));
   if (out.views.size() < images.size()) say("not placed: " + missing_names(images, out.views));
@@ -176,22 +184,36 @@ Json json_of(const Similarity& s) {
 Json json_of(const ClipReport& clip) {
   Json shots = Json::array();
   for (const ShotReport& shot : clip.shots) {
-    shots.push_back({{"begin", shot.range.begin}, {"end", shot.range.end}, {"duplicates", shot.duplicates},
-                     {"pairs_judged", shot.judged}, {"parallax_share", shot.parallax}, {"moved", shot.moved},
-                     {"flicker", shot.marks.flicker}, {"weave_pixels", shot.marks.weave},
-                     {"grain_codes", shot.marks.grain}, {"scratched_share", shot.marks.scratched},
+    shots.push_back({{"begin", shot.range.begin},
+                     {"end", shot.range.end},
+                     {"duplicates", shot.duplicates},
+                     {"pairs_judged", shot.judged},
+                     {"parallax_share", shot.parallax},
+                     {"moved", shot.moved},
+                     {"flicker", shot.marks.flicker},
+                     {"weave_pixels", shot.marks.weave},
+                     {"grain_codes", shot.marks.grain},
+                     {"scratched_share", shot.marks.scratched},
                      {"refusal", shot.refusal()}});
   }
-  return {{"width", clip.width}, {"height", clip.height}, {"frames", clip.frames}, {"fps", clip.fps},
-          {"pixel_aspect", clip.pixel_aspect}, {"interlaced", clip.interlaced}, {"combed_share", clip.combed},
-          {"picture", {clip.picture.x, clip.picture.y, clip.picture.width, clip.picture.height}}, {"shots", shots},
+  return {{"width", clip.width},
+          {"height", clip.height},
+          {"frames", clip.frames},
+          {"fps", clip.fps},
+          {"pixel_aspect", clip.pixel_aspect},
+          {"interlaced", clip.interlaced},
+          {"combed_share", clip.combed},
+          {"picture", {clip.picture.x, clip.picture.y, clip.picture.width, clip.picture.height}},
+          {"shots", shots},
           {"shot", clip.shot}};
 }
 
 Json json_of(const std::vector<PreparedImage>& images, const std::vector<View>& views) {
   Json out = Json::array();
   for (const PreparedImage& image : images) {
-    Json one = {{"name", image.name}, {"source", image.source.string()}, {"camera", image.camera},
+    Json one = {{"name", image.name},
+                {"source", image.source.string()},
+                {"camera", image.camera},
                 {"sharpness", image.sharpness}};
     if (image.frame >= 0) one["frame"] = image.frame;
     if (image.exposure != 1) one["exposure"] = image.exposure;
@@ -206,7 +228,9 @@ Json record_of(const fs::path& source, const PrepareOptions& options, const Mate
                const FrameChoice& frame) {
   Json out;
   out["source"] = fs::absolute(source).lexically_normal().string();
-  out["transfer"] = {{"source", options.sensor.transfer}, {"images", "srgb"}, {"black_level", options.sensor.black_level},
+  out["transfer"] = {{"source", options.sensor.transfer},
+                     {"images", "srgb"},
+                     {"black_level", options.sensor.black_level},
                      {"white_level", options.sensor.white_level}};
   if (material.clip) out["clip"] = json_of(*material.clip);
   out["unreadable"] = material.set.unreadable;
@@ -216,18 +240,26 @@ Json record_of(const fs::path& source, const PrepareOptions& options, const Mate
   found["images"] = material.set.images.size();
   if (poses.recovery) {
     const PoseOptions& used = options.poses;
-    found.update(Json{{"matching", poses.recovery->matching}, {"pairs", poses.recovery->pairs},
-                      {"model_sizes", poses.recovery->model_sizes}, {"median_features", poses.recovery->median_features},
-                      {"seconds", poses.recovery->seconds}, {"camera_model", used.camera_model},
-                      {"features", used.features}, {"longest_side", used.longest_side},
-                      {"exhaustive_up_to", used.exhaustive_up_to}, {"neighbours", used.neighbours}, {"alike", used.alike}});
+    found.update(Json{{"matching", poses.recovery->matching},
+                      {"pairs", poses.recovery->pairs},
+                      {"model_sizes", poses.recovery->model_sizes},
+                      {"median_features", poses.recovery->median_features},
+                      {"seconds", poses.recovery->seconds},
+                      {"camera_model", used.camera_model},
+                      {"features", used.features},
+                      {"longest_side", used.longest_side},
+                      {"exhaustive_up_to", used.exhaustive_up_to},
+                      {"neighbours", used.neighbours},
+                      {"alike", used.alike}});
   }
-  out["frame"] = {{"up_by", frame.up_by}, {"ground_share", frame.ground_share},
-                  {"unit", frame.metres ? "metre" : "unknown"}, {"measure", options.frame.measure},
+  out["frame"] = {{"up_by", frame.up_by},
+                  {"ground_share", frame.ground_share},
+                  {"unit", frame.metres ? "metre" : "unknown"},
+                  {"measure", options.frame.measure},
                   {"capture_from_poses", json_of(frame.capture_from_poses)},
                   {"poses_from_capture", json_of(frame.capture_from_poses.inverse())}};
-  out["thresholds"] = {{"good_share", kGoodShare}, {"least_share", kLeastShare}, {"blurred", kBlurred},
-                       {"few_features", kFewFeatures}};
+  out["thresholds"] = {
+      {"good_share", kGoodShare}, {"least_share", kLeastShare}, {"blurred", kBlurred}, {"few_features", kFewFeatures}};
   out["images"] = json_of(material.set.images, poses.views);
   return out;
 }
@@ -246,13 +278,7 @@ bool needs_preparing(const fs::path& source) {
                              "cameras.txt", "sparse", "colmap"}) {
     if (fs::exists(source / marker, failure)) return false;
   }
-  for (const fs::path& folder : {source, source / "images"}) {
-    if (!fs::is_directory(folder, failure)) continue;
-    for (const auto& entry : fs::directory_iterator(folder, failure)) {
-      if (entry.is_regular_file() && is_image_file(entry.path())) return true;
-    }
-  }
-  return false;
+  return holds_photographs(source);
 }
 
 PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, const PrepareOptions& options,
@@ -266,9 +292,10 @@ PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, c
   say(fmt::format("frame: Z is up by {}, {}", frame.up_by,
                   frame.metres ? "in metres" : "no known unit (--measure gives metres)"));
   if (!options.no_exposure) {
-    const double spread = estimate_exposures(material.set.images, capture, poses.model);
-    const bool kept = spread >= kNotedExposure;
-    say(fmt::format("exposures: {:.1f} % apart{}", 100 * spread, kept ? ", evened out when the capture is read" : ""));
+    if (const auto spread = estimate_exposures(material.set.images, capture, poses.model)) {
+      say(fmt::format("exposures: {:.1f} % apart{}", 100 * *spread,
+                      *spread >= kNotedExposure ? ", evened out when the capture is read" : ""));
+    }
   }
   write_contact_sheet(capture / "contact_sheet.png", capture, poses.views, poses.points, subject);
   write_file(capture / "prepare.json", record_of(source, options, material, poses, frame).dump(1) + "\n");

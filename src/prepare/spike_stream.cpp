@@ -73,8 +73,8 @@ PhotographSet import_spikes(const fs::path& stream, const fs::path& capture, con
   const std::uintmax_t size = fs::file_size(stream), stride = tick_bytes(width, height);
   if (size % stride != 0 || size / stride < 2 * std::uintmax_t(window)) {
     throw InputError(stream, "size",
-                     fmt::format("expected whole ticks of {} bytes ({} x {} bits) and at least {}, found {} bytes", stride,
-                                 width, height, 2 * window, size));
+                     fmt::format("expected whole ticks of {} bytes ({} x {} bits) and at least {}, found {} bytes",
+                                 stride, width, height, 2 * window, size));
   }
   const std::uintmax_t ticks = size / stride;
   const auto pictures = int(std::min<std::uintmax_t>(std::uintmax_t(count), ticks / std::uintmax_t(window)));

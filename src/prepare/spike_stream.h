@@ -21,16 +21,17 @@ struct SpikeOptions {
 
   template <typename Visitor>
   void visit(Visitor&& v) {
-    v("spike_width", spike_width, Range{0, 100000}, "pixels across of a spike stream (.dat), which does not say itself");
+    v("spike_width", spike_width, Range{0, 100000},
+      "pixels across of a spike stream (.dat), which does not say itself");
     v("spike_height", spike_height, Range{0, 100000}, "pixels down of a spike stream");
     v("spike_window", spike_window, Range{2, 100000}, "ticks of a spike stream that are gathered to a picture");
     v("spike_flip", spike_flip, "the stream's first row is the lowest");
   }
 };
 
-/// The picture of a window of ticks: the firing rate, 1 = a spike every tick. Where a pixel fired twice or more it is the
-/// number of intervals over the ticks from its first spike to its last, which does not depend on where the window cuts;
-/// else the count over the window.
+/// The picture of a window of ticks: the firing rate, 1 = a spike every tick. Where a pixel fired twice or more it is
+/// the number of intervals over the ticks from its first spike to its last, which does not depend on where the window
+/// cuts; else the count over the window.
 /// @param ticks   [window][rows * columns / 8] bytes, lowest bit first, first row on top; each tick padded to bytes
 /// @return  linear luminance in [0, 1].
 [[nodiscard]] LinearImage integrate_spikes(std::span<const std::byte> ticks, int width, int height, int window);

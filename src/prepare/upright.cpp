@@ -158,9 +158,10 @@ Vec3d place_by_points(const SeenAt& seen, const std::vector<Vec3d>& points) {
     if (pixel && std::hypot(pixel->x - seen.x, pixel->y - seen.y) < reach) depths.push_back(in_camera.z);
   }
   if (depths.size() < 3) {
-    throw InputError(fmt::format("measure: {},{} of {}: expected at least 3 sparse points within {:.0f} pixels, found {};"
-                                 " name the same place in a second view: x,y,view+x,y,view",
-                                 seen.x, seen.y, view.name, reach, depths.size()));
+    throw InputError(
+        fmt::format("measure: {},{} of {}: expected at least 3 sparse points within {:.0f} pixels, found {};"
+                    " name the same place in a second view: x,y,view+x,y,view",
+                    seen.x, seen.y, view.name, reach, depths.size()));
   }
   const Vec3d direction = ray_direction(view.intrinsics, {seen.x, seen.y});
   return view.world_from_camera.point(direction * (percentile(std::move(depths), 0.3) / direction.z));
@@ -214,7 +215,8 @@ std::optional<GroundPlane> find_ground(const std::vector<Vec3d>& points, Vec3d r
       below += height < -3 * thickness ? 1 : 0;
     }
     const double share = double(on) / double(points.size());
-    if (share > best.share && double(below) < kBelowGround * double(points.size())) best = {normal, dot(normal, a), share};
+    if (share > best.share && double(below) < kBelowGround * double(points.size()))
+      best = {normal, dot(normal, a), share};
   }
   if (best.share < kGroundShare) return std::nullopt;
   // Refine: the plane of least squared distance to its points.
@@ -266,8 +268,12 @@ double units_per_metre(const std::string& measure, const std::vector<View>& view
     throw UsageError("measure: expected 'x1,y1,view1 x2,y2,view2 = 1.2m', found '" + measure + "'");
   }
   const std::string unit = match[4];
-  const double in_metres = unit == "mm" ? 1e-3 : unit == "cm" ? 1e-2 : unit == "km" ? 1e3 : unit == "in" ? 0.0254
-                           : unit == "ft" ? 0.3048 : 1.0;
+  const double in_metres = unit == "mm"   ? 1e-3
+                           : unit == "cm" ? 1e-2
+                           : unit == "km" ? 1e3
+                           : unit == "in" ? 0.0254
+                           : unit == "ft" ? 0.3048
+                                          : 1.0;
   const double metres = std::stod(match[3]) * in_metres;
   if (!(metres > 0)) throw UsageError("measure: expected a length above 0, found '" + match[3].str() + "'");
   const Vec3d a = place_of(parse_end(match[1], views), points), b = place_of(parse_end(match[2], views), points);
@@ -276,7 +282,8 @@ double units_per_metre(const std::string& measure, const std::vector<View>& view
   return units / metres;
 }
 
-FrameChoice choose_frame(const std::vector<View>& views, const std::vector<Vec3d>& points, const FrameOptions& options) {
+FrameChoice choose_frame(const std::vector<View>& views, const std::vector<Vec3d>& points,
+                         const FrameOptions& options) {
   const Vec3d subject = subject_point(views, points);
   const double distance = camera_distance(views, subject);
   std::vector<Vec3d> near_points;

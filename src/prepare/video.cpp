@@ -22,6 +22,7 @@ constexpr double kCombed = 1.0;           ///< comb ratio from which a frame is 
 constexpr double kInterlacedShare = 0.1;  ///< of frames, from which a clip is interlaced
 constexpr double kJudgedMove = 0.08;      ///< of the diagonal: pairs this far apart are judged
 constexpr double kParallaxShare = 0.25;   ///< of judged pairs, below which a shot has none
+constexpr double kSurelyNoCut = 0.6;      ///< likeness to the frame before, above which places are followed on
 constexpr int kTrackedWidth = 480;
 constexpr int kMostTracks = 400, kFewestTracks = 60;
 
@@ -69,8 +70,12 @@ class MotionObserver {
     before_.release();
     here_.clear();
   }
-  [[nodiscard]] const std::vector<MotionVerdict>& verdicts() const { return verdicts_; }
-  void clear() { verdicts_.clear(); }
+  /// `before` with the verdicts since the last call appended.
+  [[nodiscard]] std::vector<MotionVerdict> taken(std::vector<MotionVerdict> before) {
+    before.insert(before.end(), verdicts_.begin(), verdicts_.end());
+    verdicts_.clear();
+    return before;
+  }
 
  private:
   void start() {
@@ -130,6 +135,7 @@ class MotionObserver {
 struct Survey {
   std::vector<FrameFacts> frames;
   std::vector<std::vector<MotionVerdict>> verdicts;  ///< by frame at which they fell
+  cv::Size size;  ///< of a frame; a clip that says it was turned is turned back by OpenCV
   cv::Rect picture;
 };
 
@@ -145,16 +151,19 @@ Survey survey(const fs::path& file, const ProgressSink& progress) {
     const cv::Mat1b grey = grey_of(frame);
     out.frames.push_back(observer.look_at(grey));
     borders.look_at(grey);
-    if (out.frames.back().likeness < 0.6) motion.cut();  // as find_shots; one more is no harm
+    if (out.frames.back().likeness < kSurelyNoCut && !out.verdicts.empty()) {
+      motion.cut();
+      out.verdicts.back() = motion.taken(std::move(out.verdicts.back()));
+    }
     motion.look_at(grey);
-    out.verdicts.push_back(motion.verdicts());
-    motion.clear();
+    out.verdicts.push_back(motion.taken({}));
     if (progress) progress({"clip", 0.8 * std::min(1.0, double(out.frames.size()) / expected), {}});
   }
   if (out.frames.empty()) throw InputError(file, "frames", "expected at least 2, found none that can be decoded");
   motion.cut();
-  out.verdicts.back().insert(out.verdicts.back().end(), motion.verdicts().begin(), motion.verdicts().end());
+  out.verdicts.back() = motion.taken(std::move(out.verdicts.back()));
   out.picture = borders.picture();
+  out.size = borders.size();
   return out;
 }
 
@@ -200,8 +209,9 @@ std::size_t choose_shot(const std::vector<ShotReport>& shots, int wanted, const 
 cv::Mat1b code_table(const VideoOptions& options, const SensorOptions& sensor) {
   const double black = options.video_range == "limited" ? 16 : sensor.black_level;
   const double white = options.video_range == "limited" ? 235 : sensor.white_level > 0 ? sensor.white_level : 255;
-  const Transfer transfer = sensor.transfer == "linear" ? Transfer::kLinear
-                            : sensor.transfer == "gamma22" ? Transfer::kGamma22 : Transfer::kSrgb;
+  const Transfer transfer = sensor.transfer == "linear"    ? Transfer::kLinear
+                            : sensor.transfer == "gamma22" ? Transfer::kGamma22
+                                                           : Transfer::kSrgb;
   cv::Mat1b table(1, 256);
   for (int code = 0; code < 256; ++code) {
     const double value = std::clamp((code - black) / (white - black), 0.0, 1.0);
@@ -235,8 +245,8 @@ PreparedImage describe(const ClipReport& report, const cv::Mat1b& picture, int f
   return image;
 }
 
-void write_frames(const fs::path& file, const fs::path& capture, const VideoOptions& options, const SensorOptions& sensor,
-                  const Survey& clip, ClipImport& out, const ProgressSink& progress) {
+void write_frames(const fs::path& file, const fs::path& capture, const VideoOptions& options,
+                  const SensorOptions& sensor, const Survey& clip, ClipImport& out, const ProgressSink& progress) {
   cv::VideoCapture frames = open_clip(file);
   const cv::Mat1b table = code_table(options, sensor);
   std::size_t next = 0;
@@ -260,7 +270,7 @@ void write_frames(const fs::path& file, const fs::path& capture, const VideoOpti
 }  // namespace
 
 std::string ShotReport::refusal() const {
-  if (judged == 0 && moved < kJudgedMove) return "the camera hardly moves";
+  if (judged == 0) return moved >= 0 ? "the camera hardly moves" : "";  // too bare to tell: COLMAP shall try
   if (parallax < kParallaxShare) {
     return "no parallax: the camera turns or zooms on the spot (or the subject is flat), which tells no depth";
   }
@@ -292,21 +302,22 @@ ClipImport import_clip(const fs::path& file, const fs::path& capture, const Vide
   ClipReport& report = out.report;
   {
     const cv::VideoCapture clip = open_clip(file);
-    report.width = int(clip.get(cv::CAP_PROP_FRAME_WIDTH));
-    report.height = int(clip.get(cv::CAP_PROP_FRAME_HEIGHT));
     report.fps = clip.get(cv::CAP_PROP_FPS);
     const double across = clip.get(cv::CAP_PROP_SAR_NUM), up = clip.get(cv::CAP_PROP_SAR_DEN);
     if (across > 0 && up > 0) report.pixel_aspect = across / up;
   }
   const Survey clip = survey(file, progress);
   report.frames = int(clip.frames.size());
+  report.width = clip.size.width;
+  report.height = clip.size.height;
   report.picture = options.keep_borders ? cv::Rect(0, 0, report.width, report.height) : clip.picture;
   const auto combed = std::ranges::count_if(clip.frames, [](const FrameFacts& f) { return f.comb > kCombed; });
   report.combed = double(combed) / report.frames;
   report.interlaced = report.combed > kInterlacedShare;
   for (const Shot& range : find_shots(clip.frames)) report.shots.push_back(report_of(clip, range));
   if (report.shots.empty()) {
-    throw InputError(file, "frames", fmt::format("expected a shot of at least 5 frames, found {} frames", report.frames));
+    throw InputError(file, "frames",
+                     fmt::format("expected a shot of at least 5 frames, found {} frames", report.frames));
   }
   const std::size_t chosen = choose_shot(report.shots, options.shot, file);
   report.shot = int(chosen) + 1;
@@ -314,9 +325,11 @@ ClipImport import_clip(const fs::path& file, const fs::path& capture, const Vide
   if (const std::string refusal = shot.refusal(); !refusal.empty() && !options.allow_no_parallax) {
     std::string list;
     for (const std::string& line : shot_lines(report)) list += "\n  " + line;
-    throw PosesError(file.string() + ": shot " + std::to_string(report.shot) + ": " + refusal +
-                     ". A camera that travels is needed; --shot takes another shot, --allow-no-parallax goes on all the "
-                     "same." + list);
+    throw PosesError(
+        file.string() + ": shot " + std::to_string(report.shot) + ": " + refusal +
+        ". A camera that travels is needed; --shot takes another shot, --allow-no-parallax goes on all the "
+        "same." +
+        list);
   }
   const double seconds = shot.range.size() / (report.fps > 0 ? report.fps : 24);
   const int count = options.fps > 0 ? std::max(2, int(std::lround(seconds * options.fps))) : options.frames;

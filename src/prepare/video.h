@@ -13,9 +13,9 @@
 namespace cnerf {
 
 struct VideoOptions {
-  int shot = 0;                       ///< 1 is the first; 0 = the longest in which the camera travels
-  int frames = 60;                    ///< to keep
-  double fps = 0;                     ///< frames to keep a second of the clip, instead of `frames`; 0 = by `frames`
+  int shot = 0;     ///< 1 is the first; 0 = the longest in which the camera travels
+  int frames = 60;  ///< to keep
+  double fps = 0;   ///< frames to keep a second of the clip, instead of `frames`; 0 = by `frames`
   std::string video_range = "auto";
   bool keep_borders = false;
   bool allow_no_parallax = false;
@@ -35,9 +35,9 @@ struct VideoOptions {
 /// What a shot is good for.
 struct ShotReport {
   Shot range;
-  int judged = 0;           ///< pairs of frames with enough motion to tell
-  double parallax = 0;      ///< share of them with parallax
-  double moved = 0;         ///< median displacement of their places, share of the diagonal
+  int judged = 0;       ///< pairs of frames with enough motion to tell
+  double parallax = 0;  ///< share of them with parallax
+  double moved = -1;    ///< median displacement of places, share of the diagonal; -1: none could be followed
   int duplicates = 0;
   FilmMarks marks;
 
@@ -48,13 +48,13 @@ struct ShotReport {
 struct ClipReport {
   int width = 0, height = 0, frames = 0;  ///< as stored; frames that could be read
   double fps = 0;
-  double pixel_aspect = 1;                ///< width over height of a pixel
+  double pixel_aspect = 1;  ///< width over height of a pixel
   bool interlaced = false;
-  double combed = 0;                      ///< share of frames woven of two moments
-  cv::Rect picture;                       ///< what is kept of a frame
+  double combed = 0;  ///< share of frames woven of two moments
+  cv::Rect picture;   ///< what is kept of a frame
   std::vector<ShotReport> shots;
-  int shot = 0;                           ///< the one used, counted from 1
-  std::vector<int> kept;                  ///< frame numbers
+  int shot = 0;           ///< the one used, counted from 1
+  std::vector<int> kept;  ///< frame numbers
 };
 
 struct ClipImport {

@@ -51,7 +51,9 @@ Places places(const Camera& a, const Camera& b, double near, double far, double 
   return out;
 }
 
-MotionVerdict judge(const Places& p) { return judge_motion(p.before, p.after, kPicture); }
+MotionVerdict judge(const Places& p) {
+  return judge_motion(p.before, p.after, kPicture);
+}
 
 TEST(CameraMotion, TurningOnTheSpotHasNoParallax) {
   for (const int axis : {0, 1, 2}) {

@@ -32,10 +32,12 @@ std::vector<View> views_of(LensModel model, bool two_cameras) {
   return views;
 }
 
-std::vector<PreparedImage> write_images(const std::filesystem::path& folder, const std::vector<View>& views, bool mask) {
+std::vector<PreparedImage> write_images(const std::filesystem::path& folder, const std::vector<View>& views,
+                                        bool mask) {
   std::vector<PreparedImage> images;
   for (const View& view : views) {
-    write_png(folder / "images" / view.name, cv::Mat1b(view.intrinsics.height, view.intrinsics.width, std::uint8_t(90)));
+    write_png(folder / "images" / view.name,
+              cv::Mat1b(view.intrinsics.height, view.intrinsics.width, std::uint8_t(90)));
     PreparedImage image;
     image.name = view.name;
     image.exposure = 1 + 0.25 * double(images.size());

@@ -39,7 +39,8 @@ Problem make_problem(int views, int places, double noise, double wrong) {
 double worst(const Problem& problem) {
   const std::vector<double> found = solve_exposures(int(problem.exposures.size()), problem.sightings);
   double out = 0;
-  for (std::size_t v = 0; v < found.size(); ++v) out = std::max(out, std::abs(std::log(found[v] / problem.exposures[v])));
+  for (std::size_t v = 0; v < found.size(); ++v)
+    out = std::max(out, std::abs(std::log(found[v] / problem.exposures[v])));
   return out;
 }
 
@@ -48,7 +49,9 @@ TEST(Exposures, AreFoundFromSharedPlaces) {
   EXPECT_LT(worst(make_problem(21, 3000, 0.05, 0)), 0.02);
 }
 
-TEST(Exposures, WrongSightingsDoNotPull) { EXPECT_LT(worst(make_problem(21, 3000, 0.03, 0.15)), 0.05); }
+TEST(Exposures, WrongSightingsDoNotPull) {
+  EXPECT_LT(worst(make_problem(21, 3000, 0.03, 0.15)), 0.05);
+}
 
 TEST(Exposures, ScalingAViewScalesItsExposureAlone) {
   Problem problem = make_problem(11, 2000, 0.02, 0);

@@ -21,7 +21,8 @@ cv::Mat1b picture(int seed, double x = 0, double y = 0, cv::Size size = {320, 24
     const cv::Point2d at(rng.uniform() * 1.4 * size.width + x - 0.2 * size.width, rng.uniform() * size.height + y);
     const int radius = 4 + int(rng.below(18));
     const float code = 40 + 170 * rng.uniform();
-    cv::circle(out, cv::Point(int(at.x * 16), int(at.y * 16)), radius * 16, cv::Scalar(code), cv::FILLED, cv::LINE_AA, 4);
+    cv::circle(out, cv::Point(int(at.x * 16), int(at.y * 16)), radius * 16, cv::Scalar(code), cv::FILLED, cv::LINE_AA,
+               4);
   }
   cv::GaussianBlur(out, out, {0, 0}, 0.8);
   cv::Mat1b codes;
@@ -41,7 +42,9 @@ std::vector<FrameFacts> facts_of(const std::vector<cv::Mat1b>& frames) {
   return facts;
 }
 
-Shot whole(const std::vector<FrameFacts>& facts) { return {0, int(facts.size())}; }
+Shot whole(const std::vector<FrameFacts>& facts) {
+  return {0, int(facts.size())};
+}
 
 TEST(Shots, ACutSplitsAndAPanDoesNot) {
   std::vector<cv::Mat1b> frames;

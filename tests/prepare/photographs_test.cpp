@@ -35,12 +35,12 @@ std::string exif_block(int orientation, int focal_mm, int focal_35mm) {
   std::string tiff("MM\0*\0\0\0\x08", 8);
   const auto u16 = [&](int v) { tiff += {char(v >> 8), char(v)}; };
   const auto u32 = [&](int v) { tiff += {char(v >> 24), char(v >> 16), char(v >> 8), char(v)}; };
-  u16(2);                                              // entries of the first directory, at 8
+  u16(2);  // entries of the first directory, at 8
   u16(0x0112), u16(3), u32(1), u16(orientation), u16(0);
-  u16(0x8769), u16(4), u32(1), u32(38);                // the EXIF directory follows
+  u16(0x8769), u16(4), u32(1), u32(38);  // the EXIF directory follows
   u32(0);
-  u16(2);                                              // at 38
-  u16(0x920A), u16(5), u32(1), u32(68);                // focal length, a rational at 68
+  u16(2);                                // at 38
+  u16(0x920A), u16(5), u32(1), u32(68);  // focal length, a rational at 68
   u16(0xA405), u16(3), u32(1), u16(focal_35mm), u16(0);
   u32(0);
   u32(focal_mm), u32(1);
@@ -65,7 +65,9 @@ PhotographSet import_all(const fs::path& folder, const fs::path& capture, const 
   return import_photographs(list_photographs(folder), capture, masks, sensor, {});
 }
 
-cv::Mat stored(const fs::path& file) { return cv::imread(file.string(), cv::IMREAD_UNCHANGED); }
+cv::Mat stored(const fs::path& file) {
+  return cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+}
 
 TEST(Photographs, GreyEightBitKeepsItsCodes) {
   const test::TempDir folder;

@@ -73,7 +73,8 @@ TEST(Spikes, AStreamBecomesPictures) {
   EXPECT_LT(std::sqrt(squared), 0.02);  // 64 ticks
   options.spike_flip = true;
   const PhotographSet flipped = import_spikes(folder / "s.dat", folder / "flipped", options, 4, {});
-  const cv::Mat1w other = cv::imread((folder / "flipped" / "images" / flipped.images[0].name).string(), cv::IMREAD_UNCHANGED);
+  const cv::Mat1w other =
+      cv::imread((folder / "flipped" / "images" / flipped.images[0].name).string(), cv::IMREAD_UNCHANGED);
   EXPECT_EQ(other(7, 3), first(0, 3));
 }
 

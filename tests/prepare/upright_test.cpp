@@ -127,7 +127,8 @@ TEST(ChooseFrame, SetsAnyTurnedSceneUpright) {
     double distance = 0;
     for (const View& view : views) {
       distance += length(choice.capture_from_poses.point(view.world_from_camera.translation) -
-                         choice.capture_from_poses.point(moved.point({0, 0, 0}))) / double(views.size());
+                         choice.capture_from_poses.point(moved.point({0, 0, 0}))) /
+                  double(views.size());
     }
     EXPECT_NEAR(distance, 1, 0.02) << "cameras stand one unit from what they look at";
   }
@@ -244,7 +245,8 @@ TEST(FindSubject, ForwardFacingViewsGetADepthRange) {
     views.push_back(view_of(level_camera({0.1 * i, 0, 0}, {0.1 * i, 5, 0}, {0, 0, 1}), std::to_string(i)));
   }
   std::vector<Vec3d> points;
-  for (int i = 0; i < 500; ++i) points.push_back({rng.uniform() * 2.0 - 0.5, 4 + 4.0 * rng.uniform(), rng.uniform() - 0.5});
+  for (int i = 0; i < 500; ++i)
+    points.push_back({rng.uniform() * 2.0 - 0.5, 4 + 4.0 * rng.uniform(), rng.uniform() - 0.5});
   const auto subject = find_subject(views, points);
   ASSERT_TRUE(subject);
   EXPECT_TRUE(subject->forward_facing);

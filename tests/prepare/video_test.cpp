@@ -31,7 +31,8 @@ cv::Mat1b view_of_discs(double x, double pan, int seed = 1) {
   std::vector<Disc> discs;
   for (int i = 0; i < 160; ++i) {
     const double depth = 3 + 6.0 * rng.uniform();
-    discs.push_back({{(rng.uniform() - 0.5) * 16, (rng.uniform() - 0.5) * depth * 0.6, depth}, 0.06 + 0.14 * rng.uniform(),
+    discs.push_back({{(rng.uniform() - 0.5) * 16, (rng.uniform() - 0.5) * depth * 0.6, depth},
+                     0.06 + 0.14 * rng.uniform(),
                      20 + int(rng.below(220))});
   }
   std::ranges::sort(discs, [](const Disc& a, const Disc& b) { return a.at.z > b.at.z; });
@@ -70,7 +71,9 @@ std::vector<cv::Mat1b> panning(int frames, int seed = 1) {
   return out;
 }
 
-void append(std::vector<cv::Mat1b>& to, const std::vector<cv::Mat1b>& from) { to.insert(to.end(), from.begin(), from.end()); }
+void append(std::vector<cv::Mat1b>& to, const std::vector<cv::Mat1b>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
 
 class Clip : public testing::Test {
  protected:
@@ -89,10 +92,12 @@ TEST_F(Clip, ATravellingShotIsKept) {
   ASSERT_EQ(clip.report.shots.size(), 1u);
   EXPECT_GT(clip.report.shots[0].parallax, 0.5);
   ASSERT_EQ(clip.set.images.size(), 10u);
-  const cv::Mat first = cv::imread((folder_ / "out" / "images" / clip.set.images[0].name).string(), cv::IMREAD_UNCHANGED);
+  const cv::Mat first =
+      cv::imread((folder_ / "out" / "images" / clip.set.images[0].name).string(), cv::IMREAD_UNCHANGED);
   EXPECT_EQ(first.type(), CV_8UC1);
   EXPECT_EQ(first.size(), kSize);
-  EXPECT_LT(cv::norm(first, travelling(40)[std::size_t(clip.set.images[0].frame)], cv::NORM_L1) / double(first.total()), 6);
+  EXPECT_LT(cv::norm(first, travelling(40)[std::size_t(clip.set.images[0].frame)], cv::NORM_L1) / double(first.total()),
+            6);
 }
 
 TEST_F(Clip, APanIsRefusedWithTheReason) {
@@ -145,7 +150,8 @@ TEST_F(Clip, LetterboxIsCroppedAndTheOpticalAxisStays) {
   const PreparedImage& image = clip.set.images.front();
   EXPECT_NEAR(image.height, 176, 2);
   EXPECT_EQ(image.width, 320);
-  EXPECT_NEAR(image.centre_y, 120 - clip.report.picture.y, 1e-9) << "the axis goes through the middle of the stored frame";
+  EXPECT_NEAR(image.centre_y, 120 - clip.report.picture.y, 1e-9)
+      << "the axis goes through the middle of the stored frame";
 }
 
 TEST_F(Clip, RepeatedFramesAreNotKept) {
