@@ -67,18 +67,28 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The focal lengths and rotation of the least mean error, by a grid that is refined.
-Turn best_turn(const std::vector<cv::Point2f>& before, const std::vector<cv::Point2f>& after, cv::Size picture,
+/// At most `count` of them, evenly picked.
+std::vector<cv::Point2f> some_of(const std::vector<cv::Point2f>& points, std::size_t count) {
+  std::vector<cv::Point2f> out;
+  const std::size_t step = (points.size() + count - 1) / count;
+  for (std::size_t i = 0; i < points.size(); i += step) out.push_back(points[i]);
+  return out;
+}
+
+/// The focal lengths and rotation of the least mean error, by a grid that shrinks around the best.
+Turn best_turn(const std::vector<cv::Point2f>& all_before, const std::vector<cv::Point2f>& all_after, cv::Size picture,
                double diagonal) {
+  const auto before = some_of(all_before, 100), after = some_of(all_after, 100);
   Turn best;
   double least = 1e30;
   double log_focal = 0.5 * std::log(kShortest * kLongest), log_zoom = 0;
-  double focal_reach = 0.5 * std::log(kLongest / kShortest), zoom_reach = std::log(1.6);
-  for (int round = 0; round < 4; ++round) {
+  int reach = 8;
+  double focal_step = 0.5 * std::log(kLongest / kShortest) / reach, zoom_step = std::log(1.6) / reach;
+  for (int round = 0; round < 10; ++round, reach = 3, focal_step /= 1.7, zoom_step /= 1.7) {
     const double focal_middle = log_focal, zoom_middle = log_zoom;
-    for (int i = -6; i <= 6; ++i) {
-      for (int j = -6; j <= 6; ++j) {
-        const double focal = focal_middle + focal_reach * i / 6, zoom = zoom_middle + zoom_reach * j / 6;
+    for (int i = -reach; i <= reach; ++i) {
+      for (int j = -reach; j <= reach; ++j) {
+        const double focal = focal_middle + focal_step * i, zoom = zoom_middle + zoom_step * j;
         const Turn turn =
             fit_rotation(before, after, picture, diagonal * std::exp(focal), diagonal * std::exp(focal + zoom));
         double sum = 0;
@@ -91,8 +101,6 @@ Turn best_turn(const std::vector<cv::Point2f>& before, const std::vector<cv::Poi
         }
       }
     }
-    focal_reach /= 4;
-    zoom_reach /= 4;
   }
   return best;
 }

@@ -142,9 +142,7 @@ class Steps {
     }
     done_.clear();
     key_ = key;
-    for (const char* derived : {"database.db", "database.db-shm", "database.db-wal", "sparse", "pictures", "masks"}) {
-      fs::remove_all(work_ / derived);
-    }
+    for (const char* derived : {"sparse", "pictures", "masks"}) fs::remove_all(work_ / derived);
     save();
   }
   [[nodiscard]] bool has(const std::string& step) const { return done_.contains(step); }
@@ -365,7 +363,8 @@ PoseRecovery recover_poses(const std::vector<PreparedImage>& images, const fs::p
   const auto pairs = pairs_to_match(out.matching, looks, options);
   out.pairs = pairs.size();
   if (!steps.has("features")) {
-    fs::remove(work / "database.db");  // going on in the middle of a camera's images would give it a second lens
+    // Going on in the middle of a camera's images would give it a second lens.
+    for (const char* file : {"database.db", "database.db-shm", "database.db-wal"}) fs::remove(work / file);
     extract_features(colmap, images, work, options, progress);
     steps.finish("features");
   }

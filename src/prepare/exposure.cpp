@@ -14,7 +14,9 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kRounds = 30;
-constexpr double kSettled = 1e-6;                     ///< largest change of a logarithm in a round
+constexpr double kHeld = 1e-9;     ///< of a view's weight, pulling its logarithm to 0
+constexpr double kExact = 0.01;    ///< difference of logarithms below which all sightings count fully
+constexpr double kSettled = 1e-6;  ///< largest change of a logarithm in a round
 constexpr float kDarkest = 0.004f, kLightest = 0.9f;  ///< luminance between noise and clipping
 
 double median(std::vector<double>& values) {
@@ -36,42 +38,52 @@ cv::Mat1f smoothed(const fs::path& file) {
 }  // namespace
 
 std::vector<double> solve_exposures(int views, const std::vector<Sighting>& sightings) {
-  int places = 0;
-  for (const Sighting& seen : sightings) places = std::max(places, seen.place + 1);
-  std::vector<std::vector<std::size_t>> of_view(static_cast<std::size_t>(views)),
-      of_place(static_cast<std::size_t>(places));
-  std::vector<double> logs;
+  std::map<int, std::vector<std::size_t>> places;
+  std::vector<double> logs, weights(sightings.size(), 1.0);
   for (std::size_t i = 0; i < sightings.size(); ++i) {
-    of_view[std::size_t(sightings[i].view)].push_back(i);
-    of_place[std::size_t(sightings[i].place)].push_back(i);
+    places[sightings[i].place].push_back(i);
     logs.push_back(std::log(sightings[i].light));
   }
-  std::vector<double> exposure(static_cast<std::size_t>(views)), light(static_cast<std::size_t>(places)), differences;
+  cv::Mat1d exposure = cv::Mat1d::zeros(views, 1);
   for (int round = 0; round < kRounds; ++round) {
-    for (std::size_t p = 0; p < of_place.size(); ++p) {
-      differences.clear();
-      for (const std::size_t i : of_place[p]) differences.push_back(logs[i] - exposure[std::size_t(sightings[i].view)]);
-      if (!differences.empty()) light[p] = median(differences);
+    // Of each place the weighted mean of its sightings is the best light, which leaves equations between views only.
+    cv::Mat1d normal = cv::Mat1d::zeros(views, views), right = cv::Mat1d::zeros(views, 1);
+    for (const auto& [place, seen] : places) {
+      double weight = 0, sum = 0;
+      for (const std::size_t i : seen) weight += weights[i], sum += weights[i] * logs[i];
+      for (const std::size_t i : seen) {
+        const int view = sightings[i].view;
+        normal(view, view) += weights[i];
+        right(view) += weights[i] * (logs[i] - sum / weight);
+        for (const std::size_t j : seen) normal(view, sightings[j].view) -= weights[i] * weights[j] / weight;
+      }
     }
-    double change = 0;
-    for (std::size_t v = 0; v < of_view.size(); ++v) {
-      differences.clear();
-      for (const std::size_t i : of_view[v]) differences.push_back(logs[i] - light[std::size_t(sightings[i].place)]);
-      if (differences.empty()) continue;
-      const double now = median(differences);
-      change = std::max(change, std::abs(now - exposure[v]));
-      exposure[v] = now;
+    for (int v = 0; v < views; ++v) normal(v, v) += kHeld * (1 + normal(v, v));  // the common factor is free
+    const cv::Mat1d before = exposure.clone();
+    cv::solve(normal, right, exposure, cv::DECOMP_CHOLESKY);
+    for (const auto& [place, seen] : places) {
+      double weight = 0, sum = 0;
+      for (const std::size_t i : seen) {
+        weight += weights[i];
+        sum += weights[i] * (logs[i] - exposure(sightings[i].view));
+      }
+      for (const std::size_t i : seen) {
+        const double off = logs[i] - exposure(sightings[i].view) - sum / weight;
+        weights[i] = kExact / std::max(kExact, std::abs(off));
+      }
     }
-    if (change < kSettled) break;
+    if (cv::norm(exposure, before, cv::NORM_INF) < kSettled) break;
   }
-  differences.clear();
-  for (std::size_t v = 0; v < of_view.size(); ++v) {
-    if (!of_view[v].empty()) differences.push_back(exposure[v]);
+  std::vector<bool> is_seen(std::size_t(views), false);
+  for (const Sighting& seen : sightings) is_seen[std::size_t(seen.view)] = true;
+  std::vector<double> known;
+  for (int v = 0; v < views; ++v) {
+    if (is_seen[std::size_t(v)]) known.push_back(exposure(v));
   }
-  const double middle = differences.empty() ? 0 : median(differences);
-  for (std::size_t v = 0; v < of_view.size(); ++v)
-    exposure[v] = of_view[v].empty() ? 1 : std::exp(exposure[v] - middle);
-  return exposure;
+  const double middle = known.empty() ? 0 : median(known);
+  std::vector<double> out;
+  for (int v = 0; v < views; ++v) out.push_back(is_seen[std::size_t(v)] ? std::exp(exposure(v) - middle) : 1);
+  return out;
 }
 
 std::vector<Observation> read_observations(const fs::path& model) {

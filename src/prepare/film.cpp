@@ -38,9 +38,10 @@ double mean_linear(const cv::Mat1b& picture) {
 
 /// Mean 0, length 1: brightness and contrast do not count.
 cv::Mat1f normalised(const cv::Mat1b& picture, cv::Size size) {
+  cv::Mat1b small;
   cv::Mat1f out;
-  cv::resize(picture, out, size, 0, 0, cv::INTER_AREA);
-  out.convertTo(out, CV_32F);
+  cv::resize(picture, small, size, 0, 0, cv::INTER_AREA);
+  small.convertTo(out, CV_32F);
   cv::GaussianBlur(out, out, {0, 0}, 1.5);
   out -= cv::mean(out)[0];
   const double norm = cv::norm(out);

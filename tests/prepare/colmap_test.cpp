@@ -21,13 +21,17 @@ namespace fs = std::filesystem;
 #define CNERF_REQUIRE_COLMAP() \
   if (!find_program("colmap")) GTEST_SKIP() << "needs colmap on $PATH"
 
-/// The images of a capture in grey, without their poses.
-void write_grey_copies(const fs::path& from, const fs::path& to, double scale) {
+/// The first `most` images of a capture in grey, without their poses.
+void write_grey_copies(const fs::path& from, const fs::path& to, double scale, std::size_t most = 1000) {
   fs::create_directories(to);
-  for (const auto& entry : fs::directory_iterator(from)) {
-    cv::Mat image = cv::imread(entry.path().string(), cv::IMREAD_GRAYSCALE);
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(from)) files.push_back(entry.path());
+  std::ranges::sort(files);
+  files.resize(std::min(files.size(), most));
+  for (const fs::path& file : files) {
+    cv::Mat image = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
     if (scale != 1) cv::resize(image, image, {}, scale, scale, cv::INTER_AREA);
-    cv::imwrite((to / entry.path().stem()).string() + ".png", image);
+    cv::imwrite((to / file.stem()).string() + ".png", image);
   }
 }
 
@@ -49,6 +53,17 @@ PoseComparison compare_with(const fs::path& truth_folder, const fs::path& prepar
   std::printf("%zu views; largest differences: %.3f degrees, %.3f %% of the capture's size\n", found.size(),
               *std::ranges::max_element(out.rotation_degrees), 100 * *std::ranges::max_element(out.centre_errors));
   return out;
+}
+
+TEST(Colmap, FindsThePosesOfAFewSmallViews) {
+  CNERF_REQUIRE_COLMAP();
+  CNERF_REQUIRE_DATA(fox, "scenes/fox");
+  const test::TempDir folder;
+  write_grey_copies(fox / "images", folder / "photos", 0.25, 12);
+  EXPECT_EQ(prepare(folder / "photos", folder / "capture").registered, 12u);
+  const PoseComparison poses = compare_with(fox, folder / "capture");
+  for (const double degrees : poses.rotation_degrees) EXPECT_LT(degrees, 2);
+  for (const double error : poses.centre_errors) EXPECT_LT(error, 0.05);
 }
 
 TEST(Colmap, FindsThePosesOfFox) {

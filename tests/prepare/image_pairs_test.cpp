@@ -27,7 +27,7 @@ bool has(const std::vector<std::pair<int, int>>& pairs, int i, int j) {
 
 std::vector<LookVector> looks_of(int count) {
   std::vector<LookVector> looks;
-  for (int i = 0; i < count; ++i) looks.push_back(look_of(lines_at(2 * CV_PI * i / count)));
+  for (int i = 0; i < count; ++i) looks.push_back(look_of(lines_at(CV_PI * i / count)));
   return looks;
 }
 
@@ -41,7 +41,7 @@ TEST(ImagePairs, LookDoesNotChangeWithExposure) {
 }
 
 TEST(ImagePairs, NeighboursAndThoseAlikeAreMatchedOnce) {
-  const std::vector<LookVector> looks = looks_of(40);  // a full turn: image 39 resembles image 0 again
+  const std::vector<LookVector> looks = looks_of(40);  // half a turn of lines: image 39 resembles image 0 again
   const auto pairs = choose_pairs(looks, {2, 4});
   for (int i = 0; i + 2 < 40; ++i) EXPECT_TRUE(has(pairs, i, i + 1) && has(pairs, i, i + 2));
   EXPECT_TRUE(has(pairs, 0, 39)) << "the loop is closed by look";

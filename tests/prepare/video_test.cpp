@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -11,6 +12,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/rng.h"
+#include "src/base/vec3.h"
 #include "tests/support/data.h"
 
 namespace cnerf {
