@@ -10,6 +10,7 @@ packages=(
   libopenblas0-pthread  # without it LibTorch falls back to the reference BLAS, which is many times slower
   libopenvdb-dev libboost-iostreams-dev libopenvdb-tools
   libopencv-dev libopenexr-dev libtinygltf-dev libmeshoptimizer-dev
+  libexif-dev colmap
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libfmt-dev libspdlog-dev
   libtbb-dev libssl-dev zlib1g-dev libcpp-httplib-dev
   libgtest-dev libgmock-dev libbenchmark-dev

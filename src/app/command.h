@@ -22,6 +22,7 @@ struct Command {
 };
 
 Work declare_run(CLI::App& app);
+Work declare_prepare(CLI::App& app);
 Work declare_sample(CLI::App& app);
 Work declare_train(CLI::App& app);
 Work declare_colorize(CLI::App& app);

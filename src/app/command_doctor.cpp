@@ -5,17 +5,15 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <fstream>
 #include <opencv2/core/version.hpp>
-#include <optional>
 #include <set>
-#include <sstream>
 
 #include "src/app/command.h"
 #include "src/app/version.h"
 #include "src/base/cpu_features.h"
 #include "src/base/parallel.h"
+#include "src/base/program.h"
 #include "src/config/config.h"
 #include "src/engine/select_engine.h"
 #include "viewer/server/page_folder.h"
@@ -53,18 +51,8 @@ std::string blas_text() {
   return "none found";
 }
 
-std::optional<fs::path> program(const std::string& name) {
-  const char* path = std::getenv("PATH");
-  std::istringstream folders(path == nullptr ? "" : path);
-  for (std::string folder; std::getline(folders, folder, ':');) {
-    const fs::path file = fs::path(folder) / name;
-    if (::access(file.c_str(), X_OK) == 0) return file;
-  }
-  return std::nullopt;
-}
-
 void print_program(const std::string& name, const std::string& use) {
-  const auto found = program(name);
+  const auto found = find_program(name);
   line(name, found ? found->string() : "not found (" + use + ")");
 }
 

@@ -5,6 +5,7 @@
 #include "src/app/default_colorizer.h"
 #include "src/app/known_color_files.h"
 #include "src/app/pipeline.h"
+#include "src/app/prepare_step.h"
 #include "src/base/error.h"
 
 namespace cnerf {
@@ -45,15 +46,16 @@ void turntable(const RunArguments& arguments, const RunContext& context, const s
   render_step(context, take, turntable_path(context.capture, context.config.render), output);
 }
 
-void run(const RunArguments& arguments) {
+void run(RunArguments arguments) {
   (void)parse_bake_formats(arguments.format);  // a wrong one should not cost an hour
   Reporter reporter = make_reporter(arguments.config);
   Config config = config_of(arguments);
+  check_run_folder(RunDirectory(arguments.out), arguments.existing);
   if (!arguments.grey) choose_colorizer(arguments.capture, config, reporter);
+  arguments.capture = capture_of(arguments.capture, arguments.out, reporter).string();
 
   Capture capture = read_capture(arguments.capture, config, reporter);
   RunContext context{RunDirectory(arguments.out), config, std::move(capture), arguments.command_line, reporter};
-  check_run_folder(context, arguments.existing);
   // Made before the training: what cannot be made or read should not cost an hour.
   if (!arguments.grey) (void)load_known_colors(context.capture, context.config.colorizer);
   auto colorizer = needs_colorizer(arguments, context.directory) ? colorizer_of(context) : nullptr;
@@ -78,7 +80,9 @@ void run(const RunArguments& arguments) {
 
 Work declare_run(CLI::App& app) {
   auto arguments = std::make_shared<RunArguments>();
-  app.add_option("CAPTURE", arguments->capture, "Folder of photographs and camera poses")->required();
+  app.add_option("CAPTURE", arguments->capture,
+                 "Folder of photographs and camera poses; without poses, or a film clip, it is prepared first")
+      ->required();
   app.add_option("-o,--out", arguments->out, "Folder of the run, made if needed")->required();
   add_colorizer_options(app, arguments->config);
   app.add_flag("--grey", arguments->grey, "Stay grey: no colorizer");

@@ -22,7 +22,7 @@ void train(const TrainArguments& arguments, const std::vector<std::string>& comm
   const bool goes_on = arguments.existing.resume && directory.exists();
   const Config config = resolve_config(arguments.config, goes_on ? directory.config() : Config{});
   RunContext context{directory, config, read_capture(arguments.capture, config, reporter), command_line, reporter};
-  check_run_folder(context, arguments.existing);
+  check_run_folder(directory, arguments.existing);
   std::optional<LiveSession> live;
   if (arguments.view) {
     live.emplace("Training " + context.capture.root.filename().string(), arguments.browser, reporter);

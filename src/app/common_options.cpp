@@ -71,6 +71,11 @@ void add_field_options(CLI::App& app, const std::vector<Field>& fields) {
   for (const Field& field : fields) {
     std::string name = "--" + field.key;
     std::ranges::replace(name, '_', '-');
+    if (std::holds_alternative<bool*>(field.value)) {
+      app.add_flag_function(
+          name, [field](std::int64_t) { apply_setting(field.key + "=true", {field}); }, field.help);
+      continue;
+    }
     app.add_option_function<std::string>(
         name, [field](const std::string& value) { apply_setting(field.key + "=" + value, {field}); },
         field.help + " [" + default_text(field) + "]");

@@ -31,7 +31,8 @@ void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string&
                    const std::string& help);
 /// Declares --colorizer, --prompt, --keyframe, --hint and --hint-image.
 void add_colorizer_options(CLI::App& app, ConfigArguments& arguments);
-/// Declares one option a field, named like the field with `-` for `_`; legal values and defaults go to the help.
+/// Declares one option a field, named like the field with `-` for `_`; legal values and defaults go to the help. A bool
+/// becomes a flag that sets it.
 /// @param fields  must outlive the parsing.
 void add_field_options(CLI::App& app, const std::vector<Field>& fields);
 

@@ -17,6 +17,7 @@ namespace {
 constexpr Command kCommands[] = {
     {"run", "All of the below: train, colorize, evaluate, bake, render", declare_run, true},
     {"sample", "Write the embedded sample capture, with colour ground truth", declare_sample, false},
+    {"prepare", "Photographs or a film clip to a capture: camera poses by COLMAP", declare_prepare, true},
     {"train", "Stage 1: luminance and density from a capture", declare_train, true},
     {"colorize", "Stage 2: colours for a trained run; takes stand side by side", declare_colorize, true},
     {"colorize-image", "One picture, to judge a colorizer", declare_colorize_image, false},

@@ -54,9 +54,9 @@ Capture read_capture(const fs::path& path, const Config& config, Reporter& repor
   return capture;
 }
 
-void check_run_folder(const RunContext& context, const ExistingOutput& existing) {
-  const fs::path& root = context.directory.root();
-  if (context.directory.exists()) {
+void check_run_folder(const RunDirectory& directory, const ExistingOutput& existing) {
+  const fs::path& root = directory.root();
+  if (directory.exists()) {
     if (existing.resume || existing.overwrite) return;
     throw UsageError(root.string() +
                      ": holds a run already; pass --resume to go on with it or --overwrite to start again");

@@ -42,9 +42,9 @@ struct ExistingOutput {
 /// Reads a capture and says what was found, with the reader's notes.
 [[nodiscard]] Capture read_capture(const std::filesystem::path& path, const Config& config, Reporter& reporter);
 
-/// Whether a run may go to the context's folder; nothing is changed yet.
+/// Whether a run may go to the folder; nothing is changed yet.
 /// @throws UsageError  when there is a run and neither is set, or the folder holds something else.
-void check_run_folder(const RunContext& context, const ExistingOutput& existing);
+void check_run_folder(const RunDirectory& directory, const ExistingOutput& existing);
 /// Makes the folder of a run ready: clears it to overwrite, writes config.toml and run.json.
 void begin_run(const RunContext& context, const std::filesystem::path& capture_path, const ExistingOutput& existing);
 

@@ -18,6 +18,7 @@ enum class ExitCode : int {
   kInternal = 70,      ///< our own contract was broken: a bug
   kOutput = 73,        ///< the output cannot be written: permissions, full disk
   kColorizer = 76,     ///< a colorizer failed, timed out or answered nonsense
+  kPoses = 77,         ///< no camera poses can be found: no overlap, no parallax, too few views placed
   kSnapshot = 78,      ///< a snapshot of another version, or cut short
   kInterrupted = 130,  ///< Ctrl-C; progress was saved
 };
@@ -61,6 +62,11 @@ struct OutputError : Error {
 /// A colorizer that failed, hung or answered with wrong shapes or values.
 struct ColorizerError : Error {
   explicit ColorizerError(const std::string& message) : Error(ExitCode::kColorizer, message) {}
+};
+
+/// Photographs or a clip whose camera poses cannot be found. The message says why and what may help.
+struct PosesError : Error {
+  explicit PosesError(const std::string& message) : Error(ExitCode::kPoses, message) {}
 };
 
 /// A snapshot this program cannot continue from.

@@ -57,7 +57,8 @@ Source find_in_folder(const fs::path& root) {
   throw MissingInputError(
       root.string() + state +
       "looked for transforms.json, transforms_train.json, a COLMAP model (cameras.bin or cameras.txt "
-      "here, in sparse/, sparse/*/ or colmap/sparse/*/) and poses_bounds.npy");
+      "here, in sparse/, sparse/*/ or colmap/sparse/*/) and poses_bounds.npy; cnerf prepare makes a capture of "
+      "photographs or a film clip");
 }
 
 Source recognise(const fs::path& path) {
@@ -191,6 +192,7 @@ LoadedView load_view(const ListedView& listed, Transfer transfer) {
     out.view.intrinsics = resized(out.view.intrinsics, image.width, image.height);
   }
   out.view.image = encode_mono(image, transfer);
+  out.view.image.exposure = float(listed.exposure);
   if (!listed.mask_file.empty()) out.view.image.mask = read_mask(listed.mask_file, image.width, image.height);
   return out;
 }

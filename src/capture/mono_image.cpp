@@ -59,13 +59,13 @@ float encode_transfer(Transfer transfer, float luminance) {
 float MonoImage::luminance(std::size_t index) const {
   switch (depth) {
     case PixelDepth::kU8:
-      return decode_table(transfer)[u8[index]];
+      return decode_table(transfer)[u8[index]] / exposure;
     case PixelDepth::kU16:
-      return decode_transfer(transfer, float(u16[index]) / 65535.0f);
+      return decode_transfer(transfer, float(u16[index]) / 65535.0f) / exposure;
     case PixelDepth::kF32:
       break;
   }
-  return f32[index];
+  return f32[index] / exposure;
 }
 
 }  // namespace cnerf

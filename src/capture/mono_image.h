@@ -21,6 +21,7 @@ struct MonoImage {
   int width = 0, height = 0;
   PixelDepth depth = PixelDepth::kU8;
   Transfer transfer = Transfer::kSrgb;
+  float exposure = 1;               ///< light of this picture over that of the others; `luminance` divides by it
   std::vector<std::uint8_t> u8;     ///< [H, W] when depth is kU8, else empty
   std::vector<std::uint16_t> u16;   ///< [H, W] when depth is kU16, else empty
   std::vector<float> f32;           ///< [H, W] when depth is kF32, else empty; always linear
@@ -28,7 +29,7 @@ struct MonoImage {
   std::vector<std::uint8_t> mask;   ///< [H, W] 0 = ignore this pixel; empty = every pixel counts
 
   [[nodiscard]] std::size_t pixel_count() const { return std::size_t(width) * std::size_t(height); }
-  /// Linear luminance Y, 1 = white, composited over black, of pixel `index = y * width + x`.
+  /// Linear luminance Y at the exposure of the whole capture, 1 = white, composited over black, of pixel `index = y * width + x`.
   [[nodiscard]] float luminance(std::size_t index) const;
   [[nodiscard]] float coverage(std::size_t index) const { return alpha.empty() ? 1.0f : float(alpha[index]) / 255.0f; }
   [[nodiscard]] bool valid(std::size_t index) const { return mask.empty() || mask[index] != 0; }

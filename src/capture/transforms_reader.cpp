@@ -184,6 +184,10 @@ ListedView read_frame(const fs::path& file, const Json& top, const Json& frame, 
   }
   view.world_from_camera = opencv_from_opengl_camera(read_matrix(frame, file, view.field));
   read_intrinsics(fields, view);
+  view.exposure = fields.number("exposure", 1);
+  if (!(view.exposure > 0)) {
+    throw fields.error("exposure", "expected a number above 0, found " + fields.find("exposure")->dump());
+  }
   return view;
 }
 
@@ -251,11 +255,26 @@ std::optional<Aabbd> read_bounds(const fs::path& file, const Json& top) {
   return bounds;
 }
 
+/// Our own key, written for captures whose cameras all look one way.
+std::optional<DepthRange> read_depth_range(const fs::path& file, const Json& top) {
+  const auto range = top.find("depth_range");
+  if (range == top.end() || range->is_null()) return std::nullopt;
+  if (!range->is_array() || range->size() != 2) {
+    throw InputError(file, "depth_range", "expected [near, far], found " + range->dump());
+  }
+  const DepthRange out = {entry((*range)[0], file, "depth_range"), entry((*range)[1], file, "depth_range")};
+  if (!(out.near > 0 && out.near < out.far)) {
+    throw InputError(file, "depth_range", "expected 0 < near < far, found " + range->dump());
+  }
+  return out;
+}
+
 void read_hints(const fs::path& file, const Json& top, CaptureListing& listing) {
   const Json no_frame = Json::object();
   const Fields fields(file, top, no_frame, "");
   if (fields.find("aabb_scale") != nullptr) listing.aabb_scale = fields.number("aabb_scale", 1);
   listing.bounds = read_bounds(file, top);
+  listing.depth_range = read_depth_range(file, top);
   if (fields.find("applied_transform") != nullptr) {
     listing.notes.emplace_back("the poses carry an applied_transform; results are in the frame of the file, after it");
   }

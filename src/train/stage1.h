@@ -10,6 +10,7 @@
 #include "src/base/preview.h"
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
+#include "src/capture/focus.h"
 #include "src/field/scene_frame.h"
 #include "src/render/occupancy_grid.h"
 
@@ -69,9 +70,6 @@ struct Stage1Options {
   }
 };
 
-/// The point nearest to all optical axes in the least-squares sense; the cameras' mean plus a step forward where the
-/// axes are parallel and no such point is well defined. World space.
-[[nodiscard]] Vec3d focus_point(const std::vector<View>& views);
 /// Chooses the field's box for a capture. Deterministic.
 [[nodiscard]] SceneFrame place_scene(const Capture& capture, const PlacementOptions& options);
 

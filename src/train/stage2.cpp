@@ -115,6 +115,7 @@ class Colorization {
     for (std::size_t v = 0; v < views.size(); ++v) {
       views_.push_back(
           cache_view(*luminance.engine, march, views[v].camera, options_.working_resolution, options_.cached_weight));
+      ignore_masked(views_.back(), *views[v].image);
       tell("stage 2: caching views", double(v + 1) / double(views.size()), {});
       stop_if_asked();
     }

@@ -50,6 +50,16 @@ CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
   return view;
 }
 
+void ignore_masked(CachedView& view, const MonoImage& image) {
+  if (image.mask.empty()) return;
+  for (std::size_t i = 0; i < image.pixel_count(); ++i) {
+    if (image.valid(i)) continue;
+    const auto x = std::int64_t(i) % image.width, y = std::int64_t(i) / image.width;
+    const auto column = std::size_t(x * view.width / image.width), row = std::size_t(y * view.height / image.height);
+    view.opacity[row * std::size_t(view.width) + column] = 0;
+  }
+}
+
 PixelSamples pixel_samples(std::span<const Ray> rays, std::span<const WeightedSample> samples,
                            std::span<const std::size_t> offsets) {
   PixelSamples pixels;

@@ -37,6 +37,10 @@ struct CachedView {
 [[nodiscard]] CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
                                     const UnitCamera& full_size_camera, int short_side, double share);
 
+/// Makes pixels transparent that the view's mask says to ignore, wholly or in part: nothing there is learnt from, and no
+/// histogram counts it. What a colorizer is shown stays.
+void ignore_masked(CachedView& view, const MonoImage& image);
+
 /// Traced samples as the chroma engines want them.
 [[nodiscard]] PixelSamples pixel_samples(std::span<const Ray> rays, std::span<const WeightedSample> samples,
                                          std::span<const std::size_t> offsets);

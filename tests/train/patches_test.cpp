@@ -26,6 +26,29 @@ CachedView some_view(int width = 80, int height = 60) {
   return view;
 }
 
+TEST(IgnoreMasked, NoPixelOfAMaskedPlaceIsPicked) {
+  CachedView view = some_view();
+  MonoImage image;  // twice as large as the view
+  image.width = 160;
+  image.height = 120;
+  image.mask.assign(160 * 120, 255);
+  for (int y = 0; y < 120; ++y) {
+    for (int x = 81; x < 120; ++x) image.mask[std::size_t(y) * 160 + std::size_t(x)] = 0;
+  }
+  ignore_masked(view, image);
+  const std::vector<float> ab(2 * 8 * 8, 5.0f);
+  const PatchPixels picked = pick_pixels(view, {0, 20, 0, 60}, 8, ab, 4000, 1, 1);
+  bool left = false, right = false;
+  for (const std::uint32_t pixel : picked.pixels) {
+    const int x = int(pixel % 80);
+    EXPECT_TRUE(x < 40 || x >= 60) << x;
+    left |= x == 39;
+    right |= x == 60;
+  }
+  EXPECT_TRUE(left && right) << "its neighbours are";
+  EXPECT_EQ(view.luminance, some_view().luminance) << "a colorizer sees the whole picture";
+}
+
 TEST(RandomPatch, LiesInTheViewHasTheAskedSizeAndReachesEveryBorder) {
   const std::vector<CachedView> views = {some_view()};
   std::set<int> sides;

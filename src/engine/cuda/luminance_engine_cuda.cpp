@@ -311,12 +311,14 @@ void LuminanceEngineCuda::upload_views(const std::vector<TrainingView>& views) {
     return views_->planes.back().data();
   };
   const float* tables[2][3] = {};
-  const auto decoded = [&](PixelDepth depth, Transfer transfer) {
-    const float*& table = tables[depth == PixelDepth::kU16][int(transfer)];
+  const auto decoded = [&](const MonoImage& image) {
+    const bool is_deep = image.depth == PixelDepth::kU16;
+    const float* own = nullptr;  // a view of an exposure of its own needs a table of its own
+    const float*& table = image.exposure == 1 ? tables[is_deep][int(image.transfer)] : own;
     if (table == nullptr) {
-      std::vector<float> values(depth == PixelDepth::kU16 ? 65536 : 256);
+      std::vector<float> values(is_deep ? 65536 : 256);
       for (std::size_t i = 0; i < values.size(); ++i) {
-        values[i] = decode_transfer(transfer, float(i) / float(values.size() - 1));
+        values[i] = decode_transfer(image.transfer, float(i) / float(values.size() - 1)) / image.exposure;
       }
       views_->tables.push_back(uploaded(values, kImageAdvice));
       table = views_->tables.back().data();
@@ -330,14 +332,20 @@ void LuminanceEngineCuda::upload_views(const std::vector<TrainingView>& views) {
     switch (image.depth) {
       case PixelDepth::kU8:
         record.pixels = plane(image.u8.data(), image.u8.size());
-        record.decoded = decoded(image.depth, image.transfer);
+        record.decoded = decoded(image);
         break;
       case PixelDepth::kU16:
         record.pixels = plane(image.u16.data(), image.u16.size() * sizeof(std::uint16_t));
-        record.decoded = decoded(image.depth, image.transfer);
+        record.decoded = decoded(image);
         break;
       case PixelDepth::kF32:
-        record.pixels = plane(image.f32.data(), image.f32.size() * sizeof(float));
+        if (image.exposure == 1) {
+          record.pixels = plane(image.f32.data(), image.f32.size() * sizeof(float));
+        } else {
+          std::vector<float> values = image.f32;
+          for (float& value : values) value /= image.exposure;
+          record.pixels = plane(values.data(), values.size() * sizeof(float));
+        }
         break;
     }
     record.alpha = plane(image.alpha.data(), image.alpha.size());

@@ -1,0 +1,138 @@
+#include "src/prepare/camera_motion.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+
+#include "src/base/check.h"
+
+namespace cnerf {
+namespace {
+
+constexpr double kStillBelow = 0.005;  ///< of the diagonal
+constexpr double kWithin = 1.0 / 400;  ///< of the diagonal: two pixels of a picture 640 wide
+constexpr double kExplained = 0.85;    ///< of all places; the rest may be wrong or move by themselves
+
+/// Focal lengths in diagonals: from a very wide lens to a long one.
+constexpr double kShortest = 0.35, kLongest = 6;
+
+cv::Vec3d bearing(cv::Point2f pixel, cv::Size picture, double focal) {
+  const cv::Vec3d v((pixel.x - 0.5 * picture.width) / focal, (pixel.y - 0.5 * picture.height) / focal, 1);
+  return v / cv::norm(v);
+}
+
+struct Turn {
+  double focal_before = 0, focal_after = 0;  ///< pixels
+  cv::Matx33d rotation;
+};
+
+/// The rotation that brings bearings of the first picture nearest to those of the second (Kabsch), focal lengths given.
+Turn fit_rotation(const std::vector<cv::Point2f>& before, const std::vector<cv::Point2f>& after, cv::Size picture,
+                  double focal_before, double focal_after) {
+  cv::Matx33d sum = cv::Matx33d::zeros();
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    sum += bearing(after[i], picture, focal_after) * bearing(before[i], picture, focal_before).t();
+  }
+  cv::Matx31d singular;
+  cv::Matx33d u, vt;
+  cv::SVD::compute(sum, singular, u, vt);
+  const double handed = cv::determinant(u * vt) < 0 ? -1 : 1;
+  return {focal_before, focal_after, u * cv::Matx33d(1, 0, 0, 0, 1, 0, 0, 0, handed) * vt};
+}
+
+std::vector<double> errors_of(const Turn& turn, const std::vector<cv::Point2f>& before,
+                              const std::vector<cv::Point2f>& after, cv::Size picture) {
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const cv::Vec3d v = turn.rotation * bearing(before[i], picture, turn.focal_before);
+    if (v[2] <= 1e-6) {
+      errors.push_back(1e9);
+      continue;
+    }
+    const double x = v[0] / v[2] * turn.focal_after + 0.5 * picture.width;
+    const double y = v[1] / v[2] * turn.focal_after + 0.5 * picture.height;
+    errors.push_back(std::hypot(x - after[i].x, y - after[i].y));
+  }
+  return errors;
+}
+
+double share_below(const std::vector<double>& errors, double limit) {
+  return double(std::ranges::count_if(errors, [&](double e) { return e < limit; })) / double(errors.size());
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// At most `count` of them, evenly picked.
+std::vector<cv::Point2f> some_of(const std::vector<cv::Point2f>& points, std::size_t count) {
+  std::vector<cv::Point2f> out;
+  const std::size_t step = (points.size() + count - 1) / count;
+  for (std::size_t i = 0; i < points.size(); i += step) out.push_back(points[i]);
+  return out;
+}
+
+/// The focal lengths and rotation of the least mean error, by a grid that shrinks around the best.
+Turn best_turn(const std::vector<cv::Point2f>& all_before, const std::vector<cv::Point2f>& all_after, cv::Size picture,
+               double diagonal) {
+  const auto before = some_of(all_before, 100), after = some_of(all_after, 100);
+  Turn best;
+  double least = 1e30;
+  double log_focal = 0.5 * std::log(kShortest * kLongest), log_zoom = 0;
+  int reach = 8;
+  double focal_step = 0.5 * std::log(kLongest / kShortest) / reach, zoom_step = std::log(1.6) / reach;
+  for (int round = 0; round < 10; ++round, reach = 3, focal_step /= 1.7, zoom_step /= 1.7) {
+    const double focal_middle = log_focal, zoom_middle = log_zoom;
+    for (int i = -reach; i <= reach; ++i) {
+      for (int j = -reach; j <= reach; ++j) {
+        const double focal = focal_middle + focal_step * i, zoom = zoom_middle + zoom_step * j;
+        const Turn turn =
+            fit_rotation(before, after, picture, diagonal * std::exp(focal), diagonal * std::exp(focal + zoom));
+        double sum = 0;
+        for (const double error : errors_of(turn, before, after, picture)) sum += std::min(error, 0.1 * diagonal);
+        if (sum < least) {
+          least = sum;
+          best = turn;
+          log_focal = focal;
+          log_zoom = zoom;
+        }
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+MotionVerdict judge_motion(const std::vector<cv::Point2f>& before, const std::vector<cv::Point2f>& after,
+                           cv::Size picture) {
+  CNERF_CHECK_EQ(before.size(), after.size());
+  CNERF_CHECK(before.size() >= 12, "a motion is judged by 12 places at least");
+  const double diagonal = std::hypot(picture.width, picture.height);
+  MotionVerdict out;
+  std::vector<double> moves;
+  for (std::size_t i = 0; i < before.size(); ++i) moves.push_back(cv::norm(after[i] - before[i]));
+  out.moved = median(moves) / diagonal;
+  if (out.moved < kStillBelow) return out;
+
+  // Places that one homography explains: a turn is a homography, so wrong and moving places fall out here.
+  cv::Mat inlier;
+  const cv::Mat homography = cv::findHomography(before, after, cv::RANSAC, kWithin * diagonal, inlier);
+  std::vector<cv::Point2f> kept_before, kept_after;
+  for (int i = 0; !homography.empty() && i < inlier.rows; ++i) {
+    if (inlier.at<std::uint8_t>(i) == 0) continue;
+    kept_before.push_back(before[std::size_t(i)]);
+    kept_after.push_back(after[std::size_t(i)]);
+  }
+  out.motion = Motion::kParallax;
+  if (double(kept_before.size()) < kExplained * double(before.size())) return out;
+  const Turn turn = best_turn(kept_before, kept_after, picture, diagonal);
+  out.explained = share_below(errors_of(turn, before, after, picture), kWithin * diagonal);
+  if (out.explained >= kExplained) out.motion = Motion::kTurned;
+  return out;
+}
+
+}  // namespace cnerf

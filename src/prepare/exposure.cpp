@@ -1,0 +1,151 @@
+#include "src/prepare/exposure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <opencv2/imgproc.hpp>
+
+#include "src/base/parallel.h"
+#include "src/capture/byte_reader.h"
+#include "src/capture/image_io.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kRounds = 30;
+constexpr double kHeld = 1e-9;     ///< of a view's weight, pulling its logarithm to 0
+constexpr double kExact = 0.01;    ///< difference of logarithms below which all sightings count fully
+constexpr double kSettled = 1e-6;  ///< largest change of a logarithm in a round
+constexpr float kDarkest = 0.004f, kLightest = 0.9f;  ///< luminance between noise and clipping
+
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() % 2 == 1) return *middle;
+  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+/// Mean light around pixel positions of an image: 5 x 5 pixels, so that grain averages out.
+cv::Mat1f smoothed(const fs::path& file) {
+  const LinearImage image = luminance_image(read_linear_image(file, Transfer::kSrgb));
+  cv::Mat1f light(image.height, image.width);
+  std::copy(image.values.begin(), image.values.end(), light.begin());
+  cv::blur(light, light, {5, 5});
+  return light;
+}
+
+}  // namespace
+
+std::vector<double> solve_exposures(int views, const std::vector<Sighting>& sightings) {
+  std::map<int, std::vector<std::size_t>> places;
+  std::vector<double> logs, weights(sightings.size(), 1.0);
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    places[sightings[i].place].push_back(i);
+    logs.push_back(std::log(sightings[i].light));
+  }
+  cv::Mat1d exposure = cv::Mat1d::zeros(views, 1);
+  for (int round = 0; round < kRounds; ++round) {
+    // Of each place the weighted mean of its sightings is the best light, which leaves equations between views only.
+    cv::Mat1d normal = cv::Mat1d::zeros(views, views), right = cv::Mat1d::zeros(views, 1);
+    for (const auto& [place, seen] : places) {
+      double weight = 0, sum = 0;
+      for (const std::size_t i : seen) weight += weights[i], sum += weights[i] * logs[i];
+      for (const std::size_t i : seen) {
+        const int view = sightings[i].view;
+        normal(view, view) += weights[i];
+        right(view) += weights[i] * (logs[i] - sum / weight);
+        for (const std::size_t j : seen) normal(view, sightings[j].view) -= weights[i] * weights[j] / weight;
+      }
+    }
+    for (int v = 0; v < views; ++v) normal(v, v) += kHeld * (1 + normal(v, v));  // the common factor is free
+    const cv::Mat1d before = exposure.clone();
+    cv::solve(normal, right, exposure, cv::DECOMP_CHOLESKY);
+    for (const auto& [place, seen] : places) {
+      double weight = 0, sum = 0;
+      for (const std::size_t i : seen) {
+        weight += weights[i];
+        sum += weights[i] * (logs[i] - exposure(sightings[i].view));
+      }
+      for (const std::size_t i : seen) {
+        const double off = logs[i] - exposure(sightings[i].view) - sum / weight;
+        weights[i] = kExact / std::max(kExact, std::abs(off));
+      }
+    }
+    if (cv::norm(exposure, before, cv::NORM_INF) < kSettled) break;
+  }
+  std::vector<bool> is_seen(std::size_t(views), false);
+  for (const Sighting& seen : sightings) is_seen[std::size_t(seen.view)] = true;
+  std::vector<double> known;
+  for (int v = 0; v < views; ++v) {
+    if (is_seen[std::size_t(v)]) known.push_back(exposure(v));
+  }
+  const double middle = known.empty() ? 0 : median(known);
+  std::vector<double> out;
+  for (int v = 0; v < views; ++v) out.push_back(is_seen[std::size_t(v)] ? std::exp(exposure(v) - middle) : 1);
+  return out;
+}
+
+std::vector<Observation> read_observations(const fs::path& model) {
+  constexpr long long kNoPoint = -1;
+  ByteReader in(model / "images.bin");
+  std::vector<Observation> out;
+  const auto count = in.next<std::uint64_t>("number of images");
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const std::string field = "image " + std::to_string(i + 1) + " of " + std::to_string(count);
+    in.skip(1, 4 + 7 * 8 + 4, field);  // its number, rotation, translation, camera
+    const std::string name = in.next_text(field);
+    const auto points = in.next<std::uint64_t>(field);
+    for (std::uint64_t k = 0; k < points; ++k) {
+      Observation seen;
+      seen.image = name;
+      seen.x = in.next<double>(field);
+      seen.y = in.next<double>(field);
+      seen.point = in.next<std::int64_t>(field);
+      if (seen.point != kNoPoint) out.push_back(std::move(seen));
+    }
+  }
+  return out;
+}
+
+std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, const fs::path& capture,
+                                         const fs::path& model) {
+  if (!fs::exists(model / "images.bin")) return std::nullopt;
+  std::map<std::string, int> number_of;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    number_of[fs::path(images[i].name).stem().string()] = int(i);
+    number_of[images[i].source.stem().string()] = int(i);
+  }
+  std::vector<std::vector<Observation>> by_image(images.size());
+  for (Observation& seen : read_observations(model)) {
+    const auto found = number_of.find(fs::path(seen.image).stem().string());
+    if (found != number_of.end()) by_image[std::size_t(found->second)].push_back(std::move(seen));
+  }
+  std::vector<std::vector<Sighting>> parts(images.size());
+  parallel_tasks(images.size(), [&](std::size_t i) {
+    if (by_image[i].empty()) return;
+    const cv::Mat1f light = smoothed(capture / "images" / images[i].name);
+    for (const Observation& seen : by_image[i]) {
+      const int x = int(seen.x), y = int(seen.y);
+      if (x < 0 || y < 0 || x >= light.cols || y >= light.rows) continue;
+      const float value = light(y, x);
+      if (value > kDarkest && value < kLightest) parts[i].push_back({int(i), int(seen.point), double(value)});
+    }
+  });
+  std::vector<Sighting> sightings;
+  std::map<int, int> place_of;  // points are numbered with gaps
+  for (const auto& part : parts) {
+    for (Sighting seen : part) {
+      seen.place = place_of.try_emplace(seen.place, int(place_of.size())).first->second;
+      sightings.push_back(seen);
+    }
+  }
+  const std::vector<double> exposures = solve_exposures(int(images.size()), sightings);
+  double squared = 0;
+  for (const double exposure : exposures) squared += std::log(exposure) * std::log(exposure) / double(exposures.size());
+  const double spread = std::sqrt(squared);
+  for (std::size_t i = 0; i < images.size() && spread >= kNotedExposure; ++i) images[i].exposure = exposures[i];
+  return spread;
+}
+
+}  // namespace cnerf

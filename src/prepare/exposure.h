@@ -1,0 +1,46 @@
+#pragma once
+/// How much lighter or darker each view was taken than the others: shutter, iris, a flickering film. Told by what
+/// several views show of the same places.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "src/prepare/photographs.h"
+
+namespace cnerf {
+
+/// The light a view shows of a place.
+struct Sighting {
+  int view = 0;      ///< number
+  int place = 0;     ///< number
+  double light = 0;  ///< linear luminance, above 0
+};
+
+/// Exposures e such that light of view v and place p is e_v times the light of p, in the sense of least absolute
+/// differences of logarithms (by reweighted least squares, the places eliminated), so that wrong and shiny places hardly
+/// pull. Their median is 1; views without sightings get 1. Groups of views that share no place with each other keep an
+/// unknown factor between them, taken as 1.
+[[nodiscard]] std::vector<double> solve_exposures(int views, const std::vector<Sighting>& sightings);
+
+/// Where an image shows a sparse point.
+struct Observation {
+  std::string image;
+  long long point = 0;
+  double x = 0, y = 0;  ///< pixels
+};
+/// The observations of a binary COLMAP model's images.bin.  @throws MissingInputError, InputError.
+[[nodiscard]] std::vector<Observation> read_observations(const std::filesystem::path& model);
+
+/// The spread of exposures from which they are kept: relative standard deviation. Below it, differences are as likely
+/// shine and noise.
+inline constexpr double kNotedExposure = 0.02;
+
+/// Fills `exposure` of the images from what they show of the model's points; leaves 1 where that spreads less than
+/// kNotedExposure.
+/// @return  the spread found; nothing when the model does not say what it was made of (a text model).
+std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, const std::filesystem::path& capture,
+                                         const std::filesystem::path& model);
+
+}  // namespace cnerf

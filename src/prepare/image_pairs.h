@@ -1,0 +1,25 @@
+#pragma once
+/// Which pairs of images are worth matching when there are too many for all of them: neighbours in order, and those
+/// that look alike. No vocabulary file is needed.
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace cnerf {
+
+/// What a picture looks like from afar: histograms of gradient directions on a 4 x 4 grid, of length 1.
+using LookVector = std::vector<float>;
+[[nodiscard]] LookVector look_of(const cv::Mat1b& picture);
+
+struct PairOptions {
+  int neighbours = 10;  ///< on each side in the order of the images; and at distances 16, 32, 64, …
+  int alike = 20;       ///< per image, by look
+};
+
+/// Pairs (i, j), i < j, each once, sorted.
+[[nodiscard]] std::vector<std::pair<int, int>> choose_pairs(const std::vector<LookVector>& looks,
+                                                            const PairOptions& options);
+
+}  // namespace cnerf

@@ -1,0 +1,306 @@
+#include "src/prepare/photographs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <tuple>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/base/parallel.h"
+#include "src/capture/exr_io.h"
+#include "src/capture/image_io.h"
+#include "src/capture/listing.h"
+#include "src/prepare/grey_image.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+std::string lower_extension(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  return extension;
+}
+
+bool is_heic(const fs::path& file) {
+  const std::string extension = lower_extension(file);
+  return extension == ".heic" || extension == ".heif" || extension == ".hif" || extension == ".avif";
+}
+
+std::vector<fs::path> photographs_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (!entry.is_regular_file() || name.starts_with('.')) continue;
+    if (is_image_file(entry.path()) || is_heic(entry.path())) files.push_back(entry.path());
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
+void refuse_heic(const fs::path& folder, const std::vector<fs::path>& files) {
+  const auto heic = std::ranges::find_if(files, is_heic);
+  if (heic == files.end()) return;
+  const std::string extension = heic->extension().string();
+  throw InputError(
+      *heic, "format",
+      "expected JPEG, PNG, TIFF or EXR, found HEIC; convert with (Debian package libheif-examples):\n  cd " +
+          folder.string() + " && for f in *" + extension + "; do heif-convert -q 95 \"$f\" \"${f%" + extension +
+          "}.jpg\" && mv \"$f\" \"$f.done\"; done");
+}
+
+Transfer source_transfer(const std::string& name) {
+  return name == "linear" ? Transfer::kLinear : name == "gamma22" ? Transfer::kGamma22 : Transfer::kSrgb;
+}
+
+/// Stored codes, read as if they were linear, to luminance.
+void apply_levels(LinearImage& image, const SensorOptions& sensor) {
+  if (image.depth == PixelDepth::kF32) return;
+  const double largest = image.depth == PixelDepth::kU8 ? 255 : 65535;
+  const double black = sensor.black_level / largest;
+  const double white = sensor.white_level > 0 ? sensor.white_level / largest : 1;
+  const Transfer transfer = source_transfer(sensor.transfer);
+  const auto decoded = [&](float code) {
+    return decode_transfer(transfer, std::clamp(float((code - black) / (white - black)), 0.0f, 1.0f));
+  };
+  const auto channels = std::size_t(image.channels);
+  for (std::size_t i = 0; i < image.values.size(); ++i) {
+    const float alpha = image.alpha.empty() ? 1.0f : image.alpha[i / channels];
+    image.values[i] = alpha > 0 ? decoded(image.values[i] / alpha) * alpha : 0;
+  }
+}
+
+LinearImage turned_upright(const LinearImage& stored, const Upright& grid) {
+  if (grid.orientation == 1) return stored;
+  LinearImage out = stored;
+  out.width = grid.width();
+  out.height = grid.height();
+  std::size_t at = 0;
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x, ++at) {
+      const std::size_t from = grid.stored_index(x, y);
+      out.values[at] = stored.values[from];
+      if (!stored.alpha.empty()) out.alpha[at] = stored.alpha[from];
+    }
+  }
+  return out;
+}
+
+/// The luminance image as codes of `T`, with alpha as a colour image where there is some: OpenCV writes no grey +
+/// alpha.
+template <typename T>
+cv::Mat encoded(const LinearImage& image, int type, double largest) {
+  cv::Mat out(image.height, image.width, CV_MAKETYPE(type, image.alpha.empty() ? 1 : 4));
+  for (std::size_t i = 0; i < image.pixel_count(); ++i) {
+    const float alpha = image.alpha.empty() ? 1.0f : image.alpha[i];
+    const float straight = alpha > 0 ? image.values[i] / alpha : 0;
+    const auto code = T(std::lround(encode_transfer(Transfer::kSrgb, std::clamp(straight, 0.0f, 1.0f)) * largest));
+    T* pixel = out.ptr<T>(int(i) / image.width) + (int(i) % image.width) * out.channels();
+    pixel[0] = code;
+    if (out.channels() == 4) {
+      pixel[1] = pixel[2] = code;
+      pixel[3] = T(std::lround(alpha * largest));
+    }
+  }
+  return out;
+}
+
+/// Codes are kept at 8 bits only where nothing was done to them.
+bool stays_eight_bit(const LinearImage& image, const SensorOptions& sensor) {
+  return image.depth == PixelDepth::kU8 && sensor.transfer == "srgb" && sensor.black_level == 0 &&
+         sensor.white_level == 0;
+}
+
+void write_image(const fs::path& file, const LinearImage& image, bool eight_bit) {
+  if (image.depth == PixelDepth::kF32) {
+    write_atomically(file, [&](const fs::path& temporary) {
+      write_exr_channel(temporary, "Y", image.width, image.height, image.values);
+    });
+  } else {
+    write_png(file,
+              eight_bit ? encoded<std::uint8_t>(image, CV_8U, 255) : encoded<std::uint16_t>(image, CV_16U, 65535));
+  }
+}
+
+void write_mask(const fs::path& mask, const PreparedImage& image, const Upright& grid, const fs::path& target) {
+  const std::vector<std::uint8_t> stored = read_mask(mask, grid.stored_width, grid.stored_height);
+  cv::Mat1b upright(image.height, image.width);
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) upright(y, x) = stored[grid.stored_index(x, y)];
+  }
+  write_png(target, upright);
+}
+
+/// Masks by the stem of the photograph they belong to; "0001.jpg.png", as COLMAP names them, belongs to "0001".
+std::map<std::string, fs::path> masks_in(const fs::path& folder) {
+  std::map<std::string, fs::path> masks;
+  if (folder.empty()) return masks;
+  if (!fs::is_directory(folder)) throw MissingInputError(folder.string() + ": no such folder of masks");
+  for (const fs::path& file : photographs_in(folder)) {
+    fs::path stem = file.stem();
+    if (is_image_file(stem)) stem = stem.stem();
+    masks[stem.string()] = file;
+  }
+  if (masks.empty()) throw MissingInputError(folder.string() + ": holds no mask image");
+  return masks;
+}
+
+/// The stem without white space, which COLMAP's lists cannot hold.
+std::string plain_stem(const fs::path& file) {
+  std::string stem = file.stem().string();
+  std::ranges::replace_if(
+      stem, [](unsigned char c) { return std::isspace(c) != 0; }, '_');
+  return stem;
+}
+
+/// Plain stems; with the extension, then a number, where two photographs would share one.
+std::vector<std::string> names_of(const std::vector<fs::path>& files) {
+  std::map<std::string, int> uses;
+  for (const fs::path& file : files) ++uses[plain_stem(file)];
+  std::set<std::string> taken;
+  std::vector<std::string> names;
+  for (const fs::path& file : files) {
+    const std::string stem = plain_stem(file);
+    std::string name = uses[stem] == 1 ? stem : stem + "_" + lower_extension(file).substr(1);
+    while (!taken.insert(name).second) name += "_" + std::to_string(names.size());
+    names.push_back(name);
+  }
+  return names;
+}
+
+struct Imported {
+  PreparedImage image;
+  std::string lens;  ///< what tells cameras of one size apart
+  std::string problem;
+};
+
+Imported import_one(const fs::path& file, const std::string& name, const fs::path& capture,
+                    const std::map<std::string, fs::path>& masks, const SensorOptions& sensor) {
+  Imported out;
+  try {
+    const ExifFacts exif = read_exif(read_binary_file(file));
+    LinearImage stored = read_linear_image(file, Transfer::kLinear);
+    apply_levels(stored, sensor);
+    const bool eight_bit = stays_eight_bit(stored, sensor);
+    stored = luminance_image(std::move(stored));
+    const Upright grid = {exif.orientation, stored.width, stored.height};
+    const LinearImage upright = turned_upright(stored, grid);
+    PreparedImage& image = out.image;
+    image.name = name + (upright.depth == PixelDepth::kF32 ? ".exr" : ".png");
+    image.source = file;
+    image.width = upright.width;
+    image.height = upright.height;
+    image.focal = focal_pixels(exif, std::max(image.width, image.height));
+    image.sharpness = sharpness(grey_codes(upright));
+    out.lens = exif.camera + " " + std::to_string(std::lround(exif.focal_mm * 10)) + " " +
+               std::to_string(std::lround(exif.focal_35mm));
+    write_image(capture / "images" / image.name, upright, eight_bit);
+    if (const auto mask = masks.find(file.stem().string()); mask != masks.end()) {
+      image.mask = fs::path("masks") / (name + ".png");
+      write_mask(mask->second, image, grid, capture / image.mask);
+    }
+  } catch (const InputError& failure) {
+    out.problem = failure.what();
+  }
+  return out;
+}
+
+/// Numbers cameras: images of one size, taken with one lens, share one.
+void group_into_cameras(std::vector<Imported>& imported, PhotographSet& set) {
+  std::map<std::tuple<int, int, std::string>, int> cameras;
+  for (Imported& each : imported) {
+    PreparedImage& image = each.image;
+    const auto key = std::tuple(image.width, image.height, each.lens);
+    image.camera = cameras.try_emplace(key, int(cameras.size())).first->second;
+    set.images.push_back(std::move(image));
+  }
+  if (cameras.size() > 1) {
+    set.notes.push_back("photographs of " + std::to_string(cameras.size()) + " cameras, told apart by size and lens");
+  }
+}
+
+}  // namespace
+
+std::size_t Upright::stored_index(int x, int y) const {
+  const int right = width() - 1 - x, bottom = height() - 1 - y;
+  int column = x, row = y;
+  switch (orientation) {
+    case 2:
+      column = right;
+      break;
+    case 3:
+      column = right, row = bottom;
+      break;
+    case 4:
+      row = bottom;
+      break;
+    case 5:
+      column = y, row = x;
+      break;
+    case 6:
+      column = y, row = right;
+      break;
+    case 7:
+      column = bottom, row = right;
+      break;
+    case 8:
+      column = bottom, row = x;
+      break;
+    default:
+      break;
+  }
+  return std::size_t(row) * std::size_t(stored_width) + std::size_t(column);
+}
+
+bool holds_photographs(const fs::path& folder) {
+  for (const fs::path& place : {folder, folder / "images"}) {
+    if (fs::is_directory(place) && !photographs_in(place).empty()) return true;
+  }
+  return false;
+}
+
+std::vector<fs::path> list_photographs(const fs::path& folder) {
+  if (!fs::is_directory(folder)) throw MissingInputError(folder.string() + ": no such folder");
+  std::vector<fs::path> files = photographs_in(folder);
+  if (files.empty() && fs::is_directory(folder / "images")) files = photographs_in(folder / "images");
+  if (files.empty()) throw MissingInputError(folder.string() + ": holds no photograph (JPEG, PNG, TIFF or EXR)");
+  refuse_heic(files.front().parent_path(), files);
+  return files;
+}
+
+PhotographSet import_photographs(const std::vector<fs::path>& files, const fs::path& capture, const fs::path& masks,
+                                 const SensorOptions& sensor, const ProgressSink& progress) {
+  const std::map<std::string, fs::path> mask_of = masks_in(masks);
+  const std::vector<std::string> names = names_of(files);
+  std::vector<Imported> imported(files.size());
+  std::size_t done = 0;
+  const std::size_t at_once = std::size_t(std::max(1, thread_count()));
+  for (std::size_t begin = 0; begin < files.size(); begin = done) {  // in portions, to report and to stop between them
+    done = std::min(files.size(), begin + at_once);
+    parallel_tasks(done - begin, [&](std::size_t i) {
+      imported[begin + i] = import_one(files[begin + i], names[begin + i], capture, mask_of, sensor);
+    });
+    if (progress) progress({"photographs", double(done) / double(files.size()), {}});
+    if (interruption_requested()) throw Interrupted("stopped while reading photographs");
+  }
+  PhotographSet set;
+  std::erase_if(imported, [&](const Imported& each) {
+    if (!each.problem.empty()) set.unreadable.push_back(each.problem);
+    return !each.problem.empty();
+  });
+  group_into_cameras(imported, set);
+  if (set.images.size() < 2) {
+    throw InputError(files.front().parent_path(), "photographs",
+                     "expected at least 2 that can be read, found " + std::to_string(set.images.size()) +
+                         (set.unreadable.empty() ? "" : "; the first problem: " + set.unreadable.front()));
+  }
+  const auto masked = std::ranges::count_if(set.images, [](const PreparedImage& i) { return !i.mask.empty(); });
+  if (!masks.empty() && masked == 0) {
+    throw InputError(masks, "names", "expected masks named as the photographs, e.g. " + names.front() + ".png");
+  }
+  return set;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,80 @@
+#pragma once
+/// Photographs as a user has them, on their way to images of a capture: upright, one channel, at the depth they came
+/// in.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "src/base/options.h"
+#include "src/base/progress.h"
+#include "src/prepare/exif.h"
+
+namespace cnerf {
+
+/// How stored values become luminance.
+struct SensorOptions {
+  std::string transfer = "srgb";  ///< of the source
+  double black_level = 0;         ///< code that means no light
+  double white_level = 0;         ///< code that means 1; 0 = the largest of the file's depth
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("transfer", transfer, Choice{"srgb", "linear", "gamma22"}, "how grey values of the source encode luminance");
+    v("black_level", black_level, Range{0, 65535}, "code that means no light, of a sensor's raw values");
+    v("white_level", white_level, Range{0, 65535},
+      "code that means white, e.g. 4095 of 12 bits in 16; 0 = the largest of the file's depth");
+  }
+};
+
+/// One image of the capture to be.
+struct PreparedImage {
+  std::string name;                   ///< file name below `images/`
+  std::filesystem::path source;       ///< photograph, or clip
+  std::filesystem::path mask;         ///< below the capture, "masks/NAME.png"; empty: none
+  int width = 0, height = 0;          ///< pixels, upright
+  int camera = 0;                     ///< number of its camera: same size, same lens
+  double focal = 0;                   ///< pixels, as the notes of the file tell; 0: unknown
+  double pixel_aspect = 1;            ///< width of a pixel over its height
+  double centre_x = 0, centre_y = 0;  ///< principal point, pixels; 0, 0: the middle
+  double exposure = 1;                ///< see exposure.h
+  int frame = -1;                     ///< of a clip: number of the frame in it
+  double sharpness = 0;               ///< see sharpness.h; comparable within one capture only
+};
+
+struct PhotographSet {
+  std::vector<PreparedImage> images;    ///< sorted by name
+  std::vector<std::string> unreadable;  ///< "FILE: why", left out
+  std::vector<std::string> notes;
+};
+
+/// The photographs of a folder, sorted; if it holds none itself, those of its `images` folder.
+/// @throws MissingInputError  no such folder, or no photograph in it.
+/// @throws InputError  HEIC files, with the command that converts them.
+[[nodiscard]] std::vector<std::filesystem::path> list_photographs(const std::filesystem::path& folder);
+
+/// True for a folder that `list_photographs` finds something in, be it only what it refuses.
+[[nodiscard]] bool holds_photographs(const std::filesystem::path& folder);
+
+/// Writes every photograph to `capture/images`: turned upright as its EXIF note says, colours reduced to luminance,
+/// levels applied, never resampled. 8-bit photographs become 8-bit PNG files, deeper ones 16-bit PNG, floats EXR;
+/// integer codes are sRGB-encoded whatever the source was.
+/// @param masks  folder of masks named as the photographs (any image extension), black = ignore; empty: none.
+/// @throws MissingInputError  a mask folder without a mask.  @throws InputError  when fewer than 2 can be read, or a
+/// mask does not fit.  @throws Interrupted.
+[[nodiscard]] PhotographSet import_photographs(const std::vector<std::filesystem::path>& files,
+                                               const std::filesystem::path& capture, const std::filesystem::path& masks,
+                                               const SensorOptions& sensor, const ProgressSink& progress);
+
+/// Turns a pixel grid upright: the size of an image of `width` x `height` after `orientation`, and the stored pixel
+/// that upright pixel (x, y) shows.
+struct Upright {
+  int orientation = 1;
+  int stored_width = 0, stored_height = 0;
+
+  [[nodiscard]] int width() const { return orientation < 5 ? stored_width : stored_height; }
+  [[nodiscard]] int height() const { return orientation < 5 ? stored_height : stored_width; }
+  [[nodiscard]] std::size_t stored_index(int x, int y) const;
+};
+
+}  // namespace cnerf

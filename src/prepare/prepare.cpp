@@ -1,0 +1,306 @@
+#include "src/prepare/prepare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/capture/listing.h"
+#include "src/prepare/capture_writer.h"
+#include "src/prepare/exposure.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kGoodShare = 0.8;    ///< of images registered, below which advice is given
+constexpr double kLeastShare = 0.25;  ///< below which the poses are not worth a training
+constexpr double kBlurred = 0.5;      ///< of the median sharpness
+constexpr double kFewFeatures = 500;  ///< an image
+
+/// Where the images came from.
+struct Material {
+  PhotographSet set;
+  std::optional<ClipReport> clip;
+  bool ordered = false;  ///< successive images are neighbours
+};
+
+/// The poses, in whatever frame they came.
+struct Poses {
+  std::vector<View> views;  ///< named as the images; no pixels
+  std::vector<Vec3d> points;
+  std::optional<PoseRecovery> recovery;
+  fs::path model;
+};
+
+Material read_material(const fs::path& source, const fs::path& capture, const PrepareOptions& options,
+                       const ProgressSink& progress, const Say& say) {
+  Material out;
+  if (fs::is_directory(source)) {
+    out.set = import_photographs(list_photographs(source), capture, options.masks, options.sensor, progress);
+    say(fmt::format("photographs: {} read{}", out.set.images.size(),
+                    out.set.unreadable.empty() ? "" : fmt::format(", {} left out", out.set.unreadable.size())));
+    for (const std::string& problem : out.set.unreadable) say("left out: " + problem);
+    for (const std::string& note : out.set.notes) say("note: " + note);
+    return out;
+  }
+  if (!fs::exists(source)) throw MissingInputError(source.string() + ": no such file or folder");
+  if (!options.masks.empty()) throw UsageError("masks: expected with photographs; frames of a clip have no names yet");
+  if (source.extension() == ".dat") {
+    out.set = import_spikes(source, capture, options.spikes, options.video.frames, progress);
+    out.ordered = true;
+    say(fmt::format("spike stream: {} pictures of {} ticks each", out.set.images.size(), options.spikes.spike_window));
+    return out;
+  }
+  ClipImport clip = import_clip(source, capture, options.video, options.sensor, progress);
+  out.set = std::move(clip.set);
+  out.clip = std::move(clip.report);
+  out.ordered = true;
+  const ClipReport& report = *out.clip;
+  say(fmt::format("clip: {} frames of {} x {}, {:.3g} a second, {} shot{}", report.frames, report.width, report.height,
+                  report.fps, report.shots.size(), report.shots.size() == 1 ? "" : "s"));
+  for (const std::string& line : shot_lines(report)) say(line);
+  const FilmMarks& marks = report.shots[std::size_t(report.shot - 1)].marks;
+  say(fmt::format(
+      "shot {} is used, {} frames kept; flicker {:.1f} %, weave {:.2f} pixels, grain up to {:.1f} codes, "
+      "scratches in {:.0f} % of frames",
+      report.shot, report.kept.size(), 100 * marks.flicker, marks.weave, marks.grain, 100 * marks.scratched));
+  if (report.picture.width != report.width || report.picture.height != report.height) {
+    say(fmt::format("borders cropped: {} x {} at {}, {} is left", report.picture.width, report.picture.height,
+                    report.picture.x, report.picture.y));
+  }
+  if (report.interlaced) say("interlaced: the upper field of each frame is kept");
+  return out;
+}
+
+/// Gives the views of a model the names of our images: those of COLMAP's own run, or those with the same stem.
+Poses poses_of_model(const fs::path& model, const fs::path& capture, const std::vector<PreparedImage>& images) {
+  std::map<std::string, const PreparedImage*> by_name;
+  for (const PreparedImage& image : images) {
+    by_name[fs::path(image.name).stem().string()] = &image;
+    by_name[image.source.stem().string()] = &image;
+  }
+  Poses out;
+  out.model = model;
+  CaptureListing listing = read_colmap(capture, model);
+  out.points = std::move(listing.points);
+  for (const ListedView& listed : listing.views) {
+    const auto found = by_name.find(fs::path(listed.name).stem().string());
+    if (found == by_name.end()) continue;
+    View view;
+    view.name = found->second->name;
+    view.image_file = capture / "images" / view.name;
+    view.intrinsics = listed.intrinsics;
+    view.world_from_camera = listed.world_from_camera;
+    if (view.intrinsics.width != found->second->width || view.intrinsics.height != found->second->height) {
+      throw InputError(model, "image " + listed.name,
+                       fmt::format("expected the size of the photograph, {} x {}, found {} x {}", found->second->width,
+                                   found->second->height, view.intrinsics.width, view.intrinsics.height));
+    }
+    out.views.push_back(std::move(view));
+  }
+  std::ranges::sort(out.views, {}, &View::name);
+  return out;
+}
+
+/// What may have kept images from being placed, as sentences.
+std::string advice(const std::vector<PreparedImage>& images, const PoseRecovery& recovery, bool is_clip) {
+  std::vector<double> values;
+  for (const PreparedImage& image : images) values.push_back(image.sharpness);
+  std::ranges::sort(values);
+  const double usual = values[values.size() / 2];
+  const auto blurred = std::ranges::count_if(values, [&](double v) { return v < kBlurred * usual; });
+  std::string text;
+  if (recovery.median_features > 0 && recovery.median_features < kFewFeatures) {
+    text += fmt::format(
+        " Pictures hold few details ({:.0f} features in the median one): more light, less blur, or a "
+        "patterned cloth under the subject help.",
+        recovery.median_features);
+  }
+  if (blurred > 0)
+    text += fmt::format(" {} of {} pictures are much less sharp than the others.", blurred, images.size());
+  if (recovery.model_sizes.size() > 1) {
+    text += fmt::format(
+        " {} groups of pictures do not connect: pictures in between, with two thirds of overlap, join "
+        "them.",
+        recovery.model_sizes.size());
+  }
+  text += is_clip ? " More frames (--frames) overlap more."
+                  : " Neighbouring pictures should share two thirds of what they "
+                    "show, from places a step apart.";
+  return text;
+}
+
+std::string missing_names(const std::vector<PreparedImage>& images, const std::vector<View>& views) {
+  std::string text;
+  int count = 0;
+  for (const PreparedImage& image : images) {
+    if (std::ranges::any_of(views, [&](const View& view) { return view.name == image.name; })) continue;
+    if (++count <= 8) text += (text.empty() ? "" : ", ") + image.name;
+  }
+  return text + (count > 8 ? fmt::format(" and {} more", count - 8) : "");
+}
+
+Poses find_poses(const Material& material, const fs::path& capture, const fs::path& work, const PrepareOptions& options,
+                 const ProgressSink& progress, const Say& say) {
+  const std::vector<PreparedImage>& images = material.set.images;
+  if (!options.colmap_model.empty()) {
+    Poses out = poses_of_model(options.colmap_model, capture, images);
+    if (out.views.size() < 2) {
+      throw InputError(options.colmap_model, "images",
+                       fmt::format("expected the photographs' names, found {} of them", out.views.size()));
+    }
+    return out;
+  }
+  const bool is_clip = material.ordered;
+  const PoseRecovery recovery = recover_poses(images, capture, work, is_clip, options.poses, progress);
+  Poses out;
+  if (!recovery.model.empty()) out = poses_of_model(recovery.model, capture, images);
+  out.recovery = recovery;
+  const double share = double(out.views.size()) / double(images.size());
+  const std::string found = fmt::format("poses: {} of {} images placed", out.views.size(), images.size());
+  if (out.views.size() < 3 || share < kLeastShare) {
+    throw PosesError(found + "." + advice(images, recovery, is_clip) +
+                     " COLMAP's log: " + (work / "colmap.log").string());
+  }
+  say(found + fmt::format(" ({} matching, {} pairs)", recovery.matching, recovery.pairs));
+  if (out.views.size() < images.size()) say("not placed: " + missing_names(images, out.views));
+  if (share < kGoodShare) say("advice:" + advice(images, recovery, is_clip));
+  return out;
+}
+
+Json json_of(const Similarity& s) {
+  const Mat3d& r = s.rotation;
+  Json rows = Json::array();
+  for (const Vec3d& row : r.rows) rows.push_back({row.x, row.y, row.z});
+  return {{"scale", s.scale}, {"rotation", rows}, {"translation", {s.translation.x, s.translation.y, s.translation.z}}};
+}
+
+Json json_of(const ClipReport& clip) {
+  Json shots = Json::array();
+  for (const ShotReport& shot : clip.shots) {
+    shots.push_back({{"begin", shot.range.begin},
+                     {"end", shot.range.end},
+                     {"duplicates", shot.duplicates},
+                     {"pairs_judged", shot.judged},
+                     {"parallax_share", shot.parallax},
+                     {"moved", shot.moved},
+                     {"flicker", shot.marks.flicker},
+                     {"weave_pixels", shot.marks.weave},
+                     {"grain_codes", shot.marks.grain},
+                     {"scratched_share", shot.marks.scratched},
+                     {"refusal", shot.refusal()}});
+  }
+  return {{"width", clip.width},
+          {"height", clip.height},
+          {"frames", clip.frames},
+          {"fps", clip.fps},
+          {"pixel_aspect", clip.pixel_aspect},
+          {"interlaced", clip.interlaced},
+          {"combed_share", clip.combed},
+          {"picture", {clip.picture.x, clip.picture.y, clip.picture.width, clip.picture.height}},
+          {"shots", shots},
+          {"shot", clip.shot}};
+}
+
+Json json_of(const std::vector<PreparedImage>& images, const std::vector<View>& views) {
+  Json out = Json::array();
+  for (const PreparedImage& image : images) {
+    Json one = {{"name", image.name},
+                {"source", image.source.string()},
+                {"camera", image.camera},
+                {"sharpness", image.sharpness}};
+    if (image.frame >= 0) one["frame"] = image.frame;
+    if (image.exposure != 1) one["exposure"] = image.exposure;
+    if (image.focal > 0) one["focal_pixels"] = image.focal;
+    one["placed"] = std::ranges::any_of(views, [&](const View& view) { return view.name == image.name; });
+    out.push_back(std::move(one));
+  }
+  return out;
+}
+
+Json record_of(const fs::path& source, const PrepareOptions& options, const Material& material, const Poses& poses,
+               const FrameChoice& frame) {
+  Json out;
+  out["source"] = fs::absolute(source).lexically_normal().string();
+  out["transfer"] = {{"source", options.sensor.transfer},
+                     {"images", "srgb"},
+                     {"black_level", options.sensor.black_level},
+                     {"white_level", options.sensor.white_level}};
+  if (material.clip) out["clip"] = json_of(*material.clip);
+  out["unreadable"] = material.set.unreadable;
+  Json& found = out["poses"];
+  found["model"] = poses.model.string();
+  found["placed"] = poses.views.size();
+  found["images"] = material.set.images.size();
+  if (poses.recovery) {
+    const PoseOptions& used = options.poses;
+    found.update(Json{{"matching", poses.recovery->matching},
+                      {"pairs", poses.recovery->pairs},
+                      {"model_sizes", poses.recovery->model_sizes},
+                      {"median_features", poses.recovery->median_features},
+                      {"seconds", poses.recovery->seconds},
+                      {"camera_model", used.camera_model},
+                      {"features", used.features},
+                      {"longest_side", used.longest_side},
+                      {"exhaustive_up_to", used.exhaustive_up_to},
+                      {"neighbours", used.neighbours},
+                      {"alike", used.alike}});
+  }
+  out["frame"] = {{"up_by", frame.up_by},
+                  {"ground_share", frame.ground_share},
+                  {"unit", frame.metres ? "metre" : "unknown"},
+                  {"measure", options.frame.measure},
+                  {"capture_from_poses", json_of(frame.capture_from_poses)},
+                  {"poses_from_capture", json_of(frame.capture_from_poses.inverse())}};
+  out["thresholds"] = {
+      {"good_share", kGoodShare}, {"least_share", kLeastShare}, {"blurred", kBlurred}, {"few_features", kFewFeatures}};
+  out["images"] = json_of(material.set.images, poses.views);
+  return out;
+}
+
+}  // namespace
+
+bool needs_preparing(const fs::path& source) {
+  std::error_code failure;
+  if (fs::is_regular_file(source, failure)) {
+    const std::string extension = source.extension().string();
+    const bool is_marker = extension == ".json" || extension == ".npy" || extension == ".bin" || extension == ".txt";
+    return !is_marker && is_clip(source);
+  }
+  if (!fs::is_directory(source, failure)) return false;
+  for (const char* marker : {"transforms.json", "transforms_train.json", "poses_bounds.npy", "cameras.bin",
+                             "cameras.txt", "sparse", "colmap"}) {
+    if (fs::exists(source / marker, failure)) return false;
+  }
+  return holds_photographs(source);
+}
+
+PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, const PrepareOptions& options,
+                              const ProgressSink& progress, const Say& say) {
+  Material material = read_material(source, capture, options, progress, say);
+  Poses poses = find_poses(material, capture, capture / "work", options, progress, say);
+  const FrameChoice frame = choose_frame(poses.views, poses.points, options.frame);
+  for (View& view : poses.views) view.world_from_camera = frame.capture_from_poses.pose(view.world_from_camera);
+  for (Vec3d& point : poses.points) point = frame.capture_from_poses.point(point);
+  const auto subject = find_subject(poses.views, poses.points);
+  say(fmt::format("frame: Z is up by {}, {}", frame.up_by,
+                  frame.metres ? "in metres" : "no known unit (--measure gives metres)"));
+  if (!options.no_exposure) {
+    if (const auto spread = estimate_exposures(material.set.images, capture, poses.model)) {
+      say(fmt::format("exposures: {:.1f} % apart{}", 100 * *spread,
+                      *spread >= kNotedExposure ? ", evened out when the capture is read" : ""));
+    }
+  }
+  write_contact_sheet(capture / "contact_sheet.png", capture, poses.views, poses.points, subject);
+  write_file(capture / "prepare.json", record_of(source, options, material, poses, frame).dump(1) + "\n");
+  write_file(capture / "transforms.json", transforms_json(poses.views, material.set.images, subject).dump(1) + "\n");
+  return {material.set.images.size(), poses.views.size()};
+}
+
+}  // namespace cnerf

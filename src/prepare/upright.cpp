@@ -1,0 +1,364 @@
+#include "src/prepare/upright.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <regex>
+
+#include "src/base/check.h"
+#include "src/base/error.h"
+#include "src/base/rng.h"
+#include "src/capture/focus.h"
+
+namespace cnerf {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+// How far the horizontal axes must spread before they tell up: the middle eigenvalue of their mean outer product, which
+// is sin^2 of the spread.
+constexpr double kAxesSpread = 0.02;
+constexpr double kLevelWithin = 60 * kDegree;   ///< of up by axes and up by tops, or the axes mislead (upright formats)
+constexpr double kGroundWithin = 30 * kDegree;  ///< of a ground's normal and up by cameras
+constexpr double kGroundThickness = 0.02;       ///< of the points' median distance from their middle
+constexpr double kGroundShare = 0.12, kBelowGround = 0.05;
+constexpr double kForwardWithin = 30 * kDegree;  ///< of every optical axis and their mean, in forward-facing captures
+
+double median(std::vector<double> values) {
+  CNERF_CHECK(!values.empty(), "a median of nothing");
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double percentile(std::vector<double> values, double share) {
+  const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+Vec3d median_of(const std::vector<Vec3d>& points) {
+  Vec3d out;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Vec3d& point : points) values.push_back(point[axis]);
+    out[axis] = median(std::move(values));
+  }
+  return out;
+}
+
+void add_outer(Mat3d& sum, Vec3d v) {
+  for (int row = 0; row < 3; ++row) sum.rows[row] += v * v[row];
+}
+
+Vec3d mean_axis(const std::vector<View>& views) {
+  Vec3d sum{};
+  for (const View& view : views) sum += view.world_from_camera.linear.column(2);
+  return sum / double(views.size());
+}
+
+bool is_forward_facing(const std::vector<View>& views) {
+  const Vec3d mean = mean_axis(views);
+  if (length(mean) < 0.5) return false;
+  return std::ranges::all_of(views, [&](const View& view) {
+    return dot(view.world_from_camera.linear.column(2), normalized(mean)) > std::cos(kForwardWithin);
+  });
+}
+
+/// Whether a view shows a point, and how deep.
+std::optional<double> depth_in_view(const View& view, Vec3d point) {
+  const Vec3d in_camera = view.world_from_camera.inverse().point(point);
+  if (in_camera.z <= 0) return std::nullopt;
+  const auto pixel = project(view.intrinsics, in_camera);
+  if (!pixel || pixel->x < 0 || pixel->y < 0 || pixel->x >= view.intrinsics.width ||
+      pixel->y >= view.intrinsics.height) {
+    return std::nullopt;
+  }
+  return in_camera.z;
+}
+
+/// What the cameras look at. Parallel axes meet nowhere: there the points in view tell how far the subject is.
+Vec3d subject_point(const std::vector<View>& views, const std::vector<Vec3d>& points) {
+  if (!is_forward_facing(views) || points.empty()) return focus_point(views);
+  std::vector<Vec3d> seen;
+  for (const Vec3d& point : points) {
+    const auto sees = [&](const View& view) { return depth_in_view(view, point).has_value(); };
+    if (std::size_t(std::ranges::count_if(views, sees)) * 2 >= views.size()) seen.push_back(point);
+  }
+  return seen.empty() ? focus_point(views) : median_of(seen);
+}
+
+double camera_distance(const std::vector<View>& views, Vec3d point) {
+  double sum = 0;
+  for (const View& view : views) sum += length(view.world_from_camera.translation - point);
+  return sum / double(views.size());
+}
+
+std::optional<Vec3d> parse_direction(const std::string& text) {
+  Vec3d v;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3 || !(length(v) > 1e-12)) {
+    return std::nullopt;
+  }
+  return normalized(v);
+}
+
+// ---- measures -----------------------------------------------------------------------------------------------------
+
+struct SeenAt {
+  double x = 0, y = 0;
+  const View* view = nullptr;
+};
+
+const View& view_named(const std::string& name, const std::vector<View>& views) {
+  for (const View& view : views) {
+    const std::filesystem::path file = std::filesystem::path(view.name).filename();
+    if (name == view.name || name == file || name == file.stem()) return view;
+  }
+  throw UsageError("measure: expected the name of a registered view, found '" + name + "'");
+}
+
+/// "x,y,view+x,y,view".
+std::vector<SeenAt> parse_end(const std::string& text, const std::vector<View>& views) {
+  static const std::regex sighting(R"(\s*([0-9.]+),([0-9.]+),([^+]+))");
+  std::vector<SeenAt> out;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find('+', begin), text.size());
+    const std::string part = text.substr(begin, end - begin);
+    std::smatch match;
+    if (!std::regex_match(part, match, sighting)) {
+      throw UsageError("measure: expected x,y,view, found '" + part + "'");
+    }
+    const View& view = view_named(match[3], views);
+    out.push_back({std::stod(match[1]), std::stod(match[2]), &view});
+    if (out.back().x > view.intrinsics.width || out.back().y > view.intrinsics.height) {
+      throw UsageError(fmt::format("measure: expected a pixel of {} ({} x {}), found {},{}", view.name,
+                                   view.intrinsics.width, view.intrinsics.height, out.back().x, out.back().y));
+    }
+    begin = end + 1;
+  }
+  return out;
+}
+
+WorldRay ray_of(const SeenAt& seen) {
+  const Affined& pose = seen.view->world_from_camera;
+  return {pose.translation, normalized(pose.linear * ray_direction(seen.view->intrinsics, {seen.x, seen.y}))};
+}
+
+/// The place of an end that one view shows: as deep as what lies nearest around it in the picture.
+Vec3d place_by_points(const SeenAt& seen, const std::vector<Vec3d>& points) {
+  const View& view = *seen.view;
+  const double reach = 0.03 * std::max(view.intrinsics.width, view.intrinsics.height);
+  std::vector<double> depths;
+  for (const Vec3d& point : points) {
+    const Vec3d in_camera = view.world_from_camera.inverse().point(point);
+    const auto pixel = in_camera.z > 0 ? project(view.intrinsics, in_camera) : std::nullopt;
+    if (pixel && std::hypot(pixel->x - seen.x, pixel->y - seen.y) < reach) depths.push_back(in_camera.z);
+  }
+  if (depths.size() < 3) {
+    throw InputError(
+        fmt::format("measure: {},{} of {}: expected at least 3 sparse points within {:.0f} pixels, found {};"
+                    " name the same place in a second view: x,y,view+x,y,view",
+                    seen.x, seen.y, view.name, reach, depths.size()));
+  }
+  const Vec3d direction = ray_direction(view.intrinsics, {seen.x, seen.y});
+  return view.world_from_camera.point(direction * (percentile(std::move(depths), 0.3) / direction.z));
+}
+
+Vec3d place_of(const std::vector<SeenAt>& sightings, const std::vector<Vec3d>& points) {
+  if (sightings.size() == 1) return place_by_points(sightings.front(), points);
+  std::vector<WorldRay> rays;
+  for (const SeenAt& seen : sightings) rays.push_back(ray_of(seen));
+  return triangulate(rays).point;
+}
+
+}  // namespace
+
+UpFromCameras up_from_cameras(const std::vector<Affined>& world_from_camera) {
+  Mat3d axes{};
+  Vec3d tops{};
+  const double share = 1.0 / double(world_from_camera.size());
+  for (const Affined& pose : world_from_camera) {
+    add_outer(axes, pose.linear.column(0) * std::sqrt(share));
+    tops += -pose.linear.column(1) * share;
+  }
+  const SymmetricEigen eigen = symmetric_eigen(axes);
+  Vec3d up = eigen.vectors.column(0);
+  if (dot(up, tops) < 0) up = -up;
+  if (length(tops) < 1e-9) return {up, true};
+  const bool spread = eigen.values.y > kAxesSpread && eigen.values.x < 0.25 * eigen.values.y;
+  if (spread && dot(up, normalized(tops)) > std::cos(kLevelWithin)) return {up, true};
+  return {normalized(tops), false};
+}
+
+std::optional<GroundPlane> find_ground(const std::vector<Vec3d>& points, Vec3d roughly_up) {
+  if (points.size() < 50) return std::nullopt;
+  const Vec3d middle = median_of(points);
+  std::vector<double> distances;
+  for (const Vec3d& point : points) distances.push_back(length(point - middle));
+  const double thickness = kGroundThickness * median(distances);
+  const CounterRng rng(0x67726f756e64ull, 0);
+  GroundPlane best;
+  for (std::uint64_t trial = 0; trial < 2000; ++trial) {
+    const auto pick = [&](std::uint64_t k) { return points[rng.below(trial * 3 + k, std::uint32_t(points.size()))]; };
+    const Vec3d a = pick(0), span = cross(pick(1) - a, pick(2) - a);
+    if (!(length(span) > 1e-12)) continue;
+    Vec3d normal = normalized(span);
+    if (dot(normal, roughly_up) < 0) normal = -normal;
+    if (dot(normal, roughly_up) < std::cos(kGroundWithin)) continue;
+    std::size_t on = 0, below = 0;
+    for (const Vec3d& point : points) {
+      const double height = dot(normal, point - a);
+      on += std::abs(height) < thickness ? 1 : 0;
+      below += height < -3 * thickness ? 1 : 0;
+    }
+    const double share = double(on) / double(points.size());
+    if (share > best.share && double(below) < kBelowGround * double(points.size()))
+      best = {normal, dot(normal, a), share};
+  }
+  if (best.share < kGroundShare) return std::nullopt;
+  // Refine: the plane of least squared distance to its points.
+  Vec3d mean{};
+  std::vector<Vec3d> on;
+  for (const Vec3d& point : points) {
+    if (std::abs(dot(best.normal, point) - best.height) < thickness) on.push_back(point);
+  }
+  for (const Vec3d& point : on) mean += point / double(on.size());
+  Mat3d spread{};
+  for (const Vec3d& point : on) add_outer(spread, point - mean);
+  Vec3d normal = symmetric_eigen(spread).vectors.column(0);
+  if (dot(normal, roughly_up) < 0) normal = -normal;
+  return GroundPlane{normal, dot(normal, mean), best.share};
+}
+
+Triangulated triangulate(const std::vector<WorldRay>& rays) {
+  CNERF_CHECK(rays.size() >= 2, "a place is triangulated from two rays at least");
+  Mat3d normal{};
+  Vec3d right{};
+  double least_cosine = 1;
+  for (const WorldRay& ray : rays) {
+    const Vec3d d = ray.direction;
+    for (int i = 0; i < 3; ++i) {
+      Vec3d row = d * -d[i];
+      row[i] += 1;
+      normal.rows[i] += row;
+      right[i] += dot(row, ray.origin);
+    }
+    for (const WorldRay& other : rays) least_cosine = std::min(least_cosine, dot(d, other.direction));
+  }
+  Triangulated out;
+  out.widest_degrees = std::acos(std::clamp(least_cosine, -1.0, 1.0)) / kDegree;
+  if (!(normal.determinant() > 1e-9)) throw InputError("triangulation: the rays are parallel, so they meet nowhere");
+  out.point = normal.inverse() * right;
+  double squared = 0;
+  for (const WorldRay& ray : rays) {
+    const Vec3d off = cross(out.point - ray.origin, ray.direction);
+    squared += dot(off, off);
+  }
+  out.distance = std::sqrt(squared / double(rays.size()));
+  return out;
+}
+
+double units_per_metre(const std::string& measure, const std::vector<View>& views, const std::vector<Vec3d>& points) {
+  static const std::regex whole(R"(\s*(\S+)\s+(\S+)\s*=\s*([0-9.]+)\s*(mm|cm|m|km|in|ft)?\s*)");
+  std::smatch match;
+  if (!std::regex_match(measure, match, whole)) {
+    throw UsageError("measure: expected 'x1,y1,view1 x2,y2,view2 = 1.2m', found '" + measure + "'");
+  }
+  const std::string unit = match[4];
+  const double in_metres = unit == "mm"   ? 1e-3
+                           : unit == "cm" ? 1e-2
+                           : unit == "km" ? 1e3
+                           : unit == "in" ? 0.0254
+                           : unit == "ft" ? 0.3048
+                                          : 1.0;
+  const double metres = std::stod(match[3]) * in_metres;
+  if (!(metres > 0)) throw UsageError("measure: expected a length above 0, found '" + match[3].str() + "'");
+  const Vec3d a = place_of(parse_end(match[1], views), points), b = place_of(parse_end(match[2], views), points);
+  const double units = length(a - b);
+  if (!(units > 1e-9 * camera_distance(views, a))) throw UsageError("measure: both ends are the same place");
+  return units / metres;
+}
+
+FrameChoice choose_frame(const std::vector<View>& views, const std::vector<Vec3d>& points,
+                         const FrameOptions& options) {
+  const Vec3d subject = subject_point(views, points);
+  const double distance = camera_distance(views, subject);
+  std::vector<Vec3d> near_points;
+  for (const Vec3d& point : points) {
+    if (length(point - subject) < distance) near_points.push_back(point);
+  }
+
+  FrameChoice out;
+  if (options.up == "none") {
+    out.up_by = "none";
+    out.capture_from_poses.scale = options.scale > 0 ? options.scale : 1;
+  } else {
+    std::vector<Affined> poses;
+    for (const View& view : views) poses.push_back(view.world_from_camera);
+    const UpFromCameras cameras = up_from_cameras(poses);
+    Vec3d up = cameras.up;
+    out.up_by = cameras.from_axes ? "level cameras" : "camera tops";
+    std::optional<GroundPlane> ground;
+    if (options.up == "auto") {
+      ground = find_ground(near_points, up);
+    } else if (options.up != "cameras") {
+      const auto given = parse_direction(options.up);
+      if (!given) throw UsageError("up: expected auto, cameras, none or x,y,z, found '" + options.up + "'");
+      up = *given;
+      out.up_by = "given";
+    }
+    if (ground) {
+      up = ground->normal;
+      out.up_by = "ground";
+      out.ground_share = ground->share;
+    }
+    Similarity& frame = out.capture_from_poses;
+    frame.rotation = rotation_between(up, {0, 0, 1});
+    frame.scale = options.scale > 0 ? options.scale : 1 / distance;
+    const Vec3d base = subject + up * ((ground ? ground->height : dot(up, subject)) - dot(up, subject));
+    frame.translation = -(frame.scale * (frame.rotation * base));
+  }
+  if (!options.measure.empty()) {
+    const double scale = 1 / units_per_metre(options.measure, views, points);
+    out.capture_from_poses.translation = out.capture_from_poses.translation * (scale / out.capture_from_poses.scale);
+    out.capture_from_poses.scale = scale;
+    out.metres = true;
+  }
+  return out;
+}
+
+std::optional<SubjectBox> find_subject(const std::vector<View>& views, const std::vector<Vec3d>& points) {
+  SubjectBox out;
+  out.forward_facing = is_forward_facing(views);
+  const Vec3d subject = subject_point(views, points);
+  const double reach = out.forward_facing ? std::numeric_limits<double>::infinity() : camera_distance(views, subject);
+  std::vector<Vec3d> inside;
+  std::vector<double> depths;
+  for (const Vec3d& point : points) {
+    std::size_t seen = 0;
+    for (const View& view : views) {
+      const auto depth = depth_in_view(view, point);
+      if (depth) depths.push_back(*depth);
+      seen += depth ? 1 : 0;
+    }
+    const std::size_t enough = std::max<std::size_t>(2, views.size() * 3 / 10);
+    if (seen >= enough && length(point - subject) < reach) inside.push_back(point);
+  }
+  if (inside.size() < 20) return std::nullopt;
+  out.near = 0.9 * percentile(depths, 0.001);
+  out.far = 1.1 * percentile(depths, 0.999);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Vec3d& point : inside) values.push_back(point[axis]);
+    const double low = percentile(values, 0.01), high = percentile(values, 0.99);
+    const double pad = 0.05 * (high - low) + 1e-9;
+    out.box.min[axis] = low - pad;
+    out.box.max[axis] = high + pad;
+  }
+  return out;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,80 @@
+#pragma once
+/// A film clip on its way to images of a capture: shots, the frames worth keeping, borders, fields.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "src/base/options.h"
+#include "src/base/progress.h"
+#include "src/prepare/film.h"
+#include "src/prepare/photographs.h"
+
+namespace cnerf {
+
+struct VideoOptions {
+  int shot = 0;     ///< 1 is the first; 0 = the longest in which the camera travels
+  int frames = 60;  ///< to keep
+  double fps = 0;   ///< frames to keep a second of the clip, instead of `frames`; 0 = by `frames`
+  std::string video_range = "auto";
+  bool keep_borders = false;
+  bool allow_no_parallax = false;
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("shot", shot, Range{0, 100000}, "shot of a clip to use; 0 = the longest in which the camera travels");
+    v("frames", frames, Range{2, 10000}, "frames of a clip to keep, the sharpest of each window");
+    v("fps", fps, Range{0, 1000}, "frames to keep a second, instead of a number; 0 = by number");
+    v("video_range", video_range, Choice{"auto", "full", "limited"},
+      "codes of black and white: as the clip says, 0 to 255, or 16 to 235 that the decoder did not expand");
+    v("keep_borders", keep_borders, "leave letterbox bars in the pictures");
+    v("allow_no_parallax", allow_no_parallax, "go on with a shot in which the camera seems only to turn or zoom");
+  }
+};
+
+/// What a shot is good for.
+struct ShotReport {
+  Shot range;
+  int judged = 0;       ///< pairs of frames with enough motion to tell
+  double parallax = 0;  ///< share of them with parallax
+  double moved = -1;    ///< median displacement of places, share of the diagonal; -1: none could be followed
+  int duplicates = 0;
+  FilmMarks marks;
+
+  /// Why the shot cannot be reconstructed; empty if it can.
+  [[nodiscard]] std::string refusal() const;
+};
+
+struct ClipReport {
+  int width = 0, height = 0, frames = 0;  ///< as stored; frames that could be read
+  double fps = 0;
+  double pixel_aspect = 1;  ///< width over height of a pixel
+  bool interlaced = false;
+  double combed = 0;  ///< share of frames woven of two moments
+  cv::Rect picture;   ///< what is kept of a frame
+  std::vector<ShotReport> shots;
+  int shot = 0;           ///< the one used, counted from 1
+  std::vector<int> kept;  ///< frame numbers
+};
+
+struct ClipImport {
+  PhotographSet set;
+  ClipReport report;
+};
+
+/// True for a file that OpenCV can open as a video; by content, not by name.
+[[nodiscard]] bool is_clip(const std::filesystem::path& file);
+
+/// Reads the clip twice: once to judge every frame, once to write those worth keeping to `capture/images`. Borders are
+/// cropped with the principal point kept; of interlaced frames one field is kept, with pixels twice as high; nothing is
+/// resampled.
+/// @throws InputError   no clip, too few frames.  @throws UsageError  no such shot.
+/// @throws PosesError   a shot without parallax or motion, with the reason.  @throws Interrupted.
+[[nodiscard]] ClipImport import_clip(const std::filesystem::path& clip, const std::filesystem::path& capture,
+                                     const VideoOptions& options, const SensorOptions& sensor,
+                                     const ProgressSink& progress);
+
+/// The shots as lines for the user, each with its frames, seconds and what speaks against it.
+[[nodiscard]] std::vector<std::string> shot_lines(const ClipReport& report);
+
+}  // namespace cnerf

@@ -1,0 +1,59 @@
+#include "src/base/program.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+
+TEST(FindProgram, LooksOnThePathAndTakesPathsAsTheyAre) {
+  EXPECT_TRUE(find_program("sh"));
+  EXPECT_TRUE(find_program("/bin/sh"));
+  EXPECT_FALSE(find_program("no-such-program-anywhere"));
+  EXPECT_FALSE(find_program("/bin")) << "a folder";
+  EXPECT_FALSE(find_program("/etc/passwd")) << "not executable";
+}
+
+TEST(RunProgram, ReturnsTheStatusAndAppendsBothOutputs) {
+  const test::TempDir folder;
+  EXPECT_EQ(run_program({"/bin/sh", "-c", "echo one; echo two >&2; exit 3"}, folder / "log"), 3);
+  EXPECT_EQ(run_program({"/bin/sh", "-c", "echo \"three $1\"", "sh", "a b"}, folder / "log"), 0);
+  EXPECT_EQ(read_text_file(folder / "log"), "one\ntwo\nthree a b\n");
+  EXPECT_EQ(run_program({"/bin/sh", "-c", "kill -9 $$"}, folder / "log"), 128 + 9);
+}
+
+TEST(RunProgram, GivesNoInputAndSaysThatThereIsNoScreen) {
+  const test::TempDir folder;
+  EXPECT_EQ(run_program({"/bin/sh", "-c", "cat; echo $QT_QPA_PLATFORM"}, folder / "log"), 0);
+  EXPECT_EQ(read_text_file(folder / "log"), "offscreen\n");
+}
+
+TEST(RunProgram, AWatchThatThrowsEndsTheProgramAndItsChildren) {
+  const test::TempDir folder;
+  const auto start = std::chrono::steady_clock::now();
+  int looks = 0;
+  const auto watch = [&] {
+    if (++looks == 3) throw Interrupted("enough");
+  };
+  const std::string late = (folder / "late").string();
+  EXPECT_THROW(
+      (void)run_program({"/bin/sh", "-c", "(sleep 1; touch '" + late + "') & sleep 20"}, folder / "log", watch),
+      Interrupted);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+  (void)run_program({"/bin/sh", "-c", "sleep 1.5"}, folder / "log");
+  EXPECT_FALSE(std::filesystem::exists(late));
+}
+
+TEST(RunProgram, MissingProgramsAndLogsAreNamed) {
+  const test::TempDir folder;
+  EXPECT_THROW((void)run_program({"/absent/program"}, folder / "log"), DeviceError);
+  EXPECT_THROW((void)run_program({"/bin/true"}, folder / "absent" / "log"), OutputError);
+}
+
+}  // namespace
+}  // namespace cnerf

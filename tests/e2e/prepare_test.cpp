@@ -1,0 +1,133 @@
+/// cnerf prepare as a program: what it makes, what it refuses, what it leaves.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "src/base/files.h"
+#include "src/capture/load_capture.h"
+#include "src/prepare/similarity.h"
+#include "tests/e2e/program.h"
+#include "tests/support/data.h"
+
+namespace cnerf::test {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// w x y z of a rotation, by the largest of the four, so that none is lost to rounding.
+std::array<double, 4> quaternion_of(const Mat3d& m) {
+  const auto at = [&](int r, int c) { return m.rows[r][c]; };
+  const std::array<double, 4> squares = {1 + at(0, 0) + at(1, 1) + at(2, 2), 1 + at(0, 0) - at(1, 1) - at(2, 2),
+                                         1 - at(0, 0) + at(1, 1) - at(2, 2), 1 - at(0, 0) - at(1, 1) + at(2, 2)};
+  const double wx = at(2, 1) - at(1, 2), wy = at(0, 2) - at(2, 0), wz = at(1, 0) - at(0, 1);
+  const double xy = at(0, 1) + at(1, 0), xz = at(0, 2) + at(2, 0), yz = at(1, 2) + at(2, 1);
+  const double products[4][4] = {
+      {squares[0], wx, wy, wz}, {wx, squares[1], xy, xz}, {wy, xy, squares[2], yz}, {wz, xz, yz, squares[3]}};
+  const auto largest = std::size_t(std::ranges::max_element(squares) - squares.begin());
+  const double scale = 0.5 / std::sqrt(squares[largest]);
+  return {products[largest][0] * scale, products[largest][1] * scale, products[largest][2] * scale,
+          products[largest][3] * scale};
+}
+
+/// The tiny capture as a user has it: photographs, and somebody's COLMAP model.
+struct UserFolder {
+  fs::path photos, model;
+};
+UserFolder without_poses(const fs::path& folder) {
+  const UserFolder out = {folder / "photos", folder / "model"};
+  fs::create_directories(out.photos);
+  const Capture capture = load_capture(tiny_capture());
+  std::ostringstream cameras, images;
+  cameras.precision(17), images.precision(17);
+  int number = 0;
+  for (const View& view : capture.views) {
+    fs::copy_file(view.image_file, out.photos / view.image_file.filename());
+    const Affined camera_from_world = view.world_from_camera.inverse();
+    ++number;
+    images << number;
+    for (const double q : quaternion_of(camera_from_world.linear)) images << ' ' << q;
+    for (int axis = 0; axis < 3; ++axis) images << ' ' << camera_from_world.translation[axis];
+    images << " 1 " << view.image_file.filename().string() << "\n\n";
+  }
+  const Intrinsics& lens = capture.views.front().intrinsics;
+  cameras << "1 PINHOLE " << lens.width << ' ' << lens.height << ' ' << lens.fx << ' ' << lens.fy << ' ' << lens.cx
+          << ' ' << lens.cy << '\n';
+  write_file(out.model / "cameras.txt", cameras.str());
+  write_file(out.model / "images.txt", images.str());
+  write_file(out.model / "points3D.txt", std::string_view("1 0 0 0 9 9 9 0.1\n2 0.1 0 0.2 9 9 9 0.1\n"));
+  return out;
+}
+
+TEST(Prepare, TakesAReadyModelAndSetsItUpright) {
+  const TempDir folder;
+  const UserFolder user = without_poses(folder.path());
+  const fs::path out = folder / "capture";
+  const ProgramResult result =
+      cnerf({"prepare", user.photos.string(), "-o", out.string(), "--colmap-model", user.model.string()});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  for (const char* file : {"transforms.json", "prepare.json", "contact_sheet.png"}) EXPECT_TRUE(fs::exists(out / file));
+  std::vector<Affined> poses, truth;
+  const Capture given = load_capture(tiny_capture()), prepared = load_capture(out);
+  ASSERT_EQ(prepared.views.size(), given.views.size());
+  for (std::size_t i = 0; i < given.views.size(); ++i) {
+    poses.push_back(prepared.views[i].world_from_camera);
+    truth.push_back(given.views[i].world_from_camera);
+    EXPECT_EQ(prepared.views[i].image.u8, given.views[i].image.u8);
+  }
+  const PoseComparison comparison = compare_poses(poses, truth);
+  for (const double degrees : comparison.rotation_degrees) EXPECT_LT(degrees, 1e-6);
+  for (const double error : comparison.centre_errors) EXPECT_LT(error, 1e-9);
+  // The sample's cameras are level about Z, so Z stays up.
+  EXPECT_LT(length(comparison.truth_from_poses.rotation * Vec3d{0, 0, 1} - Vec3d{0, 0, 1}), 1e-6);
+
+  const auto record = nlohmann::json::parse(read_text_file(out / "prepare.json"));
+  EXPECT_EQ(record.at("poses").at("placed"), given.views.size());
+  EXPECT_EQ(record.at("frame").at("unit"), "unknown");
+
+  EXPECT_EQ(cnerf({"prepare", user.photos.string(), "-o", out.string()}).exit_code, 64) << "it is there already";
+  EXPECT_EQ(cnerf({"prepare", user.photos.string(), "-o", out.string(), "--resume"}).exit_code, 0);
+  EXPECT_EQ(cnerf({"prepare", user.model.string(), "-o", out.string(), "--resume"}).exit_code, 64) << "another source";
+}
+
+TEST(Prepare, WithoutColmapSaysHowToGetItAndGoesOnLater) {
+  const TempDir folder;
+  const UserFolder user = without_poses(folder.path());
+  const std::string out = (folder / "capture").string();
+  const ProgramResult result = cnerf({"prepare", user.photos.string(), "-o", out, "--colmap", "/absent/colmap"});
+  EXPECT_EQ(result.exit_code, 69);
+  EXPECT_THAT(result.err, HasSubstr("apt install colmap"));
+  EXPECT_TRUE(fs::exists(fs::path(out) / "images"));
+  EXPECT_FALSE(fs::exists(fs::path(out) / "transforms.json"));
+  EXPECT_EQ(
+      cnerf({"prepare", user.photos.string(), "-o", out, "--resume", "--colmap-model", user.model.string()}).exit_code,
+      0);
+}
+
+TEST(Prepare, BadInputIsNamed) {
+  const TempDir folder;
+  const UserFolder user = without_poses(folder.path());
+  const std::string out = (folder / "capture").string();
+  const auto refused = [&](const std::vector<std::string>& words, int code, const std::string& message) {
+    const ProgramResult result = cnerf(words);
+    EXPECT_EQ(result.exit_code, code) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(message));
+  };
+  refused({"prepare", (folder / "absent").string(), "-o", out}, 66, "absent");
+  write_file(folder / "broken.mp4", std::string_view("no film"));
+  refused({"prepare", (folder / "broken.mp4").string(), "-o", out}, 65, "broken.mp4");
+  fs::remove_all(out);
+  refused({"prepare", user.photos.string(), "-o", out, "--frames", "1"}, 64, "frames");
+  refused({"prepare", user.photos.string(), "-o", folder.path().string()}, 64, "is not empty");
+  write_file(user.photos / "x.heic", std::string_view("x"));
+  refused({"prepare", user.photos.string(), "-o", out}, 65, "heif-convert");
+}
+
+}  // namespace
+}  // namespace cnerf::test

@@ -1,0 +1,232 @@
+#include "src/prepare/photographs.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/capture/exr_io.h"
+#include "src/color/colorspace_math.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+cv::Mat1b ramp(int width, int height, int seed = 0) {
+  cv::Mat1b image(height, width);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) image(y, x) = std::uint8_t(7 * x + 11 * y + seed);
+  }
+  return image;
+}
+
+void write(const fs::path& file, const cv::Mat& image) {
+  fs::create_directories(file.parent_path());
+  ASSERT_TRUE(cv::imwrite(file.string(), image));
+}
+
+/// A big-endian EXIF block with orientation, focal length and its 35 mm equivalent.
+std::string exif_block(int orientation, int focal_mm, int focal_35mm) {
+  std::string tiff("MM\0*\0\0\0\x08", 8);
+  const auto u16 = [&](int v) { tiff += {char(v >> 8), char(v)}; };
+  const auto u32 = [&](int v) { tiff += {char(v >> 24), char(v >> 16), char(v >> 8), char(v)}; };
+  u16(2);  // entries of the first directory, at 8
+  u16(0x0112), u16(3), u32(1), u16(orientation), u16(0);
+  u16(0x8769), u16(4), u32(1), u32(38);  // the EXIF directory follows
+  u32(0);
+  u16(2);                                // at 38
+  u16(0x920A), u16(5), u32(1), u32(68);  // focal length, a rational at 68
+  u16(0xA405), u16(3), u32(1), u16(focal_35mm), u16(0);
+  u32(0);
+  u32(focal_mm), u32(1);
+  return std::string("Exif\0\0", 6) + tiff;
+}
+
+/// A JPEG with the block inserted behind its first marker.
+void write_jpeg(const fs::path& file, const cv::Mat& image, const std::string& exif) {
+  std::vector<std::uint8_t> bytes;
+  ASSERT_TRUE(cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, 100}));
+  const std::size_t size = exif.size() + 2;
+  std::string text(bytes.begin(), bytes.begin() + 2);
+  text += {char(0xFF), char(0xE1), char(size >> 8), char(size)};
+  text += exif;
+  text.append(bytes.begin() + 2, bytes.end());
+  fs::create_directories(file.parent_path());
+  write_file(file, text);
+}
+
+PhotographSet import_all(const fs::path& folder, const fs::path& capture, const SensorOptions& sensor = {},
+                         const fs::path& masks = {}) {
+  return import_photographs(list_photographs(folder), capture, masks, sensor, {});
+}
+
+cv::Mat stored(const fs::path& file) {
+  return cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+}
+
+TEST(Photographs, GreyEightBitKeepsItsCodes) {
+  const test::TempDir folder;
+  write(folder / "in/a.png", ramp(31, 17));
+  write(folder / "in/b.tiff", ramp(31, 17, 5));
+  const PhotographSet set = import_all(folder / "in", folder / "out");
+  ASSERT_EQ(set.images.size(), 2u);
+  EXPECT_EQ(set.images[0].name, "a.png");
+  const cv::Mat a = stored(folder / "out/images/a.png"), b = stored(folder / "out/images/b.png");
+  ASSERT_EQ(a.type(), CV_8UC1);
+  EXPECT_EQ(cv::norm(a, ramp(31, 17), cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(b, ramp(31, 17, 5), cv::NORM_INF), 0);
+  EXPECT_EQ(set.images[0].camera, set.images[1].camera);
+}
+
+TEST(Photographs, SixteenBitsAndFloatsKeepTheirDepth) {
+  const test::TempDir folder;
+  cv::Mat1w deep(8, 9);
+  for (int i = 0; i < 72; ++i) deep(i / 9, i % 9) = std::uint16_t(900 * i + 3);
+  write(folder / "in/deep.png", deep);
+  const std::vector<float> light = {0, 0.25f, 0.5f, 1.5f, 2, 3, 4, 5, 6, 7, 8, 9};
+  write_exr_channel(folder / "in/float.exr", "Y", 4, 3, light);
+  const PhotographSet set = import_all(folder / "in", folder / "out");
+  const cv::Mat back = stored(folder / "out/images/deep.png");
+  ASSERT_EQ(back.type(), CV_16UC1);
+  EXPECT_LE(cv::norm(back, deep, cv::NORM_INF), 1);  // through linear light in floats
+  EXPECT_EQ(read_exr(folder / "out/images/float.exr").values, light);
+  EXPECT_NE(set.images[0].camera, set.images[1].camera) << "sizes differ";
+}
+
+TEST(Photographs, ColoursBecomeTheirLuminance) {
+  const test::TempDir folder;
+  write(folder / "in/a.png", cv::Mat(6, 8, CV_8UC3, cv::Scalar(10, 200, 90)));
+  write(folder / "in/b.png", cv::Mat(6, 8, CV_8UC3, cv::Scalar(77, 77, 77)));
+  (void)import_all(folder / "in", folder / "out");
+  const cv::Mat a = stored(folder / "out/images/a.png"), b = stored(folder / "out/images/b.png");
+  ASSERT_EQ(a.channels(), 1);
+  const auto light = [](int code) { return linear_from_srgb(code / 255.0); };
+  const double luminance = luminance_of<double>({light(90), light(200), light(10)});
+  EXPECT_EQ(int(a.at<std::uint8_t>(0)), int(std::lround(255 * srgb_from_linear(luminance))));
+  EXPECT_EQ(int(b.at<std::uint8_t>(0)), 77);
+}
+
+TEST(Photographs, ExifTurnsUprightAndTellsTheLens) {
+  // Upright, the bright corner is at the top left in every one of the eight orientations.
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    const Upright grid = {orientation, 64, 32};
+    cv::Mat1b image(32, 64, std::uint8_t(30));
+    for (int y = 0; y < 8; ++y) {
+      for (int x = 0; x < 8; ++x) image(int(grid.stored_index(x, y)) / 64, int(grid.stored_index(x, y)) % 64) = 220;
+    }
+    const test::TempDir folder;
+    write_jpeg(folder / "in/a.jpg", image, exif_block(orientation, 26, 28));
+    write_jpeg(folder / "in/b.jpg", image, exif_block(orientation, 50, 75));
+    const PhotographSet set = import_all(folder / "in", folder / "out");
+    const cv::Mat upright = stored(folder / "out/images/a.png");
+    EXPECT_EQ(upright.cols, orientation < 5 ? 64 : 32) << orientation;
+    EXPECT_GT(upright.at<std::uint8_t>(3, 3), 180) << orientation;
+    EXPECT_LT(upright.at<std::uint8_t>(upright.rows - 4, upright.cols - 4), 60) << orientation;
+    EXPECT_NEAR(set.images[0].focal, 28.0 / 36 * 64, 1e-9);
+    EXPECT_NEAR(set.images[1].focal, 75.0 / 36 * 64, 1e-9);
+    EXPECT_NE(set.images[0].camera, set.images[1].camera) << "two focal lengths";
+  }
+}
+
+TEST(Photographs, EveryOrientationIsABijection) {
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    const Upright grid = {orientation, 5, 3};
+    std::vector<int> hits(15);
+    for (int y = 0; y < grid.height(); ++y) {
+      for (int x = 0; x < grid.width(); ++x) ++hits.at(grid.stored_index(x, y));
+    }
+    EXPECT_THAT(hits, testing::Each(1)) << orientation;
+  }
+  // As EXIF numbers them: in 6 the stored image has to be turned clockwise, so its bottom left comes to the top left.
+  EXPECT_EQ((Upright{6, 5, 3}.stored_index(0, 0)), 2u * 5);
+  EXPECT_EQ((Upright{3, 5, 3}.stored_index(0, 0)), 14u);
+  EXPECT_EQ((Upright{8, 5, 3}.stored_index(0, 0)), 4u);
+}
+
+TEST(Photographs, BrokenNotesAreIgnored) {
+  const test::TempDir folder;
+  std::string broken = exif_block(6, 26, 28);
+  for (std::size_t i = 14; i < broken.size(); ++i) broken[i] = char(0xEE);
+  write_jpeg(folder / "in/a.jpg", ramp(20, 10), broken);
+  write_jpeg(folder / "in/b.jpg", ramp(20, 10), exif_block(6, 26, 28).substr(0, 20));
+  EXPECT_EQ(import_all(folder / "in", folder / "out").images.size(), 2u);
+}
+
+TEST(Photographs, LevelsOfASensorAreApplied) {
+  const test::TempDir folder;
+  cv::Mat1w raw(2, 3);
+  raw(0, 0) = 64, raw(0, 1) = 4095, raw(0, 2) = 64 + 4031 / 2, raw(1, 0) = 0, raw(1, 1) = 5000, raw(1, 2) = 1071;
+  write(folder / "in/a.png", raw);
+  write(folder / "in/b.png", raw);
+  SensorOptions sensor;
+  sensor.transfer = "linear";
+  sensor.black_level = 64;
+  sensor.white_level = 4095;
+  (void)import_all(folder / "in", folder / "out", sensor);
+  const cv::Mat1w a = stored(folder / "out/images/a.png");
+  const auto light = [&](int y, int x) { return linear_from_srgb(a(y, x) / 65535.0); };
+  EXPECT_EQ(a(0, 0), 0);
+  EXPECT_EQ(a(0, 1), 65535);
+  EXPECT_EQ(a(1, 0), 0) << "below black";
+  EXPECT_EQ(a(1, 1), 65535) << "above white";
+  EXPECT_NEAR(light(0, 2), 0.5, 2e-4);
+  EXPECT_NEAR(light(1, 2), (1071 - 64) / 4031.0, 2e-4);
+}
+
+TEST(Photographs, UnreadableOnesAreNamedAndLeftOut) {
+  const test::TempDir folder;
+  write(folder / "in/a.png", ramp(20, 10));
+  write(folder / "in/b.png", ramp(20, 10));
+  write_file(folder / "in/c.jpg", std::string_view("not an image"));
+  const PhotographSet set = import_all(folder / "in", folder / "out");
+  EXPECT_EQ(set.images.size(), 2u);
+  ASSERT_EQ(set.unreadable.size(), 1u);
+  EXPECT_THAT(set.unreadable[0], HasSubstr("c.jpg"));
+  fs::remove(folder / "in/b.png");
+  EXPECT_THROW((void)import_all(folder / "in", folder / "out"), InputError) << "one is too few";
+}
+
+TEST(Photographs, HeicIsRefusedWithTheCommandThatConverts) {
+  const test::TempDir folder;
+  write(folder / "in/a.png", ramp(20, 10));
+  write_file(folder / "in/b.HEIC", std::string_view("ftypheic"));
+  try {
+    (void)list_photographs(folder / "in");
+    FAIL() << "not refused";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("b.HEIC"));
+    EXPECT_THAT(error.what(), HasSubstr("heif-convert"));
+  }
+}
+
+TEST(Photographs, MasksFollowTheirPhotograph) {
+  const test::TempDir folder;
+  write(folder / "in/one two.png", ramp(20, 10));
+  write(folder / "in/b.png", ramp(20, 10, 3));
+  cv::Mat1b mask(10, 20, std::uint8_t(255));
+  mask.colRange(0, 5) = 0;
+  write(folder / "masks/b.png.png", mask);
+  const PhotographSet set = import_all(folder / "in", folder / "out", {}, folder / "masks");
+  EXPECT_EQ(set.images[0].name, "b.png");
+  EXPECT_EQ(set.images[0].mask, "masks/b.png");
+  EXPECT_EQ(set.images[1].name, "one_two.png");
+  EXPECT_TRUE(set.images[1].mask.empty());
+  EXPECT_EQ(cv::norm(stored(folder / "out/masks/b.png"), mask, cv::NORM_INF), 0);
+  fs::remove(folder / "masks/b.png.png");
+  write(folder / "masks/other.png", mask);
+  EXPECT_THROW((void)import_all(folder / "in", folder / "out", {}, folder / "masks"), InputError);
+}
+
+TEST(Photographs, AFolderWithoutAnyIsRefused) {
+  const test::TempDir folder;
+  EXPECT_THROW((void)list_photographs(folder / "nowhere"), MissingInputError);
+  EXPECT_THROW((void)list_photographs(folder.path()), MissingInputError);
+}
+
+}  // namespace
+}  // namespace cnerf
