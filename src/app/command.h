@@ -25,6 +25,7 @@ Work declare_run(CLI::App& app);
 Work declare_sample(CLI::App& app);
 Work declare_train(CLI::App& app);
 Work declare_colorize(CLI::App& app);
+Work declare_colorize_image(CLI::App& app);
 Work declare_render(CLI::App& app);
 Work declare_eval(CLI::App& app);
 Work declare_bake(CLI::App& app);

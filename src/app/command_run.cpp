@@ -3,6 +3,7 @@
 #include "src/app/command.h"
 #include "src/app/common_options.h"
 #include "src/app/default_colorizer.h"
+#include "src/app/known_color_files.h"
 #include "src/app/pipeline.h"
 #include "src/base/error.h"
 
@@ -53,7 +54,8 @@ void run(const RunArguments& arguments) {
   Capture capture = read_capture(arguments.capture, config, reporter);
   RunContext context{RunDirectory(arguments.out), config, std::move(capture), arguments.command_line, reporter};
   check_run_folder(context, arguments.existing);
-  // Made before the training: one that cannot be made should not cost an hour.
+  // Made before the training: what cannot be made or read should not cost an hour.
+  if (!arguments.grey) (void)load_known_colors(context.capture, context.config.colorizer);
   auto colorizer = needs_colorizer(arguments, context.directory) ? colorizer_of(context) : nullptr;
   begin_run(context, arguments.capture, arguments.existing);
   train_step(context, arguments.existing.resume);
@@ -78,8 +80,7 @@ Work declare_run(CLI::App& app) {
   auto arguments = std::make_shared<RunArguments>();
   app.add_option("CAPTURE", arguments->capture, "Folder of photographs and camera poses")->required();
   app.add_option("-o,--out", arguments->out, "Folder of the run, made if needed")->required();
-  add_short_form(app, arguments->config, "--colorizer", "colorizer.spec",
-                 "Who colours: reference:IMAGE..., torchscript:FILE, exec:COMMAND");
+  add_colorizer_options(app, arguments->config);
   app.add_flag("--grey", arguments->grey, "Stay grey: no colorizer");
   app.add_option("--format", arguments->format, "What to bake: vdb, gltf, exr, web or several, comma-separated");
   add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");

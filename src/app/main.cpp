@@ -19,6 +19,7 @@ constexpr Command kCommands[] = {
     {"sample", "Write the embedded sample capture, with colour ground truth", declare_sample, false},
     {"train", "Stage 1: luminance and density from a capture", declare_train, true},
     {"colorize", "Stage 2: colours for a trained run; takes stand side by side", declare_colorize, true},
+    {"colorize-image", "One picture, to judge a colorizer", declare_colorize_image, false},
     {"render", "Pictures and videos of a run", declare_render, false},
     {"eval", "Numbers against held-out views, and a contact sheet", declare_eval, false},
     {"bake", "A run as an OpenVDB volume for Blender and others", declare_bake, false},

@@ -48,6 +48,9 @@ void check_run_folder(const RunContext& context, const ExistingOutput& existing)
 /// Makes the folder of a run ready: clears it to overwrite, writes config.toml and run.json.
 void begin_run(const RunContext& context, const std::filesystem::path& capture_path, const ExistingOutput& existing);
 
+/// What the configuration says of its colorizer. The folders are those of `ColorizerOptions`; empty = none.
+[[nodiscard]] ColorizerOptions colorizer_options(const Config& config, const std::filesystem::path& working_folder,
+                                                 const std::filesystem::path& cache_folder, Reporter& reporter);
 /// The colorizer the configuration names. What it learns is kept in the run's folder, for the next time.
 /// @throws UsageError, MissingInputError, ColorizerError.
 [[nodiscard]] std::unique_ptr<Colorizer> colorizer_of(const RunContext& context);
@@ -59,6 +62,8 @@ void train_step(RunContext& context, bool resume);
 /// that was not finished.  @throws UsageError  when the named take is finished and neither is set.
 [[nodiscard]] std::string take_to_write(const RunContext& context, const std::string& named,
                                         const ExistingOutput& existing);
+/// Writes the gallery of base candidates beside the takes; touches none of them.
+void show_bases(const RunContext& context);
 /// Stage 2 into `take`, unless it is finished. Makes it the current take.
 /// @param colorizer  null: `colorizer_of(context)` is made when it is needed.
 void colorize_step(RunContext& context, const std::string& take, const ExistingOutput& existing,
