@@ -83,7 +83,11 @@ TEST(WebBundle, ListsWhatItWroteWithChecksums) {
 TEST(WebBundle, ItsSizeIsEstimatedWell) {
   BakedVolume volume = test::block_volume({0, 0, 0}, {80, 80, 80}, 9);
   for (BakedVoxel& voxel : volume.voxels) {
-    voxel.sigma = 1 + static_cast<float>((voxel.i * 7919 + voxel.j * 104729 + voxel.k * 1299709) % 97);
+    // Noise that does not repeat: what does packs better the more of it there is.
+    auto h = static_cast<std::uint32_t>((voxel.i * 80 + voxel.j) * 80 + voxel.k) * 2654435761u;
+    h = (h ^ h >> 15) * 2246822519u;
+    h = (h ^ h >> 13) * 3266489917u;
+    voxel.sigma = 1 + static_cast<float>((h ^ h >> 16) % 97);
   }
   const WebBricks bricks = make_web_bricks(volume);
   const test::TempDir folder;
