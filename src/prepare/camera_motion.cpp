@@ -14,6 +14,8 @@ constexpr double kStillBelow = 0.005;  ///< of the diagonal
 constexpr double kWithin = 1.0 / 400;  ///< of the diagonal: two pixels of a picture 640 wide
 constexpr double kExplained = 0.85;    ///< of all places; the rest may be wrong or move by themselves
 
+constexpr double kWorthATry = 0.5;  ///< of all places within one homography, which random picks find roughly
+
 /// Focal lengths in diagonals: from a very wide lens to a long one.
 constexpr double kShortest = 0.35, kLongest = 6;
 
@@ -128,7 +130,7 @@ MotionVerdict judge_motion(const std::vector<cv::Point2f>& before, const std::ve
     kept_after.push_back(after[std::size_t(i)]);
   }
   out.motion = Motion::kParallax;
-  if (double(kept_before.size()) < kExplained * double(before.size())) return out;
+  if (double(kept_before.size()) < kWorthATry * double(before.size())) return out;
   const Turn turn = best_turn(kept_before, kept_after, picture, diagonal);
   out.explained = share_below(errors_of(turn, before, after, picture), kWithin * diagonal);
   if (out.explained >= kExplained) out.motion = Motion::kTurned;
