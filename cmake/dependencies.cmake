@@ -2,18 +2,20 @@
 find_package(Threads REQUIRED)
 find_package(TBB REQUIRED)
 find_package(OpenSSL REQUIRED COMPONENTS Crypto)
+find_package(ZLIB REQUIRED)
 find_package(fmt REQUIRED)
 find_package(spdlog REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(tomlplusplus REQUIRED)
 find_package(CLI11 REQUIRED)
-find_package(OpenCV REQUIRED COMPONENTS core imgcodecs imgproc videoio video calib3d)
+find_package(OpenCV REQUIRED COMPONENTS core dnn imgcodecs imgproc videoio video calib3d)
 find_package(Imath REQUIRED)
 find_package(OpenEXR REQUIRED)
 find_package(meshoptimizer REQUIRED)
 find_package(TinyGLTF REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(exif REQUIRED IMPORTED_TARGET libexif)
+pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib)
 
 # OpenVDB ships a find module instead of a config package, and needs Boost iostreams.
 list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB

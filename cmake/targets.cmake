@@ -22,7 +22,8 @@ function(cnerf_add_test name)
   add_executable(${name} ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE cnerf_options cnerf_test_support ${arg_LINK})
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
+  # Torch takes seconds to load on a busy machine.
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
     PROPERTIES LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT})
 endfunction()
 

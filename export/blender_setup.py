@@ -204,6 +204,53 @@ def add_camera(scene, root, camera, volume):
     return placed
 
 
+def path_cameras(file):
+    """The cameras of a path that the viewer exported, as the manifest describes cameras."""
+    with open(file, encoding="utf-8") as text:
+        path = json.load(text)
+    frames = path.get("frames") or []
+    if not frames:
+        raise ValueError(file + ": frames: expected a list of cameras")
+    cameras = []
+    for number, frame in enumerate(frames):
+        value = {**path, **frame}
+        missing = [key for key in ("w", "h", "fl_x", "transform_matrix") if key not in value]
+        if missing:
+            raise ValueError("%s: frames[%d]: %s is missing" % (file, number, missing[0]))
+        opengl = Matrix(value["transform_matrix"])
+        cameras.append({
+            "name": "path", "width": int(value["w"]), "height": int(value["h"]), "fx": value["fl_x"],
+            "fy": value.get("fl_y", value["fl_x"]), "cx": value.get("cx", 0.5 * value["w"]),
+            "cy": value.get("cy", 0.5 * value["h"]), "model": "pinhole", "distortion": [0.0] * 8,
+            "world_from_camera": opengl @ blender_from_opencv_camera(),
+        })
+    return cameras, path.get("fps", 30)
+
+
+def add_path(scene, root, file, volume):
+    """An animated camera; it becomes the active one."""
+    cameras, fps = path_cameras(file)
+    moving = add_camera(scene, root, cameras[0], volume)
+    moving.rotation_mode = "QUATERNION"
+    before = None
+    for number, camera in enumerate(cameras, start=1):
+        at = Matrix(camera["world_from_camera"]) @ blender_from_opencv_camera()
+        turn = at.to_quaternion()
+        if before is not None:
+            turn.make_compatible(before)  # q and -q are one rotation, but not half-way between
+        before = turn
+        moving.location = at.to_translation()
+        moving.rotation_quaternion = turn
+        moving.data.lens = SENSOR_MM * camera["fx"] / camera["width"]
+        moving.keyframe_insert("location", frame=number)
+        moving.keyframe_insert("rotation_quaternion", frame=number)
+        moving.data.keyframe_insert("lens", frame=number)
+    scene.frame_start, scene.frame_end = 1, len(cameras)
+    scene.render.fps = max(1, round(fps))
+    scene.frame_set(1)
+    use_camera(scene, cameras[0], moving)
+
+
 def overview_camera(volume):
     """A camera for bakes without any: in front of the box, in the manifest's terms."""
     radius, centre = scene_radius(volume)
@@ -309,6 +356,8 @@ def set_up(options):
     placed = [add_camera(scene, root, camera, bounded) for camera in cameras]
     picked = pick_camera(cameras, options.camera)
     use_camera(scene, cameras[picked], placed[picked])
+    if options.path:
+        add_path(scene, root, options.path, bounded)
     return scene
 
 
@@ -332,6 +381,7 @@ def parse_options(arguments):
     parser = argparse.ArgumentParser(prog="blender_setup.py", description="Shows a cnerf bake in Blender.")
     parser.add_argument("--manifest", default="", help="manifest.json; default: the one beside this file")
     parser.add_argument("--camera", default="0", help="number or name of the camera to look through")
+    parser.add_argument("--path", default="", help="camera path (JSON) of the viewer; animates a camera")
     parser.add_argument("--render", default="", help="picture to render, .exr or .png")
     parser.add_argument("--save", default="", help=".blend file to save the scene to")
     parser.add_argument("--engine", choices=("cycles", "eevee"), default="cycles")

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bake/dilate.h"
+#include "export/manifest_json.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 
@@ -183,6 +184,20 @@ BakeManifest manifest_from(const Json& j) {
 
 }  // namespace
 
+Json camera_json(const BakeCamera& camera) {
+  return to_json(camera);
+}
+Json frame_json(const SceneFrame& frame) {
+  return to_json(frame);
+}
+Json color_json(const std::string& colorizer, const std::string& take) {
+  return {{"space", "lin_rec709"},
+          {"white", "D65"},
+          {"inferred", !colorizer.empty()},
+          {"colorizer", colorizer},
+          {"take", take}};
+}
+
 ManifestVolume describe_volume(const BakedVolume& volume, const std::string& file, const VdbOptions& options) {
   std::vector<BakedVoxel> dense;
   ManifestVolume described;
@@ -220,11 +235,6 @@ ManifestMesh describe_mesh(const BakedMesh& mesh) {
 fs::path write_manifest(const BakeManifest& manifest, const fs::path& folder) {
   Json cameras = Json::array();
   for (const BakeCamera& camera : manifest.cameras) cameras.push_back(to_json(camera));
-  const Json color{{"space", "lin_rec709"},
-                   {"white", "D65"},
-                   {"inferred", !manifest.colorizer.empty()},
-                   {"colorizer", manifest.colorizer},
-                   {"take", manifest.take}};
   const Json j{{"schema", kManifestSchema},
                {"program", "cnerf"},
                {"program_version", CNERF_VERSION},
@@ -232,7 +242,7 @@ fs::path write_manifest(const BakeManifest& manifest, const fs::path& folder) {
                {"files", describe_files(manifest.files, folder)},
                {"units", manifest.units},
                {"up_axis", manifest.up_axis},
-               {"color", color},
+               {"color", color_json(manifest.colorizer, manifest.take)},
                {"frame", to_json(manifest.frame)},
                {"volume", manifest.volume ? to_json(*manifest.volume) : Json(nullptr)},
                {"mesh", manifest.mesh ? to_json(*manifest.mesh) : Json(nullptr)},

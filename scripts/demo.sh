@@ -6,8 +6,8 @@ cd "$(dirname "$0")/.."
 out="${1:-out/demo}"
 
 bash scripts/install_dependencies.sh
-cmake --preset release -DCNERF_TESTS=OFF > /dev/null
-cmake --build --preset release --target cnerf
+cmake --preset release -DCNERF_TESTS=OFF -DCNERF_VIEWER=ON > /dev/null
+cmake --build --preset release --target cnerf cnerf_viewer_page
 cnerf=build/release/cnerf
 
 rm -rf "$out"
@@ -19,3 +19,4 @@ echo "volume (OpenVDB):    $(ls "$out"/run/bakes/*/*.vdb)"
 echo "before and after:    $out/run/contact_sheet.png"
 echo "turntable video:     $(ls "$out"/run/renders/*/turntable.mp4)"
 echo "metrics:             $out/run/metrics.json"
+echo "in a browser:        $cnerf view $out/run"

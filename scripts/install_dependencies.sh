@@ -12,11 +12,11 @@ packages=(
   libopencv-dev libopenexr-dev libtinygltf-dev libmeshoptimizer-dev
   libexif-dev colmap
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libfmt-dev libspdlog-dev
-  libtbb-dev libssl-dev libcpp-httplib-dev
+  libtbb-dev libssl-dev zlib1g-dev libcpp-httplib-dev
   libgtest-dev libgmock-dev libbenchmark-dev
 )
 if [[ "${1:-}" == "--tests" ]]; then
-  packages+=(blender python3-numpy)
+  packages+=(blender python3-numpy chromium)
 fi
 
 # Khronos' glTF validator, which Debian does not package. Tests that need it skip where it cannot be had.
@@ -35,6 +35,20 @@ install_gltf_validator() {
 if [[ "${1:-}" == "--tests" ]]; then
   install_gltf_validator
 fi
+
+# What the viewer's page is built with: Vite, TypeScript; nothing of it is part of the page.
+install_page_packages() {
+  local folder
+  folder="$(dirname "$0")/../viewer"
+  [[ "$folder/node_modules/.package-lock.json" -nt "$folder/package-lock.json" ]] && return
+  if ! command -v npm >/dev/null; then
+    echo "dependencies: no npm, so the viewer's page is not built"
+    return
+  fi
+  npm ci --prefix "$folder" --fetch-retries=1 --fetch-timeout=60000 --no-fund --no-audit --loglevel=error ||
+    echo "dependencies: npm cannot get the packages of the viewer's page; it is not built"
+}
+install_page_packages
 
 missing=()
 for package in "${packages[@]}"; do

@@ -21,7 +21,7 @@ __global__ void encode(const __grid_constant__ GridLevels levels, const uint2* _
   const float4 place = places[sample];
   const float position[3] = {place.x, place.y, place.z};
   const int l = static_cast<int>(blockIdx.y);
-  encoded[std::size_t(sample) * levels.count + l] = halves_of(gather(levels.level[l], table, position));
+  encoded[std::size_t(sample) * levels.count + l] = gather(levels.level[l], table, position);
 }
 
 /// Blocks of one level follow one another, so that the gradients of that level stay in L2.

@@ -26,9 +26,11 @@ Work declare_prepare(CLI::App& app);
 Work declare_sample(CLI::App& app);
 Work declare_train(CLI::App& app);
 Work declare_colorize(CLI::App& app);
+Work declare_colorize_image(CLI::App& app);
 Work declare_render(CLI::App& app);
 Work declare_eval(CLI::App& app);
 Work declare_bake(CLI::App& app);
+Work declare_view(CLI::App& app);
 Work declare_info(CLI::App& app);
 Work declare_doctor(CLI::App& app);
 

@@ -20,10 +20,11 @@ void bake(const BakeArguments& arguments, const std::vector<std::string>& comman
   const RunDirectory directory = RunDirectory::open(arguments.run.run);
   const std::string take = directory.choose_take(arguments.run.take);
   const fs::path folder = arguments.out.empty() ? directory.bakes(take) : fs::path(arguments.out);
-  refuse_existing(folder / "manifest.json", arguments.overwrite);
+  refuse_existing(last_file(folder, formats), arguments.overwrite);
   const RunContext context = open_run(arguments.run, take, command_line, reporter);
   bake_step(context, take, folder, formats);
-  reporter.next("blender --python " + (folder / "blender_setup.py").string());
+  if (formats.web) reporter.next("cnerf view " + web_folder(folder).string());
+  if (formats.vdb || formats.gltf) reporter.next("blender --python " + (folder / "blender_setup.py").string());
 }
 
 }  // namespace
@@ -31,14 +32,17 @@ void bake(const BakeArguments& arguments, const std::vector<std::string>& comman
 Work declare_bake(CLI::App& app) {
   auto arguments = std::make_shared<BakeArguments>();
   add_run_folder_options(app, arguments->run);
-  app.add_option("--format", arguments->format, "vdb, gltf, exr or several, comma-separated");
+  app.add_option("--format", arguments->format, "vdb, gltf, exr, web or several, comma-separated");
   app.add_option("-o,--out", arguments->out, "Folder to write to; RUN/bakes/TAKE if not given");
   add_short_form(app, arguments->run.config, "--resolution", "bake.resolution", "Voxels along the longest axis");
+  add_short_form(app, arguments->run.config, "--aabb", "bake.aabb", "Box to bake, x0,y0,z0,x1,y1,z1 in world units");
   add_short_form(app, arguments->run.config, "--voxel-origin", "vdb.voxel_origin",
                  "center, or corner for Blender <= 4.4");
   app.add_flag_callback(
       "--houdini", [arguments] { arguments->run.config.short_forms.emplace_back("vdb.houdini=true"); },
       "Also write the colour grid under Houdini's name, Cd");
+  add_short_form(app, arguments->run.config, "--web-resolution", "web.resolution",
+                 "Voxels along the longest axis of a web bundle, at most");
   add_short_form(app, arguments->run.config, "--faces", "mesh.faces", "Triangles of the mesh, about");
   add_short_form(app, arguments->run.config, "--texture-size", "mesh.texture_size", "Texels along a side");
   app.add_flag_callback(

@@ -16,6 +16,7 @@
 #include "src/base/program.h"
 #include "src/config/config.h"
 #include "src/engine/select_engine.h"
+#include "viewer/server/page_folder.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -85,6 +86,8 @@ void doctor() {
   line("OpenVDB", CNERF_OPENVDB_VERSION);
   line("OpenEXR", OPENEXR_VERSION_STRING);
   line("presets", presets_text());
+  const fs::path page = find_page();
+  line("viewer page", page.empty() ? "not built (CNERF_VIEWER, npm)" : page.string());
   print_program("blender", "shows bakes");
   print_program("colmap", "finds camera poses");
   print_program("ffmpeg", "cuts videos into pictures");

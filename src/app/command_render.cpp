@@ -3,9 +3,15 @@
 #include <algorithm>
 #include <sstream>
 
+#include "bake/volume_integrator.h"
+#include "export/manifest.h"
+#include "export/vdb_reader.h"
+#include "export/web_pictures.h"
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
 #include "src/base/error.h"
+#include "src/base/progress.h"
+#include "src/evaluate/contact_sheet.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -34,8 +40,45 @@ RenderOutput output_of(const RenderArguments& arguments) {
   return output;
 }
 
+/// Pictures of a bake, straight from its voxels: what every viewer of it should show.
+void render_bake(const RenderArguments& arguments, Reporter& reporter) {
+  const fs::path bake = arguments.run.run;
+  if (!arguments.format.empty() && arguments.format != "png") {
+    throw UsageError("--format: expected png, as all that is rendered of a bake, got '" + arguments.format + "'");
+  }
+  const BakeManifest manifest = read_manifest(bake / "manifest.json");
+  if (!manifest.volume)
+    throw InputError(bake / "manifest.json", "volume", "this bake has none; bake with --format vdb");
+  CameraPath path{"cameras", {}};
+  if (arguments.path == "cameras" || arguments.path == RenderArguments{}.path) {
+    for (const BakeCamera& camera : manifest.cameras) {
+      std::string name = fs::path(camera.name).replace_extension().string();
+      std::ranges::replace(name, '/', '_');
+      path.cameras.push_back({name, without_distortion(camera.intrinsics), camera.world_from_camera});
+    }
+  } else {
+    path = path_from_file(arguments.path);
+  }
+  const fs::path folder = (arguments.out.empty() ? bake / "renders" : fs::path(arguments.out)) / path.name;
+  refuse_existing(folder, arguments.overwrite);
+  const BakedVolume volume = read_vdb(bake / manifest.volume->file);
+  const ProgressSink progress = reporter.sink();
+  for (std::size_t i = 0; i < path.cameras.size(); ++i) {
+    const PathCamera& camera = path.cameras[i];
+    const VolumeImage image = integrate_volume(volume, camera.intrinsics, camera.world_from_camera);
+    write_png(folder / (camera.name + ".png"), picture_from_linear(image.width, image.height, image.rgb));
+    progress({"render", double(i + 1) / double(path.cameras.size()), {}});
+    if (interruption_requested()) throw Interrupted("stopped");
+  }
+  reporter.wrote("pictures", folder);
+}
+
 void render(const RenderArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
+  const fs::path folder = arguments.run.run;
+  if (!RunDirectory(folder).exists() && fs::exists(folder / "manifest.json")) {
+    return render_bake(arguments, reporter);
+  }
   RenderOutput output = output_of(arguments);
   const RunDirectory directory = RunDirectory::open(arguments.run.run);
   const std::string take = directory.choose_take(arguments.run.take);
@@ -54,7 +97,8 @@ Work declare_render(CLI::App& app) {
   auto arguments = std::make_shared<RenderArguments>();
   add_run_folder_options(app, arguments->run);
   app.add_option("--path", arguments->path,
-                 "turntable (whichever of the next two suits), spiral, orbit, held-out, or a camera file (JSON)");
+                 "turntable (whichever of the next two suits), spiral, orbit, held-out, or a camera file (JSON); of a "
+                 "bake instead of a run: a camera file, or cameras for all of the capture's, as png");
   app.add_option("--format", arguments->format, "png, exr, mp4 or several, comma-separated");
   app.add_option("-o,--out", arguments->out, "Folder to write to; RUN/renders/TAKE if not given");
   app.add_flag("--baked", arguments->baked, "Show the colours of the bake instead of the per-pixel ones");

@@ -3,6 +3,7 @@
 #include "src/app/command.h"
 #include "src/app/common_options.h"
 #include "src/app/default_colorizer.h"
+#include "src/app/known_color_files.h"
 #include "src/app/pipeline.h"
 #include "src/app/prepare_step.h"
 #include "src/base/error.h"
@@ -55,7 +56,8 @@ void run(RunArguments arguments) {
 
   Capture capture = read_capture(arguments.capture, config, reporter);
   RunContext context{RunDirectory(arguments.out), config, std::move(capture), arguments.command_line, reporter};
-  // Made before the training: one that cannot be made should not cost an hour.
+  // Made before the training: what cannot be made or read should not cost an hour.
+  if (!arguments.grey) (void)load_known_colors(context.capture, context.config.colorizer);
   auto colorizer = needs_colorizer(arguments, context.directory) ? colorizer_of(context) : nullptr;
   begin_run(context, arguments.capture, arguments.existing);
   train_step(context, arguments.existing.resume);
@@ -66,11 +68,12 @@ void run(RunArguments arguments) {
     colorize_step(context, take, arguments.existing, std::move(colorizer));
   }
   if (!is_done(arguments, context.directory.metrics_file())) evaluate_step(context, take);
-  if (!is_done(arguments, context.directory.bakes(take) / "manifest.json")) {
-    bake_step(context, take, context.directory.bakes(take), parse_bake_formats(arguments.format));
-  }
+  const BakeFormats formats = parse_bake_formats(arguments.format);
+  const fs::path bake = context.directory.bakes(take);
+  if (!is_done(arguments, last_file(bake, formats))) bake_step(context, take, bake, formats);
   turntable(arguments, context, take);
-  reporter.next("blender --python " + (context.directory.bakes(take) / "blender_setup.py").string());
+  reporter.next("cnerf view " + arguments.out);
+  if (formats.vdb || formats.gltf) reporter.next("blender --python " + (bake / "blender_setup.py").string());
 }
 
 }  // namespace
@@ -81,10 +84,9 @@ Work declare_run(CLI::App& app) {
                  "Folder of photographs and camera poses; without poses, or a film clip, it is prepared first")
       ->required();
   app.add_option("-o,--out", arguments->out, "Folder of the run, made if needed")->required();
-  add_short_form(app, arguments->config, "--colorizer", "colorizer.spec",
-                 "Who colours: reference:IMAGE..., torchscript:FILE, exec:COMMAND");
+  add_colorizer_options(app, arguments->config);
   app.add_flag("--grey", arguments->grey, "Stay grey: no colorizer");
-  app.add_option("--format", arguments->format, "What to bake: vdb, gltf, exr or several, comma-separated");
+  app.add_option("--format", arguments->format, "What to bake: vdb, gltf, exr, web or several, comma-separated");
   add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");
   add_short_form(app, arguments->config, "--holdout", "capture.holdout", "Keep every N-th view for evaluation");
   add_short_form(app, arguments->config, "--transfer", "capture.transfer", "How grey values encode luminance");

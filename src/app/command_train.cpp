@@ -2,6 +2,7 @@
 
 #include "src/app/command.h"
 #include "src/app/common_options.h"
+#include "src/app/live_session.h"
 #include "src/app/pipeline.h"
 
 namespace cnerf {
@@ -11,6 +12,8 @@ struct TrainArguments {
   ConfigArguments config;
   std::string capture, out;
   ExistingOutput existing;
+  bool view = false;
+  BrowserArguments browser;
 };
 
 void train(const TrainArguments& arguments, const std::vector<std::string>& command_line) {
@@ -20,6 +23,12 @@ void train(const TrainArguments& arguments, const std::vector<std::string>& comm
   const Config config = resolve_config(arguments.config, goes_on ? directory.config() : Config{});
   RunContext context{directory, config, read_capture(arguments.capture, config, reporter), command_line, reporter};
   check_run_folder(directory, arguments.existing);
+  std::optional<LiveSession> live;
+  if (arguments.view) {
+    live.emplace("Training " + context.capture.root.filename().string(), arguments.browser, reporter);
+    context.watcher = live->watching(reporter.sink());
+    context.previews = live->previews();
+  }
   begin_run(context, arguments.capture, arguments.existing);
   train_step(context, arguments.existing.resume);
   reporter.next("cnerf colorize " + arguments.out + " --colorizer reference:PHOTO.jpg");
@@ -36,6 +45,8 @@ Work declare_train(CLI::App& app) {
   add_short_form(app, arguments->config, "--transfer", "capture.transfer", "How grey values encode luminance");
   app.add_flag("--resume", arguments->existing.resume, "Go on with a run that was stopped");
   app.add_flag("--overwrite", arguments->existing.overwrite, "Start again where a run is already");
+  app.add_flag("--view", arguments->view, "Show the training in the browser, with buttons to pause and to stop");
+  add_browser_options(app, arguments->browser);
   add_config_options(app, arguments->config);
   return [arguments](const auto& command_line) { train(*arguments, command_line); };
 }

@@ -42,6 +42,31 @@ void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string
       help + " (" + key + ")");
 }
 
+void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
+                   const std::string& help) {
+  app.add_option_function<std::vector<std::string>>(
+         option,
+         [&arguments, key](const std::vector<std::string>& values) {
+           arguments.short_forms.push_back(key + "=" + joined(values, ";"));
+         },
+         help + " (" + key + ")")
+      ->allow_extra_args(false)
+      ->take_all();
+}
+
+void add_colorizer_options(CLI::App& app, ConfigArguments& arguments) {
+  add_short_form(
+      app, arguments, "--colorizer", "colorizer.spec",
+      "Who colours: builtin, reference:IMAGE..., torchscript:FILE, onnx:FILE, caffe:PROTO,MODEL, exec:COMMAND");
+  add_short_form(app, arguments, "--prompt", "colorizer.prompt", "A text for colorizers that take one");
+  add_list_form(app, arguments, "--keyframe", "colorizer.keyframes",
+                "VIEW=FILE, a painted frame of the capture; may be repeated");
+  add_list_form(app, arguments, "--hint", "colorizer.hints",
+                "x,y,VIEW,#rrggbb: the thing at that pixel of the view's file has that colour; may be repeated");
+  add_list_form(app, arguments, "--hint-image", "colorizer.hint_images",
+                "VIEW=FILE, a picture that is transparent except for strokes; may be repeated");
+}
+
 void add_field_options(CLI::App& app, const std::vector<Field>& fields) {
   for (const Field& field : fields) {
     std::string name = "--" + field.key;

@@ -26,6 +26,11 @@ void add_config_options(CLI::App& app, ConfigArguments& arguments);
 /// Declares `option` as a short form of the config key `key`.
 void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
                     const std::string& help);
+/// Declares `option`, which may be repeated, as a short form of a config key that holds a list separated by `;`.
+void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
+                   const std::string& help);
+/// Declares --colorizer, --prompt, --keyframe, --hint and --hint-image.
+void add_colorizer_options(CLI::App& app, ConfigArguments& arguments);
 /// Declares one option a field, named like the field with `-` for `_`; legal values and defaults go to the help. A bool
 /// becomes a flag that sets it.
 /// @param fields  must outlive the parsing.

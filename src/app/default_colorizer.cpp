@@ -1,10 +1,19 @@
 #include "src/app/default_colorizer.h"
 
+#include "src/app/known_color_files.h"
+
 namespace cnerf {
 namespace fs = std::filesystem;
 
 void choose_colorizer(const fs::path& capture, Config& config, Reporter& reporter) {
   if (!config.colorizer.spec.empty()) return;
+  if (!config.colorizer.keyframes.empty()) {
+    for (const fs::path& file : key_frame_files(config.colorizer)) {
+      config.colorizer.spec += (config.colorizer.spec.empty() ? "reference:" : ",") + fs::absolute(file).string();
+    }
+    reporter.say("no --colorizer given: what no key frame shows gets colours like theirs");
+    return;
+  }
   const fs::path folder = fs::is_directory(capture) ? capture : capture.parent_path();
   const fs::path references = folder / "references";
   if (fs::is_directory(references)) {

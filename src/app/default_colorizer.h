@@ -8,8 +8,9 @@
 
 namespace cnerf {
 
-/// Leaves a given `config.colorizer.spec` alone; else takes the photographs in the capture's folder `references`, which
-/// `cnerf sample` writes there, or, without any, the built-in network. Says what it chose.
+/// Leaves a given `config.colorizer.spec` alone; else takes the key frames as references, or the photographs in the
+/// capture's folder `references`, which `cnerf sample` writes there, or, without any, the built-in network. Says what
+/// it chose.
 void choose_colorizer(const std::filesystem::path& capture, Config& config, Reporter& reporter);
 
 }  // namespace cnerf

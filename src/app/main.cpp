@@ -20,9 +20,11 @@ constexpr Command kCommands[] = {
     {"prepare", "Photographs or a film clip to a capture: camera poses by COLMAP", declare_prepare, true},
     {"train", "Stage 1: luminance and density from a capture", declare_train, true},
     {"colorize", "Stage 2: colours for a trained run; takes stand side by side", declare_colorize, true},
+    {"colorize-image", "One picture, to judge a colorizer", declare_colorize_image, false},
     {"render", "Pictures and videos of a run", declare_render, false},
     {"eval", "Numbers against held-out views, and a contact sheet", declare_eval, false},
     {"bake", "A run as an OpenVDB volume for Blender and others", declare_bake, false},
+    {"view", "A bake or a run in the browser", declare_view, false},
     {"info", "What a capture, run, snapshot or VDB holds", declare_info, false},
     {"doctor", "What this machine and build can do", declare_doctor, false},
 };

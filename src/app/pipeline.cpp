@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "src/app/known_color_files.h"
 #include "src/app/version.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -78,16 +79,23 @@ void begin_run(const RunContext& context, const fs::path& capture_path, const Ex
   directory.save(record);
 }
 
-std::unique_ptr<Colorizer> colorizer_of(const RunContext& context) {
+ColorizerOptions colorizer_options(const Config& config, const fs::path& working_folder, const fs::path& cache_folder,
+                                   Reporter& reporter) {
   ColorizerOptions options;
-  options.spec = context.config.colorizer.spec;
-  options.working_folder = context.capture.root;
-  options.timeout_seconds = context.config.colorizer.timeout_seconds;
-  options.reference_steps = context.config.colorizer.reference_steps;
-  options.seed = static_cast<std::uint64_t>(context.config.stage2.seed);
-  options.cache_folder = context.directory.colorizer_cache();
-  options.progress = context.reporter.sink();
-  return make_colorizer(options);
+  options.spec = config.colorizer.spec;
+  options.prompt = config.colorizer.prompt;
+  options.working_folder = working_folder;
+  options.timeout_seconds = config.colorizer.timeout_seconds;
+  options.reference_steps = config.colorizer.reference_steps;
+  options.seed = static_cast<std::uint64_t>(config.stage2.seed);
+  options.cache_folder = cache_folder;
+  options.progress = reporter.sink();
+  return options;
+}
+
+std::unique_ptr<Colorizer> colorizer_of(const RunContext& context) {
+  return make_colorizer(
+      colorizer_options(context.config, context.capture.root, context.directory.colorizer_cache(), context.reporter));
 }
 
 void train_step(RunContext& context, bool resume) {
@@ -95,7 +103,7 @@ void train_step(RunContext& context, bool resume) {
   RunRecord record = directory.record();
   if (!record.stage1_finished || !resume) {
     record.stage1 = train_stage1(context.capture, context.config.stage1, directory.stage1_snapshot(), resume,
-                                 context.reporter.sink());
+                                 context.training_sink(), context.previews);
     record.stage1_finished = true;
     directory.save(record);
   }
@@ -121,28 +129,41 @@ std::string take_to_write(const RunContext& context, const std::string& named, c
   return directory.free_take_name(kind_of(context.config.colorizer.spec));
 }
 
+void show_bases(const RunContext& context) {
+  const RunDirectory& directory = context.directory;
+  const fs::path gallery = directory.root() / "bases.png";
+  write_base_candidates(context.capture, directory.stage1_snapshot(), context.config.stage2, *colorizer_of(context),
+                        gallery, context.reporter.sink());
+  context.reporter.wrote("base candidates", gallery);
+  context.reporter.next("cnerf colorize " + directory.root().string() + " --bases 2,5,7");
+}
+
 void colorize_step(RunContext& context, const std::string& take, const ExistingOutput& existing,
                    std::unique_ptr<Colorizer> colorizer) {
   const RunDirectory& directory = context.directory;
   std::optional<TakeRecord> finished = directory.take_record(take);
   if (!finished || !existing.resume) {
-    if (!colorizer) colorizer = colorizer_of(context);  // before anything is written: it may refuse
+    // Before anything is written: they may refuse.
+    const std::vector<KnownColors> known = load_known_colors(context.capture, context.config.colorizer);
+    if (!colorizer) colorizer = colorizer_of(context);
     if (existing.overwrite) fs::remove_all(directory.take_folder(take));
     write_file(directory.take_config_file(take), to_toml(context.config));
     const Stage2Report report =
-        train_stage2(context.capture, directory.stage1_snapshot(), context.config.stage2, *colorizer,
-                     directory.take_snapshot(take), existing.resume, context.reporter.sink());
-    context.reporter.sink()({"stage 2", 1.0, {}});
-    finished = TakeRecord{take, colorizer->name(), report};
+        train_stage2(context.capture, directory.stage1_snapshot(), context.config.stage2, *colorizer, known,
+                     directory.take_snapshot(take), existing.resume, context.training_sink(), context.previews);
+    context.training_sink()({"stage 2", 1.0, {}});
+    finished = TakeRecord{take, colorizer->name() + describe(known), report};
     directory.save(*finished);
     RunRecord record = directory.record();
     record.current_take = take;
     directory.save(record);
   }
   const Stage2Report& report = finished->stage2;
-  context.reporter.say(fmt::format(
-      "take {}: {} by {}, {} patches accepted, {} rejected; baked colour is {:.2f} ab from the per-pixel decode", take,
-      duration_text(report.seconds), finished->colorizer, report.accepted, report.rejected, report.bake_ab_distance));
+  context.reporter.say(
+      fmt::format("take {}: {}, {:.0f} s of them waiting for {}, {} patches accepted, {} rejected; baked colour is "
+                  "{:.2f} ab from the per-pixel decode",
+                  take, duration_text(report.seconds), report.waited_seconds, finished->colorizer, report.accepted,
+                  report.rejected, report.bake_ab_distance));
   context.reporter.wrote("take", directory.take_folder(take));
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "export/web_bundle.h"
 #include "src/app/camera_path.h"
 #include "src/app/picture_files.h"
 #include "src/app/reporter.h"
@@ -25,6 +26,11 @@ struct RunContext {
   Capture capture;
   std::vector<std::string> command_line;
   Reporter& reporter;
+  ProgressSink watcher = nullptr;  ///< of the training, instead of the reporter's own sink
+  PreviewSink previews = nullptr;  ///< has pictures of the training drawn
+
+  /// Who is told how the training goes.
+  [[nodiscard]] ProgressSink training_sink() const { return watcher ? watcher : reporter.sink(); }
 };
 
 /// What to do about output that is already there.
@@ -42,6 +48,9 @@ void check_run_folder(const RunDirectory& directory, const ExistingOutput& exist
 /// Makes the folder of a run ready: clears it to overwrite, writes config.toml and run.json.
 void begin_run(const RunContext& context, const std::filesystem::path& capture_path, const ExistingOutput& existing);
 
+/// What the configuration says of its colorizer. The folders are those of `ColorizerOptions`; empty = none.
+[[nodiscard]] ColorizerOptions colorizer_options(const Config& config, const std::filesystem::path& working_folder,
+                                                 const std::filesystem::path& cache_folder, Reporter& reporter);
 /// The colorizer the configuration names. What it learns is kept in the run's folder, for the next time.
 /// @throws UsageError, MissingInputError, ColorizerError.
 [[nodiscard]] std::unique_ptr<Colorizer> colorizer_of(const RunContext& context);
@@ -53,6 +62,8 @@ void train_step(RunContext& context, bool resume);
 /// that was not finished.  @throws UsageError  when the named take is finished and neither is set.
 [[nodiscard]] std::string take_to_write(const RunContext& context, const std::string& named,
                                         const ExistingOutput& existing);
+/// Writes the gallery of base candidates beside the takes; touches none of them.
+void show_bases(const RunContext& context);
 /// Stage 2 into `take`, unless it is finished. Makes it the current take.
 /// @param colorizer  null: `colorizer_of(context)` is made when it is needed.
 void colorize_step(RunContext& context, const std::string& take, const ExistingOutput& existing,
@@ -66,13 +77,23 @@ struct BakeFormats {
   bool vdb = false;   ///< the volume
   bool gltf = false;  ///< a textured mesh, as .gltf and .glb
   bool exr = false;   ///< the mesh's textures in floating point, beside the mesh
+  bool web = false;   ///< a folder with a page, for browsers
 };
-/// "vdb,gltf,exr" or some of them; exr brings the mesh along.  @throws UsageError.
+/// "vdb,gltf,exr,web" or some of them; exr brings the mesh along.  @throws UsageError.
 [[nodiscard]] BakeFormats parse_bake_formats(const std::string& list);
+
+/// The file that a bake of these formats writes last: once it is there, all of it is.
+[[nodiscard]] std::filesystem::path last_file(const std::filesystem::path& folder, const BakeFormats& formats);
+/// The folder of the web bundle of a bake.
+[[nodiscard]] std::filesystem::path web_folder(const std::filesystem::path& bake);
 
 /// Bakes a take (empty: grey) and writes the set-up script and the manifest beside it.
 void bake_step(const RunContext& context, const std::string& take, const std::filesystem::path& folder,
                const BakeFormats& formats);
+
+/// Writes the web bundle of a volume; says its size before and after.
+void write_web(const BakedVolume& volume, WebScene scene, const std::filesystem::path& folder,
+               const WebOptions& options, Reporter& reporter);
 
 /// File kinds a render leaves.
 struct RenderOutput {

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <sstream>
 
 #include "bake/bake_plan.h"
 #include "bake/mesh/mesh_baker.h"
+#include "bake/resample.h"
 #include "bake/volume_baker.h"
 #include "export/bake_folder.h"
 #include "export/color_origin.h"
@@ -14,6 +16,7 @@
 #include "src/base/files.h"
 #include "src/base/usage.h"
 #include "src/evaluate/evaluate.h"
+#include "viewer/server/page_folder.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -65,6 +68,18 @@ std::vector<BakeCamera> cameras_of(const Capture& capture) {
   std::vector<BakeCamera> cameras;
   for (const View& view : capture.views) cameras.push_back({view.name, view.intrinsics, view.world_from_camera});
   return cameras;
+}
+
+/// The photographs as the program sees them, or none.
+std::vector<WebPhoto> web_photos(const Capture& capture, const WebOptions& options) {
+  std::vector<WebPhoto> photos;
+  if (options.photo_side == 0) return photos;
+  for (const View& view : capture.views) {
+    std::vector<float> luminance(view.image.pixel_count());
+    for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = view.image.luminance(i);
+    photos.push_back(make_web_photo(view.intrinsics, luminance, options.photo_side, options.photo_quality));
+  }
+  return photos;
 }
 
 /// The files of one render, opened as pictures come.
@@ -147,13 +162,44 @@ BakeFormats parse_bake_formats(const std::string& list) {
     bool* flag = format == "vdb"    ? &formats.vdb
                  : format == "gltf" ? &formats.gltf
                  : format == "exr"  ? &formats.exr
+                 : format == "web"  ? &formats.web
                                     : nullptr;
-    if (flag == nullptr) throw UsageError("--format: expected vdb, gltf or exr, got '" + format + "'");
+    if (flag == nullptr) throw UsageError("--format: expected vdb, gltf, exr or web, got '" + format + "'");
     *flag = true;
   }
-  if (!formats.vdb && !formats.gltf && !formats.exr) throw UsageError("--format: expected vdb, gltf or exr, got none");
+  if (!formats.vdb && !formats.gltf && !formats.exr && !formats.web) {
+    throw UsageError("--format: expected vdb, gltf, exr or web, got none");
+  }
   formats.gltf = formats.gltf || formats.exr;
   return formats;
+}
+
+fs::path web_folder(const fs::path& bake) {
+  return bake / "web";
+}
+
+fs::path last_file(const fs::path& folder, const BakeFormats& formats) {
+  return formats.vdb || formats.gltf ? folder / "manifest.json" : web_folder(folder) / kWebManifest;
+}
+
+void write_web(const BakedVolume& volume, WebScene scene, const fs::path& folder, const WebOptions& options,
+               Reporter& reporter) {
+  const BakedVolume small = resample_volume(volume, options.resolution);
+  const WebBricks bricks = make_web_bricks(small, options.density);
+  const WebEstimate estimate = estimate_web(bricks);
+  const auto mib = [](std::size_t bytes) { return double(bytes) / (1 << 20); };
+  reporter.say(
+      fmt::format("web: {} x {} x {} voxels, {} bricks; about {:.1f} MiB to load, {:.0f} MiB of graphics memory",
+                  small.resolution.x, small.resolution.y, small.resolution.z, bricks.stored(),
+                  mib(estimate.download_bytes), mib(estimate.texture_bytes)));
+  const fs::path page = find_page();
+  if (page.empty()) {
+    reporter.say("note: this cnerf was built without the page (CNERF_VIEWER); the bundle holds data only");
+  }
+  const WebReport report = write_web_bundle(small, bricks, scene, folder, page, options);
+  reporter.say(fmt::format("web: {:.2f} MiB of volume, {:.2f} MiB of photographs, {:.0f} KiB of page",
+                           mib(report.volume_bytes), mib(report.photo_bytes), double(report.page_bytes) / 1024));
+  reporter.wrote("web bundle", folder);
 }
 
 void bake_step(const RunContext& context, const std::string& take, const fs::path& folder, const BakeFormats& formats) {
@@ -162,14 +208,26 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   const Config& config = context.config;
   const std::vector<BakeCamera> cameras = cameras_of(context.capture);
   BakeFolder bake(folder, cameras, context.command_line, config.vdb.units, config.vdb.up_axis);
-  if (formats.vdb) {
-    say_estimate(*scene, config.bake, context.reporter);
-    BakedVolume volume = bake_volume(*scene, cameras, config.bake, context.reporter.sink());
+  if (formats.vdb || formats.web) {
+    BakeOptions options = config.bake;
+    if (!formats.vdb) options.resolution = std::min(options.resolution, config.web.resolution);
+    say_estimate(*scene, options, context.reporter);
+    BakedVolume volume = bake_volume(*scene, cameras, options, context.reporter.sink());
     volume.colorizer = colorizer_name(context.directory, take);
     volume.take = take;
-    const fs::path vdb = bake.add_volume(volume, "volume", config.vdb);
-    context.reporter.say(fmt::format("bake: {} voxels of {:.4g} world units", volume.voxels.size(), volume.voxel_size));
-    context.reporter.wrote("volume", vdb);
+    if (formats.web) {
+      const std::string title = context.capture.root.filename().string();
+      write_web(volume,
+                {title, cameras, web_photos(context.capture, config.web), context.command_line, config.vdb.units,
+                 config.vdb.up_axis},
+                web_folder(folder), config.web, context.reporter);
+    }
+    if (formats.vdb) {
+      const fs::path vdb = bake.add_volume(volume, "volume", config.vdb);
+      context.reporter.say(
+          fmt::format("bake: {} voxels of {:.4g} world units", volume.voxels.size(), volume.voxel_size));
+      context.reporter.wrote("volume", vdb);
+    }
   }
   if (formats.gltf) {
     BakedMesh mesh = bake_mesh(*scene, cameras, config.bake, config.mesh, context.reporter.sink());
@@ -181,8 +239,10 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
     context.reporter.wrote("mesh", files.glb);
     context.reporter.wrote("mesh", files.gltf);
   }
-  bake.finish();
-  context.reporter.wrote("Blender set-up", bake.blender_setup());
+  if (formats.vdb || formats.gltf) {
+    bake.finish();
+    context.reporter.wrote("Blender set-up", bake.blender_setup());
+  }
   note_time(context.directory, "bake", watch);
 }
 

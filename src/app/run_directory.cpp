@@ -118,8 +118,8 @@ std::optional<TakeRecord> RunDirectory::take_record(const std::string& take) con
     record.name = json.at("name").get<std::string>();
     record.colorizer = json.at("colorizer").get<std::string>();
     record.stage2 = {json.at("accepted_patches").get<int>(), json.at("rejected_patches").get<int>(),
-                     json.at("seconds").get<double>(), json.at("colorizer_seconds").get<double>(),
-                     json.at("bake_ab_distance").get<double>()};
+                     json.at("seconds").get<double>(),       json.at("colorizer_seconds").get<double>(),
+                     json.value("waited_seconds", 0.0),      json.at("bake_ab_distance").get<double>()};
     return record;
   });
 }
@@ -136,6 +136,7 @@ void RunDirectory::save(const TakeRecord& record) const {
                   {"acceptance_rate", double(stage2.accepted) / answers},
                   {"seconds", stage2.seconds},
                   {"colorizer_seconds", stage2.colorizer_seconds},
+                  {"waited_seconds", stage2.waited_seconds},
                   {"bake_ab_distance", stage2.bake_ab_distance}};
   write_file(take_record_file(record.name), json.dump(2) + "\n");
 }

@@ -9,6 +9,7 @@
 ///   renders/NAME/        pictures and videos of a take ("grey": of none)
 ///   bakes/NAME/          volumes of a take
 ///   metrics.json, contact_sheet.png   of the take evaluated last
+///   bases.png            base candidates, when only those were asked for
 
 #include <filesystem>
 #include <map>

@@ -3,6 +3,8 @@
 #include <csignal>
 #include <cstdlib>
 
+#include "src/base/interruption.h"
+
 namespace cnerf {
 namespace {
 
@@ -17,6 +19,10 @@ void handle_signal(int) {
 
 bool interruption_requested() {
   return interruption != 0;
+}
+
+void request_interruption() {
+  interruption = 1;
 }
 
 void install_interruption_handler() {

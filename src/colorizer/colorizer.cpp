@@ -24,6 +24,8 @@ constexpr Kind kKinds[] = {
 #endif
     {"reference", "IMAGE[,IMAGE...]", make_reference_colorizer, true},
     {"torchscript", "FILE", make_torchscript_colorizer, true},
+    {"onnx", "FILE", make_onnx_colorizer, true},
+    {"caffe", "PROTO,MODEL", make_caffe_colorizer, true},
     {"exec", "COMMAND", make_exec_colorizer, true},
     {"grey", "", make_grey_colorizer, false},
 };
@@ -84,6 +86,10 @@ std::unique_ptr<Colorizer> make_colorizer(const ColorizerOptions& options) {
     if (name != kind.name) continue;
     if (kind.needs_argument && argument.empty()) {
       throw UsageError("colorizer \"" + options.spec + "\": expected " + usage_of(kind));
+    }
+    if (!options.prompt.empty() && (name != "exec" || !takes_prompt(argument))) {
+      throw UsageError("--prompt: colorizer \"" + options.spec +
+                       "\" takes no text; only exec: commands with {prompt} in them do");
     }
     return kind.make(argument, options);
   }

@@ -39,7 +39,8 @@ class Colorizer {
 };
 
 struct ColorizerOptions {
-  std::string spec;                      ///< "reference:IMAGE…", "torchscript:FILE", "exec:COMMAND", "grey"
+  std::string spec;                      ///< "builtin", "reference:IMAGE…", "torchscript:FILE", …: see kinds.h
+  std::string prompt;                    ///< a text for kinds that take one; the others refuse it
   std::filesystem::path working_folder;  ///< relative files of the spec are looked up here, then as given
   std::filesystem::path cache_folder;    ///< a fitted reference: network is kept here; empty = refit every time
   double timeout_seconds = 60;           ///< for one batch of an exec: colorizer

@@ -18,6 +18,7 @@ static_assert(std::endian::native == std::endian::little, "the protocol is littl
 
 constexpr std::array<char, 4> kQuestionMagic{'C', 'N', 'Q', '1'}, kAnswerMagic{'C', 'N', 'A', '1'};
 constexpr std::uint32_t kVersion = 1, kAbKind = 0, kLogitsKind = 1;
+constexpr std::string_view kPromptPlace = "{prompt}";
 constexpr int kAttempts = 2;  // a program that crashed or hung is started once more
 
 struct QuestionHeader {
@@ -29,6 +30,13 @@ struct AnswerHeader {
   std::uint32_t kind, batch, channels, height, width;
 };
 static_assert(sizeof(QuestionHeader) == 20 && sizeof(AnswerHeader) == 24);
+
+/// A text as one word of the shell.
+std::string quoted(const std::string& text) {
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return word + "'";
+}
 
 class ExecColorizer final : public Colorizer {
  public:
@@ -137,8 +145,16 @@ class ExecColorizer final : public Colorizer {
 
 }  // namespace
 
+bool takes_prompt(const std::string& command) {
+  return command.find(kPromptPlace) != std::string::npos;
+}
+
 std::unique_ptr<Colorizer> make_exec_colorizer(const std::string& argument, const ColorizerOptions& options) {
-  return std::make_unique<ExecColorizer>(argument, options.timeout_seconds);
+  std::string command = argument;
+  if (const auto place = command.find(kPromptPlace); place != std::string::npos) {
+    command.replace(place, kPromptPlace.size(), quoted(options.prompt));
+  }
+  return std::make_unique<ExecColorizer>(command, options.timeout_seconds);
 }
 
 }  // namespace cnerf

@@ -17,8 +17,17 @@ std::unique_ptr<Colorizer> make_reference_colorizer(const std::string& argument,
 /// `FILE`: a scripted LibTorch module, see docs/colorizers.md.
 std::unique_ptr<Colorizer> make_torchscript_colorizer(const std::string& argument, const ColorizerOptions& options);
 
-/// `COMMAND`: any program that speaks the pipe protocol of docs/colorizers.md.
+/// `FILE`: a network in the ONNX format, run by OpenCV.
+std::unique_ptr<Colorizer> make_onnx_colorizer(const std::string& argument, const ColorizerOptions& options);
+
+/// `PROTO,MODEL`: a Caffe network, run by OpenCV.
+std::unique_ptr<Colorizer> make_caffe_colorizer(const std::string& argument, const ColorizerOptions& options);
+
+/// `COMMAND`: any program that speaks the pipe protocol of docs/colorizers.md. `{prompt}` in it becomes the prompt.
 std::unique_ptr<Colorizer> make_exec_colorizer(const std::string& argument, const ColorizerOptions& options);
+
+/// Whether a command says that it takes a prompt.
+[[nodiscard]] bool takes_prompt(const std::string& command);
 
 /// `[FILE]`: the network whose weights come with the program.
 std::unique_ptr<Colorizer> make_builtin_colorizer(const std::string& argument, const ColorizerOptions& options);

@@ -10,6 +10,7 @@
 #include "bake/mesh/mesh_options.h"
 #include "export/exr_writer.h"
 #include "export/vdb_writer.h"
+#include "export/web_options.h"
 #include "src/capture/load_capture.h"
 #include "src/train/scene.h"
 #include "src/train/stage1.h"
@@ -18,13 +19,22 @@
 namespace cnerf {
 
 struct ColorizerConfig {
-  std::string spec;  ///< "reference:IMAGE…", "torchscript:FILE", "exec:COMMAND", "grey"; empty = none given
+  std::string spec;             ///< "builtin", "reference:IMAGE…", "torchscript:FILE", …; empty = none given
+  std::string keyframes;        ///< "VIEW=FILE;…": painted frames of the capture
+  std::string hint_images;      ///< "VIEW=FILE;…": pictures that are transparent except for strokes
+  std::string hints;            ///< "x,y,VIEW,#rrggbb;…": dots, in pixels of the view's image file
+  std::string prompt;           ///< a text for colorizers that take one
   double timeout_seconds = 60;  ///< for one batch of an exec: colorizer
   int reference_steps = 1200;   ///< optimiser steps of a reference: colorizer's fit
 
   template <typename Visitor>
   void visit(Visitor&& v) {
-    v("spec", spec, "reference:IMAGE..., torchscript:FILE, exec:COMMAND or grey; empty = none");
+    v("spec", spec,
+      "builtin, reference:IMAGE..., torchscript:FILE, onnx:FILE, caffe:PROTO,MODEL, exec:COMMAND or grey");
+    v("keyframes", keyframes, "painted frames of the capture, VIEW=FILE;...");
+    v("hint_images", hint_images, "pictures that are transparent except for strokes, VIEW=FILE;...");
+    v("hints", hints, "dots of colour, x,y,VIEW,#rrggbb;... in pixels of the view's image file");
+    v("prompt", prompt, "a text for colorizers that take one: exec: commands with {prompt} in them");
     v("timeout_seconds", timeout_seconds, Range{0.1, 1e6}, "an exec: colorizer that takes longer for a batch failed");
     v("reference_steps", reference_steps, Range{1, 1e6}, "optimiser steps of the fit to a reference: photograph");
   }
@@ -32,9 +42,9 @@ struct ColorizerConfig {
 
 /// Pictures and videos.
 struct RenderConfig {
-  int frames = 90;       ///< of a spiral or an orbit
-  int fps = 30;          ///< of videos
-  int short_side = 360;  ///< pixels of a spiral or an orbit; never more than the capture's
+  int frames = 72;       ///< of a spiral or an orbit
+  int fps = 24;          ///< of videos
+  int short_side = 270;  ///< pixels of a spiral or an orbit; never more than the capture's
   int steps_per_box = RenderOptions{}.steps_per_box;
   double min_transmittance = RenderOptions{}.min_transmittance;
 
@@ -59,6 +69,7 @@ struct Config {
   VdbOptions vdb;
   MeshOptions mesh;
   ExrOptions exr;
+  WebOptions web;
   RenderConfig render;
 
   template <typename Visitor>
@@ -73,6 +84,7 @@ struct Config {
     v.section("vdb", vdb);
     v.section("mesh", mesh);
     v.section("exr", exr);
+    v.section("web", web);
     v.section("render", render);
   }
 };

@@ -58,8 +58,8 @@ ColorModel ColorModel::load(const std::filesystem::path& file) {
     model = create(options_from_json<Stage2Options>(snapshot.header().at("options")));
     const nlohmann::json& report = snapshot.header().at("report");
     SnapshotTimes times = load_times(file);
-    model.report = {report.at("accepted"), report.at("rejected"), times["seconds"], times["colorizer_seconds"],
-                    report.at("bake_ab_distance")};
+    model.report = {report.at("accepted"),      report.at("rejected"),   times["seconds"],
+                    times["colorizer_seconds"], times["waited_seconds"], report.at("bake_ab_distance")};
   } catch (const nlohmann::json::exception& problem) {
     throw SnapshotError(file.string() + ": header: " + problem.what());
   }
@@ -80,7 +80,9 @@ void ColorModel::save(const std::filesystem::path& file) {
        {"report",
         {{"accepted", report.accepted}, {"rejected", report.rejected}, {"bake_ab_distance", report.bake_ab_distance}}}},
       state());
-  save_times(file, {{"seconds", report.seconds}, {"colorizer_seconds", report.colorizer_seconds}});
+  save_times(file, {{"seconds", report.seconds},
+                    {"colorizer_seconds", report.colorizer_seconds},
+                    {"waited_seconds", report.waited_seconds}});
 }
 
 std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {

@@ -12,7 +12,7 @@ namespace cnerf {
 namespace {
 
 /// The square of a [H, W] array, resized to K x K.
-std::vector<float> resized_square(const std::vector<float>& image, const CachedView& view, const PatchPlace& place,
+std::vector<float> resized_square(std::span<const float> image, const CachedView& view, const PatchPlace& place,
                                   int k) {
   const cv::Mat whole(view.height, view.width, CV_32F, const_cast<float*>(image.data()));
   const cv::Mat square = whole(cv::Rect(place.left, place.top, place.side, place.side));
@@ -55,6 +55,14 @@ RenderedPatch render_patch(const CachedView& view, const PatchPlace& place, int 
   patch.lightness = resized_square(view.luminance, view, place, k);
   for (float& value : patch.lightness) value = std::clamp(lightness_from_luminance(value), 0.0f, 100.0f);
   patch.opacity = resized_square(view.opacity, view, place, k);
+  return patch;
+}
+
+std::vector<float> patch_colors(const CachedView& view, const PatchPlace& place, int k, const std::vector<float>& ab) {
+  const std::span<const float> all(ab);
+  std::vector<float> patch = resized_square(all.first(ab.size() / 2), view, place, k);
+  const std::vector<float> b = resized_square(all.last(ab.size() / 2), view, place, k);
+  patch.insert(patch.end(), b.begin(), b.end());
   return patch;
 }
 

@@ -27,6 +27,11 @@ struct RenderedPatch {
 };
 [[nodiscard]] RenderedPatch render_patch(const CachedView& view, const PatchPlace& place, int k);
 
+/// The square of a picture with the view's size, resized to [2, K, K].
+/// @param ab  [2, H, W]
+[[nodiscard]] std::vector<float> patch_colors(const CachedView& view, const PatchPlace& place, int k,
+                                              const std::vector<float>& ab);
+
 /// Some pixels of the square with the answer's colour at each (bilinear).
 struct PatchPixels {
   std::vector<std::uint32_t> pixels;  ///< y * width + x in the view; only those of some opacity

@@ -43,6 +43,42 @@ class RunningPsnr {
   std::deque<double> window_;
 };
 
+constexpr int kPreviews = 4;
+constexpr int kPreviewSide = 200;  ///< pixels of the longer side
+
+/// The views that previews show: held-out ones, else some of all.
+std::vector<const View*> preview_views(const Capture& capture) {
+  std::vector<const View*> held_out, all;
+  for (const View& view : capture.views) (view.held_out ? held_out : all).push_back(&view);
+  const std::vector<const View*>& from = held_out.empty() ? all : held_out;
+  std::vector<const View*> chosen;
+  for (std::size_t i = 0; i < kPreviews && i < from.size(); ++i) {
+    chosen.push_back(from[i * from.size() / std::min<std::size_t>(kPreviews, from.size())]);
+  }
+  return chosen;
+}
+
+PreviewPicture preview_of(const LuminanceModel& model, const View& view) {
+  const Intrinsics& full = view.intrinsics;
+  const double scale = std::min(1.0, double(kPreviewSide) / std::max(full.width, full.height));
+  const Intrinsics lens = resized(full, std::max(1, int(full.width * scale)), std::max(1, int(full.height * scale)));
+  const UnitCamera camera(lens, view.world_from_camera, model.frame);
+  PreviewPicture picture{view.name, lens.width, lens.height, {}, {}};
+  std::vector<Ray> rays;
+  for (int y = 0; y < lens.height; ++y) {
+    for (int x = 0; x < lens.width; ++x) {
+      rays.push_back(camera.ray({x + 0.5, y + 0.5}));
+      const std::size_t column = std::size_t((x + 0.5) / lens.width * view.image.width);
+      const std::size_t row = std::size_t((y + 0.5) / lens.height * view.image.height);
+      picture.input.push_back(view.image.luminance(row * std::size_t(view.image.width) + column));
+    }
+  }
+  std::vector<RayResult> results(rays.size());
+  model.engine->render(rays, model.march(), {1e-2f, 0.9f}, results);
+  for (const RayResult& result : results) picture.ours.push_back(result.luminance);
+  return picture;
+}
+
 LuminanceModel start_or_resume(const Capture& capture, const Stage1Options& options,
                                const std::filesystem::path& snapshot, bool resume) {
   if (!resume || !std::filesystem::exists(snapshot)) return LuminanceModel::create(capture, options);
@@ -59,13 +95,16 @@ LuminanceModel start_or_resume(const Capture& capture, const Stage1Options& opti
 }  // namespace
 
 Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, const std::filesystem::path& snapshot,
-                          bool resume, const ProgressSink& progress) {
+                          bool resume, const ProgressSink& progress, const PreviewSink& previews) {
   LuminanceModel model = start_or_resume(capture, options, snapshot, resume);
   const std::vector<TrainingView> views = training_views(capture, model.frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
 
   const double seconds_before = model.seconds;
   const Stopwatch watch;
+  double told_seconds = 0;  // an observer's pauses and pictures are no training
+  const std::vector<const View*> shown = preview_views(capture);
+  const DrawPreview preview = [&](std::size_t index) { return preview_of(model, *shown[index % shown.size()]); };
   double rays = 0;
   RunningPsnr psnr;
   while (model.engine->step_count() < options.steps) {
@@ -76,15 +115,21 @@ Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, 
     }
     const StepReport step = model.engine->step(views, learning_rate(options, fraction));
     model.trained_samples += double(step.trained_samples);
-    model.seconds = seconds_before + watch.seconds();
+    model.seconds = seconds_before + watch.seconds() - told_seconds;
     rays += double(step.rays);
     psnr.add(step.squared_error);
 
     const long done = model.engine->step_count();
     if (progress) {
+      const Stopwatch telling;
       progress({"stage 1",
                 fraction,
-                {{"psnr", psnr.value()}, {"rays/s", rays / watch.seconds()}, {"samples", model.trained_samples}}});
+                {{"psnr", psnr.value()},
+                 {"loss", step.loss},
+                 {"rays/s", rays / (watch.seconds() - told_seconds)},
+                 {"samples", model.trained_samples}}});
+      if (previews) previews(preview);
+      told_seconds += telling.seconds();
     }
     if (interruption_requested()) {
       model.save(snapshot);

@@ -7,6 +7,7 @@
 
 #include "encoding/hash_grid_levels.h"
 #include "src/base/options.h"
+#include "src/base/preview.h"
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/capture/focus.h"
@@ -80,10 +81,11 @@ struct Stage1Report {
 };
 
 /// Trains (or goes on training, when `snapshot` exists and `resume` is set) and leaves the result in `snapshot`.
+/// What `progress` and `previews` take is no training time; previews show held-out views, or some of all.
 /// Resuming continues bit for bit on the CPU, whatever the number of threads.
 /// @throws Interrupted    after saving, when the user asked to stop.
 /// @throws SnapshotError  `snapshot` is of another version, cut short, or of another configuration.
 Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, const std::filesystem::path& snapshot,
-                          bool resume, const ProgressSink& progress = {});
+                          bool resume, const ProgressSink& progress = {}, const PreviewSink& previews = {});
 
 }  // namespace cnerf

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
+#include <iterator>
 #include <numeric>
 #include <sstream>
 
@@ -9,6 +11,7 @@
 #include "src/base/files.h"
 #include "src/base/rng.h"
 #include "src/base/usage.h"
+#include "src/color/colorspace_math.h"
 #include "src/colorizer/gallery.h"
 #include "src/train/color_model.h"
 #include "src/train/luminance_model.h"
@@ -23,9 +26,19 @@ constexpr int kDistillPixels = 8192;  // pixels a distillation step
 constexpr std::size_t kGalleryTiles = 20;
 constexpr std::uint64_t kFirstBaseIndex = std::uint64_t(1) << 32;  // patch indices of bases, apart from training's
 constexpr int kMostRejectedInARow = 400;
+constexpr std::size_t kPreviews = 3;
+constexpr int kPreviewSide = 120;  // pixels of the shorter side
 
 float decayed(double from, double to, double fraction) {
   return static_cast<float>(from * std::pow(to / from, std::clamp(2.0 * fraction - 1.0, 0.0, 1.0)));
+}
+
+std::vector<std::string> training_view_names(const Capture& capture) {
+  std::vector<std::string> names;
+  for (const View& view : capture.views) {
+    if (!view.held_out) names.push_back(view.name);
+  }
+  return names;
 }
 
 /// A patch that was shown to the colorizer, and what came back.
@@ -35,19 +48,29 @@ struct AnsweredPatch {
   std::vector<float> ab;  // [2, K, K]
 };
 
+struct Answers {
+  std::vector<AnsweredPatch> patches;
+  double seconds = 0;  ///< that rendering and colouring them took
+};
+
 /// One run of stage 2.
 class Colorization {
  public:
-  Colorization(const Capture& capture, const std::filesystem::path& stage1_snapshot, const Stage2Options& options,
-               Colorizer& colorizer, std::filesystem::path take_snapshot, bool resume, const ProgressSink& progress)
-      : options_(options), colorizer_(colorizer), file_(std::move(take_snapshot)), progress_(progress) {
-    const std::string stage1_digest = sha256(read_binary_file(stage1_snapshot));
-    start_or_resume(stage1_digest, resume);
+  Colorization(const Stage2Options& options, Colorizer& colorizer, std::filesystem::path take_snapshot,
+               const ProgressSink& progress, const PreviewSink& watcher = {})
+      : options_(options),
+        colorizer_(colorizer),
+        file_(std::move(take_snapshot)),
+        progress_(progress),
+        watcher_(watcher) {}
+
+  Stage2Report run(const Capture& capture, const std::filesystem::path& stage1_snapshot,
+                   std::span<const KnownColors> known, bool resume) {
+    start_or_resume(sha256(read_binary_file(stage1_snapshot)), colorizer_.name() + describe(known), resume);
     seconds_before_ = model_.report.seconds;
     cache_views(capture, LuminanceModel::load(stage1_snapshot));
-  }
+    known_ = KnownColorMap(views_, training_view_names(capture), known);
 
-  Stage2Report run() {
     const std::vector<AnsweredPatch> bases = choose_bases();
     std::vector<ColorPatchView> base_views;
     for (const AnsweredPatch& base : bases) base_views.push_back(view_of(base));
@@ -60,14 +83,19 @@ class Colorization {
     return model_.report;
   }
 
+  void only_bases(const Capture& capture, const std::filesystem::path& stage1_snapshot) {
+    cache_views(capture, LuminanceModel::load(stage1_snapshot));
+    write_candidates(ask_candidates(), file_);
+  }
+
  private:
-  void start_or_resume(const std::string& stage1_digest, bool resume) {
+  void start_or_resume(const std::string& stage1_digest, const std::string& source, bool resume) {
     if (resume && std::filesystem::exists(file_)) {
       model_ = ColorModel::load(file_);
       if (model_.stage1_sha256 != stage1_digest) {
         throw SnapshotError(file_.string() + ": colorizes another stage 1 snapshot; run without --resume");
       }
-      if (model_.colorizer != colorizer_.name() || options_to_json(model_.options) != options_to_json(options_)) {
+      if (model_.colorizer != source || options_to_json(model_.options) != options_to_json(options_)) {
         throw SnapshotError(file_.string() +
                             ": was made with another colorizer or other stage2 options; run with the "
                             "same ones, or without --resume");
@@ -75,7 +103,7 @@ class Colorization {
       return;
     }
     model_ = ColorModel::create(options_);
-    model_.colorizer = colorizer_.name();
+    model_.colorizer = source;
     model_.stage1_sha256 = stage1_digest;
   }
 
@@ -83,6 +111,7 @@ class Colorization {
     const std::vector<TrainingView> views = training_views(capture, luminance.frame);
     if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
     const MarchSettings march = luminance.march();
+    if (watcher_) cache_previews(capture, luminance);
     for (std::size_t v = 0; v < views.size(); ++v) {
       views_.push_back(
           cache_view(*luminance.engine, march, views[v].camera, options_.working_resolution, options_.cached_weight));
@@ -92,7 +121,31 @@ class Colorization {
     }
   }
 
-  std::vector<AnsweredPatch> ask(const std::vector<PatchPlace>& places) {
+  /// Held-out views, small: what an observer may want to see.
+  void cache_previews(const Capture& capture, const LuminanceModel& luminance) {
+    for (const View& view : capture.views) {
+      if (!view.held_out || previews_.size() >= kPreviews) continue;
+      const UnitCamera camera(view.intrinsics, view.world_from_camera, luminance.frame);
+      previews_.push_back({view.name, cache_view(*luminance.engine, luminance.march(), camera, kPreviewSide, 0.95)});
+    }
+  }
+
+  [[nodiscard]] PreviewPicture preview(std::size_t index) const {
+    const auto& [name, view] = previews_[index % previews_.size()];
+    PreviewPicture picture{name, view.width, view.height, {}, view.luminance};
+    std::vector<std::uint32_t> all(view.luminance.size());
+    std::iota(all.begin(), all.end(), 0u);
+    const std::vector<Ab> colors = model_.decode(pixel_samples(view, all));
+    for (std::size_t p = 0; p < all.size(); ++p) {
+      const Ab ab = view.opacity[p] < kLeastColoredOpacity ? Ab{} : colors[p];
+      const float lightness = lightness_from_luminance(view.luminance[p]);
+      const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness, ab.a, ab.b});
+      picture.ours.insert(picture.ours.end(), {rgb.x, rgb.y, rgb.z});
+    }
+    return picture;
+  }
+
+  [[nodiscard]] Answers ask(const std::vector<PatchPlace>& places) const {
     const Stopwatch watch;
     const int k = options_.patch_size;
     LightnessBatch question{int(places.size()), k, k, {}};
@@ -105,39 +158,64 @@ class Colorization {
     const ChromaBatch answer = colorizer_.colorize(question);
     check_answer(colorizer_.name(), question, answer);
     for (std::size_t i = 0; i < answered.size(); ++i) answered[i].ab = ab_of(answer, int(i));
-    model_.report.colorizer_seconds += watch.seconds();
-    return answered;
+    return {std::move(answered), watch.seconds()};
   }
 
   [[nodiscard]] ColorPatchView view_of(const AnsweredPatch& patch) const {
     return {options_.patch_size, options_.patch_size, patch.ab, patch.shown.lightness, patch.shown.opacity};
   }
 
-  /// Base patches (paper: s = 0.7, 5 images), spread evenly over the views so that they cover a 360 capture's
-  /// directions. All candidates go into a gallery, from which a user may pick.
+  /// Base patches (paper: s = 0.7, 5 images): parts of the key frames, whose colours are known; without any, answers of
+  /// the colorizer, from which a user may pick.
   std::vector<AnsweredPatch> choose_bases() {
+    if (!known_.key_frames().empty()) return bases_of_key_frames();
+    const std::vector<AnsweredPatch> answered = ask_candidates();
+    write_candidates(answered, file_.parent_path() / "bases.png");
+    std::vector<AnsweredPatch> bases;
+    for (const int index : picked_bases(int(answered.size()))) bases.push_back(answered[std::size_t(index)]);
+    return bases;
+  }
+
+  std::vector<AnsweredPatch> bases_of_key_frames() {
+    std::vector<AnsweredPatch> bases;
+    const auto frames = known_.key_frames();
+    for (int i = 0; i < options_.purify.base_images; ++i) {
+      const KnownColorMap::KeyFrame& frame = frames[std::size_t(i) % frames.size()];
+      const PatchPlace place = base_patch(frame.view, i);
+      const int k = options_.patch_size;
+      bases.push_back(
+          {place, render_patch(views_[frame.view], place, k), patch_colors(views_[frame.view], place, k, frame.ab)});
+    }
+    write_candidates(bases, file_.parent_path() / "bases.png");
+    return bases;
+  }
+
+  [[nodiscard]] PatchPlace base_patch(std::size_t view, int index) const {
+    return random_patch(views_, view, options_.purify.base_scale, options_.purify.base_scale,
+                        std::uint64_t(options_.seed), kFirstBaseIndex + std::uint64_t(index));
+  }
+
+  /// Spread evenly over the views, so that they cover a 360 capture's directions.
+  std::vector<AnsweredPatch> ask_candidates() {
     const int candidates = std::max(kBaseCandidates, options_.purify.base_images);
     std::vector<PatchPlace> places;
     for (int i = 0; i < candidates; ++i) {
-      const std::size_t view = std::size_t(i) * views_.size() / std::size_t(candidates);
-      places.push_back(random_patch(views_, view, options_.purify.base_scale, options_.purify.base_scale,
-                                    std::uint64_t(options_.seed), kFirstBaseIndex + std::uint64_t(i)));
+      places.push_back(base_patch(std::size_t(i) * views_.size() / std::size_t(candidates), i));
     }
     std::vector<AnsweredPatch> answered;
     for (std::size_t first = 0; first < places.size(); first += std::size_t(options_.colorizer_batch)) {
       const auto last = std::min(places.size(), first + std::size_t(options_.colorizer_batch));
-      for (AnsweredPatch& patch : ask({places.begin() + long(first), places.begin() + long(last)})) {
-        answered.push_back(std::move(patch));
-      }
+      Answers answers = ask({places.begin() + long(first), places.begin() + long(last)});
+      model_.report.colorizer_seconds += answers.seconds;
+      std::ranges::move(answers.patches, std::back_inserter(answered));
     }
-    std::vector<GalleryTile> tiles;
-    for (std::size_t i = 0; i < answered.size(); ++i)
-      tiles.push_back(tile_of(answered[i], "base " + std::to_string(i)));
-    write_gallery(file_.parent_path() / "bases.png", tiles);
+    return answered;
+  }
 
-    std::vector<AnsweredPatch> bases;
-    for (const int index : picked_bases(candidates)) bases.push_back(answered[std::size_t(index)]);
-    return bases;
+  void write_candidates(const std::vector<AnsweredPatch>& patches, const std::filesystem::path& file) const {
+    std::vector<GalleryTile> tiles;
+    for (std::size_t i = 0; i < patches.size(); ++i) tiles.push_back(tile_of(patches[i], "base " + std::to_string(i)));
+    write_gallery(file, tiles);
   }
 
   [[nodiscard]] std::vector<int> picked_bases(int candidates) const {
@@ -175,32 +253,45 @@ class Colorization {
     class_weights_ = rebalancing_weights(prior, static_cast<float>(options_.rebalancing));
   }
 
-  /// Query-based colorization: draw, ask, purify, train on what passes.
-  void inject(const Purifier& purifier) {
-    int rejected_in_a_row = 0;
-    while (model_.chroma->step_count() < options_.patches) {
+  /// The colorizer answers about patches `first`, `first` + 1, … while others are trained on. One query is under way at
+  /// a time; which patches it shows depends on their numbers alone.
+  [[nodiscard]] std::future<Answers> ask_ahead(std::int64_t first) {
+    return std::async(std::launch::async, [this, first] {
       std::vector<PatchPlace> places;
       for (int i = 0; i < options_.colorizer_batch; ++i) {
-        const auto index = static_cast<std::uint64_t>(model_.queries.front()++);
+        const auto index = static_cast<std::uint64_t>(first + i);
         const CounterRng rng(std::uint64_t(options_.seed), index);
         places.push_back(random_patch(views_, rng.below(0, std::uint32_t(views_.size())), options_.scale_min,
                                       options_.scale_max, std::uint64_t(options_.seed), index));
       }
-      for (const AnsweredPatch& patch : ask(places)) {
-        if (!purifier.accepts(view_of(patch))) {
-          model_.report.rejected += 1;
-          remember(rejected_, patch);
-          if (++rejected_in_a_row >= kMostRejectedInARow) {
-            throw ColorizerError(colorizer_.name() + ": " + std::to_string(rejected_in_a_row) +
-                                 " answers in a row were rejected as unlike the base images; see bases.png, lower "
-                                 "stage2.purify.threshold, or pick other bases");
-          }
-          continue;
+      return ask(places);
+    });
+  }
+
+  /// Query-based colorization: draw, ask, purify, train on what passes.
+  void inject(const Purifier& purifier) {
+    int rejected_in_a_row = 0;
+    std::future<Answers> coming = ask_ahead(model_.queries.front());
+    while (model_.chroma->step_count() < options_.patches) {
+      const Stopwatch waiting;
+      const Answers answers = coming.get();
+      model_.report.waited_seconds += waiting.seconds();
+      model_.report.colorizer_seconds += answers.seconds;
+      model_.queries.front() += options_.colorizer_batch;
+      coming = ask_ahead(model_.queries.front());
+      for (const AnsweredPatch& patch : answers.patches) {
+        const bool is_accepted = purifier.accepts(view_of(patch));
+        (is_accepted ? model_.report.accepted : model_.report.rejected) += 1;
+        remember(is_accepted ? accepted_ : rejected_, patch);
+        rejected_in_a_row = is_accepted ? 0 : rejected_in_a_row + 1;
+        // What is known needs no answer.
+        const bool is_of_use = is_accepted || !known_.places().empty();
+        if (!is_of_use && rejected_in_a_row >= kMostRejectedInARow) {
+          throw ColorizerError(colorizer_.name() + ": " + std::to_string(rejected_in_a_row) +
+                               " answers in a row were rejected as unlike the base images; see bases.png, lower "
+                               "stage2.purify.threshold, or pick other bases");
         }
-        rejected_in_a_row = 0;
-        model_.report.accepted += 1;
-        remember(accepted_, patch);
-        if (model_.chroma->step_count() < options_.patches) train_on(patch);
+        if (is_of_use && model_.chroma->step_count() < options_.patches) train_on(patch, is_accepted);
       }
       after_step(model_.chroma->step_count(), options_.patches);
     }
@@ -208,20 +299,38 @@ class Colorization {
     write_gallery(file_.parent_path() / "rejected.png", rejected_);
   }
 
-  void train_on(const AnsweredPatch& patch) {
+  /// @param is_accepted  false: only what is known is trained on
+  void train_on(const AnsweredPatch& patch, bool is_accepted) {
     const CachedView& view = views_[patch.place.view];
     const auto step = static_cast<std::uint64_t>(model_.chroma->step_count());
     const PatchPixels picked = pick_pixels(view, patch.place, options_.patch_size, patch.ab, options_.rays_per_patch,
                                            std::uint64_t(options_.seed), step);
+    std::vector<std::uint32_t> wanted;
     std::vector<SoftLabel> labels;
     std::vector<float> weights;
+    const auto want = [&](const CachedView& of, std::uint32_t pixel, Ab color) {
+      labels.push_back(soft_label(color));
+      const float of_class = class_weights_.empty() ? 1.0f : class_weights_[std::size_t(nearest_bin(color))];
+      weights.push_back(of_class * of.opacity[pixel]);
+    };
     for (std::size_t i = 0; i < picked.pixels.size(); ++i) {
-      labels.push_back(soft_label(picked.colors[i]));
-      const float of_class = class_weights_.empty() ? 1.0f : class_weights_[std::size_t(nearest_bin(picked.colors[i]))];
-      weights.push_back(of_class * view.opacity[picked.pixels[i]]);
+      const Ab* known = known_.find(patch.place.view, picked.pixels[i]);
+      if (known == nullptr && !is_accepted) continue;
+      wanted.push_back(picked.pixels[i]);
+      want(view, picked.pixels[i], known != nullptr ? *known : picked.colors[i]);
+    }
+    PixelSamples pixels = pixel_samples(view, wanted);
+    if (const auto places = known_.places(); !places.empty()) {
+      const CounterRng rng(std::uint64_t(options_.seed) ^ 0x6b6e6f776eull, step);
+      const auto count = std::uint64_t(options_.known_share * options_.rays_per_patch);
+      for (std::uint64_t i = 0; i < count; ++i) {
+        const KnownColorMap::Place place = places[rng.below(i, std::uint32_t(places.size()))];
+        append(pixels, pixel_samples(views_[place.view], std::span(&place.pixel, 1)));
+        want(views_[place.view], place.pixel, *known_.find(place.view, place.pixel));
+      }
     }
     const double fraction = double(step) / options_.patches;
-    loss_ = model_.chroma->step(pixel_samples(view, picked.pixels), labels, weights,
+    loss_ = model_.chroma->step(pixels, labels, weights,
                                 decayed(options_.learning_rate, options_.final_learning_rate, fraction));
   }
 
@@ -267,12 +376,16 @@ class Colorization {
     tell(distilling ? "stage 2: colour for baking" : "stage 2", double(done) / all,
          {{distilling ? "ab distance" : "loss", loss_},
           {"accepted", double(model_.report.accepted) / std::max(asked, 1)},
-          {"colorizer s", model_.report.colorizer_seconds}});
+          {"waited s", model_.report.waited_seconds}});
     stop_if_asked();
   }
 
   void tell(const std::string& task, double fraction, std::vector<std::pair<std::string, double>> figures) const {
-    if (progress_) progress_({task, std::min(fraction, 1.0), std::move(figures)});
+    if (!progress_) return;
+    const Stopwatch telling;
+    progress_({task, std::min(fraction, 1.0), std::move(figures)});
+    if (watcher_ && !previews_.empty()) watcher_([this](std::size_t index) { return preview(index); });
+    told_seconds_ += telling.seconds();
   }
 
   void stop_if_asked() {
@@ -282,7 +395,7 @@ class Colorization {
   }
 
   void save() {
-    model_.report.seconds = seconds_before_ + watch_.seconds();
+    model_.report.seconds = seconds_before_ + watch_.seconds() - told_seconds_;
     model_.save(file_);
   }
 
@@ -298,21 +411,33 @@ class Colorization {
   Colorizer& colorizer_;
   std::filesystem::path file_;
   ProgressSink progress_;
+  PreviewSink watcher_;
   ColorModel model_;
   std::vector<CachedView> views_;
+  KnownColorMap known_;
   std::vector<float> class_weights_;  // [313]; empty = all alike
   std::vector<GalleryTile> accepted_, rejected_;
   double loss_ = 0;
   Stopwatch watch_;
   double seconds_before_ = 0;
+  mutable double told_seconds_ = 0;  // an observer's pauses and pictures are no training
+  std::vector<std::pair<std::string, CachedView>> previews_;
 };
 
 }  // namespace
 
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
-                          const Stage2Options& options, Colorizer& colorizer,
-                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress) {
-  return Colorization(capture, stage1_snapshot, options, colorizer, take_snapshot, resume, progress).run();
+                          const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
+                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress,
+                          const PreviewSink& previews) {
+  return Colorization(options, colorizer, take_snapshot, progress, previews)
+      .run(capture, stage1_snapshot, known, resume);
+}
+
+void write_base_candidates(const Capture& capture, const std::filesystem::path& stage1_snapshot,
+                           const Stage2Options& options, Colorizer& colorizer, const std::filesystem::path& gallery,
+                           const ProgressSink& progress) {
+  Colorization(options, colorizer, gallery, progress).only_bases(capture, stage1_snapshot);
 }
 
 }  // namespace cnerf

@@ -6,10 +6,12 @@
 
 #include "encoding/hash_grid_levels.h"
 #include "src/base/options.h"
+#include "src/base/preview.h"
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/colorizer/colorizer.h"
 #include "src/colorizer/purify.h"
+#include "src/train/known_colors.h"
 
 namespace cnerf {
 
@@ -18,6 +20,7 @@ struct Stage2Options {
   int patch_size = 128;                     ///< K
   double scale_min = 0.3, scale_max = 0.7;  ///< s: the patch's side as a share of the image's short side
   int rays_per_patch = 4096;                ///< pixels of a patch that are trained on
+  double known_share = 1;  ///< pixels of known colours trained on with a patch, as a share of rays_per_patch
   double learning_rate = 1e-2;
   double final_learning_rate = 1e-3;
   int working_resolution = 384;      ///< short side, pixels, at which samples are cached
@@ -37,6 +40,7 @@ struct Stage2Options {
     v("scale_min", scale_min, Range{0.02, 1}, "smallest share of the short side a patch covers");
     v("scale_max", scale_max, Range{0.02, 1}, "largest share of the short side a patch covers");
     v("rays_per_patch", rays_per_patch, Range{64, 1 << 20}, "pixels of a patch that are trained on");
+    v("known_share", known_share, Range{0, 16}, "pixels of key frames and hints a patch, as a share of rays_per_patch");
     v("learning_rate", learning_rate, Range{1e-8, 1}, "Adam's step size at the start");
     v("final_learning_rate", final_learning_rate, Range{1e-8, 1}, "Adam's step size at the end");
     v("working_resolution", working_resolution, Range{32, 4096}, "short side at which samples are cached, pixels");
@@ -53,15 +57,27 @@ struct Stage2Options {
 
 struct Stage2Report {
   int accepted = 0, rejected = 0;  ///< patches
-  double seconds = 0, colorizer_seconds = 0;
-  double bake_ab_distance = 0;  ///< mean ab distance of the baked contract's colour to the per-pixel decode
+  double seconds = 0;
+  double colorizer_seconds = 0;  ///< that queries took, beside the training but for the base patches
+  double waited_seconds = 0;     ///< that the training waited for them
+  double bake_ab_distance = 0;   ///< mean ab distance of the baked contract's colour to the per-pixel decode
 };
 
 /// Colorizes a trained scene and leaves the result in `take_snapshot`; galleries of base, accepted and rejected patches
 /// are written beside it as PNG.
-/// @throws ColorizerError, Interrupted, SnapshotError.
+/// @param known     colours that overrule the colorizer's; key frames among them are the purification's bases
+/// @param previews  is offered pictures of held-out views, where there are any
+/// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
-                          const Stage2Options& options, Colorizer& colorizer,
-                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress = {});
+                          const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
+                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress = {},
+                          const PreviewSink& previews = {});
+
+/// Only asks for the base candidates, twelve patches spread over the views, and writes their gallery: what the whole
+/// scene would be coloured like, in a minute. `stage2.purify.picked_bases` then picks those that are liked.
+/// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
+void write_base_candidates(const Capture& capture, const std::filesystem::path& stage1_snapshot,
+                           const Stage2Options& options, Colorizer& colorizer, const std::filesystem::path& gallery,
+                           const ProgressSink& progress = {});
 
 }  // namespace cnerf

@@ -20,10 +20,10 @@ namespace fs = std::filesystem;
 /// From the bottom to the top, as add_subdirectory has them in the root CMakeLists.txt; a file may include its own
 /// folder and those before it.
 const std::vector<std::string> kLayers = {
-    "src/base",  "src/color",    "src/capture", "src/prepare",   "encoding",
-    "src/field", "src/render",   "src/engine",  "src/colorizer", "src/colorizer_training",
-    "src/train", "src/evaluate", "bake",        "export",        "src/config",
-    "src/app"};
+    "src/base",   "src/color",    "src/capture", "src/prepare",   "encoding",
+    "src/field",  "src/render",   "src/engine",  "src/colorizer", "src/colorizer_training",
+    "src/train",  "src/evaluate", "bake",        "export",        "viewer",
+    "src/config", "src/app"};
 
 constexpr const char* kColorTruth = "color_truth.h";
 const std::vector<std::string> kTrainingFolders = {"src/train", "src/engine", "src/field", "src/render", "encoding"};
@@ -65,7 +65,7 @@ bool is_source(const fs::path& path) {
 std::vector<Include> all_includes() {
   const fs::path root = CNERF_SOURCE_DIR;
   std::vector<Include> all;
-  for (const char* folder : {"src", "encoding", "bake", "export"}) {
+  for (const char* folder : {"src", "encoding", "bake", "export", "viewer/server"}) {
     for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
       if (!entry.is_regular_file() || !is_source(entry.path())) continue;
       const std::string file = fs::relative(entry.path(), root).generic_string();

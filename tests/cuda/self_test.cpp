@@ -1,5 +1,6 @@
 // Every kernel against the CPU's code on random input. A bound is stated where it is used; weights and activations are
-// rounded to 16 bits on the GPU (half: 5e-4 relative, bfloat16 in the backward pass: 4e-3), sums are floats.
+// rounded to 16 bits on the GPU (half: 5e-4 relative, bfloat16 in the backward pass: 4e-3), sums are floats but for the
+// eight corners of a hash grid's cell.
 
 #include <cuda_runtime_api.h>
 
@@ -109,7 +110,7 @@ void check_hash_grid(int levels, int log2_rows) {
   const std::vector<float> reference = encode_reference(layout, table, positions);
   std::vector<float> seen;
   for (const std::uint16_t h : encoded.downloaded()) seen.push_back(float_of_half(h));
-  expect_below("hash grid forward", relative_distance(seen, reference), 5e-4);
+  expect_below("hash grid forward", relative_distance(seen, reference), 2e-3);
 
   std::vector<double> d_encoded(std::size_t(count) * 4 * std::size_t(levels));
   std::vector<std::uint16_t> d_bfloat(std::size_t(capacity) * 4 * std::size_t(levels), 0);
@@ -226,7 +227,7 @@ void check_engine(const Problem& problem) {
   std::vector<RayResult> rendered(rays.size()), seen(rays.size()), of_view(rays.size());
   cpu.render(rays, options.march, {}, rendered);
   cuda.render(rays, options.march, {}, seen);
-  cuda.render_view(views[1].camera, options.march, {}, of_view);
+  cuda.render_view(views[1].camera, options.march, RenderEffort{}.min_transmittance, of_view);
   std::vector<double> luminance[3], opacity[2], depth[2];
   for (std::size_t r = 0; r < rays.size(); ++r) {
     luminance[0].push_back(seen[r].luminance), luminance[1].push_back(rendered[r].luminance);

@@ -99,6 +99,81 @@ TEST(Pipeline, TakesStandSideBySide) {
   }
 }
 
+TEST(Pipeline, KeyFramesAndHintsOverruleTheColorizer) {
+  const TempDir folder;
+  const std::string out = (folder / "run").string();
+  ASSERT_EQ(train(tiny_capture(), out, {"--set", "stage1.steps=600"}).exit_code, 0) << "enough to have surfaces";
+  const std::string truth = (tiny_capture() / "color/view_004.png").string();
+  ASSERT_TRUE(fs::exists(truth));
+  const auto colorize = [&](const std::string& take, const std::vector<std::string>& known) {
+    const auto arguments =
+        concatenated({"colorize", out, "--colorizer", "grey", "--take", take, "--set", "stage2.patches=60", "--set",
+                      "stage2.purify.enabled=true", "--set", "stage2.distill_steps=60"},
+                     known);
+    const ProgramResult result = cnerf(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(cnerf({"eval", out, "--take", take}).exit_code, 0);
+    return json_of(folder / "run/takes" / take / "metrics.json").at("mean").at("ab_error").get<double>();
+  };
+  const double grey = colorize("plain", {});
+  const double painted = colorize("painted", {"--keyframe", "view_004=" + truth});
+  EXPECT_LT(painted, 0.9 * grey) << "what the key frame shows has its colours in other views";
+  EXPECT_THAT(json_of(folder / "run/takes/painted/take.json").at("colorizer").get<std::string>(),
+              HasSubstr("grey + key frame"));
+
+  const double hinted = colorize("hinted", {"--hint", "24,30,view_004,#ff0000"});
+  EXPECT_NE(hinted, grey);
+  const ProgramResult missing = cnerf({"colorize", out, "--keyframe", "zebra=" + truth});
+  EXPECT_EQ(missing.exit_code, 64) << missing.err;
+  EXPECT_THAT(missing.err, HasSubstr("zebra"));
+}
+
+TEST(Pipeline, BaseCandidatesAreShownWithoutMakingATake) {
+  const TempDir folder;
+  const std::string out = (folder / "run").string();
+  ASSERT_EQ(train(tiny_capture(), out).exit_code, 0);
+  const ProgramResult result = cnerf({"colorize", out, "--colorizer", "grey", "--bases-only"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_FALSE(cv::imread((folder / "run/bases.png").string()).empty());
+  EXPECT_FALSE(fs::exists(folder / "run/takes"));
+  EXPECT_EQ(cnerf({"colorize", out, "--colorizer", "grey", "--bases", "2,99"}).exit_code, 64);
+}
+
+TEST(Program, ColorizesOnePicture) {
+  const TempDir folder;
+  const std::string in = (tiny_capture() / "images/view_000.png").string(), out = (folder / "out.png").string();
+  // A program that answers a = L / 4, b = -10 everywhere.
+  write_file(folder / "warm.py", R"(
+import struct, sys
+while True:
+    head = sys.stdin.buffer.read(20)
+    if len(head) < 20: break
+    _, _, b, h, w = struct.unpack("<4s4I", head)
+    values = struct.unpack("<%df" % (b * h * w), sys.stdin.buffer.read(4 * b * h * w))
+    sys.stdout.buffer.write(struct.pack("<4s5I", b"CNA1", 0, b, 2, h, w))
+    sys.stdout.buffer.write(struct.pack("<%df" % (2 * b * h * w), *[v / 4 for v in values], *[-10.0] * (b * h * w)))
+    sys.stdout.buffer.flush()
+)");
+  const std::vector<std::string> call = {"colorize-image", in, out, "--colorizer",
+                                         "exec:python3 " + (folder / "warm.py").string()};
+  const ProgramResult result = cnerf(call);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const cv::Mat picture = cv::imread(out), source = cv::imread(in);
+  ASSERT_EQ(picture.size(), source.size());
+  double red_over_green = 0;
+  for (int y = 0; y < picture.rows; ++y) {
+    for (int x = 0; x < picture.cols; ++x) {
+      const auto& pixel = picture.at<cv::Vec3b>(y, x);
+      red_over_green += pixel[2] - pixel[1];
+    }
+  }
+  EXPECT_GT(red_over_green / double(picture.total()), 3);
+  EXPECT_EQ(cnerf(call).exit_code, 64) << "an existing picture is not replaced unasked";
+  EXPECT_EQ(
+      cnerf({"colorize-image", in, (folder / "p.png").string(), "--prompt", "red", "--colorizer", "grey"}).exit_code,
+      64);
+}
+
 TEST(Pipeline, ProgressAsJson) {
   const TempDir folder;
   const ProgramResult result = train(tiny_capture(), folder / "run", {"--progress", "json"});

@@ -21,7 +21,8 @@ inline void cuda_check(cudaError_t result, const char* call) {
 }
 #define CNERF_CUDA(call) ::cnerf::cuda_check((call), #call)
 
-/// Plain device memory of trivially copyable elements.
+/// Plain device memory of trivially copyable elements. What the constructor and `upload` write has arrived when they
+/// return: they use the default stream, for which the engine's own streams do not wait.
 template <typename T>
 class DeviceBuffer {
  public:
@@ -40,6 +41,7 @@ class DeviceBuffer {
     }
     cuda_check(result, "cudaMalloc");
     CNERF_CUDA(cudaMemset(data_, 0, size * sizeof(T)));
+    CNERF_CUDA(cudaStreamSynchronize(nullptr));
   }
   DeviceBuffer(DeviceBuffer&& other) noexcept { swap(other); }
   DeviceBuffer& operator=(DeviceBuffer&& other) noexcept {
@@ -54,7 +56,9 @@ class DeviceBuffer {
   [[nodiscard]] std::size_t bytes() const { return size_ * sizeof(T); }
 
   void upload(const T* from, std::size_t count) const {
-    if (count > 0) CNERF_CUDA(cudaMemcpy(data_, from, count * sizeof(T), cudaMemcpyHostToDevice));
+    if (count == 0) return;
+    CNERF_CUDA(cudaMemcpy(data_, from, count * sizeof(T), cudaMemcpyHostToDevice));
+    CNERF_CUDA(cudaStreamSynchronize(nullptr));
   }
   void download(T* to, std::size_t count, std::size_t first = 0) const {
     if (count > 0) CNERF_CUDA(cudaMemcpy(to, data_ + first, count * sizeof(T), cudaMemcpyDeviceToHost));

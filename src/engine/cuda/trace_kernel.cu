@@ -14,6 +14,9 @@ namespace {
 constexpr int kWarps = 8;
 constexpr int kThreads = 32 * kWarps;
 
+/// Of a rendering, 32 samples that add less than this to the opacity are left dark: a tenth of an 8-bit step in light.
+constexpr float kLeastSeen = 4e-4f;
+
 enum class Keep { kTraining, kResults, kSamples };
 
 template <int KT>
@@ -140,9 +143,8 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
     const Vec3f place = in_box(record.ray.at(sample.t));
     warp.encode(levels, job.field.table, place, lane);
     __syncwarp();
-    const RawField raw = nets(warp, &direction);
-
-    const float depth = density_from_raw(raw.density, job.field.density_scale) * sample.dt;
+    typename FieldNets<KT>::Geometry geometry;
+    const float depth = density_from_raw(nets.density(warp, geometry), job.field.density_scale) * sample.dt;
     const RunOptics optics(ray.depth, int(lane) < count ? depth : 0.0f);
     const unsigned opaque = __ballot_sync(~0u, optics.transmittance_after() < job.min_transmittance);
     if (opaque != 0 && __ffs(opaque) <= count) {
@@ -150,13 +152,15 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
       is_open = false;
     }
     const float weight = int(lane) < count ? optics.weight() : 0.0f;
-    const float luminance = job.field.activation.value(raw.luminance);
+    const bool is_seen = kKeep != Keep::kResults || warp_sum(weight) > kLeastSeen;
+    const float raw_luminance = is_seen ? nets.luminance(warp, geometry, &direction) : 0.0f;
+    const float luminance = is_seen ? job.field.activation.value(raw_luminance) : 0.0f;
     ray.luminance += weight * luminance;
     ray.weighted_t += weight * sample.t;
     ray.depth = __shfl_sync(~0u, optics.depth_through, count - 1);
 
     if constexpr (kKeep == Keep::kTraining) {
-      keep_for_training(job.samples, warp, ray, ray_index, count, place, depth, raw.luminance, &job.state->samples);
+      keep_for_training(job.samples, warp, ray, ray_index, count, place, depth, raw_luminance, &job.state->samples);
       is_open = is_open && ray.has_room;
     }
     if constexpr (kKeep == Keep::kSamples) {
@@ -231,15 +235,12 @@ __global__ void __launch_bounds__(kThreads, 2)
     warp.encode(levels, field.table, in_box(positions[i]), lane);
     if (directions != nullptr) warp.set_direction(directions[i], lane);
     __syncwarp();
-    RawField raw;
-    if (directions != nullptr) {
-      raw = nets(warp, nullptr);
-    } else {
-      raw.density = nets.density(warp);
-    }
+    typename FieldNets<KT>::Geometry geometry;
+    const float raw_density = nets.density(warp, geometry);
+    const float raw_luminance = directions != nullptr ? nets.luminance(warp, geometry, nullptr) : 0.0f;
     if (first + lane < count) {
-      if (sigma != nullptr) sigma[i] = density_from_raw(raw.density, field.density_scale);
-      if (luminance != nullptr) luminance[i] = field.activation.value(raw.luminance);
+      if (sigma != nullptr) sigma[i] = density_from_raw(raw_density, field.density_scale);
+      if (luminance != nullptr) luminance[i] = field.activation.value(raw_luminance);
     }
     __syncwarp();
   }
@@ -265,7 +266,8 @@ __global__ void __launch_bounds__(kThreads, 2)
     const Vec3f within = {rng.uniform(3 * cell), rng.uniform(3 * cell + 1), rng.uniform(3 * cell + 2)};
     warp.encode(levels, field.table, in_box(layout.point_in(cell, within)), lane);
     __syncwarp();
-    const float sigma = density_from_raw(nets.density(warp), field.density_scale);
+    typename FieldNets<KT>::Geometry unused;
+    const float sigma = density_from_raw(nets.density(warp, unused), field.density_scale);
     if (first + lane < count && remembered != kExcludedCell) {
       density[cell] = fmaxf(remembered == kNeverSeenCell ? 0.0f : remembered * decay, sigma);
     }

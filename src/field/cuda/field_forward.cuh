@@ -24,11 +24,6 @@ __device__ inline DirectionCode encode_direction(Vec3f direction) {
   return code;
 }
 
-/// Outputs of the nets for one sample.
-struct RawField {
-  float density = 0, luminance = 0;
-};
-
 /// Shared memory of one warp.
 template <int KT>
 struct WarpField {
@@ -46,7 +41,7 @@ struct WarpField {
     const float position[3] = {p.x, p.y, p.z};
     auto* row = reinterpret_cast<uint2*>(encoded[lane]);
 #pragma unroll 2
-    for (int l = 0; l < levels.count; ++l) row[l] = halves_of(gather(levels.level[l], table, position));
+    for (int l = 0; l < levels.count; ++l) row[l] = gather(levels.level[l], table, position);
   }
   /// Writes this lane's direction, where every sample has its own.
   __device__ void set_direction(Vec3f d, unsigned lane) {
@@ -66,25 +61,35 @@ class FieldNets {
 
   __device__ FieldNets(const uint2* weights, const float* last_layer) : weights_(weights), last_(last_layer) {}
 
-  /// Density only, of this lane's sample.
-  __device__ float density(WarpField<KT>& warp) const {
+  /// What the luminance net needs of the density net: its outputs as left operands.
+  struct Geometry {
+    std::uint32_t channels[kTiles][4];
+  };
+
+  /// Raw log density of this lane's sample.
+  __device__ float density(WarpField<KT>& warp, Geometry& geometry) const {
+    const unsigned lane = threadIdx.x % 32, g = lane / 4, t = lane % 4;
     std::uint32_t hidden[kTiles][4][4];
     hidden_layer(warp, hidden);
-    geometry(warp, hidden, [](int, const float(&)[2][4]) {});
+    dense<Half, kTiles, 4, 1>(hidden, weights_ + Shape::kPackedDensity2, [&](int m, int, const float(&sums)[2][4]) {
+      if (t == 0) {
+        warp.density[16 * m + g] = sums[0][0];
+        warp.density[16 * m + g + 8] = sums[0][2];
+      }
+      pack_operand<Half>(sums, geometry.channels[m]);
+    });
     __syncwarp();
-    return warp.density[threadIdx.x % 32];
+    return warp.density[lane];
   }
+  /// The luminance net's raw output for this lane's sample.
   /// @param direction  share_of_lane() of the direction all samples have; null: each has its own in `warp.direction`
-  __device__ RawField operator()(WarpField<KT>& warp, const uint2* direction) const {
+  __device__ float luminance(WarpField<KT>& warp, const Geometry& geometry, const uint2* direction) const {
     const unsigned lane = threadIdx.x % 32;
     std::uint32_t features[kTiles][2][4];
-    {
-      std::uint32_t hidden[kTiles][4][4];
-      hidden_layer(warp, hidden);
-      geometry(warp, hidden, [&](int m, const float(&sums)[2][4]) { pack_operand<Half>(sums, features[m][0]); });
-    }
 #pragma unroll
     for (int m = 0; m < kTiles; ++m) {
+#pragma unroll
+      for (int r = 0; r < 4; ++r) features[m][0][r] = geometry.channels[m][r];
       if (direction != nullptr) {
         features[m][1][0] = features[m][1][1] = direction->x;
         features[m][1][2] = features[m][1][3] = direction->y;
@@ -97,9 +102,9 @@ class FieldNets {
                               [&](int m, int n, const float(&sums)[2][4]) { pack_relu<Half>(sums, first[m][n]); });
     dense<Half, kTiles, 4, 4>(first, weights_ + Shape::kPackedLuminance2,
                               [&](int m, int n, const float(&sums)[2][4]) { pack_relu<Half>(sums, second[m][n]); });
-    luminance(warp, second);
+    last_layer(warp, second);
     __syncwarp();
-    return {warp.density[lane], warp.luminance[lane]};
+    return warp.luminance[lane];
   }
 
  private:
@@ -116,19 +121,8 @@ class FieldNets {
     dense<Half, kTiles, KT, 4>(encoded, weights_ + Shape::kPackedDensity1,
                                [&](int m, int n, const float(&sums)[2][4]) { pack_relu<Half>(sums, hidden[m][n]); });
   }
-  template <typename Keep>
-  __device__ void geometry(WarpField<KT>& warp, const std::uint32_t (&hidden)[kTiles][4][4], Keep&& keep) const {
-    const unsigned lane = threadIdx.x % 32, g = lane / 4, t = lane % 4;
-    dense<Half, kTiles, 4, 1>(hidden, weights_ + Shape::kPackedDensity2, [&](int m, int, const float(&sums)[2][4]) {
-      if (t == 0) {
-        warp.density[16 * m + g] = sums[0][0];
-        warp.density[16 * m + g + 8] = sums[0][2];
-      }
-      keep(m, sums);
-    });
-  }
   /// The last layer has one output: a dot product in floats.
-  __device__ void luminance(WarpField<KT>& warp, const std::uint32_t (&hidden)[kTiles][4][4]) const {
+  __device__ void last_layer(WarpField<KT>& warp, const std::uint32_t (&hidden)[kTiles][4][4]) const {
     const unsigned lane = threadIdx.x % 32, g = lane / 4, t = lane % 4;
     float sum[kTiles][2] = {};
 #pragma unroll

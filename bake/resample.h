@@ -1,0 +1,15 @@
+#pragma once
+/// A baked volume at fewer voxels, for viewers.
+
+#include "bake/baked_volume.h"
+
+namespace cnerf {
+
+/// The volume with at most `resolution` voxels along its longest axis. What is there already is returned as it is:
+/// voxels are never made smaller. A new voxel's density is the mean over its cube, so that the optical depth of what is
+/// thin is kept; its colour and luminance are the means of what it covers, weighted by the light that each part emits.
+/// Voxels without density are left out: call dilate_colors where colour has to reach beyond.
+/// @throws ContractError  on an empty volume or a resolution below 1.
+[[nodiscard]] BakedVolume resample_volume(const BakedVolume& volume, int resolution);
+
+}  // namespace cnerf

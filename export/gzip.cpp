@@ -1,0 +1,44 @@
+#include "export/gzip.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "src/base/check.h"
+
+namespace cnerf {
+
+std::vector<std::byte> gzip(std::span<const std::uint8_t> bytes) {
+  constexpr int kGzip = 15 + 16;  // window of 32 KiB; 16 asks for a gzip header instead of zlib's
+  z_stream stream{};
+  CNERF_CHECK(deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, kGzip, 9, Z_FILTERED) == Z_OK,
+              "zlib cannot start");
+  std::vector<std::byte> packed;
+  std::vector<std::byte> block(1 << 18);
+  // zlib counts in 32 bits: larger inputs go in pieces.
+  constexpr std::size_t kLargest = 1u << 30;
+  std::size_t at = 0;
+  int state = Z_OK;
+  while (state != Z_STREAM_END) {
+    if (stream.avail_in == 0) {
+      const std::size_t count = std::min(kLargest, bytes.size() - at);
+      stream.next_in = const_cast<Bytef*>(bytes.data() + at);
+      stream.avail_in = static_cast<uInt>(count);
+      at += count;
+    }
+    stream.next_out = reinterpret_cast<Bytef*>(block.data());
+    stream.avail_out = static_cast<uInt>(block.size());
+    state = deflate(&stream, at == bytes.size() ? Z_FINISH : Z_NO_FLUSH);
+    if (state != Z_OK && state != Z_STREAM_END) {
+      deflateEnd(&stream);
+      CNERF_CHECK(false, "zlib failed");
+    }
+    packed.insert(packed.end(), block.begin(),
+                  block.begin() + static_cast<std::ptrdiff_t>(block.size() - stream.avail_out));
+  }
+  deflateEnd(&stream);
+  return packed;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,161 @@
+#include "export/web_bundle.h"
+
+#include <fmt/format.h>
+
+#include "export/gzip.h"
+#include "export/manifest_json.h"
+#include "src/base/check.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+
+namespace cnerf {
+namespace {
+
+using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
+
+constexpr int kPosterSide = 640;
+
+Json to_json(Vec3d v) {
+  return {v.x, v.y, v.z};
+}
+
+/// Writes the files of a bundle and remembers what its manifest says of them.
+class BundleFiles {
+ public:
+  explicit BundleFiles(fs::path folder) : folder_(std::move(folder)) {}
+
+  std::size_t add(const std::string& name, std::span<const std::byte> content, std::size_t raw_bytes = 0) {
+    write_file(folder_ / name, content);
+    Json entry{{"name", name}, {"bytes", content.size()}, {"sha256", sha256(content)}};
+    if (raw_bytes > 0) entry["raw_bytes"] = raw_bytes;
+    list_.push_back(entry);
+    return content.size();
+  }
+  std::size_t add_packed(const std::string& name, const std::vector<std::uint8_t>& bytes) {
+    return add(name, gzip(bytes), bytes.size());
+  }
+  [[nodiscard]] const Json& list() const { return list_; }
+
+ private:
+  fs::path folder_;
+  Json list_ = Json::array();
+};
+
+std::size_t copy_page(const fs::path& page, const fs::path& folder) {
+  if (!fs::exists(page / "index.html")) {
+    throw MissingInputError(page.string() + ": holds no built page (index.html); build the target cnerf_viewer_page");
+  }
+  std::size_t bytes = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(page)) {
+    if (!entry.is_regular_file()) continue;
+    const std::vector<std::byte> content = read_binary_file(entry.path());
+    write_file(folder / fs::relative(entry.path(), page), content);
+    bytes += content.size();
+  }
+  return bytes;
+}
+
+Json volume_json(const WebBricks& bricks, const WebOptions& options) {
+  Json density{{"file", "density.bin"}, {"encoding", options.density}, {"unit", "1/world unit"}};
+  if (options.density == "r8") {
+    density["formula"] = "scale * (code / 255)^3";
+    density["scale"] = bricks.density_scale;
+  }
+  density["max"] = bricks.max_density;
+  const Vec3i n = bricks.counts;
+  const double side = bricks.voxel_size * kWebBrickSide;
+  const Vec3d end = bricks.origin + Vec3d{n.x * side, n.y * side, n.z * side};
+  return {{"origin", to_json(bricks.origin)},
+          {"voxel_size", bricks.voxel_size},
+          {"brick_side", kWebBrickSide},
+          {"bricks", {n.x, n.y, n.z}},
+          {"stored_bricks", bricks.stored()},
+          {"voxels", bricks.voxels},
+          {"bounds", {{"min", to_json(bricks.origin)}, {"max", to_json(end)}}},
+          {"filter", "differences"},
+          {"occupancy", {{"file", "occupancy.bin"}, {"meaning", "bricks to the nearest stored one; 0 = stored"}}},
+          {"density", density},
+          {"color", {{"file", "color.bin"}, {"encoding", "L* 255/100, a + 128, b + 128; CIE 1976, D65"}}}};
+}
+
+Json cameras_json(const WebScene& scene) {
+  Json cameras = Json::array();
+  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+    Json camera = camera_json(scene.cameras[i]);
+    const bool has_photo = !scene.photos.empty() && !scene.photos[i].jpeg.empty();
+    camera["photo"] = has_photo ? Json(fmt::format("photos/{:03}.jpg", i)) : Json(nullptr);
+    cameras.push_back(camera);
+  }
+  return cameras;
+}
+
+/// Every sixteenth brick.
+std::vector<std::uint8_t> sample_of(const std::vector<std::uint8_t>& bricks) {
+  std::vector<std::uint8_t> sample;
+  for (std::size_t begin = 0; begin < bricks.size(); begin += 16 * kWebBrickVoxels) {
+    sample.insert(sample.end(), bricks.begin() + static_cast<std::ptrdiff_t>(begin),
+                  bricks.begin() + static_cast<std::ptrdiff_t>(begin + kWebBrickVoxels));
+  }
+  to_differences(sample);
+  return sample;
+}
+
+std::size_t packed_size(const std::vector<std::uint8_t>& bricks) {
+  const std::vector<std::uint8_t> sample = sample_of(bricks);
+  return static_cast<std::size_t>(double(gzip(sample).size()) * double(bricks.size()) / double(sample.size()));
+}
+
+}  // namespace
+
+WebEstimate estimate_web(const WebBricks& bricks) {
+  constexpr std::size_t kTexels = (kWebBrickSide + 2) * (kWebBrickSide + 2) * (kWebBrickSide + 2);  // with neighbours
+  return {packed_size(bricks.density) + packed_size(bricks.lab) + gzip(bricks.distance).size(),
+          bricks.stored() * kTexels * (2 + 4) + 4 * bricks.distance.size()};
+}
+
+WebReport write_web_bundle(const BakedVolume& volume, const WebBricks& bricks, const WebScene& scene,
+                           const fs::path& folder, const fs::path& page, const WebOptions& options) {
+  CNERF_CHECK(scene.photos.empty() || scene.photos.size() == scene.cameras.size(), "one photograph a camera");
+  std::error_code ignored;
+  fs::remove(folder / kWebManifest, ignored);  // a manifest never names files of another bundle
+  BundleFiles files(folder);
+  WebReport report;
+  report.volume_bytes += files.add_packed("occupancy.bin", bricks.distance);
+  std::vector<std::uint8_t> density = bricks.density, lab = bricks.lab;
+  to_differences(density);
+  to_differences(lab);
+  report.volume_bytes += files.add_packed("density.bin", density);
+  report.volume_bytes += files.add_packed("color.bin", lab);
+
+  Json poster(nullptr);
+  if (!scene.cameras.empty()) {
+    files.add("poster.webp", make_poster(volume, scene.cameras.front(), kPosterSide));
+    poster = {{"file", "poster.webp"}, {"camera", 0}};
+  }
+  for (std::size_t i = 0; i < scene.photos.size(); ++i) {
+    if (scene.photos[i].jpeg.empty()) continue;
+    report.photo_bytes += files.add(fmt::format("photos/{:03}.jpg", i), scene.photos[i].jpeg);
+  }
+  if (!page.empty()) report.page_bytes = copy_page(page, folder);
+
+  const Json json{{"schema", kWebSchema},
+                  {"program", "cnerf"},
+                  {"program_version", CNERF_VERSION},
+                  {"title", scene.title},
+                  {"command_line", scene.command_line},
+                  {"units", scene.units},
+                  {"up_axis", scene.up_axis},
+                  {"color", color_json(volume.colorizer, volume.take)},
+                  {"frame", frame_json(volume.frame)},
+                  {"volume", volume_json(bricks, options)},
+                  {"poster", poster},
+                  {"files", files.list()},
+                  {"camera_axes", "+X right, +Y down, +Z forward; centre of the first pixel at (0.5, 0.5)"},
+                  {"cameras", cameras_json(scene)}};
+  report.manifest = folder / kWebManifest;
+  write_file(report.manifest, json.dump(1) + "\n");
+  return report;
+}
+
+}  // namespace cnerf

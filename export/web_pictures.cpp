@@ -1,0 +1,97 @@
+#include "export/web_pictures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "bake/volume_integrator.h"
+#include "src/base/check.h"
+#include "src/color/colorspace_math.h"
+
+namespace cnerf {
+namespace {
+
+std::vector<std::byte> encoded(const char* extension, const cv::Mat& image, const std::vector<int>& options) {
+  std::vector<std::uint8_t> bytes;
+  CNERF_CHECK(cv::imencode(extension, image, bytes, options), std::string("OpenCV cannot write ") + extension);
+  std::vector<std::byte> result(bytes.size());
+  std::ranges::transform(bytes, result.begin(), [](std::uint8_t b) { return static_cast<std::byte>(b); });
+  return result;
+}
+
+std::uint8_t srgb_byte(float linear) {
+  return static_cast<std::uint8_t>(std::lround(255 * srgb_from_linear(std::clamp(linear, 0.0f, 1.0f))));
+}
+
+/// The camera for a picture whose longer side is `side` pixels at most.
+Intrinsics fitted(const Intrinsics& intrinsics, int side) {
+  const double scale = std::min(1.0, double(side) / std::max(intrinsics.width, intrinsics.height));
+  return resized(intrinsics, std::max(1, static_cast<int>(std::lround(intrinsics.width * scale))),
+                 std::max(1, static_cast<int>(std::lround(intrinsics.height * scale))));
+}
+
+/// For every pixel of the pinhole picture, where the lens put it; -1 where it did not.
+void undistortion(const Intrinsics& lens, const Intrinsics& pinhole, cv::Mat& x, cv::Mat& y) {
+  x.create(pinhole.height, pinhole.width, CV_32F);
+  y.create(pinhole.height, pinhole.width, CV_32F);
+  for (int row = 0; row < pinhole.height; ++row) {
+    for (int column = 0; column < pinhole.width; ++column) {
+      const auto seen = project(lens, ray_direction(pinhole, {column + 0.5, row + 0.5}));
+      x.at<float>(row, column) = seen ? static_cast<float>(seen->x - 0.5) : -1.0f;  // OpenCV's pixel centres are whole
+      y.at<float>(row, column) = seen ? static_cast<float>(seen->y - 0.5) : -1.0f;
+    }
+  }
+}
+
+}  // namespace
+
+Intrinsics without_distortion(const Intrinsics& intrinsics) {
+  Intrinsics pinhole = intrinsics;
+  pinhole.model = LensModel::kPinhole;
+  pinhole.distortion = {};
+  return pinhole;
+}
+
+WebPhoto make_web_photo(const Intrinsics& intrinsics, const std::vector<float>& luminance, int side, int quality) {
+  CNERF_CHECK_EQ(luminance.size(), static_cast<std::size_t>(intrinsics.width) * intrinsics.height);
+  const cv::Mat linear(intrinsics.height, intrinsics.width, CV_32F, const_cast<float*>(luminance.data()));
+  const Intrinsics small = fitted(intrinsics, side);
+  cv::Mat scaled, shown;
+  cv::resize(linear, scaled, {small.width, small.height}, 0, 0, cv::INTER_AREA);  // in linear light
+  if (intrinsics.model == LensModel::kPinhole) {
+    shown = scaled;
+  } else {
+    cv::Mat x, y;
+    undistortion(small, without_distortion(small), x, y);
+    cv::remap(scaled, shown, x, y, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
+  }
+  cv::Mat grey(shown.rows, shown.cols, CV_8U);
+  for (int row = 0; row < shown.rows; ++row) {
+    for (int column = 0; column < shown.cols; ++column) {
+      grey.at<std::uint8_t>(row, column) = srgb_byte(shown.at<float>(row, column));
+    }
+  }
+  return {encoded(".jpg", grey, {cv::IMWRITE_JPEG_QUALITY, quality}), grey.cols, grey.rows};
+}
+
+std::vector<std::byte> make_poster(const BakedVolume& volume, const BakeCamera& camera, int side) {
+  const Intrinsics pinhole = without_distortion(fitted(camera.intrinsics, side));
+  IntegratorOptions options;
+  options.step = 0.5;
+  options.samples_per_axis = 1;
+  const VolumeImage image = integrate_volume(volume, pinhole, camera.world_from_camera, options);
+  cv::Mat bgra(image.height, image.width, CV_8UC4);
+  for (int i = 0; i < image.width * image.height; ++i) {
+    const float opacity = image.opacity[static_cast<std::size_t>(i)];
+    std::uint8_t* pixel = bgra.data + 4 * i;
+    for (int c = 0; c < 3; ++c) {
+      const float premultiplied = image.rgb[static_cast<std::size_t>(3 * i + c)];
+      pixel[2 - c] = srgb_byte(opacity > 0 ? premultiplied / opacity : 0.0f);
+    }
+    pixel[3] = static_cast<std::uint8_t>(std::lround(255 * std::clamp(opacity, 0.0f, 1.0f)));
+  }
+  return encoded(".webp", bgra, {cv::IMWRITE_WEBP_QUALITY, 80});
+}
+
+}  // namespace cnerf

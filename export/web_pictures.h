@@ -1,0 +1,29 @@
+#pragma once
+/// The pictures of a web bundle: photographs to lay over the volume, and a poster to show while it loads.
+
+#include <cstddef>
+#include <vector>
+
+#include "bake/bake_camera.h"
+#include "bake/baked_volume.h"
+
+namespace cnerf {
+
+/// A photograph as the page shows it, or none.
+struct WebPhoto {
+  std::vector<std::byte> jpeg;  ///< 8-bit grey sRGB without lens distortion; empty = none
+  int width = 0, height = 0;
+};
+
+/// A pinhole camera with the focal lengths and the principal point of a lens.
+[[nodiscard]] Intrinsics without_distortion(const Intrinsics& intrinsics);
+
+/// @param luminance  [H, W] linear Y, 1 = white, as the camera saw it; the lens's distortion is undone.
+/// @param side       pixels of the longer side, at most.
+[[nodiscard]] WebPhoto make_web_photo(const Intrinsics& intrinsics, const std::vector<float>& luminance, int side,
+                                      int quality);
+
+/// WebP with alpha of what a camera sees of a volume, `side` pixels long at most: sRGB, not premultiplied.
+[[nodiscard]] std::vector<std::byte> make_poster(const BakedVolume& volume, const BakeCamera& camera, int side);
+
+}  // namespace cnerf

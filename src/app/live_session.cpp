@@ -1,0 +1,103 @@
+#include "src/app/live_session.h"
+
+#include <algorithm>
+#include <cctype>
+#include <exception>
+#include <opencv2/imgcodecs.hpp>
+#include <thread>
+
+#include "src/base/interruption.h"
+#include "src/base/usage.h"
+#include "src/evaluate/contact_sheet.h"
+#include "viewer/server/page_folder.h"
+
+namespace cnerf {
+namespace {
+
+constexpr auto kBetweenReports = std::chrono::milliseconds(250);
+constexpr double kLeastBetweenPictures = 1.5;  // seconds
+constexpr double kPictureShare = 0.02;         // of the time, at most; reports take next to none
+
+std::string jpeg_of(int width, int height, const std::vector<float>& linear) {
+  Picture picture = picture_from_linear(width, height, linear);
+  for (std::size_t i = 0; i + 2 < picture.rgb.size(); i += 3) std::swap(picture.rgb[i], picture.rgb[i + 2]);
+  const cv::Mat bgr(height, width, CV_8UC3, picture.rgb.data());
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".jpg", bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
+  return {bytes.begin(), bytes.end()};
+}
+
+/// "images/view 1.png" -> "images_view_1"
+std::string plain_name(const std::string& name) {
+  std::string plain = name.substr(0, name.rfind('.'));
+  for (char& c : plain) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-') c = '_';
+  }
+  return plain.size() > 60 ? plain.substr(plain.size() - 60) : plain;
+}
+
+}  // namespace
+
+void add_browser_options(CLI::App& app, BrowserArguments& arguments) {
+  app.add_option("--port", arguments.server.port, "Port of the page; 0 chooses a free one")
+      ->check(CLI::Range(0, 65535));
+  app.add_option("--host", arguments.server.host,
+                 "Address to listen on; other than this machine's own it needs --token");
+  app.add_option("--token", arguments.server.token, "Secret that visitors of the page need, 16 letters or more");
+  app.add_flag("--no-browser", arguments.no_browser, "Only print the address");
+}
+
+LiveSession::LiveSession(const std::string& title, const BrowserArguments& arguments, Reporter& reporter)
+    : feed_(title), server_({find_page()}, arguments.server, &feed_) {
+  server_.start();
+  reporter.say("view: " + server_.address());
+  if (find_page().empty()) reporter.say("note: this cnerf was built without the page; the address serves data only");
+  if (!arguments.no_browser) open_browser(server_.address());
+}
+
+LiveSession::~LiveSession() {
+  feed_.say(interruption_requested()         ? "Stopped and saved. The same command with --resume goes on."
+            : std::uncaught_exceptions() > 0 ? "Ended with an error; the terminal says which."
+                                             : "Finished.",
+            true);
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));  // so that tabs hear it
+}
+
+ProgressSink LiveSession::watching(ProgressSink inner) {
+  return [this, inner = std::move(inner)](const Progress& progress) {
+    inner(progress);
+    look(progress);
+  };
+}
+
+void LiveSession::look(const Progress& progress) {
+  const auto now = Clock::now();
+  const bool is_new = progress.task != task_;
+  if (is_new || progress.fraction >= 1 || now - last_shown_ >= kBetweenReports) {
+    task_ = progress.task;
+    last_shown_ = now;
+    feed_.progress(progress);
+  }
+  feed_.wait_while_paused();
+  if (feed_.stop_requested()) request_interruption();
+}
+
+PreviewSink LiveSession::previews() {
+  return [this](const DrawPreview& draw) {
+    if (Clock::now() < next_picture_) return;
+    const Stopwatch watch;
+    show(draw(drawn_++));
+    const double pause = std::max(kLeastBetweenPictures, watch.seconds() / kPictureShare);
+    next_picture_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(pause));
+  };
+}
+
+void LiveSession::show(const PreviewPicture& picture) {
+  const std::string name = plain_name(picture.name);
+  if (!feed_.picture(name + ".input")) {
+    feed_.picture(name + ".input", jpeg_of(picture.width, picture.height, picture.input));
+  }
+  feed_.picture(name + ".ours", jpeg_of(picture.width, picture.height, picture.ours));
+}
+
+}  // namespace cnerf

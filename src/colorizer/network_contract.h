@@ -1,0 +1,48 @@
+#pragma once
+/// How a network that somebody trained wants to be asked, and what it answers: declared in a TOML file beside it.
+/// Shared by the back ends that run such networks. docs/colorizers.md describes the file.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "src/colorizer/colorizer.h"
+
+namespace cnerf {
+
+struct NetworkContract {
+  std::string input = "L100";  ///< L*: "L100" 0..100, "L01" 0..1, "L-50" -50..50, "L-1" -1..1, "rgb01" grey sRGB
+  std::string output = "ab";   ///< "ab" Lab units, "ab1" ab / 110, "logits313", "rgb01" sRGB
+  std::string layer;           ///< whose output is read, where the back end has names for layers; empty = the last
+  int size = 0;                ///< patches are resized to this side; 0 = as they are
+  int multiple_of = 1;         ///< else padded up to a multiple of this by repeating the border
+
+  [[nodiscard]] int output_channels() const;
+};
+
+/// `network`.toml, or what holds without it.  @throws InputError  naming the key.
+[[nodiscard]] NetworkContract contract_beside(const std::filesystem::path& network);
+
+/// A float tensor [batch, channels, height, width].
+struct Planes {
+  int batch = 0, channels = 0, height = 0, width = 0;
+  std::vector<float> values;
+
+  [[nodiscard]] std::size_t plane_size() const { return std::size_t(height) * std::size_t(width); }
+  [[nodiscard]] std::string shape_text() const;
+};
+
+/// The question in the network's own size and unit.
+[[nodiscard]] Planes network_input(const NetworkContract& contract, const LightnessBatch& question);
+
+/// The network's answer as the question's size and our units have it. An answer at another resolution than the input's
+/// (say, logits at a quarter) is brought back to it; then the padding goes.
+/// @param asked  what the network was given
+/// @throws ColorizerError  naming `colorizer`, when the shape is not what the contract says.
+[[nodiscard]] ChromaBatch chroma_of(const NetworkContract& contract, const Planes& raw, const Planes& asked,
+                                    const LightnessBatch& question, const std::string& colorizer);
+
+/// The first line of a library's message: the rest is its stack.
+[[nodiscard]] std::string first_line(const std::string& text);
+
+}  // namespace cnerf

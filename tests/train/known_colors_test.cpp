@@ -1,0 +1,175 @@
+// Key frames and hints, carried from view to view over a scene whose geometry is known.
+
+#include "src/train/known_colors.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "src/base/error.h"
+
+namespace cnerf {
+namespace {
+
+constexpr int kWidth = 60, kHeight = 40;
+constexpr float kWall = 0.8f, kBoard = 0.4f;  // z of a wall, and of a board before a part of it
+
+/// Colour of a point of the scene: every place has its own.
+Ab color_at(Vec3f p) {
+  return {80 * p.x, 80 * p.y};
+}
+
+/// A pinhole camera that looks along z at the wall, and at the board where it stands in the way.
+CachedView look(float x, bool has_board, float luminance = 0.3f) {
+  CachedView view;
+  view.width = kWidth, view.height = kHeight;
+  view.camera.intrinsics = {LensModel::kPinhole, kWidth, kHeight, 50, 50, kWidth / 2.0, kHeight / 2.0, {}};
+  view.camera.unit_from_camera = Mat3d::from_columns({1, 0, 0}, {0, 1, 0}, {0, 0, 1});
+  view.camera.origin = {double(x), 0.5, 0.0};
+  view.offsets.push_back(0);
+  for (int py = 0; py < kHeight; ++py) {
+    for (int px = 0; px < kWidth; ++px) {
+      const Ray ray = view.camera.ray({px + 0.5, py + 0.5});
+      const float to_board = kBoard / ray.direction.z, to_wall = kWall / ray.direction.z;
+      const float board_x = ray.at(to_board).x;
+      const bool hits_board = has_board && board_x > 0.45f && board_x < 0.55f;
+      view.samples.push_back({hits_board ? to_board : to_wall, 65535, 65535});
+      view.offsets.push_back(view.samples.size());
+      view.luminance.push_back(luminance);
+      view.opacity.push_back(1.0f);
+    }
+  }
+  return view;
+}
+
+Vec3f point_at(const CachedView& view, std::uint32_t pixel) {
+  const Ray ray = view.camera.ray({double(pixel % kWidth) + 0.5, double(pixel / kWidth) + 0.5});
+  return ray.at(view.samples[pixel].t);
+}
+
+KnownColors key_frame_of(const CachedView& view, const std::string& name) {
+  KnownColors known{KnownColorKind::kKeyFrame, name, kWidth, kHeight, {}, {}};
+  for (std::uint32_t p = 0; p < view.samples.size(); ++p) known.ab.push_back(color_at(point_at(view, p)));
+  known.is_known.assign(known.ab.size(), 1);
+  return known;
+}
+
+const std::vector<std::string> kNames = {"left.png", "right.png"};
+
+TEST(KnownColors, AKeyFrameColorsWhatItShowsInOtherViewsAndNothingElse) {
+  const std::vector<CachedView> views = {look(0.45f, true), look(0.55f, true)};
+  const std::vector<KnownColors> known = {key_frame_of(views[0], kNames[0])};
+  const KnownColorMap map(views, kNames, known);
+  const double pixel = kWall / 50;  // of the wall, unit space
+  int found = 0, hidden = 0;
+  for (std::uint32_t p = 0; p < views[1].samples.size(); ++p) {
+    const Vec3f point = point_at(views[1], p);
+    const auto from = project(views[0].camera.intrinsics, point.cast<double>() - views[0].camera.origin);
+    const bool is_in_picture = from && from->x >= 0 && from->y >= 0 && from->x < kWidth && from->y < kHeight;
+    const Ab* color = map.find(1, p);
+    if (!is_in_picture) {
+      EXPECT_EQ(color, nullptr);
+      continue;
+    }
+    const auto seen = std::uint32_t(int(from->y) * kWidth + int(from->x));
+    const bool is_same_surface = std::abs(point_at(views[0], seen).z - point.z) < 0.01f;
+    EXPECT_EQ(color != nullptr, is_same_surface) << "pixel " << p;
+    hidden += is_same_surface ? 0 : 1;
+    if (color == nullptr) continue;
+    ++found;
+    EXPECT_NEAR(color->a, color_at(point).a, 80 * pixel);
+    EXPECT_NEAR(color->b, color_at(point).b, 80 * pixel);
+  }
+  EXPECT_GT(found, kWidth * kHeight / 2);
+  EXPECT_GT(hidden, 50) << "the board hides a part of the wall from the key frame alone";
+  EXPECT_EQ(std::size_t(found) + views[0].samples.size(), map.places().size());
+}
+
+TEST(KnownColors, WhatLooksDifferentIsNotTheSame) {
+  const std::vector<CachedView> views = {look(0.45f, false, 0.1f), look(0.55f, false, 0.6f)};
+  const std::vector<KnownColors> known = {key_frame_of(views[0], kNames[0])};
+  const KnownColorMap map(views, kNames, known);
+  for (std::uint32_t p = 0; p < views[1].samples.size(); ++p) EXPECT_EQ(map.find(1, p), nullptr);
+}
+
+TEST(KnownColors, AKeyFrameMayHaveAnySizeOfTheShape) {
+  const std::vector<CachedView> views = {look(0.5f, false), look(0.5f, false)};
+  const KnownColors small = key_frame_of(views[0], kNames[0]);
+  KnownColors large{KnownColorKind::kKeyFrame, kNames[0], 3 * kWidth, 3 * kHeight, {}, {}};
+  for (int y = 0; y < large.height; ++y) {
+    for (int x = 0; x < large.width; ++x) large.ab.push_back(small.ab[std::size_t(y / 3 * kWidth + x / 3)]);
+  }
+  large.is_known.assign(large.ab.size(), 1);
+  const KnownColorMap of_small(views, kNames, std::span(&small, 1)), of_large(views, kNames, std::span(&large, 1));
+  for (std::uint32_t p = 0; p < small.ab.size(); ++p) {
+    ASSERT_NE(of_large.find(0, p), nullptr);
+    EXPECT_NEAR(of_large.find(0, p)->a, of_small.find(0, p)->a, 1e-4);
+  }
+  ASSERT_EQ(of_large.key_frames().size(), 1u);
+  EXPECT_EQ(of_large.key_frames()[0].ab.size(), 2 * small.ab.size());
+}
+
+KnownColors stroke_at(int x, int y, Ab color) {
+  KnownColors strokes{KnownColorKind::kStrokes, kNames[0], kWidth, kHeight, {}, {}};
+  strokes.ab.resize(std::size_t(kWidth) * kHeight);
+  strokes.is_known.assign(strokes.ab.size(), 0);
+  strokes.ab[std::size_t(y * kWidth + x)] = color;
+  strokes.is_known[std::size_t(y * kWidth + x)] = 1;
+  return strokes;
+}
+
+TEST(KnownColors, AStrokeStopsWhereLightnessOrDepthJumps) {
+  CachedView view = look(0.5f, true);
+  for (std::size_t p = 0; p < view.luminance.size(); ++p) {
+    if (int(p) / kWidth >= kHeight / 2) view.luminance[p] = 0.9f;  // the lower half is bright
+  }
+  const std::vector<float> surface = surface_distance(view);
+  const KnownColors grown = spread(stroke_at(5, 5, {40, -20}), view, surface);
+  int colored = 0;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const auto p = std::uint32_t(y * kWidth + x);
+      if (grown.is_known[p] == 0) continue;
+      ++colored;
+      EXPECT_LT(y, kHeight / 2);
+      EXPECT_NEAR(point_at(view, p).z, kWall, 1e-3) << "the board is another thing";
+      EXPECT_EQ(grown.ab[p].a, 40);
+    }
+  }
+  EXPECT_GT(colored, 200);
+}
+
+TEST(KnownColors, OfTwoStrokesTheNearerCounts) {
+  const CachedView view = look(0.5f, false);
+  KnownColors strokes = stroke_at(20, 20, {50, 0});
+  strokes.ab[20 * kWidth + 32] = {-50, 0};
+  strokes.is_known[20 * kWidth + 32] = 1;
+  const KnownColors grown = spread(strokes, view, surface_distance(view));
+  EXPECT_EQ(grown.ab[20 * kWidth + 24].a, 50);
+  EXPECT_EQ(grown.ab[20 * kWidth + 29].a, -50);
+  EXPECT_EQ(grown.is_known[20 * kWidth + 59], 0) << "too far from both";
+}
+
+TEST(KnownColors, HintsCorrectKeyFrames) {
+  const std::vector<CachedView> views = {look(0.45f, false), look(0.55f, false)};
+  const std::vector<KnownColors> known = {key_frame_of(views[0], kNames[0]), stroke_at(30, 20, {-60, -60})};
+  const KnownColorMap map(views, kNames, known);
+  ASSERT_NE(map.find(0, 20 * kWidth + 30), nullptr);
+  EXPECT_EQ(map.find(0, 20 * kWidth + 30)->a, -60);
+  EXPECT_GT(map.find(0, 0)->b, -60) << "far from the stroke the key frame holds";
+}
+
+TEST(KnownColors, AViewThatIsNotThereIsNamed) {
+  const std::vector<CachedView> views = {look(0.5f, false), look(0.5f, false)};
+  const std::vector<KnownColors> known = {key_frame_of(views[0], "middle.png")};
+  EXPECT_THROW(KnownColorMap(views, kNames, known), UsageError);
+}
+
+TEST(KnownColors, TheirDescriptionTellsThemApart) {
+  const KnownColors one = stroke_at(3, 3, {1, 2}), other = stroke_at(3, 3, {1, 3});
+  EXPECT_EQ(describe({}), "");
+  EXPECT_NE(describe(std::span(&one, 1)), describe(std::span(&other, 1)));
+}
+
+}  // namespace
+}  // namespace cnerf

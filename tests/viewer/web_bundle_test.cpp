@@ -1,0 +1,161 @@
+#include "export/web_bundle.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <cstring>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "export/gzip.h"
+#include "src/base/check.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/color/colorspace_math.h"
+#include "tests/export/test_volumes.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+std::vector<std::uint8_t> unpacked(const std::vector<std::byte>& packed) {
+  z_stream stream{};
+  EXPECT_EQ(inflateInit2(&stream, 15 + 16), Z_OK);
+  std::vector<std::uint8_t> result(1 << 24);
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(packed.data()));
+  stream.avail_in = static_cast<uInt>(packed.size());
+  stream.next_out = result.data();
+  stream.avail_out = static_cast<uInt>(result.size());
+  EXPECT_EQ(inflate(&stream, Z_FINISH), Z_STREAM_END);
+  result.resize(stream.total_out);
+  inflateEnd(&stream);
+  return result;
+}
+
+TEST(Gzip, ComesBackAndIsTheSameEveryTime) {
+  std::vector<std::uint8_t> bytes(700'000);
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(i * i >> 3);
+  EXPECT_EQ(unpacked(gzip(bytes)), bytes);
+  EXPECT_EQ(gzip(bytes), gzip(bytes));
+  EXPECT_TRUE(unpacked(gzip({})).empty());
+}
+
+BakeCamera camera() {
+  BakeCamera made{"images/a.png", {LensModel::kPinhole, 64, 48, 80, 80, 32, 24, {}}, {}};
+  made.world_from_camera = {Mat3d::identity(), {1.1, 2.1, 1}};
+  return made;
+}
+
+struct Written {
+  test::TempDir folder;
+  BakedVolume volume = test::block_volume({0, 0, 0}, {5, 5, 5}, 9);
+  WebBricks bricks = make_web_bricks(volume);
+  WebReport report;
+  Json json;
+
+  explicit Written(const fs::path& page = {}) {
+    const WebPhoto photo = make_web_photo(camera().intrinsics, std::vector<float>(64 * 48, 0.25f), 32, 80);
+    report = write_web_bundle(volume, bricks, {"block", {camera()}, {photo}, {"cnerf", "bake"}, "metres", "y"},
+                              folder.path(), page, {});
+    json = Json::parse(read_text_file(report.manifest));
+  }
+};
+
+TEST(WebBundle, ListsWhatItWroteWithChecksums) {
+  const Written written;
+  std::size_t listed = 0;
+  for (const Json& file : written.json.at("files")) {
+    const auto content = read_binary_file(written.folder / file.at("name").get<std::string>());
+    EXPECT_EQ(content.size(), file.at("bytes").get<std::size_t>());
+    EXPECT_EQ(sha256(content), file.at("sha256").get<std::string>());
+    ++listed;
+  }
+  EXPECT_EQ(listed, 5u);  // three parts, poster, photograph
+  EXPECT_EQ(unpacked(read_binary_file(written.folder / "occupancy.bin")), written.bricks.distance);
+  std::vector<std::uint8_t> density = written.bricks.density;
+  to_differences(density);
+  EXPECT_EQ(unpacked(read_binary_file(written.folder / "density.bin")), density);
+}
+
+TEST(WebBundle, ItsSizeIsEstimatedWell) {
+  BakedVolume volume = test::block_volume({0, 0, 0}, {80, 80, 80}, 9);
+  for (BakedVoxel& voxel : volume.voxels) {
+    voxel.sigma = 1 + static_cast<float>((voxel.i * 7919 + voxel.j * 104729 + voxel.k * 1299709) % 97);
+  }
+  const WebBricks bricks = make_web_bricks(volume);
+  const test::TempDir folder;
+  const WebReport report = write_web_bundle(volume, bricks, {}, folder.path(), {}, {});
+  const double estimate = double(estimate_web(bricks).download_bytes);
+  EXPECT_NEAR(estimate / double(report.volume_bytes), 1, 0.25);
+}
+
+TEST(WebBundle, SaysFrameCamerasAndOriginOfTheColour) {
+  const Json json = Written().json;
+  EXPECT_EQ(json.at("up_axis"), "y");
+  EXPECT_EQ(json.at("units"), "metres");
+  EXPECT_EQ(json.at("color").at("colorizer"), "builtin");
+  EXPECT_EQ(json.at("cameras").at(0).at("photo"), "photos/000.jpg");
+  EXPECT_EQ(json.at("cameras").at(0).at("world_from_camera").at(2).at(3), 1.0);
+  EXPECT_EQ(json.at("frame").at("world_centre").at(2), 3.5);
+  EXPECT_NEAR(json.at("volume").at("voxel_size").get<double>(), 0.05, 1e-15);
+}
+
+TEST(WebBundle, PosterIsThePictureWithAlpha) {
+  const Written written;
+  const cv::Mat poster = cv::imread((written.folder / "poster.webp").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(poster.channels(), 4);
+  EXPECT_EQ(poster.cols, 64);
+  const cv::Vec4b middle = poster.at<cv::Vec4b>(24, 32), corner = poster.at<cv::Vec4b>(0, 0);
+  EXPECT_GT(middle[3], 150);  // 5 voxels of 0.45: 1 - exp(-2.25) = 0.89
+  EXPECT_EQ(corner[3], 0);
+  EXPECT_GT(middle[0], middle[2]);  // the block is blue
+}
+
+TEST(WebBundle, APhotographLosesItsDistortionAndKeepsItsTone) {
+  Intrinsics lens{LensModel::kOpenCv, 200, 100, 150, 150, 100, 50, {-0.2, 0, 0, 0, 0, 0, 0, 0}};
+  // A dot where the lens puts the direction (0.4, 0.2, 1).
+  const auto seen = project(lens, {0.4, 0.2, 1});
+  std::vector<float> luminance(200 * 100, 0.2f);
+  for (int y = -2; y <= 2; ++y)
+    for (int x = -2; x <= 2; ++x) {
+      luminance[static_cast<std::size_t>((int(seen->y) + y) * 200 + int(seen->x) + x)] = 1.0f;
+    }
+  const WebPhoto photo = make_web_photo(lens, luminance, 200, 95);
+  std::vector<std::uint8_t> bytes(photo.jpeg.size());
+  std::memcpy(bytes.data(), photo.jpeg.data(), bytes.size());
+  const cv::Mat grey = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
+  cv::Point brightest;
+  cv::minMaxLoc(grey, nullptr, nullptr, nullptr, &brightest);
+  EXPECT_NEAR(brightest.x, 100 + 0.4 * 150, 4);
+  EXPECT_NEAR(brightest.y, 50 + 0.2 * 150, 4);
+  EXPECT_NEAR(grey.at<std::uint8_t>(20, 40), 255 * srgb_from_linear(0.2f), 2);
+  EXPECT_GT(std::abs(seen->x - (100 + 0.4 * 150)), 2) << "the lens must bend, or this shows nothing";
+}
+
+TEST(WebBundle, CopiesThePage) {
+  const test::TempDir page;
+  write_file(page / "index.html", std::string_view("<p>"));
+  fs::create_directories(page / "assets");
+  write_file(page / "assets" / "a.js", std::string_view("1;"));
+  const Written written(page.path());
+  EXPECT_EQ(read_text_file(written.folder / "index.html"), "<p>");
+  EXPECT_EQ(read_text_file(written.folder / "assets" / "a.js"), "1;");
+  EXPECT_EQ(written.report.page_bytes, 5u);
+}
+
+TEST(WebBundle, RefusesWhatDoesNotFit) {
+  const test::TempDir folder, empty;
+  const BakedVolume volume = test::block_volume({0, 0, 0}, {2, 2, 2}, 9);
+  const WebBricks bricks = make_web_bricks(volume);
+  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {{}, {}}, {}}, folder.path(), {}, {}), ContractError);
+  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {}, {}}, folder.path(), empty.path(), {}),
+               MissingInputError);
+  EXPECT_FALSE(fs::exists(folder / "bundle.json")) << "the manifest comes last";
+  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {}, {}}, "/proc/nowhere", {}, {}), OutputError);
+}
+
+}  // namespace
+}  // namespace cnerf

@@ -1,0 +1,207 @@
+#include "viewer/server/web_server.h"
+
+#include <gtest/gtest.h>
+#include <httplib.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+namespace fs = std::filesystem;
+
+/// A folder to serve, with a secret beside it.
+struct Site {
+  test::TempDir folder;
+  fs::path root = folder / "site";
+
+  Site() {
+    write_file(root / "index.html", std::string_view("<h1>page</h1>"));
+    write_file(root / "bundle.json", std::string_view("{}"));
+    write_file(root / "photos" / "000.jpg", std::string_view("jpeg"));
+    write_file(root / ".hidden", std::string_view("hidden"));
+    write_file(folder / "secret.txt", std::string_view("secret"));
+    fs::create_symlink(folder / "secret.txt", root / "link.txt");
+    fs::create_directory_symlink(folder.path(), root / "up");
+  }
+};
+
+/// What the server says to raw bytes.
+std::string raw_answer(int port, const std::string& bytes) {
+  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  timeval patience{8, 0};
+  ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  std::string answer;
+  if (::connect(socket, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0) {
+    (void)::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    char block[4096];
+    for (ssize_t n; (n = ::recv(socket, block, sizeof block, 0)) > 0;)
+      answer.append(block, static_cast<std::size_t>(n));
+  }
+  ::close(socket);
+  return answer;
+}
+
+int status_of(const std::string& answer) {
+  return answer.size() > 12 ? std::stoi(answer.substr(9, 3)) : 0;
+}
+
+std::string request(const std::string& line, const std::string& more = "Host: 127.0.0.1\r\n") {
+  return line + " HTTP/1.1\r\n" + more + "Connection: close\r\n\r\n";
+}
+
+TEST(WebServer, ServesFilesWithTheirTypes) {
+  const Site site;
+  WebServer server({site.root}, {});
+  server.start();
+  httplib::Client client("127.0.0.1", server.port());
+  const auto page = client.Get("/");
+  ASSERT_TRUE(page);
+  EXPECT_EQ(page->body, "<h1>page</h1>");
+  EXPECT_EQ(page->get_header_value("Content-Type"), "text/html; charset=utf-8");
+  EXPECT_NE(page->get_header_value("Content-Security-Policy"), "");
+  EXPECT_EQ(client.Get("/photos/000.jpg?v=1")->get_header_value("Content-Type"), "image/jpeg");
+  EXPECT_EQ(client.Head("/bundle.json")->status, 200);
+  EXPECT_EQ(client.Get("/nothing")->status, 404);
+  EXPECT_EQ(client.Get("/live/state")->status, 404) << "no feed, no feed's addresses";
+  EXPECT_EQ(server.address(), "http://127.0.0.1:" + std::to_string(server.port()) + "/");
+}
+
+TEST(WebServer, TheFirstFolderWins) {
+  const Site site;
+  const test::TempDir page;
+  write_file(page / "index.html", std::string_view("newer"));
+  WebServer server({page.path(), site.root}, {});
+  server.start();
+  httplib::Client client("127.0.0.1", server.port());
+  EXPECT_EQ(client.Get("/")->body, "newer");
+  EXPECT_EQ(client.Get("/bundle.json")->body, "{}");
+}
+
+TEST(WebServer, NoPathAndNoLinkLeavesTheFolder) {
+  const Site site;
+  WebServer server({site.root}, {});
+  server.start();
+  for (const char* path : {"/../secret.txt", "/photos/../../secret.txt", "/%2e%2e/secret.txt", "/..%2fsecret.txt",
+                           "/..\\secret.txt", "/link.txt", "/up/secret.txt", "/.hidden", "//etc/passwd", "/%00",
+                           "/photos/%2e%2e/%2e%2e/secret.txt", "/photos"}) {
+    const std::string answer = raw_answer(server.port(), request(std::string("GET ") + path));
+    EXPECT_GE(status_of(answer), 400) << path;
+    EXPECT_EQ(answer.find("secret\n"), std::string::npos);
+    EXPECT_EQ(answer.find("\r\n\r\nsecret"), std::string::npos) << path;
+    EXPECT_EQ(answer.find("root:"), std::string::npos) << path;
+  }
+  EXPECT_EQ(status_of(raw_answer(server.port(), request("GET /photos/../index.html"))), 404);
+  EXPECT_EQ(status_of(raw_answer(server.port(), request("GET /index.html"))), 200) << "the same way does find files";
+}
+
+TEST(WebServer, RefusesOtherMethodsLargeAndMalformedRequests) {
+  const Site site;
+  WebServer server({site.root}, {});
+  server.start();
+  const int port = server.port();
+  for (const char* method : {"POST", "PUT", "DELETE", "OPTIONS", "PATCH"}) {
+    EXPECT_EQ(status_of(raw_answer(
+                  port, request(std::string(method) + " /index.html", "Host: 127.0.0.1\r\nContent-Length: 0\r\n"))),
+              405)
+        << method;
+  }
+  EXPECT_GE(status_of(raw_answer(port, request("GET /" + std::string(20'000, 'a')))), 400);
+  const std::string large =
+      "POST /index.html HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nContent-Length: 100000\r\n\r\n" +
+      std::string(100'000, 'x');
+  const int status = status_of(raw_answer(port, large));
+  EXPECT_TRUE(status == 0 || status >= 400) << status;
+  for (const char* nonsense : {"hello\r\n\r\n", "GET\r\n\r\n", "\r\n\r\n", "GET / HTTP/9.9\r\n\r\n"}) {
+    const int answer = status_of(raw_answer(port, nonsense));
+    EXPECT_TRUE(answer == 0 || answer >= 400) << nonsense;
+  }
+  EXPECT_EQ(status_of(raw_answer(port, request("GET /"))), 200) << "and goes on";
+}
+
+TEST(WebServer, AnswersToItsOwnNameOnly) {
+  const Site site;
+  WebServer server({site.root}, {});
+  server.start();
+  EXPECT_EQ(status_of(raw_answer(server.port(), request("GET /", "Host: evil.example:80\r\n"))), 421);
+  EXPECT_EQ(status_of(raw_answer(server.port(), request("GET /", ""))), 421);
+  EXPECT_EQ(status_of(raw_answer(server.port(), request("GET /", "Host: localhost:99\r\n"))), 200);
+}
+
+TEST(WebServer, AnotherHostNeedsATokenAndVisitorsToo) {
+  EXPECT_THROW(check_web_server_options({"0.0.0.0", 0, ""}), UsageError);
+  EXPECT_THROW(check_web_server_options({"0.0.0.0", 0, "short"}), UsageError);
+  EXPECT_THROW(check_web_server_options({"127.0.0.1", 0, "with spaces and more"}), UsageError);
+  const std::string token = random_token();
+  EXPECT_NE(token, random_token());
+  const Site site;
+  WebServer server({site.root}, {"0.0.0.0", 0, token});
+  server.start();
+  const int port = server.port();
+  EXPECT_EQ(status_of(raw_answer(port, request("GET /"))), 401);
+  EXPECT_EQ(status_of(raw_answer(port, request("GET /?token=" + std::string(32, 'a')))), 401);
+  const std::string welcome = raw_answer(port, request("GET /?token=" + token));
+  EXPECT_EQ(status_of(welcome), 303);
+  EXPECT_NE(welcome.find("HttpOnly; SameSite=Strict"), std::string::npos);
+  EXPECT_EQ(status_of(raw_answer(port, request("GET /", "Host: a\r\nCookie: x=1; cnerf_token=" + token + "\r\n"))),
+            200);
+  EXPECT_NE(server.address().find("?token=" + token), std::string::npos);
+}
+
+TEST(WebServer, ATakenPortIsSaidToBe) {
+  const Site site;
+  WebServer first({site.root}, {});
+  first.start();
+  WebServer second({site.root}, {"127.0.0.1", first.port(), ""});
+  EXPECT_THROW(second.start(), DeviceError);
+}
+
+TEST(WebServer, TheFeedIsReadAndSteered) {
+  LiveFeed feed("train");
+  feed.picture("v.ours", "jpeg");
+  WebServer server({}, {}, &feed);
+  server.start();
+  httplib::Client client("127.0.0.1", server.port());
+  EXPECT_EQ(nlohmann::json::parse(client.Get("/live/state")->body).at("title"), "train");
+  EXPECT_EQ(client.Get("/live/pictures/v.ours")->body, "jpeg");
+  EXPECT_EQ(client.Get("/live/pictures/w.ours")->status, 404);
+  const httplib::Headers ours{{"X-Cnerf", "1"}};
+  EXPECT_EQ(client.Post("/live/control", R"({"action":"pause"})", "application/json")->status, 403)
+      << "another site can post, but not with our header";
+  EXPECT_EQ(client.Post("/live/control", ours, "{}", "application/json")->status, 400);
+  EXPECT_EQ(client.Post("/live/control", ours, R"({"action":"fly"})", "application/json")->status, 400);
+  EXPECT_EQ(client.Post("/live/control", ours, R"({"action":"pause"})", "application/json")->status, 200);
+  EXPECT_TRUE(nlohmann::json::parse(feed.state()).at("paused"));
+  EXPECT_EQ(client.Post("/live/control", ours, R"({"action":"stop"})", "application/json")->status, 200);
+  EXPECT_TRUE(feed.stop_requested());
+}
+
+TEST(WebServer, EventsFollowTheFeed) {
+  LiveFeed feed("train");
+  WebServer server({}, {}, &feed);
+  server.start();
+  httplib::Client client("127.0.0.1", server.port());
+  std::string heard;
+  std::thread work([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    feed.progress({"stage 1", 0.75, {}});
+  });
+  (void)client.Get("/live/events", [&](const char* data, std::size_t size) {
+    heard.append(data, size);
+    return heard.find("0.75") == std::string::npos;  // false ends it
+  });
+  work.join();
+  EXPECT_TRUE(heard.starts_with("data: {"));
+  EXPECT_NE(heard.find("\"fraction\":0.75"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace cnerf

@@ -1,0 +1,313 @@
+#include "viewer/server/web_server.h"
+
+#include <fmt/format.h>
+#include <httplib.h>
+#include <openssl/crypto.h>
+#include <openssl/rand.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+
+namespace cnerf {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLargestBody = 4096;
+constexpr std::size_t kLeastToken = 16;
+constexpr int kMostListeners = 8;  ///< tabs that follow a feed; each holds a thread
+constexpr int kThreads = 24;
+constexpr const char* kCookie = "cnerf_token";
+
+bool is_loopback(const std::string& host) {
+  return host == "localhost" || host == "::1" || host.starts_with("127.");
+}
+
+const char* content_type(const fs::path& file) {
+  static const std::map<std::string, const char*> types{{".html", "text/html; charset=utf-8"},
+                                                        {".js", "text/javascript"},
+                                                        {".css", "text/css"},
+                                                        {".json", "application/json"},
+                                                        {".svg", "image/svg+xml"},
+                                                        {".png", "image/png"},
+                                                        {".jpg", "image/jpeg"},
+                                                        {".webp", "image/webp"},
+                                                        {".ico", "image/x-icon"},
+                                                        {".txt", "text/plain; charset=utf-8"},
+                                                        {".map", "application/json"}};
+  const auto found = types.find(file.extension().string());
+  return found == types.end() ? "application/octet-stream" : found->second;
+}
+
+/// "name:port" without the port.
+std::string host_name(const std::string& header) {
+  if (header.starts_with('[')) return header.substr(1, header.find(']') - 1);
+  return header.substr(0, header.find(':'));
+}
+
+bool equal_in_constant_time(const std::string& a, const std::string& b) {
+  return a.size() == b.size() && CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
+}
+
+std::string cookie_of(const httplib::Request& request) {
+  const std::string header = request.get_header_value("Cookie");
+  const std::string key = std::string(kCookie) + "=";
+  for (std::size_t at = 0; at < header.size();) {
+    std::size_t end = header.find(';', at);
+    if (end == std::string::npos) end = header.size();
+    while (at < end && header[at] == ' ') ++at;
+    if (header.compare(at, key.size(), key) == 0) return header.substr(at + key.size(), end - at - key.size());
+    at = end + 1;
+  }
+  return {};
+}
+
+void refuse(httplib::Response& response, int status, const std::string& why) {
+  response.status = status;
+  response.set_content(why + "\n", "text/plain; charset=utf-8");
+}
+
+}  // namespace
+
+void check_web_server_options(const WebServerOptions& options) {
+  if (!is_loopback(options.host) && options.token.empty()) {
+    throw UsageError("--host " + options.host + ": others could look, so it needs --token; for example --token " +
+                     random_token());
+  }
+  const bool plain = std::ranges::all_of(
+      options.token, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_'; });
+  if (!options.token.empty() && (!plain || options.token.size() < kLeastToken)) {
+    throw UsageError(fmt::format("--token: expected at least {} letters, digits, - or _, got {} characters",
+                                 kLeastToken, options.token.size()));
+  }
+}
+
+std::string random_token() {
+  constexpr std::string_view kLetters = "abcdefghijkmnpqrstuvwxyz23456789";  // 32, none alike
+  unsigned char bytes[32];
+  if (RAND_bytes(bytes, sizeof bytes) != 1) throw DeviceError("OpenSSL: no random numbers");
+  std::string token;
+  for (const unsigned char byte : bytes) token += kLetters[byte % kLetters.size()];
+  return token;
+}
+
+struct WebServer::State {
+  std::vector<fs::path> folders;
+  WebServerOptions options;
+  LiveFeed* feed;
+  httplib::Server server;
+  std::thread thread;
+  int port = 0;
+  std::atomic<int> listeners{0};
+
+  /// The file behind an address; empty when there is none, or it is not below the folder it was found in.
+  [[nodiscard]] fs::path find(const std::string& path) const {
+    if (path.find('\0') != std::string::npos || path.find('\\') != std::string::npos) return {};
+    const fs::path relative = fs::path(path).relative_path();
+    for (const fs::path& part : relative) {
+      if (part == ".." || part.string().starts_with('.')) return {};
+    }
+    for (const fs::path& folder : folders) {
+      std::error_code failure;
+      const fs::path root = fs::canonical(folder, failure);
+      if (failure) continue;
+      fs::path wanted = root / relative;
+      if (relative.empty() || fs::is_directory(wanted, failure)) wanted /= "index.html";
+      const fs::path file = fs::canonical(wanted, failure);  // resolves links
+      if (failure || !fs::is_regular_file(file, failure)) continue;
+      const auto [end, ignored] = std::mismatch(root.begin(), root.end(), file.begin(), file.end());
+      if (end == root.end()) return file;
+    }
+    return {};
+  }
+
+  [[nodiscard]] bool is_known_host(const httplib::Request& request) const {
+    const std::string host = host_name(request.get_header_value("Host"));
+    if (host.empty()) return false;
+    return !is_loopback(options.host) || is_loopback(host);
+  }
+
+  /// @return whether the request goes no further.
+  bool check(const httplib::Request& request, httplib::Response& response) const {
+    response.set_header("X-Content-Type-Options", "nosniff");
+    response.set_header("Referrer-Policy", "no-referrer");
+    response.set_header("Cache-Control", "no-cache");
+    response.set_header("Content-Security-Policy",
+                        "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
+                        "frame-ancestors 'none'; base-uri 'none'; form-action 'none'");
+    const bool control = request.method == "POST" && request.path == "/live/control";
+    if (request.method != "GET" && request.method != "HEAD" && !control) {
+      refuse(response, 405, "only GET and HEAD");
+      return true;
+    }
+    if (!is_known_host(request)) {
+      refuse(response, 421, "this server answers to its own name only");
+      return true;
+    }
+    if (options.token.empty()) return false;
+    if (equal_in_constant_time(request.get_param_value("token"), options.token)) {
+      response.set_header("Set-Cookie",
+                          std::string(kCookie) + "=" + options.token + "; HttpOnly; SameSite=Strict; Path=/");
+      response.set_redirect(request.path, 303);
+      return true;
+    }
+    if (equal_in_constant_time(cookie_of(request), options.token)) return false;
+    refuse(response, 401, "open the address with its ?token=");
+    return true;
+  }
+
+  void serve_file(const httplib::Request& request, httplib::Response& response) const {
+    const fs::path file = find(request.path);
+    if (file.empty()) return refuse(response, 404, "not here");
+    const std::vector<std::byte> bytes = read_binary_file(file);
+    response.set_content(reinterpret_cast<const char*>(bytes.data()), bytes.size(), content_type(file));
+  }
+
+  void follow(httplib::Response& response) {
+    if (listeners.fetch_add(1) >= kMostListeners) {
+      listeners.fetch_sub(1);
+      return refuse(response, 503, "too many tabs follow already");
+    }
+    auto version = std::make_shared<std::uint64_t>(0);
+    response.set_chunked_content_provider(
+        "text/event-stream",
+        [this, version](std::size_t, httplib::DataSink& sink) {
+          const auto news = feed->wait_for_news(*version, 2.0);
+          if (!news && (feed->closed() || !server.is_running())) {
+            sink.done();
+            return true;
+          }
+          if (!news) return sink.write(":\n\n", 3);  // keeps the line open, and notices a closed tab
+          *version = news->first;
+          const std::string event = "data: " + news->second + "\n\n";
+          const bool sent = sink.write(event.data(), event.size());
+          std::this_thread::sleep_for(std::chrono::milliseconds(400));  // enough to look at
+          return sent;
+        },
+        [this](bool) { listeners.fetch_sub(1); });
+  }
+
+  void control(const httplib::Request& request, httplib::Response& response) {
+    if (request.get_header_value("X-Cnerf") != "1") return refuse(response, 403, "the header X-Cnerf is missing");
+    std::string action;
+    try {
+      action = nlohmann::json::parse(request.body).at("action").get<std::string>();
+    } catch (const nlohmann::json::exception&) {
+      return refuse(response, 400, "expected {\"action\": \"pause\" | \"resume\" | \"stop\"}");
+    }
+    if (action == "pause" || action == "resume") {
+      feed->request_pause(action == "pause");
+    } else if (action == "stop") {
+      feed->request_stop();
+    } else {
+      return refuse(response, 400, "unknown action");
+    }
+    response.set_content(feed->state(), "application/json");
+  }
+
+  void route() {
+    // The library's default also allows a second server on the same port.
+    server.set_socket_options([](socket_t socket) {
+      const int yes = 1;
+      ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    });
+    server.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
+    server.set_payload_max_length(kLargestBody);
+    server.set_read_timeout(5);
+    server.set_write_timeout(30);
+    server.set_keep_alive_max_count(200);
+    server.set_keep_alive_timeout(5);
+    server.set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
+      return check(request, response) ? httplib::Server::HandlerResponse::Handled
+                                      : httplib::Server::HandlerResponse::Unhandled;
+    });
+    server.set_exception_handler([](const httplib::Request&, httplib::Response& response, std::exception_ptr) {
+      refuse(response, 500, "this cannot be read");
+    });
+    if (feed != nullptr) {
+      server.Get("/live/state", [this](const httplib::Request&, httplib::Response& response) {
+        response.set_content(feed->state(), "application/json");
+      });
+      server.Get("/live/events", [this](const httplib::Request&, httplib::Response& response) { follow(response); });
+      server.Get(R"(/live/pictures/([\w.-]{1,80}))",
+                 [this](const httplib::Request& request, httplib::Response& response) {
+                   const auto bytes = feed->picture(request.matches[1]);
+                   if (!bytes) return refuse(response, 404, "not here");
+                   response.set_content(*bytes, "image/jpeg");
+                 });
+      server.Post("/live/control",
+                  [this](const httplib::Request& request, httplib::Response& response) { control(request, response); });
+    }
+    server.Get(".*",
+               [this](const httplib::Request& request, httplib::Response& response) { serve_file(request, response); });
+  }
+};
+
+WebServer::WebServer(std::vector<fs::path> folders, const WebServerOptions& options, LiveFeed* feed)
+    : state_(std::make_unique<State>()) {
+  check_web_server_options(options);
+  state_->folders = std::move(folders);
+  state_->options = options;
+  state_->feed = feed;
+  state_->route();
+}
+
+WebServer::~WebServer() {
+  stop();
+}
+
+void WebServer::start() {
+  State& s = *state_;
+  const std::string& host = s.options.host;
+  if (s.options.port > 0) {
+    s.port = s.server.bind_to_port(host.c_str(), s.options.port) ? s.options.port : -1;
+  } else {
+    s.port = s.server.bind_to_any_port(host.c_str());
+  }
+  if (s.port <= 0) {
+    throw DeviceError(fmt::format("{}:{}: cannot be listened on; is the port in use, or the address another machine's?",
+                                  host, s.options.port > 0 ? std::to_string(s.options.port) : "any"));
+  }
+  s.thread = std::thread([&s] { s.server.listen_after_bind(); });
+  while (!s.server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
+void WebServer::stop() {
+  if (!state_->thread.joinable()) return;
+  if (state_->feed != nullptr) state_->feed->close();
+  state_->server.stop();
+  state_->thread.join();
+}
+
+int WebServer::port() const {
+  return state_->port;
+}
+
+std::string WebServer::address() const {
+  const WebServerOptions& options = state_->options;
+  std::string host = options.host == "0.0.0.0" || options.host == "::" ? "127.0.0.1" : options.host;
+  if (host.find(':') != std::string::npos) host = "[" + host + "]";
+  const std::string query = options.token.empty() ? "" : "?token=" + options.token;
+  return fmt::format("http://{}:{}/{}", host, state_->port, query);
+}
+
+bool open_browser(const std::string& address) {
+  if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return false;
+  if (::access("/usr/bin/xdg-open", X_OK) != 0) return false;
+  const pid_t child = ::fork();
+  if (child != 0) return child > 0 && (::waitpid(child, nullptr, 0), true);
+  if (::fork() == 0) {  // a grandchild is nobody's to wait for
+    ::execl("/usr/bin/xdg-open", "xdg-open", address.c_str(), static_cast<char*>(nullptr));
+    ::_exit(127);
+  }
+  ::_exit(0);
+}
+
+}  // namespace cnerf

@@ -1,0 +1,113 @@
+/** Mouse, touch and keyboard -> camera. */
+
+import type { App } from "./app";
+import { dollied, looked, moved, orbited, zoomed } from "./camera";
+import { add, apply, norm, sub, type Vec3 } from "./math";
+
+const radiansAPixel = 0.006;
+
+export class Input {
+  private pointers = new Map<number, { x: number; y: number }>();
+  private keys = new Set<string>();
+  private last = 0;
+
+  constructor(private readonly app: App, private readonly surface: HTMLElement, private readonly actions: Record<string, () => void>) {
+    surface.addEventListener("pointerdown", (e) => this.down(e));
+    surface.addEventListener("pointermove", (e) => this.move(e));
+    for (const type of ["pointerup", "pointercancel", "lostpointercapture"] as const) surface.addEventListener(type, (e) => this.pointers.delete(e.pointerId));
+    surface.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
+    surface.addEventListener("contextmenu", (e) => e.preventDefault());
+    window.addEventListener("keydown", (e) => this.key(e));
+    window.addEventListener("keyup", (e) => this.keys.delete(e.code));
+    window.addEventListener("blur", () => this.keys.clear());
+  }
+
+  private down(e: PointerEvent): void {
+    this.surface.setPointerCapture(e.pointerId);
+    this.pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
+    (document.activeElement as HTMLElement | null)?.blur();
+  }
+
+  private move(e: PointerEvent): void {
+    const before = this.pointers.get(e.pointerId);
+    if (!before) return;
+    const dx = e.clientX - before.x;
+    const dy = e.clientY - before.y;
+    if (this.pointers.size === 2) return this.pinch(e, before, dx, dy);
+    this.pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
+    if (e.buttons & 6 || e.shiftKey) return this.pan(dx, dy);
+    const { app } = this;
+    if (app.settings.fly) return app.setView(looked(app.view, app.up, dx * radiansAPixel * 0.6, -dy * radiansAPixel * 0.6));
+    app.setView(orbited(app.view, app.target, app.up, -dx * radiansAPixel, -dy * radiansAPixel));
+  }
+
+  private pinch(e: PointerEvent, before: { x: number; y: number }, dx: number, dy: number): void {
+    const [otherId] = [...this.pointers.keys()].filter((id) => id !== e.pointerId);
+    const other = this.pointers.get(otherId)!;
+    const was = Math.hypot(before.x - other.x, before.y - other.y);
+    const is = Math.hypot(e.clientX - other.x, e.clientY - other.y);
+    this.pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
+    this.pan(dx / 2, dy / 2);
+    if (was > 10 && is > 10) this.dolly(was / is);
+  }
+
+  private pan(dx: number, dy: number): void {
+    const { app } = this;
+    const distance = norm(sub(app.target, app.view.position));
+    const pixels = this.surface.clientHeight / app.view.lens.height;
+    const unit = distance / (app.view.lens.fy * pixels);
+    const shift = apply(app.view.rotation, [-dx * unit, -dy * unit, 0]);
+    app.setView({ ...app.view, position: add(app.view.position, shift) }, add(app.target, shift));
+  }
+
+  private dolly(factor: number): void {
+    const { app } = this;
+    app.setView(dollied(app.view, app.target, factor));
+  }
+
+  private wheel(e: WheelEvent): void {
+    e.preventDefault();
+    const factor = Math.exp(Math.max(-120, Math.min(120, e.deltaY * (e.deltaMode === 1 ? 30 : 1))) * 0.0015);
+    if (e.altKey) return this.app.setView(zoomed(this.app.view, 1 / factor));
+    if (this.app.settings.fly) return this.walk(0, 0, (1 - factor) * this.reach());
+    this.dolly(factor);
+  }
+
+  private reach(): number {
+    return norm(sub(this.app.high, this.app.low)) / 2;
+  }
+  private walk(right: number, down: number, forward: number): void {
+    const { app } = this;
+    const view = moved(app.view, right, down, forward);
+    app.setView(view, add(app.target, sub(view.position, app.view.position)) as Vec3);
+  }
+
+  private key(e: KeyboardEvent): void {
+    const target = e.target as HTMLElement;
+    if (e.ctrlKey || e.metaKey) return;
+    if (target instanceof HTMLInputElement && target.type !== "range" && target.type !== "checkbox") return;
+    if (/^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/.test(e.code)) {
+      if (target instanceof HTMLInputElement && e.code.startsWith("Arrow")) return;
+      this.keys.add(e.code);
+      e.preventDefault();
+      return;
+    }
+    const action = this.actions[e.key.length === 1 ? e.key.toLowerCase() : e.key];
+    if (!action) return;
+    e.preventDefault();
+    action();
+  }
+
+  /** To be called once an animation frame: keys that are held. */
+  step(now: number): void {
+    const seconds = Math.min(0.1, (now - this.last) / 1000);
+    this.last = now;
+    if (this.keys.size === 0) return;
+    const held = (...codes: string[]) => (codes.some((code) => this.keys.has(code)) ? 1 : 0);
+    const speed = this.reach() * 0.6 * seconds;
+    const right = held("KeyD", "ArrowRight") - held("KeyA", "ArrowLeft");
+    const forward = held("KeyW", "ArrowUp") - held("KeyS", "ArrowDown");
+    const up = held("KeyE") - held("KeyQ");
+    if (right || forward || up) this.walk(right * speed, -up * speed, forward * speed);
+  }
+}

@@ -1,0 +1,152 @@
+/** Small pieces of interface. */
+
+type Props = { [key: string]: unknown };
+
+export function el<K extends keyof HTMLElementTagNameMap>(tag: K, props: Props = {}, ...children: (Node | string | null)[]): HTMLElementTagNameMap[K] {
+  const node = document.createElement(tag);
+  for (const [key, value] of Object.entries(props)) {
+    if (key.startsWith("on") && typeof value === "function") node.addEventListener(key.slice(2), value as EventListener);
+    else if (key === "class") node.className = String(value);
+    else if (value === true) node.setAttribute(key, "");
+    else if (value !== false && value !== undefined && value !== null) node.setAttribute(key, String(value));
+  }
+  for (const child of children) if (child !== null) node.append(child);
+  return node;
+}
+
+const paths: Record<string, string> = {
+  home: "M4 11 12 4l8 7M6 10v10h4v-6h4v6h4V10",
+  frame: "M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5M12 9.500a2.500 2.500 0 1 0 0 5 2.500 2.500 0 0 0 0-5",
+  camera: "M4 8h3l2-3h6l2 3h3v11H4zM12 10a3.500 3.500 0 1 0 0 7 3.500 3.500 0 0 0 0-7",
+  link: "M10 14a4 4 0 0 0 6 .4l3-3a4 4 0 0 0-5.600-5.600l-1.500 1.500M14 10a4 4 0 0 0-6-.4l-3 3A4 4 0 0 0 10.600 18.200l1.500-1.500",
+  help: "M9 9a3 3 0 1 1 4.500 2.600c-1 .6-1.500 1.200-1.500 2.400M12 17.500v.6M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18",
+  panel: "M4 7h10M18 7h2M4 17h2M10 17h10M14 5v4M6 15v4",
+  play: "M7 5v14l12-7z",
+  stop: "M6 6h12v12H6z",
+  pause: "M8 5v14M16 5v14",
+  plus: "M12 5v14M5 12h14",
+  close: "M6 6l12 12M18 6 6 18",
+  save: "M12 4v11M8 11l4 4 4-4M5 19h14",
+  full: "M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5",
+};
+
+export function icon(name: string): SVGSVGElement {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("viewBox", "0 0 24 24");
+  svg.setAttribute("class", "icon");
+  svg.setAttribute("aria-hidden", "true");
+  const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  path.setAttribute("d", paths[name]);
+  svg.append(path);
+  return svg;
+}
+
+export function iconButton(name: string, title: string, onclick: () => void, id?: string): HTMLButtonElement {
+  return el("button", { class: "icon-button", title, "aria-label": title, onclick, type: "button", id }, icon(name));
+}
+export function button(label: string, onclick: () => void, props: Props = {}): HTMLButtonElement {
+  return el("button", { class: "button", type: "button", onclick, ...props }, label);
+}
+
+export interface Slider {
+  node: HTMLElement;
+  set(value: number): void;
+}
+
+export interface SliderOptions {
+  id: string;
+  label: string;
+  min: number;
+  max: number;
+  step: number;
+  value: number;
+  /** What a double click goes back to. */
+  reset: number;
+  show?: (value: number) => string;
+  change: (value: number) => void;
+}
+
+export function slider(options: SliderOptions): Slider {
+  const show = options.show ?? ((v: number) => v.toFixed(2));
+  const output = el("output", { for: options.id });
+  const input = el("input", { type: "range", id: options.id, min: options.min, max: options.max, step: options.step });
+  const set = (value: number) => {
+    input.value = String(value);
+    output.value = show(value);
+    input.style.setProperty("--fill", `${(100 * (value - options.min)) / (options.max - options.min)}%`);
+  };
+  input.addEventListener("input", () => {
+    const value = Number(input.value);
+    set(value);
+    options.change(value);
+  });
+  const node = el("label", { class: "slider", title: "Double click resets" }, el("span", { class: "name" }, options.label), output, input);
+  node.addEventListener("dblclick", () => {
+    set(options.reset);
+    options.change(options.reset);
+  });
+  set(options.value);
+  return { node, set };
+}
+
+export interface Segments<T extends string> {
+  node: HTMLElement;
+  set(value: T): void;
+}
+
+export function segments<T extends string>(id: string, choices: [T, string][], value: T, change: (value: T) => void): Segments<T> {
+  const buttons = choices.map(([key, label]) => el("button", { type: "button", "data-value": key, onclick: () => (set(key), change(key)) }, label));
+  const node = el("div", { class: "segments", id, role: "group" }, ...buttons);
+  function set(wanted: T): void {
+    for (const b of buttons) b.setAttribute("aria-pressed", String(b.dataset.value === wanted));
+  }
+  set(value);
+  return { node, set };
+}
+
+export interface Toggle {
+  node: HTMLElement;
+  set(value: boolean): void;
+}
+
+export function toggle(id: string, label: string, value: boolean, change: (value: boolean) => void): Toggle {
+  const input = el("input", { type: "checkbox", id, role: "switch" });
+  input.checked = value;
+  input.addEventListener("change", () => change(input.checked));
+  return { node: el("label", { class: "toggle" }, el("span", { class: "name" }, label), input), set: (v) => (input.checked = v) };
+}
+
+export function section(title: string, open: boolean, ...children: (Node | string)[]): HTMLDetailsElement {
+  return el("details", { class: "section", open }, el("summary", {}, title), el("div", { class: "body" }, ...children));
+}
+
+let toastTimer = 0;
+export function toast(text: string): void {
+  let node = document.getElementById("toast");
+  if (!node) {
+    node = el("div", { id: "toast", role: "status" });
+    document.body.append(node);
+  }
+  node.textContent = text;
+  node.classList.add("shown");
+  window.clearTimeout(toastTimer);
+  toastTimer = window.setTimeout(() => node!.classList.remove("shown"), 2400);
+}
+
+export async function copyText(text: string, what: string): Promise<void> {
+  try {
+    await navigator.clipboard.writeText(text);
+    toast(`${what} copied`);
+  } catch {
+    window.prompt(`${what}:`, text);
+  }
+}
+
+export function download(name: string, content: Blob): void {
+  const url = URL.createObjectURL(content);
+  const link = el("a", { href: url, download: name });
+  document.body.append(link);
+  link.click();
+  link.remove();
+  setTimeout(() => URL.revokeObjectURL(url), 10_000);
+}

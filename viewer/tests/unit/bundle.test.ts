@@ -1,0 +1,83 @@
+import { createHash } from "node:crypto";
+import { gzipSync } from "node:zlib";
+import { afterEach, describe, expect, it, vi } from "vitest";
+import { BundleError, bundleSchema, loadVolume, parseBundle } from "../../src/bundle";
+import { expected, manifestText } from "./fixture";
+
+const parts: Record<string, Uint8Array> = { "occupancy.bin": new Uint8Array([0]), "density.bin": new Uint8Array(512).fill(9), "color.bin": new Uint8Array(1536) };
+const packedParts = Object.fromEntries(Object.entries(parts).map(([name, raw]) => [name, new Uint8Array(gzipSync(raw))]));
+
+function manifest(): any {
+  return {
+    schema: 1, program_version: "0", title: "t", units: "m", up_axis: "z", poster: null, cameras: [],
+    color: { inferred: true, colorizer: "c", take: "t" },
+    volume: { origin: [0, 0, 0], voxel_size: 0.1, brick_side: 8, bricks: [1, 1, 1], stored_bricks: 1, voxels: 1, density: { encoding: "r8", scale: 10, max: 10 } },
+    files: Object.entries(packedParts).map(([name, bytes]) => ({ name, bytes: bytes.length, raw_bytes: parts[name].length, sha256: createHash("sha256").update(bytes).digest("hex") })),
+  };
+}
+const parsed = (change: (json: any) => void) => {
+  const json = manifest();
+  change(json);
+  return () => parseBundle(JSON.stringify(json));
+};
+const serve = (files: Record<string, Uint8Array>) =>
+  vi.stubGlobal("fetch", async (url: string) => {
+    const name = url.split("/").pop()!;
+    return files[name] ? new Response(files[name] as BodyInit) : new Response("", { status: 404, statusText: "Not Found" });
+  });
+afterEach(() => vi.unstubAllGlobals());
+
+describe("manifest", () => {
+  it("is read", () => expect(parsed(() => {})().volume.density.scale).toBe(10));
+  it.skipIf(!expected)("is read as C++ writes it", () => {
+    const bundle = parseBundle(manifestText("r16f"));
+    expect(bundle.cameras).toHaveLength(3);
+    expect(bundle.cameras[1].photo).toBe("photos/001.jpg");
+    expect(bundle.upAxis).toBe("z");
+    expect(bundle.volume.density.encoding).toBe("r16f");
+    expect(bundle.colorizer).toBe("reference:a.png");
+  });
+  const wrong: [string, (json: any) => void, RegExp][] = [
+    ["a newer schema", (j) => (j.schema = bundleSchema + 1), /schema.*newer/],
+    ["a missing number", (j) => delete j.volume.voxel_size, /voxel_size/],
+    ["a number that is none", (j) => (j.volume.voxel_size = "x"), /voxel_size.*"x"/],
+    ["a size of 0", (j) => (j.volume.voxel_size = 0), /voxel_size.*positive/],
+    ["another encoding", (j) => (j.volume.density.encoding = "r4"), /encoding.*r4/],
+    ["a file outside", (j) => j.files.push({ name: "../x", bytes: 1, sha256: "" }), /leaves the bundle/],
+    ["a missing part", (j) => j.files.pop(), /color\.bin/],
+    ["a camera without a pose", (j) => j.cameras.push({ name: "a", width: 1, height: 1, fx: 1, fy: 1, cx: 0, cy: 0 }), /cameras\[0\]/],
+  ];
+  for (const [what, change, message] of wrong) it(`refuses ${what}, by name`, () => expect(parsed(change)).toThrow(message));
+  it("refuses half a file", () => expect(() => parseBundle(JSON.stringify(manifest()).slice(0, 100))).toThrow(BundleError));
+});
+
+describe("parts", () => {
+  it("are loaded, checked and unpacked", async () => {
+    serve(packedParts);
+    let share = 0;
+    const volume = await loadVolume("http://a/", parseBundle(JSON.stringify(manifest())), (s) => (share = s));
+    expect(Array.from(volume.density.subarray(0, 3))).toEqual([9, 9, 9]);
+    expect(share).toBe(1);
+  });
+  const damages: [string, (bytes: Uint8Array) => Uint8Array, RegExp][] = [
+    ["a changed byte", (b) => b.map((v, i) => (i === 20 ? v ^ 1 : v)), /density\.bin.*SHA-256/],
+    ["a cut end", (b) => b.subarray(0, b.length - 3), /density\.bin.*bytes instead of/],
+    ["another file", () => new Uint8Array(gzipSync(new Uint8Array(5))), /density\.bin.*damaged/],
+  ];
+  for (const [what, damage, message] of damages) {
+    it(`with ${what} are refused, by name`, async () => {
+      serve({ ...packedParts, "density.bin": damage(packedParts["density.bin"]) });
+      await expect(loadVolume("http://a/", parseBundle(JSON.stringify(manifest())), () => {})).rejects.toThrow(message);
+    });
+  }
+  it("with a changed byte are refused without SHA-256 too", async () => {
+    vi.stubGlobal("crypto", {});
+    const bytes = packedParts["density.bin"].map((v, i) => (i === packedParts["density.bin"].length - 6 ? v ^ 1 : v));
+    serve({ ...packedParts, "density.bin": bytes });
+    await expect(loadVolume("http://a/", parseBundle(JSON.stringify(manifest())), () => {})).rejects.toThrow(/density\.bin.*damaged/);
+  });
+  it("that are missing are named with what the server says", async () => {
+    serve({});
+    await expect(loadVolume("http://a/", parseBundle(JSON.stringify(manifest())), () => {})).rejects.toThrow(/404/);
+  });
+});

@@ -1,0 +1,25 @@
+/** What the C++ side wrote: `web_fixture FOLDER`, its folder in CNERF_FIXTURE. */
+
+import { existsSync, readFileSync } from "node:fs";
+import { join } from "node:path";
+import { gunzipSync } from "node:zlib";
+import { parseBundle, type Packed } from "../../src/bundle";
+
+export const folder = process.env.CNERF_FIXTURE ?? "";
+const there = folder !== "" && existsSync(join(folder, "expected.json"));
+if (!there) console.warn("CNERF_FIXTURE names no fixture: tests against C++ are skipped; ctest -L viewer makes it");
+
+interface Expected {
+  projections: { camera: number; point: [number, number, number]; pixel: [number, number] }[];
+  voxels: { centre: [number, number, number]; sigma: number; lightness: number; a: number; b: number }[];
+  images: { width: number; height: number; rgb: number[]; opacity: number[] }[];
+}
+
+export const manifestText = (kind: "r8" | "r16f") => readFileSync(join(folder, kind, "bundle.json"), "utf8");
+export const bundle = there ? parseBundle(manifestText("r8")) : null;
+export const expected = there ? (JSON.parse(readFileSync(join(folder, "expected.json"), "utf8")) as Expected) : null;
+
+export function packed(kind: "r8" | "r16f"): Packed {
+  const read = (name: string) => new Uint8Array(gunzipSync(readFileSync(join(folder, kind, name))));
+  return { occupancy: read("occupancy.bin"), density: read("density.bin"), color: read("color.bin") };
+}
