@@ -77,34 +77,47 @@ std::vector<cv::Point2f> some_of(const std::vector<cv::Point2f>& points, std::si
   return out;
 }
 
-/// The focal lengths and rotation of the least mean error, by a grid that shrinks around the best.
-Turn best_turn(const std::vector<cv::Point2f>& all_before, const std::vector<cv::Point2f>& all_after, cv::Size picture,
-               double diagonal) {
-  const auto before = some_of(all_before, 100), after = some_of(all_after, 100);
-  Turn best;
-  double least = 1e30;
-  double log_focal = 0.5 * std::log(kShortest * kLongest), log_zoom = 0;
-  int reach = 8;
-  double focal_step = 0.5 * std::log(kLongest / kShortest) / reach, zoom_step = std::log(1.6) / reach;
-  for (int round = 0; round < 10; ++round, reach = 3, focal_step /= 1.7, zoom_step /= 1.7) {
-    const double focal_middle = log_focal, zoom_middle = log_zoom;
+struct Least {
+  double cost = 1e30, at = 0;
+};
+
+/// The least of `cost` in [low, high]: 13 places, then five around the best, ever closer.
+template <typename Cost>
+Least search(double low, double high, int rounds, Cost&& cost) {
+  Least least = {1e30, 0.5 * (low + high)};
+  int reach = 6;
+  double step = (high - low) / (2 * reach);
+  for (int round = 0; round < rounds; ++round, reach = 2, step /= 2.5) {
+    const double middle = least.at;
     for (int i = -reach; i <= reach; ++i) {
-      for (int j = -reach; j <= reach; ++j) {
-        const double focal = focal_middle + focal_step * i, zoom = zoom_middle + zoom_step * j;
-        const Turn turn =
-            fit_rotation(before, after, picture, diagonal * std::exp(focal), diagonal * std::exp(focal + zoom));
-        double sum = 0;
-        for (const double error : errors_of(turn, before, after, picture)) sum += std::min(error, 0.1 * diagonal);
-        if (sum < least) {
-          least = sum;
-          best = turn;
-          log_focal = focal;
-          log_zoom = zoom;
-        }
-      }
+      const double at = middle + step * i;
+      if (const double value = cost(at); value < least.cost) least = {value, at};
     }
   }
-  return best;
+  return least;
+}
+
+/// The focal lengths and rotation of the least mean error. The zoom is searched for each focal length anew: the two
+/// trade against each other, so a search over both at once stays where it first looked.
+Turn best_turn(const std::vector<cv::Point2f>& all_before, const std::vector<cv::Point2f>& all_after, cv::Size picture,
+               double diagonal) {
+  const auto before = some_of(all_before, 60), after = some_of(all_after, 60);
+  const auto turn_of = [&](double log_focal, double log_zoom) {
+    return fit_rotation(before, after, picture, diagonal * std::exp(log_focal),
+                        diagonal * std::exp(log_focal + log_zoom));
+  };
+  const auto best_zoom = [&](double log_focal) {
+    return search(-std::log(1.6), std::log(1.6), 6, [&](double log_zoom) {
+      double sum = 0;
+      for (const double error : errors_of(turn_of(log_focal, log_zoom), before, after, picture)) {
+        sum += std::min(error, 0.1 * diagonal);
+      }
+      return sum;
+    });
+  };
+  const Least focal =
+      search(std::log(kShortest), std::log(kLongest), 5, [&](double log_focal) { return best_zoom(log_focal).cost; });
+  return turn_of(focal.at, best_zoom(focal.at).at);
 }
 
 }  // namespace
