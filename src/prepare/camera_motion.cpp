@@ -14,6 +14,8 @@ constexpr double kStillBelow = 0.005;  ///< of the diagonal
 constexpr double kWithin = 1.0 / 400;  ///< of the diagonal: two pixels of a picture 640 wide
 constexpr double kExplained = 0.85;    ///< of all places; the rest may be wrong or move by themselves
 
+constexpr double kWorthATry = 0.5;  ///< of all places within one homography, which random picks find roughly
+
 /// Focal lengths in diagonals: from a very wide lens to a long one.
 constexpr double kShortest = 0.35, kLongest = 6;
 
@@ -75,34 +77,47 @@ std::vector<cv::Point2f> some_of(const std::vector<cv::Point2f>& points, std::si
   return out;
 }
 
-/// The focal lengths and rotation of the least mean error, by a grid that shrinks around the best.
-Turn best_turn(const std::vector<cv::Point2f>& all_before, const std::vector<cv::Point2f>& all_after, cv::Size picture,
-               double diagonal) {
-  const auto before = some_of(all_before, 100), after = some_of(all_after, 100);
-  Turn best;
-  double least = 1e30;
-  double log_focal = 0.5 * std::log(kShortest * kLongest), log_zoom = 0;
-  int reach = 8;
-  double focal_step = 0.5 * std::log(kLongest / kShortest) / reach, zoom_step = std::log(1.6) / reach;
-  for (int round = 0; round < 10; ++round, reach = 3, focal_step /= 1.7, zoom_step /= 1.7) {
-    const double focal_middle = log_focal, zoom_middle = log_zoom;
+struct Least {
+  double cost = 1e30, at = 0;
+};
+
+/// The least of `cost` in [low, high]: 13 places, then five around the best, ever closer.
+template <typename Cost>
+Least search(double low, double high, int rounds, Cost&& cost) {
+  Least least = {1e30, 0.5 * (low + high)};
+  int reach = 6;
+  double step = (high - low) / (2 * reach);
+  for (int round = 0; round < rounds; ++round, reach = 2, step /= 2.5) {
+    const double middle = least.at;
     for (int i = -reach; i <= reach; ++i) {
-      for (int j = -reach; j <= reach; ++j) {
-        const double focal = focal_middle + focal_step * i, zoom = zoom_middle + zoom_step * j;
-        const Turn turn =
-            fit_rotation(before, after, picture, diagonal * std::exp(focal), diagonal * std::exp(focal + zoom));
-        double sum = 0;
-        for (const double error : errors_of(turn, before, after, picture)) sum += std::min(error, 0.1 * diagonal);
-        if (sum < least) {
-          least = sum;
-          best = turn;
-          log_focal = focal;
-          log_zoom = zoom;
-        }
-      }
+      const double at = middle + step * i;
+      if (const double value = cost(at); value < least.cost) least = {value, at};
     }
   }
-  return best;
+  return least;
+}
+
+/// The focal lengths and rotation of the least mean error. The zoom is searched for each focal length anew: the two
+/// trade against each other, so a search over both at once stays where it first looked.
+Turn best_turn(const std::vector<cv::Point2f>& all_before, const std::vector<cv::Point2f>& all_after, cv::Size picture,
+               double diagonal) {
+  const auto before = some_of(all_before, 60), after = some_of(all_after, 60);
+  const auto turn_of = [&](double log_focal, double log_zoom) {
+    return fit_rotation(before, after, picture, diagonal * std::exp(log_focal),
+                        diagonal * std::exp(log_focal + log_zoom));
+  };
+  const auto best_zoom = [&](double log_focal) {
+    return search(-std::log(1.6), std::log(1.6), 6, [&](double log_zoom) {
+      double sum = 0;
+      for (const double error : errors_of(turn_of(log_focal, log_zoom), before, after, picture)) {
+        sum += std::min(error, 0.1 * diagonal);
+      }
+      return sum;
+    });
+  };
+  const Least focal =
+      search(std::log(kShortest), std::log(kLongest), 5, [&](double log_focal) { return best_zoom(log_focal).cost; });
+  return turn_of(focal.at, best_zoom(focal.at).at);
 }
 
 }  // namespace
@@ -128,7 +143,7 @@ MotionVerdict judge_motion(const std::vector<cv::Point2f>& before, const std::ve
     kept_after.push_back(after[std::size_t(i)]);
   }
   out.motion = Motion::kParallax;
-  if (double(kept_before.size()) < kExplained * double(before.size())) return out;
+  if (double(kept_before.size()) < kWorthATry * double(before.size())) return out;
   const Turn turn = best_turn(kept_before, kept_after, picture, diagonal);
   out.explained = share_below(errors_of(turn, before, after, picture), kWithin * diagonal);
   if (out.explained >= kExplained) out.motion = Motion::kTurned;
