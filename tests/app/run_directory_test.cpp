@@ -33,10 +33,14 @@ TEST(RunDirectoryTest, RecordsReturnAsTheyWereSaved) {
   EXPECT_EQ(read.current_take, "reference");
 
   EXPECT_FALSE(run.take_record("reference"));
-  run.save(TakeRecord{"reference", "reference:a.png", {40, 10, 3.5, 1.25, 0.5}});
+  run.save(
+      TakeRecord{"reference",
+                 "reference:a.png",
+                 {.accepted = 40, .rejected = 10, .seconds = 3.5, .waited_seconds = 0.25, .bake_ab_distance = 0.5}});
   const TakeRecord take = run.take_record("reference").value();
   EXPECT_EQ(take.colorizer, "reference:a.png");
   EXPECT_EQ(take.stage2.accepted, 40);
+  EXPECT_EQ(take.stage2.waited_seconds, 0.25);
   EXPECT_EQ(take.stage2.bake_ab_distance, 0.5);
 }
 
