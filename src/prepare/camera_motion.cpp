@@ -11,7 +11,8 @@ namespace cnerf {
 namespace {
 
 constexpr double kStillBelow = 0.005;  ///< of the diagonal
-constexpr double kWithin = 1.0 / 400;  ///< of the diagonal: two pixels of a picture 640 wide
+constexpr double kWithin = 1.0 / 250;  ///< of the diagonal
+constexpr double kLeastWithin = 2;     ///< pixels: as far as places drift when they are followed
 constexpr double kExplained = 0.85;    ///< of all places; the rest may be wrong or move by themselves
 
 constexpr double kWorthATry = 0.5;  ///< of all places within one homography, which random picks find roughly
@@ -127,6 +128,7 @@ MotionVerdict judge_motion(const std::vector<cv::Point2f>& before, const std::ve
   CNERF_CHECK_EQ(before.size(), after.size());
   CNERF_CHECK(before.size() >= 12, "a motion is judged by 12 places at least");
   const double diagonal = std::hypot(picture.width, picture.height);
+  const double within = std::max(kLeastWithin, kWithin * diagonal);
   MotionVerdict out;
   std::vector<double> moves;
   for (std::size_t i = 0; i < before.size(); ++i) moves.push_back(cv::norm(after[i] - before[i]));
@@ -135,7 +137,7 @@ MotionVerdict judge_motion(const std::vector<cv::Point2f>& before, const std::ve
 
   // Places that one homography explains: a turn is a homography, so wrong and moving places fall out here.
   cv::Mat inlier;
-  const cv::Mat homography = cv::findHomography(before, after, cv::RANSAC, kWithin * diagonal, inlier);
+  const cv::Mat homography = cv::findHomography(before, after, cv::RANSAC, within, inlier);
   std::vector<cv::Point2f> kept_before, kept_after;
   for (int i = 0; !homography.empty() && i < inlier.rows; ++i) {
     if (inlier.at<std::uint8_t>(i) == 0) continue;
@@ -145,7 +147,7 @@ MotionVerdict judge_motion(const std::vector<cv::Point2f>& before, const std::ve
   out.motion = Motion::kParallax;
   if (double(kept_before.size()) < kWorthATry * double(before.size())) return out;
   const Turn turn = best_turn(kept_before, kept_after, picture, diagonal);
-  out.explained = share_below(errors_of(turn, before, after, picture), kWithin * diagonal);
+  out.explained = share_below(errors_of(turn, before, after, picture), within);
   if (out.explained >= kExplained) out.motion = Motion::kTurned;
   return out;
 }

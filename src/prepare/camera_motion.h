@@ -16,7 +16,7 @@ enum class Motion {
 struct MotionVerdict {
   Motion motion = Motion::kStill;
   double moved = 0;      ///< median displacement, share of the picture's diagonal
-  double explained = 0;  ///< share of the places that the best turn puts within 1/400 of the diagonal
+  double explained = 0;  ///< share of the places that the best turn puts within 1/250 of the diagonal, or two pixels
 };
 
 /// @param before, after  the same places in both pictures, pixels; at least 12
