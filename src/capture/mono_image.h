@@ -29,7 +29,8 @@ struct MonoImage {
   std::vector<std::uint8_t> mask;   ///< [H, W] 0 = ignore this pixel; empty = every pixel counts
 
   [[nodiscard]] std::size_t pixel_count() const { return std::size_t(width) * std::size_t(height); }
-  /// Linear luminance Y at the exposure of the whole capture, 1 = white, composited over black, of pixel `index = y * width + x`.
+  /// Linear luminance Y at the exposure of the whole capture, 1 = white, composited over black.
+  /// @param index  y * width + x
   [[nodiscard]] float luminance(std::size_t index) const;
   [[nodiscard]] float coverage(std::size_t index) const { return alpha.empty() ? 1.0f : float(alpha[index]) / 255.0f; }
   [[nodiscard]] bool valid(std::size_t index) const { return mask.empty() || mask[index] != 0; }

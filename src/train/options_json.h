@@ -21,16 +21,17 @@ class OptionsToJson {
   nlohmann::json json = nlohmann::json::object();
 };
 
+/// A snapshot of an earlier version lacks the options that came later; they keep their defaults.
 class OptionsFromJson {
  public:
   explicit OptionsFromJson(const nlohmann::json& json) : json_(json) {}
   template <typename T, typename... Rest>
   void operator()(const char* name, T& value, const Rest&...) {
-    json_.at(name).get_to(value);
+    if (const auto found = json_.find(name); found != json_.end()) found->get_to(value);
   }
   template <typename Nested>
   void section(const char* name, Nested& nested) {
-    nested.visit(OptionsFromJson(json_.at(name)));
+    if (const auto found = json_.find(name); found != json_.end()) nested.visit(OptionsFromJson(*found));
   }
 
  private:

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -67,6 +68,7 @@ TEST(Colmap, FindsThePosesOfAFewSmallViews) {
 }
 
 TEST(Colmap, FindsThePosesOfFox) {
+  if (std::getenv("CNERF_LONG_TESTS") == nullptr) GTEST_SKIP() << "takes many minutes; set CNERF_LONG_TESTS=1";
   CNERF_REQUIRE_COLMAP();
   CNERF_REQUIRE_DATA(fox, "scenes/fox");
   const test::TempDir folder;
@@ -81,6 +83,7 @@ TEST(Colmap, FindsThePosesOfFox) {
 }
 
 TEST(Colmap, FindsThePosesOfFlower) {
+  if (std::getenv("CNERF_LONG_TESTS") == nullptr) GTEST_SKIP() << "takes many minutes; set CNERF_LONG_TESTS=1";
   CNERF_REQUIRE_COLMAP();
   CNERF_REQUIRE_DATA(flower, "scenes/flower");
   const test::TempDir folder;
