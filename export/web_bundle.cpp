@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "export/gzip.h"
+#include "src/base/gzip.h"
 #include "export/manifest_json.h"
 #include "src/base/check.h"
 #include "src/base/error.h"

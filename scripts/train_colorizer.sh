@@ -6,7 +6,7 @@
 #
 # DATA holds colorizer/ (image archives) and lpips/ (SqueezeNet weights for the auxiliary feature loss). The trainer is
 # built from src/colorizer_training as a project of its own, with the LibTorch of TORCH_PREFIX (a CMake prefix path;
-# python3's torch when empty). It needs OpenSSL, libjpeg, libwebp and CLI11 beside it.
+# python3's torch when empty). It needs OpenSSL, zlib, libjpeg, libwebp and CLI11 beside it.
 set -euo pipefail
 
 if [ $# -lt 2 ]; then

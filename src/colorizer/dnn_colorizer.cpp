@@ -12,23 +12,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class DnnColorizer final : public Colorizer {
+class DnnColorizer final : public NetworkColorizer {
  public:
   DnnColorizer(std::string name, NetworkContract contract, cv::dnn::Net network)
-      : name_(std::move(name)), contract_(std::move(contract)), network_(std::move(network)) {
+      : NetworkColorizer(std::move(name), std::move(contract)), network_(std::move(network)) {
     network_.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
     network_.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
   }
 
-  ChromaBatch colorize(const LightnessBatch& patches) override {
-    const Planes input = network_input(contract_, patches);
-    return chroma_of(contract_, run(input), input, patches, name_);
-  }
-
-  [[nodiscard]] std::string name() const override { return name_; }
-
  private:
-  Planes run(const Planes& input) {
+  Planes run(const Planes& input) override {
     const int shape[] = {input.batch, input.channels, input.height, input.width};
     cv::Mat answer;
     try {
@@ -44,8 +37,6 @@ class DnnColorizer final : public Colorizer {
     return {answer.size[0], answer.size[1], answer.size[2], answer.size[3], {values, values + answer.total()}};
   }
 
-  std::string name_;
-  NetworkContract contract_;
   cv::dnn::Net network_;
 };
 

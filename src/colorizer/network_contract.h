@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "src/colorizer/colorizer.h"
@@ -41,6 +42,26 @@ struct Planes {
 /// @throws ColorizerError  naming `colorizer`, when the shape is not what the contract says.
 [[nodiscard]] ChromaBatch chroma_of(const NetworkContract& contract, const Planes& raw, const Planes& asked,
                                     const LightnessBatch& question, const std::string& colorizer);
+
+/// A colorizer that asks such a network; its back end says how the network is run.
+class NetworkColorizer : public Colorizer {
+ public:
+  NetworkColorizer(std::string name, NetworkContract contract)
+      : name_(std::move(name)), contract_(std::move(contract)) {}
+
+  ChromaBatch colorize(const LightnessBatch& patches) final {
+    const Planes input = network_input(contract_, patches);
+    return chroma_of(contract_, run(input), input, patches, name_);
+  }
+  [[nodiscard]] std::string name() const final { return name_; }
+
+ protected:
+  /// @throws ColorizerError  naming the colorizer.
+  [[nodiscard]] virtual Planes run(const Planes& input) = 0;
+
+  std::string name_;
+  NetworkContract contract_;
+};
 
 /// The first line of a library's message: the rest is its stack.
 [[nodiscard]] std::string first_line(const std::string& text);

@@ -7,6 +7,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/gzip.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -14,8 +15,9 @@ using torch::Tensor;
 
 namespace {
 
-constexpr std::string_view kMagic = "CNERFCW1";
+constexpr std::string_view kMagic = "CNERFCW2";
 constexpr std::size_t kChecksumBytes = 64;
+constexpr std::size_t kMostContent = std::size_t(1) << 26;  // a file that unpacks to more is none of ours
 
 template <typename T>
 void append(std::vector<std::byte>& out, const T& value) {
@@ -56,6 +58,23 @@ class Reader {
   std::span<const std::byte> rest_;
 };
 
+std::vector<std::uint8_t> evens_then_odds(std::span<const std::byte> content) {
+  std::vector<std::uint8_t> sorted;
+  sorted.reserve(content.size());
+  for (std::size_t first : {0, 1}) {
+    for (std::size_t i = first; i < content.size(); i += 2) sorted.push_back(std::to_integer<std::uint8_t>(content[i]));
+  }
+  return sorted;
+}
+
+/// Undoes `evens_then_odds`.
+std::vector<std::byte> interleaved(std::span<const std::uint8_t> sorted) {
+  std::vector<std::byte> content(sorted.size());
+  const std::size_t evens = (sorted.size() + 1) / 2;
+  for (std::size_t i = 0; i < sorted.size(); ++i) content[i] = std::byte{sorted[i / 2 + (i % 2 == 0 ? 0 : evens)]};
+  return content;
+}
+
 void read_parameter(const fs::path& file, Reader& reader, torch::OrderedDict<std::string, Tensor>& parameters) {
   const std::string name = reader.text(reader.value<std::uint32_t>());
   std::vector<std::int64_t> shape(std::min<std::uint32_t>(reader.value<std::uint32_t>(), 8));
@@ -89,21 +108,26 @@ void save_colorizer_weights(const fs::path& file, const ColorizerNet& network, c
   std::vector<std::byte> content;
   append(content, kMagic.data(), kMagic.size());
   append(content, sha256(payload).data(), kChecksumBytes);
-  append(content, payload.data(), payload.size());
+  const std::vector<std::byte> packed = gzip(evens_then_odds(payload));
+  append(content, packed.data(), packed.size());
   write_file(file, content);
 }
 
 ColorizerWeights load_colorizer_weights(const fs::path& file) {
-  const std::vector<std::byte> content = read_binary_file(file);
-  Reader reader(file, content);
-  if (reader.text(kMagic.size()) != kMagic) {
-    throw InputError(file, "header", "expected colorizer weights of version 1 (" + std::string(kMagic) + ")");
+  const std::vector<std::byte> whole = read_binary_file(file);
+  Reader header(file, whole);
+  if (header.text(kMagic.size()) != kMagic) {
+    throw InputError(file, "header", "expected colorizer weights of version 2 (" + std::string(kMagic) + ")");
   }
   ColorizerWeights weights;
-  weights.sha256 = reader.text(kChecksumBytes);
-  if (sha256(reader.rest()) != weights.sha256) {
-    throw InputError(file, "checksum", "expected SHA-256 " + weights.sha256 + ", found " + sha256(reader.rest()));
+  weights.sha256 = header.text(kChecksumBytes);
+  const auto unpacked = gunzip(header.rest(), kMostContent);
+  if (!unpacked) throw InputError(file, "checksum", "the packed content is damaged or cut short");
+  const std::vector<std::byte> content = interleaved(*unpacked);
+  if (sha256(content) != weights.sha256) {
+    throw InputError(file, "checksum", "expected SHA-256 " + weights.sha256 + ", found " + sha256(content));
   }
+  Reader reader(file, content);
   weights.decoding.temperature = reader.value<double>();
   weights.decoding.gain = reader.value<double>();
   weights.network = ColorizerNet(Normalisation::kFolded);

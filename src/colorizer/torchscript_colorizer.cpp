@@ -25,10 +25,10 @@ std::string shape_text(const Tensor& tensor) {
   return text + "]";
 }
 
-class TorchScriptColorizer final : public Colorizer {
+class TorchScriptColorizer final : public NetworkColorizer {
  public:
   TorchScriptColorizer(const fs::path& file, const std::string& shown)
-      : name_("torchscript:" + shown), contract_(contract_beside(file)) {
+      : NetworkColorizer("torchscript:" + shown, contract_beside(file)) {
     try {
       module_ = torch::jit::load(file.string(), torch::kCPU);
       module_.eval();
@@ -38,15 +38,8 @@ class TorchScriptColorizer final : public Colorizer {
     }
   }
 
-  ChromaBatch colorize(const LightnessBatch& patches) override {
-    const Planes input = network_input(contract_, patches);
-    return chroma_of(contract_, run(input), input, patches, name_);
-  }
-
-  [[nodiscard]] std::string name() const override { return name_; }
-
  private:
-  Planes run(const Planes& input) {
+  Planes run(const Planes& input) override {
     const torch::NoGradGuard no_grad;
     const Tensor question = torch::from_blob(const_cast<float*>(input.values.data()),
                                              {input.batch, input.channels, input.height, input.width}, torch::kFloat32);
@@ -70,8 +63,6 @@ class TorchScriptColorizer final : public Colorizer {
             {values, values + answer.numel()}};
   }
 
-  std::string name_;
-  NetworkContract contract_;
   torch::jit::Module module_;
 };
 

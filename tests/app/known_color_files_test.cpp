@@ -5,7 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <numeric>
+#include <opencv2/imgcodecs.hpp>
 
 #include "src/base/error.h"
 #include "src/evaluate/contact_sheet.h"
@@ -70,6 +71,25 @@ TEST_F(KnownColorFiles, KeyFramesComeFirstThenHints) {
   EXPECT_EQ(known[2].is_known[0], 0);
   EXPECT_LT(known[2].ab[5 * 20 + 5].a, -50) << "green";
   EXPECT_EQ(known[3].is_known[19], 1) << "the corner";
+}
+
+TEST_F(KnownColorFiles, OfAHintPictureOnlyTheStrokesCount) {
+  cv::Mat4b strokes(20, 40, cv::Vec4b(0, 0, 0, 0));
+  strokes.at<cv::Vec4b>(6, 31) = {30, 30, 200, 255};  // B G R A
+  strokes.at<cv::Vec4b>(7, 31) = {30, 30, 200, 60};   // too faint
+  cv::imwrite(at("strokes.png"), strokes);
+  ColorizerConfig config;
+  config.hint_images = "a=" + at("strokes.png");
+  const std::vector<KnownColors> known = load_known_colors(capture_, config);
+  ASSERT_EQ(known.size(), 1u);
+  EXPECT_EQ(known[0].kind, KnownColorKind::kStrokes);
+  EXPECT_EQ(std::accumulate(known[0].is_known.begin(), known[0].is_known.end(), 0), 1);
+  EXPECT_EQ(known[0].is_known[6 * 40 + 31], 1);
+  EXPECT_GT(known[0].ab[6 * 40 + 31].a, 40) << "red";
+
+  cv::imwrite(at("empty.png"), cv::Mat4b(20, 40, cv::Vec4b(0, 0, 0, 0)));
+  config.hint_images = "a=" + at("empty.png");
+  EXPECT_THAT(refusal<InputError>(config), HasSubstr("nothing is painted"));
 }
 
 TEST_F(KnownColorFiles, BadEntriesAreRefusedByName) {

@@ -70,6 +70,22 @@ constexpr const char* kGoodAnswer = R"(
     put(0, (B, 2, H, W), out)
 )";
 
+TEST_F(ExecColorizer, APromptReachesTheProgramAsOneWordWhateverIsInIt) {
+  const std::string prompt = R"(it's a "red" $HOME; `fox`)";
+  write_file(folder_ / "wanted.txt", prompt);
+  ColorizerOptions options;
+  options.spec = command(R"(
+    same = sys.argv[1] == open(sys.argv[2]).read() and len(sys.argv) == 3
+    put(0, (B, 2, H, W), [42.0 if same else -42.0] * (2 * B * H * W))
+)") + " {prompt} " +
+                 (folder_ / "wanted.txt").string();
+  options.prompt = prompt;
+  EXPECT_EQ(make_colorizer(options)->colorize(some_question()).ab[0], 42);
+
+  options.spec = command(kGoodAnswer);
+  EXPECT_THAT(message_of<UsageError>([&] { (void)make_colorizer(options); }), HasSubstr("--prompt"));
+}
+
 TEST_F(ExecColorizer, SpeaksTheProtocolForManyQuestions) {
   const auto colorizer = test::colorizer_of(command(kGoodAnswer));
   for (const auto& question : {some_question(2, 6, 5), some_question(1, 3, 9), some_question(4, 128, 128)}) {

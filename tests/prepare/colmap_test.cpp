@@ -21,6 +21,8 @@ namespace fs = std::filesystem;
 
 #define CNERF_REQUIRE_COLMAP() \
   if (!find_program("colmap")) GTEST_SKIP() << "needs colmap on $PATH"
+#define CNERF_REQUIRE_PATIENCE() \
+  if (std::getenv("CNERF_LONG_TESTS") == nullptr) GTEST_SKIP() << "takes many minutes; set CNERF_LONG_TESTS=1"
 
 /// The first `most` images of a capture in grey, without their poses.
 void write_grey_copies(const fs::path& from, const fs::path& to, double scale, std::size_t most = 1000) {
@@ -68,7 +70,7 @@ TEST(Colmap, FindsThePosesOfAFewSmallViews) {
 }
 
 TEST(Colmap, FindsThePosesOfFox) {
-  if (std::getenv("CNERF_LONG_TESTS") == nullptr) GTEST_SKIP() << "takes many minutes; set CNERF_LONG_TESTS=1";
+  CNERF_REQUIRE_PATIENCE();
   CNERF_REQUIRE_COLMAP();
   CNERF_REQUIRE_DATA(fox, "scenes/fox");
   const test::TempDir folder;
@@ -83,7 +85,7 @@ TEST(Colmap, FindsThePosesOfFox) {
 }
 
 TEST(Colmap, FindsThePosesOfFlower) {
-  if (std::getenv("CNERF_LONG_TESTS") == nullptr) GTEST_SKIP() << "takes many minutes; set CNERF_LONG_TESTS=1";
+  CNERF_REQUIRE_PATIENCE();
   CNERF_REQUIRE_COLMAP();
   CNERF_REQUIRE_DATA(flower, "scenes/flower");
   const test::TempDir folder;
@@ -111,7 +113,7 @@ TEST(Colmap, PhotographsWithoutOverlapAreRefusedWithAdvice) {
     EXPECT_NE(std::string(error.what()).find("two thirds"), std::string::npos) << error.what();
   }
   EXPECT_FALSE(fs::exists(folder / "capture/transforms.json"));
-  EXPECT_TRUE(fs::exists(folder / "capture/work/colmap.log"));
+  EXPECT_TRUE(fs::exists(folder / "capture" / "work" / "colmap.log"));
 }
 
 /// Needs no COLMAP: what is said where there is none.
