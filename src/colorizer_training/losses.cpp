@@ -19,6 +19,11 @@ constexpr double kLabelSmoothing = 0.1;
 constexpr float kExcluded = -1e9f;
 constexpr double kPriorSmoothing = 5;  // ab units, as the soft labels
 
+/// [B, 313, h, w] -> [B h w, 313].
+Tensor log_probability_rows(const Tensor& logits) {
+  return torch::log_softmax(logits.permute({0, 2, 3, 1}).reshape({-1, kAbBinCount}).to(torch::kFloat32), 1);
+}
+
 }  // namespace
 
 SoftLabelTable::SoftLabelTable(torch::Device device) {
@@ -60,14 +65,19 @@ Tensor measure_prior(const std::vector<Tensor>& ab_samples, const SoftLabelTable
 
 ColorLoss color_loss(const Tensor& logits, const Tensor& ab, const SoftLabelTable& table, const Tensor& class_weights) {
   const auto targets = table.look_up(ab);
-  const Tensor rows = logits.permute({0, 2, 3, 1}).reshape({-1, kAbBinCount}).to(torch::kFloat32);
-  const Tensor log_probability = torch::log_softmax(rows, 1);
+  const Tensor log_probability = log_probability_rows(logits);
   const Tensor cross_entropy = -(log_probability.gather(1, targets.bin) * targets.weight).sum(1);
   const Tensor weight = class_weights.index_select(0, targets.bin.select(1, 0));
   const Tensor expected = torch::matmul(log_probability.exp(), table.centres());  // [P, 2]
   const Tensor truth = ab.permute({0, 2, 3, 1}).reshape({-1, 2});
   const Tensor regression = 2 * torch::smooth_l1_loss(expected, truth, at::Reduction::Mean, kRegressionBeta);
   return {(cross_entropy * weight).mean(), regression};
+}
+
+Tensor distillation_loss(const Tensor& logits, const Tensor& probability, const Tensor& class_weights) {
+  const Tensor cross_entropy = -(probability * log_probability_rows(logits)).sum(1);
+  const Tensor weight = 1 / torch::matmul(probability, 1 / class_weights);
+  return (cross_entropy * weight).mean();
 }
 
 AuxiliaryHeadsImpl::AuxiliaryHeadsImpl(std::int64_t classes, std::int64_t feature_channels) {

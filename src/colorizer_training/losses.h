@@ -39,6 +39,13 @@ struct ColorLoss {
 [[nodiscard]] ColorLoss color_loss(const torch::Tensor& logits, const torch::Tensor& ab, const SoftLabelTable& table,
                                    const torch::Tensor& class_weights);
 
+/// `color_loss`'s classification with the truth drawn from a known distribution instead of seen: what the rebalanced loss
+/// is on average over pictures of one lightness, if `probability` is the rebalanced distribution of their colours. A
+/// pixel then weighs the sum over classes of prior probability times class weight, which is 1 / sum(probability / weight).
+/// @param probability  [B h w, 313] row by row, of an ensemble trained with the same class weights (Hinton et al. 2015).
+[[nodiscard]] torch::Tensor distillation_loss(const torch::Tensor& logits, const torch::Tensor& probability,
+                                              const torch::Tensor& class_weights);
+
 /// Heads that only training has: the class of the picture, and a frozen classifier's features of its colours.
 class AuxiliaryHeadsImpl : public torch::nn::Module {
  public:

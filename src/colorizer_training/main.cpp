@@ -25,6 +25,7 @@ struct Options {
   std::vector<fs::path> evaluation;  ///< tars that are only judged on
   fs::path teacher, output = "colorizer-training", evaluate;
   std::vector<fs::path> average;  ///< weights of one run to average
+  std::vector<fs::path> distil;   ///< weights of other runs to learn from
   std::string device = "auto";
   bool resume = false, photo_labels = true;
   double minutes = 0;  ///< training time; 0 = as many steps as asked for
@@ -45,6 +46,7 @@ void add_options(CLI::App& app, Options& o) {
   app.add_option("--tile", o.sources.tile_side, "side of a mosaic's tiles, pixels")->check(CLI::Range(8, 1024));
   app.add_flag("--balance-sets", o.sources.balance_sets, "draw large photo sets less often, as the root of their size");
   app.add_option("--evaluation", o.evaluation, "tars or folders that are never trained on, only judged");
+  app.add_option("--distil", o.distil, "latest.weights of other runs: learn their mean answer besides the truth");
   app.add_option("--teacher", o.teacher, "LPIPS SqueezeNet weights: predict a classifier's features of the colours");
   app.add_option("-o,--output", o.output, "folder for checkpoint, pictures, scores and weights");
   app.add_option("--evaluate", o.evaluate, "only write the score table of these weights");
@@ -76,6 +78,8 @@ void add_options(CLI::App& app, Options& o) {
   app.add_option("--regression-weight", t.regression_weight, "of the smooth L1 on the expected ab");
   app.add_option("--label-weight", t.label_weight, "of the auxiliary class loss");
   app.add_option("--feature-weight", t.feature_weight, "of the auxiliary feature loss");
+  app.add_option("--distillation-share", t.distillation_share, "of the classification loss, with --distil")
+      ->check(CLI::Range(0.0, 1.0));
   app.add_option("--average-decay", t.average_decay, "of the averaged weights, a step");
   app.add_option("--cutmix", t.augment.cutmix, "share of batches");
   app.add_option("--seed", t.seed, "of weights and batches");
@@ -215,7 +219,7 @@ void train(const Options& o, torch::Device device) {
               images.classes.names.size());
   std::unique_ptr<FeatureTeacher> teacher;
   if (!o.teacher.empty()) teacher = std::make_unique<FeatureTeacher>(o.teacher, device);
-  ColorizerTrainer trainer(images, std::move(teacher), o.training, device);
+  ColorizerTrainer trainer(images, std::move(teacher), Ensemble(o.distil, device), o.training, device);
   std::printf("%lld parameters\n", static_cast<long long>(parameter_count(*trainer.averaged())));
   if (o.resume) trainer.load(o.output / "checkpoint.pt");
   run_steps(trainer, images, o, device);

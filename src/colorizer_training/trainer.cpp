@@ -22,6 +22,7 @@ namespace {
 
 constexpr int kPriorBatches = 100, kStatisticsBatches = 60;
 constexpr std::uint64_t kCropStream = 0x63726f70;     // the size of each step's crops
+constexpr std::uint64_t kEnsembleStream = 0x656e73;   // the members that each step asks
 constexpr std::uint64_t kPriorStream = 0x7072696f72;  // batches that only measure
 
 /// bf16 for matrix products and convolutions on CUDA while it lives; weights and losses stay f32.
@@ -63,12 +64,13 @@ AuxiliaryHeads make_heads(const ImageSet& images, bool teacher, torch::Device de
 
 }  // namespace
 
-ColorizerTrainer::ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher,
+ColorizerTrainer::ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher, Ensemble ensemble,
                                    const TrainerOptions& options, torch::Device device)
     : options_(options),
       device_(device),
       images_(images),
       teacher_(std::move(teacher)),
+      ensemble_(std::move(ensemble)),
       photos_(images.photos, device),
       tiles_(images.tiles, device),
       table_(device),
@@ -123,10 +125,14 @@ StepLosses ColorizerTrainer::step() {
   // Also seeds the generators that dropout draws from.
   const Batch batch = batch_of(options_.seed, step_, options_.tile_share);
   ColorizerFeatures features;
-  Tensor labels, mixed_labels, predicted, teacher;
+  Tensor labels, predicted, teacher, ensemble;
   {
     const MixedPrecision mixed(device_);
     features = network_->features(batch.lightness);
+    if (!ensemble_.empty()) {
+      SequentialRng rng(options_.seed ^ kEnsembleStream, std::uint64_t(step_));
+      ensemble = ensemble_.probability(batch.lightness, rng);
+    }
     labels = heads_->classify(features.global);
     if (teacher_) {
       predicted = heads_->predict_features(features.semantic);
@@ -137,13 +143,18 @@ StepLosses ColorizerTrainer::step() {
   const Tensor label = (1 - batch.mixed_share) * label_loss_(labels, batch.label) +
                        batch.mixed_share * label_loss_(labels, batch.mixed_label);
   const Tensor feature = teacher_ ? feature_loss(predicted, teacher) : torch::zeros({}, batch.ab.options());
-  const Tensor total = color.classification + options_.regression_weight * color.regression +
+  Tensor classification = color.classification;
+  if (ensemble.defined()) {
+    classification = classification.lerp(distillation_loss(features.logits, ensemble, class_weights_),
+                                         options_.distillation_share);
+  }
+  const Tensor total = classification + options_.regression_weight * color.regression +
                        options_.label_weight * label + options_.feature_weight * feature;
   total.backward();
   optimizer_.step(learning_rate(), step_ + 1);
   average_weights();
   ++step_;
-  return {color.classification.detach(), color.regression.detach(), label.detach(), feature.detach()};
+  return {classification.detach(), color.regression.detach(), label.detach(), feature.detach()};
 }
 
 void ColorizerTrainer::measure_statistics() {

@@ -11,6 +11,7 @@
 
 #include "src/colorizer/network.h"
 #include "src/colorizer_training/batch.h"
+#include "src/colorizer_training/ensemble.h"
 #include "src/colorizer_training/feature_teacher.h"
 #include "src/colorizer_training/flat_parameters.h"
 #include "src/colorizer_training/losses.h"
@@ -29,6 +30,7 @@ struct TrainerOptions {
   double regression_weight = 0.01;
   double label_weight = 1.0;
   double feature_weight = 1.0;   ///< of the teacher's features; without a teacher file there is none
+  double distillation_share = 0.7;  ///< of the classification loss, where there is an ensemble to learn from
   double average_decay = 0.999;  ///< of the weights that are kept, a step
   int epoch_steps = 2000;        ///< between checkpoints, scores and pictures
   std::uint64_t seed = 1;
@@ -46,9 +48,9 @@ struct StepLosses {
 /// checkpoint repeats the uninterrupted one bit for bit on the CPU.
 class ColorizerTrainer {
  public:
-  /// @param images  must outlive the trainer.  @param teacher  may be null.
-  ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher, const TrainerOptions& options,
-                   torch::Device device);
+  /// @param images  must outlive the trainer.  @param teacher  may be null.  @param ensemble  may be empty.
+  ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher, Ensemble ensemble,
+                   const TrainerOptions& options, torch::Device device);
 
   StepLosses step();
   [[nodiscard]] std::int64_t steps_done() const { return step_; }
@@ -80,6 +82,7 @@ class ColorizerTrainer {
   torch::Device device_;
   const ImageSet& images_;
   std::unique_ptr<FeatureTeacher> teacher_;
+  Ensemble ensemble_;
   ResidentImages photos_, tiles_;
   SoftLabelTable table_;
   LabelLoss label_loss_;

@@ -5,6 +5,8 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/color/ab_bins.h"
+#include "src/colorizer/network_weights.h"
 #include "src/colorizer_training/score.h"
 #include "src/colorizer_training/tar_reader.h"
 #include "src/colorizer_training/trainer.h"
@@ -54,7 +56,7 @@ TrainerOptions tiny_options() {
 
 TEST(ColorizerTrainer, LearnsATinySet) {
   const ImageSet set = tiny_set();
-  ColorizerTrainer trainer(set, nullptr, tiny_options(), torch::kCPU);
+  ColorizerTrainer trainer(set, nullptr, {}, tiny_options(), torch::kCPU);
   const auto mean_loss = [&](int steps) {
     double sum = 0;
     for (int i = 0; i < steps; ++i) sum += trainer.step().classification.item<double>();
@@ -68,12 +70,12 @@ TEST(ColorizerTrainer, LearnsATinySet) {
 TEST(ColorizerTrainer, ContinuesBitForBit) {
   const test::TempDir folder;
   const ImageSet set = tiny_set();
-  ColorizerTrainer straight(set, nullptr, tiny_options(), torch::kCPU);
+  ColorizerTrainer straight(set, nullptr, {}, tiny_options(), torch::kCPU);
   for (int i = 0; i < 3; ++i) straight.step();
   straight.save(folder / "checkpoint.pt");
   const double expected = (straight.step(), straight.step()).classification.item<double>();
 
-  ColorizerTrainer resumed(set, nullptr, tiny_options(), torch::kCPU);
+  ColorizerTrainer resumed(set, nullptr, {}, tiny_options(), torch::kCPU);
   resumed.load(folder / "checkpoint.pt");
   EXPECT_EQ(resumed.steps_done(), 3);
   EXPECT_EQ((resumed.step(), resumed.step()).classification.item<double>(), expected);
@@ -88,7 +90,7 @@ TEST(ColorizerTrainer, MeasuresStatisticsWhereTilesCameAlone) {
   for (const double tile_share : {0.0, 0.5}) {
     TrainerOptions options = tiny_options();
     options.tile_share = tile_share;
-    ColorizerTrainer trainer(set, nullptr, options, torch::kCPU);
+    ColorizerTrainer trainer(set, nullptr, {}, options, torch::kCPU);
     {
       const torch::AutoGradMode with_gradients(true);
       for (int i = 0; i < 4; ++i) trainer.step();
@@ -102,10 +104,58 @@ TEST(ColorizerTrainer, MeasuresStatisticsWhereTilesCameAlone) {
   }
 }
 
+TEST(DistillationLoss, IsTheRebalancedLossAveragedOverTheTruth) {
+  torch::manual_seed(3);
+  const SoftLabelTable table(torch::kCPU);
+  const torch::Tensor logits = torch::randn({1, kAbBinCount, 1, 1}), weights = 0.2 + 3 * torch::rand({kAbBinCount});
+  // Half of the pictures show one colour here, half another.
+  const std::vector<torch::Tensor> truths = {torch::tensor({20.0f, 31.0f}).view({1, 2, 1, 1}),
+                                             torch::tensor({-42.0f, 13.0f}).view({1, 2, 1, 1})};
+  torch::Tensor average = torch::zeros({}), rebalanced = torch::zeros({kAbBinCount});
+  for (const torch::Tensor& truth : truths) {
+    average += 0.5 * color_loss(logits, truth, table, weights).classification;
+    const auto target = table.look_up(truth);
+    const torch::Tensor weight = weights.index_select(0, target.bin.select(1, 0));
+    rebalanced.index_add_(0, target.bin[0], 0.5 * weight * target.weight[0]);
+  }
+  const torch::Tensor probability = (rebalanced / rebalanced.sum()).view({1, -1});
+  const torch::Tensor flat = torch::ones({kAbBinCount});
+  const torch::Tensor unweighted = -(probability * torch::log_softmax(logits.view({1, -1}), 1)).sum();
+  EXPECT_NEAR(distillation_loss(logits, probability, flat).item<double>(), unweighted.item<double>(), 1e-5);
+  const double emphasis = 1 / (probability.flatten() / weights).sum().item<double>();
+  EXPECT_NEAR(distillation_loss(logits, probability, weights).item<double>(), emphasis * unweighted.item<double>(),
+              1e-4);
+  EXPECT_NEAR(average.item<double>(), (rebalanced.sum() * unweighted).item<double>(), 1e-4);
+}
+
+TEST(ColorizerTrainer, LearnsFromAnEnsembleWhatTheTruthDoesNotSay) {
+  const test::TempDir folder;
+  const ImageSet set = tiny_set();
+  torch::manual_seed(4);
+  ColorizerNet always_green(Normalisation::kFolded);
+  {
+    const torch::NoGradGuard no_grad;
+    torch::Tensor offsets = torch::zeros({kAbBinCount});
+    offsets[nearest_bin({-50, 40})] = 30;
+    always_green->shift_logits(offsets);
+  }
+  save_colorizer_weights(folder / "green.weights", always_green, {});
+  TrainerOptions options = tiny_options();
+  options.distillation_share = 1;
+  options.regression_weight = 0;
+  ColorizerTrainer trainer(set, nullptr, Ensemble({folder / "green.weights"}, torch::kCPU), options, torch::kCPU);
+  const double before = trainer.step().classification.item<double>();
+  double after = before;
+  for (int i = 1; i < options.steps; ++i) after = trainer.step().classification.item<double>();
+  // The pictures themselves are red and blue: without the ensemble the answer of one green would stay wrong.
+  EXPECT_LT(after, 0.5 * before);
+  EXPECT_THROW(Ensemble({folder / "none.weights"}, torch::kCPU), MissingInputError);
+}
+
 TEST(ColorizerTrainer, RefusesOtherCheckpoints) {
   const test::TempDir folder;
   const ImageSet set = tiny_set();
-  ColorizerTrainer trainer(set, nullptr, tiny_options(), torch::kCPU);
+  ColorizerTrainer trainer(set, nullptr, {}, tiny_options(), torch::kCPU);
   EXPECT_THROW(trainer.load(folder / "none.pt"), MissingInputError);
   write_file(folder / "short.pt", std::string_view("not a checkpoint"));
   EXPECT_THROW(trainer.load(folder / "short.pt"), SnapshotError);
