@@ -22,8 +22,8 @@ if(CNERF_WARNINGS_AS_ERRORS)
 endif()
 if(CNERF_SANITIZE)
   target_compile_options(cnerf_options INTERFACE
-                         $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=address,undefined;-fno-omit-frame-pointer>)
-  target_link_options(cnerf_options INTERFACE -fsanitize=address,undefined)
+                         $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=${CNERF_SANITIZE};-fno-omit-frame-pointer>)
+  target_link_options(cnerf_options INTERFACE -fsanitize=${CNERF_SANITIZE})
 endif()
 
 if(CNERF_CUDA)

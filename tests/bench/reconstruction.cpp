@@ -1,7 +1,9 @@
 // Quality over time of stage 1 on a real capture: trains with the given options and prints the held-out luminance PSNR
-// (decision 1 of docs/decisions.md) at growing training times. Evaluation does not count as training time.
+// (decision 1 of docs/decisions.md) at growing training times. Evaluation does not count as training time. With `samples`
+// the marks are millions of trained samples instead, which do not depend on what else the machine does.
 //
 //   reconstruction CAPTURE [downscale=1] [holdout=8] [seconds=60] [option=value ...]
+//   reconstruction CAPTURE [downscale=1] [holdout=8] samples=70,140,340 [option=value ...]
 //
 // Options are stage 1's by their short names, e.g. grid.log2_rows=16 steps_per_box=512 samples_per_step=65536.
 
@@ -11,7 +13,9 @@
 #include <cstdio>
 #include <ctime>
 #include <map>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
@@ -78,21 +82,30 @@ double held_out_psnr(const cnerf::Capture& capture, const cnerf::LuminanceModel&
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::puts("reconstruction CAPTURE [downscale=N] [holdout=N] [seconds=S] [option=value ...]");
+    std::puts("reconstruction CAPTURE [downscale=N] [holdout=N] [seconds=S | samples=M,...] [option=value ...]");
     return 64;
   }
   std::map<std::string, double> own = {{"downscale", 1},  {"holdout", 8}, {"seconds", 60},
                                        {"eval_every", 1}, {"verbose", 0}, {"first", 0.25}};
+  std::vector<double> marks;  // of the training's length: million samples if given, else seconds
   nlohmann::json json = cnerf::options_to_json(cnerf::Stage1Options{});
   for (int i = 2; i < argc; ++i) {
     const std::string argument = argv[i];
     const std::size_t equals = argument.find('=');
     const std::string key = argument.substr(0, equals), value = argument.substr(equals + 1);
-    if (own.count(key) > 0) {
+    if (key == "samples") {
+      std::stringstream list(value);
+      for (std::string mark; std::getline(list, mark, ',');) marks.push_back(std::stod(mark));
+    } else if (own.count(key) > 0) {
       own[key] = std::stod(value);
     } else {
       set_option(json, key, value);
     }
+  }
+  const bool by_samples = !marks.empty();
+  if (!by_samples) {
+    for (double mark = own["seconds"] * own["first"]; mark < own["seconds"]; mark *= 2) marks.push_back(mark);
+    marks.push_back(own["seconds"]);
   }
   const auto options = cnerf::options_from_json<cnerf::Stage1Options>(json);
   cnerf::CaptureOptions capture_options;
@@ -105,11 +118,12 @@ int main(int argc, char** argv) {
               views[0].image->height, model.frame.cascades, 1 / model.frame.unit_per_world);
 
   const cnerf::RenderEffort all = {1e-4f, 1.0f}, quick = {1e-3f, 0.995f};  // what is left out is measured at the end
-  double trained = 0, marched = 0, rays = 0, elapsed = 0, processor = 0, next_report = own["seconds"] * own["first"];
-  while (elapsed < own["seconds"]) {
+  double trained = 0, marched = 0, rays = 0, elapsed = 0, processor = 0;
+  const auto length = [&] { return by_samples ? trained / 1e6 : elapsed; };
+  for (std::size_t reached = 0; reached < marks.size();) {
     const Clock::time_point start = Clock::now();
     const double processor_start = processor_seconds();
-    const double fraction = elapsed / own["seconds"];
+    const double fraction = length() / marks.back();
     const double decay = std::clamp(2.0 * fraction - 1.0, 0.0, 1.0);
     const auto rate =
         float(options.learning_rate * std::pow(options.final_learning_rate / options.learning_rate, decay));
@@ -124,8 +138,8 @@ int main(int argc, char** argv) {
                   model.engine->step_count(), elapsed, step.rays, step.marched_samples, step.trained_samples, step.loss,
                   model.engine->occupancy().occupied_share());
     }
-    if (elapsed < next_report && elapsed < own["seconds"]) continue;
-    next_report *= 2;
+    if (length() < marks[reached]) continue;
+    ++reached;
     const Clock::time_point eval_start = Clock::now();
     const double psnr = held_out_psnr(capture, model, int(own["eval_every"]), quick);
     std::printf(

@@ -1,5 +1,4 @@
-// LibTorch's autograd as the oracle: the hash grid out of index_select, the nets out of linear layers, compositing out
-// of cumulative products. No line of it is shared with the engine.
+// LibTorch's autograd as the oracle: the field as in tests/support/torch_oracle.h, compositing out of cumulative sums.
 
 #include <gtest/gtest.h>
 #include <torch/torch.h>
@@ -10,47 +9,11 @@
 #include "src/base/error.h"
 #include "src/engine/cpu/luminance_engine_cpu.h"
 #include "tests/support/finite_difference.h"
+#include "tests/support/torch_oracle.h"
 #include "tests/support/toy_capture.h"
 
 namespace cnerf {
 namespace {
-
-/// Plain LibTorch trilinear lookup.  @param positions [n, 3]  @return [n, 4 L]
-torch::Tensor encode_by_index_select(const std::vector<GridLevel>& levels, const torch::Tensor& table,
-                                     const torch::Tensor& positions) {
-  std::vector<torch::Tensor> encoded;
-  for (const GridLevel& level : levels) {
-    const torch::Tensor scaled = positions * double(level.cells);
-    const torch::Tensor corner = scaled.floor();
-    const torch::Tensor fraction = scaled - corner;
-    const torch::Tensor base = corner.to(torch::kInt64);
-    torch::Tensor sum = torch::zeros({positions.size(0), 4}, table.options());
-    for (int c = 0; c < 8; ++c) {
-      torch::Tensor weight = torch::ones({positions.size(0)}, positions.options());
-      std::vector<torch::Tensor> point;
-      for (int axis = 0; axis < 3; ++axis) {
-        const bool upper = ((c >> axis) & 1) != 0;
-        const torch::Tensor f = fraction.select(1, axis);
-        weight = weight * (upper ? f : 1 - f);
-        point.push_back(base.select(1, axis) + (upper ? 1 : 0));
-      }
-      torch::Tensor row;
-      if (level.hashed) {
-        const torch::Tensor mask32 = torch::full_like(point[0], std::int64_t(0xffffffff));
-        row = torch::bitwise_xor(
-                  torch::bitwise_xor(point[0], torch::bitwise_and(point[1] * std::int64_t(2654435761), mask32)),
-                  torch::bitwise_and(point[2] * std::int64_t(805459861), mask32)) %
-              std::int64_t(level.rows);
-      } else {
-        const std::int64_t stride = std::int64_t(level.cells) + 1;
-        row = point[0] + stride * (point[1] + stride * point[2]);
-      }
-      sum = sum + weight.unsqueeze(1) * table.index_select(0, row + std::int64_t(level.first_row));
-    }
-    encoded.push_back(sum);
-  }
-  return torch::cat(encoded, 1);
-}
 
 HashGridOptions small_grid() {
   return {.levels = 4, .log2_rows = 9, .coarsest_resolution = 3, .finest_resolution = 40};
@@ -69,7 +32,7 @@ TEST(TorchOracle, HashGridModuleForwardAndBackward) {
   (encoded * upstream).sum().backward();
 
   const torch::Tensor table = grid->table.detach().to(torch::kFloat64).requires_grad_(true);
-  const torch::Tensor expected = encode_by_index_select(grid->levels(), table, positions.to(torch::kFloat64));
+  const torch::Tensor expected = test::encode_by_index_select(grid->levels(), table, positions.to(torch::kFloat64));
   (expected * upstream.to(torch::kFloat64)).sum().backward();
   EXPECT_LT((encoded - expected).abs().max().item<double>(), 1e-4);  // float positions at 40 cells: 40 * 2^-24 * 8
   EXPECT_LT(((grid->table.grad() - table.grad()).norm() / table.grad().norm()).item<double>(), 1e-4);
@@ -82,22 +45,6 @@ TEST(TorchOracle, HashGridModuleRefusesWhatItCannotTake) {
   EXPECT_THROW(grid->forward(torch::rand({5, 3}, torch::kFloat64)), ContractError);
   EXPECT_THROW(grid->forward(torch::rand({5, 3}) + 1), ContractError);
   EXPECT_EQ(grid->forward(torch::rand({0, 3})).size(0), 0);
-}
-
-torch::Tensor lightness(const torch::Tensor& y) {
-  const double epsilon = 216.0 / 24389.0, kappa = 24389.0 / 27.0;
-  return torch::where(y > epsilon, 116 * y.clamp_min(epsilon).pow(1.0 / 3.0) - 16, kappa * y);
-}
-
-torch::Tensor luminance_of_lightness(const torch::Tensor& lightness) {
-  const torch::Tensor cube = ((lightness + 16) / 116).pow(3);
-  return torch::where(lightness > 8, cube, lightness * 27.0 / 24389.0);
-}
-
-torch::Tensor harmonics(Vec3d d) {
-  std::vector<double> values(kSphericalHarmonics);
-  spherical_harmonics(d.x, d.y, d.z, [&](int i, double value) { values[std::size_t(i)] = value; });
-  return torch::tensor(values, torch::kFloat64);
 }
 
 TEST(TorchOracle, GradientOfAWholeStep) {
@@ -123,23 +70,8 @@ TEST(TorchOracle, GradientOfAWholeStep) {
   const auto* table_values = reinterpret_cast<const float*>(state.front().bytes.data());
   const std::vector<float> table_copy(table_values, table_values + state.front().bytes.size() / sizeof(float));
   const torch::Tensor table = parameter(table_copy, std::int64_t(table_copy.size() / 4));
-  std::vector<torch::Tensor> density_layers, luminance_layers;
-  const auto split = [&](const MlpCpu& net, std::vector<torch::Tensor>& layers) {
-    for (int l = 0; l < net.layout().layers(); ++l) {
-      const std::vector<float> w(net.weights().begin() + long(net.layout().weight_offset(l)),
-                                 net.weights().begin() + long(net.layout().weight_offset(l + 1)));
-      layers.push_back(parameter(w, net.layout().widths[std::size_t(l) + 1]));
-    }
-  };
-  split(engine.field().density_net(), density_layers);
-  split(engine.field().luminance_net(), luminance_layers);
-  const auto run = [](const std::vector<torch::Tensor>& layers, torch::Tensor x) {
-    for (std::size_t l = 0; l < layers.size(); ++l) {
-      x = x.matmul(layers[l].t());
-      if (l + 1 < layers.size()) x = torch::relu(x);
-    }
-    return x;
-  };
+  const std::vector<torch::Tensor> density_layers = test::layers_of(engine.field().density_net(), torch::kFloat64);
+  const std::vector<torch::Tensor> luminance_layers = test::layers_of(engine.field().luminance_net(), torch::kFloat64);
 
   torch::Tensor loss = torch::zeros({}, f64);
   for (std::size_t r = 0; r < analytic.report.rays; ++r) {
@@ -155,19 +87,18 @@ TEST(TorchOracle, GradientOfAWholeStep) {
     if (!dt.empty()) {
       const torch::Tensor x = torch::tensor(positions, f64).view({-1, 3});
       const torch::Tensor features =
-          run(density_layers, encode_by_index_select(engine.field().grid().levels(), table, x));
+          test::run_layers(density_layers, test::encode_by_index_select(engine.field().grid().levels(), table, x));
       const torch::Tensor tau = features.select(1, 0).clamp(-15, 15).exp() * torch::tensor(dt, f64);
-      const torch::Tensor direction = harmonics(ray.ray.direction.cast<double>()).expand({x.size(0), -1});
-      const torch::Tensor raw = run(luminance_layers, torch::cat({features, direction}, 1)).select(1, 0);
-      const double brightest = 116 * std::cbrt(1.05) - 16;
-      const torch::Tensor y = luminance_of_lightness(brightest * torch::sigmoid(raw));
+      const torch::Tensor direction = test::harmonics(ray.ray.direction.cast<double>()).expand({x.size(0), -1});
+      const torch::Tensor raw = test::run_layers(luminance_layers, torch::cat({features, direction}, 1)).select(1, 0);
+      const torch::Tensor y = test::luminance_activation(raw, options.max_luminance);
       const torch::Tensor behind = torch::exp(-tau.cumsum(0));
       const torch::Tensor before = torch::cat({torch::ones({1}, f64), behind.slice(0, 0, -1)});
       seen = ((before - behind) * y).sum();
       end = behind.select(0, -1);
     }
     const torch::Tensor wanted = torch::full({}, ray.target + (1.0 - ray.coverage) * ray.background, f64);
-    loss = loss + ((lightness(seen + end * double(ray.background)) - lightness(wanted)) / 100).square();
+    loss = loss + ((test::lightness(seen + end * double(ray.background)) - test::lightness(wanted)) / 100).square();
   }
   loss = loss / double(analytic.report.rays);
   loss.backward();

@@ -1,0 +1,227 @@
+// A whole step of stage 1 (march, forward, backward, Adam) on a real capture: two threads against one, and against the
+// same mathematics out of LibTorch's operators and autograd, same configuration, same samples, in the same run.
+//
+//   step_bench CAPTURE [--downscale N] [--threads N] [options of Google Benchmark]
+//
+// LibTorch is spared the marching: it gets the samples in occupied space, finds those that light reaches, and trains on
+// them. It repeats one batch.
+
+#include <benchmark/benchmark.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+
+#include "encoding/cpu/hash_grid_kernels.h"
+#include "src/base/parallel.h"
+#include "src/capture/load_capture.h"
+#include "src/engine/cpu/luminance_engine_cpu.h"
+#include "src/train/luminance_model.h"
+#include "tests/bench/bench_support.h"
+#include "tests/support/torch_oracle.h"
+
+namespace cnerf {
+namespace {
+
+constexpr int kWarmUpSteps = 400;  // until the grid knows empty space and steps have their full size
+constexpr int kRounds = 8, kStepsARound = 6;
+constexpr float kLearningRate = 1e-2f, kTrainingTransmittance = 1e-4f;
+
+/// A field in the middle of its training.
+struct Training {
+  Training(const std::filesystem::path& folder, int downscale)
+      : capture(load_capture(folder, {.downscale = downscale, .holdout = 8})),
+        model(LuminanceModel::create(capture, Stage1Options{})),
+        views(training_views(capture, model.frame)),
+        engine(dynamic_cast<LuminanceEngineCpu&>(*model.engine)) {
+    for (int i = 0; i < kWarmUpSteps; ++i) engine.step(views, kLearningRate);
+  }
+
+  Capture capture;
+  LuminanceModel model;
+  std::vector<TrainingView> views;
+  LuminanceEngineCpu& engine;
+};
+
+/// Seconds a trained sample over a few steps.
+double engine_seconds(Training& training, int threads) {
+  set_thread_count(threads);
+  double samples = 0;
+  const double seconds = bench::best_seconds(1, [&] {
+    for (int i = 0; i < kStepsARound; ++i) {
+      samples += double(training.engine.step(training.views, kLearningRate).trained_samples);
+    }
+  });
+  set_thread_count(0);
+  return seconds / samples;
+}
+
+/// The engine's next step in LibTorch.
+class TorchStep {
+ public:
+  explicit TorchStep(Training& training) : engine_(training.engine) {
+    wanted_ = engine_.gradients(training.views);
+    march(training);
+    const std::vector<StatePiece> state = engine_.state();
+    const auto* values = reinterpret_cast<const float*>(state.front().bytes.data());
+    const auto count = std::int64_t(state.front().bytes.size() / sizeof(float));
+    table_ = torch::tensor(std::vector<float>(values, values + count)).view({-1, 4}).requires_grad_(true);
+    density_layers_ = test::layers_of(engine_.field().density_net(), torch::kFloat32);
+    luminance_layers_ = test::layers_of(engine_.field().luminance_net(), torch::kFloat32);
+    std::vector<torch::Tensor> parameters = {table_};
+    for (const auto* layers : {&density_layers_, &luminance_layers_}) {
+      parameters.insert(parameters.end(), layers->begin(), layers->end());
+    }
+    adam_ = std::make_unique<torch::optim::Adam>(
+        parameters, torch::optim::AdamOptions(kLearningRate).betas({0.9, 0.99}).eps(1e-15));
+  }
+
+  /// Loss and gradients as the engine finds them, up to float sums.
+  void verify() {
+    std::int64_t trained = 0;
+    const torch::Tensor value = loss(trained);
+    value.backward();
+    bench::require(std::abs(value.item<double>() - wanted_.report.loss) < 1e-3 * wanted_.report.loss,
+                   "LibTorch's loss differs from the engine's");
+    const torch::Tensor expected = torch::tensor(wanted_.table).view({-1, 4});
+    bench::require(((table_.grad() - expected).norm() / expected.norm()).item<double>() < 1e-2,
+                   "LibTorch's gradient differs from the engine's");
+    adam_->zero_grad();
+  }
+  /// @return  samples trained on
+  double step() {
+    std::int64_t trained = 0;
+    loss(trained).backward();
+    adam_->step();
+    adam_->zero_grad();
+    return double(trained);
+  }
+
+ private:
+  /// The rays of the next step and all samples on them in occupied space.
+  void march(const Training& training) {
+    std::vector<float> positions, dt, targets, backgrounds;
+    std::vector<std::int64_t> ray_of;
+    std::vector<torch::Tensor> directions;
+    for (std::size_t r = 0; r < wanted_.report.rays; ++r) {
+      const auto observed = engine_.observe(training.views, r);
+      RayMarcher marcher(engine_.occupancy(), engine_.options().march, observed.ray, observed.jitter);
+      for (RaySample sample; marcher.next(sample);) {
+        const Vec3f p = observed.ray.at(sample.t);
+        for (int axis = 0; axis < 3; ++axis) positions.push_back(std::clamp(p[axis], 0.0f, 1.0f));
+        dt.push_back(sample.dt);
+        ray_of.push_back(std::int64_t(r));
+      }
+      targets.push_back(observed.target + (1 - observed.coverage) * observed.background);
+      backgrounds.push_back(observed.background);
+      directions.push_back(test::harmonics(observed.ray.direction.cast<double>()).to(torch::kFloat32));
+    }
+    positions_ = torch::tensor(positions).view({-1, 3});
+    dt_ = torch::tensor(dt);
+    ray_ = torch::tensor(ray_of);
+    target_ = torch::tensor(targets);
+    background_ = torch::tensor(backgrounds);
+    directions_ = torch::stack(directions);
+  }
+
+  torch::Tensor features_at(const torch::Tensor& positions) const {
+    const auto& levels = engine_.field().grid().levels();
+    return test::run_layers(density_layers_, test::encode_by_index_select(levels, table_, positions));
+  }
+  torch::Tensor optical_depth(const torch::Tensor& features, const torch::Tensor& dt) const {
+    const double scale = std::ldexp(1.0, engine_.options().cascades - 1);
+    return features.select(1, 0).clamp(-15, 15).exp() * dt * scale;
+  }
+  struct Walk {
+    torch::Tensor of_ray;          ///< [R] f64 optical depth of whole rays
+    torch::Tensor before, behind;  ///< [N] f64 transmittance in front of and behind each sample
+  };
+  /// Rays lie behind one another: a sum over all of them, less what the rays before add up to. Doubles, for it is long.
+  Walk walk(const torch::Tensor& depth, const torch::Tensor& ray) const {
+    const torch::Tensor deep = depth.to(torch::kFloat64);
+    const torch::Tensor of_ray = torch::zeros({target_.size(0)}, torch::kFloat64).index_add(0, ray, deep);
+    const torch::Tensor sum = deep.cumsum(0) - (of_ray.cumsum(0) - of_ray).index_select(0, ray);
+    return {of_ray, torch::exp(deep - sum), torch::exp(-sum)};
+  }
+
+  /// @param[out] trained  samples in front of the point where their ray becomes opaque
+  torch::Tensor loss(std::int64_t& trained) const {
+    torch::Tensor kept;
+    {
+      const torch::NoGradGuard density_first;
+      kept = (walk(optical_depth(features_at(positions_), dt_), ray_).before >= kTrainingTransmittance).nonzero();
+      kept = kept.squeeze(1);
+    }
+    trained = kept.numel();
+    const torch::Tensor ray = ray_.index_select(0, kept);
+    const torch::Tensor features = features_at(positions_.index_select(0, kept));
+    const torch::Tensor directions = directions_.index_select(0, ray);
+    const torch::Tensor raw = test::run_layers(luminance_layers_, torch::cat({features, directions}, 1)).select(1, 0);
+    const Walk through = walk(optical_depth(features, dt_.index_select(0, kept)), ray);
+    const torch::Tensor light = (through.before - through.behind).to(torch::kFloat32) *
+                                test::luminance_activation(raw, engine_.options().max_luminance);
+    const torch::Tensor seen = torch::zeros_like(target_).index_add(0, ray, light) +
+                               torch::exp(-through.of_ray).to(torch::kFloat32) * background_;
+    return ((test::lightness(seen) - test::lightness(target_)) / 100).square().mean();
+  }
+
+  LuminanceEngineCpu& engine_;
+  LuminanceEngineCpu::Gradients wanted_;
+  torch::Tensor positions_, dt_, ray_, target_, background_, directions_, table_;
+  std::vector<torch::Tensor> density_layers_, luminance_layers_;
+  std::unique_ptr<torch::optim::Adam> adam_;
+};
+
+void report(benchmark::State& state, double seconds_a_sample, int threads) {
+  state.counters["ns_a_sample"] = 1e9 * seconds_a_sample;
+  state.counters["M_samples_s"] = 1e-6 / seconds_a_sample;
+  state.counters["threads"] = threads;
+  state.SetLabel(to_string(active_isa()));
+}
+
+/// Rounds of either kind in turn, so that what else the machine does falls on all alike; the best round counts.
+void WholeStep(benchmark::State& state, Training& training, int threads) {
+  torch::set_num_threads(threads);
+  TorchStep torch_step(training);
+  torch_step.verify();
+  for (auto _ : state) {
+    double all = 1e30, one = 1e30, torch_best = 1e30;
+    for (int i = 0; i < kRounds; ++i) {
+      all = std::min(all, engine_seconds(training, threads));
+      one = std::min(one, engine_seconds(training, 1));
+      if (i % 4 == 0) {
+        double samples = 0;
+        const double seconds = bench::best_seconds(1, [&] { samples = torch_step.step(); });
+        torch_best = std::min(torch_best, seconds / samples);
+      }
+    }
+    report(state, all, threads);
+    state.counters["one_thread_ns"] = 1e9 * one;
+    state.counters["against_one_thread"] = one / all;
+    state.counters["libtorch_ns"] = 1e9 * torch_best;
+    state.counters["against_libtorch"] = torch_best / all;
+  }
+}
+
+}  // namespace
+}  // namespace cnerf
+
+int main(int argc, char** argv) {
+  CLI::App app("A whole step of stage 1 against LibTorch's autograd.");
+  app.allow_extras();
+  std::filesystem::path capture;
+  int downscale = 2, threads = 2;
+  app.add_option("capture", capture, "folder of a capture")->required();
+  app.add_option("--downscale", downscale, "of its images");
+  app.add_option("--threads", threads, "of the engine and of LibTorch");
+  CLI11_PARSE(app, argc, argv);
+  cnerf::Training training(capture, downscale);
+  benchmark::RegisterBenchmark("WholeStep", [&](benchmark::State& state) {
+    cnerf::WholeStep(state, training, threads);
+  })->Iterations(1)->Unit(benchmark::kMillisecond);
+  int rest_count = 1;
+  std::vector<std::string> rest = app.remaining();
+  std::vector<char*> rest_arguments = {argv[0]};
+  for (std::string& argument : rest) rest_arguments.push_back(argument.data()), ++rest_count;
+  benchmark::Initialize(&rest_count, rest_arguments.data());
+  benchmark::RunSpecifiedBenchmarks();
+}
