@@ -22,7 +22,8 @@ class Ensemble {
 
   /// The distributions of one member that `rng` draws, without gradients. Over many steps they teach what the mean of
   /// all would: cross-entropy is linear in its target.
-  /// @param lightness  [B, 1, H, W] f32, L*.  @return  [P, 313] f32 of the P = B ceil(H/4) ceil(W/4) blocks, row by row.
+  /// @param lightness  [B, 1, H, W] f32, L*.
+  /// @return           [B ceil(H/4) ceil(W/4), 313] f32, block by block in rows.
   [[nodiscard]] torch::Tensor probability(const torch::Tensor& lightness, SequentialRng& rng);
 
  private:

@@ -39,10 +39,11 @@ struct ColorLoss {
 [[nodiscard]] ColorLoss color_loss(const torch::Tensor& logits, const torch::Tensor& ab, const SoftLabelTable& table,
                                    const torch::Tensor& class_weights);
 
-/// `color_loss`'s classification with the truth drawn from a known distribution instead of seen: what the rebalanced loss
-/// is on average over pictures of one lightness, if `probability` is the rebalanced distribution of their colours. A
-/// pixel then weighs the sum over classes of prior probability times class weight, which is 1 / sum(probability / weight).
-/// @param probability  [B h w, 313] row by row, of an ensemble trained with the same class weights (Hinton et al. 2015).
+/// `color_loss`'s classification with the truth drawn from a known distribution instead of seen (Hinton et al. 2015):
+/// what the rebalanced loss is on average over pictures of one lightness, if `probability` is the rebalanced
+/// distribution of their colours. A pixel then weighs the sum over classes of probability times class weight before
+/// the rebalancing, which is 1 / sum(probability / weight).
+/// @param probability  [B h w, 313] row by row, of networks trained with the same class weights.
 [[nodiscard]] torch::Tensor distillation_loss(const torch::Tensor& logits, const torch::Tensor& probability,
                                               const torch::Tensor& class_weights);
 

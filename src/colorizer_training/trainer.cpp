@@ -145,11 +145,11 @@ StepLosses ColorizerTrainer::step() {
   const Tensor feature = teacher_ ? feature_loss(predicted, teacher) : torch::zeros({}, batch.ab.options());
   Tensor classification = color.classification;
   if (ensemble.defined()) {
-    classification = classification.lerp(distillation_loss(features.logits, ensemble, class_weights_),
-                                         options_.distillation_share);
+    classification =
+        classification.lerp(distillation_loss(features.logits, ensemble, class_weights_), options_.distillation_share);
   }
-  const Tensor total = classification + options_.regression_weight * color.regression +
-                       options_.label_weight * label + options_.feature_weight * feature;
+  const Tensor total = classification + options_.regression_weight * color.regression + options_.label_weight * label +
+                       options_.feature_weight * feature;
   total.backward();
   optimizer_.step(learning_rate(), step_ + 1);
   average_weights();

@@ -29,10 +29,10 @@ struct TrainerOptions {
   double rebalancing = 0.5;  ///< lambda
   double regression_weight = 0.01;
   double label_weight = 1.0;
-  double feature_weight = 1.0;   ///< of the teacher's features; without a teacher file there is none
+  double feature_weight = 1.0;      ///< of the teacher's features; without a teacher file there is none
   double distillation_share = 0.7;  ///< of the classification loss, where there is an ensemble to learn from
-  double average_decay = 0.999;  ///< of the weights that are kept, a step
-  int epoch_steps = 2000;        ///< between checkpoints, scores and pictures
+  double average_decay = 0.999;     ///< of the weights that are kept, a step
+  int epoch_steps = 2000;           ///< between checkpoints, scores and pictures
   std::uint64_t seed = 1;
   AugmentOptions augment;
   AugmentOptions tile_augment{.patch_share = 0, .blur_sigma = 0.8};  ///< of steps with tiles alone

@@ -215,9 +215,10 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads, "of the engine and of LibTorch");
   CLI11_PARSE(app, argc, argv);
   cnerf::Training training(capture, downscale);
-  benchmark::RegisterBenchmark("WholeStep", [&](benchmark::State& state) {
-    cnerf::WholeStep(state, training, threads);
-  })->Iterations(1)->Unit(benchmark::kMillisecond);
+  benchmark::RegisterBenchmark("WholeStep",
+                               [&](benchmark::State& state) { cnerf::WholeStep(state, training, threads); })
+      ->Iterations(1)
+      ->Unit(benchmark::kMillisecond);
   int rest_count = 1;
   std::vector<std::string> rest = app.remaining();
   std::vector<char*> rest_arguments = {argv[0]};
