@@ -16,10 +16,12 @@
 namespace cnerf {
 
 struct Stage2Options {
-  int patches = 600;                        ///< accepted patches
-  int patch_size = 128;                     ///< K
-  double scale_min = 0.3, scale_max = 0.7;  ///< s: the patch's side as a share of the image's short side
-  int rays_per_patch = 4096;                ///< pixels of a patch that are trained on
+  int patches = 600;                         ///< accepted patches
+  std::string questions = "patches";         ///< what the colorizer is shown: patches drawn afresh, or each view once
+  std::string injection = "classification";  ///< a distribution over ab bins, or a photometric loss of ab
+  int patch_size = 128;                      ///< K
+  double scale_min = 0.3, scale_max = 0.7;   ///< s: the patch's side as a share of the image's short side
+  int rays_per_patch = 4096;                 ///< pixels of a patch that are trained on
   double known_share = 1;  ///< pixels of known colours trained on with a patch, as a share of rays_per_patch
   double learning_rate = 1e-2;
   double final_learning_rate = 1e-3;
@@ -36,6 +38,10 @@ struct Stage2Options {
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("patches", patches, Range{1, 1e7}, "accepted patches to train on");
+    v("questions", questions, Choice{"patches", "views"},
+      "what the colorizer is shown: patches drawn afresh, or each view whole and once (colorize, then fuse)");
+    v("injection", injection, Choice{"classification", "photometric"},
+      "a distribution over the ab bins, or the mean squared ab distance");
     v("patch_size", patch_size, Range{16, 512}, "K: pixels along a side of a patch");
     v("scale_min", scale_min, Range{0.02, 1}, "smallest share of the short side a patch covers");
     v("scale_max", scale_max, Range{0.02, 1}, "largest share of the short side a patch covers");
