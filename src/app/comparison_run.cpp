@@ -110,6 +110,12 @@ struct ComparisonRun::Subject {
   [[nodiscard]] std::vector<std::size_t> shown() const { return some_of(evaluated.size(), kShownViews); }
 };
 
+struct ComparisonRun::Geometry {
+  fs::path folder;
+  std::vector<CachedView> training_views;
+  std::shared_ptr<TraceMemory> traces = make_trace_memory();
+};
+
 ComparisonRun::ComparisonRun(ComparisonPlan plan, Config config, Reporter& reporter)
     : plan_(std::move(plan)), config_(std::move(config)), reporter_(reporter) {
   if (!plan_.lpips_weights.empty()) lpips_ = std::make_unique<Lpips>(plan_.lpips_weights);
@@ -152,14 +158,14 @@ fs::path ComparisonRun::folder_of(const Subject& subject, int seed) const {
 }
 
 void ComparisonRun::run_capture(const Subject& subject, int seed) {
-  const fs::path folder = folder_of(subject, seed);
-  const std::string stage1_settings = train(subject, seed, folder);
+  Geometry geometry{folder_of(subject, seed), {}};
+  const std::string stage1_settings = train(subject, seed, geometry.folder);
   for (const Method* method : plan_.methods) {
     const std::string settings =
         digest(stage1_settings + method->name + options_to_json(stage2_of(*method, config_.stage2)).dump() +
                options_to_json(config_.colorizer).dump() + options_to_json(config_.render).dump() +
                (lpips_ ? lpips_->network() : ""));
-    cells_.push_back(run_cell(subject, *method, seed, folder / method->name, settings));
+    cells_.push_back(run_cell(subject, *method, seed, geometry, settings));
   }
 }
 
@@ -179,8 +185,9 @@ std::string ComparisonRun::train(const Subject& subject, int seed, const fs::pat
   return settings;
 }
 
-ComparisonCell ComparisonRun::run_cell(const Subject& subject, const Method& method, int seed, const fs::path& folder,
+ComparisonCell ComparisonRun::run_cell(const Subject& subject, const Method& method, int seed, Geometry& geometry,
                                        const std::string& settings) const {
+  const fs::path folder = geometry.folder / method.name;
   const fs::path file = folder / "cell.json";
   if (fs::exists(file) && settings_in(folder) == settings) {
     ComparisonCell finished = read_cell(file);
@@ -194,8 +201,8 @@ ComparisonCell ComparisonRun::run_cell(const Subject& subject, const Method& met
   cell.seed = seed;
   cell.settings = settings;
   try {
-    if (method.is_colored) colorize(subject, method, seed, folder, cell);
-    look(subject, method, folder, cell);
+    if (method.is_colored) colorize(subject, method, seed, geometry, cell);
+    look(subject, method, geometry, cell);
   } catch (const Interrupted&) {
     throw;
   } catch (const std::exception& problem) {
@@ -224,13 +231,14 @@ std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, 
   return std::make_unique<OwningFlowColorizer>(std::move(colorizer));
 }
 
-void ComparisonRun::colorize(const Subject& subject, const Method& method, int seed, const fs::path& folder,
+void ComparisonRun::colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry,
                              ComparisonCell& cell) const {
   Stage2Options options = stage2_of(method, config_.stage2);
   options.seed = seed;
   const auto colorizer = colorizer_for(subject, method, seed);
-  const Stage2Report report = train_stage2(subject.capture, folder_of(subject, seed) / "stage1.snapshot", options,
-                                           *colorizer, {}, folder / "take.snapshot", true, reporter_.sink());
+  const Stage2Report report = train_stage2(subject.capture, geometry.folder / "stage1.snapshot", options, *colorizer,
+                                           {}, geometry.folder / method.name / "take.snapshot", true, reporter_.sink(),
+                                           {}, &geometry.training_views);
   cell.accepted = report.accepted;
   cell.rejected = report.rejected;
   cell.seconds = report.seconds;
@@ -238,10 +246,10 @@ void ComparisonRun::colorize(const Subject& subject, const Method& method, int s
 }
 
 /// Measures the views, and renders what is shown of a method.
-void ComparisonRun::look(const Subject& subject, const Method& method, const fs::path& folder,
-                         ComparisonCell& cell) const {
-  const auto scene =
-      Scene::load(folder.parent_path() / "stage1.snapshot", method.is_colored ? folder / "take.snapshot" : fs::path());
+void ComparisonRun::look(const Subject& subject, const Method& method, Geometry& geometry, ComparisonCell& cell) const {
+  const fs::path folder = geometry.folder / method.name;
+  const auto scene = Scene::load(geometry.folder / "stage1.snapshot",
+                                 method.is_colored ? folder / "take.snapshot" : fs::path(), geometry.traces);
   EvaluateOptions options;
   options.render = render_options(config_);
   options.lpips = lpips_.get();

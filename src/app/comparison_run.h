@@ -46,16 +46,15 @@ class ComparisonRun {
   void write_rating_sheet() const;
 
  private:
-  struct Subject;  ///< a capture and its name
+  struct Subject;   ///< a capture and its name
+  struct Geometry;  ///< what all methods share that stand on one stage 1
 
   void run_capture(const Subject& subject, int seed);
   [[nodiscard]] std::string train(const Subject& subject, int seed, const std::filesystem::path& folder) const;
-  [[nodiscard]] ComparisonCell run_cell(const Subject& subject, const Method& method, int seed,
-                                        const std::filesystem::path& folder, const std::string& settings) const;
-  void colorize(const Subject& subject, const Method& method, int seed, const std::filesystem::path& folder,
-                ComparisonCell& cell) const;
-  void look(const Subject& subject, const Method& method, const std::filesystem::path& folder,
-            ComparisonCell& cell) const;
+  [[nodiscard]] ComparisonCell run_cell(const Subject& subject, const Method& method, int seed, Geometry& geometry,
+                                        const std::string& settings) const;
+  void colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry, ComparisonCell& cell) const;
+  void look(const Subject& subject, const Method& method, Geometry& geometry, ComparisonCell& cell) const;
   [[nodiscard]] std::unique_ptr<Colorizer> colorizer_for(const Subject& subject, const Method& method, int seed) const;
   [[nodiscard]] std::filesystem::path folder_of(const Subject& subject, int seed) const;
   [[nodiscard]] ReportCapture report_of(const Subject& subject) const;

@@ -58,12 +58,13 @@ struct Answers {
 class Colorization {
  public:
   Colorization(const Stage2Options& options, Colorizer& colorizer, std::filesystem::path take_snapshot,
-               const ProgressSink& progress, const PreviewSink& watcher = {})
+               const ProgressSink& progress, const PreviewSink& watcher = {}, std::vector<CachedView>* shared = nullptr)
       : options_(options),
         colorizer_(colorizer),
         file_(std::move(take_snapshot)),
         progress_(progress),
-        watcher_(watcher) {}
+        watcher_(watcher),
+        views_(shared != nullptr ? *shared : own_views_) {}
 
   Stage2Report run(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                    std::span<const KnownColors> known, bool resume) {
@@ -116,7 +117,7 @@ class Colorization {
     if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
     const MarchSettings march = luminance.march();
     if (watcher_) cache_previews(capture, luminance);
-    for (std::size_t v = 0; v < views.size(); ++v) {
+    for (std::size_t v = views_.size(); v < views.size(); ++v) {
       views_.push_back(
           cache_view(*luminance.engine, march, views[v].camera, options_.working_resolution, options_.cached_weight));
       ignore_masked(views_.back(), *views[v].image);
@@ -451,7 +452,8 @@ class Colorization {
   ProgressSink progress_;
   PreviewSink watcher_;
   ColorModel model_;
-  std::vector<CachedView> views_;
+  std::vector<CachedView> own_views_;
+  std::vector<CachedView>& views_;
   std::vector<std::string> names_;                // of the views
   std::vector<std::vector<float>> view_answers_;  // [2, H, W] of each view; empty: patches are asked about
   KnownColorMap known_;
@@ -469,8 +471,8 @@ class Colorization {
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                           const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
                           const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress,
-                          const PreviewSink& previews) {
-  return Colorization(options, colorizer, take_snapshot, progress, previews)
+                          const PreviewSink& previews, std::vector<CachedView>* shared) {
+  return Colorization(options, colorizer, take_snapshot, progress, previews, shared)
       .run(capture, stage1_snapshot, known, resume);
 }
 

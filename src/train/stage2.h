@@ -73,11 +73,13 @@ struct Stage2Report {
 /// are written beside it as PNG.
 /// @param known     colours that overrule the colorizer's; key frames among them are the purification's bases
 /// @param previews  is offered pictures of held-out views, where there are any
+/// @param shared    where several colorizations of one stage 1 keep its traced views, for as long as working_resolution
+///                  and cached_weight are the same; empty at first; null = none of it is kept
 /// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                           const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
                           const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress = {},
-                          const PreviewSink& previews = {});
+                          const PreviewSink& previews = {}, std::vector<CachedView>* shared = nullptr);
 
 /// Only asks for the base candidates, twelve patches spread over the views, and writes their gallery: what the whole
 /// scene would be coloured like, in a minute. `stage2.purify.picked_bases` then picks those that are liked.
