@@ -60,20 +60,26 @@ constexpr ComparisonColumn kColumns[] = {
      [](const ComparisonCell& c) { return if_any(c.long_range, &Consistency::mean); }},
     {"long_range_p95", "Long 95 %", -1, 2, "its 95th percentile",
      [](const ComparisonCell& c) { return if_any(c.long_range, &Consistency::p95); }},
+    {"short_relative", "Short %", -1, 1, "short-range mean distance in percent of the mean chroma: grey hides flicker",
+     [](const ComparisonCell& c) { return c.short_range.relative(); }},
+    {"long_relative", "Long %", -1, 1, "the same of the long range",
+     [](const ComparisonCell& c) { return c.long_range.relative(); }},
     {"acceptance", "Accepted", 0, 0, "percent of the colorizer's answers that purification let pass", acceptance},
     {"seconds", "Stage 2", 0, 0, "seconds",
      [](const ComparisonCell& c) { return c.seconds > 0 ? std::optional(c.seconds) : std::nullopt; }},
 };
-constexpr const char* kClaims[] = {"lpips", "colourfulness_gap", "short_range", "long_range", "psnr_rgb"};
+constexpr const char* kClaims[] = {"lpips",          "colourfulness_gap", "short_range", "long_range",
+                                   "short_relative", "long_relative",     "psnr_rgb"};
 
 Json json_of(const Consistency& found) {
   Json json = {{"pixels", found.pixels}};
-  if (found.pixels > 0) json.update({{"mean", found.mean}, {"p95", found.p95}});
+  if (found.pixels > 0) json.update({{"mean", found.mean}, {"p95", found.p95}, {"chroma", found.chroma}});
   return json;
 }
 
 Consistency consistency_of(const Json& json) {
-  return {json.value("mean", 0.0), json.value("p95", 0.0), json.at("pixels").get<std::size_t>()};
+  return {json.value("mean", 0.0), json.value("p95", 0.0), json.at("pixels").get<std::size_t>(),
+          json.value("chroma", 0.0)};
 }
 
 ViewMetrics view_metrics_of(const Json& json) {

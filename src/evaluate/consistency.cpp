@@ -62,12 +62,12 @@ void check(const SeenView& view) {
 
 }  // namespace
 
-std::vector<float> carried_ab_distances(const SeenView& from, const SeenView& to) {
+std::vector<CarriedPixel> carried_pixels(const SeenView& from, const SeenView& to) {
   check(from);
   check(to);
   const AbMap here(from), there(to);
   const Affined to_from_world = to.world_from_camera.inverse();
-  std::vector<float> distances;
+  std::vector<CarriedPixel> pixels;
   for (int y = 0; y < from.image->height; ++y) {
     for (int x = 0; x < from.image->width; ++x) {
       const std::size_t i = std::size_t(y) * std::size_t(from.image->width) + std::size_t(x);
@@ -79,19 +79,22 @@ std::vector<float> carried_ab_distances(const SeenView& from, const SeenView& to
       if (!place) continue;
       const Ab found = there.at(*place, in_camera.z), carried = here.at(i);
       if (std::isnan(found.a)) continue;
-      distances.push_back(std::hypot(found.a - carried.a, found.b - carried.b));
+      pixels.push_back({std::hypot(found.a - carried.a, found.b - carried.b), std::hypot(carried.a, carried.b)});
     }
   }
-  return distances;
+  return pixels;
 }
 
 Consistency consistency(std::span<const SeenView> sequence, std::size_t step) {
   CNERF_CHECK(step > 0, "a step of at least one");
   std::vector<float> all;
+  double chroma = 0;
   for (std::size_t i = 0; i + step < sequence.size(); ++i) {
     for (const auto& [from, to] : {std::pair{i, i + step}, std::pair{i + step, i}}) {
-      const std::vector<float> some = carried_ab_distances(sequence[from], sequence[to]);
-      all.insert(all.end(), some.begin(), some.end());
+      for (const CarriedPixel& pixel : carried_pixels(sequence[from], sequence[to])) {
+        all.push_back(pixel.distance);
+        chroma += double(pixel.chroma);
+      }
     }
   }
   Consistency result;
@@ -101,6 +104,7 @@ Consistency consistency(std::span<const SeenView> sequence, std::size_t step) {
     return result;
   }
   result.mean = std::accumulate(all.begin(), all.end(), 0.0) / double(all.size());
+  result.chroma = chroma / double(all.size());
   const auto at95 = all.begin() + std::ptrdiff_t(0.95 * double(all.size() - 1));
   std::nth_element(all.begin(), at95, all.end());
   result.p95 = *at95;

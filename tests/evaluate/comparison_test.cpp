@@ -28,7 +28,7 @@ ComparisonCell cell(const std::string& capture, const std::string& method, int s
   ViewMetrics other = view;
   other.colourfulness_difference = 5;
   made.metrics = {"held-out", "", "simulated:", mean_of({view, other}), {view, other}};
-  made.short_range = {1.5, 4, 1000};
+  made.short_range = {1.5, 4, 1000, 10};
   made.accepted = 3;
   made.rejected = 1;
   return made;
@@ -81,7 +81,9 @@ TEST(Comparison, RowsAreMeansOverSeedsAndOfAllCaptures) {
   EXPECT_DOUBLE_EQ(of_all[0].columns[column("lpips")]->mean, 0.3);
   EXPECT_DOUBLE_EQ(of_all[0].columns[column("colourfulness_gap")]->mean, 4);  // of |-3| and |5|
   EXPECT_DOUBLE_EQ(of_all[0].columns[column("acceptance")]->mean, 75);
+  EXPECT_DOUBLE_EQ(of_all[0].columns[column("short_relative")]->mean, 15);
   EXPECT_FALSE(of_all[0].columns[column("long_range")]);
+  EXPECT_FALSE(of_all[0].columns[column("long_relative")]);
 }
 
 TEST(Comparison, ADuelIsWonByWhatTheColumnCallsBetter) {

@@ -81,6 +81,8 @@ TEST(Consistency, ATurnOfHueBetweenTwoViewsIsTheChordItMakes) {
   const double chord = 2 * chroma * std::sin(turn / 2);
   EXPECT_NEAR(found.mean, chord, 1e-3);
   EXPECT_NEAR(found.p95, chord, 1e-3);
+  EXPECT_NEAR(found.chroma, chroma, 1e-3);
+  EXPECT_NEAR(*found.relative(), 100 * chord / chroma, 1e-2);
 }
 
 TEST(Consistency, StepsCompareTheViewsThatAreSoFarApart) {
@@ -100,10 +102,11 @@ TEST(Consistency, WhatIsHiddenInTheOtherViewDoesNotCount) {
   const Wall red{[](double, double) { return Lab<float>{50, 40, 20}; }, /*wall_z=*/2};
   const RenderedImage behind = grey.seen_from(kLens, {0, 0, 0}), before = red.seen_from(kLens, {0.1, 0, 0});
   const SeenView from{&behind, kLens, at({0, 0, 0})}, to{&before, kLens, at({0.1, 0, 0})};
-  EXPECT_TRUE(carried_ab_distances(from, to).empty());
+  EXPECT_TRUE(carried_pixels(from, to).empty());
   // The same depths count, so it was the occlusion test.
+  EXPECT_FALSE(Consistency{}.relative());
   const RenderedImage not_hidden = grey.seen_from(kLens, {0.1, 0, 0});
-  EXPECT_FALSE(carried_ab_distances(from, {&not_hidden, kLens, at({0.1, 0, 0})}).empty());
+  EXPECT_FALSE(carried_pixels(from, {&not_hidden, kLens, at({0.1, 0, 0})}).empty());
 }
 
 TEST(Consistency, TransparentPixelsDoNotCount) {
@@ -111,7 +114,7 @@ TEST(Consistency, TransparentPixelsDoNotCount) {
   RenderedImage image = wall.seen_from(kLens, {0, 0, 0});
   std::fill(image.opacity.begin(), image.opacity.end(), 0.5f);
   const SeenView view{&image, kLens, at({0, 0, 0})};
-  EXPECT_TRUE(carried_ab_distances(view, view).empty());
+  EXPECT_TRUE(carried_pixels(view, view).empty());
 }
 
 }  // namespace
