@@ -29,6 +29,7 @@ Work declare_colorize(CLI::App& app);
 Work declare_colorize_image(CLI::App& app);
 Work declare_render(CLI::App& app);
 Work declare_eval(CLI::App& app);
+Work declare_compare(CLI::App& app);
 Work declare_bake(CLI::App& app);
 Work declare_view(CLI::App& app);
 Work declare_info(CLI::App& app);

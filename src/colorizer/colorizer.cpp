@@ -35,6 +35,9 @@ std::string usage_of(const Kind& kind) {
 }
 
 [[noreturn]] void refuse_spec(const std::string& spec) {
+  if (spec.substr(0, spec.find(':')) == "simulated") {
+    throw UsageError("colorizer \"" + spec + "\": knows the true colours, so only cnerf compare takes it");
+  }
   std::string message = spec.empty() ? "no colorizer named" : "unknown colorizer \"" + spec + "\"";
   message += "; expected one of";
   for (const Kind& kind : kKinds) message += " " + usage_of(kind);

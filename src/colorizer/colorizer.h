@@ -11,10 +11,19 @@
 
 namespace cnerf {
 
+/// Where a patch was cut from, for colorizers that work on a whole capture: a rectangle of a view, as shares of the
+/// view's width and height. It says where, never which colour.
+struct PatchOrigin {
+  std::string view;  ///< name, as the capture has it
+  double left = 0, top = 0, width = 1, height = 1;
+  std::uint64_t query = 0;  ///< number of the question: a question that is repeated, say by --resume, keeps it
+};
+
 /// A batch of lightness patches. L* in 0..100.
 struct LightnessBatch {
   int batch = 0, height = 0, width = 0;
-  std::vector<float> lightness;  ///< [B, H, W]
+  std::vector<float> lightness;           ///< [B, H, W]
+  std::vector<PatchOrigin> origins = {};  ///< [B]; empty where patches are of no capture
 };
 
 /// The colorizer's answer; exactly one of the two is filled.

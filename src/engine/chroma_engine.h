@@ -36,13 +36,24 @@ class ChromaEngine {
   virtual void state_loaded() = 0;
 };
 
+/// What an ab distance of d costs.
+enum class AbLoss {
+  kHuber,    ///< d^2 below a few units, d above: what a few wrong pixels say hardly counts
+  kSquared,  ///< d^2, the photometric loss: the mean of what is said
+};
+
 /// Per-sample chromaticity, fitted so that compositing it reproduces the pixels' decoded colours (what is baked is what
 /// is seen). XYZ of samples composite linearly, so this is exact for every emission-absorption renderer.
 class ChromaticityEngine {
  public:
   virtual ~ChromaticityEngine() = default;
   /// One optimiser step towards target ab values at the pixels' own luminance; returns the mean ab distance.
-  virtual double step(const PixelSamples& pixels, std::span<const Ab> targets, float learning_rate) = 0;
+  /// @param pixel_weights  [R] factors of the pixels' losses; may be empty = all 1
+  virtual double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
+                      AbLoss loss, float learning_rate) = 0;
+  double step(const PixelSamples& pixels, std::span<const Ab> targets, float learning_rate) {
+    return step(pixels, targets, {}, AbLoss::kHuber, learning_rate);
+  }
   /// ab of the composited XYZ of each pixel.
   virtual void composite(const PixelSamples& pixels, std::span<Ab> colors) const = 0;
   virtual void query(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const = 0;

@@ -24,14 +24,6 @@ Picture picture_of(const cv::Mat& mat) {
   return {mat.cols, mat.rows, {mat.data, mat.data + mat.total() * 3}};
 }
 
-Picture scaled_down(const Picture& picture, int width) {
-  if (picture.width <= width) return picture;
-  cv::Mat small;
-  const int height = std::max(1, picture.height * width / picture.width);
-  cv::resize(mat_of(picture), small, {width, height}, 0, 0, cv::INTER_AREA);
-  return picture_of(small);
-}
-
 }  // namespace
 
 Picture picture_from_linear(int width, int height, const std::vector<float>& linear) {
@@ -42,6 +34,23 @@ Picture picture_from_linear(int width, int height, const std::vector<float>& lin
   Picture picture{width, height, std::vector<std::uint8_t>(3 * pixels)};
   for (std::size_t i = 0; i < pixels; ++i) std::fill_n(picture.rgb.begin() + 3 * i, 3, values[i]);
   return picture;
+}
+
+Picture scaled_down(const Picture& picture, int width) {
+  if (picture.width <= width) return picture;
+  cv::Mat small;
+  const int height = std::max(1, picture.height * width / picture.width);
+  cv::resize(mat_of(picture), small, {width, height}, 0, 0, cv::INTER_AREA);
+  return picture_of(small);
+}
+
+std::vector<std::byte> jpeg_bytes(const Picture& picture, int quality) {
+  cv::Mat bgr;
+  cv::cvtColor(mat_of(picture), bgr, cv::COLOR_RGB2BGR);
+  std::vector<std::uint8_t> bytes;
+  CNERF_CHECK(cv::imencode(".jpg", bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, quality}), "OpenCV encodes JPEG");
+  const auto raw = std::as_bytes(std::span(bytes));
+  return {raw.begin(), raw.end()};
 }
 
 ContactSheet::ContactSheet(std::vector<std::string> titles, int cell_width)

@@ -1,6 +1,7 @@
 #pragma once
 /// A picture of pictures: one row a view, one column a kind.
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -35,6 +36,11 @@ class ContactSheet {
   int cell_width_;
   std::vector<std::vector<Picture>> rows_;
 };
+
+/// The picture, scaled down to `width` where it is wider.
+[[nodiscard]] Picture scaled_down(const Picture& picture, int width);
+/// A JPEG file's bytes.  @param quality  0 to 100
+[[nodiscard]] std::vector<std::byte> jpeg_bytes(const Picture& picture, int quality);
 
 /// @throws OutputError.
 void write_png(const std::filesystem::path& file, const Picture& picture);

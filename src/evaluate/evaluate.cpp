@@ -50,7 +50,7 @@ void measure_luminance(const EvaluatedView& pictures, ViewMetrics& metrics) {
   metrics.ssim = ssim(encoded(pictures.ours.luminance), encoded(truth), image.width, image.height, image.mask);
 }
 
-void measure_colour(const EvaluatedView& pictures, ViewMetrics& metrics) {
+void measure_colour(const EvaluatedView& pictures, const Lpips* lpips, ViewMetrics& metrics) {
   const std::vector<std::uint8_t>& valid = pictures.view.image.mask;
   const std::vector<float>& ours = pictures.ours.rgb;
   const Colourfulness colourful = colourfulness(srgb8_from_linear(ours), valid);
@@ -66,6 +66,10 @@ void measure_colour(const EvaluatedView& pictures, ViewMetrics& metrics) {
   metrics.colourfulness_magnitude_difference = colourful.magnitude - wanted.magnitude;
   metrics.psnr_rgb = psnr_from_mse(encoded_mse(ours, truth, 3, valid));
   metrics.ssim_rgb = ssim_of_channels(encoded(ours), encoded(truth), pictures.ours.width, pictures.ours.height, valid);
+  if (lpips != nullptr) {
+    metrics.lpips =
+        lpips->distance(srgb8_from_linear(ours), srgb8_from_linear(truth), pictures.ours.width, pictures.ours.height);
+  }
   metrics.ab_error = mean_ab_distance(ours, truth, valid);
   metrics.ab_error_grey = mean_ab_distance(truth, {}, valid);
 }
@@ -76,6 +80,22 @@ void drop_nan(ViewMetrics& metrics) {
     if (value && !std::isfinite(*value)) value.reset();
   });
 }
+
+/// The luminance of a picture as its colour.
+void paint_grey(RenderedImage& image) {
+  for (const float y : image.luminance) image.rgb.insert(image.rgb.end(), {y, y, y});
+}
+
+nlohmann::ordered_json json_of(const ViewMetrics& metrics) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  if (!metrics.view.empty()) json["view"] = metrics.view;
+  ViewMetrics::visit(metrics, [&](const char* name, const std::optional<double>& value) {
+    if (value) json[name] = *value;
+  });
+  return json;
+}
+
+}  // namespace
 
 ViewMetrics mean_of(const std::vector<ViewMetrics>& views) {
   struct Sum {
@@ -100,17 +120,6 @@ ViewMetrics mean_of(const std::vector<ViewMetrics>& views) {
   return mean;
 }
 
-nlohmann::ordered_json json_of(const ViewMetrics& metrics) {
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  if (!metrics.view.empty()) json["view"] = metrics.view;
-  ViewMetrics::visit(metrics, [&](const char* name, const std::optional<double>& value) {
-    if (value) json[name] = *value;
-  });
-  return json;
-}
-
-}  // namespace
-
 std::vector<const View*> views_to_evaluate(const Capture& capture, const EvaluateOptions& options) {
   std::vector<const View*> held_out, all;
   for (const View& view : capture.views) {
@@ -124,13 +133,13 @@ std::vector<const View*> views_to_evaluate(const Capture& capture, const Evaluat
   return some;
 }
 
-ViewMetrics measure(const EvaluatedView& pictures) {
+ViewMetrics measure(const EvaluatedView& pictures, const Lpips* lpips) {
   CNERF_CHECK_EQ(pictures.ours.width, pictures.view.image.width);
   CNERF_CHECK_EQ(pictures.ours.height, pictures.view.image.height);
   ViewMetrics metrics;
   metrics.view = pictures.view.name;
   measure_luminance(pictures, metrics);
-  if (!pictures.ours.rgb.empty()) measure_colour(pictures, metrics);
+  if (!pictures.ours.rgb.empty()) measure_colour(pictures, lpips, metrics);
   if (!pictures.ours.rgb.empty() && !pictures.ours.baked_rgb.empty()) {
     metrics.bake_ab_distance = mean_ab_distance(pictures.ours.baked_rgb, pictures.ours.rgb,
                                                 coloured_pixels(pictures.ours, pictures.view.image.mask));
@@ -145,12 +154,14 @@ Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptio
   Metrics metrics;
   metrics.split = views.front()->held_out ? "held-out" : "train";
   RenderOptions render = options.render;
-  render.color = render.baked_color = scene.is_colorized();
+  render.color = scene.is_colorized();
+  render.baked_color = scene.is_colorized() && options.with_baked;
   for (const View* view : views) {
     if (interruption_requested()) throw Interrupted("evaluation stopped; nothing was written");
-    const RenderedImage ours = scene.render(view->intrinsics, view->world_from_camera, render);
+    RenderedImage ours = scene.render(view->intrinsics, view->world_from_camera, render);
+    if (ours.rgb.empty() && options.grey_as_color) paint_grey(ours);
     const std::optional<ColorImage> truth = load_color_truth(*view);
-    metrics.views.push_back(measure({*view, ours, truth}));
+    metrics.views.push_back(measure({*view, ours, truth}, options.lpips));
     if (watch) watch({*view, ours, truth});
     if (progress) {
       progress({"evaluate",

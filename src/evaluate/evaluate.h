@@ -10,6 +10,7 @@
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/capture/color_truth.h"
+#include "src/evaluate/lpips.h"
 #include "src/evaluate/metrics.h"
 #include "src/train/scene.h"
 
@@ -24,6 +25,7 @@ struct ViewMetrics {
   std::optional<double> psnr_rgb;        ///< dB; sRGB-encoded values of all three channels
   std::optional<double> ssim;            ///< of encoded luminance
   std::optional<double> ssim_rgb;        ///< mean of the three encoded channels
+  std::optional<double> lpips;           ///< of 8-bit sRGB, where weights were given
   std::optional<double> colourfulness, colourfulness_truth, colourfulness_difference;  ///< difference: ours - truth
   std::optional<double> colourfulness_magnitude, colourfulness_magnitude_truth, colourfulness_magnitude_difference;
   std::optional<double> ab_error;          ///< mean Lab ab distance to the truth
@@ -37,6 +39,7 @@ struct ViewMetrics {
     visitor("psnr_rgb", self.psnr_rgb);
     visitor("ssim", self.ssim);
     visitor("ssim_rgb", self.ssim_rgb);
+    visitor("lpips", self.lpips);
     visitor("colourfulness", self.colourfulness);
     visitor("colourfulness_truth", self.colourfulness_truth);
     visitor("colourfulness_difference", self.colourfulness_difference);
@@ -65,7 +68,10 @@ struct EvaluatedView {
 
 struct EvaluateOptions {
   RenderOptions render;
-  int training_views = 8;  ///< at most so many, evenly spread, when nothing was held out
+  int training_views = 8;        ///< at most so many, evenly spread, when nothing was held out
+  const Lpips* lpips = nullptr;  ///< measures LPIPS too; the networks run one view at a time
+  bool with_baked = true;        ///< also compares the bake's colours with the per-pixel decode
+  bool grey_as_color = false;    ///< an uncoloured scene counts as one that was coloured grey
 };
 
 /// The views `evaluate` looks at: the held-out ones, or some training views when there are none.
@@ -78,7 +84,10 @@ struct EvaluateOptions {
                                const ProgressSink& progress = {});
 
 /// Measures one pair of pictures; `evaluate` is this over all views.
-[[nodiscard]] ViewMetrics measure(const EvaluatedView& pictures);
+[[nodiscard]] ViewMetrics measure(const EvaluatedView& pictures, const Lpips* lpips = nullptr);
+
+/// The mean over the views that have a number, for each number.
+[[nodiscard]] ViewMetrics mean_of(const std::vector<ViewMetrics>& views);
 
 /// `{"schema_version": 1, "split", "take", "colorizer", "mean": {...}, "views": [...]}`; absent numbers are left out.
 [[nodiscard]] std::string to_json(const Metrics& metrics);

@@ -25,8 +25,11 @@ struct ColorModel {
   static ColorModel load(const std::filesystem::path& snapshot);
   void save(const std::filesystem::path& snapshot);
 
-  /// Colours of pixels by the paper's way: decode the composited distribution, then into the gamut at the pixel's own
-  /// luminance. Pixels of hardly any opacity are grey.
+  /// Whether colours are learnt as such, without a distribution (stage2.injection = "photometric").
+  [[nodiscard]] bool is_photometric() const { return options.injection == "photometric"; }
+
+  /// Colours of pixels by the paper's way: decode the composited distribution (of a photometric model: the composited
+  /// colour), then into the gamut at the pixel's own luminance. Pixels of hardly any opacity are grey.
   [[nodiscard]] std::vector<Ab> decode(const PixelSamples& pixels) const;
 
  private:

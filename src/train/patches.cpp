@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/rng.h"
@@ -44,6 +45,7 @@ PatchPlace random_patch(const std::vector<CachedView>& views, std::size_t view, 
   const double scale = scale_min + (scale_max - scale_min) * double(rng.uniform(0));
   PatchPlace place;
   place.view = view;
+  place.index = index;
   place.side = std::clamp(int(std::lround(scale * cached.short_side())), 2, cached.short_side());
   place.left = int(rng.below(1, std::uint32_t(cached.width - place.side + 1)));
   place.top = int(rng.below(2, std::uint32_t(cached.height - place.side + 1)));
@@ -64,6 +66,46 @@ std::vector<float> patch_colors(const CachedView& view, const PatchPlace& place,
   const std::vector<float> b = resized_square(all.last(ab.size() / 2), view, place, k);
   patch.insert(patch.end(), b.begin(), b.end());
   return patch;
+}
+
+LightnessBatch whole_view(const CachedView& view, const std::string& name, std::uint64_t query, int short_side) {
+  const double factor = std::min(1.0, double(short_side) / view.short_side());
+  const cv::Size size(std::max(2, int(std::lround(view.width * factor))),
+                      std::max(2, int(std::lround(view.height * factor))));
+  LightnessBatch question{1, size.height, size.width, std::vector<float>(std::size_t(size.area())), {}};
+  const cv::Mat luminance(view.height, view.width, CV_32F, const_cast<float*>(view.luminance.data()));
+  cv::Mat shown(size, CV_32F, question.lightness.data());
+  cv::resize(luminance, shown, size, 0, 0, cv::INTER_AREA);
+  for (float& value : question.lightness) value = std::clamp(lightness_from_luminance(value), 0.0f, 100.0f);
+  question.origins.push_back({name, 0, 0, 1, 1, query});
+  return question;
+}
+
+std::vector<float> at_view_size(const CachedView& view, const LightnessBatch& question, const std::vector<float>& ab) {
+  const std::size_t pixels = std::size_t(view.width) * std::size_t(view.height);
+  std::vector<float> out(2 * pixels);
+  for (std::size_t c = 0; c < 2; ++c) {
+    const cv::Mat answer(question.height, question.width, CV_32F,
+                         const_cast<float*>(ab.data()) + c * question.lightness.size());
+    cv::Mat whole(view.height, view.width, CV_32F, out.data() + c * pixels);
+    cv::resize(answer, whole, whole.size(), 0, 0, cv::INTER_LINEAR);
+  }
+  return out;
+}
+
+std::vector<std::size_t> along_the_path(const std::vector<CachedView>& views) {
+  std::vector<std::size_t> path, left(views.size());
+  std::iota(left.begin(), left.end(), std::size_t(0));
+  while (!left.empty()) {
+    auto next = left.begin();
+    if (!path.empty()) {
+      const Vec3d here = views[path.back()].camera.origin;
+      next = std::ranges::min_element(left, {}, [&](std::size_t v) { return length(views[v].camera.origin - here); });
+    }
+    path.push_back(*next);
+    left.erase(next);
+  }
+  return path;
 }
 
 PatchPixels pick_pixels(const CachedView& view, const PatchPlace& place, int k, const std::vector<float>& ab, int count,

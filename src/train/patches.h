@@ -3,9 +3,11 @@
 /// and which of its answer's pixels are trained on.
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "src/color/ab_bins.h"
+#include "src/colorizer/colorizer.h"
 #include "src/train/view_cache.h"
 
 namespace cnerf {
@@ -14,6 +16,7 @@ namespace cnerf {
 struct PatchPlace {
   std::size_t view = 0;
   int left = 0, top = 0, side = 0;
+  std::uint64_t index = 0;  ///< that it was drawn by
 };
 
 /// A random place whose side is a share in [scale_min, scale_max] of the view's short side; patches reach the borders.
@@ -31,6 +34,15 @@ struct RenderedPatch {
 /// @param ab  [2, H, W]
 [[nodiscard]] std::vector<float> patch_colors(const CachedView& view, const PatchPlace& place, int k,
                                               const std::vector<float>& ab);
+
+/// A whole view as a question, its short side at most `short_side` pixels.
+[[nodiscard]] LightnessBatch whole_view(const CachedView& view, const std::string& name, std::uint64_t query,
+                                        int short_side);
+/// The answer to such a question at the view's own size, [2, H, W].
+[[nodiscard]] std::vector<float> at_view_size(const CachedView& view, const LightnessBatch& question,
+                                              const std::vector<float>& ab);
+/// The views in an order in which one might walk past them: from the first one always to the nearest that is left.
+[[nodiscard]] std::vector<std::size_t> along_the_path(const std::vector<CachedView>& views);
 
 /// Some pixels of the square with the answer's colour at each (bilinear).
 struct PatchPixels {

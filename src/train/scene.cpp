@@ -1,7 +1,9 @@
 #include "src/train/scene.h"
 
 #include <algorithm>
+#include <map>
 #include <optional>
+#include <type_traits>
 
 #include "src/color/colorspace_math.h"
 #include "src/train/color_model.h"
@@ -9,7 +11,57 @@
 #include "src/train/view_cache.h"
 
 namespace cnerf {
+
+/// By camera, effort and part of the picture.
+class TraceMemory {
+ public:
+  struct Trace {
+    std::vector<WeightedSample> samples;
+    std::vector<std::size_t> offsets;
+  };
+
+  explicit TraceMemory(std::size_t most_samples) : left_(most_samples) {}
+
+  [[nodiscard]] const Trace* find(const std::string& key) const {
+    const auto found = traces_.find(key);
+    return found == traces_.end() ? nullptr : &found->second;
+  }
+  void keep(const std::string& key, const Trace& trace) {
+    if (trace.samples.size() > left_) return;
+    left_ -= trace.samples.size();
+    traces_.emplace(key, trace);
+  }
+
+ private:
+  std::size_t left_;
+  std::map<std::string, Trace> traces_;
+};
+
+std::shared_ptr<TraceMemory> make_trace_memory(std::size_t most_samples) {
+  return std::make_shared<TraceMemory>(most_samples);
+}
+
 namespace {
+
+/// Bytes that tell one part of one view from all others.
+std::string trace_key(const UnitCamera& camera, const RenderOptions& options, std::size_t first) {
+  std::string key;
+  const auto add = [&](const auto& value) {
+    static_assert(std::is_arithmetic_v<std::remove_cvref_t<decltype(value)>>);
+    key.append(reinterpret_cast<const char*>(&value), sizeof(value));
+  };
+  const Intrinsics& lens = camera.intrinsics;
+  add(int(lens.model));
+  for (const int value : {lens.width, lens.height, options.steps_per_box}) add(value);
+  for (const double value : {lens.fx, lens.fy, lens.cx, lens.cy, options.min_transmittance}) add(value);
+  for (const double value : lens.distortion) add(value);
+  for (int axis = 0; axis < 3; ++axis) {
+    add(camera.origin[axis]);
+    for (int column = 0; column < 3; ++column) add(camera.unit_from_camera.rows[axis][column]);
+  }
+  add(first);
+  return key;
+}
 
 constexpr std::size_t kRaysAtATime = 16384;  // bounds the memory of traced samples
 constexpr float kShadedShare = 0.995f;       // what the rest could change is below a grey level of an 8-bit picture
@@ -22,8 +74,9 @@ void put_color(std::vector<float>& image, std::size_t pixel, Ab color, float lum
 
 class TrainedScene final : public Scene {
  public:
-  TrainedScene(const std::filesystem::path& stage1_snapshot, const std::filesystem::path& take_snapshot)
-      : luminance_(LuminanceModel::load(stage1_snapshot)) {
+  TrainedScene(const std::filesystem::path& stage1_snapshot, const std::filesystem::path& take_snapshot,
+               std::shared_ptr<TraceMemory> memory)
+      : luminance_(LuminanceModel::load(stage1_snapshot)), memory_(std::move(memory)) {
     if (!take_snapshot.empty()) color_ = ColorModel::load(take_snapshot);
   }
 
@@ -67,6 +120,20 @@ class TrainedScene final : public Scene {
   }
 
  private:
+  [[nodiscard]] TraceMemory::Trace trace(const UnitCamera& camera, std::span<const Ray> rays,
+                                         const RenderOptions& options, std::size_t first) const {
+    const std::string key = memory_ ? trace_key(camera, options, first) : "";
+    if (memory_) {
+      if (const TraceMemory::Trace* known = memory_->find(key)) return *known;
+    }
+    TraceMemory::Trace trace;
+    luminance_.engine->trace(rays, luminance_.march(options.steps_per_box),
+                             {static_cast<float>(options.min_transmittance), kShadedShare}, trace.samples,
+                             trace.offsets);
+    if (memory_) memory_->keep(key, trace);
+    return trace;
+  }
+
   void render_part(const UnitCamera& camera, const RenderOptions& options, std::size_t first, std::size_t last,
                    RenderedImage& image) const {
     std::vector<Ray> rays;
@@ -74,10 +141,7 @@ class TrainedScene final : public Scene {
       rays.push_back(
           camera.ray({double(p % std::size_t(image.width)) + 0.5, double(p / std::size_t(image.width)) + 0.5}));
     }
-    std::vector<WeightedSample> samples;
-    std::vector<std::size_t> offsets;
-    luminance_.engine->trace(rays, luminance_.march(options.steps_per_box),
-                             {static_cast<float>(options.min_transmittance), kShadedShare}, samples, offsets);
+    const auto [samples, offsets] = trace(camera, rays, options, first);
     const Vec3f axis = camera.unit_from_camera.column(2).cast<float>();
     for (std::size_t r = 0; r < rays.size(); ++r) {
       float weighted_t = 0;
@@ -110,13 +174,14 @@ class TrainedScene final : public Scene {
 
   LuminanceModel luminance_;
   std::optional<ColorModel> color_;
+  std::shared_ptr<TraceMemory> memory_;
 };
 
 }  // namespace
 
 std::unique_ptr<Scene> Scene::load(const std::filesystem::path& stage1_snapshot,
-                                   const std::filesystem::path& take_snapshot) {
-  return std::make_unique<TrainedScene>(stage1_snapshot, take_snapshot);
+                                   const std::filesystem::path& take_snapshot, std::shared_ptr<TraceMemory> memory) {
+  return std::make_unique<TrainedScene>(stage1_snapshot, take_snapshot, std::move(memory));
 }
 
 }  // namespace cnerf

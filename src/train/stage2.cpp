@@ -24,6 +24,7 @@ namespace {
 constexpr int kBaseCandidates = 12;
 constexpr int kDistillPixels = 8192;  // pixels a distillation step
 constexpr std::size_t kGalleryTiles = 20;
+constexpr int kWholeViewPatches = 2;  // a whole view is shown with a short side of so many patch sides
 constexpr std::uint64_t kFirstBaseIndex = std::uint64_t(1) << 32;  // patch indices of bases, apart from training's
 constexpr int kMostRejectedInARow = 400;
 constexpr std::size_t kPreviews = 3;
@@ -57,27 +58,30 @@ struct Answers {
 class Colorization {
  public:
   Colorization(const Stage2Options& options, Colorizer& colorizer, std::filesystem::path take_snapshot,
-               const ProgressSink& progress, const PreviewSink& watcher = {})
+               const ProgressSink& progress, const PreviewSink& watcher = {}, std::vector<CachedView>* shared = nullptr)
       : options_(options),
         colorizer_(colorizer),
         file_(std::move(take_snapshot)),
         progress_(progress),
-        watcher_(watcher) {}
+        watcher_(watcher),
+        views_(shared != nullptr ? *shared : own_views_) {}
 
   Stage2Report run(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                    std::span<const KnownColors> known, bool resume) {
     start_or_resume(sha256(read_binary_file(stage1_snapshot)), colorizer_.name() + describe(known), resume);
     seconds_before_ = model_.report.seconds;
     cache_views(capture, LuminanceModel::load(stage1_snapshot));
-    known_ = KnownColorMap(views_, training_view_names(capture), known);
+    names_ = training_view_names(capture);
+    known_ = KnownColorMap(views_, names_, known);
 
+    if (options_.questions == "views") ask_about_views();
     const std::vector<AnsweredPatch> bases = choose_bases();
     std::vector<ColorPatchView> base_views;
     for (const AnsweredPatch& base : bases) base_views.push_back(view_of(base));
     const Purifier purifier(options_.purify, base_views);
     measure_prior(bases);
     inject(purifier);
-    distill();
+    if (!model_.is_photometric()) distill();
     measure_bake_distance();
     save();
     return model_.report;
@@ -85,6 +89,7 @@ class Colorization {
 
   void only_bases(const Capture& capture, const std::filesystem::path& stage1_snapshot) {
     cache_views(capture, LuminanceModel::load(stage1_snapshot));
+    names_ = training_view_names(capture);
     write_candidates(ask_candidates(), file_);
   }
 
@@ -112,7 +117,7 @@ class Colorization {
     if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
     const MarchSettings march = luminance.march();
     if (watcher_) cache_previews(capture, luminance);
-    for (std::size_t v = 0; v < views.size(); ++v) {
+    for (std::size_t v = views_.size(); v < views.size(); ++v) {
       views_.push_back(
           cache_view(*luminance.engine, march, views[v].camera, options_.working_resolution, options_.cached_weight));
       ignore_masked(views_.back(), *views[v].image);
@@ -151,10 +156,16 @@ class Colorization {
     LightnessBatch question{int(places.size()), k, k, {}};
     std::vector<AnsweredPatch> answered;
     for (const PatchPlace& place : places) {
-      answered.push_back({place, render_patch(views_[place.view], place, k), {}});
+      const CachedView& view = views_[place.view];
+      answered.push_back({place, render_patch(view, place, k), {}});
+      if (!view_answers_.empty()) answered.back().ab = patch_colors(view, place, k, view_answers_[place.view]);
       const std::vector<float>& lightness = answered.back().shown.lightness;
       question.lightness.insert(question.lightness.end(), lightness.begin(), lightness.end());
+      const double w = view.width, h = view.height;
+      question.origins.push_back(
+          {names_[place.view], place.left / w, place.top / h, place.side / w, place.side / h, place.index});
     }
+    if (!view_answers_.empty()) return {std::move(answered), watch.seconds()};
     const ChromaBatch answer = colorizer_.colorize(question);
     check_answer(colorizer_.name(), question, answer);
     for (std::size_t i = 0; i < answered.size(); ++i) answered[i].ab = ab_of(answer, int(i));
@@ -163,6 +174,24 @@ class Colorization {
 
   [[nodiscard]] ColorPatchView view_of(const AnsweredPatch& patch) const {
     return {options_.patch_size, options_.patch_size, patch.ab, patch.shown.lightness, patch.shown.opacity};
+  }
+
+  /// Shows the colorizer each view whole and once. They come along the path of the cameras, so that a colorizer that
+  /// remembers can carry colours on from one view to the next.
+  void ask_about_views() {
+    view_answers_.resize(views_.size());
+    double asked = 0;
+    for (const std::size_t v : along_the_path(views_)) {
+      const Stopwatch watch;
+      const CachedView& view = views_[v];
+      const LightnessBatch question = whole_view(view, names_[v], v, kWholeViewPatches * options_.patch_size);
+      const ChromaBatch answer = colorizer_.colorize(question);
+      check_answer(colorizer_.name(), question, answer);
+      view_answers_[v] = at_view_size(view, question, ab_of(answer, 0));
+      model_.report.colorizer_seconds += watch.seconds();
+      tell("stage 2: colouring views", ++asked / double(views_.size()), {});
+      stop_if_asked();
+    }
   }
 
   /// Base patches (paper: s = 0.7, 5 images): parts of the key frames, whose colours are known; without any, answers of
@@ -272,7 +301,7 @@ class Colorization {
   void inject(const Purifier& purifier) {
     int rejected_in_a_row = 0;
     std::future<Answers> coming = ask_ahead(model_.queries.front());
-    while (model_.chroma->step_count() < options_.patches) {
+    while (steps() < options_.patches) {
       const Stopwatch waiting;
       const Answers answers = coming.get();
       model_.report.waited_seconds += waiting.seconds();
@@ -291,25 +320,30 @@ class Colorization {
                                " answers in a row were rejected as unlike the base images; see bases.png, lower "
                                "stage2.purify.threshold, or pick other bases");
         }
-        if (is_of_use && model_.chroma->step_count() < options_.patches) train_on(patch, is_accepted);
+        if (is_of_use && steps() < options_.patches) train_on(patch, is_accepted);
       }
-      after_step(model_.chroma->step_count(), options_.patches);
+      after_step(steps(), options_.patches);
     }
     write_gallery(file_.parent_path() / "accepted.png", accepted_);
     write_gallery(file_.parent_path() / "rejected.png", rejected_);
   }
 
+  /// Patches trained on so far.
+  [[nodiscard]] long steps() const {
+    return model_.is_photometric() ? model_.chromaticity->step_count() : model_.chroma->step_count();
+  }
+
   /// @param is_accepted  false: only what is known is trained on
   void train_on(const AnsweredPatch& patch, bool is_accepted) {
     const CachedView& view = views_[patch.place.view];
-    const auto step = static_cast<std::uint64_t>(model_.chroma->step_count());
+    const auto step = static_cast<std::uint64_t>(steps());
     const PatchPixels picked = pick_pixels(view, patch.place, options_.patch_size, patch.ab, options_.rays_per_patch,
                                            std::uint64_t(options_.seed), step);
     std::vector<std::uint32_t> wanted;
-    std::vector<SoftLabel> labels;
+    std::vector<Ab> colors;
     std::vector<float> weights;
     const auto want = [&](const CachedView& of, std::uint32_t pixel, Ab color) {
-      labels.push_back(soft_label(color));
+      colors.push_back(color);
       const float of_class = class_weights_.empty() ? 1.0f : class_weights_[std::size_t(nearest_bin(color))];
       weights.push_back(of_class * of.opacity[pixel]);
     };
@@ -329,9 +363,14 @@ class Colorization {
         want(views_[place.view], place.pixel, *known_.find(place.view, place.pixel));
       }
     }
-    const double fraction = double(step) / options_.patches;
-    loss_ = model_.chroma->step(pixels, labels, weights,
-                                decayed(options_.learning_rate, options_.final_learning_rate, fraction));
+    const float rate = decayed(options_.learning_rate, options_.final_learning_rate, double(step) / options_.patches);
+    if (model_.is_photometric()) {
+      loss_ = model_.chromaticity->step(pixels, colors, weights, AbLoss::kSquared, rate);
+    } else {
+      std::vector<SoftLabel> labels;
+      std::ranges::transform(colors, std::back_inserter(labels), soft_label);
+      loss_ = model_.chroma->step(pixels, labels, weights, rate);
+    }
   }
 
   /// Random visible pixels of all views.
@@ -371,7 +410,7 @@ class Colorization {
   }
 
   void after_step(long done, int all) {
-    const bool distilling = model_.chromaticity->step_count() > 0;
+    const bool distilling = !model_.is_photometric() && model_.chromaticity->step_count() > 0;
     const int asked = model_.report.accepted + model_.report.rejected;
     tell(distilling ? "stage 2: colour for baking" : "stage 2", double(done) / all,
          {{distilling ? "ab distance" : "loss", loss_},
@@ -413,7 +452,10 @@ class Colorization {
   ProgressSink progress_;
   PreviewSink watcher_;
   ColorModel model_;
-  std::vector<CachedView> views_;
+  std::vector<CachedView> own_views_;
+  std::vector<CachedView>& views_;
+  std::vector<std::string> names_;                // of the views
+  std::vector<std::vector<float>> view_answers_;  // [2, H, W] of each view; empty: patches are asked about
   KnownColorMap known_;
   std::vector<float> class_weights_;  // [313]; empty = all alike
   std::vector<GalleryTile> accepted_, rejected_;
@@ -429,8 +471,8 @@ class Colorization {
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                           const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
                           const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress,
-                          const PreviewSink& previews) {
-  return Colorization(options, colorizer, take_snapshot, progress, previews)
+                          const PreviewSink& previews, std::vector<CachedView>* shared) {
+  return Colorization(options, colorizer, take_snapshot, progress, previews, shared)
       .run(capture, stage1_snapshot, known, resume);
 }
 

@@ -16,10 +16,12 @@
 namespace cnerf {
 
 struct Stage2Options {
-  int patches = 600;                        ///< accepted patches
-  int patch_size = 128;                     ///< K
-  double scale_min = 0.3, scale_max = 0.7;  ///< s: the patch's side as a share of the image's short side
-  int rays_per_patch = 4096;                ///< pixels of a patch that are trained on
+  int patches = 600;                         ///< accepted patches
+  std::string questions = "patches";         ///< what the colorizer is shown: patches drawn afresh, or each view once
+  std::string injection = "classification";  ///< a distribution over ab bins, or a photometric loss of ab
+  int patch_size = 128;                      ///< K
+  double scale_min = 0.3, scale_max = 0.7;   ///< s: the patch's side as a share of the image's short side
+  int rays_per_patch = 4096;                 ///< pixels of a patch that are trained on
   double known_share = 1;  ///< pixels of known colours trained on with a patch, as a share of rays_per_patch
   double learning_rate = 1e-2;
   double final_learning_rate = 1e-3;
@@ -36,6 +38,10 @@ struct Stage2Options {
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("patches", patches, Range{1, 1e7}, "accepted patches to train on");
+    v("questions", questions, Choice{"patches", "views"},
+      "what the colorizer is shown: patches drawn afresh, or each view whole and once (colorize, then fuse)");
+    v("injection", injection, Choice{"classification", "photometric"},
+      "a distribution over the ab bins, or the mean squared ab distance");
     v("patch_size", patch_size, Range{16, 512}, "K: pixels along a side of a patch");
     v("scale_min", scale_min, Range{0.02, 1}, "smallest share of the short side a patch covers");
     v("scale_max", scale_max, Range{0.02, 1}, "largest share of the short side a patch covers");
@@ -67,11 +73,13 @@ struct Stage2Report {
 /// are written beside it as PNG.
 /// @param known     colours that overrule the colorizer's; key frames among them are the purification's bases
 /// @param previews  is offered pictures of held-out views, where there are any
+/// @param shared    where several colorizations of one stage 1 keep its traced views, for as long as working_resolution
+///                  and cached_weight are the same; empty at first; null = none of it is kept
 /// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                           const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
                           const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress = {},
-                          const PreviewSink& previews = {});
+                          const PreviewSink& previews = {}, std::vector<CachedView>* shared = nullptr);
 
 /// Only asks for the base candidates, twelve patches spread over the views, and writes their gallery: what the whole
 /// scene would be coloured like, in a minute. `stage2.purify.picked_bases` then picks those that are liked.

@@ -25,7 +25,8 @@ TEST(Program, SaysItsVersion) {
 TEST(Program, EveryCommandHasHelp) {
   const ProgramResult all = cnerf({"--help"});
   EXPECT_EQ(all.exit_code, 0);
-  for (const char* command : {"run", "sample", "train", "colorize", "render", "eval", "bake", "view", "info", "doctor"}) {
+  for (const char* command :
+       {"run", "sample", "train", "colorize", "render", "eval", "compare", "bake", "view", "info", "doctor"}) {
     EXPECT_THAT(all.out, HasSubstr(command));
     const ProgramResult one = cnerf({command, "--help"});
     EXPECT_EQ(one.exit_code, 0) << command;

@@ -123,6 +123,46 @@ TEST(ChromaticityEngine, StartsGreyAndReachesTheTargets) {
 }
 
 /// The contract of the bake: compositing the samples' XYZ in linear light gives the pixel's ab and its luminance.
+/// Two answers of three say one colour, the third says another: the photometric loss takes their mean, Huber's stays
+/// with the majority.
+TEST(ChromaticityEngine, SquaredLossTakesTheMeanAndHubersTheMajority) {
+  const Ab often{30, 10}, seldom{-30, -10};
+  const PixelSamples pixels = row_of_pixels(12);
+  const auto learnt = [&](AbLoss loss) {
+    const auto engine = make_cpu_chromaticity_engine(small_grid(), 5);
+    for (int i = 0; i < 600; ++i) {
+      const std::vector<Ab> targets(12, i % 3 == 2 ? seldom : often);
+      engine->step(pixels, targets, {}, loss, i < 400 ? 1e-2f : 1e-3f);
+    }
+    std::vector<Ab> colors(12);
+    engine->composite(pixels, colors);
+    return colors;
+  };
+  const std::vector<Ab> mean = learnt(AbLoss::kSquared), majority = learnt(AbLoss::kHuber);
+  for (int p = 0; p < 12; ++p) {
+    EXPECT_NEAR(mean[p].a, (2 * often.a + seldom.a) / 3, 5);
+    EXPECT_NEAR(majority[p].a, often.a, 5);
+  }
+}
+
+TEST(ChromaticityEngine, APixelWithoutWeightDoesNotCount) {
+  const PixelSamples pixels = row_of_pixels(2);
+  const auto engine = make_cpu_chromaticity_engine(small_grid(), 5);
+  const std::vector<float> weights = {1, 0};
+  for (int i = 0; i < 200; ++i) engine->step(pixels, std::vector<Ab>(2, {30, 10}), weights, AbLoss::kSquared, 1e-2f);
+  const auto unweighted = make_cpu_chromaticity_engine(small_grid(), 5);
+  PixelSamples first = row_of_pixels(2);
+  first.offsets.resize(2);
+  first.positions.resize(2);
+  first.weights.resize(2);
+  first.luminance.resize(2);
+  for (int i = 0; i < 200; ++i) unweighted->step(first, std::vector<Ab>(1, {30, 10}), {}, AbLoss::kSquared, 1e-2f);
+  std::vector<Ab> with(2), without(2);
+  engine->composite(pixels, with);
+  unweighted->composite(pixels, without);
+  for (int p = 0; p < 2; ++p) EXPECT_NEAR(with[p].a, without[p].a, 1.0) << p;
+}
+
 TEST(ChromaticityEngine, PixelColourIsTheCompositeOfTheSamplesLight) {
   const auto engine = make_cpu_chromaticity_engine(small_grid(), 3);
   const PixelSamples pixels = row_of_pixels(16);

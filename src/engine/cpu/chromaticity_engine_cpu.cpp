@@ -34,7 +34,9 @@ class ChromaticityEngineCpu final : public ChromaticityEngine {
   ChromaticityEngineCpu(const HashGridOptions& grid, std::uint64_t seed)
       : field_(grid, kOutputs, /*relu_output=*/false, seed) {}
 
-  double step(const PixelSamples& pixels, std::span<const Ab> targets, float learning_rate) override {
+  using ChromaticityEngine::step;
+  double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
+              AbLoss loss, float learning_rate) override {
     CNERF_CHECK_EQ(targets.size(), pixels.pixels());
     const float scale = 1.0f / static_cast<float>(pixels.pixels());
     chunks_.run(pixels.pixels(), kBlockPixels, field_.weight_count(),
@@ -43,7 +45,8 @@ class ChromaticityEngineCpu final : public ChromaticityEngine {
                   const std::size_t first = forward(pixels, begin, end, work);
                   std::fill(work.d_output.begin(), work.d_output.end(), 0.0f);
                   for (std::size_t p = begin; p < end; ++p) {
-                    chunk.loss += loss_gradient(pixels, p, first, targets[p], scale, work);
+                    const float weight = pixel_weights.empty() ? 1.0f : pixel_weights[p];
+                    chunk.loss += loss_gradient(pixels, p, first, targets[p], loss, weight * scale, work);
                   }
                   float* d_encoded = chunk.append(work.positions, work.groups, field_.encoded_channels());
                   field_.backward(work, d_encoded, chunk.d_weights.data());
@@ -106,14 +109,14 @@ class ChromaticityEngineCpu final : public ChromaticityEngine {
     return sum;
   }
 
-  /// ab distance of one pixel; adds the gradient of its smooth form (Huber) to the samples' outputs.
-  double loss_gradient(const PixelSamples& pixels, std::size_t p, std::size_t first, Ab target, float scale,
-                       PointWorkspace& work) const {
+  /// ab distance of one pixel; adds the gradient of its loss, times `scale`, to the samples' outputs.
+  double loss_gradient(const PixelSamples& pixels, std::size_t p, std::size_t first, Ab target, AbLoss loss,
+                       float scale, PointWorkspace& work) const {
     const PixelXyz seen = xyz_of(pixels, p, first, work);
     const Ab color = ab_of(seen);
     const float da = color.a - target.a, db = color.b - target.b;
     const float distance = std::sqrt(da * da + db * db);
-    const float slope = scale / std::max(distance, kSmoothDistance);
+    const float slope = scale / (loss == AbLoss::kHuber ? std::max(distance, kSmoothDistance) : kSmoothDistance);
     const float d_x = slope * da * 500.0f * lab_f_derivative(seen.x);
     const float d_z = -slope * db * 200.0f * lab_f_derivative(seen.z);
     for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {

@@ -1,0 +1,95 @@
+/// cnerf compare: the paper's table, its baselines and ablations.
+
+#include "src/app/command.h"
+#include "src/app/common_options.h"
+#include "src/app/comparison_run.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/evaluate/rating_sheet.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+struct CompareArguments {
+  ConfigArguments config;
+  std::vector<std::string> captures, ratings;
+  std::string out, methods = "all", lpips_weights;
+  int seeds = 1;
+  bool rating_sheet = false, resume = false, overwrite = false;
+};
+
+void read_ratings_back(const CompareArguments& arguments, Reporter& reporter) {
+  const fs::path folder = arguments.out;
+  const std::vector<fs::path> answers(arguments.ratings.begin(), arguments.ratings.end());
+  const std::vector<MethodRating> ratings = read_ratings(folder / "rating_key.json", answers);
+  write_file(folder / "ratings.json", ratings_json(ratings));
+  write_file(folder / "ratings.md", ratings_markdown(ratings));
+  reporter.say(ratings_markdown(ratings));
+  reporter.wrote("ratings", folder / "ratings.json");
+  reporter.wrote("ratings", folder / "ratings.md");
+}
+
+/// A comparison that is there already is gone on with, or made anew, only when that is asked for.
+void check_folder(const CompareArguments& arguments) {
+  const fs::path folder = arguments.out;
+  std::error_code failure;
+  if (!fs::exists(folder, failure) || fs::is_empty(folder, failure)) return;
+  if (!fs::is_directory(folder / "runs", failure)) {
+    throw UsageError(arguments.out + ": is not empty and holds no comparison; choose another folder");
+  }
+  if (arguments.overwrite) {
+    fs::remove_all(folder / "runs");
+  } else if (!arguments.resume) {
+    throw UsageError(arguments.out +
+                     ": holds a comparison already; pass --resume to go on with it or --overwrite to start again");
+  }
+}
+
+void compare(const CompareArguments& arguments, const std::vector<std::string>& command_line) {
+  Reporter reporter = make_reporter(arguments.config);
+  if (!arguments.ratings.empty()) return read_ratings_back(arguments, reporter);
+  if (arguments.captures.empty()) throw UsageError("CAPTURE: at least one is needed");
+  Config config = resolve_config(arguments.config);
+  if (config.colorizer.spec.empty()) {
+    config.colorizer.spec = "simulated:";
+    reporter.say("no --colorizer given: a simulated one disturbs the true colours (docs/evaluation.md)");
+  }
+  ComparisonPlan plan;
+  plan.captures.assign(arguments.captures.begin(), arguments.captures.end());
+  plan.report = arguments.out;
+  plan.methods = parse_methods(arguments.methods);
+  for (int seed = 1; seed <= arguments.seeds; ++seed) plan.seeds.push_back(seed);
+  plan.lpips_weights = arguments.lpips_weights;
+  for (const std::string& word : command_line) plan.command_line += (plan.command_line.empty() ? "" : " ") + word;
+  check_folder(arguments);
+  ComparisonRun comparison(std::move(plan), config, reporter);
+  write_file(fs::path(arguments.out) / "config.toml", to_toml(config));
+  comparison.run();
+  comparison.write_report();
+  if (arguments.rating_sheet) comparison.write_rating_sheet();
+  reporter.next("open " + (fs::path(arguments.out) / "report.html").string() + " in a browser");
+}
+
+}  // namespace
+
+Work declare_compare(CLI::App& app) {
+  auto arguments = std::make_shared<CompareArguments>();
+  app.add_option("CAPTURE", arguments->captures, "Folders of colour photographs and camera poses");
+  app.add_option("-o,--out", arguments->out, "Folder of the report, made if needed")->required();
+  app.add_option("--methods", arguments->methods, "Names of methods, comma-separated, or all [all]");
+  app.add_option("--seeds", arguments->seeds, "How often everything is repeated, with seeds 1, 2, ... [1]")
+      ->check(CLI::Range(1, 100));
+  app.add_option("--lpips-weights", arguments->lpips_weights, "LPIPS weights (X_f32.bin beside X_manifest.txt)");
+  app.add_flag("--rating-sheet", arguments->rating_sheet, "Also write a page on which people judge unnamed pictures");
+  app.add_option("--ratings", arguments->ratings, "Only make a table of these files of answers to the rating sheet");
+  add_colorizer_options(app, arguments->config);
+  add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");
+  add_short_form(app, arguments->config, "--holdout", "capture.holdout", "Keep every N-th view for evaluation");
+  app.add_flag("--resume", arguments->resume, "Go on with a comparison; what is finished and unchanged stays");
+  app.add_flag("--overwrite", arguments->overwrite, "Start again where a comparison is already");
+  add_config_options(app, arguments->config);
+  return [arguments](const auto& command_line) { compare(*arguments, command_line); };
+}
+
+}  // namespace cnerf

@@ -1,0 +1,349 @@
+#include "src/app/comparison_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "src/app/camera_path.h"
+#include "src/app/picture_files.h"
+#include "src/app/pipeline.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/capture/color_truth.h"
+#include "src/evaluate/flow_colorizer.h"
+#include "src/evaluate/rating_sheet.h"
+#include "src/evaluate/simulated_colorizer.h"
+#include "src/train/options_json.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kUsualHoldout = 8;       // where neither the capture nor the user says
+constexpr int kShownViews = 4;         // of a capture, in the report
+constexpr int kPictureWidth = 480;     // pixels, in the report
+constexpr int kPictureQuality = 88;    // of JPEG
+constexpr int kFrameQuality = 80;      // of a turntable's
+constexpr int kFramesPerSecond = 12;   // of a turntable
+constexpr std::size_t kLongRange = 8;  // the turntable's share that long-range consistency looks across
+
+/// A colorizer that asks another one, kept alive with it.
+class OwningFlowColorizer final : public Colorizer {
+ public:
+  explicit OwningFlowColorizer(std::unique_ptr<Colorizer> inner) : inner_(std::move(inner)), flow_(*inner_) {}
+  ChromaBatch colorize(const LightnessBatch& patches) override { return flow_.colorize(patches); }
+  [[nodiscard]] std::string name() const override { return flow_.name(); }
+
+ private:
+  std::unique_ptr<Colorizer> inner_;
+  FlowColorizer flow_;
+};
+
+bool is_simulated(const std::string& spec) {
+  return spec == "simulated" || spec.starts_with("simulated:");
+}
+
+EncodedPicture read_picture(const fs::path& file, const char* type) {
+  return {type, read_binary_file(file)};
+}
+
+std::vector<EncodedPicture> read_pictures(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code failure;
+  for (const auto& entry : fs::directory_iterator(folder, failure)) files.push_back(entry.path());
+  std::ranges::sort(files);
+  std::vector<EncodedPicture> pictures;
+  for (const fs::path& file : files) pictures.push_back(read_picture(file, "jpeg"));
+  return pictures;
+}
+
+void write_jpeg(const fs::path& file, const Picture& picture, int width, int quality) {
+  write_file(file, std::span<const std::byte>(jpeg_bytes(scaled_down(picture, width), quality)));
+}
+
+std::string digest(const std::string& text) {
+  return sha256(std::as_bytes(std::span(text)));
+}
+
+std::string numbered(std::size_t index) {
+  return fmt::format("{:04}.jpg", index);
+}
+
+/// Evenly spread indices.
+std::vector<std::size_t> some_of(std::size_t all, std::size_t wanted) {
+  std::vector<std::size_t> indices;
+  const std::size_t count = std::min(all, wanted);
+  for (std::size_t i = 0; i < count; ++i) indices.push_back(i * all / count);
+  return indices;
+}
+
+bool any_held_out(const Capture& capture) {
+  return std::ranges::any_of(capture.views, [](const View& view) { return view.held_out; });
+}
+
+Picture input_picture(const View& view) {
+  std::vector<float> luminance(view.image.pixel_count());
+  for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = view.image.luminance(i);
+  return picture_from_linear(view.image.width, view.image.height, luminance);
+}
+
+/// The settings that a folder was made with; empty when it was not.
+std::string settings_in(const fs::path& folder) {
+  const fs::path file = folder / "settings.txt";
+  return fs::exists(file) ? read_text_file(file) : "";
+}
+
+/// An empty folder unless it was made with these settings.
+void begin_folder(const fs::path& folder, const std::string& settings) {
+  if (settings_in(folder) == settings) return;
+  fs::remove_all(folder);
+  write_file(folder / "settings.txt", settings);
+}
+
+}  // namespace
+
+struct ComparisonRun::Subject {
+  std::string name;
+  Capture capture;
+  std::vector<const View*> evaluated;
+
+  [[nodiscard]] std::vector<std::size_t> shown() const { return some_of(evaluated.size(), kShownViews); }
+};
+
+struct ComparisonRun::Geometry {
+  fs::path folder;
+  std::vector<CachedView> training_views;
+  std::shared_ptr<TraceMemory> traces = make_trace_memory();
+};
+
+ComparisonRun::ComparisonRun(ComparisonPlan plan, Config config, Reporter& reporter)
+    : plan_(std::move(plan)), config_(std::move(config)), reporter_(reporter) {
+  if (!plan_.lpips_weights.empty()) lpips_ = std::make_unique<Lpips>(plan_.lpips_weights);
+  if (is_simulated(config_.colorizer.spec)) {
+    const std::string& spec = config_.colorizer.spec;
+    (void)parse_simulation(spec.substr(std::min(spec.size(), sizeof("simulated:") - 1)));
+  }
+  for (const fs::path& path : plan_.captures) {
+    auto subject = std::make_shared<Subject>();
+    subject->capture = read_capture(path, config_, reporter_);
+    if (!any_held_out(subject->capture) && config_.capture.holdout == 0) {
+      Config held_out = config_;
+      held_out.capture.holdout = kUsualHoldout;
+      reporter_.say(fmt::format("nothing is held out by the capture: every {}th view is", kUsualHoldout));
+      subject->capture = load_capture(path, held_out.capture);
+    }
+    subject->evaluated = views_to_evaluate(subject->capture, {});
+    if (!load_color_truth(*subject->evaluated.front())) {
+      throw InputError(subject->evaluated.front()->image_file, "colour",
+                       "methods are compared with true colours, and this picture is grey");
+    }
+    const std::string name = fs::absolute(path / "").lexically_normal().parent_path().filename().string();
+    subject->name = name;
+    for (int copy = 2; std::ranges::any_of(subjects_, [&](const auto& other) { return other->name == subject->name; });
+         ++copy) {
+      subject->name = fmt::format("{}-{}", name, copy);
+    }
+    subjects_.push_back(std::move(subject));
+  }
+}
+
+void ComparisonRun::run() {
+  for (const auto& subject : subjects_) {
+    for (const int seed : plan_.seeds) run_capture(*subject, seed);
+  }
+}
+
+fs::path ComparisonRun::folder_of(const Subject& subject, int seed) const {
+  return plan_.report / "runs" / subject.name / fmt::format("seed-{}", seed);
+}
+
+void ComparisonRun::run_capture(const Subject& subject, int seed) {
+  Geometry geometry{folder_of(subject, seed), {}};
+  const std::string stage1_settings = train(subject, seed, geometry.folder);
+  for (const Method* method : plan_.methods) {
+    const std::string settings =
+        digest(stage1_settings + method->name + options_to_json(stage2_of(*method, config_.stage2)).dump() +
+               options_to_json(config_.colorizer).dump() + options_to_json(config_.render).dump() +
+               (lpips_ ? lpips_->network() : ""));
+    cells_.push_back(run_cell(subject, *method, seed, geometry, settings));
+  }
+}
+
+std::string ComparisonRun::train(const Subject& subject, int seed, const fs::path& folder) const {
+  Stage1Options options = config_.stage1;
+  options.seed = seed;
+  const std::string settings = digest(fs::absolute(subject.capture.root).string() + options_to_json(options).dump() +
+                                      options_to_json(config_.capture).dump());
+  const fs::path done = folder / "stage1.txt";
+  if (settings_in(folder) == settings && fs::exists(done)) return settings;
+  begin_folder(folder, settings);
+  reporter_.say(fmt::format("{}, seed {}: stage 1", subject.name, seed));
+  const Stage1Report report =
+      train_stage1(subject.capture, options, folder / "stage1.snapshot", true, reporter_.sink());
+  write_file(done, fmt::format("{} steps, {:.1f} s, {:.2f} dB on training pixels\n", report.steps, report.seconds,
+                               report.train_psnr));
+  return settings;
+}
+
+ComparisonCell ComparisonRun::run_cell(const Subject& subject, const Method& method, int seed, Geometry& geometry,
+                                       const std::string& settings) const {
+  const fs::path folder = geometry.folder / method.name;
+  const fs::path file = folder / "cell.json";
+  if (fs::exists(file) && settings_in(folder) == settings) {
+    ComparisonCell finished = read_cell(file);
+    if (finished.error.empty()) return finished;
+  }
+  begin_folder(folder, settings);
+  reporter_.say(fmt::format("{}, seed {}: {}", subject.name, seed, method.name));
+  ComparisonCell cell;
+  cell.capture = subject.name;
+  cell.method = method.name;
+  cell.seed = seed;
+  cell.settings = settings;
+  try {
+    if (method.is_colored) colorize(subject, method, seed, geometry, cell);
+    look(subject, method, geometry, cell);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::exception& problem) {
+    cell.error = problem.what();
+    reporter_.say(fmt::format("{} failed: {}", method.name, problem.what()));
+  }
+  write_file(file, to_json(cell));
+  return cell;
+}
+
+std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, const Method& method, int seed) const {
+  const std::string& spec = config_.colorizer.spec;
+  if (method.knows_truth) return make_simulated_colorizer(subject.capture, oracle_simulation());
+  std::unique_ptr<Colorizer> colorizer;
+  if (is_simulated(spec)) {
+    SimulationOptions options = parse_simulation(spec == "simulated" ? "" : spec.substr(spec.find(':') + 1));
+    options.seed += seed - 1;  // each seed meets other errors
+    colorizer = make_simulated_colorizer(subject.capture, options);
+  } else {
+    Config of_seed = config_;
+    of_seed.stage2.seed = seed;
+    colorizer =
+        make_colorizer(colorizer_options(of_seed, subject.capture.root, folder_of(subject, seed) / "cache", reporter_));
+  }
+  if (!method.follows_flow) return colorizer;
+  return std::make_unique<OwningFlowColorizer>(std::move(colorizer));
+}
+
+void ComparisonRun::colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry,
+                             ComparisonCell& cell) const {
+  Stage2Options options = stage2_of(method, config_.stage2);
+  options.seed = seed;
+  const auto colorizer = colorizer_for(subject, method, seed);
+  const Stage2Report report = train_stage2(subject.capture, geometry.folder / "stage1.snapshot", options, *colorizer,
+                                           {}, geometry.folder / method.name / "take.snapshot", true, reporter_.sink(),
+                                           {}, &geometry.training_views);
+  cell.accepted = report.accepted;
+  cell.rejected = report.rejected;
+  cell.seconds = report.seconds;
+  cell.metrics.colorizer = colorizer->name();
+}
+
+/// Measures the views, and renders what is shown of a method.
+void ComparisonRun::look(const Subject& subject, const Method& method, Geometry& geometry, ComparisonCell& cell) const {
+  const fs::path folder = geometry.folder / method.name;
+  const auto scene = Scene::load(geometry.folder / "stage1.snapshot",
+                                 method.is_colored ? folder / "take.snapshot" : fs::path(), geometry.traces);
+  EvaluateOptions options;
+  options.render = render_options(config_);
+  options.lpips = lpips_.get();
+  options.with_baked = false;
+  options.grey_as_color = true;
+  const std::vector<std::size_t> shown = subject.shown();
+  std::size_t index = 0;
+  const auto keep_shown = [&](const EvaluatedView& view) {
+    const auto place = std::ranges::find(shown, index++);
+    if (place == shown.end()) return;
+    write_jpeg(folder / "views" / numbered(std::size_t(place - shown.begin())),
+               picture_of(view.ours, ShownColor::kDecoded), kPictureWidth, kPictureQuality);
+  };
+  const std::string colorizer = cell.metrics.colorizer;
+  cell.metrics = evaluate(*scene, subject.capture, options, keep_shown, reporter_.sink());
+  cell.metrics.take = method.name;
+  cell.metrics.colorizer = colorizer;
+
+  const CameraPath path = turntable_path(subject.capture, config_.render);
+  std::vector<RenderedImage> frames;
+  std::vector<SeenView> seen;
+  frames.reserve(path.cameras.size());
+  for (const PathCamera& camera : path.cameras) {
+    if (interruption_requested()) throw Interrupted("comparison stopped");
+    frames.push_back(scene->render(camera.intrinsics, camera.world_from_camera, options.render));
+    write_jpeg(folder / "turntable" / numbered(frames.size() - 1), picture_of(frames.back(), ShownColor::kDecoded),
+               kPictureWidth, kFrameQuality);
+    seen.push_back({&frames.back(), camera.intrinsics, camera.world_from_camera});
+    reporter_.sink()({"turntable", double(frames.size()) / double(path.cameras.size()), {}});
+  }
+  if (!method.is_colored) return;
+  cell.short_range = consistency(seen, 1);
+  cell.long_range = consistency(seen, std::max<std::size_t>(2, path.cameras.size() / kLongRange));
+}
+
+ComparisonSummary ComparisonRun::summary() const {
+  return {config_.colorizer.spec, lpips_ ? lpips_->network() : "", plan_.command_line};
+}
+
+/// Pictures of the first seed.
+ReportCapture ComparisonRun::report_of(const Subject& subject) const {
+  ReportCapture report;
+  report.name = subject.name;
+  report.frames_per_second = kFramesPerSecond;
+  for (const std::size_t index : subject.shown()) {
+    const View& view = *subject.evaluated[index];
+    report.view_names.push_back(view.name);
+    report.inputs.push_back({"jpeg", jpeg_bytes(scaled_down(input_picture(view), kPictureWidth), kPictureQuality)});
+    const std::optional<ColorImage> truth = load_color_truth(view);
+    if (!truth) continue;
+    const Picture picture = picture_from_linear(truth->width, truth->height, truth->rgb);
+    report.truths.push_back({"jpeg", jpeg_bytes(scaled_down(picture, kPictureWidth), kPictureQuality)});
+  }
+  if (report.truths.size() != report.inputs.size()) report.truths.clear();
+  const fs::path runs = folder_of(subject, plan_.seeds.front());
+  for (const Method* method : plan_.methods) {
+    const fs::path folder = runs / method->name;
+    ReportMethod shown{method->name, read_pictures(folder / "views"), read_pictures(folder / "turntable"), {}};
+    for (const auto& [file, title] : {std::pair{"bases.png", "base images"},
+                                      {"accepted.png", "accepted answers"},
+                                      {"rejected.png", "rejected answers"}}) {
+      const bool purifies = method->is_colored && stage2_of(*method, config_.stage2).purify.enabled;
+      if (purifies && fs::exists(folder / file)) shown.galleries.push_back({title, read_picture(folder / file, "png")});
+    }
+    report.methods.push_back(std::move(shown));
+  }
+  return report;
+}
+
+void ComparisonRun::write_report() const {
+  std::vector<ReportCapture> captures;
+  for (const auto& subject : subjects_) captures.push_back(report_of(*subject));
+  write_file(plan_.report / "table.json", table_json(cells_, summary()));
+  write_file(plan_.report / "table.md", table_markdown(cells_, summary()));
+  write_file(plan_.report / "report.html", comparison_html(cells_, summary(), captures));
+  for (const char* file : {"table.json", "table.md", "report.html"}) reporter_.wrote("comparison", plan_.report / file);
+}
+
+void ComparisonRun::write_rating_sheet() const {
+  std::vector<RatedPicture> pictures;
+  for (const auto& subject : subjects_) {
+    const ReportCapture report = report_of(*subject);
+    for (const ReportMethod& method : report.methods) {
+      const bool is_bound = method.name == "grey" || method.name == "oracle";
+      for (std::size_t v = 0; v < method.views.size() && !is_bound; ++v) {
+        pictures.push_back({subject->name, report.view_names[v], method.name, method.views[v]});
+      }
+    }
+  }
+  const RatingSheet sheet = make_rating_sheet(std::move(pictures), std::uint64_t(plan_.seeds.front()));
+  write_file(plan_.report / "rating_sheet.html", sheet.html);
+  write_file(plan_.report / "rating_key.json", sheet.key);
+  reporter_.wrote("rating sheet, for raters", plan_.report / "rating_sheet.html");
+  reporter_.wrote("its key, not for raters", plan_.report / "rating_key.json");
+}
+
+}  // namespace cnerf

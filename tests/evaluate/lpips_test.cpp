@@ -1,0 +1,75 @@
+#include "src/evaluate/lpips.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "tests/support/data.h"
+
+namespace cnerf::test {
+namespace {
+namespace fs = std::filesystem;
+
+struct Rgb8 {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> values;
+};
+
+Rgb8 read_rgb(const fs::path& file) {
+  cv::Mat image;
+  cv::cvtColor(cv::imread(file.string()), image, cv::COLOR_BGR2RGB);
+  return {image.cols, image.rows, {image.data, image.data + image.total() * 3}};
+}
+
+double distance(const Lpips& lpips, const Rgb8& a, const Rgb8& b) {
+  return lpips.distance(a.values, b.values, a.width, a.height);
+}
+
+/// Golden values of the published code, version 0.1.
+TEST(Lpips, AlexNetGivesThePublishedDistances) {
+  CNERF_REQUIRE_DATA(data, "lpips");
+  const Lpips lpips(data / "lpips_alex_f32.bin");
+  const Rgb8 reference = read_rgb(data / "ex_ref.png");
+  EXPECT_EQ(lpips.network(), "AlexNet");
+  EXPECT_NEAR(distance(lpips, read_rgb(data / "ex_p0.png"), reference), 0.7219, 1e-4);
+  EXPECT_NEAR(distance(lpips, read_rgb(data / "ex_p1.png"), reference), 0.1376, 1e-4);
+}
+
+TEST(Lpips, SqueezeNetGivesThePublishedDistances) {
+  CNERF_REQUIRE_DATA(data, "lpips");
+  const Lpips lpips(data / "lpips_sq_f32.bin");
+  const Rgb8 reference = read_rgb(data / "ex_ref.png");
+  EXPECT_EQ(lpips.network(), "SqueezeNet");
+  EXPECT_NEAR(distance(lpips, read_rgb(data / "ex_p0.png"), reference), 0.71105, 1e-4);
+  EXPECT_NEAR(distance(lpips, read_rgb(data / "ex_p1.png"), reference), 0.14790, 1e-4);
+}
+
+TEST(Lpips, IsZeroForEqualPicturesAndSymmetric) {
+  CNERF_REQUIRE_DATA(data, "lpips");
+  const Lpips lpips(data / "lpips_alex_f32.bin");
+  const Rgb8 a = read_rgb(data / "ex_ref.png"), b = read_rgb(data / "ex_p0.png");
+  EXPECT_EQ(distance(lpips, a, a), 0.0);
+  EXPECT_NEAR(distance(lpips, a, b), distance(lpips, b, a), 1e-6);
+}
+
+TEST(Lpips, RefusesWeightsThatAreNone) {
+  const TempDir folder;
+  EXPECT_THROW(Lpips(folder / "missing.bin"), MissingInputError);
+  write_file(folder / "net.bin", std::string(64, '\0'));
+  EXPECT_THROW(Lpips(folder / "net.bin"), MissingInputError);  // no manifest
+  write_file(folder / "net.txt", std::string("conv1.weight 64x3x11x11 0\n"));
+  try {
+    Lpips lpips(folder / "net.bin");
+    FAIL() << "read beyond the end";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("conv1.weight"), std::string::npos) << error.what();
+  }
+  write_file(folder / "net.txt", std::string("conv1.weight 4xthree 0\n"));
+  EXPECT_THROW(Lpips(folder / "net.bin"), InputError);
+}
+
+}  // namespace
+}  // namespace cnerf::test
