@@ -10,6 +10,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/colorizer/builtin_colorizer.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/reference_images.h"
 
@@ -108,6 +109,7 @@ class ReferenceColorizer final : public Colorizer {
 std::unique_ptr<Colorizer> make_reference_colorizer(const std::string& argument, const ColorizerOptions& options) {
   ReferenceRecipe recipe;
   recipe.steps = options.reference_steps;
+  if (options.reference_on_builtin) recipe.builtin = builtin_weights_file();
   return make_reference_colorizer(argument, options, recipe);
 }
 

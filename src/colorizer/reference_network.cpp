@@ -6,12 +6,15 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <sstream>
 
 #include "src/base/check.h"
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/color/ab_bins.h"
+#include "src/colorizer/network_weights.h"
 
 // Present when LibTorch computes with OpenBLAS, null otherwise.
 extern "C" __attribute__((weak)) void openblas_set_num_threads(int threads);
@@ -58,6 +61,13 @@ struct BlockImpl : nn::Module {
 };
 TORCH_MODULE(Block);
 
+/// What the frozen built-in network makes of a picture; empty without one.
+struct Guidance {
+  static constexpr std::size_t kSemanticLevel = 3, kAbLevel = 1;  // of the U-Net, at the same resolution
+  Tensor semantic;  ///< [B, ColorizerNetImpl::kSemanticChannels, H/16, W/16]
+  Tensor ab;        ///< [B, 2, H/4, W/4], network units
+};
+
 /// U-Net from lightness at full size to `outputs` channels at half size.
 struct UNetImpl : nn::Module {
   UNetImpl(const ReferenceRecipe& recipe, int outputs) : recipe_(recipe) {
@@ -77,15 +87,22 @@ struct UNetImpl : nn::Module {
       decode.push_back(register_module("decode" + name, Block(c[level], c[level], 1)));
     }
     head = register_module("head", nn::Conv2d(nn::Conv2dOptions(c[0], outputs, 1)));
+    if (recipe.builtin.empty()) return;
+    CNERF_CHECK(c.size() > Guidance::kSemanticLevel, "as many levels as the built-in network's features need");
+    guide_semantic = register_module("guide_semantic", nn::Conv2d(nn::Conv2dOptions(ColorizerNetImpl::kSemanticChannels,
+                                                                                    c[Guidance::kSemanticLevel], 1)));
+    guide_ab = register_module("guide_ab", nn::Conv2d(nn::Conv2dOptions(2, c[Guidance::kAbLevel], 3).padding(1)));
   }
 
   /// @param lightness  [B, 1, H, W] L*, H and W multiples of 2^levels.   @return [B, outputs, H/2, W/2]
-  Tensor forward(const Tensor& lightness) {
+  Tensor forward(const Tensor& lightness, const Guidance& guidance) {
     Tensor x = features(lightness);
     x = x.contiguous(at::MemoryFormat::ChannelsLast);
     std::vector<Tensor> skips;
     for (std::size_t level = 0; level < down.size(); ++level) {
       x = down[level](x);
+      if (guide_semantic && level == Guidance::kSemanticLevel) x = x + guide_semantic(guidance.semantic);
+      if (guide_ab && level == Guidance::kAbLevel) x = x + guide_ab(guidance.ab);
       x = x + encode[level](x);
       skips.push_back(x);
     }
@@ -123,6 +140,7 @@ struct UNetImpl : nn::Module {
   Block wide{nullptr};
   nn::Conv2d global{nullptr};
   nn::Conv2d head{nullptr};
+  nn::Conv2d guide_semantic{nullptr}, guide_ab{nullptr};  // empty without guidance
 
  private:
   ReferenceRecipe recipe_;
@@ -141,8 +159,9 @@ void initialise(UNet& net, std::uint64_t seed) {
       continue;
     }
     const double fan_in = double(parameter.numel()) / double(parameter.size(0));
+    const bool guide = item.key().rfind("guide", 0) == 0;
     const bool last = item.key().rfind("head", 0) == 0, before_silu = item.key().find(".conv.") != std::string::npos;
-    const double gain = last ? 0.1 : before_silu ? 1.4 : 0.6;
+    const double gain = guide ? 0 : last ? 0.1 : before_silu ? 1.4 : 0.6;
     Tensor values = torch::empty(parameter.sizes());
     float* value = values.data_ptr<float>();
     for (int64_t i = 0; i < values.numel(); ++i) value[i] = float(gain / std::sqrt(fan_in)) * rng.normal();
@@ -204,7 +223,7 @@ class LabelTable {
 
 std::string ReferenceRecipe::text() const {
   std::ostringstream text;
-  text << "reference network 2; channels";
+  text << "reference network 3; channels";
   for (int c : channels) text << ' ' << c;
   text << "; patch " << patch_size << "; steps " << steps << "; batch " << batch << '/' << shards << "; rate "
        << learning_rate << "; decay " << weight_decay << "; classify " << classify << ' ' << temperature
@@ -212,6 +231,7 @@ std::string ReferenceRecipe::text() const {
        << "; rotation " << distortion.rotation << "; stretch " << distortion.stretch << "; flip " << distortion.flip
        << "; tone " << distortion.log_gamma << ' ' << distortion.contrast << "; blur " << distortion.blur << "; noise "
        << distortion.noise;
+  if (!builtin.empty()) text << "; on " << sha256(read_binary_file(builtin));
   return text.str();
 }
 
@@ -222,7 +242,14 @@ struct ReferenceNetwork::Parts {
   std::unique_ptr<LabelTable> labels;  // likewise
   Tensor centres;                      // [2, classes, 1, 1]
   UNet net{nullptr};
+  std::optional<ColorizerWeights> builtin;
 
+  [[nodiscard]] Guidance guidance(const Tensor& lightness) const {
+    if (!builtin) return {};
+    const torch::NoGradGuard no_grad;
+    const ColorizerFeatures features = ColorizerNet(builtin->network)->features(lightness);
+    return {features.semantic, decode_ab(features.logits, builtin->decoding) / kAbScale};
+  }
   [[nodiscard]] Tensor decode(const Tensor& out) const {
     if (!recipe.classify) return out * kAbScale;
     const Tensor p = torch::softmax(out / recipe.temperature, 1);
@@ -272,7 +299,7 @@ std::vector<Tensor> ReferenceNetwork::Parts::shard_gradients(std::span<const Ref
                            {lightness.data_ptr<float>() + std::size_t(i) * pixels, pixels},
                            {ab.data_ptr<float>() + std::size_t(i) * 2 * pixels, 2 * pixels});
   }
-  const Tensor value = loss(UNet(net)->forward(lightness), torch::avg_pool2d(ab, {2, 2}));
+  const Tensor value = loss(UNet(net)->forward(lightness, guidance(lightness)), torch::avg_pool2d(ab, {2, 2}));
   *loss_value = value.item<double>();
   return torch::autograd::grad({value}, net->parameters());
 }
@@ -295,6 +322,7 @@ ReferenceNetwork::ReferenceNetwork(const ReferenceRecipe& recipe, std::span<cons
     }
     parts_->labels = std::make_unique<LabelTable>(class_of);
   }
+  if (!recipe.builtin.empty()) parts_->builtin = load_colorizer_weights(recipe.builtin);
   parts_->net = UNet(recipe, recipe.classify ? int(parts_->bins.size()) : 2);
   initialise(parts_->net, seed);
 }
@@ -352,7 +380,7 @@ std::vector<float> ReferenceNetwork::colorize(const LightnessBatch& patches, boo
     lightness = torch::replication_pad2d(lightness, {0, rounded(width) - width, 0, rounded(height) - height});
     if (mirror) lightness = torch::cat({lightness, lightness.flip({3})});
     UNet net(parts_->net);
-    Tensor ab = parts_->decode(net->forward(lightness));
+    Tensor ab = parts_->decode(net->forward(lightness, parts_->guidance(lightness)));
     if (mirror) ab = (ab.slice(0, 0, 1) + ab.slice(0, 1, 2).flip({3})) / 2;
     ab = torch::upsample_bilinear2d(ab, {rounded(height), rounded(width)}, false);
     ab = ab.slice(2, 0, height).slice(3, 0, width).contiguous();

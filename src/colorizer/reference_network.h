@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
@@ -19,7 +20,7 @@ namespace cnerf {
 struct ReferenceRecipe {
   std::vector<int> channels = {24, 48, 64, 96, 96};  ///< per level; the first is at half the patch's size
   int patch_size = 128;
-  int steps = 1200;
+  int steps = 900;
   int batch = 4;
   int shards = 4;  ///< a batch's fixed parts; each is one task, so that results do not depend on the threads
   double learning_rate = 4e-3;
@@ -27,6 +28,10 @@ struct ReferenceRecipe {
   bool classify = true;    ///< soft labels over the photographs' bins, instead of ab itself
   double temperature = 1;  ///< of the annealed mean, when it classifies
   bool local_statistics = true;
+  /// Weights of the built-in network; empty = none. It is frozen, and the network fitted here reads what it makes of the
+  /// picture: its inner features and its colours (ladder side-tuning, Sung et al. 2022). These paths start at zero, so
+  /// that the photographs decide how much of it is used.
+  std::filesystem::path builtin;
   PatchDistortion distortion;
 
   /// All settings as text: part of a cache's key.

@@ -19,13 +19,14 @@
 namespace cnerf {
 
 struct ColorizerConfig {
-  std::string spec;             ///< "builtin", "reference:IMAGE…", "torchscript:FILE", …; empty = none given
-  std::string keyframes;        ///< "VIEW=FILE;…": painted frames of the capture
-  std::string hint_images;      ///< "VIEW=FILE;…": pictures that are transparent except for strokes
-  std::string hints;            ///< "x,y,VIEW,#rrggbb;…": dots, in pixels of the view's image file
-  std::string prompt;           ///< a text for colorizers that take one
-  double timeout_seconds = 60;  ///< for one batch of an exec: colorizer
-  int reference_steps = 1200;   ///< optimiser steps of a reference: colorizer's fit
+  std::string spec;                  ///< "builtin", "reference:IMAGE…", "torchscript:FILE", …; empty = none given
+  std::string keyframes;             ///< "VIEW=FILE;…": painted frames of the capture
+  std::string hint_images;           ///< "VIEW=FILE;…": pictures that are transparent except for strokes
+  std::string hints;                 ///< "x,y,VIEW,#rrggbb;…": dots, in pixels of the view's image file
+  std::string prompt;                ///< a text for colorizers that take one
+  double timeout_seconds = 60;       ///< for one batch of an exec: colorizer
+  int reference_steps = 900;         ///< optimiser steps of a reference: colorizer's fit
+  bool reference_on_builtin = true;  ///< that fit builds on the built-in network
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -37,6 +38,7 @@ struct ColorizerConfig {
     v("prompt", prompt, "a text for colorizers that take one: exec: commands with {prompt} in them");
     v("timeout_seconds", timeout_seconds, Range{0.1, 1e6}, "an exec: colorizer that takes longer for a batch failed");
     v("reference_steps", reference_steps, Range{1, 1e6}, "optimiser steps of the fit to a reference: photograph");
+    v("reference_on_builtin", reference_on_builtin, "that fit builds on what the built-in network makes of a picture");
   }
 };
 

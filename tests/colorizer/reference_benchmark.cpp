@@ -62,6 +62,7 @@ Settings parse(int argc, char** argv) {
       {"classify", [&](auto& v) { r.classify = std::stoi(v) != 0; }},
       {"temperature", [&](auto& v) { r.temperature = std::stod(v); }},
       {"statistics", [&](auto& v) { r.local_statistics = std::stoi(v) != 0; }},
+      {"builtin", [&](auto& v) { r.builtin = v; }},
       {"channels", [&](auto& v) { r.channels = numbers(v); }},
       {"share_min", [&](auto& v) { r.distortion.share_min = std::stod(v); }},
       {"share_max", [&](auto& v) { r.distortion.share_max = std::stod(v); }},

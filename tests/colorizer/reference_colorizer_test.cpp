@@ -9,6 +9,7 @@
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
+#include "src/colorizer/builtin_colorizer.h"
 #include "src/colorizer/reference_colorizer.h"
 #include "src/colorizer/reference_images.h"
 #include "src/colorizer/reference_network.h"
@@ -121,6 +122,34 @@ TEST_P(ReferenceNetworks, TheSameSeedGivesTheSameWeightsWithAnyNumberOfThreads) 
   EXPECT_EQ(once, fitted(2, 5));
   EXPECT_EQ(once, fitted(4, 5));
   EXPECT_NE(once, fitted(1, 6));
+}
+
+TEST(ReferenceNetwork, StartsAsItWouldWithoutTheBuiltinNetworkAndLearnsToUseIt) {
+  const Toy toy = toy_scene(1);
+  const std::vector<ReferenceImage> images{make_reference_image(toy.side, toy.side, toy.linear_rgb)};
+  const ReferenceRecipe alone = short_recipe(4);
+  ReferenceRecipe guided = alone;
+  guided.builtin = builtin_weights_file();
+  ReferenceNetwork plain(alone, images, 3), on_builtin(guided, images, 3);
+  EXPECT_GT(on_builtin.weights().size(), plain.weights().size());
+  const LightnessBatch question = test::some_question(2, 64, 96);
+  EXPECT_EQ(on_builtin.colorize(question), plain.colorize(question));
+
+  plain.fit(images, {});
+  on_builtin.fit(images, {});
+  EXPECT_NE(on_builtin.colorize(question), plain.colorize(question));
+  EXPECT_NE(guided.text(), alone.text()) << "a cached fit would be taken for another";
+
+  const auto fitted = [&](int threads) {
+    set_thread_count(threads);
+    ReferenceNetwork network(guided, images, 5);
+    network.fit(images, {});
+    set_thread_count(0);
+    return network.weights();
+  };
+  EXPECT_EQ(fitted(1), fitted(4));
+  guided.builtin = "no such.weights";
+  EXPECT_THROW(ReferenceNetwork(guided, images, 1), MissingInputError);
 }
 
 TEST(ReferenceNetwork, AnswersAnySizeAndWeightsComeBack) {
