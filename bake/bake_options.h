@@ -12,6 +12,9 @@ struct BakeOptions {
   double voxel_size = 0;             ///< world units; 0 = from `resolution`
   std::string aabb;                  ///< "x0,y0,z0,x1,y1,z1", world units; empty = tight box around occupied space
   double opacity_threshold = 0.01;   ///< on alpha = 1 - exp(-sigma h) of a voxel; fainter ones are dropped
+  double weight_threshold = 0.0125;  ///< share of a pixel's light a voxel gives to the view that sees it best; ditto
+  std::string grids = "auto";        ///< "one", or "nested": finer grids where most pixels look; auto: by cascades
+  std::string budget;                ///< memory of a renderer that makes grids dense, "4G"; empty = no limit
   int dilation = 2;                  ///< voxels that colour reaches beyond density; renderers interpolate into them
   int subsamples = 2;                ///< per axis of a voxel, for density
   int views_per_voxel = 8;           ///< training views that a voxel's luminance is averaged over, at most
@@ -24,6 +27,11 @@ struct BakeOptions {
     v("voxel_size", voxel_size, Range{0, 1e9}, "world units; 0 takes it from the resolution");
     v("aabb", aabb, "box to bake, x0,y0,z0,x1,y1,z1 in world units; empty = around occupied space");
     v("opacity_threshold", opacity_threshold, Range{0, 1}, "opacity of a voxel below which it is dropped");
+    v("weight_threshold", weight_threshold, Range{0, 0.5},
+      "share of a pixel's light a voxel gives to the view that sees it best, below which it is dropped");
+    v("grids", grids, Choice{"auto", "one", "nested"},
+      "one grid, or nested ones, finer where most pixels look; auto nests where the field has cascades");
+    v("budget", budget, "memory Cycles may take for the grids, as 4G or 500M; makes voxels larger until they fit");
     v("dilation", dilation, Range{2, 8}, "voxels that colour reaches beyond density");
     v("subsamples", subsamples, Range{1, 8}, "density samples along each axis of a voxel");
     v("views_per_voxel", views_per_voxel, Range{1, 256}, "views that a voxel's luminance is averaged over");

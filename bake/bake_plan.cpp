@@ -141,7 +141,7 @@ BakeEstimate estimate_bake(const ColorField& field, const BakePlan& plan) {
     for (int j = 0; j < plan.resolution.y; ++j) {
       for (int k = 0; k < plan.resolution.z; ++k) {
         const Vec3d world = plan.world_from_voxel({static_cast<double>(i) + 0.5, j + 0.5, k + 0.5});
-        if (!plan.box.contains(world)) continue;
+        if (!plan.box.contains(world) || plan.in_hole({static_cast<int>(i), j, k})) continue;
         per_plane[i] += field.may_be_occupied(frame.unit_from_world(world).cast<float>()) ? 1 : 0;
       }
     }

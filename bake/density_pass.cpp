@@ -17,6 +17,7 @@ Vec3f clamped_to_unit(Vec3f p) {
 /// Sub-samples of a brick that may hold matter, and the voxel each belongs to.
 struct BrickSamples {
   std::vector<Vec3f> positions;  ///< unit space
+  std::vector<Vec3f> insides;    ///< 0..1 in the voxel
   std::vector<std::int16_t> offsets;
 };
 
@@ -24,6 +25,7 @@ BrickSamples gather_samples(const ColorField& field, const BakePlan& plan, int s
   BrickSamples samples;
   for (int offset = 0; offset < kBrickVoxels; ++offset) {
     const Vec3i voxel = brick_min + brick_local(offset);
+    if (plan.in_hole(voxel)) continue;
     for (int s = 0; s < subsamples * subsamples * subsamples; ++s) {
       const Vec3i sub{s / (subsamples * subsamples), s / subsamples % subsamples, s % subsamples};
       const Vec3d inside = (sub.cast<double>() + Vec3d{0.5, 0.5, 0.5}) / static_cast<double>(subsamples);
@@ -32,6 +34,7 @@ BrickSamples gather_samples(const ColorField& field, const BakePlan& plan, int s
       const Vec3f unit = clamped_to_unit(field.frame().unit_from_world(world).cast<float>());
       if (!field.may_be_occupied(unit)) continue;
       samples.positions.push_back(unit);
+      samples.insides.push_back(inside.cast<float>());
       samples.offsets.push_back(static_cast<std::int16_t>(offset));
     }
   }
@@ -46,11 +49,16 @@ void check_density(float sigma) {
 /// Sums over the sub-samples of one voxel.
 struct Accumulated {
   double alpha = 0;
-  Vec3d alpha_position{};
+  Vec3d alpha_inside{};
 };
 
+std::uint8_t in_256ths(double share) {
+  return static_cast<std::uint8_t>(std::clamp(static_cast<int>(share * 256), 0, 255));
+}
+
+/// The kept voxels of a brick; their densities go to `values`, which is made when there are any.
 std::vector<DenseVoxel> bake_brick(const ColorField& field, const BakePlan& plan, const BakeOptions& options,
-                                   Vec3i brick_min) {
+                                   Vec3i brick_min, const std::function<float*()>& values) {
   const BrickSamples samples = gather_samples(field, plan, options.subsamples, brick_min);
   if (samples.positions.empty()) return {};
   std::vector<float> sigma(samples.positions.size());
@@ -64,19 +72,24 @@ std::vector<DenseVoxel> bake_brick(const ColorField& field, const BakePlan& plan
     const double alpha = -std::expm1(-sigma[s] * world_from_unit_density * h);
     Accumulated& sum = sums[samples.offsets[s]];
     sum.alpha += alpha;
-    sum.alpha_position += samples.positions[s].cast<double>() * alpha;
+    sum.alpha_inside += samples.insides[s].cast<double>() * alpha;
   }
 
   std::vector<DenseVoxel> kept;
+  float* densities = nullptr;
   const double count = std::pow(options.subsamples, 3);  // skipped sub-samples count as clear
   for (int offset = 0; offset < kBrickVoxels; ++offset) {
     const Accumulated& sum = sums[offset];
     const double alpha = sum.alpha / count;
     if (sum.alpha <= 0 || alpha < options.opacity_threshold) continue;
     const double density = std::min(max_sigma(h), -std::log1p(-alpha) / h);
-    kept.push_back({static_cast<std::int16_t>(offset), static_cast<float>(density),
-                    (sum.alpha_position / sum.alpha).cast<float>()});
+    const Vec3d inside = sum.alpha_inside / sum.alpha;
+    if (densities == nullptr) densities = values();
+    densities[offset] = static_cast<float>(density);
+    kept.push_back(
+        {static_cast<std::uint16_t>(offset), {in_256ths(inside.x), in_256ths(inside.y), in_256ths(inside.z)}});
   }
+  kept.shrink_to_fit();
   return kept;
 }
 
@@ -103,10 +116,8 @@ DensityPass bake_density(const ColorField& field, const BakePlan& plan, const Ba
   DensityPass pass{BrickGrid<float>({0, 0, 0}, plan.resolution, 0.0f), {}};
   pass.bricks.resize(pass.sigma.brick_count());
   const auto bake_one = [&](std::size_t brick) {
-    pass.bricks[brick] = bake_brick(field, plan, options, pass.sigma.brick_min(brick));
-    if (pass.bricks[brick].empty()) return;
-    auto& values = pass.sigma.make_brick(brick);
-    for (const DenseVoxel& voxel : pass.bricks[brick]) values[voxel.offset] = voxel.sigma;
+    pass.bricks[brick] = bake_brick(field, plan, options, pass.sigma.brick_min(brick),
+                                    [&] { return pass.sigma.make_brick(brick).data(); });
   };
   parallel_batches(pass.bricks.size(), bake_one, advance);
   return pass;

@@ -1,6 +1,7 @@
 #pragma once
 /// First pass of a bake: density, brick by brick.
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -10,11 +11,14 @@
 
 namespace cnerf {
 
-/// A voxel dense enough to be kept.
+/// A voxel dense enough to be kept. Its density is in the grid; there are many of these, so they are small.
 struct DenseVoxel {
-  std::int16_t offset = 0;  ///< in its brick, see brick_offset
-  float sigma = 0;          ///< 1/world unit
-  Vec3f centroid{};         ///< unit space; of its matter: where the colour of the voxel is asked for
+  std::uint16_t offset = 0;                ///< in its brick, see brick_offset
+  std::array<std::uint8_t, 3> centroid{};  ///< of its matter, in 256ths of the voxel: where its colour is asked for
+
+  [[nodiscard]] Vec3d centroid_in_voxel() const {
+    return Vec3d{centroid[0] + 0.5, centroid[1] + 0.5, centroid[2] + 0.5} / 256.0;
+  }
 };
 
 struct DensityPass {

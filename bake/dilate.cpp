@@ -1,6 +1,7 @@
 #include "bake/dilate.h"
 
 #include <algorithm>
+#include <optional>
 #include <tuple>
 
 #include "bake/brick_grid.h"
@@ -13,12 +14,17 @@ namespace {
 constexpr std::int32_t kMissing = -1;
 constexpr std::int32_t kColorOnly = -2;
 
+/// Squared distance from density, in voxels, at which trilinear interpolation no longer mixes in a voxel's colour.
+constexpr int kBeyondInterpolation = 4;
+
 using IndexGrid = BrickGrid<std::int32_t>;
 
 IndexGrid index_voxels(const BakedVolume& volume, int radius) {
   const VoxelBox box = bounding_box(volume.voxels);
-  const Vec3i margin{radius, radius, radius};
-  IndexGrid grid(box.min - margin, box.size + margin * 2, kMissing);
+  Vec3i low = box.min - Vec3i{radius, radius, radius};
+  const Vec3i high = box.min + box.size + Vec3i{radius, radius, radius};
+  for (int axis = 0; axis < 3; ++axis) low[axis] &= ~(kBrickSide - 1);  // bricks are the leaves of a VDB
+  IndexGrid grid(low, high - low, kMissing);
   for (std::size_t v = 0; v < volume.voxels.size(); ++v) {
     const BakedVoxel& voxel = volume.voxels[v];
     const Vec3i at{voxel.i, voxel.j, voxel.k};
@@ -77,12 +83,17 @@ std::vector<BakedVoxel> missing_voxels(const IndexGrid& grid, std::size_t brick,
   const Vec3i brick_min = grid.brick_min(brick);
   const NearDensity near_density(grid, brick_min, radius);
   std::vector<BakedVoxel> added;
+  std::optional<BakedVoxel> outer;
   for (int offset = 0; offset < kBrickVoxels; ++offset) {
     const Vec3i local = brick_local(offset);
     const Vec3i at = brick_min + local;
     if (!near_density(local) || grid.at(at) != kMissing) continue;
     const auto source = std::find_if(offsets.begin(), offsets.end(), [&](Vec3i o) { return grid.at(at + o) >= 0; });
     BakedVoxel voxel = voxels[grid.at(at + *source)];
+    if (dot(*source, *source) >= kBeyondInterpolation) {
+      if (!outer) outer = voxel;
+      voxel = *outer;
+    }
     voxel.i = at.x;
     voxel.j = at.y;
     voxel.k = at.z;

@@ -7,8 +7,9 @@
 namespace cnerf {
 
 /// Adds every missing voxel within `radius` (in each axis) of a voxel with sigma > 0. The new ones have sigma 0 and the
-/// colour of the nearest voxel with density. Voxels that exist stay as they are; the result is sorted. May make voxels
-/// outside [0, resolution). Running it again adds nothing.
+/// colour of the nearest voxel with density; those that interpolation does not reach (two voxels away and more) share
+/// one such colour a brick of 8^3, which costs a file nothing. Voxels that exist stay as they are; the result is
+/// sorted. May make voxels outside [0, resolution). Running it again adds nothing.
 /// @throws ContractError  when two voxels share a place.
 void dilate_colors(BakedVolume& volume, int radius);
 

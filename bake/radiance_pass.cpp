@@ -17,6 +17,7 @@ constexpr std::array<Vec3f, 6> kDefaultDirections{
 struct LuminanceQueries {
   std::vector<std::size_t> voxels;  ///< index into the brick's dense voxels, of those that are kept
   std::vector<std::size_t> ends;    ///< end of each kept voxel's run
+  std::vector<Vec3f> centroids;     ///< of each kept voxel, unit space
   std::vector<Vec3f> positions, directions;
   std::vector<float> weights;
 
@@ -31,7 +32,7 @@ class BrickRadiance {
  public:
   BrickRadiance(const ColorField& field, const ViewSelection& views, bool has_cameras, const BakePlan& plan,
                 const BakeOptions& options, const DensityPass& density)
-      : field_(field), views_(views), plan_(plan), density_(density) {
+      : field_(field), views_(views), plan_(plan), density_(density), weight_threshold_(options.weight_threshold) {
     keep_unseen_ = options.keep_unseen || !has_cameras;
   }
 
@@ -39,38 +40,45 @@ class BrickRadiance {
     const std::vector<DenseVoxel>& dense = density_.bricks[brick];
     if (dense.empty()) return {};
     const Vec3i brick_min = density_.sigma.brick_min(brick);
-    const LuminanceQueries queries = gather(dense, brick_min);
+    const LuminanceQueries queries = gather(dense, density_.sigma.brick(brick), brick_min);
     if (queries.voxels.empty()) return {};
     const std::vector<float> luminance = mean_luminance(queries);
-    const std::vector<Chromaticity> chromaticity = ask_chromaticity(dense, queries);
+    const std::vector<Chromaticity> chromaticity = ask_chromaticity(queries);
 
     std::vector<BakedVoxel> voxels;
     for (std::size_t v = 0; v < queries.voxels.size(); ++v) {
-      const DenseVoxel& voxel = dense[queries.voxels[v]];
-      const Vec3i at = brick_min + brick_local(voxel.offset);
+      const int offset = dense[queries.voxels[v]].offset;
+      const Vec3i at = brick_min + brick_local(offset);
       const VoxelColor color = voxel_color(luminance[v], chromaticity[v]);
-      voxels.push_back({at.x, at.y, at.z, voxel.sigma, luminance_of(color.rgb), color.rgb, color.a, color.b});
+      voxels.push_back({at.x, at.y, at.z, density_.sigma.brick(brick)[offset], luminance_of(color.rgb), color.rgb,
+                        color.a, color.b});
     }
     return voxels;
   }
 
  private:
-  [[nodiscard]] LuminanceQueries gather(const std::vector<DenseVoxel>& dense, Vec3i brick_min) const {
+  [[nodiscard]] LuminanceQueries gather(const std::vector<DenseVoxel>& dense,
+                                        const std::array<float, kBrickVoxels>& sigma, Vec3i brick_min) const {
     constexpr double kHalf = kBrickSide / 2.0;
     const Vec3d centre = plan_.world_from_voxel(brick_min.cast<double>() + Vec3d{kHalf, kHalf, kHalf});
     const std::vector<int> order = views_.try_order(centre);
     LuminanceQueries queries;
     for (std::size_t v = 0; v < dense.size(); ++v) {
-      const Vec3d world = field_.frame().world_from_unit(dense[v].centroid.cast<double>());
-      const std::vector<SeenBy> seen = views_.seen_by(density_.sigma, world, order);
+      const int offset = dense[v].offset;
+      const double opacity = -std::expm1(-sigma[offset] * plan_.voxel_size);
+      const auto least = static_cast<float>(weight_threshold_ / opacity);
+      if (least > 1 && !keep_unseen_) continue;
+      const Vec3i voxel = brick_min + brick_local(offset);
+      const Vec3d world = plan_.world_from_voxel(voxel.cast<double>() + dense[v].centroid_in_voxel());
+      const std::vector<SeenBy> seen = views_.seen_by(density_.sigma, world, order, keep_unseen_ ? 0 : least);
       if (seen.empty() && !keep_unseen_) continue;
-      for (const SeenBy& view : seen) {
-        queries.add(dense[v].centroid, views_.direction_to(view.camera, world), view.transmittance);
-      }
+      const Vec3f unit = field_.frame().unit_from_world(world).cast<float>();
+      for (const SeenBy& view : seen) queries.add(unit, views_.direction_to(view.camera, world), view.transmittance);
       if (seen.empty()) {
-        for (const Vec3f direction : kDefaultDirections) queries.add(dense[v].centroid, direction, 1.0f);
+        for (const Vec3f direction : kDefaultDirections) queries.add(unit, direction, 1.0f);
       }
       queries.voxels.push_back(v);
+      queries.centroids.push_back(unit);
       queries.ends.push_back(queries.positions.size());
     }
     return queries;
@@ -94,12 +102,9 @@ class BrickRadiance {
     return mean;
   }
 
-  [[nodiscard]] std::vector<Chromaticity> ask_chromaticity(const std::vector<DenseVoxel>& dense,
-                                                           const LuminanceQueries& queries) const {
-    std::vector<Vec3f> positions;
-    for (const std::size_t v : queries.voxels) positions.push_back(dense[v].centroid);
-    std::vector<Chromaticity> answers(positions.size());
-    field_.query_chromaticity(positions, answers);
+  [[nodiscard]] std::vector<Chromaticity> ask_chromaticity(const LuminanceQueries& queries) const {
+    std::vector<Chromaticity> answers(queries.centroids.size());
+    field_.query_chromaticity(queries.centroids, answers);
     for (const Chromaticity& c : answers) {
       CNERF_CHECK(std::isfinite(c.x) && std::isfinite(c.z), "the field answered a chromaticity that is not finite");
     }
@@ -110,6 +115,7 @@ class BrickRadiance {
   const ViewSelection& views_;
   const BakePlan& plan_;
   const DensityPass& density_;
+  double weight_threshold_ = 0;
   bool keep_unseen_ = false;
 };
 
@@ -138,14 +144,21 @@ VoxelColor voxel_color(float luminance, Chromaticity chromaticity) {
 }
 
 std::vector<BakedVoxel> bake_radiance(const ColorField& field, const std::vector<BakeCamera>& cameras,
-                                      const BakePlan& plan, const BakeOptions& options, const DensityPass& density,
-                                      const std::function<void(double)>& advance) {
-  const ViewSelection views(cameras, plan, options);
+                                      const std::vector<BakeLevel>& levels, std::size_t level,
+                                      const BakeOptions& options, const std::function<void(double)>& advance) {
+  const auto& [plan, density] = levels[level];
+  ViewSelection views(cameras, plan, options);
+  for (std::size_t other = 0; other < levels.size(); ++other) {
+    if (other != level) views.look_through(levels[other].density.sigma, levels[other].plan);
+  }
   const BrickRadiance radiance(field, views, !cameras.empty(), plan, options, density);
   std::vector<std::vector<BakedVoxel>> bricks(density.bricks.size());
   parallel_batches(
       bricks.size(), [&](std::size_t brick) { bricks[brick] = radiance.bake(brick); }, advance);
+  std::size_t count = 0;
+  for (const std::vector<BakedVoxel>& brick : bricks) count += brick.size();
   std::vector<BakedVoxel> voxels;
+  voxels.reserve(count);
   for (std::vector<BakedVoxel>& brick : bricks) {
     voxels.insert(voxels.end(), brick.begin(), brick.end());
     std::vector<BakedVoxel>().swap(brick);

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "bake/bake_camera.h"
+#include "bake/bake_levels.h"
 #include "bake/baked_volume.h"
-#include "bake/density_pass.h"
 
 namespace cnerf {
 
@@ -19,13 +19,15 @@ struct VoxelColor {
 [[nodiscard]] VoxelColor voxel_color(float luminance, Chromaticity chromaticity);
 
 /// The voxels of a density pass with their colours, by brick; those that no camera sees are left out unless
-/// `keep_unseen`. Luminance is the mean over the cameras that see the voxel, weighted by transmittance; where none
-/// does, and everywhere when there are no cameras, over the six axis directions.
+/// `keep_unseen`. So are those that give less than `weight_threshold` of a pixel's light (transmittance times opacity)
+/// even to the camera that sees them best. Luminance is the mean over the cameras that see the voxel, weighted by
+/// transmittance; where none does, and everywhere when there are no cameras, over the six axis directions.
+/// @param levels  all levels of the bake; `level` is the one to bake, the others stand in its light.
 /// @param advance  as in bake_density.
 /// @throws ContractError  when the field answers a luminance or chromaticity that is not finite.
 [[nodiscard]] std::vector<BakedVoxel> bake_radiance(const ColorField& field, const std::vector<BakeCamera>& cameras,
-                                                    const BakePlan& plan, const BakeOptions& options,
-                                                    const DensityPass& density,
+                                                    const std::vector<BakeLevel>& levels, std::size_t level,
+                                                    const BakeOptions& options,
                                                     const std::function<void(double)>& advance);
 
 }  // namespace cnerf

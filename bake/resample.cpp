@@ -53,10 +53,11 @@ Vec3i indices_of(std::uint64_t key) {
 
 using Cells = std::unordered_map<std::uint64_t, Gathered>;
 
-void gather(const BakedVoxel& voxel, double ratio, double voxel_size, Cells& cells) {
+/// @param offset  of the old lattice in the new one, old voxels.
+void gather(const BakedVoxel& voxel, Vec3i offset, double ratio, double voxel_size, Cells& cells) {
   Overlap x[2], y[2], z[2];
-  const int nx = overlaps_of(voxel.i, ratio, x), ny = overlaps_of(voxel.j, ratio, y),
-            nz = overlaps_of(voxel.k, ratio, z);
+  const int nx = overlaps_of(voxel.i + offset.x, ratio, x), ny = overlaps_of(voxel.j + offset.y, ratio, y),
+            nz = overlaps_of(voxel.k + offset.z, ratio, z);
   const double emission = -std::expm1(-double(voxel.sigma) * voxel_size);
   for (int a = 0; a < nx; ++a) {
     for (int b = 0; b < ny; ++b) {
@@ -92,7 +93,7 @@ BakedVolume resample_volume(const BakedVolume& volume, int resolution) {
   Cells cells;
   cells.reserve(volume.voxels.size() / 2);
   for (const BakedVoxel& voxel : volume.voxels) {
-    if (voxel.sigma > 0) gather(voxel, ratio, volume.voxel_size, cells);
+    if (voxel.sigma > 0) gather(voxel, {0, 0, 0}, ratio, volume.voxel_size, cells);
   }
   BakedVolume result = volume;
   result.voxel_size = volume.voxel_size / ratio;
@@ -105,6 +106,28 @@ BakedVolume resample_volume(const BakedVolume& volume, int resolution) {
   }
   sort_voxels(result.voxels);
   return result;
+}
+
+BakedVolume merged_volume(std::vector<BakedVolume> volumes) {
+  CNERF_CHECK(!volumes.empty(), "there is no volume to merge");
+  BakedVolume merged = std::move(volumes.back());
+  volumes.pop_back();
+  if (volumes.empty()) return merged;
+  Cells cells;
+  for (const BakedVolume& finer : volumes) {
+    const Vec3d shift = (finer.origin - merged.origin) / finer.voxel_size;
+    const Vec3i offset{static_cast<int>(std::lround(shift.x)), static_cast<int>(std::lround(shift.y)),
+                       static_cast<int>(std::lround(shift.z))};
+    for (const BakedVoxel& voxel : finer.voxels) {
+      if (voxel.sigma > 0) gather(voxel, offset, finer.voxel_size / merged.voxel_size, finer.voxel_size, cells);
+    }
+  }
+  std::erase_if(merged.voxels, [](const BakedVoxel& voxel) { return !(voxel.sigma > 0); });  // dilated into the holes
+  for (const auto& [key, cell] : cells) {
+    if (cell.light > 0) merged.voxels.push_back(voxel_of(key, cell));
+  }
+  sort_voxels(merged.voxels);
+  return merged;
 }
 
 }  // namespace cnerf

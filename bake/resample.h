@@ -12,4 +12,8 @@ namespace cnerf {
 /// @throws ContractError  on an empty volume or a resolution below 1.
 [[nodiscard]] BakedVolume resample_volume(const BakedVolume& volume, int resolution);
 
+/// Nested volumes (finest first, faces on faces, as bake_volumes makes them) as one with the voxels of the coarsest, by
+/// the same rule. One volume comes back as it is.
+[[nodiscard]] BakedVolume merged_volume(std::vector<BakedVolume> volumes);
+
 }  // namespace cnerf

@@ -24,6 +24,18 @@ int steps_across_brick(Vec3i low, Vec3f p, Vec3f inverse_direction) {
   return std::max(1, static_cast<int>(std::min(exit, 1e6f)));
 }
 
+/// Where a ray from `p` comes into [0, size); 0 when it starts there, infinity when it misses.
+float entry(Vec3f p, Vec3f inverse_direction, Vec3f size) {
+  float enter = 0, leave = std::numeric_limits<float>::max();
+  for (int axis = 0; axis < 3; ++axis) {
+    const float a = -p[axis] * inverse_direction[axis], b = (size[axis] - p[axis]) * inverse_direction[axis];
+    if (std::isnan(a) || std::isnan(b)) continue;  // parallel to a face and on it
+    enter = std::max(enter, std::min(a, b));
+    leave = std::min(leave, std::max(a, b));
+  }
+  return enter <= leave ? enter : std::numeric_limits<float>::infinity();
+}
+
 bool inside(Vec3f p, Vec3f size) {
   return p.x >= 0 && p.y >= 0 && p.z >= 0 && p.x < size.x && p.y < size.y && p.z < size.z;
 }
@@ -41,7 +53,9 @@ float transmittance_between(const BrickGrid<float>& sigma, double voxel_size, Ve
   const auto h = static_cast<float>(voxel_size);
   const float deepest = -std::log(stop_below);
   float depth = 0;
-  for (float t = 1; t < distance;) {
+  // Whole steps from the start, so that where a ray comes in does not matter; the first may round to just outside.
+  const float enter = std::max(1.0f, std::ceil(entry(start, inverse, size)));
+  for (float t = enter; t < distance;) {
     const Vec3f p = start + d * t;
     if (!inside(p, size)) break;  // the box is convex: what left it does not come back
     const Vec3i voxel = p.cast<int>();
@@ -102,9 +116,22 @@ bool ViewSelection::has_in_picture(const Eye& eye, Vec3d world) const {
          pixel->y <= eye.intrinsics.height;
 }
 
-std::vector<SeenBy> ViewSelection::seen_by(const BrickGrid<float>& sigma, Vec3d world,
-                                           const std::vector<int>& order) const {
-  const auto in_voxels = [&](Vec3d p) { return ((p - plan_.origin) / plan_.voxel_size).cast<float>(); };
+float ViewSelection::transmittance_to(const Eye& eye, const BrickGrid<float>& sigma, Vec3d world, float least) const {
+  const auto through = [&](const BrickGrid<float>& grid, const BakePlan& plan) {
+    return transmittance_between(grid, plan.voxel_size, plan.voxel_from_world(world).cast<float>(),
+                                 plan.voxel_from_world(eye.centre).cast<float>(), least);
+  };
+  float transmittance = through(sigma, plan_);
+  for (const Level& other : others_) {
+    if (transmittance < least) break;
+    transmittance *= through(*other.sigma, *other.plan);
+  }
+  return transmittance;
+}
+
+std::vector<SeenBy> ViewSelection::seen_by(const BrickGrid<float>& sigma, Vec3d world, const std::vector<int>& order,
+                                           float least) const {
+  least = std::max(least, seen_transmittance_);
   std::vector<SeenBy> seen;
   int good = 0, tried = 0;
   const int enough_tries = kTriesPerView * views_per_voxel_;
@@ -113,9 +140,8 @@ std::vector<SeenBy> ViewSelection::seen_by(const BrickGrid<float>& sigma, Vec3d 
     if (!has_in_picture(eye, world)) continue;
     // Matter just below a surface is seen dimly by many: the cameras tried so far surround it already.
     if (++tried > enough_tries && static_cast<int>(seen.size()) >= views_per_voxel_) break;
-    const float transmittance =
-        transmittance_between(sigma, plan_.voxel_size, in_voxels(world), in_voxels(eye.centre), seen_transmittance_);
-    if (transmittance < seen_transmittance_) continue;
+    const float transmittance = transmittance_to(eye, sigma, world, least);
+    if (transmittance < least) continue;
     seen.push_back({camera, transmittance});
     good += transmittance >= kGoodTransmittance ? 1 : 0;
     if (good == views_per_voxel_) break;

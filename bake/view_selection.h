@@ -30,9 +30,13 @@ class ViewSelection {
   /// then always the one farthest, in direction, from those before it; so a few cameras already surround the point.
   [[nodiscard]] std::vector<int> try_order(Vec3d world) const;
 
+  /// Light also has to pass this grid, of another level of the same bake; both must outlive this object.
+  void look_through(const BrickGrid<float>& sigma, const BakePlan& plan) { others_.push_back({&sigma, &plan}); }
+
   /// At most `views_per_voxel` cameras that have the point in their picture and see it, best first.
-  [[nodiscard]] std::vector<SeenBy> seen_by(const BrickGrid<float>& sigma, Vec3d world,
-                                            const std::vector<int>& order) const;
+  /// @param least  transmittance below which a camera does not count, if above `seen_transmittance`.
+  [[nodiscard]] std::vector<SeenBy> seen_by(const BrickGrid<float>& sigma, Vec3d world, const std::vector<int>& order,
+                                            float least = 0) const;
 
   /// Unit direction from a camera to a point.
   [[nodiscard]] Vec3f direction_to(int camera, Vec3d world) const;
@@ -43,9 +47,15 @@ class ViewSelection {
     Affined camera_from_world;
     Vec3d centre;  // world
   };
+  struct Level {
+    const BrickGrid<float>* sigma;
+    const BakePlan* plan;
+  };
   [[nodiscard]] bool has_in_picture(const Eye& eye, Vec3d world) const;
+  [[nodiscard]] float transmittance_to(const Eye& eye, const BrickGrid<float>& sigma, Vec3d world, float least) const;
 
   std::vector<Eye> eyes_;
+  std::vector<Level> others_;
   BakePlan plan_;
   int views_per_voxel_;
   float seen_transmittance_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "bake/brick_grid.h"
 #include "bake/dilate.h"
@@ -14,7 +15,7 @@ namespace cnerf {
 namespace {
 
 struct Sample {
-  float sigma = 0;  // 1/voxel
+  float sigma = 0;  // 1/world unit
   Vec3f rgb{};
 };
 
@@ -23,13 +24,24 @@ struct Radiance {
   double transmittance = 1;
 };
 
-/// The volume in voxel coordinates: voxel ijk covers [ijk, ijk + 1), its value sits at the centre.
+/// A volume in voxel coordinates: voxel ijk covers [ijk, ijk + 1), its value sits at the centre.
 class VoxelMedium {
  public:
-  explicit VoxelMedium(const BakedVolume& volume) : grid_(fill(volume)), near_(bricks_with_neighbours(grid_)) {
+  explicit VoxelMedium(const BakedVolume& volume)
+      : origin_(volume.origin),
+        voxel_size_(volume.voxel_size),
+        grid_(fill(volume)),
+        near_(bricks_with_neighbours(grid_)) {
     box_ = {grid_.min().cast<double>(), (grid_.min() + grid_.size()).cast<double>()};
   }
-  [[nodiscard]] const Aabbd& box() const { return box_; }
+  [[nodiscard]] double voxel_size() const { return voxel_size_; }
+  [[nodiscard]] Vec3d voxel_from_world(Vec3d p) const { return (p - origin_) / voxel_size_; }
+  /// Stretch of a ray through the box, in world units along it.
+  [[nodiscard]] std::optional<Interval<double>> stretch(Vec3d world, Vec3d direction) const {
+    const auto inside = intersect(box_, voxel_from_world(world), direction);
+    if (!inside) return std::nullopt;
+    return Interval<double>{inside->begin * voxel_size_, inside->end * voxel_size_};
+  }
 
   [[nodiscard]] Sample interpolated(Vec3d p) const {
     const Vec3d q = p - Vec3d{0.5, 0.5, 0.5};
@@ -46,10 +58,13 @@ class VoxelMedium {
     return sum;
   }
 
-  /// Distance, from p along d, over which interpolation cannot find anything; 0 where it might.
+  /// Distance in voxels, from p along d, over which interpolation cannot find anything; 0 where it might.
   [[nodiscard]] double empty_distance(Vec3d p, Vec3d d) const {
     const Vec3i voxel = floored(p);
-    if (!grid_.contains(voxel)) return 0;
+    if (!grid_.contains(voxel)) {
+      const auto ahead = intersect(box_, p, d);
+      return ahead && ahead->end > 0 ? std::max(ahead->begin, 1e-3) : std::numeric_limits<double>::max();
+    }
     const std::size_t brick = grid_.brick_of(voxel);
     if (near_[brick]) return 0;
     const Vec3i low = grid_.brick_min(brick);
@@ -69,36 +84,64 @@ class VoxelMedium {
     const VoxelBox box = bounding_box(volume.voxels);
     // One voxel of margin: interpolation reaches half a voxel beyond the outermost centres.
     BrickGrid<Sample> grid(box.min - Vec3i{1, 1, 1}, box.size + Vec3i{2, 2, 2}, Sample{});
-    const auto h = static_cast<float>(volume.voxel_size);
-    for (const BakedVoxel& voxel : volume.voxels) {
-      grid.set({voxel.i, voxel.j, voxel.k}, {voxel.sigma * h, voxel.rgb});
-    }
+    for (const BakedVoxel& voxel : volume.voxels) grid.set({voxel.i, voxel.j, voxel.k}, {voxel.sigma, voxel.rgb});
     return grid;
   }
 
+  Vec3d origin_;
+  double voxel_size_;
   BrickGrid<Sample> grid_;
   std::vector<char> near_;
   Aabbd box_;
 };
 
-/// @param origin, direction  voxel coordinates; direction of unit length.
-Radiance integrate_ray(const VoxelMedium& medium, Vec3d origin, Vec3d direction, double dt) {
-  constexpr double kOpaque = 1e-7;
-  Radiance result;
-  const auto inside = intersect(medium.box(), origin, direction);
-  if (!inside) return result;
-  for (double begin = inside->begin; begin < inside->end && result.transmittance > kOpaque;) {
-    const double length = std::min(dt, inside->end - begin);
-    const Vec3d middle = origin + direction * (begin + length / 2);
-    const double empty = medium.empty_distance(middle, direction);
+/// What all media together hold at a point, and how far nothing is if they hold nothing.
+struct Mixture {
+  double sigma = 0;                                   ///< 1/world unit
+  Vec3d emission{};                                   ///< density times colour
+  double empty = std::numeric_limits<double>::max();  ///< world units
+};
+
+Mixture mixture_at(const std::vector<VoxelMedium>& media, Vec3d world, Vec3d direction) {
+  Mixture mixture;
+  for (const VoxelMedium& medium : media) {
+    const Vec3d p = medium.voxel_from_world(world);
+    const double empty = medium.empty_distance(p, direction);
     if (empty > 0) {
-      begin += dt * std::max(1.0, std::floor(empty / dt));  // whole steps: skipping must not move the others
+      mixture.empty = std::min(mixture.empty, empty * medium.voxel_size());
       continue;
     }
-    const Sample sample = medium.interpolated(middle);
-    const double alpha = -std::expm1(-sample.sigma * length);
-    result.rgb += sample.rgb.cast<double>() * (result.transmittance * alpha);
-    result.transmittance *= 1 - alpha;
+    mixture.empty = 0;
+    const Sample sample = medium.interpolated(p);
+    mixture.sigma += sample.sigma;
+    mixture.emission += (sample.rgb * sample.sigma).cast<double>();
+  }
+  return mixture;
+}
+
+/// @param step  world units.
+Radiance integrate_ray(const std::vector<VoxelMedium>& media, Vec3d origin, Vec3d direction, double step) {
+  constexpr double kOpaque = 1e-7;
+  Radiance result;
+  double begin = std::numeric_limits<double>::max(), end = 0;
+  for (const VoxelMedium& medium : media) {
+    if (const auto stretch = medium.stretch(origin, direction)) {
+      begin = std::min(begin, stretch->begin);
+      end = std::max(end, stretch->end);
+    }
+  }
+  while (begin < end && result.transmittance > kOpaque) {
+    const double length = std::min(step, end - begin);
+    const Mixture mixture = mixture_at(media, origin + direction * (begin + length / 2), direction);
+    if (mixture.empty > 0) {
+      begin += step * std::max(1.0, std::floor(mixture.empty / step));  // whole steps: skipping moves no other
+      continue;
+    }
+    if (mixture.sigma > 0) {
+      const double alpha = -std::expm1(-mixture.sigma * length);
+      result.rgb += mixture.emission * (result.transmittance * alpha / mixture.sigma);
+      result.transmittance *= 1 - alpha;
+    }
     begin += length;
   }
   return result;
@@ -106,13 +149,18 @@ Radiance integrate_ray(const VoxelMedium& medium, Vec3d origin, Vec3d direction,
 
 }  // namespace
 
-VolumeImage integrate_volume(const BakedVolume& volume, const Intrinsics& intrinsics, const Affined& world_from_camera,
-                             const IntegratorOptions& options) {
-  CNERF_CHECK(!volume.voxels.empty() && volume.voxel_size > 0, "an empty volume cannot be rendered");
+VolumeImage integrate_volumes(std::span<const BakedVolume> volumes, const Intrinsics& intrinsics,
+                              const Affined& world_from_camera, const IntegratorOptions& options) {
+  CNERF_CHECK(!volumes.empty(), "there is no volume to render");
   CNERF_CHECK(options.step > 0 && options.samples_per_axis > 0, "integrator options must be positive");
-  const VoxelMedium medium(volume);
+  std::vector<VoxelMedium> media;
+  double finest = std::numeric_limits<double>::max();
+  for (const BakedVolume& volume : volumes) {
+    CNERF_CHECK(!volume.voxels.empty() && volume.voxel_size > 0, "an empty volume cannot be rendered");
+    media.emplace_back(volume);
+    finest = std::min(finest, volume.voxel_size);
+  }
   const int n = options.samples_per_axis;
-  const Vec3d origin = (world_from_camera.translation - volume.origin) / volume.voxel_size;
   VolumeImage image;
   image.width = intrinsics.width;
   image.height = intrinsics.height;
@@ -125,8 +173,8 @@ VolumeImage integrate_volume(const BakedVolume& volume, const Intrinsics& intrin
       double opacity = 0;
       for (int s = 0; s < n * n; ++s) {
         const PixelPosition pixel{x + (s % n + 0.5) / n, static_cast<double>(y) + (s / n + 0.5) / n};
-        const Vec3d direction = world_from_camera.direction(ray_direction(intrinsics, pixel));
-        const Radiance ray = integrate_ray(medium, origin, normalized(direction), options.step);
+        const Vec3d direction = normalized(world_from_camera.direction(ray_direction(intrinsics, pixel)));
+        const Radiance ray = integrate_ray(media, world_from_camera.translation, direction, options.step * finest);
         rgb += ray.rgb;
         opacity += 1 - ray.transmittance;
       }
@@ -136,6 +184,11 @@ VolumeImage integrate_volume(const BakedVolume& volume, const Intrinsics& intrin
     }
   });
   return image;
+}
+
+VolumeImage integrate_volume(const BakedVolume& volume, const Intrinsics& intrinsics, const Affined& world_from_camera,
+                             const IntegratorOptions& options) {
+  return integrate_volumes({&volume, 1}, intrinsics, world_from_camera, options);
 }
 
 }  // namespace cnerf

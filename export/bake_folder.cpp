@@ -1,7 +1,11 @@
 #include "export/bake_folder.h"
 
+#include <algorithm>
+
 #include "export/blender_setup.h"
 #include "export/color_origin.h"
+#include "export/usd_writer.h"
+#include "src/base/files.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -24,6 +28,41 @@ fs::path BakeFolder::add_volume(const BakedVolume& volume, const std::string& na
   manifest_.frame = volume.frame;
   manifest_.volume = describe_volume(volume, vdb.filename().string(), options);
   return vdb;
+}
+
+std::vector<fs::path> BakeFolder::add_volumes(const std::vector<BakedVolume>& volumes, const std::string& name,
+                                              const VdbOptions& options) {
+  std::vector<fs::path> files{add_volume(volumes.back(), name, options)};
+  for (std::size_t finer = 1; finer < volumes.size(); ++finer) {
+    const BakedVolume& volume = volumes[volumes.size() - 1 - finer];
+    const fs::path vdb = folder_ / (name + "_fine" + std::to_string(finer) + ".vdb");
+    write_vdb(volume, vdb, options);
+    list(vdb);
+    manifest_.finer_volumes.insert(manifest_.finer_volumes.begin(),
+                                   describe_volume(volume, vdb.filename().string(), options));
+    files.push_back(vdb);
+  }
+  if (options.usd) {
+    std::vector<ManifestVolume> all = manifest_.finer_volumes;
+    all.push_back(*manifest_.volume);
+    const fs::path usd = folder_ / (name + ".usda");
+    write_usd(all, manifest_.up_axis, options.metres_per_unit, color_origin_text(manifest_.colorizer, manifest_.take),
+              usd);
+    list(usd);
+    files.push_back(usd);
+  }
+  manifest_.metres_per_unit = options.metres_per_unit;
+  return files;
+}
+
+void BakeFolder::add_plate(const std::string& camera, const std::vector<std::byte>& jpeg) {
+  std::string stem = fs::path(camera).replace_extension().string();
+  std::ranges::replace_if(
+      stem, [](char c) { return c == '/' || c == '\\'; }, '_');
+  const std::string file = "plates/" + stem + ".jpg";
+  write_file(folder_ / file, jpeg);
+  manifest_.files.push_back(file);
+  manifest_.plates[camera] = file;
 }
 
 GltfFiles BakeFolder::add_mesh(const BakedMesh& mesh, const std::string& name, const MeshExportOptions& options) {
@@ -62,7 +101,20 @@ GltfFiles BakeFolder::add_mesh(const BakedMesh& mesh, const std::string& name, c
 
 void BakeFolder::finish() {
   list(write_blender_setup(folder_));
+  std::vector<std::string> former;
+  if (fs::exists(manifest())) {
+    try {
+      former = read_manifest(manifest()).files;
+    } catch (const std::exception&) {
+      // Not a manifest of ours, so nothing here is known to be of a former bake.
+    }
+  }
   write_manifest(manifest_, folder_);
+  for (const std::string& file : former) {
+    const fs::path inside = fs::path(file).lexically_normal();
+    const bool stays = std::ranges::find(manifest_.files, file) != manifest_.files.end();
+    if (!stays && inside.is_relative() && *inside.begin() != "..") fs::remove(folder_ / inside);
+  }
 }
 
 }  // namespace cnerf

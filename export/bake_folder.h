@@ -29,11 +29,19 @@ class BakeFolder {
 
   /// Writes `name`.vdb.  @throws ContractError, OutputError  as write_vdb.
   std::filesystem::path add_volume(const BakedVolume& volume, const std::string& name, const VdbOptions& options);
+  /// Nested grids, finest first: the coarsest as `name`.vdb, finer ones as `name`_fine1.vdb and so on.
+  /// @return  the files, coarsest first.
+  std::vector<std::filesystem::path> add_volumes(const std::vector<BakedVolume>& volumes, const std::string& name,
+                                                 const VdbOptions& options);
   /// Writes `name`.gltf, .bin, .glb, `name`_basecolor.png and, if asked for, `name`_rgb.exr, _lum.exr and _lab.exr.
   /// To be called after add_volume, where there is a volume: the mesh then names it.
   /// @throws ContractError, OutputError.
   GltfFiles add_mesh(const BakedMesh& mesh, const std::string& name, const MeshExportOptions& options);
-  /// Writes blender_setup.py and manifest.json.  @throws OutputError.
+  /// A camera's photograph without lens distortion, as plates/`stem`.jpg: what Blender shows behind its view.
+  /// @throws OutputError.
+  void add_plate(const std::string& camera, const std::vector<std::byte>& jpeg);
+  /// Writes blender_setup.py and manifest.json. Files that a former manifest here lists and this one does not are
+  /// removed.  @throws OutputError.
   void finish();
 
   [[nodiscard]] std::filesystem::path manifest() const { return folder_ / "manifest.json"; }

@@ -2,6 +2,7 @@
 place, and the capture's cameras.
 
 In Blender:  open this file in the Scripting tab and press Run. It makes a scene of its own and leaves others alone.
+As add-on:   Edit > Preferences > Add-ons > Install, this file; then File > Import > cnerf bake (manifest.json).
 Headless:    blender -b --python blender_setup.py -- --render out.exr --camera 3 --samples 64
              blender -b --python blender_setup.py -- --save scene.blend
 Works with Blender 3.4 and later. Colours are linear Rec.709; the view transform is set to Standard, because Filmic and
@@ -12,11 +13,20 @@ import argparse
 import json
 import math
 import os
+import re
 import sys
 import traceback
 
 import bpy
 from mathutils import Matrix, Vector
+
+bl_info = {
+    "name": "cnerf bake",
+    "description": "Shows a cnerf bake: emitting and absorbing volumes, the textured mesh, the capture's cameras",
+    "blender": (3, 4, 0),
+    "category": "Import-Export",
+    "location": "File > Import > cnerf bake",
+}
 
 BAKE_FOLDER = ""
 
@@ -56,7 +66,7 @@ def set_if_known(settings, name, value):
 
 
 def make_scene():
-    if bpy.app.background:
+    if bpy.app.background and __name__ == "__main__":
         bpy.ops.wm.read_factory_settings(use_empty=True)
         scene = bpy.context.scene
         scene.name = "cnerf"
@@ -66,7 +76,117 @@ def make_scene():
     return scene
 
 
-def make_material():
+def add_socket(tree, name, kind, is_input, default=None, low=None, high=None):
+    """A socket of a node group; Blender 4.0 changed how they are made."""
+    if hasattr(tree, "interface"):
+        socket = tree.interface.new_socket(name, in_out="INPUT" if is_input else "OUTPUT", socket_type=kind)
+    else:
+        socket = (tree.inputs if is_input else tree.outputs).new(kind, name)
+    if default is not None:
+        socket.default_value = default
+    if low is not None:
+        socket.min_value, socket.max_value = low, high
+
+
+class MathNodes:
+    """Formulas as nodes: every method makes a node and returns its output."""
+
+    def __init__(self, tree):
+        self.tree, self.count = tree, 0
+
+    def node(self, kind, **properties):
+        made = self.tree.nodes.new(kind)
+        made.location = (180 * (self.count % 12), -170 * (self.count // 12))
+        self.count += 1
+        for name, value in properties.items():
+            setattr(made, name, value)
+        return made
+
+    def put(self, value, socket):
+        if isinstance(value, (int, float)):
+            socket.default_value = value
+        else:
+            self.tree.links.new(value, socket)
+
+    def math(self, operation, *values):
+        made = self.node("ShaderNodeMath", operation=operation)
+        for value, socket in zip(values, made.inputs):
+            self.put(value, socket)
+        return made.outputs[0]
+
+    def times(self, a, b):
+        return self.math("MULTIPLY", a, b)
+
+    def plus(self, a, b):
+        return self.math("ADD", a, b)
+
+    def weighted(self, weights, values):
+        terms = [self.times(value, weight) for weight, value in zip(weights, values)]
+        return self.plus(self.plus(terms[0], terms[1]), terms[2])
+
+    def choose(self, condition, yes, no):
+        """condition is 0 or 1."""
+        return self.plus(self.times(condition, yes), self.times(self.math("SUBTRACT", 1.0, condition), no))
+
+
+# CIE 1976 L*a*b*, D65 2 degrees, and Rec.709 primaries.
+LAB_EPSILON, LAB_KAPPA = 216.0 / 24389.0, 24389.0 / 27.0
+WHITE = (0.95047, 1.0, 1.08883)
+RGB_FROM_XYZ = ((3.2404542, -1.5371385, -0.4985314), (-0.9692660, 1.8760108, 0.0415560),
+                (0.0556434, -0.2040259, 1.0572252))
+
+
+def make_regrade_group():
+    """Colour rebuilt from luminance and Lab a, b, for regrading the colorization without training anew.
+
+    At Regrade 0 the baked colour passes through, and Cycles drops the rest. Exposure is in stops, Hue in degrees."""
+    name = "cnerf regrade"
+    if name in bpy.data.node_groups:
+        return bpy.data.node_groups[name]
+    tree = bpy.data.node_groups.new(name, "ShaderNodeTree")
+    add_socket(tree, "Color", "NodeSocketColor", True)
+    for grid in ("luminance", "lab_a", "lab_b"):
+        add_socket(tree, grid, "NodeSocketFloat", True, 0.0)
+    add_socket(tree, "Regrade", "NodeSocketFloat", True, 0.0, 0.0, 1.0)
+    add_socket(tree, "Exposure", "NodeSocketFloat", True, 0.0, -10.0, 10.0)
+    add_socket(tree, "Saturation", "NodeSocketFloat", True, 1.0, 0.0, 4.0)
+    add_socket(tree, "Hue", "NodeSocketFloat", True, 0.0, -180.0, 180.0)
+    add_socket(tree, "Color", "NodeSocketColor", False)
+
+    nodes = MathNodes(tree)
+    given = nodes.node("NodeGroupInput").outputs
+    y = nodes.math("MAXIMUM", given["luminance"], 0.0)
+    turn = nodes.math("RADIANS", given["Hue"])
+    cosine = nodes.times(nodes.math("COSINE", turn), given["Saturation"])
+    sine = nodes.times(nodes.math("SINE", turn), given["Saturation"])
+    a = nodes.math("SUBTRACT", nodes.times(given["lab_a"], cosine), nodes.times(given["lab_b"], sine))
+    b = nodes.plus(nodes.times(given["lab_a"], sine), nodes.times(given["lab_b"], cosine))
+
+    is_bright = nodes.math("GREATER_THAN", y, LAB_EPSILON)
+    linear_part = nodes.times(nodes.plus(nodes.times(y, LAB_KAPPA), 16.0), 1.0 / 116.0)
+    f_y = nodes.choose(is_bright, nodes.math("POWER", y, 1.0 / 3.0), linear_part)
+
+    def inverse(f):
+        cubed = nodes.times(nodes.times(f, f), f)
+        low = nodes.times(nodes.math("SUBTRACT", nodes.times(f, 116.0), 16.0), 1.0 / LAB_KAPPA)
+        return nodes.choose(nodes.math("GREATER_THAN", cubed, LAB_EPSILON), cubed, low)
+
+    x = nodes.times(inverse(nodes.plus(f_y, nodes.times(a, 1.0 / 500.0))), WHITE[0])
+    z = nodes.times(inverse(nodes.math("SUBTRACT", f_y, nodes.times(b, 1.0 / 200.0))), WHITE[2])
+    gain = nodes.math("POWER", 2.0, given["Exposure"])
+    rgb = nodes.node("ShaderNodeCombineXYZ")
+    for row, socket in zip(RGB_FROM_XYZ, rgb.inputs):
+        channel = nodes.math("MAXIMUM", nodes.weighted(row, (x, y, z)), 0.0)
+        nodes.put(nodes.times(channel, gain), socket)
+    mix = nodes.node("ShaderNodeMixRGB", blend_type="MIX")
+    nodes.put(given["Regrade"], mix.inputs[0])
+    nodes.put(given["Color"], mix.inputs[1])
+    nodes.put(rgb.outputs[0], mix.inputs[2])
+    nodes.put(mix.outputs[0], nodes.node("NodeGroupOutput").inputs["Color"])
+    return tree
+
+
+def make_material(density_scale):
     """Absorption and emission, both of the density: exactly c (1 - exp(-tau)). Principled Volume would not multiply
     emission by density."""
     material = bpy.data.materials.new("cnerf volume")
@@ -82,9 +202,15 @@ def make_material():
         return made
 
     density = node("ShaderNodeAttribute", -700, 120, attribute_name="density", label="density")
-    color = node("ShaderNodeAttribute", -700, -120, attribute_name="color", label="color")
+    color = node("ShaderNodeAttribute", -920, -120, attribute_name="color", label="color")
+    regrade = node("ShaderNodeGroup", -480, -120, label="regrade")
+    regrade.node_tree = make_regrade_group()
+    links.new(color.outputs["Color"], regrade.inputs["Color"])
+    for number, name in enumerate(("luminance", "lab_a", "lab_b")):
+        grid = node("ShaderNodeAttribute", -920, -300 - 180 * number, attribute_name=name, label=name)
+        links.new(grid.outputs["Fac"], regrade.inputs[name])
     gain = node("ShaderNodeMath", -480, 120, operation="MULTIPLY", label="density gain")
-    gain.inputs[1].default_value = 1.0
+    gain.inputs[1].default_value = density_scale  # 1, unless the file's density is normalized
     absorption = node("ShaderNodeVolumeAbsorption", -240, 120)
     absorption.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
     emission = node("ShaderNodeEmission", -240, -80)
@@ -94,7 +220,7 @@ def make_material():
     links.new(density.outputs["Fac"], gain.inputs[0])
     links.new(gain.outputs[0], absorption.inputs["Density"])
     links.new(gain.outputs[0], emission.inputs["Strength"])
-    links.new(color.outputs["Color"], emission.inputs["Color"])
+    links.new(regrade.outputs["Color"], emission.inputs["Color"])
     links.new(absorption.outputs[0], both.inputs[0])
     links.new(emission.outputs[0], both.inputs[1])
     links.new(both.outputs[0], output.inputs["Volume"])
@@ -104,7 +230,7 @@ def make_material():
     return material
 
 
-def add_volume(scene, root, volume, folder):
+def add_volume(scene, root, volume, folder, material):
     data = bpy.data.volumes.new("cnerf volume")
     data.filepath = os.path.join(folder, volume["file"])
     data.render.space = "OBJECT"
@@ -112,7 +238,7 @@ def add_volume(scene, root, volume, folder):
     data.render.clipping = 0.0  # the default cuts densities below 0.001 per unit, which large scenes have
     if hasattr(data.render, "precision"):
         data.render.precision = "HALF" if volume["half_density"] else "FULL"
-    data.materials.append(make_material())
+    data.materials.append(material)
     shown = bpy.data.objects.new("cnerf volume", data)
     shown.parent = root
     shown.location = (half_voxel_shift(volume),) * 3
@@ -191,17 +317,42 @@ def add_camera(scene, root, camera, volume):
     world_from_camera = Matrix(camera["world_from_camera"])
     radius, centre = scene_radius(volume)
     distance = (world_from_camera.to_translation() - centre).length
-    data.clip_start = 1e-4 * radius
-    data.clip_end = 2.0 * (distance + radius)
+    scale = root.matrix_basis.median_scale  # of the Empty; clipping is in metres
+    data.clip_start = scale * 1e-4 * radius
+    data.clip_end = scale * 2.0 * (distance + radius)
     data.display_size = 0.05 * radius
 
     placed = bpy.data.objects.new(camera["name"], data)
     placed.parent = root
     placed.matrix_basis = world_from_camera @ blender_from_opencv_camera()
     scene.collection.objects.link(placed)
-    if any(camera["distortion"]):
-        print("cnerf: camera", camera["name"], "has lens distortion, which Blender's camera leaves out")
     return placed
+
+
+def show_plate(data, file):
+    """A photograph behind what the camera sees; it is without lens distortion, as Blender's camera is."""
+    if not os.path.isfile(file):
+        print("cnerf:", file, "is not there; the camera has no background")
+        return
+    plate = data.background_images.new()
+    plate.image = bpy.data.images.load(file, check_existing=True)
+    plate.alpha = 0.5
+    plate.display_depth = "BACK"
+    data.show_background_images = True
+
+
+def frame_number(name):
+    """The number that a picture's name ends with, as frames of a film do; None without one."""
+    found = re.search(r"(\d+)$", os.path.splitext(name)[0])
+    return int(found.group(1)) if found else None
+
+
+def numbered_frames(cameras):
+    """Frame number and camera, in order; nothing unless every picture has a number of its own."""
+    numbers = [frame_number(camera["name"]) for camera in cameras]
+    if len(cameras) < 2 or None in numbers or len(set(numbers)) < len(numbers):
+        return []
+    return sorted(zip(numbers, cameras), key=lambda pair: pair[0])
 
 
 def path_cameras(file):
@@ -230,10 +381,19 @@ def path_cameras(file):
 def add_path(scene, root, file, volume):
     """An animated camera; it becomes the active one."""
     cameras, fps = path_cameras(file)
-    moving = add_camera(scene, root, cameras[0], volume)
+    moving = add_moving_camera(scene, root, list(enumerate(cameras, start=1)), volume)
+    scene.frame_start, scene.frame_end = 1, len(cameras)
+    scene.render.fps = max(1, round(fps))
+    scene.frame_set(1)
+    use_camera(scene, cameras[0], moving)
+
+
+def add_moving_camera(scene, root, frames, volume):
+    """One camera that is where each frame's camera is."""
+    moving = add_camera(scene, root, frames[0][1], volume)
     moving.rotation_mode = "QUATERNION"
     before = None
-    for number, camera in enumerate(cameras, start=1):
+    for number, camera in frames:
         at = Matrix(camera["world_from_camera"]) @ blender_from_opencv_camera()
         turn = at.to_quaternion()
         if before is not None:
@@ -245,10 +405,35 @@ def add_path(scene, root, file, volume):
         moving.keyframe_insert("location", frame=number)
         moving.keyframe_insert("rotation_quaternion", frame=number)
         moving.data.keyframe_insert("lens", frame=number)
-    scene.frame_start, scene.frame_end = 1, len(cameras)
-    scene.render.fps = max(1, round(fps))
-    scene.frame_set(1)
-    use_camera(scene, cameras[0], moving)
+    return moving
+
+
+def add_film_camera(scene, root, cameras, volume):
+    """The capture's own way as one animated camera, where its pictures are numbered."""
+    frames = numbered_frames(cameras)
+    if not frames:
+        return None
+    moving = add_moving_camera(scene, root, frames, volume)
+    moving.name = moving.data.name = "cnerf film"
+    scene.frame_start, scene.frame_end = frames[0][0], frames[-1][0]
+    return moving
+
+
+def upright(manifest):
+    """From the frame of the poses, in its units, to Blender's: Z up, metres."""
+    turns = {"x": Matrix(((0, -1, 0), (0, 0, -1), (1, 0, 0))), "y": Matrix(((1, 0, 0), (0, 0, -1), (0, 1, 0))),
+             "z": Matrix.Identity(3)}
+    return turns[manifest.get("up_axis", "z")].to_4x4() @ Matrix.Scale(manifest.get("metres_per_unit", 1.0), 4)
+
+
+def cycles_memory(volumes):
+    """Bytes that Cycles takes for the grids: it makes them dense, in 32 bits, vectors with four components."""
+    total = 0
+    for volume in volumes:
+        low, high = volume["bounds"]["min"], volume["bounds"]["max"]
+        voxels = math.prod((b - a) / volume["voxel_size"] + 6.0 for a, b in zip(low, high))
+        total += 4 * voxels * (1 + 4)  # density and color; the other grids are read when colours are regraded
+    return total
 
 
 def overview_camera(volume):
@@ -288,9 +473,9 @@ def blacken_world(scene):
     scene.world = world
 
 
-def steps_needed(volume, step_rate):
+def steps_needed(volume, voxel_size, step_rate):
     low, high = volume["bounds"]["min"], volume["bounds"]["max"]
-    diagonal = math.dist(low, high) / volume["voxel_size"]
+    diagonal = math.dist(low, high) / voxel_size
     return min(MAX_STEPS_OF_BLENDER, max(1024, int(1.2 * diagonal / step_rate) + 16))
 
 
@@ -306,27 +491,34 @@ def set_engine(scene, name):
     raise ValueError("this Blender has none of " + ", ".join(wanted))
 
 
-def set_up_rendering(scene, volume, options):
+def set_up_rendering(scene, volume, voxel_size, options):
     set_engine(scene, options.engine)
     cycles = scene.cycles
     cycles.samples = options.samples
     cycles.use_denoising = False
     set_if_known(cycles, "volume_step_rate", options.step_rate)
     set_if_known(cycles, "volume_preview_step_rate", max(1.0, options.step_rate))
-    set_if_known(cycles, "volume_max_steps", steps_needed(volume, options.step_rate))
+    set_if_known(cycles, "volume_max_steps", steps_needed(volume, voxel_size, options.step_rate))
     cycles.volume_bounces = 0
     set_if_known(cycles, "volume_biased", True)  # ray marching, where the default is null scattering
     if options.exact:
         cycles.use_adaptive_sampling = False
         cycles.pixel_filter_type = "BOX"
         cycles.filter_width = 1.0
-        set_if_known(cycles, "volume_max_steps", max(4096, steps_needed(volume, options.step_rate)))
+        set_if_known(cycles, "volume_max_steps", max(4096, steps_needed(volume, voxel_size, options.step_rate)))
     scene.render.film_transparent = options.transparent or options.exact
     scene.display_settings.display_device = "sRGB"
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     scene.view_settings.exposure = 0.0
     scene.view_settings.gamma = 1.0
+
+
+def set_regrade(material, options):
+    for node in material.node_tree.nodes:
+        if node.type == "GROUP":
+            for name in ("Regrade", "Exposure", "Saturation", "Hue"):
+                node.inputs[name].default_value = getattr(options, name.lower())
 
 
 def set_up(options):
@@ -345,17 +537,33 @@ def set_up(options):
     root.empty_display_size = 0.1 * scene_radius(bounded)[0]
     scene.collection.objects.link(root)
     folder = os.path.dirname(manifest_file)
+    root.matrix_basis = upright(manifest)
     if volume:
-        add_volume(scene, root, volume, folder).hide_render = mesh_use == "only"
+        # Nested grids lie inside each other, the coarser ones empty where finer ones are.
+        volumes = manifest.get("finer_volumes", []) + [volume]
+        for each in volumes:
+            material = make_material(each.get("density_scale", 1.0))
+            set_regrade(material, options)
+            add_volume(scene, root, each, folder, material).hide_render = mesh_use == "only"
+        print("cnerf: Cycles will take about %.2f GiB for the grids" % (cycles_memory(volumes) / 2**30))
     if mesh and mesh_use != "none":
         add_mesh(scene, root, mesh, folder, mesh_use)
     blacken_world(scene)
-    set_up_rendering(scene, bounded, options)
+    finest = manifest["finer_volumes"][0] if manifest.get("finer_volumes") else bounded
+    set_up_rendering(scene, bounded, finest["voxel_size"], options)
 
     cameras = manifest["cameras"] or [overview_camera(bounded)]
     placed = [add_camera(scene, root, camera, bounded) for camera in cameras]
     picked = pick_camera(cameras, options.camera)
+    for camera, shown in zip(cameras, placed):
+        if camera.get("plate"):
+            show_plate(shown.data, os.path.join(folder, camera["plate"]))
+    film = add_film_camera(scene, root, cameras, bounded)
     use_camera(scene, cameras[picked], placed[picked])
+    if options.film:
+        if film is None:
+            raise ValueError("the capture's pictures are not numbered: there is no film to follow")
+        use_camera(scene, cameras[0], film)
     if options.path:
         add_path(scene, root, options.path, bounded)
     return scene
@@ -382,6 +590,11 @@ def parse_options(arguments):
     parser.add_argument("--manifest", default="", help="manifest.json; default: the one beside this file")
     parser.add_argument("--camera", default="0", help="number or name of the camera to look through")
     parser.add_argument("--path", default="", help="camera path (JSON) of the viewer; animates a camera")
+    parser.add_argument("--film", action="store_true", help="look through the camera that follows numbered pictures")
+    parser.add_argument("--regrade", type=float, default=0.0, help="1: colour from luminance and Lab, see below")
+    parser.add_argument("--exposure", type=float, default=0.0, help="stops, with --regrade 1")
+    parser.add_argument("--saturation", type=float, default=1.0, help="with --regrade 1; 0 is grey")
+    parser.add_argument("--hue", type=float, default=0.0, help="turn of the colours in degrees, with --regrade 1")
     parser.add_argument("--render", default="", help="picture to render, .exr or .png")
     parser.add_argument("--save", default="", help=".blend file to save the scene to")
     parser.add_argument("--engine", choices=("cycles", "eevee"), default="cycles")
@@ -402,6 +615,41 @@ def main():
         bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath(options.save))
     if options.render:
         render(scene, options.render)
+
+
+class ImportCnerfBake(bpy.types.Operator):
+    """Show a bake of cnerf in a scene of its own"""
+
+    bl_idname = "import_scene.cnerf_bake"
+    bl_label = "Import cnerf bake"
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH")
+    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
+
+    def invoke(self, context, event):
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        try:
+            set_up(parse_options(["--manifest", self.filepath]))
+        except (OSError, ValueError, KeyError) as failure:
+            self.report({"ERROR"}, str(failure))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+def add_menu_item(menu, context):
+    menu.layout.operator(ImportCnerfBake.bl_idname, text="cnerf bake (manifest.json)")
+
+
+def register():
+    bpy.utils.register_class(ImportCnerfBake)
+    bpy.types.TOPBAR_MT_file_import.append(add_menu_item)
+
+
+def unregister():
+    bpy.types.TOPBAR_MT_file_import.remove(add_menu_item)
+    bpy.utils.unregister_class(ImportCnerfBake)
 
 
 if __name__ == "__main__":

@@ -87,7 +87,8 @@ Json to_json(const ManifestVolume& volume) {
           {"max_density", volume.max_density},
           {"density_unit", "1/world unit"},
           {"voxel_origin", volume.voxel_origin},
-          {"half_density", volume.half_density}};
+          {"half_density", volume.half_density},
+          {"density_scale", volume.density_scale}};
 }
 
 ManifestVolume volume_from(const Json& j) {
@@ -100,6 +101,7 @@ ManifestVolume volume_from(const Json& j) {
   volume.max_density = j.at("max_density").get<double>();
   volume.voxel_origin = j.at("voxel_origin").get<std::string>();
   volume.half_density = j.at("half_density").get<bool>();
+  volume.density_scale = j.value("density_scale", 1.0);
   return volume;
 }
 
@@ -176,8 +178,15 @@ BakeManifest manifest_from(const Json& j) {
   manifest.colorizer = j.at("color").at("colorizer").get<std::string>();
   manifest.take = j.at("color").at("take").get<std::string>();
   manifest.frame = frame_from(j.at("frame"));
-  for (const Json& camera : j.at("cameras")) manifest.cameras.push_back(camera_from(camera));
+  manifest.metres_per_unit = j.value("metres_per_unit", 1.0);
+  for (const Json& camera : j.at("cameras")) {
+    manifest.cameras.push_back(camera_from(camera));
+    if (camera.contains("plate")) manifest.plates[manifest.cameras.back().name] = camera.at("plate").get<std::string>();
+  }
   if (!j.at("volume").is_null()) manifest.volume = volume_from(j.at("volume"));
+  if (j.contains("finer_volumes")) {
+    for (const Json& volume : j.at("finer_volumes")) manifest.finer_volumes.push_back(volume_from(volume));
+  }
   if (j.contains("mesh") && !j.at("mesh").is_null()) manifest.mesh = mesh_from(j.at("mesh"));
   return manifest;
 }
@@ -215,7 +224,8 @@ ManifestVolume describe_volume(const BakedVolume& volume, const std::string& fil
   described.resolution = volume.resolution;
   described.voxels = dense.size();
   described.voxel_origin = options.voxel_origin;
-  described.half_density = options.half && density_fits_half(volume);
+  described.half_density = density_fits_half(volume, options);
+  described.density_scale = density_scale(volume, options);
   return described;
 }
 
@@ -234,7 +244,13 @@ ManifestMesh describe_mesh(const BakedMesh& mesh) {
 
 fs::path write_manifest(const BakeManifest& manifest, const fs::path& folder) {
   Json cameras = Json::array();
-  for (const BakeCamera& camera : manifest.cameras) cameras.push_back(to_json(camera));
+  for (const BakeCamera& camera : manifest.cameras) {
+    cameras.push_back(to_json(camera));
+    const auto plate = manifest.plates.find(camera.name);
+    if (plate != manifest.plates.end()) cameras.back()["plate"] = plate->second;
+  }
+  Json finer = Json::array();
+  for (const ManifestVolume& volume : manifest.finer_volumes) finer.push_back(to_json(volume));
   const Json j{{"schema", kManifestSchema},
                {"program", "cnerf"},
                {"program_version", CNERF_VERSION},
@@ -242,9 +258,11 @@ fs::path write_manifest(const BakeManifest& manifest, const fs::path& folder) {
                {"files", describe_files(manifest.files, folder)},
                {"units", manifest.units},
                {"up_axis", manifest.up_axis},
+               {"metres_per_unit", manifest.metres_per_unit},
                {"color", color_json(manifest.colorizer, manifest.take)},
                {"frame", to_json(manifest.frame)},
                {"volume", manifest.volume ? to_json(*manifest.volume) : Json(nullptr)},
+               {"finer_volumes", finer},
                {"mesh", manifest.mesh ? to_json(*manifest.mesh) : Json(nullptr)},
                {"camera_axes", "+X right, +Y down, +Z forward; centre of the first pixel at (0.5, 0.5)"},
                {"cameras", cameras}};

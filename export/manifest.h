@@ -2,6 +2,7 @@
 /// manifest.json: what a bake consists of and where it lies. Everything else that reads a bake starts here.
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,7 @@ struct ManifestVolume {
   double max_density = 0;    ///< 1/world unit
   std::string voxel_origin;  ///< "center" or "corner", see VdbOptions
   bool half_density = true;  ///< density is stored in 16 bits
+  double density_scale = 1;  ///< what the file's density is to be multiplied with, 1/world unit
 };
 [[nodiscard]] ManifestVolume describe_volume(const BakedVolume& volume, const std::string& file,
                                              const VdbOptions& options);
@@ -48,11 +50,14 @@ struct BakeManifest {
   std::vector<std::string> files;  ///< relative to the manifest; their sizes and SHA-256 are added when writing
   std::string units = "scene units";
   std::string up_axis = "z";
-  std::string colorizer;  ///< empty = not colorized
+  double metres_per_unit = 1;  ///< of the world; 1 where nobody knows
+  std::string colorizer;       ///< empty = not colorized
   std::string take;
   SceneFrame frame;
-  std::vector<BakeCamera> cameras;  ///< of the capture
-  std::optional<ManifestVolume> volume;
+  std::vector<BakeCamera> cameras;            ///< of the capture
+  std::map<std::string, std::string> plates;  ///< camera's name -> its photograph without lens distortion, a file
+  std::optional<ManifestVolume> volume;       ///< the only grid, or the coarsest of nested ones
+  std::vector<ManifestVolume> finer_volumes;  ///< inside of it, finest first; each coarser one is empty there
   std::optional<ManifestMesh> mesh;
 };
 

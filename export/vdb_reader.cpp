@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "bake/dilate.h"
+#include "export/manifest.h"
 #include "src/base/error.h"
 
 namespace cnerf {
@@ -89,12 +90,13 @@ void read_voxels(const OpenedFile& file, const openvdb::FloatGrid& density, Bake
   const auto of_color = (color ? color : openvdb::Vec3SGrid::create())->getConstAccessor();
   const auto of_a = a->getConstAccessor(), of_b = b->getConstAccessor();
   const auto of_luminance = luminance->getConstAccessor();
+  const auto scale = static_cast<float>(meta_or<double>(file.metadata, "cnerf_density_scale", 1.0));
   for_each_active(density, [&](const openvdb::Coord& at) {
     const openvdb::Vec3s rgb = color ? of_color.getValue(at) : openvdb::Vec3s(0, 0, 0);
     volume.voxels.push_back({at.x(),
                              at.y(),
                              at.z(),
-                             of_density.getValue(at),
+                             of_density.getValue(at) * scale,
                              of_luminance.getValue(at),
                              {rgb.x(), rgb.y(), rgb.z()},
                              of_a.getValue(at),
@@ -161,6 +163,17 @@ BakedVolume read_vdb(const std::filesystem::path& path) {
   read_transform(path, file, *density, volume);
   read_voxels(file, *density, volume);
   return volume;
+}
+
+std::vector<BakedVolume> read_volumes(const std::filesystem::path& bake_folder) {
+  const BakeManifest manifest = read_manifest(bake_folder / "manifest.json");
+  if (!manifest.volume) {
+    throw InputError(bake_folder / "manifest.json", "volume", "this bake has none; bake with --format vdb");
+  }
+  std::vector<BakedVolume> volumes;
+  for (const ManifestVolume& finer : manifest.finer_volumes) volumes.push_back(read_vdb(bake_folder / finer.file));
+  volumes.push_back(read_vdb(bake_folder / manifest.volume->file));
+  return volumes;
 }
 
 VdbSummary summarize_vdb(const std::filesystem::path& path) {

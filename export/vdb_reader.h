@@ -17,6 +17,10 @@ namespace cnerf {
 /// @throws MissingInputError, InputError  e.g. without `density`, or with a transform that is not uniform.
 [[nodiscard]] BakedVolume read_vdb(const std::filesystem::path& path);
 
+/// The grids of a bake by its manifest, finest first.
+/// @throws MissingInputError, InputError  also when the bake has no volume.
+[[nodiscard]] std::vector<BakedVolume> read_volumes(const std::filesystem::path& bake_folder);
+
 struct VdbGridSummary {
   std::string name, type, grid_class;  ///< "density", "float", "fog volume"
   bool half = false;                   ///< stored in 16 bits

@@ -50,33 +50,54 @@ typename Grid::Ptr make_grid(const std::string& name, const BakedVolume& volume,
   return grid;
 }
 
-openvdb::Vec3SGrid::Ptr color_grid(const std::string& name, const BakedVolume& volume, float largest) {
+/// Keeps values finite in what a file stores.
+struct Stored {
+  bool half = true;
+  [[nodiscard]] float operator()(float value) const { return half ? std::clamp(value, -kHalfMax, kHalfMax) : value; }
+};
+
+openvdb::Vec3SGrid::Ptr color_grid(const std::string& name, const BakedVolume& volume, Stored stored) {
   auto grid = make_grid<openvdb::Vec3SGrid>(name, volume, [&](const BakedVoxel& v) {
-    return openvdb::Vec3s(std::min(v.rgb.x, largest), std::min(v.rgb.y, largest), std::min(v.rgb.z, largest));
+    return openvdb::Vec3s(stored(v.rgb.x), stored(v.rgb.y), stored(v.rgb.z));
   });
   grid->setVectorType(openvdb::VEC_INVARIANT);
   grid->insertMeta("colorspace", openvdb::StringMetadata("lin_rec709"));
   return grid;
 }
 
+openvdb::Vec3SGrid::Ptr emission_grid(const BakedVolume& volume, Stored stored) {
+  auto grid = make_grid<openvdb::Vec3SGrid>("emission", volume, [&](const BakedVoxel& v) {
+    const Vec3f emission = v.rgb * v.sigma;
+    return openvdb::Vec3s(stored(emission.x), stored(emission.y), stored(emission.z));
+  });
+  grid->setVectorType(openvdb::VEC_INVARIANT);
+  grid->insertMeta("colorspace", openvdb::StringMetadata("lin_rec709"));
+  grid->insertMeta("meaning", openvdb::StringMetadata("density times color, per world unit"));
+  return grid;
+}
+
 openvdb::FloatGrid::Ptr float_grid(const std::string& name, const std::string& meaning, const BakedVolume& volume,
-                                   float BakedVoxel::*member, float largest) {
-  auto grid =
-      make_grid<openvdb::FloatGrid>(name, volume, [&](const BakedVoxel& v) { return std::min(v.*member, largest); });
+                                   float BakedVoxel::*member, Stored stored) {
+  auto grid = make_grid<openvdb::FloatGrid>(name, volume, [&](const BakedVoxel& v) { return stored(v.*member); });
   grid->insertMeta("meaning", openvdb::StringMetadata(meaning));
   return grid;
 }
 
 openvdb::GridPtrVec make_grids(const BakedVolume& volume, const VdbOptions& options) {
-  const float largest = options.half ? kHalfMax : std::numeric_limits<float>::max();
-  const bool half_density = options.half && density_fits_half(volume);
-  const auto density =
-      float_grid("density", "extinction, 1/world unit", volume, &BakedVoxel::sigma, std::numeric_limits<float>::max());
-  openvdb::GridPtrVec grids{density, color_grid("color", volume, largest)};
-  if (options.houdini) grids.push_back(color_grid("Cd", volume, largest));
-  grids.push_back(float_grid("lab_a", "CIE 1976 a, D65", volume, &BakedVoxel::a, largest));
-  grids.push_back(float_grid("lab_b", "CIE 1976 b, D65", volume, &BakedVoxel::b, largest));
-  grids.push_back(float_grid("luminance", "linear Y", volume, &BakedVoxel::luminance, largest));
+  const Stored stored{options.half};
+  const bool half_density = density_fits_half(volume, options);
+  const double scale = density_scale(volume, options);
+  const auto density = make_grid<openvdb::FloatGrid>(
+      "density", volume, [&](const BakedVoxel& v) { return static_cast<float>(v.sigma / scale); });
+  density->insertMeta("meaning",
+                      openvdb::StringMetadata(options.normalize_density ? "extinction in units of cnerf_density_scale"
+                                                                        : "extinction, 1/world unit"));
+  openvdb::GridPtrVec grids{density, color_grid("color", volume, stored)};
+  if (options.houdini) grids.push_back(color_grid("Cd", volume, stored));
+  if (options.emission) grids.push_back(emission_grid(volume, stored));
+  grids.push_back(float_grid("lab_a", "CIE 1976 a, D65", volume, &BakedVoxel::a, stored));
+  grids.push_back(float_grid("lab_b", "CIE 1976 b, D65", volume, &BakedVoxel::b, stored));
+  grids.push_back(float_grid("luminance", "linear Y", volume, &BakedVoxel::luminance, stored));
   const auto transform = transform_of(volume, options);
   for (const auto& grid : grids) {
     grid->setTransform(transform);
@@ -97,6 +118,7 @@ openvdb::MetaMap file_metadata(const BakedVolume& volume, const VdbOptions& opti
   meta.insertMeta("cnerf_cascades", openvdb::Int32Metadata(frame.cascades));
   meta.insertMeta("cnerf_resolution", openvdb::Vec3IMetadata(openvdb::Vec3i(volume.resolution.x, volume.resolution.y,
                                                                             volume.resolution.z)));
+  meta.insertMeta("cnerf_density_scale", openvdb::DoubleMetadata(density_scale(volume, options)));
   meta.insertMeta("units", Text(options.units));
   meta.insertMeta("up_axis", Text(options.up_axis));
   meta.insertMeta("colorspace", Text("lin_rec709"));
@@ -106,6 +128,19 @@ openvdb::MetaMap file_metadata(const BakedVolume& volume, const VdbOptions& opti
   meta.insertMeta("colorizer", Text(volume.colorizer));
   meta.insertMeta("take", Text(volume.take));
   return meta;
+}
+
+/// Two corners without density or colour: the box of what is active grows by `padding` voxels on every side.
+void pad_box(BakedVolume& volume, int padding) {
+  const VoxelBox box = bounding_box(volume.voxels);
+  const Vec3i margin{padding, padding, padding};
+  for (const Vec3i corner : {box.min - margin, box.min + box.size - Vec3i{1, 1, 1} + margin}) {
+    BakedVoxel voxel;
+    voxel.i = corner.x;
+    voxel.j = corner.y;
+    voxel.k = corner.z;
+    volume.voxels.push_back(voxel);
+  }
 }
 
 std::uint32_t compression_flags(const std::string& name) {
@@ -144,9 +179,19 @@ void check_options(const VdbOptions& options) {
 
 }  // namespace
 
-bool density_fits_half(const BakedVolume& volume) {
-  return std::all_of(volume.voxels.begin(), volume.voxels.end(), [](const BakedVoxel& v) {
-    return v.sigma == 0 || (v.sigma <= kHalfMax && v.sigma >= kHalfMinNormal);
+double density_scale(const BakedVolume& volume, const VdbOptions& options) {
+  if (!options.normalize_density) return 1;
+  float largest = 0;
+  for (const BakedVoxel& v : volume.voxels) largest = std::max(largest, v.sigma);
+  return largest > 0 ? largest : 1;
+}
+
+bool density_fits_half(const BakedVolume& volume, const VdbOptions& options) {
+  if (!options.half) return false;
+  const auto scale = static_cast<float>(density_scale(volume, options));
+  return std::all_of(volume.voxels.begin(), volume.voxels.end(), [scale](const BakedVoxel& v) {
+    const float stored = v.sigma / scale;
+    return stored == 0 || (stored <= kHalfMax && stored >= kHalfMinNormal);
   });
 }
 
@@ -155,7 +200,8 @@ void write_vdb(const BakedVolume& volume, const std::filesystem::path& path, con
   check_voxels(volume);
   openvdb::initialize();
   BakedVolume padded = volume;
-  dilate_colors(padded, options.dilation + options.padding);
+  dilate_colors(padded, options.dilation);
+  pad_box(padded, options.padding);
   const openvdb::GridPtrVec grids = make_grids(padded, options);
   const openvdb::MetaMap meta = file_metadata(volume, options);
   write_atomically(path, [&](const std::filesystem::path& temporary) {

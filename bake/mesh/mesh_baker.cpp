@@ -11,6 +11,8 @@
 namespace cnerf {
 namespace {
 
+constexpr double kDensityShare = 0.25, kSurfaceShare = 0.35;
+
 /// Maps the shares of the steps onto one progress line, and stops on Ctrl-C.
 class MeshProgress {
  public:
@@ -49,12 +51,10 @@ void put_into_world(const UnwrappedMesh& unwrapped, const BakePlan& plan, BakedM
 
 }  // namespace
 
-BakedMesh bake_mesh(const ColorField& field, const std::vector<BakeCamera>& cameras, const BakeOptions& bake,
-                    const MeshOptions& options, const ProgressSink& sink) {
-  constexpr double kDensityShare = 0.25, kSurfaceShare = 0.35;
+BakedMesh bake_mesh(const ColorField& field, const std::vector<BakeCamera>& cameras, const BakeLevel& level,
+                    const BakeOptions& bake, const MeshOptions& options, const ProgressSink& sink) {
   const MeshProgress progress(sink);
-  const BakePlan plan = plan_bake(field, bake);
-  const DensityPass density = bake_density(field, plan, bake, progress.step(0, kDensityShare));
+  const auto& [plan, density] = level;
   const SurfaceMesh surface = make_surface(solidified(density.sigma, cameras, plan, bake), plan, options);
   const UnwrappedMesh unwrapped = unwrap(surface, options.texture_size, options.gutter);
   progress.step(kDensityShare, kSurfaceShare)(1);
@@ -68,6 +68,14 @@ BakedMesh bake_mesh(const ColorField& field, const std::vector<BakeCamera>& came
   mesh.gutter = options.gutter;
   mesh.frame = field.frame();
   return mesh;
+}
+
+BakedMesh bake_mesh(const ColorField& field, const std::vector<BakeCamera>& cameras, const BakeOptions& bake,
+                    const MeshOptions& options, const ProgressSink& sink) {
+  const MeshProgress progress(sink);
+  BakePlan plan = plan_bake(field, bake);
+  DensityPass density = bake_density(field, plan, bake, progress.step(0, kDensityShare));
+  return bake_mesh(field, cameras, BakeLevel{plan, std::move(density)}, bake, options, sink);
 }
 
 }  // namespace cnerf

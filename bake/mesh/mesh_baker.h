@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "bake/bake_camera.h"
-#include "bake/bake_options.h"
+#include "bake/bake_levels.h"
 #include "bake/baked_mesh.h"
 #include "bake/mesh/mesh_options.h"
 #include "src/base/progress.h"
@@ -12,7 +12,7 @@
 
 namespace cnerf {
 
-/// Density baked as for a volume (`bake`: box, voxel size, sub-samples), its surface, reduced and unwrapped, and a
+/// The surface of a baked density (of a bake of one level), reduced and unwrapped, and a
 /// texture of what the cameras see of it. The caller fills in `colorizer` and `take` of the result.
 /// Same result for any number of threads.
 /// @param cameras  of the capture: a texel's luminance is the mean of what they see.
@@ -20,6 +20,10 @@ namespace cnerf {
 /// @throws InputError     when nothing in the box is opaque enough to have a surface.
 /// @throws ContractError  when the field answers NaN, infinity or a negative density.
 /// @throws Interrupted    on Ctrl-C.
+[[nodiscard]] BakedMesh bake_mesh(const ColorField& field, const std::vector<BakeCamera>& cameras,
+                                  const BakeLevel& level, const BakeOptions& bake, const MeshOptions& options,
+                                  const ProgressSink& progress = {});
+/// The same after baking density itself, on one lattice whatever `bake.grids` says.
 [[nodiscard]] BakedMesh bake_mesh(const ColorField& field, const std::vector<BakeCamera>& cameras,
                                   const BakeOptions& bake, const MeshOptions& options,
                                   const ProgressSink& progress = {});

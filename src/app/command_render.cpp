@@ -61,11 +61,11 @@ void render_bake(const RenderArguments& arguments, Reporter& reporter) {
   }
   const fs::path folder = (arguments.out.empty() ? bake / "renders" : fs::path(arguments.out)) / path.name;
   refuse_existing(folder, arguments.overwrite);
-  const BakedVolume volume = read_vdb(bake / manifest.volume->file);
+  const std::vector<BakedVolume> volumes = read_volumes(bake);
   const ProgressSink progress = reporter.sink();
   for (std::size_t i = 0; i < path.cameras.size(); ++i) {
     const PathCamera& camera = path.cameras[i];
-    const VolumeImage image = integrate_volume(volume, camera.intrinsics, camera.world_from_camera);
+    const VolumeImage image = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);
     write_png(folder / (camera.name + ".png"), picture_from_linear(image.width, image.height, image.rgb));
     progress({"render", double(i + 1) / double(path.cameras.size()), {}});
     if (interruption_requested()) throw Interrupted("stopped");

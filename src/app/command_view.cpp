@@ -2,6 +2,7 @@
 
 #include <thread>
 
+#include "bake/resample.h"
 #include "export/manifest.h"
 #include "export/vdb_reader.h"
 #include "src/app/command.h"
@@ -39,7 +40,7 @@ fs::path bundle_of_bake(const fs::path& bake, const Config& config, const std::v
   if (!manifest.volume) {
     throw InputError(manifest_file, "volume", "this bake has none; bake with --format vdb or --format web");
   }
-  const BakedVolume volume = read_vdb(bake / manifest.volume->file);
+  const BakedVolume volume = merged_volume(read_volumes(bake));
   write_web(volume, {bake.filename().string(), manifest.cameras, {}, command_line, manifest.units, manifest.up_axis},
             folder, config.web, reporter);
   reporter.say("note: the photographs are with the capture; cnerf bake RUN --format web adds them");

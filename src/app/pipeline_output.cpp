@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <sstream>
 
-#include "bake/bake_plan.h"
 #include "bake/mesh/mesh_baker.h"
 #include "bake/resample.h"
 #include "bake/volume_baker.h"
@@ -28,10 +27,14 @@ std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::stri
   return Scene::load(directory.stage1_snapshot(), take.empty() ? fs::path() : directory.take_snapshot(take));
 }
 
-Picture grey_picture(const View& view) {
+std::vector<float> luminance_of(const View& view) {
   std::vector<float> luminance(view.image.pixel_count());
   for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = view.image.luminance(i);
-  return picture_from_linear(view.image.width, view.image.height, luminance);
+  return luminance;
+}
+
+Picture grey_picture(const View& view) {
+  return picture_from_linear(view.image.width, view.image.height, luminance_of(view));
 }
 
 std::string colorizer_name(const RunDirectory& directory, const std::string& take) {
@@ -56,12 +59,16 @@ void say_metrics(const Metrics& metrics, Reporter& reporter) {
   reporter.say(text);
 }
 
-void say_estimate(const Scene& scene, const BakeOptions& options, Reporter& reporter) {
-  const BakePlan plan = plan_bake(scene, options);
-  const BakeEstimate estimate = estimate_bake(scene, plan);
-  reporter.say(fmt::format("bake: {} x {} x {} voxels, at most {:.1f} M of them filled; about {:.1f} GiB of memory",
-                           plan.resolution.x, plan.resolution.y, plan.resolution.z, 1e-6 * double(estimate.voxels),
-                           double(estimate.memory_bytes) / (1 << 30)));
+void say_estimate(const Scene& scene, const std::vector<BakePlan>& plans, Reporter& reporter) {
+  for (const BakePlan& plan : plans) {
+    const BakeEstimate estimate = estimate_bake(scene, plan);
+    reporter.say(
+        fmt::format("bake: {} x {} x {} voxels of {:.4g}, at most {:.1f} M of them filled; about {:.1f} GiB of memory",
+                    plan.resolution.x, plan.resolution.y, plan.resolution.z, plan.voxel_size,
+                    1e-6 * double(estimate.voxels), double(estimate.memory_bytes) / (1 << 30)));
+  }
+  reporter.say(
+      fmt::format("bake: Cycles will take about {:.2f} GiB for them", double(cycles_bytes(plans)) / (1 << 30)));
 }
 
 std::vector<BakeCamera> cameras_of(const Capture& capture) {
@@ -75,9 +82,7 @@ std::vector<WebPhoto> web_photos(const Capture& capture, const WebOptions& optio
   std::vector<WebPhoto> photos;
   if (options.photo_side == 0) return photos;
   for (const View& view : capture.views) {
-    std::vector<float> luminance(view.image.pixel_count());
-    for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = view.image.luminance(i);
-    photos.push_back(make_web_photo(view.intrinsics, luminance, options.photo_side, options.photo_quality));
+    photos.push_back(make_web_photo(view.intrinsics, luminance_of(view), options.photo_side, options.photo_quality));
   }
   return photos;
 }
@@ -208,36 +213,49 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   const Config& config = context.config;
   const std::vector<BakeCamera> cameras = cameras_of(context.capture);
   BakeFolder bake(folder, cameras, context.command_line, config.vdb.units, config.vdb.up_axis);
+  BakeOptions options = config.bake;
+  if (formats.web && !formats.vdb && !formats.gltf) {
+    options.resolution = std::min(options.resolution, config.web.resolution);
+  }
+  const std::string colorizer = colorizer_name(context.directory, take);
+  const std::vector<BakePlan> plans = plan_within_budget(*scene, cameras, options);
+  say_estimate(*scene, plans, context.reporter);
+  const std::vector<BakeLevel> levels = bake_levels(*scene, plans, options, context.reporter.sink());
   if (formats.vdb || formats.web) {
-    BakeOptions options = config.bake;
-    if (!formats.vdb) options.resolution = std::min(options.resolution, config.web.resolution);
-    say_estimate(*scene, options, context.reporter);
-    BakedVolume volume = bake_volume(*scene, cameras, options, context.reporter.sink());
-    volume.colorizer = colorizer_name(context.directory, take);
-    volume.take = take;
+    std::vector<BakedVolume> volumes = bake_volumes(*scene, cameras, levels, options, context.reporter.sink());
+    for (BakedVolume& volume : volumes) {
+      volume.colorizer = colorizer;
+      volume.take = take;
+    }
+    if (formats.vdb) {
+      for (const fs::path& vdb : bake.add_volumes(volumes, "volume", config.vdb)) context.reporter.wrote("volume", vdb);
+    }
     if (formats.web) {
       const std::string title = context.capture.root.filename().string();
-      write_web(volume,
+      write_web(merged_volume(std::move(volumes)),
                 {title, cameras, web_photos(context.capture, config.web), context.command_line, config.vdb.units,
                  config.vdb.up_axis},
                 web_folder(folder), config.web, context.reporter);
     }
-    if (formats.vdb) {
-      const fs::path vdb = bake.add_volume(volume, "volume", config.vdb);
-      context.reporter.say(
-          fmt::format("bake: {} voxels of {:.4g} world units", volume.voxels.size(), volume.voxel_size));
-      context.reporter.wrote("volume", vdb);
-    }
   }
   if (formats.gltf) {
-    BakedMesh mesh = bake_mesh(*scene, cameras, config.bake, config.mesh, context.reporter.sink());
-    mesh.colorizer = colorizer_name(context.directory, take);
+    // A surface needs all of the density on one lattice.
+    BakedMesh mesh = levels.size() == 1
+                         ? bake_mesh(*scene, cameras, levels[0], options, config.mesh, context.reporter.sink())
+                         : bake_mesh(*scene, cameras, options, config.mesh, context.reporter.sink());
+    mesh.colorizer = colorizer;
     mesh.take = take;
     const GltfFiles files = bake.add_mesh(mesh, "mesh", {formats.exr, config.exr});
     context.reporter.say(fmt::format("mesh: {} faces, {} charts in {} x {} texels", mesh.triangles.size(), mesh.charts,
                                      mesh.texture.size, mesh.texture.size));
     context.reporter.wrote("mesh", files.glb);
     context.reporter.wrote("mesh", files.gltf);
+  }
+  if ((formats.vdb || formats.gltf) && config.vdb.plates) {
+    constexpr int kPlateSide = 4096, kPlateQuality = 92;
+    for (const View& view : context.capture.views) {
+      bake.add_plate(view.name, make_web_photo(view.intrinsics, luminance_of(view), kPlateSide, kPlateQuality).jpeg);
+    }
   }
   if (formats.vdb || formats.gltf) {
     bake.finish();

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <tuple>
+
 #include <algorithm>
 #include <cstdlib>
 
@@ -44,10 +47,30 @@ TEST(Dilate, NewVoxelsHaveTheNearestColorAndNoDensity) {
   for (const BakedVoxel& v : volume.voxels) {
     const bool original = v.j == 7 && v.k == 7 && (v.i == 7 || v.i == 10);
     EXPECT_EQ(v.sigma > 0, original);
+    const int i = std::abs(v.i - 7) < std::abs(v.i - 10) ? v.i - 7 : v.i - 10;
+    if (i * i + (v.j - 7) * (v.j - 7) + (v.k - 7) * (v.k - 7) >= 4) {  // out of interpolation's reach: any of the two
+      EXPECT_TRUE(v.rgb == (Vec3f{1, 0, 0}) || v.rgb == (Vec3f{0, 1, 0}));
+      continue;
+    }
     EXPECT_EQ(v.rgb, (std::abs(v.i - 7) < std::abs(v.i - 10) ? Vec3f{1, 0, 0} : Vec3f{0, 1, 0}));
   }
   EXPECT_EQ(find(volume, 8, 8, 8)->a, 10);
   EXPECT_EQ(find(volume, 9, 8, 8)->luminance, 0.4f);
+}
+
+TEST(Dilate, BeyondInterpolationABrickHasOneColor) {
+  BakedVolume volume = two_voxels();
+  dilate_colors(volume, 2);
+  std::map<std::tuple<int, int, int>, Vec3f> of_brick;
+  std::size_t outer = 0;
+  for (const BakedVoxel& v : volume.voxels) {
+    const int i = std::abs(v.i - 7) < std::abs(v.i - 10) ? v.i - 7 : v.i - 10;
+    if (i * i + (v.j - 7) * (v.j - 7) + (v.k - 7) * (v.k - 7) < 4) continue;
+    ++outer;
+    const auto [brick, is_first] = of_brick.try_emplace({v.i / 8, v.j / 8, v.k / 8}, v.rgb);
+    EXPECT_EQ(brick->second, v.rgb);
+  }
+  EXPECT_GT(outer, 4 * of_brick.size());
 }
 
 TEST(Dilate, TwiceIsOnceAndGrowingLaterIsTheSame) {

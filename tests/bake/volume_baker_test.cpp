@@ -156,10 +156,13 @@ TEST(BakeVolume, LuminanceIsWhatTheCamerasSee) {
 
   const BakeCamera left = camera_at("left", {-3, 2, 3}, {1, 2, 3}, 64, 64, 100);
   const BakedVolume both = bake_volume(field, {camera_at_positive_x(), left}, slab_options());
+  std::size_t mixed = 0;
   for (const BakedVoxel& v : both.voxels) {
-    EXPECT_GT(v.luminance, 0.2f);
-    EXPECT_LT(v.luminance, 0.8f);
+    EXPECT_GT(v.luminance, 0.2f - 1e-5f);
+    EXPECT_LT(v.luminance, 0.8f + 1e-5f);
+    mixed += v.luminance > 0.21f && v.luminance < 0.79f ? 1 : 0;
   }
+  EXPECT_GT(mixed, both.voxels.size() / 4);  // the others are seen by one camera only, the other's view is too dim
 }
 
 TEST(BakeVolume, VoxelsThatNoCameraSeesAreDropped) {
@@ -168,6 +171,7 @@ TEST(BakeVolume, VoxelsThatNoCameraSeesAreDropped) {
     return std::count_if(volume.voxels.begin(), volume.voxels.end(), [](const auto& v) { return v.sigma > 0; });
   };
   BakeOptions options = slab_options();
+  options.weight_threshold = 0.001;
   const BakedVolume seen = bake_volume(field, {camera_at_positive_x()}, options);
   // The face towards the camera and the voxel behind it (e^-5 of the light).
   EXPECT_EQ(dense(seen), 2 * 20 * 20);
@@ -175,6 +179,22 @@ TEST(BakeVolume, VoxelsThatNoCameraSeesAreDropped) {
   for (const BakedVoxel& v : seen.voxels) EXPECT_GT(seen.origin.x + v.i * seen.voxel_size, nearest_dropped);
   options.keep_unseen = true;
   EXPECT_EQ(dense(bake_volume(field, {camera_at_positive_x()}, options)), 40 * 20 * 20);
+}
+
+TEST(BakeVolume, VoxelsThatHardlyReachAnyPixelAreDropped) {
+  // Fog in front of the camera and a wall: behind the wall fog is seen by nobody, in front each voxel takes 2.5 %.
+  AnalyticField field(kFrame, box_density({0.25f, 0.375f, 0.375f}, {0.75f, 0.625f, 0.625f}, 2));
+  const auto dense = [&](double threshold) {
+    BakeOptions options = slab_options();
+    options.weight_threshold = threshold;
+    std::size_t count = 0;
+    for (const BakedVoxel& v : bake_volume(field, {camera_at_positive_x()}, options).voxels) count += v.sigma > 0;
+    return count;
+  };
+  EXPECT_EQ(dense(0), 40u * 20 * 20);
+  // Light of the k-th layer: 0.0247 exp(-0.025 k), which falls below 0.0125 at layer 27.
+  EXPECT_NEAR(double(dense(0.0125)) / (20 * 20), 27, 2.5);
+  EXPECT_THROW((void)dense(0.03), InputError);
 }
 
 TEST(BakeVolume, NothingSeenIsAnInputError) {

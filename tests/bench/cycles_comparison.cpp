@@ -1,10 +1,10 @@
 // A baked run in the real Blender: renders the held-out views of a capture in Cycles (linear EXR, box filter, volume
-// step rate 0.25) and compares them with our own integrator on the same grids and with the capture's colours, over
-// pixels whose opacity is above 0.01.
+// step rate 0.25) and compares them with our own integrator on the same grids, with the capture's colours and, where
+// snapshots are given, with the field's own render, over pixels whose opacity is above 0.01.
 //
-//   cycles_comparison BAKE CAPTURE [views=3] [samples=64] [downscale=1] [holdout=0]
+//   cycles_comparison BAKE CAPTURE [STAGE1.snapshot [TAKE.snapshot]] [views=3] [samples=64] [downscale=1] [holdout=0]
 //
-// BAKE is the folder with volume.vdb, manifest.json and blender_setup.py.
+// BAKE is the folder with the VDB files, manifest.json and blender_setup.py.
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +17,7 @@
 #include "src/capture/color_truth.h"
 #include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
+#include "src/train/scene.h"
 #include "tests/blender/blender_run.h"
 
 namespace {
@@ -33,21 +34,32 @@ double encoded(float linear) {
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    std::puts("cycles_comparison BAKE CAPTURE [views=N] [samples=N] [downscale=N] [holdout=N]");
+    std::puts(
+        "cycles_comparison BAKE CAPTURE [STAGE1.snapshot [TAKE.snapshot]] [views=N] [samples=N] [downscale=N] "
+        "[holdout=N]");
     return 64;
   }
   const std::filesystem::path bake = argv[1];
+  std::filesystem::path stage1, take;
   std::map<std::string, int> options = {{"views", 3}, {"samples", 64}, {"downscale", 1}, {"holdout", 0}};
   for (int i = 3; i < argc; ++i) {
     const std::string argument = argv[i];
     const std::size_t equals = argument.find('=');
+    if (equals == std::string::npos) {
+      (stage1.empty() ? stage1 : take) = argument;
+      continue;
+    }
     options.at(argument.substr(0, equals)) = std::stoi(argument.substr(equals + 1));
   }
   cnerf::CaptureOptions capture_options;
   capture_options.downscale = options["downscale"];
   capture_options.holdout = options["holdout"];
   const cnerf::Capture capture = cnerf::load_capture(argv[2], capture_options);
-  const cnerf::BakedVolume volume = cnerf::read_vdb(bake / "volume.vdb");
+  const std::vector<cnerf::BakedVolume> volumes = cnerf::read_volumes(bake);
+  const auto scene = stage1.empty() ? nullptr : cnerf::Scene::load(stage1, take);
+  cnerf::RenderOptions render;
+  render.color = false;
+  render.baked_color = scene != nullptr && scene->is_colorized();
 
   int done = 0;
   for (const cnerf::View& view : capture.views) {
@@ -56,9 +68,10 @@ int main(int argc, char** argv) {
     const cnerf::test::RenderedExr cycles = cnerf::test::render_exact(
         bake / "blender_setup.py",
         "--camera '" + view.name + "' --samples " + std::to_string(options["samples"]) + " --step-rate 0.25");
-    const cnerf::VolumeImage ours = cnerf::integrate_volume(volume, view.intrinsics, view.world_from_camera);
+    const cnerf::VolumeImage ours = cnerf::integrate_volumes(volumes, view.intrinsics, view.world_from_camera);
     const auto truth = cnerf::load_color_truth(view);
-    double against_ours = 0, against_truth = 0;
+    const auto field = scene ? scene->render(view.intrinsics, view.world_from_camera, render) : cnerf::RenderedImage{};
+    double against_ours = 0, against_truth = 0, against_field = 0;
     std::size_t values = 0;
     for (int p = 0; p < ours.width * ours.height; ++p) {
       const float* rgba = &cycles.rgba[4 * std::size_t(p)];
@@ -66,6 +79,10 @@ int main(int argc, char** argv) {
       for (int c = 0; c < 3; ++c, ++values) {
         const double difference = double(rgba[c]) - ours.rgb[3 * std::size_t(p) + c];
         against_ours += difference * difference;
+        if (scene) {
+          const float wanted = render.baked_color ? field.baked_rgb[3 * std::size_t(p) + c] : field.luminance[p];
+          against_field += std::pow(encoded(rgba[c]) - encoded(wanted), 2);
+        }
         if (!truth) continue;
         const double error = encoded(rgba[c]) - encoded(truth->rgb[3 * std::size_t(p) + c]);
         against_truth += error * error;
@@ -73,6 +90,7 @@ int main(int argc, char** argv) {
     }
     std::printf("%s: Cycles against our integrator %.2f dB (linear)", view.name.c_str(),
                 decibels(against_ours, values));
+    if (scene) std::printf(", against the field %.2f dB (sRGB)", decibels(against_field, values));
     if (truth) std::printf(", against the true colours %.2f dB (sRGB)", decibels(against_truth, values));
     std::printf(", over %zu pixels\n", values / 3);
     std::fflush(stdout);

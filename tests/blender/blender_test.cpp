@@ -7,7 +7,9 @@
 
 #include "bake/volume_baker.h"
 #include "bake/volume_integrator.h"
+#include "export/bake_folder.h"
 #include "export/volume_export.h"
+#include "export/web_pictures.h"
 #include "src/base/files.h"
 #include "src/color/colorspace_math.h"
 #include "tests/bake/analytic_field.h"
@@ -214,6 +216,111 @@ TEST(Blender, CyclesAndOurIntegratorAgree) {
   BakedVolume shifted = volume;
   shifted.origin = shifted.origin + Vec3d{0.5, 0.5, 0.5} * shifted.voxel_size;
   EXPECT_LT(compare(cycles, integrate_volume(shifted, camera.intrinsics, camera.world_from_camera)).psnr, 40);
+}
+
+TEST(Blender, NestedGridsAgreeWithOurIntegrator) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  AnalyticField field({{0, 0, 0}, 0.25, 2}, [](Vec3f p) {
+    const float q = length(p - Vec3f{0.5f, 0.5f, 0.5f});
+    return q < 0.3f ? 12 * (1 - q / 0.3f) : 0.0f;
+  });
+  field.with_luminance([](Vec3f p, Vec3f) { return 0.2f + 0.5f * p.x; });
+  const BakeCamera camera = camera_at("front", {0.5, -6, 0.7}, {0, 0, 0}, 96, 96, 180);
+  BakeOptions options;
+  options.resolution = 32;
+  const std::vector<BakeCamera> cameras{camera, camera_at("right", {6, 0.4, 0}, {0, 0, 0}, 96, 96, 180)};
+  const auto levels = bake_levels(field, plan_levels(field, cameras, options), options, [](double) {});
+  const std::vector<BakedVolume> volumes = bake_volumes(field, cameras, levels, options);
+  ASSERT_GT(volumes.size(), 1u);
+  BakeFolder bake(folder.path(), cameras, {}, "units", "y");  // stands up: the Empty turns everything with it
+  bake.add_volumes(volumes, "volume", {});
+  bake.finish();
+  const RenderedExr cycles = render_exact(bake.blender_setup(), "--step-rate 0.25 --samples 64");
+  const VolumeImage ours = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);
+  const Comparison equal = compare(cycles, ours);
+  std::printf("Nested grids, Cycles against our integrator: %.2f dB over %zu pixels\n", equal.psnr, equal.pixels);
+  EXPECT_GT(equal.pixels, 1000u);
+  EXPECT_GE(equal.psnr, 40);
+}
+
+TEST(Blender, RegradingRebuildsTheColorAndTurnsItGrey) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  BakedVolume volume = block_volume({0, 0, 0}, {20, 20, 20}, 40);
+  const Lab<float> lab = lab_from_linear_rgb(kColor);
+  for (BakedVoxel& v : volume.voxels) {
+    v.luminance = luminance_of(kColor);
+    v.a = lab.a;
+    v.b = lab.b;
+  }
+  const Vec3d middle = voxel_position(volume, {10, 10, 10});
+  const BakeCamera camera = camera_at("front", middle + Vec3d{0, -5, 0}, middle, 16, 16, 60);
+  const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "block");
+  const auto centre = [&](const std::string& grade) {
+    const RenderedExr image = render_exact(bake.blender_setup, "--samples 16 " + grade);
+    const float* p = image.pixel(8, 8);
+    return Vec3f{p[0], p[1], p[2]};
+  };
+  EXPECT_LT(length(centre("--regrade 1") - kColor), 3e-3f);
+  const float y = luminance_of(kColor);
+  EXPECT_LT(length(centre("--regrade 1 --saturation 0") - Vec3f{y, y, y}), 3e-3f);
+  EXPECT_LT(length(centre("--regrade 1 --saturation 0 --exposure 1") - Vec3f{y, y, y} * 2.0f), 6e-3f);
+  Lab<float> opposite = lab;
+  opposite.a = -lab.a * 0.5f;
+  opposite.b = -lab.b * 0.5f;
+  EXPECT_LT(length(centre("--regrade 1 --hue 180 --saturation 0.5") - linear_rgb_from_lab(opposite)), 3e-3f);
+}
+
+TEST(Blender, NumberedPicturesBecomeAFilmWithPlatesUnderAnUprightEmpty) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  std::vector<BakeCamera> cameras;
+  for (const int frame : {3, 4, 7}) {
+    cameras.push_back(
+        camera_at("images/frame_" + std::to_string(frame) + ".png", {double(frame), 2, 9}, {1, 2, 3}, 8, 8, 9));
+  }
+  VdbOptions options;
+  options.metres_per_unit = 0.01;
+  BakeFolder bake(folder.path(), cameras, {}, "cm", "y");
+  bake.add_volumes({block_volume({0, 0, 0}, {4, 4, 4}, 1)}, "volume", options);
+  bake.add_plate(cameras[1].name, make_web_photo(cameras[1].intrinsics, std::vector<float>(64, 0.5f), 8, 90).jpeg);
+  bake.finish();
+  std::ofstream(folder / "check.py")
+      << "import bpy\n"
+         "scene = bpy.context.scene\n"
+         "root, film = bpy.data.objects['cnerf'], bpy.data.objects['cnerf film']\n"
+         "assert scene.camera == film and (scene.frame_start, scene.frame_end) == (3, 7)\n"
+         "assert all(o.parent == root for o in scene.objects if o != root)\n"
+         "for frame in (3, 4, 7):\n"
+         "    scene.frame_set(frame)\n"
+         "    at = film.matrix_world.to_translation()\n"  // (x, y, z) stands up as (x, -z, y), in metres
+         "    assert max(abs(a - b) for a, b in zip(at, (0.01 * frame, -0.09, 0.02))) < 1e-6, at\n"
+         "plates = [len(o.data.background_images) for o in scene.objects if o.type == 'CAMERA']\n"
+         "assert sum(plates) == 1, plates\n";
+  EXPECT_EQ(run_blender(bake.blender_setup(), "--film", folder / "check.py"), 0)
+      << read_text_file(folder / "blender.log");
+}
+
+TEST(Blender, TheAddOnImportsABakeIntoASceneOfItsOwn) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, {}, folder.path(), "block");
+  std::ofstream(folder / "import.py") << "import bpy, importlib.util\n"
+                                         "spec = importlib.util.spec_from_file_location('cnerf_bake', r'" +
+                                             bake.blender_setup.string() +
+                                             "')\n"
+                                             "module = importlib.util.module_from_spec(spec)\n"
+                                             "spec.loader.exec_module(module)\n"
+                                             "assert module.bl_info['category'] == 'Import-Export'\n"
+                                             "module.register()\n"
+                                             "assert bpy.ops.import_scene.cnerf_bake(filepath=r'" +
+                                             bake.manifest.string() +
+                                             "') == {'FINISHED'}\n"
+                                             "assert 'VOLUME' in [o.type for o in bpy.data.scenes['cnerf'].objects]\n"
+                                             "assert bpy.data.scenes['Scene'].objects\n"
+                                             "module.unregister()\n";
+  EXPECT_EQ(run_blender(folder / "import.py", ""), 0) << read_text_file(folder / "blender.log");
 }
 
 TEST(Blender, PastedIntoTheTextEditorItMakesASceneOfItsOwn) {

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "export/bake_folder.h"
+#include "export/vdb_reader.h"
 #include "export/volume_export.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -102,6 +104,47 @@ TEST(Manifest, AMissingFileIsNotListed) {
   BakeManifest manifest;
   manifest.files = {"nowhere.vdb"};
   EXPECT_THROW(write_manifest(manifest, folder.path()), MissingInputError);
+}
+
+TEST(BakeFolder, NestedGridsAreListedAndReadBackFinestFirst) {
+  const TempDir folder;
+  const BakedVolume coarse = block_volume({0, 0, 0}, {6, 6, 6}, 1, 0.1),
+                    fine = block_volume({0, 0, 0}, {4, 4, 4}, 2, 0.05);
+  VdbOptions options;
+  options.usd = true;
+  BakeFolder bake(folder.path(), {camera_at("a", {5, 5, 5}, {0, 0, 0}, 8, 8, 9)}, {}, "cm", "y");
+  const auto files = bake.add_volumes({fine, coarse}, "volume", options);
+  bake.add_plate("images/a.png", std::vector<std::byte>(7));
+  bake.finish();
+  EXPECT_EQ(files.size(), 3u);
+  const std::vector<BakedVolume> read = read_volumes(folder.path());
+  ASSERT_EQ(read.size(), 2u);
+  EXPECT_NEAR(read[0].voxel_size, 0.05, 1e-12);
+  EXPECT_NEAR(read[1].voxel_size, 0.1, 1e-12);
+  const BakeManifest manifest = read_manifest(bake.manifest());
+  EXPECT_EQ(manifest.plates.count("a"), 0u) << "plates belong to cameras by their full names";
+  const std::string usd = read_text_file(folder / "volume.usda");
+  for (const char* part : {"@./volume.vdb@", "@./volume_fine1.vdb@", "upAxis = \"Y\"", "token fieldName = \"lab_b\""}) {
+    EXPECT_NE(usd.find(part), std::string::npos) << part;
+  }
+}
+
+TEST(BakeFolder, ASecondBakeLeavesNothingOfTheFirst) {
+  const TempDir folder;
+  const BakedVolume volume = block_volume({0, 0, 0}, {4, 4, 4}, 2);
+  std::ofstream(folder / "mine.txt") << "not of a bake";
+  BakeFolder first(folder.path(), {}, {}, "m", "z");
+  first.add_volumes({volume, volume}, "volume", {});
+  first.add_plate("images/a.png", std::vector<std::byte>(7));
+  first.finish();
+  EXPECT_TRUE(std::filesystem::exists(folder / "plates" / "images_a.jpg"));
+  BakeFolder second(folder.path(), {}, {}, "m", "z");
+  second.add_volumes({volume}, "volume", {});
+  second.finish();
+  EXPECT_TRUE(std::filesystem::exists(folder / "volume.vdb"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "mine.txt"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "volume_fine1.vdb"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "plates" / "images_a.jpg"));
 }
 
 }  // namespace

@@ -85,7 +85,9 @@ TEST(Vdb, CentreRuleAndCornerRule) {
   corner.voxel_origin = "corner";
   write_vdb(block(), folder / "center.vdb");
   write_vdb(block(), folder / "corner.vdb", corner);
-  const auto at = [&](const char* file) { return grid_named(folder / file, "density")->indexToWorld(openvdb::Coord(0, 0, 0)); };
+  const auto at = [&](const char* file) {
+    return grid_named(folder / file, "density")->indexToWorld(openvdb::Coord(0, 0, 0));
+  };
   EXPECT_NEAR((at("center.vdb") - openvdb::Vec3d(1.025, 2.025, 3.025)).length(), 0, 1e-12);
   EXPECT_NEAR((at("corner.vdb") - openvdb::Vec3d(1, 2, 3)).length(), 0, 1e-12);
   EXPECT_NEAR(grid_named(folder / "center.vdb", "density")->voxelSize().x(), 0.05, 1e-15);
@@ -97,12 +99,21 @@ TEST(Vdb, ColorReachesBeyondDensityAndDensityIsPadded) {
   const auto density = openvdb::gridPtrCast<openvdb::FloatGrid>(grid_named(folder / "a.vdb", "density"));
   const auto color = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid_named(folder / "a.vdb", "color"));
   EXPECT_EQ(density->evalActiveVoxelBoundingBox(), openvdb::CoordBBox(1, 2, 3, 14, 15, 16));
+  std::size_t corners = 0;
   for (auto it = density->cbeginValueOn(); it; ++it) {
     const openvdb::Coord at = it.getCoord();
+    if (!openvdb::CoordBBox(2, 3, 4, 13, 14, 15).isInside(at)) {  // holds the box open, and nothing else
+      EXPECT_EQ(*it, 0.0f);
+      EXPECT_EQ(color->tree().getValue(at), openvdb::Vec3s(0));
+      ++corners;
+      continue;
+    }
     const bool inside = openvdb::CoordBBox(4, 5, 6, 11, 12, 13).isInside(at);
     EXPECT_EQ(*it, inside ? 2.0f : 0.0f) << at;
     EXPECT_NEAR(color->tree().getValue(at).z(), 0.8f, 5e-4f) << at;
   }
+  EXPECT_EQ(corners, 2u);
+  EXPECT_EQ(density->activeVoxelCount(), 12u * 12 * 12 + 2);
 }
 
 TEST(Vdb, ReadsBackWhatWasWritten) {
@@ -127,7 +138,7 @@ TEST(Vdb, ReadsBackWhatWasWritten) {
     EXPECT_NEAR(r.a, v.a, 2e-3);
     EXPECT_NEAR(r.b, v.b, 2e-2);
   }
-  EXPECT_EQ(read.voxels.size(), 14u * 14 * 14 + 7u * 7 * 7);
+  EXPECT_EQ(read.voxels.size(), 12u * 12 * 12 + 5u * 5 * 5 + 2);
 }
 
 TEST(Vdb, HugeDensitiesStayFinite) {
@@ -143,7 +154,7 @@ TEST(Vdb, HugeDensitiesStayFinite) {
 TEST(Vdb, TinyDensitiesKeepTheirDigits) {
   const TempDir folder;
   write_vdb(block(1.2345e-7f), folder / "a.vdb");
-  EXPECT_EQ(read_vdb(folder / "a.vdb").voxels[14 * 14 * 7 + 14 * 7 + 7].sigma, 1.2345e-7f);
+  EXPECT_EQ(summary_named(summarize_vdb(folder / "a.vdb"), "density").max_value.at(0), double(1.2345e-7f));
 }
 
 TEST(Vdb, MetadataSaysWhatTheFileIs) {
@@ -168,12 +179,41 @@ TEST(Vdb, SummaryDescribesEveryGrid) {
   const VdbGridSummary& color = summary_named(summary, "color");
   EXPECT_EQ(color.type, "vec3s");
   EXPECT_EQ(color.grid_class, "fog volume");
-  EXPECT_EQ(color.active_voxels, 14u * 14 * 14);
+  EXPECT_EQ(color.active_voxels, 12u * 12 * 12 + 2);
   EXPECT_EQ(color.index_min, (Vec3i{1, 2, 3}));
   EXPECT_EQ(color.index_max, (Vec3i{14, 15, 16}));
   ASSERT_EQ(color.max_value.size(), 3u);
   EXPECT_NEAR(color.max_value[1], 0.5, 1e-3);
-  EXPECT_NEAR(summary_named(summary, "lab_b").min_value.at(0), -31.25, 1e-6);
+  EXPECT_EQ(summary_named(summary, "lab_b").min_value.at(0), -31.25);
+}
+
+TEST(Vdb, EmissionIsDensityTimesColor) {
+  const TempDir folder;
+  write_vdb(block(4), folder / "a.vdb", {.emission = true});
+  const auto emission = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid_named(folder / "a.vdb", "emission"));
+  ASSERT_NE(emission, nullptr);
+  EXPECT_NEAR((emission->tree().getValue(openvdb::Coord(7, 7, 7)) - openvdb::Vec3s(0.8f, 2.0f, 3.2f)).length(), 0,
+              3e-3);
+  EXPECT_EQ(emission->tree().getValue(openvdb::Coord(2, 7, 7)), openvdb::Vec3s(0)) << "where density is 0";
+  EXPECT_EQ(emission->evalActiveVoxelBoundingBox(),
+            grid_named(folder / "a.vdb", "density")->evalActiveVoxelBoundingBox());
+}
+
+TEST(Vdb, NormalizedDensityComesBackInWorldUnits) {
+  const TempDir folder;
+  BakedVolume volume = block(500);
+  volume.voxels[0].sigma = 2e6f;  // beyond half precision, unless normalized
+  write_vdb(volume, folder / "a.vdb", {.normalize_density = true});
+  const VdbSummary summary = summarize_vdb(folder / "a.vdb");
+  EXPECT_EQ(summary_named(summary, "density").max_value.at(0), 1.0);
+  float largest = 0;
+  for (const BakedVoxel& v : read_vdb(folder / "a.vdb").voxels) {
+    largest = std::max(largest, v.sigma);
+    if (v.i == 7 && v.j == 7 && v.k == 7) {
+      EXPECT_NEAR(v.sigma, 500, 0.5);
+    }
+  }
+  EXPECT_EQ(largest, 2e6f);
 }
 
 TEST(Vdb, EveryCompressionReadsBack) {
@@ -182,7 +222,7 @@ TEST(Vdb, EveryCompressionReadsBack) {
     VdbOptions options;
     options.compression = compression;
     write_vdb(block(), folder / "a.vdb", options);
-    EXPECT_EQ(read_vdb(folder / "a.vdb").voxels.size(), 14u * 14 * 14) << compression;
+    EXPECT_EQ(read_vdb(folder / "a.vdb").voxels.size(), 12u * 12 * 12 + 2) << compression;
   }
 }
 

@@ -1,0 +1,253 @@
+#include "bake/bake_levels.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "src/base/error.h"
+#include "src/base/parallel.h"
+
+namespace cnerf {
+namespace {
+
+constexpr std::size_t kMostLevels = 4;
+constexpr int kLookResolution = 160;   ///< of the density that pixels are traced in
+constexpr int kLookRays = 24;          ///< along each axis of a picture
+constexpr double kPixelsPerVoxel = 2;  ///< that a voxel may cover
+constexpr double kLeastShare = 0.15;   ///< of all pixels that must gain by a finer grid
+constexpr int kCells = 32;             ///< along each axis, to look for its place
+constexpr double kHalfOpaque = 0.693147;
+
+/// "4G", "500M", "64k" or a number of bytes.
+std::size_t bytes_of(const std::string& text) {
+  double amount = 0;
+  char unit = 0, rest = 0;
+  const int read = std::sscanf(text.c_str(), " %lf %c %c", &amount, &unit, &rest);
+  const std::string units = "kMG";
+  const std::size_t at = units.find(unit);
+  if (read < 1 || read > 2 || !(amount > 0) || (read == 2 && at == std::string::npos)) {
+    throw UsageError("budget: expected an amount of memory like 4G or 500M, got \"" + text + "\"");
+  }
+  return static_cast<std::size_t>(std::ldexp(amount, read == 2 ? 10 * (static_cast<int>(at) + 1) : 0));
+}
+
+/// What a pixel looks at, and how large voxels may be there.
+struct Sight {
+  Vec3d world;
+  double voxel_size;
+};
+
+std::vector<Sight> sights_of(const BakeCamera& camera, const BakePlan& plan, const BrickGrid<float>& sigma) {
+  const Intrinsics& lens = camera.intrinsics;
+  const Vec3d eye = camera.world_from_camera.translation;
+  const Vec3d origin = plan.voxel_from_world(eye);
+  const Aabbd box{{0, 0, 0}, plan.resolution.cast<double>()};
+  std::vector<Sight> sights;
+  for (int ray = 0; ray < kLookRays * kLookRays; ++ray) {
+    const PixelPosition pixel{(ray % kLookRays + 0.5) * lens.width / kLookRays,
+                              (ray / kLookRays + 0.5) * lens.height / kLookRays};
+    const Vec3d d = normalized(camera.world_from_camera.direction(ray_direction(lens, pixel)));
+    const auto inside = intersect(box, origin, d);
+    if (!inside) continue;
+    double depth = 0;
+    for (double t = inside->begin + 0.5; t < inside->end && depth < kHalfOpaque; t += 1) {
+      depth += sigma.at((origin + d * t).cast<int>()) * plan.voxel_size;
+      if (depth < kHalfOpaque) continue;
+      const double distance = t * plan.voxel_size;
+      sights.push_back({eye + d * distance, kPixelsPerVoxel * distance / lens.fx});
+    }
+  }
+  return sights;
+}
+
+/// Where the cameras' pixels end, in a density too coarse for anything else.
+std::vector<Sight> all_sights(const ColorField& field, const std::vector<BakeCamera>& cameras, BakeOptions options) {
+  options.resolution = std::min(options.resolution, kLookResolution);
+  options.voxel_size = 0;
+  options.subsamples = 1;
+  const BakePlan plan = plan_bake(field, options);
+  const DensityPass density = bake_density(field, plan, options, [](double) {});
+  std::vector<std::vector<Sight>> of_cameras(cameras.size());
+  parallel_tasks(cameras.size(), [&](std::size_t c) { of_cameras[c] = sights_of(cameras[c], plan, density.sigma); });
+  std::vector<Sight> sights;
+  for (const std::vector<Sight>& some : of_cameras) sights.insert(sights.end(), some.begin(), some.end());
+  return sights;
+}
+
+/// Counts of points in cells of a box, summed so that any block of cells takes eight look-ups.
+class CellCounts {
+ public:
+  CellCounts(const Aabbd& box, const std::vector<Vec3d>& points) : sums_((kCells + 1) * (kCells + 1) * (kCells + 1)) {
+    for (const Vec3d p : points) {
+      Vec3i cell;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double share = (p[axis] - box.min[axis]) / (box.max[axis] - box.min[axis]);
+        cell[axis] = std::clamp(static_cast<int>(share * kCells), 0, kCells - 1);
+      }
+      ++at(cell + Vec3i{1, 1, 1});
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      for (std::size_t i = 0; i < sums_.size(); ++i) {
+        Vec3i cell = position(i);
+        if (cell[axis] == 0) continue;
+        --cell[axis];
+        sums_[i] += at(cell);
+      }
+    }
+  }
+  /// In cells [low, low + size).
+  [[nodiscard]] int in_block(Vec3i low, Vec3i size) const {
+    int count = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3i upper{corner & 1, corner >> 1 & 1, corner >> 2};
+      const int sign = (upper.x + upper.y + upper.z) % 2 == 1 ? 1 : -1;
+      count += sign * sums_[index(low + Vec3i{upper.x * size.x, upper.y * size.y, upper.z * size.z})];
+    }
+    return count;
+  }
+
+ private:
+  [[nodiscard]] static std::size_t index(Vec3i c) {
+    return (static_cast<std::size_t>(c.x) * (kCells + 1) + c.y) * (kCells + 1) + c.z;
+  }
+  [[nodiscard]] static Vec3i position(std::size_t i) {
+    const auto n = static_cast<int>(i);
+    return {n / ((kCells + 1) * (kCells + 1)), n / (kCells + 1) % (kCells + 1), n % (kCells + 1)};
+  }
+  int& at(Vec3i cell) { return sums_[index(cell)]; }
+
+  std::vector<int> sums_;
+};
+
+/// The part of `box`, at most `side` long along each axis, that holds most points; around them, if it holds any.
+Aabbd fullest_part(const Aabbd& box, double side, const std::vector<Vec3d>& points) {
+  const CellCounts counts(box, points);
+  const Vec3d cell = box.size() / static_cast<double>(kCells);
+  Vec3i size, best;
+  for (int axis = 0; axis < 3; ++axis) size[axis] = std::clamp(static_cast<int>(side / cell[axis]), 1, kCells);
+  int most = -1;
+  for (int x = 0; x <= kCells - size.x; ++x) {
+    for (int y = 0; y <= kCells - size.y; ++y) {
+      for (int z = 0; z <= kCells - size.z; ++z) {
+        const int count = counts.in_block({x, y, z}, size);
+        if (count <= most) continue;
+        most = count;
+        best = {x, y, z};
+      }
+    }
+  }
+  Aabbd window;
+  for (int axis = 0; axis < 3; ++axis) {
+    window.min[axis] = box.min[axis] + best[axis] * cell[axis];
+    window.max[axis] = window.min[axis] + size[axis] * cell[axis];
+  }
+  Aabbd around = Aabbd::empty();
+  for (const Vec3d p : points) {
+    if (window.contains(p)) around.grow(p);
+  }
+  if (around.min.x > around.max.x) return window;
+  for (int axis = 0; axis < 3; ++axis) {  // what lies behind the points belongs to them
+    window.min[axis] = std::max(window.min[axis], around.min[axis] - cell[axis]);
+    window.max[axis] = std::min(window.max[axis], around.max[axis] + cell[axis]);
+  }
+  return window;
+}
+
+/// A lattice of half the voxel size for the part of `parent` around `box`, cut out of the parent.
+BakePlan finer_plan(BakePlan& parent, const Aabbd& box, int margin) {
+  BakePlan plan;
+  plan.voxel_size = parent.voxel_size / 2;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = (box.min[axis] - parent.origin[axis]) / parent.voxel_size;
+    const double high = (box.max[axis] - parent.origin[axis]) / parent.voxel_size;
+    parent.hole_min[axis] = std::max(margin, static_cast<int>(std::floor(low)));
+    parent.hole_max[axis] = std::min(parent.resolution[axis] - margin, static_cast<int>(std::ceil(high)));
+    plan.resolution[axis] = 2 * (parent.hole_max[axis] - parent.hole_min[axis]) + 2 * margin;
+  }
+  const Aabbd cut{parent.world_from_voxel(parent.hole_min.cast<double>()),
+                  parent.world_from_voxel(parent.hole_max.cast<double>())};
+  plan.origin = cut.min - Vec3d{1, 1, 1} * (margin * plan.voxel_size);
+  for (int axis = 0; axis < 3; ++axis) {
+    plan.box.min[axis] = std::max(cut.min[axis], parent.box.min[axis]);
+    plan.box.max[axis] = std::min(cut.max[axis], parent.box.max[axis]);
+  }
+  return plan;
+}
+
+}  // namespace
+
+std::vector<BakePlan> plan_levels(const ColorField& field, const std::vector<BakeCamera>& cameras,
+                                  const BakeOptions& options) {
+  std::vector<BakePlan> plans{plan_bake(field, options)};
+  const bool nested = options.grids == "nested" || (options.grids == "auto" && field.frame().cascades > 1);
+  if (!nested || cameras.empty()) return plans;
+  std::vector<Sight> sights = all_sights(field, cameras, options);
+  const auto enough = static_cast<std::size_t>(kLeastShare * static_cast<double>(sights.size()));
+  const Vec3i resolution = plans[0].resolution;
+  const int inner = std::max({resolution.x, resolution.y, resolution.z}) - 2 * options.dilation;
+  while (plans.size() < kMostLevels) {
+    BakePlan& parent = plans.back();
+    std::vector<Vec3d> wanting;
+    for (const Sight& sight : sights) {
+      if (sight.voxel_size < parent.voxel_size && parent.box.contains(sight.world)) wanting.push_back(sight.world);
+    }
+    const double side = (inner - 2) * parent.voxel_size / 2;  // rounding outwards adds two voxels
+    const Aabbd box = fullest_part(parent.box, side, wanting);
+    const auto gaining = static_cast<std::size_t>(
+        std::count_if(wanting.begin(), wanting.end(), [&](Vec3d p) { return box.contains(p); }));
+    if (gaining == 0 || gaining < enough) break;
+    plans.push_back(finer_plan(parent, box, options.dilation));
+  }
+  std::reverse(plans.begin(), plans.end());
+  return plans;
+}
+
+std::size_t cycles_bytes(const std::vector<BakePlan>& plans) {
+  constexpr std::size_t kBytesOfVoxel = 4 * (1 + 4);
+  std::size_t bytes = 0;
+  for (const BakePlan& plan : plans) bytes += plan.lattice_voxels() * kBytesOfVoxel;
+  return bytes;
+}
+
+std::vector<BakePlan> plan_within_budget(const ColorField& field, const std::vector<BakeCamera>& cameras,
+                                         const BakeOptions& options) {
+  std::vector<BakePlan> plans = plan_levels(field, cameras, options);
+  if (options.budget.empty()) return plans;
+  const auto budget = static_cast<double>(bytes_of(options.budget));
+  constexpr int kLeastResolution = 16;
+  BakeOptions smaller = options;
+  while (static_cast<double>(cycles_bytes(plans)) > budget) {
+    const double ratio = 0.98 * std::cbrt(budget / static_cast<double>(cycles_bytes(plans)));
+    if (smaller.voxel_size > 0) {
+      smaller.voxel_size /= ratio;
+    } else {
+      smaller.resolution = static_cast<int>(smaller.resolution * ratio);
+    }
+    const Vec3i resolution = plans.back().resolution;
+    if (ratio * std::max({resolution.x, resolution.y, resolution.z}) < kLeastResolution) {
+      throw UsageError("budget: " + options.budget + " is too little for a volume");
+    }
+    plans = plan_levels(field, cameras, smaller);
+  }
+  return plans;
+}
+
+std::vector<BakeLevel> bake_levels(const ColorField& field, std::vector<BakePlan> plans, const BakeOptions& options,
+                                   const std::function<void(double)>& advance) {
+  std::vector<BakeLevel> levels;
+  double whole = 0, done = 0;
+  for (const BakePlan& plan : plans) whole += static_cast<double>(plan.lattice_voxels());
+  bool any = false;
+  for (BakePlan& plan : plans) {
+    const double share = static_cast<double>(plan.lattice_voxels()) / whole;
+    DensityPass density = bake_density(field, plan, options, [&](double of_this) { advance(done + share * of_this); });
+    done += share;
+    for (const std::vector<DenseVoxel>& brick : density.bricks) any = any || !brick.empty();
+    levels.push_back({plan, std::move(density)});
+  }
+  if (!any) throw InputError("bake: no voxel is as opaque as opacity_threshold; lower it, or check --aabb");
+  return levels;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,109 @@
+// What a bake keeps of its field: held-out views of a capture (all views where none is held out), rendered from the
+// baked voxels by our own integrator, against
+//   * the field's render of the view: PSNR of sRGB-encoded colour;
+//   * the photograph: PSNR of sRGB-encoded luminance, beside that of the field.
+// All over black.
+//
+//   bake_comparison BAKE CAPTURE STAGE1.snapshot [TAKE.snapshot] [views=3] [downscale=1] [holdout=0] [rays=2]
+//                   [percent_of_step=50]
+//
+// BAKE is a folder with manifest.json. `rays` are those along each axis of a pixel.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <string>
+
+#include "bake/volume_integrator.h"
+#include "export/manifest.h"
+#include "export/vdb_reader.h"
+#include "src/capture/load_capture.h"
+#include "src/color/colorspace_math.h"
+#include "src/train/scene.h"
+
+namespace {
+
+double encoded(float linear) {
+  return cnerf::srgb_from_linear(std::clamp(linear, 0.0f, 1.0f));
+}
+
+double decibels(double squared, std::size_t values) {
+  return -10 * std::log10(std::max(squared / double(std::max<std::size_t>(values, 1)), 1e-12));
+}
+
+struct Sums {
+  double color = 0, bake_photo = 0, field_photo = 0;
+  std::size_t pixels = 0;
+};
+
+void print(const std::string& name, const Sums& sums) {
+  std::printf("%s: bake against field %.2f dB; luminance against the photograph: bake %.2f dB, field %.2f dB\n",
+              name.c_str(), decibels(sums.color, 3 * sums.pixels), decibels(sums.bake_photo, sums.pixels),
+              decibels(sums.field_photo, sums.pixels));
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 4) {
+    std::puts(
+        "bake_comparison BAKE CAPTURE STAGE1.snapshot [TAKE.snapshot] [views=N] [downscale=N] [holdout=N] "
+        "[rays=N] [percent_of_step=N]");
+    return 64;
+  }
+  const std::filesystem::path bake = argv[1];
+  std::filesystem::path take;
+  std::map<std::string, int> options = {
+      {"views", 3}, {"downscale", 1}, {"holdout", 0}, {"rays", 2}, {"percent_of_step", 50}};
+  for (int i = 4; i < argc; ++i) {
+    const std::string argument = argv[i];
+    const std::size_t equals = argument.find('=');
+    if (equals == std::string::npos) {
+      take = argument;
+    } else {
+      options.at(argument.substr(0, equals)) = std::stoi(argument.substr(equals + 1));
+    }
+  }
+  cnerf::CaptureOptions capture_options;
+  capture_options.downscale = options["downscale"];
+  capture_options.holdout = options["holdout"];
+  const cnerf::Capture capture = cnerf::load_capture(argv[2], capture_options);
+  const auto scene = cnerf::Scene::load(argv[3], take);
+  const std::vector<cnerf::BakedVolume> levels = cnerf::read_volumes(bake);
+  const bool any_held_out =
+      std::any_of(capture.views.begin(), capture.views.end(), [](const auto& v) { return v.held_out; });
+  cnerf::RenderOptions render;
+  render.color = false;
+  render.baked_color = scene->is_colorized();
+
+  Sums mean;
+  int done = 0;
+  for (const cnerf::View& view : capture.views) {
+    if ((any_held_out && !view.held_out) || done >= options["views"]) continue;
+    ++done;
+    const cnerf::VolumeImage ours = cnerf::integrate_volumes(levels, view.intrinsics, view.world_from_camera,
+                                                             {options["percent_of_step"] / 100.0, options["rays"]});
+    const cnerf::RenderedImage field = scene->render(view.intrinsics, view.world_from_camera, render);
+    Sums sums;
+    sums.pixels = field.luminance.size();
+    for (std::size_t p = 0; p < sums.pixels; ++p) {
+      const float* rgb = &ours.rgb[3 * p];
+      const double photo = encoded(view.image.luminance(p));
+      for (std::size_t c = 0; c < 3; ++c) {
+        const float wanted = field.baked_rgb.empty() ? field.luminance[p] : field.baked_rgb[3 * p + c];
+        sums.color += std::pow(encoded(rgb[c]) - encoded(wanted), 2);
+      }
+      sums.bake_photo += std::pow(encoded(cnerf::luminance_of(cnerf::Vec3f{rgb[0], rgb[1], rgb[2]})) - photo, 2);
+      sums.field_photo += std::pow(encoded(field.luminance[p]) - photo, 2);
+    }
+    print(view.name, sums);
+    mean.color += sums.color;
+    mean.bake_photo += sums.bake_photo;
+    mean.field_photo += sums.field_photo;
+    mean.pixels += sums.pixels;
+  }
+  print("all views", mean);
+  return done > 0 ? 0 : 65;
+}
