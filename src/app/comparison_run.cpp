@@ -43,6 +43,12 @@ bool is_simulated(const std::string& spec) {
   return spec == "simulated" || spec.starts_with("simulated:");
 }
 
+/// @throws UsageError
+SimulationOptions simulation_of(const std::string& spec) {
+  const std::size_t colon = spec.find(':');
+  return parse_simulation(colon == std::string::npos ? "" : spec.substr(colon + 1));
+}
+
 EncodedPicture read_picture(const fs::path& file, const char* type) {
   return {type, read_binary_file(file)};
 }
@@ -119,10 +125,7 @@ struct ComparisonRun::Geometry {
 ComparisonRun::ComparisonRun(ComparisonPlan plan, Config config, Reporter& reporter)
     : plan_(std::move(plan)), config_(std::move(config)), reporter_(reporter) {
   if (!plan_.lpips_weights.empty()) lpips_ = std::make_unique<Lpips>(plan_.lpips_weights);
-  if (is_simulated(config_.colorizer.spec)) {
-    const std::string& spec = config_.colorizer.spec;
-    (void)parse_simulation(spec.substr(std::min(spec.size(), sizeof("simulated:") - 1)));
-  }
+  if (is_simulated(config_.colorizer.spec)) (void)simulation_of(config_.colorizer.spec);
   for (const fs::path& path : plan_.captures) {
     auto subject = std::make_shared<Subject>();
     subject->capture = read_capture(path, config_, reporter_);
@@ -218,7 +221,7 @@ std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, 
   if (method.knows_truth) return make_simulated_colorizer(subject.capture, oracle_simulation());
   std::unique_ptr<Colorizer> colorizer;
   if (is_simulated(spec)) {
-    SimulationOptions options = parse_simulation(spec == "simulated" ? "" : spec.substr(spec.find(':') + 1));
+    SimulationOptions options = simulation_of(spec);
     options.seed += seed - 1;  // each seed meets other errors
     colorizer = make_simulated_colorizer(subject.capture, options);
   } else {
@@ -286,7 +289,9 @@ void ComparisonRun::look(const Subject& subject, const Method& method, Geometry&
 }
 
 ComparisonSummary ComparisonRun::summary() const {
-  return {config_.colorizer.spec, lpips_ ? lpips_->network() : "", plan_.command_line};
+  const std::string& spec = config_.colorizer.spec;
+  const std::string colorizer = is_simulated(spec) ? "simulated:" + to_text(simulation_of(spec)) : spec;
+  return {colorizer, lpips_ ? lpips_->network() : "", plan_.command_line};
 }
 
 /// Pictures of the first seed.
