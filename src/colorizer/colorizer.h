@@ -53,7 +53,7 @@ struct ColorizerOptions {
   std::filesystem::path working_folder;  ///< relative files of the spec are looked up here, then as given
   std::filesystem::path cache_folder;    ///< a fitted reference: network is kept here; empty = refit every time
   double timeout_seconds = 60;           ///< for one batch of an exec: colorizer
-  int reference_steps = 900;             ///< optimiser steps of that fit
+  int reference_steps = 480;             ///< optimiser steps of that fit
   bool reference_on_builtin = true;      ///< that fit reads what the built-in network makes of a picture
   std::uint64_t seed = 1;                ///< of the fit of a reference: network
   ProgressSink progress;                 ///< watches that fit; may throw Interrupted

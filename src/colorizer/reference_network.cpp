@@ -322,7 +322,14 @@ ReferenceNetwork::ReferenceNetwork(const ReferenceRecipe& recipe, std::span<cons
     }
     parts_->labels = std::make_unique<LabelTable>(class_of);
   }
-  if (!recipe.builtin.empty()) parts_->builtin = load_colorizer_weights(recipe.builtin);
+  if (!recipe.builtin.empty()) {
+    parts_->builtin = load_colorizer_weights(recipe.builtin);
+    // Once here, instead of in every convolution of every step.
+    for (Tensor& parameter : parts_->builtin->network->parameters()) {
+      parameter.set_requires_grad(false);
+      if (parameter.dim() == 4) parameter.set_data(parameter.contiguous(at::MemoryFormat::ChannelsLast));
+    }
+  }
   parts_->net = UNet(recipe, recipe.classify ? int(parts_->bins.size()) : 2);
   initialise(parts_->net, seed);
 }

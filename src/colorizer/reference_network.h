@@ -20,7 +20,7 @@ namespace cnerf {
 struct ReferenceRecipe {
   std::vector<int> channels = {24, 48, 64, 96, 96};  ///< per level; the first is at half the patch's size
   int patch_size = 128;
-  int steps = 900;
+  int steps = 480;
   int batch = 4;
   int shards = 4;  ///< a batch's fixed parts; each is one task, so that results do not depend on the threads
   double learning_rate = 4e-3;

@@ -25,7 +25,7 @@ struct ColorizerConfig {
   std::string hints;                 ///< "x,y,VIEW,#rrggbb;…": dots, in pixels of the view's image file
   std::string prompt;                ///< a text for colorizers that take one
   double timeout_seconds = 60;       ///< for one batch of an exec: colorizer
-  int reference_steps = 900;         ///< optimiser steps of a reference: colorizer's fit
+  int reference_steps = 480;         ///< optimiser steps of a reference: colorizer's fit
   bool reference_on_builtin = true;  ///< that fit builds on the built-in network
 
   template <typename Visitor>
