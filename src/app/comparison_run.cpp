@@ -27,18 +27,6 @@ constexpr int kFrameQuality = 80;      // of a turntable's
 constexpr int kFramesPerSecond = 12;   // of a turntable
 constexpr std::size_t kLongRange = 8;  // the turntable's share that long-range consistency looks across
 
-/// A colorizer that asks another one, kept alive with it.
-class OwningFlowColorizer final : public Colorizer {
- public:
-  explicit OwningFlowColorizer(std::unique_ptr<Colorizer> inner) : inner_(std::move(inner)), flow_(*inner_) {}
-  ChromaBatch colorize(const LightnessBatch& patches) override { return flow_.colorize(patches); }
-  [[nodiscard]] std::string name() const override { return flow_.name(); }
-
- private:
-  std::unique_ptr<Colorizer> inner_;
-  FlowColorizer flow_;
-};
-
 bool is_simulated(const std::string& spec) {
   return spec == "simulated" || spec.starts_with("simulated:");
 }
@@ -85,12 +73,6 @@ std::vector<std::size_t> some_of(std::size_t all, std::size_t wanted) {
 
 bool any_held_out(const Capture& capture) {
   return std::ranges::any_of(capture.views, [](const View& view) { return view.held_out; });
-}
-
-Picture input_picture(const View& view) {
-  std::vector<float> luminance(view.image.pixel_count());
-  for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = view.image.luminance(i);
-  return picture_from_linear(view.image.width, view.image.height, luminance);
 }
 
 /// The settings that a folder was made with; empty when it was not.
@@ -231,7 +213,7 @@ std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, 
         make_colorizer(colorizer_options(of_seed, subject.capture.root, folder_of(subject, seed) / "cache", reporter_));
   }
   if (!method.follows_flow) return colorizer;
-  return std::make_unique<OwningFlowColorizer>(std::move(colorizer));
+  return std::make_unique<FlowColorizer>(std::move(colorizer));
 }
 
 void ComparisonRun::colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry,
@@ -302,7 +284,8 @@ ReportCapture ComparisonRun::report_of(const Subject& subject) const {
   for (const std::size_t index : subject.shown()) {
     const View& view = *subject.evaluated[index];
     report.view_names.push_back(view.name);
-    report.inputs.push_back({"jpeg", jpeg_bytes(scaled_down(input_picture(view), kPictureWidth), kPictureQuality)});
+    report.inputs.push_back(
+        {"jpeg", jpeg_bytes(scaled_down(grey_picture(view.image), kPictureWidth), kPictureQuality)});
     const std::optional<ColorImage> truth = load_color_truth(view);
     if (!truth) continue;
     const Picture picture = picture_from_linear(truth->width, truth->height, truth->rgb);

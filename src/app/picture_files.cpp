@@ -10,6 +10,7 @@
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/capture/luminance_plane.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -21,6 +22,10 @@ std::vector<float> shown_rgb(const RenderedImage& image, ShownColor color) {
   grey.reserve(3 * image.luminance.size());
   for (const float y : image.luminance) grey.insert(grey.end(), {y, y, y});
   return grey;
+}
+
+Picture grey_picture(const MonoImage& image) {
+  return picture_from_linear(image.width, image.height, luminance_plane(image));
 }
 
 Picture picture_of(const RenderedImage& image, ShownColor color) {

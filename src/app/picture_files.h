@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "src/capture/mono_image.h"
 #include "src/evaluate/contact_sheet.h"
 #include "src/train/scene.h"
 
@@ -15,6 +16,8 @@ enum class ShownColor {
   kBaked,    ///< composited per-sample colour, as a bake shows it
 };
 
+/// 8-bit sRGB of the luminance.
+[[nodiscard]] Picture grey_picture(const MonoImage& image);
 /// Linear Rec.709 over black, [H, W, 3].
 [[nodiscard]] std::vector<float> shown_rgb(const RenderedImage& image, ShownColor color);
 /// 8-bit sRGB over black.

@@ -14,6 +14,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/usage.h"
+#include "src/capture/luminance_plane.h"
 #include "src/evaluate/evaluate.h"
 #include "viewer/server/page_folder.h"
 
@@ -25,16 +26,6 @@ constexpr int kSheetRows = 6;
 
 std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::string& take) {
   return Scene::load(directory.stage1_snapshot(), take.empty() ? fs::path() : directory.take_snapshot(take));
-}
-
-std::vector<float> luminance_of(const View& view) {
-  std::vector<float> luminance(view.image.pixel_count());
-  for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = view.image.luminance(i);
-  return luminance;
-}
-
-Picture grey_picture(const View& view) {
-  return picture_from_linear(view.image.width, view.image.height, luminance_of(view));
 }
 
 std::string colorizer_name(const RunDirectory& directory, const std::string& take) {
@@ -82,7 +73,8 @@ std::vector<WebPhoto> web_photos(const Capture& capture, const WebOptions& optio
   std::vector<WebPhoto> photos;
   if (options.photo_side == 0) return photos;
   for (const View& view : capture.views) {
-    photos.push_back(make_web_photo(view.intrinsics, luminance_of(view), options.photo_side, options.photo_quality));
+    photos.push_back(
+        make_web_photo(view.intrinsics, luminance_plane(view.image), options.photo_side, options.photo_quality));
   }
   return photos;
 }
@@ -144,7 +136,7 @@ void evaluate_step(const RunContext& context, const std::string& take) {
     if (sheet.rows() >= kSheetRows) return;
     const Picture truth =
         view.truth ? picture_from_linear(view.truth->width, view.truth->height, view.truth->rgb) : Picture{};
-    sheet.add_row({grey_picture(view.view), picture_of(view.ours, ShownColor::kDecoded), truth});
+    sheet.add_row({grey_picture(view.view.image), picture_of(view.ours, ShownColor::kDecoded), truth});
   };
   Metrics metrics = evaluate(*scene, context.capture, options, add_to_sheet, context.reporter.sink());
   metrics.take = take;
@@ -216,6 +208,7 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   BakeOptions options = config.bake;
   if (formats.web && !formats.vdb && !formats.gltf) {
     options.resolution = std::min(options.resolution, config.web.resolution);
+    if (options.grids == "auto") options.grids = "one";  // the bundle would only average finer ones
   }
   const std::string colorizer = colorizer_name(context.directory, take);
   const std::vector<BakePlan> plans = plan_within_budget(*scene, cameras, options);
@@ -254,7 +247,8 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   if ((formats.vdb || formats.gltf) && config.vdb.plates) {
     constexpr int kPlateSide = 4096, kPlateQuality = 92;
     for (const View& view : context.capture.views) {
-      bake.add_plate(view.name, make_web_photo(view.intrinsics, luminance_of(view), kPlateSide, kPlateQuality).jpeg);
+      bake.add_plate(view.name,
+                     make_web_photo(view.intrinsics, luminance_plane(view.image), kPlateSide, kPlateQuality).jpeg);
     }
   }
   if (formats.vdb || formats.gltf) {

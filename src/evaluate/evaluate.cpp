@@ -5,18 +5,13 @@
 
 #include "src/base/check.h"
 #include "src/base/error.h"
+#include "src/capture/luminance_plane.h"
 
 namespace cnerf {
 namespace {
 
 /// Pixels below this opacity have no colour of their own (design: the decode divides by opacity).
 constexpr float kColouredOpacity = 0.01f;
-
-std::vector<float> luminance_of_view(const MonoImage& image) {
-  std::vector<float> luminance(image.pixel_count());
-  for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = image.luminance(i);
-  return luminance;
-}
 
 std::vector<float> channel(std::span<const float> rgb, int index) {
   std::vector<float> values(rgb.size() / 3);
@@ -45,7 +40,7 @@ std::vector<std::uint8_t> coloured_pixels(const RenderedImage& image, std::span<
 
 void measure_luminance(const EvaluatedView& pictures, ViewMetrics& metrics) {
   const MonoImage& image = pictures.view.image;
-  const std::vector<float> truth = luminance_of_view(image);
+  const std::vector<float> truth = luminance_plane(image);
   metrics.psnr_luminance = psnr_from_mse(encoded_mse(pictures.ours.luminance, truth, 1, image.mask));
   metrics.ssim = ssim(encoded(pictures.ours.luminance), encoded(truth), image.width, image.height, image.mask);
 }

@@ -56,14 +56,14 @@ struct FlowColorizer::Memory {
   cv::Mat lightness, a, b;
 };
 
-FlowColorizer::FlowColorizer(Colorizer& inner) : inner_(inner) {}
+FlowColorizer::FlowColorizer(std::unique_ptr<Colorizer> inner) : inner_(std::move(inner)) {}
 FlowColorizer::~FlowColorizer() = default;
 
 ChromaBatch FlowColorizer::colorize(const LightnessBatch& view) {
   if (view.batch != 1)
     throw ColorizerError(name() + ": expected one view at a time, got " + std::to_string(view.batch));
-  const ChromaBatch answered = inner_.colorize(view);
-  check_answer(inner_.name(), view, answered);
+  const ChromaBatch answered = inner_->colorize(view);
+  check_answer(inner_->name(), view, answered);
   ChromaBatch answer{1, view.height, view.width, ab_of(answered, 0), {}};
   cv::Mat lightness(view.height, view.width, CV_32F, const_cast<float*>(view.lightness.data()));
   cv::Mat a = channel_of(answer.ab, 0, view.height, view.width), b = channel_of(answer.ab, 1, view.height, view.width);

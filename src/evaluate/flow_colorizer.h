@@ -17,17 +17,16 @@ inline constexpr float kCarriedShare = 0.8f;
 /// as the two ways agree and the lightness matches. A view of another size starts afresh.
 class FlowColorizer final : public Colorizer {
  public:
-  /// @param inner  must outlive this
-  explicit FlowColorizer(Colorizer& inner);
+  explicit FlowColorizer(std::unique_ptr<Colorizer> inner);
   ~FlowColorizer() override;
 
   /// @throws ColorizerError  also for a batch of more than one.
   [[nodiscard]] ChromaBatch colorize(const LightnessBatch& view) override;
-  [[nodiscard]] std::string name() const override { return "flow over " + inner_.name(); }
+  [[nodiscard]] std::string name() const override { return "flow over " + inner_->name(); }
 
  private:
   struct Memory;
-  Colorizer& inner_;
+  std::unique_ptr<Colorizer> inner_;
   std::unique_ptr<Memory> memory_;
 };
 

@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <map>
 #include <string>
 
 #include "bake/volume_integrator.h"
@@ -21,16 +20,12 @@
 #include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
 #include "src/train/scene.h"
+#include "tests/bench/comparison_support.h"
 
 namespace {
 
-double encoded(float linear) {
-  return cnerf::srgb_from_linear(std::clamp(linear, 0.0f, 1.0f));
-}
-
-double decibels(double squared, std::size_t values) {
-  return -10 * std::log10(std::max(squared / double(std::max<std::size_t>(values, 1)), 1e-12));
-}
+using cnerf::bench::decibels;
+using cnerf::bench::encoded;
 
 struct Sums {
   double color = 0, bake_photo = 0, field_photo = 0;
@@ -47,31 +42,20 @@ void print(const std::string& name, const Sums& sums) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 4) {
+  auto [files, options] = cnerf::bench::parse_arguments(
+      argc, argv, {{"views", 3}, {"downscale", 1}, {"holdout", 0}, {"rays", 2}, {"percent_of_step", 50}});
+  if (files.size() < 3) {
     std::puts(
         "bake_comparison BAKE CAPTURE STAGE1.snapshot [TAKE.snapshot] [views=N] [downscale=N] [holdout=N] "
         "[rays=N] [percent_of_step=N]");
     return 64;
   }
-  const std::filesystem::path bake = argv[1];
-  std::filesystem::path take;
-  std::map<std::string, int> options = {
-      {"views", 3}, {"downscale", 1}, {"holdout", 0}, {"rays", 2}, {"percent_of_step", 50}};
-  for (int i = 4; i < argc; ++i) {
-    const std::string argument = argv[i];
-    const std::size_t equals = argument.find('=');
-    if (equals == std::string::npos) {
-      take = argument;
-    } else {
-      options.at(argument.substr(0, equals)) = std::stoi(argument.substr(equals + 1));
-    }
-  }
   cnerf::CaptureOptions capture_options;
   capture_options.downscale = options["downscale"];
   capture_options.holdout = options["holdout"];
-  const cnerf::Capture capture = cnerf::load_capture(argv[2], capture_options);
-  const auto scene = cnerf::Scene::load(argv[3], take);
-  const std::vector<cnerf::BakedVolume> levels = cnerf::read_volumes(bake);
+  const cnerf::Capture capture = cnerf::load_capture(files[1], capture_options);
+  const auto scene = cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "");
+  const std::vector<cnerf::BakedVolume> levels = cnerf::read_volumes(files[0]);
   const bool any_held_out =
       std::any_of(capture.views.begin(), capture.views.end(), [](const auto& v) { return v.held_out; });
   cnerf::RenderOptions render;

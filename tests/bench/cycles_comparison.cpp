@@ -9,54 +9,35 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <map>
 #include <string>
 
 #include "bake/volume_integrator.h"
 #include "export/vdb_reader.h"
 #include "src/capture/color_truth.h"
 #include "src/capture/load_capture.h"
-#include "src/color/colorspace_math.h"
 #include "src/train/scene.h"
+#include "tests/bench/comparison_support.h"
 #include "tests/blender/blender_run.h"
 
-namespace {
-
-double decibels(double squared, std::size_t values) {
-  return -10 * std::log10(std::max(squared / double(values), 1e-12));
-}
-
-double encoded(float linear) {
-  return cnerf::srgb_from_linear(std::clamp(linear, 0.0f, 1.0f));
-}
-
-}  // namespace
+using cnerf::bench::decibels;
+using cnerf::bench::encoded;
 
 int main(int argc, char** argv) {
-  if (argc < 3) {
+  auto [files, options] =
+      cnerf::bench::parse_arguments(argc, argv, {{"views", 3}, {"samples", 64}, {"downscale", 1}, {"holdout", 0}});
+  if (files.size() < 2) {
     std::puts(
         "cycles_comparison BAKE CAPTURE [STAGE1.snapshot [TAKE.snapshot]] [views=N] [samples=N] [downscale=N] "
         "[holdout=N]");
     return 64;
   }
-  const std::filesystem::path bake = argv[1];
-  std::filesystem::path stage1, take;
-  std::map<std::string, int> options = {{"views", 3}, {"samples", 64}, {"downscale", 1}, {"holdout", 0}};
-  for (int i = 3; i < argc; ++i) {
-    const std::string argument = argv[i];
-    const std::size_t equals = argument.find('=');
-    if (equals == std::string::npos) {
-      (stage1.empty() ? stage1 : take) = argument;
-      continue;
-    }
-    options.at(argument.substr(0, equals)) = std::stoi(argument.substr(equals + 1));
-  }
+  const std::filesystem::path bake = files[0];
   cnerf::CaptureOptions capture_options;
   capture_options.downscale = options["downscale"];
   capture_options.holdout = options["holdout"];
-  const cnerf::Capture capture = cnerf::load_capture(argv[2], capture_options);
+  const cnerf::Capture capture = cnerf::load_capture(files[1], capture_options);
   const std::vector<cnerf::BakedVolume> volumes = cnerf::read_volumes(bake);
-  const auto scene = stage1.empty() ? nullptr : cnerf::Scene::load(stage1, take);
+  const auto scene = files.size() > 2 ? cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "") : nullptr;
   cnerf::RenderOptions render;
   render.color = false;
   render.baked_color = scene != nullptr && scene->is_colorized();

@@ -11,26 +11,21 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <map>
 #include <string>
 
 #include "export/manifest.h"
 #include "src/capture/load_capture.h"
-#include "src/color/colorspace_math.h"
 #include "src/train/scene.h"
+#include "tests/bench/comparison_support.h"
 #include "tests/blender/blender_run.h"
 
 namespace {
 
+using cnerf::bench::decibels;
+using cnerf::bench::encoded;
+using cnerf::bench::rgb_of;
+
 using cnerf::test::RenderedExr;
-
-double encoded(float linear) {
-  return cnerf::srgb_from_linear(std::clamp(linear, 0.0f, 1.0f));
-}
-
-double decibels(double squared, std::size_t values) {
-  return -10 * std::log10(std::max(squared / double(std::max<std::size_t>(values, 1)), 1e-12));
-}
 
 struct Overlap {
   std::size_t both = 0, either = 0;
@@ -40,14 +35,6 @@ struct Overlap {
   }
   [[nodiscard]] double iou() const { return double(both) / double(std::max<std::size_t>(either, 1)); }
 };
-
-/// The field over black, linear RGB; grey where it has no colour.
-std::vector<float> rgb_of(const cnerf::RenderedImage& image) {
-  if (!image.baked_rgb.empty()) return image.baked_rgb;
-  std::vector<float> rgb;
-  for (const float y : image.luminance) rgb.insert(rgb.end(), {y, y, y});
-  return rgb;
-}
 
 void compare(const RenderedExr& mesh, const cnerf::RenderedImage& field, const std::string& name) {
   const std::vector<float> rgb = rgb_of(field);
@@ -74,24 +61,14 @@ void compare(const RenderedExr& mesh, const RenderedExr& volume, const std::stri
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 4) {
+  auto [files, options] = cnerf::bench::parse_arguments(argc, argv, {{"views", 3}, {"samples", 16}, {"volume", 1}});
+  if (files.size() < 3) {
     std::puts("mesh_comparison BAKE CAPTURE STAGE1.snapshot [TAKE.snapshot] [views=N] [samples=N] [volume=0|1]");
     return 64;
   }
-  const std::filesystem::path bake = argv[1];
-  std::filesystem::path take;
-  std::map<std::string, int> options = {{"views", 3}, {"samples", 16}, {"volume", 1}};
-  for (int i = 4; i < argc; ++i) {
-    const std::string argument = argv[i];
-    const std::size_t equals = argument.find('=');
-    if (equals == std::string::npos) {
-      take = argument;
-    } else {
-      options.at(argument.substr(0, equals)) = std::stoi(argument.substr(equals + 1));
-    }
-  }
-  const cnerf::Capture capture = cnerf::load_capture(argv[2], {});
-  const auto scene = cnerf::Scene::load(argv[3], take);
+  const std::filesystem::path bake = files[0];
+  const cnerf::Capture capture = cnerf::load_capture(files[1], {});
+  const auto scene = cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "");
   const bool with_volume = options["volume"] != 0 && cnerf::read_manifest(bake / "manifest.json").volume.has_value();
   const bool any_held_out =
       std::any_of(capture.views.begin(), capture.views.end(), [](const auto& v) { return v.held_out; });

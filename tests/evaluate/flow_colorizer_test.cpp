@@ -46,8 +46,7 @@ double mean_a(const ChromaBatch& answer) {
 }
 
 TEST(FlowColorizer, CarriesColoursAlongWhereTheViewMoved) {
-  Flickering inner;
-  FlowColorizer flow(inner);
+  FlowColorizer flow(std::make_unique<Flickering>());
   EXPECT_NEAR(mean_a(flow.colorize(textured(0))), 30, 1e-4);
   // Where the flow is trusted wholly: 0.8 * 30 + 0.2 * -30 = 18.
   EXPECT_NEAR(mean_a(flow.colorize(textured(3))), 18, 3);
@@ -55,23 +54,20 @@ TEST(FlowColorizer, CarriesColoursAlongWhereTheViewMoved) {
 }
 
 TEST(FlowColorizer, AnotherSceneIsNotMistakenForTheOneBefore) {
-  Flickering inner;
-  FlowColorizer flow(inner);
+  FlowColorizer flow(std::make_unique<Flickering>());
   (void)flow.colorize(textured(0));
   EXPECT_LT(mean_a(flow.colorize(textured(0, 99))), -10);
 }
 
 TEST(FlowColorizer, AViewOfAnotherSizeStartsAfresh) {
-  Flickering inner;
-  FlowColorizer flow(inner);
+  FlowColorizer flow(std::make_unique<Flickering>());
   (void)flow.colorize(textured(0));
   const LightnessBatch small{1, 32, 32, std::vector<float>(32 * 32, 50.0f)};
   EXPECT_NEAR(mean_a(flow.colorize(small)), -30, 1e-4);
 }
 
 TEST(FlowColorizer, TakesOneViewAtATime) {
-  Flickering inner;
-  FlowColorizer flow(inner);
+  FlowColorizer flow(std::make_unique<Flickering>());
   const LightnessBatch two{2, 8, 8, std::vector<float>(128, 50.0f)};
   EXPECT_THROW((void)flow.colorize(two), ColorizerError);
 }

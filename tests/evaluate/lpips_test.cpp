@@ -29,22 +29,25 @@ double distance(const Lpips& lpips, const Rgb8& a, const Rgb8& b) {
 }
 
 /// Golden values of the published code, version 0.1.
-TEST(Lpips, AlexNetGivesThePublishedDistances) {
-  CNERF_REQUIRE_DATA(data, "lpips");
-  const Lpips lpips(data / "lpips_alex_f32.bin");
-  const Rgb8 reference = read_rgb(data / "ex_ref.png");
-  EXPECT_EQ(lpips.network(), "AlexNet");
-  EXPECT_NEAR(distance(lpips, read_rgb(data / "ex_p0.png"), reference), 0.7219, 1e-4);
-  EXPECT_NEAR(distance(lpips, read_rgb(data / "ex_p1.png"), reference), 0.1376, 1e-4);
-}
+struct Golden {
+  const char* weights;
+  const char* network;
+  double far, near;  ///< of ex_p0 and ex_p1 from ex_ref
+};
 
-TEST(Lpips, SqueezeNetGivesThePublishedDistances) {
+class PublishedDistances : public ::testing::TestWithParam<Golden> {};
+INSTANTIATE_TEST_SUITE_P(Lpips, PublishedDistances,
+                         ::testing::Values(Golden{"lpips_alex_f32.bin", "AlexNet", 0.7219, 0.1376},
+                                           Golden{"lpips_sq_f32.bin", "SqueezeNet", 0.71105, 0.14790}),
+                         [](const auto& parameter) { return parameter.param.network; });
+
+TEST_P(PublishedDistances, AreReached) {
   CNERF_REQUIRE_DATA(data, "lpips");
-  const Lpips lpips(data / "lpips_sq_f32.bin");
+  const Lpips lpips(data / GetParam().weights);
   const Rgb8 reference = read_rgb(data / "ex_ref.png");
-  EXPECT_EQ(lpips.network(), "SqueezeNet");
-  EXPECT_NEAR(distance(lpips, read_rgb(data / "ex_p0.png"), reference), 0.71105, 1e-4);
-  EXPECT_NEAR(distance(lpips, read_rgb(data / "ex_p1.png"), reference), 0.14790, 1e-4);
+  EXPECT_EQ(lpips.network(), GetParam().network);
+  EXPECT_NEAR(distance(lpips, read_rgb(data / "ex_p0.png"), reference), GetParam().far, 1e-4);
+  EXPECT_NEAR(distance(lpips, read_rgb(data / "ex_p1.png"), reference), GetParam().near, 1e-4);
 }
 
 TEST(Lpips, IsZeroForEqualPicturesAndSymmetric) {
