@@ -10,7 +10,7 @@ namespace {
 
 struct PrepareArguments {
   std::string source, out, progress = "auto";
-  PrepareOptions options;
+  PrepareStepOptions options;
   ExistingOutput existing;
   int threads = 0;
 };

@@ -1,7 +1,15 @@
 #include "src/app/prepare_step.h"
 
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/capture/load_capture.h"
+#include "src/prepare/grey_image.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -15,9 +23,49 @@ bool is_empty_or_missing(const fs::path& folder) {
   return !fs::exists(folder, failure) || (fs::is_directory(folder, failure) && fs::is_empty(folder, failure));
 }
 
+/// Masks what moves, in files of the pictures' own size beside those that are there, and names them in transforms.json.
+void mask_motion(const fs::path& capture, const MotionMaskOptions& options, Reporter& reporter) {
+  CaptureOptions reading;
+  const Capture full = load_capture(capture, reading);
+  int longest = 0;
+  for (const View& view : full.views) longest = std::max({longest, view.image.width, view.image.height});
+  reading.downscale = std::max(1, longest / options.motion_side);
+  const auto masks = find_motion(load_capture(capture, reading), options, capture / "work", reporter.sink());
+
+  auto transforms = nlohmann::ordered_json::parse(read_text_file(capture / "transforms.json"));
+  auto record = nlohmann::ordered_json::parse(read_text_file(capture / "prepare.json"));
+  double share = 0;
+  std::string left_alone;
+  for (std::size_t v = 0; v < masks.size(); ++v) {
+    const View& view = full.views[v];
+    const MotionMask& mask = masks[v];
+    if (mask.valid.empty()) left_alone += (left_alone.empty() ? "" : ", ") + view.name;
+    if (mask.valid.empty() || mask.share == 0) continue;
+    share += mask.share / double(masks.size());
+    std::vector<std::uint8_t> codes = mask.valid;
+    cv::Mat1b valid(mask.height, mask.width, codes.data()), sized;
+    cv::resize(valid, sized, {view.image.width, view.image.height}, 0, 0, cv::INTER_NEAREST);
+    for (std::size_t p = 0; p < view.image.pixel_count(); ++p) {
+      if (!view.image.valid(p)) sized(int(p) / sized.cols, int(p) % sized.cols) = 0;
+    }
+    const fs::path file = fs::path("masks") / ("still_" + fs::path(view.name).stem().string() + ".png");
+    write_png(capture / file, sized);
+    for (auto& frame : transforms.at("frames")) {
+      if (frame.at("file_path") == view.name) frame["mask_path"] = file.generic_string();
+    }
+    record["motion"]["shares"][view.name] = mask.share;
+  }
+  record["motion"]["difference"] = options.motion_difference;
+  record["motion"]["steps"] = options.motion_steps;
+  write_file(capture / "prepare.json", record.dump(1) + "\n");
+  write_file(capture / "transforms.json", transforms.dump(1) + "\n");
+  reporter.say(fmt::format("motion: {:.1f} % of the pictures is masked (masks/still_*.png)", 100 * share));
+  if (!left_alone.empty()) reporter.say("motion: fitted too badly to tell, not masked: " + left_alone);
+}
+
 }  // namespace
 
-void prepare_step(const fs::path& source, const fs::path& out, const PrepareOptions& options,
+void prepare_step(const fs::path& source, const fs::path& out, const PrepareStepOptions& options,
                   const ExistingOutput& existing, Reporter& reporter) {
   if (!fs::exists(source)) throw MissingInputError(source.string() + ": no such file or folder");
   const bool finished = fs::exists(out / "transforms.json");
@@ -29,6 +77,8 @@ void prepare_step(const fs::path& source, const fs::path& out, const PrepareOpti
   }
   if (finished && ours && existing.resume) {
     reporter.say("capture: " + out.string() + " was prepared before");
+    const auto record = nlohmann::json::parse(read_text_file(out / "prepare.json"));
+    if (options.motion_masks && !record.contains("motion")) mask_motion(out, options.motion, reporter);
     return;
   }
   if (!is_empty_or_missing(out)) {
@@ -45,7 +95,8 @@ void prepare_step(const fs::path& source, const fs::path& out, const PrepareOpti
     }
   }
   write_file(out / kMark, origin);
-  prepare_capture(source, out, options, reporter.sink(), [&](const std::string& text) { reporter.say(text); });
+  prepare_capture(source, out, options.prepare, reporter.sink(), [&](const std::string& text) { reporter.say(text); });
+  if (options.motion_masks) mask_motion(out, options.motion, reporter);
   reporter.wrote("contact sheet", out / "contact_sheet.png");
   reporter.wrote("capture", out);
 }

@@ -26,6 +26,7 @@ constexpr double kAngleOfView = 42;  ///< degrees, horizontal
 constexpr double kDistance = 3.6;    ///< from the point all cameras look at
 constexpr Vec3d kLookAt = {0, 0, 0.12};
 constexpr std::array<double, 3> kElevations = {20, 36, 53};  ///< degrees above the plate
+constexpr double kOrbitElevation = 32;
 constexpr int kTestEvery = 8;
 constexpr int kFirstReference = 1, kReferences = 3;  // training views; the golden angle puts them around the scene
 
@@ -44,12 +45,14 @@ Intrinsics camera_of(const SampleSceneOptions& options) {
   return out;
 }
 
-/// Cameras around the plate: azimuths by the golden angle, so that any number of views is spread evenly, at elevations
-/// in turn.
-Affined pose_of(int view) {
-  const double golden_angle = std::numbers::pi * (3 - std::sqrt(5.0));
-  const double azimuth = view * golden_angle - 0.5 * std::numbers::pi;
-  const double elevation = kElevations[std::size_t(view) % kElevations.size()] * std::numbers::pi / 180;
+/// Cameras around the plate. Azimuths by the golden angle, so that any number of views is spread evenly, at elevations
+/// in turn; or one turn at one elevation.
+Affined pose_of(const SampleSceneOptions& options, int view) {
+  const bool orbit = options.path == "orbit";
+  const double step = orbit ? 2 * std::numbers::pi / options.views : std::numbers::pi * (3 - std::sqrt(5.0));
+  const double azimuth = view * step - 0.5 * std::numbers::pi;
+  const double degrees = orbit ? kOrbitElevation : kElevations[std::size_t(view) % kElevations.size()];
+  const double elevation = degrees * std::numbers::pi / 180;
   const Vec3d outward = {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
                          std::sin(elevation)};
   const Vec3d forward = -outward;
@@ -70,7 +73,7 @@ bool is_test_view(int view, int views) {
 
 RenderedView render_view(const SampleSceneOptions& options, int view) {
   const Intrinsics intrinsics = camera_of(options);
-  const Affined pose = pose_of(view);
+  const Affined pose = pose_of(options, view);
   const int side = int(std::lround(std::sqrt(double(options.samples_per_pixel))));
   const CounterRng seeds(std::uint64_t(options.seed), std::uint64_t(view));
   RenderedView out;
@@ -138,7 +141,7 @@ nlohmann::ordered_json transforms_of(const SampleSceneOptions& options) {
   for (int view = 0; view < options.views; ++view) {
     const std::string name = "images/" + file_name(view, "png");
     out[is_test_view(view, options.views) ? "test_filenames" : "train_filenames"].push_back(name);
-    out["frames"].push_back({{"file_path", name}, {"transform_matrix", matrix_of(pose_of(view))}});
+    out["frames"].push_back({{"file_path", name}, {"transform_matrix", matrix_of(pose_of(options, view))}});
   }
   return out;
 }

@@ -2,6 +2,7 @@
 /// The embedded sample: a procedural scene, ray-traced by our own code, with exact colour and depth.
 
 #include <filesystem>
+#include <string>
 
 #include "src/base/options.h"
 #include "src/base/progress.h"
@@ -10,6 +11,7 @@ namespace cnerf {
 
 struct SampleSceneOptions {
   int views = 40;
+  std::string path = "around";    ///< around: by the golden angle, any number evenly; orbit: one turn, view after view
   int width = 320, height = 240;  ///< pixels
   int samples_per_pixel = 16;     ///< a square number; stratified
   int seed = 1;
@@ -17,6 +19,7 @@ struct SampleSceneOptions {
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("views", views, Range{2, 1000}, "camera positions");
+    v("path", path, Choice{"around", "orbit"}, "views spread all around, or one after another along a circle");
     v("width", width, Range{16, 4096}, "pixels");
     v("height", height, Range{16, 4096}, "pixels");
     v("samples_per_pixel", samples_per_pixel, Range{1, 1024}, "square number of stratified samples");

@@ -26,6 +26,10 @@ namespace {
 
 constexpr std::size_t kPairsACall = 40;  ///< matched by one call of COLMAP, at least
 constexpr int kExhaustiveFrames = 40;    ///< of a clip: where neighbours are known, all pairs are soon a waste
+constexpr int kViewsForLens = 6;          ///< of a camera, from which more than one number of its lens can be told
+constexpr int kViewsForCentre = 15;       ///< the same, from which its principal point can be told from its turns
+constexpr double kFarthestCentre = 0.05;  ///< of the longer side, by which a principal point may be off the middle
+constexpr double kOddestAspect = 0.03;    ///< by which focal lengths may differ
 
 /// The number at the start of `text`.
 std::optional<double> leading_number(std::string_view text) {
@@ -142,7 +146,7 @@ class Steps {
     }
     done_.clear();
     key_ = key;
-    for (const char* derived : {"sparse", "pictures", "masks"}) fs::remove_all(work_ / derived);
+    for (const char* derived : {"sparse", "free", "adjusted", "pictures", "masks"}) fs::remove_all(work_ / derived);
     save();
   }
   [[nodiscard]] bool has(const std::string& step) const { return done_.contains(step); }
@@ -195,7 +199,7 @@ void write_masks(const std::vector<PreparedImage>& images, const fs::path& captu
 /// The start of an estimate: focal length from the file's notes, else COLMAP's rule of thumb of 1.2 times the longer
 /// side; pixels that are not square give two.
 std::string first_parameters(const PreparedImage& image, const std::string& model) {
-  const double focal = image.focal > 0 ? image.focal : 1.2 * std::max(image.width, image.height);
+  const double focal = image.focal > 0 ? image.focal : 1.2 * std::max({image.width, image.height, image.uncropped});
   const bool centred = image.centre_x == 0 && image.centre_y == 0;
   const double cx = centred ? 0.5 * image.width : image.centre_x, cy = centred ? 0.5 * image.height : image.centre_y;
   if (model == "SIMPLE_RADIAL") return fmt::format("{},{},{},0", focal, cx, cy);
@@ -203,9 +207,12 @@ std::string first_parameters(const PreparedImage& image, const std::string& mode
   return fmt::format("{},{},{},{},0,0,0,0", focal / image.pixel_aspect, focal, cx, cy);
 }
 
-std::string model_of(const PreparedImage& image, const PoseOptions& options) {
-  const bool one_focal = options.camera_model == "SIMPLE_RADIAL" || options.camera_model == "RADIAL";
-  return one_focal && image.pixel_aspect != 1 ? "OPENCV" : options.camera_model;
+/// The lens that poses are found with. One focal length where pixels are known to be square: on an orbit, two of them
+/// trade against the shape of the scene, and COLMAP settles on a wrong one. `free_lenses` frees the rest afterwards.
+std::string mapping_model(const PreparedImage& image, const PoseOptions& options) {
+  if (options.camera_model == "OPENCV_FISHEYE") return options.camera_model;
+  if (image.pixel_aspect != 1) return "OPENCV";
+  return options.camera_model == "OPENCV" ? "SIMPLE_RADIAL" : options.camera_model;
 }
 
 void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, const fs::path& work,
@@ -218,7 +225,7 @@ void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, 
     for (const PreparedImage* image : members) list += image->name + "\n";
     const fs::path list_file = work / fmt::format("camera_{}.txt", number);
     write_file(list_file, list);
-    const std::string model = model_of(*members.front(), options);
+    const std::string model = mapping_model(*members.front(), options);
     const char* command = "feature_extractor";
     std::vector<std::string> words = {command,
                                       "--database_path",
@@ -301,6 +308,72 @@ void map_images(Colmap& colmap, const std::vector<PreparedImage>& images, const 
   (void)colmap.run(words, "poses", images.size(), progress, "failed to create sparse model");  // then there is none
 }
 
+/// The lens of each camera of a model, by the camera's number.
+std::map<int, Intrinsics> lenses_of(const fs::path& model, const std::vector<PreparedImage>& images) {
+  std::map<std::string, int> camera_of;
+  for (const PreparedImage& image : images) camera_of[image.name] = image.camera;
+  std::map<int, Intrinsics> out;
+  for (const ListedView& view : read_colmap(model, model).views) {
+    const auto found = camera_of.find(fs::path(view.name).filename().string());
+    if (found != camera_of.end()) out[found->second] = view.intrinsics;
+  }
+  return out;
+}
+
+/// A text model's cameras with the lenses of OPENCV in place of those of SIMPLE_RADIAL, which are a case of them.
+std::string with_full_lenses(const std::string& cameras) {
+  std::istringstream in(cameras);
+  std::string out;
+  for (std::string line; std::getline(in, line);) {
+    std::istringstream words(line);
+    std::string number, model, width, height, focal, cx, cy, k;
+    words >> number >> model >> width >> height >> focal >> cx >> cy >> k;
+    const bool is_simple = model == "SIMPLE_RADIAL";
+    out += is_simple ? fmt::format("{} OPENCV {} {} {} {} {} {} {} 0 0 0", number, width, height, focal, focal, cx, cy, k)
+                     : line;
+    out += '\n';
+  }
+  return out;
+}
+
+/// True where free lenses stayed near those they started from: too free for what the views tell, they run away.
+bool is_plausible(const Intrinsics& lens, const Intrinsics& start) {
+  const double moved = std::hypot(lens.cx - start.cx, lens.cy - start.cy) / std::max(start.width, start.height);
+  const double aspect = lens.fx / lens.fy * start.fy / start.fx;
+  return moved < kFarthestCentre && std::abs(aspect - 1) < kOddestAspect;
+}
+
+/// Adjusts the whole model once more, with lenses of all parameters: the mapper keeps them simple, with the axis in the
+/// middle of the pictures, and turns every camera to make up for what that leaves out. The axis is free only where each
+/// camera has views enough to tell it.
+/// @return  the folder of the model to use: `model`, if the lenses became implausible.
+fs::path free_lenses(Colmap& colmap, const fs::path& model, const std::vector<PreparedImage>& images,
+                     const fs::path& work, const ProgressSink& progress) {
+  std::map<int, int> views;
+  for (const auto& image : images) ++views[image.camera];
+  const int fewest = std::ranges::min_element(views, {}, &std::pair<const int, int>::second)->second;
+  if (fewest < kViewsForLens) return model;
+  const fs::path start = work / "free", adjusted = work / "adjusted";
+  for (const fs::path& folder : {start, adjusted}) {
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+  }
+  (void)colmap.run({"model_converter", "--input_path", model, "--output_path", start, "--output_type", "TXT"}, "lenses",
+                   images.size(), progress);
+  write_file(start / "cameras.txt", with_full_lenses(read_text_file(start / "cameras.txt")));
+  const char* command = "bundle_adjuster";
+  std::vector<std::string> words = {command, "--input_path", start, "--output_path", adjusted};
+  if (const auto centre = colmap.option(command, {"BundleAdjustment.refine_principal_point"});
+      centre && fewest >= kViewsForCentre) {
+    words.insert(words.end(), {*centre, "1"});
+  }
+  (void)colmap.run(words, "lenses", images.size(), progress);
+  const auto before = lenses_of(start, images), after = lenses_of(adjusted, images);
+  const bool plausible =
+      std::ranges::all_of(after, [&](const auto& camera) { return is_plausible(camera.second, before.at(camera.first)); });
+  return plausible ? adjusted : model;
+}
+
 /// Of the lines "Features: 4218" of the log, one an image.
 double median_features(const fs::path& log) {
   const std::string text = fs::exists(log) ? read_text_file(log) : "";
@@ -381,6 +454,9 @@ PoseRecovery recover_poses(const std::vector<PreparedImage>& images, const fs::p
     out.model_sizes.push_back(count);
   }
   out.median_features = median_features(work / "colmap.log");
+  if (!out.model.empty() && options.camera_model == "OPENCV") {
+    out.model = free_lenses(colmap, out.model, images, work, progress);
+  }
   out.seconds = watch.seconds();
   return out;
 }

@@ -38,7 +38,7 @@ struct PoseOptions {
 };
 
 struct PoseRecovery {
-  std::filesystem::path model;           ///< folder of the model with the most images
+  std::filesystem::path model;           ///< folder of the model with the most images, lenses adjusted
   std::vector<std::size_t> model_sizes;  ///< registered images of all models, largest first
   std::string matching;                  ///< what was chosen
   std::size_t pairs = 0;                 ///< matched

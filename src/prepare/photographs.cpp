@@ -133,20 +133,6 @@ void write_mask(const fs::path& mask, const PreparedImage& image, const Upright&
   write_png(target, upright);
 }
 
-/// Masks by the stem of the photograph they belong to; "0001.jpg.png", as COLMAP names them, belongs to "0001".
-std::map<std::string, fs::path> masks_in(const fs::path& folder) {
-  std::map<std::string, fs::path> masks;
-  if (folder.empty()) return masks;
-  if (!fs::is_directory(folder)) throw MissingInputError(folder.string() + ": no such folder of masks");
-  for (const fs::path& file : photographs_in(folder)) {
-    fs::path stem = file.stem();
-    if (is_image_file(stem)) stem = stem.stem();
-    masks[stem.string()] = file;
-  }
-  if (masks.empty()) throw MissingInputError(folder.string() + ": holds no mask image");
-  return masks;
-}
-
 /// The stem without white space, which COLMAP's lists cannot hold.
 std::string plain_stem(const fs::path& file) {
   std::string stem = file.stem().string();
@@ -222,6 +208,19 @@ void group_into_cameras(std::vector<Imported>& imported, PhotographSet& set) {
 }
 
 }  // namespace
+
+std::map<std::string, fs::path> masks_in(const fs::path& folder) {
+  std::map<std::string, fs::path> masks;
+  if (folder.empty()) return masks;
+  if (!fs::is_directory(folder)) throw MissingInputError(folder.string() + ": no such folder of masks");
+  for (const fs::path& file : photographs_in(folder)) {
+    fs::path stem = file.stem();
+    if (is_image_file(stem)) stem = stem.stem();
+    masks[stem.string()] = file;
+  }
+  if (masks.empty()) throw MissingInputError(folder.string() + ": holds no mask image");
+  return masks;
+}
 
 std::size_t Upright::stored_index(int x, int y) const {
   const int right = width() - 1 - x, bottom = height() - 1 - y;

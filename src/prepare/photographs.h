@@ -3,6 +3,7 @@
 /// in.
 
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,7 @@ struct PreparedImage {
   double focal = 0;                   ///< pixels, as the notes of the file tell; 0: unknown
   double pixel_aspect = 1;            ///< width of a pixel over its height
   double centre_x = 0, centre_y = 0;  ///< principal point, pixels; 0, 0: the middle
+  int uncropped = 0;                  ///< longer side of the frame that borders were cut from, pixels; 0: none were
   double exposure = 1;                ///< see exposure.h
   int frame = -1;                     ///< of a clip: number of the frame in it
   double sharpness = 0;               ///< see sharpness.h; comparable within one capture only
@@ -65,6 +67,10 @@ struct PhotographSet {
 [[nodiscard]] PhotographSet import_photographs(const std::vector<std::filesystem::path>& files,
                                                const std::filesystem::path& capture, const std::filesystem::path& masks,
                                                const SensorOptions& sensor, const ProgressSink& progress);
+
+/// Masks of a folder by the stem of the picture they belong to; "0001.jpg.png", as COLMAP names them, belongs to
+/// "0001". None for an empty path.  @throws MissingInputError  no such folder, or no picture in it.
+[[nodiscard]] std::map<std::string, std::filesystem::path> masks_in(const std::filesystem::path& folder);
 
 /// Turns a pixel grid upright: the size of an image of `width` x `height` after `orientation`, and the stored pixel
 /// that upright pixel (x, y) shows.

@@ -11,6 +11,7 @@
 #include "src/capture/listing.h"
 #include "src/prepare/capture_writer.h"
 #include "src/prepare/exposure.h"
+#include "src/prepare/parallax.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -50,14 +51,14 @@ Material read_material(const fs::path& source, const fs::path& capture, const Pr
     return out;
   }
   if (!fs::exists(source)) throw MissingInputError(source.string() + ": no such file or folder");
-  if (!options.masks.empty()) throw UsageError("masks: expected with photographs; frames of a clip have no names yet");
   if (source.extension() == ".dat") {
+    if (!options.masks.empty()) throw UsageError("masks: expected with photographs or a clip, found a spike stream");
     out.set = import_spikes(source, capture, options.spikes, options.video.frames, progress);
     out.ordered = true;
     say(fmt::format("spike stream: {} pictures of {} ticks each", out.set.images.size(), options.spikes.spike_window));
     return out;
   }
-  ClipImport clip = import_clip(source, capture, options.video, options.sensor, progress);
+  ClipImport clip = import_clip(source, capture, options.masks, options.video, options.sensor, progress);
   out.set = std::move(clip.set);
   out.clip = std::move(clip.report);
   out.ordered = true;
@@ -146,6 +147,16 @@ std::string missing_names(const std::vector<PreparedImage>& images, const std::v
   return text + (count > 8 ? fmt::format(" and {} more", count - 8) : "");
 }
 
+/// Photographs taken from one place give no depth, however long COLMAP works on them.
+void refuse_turns(const std::vector<PreparedImage>& images, const fs::path& capture) {
+  const ParallaxSurvey survey = survey_parallax(images, capture);
+  if (!survey.only_turned()) return;
+  throw PosesError(fmt::format(
+      "no parallax: in {} of {} pairs of photographs the camera only turns or zooms on the spot (or the subject is flat), "
+      "which tells no depth. Take the pictures from places a step apart; --allow-no-parallax goes on all the same.",
+      survey.judged - survey.with_parallax, survey.judged));
+}
+
 Poses find_poses(const Material& material, const fs::path& capture, const fs::path& work, const PrepareOptions& options,
                  const ProgressSink& progress, const Say& say) {
   const std::vector<PreparedImage>& images = material.set.images;
@@ -158,6 +169,7 @@ Poses find_poses(const Material& material, const fs::path& capture, const fs::pa
     return out;
   }
   const bool is_clip = material.ordered;
+  if (!is_clip && !options.video.allow_no_parallax) refuse_turns(images, capture);
   const PoseRecovery recovery = recover_poses(images, capture, work, is_clip, options.poses, progress);
   Poses out;
   if (!recovery.model.empty()) out = poses_of_model(recovery.model, capture, images);
@@ -172,6 +184,15 @@ Poses find_poses(const Material& material, const fs::path& capture, const fs::pa
   if (out.views.size() < images.size()) say("not placed: " + missing_names(images, out.views));
   if (share < kGoodShare) say("advice:" + advice(images, recovery, is_clip));
   return out;
+}
+
+/// The subject's box as it is found, or as it is given.
+std::optional<SubjectBox> subject_of(const Poses& poses, const FrameOptions& options) {
+  auto subject = find_subject(poses.views, poses.points);
+  if (options.box.empty()) return subject;
+  if (!subject) subject.emplace();
+  subject->box = parse_box(options.box);
+  return subject;
 }
 
 Json json_of(const Similarity& s) {
@@ -224,8 +245,12 @@ Json json_of(const std::vector<PreparedImage>& images, const std::vector<View>& 
   return out;
 }
 
+Json json_of(const Aabbd& box) {
+  return {{box.min.x, box.min.y, box.min.z}, {box.max.x, box.max.y, box.max.z}};
+}
+
 Json record_of(const fs::path& source, const PrepareOptions& options, const Material& material, const Poses& poses,
-               const FrameChoice& frame) {
+               const FrameChoice& frame, const std::optional<SubjectBox>& subject) {
   Json out;
   out["source"] = fs::absolute(source).lexically_normal().string();
   out["transfer"] = {{"source", options.sensor.transfer},
@@ -258,6 +283,7 @@ Json record_of(const fs::path& source, const PrepareOptions& options, const Mate
                   {"measure", options.frame.measure},
                   {"capture_from_poses", json_of(frame.capture_from_poses)},
                   {"poses_from_capture", json_of(frame.capture_from_poses.inverse())}};
+  if (subject) out["box"] = {{"by", options.frame.box.empty() ? "points" : "given"}, {"corners", json_of(subject->box)}};
   out["thresholds"] = {
       {"good_share", kGoodShare}, {"least_share", kLeastShare}, {"blurred", kBlurred}, {"few_features", kFewFeatures}};
   out["images"] = json_of(material.set.images, poses.views);
@@ -288,7 +314,7 @@ PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, c
   const FrameChoice frame = choose_frame(poses.views, poses.points, options.frame);
   for (View& view : poses.views) view.world_from_camera = frame.capture_from_poses.pose(view.world_from_camera);
   for (Vec3d& point : poses.points) point = frame.capture_from_poses.point(point);
-  const auto subject = find_subject(poses.views, poses.points);
+  const auto subject = subject_of(poses, options.frame);
   say(fmt::format("frame: Z is up by {}, {}", frame.up_by,
                   frame.metres ? "in metres" : "no known unit (--measure gives metres)"));
   if (!options.no_exposure) {
@@ -298,7 +324,7 @@ PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, c
     }
   }
   write_contact_sheet(capture / "contact_sheet.png", capture, poses.views, poses.points, subject);
-  write_file(capture / "prepare.json", record_of(source, options, material, poses, frame).dump(1) + "\n");
+  write_file(capture / "prepare.json", record_of(source, options, material, poses, frame, subject).dump(1) + "\n");
   write_file(capture / "transforms.json", transforms_json(poses.views, material.set.images, subject).dump(1) + "\n");
   return {material.set.images.size(), poses.views.size()};
 }

@@ -17,7 +17,7 @@
 namespace cnerf {
 
 struct PrepareOptions {
-  std::string masks;         ///< folder; empty: none
+  std::string masks;         ///< folder, or one picture for all frames of a clip; empty: none
   std::string colmap_model;  ///< a ready model; empty: made by COLMAP
   bool no_exposure = false;  ///< take all views as equally exposed
   SensorOptions sensor;
@@ -28,7 +28,7 @@ struct PrepareOptions {
 
   template <typename Visitor>
   void visit(Visitor&& v) {
-    v("masks", masks, "folder of masks named as the photographs, black = ignore");
+    v("masks", masks, "folder of masks named as the photographs, black = ignore; for a clip also one picture for all frames");
     v("colmap_model", colmap_model, "folder of a ready COLMAP model, instead of making one");
     v("no_exposure", no_exposure, "take all views as equally exposed");
     sensor.visit(v);

@@ -330,6 +330,20 @@ FrameChoice choose_frame(const std::vector<View>& views, const std::vector<Vec3d
   return out;
 }
 
+Aabbd parse_box(const std::string& text) {
+  Vec3d a, b;
+  char rest = 0;
+  const int read = std::sscanf(text.c_str(), "%lf,%lf,%lf %lf,%lf,%lf %c", &a.x, &a.y, &a.z, &b.x, &b.y, &b.z, &rest);
+  Aabbd box = Aabbd::empty();
+  box.grow(a);
+  box.grow(b);
+  const Vec3d size = box.size();
+  if (read != 6 || !(size.x > 0 && size.y > 0 && size.z > 0) || !std::isfinite(length(a) + length(b))) {
+    throw UsageError("box: expected two corners 'x,y,z x,y,z' that differ along every axis, found '" + text + "'");
+  }
+  return box;
+}
+
 std::optional<SubjectBox> find_subject(const std::vector<View>& views, const std::vector<Vec3d>& points) {
   SubjectBox out;
   out.forward_facing = is_forward_facing(views);

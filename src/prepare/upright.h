@@ -17,6 +17,7 @@ struct FrameOptions {
   std::string up = "auto";  ///< auto, cameras, none, or x,y,z in the frame of the poses
   double scale = 0;         ///< capture units a unit of the poses; 0 = cameras' mean distance to the subject becomes 1
   std::string measure;      ///< "x1,y1,view1 x2,y2,view2 = 1.2m"
+  std::string box;          ///< "x,y,z x,y,z": two corners in the frame of the capture; empty: found
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -24,6 +25,7 @@ struct FrameOptions {
     v("scale", scale, Range{0, 1e12}, "units of the capture a unit of the poses; 0 = cameras are 1 from the subject");
     v("measure", measure,
       "a known length, 'x1,y1,view1 x2,y2,view2 = 1.2m' in pixels of the prepared images; the scene is then in metres");
+    v("box", box, "the subject's box, 'x,y,z x,y,z' in units of the capture, instead of the one that is found");
   }
 };
 
@@ -74,6 +76,9 @@ struct WorldRay {
 /// @throws UsageError, InputError  as `units_per_metre`, and an `up` that is none.
 [[nodiscard]] FrameChoice choose_frame(const std::vector<View>& views, const std::vector<Vec3d>& points,
                                        const FrameOptions& options);
+
+/// A box given as two of its corners, "x,y,z x,y,z", in any order.  @throws UsageError  another text, or a flat box.
+[[nodiscard]] Aabbd parse_box(const std::string& text);
 
 /// The subject's box, in the frame of views and points: between the cameras where they look inwards, what they see up
 /// to a far plane where they look one way. Nothing when there are too few points.

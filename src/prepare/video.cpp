@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 #include <opencv2/videoio.hpp>
 
 #include "src/base/error.h"
+#include "src/capture/image_io.h"
 #include "src/color/colorspace_math.h"
 #include "src/prepare/camera_motion.h"
 #include "src/prepare/grey_image.h"
@@ -54,12 +56,29 @@ cv::Mat1b grey_of(const cv::Mat& frame) {
   return out;
 }
 
+/// A picture whose brightness and contrast are alike everywhere, so that flicker is not taken for motion.
+/// @param textured  becomes 255 where there is more than grain to follow
+cv::Mat1b evened_out(const cv::Mat1b& picture, cv::Mat1b& textured) {
+  constexpr int kAround = 31;           // pixels
+  constexpr double kTexture = 8;        // codes, standard deviation
+  cv::Mat1f codes, mean, square;
+  picture.convertTo(codes, CV_32F);
+  cv::GaussianBlur(codes, codes, {}, 0.8);  // grain
+  cv::blur(codes, mean, {kAround, kAround});
+  cv::blur(codes.mul(codes), square, {kAround, kAround});
+  cv::Mat1f deviation;
+  cv::sqrt(cv::max(square - mean.mul(mean), 0), deviation);
+  textured = deviation > kTexture;
+  cv::Mat1b out;
+  cv::Mat1f((codes - mean) / (deviation + kTexture)).convertTo(out, CV_8U, 48, 128);
+  return out;
+}
+
 /// Follows places through a shot and judges pairs of frames between which they moved enough.
 class MotionObserver {
  public:
   void look_at(const cv::Mat1b& frame) {
-    cv::Mat1b small;
-    cv::equalizeHist(reduced_to(frame, kTrackedWidth), small);  // flicker would be taken for motion
+    const cv::Mat1b small = evened_out(reduced_to(frame, kTrackedWidth), textured_);
     if (!before_.empty() && !here_.empty()) follow(small);
     before_ = small;
     if (here_.size() < kFewestTracks) start();
@@ -80,7 +99,7 @@ class MotionObserver {
  private:
   void start() {
     here_.clear();
-    cv::goodFeaturesToTrack(before_, here_, kMostTracks, 0.01, 8);
+    cv::goodFeaturesToTrack(before_, here_, kMostTracks, 0.01, 8, textured_);
     at_start_ = here_;
     followed_ = 0;
   }
@@ -125,7 +144,7 @@ class MotionObserver {
     verdicts_.push_back(judge_motion(at_start_, here_, before_.size()));
   }
 
-  cv::Mat1b before_;
+  cv::Mat1b before_, textured_;
   std::vector<cv::Point2f> at_start_, here_;
   int followed_ = 0;
   std::vector<MotionVerdict> verdicts_;
@@ -237,6 +256,7 @@ PreparedImage describe(const ClipReport& report, const cv::Mat1b& picture, int f
   image.height = picture.rows;
   image.frame = frame;
   image.sharpness = sharpness;
+  image.uncropped = std::max(report.width, report.height);
   image.pixel_aspect = report.pixel_aspect * (report.interlaced ? 0.5 : 1);
   // The optical axis goes through the middle of the frame as it was stored, wherever borders were cut.
   image.centre_x = 0.5 * report.width - report.picture.x;
@@ -245,10 +265,50 @@ PreparedImage describe(const ClipReport& report, const cv::Mat1b& picture, int f
   return image;
 }
 
-void write_frames(const fs::path& file, const fs::path& capture, const VideoOptions& options,
+/// The masks of a clip's frames, cut as the frames are.
+class FrameMasks {
+ public:
+  FrameMasks(const fs::path& masks, const fs::path& capture, const ClipReport& report)
+      : capture_(capture), report_(report) {
+    if (fs::is_directory(masks)) {
+      by_stem_ = masks_in(masks);
+    } else if (!masks.empty()) {
+      if (!fs::exists(masks)) throw MissingInputError(masks.string() + ": no such mask, or folder of masks");
+      of_all_ = write(masks, "masks/every_frame.png");
+    }
+  }
+  /// The frame's mask, below the capture; empty: none.
+  [[nodiscard]] fs::path of(const std::string& name) {
+    const auto found = by_stem_.find(fs::path(name).stem().string());
+    if (found == by_stem_.end()) return of_all_;
+    ++used_;
+    return write(found->second, fs::path("masks") / name);
+  }
+  /// @throws InputError  when none of a folder's masks belongs to a frame.
+  void check_used(const fs::path& masks, const std::string& name) const {
+    if (by_stem_.empty() || used_ > 0) return;
+    throw InputError(masks, "names", "expected masks named as the kept frames, e.g. " + name);
+  }
+
+ private:
+  fs::path write(const fs::path& mask, const fs::path& name) const {
+    std::vector<std::uint8_t> codes = read_mask(mask, report_.width, report_.height);
+    write_png(capture_ / name, kept_part(cv::Mat1b(report_.height, report_.width, codes.data()), report_));
+    return name;
+  }
+
+  fs::path capture_;
+  const ClipReport& report_;
+  std::map<std::string, fs::path> by_stem_;
+  fs::path of_all_;
+  int used_ = 0;
+};
+
+void write_frames(const fs::path& file, const fs::path& capture, const fs::path& masks, const VideoOptions& options,
                   const SensorOptions& sensor, const Survey& clip, ClipImport& out, const ProgressSink& progress) {
   cv::VideoCapture frames = open_clip(file);
   const cv::Mat1b table = code_table(options, sensor);
+  FrameMasks frame_masks(masks, capture, out.report);
   std::size_t next = 0;
   const std::vector<int>& kept = out.report.kept;
   for (int number = 0; next < kept.size() && frames.grab(); ++number) {
@@ -259,12 +319,14 @@ void write_frames(const fs::path& file, const fs::path& capture, const VideoOpti
     cv::LUT(kept_part(grey_of(frame), out.report), table, codes);
     PreparedImage image = describe(out.report, codes, number, clip.frames[std::size_t(number)].sharpness);
     image.source = file;
+    image.mask = frame_masks.of(image.name);
     write_png(capture / "images" / image.name, codes);
     out.set.images.push_back(std::move(image));
     ++next;
     if (progress) progress({"clip", 0.8 + 0.2 * double(next) / double(kept.size()), {}});
     if (interruption_requested()) throw Interrupted("stopped while writing frames");
   }
+  if (!out.set.images.empty()) frame_masks.check_used(masks, out.set.images.front().name);
 }
 
 }  // namespace
@@ -296,8 +358,8 @@ std::vector<std::string> shot_lines(const ClipReport& report) {
   return lines;
 }
 
-ClipImport import_clip(const fs::path& file, const fs::path& capture, const VideoOptions& options,
-                       const SensorOptions& sensor, const ProgressSink& progress) {
+ClipImport import_clip(const fs::path& file, const fs::path& capture, const fs::path& masks,
+                       const VideoOptions& options, const SensorOptions& sensor, const ProgressSink& progress) {
   ClipImport out;
   ClipReport& report = out.report;
   {
@@ -334,7 +396,7 @@ ClipImport import_clip(const fs::path& file, const fs::path& capture, const Vide
   const double seconds = shot.range.size() / (report.fps > 0 ? report.fps : 24);
   const int count = options.fps > 0 ? std::max(2, int(std::lround(seconds * options.fps))) : options.frames;
   report.kept = choose_frames(clip.frames, shot.range, find_duplicates(clip.frames, shot.range), count);
-  write_frames(file, capture, options, sensor, clip, out, progress);
+  write_frames(file, capture, masks, options, sensor, clip, out, progress);
   if (out.set.images.size() < 2) {
     throw InputError(file, "frames", fmt::format("expected at least 2 to keep, found {}", out.set.images.size()));
   }

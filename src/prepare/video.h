@@ -28,7 +28,7 @@ struct VideoOptions {
     v("video_range", video_range, Choice{"auto", "full", "limited"},
       "codes of black and white: as the clip says, 0 to 255, or 16 to 235 that the decoder did not expand");
     v("keep_borders", keep_borders, "leave letterbox bars in the pictures");
-    v("allow_no_parallax", allow_no_parallax, "go on with a shot in which the camera seems only to turn or zoom");
+    v("allow_no_parallax", allow_no_parallax, "go on with a shot, or photographs, between which the camera seems only to turn");
   }
 };
 
@@ -68,11 +68,13 @@ struct ClipImport {
 /// Reads the clip twice: once to judge every frame, once to write those worth keeping to `capture/images`. Borders are
 /// cropped with the principal point kept; of interlaced frames one field is kept, with pixels twice as high; nothing is
 /// resampled.
-/// @throws InputError   no clip, too few frames.  @throws UsageError  no such shot.
+/// @param masks  a picture of the size of a frame, black = ignore in every frame (a logo, a time code), or a folder of
+///               pictures named as the kept frames (frame_000123.png); empty: none.
+/// @throws InputError   no clip, too few frames, a mask of another size.  @throws UsageError  no such shot.
 /// @throws PosesError   a shot without parallax or motion, with the reason.  @throws Interrupted.
 [[nodiscard]] ClipImport import_clip(const std::filesystem::path& clip, const std::filesystem::path& capture,
-                                     const VideoOptions& options, const SensorOptions& sensor,
-                                     const ProgressSink& progress);
+                                     const std::filesystem::path& masks, const VideoOptions& options,
+                                     const SensorOptions& sensor, const ProgressSink& progress);
 
 /// The shots as lines for the user, each with its frames, seconds and what speaks against it.
 [[nodiscard]] std::vector<std::string> shot_lines(const ClipReport& report);

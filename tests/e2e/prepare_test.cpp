@@ -96,6 +96,26 @@ TEST(Prepare, TakesAReadyModelAndSetsItUpright) {
   EXPECT_EQ(cnerf({"prepare", user.model.string(), "-o", out.string(), "--resume"}).exit_code, 64) << "another source";
 }
 
+TEST(Prepare, LooksForMotionAlsoAfterwards) {
+  const TempDir folder;
+  const UserFolder user = without_poses(folder.path());
+  const fs::path out = folder / "capture";
+  std::vector<std::string> words = {"prepare", user.photos.string(), "-o", out.string(), "--colmap-model",
+                                    user.model.string()};
+  ASSERT_EQ(cnerf(words).exit_code, 0);
+  words.insert(words.end(), {"--resume", "--motion-masks", "--motion-steps", "50"});
+  const ProgramResult result = cnerf(words);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("motion: "));
+  const auto motion = nlohmann::json::parse(read_text_file(out / "prepare.json")).at("motion");
+  EXPECT_EQ(motion.at("steps"), 50);
+  const auto shares = motion.value("shares", nlohmann::json::object());
+  for (const View& view : load_capture(out).views) {
+    const double hidden = double(std::ranges::count(view.image.mask, 0)) / double(view.image.pixel_count());
+    EXPECT_NEAR(hidden, shares.value(view.name, 0.0), 0.02) << view.name;
+  }
+}
+
 TEST(Prepare, WithoutColmapSaysHowToGetItAndGoesOnLater) {
   const TempDir folder;
   const UserFolder user = without_poses(folder.path());

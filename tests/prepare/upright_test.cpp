@@ -254,5 +254,14 @@ TEST(FindSubject, ForwardFacingViewsGetADepthRange) {
   EXPECT_NEAR(subject->far, 1.1 * 8, 0.1);
 }
 
+TEST(Box, IsReadFromItsCornersInAnyOrder) {
+  const Aabbd box = parse_box("1,-2,0.5 -1,2,0");
+  EXPECT_EQ(box.min, (Vec3d{-1, -2, 0}));
+  EXPECT_EQ(box.max, (Vec3d{1, 2, 0.5}));
+  for (const char* bad : {"", "1,2,3", "1,2,3 1,4,5", "0,0,0 1,1,1 x", "0,0,0 1,1,nan", "a,b,c d,e,f"}) {
+    EXPECT_THROW((void)parse_box(bad), UsageError) << bad;
+  }
+}
+
 }  // namespace
 }  // namespace cnerf

@@ -79,9 +79,10 @@ void append(std::vector<cv::Mat1b>& to, const std::vector<cv::Mat1b>& from) {
 
 class Clip : public testing::Test {
  protected:
-  ClipImport import_frames(const std::vector<cv::Mat1b>& frames, const VideoOptions& options = {}) {
+  ClipImport import_frames(const std::vector<cv::Mat1b>& frames, const VideoOptions& options = {},
+                           const fs::path& masks = {}) {
     if (!write_clip(folder_ / "clip.mp4", frames)) throw MissingInputError("no MPEG-4 encoder");
-    return import_clip(folder_ / "clip.mp4", folder_ / "out", options, {}, {});
+    return import_clip(folder_ / "clip.mp4", folder_ / "out", masks, options, {}, {});
   }
   test::TempDir folder_;
 };
@@ -100,6 +101,43 @@ TEST_F(Clip, ATravellingShotIsKept) {
   EXPECT_EQ(first.size(), kSize);
   EXPECT_LT(cv::norm(first, travelling(40)[std::size_t(clip.set.images[0].frame)], cv::NORM_L1) / double(first.total()),
             6);
+}
+
+TEST_F(Clip, OneMaskServesAllFramesAndIsCutAsTheyAre) {
+  std::vector<cv::Mat1b> frames = travelling(40);
+  for (cv::Mat1b& frame : frames) cv::copyMakeBorder(frame, frame, 30, 30, 0, 0, cv::BORDER_CONSTANT, cv::Scalar(0));
+  cv::Mat1b logo(frames.front().size(), std::uint8_t(255));
+  logo(cv::Rect(10, 35, 40, 20)) = 0;
+  cv::imwrite((folder_ / "logo.png").string(), logo);
+  VideoOptions options;
+  options.frames = 6;
+  const ClipImport clip = import_frames(frames, options, folder_ / "logo.png");
+  ASSERT_EQ(clip.set.images.size(), 6u);
+  for (const PreparedImage& image : clip.set.images) {
+    const cv::Mat1b mask = cv::imread((folder_ / "out" / image.mask).string(), cv::IMREAD_GRAYSCALE);
+    ASSERT_EQ(mask.size(), cv::Size(image.width, image.height));
+    const cv::Rect cut = clip.report.picture;
+    EXPECT_EQ(cv::norm(mask, logo(cut), cv::NORM_INF), 0);
+    EXPECT_GT(cv::countNonZero(mask == 0), 700) << "the logo is hidden";
+  }
+}
+
+TEST_F(Clip, MasksOfSingleFramesGoByTheirNames) {
+  VideoOptions options;
+  options.frames = 4;
+  const std::string wanted = import_frames(travelling(40), options).set.images[1].name;
+  fs::create_directories(folder_ / "masks");
+  cv::Mat1b half(kSize, std::uint8_t(255));
+  half.colRange(0, kSize.width / 2) = 0;
+  cv::imwrite((folder_ / "masks" / wanted).string(), half);
+  const ClipImport clip = import_frames(travelling(40), options, folder_ / "masks");
+  EXPECT_TRUE(clip.set.images[0].mask.empty());
+  EXPECT_EQ(clip.set.images[1].mask, fs::path("masks") / wanted);
+  fs::rename(folder_ / "masks" / wanted, folder_ / "masks" / "other.png");
+  EXPECT_THROW((void)import_frames(travelling(40), options, folder_ / "masks"), InputError);
+  EXPECT_THROW((void)import_frames(travelling(40), options, folder_ / "absent"), MissingInputError);
+  cv::imwrite((folder_ / "small.png").string(), cv::Mat1b(20, 20, std::uint8_t(255)));
+  EXPECT_THROW((void)import_frames(travelling(40), options, folder_ / "small.png"), InputError);
 }
 
 TEST_F(Clip, APanIsRefusedWithTheReason) {
@@ -200,7 +238,7 @@ TEST_F(Clip, WovenFieldsAreTakenApart) {
 TEST_F(Clip, OtherFilesAreRefused) {
   write_file(folder_ / "clip.mp4", std::string_view("no clip"));
   EXPECT_FALSE(is_clip(folder_ / "clip.mp4"));
-  EXPECT_THROW((void)import_clip(folder_ / "clip.mp4", folder_ / "out", {}, {}, {}), InputError);
+  EXPECT_THROW((void)import_clip(folder_ / "clip.mp4", folder_ / "out", {}, {}, {}, {}), InputError);
 }
 
 }  // namespace
