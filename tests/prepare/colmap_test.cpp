@@ -12,6 +12,7 @@
 #include "src/base/program.h"
 #include "src/base/usage.h"
 #include "src/capture/load_capture.h"
+#include "src/capture/sample_scene.h"
 #include "src/prepare/prepare.h"
 #include "tests/support/data.h"
 
@@ -44,7 +45,7 @@ PrepareReport prepare(const fs::path& source, const fs::path& out, const Prepare
 
 PoseComparison compare_with(const fs::path& truth_folder, const fs::path& prepared) {
   std::map<std::string, Affined> truth;
-  for (const View& view : load_capture(truth_folder, {.downscale = 4}).views) {
+  for (const View& view : load_capture(truth_folder).views) {
     truth[fs::path(view.name).stem().string()] = view.world_from_camera;
   }
   std::vector<Affined> found, given;
@@ -67,6 +68,29 @@ TEST(Colmap, FindsThePosesOfAFewSmallViews) {
   const PoseComparison poses = compare_with(fox, folder / "capture");
   for (const double degrees : poses.rotation_degrees) EXPECT_LT(degrees, 2);
   for (const double error : poses.centre_errors) EXPECT_LT(error, 0.05);
+}
+
+/// A circle around a subject, of which nothing tells the lens, trades focal lengths against the shape of the scene.
+TEST(Colmap, FindsTheLensOfAnOrbit) {
+  CNERF_REQUIRE_COLMAP();
+  const test::TempDir folder;
+  SampleSceneOptions options;
+  options.path = "orbit";
+  options.views = 36;
+  options.width = 400;
+  options.height = 300;
+  options.samples_per_pixel = 4;
+  write_sample_scene(folder / "sample", options);
+  write_grey_copies(folder / "sample" / "images", folder / "photos", 1);
+  EXPECT_EQ(prepare(folder / "photos", folder / "capture").registered, 36u);
+  const Intrinsics truth = load_capture(folder / "sample").views.front().intrinsics;
+  const Intrinsics found = load_capture(folder / "capture").views.front().intrinsics;
+  std::printf("focal lengths %.1f, %.1f; true %.1f\n", found.fx, found.fy, truth.fx);
+  EXPECT_NEAR(found.fx / truth.fx, 1, 0.03);
+  EXPECT_NEAR(found.fy / truth.fx, 1, 0.03);
+  const PoseComparison poses = compare_with(folder / "sample", folder / "capture");
+  for (const double degrees : poses.rotation_degrees) EXPECT_LT(degrees, 1.5);
+  for (const double error : poses.centre_errors) EXPECT_LT(error, 0.02);
 }
 
 TEST(Colmap, FindsThePosesOfFox) {
