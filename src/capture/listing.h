@@ -21,7 +21,8 @@ struct ListedView {
   Intrinsics intrinsics;
   double angle_x = 0, angle_y = 0;  ///< full angles of view, radians; 0: not stated
   Affined world_from_camera;        ///< rigid, axes of camera.h
-  double exposure = 1;   ///< light of the image over that of the others
+  double exposure = 1;              ///< light of the image over that of the others
+  double haze = 0;                  ///< linear light that lies over the image alone
   double downscale = 1;             ///< still to be applied to the image file
   bool held_out = false;
 };

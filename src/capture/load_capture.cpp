@@ -5,6 +5,7 @@
 
 #include "src/base/error.h"
 #include "src/base/parallel.h"
+#include "src/capture/black_background.h"
 #include "src/capture/image_io.h"
 #include "src/capture/listing.h"
 
@@ -193,6 +194,7 @@ LoadedView load_view(const ListedView& listed, Transfer transfer) {
   }
   out.view.image = encode_mono(image, transfer);
   out.view.image.exposure = float(listed.exposure);
+  out.view.image.haze = float(listed.haze);
   if (!listed.mask_file.empty()) out.view.image.mask = read_mask(listed.mask_file, image.width, image.height);
   return out;
 }
@@ -253,6 +255,9 @@ Capture load_capture(const fs::path& path, const CaptureOptions& options) {
   capture.listed_images = int(listed);
   capture.notes = std::move(listing.notes);
   load_views(listing.views, transfer, capture);
+  if (options.cut_out_of_black && !capture.depth_range && cut_out_of_black(capture.views)) {
+    capture.notes.push_back("all views show an object before black, which is taken as empty (capture.cut_out_of_black)");
+  }
   capture.is_bounded_object = std::all_of(capture.views.begin(), capture.views.end(), is_cut_out);
   if (!capture.is_bounded_object) {
     for (View& view : capture.views) mask_what_is_transparent(view.image);

@@ -11,12 +11,14 @@ namespace cnerf {
 struct CaptureOptions {
   int downscale = 1;              ///< divides image sizes; picks LLFF's images_N or resizes by area averaging
   std::string transfer = "srgb";  ///< how grey values encode luminance
+  bool cut_out_of_black = true;   ///< what lies black around an object is nothing; see black_background.h
   int holdout = 0;  ///< every N-th view of the sorted existing files is held out; 0 = the data set's split
 
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("downscale", downscale, Range{1, 64}, "divide image sizes by this");
     v("transfer", transfer, Choice{"srgb", "linear", "gamma22"}, "how grey values encode luminance");
+    v("cut_out_of_black", cut_out_of_black, "where all views show an object before black, take the black as empty");
     v("holdout", holdout, Range{0, 1000},
       "hold out every N-th view; 0 follows the data set's own split, if it has one");
   }

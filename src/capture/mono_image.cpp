@@ -56,16 +56,16 @@ float encode_transfer(Transfer transfer, float luminance) {
   return srgb_from_linear(luminance);
 }
 
-float MonoImage::luminance(std::size_t index) const {
+float MonoImage::stored_luminance(std::size_t index) const {
   switch (depth) {
     case PixelDepth::kU8:
-      return decode_table(transfer)[u8[index]] / exposure;
+      return decode_table(transfer)[u8[index]];
     case PixelDepth::kU16:
-      return decode_transfer(transfer, float(u16[index]) / 65535.0f) / exposure;
+      return decode_transfer(transfer, float(u16[index]) / 65535.0f);
     case PixelDepth::kF32:
       break;
   }
-  return f32[index] / exposure;
+  return f32[index];
 }
 
 }  // namespace cnerf

@@ -1,6 +1,7 @@
 #pragma once
 /// Single-channel images at the depth they came in. No colour ever enters this type.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -22,6 +23,7 @@ struct MonoImage {
   PixelDepth depth = PixelDepth::kU8;
   Transfer transfer = Transfer::kSrgb;
   float exposure = 1;               ///< light of this picture over that of the others; `luminance` divides by it
+  float haze = 0;                   ///< light that lies over this picture alone; `luminance` takes it off before
   std::vector<std::uint8_t> u8;     ///< [H, W] when depth is kU8, else empty
   std::vector<std::uint16_t> u16;   ///< [H, W] when depth is kU16, else empty
   std::vector<float> f32;           ///< [H, W] when depth is kF32, else empty; always linear
@@ -31,7 +33,11 @@ struct MonoImage {
   [[nodiscard]] std::size_t pixel_count() const { return std::size_t(width) * std::size_t(height); }
   /// Linear luminance Y at the exposure of the whole capture, 1 = white, composited over black.
   /// @param index  y * width + x
-  [[nodiscard]] float luminance(std::size_t index) const;
+  [[nodiscard]] float luminance(std::size_t index) const { return evened(stored_luminance(index)); }
+  /// The same as the picture was taken.
+  [[nodiscard]] float stored_luminance(std::size_t index) const;
+  /// Light as the whole capture has it, from light as this picture has it. Never below 0 where there is haze.
+  [[nodiscard]] float evened(float light) const { return (haze > 0 ? std::max(0.0f, light - haze) : light) / exposure; }
   [[nodiscard]] float coverage(std::size_t index) const { return alpha.empty() ? 1.0f : float(alpha[index]) / 255.0f; }
   [[nodiscard]] bool valid(std::size_t index) const { return mask.empty() || mask[index] != 0; }
 };

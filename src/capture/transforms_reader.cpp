@@ -188,6 +188,10 @@ ListedView read_frame(const fs::path& file, const Json& top, const Json& frame, 
   if (!(view.exposure > 0)) {
     throw fields.error("exposure", "expected a number above 0, found " + fields.find("exposure")->dump());
   }
+  view.haze = fields.number("haze", 0);
+  if (!(view.haze >= 0 && view.haze < 1)) {
+    throw fields.error("haze", "expected a number from 0 to below 1, found " + fields.find("haze")->dump());
+  }
   return view;
 }
 

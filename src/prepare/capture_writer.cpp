@@ -167,6 +167,7 @@ Json transforms_json(const std::vector<View>& views, const std::vector<PreparedI
       const PreparedImage& image = *found->second;
       if (!image.mask.empty()) frame["mask_path"] = image.mask.generic_string();
       if (image.exposure != 1) frame["exposure"] = image.exposure;
+      if (image.haze != 0) frame["haze"] = image.haze;
     }
     if (!one_lens) frame.update(lens_of(view));
     frame["transform_matrix"] = matrix_of(view.world_from_camera);

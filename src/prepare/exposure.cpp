@@ -14,6 +14,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kRounds = 30;
+constexpr int kHazeRounds = 300;
+constexpr double kExactLight = 0.004;  ///< difference of linear light below which all sightings count fully
 constexpr double kHeld = 1e-9;     ///< of a view's weight, pulling its logarithm to 0
 constexpr double kExact = 0.01;    ///< difference of logarithms below which all sightings count fully
 constexpr double kSettled = 1e-6;  ///< largest change of a logarithm in a round
@@ -86,6 +88,65 @@ std::vector<double> solve_exposures(int views, const std::vector<Sighting>& sigh
   return out;
 }
 
+std::vector<ViewLight> solve_exposures_and_haze(int views, const std::vector<Sighting>& sightings) {
+  const std::vector<double> alone = solve_exposures(views, sightings);
+  std::vector<ViewLight> light;
+  for (const double exposure : alone) light.push_back({exposure, 0});
+  std::map<int, std::size_t> number;  // places are numbered with gaps
+  std::vector<int> sighted(std::size_t(views), 0);
+  for (const Sighting& seen : sightings) {
+    number.try_emplace(seen.place, number.size());
+    ++sighted[std::size_t(seen.view)];
+  }
+  std::vector<std::size_t> place(sightings.size());
+  for (std::size_t i = 0; i < sightings.size(); ++i) place[i] = number.at(sightings[i].place);
+  std::vector<double> weights(sightings.size(), 1.0), of_place(number.size());
+  for (int round = 0; round < kHazeRounds; ++round) {
+    // The best light of each place for the views as they stand ...
+    std::vector<double> sum(number.size(), 0.0), weight(number.size(), 0.0);
+    for (std::size_t i = 0; i < sightings.size(); ++i) {
+      const ViewLight& view = light[std::size_t(sightings[i].view)];
+      sum[place[i]] += weights[i] * view.exposure * (sightings[i].light - view.haze);
+      weight[place[i]] += weights[i] * view.exposure * view.exposure;
+    }
+    for (std::size_t p = 0; p < sum.size(); ++p) of_place[p] = sum[p] / weight[p];
+    // ... and the best line of each view through those.
+    struct Line {
+      double w = 0, x = 0, y = 0, xx = 0, xy = 0;
+    };
+    std::vector<Line> lines(std::size_t(views), Line{});
+    for (std::size_t i = 0; i < sightings.size(); ++i) {
+      Line& line = lines[std::size_t(sightings[i].view)];
+      const double w = weights[i], x = of_place[place[i]], y = sightings[i].light;
+      line.w += w, line.x += w * x, line.y += w * y, line.xx += w * x * x, line.xy += w * x * y;
+    }
+    std::vector<double> exposures, hazes;
+    for (std::size_t v = 0; v < lines.size(); ++v) {
+      const Line& line = lines[v];
+      const double spread = line.w * line.xx - line.x * line.x;
+      if (sighted[v] < kSightingsForHaze || !(spread > 1e-9 * line.w * line.w)) continue;
+      light[v].exposure = std::max(1e-3, (line.w * line.xy - line.x * line.y) / spread);
+      light[v].haze = (line.y - light[v].exposure * line.x) / line.w;
+      exposures.push_back(light[v].exposure);
+      hazes.push_back(light[v].haze / light[v].exposure);
+    }
+    if (exposures.empty()) return light;
+    // Free are a factor and a light common to all places: the median exposure is 1, the least haze 0.
+    const double factor = median(exposures), least = *std::ranges::min_element(hazes);
+    for (std::size_t v = 0; v < lines.size(); ++v) {
+      if (sighted[v] < kSightingsForHaze) continue;
+      light[v].haze = std::max(0.0, light[v].haze - light[v].exposure * least);
+      light[v].exposure /= factor;
+    }
+    for (std::size_t i = 0; i < sightings.size(); ++i) {
+      const ViewLight& view = light[std::size_t(sightings[i].view)];
+      const double expected = view.exposure * factor * (of_place[place[i]] + least) + view.haze;
+      weights[i] = kExactLight / std::max(kExactLight, std::abs(sightings[i].light - expected));
+    }
+  }
+  return light;
+}
+
 std::vector<Observation> read_observations(const fs::path& model) {
   constexpr long long kNoPoint = -1;
   ByteReader in(model / "images.bin");
@@ -109,7 +170,7 @@ std::vector<Observation> read_observations(const fs::path& model) {
 }
 
 std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, const fs::path& capture,
-                                         const fs::path& model) {
+                                         const fs::path& model, bool with_haze) {
   if (!fs::exists(model / "images.bin")) return std::nullopt;
   std::map<std::string, int> number_of;
   for (std::size_t i = 0; i < images.size(); ++i) {
@@ -144,7 +205,12 @@ std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, con
   double squared = 0;
   for (const double exposure : exposures) squared += std::log(exposure) * std::log(exposure) / double(exposures.size());
   const double spread = std::sqrt(squared);
-  for (std::size_t i = 0; i < images.size() && spread >= kNotedExposure; ++i) images[i].exposure = exposures[i];
+  if (spread < kNotedExposure) return spread;
+  for (std::size_t i = 0; i < images.size(); ++i) images[i].exposure = exposures[i];
+  if (with_haze) {
+    const std::vector<ViewLight> light = solve_exposures_and_haze(int(images.size()), sightings);
+    for (std::size_t i = 0; i < images.size(); ++i) images[i].exposure = light[i].exposure, images[i].haze = light[i].haze;
+  }
   return spread;
 }
 

@@ -24,6 +24,16 @@ struct Sighting {
 /// unknown factor between them, taken as 1.
 [[nodiscard]] std::vector<double> solve_exposures(int views, const std::vector<Sighting>& sightings);
 
+/// How a view was taken: light of view v and place p is exposure_v times the light of p, plus haze_v.
+struct ViewLight {
+  double exposure = 1;
+  double haze = 0;  ///< fog of the film, stray light; linear, 1 = white
+};
+/// The same with light that lies over each view. The least hazy view has none, the median exposure is 1; views of fewer
+/// than kSightingsForHaze sightings get their exposure alone.
+inline constexpr int kSightingsForHaze = 50;
+[[nodiscard]] std::vector<ViewLight> solve_exposures_and_haze(int views, const std::vector<Sighting>& sightings);
+
 /// Where an image shows a sparse point.
 struct Observation {
   std::string image;
@@ -37,10 +47,10 @@ struct Observation {
 /// shine and noise.
 inline constexpr double kNotedExposure = 0.02;
 
-/// Fills `exposure` of the images from what they show of the model's points; leaves 1 where that spreads less than
-/// kNotedExposure.
+/// Fills `exposure` of the images from what they show of the model's points, and `haze` if asked to; leaves 1 and 0
+/// where exposures spread less than kNotedExposure.
 /// @return  the spread found; nothing when the model does not say what it was made of (a text model).
 std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, const std::filesystem::path& capture,
-                                         const std::filesystem::path& model);
+                                         const std::filesystem::path& model, bool with_haze);
 
 }  // namespace cnerf

@@ -39,7 +39,7 @@ struct PreparedImage {
   double pixel_aspect = 1;            ///< width of a pixel over its height
   double centre_x = 0, centre_y = 0;  ///< principal point, pixels; 0, 0: the middle
   int uncropped = 0;                  ///< longer side of the frame that borders were cut from, pixels; 0: none were
-  double exposure = 1;                ///< see exposure.h
+  double exposure = 1, haze = 0;      ///< see exposure.h
   int frame = -1;                     ///< of a clip: number of the frame in it
   double sharpness = 0;               ///< see sharpness.h; comparable within one capture only
 };

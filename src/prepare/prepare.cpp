@@ -238,6 +238,7 @@ Json json_of(const std::vector<PreparedImage>& images, const std::vector<View>& 
                 {"sharpness", image.sharpness}};
     if (image.frame >= 0) one["frame"] = image.frame;
     if (image.exposure != 1) one["exposure"] = image.exposure;
+    if (image.haze != 0) one["haze"] = image.haze;
     if (image.focal > 0) one["focal_pixels"] = image.focal;
     one["placed"] = std::ranges::any_of(views, [&](const View& view) { return view.name == image.name; });
     out.push_back(std::move(one));
@@ -318,7 +319,7 @@ PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, c
   say(fmt::format("frame: Z is up by {}, {}", frame.up_by,
                   frame.metres ? "in metres" : "no known unit (--measure gives metres)"));
   if (!options.no_exposure) {
-    if (const auto spread = estimate_exposures(material.set.images, capture, poses.model)) {
+    if (const auto spread = estimate_exposures(material.set.images, capture, poses.model, options.haze)) {
       say(fmt::format("exposures: {:.1f} % apart{}", 100 * *spread,
                       *spread >= kNotedExposure ? ", evened out when the capture is read" : ""));
     }

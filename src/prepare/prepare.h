@@ -20,6 +20,7 @@ struct PrepareOptions {
   std::string masks;         ///< folder, or one picture for all frames of a clip; empty: none
   std::string colmap_model;  ///< a ready model; empty: made by COLMAP
   bool no_exposure = false;  ///< take all views as equally exposed
+  bool haze = false;         ///< besides exposures, estimate light that lies over each view
   SensorOptions sensor;
   VideoOptions video;
   SpikeOptions spikes;
@@ -31,6 +32,7 @@ struct PrepareOptions {
     v("masks", masks, "folder of masks named as the photographs, black = ignore; for a clip also one picture for all frames");
     v("colmap_model", colmap_model, "folder of a ready COLMAP model, instead of making one");
     v("no_exposure", no_exposure, "take all views as equally exposed");
+    v("haze", haze, "besides exposures, estimate light that lies over each view: fog of old film, stray light");
     sensor.visit(v);
     video.visit(v);
     spikes.visit(v);

@@ -62,6 +62,27 @@ TEST(Exposures, ScalingAViewScalesItsExposureAlone) {
   for (std::size_t v = 0; v < 11; ++v) EXPECT_NEAR(after[v] / before[v], v == darkest ? 0.5 : 1, 0.02) << v;
 }
 
+TEST(Exposures, HazeIsToldFromExposure) {
+  Problem problem = make_problem(21, 4000, 0.01, 0.05);
+  std::vector<double> haze;
+  for (int v = 0; v < 21; ++v) haze.push_back(v % 4 == 0 ? 0.0 : 0.01 * (v % 7));
+  for (Sighting& seen : problem.sightings) seen.light += haze[std::size_t(seen.view)];
+  const std::vector<ViewLight> found = solve_exposures_and_haze(21, problem.sightings);
+  for (std::size_t v = 0; v < found.size(); ++v) {
+    EXPECT_NEAR(found[v].exposure / problem.exposures[v], 1, 0.02) << v;
+    EXPECT_NEAR(found[v].haze, haze[v], 0.005) << v;
+  }
+}
+
+TEST(Exposures, WithoutHazeNoneIsFound) {
+  const Problem problem = make_problem(21, 4000, 0, 0);
+  const std::vector<ViewLight> found = solve_exposures_and_haze(21, problem.sightings);
+  for (std::size_t v = 0; v < found.size(); ++v) {
+    EXPECT_NEAR(found[v].exposure / problem.exposures[v], 1, 1e-3);
+    EXPECT_NEAR(found[v].haze, 0, 1e-4);
+  }
+}
+
 TEST(Exposures, ViewsThatShareNothingKeepOne) {
   const std::vector<double> found = solve_exposures(3, {{0, 0, 0.5}, {1, 0, 0.5}});
   EXPECT_DOUBLE_EQ(found[2], 1);

@@ -314,11 +314,11 @@ void LuminanceEngineCuda::upload_views(const std::vector<TrainingView>& views) {
   const auto decoded = [&](const MonoImage& image) {
     const bool is_deep = image.depth == PixelDepth::kU16;
     const float* own = nullptr;  // a view of an exposure of its own needs a table of its own
-    const float*& table = image.exposure == 1 ? tables[is_deep][int(image.transfer)] : own;
+    const float*& table = image.exposure == 1 && image.haze == 0 ? tables[is_deep][int(image.transfer)] : own;
     if (table == nullptr) {
       std::vector<float> values(is_deep ? 65536 : 256);
       for (std::size_t i = 0; i < values.size(); ++i) {
-        values[i] = decode_transfer(image.transfer, float(i) / float(values.size() - 1)) / image.exposure;
+        values[i] = image.evened(decode_transfer(image.transfer, float(i) / float(values.size() - 1)));
       }
       views_->tables.push_back(uploaded(values, kImageAdvice));
       table = views_->tables.back().data();
@@ -339,11 +339,11 @@ void LuminanceEngineCuda::upload_views(const std::vector<TrainingView>& views) {
         record.decoded = decoded(image);
         break;
       case PixelDepth::kF32:
-        if (image.exposure == 1) {
+        if (image.exposure == 1 && image.haze == 0) {
           record.pixels = plane(image.f32.data(), image.f32.size() * sizeof(float));
         } else {
           std::vector<float> values = image.f32;
-          for (float& value : values) value /= image.exposure;
+          for (float& value : values) value = image.evened(value);
           record.pixels = plane(values.data(), values.size() * sizeof(float));
         }
         break;

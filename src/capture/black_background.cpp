@@ -1,0 +1,104 @@
+#include "src/capture/black_background.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <opencv2/imgproc.hpp>
+
+#include "src/base/parallel.h"
+#include "src/color/colorspace_math.h"
+
+namespace cnerf {
+namespace {
+
+constexpr double kBlackest = 8;         ///< sRGB codes, of the median of a rim
+constexpr double kAgainstLight = 0.06;  ///< of the picture's lightest hundredth, that a black rim stays below
+constexpr double kLeastReach = 4;       ///< codes above the rim's median that are black too; more where there is grain
+constexpr double kGrainReach = 4;       ///< standard deviations
+constexpr double kRimShare = 0.5;       ///< of a view's rim that is black: objects may be cut by the picture
+constexpr double kEmptyShare = 0.05;    ///< of a view that is empty at least
+constexpr int kRim = 2;                 ///< pixels
+
+/// sRGB codes, grain averaged.
+cv::Mat1f codes_of(const MonoImage& image) {
+  cv::Mat1f codes(image.height, image.width);
+  for (std::size_t p = 0; p < image.pixel_count(); ++p) {
+    const float light = std::clamp(image.stored_luminance(p), 0.0f, 1.0f);
+    codes(int(p) / image.width, int(p) % image.width) = 255 * srgb_from_linear(light);
+  }
+  cv::blur(codes, codes, {3, 3});
+  return codes;
+}
+
+cv::Mat1b rim_of(cv::Size size) {
+  cv::Mat1b rim(size, std::uint8_t(255));
+  rim(cv::Rect(kRim, kRim, size.width - 2 * kRim, size.height - 2 * kRim)) = 0;
+  return rim;
+}
+
+float quantile(std::vector<float> values, double share) {
+  const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// 255 where the view shows nothing; no value if it does not stand before black.
+std::optional<cv::Mat1b> empty_part(const MonoImage& image) {
+  if (!image.alpha.empty() || image.width < 8 * kRim || image.height < 8 * kRim) return std::nullopt;
+  const cv::Mat1f codes = codes_of(image);
+  const cv::Mat1b rim = rim_of(codes.size());
+  std::vector<float> at_rim;
+  for (int y = 0; y < codes.rows; ++y) {
+    for (int x = 0; x < codes.cols; ++x) {
+      if (rim(y, x) != 0) at_rim.push_back(codes(y, x));
+    }
+  }
+  const float level = quantile(at_rim, 0.5), lightest = quantile({codes.begin(), codes.end()}, 0.99);
+  if (level > kBlackest || level > kAgainstLight * lightest) return std::nullopt;
+  // The darker half of the rim lies below its median: its spread is that of the grain.
+  const double grain = 1.5 * (level - quantile(at_rim, 0.16));
+  const double limit = level + std::max(kLeastReach, kGrainReach * grain);
+  const auto black = std::ranges::count_if(at_rim, [&](float code) { return code <= limit; });
+  if (double(black) < kRimShare * double(at_rim.size())) return std::nullopt;
+
+  const cv::Mat1b dark = codes <= limit;
+  cv::Mat1i labels;
+  const int count = cv::connectedComponents(dark, labels);
+  std::vector<bool> reaches_rim(std::size_t(count), false);
+  for (int y = 0; y < codes.rows; ++y) {
+    for (int x = 0; x < codes.cols; ++x) {
+      if (rim(y, x) != 0 && dark(y, x) != 0) reaches_rim[std::size_t(labels(y, x))] = true;
+    }
+  }
+  cv::Mat1b empty(codes.size(), std::uint8_t(0));
+  for (int y = 0; y < codes.rows; ++y) {
+    for (int x = 0; x < codes.cols; ++x) {
+      if (dark(y, x) != 0 && reaches_rim[std::size_t(labels(y, x))]) empty(y, x) = 255;
+    }
+  }
+  if (cv::countNonZero(empty) < kEmptyShare * double(empty.total())) return std::nullopt;
+  return empty;
+}
+
+void cut_out(MonoImage& image, const cv::Mat1b& empty) {
+  image.alpha.assign(image.pixel_count(), 255);
+  for (std::size_t p = 0; p < image.pixel_count(); ++p) {
+    if (empty(int(p) / image.width, int(p) % image.width) == 0) continue;
+    image.alpha[p] = 0;
+    if (!image.u8.empty()) image.u8[p] = 0;
+    if (!image.u16.empty()) image.u16[p] = 0;
+    if (!image.f32.empty()) image.f32[p] = 0;
+  }
+}
+
+}  // namespace
+
+bool cut_out_of_black(std::vector<View>& views) {
+  std::vector<std::optional<cv::Mat1b>> empty(views.size());
+  parallel_tasks(views.size(), [&](std::size_t v) { empty[v] = empty_part(views[v].image); });
+  if (!std::ranges::all_of(empty, [](const auto& part) { return part.has_value(); })) return false;
+  for (std::size_t v = 0; v < views.size(); ++v) cut_out(views[v].image, *empty[v]);
+  return true;
+}
+
+}  // namespace cnerf
