@@ -42,12 +42,13 @@ void append_crop(const AugmentOptions& o, float aspect, SequentialRng& rng, std:
 enum LightnessColumn { kGamma, kContrast, kShift, kBlur, kNoise, kCoarseNoise, kLightnessColumns };
 
 void append_lightness(const AugmentOptions& o, SequentialRng& rng, std::vector<float>& rows) {
-  const float gamma = std::exp(rng.uniform(-1, 1) * float(o.gamma));
-  const float contrast = 1 + rng.uniform(-1, 1) * float(o.contrast);
-  const float shift = rng.uniform(-1, 1) * float(o.shift);
-  const float blur = rng.uniform() < o.blur_share ? rng.uniform(0.2f, float(o.blur_sigma)) : 0.1f;
-  const float noise = rng.uniform() < 0.5f ? rng.uniform() * float(o.noise) : 0;
-  const float coarse = rng.uniform() < 0.3f ? rng.uniform() * float(o.coarse_noise) : 0;
+  const float tone = float(o.tone_strength), wear = float(o.wear_strength);
+  const float gamma = std::exp(rng.uniform(-1, 1) * float(o.gamma) * tone);
+  const float contrast = 1 + rng.uniform(-1, 1) * float(o.contrast) * tone;
+  const float shift = rng.uniform(-1, 1) * float(o.shift) * tone;
+  const float blur = rng.uniform() < o.blur_share * wear ? rng.uniform(0.2f, float(o.blur_sigma)) : 0.1f;
+  const float noise = rng.uniform() < 0.5f * wear ? rng.uniform() * float(o.noise) : 0;
+  const float coarse = rng.uniform() < 0.3f * wear ? rng.uniform() * float(o.coarse_noise) : 0;
   rows.insert(rows.end(), {gamma, contrast, shift, blur, noise, coarse});
 }
 

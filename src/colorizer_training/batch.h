@@ -19,6 +19,8 @@ struct AugmentOptions {
   double gamma = 0.35, contrast = 0.3, shift = 8;  ///< log gamma; relative contrast; L* offset
   double blur_sigma = 1.6, blur_share = 0.6;       ///< pixels of the crop
   double noise = 2.5, coarse_noise = 3.0;          ///< standard deviations up to this, L*
+  double tone_strength = 1;                        ///< factor on gamma, contrast and shift
+  double wear_strength = 1;                        ///< factor on the shares of blurred and of noisy crops
 };
 
 /// Images that stay on the training device, as bytes.

@@ -82,6 +82,14 @@ void add_options(CLI::App& app, Options& o) {
       ->check(CLI::Range(0.0, 1.0));
   app.add_option("--average-decay", t.average_decay, "of the averaged weights, a step");
   app.add_option("--cutmix", t.augment.cutmix, "share of batches");
+  app.add_option_function<double>(
+         "--tone", [&t](double factor) { t.augment.tone_strength = t.tile_augment.tone_strength = factor; },
+         "factor on the changes of lightness: gamma, contrast, shift")
+      ->check(CLI::Range(0.0, 2.0));
+  app.add_option_function<double>(
+         "--wear", [&t](double factor) { t.augment.wear_strength = t.tile_augment.wear_strength = factor; },
+         "factor on how many crops are blurred or noisy")
+      ->check(CLI::Range(0.0, 1.6));
   app.add_option("--seed", t.seed, "of weights and batches");
 }
 
