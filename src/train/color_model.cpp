@@ -4,6 +4,7 @@
 
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
+#include "src/engine/select_engine.h"
 #include "src/train/options_json.h"
 
 namespace cnerf {
@@ -39,8 +40,8 @@ ColorModel ColorModel::create(const Stage2Options& options) {
   ColorModel model;
   model.options = options;
   const auto seed = static_cast<std::uint64_t>(options.seed);
-  model.chroma = make_cpu_chroma_engine(options.grid, seed ^ 0x636872ull);
-  model.chromaticity = make_cpu_chromaticity_engine(options.grid, seed ^ 0x78797aull);
+  model.chroma = make_chroma_engine(options.grid, seed ^ 0x636872ull);
+  model.chromaticity = make_chromaticity_engine(options.grid, seed ^ 0x78797aull);
   return model;
 }
 
