@@ -28,11 +28,13 @@ Ab in_gamut(Ab color, float luminance) {
 
 std::vector<float> pixel_luminance(const PixelSamples& pixels) {
   std::vector<float> luminance(pixels.pixels(), 0.0f);
-  for (std::size_t p = 0; p < pixels.pixels(); ++p) {
-    for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
-      luminance[p] += pixels.weights[s] * pixels.luminance[s];
+  parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
+        luminance[p] += pixels.weights[s] * pixels.luminance[s];
+      }
     }
-  }
+  });
   return luminance;
 }
 

@@ -35,13 +35,13 @@ double median_milliseconds(int repetitions, const std::function<void()>& work) {
 /// Pixels of views that see something.
 PixelSamples visible_pixels(const std::vector<CachedView>& views, int count, std::uint64_t seed) {
   SequentialRng rng(seed, 12);
-  PixelSamples pixels;
-  while (pixels.pixels() < std::size_t(count)) {
-    const CachedView& view = views[std::size_t(rng.uniform() * float(views.size()))];
-    const auto pixel = std::uint32_t(rng.uniform() * float(view.width * view.height));
-    if (view.opacity[pixel] >= kLeastColoredOpacity) append(pixels, pixel_samples(view, std::span(&pixel, 1)));
+  std::vector<ViewPixel> wanted;
+  while (wanted.size() < std::size_t(count)) {
+    const auto v = std::uint32_t(rng.uniform() * float(views.size()));
+    const auto pixel = std::uint32_t(rng.uniform() * float(views[v].width * views[v].height));
+    if (views[v].opacity[pixel] >= kLeastColoredOpacity) wanted.push_back({v, pixel});
   }
-  return pixels;
+  return pixel_samples(views, wanted);
 }
 std::vector<SoftLabel> labels_of(const PixelSamples& pixels) {
   std::vector<SoftLabel> labels;

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "src/base/check.h"
+#include "src/base/parallel.h"
 #include "src/base/rng.h"
 #include "src/engine/cuda/trained_parameters.h"
 #include "src/engine/heaviest_samples.h"
@@ -29,6 +30,37 @@ const char* const kGridAdvice = "the hash grid; lower stage1.grid.log2_rows or s
 const char* const kSampleAdvice = "the samples of a step; lower stage1.samples_per_step";
 const char* const kImageAdvice = "the training images; raise capture.downscale";
 const char* const kRayAdvice = "rays";
+
+}  // namespace
+
+namespace {
+
+/// Puts traced samples in the order of their rays and leaves out the light ones.
+void append_heaviest(std::span<const TracedRay> rays, const WeightedSample* found, float share,
+                     std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) {
+  constexpr std::size_t kRays = 256;  // of a part
+  struct Part {
+    std::vector<WeightedSample> samples;
+    std::vector<std::size_t> offsets = {0};
+  };
+  std::vector<Part> parts((rays.size() + kRays - 1) / kRays);
+  parallel_tasks(parts.size(), [&](std::size_t i) {
+    Part& part = parts[i];
+    for (const TracedRay& ray : rays.subspan(i * kRays, std::min(kRays, rays.size() - i * kRays))) {
+      for (std::uint32_t s = 0; s < ray.samples; s += 32) {
+        const WeightedSample* run = found + ray.run[s / 32];
+        part.samples.insert(part.samples.end(), run, run + std::min(32u, ray.samples - s));
+      }
+      part.offsets.push_back(part.samples.size());
+    }
+    if (share < 1) keep_heaviest(share, part.samples, part.offsets);
+  });
+  for (const Part& part : parts) {
+    const std::size_t before = samples.size();
+    samples.insert(samples.end(), part.samples.begin(), part.samples.end());
+    for (std::size_t r = 1; r < part.offsets.size(); ++r) offsets.push_back(before + part.offsets[r]);
+  }
+}
 
 }  // namespace
 
@@ -57,6 +89,7 @@ struct LuminanceEngineCuda::Memory {
   DeviceBuffer<RayResult> results;
   DeviceBuffer<WeightedSample> weighted;
   DeviceBuffer<TracedRay> traced;
+  std::unique_ptr<MappedBuffer<WeightedSample>> found;  // a copy of `weighted`, pinned
   DeviceBuffer<Vec3f> points, point_directions;
   DeviceBuffer<float> answers;
 
@@ -511,7 +544,7 @@ void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& 
   const std::size_t room = std::size_t(1) << 22;
   if (m.weighted.size() < room) m.weighted = {room, kRayAdvice};
   if (m.traced.size() < most) m.traced = {most, kRayAdvice};
-  std::vector<WeightedSample> found;
+  if (!m.found) m.found = std::make_unique<MappedBuffer<WeightedSample>>(room);
   for (std::size_t first = 0; first < rays.size();) {
     const auto count = std::uint32_t(std::min<std::size_t>(most, rays.size() - first));
     TraceJob trace = job_of_rays(rays.subspan(first, count), march, effort.min_transmittance);
@@ -525,17 +558,14 @@ void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& 
       most = count / 2;  // too many samples: fewer rays at a time
       continue;
     }
-    found.resize(state.samples);
-    m.weighted.download(found.data(), found.size());
+    CNERF_CUDA(cudaMemcpyAsync(&(*m.found)[0], m.weighted.data(), state.samples * sizeof(WeightedSample),
+                               cudaMemcpyDeviceToHost, m.stream));
     std::vector<TracedRay> of_rays(count);
     m.traced.download(of_rays.data(), count);
-    for (const TracedRay& ray : of_rays) {
-      for (std::uint32_t s = 0; s < ray.samples; ++s) samples.push_back(found[ray.run[s / 32] + s % 32]);
-      offsets.push_back(samples.size());
-    }
+    m.wait();
+    append_heaviest(of_rays, &(*m.found)[0], effort.shaded_share, samples, offsets);
     first += count;
   }
-  if (effort.shaded_share < 1) keep_heaviest(effort.shaded_share, samples, offsets);
 }
 
 void LuminanceEngineCuda::query_density(std::span<const Vec3f> positions, std::span<float> sigma) const {
