@@ -89,24 +89,16 @@ void ColorModel::save(const std::filesystem::path& file) {
 }
 
 std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {
-  std::vector<float> logits;
   std::vector<Ab> colors(pixels.pixels());
   if (is_photometric()) {
     chromaticity->composite(pixels, colors);
   } else {
-    logits.resize(pixels.pixels() * kAbBinCount);
-    chroma->logits(pixels, logits);
+    chroma->decode(pixels, static_cast<float>(options.decode_temperature), colors);
   }
   const std::vector<float> luminance = pixel_luminance(pixels);
   parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       const bool is_colored = pixel_opacity(pixels, p) >= kLeastColoredOpacity;
-      if (is_colored && !logits.empty()) {
-        const std::span<const float> of_pixel(logits.data() + p * kAbBinCount, kAbBinCount);
-        colors[p] = options.decode_temperature > 0
-                        ? decode_annealed_mean(of_pixel, static_cast<float>(options.decode_temperature))
-                        : decode_arg_max(of_pixel);
-      }
       colors[p] = is_colored ? in_gamut(colors[p], luminance[p]) : Ab{};
     }
   });

@@ -53,13 +53,14 @@ void time_engines(const char* device, const PixelSamples& patch, const PixelSamp
                   ChromaticityEngine& chromaticity, int repetitions) {
   const std::vector<SoftLabel> labels = labels_of(patch);
   const std::vector<Ab> targets = colors_of(distilled);
-  std::vector<float> logits(distilled.pixels() * kAbBinCount);
+  std::vector<Ab> colors(distilled.pixels());
   std::vector<Chromaticity> ratios(distilled.positions.size());
   std::printf("%s: step on %zu pixels %.3f ms", device, patch.pixels(),
               median_milliseconds(repetitions, [&] { chroma.step(patch, labels, {}, 1e-3f); }));
   std::printf("  distillation step on %zu pixels %.3f ms", distilled.pixels(),
               median_milliseconds(repetitions, [&] { chromaticity.step(distilled, targets, 1e-3f); }));
-  std::printf("  their logits %.3f ms", median_milliseconds(repetitions, [&] { chroma.logits(distilled, logits); }));
+  std::printf("  decoding them %.3f ms",
+              median_milliseconds(repetitions, [&] { chroma.decode(distilled, 0.38f, colors); }));
   std::printf("  query of %zu points %.3f ms\n", ratios.size(),
               median_milliseconds(repetitions, [&] { chromaticity.query(distilled.positions, ratios); }));
   std::fflush(stdout);
@@ -80,14 +81,8 @@ void time_stage2(const std::vector<CachedView>& views, const HashGridOptions& gr
   const double distillation = milliseconds([&] {
     for (int i = 0; i < distillation_steps; ++i) {
       const PixelSamples pixels = visible_pixels(views, 2 * rays, std::uint64_t(i) << 32);
-      std::vector<float> logits(pixels.pixels() * kAbBinCount);
-      chroma->logits(pixels, logits);
       std::vector<Ab> decoded(pixels.pixels());
-      parallel_ranges(decoded.size(), 256, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t p = begin; p < end; ++p) {
-          decoded[p] = decode_annealed_mean(std::span(logits).subspan(p * kAbBinCount, kAbBinCount), 0.38f);
-        }
-      });
+      chroma->decode(pixels, 0.38f, decoded);
       distance = chromaticity->step(pixels, decoded, 1e-2f);
     }
   });

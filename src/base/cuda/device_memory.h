@@ -64,6 +64,11 @@ class DeviceBuffer {
   void upload(const T* from, std::size_t count, cudaStream_t stream) const {
     if (count > 0) CNERF_CUDA(cudaMemcpyAsync(data_, from, count * sizeof(T), cudaMemcpyHostToDevice, stream));
   }
+  /// In the order of a stream; there when that has been waited for.
+  void download(T* to, std::size_t count, cudaStream_t stream) const {
+    if (count > 0) CNERF_CUDA(cudaMemcpyAsync(to, data_, count * sizeof(T), cudaMemcpyDeviceToHost, stream));
+  }
+
   void upload(const T* from, std::size_t count) const {
     if (count == 0) return;
     CNERF_CUDA(cudaMemcpy(data_, from, count * sizeof(T), cudaMemcpyHostToDevice));

@@ -1,5 +1,6 @@
 #include <tbb/enumerable_thread_specific.h>
 
+#include <array>
 #include <cmath>
 
 #include "src/base/check.h"
@@ -55,6 +56,19 @@ class ChromaEngineCpu final : public ChromaEngine {
       forward(pixels, begin, end, work);
       for (std::size_t p = begin; p < end; ++p) {
         for (int q = 0; q < kAbBinCount; ++q) logits[p * kAbBinCount + q] = work.logits[logit_at(p - begin, q)];
+      }
+    });
+  }
+
+  void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const override {
+    CNERF_CHECK_EQ(colors.size(), pixels.pixels());
+    parallel_ranges(pixels.pixels(), kBlockPixels, [&](std::size_t begin, std::size_t end) {
+      Work& work = works_.local();
+      forward(pixels, begin, end, work);
+      std::array<float, kAbBinCount> of_pixel;
+      for (std::size_t p = begin; p < end; ++p) {
+        for (int q = 0; q < kAbBinCount; ++q) of_pixel[std::size_t(q)] = work.logits[logit_at(p - begin, q)];
+        colors[p] = temperature > 0 ? decode_annealed_mean(of_pixel, temperature) : decode_arg_max(of_pixel);
       }
     });
   }

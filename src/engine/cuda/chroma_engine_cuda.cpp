@@ -11,7 +11,7 @@
 namespace cnerf {
 namespace {
 
-constexpr std::size_t kPixelsAtATime = 1 << 14;  // whose logits are asked for
+constexpr std::size_t kPixelsAtATime = 1 << 14;  // that are asked about
 
 class ChromaEngineCuda final : public ChromaEngine {
  public:
@@ -52,17 +52,19 @@ class ChromaEngineCuda final : public ChromaEngine {
 
   void logits(const PixelSamples& pixels, std::span<float> logits) const override {
     CNERF_CHECK_EQ(logits.size(), pixels.pixels() * kAbBinCount);
-    const std::lock_guard lock(mutex_);
-    for (std::size_t begin = 0; begin < pixels.pixels(); begin += kPixelsAtATime) {
-      const std::size_t end = std::min(begin + kPixelsAtATime, pixels.pixels()), values = (end - begin) * kAbBinCount;
-      batch_.upload(pixels, begin, end, stream_);
-      features_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/false, stream_);
-      logits_.reserve(values, "logits");
+    for_pieces(pixels, [&](std::size_t begin, std::size_t count) {
+      logits_.reserve(count * kAbBinCount, "logits");
       chroma_logits(head_job(), logits_.data(), stream_);
-      CNERF_CUDA(cudaMemcpyAsync(logits.data() + begin * kAbBinCount, logits_.data(), values * sizeof(float),
-                                 cudaMemcpyDeviceToHost, stream_));
-      stream_.wait();
-    }
+      logits_.download(logits.data() + begin * kAbBinCount, count * kAbBinCount, stream_);
+    });
+  }
+  void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const override {
+    CNERF_CHECK_EQ(colors.size(), pixels.pixels());
+    for_pieces(pixels, [&](std::size_t begin, std::size_t count) {
+      colors_.reserve(count, "pixels");
+      chroma_colors(head_job(), {temperature, centres_.data(), colors_.data()}, stream_);
+      colors_.download(colors.data() + begin, count, stream_);
+    });
   }
 
   [[nodiscard]] long step_count() const override { return steps_.front(); }
@@ -83,6 +85,18 @@ class ChromaEngineCuda final : public ChromaEngine {
   }
 
  private:
+  /// Composites features of some pixels at a time and calls `work(first pixel, count)`.
+  template <typename Work>
+  void for_pieces(const PixelSamples& pixels, Work&& work) const {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t begin = 0; begin < pixels.pixels(); begin += kPixelsAtATime) {
+      const std::size_t end = std::min(begin + kPixelsAtATime, pixels.pixels());
+      batch_.upload(pixels, begin, end, stream_);
+      features_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/false, stream_);
+      work(begin, end - begin);
+      stream_.wait();
+    }
+  }
   [[nodiscard]] ChromaHeadJob head_job() const {
     return {batch_.arrays(),
             features_.features(),
@@ -103,8 +117,10 @@ class ChromaEngineCuda final : public ChromaEngine {
   DeviceBuffer<SoftLabel> labels_;
   std::vector<std::int64_t> steps_ = {0};
   mutable PixelBatch batch_;
+  DeviceBuffer<Ab> centres_ = uploaded(std::vector<Ab>(ab_bin_centres().begin(), ab_bin_centres().end()), "bins");
   mutable DeviceBuffer<float> logits_;
-  mutable std::mutex mutex_;  // logits are asked for from many threads
+  mutable DeviceBuffer<Ab> colors_;
+  mutable std::mutex mutex_;  // pixels are decoded from many threads
 };
 
 }  // namespace

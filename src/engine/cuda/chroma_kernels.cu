@@ -1,5 +1,7 @@
 #include "src/engine/cuda/chroma_kernels.h"
 
+#include <type_traits>
+
 #include "src/base/cuda/launch.h"
 #include "src/base/cuda/warp.cuh"
 #include "src/engine/initial_state.h"
@@ -97,7 +99,9 @@ struct HeadShared {
   alignas(16) __half composited[kPixels][kInputs + 8];
   alignas(16) __nv_bfloat16 inputs[kPixels][kInputs + 8];  ///< the same
   alignas(16) __nv_bfloat16 d_logits[kPixels][kOutputs + 8];
-  float largest[kWarps][kPixels], sum[kWarps][kPixels];
+  // What each warp found for the pixels:
+  float largest[kWarps][kPixels];
+  float sum[3][kWarps][kPixels];
 };
 
 /// A lane's share of its warp's logits: of 16-column tile i, 8-column block b, rows g and g + 8, neighbours j.
@@ -155,50 +159,43 @@ __device__ void apply_head(const HeadShared& shared, Logits& logits) {
       kOutputs / 8);
 }
 
-/// What all warps found for row g + 8 half.
+/// Joins what the lanes of a row have, for all lanes of the block that share it.
 template <typename Join>
-__device__ float joined(const float (&of_warps)[kWarps][kPixels], int half, Join&& join) {
+__device__ float of_row(float value, int half, float (&of_warps)[kWarps][kPixels], Join&& join) {
   const unsigned row = threadIdx.x % 32 / 4 + 8 * half;
-  float value = of_warps[0][row];
+  value = join(value, __shfl_xor_sync(~0u, value, 1));
+  value = join(value, __shfl_xor_sync(~0u, value, 2));
+  if (threadIdx.x % 4 == 0) of_warps[threadIdx.x / 32][row] = value;
+  __syncthreads();
+  value = of_warps[0][row];
 #pragma unroll
   for (int w = 1; w < kWarps; ++w) value = join(value, of_warps[w][row]);
   return value;
+}
+__device__ float largest_of_row(Logits& logits, int half, HeadShared& shared) {
+  float largest = -INFINITY;
+  logits.for_row(half, [&](int q, float& logit) { largest = q < kAbBinCount ? fmaxf(largest, logit) : largest; });
+  return of_row(largest, half, shared.largest, [](float a, float b) { return fmaxf(a, b); });
+}
+__device__ float sum_of_row(float value, int half, float (&of_warps)[kWarps][kPixels]) {
+  return of_row(value, half, of_warps, [](float a, float b) { return a + b; });
 }
 
 /// Turns logits into the gradient of the pixels' losses by them; returns this lane's part of the losses.
 __device__ float softmax_gradient(std::uint32_t first, std::uint32_t pixels, const ChromaTargets& targets,
                                   HeadShared& shared, Logits& logits) {
-  const unsigned warp = threadIdx.x / 32, g = threadIdx.x % 32 / 4, t = threadIdx.x % 4;
-  const auto larger = [](float a, float b) { return fmaxf(a, b); };
-  const auto plus = [](float a, float b) { return a + b; };
-#pragma unroll
-  for (int half = 0; half < 2; ++half) {
-    float largest = -INFINITY;
-    logits.for_row(half, [&](int q, float& logit) { largest = q < kAbBinCount ? fmaxf(largest, logit) : largest; });
-    largest = fmaxf(largest, __shfl_xor_sync(~0u, largest, 1));
-    largest = fmaxf(largest, __shfl_xor_sync(~0u, largest, 2));
-    if (t == 0) shared.largest[warp][g + 8 * half] = largest;
-  }
-  __syncthreads();
-  float largest[2];
-#pragma unroll
-  for (int half = 0; half < 2; ++half) {
-    largest[half] = joined(shared.largest, half, larger);
-    float sum = 0;
-    logits.for_row(half, [&](int q, float& logit) { sum += q < kAbBinCount ? expf(logit - largest[half]) : 0.0f; });
-    sum += __shfl_xor_sync(~0u, sum, 1);
-    sum += __shfl_xor_sync(~0u, sum, 2);
-    if (t == 0) shared.sum[warp][g + 8 * half] = sum;
-  }
-  __syncthreads();
   float loss = 0;
 #pragma unroll
   for (int half = 0; half < 2; ++half) {
-    const std::uint32_t pixel = first + g + 8 * half;
+    const float largest = largest_of_row(logits, half, shared);
+    float sum = 0;
+    logits.for_row(half, [&](int q, float& logit) { sum += q < kAbBinCount ? expf(logit - largest) : 0.0f; });
+    const float log_sum = largest + logf(sum_of_row(sum, half, shared.sum[0]));
+
+    const std::uint32_t pixel = first + threadIdx.x % 32 / 4 + 8 * half;
     const float weight = pixel < pixels ? targets.pixel_weights[pixel] : 0.0f;
-    const SoftLabel& label = targets.labels[min(pixel, pixels - 1)];
-    const float log_sum = largest[half] + logf(joined(shared.sum, half, plus));
     const float factor = weight * targets.scale;
+    const SoftLabel& label = targets.labels[min(pixel, pixels - 1)];
     logits.for_row(half, [&](int q, float& logit) {
       const float log_probability = logit - log_sum;
       logit = q < kAbBinCount ? factor * expf(log_probability) : 0.0f;
@@ -211,6 +208,42 @@ __device__ float softmax_gradient(std::uint32_t first, std::uint32_t pixels, con
     });
   }
   return loss;
+}
+
+/// The mean of the bins' centres under softmax(logits / temperature) (Zhang et al. 2016, Eq. 5).
+__device__ void write_colors(std::uint32_t first, std::uint32_t pixels, const ChromaDecoding& decoding,
+                             HeadShared& shared, Logits& logits) {
+#pragma unroll
+  for (int half = 0; half < 2; ++half) {
+    const float largest = largest_of_row(logits, half, shared);
+    float sum = 0, a = 0, b = 0;
+    logits.for_row(half, [&](int q, float& logit) {
+      if (q >= kAbBinCount) return;
+      const float weight = decoding.temperature > 0 ? expf((logit - largest) / decoding.temperature)
+                           : logit == largest       ? 1.0f
+                                                    : 0.0f;
+      const Ab centre = decoding.centres[q];
+      sum += weight;
+      a += weight * centre.a;
+      b += weight * centre.b;
+    });
+    sum = sum_of_row(sum, half, shared.sum[0]);
+    a = sum_of_row(a, half, shared.sum[1]);
+    b = sum_of_row(b, half, shared.sum[2]);
+    const std::uint32_t pixel = first + threadIdx.x % 32 / 4 + 8 * half;
+    if (pixel < pixels && threadIdx.x < 32 && threadIdx.x % 4 == 0) decoding.colors[pixel] = {a / sum, b / sum};
+  }
+}
+
+__device__ void write_logits(std::uint32_t first, std::uint32_t pixels, float* to, Logits& logits) {
+#pragma unroll
+  for (int half = 0; half < 2; ++half) {
+    const std::uint32_t pixel = first + threadIdx.x % 32 / 4 + 8 * half;
+    if (pixel >= pixels) continue;
+    logits.for_row(half, [&](int q, float& logit) {
+      if (q < kAbBinCount) to[std::size_t(pixel) * kAbBinCount + q] = logit;
+    });
+  }
 }
 
 /// Gradient of the composited features: of four warps, each 16 of them.
@@ -237,10 +270,10 @@ __device__ void feature_gradient(const HeadShared& shared, std::uint32_t first, 
   }
 }
 
-/// @param targets  null: the logits are written
-template <bool kTrain>
-__global__ void __launch_bounds__(kThreads, 1)
-    head(const ChromaHeadJob job, const ChromaTargets targets, float* logits_out) {
+/// @tparam Use  ChromaTargets, ChromaDecoding, or where logits are written to
+template <typename Use>
+__global__ void __launch_bounds__(kThreads, 1) head(const ChromaHeadJob job, const Use use) {
+  constexpr bool kTrain = std::is_same_v<Use, ChromaTargets>;
   extern __shared__ uint4 memory[];
   auto& shared = *reinterpret_cast<HeadShared*>(memory);
   for (unsigned i = threadIdx.x; i < kHeadWeights / 4; i += kThreads) shared.forward[i] = job.weights.forward[i];
@@ -256,15 +289,18 @@ __global__ void __launch_bounds__(kThreads, 1)
   }
 
   const int own = int(threadIdx.x) / 32 * kOfWarp;
-  float d_weights[2][kInputs / 8][4] = {};
-  double loss = 0;
-  for (std::uint32_t first = blockIdx.x * kPixels; first < job.pixels.pixels; first += gridDim.x * kPixels) {
+  const std::uint32_t pixels = job.pixels.pixels;
+  [[maybe_unused]] float d_weights[2][kInputs / 8][4] = {};
+  [[maybe_unused]] double loss = 0;
+  for (std::uint32_t first = blockIdx.x * kPixels; first < pixels; first += gridDim.x * kPixels) {
     composite_features(job, first, shared);
     __syncthreads();
     Logits logits;
     apply_head(shared, logits);
+    if constexpr (std::is_same_v<Use, float*>) write_logits(first, pixels, use, logits);
+    if constexpr (std::is_same_v<Use, ChromaDecoding>) write_colors(first, pixels, use, shared, logits);
     if constexpr (kTrain) {
-      loss += softmax_gradient(first, job.pixels.pixels, targets, shared, logits);
+      loss += softmax_gradient(first, pixels, use, shared, logits);
 #pragma unroll
       for (int i = 0; i < 2; ++i) {
         std::uint32_t operand[4];
@@ -272,38 +308,28 @@ __global__ void __launch_bounds__(kThreads, 1)
         store_rows(shared.d_logits, 0, own + 16 * i, operand);
       }
       __syncthreads();
-      feature_gradient(shared, first, job.pixels.pixels, targets.d_composited);
+      feature_gradient(shared, first, pixels, use.d_composited);
 #pragma unroll
       for (int i = 0; i < 2; ++i) {
         add_weight_gradient<kPixels>(d_weights[i], shared.d_logits, own + 16 * i, shared.inputs, 0);
-      }
-    } else {
-#pragma unroll
-      for (int half = 0; half < 2; ++half) {
-        const std::uint32_t pixel = first + threadIdx.x % 32 / 4 + 8 * half;
-        if (pixel >= job.pixels.pixels) continue;
-        logits.for_row(half, [&](int q, float& logit) {
-          if (q < kAbBinCount) logits_out[std::size_t(pixel) * kAbBinCount + q] = logit;
-        });
       }
     }
     __syncthreads();
   }
   if constexpr (kTrain) {
-    float* part = targets.d_weights + std::size_t(blockIdx.x) * kHeadWeights;
+    float* part = use.d_weights + std::size_t(blockIdx.x) * kHeadWeights;
 #pragma unroll
     for (int i = 0; i < 2; ++i) write_weight_gradient(d_weights[i], part, kInputs, own + 16 * i, 0);
     const float of_warp = warp_sum(float(loss));
-    if (threadIdx.x % 32 == 0) atomicAdd(targets.loss, double(of_warp));
+    if (threadIdx.x % 32 == 0) atomicAdd(use.loss, double(of_warp));
   }
 }
 
-template <bool kTrain>
-void launch_head(const ChromaHeadJob& job, const ChromaTargets& targets, float* logits, cudaStream_t stream) {
+template <typename Use>
+void launch_head(const ChromaHeadJob& job, const Use& use, cudaStream_t stream) {
   if (job.pixels.pixels == 0) return;
-  resident_blocks<head<kTrain>>(kThreads, sizeof(HeadShared));
-  head<kTrain>
-      <<<unsigned(chroma_head_parts(job.pixels.pixels)), kThreads, sizeof(HeadShared), stream>>>(job, targets, logits);
+  resident_blocks<head<Use>>(kThreads, sizeof(HeadShared));
+  head<Use><<<unsigned(chroma_head_parts(job.pixels.pixels)), kThreads, sizeof(HeadShared), stream>>>(job, use);
   CNERF_CUDA(cudaGetLastError());
 }
 
@@ -316,10 +342,13 @@ void prepare_samples(const PixelArrays& pixels, cudaStream_t stream) {
 }
 
 void chroma_logits(const ChromaHeadJob& job, float* logits, cudaStream_t stream) {
-  launch_head<false>(job, {}, logits, stream);
+  launch_head(job, logits, stream);
+}
+void chroma_colors(const ChromaHeadJob& job, const ChromaDecoding& decoding, cudaStream_t stream) {
+  launch_head(job, decoding, stream);
 }
 void chroma_loss(const ChromaHeadJob& job, const ChromaTargets& targets, cudaStream_t stream) {
-  launch_head<true>(job, targets, nullptr, stream);
+  launch_head(job, targets, stream);
 }
 
 int chroma_head_parts(std::uint32_t pixels) {

@@ -43,6 +43,13 @@ struct ChromaHeadJob {
 /// @param logits  [pixels, 313], written
 void chroma_logits(const ChromaHeadJob& job, float* logits, cudaStream_t stream);
 
+struct ChromaDecoding {
+  float temperature;  ///< 0: the most probable bin; of equals, their mean
+  const Ab* centres;  ///< [313] of the bins
+  Ab* colors;         ///< [pixels], written
+};
+void chroma_colors(const ChromaHeadJob& job, const ChromaDecoding& decoding, cudaStream_t stream);
+
 struct ChromaTargets {
   const SoftLabel* labels;     ///< [pixels]
   const float* pixel_weights;  ///< [pixels]

@@ -54,8 +54,7 @@ class ChromaticityEngineCuda final : public ChromaticityEngine {
       field_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/false, stream_);
       colors_.reserve(end - begin, "pixels");
       composite_chromaticity(batch_.arrays(), field_.numbers(), colors_.data(), stream_);
-      CNERF_CUDA(cudaMemcpyAsync(colors.data() + begin, colors_.data(), (end - begin) * sizeof(Ab),
-                                 cudaMemcpyDeviceToHost, stream_));
+      colors_.download(colors.data() + begin, end - begin, stream_);
       stream_.wait();
     }
   }
@@ -70,8 +69,7 @@ class ChromaticityEngineCuda final : public ChromaticityEngine {
       points_.upload(positions.data() + first, count, stream_);
       field_.forward(points_.data(), std::uint32_t(count), /*for_training=*/false, stream_);
       chromaticity_of_logs(field_.numbers(), std::uint32_t(count), ratios_.data(), stream_);
-      CNERF_CUDA(cudaMemcpyAsync(chromaticity.data() + first, ratios_.data(), count * sizeof(Chromaticity),
-                                 cudaMemcpyDeviceToHost, stream_));
+      ratios_.download(chromaticity.data() + first, count, stream_);
       stream_.wait();
     }
   }

@@ -55,11 +55,15 @@ void append_heaviest(std::span<const TracedRay> rays, const WeightedSample* foun
     }
     if (share < 1) keep_heaviest(share, part.samples, part.offsets);
   });
+  std::vector<std::size_t> begins = {samples.size()};
   for (const Part& part : parts) {
-    const std::size_t before = samples.size();
-    samples.insert(samples.end(), part.samples.begin(), part.samples.end());
-    for (std::size_t r = 1; r < part.offsets.size(); ++r) offsets.push_back(before + part.offsets[r]);
+    for (std::size_t r = 1; r < part.offsets.size(); ++r) offsets.push_back(begins.back() + part.offsets[r]);
+    begins.push_back(begins.back() + part.samples.size());
   }
+  samples.resize(begins.back());
+  parallel_tasks(parts.size(), [&](std::size_t i) {
+    std::copy(parts[i].samples.begin(), parts[i].samples.end(), samples.begin() + std::ptrdiff_t(begins[i]));
+  });
 }
 
 }  // namespace
@@ -558,8 +562,7 @@ void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& 
       most = count / 2;  // too many samples: fewer rays at a time
       continue;
     }
-    CNERF_CUDA(cudaMemcpyAsync(&(*m.found)[0], m.weighted.data(), state.samples * sizeof(WeightedSample),
-                               cudaMemcpyDeviceToHost, m.stream));
+    m.weighted.download(&(*m.found)[0], state.samples, m.stream);
     std::vector<TracedRay> of_rays(count);
     m.traced.download(of_rays.data(), count);
     m.wait();
