@@ -1,8 +1,10 @@
-// Stage 2's engines against the CPU's, on random pixels.
+// Stage 2's engines against the CPU's, on random pixels. Bounds are two to ten times what was seen on an H200
+// (docs/performance.md); what is seen comes from rounding to 16 bits, as in self_test.cpp.
 
 #include "src/engine/chroma_engine.h"
 
 #include <cstring>
+#include <numeric>
 
 #include "src/base/rng.h"
 #include "src/field/adam.h"
@@ -44,12 +46,12 @@ void compare_steps(Engine& cpu, Engine& cuda, Step&& step) {
   forget_moments(cpu);
   copy_state(cpu, cuda);
   const double expected_loss = step(cpu, 1e-9f), loss = step(cuda, 1e-9f);
-  expect_below("loss", std::abs(loss - expected_loss) / expected_loss, 5e-3);
+  expect_below("loss", std::abs(loss - expected_loss) / expected_loss, 1e-3);
   const std::vector<StatePiece> expected = cpu.state(), found = cuda.state();
   for (const StatePiece& piece : expected) {
     const std::string& name = piece.name;
     if (!name.ends_with("first_moments") && !name.ends_with("grid.moments")) continue;
-    expect_gradient("gradient: " + name, gradient_in(found, name), gradient_in(expected, name), 3e-2);
+    expect_gradient("gradient: " + name, gradient_in(found, name), gradient_in(expected, name), 2e-2);
   }
 
   for (int i = 0; i < 4; ++i) step(cpu, 1e-3f), step(cuda, 1e-3f);
@@ -58,7 +60,7 @@ void compare_steps(Engine& cpu, Engine& cuda, Step&& step) {
     if (of_cpu[i].name.ends_with("steps")) continue;
     const bool is_moment = of_cpu[i].name.find("moments") != std::string::npos;
     expect_below("after steps: " + of_cpu[i].name, relative_distance(floats_of(of_cuda[i]), floats_of(of_cpu[i])),
-                 is_moment ? 3e-2 : 1e-2);
+                 is_moment ? 2e-2 : 2e-3);
   }
 }
 
@@ -101,6 +103,10 @@ void check_distribution(int levels, int count, bool quick) {
     cuda->decode(pixels, temperature, found);
     std::vector<double> distances;
     for (std::size_t p = 0; p < found.size(); ++p) {
+      const auto begin = pixels.weights.begin();
+      const float opacity = std::accumulate(begin + std::ptrdiff_t(pixels.offsets[p]),
+                                            begin + std::ptrdiff_t(pixels.offsets[p + 1]), 0.0f);
+      if (opacity < kLeastColoredOpacity) continue;  // its logits mean nothing
       distances.push_back(std::hypot(found[p].a - expected[p].a, found[p].b - expected[p].b));
     }
     // Two bins may be equally probable but for rounding: hence not the furthest, but the 99th percentile.
@@ -108,11 +114,11 @@ void check_distribution(int levels, int count, bool quick) {
     std::nth_element(distances.begin(), rank, distances.end());
     expect_below(what, *rank, bound);
   };
-  compare_logits("logits at the start", 1e-2);
+  compare_logits("logits at the start", 1e-3);
   for (int i = 0; i < 30; ++i) step(*cpu, 1e-2f);
   copy_state(*cpu, *cuda);
-  compare_logits("logits after training", 1e-2);
-  compare_colors("annealed mean, ab distance", 0.38f, 0.2);
+  compare_logits("logits after training", 1e-3);
+  compare_colors("annealed mean, ab distance", 0.38f, 0.1);
   compare_colors("most probable bin, ab distance", 0, 1e-3);
   compare_steps(*cpu, *cuda, step);
   if (quick) return;
@@ -127,7 +133,7 @@ void check_distribution(int levels, int count, bool quick) {
   expect_below("loss after 150 steps / the CPU's", last / of_cpu, 1.1);
   copy_state(*fresh, *cpu);  // and back
   copy_state(*fresh, *cuda);
-  compare_logits("logits of what the GPU trained, on the CPU", 1e-2);
+  compare_logits("logits of what the GPU trained, on the CPU", 1e-3);
 }
 
 void check_chromaticity(int levels, int count, AbLoss loss, bool quick) {
@@ -158,7 +164,7 @@ void check_chromaticity(int levels, int count, AbLoss loss, bool quick) {
   for (std::size_t p = 0; p < found.size(); ++p) {
     furthest = std::max(furthest, double(std::hypot(found[p].a - expected[p].a, found[p].b - expected[p].b)));
   }
-  expect_below("composited colours, largest ab distance", furthest, 0.5);
+  expect_below("composited colours, largest ab distance", furthest, 0.15);
   std::vector<Chromaticity> ratios(pixels.positions.size()), of_cpu(ratios.size());
   cpu->query(pixels.positions, of_cpu);
   cuda->query(pixels.positions, ratios);
@@ -167,7 +173,7 @@ void check_chromaticity(int levels, int count, AbLoss loss, bool quick) {
     furthest = std::max(
         {furthest, double(std::abs(ratios[i].x / of_cpu[i].x - 1)), double(std::abs(ratios[i].z / of_cpu[i].z - 1))});
   }
-  expect_below("chromaticity of points, largest relative distance", furthest, 1e-2);
+  expect_below("chromaticity of points, largest relative distance", furthest, 4e-3);
   compare_steps(*cpu, *cuda, step_to_moved);
   if (quick) return;
 

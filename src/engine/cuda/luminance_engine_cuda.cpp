@@ -567,6 +567,7 @@ void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& 
     m.traced.download(of_rays.data(), count);
     m.wait();
     append_heaviest(of_rays, &(*m.found)[0], effort.shaded_share, samples, offsets);
+    if (first == 0) samples.reserve(samples.size() * (rays.size() / count + 1));  // as many a ray: hardly ever moves
     first += count;
   }
 }
