@@ -9,14 +9,12 @@
 
 #include "encoding/hash_grid_levels.h"
 #include "src/color/ab_bins.h"
+#include "src/engine/chroma_math.h"
 #include "src/engine/pixel_samples.h"
 #include "src/engine/state.h"
 #include "src/field/color_field.h"
 
 namespace cnerf {
-
-/// Pixels of less opacity have no colour: a uniform softmax would decode to the first bin, a vivid green.
-inline constexpr float kLeastColoredOpacity = 0.01f;
 
 /// Classification-based injection (paper, Eq. color classification loss, read as KL(Z || Z_hat), mean over pixels).
 /// Hidden features of samples are composited once, a linear head is applied once a pixel: the same as compositing
@@ -31,15 +29,11 @@ class ChromaEngine {
                       std::span<const float> pixel_weights, float learning_rate) = 0;
   /// @param logits  [R, 313]; of pixels below kLeastColoredOpacity they mean nothing
   virtual void logits(const PixelSamples& pixels, std::span<float> logits) const = 0;
+  /// One colour a pixel, of the same pixels: see `decode_annealed_mean`; temperature 0 is `decode_arg_max`.
+  virtual void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const = 0;
   [[nodiscard]] virtual long step_count() const = 0;
   [[nodiscard]] virtual std::vector<StatePiece> state() = 0;
   virtual void state_loaded() = 0;
-};
-
-/// What an ab distance of d costs.
-enum class AbLoss {
-  kHuber,    ///< d^2 below a few units, d above: what a few wrong pixels say hardly counts
-  kSquared,  ///< d^2, the photometric loss: the mean of what is said
 };
 
 /// Per-sample chromaticity, fitted so that compositing it reproduces the pixels' decoded colours (what is baked is what
@@ -65,5 +59,9 @@ class ChromaticityEngine {
 [[nodiscard]] std::unique_ptr<ChromaEngine> make_cpu_chroma_engine(const HashGridOptions& grid, std::uint64_t seed);
 [[nodiscard]] std::unique_ptr<ChromaticityEngine> make_cpu_chromaticity_engine(const HashGridOptions& grid,
                                                                                std::uint64_t seed);
+/// @throws DeviceError  without a usable GPU, or when its memory does not suffice
+[[nodiscard]] std::unique_ptr<ChromaEngine> make_cuda_chroma_engine(const HashGridOptions& grid, std::uint64_t seed);
+[[nodiscard]] std::unique_ptr<ChromaticityEngine> make_cuda_chromaticity_engine(const HashGridOptions& grid,
+                                                                                std::uint64_t seed);
 
 }  // namespace cnerf

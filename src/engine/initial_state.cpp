@@ -19,4 +19,10 @@ std::vector<float> initial_table(const std::vector<GridLevel>& levels, std::uint
   return table;
 }
 
+std::vector<float> initial_chroma_head(std::uint64_t seed) {
+  std::vector<float> weights = initial_weights({{kChromaHeadInputs, kChromaHeadOutputs}}, seed, kChromaHeadStream);
+  for (float& weight : weights) weight *= 0.1f;
+  return weights;
+}
+
 }  // namespace cnerf

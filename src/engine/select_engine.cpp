@@ -12,7 +12,7 @@ std::atomic<EngineDevice> selected = EngineDevice::kCpu;  // NOLINT: a setting o
 }  // namespace
 
 #if !CNERF_CUDA_ENGINE
-// What luminance_engine.h declares for builds with CUDA.
+// What luminance_engine.h and chroma_engine.h declare for builds with CUDA.
 bool has_cuda_device() {
   return false;
 }
@@ -20,6 +20,12 @@ std::string cuda_device_text() {
   return "";
 }
 std::unique_ptr<LuminanceEngine> make_cuda_luminance_engine(const LuminanceEngineOptions&) {
+  throw DeviceError("this build has no CUDA engine");
+}
+std::unique_ptr<ChromaEngine> make_cuda_chroma_engine(const HashGridOptions&, std::uint64_t) {
+  throw DeviceError("this build has no CUDA engine");
+}
+std::unique_ptr<ChromaticityEngine> make_cuda_chromaticity_engine(const HashGridOptions&, std::uint64_t) {
   throw DeviceError("this build has no CUDA engine");
 }
 #endif
@@ -50,6 +56,15 @@ std::string cuda_engine_text() {
 
 std::unique_ptr<LuminanceEngine> make_luminance_engine(const LuminanceEngineOptions& options) {
   return selected == EngineDevice::kCuda ? make_cuda_luminance_engine(options) : make_cpu_luminance_engine(options);
+}
+
+std::unique_ptr<ChromaEngine> make_chroma_engine(const HashGridOptions& grid, std::uint64_t seed) {
+  return selected == EngineDevice::kCuda ? make_cuda_chroma_engine(grid, seed) : make_cpu_chroma_engine(grid, seed);
+}
+
+std::unique_ptr<ChromaticityEngine> make_chromaticity_engine(const HashGridOptions& grid, std::uint64_t seed) {
+  return selected == EngineDevice::kCuda ? make_cuda_chromaticity_engine(grid, seed)
+                                         : make_cpu_chromaticity_engine(grid, seed);
 }
 
 }  // namespace cnerf

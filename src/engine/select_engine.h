@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "src/engine/chroma_engine.h"
 #include "src/engine/luminance_engine.h"
 
 namespace cnerf {
@@ -20,7 +21,10 @@ void select_engine_device(const std::string& device);
 /// What `doctor` says about it: "not built in", "no usable GPU", or the GPU's name and memory.
 [[nodiscard]] std::string cuda_engine_text();
 
-/// The engine of the selected device.
+/// The engines of the selected device.
 [[nodiscard]] std::unique_ptr<LuminanceEngine> make_luminance_engine(const LuminanceEngineOptions& options);
+[[nodiscard]] std::unique_ptr<ChromaEngine> make_chroma_engine(const HashGridOptions& grid, std::uint64_t seed);
+[[nodiscard]] std::unique_ptr<ChromaticityEngine> make_chromaticity_engine(const HashGridOptions& grid,
+                                                                           std::uint64_t seed);
 
 }  // namespace cnerf

@@ -4,6 +4,7 @@
 
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
+#include "src/engine/select_engine.h"
 #include "src/train/options_json.h"
 
 namespace cnerf {
@@ -27,11 +28,13 @@ Ab in_gamut(Ab color, float luminance) {
 
 std::vector<float> pixel_luminance(const PixelSamples& pixels) {
   std::vector<float> luminance(pixels.pixels(), 0.0f);
-  for (std::size_t p = 0; p < pixels.pixels(); ++p) {
-    for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
-      luminance[p] += pixels.weights[s] * pixels.luminance[s];
+  parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
+        luminance[p] += pixels.weights[s] * pixels.luminance[s];
+      }
     }
-  }
+  });
   return luminance;
 }
 
@@ -39,8 +42,8 @@ ColorModel ColorModel::create(const Stage2Options& options) {
   ColorModel model;
   model.options = options;
   const auto seed = static_cast<std::uint64_t>(options.seed);
-  model.chroma = make_cpu_chroma_engine(options.grid, seed ^ 0x636872ull);
-  model.chromaticity = make_cpu_chromaticity_engine(options.grid, seed ^ 0x78797aull);
+  model.chroma = make_chroma_engine(options.grid, seed ^ 0x636872ull);
+  model.chromaticity = make_chromaticity_engine(options.grid, seed ^ 0x78797aull);
   return model;
 }
 
@@ -86,24 +89,16 @@ void ColorModel::save(const std::filesystem::path& file) {
 }
 
 std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {
-  std::vector<float> logits;
   std::vector<Ab> colors(pixels.pixels());
   if (is_photometric()) {
     chromaticity->composite(pixels, colors);
   } else {
-    logits.resize(pixels.pixels() * kAbBinCount);
-    chroma->logits(pixels, logits);
+    chroma->decode(pixels, static_cast<float>(options.decode_temperature), colors);
   }
   const std::vector<float> luminance = pixel_luminance(pixels);
   parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       const bool is_colored = pixel_opacity(pixels, p) >= kLeastColoredOpacity;
-      if (is_colored && !logits.empty()) {
-        const std::span<const float> of_pixel(logits.data() + p * kAbBinCount, kAbBinCount);
-        colors[p] = options.decode_temperature > 0
-                        ? decode_annealed_mean(of_pixel, static_cast<float>(options.decode_temperature))
-                        : decode_arg_max(of_pixel);
-      }
       colors[p] = is_colored ? in_gamut(colors[p], luminance[p]) : Ab{};
     }
   });

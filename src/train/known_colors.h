@@ -49,10 +49,6 @@ struct StrokeReach {
 /// What is known of the pixels of all cached views.
 class KnownColorMap {
  public:
-  struct Place {
-    std::uint32_t view = 0, pixel = 0;
-  };
-
   KnownColorMap() = default;
   /// @param names  [views] of the cached views
   /// @throws UsageError  when a name is none of them.
@@ -62,7 +58,7 @@ class KnownColorMap {
   /// Null where nothing is known.
   [[nodiscard]] const Ab* find(std::size_t view, std::uint32_t pixel) const;
   /// All known pixels, view by view.
-  [[nodiscard]] std::span<const Place> places() const { return places_; }
+  [[nodiscard]] std::span<const ViewPixel> places() const { return places_; }
 
   /// A view that was given as a key frame, with its colours at the cached view's size, [2, H, W].
   struct KeyFrame {
@@ -74,7 +70,7 @@ class KnownColorMap {
  private:
   std::vector<std::vector<Ab>> ab_;  // [views][H, W]; empty where a view has none
   std::vector<std::vector<std::uint8_t>> is_known_;
-  std::vector<Place> places_;
+  std::vector<ViewPixel> places_;
   std::vector<KeyFrame> key_frames_;
 };
 

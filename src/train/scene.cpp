@@ -5,6 +5,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
 #include "src/train/color_model.h"
 #include "src/train/luminance_model.h"
@@ -63,13 +64,20 @@ std::string trace_key(const UnitCamera& camera, const RenderOptions& options, st
   return key;
 }
 
+constexpr std::size_t kGrain = 256;          // rays of a parallel piece of work
 constexpr std::size_t kRaysAtATime = 16384;  // bounds the memory of traced samples
 constexpr float kShadedShare = 0.995f;       // what the rest could change is below a grey level of an 8-bit picture
 
-/// One result a pixel of an image, three channels interleaved.
-void put_color(std::vector<float>& image, std::size_t pixel, Ab color, float luminance) {
-  const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness_from_luminance(luminance), color.a, color.b});
-  for (int c = 0; c < 3; ++c) image[3 * pixel + std::size_t(c)] = rgb[c];
+/// Colours of the pixels from `first` on, at their luminance, to an image of three interleaved channels.
+void put_colors(const std::vector<Ab>& colors, const std::vector<float>& luminance, std::size_t first,
+                std::vector<float>& image) {
+  parallel_ranges(colors.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const float lightness = lightness_from_luminance(luminance[first + i]);
+      const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness, colors[i].a, colors[i].b});
+      for (int c = 0; c < 3; ++c) image[3 * (first + i) + std::size_t(c)] = rgb[c];
+    }
+  });
 }
 
 class TrainedScene final : public Scene {
@@ -136,39 +144,39 @@ class TrainedScene final : public Scene {
 
   void render_part(const UnitCamera& camera, const RenderOptions& options, std::size_t first, std::size_t last,
                    RenderedImage& image) const {
-    std::vector<Ray> rays;
-    for (std::size_t p = first; p < last; ++p) {
-      rays.push_back(
-          camera.ray({double(p % std::size_t(image.width)) + 0.5, double(p / std::size_t(image.width)) + 0.5}));
-    }
-    const auto [samples, offsets] = trace(camera, rays, options, first);
+    std::vector<Ray> rays(last - first);
+    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) {
+        const std::size_t p = first + r, width = std::size_t(image.width);
+        rays[r] = camera.ray({double(p % width) + 0.5, double(p / width) + 0.5});
+      }
+    });
+    const TraceMemory::Trace traced = trace(camera, rays, options, first);
+    const std::vector<WeightedSample>& samples = traced.samples;
+    const std::vector<std::size_t>& offsets = traced.offsets;
     const Vec3f axis = camera.unit_from_camera.column(2).cast<float>();
-    for (std::size_t r = 0; r < rays.size(); ++r) {
-      float weighted_t = 0;
-      for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
-        image.luminance[first + r] += samples[s].weight * samples[s].luminance;
-        image.opacity[first + r] += samples[s].weight;
-        weighted_t += samples[s].weight * samples[s].t;
+    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) {
+        float weighted_t = 0;
+        for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
+          image.luminance[first + r] += samples[s].weight * samples[s].luminance;
+          image.opacity[first + r] += samples[s].weight;
+          weighted_t += samples[s].weight * samples[s].t;
+        }
+        if (image.opacity[first + r] >= 0.5f) {
+          const float t = weighted_t / image.opacity[first + r];
+          image.depth[first + r] = t * dot(rays[r].direction, axis) / static_cast<float>(frame().unit_per_world);
+        }
       }
-      if (image.opacity[first + r] >= 0.5f) {
-        const float t = weighted_t / image.opacity[first + r];
-        image.depth[first + r] = t * dot(rays[r].direction, axis) / static_cast<float>(frame().unit_per_world);
-      }
-    }
+    });
     if (image.rgb.empty() && image.baked_rgb.empty()) return;
 
     const PixelSamples pixels = pixel_samples(rays, samples, offsets);
-    if (!image.rgb.empty()) {
-      const std::vector<Ab> colors = color_->decode(pixels);
-      for (std::size_t r = 0; r < rays.size(); ++r)
-        put_color(image.rgb, first + r, colors[r], image.luminance[first + r]);
-    }
+    if (!image.rgb.empty()) put_colors(color_->decode(pixels), image.luminance, first, image.rgb);
     if (!image.baked_rgb.empty()) {
       std::vector<Ab> colors(rays.size());
       color_->chromaticity->composite(pixels, colors);
-      for (std::size_t r = 0; r < rays.size(); ++r) {
-        put_color(image.baked_rgb, first + r, colors[r], image.luminance[first + r]);
-      }
+      put_colors(colors, image.luminance, first, image.baked_rgb);
     }
   }
 

@@ -138,9 +138,9 @@ class Colorization {
   [[nodiscard]] PreviewPicture preview(std::size_t index) const {
     const auto& [name, view] = previews_[index % previews_.size()];
     PreviewPicture picture{name, view.width, view.height, {}, view.luminance};
-    std::vector<std::uint32_t> all(view.luminance.size());
-    std::iota(all.begin(), all.end(), 0u);
-    const std::vector<Ab> colors = model_.decode(pixel_samples(view, all));
+    std::vector<ViewPixel> all(view.luminance.size());
+    for (std::size_t p = 0; p < all.size(); ++p) all[p].pixel = std::uint32_t(p);
+    const std::vector<Ab> colors = model_.decode(pixel_samples(std::span(&view, 1), all));
     for (std::size_t p = 0; p < all.size(); ++p) {
       const Ab ab = view.opacity[p] < kLeastColoredOpacity ? Ab{} : colors[p];
       const float lightness = lightness_from_luminance(view.luminance[p]);
@@ -339,30 +339,29 @@ class Colorization {
     const auto step = static_cast<std::uint64_t>(steps());
     const PatchPixels picked = pick_pixels(view, patch.place, options_.patch_size, patch.ab, options_.rays_per_patch,
                                            std::uint64_t(options_.seed), step);
-    std::vector<std::uint32_t> wanted;
+    std::vector<ViewPixel> wanted;
     std::vector<Ab> colors;
     std::vector<float> weights;
-    const auto want = [&](const CachedView& of, std::uint32_t pixel, Ab color) {
+    const auto want = [&](ViewPixel place, Ab color) {
+      wanted.push_back(place);
       colors.push_back(color);
       const float of_class = class_weights_.empty() ? 1.0f : class_weights_[std::size_t(nearest_bin(color))];
-      weights.push_back(of_class * of.opacity[pixel]);
+      weights.push_back(of_class * views_[place.view].opacity[place.pixel]);
     };
     for (std::size_t i = 0; i < picked.pixels.size(); ++i) {
       const Ab* known = known_.find(patch.place.view, picked.pixels[i]);
       if (known == nullptr && !is_accepted) continue;
-      wanted.push_back(picked.pixels[i]);
-      want(view, picked.pixels[i], known != nullptr ? *known : picked.colors[i]);
+      want({std::uint32_t(patch.place.view), picked.pixels[i]}, known != nullptr ? *known : picked.colors[i]);
     }
-    PixelSamples pixels = pixel_samples(view, wanted);
     if (const auto places = known_.places(); !places.empty()) {
       const CounterRng rng(std::uint64_t(options_.seed) ^ 0x6b6e6f776eull, step);
       const auto count = std::uint64_t(options_.known_share * options_.rays_per_patch);
       for (std::uint64_t i = 0; i < count; ++i) {
-        const KnownColorMap::Place place = places[rng.below(i, std::uint32_t(places.size()))];
-        append(pixels, pixel_samples(views_[place.view], std::span(&place.pixel, 1)));
-        want(views_[place.view], place.pixel, *known_.find(place.view, place.pixel));
+        const ViewPixel place = places[rng.below(i, std::uint32_t(places.size()))];
+        want(place, *known_.find(place.view, place.pixel));
       }
     }
+    const PixelSamples pixels = pixel_samples(views_, wanted);
     const float rate = decayed(options_.learning_rate, options_.final_learning_rate, double(step) / options_.patches);
     if (model_.is_photometric()) {
       loss_ = model_.chromaticity->step(pixels, colors, weights, AbLoss::kSquared, rate);
@@ -376,13 +375,14 @@ class Colorization {
   /// Random visible pixels of all views.
   [[nodiscard]] PixelSamples random_pixels(int count, std::uint64_t stream) const {
     const CounterRng rng(std::uint64_t(options_.seed) ^ 0x64697374ull, stream);
-    PixelSamples pixels;
+    std::vector<ViewPixel> wanted;
     for (int i = 0; i < count; ++i) {
-      const CachedView& view = views_[rng.below(2 * std::uint64_t(i), std::uint32_t(views_.size()))];
+      const std::uint32_t v = rng.below(2 * std::uint64_t(i), std::uint32_t(views_.size()));
+      const CachedView& view = views_[v];
       const std::uint32_t pixel = rng.below(2 * std::uint64_t(i) + 1, std::uint32_t(view.width * view.height));
-      if (view.opacity[pixel] >= kLeastColoredOpacity) append(pixels, pixel_samples(view, std::span(&pixel, 1)));
+      if (view.opacity[pixel] >= kLeastColoredOpacity) wanted.push_back({v, pixel});
     }
-    return pixels;
+    return pixel_samples(views_, wanted);
   }
 
   /// Fits the per-sample colour to the pixels' decoded colours (what is baked is what is seen).

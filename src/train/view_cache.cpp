@@ -3,20 +3,40 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/base/parallel.h"
+
 namespace cnerf {
 namespace {
 
 constexpr float kFullScale = 65535.0f;
 constexpr float kCacheTransmittance = 2e-3f;  // what lies behind is not worth a sample
+constexpr std::size_t kGrain = 512;           // pixels of a parallel piece of work
 
 void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
   view.brightest = 1e-6f;
   for (const WeightedSample& sample : samples) view.brightest = std::max(view.brightest, sample.luminance);
-  view.samples.reserve(samples.size());
-  for (const WeightedSample& sample : samples) {
-    view.samples.push_back({sample.t, std::uint16_t(std::lround(std::min(sample.weight, 1.0f) * kFullScale)),
-                            std::uint16_t(std::lround(sample.luminance / view.brightest * kFullScale))});
-  }
+  view.samples.resize(samples.size());
+  parallel_ranges(samples.size(), 16 * kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      view.samples[s] = {samples[s].t, std::uint16_t(std::lround(std::min(samples[s].weight, 1.0f) * kFullScale)),
+                         std::uint16_t(std::lround(samples[s].luminance / view.brightest * kFullScale))};
+    }
+  });
+}
+
+/// @param pixel  y * width + x
+Ray ray_of(const CachedView& view, std::size_t pixel) {
+  const auto width = std::size_t(view.width);
+  return view.camera.ray({double(pixel % width) + 0.5, double(pixel / width) + 0.5});
+}
+
+PixelSamples with_room_for(std::vector<std::size_t> offsets) {
+  PixelSamples pixels;
+  pixels.positions.resize(offsets.back());
+  pixels.weights.resize(offsets.back());
+  pixels.luminance.resize(offsets.back());
+  pixels.offsets = std::move(offsets);
+  return pixels;
 }
 
 }  // namespace
@@ -31,21 +51,22 @@ CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
   view.height = std::max(1, int(std::lround(lens.height * factor)));
   view.camera.intrinsics = resized(lens, view.width, view.height);
 
-  std::vector<Ray> rays;
-  rays.reserve(std::size_t(view.width) * view.height);
-  for (int y = 0; y < view.height; ++y) {
-    for (int x = 0; x < view.width; ++x) rays.push_back(view.camera.ray({x + 0.5, y + 0.5}));
-  }
+  std::vector<Ray> rays(std::size_t(view.width) * std::size_t(view.height));
+  parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) rays[p] = ray_of(view, p);
+  });
   std::vector<WeightedSample> samples;
   engine.trace(rays, march, {kCacheTransmittance, static_cast<float>(share)}, samples, view.offsets);
   view.luminance.resize(rays.size());
   view.opacity.resize(rays.size());
-  for (std::size_t p = 0; p < rays.size(); ++p) {
-    for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s) {
-      view.luminance[p] += samples[s].weight * samples[s].luminance;
-      view.opacity[p] += samples[s].weight;
+  parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s) {
+        view.luminance[p] += samples[s].weight * samples[s].luminance;
+        view.opacity[p] += samples[s].weight;
+      }
     }
-  }
+  });
   pack(samples, view);
   return view;
 }
@@ -62,39 +83,40 @@ void ignore_masked(CachedView& view, const MonoImage& image) {
 
 PixelSamples pixel_samples(std::span<const Ray> rays, std::span<const WeightedSample> samples,
                            std::span<const std::size_t> offsets) {
-  PixelSamples pixels;
-  for (std::size_t r = 0; r < rays.size(); ++r) {
-    for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
-      pixels.positions.push_back(rays[r].at(samples[s].t));
-      pixels.weights.push_back(samples[s].weight);
-      pixels.luminance.push_back(samples[s].luminance);
+  PixelSamples pixels = with_room_for({offsets.begin(), offsets.end()});
+  parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t r = begin; r < end; ++r) {
+      for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
+        pixels.positions[s] = rays[r].at(samples[s].t);
+        pixels.weights[s] = samples[s].weight;
+        pixels.luminance[s] = samples[s].luminance;
+      }
     }
-    pixels.offsets.push_back(pixels.positions.size());
-  }
+  });
   return pixels;
 }
 
-PixelSamples pixel_samples(const CachedView& view, std::span<const std::uint32_t> wanted) {
-  PixelSamples pixels;
-  for (const std::uint32_t p : wanted) {
-    const Ray ray = view.camera.ray({p % std::uint32_t(view.width) + 0.5, p / std::uint32_t(view.width) + 0.5});
-    for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s) {
-      const CachedSample& sample = view.samples[s];
-      pixels.positions.push_back(ray.at(sample.t));
-      pixels.weights.push_back(float(sample.weight) / kFullScale);
-      pixels.luminance.push_back(float(sample.luminance) / kFullScale * view.brightest);
-    }
-    pixels.offsets.push_back(pixels.positions.size());
+PixelSamples pixel_samples(std::span<const CachedView> views, std::span<const ViewPixel> wanted) {
+  std::vector<std::size_t> offsets = {0};
+  for (const auto& [v, p] : wanted) {
+    offsets.push_back(offsets.back() + views[v].offsets[p + 1] - views[v].offsets[p]);
   }
+  PixelSamples pixels = with_room_for(std::move(offsets));
+  parallel_ranges(wanted.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const CachedView& view = views[wanted[i].view];
+      const std::uint32_t p = wanted[i].pixel;
+      const Ray ray = ray_of(view, p);
+      std::size_t at = pixels.offsets[i];
+      for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s, ++at) {
+        const CachedSample& sample = view.samples[s];
+        pixels.positions[at] = ray.at(sample.t);
+        pixels.weights[at] = float(sample.weight) / kFullScale;
+        pixels.luminance[at] = float(sample.luminance) / kFullScale * view.brightest;
+      }
+    }
+  });
   return pixels;
-}
-
-void append(PixelSamples& to, const PixelSamples& more) {
-  const std::size_t before = to.positions.size();
-  to.positions.insert(to.positions.end(), more.positions.begin(), more.positions.end());
-  to.weights.insert(to.weights.end(), more.weights.begin(), more.weights.end());
-  to.luminance.insert(to.luminance.end(), more.luminance.begin(), more.luminance.end());
-  for (std::size_t i = 1; i < more.offsets.size(); ++i) to.offsets.push_back(before + more.offsets[i]);
 }
 
 }  // namespace cnerf

@@ -37,18 +37,20 @@ struct CachedView {
 [[nodiscard]] CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
                                     const UnitCamera& full_size_camera, int short_side, double share);
 
-/// Makes pixels transparent that the view's mask says to ignore, wholly or in part: nothing there is learnt from, and no
-/// histogram counts it. What a colorizer is shown stays.
+/// Makes pixels transparent that the view's mask says to ignore, wholly or in part: nothing there is learnt from, and
+/// no histogram counts it. What a colorizer is shown stays.
 void ignore_masked(CachedView& view, const MonoImage& image);
 
 /// Traced samples as the chroma engines want them.
 [[nodiscard]] PixelSamples pixel_samples(std::span<const Ray> rays, std::span<const WeightedSample> samples,
                                          std::span<const std::size_t> offsets);
 
-/// Samples of some pixels, given as y * width + x, of a cached view.
-[[nodiscard]] PixelSamples pixel_samples(const CachedView& view, std::span<const std::uint32_t> pixels);
-
-/// Appends the pixels of `more`.
-void append(PixelSamples& to, const PixelSamples& more);
+/// A pixel of one of several views.
+struct ViewPixel {
+  std::uint32_t view = 0;
+  std::uint32_t pixel = 0;  ///< y * width + x
+};
+/// Samples of some pixels of cached views.
+[[nodiscard]] PixelSamples pixel_samples(std::span<const CachedView> views, std::span<const ViewPixel> pixels);
 
 }  // namespace cnerf

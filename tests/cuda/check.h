@@ -37,8 +37,12 @@ class Arguments {
 
 /// Compares every kernel with the CPU; returns the number of failures.
 int self_test(const Arguments& arguments);
+/// Its part about stage 2.
+void check_chroma(bool quick);
 /// Times the kernels on a packed capture after some training.
 int bench(const Arguments& arguments);
+/// Times stage 2 on a packed capture: caching its views, steps of both engines on either device, colours of pixels.
+int bench_stage2(const Arguments& arguments);
 /// Trains on a packed capture; prints the held-out PSNR at growing training times.
 int train(const Arguments& arguments);
 

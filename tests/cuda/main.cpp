@@ -2,6 +2,7 @@
 //
 //   cnerf-cuda-check self-test
 //   cnerf-cuda-check bench  capture=FOLDER [steps=1000] [option=value ...]
+//   cnerf-cuda-check bench-stage2 capture=FOLDER [steps=3000] [rays=4096] [option=value ...]
 //   cnerf-cuda-check train  capture=FOLDER [seconds=10] [seeds=1] [option=value ...]
 //
 // FOLDER is what pack_capture made. Options: levels, log2_rows, coarsest, finest, samples, steps_per_box, cone_angle,
@@ -38,11 +39,12 @@ int main(int argc, char** argv) {
   try {
     if (command == "self-test") return cnerf::test::self_test(arguments) == 0 ? 0 : 1;
     if (command == "bench") return cnerf::test::bench(arguments);
+    if (command == "bench-stage2") return cnerf::test::bench_stage2(arguments);
     if (command == "train") return cnerf::test::train(arguments);
   } catch (const std::exception& failure) {
     std::fprintf(stderr, "%s\n", failure.what());
     return 1;
   }
-  std::puts("cnerf-cuda-check self-test | bench capture=FOLDER | train capture=FOLDER");
+  std::puts("cnerf-cuda-check self-test | bench capture=FOLDER | bench-stage2 capture=FOLDER | train capture=FOLDER");
   return 64;
 }

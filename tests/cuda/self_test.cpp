@@ -15,32 +15,13 @@
 #include "src/engine/cpu/luminance_engine_cpu.h"
 #include "src/engine/cuda/luminance_engine_cuda.h"
 #include "tests/cuda/check.h"
+#include "tests/cuda/expect.h"
 #include "tests/support/toy_capture.h"
 
 namespace cnerf::test {
 namespace {
 
-int failures = 0;
-
-void expect(bool holds, const char* what, double value, double bound) {
-  std::printf("%s  %-58s %10.3e  (bound %.1e)\n", holds ? "ok  " : "FAIL", what, value, bound);
-  std::fflush(stdout);
-  if (!holds) ++failures;
-}
-void expect_below(const char* what, double value, double bound) {
-  expect(value < bound, what, value, bound);  // false for NaN
-}
-
-/// |a - b| / |b|
-template <typename A, typename B>
-double relative_distance(const A& a, const B& b) {
-  double difference = 0, size = 0;
-  for (std::size_t i = 0; i < b.size(); ++i) {
-    difference += (double(a[i]) - double(b[i])) * (double(a[i]) - double(b[i]));
-    size += double(b[i]) * double(b[i]);
-  }
-  return std::sqrt(difference / std::max(size, 1e-300));
-}
+int failure_count = 0;
 
 std::uint16_t half_of(float value) {
   // Round to nearest even by way of the exponent's unit in the last place; the values here are normal or tiny.
@@ -132,30 +113,13 @@ void check_hash_grid(int levels, int log2_rows) {
   std::vector<double> exact_positions(positions.begin(), positions.end());
   const std::vector<float> d_float(d_encoded.begin(), d_encoded.end());
   const std::vector<float> expected = encode_backward_reference(layout, positions, d_float);
-  std::vector<float> found = gradient.downloaded();
-  expect_below("hash grid backward", relative_distance(found, expected), 1e-5);
-  for (float& value : found) value = -value;
-  expect(relative_distance(found, expected) > 1.0, "  (a flipped gradient is noticed)",
-         relative_distance(found, expected), 1.0);
-}
-
-/// Copies the state of one engine into another.
-void copy_state(LuminanceEngine& from, LuminanceEngine& to) {
-  const std::vector<StatePiece> source = from.state(), target = to.state();
-  for (std::size_t i = 0; i < source.size(); ++i) {
-    if (source[i].name != target[i].name || source[i].bytes.size() != target[i].bytes.size()) {
-      expect(false, ("state piece " + source[i].name).c_str(), 0, 0);
-      continue;
-    }
-    std::copy(source[i].bytes.begin(), source[i].bytes.end(), target[i].bytes.begin());
-  }
-  to.state_loaded();
+  expect_gradient("hash grid backward", gradient.downloaded(), expected, 1e-5);
 }
 
 struct Problem {
   const char* name;
   int levels, log2_rows, finest, cascades, patch;
-  bool with_alpha, with_lens;
+  bool with_alpha, with_lens, with_exposures = false;
 };
 
 void check_engine(const Problem& problem) {
@@ -169,6 +133,10 @@ void check_engine(const Problem& problem) {
       view.image.mask.assign(view.image.pixel_count(), 255);
       for (std::size_t i = 0; i < view.image.mask.size(); i += 3) view.image.mask[i] = 0;
     }
+  }
+  if (problem.with_exposures) {
+    for (std::size_t v = 0; v < capture.views.size(); ++v)
+      capture.views[v].image.exposure = 0.7f + 0.15f * float(v % 5);
   }
   SceneFrame frame;
   frame.unit_per_world = problem.cascades > 1 ? 0.12 : 0.4;
@@ -187,7 +155,7 @@ void check_engine(const Problem& problem) {
   LuminanceEngineCpu cpu(options);
   LuminanceEngineCuda cuda(options);
   for (int i = 0; i < 40; ++i) cpu.step(views, 1e-2f);
-  copy_state(cpu, cuda);
+  copy_state<LuminanceEngine>(cpu, cuda);
 
   const LuminanceEngineCpu::Gradients expected = cpu.gradients(views);
   const CudaGradients found = cuda.gradients(views);
@@ -200,11 +168,7 @@ void check_engine(const Problem& problem) {
                std::abs(found.report.squared_error - expected.report.squared_error) / expected.report.squared_error,
                5e-3);
   expect_below("gradient of the table", relative_distance(found.table, expected.table), 3e-2);
-  expect_below("gradient of the nets", relative_distance(found.weights, expected.weights), 3e-2);
-  std::vector<float> flipped = found.weights;
-  for (float& value : flipped) value = -value;
-  expect(relative_distance(flipped, expected.weights) > 1.0, "  (a flipped gradient is noticed)",
-         relative_distance(flipped, expected.weights), 1.0);
+  expect_gradient("gradient of the nets", found.weights, expected.weights, 3e-2);
 
   SequentialRng rng(11, 3);
   std::vector<Vec3f> points, directions;
@@ -255,20 +219,17 @@ void check_engine(const Problem& problem) {
   expect_below("traced luminance", relative_distance(traced, luminance[0]), 1e-4);
 
   // A step: the occupancy's look, then Adam. Where gradients are mostly noise, Adam's step has either sign.
-  copy_state(cpu, cuda);
+  copy_state<LuminanceEngine>(cpu, cuda);
   while (cpu.step_count() % 16 != 0) cpu.step(views, 1e-3f);
-  copy_state(cpu, cuda);
+  copy_state<LuminanceEngine>(cpu, cuda);
   cpu.step(views, 1e-3f);
   cuda.step(views, 1e-3f);
   cuda.finish();
   const std::vector<StatePiece> of_cpu = cpu.state(), of_cuda = cuda.state();
   for (std::size_t i = 0; i < of_cpu.size(); ++i) {
-    const auto floats = [](const StatePiece& piece) {
-      return std::span(reinterpret_cast<const float*>(piece.bytes.data()), piece.bytes.size() / sizeof(float));
-    };
     if (of_cpu[i].name == "counters") continue;
     const bool is_second = of_cpu[i].name.find("moments") != std::string::npos;
-    expect_below(("after a step: " + of_cpu[i].name).c_str(), relative_distance(floats(of_cuda[i]), floats(of_cpu[i])),
+    expect_below("after a step: " + of_cpu[i].name, relative_distance(floats_of(of_cuda[i]), floats_of(of_cpu[i])),
                  is_second ? 3e-2 : 1e-2);
   }
 
@@ -296,18 +257,38 @@ void check_errors() {
 
 }  // namespace
 
+void expect(bool holds, const std::string& what, double value, double bound) {
+  std::printf("%s  %-58s %10.3e  (bound %.1e)\n", holds ? "ok  " : "FAIL", what.c_str(), value, bound);
+  std::fflush(stdout);
+  if (!holds) ++failure_count;
+}
+int failures() {
+  return failure_count;
+}
+void expect_gradient(const std::string& what, const std::vector<float>& found, const std::vector<float>& expected,
+                     double bound) {
+  expect_below(what, relative_distance(found, expected), bound);
+  std::vector<float> flipped = found;
+  for (float& value : flipped) value = -value;
+  const double distance = relative_distance(flipped, expected);
+  expect(distance > 1.0, "  (a flipped one is noticed)", distance, 1.0);
+}
+
 int self_test(const Arguments& arguments) {
+  const bool quick = arguments.number("quick", 0) != 0;
+  check_chroma(quick);
+  if (arguments.number("stage", 0) == 2) return failures();
   check_hash_grid(8, 15);
   check_hash_grid(3, 19);
-  check_engine({"opaque", 8, 14, 64, 1, 0, false, false});
-  if (arguments.number("quick", 0) == 0) {
+  check_engine({"opaque, exposures", 8, 14, 64, 1, 0, false, false, true});
+  if (!quick) {
     check_engine({"alpha", 3, 12, 20, 1, 0, true, false});
     check_engine({"cascades, lens, mask", 12, 14, 128, 3, 0, false, true});
     check_engine({"patches", 16, 13, 128, 2, 8, false, false});
   }
   check_errors();
-  std::printf("%d failures\n", failures);
-  return failures;
+  std::printf("%d failures\n", failures());
+  return failures();
 }
 
 }  // namespace cnerf::test

@@ -14,7 +14,7 @@ struct ProgramResult {
   std::string err;  ///< standard error
 };
 
-/// Runs cnerf with these arguments and waits for it.
+/// Runs cnerf with these arguments and waits for it. It sees no GPU, whatever the machine has.
 [[nodiscard]] ProgramResult cnerf(const std::vector<std::string>& arguments);
 
 /// As `cnerf`, and sends SIGINT once standard output holds `text`.

@@ -55,6 +55,20 @@ class DeviceBuffer {
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::size_t bytes() const { return size_ * sizeof(T); }
 
+  /// Makes room for `size` elements; what was there is lost when it has to grow.
+  void reserve(std::size_t size, const std::string& use) {
+    if (size_ < size) *this = DeviceBuffer(size + size / 4, use);
+  }
+
+  /// In the order of a stream; `from` may be changed at once.
+  void upload(const T* from, std::size_t count, cudaStream_t stream) const {
+    if (count > 0) CNERF_CUDA(cudaMemcpyAsync(data_, from, count * sizeof(T), cudaMemcpyHostToDevice, stream));
+  }
+  /// In the order of a stream; there when that has been waited for.
+  void download(T* to, std::size_t count, cudaStream_t stream) const {
+    if (count > 0) CNERF_CUDA(cudaMemcpyAsync(to, data_, count * sizeof(T), cudaMemcpyDeviceToHost, stream));
+  }
+
   void upload(const T* from, std::size_t count) const {
     if (count == 0) return;
     CNERF_CUDA(cudaMemcpy(data_, from, count * sizeof(T), cudaMemcpyHostToDevice));

@@ -1,28 +1,28 @@
 #include <tbb/enumerable_thread_specific.h>
 
+#include <array>
 #include <cmath>
 
 #include "src/base/check.h"
 #include "src/engine/chroma_engine.h"
 #include "src/engine/cpu/point_net.h"
 #include "src/engine/cpu/step_chunks.h"
+#include "src/engine/initial_state.h"
 
 namespace cnerf {
 namespace {
 
-constexpr int kFeatures = 64;                  // hidden features a sample
-constexpr int kHeadInputs = kFeatures + 4;     // features, the bias's constant 1, padding
-constexpr int kHeadOutputs = kAbBinCount + 3;  // padded to a multiple of 4
-constexpr std::size_t kBlockPixels = 64;       // four groups: their logits stay in L2
+constexpr int kFeatures = kChromaFeatures;
+constexpr int kHeadInputs = kChromaHeadInputs;
+constexpr int kHeadOutputs = kChromaHeadOutputs;
+constexpr std::size_t kBlockPixels = 64;  // four groups: their logits stay in L2
 
 class ChromaEngineCpu final : public ChromaEngine {
  public:
   ChromaEngineCpu(const HashGridOptions& grid, std::uint64_t seed)
-      : features_(grid, kFeatures, /*relu_output=*/true, seed), head_({{kHeadInputs, kHeadOutputs}}, seed, 4) {
-    // The head starts small, so that the first distribution is nearly uniform.
-    std::vector<float> weights(head_.weights().begin(), head_.weights().end());
-    for (float& w : weights) w *= 0.1f;
-    head_.set_weights(weights);
+      : features_(grid, kFeatures, /*relu_output=*/true, seed),
+        head_({{kHeadInputs, kHeadOutputs}}, seed, kChromaHeadStream) {
+    head_.set_weights(initial_chroma_head(seed));
   }
 
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
@@ -60,6 +60,19 @@ class ChromaEngineCpu final : public ChromaEngine {
     });
   }
 
+  void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const override {
+    CNERF_CHECK_EQ(colors.size(), pixels.pixels());
+    parallel_ranges(pixels.pixels(), kBlockPixels, [&](std::size_t begin, std::size_t end) {
+      Work& work = works_.local();
+      forward(pixels, begin, end, work);
+      std::array<float, kAbBinCount> of_pixel;
+      for (std::size_t p = begin; p < end; ++p) {
+        for (int q = 0; q < kAbBinCount; ++q) of_pixel[std::size_t(q)] = work.logits[logit_at(p - begin, q)];
+        colors[p] = temperature > 0 ? decode_annealed_mean(of_pixel, temperature) : decode_arg_max(of_pixel);
+      }
+    });
+  }
+
   [[nodiscard]] long step_count() const override { return steps_.front(); }
   [[nodiscard]] std::vector<StatePiece> state() override {
     std::vector<StatePiece> state;
@@ -85,11 +98,10 @@ class ChromaEngineCpu final : public ChromaEngine {
   static std::size_t head_input_at(std::size_t pixel, int channel) {
     return (pixel / kGroup * kHeadInputs + std::size_t(channel)) * kGroup + pixel % kGroup;
   }
-  /// 1 / A, or 0 for pixels that have no colour.
-  static float inverse_opacity(const PixelSamples& pixels, std::size_t p) {
+  static float inverse_opacity_of(const PixelSamples& pixels, std::size_t p) {
     float opacity = 0;
     for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) opacity += pixels.weights[s];
-    return opacity < kLeastColoredOpacity ? 0.0f : 1.0f / opacity;
+    return inverse_opacity(opacity);
   }
 
   void forward(const PixelSamples& pixels, std::size_t begin, std::size_t end, Work& work) const {
@@ -101,7 +113,7 @@ class ChromaEngineCpu final : public ChromaEngine {
     ensure_size(work.composited, groups * kHeadInputs * kGroup);
     std::fill_n(work.composited.begin(), groups * kHeadInputs * kGroup, 0.0f);
     for (std::size_t p = begin; p < end; ++p) {
-      const float inverse = inverse_opacity(pixels, p);
+      const float inverse = inverse_opacity_of(pixels, p);
       for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
         const float weight = pixels.weights[s] * inverse;
         for (int c = 0; c < kFeatures; ++c) {
@@ -132,7 +144,7 @@ class ChromaEngineCpu final : public ChromaEngine {
       const std::size_t at = logit_at(pixel, label.bin[i]);
       const float z = label.weight[i];
       if (z <= 0) continue;
-      loss += z * (std::log(z) - (work.logits[at] - largest - std::log(sum)));
+      loss += divergence(z, work.logits[at] - largest - std::log(sum));
       work.d_logits[at] -= scale * z;
     }
     for (int pad = kAbBinCount; pad < kHeadOutputs; ++pad) work.d_logits[logit_at(pixel, pad)] = 0;
@@ -154,7 +166,7 @@ class ChromaEngineCpu final : public ChromaEngine {
     const std::size_t first = pixels.offsets[begin];
     std::fill(work.points.d_output.begin(), work.points.d_output.end(), 0.0f);
     for (std::size_t p = begin; p < end; ++p) {
-      const float inverse = inverse_opacity(pixels, p);
+      const float inverse = inverse_opacity_of(pixels, p);
       for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
         const float weight = pixels.weights[s] * inverse;
         for (int c = 0; c < kFeatures; ++c) {

@@ -3,36 +3,20 @@
 #include <cmath>
 
 #include "src/base/check.h"
-#include "src/color/colorspace_math.h"
 #include "src/engine/chroma_engine.h"
 #include "src/engine/cpu/point_net.h"
 #include "src/engine/cpu/step_chunks.h"
+#include "src/engine/initial_state.h"
 
 namespace cnerf {
 namespace {
 
-constexpr int kOutputs = 4;  // log x, log z, padding
 constexpr std::size_t kBlockPixels = 64;
-constexpr float kLogLimit = 3.0f;        // chromaticity ratios stay within e^-3 .. e^3: far beyond Rec.709
-constexpr float kSmoothDistance = 4.0f;  // ab units below which the loss is quadratic
-
-/// XYZ of a pixel relative to white.
-struct PixelXyz {
-  float x = 0, y = 0, z = 0;
-};
-
-Ab ab_of(const PixelXyz& pixel) {
-  return {500.0f * (lab_f(pixel.x) - lab_f(pixel.y)), 200.0f * (lab_f(pixel.y) - lab_f(pixel.z))};
-}
-
-float ratio_of(float log_ratio) {
-  return std::exp(std::clamp(log_ratio, -kLogLimit, kLogLimit));
-}
 
 class ChromaticityEngineCpu final : public ChromaticityEngine {
  public:
   ChromaticityEngineCpu(const HashGridOptions& grid, std::uint64_t seed)
-      : field_(grid, kOutputs, /*relu_output=*/false, seed) {}
+      : field_(grid, kChromaticityOutputs, /*relu_output=*/false, seed) {}
 
   using ChromaticityEngine::step;
   double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
@@ -113,19 +97,14 @@ class ChromaticityEngineCpu final : public ChromaticityEngine {
   double loss_gradient(const PixelSamples& pixels, std::size_t p, std::size_t first, Ab target, AbLoss loss,
                        float scale, PointWorkspace& work) const {
     const PixelXyz seen = xyz_of(pixels, p, first, work);
-    const Ab color = ab_of(seen);
-    const float da = color.a - target.a, db = color.b - target.b;
-    const float distance = std::sqrt(da * da + db * db);
-    const float slope = scale / (loss == AbLoss::kHuber ? std::max(distance, kSmoothDistance) : kSmoothDistance);
-    const float d_x = slope * da * 500.0f * lab_f_derivative(seen.x);
-    const float d_z = -slope * db * 200.0f * lab_f_derivative(seen.z);
+    const AbError error = ab_error(seen, target, loss, scale);
     for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
       const float light = pixels.weights[s] * pixels.luminance[s];
       const std::size_t at_x = field_.output_at(s - first, 0), at_z = field_.output_at(s - first, 1);
-      if (std::abs(work.output[at_x]) < kLogLimit) work.d_output[at_x] = d_x * light * ratio_of(work.output[at_x]);
-      if (std::abs(work.output[at_z]) < kLogLimit) work.d_output[at_z] = d_z * light * ratio_of(work.output[at_z]);
+      work.d_output[at_x] = error.d_x * light * ratio_derivative(work.output[at_x]);
+      work.d_output[at_z] = error.d_z * light * ratio_derivative(work.output[at_z]);
     }
-    return distance;
+    return error.distance;
   }
 
   PointNetCpu field_;

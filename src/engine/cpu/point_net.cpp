@@ -2,25 +2,21 @@
 
 #include <algorithm>
 
+#include "src/engine/initial_state.h"
+
 namespace cnerf {
-namespace {
-
-constexpr int kHidden = 64;
-
-}  // namespace
-
 PointNetCpu::PointNetCpu(const HashGridOptions& grid, int outputs, bool relu_output, std::uint64_t seed)
     : outputs_(outputs),
       relu_output_(relu_output),
       grid_(grid, seed),
-      net_({{grid_.channels(), kHidden, outputs}}, seed, 3, relu_output) {}
+      net_(point_net_layout(static_cast<int>(grid_.levels().size()), outputs), seed, kPointNetStream, relu_output) {}
 
 void PointNetCpu::set_points(std::span<const Vec3f> points, PointWorkspace& work) const {
   work.groups = (points.size() + kGroup - 1) / kGroup;
   const std::size_t lanes = work.groups * kGroup;
   ensure_size(work.positions, lanes * 3);
   ensure_size(work.encoded, lanes * std::size_t(encoded_channels()));
-  for (auto* buffer : {&work.hidden, &work.d_hidden}) ensure_size(*buffer, lanes * kHidden);
+  for (auto* buffer : {&work.hidden, &work.d_hidden}) ensure_size(*buffer, lanes * kHiddenWidth);
   for (auto* buffer : {&work.output, &work.d_output}) ensure_size(*buffer, lanes * std::size_t(outputs_));
   for (std::size_t i = 0; i < lanes; ++i) {
     const Vec3f p = i < points.size() ? points[i] : Vec3f{0.5f, 0.5f, 0.5f};
@@ -30,7 +26,8 @@ void PointNetCpu::set_points(std::span<const Vec3f> points, PointWorkspace& work
 }
 
 std::vector<Channels> PointNetCpu::activations(PointWorkspace& work) const {
-  return {{work.encoded.data(), encoded_channels()}, {work.hidden.data(), kHidden}, {work.output.data(), outputs_}};
+  return {
+      {work.encoded.data(), encoded_channels()}, {work.hidden.data(), kHiddenWidth}, {work.output.data(), outputs_}};
 }
 
 void PointNetCpu::forward(PointWorkspace& work) const {
@@ -43,9 +40,10 @@ void PointNetCpu::backward(PointWorkspace& work, float* d_encoded, float* d_weig
     const std::size_t values = work.groups * kGroup * std::size_t(outputs_);
     for (std::size_t i = 0; i < values; ++i) work.d_output[i] = work.output[i] > 0 ? work.d_output[i] : 0;
   }
-  net_.backward(activations(work),
-                {{d_encoded, encoded_channels()}, {work.d_hidden.data(), kHidden}, {work.d_output.data(), outputs_}},
-                work.groups, d_weights);
+  net_.backward(
+      activations(work),
+      {{d_encoded, encoded_channels()}, {work.d_hidden.data(), kHiddenWidth}, {work.d_output.data(), outputs_}},
+      work.groups, d_weights);
 }
 
 void PointNetCpu::update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights,

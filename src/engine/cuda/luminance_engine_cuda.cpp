@@ -4,11 +4,13 @@
 #include <cmath>
 #include <cstring>
 
-#include "encoding/cuda/hash_grid_cuda.h"
 #include "src/base/check.h"
+#include "src/base/parallel.h"
 #include "src/base/rng.h"
+#include "src/engine/cuda/trained_parameters.h"
 #include "src/engine/heaviest_samples.h"
 #include "src/engine/initial_state.h"
+#include "src/field/cuda/channel_tiles.h"
 #include "src/field/cuda/field_backward.h"
 #include "src/field/mlp_layout.h"
 #include "src/render/composite_math.h"
@@ -31,13 +33,46 @@ const char* const kRayAdvice = "rays";
 
 }  // namespace
 
+namespace {
+
+/// Puts traced samples in the order of their rays and leaves out the light ones.
+void append_heaviest(std::span<const TracedRay> rays, const WeightedSample* found, float share,
+                     std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) {
+  constexpr std::size_t kRays = 256;  // of a part
+  struct Part {
+    std::vector<WeightedSample> samples;
+    std::vector<std::size_t> offsets = {0};
+  };
+  std::vector<Part> parts((rays.size() + kRays - 1) / kRays);
+  parallel_tasks(parts.size(), [&](std::size_t i) {
+    Part& part = parts[i];
+    for (const TracedRay& ray : rays.subspan(i * kRays, std::min(kRays, rays.size() - i * kRays))) {
+      for (std::uint32_t s = 0; s < ray.samples; s += 32) {
+        const WeightedSample* run = found + ray.run[s / 32];
+        part.samples.insert(part.samples.end(), run, run + std::min(32u, ray.samples - s));
+      }
+      part.offsets.push_back(part.samples.size());
+    }
+    if (share < 1) keep_heaviest(share, part.samples, part.offsets);
+  });
+  std::vector<std::size_t> begins = {samples.size()};
+  for (const Part& part : parts) {
+    for (std::size_t r = 1; r < part.offsets.size(); ++r) offsets.push_back(begins.back() + part.offsets[r]);
+    begins.push_back(begins.back() + part.samples.size());
+  }
+  samples.resize(begins.back());
+  parallel_tasks(parts.size(), [&](std::size_t i) {
+    std::copy(parts[i].samples.begin(), parts[i].samples.end(), samples.begin() + std::ptrdiff_t(begins[i]));
+  });
+}
+
+}  // namespace
+
 /// Everything on the GPU but the images.
 struct LuminanceEngineCuda::Memory {
-  // Hash grid.
-  DeviceBuffer<float> table, d_table, moments;
-  DeviceBuffer<std::uint16_t> halves;
-  // Nets.
-  DeviceBuffer<float> density, density_first, density_second, luminance, luminance_first, luminance_second;
+  // The field.
+  TrainedGrid grid;
+  TrainedNet density, luminance;
   DeviceBuffer<std::uint16_t> forward, backward;
   DeviceBuffer<float> last_layer, d_weights;
   // A step.
@@ -58,6 +93,7 @@ struct LuminanceEngineCuda::Memory {
   DeviceBuffer<RayResult> results;
   DeviceBuffer<WeightedSample> weighted;
   DeviceBuffer<TracedRay> traced;
+  std::unique_ptr<MappedBuffer<WeightedSample>> found;  // a copy of `weighted`, pinned
   DeviceBuffer<Vec3f> points, point_directions;
   DeviceBuffer<float> answers;
 
@@ -89,12 +125,11 @@ struct LuminanceEngineCuda::Memory {
 
   template <typename Visit>
   void for_each_buffer(Visit&& visit) const {
-    visit(table), visit(d_table), visit(moments), visit(halves), visit(density), visit(density_first),
-        visit(density_second), visit(luminance), visit(luminance_first), visit(luminance_second), visit(forward),
-        visit(backward), visit(last_layer), visit(d_weights), visit(state), visit(places), visit(gradients),
-        visit(encoded), visit(d_encoded), visit(rays), visit(directions), visit(cells), visit(bits), visit(render_bits),
-        visit(totals), visit(trace_state), visit(plain_rays), visit(trace_rays), visit(trace_directions),
-        visit(results), visit(weighted), visit(traced), visit(points), visit(point_directions), visit(answers);
+    visit(grid), visit(density), visit(luminance), visit(forward), visit(backward), visit(last_layer), visit(d_weights),
+        visit(state), visit(places), visit(gradients), visit(encoded), visit(d_encoded), visit(rays), visit(directions),
+        visit(cells), visit(bits), visit(render_bits), visit(totals), visit(trace_state), visit(plain_rays),
+        visit(trace_rays), visit(trace_directions), visit(results), visit(weighted), visit(traced), visit(points),
+        visit(point_directions), visit(answers);
   }
 };
 
@@ -117,27 +152,18 @@ struct LuminanceEngineCuda::Views {
 
 LuminanceEngineCuda::LuminanceEngineCuda(const LuminanceEngineOptions& options)
     : options_(options),
-      levels_(hash_grid_levels(options.grid)),
-      rows_(total_rows(levels_)),
       capacity_(std::uint32_t(options.samples_per_step) * 2),
       density_scale_(1.0f / std::ldexp(1.0f, 1 - options.cascades)),
       activation_(LuminanceActivation<float>::up_to(options.max_luminance)),
       memory_(std::make_unique<Memory>()),
       occupancy_(options.occupancy, options.cascades) {
   Memory& m = *memory_;
-  const std::size_t levels = levels_.size();
-  const std::size_t channels = 16 * ((levels + 3) / 4);
-  m.table = {rows_ * std::size_t(4), kGridAdvice};
-  m.d_table = {rows_ * std::size_t(4), kGridAdvice};
-  m.moments = {rows_ * std::size_t(8), kGridAdvice};
-  m.halves = {rows_ * std::size_t(4), kGridAdvice};
-
-  const MlpLayout density = density_net_layout(int(levels)), luminance = luminance_net_layout();
-  for (auto* buffer : {&m.density, &m.density_first, &m.density_second}) *buffer = {density.weight_count(), "nets"};
-  for (auto* buffer : {&m.luminance, &m.luminance_first, &m.luminance_second}) {
-    *buffer = {luminance.weight_count(), "nets"};
-  }
-  const auto weights = std::size_t(field_weight_count(int(levels)));
+  m.grid = {options.grid, options.seed, kGridAdvice};
+  const auto levels = int(m.grid.levels().size());
+  const auto channels = std::size_t(16 * channel_tiles(levels));
+  m.density = TrainedNet(initial_weights(density_net_layout(levels), options.seed, kDensityNetStream));
+  m.luminance = TrainedNet(initial_weights(luminance_net_layout(), options.seed, kLuminanceNetStream));
+  const auto weights = std::size_t(field_weight_count(levels));
   m.forward = {weights, "nets"};
   m.backward = {weights, "nets"};
   m.last_layer = {kHiddenWidth, "nets"};
@@ -147,7 +173,7 @@ LuminanceEngineCuda::LuminanceEngineCuda(const LuminanceEngineOptions& options)
   m.places = {capacity_ * std::size_t(4), kSampleAdvice};
   m.gradients = {capacity_ * std::size_t(2), kSampleAdvice};
   m.encoded = {capacity_ * channels, kSampleAdvice};
-  m.d_encoded = {capacity_ * 4 * levels, kSampleAdvice};
+  m.d_encoded = {capacity_ * std::size_t(4 * levels), kSampleAdvice};
   m.rays = {kMostRays, kRayAdvice};
   m.directions = {kMostRays * std::size_t(8), kRayAdvice};
 
@@ -155,15 +181,7 @@ LuminanceEngineCuda::LuminanceEngineCuda(const LuminanceEngineOptions& options)
   m.bits = {occupancy_.densities().size() / 32, "the occupancy grid; lower stage1.occupancy.resolution"};
   m.totals = {2 * std::size_t(options.cascades), "the occupancy grid"};
 
-  host_.table = initial_table(levels_, options.seed);
-  host_.moments.assign(rows_ * std::size_t(8), 0.0f);
-  host_.density = initial_weights(density, options.seed, kDensityNetStream);
-  host_.luminance = initial_weights(luminance, options.seed, kLuminanceNetStream);
-  for (auto* moments : {&host_.density_first, &host_.density_second}) moments->assign(density.weight_count(), 0.0f);
-  for (auto* moments : {&host_.luminance_first, &host_.luminance_second}) {
-    moments->assign(luminance.weight_count(), 0.0f);
-  }
-  host_.counters = {0, std::clamp<std::int64_t>(options.samples_per_step / 256, 64, kMostRays)};
+  counters_ = {0, std::clamp<std::int64_t>(options.samples_per_step / 256, 64, kMostRays)};
   state_loaded();
 }
 
@@ -171,10 +189,10 @@ LuminanceEngineCuda::~LuminanceEngineCuda() = default;
 
 FieldView LuminanceEngineCuda::field() const {
   const Memory& m = *memory_;
-  return {levels_.data(),
-          int(levels_.size()),
-          reinterpret_cast<const uint2*>(m.halves.data()),
-          {reinterpret_cast<const uint2*>(m.forward.data()), reinterpret_cast<const uint2*>(m.backward.data()),
+  return {m.grid.levels().data(),
+          int(m.grid.levels().size()),
+          m.grid.table(),
+          {{reinterpret_cast<const uint2*>(m.forward.data()), reinterpret_cast<const uint2*>(m.backward.data())},
            m.last_layer.data()},
           density_scale_,
           activation_};
@@ -218,7 +236,7 @@ void LuminanceEngineCuda::follow_rays(cudaStream_t stream) {
 
 void LuminanceEngineCuda::nets_backward(cudaStream_t stream) {
   const Memory& m = *memory_;
-  field_backward({int(levels_.size()),
+  field_backward({int(m.grid.levels().size()),
                   field().nets,
                   {&m.state.data()->samples, capacity_},
                   reinterpret_cast<const float4*>(m.places.data()),
@@ -232,25 +250,21 @@ void LuminanceEngineCuda::nets_backward(cudaStream_t stream) {
 
 void LuminanceEngineCuda::grid_backward(cudaStream_t stream) {
   const Memory& m = *memory_;
-  encode_backward_cuda(levels_, m.places.data(), {&m.state.data()->samples, capacity_}, m.d_encoded.data(),
-                       m.d_table.data(), stream);
+  m.grid.backward(reinterpret_cast<const float4*>(m.places.data()), {&m.state.data()->samples, capacity_},
+                  m.d_encoded.data(), stream);
 }
 
 void LuminanceEngineCuda::update_nets(cudaStream_t stream, bool only_pack) {
   const Memory& m = *memory_;
-  field_update(
-      {int(levels_.size()), only_pack ? nullptr : m.d_weights.data(), field_backward_blocks(), &m.state.data()->adam,
-       m.density.data(), m.density_first.data(), m.density_second.data(), m.luminance.data(), m.luminance_first.data(),
-       m.luminance_second.data(), reinterpret_cast<uint2*>(m.forward.data()),
-       reinterpret_cast<uint2*>(m.backward.data()), m.last_layer.data()},
-      stream);
+  const FieldParameters parameters{m.density.weights(), m.luminance.weights(),
+                                   reinterpret_cast<uint2*>(m.forward.data()),
+                                   reinterpret_cast<uint2*>(m.backward.data()), m.last_layer.data()};
+  update_layers(field_layers(int(m.grid.levels().size()), parameters), only_pack ? nullptr : m.d_weights.data(),
+                field_backward_blocks(), &m.state.data()->adam, stream);
 }
 
 void LuminanceEngineCuda::update_table(cudaStream_t stream) {
-  const Memory& m = *memory_;
-  cnerf::update_table(&m.state.data()->adam, rows_, reinterpret_cast<float4*>(m.table.data()),
-                      reinterpret_cast<float4*>(m.d_table.data()), reinterpret_cast<float4*>(m.moments.data()),
-                      reinterpret_cast<uint2*>(m.halves.data()), stream);
+  memory_->grid.update(&memory_->state.data()->adam, stream);
 }
 
 void LuminanceEngineCuda::look_at_occupancy(cudaStream_t stream) {
@@ -394,16 +408,16 @@ CudaGradients LuminanceEngineCuda::gradients(const std::vector<TrainingView>& vi
   grid_backward(m.stream);
   m.wait();
   CudaGradients result;
-  result.table = m.d_table.downloaded();
-  CNERF_CUDA(cudaMemset(m.d_table.data(), 0, m.d_table.bytes()));
+  result.table = m.grid.gradient().downloaded();
+  CNERF_CUDA(cudaMemset(m.grid.gradient().data(), 0, m.grid.gradient().bytes()));
   const StepState state = m.state.downloaded().front();
   result.report = {state.loss / state.rays, state.squared_error / state.rays, state.rays, std::size_t(state.marched),
                    std::min(state.samples, capacity_)};
 
   // From the parts of the blocks to the nets' own order: layers without the channels that pad the hash grid's.
   const std::vector<float> parts = m.d_weights.downloaded();
-  const int channels = 4 * int(levels_.size()), padded = (channels + 15) / 16 * 16;
-  const auto count = std::size_t(field_weight_count(int(levels_.size())));
+  const int levels = int(m.grid.levels().size()), channels = 4 * levels, padded = 16 * channel_tiles(levels);
+  const auto count = std::size_t(field_weight_count(levels));
   std::vector<float> sums(count, 0.0f);
   for (std::size_t i = 0; i < parts.size(); ++i) sums[i % count] += parts[i];
   for (int out = 0; out < kHiddenWidth; ++out) {
@@ -534,7 +548,7 @@ void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& 
   const std::size_t room = std::size_t(1) << 22;
   if (m.weighted.size() < room) m.weighted = {room, kRayAdvice};
   if (m.traced.size() < most) m.traced = {most, kRayAdvice};
-  std::vector<WeightedSample> found;
+  if (!m.found) m.found = std::make_unique<MappedBuffer<WeightedSample>>(room);
   for (std::size_t first = 0; first < rays.size();) {
     const auto count = std::uint32_t(std::min<std::size_t>(most, rays.size() - first));
     TraceJob trace = job_of_rays(rays.subspan(first, count), march, effort.min_transmittance);
@@ -548,17 +562,14 @@ void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& 
       most = count / 2;  // too many samples: fewer rays at a time
       continue;
     }
-    found.resize(state.samples);
-    m.weighted.download(found.data(), found.size());
+    m.weighted.download(&(*m.found)[0], state.samples, m.stream);
     std::vector<TracedRay> of_rays(count);
     m.traced.download(of_rays.data(), count);
-    for (const TracedRay& ray : of_rays) {
-      for (std::uint32_t s = 0; s < ray.samples; ++s) samples.push_back(found[ray.run[s / 32] + s % 32]);
-      offsets.push_back(samples.size());
-    }
+    m.wait();
+    append_heaviest(of_rays, &(*m.found)[0], effort.shaded_share, samples, offsets);
+    if (first == 0) samples.reserve(samples.size() * (rays.size() / count + 1));  // as many a ray: hardly ever moves
     first += count;
   }
-  if (effort.shaded_share < 1) keep_heaviest(effort.shaded_share, samples, offsets);
 }
 
 void LuminanceEngineCuda::query_density(std::span<const Vec3f> positions, std::span<float> sigma) const {
@@ -631,29 +642,17 @@ void LuminanceEngineCuda::exclude(const std::function<bool(Vec3f, float)>& wante
 
 std::vector<StatePiece> LuminanceEngineCuda::state() {
   const std::lock_guard lock(mutex_);
-  const Memory& m = *memory_;
+  Memory& m = *memory_;
   m.wait();
   fetch_occupancy();
-  const auto fetch = [](const DeviceBuffer<float>& from, std::vector<float>& to) {
-    from.download(to.data(), to.size());
-  };
-  fetch(m.table, host_.table), fetch(m.moments, host_.moments);
-  fetch(m.density, host_.density), fetch(m.density_first, host_.density_first);
-  fetch(m.density_second, host_.density_second), fetch(m.luminance, host_.luminance);
-  fetch(m.luminance_first, host_.luminance_first), fetch(m.luminance_second, host_.luminance_second);
-  host_.counters = {steps_, m.state.downloaded().front().rays};
+  counters_ = {steps_, m.state.downloaded().front().rays};
 
   std::vector<StatePiece> state;
-  state.push_back(state_piece("grid.table", host_.table));
-  state.push_back(state_piece("grid.moments", host_.moments));
-  state.push_back(state_piece("density_net.weights", host_.density));
-  state.push_back(state_piece("density_net.first_moments", host_.density_first));
-  state.push_back(state_piece("density_net.second_moments", host_.density_second));
-  state.push_back(state_piece("luminance_net.weights", host_.luminance));
-  state.push_back(state_piece("luminance_net.first_moments", host_.luminance_first));
-  state.push_back(state_piece("luminance_net.second_moments", host_.luminance_second));
+  m.grid.append_state("grid", state);
+  m.density.append_state("density_net", state);
+  m.luminance.append_state("luminance_net", state);
   state.push_back(state_piece("occupancy", occupancy_.densities()));
-  state.push_back(state_piece("counters", host_.counters));
+  state.push_back(state_piece("counters", counters_));
   return state;
 }
 
@@ -661,23 +660,17 @@ void LuminanceEngineCuda::state_loaded() {
   const std::lock_guard lock(mutex_);
   const Memory& m = *memory_;
   m.wait();
-  const auto put = [](const std::vector<float>& from, const DeviceBuffer<float>& to) {
-    to.upload(from.data(), from.size());
-  };
-  put(host_.table, m.table), put(host_.moments, m.moments);
-  put(host_.density, m.density), put(host_.density_first, m.density_first);
-  put(host_.density_second, m.density_second), put(host_.luminance, m.luminance);
-  put(host_.luminance_first, m.luminance_first), put(host_.luminance_second, m.luminance_second);
-  steps_ = long(host_.counters[0]);
+  m.grid.upload(m.stream);
+  m.density.upload();
+  m.luminance.upload();
+  steps_ = long(counters_[0]);
   StepState state;
-  state.step = host_.counters[0];
-  state.rays = std::uint32_t(host_.counters[1]);
+  state.step = counters_[0];
+  state.rays = std::uint32_t(counters_[1]);
   m.state.upload(&state, 1);
   m.cells.upload(occupancy_.densities().data(), occupancy_.densities().size());
   occupancy_.refresh_bits();
   occupancy_is_old_ = false;
-  round_table(rows_, reinterpret_cast<const float4*>(m.table.data()), reinterpret_cast<uint2*>(m.halves.data()),
-              m.stream);
   update_nets(m.stream, true);
   refresh_occupancy_bits(OccupancyLayout(options_.occupancy.resolution, options_.cascades), options_.occupancy,
                          m.cells.data(), m.totals.data(), m.bits.data(), m.stream);

@@ -90,8 +90,7 @@ class LuminanceEngineCuda final : public LuminanceEngine {
                                      float min_transmittance) const;
 
   LuminanceEngineOptions options_;
-  std::vector<GridLevel> levels_;
-  std::uint32_t rows_ = 0, capacity_ = 0;
+  std::uint32_t capacity_ = 0;
   float density_scale_ = 1;
   LuminanceActivation<float> activation_;
   long steps_ = 0;
@@ -102,12 +101,8 @@ class LuminanceEngineCuda final : public LuminanceEngine {
   // What the host knows of the GPU's state, when asked for it.
   mutable OccupancyGrid occupancy_;
   mutable std::atomic<bool> occupancy_is_old_ = false;
-  struct HostState {
-    std::vector<float> table, moments, density, density_first, density_second, luminance, luminance_first,
-        luminance_second;
-    std::vector<std::int64_t> counters;
-  } host_;
-  mutable std::mutex mutex_;  // queries come from many threads
+  std::vector<std::int64_t> counters_;  // steps done, rays of the next step
+  mutable std::mutex mutex_;            // queries come from many threads
 };
 
 }  // namespace cnerf

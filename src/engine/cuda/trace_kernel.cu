@@ -1,6 +1,7 @@
 #include "src/engine/cuda/trace_kernel.h"
 
 #include "src/base/cuda/device_memory.h"
+#include "src/base/cuda/launch.h"
 #include "src/base/cuda/warp.cuh"
 #include "src/color/colorspace_math.h"
 #include "src/field/cuda/channel_tiles.h"
@@ -24,10 +25,6 @@ struct TraceShared {
   BlockField<KT, kWarps> field;
   MarchQueue queue[kWarps];
 };
-
-__device__ Vec3f in_box(Vec3f p) {
-  return {__saturatef(p.x), __saturatef(p.y), __saturatef(p.z)};
-}
 
 /// Optical depths of a run of samples, and with them the light that comes through.
 struct RunOptics {
@@ -73,13 +70,8 @@ __device__ void keep_for_training(const SampleArrays& samples, const WarpField<K
     samples.places[begin + lane] = make_float4(place.x, place.y, place.z, __uint_as_float(ray_index));
     samples.gradients[begin + lane] = make_float2(depth, raw_luminance);
   }
-  constexpr unsigned kParts = 2 * KT;  // 16 bytes each
-  for (unsigned part = lane; part < unsigned(count) * kParts; part += 32) {
-    const unsigned row = part / kParts;
-    if (begin + row >= samples.capacity) break;
-    samples.encoded[std::size_t(begin) * kParts + part] =
-        reinterpret_cast<const uint4*>(warp.encoded[row])[part % kParts];
-  }
+  const std::uint32_t room = samples.capacity - min(begin, samples.capacity);
+  warp.store(samples.encoded + std::size_t(begin) * (2 * KT), unsigned(count), room, lane);
 }
 
 /// Loss of a finished training ray and its gradient by what its samples emit and absorb.
@@ -312,32 +304,12 @@ GridLevels levels_of(const FieldView& field) {
   return {field.levels, std::size_t(field.n_levels)};
 }
 
-int multiprocessors() {
-  int device = 0, count = 0;
-  CNERF_CUDA(cudaGetDevice(&device));
-  CNERF_CUDA(cudaDeviceGetAttribute(&count, cudaDevAttrMultiProcessorCount, device));
-  return count;
-}
-
-/// Blocks that fill the GPU, with as much shared memory as they need.
-template <typename Shared, auto kKernel>
-unsigned resident_blocks() {
-  static const unsigned blocks = [&] {
-    CNERF_CUDA(cudaFuncSetAttribute(reinterpret_cast<const void*>(kKernel), cudaFuncAttributeMaxDynamicSharedMemorySize,
-                                    int(sizeof(Shared))));
-    int of_one = 0;
-    CNERF_CUDA(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&of_one, kKernel, kThreads, sizeof(Shared)));
-    return unsigned(std::max(of_one, 1) * multiprocessors());
-  }();
-  return blocks;
-}
-
 template <Keep kKeep>
 void launch_trace(const TraceJob& job, cudaStream_t stream) {
   with_channel_tiles(job.field.n_levels, [&](auto tiles) {
     constexpr int KT = decltype(tiles)::value;
     using Shared = TraceShared<KT>;
-    const unsigned blocks = resident_blocks<Shared, trace<KT, kKeep>>();
+    const unsigned blocks = resident_blocks<trace<KT, kKeep>>(kThreads, sizeof(Shared));
     trace<KT, kKeep><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(job.field), job);
     CNERF_CUDA(cudaGetLastError());
   });
@@ -360,7 +332,8 @@ void query_field(const FieldView& field, const Vec3f* positions, const Vec3f* di
   with_channel_tiles(field.n_levels, [&](auto tiles) {
     constexpr int KT = decltype(tiles)::value;
     using Shared = QueryShared<KT>;
-    const unsigned blocks = std::min(resident_blocks<Shared, query<KT>>(), (count + kThreads - 1) / kThreads);
+    const unsigned blocks =
+        std::min(resident_blocks<query<KT>>(kThreads, sizeof(Shared)), (count + kThreads - 1) / kThreads);
     query<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field, positions, directions, count,
                                                             sigma, luminance);
     CNERF_CUDA(cudaGetLastError());
@@ -373,7 +346,7 @@ void update_occupancy(const FieldView& field, const OccupancyLayout& layout, con
   with_channel_tiles(field.n_levels, [&](auto tiles) {
     constexpr int KT = decltype(tiles)::value;
     using Shared = QueryShared<KT>;
-    const unsigned blocks = resident_blocks<Shared, look_at_cells<KT>>();
+    const unsigned blocks = resident_blocks<look_at_cells<KT>>(kThreads, sizeof(Shared));
     look_at_cells<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field, layout, options.decay,
                                                                     stride, phase, occupancy_rng(jitter_seed), density);
     CNERF_CUDA(cudaGetLastError());

@@ -5,9 +5,9 @@
 #include <cuda_runtime_api.h>
 
 #include <cstdint>
+#include <vector>
 
 #include "encoding/cuda/hash_grid_cuda.h"
-#include "src/field/adam.h"
 #include "src/field/cuda/field_weights.h"
 
 namespace cnerf {
@@ -31,19 +31,13 @@ struct FieldBackwardJob {
 [[nodiscard]] int field_weight_count(int levels);
 void field_backward(const FieldBackwardJob& job, cudaStream_t stream);
 
-/// A step of Adam on the nets: sums up the parts, moves the weights, packs them anew.
-struct FieldUpdateJob {
-  int levels;
-  const float* d_weights;  ///< [parts, FieldShape::kWeights]; null: only pack
-  int parts;
-  const AdamStep* adam;  ///< device memory
-  // The density net's weights and moments, then the luminance net's, as mlp_layout.h orders them.
-  float *density, *density_first, *density_second;
-  float *luminance, *luminance_first, *luminance_second;
-  // Packed:
-  uint2 *forward, *backward;
+/// Where the weights of the field lie on the GPU.
+struct FieldParameters {
+  TrainedWeights density, luminance;  ///< as mlp_layout.h orders them
+  uint2 *forward, *backward;          ///< packed
   float* last_layer;
 };
-void field_update(const FieldUpdateJob& job, cudaStream_t stream);
+/// The layers of both nets, in the order of their gradient.
+[[nodiscard]] std::vector<DenseLayer> field_layers(int levels, const FieldParameters& parameters);
 
 }  // namespace cnerf

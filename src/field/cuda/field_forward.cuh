@@ -24,13 +24,19 @@ __device__ inline DirectionCode encode_direction(Vec3f direction) {
   return code;
 }
 
-/// Shared memory of one warp.
+/// A point as the hash grid takes it.
+__device__ inline Vec3f in_box(Vec3f p) {
+  return {__saturatef(p.x), __saturatef(p.y), __saturatef(p.z)};
+}
+
+/// What a warp works on: 32 samples in two tiles of 16.
+inline constexpr int kWarpTiles = 2;
+
+/// Encoded positions of a warp's samples, in shared memory.
 template <int KT>
-struct WarpField {
+struct WarpEncoding {
   static constexpr int kStride = 16 * KT + 8;  // padded: rows of 8 fall into different banks
   alignas(16) __half encoded[32][kStride];     ///< a row a sample; channels behind the last level's must be zero
-  alignas(16) __half direction[32][kSphericalHarmonics + 8];
-  float density[32], luminance[32];
 
   __device__ void clear(unsigned lane) {
     for (int c = 0; c < kStride; ++c) encoded[lane][c] = __half(0.0f);
@@ -43,6 +49,35 @@ struct WarpField {
 #pragma unroll 2
     for (int l = 0; l < levels.count; ++l) row[l] = gather(levels.level[l], table, position);
   }
+  /// Copies the first `count` rows to [.., 16 KT] halves, whole rows at a time; `room` rows fit.
+  __device__ void store(uint4* to, unsigned count, unsigned room, unsigned lane) const {
+    constexpr unsigned kParts = 2 * KT;  // 16 bytes each
+    for (unsigned part = lane; part < min(count, room) * kParts; part += 32) {
+      to[part] = reinterpret_cast<const uint4*>(encoded[part / kParts])[part % kParts];
+    }
+  }
+  /// ReLU of a first layer of 64 outputs, as left operands. The whole warp calls it, after `__syncwarp`.
+  __device__ void hidden_layer(const uint2* weights, std::uint32_t (&hidden)[kWarpTiles][4][4]) const {
+    const unsigned lane = threadIdx.x % 32;
+    std::uint32_t operands[kWarpTiles][KT][4];
+#pragma unroll
+    for (int m = 0; m < kWarpTiles; ++m) {
+#pragma unroll
+      for (int k = 0; k < KT; ++k) {
+        load_operand(operands[m][k], &encoded[16 * m + lane % 16][16 * k + 8 * (lane / 16)]);
+      }
+    }
+    dense<Half, kWarpTiles, KT, 4>(
+        operands, weights, [&](int m, int n, const float(&sums)[2][4]) { pack_relu<Half>(sums, hidden[m][n]); });
+  }
+};
+
+/// Shared memory of one warp.
+template <int KT>
+struct WarpField : WarpEncoding<KT> {
+  alignas(16) __half direction[32][kSphericalHarmonics + 8];
+  float density[32], luminance[32];
+
   /// Writes this lane's direction, where every sample has its own.
   __device__ void set_direction(Vec3f d, unsigned lane) {
     const DirectionCode code = encode_direction(d);
@@ -57,7 +92,7 @@ template <int KT>
 class FieldNets {
  public:
   using Shape = FieldShape<KT>;
-  static constexpr int kTiles = 2;  // of 16 samples
+  static constexpr int kTiles = kWarpTiles;
 
   __device__ FieldNets(const uint2* weights, const float* last_layer) : weights_(weights), last_(last_layer) {}
 
@@ -70,7 +105,7 @@ class FieldNets {
   __device__ float density(WarpField<KT>& warp, Geometry& geometry) const {
     const unsigned lane = threadIdx.x % 32, g = lane / 4, t = lane % 4;
     std::uint32_t hidden[kTiles][4][4];
-    hidden_layer(warp, hidden);
+    warp.hidden_layer(weights_ + Shape::kPackedDensity1, hidden);
     dense<Half, kTiles, 4, 1>(hidden, weights_ + Shape::kPackedDensity2, [&](int m, int, const float(&sums)[2][4]) {
       if (t == 0) {
         warp.density[16 * m + g] = sums[0][0];
@@ -108,19 +143,6 @@ class FieldNets {
   }
 
  private:
-  __device__ void hidden_layer(WarpField<KT>& warp, std::uint32_t (&hidden)[kTiles][4][4]) const {
-    const unsigned lane = threadIdx.x % 32;
-    std::uint32_t encoded[kTiles][KT][4];
-#pragma unroll
-    for (int m = 0; m < kTiles; ++m) {
-#pragma unroll
-      for (int k = 0; k < KT; ++k) {
-        load_operand(encoded[m][k], &warp.encoded[16 * m + lane % 16][16 * k + 8 * (lane / 16)]);
-      }
-    }
-    dense<Half, kTiles, KT, 4>(encoded, weights_ + Shape::kPackedDensity1,
-                               [&](int m, int n, const float(&sums)[2][4]) { pack_relu<Half>(sums, hidden[m][n]); });
-  }
   /// The last layer has one output: a dot product in floats.
   __device__ void last_layer(WarpField<KT>& warp, const std::uint32_t (&hidden)[kTiles][4][4]) const {
     const unsigned lane = threadIdx.x % 32, g = lane / 4, t = lane % 4;
@@ -164,7 +186,7 @@ struct BlockField {
 
   /// By all threads of the block.
   __device__ void load(const PackedField& field) {
-    const auto* from = reinterpret_cast<const uint4*>(field.forward);
+    const auto* from = reinterpret_cast<const uint4*>(field.weights.forward);
     auto* to = reinterpret_cast<uint4*>(weights);
     for (unsigned i = threadIdx.x; i < FieldShape<KT>::kPacked / 2; i += blockDim.x) to[i] = from[i];
     for (unsigned i = threadIdx.x; i < kHiddenWidth; i += blockDim.x) last_layer[i] = field.last_layer[i];

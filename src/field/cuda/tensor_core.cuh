@@ -79,15 +79,17 @@ __device__ inline uint2 load_transposed_pair(const void* row_of_lane) {
 /// One layer: out = in W, for M tiles of 16 samples.
 /// @param weights  fragments [K][2 N][lane], as `packed_place` orders them
 /// @param finish   (m, n, sums of output tiles 2n and 2n + 1) -> void
+/// @param tiles    output tiles of 8 that the weights have, where this is a part of a wider layer
 template <typename Format, int M, int K, int N, typename Finish>
-__device__ inline void dense(const std::uint32_t (&in)[M][K][4], const uint2* weights, Finish&& finish) {
+__device__ inline void dense(const std::uint32_t (&in)[M][K][4], const uint2* weights, Finish&& finish,
+                             int tiles = 2 * N) {
   const unsigned lane = threadIdx.x % 32;
 #pragma unroll
   for (int n = 0; n < N; ++n) {
     float sums[M][2][4] = {};
 #pragma unroll
     for (int k = 0; k < K; ++k) {
-      const uint2 left = weights[(k * 2 * N + 2 * n) * 32 + lane], right = weights[(k * 2 * N + 2 * n + 1) * 32 + lane];
+      const uint2 left = weights[(k * tiles + 2 * n) * 32 + lane], right = weights[(k * tiles + 2 * n + 1) * 32 + lane];
 #pragma unroll
       for (int m = 0; m < M; ++m) {
         Format::multiply_add(sums[m][0], in[m][k], left);

@@ -1,0 +1,65 @@
+#pragma once
+/// The maths of stage 2's engines, once for every device.
+
+#include <cmath>
+
+#include "src/base/host_device.h"
+#include "src/color/ab_bins.h"
+#include "src/color/colorspace_math.h"
+
+namespace cnerf {
+
+/// Pixels of less opacity have no colour: a uniform softmax would decode to the first bin, a vivid green.
+inline constexpr float kLeastColoredOpacity = 0.01f;
+
+/// 1 / A, or 0 for pixels that have no colour.
+CNERF_HD inline float inverse_opacity(float opacity) {
+  return opacity < kLeastColoredOpacity ? 0.0f : 1.0f / opacity;
+}
+
+/// A bin's part of KL(label || p).  @param label  > 0
+CNERF_HD inline float divergence(float label, float log_probability) {
+  return label * (std::log(label) - log_probability);
+}
+
+/// What an ab distance of d costs.
+enum class AbLoss {
+  kHuber,    ///< d^2 below a few units, d above: what a few wrong pixels say hardly counts
+  kSquared,  ///< d^2, the photometric loss: the mean of what is said
+};
+
+inline constexpr float kLogRatioLimit = 3.0f;   ///< chromaticity stays within e^-3 .. e^3: far beyond Rec.709
+inline constexpr float kSmoothDistance = 4.0f;  ///< ab units below which Huber's loss is quadratic
+
+/// Chromaticity of a sample from the net's output.
+CNERF_HD inline float ratio_of(float log_ratio) {
+  return std::exp(log_ratio < -kLogRatioLimit  ? -kLogRatioLimit
+                  : log_ratio > kLogRatioLimit ? kLogRatioLimit
+                                               : log_ratio);
+}
+CNERF_HD inline float ratio_derivative(float log_ratio) {
+  return std::abs(log_ratio) < kLogRatioLimit ? ratio_of(log_ratio) : 0.0f;
+}
+
+/// XYZ of a pixel relative to white.
+struct PixelXyz {
+  float x = 0, y = 0, z = 0;
+};
+CNERF_HD inline Ab ab_of(const PixelXyz& pixel) {
+  return {500.0f * (lab_f(pixel.x) - lab_f(pixel.y)), 200.0f * (lab_f(pixel.y) - lab_f(pixel.z))};
+}
+
+/// How far a pixel is from its target, in ab units, and the gradient of `scale` times its loss.
+struct AbError {
+  float distance = 0, d_x = 0, d_z = 0;
+};
+CNERF_HD inline AbError ab_error(const PixelXyz& seen, Ab target, AbLoss loss, float scale) {
+  const Ab color = ab_of(seen);
+  const float da = color.a - target.a, db = color.b - target.b;
+  const float distance = std::sqrt(da * da + db * db);
+  const bool is_far = loss == AbLoss::kHuber && distance > kSmoothDistance;
+  const float slope = scale / (is_far ? distance : kSmoothDistance);
+  return {distance, slope * da * 500.0f * lab_f_derivative(seen.x), -slope * db * 200.0f * lab_f_derivative(seen.z)};
+}
+
+}  // namespace cnerf

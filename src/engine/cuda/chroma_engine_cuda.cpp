@@ -1,0 +1,133 @@
+#include <mutex>
+
+#include "src/base/check.h"
+#include "src/engine/chroma_engine.h"
+#include "src/engine/cuda/chroma_stream.h"
+#include "src/engine/cuda/pixel_batch.h"
+#include "src/engine/cuda/point_net.h"
+#include "src/engine/initial_state.h"
+#include "src/engine/luminance_engine.h"
+
+namespace cnerf {
+namespace {
+
+constexpr std::size_t kPixelsAtATime = 1 << 14;  // that are asked about
+
+class ChromaEngineCuda final : public ChromaEngine {
+ public:
+  ChromaEngineCuda(const HashGridOptions& grid, std::uint64_t seed)
+      : features_(grid, PointOutputs::kFeatures, seed),
+        head_(initial_chroma_head(seed)),
+        forward_(std::size_t(chroma_head_weight_count()), "nets"),
+        backward_(std::size_t(chroma_head_weight_count()), "nets") {
+    state_loaded();
+  }
+
+  double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
+              float learning_rate) override {
+    CNERF_CHECK_EQ(labels.size(), pixels.pixels());
+    const std::lock_guard lock(mutex_);
+    const std::size_t n = pixels.pixels();
+    batch_.upload(pixels, 0, n, stream_);
+    steps_.front() += 1;
+    stream_.begin_step(learning_rate, steps_.front(), batch_.samples());
+    labels_.reserve(n, "labels");
+    labels_.upload(labels.data(), n, stream_);
+    d_composited_.reserve(n * kChromaFeatures, "pixels");
+    const int parts = chroma_head_parts(batch_.arrays().pixels);
+    d_head_.reserve(std::size_t(parts) * std::size_t(chroma_head_weight_count()), "nets");
+
+    features_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/true, stream_);
+    const float scale = 1.0f / static_cast<float>(n);
+    chroma_loss(head_job(),
+                {labels_.data(), batch_.upload_weights(pixel_weights, stream_), scale, d_composited_.data(),
+                 d_head_.data(), &stream_.step()->loss},
+                stream_);
+    features_.backward(batch_.arrays().places, {&stream_.step()->samples, batch_.samples()},
+                       {batch_.arrays().shares, d_composited_.data(), nullptr}, stream_);
+    update_head(d_head_.data(), parts);
+    features_.update(&stream_.step()->adam, stream_);
+    return stream_.end_step() * scale;
+  }
+
+  void logits(const PixelSamples& pixels, std::span<float> logits) const override {
+    CNERF_CHECK_EQ(logits.size(), pixels.pixels() * kAbBinCount);
+    for_pieces(pixels, [&](std::size_t begin, std::size_t count) {
+      logits_.reserve(count * kAbBinCount, "logits");
+      chroma_logits(head_job(), logits_.data(), stream_);
+      logits_.download(logits.data() + begin * kAbBinCount, count * kAbBinCount, stream_);
+    });
+  }
+  void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const override {
+    CNERF_CHECK_EQ(colors.size(), pixels.pixels());
+    for_pieces(pixels, [&](std::size_t begin, std::size_t count) {
+      colors_.reserve(count, "pixels");
+      chroma_colors(head_job(), {temperature, centres_.data(), colors_.data()}, stream_);
+      colors_.download(colors.data() + begin, count, stream_);
+    });
+  }
+
+  [[nodiscard]] long step_count() const override { return steps_.front(); }
+  [[nodiscard]] std::vector<StatePiece> state() override {
+    const std::lock_guard lock(mutex_);
+    std::vector<StatePiece> state;
+    features_.append_state("features", state);
+    head_.append_state("head", state);
+    state.push_back(state_piece("chroma_steps", steps_));
+    return state;
+  }
+  void state_loaded() override {
+    const std::lock_guard lock(mutex_);
+    features_.upload(stream_);
+    head_.upload();
+    update_head(nullptr, 0);
+    stream_.wait();
+  }
+
+ private:
+  /// Composites features of some pixels at a time and calls `work(first pixel, count)`.
+  template <typename Work>
+  void for_pieces(const PixelSamples& pixels, Work&& work) const {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t begin = 0; begin < pixels.pixels(); begin += kPixelsAtATime) {
+      const std::size_t end = std::min(begin + kPixelsAtATime, pixels.pixels());
+      batch_.upload(pixels, begin, end, stream_);
+      features_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/false, stream_);
+      work(begin, end - begin);
+      stream_.wait();
+    }
+  }
+  [[nodiscard]] ChromaHeadJob head_job() const {
+    return {batch_.arrays(),
+            features_.features(),
+            {reinterpret_cast<const uint2*>(forward_.data()), reinterpret_cast<const uint2*>(backward_.data())}};
+  }
+  /// @param gradient  null: only packs the weights
+  void update_head(const float* gradient, int parts) const {
+    update_layers({chroma_head_layer(head_.weights(), reinterpret_cast<uint2*>(forward_.data()),
+                                     reinterpret_cast<uint2*>(backward_.data()))},
+                  gradient, parts, &stream_.step()->adam, stream_);
+  }
+
+  ChromaStream stream_;
+  mutable PointNetCuda features_;
+  TrainedNet head_;
+  DeviceBuffer<std::uint16_t> forward_, backward_;  // the head's packed weights
+  DeviceBuffer<float> d_head_, d_composited_;
+  DeviceBuffer<SoftLabel> labels_;
+  std::vector<std::int64_t> steps_ = {0};
+  mutable PixelBatch batch_;
+  DeviceBuffer<Ab> centres_ = uploaded(std::vector<Ab>(ab_bin_centres().begin(), ab_bin_centres().end()), "bins");
+  mutable DeviceBuffer<float> logits_;
+  mutable DeviceBuffer<Ab> colors_;
+  mutable std::mutex mutex_;  // pixels are decoded from many threads
+};
+
+}  // namespace
+
+std::unique_ptr<ChromaEngine> make_cuda_chroma_engine(const HashGridOptions& grid, std::uint64_t seed) {
+  if (!has_cuda_device()) throw DeviceError("no CUDA device: no driver, or no GPU it can use");
+  return std::make_unique<ChromaEngineCuda>(grid, seed);
+}
+
+}  // namespace cnerf

@@ -1,0 +1,110 @@
+#include <mutex>
+
+#include "src/base/check.h"
+#include "src/engine/chroma_engine.h"
+#include "src/engine/cuda/chroma_stream.h"
+#include "src/engine/cuda/pixel_batch.h"
+#include "src/engine/cuda/point_net.h"
+#include "src/engine/luminance_engine.h"
+
+namespace cnerf {
+namespace {
+
+constexpr std::size_t kPixelsAtATime = 1 << 16;
+constexpr std::size_t kPointsAtATime = 1 << 20;
+
+class ChromaticityEngineCuda final : public ChromaticityEngine {
+ public:
+  ChromaticityEngineCuda(const HashGridOptions& grid, std::uint64_t seed) : field_(grid, PointOutputs::kNumbers, seed) {
+    state_loaded();
+  }
+
+  using ChromaticityEngine::step;
+  double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
+              AbLoss loss, float learning_rate) override {
+    CNERF_CHECK_EQ(targets.size(), pixels.pixels());
+    const std::lock_guard lock(mutex_);
+    const std::size_t n = pixels.pixels();
+    batch_.upload(pixels, 0, n, stream_);
+    steps_.front() += 1;
+    stream_.begin_step(learning_rate, steps_.front(), batch_.samples());
+    colors_.reserve(n, "pixels");
+    colors_.upload(targets.data(), n, stream_);
+    d_logs_.reserve(2 * std::size_t(batch_.samples()), "samples");
+    auto* d_logs = reinterpret_cast<float2*>(d_logs_.data());
+
+    field_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/true, stream_);
+    const float scale = 1.0f / static_cast<float>(n);
+    chromaticity_loss(
+        batch_.arrays(), field_.numbers(),
+        {colors_.data(), batch_.upload_weights(pixel_weights, stream_), loss, scale, d_logs, &stream_.step()->loss},
+        stream_);
+    field_.backward(batch_.arrays().places, {&stream_.step()->samples, batch_.samples()}, {nullptr, nullptr, d_logs},
+                    stream_);
+    field_.update(&stream_.step()->adam, stream_);
+    return stream_.end_step() * scale;
+  }
+
+  void composite(const PixelSamples& pixels, std::span<Ab> colors) const override {
+    CNERF_CHECK_EQ(colors.size(), pixels.pixels());
+    const std::lock_guard lock(mutex_);
+    for (std::size_t begin = 0; begin < pixels.pixels(); begin += kPixelsAtATime) {
+      const std::size_t end = std::min(begin + kPixelsAtATime, pixels.pixels());
+      batch_.upload(pixels, begin, end, stream_);
+      field_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/false, stream_);
+      colors_.reserve(end - begin, "pixels");
+      composite_chromaticity(batch_.arrays(), field_.numbers(), colors_.data(), stream_);
+      colors_.download(colors.data() + begin, end - begin, stream_);
+      stream_.wait();
+    }
+  }
+
+  void query(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const override {
+    CNERF_CHECK_EQ(positions.size(), chromaticity.size());
+    const std::lock_guard lock(mutex_);
+    for (std::size_t first = 0; first < positions.size(); first += kPointsAtATime) {
+      const std::size_t count = std::min(kPointsAtATime, positions.size() - first);
+      points_.reserve(count, "points");
+      ratios_.reserve(count, "points");
+      points_.upload(positions.data() + first, count, stream_);
+      field_.forward(points_.data(), std::uint32_t(count), /*for_training=*/false, stream_);
+      chromaticity_of_logs(field_.numbers(), std::uint32_t(count), ratios_.data(), stream_);
+      ratios_.download(chromaticity.data() + first, count, stream_);
+      stream_.wait();
+    }
+  }
+
+  [[nodiscard]] long step_count() const override { return steps_.front(); }
+  [[nodiscard]] std::vector<StatePiece> state() override {
+    const std::lock_guard lock(mutex_);
+    std::vector<StatePiece> state;
+    field_.append_state("chromaticity", state);
+    state.push_back(state_piece("chromaticity_steps", steps_));
+    return state;
+  }
+  void state_loaded() override {
+    const std::lock_guard lock(mutex_);
+    field_.upload(stream_);
+    stream_.wait();
+  }
+
+ private:
+  ChromaStream stream_;
+  mutable PointNetCuda field_;
+  DeviceBuffer<float> d_logs_;  // 2 a sample
+  std::vector<std::int64_t> steps_ = {0};
+  mutable PixelBatch batch_;
+  mutable DeviceBuffer<Ab> colors_;
+  mutable DeviceBuffer<Vec3f> points_;
+  mutable DeviceBuffer<Chromaticity> ratios_;
+  mutable std::mutex mutex_;  // bakes query from many threads
+};
+
+}  // namespace
+
+std::unique_ptr<ChromaticityEngine> make_cuda_chromaticity_engine(const HashGridOptions& grid, std::uint64_t seed) {
+  if (!has_cuda_device()) throw DeviceError("no CUDA device: no driver, or no GPU it can use");
+  return std::make_unique<ChromaticityEngineCuda>(grid, seed);
+}
+
+}  // namespace cnerf

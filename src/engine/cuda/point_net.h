@@ -1,0 +1,51 @@
+#pragma once
+/// A trainable hash grid and small net over points on the GPU: the counterpart of the CPU's PointNetCpu.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "src/engine/cuda/trained_parameters.h"
+#include "src/field/cuda/point_net.h"
+
+namespace cnerf {
+
+class PointNetCuda {
+ public:
+  PointNetCuda(const HashGridOptions& grid, PointOutputs outputs, std::uint64_t seed);
+
+  /// @param for_training  keeps what `backward` needs
+  void forward(const Vec3f* positions, std::uint32_t count, bool for_training, cudaStream_t stream);
+  /// Of the latest `forward`; features or numbers, whichever the net has.
+  [[nodiscard]] const std::uint32_t* features() const { return features_.data(); }  ///< [count, 64] halves
+  [[nodiscard]] const float2* numbers() const { return reinterpret_cast<const float2*>(numbers_.data()); }
+
+  /// Gradient of the outputs, where it comes from.
+  struct OutputGradient {
+    const float* shares = nullptr;        ///< of features, see PointBackwardJob
+    const float* d_composited = nullptr;  ///< likewise
+    const float2* d_numbers = nullptr;    ///< of numbers
+  };
+  /// @param samples  those of the latest `forward`
+  void backward(const float4* places, SampleCount samples, const OutputGradient& gradient, cudaStream_t stream);
+  /// Adam, after `backward`.  @param adam  device memory
+  void update(const AdamStep* adam, cudaStream_t stream) const;
+
+  void append_state(const std::string& prefix, std::vector<StatePiece>& state);
+  void upload(cudaStream_t stream) const;
+
+ private:
+  [[nodiscard]] int levels() const { return int(grid_.levels().size()); }
+  void update_net(const AdamStep* adam, const float* d_weights, cudaStream_t stream) const;
+
+  PointOutputs outputs_;
+  TrainedGrid grid_;
+  TrainedNet net_;
+  DeviceBuffer<std::uint16_t> forward_, backward_;  // packed weights
+  DeviceBuffer<float> d_weights_;
+  DeviceBuffer<std::uint16_t> encoded_, d_encoded_;
+  DeviceBuffer<std::uint32_t> features_;
+  DeviceBuffer<float> numbers_;  // 2 a point
+};
+
+}  // namespace cnerf
