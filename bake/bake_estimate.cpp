@@ -47,7 +47,7 @@ Contents probe(const ColorField& field, const BakePlan& plan, const BakeOptions&
 
 BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>& plans, const BakeOptions& options) {
   BakeOptions coarse = options;
-  coarse.subsamples = 1;  // counts, not values
+  coarse.subsamples = 1;                                           // counts, not values
   constexpr double kBytesInHalf = 7 * 2;                           // density, colour, a, b, luminance
   constexpr double kBrickBytes = kBrickVoxels * sizeof(float);     // of the density that light passes through
   constexpr double kLeafBytes = 3 * kBrickVoxels * sizeof(float);  // of the largest grid of a file, that of colours
@@ -57,10 +57,11 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
   BakeEstimate estimate;
   for (const BakePlan& plan : plans) {
     const Contents contents = probe(field, plan, coarse);
-    density += contents.bricks * kBrickBytes + static_cast<double>(plan.lattice_voxels() / kBrickVoxels * sizeof(void*));
+    density +=
+        contents.bricks * kBrickBytes + static_cast<double>(plan.lattice_voxels() / kBrickVoxels * sizeof(void*));
     density += contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel));
-    writing = std::max(writing, contents.bricks * kRim * kLeafBytes +
-                                    kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel));
+    writing = std::max(
+        writing, contents.bricks * kRim * kLeafBytes + kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel));
     estimate.voxels += static_cast<std::size_t>(contents.voxels);
   }
   estimate.memory_bytes = static_cast<std::size_t>(std::max(density, writing));

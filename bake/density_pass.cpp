@@ -83,7 +83,9 @@ std::vector<DenseVoxel> bake_brick(const ColorField& field, const BakePlan& plan
     if (sum.alpha <= 0 || alpha < options.opacity_threshold) continue;
     const double density = std::min(max_sigma(h), -std::log1p(-alpha) / h);
     const Vec3d inside = sum.alpha_inside / sum.alpha;
-    kept.push_back({static_cast<float>(density), brick, static_cast<std::uint16_t>(offset),
+    kept.push_back({static_cast<float>(density),
+                    brick,
+                    static_cast<std::uint16_t>(offset),
                     {in_256ths(inside.x), in_256ths(inside.y), in_256ths(inside.z)}});
   }
   return kept;

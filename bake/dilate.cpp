@@ -107,9 +107,7 @@ class PlaneWindow {
   }
 
  private:
-  [[nodiscard]] const IndexedPlane& plane_of(Vec3i voxel) const {
-    return *planes_[(voxel.x >> 3) - planes_[0]->plane];
-  }
+  [[nodiscard]] const IndexedPlane& plane_of(Vec3i voxel) const { return *planes_[(voxel.x >> 3) - planes_[0]->plane]; }
 
   VolumePlanes source_;
   std::array<std::shared_ptr<const IndexedPlane>, 3> planes_;

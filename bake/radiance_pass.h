@@ -20,10 +20,10 @@ struct VoxelColor {
 };
 [[nodiscard]] VoxelColor voxel_color(float luminance, Chromaticity chromaticity);
 
-/// Second pass over one level of a bake. Voxels that no camera sees are left out unless `keep_unseen`. So are those that
-/// give less than `weight_threshold` of a pixel's light (transmittance times opacity) even to the camera that sees them
-/// best. Luminance is the mean over the cameras that see the voxel, weighted by transmittance; where none does, and
-/// everywhere when there are no cameras, over the six axis directions.
+/// Second pass over one level of a bake. Voxels that no camera sees are left out unless `keep_unseen`. So are those
+/// that give less than `weight_threshold` of a pixel's light (transmittance times opacity) even to the camera that sees
+/// them best. Luminance is the mean over the cameras that see the voxel, weighted by transmittance; where none does,
+/// and everywhere when there are no cameras, over the six axis directions.
 class RadiancePass {
  public:
   /// @param levels  all levels of the bake; `level` is the one to bake, the others stand in its light. All must outlive

@@ -47,8 +47,8 @@ std::vector<BakeLevel> bake_levels(const ColorField& field, const std::vector<Ba
   bool any = false;
   for (BakeLevel& level : levels) {
     for (int plane = 0; plane < plane_count(level.plan); ++plane) {
-      const auto voxels = journal.part<DenseVoxel>(
-          part++, [&] { return bake_density_plane(field, level.plan, options, plane); });
+      const auto voxels =
+          journal.part<DenseVoxel>(part++, [&] { return bake_density_plane(field, level.plan, options, plane); });
       put_plane(voxels, plane, level.sigma);
       any = any || !voxels.empty();
       progress.plane_done();
@@ -71,14 +71,14 @@ std::vector<VolumePlanes> bake_volumes(const ColorField& field, const std::vecto
     const std::size_t first = planes_of_density + dense_part;
     bool any = false;
     for (int plane = 0; plane < plane_count(plan); ++plane, ++dense_part) {
-      const auto voxels = journal.part<BakedVoxel>(planes_of_density + dense_part, [&] {
-        return pass.bake_plane(journal.read<DenseVoxel>(dense_part), plane);
-      });
+      const auto voxels = journal.part<BakedVoxel>(
+          planes_of_density + dense_part, [&] { return pass.bake_plane(journal.read<DenseVoxel>(dense_part), plane); });
       any = any || !voxels.empty();
       progress.plane_done();
     }
     if (!any) continue;
-    VolumePlanes volume{{plan.origin, plan.voxel_size, plan.resolution, field.frame(), {}, {}}, 0, plane_count(plan), {}};
+    VolumePlanes volume{
+        {plan.origin, plan.voxel_size, plan.resolution, field.frame(), {}, {}}, 0, plane_count(plan), {}};
     volume.read = [&journal, first, end = volume.end](int plane) {
       if (plane < 0 || plane >= end) return std::vector<BakedVoxel>();
       return journal.read<BakedVoxel>(first + static_cast<std::size_t>(plane));

@@ -31,7 +31,7 @@ struct VoxelBox {
 
 /// What writers have to know before they see the first voxel.
 struct VolumeStatistics {
-  VoxelBox all, dense;    ///< around all voxels and around those with density
+  VoxelBox all, dense;     ///< around all voxels and around those with density
   std::size_t voxels = 0;  ///< with density
   float min_sigma = std::numeric_limits<float>::infinity(), max_sigma = 0;  ///< 1/world unit; of those
 };

@@ -59,8 +59,8 @@ std::vector<fs::path> BakeFolder::add_volumes(const std::vector<VolumePlanes>& v
     std::vector<ManifestVolume> all = manifest_.finer_volumes;
     all.push_back(*manifest_.volume);
     const fs::path usd = folder_ / (name + ".usda");
-    write_usd(all, options.up == "poses" ? manifest_.up_axis : options.up, options.metres_per_unit, color_origin_text(manifest_.colorizer, manifest_.take),
-              usd);
+    write_usd(all, options.up == "poses" ? manifest_.up_axis : options.up, options.metres_per_unit,
+              color_origin_text(manifest_.colorizer, manifest_.take), usd);
     list(usd);
     files.push_back(usd);
   }

@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "src/base/aabb.h"
 #include "export/up_axis.h"
+#include "src/base/aabb.h"
 #include "src/base/check.h"
 #include "src/base/files.h"
 

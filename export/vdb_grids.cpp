@@ -183,7 +183,8 @@ openvdb::MetaMap VdbGrids::file_metadata() const {
   const SceneFrame& frame = volume.frame;
   openvdb::MetaMap meta;
   meta.insertMeta("cnerf_version", Text(CNERF_VERSION));
-  meta.insertMeta("cnerf_world_to_source", openvdb::Mat4DMetadata(row_vector_matrix(file_from_world(options).inverse())));
+  meta.insertMeta("cnerf_world_to_source",
+                  openvdb::Mat4DMetadata(row_vector_matrix(file_from_world(options).inverse())));
   meta.insertMeta("cnerf_unit_per_world", openvdb::DoubleMetadata(frame.unit_per_world));
   meta.insertMeta("cnerf_world_centre", openvdb::Vec3DMetadata(openvdb::Vec3d(
                                             frame.world_centre.x, frame.world_centre.y, frame.world_centre.z)));

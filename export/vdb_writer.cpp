@@ -21,8 +21,8 @@ std::uint32_t compression_flags(const std::string& name) {
   return openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK;
 }
 
-/// What openvdb::io::File writes, but grid after grid, so that only one is in memory, and to a stream whose failures are
-/// seen: File leaves a cut-off file on a full disk and says nothing.
+/// What openvdb::io::File writes, but grid after grid, so that only one is in memory, and to a stream whose failures
+/// are seen: File leaves a cut-off file on a full disk and says nothing.
 class CheckedArchive : public openvdb::io::Archive {
  public:
   explicit CheckedArchive(std::uint32_t compression) { setCompression(compression); }

@@ -33,15 +33,17 @@ void say_estimate(const std::vector<BakePlan>& plans, const BakeEstimate& estima
     reporter.say(fmt::format("bake: {} x {} x {} voxels of {:.4g}", plan.resolution.x, plan.resolution.y,
                              plan.resolution.z, plan.voxel_size));
   }
-  reporter.say(fmt::format("bake: about {:.1f} M of them hold something; {} of memory beside the {} held now, {} of disk",
-                           1e-6 * double(estimate.voxels), in_words(estimate.memory_bytes),
-                           in_words(held_memory_bytes()), in_words(estimate.disk_bytes)));
+  reporter.say(
+      fmt::format("bake: about {:.1f} M of them hold something; {} of memory beside the {} held now, {} of disk",
+                  1e-6 * double(estimate.voxels), in_words(estimate.memory_bytes), in_words(held_memory_bytes()),
+                  in_words(estimate.disk_bytes)));
   reporter.say(fmt::format("bake: Cycles will take about {} for them", in_words(cycles_bytes(plans))));
 }
 
 /// All that a bake's voxels depend on: what differs in any of it does not continue another.
-std::string bake_identity(const RunDirectory& directory, const std::string& take, const std::vector<BakeCamera>& cameras,
-                          const std::vector<BakePlan>& plans, BakeOptions options) {
+std::string bake_identity(const RunDirectory& directory, const std::string& take,
+                          const std::vector<BakeCamera>& cameras, const std::vector<BakePlan>& plans,
+                          BakeOptions options) {
   options.max_memory.clear();  // a bake may go on with more of it
   std::ostringstream identity;
   identity << "cnerf " << version_text() << '\n' << sha256(read_binary_file(directory.stage1_snapshot())) << '\n';
@@ -96,7 +98,8 @@ void write_volumes(const std::vector<VolumePlanes>& volumes, const BakeOptions& 
 void write_web_of(const std::vector<VolumePlanes>& volumes, const std::vector<BakeCamera>& cameras,
                   const RunContext& context, const fs::path& folder) {
   std::vector<BakedVolume> whole;
-  for (const VolumePlanes& volume : volumes) whole.push_back(whole_volume(dilated(volume, context.config.bake.dilation)));
+  for (const VolumePlanes& volume : volumes)
+    whole.push_back(whole_volume(dilated(volume, context.config.bake.dilation)));
   const Config& config = context.config;
   write_web(merged_volume(std::move(whole)),
             {context.capture.root.filename().string(), cameras, web_photos(context.capture, config.web),
@@ -190,7 +193,8 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   BakeFolder bake(folder, cameras, context.command_line, config.vdb.units, config.vdb.up_axis);
   std::vector<BakeLevel> levels = bake_levels(*scene, plans, options, journal, context.reporter.sink());
   if (formats.vdb || formats.web) {
-    std::vector<VolumePlanes> volumes = bake_volumes(*scene, cameras, levels, options, journal, context.reporter.sink());
+    std::vector<VolumePlanes> volumes =
+        bake_volumes(*scene, cameras, levels, options, journal, context.reporter.sink());
     if (!formats.gltf) levels.clear();  // files are written grid by grid: they need the memory
     for (VolumePlanes& volume : volumes) {
       volume.colorizer = origin.colorizer;
@@ -201,8 +205,8 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   }
   if (formats.gltf) {
     const BakeLevel level = merged_level(std::move(levels), options);  // a surface needs all of it on one lattice
-    write_mesh(bake_mesh(*scene, cameras, level, options, config.mesh, context.reporter.sink()), origin, formats, context,
-               bake);
+    write_mesh(bake_mesh(*scene, cameras, level, options, config.mesh, context.reporter.sink()), origin, formats,
+               context, bake);
   }
   if (formats.vdb || formats.gltf) {
     if (config.vdb.plates) add_plates(context.capture, bake);

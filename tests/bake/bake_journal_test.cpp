@@ -61,7 +61,8 @@ TEST(BakeJournal, WhateverIsCutOffIsDroppedAndTheRestStays) {
     BakeJournal journal(folder / "cut", "one bake");
     ASSERT_GE(journal.found(), most) << bytes;
     most = journal.found();
-    for (std::size_t p = 0; p < journal.found(); ++p) ASSERT_EQ(journal.read<int>(p), numbers(10 * static_cast<int>(p)));
+    for (std::size_t p = 0; p < journal.found(); ++p)
+      ASSERT_EQ(journal.read<int>(p), numbers(10 * static_cast<int>(p)));
     if (bytes % 16 != 0) continue;
     for (std::size_t p = 0; p < 4; ++p) {
       (void)journal.part<int>(p, [p] { return numbers(10 * static_cast<int>(p)); });

@@ -251,7 +251,11 @@ TEST(BakeVolume, AStoppedBakeGoesOnToTheSameVoxels) {
     BakeJournal journal(folder / "unfinished", "bake");
     EXPECT_EQ(journal.found(), planes - 1);
     try {
-      EXPECT_EQ(bake(journal, [&](const Progress&) { if (++done == planes) throw Interrupted("stop"); }), expected);
+      EXPECT_EQ(bake(journal,
+                     [&](const Progress&) {
+                       if (++done == planes) throw Interrupted("stop");
+                     }),
+                expected);
       break;
     } catch (const Interrupted&) {
       ++stops;

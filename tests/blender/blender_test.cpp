@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "bake/dilate.h"
 #include "bake/volume_baker.h"
 #include "bake/volume_integrator.h"
 #include "export/bake_folder.h"
@@ -229,8 +230,7 @@ TEST(Blender, AFileThatStandsUpLiesWhereThePosesHaveIt) {
   options.up = "y";
   const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "balls", options);
   const RenderedExr cycles = render_exact(bake.blender_setup, "--step-rate 0.25 --samples 32");
-  const Comparison equal =
-      compare(cycles, integrate_volume(volume, camera.intrinsics, camera.world_from_camera));
+  const Comparison equal = compare(cycles, integrate_volume(volume, camera.intrinsics, camera.world_from_camera));
   EXPECT_GT(equal.pixels, 500u);
   EXPECT_GE(equal.psnr, 40);
 }
@@ -324,7 +324,8 @@ TEST(Blender, NumberedPicturesBecomeAFilmWithPlatesUnderAnUprightEmpty) {
   VdbOptions options;
   options.metres_per_unit = 0.01;
   BakeFolder bake(folder.path(), cameras, {}, "cm", "y");
-  bake.add_volumes({block_volume({0, 0, 0}, {4, 4, 4}, 1)}, "volume", options);
+  const BakedVolume block = block_volume({0, 0, 0}, {4, 4, 4}, 1);
+  bake.add_volumes({planes_of(block)}, "volume", options);
   bake.add_plate(cameras[1].name, make_web_photo(cameras[1].intrinsics, std::vector<float>(64, 0.5f), 8, 90).jpeg);
   bake.finish();
   std::ofstream(folder / "check.py")

@@ -48,7 +48,8 @@ std::vector<ColmapImage> images_of(const std::string& text) {
 /// COLMAP's OPENCV model: fx fy cx cy k1 k2 p1 p2.
 PixelPosition colmap_pixel(Vec3d p, const std::vector<double>& c, bool distorted) {
   const double u = p.x / p.z, v = p.y / p.z, r2 = u * u + v * v;
-  const double k1 = distorted ? c[4] : 0, k2 = distorted ? c[5] : 0, p1 = distorted ? c[6] : 0, p2 = distorted ? c[7] : 0;
+  const double k1 = distorted ? c[4] : 0, k2 = distorted ? c[5] : 0, p1 = distorted ? c[6] : 0,
+               p2 = distorted ? c[7] : 0;
   const double radial = 1 + k1 * r2 + k2 * r2 * r2;
   return {c[0] * (u * radial + 2 * p1 * u * v + p2 * (r2 + 2 * u * u)) + c[2],
           c[1] * (v * radial + 2 * p2 * u * v + p1 * (r2 + 2 * v * v)) + c[3]};
@@ -58,9 +59,7 @@ PixelPosition gltf_pixel(const tinygltf::Node& node, const tinygltf::Camera& cam
   const Vec3d q{-node.rotation[0], -node.rotation[1], -node.rotation[2]};  // the inverse rotation
   const Vec3d away = in_gltf - Vec3d{node.translation[0], node.translation[1], node.translation[2]};
   const Vec3d p = away + cross(q, cross(q, away) + away * node.rotation[3]) * 2.0;  // looks along -Z, +Y up
-  const auto extra = [&](const char* name) {
-    return camera.extras.Get("cnerf").Get(name).GetNumberAsDouble();
-  };
+  const auto extra = [&](const char* name) { return camera.extras.Get("cnerf").Get(name).GetNumberAsDouble(); };
   const double tangent = std::tan(camera.perspective.yfov / 2);
   const double fy = extra("height") / 2 / tangent;
   const double fx = extra("width") / 2 / (tangent * camera.perspective.aspectRatio);
@@ -91,7 +90,8 @@ TEST(ExportedCameras, PointsOfAColmapModelLandOnTheirPixels) {
   for (const ColmapImage& image : images) {
     const auto has_name = [&](const std::string& name) { return name.find(image.name) != std::string::npos; };
     const auto exported = std::ranges::find_if(manifest.cameras, [&](const auto& c) { return has_name(c.name); });
-    const auto node = std::ranges::find_if(gltf.nodes, [&](const auto& n) { return n.camera >= 0 && has_name(n.name); });
+    const auto node =
+        std::ranges::find_if(gltf.nodes, [&](const auto& n) { return n.camera >= 0 && has_name(n.name); });
     ASSERT_TRUE(exported != manifest.cameras.end() && node != gltf.nodes.end()) << image.name;
     for (const Vec3d p : {Vec3d{0, 0, 0}, {0.3, 0.1, -0.2}, {-0.2, 0.4, 0.3}, {0.1, -0.35, 0.25}}) {
       const Vec3d in_camera = image.camera_from_world(p);

@@ -121,8 +121,8 @@ TEST_P(VdbUp, TheFileStandsUpAndComesBackAsItWas) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Axes, VdbUp, testing::Combine(testing::Values("x", "y", "z"), testing::Values("y", "z")),
-                         [](const auto& info) {
-                           return std::string(std::get<0>(info.param)) + "Becomes" + std::get<1>(info.param);
+                         [](const auto& axes) {
+                           return std::string(std::get<0>(axes.param)) + "Becomes" + std::get<1>(axes.param);
                          });
 
 TEST(Vdb, VoxelsThatLieAskewAreRefused) {
