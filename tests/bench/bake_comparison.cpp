@@ -1,5 +1,5 @@
 // What a bake keeps of its field: held-out views of a capture (all views where none is held out; with trained=1 those
-// that are not), evenly spread over it, rendered from the baked voxels by our own integrator, against
+// that are not, evenly spread), rendered from the baked voxels by our own integrator, against
 //   * the field's render of the view: PSNR of sRGB-encoded colour;
 //   * the photograph: PSNR of sRGB-encoded luminance, beside that of the field.
 // All over black.
