@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 
+#include "bake/density_pass.h"
+#include "src/base/byte_count.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
 
@@ -18,19 +19,6 @@ constexpr double kPixelsPerVoxel = 2;  ///< that a voxel may cover
 constexpr double kLeastShare = 0.15;   ///< of all pixels that must gain by a finer grid
 constexpr int kCells = 32;             ///< along each axis, to look for its place
 constexpr double kHalfOpaque = 0.693147;
-
-/// "4G", "500M", "64k" or a number of bytes.
-std::size_t bytes_of(const std::string& text) {
-  double amount = 0;
-  char unit = 0, rest = 0;
-  const int read = std::sscanf(text.c_str(), " %lf %c %c", &amount, &unit, &rest);
-  const std::string units = "kMG";
-  const std::size_t at = units.find(unit);
-  if (read < 1 || read > 2 || !(amount > 0) || (read == 2 && at == std::string::npos)) {
-    throw UsageError("budget: expected an amount of memory like 4G or 500M, got \"" + text + "\"");
-  }
-  return static_cast<std::size_t>(std::ldexp(amount, read == 2 ? 10 * (static_cast<int>(at) + 1) : 0));
-}
 
 /// What a pixel looks at, and how large voxels may be there.
 struct Sight {
@@ -67,9 +55,9 @@ std::vector<Sight> all_sights(const ColorField& field, const std::vector<BakeCam
   options.voxel_size = 0;
   options.subsamples = 1;
   const BakePlan plan = plan_bake(field, options);
-  const DensityPass density = bake_density(field, plan, options, [](double) {});
+  const BrickGrid<float> sigma = bake_density(field, plan, options, [](double) {});
   std::vector<std::vector<Sight>> of_cameras(cameras.size());
-  parallel_tasks(cameras.size(), [&](std::size_t c) { of_cameras[c] = sights_of(cameras[c], plan, density.sigma); });
+  parallel_tasks(cameras.size(), [&](std::size_t c) { of_cameras[c] = sights_of(cameras[c], plan, sigma); });
   std::vector<Sight> sights;
   for (const std::vector<Sight>& some : of_cameras) sights.insert(sights.end(), some.begin(), some.end());
   return sights;
@@ -175,6 +163,33 @@ BakePlan finer_plan(BakePlan& parent, const Aabbd& box, int margin) {
   return plan;
 }
 
+/// Of a voxel that lets through as much light as the eight voxels of half its size from `first` on.
+double density_of_finer(const BrickGrid<float>& finer, Vec3i first, double voxel_size) {
+  double alpha = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const float sigma = finer.at(first + Vec3i{corner & 1, corner >> 1 & 1, corner >> 2});
+    alpha -= std::expm1(-sigma * voxel_size) / 8;
+  }
+  return std::min(max_sigma(voxel_size), -std::log1p(-alpha) / voxel_size);
+}
+
+/// Puts a finer level's density where its parent is cut out for it.
+void fill_hole(BakeLevel& parent, const BakeLevel& finer, double opacity_threshold) {
+  const Vec3i low = parent.plan.hole_min, high = parent.plan.hole_max;
+  const double faintest = -std::log1p(-std::min(opacity_threshold, 0.999)) / parent.plan.voxel_size;
+  for (int i = low.x; i < high.x; ++i) {
+    for (int j = low.y; j < high.y; ++j) {
+      for (int k = low.z; k < high.z; ++k) {
+        const Vec3d corner = parent.plan.world_from_voxel(Vec3i{i, j, k}.cast<double>());
+        const Vec3d there = finer.plan.voxel_from_world(corner) + Vec3d{0.5, 0.5, 0.5};  // faces meet: a whole number
+        const double sigma = density_of_finer(finer.sigma, there.cast<int>(), parent.plan.voxel_size);
+        if (sigma > 0 && sigma >= faintest) parent.sigma.set({i, j, k}, static_cast<float>(sigma));
+      }
+    }
+  }
+  parent.plan.hole_min = parent.plan.hole_max = {};
+}
+
 }  // namespace
 
 std::vector<BakePlan> plan_levels(const ColorField& field, const std::vector<BakeCamera>& cameras,
@@ -214,7 +229,7 @@ std::vector<BakePlan> plan_within_budget(const ColorField& field, const std::vec
                                          const BakeOptions& options) {
   std::vector<BakePlan> plans = plan_levels(field, cameras, options);
   if (options.budget.empty()) return plans;
-  const auto budget = static_cast<double>(bytes_of(options.budget));
+  const auto budget = static_cast<double>(bytes_from("budget", options.budget));
   constexpr int kLeastResolution = 16;
   BakeOptions smaller = options;
   while (static_cast<double>(cycles_bytes(plans)) > budget) {
@@ -233,21 +248,14 @@ std::vector<BakePlan> plan_within_budget(const ColorField& field, const std::vec
   return plans;
 }
 
-std::vector<BakeLevel> bake_levels(const ColorField& field, std::vector<BakePlan> plans, const BakeOptions& options,
-                                   const std::function<void(double)>& advance) {
-  std::vector<BakeLevel> levels;
-  double whole = 0, done = 0;
-  for (const BakePlan& plan : plans) whole += static_cast<double>(plan.lattice_voxels());
-  bool any = false;
-  for (BakePlan& plan : plans) {
-    const double share = static_cast<double>(plan.lattice_voxels()) / whole;
-    DensityPass density = bake_density(field, plan, options, [&](double of_this) { advance(done + share * of_this); });
-    done += share;
-    for (const std::vector<DenseVoxel>& brick : density.bricks) any = any || !brick.empty();
-    levels.push_back({plan, std::move(density)});
+BakeLevel merged_level(std::vector<BakeLevel> levels, const BakeOptions& options) {
+  BakeLevel merged = std::move(levels.front());
+  for (std::size_t next = 1; next < levels.size(); ++next) {
+    BakeLevel coarser = std::move(levels[next]);
+    fill_hole(coarser, merged, options.opacity_threshold);
+    merged = std::move(coarser);
   }
-  if (!any) throw InputError("bake: no voxel is as opaque as opacity_threshold; lower it, or check --aabb");
-  return levels;
+  return merged;
 }
 
 }  // namespace cnerf

@@ -1,18 +1,18 @@
 #pragma once
 /// The lattices of a bake and the density on them: what volumes and meshes are both made from.
 
-#include <functional>
 #include <vector>
 
 #include "bake/bake_camera.h"
-#include "bake/density_pass.h"
+#include "bake/bake_plan.h"
+#include "bake/brick_grid.h"
 
 namespace cnerf {
 
 /// One grid of a bake. Where grids are nested, a coarser one has a hole where the next finer one lies.
 struct BakeLevel {
   BakePlan plan;
-  DensityPass density;
+  BrickGrid<float> sigma;  ///< 1/world unit; only voxels dense enough to be kept, else 0
 };
 
 /// The lattices of a bake, finest first. The last is that of plan_bake. With `grids` nested (auto: where the field has
@@ -33,11 +33,8 @@ struct BakeLevel {
 [[nodiscard]] std::vector<BakePlan> plan_within_budget(const ColorField& field, const std::vector<BakeCamera>& cameras,
                                                        const BakeOptions& options);
 
-/// Density on each lattice of plan_levels.  @param advance  as in bake_density.
-/// @throws UsageError, InputError     as plan_bake; also when nothing is as opaque as `opacity_threshold`.
-/// @throws ContractError  when the field answers NaN, infinity or a negative density.
-[[nodiscard]] std::vector<BakeLevel> bake_levels(const ColorField& field, std::vector<BakePlan> plans,
-                                                 const BakeOptions& options,
-                                                 const std::function<void(double)>& advance);
+/// The density of all levels on the lattice of the coarsest: where a finer one lies in its hole, a voxel lets through
+/// the mean of what the finer ones there do.  @param levels  finest first, at least one.
+[[nodiscard]] BakeLevel merged_level(std::vector<BakeLevel> levels, const BakeOptions& options);
 
 }  // namespace cnerf

@@ -15,6 +15,7 @@ struct BakeOptions {
   double weight_threshold = 0.0125;  ///< share of a pixel's light a voxel gives to the view that sees it best; ditto
   std::string grids = "auto";        ///< "one", or "nested": finer grids where most pixels look; auto: by cascades
   std::string budget;                ///< memory of a renderer that makes grids dense, "4G"; empty = no limit
+  std::string max_memory;            ///< of the whole process while volumes are baked, "1G"; empty = no limit
   int dilation = 2;                  ///< voxels that colour reaches beyond density; renderers interpolate into them
   int subsamples = 2;                ///< per axis of a voxel, for density
   int views_per_voxel = 8;           ///< training views that a voxel's luminance is averaged over, at most
@@ -32,6 +33,7 @@ struct BakeOptions {
     v("grids", grids, Choice{"auto", "one", "nested"},
       "one grid, or nested ones, finer where most pixels look; auto nests where the field has cascades");
     v("budget", budget, "memory Cycles may take for the grids, as 4G or 500M; makes voxels larger until they fit");
+    v("max_memory", max_memory, "memory the bake of a volume may take, as 1G; one that needs more is refused");
     v("dilation", dilation, Range{2, 8}, "voxels that colour reaches beyond density");
     v("subsamples", subsamples, Range{1, 8}, "density samples along each axis of a voxel");
     v("views_per_voxel", views_per_voxel, Range{1, 256}, "views that a voxel's luminance is averaged over");

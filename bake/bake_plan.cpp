@@ -2,11 +2,9 @@
 
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 #include <sstream>
 #include <vector>
 
-#include "bake/baked_volume.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
 
@@ -132,26 +130,6 @@ BakePlan plan_bake(const ColorField& field, const BakeOptions& options) {
     plan.origin[axis] = plan.box.min[axis] - margin * plan.voxel_size;
   }
   return plan;
-}
-
-BakeEstimate estimate_bake(const ColorField& field, const BakePlan& plan) {
-  const SceneFrame& frame = field.frame();
-  std::vector<std::size_t> per_plane(static_cast<std::size_t>(plan.resolution.x), 0);
-  parallel_tasks(per_plane.size(), [&](std::size_t i) {
-    for (int j = 0; j < plan.resolution.y; ++j) {
-      for (int k = 0; k < plan.resolution.z; ++k) {
-        const Vec3d world = plan.world_from_voxel({static_cast<double>(i) + 0.5, j + 0.5, k + 0.5});
-        if (!plan.box.contains(world) || plan.in_hole({static_cast<int>(i), j, k})) continue;
-        per_plane[i] += field.may_be_occupied(frame.unit_from_world(world).cast<float>()) ? 1 : 0;
-      }
-    }
-  });
-  BakeEstimate estimate;
-  estimate.voxels = std::accumulate(per_plane.begin(), per_plane.end(), std::size_t{0});
-  constexpr std::size_t kBytesInHalf = 7 * 2;  // density, colour, a, b, luminance
-  estimate.memory_bytes = estimate.voxels * 2 * sizeof(BakedVoxel) + plan.lattice_voxels() / 64;
-  estimate.file_bytes = estimate.voxels * kBytesInHalf;
-  return estimate;
 }
 
 }  // namespace cnerf

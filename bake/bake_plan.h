@@ -33,12 +33,4 @@ struct BakePlan {
 /// @throws InputError  when the field is empty everywhere.
 [[nodiscard]] BakePlan plan_bake(const ColorField& field, const BakeOptions& options);
 
-/// What a bake will need, before it is run.
-struct BakeEstimate {
-  std::size_t voxels = 0;        ///< upper bound on voxels with density: those whose centre may be occupied
-  std::size_t memory_bytes = 0;  ///< working memory, about
-  std::size_t file_bytes = 0;    ///< of a VDB in half precision before compression, about
-};
-[[nodiscard]] BakeEstimate estimate_bake(const ColorField& field, const BakePlan& plan);
-
 }  // namespace cnerf

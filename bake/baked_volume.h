@@ -21,15 +21,19 @@ struct BakedVoxel {
   friend bool operator==(const BakedVoxel&, const BakedVoxel&) = default;
 };
 
-struct BakedVolume {
-  Vec3d origin{};                  ///< world position of the corner of voxel (0, 0, 0)
-  double voxel_size = 0;           ///< world units; cubic voxels
-  Vec3i resolution{};              ///< voxels along each axis of the baked box
-  SceneFrame frame;                ///< of the field it was baked from
-  std::vector<BakedVoxel> voxels;  ///< sparse; sorted by (i, j, k), no duplicates
+/// All of a volume but its voxels.
+struct VolumeHeader {
+  Vec3d origin{};         ///< world position of the corner of voxel (0, 0, 0)
+  double voxel_size = 0;  ///< world units; cubic voxels
+  Vec3i resolution{};     ///< voxels along each axis of the baked box
+  SceneFrame frame;       ///< of the field it was baked from
 
   std::string colorizer;  ///< who inferred the colours; empty = grey
   std::string take;       ///< which colorization of the run
+};
+
+struct BakedVolume : VolumeHeader {
+  std::vector<BakedVoxel> voxels;  ///< sparse; sorted by (i, j, k), no duplicates
 };
 
 }  // namespace cnerf

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "src/base/parallel.h"
 
@@ -56,10 +57,9 @@ std::uint8_t in_256ths(double share) {
   return static_cast<std::uint8_t>(std::clamp(static_cast<int>(share * 256), 0, 255));
 }
 
-/// The kept voxels of a brick; their densities go to `values`, which is made when there are any.
-std::vector<DenseVoxel> bake_brick(const ColorField& field, const BakePlan& plan, const BakeOptions& options,
-                                   Vec3i brick_min, const std::function<float*()>& values) {
-  const BrickSamples samples = gather_samples(field, plan, options.subsamples, brick_min);
+std::vector<DenseVoxel> bake_brick(const ColorField& field, const BakePlan& plan, const BakeOptions& options, int plane,
+                                   std::uint32_t brick) {
+  const BrickSamples samples = gather_samples(field, plan, options.subsamples, brick_min_of(plan, plane, brick));
   if (samples.positions.empty()) return {};
   std::vector<float> sigma(samples.positions.size());
   field.query_density(samples.positions, sigma);
@@ -76,7 +76,6 @@ std::vector<DenseVoxel> bake_brick(const ColorField& field, const BakePlan& plan
   }
 
   std::vector<DenseVoxel> kept;
-  float* densities = nullptr;
   const double count = std::pow(options.subsamples, 3);  // skipped sub-samples count as clear
   for (int offset = 0; offset < kBrickVoxels; ++offset) {
     const Accumulated& sum = sums[offset];
@@ -84,12 +83,11 @@ std::vector<DenseVoxel> bake_brick(const ColorField& field, const BakePlan& plan
     if (sum.alpha <= 0 || alpha < options.opacity_threshold) continue;
     const double density = std::min(max_sigma(h), -std::log1p(-alpha) / h);
     const Vec3d inside = sum.alpha_inside / sum.alpha;
-    if (densities == nullptr) densities = values();
-    densities[offset] = static_cast<float>(density);
-    kept.push_back(
-        {static_cast<std::uint16_t>(offset), {in_256ths(inside.x), in_256ths(inside.y), in_256ths(inside.z)}});
+    kept.push_back({static_cast<float>(density),
+                    brick,
+                    static_cast<std::uint16_t>(offset),
+                    {in_256ths(inside.x), in_256ths(inside.y), in_256ths(inside.z)}});
   }
-  kept.shrink_to_fit();
   return kept;
 }
 
@@ -100,27 +98,53 @@ double max_sigma(double voxel_size) {
   return kOpaqueDepth / voxel_size;
 }
 
-void parallel_batches(std::size_t tasks, const std::function<void(std::size_t)>& task,
-                      const std::function<void(double)>& advance) {
-  constexpr std::size_t kBatches = 64;
-  for (std::size_t batch = 0; batch < kBatches; ++batch) {
-    const std::size_t begin = tasks * batch / kBatches;
-    const std::size_t end = tasks * (batch + 1) / kBatches;
-    parallel_tasks(end - begin, [&](std::size_t i) { task(begin + i); });
-    advance(static_cast<double>(batch + 1) / kBatches);
-  }
+int plane_count(const BakePlan& plan) {
+  return (plan.resolution.x + kBrickSide - 1) / kBrickSide;
+}
+Vec3i plane_bricks(const BakePlan& plan) {
+  return {1, (plan.resolution.y + kBrickSide - 1) / kBrickSide, (plan.resolution.z + kBrickSide - 1) / kBrickSide};
+}
+Vec3i brick_min_of(const BakePlan& plan, int plane, std::uint32_t brick) {
+  const auto row = static_cast<std::uint32_t>(plane_bricks(plan).z);
+  return Vec3i{plane, static_cast<int>(brick / row), static_cast<int>(brick % row)} * kBrickSide;
 }
 
-DensityPass bake_density(const ColorField& field, const BakePlan& plan, const BakeOptions& options,
-                         const std::function<void(double)>& advance) {
-  DensityPass pass{BrickGrid<float>({0, 0, 0}, plan.resolution, 0.0f), {}};
-  pass.bricks.resize(pass.sigma.brick_count());
-  const auto bake_one = [&](std::size_t brick) {
-    pass.bricks[brick] = bake_brick(field, plan, options, pass.sigma.brick_min(brick),
-                                    [&] { return pass.sigma.make_brick(brick).data(); });
-  };
-  parallel_batches(pass.bricks.size(), bake_one, advance);
-  return pass;
+std::vector<DenseVoxel> bake_density_bricks(const ColorField& field, const BakePlan& plan, const BakeOptions& options,
+                                            int plane, std::span<const std::uint32_t> bricks) {
+  std::vector<std::vector<DenseVoxel>> of_bricks(bricks.size());
+  parallel_tasks(bricks.size(),
+                 [&](std::size_t b) { of_bricks[b] = bake_brick(field, plan, options, plane, bricks[b]); });
+  std::vector<DenseVoxel> voxels;
+  for (const std::vector<DenseVoxel>& brick : of_bricks) voxels.insert(voxels.end(), brick.begin(), brick.end());
+  return voxels;
+}
+
+std::vector<DenseVoxel> bake_density_plane(const ColorField& field, const BakePlan& plan, const BakeOptions& options,
+                                           int plane) {
+  const Vec3i counts = plane_bricks(plan);
+  std::vector<std::uint32_t> bricks(static_cast<std::size_t>(counts.y) * counts.z);
+  std::iota(bricks.begin(), bricks.end(), 0u);
+  return bake_density_bricks(field, plan, options, plane, bricks);
+}
+
+BrickGrid<float> empty_density(const BakePlan& plan) {
+  return {{0, 0, 0}, plan.resolution, 0.0f};
+}
+
+void put_plane(std::span<const DenseVoxel> voxels, int plane, BrickGrid<float>& sigma) {
+  const Vec3i counts = sigma.brick_counts();
+  const std::size_t first = static_cast<std::size_t>(plane) * counts.y * counts.z;
+  for (const DenseVoxel& voxel : voxels) sigma.make_brick(first + voxel.brick)[voxel.offset] = voxel.sigma;
+}
+
+BrickGrid<float> bake_density(const ColorField& field, const BakePlan& plan, const BakeOptions& options,
+                              const std::function<void(double)>& advance) {
+  BrickGrid<float> sigma = empty_density(plan);
+  for (int plane = 0; plane < plane_count(plan); ++plane) {
+    put_plane(bake_density_plane(field, plan, options, plane), plane, sigma);
+    advance((plane + 1.0) / plane_count(plan));
+  }
+  return sigma;
 }
 
 }  // namespace cnerf

@@ -1,6 +1,8 @@
 #include "bake/dilate.h"
 
 #include <algorithm>
+#include <array>
+#include <memory>
 #include <optional>
 #include <tuple>
 
@@ -19,20 +21,97 @@ constexpr int kBeyondInterpolation = 4;
 
 using IndexGrid = BrickGrid<std::int32_t>;
 
-IndexGrid index_voxels(const BakedVolume& volume, int radius) {
-  const VoxelBox box = bounding_box(volume.voxels);
-  Vec3i low = box.min - Vec3i{radius, radius, radius};
-  const Vec3i high = box.min + box.size + Vec3i{radius, radius, radius};
+/// The voxels of one plane of bricks, found by place.
+struct IndexedPlane {
+  int plane = 0;
+  std::vector<BakedVoxel> voxels;
+  std::optional<IndexGrid> grid;  ///< none when the plane is empty
+};
+
+IndexedPlane indexed(int plane, std::vector<BakedVoxel> voxels) {
+  IndexedPlane indexed{plane, std::move(voxels), {}};
+  if (indexed.voxels.empty()) return indexed;
+  const VoxelBox box = bounding_box(indexed.voxels);
+  Vec3i low = box.min, high = box.min + box.size;
   for (int axis = 0; axis < 3; ++axis) low[axis] &= ~(kBrickSide - 1);  // bricks are the leaves of a VDB
-  IndexGrid grid(low, high - low, kMissing);
-  for (std::size_t v = 0; v < volume.voxels.size(); ++v) {
-    const BakedVoxel& voxel = volume.voxels[v];
+  indexed.grid.emplace(low, high - low, kMissing);
+  for (std::size_t v = 0; v < indexed.voxels.size(); ++v) {
+    const BakedVoxel& voxel = indexed.voxels[v];
     const Vec3i at{voxel.i, voxel.j, voxel.k};
-    CNERF_CHECK(grid.at(at) == kMissing, "two baked voxels share a place");
-    grid.set(at, voxel.sigma > 0 ? static_cast<std::int32_t>(v) : kColorOnly);
+    CNERF_CHECK(indexed.grid->at(at) == kMissing, "two baked voxels share a place");
+    indexed.grid->set(at, voxel.sigma > 0 ? static_cast<std::int32_t>(v) : kColorOnly);
   }
-  return grid;
+  return indexed;
 }
+
+/// A plane of bricks between its neighbours.
+class PlaneWindow {
+ public:
+  explicit PlaneWindow(const VolumePlanes& source) : source_(source) {}
+
+  /// Moves to another plane; what stays in sight is not read again.
+  void move_to(int plane) {
+    std::array<std::shared_ptr<const IndexedPlane>, 3> next;
+    for (int n = 0; n < 3; ++n) {
+      for (const auto& known : planes_) {
+        if (known && known->plane == plane + n - 1) next[n] = known;
+      }
+      if (!next[n]) next[n] = std::make_shared<IndexedPlane>(indexed(plane + n - 1, source_.read(plane + n - 1)));
+    }
+    planes_ = next;
+  }
+  [[nodiscard]] const IndexedPlane& middle() const { return *planes_[1]; }
+
+  /// Bricks of the middle plane that may have density within eight voxels: their (y, z) as box of voxels.
+  [[nodiscard]] VoxelBox reach() const {
+    VoxelBox box;
+    Vec3i low, high;
+    bool any = false;
+    for (const auto& plane : planes_) {
+      if (!plane->grid) continue;
+      const Vec3i from = plane->grid->min(), to = from + plane->grid->size();
+      for (int axis = 1; axis < 3; ++axis) {
+        low[axis] = any ? std::min(low[axis], from[axis]) : from[axis];
+        high[axis] = any ? std::max(high[axis], to[axis]) : to[axis];
+      }
+      any = true;
+    }
+    if (!any) return box;
+    box.min = {kBrickSide * middle().plane, low.y - kBrickSide, low.z - kBrickSide};
+    box.size = {kBrickSide, high.y - low.y + 2 * kBrickSide, high.z - low.z + 2 * kBrickSide};
+    return box;
+  }
+  /// Whether a brick of the middle plane or one of its neighbours holds voxels.
+  [[nodiscard]] bool is_touched(Vec3i brick_min) const {
+    for (const auto& plane : planes_) {
+      if (!plane->grid) continue;
+      for (int y = -1; y <= 1; ++y) {
+        for (int z = -1; z <= 1; ++z) {
+          const Vec3i at{plane->grid->min().x, brick_min.y + kBrickSide * y, brick_min.z + kBrickSide * z};
+          if (plane->grid->contains(at) && plane->grid->has_brick(plane->grid->brick_of(at))) return true;
+        }
+      }
+    }
+    return false;
+  }
+  [[nodiscard]] bool is_missing(Vec3i voxel) const {
+    const IndexedPlane& plane = plane_of(voxel);
+    return !plane.grid || plane.grid->at(voxel) == kMissing;
+  }
+  /// The voxel there if it has density.
+  [[nodiscard]] const BakedVoxel* dense_at(Vec3i voxel) const {
+    const IndexedPlane& plane = plane_of(voxel);
+    if (!plane.grid) return nullptr;
+    const std::int32_t index = plane.grid->at(voxel);
+    return index >= 0 ? &plane.voxels[index] : nullptr;
+  }
+
+ private:
+  [[nodiscard]] const IndexedPlane& plane_of(Vec3i voxel) const { return *planes_[(voxel.x >> 3) - planes_[0]->plane]; }
+
+  VolumePlanes source_;
+  std::array<std::shared_ptr<const IndexedPlane>, 3> planes_;
+};
 
 /// All offsets of the cube of this radius, nearest first.
 std::vector<Vec3i> offsets_by_distance(int radius) {
@@ -47,10 +126,10 @@ std::vector<Vec3i> offsets_by_distance(int radius) {
 /// Which voxels of a brick have density within `radius`: a box dilation, one axis after the other.
 class NearDensity {
  public:
-  NearDensity(const IndexGrid& grid, Vec3i brick_min, int radius)
+  NearDensity(const PlaneWindow& window, Vec3i brick_min, int radius)
       : radius_(radius), side_(kBrickSide + 2 * radius), near_(static_cast<std::size_t>(side_) * side_ * side_) {
     for (std::size_t i = 0; i < near_.size(); ++i) {
-      near_[i] = grid.at(brick_min + position(i) - Vec3i{radius, radius, radius}) >= 0;
+      near_[i] = window.dense_at(brick_min + position(i) - Vec3i{radius, radius, radius}) != nullptr;
     }
     for (int axis = 0; axis < 3; ++axis) dilate(axis);
   }
@@ -78,18 +157,18 @@ class NearDensity {
   std::vector<char> near_;
 };
 
-std::vector<BakedVoxel> missing_voxels(const IndexGrid& grid, std::size_t brick, const std::vector<BakedVoxel>& voxels,
-                                       int radius, const std::vector<Vec3i>& offsets) {
-  const Vec3i brick_min = grid.brick_min(brick);
-  const NearDensity near_density(grid, brick_min, radius);
+std::vector<BakedVoxel> missing_voxels(const PlaneWindow& window, Vec3i brick_min, int radius,
+                                       const std::vector<Vec3i>& offsets) {
+  const NearDensity near_density(window, brick_min, radius);
   std::vector<BakedVoxel> added;
   std::optional<BakedVoxel> outer;
   for (int offset = 0; offset < kBrickVoxels; ++offset) {
     const Vec3i local = brick_local(offset);
     const Vec3i at = brick_min + local;
-    if (!near_density(local) || grid.at(at) != kMissing) continue;
-    const auto source = std::find_if(offsets.begin(), offsets.end(), [&](Vec3i o) { return grid.at(at + o) >= 0; });
-    BakedVoxel voxel = voxels[grid.at(at + *source)];
+    if (!near_density(local) || !window.is_missing(at)) continue;
+    const auto source =
+        std::find_if(offsets.begin(), offsets.end(), [&](Vec3i o) { return window.dense_at(at + o) != nullptr; });
+    BakedVoxel voxel = *window.dense_at(at + *source);
     if (dot(*source, *source) >= kBeyondInterpolation) {
       if (!outer) outer = voxel;
       voxel = *outer;
@@ -103,6 +182,24 @@ std::vector<BakedVoxel> missing_voxels(const IndexGrid& grid, std::size_t brick,
   return added;
 }
 
+/// The middle plane of the window with what it lacks.
+std::vector<BakedVoxel> dilated_plane(const PlaneWindow& window, int radius, const std::vector<Vec3i>& offsets) {
+  const VoxelBox reach = window.reach();
+  std::vector<Vec3i> bricks;
+  for (int y = 0; y < reach.size.y; y += kBrickSide) {
+    for (int z = 0; z < reach.size.z; z += kBrickSide) {
+      const Vec3i brick = reach.min + Vec3i{0, y, z};
+      if (window.is_touched(brick)) bricks.push_back(brick);
+    }
+  }
+  std::vector<std::vector<BakedVoxel>> added(bricks.size());
+  parallel_tasks(bricks.size(), [&](std::size_t b) { added[b] = missing_voxels(window, bricks[b], radius, offsets); });
+  std::vector<BakedVoxel> voxels = window.middle().voxels;
+  for (const std::vector<BakedVoxel>& brick : added) voxels.insert(voxels.end(), brick.begin(), brick.end());
+  sort_voxels(voxels);
+  return voxels;
+}
+
 }  // namespace
 
 void sort_voxels(std::vector<BakedVoxel>& voxels) {
@@ -110,34 +207,22 @@ void sort_voxels(std::vector<BakedVoxel>& voxels) {
             [](const BakedVoxel& a, const BakedVoxel& b) { return std::tie(a.i, a.j, a.k) < std::tie(b.i, b.j, b.k); });
 }
 
-VoxelBox bounding_box(const std::vector<BakedVoxel>& voxels) {
-  if (voxels.empty()) return {};
-  Vec3i low{voxels[0].i, voxels[0].j, voxels[0].k};
-  Vec3i high = low;
-  for (const BakedVoxel& voxel : voxels) {
-    const Vec3i at{voxel.i, voxel.j, voxel.k};
-    for (int axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], at[axis]);
-      high[axis] = std::max(high[axis], at[axis]);
-    }
-  }
-  return {low, high - low + Vec3i{1, 1, 1}};
+VolumePlanes dilated(const VolumePlanes& volume, int radius) {
+  CNERF_CHECK(radius >= 0 && radius <= kBrickSide, "dilation must be within [0, 8] voxels");
+  VolumePlanes result = volume;
+  if (volume.begin == volume.end) return result;
+  --result.begin;
+  ++result.end;
+  result.read = [window = PlaneWindow(volume), radius, offsets = offsets_by_distance(radius)](int plane) mutable {
+    window.move_to(plane);
+    return dilated_plane(window, radius, offsets);
+  };
+  return result;
 }
 
 void dilate_colors(BakedVolume& volume, int radius) {
-  CNERF_CHECK(radius >= 0 && radius <= kBrickSide, "dilation must be within [0, 8] voxels");
-  if (volume.voxels.empty()) return;
-  const IndexGrid grid = index_voxels(volume, radius);
-  const std::vector<Vec3i> offsets = offsets_by_distance(radius);
-  const std::vector<char> touched = bricks_with_neighbours(grid);
-  std::vector<std::vector<BakedVoxel>> added(grid.brick_count());
-  parallel_tasks(grid.brick_count(), [&](std::size_t brick) {
-    if (touched[brick]) added[brick] = missing_voxels(grid, brick, volume.voxels, radius, offsets);
-  });
-  for (const std::vector<BakedVoxel>& brick : added) {
-    volume.voxels.insert(volume.voxels.end(), brick.begin(), brick.end());
-  }
   sort_voxels(volume.voxels);
+  volume = whole_volume(dilated(planes_of(volume), radius));
 }
 
 }  // namespace cnerf

@@ -2,24 +2,22 @@
 /// Colour beyond the support of density: renderers interpolate colour and density apart, so at the rim of an object
 /// they would mix its colour with black if colour ended where density does.
 
-#include "bake/baked_volume.h"
+#include "bake/volume_planes.h"
 
 namespace cnerf {
 
-/// Adds every missing voxel within `radius` (in each axis) of a voxel with sigma > 0. The new ones have sigma 0 and the
-/// colour of the nearest voxel with density; those that interpolation does not reach (two voxels away and more) share
-/// one such colour a brick of 8^3, which costs a file nothing. Voxels that exist stay as they are; the result is
-/// sorted. May make voxels outside [0, resolution). Running it again adds nothing.
-/// @throws ContractError  when two voxels share a place.
+/// The volume with every missing voxel within `radius` (in each axis) of a voxel with sigma > 0. The new ones have
+/// sigma 0 and the colour of the nearest voxel with density; those that interpolation does not reach (two voxels away
+/// and more) share one such colour a brick of 8^3, which costs a file nothing. Voxels that exist stay as they are. May
+/// make voxels outside [0, resolution). Running it again adds nothing. Holds three planes of bricks at a time.
+/// @param radius  [0, 8] voxels.
+/// Reading throws ContractError when two voxels share a place.
+[[nodiscard]] VolumePlanes dilated(const VolumePlanes& volume, int radius);
+
+/// The same in memory; `volume` need not be sorted, the result is.
 void dilate_colors(BakedVolume& volume, int radius);
 
 /// Sorts voxels by (i, j, k).
 void sort_voxels(std::vector<BakedVoxel>& voxels);
-
-/// First voxel and extent of the box around all voxels; extent 0 when there are none.
-struct VoxelBox {
-  Vec3i min{}, size{};
-};
-[[nodiscard]] VoxelBox bounding_box(const std::vector<BakedVoxel>& voxels);
 
 }  // namespace cnerf

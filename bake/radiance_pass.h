@@ -1,12 +1,14 @@
 #pragma once
 /// Second pass of a bake: luminance as the cameras see it, and colour.
 
-#include <functional>
+#include <span>
 #include <vector>
 
 #include "bake/bake_camera.h"
 #include "bake/bake_levels.h"
 #include "bake/baked_volume.h"
+#include "bake/density_pass.h"
+#include "bake/view_selection.h"
 
 namespace cnerf {
 
@@ -18,16 +20,33 @@ struct VoxelColor {
 };
 [[nodiscard]] VoxelColor voxel_color(float luminance, Chromaticity chromaticity);
 
-/// The voxels of a density pass with their colours, by brick; those that no camera sees are left out unless
-/// `keep_unseen`. So are those that give less than `weight_threshold` of a pixel's light (transmittance times opacity)
-/// even to the camera that sees them best. Luminance is the mean over the cameras that see the voxel, weighted by
-/// transmittance; where none does, and everywhere when there are no cameras, over the six axis directions.
-/// @param levels  all levels of the bake; `level` is the one to bake, the others stand in its light.
-/// @param advance  as in bake_density.
-/// @throws ContractError  when the field answers a luminance or chromaticity that is not finite.
-[[nodiscard]] std::vector<BakedVoxel> bake_radiance(const ColorField& field, const std::vector<BakeCamera>& cameras,
-                                                    const std::vector<BakeLevel>& levels, std::size_t level,
-                                                    const BakeOptions& options,
-                                                    const std::function<void(double)>& advance);
+/// Second pass over one level of a bake. Voxels that no camera sees are left out unless `keep_unseen`. So are those
+/// that give less than `weight_threshold` of a pixel's light (transmittance times opacity) even to the camera that sees
+/// them best. Luminance is the mean over the cameras that see the voxel, weighted by transmittance; where none does,
+/// and everywhere when there are no cameras, over the six axis directions.
+class RadiancePass {
+ public:
+  /// @param levels  all levels of the bake; `level` is the one to bake, the others stand in its light. All must outlive
+  ///                this object.
+  RadiancePass(const ColorField& field, const std::vector<BakeCamera>& cameras, const std::vector<BakeLevel>& levels,
+               std::size_t level, const BakeOptions& options);
+
+  /// The voxels of a plane of the density pass with their colours, sorted by (i, j, k).
+  /// @throws ContractError  when the field answers a luminance or chromaticity that is not finite.
+  [[nodiscard]] std::vector<BakedVoxel> bake_plane(std::span<const DenseVoxel> dense, int plane) const;
+
+ private:
+  struct Queries;
+  [[nodiscard]] std::vector<BakedVoxel> bake_brick(std::span<const DenseVoxel> dense, int plane) const;
+  [[nodiscard]] Queries gather(std::span<const DenseVoxel> dense, Vec3i brick_min) const;
+  [[nodiscard]] std::vector<float> mean_luminance(const Queries& queries) const;
+  [[nodiscard]] std::vector<Chromaticity> ask_chromaticity(const Queries& queries) const;
+
+  const ColorField& field_;
+  const BakeLevel& level_;
+  ViewSelection views_;
+  double weight_threshold_;
+  bool keep_unseen_;
+};
 
 }  // namespace cnerf

@@ -3,31 +3,38 @@
 
 #include <vector>
 
+#include "bake/bake_journal.h"
 #include "bake/bake_levels.h"
-#include "bake/baked_volume.h"
+#include "bake/volume_planes.h"
 #include "src/base/progress.h"
 
 namespace cnerf {
 
-/// Bakes luminance and colour of a field on lattices whose density is known (bake_levels), dilated by
-/// `options.dilation` voxels. Densities are in 1/world unit. One volume for each level that holds anything, finest
-/// first. The caller fills in `colorizer` and `take` of the results.
+/// First half of a bake: density on each lattice of plan_levels, 1/world unit. What the journal has of it is not made
+/// again; what is made goes there.
+/// @param journal  of this bake and no other, see bake_journal.h.
+/// @throws InputError     when nothing is as opaque as `opacity_threshold`.
+/// @throws ContractError  when the field answers NaN, infinity or a negative density.
+/// @throws OutputError    when the journal cannot be written.
+/// @throws Interrupted    on Ctrl-C, between planes of bricks.
+[[nodiscard]] std::vector<BakeLevel> bake_levels(const ColorField& field, const std::vector<BakePlan>& plans,
+                                                 const BakeOptions& options, BakeJournal& journal,
+                                                 const ProgressSink& progress = {});
+
+/// Second half: luminance and colour on lattices whose density is known (bake_levels), not dilated. One volume for each
+/// level that holds anything, finest first. The caller fills in `colorizer` and `take` of the results.
 /// @param cameras  of the capture: a voxel's luminance is the mean of what they see, and voxels that none sees are
 ///                 dropped unless `keep_unseen`. Without cameras all voxels are kept.
-/// Same result for any number of threads.
+/// @param journal  the same; it must outlive the results, whose voxels stay there. `levels` need not.
+/// Same result for any number of threads, and however often the bake was stopped in between.
 /// @throws InputError     when no camera sees anything.
 /// @throws ContractError  when the field answers NaN or infinity.
-/// @throws Interrupted    on Ctrl-C, between batches of bricks.
-[[nodiscard]] std::vector<BakedVolume> bake_volumes(const ColorField& field, const std::vector<BakeCamera>& cameras,
-                                                    const std::vector<BakeLevel>& levels, const BakeOptions& options,
-                                                    const ProgressSink& progress = {});
+/// @throws OutputError, Interrupted  as bake_levels.
+[[nodiscard]] std::vector<VolumePlanes> bake_volumes(const ColorField& field, const std::vector<BakeCamera>& cameras,
+                                                     const std::vector<BakeLevel>& levels, const BakeOptions& options,
+                                                     BakeJournal& journal, const ProgressSink& progress = {});
 
-/// The density of a bake, with progress on the same line as bake_volumes.
-/// @throws UsageError, InputError, ContractError  as bake_levels.  @throws Interrupted.
-[[nodiscard]] std::vector<BakeLevel> bake_levels(const ColorField& field, std::vector<BakePlan> plans,
-                                                 const BakeOptions& options, const ProgressSink& progress);
-
-/// Both, on one lattice whatever `options.grids` says.
+/// Both, on one lattice whatever `options.grids` says, in memory; colours are dilated by `options.dilation`.
 [[nodiscard]] BakedVolume bake_volume(const ColorField& field, const std::vector<BakeCamera>& cameras,
                                       const BakeOptions& options, const ProgressSink& progress = {});
 

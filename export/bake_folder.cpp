@@ -4,6 +4,7 @@
 
 #include "export/blender_setup.h"
 #include "export/color_origin.h"
+#include "export/nvdb_writer.h"
 #include "export/usd_writer.h"
 #include "src/base/files.h"
 
@@ -19,10 +20,20 @@ BakeFolder::BakeFolder(fs::path folder, std::vector<BakeCamera> cameras, std::ve
   manifest_.up_axis = up_axis;
 }
 
-fs::path BakeFolder::add_volume(const BakedVolume& volume, const std::string& name, const VdbOptions& options) {
+fs::path BakeFolder::write_grids(const VolumePlanes& volume, const std::string& name, const VdbOptions& options) {
   const fs::path vdb = folder_ / (name + ".vdb");
   write_vdb(volume, vdb, options);
   list(vdb);
+  if (options.nvdb) {
+    const fs::path nvdb = folder_ / (name + ".nvdb");
+    write_nvdb(volume, nvdb, options);
+    list(nvdb);
+  }
+  return vdb;
+}
+
+fs::path BakeFolder::add_volume(const VolumePlanes& volume, const std::string& name, const VdbOptions& options) {
+  const fs::path vdb = write_grids(volume, name, options);
   manifest_.colorizer = volume.colorizer;
   manifest_.take = volume.take;
   manifest_.frame = volume.frame;
@@ -30,14 +41,16 @@ fs::path BakeFolder::add_volume(const BakedVolume& volume, const std::string& na
   return vdb;
 }
 
-std::vector<fs::path> BakeFolder::add_volumes(const std::vector<BakedVolume>& volumes, const std::string& name,
+fs::path BakeFolder::add_volume(const BakedVolume& volume, const std::string& name, const VdbOptions& options) {
+  return add_volume(planes_of(volume), name, options);
+}
+
+std::vector<fs::path> BakeFolder::add_volumes(const std::vector<VolumePlanes>& volumes, const std::string& name,
                                               const VdbOptions& options) {
   std::vector<fs::path> files{add_volume(volumes.back(), name, options)};
   for (std::size_t finer = 1; finer < volumes.size(); ++finer) {
-    const BakedVolume& volume = volumes[volumes.size() - 1 - finer];
-    const fs::path vdb = folder_ / (name + "_fine" + std::to_string(finer) + ".vdb");
-    write_vdb(volume, vdb, options);
-    list(vdb);
+    const VolumePlanes& volume = volumes[volumes.size() - 1 - finer];
+    const fs::path vdb = write_grids(volume, name + "_fine" + std::to_string(finer), options);
     manifest_.finer_volumes.insert(manifest_.finer_volumes.begin(),
                                    describe_volume(volume, vdb.filename().string(), options));
     files.push_back(vdb);
@@ -46,8 +59,8 @@ std::vector<fs::path> BakeFolder::add_volumes(const std::vector<BakedVolume>& vo
     std::vector<ManifestVolume> all = manifest_.finer_volumes;
     all.push_back(*manifest_.volume);
     const fs::path usd = folder_ / (name + ".usda");
-    write_usd(all, manifest_.up_axis, options.metres_per_unit, color_origin_text(manifest_.colorizer, manifest_.take),
-              usd);
+    write_usd(all, options.up == "poses" ? manifest_.up_axis : options.up, options.metres_per_unit,
+              color_origin_text(manifest_.colorizer, manifest_.take), usd);
     list(usd);
     files.push_back(usd);
   }

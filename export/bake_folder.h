@@ -27,11 +27,12 @@ class BakeFolder {
   BakeFolder(std::filesystem::path folder, std::vector<BakeCamera> cameras, std::vector<std::string> command_line,
              const std::string& units, const std::string& up_axis);
 
-  /// Writes `name`.vdb.  @throws ContractError, OutputError  as write_vdb.
+  /// Writes `name`.vdb and, if asked for, `name`.nvdb.  @throws ContractError, OutputError  as write_vdb.
+  std::filesystem::path add_volume(const VolumePlanes& volume, const std::string& name, const VdbOptions& options);
   std::filesystem::path add_volume(const BakedVolume& volume, const std::string& name, const VdbOptions& options);
   /// Nested grids, finest first: the coarsest as `name`.vdb, finer ones as `name`_fine1.vdb and so on.
   /// @return  the files, coarsest first.
-  std::vector<std::filesystem::path> add_volumes(const std::vector<BakedVolume>& volumes, const std::string& name,
+  std::vector<std::filesystem::path> add_volumes(const std::vector<VolumePlanes>& volumes, const std::string& name,
                                                  const VdbOptions& options);
   /// Writes `name`.gltf, .bin, .glb, `name`_basecolor.png and, if asked for, `name`_rgb.exr, _lum.exr and _lab.exr.
   /// To be called after add_volume, where there is a volume: the mesh then names it.
@@ -48,6 +49,7 @@ class BakeFolder {
   [[nodiscard]] std::filesystem::path blender_setup() const { return folder_ / "blender_setup.py"; }
 
  private:
+  std::filesystem::path write_grids(const VolumePlanes& volume, const std::string& name, const VdbOptions& options);
   void list(const std::filesystem::path& file) { manifest_.files.push_back(file.filename().string()); }
 
   std::filesystem::path folder_;

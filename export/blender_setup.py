@@ -241,7 +241,8 @@ def add_volume(scene, root, volume, folder, material):
     data.materials.append(material)
     shown = bpy.data.objects.new("cnerf volume", data)
     shown.parent = root
-    shown.location = (half_voxel_shift(volume),) * 3
+    turned_back = Matrix(volume.get("world_from_file", Matrix.Identity(4)))  # the file may stand up, the poses do not
+    shown.matrix_basis = Matrix.Translation((half_voxel_shift(volume),) * 3) @ turned_back
     scene.collection.objects.link(shown)
     return shown
 

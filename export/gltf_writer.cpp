@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "export/up_axis.h"
 #include "src/base/aabb.h"
 #include "src/base/check.h"
 #include "src/base/files.h"
@@ -258,10 +259,7 @@ std::string gltf_of(tinygltf::Model model, const std::string& buffer_name, const
 }  // namespace
 
 Affined gltf_from_world(const std::string& up_axis) {
-  if (up_axis == "y") return {};
-  if (up_axis == "x") return {{{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}}, {}};
-  CNERF_CHECK(up_axis == "z", up_axis);
-  return {{{{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}}, {}};
+  return turned_up(up_axis, "y");
 }
 
 GltfFiles write_gltf(const BakedMesh& mesh, const GltfScene& scene, const std::filesystem::path& folder,

@@ -2,7 +2,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "bake/dilate.h"
 #include "export/manifest_json.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -88,7 +87,9 @@ Json to_json(const ManifestVolume& volume) {
           {"density_unit", "1/world unit"},
           {"voxel_origin", volume.voxel_origin},
           {"half_density", volume.half_density},
-          {"density_scale", volume.density_scale}};
+          {"density_scale", volume.density_scale},
+          {"file_from_world", to_json(volume.file_from_world)},
+          {"world_from_file", to_json(volume.file_from_world.inverse())}};
 }
 
 ManifestVolume volume_from(const Json& j) {
@@ -102,6 +103,7 @@ ManifestVolume volume_from(const Json& j) {
   volume.voxel_origin = j.at("voxel_origin").get<std::string>();
   volume.half_density = j.at("half_density").get<bool>();
   volume.density_scale = j.value("density_scale", 1.0);
+  if (j.contains("file_from_world")) volume.file_from_world = affine_from(j.at("file_from_world"));
   return volume;
 }
 
@@ -207,25 +209,22 @@ Json color_json(const std::string& colorizer, const std::string& take) {
           {"take", take}};
 }
 
-ManifestVolume describe_volume(const BakedVolume& volume, const std::string& file, const VdbOptions& options) {
-  std::vector<BakedVoxel> dense;
-  ManifestVolume described;
-  for (const BakedVoxel& voxel : volume.voxels) {
-    if (!(voxel.sigma > 0)) continue;
-    dense.push_back(voxel);
-    described.max_density = std::max<double>(described.max_density, voxel.sigma);
-  }
-  const VoxelBox box = bounding_box(dense);
+ManifestVolume describe_volume(const VolumePlanes& volume, const std::string& file, const VdbOptions& options) {
+  const VolumeStatistics statistics = statistics_of(volume);
+  const VoxelBox& box = statistics.dense;
   const double h = volume.voxel_size;
+  ManifestVolume described;
   described.file = file;
   described.bounds = {volume.origin + box.min.cast<double>() * h,
                       volume.origin + (box.min + box.size).cast<double>() * h};
   described.voxel_size = h;
   described.resolution = volume.resolution;
-  described.voxels = dense.size();
+  described.voxels = statistics.voxels;
+  described.max_density = statistics.max_sigma;
   described.voxel_origin = options.voxel_origin;
-  described.half_density = density_fits_half(volume, options);
-  described.density_scale = density_scale(volume, options);
+  described.half_density = density_fits_half(statistics, options);
+  described.density_scale = density_scale(statistics, options);
+  described.file_from_world = file_from_world(options);
   return described;
 }
 

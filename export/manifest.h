@@ -28,8 +28,9 @@ struct ManifestVolume {
   std::string voxel_origin;  ///< "center" or "corner", see VdbOptions
   bool half_density = true;  ///< density is stored in 16 bits
   double density_scale = 1;  ///< what the file's density is to be multiplied with, 1/world unit
+  Affined file_from_world;   ///< a rotation, see VdbOptions::up
 };
-[[nodiscard]] ManifestVolume describe_volume(const BakedVolume& volume, const std::string& file,
+[[nodiscard]] ManifestVolume describe_volume(const VolumePlanes& volume, const std::string& file,
                                              const VdbOptions& options);
 
 /// The mesh of a bake. File names are relative to the manifest; empty = not written.

@@ -28,7 +28,10 @@ std::string quoted(const std::string& text) {
 
 std::string volume_prim(const ManifestVolume& volume, std::size_t number) {
   std::string text = fmt::format("    def Volume \"grid_{}\"\n    {{\n", number);
-  const Vec3d low = volume.bounds.min, high = volume.bounds.max;
+  Aabbd box = Aabbd::empty();  // of the file
+  box.grow(volume.file_from_world.point(volume.bounds.min));
+  box.grow(volume.file_from_world.point(volume.bounds.max));
+  const Vec3d low = box.min, high = box.max;
   text += fmt::format("        float3[] extent = [({}, {}, {}), ({}, {}, {})]\n", low.x, low.y, low.z, high.x, high.y,
                       high.z);
   for (const Field& field : kFields) {

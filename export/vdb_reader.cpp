@@ -65,7 +65,19 @@ void read_transform(const std::filesystem::path& path, const OpenedFile& file, c
   }
   volume.voxel_size = transform.voxelSize().x();
   const bool centred = meta_or<std::string>(file.metadata, "voxel_origin", "center") == "center";
-  const openvdb::Vec3d first = transform.indexToWorld(openvdb::Vec3d(0, 0, 0));
+  const auto upright = meta_or<openvdb::Mat4d>(file.metadata, "cnerf_world_to_source", openvdb::Mat4d::identity());
+  const auto world = [&](double i, double j, double k) {
+    return upright.transform(transform.indexToWorld(openvdb::Vec3d(i, j, k)));
+  };
+  const openvdb::Vec3d first = world(0, 0, 0);
+  const double h = volume.voxel_size;
+  const openvdb::Vec3d expected[] = {{h, 0, 0}, {0, h, 0}, {0, 0, h}};
+  const openvdb::Vec3d steps[] = {world(1, 0, 0) - first, world(0, 1, 0) - first, world(0, 0, 1) - first};
+  for (int axis = 0; axis < 3; ++axis) {
+    if ((steps[axis] - expected[axis]).length() > 1e-6 * h) {
+      throw InputError(path, "density", "expected voxels along the axes of the poses' frame");
+    }
+  }
   const double shift = centred ? volume.voxel_size / 2 : 0;
   volume.origin = {first.x() - shift, first.y() - shift, first.z() - shift};
 }

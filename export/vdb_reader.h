@@ -14,7 +14,7 @@ namespace cnerf {
 
 /// The active voxels of a file with a `density` grid; `color`, `lab_a`, `lab_b` and `luminance` are 0 where missing.
 /// Files that do not say where their values sit are taken as centred.
-/// @throws MissingInputError, InputError  e.g. without `density`, or with a transform that is not uniform.
+/// @throws MissingInputError, InputError  e.g. without `density`, or with a transform that is not uniform or turned.
 [[nodiscard]] BakedVolume read_vdb(const std::filesystem::path& path);
 
 /// The grids of a bake by its manifest, finest first.

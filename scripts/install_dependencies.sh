@@ -8,7 +8,7 @@ packages=(
   cmake ninja-build g++ pkg-config ccache
   libtorch-dev
   libopenblas0-pthread  # without it LibTorch falls back to the reference BLAS, which is many times slower
-  libopenvdb-dev libboost-iostreams-dev libopenvdb-tools
+  libopenvdb-dev libboost-iostreams-dev libopenvdb-tools libnanovdb-dev
   libopencv-dev libopenexr-dev libtinygltf-dev libmeshoptimizer-dev
   libexif-dev colmap
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libfmt-dev libspdlog-dev

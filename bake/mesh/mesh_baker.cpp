@@ -54,14 +54,14 @@ void put_into_world(const UnwrappedMesh& unwrapped, const BakePlan& plan, BakedM
 BakedMesh bake_mesh(const ColorField& field, const std::vector<BakeCamera>& cameras, const BakeLevel& level,
                     const BakeOptions& bake, const MeshOptions& options, const ProgressSink& sink) {
   const MeshProgress progress(sink);
-  const auto& [plan, density] = level;
-  const SurfaceMesh surface = make_surface(solidified(density.sigma, cameras, plan, bake), plan, options);
+  const auto& [plan, sigma] = level;
+  const SurfaceMesh surface = make_surface(solidified(sigma, cameras, plan, bake), plan, options);
   const UnwrappedMesh unwrapped = unwrap(surface, options.texture_size, options.gutter);
   progress.step(kDensityShare, kSurfaceShare)(1);
 
   BakedMesh mesh;
   put_into_world(unwrapped, plan, mesh);
-  const TexelShader shader(field, cameras, plan, bake, options, density.sigma);
+  const TexelShader shader(field, cameras, plan, bake, options, sigma);
   mesh.texture = bake_texture(unwrapped, shader, options.gutter, progress.step(kSurfaceShare, 1));
   mesh.voxel_size = plan.voxel_size;
   mesh.charts = unwrapped.charts;
@@ -73,9 +73,9 @@ BakedMesh bake_mesh(const ColorField& field, const std::vector<BakeCamera>& came
 BakedMesh bake_mesh(const ColorField& field, const std::vector<BakeCamera>& cameras, const BakeOptions& bake,
                     const MeshOptions& options, const ProgressSink& sink) {
   const MeshProgress progress(sink);
-  BakePlan plan = plan_bake(field, bake);
-  DensityPass density = bake_density(field, plan, bake, progress.step(0, kDensityShare));
-  return bake_mesh(field, cameras, BakeLevel{plan, std::move(density)}, bake, options, sink);
+  const BakePlan plan = plan_bake(field, bake);
+  const BakeLevel level{plan, bake_density(field, plan, bake, progress.step(0, kDensityShare))};
+  return bake_mesh(field, cameras, level, bake, options, sink);
 }
 
 }  // namespace cnerf

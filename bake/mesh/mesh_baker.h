@@ -12,9 +12,10 @@
 
 namespace cnerf {
 
-/// The surface of a baked density (of a bake of one level), reduced and unwrapped, and a
-/// texture of what the cameras see of it. The caller fills in `colorizer` and `take` of the result.
+/// The surface of a baked density, reduced and unwrapped, and a texture of what the cameras see of it. The caller fills
+/// in `colorizer` and `take` of the result.
 /// Same result for any number of threads.
+/// @param level    without a hole; see merged_level.
 /// @param cameras  of the capture: a texel's luminance is the mean of what they see.
 /// @throws UsageError     on options that contradict each other, or charts that do not fit into the texture.
 /// @throws InputError     when nothing in the box is opaque enough to have a surface.

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "bake/density_pass.h"
 #include "bake/mesh/texel_map.h"
 #include "bake/radiance_pass.h"
+#include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
 
 namespace cnerf {
@@ -120,12 +120,14 @@ BakedTexture bake_texture(const UnwrappedMesh& mesh, const TexelShader& shader, 
   for (auto* map : {&texture.luminance, &texture.a, &texture.b}) map->resize(texels);
   texture.coverage.resize(texels);
   const auto tiles = tiles_of(mesh);
-  parallel_batches(
-      tiles.size(),
-      [&](std::size_t tile) {
-        if (!tiles[tile].empty()) shade_tile(tiles[tile], shader, texture);
-      },
-      advance);
+  constexpr std::size_t kBatches = 64;
+  for (std::size_t batch = 0; batch < kBatches; ++batch) {
+    const std::size_t begin = tiles.size() * batch / kBatches, end = tiles.size() * (batch + 1) / kBatches;
+    parallel_tasks(end - begin, [&](std::size_t i) {
+      if (!tiles[begin + i].empty()) shade_tile(tiles[begin + i], shader, texture);
+    });
+    advance(double(batch + 1) / kBatches);
+  }
   fill_in(texture, reach);
   return texture;
 }

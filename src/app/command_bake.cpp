@@ -39,6 +39,7 @@ Work declare_bake(CLI::App& app) {
   add_short_form(app, arguments->run.config, "--voxel-size", "bake.voxel_size", "Side of a voxel in world units");
   add_short_form(app, arguments->run.config, "--grids", "bake.grids", "one, nested or auto: see docs/export.md");
   add_short_form(app, arguments->run.config, "--budget", "bake.budget", "Memory Cycles may take for the grids, as 4G");
+  add_short_form(app, arguments->run.config, "--max-memory", "bake.max_memory", "Memory the bake may take, as 1G");
   const auto flag = [&](const char* option, const char* setting, const char* help) {
     app.add_flag_callback(
         option, [arguments, setting] { arguments->run.config.short_forms.push_back(std::string(setting) + "=true"); },
@@ -47,9 +48,11 @@ Work declare_bake(CLI::App& app) {
   flag("--keep-unseen", "bake.keep_unseen", "Keep voxels that no camera sees");
   flag("--emission", "vdb.emission", "Also write a grid emission: density times color");
   flag("--normalize-density", "vdb.normalize_density", "Density from 0 to 1, for Unreal; the scale is in the metadata");
+  flag("--nvdb", "vdb.nvdb", "Also the grids as NanoVDB");
   flag("--usd", "vdb.usd", "Also a .usda with the grids");
   flag("--houdini", "vdb.houdini", "Also write the colour grid under Houdini's name, Cd");
   flag("--exr-mip", "exr.mip", "EXR textures as tiles with mip-map levels");
+  add_short_form(app, arguments->run.config, "--up", "vdb.up", "Axis that points up in the VDB: y, z or poses");
   add_short_form(app, arguments->run.config, "--voxel-origin", "vdb.voxel_origin",
                  "center, or corner for Blender <= 4.4");
   add_short_form(app, arguments->run.config, "--web-resolution", "web.resolution",

@@ -8,6 +8,8 @@ namespace cnerf {
 
 /// The most memory the process ever held resident, bytes.
 [[nodiscard]] std::size_t peak_memory_bytes();
+/// Memory it holds resident now, bytes; 0 where the system does not tell.
+[[nodiscard]] std::size_t held_memory_bytes();
 
 /// Seconds since it was made.
 class Stopwatch {

@@ -71,17 +71,5 @@ TEST(BakePlan, AnEmptyFieldIsAnInputError) {
   EXPECT_THROW((void)plan_bake(empty, {}), InputError);
 }
 
-TEST(BakePlan, EstimateBoundsTheVoxelsFromAbove) {
-  BakeOptions options;
-  options.resolution = 64;
-  const AnalyticField field = sphere_field();
-  const BakePlan plan = plan_bake(field, options);
-  const BakeEstimate estimate = estimate_bake(field, plan);
-  const double ball = 4.0 / 3 * 3.14159265 / std::pow(plan.voxel_size, 3);  // radius 1 in world units
-  EXPECT_GT(static_cast<double>(estimate.voxels), ball);
-  EXPECT_LT(static_cast<double>(estimate.voxels), 1.3 * ball);  // occupancy's margin is 1/32 of the radius
-  EXPECT_GT(estimate.memory_bytes, estimate.file_bytes);
-}
-
 }  // namespace
 }  // namespace cnerf::test

@@ -7,11 +7,13 @@
 #include <tuple>
 
 #include "bake/density_pass.h"
+#include "bake/dilate.h"
 #include "bake/radiance_pass.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
 #include "tests/bake/analytic_field.h"
+#include "tests/support/data.h"
 
 namespace cnerf::test {
 namespace {
@@ -227,6 +229,50 @@ TEST(BakeVolume, ReportsProgressUpToTheEndAndStopsWhenTold) {
   EXPECT_EQ(shares.back(), 1.0);
   EXPECT_THROW((void)bake_volume(slab(3), {}, slab_options(), [](const Progress&) { throw Interrupted("stop"); }),
                Interrupted);
+}
+
+TEST(BakeVolume, AStoppedBakeGoesOnToTheSameVoxels) {
+  const TempDir folder;
+  const AnalyticField field = slab(30);
+  const std::vector<BakeCamera> cameras{camera_at_positive_x()};
+  const BakeOptions options = slab_options();
+  const std::vector<BakePlan> plans{plan_bake(field, options)};
+  const auto bake = [&](BakeJournal& journal, const ProgressSink& sink) {
+    const auto levels = bake_levels(field, plans, options, journal, sink);
+    return whole_volume(bake_volumes(field, cameras, levels, options, journal, sink).front()).voxels;
+  };
+  BakeJournal undisturbed;
+  const std::vector<BakedVoxel> expected = bake(undisturbed, {});
+  ASSERT_FALSE(expected.empty());
+
+  int stops = 0;
+  for (std::size_t planes = 1;; ++planes) {  // every run is stopped after one plane more
+    std::size_t done = 0;
+    BakeJournal journal(folder / "unfinished", "bake");
+    EXPECT_EQ(journal.found(), planes - 1);
+    try {
+      EXPECT_EQ(bake(journal,
+                     [&](const Progress&) {
+                       if (++done == planes) throw Interrupted("stop");
+                     }),
+                expected);
+      break;
+    } catch (const Interrupted&) {
+      ++stops;
+    }
+  }
+  EXPECT_EQ(stops, 2 * plane_count(plans[0]));
+}
+
+TEST(BakeVolume, IsTheSameReadInPlanesAndWhole) {
+  BakeJournal journal;
+  const AnalyticField field = slab(3);
+  const BakeOptions options = slab_options();
+  const auto levels = bake_levels(field, {plan_bake(field, options)}, options, journal);
+  const VolumePlanes planes = bake_volumes(field, {}, levels, options, journal).front();
+  EXPECT_EQ(whole_volume(dilated(planes, options.dilation)).voxels, bake_volume(field, {}, options).voxels);
+  EXPECT_EQ(statistics_of(planes).voxels, 40u * 20 * 20);
+  EXPECT_EQ(statistics_of(planes).dense.size, (Vec3i{40, 20, 20}));
 }
 
 }  // namespace

@@ -1,11 +1,11 @@
-// What a bake keeps of its field: held-out views of a capture (all views where none is held out), rendered from the
-// baked voxels by our own integrator, against
+// What a bake keeps of its field: held-out views of a capture (all views where none is held out; with trained=1 those
+// that are not, evenly spread), rendered from the baked voxels by our own integrator, against
 //   * the field's render of the view: PSNR of sRGB-encoded colour;
 //   * the photograph: PSNR of sRGB-encoded luminance, beside that of the field.
 // All over black.
 //
 //   bake_comparison BAKE CAPTURE STAGE1.snapshot [TAKE.snapshot] [views=3] [downscale=1] [holdout=0] [rays=2]
-//                   [percent_of_step=50]
+//                   [percent_of_step=50] [trained=0]
 //
 // BAKE is a folder with manifest.json. `rays` are those along each axis of a pixel.
 
@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "bake/volume_integrator.h"
 #include "export/manifest.h"
@@ -39,15 +40,29 @@ void print(const std::string& name, const Sums& sums) {
   std::fflush(stdout);
 }
 
+/// The first held-out views (of all views where none is), or trained ones, evenly spread.
+std::vector<const cnerf::View*> views_to_compare(const cnerf::Capture& capture, bool trained, std::size_t most) {
+  const bool any_held_out =
+      std::any_of(capture.views.begin(), capture.views.end(), [](const auto& v) { return v.held_out; });
+  std::vector<const cnerf::View*> candidates, chosen;
+  for (const cnerf::View& view : capture.views) {
+    if (!any_held_out || view.held_out != trained) candidates.push_back(&view);
+  }
+  most = std::min(most, candidates.size());
+  for (std::size_t v = 0; v < most; ++v) chosen.push_back(candidates[trained ? v * candidates.size() / most : v]);
+  return chosen;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   auto [files, options] = cnerf::bench::parse_arguments(
-      argc, argv, {{"views", 3}, {"downscale", 1}, {"holdout", 0}, {"rays", 2}, {"percent_of_step", 50}});
+      argc, argv,
+      {{"views", 3}, {"downscale", 1}, {"holdout", 0}, {"rays", 2}, {"percent_of_step", 50}, {"trained", 0}});
   if (files.size() < 3) {
     std::puts(
         "bake_comparison BAKE CAPTURE STAGE1.snapshot [TAKE.snapshot] [views=N] [downscale=N] [holdout=N] "
-        "[rays=N] [percent_of_step=N]");
+        "[rays=N] [percent_of_step=N] [trained=0|1]");
     return 64;
   }
   cnerf::CaptureOptions capture_options;
@@ -56,17 +71,14 @@ int main(int argc, char** argv) {
   const cnerf::Capture capture = cnerf::load_capture(files[1], capture_options);
   const auto scene = cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "");
   const std::vector<cnerf::BakedVolume> levels = cnerf::read_volumes(files[0]);
-  const bool any_held_out =
-      std::any_of(capture.views.begin(), capture.views.end(), [](const auto& v) { return v.held_out; });
+  const auto views = views_to_compare(capture, options["trained"] != 0, std::size_t(options["views"]));
   cnerf::RenderOptions render;
   render.color = false;
   render.baked_color = scene->is_colorized();
 
   Sums mean;
-  int done = 0;
-  for (const cnerf::View& view : capture.views) {
-    if ((any_held_out && !view.held_out) || done >= options["views"]) continue;
-    ++done;
+  for (const cnerf::View* compared : views) {
+    const cnerf::View& view = *compared;
     const cnerf::VolumeImage ours = cnerf::integrate_volumes(levels, view.intrinsics, view.world_from_camera,
                                                              {options["percent_of_step"] / 100.0, options["rays"]});
     const cnerf::RenderedImage field = scene->render(view.intrinsics, view.world_from_camera, render);
@@ -89,5 +101,5 @@ int main(int argc, char** argv) {
     mean.pixels += sums.pixels;
   }
   print("all views", mean);
-  return done > 0 ? 0 : 65;
+  return views.empty() ? 65 : 0;
 }

@@ -1,6 +1,7 @@
 // A baked run in the real Blender: renders the held-out views of a capture in Cycles (linear EXR, box filter, volume
 // step rate 0.25) and compares them with our own integrator on the same grids, with the capture's colours and, where
-// snapshots are given, with the field's own render, over pixels whose opacity is above 0.01.
+// snapshots are given, with the field's own render, over pixels whose opacity is above 0.01; with the field's render
+// also over the whole picture, black where nothing is.
 //
 //   cycles_comparison BAKE CAPTURE [STAGE1.snapshot [TAKE.snapshot]] [views=3] [samples=64] [downscale=1] [holdout=0]
 //
@@ -52,10 +53,14 @@ int main(int argc, char** argv) {
     const cnerf::VolumeImage ours = cnerf::integrate_volumes(volumes, view.intrinsics, view.world_from_camera);
     const auto truth = cnerf::load_color_truth(view);
     const auto field = scene ? scene->render(view.intrinsics, view.world_from_camera, render) : cnerf::RenderedImage{};
-    double against_ours = 0, against_truth = 0, against_field = 0;
+    double against_ours = 0, against_truth = 0, against_field = 0, picture = 0;
     std::size_t values = 0;
     for (int p = 0; p < ours.width * ours.height; ++p) {
       const float* rgba = &cycles.rgba[4 * std::size_t(p)];
+      for (int c = 0; scene && c < 3; ++c) {
+        const float wanted = render.baked_color ? field.baked_rgb[3 * std::size_t(p) + c] : field.luminance[p];
+        picture += std::pow(encoded(rgba[c]) - encoded(wanted), 2);
+      }
       if (std::max(rgba[3], ours.opacity[std::size_t(p)]) <= 0.01f) continue;
       for (int c = 0; c < 3; ++c, ++values) {
         const double difference = double(rgba[c]) - ours.rgb[3 * std::size_t(p) + c];
@@ -71,7 +76,10 @@ int main(int argc, char** argv) {
     }
     std::printf("%s: Cycles against our integrator %.2f dB (linear)", view.name.c_str(),
                 decibels(against_ours, values));
-    if (scene) std::printf(", against the field %.2f dB (sRGB)", decibels(against_field, values));
+    if (scene) {
+      std::printf(", against the field %.2f dB (sRGB; %.2f dB over the picture)", decibels(against_field, values),
+                  decibels(picture, 3 * field.luminance.size()));
+    }
     if (truth) std::printf(", against the true colours %.2f dB (sRGB)", decibels(against_truth, values));
     std::printf(", over %zu pixels\n", values / 3);
     std::fflush(stdout);

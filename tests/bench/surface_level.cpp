@@ -98,7 +98,7 @@ int main(int argc, char** argv) {
   cnerf::BakeOptions bake;
   bake.resolution = options["resolution"];
   const cnerf::BakePlan plan = cnerf::plan_bake(*scene, bake);
-  const cnerf::DensityPass density = cnerf::bake_density(*scene, plan, bake, [](double) {});
+  const cnerf::BrickGrid<float> sigma = cnerf::bake_density(*scene, plan, bake, [](double) {});
   const cnerf::Aabbd box{{0, 0, 0}, plan.resolution.cast<double>()};
 
   std::vector<Line> lines;
@@ -119,7 +119,7 @@ int main(int argc, char** argv) {
     std::vector<double> offsets, distances;
     std::size_t only_field = 0, only_mesh = 0;
     for (std::size_t i = 0; i < lines.size(); ++i) {
-      const auto found = level_depth(density.sigma, depth * plan.voxel_size, lines[i]);
+      const auto found = level_depth(sigma, depth * plan.voxel_size, lines[i]);
       only_field += truth[i] && !found ? 1 : 0;
       only_mesh += found && !truth[i] ? 1 : 0;
       if (!found || !truth[i]) continue;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "bake/dilate.h"
 #include "bake/volume_baker.h"
 #include "bake/volume_integrator.h"
 #include "export/bake_folder.h"
@@ -218,6 +219,43 @@ TEST(Blender, CyclesAndOurIntegratorAgree) {
   EXPECT_LT(compare(cycles, integrate_volume(shifted, camera.intrinsics, camera.world_from_camera)).psnr, 40);
 }
 
+/// Off the middle in every direction, so that no wrong turn maps it onto itself.
+TEST(Blender, AFileThatStandsUpLiesWhereThePosesHaveIt) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const BakedVolume volume = soft_scene();
+  const BakeCamera camera = camera_at("three quarters", {3.6, -3.4, 1.9}, {2, -1, 0.5}, 80, 60, 130);
+  VdbOptions options;
+  options.up_axis = "z";
+  options.up = "y";
+  const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "balls", options);
+  const RenderedExr cycles = render_exact(bake.blender_setup, "--step-rate 0.25 --samples 32");
+  const Comparison equal = compare(cycles, integrate_volume(volume, camera.intrinsics, camera.world_from_camera));
+  EXPECT_GT(equal.pixels, 500u);
+  EXPECT_GE(equal.psnr, 40);
+}
+
+TEST(Blender, TheSceneShowsColoursAsTheyAreAndSkipsNoVoxel) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  BakedVolume volume = block_volume({0, 0, 0}, {4, 4, 4}, 1);
+  volume.voxels.push_back(volume.voxels.back());
+  volume.voxels.back().i = 1400;  // the diagonal has more voxels than Cycles has steps by default
+  const VolumeExport bake = export_volume(volume, {}, {}, folder.path(), "block");
+  std::ofstream(folder / "check.py")
+      << "import bpy\n"
+         "scene = bpy.data.scenes['cnerf']\n"
+         "assert scene.view_settings.view_transform == 'Standard'\n"
+         "assert scene.cycles.volume_step_rate <= 1 and scene.cycles.volume_max_steps > 1400\n"
+         "data = [o.data for o in scene.objects if o.type == 'VOLUME'][0]\n"
+         "assert data.render.space == 'OBJECT' and data.render.step_size == 0 and data.render.clipping == 0\n"
+         "assert data.render.precision == 'HALF'\n"
+         "assert all(a == b for a, b in zip(data.materials[0].node_tree.nodes['Volume Absorption'].inputs['Color']"
+         ".default_value, (0, 0, 0, 1)))\n"
+         "assert not [n for n in data.materials[0].node_tree.nodes if n.type == 'PRINCIPLED_VOLUME']\n";
+  EXPECT_EQ(run_blender(bake.blender_setup, "", folder / "check.py"), 0) << read_text_file(folder / "blender.log");
+}
+
 TEST(Blender, NestedGridsAgreeWithOurIntegrator) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
@@ -230,11 +268,14 @@ TEST(Blender, NestedGridsAgreeWithOurIntegrator) {
   BakeOptions options;
   options.resolution = 32;
   const std::vector<BakeCamera> cameras{camera, camera_at("right", {6, 0.4, 0}, {0, 0, 0}, 96, 96, 180)};
-  const auto levels = bake_levels(field, plan_levels(field, cameras, options), options, [](double) {});
-  const std::vector<BakedVolume> volumes = bake_volumes(field, cameras, levels, options);
-  ASSERT_GT(volumes.size(), 1u);
+  BakeJournal journal;
+  const auto levels = bake_levels(field, plan_levels(field, cameras, options), options, journal);
+  const std::vector<VolumePlanes> planes = bake_volumes(field, cameras, levels, options, journal);
+  ASSERT_GT(planes.size(), 1u);
+  std::vector<BakedVolume> volumes;
+  for (const VolumePlanes& level : planes) volumes.push_back(whole_volume(dilated(level, options.dilation)));
   BakeFolder bake(folder.path(), cameras, {}, "units", "y");  // stands up: the Empty turns everything with it
-  bake.add_volumes(volumes, "volume", {});
+  bake.add_volumes(planes, "volume", {});
   bake.finish();
   const RenderedExr cycles = render_exact(bake.blender_setup(), "--step-rate 0.25 --samples 64");
   const VolumeImage ours = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);
@@ -283,7 +324,8 @@ TEST(Blender, NumberedPicturesBecomeAFilmWithPlatesUnderAnUprightEmpty) {
   VdbOptions options;
   options.metres_per_unit = 0.01;
   BakeFolder bake(folder.path(), cameras, {}, "cm", "y");
-  bake.add_volumes({block_volume({0, 0, 0}, {4, 4, 4}, 1)}, "volume", options);
+  const BakedVolume block = block_volume({0, 0, 0}, {4, 4, 4}, 1);
+  bake.add_volumes({planes_of(block)}, "volume", options);
   bake.add_plate(cameras[1].name, make_web_photo(cameras[1].intrinsics, std::vector<float>(64, 0.5f), 8, 90).jpeg);
   bake.finish();
   std::ofstream(folder / "check.py")

@@ -126,6 +126,18 @@ const fs::path& tiny_capture() {
   return capture;
 }
 
+const fs::path& tiny_run() {
+  static const auto folder = std::make_unique<TempDir>();
+  static const fs::path run = [] {
+    const fs::path out = *folder / "run";
+    const ProgramResult made =
+        cnerf(concatenated({"train", tiny_capture().string(), "-o", out.string()}, tiny_options()));
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    return out;
+  }();
+  return run;
+}
+
 std::vector<std::string> files_below(const fs::path& folder) {
   std::vector<std::string> files;
   if (!fs::exists(folder)) return files;

@@ -29,6 +29,9 @@ struct ProgramResult {
 /// A sample capture of few, small views, made once for all tests of this process.
 [[nodiscard]] const std::filesystem::path& tiny_capture();
 
+/// A grey run of it, made once for all tests of this process.
+[[nodiscard]] const std::filesystem::path& tiny_run();
+
 /// All files below a folder, relative, sorted.
 [[nodiscard]] std::vector<std::string> files_below(const std::filesystem::path& folder);
 

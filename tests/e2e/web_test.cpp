@@ -16,19 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-/// A grey run, made once.
-const fs::path& tiny_run() {
-  static const auto folder = std::make_unique<TempDir>();
-  static const fs::path run = [] {
-    const fs::path out = *folder / "run";
-    const ProgramResult made =
-        cnerf(concatenated({"train", tiny_capture().string(), "-o", out.string()}, tiny_options()));
-    EXPECT_EQ(made.exit_code, 0) << made.err;
-    return out;
-  }();
-  return run;
-}
-
 TEST(Web, ABakeForBrowsersIsABundleWithPhotographs) {
   const TempDir folder;
   const fs::path bake = folder / "bake";

@@ -113,7 +113,7 @@ TEST(BakeFolder, NestedGridsAreListedAndReadBackFinestFirst) {
   VdbOptions options;
   options.usd = true;
   BakeFolder bake(folder.path(), {camera_at("a", {5, 5, 5}, {0, 0, 0}, 8, 8, 9)}, {}, "cm", "y");
-  const auto files = bake.add_volumes({fine, coarse}, "volume", options);
+  const auto files = bake.add_volumes({planes_of(fine), planes_of(coarse)}, "volume", options);
   bake.add_plate("images/a.png", std::vector<std::byte>(7));
   bake.finish();
   EXPECT_EQ(files.size(), 3u);
@@ -134,12 +134,12 @@ TEST(BakeFolder, ASecondBakeLeavesNothingOfTheFirst) {
   const BakedVolume volume = block_volume({0, 0, 0}, {4, 4, 4}, 2);
   std::ofstream(folder / "mine.txt") << "not of a bake";
   BakeFolder first(folder.path(), {}, {}, "m", "z");
-  first.add_volumes({volume, volume}, "volume", {});
+  first.add_volumes({planes_of(volume), planes_of(volume)}, "volume", {});
   first.add_plate("images/a.png", std::vector<std::byte>(7));
   first.finish();
   EXPECT_TRUE(std::filesystem::exists(folder / "plates" / "images_a.jpg"));
   BakeFolder second(folder.path(), {}, {}, "m", "z");
-  second.add_volumes({volume}, "volume", {});
+  second.add_volumes({planes_of(volume)}, "volume", {});
   second.finish();
   EXPECT_TRUE(std::filesystem::exists(folder / "volume.vdb"));
   EXPECT_TRUE(std::filesystem::exists(folder / "mine.txt"));

@@ -93,6 +93,49 @@ TEST(Vdb, CentreRuleAndCornerRule) {
   EXPECT_NEAR(grid_named(folder / "center.vdb", "density")->voxelSize().x(), 0.05, 1e-15);
 }
 
+/// Every axis that can point up, in the poses' frame and in the file.
+class VdbUp : public testing::TestWithParam<std::tuple<const char*, const char*>> {};
+
+TEST_P(VdbUp, TheFileStandsUpAndComesBackAsItWas) {
+  const auto [up_axis, up] = GetParam();
+  const TempDir folder;
+  VdbOptions options;
+  options.up_axis = up_axis;
+  options.up = up;
+  write_vdb(block(), folder / "a.vdb", options);
+  const auto density = grid_named(folder / "a.vdb", "density");
+  const auto position = [&](Vec3i at) { return density->indexToWorld(openvdb::Coord(at.x, at.y, at.z)); };
+  Vec3i upwards{};
+  upwards[*up_axis - 'x'] = 1;
+  const openvdb::Vec3d step = position(upwards) - position({0, 0, 0});
+  openvdb::Vec3d expected(0, 0, 0);
+  expected[*up - 'x'] = 0.05;
+  EXPECT_NEAR((step - expected).length(), 0, 1e-12);
+  const Affined turn = file_from_world(options);
+  EXPECT_NEAR(dot(turn.linear.rows[0], cross(turn.linear.rows[1], turn.linear.rows[2])), 1, 1e-15) << "not mirrored";
+  const Vec3d first = turn.point({1.025, 2.025, 3.025});
+  EXPECT_NEAR((position({0, 0, 0}) - openvdb::Vec3d(first.x, first.y, first.z)).length(), 0, 1e-12);
+  EXPECT_EQ(summarize_vdb(folder / "a.vdb").metadata.at("up_axis"), up);
+  const BakedVolume read = read_vdb(folder / "a.vdb");
+  EXPECT_NEAR(length(read.origin - block().origin), 0, 1e-12) << "in the poses' frame again";
+}
+
+INSTANTIATE_TEST_SUITE_P(Axes, VdbUp, testing::Combine(testing::Values("x", "y", "z"), testing::Values("y", "z")),
+                         [](const auto& axes) {
+                           return std::string(std::get<0>(axes.param)) + "Becomes" + std::get<1>(axes.param);
+                         });
+
+TEST(Vdb, VoxelsThatLieAskewAreRefused) {
+  const TempDir folder;
+  openvdb::initialize();
+  const auto grid = openvdb::FloatGrid::create();
+  grid->setName("density");
+  grid->tree().setValue(openvdb::Coord(0, 0, 0), 1);
+  grid->transform().postRotate(0.3, openvdb::math::Z_AXIS);
+  openvdb::io::File((folder / "a.vdb").string()).write({grid});
+  EXPECT_THROW((void)read_vdb(folder / "a.vdb"), InputError);
+}
+
 TEST(Vdb, ColorReachesBeyondDensityAndDensityIsPadded) {
   const TempDir folder;
   write_vdb(block(), folder / "a.vdb");

@@ -1,0 +1,82 @@
+#include "bake/bake_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bake/baked_volume.h"
+#include "bake/brick_grid.h"
+#include "bake/density_pass.h"
+#include "src/base/byte_count.h"
+#include "src/base/error.h"
+
+namespace cnerf {
+namespace {
+
+constexpr std::size_t kProbes = 8192;  ///< bricks of a grid that are looked into
+
+/// What is found in some bricks of a grid, blown up to all of them.
+struct Contents {
+  double voxels = 0, bricks = 0;
+  double in_fullest_plane = 0;  ///< voxels
+};
+
+Contents probe(const ColorField& field, const BakePlan& plan, const BakeOptions& options) {
+  const Vec3i counts = plane_bricks(plan);
+  const std::size_t in_plane = static_cast<std::size_t>(counts.y) * counts.z;
+  const std::size_t all = in_plane * static_cast<std::size_t>(plane_count(plan));
+  // Odd, so that it meets all columns of a plane whose rows are a power of two long.
+  const std::size_t stride = std::max<std::size_t>(1, all / kProbes) | 1;
+  Contents contents;
+  for (int plane = 0; plane < plane_count(plan); ++plane) {
+    const std::size_t begin = in_plane * static_cast<std::size_t>(plane);
+    std::vector<std::uint32_t> bricks;
+    for (std::size_t b = (stride - begin % stride) % stride; b < in_plane; b += stride) {
+      bricks.push_back(static_cast<std::uint32_t>(b));
+    }
+    const std::vector<DenseVoxel> voxels = bake_density_bricks(field, plan, options, plane, bricks);
+    double filled = 0;
+    for (std::size_t v = 0; v < voxels.size(); ++v) filled += v == 0 || voxels[v].brick != voxels[v - 1].brick ? 1 : 0;
+    contents.voxels += static_cast<double>(voxels.size() * stride);
+    contents.bricks += filled * static_cast<double>(stride);
+    contents.in_fullest_plane = std::max(contents.in_fullest_plane, static_cast<double>(voxels.size() * stride));
+  }
+  return contents;
+}
+
+}  // namespace
+
+BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>& plans, const BakeOptions& options) {
+  BakeOptions coarse = options;
+  coarse.subsamples = 1;                                           // counts, not values
+  constexpr double kBytesInHalf = 7 * 2;                           // density, colour, a, b, luminance
+  constexpr double kBrickBytes = kBrickVoxels * sizeof(float);     // of the density that light passes through
+  constexpr double kLeafBytes = 3 * kBrickVoxels * sizeof(float);  // of the largest grid of a file, that of colours
+  constexpr double kRim = 1.5;                                     // leaves that only hold dilated colours
+  constexpr double kPlanes = 4;                                    // held while a file is written
+  double density = 0, writing = 0;
+  BakeEstimate estimate;
+  for (const BakePlan& plan : plans) {
+    const Contents contents = probe(field, plan, coarse);
+    density +=
+        contents.bricks * kBrickBytes + static_cast<double>(plan.lattice_voxels() / kBrickVoxels * sizeof(void*));
+    density += contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel));
+    writing = std::max(
+        writing, contents.bricks * kRim * kLeafBytes + kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel));
+    estimate.voxels += static_cast<std::size_t>(contents.voxels);
+  }
+  estimate.memory_bytes = static_cast<std::size_t>(std::max(density, writing));
+  estimate.disk_bytes = estimate.voxels * (sizeof(DenseVoxel) + sizeof(BakedVoxel));
+  estimate.file_bytes = static_cast<std::size_t>(static_cast<double>(estimate.voxels) * kBytesInHalf);
+  return estimate;
+}
+
+void check_memory(const BakeEstimate& estimate, std::size_t held_bytes, const BakeOptions& options) {
+  if (options.max_memory.empty()) return;
+  const std::size_t allowed = bytes_from("max_memory", options.max_memory);
+  const std::size_t needed = estimate.memory_bytes + held_bytes;
+  if (needed <= allowed) return;
+  throw UsageError("max_memory: " + options.max_memory + " is too little, this bake takes about " + in_words(needed) +
+                   "; lower --resolution, cut the box with --aabb or raise bake.opacity_threshold");
+}
+
+}  // namespace cnerf

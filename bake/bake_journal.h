@@ -1,0 +1,61 @@
+#pragma once
+/// Finished parts of a bake on disk, so that a bake holds little in memory and goes on where it was stopped.
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace cnerf {
+
+/// A list of byte strings in a file that only grows. A process may be killed at any time: what is cut off or damaged is
+/// dropped when the file is opened again, and everything before it is still there. Not for several threads.
+class BakeJournal {
+ public:
+  /// In a file without a name, gone with the object.  @throws OutputError.
+  BakeJournal();
+  /// Continues `file` if it was begun under the same `identity`, else begins it anew.
+  /// @param identity  says all that the parts depend on; any text.  @throws OutputError.
+  BakeJournal(const std::filesystem::path& file, const std::string& identity);
+  ~BakeJournal();
+  BakeJournal(BakeJournal&&) noexcept;
+  BakeJournal& operator=(BakeJournal&&) noexcept;
+
+  [[nodiscard]] std::size_t size() const;
+  /// How many parts there were when the file was opened.
+  [[nodiscard]] std::size_t found() const;
+
+  /// Part `number`: read if it is finished, else made and written. Parts are made in order, without gaps.
+  /// @throws OutputError  when it cannot be written, e.g. on a full disk; and whatever `make` throws.
+  template <typename T>
+  std::vector<T> part(std::size_t number, const std::function<std::vector<T>()>& make) {
+    if (number < size()) return read<T>(number);
+    std::vector<T> made = make();
+    append(number, std::as_bytes(std::span<const T>(made)));
+    return made;
+  }
+  /// A finished part.  @throws InputError  when it cannot be read any more.
+  template <typename T>
+  [[nodiscard]] std::vector<T> read(std::size_t number) const {
+    static_assert(std::is_trivially_copyable_v<T>, "parts are stored as they lie in memory");
+    const std::vector<std::byte> bytes = read_bytes(number);
+    std::vector<T> values(bytes.size() / sizeof(T));
+    if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
+    return values;
+  }
+
+ private:
+  struct File;
+  void append(std::size_t number, std::span<const std::byte> bytes);
+  [[nodiscard]] std::vector<std::byte> read_bytes(std::size_t number) const;
+
+  std::unique_ptr<File> file_;
+};
+
+}  // namespace cnerf

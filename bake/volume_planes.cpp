@@ -1,0 +1,102 @@
+#include "bake/volume_planes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "bake/brick_grid.h"
+#include "src/base/check.h"
+
+namespace cnerf {
+namespace {
+
+/// Grows with every voxel it is told of.
+class GrowingBox {
+ public:
+  void add(const BakedVoxel& voxel) {
+    const Vec3i at{voxel.i, voxel.j, voxel.k};
+    for (int axis = 0; axis < 3; ++axis) {
+      low_[axis] = std::min(low_[axis], at[axis]);
+      high_[axis] = std::max(high_[axis], at[axis]);
+    }
+  }
+  [[nodiscard]] VoxelBox box() const {
+    if (low_.x > high_.x) return {};
+    return {low_, high_ - low_ + Vec3i{1, 1, 1}};
+  }
+
+ private:
+  static constexpr int kMost = std::numeric_limits<int>::max();
+  Vec3i low_{kMost, kMost, kMost}, high_{-kMost, -kMost, -kMost};
+};
+
+void check_voxel(const BakedVoxel& v) {
+  const bool finite = std::isfinite(v.sigma) && std::isfinite(v.luminance) && std::isfinite(v.rgb.x) &&
+                      std::isfinite(v.rgb.y) && std::isfinite(v.rgb.z) && std::isfinite(v.a) && std::isfinite(v.b);
+  CNERF_CHECK(finite && v.sigma >= 0, "voxel with NaN, infinity or negative density at " + std::to_string(v.i) + ", " +
+                                          std::to_string(v.j) + ", " + std::to_string(v.k));
+}
+
+int plane_of(int i) {
+  static_assert(kBrickSide == 8);
+  return i >> 3;  // downwards, also for negative ones
+}
+
+}  // namespace
+
+VolumePlanes planes_of(const BakedVolume& volume) {
+  const std::vector<BakedVoxel>& voxels = volume.voxels;
+  CNERF_CHECK(std::is_sorted(voxels.begin(), voxels.end(),
+                             [](const BakedVoxel& a, const BakedVoxel& b) {
+                               return std::tie(a.i, a.j, a.k) < std::tie(b.i, b.j, b.k);
+                             }),
+              "voxels must be sorted by (i, j, k)");
+  VolumePlanes planes{volume, 0, 0, {}};
+  if (!voxels.empty()) {
+    planes.begin = plane_of(voxels.front().i);
+    planes.end = plane_of(voxels.back().i) + 1;
+  }
+  planes.read = [&voxels](int plane) {
+    const auto before = [](const BakedVoxel& voxel, int i) { return voxel.i < i; };
+    const auto begin = std::lower_bound(voxels.begin(), voxels.end(), kBrickSide * plane, before);
+    const auto end = std::lower_bound(begin, voxels.end(), kBrickSide * (plane + 1), before);
+    return std::vector<BakedVoxel>(begin, end);
+  };
+  return planes;
+}
+
+BakedVolume whole_volume(const VolumePlanes& volume) {
+  BakedVolume whole{volume, {}};
+  for (int plane = volume.begin; plane < volume.end; ++plane) {
+    const std::vector<BakedVoxel> voxels = volume.read(plane);
+    whole.voxels.insert(whole.voxels.end(), voxels.begin(), voxels.end());
+  }
+  return whole;
+}
+
+VoxelBox bounding_box(const std::vector<BakedVoxel>& voxels) {
+  GrowingBox box;
+  for (const BakedVoxel& voxel : voxels) box.add(voxel);
+  return box.box();
+}
+
+VolumeStatistics statistics_of(const VolumePlanes& volume) {
+  VolumeStatistics statistics;
+  GrowingBox all, dense;
+  for (int plane = volume.begin; plane < volume.end; ++plane) {
+    for (const BakedVoxel& voxel : volume.read(plane)) {
+      check_voxel(voxel);
+      all.add(voxel);
+      if (!(voxel.sigma > 0)) continue;
+      dense.add(voxel);
+      ++statistics.voxels;
+      statistics.min_sigma = std::min(statistics.min_sigma, voxel.sigma);
+      statistics.max_sigma = std::max(statistics.max_sigma, voxel.sigma);
+    }
+  }
+  statistics.all = all.box();
+  statistics.dense = dense.box();
+  return statistics;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,94 @@
+#include "bake/bake_journal.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <numeric>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "tests/support/data.h"
+
+namespace cnerf::test {
+namespace {
+namespace fs = std::filesystem;
+
+std::vector<int> numbers(int count) {
+  std::vector<int> made(static_cast<std::size_t>(count));
+  std::iota(made.begin(), made.end(), count);
+  return made;
+}
+
+std::vector<int> never_made() {
+  ADD_FAILURE() << "a finished part was made again";
+  return {};
+}
+
+/// Parts of 0, 10, 20, ... numbers.
+void fill(const fs::path& file, std::size_t parts) {
+  BakeJournal journal(file, "one bake");
+  for (std::size_t p = 0; p < parts; ++p) {
+    (void)journal.part<int>(p, [p] { return numbers(10 * static_cast<int>(p)); });
+  }
+}
+
+TEST(BakeJournal, FinishedPartsAreReadNotMade) {
+  const TempDir folder;
+  fill(folder / "j", 4);
+  BakeJournal journal(folder / "j", "one bake");
+  EXPECT_EQ(journal.found(), 4u);
+  EXPECT_EQ(journal.part<int>(3, never_made), numbers(30));
+  EXPECT_EQ(journal.part<int>(0, never_made), numbers(0));
+  EXPECT_EQ(journal.part<int>(4, [] { return numbers(40); }), numbers(40));
+  EXPECT_EQ(journal.size(), 5u);
+}
+
+TEST(BakeJournal, AnotherBakeBeginsAnew) {
+  const TempDir folder;
+  fill(folder / "j", 4);
+  const BakeJournal journal(folder / "j", "another bake");
+  EXPECT_EQ(journal.size(), 0u);
+  EXPECT_EQ(BakeJournal(folder / "j", "another bake").found(), 0u);
+}
+
+TEST(BakeJournal, WhateverIsCutOffIsDroppedAndTheRestStays) {
+  const TempDir folder;
+  fill(folder / "whole", 4);
+  const auto whole = read_binary_file(folder / "whole");
+  std::size_t most = 0;
+  for (std::size_t bytes = 0; bytes <= whole.size(); ++bytes) {
+    write_file(folder / "cut", std::span(whole).first(bytes));
+    BakeJournal journal(folder / "cut", "one bake");
+    ASSERT_GE(journal.found(), most) << bytes;
+    most = journal.found();
+    for (std::size_t p = 0; p < journal.found(); ++p)
+      ASSERT_EQ(journal.read<int>(p), numbers(10 * static_cast<int>(p)));
+    if (bytes % 16 != 0) continue;
+    for (std::size_t p = 0; p < 4; ++p) {
+      (void)journal.part<int>(p, [p] { return numbers(10 * static_cast<int>(p)); });
+    }
+    ASSERT_EQ(read_binary_file(folder / "cut"), whole) << bytes;
+  }
+  EXPECT_EQ(most, 4u);
+}
+
+TEST(BakeJournal, DamagedPartsAreDropped) {
+  const TempDir folder;
+  fill(folder / "whole", 4);
+  auto bytes = read_binary_file(folder / "whole");
+  bytes[bytes.size() - 1] ^= std::byte{1};
+  write_file(folder / "damaged", bytes);
+  EXPECT_EQ(BakeJournal(folder / "damaged", "one bake").found(), 3u);
+}
+
+TEST(BakeJournal, PlacesThatCannotBeWrittenAreOutputErrors) {
+  const TempDir folder;
+  std::ofstream(folder / "file") << "no folder";
+  EXPECT_THROW(BakeJournal(folder / "file" / "j", "one bake"), OutputError);
+  BakeJournal journal;
+  EXPECT_THROW((void)journal.part<int>(1, [] { return numbers(1); }), ContractError) << "parts have an order";
+  EXPECT_THROW((void)journal.read<int>(0), ContractError);
+}
+
+}  // namespace
+}  // namespace cnerf::test

@@ -1,0 +1,71 @@
+/// cnerf bake that is stopped, runs out of disk or is not given enough memory.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "src/base/files.h"
+#include "tests/e2e/program.h"
+#include "tests/support/data.h"
+
+namespace cnerf::test {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+std::vector<std::string> bake_into(const fs::path& folder) {
+  return {"bake", tiny_run().string(), "-o", folder.string(), "--resolution", "64", "--progress", "json"};
+}
+
+/// A VDB from behind the identifier that OpenVDB draws at random for every file.
+std::vector<std::byte> grids_of(const fs::path& vdb) {
+  constexpr std::size_t kIdentifierEnds = 8 + 4 + 8 + 1 + 36;
+  const auto bytes = read_binary_file(vdb);
+  return {bytes.begin() + kIdentifierEnds, bytes.end()};
+}
+
+TEST(Bake, InterruptedOnesGoOnToTheSameBytes) {
+  const TempDir folder;
+  ASSERT_EQ(cnerf(bake_into(folder / "whole")).exit_code, 0);
+  const ProgramResult stopped = cnerf_interrupted_at(bake_into(folder / "parts"), "\"bake\"");
+  if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
+  EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
+  EXPECT_THAT(stopped.err, HasSubstr("the same command goes on"));
+  EXPECT_THAT(files_below(folder / "parts"), testing::ElementsAre("unfinished.bake"));
+  const ProgramResult resumed = cnerf(bake_into(folder / "parts"));
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_THAT(resumed.out, HasSubstr("going on where it was stopped"));
+  EXPECT_TRUE(grids_of(folder / "parts/volume.vdb") == grids_of(folder / "whole/volume.vdb"));
+  EXPECT_EQ(files_below(folder / "parts"), files_below(folder / "whole"));
+}
+
+TEST(Bake, OtherOptionsBeginAnew) {
+  const TempDir folder;
+  const ProgramResult stopped = cnerf_interrupted_at(bake_into(folder / "parts"), "\"bake\"");
+  if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
+  const ProgramResult other =
+      cnerf(concatenated(bake_into(folder / "parts"), {"--set", "bake.opacity_threshold=0.02"}));
+  ASSERT_EQ(other.exit_code, 0) << other.err;
+  EXPECT_THAT(other.out, testing::Not(HasSubstr("going on where it was stopped")));
+}
+
+TEST(Bake, AFullDiskIsNamedAndLosesNothing) {
+  const TempDir folder;
+  const ProgramResult full = cnerf_with_file_limit(bake_into(folder / "bake"), 40'000);
+  EXPECT_EQ(full.exit_code, 73) << full.err;
+  EXPECT_THAT(full.err, HasSubstr("unfinished.bake"));
+  EXPECT_THAT(files_below(folder / "bake"), testing::ElementsAre("unfinished.bake"));
+  EXPECT_EQ(cnerf(bake_into(folder / "bake")).exit_code, 0);
+}
+
+TEST(Bake, TooLittleMemoryIsRefusedBeforeAnythingIsBaked) {
+  const TempDir folder;
+  const ProgramResult refused = cnerf(concatenated(bake_into(folder / "bake"), {"--max-memory", "10M"}));
+  EXPECT_EQ(refused.exit_code, 64) << refused.err;
+  EXPECT_THAT(refused.err, testing::AllOf(HasSubstr("max_memory"), HasSubstr("10M")));
+  EXPECT_THAT(cnerf(concatenated(bake_into(folder / "bake"), {"--max-memory", "lots"})).err, HasSubstr("\"lots\""));
+  EXPECT_TRUE(files_below(folder / "bake").empty());
+  EXPECT_EQ(cnerf(concatenated(bake_into(folder / "bake"), {"--max-memory", "4G"})).exit_code, 0);
+}
+
+}  // namespace
+}  // namespace cnerf::test
