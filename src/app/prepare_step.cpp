@@ -23,6 +23,18 @@ bool is_empty_or_missing(const fs::path& folder) {
   return !fs::exists(folder, failure) || (fs::is_directory(folder, failure) && fs::is_empty(folder, failure));
 }
 
+/// What moved in a view, together with what was masked already, at the size of the view.
+cv::Mat1b still_part(const MotionMask& mask, const MonoImage& image) {
+  std::vector<std::uint8_t> codes = mask.valid;
+  cv::Mat1b still;
+  cv::resize(cv::Mat1b(mask.height, mask.width, codes.data()), still, {image.width, image.height}, 0, 0,
+             cv::INTER_NEAREST);
+  for (std::size_t p = 0; p < image.pixel_count(); ++p) {
+    if (!image.valid(p)) still(int(p) / still.cols, int(p) % still.cols) = 0;
+  }
+  return still;
+}
+
 /// Masks what moves, in files of the pictures' own size beside those that are there, and names them in transforms.json.
 void mask_motion(const fs::path& capture, const MotionMaskOptions& options, Reporter& reporter) {
   CaptureOptions reading;
@@ -42,14 +54,8 @@ void mask_motion(const fs::path& capture, const MotionMaskOptions& options, Repo
     if (mask.valid.empty()) left_alone += (left_alone.empty() ? "" : ", ") + view.name;
     if (mask.valid.empty() || mask.share == 0) continue;
     share += mask.share / double(masks.size());
-    std::vector<std::uint8_t> codes = mask.valid;
-    cv::Mat1b valid(mask.height, mask.width, codes.data()), sized;
-    cv::resize(valid, sized, {view.image.width, view.image.height}, 0, 0, cv::INTER_NEAREST);
-    for (std::size_t p = 0; p < view.image.pixel_count(); ++p) {
-      if (!view.image.valid(p)) sized(int(p) / sized.cols, int(p) % sized.cols) = 0;
-    }
     const fs::path file = fs::path("masks") / ("still_" + fs::path(view.name).stem().string() + ".png");
-    write_png(capture / file, sized);
+    write_png(capture / file, still_part(mask, view.image));
     for (auto& frame : transforms.at("frames")) {
       if (frame.at("file_path") == view.name) frame["mask_path"] = file.generic_string();
     }

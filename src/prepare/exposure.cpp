@@ -88,63 +88,104 @@ std::vector<double> solve_exposures(int views, const std::vector<Sighting>& sigh
   return out;
 }
 
-std::vector<ViewLight> solve_exposures_and_haze(int views, const std::vector<Sighting>& sightings) {
-  const std::vector<double> alone = solve_exposures(views, sightings);
-  std::vector<ViewLight> light;
-  for (const double exposure : alone) light.push_back({exposure, 0});
-  std::map<int, std::size_t> number;  // places are numbered with gaps
-  std::vector<int> sighted(std::size_t(views), 0);
-  for (const Sighting& seen : sightings) {
-    number.try_emplace(seen.place, number.size());
-    ++sighted[std::size_t(seen.view)];
-  }
-  std::vector<std::size_t> place(sightings.size());
-  for (std::size_t i = 0; i < sightings.size(); ++i) place[i] = number.at(sightings[i].place);
-  std::vector<double> weights(sightings.size(), 1.0), of_place(number.size());
-  for (int round = 0; round < kHazeRounds; ++round) {
-    // The best light of each place for the views as they stand ...
-    std::vector<double> sum(number.size(), 0.0), weight(number.size(), 0.0);
-    for (std::size_t i = 0; i < sightings.size(); ++i) {
-      const ViewLight& view = light[std::size_t(sightings[i].view)];
-      sum[place[i]] += weights[i] * view.exposure * (sightings[i].light - view.haze);
-      weight[place[i]] += weights[i] * view.exposure * view.exposure;
+namespace {
+
+/// Alternates between the light of places and that of views, which pull each other to a fit.
+class HazeFit {
+ public:
+  HazeFit(int views, const std::vector<Sighting>& sightings) : sightings_(sightings), weights_(sightings.size(), 1.0) {
+    for (const double exposure : solve_exposures(views, sightings)) light_.push_back({exposure, 0});
+    sighted_.assign(light_.size(), 0);
+    std::map<int, std::size_t> number;  // places are numbered with gaps
+    for (const Sighting& seen : sightings) {
+      place_.push_back(number.try_emplace(seen.place, number.size()).first->second);
+      ++sighted_[std::size_t(seen.view)];
     }
-    for (std::size_t p = 0; p < sum.size(); ++p) of_place[p] = sum[p] / weight[p];
-    // ... and the best line of each view through those.
-    struct Line {
+    of_place_.resize(number.size());
+  }
+
+  void round() {
+    light_places();
+    fit_lines();
+    fix_what_is_free();
+    reweight();
+  }
+  [[nodiscard]] const std::vector<ViewLight>& light() const { return light_; }
+
+ private:
+  [[nodiscard]] bool is_fitted(std::size_t view) const { return sighted_[view] >= kSightingsForHaze; }
+
+  /// The best light of each place for the views as they stand.
+  void light_places() {
+    std::vector<double> sum(of_place_.size(), 0.0), weight(of_place_.size(), 0.0);
+    for (std::size_t i = 0; i < sightings_.size(); ++i) {
+      const ViewLight& view = light_[std::size_t(sightings_[i].view)];
+      sum[place_[i]] += weights_[i] * view.exposure * (sightings_[i].light - view.haze);
+      weight[place_[i]] += weights_[i] * view.exposure * view.exposure;
+    }
+    for (std::size_t p = 0; p < sum.size(); ++p) of_place_[p] = sum[p] / weight[p];
+  }
+
+  /// The best line of each view through the light of its places.
+  void fit_lines() {
+    struct Sums {
       double w = 0, x = 0, y = 0, xx = 0, xy = 0;
     };
-    std::vector<Line> lines(std::size_t(views), Line{});
-    for (std::size_t i = 0; i < sightings.size(); ++i) {
-      Line& line = lines[std::size_t(sightings[i].view)];
-      const double w = weights[i], x = of_place[place[i]], y = sightings[i].light;
-      line.w += w, line.x += w * x, line.y += w * y, line.xx += w * x * x, line.xy += w * x * y;
+    std::vector<Sums> sums(light_.size());
+    for (std::size_t i = 0; i < sightings_.size(); ++i) {
+      Sums& s = sums[std::size_t(sightings_[i].view)];
+      const double w = weights_[i], x = of_place_[place_[i]], y = sightings_[i].light;
+      s.w += w, s.x += w * x, s.y += w * y, s.xx += w * x * x, s.xy += w * x * y;
     }
-    std::vector<double> exposures, hazes;
-    for (std::size_t v = 0; v < lines.size(); ++v) {
-      const Line& line = lines[v];
-      const double spread = line.w * line.xx - line.x * line.x;
-      if (sighted[v] < kSightingsForHaze || !(spread > 1e-9 * line.w * line.w)) continue;
-      light[v].exposure = std::max(1e-3, (line.w * line.xy - line.x * line.y) / spread);
-      light[v].haze = (line.y - light[v].exposure * line.x) / line.w;
-      exposures.push_back(light[v].exposure);
-      hazes.push_back(light[v].haze / light[v].exposure);
-    }
-    if (exposures.empty()) return light;
-    // Free are a factor and a light common to all places: the median exposure is 1, the least haze 0.
-    const double factor = median(exposures), least = *std::ranges::min_element(hazes);
-    for (std::size_t v = 0; v < lines.size(); ++v) {
-      if (sighted[v] < kSightingsForHaze) continue;
-      light[v].haze = std::max(0.0, light[v].haze - light[v].exposure * least);
-      light[v].exposure /= factor;
-    }
-    for (std::size_t i = 0; i < sightings.size(); ++i) {
-      const ViewLight& view = light[std::size_t(sightings[i].view)];
-      const double expected = view.exposure * factor * (of_place[place[i]] + least) + view.haze;
-      weights[i] = kExactLight / std::max(kExactLight, std::abs(sightings[i].light - expected));
+    for (std::size_t v = 0; v < sums.size(); ++v) {
+      const Sums& s = sums[v];
+      const double spread = s.w * s.xx - s.x * s.x;
+      if (!is_fitted(v) || !(spread > 1e-9 * s.w * s.w)) continue;
+      light_[v].exposure = std::max(1e-3, (s.w * s.xy - s.x * s.y) / spread);
+      light_[v].haze = (s.y - light_[v].exposure * s.x) / s.w;
     }
   }
-  return light;
+
+  /// A factor and a light common to all places: the median exposure becomes 1, the least haze 0.
+  void fix_what_is_free() {
+    std::vector<double> exposures, hazes;
+    for (std::size_t v = 0; v < light_.size(); ++v) {
+      if (!is_fitted(v)) continue;
+      exposures.push_back(light_[v].exposure);
+      hazes.push_back(light_[v].haze / light_[v].exposure);
+    }
+    if (exposures.empty()) return;
+    const double factor = median(exposures), least = *std::ranges::min_element(hazes);
+    for (std::size_t v = 0; v < light_.size(); ++v) {
+      if (!is_fitted(v)) continue;
+      light_[v].haze = std::max(0.0, light_[v].haze - light_[v].exposure * least);
+      light_[v].exposure /= factor;
+    }
+    for (double& light : of_place_) light = factor * (light + least);
+  }
+
+  void reweight() {
+    for (std::size_t i = 0; i < sightings_.size(); ++i) {
+      const ViewLight& view = light_[std::size_t(sightings_[i].view)];
+      const double off = sightings_[i].light - view.exposure * of_place_[place_[i]] - view.haze;
+      weights_[i] = kExactLight / std::max(kExactLight, std::abs(off));
+    }
+  }
+
+  const std::vector<Sighting>& sightings_;
+  std::vector<double> weights_;        ///< of the sightings
+  std::vector<std::size_t> place_;     ///< of the sightings, counted without gaps
+  std::vector<double> of_place_;       ///< light of the places
+  std::vector<ViewLight> light_;       ///< of the views
+  std::vector<int> sighted_;           ///< sightings of the views
+};
+
+}  // namespace
+
+std::vector<ViewLight> solve_exposures_and_haze(int views, const std::vector<Sighting>& sightings) {
+  HazeFit fit(views, sightings);
+  for (int round = 0; round < kHazeRounds; ++round) fit.round();
+  return fit.light();
 }
 
 std::vector<Observation> read_observations(const fs::path& model) {

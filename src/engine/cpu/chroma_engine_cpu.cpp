@@ -5,6 +5,7 @@
 
 #include "src/base/check.h"
 #include "src/engine/chroma_engine.h"
+#include "src/engine/chroma_state.h"
 #include "src/engine/cpu/point_net.h"
 #include "src/engine/cpu/step_chunks.h"
 #include "src/engine/initial_state.h"
@@ -74,13 +75,7 @@ class ChromaEngineCpu final : public ChromaEngine {
   }
 
   [[nodiscard]] long step_count() const override { return steps_.front(); }
-  [[nodiscard]] std::vector<StatePiece> state() override {
-    std::vector<StatePiece> state;
-    features_.append_state("features", state);
-    head_.append_state("head", state);
-    state.push_back(state_piece("chroma_steps", steps_));
-    return state;
-  }
+  [[nodiscard]] std::vector<StatePiece> state() override { return chroma_state(features_, head_, steps_); }
   void state_loaded() override {
     features_.state_loaded();
     head_.transpose_weights();

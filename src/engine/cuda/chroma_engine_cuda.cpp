@@ -2,6 +2,7 @@
 
 #include "src/base/check.h"
 #include "src/engine/chroma_engine.h"
+#include "src/engine/chroma_state.h"
 #include "src/engine/cuda/chroma_stream.h"
 #include "src/engine/cuda/pixel_batch.h"
 #include "src/engine/cuda/point_net.h"
@@ -70,11 +71,7 @@ class ChromaEngineCuda final : public ChromaEngine {
   [[nodiscard]] long step_count() const override { return steps_.front(); }
   [[nodiscard]] std::vector<StatePiece> state() override {
     const std::lock_guard lock(mutex_);
-    std::vector<StatePiece> state;
-    features_.append_state("features", state);
-    head_.append_state("head", state);
-    state.push_back(state_piece("chroma_steps", steps_));
-    return state;
+    return chroma_state(features_, head_, steps_);
   }
   void state_loaded() override {
     const std::lock_guard lock(mutex_);
