@@ -100,6 +100,10 @@ TEST(Prepare, LooksForMotionAlsoAfterwards) {
   const TempDir folder;
   const UserFolder user = without_poses(folder.path());
   const fs::path out = folder / "capture";
+  const fs::path disturbed = user.photos / load_capture(tiny_capture()).views.front().image_file.filename();
+  cv::Mat picture = cv::imread(disturbed.string(), cv::IMREAD_UNCHANGED);
+  picture(cv::Rect(picture.cols / 3, picture.rows / 3, picture.cols / 3, picture.rows / 3)) = cv::Scalar::all(255);
+  cv::imwrite(disturbed.string(), picture);
   std::vector<std::string> words = {"prepare", user.photos.string(), "-o", out.string(), "--colmap-model",
                                     user.model.string()};
   ASSERT_EQ(cnerf(words).exit_code, 0);
@@ -110,6 +114,7 @@ TEST(Prepare, LooksForMotionAlsoAfterwards) {
   const auto motion = nlohmann::json::parse(read_text_file(out / "prepare.json")).at("motion");
   EXPECT_EQ(motion.at("steps"), 50);
   const auto shares = motion.value("shares", nlohmann::json::object());
+  EXPECT_GT(shares.value("images/" + disturbed.stem().string() + ".png", 0.0), 0.05) << motion.dump();
   for (const View& view : load_capture(out).views) {
     const double hidden = double(std::ranges::count(view.image.mask, 0)) / double(view.image.pixel_count());
     EXPECT_NEAR(hidden, shares.value(view.name, 0.0), 0.02) << view.name;
