@@ -17,6 +17,7 @@ struct HashGridOptions {
   int log2_rows = 15;            ///< log2 T: rows a level has at most
   int coarsest_resolution = 16;  ///< N_min, cells an axis
   int finest_resolution = 1024;  ///< N_max, cells an axis
+  double decay = 0;              ///< of a row that a step moves, in units of the learning rate (decoupled)
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -25,6 +26,7 @@ struct HashGridOptions {
     v("log2_rows", log2_rows, Range{8, 24}, "log2 of the rows a level has at most (T)");
     v("coarsest_resolution", coarsest_resolution, Range{2, 1024}, "cells along an axis of the coarsest level (N_min)");
     v("finest_resolution", finest_resolution, Range{2, 65536}, "cells along an axis of the finest level (N_max)");
+    v("decay", decay, Range{0, 10}, "weight decay of the rows that a step moves, in units of the learning rate");
   }
 };
 

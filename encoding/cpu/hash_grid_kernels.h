@@ -28,9 +28,10 @@ struct HashGridKernels {
                         int channels, int first_channel, float* d_rows);
   /// Adam on the rows whose gradient is not zero; those gradients are set to zero. Rows without gradient keep their
   /// moments, as in Mueller et al. 2022, Sec. 4.
+  /// @param kept     what weight decay leaves of a row's features, 1 without
   /// @param moments  [rows, 8]: first moments of a row's 4 features, then second moments
-  void (*adam_rows)(float* table, float* d_rows, float* moments, std::size_t rows, float step_size, float beta1,
-                    float beta2, float epsilon, float second_correction);
+  void (*adam_rows)(float* table, float* d_rows, float* moments, std::size_t rows, float kept, float step_size,
+                    float beta1, float beta2, float epsilon, float second_correction);
 };
 
 /// The kernels of `active_isa()`.

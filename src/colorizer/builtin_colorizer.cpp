@@ -6,8 +6,10 @@
 #include <vector>
 
 #include "src/base/error.h"
+#include "src/base/parallel.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/network_weights.h"
+#include "src/colorizer/single_threaded_ops.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -16,7 +18,7 @@ using torch::Tensor;
 namespace {
 
 constexpr const char* kWeightsName = "colorizer.weights";
-constexpr int kPatchesPerPass = 8;
+constexpr int kPatchesPerPass = 8;  // on a GPU
 
 class BuiltinColorizer final : public Colorizer {
  public:
@@ -32,6 +34,15 @@ class BuiltinColorizer final : public Colorizer {
     }
     ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
     answer.ab.resize(2 * patches.lightness.size());
+    if (device_.is_cpu() && patches.batch > 1) {
+      // A task a patch: threads that share an operator spend more time on meeting than on work of this size.
+      const SingleThreadedOps single;
+      parallel_tasks(std::size_t(patches.batch), [&](std::size_t i) {
+        at::init_num_threads();
+        colorize_pass(patches, int(i), 1, answer);
+      });
+      return answer;
+    }
     for (int first = 0; first < patches.batch; first += kPatchesPerPass) {
       colorize_pass(patches, first, std::min(kPatchesPerPass, patches.batch - first), answer);
     }

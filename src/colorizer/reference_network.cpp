@@ -15,10 +15,7 @@
 #include "src/base/parallel.h"
 #include "src/color/ab_bins.h"
 #include "src/colorizer/network_weights.h"
-
-// Present when LibTorch computes with OpenBLAS, null otherwise.
-extern "C" __attribute__((weak)) void openblas_set_num_threads(int threads);
-extern "C" __attribute__((weak)) int openblas_get_num_threads();
+#include "src/colorizer/single_threaded_ops.h"
 
 namespace cnerf {
 namespace {
@@ -27,27 +24,6 @@ namespace nn = torch::nn;
 using torch::Tensor;
 
 constexpr float kAbScale = 40.0f;  // network units of ab: keeps outputs near 1
-
-/// One thread inside an operator while it lives: the parallel tasks around it are the parallelism, and a sum's order
-/// must not depend on the machine. OpenBLAS has threads of its own, which would spin beside ours.
-class SingleThreadedOps {
- public:
-  SingleThreadedOps() : torch_before_(at::get_num_threads()) {
-    at::set_num_threads(1);
-    if (openblas_get_num_threads == nullptr || openblas_set_num_threads == nullptr) return;
-    blas_before_ = openblas_get_num_threads();
-    openblas_set_num_threads(1);
-  }
-  ~SingleThreadedOps() {
-    at::set_num_threads(torch_before_);
-    if (blas_before_ > 0) openblas_set_num_threads(blas_before_);
-  }
-  SingleThreadedOps(const SingleThreadedOps&) = delete;
-  SingleThreadedOps& operator=(const SingleThreadedOps&) = delete;
-
- private:
-  int torch_before_, blas_before_ = 0;
-};
 
 /// Convolution, SiLU. No normalisation: with it, the same time of fitting ends at colours a tenth further from the
 /// truth.

@@ -24,12 +24,13 @@ struct LuminanceEngineOptions {
   int patch_size = 0;  ///< 0: independent pixels; K: pixels come as K x K patches (paper, Eq. patch sampling)
   float patch_scale_min = 0.3f, patch_scale_max = 0.7f;  ///< s, share of the image's short side
   float max_luminance = 1.0f;                            ///< of the images; the field emits at most a little more
+  float distortion_weight = 0;  ///< of each ray's distortion (distortion_math.h) in the loss
   std::uint64_t seed = 1;
 };
 
 /// What a step did.
 struct StepReport {
-  double loss = 0;           ///< mean over rays of ((L* - L*_observed) / 100)^2
+  double loss = 0;           ///< mean over rays of ((L* - L*_observed) / 100)^2 + distortion_weight * distortion
   double squared_error = 0;  ///< mean over rays, on sRGB-encoded luminance clamped to [0, 1]
   std::size_t rays = 0;
   std::size_t marched_samples = 0, trained_samples = 0;

@@ -15,12 +15,14 @@ struct AdamSettings {
 
 /// Bias corrections of optimiser step `step` (counted from 1), folded into the step size and the second moment.
 struct AdamStep {
+  float learning_rate = 0;
   float step_size = 0;
   float second_correction = 0;
 
   AdamStep() = default;
-  CNERF_HD AdamStep(const AdamSettings& settings, float learning_rate, long step)
-      : step_size(static_cast<float>(learning_rate / (1.0 - std::pow(double(settings.beta1), double(step))))),
+  CNERF_HD AdamStep(const AdamSettings& settings, float rate, long step)
+      : learning_rate(rate),
+        step_size(static_cast<float>(rate / (1.0 - std::pow(double(settings.beta1), double(step))))),
         second_correction(static_cast<float>(1.0 / (1.0 - std::pow(double(settings.beta2), double(step))))) {}
 
   /// Moves one parameter against its gradient `d`.

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "src/base/aabb.h"
+#include "src/base/host_device.h"
 #include "src/render/occupancy_grid.h"
 #include "src/render/ray.h"
 
@@ -17,6 +18,12 @@ struct MarchSettings {
   float dt_max = 0;
   float cone_angle = 0;  ///< 0: constant steps
 };
+
+/// Length of the step at t.
+[[nodiscard]] CNERF_HD inline float march_step(const MarchSettings& settings, float t) {
+  const float dt = settings.cone_angle * t;
+  return dt < settings.dt_min ? settings.dt_min : dt > settings.dt_max ? settings.dt_max : dt;
+}
 
 /// @param steps_per_box  across the innermost cascade; 1 / dt_min
 /// @param cone_angle     used by scenes of several cascades; a single one has constant steps
@@ -39,7 +46,7 @@ class RayMarcher {
     if (!inside) return;
     t_ = inside->begin;
     t_end_ = inside->end;
-    t_ += jitter * step(t_);
+    t_ += jitter * march_step(settings_, t_);
     for (int axis = 0; axis < 3; ++axis) {
       inverse_[axis] = ray.direction[axis] == 0 ? std::numeric_limits<float>::max() : 1.0f / ray.direction[axis];
     }
@@ -50,7 +57,7 @@ class RayMarcher {
     while (t_ < t_end_) {
       const Vec3f p = ray_.at(t_);
       const int cascade = grid_->cascade_of(p);
-      const float dt = step(t_);
+      const float dt = march_step(settings_, t_);
       if (grid_->occupied(cascade, p)) {
         sample = {t_, dt};
         t_ += dt;
@@ -64,10 +71,6 @@ class RayMarcher {
   }
 
  private:
-  [[nodiscard]] float step(float t) const {
-    return std::clamp(settings_.cone_angle * t, settings_.dt_min, settings_.dt_max);
-  }
-
   /// Steps on until the aligned cube of the given side around `p` is left.
   void leave_cell(Vec3f p, float side, float dt) {
     float exit = std::numeric_limits<float>::max();
@@ -80,7 +83,7 @@ class RayMarcher {
     if (settings_.cone_angle == 0) {
       t_ += dt * std::max(1.0f, std::ceil((target - t_) / dt));
     } else {
-      do t_ += step(t_);
+      do t_ += march_step(settings_, t_);
       while (t_ < target);
     }
   }

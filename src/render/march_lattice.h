@@ -30,8 +30,7 @@ class MarchLattice {
 
   /// Length of the step that starts at t.
   [[nodiscard]] CNERF_HD float step(float t) const {
-    const float dt = settings_.cone_angle * t;
-    return dt < settings_.dt_min ? settings_.dt_min : dt > settings_.dt_max ? settings_.dt_max : dt;
+    return march_step(settings_, t);
   }
   /// The index-th point.
   [[nodiscard]] CNERF_HD float t_at(int index) const {

@@ -42,11 +42,12 @@ struct Stage1Options {
   int patch_size = 32;                ///< K of patch sampling
   double learning_rate = 1e-2;        ///< of Adam at the start
   double final_learning_rate = 5e-4;  ///< reached by exponential decay over the last half
+  double distortion_weight = 3e-4;    ///< of a ray's distortion in the loss (src/render/distortion_math.h)
   int steps_per_box = 256;            ///< march steps across the innermost cascade's side
   double cone_angle = 1.0 / 64;       ///< march step over distance, where there are several cascades
   int checkpoint_every = 1000;        ///< steps between snapshots; 0 = only at the end
   int seed = 1;
-  HashGridOptions grid;
+  HashGridOptions grid = {.decay = 0.1};
   OccupancyOptions occupancy;
   PlacementOptions placement;
 
@@ -60,6 +61,8 @@ struct Stage1Options {
     v("patch_size", patch_size, Range{4, 256}, "K of patch sampling");
     v("learning_rate", learning_rate, Range{1e-8, 1}, "Adam's step size at the start");
     v("final_learning_rate", final_learning_rate, Range{1e-8, 1}, "Adam's step size at the end");
+    v("distortion_weight", distortion_weight, Range{0, 10},
+      "of a loss on how far apart the samples of a ray lie: against fog and floaters");
     v("steps_per_box", steps_per_box, Range{16, 8192}, "march steps across the side of the innermost cascade");
     v("cone_angle", cone_angle, Range{1e-4, 1}, "march step over distance, in scenes of several cascades");
     v("checkpoint_every", checkpoint_every, Range{0, 1e8}, "steps between snapshots; 0 = only at the end");

@@ -5,6 +5,7 @@
 //   reconstruction CAPTURE [downscale=1] [holdout=8] [seconds=60] [option=value ...]
 //   reconstruction CAPTURE [downscale=1] [holdout=8] samples=70,140,340 [option=value ...]
 //
+// With `validation=N` every N-th of the views to be trained on is judged instead of the held-out ones.
 // Options are stage 1's by their short names, e.g. grid.log2_rows=16 steps_per_box=512 samples_per_step=65536.
 
 #include <algorithm>
@@ -21,6 +22,7 @@
 #include "src/color/colorspace_math.h"
 #include "src/train/luminance_model.h"
 #include "src/train/options_json.h"
+#include "tests/support/validation_fold.h"
 
 namespace {
 
@@ -86,7 +88,7 @@ int main(int argc, char** argv) {
     return 64;
   }
   std::map<std::string, double> own = {{"downscale", 1},  {"holdout", 8}, {"seconds", 60},
-                                       {"eval_every", 1}, {"verbose", 0}, {"first", 0.25}};
+                                       {"eval_every", 1}, {"verbose", 0}, {"first", 0.25}, {"validation", 0}};
   std::vector<double> marks;  // of the training's length: million samples if given, else seconds
   nlohmann::json json = cnerf::options_to_json(cnerf::Stage1Options{});
   for (int i = 2; i < argc; ++i) {
@@ -111,7 +113,8 @@ int main(int argc, char** argv) {
   cnerf::CaptureOptions capture_options;
   capture_options.downscale = int(own["downscale"]);
   capture_options.holdout = int(own["holdout"]);
-  const cnerf::Capture capture = cnerf::load_capture(argv[1], capture_options);
+  cnerf::Capture capture = cnerf::load_capture(argv[1], capture_options);
+  if (own["validation"] > 0) cnerf::test::hold_out_of_training(capture, int(own["validation"]));
   cnerf::LuminanceModel model = cnerf::LuminanceModel::create(capture, options);
   const auto views = cnerf::training_views(capture, model.frame);
   std::printf("%zu training views of %dx%d, %d cascades, side %.3f world units\n", views.size(), views[0].image->width,

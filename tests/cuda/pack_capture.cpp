@@ -1,6 +1,8 @@
 // Packs a capture for cnerf-cuda-check: reads it as `cnerf train` does, places the box, excludes what no view sees.
 //
-//   pack_capture CAPTURE FOLDER [downscale=1] [holdout=8] [option=value of stage 1 ...]
+//   pack_capture CAPTURE FOLDER [downscale=1] [holdout=8] [validation=N]
+//
+// With `validation` every N-th of the views to be trained on is judged instead of the held-out ones: for choosing settings.
 
 #include <cstdio>
 #include <string>
@@ -8,22 +10,26 @@
 #include "src/capture/load_capture.h"
 #include "src/train/luminance_model.h"
 #include "tests/cuda/packed_capture.h"
+#include "tests/support/validation_fold.h"
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    std::puts("pack_capture CAPTURE FOLDER [downscale=N] [holdout=N]");
+    std::puts("pack_capture CAPTURE FOLDER [downscale=N] [holdout=N] [validation=N]");
     return 64;
   }
   cnerf::CaptureOptions options;
   options.holdout = 8;
+  int validation = 0;
   for (int i = 3; i < argc; ++i) {
     const std::string argument = argv[i];
     const std::size_t equals = argument.find('=');
-    (argument.substr(0, equals) == "downscale" ? options.downscale : options.holdout) =
+    const std::string name = argument.substr(0, equals);
+    (name == "downscale" ? options.downscale : name == "validation" ? validation : options.holdout) =
         std::stoi(argument.substr(equals + 1));
   }
   cnerf::test::PackedCapture packed;
   packed.capture = cnerf::load_capture(argv[1], options);
+  if (validation > 0) cnerf::test::hold_out_of_training(packed.capture, validation);
   cnerf::Stage1Options stage1;
   const auto model = cnerf::LuminanceModel::create(packed.capture, stage1);
   packed.frame = model.frame;

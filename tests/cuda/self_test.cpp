@@ -120,6 +120,7 @@ struct Problem {
   const char* name;
   int levels, log2_rows, finest, cascades, patch;
   bool with_alpha, with_lens, with_exposures = false;
+  float distortion_weight = 0;
 };
 
 void check_engine(const Problem& problem) {
@@ -152,6 +153,7 @@ void check_engine(const Problem& problem) {
   options.march = march_settings(problem.cascades, 64, 1.0 / 64);
   options.samples_per_step = 16384;
   options.patch_size = problem.patch;
+  options.distortion_weight = problem.distortion_weight;
   LuminanceEngineCpu cpu(options);
   LuminanceEngineCuda cuda(options);
   for (int i = 0; i < 40; ++i) cpu.step(views, 1e-2f);
@@ -281,6 +283,7 @@ int self_test(const Arguments& arguments) {
   check_hash_grid(8, 15);
   check_hash_grid(3, 19);
   check_engine({"opaque, exposures", 8, 14, 64, 1, 0, false, false, true});
+  check_engine({"distortion", 8, 14, 64, 2, 0, false, false, false, 0.3f});
   if (!quick) {
     check_engine({"alpha", 3, 12, 20, 1, 0, true, false});
     check_engine({"cascades, lens, mask", 12, 14, 128, 3, 0, false, true});

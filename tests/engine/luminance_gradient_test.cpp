@@ -12,6 +12,7 @@
 #include "src/engine/cpu/luminance_engine_cpu.h"
 #include "src/field/mlp_reference.h"
 #include "src/render/composite_math.h"
+#include "src/render/distortion_math.h"
 #include "tests/support/finite_difference.h"
 #include "tests/support/isa.h"
 #include "tests/support/toy_capture.h"
@@ -38,7 +39,8 @@ class LossInDouble {
       : levels_(engine.field().grid().levels()),
         density_(engine.field().density_net().layout()),
         luminance_(engine.field().luminance_net().layout()),
-        max_luminance_(engine.options().max_luminance) {
+        max_luminance_(engine.options().max_luminance),
+        distortion_weight_(engine.options().distortion_weight) {
     for (std::size_t r = 0; r < n_rays; ++r) {
       rays_.push_back(engine.observe(views, r));
       RayMarcher marcher(engine.occupancy(), engine.options().march, rays_.back().ray, rays_.back().jitter);
@@ -62,6 +64,7 @@ class LossInDouble {
     double loss = 0;
     for (std::size_t r = 0; r < rays_.size(); ++r) {
       Compositor<double> seen;
+      Distortion<double> distortion;
       for (const RaySample& sample : samples_[r]) {
         const Vec3f p = rays_[r].ray.at(sample.t);
         const std::vector<double> position = {std::clamp(double(p.x), 0.0, 1.0), std::clamp(double(p.y), 0.0, 1.0),
@@ -70,14 +73,16 @@ class LossInDouble {
         const double sigma = density_from_raw(features[0], 1.0);
         const Vec3d d = rays_[r].ray.direction.cast<double>();
         spherical_harmonics(d.x, d.y, d.z, [&](int, double value) { features.push_back(value); });
-        seen.add(alpha_of(sigma, double(sample.dt)), activation.value(luminance_net.forward(features).back()[0]));
+        const double weight =
+            seen.add(alpha_of(sigma, double(sample.dt)), activation.value(luminance_net.forward(features).back()[0]));
+        distortion.add(weight, {double(sample.t), double(sample.dt)});
       }
       const double background = rays_[r].background;
       const double wanted = rays_[r].target + (1.0 - rays_[r].coverage) * background;
       const double error =
           (lightness_from_luminance(seen.value + seen.transmittance * background) - lightness_from_luminance(wanted)) /
           100.0;
-      loss += error * error / double(rays_.size());
+      loss += (error * error + distortion_weight_ * distortion.value) / double(rays_.size());
     }
     return loss;
   }
@@ -85,7 +90,7 @@ class LossInDouble {
  private:
   std::vector<GridLevel> levels_;
   MlpLayout density_, luminance_;
-  double max_luminance_;
+  double max_luminance_, distortion_weight_;
   std::vector<LuminanceEngineCpu::ObservedRay> rays_;
   std::vector<std::vector<RaySample>> samples_;
 };
@@ -100,17 +105,24 @@ std::vector<std::size_t> telling_indices(const std::vector<double>& gradient, st
   return order;
 }
 
-class LuminanceGradient : public testing::TestWithParam<bool> {};
+struct Loss {
+  const char* name;
+  bool with_alpha;
+  float distortion_weight;
+};
+
+class LuminanceGradient : public testing::TestWithParam<Loss> {};
 
 TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
-  const bool with_alpha = GetParam();
-  const Capture capture = test::toy_capture(4, 24, 20, with_alpha);
+  const Capture capture = test::toy_capture(4, 24, 20, GetParam().with_alpha);
+  LuminanceEngineOptions options = small_engine();
+  options.distortion_weight = GetParam().distortion_weight;
   SceneFrame frame;
   frame.unit_per_world = 0.4;
   const std::vector<TrainingView> views = training_views(capture, frame);
   for (const IsaLevel isa : test::available_isas()) {
     const test::ScopedIsa scope(isa);
-    LuminanceEngineCpu engine(small_engine());
+    LuminanceEngineCpu engine(options);
     for (int i = 0; i < 12; ++i) engine.step(views, 1e-2f);  // away from the symmetric start
     const LuminanceEngineCpu::Gradients analytic = engine.gradients(views);
     ASSERT_GT(analytic.report.trained_samples, 500u);
@@ -143,8 +155,10 @@ TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Opaque, LuminanceGradient, testing::Values(false, true),
-                         [](const auto& param_info) { return param_info.param ? "WithAlpha" : "Opaque"; });
+INSTANTIATE_TEST_SUITE_P(Of, LuminanceGradient,
+                         testing::Values(Loss{"Opaque", false, 0}, Loss{"WithAlpha", true, 0},
+                                         Loss{"Distortion", false, 0.3f}, Loss{"DistortionAndAlpha", true, 0.3f}),
+                         [](const auto& param_info) { return param_info.param.name; });
 
 TEST(LuminanceEngine, StepsAreBitEqualForAnyNumberOfThreads) {
   const Capture capture = test::toy_capture();

@@ -42,6 +42,7 @@ class HashGridCpu {
 
  private:
   std::vector<GridLevel> levels_;
+  float decay_;
   const HashGridKernels* kernels_;
   AlignedVector<float> table_;    ///< [rows, 4]
   AlignedVector<float> d_table_;  ///< [rows, 4], zero between steps

@@ -9,6 +9,7 @@
 #include "src/color/colorspace_math.h"
 #include "src/engine/heaviest_samples.h"
 #include "src/render/composite_math.h"
+#include "src/render/distortion_math.h"
 
 namespace cnerf {
 namespace {
@@ -173,8 +174,12 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
 
   for (std::size_t r = 0; r < rays.size(); ++r) {
     Compositor<float> ray;
+    Distortion<float> distortion;
     for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
-      ray.add(alpha_of(field_.sigma(block.work, s), block.samples[s].dt), field_.luminance(block.work, s));
+      const MarchedSample& sample = block.samples[s];
+      const float alpha = alpha_of(field_.sigma(block.work, s), sample.dt);
+      const float weight = ray.add(alpha, field_.luminance(block.work, s));
+      if (options_.distortion_weight > 0) distortion.add(weight, {sample.t, sample.dt});
     }
     const float background = rays[r].background;
     const float seen = ray.value + ray.transmittance * background;
@@ -182,17 +187,27 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
     const float error = (lightness_from_luminance(seen) - lightness_from_luminance(wanted)) / 100.0f;
     const float encoded_error =
         srgb_from_linear(std::clamp(ray.value, 0.0f, 1.0f)) - srgb_from_linear(std::clamp(rays[r].target, 0.0f, 1.0f));
-    chunk.loss += error * error;
+    chunk.loss += error * error + options_.distortion_weight * distortion.value;
     chunk.squared_error += encoded_error * encoded_error;
 
     const float d_seen = gradient_scale * 2.0f * error * lightness_derivative(seen) / 100.0f;
+    const float d_distortion = gradient_scale * options_.distortion_weight;
+    // By Euler's theorem, the derivatives of the distortion by the weights, times the weights, sum up to twice itself.
+    float distortion_behind = 2.0f * distortion.value;
     Compositor<float> again;
+    Distortion<float> before;
     for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
       const float dt = block.samples[s].dt;
       const float luminance = field_.luminance(block.work, s);
       const float weight = again.add(alpha_of(field_.sigma(block.work, s), dt), luminance);
-      const float suffix = seen - again.value;
-      const float d_sigma = d_seen * density_derivative(dt, again.transmittance, luminance, suffix);
+      float d_sigma = d_seen * density_derivative(dt, again.transmittance, luminance, seen - again.value);
+      if (d_distortion > 0) {
+        const LogInterval<float> at(block.samples[s].t, dt);
+        const float d_weight = distortion_derivative(weight, at, before.weight, before.moment, distortion);
+        before.add(weight, at);
+        distortion_behind -= weight * d_weight;
+        d_sigma += d_distortion * density_derivative(dt, again.transmittance, d_weight, distortion_behind);
+      }
       field_.set_gradient(block.work, s, d_sigma, d_seen * weight);
     }
   }

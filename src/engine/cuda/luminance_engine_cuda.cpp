@@ -231,6 +231,7 @@ void LuminanceEngineCuda::follow_rays(cudaStream_t stream) {
   trace.state = m.state.data();
   trace.samples = {capacity_, reinterpret_cast<float4*>(m.places.data()), reinterpret_cast<uint4*>(m.encoded.data()),
                    reinterpret_cast<float2*>(m.gradients.data())};
+  trace.distortion_weight = options_.distortion_weight;
   trace_training_rays(trace, stream);
 }
 

@@ -94,7 +94,7 @@ __global__ void of_camera(const __grid_constant__ UnitCamera camera, std::uint32
   directions[ray] = encode_direction(record.ray.direction);
 }
 
-__global__ void adam_rows(const AdamStep* adam, std::uint32_t rows, float4* __restrict__ table,
+__global__ void adam_rows(const AdamStep* adam, std::uint32_t rows, float decay, float4* __restrict__ table,
                           float4* __restrict__ d_table, float4* __restrict__ moments, uint2* __restrict__ halves) {
   const std::uint32_t row = blockIdx.x * kThreads + threadIdx.x;
   if (row >= rows) return;
@@ -103,6 +103,8 @@ __global__ void adam_rows(const AdamStep* adam, std::uint32_t rows, float4* __re
   const AdamStep step = *adam;
   float4 value = table[row], first = moments[2 * std::size_t(row)], second = moments[2 * std::size_t(row) + 1];
   const AdamSettings settings;
+  const float kept = 1 - step.learning_rate * decay;
+  value = make_float4(kept * value.x, kept * value.y, kept * value.z, kept * value.w);
   step.apply(settings, d.x, first.x, second.x, value.x);
   step.apply(settings, d.y, first.y, second.y, value.y);
   step.apply(settings, d.z, first.z, second.z, value.z);
@@ -155,9 +157,9 @@ void camera_rays(const UnitCamera& camera, std::uint32_t first, std::uint32_t co
   CNERF_CUDA(cudaGetLastError());
 }
 
-void update_table(const AdamStep* adam, std::uint32_t rows, float4* table, float4* d_table, float4* moments,
-                  uint2* halves, cudaStream_t stream) {
-  adam_rows<<<blocks_for(rows), kThreads, 0, stream>>>(adam, rows, table, d_table, moments, halves);
+void update_table(const AdamStep* adam, std::uint32_t rows, float decay, float4* table, float4* d_table,
+                  float4* moments, uint2* halves, cudaStream_t stream) {
+  adam_rows<<<blocks_for(rows), kThreads, 0, stream>>>(adam, rows, decay, table, d_table, moments, halves);
   CNERF_CUDA(cudaGetLastError());
 }
 

@@ -56,9 +56,10 @@ void camera_rays(const UnitCamera& camera, std::uint32_t first, std::uint32_t co
                  DirectionCode* directions, cudaStream_t stream);
 
 /// Adam on rows of four features whose gradient is not zero; clears the gradient and renews the halves.
+/// @param decay    see HashGridOptions
 /// @param moments  [rows, 8]: first moments, then second ones
-void update_table(const AdamStep* adam, std::uint32_t rows, float4* table, float4* d_table, float4* moments,
-                  uint2* halves, cudaStream_t stream);
+void update_table(const AdamStep* adam, std::uint32_t rows, float decay, float4* table, float4* d_table,
+                  float4* moments, uint2* halves, cudaStream_t stream);
 /// Only the halves.
 void round_table(std::uint32_t rows, const float4* table, uint2* halves, cudaStream_t stream);
 

@@ -8,6 +8,7 @@
 #include "src/field/cuda/field_forward.cuh"
 #include "src/render/composite_math.h"
 #include "src/render/cuda/warp_march.cuh"
+#include "src/render/distortion_math.h"
 
 namespace cnerf {
 namespace {
@@ -38,11 +39,32 @@ struct RunOptics {
   [[nodiscard]] __device__ float total() const { return __shfl_sync(~0u, depth_through, 31); }
 };
 
+/// A ray's distortion, a run of samples at a time.
+struct RunDistortion {
+  Distortion<float> of_runs;  ///< weight and moment of the runs so far; of the value this lane's share
+
+  /// Adds a run, a sample a lane; returns the sums in front of this lane's sample.
+  __device__ Distortion<float> add(float w, const LogInterval<float>& at) {
+    const float own = w * at.place, weight = warp_prefix_sum(w), moment = warp_prefix_sum(own);
+    Distortion<float> before = {of_runs.weight + weight - w, of_runs.moment + moment - own, of_runs.value};
+    of_runs.weight += __shfl_sync(~0u, weight, 31);
+    of_runs.moment += __shfl_sync(~0u, moment, 31);
+    Distortion<float> through = before;
+    through.add(w, at);
+    of_runs.value = through.value;
+    return before;
+  }
+  [[nodiscard]] __device__ Distortion<float> total() const {
+    return {of_runs.weight, of_runs.moment, warp_sum(of_runs.value)};
+  }
+};
+
 /// What a ray has gathered so far. Runs lie in memory one after another, or wherever there was room; lane r knows where
 /// run r begins.
 struct RayProgress {
   float depth = 0;                      ///< optical
   float luminance = 0, weighted_t = 0;  ///< this lane's share
+  RunDistortion distortion;             ///< of training rays
   int samples = 0, marched = 0;
   std::uint32_t run_begin = 0;
   bool has_room = true;
@@ -82,15 +104,20 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
   const float seen = luminance + expf(-ray.depth) * record.background;
   const float wanted = record.target + (1.0f - record.coverage) * record.background;
   const float error = (lightness_from_luminance(seen) - lightness_from_luminance(wanted)) / 100.0f;
+  const Distortion<float> distortion = ray.distortion.total();
   if (lane == 0) {
     const float encoded_error = srgb_from_linear(__saturatef(luminance)) - srgb_from_linear(__saturatef(record.target));
-    sums.loss += error * error;
+    sums.loss += error * error + job.distortion_weight * distortion.value;
     sums.squared_error += encoded_error * encoded_error;
     sums.marched += unsigned(ray.marched);
     sums.dropped += ray.has_room ? 0u : 1u;
   }
   const float d_seen =
       ray.has_room ? 2.0f * error * lightness_derivative(seen) / (100.0f * static_cast<float>(n_rays)) : 0.0f;
+  const float d_distortion = ray.has_room ? job.distortion_weight / static_cast<float>(n_rays) : 0.0f;
+  // By Euler's theorem, the derivatives of the distortion by the weights, times the weights, sum up to twice itself.
+  float distortion_behind = 2.0f * distortion.value;
+  RunDistortion again;
   float depth = 0, composited = 0;
   for (int first = 0; first < ray.samples; first += 32) {
     const std::uint32_t at = __shfl_sync(~0u, ray.run_begin, first / 32) + lane;
@@ -100,8 +127,19 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
     const float value = job.field.activation.value(stored.y);
     const float weight = optics.weight();
     const float through = composited + warp_prefix_sum(weight * value);
-    const float d_log_density =
+    float d_log_density =
         stored.x * d_seen * density_derivative(1.0f, optics.transmittance_after(), value, seen - through);
+    if (job.distortion_weight > 0) {
+      const float4 place = mine ? job.samples.places[at] : make_float4(0, 0, 0, 0);
+      const float t = dot(Vec3f{place.x, place.y, place.z} - record.ray.origin, record.ray.direction);
+      const LogInterval<float> interval(t, march_step(job.march, t));
+      const Distortion<float> before = again.add(weight, interval);
+      const float d_weight = distortion_derivative(weight, interval, before.weight, before.moment, distortion);
+      const float taken = warp_prefix_sum(weight * d_weight);
+      d_log_density += stored.x * d_distortion *
+                       density_derivative(1.0f, optics.transmittance_after(), d_weight, distortion_behind - taken);
+      distortion_behind -= __shfl_sync(~0u, taken, 31);
+    }
     const float d_raw = d_seen * weight * job.field.activation.derivative(stored.y);
     if (mine) job.samples.gradients[at] = make_float2(d_raw, d_log_density);
     depth = optics.total();
@@ -152,6 +190,7 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
     ray.depth = __shfl_sync(~0u, optics.depth_through, count - 1);
 
     if constexpr (kKeep == Keep::kTraining) {
+      if (job.distortion_weight > 0) ray.distortion.add(weight, {sample.t, sample.dt});
       keep_for_training(job.samples, warp, ray, ray_index, count, place, depth, raw_luminance, &job.state->samples);
       is_open = is_open && ray.has_room;
     }

@@ -55,6 +55,7 @@ struct TraceJob {
   StepState* state;  ///< rays, next_ray, samples; training also sums up here
   // Training:
   SampleArrays samples;
+  float distortion_weight = 0;
   // Rendering:
   RayResult* results = nullptr;
   // Tracing:

@@ -79,6 +79,7 @@ class TrainedGrid {
   [[nodiscard]] std::uint32_t rows() const { return total_rows(levels_); }
 
   std::vector<GridLevel> levels_;
+  float decay_ = 0;
   StateBuffer table_, moments_;  // [rows, 4], [rows, 8]
   DeviceBuffer<float> d_table_;
   DeviceBuffer<std::uint16_t> halves_;

@@ -1,0 +1,18 @@
+#pragma once
+/// Choosing settings without looking at the views that judge them.
+
+#include <vector>
+
+#include "src/capture/capture.h"
+
+namespace cnerf::test {
+
+/// Drops the held-out views and holds out every `every`-th of the others in their place.
+inline void hold_out_of_training(Capture& capture, int every) {
+  std::erase_if(capture.views, [](const View& view) { return view.held_out; });
+  for (std::size_t i = 0; i < capture.views.size(); ++i) {
+    capture.views[i].held_out = i % std::size_t(every) == std::size_t(every) / 2;
+  }
+}
+
+}  // namespace cnerf::test
