@@ -58,19 +58,21 @@ struct Answers {
 class Colorization {
  public:
   Colorization(const Stage2Options& options, Colorizer& colorizer, std::filesystem::path take_snapshot,
-               const ProgressSink& progress, const PreviewSink& watcher = {}, std::vector<CachedView>* shared = nullptr)
+               const ProgressSink& progress, const PreviewSink& watcher = {}, std::vector<CachedView>* shared = nullptr,
+               EngineMakers makers = {})
       : options_(options),
         colorizer_(colorizer),
         file_(std::move(take_snapshot)),
         progress_(progress),
         watcher_(watcher),
+        makers_(std::move(makers)),
         views_(shared != nullptr ? *shared : own_views_) {}
 
   Stage2Report run(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                    std::span<const KnownColors> known, bool resume) {
     start_or_resume(sha256(read_binary_file(stage1_snapshot)), colorizer_.name() + describe(known), resume);
     seconds_before_ = model_.report.seconds;
-    cache_views(capture, LuminanceModel::load(stage1_snapshot));
+    cache_views(capture, LuminanceModel::load(stage1_snapshot, makers_));
     names_ = training_view_names(capture);
     known_ = KnownColorMap(views_, names_, known);
 
@@ -88,7 +90,7 @@ class Colorization {
   }
 
   void only_bases(const Capture& capture, const std::filesystem::path& stage1_snapshot) {
-    cache_views(capture, LuminanceModel::load(stage1_snapshot));
+    cache_views(capture, LuminanceModel::load(stage1_snapshot, makers_));
     names_ = training_view_names(capture);
     write_candidates(ask_candidates(), file_);
   }
@@ -96,7 +98,7 @@ class Colorization {
  private:
   void start_or_resume(const std::string& stage1_digest, const std::string& source, bool resume) {
     if (resume && std::filesystem::exists(file_)) {
-      model_ = ColorModel::load(file_);
+      model_ = ColorModel::load(file_, makers_);
       if (model_.stage1_sha256 != stage1_digest) {
         throw SnapshotError(file_.string() + ": colorizes another stage 1 snapshot; run without --resume");
       }
@@ -107,7 +109,7 @@ class Colorization {
       }
       return;
     }
-    model_ = ColorModel::create(options_);
+    model_ = ColorModel::create(options_, makers_);
     model_.colorizer = source;
     model_.stage1_sha256 = stage1_digest;
   }
@@ -451,6 +453,7 @@ class Colorization {
   std::filesystem::path file_;
   ProgressSink progress_;
   PreviewSink watcher_;
+  EngineMakers makers_;
   ColorModel model_;
   std::vector<CachedView> own_views_;
   std::vector<CachedView>& views_;
@@ -471,8 +474,8 @@ class Colorization {
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                           const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
                           const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress,
-                          const PreviewSink& previews, std::vector<CachedView>* shared) {
-  return Colorization(options, colorizer, take_snapshot, progress, previews, shared)
+                          const PreviewSink& previews, std::vector<CachedView>* shared, const EngineMakers& makers) {
+  return Colorization(options, colorizer, take_snapshot, progress, previews, shared, makers)
       .run(capture, stage1_snapshot, known, resume);
 }
 
