@@ -32,7 +32,7 @@ std::vector<const Method*> parse_methods(const std::string& list) {
   return methods;
 }
 
-Stage2Options stage2_of(const Method& method, Stage2Options configured) {
+Stage2Options stage2_of(const Method& method, Stage2Options configured, const CompareOptions& compare) {
   const std::string name = method.name;
   Stage2Options options = std::move(configured);
   if (name == "colornerf-paper") options.decode_temperature = 0;
@@ -42,6 +42,10 @@ Stage2Options stage2_of(const Method& method, Stage2Options configured) {
     options.questions = "views";
     options.injection = "photometric";
     options.purify.enabled = false;
+  }
+  if (method.has_own_field) {
+    options.learning_rate = compare.positional_learning_rate;
+    options.final_learning_rate = compare.positional_final_learning_rate;
   }
   options.distill_steps = 0;  // nothing is baked
   return options;
