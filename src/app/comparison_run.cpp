@@ -11,6 +11,10 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/capture/color_truth.h"
+#include "src/capture/luminance_plane.h"
+#include "src/color/colorspace_math.h"
+#include "src/colorizer/gallery.h"
+#include "src/evaluate/contact_sheet.h"
 #include "src/evaluate/flow_colorizer.h"
 #include "src/evaluate/positional_field.h"
 #include "src/evaluate/rating_sheet.h"
@@ -32,6 +36,8 @@ constexpr int kFrameQuality = 80;      // of a turntable's
 constexpr int kFramesPerSecond = 12;   // of a turntable
 constexpr std::size_t kLongRange = 8;  // the turntable's share that long-range consistency looks across
 
+constexpr int kStripWidth = 168;  // pixels of a picture in a strip: a document shows four side by side
+constexpr int kStripColumns = 4;
 constexpr std::size_t kMeasuredPixels = 1024;  // of a learning curve: rendering them by an MLP takes seconds
 constexpr int kManySteps = 100'000'000;        // the time ends a training, not these
 
@@ -118,6 +124,21 @@ Stage1Report train_measured(const Capture& capture, std::span<const View* const>
   points.push_back({report.seconds, pixels.psnr(*LuminanceModel::load(snapshot, makers).engine, march)});
   write_file(fs::path(snapshot).replace_extension(".curve"), to_text(points));
   return report;
+}
+
+/// A small tile of a picture in linear light.
+GalleryTile tile_of(int width, int height, const std::vector<float>& linear, std::string caption) {
+  const Picture small = scaled_down(picture_from_linear(width, height, linear), kStripWidth);
+  const std::size_t n = small.rgb.size() / 3;
+  GalleryTile tile{small.height, small.width, std::vector<float>(n), std::vector<float>(2 * n), std::move(caption)};
+  for (std::size_t p = 0; p < n; ++p) {
+    const auto light = [&](std::size_t c) { return linear_from_srgb(float(small.rgb[3 * p + c]) / 255.0f); };
+    const Lab<float> lab = lab_from_linear_rgb(Vec3f{light(0), light(1), light(2)});
+    tile.lightness[p] = lab.lightness;
+    tile.ab[p] = lab.a;
+    tile.ab[n + p] = lab.b;
+  }
+  return tile;
 }
 
 /// An empty folder unless it was made with these settings.
@@ -458,7 +479,27 @@ ReportCapture ComparisonRun::report_of(const Subject& subject) const {
   return report;
 }
 
+/// The first shown view by every method beside the input and the truth, for documents.
+fs::path ComparisonRun::write_strip(const Subject& subject) const {
+  const View& view = *subject.evaluated[subject.shown().front()];
+  std::vector<GalleryTile> tiles;
+  tiles.push_back(tile_of(view.image.width, view.image.height, luminance_plane(view.image), "input"));
+  for (const Method* method : plan_.methods) {
+    const fs::path file = folder_of(subject, plan_.seeds.front()) / method->name / "views" / numbered(0);
+    if (!method->is_colored || !fs::exists(file)) continue;
+    const ColorImage image = load_color_image(file);
+    tiles.push_back(tile_of(image.width, image.height, image.rgb, method->name));
+  }
+  if (const auto truth = load_color_truth(view)) {
+    tiles.push_back(tile_of(truth->width, truth->height, truth->rgb, "truth"));
+  }
+  const fs::path file = plan_.report / ("strip-" + subject.name + ".png");
+  write_gallery(file, tiles, kStripColumns);
+  return file;
+}
+
 void ComparisonRun::write_report() const {
+  for (const auto& subject : subjects_) reporter_.wrote("pictures", write_strip(*subject));
   std::vector<ReportCapture> captures;
   for (const auto& subject : subjects_) captures.push_back(report_of(*subject));
   write_file(plan_.report / "table.json", table_json(cells_, summary()));

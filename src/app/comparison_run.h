@@ -1,7 +1,7 @@
 #pragma once
 /// Runs a comparison: stage 1 once a capture and seed, every method on top of it, and a report of what is there.
 ///
-///   REPORT/table.json, table.md, report.html
+///   REPORT/table.json, table.md, report.html, strip-CAPTURE.png
 ///   REPORT/rating_sheet.html, rating_key.json      with --rating-sheet
 ///   REPORT/runs/CAPTURE/seed-N/stage1.snapshot
 ///   REPORT/runs/CAPTURE/seed-N/METHOD/             take.snapshot, cell.json, galleries, views/, turntable/
@@ -76,6 +76,7 @@ class ComparisonRun {
   void look(const Subject& subject, const Method& method, Geometry& geometry, ComparisonCell& cell) const;
   [[nodiscard]] std::unique_ptr<Colorizer> colorizer_for(const Subject& subject, const Method& method, int seed) const;
   [[nodiscard]] std::filesystem::path folder_of(const Subject& subject, int seed) const;
+  [[nodiscard]] std::filesystem::path write_strip(const Subject& subject) const;
   [[nodiscard]] ReportCapture report_of(const Subject& subject) const;
   [[nodiscard]] ComparisonSummary summary() const;
 

@@ -119,7 +119,8 @@ ProgressSink LearningCurve::watching(std::string task, ProgressSink inner) {
 void LearningCurve::measure(double now) {
   const Stopwatch watch;
   points_.push_back({now, measure_()});
-  next_ = std::max(kFirstMeasurement, kNextMeasurement * now);
+  // Not longer measuring than training.
+  next_ = std::max({kFirstMeasurement, kNextMeasurement * now, now + watch.seconds()});
   paused_ += watch.seconds();
 }
 

@@ -52,7 +52,7 @@ class HeldOutPixels {
   PixelSamples samples_;
 };
 
-/// Measures at times that grow by a factor.
+/// Measures at times that grow by a factor, and for no longer than there is training.
 class LearningCurve {
  public:
   explicit LearningCurve(std::function<double()> measure) : measure_(std::move(measure)) {}

@@ -23,6 +23,8 @@ namespace {
 
 constexpr int kBaseCandidates = 12;
 constexpr int kDistillPixels = 8192;  // pixels a distillation step
+constexpr double kDistillRate = 1e-2,
+                 kFinalDistillRate = 1e-3;  // of its own: distances want smaller steps than classes
 constexpr std::size_t kGalleryTiles = 20;
 constexpr int kWholeViewPatches = 2;  // a whole view is shown with a short side of so many patch sides
 constexpr std::uint64_t kFirstBaseIndex = std::uint64_t(1) << 32;  // patch indices of bases, apart from training's
@@ -394,8 +396,8 @@ class Colorization {
       const PixelSamples pixels = random_pixels(kDistillPixels, std::uint64_t(step));
       if (pixels.pixels() == 0) break;
       const double fraction = double(step) / options_.distill_steps;
-      loss_ = model_.chromaticity->step(pixels, model_.decode(pixels),
-                                        decayed(options_.learning_rate, options_.final_learning_rate, fraction));
+      loss_ =
+          model_.chromaticity->step(pixels, model_.decode(pixels), decayed(kDistillRate, kFinalDistillRate, fraction));
       after_step(step + 1, options_.distill_steps);
     }
   }

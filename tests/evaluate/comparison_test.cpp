@@ -167,6 +167,13 @@ TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
   EXPECT_EQ(of("colornerf-paper").decode_temperature, 0);
   EXPECT_EQ(of("oracle").patches, full.patches);
   EXPECT_EQ(of("positional-encoding").patches, full.patches);
+  Stage2Options fast;
+  fast.learning_rate = 0.05;
+  const auto rate_of = [&](const char* name) {
+    return stage2_of(*parse_methods(name).front(), fast, {}).learning_rate;
+  };
+  EXPECT_EQ(rate_of("without-purification"), 0.05);
+  EXPECT_EQ(rate_of("without-classification"), Stage2Options{}.learning_rate) << "its own best step size";
   EXPECT_EQ(of("positional-encoding").learning_rate, CompareOptions{}.positional_learning_rate);
   EXPECT_EQ(of("positional-encoding").injection, full.injection);
 }
