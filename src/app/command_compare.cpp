@@ -15,8 +15,8 @@ struct CompareArguments {
   ConfigArguments config;
   std::vector<std::string> captures, ratings;
   std::string out, methods = "all", lpips_weights;
-  int seeds = 1;
-  bool rating_sheet = false, resume = false, overwrite = false;
+  int seeds = 1, first_seed = 1;
+  bool rating_sheet = false, resume = false, overwrite = false, only_report = false;
 };
 
 void read_ratings_back(const CompareArguments& arguments, Reporter& reporter) {
@@ -40,7 +40,7 @@ void check_folder(const CompareArguments& arguments) {
   }
   if (arguments.overwrite) {
     fs::remove_all(folder / "runs");
-  } else if (!arguments.resume) {
+  } else if (!arguments.resume && !arguments.only_report) {
     throw UsageError(arguments.out +
                      ": holds a comparison already; pass --resume to go on with it or --overwrite to start again");
   }
@@ -56,10 +56,11 @@ void compare(const CompareArguments& arguments, const std::vector<std::string>& 
     reporter.say("no --colorizer given: a simulated one disturbs the true colours (docs/evaluation.md)");
   }
   ComparisonPlan plan;
-  plan.captures.assign(arguments.captures.begin(), arguments.captures.end());
+  for (const std::string& text : arguments.captures) plan.captures.push_back(parse_compared_capture(text));
+  plan.only_report = arguments.only_report;
   plan.report = arguments.out;
   plan.methods = parse_methods(arguments.methods);
-  for (int seed = 1; seed <= arguments.seeds; ++seed) plan.seeds.push_back(seed);
+  for (int i = 0; i < arguments.seeds; ++i) plan.seeds.push_back(arguments.first_seed + i);
   plan.lpips_weights = arguments.lpips_weights;
   for (const std::string& word : command_line) plan.command_line += (plan.command_line.empty() ? "" : " ") + word;
   check_folder(arguments);
@@ -75,18 +76,24 @@ void compare(const CompareArguments& arguments, const std::vector<std::string>& 
 
 Work declare_compare(CLI::App& app) {
   auto arguments = std::make_shared<CompareArguments>();
-  app.add_option("CAPTURE", arguments->captures, "Folders of colour photographs and camera poses");
+  app.add_option("CAPTURE", arguments->captures,
+                 "Folders of colour photographs and camera poses; FOLDER@4: image sizes divided by 4");
   app.add_option("-o,--out", arguments->out, "Folder of the report, made if needed")->required();
   app.add_option("--methods", arguments->methods, "Names of methods, comma-separated, or all [all]");
   app.add_option("--seeds", arguments->seeds, "How often everything is repeated, with seeds 1, 2, ... [1]")
       ->check(CLI::Range(1, 100));
+  app.add_option("--first-seed", arguments->first_seed, "Where the seeds begin, for parts that run side by side [1]")
+      ->check(CLI::Range(1, 1000000));
   app.add_option("--lpips-weights", arguments->lpips_weights, "LPIPS weights (X_f32.bin beside X_manifest.txt)");
   app.add_flag("--rating-sheet", arguments->rating_sheet, "Also write a page on which people judge unnamed pictures");
   app.add_option("--ratings", arguments->ratings, "Only make a table of these files of answers to the rating sheet");
   add_colorizer_options(app, arguments->config);
+  add_short_form(app, arguments->config, "--style-reference", "compare.style_reference",
+                 "Image whose style style-transfer takes");
   add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");
   add_short_form(app, arguments->config, "--holdout", "capture.holdout", "Keep every N-th view for evaluation");
   app.add_flag("--resume", arguments->resume, "Go on with a comparison; what is finished and unchanged stays");
+  app.add_flag("--only-report", arguments->only_report, "Train nothing; make the report of what is there");
   app.add_flag("--overwrite", arguments->overwrite, "Start again where a comparison is already");
   add_config_options(app, arguments->config);
   return [arguments](const auto& command_line) { compare(*arguments, command_line); };

@@ -6,19 +6,25 @@
 namespace cnerf {
 namespace {
 
-void eval(const RunFolderArguments& arguments, const std::vector<std::string>& command_line) {
+struct EvalArguments : RunFolderArguments {
+  std::string lpips_weights;
+};
+
+void eval(const EvalArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
   const std::string take = RunDirectory::open(arguments.run).choose_take(arguments.take);
   const RunContext context = open_run(arguments, take, command_line, reporter);
-  evaluate_step(context, take);
+  evaluate_step(context, take, arguments.lpips_weights);
   reporter.next("cnerf render " + arguments.run + " --path turntable");
 }
 
 }  // namespace
 
 Work declare_eval(CLI::App& app) {
-  auto arguments = std::make_shared<RunFolderArguments>();
+  auto arguments = std::make_shared<EvalArguments>();
   add_run_folder_options(app, *arguments);
+  app.add_option("--lpips-weights", arguments->lpips_weights,
+                 "Also measure LPIPS, with these weights (X_f32.bin beside X_manifest.txt)");
   return [arguments](const auto& command_line) { eval(*arguments, command_line); };
 }
 

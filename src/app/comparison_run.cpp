@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <sstream>
 
 #include "src/app/camera_path.h"
 #include "src/app/picture_files.h"
@@ -10,9 +11,17 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/capture/color_truth.h"
+#include "src/capture/luminance_plane.h"
+#include "src/color/colorspace_math.h"
+#include "src/colorizer/gallery.h"
+#include "src/evaluate/contact_sheet.h"
 #include "src/evaluate/flow_colorizer.h"
+#include "src/evaluate/positional_field.h"
 #include "src/evaluate/rating_sheet.h"
 #include "src/evaluate/simulated_colorizer.h"
+#include "src/evaluate/style_transfer.h"
+#include "src/train/color_model.h"
+#include "src/train/luminance_model.h"
 #include "src/train/options_json.h"
 
 namespace cnerf {
@@ -26,6 +35,11 @@ constexpr int kPictureQuality = 88;    // of JPEG
 constexpr int kFrameQuality = 80;      // of a turntable's
 constexpr int kFramesPerSecond = 12;   // of a turntable
 constexpr std::size_t kLongRange = 8;  // the turntable's share that long-range consistency looks across
+
+constexpr int kStripWidth = 168;  // pixels of a picture in a strip: a document shows four side by side
+constexpr int kStripColumns = 4;
+constexpr std::size_t kMeasuredPixels = 1024;  // of a learning curve: rendering them by an MLP takes seconds
+constexpr int kManySteps = 100'000'000;        // the time ends a training, not these
 
 bool is_simulated(const std::string& spec) {
   return spec == "simulated" || spec.starts_with("simulated:");
@@ -81,6 +95,52 @@ std::string settings_in(const fs::path& folder) {
   return fs::exists(file) ? read_text_file(file) : "";
 }
 
+std::string to_text(const std::vector<LearningPoint>& curve) {
+  std::string text;
+  for (const LearningPoint& point : curve) text += fmt::format("{:.6g} {:.6g}\n", point.seconds, point.value);
+  return text;
+}
+std::vector<LearningPoint> read_curve(const fs::path& file) {
+  std::vector<LearningPoint> curve;
+  std::istringstream lines(fs::exists(file) ? read_text_file(file) : "");
+  for (LearningPoint point; lines >> point.seconds >> point.value;) curve.push_back(point);
+  return curve;
+}
+
+/// Trains stage 1, and leaves the curve of its PSNR beside the snapshot.
+Stage1Report train_measured(const Capture& capture, std::span<const View* const> views, const Stage1Options& options,
+                            const fs::path& snapshot, const EngineMakers& makers, const ProgressSink& progress) {
+  const SceneFrame frame = place_scene(capture, options.placement);
+  const HeldOutPixels pixels(views, frame, kMeasuredPixels);
+  const MarchSettings march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
+  EngineWatch engines;
+  LearningCurve curve([&] { return pixels.psnr(*engines.luminance, march); });
+  const Stage1Report report =
+      train_stage1(capture, options, snapshot, true, curve.watching("stage 1", progress), {}, engines.over(makers));
+  // The engine is gone; what it came to is in the snapshot. What an earlier part of the training took comes first.
+  const double before = curve.points().empty() ? report.seconds : report.seconds - curve.seconds();
+  std::vector<LearningPoint> points = curve.points();
+  for (LearningPoint& point : points) point.seconds += std::max(before, 0.0);
+  points.push_back({report.seconds, pixels.psnr(*LuminanceModel::load(snapshot, makers).engine, march)});
+  write_file(fs::path(snapshot).replace_extension(".curve"), to_text(points));
+  return report;
+}
+
+/// A small tile of a picture in linear light.
+GalleryTile tile_of(int width, int height, const std::vector<float>& linear, std::string caption) {
+  const Picture small = scaled_down(picture_from_linear(width, height, linear), kStripWidth);
+  const std::size_t n = small.rgb.size() / 3;
+  GalleryTile tile{small.height, small.width, std::vector<float>(n), std::vector<float>(2 * n), std::move(caption)};
+  for (std::size_t p = 0; p < n; ++p) {
+    const auto light = [&](std::size_t c) { return linear_from_srgb(float(small.rgb[3 * p + c]) / 255.0f); };
+    const Lab<float> lab = lab_from_linear_rgb(Vec3f{light(0), light(1), light(2)});
+    tile.lightness[p] = lab.lightness;
+    tile.ab[p] = lab.a;
+    tile.ab[n + p] = lab.b;
+  }
+  return tile;
+}
+
 /// An empty folder unless it was made with these settings.
 void begin_folder(const fs::path& folder, const std::string& settings) {
   if (settings_in(folder) == settings) return;
@@ -90,8 +150,21 @@ void begin_folder(const fs::path& folder, const std::string& settings) {
 
 }  // namespace
 
+ComparedCapture parse_compared_capture(const std::string& text) {
+  const std::size_t at = text.rfind('@');
+  const std::string digits = at == std::string::npos ? "" : text.substr(at + 1);
+  const bool is_number =
+      !digits.empty() && digits.size() < 3 && digits.find_first_not_of("0123456789") == std::string::npos;
+  if (at == std::string::npos || fs::exists(text)) return {text, 0};
+  if (!is_number || std::stoi(digits) < 1 || std::stoi(digits) > 64) {
+    throw UsageError("CAPTURE: " + text + ": expected FOLDER@N, image sizes divided by N from 1 to 64");
+  }
+  return {text.substr(0, at), std::stoi(digits)};
+}
+
 struct ComparisonRun::Subject {
   std::string name;
+  CaptureOptions options;
   Capture capture;
   std::vector<const View*> evaluated;
 
@@ -104,19 +177,46 @@ struct ComparisonRun::Geometry {
   std::shared_ptr<TraceMemory> traces = make_trace_memory();
 };
 
+/// What a method's colours stand on.
+struct ComparisonRun::Field {
+  fs::path stage1;      ///< snapshot
+  EngineMakers makers;  ///< of it and of the colours
+  EngineMakers own;     ///< of a stage 1 of its own
+  bool is_shared = true;
+};
+
+ComparisonRun::Field ComparisonRun::field_of(const Subject& subject, const Method& method,
+                                             const Geometry& geometry) const {
+  Field field;
+  field.stage1 = geometry.folder / "stage1.snapshot";
+  if (!method.has_own_field) return field;
+  const SceneFrame frame = place_scene(subject.capture, config_.stage1.placement);
+  field.own = positional_engines(positional_rays(subject.capture, frame), config_.compare.positional_trains_encoding);
+  field.makers = field.own;
+  field.is_shared = config_.compare.positional_geometry == "shared";
+  if (field.is_shared) {
+    field.makers.luminance = make_luminance_engine;
+  } else {
+    field.stage1 = geometry.folder / method.name / "stage1.snapshot";
+  }
+  return field;
+}
+
 ComparisonRun::ComparisonRun(ComparisonPlan plan, Config config, Reporter& reporter)
     : plan_(std::move(plan)), config_(std::move(config)), reporter_(reporter) {
   if (!plan_.lpips_weights.empty()) lpips_ = std::make_unique<Lpips>(plan_.lpips_weights);
   if (is_simulated(config_.colorizer.spec)) (void)simulation_of(config_.colorizer.spec);
-  for (const fs::path& path : plan_.captures) {
+  for (const auto& [path, downscale] : plan_.captures) {
     auto subject = std::make_shared<Subject>();
-    subject->capture = read_capture(path, config_, reporter_);
+    Config of_subject = config_;
+    if (downscale > 0) of_subject.capture.downscale = downscale;
+    subject->capture = read_capture(path, of_subject, reporter_);
     if (!any_held_out(subject->capture) && config_.capture.holdout == 0) {
-      Config held_out = config_;
-      held_out.capture.holdout = kUsualHoldout;
+      of_subject.capture.holdout = kUsualHoldout;
       reporter_.say(fmt::format("nothing is held out by the capture: every {}th view is", kUsualHoldout));
-      subject->capture = load_capture(path, held_out.capture);
+      subject->capture = load_capture(path, of_subject.capture);
     }
+    subject->options = of_subject.capture;
     subject->evaluated = views_to_evaluate(subject->capture, {});
     if (!load_color_truth(*subject->evaluated.front())) {
       throw InputError(subject->evaluated.front()->image_file, "colour",
@@ -134,8 +234,9 @@ ComparisonRun::ComparisonRun(ComparisonPlan plan, Config config, Reporter& repor
 
 void ComparisonRun::run() {
   for (const auto& subject : subjects_) {
-    for (const int seed : plan_.seeds) run_capture(*subject, seed);
+    for (const int seed : plan_.seeds) plan_.only_report ? collect(*subject, seed) : run_capture(*subject, seed);
   }
+  if (cells_.empty()) throw UsageError(plan_.report.string() + ": no finished method of these captures and seeds");
 }
 
 fs::path ComparisonRun::folder_of(const Subject& subject, int seed) const {
@@ -146,11 +247,19 @@ void ComparisonRun::run_capture(const Subject& subject, int seed) {
   Geometry geometry{folder_of(subject, seed), {}};
   const std::string stage1_settings = train(subject, seed, geometry.folder);
   for (const Method* method : plan_.methods) {
-    const std::string settings =
-        digest(stage1_settings + method->name + options_to_json(stage2_of(*method, config_.stage2)).dump() +
-               options_to_json(config_.colorizer).dump() + options_to_json(config_.render).dump() +
-               (lpips_ ? lpips_->network() : ""));
+    const std::string settings = digest(
+        stage1_settings + method->name + options_to_json(stage2_of(*method, config_.stage2, config_.compare)).dump() +
+        (method->has_own_field || method->matches_features ? options_to_json(config_.compare).dump() : "") +
+        options_to_json(config_.colorizer).dump() + options_to_json(config_.render).dump() +
+        (lpips_ ? lpips_->network() : ""));
     cells_.push_back(run_cell(subject, *method, seed, geometry, settings));
+  }
+}
+
+void ComparisonRun::collect(const Subject& subject, int seed) {
+  for (const Method* method : plan_.methods) {
+    const fs::path file = folder_of(subject, seed) / method->name / "cell.json";
+    if (fs::exists(file)) cells_.push_back(read_cell(file));
   }
 }
 
@@ -158,13 +267,13 @@ std::string ComparisonRun::train(const Subject& subject, int seed, const fs::pat
   Stage1Options options = config_.stage1;
   options.seed = seed;
   const std::string settings = digest(fs::absolute(subject.capture.root).string() + options_to_json(options).dump() +
-                                      options_to_json(config_.capture).dump());
+                                      options_to_json(subject.options).dump());
   const fs::path done = folder / "stage1.txt";
   if (settings_in(folder) == settings && fs::exists(done)) return settings;
   begin_folder(folder, settings);
   reporter_.say(fmt::format("{}, seed {}: stage 1", subject.name, seed));
   const Stage1Report report =
-      train_stage1(subject.capture, options, folder / "stage1.snapshot", true, reporter_.sink());
+      train_measured(subject.capture, subject.evaluated, options, folder / "stage1.snapshot", {}, reporter_.sink());
   write_file(done, fmt::format("{} steps, {:.1f} s, {:.2f} dB on training pixels\n", report.steps, report.seconds,
                                report.train_psnr));
   return settings;
@@ -216,14 +325,76 @@ std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, 
   return std::make_unique<FlowColorizer>(std::move(colorizer));
 }
 
+/// Stage 1 of a method that has a field of its own: some times as long as the shared one took.
+void ComparisonRun::train_own_field(const Subject& subject, int seed, const Geometry& geometry,
+                                    const EngineMakers& makers, ComparisonCell& cell) const {
+  Stage1Options options = config_.stage1;
+  options.seed = seed;
+  options.steps = kManySteps;
+  options.checkpoint_every = 0;
+  options.max_seconds =
+      config_.compare.positional_budget * LuminanceModel::load(geometry.folder / "stage1.snapshot").seconds;
+  options.learning_rate = config_.compare.positional_learning_rate;
+  options.final_learning_rate = config_.compare.positional_final_learning_rate;
+  const fs::path snapshot = geometry.folder / cell.method / "stage1.snapshot";
+  (void)train_measured(subject.capture, subject.evaluated, options, snapshot, makers, reporter_.sink());
+  cell.stage1_curve = read_curve(fs::path(snapshot).replace_extension(".curve"));
+}
+
+/// ARF in place of stage 2.
+StyleReport ComparisonRun::transfer(const Subject& subject, const fs::path& stage1, const Stage2Options& options,
+                                    Colorizer& colorizer, const fs::path& take) const {
+  const CompareOptions& compare = config_.compare;
+  const fs::path network = compare.style_network.empty() ? plan_.lpips_weights : fs::path(compare.style_network);
+  if (network.empty()) {
+    throw UsageError(
+        "style-transfer: needs a network of features: --lpips-weights of AlexNet, or compare.style_network");
+  }
+  const LabPicture reference = compare.style_reference.empty() ? colorized_view(subject.capture, stage1, colorizer)
+                                                               : reference_image(compare.style_reference);
+  const StyleLoss loss(network, reference);
+  return transfer_style(subject.capture, stage1, loss, reference, options, compare.style_steps, take, reporter_.sink());
+}
+
 void ComparisonRun::colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry,
                              ComparisonCell& cell) const {
-  Stage2Options options = stage2_of(method, config_.stage2);
+  Stage2Options options = stage2_of(method, config_.stage2, config_.compare);
   options.seed = seed;
+  Field field = field_of(subject, method, geometry);
+  if (method.has_own_field) train_own_field(subject, seed, geometry, field.own, cell);
   const auto colorizer = colorizer_for(subject, method, seed);
-  const Stage2Report report = train_stage2(subject.capture, geometry.folder / "stage1.snapshot", options, *colorizer,
-                                           {}, geometry.folder / method.name / "take.snapshot", true, reporter_.sink(),
-                                           {}, &geometry.training_views);
+  const fs::path take = geometry.folder / method.name / "take.snapshot";
+  if (method.matches_features) {
+    const StyleReport report = transfer(subject, field.stage1, options, *colorizer, take);
+    cell.seconds = report.seconds;
+    cell.metrics.colorizer = colorizer->name();
+    return;
+  }
+
+  const bool is_measured = method.has_own_field || std::string(method.name) == kMethods[0].name;
+  std::optional<HeldOutPixels> pixels;
+  EngineWatch engines;
+  LearningCurve curve([&] { return pixels->ab_error(*engines.chroma, float(options.decode_temperature)); });
+  ProgressSink progress = reporter_.sink();
+  if (is_measured && options.injection == "classification") {
+    const LuminanceModel model = LuminanceModel::load(field.stage1, field.makers);
+    pixels.emplace(subject.evaluated, model.frame, kMeasuredPixels);
+    pixels->trace(*model.engine, model.march());
+    progress = curve.watching("stage 2", progress);
+  }
+  if (pixels) fs::remove(take);  // a curve is of one training from its beginning
+  std::vector<CachedView> own_views;
+  const Stage2Report report =
+      train_stage2(subject.capture, field.stage1, options, *colorizer, {}, take, true, progress, {},
+                   field.is_shared ? &geometry.training_views : &own_views, engines.over(field.makers));
+  if (pixels && !curve.points().empty()) {
+    cell.stage2_curve = curve.points();
+    const ColorModel model = ColorModel::load(take, field.makers);
+    cell.stage2_curve.push_back({curve.seconds(), pixels->ab_error(*model.chroma, float(options.decode_temperature))});
+  }
+  if (std::string(method.name) == kMethods[0].name) {
+    cell.stage1_curve = read_curve(geometry.folder / "stage1.curve");
+  }
   cell.accepted = report.accepted;
   cell.rejected = report.rejected;
   cell.seconds = report.seconds;
@@ -233,8 +404,9 @@ void ComparisonRun::colorize(const Subject& subject, const Method& method, int s
 /// Measures the views, and renders what is shown of a method.
 void ComparisonRun::look(const Subject& subject, const Method& method, Geometry& geometry, ComparisonCell& cell) const {
   const fs::path folder = geometry.folder / method.name;
-  const auto scene = Scene::load(geometry.folder / "stage1.snapshot",
-                                 method.is_colored ? folder / "take.snapshot" : fs::path(), geometry.traces);
+  const Field field = field_of(subject, method, geometry);
+  const auto scene = Scene::load(field.stage1, method.is_colored ? folder / "take.snapshot" : fs::path(),
+                                 field.is_shared ? geometry.traces : nullptr, field.makers);
   EvaluateOptions options;
   options.render = render_options(config_);
   options.lpips = lpips_.get();
@@ -299,7 +471,7 @@ ReportCapture ComparisonRun::report_of(const Subject& subject) const {
     for (const auto& [file, title] : {std::pair{"bases.png", "base images"},
                                       {"accepted.png", "accepted answers"},
                                       {"rejected.png", "rejected answers"}}) {
-      const bool purifies = method->is_colored && stage2_of(*method, config_.stage2).purify.enabled;
+      const bool purifies = method->is_colored && stage2_of(*method, config_.stage2, config_.compare).purify.enabled;
       if (purifies && fs::exists(folder / file)) shown.galleries.push_back({title, read_picture(folder / file, "png")});
     }
     report.methods.push_back(std::move(shown));
@@ -307,7 +479,27 @@ ReportCapture ComparisonRun::report_of(const Subject& subject) const {
   return report;
 }
 
+/// The first shown view by every method beside the input and the truth, for documents.
+fs::path ComparisonRun::write_strip(const Subject& subject) const {
+  const View& view = *subject.evaluated[subject.shown().front()];
+  std::vector<GalleryTile> tiles;
+  tiles.push_back(tile_of(view.image.width, view.image.height, luminance_plane(view.image), "input"));
+  for (const Method* method : plan_.methods) {
+    const fs::path file = folder_of(subject, plan_.seeds.front()) / method->name / "views" / numbered(0);
+    if (!method->is_colored || !fs::exists(file)) continue;
+    const ColorImage image = load_color_image(file);
+    tiles.push_back(tile_of(image.width, image.height, image.rgb, method->name));
+  }
+  if (const auto truth = load_color_truth(view)) {
+    tiles.push_back(tile_of(truth->width, truth->height, truth->rgb, "truth"));
+  }
+  const fs::path file = plan_.report / ("strip-" + subject.name + ".png");
+  write_gallery(file, tiles, kStripColumns);
+  return file;
+}
+
 void ComparisonRun::write_report() const {
+  for (const auto& subject : subjects_) reporter_.wrote("pictures", write_strip(*subject));
   std::vector<ReportCapture> captures;
   for (const auto& subject : subjects_) captures.push_back(report_of(*subject));
   write_file(plan_.report / "table.json", table_json(cells_, summary()));

@@ -70,7 +70,8 @@ void colorize_step(RunContext& context, const std::string& take, const ExistingO
                    std::unique_ptr<Colorizer> colorizer = nullptr);
 
 /// Measures a take (empty: luminance only) and writes metrics.json and the contact sheet.
-void evaluate_step(const RunContext& context, const std::string& take);
+/// @param lpips_weights  see `Lpips`; empty = LPIPS is not measured
+void evaluate_step(const RunContext& context, const std::string& take, const std::filesystem::path& lpips_weights = {});
 
 /// What a bake writes.
 struct BakeFormats {

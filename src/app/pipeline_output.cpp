@@ -25,6 +25,7 @@ void say_metrics(const Metrics& metrics, Reporter& reporter) {
                                  mean.psnr_luminance.value_or(0));
   if (mean.ssim) text += fmt::format(", SSIM {:.3f}", *mean.ssim);
   if (mean.psnr_rgb) text += fmt::format(", RGB {:.2f} dB", *mean.psnr_rgb);
+  if (mean.lpips) text += fmt::format(", LPIPS {:.3f}", *mean.lpips);
   if (mean.ab_error) text += fmt::format(", ab error {:.2f} (all grey {:.2f})", *mean.ab_error, *mean.ab_error_grey);
   if (mean.bake_ab_distance) text += fmt::format(", baked colour {:.2f} ab from per-pixel", *mean.bake_ab_distance);
   reporter.say(text);
@@ -76,11 +77,14 @@ class RenderFiles {
 
 }  // namespace
 
-void evaluate_step(const RunContext& context, const std::string& take) {
+void evaluate_step(const RunContext& context, const std::string& take, const std::filesystem::path& lpips_weights) {
   const RunDirectory& directory = context.directory;
   const Stopwatch watch;
+  std::optional<Lpips> lpips;
+  if (!lpips_weights.empty()) lpips.emplace(lpips_weights);  // read first: what is missing costs no rendering
   const auto scene = load_scene(directory, take);
   EvaluateOptions options;
+  options.lpips = lpips ? &*lpips : nullptr;
   options.render = render_options(context.config);
   ContactSheet sheet({"input", "ours", "truth"});
   const auto add_to_sheet = [&](const EvaluatedView& view) {

@@ -12,6 +12,7 @@
 #include "export/vdb_writer.h"
 #include "export/web_options.h"
 #include "src/capture/load_capture.h"
+#include "src/evaluate/methods.h"
 #include "src/train/scene.h"
 #include "src/train/stage1.h"
 #include "src/train/stage2.h"
@@ -73,6 +74,7 @@ struct Config {
   ExrOptions exr;
   WebOptions web;
   RenderConfig render;
+  CompareOptions compare;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -88,6 +90,7 @@ struct Config {
     v.section("exr", exr);
     v.section("web", web);
     v.section("render", render);
+    v.section("compare", compare);
   }
 };
 

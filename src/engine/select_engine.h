@@ -1,6 +1,7 @@
 #pragma once
 /// Which device trains and renders. Chosen once by the application, as the number of threads is.
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -26,5 +27,14 @@ void select_engine_device(const std::string& device);
 [[nodiscard]] std::unique_ptr<ChromaEngine> make_chroma_engine(const HashGridOptions& grid, std::uint64_t seed);
 [[nodiscard]] std::unique_ptr<ChromaticityEngine> make_chromaticity_engine(const HashGridOptions& grid,
                                                                            std::uint64_t seed);
+
+/// Who makes the engines of a training: the selected device, unless a comparison puts another kind of field, or an
+/// observer, behind the same interfaces. A snapshot is to be read with the makers that it was written with.
+struct EngineMakers {
+  std::function<std::unique_ptr<LuminanceEngine>(const LuminanceEngineOptions& options)> luminance =
+      make_luminance_engine;
+  std::function<std::unique_ptr<ChromaEngine>(const HashGridOptions& grid, std::uint64_t seed)> chroma =
+      make_chroma_engine;
+};
 
 }  // namespace cnerf

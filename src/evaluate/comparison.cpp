@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int kTableSchemaVersion = 1;
-constexpr const char* kOwnMethod = "colornerf";
+constexpr const char *kOwnMethod = "colornerf", *kOwnField = "positional-encoding";
 
 /// Mean of |difference| over views: views that are too colourful do not make up for those that are too grey.
 std::optional<double> colourfulness_gap(const ComparisonCell& cell) {
@@ -71,6 +71,10 @@ constexpr ComparisonColumn kColumns[] = {
 constexpr const char* kClaims[] = {"lpips",          "colourfulness_gap", "short_range", "long_range",
                                    "short_relative", "long_relative",     "psnr_rgb"};
 
+constexpr const char* kRacesMeaning =
+    "The hash grid (`colornerf`) against the paper's field (`positional-encoding`), on the same held-out pixels while "
+    "they train: PSNR of luminance in stage 1, ab error in stage 2. Seconds of training alone; means over seeds.";
+
 Json json_of(const Consistency& found) {
   Json json = {{"pixels", found.pixels}};
   if (found.pixels > 0) json.update({{"mean", found.mean}, {"p95", found.p95}, {"chroma", found.chroma}});
@@ -80,6 +84,19 @@ Json json_of(const Consistency& found) {
 Consistency consistency_of(const Json& json) {
   return {json.value("mean", 0.0), json.value("p95", 0.0), json.at("pixels").get<std::size_t>(),
           json.value("chroma", 0.0)};
+}
+
+/// [[seconds, value], ...]
+Json json_of(const std::vector<LearningPoint>& curve) {
+  Json json = Json::array();
+  for (const LearningPoint& point : curve) json.push_back({point.seconds, point.value});
+  return json;
+}
+
+std::vector<LearningPoint> curve_of(const Json& json) {
+  std::vector<LearningPoint> curve;
+  for (const Json& point : json) curve.push_back({point.at(0), point.at(1)});
+  return curve;
 }
 
 ViewMetrics view_metrics_of(const Json& json) {
@@ -172,6 +189,8 @@ std::string to_json(const ComparisonCell& cell) {
   json["accepted"] = cell.accepted;
   json["rejected"] = cell.rejected;
   json["seconds"] = cell.seconds;
+  if (!cell.stage1_curve.empty()) json["stage1_curve"] = json_of(cell.stage1_curve);
+  if (!cell.stage2_curve.empty()) json["stage2_curve"] = json_of(cell.stage2_curve);
   return json.dump(2) + "\n";
 }
 
@@ -193,6 +212,8 @@ ComparisonCell read_cell(const std::filesystem::path& file) {
     cell.accepted = json.at("accepted");
     cell.rejected = json.at("rejected");
     cell.seconds = json.at("seconds");
+    cell.stage1_curve = curve_of(json.value("stage1_curve", Json::array()));
+    cell.stage2_curve = curve_of(json.value("stage2_curve", Json::array()));
     return cell;
   } catch (const nlohmann::json::exception& problem) {
     throw InputError(file.string() + ": " + problem.what());
@@ -263,6 +284,62 @@ std::vector<Duel> duels(std::span<const ComparisonCell> cells) {
   return all;
 }
 
+std::vector<TrainingRace> training_races(std::span<const ComparisonCell> cells) {
+  std::vector<TrainingRace> races;
+  for (const std::string& capture : captures_of(cells)) {
+    for (const int stage : {1, 2}) {
+      const int better = stage == 1 ? 1 : -1;
+      TrainingRace race{.capture = capture, .stage = stage};
+      for (const ComparisonCell& grid : cells) {
+        if (grid.capture != capture || grid.method != kOwnMethod || !grid.error.empty()) continue;
+        for (const ComparisonCell& field : cells) {
+          const bool is_pair = field.capture == capture && field.method == kOwnField && field.seed == grid.seed;
+          const auto& ours = stage == 1 ? grid.stage1_curve : grid.stage2_curve;
+          const auto& theirs = stage == 1 ? field.stage1_curve : field.stage2_curve;
+          if (!is_pair || !field.error.empty() || ours.empty() || theirs.empty()) continue;
+          ++race.seeds;
+          race.grid_seconds += ours.back().seconds;
+          race.grid_value += ours.back().value;
+          race.field_seconds += theirs.back().seconds;
+          race.field_value += theirs.back().value;
+          race.grid_after_tenth += value_at(ours, theirs.back().seconds / 10);
+          const std::optional<double> reached = seconds_to(theirs, ours.back().value, better);
+          race.reached += reached ? 1 : 0;
+          race.reached_after += reached.value_or(0);
+        }
+      }
+      if (race.seeds == 0) continue;
+      for (double* sum :
+           {&race.grid_seconds, &race.grid_value, &race.field_seconds, &race.field_value, &race.grid_after_tenth}) {
+        *sum /= race.seeds;
+      }
+      race.reached_after /= std::max(race.reached, 1);
+      races.push_back(std::move(race));
+    }
+  }
+  return races;
+}
+
+std::string races_markdown(std::span<const ComparisonCell> cells) {
+  const std::vector<TrainingRace> races = training_races(cells);
+  if (races.empty()) return "";
+  std::string text =
+      "| Capture | Stage | hash grid | comes to | MLP | comes to | of the hash grid's time | as good as the hash grid "
+      "after | hash grid after 1/10 of the MLP's time |\n|---|---|---|---|---|---|---|---|---|\n";
+  for (const TrainingRace& race : races) {
+    const char* unit = race.stage == 1 ? " dB" : " ab";
+    const std::string reached = race.reached == 0 ? "never"
+                                : race.reached == race.seeds
+                                    ? fmt::format("{:.1f} s", race.reached_after)
+                                    : fmt::format("{:.1f} s in {} of {}", race.reached_after, race.reached, race.seeds);
+    text +=
+        fmt::format("| {} | {} | {:.1f} s | {:.2f}{} | {:.1f} s | {:.2f}{} | {:.1f} | {} | {:.2f}{} |\n", race.capture,
+                    race.stage, race.grid_seconds, race.grid_value, unit, race.field_seconds, race.field_value, unit,
+                    race.field_seconds / std::max(race.grid_seconds, 1e-9), reached, race.grid_after_tenth, unit);
+  }
+  return text;
+}
+
 std::string table_json(std::span<const ComparisonCell> cells, const ComparisonSummary& summary) {
   Json json = {{"schema_version", kTableSchemaVersion},
                {"colorizer", summary.colorizer},
@@ -296,6 +373,16 @@ std::string table_json(std::span<const ComparisonCell> cells, const ComparisonSu
                              {"pairs", duel.pairs},
                              {"mean_gain", duel.mean_gain}});
   }
+  for (const TrainingRace& race : training_races(cells)) {
+    json["training_times"].push_back({{"capture", race.capture},
+                                      {"stage", race.stage},
+                                      {"seeds", race.seeds},
+                                      {"hash_grid", {{"seconds", race.grid_seconds}, {"value", race.grid_value}}},
+                                      {"mlp", {{"seconds", race.field_seconds}, {"value", race.field_value}}},
+                                      {"reached", race.reached},
+                                      {"reached_after", race.reached_after},
+                                      {"hash_grid_after_tenth", race.grid_after_tenth}});
+  }
   json["cells"] = Json::array();
   for (const ComparisonCell& cell : cells) json["cells"].push_back(Json::parse(to_json(cell)));
   return json.dump(2) + "\n";
@@ -319,6 +406,9 @@ std::string table_markdown(std::span<const ComparisonCell> cells, const Comparis
       text += fmt::format("| {} | {} | {} of {} | {:+.{}f} |\n", duel.method, duel.column->title, duel.wins, duel.pairs,
                           duel.mean_gain, duel.column->digits + 1);
     }
+  }
+  if (const std::string races = races_markdown(cells); !races.empty()) {
+    text += "\n## Training times\n\n" + std::string(kRacesMeaning) + "\n\n" + races;
   }
   text += "\n## What the numbers mean\n\n";
   for (const ComparisonColumn& column : kColumns) text += fmt::format("* **{}**: {}\n", column.title, column.help);

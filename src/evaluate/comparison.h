@@ -9,6 +9,7 @@
 
 #include "src/evaluate/consistency.h"
 #include "src/evaluate/evaluate.h"
+#include "src/evaluate/learning_curve.h"
 
 namespace cnerf {
 
@@ -22,6 +23,9 @@ struct ComparisonCell {
   Consistency short_range, long_range;
   int accepted = 0, rejected = 0;  ///< answers of the colorizer
   double seconds = 0;              ///< that stage 2 took
+  /// Of `colornerf` and of methods with a field of their own: PSNR of luminance during stage 1, ab error during
+  /// stage 2.
+  std::vector<LearningPoint> stage1_curve, stage2_curve;
 };
 
 [[nodiscard]] std::string to_json(const ComparisonCell& cell);
@@ -68,6 +72,20 @@ struct Duel {
 /// difference, consistency and PSNR.
 [[nodiscard]] std::vector<Duel> duels(std::span<const ComparisonCell> cells);
 
+/// How long two fields train until they are as good as each other: means over the seeds that both have.
+struct TrainingRace {
+  std::string capture;
+  int stage = 1;  ///< 1: PSNR of luminance, dB; 2: ab error
+  int seeds = 0;
+  double grid_seconds = 0, grid_value = 0;    ///< the hash grid's whole training, and what it came to
+  double field_seconds = 0, field_value = 0;  ///< the other field's
+  int reached = 0;                            ///< seeds in which the other field became as good as the hash grid's end
+  double reached_after = 0;                   ///< seconds that it took them; 0 where none did
+  double grid_after_tenth = 0;                ///< the hash grid after a tenth of the other field's time
+};
+/// The paper's field against the hash grid, for each capture and stage that both were measured in.
+[[nodiscard]] std::vector<TrainingRace> training_races(std::span<const ComparisonCell> cells);
+
 /// What a comparison was made of.
 struct ComparisonSummary {
   std::string colorizer;  ///< spec
@@ -78,6 +96,8 @@ struct ComparisonSummary {
 /// {"schema_version", "colorizer", "lpips", "command_line", "columns", "tables": [{"capture", "rows"}], "duels",
 /// "cells"}
 [[nodiscard]] std::string table_json(std::span<const ComparisonCell> cells, const ComparisonSummary& summary);
+/// `training_races` as a table; empty where there are none.
+[[nodiscard]] std::string races_markdown(std::span<const ComparisonCell> cells);
 /// The same for people; `table_markdown` names each number's meaning below the tables.
 [[nodiscard]] std::string table_markdown(std::span<const ComparisonCell> cells, const ComparisonSummary& summary);
 

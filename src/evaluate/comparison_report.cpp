@@ -332,6 +332,26 @@ std::string capture_html(std::span<const ComparisonCell> cells, const ReportCapt
          view_plots(cells, capture.name) + seed_plots(cells, capture.name) + galleries_html(cells, capture);
 }
 
+std::string races_html(std::span<const ComparisonCell> cells) {
+  const std::vector<TrainingRace> races = training_races(cells);
+  if (races.empty()) return "";
+  std::string html =
+      "<h2>Training times</h2><p>On the same held-out pixels while they train: PSNR of luminance (dB) in stage 1, ab "
+      "error in stage 2.</p><div class=\"wide\"><table><tr><th>Capture</th><th>Stage</th><th>Hash grid, s</th>"
+      "<th>comes to</th><th>MLP, s</th><th>comes to</th><th>as good after, s</th><th>hash grid after 1/10 of the "
+      "MLP's time</th></tr>";
+  for (const TrainingRace& race : races) {
+    html += fmt::format(
+        "<tr><td>{}</td><td>{}</td><td>{:.1f}</td><td>{:.2f}</td><td>{:.1f}</td><td>{:.2f}</td><td>{}</td>"
+        "<td>{:.2f}</td></tr>",
+        html_text(race.capture), race.stage, race.grid_seconds, race.grid_value, race.field_seconds, race.field_value,
+        race.reached > 0 ? fmt::format("{:.1f} ({} of {} seeds)", race.reached_after, race.reached, race.seeds)
+                         : "never",
+        race.grid_after_tenth);
+  }
+  return html + "</table></div>";
+}
+
 std::string methods_html(std::span<const ComparisonCell> cells) {
   std::string html = "<h2>Methods</h2><ul>";
   for (const Method& method : kMethods) {
@@ -390,7 +410,7 @@ std::string comparison_html(std::span<const ComparisonCell> cells, const Compari
       ". Made by <code>" + html_text(summary.command_line) + "</code>.</p>";
   if (captures.size() > 1) body += "<h2>All captures</h2>" + table_html(table_rows(cells, "")) + seed_plots(cells, "");
   for (const ReportCapture& capture : captures) body += capture_html(cells, capture);
-  body += duels_html(cells) + methods_html(cells) + "<h2>The paper's table</h2>" + kPaperTable +
+  body += duels_html(cells) + races_html(cells) + methods_html(cells) + "<h2>The paper's table</h2>" + kPaperTable +
           "<h2>What the numbers mean</h2><ul>";
   for (const ComparisonColumn& column : comparison_columns()) {
     body += "<li><b>" + html_text(column.title) + "</b>: " + html_text(column.help) + "</li>";

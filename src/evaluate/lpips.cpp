@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <map>
 #include <opencv2/dnn.hpp>
-#include <sstream>
 #include <vector>
 
 #include "src/base/check.h"
 #include "src/base/error.h"
-#include "src/base/files.h"
+#include "src/evaluate/tensor_file.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -23,74 +21,21 @@ constexpr float kShift[3] = {-0.030f, -0.088f, -0.188f}, kScale[3] = {0.458f, 0.
 constexpr float kTiny = 1e-10f;  // added to norms
 constexpr int kLeastSide = 32;
 
-fs::path manifest_of(const fs::path& weights) {
-  std::string stem = weights.stem().string();
-  if (stem.ends_with("_f32")) return weights.parent_path() / (stem.substr(0, stem.size() - 4) + "_manifest.txt");
-  return weights.parent_path() / (stem + ".txt");
+/// What OpenCV wants: a matrix of its own.
+cv::Mat matrix(const TensorFile::Tensor& tensor) {
+  cv::Mat values(tensor.shape, CV_32F);
+  std::memcpy(values.data, tensor.values.data(), tensor.values.size_bytes());
+  return values;
 }
-
-/// Named tensors of a file.
-class Tensors {
- public:
-  explicit Tensors(const fs::path& weights) : file_(weights), bytes_(read_binary_file(weights)) {
-    const fs::path manifest = manifest_of(weights);
-    std::istringstream lines(read_text_file(manifest));
-    for (std::string line; std::getline(lines, line);) {
-      if (!line.empty()) add(line, manifest);
-    }
-  }
-
-  [[nodiscard]] bool has(const std::string& name) const { return entries_.contains(name); }
-
-  [[nodiscard]] cv::Mat get(const std::string& name) const {
-    const auto found = entries_.find(name);
-    if (found == entries_.end()) throw InputError(manifest_of(file_), name, "no such tensor; is this another network?");
-    cv::Mat values(found->second.shape, CV_32F);
-    std::memcpy(values.data, bytes_.data() + 4 * found->second.offset, 4 * values.total());
-    return values;
-  }
-
- private:
-  struct Entry {
-    std::vector<int> shape;
-    std::size_t offset = 0;
-  };
-
-  void add(const std::string& line, const fs::path& manifest) {
-    std::istringstream words(line);
-    std::string name, shape;
-    Entry entry;
-    if (!(words >> name >> shape >> entry.offset)) {
-      throw InputError(manifest, line, "expected a name, a shape such as 64x3x3x3, and an offset");
-    }
-    std::size_t size = 1;
-    std::istringstream sides(shape);
-    for (std::string side; std::getline(sides, side, 'x');) {
-      const bool is_number =
-          !side.empty() && side.size() < 7 && side.find_first_not_of("0123456789") == std::string::npos;
-      if (!is_number) throw InputError(manifest, name, "expected a shape such as 64x3x3x3, got " + shape);
-      entry.shape.push_back(std::stoi(side));
-      size *= std::size_t(entry.shape.back());
-    }
-    if (size == 0 || entry.offset > bytes_.size() / 4 || size > bytes_.size() / 4 - entry.offset) {
-      throw InputError(file_, name, "lies beyond the end of the file");
-    }
-    entries_.emplace(name, std::move(entry));
-  }
-
-  fs::path file_;
-  std::vector<std::byte> bytes_;
-  std::map<std::string, Entry> entries_;
-};
 
 /// A network put together layer by layer.
 class Builder {
  public:
-  explicit Builder(const Tensors& tensors) : tensors_(tensors) {}
+  explicit Builder(const TensorFile& tensors) : tensors_(tensors) {}
 
   /// @param weights  tensor prefix: "conv1", "core.net.slice1.0"
   int convolution(int input, const std::string& weights, int stride, int padding) {
-    const cv::Mat kernel = tensors_.get(weights + ".weight");
+    const cv::Mat kernel = matrix(tensors_.get(weights + ".weight"));
     if (kernel.dims != 4) throw ContractError(weights + ": expected a kernel of four dimensions");
     LayerParams params;
     params.set("num_output", kernel.size[0]);
@@ -98,7 +43,7 @@ class Builder {
     params.set("kernel_w", kernel.size[3]);
     params.set("stride", stride);
     params.set("pad", padding);
-    cv::Mat bias = tensors_.get(weights + ".bias");
+    cv::Mat bias = matrix(tensors_.get(weights + ".bias"));
     params.blobs = {kernel, bias.reshape(1, 1)};
     return relu(add(weights, "Convolution", params, {input}), weights + ".relu");
   }
@@ -123,7 +68,7 @@ class Builder {
   void compare(int layer, const std::string& weights) {
     // A copy of its own: outputs that the network asks for are then never computed in place by the next layer.
     outputs.push_back(names_.at(std::size_t(layer)));
-    cv::Mat values = tensors_.get(weights);
+    cv::Mat values = matrix(tensors_.get(weights));
     layer_weights.push_back(values.reshape(1, 1).clone());
   }
 
@@ -144,7 +89,7 @@ class Builder {
     return layer;
   }
 
-  const Tensors& tensors_;
+  const TensorFile& tensors_;
   std::vector<std::string> names_;
 };
 
@@ -238,7 +183,7 @@ struct Lpips::Network {
 };
 
 Lpips::Lpips(const fs::path& weights) : network_(std::make_unique<Network>()) {
-  const Tensors tensors(weights);
+  const TensorFile tensors(weights);
   Builder builder(tensors);
   const bool is_alex = tensors.has("conv1.weight");
   is_alex ? build_alex(builder) : build_squeeze(builder);

@@ -32,8 +32,8 @@ std::vector<const Method*> parse_methods(const std::string& list) {
   return methods;
 }
 
-Stage2Options stage2_of(const Method& method, Stage2Options configured) {
-  const std::string name = method.name;
+Stage2Options stage2_of(const Method& method, Stage2Options configured, const CompareOptions& compare) {
+  const std::string name = method.name, configured_injection = configured.injection;
   Stage2Options options = std::move(configured);
   if (name == "colornerf-paper") options.decode_temperature = 0;
   if (name == "without-purification") options.purify.enabled = false;
@@ -42,6 +42,15 @@ Stage2Options stage2_of(const Method& method, Stage2Options configured) {
     options.questions = "views";
     options.injection = "photometric";
     options.purify.enabled = false;
+  }
+  if (options.injection == "photometric" && configured_injection == "classification") {
+    // The photometric loss is not to lose because of a step size chosen for classes: docs/decisions.md, 32.
+    options.learning_rate = Stage2Options{}.learning_rate;
+    options.final_learning_rate = Stage2Options{}.final_learning_rate;
+  }
+  if (method.has_own_field) {
+    options.learning_rate = compare.positional_learning_rate;
+    options.final_learning_rate = compare.positional_final_learning_rate;
   }
   options.distill_steps = 0;  // nothing is baked
   return options;

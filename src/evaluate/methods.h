@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "src/base/options.h"
 #include "src/capture/capture.h"
 #include "src/colorizer/colorizer.h"
 #include "src/train/stage2.h"
@@ -17,8 +18,40 @@ struct Method {
   const char* name;     ///< "without-purification": of rows and folders
   const char* summary;  ///< a sentence for the report
   bool is_colored = true;
-  bool knows_truth = false;   ///< asks a colorizer that answers the true colours
-  bool follows_flow = false;  ///< carries colours from view to view
+  bool knows_truth = false;       ///< asks a colorizer that answers the true colours
+  bool follows_flow = false;      ///< carries colours from view to view
+  bool has_own_field = false;     ///< the paper's MLP instead of the hash grid
+  bool matches_features = false;  ///< style transfer: asks no colorizer about patches
+};
+
+/// What single methods need beyond the configuration of a run.
+struct CompareOptions {
+  double positional_budget = 4;                  ///< stage 1 of the paper's field, in times of the hash grid's
+  double positional_learning_rate = 5e-4;        ///< of the paper's field (Mildenhall et al. 2020), in both stages
+  double positional_final_learning_rate = 5e-5;  ///< at their ends
+  std::string positional_geometry = "shared";    ///< whose geometry its stage 2 stands on
+  bool positional_trains_encoding = false;       ///< stage 2 changes its copy of the point encoding
+
+  std::string style_reference;  ///< image whose style is transferred; empty = a training view, coloured
+  std::string style_network;    ///< TorchScript module of features; empty = LPIPS's AlexNet
+  int style_steps = 160;        ///< pictures that style transfer renders
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("positional_budget", positional_budget, Range{0.01, 1000},
+      "training time of stage 1 of the paper's field, in times of the hash grid's");
+    v("positional_learning_rate", positional_learning_rate, Range{1e-8, 1}, "its step size at the start, both stages");
+    v("positional_final_learning_rate", positional_final_learning_rate, Range{1e-8, 1}, "its step size at the end");
+    v("positional_geometry", positional_geometry, Choice{"shared", "own"},
+      "its stage 2 stands on the stage 1 that all rows share, or on its own");
+    v("positional_trains_encoding", positional_trains_encoding,
+      "its stage 2 changes the point encoding instead of keeping it fixed as in the paper");
+    v("style_reference", style_reference,
+      "image whose style is transferred; empty: the middle training view, coloured by the colorizer");
+    v("style_network", style_network,
+      "TorchScript module whose features are matched; empty: the AlexNet of --lpips-weights");
+    v("style_steps", style_steps, Range{4, 1e6}, "pictures that style transfer renders and follows");
+  }
 };
 
 /// Own method first; the order of rows.
@@ -34,6 +67,15 @@ inline constexpr Method kMethods[] = {
      "colorization "
      "network (the paper's Vid+NeRF)",
      true, false, true},
+    {.name = "style-transfer",
+     .summary =
+         "ARF: colours are changed until the features of pictures are those of a reference image (nearest-neighbour "
+         "feature matching), which is a training view coloured by the colorizer unless another is given",
+     .matches_features = true},
+    {.name = "positional-encoding",
+     .summary = "the paper's own field, an MLP of eight layers of 256 with positional encoding, in place of the hash "
+                "grid; as many patches; see the table of training times",
+     .has_own_field = true},
     {"grey", "no colour at all: the lower bound", false},
     {"oracle", "the full method, its colorizer answering the true colours: the upper bound", true, true},
 };
@@ -44,6 +86,6 @@ inline constexpr Method kMethods[] = {
 [[nodiscard]] std::vector<const Method*> parse_methods(const std::string& list);
 
 /// What stage 2 does differently for a method.
-[[nodiscard]] Stage2Options stage2_of(const Method& method, Stage2Options configured);
+[[nodiscard]] Stage2Options stage2_of(const Method& method, Stage2Options configured, const CompareOptions& compare);
 
 }  // namespace cnerf

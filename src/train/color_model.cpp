@@ -4,7 +4,6 @@
 
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
-#include "src/engine/select_engine.h"
 #include "src/train/options_json.h"
 
 namespace cnerf {
@@ -38,11 +37,11 @@ std::vector<float> pixel_luminance(const PixelSamples& pixels) {
   return luminance;
 }
 
-ColorModel ColorModel::create(const Stage2Options& options) {
+ColorModel ColorModel::create(const Stage2Options& options, const EngineMakers& makers) {
   ColorModel model;
   model.options = options;
   const auto seed = static_cast<std::uint64_t>(options.seed);
-  model.chroma = make_chroma_engine(options.grid, seed ^ 0x636872ull);
+  model.chroma = makers.chroma(options.grid, seed ^ 0x636872ull);
   model.chromaticity = make_chromaticity_engine(options.grid, seed ^ 0x78797aull);
   return model;
 }
@@ -54,11 +53,11 @@ std::vector<StatePiece> ColorModel::state() {
   return pieces;
 }
 
-ColorModel ColorModel::load(const std::filesystem::path& file) {
+ColorModel ColorModel::load(const std::filesystem::path& file, const EngineMakers& makers) {
   const Snapshot snapshot(file, kKind);
   ColorModel model;
   try {
-    model = create(options_from_json<Stage2Options>(snapshot.header().at("options")));
+    model = create(options_from_json<Stage2Options>(snapshot.header().at("options")), makers);
     const nlohmann::json& report = snapshot.header().at("report");
     SnapshotTimes times = load_times(file);
     model.report = {report.at("accepted"),      report.at("rejected"),   times["seconds"],

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "src/engine/chroma_engine.h"
+#include "src/engine/select_engine.h"
 #include "src/train/snapshot.h"
 #include "src/train/stage2.h"
 
@@ -20,9 +21,9 @@ struct ColorModel {
   std::unique_ptr<ChromaEngine> chroma;
   std::unique_ptr<ChromaticityEngine> chromaticity;
 
-  static ColorModel create(const Stage2Options& options);
+  static ColorModel create(const Stage2Options& options, const EngineMakers& makers = {});
   /// @throws MissingInputError, SnapshotError
-  static ColorModel load(const std::filesystem::path& snapshot);
+  static ColorModel load(const std::filesystem::path& snapshot, const EngineMakers& makers = {});
   void save(const std::filesystem::path& snapshot);
 
   /// Whether colours are learnt as such, without a distribution (stage2.injection = "photometric").

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "src/engine/select_engine.h"
 #include "src/train/options_json.h"
 
 namespace cnerf {
@@ -10,8 +9,8 @@ namespace {
 
 constexpr const char* kKind = "stage1";
 
-std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stage1Options& options,
-                                             float max_luminance) {
+std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stage1Options& options, float max_luminance,
+                                             const EngineMakers& makers) {
   LuminanceEngineOptions engine;
   engine.grid = options.grid;
   engine.occupancy = options.occupancy;
@@ -22,7 +21,7 @@ std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stag
   engine.distortion_weight = static_cast<float>(options.distortion_weight);
   engine.max_luminance = max_luminance;
   engine.seed = static_cast<std::uint64_t>(options.seed);
-  return make_luminance_engine(engine);
+  return makers.luminance(engine);
 }
 
 /// White of integer images; floating point ones may be brighter.
@@ -95,17 +94,18 @@ SceneFrame frame_from_json(const nlohmann::json& json) {
           json.at("cascades").get<int>()};
 }
 
-LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options) {
+LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options,
+                                      const EngineMakers& makers) {
   LuminanceModel model;
   model.frame = place_scene(capture, options.placement);
   model.options = options;
   model.max_luminance = brightest(capture);
-  model.engine = make_engine(model.frame, options, model.max_luminance);
+  model.engine = make_engine(model.frame, options, model.max_luminance, makers);
   exclude_unseen(capture, model);
   return model;
 }
 
-LuminanceModel LuminanceModel::load(const std::filesystem::path& file) {
+LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const EngineMakers& makers) {
   const Snapshot snapshot(file, kKind);
   LuminanceModel model;
   try {
@@ -117,7 +117,7 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file) {
   model.max_luminance = header_field<float>(snapshot, "max_luminance");
   model.seconds = load_times(file)["seconds"];
   model.trained_samples = header_field<double>(snapshot, "trained_samples");
-  model.engine = make_engine(model.frame, model.options, model.max_luminance);
+  model.engine = make_engine(model.frame, model.options, model.max_luminance, makers);
   snapshot.restore(model.engine->state());
   model.engine->state_loaded();
   return model;

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "src/engine/luminance_engine.h"
+#include "src/engine/select_engine.h"
 #include "src/train/snapshot.h"
 #include "src/train/stage1.h"
 
@@ -19,9 +20,9 @@ struct LuminanceModel {
   std::unique_ptr<LuminanceEngine> engine;
 
   /// A fresh model for a capture.
-  static LuminanceModel create(const Capture& capture, const Stage1Options& options);
+  static LuminanceModel create(const Capture& capture, const Stage1Options& options, const EngineMakers& makers = {});
   /// @throws MissingInputError, SnapshotError
-  static LuminanceModel load(const std::filesystem::path& snapshot);
+  static LuminanceModel load(const std::filesystem::path& snapshot, const EngineMakers& makers = {});
   void save(const std::filesystem::path& snapshot) const;
 
   /// How to march; `steps_per_box` = 0 as in training.

@@ -8,6 +8,7 @@
 #include "src/base/options.h"
 #include "src/base/progress.h"
 #include "src/capture/camera.h"
+#include "src/engine/select_engine.h"
 #include "src/field/color_field.h"
 
 namespace cnerf {
@@ -42,7 +43,7 @@ class Scene : public ColorField {
   /// @throws MissingInputError, SnapshotError.
   static std::unique_ptr<Scene> load(const std::filesystem::path& stage1_snapshot,
                                      const std::filesystem::path& take_snapshot = {},
-                                     std::shared_ptr<TraceMemory> memory = nullptr);
+                                     std::shared_ptr<TraceMemory> memory = nullptr, const EngineMakers& makers = {});
 
   [[nodiscard]] virtual bool is_colorized() const = 0;
   [[nodiscard]] virtual std::string colorizer() const = 0;  ///< name of the colorizer; empty when not colorized

@@ -80,9 +80,9 @@ PreviewPicture preview_of(const LuminanceModel& model, const View& view) {
 }
 
 LuminanceModel start_or_resume(const Capture& capture, const Stage1Options& options,
-                               const std::filesystem::path& snapshot, bool resume) {
-  if (!resume || !std::filesystem::exists(snapshot)) return LuminanceModel::create(capture, options);
-  LuminanceModel model = LuminanceModel::load(snapshot);
+                               const std::filesystem::path& snapshot, bool resume, const EngineMakers& makers) {
+  if (!resume || !std::filesystem::exists(snapshot)) return LuminanceModel::create(capture, options, makers);
+  LuminanceModel model = LuminanceModel::load(snapshot, makers);
   if (comparable(model.options) != comparable(options)) {
     throw SnapshotError(snapshot.string() +
                         ": was trained with other stage1 options; run with the same ones, or "
@@ -95,8 +95,9 @@ LuminanceModel start_or_resume(const Capture& capture, const Stage1Options& opti
 }  // namespace
 
 Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, const std::filesystem::path& snapshot,
-                          bool resume, const ProgressSink& progress, const PreviewSink& previews) {
-  LuminanceModel model = start_or_resume(capture, options, snapshot, resume);
+                          bool resume, const ProgressSink& progress, const PreviewSink& previews,
+                          const EngineMakers& makers) {
+  LuminanceModel model = start_or_resume(capture, options, snapshot, resume, makers);
   const std::vector<TrainingView> views = training_views(capture, model.frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
 

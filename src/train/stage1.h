@@ -11,6 +11,7 @@
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/capture/focus.h"
+#include "src/engine/select_engine.h"
 #include "src/field/scene_frame.h"
 #include "src/render/occupancy_grid.h"
 
@@ -89,6 +90,7 @@ struct Stage1Report {
 /// @throws Interrupted    after saving, when the user asked to stop.
 /// @throws SnapshotError  `snapshot` is of another version, cut short, or of another configuration.
 Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, const std::filesystem::path& snapshot,
-                          bool resume, const ProgressSink& progress = {}, const PreviewSink& previews = {});
+                          bool resume, const ProgressSink& progress = {}, const PreviewSink& previews = {},
+                          const EngineMakers& makers = {});
 
 }  // namespace cnerf

@@ -23,6 +23,8 @@ namespace {
 
 constexpr int kBaseCandidates = 12;
 constexpr int kDistillPixels = 8192;  // pixels a distillation step
+constexpr double kDistillRate = 1e-2,
+                 kFinalDistillRate = 1e-3;  // of its own: distances want smaller steps than classes
 constexpr std::size_t kGalleryTiles = 20;
 constexpr int kWholeViewPatches = 2;  // a whole view is shown with a short side of so many patch sides
 constexpr std::uint64_t kFirstBaseIndex = std::uint64_t(1) << 32;  // patch indices of bases, apart from training's
@@ -58,19 +60,21 @@ struct Answers {
 class Colorization {
  public:
   Colorization(const Stage2Options& options, Colorizer& colorizer, std::filesystem::path take_snapshot,
-               const ProgressSink& progress, const PreviewSink& watcher = {}, std::vector<CachedView>* shared = nullptr)
+               const ProgressSink& progress, const PreviewSink& watcher = {}, std::vector<CachedView>* shared = nullptr,
+               EngineMakers makers = {})
       : options_(options),
         colorizer_(colorizer),
         file_(std::move(take_snapshot)),
         progress_(progress),
         watcher_(watcher),
+        makers_(std::move(makers)),
         views_(shared != nullptr ? *shared : own_views_) {}
 
   Stage2Report run(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                    std::span<const KnownColors> known, bool resume) {
     start_or_resume(sha256(read_binary_file(stage1_snapshot)), colorizer_.name() + describe(known), resume);
     seconds_before_ = model_.report.seconds;
-    cache_views(capture, LuminanceModel::load(stage1_snapshot));
+    cache_views(capture, LuminanceModel::load(stage1_snapshot, makers_));
     names_ = training_view_names(capture);
     known_ = KnownColorMap(views_, names_, known);
 
@@ -88,7 +92,7 @@ class Colorization {
   }
 
   void only_bases(const Capture& capture, const std::filesystem::path& stage1_snapshot) {
-    cache_views(capture, LuminanceModel::load(stage1_snapshot));
+    cache_views(capture, LuminanceModel::load(stage1_snapshot, makers_));
     names_ = training_view_names(capture);
     write_candidates(ask_candidates(), file_);
   }
@@ -96,7 +100,7 @@ class Colorization {
  private:
   void start_or_resume(const std::string& stage1_digest, const std::string& source, bool resume) {
     if (resume && std::filesystem::exists(file_)) {
-      model_ = ColorModel::load(file_);
+      model_ = ColorModel::load(file_, makers_);
       if (model_.stage1_sha256 != stage1_digest) {
         throw SnapshotError(file_.string() + ": colorizes another stage 1 snapshot; run without --resume");
       }
@@ -107,7 +111,7 @@ class Colorization {
       }
       return;
     }
-    model_ = ColorModel::create(options_);
+    model_ = ColorModel::create(options_, makers_);
     model_.colorizer = source;
     model_.stage1_sha256 = stage1_digest;
   }
@@ -392,8 +396,8 @@ class Colorization {
       const PixelSamples pixels = random_pixels(kDistillPixels, std::uint64_t(step));
       if (pixels.pixels() == 0) break;
       const double fraction = double(step) / options_.distill_steps;
-      loss_ = model_.chromaticity->step(pixels, model_.decode(pixels),
-                                        decayed(options_.learning_rate, options_.final_learning_rate, fraction));
+      loss_ =
+          model_.chromaticity->step(pixels, model_.decode(pixels), decayed(kDistillRate, kFinalDistillRate, fraction));
       after_step(step + 1, options_.distill_steps);
     }
   }
@@ -451,6 +455,7 @@ class Colorization {
   std::filesystem::path file_;
   ProgressSink progress_;
   PreviewSink watcher_;
+  EngineMakers makers_;
   ColorModel model_;
   std::vector<CachedView> own_views_;
   std::vector<CachedView>& views_;
@@ -471,8 +476,8 @@ class Colorization {
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                           const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
                           const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress,
-                          const PreviewSink& previews, std::vector<CachedView>* shared) {
-  return Colorization(options, colorizer, take_snapshot, progress, previews, shared)
+                          const PreviewSink& previews, std::vector<CachedView>* shared, const EngineMakers& makers) {
+  return Colorization(options, colorizer, take_snapshot, progress, previews, shared, makers)
       .run(capture, stage1_snapshot, known, resume);
 }
 

@@ -11,6 +11,7 @@
 #include "src/capture/capture.h"
 #include "src/colorizer/colorizer.h"
 #include "src/colorizer/purify.h"
+#include "src/engine/select_engine.h"
 #include "src/train/known_colors.h"
 
 namespace cnerf {
@@ -79,7 +80,8 @@ struct Stage2Report {
 Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                           const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
                           const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress = {},
-                          const PreviewSink& previews = {}, std::vector<CachedView>* shared = nullptr);
+                          const PreviewSink& previews = {}, std::vector<CachedView>* shared = nullptr,
+                          const EngineMakers& makers = {});
 
 /// Only asks for the base candidates, twelve patches spread over the views, and writes their gallery: what the whole
 /// scene would be coloured like, in a minute. `stage2.purify.picked_bases` then picks those that are liked.

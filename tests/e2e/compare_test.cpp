@@ -41,10 +41,18 @@ TEST(Compare, EveryMethodLeavesARowAndTheReportStandsAlone) {
   const auto table = json_of(folder / "out/table.json");
   ASSERT_EQ(table["tables"].size(), 1u);
   for (const auto& row : table["tables"][0]["rows"]) {
+    if (row["method"] == "style-transfer") continue;
     EXPECT_FALSE(row.contains("error")) << row.dump();
     EXPECT_TRUE(row.contains("psnr_rgb")) << row.dump();
   }
-  EXPECT_EQ(table["tables"][0]["rows"].size(), 8u);
+  EXPECT_EQ(table["tables"][0]["rows"].size(), 10u);
+  EXPECT_THAT(row_of(table, "style-transfer")["error"], HasSubstr("--lpips-weights")) << "it needs a network";
+  ASSERT_EQ(table["training_times"].size(), 2u);
+  for (const auto& race : table["training_times"]) {
+    EXPECT_GT(race["hash_grid"]["seconds"], 0) << race.dump();
+    EXPECT_GT(race["mlp"]["seconds"], 0) << race.dump();
+  }
+  EXPECT_THAT(read_text_file(folder / "out/table.md"), HasSubstr("## Training times"));
   EXPECT_EQ(row_of(table, "grey")["colourfulness"]["mean"], 0);
   EXPECT_FALSE(row_of(table, "grey").contains("lpips")) << "no weights were given";
   const std::string report = read_text_file(folder / "out/report.html");
@@ -66,6 +74,41 @@ TEST(Compare, EveryMethodLeavesARowAndTheReportStandsAlone) {
                                      (folder / "a.json").string(), (folder / "b.json").string()});
   ASSERT_EQ(rated.exit_code, 0) << rated.err;
   EXPECT_THAT(read_text_file(folder / "out/ratings.md"), HasSubstr("| colornerf | 5.00"));
+}
+
+TEST(Compare, StyleTransferFollowsTheReferenceItIsGiven) {
+  CNERF_REQUIRE_DATA(weights, "lpips/lpips_alex_f32.bin");
+  const TempDir folder;
+  const std::string reference = (tiny_capture() / "references/view_001.png").string();
+  const ProgramResult result =
+      compare(folder / "out", "style-transfer,grey",
+              {"--lpips-weights", weights.string(), "--style-reference", reference, "--set", "compare.style_steps=8"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto table = json_of(folder / "out/table.json");
+  const auto row = row_of(table, "style-transfer");
+  EXPECT_FALSE(row.contains("error")) << row.dump();
+  EXPECT_GT(row["colourfulness"]["mean"], 1);
+  EXPECT_TRUE(row.contains("lpips"));
+
+  const ProgramResult missing = compare(folder / "other", "style-transfer",
+                                        {"--lpips-weights", weights.string(), "--style-reference", "missing.png"});
+  EXPECT_THAT(row_of(json_of(folder / "other/table.json"), "style-transfer")["error"], HasSubstr("missing.png"));
+}
+
+/// Parts that ran side by side in one folder make one table.
+TEST(Compare, SeedsOfSeveralRunsAreJoined) {
+  const TempDir folder;
+  const fs::path out = folder / "out";
+  ASSERT_EQ(compare(out, "colornerf", {"--first-seed", "2", "--resume"}).exit_code, 0);
+  ASSERT_EQ(compare(out, "colornerf", {"--resume"}).exit_code, 0);
+  const fs::path cell = out / "runs" / tiny_capture().filename() / "seed-2/colornerf/cell.json";
+  const auto before = fs::last_write_time(cell);
+  ASSERT_EQ(compare(out, "colornerf,grey", {"--seeds", "3", "--only-report"}).exit_code, 0);
+  EXPECT_EQ(fs::last_write_time(cell), before) << "nothing is trained";
+  const auto table = json_of(out / "table.json");
+  EXPECT_EQ(row_of(table, "colornerf")["psnr_rgb"]["n"], 2);
+  EXPECT_EQ(table["tables"][0]["rows"].size(), 1u) << "of grey there is nothing";
+  EXPECT_EQ(compare(folder / "empty", "colornerf", {"--only-report"}).exit_code, 64);
 }
 
 TEST(Compare, ResumingMakesOnlyWhatIsMissing) {
@@ -107,6 +150,18 @@ TEST(Compare, AMethodThatFailsLeavesARowThatSaysSo) {
   const auto table = json_of(folder / "out/table.json");
   EXPECT_THAT(row_of(table, "colornerf")["error"], HasSubstr("exec:false"));
   EXPECT_TRUE(row_of(table, "grey").contains("psnr_rgb"));
+}
+
+TEST(Compare, ACaptureMayHaveASizeOfItsOwn) {
+  const TempDir folder;
+  const std::string small = tiny_capture().string() + "@2";
+  const ProgramResult result = cnerf(
+      concatenated({"compare", tiny_capture().string(), small, "-o", (folder / "out").string(), "--methods", "grey"},
+                   tiny_options()));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out + result.err, HasSubstr("24 x 18"));
+  EXPECT_EQ(json_of(folder / "out/table.json")["tables"].size(), 3u) << "two captures and both together";
+  EXPECT_EQ(cnerf({"compare", tiny_capture().string() + "@0", "-o", (folder / "no").string()}).exit_code, 64);
 }
 
 TEST(Compare, WhatCannotBeComparedIsRefusedBeforeTraining) {

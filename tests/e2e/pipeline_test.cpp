@@ -99,6 +99,21 @@ TEST(Pipeline, TakesStandSideBySide) {
   }
 }
 
+TEST(Pipeline, EvaluationMeasuresLpipsWithWeights) {
+  CNERF_REQUIRE_DATA(weights, "lpips/lpips_alex_f32.bin");
+  const TempDir folder;
+  const std::string out = (folder / "run").string();
+  ASSERT_EQ(train(tiny_capture(), out).exit_code, 0);
+  ASSERT_EQ(cnerf({"colorize", out, "--colorizer", "grey", "--take", "grey"}).exit_code, 0);
+  ASSERT_EQ(cnerf({"eval", out}).exit_code, 0);
+  EXPECT_FALSE(json_of(folder / "run/metrics.json").at("mean").contains("lpips"));
+  const ProgramResult result = cnerf({"eval", out, "--lpips-weights", weights.string()});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_GT(json_of(folder / "run/metrics.json").at("mean").at("lpips").get<double>(), 0);
+  EXPECT_THAT(result.out + result.err, HasSubstr("LPIPS"));
+  EXPECT_EQ(cnerf({"eval", out, "--lpips-weights", "missing.bin"}).exit_code, 66);
+}
+
 TEST(Pipeline, KeyFramesAndHintsOverruleTheColorizer) {
   const TempDir folder;
   const std::string out = (folder / "run").string();

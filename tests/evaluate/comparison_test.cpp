@@ -154,7 +154,7 @@ TEST(Methods, ListsAreReadAndUnknownOnesRefused) {
 }
 
 TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
-  const auto of = [](const char* name) { return stage2_of(*parse_methods(name).front(), Stage2Options{}); };
+  const auto of = [](const char* name) { return stage2_of(*parse_methods(name).front(), Stage2Options{}, {}); };
   const Stage2Options full = of("colornerf");
   EXPECT_TRUE(full.purify.enabled);
   EXPECT_EQ(full.questions, "patches");
@@ -166,6 +166,16 @@ TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
   EXPECT_EQ(of("colorize-then-fuse").questions, "views");
   EXPECT_EQ(of("colornerf-paper").decode_temperature, 0);
   EXPECT_EQ(of("oracle").patches, full.patches);
+  EXPECT_EQ(of("positional-encoding").patches, full.patches);
+  Stage2Options fast;
+  fast.learning_rate = 0.05;
+  const auto rate_of = [&](const char* name) {
+    return stage2_of(*parse_methods(name).front(), fast, {}).learning_rate;
+  };
+  EXPECT_EQ(rate_of("without-purification"), 0.05);
+  EXPECT_EQ(rate_of("without-classification"), Stage2Options{}.learning_rate) << "its own best step size";
+  EXPECT_EQ(of("positional-encoding").learning_rate, CompareOptions{}.positional_learning_rate);
+  EXPECT_EQ(of("positional-encoding").injection, full.injection);
 }
 
 }  // namespace
