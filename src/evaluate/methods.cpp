@@ -44,7 +44,7 @@ Stage2Options stage2_of(const Method& method, Stage2Options configured, const Co
     options.purify.enabled = false;
   }
   if (options.injection == "photometric" && configured_injection == "classification") {
-    // The photometric loss is not to lose because of a step size chosen for classes: docs/decisions.md, 32.
+    // The photometric loss is not to lose because of a step size chosen for classes: docs/decisions.md, 33.
     options.learning_rate = Stage2Options{}.learning_rate;
     options.final_learning_rate = Stage2Options{}.final_learning_rate;
   }
