@@ -11,6 +11,7 @@
 #include "src/color/colorspace_math.h"
 #include "src/evaluate/torch/style_math.h"
 #include "src/train/scene.h"
+#include "src/train/stage1.h"
 #include "tests/support/data.h"
 #include "tests/support/finite_difference.h"
 #include "tests/support/toy_capture.h"
