@@ -2,15 +2,21 @@
 /// A camera of the capture as bakes and exports carry it: plain data, no image.
 
 #include <string>
+#include <vector>
 
 #include "src/capture/camera.h"
 
 namespace cnerf {
+
+struct Capture;
 
 struct BakeCamera {
   std::string name;           ///< as the poses name the view
   Intrinsics intrinsics;      ///< pixels; conventions of camera.h
   Affined world_from_camera;  ///< rigid; OpenCV camera axes
 };
+
+/// Of all views, held-out ones included: no photograph is looked at.
+[[nodiscard]] std::vector<BakeCamera> cameras_of(const Capture& capture);
 
 }  // namespace cnerf

@@ -1,17 +1,14 @@
 #include "bake/radiance_pass.h"
 
-#include <array>
 #include <cmath>
 
 #include "bake/dilate.h"
+#include "bake/view_average.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
 
 namespace cnerf {
 namespace {
-
-constexpr std::array<Vec3f, 6> kDefaultDirections{
-    {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
 
 bool in_gamut(Vec3f rgb, float luminance) {
   const float top = std::max(1.0f, luminance);
@@ -37,19 +34,11 @@ VoxelColor voxel_color(float luminance, Chromaticity chromaticity) {
   return color;
 }
 
-/// What is asked of the field for one brick: for each voxel a run of directions with weights.
+/// What is asked of the field for one brick.
 struct RadiancePass::Queries {
   std::vector<std::size_t> voxels;  ///< index into the brick's dense voxels, of those that are kept
-  std::vector<std::size_t> ends;    ///< end of each kept voxel's run
   std::vector<Vec3f> centroids;     ///< of each kept voxel, unit space
-  std::vector<Vec3f> positions, directions;
-  std::vector<float> weights;
-
-  void add(Vec3f position, Vec3f direction, float weight) {
-    positions.push_back(position);
-    directions.push_back(direction);
-    weights.push_back(weight);
-  }
+  ViewMeans means;                  ///< of each kept voxel
 };
 
 RadiancePass::RadiancePass(const ColorField& field, const std::vector<BakeCamera>& cameras,
@@ -82,7 +71,7 @@ std::vector<BakedVoxel> RadiancePass::bake_brick(std::span<const DenseVoxel> den
   const Vec3i brick_min = brick_min_of(level_.plan, plane, dense.front().brick);
   const Queries queries = gather(dense, brick_min);
   if (queries.voxels.empty()) return {};
-  const std::vector<float> luminance = mean_luminance(queries);
+  const std::vector<float> luminance = queries.means.luminance(field_);
   const std::vector<Chromaticity> chromaticity = ask_chromaticity(queries);
 
   std::vector<BakedVoxel> voxels;
@@ -110,33 +99,15 @@ RadiancePass::Queries RadiancePass::gather(std::span<const DenseVoxel> dense, Ve
     const std::vector<SeenBy> seen = views_.seen_by(level_.sigma, world, order, keep_unseen_ ? 0 : least);
     if (seen.empty() && !keep_unseen_) continue;
     const Vec3f unit = field_.frame().unit_from_world(world).cast<float>();
-    for (const SeenBy& view : seen) queries.add(unit, views_.direction_to(view.camera, world), view.transmittance);
-    if (seen.empty()) {
-      for (const Vec3f direction : kDefaultDirections) queries.add(unit, direction, 1.0f);
+    for (const SeenBy& view : seen) {
+      queries.means.look_along(unit, views_.direction_to(view.camera, world), view.transmittance);
     }
+    if (seen.empty()) queries.means.look_from_all_sides(unit);
+    queries.means.next_point();
     queries.voxels.push_back(v);
     queries.centroids.push_back(unit);
-    queries.ends.push_back(queries.positions.size());
   }
   return queries;
-}
-
-std::vector<float> RadiancePass::mean_luminance(const Queries& queries) const {
-  std::vector<float> answers(queries.positions.size());
-  field_.query_luminance(queries.positions, queries.directions, answers);
-  std::vector<float> mean;
-  std::size_t begin = 0;
-  for (const std::size_t end : queries.ends) {
-    double sum = 0, weight = 0;
-    for (std::size_t q = begin; q < end; ++q) {
-      CNERF_CHECK(std::isfinite(answers[q]), "the field answered a luminance that is not finite");
-      sum += static_cast<double>(queries.weights[q]) * answers[q];
-      weight += queries.weights[q];
-    }
-    mean.push_back(static_cast<float>(std::max(0.0, sum / weight)));
-    begin = end;
-  }
-  return mean;
 }
 
 std::vector<Chromaticity> RadiancePass::ask_chromaticity(const Queries& queries) const {

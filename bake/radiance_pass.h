@@ -39,7 +39,6 @@ class RadiancePass {
   struct Queries;
   [[nodiscard]] std::vector<BakedVoxel> bake_brick(std::span<const DenseVoxel> dense, int plane) const;
   [[nodiscard]] Queries gather(std::span<const DenseVoxel> dense, Vec3i brick_min) const;
-  [[nodiscard]] std::vector<float> mean_luminance(const Queries& queries) const;
   [[nodiscard]] std::vector<Chromaticity> ask_chromaticity(const Queries& queries) const;
 
   const ColorField& field_;

@@ -165,8 +165,8 @@ SceneFrame frame_from(const Json& j) {
 Json describe_files(const std::vector<std::string>& files, const fs::path& folder) {
   Json list = Json::array();
   for (const std::string& name : files) {
-    const std::vector<std::byte> content = read_binary_file(folder / name);
-    list.push_back({{"name", name}, {"bytes", content.size()}, {"sha256", sha256(content)}});
+    const std::string checksum = sha256_of_file(folder / name);
+    list.push_back({{"name", name}, {"bytes", fs::file_size(folder / name)}, {"sha256", checksum}});
   }
   return list;
 }

@@ -7,7 +7,7 @@ namespace cnerf {
 
 struct MeshOptions {
   int faces = 60000;            ///< triangles after decimation, about
-  double surface_depth = 0.7;   ///< voxels of matter that halve the light where the surface is drawn
+  double surface_depth = 2.0;   ///< voxels of matter that halve the light where the surface is drawn
   double adaptivity = 0.02;     ///< of the extraction: how far flat parts may be merged; 0 = one quad a voxel
   double smallest_part = 0.03;  ///< diagonal of a loose part, in diagonals of the whole, below which it is dropped
   int smoothing = 4;            ///< rounds of smoothing that keeps the volume, against voxel steps

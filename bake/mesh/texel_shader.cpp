@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bake/view_average.h"
 #include "src/base/check.h"
 
 namespace cnerf {
@@ -108,30 +109,20 @@ std::vector<SurfaceColor> TexelShader::shade(std::span<const SurfacePoint> point
   const std::vector<Sample> samples = samples_along_rays(points, colors);
   const std::vector<std::vector<View>> views = views_of(points);
 
-  std::vector<Vec3f> positions, directions;  // one query for every sample and view
-  std::vector<Vec3f> sample_positions;
+  ViewMeans means;  // of every sample
+  std::vector<Vec3f> positions;
   for (const Sample& sample : samples) {
-    sample_positions.push_back(sample.unit);
-    for (const View& view : views[sample.point]) {
-      positions.push_back(sample.unit);
-      directions.push_back(view.direction);
-    }
+    positions.push_back(sample.unit);
+    for (const View& view : views[sample.point]) means.look_along(sample.unit, view.direction, view.weight);
+    means.next_point();
   }
-  std::vector<float> luminance(positions.size());
-  field_.query_luminance(positions, directions, luminance);
+  const std::vector<float> luminance = means.luminance(field_);
   std::vector<Chromaticity> chromaticity(samples.size());
-  field_.query_chromaticity(sample_positions, chromaticity);
+  field_.query_chromaticity(positions, chromaticity);
 
   std::vector<Vec3d> light(points.size());  // XYZ relative to white, times opacity
-  std::size_t query = 0;
   for (std::size_t s = 0; s < samples.size(); ++s) {
-    double sum = 0, weight = 0;
-    for (const View& view : views[samples[s].point]) {
-      CNERF_CHECK(std::isfinite(luminance[query]), "the field answered a luminance that is not finite");
-      sum += view.weight * luminance[query++];
-      weight += view.weight;
-    }
-    const double y = std::max(0.0, sum / weight) * samples[s].weight;
+    const double y = static_cast<double>(luminance[s]) * samples[s].weight;
     const Chromaticity& c = chromaticity[s];
     CNERF_CHECK(std::isfinite(c.x) && std::isfinite(c.z), "the field answered a chromaticity that is not finite");
     light[samples[s].point] += Vec3d{y * c.x, y, y * c.z};

@@ -20,7 +20,7 @@ namespace {
 struct RenderArguments {
   RunFolderArguments run;
   std::string path = "turntable", format, out;
-  bool baked = false, overwrite = false;
+  bool baked = false, view_averaged = false, overwrite = false;
 };
 
 /// "png,exr" as flags. Without a format a moving camera gives a video, single views give pictures.
@@ -36,7 +36,8 @@ RenderOutput output_of(const RenderArguments& arguments) {
     if (flag == nullptr) throw UsageError("--format: expected png, exr or mp4, got '" + format + "'");
     *flag = true;
   }
-  output.color = arguments.baked ? ShownColor::kBaked : ShownColor::kDecoded;
+  output.color = arguments.baked || arguments.view_averaged ? ShownColor::kBaked : ShownColor::kDecoded;
+  output.view_averaged = arguments.view_averaged;
   return output;
 }
 
@@ -102,6 +103,8 @@ Work declare_render(CLI::App& app) {
   app.add_option("--format", arguments->format, "png, exr, mp4 or several, comma-separated");
   app.add_option("-o,--out", arguments->out, "Folder to write to; RUN/renders/TAKE if not given");
   app.add_flag("--baked", arguments->baked, "Show the colours of the bake instead of the per-pixel ones");
+  app.add_flag("--view-averaged", arguments->view_averaged,
+               "Show what a bake is made from: --baked colours with the mean brightness of the views that see a point");
   app.add_flag("--overwrite", arguments->overwrite, "Replace what is there");
   return [arguments](const auto& command_line) { render(*arguments, command_line); };
 }

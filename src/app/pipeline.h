@@ -101,6 +101,7 @@ struct RenderOutput {
   std::filesystem::path folder;
   bool png = false, exr = false, mp4 = false;
   ShownColor color = ShownColor::kDecoded;
+  bool view_averaged = false;  ///< luminance as a bake averages it over the views that see a point
 };
 /// Renders a take along a path.
 void render_step(const RunContext& context, const std::string& take, const CameraPath& path,

@@ -46,8 +46,8 @@ std::string bake_identity(const RunDirectory& directory, const std::string& take
                           BakeOptions options) {
   options.max_memory.clear();  // a bake may go on with more of it
   std::ostringstream identity;
-  identity << "cnerf " << version_text() << '\n' << sha256(read_binary_file(directory.stage1_snapshot())) << '\n';
-  if (!take.empty()) identity << sha256(read_binary_file(directory.take_snapshot(take))) << '\n';
+  identity << "cnerf " << version_text() << '\n' << sha256_of_file(directory.stage1_snapshot()) << '\n';
+  if (!take.empty()) identity << sha256_of_file(directory.take_snapshot(take)) << '\n';
   identity << write_toml(fields_of(options)) << std::hexfloat;
   for (const BakePlan& plan : plans) {
     identity << plan.origin.x << ' ' << plan.origin.y << ' ' << plan.origin.z << ' ' << plan.voxel_size << ' '
@@ -55,12 +55,6 @@ std::string bake_identity(const RunDirectory& directory, const std::string& take
   }
   for (const BakeCamera& camera : cameras) identity << camera_json(camera).dump() << '\n';
   return identity.str();
-}
-
-std::vector<BakeCamera> cameras_of(const Capture& capture) {
-  std::vector<BakeCamera> cameras;
-  for (const View& view : capture.views) cameras.push_back({view.name, view.intrinsics, view.world_from_camera});
-  return cameras;
 }
 
 /// The photographs as the program sees them, or none.
@@ -123,6 +117,17 @@ void add_plates(const Capture& capture, BakeFolder& bake) {
   for (const View& view : capture.views) {
     bake.add_plate(view.name,
                    make_web_photo(view.intrinsics, luminance_plane(view.image), kPlateSide, kPlateQuality).jpeg);
+  }
+}
+
+/// What `bake` makes. Where the input is at fault nothing is left to go on with: the same voxels would fail again.
+template <typename Bake>
+auto unless_input_fails(const fs::path& unfinished, const Bake& bake) {
+  try {
+    return bake();
+  } catch (const InputError&) {
+    fs::remove(unfinished);
+    throw;
   }
 }
 
@@ -191,10 +196,11 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   BakeJournal journal(unfinished, bake_identity(context.directory, take, cameras, plans, options));
   if (journal.found() > 0) context.reporter.say("bake: going on where it was stopped");
   BakeFolder bake(folder, cameras, context.command_line, config.vdb.units, config.vdb.up_axis);
-  std::vector<BakeLevel> levels = bake_levels(*scene, plans, options, journal, context.reporter.sink());
+  std::vector<BakeLevel> levels = unless_input_fails(
+      unfinished, [&] { return bake_levels(*scene, plans, options, journal, context.reporter.sink()); });
   if (formats.vdb || formats.web) {
-    std::vector<VolumePlanes> volumes =
-        bake_volumes(*scene, cameras, levels, options, journal, context.reporter.sink());
+    std::vector<VolumePlanes> volumes = unless_input_fails(
+        unfinished, [&] { return bake_volumes(*scene, cameras, levels, options, journal, context.reporter.sink()); });
     if (!formats.gltf) levels.clear();  // files are written grid by grid: they need the memory
     for (VolumePlanes& volume : volumes) {
       volume.colorizer = origin.colorizer;

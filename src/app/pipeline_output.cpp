@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "bake/view_average.h"
 #include "export/color_origin.h"
 #include "src/app/pipeline.h"
 #include "src/app/run_scene.h"
@@ -114,6 +115,11 @@ void render_step(const RunContext& context, const std::string& take, const Camer
   RenderOptions options = render_options(context.config);
   options.color = scene->is_colorized() && output.color == ShownColor::kDecoded;
   options.baked_color = scene->is_colorized() && output.color == ShownColor::kBaked;
+  std::unique_ptr<ViewAverage> average;
+  if (output.view_averaged) {
+    average = make_view_average(*scene, cameras_of(context.capture), context.config.bake, context.reporter.sink());
+    options.luminance = [&average](auto positions, auto luminance) { average->query(positions, luminance); };
+  }
   const std::string color_origin = color_origin_text(colorizer_name(context.directory, take), take);
   RenderFiles files(output, path.name, color_origin, context.config.render.fps, context.reporter);
   const ProgressSink progress = context.reporter.sink();

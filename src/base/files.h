@@ -28,5 +28,7 @@ void write_file(const std::filesystem::path& target, std::string_view content);
 
 /// Hex SHA-256 of `content`, for manifests and weights.
 [[nodiscard]] std::string sha256(std::span<const std::byte> content);
+/// The same of a file, of which little is held in memory at a time.  @throws MissingInputError, InputError.
+[[nodiscard]] std::string sha256_of_file(const std::filesystem::path& file);
 
 }  // namespace cnerf

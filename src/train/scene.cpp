@@ -142,6 +142,18 @@ class TrainedScene final : public Scene {
     return trace;
   }
 
+  static void replace_luminance(std::span<const Ray> rays, const RenderOptions& options, TraceMemory::Trace& traced) {
+    std::vector<Vec3f> positions;
+    for (std::size_t r = 0; r < rays.size(); ++r) {
+      for (std::size_t s = traced.offsets[r]; s < traced.offsets[r + 1]; ++s) {
+        positions.push_back(rays[r].origin + rays[r].direction * traced.samples[s].t);
+      }
+    }
+    std::vector<float> luminance(positions.size());
+    options.luminance(positions, luminance);
+    for (std::size_t s = 0; s < luminance.size(); ++s) traced.samples[s].luminance = luminance[s];
+  }
+
   void render_part(const UnitCamera& camera, const RenderOptions& options, std::size_t first, std::size_t last,
                    RenderedImage& image) const {
     std::vector<Ray> rays(last - first);
@@ -151,7 +163,8 @@ class TrainedScene final : public Scene {
         rays[r] = camera.ray({double(p % width) + 0.5, double(p / width) + 0.5});
       }
     });
-    const TraceMemory::Trace traced = trace(camera, rays, options, first);
+    TraceMemory::Trace traced = trace(camera, rays, options, first);
+    if (options.luminance) replace_luminance(rays, options, traced);
     const std::vector<WeightedSample>& samples = traced.samples;
     const std::vector<std::size_t>& offsets = traced.offsets;
     const Vec3f axis = camera.unit_from_camera.column(2).cast<float>();

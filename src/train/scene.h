@@ -2,7 +2,9 @@
 /// A trained scene, loaded for rendering, evaluation and baking.
 
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "src/base/options.h"
@@ -28,6 +30,8 @@ struct RenderOptions {
   double min_transmittance = 1e-3;  ///< a ray ends below this
   bool color = true;                ///< also rgb, when the scene is colorized
   bool baked_color = false;         ///< also baked_rgb
+  /// Linear Y of samples at positions in unit space, in place of the field's own, which depends on the view.
+  std::function<void(std::span<const Vec3f> positions, std::span<float> luminance)> luminance = {};
 };
 
 /// What the rays of rendered views met. Scenes of one stage 1 that share it march through a view once; each further

@@ -72,7 +72,7 @@ class Colorization {
 
   Stage2Report run(const Capture& capture, const std::filesystem::path& stage1_snapshot,
                    std::span<const KnownColors> known, bool resume) {
-    start_or_resume(sha256(read_binary_file(stage1_snapshot)), colorizer_.name() + describe(known), resume);
+    start_or_resume(sha256_of_file(stage1_snapshot), colorizer_.name() + describe(known), resume);
     seconds_before_ = model_.report.seconds;
     cache_views(capture, LuminanceModel::load(stage1_snapshot, makers_));
     names_ = training_view_names(capture);

@@ -23,6 +23,17 @@ std::string hash_of(std::string_view text) {
   return sha256(std::as_bytes(std::span(text.data(), text.size())));
 }
 
+TEST(Files, ChecksumOfAFileIsThatOfItsContent) {
+  const test::TempDir folder;
+  for (const std::size_t bytes : {std::size_t(0), std::size_t(5), std::size_t(1) << 20, (std::size_t(3) << 20) + 7}) {
+    std::string text(bytes, 'x');
+    if (bytes > 0) text.back() = 'y';
+    write_file(folder / "a", text);
+    EXPECT_EQ(sha256_of_file(folder / "a"), hash_of(text)) << bytes << " bytes: pieces of it are read";
+  }
+  EXPECT_THROW((void)sha256_of_file(folder / "missing"), MissingInputError);
+}
+
 TEST(Files, WritesAndReadsBack) {
   const test::TempDir folder;
   write_file(folder / "deep/er/a.txt", "grey\n");

@@ -1,13 +1,20 @@
 #pragma once
-/// What the benchmarks that compare pictures share: their command lines and their measure.
+/// What the benchmarks that compare pictures share: their command lines, the views and renders they compare with, and
+/// their measure.
 
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "bake/view_average.h"
+#include "export/manifest.h"
+#include "src/capture/capture.h"
 #include "src/color/colorspace_math.h"
+#include "src/evaluate/contact_sheet.h"
 #include "src/train/scene.h"
 
 namespace cnerf::bench {
@@ -23,12 +30,49 @@ inline double decibels(double squared, std::size_t values) {
 }
 
 /// The field over black, linear RGB; grey where it has no colour.  [H, W, 3]
-inline std::vector<float> rgb_of(const RenderedImage& image) {
-  if (!image.baked_rgb.empty()) return image.baked_rgb;
-  std::vector<float> rgb;
-  for (const float y : image.luminance) rgb.insert(rgb.end(), {y, y, y});
-  return rgb;
-}
+[[nodiscard]] std::vector<float> rgb_of(const RenderedImage& image);
+
+/// How to render a field for comparisons with a bake: colours of samples, and luminance as it is or averaged.
+/// @param average  null, or what `render` is to show; must outlive the result.
+[[nodiscard]] RenderOptions field_options(const Scene& scene, const ViewAverage* average);
+
+/// The view-averaged field behind a bake, on lattices like its own.
+[[nodiscard]] std::unique_ptr<ViewAverage> average_behind(const BakeManifest& bake, const Scene& scene,
+                                                          const Capture& capture);
+
+/// The first held-out views (of all views where none is), or trained ones, evenly spread; at most `most`.
+[[nodiscard]] std::vector<const View*> views_to_compare(const Capture& capture, bool trained, int most);
+
+/// How like the field's render a picture is, pixel by pixel: squared differences of sRGB-encoded colour over black, and
+/// how far their silhouettes (opacity above a half) overlap.
+class Likeness {
+ public:
+  /// @param rgba  linear, premultiplied.  @param wanted  linear RGB.  @param opacity  of the wanted.
+  void add(const float* rgba, const float* wanted, float opacity);
+  /// The pixels of another picture.
+  void add(const Likeness& other);
+
+  /// The whole picture, black where nothing is.
+  [[nodiscard]] double picture() const { return decibels(squared_, 3 * pixels_); }
+  /// Pixels that either covers to more than 1 %.
+  [[nodiscard]] double covered() const { return decibels(squared_covered_, 3 * covered_); }
+  /// Pixels that both cover to 99 %: without rims and thin parts.
+  [[nodiscard]] double inside() const { return decibels(squared_inside_, 3 * inside_); }
+  /// Intersection over union of the silhouettes.
+  [[nodiscard]] double overlap() const { return double(both_) / double(std::max<std::size_t>(either_, 1)); }
+  /// All of it in words.
+  [[nodiscard]] std::string text() const;
+
+ private:
+  double squared_ = 0, squared_covered_ = 0, squared_inside_ = 0;
+  std::size_t pixels_ = 0, covered_ = 0, inside_ = 0, both_ = 0, either_ = 0;
+};
+
+/// @param rgba  [H, W, 4] of the view that `field` was rendered from, see Likeness::add.
+[[nodiscard]] Likeness likeness_of(std::span<const float> rgba, const RenderedImage& field);
+/// A row of three pictures: this one, the field, and what this one adds to the field's sRGB-encoded colour, at twice
+/// the contrast; grey where it adds nothing.
+void add_row(ContactSheet& sheet, std::span<const float> rgba, const RenderedImage& field);
 
 /// `FILE... key=value...` behind the program's name.
 struct Arguments {
@@ -36,18 +80,6 @@ struct Arguments {
   std::map<std::string, int> options;
 };
 /// @param options  the known ones with their defaults.  @throws std::out_of_range, std::invalid_argument  on others.
-inline Arguments parse_arguments(int argc, char** argv, std::map<std::string, int> options) {
-  Arguments parsed{{}, std::move(options)};
-  for (int i = 1; i < argc; ++i) {
-    const std::string argument = argv[i];
-    const std::size_t equals = argument.find('=');
-    if (equals == std::string::npos) {
-      parsed.files.push_back(argument);
-    } else {
-      parsed.options.at(argument.substr(0, equals)) = std::stoi(argument.substr(equals + 1));
-    }
-  }
-  return parsed;
-}
+[[nodiscard]] Arguments parse_arguments(int argc, char** argv, std::map<std::string, int> options);
 
 }  // namespace cnerf::bench

@@ -1,35 +1,67 @@
-// A baked run in the real Blender: renders the held-out views of a capture in Cycles (linear EXR, box filter, volume
-// step rate 0.25) and compares them with our own integrator on the same grids, with the capture's colours and, where
-// snapshots are given, with the field's own render, over pixels whose opacity is above 0.01; with the field's render
-// also over the whole picture, black where nothing is.
+// A baked volume in the real Blender: renders views of a capture in Cycles (linear EXR, box filter, volume step rate
+// 0.25) and compares them with our own integrator on the same grids, with the capture's colours where anything is, and,
+// where snapshots are given, with the field's own render (averaged=1: with the view-averaged field), see Likeness.
 //
 //   cycles_comparison BAKE CAPTURE [STAGE1.snapshot [TAKE.snapshot]] [views=3] [samples=64] [downscale=1] [holdout=0]
+//                     [trained=0] [averaged=0] [pictures=0]
 //
-// BAKE is the folder with the VDB files, manifest.json and blender_setup.py.
+// BAKE is the folder with the VDB files, manifest.json and blender_setup.py. The views are the first held-out ones (all
+// views where none is), with trained=1 some of the others, evenly spread. With pictures=1 the folder gets
+// `cycles_comparison.png`: Cycles, field, and their difference.
 
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
+#include <optional>
 #include <string>
 
 #include "bake/volume_integrator.h"
 #include "export/vdb_reader.h"
 #include "src/capture/color_truth.h"
 #include "src/capture/load_capture.h"
-#include "src/train/scene.h"
 #include "tests/bench/comparison_support.h"
 #include "tests/blender/blender_run.h"
 
+namespace {
+
 using cnerf::bench::decibels;
 using cnerf::bench::encoded;
+using cnerf::test::RenderedExr;
+
+/// Mean squared differences over pixels where either renderer of the grids shows something.
+struct Differences {
+  double ours = 0;   ///< linear, to our integrator
+  double truth = 0;  ///< sRGB-encoded, to the capture's colours
+  std::size_t values = 0;
+};
+
+Differences differences(const RenderedExr& cycles, const cnerf::VolumeImage& ours,
+                        const std::optional<cnerf::ColorImage>& truth) {
+  Differences sums;
+  for (std::size_t p = 0; p < ours.opacity.size(); ++p) {
+    const float* rgba = &cycles.rgba[4 * p];
+    if (std::max(rgba[3], ours.opacity[p]) <= 0.01f) continue;
+    for (std::size_t c = 0; c < 3; ++c, ++sums.values) {
+      sums.ours += std::pow(double(rgba[c]) - ours.rgb[3 * p + c], 2);
+      if (truth) sums.truth += std::pow(encoded(rgba[c]) - encoded(truth->rgb[3 * p + c]), 2);
+    }
+  }
+  return sums;
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
-  auto [files, options] =
-      cnerf::bench::parse_arguments(argc, argv, {{"views", 3}, {"samples", 64}, {"downscale", 1}, {"holdout", 0}});
+  auto [files, options] = cnerf::bench::parse_arguments(argc, argv,
+                                                        {{"views", 3},
+                                                         {"samples", 64},
+                                                         {"downscale", 1},
+                                                         {"holdout", 0},
+                                                         {"trained", 0},
+                                                         {"averaged", 0},
+                                                         {"pictures", 0}});
   if (files.size() < 2) {
     std::puts(
         "cycles_comparison BAKE CAPTURE [STAGE1.snapshot [TAKE.snapshot]] [views=N] [samples=N] [downscale=N] "
-        "[holdout=N]");
+        "[holdout=N] [trained=0|1] [averaged=0|1] [pictures=0|1]");
     return 64;
   }
   const std::filesystem::path bake = files[0];
@@ -39,50 +71,32 @@ int main(int argc, char** argv) {
   const cnerf::Capture capture = cnerf::load_capture(files[1], capture_options);
   const std::vector<cnerf::BakedVolume> volumes = cnerf::read_volumes(bake);
   const auto scene = files.size() > 2 ? cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "") : nullptr;
-  cnerf::RenderOptions render;
-  render.color = false;
-  render.baked_color = scene != nullptr && scene->is_colorized();
+  const auto average = scene && options["averaged"] != 0
+                           ? cnerf::bench::average_behind(cnerf::read_manifest(bake / "manifest.json"), *scene, capture)
+                           : nullptr;
+  const auto views = cnerf::bench::views_to_compare(capture, options["trained"] != 0, options["views"]);
 
-  int done = 0;
-  for (const cnerf::View& view : capture.views) {
-    if (!view.held_out || done >= options["views"]) continue;
-    ++done;
-    const cnerf::test::RenderedExr cycles = cnerf::test::render_exact(
+  cnerf::ContactSheet sheet({"Cycles", "field", "difference x 2"}, 1000);
+  for (const cnerf::View* view : views) {
+    const RenderedExr cycles = cnerf::test::render_exact(
         bake / "blender_setup.py",
-        "--camera '" + view.name + "' --samples " + std::to_string(options["samples"]) + " --step-rate 0.25");
-    const cnerf::VolumeImage ours = cnerf::integrate_volumes(volumes, view.intrinsics, view.world_from_camera);
-    const auto truth = cnerf::load_color_truth(view);
-    const auto field = scene ? scene->render(view.intrinsics, view.world_from_camera, render) : cnerf::RenderedImage{};
-    double against_ours = 0, against_truth = 0, against_field = 0, picture = 0;
-    std::size_t values = 0;
-    for (int p = 0; p < ours.width * ours.height; ++p) {
-      const float* rgba = &cycles.rgba[4 * std::size_t(p)];
-      for (int c = 0; scene && c < 3; ++c) {
-        const float wanted = render.baked_color ? field.baked_rgb[3 * std::size_t(p) + c] : field.luminance[p];
-        picture += std::pow(encoded(rgba[c]) - encoded(wanted), 2);
-      }
-      if (std::max(rgba[3], ours.opacity[std::size_t(p)]) <= 0.01f) continue;
-      for (int c = 0; c < 3; ++c, ++values) {
-        const double difference = double(rgba[c]) - ours.rgb[3 * std::size_t(p) + c];
-        against_ours += difference * difference;
-        if (scene) {
-          const float wanted = render.baked_color ? field.baked_rgb[3 * std::size_t(p) + c] : field.luminance[p];
-          against_field += std::pow(encoded(rgba[c]) - encoded(wanted), 2);
-        }
-        if (!truth) continue;
-        const double error = encoded(rgba[c]) - encoded(truth->rgb[3 * std::size_t(p) + c]);
-        against_truth += error * error;
-      }
-    }
-    std::printf("%s: Cycles against our integrator %.2f dB (linear)", view.name.c_str(),
-                decibels(against_ours, values));
+        "--camera '" + view->name + "' --samples " + std::to_string(options["samples"]) + " --step-rate 0.25");
+    const auto ours = cnerf::integrate_volumes(volumes, view->intrinsics, view->world_from_camera);
+    const auto truth = cnerf::load_color_truth(*view);
+    const Differences sums = differences(cycles, ours, truth);
+    std::printf("%s: Cycles against our integrator %.2f dB (linear)", view->name.c_str(),
+                decibels(sums.ours, sums.values));
+    if (truth) std::printf(", against the true colours %.2f dB (sRGB)", decibels(sums.truth, sums.values));
+    std::printf(", over %zu pixels\n", sums.values / 3);
     if (scene) {
-      std::printf(", against the field %.2f dB (sRGB; %.2f dB over the picture)", decibels(against_field, values),
-                  decibels(picture, 3 * field.luminance.size()));
+      const auto field =
+          scene->render(view->intrinsics, view->world_from_camera, cnerf::bench::field_options(*scene, average.get()));
+      std::printf("%s: Cycles against the %sfield %s\n", view->name.c_str(), average ? "view-averaged " : "",
+                  cnerf::bench::likeness_of(cycles.rgba, field).text().c_str());
+      if (options["pictures"] != 0) cnerf::bench::add_row(sheet, cycles.rgba, field);
     }
-    if (truth) std::printf(", against the true colours %.2f dB (sRGB)", decibels(against_truth, values));
-    std::printf(", over %zu pixels\n", values / 3);
     std::fflush(stdout);
   }
-  return done > 0 ? 0 : 65;
+  if (options["pictures"] != 0) write_png(bake / "cycles_comparison.png", sheet.compose());
+  return views.empty() ? 65 : 0;
 }

@@ -1,7 +1,8 @@
 // Where should the surface of a bake lie? Along rays of the training views, compares the depth at which half of the
 // field's light is taken with the depth at which the baked grid crosses the level of a mesh, for several values of
 // mesh.surface_depth. Prints, in voxels, the median offset (positive: the mesh lies behind), the median distance, and
-// the shares of rays that meet only one of the two.
+// the shares of rays that meet only one of the two. The median is not what decides: a level that suits most rays loses
+// what is thin or loose (mesh_comparison), and a texture makes up for an offset but not for a hole.
 //
 //   surface_level CAPTURE STAGE1.snapshot [resolution=192] [rays=4000]
 

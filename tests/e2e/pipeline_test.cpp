@@ -78,6 +78,12 @@ TEST(Pipeline, StepsOneByOneWithoutColour) {
   const ProgramResult render = cnerf({"render", out, "--path", "held-out", "--format", "png,exr"});
   EXPECT_EQ(render.exit_code, 0) << render.err;
   EXPECT_EQ(files_below(folder / "run/renders/grey/held-out").size(), 4u) << "two views, two formats";
+  const fs::path averaged = folder / "averaged";
+  EXPECT_EQ(cnerf({"render", out, "--path", "held-out", "--view-averaged", "-o", averaged.string()}).exit_code, 0);
+  const std::string picture = files_below(averaged / "held-out").at(0);
+  EXPECT_NE(read_binary_file(averaged / "held-out" / picture),
+            read_binary_file(folder / "run/renders/grey/held-out" / picture))
+      << "luminance depends on the view, its mean does not";
   EXPECT_EQ(cnerf({"render", out, "--path", "orbit", "--format", "gif"}).exit_code, 64);
   EXPECT_EQ(cnerf({"eval", out, "--take", "none"}).exit_code, 66);
 }

@@ -1,0 +1,124 @@
+#include "bake/view_average.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "bake/volume_baker.h"
+#include "src/base/check.h"
+#include "src/base/parallel.h"
+
+namespace cnerf {
+namespace {
+
+constexpr std::array<Vec3f, 6> kAllSides{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
+
+}  // namespace
+
+void ViewMeans::look_along(Vec3f unit, Vec3f direction, float weight) {
+  positions_.push_back(unit);
+  directions_.push_back(direction);
+  weights_.push_back(weight);
+}
+
+void ViewMeans::look_from_all_sides(Vec3f unit) {
+  for (const Vec3f direction : kAllSides) look_along(unit, direction, 1.0f);
+}
+
+std::vector<float> ViewMeans::luminance(const ColorField& field) const {
+  std::vector<float> answers(positions_.size());
+  field.query_luminance(positions_, directions_, answers);
+  std::vector<float> means;
+  std::size_t begin = 0;
+  for (const std::size_t end : ends_) {
+    double sum = 0, weight = 0;
+    for (std::size_t q = begin; q < end; ++q) {
+      CNERF_CHECK(std::isfinite(answers[q]), "the field answered a luminance that is not finite");
+      sum += static_cast<double>(weights_[q]) * answers[q];
+      weight += weights_[q];
+    }
+    means.push_back(static_cast<float>(std::max(0.0, sum / weight)));
+    begin = end;
+  }
+  return means;
+}
+
+struct ViewAverage::Brick {
+  std::size_t level = 0;
+  Vec3d centre{};                   // world
+  std::vector<std::size_t> points;  // of the positions asked for
+};
+
+ViewAverage::ViewAverage(const ColorField& field, const std::vector<BakeCamera>& cameras, std::vector<BakeLevel> levels,
+                         const BakeOptions& options)
+    : field_(field), levels_(std::move(levels)) {
+  for (const BakeLevel& level : levels_) {
+    ViewSelection& views = views_.emplace_back(cameras, level.plan, options);
+    for (const BakeLevel& other : levels_) {
+      if (&other != &level) views.look_through(other.sigma, other.plan);
+    }
+  }
+}
+
+std::size_t ViewAverage::level_of(Vec3d world) const {
+  for (std::size_t level = 0; level + 1 < levels_.size(); ++level) {
+    const BakePlan& plan = levels_[level].plan;
+    const Vec3d p = plan.voxel_from_world(world);
+    const Aabbd lattice{{0, 0, 0}, plan.resolution.cast<double>()};
+    if (lattice.contains(p) && !plan.in_hole(p.cast<int>())) return level;
+  }
+  return levels_.size() - 1;
+}
+
+std::vector<ViewAverage::Brick> ViewAverage::by_brick(std::span<const Vec3f> positions) const {
+  using Key = std::pair<std::size_t, std::array<int, 3>>;
+  constexpr double kSide = kBrickSide;  // voxels
+  std::map<Key, Brick> bricks;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const Vec3d world = field_.frame().world_from_unit(positions[i].cast<double>());
+    const std::size_t level = level_of(world);
+    const BakePlan& plan = levels_[level].plan;
+    const Vec3d p = plan.voxel_from_world(world) / kSide;
+    const std::array<int, 3> at{static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)),
+                                static_cast<int>(std::floor(p.z))};
+    Brick& brick = bricks[{level, at}];
+    brick.level = level;
+    brick.centre = plan.world_from_voxel(Vec3d{at[0] + 0.5, at[1] + 0.5, at[2] + 0.5} * kSide);
+    brick.points.push_back(i);
+  }
+  std::vector<Brick> list;
+  for (auto& [key, brick] : bricks) list.push_back(std::move(brick));
+  return list;
+}
+
+void ViewAverage::query(std::span<const Vec3f> positions, std::span<float> luminance) const {
+  const std::vector<Brick> bricks = by_brick(positions);
+  parallel_tasks(bricks.size(), [&](std::size_t b) {
+    const Brick& brick = bricks[b];
+    const ViewSelection& views = views_[brick.level];
+    const std::vector<int> order = views.try_order(brick.centre);
+    ViewMeans means;
+    for (const std::size_t point : brick.points) {
+      const Vec3d world = field_.frame().world_from_unit(positions[point].cast<double>());
+      const std::vector<SeenBy> seen = views.seen_by(levels_[brick.level].sigma, world, order);
+      for (const SeenBy& view : seen) {
+        means.look_along(positions[point], views.direction_to(view.camera, world), view.transmittance);
+      }
+      if (seen.empty()) means.look_from_all_sides(positions[point]);
+      means.next_point();
+    }
+    const std::vector<float> answers = means.luminance(field_);
+    for (std::size_t i = 0; i < answers.size(); ++i) luminance[brick.points[i]] = answers[i];
+  });
+}
+
+std::unique_ptr<ViewAverage> make_view_average(const ColorField& field, const std::vector<BakeCamera>& cameras,
+                                               const BakeOptions& options, const ProgressSink& progress) {
+  BakeJournal journal;
+  auto levels = bake_levels(field, plan_within_budget(field, cameras, options), options, journal, progress);
+  return std::make_unique<ViewAverage>(field, cameras, std::move(levels), options);
+}
+
+}  // namespace cnerf

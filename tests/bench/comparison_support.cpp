@@ -1,0 +1,110 @@
+#include "tests/bench/comparison_support.h"
+
+#include <fmt/format.h>
+
+namespace cnerf::bench {
+
+std::vector<float> rgb_of(const RenderedImage& image) {
+  if (!image.baked_rgb.empty()) return image.baked_rgb;
+  std::vector<float> rgb;
+  for (const float y : image.luminance) rgb.insert(rgb.end(), {y, y, y});
+  return rgb;
+}
+
+RenderOptions field_options(const Scene& scene, const ViewAverage* average) {
+  RenderOptions options;
+  options.color = false;
+  options.baked_color = scene.is_colorized();
+  if (average != nullptr) {
+    options.luminance = [average](auto positions, auto luminance) { average->query(positions, luminance); };
+  }
+  return options;
+}
+
+std::unique_ptr<ViewAverage> average_behind(const BakeManifest& bake, const Scene& scene, const Capture& capture) {
+  BakeOptions options;
+  options.voxel_size = bake.volume ? bake.volume->voxel_size : bake.mesh->voxel_size;
+  options.grids = bake.finer_volumes.empty() ? "one" : "nested";
+  return make_view_average(scene, cameras_of(capture), options);
+}
+
+std::vector<const View*> views_to_compare(const Capture& capture, bool trained, int most) {
+  const bool any_held_out = std::ranges::any_of(capture.views, [](const View& view) { return view.held_out; });
+  std::vector<const View*> candidates, chosen;
+  for (const View& view : capture.views) {
+    if (!any_held_out || view.held_out != trained) candidates.push_back(&view);
+  }
+  const std::size_t count = std::min(candidates.size(), std::size_t(most));
+  for (std::size_t v = 0; v < count; ++v) chosen.push_back(candidates[trained ? v * candidates.size() / count : v]);
+  return chosen;
+}
+
+void Likeness::add(const float* rgba, const float* wanted, float opacity) {
+  double error = 0;
+  for (int c = 0; c < 3; ++c) error += std::pow(encoded(rgba[c]) - encoded(wanted[c]), 2);
+  ++pixels_;
+  squared_ += error;
+  both_ += std::min(rgba[3], opacity) > 0.5f ? 1 : 0;
+  either_ += std::max(rgba[3], opacity) > 0.5f ? 1 : 0;
+  if (std::max(rgba[3], opacity) <= 0.01f) return;
+  ++covered_;
+  squared_covered_ += error;
+  if (std::min(rgba[3], opacity) < 0.99f) return;
+  ++inside_;
+  squared_inside_ += error;
+}
+
+void Likeness::add(const Likeness& other) {
+  squared_ += other.squared_;
+  squared_covered_ += other.squared_covered_;
+  squared_inside_ += other.squared_inside_;
+  pixels_ += other.pixels_;
+  covered_ += other.covered_;
+  inside_ += other.inside_;
+  both_ += other.both_;
+  either_ += other.either_;
+}
+
+std::string Likeness::text() const {
+  return fmt::format(
+      "{:.2f} dB over what they cover, {:.2f} dB inside ({:.0f} % of it), {:.2f} dB over the picture, silhouettes IoU "
+      "{:.4f}",
+      covered(), inside(), 100.0 * double(inside_) / double(std::max<std::size_t>(covered_, 1)), picture(), overlap());
+}
+
+Likeness likeness_of(std::span<const float> rgba, const RenderedImage& field) {
+  const std::vector<float> wanted = rgb_of(field);
+  Likeness likeness;
+  for (std::size_t p = 0; p < field.opacity.size(); ++p) likeness.add(&rgba[4 * p], &wanted[3 * p], field.opacity[p]);
+  return likeness;
+}
+
+void add_row(ContactSheet& sheet, std::span<const float> rgba, const RenderedImage& field) {
+  const std::vector<float> wanted = rgb_of(field);
+  std::vector<float> shown, difference;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    shown.push_back(rgba[4 * (i / 3) + i % 3]);
+    const float more = 2 * (encoded(shown.back()) - encoded(wanted[i]));
+    difference.push_back(linear_from_srgb(std::clamp(0.5f + more, 0.0f, 1.0f)));
+  }
+  const auto picture = [&](const std::vector<float>& rgb) {
+    return picture_from_linear(field.width, field.height, rgb);
+  };
+  sheet.add_row({picture(shown), picture(wanted), picture(difference)});
+}
+
+Arguments parse_arguments(int argc, char** argv, std::map<std::string, int> options) {
+  Arguments parsed{{}, std::move(options)};
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    const std::size_t equals = argument.find('=');
+    if (equals == std::string::npos) {
+      parsed.files.push_back(argument);
+    } else {
+      parsed.options.at(argument.substr(0, equals)) = std::stoi(argument.substr(equals + 1));
+    }
+  }
+  return parsed;
+}
+
+}  // namespace cnerf::bench
