@@ -57,14 +57,6 @@ TEST(Bake, AFullDiskIsNamedAndLosesNothing) {
   EXPECT_EQ(cnerf(bake_into(folder / "bake")).exit_code, 0);
 }
 
-TEST(Bake, WhatCannotBeBakedLeavesNothingBehind) {
-  const TempDir folder;
-  const ProgramResult refused = cnerf(concatenated(bake_into(folder / "bake"), {"--set", "bake.opacity_threshold=1"}));
-  EXPECT_EQ(refused.exit_code, 65) << refused.err;
-  EXPECT_THAT(refused.err, HasSubstr("no voxel is as opaque"));
-  EXPECT_TRUE(files_below(folder / "bake").empty()) << "the same would fail again";
-}
-
 TEST(Bake, TooLittleMemoryIsRefusedBeforeAnythingIsBaked) {
   const TempDir folder;
   const ProgramResult refused = cnerf(concatenated(bake_into(folder / "bake"), {"--max-memory", "10M"}));
