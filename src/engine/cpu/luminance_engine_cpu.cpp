@@ -14,7 +14,7 @@
 namespace cnerf {
 namespace {
 
-constexpr std::size_t kWaveSamples = 16;  // samples a ray adds to one wave of the density-first pass
+constexpr std::size_t kWaveSamples = 8;  // samples a ray adds to one wave of the density-first pass
 constexpr std::size_t kMostSamplesPerRay = 1024;
 constexpr float kTrainingTransmittance = 1e-4f;  // a training ray ends below this
 constexpr int kOccupancyEvery = 16;              // steps
