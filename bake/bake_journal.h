@@ -12,6 +12,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "src/base/error.h"
+
 namespace cnerf {
 
 /// A list of byte strings in a file that only grows. A process may be killed at any time: what is cut off or damaged is
@@ -57,5 +59,16 @@ class BakeJournal {
 
   std::unique_ptr<File> file_;
 };
+
+/// What `bake` makes. When its input is at fault, its journal goes: the same parts would fail again.
+template <typename Bake>
+auto drop_journal_on_bad_input(const std::filesystem::path& journal, const Bake& bake) {
+  try {
+    return bake();
+  } catch (const InputError&) {
+    std::filesystem::remove(journal);
+    throw;
+  }
+}
 
 }  // namespace cnerf

@@ -120,17 +120,6 @@ void add_plates(const Capture& capture, BakeFolder& bake) {
   }
 }
 
-/// What `bake` makes. Where the input is at fault nothing is left to go on with: the same voxels would fail again.
-template <typename Bake>
-auto unless_input_fails(const fs::path& unfinished, const Bake& bake) {
-  try {
-    return bake();
-  } catch (const InputError&) {
-    fs::remove(unfinished);
-    throw;
-  }
-}
-
 }  // namespace
 
 BakeFormats parse_bake_formats(const std::string& list) {
@@ -196,10 +185,10 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   BakeJournal journal(unfinished, bake_identity(context.directory, take, cameras, plans, options));
   if (journal.found() > 0) context.reporter.say("bake: going on where it was stopped");
   BakeFolder bake(folder, cameras, context.command_line, config.vdb.units, config.vdb.up_axis);
-  std::vector<BakeLevel> levels = unless_input_fails(
+  std::vector<BakeLevel> levels = drop_journal_on_bad_input(
       unfinished, [&] { return bake_levels(*scene, plans, options, journal, context.reporter.sink()); });
   if (formats.vdb || formats.web) {
-    std::vector<VolumePlanes> volumes = unless_input_fails(
+    std::vector<VolumePlanes> volumes = drop_journal_on_bad_input(
         unfinished, [&] { return bake_volumes(*scene, cameras, levels, options, journal, context.reporter.sink()); });
     if (!formats.gltf) levels.clear();  // files are written grid by grid: they need the memory
     for (VolumePlanes& volume : volumes) {

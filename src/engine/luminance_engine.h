@@ -11,6 +11,7 @@
 #include "src/engine/state.h"
 #include "src/render/march.h"
 #include "src/render/occupancy_grid.h"
+#include "src/render/pixel_sampler.h"
 #include "src/render/training_views.h"
 
 namespace cnerf {
@@ -26,6 +27,8 @@ struct LuminanceEngineOptions {
   float max_luminance = 1.0f;                            ///< of the images; the field emits at most a little more
   float distortion_weight = 0;  ///< of each ray's distortion (distortion_math.h) in the loss
   std::uint64_t seed = 1;
+
+  [[nodiscard]] PixelSampling sampling() const { return {patch_size, patch_scale_min, patch_scale_max}; }
 };
 
 /// What a step did.

@@ -16,6 +16,9 @@ struct PixelSampling {
   float scale_min = 0.3f, scale_max = 0.7f;
 };
 
+/// Picks of a pixel before one that is masked out is taken after all.
+inline constexpr int kPickAttempts = 16;
+
 struct PickedPixel {
   std::uint32_t view = 0;
   int x = 0, y = 0;

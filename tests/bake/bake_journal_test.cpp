@@ -90,5 +90,16 @@ TEST(BakeJournal, PlacesThatCannotBeWrittenAreOutputErrors) {
   EXPECT_THROW((void)journal.read<int>(0), ContractError);
 }
 
+TEST(BakeJournal, GoesWithBadInputAndStaysForEverythingElse) {
+  const TempDir folder;
+  const auto journal = folder / "journal";
+  fill(journal, 2);
+  EXPECT_EQ(drop_journal_on_bad_input(journal, [] { return 7; }), 7);
+  EXPECT_THROW(drop_journal_on_bad_input(journal, []() -> int { throw OutputError("disk full"); }), OutputError);
+  EXPECT_EQ(BakeJournal(journal, "one bake").found(), 2u) << "what is done is worth going on with";
+  EXPECT_THROW(drop_journal_on_bad_input(journal, []() -> int { throw InputError("no voxel"); }), InputError);
+  EXPECT_FALSE(exists(journal));
+}
+
 }  // namespace
 }  // namespace cnerf::test

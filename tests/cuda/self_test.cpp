@@ -9,11 +9,15 @@
 #include <cstdio>
 #include <cstring>
 
+#include "encoding/cpu/hash_grid_kernels.h"
 #include "encoding/cuda/hash_grid_cuda.h"
 #include "encoding/hash_grid_reference.h"
+#include "src/base/aligned.h"
 #include "src/base/rng.h"
 #include "src/engine/cpu/luminance_engine_cpu.h"
 #include "src/engine/cuda/luminance_engine_cuda.h"
+#include "src/engine/cuda/step_kernels.h"
+#include "src/field/adam.h"
 #include "tests/cuda/check.h"
 #include "tests/cuda/expect.h"
 #include "tests/support/toy_capture.h"
@@ -114,6 +118,37 @@ void check_hash_grid(int levels, int log2_rows) {
   const std::vector<float> d_float(d_encoded.begin(), d_encoded.end());
   const std::vector<float> expected = encode_backward_reference(layout, positions, d_float);
   expect_gradient("hash grid backward", gradient.downloaded(), expected, 1e-5);
+}
+
+/// Adam and decay on rows with and without a gradient, against the processor's kernel.
+void check_table_update() {
+  constexpr std::uint32_t kRows = 4099;
+  constexpr float kDecay = 30;  // a step then takes 30 % of a row: no rounding hides a missing decay
+  const AdamSettings settings;
+  const AdamStep step(settings, 1e-2f, 5);
+  SequentialRng rng(13, 1);
+  AlignedVector<float> table, gradient, moments;
+  for (std::uint32_t row = 0; row < kRows; ++row) {
+    for (int f = 0; f < 4; ++f) {
+      table.push_back(rng.uniform(-1, 1));
+      gradient.push_back(row % 3 == 0 ? 0.0f : rng.uniform(-1, 1));
+      moments.push_back(rng.uniform(-1, 1));
+    }
+    for (int f = 0; f < 4; ++f) moments.push_back(rng.uniform(0.1f, 1));
+  }
+  const auto on_device = [](const AlignedVector<float>& v) { return uploaded(std::vector(v.begin(), v.end()), "test"); };
+  const auto d_table = on_device(table), d_gradient = on_device(gradient), d_moments = on_device(moments);
+  DeviceBuffer<std::uint16_t> halves(table.size(), "test");
+  const auto d_step = uploaded(std::vector<AdamStep>{step}, "test");
+  update_table(d_step.data(), kRows, kDecay, reinterpret_cast<float4*>(d_table.data()),
+               reinterpret_cast<float4*>(d_gradient.data()), reinterpret_cast<float4*>(d_moments.data()),
+               reinterpret_cast<uint2*>(halves.data()), nullptr);
+  CNERF_CUDA(cudaDeviceSynchronize());
+  hash_grid_kernels().adam_rows(table.data(), gradient.data(), moments.data(), kRows, 1 - step.learning_rate * kDecay,
+                                step.step_size, settings.beta1, settings.beta2, settings.epsilon,
+                                step.second_correction);
+  expect_below("table after Adam and decay", relative_distance(d_table.downloaded(), table), 1e-5);
+  expect_below("its moments", relative_distance(d_moments.downloaded(), moments), 1e-5);
 }
 
 struct Problem {
@@ -282,6 +317,7 @@ int self_test(const Arguments& arguments) {
   if (arguments.number("stage", 0) == 2) return failures();
   check_hash_grid(8, 15);
   check_hash_grid(3, 19);
+  check_table_update();
   check_engine({"opaque, exposures", 8, 14, 64, 1, 0, false, false, true});
   check_engine({"distortion", 8, 14, 64, 2, 0, false, false, false, 0.3f});
   if (!quick) {

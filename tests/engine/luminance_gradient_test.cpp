@@ -91,7 +91,7 @@ class LossInDouble {
   std::vector<GridLevel> levels_;
   MlpLayout density_, luminance_;
   double max_luminance_, distortion_weight_;
-  std::vector<LuminanceEngineCpu::ObservedRay> rays_;
+  std::vector<ObservedRay> rays_;
   std::vector<std::vector<RaySample>> samples_;
 };
 

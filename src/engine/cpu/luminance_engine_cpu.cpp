@@ -46,30 +46,6 @@ LuminanceEngineCpu::LuminanceEngineCpu(const LuminanceEngineOptions& options)
       counters_{0, std::clamp<std::int64_t>(options.samples_per_step / 256, 64, kMostRays)},
       chunks_(kChunks) {}
 
-LuminanceEngineCpu::ObservedRay LuminanceEngineCpu::observe(const std::vector<TrainingView>& views,
-                                                            std::size_t ray) const {
-  const auto step = static_cast<std::uint64_t>(step_count());
-  const PixelSampling sampling = {options_.patch_size, options_.patch_scale_min, options_.patch_scale_max};
-  PickedPixel pixel;
-  std::size_t index = 0;
-  for (int attempt = 0; attempt < 16; ++attempt) {
-    pixel = pick_pixel(views, sampling, options_.seed, step, ray, attempt);
-    index = std::size_t(pixel.y) * std::size_t(views[pixel.view].image->width) + std::size_t(pixel.x);
-    if (views[pixel.view].image->valid(index)) break;
-  }
-  const TrainingView& view = views[pixel.view];
-  const CounterRng rng = ray_rng(options_.seed, step);
-  ObservedRay observed;
-  observed.ray = view.camera.ray({pixel.x + 0.5, pixel.y + 0.5});
-  observed.target = view.image->luminance(index);
-  observed.coverage = view.image->coverage(index);
-  observed.jitter = rng.uniform(2 * ray);
-  // Another background each time: what is transparent has to become empty and what is opaque solid. Over black, a dark
-  // thing could as well be a hole, and thin fog everywhere explains a dim picture.
-  observed.background = luminance_from_lightness(100.0f * rng.uniform(2 * ray + 1));
-  return observed;
-}
-
 void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
                                  float min_transmittance, Block& block) const {
   struct Walk {
@@ -183,8 +159,7 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
     }
     const float background = rays[r].background;
     const float seen = ray.value + ray.transmittance * background;
-    const float wanted = rays[r].target + (1.0f - rays[r].coverage) * background;
-    const float error = (lightness_from_luminance(seen) - lightness_from_luminance(wanted)) / 100.0f;
+    const float error = (lightness_from_luminance(seen) - lightness_from_luminance(rays[r].wanted())) / 100.0f;
     const float encoded_error =
         srgb_from_linear(std::clamp(ray.value, 0.0f, 1.0f)) - srgb_from_linear(std::clamp(rays[r].target, 0.0f, 1.0f));
     chunk.loss += error * error + options_.distortion_weight * distortion.value;

@@ -8,7 +8,7 @@
 
 #include "src/engine/cpu/luminance_field.h"
 #include "src/engine/luminance_engine.h"
-#include "src/render/pixel_sampler.h"
+#include "src/render/observed_ray.h"
 
 namespace cnerf {
 
@@ -31,16 +31,10 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   [[nodiscard]] std::vector<StatePiece> state() override;
   void state_loaded() override;
 
-  /// A ray of a training step and what its pixel shows.
-  struct ObservedRay {
-    Ray ray;
-    float target = 0;      ///< linear Y over black
-    float coverage = 1;    ///< alpha of the pixel
-    float background = 0;  ///< linear Y put behind ray and pixel alike
-    float jitter = 0;
-  };
   /// The rays of the next step: a pure function of the step number.
-  [[nodiscard]] ObservedRay observe(const std::vector<TrainingView>& views, std::size_t ray) const;
+  [[nodiscard]] ObservedRay observe(const std::vector<TrainingView>& views, std::size_t ray) const {
+    return observe_ray(views, options_.sampling(), options_.seed, static_cast<std::uint64_t>(step_count()), ray);
+  }
 
   /// Gradients of one step without applying them, for tests.
   struct Gradients {

@@ -216,7 +216,7 @@ void LuminanceEngineCuda::draw(cudaStream_t stream) {
   DrawJob draw{m.state.data(),
                views_->records.data(),
                std::uint32_t(views_->records.size()),
-               {options_.patch_size, options_.patch_scale_min, options_.patch_scale_max},
+               options_.sampling(),
                options_.seed,
                m.rays.data(),
                reinterpret_cast<DirectionCode*>(m.directions.data())};

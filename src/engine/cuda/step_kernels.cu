@@ -9,7 +9,6 @@ namespace cnerf {
 namespace {
 
 constexpr unsigned kThreads = 128;
-constexpr int kPickAttempts = 16;
 
 unsigned blocks_for(std::size_t items) {
   return unsigned((items + kThreads - 1) / kThreads);

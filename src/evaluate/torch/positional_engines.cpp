@@ -13,7 +13,7 @@
 #include "src/evaluate/positional_field.h"
 #include "src/evaluate/torch/positional_math.h"
 #include "src/field/luminance_activation.h"
-#include "src/render/pixel_sampler.h"
+#include "src/render/observed_ray.h"
 
 namespace cnerf {
 namespace {
@@ -219,16 +219,19 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
     CNERF_CHECK(!views.empty(), "no training views");
     const FastProducts fast;
     const std::size_t n = rays_a_step();
+    // The same pixels and backgrounds as the hash grid's engines draw.
     std::vector<Ray> rays(n);
-    std::vector<float> target(n), coverage(n), background(n);
+    std::vector<float> backgrounds(n), targets(n), wanted_light(n);
     parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) observe(views, r, rays[r], target[r], coverage[r], background[r]);
+      for (std::size_t r = begin; r < end; ++r) {
+        const ObservedRay observed =
+            observe_ray(views, options_.sampling(), options_.seed, std::uint64_t(counters_[0]), r);
+        rays[r] = observed.ray, backgrounds[r] = observed.background;
+        targets[r] = observed.target, wanted_light[r] = observed.wanted();
+      }
     });
-    const auto column = [n](const std::vector<float>& values) {
-      return tensor_of(values, {std::int64_t(n)}, torch::kFloat32);
-    };
-    const torch::Tensor behind = column(background);
-    const torch::Tensor wanted = column(target) + (1 - column(coverage)) * behind;
+    const torch::Tensor behind = tensor_of(backgrounds, {std::int64_t(n)}, torch::kFloat32);
+    const torch::Tensor wanted = tensor_of(wanted_light, {std::int64_t(n)}, torch::kFloat32);
     const RayTensors where = on_device(rays);
     const torch::Tensor coarse_t =
         coarse_distances(where, uniform(options_.seed, noise(0), {std::int64_t(n), kCoarseSamples}));
@@ -250,7 +253,7 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
     const std::vector<float> seen = floats_of(fine.luminance_of_rays());
     for (std::size_t r = 0; r < n; ++r) {
       const float error =
-          srgb_from_linear(std::clamp(seen[r], 0.0f, 1.0f)) - srgb_from_linear(std::clamp(target[r], 0.0f, 1.0f));
+          srgb_from_linear(std::clamp(seen[r], 0.0f, 1.0f)) - srgb_from_linear(std::clamp(targets[r], 0.0f, 1.0f));
       report.squared_error += error * error / double(n);
     }
     report.rays = n;
@@ -337,25 +340,6 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
     return std::size_t(std::max(16, options_.samples_per_step / (2 * kCoarseSamples + kFineSamples)));
   }
   [[nodiscard]] std::uint64_t noise(std::uint64_t which) const { return 2 * std::uint64_t(counters_[0]) + which; }
-
-  /// The same pixel and background as the hash grid's engine draws.
-  void observe(const std::vector<TrainingView>& views, std::size_t r, Ray& ray, float& target, float& coverage,
-               float& background) const {
-    const auto step = std::uint64_t(counters_[0]);
-    const PixelSampling sampling = {options_.patch_size, options_.patch_scale_min, options_.patch_scale_max};
-    PickedPixel pixel;
-    std::size_t index = 0;
-    for (int attempt = 0; attempt < 16; ++attempt) {
-      pixel = pick_pixel(views, sampling, options_.seed, step, r, attempt);
-      index = std::size_t(pixel.y) * std::size_t(views[pixel.view].image->width) + std::size_t(pixel.x);
-      if (views[pixel.view].image->valid(index)) break;
-    }
-    const TrainingView& view = views[pixel.view];
-    ray = view.camera.ray({pixel.x + 0.5, pixel.y + 0.5});
-    target = view.image->luminance(index);
-    coverage = view.image->coverage(index);
-    background = luminance_from_lightness(100.0f * ray_rng(options_.seed, step).uniform(2 * r + 1));
-  }
 
   static torch::Tensor vectors(std::span<const Vec3f> all) {
     static_assert(sizeof(Vec3f) == 3 * sizeof(float));
