@@ -25,8 +25,13 @@ class ChromaEngine {
   /// One optimiser step; returns the mean loss.
   /// @param labels         [R] soft labels of the pixels
   /// @param pixel_weights  [R] factors of the pixels' losses (class rebalancing, opacity); may be empty = all 1
+  /// @param spread_weight  of the mean over pixels of their spread (chroma_math.h) in the loss
   virtual double step(const PixelSamples& pixels, std::span<const SoftLabel> labels,
-                      std::span<const float> pixel_weights, float learning_rate) = 0;
+                      std::span<const float> pixel_weights, float spread_weight, float learning_rate) = 0;
+  double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
+              float learning_rate) {
+    return step(pixels, labels, pixel_weights, 0, learning_rate);
+  }
   /// @param logits  [R, 313]; of pixels below kLeastColoredOpacity they mean nothing
   virtual void logits(const PixelSamples& pixels, std::span<float> logits) const = 0;
   /// One colour a pixel, of the same pixels: see `decode_annealed_mean`; temperature 0 is `decode_arg_max`.

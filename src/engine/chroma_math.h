@@ -22,6 +22,15 @@ CNERF_HD inline float divergence(float label, float log_probability) {
   return label * (std::log(label) - log_probability);
 }
 
+/// The spread of a pixel with samples of features h_i and shares w_i / A, composited to H, is
+///   sum_i w_i / A |h_i - H|^2 = sum_i w_i / A |h_i|^2 - |H|^2.
+/// Weighed into the loss it gives a surface one colour through its depth, so that views which weigh its samples
+/// otherwise show the same colour. H being the mean, its own derivative falls out:
+/// @return  s of the derivative by h_i: s w_i / A (h_i - H)   @param scale  of the loss
+CNERF_HD inline float spread_slope(float spread_weight, float scale) {
+  return 2 * spread_weight * scale;
+}
+
 /// What an ab distance of d costs.
 enum class AbLoss {
   kHuber,    ///< d^2 below a few units, d above: what a few wrong pixels say hardly counts

@@ -29,6 +29,7 @@ struct Stage2Options {
   int working_resolution = 384;      ///< short side, pixels, at which samples are cached
   double cached_weight = 0.99;       ///< share of a pixel's weight the cached samples carry
   double rebalancing = 0;            ///< lambda mixing of class rebalancing; 0 = off
+  double spread_weight = 0;          ///< of the spread of a pixel's features in the loss (src/engine/chroma_math.h)
   double decode_temperature = 0.2;   ///< annealed-mean temperature; 0 = arg-max
   int distill_steps = 1000;          ///< steps of the fit of per-sample colour for baking
   int colorizer_batch = 4;           ///< patches a colorizer query
@@ -53,6 +54,8 @@ struct Stage2Options {
     v("working_resolution", working_resolution, Range{32, 4096}, "short side at which samples are cached, pixels");
     v("cached_weight", cached_weight, Range{0.5, 1}, "share of a pixel's weight that its cached samples carry");
     v("rebalancing", rebalancing, Range{0, 1}, "class rebalancing: 0 = off, else the share of the prior");
+    v("spread_weight", spread_weight, Range{0, 1000},
+      "of a loss on how far apart the features of a ray's samples lie: for colours that agree from view to view");
     v("decode_temperature", decode_temperature, Range{0, 10}, "annealed-mean temperature; 0 = arg-max");
     v("distill_steps", distill_steps, Range{0, 1e6}, "steps of the fit of per-sample colour that baking uses");
     v("colorizer_batch", colorizer_batch, Range{1, 64}, "patches a colorizer query");

@@ -68,8 +68,8 @@ HashGridOptions grid_of(int levels) {
   return {.levels = levels, .log2_rows = 12, .coarsest_resolution = 4, .finest_resolution = 128};
 }
 
-void check_distribution(int levels, int count, bool quick) {
-  std::printf("-- distribution: %d levels, %d pixels\n", levels, count);
+void check_distribution(int levels, int count, float spread_weight, bool quick) {
+  std::printf("-- distribution: %d levels, %d pixels, spread weight %g\n", levels, count, double(spread_weight));
   const PixelSamples pixels = random_pixels(count, 24, 3);
   const std::vector<Ab> colors = colors_of(pixels);
   std::vector<SoftLabel> labels;
@@ -81,7 +81,7 @@ void check_distribution(int levels, int count, bool quick) {
   }
   weights.front() = 0;
   const auto cpu = make_cpu_chroma_engine(grid_of(levels), 5), cuda = make_cuda_chroma_engine(grid_of(levels), 5);
-  const auto step = [&](ChromaEngine& engine, float rate) { return engine.step(pixels, labels, weights, rate); };
+  const auto step = [&](ChromaEngine& engine, float rate) { return engine.step(pixels, labels, weights, spread_weight, rate); };
 
   const auto compare_logits = [&](const char* what, double bound) {
     std::vector<float> expected(std::size_t(count) * kAbBinCount), found(expected.size());
@@ -203,11 +203,12 @@ void check_empty_pixels() {
 }  // namespace
 
 void check_chroma(bool quick) {
-  check_distribution(8, 777, quick);
+  check_distribution(8, 777, 0, quick);
+  check_distribution(8, 777, 3, quick);
   check_chromaticity(8, 777, AbLoss::kHuber, quick);
   if (!quick) {
-    check_distribution(3, 16, quick);
-    check_distribution(16, 4096, quick);
+    check_distribution(3, 16, 0, quick);
+    check_distribution(16, 4096, 0.3f, quick);
     check_chromaticity(3, 1, AbLoss::kSquared, quick);
     check_chromaticity(13, 3000, AbLoss::kSquared, quick);
   }

@@ -1,12 +1,17 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <span>
+#include <string>
 
 #include "src/base/parallel.h"
 #include "src/base/rng.h"
 #include "src/color/colorspace_math.h"
 #include "src/engine/chroma_engine.h"
 #include "src/engine/cpu/mlp.h"
+#include "src/field/adam.h"
 
 namespace cnerf {
 namespace {
@@ -79,18 +84,94 @@ TEST(ChromaEngine, LearnsTwoColours) {
   EXPECT_EQ(decode_arg_max(std::span(logits).last(kAbBinCount)).a, -30);
 }
 
-/// The gradient of the first step, seen through what Adam makes of it: its first step moves each weight by the rate
-/// against the sign of its gradient, so a small step must lower the loss, and one with the opposite sign raise it.
-TEST(ChromaEngine, GradientPointsDownhill) {
-  const PixelSamples pixels = row_of_pixels(64);
-  const auto loss_after = [&](float rate) {
-    const auto engine = make_cpu_chroma_engine(small_grid(), 5);
-    engine->step(pixels, two_halves(64), {}, rate);
-    return engine->step(pixels, two_halves(64), {}, 1e-9f);
+/// The engine's parameters and, after a step from zero moments, their gradient: a tenth of it is in the first moments.
+struct Parameters {
+  std::span<float> values;
+  std::vector<float> gradient;
+};
+std::vector<Parameters> parameters_of(ChromaEngine& engine) {
+  const auto floats = [](const StatePiece& piece) {
+    return std::span(reinterpret_cast<float*>(piece.bytes.data()), piece.bytes.size() / sizeof(float));
   };
-  const double before = loss_after(1e-9f);
-  EXPECT_LT(loss_after(1e-4f), before - 1e-4);
-  EXPECT_GT(loss_after(-1e-4f), before + 1e-4);
+  const std::vector<StatePiece> state = engine.state();
+  const auto piece = [&](const std::string& name) {
+    return floats(*std::ranges::find(state, name, &StatePiece::name));
+  };
+  std::vector<Parameters> parameters;
+  for (const StatePiece& moments : state) {
+    const bool is_grid = moments.name.ends_with("grid.moments");  // [rows, 8], the first moments in front
+    const auto dot = moments.name.rfind('.');
+    if (!is_grid && !moments.name.ends_with("first_moments")) continue;
+    Parameters found{piece(moments.name.substr(0, dot) + (is_grid ? ".table" : ".weights")), {}};
+    const std::span<float> values = floats(moments);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (!is_grid || i % 8 < 4) found.gradient.push_back(values[i] / (1 - AdamSettings{}.beta1));
+    }
+    parameters.push_back(std::move(found));
+  }
+  return parameters;
+}
+
+TEST(ChromaEngine, GradientIsTheLossesDerivativeSpreadIncluded) {
+  const PixelSamples pixels = row_of_pixels(48);
+  for (const float spread_weight : {0.0f, 30.0f}) {
+    const auto engine = make_cpu_chroma_engine(small_grid(), 5);
+    for (int i = 0; i < 20; ++i) engine->step(pixels, two_halves(48), {}, 1e-2f);
+    for (const StatePiece& piece : engine->state()) {
+      if (piece.name.find("moments") != std::string::npos) std::ranges::fill(piece.bytes, std::byte{0});
+    }
+    const auto loss = [&] {
+      engine->state_loaded();
+      return engine->step(pixels, two_halves(48), {}, spread_weight, 1e-12f);
+    };
+    loss();
+    const std::vector<Parameters> parameters = parameters_of(*engine);
+    ASSERT_EQ(parameters.size(), 3u) << "grid, net and head";
+    for (const Parameters& p : parameters) {
+      ASSERT_EQ(p.values.size(), p.gradient.size());
+      double slope = 0;  // along the gradient, per unit of its length
+      for (const float g : p.gradient) slope += double(g) * g;
+      slope = std::sqrt(slope);
+      const std::vector<float> kept(p.values.begin(), p.values.end());
+      const auto loss_at = [&](double distance) {
+        for (std::size_t i = 0; i < kept.size(); ++i) p.values[i] = kept[i] + float(distance * p.gradient[i] / slope);
+        const double result = loss();
+        std::ranges::copy(kept, p.values.begin());
+        return result;
+      };
+      constexpr double kStep = 1e-3;
+      EXPECT_NEAR((loss_at(kStep) - loss_at(-kStep)) / (2 * kStep), slope, 0.02 * slope) << spread_weight;
+    }
+  }
+}
+
+TEST(ChromaEngine, SpreadIsWhatTheLossGrowsBy) {
+  const PixelSamples pixels = row_of_pixels(48);
+  const auto loss = [&](const PixelSamples& of, float spread_weight) {
+    return make_cpu_chroma_engine(small_grid(), 5)->step(of, two_halves(int(of.pixels())), {}, spread_weight, 1e-9f);
+  };
+  const double none = loss(pixels, 0), once = loss(pixels, 1), twice = loss(pixels, 2);
+  EXPECT_GT(once, none);
+  EXPECT_NEAR(twice - none, 2 * (once - none), 1e-6);
+  EXPECT_NEAR(loss(single_samples(pixels), 100), loss(single_samples(pixels), 0), 1e-5) << "one sample has no spread";
+}
+
+TEST(ChromaEngine, SpreadMakesTheSamplesOfAPixelAgree) {
+  const PixelSamples pixels = row_of_pixels(64), samples = single_samples(pixels);
+  const auto disagreement = [&](float spread_weight) {
+    const auto engine = make_cpu_chroma_engine(small_grid(), 3);
+    double last = 0;
+    for (int i = 0; i < 150; ++i) last = engine->step(pixels, two_halves(64), {}, spread_weight, 1e-2f);
+    EXPECT_LT(last, 0.3) << "what is wanted is still learnt";
+    std::vector<Ab> colors(samples.pixels());
+    engine->decode(samples, 1.0f, colors);
+    double total = 0;
+    for (std::size_t s = 0; s < colors.size(); s += 2) {
+      total += std::hypot(colors[s].a - colors[s + 1].a, colors[s].b - colors[s + 1].b);
+    }
+    return total / double(pixels.pixels());
+  };
+  EXPECT_LT(disagreement(1.0f), 0.5 * disagreement(0));
 }
 
 TEST(ChromaEngine, StepsAreBitEqualForAnyNumberOfThreads) {

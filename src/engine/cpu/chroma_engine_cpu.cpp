@@ -26,8 +26,9 @@ class ChromaEngineCpu final : public ChromaEngine {
     head_.set_weights(initial_chroma_head(seed));
   }
 
+  using ChromaEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
-              float learning_rate) override {
+              float spread_weight, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
     const float scale = 1.0f / static_cast<float>(pixels.pixels());
     chunks_.run(pixels.pixels(), kBlockPixels, features_.weight_count() + head_.layout().weight_count(),
@@ -39,7 +40,8 @@ class ChromaEngineCpu final : public ChromaEngine {
                     chunk.loss += weight * loss_gradient(work, p - begin, labels[p], weight * scale);
                   }
                   clear_padding(work, end - begin);
-                  backward(pixels, begin, end, work, chunk);
+                  const double spread = backward(pixels, begin, end, spread_slope(spread_weight, scale), work, chunk);
+                  chunk.loss += spread_weight * spread;
                 });
     steps_.front() += 1;
     const std::vector<float> d_weights = chunks_.d_weights();
@@ -153,25 +155,33 @@ class ChromaEngineCpu final : public ChromaEngine {
     }
   }
 
-  void backward(const PixelSamples& pixels, std::size_t begin, std::size_t end, Work& work, StepChunk& chunk) const {
+  /// Returns the sum of the pixels' spreads.
+  double backward(const PixelSamples& pixels, std::size_t begin, std::size_t end, float spread_slope, Work& work,
+                  StepChunk& chunk) const {
     ensure_size(work.d_composited, work.composited.size());
     head_.backward({{work.composited.data(), kHeadInputs}, {work.logits.data(), kHeadOutputs}},
                    {{work.d_composited.data(), kHeadInputs}, {work.d_logits.data(), kHeadOutputs}},
                    (end - begin + kGroup - 1) / kGroup, chunk.d_weights.data() + features_.weight_count());
     const std::size_t first = pixels.offsets[begin];
     std::fill(work.points.d_output.begin(), work.points.d_output.end(), 0.0f);
+    double spread = 0;
     for (std::size_t p = begin; p < end; ++p) {
       const float inverse = inverse_opacity_of(pixels, p);
       for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
-        const float weight = pixels.weights[s] * inverse;
+        const float share = pixels.weights[s] * inverse;
+        float squared_distance = 0;
         for (int c = 0; c < kFeatures; ++c) {
-          work.points.d_output[features_.output_at(s - first, c)] =
-              weight * work.d_composited[head_input_at(p - begin, c)];
+          const std::size_t of_sample = features_.output_at(s - first, c), of_pixel = head_input_at(p - begin, c);
+          const float distance = work.points.output[of_sample] - work.composited[of_pixel];
+          squared_distance += distance * distance;
+          work.points.d_output[of_sample] = share * (work.d_composited[of_pixel] + spread_slope * distance);
         }
+        spread += double(share * squared_distance);
       }
     }
     float* d_encoded = chunk.append(work.points.positions, work.points.groups, features_.encoded_channels());
     features_.backward(work.points, d_encoded, chunk.d_weights.data());
+    return spread;
   }
 
   PointNetCpu features_;

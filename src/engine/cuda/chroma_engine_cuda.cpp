@@ -24,8 +24,9 @@ class ChromaEngineCuda final : public ChromaEngine {
     state_loaded();
   }
 
+  using ChromaEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
-              float learning_rate) override {
+              float spread_weight, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
     const std::lock_guard lock(mutex_);
     const std::size_t n = pixels.pixels();
@@ -41,11 +42,11 @@ class ChromaEngineCuda final : public ChromaEngine {
     features_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/true, stream_);
     const float scale = 1.0f / static_cast<float>(n);
     chroma_loss(head_job(),
-                {labels_.data(), batch_.upload_weights(pixel_weights, stream_), scale, d_composited_.data(),
-                 d_head_.data(), &stream_.step()->loss},
+                {labels_.data(), batch_.upload_weights(pixel_weights, stream_), scale, spread_weight,
+                 d_composited_.data(), d_head_.data(), &stream_.step()->loss},
                 stream_);
     features_.backward(batch_.arrays().places, {&stream_.step()->samples, batch_.samples()},
-                       {batch_.arrays().shares, d_composited_.data(), nullptr}, stream_);
+                       {batch_.arrays().shares, d_composited_.data(), spread_slope(spread_weight, scale)}, stream_);
     update_head(d_head_.data(), parts);
     features_.update(&stream_.step()->adam, stream_);
     return stream_.end_step() * scale;

@@ -123,11 +123,14 @@ struct Logits {
   }
 };
 
-/// Composites features of the block's pixels; the constant behind them stays.
-__device__ void composite_features(const ChromaHeadJob& job, std::uint32_t first, HeadShared& shared) {
+/// Composites features of the block's pixels; the constant behind them stays. Returns this lane's part of the pixels'
+/// spreads.
+__device__ float composite_features(const ChromaHeadJob& job, std::uint32_t first, HeadShared& shared) {
   const unsigned lane = threadIdx.x % 32;
+  float spread = 0;
   for (unsigned p = threadIdx.x / 32; p < kPixels; p += kWarps) {
     float2 sum = make_float2(0, 0);
+    float squares = 0;
     if (first + p < job.pixels.pixels) {
       const std::uint32_t end = job.pixels.offsets[first + p + 1];
 #pragma unroll 4
@@ -136,11 +139,14 @@ __device__ void composite_features(const ChromaHeadJob& job, std::uint32_t first
         const float2 features = floats_of_halves(job.features[std::size_t(s) * (kFeatures / 2) + lane]);
         sum.x += share * features.x;
         sum.y += share * features.y;
+        squares += share * (features.x * features.x + features.y * features.y);
       }
     }
+    spread += squares - sum.x * sum.x - sum.y * sum.y;
     *reinterpret_cast<std::uint32_t*>(&shared.composited[p][2 * lane]) = Half::pack(sum.x, sum.y);
     *reinterpret_cast<std::uint32_t*>(&shared.inputs[p][2 * lane]) = Bfloat::pack(sum.x, sum.y);
   }
+  return spread;
 }
 
 __device__ void apply_head(const HeadShared& shared, Logits& logits) {
@@ -248,7 +254,7 @@ __device__ void write_logits(std::uint32_t first, std::uint32_t pixels, float* t
 
 /// Gradient of the composited features: of four warps, each 16 of them.
 __device__ void feature_gradient(const HeadShared& shared, std::uint32_t first, std::uint32_t pixels,
-                                 float* d_composited) {
+                                 const ChromaTargets& targets) {
   const unsigned lane = threadIdx.x % 32, warp = threadIdx.x / 32, g = lane / 4, t = lane % 4;
   if (warp >= kFeatures / 16) return;
   float sums[2][4] = {};
@@ -263,10 +269,13 @@ __device__ void feature_gradient(const HeadShared& shared, std::uint32_t first, 
 #pragma unroll
   for (int n = 0; n < 4; ++n) {
     const int b = n / 2, half = n % 2;
-    const std::uint32_t pixel = first + g + 8 * half;
+    const std::uint32_t row = g + 8 * half, pixel = first + row, column = 16 * warp + 8 * b + 2 * t;
     if (pixel >= pixels) continue;
-    *reinterpret_cast<float2*>(&d_composited[std::size_t(pixel) * kFeatures + 16 * warp + 8 * b + 2 * t]) =
-        make_float2(sums[b][2 * half], sums[b][2 * half + 1]);
+    const float2 composited =
+        floats_of_halves(*reinterpret_cast<const std::uint32_t*>(&shared.composited[row][column]));
+    const float slope = spread_slope(targets.spread_weight, targets.scale);
+    *reinterpret_cast<float2*>(&targets.d_composited[std::size_t(pixel) * kFeatures + column]) =
+        make_float2(sums[b][2 * half] - slope * composited.x, sums[b][2 * half + 1] - slope * composited.y);
   }
 }
 
@@ -293,14 +302,14 @@ __global__ void __launch_bounds__(kThreads, 1) head(const ChromaHeadJob job, con
   [[maybe_unused]] float d_weights[2][kInputs / 8][4] = {};
   [[maybe_unused]] double loss = 0;
   for (std::uint32_t first = blockIdx.x * kPixels; first < pixels; first += gridDim.x * kPixels) {
-    composite_features(job, first, shared);
+    [[maybe_unused]] const float spread = composite_features(job, first, shared);
     __syncthreads();
     Logits logits;
     apply_head(shared, logits);
     if constexpr (std::is_same_v<Use, float*>) write_logits(first, pixels, use, logits);
     if constexpr (std::is_same_v<Use, ChromaDecoding>) write_colors(first, pixels, use, shared, logits);
     if constexpr (kTrain) {
-      loss += softmax_gradient(first, pixels, use, shared, logits);
+      loss += softmax_gradient(first, pixels, use, shared, logits) + use.spread_weight * spread;
 #pragma unroll
       for (int i = 0; i < 2; ++i) {
         std::uint32_t operand[4];
@@ -308,7 +317,7 @@ __global__ void __launch_bounds__(kThreads, 1) head(const ChromaHeadJob job, con
         store_rows(shared.d_logits, 0, own + 16 * i, operand);
       }
       __syncthreads();
-      feature_gradient(shared, first, pixels, use.d_composited);
+      feature_gradient(shared, first, pixels, use);
 #pragma unroll
       for (int i = 0; i < 2; ++i) {
         add_weight_gradient<kPixels>(d_weights[i], shared.d_logits, own + 16 * i, shared.inputs, 0);

@@ -39,7 +39,7 @@ class ChromaticityEngineCuda final : public ChromaticityEngine {
         batch_.arrays(), field_.numbers(),
         {colors_.data(), batch_.upload_weights(pixel_weights, stream_), loss, scale, d_logs, &stream_.step()->loss},
         stream_);
-    field_.backward(batch_.arrays().places, {&stream_.step()->samples, batch_.samples()}, {nullptr, nullptr, d_logs},
+    field_.backward(batch_.arrays().places, {&stream_.step()->samples, batch_.samples()}, {.d_numbers = d_logs},
                     stream_);
     field_.update(&stream_.step()->adam, stream_);
     return stream_.end_step() * scale;

@@ -52,6 +52,7 @@ void PointNetCuda::backward(const float4* places, SampleCount samples, const Out
   job.places = places;
   job.shares = gradient.shares;
   job.d_composited = gradient.d_composited;
+  job.d_feature = gradient.d_feature;
   job.d_numbers = gradient.d_numbers;
   job.d_encoded = d_encoded_.data();
   job.d_weights = d_weights_.data();

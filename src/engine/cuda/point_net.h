@@ -24,6 +24,7 @@ class PointNetCuda {
   struct OutputGradient {
     const float* shares = nullptr;        ///< of features, see PointBackwardJob
     const float* d_composited = nullptr;  ///< likewise
+    float d_feature = 0;                  ///< likewise
     const float2* d_numbers = nullptr;    ///< of numbers
   };
   /// @param samples  those of the latest `forward`

@@ -441,8 +441,9 @@ class PositionalChromaEngine final : public ChromaEngine {
     trained_ = std::make_unique<Trained>(joined(net_->parameters(), trunk_->parameters()));
   }
 
+  using ChromaEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
-              float learning_rate) override {
+              float spread_weight, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
     const FastProducts fast;
     const auto n = std::int64_t(labels.size());
@@ -453,9 +454,11 @@ class PositionalChromaEngine final : public ChromaEngine {
       bins.insert(bins.end(), label.bin.begin(), label.bin.end());
       shares.insert(shares.end(), label.weight.begin(), label.weight.end());
     }
-    const torch::Tensor loss = positional::classification_loss(
-        forward(pixels, 0, pixels.pixels()), tensor_of(bins, {n, kSoftLabelBins}, torch::kInt64),
+    const Composited seen = forward(pixels, 0, pixels.pixels());
+    torch::Tensor loss = positional::classification_loss(
+        net_->classes->forward(seen.features), tensor_of(bins, {n, kSoftLabelBins}, torch::kInt64),
         tensor_of(shares, {n, kSoftLabelBins}, torch::kFloat32), tensor_of(weights, {n}, torch::kFloat32));
+    if (spread_weight > 0) loss = loss + spread_weight * seen.spread() / n;
     loss.backward();
     steps_.front() += 1;
     trained_->follow(double(learning_rate), steps_.front());
@@ -490,8 +493,16 @@ class PositionalChromaEngine final : public ChromaEngine {
   void state_loaded() override { trained_->state_loaded(); }
 
  private:
-  /// Logits of the pixels in [begin, end).  [R, 313]
-  [[nodiscard]] torch::Tensor forward(const PixelSamples& pixels, std::size_t begin, std::size_t end) const {
+  struct Composited {
+    torch::Tensor features;  ///< [R, kHeadWidth]
+    torch::Tensor hidden;    ///< [S, kHeadWidth], features of samples
+    torch::Tensor share;     ///< [S, 1]
+
+    /// Sum over pixels (chroma_math.h).
+    [[nodiscard]] torch::Tensor spread() const { return (share * hidden.square()).sum() - features.square().sum(); }
+  };
+  /// Of the pixels in [begin, end).
+  [[nodiscard]] Composited forward(const PixelSamples& pixels, std::size_t begin, std::size_t end) const {
     const std::size_t first = pixels.offsets[begin], count = pixels.offsets[end] - first;
     std::vector<std::int64_t> pixel_of(count);
     std::vector<float> share(count), positions;
@@ -511,10 +522,10 @@ class PositionalChromaEngine final : public ChromaEngine {
       const torch::AutoGradMode mode(trains_encoding_ && torch::GradMode::is_enabled());
       w = trunk_->forward(tensor_of(positions, {n, 3}, torch::kFloat32));
     }
-    const torch::Tensor hidden = net_->hidden(w) * tensor_of(share, {n, 1}, torch::kFloat32);
+    const torch::Tensor hidden = net_->hidden(w), shares = tensor_of(share, {n, 1}, torch::kFloat32);
     const torch::Tensor composited = torch::zeros({std::int64_t(end - begin), kHeadWidth}, hidden.options())
-                                         .index_add(0, tensor_of(pixel_of, {n}, torch::kInt64), hidden);
-    return net_->classes->forward(composited);
+                                         .index_add(0, tensor_of(pixel_of, {n}, torch::kInt64), hidden * shares);
+    return {composited, hidden, shares};
   }
 
   /// Calls `use(first pixel, logits)` for pixels of about kPointsAtATime samples at a time.
@@ -528,7 +539,7 @@ class PositionalChromaEngine final : public ChromaEngine {
              pixels.offsets[end + 1] - pixels.offsets[begin] <= std::size_t(kPointsAtATime)) {
         ++end;
       }
-      use(begin, floats_of(forward(pixels, begin, end)));
+      use(begin, floats_of(net_->classes->forward(forward(pixels, begin, end).features)));
       begin = end;
     }
   }

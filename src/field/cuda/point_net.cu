@@ -121,8 +121,11 @@ __device__ void output_gradient(const PointBackwardJob& job, const std::uint32_t
 #pragma unroll
       for (int half = 0; half < 2; ++half) {
         const float2 d = *reinterpret_cast<const float2*>(d_pixel[half] + 16 * i + 8 * block + 2 * t);
-        d_outputs[0][i][2 * block + half] = Bfloat::pack(sums[block][2 * half] > 0 ? share[half] * d.x : 0.0f,
-                                                         sums[block][2 * half + 1] > 0 ? share[half] * d.y : 0.0f);
+        const auto behind_relu = [&](float feature, float d_of_pixel) {
+          return feature > 0 ? share[half] * (d_of_pixel + job.d_feature * feature) : 0.0f;
+        };
+        d_outputs[0][i][2 * block + half] =
+            Bfloat::pack(behind_relu(sums[block][2 * half], d.x), behind_relu(sums[block][2 * half + 1], d.y));
       }
     }
   });

@@ -39,6 +39,7 @@ struct PointBackwardJob {
   const float4* places = nullptr;       ///< w holds the bits of the pixel's number
   const float* shares = nullptr;        ///< [most]
   const float* d_composited = nullptr;  ///< [pixels, 64]
+  float d_feature = 0;                  ///< a sample's share of this times its features is added
   // Of numbers:
   const float2* d_numbers = nullptr;  ///< [most]
   void* d_encoded;                    ///< [levels, most, 4] of bfloat16, written
