@@ -165,6 +165,10 @@ TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
   EXPECT_TRUE(of("without-classification").purify.enabled);
   EXPECT_EQ(of("colorize-then-fuse").questions, "views");
   EXPECT_EQ(of("colornerf-paper").decode_temperature, 0);
+  Stage2Options smooth;
+  smooth.spread_weight = 2;
+  EXPECT_EQ(stage2_of(*parse_methods("colornerf-paper").front(), smooth, {}).spread_weight, 0) << "not in the paper";
+  EXPECT_EQ(stage2_of(*parse_methods("without-purification").front(), smooth, {}).spread_weight, 2);
   EXPECT_EQ(of("oracle").patches, full.patches);
   EXPECT_EQ(of("positional-encoding").patches, full.patches);
   Stage2Options fast;

@@ -98,6 +98,8 @@ struct HeadShared {
   // Rows are padded: 8 of them fall into different banks.
   alignas(16) __half composited[kPixels][kInputs + 8];
   alignas(16) __nv_bfloat16 inputs[kPixels][kInputs + 8];  ///< the same
+  float2 mean[kPixels][kFeatures / 2];                     ///< the same without the constant: the spread's differences
+                                                           ///< are small
   alignas(16) __nv_bfloat16 d_logits[kPixels][kOutputs + 8];
   // What each warp found for the pixels:
   float largest[kWarps][kPixels];
@@ -145,6 +147,7 @@ __device__ float composite_features(const ChromaHeadJob& job, std::uint32_t firs
     spread += squares - sum.x * sum.x - sum.y * sum.y;
     *reinterpret_cast<std::uint32_t*>(&shared.composited[p][2 * lane]) = Half::pack(sum.x, sum.y);
     *reinterpret_cast<std::uint32_t*>(&shared.inputs[p][2 * lane]) = Bfloat::pack(sum.x, sum.y);
+    shared.mean[p][lane] = sum;
   }
   return spread;
 }
@@ -271,11 +274,10 @@ __device__ void feature_gradient(const HeadShared& shared, std::uint32_t first, 
     const int b = n / 2, half = n % 2;
     const std::uint32_t row = g + 8 * half, pixel = first + row, column = 16 * warp + 8 * b + 2 * t;
     if (pixel >= pixels) continue;
-    const float2 composited =
-        floats_of_halves(*reinterpret_cast<const std::uint32_t*>(&shared.composited[row][column]));
+    const float2 mean = shared.mean[row][column / 2];
     const float slope = spread_slope(targets.spread_weight, targets.scale);
     *reinterpret_cast<float2*>(&targets.d_composited[std::size_t(pixel) * kFeatures + column]) =
-        make_float2(sums[b][2 * half] - slope * composited.x, sums[b][2 * half + 1] - slope * composited.y);
+        make_float2(sums[b][2 * half] - slope * mean.x, sums[b][2 * half + 1] - slope * mean.y);
   }
 }
 

@@ -121,11 +121,10 @@ __device__ void output_gradient(const PointBackwardJob& job, const std::uint32_t
 #pragma unroll
       for (int half = 0; half < 2; ++half) {
         const float2 d = *reinterpret_cast<const float2*>(d_pixel[half] + 16 * i + 8 * block + 2 * t);
-        const auto behind_relu = [&](float feature, float d_of_pixel) {
-          return feature > 0 ? share[half] * (d_of_pixel + job.d_feature * feature) : 0.0f;
-        };
-        d_outputs[0][i][2 * block + half] =
-            Bfloat::pack(behind_relu(sums[block][2 * half], d.x), behind_relu(sums[block][2 * half + 1], d.y));
+        // Features as they were composited: rounded.
+        const float2 h = floats_of_halves(Half::pack(sums[block][2 * half], sums[block][2 * half + 1]));
+        d_outputs[0][i][2 * block + half] = Bfloat::pack(h.x > 0 ? share[half] * (d.x + job.d_feature * h.x) : 0.0f,
+                                                         h.y > 0 ? share[half] * (d.y + job.d_feature * h.y) : 0.0f);
       }
     }
   });
