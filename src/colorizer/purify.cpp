@@ -154,6 +154,18 @@ ColorHistogram rgb_histogram(const ColorPatchView& patch) {
   return result;
 }
 
+std::size_t most_typical(const PurifyOptions& options, std::span<const ColorPatchView> answers) {
+  CNERF_CHECK(!answers.empty(), "nothing to choose from");
+  std::vector<double> agreement(answers.size(), 0.0);
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    const Purifier alike(options, answers.subspan(i, 1));
+    for (std::size_t j = 0; j < answers.size(); ++j) {
+      if (j != i) agreement[j] += alike.similarity(answers[j]);
+    }
+  }
+  return std::size_t(std::ranges::max_element(agreement) - agreement.begin());
+}
+
 Purifier::Purifier(const PurifyOptions& options, std::span<const ColorPatchView> bases) : options_(options) {
   if (options.histogram != "ab" && options.histogram != "rgb") {
     throw UsageError("purify.histogram: expected \"ab\" or \"rgb\", got \"" + options.histogram + "\"");

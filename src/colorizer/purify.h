@@ -17,6 +17,7 @@ struct PurifyOptions {
   bool enabled = true;
   int base_images = 5;
   double base_scale = 0.7;       ///< s of the base patches
+  int opinions = 16;             ///< answers a base is chosen from; 1 = whatever comes first, as in the paper
   double threshold = 0.80;       ///< T
   std::string histogram = "ab";  ///< opacity-masked 2-D ab histogram, or 8x8x8 RGB as in the published code
   std::string picked_bases;      ///< "2,5,7" of the candidates; empty = chosen to cover the views
@@ -26,6 +27,8 @@ struct PurifyOptions {
     v("enabled", enabled, "reject outlier answers of the colorizer");
     v("base_images", base_images, Range{1, 64}, "patches answers are compared with");
     v("base_scale", base_scale, Range{0.05, 1}, "share of the short side a base patch covers");
+    v("opinions", opinions, Range{1, 256},
+      "answers about the place of a base, of which it is the most typical one; 1 = the first one");
     v("threshold", threshold, Range{-1, 1}, "histogram similarity an answer must exceed");
     v("histogram", histogram, Choice{"ab", "rgb"},
       "opacity-masked ab histogram, or 8x8x8 RGB as in the published code");
@@ -57,6 +60,12 @@ inline constexpr float kNeutralChroma = 3.0f, kChromaticChroma = 6.0f;
 
 /// 8x8x8 histogram of sRGB, as in the published code.
 [[nodiscard]] ColorHistogram rgb_histogram(const ColorPatchView& patch);
+
+/// Of several answers about one place, the one most like the others: their medoid under the similarity below, the first
+/// of equals. A base that is an outlier lets all of its like pass, and a base's hue is off by what its answer's is.
+/// @throws UsageError     when the options name an unknown histogram.
+/// @throws ContractError  when there is no answer.
+[[nodiscard]] std::size_t most_typical(const PurifyOptions& options, std::span<const ColorPatchView> answers);
 
 /// Compares answers with base patches.
 class Purifier {

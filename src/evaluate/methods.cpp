@@ -35,7 +35,10 @@ std::vector<const Method*> parse_methods(const std::string& list) {
 Stage2Options stage2_of(const Method& method, Stage2Options configured, const CompareOptions& compare) {
   const std::string name = method.name, configured_injection = configured.injection;
   Stage2Options options = std::move(configured);
-  if (name == "colornerf-paper") options.decode_temperature = options.spread_weight = 0;
+  if (name == "colornerf-paper") {
+    options.decode_temperature = options.spread_weight = 0;
+    options.purify.opinions = 1;
+  }
   if (name == "without-purification") options.purify.enabled = false;
   if (name == "without-classification") options.injection = "photometric";
   if (name == "colorize-then-fuse" || name == "video-then-fuse") {

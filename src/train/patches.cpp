@@ -52,6 +52,22 @@ PatchPlace random_patch(const std::vector<CachedView>& views, std::size_t view, 
   return place;
 }
 
+PatchPlace near_patch(const std::vector<CachedView>& views, const PatchPlace& place, std::uint64_t seed,
+                      std::uint64_t index) {
+  constexpr double kMost = 0.05;
+  const CounterRng rng(seed ^ 0x6e656172ull, index);
+  const CachedView& cached = views[place.view];
+  const auto off = [&](std::uint64_t draw) {
+    return int(std::lround(kMost * place.side * (2 * double(rng.uniform(draw)) - 1)));
+  };
+  PatchPlace moved = place;
+  moved.index = index;
+  moved.side = std::clamp(place.side + off(0), 2, cached.short_side());
+  moved.left = std::clamp(place.left + off(1), 0, cached.width - moved.side);
+  moved.top = std::clamp(place.top + off(2), 0, cached.height - moved.side);
+  return moved;
+}
+
 RenderedPatch render_patch(const CachedView& view, const PatchPlace& place, int k) {
   RenderedPatch patch;
   patch.lightness = resized_square(view.luminance, view, place, k);

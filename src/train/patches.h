@@ -23,6 +23,10 @@ struct PatchPlace {
 [[nodiscard]] PatchPlace random_patch(const std::vector<CachedView>& views, std::size_t view, double scale_min,
                                       double scale_max, std::uint64_t seed, std::uint64_t index);
 
+/// The place moved and resized by up to a twentieth of its side: nearly the same picture, another question.
+[[nodiscard]] PatchPlace near_patch(const std::vector<CachedView>& views, const PatchPlace& place, std::uint64_t seed,
+                                    std::uint64_t index);
+
 /// What the colorizer sees: K x K, area-averaged in linear light where the square is wider than that.
 struct RenderedPatch {
   std::vector<float> lightness;  ///< [K, K] L* 0..100

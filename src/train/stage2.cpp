@@ -27,7 +27,8 @@ constexpr double kDistillRate = 1e-2,
                  kFinalDistillRate = 1e-3;  // of its own: distances want smaller steps than classes
 constexpr std::size_t kGalleryTiles = 20;
 constexpr int kWholeViewPatches = 2;  // a whole view is shown with a short side of so many patch sides
-constexpr std::uint64_t kFirstBaseIndex = std::uint64_t(1) << 32;  // patch indices of bases, apart from training's
+// Patch indices of bases and of opinions about them, apart from training's.
+constexpr std::uint64_t kFirstBaseIndex = std::uint64_t(1) << 32, kFirstOpinionIndex = std::uint64_t(1) << 33;
 constexpr int kMostRejectedInARow = 400;
 constexpr std::size_t kPreviews = 3;
 constexpr int kPreviewSide = 120;  // pixels of the shorter side
@@ -199,13 +200,40 @@ class Colorization {
   }
 
   /// Base patches (paper: s = 0.7, 5 images): parts of the key frames, whose colours are known; without any, answers of
-  /// the colorizer, from which a user may pick.
+  /// the colorizer, those that a user picked or the most typical ones.
   std::vector<AnsweredPatch> choose_bases() {
     if (!known_.key_frames().empty()) return bases_of_key_frames();
+    const PurifyOptions& purify = options_.purify;
+    if (purify.enabled && purify.picked_bases.empty() && purify.opinions > 1) return typical_bases();
     const std::vector<AnsweredPatch> answered = ask_candidates();
     write_candidates(answered, file_.parent_path() / "bases.png");
     std::vector<AnsweredPatch> bases;
     for (const int index : picked_bases(int(answered.size()))) bases.push_back(answered[std::size_t(index)]);
+    return bases;
+  }
+
+  /// Where nobody picks: of several answers about each place, the one most like the others.
+  std::vector<AnsweredPatch> typical_bases() {
+    const std::vector<int> places = picked_bases(candidate_count());
+    const int opinions = options_.purify.opinions;
+    std::vector<PatchPlace> asked;
+    for (const int candidate : places) {
+      const PatchPlace place = candidate_place(candidate);
+      asked.push_back(place);
+      for (int i = 1; i < opinions; ++i) {
+        asked.push_back(near_patch(views_, place, std::uint64_t(options_.seed), kFirstOpinionIndex + asked.size()));
+      }
+    }
+    const std::vector<AnsweredPatch> answered = ask_all(asked);
+    std::vector<AnsweredPatch> bases;
+    std::vector<GalleryTile> tiles;
+    for (std::size_t first = 0; first < answered.size(); first += std::size_t(opinions)) {
+      std::vector<ColorPatchView> views;
+      for (int i = 0; i < opinions; ++i) views.push_back(view_of(answered[first + std::size_t(i)]));
+      bases.push_back(answered[first + most_typical(options_.purify, views)]);
+      tiles.push_back(tile_of(bases.back(), "of " + std::to_string(opinions)));
+    }
+    write_gallery(file_.parent_path() / "bases.png", tiles);
     return bases;
   }
 
@@ -228,13 +256,18 @@ class Colorization {
                         std::uint64_t(options_.seed), kFirstBaseIndex + std::uint64_t(index));
   }
 
+  [[nodiscard]] int candidate_count() const { return std::max(kBaseCandidates, options_.purify.base_images); }
   /// Spread evenly over the views, so that they cover a 360 capture's directions.
+  [[nodiscard]] PatchPlace candidate_place(int candidate) const {
+    return base_patch(std::size_t(candidate) * views_.size() / std::size_t(candidate_count()), candidate);
+  }
   std::vector<AnsweredPatch> ask_candidates() {
-    const int candidates = std::max(kBaseCandidates, options_.purify.base_images);
     std::vector<PatchPlace> places;
-    for (int i = 0; i < candidates; ++i) {
-      places.push_back(base_patch(std::size_t(i) * views_.size() / std::size_t(candidates), i));
-    }
+    for (int i = 0; i < candidate_count(); ++i) places.push_back(candidate_place(i));
+    return ask_all(places);
+  }
+
+  std::vector<AnsweredPatch> ask_all(const std::vector<PatchPlace>& places) {
     std::vector<AnsweredPatch> answered;
     for (std::size_t first = 0; first < places.size(); first += std::size_t(options_.colorizer_batch)) {
       const auto last = std::min(places.size(), first + std::size_t(options_.colorizer_batch));

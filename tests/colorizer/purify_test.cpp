@@ -149,6 +149,24 @@ TEST(Purifier, OutliersAmongManyAnswersAreTheOnesRejected) {
   }
 }
 
+TEST(Purifier, TheMostTypicalAnswerIsOfTheMajorityAndInItsMiddle) {
+  // Nine answers of one kind whose hue varies, four alike of another kind, three outliers.
+  std::vector<Patch> answers;
+  for (int i = 0; i < 3; ++i) answers.push_back(patch_of(-40, float(20 * i - 60), 6));
+  for (int i = 0; i < 4; ++i) answers.push_back(patch_of(8, 14, 6, std::uint64_t(20 + i)));
+  for (int i = 0; i < 9; ++i) {
+    const double hue = 0.8 + 0.1 * (i - 4);
+    answers.push_back(patch_of(float(50 * std::cos(hue)), float(50 * std::sin(hue)), 6, std::uint64_t(40 + i)));
+  }
+  std::vector<ColorPatchView> views;
+  for (const Patch& answer : answers) views.push_back(answer.view());
+  const std::size_t chosen = most_typical(PurifyOptions{}, views);
+  EXPECT_GE(chosen, 7u + 3u);
+  EXPECT_LE(chosen, 7u + 5u);
+  EXPECT_EQ(most_typical(PurifyOptions{}, std::span(views).first(1)), 0u);
+  EXPECT_THROW((void)most_typical(PurifyOptions{}, {}), ContractError);
+}
+
 TEST(Purifier, OffAcceptsEverything) {
   PurifyOptions options;
   options.enabled = false;

@@ -78,6 +78,25 @@ TEST(RandomPatch, IsAFunctionOfSeedAndIndex) {
   EXPECT_NE(text(1, 5), text(2, 5));
 }
 
+TEST(NearPatch, LiesInTheViewAndShowsMostOfTheSamePlace) {
+  const std::vector<CachedView> views = {some_view()};
+  std::set<int> lefts;
+  for (std::uint64_t i = 0; i < 500; ++i) {
+    const PatchPlace place = random_patch(views, 0, 0.7, 0.7, 7, i), other = near_patch(views, place, 7, 1000 + i);
+    ASSERT_TRUE(other.left >= 0 && other.left + other.side <= 80 && other.top >= 0 && other.top + other.side <= 60);
+    EXPECT_EQ(other.view, place.view);
+    EXPECT_EQ(other.index, 1000 + i);
+    const auto shared = [](int a, int b, int side_a, int side_b) {
+      return std::min(a + side_a, b + side_b) - std::max(a, b);
+    };
+    EXPECT_GE(shared(place.left, other.left, place.side, other.side) *
+                  shared(place.top, other.top, place.side, other.side),
+              0.8 * place.side * place.side);
+    lefts.insert(other.left - place.left);
+  }
+  EXPECT_GE(lefts.size(), 4u) << "they differ";
+}
+
 TEST(RenderPatch, AveragesLightNotLightness) {
   CachedView view = some_view(8, 8);
   for (std::size_t i = 0; i < view.luminance.size(); ++i) view.luminance[i] = i % 2 == 0 ? 0.0f : 1.0f;
