@@ -20,7 +20,7 @@ enum class Retired { kRefused, kAllowedIfEqual };
 
 /// Reads `text` over `fields`: keys that are absent keep their value.
 /// @param source  what errors call the text: a file name.
-/// @throws UsageError  broken TOML, an unknown key (names the nearest known one), a retired key (names its successor), a
+/// @throws UsageError  broken TOML, an unknown key (names the nearest known one), a retired one (and its successor), a
 ///                     wrong type, a value out of range; the message reads `source: key: what was expected, what was
 ///                     found`. Fields read before the faulty one keep their new values.
 void read_toml(std::string_view text, const std::string& source, const std::vector<Field>& fields,
