@@ -17,6 +17,7 @@ struct BakeOptions {
   std::string budget;                ///< memory of a renderer that makes grids dense, "4G"; empty = no limit
   std::string max_memory;            ///< of the whole process while volumes are baked, "1G"; empty = no limit
   int dilation = 2;                  ///< voxels that colour reaches beyond density; renderers interpolate into them
+  double sharpening = 1;             ///< of density against the blur of renderers' interpolation (bake/sharpen.h)
   int subsamples = 2;                ///< per axis of a voxel, for density
   int views_per_voxel = 8;           ///< training views that a voxel's luminance is averaged over, at most
   double seen_transmittance = 1e-3;  ///< from a camera to a voxel, above which the camera sees it
@@ -35,6 +36,7 @@ struct BakeOptions {
     v("budget", budget, "memory Cycles may take for the grids, as 4G or 500M; makes voxels larger until they fit");
     v("max_memory", max_memory, "memory the bake of a volume may take, as 1G; one that needs more is refused");
     v("dilation", dilation, Range{2, 8}, "voxels that colour reaches beyond density");
+    v("sharpening", sharpening, Range{0, 4}, "of density at rims, which renderers widen by interpolation; 0 = none");
     v("subsamples", subsamples, Range{1, 8}, "density samples along each axis of a voxel");
     v("views_per_voxel", views_per_voxel, Range{1, 256}, "views that a voxel's luminance is averaged over");
     v("seen_transmittance", seen_transmittance, Range{0, 1}, "share of light that makes a voxel count as seen");

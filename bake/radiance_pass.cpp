@@ -1,8 +1,10 @@
 #include "bake/radiance_pass.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "bake/dilate.h"
+#include "bake/sharpen.h"
 #include "bake/view_average.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
@@ -37,6 +39,7 @@ VoxelColor voxel_color(float luminance, Chromaticity chromaticity) {
 /// What is asked of the field for one brick.
 struct RadiancePass::Queries {
   std::vector<std::size_t> voxels;  ///< index into the brick's dense voxels, of those that are kept
+  std::vector<float> sigma;         ///< of each kept voxel, sharpened, 1/world unit
   std::vector<Vec3f> centroids;     ///< of each kept voxel, unit space
   ViewMeans means;                  ///< of each kept voxel
 };
@@ -47,6 +50,8 @@ RadiancePass::RadiancePass(const ColorField& field, const std::vector<BakeCamera
       level_(levels[level]),
       views_(cameras, levels[level].plan, options),
       weight_threshold_(options.weight_threshold),
+      sharpening_(options.sharpening),
+      faintest_(-std::log1p(-std::min(options.opacity_threshold, 0.999)) / level_.plan.voxel_size),
       keep_unseen_(options.keep_unseen || cameras.empty()) {
   for (std::size_t other = 0; other < levels.size(); ++other) {
     if (other != level) views_.look_through(levels[other].sigma, levels[other].plan);
@@ -79,7 +84,7 @@ std::vector<BakedVoxel> RadiancePass::bake_brick(std::span<const DenseVoxel> den
     const DenseVoxel& voxel = dense[queries.voxels[v]];
     const Vec3i at = brick_min + brick_local(voxel.offset);
     const VoxelColor color = voxel_color(luminance[v], chromaticity[v]);
-    voxels.push_back({at.x, at.y, at.z, voxel.sigma, luminance_of(color.rgb), color.rgb, color.a, color.b});
+    voxels.push_back({at.x, at.y, at.z, queries.sigma[v], luminance_of(color.rgb), color.rgb, color.a, color.b});
   }
   return voxels;
 }
@@ -105,6 +110,8 @@ RadiancePass::Queries RadiancePass::gather(std::span<const DenseVoxel> dense, Ve
     if (seen.empty()) queries.means.look_from_all_sides(unit);
     queries.means.next_point();
     queries.voxels.push_back(v);
+    const float sigma = sharpening_ > 0 ? sharpened_density(level_, voxel, sharpening_) : dense[v].sigma;
+    queries.sigma.push_back(sigma < faintest_ ? 0.0f : sigma);
     queries.centroids.push_back(unit);
   }
   return queries;

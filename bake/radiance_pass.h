@@ -23,7 +23,9 @@ struct VoxelColor {
 /// Second pass over one level of a bake. Voxels that no camera sees are left out unless `keep_unseen`. So are those
 /// that give less than `weight_threshold` of a pixel's light (transmittance times opacity) even to the camera that sees
 /// them best. Luminance is the mean over the cameras that see the voxel, weighted by transmittance; where none does,
-/// and everywhere when there are no cameras, over the six axis directions.
+/// and everywhere when there are no cameras, over the six axis directions. Light passes through density as it was
+/// baked, but what voxels are given is sharpened. Those fainter than `opacity_threshold` then keep their colour alone,
+/// which is better than that of a neighbour.
 class RadiancePass {
  public:
   /// @param levels  all levels of the bake; `level` is the one to bake, the others stand in its light. All must outlive
@@ -45,6 +47,8 @@ class RadiancePass {
   const BakeLevel& level_;
   ViewSelection views_;
   double weight_threshold_;
+  double sharpening_;
+  double faintest_;  ///< density that is kept, 1/world unit
   bool keep_unseen_;
 };
 

@@ -342,6 +342,38 @@ def show_plate(data, file):
     data.show_background_images = True
 
 
+def compositing_tree(scene):
+    """The scene's compositing nodes; Blender 5.0 made them a node group that has to be chosen."""
+    if hasattr(scene, "compositing_node_group"):
+        scene.compositing_node_group = bpy.data.node_groups.new("cnerf plate", "CompositorNodeTree")
+        return scene.compositing_node_group
+    scene.use_nodes = True
+    scene.node_tree.nodes.clear()
+    return scene.node_tree
+
+
+def lay_over_plate(scene, data, opacity):
+    """Lays renders over the photograph of their camera."""
+    if not data.background_images:
+        raise ValueError("%s has no photograph to render over" % data.name)
+    scene.render.film_transparent = True
+    tree = compositing_tree(scene)
+    photograph, rendered = tree.nodes.new("CompositorNodeImage"), tree.nodes.new("CompositorNodeRLayers")
+    photograph.image = data.background_images[0].image
+    fitted = tree.nodes.new("CompositorNodeScale")
+    fitted.space, fitted.frame_method = "RENDER_SIZE", "STRETCH"
+    over = tree.nodes.new("CompositorNodeAlphaOver")
+    over.inputs[0].default_value = opacity
+    output = tree.nodes.new("CompositorNodeComposite")
+    rendered.scene = scene
+    for number, node in enumerate((photograph, fitted, rendered, over, output)):
+        node.location = (260 * number, -60 * number)
+    tree.links.new(photograph.outputs["Image"], fitted.inputs[0])
+    tree.links.new(fitted.outputs[0], over.inputs[1])
+    tree.links.new(rendered.outputs["Image"], over.inputs[2])
+    tree.links.new(over.outputs[0], output.inputs[0])
+
+
 def frame_number(name):
     """The number that a picture's name ends with, as frames of a film do; None without one."""
     found = re.search(r"(\d+)$", os.path.splitext(name)[0])
@@ -567,6 +599,8 @@ def set_up(options):
         use_camera(scene, cameras[0], film)
     if options.path:
         add_path(scene, root, options.path, bounded)
+    if options.over_plate is not None:
+        lay_over_plate(scene, scene.camera.data, options.over_plate)
     return scene
 
 
@@ -603,6 +637,8 @@ def parse_options(arguments):
     parser.add_argument("--step-rate", type=float, default=1.0, help="length of a volume step, in voxels")
     parser.add_argument("--mesh", choices=("hidden", "shown", "only", "holdout", "shadow", "none"), default="",
                         help="how the mesh takes part in renders; default: hidden beside a volume, else shown")
+    parser.add_argument("--over-plate", type=float, metavar="OPACITY",
+                        help="lay the render over the photograph of its camera: 1 hides it, 0.5 shows both")
     parser.add_argument("--transparent", action="store_true", help="opacity in the picture's alpha channel")
     parser.add_argument("--exact", action="store_true", help="box pixel filter, all samples, opacity in alpha")
     return parser.parse_args(arguments)

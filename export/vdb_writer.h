@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include "bake/bake_options.h"
 #include "bake/volume_planes.h"
 #include "src/base/options.h"
 #include "src/base/vec3.h"
@@ -21,11 +22,13 @@ struct VdbOptions {
   bool usd = false;                     ///< also a .usda that places the grids, for programs that read USD
   bool plates = true;                   ///< also the photographs without lens distortion, for Blender's cameras
   double metres_per_unit = 1;           ///< of the world; for the manifest and USD
-  int dilation = 2;                     ///< voxels that colour must reach beyond density; missing ones are added
   int padding = 1;                      ///< voxels of zeros between that and the sides of the active box
   std::string units = "scene units";    ///< what a world unit is; recorded only
   std::string up_axis = "z";            ///< axis that points up in the poses' frame
   std::string up = "poses";             ///< axis that points up in the file; "poses": nothing is turned
+
+  /// Voxels that colour must reach beyond density; missing ones are added. Not an option by itself: the bake's.
+  int dilation = BakeOptions{}.dilation;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -40,7 +43,6 @@ struct VdbOptions {
     v("usd", usd, "also a .usda with an OpenVDBAsset for each grid");
     v("plates", plates, "also the photographs without lens distortion, behind Blender's cameras");
     v("metres_per_unit", metres_per_unit, Range{1e-9, 1e9}, "metres in a unit of the poses' frame");
-    v("dilation", dilation, Range{2, 6}, "voxels that colour reaches beyond density");
     v("padding", padding, Range{1, 2}, "voxels of zeros between that and the sides of the grids' box");
     v("units", units, "what a world unit is, for the metadata");
     v("up_axis", up_axis, Choice{"x", "y", "z"}, "axis that points up in the poses' frame");

@@ -85,7 +85,7 @@ BakeOptions volume_options(const Config& config, const BakeFormats& formats) {
 void write_volumes(const std::vector<VolumePlanes>& volumes, const BakeOptions& options, const RunContext& context,
                    BakeFolder& bake) {
   VdbOptions vdb = context.config.vdb;
-  vdb.dilation = std::max(vdb.dilation, options.dilation);
+  vdb.dilation = options.dilation;
   for (const fs::path& file : bake.add_volumes(volumes, "volume", vdb)) context.reporter.wrote("volume", file);
 }
 

@@ -145,7 +145,7 @@ Config RunDirectory::config(const std::string& take) const {
   Config config;
   std::error_code failure;
   const bool of_take = !take.empty() && fs::is_regular_file(take_config_file(take), failure);
-  read_config_file(of_take ? take_config_file(take) : config_file(), config);
+  read_run_config(of_take ? take_config_file(take) : config_file(), config);
   return config;
 }
 

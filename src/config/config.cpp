@@ -10,12 +10,21 @@
 namespace cnerf {
 namespace fs = std::filesystem;
 
+const std::vector<RetiredKey>& retired_keys() {
+  static const std::vector<RetiredKey> keys{{"vdb.dilation", "bake.dilation"}};
+  return keys;
+}
+
 void read_config_file(const fs::path& file, Config& config) {
-  read_toml(read_text_file(file), file.string(), fields_of(config));
+  read_toml(read_text_file(file), file.string(), fields_of(config), retired_keys());
+}
+
+void read_run_config(const fs::path& file, Config& config) {
+  read_toml(read_text_file(file), file.string(), fields_of(config), retired_keys(), Retired::kAllowedIfEqual);
 }
 
 void apply_setting(std::string_view setting, Config& config) {
-  apply_setting(setting, fields_of(config));
+  apply_setting(setting, fields_of(config), retired_keys());
 }
 
 std::string to_toml(const Config& config) {

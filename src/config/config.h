@@ -12,6 +12,7 @@
 #include "export/vdb_writer.h"
 #include "export/web_options.h"
 #include "src/capture/load_capture.h"
+#include "src/config/toml_binding.h"
 #include "src/evaluate/methods.h"
 #include "src/train/scene.h"
 #include "src/train/stage1.h"
@@ -94,8 +95,13 @@ struct Config {
   }
 };
 
+/// Keys that options had once; using one is an error that names its successor.
+[[nodiscard]] const std::vector<RetiredKey>& retired_keys();
+
 /// Reads a file over `config`.  @throws MissingInputError, UsageError naming file, key, value and what is legal.
 void read_config_file(const std::filesystem::path& file, Config& config);
+/// The same for what `to_toml` wrote into a run's folder, perhaps before some keys were retired.
+void read_run_config(const std::filesystem::path& file, Config& config);
 
 /// Applies one `key.path=value`.  @throws UsageError.
 void apply_setting(std::string_view setting, Config& config);

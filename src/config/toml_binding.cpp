@@ -7,7 +7,9 @@
 #include <cmath>
 #include <concepts>
 #include <numeric>
+#include <optional>
 #include <sstream>
+#include <utility>
 
 #include "src/base/error.h"
 
@@ -173,6 +175,26 @@ toml::table parse(std::string_view text, const std::string& source) {
   }
 }
 
+std::string section_of(const std::string& key) {
+  const auto dot = key.rfind('.');
+  return dot == std::string::npos ? "" : key.substr(0, dot);
+}
+
+[[noreturn]] void refuse_retired(const RetiredKey& old, const std::string& value, const std::string& source) {
+  Origin{source, old.key}.refuse("is no option any more, use '" + old.now + "'; got " + value);
+}
+
+/// Removes a key from a table and returns its value as text; nothing where the key is not there.
+std::optional<std::string> take_out(toml::table& table, const std::string& key) {
+  const std::string section = section_of(key);
+  toml::table* home = section.empty() ? &table : table.at_path(section).as_table();
+  const toml::node* node = home != nullptr ? home->get(last_name(key)) : nullptr;
+  if (node == nullptr) return std::nullopt;
+  std::string value = text_of(*node);
+  home->erase(last_name(key));
+  return value;
+}
+
 std::string toml_string(const std::string& text) {
   std::ostringstream out;
   out << toml::value<std::string>(text);
@@ -213,18 +235,26 @@ std::string setting_as_toml(const Field& field, const std::string& value) {
   return "[" + list + "]";
 }
 
-std::string section_of(const std::string& key) {
-  const auto dot = key.rfind('.');
-  return dot == std::string::npos ? "" : key.substr(0, dot);
-}
-
 }  // namespace
 
-void read_toml(std::string_view text, const std::string& source, const std::vector<Field>& fields) {
-  read_table(parse(text, source), "", source, fields);
+void read_toml(std::string_view text, const std::string& source, const std::vector<Field>& fields,
+               const std::vector<RetiredKey>& retired, Retired treatment) {
+  toml::table table = parse(text, source);
+  std::vector<std::pair<RetiredKey, std::string>> found;
+  for (const RetiredKey& old : retired) {
+    const auto value = take_out(table, old.key);
+    if (!value) continue;
+    if (treatment == Retired::kRefused) refuse_retired(old, *value, source);
+    found.emplace_back(old, *value);
+  }
+  read_table(table, "", source, fields);
+  for (const auto& [old, value] : found) {
+    const auto successor = std::ranges::find(fields, old.now, &Field::key);
+    if (successor == fields.end() || value_text(*successor) != value) refuse_retired(old, value, source);
+  }
 }
 
-void apply_setting(std::string_view setting, const std::vector<Field>& fields) {
+void apply_setting(std::string_view setting, const std::vector<Field>& fields, const std::vector<RetiredKey>& retired) {
   const auto equals = setting.find('=');
   if (equals == std::string_view::npos) {
     throw UsageError("--set: expected key.path=value, got '" + std::string(setting) + "'");
@@ -232,6 +262,8 @@ void apply_setting(std::string_view setting, const std::vector<Field>& fields) {
   const std::string key(setting.substr(0, equals));
   const std::string value(setting.substr(equals + 1));
   const Origin origin{"--set", key};
+  const auto old = std::ranges::find(retired, key, &RetiredKey::key);
+  if (old != retired.end()) refuse_retired(*old, value, origin.source);
   const auto field = std::ranges::find(fields, key, &Field::key);
   if (field == fields.end() && is_section(fields, key)) origin.refuse("is a section, not an option");
   if (field == fields.end()) refuse_unknown(fields, origin);

@@ -9,16 +9,27 @@
 
 namespace cnerf {
 
+/// A key that options used to have, and the one that has its meaning now.
+struct RetiredKey {
+  std::string key, now;
+};
+
+/// What to do with retired keys: people are told; but what the program wrote itself, before a key was retired, holds
+/// every key, and may say the same twice.
+enum class Retired { kRefused, kAllowedIfEqual };
+
 /// Reads `text` over `fields`: keys that are absent keep their value.
 /// @param source  what errors call the text: a file name.
-/// @throws UsageError  broken TOML, an unknown key (names the nearest known one), a wrong type, a value out of range;
-///                     the message reads `source: key: what was expected, what was found`. Fields read before the
-///                     faulty one keep their new values.
-void read_toml(std::string_view text, const std::string& source, const std::vector<Field>& fields);
+/// @throws UsageError  broken TOML, an unknown key (names the nearest known one), a retired one (and its successor), a
+///                     wrong type, a value out of range; the message reads `source: key: what was expected, what was
+///                     found`. Fields read before the faulty one keep their new values.
+void read_toml(std::string_view text, const std::string& source, const std::vector<Field>& fields,
+               const std::vector<RetiredKey>& retired = {}, Retired treatment = Retired::kRefused);
 
 /// Applies one `key.path=value` of the command line. Strings need no quotes; lists are TOML arrays or comma-separated.
 /// @throws UsageError  as `read_toml`.
-void apply_setting(std::string_view setting, const std::vector<Field>& fields);
+void apply_setting(std::string_view setting, const std::vector<Field>& fields,
+                   const std::vector<RetiredKey>& retired = {});
 
 /// All fields as TOML that `read_toml` reads back to equal values, bit for bit.
 [[nodiscard]] std::string write_toml(const std::vector<Field>& fields);

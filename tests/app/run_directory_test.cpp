@@ -67,6 +67,13 @@ TEST(RunDirectoryTest, NewerOrBrokenRecordsAreRefusedByName) {
   EXPECT_THAT(message_for("{\"schema_version\": 1}"), HasSubstr("capture")) << "the missing field is named";
 }
 
+TEST(RunDirectoryTest, RunsFromBeforeAKeyWasRetiredAreRead) {
+  const test::TempDir folder;
+  const RunDirectory run(folder.path());
+  write_file(run.config_file(), std::string_view("[bake]\nresolution = 99\ndilation = 2\n[vdb]\ndilation = 2\n"));
+  EXPECT_EQ(run.config("").bake.resolution, 99);
+}
+
 TEST(RunDirectoryTest, TakesStandSideBySide) {
   const test::TempDir folder;
   const RunDirectory run(folder.path());

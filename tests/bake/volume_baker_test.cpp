@@ -54,6 +54,7 @@ TEST(BakeVolume, HalfCoveredVoxelsLetHalfOfTheLightThrough) {
   AnalyticField field(kFrame, box_density({0.25f, 0.375f, 0.375f}, {0.75f, 0.63125f, 0.625f}, 400), 0.5f);
   BakeOptions options = slab_options();
   options.subsamples = 4;
+  options.sharpening = 0;
   const BakedVolume volume = bake_volume(field, {}, options);
   const double full = std::exp(-200 * volume.voxel_size), half = (1 + full) / 2;
   std::size_t halves = 0;

@@ -344,6 +344,64 @@ TEST(Blender, NumberedPicturesBecomeAFilmWithPlatesUnderAnUprightEmpty) {
       << read_text_file(folder / "blender.log");
 }
 
+/// A white ball before black, as a camera with a lens would have photographed it.
+std::vector<float> photograph_of_ball(const BakeCamera& camera, Vec3d centre, double radius) {
+  const Intrinsics& lens = camera.intrinsics;
+  const Vec3d to_centre = centre - camera.world_from_camera.translation;
+  std::vector<float> luminance;
+  for (int y = 0; y < lens.height; ++y) {
+    for (int x = 0; x < lens.width; ++x) {
+      const Vec3d d = normalized(camera.world_from_camera.direction(ray_direction(lens, {x + 0.5, y + 0.5})));
+      const double along = dot(d, to_centre);
+      luminance.push_back(dot(to_centre, to_centre) - along * along < radius * radius ? 1.0f : 0.0f);
+    }
+  }
+  return luminance;
+}
+
+/// A lens that bends, pixels that are not square, an axis and a ball off the middle.
+TEST(Blender, ThePhotographLiesUnderWhatItShows) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const AnalyticField ball({{0, 0, 0}, 0.5, 1}, sphere_density({0.7f, 0.55f, 0.65f}, 0.12f, 400), 0.6f);
+  const Vec3d centre = ball.frame().world_from_unit(Vec3d{0.7, 0.55, 0.65});
+  BakeOptions options;
+  options.voxel_size = 1.0 / 128;  // an opaque ball grows by less than half a voxel
+  BakeCamera camera = camera_at("front", {0, -1.6, 0}, {0, 0, 0}, 120, 160, 100);
+  camera.intrinsics.fy = 90;
+  camera.intrinsics.cx = 52;
+  camera.intrinsics.cy = 87.5;
+  BakeCamera bent = camera;
+  bent.intrinsics.model = LensModel::kOpenCv;
+  bent.intrinsics.distortion = {0.8};
+  const std::vector<float> photograph = photograph_of_ball(bent, centre, 0.24);
+  const BakedVolume volume = bake_volume(ball, {}, options);
+
+  const auto overlap_of = [&](const BakeCamera& shown_as, const std::string& name) {
+    BakeFolder bake(folder / name, {shown_as}, {}, "scene units", "y");
+    bake.add_volume(volume, "volume", {});
+    bake.add_plate("front", make_web_photo(shown_as.intrinsics, photograph, 4096, 95).jpeg);
+    bake.finish();
+    const RenderedExr ours = render_exact(bake.blender_setup(), "--samples 16");
+    const RenderedExr plate = render_exact(bake.blender_setup(), "--samples 1 --over-plate 0");
+    const RenderedExr half = render_exact(bake.blender_setup(), "--samples 16 --over-plate 0.5");
+    std::size_t both = 0, either = 0;
+    for (int y = 0; y < ours.height; ++y) {
+      for (int x = 0; x < ours.width; ++x) {
+        const bool here = ours.pixel(x, y)[3] > 0.5f, there = plate.pixel(x, y)[1] > 0.5f;
+        both += here && there ? 1 : 0;
+        either += here || there ? 1 : 0;
+        EXPECT_NEAR(half.pixel(x, y)[1],
+                    (1 - 0.5f * ours.pixel(x, y)[3]) * plate.pixel(x, y)[1] + 0.5f * ours.pixel(x, y)[1], 0.02f);
+      }
+    }
+    EXPECT_GT(either, 500u);
+    return double(both) / double(either);
+  };
+  EXPECT_GT(overlap_of(bent, "undistorted"), 0.94);  // measured 0.953: the ball grows a little
+  EXPECT_LT(overlap_of(camera, "as it is"), 0.9);    // the measure notices the lens
+}
+
 TEST(Blender, TheAddOnImportsABakeIntoASceneOfItsOwn) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
@@ -393,6 +451,7 @@ TEST(Blender, FailuresEndWithAnExitStatus) {
   const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, {}, folder.path(), "block");
   EXPECT_NE(run_blender(bake.blender_setup, "--camera 7"), 0);
   EXPECT_NE(run_blender(bake.blender_setup, "--manifest /nowhere/manifest.json"), 0);
+  EXPECT_NE(run_blender(bake.blender_setup, "--over-plate 1"), 0) << "there is no photograph";
   EXPECT_EQ(run_blender(bake.blender_setup, "--save '" + (folder / "scene.blend").string() + "'"), 0)
       << read_text_file(folder / "blender.log");
   EXPECT_TRUE(std::filesystem::exists(folder / "scene.blend"));

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <set>
 #include <sstream>
@@ -112,6 +113,39 @@ TEST(Config, ErrorsOfAFileNameTheFile) {
     EXPECT_THAT(error.what(), testing::AllOf(HasSubstr("mine.toml"), HasSubstr("stage1.steps"), HasSubstr("got -4")));
   }
   EXPECT_THROW(read_config_file(folder / "absent.toml", config), MissingInputError);
+}
+
+TEST(Config, RetiredKeysAreGoneAndTheirSuccessorsAreThere) {
+  Config config;
+  const auto fields = fields_of(config);
+  const auto is_option = [&](const std::string& key) { return std::ranges::count(fields, key, &Field::key) > 0; };
+  for (const RetiredKey& old : retired_keys()) {
+    EXPECT_FALSE(is_option(old.key)) << old.key;
+    EXPECT_TRUE(is_option(old.now)) << old.now;
+  }
+}
+
+TEST(Config, TheDilationHasOneKey) {
+  const test::TempDir folder;
+  write_file(folder / "mine.toml", std::string_view("[vdb]\ndilation = 3\n"));
+  Config config;
+  const auto message_of = [](const auto& action) -> std::string {
+    try {
+      action();
+    } catch (const UsageError& error) {
+      return error.what();
+    }
+    return "(nothing was thrown)";
+  };
+  EXPECT_THAT(message_of([&] { read_config_file(folder / "mine.toml", config); }),
+              testing::AllOf(HasSubstr("mine.toml: vdb.dilation: "), HasSubstr("'bake.dilation'"), HasSubstr("got 3")));
+  EXPECT_THAT(message_of([&] { apply_setting("vdb.dilation=3", config); }), HasSubstr("'bake.dilation'"));
+  EXPECT_NO_THROW(apply_setting("bake.dilation=3", config));
+
+  // A run from before it was retired: nobody wrote that key by hand.
+  write_file(folder / "old_run.toml", std::string_view("[bake]\ndilation = 4\n[vdb]\ndilation = 4\n"));
+  EXPECT_NO_THROW(read_run_config(folder / "old_run.toml", config));
+  EXPECT_EQ(config.bake.dilation, 4);
 }
 
 TEST(Config, RelationsBetweenOptionsAreChecked) {

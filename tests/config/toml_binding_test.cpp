@@ -145,6 +145,31 @@ TEST(TomlBinding, RoundTripIsExact) {
   EXPECT_EQ(write_toml(fields_of(read)), text);
 }
 
+const std::vector<RetiredKey> kRetired{{"pace", "inner.rate"}, {"inner.speed", "inner.rate"}};
+
+TEST(TomlBinding, RetiredKeysNameTheirSuccessor) {
+  TestOptions options;
+  const auto fields = fields_of(options);
+  for (const char* text : {"pace = 0.1", "steps = 3\n[inner]\nspeed = 0.1"}) {
+    const std::string message = message_of([&] { read_toml(text, "my.toml", fields, kRetired); });
+    EXPECT_THAT(message, AllOf(HasSubstr("my.toml: "), HasSubstr("no option any more, use 'inner.rate'; got 0.1")));
+  }
+  EXPECT_THAT(message_of([&] { apply_setting("inner.speed=0.7", fields, kRetired); }),
+              HasSubstr("--set: inner.speed: is no option any more, use 'inner.rate'; got 0.7"));
+  EXPECT_NO_THROW(read_toml("[inner]\nrate = 0.2", "my.toml", fields, kRetired));
+}
+
+TEST(TomlBinding, WhatTheProgramWroteMaySayTheSameTwice) {
+  TestOptions options;
+  const auto fields = fields_of(options);
+  const auto reading_back = [&](const char* text) {
+    return message_of([&] { read_toml(text, "run.toml", fields, kRetired, Retired::kAllowedIfEqual); });
+  };
+  EXPECT_THAT(reading_back("pace = 0.5\n[inner]\nrate = 0.5\nspeed = 0.5"), HasSubstr("nothing was thrown"));
+  EXPECT_EQ(options.inner.rate, 0.5);
+  EXPECT_THAT(reading_back("[inner]\nrate = 0.5\nspeed = 0.75"), HasSubstr("run.toml: inner.speed: is no option"));
+}
+
 TEST(TomlBinding, NearestNameKnowsItsLimit) {
   EXPECT_EQ(nearest_name("default", {"quick", "default"}), "default");
   EXPECT_EQ(nearest_name("qick", {"quick", "default"}), "quick");

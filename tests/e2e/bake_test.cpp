@@ -67,5 +67,16 @@ TEST(Bake, TooLittleMemoryIsRefusedBeforeAnythingIsBaked) {
   EXPECT_EQ(cnerf(concatenated(bake_into(folder / "bake"), {"--max-memory", "4G"})).exit_code, 0);
 }
 
+TEST(Bake, ColorReachesAsFarAsAskedFor) {
+  const TempDir folder;
+  const auto size_of_volume = [&](const std::string& dilation) {
+    const ProgramResult baked = cnerf(
+        concatenated(bake_into(folder / dilation), {"--voxel-size", "0.04", "--set", "bake.dilation=" + dilation}));
+    EXPECT_EQ(baked.exit_code, 0) << baked.err;
+    return double(fs::file_size(folder / dilation / "volume.vdb"));
+  };
+  EXPECT_GT(size_of_volume("6"), 1.1 * size_of_volume("2"));  // of the same density; measured 1.18
+}
+
 }  // namespace
 }  // namespace cnerf::test

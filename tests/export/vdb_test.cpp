@@ -136,28 +136,36 @@ TEST(Vdb, VoxelsThatLieAskewAreRefused) {
   EXPECT_THROW((void)read_vdb(folder / "a.vdb"), InputError);
 }
 
-TEST(Vdb, ColorReachesBeyondDensityAndDensityIsPadded) {
+class VdbDilation : public testing::TestWithParam<int> {};
+
+TEST_P(VdbDilation, ColorReachesBeyondDensityAndDensityIsPadded) {
   const TempDir folder;
-  write_vdb(block(), folder / "a.vdb");
+  VdbOptions options;
+  const int reach = options.dilation = GetParam();
+  const auto box = [](int margin) {  // around the block
+    return openvdb::CoordBBox(4 - margin, 5 - margin, 6 - margin, 11 + margin, 12 + margin, 13 + margin);
+  };
+  write_vdb(block(), folder / "a.vdb", options);
   const auto density = openvdb::gridPtrCast<openvdb::FloatGrid>(grid_named(folder / "a.vdb", "density"));
   const auto color = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid_named(folder / "a.vdb", "color"));
-  EXPECT_EQ(density->evalActiveVoxelBoundingBox(), openvdb::CoordBBox(1, 2, 3, 14, 15, 16));
+  EXPECT_EQ(density->evalActiveVoxelBoundingBox(), box(reach + 1));
   std::size_t corners = 0;
   for (auto it = density->cbeginValueOn(); it; ++it) {
     const openvdb::Coord at = it.getCoord();
-    if (!openvdb::CoordBBox(2, 3, 4, 13, 14, 15).isInside(at)) {  // holds the box open, and nothing else
+    if (!box(reach).isInside(at)) {  // holds the box open, and nothing else
       EXPECT_EQ(*it, 0.0f);
       EXPECT_EQ(color->tree().getValue(at), openvdb::Vec3s(0));
       ++corners;
       continue;
     }
-    const bool inside = openvdb::CoordBBox(4, 5, 6, 11, 12, 13).isInside(at);
-    EXPECT_EQ(*it, inside ? 2.0f : 0.0f) << at;
+    EXPECT_EQ(*it, box(0).isInside(at) ? 2.0f : 0.0f) << at;
     EXPECT_NEAR(color->tree().getValue(at).z(), 0.8f, 5e-4f) << at;
   }
   EXPECT_EQ(corners, 2u);
-  EXPECT_EQ(density->activeVoxelCount(), 12u * 12 * 12 + 2);
+  const auto side = static_cast<openvdb::Index64>(8 + 2 * reach);
+  EXPECT_EQ(density->activeVoxelCount(), side * side * side + 2);
 }
+INSTANTIATE_TEST_SUITE_P(Vdb, VdbDilation, testing::Values(2, 3, 8));
 
 TEST(Vdb, ReadsBackWhatWasWritten) {
   const TempDir folder;
