@@ -105,6 +105,15 @@ LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Option
   return model;
 }
 
+Stage1Options LuminanceModel::options_in(const std::filesystem::path& file) {
+  const Snapshot snapshot(file, kKind);
+  try {
+    return options_from_json<Stage1Options>(snapshot.header().at("options"));
+  } catch (const nlohmann::json::exception& problem) {
+    throw SnapshotError(file.string() + ": header: " + problem.what());
+  }
+}
+
 LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const EngineMakers& makers) {
   const Snapshot snapshot(file, kKind);
   LuminanceModel model;

@@ -23,6 +23,8 @@ struct LuminanceModel {
   static LuminanceModel create(const Capture& capture, const Stage1Options& options, const EngineMakers& makers = {});
   /// @throws MissingInputError, SnapshotError
   static LuminanceModel load(const std::filesystem::path& snapshot, const EngineMakers& makers = {});
+  /// Only what it was trained with.  @throws MissingInputError, SnapshotError
+  static Stage1Options options_in(const std::filesystem::path& snapshot);
   void save(const std::filesystem::path& snapshot) const;
 
   /// How to march; `steps_per_box` = 0 as in training.

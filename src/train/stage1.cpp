@@ -82,17 +82,20 @@ PreviewPicture preview_of(const LuminanceModel& model, const View& view) {
 LuminanceModel start_or_resume(const Capture& capture, const Stage1Options& options,
                                const std::filesystem::path& snapshot, bool resume, const EngineMakers& makers) {
   if (!resume || !std::filesystem::exists(snapshot)) return LuminanceModel::create(capture, options, makers);
+  check_continues(snapshot, options);
   LuminanceModel model = LuminanceModel::load(snapshot, makers);
-  if (comparable(model.options) != comparable(options)) {
-    throw SnapshotError(snapshot.string() +
-                        ": was trained with other stage1 options; run with the same ones, or "
-                        "without --resume");
-  }
   model.options = options;
   return model;
 }
 
 }  // namespace
+
+void check_continues(const std::filesystem::path& snapshot, const Stage1Options& options) {
+  if (!std::filesystem::exists(snapshot)) return;
+  if (comparable(LuminanceModel::options_in(snapshot)) == comparable(options)) return;
+  throw SnapshotError(snapshot.string() +
+                      ": was trained with other stage1 options; run with the same ones, or without --resume");
+}
 
 Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, const std::filesystem::path& snapshot,
                           bool resume, const ProgressSink& progress, const PreviewSink& previews,

@@ -84,6 +84,10 @@ struct Stage1Report {
   double train_psnr = 0;  ///< luminance dB over the last 100 steps' rays
 };
 
+/// Whether a training with these options may go on from `snapshot`, if there is one.
+/// @throws SnapshotError  it is of another version, damaged, or of a training with other options.
+void check_continues(const std::filesystem::path& snapshot, const Stage1Options& options);
+
 /// Trains (or goes on training, when `snapshot` exists and `resume` is set) and leaves the result in `snapshot`.
 /// What `progress` and `previews` take is no training time; previews show held-out views, or some of all.
 /// Resuming continues bit for bit on the CPU, whatever the number of threads.

@@ -42,7 +42,7 @@ void forget_moments(Engine& engine) {
 /// Compares the gradients of one step, then what some steps make of the parameters.
 /// @param step  (engine, learning rate) -> loss
 template <typename Engine, typename Step>
-void compare_steps(Engine& cpu, Engine& cuda, Step&& step) {
+void compare_steps(Engine& cpu, Engine& cuda, Step&& step, double gradient_bound = 2e-2) {
   forget_moments(cpu);
   copy_state(cpu, cuda);
   const double expected_loss = step(cpu, 1e-9f), loss = step(cuda, 1e-9f);
@@ -51,7 +51,7 @@ void compare_steps(Engine& cpu, Engine& cuda, Step&& step) {
   for (const StatePiece& piece : expected) {
     const std::string& name = piece.name;
     if (!name.ends_with("first_moments") && !name.ends_with("grid.moments")) continue;
-    expect_gradient("gradient: " + name, gradient_in(found, name), gradient_in(expected, name), 2e-2);
+    expect_gradient("gradient: " + name, gradient_in(found, name), gradient_in(expected, name), gradient_bound);
   }
 
   for (int i = 0; i < 4; ++i) step(cpu, 1e-3f), step(cuda, 1e-3f);
@@ -120,7 +120,8 @@ void check_distribution(int levels, int count, float spread_weight, bool quick) 
   compare_logits("logits after training", 1e-3);
   compare_colors("annealed mean, ab distance", 0.38f, 0.1);
   compare_colors("most probable bin, ab distance", 0, 1e-3);
-  compare_steps(*cpu, *cuda, step);
+  // The spread is a matter of differences of features, which are rounded to half precision.
+  compare_steps(*cpu, *cuda, step, spread_weight > 1 ? 5e-2 : 2e-2);
   if (quick) return;
 
   const auto fresh_cpu = make_cpu_chroma_engine(grid_of(levels), 6);

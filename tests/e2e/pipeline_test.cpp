@@ -219,6 +219,11 @@ TEST(Pipeline, ResumingIsExact) {
   if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
   EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
   EXPECT_THAT(stopped.err, HasSubstr("--resume"));
+  const std::string config = read_text_file(folder / "parts/config.toml");
+  const ProgramResult other = cnerf(concatenated(arguments, {"--resume", "--set", "stage1.seed=99"}));
+  EXPECT_NE(other.exit_code, 0);
+  EXPECT_THAT(other.err, HasSubstr("other stage1 options"));
+  EXPECT_EQ(read_text_file(folder / "parts/config.toml"), config) << "a refused continuation changes nothing";
   const ProgramResult resumed = cnerf(concatenated(arguments, {"--resume"}));
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
   EXPECT_TRUE(read_binary_file(folder / "parts/stage1.snapshot") == read_binary_file(folder / "whole/stage1.snapshot"));
