@@ -154,36 +154,47 @@ ColorHistogram rgb_histogram(const ColorPatchView& patch) {
   return result;
 }
 
+namespace {
+
+std::vector<ColorHistogram> histograms_of(const PurifyOptions& options, std::span<const ColorPatchView> patches) {
+  if (options.histogram != "ab" && options.histogram != "rgb") {
+    throw UsageError("purify.histogram: expected \"ab\" or \"rgb\", got \"" + options.histogram + "\"");
+  }
+  std::vector<ColorHistogram> histograms;
+  for (const ColorPatchView& patch : patches) {
+    histograms.push_back(options.histogram == "rgb" ? rgb_histogram(patch) : ab_histogram(patch));
+  }
+  return histograms;
+}
+
+double similarity_of(const PurifyOptions& options, const ColorHistogram& base, const ColorHistogram& answer) {
+  return options.histogram == "rgb" ? correlation(base.bins, answer.bins, true) : ab_similarity(base, answer);
+}
+
+}  // namespace
+
 std::size_t most_typical(const PurifyOptions& options, std::span<const ColorPatchView> answers) {
   CNERF_CHECK(!answers.empty(), "nothing to choose from");
+  const std::vector<ColorHistogram> histograms = histograms_of(options, answers);
   std::vector<double> agreement(answers.size(), 0.0);
   for (std::size_t i = 0; i < answers.size(); ++i) {
-    const Purifier alike(options, answers.subspan(i, 1));
     for (std::size_t j = 0; j < answers.size(); ++j) {
-      if (j != i) agreement[j] += alike.similarity(answers[j]);
+      if (j != i) agreement[j] += similarity_of(options, histograms[i], histograms[j]);
     }
   }
   return std::size_t(std::ranges::max_element(agreement) - agreement.begin());
 }
 
-Purifier::Purifier(const PurifyOptions& options, std::span<const ColorPatchView> bases) : options_(options) {
-  if (options.histogram != "ab" && options.histogram != "rgb") {
-    throw UsageError("purify.histogram: expected \"ab\" or \"rgb\", got \"" + options.histogram + "\"");
-  }
+Purifier::Purifier(const PurifyOptions& options, std::span<const ColorPatchView> bases)
+    : options_(options), bases_(histograms_of(options, bases)) {
   CNERF_CHECK(!bases.empty(), "purification needs base patches");
-  for (const ColorPatchView& base : bases) {
-    bases_.push_back(options_.histogram == "rgb" ? rgb_histogram(base) : ab_histogram(base));
-  }
 }
 
 double Purifier::similarity(const ColorPatchView& answer) const {
-  const bool rgb = options_.histogram == "rgb";
-  const ColorHistogram histogram = rgb ? rgb_histogram(answer) : ab_histogram(answer);
+  const ColorHistogram histogram = histograms_of(options_, {&answer, 1}).front();
   if (histogram.visible < kLeastVisible) return 0;
   double best = -1;
-  for (const ColorHistogram& base : bases_) {
-    best = std::max(best, rgb ? correlation(base.bins, histogram.bins, true) : ab_similarity(base, histogram));
-  }
+  for (const ColorHistogram& base : bases_) best = std::max(best, similarity_of(options_, base, histogram));
   return best;
 }
 

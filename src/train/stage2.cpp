@@ -212,7 +212,8 @@ class Colorization {
     return bases;
   }
 
-  /// Where nobody picks: of several answers about each place, the one most like the others.
+  /// Where nobody picks: the most typical of all answers about all places says what the colours are, and of each place
+  /// the answer most like that one is its base. So places cannot disagree with each other.
   std::vector<AnsweredPatch> typical_bases() {
     const std::vector<int> places = picked_bases(candidate_count());
     const int opinions = options_.purify.opinions;
@@ -225,12 +226,16 @@ class Colorization {
       }
     }
     const std::vector<AnsweredPatch> answered = ask_all(asked);
+    std::vector<ColorPatchView> views;
+    for (const AnsweredPatch& answer : answered) views.push_back(view_of(answer));
+    const std::size_t typical = most_typical(options_.purify, views);
+    const Purifier like_it(options_.purify, std::span(views).subspan(typical, 1));
     std::vector<AnsweredPatch> bases;
     std::vector<GalleryTile> tiles;
-    for (std::size_t first = 0; first < answered.size(); first += std::size_t(opinions)) {
-      std::vector<ColorPatchView> views;
-      for (int i = 0; i < opinions; ++i) views.push_back(view_of(answered[first + std::size_t(i)]));
-      bases.push_back(answered[first + most_typical(options_.purify, views)]);
+    for (auto of_place = answered.begin(); of_place != answered.end(); of_place += opinions) {
+      bases.push_back(*std::max_element(of_place, of_place + opinions, [&](const auto& a, const auto& b) {
+        return like_it.similarity(view_of(a)) < like_it.similarity(view_of(b));
+      }));
       tiles.push_back(tile_of(bases.back(), "of " + std::to_string(opinions)));
     }
     write_gallery(file_.parent_path() / "bases.png", tiles);
