@@ -1,9 +1,8 @@
 #include "tests/support/data.h"
 
-#include <unistd.h>
-
-#include <atomic>
 #include <cstdlib>
+#include <stdexcept>
+#include <string>
 
 namespace cnerf::test {
 namespace fs = std::filesystem;
@@ -17,10 +16,10 @@ std::optional<fs::path> shared_data(const std::string& relative) {
 }
 
 TempDir::TempDir() {
-  static std::atomic<int> counter{0};
-  path_ = fs::temp_directory_path() /
-          ("cnerf-test-" + std::to_string(::getpid()) + "-" + std::to_string(counter.fetch_add(1)));
-  fs::create_directories(path_);
+  // A name that nobody has: a test that was killed leaves its folder behind.
+  std::string name = (fs::temp_directory_path() / "cnerf-test-XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder: " + name);
+  path_ = name;
 }
 
 TempDir::~TempDir() {
