@@ -176,7 +176,7 @@ double density_of_finer(const BrickGrid<float>& finer, Vec3i first, double voxel
 /// Puts a finer level's density where its parent is cut out for it.
 void fill_hole(BakeLevel& parent, const BakeLevel& finer, double opacity_threshold) {
   const Vec3i low = parent.plan.hole_min, high = parent.plan.hole_max;
-  const double faintest = -std::log1p(-std::min(opacity_threshold, 0.999)) / parent.plan.voxel_size;
+  const double faintest = faintest_density(opacity_threshold, parent.plan.voxel_size);
   for (int i = low.x; i < high.x; ++i) {
     for (int j = low.y; j < high.y; ++j) {
       for (int k = low.z; k < high.z; ++k) {

@@ -1,11 +1,19 @@
 #pragma once
 /// Options of the volume bake.
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "src/base/options.h"
 
 namespace cnerf {
+
+/// Density at which `length` of matter is just opaque enough to be kept, 1 over the length's unit.
+/// @param opacity_threshold  of the options; what is nearly 1 counts as 0.999
+[[nodiscard]] inline double faintest_density(double opacity_threshold, double length) {
+  return -std::log1p(-std::min(opacity_threshold, 0.999)) / length;
+}
 
 struct BakeOptions {
   int resolution = 256;              ///< voxels along the longest axis, dilated margin included

@@ -89,7 +89,7 @@ Aabbd occupied_box(const ColorField& field, double opacity_threshold) {
   for (int cascade = 0; cascade < frame.cascades; ++cascade) {
     const double side = std::ldexp(1.0, cascade - frame.cascades + 1);
     const double cell = side / kScanCells;
-    const auto threshold = static_cast<float>(-std::log1p(-std::min(opacity_threshold, 0.999)) / cell);
+    const auto threshold = static_cast<float>(faintest_density(opacity_threshold, cell));
     std::vector<PlaneBoxes> planes(kScanCells);
     parallel_tasks(planes.size(), [&](std::size_t plane) {
       planes[plane] = scan_plane(field, 0.5 - side / 2, cell, static_cast<int>(plane), threshold);

@@ -51,7 +51,7 @@ RadiancePass::RadiancePass(const ColorField& field, const std::vector<BakeCamera
       views_(cameras, levels[level].plan, options),
       weight_threshold_(options.weight_threshold),
       sharpening_(options.sharpening),
-      faintest_(-std::log1p(-std::min(options.opacity_threshold, 0.999)) / level_.plan.voxel_size),
+      faintest_(faintest_density(options.opacity_threshold, level_.plan.voxel_size)),
       keep_unseen_(options.keep_unseen || cameras.empty()) {
   for (std::size_t other = 0; other < levels.size(); ++other) {
     if (other != level) views_.look_through(levels[other].sigma, levels[other].plan);

@@ -342,22 +342,14 @@ def show_plate(data, file):
     data.show_background_images = True
 
 
-def compositing_tree(scene):
-    """The scene's compositing nodes; Blender 5.0 made them a node group that has to be chosen."""
-    if hasattr(scene, "compositing_node_group"):
-        scene.compositing_node_group = bpy.data.node_groups.new("cnerf plate", "CompositorNodeTree")
-        return scene.compositing_node_group
-    scene.use_nodes = True
-    scene.node_tree.nodes.clear()
-    return scene.node_tree
-
-
 def lay_over_plate(scene, data, opacity):
     """Lays renders over the photograph of their camera."""
     if not data.background_images:
         raise ValueError("%s has no photograph to render over" % data.name)
     scene.render.film_transparent = True
-    tree = compositing_tree(scene)
+    scene.use_nodes = True
+    tree = scene.node_tree
+    tree.nodes.clear()
     photograph, rendered = tree.nodes.new("CompositorNodeImage"), tree.nodes.new("CompositorNodeRLayers")
     photograph.image = data.background_images[0].image
     fitted = tree.nodes.new("CompositorNodeScale")

@@ -79,11 +79,17 @@ PreviewPicture preview_of(const LuminanceModel& model, const View& view) {
   return picture;
 }
 
+void refuse_others(const std::filesystem::path& snapshot, const Stage1Options& stored, const Stage1Options& options) {
+  if (comparable(stored) == comparable(options)) return;
+  throw SnapshotError(snapshot.string() +
+                      ": was trained with other stage1 options; run with the same ones, or without --resume");
+}
+
 LuminanceModel start_or_resume(const Capture& capture, const Stage1Options& options,
                                const std::filesystem::path& snapshot, bool resume, const EngineMakers& makers) {
   if (!resume || !std::filesystem::exists(snapshot)) return LuminanceModel::create(capture, options, makers);
-  check_continues(snapshot, options);
   LuminanceModel model = LuminanceModel::load(snapshot, makers);
+  refuse_others(snapshot, model.options, options);
   model.options = options;
   return model;
 }
@@ -91,10 +97,7 @@ LuminanceModel start_or_resume(const Capture& capture, const Stage1Options& opti
 }  // namespace
 
 void check_continues(const std::filesystem::path& snapshot, const Stage1Options& options) {
-  if (!std::filesystem::exists(snapshot)) return;
-  if (comparable(LuminanceModel::options_in(snapshot)) == comparable(options)) return;
-  throw SnapshotError(snapshot.string() +
-                      ": was trained with other stage1 options; run with the same ones, or without --resume");
+  if (std::filesystem::exists(snapshot)) refuse_others(snapshot, LuminanceModel::options_in(snapshot), options);
 }
 
 Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, const std::filesystem::path& snapshot,

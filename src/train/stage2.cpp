@@ -233,9 +233,8 @@ class Colorization {
     std::vector<AnsweredPatch> bases;
     std::vector<GalleryTile> tiles;
     for (auto of_place = answered.begin(); of_place != answered.end(); of_place += opinions) {
-      bases.push_back(*std::max_element(of_place, of_place + opinions, [&](const auto& a, const auto& b) {
-        return like_it.similarity(view_of(a)) < like_it.similarity(view_of(b));
-      }));
+      const auto likeness = [&](const AnsweredPatch& answer) { return like_it.similarity(view_of(answer)); };
+      bases.push_back(*std::ranges::max_element(of_place, of_place + opinions, {}, likeness));
       tiles.push_back(tile_of(bases.back(), "of " + std::to_string(opinions)));
     }
     write_gallery(file_.parent_path() / "bases.png", tiles);

@@ -37,6 +37,26 @@ class Listening final : public Colorizer {
   std::vector<PatchOrigin> origins;
 };
 
+/// Answers another colour about the places of bases when first asked, about one of them mostly, and to every third
+/// question of the training.
+class Erring final : public Colorizer {
+ public:
+  ChromaBatch colorize(const LightnessBatch& patches) override {
+    const std::size_t pixels = patches.lightness.size() / std::size_t(patches.batch);
+    ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
+    for (const PatchOrigin& origin : patches.origins) {
+      const bool is_base = origin.query >= std::uint64_t(1) << 32, is_first = is_base && origin.query >> 33 == 0;
+      const bool is_wrong = is_first || (is_base && origin.view == "toy0" && origin.query % 8 < 5) ||
+                            (!is_base && origin.query % 3 == 0);
+      const Ab color = is_wrong ? Ab{-40, 30} : kAnswer;
+      answer.ab.insert(answer.ab.end(), pixels, color.a);
+      answer.ab.insert(answer.ab.end(), pixels, color.b);
+    }
+    return answer;
+  }
+  [[nodiscard]] std::string name() const override { return "erring"; }
+};
+
 class Stage2 : public testing::Test {
  protected:
   void SetUp() override {
@@ -133,6 +153,29 @@ TEST_F(Stage2, LearnsTheAnswerByClassificationAndPhotometrically) {
       EXPECT_LT(distance_to_answer(name), 5) << name << "; grey is " << std::hypot(kAnswer.a, kAnswer.b);
     }
   }
+}
+
+TEST_F(Stage2, BasesAreWhatTheAnswersAboutAllPlacesAgreeOn) {
+  Stage2Options options = small_options();
+  options.purify.opinions = 8;
+  Erring colorizer;
+  const Stage2Report report = train_stage2(capture_, stage1(), options, colorizer, {}, take("agreed"), false);
+  EXPECT_GE(report.rejected, 20) << "a third of the answers is wrong, and no base is like them";
+  EXPECT_LT(distance_to_answer("agreed"), 5);
+  options.purify.opinions = 1;
+  (void)train_stage2(capture_, stage1(), options, colorizer, {}, take("first"), false);
+  EXPECT_GT(distance_to_answer("first"), 30) << "the first answers are wrong, and so is what is like them";
+}
+
+TEST_F(Stage2, SpreadWeightReachesTheField) {
+  Stage2Options options = small_options();
+  for (const double weight : {0.0, 20.0}) {
+    options.spread_weight = weight;
+    Listening colorizer;
+    (void)train_stage2(capture_, stage1(), options, colorizer, {}, take(weight > 0 ? "close" : "free"), false);
+  }
+  EXPECT_NE(rendered("free").rgb, rendered("close").rgb);
+  EXPECT_LT(distance_to_answer("close"), 5);
 }
 
 TEST_F(Stage2, SharedViewsAndRememberedTracesChangeNothing) {
