@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "src/base/check.h"
+#include "src/base/host_device.h"
 #include "src/base/vec3.h"
 
 namespace cnerf {
@@ -16,11 +17,19 @@ inline constexpr int kBrickSide = 8;
 inline constexpr int kBrickVoxels = kBrickSide * kBrickSide * kBrickSide;
 
 /// Position of a voxel inside its brick; `local` has components in [0, 8).
-[[nodiscard]] constexpr int brick_offset(Vec3i local) {
+[[nodiscard]] CNERF_HD constexpr int brick_offset(Vec3i local) {
   return (local.x * kBrickSide + local.y) * kBrickSide + local.z;
 }
 [[nodiscard]] constexpr Vec3i brick_local(int offset) {
   return {offset / (kBrickSide * kBrickSide), offset / kBrickSide % kBrickSide, offset % kBrickSide};
+}
+// Of non-negative coordinates, which a signed division would not know.
+static_assert(kBrickSide == 8);
+[[nodiscard]] CNERF_HD constexpr Vec3i brick_part(Vec3i v) {
+  return {v.x >> 3, v.y >> 3, v.z >> 3};
+}
+[[nodiscard]] CNERF_HD constexpr Vec3i local_part(Vec3i v) {
+  return {v.x & 7, v.y & 7, v.z & 7};
 }
 
 /// Different bricks may be made and written by different threads; reading while another thread writes is not safe.
@@ -73,7 +82,6 @@ class BrickGrid {
     const auto& brick = bricks_[brick_at(brick_part(relative))];
     return brick ? brick->data() : nullptr;
   }
-  [[nodiscard]] static int offset_in_brick(Vec3i relative) { return brick_offset(local_part(relative)); }
   void set(Vec3i voxel, const T& value) {
     CNERF_CHECK(contains(voxel), "voxel outside the brick grid");
     const Vec3i v = voxel - min_;
@@ -91,11 +99,6 @@ class BrickGrid {
   [[nodiscard]] const std::array<T, kBrickVoxels>& brick(std::size_t brick) const { return *bricks_[brick]; }
 
  private:
-  // Of non-negative coordinates, which a signed division would not know.
-  [[nodiscard]] static Vec3i brick_part(Vec3i v) { return {v.x >> 3, v.y >> 3, v.z >> 3}; }
-  [[nodiscard]] static Vec3i local_part(Vec3i v) { return {v.x & 7, v.y & 7, v.z & 7}; }
-  static_assert(kBrickSide == 8);
-
   Vec3i min_, size_, counts_;
   T background_;
   std::vector<std::unique_ptr<std::array<T, kBrickVoxels>>> bricks_;

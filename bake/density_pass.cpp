@@ -57,19 +57,13 @@ std::uint8_t in_256ths(double share) {
   return static_cast<std::uint8_t>(std::clamp(static_cast<int>(share * 256), 0, 255));
 }
 
-std::vector<DenseVoxel> bake_brick(const ColorField& field, const BakePlan& plan, const BakeOptions& options, int plane,
-                                   std::uint32_t brick) {
-  const BrickSamples samples = gather_samples(field, plan, options.subsamples, brick_min_of(plan, plane, brick));
-  if (samples.positions.empty()) return {};
-  std::vector<float> sigma(samples.positions.size());
-  field.query_density(samples.positions, sigma);
-
-  const double h = plan.voxel_size;
-  const double world_from_unit_density = field.frame().unit_per_world;  // 1/unit length -> 1/world unit
+/// @param sigma  what the field answers, 1/unit length
+std::vector<DenseVoxel> voxels_of(const BrickSamples& samples, std::span<const float> sigma, const SceneFrame& frame,
+                                  double h, const BakeOptions& options, std::uint32_t brick) {
   std::vector<Accumulated> sums(kBrickVoxels);
   for (std::size_t s = 0; s < sigma.size(); ++s) {
     check_density(sigma[s]);
-    const double alpha = -std::expm1(-sigma[s] * world_from_unit_density * h);
+    const double alpha = -std::expm1(-sigma[s] * frame.unit_per_world * h);
     Accumulated& sum = sums[samples.offsets[s]];
     sum.alpha += alpha;
     sum.alpha_inside += samples.insides[s].cast<double>() * alpha;
@@ -89,6 +83,32 @@ std::vector<DenseVoxel> bake_brick(const ColorField& field, const BakePlan& plan
                     {in_256ths(inside.x), in_256ths(inside.y), in_256ths(inside.z)}});
   }
   return kept;
+}
+
+/// Bricks of a plane, by one question to the field.
+std::vector<std::vector<DenseVoxel>> bake_bricks(const ColorField& field, const BakePlan& plan,
+                                                 const BakeOptions& options, int plane,
+                                                 std::span<const std::uint32_t> bricks) {
+  std::vector<BrickSamples> samples(bricks.size());
+  parallel_tasks(bricks.size(), [&](std::size_t b) {
+    samples[b] = gather_samples(field, plan, options.subsamples, brick_min_of(plan, plane, bricks[b]));
+  });
+  std::vector<Vec3f> positions;
+  std::vector<std::size_t> begins = {0};
+  for (const BrickSamples& of_brick : samples) {
+    positions.insert(positions.end(), of_brick.positions.begin(), of_brick.positions.end());
+    begins.push_back(positions.size());
+  }
+  std::vector<float> sigma(positions.size());
+  if (!positions.empty()) field.query_density(positions, sigma);
+  std::vector<std::vector<DenseVoxel>> voxels(bricks.size());
+  parallel_tasks(bricks.size(), [&](std::size_t b) {
+    const auto answers = std::span<const float>(sigma).subspan(begins[b], begins[b + 1] - begins[b]);
+    if (!answers.empty()) {
+      voxels[b] = voxels_of(samples[b], answers, field.frame(), plan.voxel_size, options, bricks[b]);
+    }
+  });
+  return voxels;
 }
 
 }  // namespace
@@ -111,11 +131,17 @@ Vec3i brick_min_of(const BakePlan& plan, int plane, std::uint32_t brick) {
 
 std::vector<DenseVoxel> bake_density_bricks(const ColorField& field, const BakePlan& plan, const BakeOptions& options,
                                             int plane, std::span<const std::uint32_t> bricks) {
-  std::vector<std::vector<DenseVoxel>> of_bricks(bricks.size());
-  parallel_tasks(bricks.size(),
-                 [&](std::size_t b) { of_bricks[b] = bake_brick(field, plan, options, plane, bricks[b]); });
+  const std::size_t samples_of_brick = kBrickVoxels * static_cast<std::size_t>(std::pow(options.subsamples, 3));
+  const std::size_t at_a_time = std::max<std::size_t>(1, field.points_at_a_time() / samples_of_brick);
+  std::vector<std::vector<DenseVoxel>> parts((bricks.size() + at_a_time - 1) / at_a_time);
+  parallel_tasks(parts.size(), [&](std::size_t part) {
+    const std::size_t begin = part * at_a_time, count = std::min(at_a_time, bricks.size() - begin);
+    for (const auto& brick : bake_bricks(field, plan, options, plane, bricks.subspan(begin, count))) {
+      parts[part].insert(parts[part].end(), brick.begin(), brick.end());
+    }
+  });
   std::vector<DenseVoxel> voxels;
-  for (const std::vector<DenseVoxel>& brick : of_bricks) voxels.insert(voxels.end(), brick.begin(), brick.end());
+  for (const std::vector<DenseVoxel>& part : parts) voxels.insert(voxels.end(), part.begin(), part.end());
   return voxels;
 }
 

@@ -98,6 +98,12 @@ class PlaneWindow {
     const IndexedPlane& plane = plane_of(voxel);
     return !plane.grid || plane.grid->at(voxel) == kMissing;
   }
+  /// What the index grid says of a brick's voxels, by offset; nullptr where none was ever written.
+  [[nodiscard]] const std::int32_t* brick_at(Vec3i brick_min) const {
+    const IndexedPlane& plane = plane_of(brick_min);
+    if (!plane.grid || !plane.grid->contains(brick_min)) return nullptr;
+    return plane.grid->find_brick(brick_min - plane.grid->min());
+  }
   /// The voxel there if it has density.
   [[nodiscard]] const BakedVoxel* dense_at(Vec3i voxel) const {
     const IndexedPlane& plane = plane_of(voxel);
@@ -128,8 +134,10 @@ class NearDensity {
  public:
   NearDensity(const PlaneWindow& window, Vec3i brick_min, int radius)
       : radius_(radius), side_(kBrickSide + 2 * radius), near_(static_cast<std::size_t>(side_) * side_ * side_) {
-    for (std::size_t i = 0; i < near_.size(); ++i) {
-      near_[i] = window.dense_at(brick_min + position(i) - Vec3i{radius, radius, radius}) != nullptr;
+    for (int neighbour = 0; neighbour < 27; ++neighbour) {
+      const Vec3i step{neighbour / 9 - 1, neighbour / 3 % 3 - 1, neighbour % 3 - 1};
+      const std::int32_t* brick = window.brick_at(brick_min + step * kBrickSide);
+      if (brick != nullptr) look_into(brick, step * kBrickSide);
     }
     for (int axis = 0; axis < 3; ++axis) dilate(axis);
   }
@@ -140,6 +148,18 @@ class NearDensity {
   [[nodiscard]] Vec3i position(std::size_t i) const {
     const auto n = static_cast<int>(i);
     return {n / (side_ * side_), n / side_ % side_, n % side_};
+  }
+  /// @param low  first voxel of the brick, from the first of the one in the middle
+  void look_into(const std::int32_t* brick, Vec3i low) {
+    Vec3i from, to;  // of the brick's voxels, those within `radius_` of the middle
+    for (int axis = 0; axis < 3; ++axis) {
+      from[axis] = std::max(0, -radius_ - low[axis]);
+      to[axis] = std::min(kBrickSide, kBrickSide + radius_ - low[axis]);
+    }
+    const Vec3i shift = low + Vec3i{radius_, radius_, radius_};
+    for (int x = from.x; x < to.x; ++x)
+      for (int y = from.y; y < to.y; ++y)
+        for (int z = from.z; z < to.z; ++z) near_[index(Vec3i{x, y, z} + shift)] = brick[brick_offset({x, y, z})] >= 0;
   }
   void dilate(int axis) {
     const std::vector<char> before = near_;
@@ -203,8 +223,16 @@ std::vector<BakedVoxel> dilated_plane(const PlaneWindow& window, int radius, con
 }  // namespace
 
 void sort_voxels(std::vector<BakedVoxel>& voxels) {
-  std::sort(voxels.begin(), voxels.end(),
-            [](const BakedVoxel& a, const BakedVoxel& b) { return std::tie(a.i, a.j, a.k) < std::tie(b.i, b.j, b.k); });
+  if (voxels.empty()) return;
+  const VoxelBox box = bounding_box(voxels);
+  std::vector<std::vector<BakedVoxel>> slices(static_cast<std::size_t>(box.size.x));  // of one i
+  for (const BakedVoxel& voxel : voxels) slices[static_cast<std::size_t>(voxel.i - box.min.x)].push_back(voxel);
+  parallel_tasks(slices.size(), [&](std::size_t s) {
+    std::sort(slices[s].begin(), slices[s].end(),
+              [](const BakedVoxel& a, const BakedVoxel& b) { return std::tie(a.j, a.k) < std::tie(b.j, b.k); });
+  });
+  voxels.clear();
+  for (const std::vector<BakedVoxel>& slice : slices) voxels.insert(voxels.end(), slice.begin(), slice.end());
 }
 
 VolumePlanes dilated(const VolumePlanes& volume, int radius) {

@@ -12,6 +12,8 @@
 namespace cnerf {
 namespace {
 
+constexpr std::size_t kViewsAtATime = 1 << 20;  ///< answers of a question who sees some voxels
+
 bool in_gamut(Vec3f rgb, float luminance) {
   const float top = std::max(1.0f, luminance);
   for (int channel = 0; channel < 3; ++channel) {
@@ -36,90 +38,138 @@ VoxelColor voxel_color(float luminance, Chromaticity chromaticity) {
   return color;
 }
 
-/// What is asked of the field for one brick.
-struct RadiancePass::Queries {
-  std::vector<std::size_t> voxels;  ///< index into the brick's dense voxels, of those that are kept
-  std::vector<float> sigma;         ///< of each kept voxel, sharpened, 1/world unit
-  std::vector<Vec3f> centroids;     ///< of each kept voxel, unit space
-  ViewMeans means;                  ///< of each kept voxel
+/// Voxels of a brick that may be kept.
+struct RadiancePass::Candidates {
+  std::vector<Vec3i> voxels;
+  std::vector<float> sigma;  ///< as it was baked, 1/world unit
+  std::vector<Sight> sights;
+  std::vector<std::int32_t> order;  ///< of cameras, for them all
 };
 
-RadiancePass::RadiancePass(const ColorField& field, const std::vector<BakeCamera>& cameras,
-                           const std::vector<BakeLevel>& levels, std::size_t level, const BakeOptions& options)
+/// Those that a camera sees, and what is asked of the field for them.
+struct RadiancePass::Kept {
+  std::vector<BakedVoxel> voxels;  ///< colours are still missing
+  std::vector<Vec3f> centroids;    ///< unit space
+  ViewMeans means;
+
+  void append(const Kept& others) {
+    voxels.insert(voxels.end(), others.voxels.begin(), others.voxels.end());
+    centroids.insert(centroids.end(), others.centroids.begin(), others.centroids.end());
+    means.append(others.means);
+  }
+};
+
+RadiancePass::RadiancePass(const ColorField& field, const std::vector<BakeLevel>& levels, std::size_t level,
+                           const ViewSelection& views, const BakeOptions& options)
     : field_(field),
       level_(levels[level]),
-      views_(cameras, levels[level].plan, options),
+      level_number_(level),
+      views_(views),
       weight_threshold_(options.weight_threshold),
       sharpening_(options.sharpening),
       faintest_(faintest_density(options.opacity_threshold, level_.plan.voxel_size)),
-      keep_unseen_(options.keep_unseen || cameras.empty()) {
-  for (std::size_t other = 0; other < levels.size(); ++other) {
-    if (other != level) views_.look_through(levels[other].sigma, levels[other].plan);
-  }
-}
+      keep_unseen_(options.keep_unseen || views.eyes().empty()) {}
 
 std::vector<BakedVoxel> RadiancePass::bake_plane(std::span<const DenseVoxel> dense, int plane) const {
+  const std::size_t most = kViewsAtATime / static_cast<std::size_t>(views_.views_per_voxel());
+  std::vector<BakedVoxel> voxels;
   std::vector<std::span<const DenseVoxel>> bricks;
+  std::size_t waiting = 0;
   for (std::size_t begin = 0, end = 0; begin < dense.size(); begin = end) {
     while (end < dense.size() && dense[end].brick == dense[begin].brick) ++end;
     bricks.push_back(dense.subspan(begin, end - begin));
+    waiting += end - begin;
+    if (waiting < most && end < dense.size()) continue;
+    bake_bricks(bricks, plane, voxels);
+    bricks.clear();
+    waiting = 0;
   }
-  std::vector<std::vector<BakedVoxel>> baked(bricks.size());
-  parallel_tasks(bricks.size(), [&](std::size_t b) { baked[b] = bake_brick(bricks[b], plane); });
-  std::vector<BakedVoxel> voxels;
-  for (const std::vector<BakedVoxel>& brick : baked) voxels.insert(voxels.end(), brick.begin(), brick.end());
   sort_voxels(voxels);
   return voxels;
 }
 
-std::vector<BakedVoxel> RadiancePass::bake_brick(std::span<const DenseVoxel> dense, int plane) const {
-  const Vec3i brick_min = brick_min_of(level_.plan, plane, dense.front().brick);
-  const Queries queries = gather(dense, brick_min);
-  if (queries.voxels.empty()) return {};
-  const std::vector<float> luminance = queries.means.luminance(field_);
-  const std::vector<Chromaticity> chromaticity = ask_chromaticity(queries);
-
-  std::vector<BakedVoxel> voxels;
-  for (std::size_t v = 0; v < queries.voxels.size(); ++v) {
-    const DenseVoxel& voxel = dense[queries.voxels[v]];
-    const Vec3i at = brick_min + brick_local(voxel.offset);
-    const VoxelColor color = voxel_color(luminance[v], chromaticity[v]);
-    voxels.push_back({at.x, at.y, at.z, queries.sigma[v], luminance_of(color.rgb), color.rgb, color.a, color.b});
+void RadiancePass::bake_bricks(std::span<const std::span<const DenseVoxel>> bricks, int plane,
+                               std::vector<BakedVoxel>& voxels) const {
+  std::vector<Candidates> candidates(bricks.size());
+  parallel_tasks(bricks.size(), [&](std::size_t b) { candidates[b] = candidates_of(bricks[b], plane); });
+  SightBatch batch;
+  std::vector<std::size_t> first;  // sight of each brick
+  for (std::uint32_t b = 0; b < candidates.size(); ++b) {
+    first.push_back(batch.sights.size());
+    for (Sight sight : candidates[b].sights) {
+      sight.order = b;
+      batch.sights.push_back(sight);
+    }
+    batch.orders.insert(batch.orders.end(), candidates[b].order.begin(), candidates[b].order.end());
   }
-  return voxels;
+  SeenBatch seen;
+  views_.find(level_number_, batch, seen);
+
+  std::vector<Kept> of_bricks(bricks.size());
+  parallel_tasks(bricks.size(), [&](std::size_t b) { of_bricks[b] = kept_of(candidates[b], seen, first[b]); });
+  Kept kept;
+  for (const Kept& of_brick : of_bricks) kept.append(of_brick);
+  const std::vector<float> luminance = kept.means.luminance(field_);
+  const std::vector<Chromaticity> chromaticity = ask_chromaticity(kept.centroids);
+  parallel_ranges(kept.voxels.size(), kBrickVoxels, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      const VoxelColor color = voxel_color(luminance[v], chromaticity[v]);
+      BakedVoxel& voxel = kept.voxels[v];
+      voxel.luminance = luminance_of(color.rgb);
+      voxel.rgb = color.rgb;
+      voxel.a = color.a;
+      voxel.b = color.b;
+    }
+  });
+  voxels.insert(voxels.end(), kept.voxels.begin(), kept.voxels.end());
 }
 
-RadiancePass::Queries RadiancePass::gather(std::span<const DenseVoxel> dense, Vec3i brick_min) const {
+RadiancePass::Candidates RadiancePass::candidates_of(std::span<const DenseVoxel> brick, int plane) const {
   constexpr double kHalf = kBrickSide / 2.0;
   const BakePlan& plan = level_.plan;
+  const Vec3i brick_min = brick_min_of(plan, plane, brick.front().brick);
   const Vec3d centre = plan.world_from_voxel(brick_min.cast<double>() + Vec3d{kHalf, kHalf, kHalf});
-  const std::vector<int> order = views_.try_order(centre);
-  Queries queries;
-  for (std::size_t v = 0; v < dense.size(); ++v) {
-    const double opacity = -std::expm1(-dense[v].sigma * plan.voxel_size);
+  Candidates candidates;
+  candidates.order = try_order(views_.eyes(), centre);
+  for (const DenseVoxel& voxel : brick) {
+    const double opacity = -std::expm1(-voxel.sigma * plan.voxel_size);
     const auto least = static_cast<float>(weight_threshold_ / opacity);
     if (least > 1 && !keep_unseen_) continue;
-    const Vec3i voxel = brick_min + brick_local(dense[v].offset);
-    const Vec3d world = plan.world_from_voxel(voxel.cast<double>() + dense[v].centroid_in_voxel());
-    const std::vector<SeenBy> seen = views_.seen_by(level_.sigma, world, order, keep_unseen_ ? 0 : least);
-    if (seen.empty() && !keep_unseen_) continue;
-    const Vec3f unit = field_.frame().unit_from_world(world).cast<float>();
-    for (const SeenBy& view : seen) {
-      queries.means.look_along(unit, views_.direction_to(view.camera, world), view.transmittance);
-    }
-    if (seen.empty()) queries.means.look_from_all_sides(unit);
-    queries.means.next_point();
-    queries.voxels.push_back(v);
-    const float sigma = sharpening_ > 0 ? sharpened_density(level_, voxel, sharpening_) : dense[v].sigma;
-    queries.sigma.push_back(sigma < faintest_ ? 0.0f : sigma);
-    queries.centroids.push_back(unit);
+    const Vec3i at = brick_min + brick_local(voxel.offset);
+    const Vec3d world = plan.world_from_voxel(at.cast<double>() + voxel.centroid_in_voxel());
+    candidates.voxels.push_back(at);
+    candidates.sigma.push_back(voxel.sigma);
+    candidates.sights.push_back({world, keep_unseen_ ? 0 : least});
   }
-  return queries;
+  return candidates;
 }
 
-std::vector<Chromaticity> RadiancePass::ask_chromaticity(const Queries& queries) const {
-  std::vector<Chromaticity> answers(queries.centroids.size());
-  field_.query_chromaticity(queries.centroids, answers);
+RadiancePass::Kept RadiancePass::kept_of(const Candidates& candidates, const SeenBatch& seen, std::size_t first) const {
+  Kept kept;
+  for (std::size_t c = 0; c < candidates.voxels.size(); ++c) {
+    const std::int32_t count = seen.counts[first + c];
+    if (count == 0 && !keep_unseen_) continue;
+    const Vec3d world = candidates.sights[c].world;
+    const Vec3f unit = field_.frame().unit_from_world(world).cast<float>();
+    const SeenBy* views = seen.seen.data() + (first + c) * static_cast<std::size_t>(views_.views_per_voxel());
+    for (const SeenBy& view : std::span(views, static_cast<std::size_t>(count))) {
+      kept.means.look_along(unit, direction_to(views_.eyes()[view.camera], world), view.transmittance);
+    }
+    if (count == 0) kept.means.look_from_all_sides(unit);
+    kept.means.next_point();
+    kept.centroids.push_back(unit);
+    const Vec3i at = candidates.voxels[c];
+    const float sigma = sharpening_ > 0 ? sharpened_density(level_, at, sharpening_) : candidates.sigma[c];
+    kept.voxels.push_back({at.x, at.y, at.z, sigma < faintest_ ? 0.0f : sigma});
+  }
+  return kept;
+}
+
+std::vector<Chromaticity> RadiancePass::ask_chromaticity(std::span<const Vec3f> points) const {
+  std::vector<Chromaticity> answers(points.size());
+  parallel_ranges(points.size(), field_.points_at_a_time(), [&](std::size_t begin, std::size_t end) {
+    field_.query_chromaticity(points.subspan(begin, end - begin), std::span(answers).subspan(begin, end - begin));
+  });
   for (const Chromaticity& c : answers) {
     CNERF_CHECK(std::isfinite(c.x) && std::isfinite(c.z), "the field answered a chromaticity that is not finite");
   }

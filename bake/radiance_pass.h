@@ -4,7 +4,6 @@
 #include <span>
 #include <vector>
 
-#include "bake/bake_camera.h"
 #include "bake/bake_levels.h"
 #include "bake/baked_volume.h"
 #include "bake/density_pass.h"
@@ -28,24 +27,29 @@ struct VoxelColor {
 /// which is better than that of a neighbour.
 class RadiancePass {
  public:
-  /// @param levels  all levels of the bake; `level` is the one to bake, the others stand in its light. All must outlive
-  ///                this object.
-  RadiancePass(const ColorField& field, const std::vector<BakeCamera>& cameras, const std::vector<BakeLevel>& levels,
-               std::size_t level, const BakeOptions& options);
+  /// @param levels  all levels of the bake; `level` is the one to bake, the others stand in its light
+  /// @param views   who sees the points of these levels.  All three must outlive this object.
+  RadiancePass(const ColorField& field, const std::vector<BakeLevel>& levels, std::size_t level,
+               const ViewSelection& views, const BakeOptions& options);
 
   /// The voxels of a plane of the density pass with their colours, sorted by (i, j, k).
   /// @throws ContractError  when the field answers a luminance or chromaticity that is not finite.
+  /// @throws DeviceError    as ViewSelection::find.
   [[nodiscard]] std::vector<BakedVoxel> bake_plane(std::span<const DenseVoxel> dense, int plane) const;
 
  private:
-  struct Queries;
-  [[nodiscard]] std::vector<BakedVoxel> bake_brick(std::span<const DenseVoxel> dense, int plane) const;
-  [[nodiscard]] Queries gather(std::span<const DenseVoxel> dense, Vec3i brick_min) const;
-  [[nodiscard]] std::vector<Chromaticity> ask_chromaticity(const Queries& queries) const;
+  struct Candidates;
+  struct Kept;
+  void bake_bricks(std::span<const std::span<const DenseVoxel>> bricks, int plane,
+                   std::vector<BakedVoxel>& voxels) const;
+  [[nodiscard]] Candidates candidates_of(std::span<const DenseVoxel> brick, int plane) const;
+  [[nodiscard]] Kept kept_of(const Candidates& candidates, const SeenBatch& seen, std::size_t first) const;
+  [[nodiscard]] std::vector<Chromaticity> ask_chromaticity(std::span<const Vec3f> points) const;
 
   const ColorField& field_;
   const BakeLevel& level_;
-  ViewSelection views_;
+  std::size_t level_number_;
+  const ViewSelection& views_;
   double weight_threshold_;
   double sharpening_;
   double faintest_;  ///< density that is kept, 1/world unit

@@ -27,9 +27,22 @@ void ViewMeans::look_from_all_sides(Vec3f unit) {
   for (const Vec3f direction : kAllSides) look_along(unit, direction, 1.0f);
 }
 
+void ViewMeans::append(const ViewMeans& others) {
+  const std::size_t first = positions_.size();
+  positions_.insert(positions_.end(), others.positions_.begin(), others.positions_.end());
+  directions_.insert(directions_.end(), others.directions_.begin(), others.directions_.end());
+  weights_.insert(weights_.end(), others.weights_.begin(), others.weights_.end());
+  for (const std::size_t end : others.ends_) ends_.push_back(first + end);
+}
+
 std::vector<float> ViewMeans::luminance(const ColorField& field) const {
   std::vector<float> answers(positions_.size());
-  field.query_luminance(positions_, directions_, answers);
+  const std::span<const Vec3f> positions = positions_, directions = directions_;
+  parallel_ranges(answers.size(), field.points_at_a_time(), [&](std::size_t begin, std::size_t end) {
+    const std::size_t count = end - begin;
+    field.query_luminance(positions.subspan(begin, count), directions.subspan(begin, count),
+                          std::span(answers).subspan(begin, count));
+  });
   std::vector<float> means;
   std::size_t begin = 0;
   for (const std::size_t end : ends_) {
@@ -53,14 +66,7 @@ struct ViewAverage::Brick {
 
 ViewAverage::ViewAverage(const ColorField& field, const std::vector<BakeCamera>& cameras, std::vector<BakeLevel> levels,
                          const BakeOptions& options)
-    : field_(field), levels_(std::move(levels)) {
-  for (const BakeLevel& level : levels_) {
-    ViewSelection& views = views_.emplace_back(cameras, level.plan, options);
-    for (const BakeLevel& other : levels_) {
-      if (&other != &level) views.look_through(other.sigma, other.plan);
-    }
-  }
-}
+    : field_(field), levels_(std::move(levels)), views_(cameras, density_levels(levels_), options) {}
 
 std::size_t ViewAverage::level_of(Vec3d world) const {
   for (std::size_t level = 0; level + 1 < levels_.size(); ++level) {
@@ -97,14 +103,13 @@ void ViewAverage::query(std::span<const Vec3f> positions, std::span<float> lumin
   const std::vector<Brick> bricks = by_brick(positions);
   parallel_tasks(bricks.size(), [&](std::size_t b) {
     const Brick& brick = bricks[b];
-    const ViewSelection& views = views_[brick.level];
-    const std::vector<int> order = views.try_order(brick.centre);
+    const std::vector<std::int32_t> order = try_order(views_.eyes(), brick.centre);
     ViewMeans means;
     for (const std::size_t point : brick.points) {
       const Vec3d world = field_.frame().world_from_unit(positions[point].cast<double>());
-      const std::vector<SeenBy> seen = views.seen_by(levels_[brick.level].sigma, world, order);
+      const std::vector<SeenBy> seen = views_.seen_by(brick.level, world, order);
       for (const SeenBy& view : seen) {
-        means.look_along(positions[point], views.direction_to(view.camera, world), view.transmittance);
+        means.look_along(positions[point], direction_to(views_.eyes()[view.camera], world), view.transmittance);
       }
       if (seen.empty()) means.look_from_all_sides(positions[point]);
       means.next_point();

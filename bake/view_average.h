@@ -22,8 +22,10 @@ class ViewMeans {
   void look_from_all_sides(Vec3f unit);
   /// The point at hand is complete: it has at least one direction.
   void next_point() { ends_.push_back(positions_.size()); }
+  /// Adds another list's points.
+  void append(const ViewMeans& others);
 
-  /// [points] linear Y, >= 0: the weighted mean over each point's directions.
+  /// [points] linear Y, >= 0: the weighted mean over each point's directions. Asked by as many threads as are free.
   /// @throws ContractError  when the field answers a luminance that is not finite.
   [[nodiscard]] std::vector<float> luminance(const ColorField& field) const;
 
@@ -57,7 +59,7 @@ class ViewAverage {
 
   const ColorField& field_;
   const std::vector<BakeLevel> levels_;
-  std::vector<ViewSelection> views_;  // of each level
+  const ViewSelection views_;
 };
 
 /// After baking density on the lattices that `options` ask for.  @throws as plan_within_budget and bake_levels.

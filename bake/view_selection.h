@@ -1,64 +1,80 @@
 #pragma once
-/// Which cameras see a point of a baked density grid.
+/// Which cameras see points of a bake.
 
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "bake/bake_camera.h"
-#include "bake/bake_plan.h"
-#include "bake/brick_grid.h"
+#include "bake/bake_levels.h"
+#include "bake/sight_math.h"
 
 namespace cnerf {
 
-/// Transmittance between two points in voxel coordinates (voxel ijk covers [ijk, ijk + 1)), by steps of one voxel with
-/// nearest-neighbour densities. The first voxel's length after `from` is left out: a surface must not hide itself.
-/// @param voxel_size  world units.  @return in [0, 1]; 0 once it falls below `stop_below`.
-[[nodiscard]] float transmittance_between(const BrickGrid<float>& sigma, double voxel_size, Vec3f from, Vec3f to,
-                                          float stop_below);
+[[nodiscard]] std::vector<Eye> eyes_of(const std::vector<BakeCamera>& cameras);
 
-/// A camera and how much of a point's light reaches it.
-struct SeenBy {
-  int camera = 0;
-  float transmittance = 0;
+/// Order in which cameras are worth trying for points around `world`: first the one with the finest pixels there, then
+/// always the one farthest, in direction, from those before it; so a few cameras already surround the point.
+[[nodiscard]] std::vector<std::int32_t> try_order(std::span<const Eye> eyes, Vec3d world);
+
+/// Unit direction from a camera to a point.
+[[nodiscard]] Vec3f direction_to(const Eye& eye, Vec3d world);
+
+/// A point, and what makes a camera see it.
+struct Sight {
+  Vec3d world{};
+  float least = 0;          ///< transmittance below which a camera does not count, if above `seen_transmittance`
+  std::uint32_t order = 0;  ///< which order of cameras is tried
 };
 
-/// Answers "who sees this voxel" for the cameras of a bake. Immutable; thread-safe.
+/// A question about points of one level.
+struct SightBatch {
+  std::vector<Sight> sights;
+  std::vector<std::int32_t> orders;  ///< [orders][cameras]
+};
+
+/// The answer.
+struct SeenBatch {
+  std::vector<SeenBy> seen;          ///< [sights][views_per_voxel], best first
+  std::vector<std::int32_t> counts;  ///< [sights] how many of a point's are set
+};
+
+using DensityLevel = SightLevel<BrickGrid<float>>;
+[[nodiscard]] std::vector<DensityLevel> density_levels(std::span<const BakeLevel> levels);
+
+/// Answers "who sees this" for the points of a bake. Immutable; thread-safe. Light has to pass the density of all
+/// levels.
 class ViewSelection {
  public:
-  ViewSelection(const std::vector<BakeCamera>& cameras, const BakePlan& plan, const BakeOptions& options);
+  /// @param levels  must outlive this object
+  ViewSelection(const std::vector<BakeCamera>& cameras, std::vector<DensityLevel> levels, const BakeOptions& options);
+  virtual ~ViewSelection() = default;
+  ViewSelection(const ViewSelection&) = delete;
+  ViewSelection& operator=(const ViewSelection&) = delete;
 
-  /// Order in which cameras are worth trying for points around `world`: first the one with the finest pixels there,
-  /// then always the one farthest, in direction, from those before it; so a few cameras already surround the point.
-  [[nodiscard]] std::vector<int> try_order(Vec3d world) const;
-
-  /// Light also has to pass this grid, of another level of the same bake; both must outlive this object.
-  void look_through(const BrickGrid<float>& sigma, const BakePlan& plan) { others_.push_back({&sigma, &plan}); }
+  [[nodiscard]] const std::vector<Eye>& eyes() const { return eyes_; }
+  [[nodiscard]] int views_per_voxel() const { return views_per_voxel_; }
 
   /// At most `views_per_voxel` cameras that have the point in their picture and see it, best first.
-  /// @param least  transmittance below which a camera does not count, if above `seen_transmittance`.
-  [[nodiscard]] std::vector<SeenBy> seen_by(const BrickGrid<float>& sigma, Vec3d world, const std::vector<int>& order,
+  /// @param level  that the point belongs to.  @param order, least  as try_order and Sight have them
+  [[nodiscard]] std::vector<SeenBy> seen_by(std::size_t level, Vec3d world, std::span<const std::int32_t> order,
                                             float least = 0) const;
+  /// The same for many points at once, by all threads or the GPU.
+  /// @throws DeviceError  when the GPU's memory does not suffice
+  virtual void find(std::size_t level, const SightBatch& batch, SeenBatch& answer) const;
 
-  /// Unit direction from a camera to a point.
-  [[nodiscard]] Vec3f direction_to(int camera, Vec3d world) const;
+ protected:
+  [[nodiscard]] SightScene<BrickGrid<float>> scene() const;
 
  private:
-  struct Eye {
-    Intrinsics intrinsics;
-    Affined camera_from_world;
-    Vec3d centre;  // world
-  };
-  struct Level {
-    const BrickGrid<float>* sigma;
-    const BakePlan* plan;
-  };
-  [[nodiscard]] bool has_in_picture(const Eye& eye, Vec3d world) const;
-  [[nodiscard]] float transmittance_to(const Eye& eye, const BrickGrid<float>& sigma, Vec3d world, float least) const;
-
   std::vector<Eye> eyes_;
-  std::vector<Level> others_;
-  BakePlan plan_;
+  std::vector<DensityLevel> levels_;
   int views_per_voxel_;
   float seen_transmittance_;
 };
+
+/// On the device that was selected for engines.
+[[nodiscard]] std::unique_ptr<ViewSelection> select_views(const std::vector<BakeCamera>& cameras,
+                                                          std::vector<DensityLevel> levels, const BakeOptions& options);
 
 }  // namespace cnerf

@@ -63,11 +63,12 @@ std::vector<VolumePlanes> bake_volumes(const ColorField& field, const std::vecto
                                        BakeJournal& journal, const ProgressSink& sink) {
   const auto planes_of_density = static_cast<std::size_t>(planes_of_all(levels));
   PassProgress progress(sink, kDensityShare, 1, static_cast<double>(planes_of_density));
+  const auto views = select_views(cameras, density_levels(levels), options);
   std::vector<VolumePlanes> volumes;
   std::size_t dense_part = 0;
   for (std::size_t level = 0; level < levels.size(); ++level) {
     const BakePlan& plan = levels[level].plan;
-    const RadiancePass pass(field, cameras, levels, level, options);
+    const RadiancePass pass(field, levels, level, *views, options);
     const std::size_t first = planes_of_density + dense_part;
     bool any = false;
     for (int plane = 0; plane < plane_count(plan); ++plane, ++dense_part) {

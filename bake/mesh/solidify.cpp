@@ -30,12 +30,12 @@ class HiddenVoxels {
  public:
   HiddenVoxels(const BrickGrid<float>& sigma, const std::vector<BakeCamera>& cameras, const BakePlan& plan,
                BakeOptions options)
-      : sigma_(sigma), plan_(plan), views_(cameras, plan, one_view(options)) {}
+      : sigma_(sigma), plan_(plan), views_(cameras, {{&sigma, plan.origin, plan.voxel_size}}, one_view(options)) {}
 
   /// Which voxels of a brick are hidden, by their offset.
   [[nodiscard]] std::vector<int> of_brick(std::size_t brick) const {
     const Vec3i low = sigma_.brick_min(brick);
-    std::vector<int> order;  // of cameras, once for the brick and only if needed
+    std::vector<std::int32_t> order;  // of cameras, once for the brick and only if needed
     std::vector<int> hidden;
     for (int offset = 0; offset < kBrickVoxels; ++offset) {
       const Vec3i voxel = low + brick_local(offset);
@@ -43,8 +43,8 @@ class HiddenVoxels {
       const Vec3f centre = voxel.cast<float>() + Vec3f{0.5f, 0.5f, 0.5f};
       if (is_open(centre)) continue;
       const Vec3d world = plan_.world_from_voxel(centre.cast<double>());
-      if (order.empty()) order = views_.try_order(world);
-      if (views_.seen_by(sigma_, world, order).empty()) hidden.push_back(offset);
+      if (order.empty()) order = try_order(views_.eyes(), world);
+      if (views_.seen_by(0, world, order).empty()) hidden.push_back(offset);
     }
     return hidden;
   }

@@ -42,7 +42,7 @@ TexelShader::TexelShader(const ColorField& field, const std::vector<BakeCamera>&
       plan_(plan),
       sigma_(sigma),
       options_(options),
-      views_(cameras, plan, with_views(bake, options.views_per_texel)) {}
+      views_(cameras, {{&sigma, plan.origin, plan.voxel_size}}, with_views(bake, options.views_per_texel)) {}
 
 std::vector<TexelShader::Sample> TexelShader::samples_along_rays(std::span<const SurfacePoint> points,
                                                                  std::vector<SurfaceColor>& colors) const {
@@ -83,18 +83,18 @@ std::vector<TexelShader::Sample> TexelShader::samples_along_rays(std::span<const
 
 std::vector<std::vector<TexelShader::View>> TexelShader::views_of(std::span<const SurfacePoint> points) const {
   std::vector<std::vector<View>> views(points.size());
-  std::vector<int> order;
+  std::vector<std::int32_t> order;
   Vec3f order_is_for{};
   for (std::size_t p = 0; p < points.size(); ++p) {
     const SurfacePoint& point = points[p];
     // From just outside, so that the surface does not hide itself.
     const Vec3d world = plan_.world_from_voxel((point.position + point.normal).cast<double>());
     if (p == 0 || length(point.position - order_is_for) > kSameCameras) {
-      order = views_.try_order(world);
+      order = try_order(views_.eyes(), world);
       order_is_for = point.position;
     }
-    for (const SeenBy& seen : views_.seen_by(sigma_, world, order)) {
-      const Vec3f direction = views_.direction_to(seen.camera, world);
+    for (const SeenBy& seen : views_.seen_by(0, world, order)) {
+      const Vec3f direction = direction_to(views_.eyes()[seen.camera], world);
       const float cosine = -dot(direction, point.normal);
       if (cosine <= 0) continue;  // sees it from behind, through an edge
       views[p].push_back({direction, seen.transmittance * std::max(cosine, kLeastCosine)});

@@ -19,6 +19,7 @@
 #include "src/base/byte_count.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/parallel.h"
 #include "src/capture/luminance_plane.h"
 #include "src/config/fields.h"
 #include "src/config/toml_binding.h"
@@ -57,14 +58,15 @@ std::string bake_identity(const RunDirectory& directory, const std::string& take
   return identity.str();
 }
 
-/// The photographs as the program sees them, or none.
+/// The photographs as the program sees them, undistorted, or none.
 std::vector<WebPhoto> web_photos(const Capture& capture, const WebOptions& options) {
   std::vector<WebPhoto> photos;
   if (options.photo_side == 0) return photos;
-  for (const View& view : capture.views) {
-    photos.push_back(
-        make_web_photo(view.intrinsics, luminance_plane(view.image), options.photo_side, options.photo_quality));
-  }
+  photos.resize(capture.views.size());
+  parallel_tasks(photos.size(), [&](std::size_t i) {
+    const View& view = capture.views[i];
+    photos[i] = make_web_photo(view.intrinsics, luminance_plane(view.image), options.photo_side, options.photo_quality);
+  });
   return photos;
 }
 
@@ -113,11 +115,11 @@ void write_mesh(BakedMesh mesh, const ColorOrigin& origin, const BakeFormats& fo
 }
 
 void add_plates(const Capture& capture, BakeFolder& bake) {
-  constexpr int kPlateSide = 4096, kPlateQuality = 92;
-  for (const View& view : capture.views) {
-    bake.add_plate(view.name,
-                   make_web_photo(view.intrinsics, luminance_plane(view.image), kPlateSide, kPlateQuality).jpeg);
-  }
+  WebOptions plates;
+  plates.photo_side = 4096;
+  plates.photo_quality = 92;
+  const std::vector<WebPhoto> photos = web_photos(capture, plates);
+  for (std::size_t i = 0; i < photos.size(); ++i) bake.add_plate(capture.views[i].name, photos[i].jpeg);
 }
 
 }  // namespace

@@ -4,42 +4,13 @@
 #include "src/capture/camera_math.h"
 
 namespace cnerf {
-namespace {
-
-using lens::distort;
-using lens::Distorted;
-using lens::fisheye_radius;
-using lens::FisheyeRadius;
-using lens::PlanePoint;
-
-std::optional<PlanePoint> fisheye_project(const std::array<double, 8>& k, Vec3d point) {
-  const double across = std::hypot(point.x, point.y);
-  const FisheyeRadius r = fisheye_radius(k, std::atan2(across, point.z));
-  if (r.slope <= 0) return std::nullopt;
-  const double scale = across > 0 ? r.value / across : 0.0;
-  return PlanePoint{point.x * scale, point.y * scale};
-}
-
-std::optional<PlanePoint> plane_position(const Intrinsics& intrinsics, Vec3d point) {
-  if (intrinsics.model == LensModel::kOpenCvFisheye) return fisheye_project(intrinsics.distortion, point);
-  const PlanePoint p = {point.x / point.z, point.y / point.z};
-  if (intrinsics.model == LensModel::kPinhole) return p;
-  const Distorted d = distort(intrinsics.distortion, p);
-  if (d.radial_slope <= 0) return std::nullopt;
-  return d.value;
-}
-
-}  // namespace
 
 Vec3d ray_direction(const Intrinsics& intrinsics, PixelPosition pixel) {
   return lens::ray_direction(intrinsics, pixel);
 }
 
 std::optional<PixelPosition> project(const Intrinsics& intrinsics, Vec3d point_in_camera) {
-  if (!(point_in_camera.z > 0)) return std::nullopt;
-  const std::optional<PlanePoint> p = plane_position(intrinsics, point_in_camera);
-  if (!p) return std::nullopt;
-  return PixelPosition{intrinsics.fx * p->x + intrinsics.cx, intrinsics.fy * p->y + intrinsics.cy};
+  return lens::project(intrinsics, point_in_camera);
 }
 
 Intrinsics resized(const Intrinsics& intrinsics, int width, int height) {

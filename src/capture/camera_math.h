@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "src/base/host_device.h"
 #include "src/capture/camera.h"
@@ -100,6 +101,31 @@ CNERF_HD inline Vec3d ray_direction(const Intrinsics& intrinsics, PixelPosition 
   if (intrinsics.model == LensModel::kOpenCvFisheye) return fisheye_direction(intrinsics.distortion, p);
   const PlanePoint straight = intrinsics.model == LensModel::kPinhole ? p : undistort(intrinsics.distortion, p);
   return normalized(Vec3d{straight.x, straight.y, 1.0});
+}
+
+CNERF_HD inline std::optional<PlanePoint> fisheye_project(const std::array<double, 8>& k, Vec3d point) {
+  const double across = std::hypot(point.x, point.y);
+  const FisheyeRadius r = fisheye_radius(k, std::atan2(across, point.z));
+  if (r.slope <= 0) return std::nullopt;
+  const double scale = across > 0 ? r.value / across : 0.0;
+  return PlanePoint{point.x * scale, point.y * scale};
+}
+
+CNERF_HD inline std::optional<PlanePoint> plane_position(const Intrinsics& intrinsics, Vec3d point) {
+  if (intrinsics.model == LensModel::kOpenCvFisheye) return fisheye_project(intrinsics.distortion, point);
+  const PlanePoint p = {point.x / point.z, point.y / point.z};
+  if (intrinsics.model == LensModel::kPinhole) return p;
+  const Distorted d = distort(intrinsics.distortion, p);
+  if (d.radial_slope <= 0) return std::nullopt;
+  return d.value;
+}
+
+/// See `cnerf::project`.
+CNERF_HD inline std::optional<PixelPosition> project(const Intrinsics& intrinsics, Vec3d point_in_camera) {
+  if (!(point_in_camera.z > 0)) return std::nullopt;
+  const std::optional<PlanePoint> p = plane_position(intrinsics, point_in_camera);
+  if (!p) return std::nullopt;
+  return PixelPosition{intrinsics.fx * p->x + intrinsics.cx, intrinsics.fy * p->y + intrinsics.cy};
 }
 
 }  // namespace cnerf::lens

@@ -76,6 +76,8 @@ class LuminanceEngine {
   virtual void trace(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                      std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const = 0;
 
+  /// Points worth asking for at once, by one of many threads.
+  [[nodiscard]] virtual std::size_t points_at_a_time() const { return std::size_t(1) << 12; }
   virtual void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const = 0;
   virtual void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
                                std::span<float> luminance) const = 0;

@@ -1,10 +1,12 @@
 #include "src/evaluate/evaluate.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "src/base/check.h"
 #include "src/base/error.h"
+#include "src/base/parallel.h"
 #include "src/capture/luminance_plane.h"
 
 namespace cnerf {
@@ -12,6 +14,8 @@ namespace {
 
 /// Pixels below this opacity have no colour of their own (design: the decode divides by opacity).
 constexpr float kColouredOpacity = 0.01f;
+/// Of views that are measured at the same time; each holds a hundred bytes a pixel meanwhile.
+constexpr std::size_t kPixelsAtATime = std::size_t(1) << 24;
 
 std::vector<float> channel(std::span<const float> rgb, int index) {
   std::vector<float> values(rgb.size() / 3);
@@ -151,17 +155,32 @@ Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptio
   RenderOptions render = options.render;
   render.color = scene.is_colorized();
   render.baked_color = scene.is_colorized() && options.with_baked;
-  for (const View* view : views) {
-    if (interruption_requested()) throw Interrupted("evaluation stopped; nothing was written");
-    RenderedImage ours = scene.render(view->intrinsics, view->world_from_camera, render);
-    if (ours.rgb.empty() && options.grey_as_color) paint_grey(ours);
-    const std::optional<ColorImage> truth = load_color_truth(*view);
-    metrics.views.push_back(measure({*view, ours, truth}, options.lpips));
-    if (watch) watch({*view, ours, truth});
-    if (progress) {
-      progress({"evaluate",
-                double(metrics.views.size()) / double(views.size()),
-                {{"psnr", metrics.views.back().psnr_luminance.value_or(0)}}});
+  const Intrinsics& first = views.front()->intrinsics;
+  const std::size_t at_a_time = std::clamp<std::size_t>(
+      kPixelsAtATime / (std::size_t(first.width) * std::size_t(first.height)), 1, thread_count());
+  for (std::size_t begin = 0; begin < views.size(); begin += at_a_time) {
+    const std::size_t count = std::min(at_a_time, views.size() - begin);
+    std::vector<RenderedImage> ours;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (interruption_requested()) throw Interrupted("evaluation stopped; nothing was written");
+      const View& view = *views[begin + i];
+      ours.push_back(scene.render(view.intrinsics, view.world_from_camera, render));
+      if (ours.back().rgb.empty() && options.grey_as_color) paint_grey(ours.back());
+    }
+    std::vector<std::optional<ColorImage>> truth(count);
+    std::vector<ViewMetrics> measured(count);
+    parallel_tasks(count, [&](std::size_t i) {
+      truth[i] = load_color_truth(*views[begin + i]);
+      measured[i] = measure({*views[begin + i], ours[i], truth[i]}, options.lpips);
+    });
+    for (std::size_t i = 0; i < count; ++i) {
+      metrics.views.push_back(measured[i]);
+      if (watch) watch({*views[begin + i], ours[i], truth[i]});
+      if (progress) {
+        progress({"evaluate",
+                  double(metrics.views.size()) / double(views.size()),
+                  {{"psnr", measured[i].psnr_luminance.value_or(0)}}});
+      }
     }
   }
   metrics.mean = mean_of(metrics.views);

@@ -1,6 +1,7 @@
 #pragma once
 /// What the bake, the viewer and evaluation need of a trained scene: point queries. Engines implement it.
 
+#include <cstddef>
 #include <span>
 
 #include "src/base/vec3.h"
@@ -20,6 +21,8 @@ class ColorField {
   virtual ~ColorField() = default;
 
   [[nodiscard]] virtual const SceneFrame& frame() const = 0;
+  /// Points worth asking for at once, by one of many threads.
+  [[nodiscard]] virtual std::size_t points_at_a_time() const { return std::size_t(1) << 12; }
   /// False where the occupancy grid knows the cell that holds `position` to be empty.
   [[nodiscard]] virtual bool may_be_occupied(Vec3f position) const = 0;
   /// sigma: density, 1/unit-space length, >= 0. Not masked by occupancy.

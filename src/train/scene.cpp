@@ -93,6 +93,7 @@ class TrainedScene final : public Scene {
     const OccupancyGrid& grid = luminance_.engine->occupancy();
     return grid.occupied(grid.cascade_of(position), position);
   }
+  [[nodiscard]] std::size_t points_at_a_time() const override { return luminance_.engine->points_at_a_time(); }
   void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override {
     luminance_.engine->query_density(positions, sigma);
   }

@@ -63,35 +63,74 @@ Ring ring() {
   return r;
 }
 
+/// Who sees points of the ring's lattice, filled with `sigma`.
+ViewSelection onlookers(const Ring& r, const BrickGrid<float>& sigma, int views) {
+  BakeOptions options;
+  options.views_per_voxel = views;
+  return {r.cameras, {{&sigma, r.plan.origin, r.plan.voxel_size}}, options};
+}
+
 TEST(ViewSelection, TriesOppositeCamerasEarly) {
-  const Ring r = ring();
-  const ViewSelection views(r.cameras, r.plan, {});
-  const std::vector<int> order = views.try_order({32, 32, 32});
+  const std::vector<std::int32_t> order = try_order(eyes_of(ring().cameras), {32, 32, 32});
   ASSERT_EQ(order.size(), 8u);
   EXPECT_EQ((order[1] - order[0] + 8) % 8, 4);
   EXPECT_EQ((order[2] - order[0] + 8) % 4, 2) << "then at right angles";
 }
 
 TEST(ViewSelection, FindsTheCamerasOnTheRightSideOfAWall) {
-  const Ring r = ring();
-  BakeOptions options;
-  options.views_per_voxel = 16;
-  const ViewSelection views(r.cameras, r.plan, options);
+  const BrickGrid<float> sigma = wall(8, 50);
+  const ViewSelection views = onlookers(ring(), sigma, 16);
   const Vec3d at{32.5, 32.5, 32.5};  // the wall's face towards -x: camera 4 and its neighbours
-  const std::vector<SeenBy> seen = views.seen_by(wall(8, 50), at, views.try_order(at));
+  const std::vector<SeenBy> seen = views.seen_by(0, at, try_order(views.eyes(), at));
   ASSERT_EQ(seen.size(), 3u);
   for (const SeenBy& view : seen) EXPECT_TRUE(view.camera >= 3 && view.camera <= 5) << view.camera;
 }
 
 TEST(ViewSelection, KeepsToTheLimitAndToThePicture) {
-  const Ring r = ring();
-  BakeOptions options;
-  options.views_per_voxel = 3;
-  const ViewSelection views(r.cameras, r.plan, options);
   const BrickGrid<float> nothing({0, 0, 0}, {64, 64, 64}, 0.0f);
-  EXPECT_EQ(views.seen_by(nothing, {32, 32, 32}, views.try_order({32, 32, 32})).size(), 3u);
+  const ViewSelection views = onlookers(ring(), nothing, 3);
+  EXPECT_EQ(views.seen_by(0, {32, 32, 32}, try_order(views.eyes(), {32, 32, 32})).size(), 3u);
   // Far above the ring: outside of every picture (field of view 28 degrees).
-  EXPECT_TRUE(views.seen_by(nothing, {32, 32, 300}, views.try_order({32, 32, 300})).empty());
+  EXPECT_TRUE(views.seen_by(0, {32, 32, 300}, try_order(views.eyes(), {32, 32, 300})).empty());
+}
+
+TEST(ViewSelection, KeepsTheBestOfMoreThanItWants) {
+  // Fog, so that cameras see the same point through more or less of it.
+  BrickGrid<float> fog({0, 0, 0}, {64, 64, 64}, 0.0f);
+  for (std::size_t b = 0; b < fog.brick_count(); ++b) fog.make_brick(b).fill(0.05f);
+  const Vec3d at{50.5, 20.5, 32.5};
+  const ViewSelection all = onlookers(ring(), fog, 8), best = onlookers(ring(), fog, 2);
+  const std::vector<SeenBy> of_all = all.seen_by(0, at, try_order(all.eyes(), at));
+  const std::vector<SeenBy> of_best = best.seen_by(0, at, try_order(best.eyes(), at));
+  ASSERT_EQ(of_all.size(), 8u);
+  ASSERT_EQ(of_best.size(), 2u);
+  for (std::size_t i = 1; i < of_all.size(); ++i) EXPECT_LE(of_all[i].transmittance, of_all[i - 1].transmittance);
+  EXPECT_GT(of_all.front().transmittance, 2 * of_all.back().transmittance) << "the fog is no test";
+  EXPECT_EQ(of_best[1].camera, of_all[1].camera) << "found after dimmer ones, and before them in the answer";
+  EXPECT_EQ(of_best[0].camera, of_all[0].camera);
+}
+
+TEST(ViewSelection, ManyPointsAreAnsweredLikeOneByOne) {
+  const BrickGrid<float> sigma = wall(4, 0.4f);
+  const ViewSelection views = onlookers(ring(), sigma, 3);
+  SightBatch batch;
+  for (int i = 0; i < 700; ++i) {
+    const Vec3d at{1.0 + i % 61, 1.0 + i % 53, 1.0 + i % 59};
+    batch.sights.push_back({at, i % 3 == 0 ? 0.6f : 0.0f, std::uint32_t(i % 2)});
+  }
+  for (const Vec3d centre : {Vec3d{10, 10, 10}, Vec3d{50, 50, 50}}) {
+    const auto order = try_order(views.eyes(), centre);
+    batch.orders.insert(batch.orders.end(), order.begin(), order.end());
+  }
+  SeenBatch answer;
+  views.find(0, batch, answer);
+  for (std::size_t i = 0; i < batch.sights.size(); ++i) {
+    const Sight& sight = batch.sights[i];
+    const auto order = std::span(batch.orders).subspan(8 * sight.order, 8);
+    const std::vector<SeenBy> seen = views.seen_by(0, sight.world, order, sight.least);
+    ASSERT_EQ(answer.counts[i], int(seen.size()));
+    for (std::size_t s = 0; s < seen.size(); ++s) EXPECT_EQ(answer.seen[3 * i + s].camera, seen[s].camera);
+  }
 }
 
 }  // namespace

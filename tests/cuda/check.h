@@ -39,6 +39,8 @@ class Arguments {
 int self_test(const Arguments& arguments);
 /// Its part about stage 2.
 void check_chroma(bool quick);
+/// Its part about bakes.
+void check_sights();
 /// Times the kernels on a packed capture after some training.
 int bench(const Arguments& arguments);
 /// Times stage 2 on a packed capture: caching its views, steps of both engines on either device, colours of pixels.

@@ -326,6 +326,7 @@ int self_test(const Arguments& arguments) {
     check_engine({"cascades, lens, mask", 12, 14, 128, 3, 0, false, true});
     check_engine({"patches", 16, 13, 128, 2, 8, false, false});
   }
+  check_sights();
   check_errors();
   std::printf("%d failures\n", failures());
   return failures();

@@ -573,6 +573,10 @@ void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& 
   }
 }
 
+std::size_t LuminanceEngineCuda::points_at_a_time() const {
+  return kPointsAtATime;
+}
+
 void LuminanceEngineCuda::query_density(std::span<const Vec3f> positions, std::span<float> sigma) const {
   CNERF_CHECK_EQ(positions.size(), sigma.size());
   const std::lock_guard lock(mutex_);

@@ -43,6 +43,7 @@ class LuminanceEngineCuda final : public LuminanceEngine {
               std::span<RayResult> results) const override;
   void trace(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
              std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const override;
+  [[nodiscard]] std::size_t points_at_a_time() const override;
   void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override;
   void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
                        std::span<float> luminance) const override;
