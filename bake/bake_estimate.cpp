@@ -8,6 +8,7 @@
 #include "bake/density_pass.h"
 #include "src/base/byte_count.h"
 #include "src/base/error.h"
+#include "src/base/parallel.h"
 
 namespace cnerf {
 namespace {
@@ -52,7 +53,7 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
   constexpr double kBrickBytes = kBrickVoxels * sizeof(float);     // of the density that light passes through
   constexpr double kLeafBytes = 3 * kBrickVoxels * sizeof(float);  // of the largest grid of a file, that of colours
   constexpr double kRim = 1.5;                                     // leaves that only hold dilated colours
-  constexpr double kPlanes = 4;                                    // held while a file is written
+  constexpr double kPlanes = 4;                                    // held by a thread while a file is written
   double density = 0, writing = 0;
   BakeEstimate estimate;
   for (const BakePlan& plan : plans) {
@@ -60,8 +61,9 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
     density +=
         contents.bricks * kBrickBytes + static_cast<double>(plan.lattice_voxels() / kBrickVoxels * sizeof(void*));
     density += contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel));
-    writing = std::max(
-        writing, contents.bricks * kRim * kLeafBytes + kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel));
+    const double threads = std::clamp(plane_count(plan) / kPlanes, 1.0, static_cast<double>(thread_count()));
+    writing = std::max(writing, contents.bricks * kRim * kLeafBytes +
+                                    threads * kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel));
     estimate.voxels += static_cast<std::size_t>(contents.voxels);
   }
   estimate.memory_bytes = static_cast<std::size_t>(std::max(density, writing));

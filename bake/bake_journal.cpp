@@ -64,10 +64,16 @@ struct BakeJournal::File {
     end = parts.back().begin + static_cast<long>(bytes.size());
   }
 
+  /// At a place of its own, so that several threads may read.
   [[nodiscard]] bool read(const Place& place, std::vector<std::byte>& bytes) const {
     bytes.resize(place.bytes);
-    return std::fseek(stream, place.begin, SEEK_SET) == 0 &&
-           std::fread(bytes.data(), 1, bytes.size(), stream) == bytes.size();
+    for (std::size_t done = 0; done < bytes.size();) {
+      const ::ssize_t got =
+          ::pread(::fileno(stream), bytes.data() + done, bytes.size() - done, place.begin + static_cast<::off_t>(done));
+      if (got <= 0) return false;
+      done += static_cast<std::size_t>(got);
+    }
+    return true;
   }
 
   /// The part that begins at `end`, if it is whole.

@@ -17,7 +17,8 @@
 namespace cnerf {
 
 /// A list of byte strings in a file that only grows. A process may be killed at any time: what is cut off or damaged is
-/// dropped when the file is opened again, and everything before it is still there. Not for several threads.
+/// dropped when the file is opened again, and everything before it is still there. Several threads may read finished
+/// parts while none is made.
 class BakeJournal {
  public:
   /// In a file without a name, gone with the object.  @throws OutputError.

@@ -6,9 +6,12 @@
 
 #include "bake/brick_grid.h"
 #include "src/base/check.h"
+#include "src/base/parallel.h"
 
 namespace cnerf {
 namespace {
+
+constexpr int kPlanesOfPart = 4;  ///< at least: neighbours are read by both of two parts
 
 /// Grows with every voxel it is told of.
 class GrowingBox {
@@ -18,6 +21,12 @@ class GrowingBox {
     for (int axis = 0; axis < 3; ++axis) {
       low_[axis] = std::min(low_[axis], at[axis]);
       high_[axis] = std::max(high_[axis], at[axis]);
+    }
+  }
+  void add(const GrowingBox& other) {
+    for (int axis = 0; axis < 3; ++axis) {
+      low_[axis] = std::min(low_[axis], other.low_[axis]);
+      high_[axis] = std::max(high_[axis], other.high_[axis]);
     }
   }
   [[nodiscard]] VoxelBox box() const {
@@ -65,6 +74,22 @@ VolumePlanes planes_of(const BakedVolume& volume) {
   return planes;
 }
 
+std::size_t part_count(const VolumePlanes& volume) {
+  const int planes = volume.end - volume.begin;
+  return static_cast<std::size_t>(std::clamp(planes / kPlanesOfPart, std::min(planes, 1), thread_count()));
+}
+
+void visit_parts(const VolumePlanes& volume,
+                 const std::function<void(std::size_t, const std::vector<BakedVoxel>&)>& visit) {
+  const auto parts = static_cast<int>(part_count(volume)), planes = volume.end - volume.begin;
+  parallel_tasks(static_cast<std::size_t>(parts), [&](std::size_t part) {
+    const VolumePlanes own = volume;
+    const auto number = static_cast<int>(part);
+    const int begin = volume.begin + planes * number / parts, end = volume.begin + planes * (number + 1) / parts;
+    for (int plane = begin; plane < end; ++plane) visit(part, own.read(plane));
+  });
+}
+
 BakedVolume whole_volume(const VolumePlanes& volume) {
   BakedVolume whole{volume, {}};
   for (int plane = volume.begin; plane < volume.end; ++plane) {
@@ -81,22 +106,34 @@ VoxelBox bounding_box(const std::vector<BakedVoxel>& voxels) {
 }
 
 VolumeStatistics statistics_of(const VolumePlanes& volume) {
-  VolumeStatistics statistics;
-  GrowingBox all, dense;
-  for (int plane = volume.begin; plane < volume.end; ++plane) {
-    for (const BakedVoxel& voxel : volume.read(plane)) {
+  struct Part {
+    GrowingBox all, dense;
+    VolumeStatistics numbers;
+  };
+  std::vector<Part> parts(part_count(volume));
+  visit_parts(volume, [&](std::size_t part, const std::vector<BakedVoxel>& voxels) {
+    auto& [all, dense, numbers] = parts[part];
+    for (const BakedVoxel& voxel : voxels) {
       check_voxel(voxel);
       all.add(voxel);
       if (!(voxel.sigma > 0)) continue;
       dense.add(voxel);
-      ++statistics.voxels;
-      statistics.min_sigma = std::min(statistics.min_sigma, voxel.sigma);
-      statistics.max_sigma = std::max(statistics.max_sigma, voxel.sigma);
+      ++numbers.voxels;
+      numbers.min_sigma = std::min(numbers.min_sigma, voxel.sigma);
+      numbers.max_sigma = std::max(numbers.max_sigma, voxel.sigma);
     }
+  });
+  Part sum;
+  for (const auto& [all, dense, numbers] : parts) {
+    sum.all.add(all);
+    sum.dense.add(dense);
+    sum.numbers.voxels += numbers.voxels;
+    sum.numbers.min_sigma = std::min(sum.numbers.min_sigma, numbers.min_sigma);
+    sum.numbers.max_sigma = std::max(sum.numbers.max_sigma, numbers.max_sigma);
   }
-  statistics.all = all.box();
-  statistics.dense = dense.box();
-  return statistics;
+  sum.numbers.all = sum.all.box();
+  sum.numbers.dense = sum.dense.box();
+  return sum.numbers;
 }
 
 }  // namespace cnerf

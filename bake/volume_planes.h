@@ -12,13 +12,19 @@ namespace cnerf {
 /// A baked volume in planes of bricks: plane p holds the voxels with 8 p <= i < 8 p + 8.
 struct VolumePlanes : VolumeHeader {
   int begin = 0, end = 0;  ///< planes that may hold voxels
-  /// Voxels of any plane, sorted by (i, j, k), no duplicates; none outside [begin, end). Not for several threads;
-  /// cheapest from `begin` upwards.
+  /// Voxels of any plane, sorted by (i, j, k), no duplicates; none outside [begin, end). Not for several threads, each
+  /// of which takes a copy of this struct; cheapest from `begin` upwards.
   std::function<std::vector<BakedVoxel>(int plane)> read;
 };
 
 /// A volume in memory, which must outlive the result.  @throws ContractError  when its voxels are not sorted.
 [[nodiscard]] VolumePlanes planes_of(const BakedVolume& volume);
+
+/// Several threads go through a volume in parts of consecutive planes. How many there are depends on the threads.
+[[nodiscard]] std::size_t part_count(const VolumePlanes& volume);
+/// Calls `visit(part, voxels)` for every plane; for those of a part in order, for parts side by side.
+void visit_parts(const VolumePlanes& volume,
+                 const std::function<void(std::size_t part, const std::vector<BakedVoxel>& voxels)>& visit);
 
 /// All planes, in memory.
 [[nodiscard]] BakedVolume whole_volume(const VolumePlanes& volume);

@@ -76,18 +76,20 @@ typename Grid::Ptr make_grid(const std::string& name, const Content& content, co
   grid->setName(name);
   grid->setCreator("cnerf " CNERF_VERSION);
   grid->setGridClass(openvdb::GRID_FOG_VOLUME);
-  auto accessor = grid->getAccessor();
-  const VolumePlanes& volume = content.volume;
-  for (int plane = volume.begin; plane < volume.end; ++plane) {
-    for (const BakedVoxel& voxel : volume.read(plane)) {
-      accessor.setValueOn({voxel.i, voxel.j, voxel.k}, value_of(voxel));
-    }
+  // Parts end where leaves do, so that trees of parts have no leaf in common.
+  std::vector<typename Grid::TreeType::Ptr> trees;
+  for (std::size_t part = 0; part < part_count(content.volume); ++part) {
+    trees.push_back(std::make_shared<typename Grid::TreeType>(grid->background()));
   }
+  visit_parts(content.volume, [&](std::size_t part, const std::vector<BakedVoxel>& voxels) {
+    openvdb::tree::ValueAccessor<typename Grid::TreeType> accessor(*trees[part]);
+    for (const BakedVoxel& voxel : voxels) accessor.setValueOn({voxel.i, voxel.j, voxel.k}, value_of(voxel));
+  });
+  for (const auto& tree : trees) grid->tree().merge(*tree, openvdb::MERGE_ACTIVE_STATES);
   const Vec3i low = content.box.min, high = low + content.box.size - Vec3i{1, 1, 1};
   for (const Vec3i corner : {low, high}) {
-    accessor.setValueOn({corner.x, corner.y, corner.z}, value_of(BakedVoxel{}));
+    grid->tree().setValueOn({corner.x, corner.y, corner.z}, value_of(BakedVoxel{}));
   }
-  accessor.clear();
   openvdb::tools::prune(grid->tree());  // full leaves of one value, as the insides of a grey bake's colours
   return grid;
 }

@@ -49,7 +49,7 @@ void measure_luminance(const EvaluatedView& pictures, ViewMetrics& metrics) {
   metrics.ssim = ssim(encoded(pictures.ours.luminance), encoded(truth), image.width, image.height, image.mask);
 }
 
-void measure_colour(const EvaluatedView& pictures, const Lpips* lpips, ViewMetrics& metrics) {
+void measure_colour(const EvaluatedView& pictures, ViewMetrics& metrics) {
   const std::vector<std::uint8_t>& valid = pictures.view.image.mask;
   const std::vector<float>& ours = pictures.ours.rgb;
   const Colourfulness colourful = colourfulness(srgb8_from_linear(ours), valid);
@@ -65,12 +65,15 @@ void measure_colour(const EvaluatedView& pictures, const Lpips* lpips, ViewMetri
   metrics.colourfulness_magnitude_difference = colourful.magnitude - wanted.magnitude;
   metrics.psnr_rgb = psnr_from_mse(encoded_mse(ours, truth, 3, valid));
   metrics.ssim_rgb = ssim_of_channels(encoded(ours), encoded(truth), pictures.ours.width, pictures.ours.height, valid);
-  if (lpips != nullptr) {
-    metrics.lpips =
-        lpips->distance(srgb8_from_linear(ours), srgb8_from_linear(truth), pictures.ours.width, pictures.ours.height);
-  }
   metrics.ab_error = mean_ab_distance(ours, truth, valid);
   metrics.ab_error_grey = mean_ab_distance(truth, {}, valid);
+}
+
+/// Networks have one memory for what passes through them: not for several threads.
+void measure_by_network(const EvaluatedView& pictures, const Lpips& lpips, ViewMetrics& metrics) {
+  if (pictures.ours.rgb.empty() || !pictures.truth) return;
+  metrics.lpips = lpips.distance(srgb8_from_linear(pictures.ours.rgb), srgb8_from_linear(pictures.truth->rgb),
+                                 pictures.ours.width, pictures.ours.height);
 }
 
 /// A number without a pixel behind it is no number.
@@ -132,13 +135,13 @@ std::vector<const View*> views_to_evaluate(const Capture& capture, const Evaluat
   return some;
 }
 
-ViewMetrics measure(const EvaluatedView& pictures, const Lpips* lpips) {
+ViewMetrics measure(const EvaluatedView& pictures) {
   CNERF_CHECK_EQ(pictures.ours.width, pictures.view.image.width);
   CNERF_CHECK_EQ(pictures.ours.height, pictures.view.image.height);
   ViewMetrics metrics;
   metrics.view = pictures.view.name;
   measure_luminance(pictures, metrics);
-  if (!pictures.ours.rgb.empty()) measure_colour(pictures, lpips, metrics);
+  if (!pictures.ours.rgb.empty()) measure_colour(pictures, metrics);
   if (!pictures.ours.rgb.empty() && !pictures.ours.baked_rgb.empty()) {
     metrics.bake_ab_distance = mean_ab_distance(pictures.ours.baked_rgb, pictures.ours.rgb,
                                                 coloured_pixels(pictures.ours, pictures.view.image.mask));
@@ -171,11 +174,13 @@ Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptio
     std::vector<ViewMetrics> measured(count);
     parallel_tasks(count, [&](std::size_t i) {
       truth[i] = load_color_truth(*views[begin + i]);
-      measured[i] = measure({*views[begin + i], ours[i], truth[i]}, options.lpips);
+      measured[i] = measure({*views[begin + i], ours[i], truth[i]});
     });
     for (std::size_t i = 0; i < count; ++i) {
+      const EvaluatedView pictures{*views[begin + i], ours[i], truth[i]};
+      if (options.lpips != nullptr) measure_by_network(pictures, *options.lpips, measured[i]);
       metrics.views.push_back(measured[i]);
-      if (watch) watch({*views[begin + i], ours[i], truth[i]});
+      if (watch) watch(pictures);
       if (progress) {
         progress({"evaluate",
                   double(metrics.views.size()) / double(views.size()),

@@ -83,8 +83,8 @@ struct EvaluateOptions {
                                const std::function<void(const EvaluatedView&)>& watch = {},
                                const ProgressSink& progress = {});
 
-/// Measures one pair of pictures; `evaluate` is this over all views.
-[[nodiscard]] ViewMetrics measure(const EvaluatedView& pictures, const Lpips* lpips = nullptr);
+/// Measures one pair of pictures; `evaluate` is this over all views, and LPIPS. Thread-safe.
+[[nodiscard]] ViewMetrics measure(const EvaluatedView& pictures);
 
 /// The mean over the views that have a number, for each number.
 [[nodiscard]] ViewMetrics mean_of(const std::vector<ViewMetrics>& views);

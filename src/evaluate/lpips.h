@@ -11,7 +11,7 @@
 namespace cnerf {
 
 /// Sum over layers of the spatial mean of weighted squared differences of channel-normalised features. AlexNet (what
-/// papers report) or SqueezeNet 1.1, whichever the weights are of.
+/// papers report) or SqueezeNet 1.1, whichever the weights are of. Not for several threads.
 class Lpips {
  public:
   /// @param weights  float32 tensors, little-endian; beside it a text with a line `name shape offset` a tensor, offsets

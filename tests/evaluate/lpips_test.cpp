@@ -7,6 +7,9 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/evaluate/contact_sheet.h"
+#include "src/evaluate/evaluate.h"
+#include "tests/evaluate/painted_scene.h"
 #include "tests/support/data.h"
 
 namespace cnerf::test {
@@ -22,6 +25,18 @@ Rgb8 read_rgb(const fs::path& file) {
   cv::Mat image;
   cv::cvtColor(cv::imread(file.string()), image, cv::COLOR_BGR2RGB);
   return {image.cols, image.rows, {image.data, image.data + image.total() * 3}};
+}
+
+constexpr int kSide = 48;
+
+/// Stripes of colours, other ones for each number.
+Picture stripes(int number) {
+  Picture picture{kSide, kSide, {}};
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const bool is_light = i % kSide / (2 + number) % 2 == 0;
+    picture.rgb.insert(picture.rgb.end(), {std::uint8_t(is_light ? 200 : 30), std::uint8_t(10 * number), 90});
+  }
+  return picture;
 }
 
 double distance(const Lpips& lpips, const Rgb8& a, const Rgb8& b) {
@@ -56,6 +71,35 @@ TEST(Lpips, IsZeroForEqualPicturesAndSymmetric) {
   const Rgb8 a = read_rgb(data / "ex_ref.png"), b = read_rgb(data / "ex_p0.png");
   EXPECT_EQ(distance(lpips, a, a), 0.0);
   EXPECT_NEAR(distance(lpips, a, b), distance(lpips, b, a), 1e-6);
+}
+
+TEST(Lpips, OfViewsMeasuredSideBySideIsThatOfEachAlone) {
+  CNERF_REQUIRE_DATA(data, "lpips");
+  const Lpips lpips(data / "lpips_alex_f32.bin");
+  const TempDir folder;
+  Capture capture;
+  for (int i = 0; i < 12; ++i) {
+    View view;
+    view.name = "view" + std::to_string(i);
+    view.image_file = folder / (view.name + ".png");
+    view.intrinsics.width = view.image.width = kSide;
+    view.intrinsics.height = view.image.height = kSide;
+    view.image.u8.assign(kSide * kSide, 90);
+    view.held_out = true;
+    write_png(view.image_file, stripes(i));
+    capture.views.push_back(view);
+  }
+  EvaluateOptions options;
+  options.lpips = &lpips;
+  const PaintedScene scene(0.2f, true);
+  const Metrics together = evaluate(scene, capture, options);
+  ASSERT_EQ(together.views.size(), 12u);
+  for (int i = 0; i < 12; ++i) {
+    Capture alone = capture;
+    alone.views = {capture.views[std::size_t(i)]};
+    EXPECT_EQ(together.views[std::size_t(i)].lpips, evaluate(scene, alone, options).views[0].lpips) << i;
+    EXPECT_TRUE(i == 0 || together.views[std::size_t(i)].lpips != together.views[0].lpips) << "all are the same";
+  }
 }
 
 TEST(Lpips, RefusesWeightsThatAreNone) {
