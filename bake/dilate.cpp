@@ -129,26 +129,29 @@ std::vector<Vec3i> offsets_by_distance(int radius) {
   return offsets;
 }
 
-/// Which voxels of a brick have density within `radius`: a box dilation, one axis after the other.
+/// Which voxels of a brick have density within `radius`: a box dilation, one axis after the other. Rows along z are
+/// bits.
 class NearDensity {
  public:
   NearDensity(const PlaneWindow& window, Vec3i brick_min, int radius)
-      : radius_(radius), side_(kBrickSide + 2 * radius), near_(static_cast<std::size_t>(side_) * side_ * side_) {
+      : radius_(radius), side_(kBrickSide + 2 * radius), rows_(static_cast<std::size_t>(side_) * side_) {
     for (int neighbour = 0; neighbour < 27; ++neighbour) {
       const Vec3i step{neighbour / 9 - 1, neighbour / 3 % 3 - 1, neighbour % 3 - 1};
       const std::int32_t* brick = window.brick_at(brick_min + step * kBrickSide);
       if (brick != nullptr) look_into(brick, step * kBrickSide);
     }
-    for (int axis = 0; axis < 3; ++axis) dilate(axis);
+    for (std::uint32_t& row : rows_) row = along_row(row);
+    spread_rows(1, side_);
+    spread_rows(side_, 1);
   }
-  [[nodiscard]] bool operator()(Vec3i local) const { return near_[index(local + Vec3i{radius_, radius_, radius_})]; }
+  [[nodiscard]] bool operator()(Vec3i local) const {
+    return (row(local.x + radius_, local.y + radius_) >> (local.z + radius_) & 1) != 0;
+  }
 
  private:
-  [[nodiscard]] std::size_t index(Vec3i p) const { return (static_cast<std::size_t>(p.x) * side_ + p.y) * side_ + p.z; }
-  [[nodiscard]] Vec3i position(std::size_t i) const {
-    const auto n = static_cast<int>(i);
-    return {n / (side_ * side_), n / side_ % side_, n % side_};
-  }
+  static_assert(kBrickSide + 2 * kBrickSide <= 32, "the widest row");
+
+  [[nodiscard]] const std::uint32_t& row(int x, int y) const { return rows_[static_cast<std::size_t>(x) * side_ + y]; }
   /// @param low  first voxel of the brick, from the first of the one in the middle
   void look_into(const std::int32_t* brick, Vec3i low) {
     Vec3i from, to;  // of the brick's voxels, those within `radius_` of the middle
@@ -156,25 +159,37 @@ class NearDensity {
       from[axis] = std::max(0, -radius_ - low[axis]);
       to[axis] = std::min(kBrickSide, kBrickSide + radius_ - low[axis]);
     }
-    const Vec3i shift = low + Vec3i{radius_, radius_, radius_};
-    for (int x = from.x; x < to.x; ++x)
-      for (int y = from.y; y < to.y; ++y)
-        for (int z = from.z; z < to.z; ++z) near_[index(Vec3i{x, y, z} + shift)] = brick[brick_offset({x, y, z})] >= 0;
+    for (int x = from.x; x < to.x; ++x) {
+      for (int y = from.y; y < to.y; ++y) {
+        std::uint32_t bits = 0;
+        for (int z = from.z; z < to.z; ++z) {
+          bits |= static_cast<std::uint32_t>(brick[brick_offset({x, y, z})] >= 0) << (z + low.z + radius_);
+        }
+        rows_[static_cast<std::size_t>(x + low.x + radius_) * side_ + (y + low.y + radius_)] |= bits;
+      }
+    }
   }
-  void dilate(int axis) {
-    const std::vector<char> before = near_;
-    for (std::size_t i = 0; i < near_.size(); ++i) {
-      Vec3i p = position(i);
-      const int centre = p[axis];
-      for (int at = std::max(0, centre - radius_); at <= std::min(side_ - 1, centre + radius_); ++at) {
-        p[axis] = at;
-        near_[i] |= before[index(p)];
+  [[nodiscard]] std::uint32_t along_row(std::uint32_t row) const {
+    std::uint32_t wide = row;
+    for (int step = 1; step <= radius_; ++step) wide |= row << step | row >> step;
+    return wide;
+  }
+  /// ORs rows that are up to `radius_` apart along one axis; `stride` apart in memory, as lines of the other axis are
+  /// `line`.
+  void spread_rows(int stride, int line) {
+    const std::vector<std::uint32_t> before = rows_;
+    for (int l = 0; l < side_; ++l) {
+      for (int at = 0; at < side_; ++at) {
+        std::uint32_t& row = rows_[static_cast<std::size_t>(l) * line + static_cast<std::size_t>(at) * stride];
+        for (int other = std::max(0, at - radius_); other <= std::min(side_ - 1, at + radius_); ++other) {
+          row |= before[static_cast<std::size_t>(l) * line + static_cast<std::size_t>(other) * stride];
+        }
       }
     }
   }
 
   int radius_, side_;
-  std::vector<char> near_;
+  std::vector<std::uint32_t> rows_;  ///< [x][y], from `radius_` voxels before the brick on
 };
 
 std::vector<BakedVoxel> missing_voxels(const PlaneWindow& window, Vec3i brick_min, int radius,
