@@ -3,7 +3,8 @@
 #   bash scripts/compare.sh REPORT [simulated|builtin] [further options of `cnerf compare`]
 # Captures and LPIPS weights are looked for in $CNERF_DATA (else ../shared/data), the program in $CNERF (else the
 # release build). Trains on a GPU where there is one. Parts run side by side, each on a capture and a seed; what is
-# finished stays, so that the same command goes on after a stop.
+# finished stays, so that the same command goes on after a stop. SEEDS=n for other than three, TIMES=no to leave out the
+# table of training times.
 set -euo pipefail
 
 report=$1
@@ -40,7 +41,7 @@ join() {
 }
 
 # Training times are taken while little else runs: two methods, one seed.
-if [ "$colorizer" = simulated ]; then
+if [ "$colorizer" = simulated ] && [ "${TIMES:-yes}" = yes ]; then
   for capture in "${captures[@]}"; do
     name=$(basename "${capture%@*}")
     part "times-$name" "$capture" --methods colornerf,positional-encoding "$@"

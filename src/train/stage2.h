@@ -29,12 +29,12 @@ struct Stage2Options {
   int working_resolution = 384;      ///< short side, pixels, at which samples are cached
   double cached_weight = 0.99;       ///< share of a pixel's weight the cached samples carry
   double rebalancing = 0;            ///< lambda mixing of class rebalancing; 0 = off
-  double spread_weight = 1;          ///< of the spread of a pixel's features in the loss (src/engine/chroma_math.h)
-  double decode_temperature = 0.2;   ///< annealed-mean temperature; 0 = arg-max
+  double spread_weight = 0.1;        ///< of the spread of a pixel's features in the loss (src/engine/chroma_math.h)
+  double decode_temperature = 0.3;   ///< annealed-mean temperature; 0 = arg-max
   int distill_steps = 1000;          ///< steps of the fit of per-sample colour for baking
   int colorizer_batch = 4;           ///< patches a colorizer query
   int seed = 1;
-  HashGridOptions grid = {.decay = 1};
+  HashGridOptions grid = {.decay = 0.1};
   PurifyOptions purify;
 
   template <typename Visitor>
