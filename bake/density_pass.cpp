@@ -9,34 +9,60 @@
 namespace cnerf {
 namespace {
 
-/// Rounding may carry a point of the box's face just outside the field's domain.
-Vec3f clamped_to_unit(Vec3f p) {
-  for (int axis = 0; axis < 3; ++axis) p[axis] = std::clamp(p[axis], 0.0f, 1.0f);
-  return p;
+/// Where the sub-samples of a voxel lie in it, 0..1, in order.
+std::vector<Vec3d> places_in_voxel(int subsamples) {
+  std::vector<Vec3d> places;
+  for (int s = 0; s < subsamples * subsamples * subsamples; ++s) {
+    const Vec3i sub{s / (subsamples * subsamples), s / subsamples % subsamples, s % subsamples};
+    places.push_back((sub.cast<double>() + Vec3d{0.5, 0.5, 0.5}) / static_cast<double>(subsamples));
+  }
+  return places;
 }
 
-/// Sub-samples of a brick that may hold matter, and the voxel each belongs to.
+/// Sub-samples of a brick that may hold matter.
 struct BrickSamples {
-  std::vector<Vec3f> positions;  ///< unit space
-  std::vector<Vec3f> insides;    ///< 0..1 in the voxel
-  std::vector<std::int16_t> offsets;
+  std::vector<Vec3f> positions;        ///< unit space
+  std::vector<std::int16_t> offsets;   ///< of the voxel each belongs to
+  std::vector<std::int16_t> in_voxel;  ///< which of the voxel's sub-samples each is
 };
 
+/// The sub-samples of a brick along one axis: coordinates of world and unit space go by axis.
+struct AxisSamples {
+  std::vector<float> unit;      ///< [kBrickSide * subsamples]
+  std::vector<char> is_inside;  ///< of the plan's box
+};
+
+AxisSamples axis_samples(const SceneFrame& frame, const BakePlan& plan, int subsamples, Vec3i brick_min, int axis) {
+  AxisSamples samples;
+  for (int i = 0; i < kBrickSide * subsamples; ++i) {
+    Vec3d voxel;
+    voxel[axis] = brick_min[axis] + i / subsamples + (i % subsamples + 0.5) / subsamples;
+    const Vec3d world = plan.world_from_voxel(voxel);
+    samples.is_inside.push_back(world[axis] >= plan.box.min[axis] && world[axis] <= plan.box.max[axis]);
+    // Rounding may carry a point of the box's face just outside the field's domain.
+    samples.unit.push_back(std::clamp(static_cast<float>(frame.unit_from_world(world)[axis]), 0.0f, 1.0f));
+  }
+  return samples;
+}
+
 BrickSamples gather_samples(const ColorField& field, const BakePlan& plan, int subsamples, Vec3i brick_min) {
+  const SceneFrame& frame = field.frame();
+  const AxisSamples x = axis_samples(frame, plan, subsamples, brick_min, 0);
+  const AxisSamples y = axis_samples(frame, plan, subsamples, brick_min, 1);
+  const AxisSamples z = axis_samples(frame, plan, subsamples, brick_min, 2);
   BrickSamples samples;
   for (int offset = 0; offset < kBrickVoxels; ++offset) {
-    const Vec3i voxel = brick_min + brick_local(offset);
-    if (plan.in_hole(voxel)) continue;
+    const Vec3i local = brick_local(offset);
+    if (plan.in_hole(brick_min + local)) continue;
+    const Vec3i first = local * subsamples;
     for (int s = 0; s < subsamples * subsamples * subsamples; ++s) {
-      const Vec3i sub{s / (subsamples * subsamples), s / subsamples % subsamples, s % subsamples};
-      const Vec3d inside = (sub.cast<double>() + Vec3d{0.5, 0.5, 0.5}) / static_cast<double>(subsamples);
-      const Vec3d world = plan.world_from_voxel(voxel.cast<double>() + inside);
-      if (!plan.box.contains(world)) continue;
-      const Vec3f unit = clamped_to_unit(field.frame().unit_from_world(world).cast<float>());
+      const Vec3i at = first + Vec3i{s / (subsamples * subsamples), s / subsamples % subsamples, s % subsamples};
+      if (!x.is_inside[at.x] || !y.is_inside[at.y] || !z.is_inside[at.z]) continue;
+      const Vec3f unit{x.unit[at.x], y.unit[at.y], z.unit[at.z]};
       if (!field.may_be_occupied(unit)) continue;
       samples.positions.push_back(unit);
-      samples.insides.push_back(inside.cast<float>());
       samples.offsets.push_back(static_cast<std::int16_t>(offset));
+      samples.in_voxel.push_back(static_cast<std::int16_t>(s));
     }
   }
   return samples;
@@ -60,13 +86,14 @@ std::uint8_t in_256ths(double share) {
 /// @param sigma  what the field answers, 1/unit length
 std::vector<DenseVoxel> voxels_of(const BrickSamples& samples, std::span<const float> sigma, const SceneFrame& frame,
                                   double h, const BakeOptions& options, std::uint32_t brick) {
+  const std::vector<Vec3d> places = places_in_voxel(options.subsamples);
   std::vector<Accumulated> sums(kBrickVoxels);
   for (std::size_t s = 0; s < sigma.size(); ++s) {
     check_density(sigma[s]);
     const double alpha = -std::expm1(-sigma[s] * frame.unit_per_world * h);
     Accumulated& sum = sums[samples.offsets[s]];
     sum.alpha += alpha;
-    sum.alpha_inside += samples.insides[s].cast<double>() * alpha;
+    sum.alpha_inside += places[samples.in_voxel[s]] * alpha;
   }
 
   std::vector<DenseVoxel> kept;
