@@ -6,6 +6,8 @@
 #include "bake/baked_volume.h"
 #include "bake/brick_grid.h"
 #include "bake/density_pass.h"
+#include "bake/radiance_pass.h"
+#include "bake/volume_planes.h"
 #include "src/base/byte_count.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
@@ -53,19 +55,26 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
   constexpr double kBrickBytes = kBrickVoxels * sizeof(float);     // of the density that light passes through
   constexpr double kLeafBytes = 3 * kBrickVoxels * sizeof(float);  // of the largest grid of a file, that of colours
   constexpr double kRim = 1.5;                                     // leaves that only hold dilated colours
-  constexpr double kPlanes = 4;                                    // held by a thread while a file is written
+  constexpr double kPlanes = 7;                                    // held by a thread while a file is written
+  constexpr double kSampleBytes = 40;                              // of a density sample on its way
+  constexpr double kSightBytes = 200, kSeenBytes = 68;  // of a voxel in a question who sees it, and of a view
   double density = 0, writing = 0;
   BakeEstimate estimate;
   for (const BakePlan& plan : plans) {
     const Contents contents = probe(field, plan, coarse);
     density +=
         contents.bricks * kBrickBytes + static_cast<double>(plan.lattice_voxels() / kBrickVoxels * sizeof(void*));
-    density += contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel));
-    const double threads = std::clamp(plane_count(plan) / kPlanes, 1.0, static_cast<double>(thread_count()));
+    const double asked =
+        std::min(contents.in_fullest_plane,
+                 static_cast<double>(RadiancePass::kViewsAtATime) / options.views_per_voxel + kBrickVoxels);
+    density += contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel)) +
+               asked * (kSightBytes + kSeenBytes * options.views_per_voxel);
+    const auto parts = static_cast<double>(part_count(plane_count(plan)));
     writing = std::max(writing, contents.bricks * kRim * kLeafBytes +
-                                    threads * kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel));
+                                    parts * kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel));
     estimate.voxels += static_cast<std::size_t>(contents.voxels);
   }
+  density += thread_count() * static_cast<double>(field.points_at_a_time()) * kSampleBytes;
   estimate.memory_bytes = static_cast<std::size_t>(std::max(density, writing));
   estimate.disk_bytes = estimate.voxels * (sizeof(DenseVoxel) + sizeof(BakedVoxel));
   estimate.file_bytes = static_cast<std::size_t>(static_cast<double>(estimate.voxels) * kBytesInHalf);

@@ -70,6 +70,7 @@ struct BakeJournal::File {
     for (std::size_t done = 0; done < bytes.size();) {
       const ::ssize_t got =
           ::pread(::fileno(stream), bytes.data() + done, bytes.size() - done, place.begin + static_cast<::off_t>(done));
+      if (got < 0 && errno == EINTR) continue;
       if (got <= 0) return false;
       done += static_cast<std::size_t>(got);
     }

@@ -21,17 +21,17 @@ constexpr int kCells = 32;             ///< along each axis, to look for its pla
 constexpr double kHalfOpaque = 0.693147;
 
 /// What a pixel looks at, and how large voxels may be there.
-struct Sight {
+struct Look {
   Vec3d world;
   double voxel_size;
 };
 
-std::vector<Sight> sights_of(const BakeCamera& camera, const BakePlan& plan, const BrickGrid<float>& sigma) {
+std::vector<Look> sights_of(const BakeCamera& camera, const BakePlan& plan, const BrickGrid<float>& sigma) {
   const Intrinsics& lens = camera.intrinsics;
   const Vec3d eye = camera.world_from_camera.translation;
   const Vec3d origin = plan.voxel_from_world(eye);
   const Aabbd box{{0, 0, 0}, plan.resolution.cast<double>()};
-  std::vector<Sight> sights;
+  std::vector<Look> sights;
   for (int ray = 0; ray < kLookRays * kLookRays; ++ray) {
     const PixelPosition pixel{(ray % kLookRays + 0.5) * lens.width / kLookRays,
                               (ray / kLookRays + 0.5) * lens.height / kLookRays};
@@ -50,16 +50,16 @@ std::vector<Sight> sights_of(const BakeCamera& camera, const BakePlan& plan, con
 }
 
 /// Where the cameras' pixels end, in a density too coarse for anything else.
-std::vector<Sight> all_sights(const ColorField& field, const std::vector<BakeCamera>& cameras, BakeOptions options) {
+std::vector<Look> all_sights(const ColorField& field, const std::vector<BakeCamera>& cameras, BakeOptions options) {
   options.resolution = std::min(options.resolution, kLookResolution);
   options.voxel_size = 0;
   options.subsamples = 1;
   const BakePlan plan = plan_bake(field, options);
   const BrickGrid<float> sigma = bake_density(field, plan, options, [](double) {});
-  std::vector<std::vector<Sight>> of_cameras(cameras.size());
+  std::vector<std::vector<Look>> of_cameras(cameras.size());
   parallel_tasks(cameras.size(), [&](std::size_t c) { of_cameras[c] = sights_of(cameras[c], plan, sigma); });
-  std::vector<Sight> sights;
-  for (const std::vector<Sight>& some : of_cameras) sights.insert(sights.end(), some.begin(), some.end());
+  std::vector<Look> sights;
+  for (const std::vector<Look>& some : of_cameras) sights.insert(sights.end(), some.begin(), some.end());
   return sights;
 }
 
@@ -197,14 +197,14 @@ std::vector<BakePlan> plan_levels(const ColorField& field, const std::vector<Bak
   std::vector<BakePlan> plans{plan_bake(field, options)};
   const bool nested = options.grids == "nested" || (options.grids == "auto" && field.frame().cascades > 1);
   if (!nested || cameras.empty()) return plans;
-  std::vector<Sight> sights = all_sights(field, cameras, options);
+  std::vector<Look> sights = all_sights(field, cameras, options);
   const auto enough = static_cast<std::size_t>(kLeastShare * static_cast<double>(sights.size()));
   const Vec3i resolution = plans[0].resolution;
   const int inner = std::max({resolution.x, resolution.y, resolution.z}) - 2 * options.dilation;
   while (plans.size() < kMostLevels) {
     BakePlan& parent = plans.back();
     std::vector<Vec3d> wanting;
-    for (const Sight& sight : sights) {
+    for (const Look& sight : sights) {
       if (sight.voxel_size < parent.voxel_size && parent.box.contains(sight.world)) wanting.push_back(sight.world);
     }
     const double side = (inner - 2) * parent.voxel_size / 2;  // rounding outwards adds two voxels

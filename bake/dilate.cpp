@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <tuple>
 
@@ -240,14 +241,18 @@ std::vector<BakedVoxel> dilated_plane(const PlaneWindow& window, int radius, con
 void sort_voxels(std::vector<BakedVoxel>& voxels) {
   if (voxels.empty()) return;
   const VoxelBox box = bounding_box(voxels);
-  std::vector<std::vector<BakedVoxel>> slices(static_cast<std::size_t>(box.size.x));  // of one i
-  for (const BakedVoxel& voxel : voxels) slices[static_cast<std::size_t>(voxel.i - box.min.x)].push_back(voxel);
-  parallel_tasks(slices.size(), [&](std::size_t s) {
-    std::sort(slices[s].begin(), slices[s].end(),
+  std::vector<std::size_t> ends(static_cast<std::size_t>(box.size.x) + 1);  // of the voxels of each i
+  for (const BakedVoxel& voxel : voxels) ++ends[static_cast<std::size_t>(voxel.i - box.min.x) + 1];
+  std::partial_sum(ends.begin(), ends.end(), ends.begin());
+  std::vector<std::size_t> next(ends.begin(), ends.end() - 1);
+  std::vector<BakedVoxel> sorted(voxels.size());
+  for (const BakedVoxel& voxel : voxels) sorted[next[static_cast<std::size_t>(voxel.i - box.min.x)]++] = voxel;
+  parallel_tasks(ends.size() - 1, [&](std::size_t i) {
+    std::sort(sorted.begin() + static_cast<std::ptrdiff_t>(ends[i]),
+              sorted.begin() + static_cast<std::ptrdiff_t>(ends[i + 1]),
               [](const BakedVoxel& a, const BakedVoxel& b) { return std::tie(a.j, a.k) < std::tie(b.j, b.k); });
   });
-  voxels.clear();
-  for (const std::vector<BakedVoxel>& slice : slices) voxels.insert(voxels.end(), slice.begin(), slice.end());
+  voxels.swap(sorted);
 }
 
 VolumePlanes dilated(const VolumePlanes& volume, int radius) {

@@ -9,7 +9,7 @@ namespace cnerf {
 /// The volume with every missing voxel within `radius` (in each axis) of a voxel with sigma > 0. The new ones have
 /// sigma 0 and the colour of the nearest voxel with density; those that interpolation does not reach (two voxels away
 /// and more) share one such colour a brick of 8^3, which costs a file nothing. Voxels that exist stay as they are. May
-/// make voxels outside [0, resolution). Running it again adds nothing. Holds three planes of bricks at a time.
+/// make voxels outside [0, resolution). Running it again adds nothing. Each copy holds three planes of bricks.
 /// @param radius  [0, 8] voxels.
 /// Reading throws ContractError when two voxels share a place.
 [[nodiscard]] VolumePlanes dilated(const VolumePlanes& volume, int radius);

@@ -12,8 +12,6 @@
 namespace cnerf {
 namespace {
 
-constexpr std::size_t kViewsAtATime = 1 << 20;  ///< answers of a question who sees some voxels
-
 bool in_gamut(Vec3f rgb, float luminance) {
   const float top = std::max(1.0f, luminance);
   for (int channel = 0; channel < 3; ++channel) {
@@ -90,6 +88,23 @@ std::vector<BakedVoxel> RadiancePass::bake_plane(std::span<const DenseVoxel> den
 
 void RadiancePass::bake_bricks(std::span<const std::span<const DenseVoxel>> bricks, int plane,
                                std::vector<BakedVoxel>& voxels) const {
+  Kept kept = seen_of(bricks, plane);
+  const std::vector<float> luminance = kept.means.luminance(field_);
+  const std::vector<Chromaticity> chromaticity = ask_chromaticity(kept.centroids);
+  parallel_ranges(kept.voxels.size(), kBrickVoxels, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      const VoxelColor color = voxel_color(luminance[v], chromaticity[v]);
+      BakedVoxel& voxel = kept.voxels[v];
+      voxel.luminance = luminance_of(color.rgb);
+      voxel.rgb = color.rgb;
+      voxel.a = color.a;
+      voxel.b = color.b;
+    }
+  });
+  voxels.insert(voxels.end(), kept.voxels.begin(), kept.voxels.end());
+}
+
+RadiancePass::Kept RadiancePass::seen_of(std::span<const std::span<const DenseVoxel>> bricks, int plane) const {
   std::vector<Candidates> candidates(bricks.size());
   parallel_tasks(bricks.size(), [&](std::size_t b) { candidates[b] = candidates_of(bricks[b], plane); });
   SightBatch batch;
@@ -109,19 +124,7 @@ void RadiancePass::bake_bricks(std::span<const std::span<const DenseVoxel>> bric
   parallel_tasks(bricks.size(), [&](std::size_t b) { of_bricks[b] = kept_of(candidates[b], seen, first[b]); });
   Kept kept;
   for (const Kept& of_brick : of_bricks) kept.append(of_brick);
-  const std::vector<float> luminance = kept.means.luminance(field_);
-  const std::vector<Chromaticity> chromaticity = ask_chromaticity(kept.centroids);
-  parallel_ranges(kept.voxels.size(), kBrickVoxels, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      const VoxelColor color = voxel_color(luminance[v], chromaticity[v]);
-      BakedVoxel& voxel = kept.voxels[v];
-      voxel.luminance = luminance_of(color.rgb);
-      voxel.rgb = color.rgb;
-      voxel.a = color.a;
-      voxel.b = color.b;
-    }
-  });
-  voxels.insert(voxels.end(), kept.voxels.begin(), kept.voxels.end());
+  return kept;
 }
 
 RadiancePass::Candidates RadiancePass::candidates_of(std::span<const DenseVoxel> brick, int plane) const {

@@ -27,6 +27,8 @@ struct VoxelColor {
 /// which is better than that of a neighbour.
 class RadiancePass {
  public:
+  static constexpr std::size_t kViewsAtATime = std::size_t(1) << 20;  ///< answers to a question who sees some voxels
+
   /// @param levels  all levels of the bake; `level` is the one to bake, the others stand in its light
   /// @param views   who sees the points of these levels.  All three must outlive this object.
   RadiancePass(const ColorField& field, const std::vector<BakeLevel>& levels, std::size_t level,
@@ -42,6 +44,7 @@ class RadiancePass {
   struct Kept;
   void bake_bricks(std::span<const std::span<const DenseVoxel>> bricks, int plane,
                    std::vector<BakedVoxel>& voxels) const;
+  [[nodiscard]] Kept seen_of(std::span<const std::span<const DenseVoxel>> bricks, int plane) const;
   [[nodiscard]] Candidates candidates_of(std::span<const DenseVoxel> brick, int plane) const;
   [[nodiscard]] Kept kept_of(const Candidates& candidates, const SeenBatch& seen, std::size_t first) const;
   [[nodiscard]] std::vector<Chromaticity> ask_chromaticity(std::span<const Vec3f> points) const;

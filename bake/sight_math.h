@@ -21,6 +21,13 @@ struct Eye {
   Vec3d centre{};  ///< world
 };
 
+/// A point, and what makes a camera see it.
+struct Sight {
+  Vec3d world{};            ///< world units
+  float least = 0;          ///< transmittance below which a camera does not count, if above `seen_transmittance`
+  std::uint32_t order = 0;  ///< which order of cameras is tried
+};
+
 /// A camera and how much of a point's light reaches it.
 struct SeenBy {
   std::int32_t camera = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "src/base/error.h"
 #include "src/base/parallel.h"
 #include "src/engine/select_engine.h"
 #if CNERF_CUDA_BAKE
@@ -97,7 +98,11 @@ std::unique_ptr<ViewSelection> select_views(const std::vector<BakeCamera>& camer
                                             const BakeOptions& options) {
 #if CNERF_CUDA_BAKE
   if (engine_device() == EngineDevice::kCuda) {
-    return std::make_unique<ViewSelectionCuda>(cameras, std::move(levels), options);
+    try {
+      return std::make_unique<ViewSelectionCuda>(cameras, levels, options);
+    } catch (const DeviceError&) {
+      // Too little memory beside the field: slower, but as good.
+    }
   }
 #endif
   return std::make_unique<ViewSelection>(cameras, std::move(levels), options);

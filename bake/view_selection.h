@@ -11,6 +11,7 @@
 
 namespace cnerf {
 
+/// In the order of the cameras.
 [[nodiscard]] std::vector<Eye> eyes_of(const std::vector<BakeCamera>& cameras);
 
 /// Order in which cameras are worth trying for points around `world`: first the one with the finest pixels there, then
@@ -20,17 +21,10 @@ namespace cnerf {
 /// Unit direction from a camera to a point.
 [[nodiscard]] Vec3f direction_to(const Eye& eye, Vec3d world);
 
-/// A point, and what makes a camera see it.
-struct Sight {
-  Vec3d world{};
-  float least = 0;          ///< transmittance below which a camera does not count, if above `seen_transmittance`
-  std::uint32_t order = 0;  ///< which order of cameras is tried
-};
-
 /// A question about points of one level.
 struct SightBatch {
   std::vector<Sight> sights;
-  std::vector<std::int32_t> orders;  ///< [orders][cameras]
+  std::vector<std::int32_t> orders;  ///< [orders][cameras], each as try_order gives it
 };
 
 /// The answer.
@@ -40,13 +34,14 @@ struct SeenBatch {
 };
 
 using DensityLevel = SightLevel<BrickGrid<float>>;
+/// Points into `levels`, whose grids must outlive the result.
 [[nodiscard]] std::vector<DensityLevel> density_levels(std::span<const BakeLevel> levels);
 
 /// Answers "who sees this" for the points of a bake. Immutable; thread-safe. Light has to pass the density of all
 /// levels.
 class ViewSelection {
  public:
-  /// @param levels  must outlive this object
+  /// @param levels  whose grids must outlive this object
   ViewSelection(const std::vector<BakeCamera>& cameras, std::vector<DensityLevel> levels, const BakeOptions& options);
   virtual ~ViewSelection() = default;
   ViewSelection(const ViewSelection&) = delete;
@@ -59,7 +54,7 @@ class ViewSelection {
   /// @param level  that the point belongs to.  @param order, least  as try_order and Sight have them
   [[nodiscard]] std::vector<SeenBy> seen_by(std::size_t level, Vec3d world, std::span<const std::int32_t> order,
                                             float least = 0) const;
-  /// The same for many points at once, by all threads or the GPU.
+  /// The same for many points of a level at once, by all threads or the GPU; overwrites `answer`.
   /// @throws DeviceError  when the GPU's memory does not suffice
   virtual void find(std::size_t level, const SightBatch& batch, SeenBatch& answer) const;
 
@@ -73,7 +68,7 @@ class ViewSelection {
   float seen_transmittance_;
 };
 
-/// On the device that was selected for engines.
+/// On the device that was selected for engines; on the processor where the GPU's memory does not suffice.
 [[nodiscard]] std::unique_ptr<ViewSelection> select_views(const std::vector<BakeCamera>& cameras,
                                                           std::vector<DensityLevel> levels, const BakeOptions& options);
 

@@ -74,14 +74,14 @@ VolumePlanes planes_of(const BakedVolume& volume) {
   return planes;
 }
 
-std::size_t part_count(const VolumePlanes& volume) {
-  const int planes = volume.end - volume.begin;
+std::size_t part_count(int planes) {
   return static_cast<std::size_t>(std::clamp(planes / kPlanesOfPart, std::min(planes, 1), thread_count()));
 }
 
 void visit_parts(const VolumePlanes& volume,
                  const std::function<void(std::size_t, const std::vector<BakedVoxel>&)>& visit) {
-  const auto parts = static_cast<int>(part_count(volume)), planes = volume.end - volume.begin;
+  const int planes = volume.end - volume.begin;
+  const auto parts = static_cast<int>(part_count(planes));
   parallel_tasks(static_cast<std::size_t>(parts), [&](std::size_t part) {
     const VolumePlanes own = volume;
     const auto number = static_cast<int>(part);
@@ -110,7 +110,7 @@ VolumeStatistics statistics_of(const VolumePlanes& volume) {
     GrowingBox all, dense;
     VolumeStatistics numbers;
   };
-  std::vector<Part> parts(part_count(volume));
+  std::vector<Part> parts(part_count(volume.end - volume.begin));
   visit_parts(volume, [&](std::size_t part, const std::vector<BakedVoxel>& voxels) {
     auto& [all, dense, numbers] = parts[part];
     for (const BakedVoxel& voxel : voxels) {

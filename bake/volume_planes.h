@@ -20,9 +20,9 @@ struct VolumePlanes : VolumeHeader {
 /// A volume in memory, which must outlive the result.  @throws ContractError  when its voxels are not sorted.
 [[nodiscard]] VolumePlanes planes_of(const BakedVolume& volume);
 
-/// Several threads go through a volume in parts of consecutive planes. How many there are depends on the threads.
-[[nodiscard]] std::size_t part_count(const VolumePlanes& volume);
-/// Calls `visit(part, voxels)` for every plane; for those of a part in order, for parts side by side.
+/// Several threads go through a volume in parts of consecutive planes: so many of them, no more than threads.
+[[nodiscard]] std::size_t part_count(int planes);
+/// Calls `visit(part, voxels)` for every plane; for those of a part in order, for parts at the same time.
 void visit_parts(const VolumePlanes& volume,
                  const std::function<void(std::size_t part, const std::vector<BakedVoxel>& voxels)>& visit);
 

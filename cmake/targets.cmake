@@ -40,6 +40,11 @@ endfunction()
 # cnerf_add_cuda_library(NAME SOURCES … [PUBLIC …]): like cnerf_add_library, of kernels and their launchers.
 function(cnerf_add_cuda_library name)
   cnerf_add_library(${name} ${ARGN})
+  cnerf_enable_cuda(${name})
+endfunction()
+
+# cnerf_enable_cuda(NAME): for a library of ours that has kernels beside other sources.
+function(cnerf_enable_cuda name)
   target_compile_options(${name} PRIVATE $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr>)
   target_link_libraries(${name} PUBLIC CUDA::cudart_static)
 endfunction()

@@ -4,11 +4,10 @@
 #include <cuda_runtime_api.h>
 
 #include "bake/sight_math.h"
-#include "bake/view_selection.h"
 
 namespace cnerf {
 
-/// A BrickGrid<float> in device memory.
+/// A BrickGrid<float> in device memory, whose lattice starts at (0, 0, 0).
 struct DeviceBricks {
   const std::int32_t* numbers = nullptr;  ///< [counts.x][counts.y][counts.z]; -1 where there is no brick
   const float* values = nullptr;          ///< [bricks][kBrickVoxels]
@@ -26,7 +25,7 @@ struct DeviceBricks {
 /// All pointers are to device memory; those of the scene as well.
 struct SightJob {
   SightScene<DeviceBricks> scene;
-  int level = 0;
+  int level = 0;                         ///< that the points belong to
   const Sight* sights = nullptr;         ///< [count]
   const std::int32_t* orders = nullptr;  ///< [orders][scene.eye_count]
   std::uint32_t count = 0;

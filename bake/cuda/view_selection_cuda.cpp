@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "bake/cuda/sight_kernel.h"
+#include "src/base/check.h"
 #include "src/base/cuda/device_memory.h"
 #include "src/base/parallel.h"
 
@@ -12,6 +13,7 @@ namespace {
 
 constexpr std::size_t kBricksAtATime = 1 << 14;  // 32 MiB on their way
 const char* const kAdvice = "the density of the bake; lower bake.resolution or cut the box with bake.aabb";
+const char* const kPointAdvice = "who sees voxels; lower bake.views_per_voxel";
 
 struct LevelMemory {
   DeviceBuffer<std::int32_t> numbers;
@@ -64,6 +66,7 @@ ViewSelectionCuda::ViewSelectionCuda(const std::vector<BakeCamera>& cameras, std
   std::vector<DeviceBricks> grids;
   for (int i = 0; i < host.level_count; ++i) {
     const BrickGrid<float>& sigma = *host.levels[i].sigma;
+    CNERF_CHECK(sigma.min() == Vec3i{}, "the lattice of a bake starts at 0");
     const LevelMemory& bricks = m.bricks.emplace_back(uploaded_bricks(sigma));
     grids.push_back({bricks.numbers.data(), bricks.values.data(), sigma.size(), sigma.brick_counts()});
   }
@@ -85,10 +88,10 @@ void ViewSelectionCuda::find(std::size_t level, const SightBatch& batch, SeenBat
   answer.counts.resize(count);
   Memory& m = *memory_;
   const std::lock_guard lock(m.mutex);
-  m.sights.reserve(count, "points");
-  m.counts.reserve(count, "points");
-  m.seen.reserve(count * views, "points");
-  m.orders.reserve(batch.orders.size(), "points");
+  m.sights.reserve(count, kPointAdvice);
+  m.counts.reserve(count, kPointAdvice);
+  m.seen.reserve(count * views, kPointAdvice);
+  m.orders.reserve(batch.orders.size(), kPointAdvice);
   m.sights.upload(batch.sights.data(), count, nullptr);
   m.orders.upload(batch.orders.data(), batch.orders.size(), nullptr);
   find_seeing_all(

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <sstream>
 
 #include "bake/bake_estimate.h"
@@ -58,14 +59,11 @@ std::string bake_identity(const RunDirectory& directory, const std::string& take
   return identity.str();
 }
 
-/// The photographs as the program sees them, undistorted, or none.
-std::vector<WebPhoto> web_photos(const Capture& capture, const WebOptions& options) {
-  std::vector<WebPhoto> photos;
-  if (options.photo_side == 0) return photos;
-  photos.resize(capture.views.size());
-  parallel_tasks(photos.size(), [&](std::size_t i) {
-    const View& view = capture.views[i];
-    photos[i] = make_web_photo(view.intrinsics, luminance_plane(view.image), options.photo_side, options.photo_quality);
+/// Photographs as the program sees them, undistorted, made by all threads.
+std::vector<WebPhoto> photos_of(std::span<const View> views, int side, int quality) {
+  std::vector<WebPhoto> photos(views.size());
+  parallel_tasks(views.size(), [&](std::size_t i) {
+    photos[i] = make_web_photo(views[i].intrinsics, luminance_plane(views[i].image), side, quality);
   });
   return photos;
 }
@@ -97,9 +95,13 @@ void write_web_of(const std::vector<VolumePlanes>& volumes, const std::vector<Ba
   for (const VolumePlanes& volume : volumes)
     whole.push_back(whole_volume(dilated(volume, context.config.bake.dilation)));
   const Config& config = context.config;
+  std::vector<WebPhoto> photos;
+  if (config.web.photo_side > 0) {
+    photos = photos_of(context.capture.views, config.web.photo_side, config.web.photo_quality);
+  }
   write_web(merged_volume(std::move(whole)),
-            {context.capture.root.filename().string(), cameras, web_photos(context.capture, config.web),
-             context.command_line, config.vdb.units, config.vdb.up_axis},
+            {context.capture.root.filename().string(), cameras, photos, context.command_line, config.vdb.units,
+             config.vdb.up_axis},
             web_folder(folder), config.web, context.reporter);
 }
 
@@ -115,11 +117,14 @@ void write_mesh(BakedMesh mesh, const ColorOrigin& origin, const BakeFormats& fo
 }
 
 void add_plates(const Capture& capture, BakeFolder& bake) {
-  WebOptions plates;
-  plates.photo_side = 4096;
-  plates.photo_quality = 92;
-  const std::vector<WebPhoto> photos = web_photos(capture, plates);
-  for (std::size_t i = 0; i < photos.size(); ++i) bake.add_plate(capture.views[i].name, photos[i].jpeg);
+  constexpr int kPlateSide = 4096, kPlateQuality = 92;
+  const std::span<const View> views = capture.views;
+  const auto at_a_time = static_cast<std::size_t>(thread_count());
+  for (std::size_t begin = 0; begin < views.size(); begin += at_a_time) {
+    const auto some = views.subspan(begin, std::min(at_a_time, views.size() - begin));
+    const std::vector<WebPhoto> photos = photos_of(some, kPlateSide, kPlateQuality);
+    for (std::size_t i = 0; i < some.size(); ++i) bake.add_plate(some[i].name, photos[i].jpeg);
+  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -30,12 +31,15 @@ void run_tasks(std::size_t tasks, const Body& body) {
   for (int t = 1; t < thread_count(); ++t) others.emplace_back(work);
   work();
 #else
-  tbb::parallel_for(
-      tbb::blocked_range<std::size_t>(0, tasks, 1),
-      [&](const auto& range) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
-      },
-      tbb::simple_partitioner{});
+  // A thread that waits for the last tasks must not begin one of an outer loop: its caller may hold a lock, or memory.
+  tbb::this_task_arena::isolate([&] {
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, tasks, 1),
+        [&](const auto& range) {
+          for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
+        },
+        tbb::simple_partitioner{});
+  });
 #endif
 }
 

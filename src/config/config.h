@@ -79,7 +79,7 @@ struct Config {
 
   template <typename Visitor>
   void visit(Visitor&& v) {
-    v("device", device, Choice{"auto", "cpu", "cuda"}, "where the fields are trained and rendered");
+    v("device", device, Choice{"auto", "cpu", "cuda"}, "where fields are trained, rendered and baked");
     v("threads", threads, Range{0, 4096}, "threads to use; 0 = all cores");
     v.section("capture", capture);
     v.section("stage1", stage1);

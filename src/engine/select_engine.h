@@ -1,5 +1,5 @@
 #pragma once
-/// Which device trains and renders. Chosen once by the application, as the number of threads is.
+/// Which device trains, renders and bakes. Chosen once by the application, as the number of threads is.
 
 #include <functional>
 #include <memory>

@@ -158,9 +158,11 @@ Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptio
   RenderOptions render = options.render;
   render.color = scene.is_colorized();
   render.baked_color = scene.is_colorized() && options.with_baked;
-  const Intrinsics& first = views.front()->intrinsics;
-  const std::size_t at_a_time = std::clamp<std::size_t>(
-      kPixelsAtATime / (std::size_t(first.width) * std::size_t(first.height)), 1, thread_count());
+  std::size_t most_pixels = 1;
+  for (const View* view : views) {
+    most_pixels = std::max(most_pixels, std::size_t(view->intrinsics.width) * std::size_t(view->intrinsics.height));
+  }
+  const std::size_t at_a_time = std::clamp<std::size_t>(kPixelsAtATime / most_pixels, 1, std::size_t(thread_count()));
   for (std::size_t begin = 0; begin < views.size(); begin += at_a_time) {
     const std::size_t count = std::min(at_a_time, views.size() - begin);
     std::vector<RenderedImage> ours;

@@ -57,7 +57,9 @@ struct CompareOptions {
 /// Own method first; the order of rows.
 inline constexpr Method kMethods[] = {
     {"colornerf", "the full method, as configured"},
-    {"colornerf-paper", "the same with the paper's decoding: the most probable colour instead of the annealed mean"},
+    {"colornerf-paper",
+     "with the paper's choices: the most probable colour instead of the annealed mean, bases as they come, no loss on "
+     "spread"},
     {"without-purification", "every answer of the colorizer is trained on"},
     {"without-classification", "a photometric ab loss instead of the distribution over colours"},
     {"colorize-then-fuse",

@@ -77,9 +77,9 @@ void check_sights() {
       seen += expected.counts[i] > 0 ? 1 : 0;
     }
     const double count = double(batch.sights.size());
-    expect_below("sights: half of the points are seen", std::abs(seen / count - 0.5), 0.4);
-    expect_below("sights: points that others see", differing / count, 2e-3);
-    expect_below("sights: transmittance of the same cameras", error, 0.1);
+    expect_below("sights: neither none nor all are seen", std::abs(seen / count - 0.5), 0.4);
+    expect_below("sights: points that others see", differing / count, 2e-3);  // found: 0 to 5e-5
+    expect_below("sights: transmittance of the same cameras", error, 0.1);    // found: 3e-7 to 2e-2
   }
 }
 
