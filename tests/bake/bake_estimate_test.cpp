@@ -36,7 +36,7 @@ TEST(BakeEstimate, VoxelsAreThoseOfTheBall) {
 
 TEST(BakeEstimate, MemoryGrowsWithTheVoxels) {
   const BakeEstimate small = estimate_at(64), large = estimate_at(128);
-  EXPECT_GT(large.memory_bytes, 5 * small.memory_bytes);
+  EXPECT_GT(large.memory_bytes, 4 * small.memory_bytes) << "planes of bricks grow with the square, all bricks faster";
   EXPECT_LT(large.memory_bytes, 10 * small.memory_bytes);
   EXPECT_GT(large.disk_bytes, large.file_bytes);
 }
