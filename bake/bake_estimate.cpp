@@ -55,7 +55,7 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
   constexpr double kBrickBytes = kBrickVoxels * sizeof(float);     // of the density that light passes through
   constexpr double kLeafBytes = 3 * kBrickVoxels * sizeof(float);  // of the largest grid of a file, that of colours
   constexpr double kRim = 1.5;                                     // leaves that only hold dilated colours
-  constexpr double kPlanes = 7;                                    // held by a thread while a file is written
+  constexpr double kPlanes = 4;                                    // three to look into, one made and sorted
   constexpr double kSampleBytes = 40;                              // of a density sample on its way
   constexpr double kSightBytes = 200, kSeenBytes = 68;  // of a voxel in a question who sees it, and of a view
   double density = 0, writing = 0;
@@ -69,7 +69,7 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
                  static_cast<double>(RadiancePass::kViewsAtATime) / options.views_per_voxel + kBrickVoxels);
     density += contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel)) +
                asked * (kSightBytes + kSeenBytes * options.views_per_voxel);
-    const auto parts = static_cast<double>(part_count(plane_count(plan)));
+    const auto parts = static_cast<double>(part_count(plane_count(plan), !options.max_memory.empty()));
     writing = std::max(writing, contents.bricks * kRim * kLeafBytes +
                                     parts * kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel));
     estimate.voxels += static_cast<std::size_t>(contents.voxels);

@@ -78,8 +78,11 @@ std::vector<VolumePlanes> bake_volumes(const ColorField& field, const std::vecto
       progress.plane_done();
     }
     if (!any) continue;
-    VolumePlanes volume{
-        {plan.origin, plan.voxel_size, plan.resolution, field.frame(), {}, {}}, 0, plane_count(plan), {}};
+    VolumePlanes volume{{plan.origin, plan.voxel_size, plan.resolution, field.frame(), {}, {}},
+                        0,
+                        plane_count(plan),
+                        !options.max_memory.empty(),
+                        {}};
     volume.read = [&journal, first, end = volume.end](int plane) {
       if (plane < 0 || plane >= end) return std::vector<BakedVoxel>();
       return journal.read<BakedVoxel>(first + static_cast<std::size_t>(plane));

@@ -60,7 +60,7 @@ VolumePlanes planes_of(const BakedVolume& volume) {
                                return std::tie(a.i, a.j, a.k) < std::tie(b.i, b.j, b.k);
                              }),
               "voxels must be sorted by (i, j, k)");
-  VolumePlanes planes{volume, 0, 0, {}};
+  VolumePlanes planes{volume, 0, 0, false, {}};
   if (!voxels.empty()) {
     planes.begin = plane_of(voxels.front().i);
     planes.end = plane_of(voxels.back().i) + 1;
@@ -74,14 +74,15 @@ VolumePlanes planes_of(const BakedVolume& volume) {
   return planes;
 }
 
-std::size_t part_count(int planes) {
+std::size_t part_count(int planes, bool is_sparing) {
+  if (is_sparing) return planes > 0 ? 1 : 0;
   return static_cast<std::size_t>(std::clamp(planes / kPlanesOfPart, std::min(planes, 1), thread_count()));
 }
 
 void visit_parts(const VolumePlanes& volume,
                  const std::function<void(std::size_t, const std::vector<BakedVoxel>&)>& visit) {
   const int planes = volume.end - volume.begin;
-  const auto parts = static_cast<int>(part_count(planes));
+  const auto parts = static_cast<int>(part_count(volume));
   parallel_tasks(static_cast<std::size_t>(parts), [&](std::size_t part) {
     const VolumePlanes own = volume;
     const auto number = static_cast<int>(part);
@@ -110,7 +111,7 @@ VolumeStatistics statistics_of(const VolumePlanes& volume) {
     GrowingBox all, dense;
     VolumeStatistics numbers;
   };
-  std::vector<Part> parts(part_count(volume.end - volume.begin));
+  std::vector<Part> parts(part_count(volume));
   visit_parts(volume, [&](std::size_t part, const std::vector<BakedVoxel>& voxels) {
     auto& [all, dense, numbers] = parts[part];
     for (const BakedVoxel& voxel : voxels) {

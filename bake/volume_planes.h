@@ -11,7 +11,8 @@ namespace cnerf {
 
 /// A baked volume in planes of bricks: plane p holds the voxels with 8 p <= i < 8 p + 8.
 struct VolumePlanes : VolumeHeader {
-  int begin = 0, end = 0;  ///< planes that may hold voxels
+  int begin = 0, end = 0;   ///< planes that may hold voxels
+  bool is_sparing = false;  ///< of memory: one thread goes through them
   /// Voxels of any plane, sorted by (i, j, k), no duplicates; none outside [begin, end). Not for several threads, each
   /// of which takes a copy of this struct; cheapest from `begin` upwards.
   std::function<std::vector<BakedVoxel>(int plane)> read;
@@ -21,7 +22,10 @@ struct VolumePlanes : VolumeHeader {
 [[nodiscard]] VolumePlanes planes_of(const BakedVolume& volume);
 
 /// Several threads go through a volume in parts of consecutive planes: so many of them, no more than threads.
-[[nodiscard]] std::size_t part_count(int planes);
+[[nodiscard]] std::size_t part_count(int planes, bool is_sparing);
+[[nodiscard]] inline std::size_t part_count(const VolumePlanes& volume) {
+  return part_count(volume.end - volume.begin, volume.is_sparing);
+}
 /// Calls `visit(part, voxels)` for every plane; for those of a part in order, for parts at the same time.
 void visit_parts(const VolumePlanes& volume,
                  const std::function<void(std::size_t part, const std::vector<BakedVoxel>& voxels)>& visit);

@@ -78,7 +78,7 @@ typename Grid::Ptr make_grid(const std::string& name, const Content& content, co
   grid->setGridClass(openvdb::GRID_FOG_VOLUME);
   // Parts end where leaves do, so that trees of parts have no leaf in common.
   std::vector<typename Grid::TreeType::Ptr> trees;
-  for (std::size_t part = 0; part < part_count(content.volume.end - content.volume.begin); ++part) {
+  for (std::size_t part = 0; part < part_count(content.volume); ++part) {
     trees.push_back(std::make_shared<typename Grid::TreeType>(grid->background()));
   }
   visit_parts(content.volume, [&](std::size_t part, const std::vector<BakedVoxel>& voxels) {

@@ -11,6 +11,7 @@
 #include "export/vdb_reader.h"
 #include "export/vdb_writer.h"
 #include "src/base/error.h"
+#include "src/base/parallel.h"
 #include "tests/export/test_volumes.h"
 #include "tests/support/data.h"
 
@@ -190,6 +191,26 @@ TEST(Vdb, ReadsBackWhatWasWritten) {
     EXPECT_NEAR(r.b, v.b, 2e-2);
   }
   EXPECT_EQ(read.voxels.size(), 12u * 12 * 12 + 5u * 5 * 5 + 2);
+}
+
+TEST(Vdb, OneThreadOrSeveralWriteTheSame) {
+  const TempDir folder;
+  BakedVolume volume = block_volume({3, 5, 6}, {150, 9, 11}, 2);  // 19 planes of bricks
+  for (BakedVoxel& voxel : volume.voxels) {
+    voxel.sigma = 1 + static_cast<float>(voxel.i % 7);
+    voxel.a = static_cast<float>(voxel.i - voxel.k);
+  }
+  VolumePlanes planes = planes_of(volume);
+  set_thread_count(4);
+  EXPECT_EQ(part_count(planes), 4u);
+  write_vdb(planes, folder / "several.vdb");
+  planes.is_sparing = true;
+  EXPECT_EQ(part_count(planes), 1u);
+  write_vdb(planes, folder / "one.vdb");
+  set_thread_count(0);
+  const BakedVolume several = read_vdb(folder / "several.vdb"), one = read_vdb(folder / "one.vdb");
+  EXPECT_GT(several.voxels.size(), volume.voxels.size()) << "colours reach beyond";
+  EXPECT_EQ(several.voxels, one.voxels);
 }
 
 TEST(Vdb, HugeDensitiesStayFinite) {
