@@ -26,12 +26,12 @@ struct Look {
   double voxel_size;
 };
 
-std::vector<Look> sights_of(const BakeCamera& camera, const BakePlan& plan, const BrickGrid<float>& sigma) {
+std::vector<Look> looks_of(const BakeCamera& camera, const BakePlan& plan, const BrickGrid<float>& sigma) {
   const Intrinsics& lens = camera.intrinsics;
   const Vec3d eye = camera.world_from_camera.translation;
   const Vec3d origin = plan.voxel_from_world(eye);
   const Aabbd box{{0, 0, 0}, plan.resolution.cast<double>()};
-  std::vector<Look> sights;
+  std::vector<Look> looks;
   for (int ray = 0; ray < kLookRays * kLookRays; ++ray) {
     const PixelPosition pixel{(ray % kLookRays + 0.5) * lens.width / kLookRays,
                               (ray / kLookRays + 0.5) * lens.height / kLookRays};
@@ -43,24 +43,24 @@ std::vector<Look> sights_of(const BakeCamera& camera, const BakePlan& plan, cons
       depth += sigma.at((origin + d * t).cast<int>()) * plan.voxel_size;
       if (depth < kHalfOpaque) continue;
       const double distance = t * plan.voxel_size;
-      sights.push_back({eye + d * distance, kPixelsPerVoxel * distance / lens.fx});
+      looks.push_back({eye + d * distance, kPixelsPerVoxel * distance / lens.fx});
     }
   }
-  return sights;
+  return looks;
 }
 
 /// Where the cameras' pixels end, in a density too coarse for anything else.
-std::vector<Look> all_sights(const ColorField& field, const std::vector<BakeCamera>& cameras, BakeOptions options) {
+std::vector<Look> all_looks(const ColorField& field, const std::vector<BakeCamera>& cameras, BakeOptions options) {
   options.resolution = std::min(options.resolution, kLookResolution);
   options.voxel_size = 0;
   options.subsamples = 1;
   const BakePlan plan = plan_bake(field, options);
   const BrickGrid<float> sigma = bake_density(field, plan, options, [](double) {});
   std::vector<std::vector<Look>> of_cameras(cameras.size());
-  parallel_tasks(cameras.size(), [&](std::size_t c) { of_cameras[c] = sights_of(cameras[c], plan, sigma); });
-  std::vector<Look> sights;
-  for (const std::vector<Look>& some : of_cameras) sights.insert(sights.end(), some.begin(), some.end());
-  return sights;
+  parallel_tasks(cameras.size(), [&](std::size_t c) { of_cameras[c] = looks_of(cameras[c], plan, sigma); });
+  std::vector<Look> looks;
+  for (const std::vector<Look>& some : of_cameras) looks.insert(looks.end(), some.begin(), some.end());
+  return looks;
 }
 
 /// Counts of points in cells of a box, summed so that any block of cells takes eight look-ups.
@@ -197,15 +197,15 @@ std::vector<BakePlan> plan_levels(const ColorField& field, const std::vector<Bak
   std::vector<BakePlan> plans{plan_bake(field, options)};
   const bool nested = options.grids == "nested" || (options.grids == "auto" && field.frame().cascades > 1);
   if (!nested || cameras.empty()) return plans;
-  std::vector<Look> sights = all_sights(field, cameras, options);
-  const auto enough = static_cast<std::size_t>(kLeastShare * static_cast<double>(sights.size()));
+  std::vector<Look> looks = all_looks(field, cameras, options);
+  const auto enough = static_cast<std::size_t>(kLeastShare * static_cast<double>(looks.size()));
   const Vec3i resolution = plans[0].resolution;
   const int inner = std::max({resolution.x, resolution.y, resolution.z}) - 2 * options.dilation;
   while (plans.size() < kMostLevels) {
     BakePlan& parent = plans.back();
     std::vector<Vec3d> wanting;
-    for (const Look& sight : sights) {
-      if (sight.voxel_size < parent.voxel_size && parent.box.contains(sight.world)) wanting.push_back(sight.world);
+    for (const Look& look : looks) {
+      if (look.voxel_size < parent.voxel_size && parent.box.contains(look.world)) wanting.push_back(look.world);
     }
     const double side = (inner - 2) * parent.voxel_size / 2;  // rounding outwards adds two voxels
     const Aabbd box = fullest_part(parent.box, side, wanting);

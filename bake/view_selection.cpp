@@ -84,11 +84,12 @@ std::vector<SeenBy> ViewSelection::seen_by(std::size_t level, Vec3d world, std::
 void ViewSelection::find(std::size_t level, const SightBatch& batch, SeenBatch& answer) const {
   answer.seen.resize(batch.sights.size() * views_per_voxel_);
   answer.counts.resize(batch.sights.size());
+  const SightScene<BrickGrid<float>> all = scene();
   parallel_ranges(batch.sights.size(), kSightsAtATime, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Sight& sight = batch.sights[i];
       answer.counts[i] =
-          find_seeing(scene(), static_cast<int>(level), sight.world, batch.orders.data() + sight.order * eyes_.size(),
+          find_seeing(all, static_cast<int>(level), sight.world, batch.orders.data() + sight.order * eyes_.size(),
                       sight.least, answer.seen.data() + i * views_per_voxel_);
     }
   });

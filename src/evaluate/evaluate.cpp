@@ -83,6 +83,15 @@ void drop_nan(ViewMetrics& metrics) {
   });
 }
 
+/// How many views are measured at the same time.
+std::size_t views_at_a_time(const std::vector<const View*>& views) {
+  std::size_t most_pixels = 1;
+  for (const View* view : views) {
+    most_pixels = std::max(most_pixels, std::size_t(view->intrinsics.width) * std::size_t(view->intrinsics.height));
+  }
+  return std::clamp<std::size_t>(kPixelsAtATime / most_pixels, 1, std::size_t(thread_count()));
+}
+
 /// The luminance of a picture as its colour.
 void paint_grey(RenderedImage& image) {
   for (const float y : image.luminance) image.rgb.insert(image.rgb.end(), {y, y, y});
@@ -158,11 +167,7 @@ Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptio
   RenderOptions render = options.render;
   render.color = scene.is_colorized();
   render.baked_color = scene.is_colorized() && options.with_baked;
-  std::size_t most_pixels = 1;
-  for (const View* view : views) {
-    most_pixels = std::max(most_pixels, std::size_t(view->intrinsics.width) * std::size_t(view->intrinsics.height));
-  }
-  const std::size_t at_a_time = std::clamp<std::size_t>(kPixelsAtATime / most_pixels, 1, std::size_t(thread_count()));
+  const std::size_t at_a_time = views_at_a_time(views);
   for (std::size_t begin = 0; begin < views.size(); begin += at_a_time) {
     const std::size_t count = std::min(at_a_time, views.size() - begin);
     std::vector<RenderedImage> ours;

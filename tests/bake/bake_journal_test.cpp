@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <fstream>
 #include <numeric>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/parallel.h"
 #include "tests/support/data.h"
 
 namespace cnerf::test {
@@ -41,6 +43,21 @@ TEST(BakeJournal, FinishedPartsAreReadNotMade) {
   EXPECT_EQ(journal.part<int>(0, never_made), numbers(0));
   EXPECT_EQ(journal.part<int>(4, [] { return numbers(40); }), numbers(40));
   EXPECT_EQ(journal.size(), 5u);
+}
+
+TEST(BakeJournal, SeveralThreadsReadAtTheSameTime) {
+  const TempDir folder;
+  constexpr std::size_t kParts = 200;
+  fill(folder / "j", kParts);
+  const BakeJournal journal(folder / "j", "one bake");
+  std::atomic<int> wrong = 0;
+  set_thread_count(4);
+  parallel_tasks(8 * kParts, [&](std::size_t task) {
+    const std::size_t part = (7 * task) % kParts;
+    wrong += journal.read<int>(part) == numbers(10 * static_cast<int>(part)) ? 0 : 1;
+  });
+  set_thread_count(0);
+  EXPECT_EQ(wrong, 0);
 }
 
 TEST(BakeJournal, AnotherBakeBeginsAnew) {
