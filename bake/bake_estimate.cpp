@@ -7,6 +7,7 @@
 #include "bake/brick_grid.h"
 #include "bake/density_pass.h"
 #include "bake/radiance_pass.h"
+#include "bake/view_selection.h"
 #include "bake/volume_planes.h"
 #include "src/base/byte_count.h"
 #include "src/base/error.h"
@@ -66,7 +67,7 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
         contents.bricks * kBrickBytes + static_cast<double>(plan.lattice_voxels() / kBrickVoxels * sizeof(void*));
     const double asked =
         std::min(contents.in_fullest_plane,
-                 static_cast<double>(RadiancePass::kViewsAtATime) / options.views_per_voxel + kBrickVoxels);
+                 static_cast<double>(kViewsAtATime) / options.views_per_voxel + kBrickVoxels);
     density += contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel)) +
                asked * (kSightBytes + kSeenBytes * options.views_per_voxel);
     const auto parts = static_cast<double>(part_count(plane_count(plan), !options.max_memory.empty()));

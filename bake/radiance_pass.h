@@ -27,8 +27,6 @@ struct VoxelColor {
 /// which is better than that of a neighbour.
 class RadiancePass {
  public:
-  static constexpr std::size_t kViewsAtATime = std::size_t(1) << 20;  ///< answers to a question who sees some voxels
-
   /// @param levels  all levels of the bake; `level` is the one to bake, the others stand in its light
   /// @param views   who sees the points of these levels.  All three must outlive this object.
   RadiancePass(const ColorField& field, const std::vector<BakeLevel>& levels, std::size_t level,

@@ -66,7 +66,7 @@ struct ViewAverage::Brick {
 
 ViewAverage::ViewAverage(const ColorField& field, const std::vector<BakeCamera>& cameras, std::vector<BakeLevel> levels,
                          const BakeOptions& options)
-    : field_(field), levels_(std::move(levels)), views_(cameras, density_levels(levels_), options) {}
+    : field_(field), levels_(std::move(levels)), views_(select_views(cameras, density_levels(levels_), options)) {}
 
 std::size_t ViewAverage::level_of(Vec3d world) const {
   for (std::size_t level = 0; level + 1 < levels_.size(); ++level) {
@@ -99,24 +99,49 @@ std::vector<ViewAverage::Brick> ViewAverage::by_brick(std::span<const Vec3f> pos
   return list;
 }
 
+void ViewAverage::ask(std::span<const Brick> bricks, std::span<const Vec3f> positions,
+                      std::span<float> luminance) const {
+  const std::vector<Eye>& eyes = views_->eyes();
+  SightBatch batch;
+  std::vector<std::size_t> points;  // in the order of the sights
+  for (std::uint32_t b = 0; b < bricks.size(); ++b) {
+    for (const std::size_t point : bricks[b].points) {
+      points.push_back(point);
+      batch.sights.push_back({field_.frame().world_from_unit(positions[point].cast<double>()), 0, b});
+    }
+  }
+  batch.orders.resize(bricks.size() * eyes.size());
+  parallel_tasks(bricks.size(), [&](std::size_t b) {
+    std::ranges::copy(try_order(eyes, bricks[b].centre),
+                      batch.orders.begin() + static_cast<std::ptrdiff_t>(b * eyes.size()));
+  });
+  SeenBatch seen;
+  views_->find(bricks.front().level, batch, seen);
+
+  ViewMeans means;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec3f position = positions[points[i]];
+    const SeenBy* views = seen.seen.data() + i * static_cast<std::size_t>(views_->views_per_voxel());
+    for (const SeenBy& view : std::span(views, static_cast<std::size_t>(seen.counts[i]))) {
+      means.look_along(position, direction_to(eyes[view.camera], batch.sights[i].world), view.transmittance);
+    }
+    if (seen.counts[i] == 0) means.look_from_all_sides(position);
+    means.next_point();
+  }
+  const std::vector<float> answers = means.luminance(field_);
+  for (std::size_t i = 0; i < points.size(); ++i) luminance[points[i]] = answers[i];
+}
+
 void ViewAverage::query(std::span<const Vec3f> positions, std::span<float> luminance) const {
   const std::vector<Brick> bricks = by_brick(positions);
-  parallel_tasks(bricks.size(), [&](std::size_t b) {
-    const Brick& brick = bricks[b];
-    const std::vector<std::int32_t> order = try_order(views_.eyes(), brick.centre);
-    ViewMeans means;
-    for (const std::size_t point : brick.points) {
-      const Vec3d world = field_.frame().world_from_unit(positions[point].cast<double>());
-      const std::vector<SeenBy> seen = views_.seen_by(brick.level, world, order);
-      for (const SeenBy& view : seen) {
-        means.look_along(positions[point], direction_to(views_.eyes()[view.camera], world), view.transmittance);
-      }
-      if (seen.empty()) means.look_from_all_sides(positions[point]);
-      means.next_point();
+  const std::size_t most = kViewsAtATime / static_cast<std::size_t>(views_->views_per_voxel());
+  for (std::size_t begin = 0, end = 0; begin < bricks.size(); begin = end) {
+    std::size_t count = 0;
+    while (end < bricks.size() && bricks[end].level == bricks[begin].level && count < most) {
+      count += bricks[end++].points.size();
     }
-    const std::vector<float> answers = means.luminance(field_);
-    for (std::size_t i = 0; i < answers.size(); ++i) luminance[brick.points[i]] = answers[i];
-  });
+    ask(std::span(bricks).subspan(begin, end - begin), positions, luminance);
+  }
 }
 
 std::unique_ptr<ViewAverage> make_view_average(const ColorField& field, const std::vector<BakeCamera>& cameras,

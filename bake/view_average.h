@@ -49,6 +49,7 @@ class ViewAverage {
   /// by how much of its light reaches them; where none does, over the directions of the axes. Thread-safe; answers do
   /// not depend on what else is asked.
   /// @throws ContractError  as ViewMeans.
+  /// @throws DeviceError    as ViewSelection::find.
   void query(std::span<const Vec3f> positions, std::span<float> luminance) const;
 
  private:
@@ -56,10 +57,11 @@ class ViewAverage {
   struct Brick;
   [[nodiscard]] std::vector<Brick> by_brick(std::span<const Vec3f> positions) const;
   [[nodiscard]] std::size_t level_of(Vec3d world) const;
+  void ask(std::span<const Brick> bricks_of_level, std::span<const Vec3f> positions, std::span<float> luminance) const;
 
   const ColorField& field_;
   const std::vector<BakeLevel> levels_;
-  const ViewSelection views_;
+  const std::unique_ptr<const ViewSelection> views_;
 };
 
 /// After baking density on the lattices that `options` ask for.  @throws as plan_within_budget and bake_levels.

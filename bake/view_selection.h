@@ -21,6 +21,9 @@ namespace cnerf {
 /// Unit direction from a camera to a point.
 [[nodiscard]] Vec3f direction_to(const Eye& eye, Vec3d world);
 
+/// Views that a question should ask for at most, points times `views_per_voxel`: it bounds the memory of the answer.
+inline constexpr std::size_t kViewsAtATime = std::size_t(1) << 20;
+
 /// A question about points of one level.
 struct SightBatch {
   std::vector<Sight> sights;

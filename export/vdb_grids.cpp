@@ -8,11 +8,26 @@
 #include "bake/dilate.h"
 #include "export/up_axis.h"
 #include "src/base/check.h"
+#include "src/base/parallel.h"
 
 namespace cnerf {
+
+class VdbGrids::Builder {
+ public:
+  Builder() = default;
+  virtual ~Builder() = default;
+  Builder(const Builder&) = delete;
+  Builder& operator=(const Builder&) = delete;
+
+  /// Of one part of the volume; parts may be added at the same time.
+  virtual void add(std::size_t part, std::span<const BakedVoxel> voxels) = 0;
+  [[nodiscard]] virtual openvdb::GridBase::Ptr finish() = 0;
+};
+
 namespace {
 
 using Content = VdbGrids::Content;
+using BuilderPtr = std::unique_ptr<VdbGrids::Builder>;
 
 constexpr float kHalfMax = 65504.0f;
 constexpr float kHalfMinNormal = 0x1p-14f;  ///< below it a half loses digits
@@ -71,27 +86,46 @@ openvdb::math::Transform::Ptr transform_of(const VolumeHeader& volume, const Vdb
 /// One grid over all voxels, with the value that `value_of` takes from each. Two corners without density or colour keep
 /// the box of what is active open.
 template <typename Grid, typename ValueOf>
-typename Grid::Ptr make_grid(const std::string& name, const Content& content, const ValueOf& value_of) {
-  auto grid = Grid::create();  // background 0
-  grid->setName(name);
-  grid->setCreator("cnerf " CNERF_VERSION);
-  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
-  // Parts end where leaves do, so that trees of parts have no leaf in common.
-  std::vector<typename Grid::TreeType::Ptr> trees;
-  for (std::size_t part = 0; part < part_count(content.volume); ++part) {
-    trees.push_back(std::make_shared<typename Grid::TreeType>(grid->background()));
+class GridBuilder final : public VdbGrids::Builder {
+ public:
+  GridBuilder(const std::string& name, const Content& content, ValueOf value_of)
+      : grid_(Grid::create()), box_(content.box), value_of_(std::move(value_of)) {  // background 0
+    grid_->setName(name);
+    grid_->setCreator("cnerf " CNERF_VERSION);
+    grid_->setGridClass(openvdb::GRID_FOG_VOLUME);
+    for (std::size_t part = 0; part < part_count(content.volume); ++part) {
+      trees_.push_back(std::make_shared<Tree>(grid_->background()));
+    }
   }
-  visit_parts(content.volume, [&](std::size_t part, const std::vector<BakedVoxel>& voxels) {
-    openvdb::tree::ValueAccessor<typename Grid::TreeType> accessor(*trees[part]);
-    for (const BakedVoxel& voxel : voxels) accessor.setValueOn({voxel.i, voxel.j, voxel.k}, value_of(voxel));
-  });
-  for (const auto& tree : trees) grid->tree().merge(*tree, openvdb::MERGE_ACTIVE_STATES);
-  const Vec3i low = content.box.min, high = low + content.box.size - Vec3i{1, 1, 1};
-  for (const Vec3i corner : {low, high}) {
-    grid->tree().setValueOn({corner.x, corner.y, corner.z}, value_of(BakedVoxel{}));
+  [[nodiscard]] Grid& grid() { return *grid_; }
+
+  void add(std::size_t part, std::span<const BakedVoxel> voxels) override {
+    openvdb::tree::ValueAccessor<Tree> accessor(*trees_[part]);
+    for (const BakedVoxel& voxel : voxels) accessor.setValueOn({voxel.i, voxel.j, voxel.k}, value_of_(voxel));
   }
-  openvdb::tools::prune(grid->tree());  // full leaves of one value, as the insides of a grey bake's colours
-  return grid;
+  [[nodiscard]] openvdb::GridBase::Ptr finish() override {
+    for (const auto& tree : trees_) grid_->tree().merge(*tree, openvdb::MERGE_ACTIVE_STATES);
+    const Vec3i low = box_.min, high = low + box_.size - Vec3i{1, 1, 1};
+    for (const Vec3i corner : {low, high}) {
+      grid_->tree().setValueOn({corner.x, corner.y, corner.z}, value_of_(BakedVoxel{}));
+    }
+    openvdb::tools::prune(grid_->tree());  // full leaves of one value, as the insides of a grey bake's colours
+    return grid_;
+  }
+
+ private:
+  using Tree = typename Grid::TreeType;
+
+  typename Grid::Ptr grid_;
+  VoxelBox box_;
+  ValueOf value_of_;
+  std::vector<typename Tree::Ptr> trees_;  ///< of the parts, which end where leaves do: no leaf is in two of them
+};
+
+template <typename Grid, typename ValueOf>
+std::unique_ptr<GridBuilder<Grid, ValueOf>> grid_builder(const std::string& name, const Content& content,
+                                                         ValueOf value_of) {
+  return std::make_unique<GridBuilder<Grid, ValueOf>>(name, content, std::move(value_of));
 }
 
 /// Keeps values finite in what a file stores.
@@ -100,44 +134,45 @@ struct Stored {
   [[nodiscard]] float operator()(float value) const { return half ? std::clamp(value, -kHalfMax, kHalfMax) : value; }
 };
 
-openvdb::GridBase::Ptr color_grid(const std::string& name, const Content& content) {
-  const Stored stored{content.options.half};
-  auto grid = make_grid<openvdb::Vec3SGrid>(name, content, [&](const BakedVoxel& v) {
-    return openvdb::Vec3s(stored(v.rgb.x), stored(v.rgb.y), stored(v.rgb.z));
-  });
-  grid->setVectorType(openvdb::VEC_INVARIANT);
-  grid->insertMeta("colorspace", openvdb::StringMetadata("lin_rec709"));
-  return grid;
+BuilderPtr color_grid(const std::string& name, const Content& content) {
+  auto builder = grid_builder<openvdb::Vec3SGrid>(
+      name, content, [stored = Stored{content.options.half}](const BakedVoxel& v) {
+        return openvdb::Vec3s(stored(v.rgb.x), stored(v.rgb.y), stored(v.rgb.z));
+      });
+  builder->grid().setVectorType(openvdb::VEC_INVARIANT);
+  builder->grid().insertMeta("colorspace", openvdb::StringMetadata("lin_rec709"));
+  return builder;
 }
 
-openvdb::GridBase::Ptr emission_grid(const Content& content) {
-  const Stored stored{content.options.half};
-  auto grid = make_grid<openvdb::Vec3SGrid>("emission", content, [&](const BakedVoxel& v) {
-    const Vec3f emission = v.rgb * v.sigma;
-    return openvdb::Vec3s(stored(emission.x), stored(emission.y), stored(emission.z));
-  });
-  grid->setVectorType(openvdb::VEC_INVARIANT);
-  grid->insertMeta("colorspace", openvdb::StringMetadata("lin_rec709"));
-  grid->insertMeta("meaning", openvdb::StringMetadata("density times color, per world unit"));
-  return grid;
+BuilderPtr emission_grid(const Content& content) {
+  auto builder = grid_builder<openvdb::Vec3SGrid>(
+      "emission", content, [stored = Stored{content.options.half}](const BakedVoxel& v) {
+        const Vec3f emission = v.rgb * v.sigma;
+        return openvdb::Vec3s(stored(emission.x), stored(emission.y), stored(emission.z));
+      });
+  builder->grid().setVectorType(openvdb::VEC_INVARIANT);
+  builder->grid().insertMeta("colorspace", openvdb::StringMetadata("lin_rec709"));
+  builder->grid().insertMeta("meaning", openvdb::StringMetadata("density times color, per world unit"));
+  return builder;
 }
 
-openvdb::GridBase::Ptr float_grid(const std::string& name, const std::string& meaning, const Content& content,
-                                  float BakedVoxel::*member) {
-  const Stored stored{content.options.half};
-  auto grid = make_grid<openvdb::FloatGrid>(name, content, [&](const BakedVoxel& v) { return stored(v.*member); });
-  grid->insertMeta("meaning", openvdb::StringMetadata(meaning));
-  return grid;
+BuilderPtr float_grid(const std::string& name, const std::string& meaning, const Content& content,
+                      float BakedVoxel::*member) {
+  auto builder = grid_builder<openvdb::FloatGrid>(
+      name, content, [stored = Stored{content.options.half}, member](const BakedVoxel& v) { return stored(v.*member); });
+  builder->grid().insertMeta("meaning", openvdb::StringMetadata(meaning));
+  return builder;
 }
 
-openvdb::GridBase::Ptr density_grid(const Content& content) {
-  const double scale = density_scale(content.statistics, content.options);
-  auto grid = make_grid<openvdb::FloatGrid>("density", content,
-                                            [&](const BakedVoxel& v) { return static_cast<float>(v.sigma / scale); });
-  grid->insertMeta("meaning", openvdb::StringMetadata(content.options.normalize_density
-                                                          ? "extinction in units of cnerf_density_scale"
-                                                          : "extinction, 1/world unit"));
-  return grid;
+BuilderPtr density_grid(const Content& content) {
+  auto builder = grid_builder<openvdb::FloatGrid>(
+      "density", content, [scale = density_scale(content.statistics, content.options)](const BakedVoxel& v) {
+        return static_cast<float>(v.sigma / scale);
+      });
+  builder->grid().insertMeta("meaning", openvdb::StringMetadata(content.options.normalize_density
+                                                                    ? "extinction in units of cnerf_density_scale"
+                                                                    : "extinction, 1/world unit"));
+  return builder;
 }
 
 }  // namespace
@@ -172,10 +207,26 @@ VdbGrids::VdbGrids(const VolumePlanes& volume, const VdbOptions& options)
 }
 
 openvdb::GridBase::Ptr VdbGrids::make(std::size_t number) const {
-  const openvdb::GridBase::Ptr grid = recipes_[number].make(content_);
-  grid->setTransform(transform_);
-  grid->setSaveFloatAsHalf(recipes_[number].half);
-  return grid;
+  return make(std::span(recipes_).subspan(number, 1)).front();
+}
+
+std::vector<openvdb::GridBase::Ptr> VdbGrids::make_all() const {
+  return make(std::span(recipes_));
+}
+
+std::vector<openvdb::GridBase::Ptr> VdbGrids::make(std::span<const Recipe> recipes) const {
+  std::vector<BuilderPtr> builders;
+  for (const Recipe& recipe : recipes) builders.push_back(recipe.begin(content_));
+  visit_parts(content_.volume, [&](std::size_t part, const std::vector<BakedVoxel>& voxels) {
+    for (const BuilderPtr& builder : builders) builder->add(part, voxels);
+  });
+  std::vector<openvdb::GridBase::Ptr> grids(recipes.size());
+  parallel_tasks(recipes.size(), [&](std::size_t g) {
+    grids[g] = builders[g]->finish();
+    grids[g]->setTransform(transform_->copy());
+    grids[g]->setSaveFloatAsHalf(recipes[g].half);
+  });
+  return grids;
 }
 
 openvdb::MetaMap VdbGrids::file_metadata() const {

@@ -5,10 +5,12 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <sstream>
 
 #include "export/vdb_grids.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/parallel.h"
 
 namespace cnerf {
 namespace {
@@ -21,8 +23,8 @@ std::uint32_t compression_flags(const std::string& name) {
   return openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK;
 }
 
-/// What openvdb::io::File writes, but grid after grid, so that only one is in memory, and to a stream whose failures
-/// are seen: File leaves a cut-off file on a full disk and says nothing.
+/// What openvdb::io::File writes, but to a stream whose failures are seen (File leaves a cut-off file on a full disk and
+/// says nothing), and either grid after grid, so that only one is in memory, or all of them at the same time.
 class CheckedArchive : public openvdb::io::Archive {
  public:
   explicit CheckedArchive(std::uint32_t compression) { setCompression(compression); }
@@ -36,12 +38,48 @@ class CheckedArchive : public openvdb::io::Archive {
     grids.file_metadata().writeMeta(out);
     const auto count = static_cast<std::int32_t>(grids.count());
     out.write(reinterpret_cast<const char*>(&count), sizeof count);
-    for (std::size_t number = 0; number < grids.count(); ++number) {
-      const openvdb::GridBase::Ptr grid = grids.make(number);
-      openvdb::io::GridDescriptor descriptor(grid->getName(), grid->type(), grid->saveFloatAsHalf());
-      writeGrid(descriptor, grid, out, /*seekable=*/true);
+    if (grids.is_sparing()) {
+      for (std::size_t number = 0; number < grids.count(); ++number) write_grid(grids.make(number), out);
+    } else {
+      write_together(grids.make_all(), out);
     }
     out.close();
+  }
+
+ private:
+  using Descriptor = openvdb::io::GridDescriptor;
+
+  /// Returns where it went.
+  Descriptor write_grid(const openvdb::GridBase::ConstPtr& grid, std::ostream& out) const {
+    Descriptor descriptor(grid->getName(), grid->type(), grid->saveFloatAsHalf());
+    writeGrid(descriptor, grid, out, /*seekable=*/true);
+    return descriptor;
+  }
+
+  /// Compressing takes longest, so each grid is written to a memory of its own, by a thread of its own.
+  void write_together(const std::vector<openvdb::GridBase::Ptr>& grids, std::ostream& out) const {
+    std::vector<std::ostringstream> written(grids.size());
+    std::vector<Descriptor> descriptors(grids.size());
+    parallel_tasks(grids.size(), [&](std::size_t g) { descriptors[g] = write_grid(grids[g], written[g]); });
+    for (std::size_t g = 0; g < grids.size(); ++g) {
+      const std::streamoff begin = out.tellp();
+      out << written[g].rdbuf();
+      const std::streamoff end = out.tellp();
+      move_descriptor(descriptors[g], begin, out);
+      out.seekp(end);
+      written[g] = {};
+    }
+  }
+
+  /// A grid says where its pieces lie, counted from the start of the file.
+  static void move_descriptor(Descriptor descriptor, std::streamoff begin, std::ostream& out) {
+    std::ostringstream header;
+    descriptor.writeHeader(header);
+    descriptor.setGridPos(descriptor.getGridPos() + begin);
+    descriptor.setBlockPos(descriptor.getBlockPos() + begin);
+    descriptor.setEndPos(descriptor.getEndPos() + begin);
+    out.seekp(begin + static_cast<std::streamoff>(header.str().size()));
+    descriptor.writeStreamPos(out);
   }
 };
 
