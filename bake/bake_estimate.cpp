@@ -8,6 +8,7 @@
 #include "bake/density_pass.h"
 #include "bake/radiance_pass.h"
 #include "bake/view_selection.h"
+#include "bake/volume_baker.h"
 #include "bake/volume_planes.h"
 #include "src/base/byte_count.h"
 #include "src/base/error.h"
@@ -68,8 +69,9 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
     const double asked =
         std::min(contents.in_fullest_plane,
                  static_cast<double>(kViewsAtATime) / options.views_per_voxel + kBrickVoxels);
-    density += contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel)) +
-               asked * (kSightBytes + kSeenBytes * options.views_per_voxel);
+    density += static_cast<double>(planes_at_a_time(options)) *
+               (contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel)) +
+                asked * (kSightBytes + kSeenBytes * options.views_per_voxel));
     const auto parts = static_cast<double>(part_count(plane_count(plan), !options.max_memory.empty()));
     writing = std::max(writing, contents.bricks * kRim * kLeafBytes +
                                     parts * kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel));

@@ -1,6 +1,7 @@
 #pragma once
 /// Finished parts of a bake on disk, so that a bake holds little in memory and goes on where it was stopped.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "src/base/error.h"
+#include "src/base/parallel.h"
 
 namespace cnerf {
 
@@ -34,14 +36,28 @@ class BakeJournal {
   /// How many parts there were when the file was opened.
   [[nodiscard]] std::size_t found() const;
 
-  /// Part `number`: read if it is finished, else made and written. Parts are made in order, without gaps.
-  /// @throws OutputError  when it cannot be written, e.g. on a full disk; and whatever `make` throws.
+  /// Calls `use(i, part first + i)` for each i below `count`, in order. A part is read if it is finished, else made and
+  /// written, which has to happen in order and without gaps. `at_a_time` parts are made at the same time: `make(i)` is
+  /// called by several threads.
+  /// @throws OutputError  when one cannot be written, e.g. on a full disk; and whatever `make` and `use` throw.
   template <typename T>
-  std::vector<T> part(std::size_t number, const std::function<std::vector<T>()>& make) {
-    if (number < size()) return read<T>(number);
-    std::vector<T> made = make();
-    append(number, std::as_bytes(std::span<const T>(made)));
-    return made;
+  void parts(std::size_t first, std::size_t count, std::size_t at_a_time,
+             const std::function<std::vector<T>(std::size_t)>& make,
+             const std::function<void(std::size_t, const std::vector<T>&)>& use) {
+    for (std::size_t begin = 0; begin < count; begin += at_a_time) {
+      std::vector<std::vector<T>> some(std::min(at_a_time, count - begin));
+      const std::size_t finished = size();
+      parallel_tasks(some.size(), [&](std::size_t i) {
+        const std::size_t number = first + begin + i;
+        some[i] = number < finished ? read<T>(number) : make(begin + i);
+      });
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        const std::size_t number = first + begin + i;
+        if (number >= finished) append(number, std::as_bytes(std::span<const T>(some[i])));
+        use(begin + i, some[i]);
+        some[i] = {};
+      }
+    }
   }
   /// A finished part.  @throws InputError  when it cannot be read any more.
   template <typename T>

@@ -51,6 +51,10 @@ BrickSamples gather_samples(const ColorField& field, const BakePlan& plan, int s
   const AxisSamples y = axis_samples(frame, plan, subsamples, brick_min, 1);
   const AxisSamples z = axis_samples(frame, plan, subsamples, brick_min, 2);
   BrickSamples samples;
+  const std::size_t most = x.unit.size() * y.unit.size() * z.unit.size();
+  samples.positions.reserve(most);
+  samples.offsets.reserve(most);
+  samples.in_voxel.reserve(most);
   for (int offset = 0; offset < kBrickVoxels; ++offset) {
     const Vec3i local = brick_local(offset);
     if (plan.in_hole(brick_min + local)) continue;

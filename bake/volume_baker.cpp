@@ -1,9 +1,12 @@
 #include "bake/volume_baker.h"
 
+#include <algorithm>
+
 #include "bake/density_pass.h"
 #include "bake/dilate.h"
 #include "bake/radiance_pass.h"
 #include "src/base/error.h"
+#include "src/base/parallel.h"
 
 namespace cnerf {
 namespace {
@@ -36,6 +39,12 @@ int planes_of_all(const std::vector<BakeLevel>& levels) {
 
 }  // namespace
 
+std::size_t planes_at_a_time(const BakeOptions& options) {
+  constexpr int kThreadsOfPlane = 4, kMost = 4;
+  if (!options.max_memory.empty()) return 1;
+  return static_cast<std::size_t>(std::clamp(thread_count() / kThreadsOfPlane, 1, kMost));
+}
+
 // The journal's parts are the planes of the density pass, level by level, then those of the radiance pass.
 
 std::vector<BakeLevel> bake_levels(const ColorField& field, const std::vector<BakePlan>& plans,
@@ -43,16 +52,19 @@ std::vector<BakeLevel> bake_levels(const ColorField& field, const std::vector<Ba
   std::vector<BakeLevel> levels;
   for (const BakePlan& plan : plans) levels.push_back({plan, empty_density(plan)});
   PassProgress progress(sink, 0, kDensityShare, planes_of_all(levels));
-  std::size_t part = 0;
+  std::size_t first = 0;
   bool any = false;
   for (BakeLevel& level : levels) {
-    for (int plane = 0; plane < plane_count(level.plan); ++plane) {
-      const auto voxels =
-          journal.part<DenseVoxel>(part++, [&] { return bake_density_plane(field, level.plan, options, plane); });
-      put_plane(voxels, plane, level.sigma);
-      any = any || !voxels.empty();
-      progress.plane_done();
-    }
+    const auto planes = static_cast<std::size_t>(plane_count(level.plan));
+    journal.parts<DenseVoxel>(
+        first, planes, planes_at_a_time(options),
+        [&](std::size_t plane) { return bake_density_plane(field, level.plan, options, static_cast<int>(plane)); },
+        [&](std::size_t plane, const std::vector<DenseVoxel>& voxels) {
+          put_plane(voxels, static_cast<int>(plane), level.sigma);
+          any = any || !voxels.empty();
+          progress.plane_done();
+        });
+    first += planes;
   }
   if (!any) throw InputError("bake: no voxel is as opaque as opacity_threshold; lower it, or check --aabb");
   return levels;
@@ -65,18 +77,23 @@ std::vector<VolumePlanes> bake_volumes(const ColorField& field, const std::vecto
   PassProgress progress(sink, kDensityShare, 1, static_cast<double>(planes_of_density));
   const auto views = select_views(cameras, density_levels(levels), options);
   std::vector<VolumePlanes> volumes;
-  std::size_t dense_part = 0;
+  std::size_t dense_first = 0;
   for (std::size_t level = 0; level < levels.size(); ++level) {
     const BakePlan& plan = levels[level].plan;
     const RadiancePass pass(field, levels, level, *views, options);
-    const std::size_t first = planes_of_density + dense_part;
+    const auto planes = static_cast<std::size_t>(plane_count(plan));
+    const std::size_t first = planes_of_density + dense_first;
     bool any = false;
-    for (int plane = 0; plane < plane_count(plan); ++plane, ++dense_part) {
-      const auto voxels = journal.part<BakedVoxel>(
-          planes_of_density + dense_part, [&] { return pass.bake_plane(journal.read<DenseVoxel>(dense_part), plane); });
-      any = any || !voxels.empty();
-      progress.plane_done();
-    }
+    journal.parts<BakedVoxel>(
+        first, planes, planes_at_a_time(options),
+        [&](std::size_t plane) {
+          return pass.bake_plane(journal.read<DenseVoxel>(dense_first + plane), static_cast<int>(plane));
+        },
+        [&](std::size_t, const std::vector<BakedVoxel>& voxels) {
+          any = any || !voxels.empty();
+          progress.plane_done();
+        });
+    dense_first += planes;
     if (!any) continue;
     VolumePlanes volume{{plan.origin, plan.voxel_size, plan.resolution, field.frame(), {}, {}},
                         0,

@@ -63,10 +63,10 @@ class CheckedArchive : public openvdb::io::Archive {
     parallel_tasks(grids.size(), [&](std::size_t g) { descriptors[g] = write_grid(grids[g], written[g]); });
     for (std::size_t g = 0; g < grids.size(); ++g) {
       const std::streamoff begin = out.tellp();
-      out << written[g].rdbuf();
-      const std::streamoff end = out.tellp();
+      const std::string_view bytes = written[g].view();
+      out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
       move_descriptor(descriptors[g], begin, out);
-      out.seekp(end);
+      out.seekp(0, std::ios::end);
       written[g] = {};
     }
   }

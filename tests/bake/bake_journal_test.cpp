@@ -26,11 +26,20 @@ std::vector<int> never_made() {
   return {};
 }
 
+/// One part, by itself.
+template <typename Make>
+std::vector<int> part(BakeJournal& journal, std::size_t number, const Make& make) {
+  std::vector<int> made;
+  journal.parts<int>(
+      number, 1, 1, [&](std::size_t) { return make(); }, [&](std::size_t, const std::vector<int>& it) { made = it; });
+  return made;
+}
+
 /// Parts of 0, 10, 20, ... numbers.
 void fill(const fs::path& file, std::size_t parts) {
   BakeJournal journal(file, "one bake");
   for (std::size_t p = 0; p < parts; ++p) {
-    (void)journal.part<int>(p, [p] { return numbers(10 * static_cast<int>(p)); });
+    (void)part(journal, p, [p] { return numbers(10 * static_cast<int>(p)); });
   }
 }
 
@@ -39,10 +48,48 @@ TEST(BakeJournal, FinishedPartsAreReadNotMade) {
   fill(folder / "j", 4);
   BakeJournal journal(folder / "j", "one bake");
   EXPECT_EQ(journal.found(), 4u);
-  EXPECT_EQ(journal.part<int>(3, never_made), numbers(30));
-  EXPECT_EQ(journal.part<int>(0, never_made), numbers(0));
-  EXPECT_EQ(journal.part<int>(4, [] { return numbers(40); }), numbers(40));
+  EXPECT_EQ(part(journal, 3, never_made), numbers(30));
+  EXPECT_EQ(part(journal, 0, never_made), numbers(0));
+  EXPECT_EQ(part(journal, 4, [] { return numbers(40); }), numbers(40));
   EXPECT_EQ(journal.size(), 5u);
+}
+
+TEST(BakeJournal, PartsMadeAtTheSameTimeAreUsedInOrderAndLieAsIfMadeOneByOne) {
+  const TempDir folder;
+  fill(folder / "one by one", 11);
+  fill(folder / "together", 3);
+  {
+    BakeJournal journal(folder / "together", "one bake");
+    std::atomic<int> made = 0;
+    std::vector<std::size_t> used;
+    journal.parts<int>(
+        1, 10, 4,
+        [&](std::size_t i) {
+          ++made;
+          return numbers(10 * static_cast<int>(i + 1));
+        },
+        [&](std::size_t i, const std::vector<int>& part) {
+          EXPECT_EQ(part, numbers(10 * static_cast<int>(i + 1)));
+          used.push_back(i);
+        });
+    EXPECT_EQ(made, 8) << "parts 1 and 2 were there";
+    EXPECT_TRUE(std::is_sorted(used.begin(), used.end()));
+    EXPECT_EQ(used.size(), 10u);
+  }
+  EXPECT_EQ(read_binary_file(folder / "together"), read_binary_file(folder / "one by one"));
+}
+
+TEST(BakeJournal, APartThatFailsKeepsThoseOfFormerGroups) {
+  const TempDir folder;
+  {
+    BakeJournal journal(folder / "j", "one bake");
+    const auto make = [](std::size_t i) {
+      if (i == 5) throw InputError("bad part");
+      return numbers(static_cast<int>(i));
+    };
+    EXPECT_THROW(journal.parts<int>(0, 8, 3, make, [](std::size_t, const std::vector<int>&) {}), InputError);
+  }
+  EXPECT_EQ(BakeJournal(folder / "j", "one bake").found(), 3u);
 }
 
 TEST(BakeJournal, SeveralThreadsReadAtTheSameTime) {
@@ -82,7 +129,7 @@ TEST(BakeJournal, WhateverIsCutOffIsDroppedAndTheRestStays) {
       ASSERT_EQ(journal.read<int>(p), numbers(10 * static_cast<int>(p)));
     if (bytes % 16 != 0) continue;
     for (std::size_t p = 0; p < 4; ++p) {
-      (void)journal.part<int>(p, [p] { return numbers(10 * static_cast<int>(p)); });
+      (void)part(journal, p, [p] { return numbers(10 * static_cast<int>(p)); });
     }
     ASSERT_EQ(read_binary_file(folder / "cut"), whole) << bytes;
   }
@@ -103,7 +150,7 @@ TEST(BakeJournal, PlacesThatCannotBeWrittenAreOutputErrors) {
   std::ofstream(folder / "file") << "no folder";
   EXPECT_THROW(BakeJournal(folder / "file" / "j", "one bake"), OutputError);
   BakeJournal journal;
-  EXPECT_THROW((void)journal.part<int>(1, [] { return numbers(1); }), ContractError) << "parts have an order";
+  EXPECT_THROW((void)part(journal, 1, [] { return numbers(1); }), ContractError) << "parts have an order";
   EXPECT_THROW((void)journal.read<int>(0), ContractError);
 }
 

@@ -11,6 +11,7 @@
 #include "export/vdb_reader.h"
 #include "export/vdb_writer.h"
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "tests/export/test_volumes.h"
 #include "tests/support/data.h"
@@ -211,6 +212,13 @@ TEST(Vdb, OneThreadOrSeveralWriteTheSame) {
   const BakedVolume several = read_vdb(folder / "several.vdb"), one = read_vdb(folder / "one.vdb");
   EXPECT_GT(several.voxels.size(), volume.voxels.size()) << "colours reach beyond";
   EXPECT_EQ(several.voxels, one.voxels);
+
+  // Grids written at the same time lie, and say that they lie, where those written one by one do.
+  constexpr std::size_t kUuid = 21, kBehindUuid = kUuid + 36;
+  auto bytes = read_binary_file(folder / "several.vdb"), wanted = read_binary_file(folder / "one.vdb");
+  ASSERT_EQ(bytes.size(), wanted.size());
+  std::copy(wanted.begin() + kUuid, wanted.begin() + kBehindUuid, bytes.begin() + kUuid);
+  EXPECT_EQ(bytes, wanted);
 }
 
 TEST(Vdb, HugeDensitiesStayFinite) {
