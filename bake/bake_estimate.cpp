@@ -66,9 +66,8 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
     const Contents contents = probe(field, plan, coarse);
     density +=
         contents.bricks * kBrickBytes + static_cast<double>(plan.lattice_voxels() / kBrickVoxels * sizeof(void*));
-    const double asked =
-        std::min(contents.in_fullest_plane,
-                 static_cast<double>(kViewsAtATime) / options.views_per_voxel + kBrickVoxels);
+    const double asked = std::min(contents.in_fullest_plane,
+                                  static_cast<double>(kViewsAtATime) / options.views_per_voxel + kBrickVoxels);
     density += static_cast<double>(planes_at_a_time(options)) *
                (contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel)) +
                 asked * (kSightBytes + kSeenBytes * options.views_per_voxel));

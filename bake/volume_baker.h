@@ -10,8 +10,8 @@
 
 namespace cnerf {
 
-/// Planes of bricks that are baked at the same time, so that the GPU and the threads wait less for each other; one where
-/// memory is limited. It takes several threads to bake one.
+/// Planes of bricks that are baked at the same time, so that the GPU and the threads wait less for each other; one
+/// where memory is limited. It takes several threads to bake one.
 [[nodiscard]] std::size_t planes_at_a_time(const BakeOptions& options);
 
 /// First half of a bake: density on each lattice of plan_levels, 1/world unit. What the journal has of it is not made

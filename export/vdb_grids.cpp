@@ -135,8 +135,8 @@ struct Stored {
 };
 
 BuilderPtr color_grid(const std::string& name, const Content& content) {
-  auto builder = grid_builder<openvdb::Vec3SGrid>(
-      name, content, [stored = Stored{content.options.half}](const BakedVoxel& v) {
+  auto builder =
+      grid_builder<openvdb::Vec3SGrid>(name, content, [stored = Stored{content.options.half}](const BakedVoxel& v) {
         return openvdb::Vec3s(stored(v.rgb.x), stored(v.rgb.y), stored(v.rgb.z));
       });
   builder->grid().setVectorType(openvdb::VEC_INVARIANT);
@@ -159,7 +159,8 @@ BuilderPtr emission_grid(const Content& content) {
 BuilderPtr float_grid(const std::string& name, const std::string& meaning, const Content& content,
                       float BakedVoxel::*member) {
   auto builder = grid_builder<openvdb::FloatGrid>(
-      name, content, [stored = Stored{content.options.half}, member](const BakedVoxel& v) { return stored(v.*member); });
+      name, content,
+      [stored = Stored{content.options.half}, member](const BakedVoxel& v) { return stored(v.*member); });
   builder->grid().insertMeta("meaning", openvdb::StringMetadata(meaning));
   return builder;
 }

@@ -23,8 +23,8 @@ std::uint32_t compression_flags(const std::string& name) {
   return openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK;
 }
 
-/// What openvdb::io::File writes, but to a stream whose failures are seen (File leaves a cut-off file on a full disk and
-/// says nothing), and either grid after grid, so that only one is in memory, or all of them at the same time.
+/// What openvdb::io::File writes, but to a stream whose failures are seen (File leaves a cut-off file on a full disk
+/// and says nothing), and either grid after grid, so that only one is in memory, or all of them at the same time.
 class CheckedArchive : public openvdb::io::Archive {
  public:
   explicit CheckedArchive(std::uint32_t compression) { setCompression(compression); }

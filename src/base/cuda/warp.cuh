@@ -1,22 +1,33 @@
 #pragma once
-/// Sums across a warp. All 32 lanes call them together.
+/// Sums across a warp, or across groups of its lanes that each work on something of their own. All 32 lanes call them
+/// together.
 
 namespace cnerf {
 
+/// @tparam kLanes  of a group, a power of two
+template <int kLanes = 32>
 __device__ inline float warp_sum(float value) {
 #pragma unroll
-  for (int offset = 16; offset > 0; offset /= 2) value += __shfl_xor_sync(~0u, value, offset);
+  for (int offset = kLanes / 2; offset > 0; offset /= 2) value += __shfl_xor_sync(~0u, value, offset);
   return value;
 }
-/// Sum of the lanes up to and including this one.
+/// Sum of the group's lanes up to and including this one.
+template <int kLanes = 32>
 __device__ inline float warp_prefix_sum(float value) {
-  const unsigned lane = threadIdx.x % 32;
+  const unsigned lane = threadIdx.x % kLanes;
 #pragma unroll
-  for (unsigned offset = 1; offset < 32; offset *= 2) {
-    const float before = __shfl_up_sync(~0u, value, offset);
+  for (unsigned offset = 1; offset < kLanes; offset *= 2) {
+    const float before = __shfl_up_sync(~0u, value, offset, kLanes);
     if (lane >= offset) value += before;
   }
   return value;
+}
+/// A bit a lane of the group, lowest first.
+template <int kLanes = 32>
+__device__ inline unsigned warp_ballot(bool yes) {
+  const unsigned all = __ballot_sync(~0u, yes);
+  if constexpr (kLanes == 32) return all;
+  return (all >> (threadIdx.x % 32 / kLanes * kLanes)) & ((1u << kLanes % 32) - 1u);
 }
 
 }  // namespace cnerf

@@ -7,6 +7,7 @@
 #include "src/base/check.h"
 #include "src/base/parallel.h"
 #include "src/base/rng.h"
+#include "src/engine/cuda/render_kernel.h"
 #include "src/engine/cuda/trained_parameters.h"
 #include "src/engine/heaviest_samples.h"
 #include "src/engine/initial_state.h"
@@ -504,7 +505,7 @@ void LuminanceEngineCuda::render(std::span<const Ray> rays, const MarchSettings&
     const auto count = std::uint32_t(std::min<std::size_t>(most, rays.size() - first));
     TraceJob trace = job_of_rays(rays.subspan(first, count), march, effort.min_transmittance);
     trace.results = m.results.data();
-    trace_to_results(trace, m.stream);
+    render_rays(trace, m.stream);
     CNERF_CUDA(cudaMemcpyAsync(results.data() + first, m.results.data(), count * sizeof(RayResult),
                                cudaMemcpyDeviceToHost, m.stream));
     m.wait();
@@ -531,7 +532,7 @@ void LuminanceEngineCuda::render_view(const UnitCamera& camera, const MarchSetti
     threshold_occupancy(trace.layout, least_optical_thickness, m.cells.data(), m.render_bits.data(), m.stream);
     trace.occupied = m.render_bits.data();
   }
-  trace_to_results(trace, m.stream);
+  render_rays(trace, m.stream);
   if (!results.empty()) {
     CNERF_CUDA(
         cudaMemcpyAsync(results.data(), m.results.data(), count * sizeof(RayResult), cudaMemcpyDeviceToHost, m.stream));

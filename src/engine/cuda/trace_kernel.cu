@@ -6,7 +6,7 @@
 #include "src/color/colorspace_math.h"
 #include "src/field/cuda/channel_tiles.h"
 #include "src/field/cuda/field_forward.cuh"
-#include "src/render/composite_math.h"
+#include "src/render/cuda/run_optics.cuh"
 #include "src/render/cuda/warp_march.cuh"
 #include "src/render/distortion_math.h"
 
@@ -16,27 +16,12 @@ namespace {
 constexpr int kWarps = 8;
 constexpr int kThreads = 32 * kWarps;
 
-/// Of a rendering, 32 samples that add less than this to the opacity are left dark: a tenth of an 8-bit step in light.
-constexpr float kLeastSeen = 4e-4f;
-
-enum class Keep { kTraining, kResults, kSamples };
+enum class Keep { kTraining, kSamples };
 
 template <int KT>
 struct TraceShared {
   BlockField<KT, kWarps> field;
   MarchQueue queue[kWarps];
-};
-
-/// Optical depths of a run of samples, and with them the light that comes through.
-struct RunOptics {
-  float depth;          ///< sigma dt of this lane's sample; 0 where there is none
-  float depth_through;  ///< of everything up to and including it
-
-  __device__ RunOptics(float depth_before, float own)
-      : depth(own), depth_through(depth_before + warp_prefix_sum(own)) {}
-  [[nodiscard]] __device__ float transmittance_after() const { return expf(-depth_through); }
-  [[nodiscard]] __device__ float weight() const { return expf(depth - depth_through) * alpha_of(depth, 1.0f); }
-  [[nodiscard]] __device__ float total() const { return __shfl_sync(~0u, depth_through, 31); }
 };
 
 /// A ray's distortion, a run of samples at a time.
@@ -62,9 +47,9 @@ struct RunDistortion {
 /// What a ray has gathered so far. Runs lie in memory one after another, or wherever there was room; lane r knows where
 /// run r begins.
 struct RayProgress {
-  float depth = 0;                      ///< optical
-  float luminance = 0, weighted_t = 0;  ///< this lane's share
-  RunDistortion distortion;             ///< of training rays
+  float depth = 0;           ///< optical
+  float luminance = 0;       ///< this lane's share
+  RunDistortion distortion;  ///< of training rays
   int samples = 0, marched = 0;
   std::uint32_t run_begin = 0;
   bool has_room = true;
@@ -123,7 +108,7 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
     const std::uint32_t at = __shfl_sync(~0u, ray.run_begin, first / 32) + lane;
     const bool mine = first + int(lane) < ray.samples && at < job.samples.capacity;
     const float2 stored = mine ? job.samples.gradients[at] : make_float2(0, 0);
-    const RunOptics optics(depth, stored.x);
+    const RunOptics<> optics(depth, stored.x);
     const float value = job.field.activation.value(stored.y);
     const float weight = optics.weight();
     const float through = composited + warp_prefix_sum(weight * value);
@@ -142,15 +127,9 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
     }
     const float d_raw = d_seen * weight * job.field.activation.derivative(stored.y);
     if (mine) job.samples.gradients[at] = make_float2(d_raw, d_log_density);
-    depth = optics.total();
+    depth = optics.depth_at(31);
     composited = __shfl_sync(~0u, through, 31);
   }
-}
-
-__device__ void write_result(RayResult& result, const RayProgress& ray) {
-  const float luminance = warp_sum(ray.luminance), weighted_t = warp_sum(ray.weighted_t);
-  const float opacity = 1.0f - expf(-ray.depth);
-  if (threadIdx.x % 32 == 0) result = {luminance, opacity, opacity > 0 ? weighted_t / opacity : 0.0f};
 }
 
 template <int KT, Keep kKeep>
@@ -160,14 +139,15 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
   WarpField<KT>& warp = shared.field.warp[threadIdx.x / 32];
   const FieldNets<KT> nets(shared.field.weights, shared.field.last_layer);
   const OccupiedSpace space = {job.layout, job.occupied};
-  const uint2 direction = job.directions[ray_index].share_of_lane();
-  WarpMarcher marcher(space, job.march, record, shared.queue[threadIdx.x / 32]);
+  uint2 directions[kWarpTiles];
+  for (uint2& direction : directions) direction = job.directions[ray_index].share_of_lane();
+  WarpMarcher<> marcher(space, job.march, record);
 
   RayProgress ray;
   RaySample sample;
   bool is_open = true;
   while (is_open && ray.samples < 32 * kMostRuns) {
-    int count = marcher.next(sample);
+    int count = marcher.next(sample, shared.queue[threadIdx.x / 32]);
     if (count == 0) break;
     ray.marched += count;
     const Vec3f place = in_box(record.ray.at(sample.t));
@@ -175,19 +155,17 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
     __syncwarp();
     typename FieldNets<KT>::Geometry geometry;
     const float depth = density_from_raw(nets.density(warp, geometry), job.field.density_scale) * sample.dt;
-    const RunOptics optics(ray.depth, int(lane) < count ? depth : 0.0f);
+    const RunOptics<> optics(ray.depth, int(lane) < count ? depth : 0.0f);
     const unsigned opaque = __ballot_sync(~0u, optics.transmittance_after() < job.min_transmittance);
     if (opaque != 0 && __ffs(opaque) <= count) {
       count = __ffs(opaque);  // the sample at which the ray becomes opaque is the last one
       is_open = false;
     }
     const float weight = int(lane) < count ? optics.weight() : 0.0f;
-    const bool is_seen = kKeep != Keep::kResults || warp_sum(weight) > kLeastSeen;
-    const float raw_luminance = is_seen ? nets.luminance(warp, geometry, &direction) : 0.0f;
-    const float luminance = is_seen ? job.field.activation.value(raw_luminance) : 0.0f;
+    const float raw_luminance = nets.luminance(warp, geometry, directions);
+    const float luminance = job.field.activation.value(raw_luminance);
     ray.luminance += weight * luminance;
-    ray.weighted_t += weight * sample.t;
-    ray.depth = __shfl_sync(~0u, optics.depth_through, count - 1);
+    ray.depth = optics.depth_at(count - 1);
 
     if constexpr (kKeep == Keep::kTraining) {
       if (job.distortion_weight > 0) ray.distortion.add(weight, {sample.t, sample.dt});
@@ -216,21 +194,14 @@ __global__ void __launch_bounds__(kThreads, 2)
   const std::uint32_t n_rays = job.state->rays;
 
   StepState sums;
-  [[maybe_unused]] std::uint32_t round = 0;
   while (true) {
     std::uint32_t index = 0;
-    if constexpr (kKeep == Keep::kResults) {
-      // Neighbouring pixels go to one multiprocessor at the same time: they look up the same cells.
-      index = (round++ * gridDim.x + blockIdx.x) * kWarps + threadIdx.x / 32;
-    } else {
-      if (lane == 0) index = atomicAdd(&job.state->next_ray, 1u);
-      index = __shfl_sync(~0u, index, 0);
-    }
+    if (lane == 0) index = atomicAdd(&job.state->next_ray, 1u);
+    index = __shfl_sync(~0u, index, 0);
     if (index >= n_rays) break;
     const RayRecord record = job.rays[index];
     const RayProgress ray = follow_ray<KT, kKeep>(levels, job, shared, record, index);
     if constexpr (kKeep == Keep::kTraining) train_ray(job, record, ray, n_rays, sums);
-    if constexpr (kKeep == Keep::kResults) write_result(job.results[index], ray);
     if constexpr (kKeep == Keep::kSamples) {
       if (lane < kMostRuns) job.traced[index].run[lane] = ray.run_begin;
       if (lane == 0) job.traced[index].samples = std::uint32_t(ray.samples);
@@ -358,9 +329,6 @@ void launch_trace(const TraceJob& job, cudaStream_t stream) {
 
 void trace_training_rays(const TraceJob& job, cudaStream_t stream) {
   launch_trace<Keep::kTraining>(job, stream);
-}
-void trace_to_results(const TraceJob& job, cudaStream_t stream) {
-  launch_trace<Keep::kResults>(job, stream);
 }
 void trace_to_samples(const TraceJob& job, cudaStream_t stream) {
   launch_trace<Keep::kSamples>(job, stream);

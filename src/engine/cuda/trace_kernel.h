@@ -1,6 +1,6 @@
 #pragma once
-/// The kernel that follows rays: march, hash grid, nets and compositing, a warp a ray. Training, rendering and tracing
-/// differ in what they keep.
+/// The kernel that follows rays and keeps their samples: march, hash grid, nets and compositing, a warp a ray. Training
+/// and tracing differ in what they keep.
 
 #include <cuda_runtime_api.h>
 
@@ -65,7 +65,6 @@ struct TraceJob {
 };
 
 void trace_training_rays(const TraceJob& job, cudaStream_t stream);
-void trace_to_results(const TraceJob& job, cudaStream_t stream);
 void trace_to_samples(const TraceJob& job, cudaStream_t stream);
 
 /// Density and luminance at points. `directions` null: density only.

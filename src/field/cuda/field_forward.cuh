@@ -117,17 +117,18 @@ class FieldNets {
     return warp.density[lane];
   }
   /// The luminance net's raw output for this lane's sample.
-  /// @param direction  share_of_lane() of the direction all samples have; null: each has its own in `warp.direction`
-  __device__ float luminance(WarpField<KT>& warp, const Geometry& geometry, const uint2* direction) const {
+  /// @param directions  [tiles] share_of_lane() of the direction all samples of a tile have; null: each sample has its
+  ///                    own in `warp.direction`
+  __device__ float luminance(WarpField<KT>& warp, const Geometry& geometry, const uint2* directions) const {
     const unsigned lane = threadIdx.x % 32;
     std::uint32_t features[kTiles][2][4];
 #pragma unroll
     for (int m = 0; m < kTiles; ++m) {
 #pragma unroll
       for (int r = 0; r < 4; ++r) features[m][0][r] = geometry.channels[m][r];
-      if (direction != nullptr) {
-        features[m][1][0] = features[m][1][1] = direction->x;
-        features[m][1][2] = features[m][1][3] = direction->y;
+      if (directions != nullptr) {
+        features[m][1][0] = features[m][1][1] = directions[m].x;
+        features[m][1][2] = features[m][1][3] = directions[m].y;
       } else {
         load_operand(features[m][1], &warp.direction[16 * m + lane % 16][8 * (lane / 16)]);
       }

@@ -1,9 +1,10 @@
 #pragma once
-/// Marching by a warp: 32 points of the ray's lattice are looked up at once, what is occupied queues up until there is
-/// a sample for every lane.
+/// Marching by a warp: as many points of the ray's lattice as it has lanes are looked up at once, what is occupied
+/// queues up until there is a sample for every lane.
 
 #include <cstdint>
 
+#include "src/base/cuda/warp.cuh"
 #include "src/render/cuda/ray_record.h"
 #include "src/render/march_lattice.h"
 #include "src/render/occupancy_layout.h"
@@ -25,45 +26,49 @@ struct MarchQueue {
   float t[64];
 };
 
+/// A ray's samples.
+/// @tparam kLanes  lanes that share a ray: 32, or 16 where a warp follows two
+template <int kLanes = 32>
 class WarpMarcher {
  public:
-  __device__ WarpMarcher(const OccupiedSpace& space, const MarchSettings& settings, const RayRecord& record,
-                         MarchQueue& queue)
-      : space_(space),
-        queue_(queue),
-        lattice_(settings, record.begin, record.jitter),
-        ray_(record.ray),
-        end_(record.end) {}
+  WarpMarcher() = default;
+  __device__ WarpMarcher(const OccupiedSpace& space, const MarchSettings& settings, const RayRecord& record)
+      : lattice_(settings, record.begin, record.jitter), ray_(record.ray), end_(record.end), space_(&space) {}
 
   /// Hands out the next samples of the ray, one a lane; returns how many there are, 0 at the ray's end.
-  __device__ int next(RaySample& sample) {
-    const unsigned lane = threadIdx.x % 32;
-    while (queued_ < 32 && lattice_.t_at(index_) < end_) {
+  /// @param wanted  whether this lane's group wants any; the whole warp calls the function
+  __device__ int next(RaySample& sample, MarchQueue& warp_queue, bool wanted = true) {
+    const unsigned lane = threadIdx.x % kLanes;
+    float* queue = warp_queue.t + threadIdx.x % 32 / kLanes * (2 * kLanes);
+    while (true) {
+      const bool looks = wanted && queued_ < kLanes && lattice_.t_at(index_) < end_;
+      if (!__any_sync(~0u, looks)) break;
       const float t = lattice_.t_at(index_ + int(lane));
-      const bool occupied = t < end_ && space_.holds(ray_.at(t));
-      const unsigned lanes = __ballot_sync(~0u, occupied);
-      if (occupied) queue_.t[queued_ + __popc(lanes & ((1u << lane) - 1u))] = t;
+      const bool occupied = looks && t < end_ && space_->holds(ray_.at(t));
+      const unsigned lanes = warp_ballot<kLanes>(occupied);
+      if (occupied) queue[queued_ + __popc(lanes & ((1u << lane) - 1u))] = t;
       queued_ += __popc(lanes);
-      index_ += 32;
+      if (looks) index_ += kLanes;
     }
     __syncwarp();
-    const int count = min(queued_, 32);
-    sample.t = int(lane) < count ? queue_.t[lane] : 0.0f;
-    sample.dt = lattice_.step(sample.t);
-    const float kept = int(lane) < queued_ - count ? queue_.t[32 + lane] : 0.0f;
+    const int count = wanted ? min(queued_, kLanes) : 0;
+    if (wanted) {
+      sample.t = int(lane) < count ? queue[lane] : 0.0f;
+      sample.dt = lattice_.step(sample.t);
+    }
+    const float kept = int(lane) < queued_ - count ? queue[count + int(lane)] : 0.0f;
     __syncwarp();
-    queue_.t[lane] = kept;
+    queue[lane] = kept;
     queued_ -= count;
     __syncwarp();
     return count;
   }
 
  private:
-  const OccupiedSpace& space_;
-  MarchQueue& queue_;
   MarchLattice lattice_;
   Ray ray_;
-  float end_;
+  float end_ = -1;
+  const OccupiedSpace* space_ = nullptr;
   int index_ = 0, queued_ = 0;
 };
 

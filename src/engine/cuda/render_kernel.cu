@@ -1,0 +1,134 @@
+#include "src/engine/cuda/render_kernel.h"
+
+#include "src/base/cuda/device_memory.h"
+#include "src/base/cuda/launch.h"
+#include "src/field/cuda/channel_tiles.h"
+#include "src/field/cuda/field_forward.cuh"
+#include "src/render/cuda/run_optics.cuh"
+#include "src/render/cuda/warp_march.cuh"
+
+namespace cnerf {
+namespace {
+
+constexpr int kWarps = 8;
+constexpr int kThreads = 32 * kWarps;
+
+/// A warp follows two rays, a tile of 16 samples of each at a time. Rays of a picture end after a dozen or two: with 32
+/// samples at a time more would be evaluated behind the last.
+constexpr int kLanes = 16;
+constexpr int kRaysOfWarp = 32 / kLanes;
+static_assert(kRaysOfWarp == kWarpTiles, "a tile has one ray's direction");
+
+/// Samples of a tile that add less than this to the opacity are left dark: a tenth of an 8-bit step in light.
+constexpr float kLeastSeen = 4e-4f;
+
+template <int KT>
+struct RenderShared {
+  BlockField<KT, kWarps> field;
+  MarchQueue queue[kWarps];
+};
+
+/// The ray of this lane's half of the warp.
+struct HalfWarpRay {
+  bool is_open = false;
+  std::uint32_t index = 0;
+  Ray ray;
+  WarpMarcher<kLanes> marcher;
+  float depth = 0;                      ///< optical, so far
+  float luminance = 0, weighted_t = 0;  ///< this lane's share
+
+  __device__ void start(std::uint32_t number, const RayRecord& record, const OccupiedSpace& space,
+                        const MarchSettings& march) {
+    is_open = true;
+    index = number;
+    ray = record.ray;
+    marcher = {space, march, record};
+    depth = luminance = weighted_t = 0;
+  }
+};
+
+/// Writes the rays of the halves that have one and for which `ends`; those are free for others then.
+__device__ void finish(HalfWarpRay& mine, bool ends, RayResult* results) {
+  ends = ends && mine.is_open;
+  const float luminance = warp_sum<kLanes>(mine.luminance), weighted_t = warp_sum<kLanes>(mine.weighted_t);
+  if (!ends) return;
+  const float opacity = 1.0f - expf(-mine.depth);
+  if (threadIdx.x % kLanes == 0) {
+    results[mine.index] = {luminance, opacity, opacity > 0 ? weighted_t / opacity : 0.0f};
+  }
+  mine.is_open = false;
+}
+
+template <int KT>
+__global__ void __launch_bounds__(kThreads, 2)
+    render(const __grid_constant__ GridLevels levels, const __grid_constant__ TraceJob job) {
+  extern __shared__ uint4 memory[];
+  auto& shared = *reinterpret_cast<RenderShared<KT>*>(memory);
+  shared.field.load(job.field.nets);
+  const unsigned lane = threadIdx.x % 32, group = lane / kLanes;
+  WarpField<KT>& warp = shared.field.warp[threadIdx.x / 32];
+  MarchQueue& queue = shared.queue[threadIdx.x / 32];
+  const FieldNets<KT> nets(shared.field.weights, shared.field.last_layer);
+  const OccupiedSpace space = {job.layout, job.occupied};
+
+  // Neighbouring pixels go to one multiprocessor at about the same time: they look up the same cells.
+  const std::uint32_t n_rays = job.state->rays, stride = gridDim.x * kWarps * kRaysOfWarp;
+  std::uint32_t next = (blockIdx.x * kWarps + threadIdx.x / 32) * kRaysOfWarp + group;
+  HalfWarpRay mine;
+  RaySample sample;
+  while (true) {
+    int count = 0;
+    bool is_done = false;
+    while (__any_sync(~0u, count == 0 && !is_done)) {
+      if (!mine.is_open && !is_done) {
+        is_done = next >= n_rays;
+        if (!is_done) mine.start(next, job.rays[next], space, job.march);
+        next += stride;
+      }
+      const bool wants = count == 0 && mine.is_open;
+      const int found = mine.marcher.next(sample, queue, wants);
+      if (wants) count = found;
+      finish(mine, count == 0, job.results);
+    }
+    if (!__any_sync(~0u, mine.is_open)) break;
+
+    uint2 directions[kRaysOfWarp];
+#pragma unroll
+    for (int r = 0; r < kRaysOfWarp; ++r) {
+      directions[r] = job.directions[__shfl_sync(~0u, mine.index, r * kLanes)].share_of_lane();
+    }
+    warp.encode(levels, job.field.table, in_box(mine.ray.at(sample.t)), lane);
+    __syncwarp();
+    typename FieldNets<KT>::Geometry geometry;
+    const float depth = density_from_raw(nets.density(warp, geometry), job.field.density_scale) * sample.dt;
+    const bool is_sample = int(lane % kLanes) < count;
+    const RunOptics<kLanes> optics(mine.depth, is_sample ? depth : 0.0f);
+    const unsigned opaque = warp_ballot<kLanes>(optics.transmittance_after() < job.min_transmittance);
+    const bool ends = opaque != 0 && __ffs(opaque) <= count;
+    if (ends) count = __ffs(opaque);  // the sample at which the ray becomes opaque is the last one
+    const float weight = int(lane % kLanes) < count ? optics.weight() : 0.0f;
+    const bool is_seen = __any_sync(~0u, warp_sum<kLanes>(weight) > kLeastSeen);
+    if (is_seen) {
+      mine.luminance += weight * job.field.activation.value(nets.luminance(warp, geometry, directions));
+    }
+    mine.weighted_t += weight * sample.t;
+    const float through = optics.depth_at(max(count, 1) - 1);
+    if (count > 0) mine.depth = through;
+    finish(mine, ends, job.results);
+    __syncwarp();
+  }
+}
+
+}  // namespace
+
+void render_rays(const TraceJob& job, cudaStream_t stream) {
+  with_channel_tiles(job.field.n_levels, [&](auto tiles) {
+    constexpr int KT = decltype(tiles)::value;
+    using Shared = RenderShared<KT>;
+    const unsigned blocks = resident_blocks<render<KT>>(kThreads, sizeof(Shared));
+    render<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(GridLevels(job.field.levels, job.field.n_levels), job);
+    CNERF_CUDA(cudaGetLastError());
+  });
+}
+
+}  // namespace cnerf
