@@ -126,6 +126,16 @@ SoftLabel soft_label(Ab color) {
   return label;
 }
 
+Ab mean_of(const SoftLabel& label) {
+  Ab mean;
+  for (std::size_t i = 0; i < label.bin.size(); ++i) {
+    const Ab centre = ab_bin_centres()[static_cast<std::size_t>(label.bin[i])];
+    mean.a += label.weight[i] * centre.a;
+    mean.b += label.weight[i] * centre.b;
+  }
+  return mean;
+}
+
 int nearest_bin(Ab color) {
   int best = 0;
   float best_distance = std::numeric_limits<float>::infinity();

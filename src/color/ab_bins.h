@@ -25,6 +25,8 @@ struct SoftLabel {
   std::array<float, kSoftLabelBins> weight{};
 };
 [[nodiscard]] SoftLabel soft_label(Ab color);
+/// The weighted mean of a label's bins.
+[[nodiscard]] Ab mean_of(const SoftLabel& label);
 /// Index of the nearest bin.
 [[nodiscard]] int nearest_bin(Ab color);
 

@@ -16,6 +16,12 @@
 
 namespace cnerf {
 
+/// What a step adds to the cross entropy.
+struct ChromaLossWeights {
+  float spread = 0;      ///< of the mean over pixels of their spread (chroma_math.h)
+  float regression = 0;  ///< of the mean over pixels of how far the distribution's mean colour is from the label's
+};
+
 /// Classification-based injection (paper, Eq. color classification loss, read as KL(Z || Z_hat), mean over pixels).
 /// Hidden features of samples are composited once, a linear head is applied once a pixel: the same as compositing
 /// logits, since the head is linear: W sum(w h) / A + b = sum(w (W h + b)) / A.
@@ -25,12 +31,11 @@ class ChromaEngine {
   /// One optimiser step; returns the mean loss.
   /// @param labels         [R] soft labels of the pixels
   /// @param pixel_weights  [R] factors of the pixels' losses (class rebalancing, opacity); may be empty = all 1
-  /// @param spread_weight  of the mean over pixels of their spread (chroma_math.h) in the loss
   virtual double step(const PixelSamples& pixels, std::span<const SoftLabel> labels,
-                      std::span<const float> pixel_weights, float spread_weight, float learning_rate) = 0;
+                      std::span<const float> pixel_weights, const ChromaLossWeights& more, float learning_rate) = 0;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               float learning_rate) {
-    return step(pixels, labels, pixel_weights, 0, learning_rate);
+    return step(pixels, labels, pixel_weights, {}, learning_rate);
   }
   /// @param logits  [R, 313]; of pixels below kLeastColoredOpacity they mean nothing
   virtual void logits(const PixelSamples& pixels, std::span<float> logits) const = 0;

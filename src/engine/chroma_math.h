@@ -31,6 +31,22 @@ CNERF_HD inline float spread_slope(float spread_weight, float scale) {
   return 2 * spread_weight * scale;
 }
 
+/// The mean colour of a distribution p over the bins, and what it costs to be away from the label's by d: smooth L1 in
+/// a and in b, quadratic below a few units. The colorizer's training has the same term (colorizer_training/losses.h).
+inline constexpr float kSmoothMean = 10.0f;
+CNERF_HD inline float mean_cost(float d) {
+  const float far = std::abs(d);
+  return far < kSmoothMean ? 0.5f * d * d / kSmoothMean : far - 0.5f * kSmoothMean;
+}
+CNERF_HD inline float mean_slope(float d) {
+  return d < -kSmoothMean ? -1.0f : d > kSmoothMean ? 1.0f : d / kSmoothMean;
+}
+/// Derivative of a function of the mean by a logit: dL/dmean . (p_q (c_q - mean)).
+/// @param d_mean  dL/dmean
+CNERF_HD inline float logit_slope(float probability, Ab centre, Ab mean, Ab d_mean) {
+  return probability * (d_mean.a * (centre.a - mean.a) + d_mean.b * (centre.b - mean.b));
+}
+
 /// What an ab distance of d costs.
 enum class AbLoss {
   kHuber,    ///< d^2 below a few units, d above: what a few wrong pixels say hardly counts

@@ -7,33 +7,40 @@
 #include <numeric>
 #include <vector>
 
+#include "src/engine/luminance_engine.h"
+
 namespace cnerf {
 
-/// Keeps, of each ray, the fewest samples that carry `share` of its weight, in order, and scales their weights up to
-/// the ray's whole opacity.
+/// Keeps, of each ray, the fewest samples that carry `effort.shaded_share` of its weight, in order, and scales their
+/// weights up to the ray's opacity. A ray that ended early counts as opaque.
 /// @tparam Sample  has a member `weight`, >= 0
 /// @param offsets  [rays + 1], where rays begin in `samples`; changed with them
 template <typename Sample>
-void keep_heaviest(float share, std::vector<Sample>& samples, std::vector<std::size_t>& offsets) {
+void keep_heaviest(const RenderEffort& effort, std::vector<Sample>& samples, std::vector<std::size_t>& offsets) {
   std::vector<float> sorted;
   std::size_t write = 0;
   for (std::size_t r = 0; r + 1 < offsets.size(); ++r) {
     const std::size_t begin = offsets[r], end = offsets[r + 1];
     sorted.clear();
     for (std::size_t s = begin; s < end; ++s) sorted.push_back(samples[s].weight);
-    std::sort(sorted.begin(), sorted.end(), std::greater<>());
     const float total = std::accumulate(sorted.begin(), sorted.end(), 0.0f);
     float lightest = 0, carried = 0;
-    for (std::size_t i = 0; i < sorted.size() && carried < share * total; ++i) carried += lightest = sorted[i];
+    if (effort.shaded_share < 1) {
+      std::sort(sorted.begin(), sorted.end(), std::greater<>());
+      for (std::size_t i = 0; i < sorted.size() && carried < effort.shaded_share * total; ++i) {
+        carried += lightest = sorted[i];
+      }
+    }
 
     offsets[r] = write;
     float kept = 0;
     for (std::size_t s = begin; s < end; ++s) {
-      if (samples[s].weight < lightest || samples[s].weight <= 0) continue;
+      if (samples[s].weight < lightest || (samples[s].weight <= 0 && effort.shaded_share < 1)) continue;
       kept += samples[s].weight;
       samples[write++] = samples[s];
     }
-    for (std::size_t s = offsets[r]; s < write; ++s) samples[s].weight *= total / kept;
+    const float scale = kept > 0 ? effort.opacity_of(total) / kept : 1.0f;
+    for (std::size_t s = offsets[r]; s < write; ++s) samples[s].weight *= scale;
   }
   if (!offsets.empty()) offsets.back() = write;
   samples.resize(write);

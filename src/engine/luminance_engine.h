@@ -25,7 +25,7 @@ struct LuminanceEngineOptions {
   int patch_size = 0;  ///< 0: independent pixels; K: pixels come as K x K patches (paper, Eq. patch sampling)
   float patch_scale_min = 0.3f, patch_scale_max = 0.7f;  ///< s, share of the image's short side
   float max_luminance = 1.0f;                            ///< of the images; the field emits at most a little more
-  float distortion_weight = 0;  ///< of each ray's distortion (distortion_math.h) in the loss
+  float distortion_weight = 0;                           ///< of each ray's distortion (distortion_math.h) in the loss
   std::uint64_t seed = 1;
 
   [[nodiscard]] PixelSampling sampling() const { return {patch_size, patch_scale_min, patch_scale_max}; }
@@ -55,10 +55,14 @@ struct WeightedSample {
 
 /// What may be left out of a picture for speed.
 struct RenderEffort {
-  float min_transmittance = 1e-3f;  ///< a ray ends below this
+  /// A ray ends below this, and counts as opaque: what is left of it is taken to look like what was seen.
+  float min_transmittance = 1e-3f;
   /// Of a ray's weight: only the heaviest samples that carry this much are shaded, and their weights are scaled up to
   /// the ray's whole opacity. Most samples of a ray weigh next to nothing; 1 shades them all.
   float shaded_share = 1;
+
+  /// Of a ray whose samples weigh `total`.
+  [[nodiscard]] float opacity_of(float total) const { return total > 1 - min_transmittance ? 1 : total; }
 };
 
 class LuminanceEngine {

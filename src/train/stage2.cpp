@@ -409,7 +409,8 @@ class Colorization {
     } else {
       std::vector<SoftLabel> labels;
       std::ranges::transform(colors, std::back_inserter(labels), soft_label);
-      loss_ = model_.chroma->step(pixels, labels, weights, float(options_.spread_weight), rate);
+      loss_ = model_.chroma->step(pixels, labels, weights,
+                                  {float(options_.spread_weight), float(options_.regression_weight)}, rate);
     }
   }
 

@@ -26,13 +26,14 @@ struct Stage2Options {
   double known_share = 1;  ///< pixels of known colours trained on with a patch, as a share of rays_per_patch
   double learning_rate = 1e-2;
   double final_learning_rate = 1e-3;
-  int working_resolution = 384;      ///< short side, pixels, at which samples are cached
-  double cached_weight = 0.99;       ///< share of a pixel's weight the cached samples carry
-  double rebalancing = 0;            ///< lambda mixing of class rebalancing; 0 = off
-  double spread_weight = 0.1;        ///< of the spread of a pixel's features in the loss (src/engine/chroma_math.h)
-  double decode_temperature = 0.3;   ///< annealed-mean temperature; 0 = arg-max
-  int distill_steps = 1000;          ///< steps of the fit of per-sample colour for baking
-  int colorizer_batch = 4;           ///< patches a colorizer query
+  int working_resolution = 384;     ///< short side, pixels, at which samples are cached
+  double cached_weight = 0.99;      ///< share of a pixel's weight the cached samples carry
+  double rebalancing = 0;           ///< lambda mixing of class rebalancing; 0 = off
+  double spread_weight = 0.1;       ///< of the spread of a pixel's features in the loss (src/engine/chroma_math.h)
+  double regression_weight = 0;     ///< of how far the distribution's mean colour is from the answer, in the loss
+  double decode_temperature = 0.3;  ///< annealed-mean temperature; 0 = arg-max
+  int distill_steps = 1000;         ///< steps of the fit of per-sample colour for baking
+  int colorizer_batch = 4;          ///< patches a colorizer query
   int seed = 1;
   HashGridOptions grid = {.decay = 0.1};
   PurifyOptions purify;
@@ -56,6 +57,8 @@ struct Stage2Options {
     v("rebalancing", rebalancing, Range{0, 1}, "class rebalancing: 0 = off, else the share of the prior");
     v("spread_weight", spread_weight, Range{0, 1000},
       "of a loss on how far apart the features of a ray's samples lie: for colours that agree from view to view");
+    v("regression_weight", regression_weight, Range{0, 1000},
+      "of a loss on how far the mean of a pixel's distribution is from the answer's colour");
     v("decode_temperature", decode_temperature, Range{0, 10}, "annealed-mean temperature; 0 = arg-max");
     v("distill_steps", distill_steps, Range{0, 1e6}, "steps of the fit of per-sample colour that baking uses");
     v("colorizer_batch", colorizer_batch, Range{1, 64}, "patches a colorizer query");

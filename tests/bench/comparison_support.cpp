@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "src/capture/exr_io.h"
+
 namespace cnerf::bench {
 
 std::vector<float> rgb_of(const RenderedImage& image) {
@@ -26,6 +28,25 @@ std::unique_ptr<ViewAverage> average_behind(const BakeManifest& bake, const Scen
   options.voxel_size = bake.volume ? bake.volume->voxel_size : bake.mesh->voxel_size;
   options.grids = bake.finer_volumes.empty() ? "one" : "nested";
   return make_view_average(scene, cameras_of(capture), options);
+}
+
+RenderedImage read_render(const std::filesystem::path& folder, const View& view) {
+  std::string name = std::filesystem::path(view.name).replace_extension(".exr").string();
+  std::ranges::replace(name, '/', '_');
+  RenderedImage image;
+  for (int c = 0; c < 3; ++c) {
+    constexpr const char* kNames[] = {"R", "G", "B"};
+    const LinearImage channel = read_exr_channel(folder / name, kNames[c]);
+    image.baked_rgb.resize(3 * channel.values.size());
+    for (std::size_t p = 0; p < channel.values.size(); ++p) {
+      image.baked_rgb[3 * p + static_cast<std::size_t>(c)] = channel.values[p];
+    }
+  }
+  const LinearImage alpha = read_exr_channel(folder / name, "A");
+  image.width = alpha.width;
+  image.height = alpha.height;
+  image.opacity = alpha.values;
+  return image;
 }
 
 std::vector<const View*> views_to_compare(const Capture& capture, bool trained, int most) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <span>
@@ -39,6 +40,10 @@ inline double decibels(double squared, std::size_t values) {
 /// The view-averaged field behind a bake, on lattices like its own.
 [[nodiscard]] std::unique_ptr<ViewAverage> average_behind(const BakeManifest& bake, const Scene& scene,
                                                           const Capture& capture);
+
+/// A view of the field as `cnerf render --path held-out --format exr` leaves it in a folder.
+/// @throws MissingInputError, InputError.
+[[nodiscard]] RenderedImage read_render(const std::filesystem::path& folder, const View& view);
 
 /// The first held-out views (of all views where none is), or trained ones, evenly spread; at most `most`.
 [[nodiscard]] std::vector<const View*> views_to_compare(const Capture& capture, bool trained, int most);

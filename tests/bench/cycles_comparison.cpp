@@ -4,6 +4,10 @@
 //
 //   cycles_comparison BAKE CAPTURE [STAGE1.snapshot [TAKE.snapshot]] [views=3] [samples=64] [downscale=1] [holdout=0]
 //                     [trained=0] [averaged=0] [pictures=0]
+//   cycles_comparison BAKE CAPTURE RENDERS [...]
+//
+// RENDERS is a folder with the field's pictures instead, as `cnerf render RUN --view-averaged --path held-out --format
+// exr` leaves them: made on a GPU, say.
 //
 // BAKE is the folder with the VDB files, manifest.json and blender_setup.py. The views are the first held-out ones (all
 // views where none is), with trained=1 some of the others, evenly spread. With pictures=1 the folder gets
@@ -70,7 +74,9 @@ int main(int argc, char** argv) {
   capture_options.holdout = options["holdout"];
   const cnerf::Capture capture = cnerf::load_capture(files[1], capture_options);
   const std::vector<cnerf::BakedVolume> volumes = cnerf::read_volumes(bake);
-  const auto scene = files.size() > 2 ? cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "") : nullptr;
+  const bool has_renders = files.size() > 2 && std::filesystem::is_directory(files[2]);
+  const auto scene =
+      files.size() > 2 && !has_renders ? cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "") : nullptr;
   const auto average = scene && options["averaged"] != 0
                            ? cnerf::bench::average_behind(cnerf::read_manifest(bake / "manifest.json"), *scene, capture)
                            : nullptr;
@@ -88,10 +94,12 @@ int main(int argc, char** argv) {
                 decibels(sums.ours, sums.values));
     if (truth) std::printf(", against the true colours %.2f dB (sRGB)", decibels(sums.truth, sums.values));
     std::printf(", over %zu pixels\n", sums.values / 3);
-    if (scene) {
-      const auto field =
-          scene->render(view->intrinsics, view->world_from_camera, cnerf::bench::field_options(*scene, average.get()));
-      std::printf("%s: Cycles against the %sfield %s\n", view->name.c_str(), average ? "view-averaged " : "",
+    if (scene || has_renders) {
+      const auto field = has_renders ? cnerf::bench::read_render(files[2], *view)
+                                     : scene->render(view->intrinsics, view->world_from_camera,
+                                                     cnerf::bench::field_options(*scene, average.get()));
+      const char* what = has_renders ? files[2].c_str() : average ? "the view-averaged field" : "the field";
+      std::printf("%s: Cycles against %s %s\n", view->name.c_str(), what,
                   cnerf::bench::likeness_of(cycles.rgba, field).text().c_str());
       if (options["pictures"] != 0) cnerf::bench::add_row(sheet, cycles.rgba, field);
     }

@@ -68,8 +68,9 @@ HashGridOptions grid_of(int levels) {
   return {.levels = levels, .log2_rows = 12, .coarsest_resolution = 4, .finest_resolution = 128};
 }
 
-void check_distribution(int levels, int count, float spread_weight, bool quick) {
-  std::printf("-- distribution: %d levels, %d pixels, spread weight %g\n", levels, count, double(spread_weight));
+void check_distribution(int levels, int count, const ChromaLossWeights& more, bool quick) {
+  std::printf("-- distribution: %d levels, %d pixels, spread weight %g, regression weight %g\n", levels, count,
+              double(more.spread), double(more.regression));
   const PixelSamples pixels = random_pixels(count, 24, 3);
   const std::vector<Ab> colors = colors_of(pixels);
   std::vector<SoftLabel> labels;
@@ -81,7 +82,7 @@ void check_distribution(int levels, int count, float spread_weight, bool quick) 
   }
   weights.front() = 0;
   const auto cpu = make_cpu_chroma_engine(grid_of(levels), 5), cuda = make_cuda_chroma_engine(grid_of(levels), 5);
-  const auto step = [&](ChromaEngine& engine, float rate) { return engine.step(pixels, labels, weights, spread_weight, rate); };
+  const auto step = [&](ChromaEngine& engine, float rate) { return engine.step(pixels, labels, weights, more, rate); };
 
   const auto compare_logits = [&](const char* what, double bound) {
     std::vector<float> expected(std::size_t(count) * kAbBinCount), found(expected.size());
@@ -121,7 +122,7 @@ void check_distribution(int levels, int count, float spread_weight, bool quick) 
   compare_colors("annealed mean, ab distance", 0.38f, 0.1);
   compare_colors("most probable bin, ab distance", 0, 1e-3);
   // The spread is a matter of differences of features, which are rounded to half precision.
-  compare_steps(*cpu, *cuda, step, spread_weight > 1 ? 5e-2 : 2e-2);
+  compare_steps(*cpu, *cuda, step, more.spread > 1 ? 5e-2 : 2e-2);
   if (quick) return;
 
   const auto fresh_cpu = make_cpu_chroma_engine(grid_of(levels), 6);
@@ -204,12 +205,13 @@ void check_empty_pixels() {
 }  // namespace
 
 void check_chroma(bool quick) {
-  check_distribution(8, 777, 0, quick);
-  check_distribution(8, 777, 3, quick);
+  check_distribution(8, 777, {}, quick);
+  check_distribution(8, 777, {.spread = 3}, quick);
+  check_distribution(8, 777, {.regression = 0.3f}, quick);
   check_chromaticity(8, 777, AbLoss::kHuber, quick);
   if (!quick) {
-    check_distribution(3, 16, 0, quick);
-    check_distribution(16, 4096, 0.3f, quick);
+    check_distribution(3, 16, {}, quick);
+    check_distribution(16, 4096, {0.3f, 0.1f}, quick);
     check_chromaticity(3, 1, AbLoss::kSquared, quick);
     check_chromaticity(13, 3000, AbLoss::kSquared, quick);
   }

@@ -112,9 +112,9 @@ std::vector<Parameters> parameters_of(ChromaEngine& engine) {
   return parameters;
 }
 
-TEST(ChromaEngine, GradientIsTheLossesDerivativeSpreadIncluded) {
+TEST(ChromaEngine, GradientIsTheLossesDerivativeAndThatOfWhatIsAdded) {
   const PixelSamples pixels = row_of_pixels(48);
-  for (const float spread_weight : {0.0f, 30.0f}) {
+  for (const ChromaLossWeights more : {ChromaLossWeights{}, {.spread = 30}, {.regression = 1}, {3, 0.1f}}) {
     const auto engine = make_cpu_chroma_engine(small_grid(), 5);
     for (int i = 0; i < 20; ++i) engine->step(pixels, two_halves(48), {}, 1e-2f);
     for (const StatePiece& piece : engine->state()) {
@@ -122,7 +122,7 @@ TEST(ChromaEngine, GradientIsTheLossesDerivativeSpreadIncluded) {
     }
     const auto loss = [&] {
       engine->state_loaded();
-      return engine->step(pixels, two_halves(48), {}, spread_weight, 1e-12f);
+      return engine->step(pixels, two_halves(48), {}, more, 1e-12f);
     };
     loss();
     const std::vector<Parameters> parameters = parameters_of(*engine);
@@ -140,15 +140,35 @@ TEST(ChromaEngine, GradientIsTheLossesDerivativeSpreadIncluded) {
         return result;
       };
       constexpr double kStep = 1e-3;
-      EXPECT_NEAR((loss_at(kStep) - loss_at(-kStep)) / (2 * kStep), slope, 0.02 * slope) << spread_weight;
+      EXPECT_NEAR((loss_at(kStep) - loss_at(-kStep)) / (2 * kStep), slope, 0.02 * slope)
+          << more.spread << ' ' << more.regression;
     }
   }
+}
+
+TEST(ChromaEngine, RegressionIsSmoothL1OfTheMean) {
+  const PixelSamples pixels = row_of_pixels(48);
+  const std::vector<SoftLabel> labels = two_halves(48);
+  const auto loss = [&](float weight) {
+    return make_cpu_chroma_engine(small_grid(), 5)->step(pixels, labels, {}, {.regression = weight}, 1e-9f);
+  };
+  std::vector<Ab> means(pixels.pixels());
+  make_cpu_chroma_engine(small_grid(), 5)->decode(pixels, 1.0f, means);
+  double expected = 0;
+  for (std::size_t p = 0; p < means.size(); ++p) {
+    const Ab wanted = mean_of(labels[p]);
+    for (const double d : {std::abs(means[p].a - wanted.a), std::abs(means[p].b - wanted.b)}) {
+      expected += (d < 10 ? d * d / 20 : d - 5) / double(means.size());
+    }
+  }
+  EXPECT_GT(expected, 1);
+  EXPECT_NEAR(loss(1) - loss(0), expected, 1e-3 * expected);
 }
 
 TEST(ChromaEngine, SpreadIsWhatTheLossGrowsBy) {
   const PixelSamples pixels = row_of_pixels(48);
   const auto loss = [&](const PixelSamples& of, float spread_weight) {
-    return make_cpu_chroma_engine(small_grid(), 5)->step(of, two_halves(int(of.pixels())), {}, spread_weight, 1e-9f);
+    return make_cpu_chroma_engine(small_grid(), 5)->step(of, two_halves(int(of.pixels())), {}, {spread_weight}, 1e-9f);
   };
   const double none = loss(pixels, 0), once = loss(pixels, 1), twice = loss(pixels, 2);
   EXPECT_GT(once, none);
@@ -161,7 +181,7 @@ TEST(ChromaEngine, SpreadMakesTheSamplesOfAPixelAgree) {
   const auto disagreement = [&](float spread_weight) {
     const auto engine = make_cpu_chroma_engine(small_grid(), 3);
     double last = 0;
-    for (int i = 0; i < 150; ++i) last = engine->step(pixels, two_halves(64), {}, spread_weight, 1e-2f);
+    for (int i = 0; i < 150; ++i) last = engine->step(pixels, two_halves(64), {}, {spread_weight}, 1e-2f);
     EXPECT_LT(last, 0.3) << "what is wanted is still learnt";
     std::vector<Ab> colors(samples.pixels());
     engine->decode(samples, 1.0f, colors);

@@ -284,7 +284,7 @@ TEST_F(PositionalField, LogitsOfAPixelAreTheMeanOfItsSamples) {
 TEST_F(PositionalField, SpreadIsWhatTheLossGrowsByAndWhatTrainingLowers) {
   const std::vector<SoftLabel> labels = {soft_label({30, -20}), soft_label({-10, 40})};
   const auto loss = [&](float spread_weight) {
-    return makers_.chroma({}, 3)->step(two_pixels(), labels, {}, spread_weight, 1e-9f);
+    return makers_.chroma({}, 3)->step(two_pixels(), labels, {}, {spread_weight}, 1e-9f);
   };
   const double none = loss(0), once = loss(1), twice = loss(2);
   EXPECT_GT(once, none);
@@ -292,7 +292,7 @@ TEST_F(PositionalField, SpreadIsWhatTheLossGrowsByAndWhatTrainingLowers) {
 
   const auto spread_after = [&](float spread_weight) {
     const auto engine = makers_.chroma({}, 3);
-    for (int i = 0; i < 60; ++i) (void)engine->step(two_pixels(), labels, {}, spread_weight, 3e-3f);
+    for (int i = 0; i < 60; ++i) (void)engine->step(two_pixels(), labels, {}, {spread_weight}, 3e-3f);
     // Steps of next to nothing: what the loss grows by is the spread.
     const double without = engine->step(two_pixels(), labels, {}, 0, 1e-12f);
     return engine->step(two_pixels(), labels, {}, 1, 1e-12f) - without;

@@ -28,7 +28,7 @@ class ChromaEngineCpu final : public ChromaEngine {
 
   using ChromaEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
-              float spread_weight, float learning_rate) override {
+              const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
     const float scale = 1.0f / static_cast<float>(pixels.pixels());
     chunks_.run(pixels.pixels(), kBlockPixels, features_.weight_count() + head_.layout().weight_count(),
@@ -37,11 +37,11 @@ class ChromaEngineCpu final : public ChromaEngine {
                   forward(pixels, begin, end, work);
                   for (std::size_t p = begin; p < end; ++p) {
                     const float weight = pixel_weights.empty() ? 1.0f : pixel_weights[p];
-                    chunk.loss += weight * loss_gradient(work, p - begin, labels[p], weight * scale);
+                    chunk.loss += weight * loss_gradient(work, p - begin, labels[p], more.regression, weight * scale);
                   }
                   clear_padding(work, end - begin);
-                  const double spread = backward(pixels, begin, end, spread_slope(spread_weight, scale), work, chunk);
-                  chunk.loss += spread_weight * spread;
+                  const double spread = backward(pixels, begin, end, spread_slope(more.spread, scale), work, chunk);
+                  chunk.loss += more.spread * spread;
                 });
     steps_.front() += 1;
     const std::vector<float> d_weights = chunks_.d_weights();
@@ -124,8 +124,8 @@ class ChromaEngineCpu final : public ChromaEngine {
     head_.forward({{work.composited.data(), kHeadInputs}, {work.logits.data(), kHeadOutputs}}, groups);
   }
 
-  /// KL(label || softmax(logits)) of one pixel; writes its gradient times `scale`.
-  static double loss_gradient(Work& work, std::size_t pixel, const SoftLabel& label, float scale) {
+  /// KL(label || softmax(logits)) of one pixel and the cost of its mean; writes the gradient times `scale`.
+  static double loss_gradient(Work& work, std::size_t pixel, const SoftLabel& label, float regression, float scale) {
     ensure_size(work.d_logits, work.logits.size());
     float largest = work.logits[logit_at(pixel, 0)];
     for (int q = 1; q < kAbBinCount; ++q) largest = std::max(largest, work.logits[logit_at(pixel, q)]);
@@ -135,8 +135,10 @@ class ChromaEngineCpu final : public ChromaEngine {
       work.d_logits[logit_at(pixel, q)] = e;
       sum += e;
     }
-    for (int q = 0; q < kAbBinCount; ++q) work.d_logits[logit_at(pixel, q)] *= scale / sum;
     double loss = 0;
+    for (int q = 0; q < kAbBinCount; ++q) work.d_logits[logit_at(pixel, q)] /= sum;
+    if (regression > 0) loss += regression * add_mean_gradient(work, pixel, mean_of(label), regression);
+    for (int q = 0; q < kAbBinCount; ++q) work.d_logits[logit_at(pixel, q)] *= scale;
     for (int i = 0; i < kSoftLabelBins; ++i) {
       const std::size_t at = logit_at(pixel, label.bin[i]);
       const float z = label.weight[i];
@@ -146,6 +148,25 @@ class ChromaEngineCpu final : public ChromaEngine {
     }
     for (int pad = kAbBinCount; pad < kHeadOutputs; ++pad) work.d_logits[logit_at(pixel, pad)] = 0;
     return loss;
+  }
+
+  /// Cost of the mean of the pixel's probabilities, which lie where its gradient by the logits goes: adds to them the
+  /// cost's derivative times `weight`.
+  static double add_mean_gradient(Work& work, std::size_t pixel, Ab wanted, float weight) {
+    const std::array<Ab, kAbBinCount>& centres = ab_bin_centres();
+    Ab mean;
+    for (int q = 0; q < kAbBinCount; ++q) {
+      const float p = work.d_logits[logit_at(pixel, q)];
+      mean.a += p * centres[std::size_t(q)].a;
+      mean.b += p * centres[std::size_t(q)].b;
+    }
+    const Ab away = {mean.a - wanted.a, mean.b - wanted.b};
+    const Ab d_mean = {weight * mean_slope(away.a), weight * mean_slope(away.b)};
+    for (int q = 0; q < kAbBinCount; ++q) {
+      float& p = work.d_logits[logit_at(pixel, q)];
+      p += logit_slope(p, centres[std::size_t(q)], mean, d_mean);
+    }
+    return mean_cost(away.a) + mean_cost(away.b);
   }
 
   static void clear_padding(Work& work, std::size_t pixels) {

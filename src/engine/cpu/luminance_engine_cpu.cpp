@@ -116,7 +116,7 @@ void LuminanceEngineCpu::collect_for_picture(std::span<const Ray> rays, const Ma
   std::array<float, kBlockRays> middle;
   middle.fill(0.5f);
   collect(rays, middle, march, effort.min_transmittance, block);
-  if (effort.shaded_share < 1) keep_heaviest(effort.shaded_share, block.samples, block.offsets);
+  keep_heaviest(effort, block.samples, block.offsets);
 }
 
 void LuminanceEngineCpu::shade(std::span<const Ray> rays, Block& block) const {

@@ -26,7 +26,7 @@ class ChromaEngineCuda final : public ChromaEngine {
 
   using ChromaEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
-              float spread_weight, float learning_rate) override {
+              const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
     const std::lock_guard lock(mutex_);
     const std::size_t n = pixels.pixels();
@@ -42,11 +42,11 @@ class ChromaEngineCuda final : public ChromaEngine {
     features_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/true, stream_);
     const float scale = 1.0f / static_cast<float>(n);
     chroma_loss(head_job(),
-                {labels_.data(), batch_.upload_weights(pixel_weights, stream_), scale, spread_weight,
-                 d_composited_.data(), d_head_.data(), &stream_.step()->loss},
+                {labels_.data(), batch_.upload_weights(pixel_weights, stream_), centres_.data(), scale, more.spread,
+                 more.regression, d_composited_.data(), d_head_.data(), &stream_.step()->loss},
                 stream_);
     features_.backward(batch_.arrays().places, {&stream_.step()->samples, batch_.samples()},
-                       {batch_.arrays().shares, d_composited_.data(), spread_slope(spread_weight, scale)}, stream_);
+                       {batch_.arrays().shares, d_composited_.data(), spread_slope(more.spread, scale)}, stream_);
     update_head(d_head_.data(), parts);
     features_.update(&stream_.step()->adam, stream_);
     return stream_.end_step() * scale;

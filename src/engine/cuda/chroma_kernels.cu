@@ -190,6 +190,32 @@ __device__ float sum_of_row(float value, int half, float (&of_warps)[kWarps][kPi
   return of_row(value, half, of_warps, [](float a, float b) { return a + b; });
 }
 
+/// Of one row's distribution: what it costs that its mean is away from the label's, and that cost's derivative.
+struct MeanColor {
+  Ab at, slope;
+  float cost = 0;
+};
+__device__ MeanColor mean_color(float log_sum, int half, const SoftLabel& label, const Ab* centres, HeadShared& shared,
+                                Logits& logits) {
+  MeanColor mean;
+  logits.for_row(half, [&](int q, float& logit) {
+    if (q >= kAbBinCount) return;
+    const float probability = expf(logit - log_sum);
+    mean.at.a += probability * centres[q].a;
+    mean.at.b += probability * centres[q].b;
+  });
+  mean.at = {sum_of_row(mean.at.a, half, shared.sum[1]), sum_of_row(mean.at.b, half, shared.sum[2])};
+  Ab away = mean.at;
+#pragma unroll
+  for (int i = 0; i < kSoftLabelBins; ++i) {
+    away.a -= label.weight[i] * centres[label.bin[i]].a;
+    away.b -= label.weight[i] * centres[label.bin[i]].b;
+  }
+  mean.slope = {mean_slope(away.a), mean_slope(away.b)};
+  mean.cost = mean_cost(away.a) + mean_cost(away.b);
+  return mean;
+}
+
 /// Turns logits into the gradient of the pixels' losses by them; returns this lane's part of the losses.
 __device__ float softmax_gradient(std::uint32_t first, std::uint32_t pixels, const ChromaTargets& targets,
                                   HeadShared& shared, Logits& logits) {
@@ -205,9 +231,16 @@ __device__ float softmax_gradient(std::uint32_t first, std::uint32_t pixels, con
     const float weight = pixel < pixels ? targets.pixel_weights[pixel] : 0.0f;
     const float factor = weight * targets.scale;
     const SoftLabel& label = targets.labels[min(pixel, pixels - 1)];
+    const MeanColor mean =
+        targets.regression_weight > 0 ? mean_color(log_sum, half, label, targets.centres, shared, logits) : MeanColor{};
+    loss += threadIdx.x < 32 && threadIdx.x % 4 == 0 ? weight * targets.regression_weight * mean.cost : 0.0f;
     logits.for_row(half, [&](int q, float& logit) {
       const float log_probability = logit - log_sum;
-      logit = q < kAbBinCount ? factor * expf(log_probability) : 0.0f;
+      const float probability = q < kAbBinCount ? expf(log_probability) : 0.0f;
+      logit = factor * probability;
+      if (targets.regression_weight > 0 && q < kAbBinCount) {
+        logit += factor * targets.regression_weight * logit_slope(probability, targets.centres[q], mean.at, mean.slope);
+      }
 #pragma unroll
       for (int i = 0; i < kSoftLabelBins; ++i) {
         if (label.bin[i] != q || label.weight[i] <= 0 || weight == 0) continue;

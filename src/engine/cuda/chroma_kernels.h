@@ -53,13 +53,15 @@ void chroma_colors(const ChromaHeadJob& job, const ChromaDecoding& decoding, cud
 struct ChromaTargets {
   const SoftLabel* labels;     ///< [pixels]
   const float* pixel_weights;  ///< [pixels]
+  const Ab* centres;           ///< [313] of the bins
   float scale;                 ///< of the gradient
   float spread_weight;         ///< of the pixels' spreads in the loss
+  float regression_weight;     ///< of the cost of the pixels' means in the loss
   float* d_composited;         ///< [pixels, 64], written: for features h it lacks spread_slope() h
   float* d_weights;            ///< [chroma_head_parts(pixels), chroma_head_weight_count()], written
   double* loss;                ///< added to
 };
-/// Softmax, its cross entropy with the labels, the spread, and their gradient, in one kernel.
+/// Softmax, its cross entropy with the labels, the cost of its mean, the spread, and their gradient, in one kernel.
 void chroma_loss(const ChromaHeadJob& job, const ChromaTargets& targets, cudaStream_t stream);
 
 [[nodiscard]] int chroma_head_parts(std::uint32_t pixels);

@@ -37,7 +37,7 @@ const char* const kRayAdvice = "rays";
 namespace {
 
 /// Puts traced samples in the order of their rays and leaves out the light ones.
-void append_heaviest(std::span<const TracedRay> rays, const WeightedSample* found, float share,
+void append_heaviest(std::span<const TracedRay> rays, const WeightedSample* found, const RenderEffort& effort,
                      std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) {
   constexpr std::size_t kRays = 256;  // of a part
   struct Part {
@@ -54,7 +54,7 @@ void append_heaviest(std::span<const TracedRay> rays, const WeightedSample* foun
       }
       part.offsets.push_back(part.samples.size());
     }
-    if (share < 1) keep_heaviest(share, part.samples, part.offsets);
+    keep_heaviest(effort, part.samples, part.offsets);
   });
   std::vector<std::size_t> begins = {samples.size()};
   for (const Part& part : parts) {
@@ -568,7 +568,7 @@ void LuminanceEngineCuda::trace(std::span<const Ray> rays, const MarchSettings& 
     std::vector<TracedRay> of_rays(count);
     m.traced.download(of_rays.data(), count);
     m.wait();
-    append_heaviest(of_rays, &(*m.found)[0], effort.shaded_share, samples, offsets);
+    append_heaviest(of_rays, &(*m.found)[0], effort, samples, offsets);
     if (first == 0) samples.reserve(samples.size() * (rays.size() / count + 1));  // as many a ray: hardly ever moves
     first += count;
   }

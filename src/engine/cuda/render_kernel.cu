@@ -47,14 +47,16 @@ struct HalfWarpRay {
   }
 };
 
-/// Writes the rays of the halves that have one and for which `ends`; those are free for others then.
-__device__ void finish(HalfWarpRay& mine, bool ends, RayResult* results) {
+/// Writes the rays of the halves that have one and for which `ends`; those are free for others then. What is left of a
+/// ray that became opaque is taken to look like what was seen of it.
+__device__ void finish(HalfWarpRay& mine, bool ends, bool is_opaque, RayResult* results) {
   ends = ends && mine.is_open;
   const float luminance = warp_sum<kLanes>(mine.luminance), weighted_t = warp_sum<kLanes>(mine.weighted_t);
   if (!ends) return;
-  const float opacity = 1.0f - expf(-mine.depth);
+  const float weight = 1.0f - expf(-mine.depth);
   if (threadIdx.x % kLanes == 0) {
-    results[mine.index] = {luminance, opacity, opacity > 0 ? weighted_t / opacity : 0.0f};
+    results[mine.index] = {is_opaque ? luminance / weight : luminance, is_opaque ? 1.0f : weight,
+                           weight > 0 ? weighted_t / weight : 0.0f};
   }
   mine.is_open = false;
 }
@@ -88,7 +90,7 @@ __global__ void __launch_bounds__(kThreads, 2)
       const bool wants = count == 0 && mine.is_open;
       const int found = mine.marcher.next(sample, queue, wants);
       if (wants) count = found;
-      finish(mine, count == 0, job.results);
+      finish(mine, count == 0, false, job.results);
     }
     if (!__any_sync(~0u, mine.is_open)) break;
 
@@ -114,7 +116,7 @@ __global__ void __launch_bounds__(kThreads, 2)
     mine.weighted_t += weight * sample.t;
     const float through = optics.depth_at(max(count, 1) - 1);
     if (count > 0) mine.depth = through;
-    finish(mine, ends, job.results);
+    finish(mine, ends, true, job.results);
     __syncwarp();
   }
 }

@@ -286,7 +286,7 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
       for (std::size_t s = 0; s < part.size(); ++s) part[s] = {distance[s], weight[s], luminance[s]};
       std::vector<std::size_t> ends;
       for (std::size_t s = 0; s <= part.size(); s += kSamples) ends.push_back(s);
-      keep_heaviest(effort.shaded_share, part, ends);
+      keep_heaviest(effort, part, ends);
       for (std::size_t r = 1; r < ends.size(); ++r) offsets.push_back(samples.size() + ends[r]);
       samples.insert(samples.end(), part.begin(), part.end());
     });
@@ -443,7 +443,7 @@ class PositionalChromaEngine final : public ChromaEngine {
 
   using ChromaEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
-              float spread_weight, float learning_rate) override {
+              const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
     const FastProducts fast;
     const auto n = std::int64_t(labels.size());
@@ -455,10 +455,22 @@ class PositionalChromaEngine final : public ChromaEngine {
       shares.insert(shares.end(), label.weight.begin(), label.weight.end());
     }
     const Composited seen = forward(pixels, 0, pixels.pixels());
-    torch::Tensor loss = positional::classification_loss(
-        net_->classes->forward(seen.features), tensor_of(bins, {n, kSoftLabelBins}, torch::kInt64),
-        tensor_of(shares, {n, kSoftLabelBins}, torch::kFloat32), tensor_of(weights, {n}, torch::kFloat32));
-    if (spread_weight > 0) loss = loss + spread_weight * seen.spread() / n;
+    const torch::Tensor logits = net_->classes->forward(seen.features),
+                        pixel_weight = tensor_of(weights, {n}, torch::kFloat32);
+    torch::Tensor loss =
+        positional::classification_loss(logits, tensor_of(bins, {n, kSoftLabelBins}, torch::kInt64),
+                                        tensor_of(shares, {n, kSoftLabelBins}, torch::kFloat32), pixel_weight);
+    if (more.spread > 0) loss = loss + more.spread * seen.spread() / n;
+    if (more.regression > 0) {
+      std::vector<float> wanted, centres;
+      for (const SoftLabel& label : labels) wanted.insert(wanted.end(), {mean_of(label).a, mean_of(label).b});
+      for (const Ab centre : ab_bin_centres()) centres.insert(centres.end(), {centre.a, centre.b});
+      const torch::Tensor mean =
+          torch::softmax(logits, 1).matmul(tensor_of(centres, {kAbBinCount, 2}, torch::kFloat32));
+      const torch::Tensor cost = torch::smooth_l1_loss(mean, tensor_of(wanted, {n, 2}, torch::kFloat32),
+                                                       at::Reduction::None, double(kSmoothMean));
+      loss = loss + more.regression * (cost.sum(1) * pixel_weight).mean();
+    }
     loss.backward();
     steps_.front() += 1;
     trained_->follow(double(learning_rate), steps_.front());
