@@ -36,6 +36,11 @@ class VoxelMedium {
   }
   [[nodiscard]] double voxel_size() const { return voxel_size_; }
   [[nodiscard]] Vec3d voxel_from_world(Vec3d p) const { return (p - origin_) / voxel_size_; }
+  /// Whether a ray from here is in the box or enters it within a distance.  @param distance  world units
+  [[nodiscard]] bool is_near(Vec3d world, Vec3d direction, double distance) const {
+    const auto ahead = intersect(box_, voxel_from_world(world), direction);
+    return ahead && ahead->end >= 0 && ahead->begin * voxel_size_ <= distance;
+  }
   /// Stretch of a ray through the box, in world units along it.
   [[nodiscard]] std::optional<Interval<double>> stretch(Vec3d world, Vec3d direction) const {
     const auto inside = intersect(box_, voxel_from_world(world), direction);
@@ -119,8 +124,19 @@ Mixture mixture_at(const std::vector<VoxelMedium>& media, Vec3d world, Vec3d dir
   return mixture;
 }
 
-/// @param step  world units.
-Radiance integrate_ray(const std::vector<VoxelMedium>& media, Vec3d origin, Vec3d direction, double step) {
+/// Of the finest voxels that are within one step of the coarsest.
+/// @param media  finest first
+double voxel_size_near(const std::vector<VoxelMedium>& media, Vec3d world, Vec3d direction, double step) {
+  const double reach = step * media.back().voxel_size();
+  for (const VoxelMedium& medium : media) {
+    if (medium.is_near(world, direction, reach)) return medium.voxel_size();
+  }
+  return media.back().voxel_size();
+}
+
+/// @param media         finest first
+/// @param voxel_share   step, voxels
+Radiance integrate_ray(const std::vector<VoxelMedium>& media, Vec3d origin, Vec3d direction, double voxel_share) {
   constexpr double kOpaque = 1e-7;
   Radiance result;
   double begin = std::numeric_limits<double>::max(), end = 0;
@@ -131,6 +147,7 @@ Radiance integrate_ray(const std::vector<VoxelMedium>& media, Vec3d origin, Vec3
     }
   }
   while (begin < end && result.transmittance > kOpaque) {
+    const double step = voxel_share * voxel_size_near(media, origin + direction * begin, direction, voxel_share);
     const double length = std::min(step, end - begin);
     const Mixture mixture = mixture_at(media, origin + direction * (begin + length / 2), direction);
     if (mixture.empty > 0) {
@@ -154,12 +171,11 @@ VolumeImage integrate_volumes(std::span<const BakedVolume> volumes, const Intrin
   CNERF_CHECK(!volumes.empty(), "there is no volume to render");
   CNERF_CHECK(options.step > 0 && options.samples_per_axis > 0, "integrator options must be positive");
   std::vector<VoxelMedium> media;
-  double finest = std::numeric_limits<double>::max();
   for (const BakedVolume& volume : volumes) {
     CNERF_CHECK(!volume.voxels.empty() && volume.voxel_size > 0, "an empty volume cannot be rendered");
     media.emplace_back(volume);
-    finest = std::min(finest, volume.voxel_size);
   }
+  std::ranges::sort(media, {}, &VoxelMedium::voxel_size);
   const int n = options.samples_per_axis;
   VolumeImage image;
   image.width = intrinsics.width;
@@ -174,7 +190,7 @@ VolumeImage integrate_volumes(std::span<const BakedVolume> volumes, const Intrin
       for (int s = 0; s < n * n; ++s) {
         const PixelPosition pixel{x + (s % n + 0.5) / n, static_cast<double>(y) + (s / n + 0.5) / n};
         const Vec3d direction = normalized(world_from_camera.direction(ray_direction(intrinsics, pixel)));
-        const Radiance ray = integrate_ray(media, world_from_camera.translation, direction, options.step * finest);
+        const Radiance ray = integrate_ray(media, world_from_camera.translation, direction, options.step);
         rgb += ray.rgb;
         opacity += 1 - ray.transmittance;
       }
