@@ -50,8 +50,11 @@ BrickSamples gather_samples(const ColorField& field, const BakePlan& plan, int s
   const AxisSamples x = axis_samples(frame, plan, subsamples, brick_min, 0);
   const AxisSamples y = axis_samples(frame, plan, subsamples, brick_min, 1);
   const AxisSamples z = axis_samples(frame, plan, subsamples, brick_min, 2);
-  BrickSamples samples;
   const std::size_t most = x.unit.size() * y.unit.size() * z.unit.size();
+  std::vector<std::uint8_t> is_occupied(most);
+  field.mark_occupied(x.unit, y.unit, z.unit, is_occupied);
+  BrickSamples samples;
+  if (std::ranges::find(is_occupied, 1) == is_occupied.end()) return samples;
   samples.positions.reserve(most);
   samples.offsets.reserve(most);
   samples.in_voxel.reserve(most);
@@ -62,9 +65,9 @@ BrickSamples gather_samples(const ColorField& field, const BakePlan& plan, int s
     for (int s = 0; s < subsamples * subsamples * subsamples; ++s) {
       const Vec3i at = first + Vec3i{s / (subsamples * subsamples), s / subsamples % subsamples, s % subsamples};
       if (!x.is_inside[at.x] || !y.is_inside[at.y] || !z.is_inside[at.z]) continue;
-      const Vec3f unit{x.unit[at.x], y.unit[at.y], z.unit[at.z]};
-      if (!field.may_be_occupied(unit)) continue;
-      samples.positions.push_back(unit);
+      const std::size_t in_lattice = (static_cast<std::size_t>(at.x) * y.unit.size() + at.y) * z.unit.size() + at.z;
+      if (is_occupied[in_lattice] == 0) continue;
+      samples.positions.push_back({x.unit[at.x], y.unit[at.y], z.unit[at.z]});
       samples.offsets.push_back(static_cast<std::int16_t>(offset));
       samples.in_voxel.push_back(static_cast<std::int16_t>(s));
     }

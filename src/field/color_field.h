@@ -2,6 +2,7 @@
 /// What the bake, the viewer and evaluation need of a trained scene: point queries. Engines implement it.
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "src/base/vec3.h"
@@ -25,6 +26,16 @@ class ColorField {
   [[nodiscard]] virtual std::size_t points_at_a_time() const { return std::size_t(1) << 12; }
   /// False where the occupancy grid knows the cell that holds `position` to be empty.
   [[nodiscard]] virtual bool may_be_occupied(Vec3f position) const = 0;
+  /// The same for all points of a lattice.  @param marks  [x][y][z], written: 1 where `may_be_occupied`
+  virtual void mark_occupied(std::span<const float> x, std::span<const float> y, std::span<const float> z,
+                             std::span<std::uint8_t> marks) const {
+    std::size_t at = 0;
+    for (const float px : x) {
+      for (const float py : y) {
+        for (const float pz : z) marks[at++] = may_be_occupied({px, py, pz}) ? 1 : 0;
+      }
+    }
+  }
   /// sigma: density, 1/unit-space length, >= 0. Not masked by occupancy.
   virtual void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const = 0;
   /// luminance: linear Y seen when looking along `directions` (unit length, away from the camera).

@@ -27,6 +27,38 @@ OccupancyGrid::OccupancyGrid(const OccupancyOptions& options, int cascades)
   blocks_.assign(cells / (kBlockSide * kBlockSide * kBlockSide), 1);
 }
 
+void OccupancyGrid::mark_occupied(std::span<const float> x, std::span<const float> y, std::span<const float> z,
+                                  std::span<std::uint8_t> marks) const {
+  CNERF_CHECK_EQ(marks.size(), x.size() * y.size() * z.size());
+  struct Axis {
+    std::vector<int> cascades;
+    std::vector<std::size_t> cells;  // [coordinates][cascades]
+  };
+  const auto axis_of = [&](std::span<const float> coordinates) {
+    Axis axis;
+    for (const float c : coordinates) {
+      axis.cascades.push_back(layout_.cascade_of(c));
+      for (int k = 0; k < layout_.cascades; ++k) axis.cells.push_back(layout_.cell_along(k, c));
+    }
+    return axis;
+  };
+  const Axis of_x = axis_of(x), of_y = axis_of(y), of_z = axis_of(z);
+  const auto n = std::size_t(layout_.cascades);
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    for (std::size_t j = 0; j < y.size(); ++j) {
+      const int of_row = std::max(of_x.cascades[i], of_y.cascades[j]);
+      for (std::size_t k = 0; k < z.size(); ++k) {
+        const int cascade = std::max(of_row, of_z.cascades[k]);
+        const auto c = std::size_t(cascade);
+        const std::size_t cell =
+            layout_.cell_at(cascade, of_x.cells[i * n + c], of_y.cells[j * n + c], of_z.cells[k * n + c]);
+        marks[at++] = (bits_[cell / 64] >> (cell % 64)) & 1u;
+      }
+    }
+  }
+}
+
 double OccupancyGrid::occupied_share() const {
   std::size_t count = 0;
   for (const std::uint64_t word : bits_) count += static_cast<std::size_t>(std::popcount(word));
@@ -66,7 +98,8 @@ void OccupancyGrid::exclude(const std::function<bool(Vec3f, float)>& wanted) {
     for (int y0 = 0; y0 < r; y0 += kSide) {
       for (int x0 = 0; x0 < r; x0 += kSide) {
         const Vec3f in_cells = {float(x0) + 0.5f * kSide, float(y0) + 0.5f * kSide, float(z0) + 0.5f * kSide};
-        const Vec3f centre = (in_cells / float(r) - Vec3f{0.5f, 0.5f, 0.5f}) * layout_.side(k) + Vec3f{0.5f, 0.5f, 0.5f};
+        const Vec3f centre =
+            (in_cells / float(r) - Vec3f{0.5f, 0.5f, 0.5f}) * layout_.side(k) + Vec3f{0.5f, 0.5f, 0.5f};
         if (wanted(centre, radius)) continue;
         for (int z = z0; z < z0 + kSide; ++z) {
           for (int y = y0; y < y0 + kSide; ++y) {

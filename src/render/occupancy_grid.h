@@ -39,6 +39,10 @@ class OccupancyGrid {
     const std::size_t cell = layout_.cell_of(cascade, p);
     return (bits_[cell / 64] >> (cell % 64)) & 1u;
   }
+  /// `occupied` of the innermost cascade that holds them, for all points of a lattice.
+  /// @param marks  [x][y][z], written: 1 where it is
+  void mark_occupied(std::span<const float> x, std::span<const float> y, std::span<const float> z,
+                     std::span<std::uint8_t> marks) const;
   /// False when all 8^3 cells around `p` are empty as well: a marcher may leave the whole block at once.
   [[nodiscard]] bool block_occupied(int cascade, Vec3f p) const { return blocks_[layout_.block_of(cascade, p)] != 0; }
 

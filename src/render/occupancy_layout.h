@@ -33,14 +33,12 @@ struct OccupancyLayout {
   }
   [[nodiscard]] CNERF_HD float cell_side(int cascade) const { return side(cascade) / static_cast<float>(resolution); }
 
-  /// The innermost cascade whose box holds `p`, of [0, 1]^3.
+  /// The innermost cascade whose box holds `p`, of [0, 1]^3: the largest of what its coordinates ask for.
   [[nodiscard]] CNERF_HD int cascade_of(Vec3f p) const {
     const float x = std::abs(p.x - 0.5f), y = std::abs(p.y - 0.5f), z = std::abs(p.z - 0.5f);
-    const float reach = 2.0f * (x > y ? (x > z ? x : z) : (y > z ? y : z));
-    int k = 0;
-    while (k + 1 < cascades && reach > side(k)) ++k;
-    return k;
+    return cascade_at(x > y ? (x > z ? x : z) : (y > z ? y : z));
   }
+  [[nodiscard]] CNERF_HD int cascade_of(float coordinate) const { return cascade_at(std::abs(coordinate - 0.5f)); }
   /// Index of the cell that holds `p`, over all cascades, x fastest.
   [[nodiscard]] CNERF_HD std::size_t cell_of(int cascade, Vec3f p) const { return index_of(cascade, p, resolution); }
   /// Index of the aligned cube of `8^3` cells that holds `p`.
@@ -58,14 +56,32 @@ struct OccupancyLayout {
     return in_cascade * side(int(cell / (r * r * r))) + Vec3f{0.5f, 0.5f, 0.5f};
   }
 
+  /// The cell along one axis that holds a coordinate.
+  [[nodiscard]] CNERF_HD std::size_t cell_along(int cascade, float coordinate) const {
+    return cell_along(cascade, coordinate, resolution);
+  }
+  /// Index of the cell that lies so far along each axis.
+  [[nodiscard]] CNERF_HD std::size_t cell_at(int cascade, std::size_t x, std::size_t y, std::size_t z) const {
+    return index_at(cascade, x, y, z, resolution);
+  }
+
  private:
-  [[nodiscard]] CNERF_HD std::size_t index_of(int cascade, Vec3f p, int r) const {
+  /// @param distance  of a coordinate from the middle
+  [[nodiscard]] CNERF_HD int cascade_at(float distance) const {
+    int k = 0;
+    while (k + 1 < cascades && 2.0f * distance > side(k)) ++k;
+    return k;
+  }
+  [[nodiscard]] CNERF_HD std::size_t cell_along(int cascade, float coordinate, int r) const {
     const float scale = 1.0f / side(cascade);
-    const auto at = [&](float x) {
-      const int cell = static_cast<int>(((x - 0.5f) * scale + 0.5f) * static_cast<float>(r));
-      return std::size_t(cell < 0 ? 0 : cell >= r ? r - 1 : cell);
-    };
-    return ((std::size_t(cascade) * std::size_t(r) + at(p.z)) * std::size_t(r) + at(p.y)) * std::size_t(r) + at(p.x);
+    const int cell = static_cast<int>(((coordinate - 0.5f) * scale + 0.5f) * static_cast<float>(r));
+    return std::size_t(cell < 0 ? 0 : cell >= r ? r - 1 : cell);
+  }
+  [[nodiscard]] CNERF_HD static std::size_t index_at(int cascade, std::size_t x, std::size_t y, std::size_t z, int r) {
+    return ((std::size_t(cascade) * std::size_t(r) + z) * std::size_t(r) + y) * std::size_t(r) + x;
+  }
+  [[nodiscard]] CNERF_HD std::size_t index_of(int cascade, Vec3f p, int r) const {
+    return index_at(cascade, cell_along(cascade, p.x, r), cell_along(cascade, p.y, r), cell_along(cascade, p.z, r), r);
   }
 };
 

@@ -93,6 +93,10 @@ class TrainedScene final : public Scene {
     const OccupancyGrid& grid = luminance_.engine->occupancy();
     return grid.occupied(grid.cascade_of(position), position);
   }
+  void mark_occupied(std::span<const float> x, std::span<const float> y, std::span<const float> z,
+                     std::span<std::uint8_t> marks) const override {
+    luminance_.engine->occupancy().mark_occupied(x, y, z, marks);
+  }
   [[nodiscard]] std::size_t points_at_a_time() const override { return luminance_.engine->points_at_a_time(); }
   void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override {
     luminance_.engine->query_density(positions, sigma);
