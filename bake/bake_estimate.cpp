@@ -52,13 +52,15 @@ Contents probe(const ColorField& field, const BakePlan& plan, const BakeOptions&
 
 BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>& plans, const BakeOptions& options) {
   BakeOptions coarse = options;
-  coarse.subsamples = 1;                                           // counts, not values
-  constexpr double kBytesInHalf = 7 * 2;                           // density, colour, a, b, luminance
-  constexpr double kBrickBytes = kBrickVoxels * sizeof(float);     // of the density that light passes through
-  constexpr double kLeafBytes = 3 * kBrickVoxels * sizeof(float);  // of the largest grid of a file, that of colours
-  constexpr double kRim = 1.5;                                     // leaves that only hold dilated colours
-  constexpr double kPlanes = 4;                                    // three to look into, one made and sorted
-  constexpr double kSampleBytes = 40;                              // of a density sample on its way
+  coarse.subsamples = 1;                                        // counts, not values
+  constexpr double kBytesInHalf = 7 * 2;                        // density, colour, a, b, luminance
+  constexpr double kBrickBytes = kBrickVoxels * sizeof(float);  // of the density that light passes through
+  // Of the grids of a file: of the largest, that of colours, where they are written one after another.
+  const bool is_sparing = !options.max_memory.empty();
+  const double leaf_bytes = (is_sparing ? 3 : 7) * kBrickVoxels * sizeof(float);
+  constexpr double kRim = 1.5;                          // leaves that only hold dilated colours
+  constexpr double kPlanes = 4;                         // three to look into, one made and sorted
+  constexpr double kSampleBytes = 40;                   // of a density sample on its way
   constexpr double kSightBytes = 200, kSeenBytes = 68;  // of a voxel in a question who sees it, and of a view
   double density = 0, writing = 0;
   BakeEstimate estimate;
@@ -71,8 +73,9 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
     density += static_cast<double>(planes_at_a_time(options)) *
                (contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel)) +
                 asked * (kSightBytes + kSeenBytes * options.views_per_voxel));
-    const auto parts = static_cast<double>(part_count(plane_count(plan), !options.max_memory.empty()));
-    writing = std::max(writing, contents.bricks * kRim * kLeafBytes +
+    const auto parts = static_cast<double>(part_count(plane_count(plan), is_sparing));
+    const double compressed = is_sparing ? 0 : contents.voxels * kBytesInHalf;
+    writing = std::max(writing, contents.bricks * kRim * leaf_bytes + compressed +
                                     parts * kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel));
     estimate.voxels += static_cast<std::size_t>(contents.voxels);
   }

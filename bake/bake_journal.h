@@ -5,9 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <exception>
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -20,7 +22,7 @@ namespace cnerf {
 
 /// A list of byte strings in a file that only grows. A process may be killed at any time: what is cut off or damaged is
 /// dropped when the file is opened again, and everything before it is still there. Several threads may read finished
-/// parts while none is made.
+/// parts while none is written.
 class BakeJournal {
  public:
   /// In a file without a name, gone with the object.  @throws OutputError.
@@ -45,17 +47,26 @@ class BakeJournal {
              const std::function<std::vector<T>(std::size_t)>& make,
              const std::function<void(std::size_t, const std::vector<T>&)>& use) {
     for (std::size_t begin = 0; begin < count; begin += at_a_time) {
-      std::vector<std::vector<T>> some(std::min(at_a_time, count - begin));
+      std::vector<std::optional<std::vector<T>>> some(std::min(at_a_time, count - begin));
       const std::size_t finished = size();
-      parallel_tasks(some.size(), [&](std::size_t i) {
+      std::exception_ptr failure;
+      try {
+        parallel_tasks(some.size(), [&](std::size_t i) {
+          const std::size_t number = first + begin + i;
+          some[i] = number < finished ? read<T>(number) : make(begin + i);
+        });
+      } catch (...) {
+        failure = std::current_exception();
+      }
+      // What is made is kept, whoever stops the bake.
+      for (std::size_t i = 0; i < some.size() && some[i]; ++i) {
         const std::size_t number = first + begin + i;
-        some[i] = number < finished ? read<T>(number) : make(begin + i);
-      });
+        if (number >= finished) append(number, std::as_bytes(std::span<const T>(*some[i])));
+      }
+      if (failure) std::rethrow_exception(failure);
       for (std::size_t i = 0; i < some.size(); ++i) {
-        const std::size_t number = first + begin + i;
-        if (number >= finished) append(number, std::as_bytes(std::span<const T>(some[i])));
-        use(begin + i, some[i]);
-        some[i] = {};
+        use(begin + i, *some[i]);
+        some[i].reset();
       }
     }
   }

@@ -13,6 +13,7 @@
 namespace cnerf {
 namespace {
 
+constexpr std::size_t kMostOrders = std::size_t(1) << 22;  ///< cameras of all orders in a question
 constexpr std::array<Vec3f, 6> kAllSides{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
 
 }  // namespace
@@ -137,7 +138,8 @@ void ViewAverage::query(std::span<const Vec3f> positions, std::span<float> lumin
   const std::size_t most = kViewsAtATime / static_cast<std::size_t>(views_->views_per_voxel());
   for (std::size_t begin = 0, end = 0; begin < bricks.size(); begin = end) {
     std::size_t count = 0;
-    while (end < bricks.size() && bricks[end].level == bricks[begin].level && count < most) {
+    while (end < bricks.size() && bricks[end].level == bricks[begin].level && count < most &&
+           (end - begin) * views_->eyes().size() < kMostOrders) {
       count += bricks[end++].points.size();
     }
     ask(std::span(bricks).subspan(begin, end - begin), positions, luminance);

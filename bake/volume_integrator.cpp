@@ -39,7 +39,7 @@ class VoxelMedium {
   /// Whether a ray from here is in the box or enters it within a distance.  @param distance  world units
   [[nodiscard]] bool is_near(Vec3d world, Vec3d direction, double distance) const {
     const auto ahead = intersect(box_, voxel_from_world(world), direction);
-    return ahead && ahead->end >= 0 && ahead->begin * voxel_size_ <= distance;
+    return ahead && ahead->begin * voxel_size_ <= distance;
   }
   /// Stretch of a ray through the box, in world units along it.
   [[nodiscard]] std::optional<Interval<double>> stretch(Vec3d world, Vec3d direction) const {
@@ -126,8 +126,8 @@ Mixture mixture_at(const std::vector<VoxelMedium>& media, Vec3d world, Vec3d dir
 
 /// Of the finest voxels that are within one step of the coarsest.
 /// @param media  finest first
-double voxel_size_near(const std::vector<VoxelMedium>& media, Vec3d world, Vec3d direction, double step) {
-  const double reach = step * media.back().voxel_size();
+double voxel_size_near(const std::vector<VoxelMedium>& media, Vec3d world, Vec3d direction, double voxel_share) {
+  const double reach = voxel_share * media.back().voxel_size();
   for (const VoxelMedium& medium : media) {
     if (medium.is_near(world, direction, reach)) return medium.voxel_size();
   }

@@ -57,11 +57,15 @@ class CheckedArchive : public openvdb::io::Archive {
   }
 
   /// Compressing takes longest, so each grid is written to a memory of its own, by a thread of its own.
-  void write_together(const std::vector<openvdb::GridBase::Ptr>& grids, std::ostream& out) const {
+  void write_together(std::vector<openvdb::GridBase::Ptr> grids, std::ostream& out) const {
     std::vector<std::ostringstream> written(grids.size());
     std::vector<Descriptor> descriptors(grids.size());
-    parallel_tasks(grids.size(), [&](std::size_t g) { descriptors[g] = write_grid(grids[g], written[g]); });
-    for (std::size_t g = 0; g < grids.size(); ++g) {
+    parallel_tasks(grids.size(), [&](std::size_t g) {
+      written[g].exceptions(std::ios::failbit | std::ios::badbit);  // where memory does not suffice as well
+      descriptors[g] = write_grid(grids[g], written[g]);
+      grids[g].reset();
+    });
+    for (std::size_t g = 0; g < written.size(); ++g) {
       const std::streamoff begin = out.tellp();
       const std::string_view bytes = written[g].view();
       out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));

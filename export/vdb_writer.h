@@ -59,8 +59,9 @@ struct VdbOptions {
 /// `dilation` beyond density, and two corners that keep the box of all of them `padding` voxels away, because renderers
 /// that make grids dense fade density, but not colour, at the sides of that box. World is the frame of the poses,
 /// turned by `up`; the metadata's `cnerf_world_to_source` turns it back. Density is stored in 16 bits only when all of
-/// it is within their normal range; else that grid has 32. Grids are made and written one after another: the largest,
-/// not their sum, is what this holds. The file is whole or not there.
+/// it is within their normal range; else that grid has 32. All grids are made and compressed at the same time; where
+/// the volume is sparing one after another, so that the largest, not their sum, is what this holds. The file is whole
+/// or not there.
 /// @throws ContractError  on NaN, infinity, negative density, an empty volume or an unknown option value.
 /// @throws OutputError    when the file cannot be written.
 void write_vdb(const VolumePlanes& volume, const std::filesystem::path& path, const VdbOptions& options = {});

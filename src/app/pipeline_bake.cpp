@@ -197,7 +197,7 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   if (formats.vdb || formats.web) {
     std::vector<VolumePlanes> volumes = drop_journal_on_bad_input(
         unfinished, [&] { return bake_volumes(*scene, cameras, levels, options, journal, context.reporter.sink()); });
-    if (!formats.gltf) levels.clear();  // files are written grid by grid: they need the memory
+    if (!formats.gltf) levels.clear();  // grids of files need the memory
     for (VolumePlanes& volume : volumes) {
       volume.colorizer = origin.colorizer;
       volume.take = origin.take;

@@ -58,7 +58,7 @@ struct RenderConfig {
     v("fps", fps, Range{1, 240}, "pictures a second of a video");
     v("short_side", short_side, Range{16, 8192}, "pixels of a spiral or an orbit, at most the capture's");
     v("steps_per_box", steps_per_box, Range{16, 8192}, "march steps across the side of the innermost cascade");
-    v("min_transmittance", min_transmittance, Range{0, 0.5}, "a ray ends below this");
+    v("min_transmittance", min_transmittance, Range{0, 0.5}, "a ray ends below this, and counts as opaque");
   }
 };
 

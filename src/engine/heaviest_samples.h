@@ -17,18 +17,18 @@ namespace cnerf {
 /// @param offsets  [rays + 1], where rays begin in `samples`; changed with them
 template <typename Sample>
 void keep_heaviest(const RenderEffort& effort, std::vector<Sample>& samples, std::vector<std::size_t>& offsets) {
-  std::vector<float> sorted;
+  std::vector<float> weights;
   std::size_t write = 0;
   for (std::size_t r = 0; r + 1 < offsets.size(); ++r) {
     const std::size_t begin = offsets[r], end = offsets[r + 1];
-    sorted.clear();
-    for (std::size_t s = begin; s < end; ++s) sorted.push_back(samples[s].weight);
-    const float total = std::accumulate(sorted.begin(), sorted.end(), 0.0f);
+    weights.clear();
+    for (std::size_t s = begin; s < end; ++s) weights.push_back(samples[s].weight);
+    const float total = std::accumulate(weights.begin(), weights.end(), 0.0f);
     float lightest = 0, carried = 0;
     if (effort.shaded_share < 1) {
-      std::sort(sorted.begin(), sorted.end(), std::greater<>());
-      for (std::size_t i = 0; i < sorted.size() && carried < effort.shaded_share * total; ++i) {
-        carried += lightest = sorted[i];
+      std::sort(weights.begin(), weights.end(), std::greater<>());
+      for (std::size_t i = 0; i < weights.size() && carried < effort.shaded_share * total; ++i) {
+        carried += lightest = weights[i];
       }
     }
 

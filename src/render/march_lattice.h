@@ -1,6 +1,7 @@
 #pragma once
-/// The points a ray may be sampled at, by number. RayMarcher walks them one after another; a kernel asks for 32 at
-/// once. Steps are dt(t) = clamp(cone_angle t, dt_min, dt_max): constant, then geometric, then constant again.
+/// The points a ray may be sampled at, by number. RayMarcher walks them one after another; a kernel asks for as
+/// many at once as lanes share the ray. Steps are dt(t) = clamp(cone_angle t, dt_min, dt_max): constant, then
+/// geometric, then constant again.
 
 #include <cmath>
 
@@ -29,9 +30,7 @@ class MarchLattice {
   }
 
   /// Length of the step that starts at t.
-  [[nodiscard]] CNERF_HD float step(float t) const {
-    return march_step(settings_, t);
-  }
+  [[nodiscard]] CNERF_HD float step(float t) const { return march_step(settings_, t); }
   /// The index-th point.
   [[nodiscard]] CNERF_HD float t_at(int index) const {
     if (settings_.cone_angle <= 0 || index < growing_at_) return first_ + static_cast<float>(index) * settings_.dt_min;

@@ -27,7 +27,7 @@ struct RenderedImage {
 
 struct RenderOptions {
   int steps_per_box = 512;          ///< march steps across the innermost cascade
-  double min_transmittance = 1e-3;  ///< a ray ends below this
+  double min_transmittance = 1e-3;  ///< a ray ends below this, and counts as opaque
   bool color = true;                ///< also rgb, when the scene is colorized
   bool baked_color = false;         ///< also baked_rgb
   /// Linear Y of samples at positions in unit space, in place of the field's own, which depends on the view.

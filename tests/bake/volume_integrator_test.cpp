@@ -95,6 +95,26 @@ TEST(Integrator, SkippingEmptySpaceChangesNothing) {
   EXPECT_GT(largest, 0.5f) << "the camera sees the blocks";
 }
 
+TEST(Integrator, NestedGridsMayBeFollowedInStepsOfTheVoxelsThatAreNear) {
+  // A fine block in front of a coarse one and beside it, seen from outside and from within the fine one.
+  BakedVolume coarse = block({0, 0, 0}, {20, 20, 20}, 0.8), fine = block({0, 0, 0}, {24, 24, 24}, 1.5);
+  constexpr double kRatio = 4;
+  fine.voxel_size = coarse.voxel_size / kRatio;
+  fine.origin = world_of(coarse, {21, 7, 7});
+  const std::vector<BakedVolume> both = {coarse, fine};
+  for (const Vec3d eye : {Vec3d{60, 12, 11}, Vec3d{24, 10, 10}}) {
+    const BakeCamera camera = camera_at("eye", world_of(coarse, eye), world_of(coarse, {0, 9, 9.5}), 16, 16, 20);
+    const VolumeImage near = integrate_volumes(both, camera.intrinsics, camera.world_from_camera, {0.25, 1});
+    const VolumeImage all = integrate_volumes(both, camera.intrinsics, camera.world_from_camera, {0.25 / kRatio, 1});
+    float largest = 0;
+    for (std::size_t p = 0; p < near.opacity.size(); ++p) {
+      EXPECT_NEAR(near.opacity[p], all.opacity[p], 2e-3);
+      largest = std::max(largest, near.opacity[p]);
+    }
+    EXPECT_GT(largest, 0.5f) << "the camera sees the blocks";
+  }
+}
+
 TEST(Integrator, ABakedSphereShowsTheFieldsOpticalDepth) {
   const SceneFrame frame{{0, 0, 0}, 0.25, 1};                                      // radius 0.25 unit = 1 world unit
   const AnalyticField field(frame, sphere_density({0.5f, 0.5f, 0.5f}, 0.25f, 4));  // sigma 1 per world unit

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "src/base/error.h"
 #include "src/capture/exr_io.h"
 
 namespace cnerf::bench {
@@ -43,6 +44,11 @@ RenderedImage read_render(const std::filesystem::path& folder, const View& view)
     }
   }
   const LinearImage alpha = read_exr_channel(folder / name, "A");
+  if (alpha.width != view.intrinsics.width || alpha.height != view.intrinsics.height) {
+    throw InputError(folder / name, "size",
+                     fmt::format("expected {} x {} as the view, found {} x {}", view.intrinsics.width,
+                                 view.intrinsics.height, alpha.width, alpha.height));
+  }
   image.width = alpha.width;
   image.height = alpha.height;
   image.opacity = alpha.values;

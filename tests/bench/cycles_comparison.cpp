@@ -64,7 +64,8 @@ int main(int argc, char** argv) {
                                                          {"pictures", 0}});
   if (files.size() < 2) {
     std::puts(
-        "cycles_comparison BAKE CAPTURE [STAGE1.snapshot [TAKE.snapshot]] [views=N] [samples=N] [downscale=N] "
+        "cycles_comparison BAKE CAPTURE [STAGE1.snapshot [TAKE.snapshot] | RENDERS] [views=N] [samples=N] "
+        "[downscale=N] "
         "[holdout=N] [trained=0|1] [averaged=0|1] [pictures=0|1]");
     return 64;
   }

@@ -294,10 +294,28 @@ TEST_F(PositionalField, SpreadIsWhatTheLossGrowsByAndWhatTrainingLowers) {
     const auto engine = makers_.chroma({}, 3);
     for (int i = 0; i < 60; ++i) (void)engine->step(two_pixels(), labels, {}, {spread_weight}, 3e-3f);
     // Steps of next to nothing: what the loss grows by is the spread.
-    const double without = engine->step(two_pixels(), labels, {}, 0, 1e-12f);
-    return engine->step(two_pixels(), labels, {}, 1, 1e-12f) - without;
+    const double without = engine->step(two_pixels(), labels, {}, {}, 1e-12f);
+    return engine->step(two_pixels(), labels, {}, {.spread = 1}, 1e-12f) - without;
   };
   EXPECT_LT(spread_after(1), 0.5 * spread_after(0));
+}
+
+TEST_F(PositionalField, RegressionIsSmoothL1OfTheMean) {
+  const std::vector<SoftLabel> labels = {soft_label({30, -20}), soft_label({-10, 40})};
+  const auto loss = [&](float weight) {
+    return makers_.chroma({}, 3)->step(two_pixels(), labels, {}, {.regression = weight}, 1e-9f);
+  };
+  std::vector<Ab> means(2);
+  makers_.chroma({}, 3)->decode(two_pixels(), 1.0f, means);
+  double expected = 0;
+  for (std::size_t p = 0; p < means.size(); ++p) {
+    const Ab wanted = mean_of(labels[p]);
+    for (const double d : {std::abs(means[p].a - wanted.a), std::abs(means[p].b - wanted.b)}) {
+      expected += (d < 10 ? d * d / 20 : d - 5) / 2;
+    }
+  }
+  EXPECT_GT(expected, 1);
+  EXPECT_NEAR(loss(1) - loss(0), expected, 1e-3 * expected);
 }
 
 TEST_F(PositionalField, LearnsColoursAndLeavesTheEncodingAlone) {

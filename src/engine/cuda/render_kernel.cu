@@ -19,7 +19,8 @@ constexpr int kLanes = 16;
 constexpr int kRaysOfWarp = 32 / kLanes;
 static_assert(kRaysOfWarp == kWarpTiles, "a tile has one ray's direction");
 
-/// Samples of a tile that add less than this to the opacity are left dark: a tenth of an 8-bit step in light.
+/// A tile whose samples add less than this to the opacity is left dark, if that of the other ray is as well: a tenth of
+/// an 8-bit step in light.
 constexpr float kLeastSeen = 4e-4f;
 
 template <int KT>
@@ -78,9 +79,9 @@ __global__ void __launch_bounds__(kThreads, 2)
   std::uint32_t next = (blockIdx.x * kWarps + threadIdx.x / 32) * kRaysOfWarp + group;
   HalfWarpRay mine;
   RaySample sample;
+  bool is_done = false;
   while (true) {
     int count = 0;
-    bool is_done = false;
     while (__any_sync(~0u, count == 0 && !is_done)) {
       if (!mine.is_open && !is_done) {
         is_done = next >= n_rays;

@@ -262,7 +262,7 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
   }
   [[nodiscard]] long step_count() const override { return counters_[0]; }
 
-  void render(std::span<const Ray> rays, const MarchSettings&, const RenderEffort&,
+  void render(std::span<const Ray> rays, const MarchSettings&, const RenderEffort& effort,
               std::span<RayResult> results) const override {
     CNERF_CHECK_EQ(rays.size(), results.size());
     for_parts(rays, [&](std::size_t first, const torch::Tensor& t, const Seen& seen) {
@@ -270,7 +270,10 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
       const torch::Tensor opacity = seen.weights.sum(1);
       const std::vector<float> a = floats_of(opacity);
       const std::vector<float> depth = floats_of((seen.weights * t).sum(1) / opacity.clamp_min(1e-6));
-      for (std::size_t r = 0; r < a.size(); ++r) results[first + r] = {luminance[r], a[r], depth[r]};
+      for (std::size_t r = 0; r < a.size(); ++r) {
+        const float opacity = effort.opacity_of(a[r]);
+        results[first + r] = {opacity > a[r] ? luminance[r] / a[r] : luminance[r], opacity, depth[r]};
+      }
     });
   }
 
