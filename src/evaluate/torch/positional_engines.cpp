@@ -271,8 +271,8 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
       const std::vector<float> a = floats_of(opacity);
       const std::vector<float> depth = floats_of((seen.weights * t).sum(1) / opacity.clamp_min(1e-6));
       for (std::size_t r = 0; r < a.size(); ++r) {
-        const float opacity = effort.opacity_of(a[r]);
-        results[first + r] = {opacity > a[r] ? luminance[r] / a[r] : luminance[r], opacity, depth[r]};
+        const float counted = effort.opacity_of(a[r]);
+        results[first + r] = {counted > a[r] ? luminance[r] / a[r] : luminance[r], counted, depth[r]};
       }
     });
   }
