@@ -96,11 +96,11 @@ TEST(Integrator, SkippingEmptySpaceChangesNothing) {
 }
 
 TEST(Integrator, NestedGridsMayBeFollowedInStepsOfTheVoxelsThatAreNear) {
-  // A fine block in front of a coarse one and beside it, seen from outside and from within the fine one.
-  BakedVolume coarse = block({0, 0, 0}, {20, 20, 20}, 0.8), fine = block({0, 0, 0}, {24, 24, 24}, 1.5);
-  constexpr double kRatio = 4;
+  // A sheet of two fine voxels, which steps of coarse ones would miss or count twice, in front of a coarse block.
+  BakedVolume coarse = block({0, 0, 0}, {20, 20, 20}, 0.8), fine = block({0, 0, 0}, {2, 64, 64}, 60);
+  constexpr double kRatio = 8;
   fine.voxel_size = coarse.voxel_size / kRatio;
-  fine.origin = world_of(coarse, {21, 7, 7});
+  fine.origin = world_of(coarse, {21, 5, 5});
   const std::vector<BakedVolume> both = {coarse, fine};
   for (const Vec3d eye : {Vec3d{60, 12, 11}, Vec3d{24, 10, 10}}) {
     const BakeCamera camera = camera_at("eye", world_of(coarse, eye), world_of(coarse, {0, 9, 9.5}), 16, 16, 20);
