@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "bake/baked_volume.h"
 #include "bake/brick_grid.h"
@@ -9,7 +11,6 @@
 #include "bake/radiance_pass.h"
 #include "bake/view_selection.h"
 #include "bake/volume_baker.h"
-#include "bake/volume_planes.h"
 #include "src/base/byte_count.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
@@ -17,14 +18,21 @@
 namespace cnerf {
 namespace {
 
-constexpr std::size_t kProbes = 8192;  ///< bricks of a grid that are looked into
+constexpr std::size_t kProbes = 8192;   ///< bricks of a grid that are looked into
+constexpr double kBytesInHalf = 7 * 2;  ///< of a voxel: density, colour, a, b, luminance
 
-/// What is found in some bricks of a grid, blown up to all of them.
 struct Contents {
   double voxels = 0, bricks = 0;
   double in_fullest_plane = 0;  ///< voxels
+
+  void add_plane(double plane_voxels, double plane_bricks) {
+    voxels += plane_voxels;
+    bricks += plane_bricks;
+    in_fullest_plane = std::max(in_fullest_plane, plane_voxels);
+  }
 };
 
+/// What is found in some bricks of a grid, blown up to all of them.
 Contents probe(const ColorField& field, const BakePlan& plan, const BakeOptions& options) {
   const Vec3i counts = plane_bricks(plan);
   const std::size_t in_plane = static_cast<std::size_t>(counts.y) * counts.z;
@@ -41,11 +49,38 @@ Contents probe(const ColorField& field, const BakePlan& plan, const BakeOptions&
     const std::vector<DenseVoxel> voxels = bake_density_bricks(field, plan, options, plane, bricks);
     double filled = 0;
     for (std::size_t v = 0; v < voxels.size(); ++v) filled += v == 0 || voxels[v].brick != voxels[v - 1].brick ? 1 : 0;
-    contents.voxels += static_cast<double>(voxels.size() * stride);
-    contents.bricks += filled * static_cast<double>(stride);
-    contents.in_fullest_plane = std::max(contents.in_fullest_plane, static_cast<double>(voxels.size() * stride));
+    contents.add_plane(static_cast<double>(voxels.size() * stride), filled * static_cast<double>(stride));
   }
   return contents;
+}
+
+/// Of all voxels of a volume.
+Contents contents_of(const VolumePlanes& volume) {
+  Contents contents;
+  for (int plane = volume.begin; plane < volume.end; ++plane) {
+    const std::vector<BakedVoxel> voxels = volume.read(plane);
+    std::set<std::pair<int, int>> bricks;
+    for (const BakedVoxel& voxel : voxels) bricks.emplace(voxel.j / kBrickSide, voxel.k / kBrickSide);
+    contents.add_plane(static_cast<double>(voxels.size()), static_cast<double>(bricks.size()));
+  }
+  return contents;
+}
+
+/// Memory that writing a grid of `planes` planes of bricks takes.
+double writing_bytes(const Contents& contents, int planes, bool is_sparing) {
+  // Of the grids of a file: of the largest, that of colours, where they are written one after another.
+  const double leaf_bytes = (is_sparing ? 3 : 7) * kBrickVoxels * sizeof(float);
+  constexpr double kRim = 1.5;   // leaves that only hold dilated colours
+  constexpr double kPlanes = 4;  // three to look into, one made and sorted
+  const double compressed = is_sparing ? 0 : contents.voxels * kBytesInHalf;
+  return contents.bricks * kRim * leaf_bytes + compressed +
+         static_cast<double>(part_count(planes, is_sparing)) * kPlanes * contents.in_fullest_plane * kRim *
+             sizeof(BakedVoxel);
+}
+
+/// `options.max_memory` in bytes.
+std::size_t allowed_bytes(const BakeOptions& options) {
+  return bytes_from("max_memory", options.max_memory);
 }
 
 }  // namespace
@@ -53,34 +88,25 @@ Contents probe(const ColorField& field, const BakePlan& plan, const BakeOptions&
 BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>& plans, const BakeOptions& options) {
   BakeOptions coarse = options;
   coarse.subsamples = 1;                                        // counts, not values
-  constexpr double kBytesInHalf = 7 * 2;                        // density, colour, a, b, luminance
   constexpr double kBrickBytes = kBrickVoxels * sizeof(float);  // of the density that light passes through
-  // Of the grids of a file: of the largest, that of colours, where they are written one after another.
-  const bool is_sparing = !options.max_memory.empty();
-  const double leaf_bytes = (is_sparing ? 3 : 7) * kBrickVoxels * sizeof(float);
-  constexpr double kRim = 1.5;                          // leaves that only hold dilated colours
-  constexpr double kPlanes = 4;                         // three to look into, one made and sorted
-  constexpr double kSampleBytes = 40;                   // of a density sample on its way
-  constexpr double kSightBytes = 200, kSeenBytes = 68;  // of a voxel in a question who sees it, and of a view
-  double density = 0, writing = 0;
+  constexpr double kSampleBytes = 40;                           // of a density sample on its way
+  constexpr double kSightBytes = 200, kSeenBytes = 68;          // of a voxel in a question who sees it, and of a view
+  double finding = thread_count() * static_cast<double>(field.points_at_a_time()) * kSampleBytes, writing = 0;
   BakeEstimate estimate;
   for (const BakePlan& plan : plans) {
     const Contents contents = probe(field, plan, coarse);
-    density +=
+    finding +=
         contents.bricks * kBrickBytes + static_cast<double>(plan.lattice_voxels() / kBrickVoxels * sizeof(void*));
     const double asked = std::min(contents.in_fullest_plane,
                                   static_cast<double>(kViewsAtATime) / options.views_per_voxel + kBrickVoxels);
-    density += static_cast<double>(planes_at_a_time(options)) *
+    finding += static_cast<double>(planes_at_a_time(options)) *
                (contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel)) +
                 asked * (kSightBytes + kSeenBytes * options.views_per_voxel));
-    const auto parts = static_cast<double>(part_count(plane_count(plan), is_sparing));
-    const double compressed = is_sparing ? 0 : contents.voxels * kBytesInHalf;
-    writing = std::max(writing, contents.bricks * kRim * leaf_bytes + compressed +
-                                    parts * kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel));
+    writing = std::max(writing, writing_bytes(contents, plane_count(plan), !options.max_memory.empty()));
     estimate.voxels += static_cast<std::size_t>(contents.voxels);
   }
-  density += thread_count() * static_cast<double>(field.points_at_a_time()) * kSampleBytes;
-  estimate.memory_bytes = static_cast<std::size_t>(std::max(density, writing));
+  estimate.memory_bytes = static_cast<std::size_t>(finding);
+  estimate.writing_bytes = static_cast<std::size_t>(writing);
   estimate.disk_bytes = estimate.voxels * (sizeof(DenseVoxel) + sizeof(BakedVoxel));
   estimate.file_bytes = static_cast<std::size_t>(static_cast<double>(estimate.voxels) * kBytesInHalf);
   return estimate;
@@ -88,11 +114,23 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
 
 void check_memory(const BakeEstimate& estimate, std::size_t held_bytes, const BakeOptions& options) {
   if (options.max_memory.empty()) return;
-  const std::size_t allowed = bytes_from("max_memory", options.max_memory);
   const std::size_t needed = estimate.memory_bytes + held_bytes;
-  if (needed <= allowed) return;
+  if (needed <= allowed_bytes(options)) return;
   throw UsageError("max_memory: " + options.max_memory + " is too little, this bake takes about " + in_words(needed) +
                    "; lower --resolution, cut the box with --aabb or raise bake.opacity_threshold");
+}
+
+void check_writing_memory(const std::vector<VolumePlanes>& volumes, std::size_t held_bytes,
+                          const BakeOptions& options) {
+  if (options.max_memory.empty()) return;
+  double writing = 0;
+  for (const VolumePlanes& volume : volumes) {
+    writing = std::max(writing, writing_bytes(contents_of(volume), volume.end - volume.begin, true));
+  }
+  const std::size_t needed = static_cast<std::size_t>(writing) + held_bytes;
+  if (needed <= allowed_bytes(options)) return;
+  throw UsageError("max_memory: " + options.max_memory + " is too little, writing the files of this bake takes about " +
+                   in_words(needed) + "; its voxels are kept: give the same command more memory");
 }
 
 }  // namespace cnerf

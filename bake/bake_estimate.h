@@ -5,15 +5,17 @@
 #include <vector>
 
 #include "bake/bake_plan.h"
+#include "bake/volume_planes.h"
 
 namespace cnerf {
 
 /// Extrapolated from some of the bricks: about.
 struct BakeEstimate {
-  std::size_t voxels = 0;        ///< with density; how many of them a camera sees is not known yet
-  std::size_t memory_bytes = 0;  ///< that a bake of volumes takes beside what the process holds already
-  std::size_t disk_bytes = 0;    ///< of its journal
-  std::size_t file_bytes = 0;    ///< of VDB files in half precision, before compression
+  std::size_t voxels = 0;         ///< with density; how many of them a camera sees is not known yet
+  std::size_t memory_bytes = 0;   ///< that finding voxels takes beside what the process holds already
+  std::size_t writing_bytes = 0;  ///< that writing their files will take at most: where a camera sees every one
+  std::size_t disk_bytes = 0;     ///< of its journal
+  std::size_t file_bytes = 0;     ///< of VDB files in half precision, before compression
 };
 
 /// @param plans  all grids of the bake.
@@ -21,8 +23,13 @@ struct BakeEstimate {
 [[nodiscard]] BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>& plans,
                                          const BakeOptions& options);
 
+/// Before voxels are looked for.
 /// @param held_bytes  what the process holds already.
-/// @throws UsageError  when `options.max_memory` is no amount of memory, or less than the bake will take.
+/// @throws UsageError  when `options.max_memory` is no amount of memory, or less than finding them will take.
 void check_memory(const BakeEstimate& estimate, std::size_t held_bytes, const BakeOptions& options);
+
+/// Before voxels are written, of which cameras may see a small part: goes through them once, if there is a limit.
+/// @throws UsageError  when `options.max_memory` is less than writing them will take; they are kept in the journal.
+void check_writing_memory(const std::vector<VolumePlanes>& volumes, std::size_t held_bytes, const BakeOptions& options);
 
 }  // namespace cnerf

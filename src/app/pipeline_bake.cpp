@@ -36,9 +36,10 @@ void say_estimate(const std::vector<BakePlan>& plans, const BakeEstimate& estima
                              plan.resolution.z, plan.voxel_size));
   }
   reporter.say(
-      fmt::format("bake: about {:.1f} M of them hold something; {} of memory beside the {} held now, {} of disk",
-                  1e-6 * double(estimate.voxels), in_words(estimate.memory_bytes), in_words(held_memory_bytes()),
-                  in_words(estimate.disk_bytes)));
+      fmt::format("bake: about {:.1f} M of them hold something; beside the {} held now, {} of memory to find what "
+                  "cameras see of them and at most {} to write it; {} of disk",
+                  1e-6 * double(estimate.voxels), in_words(held_memory_bytes()), in_words(estimate.memory_bytes),
+                  in_words(estimate.writing_bytes), in_words(estimate.disk_bytes)));
   reporter.say(fmt::format("bake: Cycles will take about {} for them", in_words(cycles_bytes(plans))));
 }
 
@@ -198,6 +199,7 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
     std::vector<VolumePlanes> volumes = drop_journal_on_bad_input(
         unfinished, [&] { return bake_volumes(*scene, cameras, levels, options, journal, context.reporter.sink()); });
     if (!formats.gltf) levels.clear();  // grids of files need the memory
+    if (formats.vdb) check_writing_memory(volumes, held_memory_bytes(), options);
     for (VolumePlanes& volume : volumes) {
       volume.colorizer = origin.colorizer;
       volume.take = origin.take;

@@ -1,9 +1,10 @@
 #include "src/capture/black_background.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <optional>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
@@ -19,12 +20,22 @@ constexpr double kRimShare = 0.5;       ///< of a view's rim that is black: obje
 constexpr double kEmptyShare = 0.05;    ///< of a view that is empty at least
 constexpr int kRim = 2;                 ///< pixels
 
+float code_of(float light) {
+  return 255 * srgb_from_linear(std::clamp(light, 0.0f, 1.0f));
+}
+
 /// sRGB codes, grain averaged.
 cv::Mat1f codes_of(const MonoImage& image) {
   cv::Mat1f codes(image.height, image.width);
-  for (std::size_t p = 0; p < image.pixel_count(); ++p) {
-    const float light = std::clamp(image.stored_luminance(p), 0.0f, 1.0f);
-    codes(int(p) / image.width, int(p) % image.width) = 255 * srgb_from_linear(light);
+  float* const out = codes.ptr<float>();
+  if (image.depth == PixelDepth::kU8) {
+    std::array<float, 256> code_of_byte;
+    for (std::size_t byte = 0; byte < 256; ++byte) {
+      code_of_byte[byte] = code_of(decode_transfer(image.transfer, float(byte) / 255.0f));
+    }
+    for (std::size_t p = 0; p < image.pixel_count(); ++p) out[p] = code_of_byte[image.u8[p]];
+  } else {
+    for (std::size_t p = 0; p < image.pixel_count(); ++p) out[p] = code_of(image.stored_luminance(p));
   }
   cv::blur(codes, codes, {3, 3});
   return codes;
@@ -53,8 +64,8 @@ std::optional<cv::Mat1b> empty_part(const MonoImage& image) {
       if (rim(y, x) != 0) at_rim.push_back(codes(y, x));
     }
   }
-  const float level = quantile(at_rim, 0.5), lightest = quantile({codes.begin(), codes.end()}, 0.99);
-  if (level > kBlackest || level > kAgainstLight * lightest) return std::nullopt;
+  const float level = quantile(at_rim, 0.5);
+  if (level > kBlackest || level > kAgainstLight * quantile({codes.begin(), codes.end()}, 0.99)) return std::nullopt;
   // The darker half of the rim lies below its median: its spread is that of the grain.
   const double grain = 1.5 * (level - quantile(at_rim, 0.16));
   const double limit = level + std::max(kLeastReach, kGrainReach * grain);

@@ -1,7 +1,10 @@
 #include "src/capture/image_io.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -135,6 +138,35 @@ T quantised(float value, float largest) {
   return static_cast<T>(std::lround(std::clamp(value, 0.0f, 1.0f) * largest));
 }
 
+/// Bytes of linear light: what rounding `encode_transfer` gives, without a power for every pixel.
+class ByteEncoder {
+ public:
+  explicit ByteEncoder(Transfer transfer) {
+    const auto rounded = [&](float light) { return quantised<std::uint8_t>(encode_transfer(transfer, light), 255.0f); };
+    for (int code = 1; code < 256; ++code) {
+      std::uint32_t below = 0, above = std::bit_cast<std::uint32_t>(1.0f);  // bits of floats >= 0 are in their order
+      while (above - below > 1) {
+        const std::uint32_t middle = below + (above - below) / 2;
+        (rounded(std::bit_cast<float>(middle)) >= code ? above : below) = middle;
+      }
+      least_light_[std::size_t(code)] = std::bit_cast<float>(above);
+    }
+    for (std::size_t cell = 0; cell < kCells; ++cell) first_code_[cell] = rounded(float(cell) / kCells);
+  }
+
+  std::uint8_t operator()(float light) const {
+    light = std::clamp(light, 0.0f, 1.0f);
+    std::size_t code = first_code_[std::min(std::size_t(light * kCells), kCells - 1)];
+    while (code < 255 && light >= least_light_[code + 1]) ++code;
+    return std::uint8_t(code);
+  }
+
+ private:
+  static constexpr std::size_t kCells = 4096;    ///< of light, each about a code wide at most
+  std::array<float, 256> least_light_{};         ///< of every code
+  std::array<std::uint8_t, kCells> first_code_;  ///< of every cell
+};
+
 }  // namespace
 
 LinearImage read_linear_image(const fs::path& file, Transfer transfer) {
@@ -184,12 +216,12 @@ MonoImage encode_mono(const LinearImage& image, Transfer transfer) {
   out.transfer = image.depth == PixelDepth::kF32 ? Transfer::kLinear : transfer;
   const std::size_t n = image.pixel_count();
   switch (image.depth) {
-    case PixelDepth::kU8:
+    case PixelDepth::kU8: {
+      const ByteEncoder encoder(transfer);
       out.u8.resize(n);
-      for (std::size_t i = 0; i < n; ++i) {
-        out.u8[i] = quantised<std::uint8_t>(encode_transfer(transfer, image.values[i]), 255.0f);
-      }
+      std::transform(image.values.begin(), image.values.end(), out.u8.begin(), encoder);
       break;
+    }
     case PixelDepth::kU16:
       out.u16.resize(n);
       for (std::size_t i = 0; i < n; ++i) {

@@ -36,8 +36,10 @@ TEST(BakeEstimate, VoxelsAreThoseOfTheBall) {
 
 TEST(BakeEstimate, MemoryGrowsWithTheVoxels) {
   const BakeEstimate small = estimate_at(64), large = estimate_at(128);
-  EXPECT_GT(large.memory_bytes, 4 * small.memory_bytes) << "planes of bricks grow with the square, all bricks faster";
-  EXPECT_LT(large.memory_bytes, 10 * small.memory_bytes);
+  for (const auto bytes : {&BakeEstimate::memory_bytes, &BakeEstimate::writing_bytes}) {
+    EXPECT_GT(large.*bytes, 3 * (small.*bytes)) << "planes of bricks grow with the square, all bricks faster";
+    EXPECT_LT(large.*bytes, 10 * (small.*bytes));
+  }
   EXPECT_GT(large.disk_bytes, large.file_bytes);
 }
 
@@ -62,6 +64,32 @@ TEST(BakeEstimate, TooLittleMemoryIsRefusedByName) {
   for (const char* bad : {"much", "-1G", "1T", "1G2", "0", "nan"}) {
     options.max_memory = bad;
     EXPECT_THROW(check_memory(estimate, held, options), UsageError) << bad;
+  }
+}
+
+/// A plane of `side` x `side` bricks, of each of which one voxel holds something.
+BakedVolume sparse_plane(int side) {
+  BakedVolume volume;
+  for (int j = 0; j < side; ++j) {
+    for (int k = 0; k < side; ++k) volume.voxels.push_back({.i = 3, .j = 8 * j + 5, .k = 8 * k + 7, .sigma = 1});
+  }
+  return volume;
+}
+
+TEST(BakeEstimate, WritingIsCheckedByTheBricksThatThereAre) {
+  const BakedVolume small = sparse_plane(10), large = sparse_plane(200);
+  BakeOptions options;
+  check_writing_memory({planes_of(large)}, 0, options);  // no limit
+  options.max_memory = "100M";
+  check_writing_memory({planes_of(small)}, 0, options);
+  EXPECT_THROW(check_writing_memory({planes_of(small)}, std::size_t{100} << 20, options), UsageError) << "held already";
+  try {
+    check_writing_memory({planes_of(small), planes_of(large)}, 0, options);
+    FAIL() << "40,000 leaves of three floats a voxel do not fit into 100 MiB";
+  } catch (const UsageError& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("max_memory: 100M"), std::string::npos) << text;
+    EXPECT_NE(text.find("kept"), std::string::npos) << text;
   }
 }
 

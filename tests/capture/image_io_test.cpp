@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 
@@ -46,6 +47,21 @@ TEST_F(ImageIo, GreyBytesSurviveUnchanged) {
     ASSERT_EQ(image.depth, PixelDepth::kU8);
     ASSERT_EQ(image.u8.size(), 256u);
     for (std::size_t i = 0; i < 256; ++i) ASSERT_EQ(image.u8[i], i);
+  }
+}
+
+TEST_F(ImageIo, BytesOfLightAreRoundedCodes) {
+  LinearImage image{1000, 60, 1, PixelDepth::kU8, {}, {}};
+  for (std::size_t i = 0; i < image.pixel_count(); ++i) {
+    image.values.push_back(float(double(i % 1000) - 10) * std::pow(10.0f, -float(i / 1000) / 10) /
+                           900);  // -0.01 to 1.1
+  }
+  for (const Transfer transfer : {Transfer::kSrgb, Transfer::kLinear, Transfer::kGamma22}) {
+    const MonoImage mono = encode_mono(image, transfer);
+    for (std::size_t i = 0; i < image.pixel_count(); ++i) {
+      const float code = encode_transfer(transfer, std::clamp(image.values[i], 0.0f, 1.0f));
+      ASSERT_EQ(mono.u8[i], std::lround(code * 255.0f)) << image.values[i];
+    }
   }
 }
 
