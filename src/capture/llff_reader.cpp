@@ -124,6 +124,10 @@ CaptureListing read_llff(const fs::path& npy_file, int downscale) {
     listing.notes.push_back("there are no images larger than those in " + folder.path.filename().string() +
                             ": the capture is read at 1/" + std::to_string(folder.reduced_by) + " size");
   }
+  listing.notes.push_back(
+      npy_file.filename().string() +
+      " knows no lens; unless these pictures were undistorted, cameras that cnerf prepare estimates "
+      "from them anew may be better");
   make_poses_rigid(listing, "");
   listing.depth_range = depth_range_of(array, npy_file);
   return listing;

@@ -62,6 +62,12 @@ TEST(Llff, WithoutFullSizeImagesTheLargestAreTaken) {
   EXPECT_THAT(capture.notes, Contains(HasSubstr("1/2 size")));
 }
 
+TEST(Llff, SaysThatTheLensIsUnknown) {
+  const test::TempDir folder;
+  test::write_llff(folder.path(), 4, "images", 8, 6);
+  EXPECT_THAT(load_capture(folder.path()).notes, Contains(HasSubstr("knows no lens")));
+}
+
 TEST(Llff, TheRestOfADownscaleIsResized) {
   const test::TempDir folder;
   test::write_llff(folder.path(), 4, "images_2", 8, 6);
