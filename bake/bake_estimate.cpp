@@ -60,7 +60,10 @@ Contents contents_of(const VolumePlanes& volume) {
   for (int plane = volume.begin; plane < volume.end; ++plane) {
     const std::vector<BakedVoxel> voxels = volume.read(plane);
     std::set<std::pair<int, int>> bricks;
-    for (const BakedVoxel& voxel : voxels) bricks.emplace(voxel.j / kBrickSide, voxel.k / kBrickSide);
+    for (const BakedVoxel& voxel : voxels) {
+      const Vec3i brick = brick_part({voxel.i, voxel.j, voxel.k});
+      bricks.emplace(brick.y, brick.z);
+    }
     contents.add_plane(static_cast<double>(voxels.size()), static_cast<double>(bricks.size()));
   }
   return contents;
@@ -116,7 +119,8 @@ void check_memory(const BakeEstimate& estimate, std::size_t held_bytes, const Ba
   if (options.max_memory.empty()) return;
   const std::size_t needed = estimate.memory_bytes + held_bytes;
   if (needed <= allowed_bytes(options)) return;
-  throw UsageError("max_memory: " + options.max_memory + " is too little, this bake takes about " + in_words(needed) +
+  throw UsageError("max_memory: " + options.max_memory +
+                   " is too little, finding the voxels of this bake takes about " + in_words(needed) +
                    "; lower --resolution, cut the box with --aabb or raise bake.opacity_threshold");
 }
 
@@ -125,7 +129,7 @@ void check_writing_memory(const std::vector<VolumePlanes>& volumes, std::size_t 
   if (options.max_memory.empty()) return;
   double writing = 0;
   for (const VolumePlanes& volume : volumes) {
-    writing = std::max(writing, writing_bytes(contents_of(volume), volume.end - volume.begin, true));
+    writing = std::max(writing, writing_bytes(contents_of(volume), volume.end - volume.begin, volume.is_sparing));
   }
   const std::size_t needed = static_cast<std::size_t>(writing) + held_bytes;
   if (needed <= allowed_bytes(options)) return;

@@ -42,7 +42,9 @@ struct BakeOptions {
     v("grids", grids, Choice{"auto", "one", "nested"},
       "one grid, or nested ones, finer where most pixels look; auto nests where the field has cascades");
     v("budget", budget, "memory Cycles may take for the grids, as 4G or 500M; makes voxels larger until they fit");
-    v("max_memory", max_memory, "memory the bake of a volume may take, as 1G; one that needs more is refused");
+    v("max_memory", max_memory,
+      "memory the bake of a volume may take, as 1G; one that needs more is refused, or stopped before its files are "
+      "written");
     v("dilation", dilation, Range{2, 8}, "voxels that colour reaches beyond density");
     v("sharpening", sharpening, Range{0, 4}, "of density at rims, which renderers widen by interpolation; 0 = none");
     v("subsamples", subsamples, Range{1, 8}, "density samples along each axis of a voxel");

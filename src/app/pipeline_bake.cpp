@@ -186,8 +186,9 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   const ColorOrigin origin{colorizer_name(context.directory, take), take};
   const std::vector<BakePlan> plans = plan_within_budget(*scene, cameras, options);
   const BakeEstimate estimate = estimate_bake(*scene, plans, options);
+  const std::size_t held = held_memory_bytes();
   say_estimate(plans, estimate, context.reporter);
-  check_memory(estimate, held_memory_bytes(), options);
+  check_memory(estimate, held, options);
 
   const fs::path unfinished = folder / "unfinished.bake";
   BakeJournal journal(unfinished, bake_identity(context.directory, take, cameras, plans, options));
@@ -199,7 +200,8 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
     std::vector<VolumePlanes> volumes = drop_journal_on_bad_input(
         unfinished, [&] { return bake_volumes(*scene, cameras, levels, options, journal, context.reporter.sink()); });
     if (!formats.gltf) levels.clear();  // grids of files need the memory
-    if (formats.vdb) check_writing_memory(volumes, held_memory_bytes(), options);
+    // Density that was given back is still the process's, and is what the grids will take.
+    if (formats.vdb) check_writing_memory(volumes, formats.gltf ? held_memory_bytes() : held, options);
     for (VolumePlanes& volume : volumes) {
       volume.colorizer = origin.colorizer;
       volume.take = origin.take;

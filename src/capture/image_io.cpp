@@ -162,7 +162,7 @@ class ByteEncoder {
   }
 
  private:
-  static constexpr std::size_t kCells = 4096;    ///< of light, each about a code wide at most
+  static constexpr std::size_t kCells = 4096;    ///< of light, most of them less than a code wide
   std::array<float, 256> least_light_{};         ///< of every code
   std::array<std::uint8_t, kCells> first_code_;  ///< of every cell
 };

@@ -126,8 +126,7 @@ CaptureListing read_llff(const fs::path& npy_file, int downscale) {
   }
   listing.notes.push_back(
       npy_file.filename().string() +
-      " knows no lens; unless these pictures were undistorted, cameras that cnerf prepare estimates "
-      "from them anew may be better");
+      " knows no lens: unless the pictures were undistorted, cameras that cnerf prepare estimates may be better");
   make_poses_rigid(listing, "");
   listing.depth_range = depth_range_of(array, npy_file);
   return listing;

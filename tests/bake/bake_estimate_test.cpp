@@ -1,8 +1,10 @@
 #include "bake/bake_estimate.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "src/base/byte_count.h"
 #include "src/base/error.h"
@@ -37,7 +39,8 @@ TEST(BakeEstimate, VoxelsAreThoseOfTheBall) {
 TEST(BakeEstimate, MemoryGrowsWithTheVoxels) {
   const BakeEstimate small = estimate_at(64), large = estimate_at(128);
   for (const auto bytes : {&BakeEstimate::memory_bytes, &BakeEstimate::writing_bytes}) {
-    EXPECT_GT(large.*bytes, 3 * (small.*bytes)) << "planes of bricks grow with the square, all bricks faster";
+    EXPECT_GT(large.*bytes, 3 * (small.*bytes))
+        << "planes of bricks grow with the square, all bricks faster, beside what threads hold at any size";
     EXPECT_LT(large.*bytes, 10 * (small.*bytes));
   }
   EXPECT_GT(large.disk_bytes, large.file_bytes);
@@ -50,6 +53,7 @@ TEST(BakeEstimate, TooLittleMemoryIsRefusedByName) {
   const std::size_t held = std::size_t{200} << 20;
   check_memory(estimate, held, options);  // no limit
   options.max_memory = "1.2G";
+  estimate.writing_bytes = std::size_t{10} << 30;  // at most: cameras may see little
   check_memory(estimate, held, options);
   options.max_memory = "1G";
   try {
@@ -67,29 +71,41 @@ TEST(BakeEstimate, TooLittleMemoryIsRefusedByName) {
   }
 }
 
-/// A plane of `side` x `side` bricks, of each of which one voxel holds something.
-BakedVolume sparse_plane(int side) {
+/// Two planes of `side` x `side` bricks around the origin, with `voxels` voxels in each brick.
+BakedVolume plates(int side, int voxels) {
   BakedVolume volume;
-  for (int j = 0; j < side; ++j) {
-    for (int k = 0; k < side; ++k) volume.voxels.push_back({.i = 3, .j = 8 * j + 5, .k = 8 * k + 7, .sigma = 1});
+  for (const int i : {-5, 3}) {
+    for (int j = -side / 2; j < side / 2; ++j) {
+      for (int k = -side / 2; k < side / 2; ++k) {
+        for (int v = 0; v < voxels; ++v) volume.voxels.push_back({.i = i, .j = 8 * j + 5, .k = 8 * k + v, .sigma = 1});
+      }
+    }
   }
   return volume;
 }
 
 TEST(BakeEstimate, WritingIsCheckedByTheBricksThatThereAre) {
-  const BakedVolume small = sparse_plane(10), large = sparse_plane(200);
+  const BakedVolume small = plates(40, 8), large = plates(120, 1);  // 3,200 and 28,800 leaves
+  const std::size_t leaf = 512 * 3 * sizeof(float);
   BakeOptions options;
+  const auto fits = [&](const BakedVolume& volume, std::size_t bytes, std::size_t held = 0) {
+    options.max_memory = std::to_string(bytes);
+    try {
+      VolumePlanes planes = planes_of(volume);
+      planes.is_sparing = true;
+      check_writing_memory({planes}, held, options);
+    } catch (const UsageError& error) {
+      EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("max_memory: " + options.max_memory),
+                                               testing::HasSubstr("voxels are kept")));
+      return false;
+    }
+    return true;
+  };
   check_writing_memory({planes_of(large)}, 0, options);  // no limit
-  options.max_memory = "100M";
-  check_writing_memory({planes_of(small)}, 0, options);
-  EXPECT_THROW(check_writing_memory({planes_of(small)}, std::size_t{100} << 20, options), UsageError) << "held already";
-  try {
-    check_writing_memory({planes_of(small), planes_of(large)}, 0, options);
-    FAIL() << "40,000 leaves of three floats a voxel do not fit into 100 MiB";
-  } catch (const UsageError& error) {
-    const std::string text = error.what();
-    EXPECT_NE(text.find("max_memory: 100M"), std::string::npos) << text;
-    EXPECT_NE(text.find("kept"), std::string::npos) << text;
+  for (const auto& [volume, leaves] : {std::pair{&small, 3200}, {&large, 28800}}) {
+    EXPECT_FALSE(fits(*volume, leaf * leaves)) << "leaves of dilated colours come on top";
+    EXPECT_TRUE(fits(*volume, 2 * leaf * leaves));
+    EXPECT_FALSE(fits(*volume, 2 * leaf * leaves, leaf * leaves)) << "held already";
   }
 }
 

@@ -51,10 +51,9 @@ TEST_F(ImageIo, GreyBytesSurviveUnchanged) {
 }
 
 TEST_F(ImageIo, BytesOfLightAreRoundedCodes) {
-  LinearImage image{1000, 60, 1, PixelDepth::kU8, {}, {}};
+  LinearImage image{1000, 60, 1, PixelDepth::kU8, {}, {}};  // -0.01 to 1.1
   for (std::size_t i = 0; i < image.pixel_count(); ++i) {
-    image.values.push_back(float(double(i % 1000) - 10) * std::pow(10.0f, -float(i / 1000) / 10) /
-                           900);  // -0.01 to 1.1
+    image.values.push_back(float(double(i % 1000) - 10) * std::pow(10.0f, -float(i / 1000) / 10) / 900);
   }
   for (const Transfer transfer : {Transfer::kSrgb, Transfer::kLinear, Transfer::kGamma22}) {
     const MonoImage mono = encode_mono(image, transfer);
