@@ -55,7 +55,14 @@ TEST_F(ImageIo, BytesOfLightAreRoundedCodes) {
   for (std::size_t i = 0; i < image.pixel_count(); ++i) {
     image.values.push_back(float(double(i % 1000) - 10) * std::pow(10.0f, -float(i / 1000) / 10) / 900);
   }
+  const std::vector<float> spread = image.values;
   for (const Transfer transfer : {Transfer::kSrgb, Transfer::kLinear, Transfer::kGamma22}) {
+    image.values = spread;
+    for (std::size_t code = 1; code < 256; ++code) {  // around where the code begins, float by float
+      float light = decode_transfer(transfer, (float(code) - 0.5f) / 255.0f);
+      for (int i = 0; i < 8; ++i) light = std::nextafter(light, 0.0f);
+      for (std::size_t i = 0; i < 17; ++i, light = std::nextafter(light, 2.0f)) image.values[17 * code + i] = light;
+    }
     const MonoImage mono = encode_mono(image, transfer);
     for (std::size_t i = 0; i < image.pixel_count(); ++i) {
       const float code = encode_transfer(transfer, std::clamp(image.values[i], 0.0f, 1.0f));
