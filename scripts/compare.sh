@@ -20,12 +20,15 @@ if [ "$colorizer" = builtin ]; then settings+=(--colorizer builtin); fi
 colors=colornerf,colornerf-paper,without-purification,without-classification,colorize-then-fuse,video-then-fuse
 colors+=,style-transfer,grey,oracle
 mkdir -p "$report/runs" "$report/logs"
+gpus=$( (nvidia-smi --list-gpus 2> /dev/null || true) | wc -l)
 
 # Runs `cnerf compare` on one capture in the background; its words go to a file.  part NAME CAPTURE options
+# Parts are dealt out to the GPUs.
 parts=()
 part() {
   local name=$1 capture=$2
   shift 2
+  if [ "$gpus" -gt 1 ]; then export CUDA_VISIBLE_DEVICES=$((${#parts[@]} % gpus)); fi
   "$cnerf" compare "$capture" -o "$report" "${settings[@]}" "$@" > "$report/logs/$name.log" 2>&1 &
   parts+=($!)
 }

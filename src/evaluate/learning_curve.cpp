@@ -88,11 +88,11 @@ void HeldOutPixels::trace(const LuminanceEngine& engine, const MarchSettings& ma
   samples_ = pixel_samples(rays_, samples, offsets);
 }
 
-double HeldOutPixels::ab_error(const ChromaEngine& engine, float temperature) const {
+double HeldOutPixels::ab_error(const ChromaEngine& engine, const BinDecoding& decoding) const {
   CNERF_CHECK_EQ(samples_.pixels(), rays_.size());
   CNERF_CHECK_EQ(colors_.size(), rays_.size());
   std::vector<Ab> decoded(rays_.size());
-  engine.decode(samples_, temperature, decoded);
+  engine.decode(samples_, decoding, decoded);
   const std::vector<float> luminance = pixel_luminance(samples_);
   double sum = 0;
   for (std::size_t i = 0; i < decoded.size(); ++i) {

@@ -43,7 +43,7 @@ class HeldOutPixels {
   /// Keeps what the rays of the pixels meet, for `ab_error`.
   void trace(const LuminanceEngine& engine, const MarchSettings& march);
   /// Mean ab distance of the decoded colours to the true ones.  @param temperature  of the decoding
-  [[nodiscard]] double ab_error(const ChromaEngine& engine, float temperature) const;
+  [[nodiscard]] double ab_error(const ChromaEngine& engine, const BinDecoding& decoding) const;
 
  private:
   std::vector<Ray> rays_;

@@ -92,7 +92,7 @@ std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {
   if (is_photometric()) {
     chromaticity->composite(pixels, colors);
   } else {
-    chroma->decode(pixels, static_cast<float>(options.decode_temperature), colors);
+    chroma->decode(pixels, options.decoding(), colors);
   }
   const std::vector<float> luminance = pixel_luminance(pixels);
   parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
