@@ -38,6 +38,7 @@ Stage2Options stage2_of(const Method& method, Stage2Options configured, const Co
   if (name == "colornerf-paper") {
     options.decode_temperature = options.decode_bandwidth = 0;
     options.spread_weight = options.regression_weight = 0;
+    options.classes = "ab";
     options.purify.opinions = 1;
   }
   if (name == "without-purification") options.purify.enabled = false;
