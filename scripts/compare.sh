@@ -2,7 +2,7 @@
 # The table of docs/evaluation.md: fox, flower and lego, three seeds, every method.
 #   bash scripts/compare.sh REPORT [simulated|builtin] [further options of `cnerf compare`]
 # Captures and LPIPS weights are looked for in $CNERF_DATA (else ../shared/data), the program in $CNERF (else the
-# release build). Trains on a GPU where there is one. Parts run side by side, each on a capture and a seed; what is
+# release build). Trains on the GPUs there are. Parts run side by side, each on a capture and a seed; what is
 # finished stays, so that the same command goes on after a stop. SEEDS=n for other than three, TIMES=no to leave out the
 # table of training times.
 set -euo pipefail
@@ -20,16 +20,22 @@ if [ "$colorizer" = builtin ]; then settings+=(--colorizer builtin); fi
 colors=colornerf,colornerf-paper,without-purification,without-classification,colorize-then-fuse,video-then-fuse
 colors+=,style-transfer,grey,oracle
 mkdir -p "$report/runs" "$report/logs"
-gpus=$( (nvidia-smi --list-gpus 2> /dev/null || true) | wc -l)
+# The GPUs that may be used, one a line.
+if [ -n "${CUDA_VISIBLE_DEVICES+set}" ]; then
+  mapfile -t gpus < <(tr ',' '\n' <<< "$CUDA_VISIBLE_DEVICES")
+else
+  mapfile -t gpus < <(nvidia-smi --query-gpu=index --format=csv,noheader 2> /dev/null || true)
+fi
 
 # Runs `cnerf compare` on one capture in the background; its words go to a file.  part NAME CAPTURE options
-# Parts are dealt out to the GPUs.
+# Parts take the GPUs in turns.
 parts=()
 part() {
   local name=$1 capture=$2
   shift 2
-  if [ "$gpus" -gt 1 ]; then export CUDA_VISIBLE_DEVICES=$((${#parts[@]} % gpus)); fi
-  "$cnerf" compare "$capture" -o "$report" "${settings[@]}" "$@" > "$report/logs/$name.log" 2>&1 &
+  local device=()
+  if [ ${#gpus[@]} -gt 1 ]; then device=("CUDA_VISIBLE_DEVICES=${gpus[$((${#parts[@]} % ${#gpus[@]}))]}"); fi
+  env "${device[@]}" "$cnerf" compare "$capture" -o "$report" "${settings[@]}" "$@" > "$report/logs/$name.log" 2>&1 &
   parts+=($!)
 }
 # Waits for all parts; says which of them failed.

@@ -374,7 +374,7 @@ void ComparisonRun::colorize(const Subject& subject, const Method& method, int s
   const bool is_measured = method.has_own_field || std::string(method.name) == kMethods[0].name;
   std::optional<HeldOutPixels> pixels;
   EngineWatch engines;
-  LearningCurve curve([&] { return pixels->ab_error(*engines.chroma, options); });
+  LearningCurve curve([&] { return pixels->ab_error(*engines.chroma, float(options.decode_temperature)); });
   ProgressSink progress = reporter_.sink();
   if (is_measured && options.injection == "classification") {
     const LuminanceModel model = LuminanceModel::load(field.stage1, field.makers);
@@ -390,7 +390,7 @@ void ComparisonRun::colorize(const Subject& subject, const Method& method, int s
   if (pixels && !curve.points().empty()) {
     cell.stage2_curve = curve.points();
     const ColorModel model = ColorModel::load(take, field.makers);
-    cell.stage2_curve.push_back({curve.seconds(), pixels->ab_error(*model.chroma, options)});
+    cell.stage2_curve.push_back({curve.seconds(), pixels->ab_error(*model.chroma, float(options.decode_temperature))});
   }
   if (std::string(method.name) == kMethods[0].name) {
     cell.stage1_curve = read_curve(geometry.folder / "stage1.curve");

@@ -169,39 +169,6 @@ Ab decode_annealed_mean(std::span<const float> logits, float temperature) {
   return {float(a / sum), float(b / sum)};
 }
 
-Ab climb_to_mode(std::span<const float> logits, float bandwidth, Ab from) {
-  CNERF_CHECK_EQ(logits.size(), std::size_t(kAbBinCount));
-  CNERF_CHECK(bandwidth > 0, "a mode needs a positive bandwidth");
-  constexpr float kNegligible = 16;  // natural logarithm of a share that is not worth an exponential
-  const std::array<Ab, kAbBinCount>& centres = ab_bin_centres();
-  const float precision = 0.5f / (bandwidth * bandwidth);
-  std::array<float, kAbBinCount> exponents;
-  for (int step = 0; step < kModeSteps; ++step) {
-    for (std::size_t i = 0; i < exponents.size(); ++i) {
-      exponents[i] = logits[i] - precision * squared_distance(centres[i], from);
-    }
-    // Relative to the largest: between two far peaks all of them may be tiny.
-    const float largest = *std::max_element(exponents.begin(), exponents.end());
-    float sum = 0;
-    Ab mean;
-    for (std::size_t i = 0; i < exponents.size(); ++i) {
-      if (exponents[i] < largest - kNegligible) continue;
-      const float weight = std::exp(exponents[i] - largest);
-      sum += weight;
-      mean.a += weight * centres[i].a;
-      mean.b += weight * centres[i].b;
-    }
-    from = {mean.a / sum, mean.b / sum};
-  }
-  return from;
-}
-
-Ab decode(std::span<const float> logits, const BinDecoding& decoding) {
-  const Ab start =
-      decoding.temperature > 0 ? decode_annealed_mean(logits, decoding.temperature) : decode_arg_max(logits);
-  return decoding.bandwidth > 0 ? climb_to_mode(logits, decoding.bandwidth, start) : start;
-}
-
 std::vector<float> rebalancing_weights(std::span<const float> prior, float lambda) {
   CNERF_CHECK_EQ(prior.size(), std::size_t(kAbBinCount));
   CNERF_CHECK(lambda >= 0 && lambda <= 1, "lambda mixes two distributions");

@@ -36,19 +36,6 @@ struct SoftLabel {
 /// towards 0 the mode.
 [[nodiscard]] Ab decode_annealed_mean(std::span<const float> logits, float temperature);
 
-/// Towards the mode nearest to `from` of the distribution smoothed by a Gaussian: steps of mean shift (Comaniciu and
-/// Meer 2002, Eq. 20). What is far away does not count, as with a low temperature, but colours between the centres of
-/// bins stay there.  @param bandwidth  standard deviation, ab units, > 0
-[[nodiscard]] Ab climb_to_mode(std::span<const float> logits, float bandwidth, Ab from);
-inline constexpr int kModeSteps = 3;
-
-/// How a distribution becomes one colour.
-struct BinDecoding {
-  float temperature = 1;  ///< of the annealed mean; 0: the most probable bin
-  float bandwidth = 0;    ///< of the climb from there to a mode, ab units; 0: none
-};
-[[nodiscard]] Ab decode(std::span<const float> logits, const BinDecoding& decoding);
-
 /// Class rebalancing (Zhang et al. 2016, Sec. 2.2): w = 1 / ((1 - lambda) p + lambda / Q), scaled so that sum p w = 1.
 /// @param prior  [313], sums to 1.
 [[nodiscard]] std::vector<float> rebalancing_weights(std::span<const float> prior, float lambda);

@@ -39,8 +39,8 @@ class ChromaEngine {
   }
   /// @param logits  [R, 313]; of pixels below kLeastColoredOpacity they mean nothing
   virtual void logits(const PixelSamples& pixels, std::span<float> logits) const = 0;
-  /// One colour a pixel, of the same pixels.
-  virtual void decode(const PixelSamples& pixels, const BinDecoding& decoding, std::span<Ab> colors) const = 0;
+  /// One colour a pixel, of the same pixels: see `decode_annealed_mean`; temperature 0 is `decode_arg_max`.
+  virtual void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const = 0;
   [[nodiscard]] virtual long step_count() const = 0;
   [[nodiscard]] virtual std::vector<StatePiece> state() = 0;
   virtual void state_loaded() = 0;

@@ -88,13 +88,18 @@ void HeldOutPixels::trace(const LuminanceEngine& engine, const MarchSettings& ma
   samples_ = pixel_samples(rays_, samples, offsets);
 }
 
-double HeldOutPixels::ab_error(const ChromaEngine& engine, const Stage2Options& options) const {
+double HeldOutPixels::ab_error(const ChromaEngine& engine, float temperature) const {
   CNERF_CHECK_EQ(samples_.pixels(), rays_.size());
   CNERF_CHECK_EQ(colors_.size(), rays_.size());
-  const std::vector<Ab> decoded = decode_colors(engine, samples_, options);
+  std::vector<Ab> decoded(rays_.size());
+  engine.decode(samples_, temperature, decoded);
+  const std::vector<float> luminance = pixel_luminance(samples_);
   double sum = 0;
   for (std::size_t i = 0; i < decoded.size(); ++i) {
-    sum += std::hypot(double(decoded[i].a - colors_[i].a), double(decoded[i].b - colors_[i].b));
+    float opacity = 0;
+    for (std::size_t s = samples_.offsets[i]; s < samples_.offsets[i + 1]; ++s) opacity += samples_.weights[s];
+    const Ab ours = opacity < kLeastColoredOpacity ? Ab{} : in_gamut(decoded[i], luminance[i]);
+    sum += std::hypot(double(ours.a - colors_[i].a), double(ours.b - colors_[i].b));
   }
   return sum / double(decoded.size());
 }

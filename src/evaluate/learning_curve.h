@@ -14,7 +14,6 @@
 #include "src/engine/pixel_samples.h"
 #include "src/engine/select_engine.h"
 #include "src/field/scene_frame.h"
-#include "src/train/stage2.h"
 
 namespace cnerf {
 
@@ -44,7 +43,7 @@ class HeldOutPixels {
   /// Keeps what the rays of the pixels meet, for `ab_error`.
   void trace(const LuminanceEngine& engine, const MarchSettings& march);
   /// Mean ab distance of the decoded colours to the true ones.  @param temperature  of the decoding
-  [[nodiscard]] double ab_error(const ChromaEngine& engine, const Stage2Options& options) const;
+  [[nodiscard]] double ab_error(const ChromaEngine& engine, float temperature) const;
 
  private:
   std::vector<Ray> rays_;

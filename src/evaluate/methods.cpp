@@ -36,9 +36,7 @@ Stage2Options stage2_of(const Method& method, Stage2Options configured, const Co
   const std::string name = method.name, configured_injection = configured.injection;
   Stage2Options options = std::move(configured);
   if (name == "colornerf-paper") {
-    options.decode_temperature = options.decode_bandwidth = 0;
-    options.spread_weight = options.regression_weight = 0;
-    options.classes = "ab";
+    options.decode_temperature = options.spread_weight = options.regression_weight = 0;
     options.purify.opinions = 1;
   }
   if (name == "without-purification") options.purify.enabled = false;

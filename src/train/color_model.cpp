@@ -1,7 +1,6 @@
 #include "src/train/color_model.h"
 
-#include <algorithm>
-#include <utility>
+#include <cmath>
 
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
@@ -18,34 +17,7 @@ float pixel_opacity(const PixelSamples& pixels, std::size_t p) {
   return opacity;
 }
 
-/// Into the gamut at the pixels' luminance; what is hardly there is grey.
-std::vector<Ab> displayed(std::vector<Ab> colors, const PixelSamples& pixels, const std::vector<float>& luminance) {
-  parallel_ranges(colors.size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      const bool is_colored = pixel_opacity(pixels, p) >= kLeastColoredOpacity;
-      colors[p] = is_colored ? in_gamut(colors[p], luminance[p]) : Ab{};
-    }
-  });
-  return colors;
-}
-
 }  // namespace
-
-float tint_scale(float luminance) {
-  constexpr float kLightness = 60;
-  return (kLightness + 16) / (lightness_from_luminance(std::max(luminance, 0.0f)) + 16);
-}
-
-std::vector<Ab> decode_colors(const ChromaEngine& chroma, const PixelSamples& pixels, const Stage2Options& options) {
-  std::vector<Ab> colors(pixels.pixels());
-  chroma.decode(pixels, options.decoding(), colors);
-  const std::vector<float> luminance = pixel_luminance(pixels);
-  for (std::size_t p = 0; options.classes == "tint" && p < colors.size(); ++p) {
-    const float scale = tint_scale(luminance[p]);
-    colors[p] = {colors[p].a / scale, colors[p].b / scale};
-  }
-  return displayed(std::move(colors), pixels, luminance);
-}
 
 Ab in_gamut(Ab color, float luminance) {
   const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness_from_luminance(luminance), color.a, color.b});
@@ -116,10 +88,20 @@ void ColorModel::save(const std::filesystem::path& file) {
 }
 
 std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {
-  if (!is_photometric()) return decode_colors(*chroma, pixels, options);
   std::vector<Ab> colors(pixels.pixels());
-  chromaticity->composite(pixels, colors);
-  return displayed(std::move(colors), pixels, pixel_luminance(pixels));
+  if (is_photometric()) {
+    chromaticity->composite(pixels, colors);
+  } else {
+    chroma->decode(pixels, static_cast<float>(options.decode_temperature), colors);
+  }
+  const std::vector<float> luminance = pixel_luminance(pixels);
+  parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      const bool is_colored = pixel_opacity(pixels, p) >= kLeastColoredOpacity;
+      colors[p] = is_colored ? in_gamut(colors[p], luminance[p]) : Ab{};
+    }
+  });
+  return colors;
 }
 
 }  // namespace cnerf

@@ -37,16 +37,6 @@ struct ColorModel {
   [[nodiscard]] std::vector<StatePiece> state();
 };
 
-/// Things of one chromaticity X : Y : Z in more or less light have ab in proportion to L* + 16 (CIELAB's cube roots).
-/// A pixel's tint is its ab brought to L* = 60 in that way. An answer is coarser than the pictures that are rendered, and
-/// so is what is learnt of its ab; of its tint, the shading within it comes back from the pixel's own luminance.
-/// @return  what ab at luminance Y is, in tints
-[[nodiscard]] float tint_scale(float luminance);
-
-/// Colours of pixels from their distributions, whose classes are options.classes: see ColorModel::decode.
-[[nodiscard]] std::vector<Ab> decode_colors(const ChromaEngine& chroma, const PixelSamples& pixels,
-                                            const Stage2Options& options);
-
 /// ab at a luminance, its chroma reduced until the colour lies in the gamut.
 [[nodiscard]] Ab in_gamut(Ab color, float luminance);
 

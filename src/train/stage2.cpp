@@ -308,13 +308,6 @@ class Colorization {
     return picked;
   }
 
-  /// What the classes are of, at luminance Y.
-  [[nodiscard]] Ab as_classified(Ab color, float luminance) const {
-    if (options_.classes == "ab") return color;
-    const float scale = tint_scale(luminance);
-    return {scale * color.a, scale * color.b};
-  }
-
   /// Class rebalancing's weights, from the colours of the base patches.
   void measure_prior(const std::vector<AnsweredPatch>& bases) {
     if (options_.rebalancing <= 0) return;
@@ -322,9 +315,7 @@ class Colorization {
     const std::size_t n = std::size_t(options_.patch_size) * std::size_t(options_.patch_size);
     for (const AnsweredPatch& base : bases) {
       for (std::size_t i = 0; i < n; ++i) {
-        const Ab color =
-            as_classified({base.ab[i], base.ab[n + i]}, luminance_from_lightness(base.shown.lightness[i]));
-        prior[std::size_t(nearest_bin(color))] += base.shown.opacity[i];
+        prior[std::size_t(nearest_bin({base.ab[i], base.ab[n + i]}))] += base.shown.opacity[i];
       }
     }
     const float total = std::accumulate(prior.begin(), prior.end(), 0.0f);
@@ -395,7 +386,8 @@ class Colorization {
     const auto want = [&](ViewPixel place, Ab color) {
       wanted.push_back(place);
       colors.push_back(color);
-      weights.push_back(views_[place.view].opacity[place.pixel]);
+      const float of_class = class_weights_.empty() ? 1.0f : class_weights_[std::size_t(nearest_bin(color))];
+      weights.push_back(of_class * views_[place.view].opacity[place.pixel]);
     };
     for (std::size_t i = 0; i < picked.pixels.size(); ++i) {
       const Ab* known = known_.find(patch.place.view, picked.pixels[i]);
@@ -416,12 +408,7 @@ class Colorization {
       loss_ = model_.chromaticity->step(pixels, colors, weights, AbLoss::kSquared, rate);
     } else {
       std::vector<SoftLabel> labels;
-      const std::vector<float> luminance = pixel_luminance(pixels);
-      for (std::size_t p = 0; p < colors.size(); ++p) {
-        const Ab color = as_classified(colors[p], luminance[p]);
-        labels.push_back(soft_label(color));
-        if (!class_weights_.empty()) weights[p] *= class_weights_[std::size_t(nearest_bin(color))];
-      }
+      std::ranges::transform(colors, std::back_inserter(labels), soft_label);
       loss_ = model_.chroma->step(pixels, labels, weights,
                                   {float(options_.spread_weight), float(options_.regression_weight)}, rate);
     }

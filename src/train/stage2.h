@@ -31,16 +31,12 @@ struct Stage2Options {
   double rebalancing = 0;           ///< lambda mixing of class rebalancing; 0 = off
   double spread_weight = 0.1;       ///< of the spread of a pixel's features in the loss (src/engine/chroma_math.h)
   double regression_weight = 0;     ///< of how far the distribution's mean colour is from the answer, in the loss
-  std::string classes = "tint";     ///< what the bins are of: "ab", or "tint" (src/train/color_model.h)
   double decode_temperature = 0.3;  ///< annealed-mean temperature; 0 = arg-max
-  double decode_bandwidth = 10;     ///< ab units of the climb from there to a mode (src/color/ab_bins.h); 0 = none
   int distill_steps = 1000;         ///< steps of the fit of per-sample colour for baking
   int colorizer_batch = 4;          ///< patches a colorizer query
   int seed = 1;
   HashGridOptions grid = {.decay = 0.1};
   PurifyOptions purify;
-
-  [[nodiscard]] BinDecoding decoding() const { return {float(decode_temperature), float(decode_bandwidth)}; }
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -63,11 +59,7 @@ struct Stage2Options {
       "of a loss on how far apart the features of a ray's samples lie: for colours that agree from view to view");
     v("regression_weight", regression_weight, Range{0, 1000},
       "of a loss on how far the mean of a pixel's distribution is from the answer's colour");
-    v("classes", classes, Choice{"ab", "tint"},
-      "what the bins are of: ab, as in the paper, or ab as it would be at one lightness");
     v("decode_temperature", decode_temperature, Range{0, 10}, "annealed-mean temperature; 0 = arg-max");
-    v("decode_bandwidth", decode_bandwidth, Range{0, 100},
-      "from there to the mode of the distribution smoothed by so many ab units; 0 = stay there");
     v("distill_steps", distill_steps, Range{0, 1e6}, "steps of the fit of per-sample colour that baking uses");
     v("colorizer_batch", colorizer_batch, Range{1, 64}, "patches a colorizer query");
     v("seed", seed, Range{0, 1e9}, "of patches and weights");

@@ -117,62 +117,10 @@ TEST(AbBins, AnnealedMeanOfHugeLogitsIsFinite) {
   EXPECT_NEAR(decode_annealed_mean(logits, 0.38f).a, 50, 1e-4);
 }
 
-/// Logits of a Gaussian around a colour, smoothed as labels are.
-std::vector<float> logits_around(Ab color, float peak) {
-  std::vector<float> logits(kAbBinCount);
-  for (std::size_t i = 0; i < logits.size(); ++i) {
-    const float a = ab_bin_centres()[i].a - color.a, b = ab_bin_centres()[i].b - color.b;
-    logits[i] = peak - (a * a + b * b) / (2 * kSoftLabelSigma * kSoftLabelSigma);
-  }
-  return logits;
-}
-
-TEST(AbBins, ModesLieBetweenBinsAsWell) {
-  double of_climb = 0, of_temperature = 0;
-  for (float a = -20; a <= 20; a += 2.5f) {
-    const std::vector<float> logits = logits_around({a, 7}, 0);
-    const auto distance = [&](Ab found) { return std::hypot(double(found.a - a), double(found.b - 7)); };
-    of_climb = std::max(of_climb, distance(decode(logits, {0.3f, 10})));
-    of_temperature = std::max(of_temperature, distance(decode(logits, {0.3f, 0})));
-  }
-  EXPECT_LT(of_climb, 1);
-  EXPECT_GT(of_temperature, 2) << "a low temperature draws colours towards the nearest bin";
-}
-
-TEST(AbBins, AModeDoesNotSeeWhatIsFarAway) {
-  std::vector<float> logits = logits_around({43, 18}, 0);
-  const std::vector<float> others = logits_around({-30, -20}, -0.5f);
-  for (std::size_t i = 0; i < logits.size(); ++i) logits[i] = std::log(std::exp(logits[i]) + std::exp(others[i]));
-  const Ab mode = decode(logits, {0, 10});
-  EXPECT_NEAR(mode.a, 43, 1);
-  EXPECT_NEAR(mode.b, 18, 1);
-  EXPECT_LT(decode(logits, {1}).a, 20) << "the mean does";
-  // From a place between both, where each weighs next to nothing, it still finds its way.
-  const Ab from_between = climb_to_mode(logits, 1, {6, -1});
-  EXPECT_TRUE(std::isfinite(from_between.a) && std::isfinite(from_between.b));
-}
-
-TEST(AbBins, ModesDoNotDependOnWhatAllLogitsShare) {
-  std::vector<float> logits = logits_around({12, -33}, 0);
-  const Ab expected = decode(logits, {0.3f, 10});
-  for (float& v : logits) v -= 1e4f;
-  EXPECT_NEAR(decode(logits, {0.3f, 10}).a, expected.a, 0.05);
-  EXPECT_NEAR(decode(logits, {0.3f, 10}).b, expected.b, 0.05);
-}
-
-TEST(AbBins, AWideKernelSeesTheMean) {
-  const std::vector<float> logits = logits_with_peaks();
-  const Ab mean = decode_annealed_mean(logits, 1), found = climb_to_mode(logits, 1e4f, {0, 0});
-  EXPECT_NEAR(found.a, mean.a, 1e-2);
-  EXPECT_NEAR(found.b, mean.b, 1e-2);
-}
-
 TEST(AbBins, ContractsAreChecked) {
   const std::vector<float> short_logits(312);
   EXPECT_THROW((void)decode_arg_max(short_logits), ContractError);
   EXPECT_THROW((void)decode_annealed_mean(logits_with_peaks(), 0.0f), ContractError);
-  EXPECT_THROW((void)climb_to_mode(logits_with_peaks(), 0.0f, {}), ContractError);
-  EXPECT_THROW((void)climb_to_mode(short_logits, 1.0f, {}), ContractError);
   EXPECT_THROW((void)rebalancing_weights(short_logits, 0.5f), ContractError);
 }
 

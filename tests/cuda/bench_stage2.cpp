@@ -16,8 +16,6 @@
 namespace cnerf::test {
 namespace {
 
-constexpr BinDecoding kDecoding = {0.3f, 10};  // the defaults of stage 2
-
 using Clock = std::chrono::steady_clock;
 
 double milliseconds(const std::function<void()>& work) {
@@ -62,7 +60,7 @@ void time_engines(const char* device, const PixelSamples& patch, const PixelSamp
   std::printf("  distillation step on %zu pixels %.3f ms", distilled.pixels(),
               median_milliseconds(repetitions, [&] { chromaticity.step(distilled, targets, 1e-3f); }));
   std::printf("  decoding them %.3f ms",
-              median_milliseconds(repetitions, [&] { chroma.decode(distilled, kDecoding, colors); }));
+              median_milliseconds(repetitions, [&] { chroma.decode(distilled, 0.38f, colors); }));
   std::printf("  query of %zu points %.3f ms\n", ratios.size(),
               median_milliseconds(repetitions, [&] { chromaticity.query(distilled.positions, ratios); }));
   std::fflush(stdout);
@@ -84,7 +82,7 @@ void time_stage2(const std::vector<CachedView>& views, const HashGridOptions& gr
     for (int i = 0; i < distillation_steps; ++i) {
       const PixelSamples pixels = visible_pixels(views, 2 * rays, std::uint64_t(i) << 32);
       std::vector<Ab> decoded(pixels.pixels());
-      chroma->decode(pixels, kDecoding, decoded);
+      chroma->decode(pixels, 0.38f, decoded);
       distance = chromaticity->step(pixels, decoded, 1e-2f);
     }
   });

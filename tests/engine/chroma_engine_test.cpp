@@ -153,7 +153,7 @@ TEST(ChromaEngine, RegressionIsSmoothL1OfTheMean) {
     return make_cpu_chroma_engine(small_grid(), 5)->step(pixels, labels, {}, {.regression = weight}, 1e-9f);
   };
   std::vector<Ab> means(pixels.pixels());
-  make_cpu_chroma_engine(small_grid(), 5)->decode(pixels, {1.0f}, means);
+  make_cpu_chroma_engine(small_grid(), 5)->decode(pixels, 1.0f, means);
   double expected = 0;
   for (std::size_t p = 0; p < means.size(); ++p) {
     const Ab wanted = mean_of(labels[p]);
@@ -184,7 +184,7 @@ TEST(ChromaEngine, SpreadMakesTheSamplesOfAPixelAgree) {
     for (int i = 0; i < 150; ++i) last = engine->step(pixels, two_halves(64), {}, {spread_weight}, 1e-2f);
     EXPECT_LT(last, 0.3) << "what is wanted is still learnt";
     std::vector<Ab> colors(samples.pixels());
-    engine->decode(samples, {1.0f}, colors);
+    engine->decode(samples, 1.0f, colors);
     double total = 0;
     for (std::size_t s = 0; s < colors.size(); s += 2) {
       total += std::hypot(colors[s].a - colors[s + 1].a, colors[s].b - colors[s + 1].b);

@@ -165,8 +165,6 @@ TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
   EXPECT_TRUE(of("without-classification").purify.enabled);
   EXPECT_EQ(of("colorize-then-fuse").questions, "views");
   EXPECT_EQ(of("colornerf-paper").decode_temperature, 0);
-  EXPECT_EQ(of("colornerf-paper").decode_bandwidth, 0);
-  EXPECT_EQ(of("colornerf-paper").classes, "ab");
   EXPECT_EQ(of("colornerf-paper").purify.opinions, 1);
   Stage2Options smooth;
   smooth.spread_weight = 2;

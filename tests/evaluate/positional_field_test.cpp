@@ -306,7 +306,7 @@ TEST_F(PositionalField, RegressionIsSmoothL1OfTheMean) {
     return makers_.chroma({}, 3)->step(two_pixels(), labels, {}, {.regression = weight}, 1e-9f);
   };
   std::vector<Ab> means(2);
-  makers_.chroma({}, 3)->decode(two_pixels(), {1.0f}, means);
+  makers_.chroma({}, 3)->decode(two_pixels(), 1.0f, means);
   double expected = 0;
   for (std::size_t p = 0; p < means.size(); ++p) {
     const Ab wanted = mean_of(labels[p]);
@@ -328,7 +328,7 @@ TEST_F(PositionalField, LearnsColoursAndLeavesTheEncodingAlone) {
   for (int i = 0; i < 120; ++i) (void)chroma->step(two_pixels(), labels, {}, 3e-3f);
   EXPECT_EQ(chroma->step_count(), 120);
   std::vector<Ab> colors(2);
-  chroma->decode(two_pixels(), {0.38f}, colors);
+  chroma->decode(two_pixels(), 0.38f, colors);
   for (std::size_t p = 0; p < 2; ++p) {
     EXPECT_NEAR(colors[p].a, wanted[p].a, 6);  // half a bin and the soft label's reach
     EXPECT_NEAR(colors[p].b, wanted[p].b, 6);

@@ -6,11 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <set>
 
 #include "src/color/colorspace_math.h"
-#include "src/train/color_model.h"
 #include "src/train/scene.h"
 #include "src/train/stage1.h"
 #include "tests/support/data.h"
@@ -59,34 +57,6 @@ class Erring final : public Colorizer {
   [[nodiscard]] std::string name() const override { return "erring"; }
 };
 
-/// Answers one chromaticity: ab in proportion to the cube root of the light, and the same for all of a patch, as an
-/// answer does that is too coarse to see shading.
-class Coarse final : public Colorizer {
- public:
-  static Ab shaded(float luminance) {
-    const float share = 1 / tint_scale(luminance);
-    return {share * 40, share * 20};
-  }
-  ChromaBatch colorize(const LightnessBatch& patches) override {
-    const std::size_t pixels = patches.lightness.size() / std::size_t(patches.batch);
-    ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
-    for (int i = 0; i < patches.batch; ++i) {
-      const auto part = std::span(patches.lightness).subspan(std::size_t(i) * pixels, pixels);
-      float light = 0, lit = 0;
-      for (const float lightness : part) {
-        if (lightness < 1) continue;
-        light += luminance_from_lightness(lightness);
-        lit += 1;
-      }
-      const Ab color = shaded(lit > 0 ? light / lit : 0);
-      answer.ab.insert(answer.ab.end(), pixels, color.a);
-      answer.ab.insert(answer.ab.end(), pixels, color.b);
-    }
-    return answer;
-  }
-  [[nodiscard]] std::string name() const override { return "coarse"; }
-};
-
 class Stage2 : public testing::Test {
  protected:
   void SetUp() override {
@@ -124,17 +94,13 @@ class Stage2 : public testing::Test {
   }
   /// Mean ab distance to the answer where a pixel is opaque and light enough to have that colour.
   [[nodiscard]] double distance_to_answer(const std::string& name) const {
-    return distance_to(name, [](float) { return kAnswer; });
-  }
-  [[nodiscard]] double distance_to(const std::string& name, const std::function<Ab(float luminance)>& wanted) const {
     const RenderedImage image = rendered(name);
     double sum = 0;
     int count = 0;
     for (std::size_t p = 0; p < image.opacity.size(); ++p) {
       if (image.opacity[p] < 0.9f || image.luminance[p] < 0.1f) continue;
       const Lab<float> lab = lab_from_linear_rgb(Vec3f{image.rgb[3 * p], image.rgb[3 * p + 1], image.rgb[3 * p + 2]});
-      const Ab color = wanted(image.luminance[p]);
-      sum += std::hypot(lab.a - color.a, lab.b - color.b);
+      sum += std::hypot(lab.a - kAnswer.a, lab.b - kAnswer.b);
       ++count;
     }
     EXPECT_GT(count, 50);
@@ -186,42 +152,6 @@ TEST_F(Stage2, LearnsTheAnswerByClassificationAndPhotometrically) {
       (void)train_stage2(capture_, stage1(), options, colorizer, {}, take(name), false);
       EXPECT_LT(distance_to_answer(name), 5) << name << "; grey is " << std::hypot(kAnswer.a, kAnswer.b);
     }
-  }
-}
-
-TEST(TintScale, IsTheSameForOneChromaticityInAnyLight) {
-  const auto tint = [](float luminance) {
-    const auto a = 500 * (lab_f(1.2f * luminance) - lab_f(luminance));
-    return tint_scale(luminance) * a;
-  };
-  for (const float luminance : {0.01f, 0.05f, 0.2f, 0.5f, 0.9f}) EXPECT_NEAR(tint(luminance), tint(0.3f), 0.02);
-  const float at_60 = luminance_from_lightness(60.0f);
-  EXPECT_NEAR(tint_scale(at_60), 1, 1e-5);
-  EXPECT_TRUE(std::isfinite(tint_scale(0)) && std::isfinite(tint_scale(-1)));
-}
-
-TEST_F(Stage2, TintsGetTheirShadingFromThePixel) {
-  double distance[2];
-  for (const char* classes : {"ab", "tint"}) {
-    Stage2Options options = small_options();
-    options.classes = classes;
-    options.patches = 150;
-    options.purify.enabled = false;
-    Coarse colorizer;
-    (void)train_stage2(capture_, stage1(), options, colorizer, {}, take(classes), false);
-    distance[classes == std::string("tint")] = distance_to(classes, &Coarse::shaded);
-  }
-  EXPECT_LT(distance[1], 0.8 * distance[0]);
-}
-
-TEST_F(Stage2, RebalancingIsOfTheClassesThatAreLearnt) {
-  for (const char* classes : {"ab", "tint"}) {
-    Stage2Options options = small_options();
-    options.classes = classes;
-    options.rebalancing = 0.5;
-    Listening colorizer;
-    (void)train_stage2(capture_, stage1(), options, colorizer, {}, take(classes), false);
-    EXPECT_LT(distance_to_answer(classes), 6) << classes;
   }
 }
 

@@ -63,7 +63,7 @@ class ChromaEngineCpu final : public ChromaEngine {
     });
   }
 
-  void decode(const PixelSamples& pixels, const BinDecoding& decoding, std::span<Ab> colors) const override {
+  void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const override {
     CNERF_CHECK_EQ(colors.size(), pixels.pixels());
     parallel_ranges(pixels.pixels(), kBlockPixels, [&](std::size_t begin, std::size_t end) {
       Work& work = works_.local();
@@ -71,7 +71,7 @@ class ChromaEngineCpu final : public ChromaEngine {
       std::array<float, kAbBinCount> of_pixel;
       for (std::size_t p = begin; p < end; ++p) {
         for (int q = 0; q < kAbBinCount; ++q) of_pixel[std::size_t(q)] = work.logits[logit_at(p - begin, q)];
-        colors[p] = cnerf::decode(of_pixel, decoding);
+        colors[p] = temperature > 0 ? decode_annealed_mean(of_pixel, temperature) : decode_arg_max(of_pixel);
       }
     });
   }

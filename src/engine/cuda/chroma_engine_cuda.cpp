@@ -60,11 +60,11 @@ class ChromaEngineCuda final : public ChromaEngine {
       logits_.download(logits.data() + begin * kAbBinCount, count * kAbBinCount, stream_);
     });
   }
-  void decode(const PixelSamples& pixels, const BinDecoding& decoding, std::span<Ab> colors) const override {
+  void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const override {
     CNERF_CHECK_EQ(colors.size(), pixels.pixels());
     for_pieces(pixels, [&](std::size_t begin, std::size_t count) {
       colors_.reserve(count, "pixels");
-      chroma_colors(head_job(), {decoding, centres_.data(), colors_.data()}, stream_);
+      chroma_colors(head_job(), {temperature, centres_.data(), colors_.data()}, stream_);
       colors_.download(colors.data() + begin, count, stream_);
     });
   }

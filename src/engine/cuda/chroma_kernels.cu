@@ -252,55 +252,28 @@ __device__ float softmax_gradient(std::uint32_t first, std::uint32_t pixels, con
   return loss;
 }
 
-/// Mean of the bins' centres in one row of the block, weighed by `weight(bin, its logit)`.
-template <typename Weight>
-__device__ Ab weighted_mean(const Ab* centres, int half, HeadShared& shared, Logits& logits, Weight&& weight) {
-  float sum = 0, a = 0, b = 0;
-  logits.for_row(half, [&](int q, float& logit) {
-    if (q >= kAbBinCount) return;
-    const float of_bin = weight(q, logit);
-    sum += of_bin;
-    a += of_bin * centres[q].a;
-    b += of_bin * centres[q].b;
-  });
-  sum = sum_of_row(sum, half, shared.sum[0]);
-  a = sum_of_row(a, half, shared.sum[1]);
-  b = sum_of_row(b, half, shared.sum[2]);
-  return {a / sum, b / sum};
-}
-
-/// `climb_to_mode` (src/color/ab_bins.h).
-__device__ Ab climb_to_mode(float bandwidth, Ab from, const Ab* centres, int half, HeadShared& shared, Logits& logits) {
-  const float precision = 0.5f / (bandwidth * bandwidth);
-  for (int step = 0; step < kModeSteps; ++step) {
-    const auto exponent = [&](int q, float logit) {
-      const float a = centres[q].a - from.a, b = centres[q].b - from.b;
-      return logit - precision * (a * a + b * b);
-    };
-    float largest = -INFINITY;
-    logits.for_row(half, [&](int q, float& logit) {
-      largest = q < kAbBinCount ? fmaxf(largest, exponent(q, logit)) : largest;
-    });
-    largest = of_row(largest, half, shared.largest, [](float a, float b) { return fmaxf(a, b); });
-    from = weighted_mean(centres, half, shared, logits,
-                         [&](int q, float logit) { return expf(exponent(q, logit) - largest); });
-  }
-  return from;
-}
-
-/// `decode` (src/color/ab_bins.h).
+/// The mean of the bins' centres under softmax(logits / temperature) (Zhang et al. 2016, Eq. 5).
 __device__ void write_colors(std::uint32_t first, std::uint32_t pixels, const ChromaDecoding& decoding,
                              HeadShared& shared, Logits& logits) {
-  const float temperature = decoding.how.temperature, bandwidth = decoding.how.bandwidth;
 #pragma unroll
   for (int half = 0; half < 2; ++half) {
     const float largest = largest_of_row(logits, half, shared);
-    Ab color = weighted_mean(decoding.centres, half, shared, logits, [&](int, float logit) {
-      return temperature > 0 ? expf((logit - largest) / temperature) : logit == largest ? 1.0f : 0.0f;
+    float sum = 0, a = 0, b = 0;
+    logits.for_row(half, [&](int q, float& logit) {
+      if (q >= kAbBinCount) return;
+      const float weight = decoding.temperature > 0 ? expf((logit - largest) / decoding.temperature)
+                           : logit == largest       ? 1.0f
+                                                    : 0.0f;
+      const Ab centre = decoding.centres[q];
+      sum += weight;
+      a += weight * centre.a;
+      b += weight * centre.b;
     });
-    if (bandwidth > 0) color = climb_to_mode(bandwidth, color, decoding.centres, half, shared, logits);
+    sum = sum_of_row(sum, half, shared.sum[0]);
+    a = sum_of_row(a, half, shared.sum[1]);
+    b = sum_of_row(b, half, shared.sum[2]);
     const std::uint32_t pixel = first + threadIdx.x % 32 / 4 + 8 * half;
-    if (pixel < pixels && threadIdx.x < 32 && threadIdx.x % 4 == 0) decoding.colors[pixel] = color;
+    if (pixel < pixels && threadIdx.x < 32 && threadIdx.x % 4 == 0) decoding.colors[pixel] = {a / sum, b / sum};
   }
 }
 

@@ -486,12 +486,13 @@ class PositionalChromaEngine final : public ChromaEngine {
       std::ranges::copy(part, logits.begin() + std::ptrdiff_t(first * kAbBinCount));
     });
   }
-  void decode(const PixelSamples& pixels, const BinDecoding& decoding, std::span<Ab> colors) const override {
+  void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const override {
     CNERF_CHECK_EQ(colors.size(), pixels.pixels());
     for_parts(pixels, [&](std::size_t first, const std::vector<float>& part) {
       parallel_ranges(part.size() / kAbBinCount, 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p) {
-          colors[first + p] = cnerf::decode(std::span(part).subspan(p * kAbBinCount, kAbBinCount), decoding);
+          const auto of_pixel = std::span(part).subspan(p * kAbBinCount, kAbBinCount);
+          colors[first + p] = temperature > 0 ? decode_annealed_mean(of_pixel, temperature) : decode_arg_max(of_pixel);
         }
       });
     });
