@@ -24,6 +24,11 @@ find_package(Boost REQUIRED COMPONENTS iostreams)
 find_package(OpenVDB REQUIRED)
 
 find_package(Torch REQUIRED)
+# PyTorch's builds of LibTorch export a std::filesystem of their own (seen with 2.11). The system's C++ library has to
+# come before them, or its objects are freed by their code.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_link_options(torch INTERFACE "LINKER:--push-state,--no-as-needed,-lstdc++,--pop-state")
+endif()
 
 if(CNERF_TESTS)
   find_package(GTest REQUIRED)
