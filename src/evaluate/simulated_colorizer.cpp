@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "src/base/error.h"
+#include "src/base/parallel.h"
 #include "src/base/rng.h"
 #include "src/capture/color_truth.h"
 #include "src/color/ab_bins.h"
@@ -20,7 +21,7 @@ namespace {
 constexpr float kSecondModeChroma = 0.35f;  // of the true chroma, in the washed-out mode
 constexpr Ab kBrown = {6, 14};              // and what is added to it
 constexpr float kCastChroma = 25;           // of an outlier's colour cast
-constexpr double kBiasPeriod = 2.0 / 3.0;   // of the content-locked bias, over the hue circle and the range of L*
+constexpr float kBiasPeriod = 2.0f / 3;     // of the content-locked bias, over the hue circle and the range of L*
 constexpr double kDegree = std::numbers::pi / 180;
 
 /// Reads one "key=value" into the options.
@@ -138,10 +139,10 @@ class SimulatedColorizer final : public Colorizer {
     const std::size_t pixels = std::size_t(patches.height) * std::size_t(patches.width);
     ChromaBatch answer{
         patches.batch, patches.height, patches.width, std::vector<float>(2 * patches.lightness.size()), {}};
-    for (std::size_t i = 0; i < patches.origins.size(); ++i) {
+    parallel_tasks(patches.origins.size(), [&](std::size_t i) {
       colorize_one(patches, patches.origins[i], std::span(patches.lightness).subspan(i * pixels, pixels),
                    std::span(answer.ab).subspan(2 * i * pixels, 2 * pixels));
-    }
+    });
     return answer;
   }
 
@@ -157,19 +158,20 @@ class SimulatedColorizer final : public Colorizer {
     const std::vector<float> b = resized_part(truth.ab.data() + truth.ab.size() / 2, truth, origin, patches);
     const Disturbance disturbance(options_, origin.query);
     for (std::size_t p = 0; p < a.size(); ++p) {
-      const double turn = disturbance.turn + bias(a[p], b[p], lightness[p]);
-      const auto cos = static_cast<float>(std::cos(turn)), sin = static_cast<float>(std::sin(turn));
+      const float turn = float(disturbance.turn) + bias(a[p], b[p], lightness[p]);
+      const float cos = std::cos(turn), sin = std::sin(turn);
       ab[p] = disturbance.chroma * (cos * a[p] - sin * b[p]) + disturbance.cast.a;
       ab[a.size() + p] = disturbance.chroma * (sin * a[p] + cos * b[p]) + disturbance.cast.b;
     }
   }
 
   /// The same for the same thing in every view, so no averaging removes it.
-  [[nodiscard]] double bias(float a, float b, float lightness) const {
+  [[nodiscard]] float bias(float a, float b, float lightness) const {
     if (options_.bias <= 0) return 0;
-    const double phase = 2 * std::numbers::pi * double(CounterRng(std::uint64_t(options_.seed), 0x62696173).uniform(0));
-    const double along_lightness = 2 * std::numbers::pi / kBiasPeriod * double(lightness) / 100;
-    return options_.bias * kDegree * std::sin(std::atan2(double(b), double(a)) + along_lightness + phase);
+    constexpr float kTurn = 2 * std::numbers::pi_v<float>;
+    const float phase = kTurn * CounterRng(std::uint64_t(options_.seed), 0x62696173).uniform(0);
+    const float along_lightness = kTurn / kBiasPeriod * lightness / 100;
+    return float(options_.bias * kDegree) * std::sin(std::atan2(b, a) + along_lightness + phase);
   }
 
   SimulationOptions options_;

@@ -24,14 +24,14 @@ struct Stage2Options {
   double scale_min = 0.3, scale_max = 0.7;   ///< s: the patch's side as a share of the image's short side
   int rays_per_patch = 4096;                 ///< pixels of a patch that are trained on
   double known_share = 1;  ///< pixels of known colours trained on with a patch, as a share of rays_per_patch
-  double learning_rate = 1e-2;
+  double learning_rate = 3e-2;
   double final_learning_rate = 1e-3;
   int working_resolution = 384;     ///< short side, pixels, at which samples are cached
   double cached_weight = 0.99;      ///< share of a pixel's weight the cached samples carry
   double rebalancing = 0;           ///< lambda mixing of class rebalancing; 0 = off
   double spread_weight = 0.1;       ///< of the spread of a pixel's features in the loss (src/engine/chroma_math.h)
-  double regression_weight = 0;     ///< of how far the distribution's mean colour is from the answer, in the loss
-  double decode_temperature = 0.3;  ///< annealed-mean temperature; 0 = arg-max
+  double regression_weight = 1;     ///< of how far the distribution's mean colour is from the answer, in the loss
+  double decode_temperature = 0.6;  ///< annealed-mean temperature; 0 = arg-max
   int distill_steps = 1000;         ///< steps of the fit of per-sample colour for baking
   int colorizer_batch = 4;          ///< patches a colorizer query
   int seed = 1;
