@@ -142,12 +142,9 @@ Tensor ColorizerNetImpl::bottleneck(Tensor x) {
 
 ColorizerFeatures ColorizerNetImpl::features(const Tensor& lightness) {
   CNERF_CHECK(lightness.dim() == 4 && lightness.size(1) == 1, "lightness is [B, 1, H, W]");
-  const std::int64_t height = lightness.size(2), width = lightness.size(3);
-  Tensor input = lightness / 50 - 1;
-  const std::int64_t bottom = (kInputMultiple - height % kInputMultiple) % kInputMultiple;
-  const std::int64_t right = (kInputMultiple - width % kInputMultiple) % kInputMultiple;
-  if (bottom + right > 0) input = F::pad(input, F::PadFuncOptions({0, right, 0, bottom}).mode(torch::kReplicate));
-  input = input.contiguous(torch::MemoryFormat::ChannelsLast);
+  CNERF_CHECK(lightness.size(2) % kInputMultiple == 0 && lightness.size(3) % kInputMultiple == 0,
+              "sides are multiples of the network's");
+  const Tensor input = (lightness / 50 - 1).contiguous(torch::MemoryFormat::ChannelsLast);
 
   const Tensor at2 = encode2_->forward(stem_->forward(input));
   const Tensor at4 = encode4_->forward(down4_->forward(at2));
@@ -160,14 +157,7 @@ ColorizerFeatures ColorizerNetImpl::features(const Tensor& lightness) {
   const Tensor up16 = decode16_->forward(join16_->forward(torch::cat({upsample_to(informed, at16), at16}, 1)));
   const Tensor up8 = decode8_->forward(join8_->forward(torch::cat({upsample_to(up16, at8), at8}, 1)));
   const Tensor up4 = decode4_->forward(join4_->forward(torch::cat({upsample_to(up8, at4), at4}, 1)));
-  Tensor logits = classify_->forward(dropout_->forward(up4));
-  if (bottom + right > 0) {
-    using torch::indexing::None;
-    using torch::indexing::Slice;
-    const auto blocks = [](std::int64_t pixels) { return (pixels + kOutputStride - 1) / kOutputStride; };
-    logits = logits.index({Slice(), Slice(), Slice(None, blocks(height)), Slice(None, blocks(width))});
-  }
-  return {logits, up16, global};
+  return {classify_->forward(dropout_->forward(up4)), up16, global};
 }
 
 void ColorizerNetImpl::shift_logits(const Tensor& offsets) {

@@ -57,8 +57,8 @@ TORCH_MODULE(AttentionUnit);
 
 /// What the network knows about a batch: the answer, and inner features that training hangs auxiliary losses on.
 struct ColorizerFeatures {
-  torch::Tensor logits;    ///< [B, 313, ceil(H/4), ceil(W/4)]
-  torch::Tensor semantic;  ///< [B, kSemanticChannels, H/16, W/16] of the padded input, after the bottleneck
+  torch::Tensor logits;    ///< [B, 313, H/4, W/4]
+  torch::Tensor semantic;  ///< [B, kSemanticChannels, H/16, W/16], after the bottleneck
   torch::Tensor global;    ///< [B, kGlobalChannels] average of the bottleneck
 };
 
@@ -69,12 +69,12 @@ class ColorizerNetImpl : public torch::nn::Module {
   static constexpr std::int64_t kSemanticChannels = 216;
   static constexpr std::int64_t kGlobalChannels = 256;
   static constexpr std::int64_t kOutputStride = 4;
-  static constexpr std::int64_t kInputMultiple = 32;  ///< other sizes are padded by replication inside
+  static constexpr std::int64_t kInputMultiple = 32;  ///< of both sides, pixels
 
   explicit ColorizerNetImpl(Normalisation normalisation = Normalisation::kBatch);
 
-  /// @param lightness  [B, 1, H, W] f32, L* 0..100, any size.
-  /// @return           [B, 313, ceil(H/4), ceil(W/4)] logits.
+  /// @param lightness  [B, 1, H, W] f32, L* 0..100; H and W are multiples of kInputMultiple.
+  /// @return           [B, 313, H/4, W/4] logits.
   torch::Tensor forward(const torch::Tensor& lightness);
   ColorizerFeatures features(const torch::Tensor& lightness);
 

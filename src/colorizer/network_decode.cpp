@@ -1,32 +1,45 @@
 #include "src/colorizer/network_decode.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "src/base/check.h"
 #include "src/color/ab_bins.h"
 
 namespace cnerf {
 namespace F = torch::nn::functional;
 using torch::Tensor;
-using torch::indexing::None;
-using torch::indexing::Slice;
 
 namespace {
 
-constexpr std::int64_t kStride = ColorizerNetImpl::kOutputStride;
-constexpr double kSpatialSigma = 0.7;     // blocks
+constexpr double kSpatialSigma = 0.7;     // cells
 constexpr double kLightnessSigma = 10.0;  // L* units
+constexpr double kMostEnlargement = 4;    // of a sliver, whose other side would grow without end
 
-/// Repeats every block kStride times in both directions and cuts to [height, width].
-Tensor spread(const Tensor& blocks, std::int64_t height, std::int64_t width) {
-  const std::int64_t batch = blocks.size(0), channels = blocks.size(1), rows = blocks.size(2), columns = blocks.size(3);
-  const Tensor full = blocks.unsqueeze(3).unsqueeze(5).expand({batch, channels, rows, kStride, columns, kStride});
-  return full.reshape({batch, channels, rows * kStride, columns * kStride})
-      .index({Slice(), Slice(), Slice(None, height), Slice(None, width)});
-}
+/// Where the pixels of one axis lie on a grid of cells.
+struct CellsOfPixels {
+  Tensor cell;    ///< [pixels] i64, whose area holds the pixel's centre
+  Tensor offset;  ///< [pixels] f32, of the pixel's centre from the cell's, in cells
 
-/// exp(-d^2 / 2 sigma^2) of a pixel's distance, in blocks, to the block `shift` blocks from its own.  [length]
-Tensor spatial_weight(int shift, std::int64_t length, const torch::TensorOptions& options) {
-  const Tensor inside = (torch::arange(length, options).remainder(kStride) + 0.5) / static_cast<double>(kStride) - 0.5;
-  return torch::exp(-(inside - shift).square() / (2 * kSpatialSigma * kSpatialSigma));
+  CellsOfPixels(std::int64_t cells, std::int64_t pixels, const torch::TensorOptions& options) {
+    const Tensor place = (torch::arange(pixels, options) + 0.5) * (double(cells) / double(pixels));
+    cell = place.to(torch::kInt64).clamp_max(cells - 1);
+    offset = place - cell - 0.5;
+  }
+  /// exp(-d^2 / 2 sigma^2) of the distance to the cell `shift` cells further.  [pixels]
+  [[nodiscard]] Tensor weight(int shift) const {
+    return torch::exp(-(offset - shift).square() / (2 * kSpatialSigma * kSpatialSigma));
+  }
+};
+
+/// Cubic, with the wider kernel that shrinking needs.
+Tensor resample(const Tensor& planes, std::int64_t height, std::int64_t width) {
+  if (planes.size(2) == height && planes.size(3) == width) return planes;
+  return F::interpolate(planes, F::InterpolateFuncOptions()
+                                    .size(std::vector<std::int64_t>{height, width})
+                                    .mode(torch::kBicubic)
+                                    .align_corners(false)
+                                    .antialias(true));
 }
 
 }  // namespace
@@ -45,48 +58,50 @@ Tensor decode_ab(const Tensor& logits, const AbDecoding& decoding) {
   return ab.permute({0, 3, 1, 2}).contiguous();
 }
 
-Tensor guided_upsample(const Tensor& blocks, const Tensor& lightness) {
+Tensor guided_upsample(const Tensor& cells, const Tensor& lightness) {
   const std::int64_t height = lightness.size(2), width = lightness.size(3);
-  const std::int64_t bottom = blocks.size(2) * kStride - height, right = blocks.size(3) * kStride - width;
-  CNERF_CHECK(bottom >= 0 && bottom < kStride && right >= 0 && right < kStride,
-              "blocks are a quarter of the lightness");
-  const Tensor padded = F::pad(lightness, F::PadFuncOptions({0, right, 0, bottom}).mode(torch::kReplicate));
-  const Tensor block_lightness = torch::avg_pool2d(padded, kStride);
+  const CellsOfPixels rows(cells.size(2), height, lightness.options());
+  const CellsOfPixels columns(cells.size(3), width, lightness.options());
 
   const auto border = F::PadFuncOptions({1, 1, 1, 1}).mode(torch::kReplicate);
-  const Tensor wide_blocks = F::pad(blocks, border), wide_lightness = F::pad(block_lightness, border);
-  const auto shifted = [&](const Tensor& wide, int dy, int dx) {
-    const Tensor window =
-        wide.index({Slice(), Slice(), Slice(1 + dy, 1 + dy + blocks.size(2)), Slice(1 + dx, 1 + dx + blocks.size(3))});
-    return spread(window, height, width);
+  const Tensor wide_cells = F::pad(cells, border);
+  const Tensor wide_lightness = F::pad(torch::adaptive_avg_pool2d(lightness, {cells.size(2), cells.size(3)}), border);
+  const auto neighbour = [&](const Tensor& wide, int dy, int dx) {
+    return wide.index_select(2, rows.cell + 1 + dy).index_select(3, columns.cell + 1 + dx);
   };
 
-  Tensor sum = torch::zeros({blocks.size(0), blocks.size(1), height, width}, blocks.options());
+  Tensor sum = torch::zeros({cells.size(0), cells.size(1), height, width}, cells.options());
   Tensor weight_sum = torch::zeros_like(lightness);
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
-      const Tensor spatial = spatial_weight(dy, height, lightness.options()).unsqueeze(1) *
-                             spatial_weight(dx, width, lightness.options()).unsqueeze(0);
-      const Tensor difference = shifted(wide_lightness, dy, dx) - lightness;
-      // The small floor keeps the sum above zero where no block is close in lightness.
+      const Tensor spatial = rows.weight(dy).unsqueeze(1) * columns.weight(dx).unsqueeze(0);
+      const Tensor difference = neighbour(wide_lightness, dy, dx) - lightness;
+      // The small floor keeps the sum above zero where no cell is close in lightness.
       const Tensor range = torch::exp(-difference.square() / (2 * kLightnessSigma * kLightnessSigma)) + 1e-3;
       const Tensor weight = range * spatial;
-      sum += weight * shifted(wide_blocks, dy, dx);
+      sum += weight * neighbour(wide_cells, dy, dx);
       weight_sum += weight;
     }
   }
   return sum / weight_sum;
 }
 
-Tensor logits_with_flips(ColorizerNet& network, const Tensor& lightness) {
-  const Tensor logits = network->forward(lightness);
-  // Blocks of the mirror image line up with ours only where the width is a multiple of the stride.
-  if (lightness.size(3) % kStride != 0) return logits;
-  return 0.5 * (logits + network->forward(lightness.flip({3})).flip({3}));
+Tensor ask_network(ColorizerNet& network, const Tensor& lightness, int short_side) {
+  constexpr std::int64_t kMultiple = ColorizerNetImpl::kInputMultiple;
+  const std::int64_t height = lightness.size(2), width = lightness.size(3);
+  const double scale = std::min(kMostEnlargement, double(short_side) / double(std::min(height, width)));
+  const auto asked = [&](std::int64_t side) {
+    return kMultiple * std::max<std::int64_t>(1, std::llround(double(side) * scale / kMultiple));
+  };
+  return network->forward(resample(lightness, asked(height), asked(width)).clamp(0, 100));
 }
 
-Tensor colorize_with_flips(ColorizerNet& network, const Tensor& lightness, const AbDecoding& decoding) {
-  return guided_upsample(decode_ab(logits_with_flips(network, lightness), decoding), lightness);
+Tensor read_answer(const Tensor& logits, const Tensor& lightness, const AbDecoding& decoding) {
+  return guided_upsample(decode_ab(logits, decoding), lightness);
+}
+
+Tensor colorize_lightness(ColorizerNet& network, const Tensor& lightness, const AbDecoding& decoding) {
+  return read_answer(ask_network(network, lightness, decoding.short_side), lightness, decoding);
 }
 
 }  // namespace cnerf

@@ -15,8 +15,9 @@ using torch::Tensor;
 
 namespace {
 
-constexpr std::string_view kMagic = "CNERFCW2";
+constexpr std::string_view kMagic = "CNERFCW3";
 constexpr std::size_t kChecksumBytes = 64;
+constexpr std::uint32_t kMostShortSide = 4096;                // pixels
 constexpr std::size_t kMostContent = std::size_t(1) << 26;  // a file that unpacks to more is none of ours
 
 template <typename T>
@@ -75,6 +76,15 @@ std::vector<std::byte> interleaved(std::span<const std::uint8_t> sorted) {
   return content;
 }
 
+int read_short_side(const fs::path& file, Reader& reader) {
+  const auto side = reader.value<std::uint32_t>();
+  if (side < ColorizerNetImpl::kInputMultiple || side > kMostShortSide) {
+    throw InputError(file, "short side", "expected " + std::to_string(ColorizerNetImpl::kInputMultiple) + " to " +
+                                             std::to_string(kMostShortSide) + " pixels, found " + std::to_string(side));
+  }
+  return int(side);
+}
+
 void read_parameter(const fs::path& file, Reader& reader, torch::OrderedDict<std::string, Tensor>& parameters) {
   const std::string name = reader.text(reader.value<std::uint32_t>());
   std::vector<std::int64_t> shape(std::min<std::uint32_t>(reader.value<std::uint32_t>(), 8));
@@ -95,6 +105,7 @@ void save_colorizer_weights(const fs::path& file, const ColorizerNet& network, c
   std::vector<std::byte> payload;
   append(payload, decoding.temperature);
   append(payload, decoding.gain);
+  append(payload, static_cast<std::uint32_t>(decoding.short_side));
   const auto parameters = network->named_parameters();
   append(payload, static_cast<std::uint32_t>(parameters.size()));
   for (const auto& item : parameters) {
@@ -117,7 +128,7 @@ ColorizerWeights load_colorizer_weights(const fs::path& file) {
   const std::vector<std::byte> whole = read_binary_file(file);
   Reader header(file, whole);
   if (header.text(kMagic.size()) != kMagic) {
-    throw InputError(file, "header", "expected colorizer weights of version 2 (" + std::string(kMagic) + ")");
+    throw InputError(file, "header", "expected colorizer weights of version 3 (" + std::string(kMagic) + ")");
   }
   ColorizerWeights weights;
   weights.sha256 = header.text(kChecksumBytes);
@@ -130,6 +141,7 @@ ColorizerWeights load_colorizer_weights(const fs::path& file) {
   Reader reader(file, content);
   weights.decoding.temperature = reader.value<double>();
   weights.decoding.gain = reader.value<double>();
+  weights.decoding.short_side = read_short_side(file, reader);
   weights.network = ColorizerNet(Normalisation::kFolded);
 
   const torch::NoGradGuard no_grad;

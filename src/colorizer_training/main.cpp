@@ -189,8 +189,8 @@ void export_weights(ColorizerNet folded, const torch::Tensor& log_weights, const
   ColorizerWeights written = load_colorizer_weights(o.output / "colorizer.weights");
   written.network->to(device);
   const std::string text = full_table(written.network, written.decoding, images, o, table, device);
-  std::printf("prior share %.2f, temperature %.2f, gain %.2f\n%s", choice.prior_share, choice.decoding.temperature,
-              choice.decoding.gain, text.c_str());
+  std::printf("short side %d, prior share %.2f, temperature %.2f, gain %.2f\n%s", choice.decoding.short_side,
+              choice.prior_share, choice.decoding.temperature, choice.decoding.gain, text.c_str());
   write_file(o.output / "scores.md", text);
 }
 

@@ -28,7 +28,7 @@ std::vector<RgbImage> photographs(const EvaluationSets& sets, bool scenes_only) 
 
 SetScore score_set(const std::string& name, const std::vector<RgbImage>& images, ColorizerNet& network,
                    const AbDecoding& decoding, const SoftLabelTable& table, torch::Device device) {
-  const std::vector<ChromaScore> scores = score_network(network, images, {{0, decoding}}, {}, true, table, device);
+  const std::vector<ChromaScore> scores = score_network(network, images, {{0, decoding}}, {}, table, device);
   return {name, int(images.size()), scores[0], score_baselines(images, table, device)};
 }
 
@@ -46,9 +46,11 @@ void paste(RgbImage& sheet, const RgbImage& image, int x, int y) {
 DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& validation, const Tensor& log_weights,
                                const SoftLabelTable& table, torch::Device device) {
   std::vector<DecodingChoice> choices;
-  for (const double share : {0.0, 0.1, 0.2, 0.3, 0.45, 0.6}) {
-    for (const double temperature : {1.0, 0.8}) {
-      for (const double gain : {0.9, 1.0, 1.15}) choices.push_back({share, {temperature, gain}});
+  for (const int short_side : {192, 224, 256, 288, 320}) {
+    for (const double share : {0.0, 0.15, 0.3, 0.45, 0.6}) {
+      for (const double temperature : {1.0, 0.8}) {
+        for (const double gain : {0.9, 1.0, 1.15, 1.3, 1.5}) choices.push_back({share, {temperature, gain, short_side}});
+      }
     }
   }
   // Scenes: the large sets of single things have near duplicates among the training images.
@@ -56,13 +58,14 @@ DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& vali
   if (images.empty()) images = photographs(validation, false);
   if (images.empty()) return {};
   const ChromaScore grey = score_grey(images, table, device);
-  const std::vector<ChromaScore> scores = score_network(network, images, choices, log_weights, true, table, device);
+  const std::vector<ChromaScore> scores = score_network(network, images, choices, log_weights, table, device);
   std::size_t best = 0;
   for (std::size_t i = 0; i < choices.size(); ++i) {
     if (merit(scores[i], grey) > merit(scores[best], grey)) best = i;
     std::printf(
-        "decoding: prior share %.2f temperature %.2f gain %.2f: raw %+.2f balanced %+.2f rmse %.3f merit %.2f\n",
-        choices[i].prior_share, choices[i].decoding.temperature, choices[i].decoding.gain,
+        "decoding: side %d share %.2f temperature %.2f gain %.2f: raw %+.2f balanced %+.2f rmse %.3f merit %.2f\n",
+        choices[i].decoding.short_side, choices[i].prior_share, choices[i].decoding.temperature,
+        choices[i].decoding.gain,
         scores[i].raw_auc - grey.raw_auc, scores[i].balanced_auc - grey.balanced_auc, scores[i].rmse / grey.rmse,
         merit(scores[i], grey));
   }
@@ -95,7 +98,7 @@ void write_sample_sheet(const std::filesystem::path& file, ColorizerNet& network
       const Tensor srgb =
           bytes.view({1, truth.height, truth.width, 3}).permute({0, 3, 1, 2}).to(device, torch::kFloat32) / 255;
       const Tensor lightness = lab_from_srgb(srgb).lightness;
-      const Tensor ab = colorize_with_flips(network, lightness, decoding);
+      const Tensor ab = colorize_lightness(network, lightness, decoding);
       RgbImage row{3 * kEvaluationSide * 3 / 2, kEvaluationSide, {}};
       row.rgb.assign(std::size_t(row.width) * std::size_t(row.height) * 3, 0);
       paste(row, image_from_lab(lightness[0], torch::zeros_like(ab[0])), 0, 0);
@@ -117,7 +120,7 @@ std::string validation_line(ColorizerNet& network, const EvaluationSets& validat
     const std::vector<RgbImage> images = photographs(validation, scenes);
     if (images.empty()) continue;
     const ChromaScore grey = score_grey(images, table, device);
-    const ChromaScore score = score_network(network, images, {DecodingChoice{}}, {}, false, table, device)[0];
+    const ChromaScore score = score_network(network, images, {DecodingChoice{}}, {}, table, device)[0];
     char line[200];
     std::snprintf(line, sizeof line, "%s raw %+.2f balanced %+.2f rmse %.3f merit %.2f",
                   scenes ? " | scenes" : "photographs", score.raw_auc - grey.raw_auc,
@@ -134,7 +137,7 @@ double patch_milliseconds(ColorizerNet& network, const AbDecoding& decoding, tor
   double least = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kTries; ++i) {
     const auto start = std::chrono::steady_clock::now();
-    (void)colorize_with_flips(network, lightness, decoding).cpu();
+    (void)colorize_lightness(network, lightness, decoding).cpu();
     const std::chrono::duration<double, std::milli> taken = std::chrono::steady_clock::now() - start;
     least = std::min(least, taken.count() / kBatch);
   }

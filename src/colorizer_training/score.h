@@ -48,7 +48,7 @@ struct SetScore {
   Baselines baselines;
 };
 
-/// A way to read the network: what is added to its logits, and how they become a colour.
+/// A way to ask and read the network: what is added to its logits besides.
 struct DecodingChoice {
   double prior_share = 0;  ///< of the rebalancing that is taken back: logits - share * log w
   AbDecoding decoding;
@@ -56,19 +56,18 @@ struct DecodingChoice {
 
 /// Scores all `choices` in one pass over the images.
 /// @param log_weights  [313] log of the rebalancing weights used in training; empty where every prior_share is 0.
-/// @param flips        average with the mirror image, as the program does.
 [[nodiscard]] std::vector<ChromaScore> score_network(ColorizerNet& network, const std::vector<RgbImage>& images,
                                                      const std::vector<DecodingChoice>& choices,
-                                                     const torch::Tensor& log_weights, bool flips,
-                                                     const SoftLabelTable& table, torch::Device device);
+                                                     const torch::Tensor& log_weights, const SoftLabelTable& table,
+                                                     torch::Device device);
 [[nodiscard]] Baselines score_baselines(const std::vector<RgbImage>& images, const SoftLabelTable& table,
                                         torch::Device device);
 
 [[nodiscard]] ChromaScore score_grey(const std::vector<RgbImage>& images, const SoftLabelTable& table,
                                      torch::Device device);
 
-/// One number to choose by, made for photographs nobody has seen: points of balanced AuC above grey's, less one point
-/// for every 0.01 of grey's RMSE above 0.85 and two for every point of raw AuC that is missing at +0.3.
+/// One number to choose by: points of balanced AuC above grey's, less one point for every 0.01 of grey's RMSE above 0.82
+/// and two for every point of raw AuC that is missing at +1.5. Laxer limits choose garish colours (docs/decisions.md, 51).
 [[nodiscard]] double merit(const ChromaScore& network, const ChromaScore& grey);
 
 /// The table of the model card (Markdown).

@@ -43,14 +43,37 @@ TEST(ColorizerNet, StaysWithinItsSize) {
   EXPECT_LE(parameter_count(*ColorizerNet(Normalisation::kFolded)), kMostParameters);
 }
 
-TEST(ColorizerNet, AnswersAnySizeAtQuarterResolution) {
+TEST(ColorizerNet, RefusesSidesItWouldHaveToPad) {
+  ColorizerNet network(Normalisation::kFolded);
+  EXPECT_THROW((void)network->forward(random_lightness(1, 32, 40)), ContractError);
+  EXPECT_THROW((void)network->forward(random_lightness(1, 40, 32)), ContractError);
+}
+
+TEST(AskNetwork, BringsThePictureToTheSideAskedAt) {
   const torch::NoGradGuard no_grad;
   ColorizerNet network(Normalisation::kFolded);
   network->eval();
-  for (const auto& [height, width] : {std::pair{32, 32}, {33, 50}, {7, 129}}) {
-    const Tensor logits = network->forward(random_lightness(2, height, width));
-    EXPECT_EQ(logits.sizes(), (std::vector<std::int64_t>{2, 313, (height + 3) / 4, (width + 3) / 4}));
-    EXPECT_TRUE(torch::isfinite(logits).all().item<bool>());
+  struct Case {
+    int height, width, short_side, expected_height, expected_width;
+  };
+  for (const Case& c : {Case{64, 64, 64, 64, 64}, Case{64, 96, 128, 128, 192}, Case{200, 130, 64, 96, 64},
+                        Case{1, 100, 256, 32, 416}, Case{33, 50, 64, 64, 96}}) {
+    const Tensor logits = ask_network(network, random_lightness(2, c.height, c.width), c.short_side);
+    EXPECT_EQ(logits.sizes(), (std::vector<std::int64_t>{2, 313, c.expected_height / 4, c.expected_width / 4}))
+        << c.height << " x " << c.width;
+  }
+  const Tensor untouched = random_lightness(1, 64, 96);
+  EXPECT_TRUE(torch::equal(ask_network(network, untouched, 64), network->forward(untouched)));
+}
+
+TEST(ColorizeLightness, AnswersAtThePicturesOwnSize) {
+  const torch::NoGradGuard no_grad;
+  ColorizerNet network(Normalisation::kFolded);
+  network->eval();
+  for (const auto& [height, width] : {std::pair{32, 32}, {33, 50}, {7, 129}, {150, 100}}) {
+    const Tensor ab = colorize_lightness(network, random_lightness(2, height, width), {1, 1, 64});
+    EXPECT_EQ(ab.sizes(), (std::vector<std::int64_t>{2, 2, height, width}));
+    EXPECT_TRUE(torch::isfinite(ab).all().item<bool>());
   }
 }
 
@@ -78,16 +101,31 @@ TEST(GuidedUpsample, KeepsConstantsAndStopsAtEdges) {
   EXPECT_GT(full.slice(3, 16, 32).min().item<float>(), 49.0f);
 }
 
+TEST(GuidedUpsample, CellsNeedNotDivideThePicture) {
+  torch::manual_seed(7);
+  // A ramp over the cells' columns, where lightness says nothing: pixels follow it, each near its own place.
+  const Tensor ramp = torch::arange(7).to(torch::kFloat32).view({1, 1, 1, 7}).expand({1, 1, 5, 7}).contiguous();
+  for (const auto& [height, width] : {std::pair{33, 50}, {5, 7}, {3, 4}}) {
+    const Tensor full = guided_upsample(ramp, torch::full({1, 1, height, width}, 50.0f));
+    ASSERT_EQ(full.sizes(), (std::vector<std::int64_t>{1, 1, height, width}));
+    const Tensor expected = (torch::arange(width) + 0.5) * 7 / width - 0.5;
+    EXPECT_LT((full - expected).abs().slice(3, width / 7, width - width / 7).max().item<float>(), 0.5f) << width;
+    EXPECT_GE(full.min().item<float>(), 0);
+    EXPECT_LE(full.max().item<float>(), 6);
+  }
+}
+
 TEST(ColorizerWeights, ComeBackAsHalfPrecision) {
   const torch::NoGradGuard no_grad;
   const test::TempDir folder;
   ColorizerNet folded = fold_batch_norm(trained_like_network());
-  save_colorizer_weights(folder / "net.weights", folded, {0.7, 1.15});
+  save_colorizer_weights(folder / "net.weights", folded, {0.7, 1.15, 224});
   EXPECT_LE(std::filesystem::file_size(folder / "net.weights"), kMostBytes);
 
   ColorizerWeights loaded = load_colorizer_weights(folder / "net.weights");
   EXPECT_EQ(loaded.decoding.temperature, 0.7);
   EXPECT_EQ(loaded.decoding.gain, 1.15);
+  EXPECT_EQ(loaded.decoding.short_side, 224);
   const Tensor input = random_lightness(1, 32, 32);
   const Tensor expected = folded->forward(input), actual = loaded.network->forward(input);
   EXPECT_LT((expected - actual).abs().max().item<float>(), 0.02f * expected.abs().max().item<float>());
@@ -115,6 +153,19 @@ TEST(ColorizerWeights, DamageIsRefusedWithTheFileNamed) {
   EXPECT_THROW((void)load_colorizer_weights(folder / "none.weights"), MissingInputError);
 }
 
+TEST(ColorizerWeights, ASideNoPictureHasIsRefused) {
+  const test::TempDir folder;
+  for (const int side : {0, 5000}) {
+    save_colorizer_weights(folder / "net.weights", ColorizerNet(Normalisation::kFolded), {1, 1, side});
+    try {
+      (void)load_colorizer_weights(folder / "net.weights");
+      ADD_FAILURE() << "accepted " << side;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("short side"), testing::HasSubstr(std::to_string(side))));
+    }
+  }
+}
+
 LightnessBatch ramp_batch(int batch, int height, int width) {
   LightnessBatch patches{batch, height, width, {}};
   for (int i = 0; i < batch * height * width; ++i) patches.lightness.push_back(float((i * 7 + i / width) % 101));
@@ -139,6 +190,35 @@ TEST(BuiltinColorizer, AnswerDoesNotDependOnTheRestOfTheBatch) {
   for (std::size_t i = 0; i < alone.size(); ++i) ASSERT_NEAR(alone[i], together[4 * 32 * 32 + i], 0.05f);
 }
 
+/// Soft blobs on [0, 1]^2, sampled at the pixels' centres.
+LightnessBatch blobs(int side) {
+  LightnessBatch picture{1, side, side, {}};
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const double u = (x + 0.5) / side, v = (y + 0.5) / side;
+      picture.lightness.push_back(float(50 + 25 * std::sin(9 * u + 4 * v) * std::cos(7 * v) + 20 * v));
+    }
+  }
+  return picture;
+}
+
+TEST(BuiltinColorizer, AnswerDoesNotDependOnThePicturesResolution) {
+  const auto colorizer = load_builtin_colorizer(builtin_weights_file());
+  const std::vector<float> coarse = colorizer->colorize(blobs(96)).ab, fine = colorizer->colorize(blobs(288)).ab;
+  double difference = 0, chroma = 0;
+  for (int channel = 0; channel < 2; ++channel) {
+    for (int y = 0; y < 96; ++y) {
+      for (int x = 0; x < 96; ++x) {
+        const float a = coarse[std::size_t((channel * 96 + y) * 96 + x)];
+        const float b = fine[std::size_t((channel * 288 + 3 * y + 1) * 288 + 3 * x + 1)];  // the same centre
+        difference += std::abs(a - b), chroma += std::abs(b);
+      }
+    }
+  }
+  EXPECT_GT(chroma, 96 * 96) << "the comparison must be able to fail";
+  EXPECT_LT(difference, 0.1 * chroma);
+}
+
 TEST(BuiltinColorizer, FlatGreyGetsNearlyNoColor) {
   const auto colorizer = load_builtin_colorizer(builtin_weights_file());
   const LightnessBatch flat{1, 64, 64, std::vector<float>(64 * 64, 55.0f)};
@@ -153,7 +233,7 @@ TEST(BuiltinColorizer, BeatsGreyOnPhotographsItNeverSaw) {
   const SoftLabelTable table(torch::kCPU);
   ColorizerWeights weights = load_colorizer_weights(builtin_weights_file());
   const ChromaScore score =
-      score_network(weights.network, images, {{0, weights.decoding}}, {}, true, table, torch::kCPU)[0];
+      score_network(weights.network, images, {{0, weights.decoding}}, {}, table, torch::kCPU)[0];
   const ChromaScore grey = score_baselines(images, table, torch::kCPU).grey;
   EXPECT_GT(score.balanced_auc, grey.balanced_auc + 3);
   EXPECT_LT(score.rmse, 0.9 * grey.rmse);

@@ -194,9 +194,9 @@ TEST(MakeBatch, IsAPureFunctionOfTheStep) {
 
 TEST(Merit, IsBalancedAucUnlessRawAucOrRmseFallShort) {
   const ChromaScore grey{88, 60, 10, 0, 30};
-  EXPECT_DOUBLE_EQ(merit({89, 67, 8, 20, 30}, grey), 7);
-  EXPECT_NEAR(merit({89, 67, 8.7, 20, 30}, grey), 7 - 2, 1e-9);
-  EXPECT_NEAR(merit({87.3, 67, 8, 20, 30}, grey), 7 - 2, 1e-9);
+  EXPECT_DOUBLE_EQ(merit({90, 67, 8, 20, 30}, grey), 7);
+  EXPECT_NEAR(merit({90, 67, 8.4, 20, 30}, grey), 7 - 2, 1e-9);
+  EXPECT_NEAR(merit({88.5, 67, 8, 20, 30}, grey), 7 - 2, 1e-9);
 }
 
 TEST(ScoreGrey, IsTheBaseline) {
