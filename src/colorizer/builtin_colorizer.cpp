@@ -57,8 +57,7 @@ class BuiltinColorizer final : public Colorizer {
     const std::size_t pixels = std::size_t(patches.height) * std::size_t(patches.width);
     Tensor lightness = torch::empty({count, 1, patches.height, patches.width});
     std::memcpy(lightness.data_ptr<float>(), &patches.lightness[std::size_t(first) * pixels], lightness.nbytes());
-    const Tensor ab =
-        colorize_lightness(weights_.network, lightness.to(device_), weights_.decoding).cpu().contiguous();
+    const Tensor ab = colorize_lightness(weights_.network, lightness.to(device_), weights_.decoding).cpu().contiguous();
     std::memcpy(&answer.ab[2 * std::size_t(first) * pixels], ab.data_ptr<float>(), ab.nbytes());
   }
 

@@ -68,7 +68,6 @@ class ColorizerNetImpl : public torch::nn::Module {
  public:
   static constexpr std::int64_t kSemanticChannels = 216;
   static constexpr std::int64_t kGlobalChannels = 256;
-  static constexpr std::int64_t kOutputStride = 4;
   static constexpr std::int64_t kInputMultiple = 32;  ///< of both sides, pixels
 
   explicit ColorizerNetImpl(Normalisation normalisation = Normalisation::kBatch);

@@ -12,9 +12,8 @@ using torch::Tensor;
 
 namespace {
 
-constexpr double kSpatialSigma = 0.7;     // cells
 constexpr double kLightnessSigma = 10.0;  // L* units
-constexpr double kMostEnlargement = 4;    // of a sliver, whose other side would grow without end
+constexpr double kMostAspect = 8;         // of a sliver narrower than that, the long side decides
 
 /// Where the pixels of one axis lie on a grid of cells.
 struct CellsOfPixels {
@@ -26,9 +25,10 @@ struct CellsOfPixels {
     cell = place.to(torch::kInt64).clamp_max(cells - 1);
     offset = place - cell - 0.5;
   }
-  /// exp(-d^2 / 2 sigma^2) of the distance to the cell `shift` cells further.  [pixels]
+  /// Quadratic B-spline of the distance to the cell `shift` cells further: three cells and no step where they change.
   [[nodiscard]] Tensor weight(int shift) const {
-    return torch::exp(-(offset - shift).square() / (2 * kSpatialSigma * kSpatialSigma));
+    if (shift == 0) return 0.75 - offset.square();
+    return 0.5 * (0.5 + shift * offset).square();
   }
 };
 
@@ -89,7 +89,8 @@ Tensor guided_upsample(const Tensor& cells, const Tensor& lightness) {
 Tensor ask_network(ColorizerNet& network, const Tensor& lightness, int short_side) {
   constexpr std::int64_t kMultiple = ColorizerNetImpl::kInputMultiple;
   const std::int64_t height = lightness.size(2), width = lightness.size(3);
-  const double scale = std::min(kMostEnlargement, double(short_side) / double(std::min(height, width)));
+  const double scale =
+      short_side * std::min(1 / double(std::min(height, width)), kMostAspect / double(std::max(height, width)));
   const auto asked = [&](std::int64_t side) {
     return kMultiple * std::max<std::int64_t>(1, std::llround(double(side) * scale / kMultiple));
   };

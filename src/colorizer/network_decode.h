@@ -22,16 +22,17 @@ struct AbDecoding {
 /// @return        [B, 2, h, w] f32 ab.
 [[nodiscard]] torch::Tensor decode_ab(const torch::Tensor& logits, const AbDecoding& decoding);
 
-/// Brings features on a coarse grid over the picture to its pixels. A pixel averages the 3x3 cells around it, by distance
-/// and by how close their mean lightness is to its own (joint bilateral upsampling, Kopf et al. 2007): colours stop at
-/// edges.
+/// Brings features on a coarse grid over the picture to its pixels. A pixel averages the 3x3 cells around it, by
+/// distance and by how close their mean lightness is to its own (joint bilateral upsampling, Kopf et al. 2007): colours
+/// stop at edges.
 /// @param cells      [B, C, h, w], any grid; its cells share the picture's area equally.
 /// @param lightness  [B, 1, H, W] L* 0..100.
 /// @return           [B, C, H, W], convex combinations of `cells`.
 [[nodiscard]] torch::Tensor guided_upsample(const torch::Tensor& cells, const torch::Tensor& lightness);
 
-/// Asks the network about the picture resampled to `short_side` (at most four times its size), each side
-/// rounded to the network's multiple: stretching a picture by a few percent costs less than padding it does.
+/// Asks the network about the picture resampled to `short_side`, each side rounded to the network's multiple:
+/// stretching a picture by a few percent costs less than padding it does. A picture longer than 8:1 is brought to 8
+/// short sides.
 /// @param lightness  [B, 1, H, W] f32, L* 0..100, any size, on the network's device.
 /// @return           [B, 313, h, w] logits; h and w are a quarter of the sides asked at.
 [[nodiscard]] torch::Tensor ask_network(ColorizerNet& network, const torch::Tensor& lightness, int short_side);

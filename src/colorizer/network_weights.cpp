@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::string_view kMagic = "CNERFCW3";
 constexpr std::size_t kChecksumBytes = 64;
-constexpr std::uint32_t kMostShortSide = 4096;                // pixels
+constexpr std::uint32_t kMostShortSide = 1024;              // pixels
 constexpr std::size_t kMostContent = std::size_t(1) << 26;  // a file that unpacks to more is none of ours
 
 template <typename T>
@@ -79,8 +79,9 @@ std::vector<std::byte> interleaved(std::span<const std::uint8_t> sorted) {
 int read_short_side(const fs::path& file, Reader& reader) {
   const auto side = reader.value<std::uint32_t>();
   if (side < ColorizerNetImpl::kInputMultiple || side > kMostShortSide) {
-    throw InputError(file, "short side", "expected " + std::to_string(ColorizerNetImpl::kInputMultiple) + " to " +
-                                             std::to_string(kMostShortSide) + " pixels, found " + std::to_string(side));
+    throw InputError(file, "short side",
+                     "expected " + std::to_string(ColorizerNetImpl::kInputMultiple) + " to " +
+                         std::to_string(kMostShortSide) + " pixels, found " + std::to_string(side));
   }
   return int(side);
 }

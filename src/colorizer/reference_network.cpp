@@ -64,7 +64,9 @@ struct UNetImpl : nn::Module {
     }
     head = register_module("head", nn::Conv2d(nn::Conv2dOptions(c[0], outputs, 1)));
     if (recipe.builtin.empty()) return;
-    CNERF_CHECK(c.size() > Guidance::kSemanticLevel, "as many levels as the built-in network's features need");
+    CNERF_CHECK((std::int64_t(1) << c.size()) % ColorizerNetImpl::kInputMultiple == 0 &&
+                    recipe.patch_size % ColorizerNetImpl::kInputMultiple == 0,
+                "sizes that the built-in network takes");
     guide_semantic = register_module("guide_semantic", nn::Conv2d(nn::Conv2dOptions(ColorizerNetImpl::kSemanticChannels,
                                                                                     c[Guidance::kSemanticLevel], 1)));
     guide_ab = register_module("guide_ab", nn::Conv2d(nn::Conv2dOptions(2, c[Guidance::kAbLevel], 3).padding(1)));

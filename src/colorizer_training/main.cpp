@@ -39,6 +39,14 @@ torch::Device choose_device(const std::string& name) {
   return torch::kCPU;
 }
 
+/// A side the network takes.
+std::string check_crop_side(const std::string& text) {
+  constexpr int kMultiple = ColorizerNetImpl::kInputMultiple;
+  int side = 0;
+  const bool good = CLI::detail::lexical_cast(text, side) && side > 0 && side % kMultiple == 0;
+  return good ? "" : text + " is no multiple of " + std::to_string(kMultiple);
+}
+
 void add_options(CLI::App& app, Options& o) {
   app.add_option("--photos", o.sources.photos, "tars or folders of set/class/name images; class - means unknown");
   app.add_option("--mosaics", o.sources.mosaics, "tars or folders of mosaics of equal square tiles");
@@ -61,10 +69,11 @@ void add_options(CLI::App& app, Options& o) {
       ->check(CLI::PositiveNumber);
   app.add_option("--held-out", o.sources.held_out, "twentieths of every set that are not trained on")
       ->check(CLI::Range(1, kHeldOutParts - 1));
-  app.add_option("--crop-sides", t.crop_sides, "one a step; multiples of 32, pixels");
+  app.add_option("--crop-sides", t.crop_sides, "one a step; multiples of 32, pixels")->check(check_crop_side);
   app.add_option("--tile-share", t.tile_share, "of the steps, with tiles alone; 0 = some of both in every step")
       ->check(CLI::Range(0.0, 1.0));
-  app.add_option("--tile-crop-side", t.tile_crop_side, "of steps with tiles alone; a multiple of 32, pixels");
+  app.add_option("--tile-crop-side", t.tile_crop_side, "of steps with tiles alone; a multiple of 32, pixels")
+      ->check(check_crop_side);
   app.add_option("--patch-share", t.augment.patch_share, "of crops that look like a scene's patches, s in 0.3..0.7")
       ->check(CLI::Range(0.0, 1.0));
   app.add_option("--whole-scale-min", t.augment.whole_scale_min, "least side of the other crops, of the short side")

@@ -49,7 +49,8 @@ DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& vali
   for (const int short_side : {192, 224, 256, 288, 320}) {
     for (const double share : {0.0, 0.15, 0.3, 0.45, 0.6}) {
       for (const double temperature : {1.0, 0.8}) {
-        for (const double gain : {0.9, 1.0, 1.15, 1.3, 1.5}) choices.push_back({share, {temperature, gain, short_side}});
+        for (const double gain : {0.9, 1.0, 1.15, 1.3, 1.5})
+          choices.push_back({share, {temperature, gain, short_side}});
       }
     }
   }
@@ -65,9 +66,8 @@ DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& vali
     std::printf(
         "decoding: side %d share %.2f temperature %.2f gain %.2f: raw %+.2f balanced %+.2f rmse %.3f merit %.2f\n",
         choices[i].decoding.short_side, choices[i].prior_share, choices[i].decoding.temperature,
-        choices[i].decoding.gain,
-        scores[i].raw_auc - grey.raw_auc, scores[i].balanced_auc - grey.balanced_auc, scores[i].rmse / grey.rmse,
-        merit(scores[i], grey));
+        choices[i].decoding.gain, scores[i].raw_auc - grey.raw_auc, scores[i].balanced_auc - grey.balanced_auc,
+        scores[i].rmse / grey.rmse, merit(scores[i], grey));
   }
   return choices[best];
 }

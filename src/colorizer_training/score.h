@@ -66,8 +66,9 @@ struct DecodingChoice {
 [[nodiscard]] ChromaScore score_grey(const std::vector<RgbImage>& images, const SoftLabelTable& table,
                                      torch::Device device);
 
-/// One number to choose by: points of balanced AuC above grey's, less one point for every 0.01 of grey's RMSE above 0.82
-/// and two for every point of raw AuC that is missing at +1.5. Laxer limits choose garish colours (docs/decisions.md, 51).
+/// One number to choose by: points of balanced AuC above grey's, less one point for every 0.01 of grey's RMSE above
+/// 0.82 and two for every point of raw AuC that is missing at +1.5. Laxer limits choose garish colours
+/// (docs/decisions.md, 51).
 [[nodiscard]] double merit(const ChromaScore& network, const ChromaScore& grey);
 
 /// The table of the model card (Markdown).

@@ -57,7 +57,7 @@ TEST(AskNetwork, BringsThePictureToTheSideAskedAt) {
     int height, width, short_side, expected_height, expected_width;
   };
   for (const Case& c : {Case{64, 64, 64, 64, 64}, Case{64, 96, 128, 128, 192}, Case{200, 130, 64, 96, 64},
-                        Case{1, 100, 256, 32, 416}, Case{33, 50, 64, 64, 96}}) {
+                        Case{1, 100, 256, 32, 2048}, Case{33, 50, 64, 64, 96}}) {
     const Tensor logits = ask_network(network, random_lightness(2, c.height, c.width), c.short_side);
     EXPECT_EQ(logits.sizes(), (std::vector<std::int64_t>{2, 313, c.expected_height / 4, c.expected_width / 4}))
         << c.height << " x " << c.width;
@@ -103,13 +103,14 @@ TEST(GuidedUpsample, KeepsConstantsAndStopsAtEdges) {
 
 TEST(GuidedUpsample, CellsNeedNotDivideThePicture) {
   torch::manual_seed(7);
-  // A ramp over the cells' columns, where lightness says nothing: pixels follow it, each near its own place.
+  // A ramp over the cells' columns, where lightness says nothing: a spline repeats it.
   const Tensor ramp = torch::arange(7).to(torch::kFloat32).view({1, 1, 1, 7}).expand({1, 1, 5, 7}).contiguous();
   for (const auto& [height, width] : {std::pair{33, 50}, {5, 7}, {3, 4}}) {
     const Tensor full = guided_upsample(ramp, torch::full({1, 1, height, width}, 50.0f));
     ASSERT_EQ(full.sizes(), (std::vector<std::int64_t>{1, 1, height, width}));
     const Tensor expected = (torch::arange(width) + 0.5) * 7 / width - 0.5;
-    EXPECT_LT((full - expected).abs().slice(3, width / 7, width - width / 7).max().item<float>(), 0.5f) << width;
+    const auto inside = [&](const Tensor& x) { return x.slice(-1, (width + 6) / 7, width - (width + 6) / 7); };
+    EXPECT_LT((inside(full) - inside(expected)).abs().max().item<float>(), 1e-3f) << width;
     EXPECT_GE(full.min().item<float>(), 0);
     EXPECT_LE(full.max().item<float>(), 6);
   }
@@ -161,7 +162,8 @@ TEST(ColorizerWeights, ASideNoPictureHasIsRefused) {
       (void)load_colorizer_weights(folder / "net.weights");
       ADD_FAILURE() << "accepted " << side;
     } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("short side"), testing::HasSubstr(std::to_string(side))));
+      EXPECT_THAT(error.what(), testing::HasSubstr("short side"));
+      EXPECT_THAT(error.what(), testing::HasSubstr(std::to_string(side)));
     }
   }
 }
@@ -232,8 +234,7 @@ TEST(BuiltinColorizer, BeatsGreyOnPhotographsItNeverSaw) {
   images.resize(8);
   const SoftLabelTable table(torch::kCPU);
   ColorizerWeights weights = load_colorizer_weights(builtin_weights_file());
-  const ChromaScore score =
-      score_network(weights.network, images, {{0, weights.decoding}}, {}, table, torch::kCPU)[0];
+  const ChromaScore score = score_network(weights.network, images, {{0, weights.decoding}}, {}, table, torch::kCPU)[0];
   const ChromaScore grey = score_baselines(images, table, torch::kCPU).grey;
   EXPECT_GT(score.balanced_auc, grey.balanced_auc + 3);
   EXPECT_LT(score.rmse, 0.9 * grey.rmse);
