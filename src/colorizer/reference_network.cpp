@@ -64,9 +64,8 @@ struct UNetImpl : nn::Module {
     }
     head = register_module("head", nn::Conv2d(nn::Conv2dOptions(c[0], outputs, 1)));
     if (recipe.builtin.empty()) return;
-    CNERF_CHECK((std::int64_t(1) << c.size()) % ColorizerNetImpl::kInputMultiple == 0 &&
-                    recipe.patch_size % ColorizerNetImpl::kInputMultiple == 0,
-                "sizes that the built-in network takes");
+    CNERF_CHECK(c.size() > Guidance::kSemanticLevel, "as many levels as the built-in network's features need");
+    CNERF_CHECK_EQ(recipe.patch_size % ColorizerNetImpl::kInputMultiple, 0);
     guide_semantic = register_module("guide_semantic", nn::Conv2d(nn::Conv2dOptions(ColorizerNetImpl::kSemanticChannels,
                                                                                     c[Guidance::kSemanticLevel], 1)));
     guide_ab = register_module("guide_ab", nn::Conv2d(nn::Conv2dOptions(2, c[Guidance::kAbLevel], 3).padding(1)));
@@ -354,7 +353,8 @@ void ReferenceNetwork::fit(std::span<const ReferenceImage> images, const Progres
 std::vector<float> ReferenceNetwork::colorize(const LightnessBatch& patches, bool mirror) const {
   const SingleThreadedOps single;
   const int64_t height = patches.height, width = patches.width, pixels = height * width;
-  const int64_t multiple = int64_t(1) << parts_->recipe.channels.size();
+  const int64_t multiple =
+      std::max(int64_t(1) << parts_->recipe.channels.size(), parts_->builtin ? ColorizerNetImpl::kInputMultiple : 1);
   const auto rounded = [&](int64_t n) { return (n + multiple - 1) / multiple * multiple; };
   std::vector<float> answer(std::size_t(patches.batch) * 2 * std::size_t(pixels));
   parallel_tasks(std::size_t(patches.batch), [&](std::size_t i) {
