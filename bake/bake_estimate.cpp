@@ -35,21 +35,21 @@ struct Contents {
 /// What is found in some bricks of a grid, blown up to all of them.
 Contents probe(const ColorField& field, const BakePlan& plan, const BakeOptions& options) {
   const Vec3i counts = plane_bricks(plan);
-  const std::size_t in_plane = static_cast<std::size_t>(counts.y) * counts.z;
-  const std::size_t all = in_plane * static_cast<std::size_t>(plane_count(plan));
+  const std::size_t in_plane = std::size_t(counts.y) * counts.z;
+  const std::size_t all = in_plane * std::size_t(plane_count(plan));
   // Odd, so that it meets all columns of a plane whose rows are a power of two long.
   const std::size_t stride = std::max<std::size_t>(1, all / kProbes) | 1;
   Contents contents;
   for (int plane = 0; plane < plane_count(plan); ++plane) {
-    const std::size_t begin = in_plane * static_cast<std::size_t>(plane);
+    const std::size_t begin = in_plane * std::size_t(plane);
     std::vector<std::uint32_t> bricks;
     for (std::size_t b = (stride - begin % stride) % stride; b < in_plane; b += stride) {
-      bricks.push_back(static_cast<std::uint32_t>(b));
+      bricks.push_back(std::uint32_t(b));
     }
     const std::vector<DenseVoxel> voxels = bake_density_bricks(field, plan, options, plane, bricks);
     double filled = 0;
     for (std::size_t v = 0; v < voxels.size(); ++v) filled += v == 0 || voxels[v].brick != voxels[v - 1].brick ? 1 : 0;
-    contents.add_plane(static_cast<double>(voxels.size() * stride), filled * static_cast<double>(stride));
+    contents.add_plane(double(voxels.size() * stride), filled * double(stride));
   }
   return contents;
 }
@@ -64,7 +64,7 @@ Contents contents_of(const VolumePlanes& volume) {
       const Vec3i brick = brick_part({voxel.i, voxel.j, voxel.k});
       bricks.emplace(brick.y, brick.z);
     }
-    contents.add_plane(static_cast<double>(voxels.size()), static_cast<double>(bricks.size()));
+    contents.add_plane(double(voxels.size()), double(bricks.size()));
   }
   return contents;
 }
@@ -77,8 +77,7 @@ double writing_bytes(const Contents& contents, int planes, bool is_sparing) {
   constexpr double kPlanes = 4;  // three to look into, one made and sorted
   const double compressed = is_sparing ? 0 : contents.voxels * kBytesInHalf;
   return contents.bricks * kRim * leaf_bytes + compressed +
-         static_cast<double>(part_count(planes, is_sparing)) * kPlanes * contents.in_fullest_plane * kRim *
-             sizeof(BakedVoxel);
+         double(part_count(planes, is_sparing)) * kPlanes * contents.in_fullest_plane * kRim * sizeof(BakedVoxel);
 }
 
 /// `options.max_memory` in bytes.
@@ -94,24 +93,23 @@ BakeEstimate estimate_bake(const ColorField& field, const std::vector<BakePlan>&
   constexpr double kBrickBytes = kBrickVoxels * sizeof(float);  // of the density that light passes through
   constexpr double kSampleBytes = 40;                           // of a density sample on its way
   constexpr double kSightBytes = 200, kSeenBytes = 68;          // of a voxel in a question who sees it, and of a view
-  double finding = thread_count() * static_cast<double>(field.points_at_a_time()) * kSampleBytes, writing = 0;
+  double finding = thread_count() * double(field.points_at_a_time()) * kSampleBytes, writing = 0;
   BakeEstimate estimate;
   for (const BakePlan& plan : plans) {
     const Contents contents = probe(field, plan, coarse);
+    finding += contents.bricks * kBrickBytes + double(plan.lattice_voxels() / kBrickVoxels * sizeof(void*));
+    const double asked =
+        std::min(contents.in_fullest_plane, double(kViewsAtATime) / options.views_per_voxel + kBrickVoxels);
     finding +=
-        contents.bricks * kBrickBytes + static_cast<double>(plan.lattice_voxels() / kBrickVoxels * sizeof(void*));
-    const double asked = std::min(contents.in_fullest_plane,
-                                  static_cast<double>(kViewsAtATime) / options.views_per_voxel + kBrickVoxels);
-    finding += static_cast<double>(planes_at_a_time(options)) *
-               (contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel)) +
-                asked * (kSightBytes + kSeenBytes * options.views_per_voxel));
+        double(planes_at_a_time(options)) * (contents.in_fullest_plane * (sizeof(DenseVoxel) + 2 * sizeof(BakedVoxel)) +
+                                             asked * (kSightBytes + kSeenBytes * options.views_per_voxel));
     writing = std::max(writing, writing_bytes(contents, plane_count(plan), !options.max_memory.empty()));
-    estimate.voxels += static_cast<std::size_t>(contents.voxels);
+    estimate.voxels += std::size_t(contents.voxels);
   }
-  estimate.memory_bytes = static_cast<std::size_t>(finding);
-  estimate.writing_bytes = static_cast<std::size_t>(writing);
+  estimate.memory_bytes = std::size_t(finding);
+  estimate.writing_bytes = std::size_t(writing);
   estimate.disk_bytes = estimate.voxels * (sizeof(DenseVoxel) + sizeof(BakedVoxel));
-  estimate.file_bytes = static_cast<std::size_t>(static_cast<double>(estimate.voxels) * kBytesInHalf);
+  estimate.file_bytes = std::size_t(double(estimate.voxels) * kBytesInHalf);
   return estimate;
 }
 
@@ -131,7 +129,7 @@ void check_writing_memory(const std::vector<VolumePlanes>& volumes, std::size_t 
   for (const VolumePlanes& volume : volumes) {
     writing = std::max(writing, writing_bytes(contents_of(volume), volume.end - volume.begin, volume.is_sparing));
   }
-  const std::size_t needed = static_cast<std::size_t>(writing) + held_bytes;
+  const std::size_t needed = std::size_t(writing) + held_bytes;
   if (needed <= allowed_bytes(options)) return;
   throw UsageError("max_memory: " + options.max_memory + " is too little, writing the files of this bake takes about " +
                    in_words(needed) + "; its voxels are kept: give the same command more memory");

@@ -60,8 +60,8 @@ struct BakeJournal::File {
                          std::fwrite(&header, sizeof header, 1, stream) == 1 &&
                          std::fwrite(bytes.data(), 1, bytes.size(), stream) == bytes.size() && std::fflush(stream) == 0;
     if (!written) fail("cannot be written");
-    parts.push_back({end + static_cast<long>(sizeof header), bytes.size()});
-    end = parts.back().begin + static_cast<long>(bytes.size());
+    parts.push_back({end + long(sizeof header), bytes.size()});
+    end = parts.back().begin + long(bytes.size());
   }
 
   /// At a place of its own, so that several threads may read.
@@ -72,7 +72,7 @@ struct BakeJournal::File {
           ::pread(::fileno(stream), bytes.data() + done, bytes.size() - done, place.begin + static_cast<::off_t>(done));
       if (got < 0 && errno == EINTR) continue;
       if (got <= 0) return false;
-      done += static_cast<std::size_t>(got);
+      done += std::size_t(got);
     }
     return true;
   }
@@ -81,10 +81,10 @@ struct BakeJournal::File {
   [[nodiscard]] bool read_next(std::size_t file_bytes, std::vector<std::byte>& bytes) {
     PartHeader header;
     if (std::fseek(stream, end, SEEK_SET) != 0 || std::fread(&header, sizeof header, 1, stream) != 1) return false;
-    const Place place{end + static_cast<long>(sizeof header), header.bytes};
+    const Place place{end + long(sizeof header), header.bytes};
     if (header.bytes > file_bytes || !read(place, bytes) || checksum_of(bytes) != header.checksum) return false;
     parts.push_back(place);
-    end = place.begin + static_cast<long>(place.bytes);
+    end = place.begin + long(place.bytes);
     return true;
   }
 

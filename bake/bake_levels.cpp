@@ -71,7 +71,7 @@ class CellCounts {
       Vec3i cell;
       for (int axis = 0; axis < 3; ++axis) {
         const double share = (p[axis] - box.min[axis]) / (box.max[axis] - box.min[axis]);
-        cell[axis] = std::clamp(static_cast<int>(share * kCells), 0, kCells - 1);
+        cell[axis] = std::clamp(int(share * kCells), 0, kCells - 1);
       }
       ++at(cell + Vec3i{1, 1, 1});
     }
@@ -97,10 +97,10 @@ class CellCounts {
 
  private:
   [[nodiscard]] static std::size_t index(Vec3i c) {
-    return (static_cast<std::size_t>(c.x) * (kCells + 1) + c.y) * (kCells + 1) + c.z;
+    return (std::size_t(c.x) * (kCells + 1) + c.y) * (kCells + 1) + c.z;
   }
   [[nodiscard]] static Vec3i position(std::size_t i) {
-    const auto n = static_cast<int>(i);
+    const auto n = int(i);
     return {n / ((kCells + 1) * (kCells + 1)), n / (kCells + 1) % (kCells + 1), n % (kCells + 1)};
   }
   int& at(Vec3i cell) { return sums_[index(cell)]; }
@@ -111,9 +111,9 @@ class CellCounts {
 /// The part of `box`, at most `side` long along each axis, that holds most points; around them, if it holds any.
 Aabbd fullest_part(const Aabbd& box, double side, const std::vector<Vec3d>& points) {
   const CellCounts counts(box, points);
-  const Vec3d cell = box.size() / static_cast<double>(kCells);
+  const Vec3d cell = box.size() / double(kCells);
   Vec3i size, best;
-  for (int axis = 0; axis < 3; ++axis) size[axis] = std::clamp(static_cast<int>(side / cell[axis]), 1, kCells);
+  for (int axis = 0; axis < 3; ++axis) size[axis] = std::clamp(int(side / cell[axis]), 1, kCells);
   int most = -1;
   for (int x = 0; x <= kCells - size.x; ++x) {
     for (int y = 0; y <= kCells - size.y; ++y) {
@@ -149,8 +149,8 @@ BakePlan finer_plan(BakePlan& parent, const Aabbd& box, int margin) {
   for (int axis = 0; axis < 3; ++axis) {
     const double low = (box.min[axis] - parent.origin[axis]) / parent.voxel_size;
     const double high = (box.max[axis] - parent.origin[axis]) / parent.voxel_size;
-    parent.hole_min[axis] = std::max(margin, static_cast<int>(std::floor(low)));
-    parent.hole_max[axis] = std::min(parent.resolution[axis] - margin, static_cast<int>(std::ceil(high)));
+    parent.hole_min[axis] = std::max(margin, int(std::floor(low)));
+    parent.hole_max[axis] = std::min(parent.resolution[axis] - margin, int(std::ceil(high)));
     plan.resolution[axis] = 2 * (parent.hole_max[axis] - parent.hole_min[axis]) + 2 * margin;
   }
   const Aabbd cut{parent.world_from_voxel(parent.hole_min.cast<double>()),
@@ -183,7 +183,7 @@ void fill_hole(BakeLevel& parent, const BakeLevel& finer, double opacity_thresho
         const Vec3d corner = parent.plan.world_from_voxel(Vec3i{i, j, k}.cast<double>());
         const Vec3d there = finer.plan.voxel_from_world(corner) + Vec3d{0.5, 0.5, 0.5};  // faces meet: a whole number
         const double sigma = density_of_finer(finer.sigma, there.cast<int>(), parent.plan.voxel_size);
-        if (sigma > 0 && sigma >= faintest) parent.sigma.set({i, j, k}, static_cast<float>(sigma));
+        if (sigma > 0 && sigma >= faintest) parent.sigma.set({i, j, k}, float(sigma));
       }
     }
   }
@@ -198,7 +198,7 @@ std::vector<BakePlan> plan_levels(const ColorField& field, const std::vector<Bak
   const bool nested = options.grids == "nested" || (options.grids == "auto" && field.frame().cascades > 1);
   if (!nested || cameras.empty()) return plans;
   std::vector<Look> looks = all_looks(field, cameras, options);
-  const auto enough = static_cast<std::size_t>(kLeastShare * static_cast<double>(looks.size()));
+  const auto enough = std::size_t(kLeastShare * double(looks.size()));
   const Vec3i resolution = plans[0].resolution;
   const int inner = std::max({resolution.x, resolution.y, resolution.z}) - 2 * options.dilation;
   while (plans.size() < kMostLevels) {
@@ -209,8 +209,8 @@ std::vector<BakePlan> plan_levels(const ColorField& field, const std::vector<Bak
     }
     const double side = (inner - 2) * parent.voxel_size / 2;  // rounding outwards adds two voxels
     const Aabbd box = fullest_part(parent.box, side, wanting);
-    const auto gaining = static_cast<std::size_t>(
-        std::count_if(wanting.begin(), wanting.end(), [&](Vec3d p) { return box.contains(p); }));
+    const auto gaining =
+        std::size_t(std::count_if(wanting.begin(), wanting.end(), [&](Vec3d p) { return box.contains(p); }));
     if (gaining == 0 || gaining < enough) break;
     plans.push_back(finer_plan(parent, box, options.dilation));
   }
@@ -229,15 +229,15 @@ std::vector<BakePlan> plan_within_budget(const ColorField& field, const std::vec
                                          const BakeOptions& options) {
   std::vector<BakePlan> plans = plan_levels(field, cameras, options);
   if (options.budget.empty()) return plans;
-  const auto budget = static_cast<double>(bytes_from("budget", options.budget));
+  const auto budget = double(bytes_from("budget", options.budget));
   constexpr int kLeastResolution = 16;
   BakeOptions smaller = options;
-  while (static_cast<double>(cycles_bytes(plans)) > budget) {
-    const double ratio = 0.98 * std::cbrt(budget / static_cast<double>(cycles_bytes(plans)));
+  while (double(cycles_bytes(plans)) > budget) {
+    const double ratio = 0.98 * std::cbrt(budget / double(cycles_bytes(plans)));
     if (smaller.voxel_size > 0) {
       smaller.voxel_size /= ratio;
     } else {
-      smaller.resolution = static_cast<int>(smaller.resolution * ratio);
+      smaller.resolution = int(smaller.resolution * ratio);
     }
     const Vec3i resolution = plans.back().resolution;
     if (ratio * std::max({resolution.x, resolution.y, resolution.z}) < kLeastResolution) {

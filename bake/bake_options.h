@@ -16,11 +16,12 @@ namespace cnerf {
 }
 
 struct BakeOptions {
-  int resolution = 256;              ///< voxels along the longest axis, dilated margin included
-  double voxel_size = 0;             ///< world units; 0 = from `resolution`
-  std::string aabb;                  ///< "x0,y0,z0,x1,y1,z1", world units; empty = tight box around occupied space
-  double opacity_threshold = 0.01;   ///< on alpha = 1 - exp(-sigma h) of a voxel; fainter ones are dropped
-  double weight_threshold = 0.0125;  ///< share of a pixel's light a voxel gives to the view that sees it best; ditto
+  int resolution = 256;             ///< voxels along the longest axis, dilated margin included
+  double voxel_size = 0;            ///< world units; 0 = from `resolution`
+  std::string aabb;                 ///< "x0,y0,z0,x1,y1,z1", world units; empty = tight box around occupied space
+  double opacity_threshold = 0.01;  ///< on alpha = 1 - exp(-sigma h) of a voxel; fainter ones are dropped
+  double weight_threshold =
+      0.0125;  ///< share of a pixel's light a voxel gives to the view that sees it best; fainter ones are dropped
   std::string grids = "auto";        ///< "one", or "nested": finer grids where most pixels look; auto: by cascades
   std::string budget;                ///< memory of a renderer that makes grids dense, "4G"; empty = no limit
   std::string max_memory;            ///< of the whole process while volumes are baked, "1G"; empty = no limit

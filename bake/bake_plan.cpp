@@ -89,10 +89,10 @@ Aabbd occupied_box(const ColorField& field, double opacity_threshold) {
   for (int cascade = 0; cascade < frame.cascades; ++cascade) {
     const double side = std::ldexp(1.0, cascade - frame.cascades + 1);
     const double cell = side / kScanCells;
-    const auto threshold = static_cast<float>(faintest_density(opacity_threshold, cell));
+    const auto threshold = float(faintest_density(opacity_threshold, cell));
     std::vector<PlaneBoxes> planes(kScanCells);
     parallel_tasks(planes.size(), [&](std::size_t plane) {
-      planes[plane] = scan_plane(field, 0.5 - side / 2, cell, static_cast<int>(plane), threshold);
+      planes[plane] = scan_plane(field, 0.5 - side / 2, cell, int(plane), threshold);
     });
     for (const PlaneBoxes& plane : planes) {
       merge(occupied, plane.occupied);
@@ -125,7 +125,7 @@ BakePlan plan_bake(const ColorField& field, const BakeOptions& options) {
   }
   for (int axis = 0; axis < 3; ++axis) {
     // A box that is a whole number of voxels long keeps that number in spite of rounding.
-    const int inner = std::max(1, static_cast<int>(std::ceil(size[axis] / plan.voxel_size - 1e-6)));
+    const int inner = std::max(1, int(std::ceil(size[axis] / plan.voxel_size - 1e-6)));
     plan.resolution[axis] = inner + 2 * margin;
     plan.origin[axis] = plan.box.min[axis] - margin * plan.voxel_size;
   }

@@ -23,9 +23,7 @@ struct BakePlan {
     return v.x >= hole_min.x && v.y >= hole_min.y && v.z >= hole_min.z && v.x < hole_max.x && v.y < hole_max.y &&
            v.z < hole_max.z;
   }
-  [[nodiscard]] std::size_t lattice_voxels() const {
-    return static_cast<std::size_t>(resolution.x) * resolution.y * resolution.z;
-  }
+  [[nodiscard]] std::size_t lattice_voxels() const { return std::size_t(resolution.x) * resolution.y * resolution.z; }
 };
 
 /// @throws UsageError  when `aabb` is not six ordered numbers, lies outside the field's box or the lattice would have

@@ -40,7 +40,7 @@ class BrickGrid {
   BrickGrid(Vec3i min, Vec3i size, T background) : min_(min), size_(size), background_(background) {
     CNERF_CHECK(size.x > 0 && size.y > 0 && size.z > 0, "a brick grid needs at least one voxel");
     for (int axis = 0; axis < 3; ++axis) counts_[axis] = (size[axis] + kBrickSide - 1) / kBrickSide;
-    bricks_.resize(static_cast<std::size_t>(counts_.x) * counts_.y * counts_.z);
+    bricks_.resize(std::size_t(counts_.x) * counts_.y * counts_.z);
   }
 
   [[nodiscard]] Vec3i min() const { return min_; }
@@ -52,14 +52,12 @@ class BrickGrid {
   /// First voxel of a brick.
   [[nodiscard]] Vec3i brick_min(std::size_t brick) const { return min_ + brick_coordinates(brick) * kBrickSide; }
   [[nodiscard]] Vec3i brick_coordinates(std::size_t brick) const {
-    const auto b = static_cast<std::ptrdiff_t>(brick);
-    const auto plane = static_cast<std::ptrdiff_t>(counts_.y) * counts_.z;
-    return {static_cast<int>(b / plane), static_cast<int>(b / counts_.z % counts_.y), static_cast<int>(b % counts_.z)};
+    const auto b = std::ptrdiff_t(brick);
+    const auto plane = std::ptrdiff_t(counts_.y) * counts_.z;
+    return {int(b / plane), int(b / counts_.z % counts_.y), int(b % counts_.z)};
   }
   /// Number of the brick at brick coordinates inside [0, brick_counts()).
-  [[nodiscard]] std::size_t brick_at(Vec3i c) const {
-    return (static_cast<std::size_t>(c.x) * counts_.y + c.y) * counts_.z + c.z;
-  }
+  [[nodiscard]] std::size_t brick_at(Vec3i c) const { return (std::size_t(c.x) * counts_.y + c.y) * counts_.z + c.z; }
   [[nodiscard]] bool contains(Vec3i voxel) const {
     const Vec3i v = voxel - min_;
     return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < size_.x && v.y < size_.y && v.z < size_.z;

@@ -14,7 +14,7 @@ std::vector<Vec3d> places_in_voxel(int subsamples) {
   std::vector<Vec3d> places;
   for (int s = 0; s < subsamples * subsamples * subsamples; ++s) {
     const Vec3i sub{s / (subsamples * subsamples), s / subsamples % subsamples, s % subsamples};
-    places.push_back((sub.cast<double>() + Vec3d{0.5, 0.5, 0.5}) / static_cast<double>(subsamples));
+    places.push_back((sub.cast<double>() + Vec3d{0.5, 0.5, 0.5}) / double(subsamples));
   }
   return places;
 }
@@ -40,7 +40,7 @@ AxisSamples axis_samples(const SceneFrame& frame, const BakePlan& plan, int subs
     const Vec3d world = plan.world_from_voxel(voxel);
     samples.is_inside.push_back(world[axis] >= plan.box.min[axis] && world[axis] <= plan.box.max[axis]);
     // Rounding may carry a point of the box's face just outside the field's domain.
-    samples.unit.push_back(std::clamp(static_cast<float>(frame.unit_from_world(world)[axis]), 0.0f, 1.0f));
+    samples.unit.push_back(std::clamp(float(frame.unit_from_world(world)[axis]), 0.0f, 1.0f));
   }
   return samples;
 }
@@ -65,11 +65,11 @@ BrickSamples gather_samples(const ColorField& field, const BakePlan& plan, int s
     for (int s = 0; s < subsamples * subsamples * subsamples; ++s) {
       const Vec3i at = first + Vec3i{s / (subsamples * subsamples), s / subsamples % subsamples, s % subsamples};
       if (!x.is_inside[at.x] || !y.is_inside[at.y] || !z.is_inside[at.z]) continue;
-      const std::size_t in_lattice = (static_cast<std::size_t>(at.x) * y.unit.size() + at.y) * z.unit.size() + at.z;
+      const std::size_t in_lattice = (std::size_t(at.x) * y.unit.size() + at.y) * z.unit.size() + at.z;
       if (is_occupied[in_lattice] == 0) continue;
       samples.positions.push_back({x.unit[at.x], y.unit[at.y], z.unit[at.z]});
-      samples.offsets.push_back(static_cast<std::int16_t>(offset));
-      samples.in_voxel.push_back(static_cast<std::int16_t>(s));
+      samples.offsets.push_back(std::int16_t(offset));
+      samples.in_voxel.push_back(std::int16_t(s));
     }
   }
   return samples;
@@ -87,7 +87,7 @@ struct Accumulated {
 };
 
 std::uint8_t in_256ths(double share) {
-  return static_cast<std::uint8_t>(std::clamp(static_cast<int>(share * 256), 0, 255));
+  return std::uint8_t(std::clamp(int(share * 256), 0, 255));
 }
 
 /// @param sigma  what the field answers, 1/unit length
@@ -111,9 +111,9 @@ std::vector<DenseVoxel> voxels_of(const BrickSamples& samples, std::span<const f
     if (sum.alpha <= 0 || alpha < options.opacity_threshold) continue;
     const double density = std::min(max_sigma(h), -std::log1p(-alpha) / h);
     const Vec3d inside = sum.alpha_inside / sum.alpha;
-    kept.push_back({static_cast<float>(density),
+    kept.push_back({float(density),
                     brick,
-                    static_cast<std::uint16_t>(offset),
+                    std::uint16_t(offset),
                     {in_256ths(inside.x), in_256ths(inside.y), in_256ths(inside.z)}});
   }
   return kept;
@@ -159,13 +159,13 @@ Vec3i plane_bricks(const BakePlan& plan) {
   return {1, (plan.resolution.y + kBrickSide - 1) / kBrickSide, (plan.resolution.z + kBrickSide - 1) / kBrickSide};
 }
 Vec3i brick_min_of(const BakePlan& plan, int plane, std::uint32_t brick) {
-  const auto row = static_cast<std::uint32_t>(plane_bricks(plan).z);
-  return Vec3i{plane, static_cast<int>(brick / row), static_cast<int>(brick % row)} * kBrickSide;
+  const auto row = std::uint32_t(plane_bricks(plan).z);
+  return Vec3i{plane, int(brick / row), int(brick % row)} * kBrickSide;
 }
 
 std::vector<DenseVoxel> bake_density_bricks(const ColorField& field, const BakePlan& plan, const BakeOptions& options,
                                             int plane, std::span<const std::uint32_t> bricks) {
-  const std::size_t samples_of_brick = kBrickVoxels * static_cast<std::size_t>(std::pow(options.subsamples, 3));
+  const std::size_t samples_of_brick = kBrickVoxels * std::size_t(std::pow(options.subsamples, 3));
   const std::size_t at_a_time = std::max<std::size_t>(1, field.points_at_a_time() / samples_of_brick);
   std::vector<std::vector<DenseVoxel>> parts((bricks.size() + at_a_time - 1) / at_a_time);
   parallel_tasks(parts.size(), [&](std::size_t part) {
@@ -182,7 +182,7 @@ std::vector<DenseVoxel> bake_density_bricks(const ColorField& field, const BakeP
 std::vector<DenseVoxel> bake_density_plane(const ColorField& field, const BakePlan& plan, const BakeOptions& options,
                                            int plane) {
   const Vec3i counts = plane_bricks(plan);
-  std::vector<std::uint32_t> bricks(static_cast<std::size_t>(counts.y) * counts.z);
+  std::vector<std::uint32_t> bricks(std::size_t(counts.y) * counts.z);
   std::iota(bricks.begin(), bricks.end(), 0u);
   return bake_density_bricks(field, plan, options, plane, bricks);
 }
@@ -193,7 +193,7 @@ BrickGrid<float> empty_density(const BakePlan& plan) {
 
 void put_plane(std::span<const DenseVoxel> voxels, int plane, BrickGrid<float>& sigma) {
   const Vec3i counts = sigma.brick_counts();
-  const std::size_t first = static_cast<std::size_t>(plane) * counts.y * counts.z;
+  const std::size_t first = std::size_t(plane) * counts.y * counts.z;
   for (const DenseVoxel& voxel : voxels) sigma.make_brick(first + voxel.brick)[voxel.offset] = voxel.sigma;
 }
 

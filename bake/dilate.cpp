@@ -40,7 +40,7 @@ IndexedPlane indexed(int plane, std::vector<BakedVoxel> voxels) {
     const BakedVoxel& voxel = indexed.voxels[v];
     const Vec3i at{voxel.i, voxel.j, voxel.k};
     CNERF_CHECK(indexed.grid->at(at) == kMissing, "two baked voxels share a place");
-    indexed.grid->set(at, voxel.sigma > 0 ? static_cast<std::int32_t>(v) : kColorOnly);
+    indexed.grid->set(at, voxel.sigma > 0 ? std::int32_t(v) : kColorOnly);
   }
   return indexed;
 }
@@ -135,7 +135,7 @@ std::vector<Vec3i> offsets_by_distance(int radius) {
 class NearDensity {
  public:
   NearDensity(const PlaneWindow& window, Vec3i brick_min, int radius)
-      : radius_(radius), side_(kBrickSide + 2 * radius), rows_(static_cast<std::size_t>(side_) * side_) {
+      : radius_(radius), side_(kBrickSide + 2 * radius), rows_(std::size_t(side_) * side_) {
     for (int neighbour = 0; neighbour < 27; ++neighbour) {
       const Vec3i step{neighbour / 9 - 1, neighbour / 3 % 3 - 1, neighbour % 3 - 1};
       const std::int32_t* brick = window.brick_at(brick_min + step * kBrickSide);
@@ -152,7 +152,7 @@ class NearDensity {
  private:
   static_assert(kBrickSide + 2 * kBrickSide <= 32, "the widest row");
 
-  [[nodiscard]] const std::uint32_t& row(int x, int y) const { return rows_[static_cast<std::size_t>(x) * side_ + y]; }
+  [[nodiscard]] const std::uint32_t& row(int x, int y) const { return rows_[std::size_t(x) * side_ + y]; }
   /// @param low  first voxel of the brick, from the first of the one in the middle
   void look_into(const std::int32_t* brick, Vec3i low) {
     Vec3i from, to;  // of the brick's voxels, those within `radius_` of the middle
@@ -164,9 +164,9 @@ class NearDensity {
       for (int y = from.y; y < to.y; ++y) {
         std::uint32_t bits = 0;
         for (int z = from.z; z < to.z; ++z) {
-          bits |= static_cast<std::uint32_t>(brick[brick_offset({x, y, z})] >= 0) << (z + low.z + radius_);
+          bits |= std::uint32_t(brick[brick_offset({x, y, z})] >= 0) << (z + low.z + radius_);
         }
-        rows_[static_cast<std::size_t>(x + low.x + radius_) * side_ + (y + low.y + radius_)] |= bits;
+        rows_[std::size_t(x + low.x + radius_) * side_ + (y + low.y + radius_)] |= bits;
       }
     }
   }
@@ -181,9 +181,9 @@ class NearDensity {
     const std::vector<std::uint32_t> before = rows_;
     for (int l = 0; l < side_; ++l) {
       for (int at = 0; at < side_; ++at) {
-        std::uint32_t& row = rows_[static_cast<std::size_t>(l) * line + static_cast<std::size_t>(at) * stride];
+        std::uint32_t& row = rows_[std::size_t(l) * line + std::size_t(at) * stride];
         for (int other = std::max(0, at - radius_); other <= std::min(side_ - 1, at + radius_); ++other) {
-          row |= before[static_cast<std::size_t>(l) * line + static_cast<std::size_t>(other) * stride];
+          row |= before[std::size_t(l) * line + std::size_t(other) * stride];
         }
       }
     }
@@ -241,15 +241,14 @@ std::vector<BakedVoxel> dilated_plane(const PlaneWindow& window, int radius, con
 void sort_voxels(std::vector<BakedVoxel>& voxels) {
   if (voxels.empty()) return;
   const VoxelBox box = bounding_box(voxels);
-  std::vector<std::size_t> ends(static_cast<std::size_t>(box.size.x) + 1);  // of the voxels of each i
-  for (const BakedVoxel& voxel : voxels) ++ends[static_cast<std::size_t>(voxel.i - box.min.x) + 1];
+  std::vector<std::size_t> ends(std::size_t(box.size.x) + 1);  // of the voxels of each i
+  for (const BakedVoxel& voxel : voxels) ++ends[std::size_t(voxel.i - box.min.x) + 1];
   std::partial_sum(ends.begin(), ends.end(), ends.begin());
   std::vector<std::size_t> next(ends.begin(), ends.end() - 1);
   std::vector<BakedVoxel> sorted(voxels.size());
-  for (const BakedVoxel& voxel : voxels) sorted[next[static_cast<std::size_t>(voxel.i - box.min.x)]++] = voxel;
+  for (const BakedVoxel& voxel : voxels) sorted[next[std::size_t(voxel.i - box.min.x)]++] = voxel;
   parallel_tasks(ends.size() - 1, [&](std::size_t i) {
-    std::sort(sorted.begin() + static_cast<std::ptrdiff_t>(ends[i]),
-              sorted.begin() + static_cast<std::ptrdiff_t>(ends[i + 1]),
+    std::sort(sorted.begin() + std::ptrdiff_t(ends[i]), sorted.begin() + std::ptrdiff_t(ends[i + 1]),
               [](const BakedVoxel& a, const BakedVoxel& b) { return std::tie(a.j, a.k) < std::tie(b.j, b.k); });
   });
   voxels.swap(sorted);

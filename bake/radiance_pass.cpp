@@ -69,7 +69,7 @@ RadiancePass::RadiancePass(const ColorField& field, const std::vector<BakeLevel>
       keep_unseen_(options.keep_unseen || views.eyes().empty()) {}
 
 std::vector<BakedVoxel> RadiancePass::bake_plane(std::span<const DenseVoxel> dense, int plane) const {
-  const std::size_t most = kViewsAtATime / static_cast<std::size_t>(views_.views_per_voxel());
+  const std::size_t most = kViewsAtATime / std::size_t(views_.views_per_voxel());
   std::vector<BakedVoxel> voxels;
   std::vector<std::span<const DenseVoxel>> bricks;
   std::size_t waiting = 0;
@@ -136,7 +136,7 @@ RadiancePass::Candidates RadiancePass::candidates_of(std::span<const DenseVoxel>
   candidates.order = try_order(views_.eyes(), centre);
   for (const DenseVoxel& voxel : brick) {
     const double opacity = -std::expm1(-voxel.sigma * plan.voxel_size);
-    const auto least = static_cast<float>(weight_threshold_ / opacity);
+    const auto least = float(weight_threshold_ / opacity);
     if (least > 1 && !keep_unseen_) continue;
     const Vec3i at = brick_min + brick_local(voxel.offset);
     const Vec3d world = plan.world_from_voxel(at.cast<double>() + voxel.centroid_in_voxel());
@@ -154,8 +154,8 @@ RadiancePass::Kept RadiancePass::kept_of(const Candidates& candidates, const See
     if (count == 0 && !keep_unseen_) continue;
     const Vec3d world = candidates.sights[c].world;
     const Vec3f unit = field_.frame().unit_from_world(world).cast<float>();
-    const SeenBy* views = seen.seen.data() + (first + c) * static_cast<std::size_t>(views_.views_per_voxel());
-    for (const SeenBy& view : std::span(views, static_cast<std::size_t>(count))) {
+    const SeenBy* views = seen.seen.data() + (first + c) * std::size_t(views_.views_per_voxel());
+    for (const SeenBy& view : std::span(views, std::size_t(count))) {
       kept.means.look_along(unit, direction_to(views_.eyes()[view.camera], world), view.transmittance);
     }
     if (count == 0) kept.means.look_from_all_sides(unit);

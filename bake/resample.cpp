@@ -29,7 +29,7 @@ struct Overlap {
 /// An old voxel is no wider than a new one: it touches two at most.
 int overlaps_of(int old_index, double ratio, Overlap out[2]) {
   const double begin = old_index * ratio, end = (old_index + 1) * ratio;
-  const int first = static_cast<int>(std::floor(begin));
+  const int first = int(std::floor(begin));
   const double border = first + 1.0;
   if (end <= border) {
     out[0] = {first, end - begin};
@@ -42,13 +42,11 @@ int overlaps_of(int old_index, double ratio, Overlap out[2]) {
 
 std::uint64_t key_of(int i, int j, int k) {
   constexpr int kBias = 1 << 20;  // far beyond any resolution
-  return static_cast<std::uint64_t>(i + kBias) << 42 | static_cast<std::uint64_t>(j + kBias) << 21 |
-         static_cast<std::uint64_t>(k + kBias);
+  return std::uint64_t(i + kBias) << 42 | std::uint64_t(j + kBias) << 21 | std::uint64_t(k + kBias);
 }
 Vec3i indices_of(std::uint64_t key) {
   constexpr int kBias = 1 << 20, kMask = (1 << 21) - 1;
-  return {static_cast<int>(key >> 42) - kBias, static_cast<int>(key >> 21 & kMask) - kBias,
-          static_cast<int>(key & kMask) - kBias};
+  return {int(key >> 42) - kBias, int(key >> 21 & kMask) - kBias, int(key & kMask) - kBias};
 }
 
 using Cells = std::unordered_map<std::uint64_t, Gathered>;
@@ -77,8 +75,7 @@ BakedVoxel voxel_of(std::uint64_t key, const Gathered& cell) {
   const Vec3i at = indices_of(key);
   const Vec3f rgb = (cell.rgb / cell.light).cast<float>();
   const Lab<float> lab = lab_from_linear_rgb(rgb);
-  return {at.x, at.y,  at.z, static_cast<float>(cell.optical), static_cast<float>(cell.luminance / cell.light),
-          rgb,  lab.a, lab.b};
+  return {at.x, at.y, at.z, float(cell.optical), float(cell.luminance / cell.light), rgb, lab.a, lab.b};
 }
 
 }  // namespace
@@ -98,7 +95,7 @@ BakedVolume resample_volume(const BakedVolume& volume, int resolution) {
   BakedVolume result = volume;
   result.voxel_size = volume.voxel_size / ratio;
   for (int axis = 0; axis < 3; ++axis) {
-    result.resolution[axis] = static_cast<int>(std::ceil(volume.resolution[axis] * ratio - 1e-9));
+    result.resolution[axis] = int(std::ceil(volume.resolution[axis] * ratio - 1e-9));
   }
   result.voxels.clear();
   for (const auto& [key, cell] : cells) {
@@ -116,8 +113,7 @@ BakedVolume merged_volume(std::vector<BakedVolume> volumes) {
   Cells cells;
   for (const BakedVolume& finer : volumes) {
     const Vec3d shift = (finer.origin - merged.origin) / finer.voxel_size;
-    const Vec3i offset{static_cast<int>(std::lround(shift.x)), static_cast<int>(std::lround(shift.y)),
-                       static_cast<int>(std::lround(shift.z))};
+    const Vec3i offset{int(std::lround(shift.x)), int(std::lround(shift.y)), int(std::lround(shift.z))};
     for (const BakedVoxel& voxel : finer.voxels) {
       if (voxel.sigma > 0) gather(voxel, offset, finer.voxel_size / merged.voxel_size, finer.voxel_size, cells);
     }

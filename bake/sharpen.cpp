@@ -23,9 +23,9 @@ float sharpened_density(const BakeLevel& level, Vec3i voxel, double strength) {
     const Vec3i at = voxel + step;
     const Vec3d middle = plan.world_from_voxel(at.cast<double>() + Vec3d{0.5, 0.5, 0.5});
     if (plan.in_hole(at) || !plan.box.contains(middle)) continue;
-    brought += share_of(step) * (static_cast<double>(level.sigma.at(at)) - own);
+    brought += share_of(step) * (double(level.sigma.at(at)) - own);
   }
-  return std::max(0.0f, own - static_cast<float>(strength * std::max(0.0, brought)));
+  return std::max(0.0f, own - float(strength * std::max(0.0, brought)));
 }
 
 }  // namespace cnerf

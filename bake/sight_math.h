@@ -67,11 +67,11 @@ inline constexpr int kTriesPerView = 3;  ///< cameras tried for each view wanted
 CNERF_HD inline int steps_across_brick(Vec3i low, Vec3f p, Vec3f inverse_direction) {
   float exit = std::numeric_limits<float>::max();
   for (int axis = 0; axis < 3; ++axis) {
-    const float face = static_cast<float>(low[axis] + (inverse_direction[axis] > 0 ? kBrickSide : 0));
+    const float face = float(low[axis] + (inverse_direction[axis] > 0 ? kBrickSide : 0));
     const float distance = (face - p[axis]) * inverse_direction[axis];
     if (distance >= 0) exit = std::min(exit, distance);  // not for NaN: parallel to the face and on it
   }
-  return std::max(1, static_cast<int>(std::min(exit, 1e6f)));
+  return std::max(1, int(std::min(exit, 1e6f)));
 }
 
 /// Where a ray from `p` comes into [0, size); 0 when it starts there, infinity when it misses.
@@ -105,7 +105,7 @@ template <typename Grid>
   const Vec3f inverse{1 / d.x, 1 / d.y, 1 / d.z};
   const Vec3f start = from - sigma.min().template cast<float>();
   const Vec3f size = sigma.size().template cast<float>();
-  const auto h = static_cast<float>(voxel_size);
+  const auto h = float(voxel_size);
   const float deepest = -std::log(stop_below);
   float depth = 0;
   // Whole steps from the start, so that where a ray comes in does not matter; the first may round to just outside.
@@ -117,7 +117,7 @@ template <typename Grid>
     const float* brick = sigma.find_brick(voxel);
     if (brick == nullptr) {
       const Vec3i low{voxel.x & ~(kBrickSide - 1), voxel.y & ~(kBrickSide - 1), voxel.z & ~(kBrickSide - 1)};
-      t += static_cast<float>(sight::steps_across_brick(low, p, inverse));
+      t += float(sight::steps_across_brick(low, p, inverse));
       continue;
     }
     depth += brick[brick_offset(local_part(voxel))] * h;

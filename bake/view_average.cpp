@@ -50,10 +50,10 @@ std::vector<float> ViewMeans::luminance(const ColorField& field) const {
     double sum = 0, weight = 0;
     for (std::size_t q = begin; q < end; ++q) {
       CNERF_CHECK(std::isfinite(answers[q]), "the field answered a luminance that is not finite");
-      sum += static_cast<double>(weights_[q]) * answers[q];
+      sum += double(weights_[q]) * answers[q];
       weight += weights_[q];
     }
-    means.push_back(static_cast<float>(std::max(0.0, sum / weight)));
+    means.push_back(float(std::max(0.0, sum / weight)));
     begin = end;
   }
   return means;
@@ -88,8 +88,7 @@ std::vector<ViewAverage::Brick> ViewAverage::by_brick(std::span<const Vec3f> pos
     const std::size_t level = level_of(world);
     const BakePlan& plan = levels_[level].plan;
     const Vec3d p = plan.voxel_from_world(world) / kSide;
-    const std::array<int, 3> at{static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)),
-                                static_cast<int>(std::floor(p.z))};
+    const std::array<int, 3> at{int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
     Brick& brick = bricks[{level, at}];
     brick.level = level;
     brick.centre = plan.world_from_voxel(Vec3d{at[0] + 0.5, at[1] + 0.5, at[2] + 0.5} * kSide);
@@ -113,8 +112,7 @@ void ViewAverage::ask(std::span<const Brick> bricks, std::span<const Vec3f> posi
   }
   batch.orders.resize(bricks.size() * eyes.size());
   parallel_tasks(bricks.size(), [&](std::size_t b) {
-    std::ranges::copy(try_order(eyes, bricks[b].centre),
-                      batch.orders.begin() + static_cast<std::ptrdiff_t>(b * eyes.size()));
+    std::ranges::copy(try_order(eyes, bricks[b].centre), batch.orders.begin() + std::ptrdiff_t(b * eyes.size()));
   });
   SeenBatch seen;
   views_->find(bricks.front().level, batch, seen);
@@ -122,8 +120,8 @@ void ViewAverage::ask(std::span<const Brick> bricks, std::span<const Vec3f> posi
   ViewMeans means;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vec3f position = positions[points[i]];
-    const SeenBy* views = seen.seen.data() + i * static_cast<std::size_t>(views_->views_per_voxel());
-    for (const SeenBy& view : std::span(views, static_cast<std::size_t>(seen.counts[i]))) {
+    const SeenBy* views = seen.seen.data() + i * std::size_t(views_->views_per_voxel());
+    for (const SeenBy& view : std::span(views, std::size_t(seen.counts[i]))) {
       means.look_along(position, direction_to(eyes[view.camera], batch.sights[i].world), view.transmittance);
     }
     if (seen.counts[i] == 0) means.look_from_all_sides(position);
@@ -135,7 +133,7 @@ void ViewAverage::ask(std::span<const Brick> bricks, std::span<const Vec3f> posi
 
 void ViewAverage::query(std::span<const Vec3f> positions, std::span<float> luminance) const {
   const std::vector<Brick> bricks = by_brick(positions);
-  const std::size_t most = kViewsAtATime / static_cast<std::size_t>(views_->views_per_voxel());
+  const std::size_t most = kViewsAtATime / std::size_t(views_->views_per_voxel());
   for (std::size_t begin = 0, end = 0; begin < bricks.size(); begin = end) {
     std::size_t count = 0;
     while (end < bricks.size() && bricks[end].level == bricks[begin].level && count < most &&

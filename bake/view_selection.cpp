@@ -48,9 +48,9 @@ std::vector<std::int32_t> try_order(std::span<const Eye> eyes, Vec3d world) {
     for (std::size_t i = picked; i < n; ++i) {
       closest[order[i]] = std::max(closest[order[i]], dot(directions[order[i]], directions[order[picked - 1]]));
     }
-    const auto farthest = std::min_element(order.begin() + static_cast<std::ptrdiff_t>(picked), order.end(),
+    const auto farthest = std::min_element(order.begin() + std::ptrdiff_t(picked), order.end(),
                                            [&](int a, int b) { return closest[a] < closest[b]; });
-    std::rotate(order.begin() + static_cast<std::ptrdiff_t>(picked), farthest, farthest + 1);
+    std::rotate(order.begin() + std::ptrdiff_t(picked), farthest, farthest + 1);
   }
   return order;
 }
@@ -66,18 +66,16 @@ ViewSelection::ViewSelection(const std::vector<BakeCamera>& cameras, std::vector
     : eyes_(eyes_of(cameras)),
       levels_(std::move(levels)),
       views_per_voxel_(options.views_per_voxel),
-      seen_transmittance_(static_cast<float>(std::max(options.seen_transmittance, 1e-8))) {}
+      seen_transmittance_(float(std::max(options.seen_transmittance, 1e-8))) {}
 
 SightScene<BrickGrid<float>> ViewSelection::scene() const {
-  return {eyes_.data(),     static_cast<int>(eyes_.size()),
-          levels_.data(),   static_cast<int>(levels_.size()),
-          views_per_voxel_, seen_transmittance_};
+  return {eyes_.data(), int(eyes_.size()), levels_.data(), int(levels_.size()), views_per_voxel_, seen_transmittance_};
 }
 
 std::vector<SeenBy> ViewSelection::seen_by(std::size_t level, Vec3d world, std::span<const std::int32_t> order,
                                            float least) const {
   std::vector<SeenBy> seen(views_per_voxel_);
-  seen.resize(find_seeing(scene(), static_cast<int>(level), world, order.data(), least, seen.data()));
+  seen.resize(find_seeing(scene(), int(level), world, order.data(), least, seen.data()));
   return seen;
 }
 
@@ -88,9 +86,8 @@ void ViewSelection::find(std::size_t level, const SightBatch& batch, SeenBatch& 
   parallel_ranges(batch.sights.size(), kSightsAtATime, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Sight& sight = batch.sights[i];
-      answer.counts[i] =
-          find_seeing(all, static_cast<int>(level), sight.world, batch.orders.data() + sight.order * eyes_.size(),
-                      sight.least, answer.seen.data() + i * views_per_voxel_);
+      answer.counts[i] = find_seeing(all, int(level), sight.world, batch.orders.data() + sight.order * eyes_.size(),
+                                     sight.least, answer.seen.data() + i * views_per_voxel_);
     }
   });
 }

@@ -42,7 +42,7 @@ int planes_of_all(const std::vector<BakeLevel>& levels) {
 std::size_t planes_at_a_time(const BakeOptions& options) {
   constexpr int kThreadsOfPlane = 4, kMost = 4;
   if (!options.max_memory.empty()) return 1;
-  return static_cast<std::size_t>(std::clamp(thread_count() / kThreadsOfPlane, 1, kMost));
+  return std::size_t(std::clamp(thread_count() / kThreadsOfPlane, 1, kMost));
 }
 
 // The journal's parts are the planes of the density pass, level by level, then those of the radiance pass.
@@ -55,12 +55,12 @@ std::vector<BakeLevel> bake_levels(const ColorField& field, const std::vector<Ba
   std::size_t first = 0;
   bool any = false;
   for (BakeLevel& level : levels) {
-    const auto planes = static_cast<std::size_t>(plane_count(level.plan));
+    const auto planes = std::size_t(plane_count(level.plan));
     journal.parts<DenseVoxel>(
         first, planes, planes_at_a_time(options),
-        [&](std::size_t plane) { return bake_density_plane(field, level.plan, options, static_cast<int>(plane)); },
+        [&](std::size_t plane) { return bake_density_plane(field, level.plan, options, int(plane)); },
         [&](std::size_t plane, const std::vector<DenseVoxel>& voxels) {
-          put_plane(voxels, static_cast<int>(plane), level.sigma);
+          put_plane(voxels, int(plane), level.sigma);
           any = any || !voxels.empty();
           progress.plane_done();
         });
@@ -73,22 +73,20 @@ std::vector<BakeLevel> bake_levels(const ColorField& field, const std::vector<Ba
 std::vector<VolumePlanes> bake_volumes(const ColorField& field, const std::vector<BakeCamera>& cameras,
                                        const std::vector<BakeLevel>& levels, const BakeOptions& options,
                                        BakeJournal& journal, const ProgressSink& sink) {
-  const auto planes_of_density = static_cast<std::size_t>(planes_of_all(levels));
-  PassProgress progress(sink, kDensityShare, 1, static_cast<double>(planes_of_density));
+  const auto planes_of_density = std::size_t(planes_of_all(levels));
+  PassProgress progress(sink, kDensityShare, 1, double(planes_of_density));
   const auto views = select_views(cameras, density_levels(levels), options);
   std::vector<VolumePlanes> volumes;
   std::size_t dense_first = 0;
   for (std::size_t level = 0; level < levels.size(); ++level) {
     const BakePlan& plan = levels[level].plan;
     const RadiancePass pass(field, levels, level, *views, options);
-    const auto planes = static_cast<std::size_t>(plane_count(plan));
+    const auto planes = std::size_t(plane_count(plan));
     const std::size_t first = planes_of_density + dense_first;
     bool any = false;
     journal.parts<BakedVoxel>(
         first, planes, planes_at_a_time(options),
-        [&](std::size_t plane) {
-          return pass.bake_plane(journal.read<DenseVoxel>(dense_first + plane), static_cast<int>(plane));
-        },
+        [&](std::size_t plane) { return pass.bake_plane(journal.read<DenseVoxel>(dense_first + plane), int(plane)); },
         [&](std::size_t, const std::vector<BakedVoxel>& voxels) {
           any = any || !voxels.empty();
           progress.plane_done();
@@ -102,7 +100,7 @@ std::vector<VolumePlanes> bake_volumes(const ColorField& field, const std::vecto
                         {}};
     volume.read = [&journal, first, end = volume.end](int plane) {
       if (plane < 0 || plane >= end) return std::vector<BakedVoxel>();
-      return journal.read<BakedVoxel>(first + static_cast<std::size_t>(plane));
+      return journal.read<BakedVoxel>(first + std::size_t(plane));
     };
     volumes.push_back(std::move(volume));
   }

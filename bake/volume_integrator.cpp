@@ -82,9 +82,7 @@ class VoxelMedium {
   }
 
  private:
-  static Vec3i floored(Vec3d p) {
-    return {static_cast<int>(std::floor(p.x)), static_cast<int>(std::floor(p.y)), static_cast<int>(std::floor(p.z))};
-  }
+  static Vec3i floored(Vec3d p) { return {int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))}; }
   static BrickGrid<Sample> fill(const BakedVolume& volume) {
     const VoxelBox box = bounding_box(volume.voxels);
     // One voxel of margin: interpolation reaches half a voxel beyond the outermost centres.
@@ -180,23 +178,23 @@ VolumeImage integrate_volumes(std::span<const BakedVolume> volumes, const Intrin
   VolumeImage image;
   image.width = intrinsics.width;
   image.height = intrinsics.height;
-  const std::size_t pixels = static_cast<std::size_t>(image.width) * image.height;
+  const std::size_t pixels = std::size_t(image.width) * image.height;
   image.rgb.resize(3 * pixels);
   image.opacity.resize(pixels);
-  parallel_tasks(static_cast<std::size_t>(image.height), [&](std::size_t y) {
+  parallel_tasks(std::size_t(image.height), [&](std::size_t y) {
     for (int x = 0; x < image.width; ++x) {
       Vec3d rgb{};
       double opacity = 0;
       for (int s = 0; s < n * n; ++s) {
-        const PixelPosition pixel{x + (s % n + 0.5) / n, static_cast<double>(y) + (s / n + 0.5) / n};
+        const PixelPosition pixel{x + (s % n + 0.5) / n, double(y) + (s / n + 0.5) / n};
         const Vec3d direction = normalized(world_from_camera.direction(ray_direction(intrinsics, pixel)));
         const Radiance ray = integrate_ray(media, world_from_camera.translation, direction, options.step);
         rgb += ray.rgb;
         opacity += 1 - ray.transmittance;
       }
       const std::size_t at = y * image.width + x;
-      for (int c = 0; c < 3; ++c) image.rgb[3 * at + c] = static_cast<float>(rgb[c] / (n * n));
-      image.opacity[at] = static_cast<float>(opacity / (n * n));
+      for (int c = 0; c < 3; ++c) image.rgb[3 * at + c] = float(rgb[c] / (n * n));
+      image.opacity[at] = float(opacity / (n * n));
     }
   });
   return image;

@@ -76,16 +76,16 @@ VolumePlanes planes_of(const BakedVolume& volume) {
 
 std::size_t part_count(int planes, bool is_sparing) {
   if (is_sparing) return planes > 0 ? 1 : 0;
-  return static_cast<std::size_t>(std::clamp(planes / kPlanesOfPart, std::min(planes, 1), thread_count()));
+  return std::size_t(std::clamp(planes / kPlanesOfPart, std::min(planes, 1), thread_count()));
 }
 
 void visit_parts(const VolumePlanes& volume,
                  const std::function<void(std::size_t, const std::vector<BakedVoxel>&)>& visit) {
   const int planes = volume.end - volume.begin;
-  const auto parts = static_cast<int>(part_count(volume));
-  parallel_tasks(static_cast<std::size_t>(parts), [&](std::size_t part) {
+  const auto parts = int(part_count(volume));
+  parallel_tasks(std::size_t(parts), [&](std::size_t part) {
     const VolumePlanes own = volume;
-    const auto number = static_cast<int>(part);
+    const auto number = int(part);
     const int begin = volume.begin + planes * number / parts, end = volume.begin + planes * (number + 1) / parts;
     for (int plane = begin; plane < end; ++plane) visit(part, own.read(plane));
   });

@@ -13,16 +13,16 @@
 namespace cnerf {
 
 CNERF_HD inline std::uint32_t to_index(float x) {
-  return static_cast<std::uint32_t>(static_cast<std::int32_t>(x));
+  return std::uint32_t(std::int32_t(x));
 }
 CNERF_HD inline std::uint32_t to_index(double x) {
-  return static_cast<std::uint32_t>(static_cast<std::int32_t>(x));
+  return std::uint32_t(std::int32_t(x));
 }
 CNERF_HD inline void to_real(std::uint32_t i, float& x) {
-  x = static_cast<float>(i);
+  x = float(i);
 }
 CNERF_HD inline void to_real(std::uint32_t i, double& x) {
-  x = static_cast<double>(i);
+  x = double(i);
 }
 
 /// The cell that holds a position, and where in the cell it is.
@@ -38,7 +38,7 @@ template <typename Index, typename Real>
 CNERF_HD GridCell<Real, Index> locate(const GridLevel& level, const Real position[3]) {
   GridCell<Real, Index> cell;
   for (int axis = 0; axis < 3; ++axis) {
-    const Real scaled = position[axis] * Real(static_cast<float>(level.cells));
+    const Real scaled = position[axis] * Real(float(level.cells));
     cell.corner[axis] = to_index(scaled);
     Real floor;
     to_real(cell.corner[axis], floor);

@@ -28,9 +28,9 @@ class MemoryStream : public Imf::OStream {
  public:
   MemoryStream() : Imf::OStream("memory") {}
   void write(const char text[], int n) override {
-    bytes_.resize(std::max(bytes_.size(), at_ + static_cast<std::size_t>(n)));
-    std::memcpy(bytes_.data() + at_, text, static_cast<std::size_t>(n));
-    at_ += static_cast<std::size_t>(n);
+    bytes_.resize(std::max(bytes_.size(), at_ + std::size_t(n)));
+    std::memcpy(bytes_.data() + at_, text, std::size_t(n));
+    at_ += std::size_t(n);
   }
   std::uint64_t tellp() override { return at_; }
   void seekp(std::uint64_t position) override { at_ = position; }
@@ -48,7 +48,7 @@ struct Level {
 };
 
 Level first_level(const ExrImage& image) {
-  const std::size_t pixels = static_cast<std::size_t>(image.width) * image.height;
+  const std::size_t pixels = std::size_t(image.width) * image.height;
   Level level{image.width, image.height, {}};
   for (const ExrChannel& channel : image.channels) {
     CNERF_CHECK(channel.values.size() > (pixels - 1) * channel.stride, "channel " + channel.name + " is too short");
@@ -74,9 +74,9 @@ Level next_level(const Level& level) {
         for (int s = 0; s < 4; ++s) {
           const int from_x = std::min(2 * x + (s & 1), level.width - 1),
                     from_y = std::min(2 * y + s / 2, level.height - 1);
-          sum += plane[static_cast<std::size_t>(from_y) * level.width + from_x];
+          sum += plane[std::size_t(from_y) * level.width + from_x];
         }
-        smaller.push_back(static_cast<float>(sum / 4));
+        smaller.push_back(float(sum / 4));
       }
     }
     next.planes.push_back(std::move(smaller));
@@ -100,7 +100,7 @@ class LevelBuffer {
  public:
   LevelBuffer(const ExrImage& image, Level& level) {
     halves_.reserve(level.planes.size());
-    const auto width = static_cast<std::size_t>(level.width);
+    const auto width = std::size_t(level.width);
     for (std::size_t c = 0; c < level.planes.size(); ++c) {
       const std::string& name = image.channels[c].name;
       if (image.channels[c].half) {

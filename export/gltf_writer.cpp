@@ -55,7 +55,7 @@ class BufferBuilder {
     const auto* begin = static_cast<const unsigned char*>(data);
     buffer.insert(buffer.end(), begin, begin + bytes);
     model_.bufferViews.push_back(view);
-    return static_cast<int>(model_.bufferViews.size()) - 1;
+    return int(model_.bufferViews.size()) - 1;
   }
   int add_accessor(int view, std::size_t count, int component, int type) {
     tinygltf::Accessor accessor;
@@ -64,7 +64,7 @@ class BufferBuilder {
     accessor.count = count;
     accessor.type = type;
     model_.accessors.push_back(accessor);
-    return static_cast<int>(model_.accessors.size()) - 1;
+    return int(model_.accessors.size()) - 1;
   }
   int add_vectors(const std::vector<Vec3f>& values) {
     const int view = add_view(values.data(), values.size() * sizeof(Vec3f), TINYGLTF_TARGET_ARRAY_BUFFER);
@@ -91,8 +91,8 @@ void add_mesh(const BakedMesh& mesh, const Mat3d& rotation, BufferBuilder& buffe
   Aabbf box = Aabbf::empty();
   for (const Vec3f& p : positions) box.grow(p);
   const int position = buffer.add_vectors(positions);
-  model.accessors[static_cast<std::size_t>(position)].minValues = {box.min.x, box.min.y, box.min.z};
-  model.accessors[static_cast<std::size_t>(position)].maxValues = {box.max.x, box.max.y, box.max.z};
+  model.accessors[std::size_t(position)].minValues = {box.min.x, box.min.y, box.min.z};
+  model.accessors[std::size_t(position)].maxValues = {box.max.x, box.max.y, box.max.z};
   primitive.attributes["POSITION"] = position;
   primitive.attributes["NORMAL"] = buffer.add_vectors(mapped(mesh.normals, rotation));
   const int uv_view =
@@ -171,10 +171,10 @@ int camera_index(const Intrinsics& lens, double near, double far, tinygltf::Mode
       {"cy", lens.cy},       {"distortion", lens.distortion}};
   camera.extras = extras(intrinsics);
   for (std::size_t c = 0; c < model.cameras.size(); ++c) {
-    if (model.cameras[c] == camera) return static_cast<int>(c);
+    if (model.cameras[c] == camera) return int(c);
   }
   model.cameras.push_back(camera);
-  return static_cast<int>(model.cameras.size()) - 1;
+  return int(model.cameras.size()) - 1;
 }
 
 /// Node of a camera: glTF's look along -Z with +Y up, ours along +Z with +Y down.
@@ -190,7 +190,7 @@ void add_cameras(const std::vector<BakeCamera>& cameras, const Affined& from_wor
     node.camera = camera_index(camera.intrinsics, 1e-3 * size, 4 * farthest + size, model);
     node.rotation = quaternion_of(placed.linear);
     node.translation = {placed.translation.x, placed.translation.y, placed.translation.z};
-    model.scenes[0].nodes.push_back(static_cast<int>(model.nodes.size()));
+    model.scenes[0].nodes.push_back(int(model.nodes.size()));
     model.nodes.push_back(node);
   }
 }

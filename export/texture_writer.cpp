@@ -12,7 +12,7 @@ namespace {
 
 std::uint8_t srgb_byte(float linear) {
   CNERF_CHECK(std::isfinite(linear), "a texture holds a value that is not finite");
-  return static_cast<std::uint8_t>(std::lround(255 * srgb_from_linear(std::clamp(linear, 0.0f, 1.0f))));
+  return std::uint8_t(std::lround(255 * srgb_from_linear(std::clamp(linear, 0.0f, 1.0f))));
 }
 
 std::map<std::string, std::string> attributes(const std::string& color_origin, const std::string& colorspace) {

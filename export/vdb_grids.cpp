@@ -168,7 +168,7 @@ BuilderPtr float_grid(const std::string& name, const std::string& meaning, const
 BuilderPtr density_grid(const Content& content) {
   auto builder = grid_builder<openvdb::FloatGrid>(
       "density", content, [scale = density_scale(content.statistics, content.options)](const BakedVoxel& v) {
-        return static_cast<float>(v.sigma / scale);
+        return float(v.sigma / scale);
       });
   builder->grid().insertMeta("meaning", openvdb::StringMetadata(content.options.normalize_density
                                                                     ? "extinction in units of cnerf_density_scale"
@@ -188,7 +188,7 @@ double density_scale(const VolumeStatistics& volume, const VdbOptions& options) 
 
 bool density_fits_half(const VolumeStatistics& volume, const VdbOptions& options) {
   if (!options.half || volume.voxels == 0) return options.half;
-  const auto scale = static_cast<float>(density_scale(volume, options));
+  const auto scale = float(density_scale(volume, options));
   return volume.max_sigma / scale <= kHalfMax && volume.min_sigma / scale >= kHalfMinNormal;
 }
 

@@ -102,7 +102,7 @@ void read_voxels(const OpenedFile& file, const openvdb::FloatGrid& density, Bake
   const auto of_color = (color ? color : openvdb::Vec3SGrid::create())->getConstAccessor();
   const auto of_a = a->getConstAccessor(), of_b = b->getConstAccessor();
   const auto of_luminance = luminance->getConstAccessor();
-  const auto scale = static_cast<float>(meta_or<double>(file.metadata, "cnerf_density_scale", 1.0));
+  const auto scale = float(meta_or<double>(file.metadata, "cnerf_density_scale", 1.0));
   for_each_active(density, [&](const openvdb::Coord& at) {
     const openvdb::Vec3s rgb = color ? of_color.getValue(at) : openvdb::Vec3s(0, 0, 0);
     volume.voxels.push_back({at.x(),
@@ -140,7 +140,7 @@ void value_range(const openvdb::GridBase& grid, VdbGridSummary& summary) {
   } else if (const auto* vector = dynamic_cast<const openvdb::Vec3SGrid*>(&grid)) {
     start_range(summary, 3);
     for (auto it = vector->cbeginValueOn(); it; ++it) {
-      for (int c = 0; c < 3; ++c) widen(summary, static_cast<std::size_t>(c), (*it)[c]);
+      for (int c = 0; c < 3; ++c) widen(summary, std::size_t(c), (*it)[c]);
     }
   }
 }

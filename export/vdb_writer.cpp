@@ -36,7 +36,7 @@ class CheckedArchive : public openvdb::io::Archive {
     out.open(file, std::ios::binary | std::ios::trunc);
     writeHeader(out, /*seekable=*/true);
     grids.file_metadata().writeMeta(out);
-    const auto count = static_cast<std::int32_t>(grids.count());
+    const auto count = std::int32_t(grids.count());
     out.write(reinterpret_cast<const char*>(&count), sizeof count);
     if (grids.is_sparing()) {
       for (std::size_t number = 0; number < grids.count(); ++number) write_grid(grids.make(number), out);
@@ -68,7 +68,7 @@ class CheckedArchive : public openvdb::io::Archive {
     for (std::size_t g = 0; g < written.size(); ++g) {
       const std::streamoff begin = out.tellp();
       const std::string_view bytes = written[g].view();
-      out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+      out.write(bytes.data(), std::streamsize(bytes.size()));
       move_descriptor(descriptors[g], begin, out);
       out.seekp(0, std::ios::end);
       written[g] = {};
@@ -82,7 +82,7 @@ class CheckedArchive : public openvdb::io::Archive {
     descriptor.setGridPos(descriptor.getGridPos() + begin);
     descriptor.setBlockPos(descriptor.getBlockPos() + begin);
     descriptor.setEndPos(descriptor.getEndPos() + begin);
-    out.seekp(begin + static_cast<std::streamoff>(header.str().size()));
+    out.seekp(begin + std::streamoff(header.str().size()));
     descriptor.writeStreamPos(out);
   }
 };

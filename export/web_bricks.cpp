@@ -19,7 +19,7 @@ constexpr double kOpaqueDepth = 24;  ///< optical depth of one voxel that no pic
 constexpr float kHalfMax = 65504.0f;
 
 std::uint8_t byte_of(float value) {
-  return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0f, 255.0f)));
+  return std::uint8_t(std::lround(std::clamp(value, 0.0f, 255.0f)));
 }
 
 int floor_div(int value, int side) {
@@ -41,14 +41,14 @@ Vec3i lay_out(const BakedVolume& volume, WebBricks& bricks) {
   bricks.voxel_size = volume.voxel_size;
   bricks.origin = volume.origin + first.cast<double>() * volume.voxel_size;
   const Vec3i n = bricks.counts;
-  bricks.distance.assign(static_cast<std::size_t>(n.x) * n.y * n.z, 255);
+  bricks.distance.assign(std::size_t(n.x) * n.y * n.z, 255);
   for (const BakedVoxel& voxel : dense) {
     const Vec3i v = Vec3i{voxel.i, voxel.j, voxel.k} - first;
     for (int z = floor_div(v.z - 1, kSide); z <= floor_div(v.z + 1, kSide); ++z) {
       for (int y = floor_div(v.y - 1, kSide); y <= floor_div(v.y + 1, kSide); ++y) {
         for (int x = floor_div(v.x - 1, kSide); x <= floor_div(v.x + 1, kSide); ++x) {
           if (x < 0 || y < 0 || z < 0 || x >= n.x || y >= n.y || z >= n.z) continue;
-          bricks.distance[(static_cast<std::size_t>(z) * n.y + y) * n.x + x] = 0;
+          bricks.distance[(std::size_t(z) * n.y + y) * n.x + x] = 0;
         }
       }
     }
@@ -61,7 +61,7 @@ Vec3i lay_out(const BakedVolume& volume, WebBricks& bricks) {
 void fill_distances(WebBricks& bricks) {
   const Vec3i n = bricks.counts;
   const auto at = [&](int x, int y, int z) -> std::uint8_t& {
-    return bricks.distance[(static_cast<std::size_t>(z) * n.y + y) * n.x + x];
+    return bricks.distance[(std::size_t(z) * n.y + y) * n.x + x];
   };
   const auto relax = [&](int x, int y, int z) {
     int nearest = at(x, y, z);
@@ -72,7 +72,7 @@ void fill_distances(WebBricks& bricks) {
           if (u < 0 || v < 0 || w < 0 || u >= n.x || v >= n.y || w >= n.z) continue;
           nearest = std::min(nearest, at(u, v, w) + 1);
         }
-    at(x, y, z) = static_cast<std::uint8_t>(std::min(nearest, int(at(x, y, z))));
+    at(x, y, z) = std::uint8_t(std::min(nearest, int(at(x, y, z))));
   };
   for (int z = 0; z < n.z; ++z)
     for (int y = 0; y < n.y; ++y)
@@ -87,7 +87,7 @@ std::vector<std::int32_t> numbers_of(const WebBricks& bricks, std::size_t& store
   std::vector<std::int32_t> numbers(bricks.distance.size(), -1);
   stored = 0;
   for (std::size_t b = 0; b < numbers.size(); ++b) {
-    if (bricks.distance[b] == 0) numbers[b] = static_cast<std::int32_t>(stored++);
+    if (bricks.distance[b] == 0) numbers[b] = std::int32_t(stored++);
   }
   return numbers;
 }
@@ -143,16 +143,16 @@ WebBricks make_web_bricks(const BakedVolume& volume, const std::string& density)
     if (v.x < 0 || v.y < 0 || v.z < 0) continue;
     const Vec3i brick{v.x / kSide, v.y / kSide, v.z / kSide};
     if (brick.x >= n.x || brick.y >= n.y || brick.z >= n.z) continue;
-    const std::int32_t number = numbers[(static_cast<std::size_t>(brick.z) * n.y + brick.y) * n.x + brick.x];
+    const std::int32_t number = numbers[(std::size_t(brick.z) * n.y + brick.y) * n.x + brick.x];
     if (number < 0) continue;
     const int local = ((v.z % kSide) * kSide + v.y % kSide) * kSide + v.x % kSide;
-    const std::size_t at = static_cast<std::size_t>(number) * kWebBrickVoxels + static_cast<std::size_t>(local);
+    const std::size_t at = std::size_t(number) * kWebBrickVoxels + std::size_t(local);
     if (half) {
       const std::uint16_t bits = Imath::half(std::min(voxel.sigma, kHalfMax)).bits();
-      bricks.density[at] = static_cast<std::uint8_t>(bits & 255);
-      bricks.density[plane + at] = static_cast<std::uint8_t>(bits >> 8);
+      bricks.density[at] = std::uint8_t(bits & 255);
+      bricks.density[plane + at] = std::uint8_t(bits >> 8);
     } else {
-      bricks.density[at] = byte_of(255 * std::cbrt(voxel.sigma / static_cast<float>(bricks.density_scale)));
+      bricks.density[at] = byte_of(255 * std::cbrt(voxel.sigma / float(bricks.density_scale)));
     }
     const float lightness = lightness_from_luminance(luminance_of(voxel.rgb));
     bricks.lab[at] = byte_of(lightness * 2.55f);
@@ -173,8 +173,8 @@ void to_differences(std::vector<std::uint8_t>& bricks) {
   for (std::size_t begin = 0; begin < bricks.size(); begin += kWebBrickVoxels) {
     for (int i = kWebBrickVoxels - 1; i > 0; --i) {
       const int step = i % kSide ? 1 : i / kSide % kSide ? kSide : kSide * kSide;
-      std::uint8_t& value = bricks[begin + static_cast<std::size_t>(i)];
-      value = static_cast<std::uint8_t>(value - bricks[begin + static_cast<std::size_t>(i - step)]);
+      std::uint8_t& value = bricks[begin + std::size_t(i)];
+      value = std::uint8_t(value - bricks[begin + std::size_t(i - step)]);
     }
   }
 }

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include "src/base/gzip.h"
 #include "export/manifest_json.h"
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/gzip.h"
 
 namespace cnerf {
 namespace {
@@ -94,8 +94,8 @@ Json cameras_json(const WebScene& scene) {
 std::vector<std::uint8_t> sample_of(const std::vector<std::uint8_t>& bricks) {
   std::vector<std::uint8_t> sample;
   for (std::size_t begin = 0; begin < bricks.size(); begin += 16 * kWebBrickVoxels) {
-    sample.insert(sample.end(), bricks.begin() + static_cast<std::ptrdiff_t>(begin),
-                  bricks.begin() + static_cast<std::ptrdiff_t>(begin + kWebBrickVoxels));
+    sample.insert(sample.end(), bricks.begin() + std::ptrdiff_t(begin),
+                  bricks.begin() + std::ptrdiff_t(begin + kWebBrickVoxels));
   }
   to_differences(sample);
   return sample;
@@ -103,7 +103,7 @@ std::vector<std::uint8_t> sample_of(const std::vector<std::uint8_t>& bricks) {
 
 std::size_t packed_size(const std::vector<std::uint8_t>& bricks) {
   const std::vector<std::uint8_t> sample = sample_of(bricks);
-  return static_cast<std::size_t>(double(gzip(sample).size()) * double(bricks.size()) / double(sample.size()));
+  return std::size_t(double(gzip(sample).size()) * double(bricks.size()) / double(sample.size()));
 }
 
 }  // namespace

@@ -21,14 +21,14 @@ std::vector<std::byte> encoded(const char* extension, const cv::Mat& image, cons
 }
 
 std::uint8_t srgb_byte(float linear) {
-  return static_cast<std::uint8_t>(std::lround(255 * srgb_from_linear(std::clamp(linear, 0.0f, 1.0f))));
+  return std::uint8_t(std::lround(255 * srgb_from_linear(std::clamp(linear, 0.0f, 1.0f))));
 }
 
 /// The camera for a picture whose longer side is `side` pixels at most.
 Intrinsics fitted(const Intrinsics& intrinsics, int side) {
   const double scale = std::min(1.0, double(side) / std::max(intrinsics.width, intrinsics.height));
-  return resized(intrinsics, std::max(1, static_cast<int>(std::lround(intrinsics.width * scale))),
-                 std::max(1, static_cast<int>(std::lround(intrinsics.height * scale))));
+  return resized(intrinsics, std::max(1, int(std::lround(intrinsics.width * scale))),
+                 std::max(1, int(std::lround(intrinsics.height * scale))));
 }
 
 /// For every pixel of the pinhole picture, where the lens put it; -1 where it did not.
@@ -38,8 +38,8 @@ void undistortion(const Intrinsics& lens, const Intrinsics& pinhole, cv::Mat& x,
   for (int row = 0; row < pinhole.height; ++row) {
     for (int column = 0; column < pinhole.width; ++column) {
       const auto seen = project(lens, ray_direction(pinhole, {column + 0.5, row + 0.5}));
-      x.at<float>(row, column) = seen ? static_cast<float>(seen->x - 0.5) : -1.0f;  // OpenCV's pixel centres are whole
-      y.at<float>(row, column) = seen ? static_cast<float>(seen->y - 0.5) : -1.0f;
+      x.at<float>(row, column) = seen ? float(seen->x - 0.5) : -1.0f;  // OpenCV's pixel centres are whole
+      y.at<float>(row, column) = seen ? float(seen->y - 0.5) : -1.0f;
     }
   }
 }
@@ -54,7 +54,7 @@ Intrinsics without_distortion(const Intrinsics& intrinsics) {
 }
 
 WebPhoto make_web_photo(const Intrinsics& intrinsics, const std::vector<float>& luminance, int side, int quality) {
-  CNERF_CHECK_EQ(luminance.size(), static_cast<std::size_t>(intrinsics.width) * intrinsics.height);
+  CNERF_CHECK_EQ(luminance.size(), std::size_t(intrinsics.width) * intrinsics.height);
   const cv::Mat linear(intrinsics.height, intrinsics.width, CV_32F, const_cast<float*>(luminance.data()));
   const Intrinsics small = fitted(intrinsics, side);
   cv::Mat scaled, shown;
@@ -83,13 +83,13 @@ std::vector<std::byte> make_poster(const BakedVolume& volume, const BakeCamera& 
   const VolumeImage image = integrate_volume(volume, pinhole, camera.world_from_camera, options);
   cv::Mat bgra(image.height, image.width, CV_8UC4);
   for (int i = 0; i < image.width * image.height; ++i) {
-    const float opacity = image.opacity[static_cast<std::size_t>(i)];
+    const float opacity = image.opacity[std::size_t(i)];
     std::uint8_t* pixel = bgra.data + 4 * i;
     for (int c = 0; c < 3; ++c) {
-      const float premultiplied = image.rgb[static_cast<std::size_t>(3 * i + c)];
+      const float premultiplied = image.rgb[std::size_t(3 * i + c)];
       pixel[2 - c] = srgb_byte(opacity > 0 ? premultiplied / opacity : 0.0f);
     }
-    pixel[3] = static_cast<std::uint8_t>(std::lround(255 * std::clamp(opacity, 0.0f, 1.0f)));
+    pixel[3] = std::uint8_t(std::lround(255 * std::clamp(opacity, 0.0f, 1.0f)));
   }
   return encoded(".webp", bgra, {cv::IMWRITE_WEBP_QUALITY, 80});
 }

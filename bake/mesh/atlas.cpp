@@ -42,7 +42,7 @@ UprightChart upright(const std::vector<PlanarTriangle>& triangles) {
   UprightChart best;
   float best_area = std::numeric_limits<float>::max();
   for (int step = 0; step < 2 * kAngles; ++step) {
-    const float angle = std::numbers::pi_v<float> / 2 * static_cast<float>(step) / kAngles;
+    const float angle = std::numbers::pi_v<float> / 2 * float(step) / kAngles;
     const Point2 axis{std::cos(angle), std::sin(angle)};
     Box2 box;
     for (const PlanarTriangle& t : triangles) {
@@ -64,24 +64,24 @@ UprightChart upright(const std::vector<PlanarTriangle>& triangles) {
 struct Outline {
   std::vector<int> upper, lower;
 
-  [[nodiscard]] int width() const { return static_cast<int>(upper.size()); }
+  [[nodiscard]] int width() const { return int(upper.size()); }
 };
 
 Outline outline_of(const UprightChart& chart, float scale, int gutter) {
-  const int columns = static_cast<int>(std::floor(chart.size.x * scale)) + 1;
+  const int columns = int(std::floor(chart.size.x * scale)) + 1;
   std::vector<int> upper(columns, std::numeric_limits<int>::max()), lower(columns, std::numeric_limits<int>::min());
   for (const PlanarTriangle& t : chart.triangles) {
     for (int corner = 0; corner < 3; ++corner) {
       Point2 a = t[corner] * scale, b = t[(corner + 1) % 3] * scale;
       if (a.x > b.x) std::swap(a, b);
-      const int first = std::clamp(static_cast<int>(std::floor(a.x)), 0, columns - 1);
-      const int last = std::clamp(static_cast<int>(std::floor(b.x)), 0, columns - 1);
+      const int first = std::clamp(int(std::floor(a.x)), 0, columns - 1);
+      const int last = std::clamp(int(std::floor(b.x)), 0, columns - 1);
       for (int column = first; column <= last; ++column) {
         const auto y_at = [&](float x) { return b.x > a.x ? a.y + (b.y - a.y) * (x - a.x) / (b.x - a.x) : a.y; };
-        const float left = y_at(std::max(a.x, static_cast<float>(column)));
-        const float right = b.x > a.x ? y_at(std::min(b.x, static_cast<float>(column + 1))) : b.y;
-        upper[column] = std::min(upper[column], static_cast<int>(std::floor(std::min(left, right))));
-        lower[column] = std::max(lower[column], static_cast<int>(std::floor(std::max(left, right))) + 1);
+        const float left = y_at(std::max(a.x, float(column)));
+        const float right = b.x > a.x ? y_at(std::min(b.x, float(column + 1))) : b.y;
+        upper[column] = std::min(upper[column], int(std::floor(std::min(left, right))));
+        lower[column] = std::max(lower[column], int(std::floor(std::max(left, right))) + 1);
       }
     }
   }
@@ -100,12 +100,12 @@ Outline outline_of(const UprightChart& chart, float scale, int gutter) {
 /// Rows from the top that are taken, column by column.
 class Skyline {
  public:
-  explicit Skyline(int size) : taken_(static_cast<std::size_t>(size), 0) {}
+  explicit Skyline(int size) : taken_(std::size_t(size), 0) {}
 
   /// Upper left texel, gutter included, of the place where the outline leaves the smallest gap; nothing when it does
   /// not fit.
   [[nodiscard]] std::optional<std::pair<int, int>> place(const Outline& outline) {
-    const int size = static_cast<int>(taken_.size());
+    const int size = int(taken_.size());
     const int stride = std::max(1, size / 512);
     std::optional<std::pair<int, int>> best;
     long least = std::numeric_limits<long>::max();
@@ -120,7 +120,7 @@ class Skyline {
       }
       if (bottom > size) continue;
       // High up first, or charts would be stacked where they match best; small gaps among those.
-      const long cost = static_cast<long>(bottom) * outline.width() + gap;
+      const long cost = long(bottom) * outline.width() + gap;
       if (cost >= least) continue;
       least = cost;
       best = {x, y};
@@ -154,10 +154,10 @@ std::optional<Atlas> packed_at(float scale, const std::vector<UprightChart>& cha
   atlas.texels_per_unit = scale;
   atlas.placements.resize(charts.size());
   for (const std::size_t c : order) {
-    if (charts[c].size.x * scale > static_cast<float>(size)) return std::nullopt;
+    if (charts[c].size.x * scale > float(size)) return std::nullopt;
     const auto place = skyline.place(outline_of(charts[c], scale, gutter));
     if (!place) return std::nullopt;
-    const Point2 corner{static_cast<float>(place->first + gutter), static_cast<float>(place->second + gutter)};
+    const Point2 corner{float(place->first + gutter), float(place->second + gutter)};
     atlas.placements[c] = {charts[c].axis, corner - charts[c].corner * scale};
   }
   return atlas;
@@ -178,7 +178,7 @@ Atlas pack_charts(const std::vector<std::vector<PlanarTriangle>>& charts, int si
                    [&](auto a, auto b) { return upright_charts[a].size.y > upright_charts[b].size.y; });
 
   constexpr int kSteps = 9;
-  auto high = static_cast<float>(size / std::sqrt(std::max(area, 1e-12)));  // every texel used
+  auto high = float(size / std::sqrt(std::max(area, 1e-12)));  // every texel used
   float low = 0;
   std::optional<Atlas> best;
   for (int step = 0; step < kSteps || (!best && step < 2 * kSteps); ++step) {

@@ -14,7 +14,7 @@ openvdb::FloatGrid::Ptr opacity_grid(const BrickGrid<float>& sigma, double voxel
   auto grid = openvdb::FloatGrid::create(0.0f);
   grid->setGridClass(openvdb::GRID_FOG_VOLUME);
   auto accessor = grid->getAccessor();
-  const auto path = static_cast<float>(voxel_size * depth);
+  const auto path = float(voxel_size * depth);
   for (std::size_t b = 0; b < sigma.brick_count(); ++b) {
     if (!sigma.has_brick(b)) continue;
     const Vec3i low = sigma.brick_min(b);

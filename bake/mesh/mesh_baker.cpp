@@ -45,7 +45,7 @@ void put_into_world(const UnwrappedMesh& unwrapped, const BakePlan& plan, BakedM
   }
   mesh.normals = unwrapped.normals;
   mesh.triangles = unwrapped.mesh.triangles;
-  const auto size = static_cast<float>(unwrapped.size);
+  const auto size = float(unwrapped.size);
   for (const Point2 texel : unwrapped.texels) mesh.uvs.push_back({texel.x / size, texel.y / size});
 }
 

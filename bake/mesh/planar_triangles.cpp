@@ -34,7 +34,7 @@ bool overlap(const PlanarTriangle& a, const PlanarTriangle& b) {
 }
 
 PlanarTriangles::Buckets PlanarTriangles::buckets_of(const PlanarTriangle& t) const {
-  const auto bucket = [&](float value) { return static_cast<std::int32_t>(std::floor(value / cell_)); };
+  const auto bucket = [&](float value) { return std::int32_t(std::floor(value / cell_)); };
   return {bucket(std::min({t[0].x, t[1].x, t[2].x})), bucket(std::min({t[0].y, t[1].y, t[2].y})),
           bucket(std::max({t[0].x, t[1].x, t[2].x})), bucket(std::max({t[0].y, t[1].y, t[2].y}))};
 }
@@ -54,7 +54,7 @@ bool PlanarTriangles::fits(const PlanarTriangle& triangle) const {
 }
 
 void PlanarTriangles::add(const PlanarTriangle& triangle) {
-  const auto index = static_cast<std::uint32_t>(triangles_.size());
+  const auto index = std::uint32_t(triangles_.size());
   triangles_.push_back(triangle);
   const Buckets range = buckets_of(triangle);
   for (std::int32_t x = range.x0; x <= range.x1; ++x) {

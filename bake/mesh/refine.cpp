@@ -16,7 +16,7 @@ float diagonal(const SurfaceMesh& mesh) {
 }
 
 void append(SurfaceMesh& to, const SurfaceMesh& part) {
-  const auto first = static_cast<std::uint32_t>(to.positions.size());
+  const auto first = std::uint32_t(to.positions.size());
   to.positions.insert(to.positions.end(), part.positions.begin(), part.positions.end());
   for (const Triangle& t : part.triangles) to.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
 }
@@ -40,7 +40,7 @@ void relax(SurfaceMesh& mesh, float step) {
 
 SurfaceMesh without_loose_parts(const SurfaceMesh& mesh, double smallest) {
   const std::vector<SurfaceMesh> parts = connected_parts(mesh);
-  const auto least = static_cast<float>(smallest * diagonal(mesh));
+  const auto least = float(smallest * diagonal(mesh));
   const auto largest = std::max_element(
       parts.begin(), parts.end(), [](const SurfaceMesh& a, const SurfaceMesh& b) { return diagonal(a) < diagonal(b); });
   SurfaceMesh kept;
@@ -60,15 +60,14 @@ void smooth(SurfaceMesh& mesh, int rounds) {
 }
 
 SurfaceMesh decimated(const SurfaceMesh& mesh, int faces) {
-  if (mesh.triangles.size() <= static_cast<std::size_t>(faces)) return mesh;
+  if (mesh.triangles.size() <= std::size_t(faces)) return mesh;
   constexpr float kAnyError = 1e9f;
   SurfaceMesh result;
   result.positions = mesh.positions;
   result.triangles.resize(mesh.triangles.size());
-  const std::size_t indices =
-      meshopt_simplify(result.triangles.data()->data(), mesh.triangles.data()->data(), 3 * mesh.triangles.size(),
-                       &mesh.positions.data()->x, mesh.positions.size(), sizeof(Vec3f),
-                       3 * static_cast<std::size_t>(faces), kAnyError, 0, nullptr);
+  const std::size_t indices = meshopt_simplify(
+      result.triangles.data()->data(), mesh.triangles.data()->data(), 3 * mesh.triangles.size(),
+      &mesh.positions.data()->x, mesh.positions.size(), sizeof(Vec3f), 3 * std::size_t(faces), kAnyError, 0, nullptr);
   result.triangles.resize(indices / 3);
   compact(result);
   return result;

@@ -56,7 +56,7 @@ class HiddenVoxels {
   }
   [[nodiscard]] bool is_open(Vec3f from) const {
     static const std::vector<Vec3f> kWays = ways_out();
-    const auto far = static_cast<float>(2 * (sigma_.size().x + sigma_.size().y + sigma_.size().z));
+    const auto far = float(2 * (sigma_.size().x + sigma_.size().y + sigma_.size().z));
     int open = 0;
     for (const Vec3f way : kWays) {
       open += transmittance_between(sigma_, plan_.voxel_size, from, from + way * far, kBlocked) > 0 ? 1 : 0;
@@ -76,7 +76,7 @@ BrickGrid<float> solidified(const BrickGrid<float>& sigma, const std::vector<Bak
                             const BakeOptions& options) {
   const HiddenVoxels hidden(sigma, cameras, plan, options);
   const std::vector<char> near_matter = bricks_with_neighbours(sigma);
-  const auto opaque = static_cast<float>(max_sigma(plan.voxel_size));
+  const auto opaque = float(max_sigma(plan.voxel_size));
   BrickGrid<float> solid(sigma.min(), sigma.size(), 0.0f);
   parallel_tasks(sigma.brick_count(), [&](std::size_t brick) {
     if (!near_matter[brick]) return;

@@ -91,12 +91,12 @@ std::vector<SurfaceMesh> connected_parts(const SurfaceMesh& mesh) {
   for (Triangle t : mesh.triangles) {
     std::uint32_t& part = part_of_root[sets.root(t[0])];
     if (part == kUnused) {
-      part = static_cast<std::uint32_t>(parts.size());
+      part = std::uint32_t(parts.size());
       parts.emplace_back();
     }
     for (std::uint32_t& vertex : t) {
       if (renamed[vertex] == kUnused) {
-        renamed[vertex] = static_cast<std::uint32_t>(parts[part].positions.size());
+        renamed[vertex] = std::uint32_t(parts[part].positions.size());
         parts[part].positions.push_back(mesh.positions[vertex]);
       }
       vertex = renamed[vertex];

@@ -52,7 +52,7 @@ std::optional<Shares> touched(const PlanarTriangle& t, Point2 p) {
   for (int corner = 0; corner < 3; ++corner) {
     const Point2 a = t[corner], b = t[(corner + 1) % 3];
     const double share = nearest_share(a, b, p);
-    const Point2 offset = a + (b - a) * static_cast<float>(share) - p;
+    const Point2 offset = a + (b - a) * float(share) - p;
     const float distance = std::max(std::abs(offset.x), std::abs(offset.y));
     if (distance >= least) continue;
     least = distance;
@@ -67,23 +67,20 @@ std::optional<Shares> touched(const PlanarTriangle& t, Point2 p) {
 /// Collects texels, each once.
 class TexelCollector {
  public:
-  explicit TexelCollector(const UnwrappedMesh& mesh)
-      : mesh_(mesh), taken_(static_cast<std::size_t>(mesh.size) * mesh.size, 0) {}
+  explicit TexelCollector(const UnwrappedMesh& mesh) : mesh_(mesh), taken_(std::size_t(mesh.size) * mesh.size, 0) {}
 
   /// Texels of a triangle for which `shares_at(x, y)` has an answer; their centres are at most `margin` outside its
   /// box.
   template <typename SharesAt>
   void add(std::size_t triangle, float margin, const SharesAt& shares_at) {
     const PlanarTriangle t = mesh_.texture_triangle(triangle);
-    const auto first = [&](float low) { return std::max(0, static_cast<int>(std::ceil(low - margin - 0.5f))); };
-    const auto last = [&](float high) {
-      return std::min(mesh_.size - 1, static_cast<int>(std::floor(high + margin - 0.5f)));
-    };
+    const auto first = [&](float low) { return std::max(0, int(std::ceil(low - margin - 0.5f))); };
+    const auto last = [&](float high) { return std::min(mesh_.size - 1, int(std::floor(high + margin - 0.5f))); };
     const int x0 = first(std::min({t[0].x, t[1].x, t[2].x})), x1 = last(std::max({t[0].x, t[1].x, t[2].x}));
     const int y0 = first(std::min({t[0].y, t[1].y, t[2].y})), y1 = last(std::max({t[0].y, t[1].y, t[2].y}));
     for (int y = y0; y <= y1; ++y) {
       for (int x = x0; x <= x1; ++x) {
-        char& taken = taken_[static_cast<std::size_t>(y) * mesh_.size + x];
+        char& taken = taken_[std::size_t(y) * mesh_.size + x];
         if (taken != 0) continue;
         const std::optional<Shares> shares = shares_at(x + 0.5, y + 0.5);
         if (!shares) continue;
@@ -109,7 +106,7 @@ class TexelCollector {
       return sum.cast<float>();
     };
     const Vec3f normal = blended(mesh_.normals);
-    return {x, y, static_cast<std::uint32_t>(triangle), blended(mesh_.mesh.positions),
+    return {x, y, std::uint32_t(triangle), blended(mesh_.mesh.positions),
             dot(normal, normal) > 1e-6f ? normalized(normal) : face_normal(mesh_.mesh, v)};
   }
 
@@ -132,9 +129,7 @@ std::vector<SurfaceTexel> surface_texels(const UnwrappedMesh& mesh) {
   }
   for (std::size_t triangle = 0; triangle < mesh.mesh.triangles.size(); ++triangle) {
     const PlanarTriangle t = mesh.texture_triangle(triangle);
-    collector.add(triangle, 0.5f, [&](double x, double y) {
-      return touched(t, {static_cast<float>(x), static_cast<float>(y)});
-    });
+    collector.add(triangle, 0.5f, [&](double x, double y) { return touched(t, {float(x), float(y)}); });
   }
   return std::move(collector).by_row();
 }

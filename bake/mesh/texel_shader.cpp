@@ -47,7 +47,7 @@ TexelShader::TexelShader(const ColorField& field, const std::vector<BakeCamera>&
 std::vector<TexelShader::Sample> TexelShader::samples_along_rays(std::span<const SurfacePoint> points,
                                                                  std::vector<SurfaceColor>& colors) const {
   const double length = options_.ray_outside + options_.ray_inside;
-  const int steps = std::max(1, static_cast<int>(std::ceil(length * kSamplesPerVoxel)));
+  const int steps = std::max(1, int(std::ceil(length * kSamplesPerVoxel)));
   const double step = length / steps;  // voxels
   std::vector<Vec3f> positions;        // unit space
   std::vector<Sample> samples;
@@ -65,7 +65,7 @@ std::vector<TexelShader::Sample> TexelShader::samples_along_rays(std::span<const
   std::vector<float> sigma(positions.size());
   field_.query_density(positions, sigma);
 
-  const auto path = static_cast<float>(step * plan_.voxel_size * field_.frame().unit_per_world);
+  const auto path = float(step * plan_.voxel_size * field_.frame().unit_per_world);
   std::vector<Sample> carrying;
   float transmittance = 1;
   for (std::size_t s = 0; s < samples.size(); ++s) {
@@ -122,17 +122,16 @@ std::vector<SurfaceColor> TexelShader::shade(std::span<const SurfacePoint> point
 
   std::vector<Vec3d> light(points.size());  // XYZ relative to white, times opacity
   for (std::size_t s = 0; s < samples.size(); ++s) {
-    const double y = static_cast<double>(luminance[s]) * samples[s].weight;
+    const double y = double(luminance[s]) * samples[s].weight;
     const Chromaticity& c = chromaticity[s];
     CNERF_CHECK(std::isfinite(c.x) && std::isfinite(c.z), "the field answered a chromaticity that is not finite");
     light[samples[s].point] += Vec3d{y * c.x, y, y * c.z};
   }
   for (std::size_t p = 0; p < points.size(); ++p) {
     if (colors[p].opacity <= 0) continue;
-    colors[p].luminance = static_cast<float>(light[p].y / colors[p].opacity);
+    colors[p].luminance = float(light[p].y / colors[p].opacity);
     if (light[p].y > 0) {
-      colors[p].chromaticity = {static_cast<float>(light[p].x / light[p].y),
-                                static_cast<float>(light[p].z / light[p].y)};
+      colors[p].chromaticity = {float(light[p].x / light[p].y), float(light[p].z / light[p].y)};
     }
   }
   return colors;

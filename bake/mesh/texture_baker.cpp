@@ -16,9 +16,9 @@ constexpr float kLeastOpacity = 0.02f;  ///< a ray that met less has no colour t
 /// Texels of each square tile of the texture; tiles are tasks.
 std::vector<std::vector<SurfaceTexel>> tiles_of(const UnwrappedMesh& mesh) {
   const int across = (mesh.size + kTile - 1) / kTile;
-  std::vector<std::vector<SurfaceTexel>> tiles(static_cast<std::size_t>(across) * across);
+  std::vector<std::vector<SurfaceTexel>> tiles(std::size_t(across) * across);
   for (const SurfaceTexel& texel : surface_texels(mesh)) {
-    tiles[static_cast<std::size_t>(texel.row / kTile) * across + texel.column / kTile].push_back(texel);
+    tiles[std::size_t(texel.row / kTile) * across + texel.column / kTile].push_back(texel);
   }
   // Neighbours in the tile may be of different charts: those of one triangle are close in space.
   for (auto& tile : tiles) {
@@ -47,7 +47,7 @@ void shade_tile(const std::vector<SurfaceTexel>& texels, const TexelShader& shad
   for (std::size_t t = 0; t < texels.size(); ++t) {
     if (colors[t].opacity < kLeastOpacity) continue;
     const VoxelColor color = voxel_color(colors[t].luminance, colors[t].chromaticity);
-    const std::size_t at = static_cast<std::size_t>(texels[t].row) * texture.size + texels[t].column;
+    const std::size_t at = std::size_t(texels[t].row) * texture.size + texels[t].column;
     put(texture, at, {color.rgb, color.a, color.b});
     texture.coverage[at] = 1;
   }
@@ -72,14 +72,14 @@ void fill_in(BakedTexture& texture, int reach) {
     front.push_back(at);
     sum += texture.rgb[at].cast<double>();
   }
-  const Vec3f mean = front.empty() ? Vec3f{} : (sum / static_cast<double>(front.size())).cast<float>();
+  const Vec3f mean = front.empty() ? Vec3f{} : (sum / double(front.size())).cast<float>();
 
   const auto neighbours = [&](std::size_t at, const auto& visit) {
-    const int x = static_cast<int>(at % size), y = static_cast<int>(at / size);
+    const int x = int(at % size), y = int(at / size);
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
         const int nx = x + dx, ny = y + dy;
-        if (nx >= 0 && ny >= 0 && nx < size && ny < size) visit(static_cast<std::size_t>(ny) * size + nx);
+        if (nx >= 0 && ny >= 0 && nx < size && ny < size) visit(std::size_t(ny) * size + nx);
       }
     }
   };
@@ -115,7 +115,7 @@ BakedTexture bake_texture(const UnwrappedMesh& mesh, const TexelShader& shader, 
                           const std::function<void(double)>& advance) {
   BakedTexture texture;
   texture.size = mesh.size;
-  const std::size_t texels = static_cast<std::size_t>(mesh.size) * mesh.size;
+  const std::size_t texels = std::size_t(mesh.size) * mesh.size;
   texture.rgb.resize(texels);
   for (auto* map : {&texture.luminance, &texture.a, &texture.b}) map->resize(texels);
   texture.coverage.resize(texels);

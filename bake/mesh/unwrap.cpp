@@ -31,14 +31,14 @@ UnwrappedMesh unwrap(const SurfaceMesh& mesh, int size, int gutter, const ChartO
 
   UnwrappedMesh result;
   result.size = size;
-  result.charts = static_cast<int>(charts.size());
+  result.charts = int(charts.size());
   for (std::size_t c = 0; c < charts.size(); ++c) {
     std::unordered_map<std::uint32_t, std::uint32_t> copies;  // vertex -> its copy in this chart
     for (const std::uint32_t face : charts[c].faces) {
       Triangle triangle{};
       for (int corner = 0; corner < 3; ++corner) {
         const std::uint32_t vertex = mesh.triangles[face][corner];
-        const auto [copy, is_new] = copies.try_emplace(vertex, static_cast<std::uint32_t>(result.texels.size()));
+        const auto [copy, is_new] = copies.try_emplace(vertex, std::uint32_t(result.texels.size()));
         if (is_new) {
           const Vec3f& position = mesh.positions[vertex];
           result.mesh.positions.push_back(position);
@@ -48,7 +48,7 @@ UnwrappedMesh unwrap(const SurfaceMesh& mesh, int size, int gutter, const ChartO
         triangle[corner] = copy->second;
       }
       result.mesh.triangles.push_back(triangle);
-      result.chart.push_back(static_cast<std::uint32_t>(c));
+      result.chart.push_back(std::uint32_t(c));
     }
   }
   return result;

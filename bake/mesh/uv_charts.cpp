@@ -71,7 +71,7 @@ class ChartMaker {
       normals_.push_back(areas_.back() > 0 ? vector / (2 * areas_.back()) : Vec3f{});
       area += areas_.back();
     }
-    cell_ = static_cast<float>(std::sqrt(2 * area / std::max<double>(1, static_cast<double>(areas_.size()))));
+    cell_ = float(std::sqrt(2 * area / std::max<double>(1, double(areas_.size()))));
   }
 
   [[nodiscard]] std::vector<UvChart> make() {
@@ -131,7 +131,7 @@ class ChartMaker {
   /// Lays faces into one plane; those that would overlap stay free for later patches.
   void lay_out(const std::vector<std::uint32_t>& faces) {
     Patch patch{{}, plane_across(mean_normal(faces)), PlanarTriangles(cell_)};
-    const auto index = static_cast<std::uint32_t>(patches_.size());
+    const auto index = std::uint32_t(patches_.size());
     // The seed always fits an empty plane of its own.
     if (!faces_plane(faces.front(), patch.plane)) patch.plane = plane_across(normals_[faces.front()]);
     for (const std::uint32_t face : faces) {

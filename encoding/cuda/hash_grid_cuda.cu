@@ -20,7 +20,7 @@ __global__ void encode(const __grid_constant__ GridLevels levels, const uint2* _
   if (sample >= *count) return;
   const float4 place = places[sample];
   const float position[3] = {place.x, place.y, place.z};
-  const int l = static_cast<int>(blockIdx.y);
+  const int l = int(blockIdx.y);
   encoded[std::size_t(sample) * levels.count + l] = gather(levels.level[l], table, position);
 }
 

@@ -18,7 +18,7 @@ struct GridLevels {
   int count = 0;
 
   GridLevels() = default;
-  GridLevels(const GridLevel* levels, std::size_t n) : count(static_cast<int>(n)) {
+  GridLevels(const GridLevel* levels, std::size_t n) : count(int(n)) {
     for (std::size_t l = 0; l < n; ++l) level[l] = levels[l];
   }
 };

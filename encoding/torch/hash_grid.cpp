@@ -68,7 +68,7 @@ struct Encode : torch::autograd::Function<Encode> {
 
 HashGridImpl::HashGridImpl(const HashGridOptions& options, std::uint64_t seed) : levels_(hash_grid_levels(options)) {
   torch::Tensor initial = torch::empty({std::int64_t(total_rows(levels_)), 4});
-  const CounterRng rng(seed, 0x9a5);
+  const CounterRng rng(seed, 2469);
   float* values = initial.data_ptr<float>();
   for (std::int64_t i = 0; i < initial.numel(); ++i) {
     values[i] = (2.0f * rng.uniform(std::uint64_t(i)) - 1.0f) * kInitialReach;

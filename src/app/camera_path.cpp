@@ -36,7 +36,7 @@ Vec3d mean_over(const Capture& capture, Of of) {
 
 double quantile(std::vector<double> values, double share) {
   std::ranges::sort(values);
-  return values[static_cast<std::size_t>(share * double(values.size() - 1))];
+  return values[std::size_t(share * double(values.size() - 1))];
 }
 
 /// Distance ahead of the cameras at which most of the scene lies.
@@ -58,7 +58,7 @@ double typical_depth(const Capture& capture, Vec3d eye, Vec3d forward) {
 Intrinsics path_intrinsics(const Capture& capture, const RenderConfig& config) {
   const Intrinsics& source = capture.views.front().intrinsics;
   const double scale = std::min(1.0, double(config.short_side) / std::min(source.width, source.height));
-  const auto even = [&](int side) { return std::max(2, 2 * static_cast<int>(std::lround(side * scale / 2))); };
+  const auto even = [&](int side) { return std::max(2, 2 * int(std::lround(side * scale / 2))); };
   Intrinsics result;
   result.width = even(source.width);
   result.height = even(source.height);

@@ -39,7 +39,8 @@ Work declare_bake(CLI::App& app) {
   add_short_form(app, arguments->run.config, "--voxel-size", "bake.voxel_size", "Side of a voxel in world units");
   add_short_form(app, arguments->run.config, "--grids", "bake.grids", "one, nested or auto: see docs/export.md");
   add_short_form(app, arguments->run.config, "--budget", "bake.budget", "Memory Cycles may take for the grids, as 4G");
-  add_short_form(app, arguments->run.config, "--max-memory", "bake.max_memory", "Memory the bake of a volume may take, as 1G");
+  add_short_form(app, arguments->run.config, "--max-memory", "bake.max_memory",
+                 "Memory the bake of a volume may take, as 1G");
   const auto flag = [&](const char* option, const char* setting, const char* help) {
     app.add_flag_callback(
         option, [arguments, setting] { arguments->run.config.short_forms.push_back(std::string(setting) + "=true"); },

@@ -57,8 +57,8 @@ void print_program(const std::string& name, const std::string& use) {
 }
 
 std::string memory_text() {
-  const double pages = static_cast<double>(::sysconf(_SC_PHYS_PAGES));
-  return fmt::format("{:.1f} GiB", pages * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 30));
+  const double pages = double(::sysconf(_SC_PHYS_PAGES));
+  return fmt::format("{:.1f} GiB", pages * double(::sysconf(_SC_PAGESIZE)) / (1 << 30));
 }
 
 std::string disk_text() {

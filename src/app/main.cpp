@@ -87,14 +87,14 @@ void run_program(CLI::App& program, int argc, char** argv) {
 
 int failed(ExitCode code, const std::string& message) {
   fmt::print(stderr, "\ncnerf: {}\n", message);
-  return static_cast<int>(code);
+  return int(code);
 }
 
 int guarded_main(int argc, char** argv) {
   CLI::App program{"Colour volumes from monochrome photographs with known camera poses", "cnerf"};
   try {
     run_program(program, argc, argv);
-    return static_cast<int>(ExitCode::kSuccess);
+    return int(ExitCode::kSuccess);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
     return failed(ExitCode::kUsage, error.what());

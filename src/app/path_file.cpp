@@ -40,8 +40,8 @@ class Frame {
     const auto w = number("w"), h = number("h");
     if (!w || !h || *w < 1 || *h < 1) refuse("w, h", "expected the size of the picture in pixels");
     Intrinsics result;
-    result.width = static_cast<int>(*w);
-    result.height = static_cast<int>(*h);
+    result.width = int(*w);
+    result.height = int(*h);
     if (const auto fl_x = number("fl_x")) {
       result.fx = *fl_x;
     } else if (const auto angle = number("camera_angle_x")) {

@@ -92,7 +92,7 @@ ColorizerOptions colorizer_options(const Config& config, const fs::path& working
   options.timeout_seconds = config.colorizer.timeout_seconds;
   options.reference_steps = config.colorizer.reference_steps;
   options.reference_on_builtin = config.colorizer.reference_on_builtin;
-  options.seed = static_cast<std::uint64_t>(config.stage2.seed);
+  options.seed = std::uint64_t(config.stage2.seed);
   options.cache_folder = cache_folder;
   options.progress = reporter.sink();
   return options;

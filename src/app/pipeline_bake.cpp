@@ -120,7 +120,7 @@ void write_mesh(BakedMesh mesh, const ColorOrigin& origin, const BakeFormats& fo
 void add_plates(const Capture& capture, BakeFolder& bake) {
   constexpr int kPlateSide = 4096, kPlateQuality = 92;
   const std::span<const View> views = capture.views;
-  const auto at_a_time = static_cast<std::size_t>(thread_count());
+  const auto at_a_time = std::size_t(thread_count());
   for (std::size_t begin = 0; begin < views.size(); begin += at_a_time) {
     const auto some = views.subspan(begin, std::min(at_a_time, views.size() - begin));
     const std::vector<WebPhoto> photos = photos_of(some, kPlateSide, kPlateQuality);

@@ -17,12 +17,12 @@ std::size_t bytes_from(const std::string& option, const std::string& text) {
   if (!is_amount) {
     throw UsageError(option + ": expected an amount of memory like 4G or 500M, got \"" + text + "\"");
   }
-  return static_cast<std::size_t>(std::ldexp(amount, read == 2 ? 10 * (static_cast<int>(at) + 1) : 0));
+  return std::size_t(std::ldexp(amount, read == 2 ? 10 * (int(at) + 1) : 0));
 }
 
 std::string in_words(std::size_t bytes) {
   char text[32];
-  const double mib = std::ldexp(static_cast<double>(bytes), -20);
+  const double mib = std::ldexp(double(bytes), -20);
   if (mib >= 1000) {
     std::snprintf(text, sizeof text, "%.2f GiB", mib / 1024);
   } else {

@@ -26,7 +26,7 @@ std::string two_values(const A& a, const B& b) {
 }  // namespace cnerf::detail
 
 #define CNERF_CHECK(condition, message)                                                          \
-  do {                                                                                          \
+  do {                                                                                           \
     if (!(condition)) ::cnerf::detail::contract_failed(__FILE__, __LINE__, #condition, message); \
   } while (false)
 

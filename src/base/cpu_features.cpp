@@ -36,13 +36,18 @@ IsaLevel active_isa() {
   return forced_level ? std::min(*forced_level, detected_isa()) : allowed;
 }
 
-void force_isa(IsaLevel level) { forced_level = level; }
+void force_isa(IsaLevel level) {
+  forced_level = level;
+}
 
 std::string to_string(IsaLevel level) {
   switch (level) {
-    case IsaLevel::kAvx512: return "avx512";
-    case IsaLevel::kAvx2: return "avx2";
-    case IsaLevel::kGeneric: break;
+    case IsaLevel::kAvx512:
+      return "avx512";
+    case IsaLevel::kAvx2:
+      return "avx2";
+    case IsaLevel::kGeneric:
+      break;
   }
   return "generic";
 }

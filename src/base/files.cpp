@@ -81,7 +81,7 @@ void write_file(const fs::path& target, std::span<const std::byte> content) {
   write_atomically(target, [&](const fs::path& temporary) {
     errno = 0;
     std::ofstream out(temporary, std::ios::binary);
-    out.write(reinterpret_cast<const char*>(content.data()), static_cast<std::streamsize>(content.size()));
+    out.write(reinterpret_cast<const char*>(content.data()), std::streamsize(content.size()));
     out.flush();
     if (!out) throw OutputError(target.string() + ": cannot be written: " + std::strerror(errno));
   });
@@ -94,9 +94,9 @@ void write_file(const fs::path& target, std::string_view content) {
 std::vector<std::byte> read_binary_file(const fs::path& file) {
   std::ifstream in = opened(file);
   in.seekg(0, std::ios::end);
-  std::vector<std::byte> content(static_cast<std::size_t>(in.tellg()));
+  std::vector<std::byte> content(std::size_t(in.tellg()));
   in.seekg(0);
-  in.read(reinterpret_cast<char*>(content.data()), static_cast<std::streamsize>(content.size()));
+  in.read(reinterpret_cast<char*>(content.data()), std::streamsize(content.size()));
   if (!in) throw InputError(file.string() + ": cannot be read to its end");
   return content;
 }
@@ -116,8 +116,8 @@ std::string sha256_of_file(const fs::path& file) {
   std::ifstream in = opened(file);
   Sha256 digest;
   std::vector<std::byte> piece(std::size_t(1) << 20);
-  while (in.read(reinterpret_cast<char*>(piece.data()), static_cast<std::streamsize>(piece.size())), in.gcount() > 0) {
-    digest.add(std::span(piece).first(static_cast<std::size_t>(in.gcount())));
+  while (in.read(reinterpret_cast<char*>(piece.data()), std::streamsize(piece.size())), in.gcount() > 0) {
+    digest.add(std::span(piece).first(std::size_t(in.gcount())));
   }
   if (in.bad()) throw InputError(file.string() + ": cannot be read to its end");
   return digest.hex();

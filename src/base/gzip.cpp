@@ -37,8 +37,7 @@ std::vector<std::byte> gzip(std::span<const std::uint8_t> bytes) {
       deflateEnd(&stream);
       CNERF_CHECK(false, "zlib failed");
     }
-    packed.insert(packed.end(), block.begin(),
-                  block.begin() + static_cast<std::ptrdiff_t>(block.size() - stream.avail_out));
+    packed.insert(packed.end(), block.begin(), block.begin() + std::ptrdiff_t(block.size() - stream.avail_out));
   }
   deflateEnd(&stream);
   return packed;

@@ -1,13 +1,14 @@
 #pragma once
 /// How an option struct tells the config binding, the help text and the tests about its fields: one member template
 ///
-///   template <typename Visitor> void visit(Visitor&& v) {
-///     v("levels", levels, Range{1, 16}, "levels of the hash grid");      // a number with its legal range
-///     v("transfer", transfer, Choice{"srgb", "linear"}, "…");            // a string out of a few
-///     v("name", name, "…");                                              // bool, std::string,
-///     std::vector<std::string> v.section("grid", grid);                                           // a nested option
-///     struct
-///   }
+///     template <typename Visitor>
+///     void visit(Visitor&& v) {
+///       v("levels", levels, Range{1, 16}, "levels of the hash grid");  // a number with its legal range
+///       v("transfer", transfer, Choice{"srgb", "linear"}, "...");      // a string out of a few
+///       v("name", name, "...");                                        // bool, std::string or a list of strings
+///       v.section("grid", grid);                                       // a nested option struct
+///     }
+///
 /// The defaults are the struct's member initialisers and stand nowhere else.
 
 #include <initializer_list>

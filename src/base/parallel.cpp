@@ -48,13 +48,13 @@ void run_tasks(std::size_t tasks, const Body& body) {
 void set_thread_count(int threads) {
   thread_limit.reset();
   if (threads > 0) {
-    thread_limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
-                                                         static_cast<std::size_t>(threads));
+    thread_limit =
+        std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
   }
 }
 
 int thread_count() {
-  return static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  return int(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
 }
 
 void parallel_tasks(std::size_t tasks, const std::function<void(std::size_t)>& task) {

@@ -2,6 +2,7 @@
 /// Counter-based random numbers: a value is a pure function of (seed, stream, index), the same on CPU and GPU and for
 /// any number of threads, so a training step can be repeated without replaying the run.
 
+#include <cstddef>
 #include <cstdint>
 
 #include "src/base/host_device.h"
@@ -16,6 +17,16 @@ CNERF_HD constexpr std::uint64_t mix_bits(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
+/// The number of a purpose's draws: the letters of its name, first letter highest. Purposes of other names draw other
+/// numbers, under the same seed.
+template <std::size_t size>
+CNERF_HD constexpr std::uint64_t named_stream(const char (&name)[size]) {
+  static_assert(size <= 9, "eight letters at most");
+  std::uint64_t stream = 0;
+  for (std::size_t i = 0; i + 1 < size; ++i) stream = stream << 8 | std::uint64_t(name[i]);
+  return stream;
+}
+
 /// The generator: every draw names its index, there is no hidden state.
 struct CounterRng {
   std::uint64_t key = 0;
@@ -27,11 +38,11 @@ struct CounterRng {
   }
   /// Uniform in [0, 1), 24 bits.
   [[nodiscard]] CNERF_HD constexpr float uniform(std::uint64_t index) const {
-    return static_cast<float>(bits(index) >> 40) * 0x1p-24f;
+    return float(bits(index) >> 40) * 0x1p-24f;
   }
   /// Uniform integer in [0, n). The bias of at most n / 2^32 is below what any use here could notice.
   [[nodiscard]] CNERF_HD constexpr std::uint32_t below(std::uint64_t index, std::uint32_t n) const {
-    return static_cast<std::uint32_t>(((bits(index) >> 32) * n) >> 32);
+    return std::uint32_t(((bits(index) >> 32) * n) >> 32);
   }
 };
 

@@ -16,7 +16,7 @@ std::size_t peak_memory_bytes() {
 std::size_t held_memory_bytes() {
   std::size_t size = 0, resident = 0;  // pages
   std::ifstream("/proc/self/statm") >> size >> resident;
-  return resident * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+  return resident * std::size_t(::sysconf(_SC_PAGESIZE));
 }
 
 }  // namespace cnerf

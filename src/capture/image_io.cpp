@@ -135,7 +135,7 @@ std::vector<float> area_resized_plane(const std::vector<float>& values, int chan
 
 template <typename T>
 T quantised(float value, float largest) {
-  return static_cast<T>(std::lround(std::clamp(value, 0.0f, 1.0f) * largest));
+  return T(std::lround(std::clamp(value, 0.0f, 1.0f) * largest));
 }
 
 /// Bytes of linear light: what rounding `encode_transfer` gives, without a power for every pixel.

@@ -90,8 +90,7 @@ CaptureListing read_listing(const Source& source, int downscale) {
   return listing;
 }
 
-// ---- which views there are
-// --------------------------------------------------------------------------------------------
+// Which views there are.
 
 /// Drops views whose image does not exist, and says so.
 void drop_missing_images(CaptureListing& listing) {
@@ -126,8 +125,7 @@ void choose_held_out(std::vector<ListedView>& views, int holdout) {
   throw InputError(views.front().poses_file, "split", left);
 }
 
-// ---- images and intrinsics
-// --------------------------------------------------------------------------------------------
+// Images and intrinsics.
 
 Transfer transfer_named(const std::string& name) {
   if (name == "srgb") return Transfer::kSrgb;
@@ -256,7 +254,8 @@ Capture load_capture(const fs::path& path, const CaptureOptions& options) {
   capture.notes = std::move(listing.notes);
   load_views(listing.views, transfer, capture);
   if (options.cut_out_of_black && !capture.depth_range && cut_out_of_black(capture.views)) {
-    capture.notes.push_back("all views show an object before black, which is taken as empty (capture.cut_out_of_black)");
+    capture.notes.push_back(
+        "all views show an object before black, which is taken as empty (capture.cut_out_of_black)");
   }
   capture.is_bounded_object = std::all_of(capture.views.begin(), capture.views.end(), is_cut_out);
   if (!capture.is_bounded_object) {

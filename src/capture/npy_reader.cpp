@@ -23,7 +23,7 @@ struct Header {
 
 /// The part of the file that describes the array: magic, version, length, and a Python dictionary as text.
 std::string header_text(const fs::path& file, std::span<const std::byte> content, std::size_t& header_size) {
-  const auto byte = [&](std::size_t i) { return static_cast<std::size_t>(content[i]); };
+  const auto byte = [&](std::size_t i) { return std::size_t(content[i]); };
   constexpr std::string_view kMagic = "\x93NUMPY";
   if (content.size() < 10 || std::memcmp(content.data(), kMagic.data(), kMagic.size()) != 0) {
     throw InputError(file, "header", "expected a NumPy .npy file, found other bytes");
@@ -74,7 +74,7 @@ std::vector<double> convert(std::span<const std::byte> bytes, std::size_t count)
   for (std::size_t i = 0; i < count; ++i) {
     T value;
     std::memcpy(&value, bytes.data() + i * sizeof(T), sizeof(T));
-    values[i] = static_cast<double>(value);
+    values[i] = double(value);
   }
   return values;
 }

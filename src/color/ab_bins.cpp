@@ -129,7 +129,7 @@ SoftLabel soft_label(Ab color) {
 Ab mean_of(const SoftLabel& label) {
   Ab mean;
   for (std::size_t i = 0; i < label.bin.size(); ++i) {
-    const Ab centre = ab_bin_centres()[static_cast<std::size_t>(label.bin[i])];
+    const Ab centre = ab_bin_centres()[std::size_t(label.bin[i])];
     mean.a += label.weight[i] * centre.a;
     mean.b += label.weight[i] * centre.b;
   }

@@ -23,7 +23,7 @@ constexpr std::int64_t kQuarterChannels = 128;                              // o
 Tensor drop_path(const Tensor& branch, double probability, bool training) {
   if (!training || probability == 0) return branch;
   const double keep = 1 - probability;
-  std::vector<std::int64_t> shape(static_cast<std::size_t>(branch.dim()), 1);
+  std::vector<std::int64_t> shape(std::size_t(branch.dim()), 1);
   shape[0] = branch.size(0);
   return branch * torch::empty(shape, branch.options()).bernoulli_(keep).div_(keep);
 }
@@ -92,7 +92,7 @@ Tensor AttentionUnitImpl::attend(const Tensor& tokens) {
   const std::int64_t batch = tokens.size(0), count = tokens.size(1), channels = tokens.size(2);
   const std::int64_t width = channels / heads_;
   const Tensor qkv = qkv_->forward(tokens).view({batch, count, 3, heads_, width}).permute({2, 0, 3, 1, 4});
-  const Tensor scores = torch::matmul(qkv[0], qkv[1].transpose(-2, -1)) / std::sqrt(static_cast<double>(width));
+  const Tensor scores = torch::matmul(qkv[0], qkv[1].transpose(-2, -1)) / std::sqrt(double(width));
   const Tensor mixed = torch::matmul(torch::softmax(scores, -1), qkv[2]);  // [B, heads, N, width]
   return projection_->forward(mixed.transpose(1, 2).reshape({batch, count, channels}));
 }

@@ -106,15 +106,15 @@ void save_colorizer_weights(const fs::path& file, const ColorizerNet& network, c
   std::vector<std::byte> payload;
   append(payload, decoding.temperature);
   append(payload, decoding.gain);
-  append(payload, static_cast<std::uint32_t>(decoding.short_side));
+  append(payload, std::uint32_t(decoding.short_side));
   const auto parameters = network->named_parameters();
-  append(payload, static_cast<std::uint32_t>(parameters.size()));
+  append(payload, std::uint32_t(parameters.size()));
   for (const auto& item : parameters) {
-    append(payload, static_cast<std::uint32_t>(item.key().size()));
+    append(payload, std::uint32_t(item.key().size()));
     append(payload, item.key().data(), item.key().size());
     const Tensor half = item.value().detach().to(torch::kCPU, torch::kHalf).contiguous();
-    append(payload, static_cast<std::uint32_t>(half.dim()));
-    for (const std::int64_t size : half.sizes()) append(payload, static_cast<std::uint32_t>(size));
+    append(payload, std::uint32_t(half.dim()));
+    for (const std::int64_t size : half.sizes()) append(payload, std::uint32_t(size));
     append(payload, half.data_ptr(), half.nbytes());
   }
   std::vector<std::byte> content;

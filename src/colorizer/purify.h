@@ -61,8 +61,8 @@ inline constexpr float kNeutralChroma = 3.0f, kChromaticChroma = 6.0f;
 /// 8x8x8 histogram of sRGB, as in the published code.
 [[nodiscard]] ColorHistogram rgb_histogram(const ColorPatchView& patch);
 
-/// Of several answers, the one most like the others: their medoid under the similarity below, the first of equals. A base
-/// that is an outlier would let all of its like pass, and a base's hue is off by what its answer's is.
+/// Of several answers, the one most like the others: their medoid under the similarity below, the first of equals. A
+/// base that is an outlier would let all of its like pass, and a base's hue is off by what its answer's is.
 /// @throws UsageError     when the options name an unknown histogram.
 /// @throws ContractError  when there is no answer.
 [[nodiscard]] std::size_t most_typical(const PurifyOptions& options, std::span<const ColorPatchView> answers);

@@ -128,7 +128,7 @@ TORCH_MODULE(UNet);
 /// smaller. Biases start at 0.
 void initialise(UNet& net, std::uint64_t seed) {
   torch::NoGradGuard no_grad;
-  SequentialRng rng(seed, 0x696e6974);
+  SequentialRng rng(seed, named_stream("init"));
   for (auto& item : net->named_parameters()) {
     Tensor& parameter = item.value();
     if (parameter.dim() < 2) {

@@ -28,9 +28,9 @@ struct ReferenceRecipe {
   bool classify = true;    ///< soft labels over the photographs' bins, instead of ab itself
   double temperature = 1;  ///< of the annealed mean, when it classifies
   bool local_statistics = true;
-  /// Weights of the built-in network; empty = none. It is frozen, and the network fitted here reads what it makes of the
-  /// picture: its inner features and its colours (ladder side-tuning, Sung et al. 2022). These paths start at zero, so
-  /// that the photographs decide how much of it is used.
+  /// Weights of the built-in network; empty = none. It is frozen, and the network fitted here reads what it makes of
+  /// the picture: its inner features and its colours (ladder side-tuning, Sung et al. 2022). These paths start at zero,
+  /// so that the photographs decide how much of it is used.
   std::filesystem::path builtin;
   PatchDistortion distortion;
 

@@ -37,8 +37,8 @@ bool decode_jpeg(std::span<const std::byte> content, RgbImage& image) {
   jpeg_read_header(&info, TRUE);
   info.out_color_space = JCS_RGB;
   jpeg_start_decompress(&info);
-  image.width = static_cast<int>(info.output_width);
-  image.height = static_cast<int>(info.output_height);
+  image.width = int(info.output_width);
+  image.height = int(info.output_height);
   image.rgb.resize(std::size_t(image.width) * std::size_t(image.height) * 3);
   while (info.output_scanline < info.output_height) {
     JSAMPROW row = &image.rgb[std::size_t(info.output_scanline) * std::size_t(image.width) * 3];

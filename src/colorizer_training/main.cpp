@@ -282,9 +282,9 @@ int main(int argc, char** argv) {
     return cnerf::run(argc, argv);
   } catch (const cnerf::Error& error) {
     std::cerr << "cnerf-train-colorizer: " << error.what() << '\n';
-    return static_cast<int>(error.exit_code());
+    return int(error.exit_code());
   } catch (const std::exception& error) {
     std::cerr << "cnerf-train-colorizer: internal error: " << error.what() << '\n';
-    return static_cast<int>(cnerf::ExitCode::kInternal);
+    return int(cnerf::ExitCode::kInternal);
   }
 }

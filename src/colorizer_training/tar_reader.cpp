@@ -35,7 +35,7 @@ std::vector<NamedBytes> read_tar(const fs::path& file) {
     const std::size_t padded = (size + kBlock - 1) / kBlock * kBlock;
     rest = rest.subspan(kBlock);
     if (padded > rest.size()) throw InputError(file.string() + ": the archive is cut short");
-    const char type = static_cast<char>(header[156]);
+    const char type = char(header[156]);
     if (type == '0' || type == '\0') {
       const std::string prefix = field(header, 345, 155), name = field(header, 0, 100);
       entries.push_back(

@@ -21,9 +21,9 @@ using torch::Tensor;
 namespace {
 
 constexpr int kPriorBatches = 100, kStatisticsBatches = 60;
-constexpr std::uint64_t kCropStream = 0x63726f70;     // the size of each step's crops
-constexpr std::uint64_t kEnsembleStream = 0x656e73;   // the members that each step asks
-constexpr std::uint64_t kPriorStream = 0x7072696f72;  // batches that only measure
+constexpr std::uint64_t kCropStream = named_stream("crop");     // the size of each step's crops
+constexpr std::uint64_t kEnsembleStream = named_stream("ens");  // the members that each step asks
+constexpr std::uint64_t kPriorStream = named_stream("prior");   // batches that only measure
 
 /// bf16 for matrix products and convolutions on CUDA while it lives; weights and losses stay f32.
 class MixedPrecision {

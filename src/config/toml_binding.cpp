@@ -67,9 +67,9 @@ void assign(const Field&, bool& target, const toml::node& node, const Origin& or
 void assign(const Field& field, int& target, const toml::node& node, const Origin& origin) {
   const auto value = node.value_exact<std::int64_t>();
   if (!value) origin.refuse("expected an integer" + in_range(field) + ", got " + text_of(node));
-  check_range(field, static_cast<double>(*value), origin);
+  check_range(field, double(*value), origin);
   if (!std::in_range<int>(*value)) origin.refuse("expected a 32-bit integer, got " + text_of(node));
-  target = static_cast<int>(*value);
+  target = int(*value);
 }
 
 template <std::floating_point Number>

@@ -15,7 +15,8 @@ namespace cnerf {
 // Streams of `initial_weights`.
 inline constexpr std::uint64_t kDensityNetStream = 1, kLuminanceNetStream = 2, kPointNetStream = 3,
                                kChromaHeadStream = 4;
-inline constexpr int kLuminanceOutputs = 4;  ///< one, padded to what the CPU's kernels want
+inline constexpr std::uint64_t kTableStream = 2469;  ///< of `initial_table`
+inline constexpr int kLuminanceOutputs = 4;          ///< one, padded to what the CPU's kernels want
 
 [[nodiscard]] inline MlpLayout density_net_layout(int levels) {
   return {{4 * levels, kHiddenWidth, kGeometryChannels}};

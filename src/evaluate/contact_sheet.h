@@ -26,7 +26,7 @@ class ContactSheet {
 
   /// A row; a picture without pixels leaves its cell empty. The picture is scaled down here, so rows cost little.
   void add_row(const std::vector<Picture>& pictures);
-  [[nodiscard]] int rows() const { return static_cast<int>(rows_.size()); }
+  [[nodiscard]] int rows() const { return int(rows_.size()); }
 
   /// The sheet; columns that are empty in every row are left out.
   [[nodiscard]] Picture compose() const;

@@ -30,10 +30,8 @@ struct Moments {
     sum_of_squares += value * value;
     ++count;
   }
-  [[nodiscard]] double mean() const { return sum / static_cast<double>(count); }
-  [[nodiscard]] double variance() const {
-    return std::max(0.0, sum_of_squares / static_cast<double>(count) - mean() * mean());
-  }
+  [[nodiscard]] double mean() const { return sum / double(count); }
+  [[nodiscard]] double variance() const { return std::max(0.0, sum_of_squares / double(count) - mean() * mean()); }
 };
 
 double colourfulness_of(const Moments& rg, const Moments& yb) {
@@ -117,7 +115,7 @@ double encoded_mse(std::span<const float> ours, std::span<const float> truth, in
     sum += difference * difference;
     ++count;
   }
-  return sum / static_cast<double>(count);
+  return sum / double(count);
 }
 
 std::optional<double> ssim(std::span<const float> ours, std::span<const float> truth, int width, int height,
@@ -181,7 +179,7 @@ std::vector<float> encoded(std::span<const float> linear) {
 std::vector<std::uint8_t> srgb8_from_linear(std::span<const float> linear) {
   std::vector<std::uint8_t> out(linear.size());
   std::ranges::transform(linear, out.begin(),
-                         [](float v) { return static_cast<std::uint8_t>(std::lround(255.0f * encoded_value(v))); });
+                         [](float v) { return std::uint8_t(std::lround(255.0f * encoded_value(v))); });
   return out;
 }
 

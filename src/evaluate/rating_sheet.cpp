@@ -124,7 +124,7 @@ std::string text_of(const Estimate& value) {
 }  // namespace
 
 RatingSheet make_rating_sheet(std::vector<RatedPicture> pictures, std::uint64_t seed) {
-  SequentialRng rng(seed, 0x72617465ull);
+  SequentialRng rng(seed, named_stream("rate"));
   std::vector<std::vector<RatedPicture>> groups;
   for (RatedPicture& picture : pictures) {
     auto group = std::ranges::find_if(groups, [&](const std::vector<RatedPicture>& each) {

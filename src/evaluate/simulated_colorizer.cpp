@@ -64,9 +64,9 @@ struct Disturbance {
   Ab cast;           ///< added
 
   Disturbance(const SimulationOptions& options, std::uint64_t query) {
-    const CounterRng rng(std::uint64_t(options.seed) ^ 0x73696d756cull, query);
+    const CounterRng rng(std::uint64_t(options.seed) ^ named_stream("simul"), query);
     turn = options.hue * (2.0 * double(rng.uniform(0)) - 1.0) * kDegree;
-    chroma = 1.0f - static_cast<float>(options.desaturate) * rng.uniform(1);
+    chroma = 1.0f - float(options.desaturate) * rng.uniform(1);
     if (double(rng.uniform(2)) < options.modes) {
       chroma *= kSecondModeChroma;
       cast = kBrown;
@@ -169,7 +169,7 @@ class SimulatedColorizer final : public Colorizer {
   [[nodiscard]] float bias(float a, float b, float lightness) const {
     if (options_.bias <= 0) return 0;
     constexpr float kTurn = 2 * std::numbers::pi_v<float>;
-    const float phase = kTurn * CounterRng(std::uint64_t(options_.seed), 0x62696173).uniform(0);
+    const float phase = kTurn * CounterRng(std::uint64_t(options_.seed), named_stream("bias")).uniform(0);
     const float along_lightness = kTurn / kBiasPeriod * lightness / 100;
     return float(options_.bias * kDegree) * std::sin(std::atan2(b, a) + along_lightness + phase);
   }

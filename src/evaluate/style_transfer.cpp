@@ -86,7 +86,7 @@ std::vector<Ab> targets_of(const LabPicture& picture, std::span<const float> gra
   double squares = 0;
   for (const float value : gradient) squares += double(value) * value;
   // Adam does not care about the scale; this one keeps it away from the smallest floats.
-  const auto scale = static_cast<float>(kGradientReach / (std::sqrt(squares / double(n)) + kLeastGradient));
+  const auto scale = float(kGradientReach / (std::sqrt(squares / double(n)) + kLeastGradient));
   std::vector<Ab> targets(n);
   for (std::size_t p = 0; p < n; ++p) {
     targets[p] = {picture.ab[p] - scale * gradient[p], picture.ab[n + p] - scale * gradient[n + p]};

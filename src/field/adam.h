@@ -22,8 +22,8 @@ struct AdamStep {
   AdamStep() = default;
   CNERF_HD AdamStep(const AdamSettings& settings, float rate, long step)
       : learning_rate(rate),
-        step_size(static_cast<float>(rate / (1.0 - std::pow(double(settings.beta1), double(step))))),
-        second_correction(static_cast<float>(1.0 / (1.0 - std::pow(double(settings.beta2), double(step))))) {}
+        step_size(float(rate / (1.0 - std::pow(double(settings.beta1), double(step))))),
+        second_correction(float(1.0 / (1.0 - std::pow(double(settings.beta2), double(step))))) {}
 
   /// Moves one parameter against its gradient `d`.
   CNERF_HD void apply(const AdamSettings& settings, float d, float& first_moment, float& second_moment,

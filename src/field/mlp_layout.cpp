@@ -11,7 +11,7 @@ std::vector<float> initial_weights(const MlpLayout& layout, unsigned long long s
   std::vector<float> weights;
   weights.reserve(layout.weight_count());
   for (int l = 0; l < layout.layers(); ++l) {
-    const float bound = std::sqrt(6.0f / static_cast<float>(layout.widths[l]));
+    const float bound = std::sqrt(6.0f / float(layout.widths[l]));
     for (int i = 0; i < layout.widths[l] * layout.widths[l + 1]; ++i) weights.push_back(rng.uniform(-bound, bound));
   }
   return weights;

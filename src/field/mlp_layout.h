@@ -10,7 +10,7 @@ namespace cnerf {
 struct MlpLayout {
   std::vector<int> widths;  ///< inputs, hidden…, outputs
 
-  [[nodiscard]] int layers() const { return static_cast<int>(widths.size()) - 1; }
+  [[nodiscard]] int layers() const { return int(widths.size()) - 1; }
   [[nodiscard]] int inputs() const { return widths.front(); }
   [[nodiscard]] int outputs() const { return widths.back(); }
   /// Offset, in floats, of the [out, in] weights of a layer; `weight_offset(layers())` is the number of weights.

@@ -24,8 +24,8 @@ namespace cnerf {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::size_t kPairsACall = 40;  ///< matched by one call of COLMAP, at least
-constexpr int kExhaustiveFrames = 40;    ///< of a clip: where neighbours are known, all pairs are soon a waste
+constexpr std::size_t kPairsACall = 40;   ///< matched by one call of COLMAP, at least
+constexpr int kExhaustiveFrames = 40;     ///< of a clip: where neighbours are known, all pairs are soon a waste
 constexpr int kViewsForLens = 6;          ///< of a camera, from which more than one number of its lens can be told
 constexpr int kViewsForCentre = 15;       ///< the same, from which its principal point can be told from its turns
 constexpr double kFarthestCentre = 0.05;  ///< of the longer side, by which a principal point may be off the middle
@@ -329,8 +329,9 @@ std::string with_full_lenses(const std::string& cameras) {
     std::string number, model, width, height, focal, cx, cy, k;
     words >> number >> model >> width >> height >> focal >> cx >> cy >> k;
     const bool is_simple = model == "SIMPLE_RADIAL";
-    out += is_simple ? fmt::format("{} OPENCV {} {} {} {} {} {} {} 0 0 0", number, width, height, focal, focal, cx, cy, k)
-                     : line;
+    out += is_simple
+               ? fmt::format("{} OPENCV {} {} {} {} {} {} {} 0 0 0", number, width, height, focal, focal, cx, cy, k)
+               : line;
     out += '\n';
   }
   return out;
@@ -369,8 +370,8 @@ fs::path free_lenses(Colmap& colmap, const fs::path& model, const std::vector<Pr
   }
   (void)colmap.run(words, "lenses", images.size(), progress);
   const auto before = lenses_of(start, images), after = lenses_of(adjusted, images);
-  const bool plausible =
-      std::ranges::all_of(after, [&](const auto& camera) { return is_plausible(camera.second, before.at(camera.first)); });
+  const bool plausible = std::ranges::all_of(
+      after, [&](const auto& camera) { return is_plausible(camera.second, before.at(camera.first)); });
   return plausible ? adjusted : model;
 }
 

@@ -16,9 +16,9 @@ namespace {
 constexpr int kRounds = 30;
 constexpr int kHazeRounds = 300;
 constexpr double kExactLight = 0.004;  ///< difference of linear light below which all sightings count fully
-constexpr double kHeld = 1e-9;     ///< of a view's weight, pulling its logarithm to 0
-constexpr double kExact = 0.01;    ///< difference of logarithms below which all sightings count fully
-constexpr double kSettled = 1e-6;  ///< largest change of a logarithm in a round
+constexpr double kHeld = 1e-9;         ///< of a view's weight, pulling its logarithm to 0
+constexpr double kExact = 0.01;        ///< difference of logarithms below which all sightings count fully
+constexpr double kSettled = 1e-6;      ///< largest change of a logarithm in a round
 constexpr float kDarkest = 0.004f, kLightest = 0.9f;  ///< luminance between noise and clipping
 
 double median(std::vector<double>& values) {
@@ -173,11 +173,11 @@ class HazeFit {
   }
 
   const std::vector<Sighting>& sightings_;
-  std::vector<double> weights_;        ///< of the sightings
-  std::vector<std::size_t> place_;     ///< of the sightings, counted without gaps
-  std::vector<double> of_place_;       ///< light of the places
-  std::vector<ViewLight> light_;       ///< of the views
-  std::vector<int> sighted_;           ///< sightings of the views
+  std::vector<double> weights_;     ///< of the sightings
+  std::vector<std::size_t> place_;  ///< of the sightings, counted without gaps
+  std::vector<double> of_place_;    ///< light of the places
+  std::vector<ViewLight> light_;    ///< of the views
+  std::vector<int> sighted_;        ///< sightings of the views
 };
 
 }  // namespace
@@ -250,7 +250,8 @@ std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, con
   for (std::size_t i = 0; i < images.size(); ++i) images[i].exposure = exposures[i];
   if (with_haze) {
     const std::vector<ViewLight> light = solve_exposures_and_haze(int(images.size()), sightings);
-    for (std::size_t i = 0; i < images.size(); ++i) images[i].exposure = light[i].exposure, images[i].haze = light[i].haze;
+    for (std::size_t i = 0; i < images.size(); ++i)
+      images[i].exposure = light[i].exposure, images[i].haze = light[i].haze;
   }
   return spread;
 }

@@ -19,9 +19,9 @@ struct Sighting {
 };
 
 /// Exposures e such that light of view v and place p is e_v times the light of p, in the sense of least absolute
-/// differences of logarithms (by reweighted least squares, the places eliminated), so that wrong and shiny places hardly
-/// pull. Their median is 1; views without sightings get 1. Groups of views that share no place with each other keep an
-/// unknown factor between them, taken as 1.
+/// differences of logarithms (by reweighted least squares, the places eliminated), so that wrong and shiny places
+/// hardly pull. Their median is 1; views without sightings get 1. Groups of views that share no place with each other
+/// keep an unknown factor between them, taken as 1.
 [[nodiscard]] std::vector<double> solve_exposures(int views, const std::vector<Sighting>& sightings);
 
 /// How a view was taken: light of view v and place p is exposure_v times the light of p, plus haze_v.

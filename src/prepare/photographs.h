@@ -41,7 +41,7 @@ struct PreparedImage {
   int uncropped = 0;                  ///< longer side of the frame that borders were cut from, pixels; 0: none were
   double exposure = 1, haze = 0;      ///< see exposure.h
   int frame = -1;                     ///< of a clip: number of the frame in it
-  double sharpness = 0;               ///< see sharpness.h; comparable within one capture only
+  double sharpness = 0;               ///< see grey_image.h; comparable within one capture only
 };
 
 struct PhotographSet {

@@ -152,7 +152,8 @@ void refuse_turns(const std::vector<PreparedImage>& images, const fs::path& capt
   const ParallaxSurvey survey = survey_parallax(images, capture);
   if (!survey.only_turned()) return;
   throw PosesError(fmt::format(
-      "no parallax: in {} of {} pairs of photographs the camera only turns or zooms on the spot (or the subject is flat), "
+      "no parallax: in {} of {} pairs of photographs the camera only turns or zooms on the spot (or the subject is "
+      "flat), "
       "which tells no depth. Take the pictures from places a step apart; --allow-no-parallax goes on all the same.",
       survey.judged - survey.with_parallax, survey.judged));
 }
@@ -284,7 +285,8 @@ Json record_of(const fs::path& source, const PrepareOptions& options, const Mate
                   {"measure", options.frame.measure},
                   {"capture_from_poses", json_of(frame.capture_from_poses)},
                   {"poses_from_capture", json_of(frame.capture_from_poses.inverse())}};
-  if (subject) out["box"] = {{"by", options.frame.box.empty() ? "points" : "given"}, {"corners", json_of(subject->box)}};
+  if (subject)
+    out["box"] = {{"by", options.frame.box.empty() ? "points" : "given"}, {"corners", json_of(subject->box)}};
   out["thresholds"] = {
       {"good_share", kGoodShare}, {"least_share", kLeastShare}, {"blurred", kBlurred}, {"few_features", kFewFeatures}};
   out["images"] = json_of(material.set.images, poses.views);

@@ -29,7 +29,8 @@ struct PrepareOptions {
 
   template <typename Visitor>
   void visit(Visitor&& v) {
-    v("masks", masks, "folder of masks named as the photographs, black = ignore; for a clip also one picture for all frames");
+    v("masks", masks,
+      "folder of masks named as the photographs, black = ignore; for a clip also one picture for all frames");
     v("colmap_model", colmap_model, "folder of a ready COLMAP model, instead of making one");
     v("no_exposure", no_exposure, "take all views as equally exposed");
     v("haze", haze, "besides exposures, estimate light that lies over each view: fog of old film, stray light");

@@ -199,7 +199,7 @@ std::optional<GroundPlane> find_ground(const std::vector<Vec3d>& points, Vec3d r
   std::vector<double> distances;
   for (const Vec3d& point : points) distances.push_back(length(point - middle));
   const double thickness = kGroundThickness * median(distances);
-  const CounterRng rng(0x67726f756e64ull, 0);
+  const CounterRng rng(named_stream("ground"), 0);
   GroundPlane best;
   for (std::uint64_t trial = 0; trial < 2000; ++trial) {
     const auto pick = [&](std::uint64_t k) { return points[rng.below(trial * 3 + k, std::uint32_t(points.size()))]; };

@@ -59,8 +59,8 @@ cv::Mat1b grey_of(const cv::Mat& frame) {
 /// A picture whose brightness and contrast are alike everywhere, so that flicker is not taken for motion.
 /// @param textured  becomes 255 where there is more than grain to follow
 cv::Mat1b evened_out(const cv::Mat1b& picture, cv::Mat1b& textured) {
-  constexpr int kAround = 31;           // pixels
-  constexpr double kTexture = 8;        // codes, standard deviation
+  constexpr int kAround = 31;     // pixels
+  constexpr double kTexture = 8;  // codes, standard deviation
   cv::Mat1f codes, mean, square;
   picture.convertTo(codes, CV_32F);
   cv::GaussianBlur(codes, codes, {}, 0.8);  // grain

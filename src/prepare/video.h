@@ -28,7 +28,8 @@ struct VideoOptions {
     v("video_range", video_range, Choice{"auto", "full", "limited"},
       "codes of black and white: as the clip says, 0 to 255, or 16 to 235 that the decoder did not expand");
     v("keep_borders", keep_borders, "leave letterbox bars in the pictures");
-    v("allow_no_parallax", allow_no_parallax, "go on with a shot, or photographs, between which the camera seems only to turn");
+    v("allow_no_parallax", allow_no_parallax,
+      "go on with a shot, or photographs, between which the camera seems only to turn");
   }
 };
 

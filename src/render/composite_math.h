@@ -30,8 +30,7 @@ struct Compositor {
 
 /// d(value) / d(sigma_i) of a composited channel: dt (T_{i+1} v_i - suffix_i).
 /// @param transmittance_after  T_{i+1}
-/// @param suffix               what samples behind i and the background add to the pixel: sum_{j>i} w_j v_j + T_end
-/// v_bg
+/// @param suffix  what samples behind i and the background add to the pixel: sum_{j>i} w_j v_j + T_end v_bg
 template <typename Real>
 CNERF_HD Real density_derivative(Real dt, Real transmittance_after, Real sample_value, Real suffix) {
   return dt * (transmittance_after * sample_value - suffix);

@@ -1,8 +1,8 @@
 #pragma once
 /// How far apart the samples lie that make up a ray's colour, and its derivative: the distortion loss of Mip-NeRF 360
-/// (Barron et al. 2022, Eq. 15). A ray that meets one surface has none; fog along it, or a floater in front of it, does.
-/// Places on a ray are logarithms of the distance, so that the scale of the scene does not matter and far things are
-/// not told from things a little farther.
+/// (Barron et al. 2022, Eq. 15). A ray that meets one surface has none; fog along it, or a floater in front of it,
+/// does. Places on a ray are logarithms of the distance, so that the scale of the scene does not matter and far things
+/// are not told from things a little farther.
 
 #include <cmath>
 

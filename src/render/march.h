@@ -29,9 +29,9 @@ struct MarchSettings {
 /// @param cone_angle     used by scenes of several cascades; a single one has constant steps
 [[nodiscard]] inline MarchSettings march_settings(int cascades, int steps_per_box, double cone_angle) {
   MarchSettings settings;
-  settings.dt_min = std::ldexp(1.0f, 1 - cascades) / static_cast<float>(steps_per_box);
+  settings.dt_min = std::ldexp(1.0f, 1 - cascades) / float(steps_per_box);
   settings.dt_max = cascades > 1 ? 1.0f / 64.0f : settings.dt_min;
-  settings.cone_angle = cascades > 1 ? static_cast<float>(cone_angle) : 0.0f;
+  settings.cone_angle = cascades > 1 ? float(cone_angle) : 0.0f;
   return settings;
 }
 

@@ -21,21 +21,20 @@ class MarchLattice {
     const float growing = settings.dt_min / settings.cone_angle;   // from here on steps grow
     const float constant = settings.dt_max / settings.cone_angle;  // and from here on they do no more
     log2_growth_ = std::log2(1.0f + settings.cone_angle);
-    growing_at_ = first_ >= growing ? 0 : static_cast<int>(std::ceil((growing - first_) / settings.dt_min));
-    growing_t_ = first_ + static_cast<float>(growing_at_) * settings.dt_min;
+    growing_at_ = first_ >= growing ? 0 : int(std::ceil((growing - first_) / settings.dt_min));
+    growing_t_ = first_ + float(growing_at_) * settings.dt_min;
     constant_at_ = growing_at_;
-    if (growing_t_ < constant)
-      constant_at_ += static_cast<int>(std::ceil(std::log2(constant / growing_t_) / log2_growth_));
-    constant_t_ = growing_t_ * std::exp2(static_cast<float>(constant_at_ - growing_at_) * log2_growth_);
+    if (growing_t_ < constant) constant_at_ += int(std::ceil(std::log2(constant / growing_t_) / log2_growth_));
+    constant_t_ = growing_t_ * std::exp2(float(constant_at_ - growing_at_) * log2_growth_);
   }
 
   /// Length of the step that starts at t.
   [[nodiscard]] CNERF_HD float step(float t) const { return march_step(settings_, t); }
   /// The index-th point.
   [[nodiscard]] CNERF_HD float t_at(int index) const {
-    if (settings_.cone_angle <= 0 || index < growing_at_) return first_ + static_cast<float>(index) * settings_.dt_min;
-    if (index < constant_at_) return growing_t_ * std::exp2(static_cast<float>(index - growing_at_) * log2_growth_);
-    return constant_t_ + static_cast<float>(index - constant_at_) * settings_.dt_max;
+    if (settings_.cone_angle <= 0 || index < growing_at_) return first_ + float(index) * settings_.dt_min;
+    if (index < constant_at_) return growing_t_ * std::exp2(float(index - growing_at_) * log2_growth_);
+    return constant_t_ + float(index - constant_at_) * settings_.dt_max;
   }
 
  private:

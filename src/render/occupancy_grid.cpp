@@ -61,7 +61,7 @@ void OccupancyGrid::mark_occupied(std::span<const float> x, std::span<const floa
 
 double OccupancyGrid::occupied_share() const {
   std::size_t count = 0;
-  for (const std::uint64_t word : bits_) count += static_cast<std::size_t>(std::popcount(word));
+  for (const std::uint64_t word : bits_) count += std::size_t(std::popcount(word));
   return double(count) / double(density_.size());
 }
 
@@ -120,7 +120,7 @@ void OccupancyGrid::refresh_bits() {
   std::fill(blocks_.begin(), blocks_.end(), std::uint8_t(0));
   parallel_tasks(std::size_t(layout_.cascades), [&](std::size_t k) {
     const float* density = density_.data() + k * cells;
-    // Early in training nothing reaches the threshold; then the densest half is what is worth sampling.
+    // Early in training nothing reaches the threshold; then cells denser than the mean are what is worth sampling.
     double total = 0;
     std::size_t included = 1;
     for (std::size_t i = 0; i < cells; ++i) {
@@ -128,8 +128,7 @@ void OccupancyGrid::refresh_bits() {
       total += std::min(density[i], 1e4f);
       ++included;
     }
-    const float threshold =
-        std::min(options_.optical_thickness / cell_side(int(k)), static_cast<float>(total / double(included)));
+    const float threshold = std::min(options_.optical_thickness / cell_side(int(k)), float(total / double(included)));
     for (std::size_t word = 0; word < cells / 64; ++word) {
       std::uint64_t bits = 0;
       for (std::size_t bit = 0; bit < 64; ++bit) {

@@ -13,9 +13,11 @@ namespace cnerf {
 inline constexpr float kExcludedCell = -1.0f;  ///< density of a cell that is empty for good
 inline constexpr float kNeverSeenCell = 1e9f;  ///< before its first look, a cell counts as occupied
 
+inline constexpr std::uint64_t kOccupancyStream = 204;
+
 /// Where in a cell an update looks: at 3 cell .. 3 cell + 2.
 [[nodiscard]] CNERF_HD inline CounterRng occupancy_rng(std::uint64_t jitter_seed) {
-  return {jitter_seed, 0x0cc};
+  return {jitter_seed, kOccupancyStream};
 }
 
 struct OccupancyLayout {
@@ -28,10 +30,8 @@ struct OccupancyLayout {
       : resolution(cells_a_side), cascades(n_cascades), innermost(std::ldexp(1.0f, 1 - n_cascades)) {}
 
   /// Side of a cascade's cube, unit space.
-  [[nodiscard]] CNERF_HD float side(int cascade) const {
-    return static_cast<float>(1u << unsigned(cascade)) * innermost;
-  }
-  [[nodiscard]] CNERF_HD float cell_side(int cascade) const { return side(cascade) / static_cast<float>(resolution); }
+  [[nodiscard]] CNERF_HD float side(int cascade) const { return float(1u << unsigned(cascade)) * innermost; }
+  [[nodiscard]] CNERF_HD float cell_side(int cascade) const { return side(cascade) / float(resolution); }
 
   /// The innermost cascade whose box holds `p`, of [0, 1]^3: the largest of what its coordinates ask for.
   [[nodiscard]] CNERF_HD int cascade_of(Vec3f p) const {
@@ -74,7 +74,7 @@ struct OccupancyLayout {
   }
   [[nodiscard]] CNERF_HD std::size_t cell_along(int cascade, float coordinate, int r) const {
     const float scale = 1.0f / side(cascade);
-    const int cell = static_cast<int>(((coordinate - 0.5f) * scale + 0.5f) * static_cast<float>(r));
+    const int cell = int(((coordinate - 0.5f) * scale + 0.5f) * float(r));
     return std::size_t(cell < 0 ? 0 : cell >= r ? r - 1 : cell);
   }
   [[nodiscard]] CNERF_HD static std::size_t index_at(int cascade, std::size_t x, std::size_t y, std::size_t z, int r) {

@@ -30,7 +30,7 @@ struct ImageSize {
 
 /// Jitter of a ray's samples and the background behind it come from this generator, at 2 ray and 2 ray + 1.
 [[nodiscard]] CNERF_HD inline CounterRng ray_rng(std::uint64_t seed, std::uint64_t step) {
-  return {seed ^ 0x6a697474ull, step};
+  return {seed ^ named_stream("jitt"), step};
 }
 
 /// @param size_of  the ImageSize of view v
@@ -38,7 +38,7 @@ struct ImageSize {
 template <typename SizeOf>
 CNERF_HD PickedPixel pick_pixel(std::uint32_t n_views, SizeOf&& size_of, const PixelSampling& sampling,
                                 std::uint64_t seed, std::uint64_t step, std::uint64_t ray, int attempt) {
-  const CounterRng rng(seed ^ 0x7261797300ull, step);
+  const CounterRng rng(seed ^ named_stream("rays\0"), step);
   if (sampling.patch_size == 0 || attempt > 0) {
     const std::uint64_t at = (ray * 16 + std::uint64_t(attempt)) * 4;
     const std::uint32_t v = rng.below(at, n_views);
@@ -63,7 +63,7 @@ CNERF_HD PickedPixel pick_pixel(std::uint32_t n_views, SizeOf&& size_of, const P
 inline PickedPixel pick_pixel(const std::vector<TrainingView>& views, const PixelSampling& sampling, std::uint64_t seed,
                               std::uint64_t step, std::uint64_t ray, int attempt) {
   const auto size_of = [&](std::uint32_t v) { return ImageSize{views[v].image->width, views[v].image->height}; };
-  return pick_pixel(static_cast<std::uint32_t>(views.size()), size_of, sampling, seed, step, ray, attempt);
+  return pick_pixel(std::uint32_t(views.size()), size_of, sampling, seed, step, ray, attempt);
 }
 
 }  // namespace cnerf

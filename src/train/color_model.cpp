@@ -40,9 +40,9 @@ std::vector<float> pixel_luminance(const PixelSamples& pixels) {
 ColorModel ColorModel::create(const Stage2Options& options, const EngineMakers& makers) {
   ColorModel model;
   model.options = options;
-  const auto seed = static_cast<std::uint64_t>(options.seed);
-  model.chroma = makers.chroma(options.grid, seed ^ 0x636872ull);
-  model.chromaticity = make_chromaticity_engine(options.grid, seed ^ 0x78797aull);
+  const auto seed = std::uint64_t(options.seed);
+  model.chroma = makers.chroma(options.grid, seed ^ named_stream("chr"));
+  model.chromaticity = make_chromaticity_engine(options.grid, seed ^ named_stream("xyz"));
   return model;
 }
 
@@ -92,7 +92,7 @@ std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {
   if (is_photometric()) {
     chromaticity->composite(pixels, colors);
   } else {
-    chroma->decode(pixels, static_cast<float>(options.decode_temperature), colors);
+    chroma->decode(pixels, float(options.decode_temperature), colors);
   }
   const std::vector<float> luminance = pixel_luminance(pixels);
   parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {

@@ -117,7 +117,7 @@ KnownColors spread(const KnownColors& strokes, const CachedView& view, std::span
     cost[p] = 0;
     open.emplace(0.0f, p);
   }
-  const float one_pixel = 1.0f / (reach.share_of_short_side * static_cast<float>(view.short_side()));
+  const float one_pixel = 1.0f / (reach.share_of_short_side * float(view.short_side()));
   while (!open.empty()) {
     const auto [so_far, p] = open.top();
     open.pop();

@@ -18,9 +18,9 @@ std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stag
   engine.march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
   engine.samples_per_step = options.samples_per_step;
   engine.patch_size = options.sampling == "patches" ? options.patch_size : 0;
-  engine.distortion_weight = static_cast<float>(options.distortion_weight);
+  engine.distortion_weight = float(options.distortion_weight);
   engine.max_luminance = max_luminance;
-  engine.seed = static_cast<std::uint64_t>(options.seed);
+  engine.seed = std::uint64_t(options.seed);
   return makers.luminance(engine);
 }
 

@@ -12,10 +12,10 @@
 namespace cnerf {
 
 struct MotionMaskOptions {
-  int motion_steps = 800;          ///< of the quick fit
-  int motion_side = 320;           ///< pixels of the longer side at which it is fitted and compared
-  double motion_difference = 0.12; ///< of sRGB-encoded luminance, blurred: what surely moved
-  double motion_largest = 0.4;     ///< of a picture: a view that disagrees more is badly fitted, not full of motion
+  int motion_steps = 800;           ///< of the quick fit
+  int motion_side = 320;            ///< pixels of the longer side at which it is fitted and compared
+  double motion_difference = 0.12;  ///< of sRGB-encoded luminance, blurred: what surely moved
+  double motion_largest = 0.4;      ///< of a picture: a view that disagrees more is badly fitted, not full of motion
 
   template <typename Visitor>
   void visit(Visitor&& v) {

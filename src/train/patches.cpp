@@ -40,7 +40,7 @@ Ab bilinear(const std::vector<float>& ab, int k, float x, float y) {
 
 PatchPlace random_patch(const std::vector<CachedView>& views, std::size_t view, double scale_min, double scale_max,
                         std::uint64_t seed, std::uint64_t index) {
-  const CounterRng rng(seed ^ 0x7061746368ull, index);
+  const CounterRng rng(seed ^ named_stream("patch"), index);
   const CachedView& cached = views[view];
   const double scale = scale_min + (scale_max - scale_min) * double(rng.uniform(0));
   PatchPlace place;
@@ -55,7 +55,7 @@ PatchPlace random_patch(const std::vector<CachedView>& views, std::size_t view, 
 PatchPlace near_patch(const std::vector<CachedView>& views, const PatchPlace& place, std::uint64_t seed,
                       std::uint64_t index) {
   constexpr double kMost = 0.05;
-  const CounterRng rng(seed ^ 0x6e656172ull, index);
+  const CounterRng rng(seed ^ named_stream("near"), index);
   const CachedView& cached = views[place.view];
   const auto off = [&](std::uint64_t draw) {
     return int(std::lround(kMost * place.side * (2 * double(rng.uniform(draw)) - 1)));
@@ -126,7 +126,7 @@ std::vector<std::size_t> along_the_path(const std::vector<CachedView>& views) {
 
 PatchPixels pick_pixels(const CachedView& view, const PatchPlace& place, int k, const std::vector<float>& ab, int count,
                         std::uint64_t seed, std::uint64_t index) {
-  const CounterRng rng(seed ^ 0x706978656cull, index);
+  const CounterRng rng(seed ^ named_stream("pixel"), index);
   PatchPixels picked;
   const float scale = float(k) / float(place.side);
   for (int i = 0; i < count; ++i) {

@@ -141,8 +141,7 @@ class TrainedScene final : public Scene {
     }
     TraceMemory::Trace trace;
     luminance_.engine->trace(rays, luminance_.march(options.steps_per_box),
-                             {static_cast<float>(options.min_transmittance), kShadedShare}, trace.samples,
-                             trace.offsets);
+                             {float(options.min_transmittance), kShadedShare}, trace.samples, trace.offsets);
     if (memory_) memory_->keep(key, trace);
     return trace;
   }
@@ -183,7 +182,7 @@ class TrainedScene final : public Scene {
         }
         if (image.opacity[first + r] >= 0.5f) {
           const float t = weighted_t / image.opacity[first + r];
-          image.depth[first + r] = t * dot(rays[r].direction, axis) / static_cast<float>(frame().unit_per_world);
+          image.depth[first + r] = t * dot(rays[r].direction, axis) / float(frame().unit_per_world);
         }
       }
     });

@@ -42,7 +42,7 @@ void save_snapshot(const std::filesystem::path& file, const std::string& kind, n
   std::vector<std::byte> content;
   append_text(content, kMagic);
   append_value(content, kSnapshotVersion);
-  append_value(content, static_cast<std::uint64_t>(text.size()));
+  append_value(content, std::uint64_t(text.size()));
   append_text(content, text);
   for (const StatePiece& piece : pieces) content.insert(content.end(), piece.bytes.begin(), piece.bytes.end());
   append_text(content, sha256(content));

@@ -15,8 +15,7 @@ namespace {
 /// Constant over the first half of the steps, then an exponential decay.
 float learning_rate(const Stage1Options& options, double fraction) {
   const double decay = std::clamp(2.0 * fraction - 1.0, 0.0, 1.0);
-  return static_cast<float>(options.learning_rate *
-                            std::pow(options.final_learning_rate / options.learning_rate, decay));
+  return float(options.learning_rate * std::pow(options.final_learning_rate / options.learning_rate, decay));
 }
 
 /// Options that may differ between a run and its continuation: they say how long, not what.

@@ -34,7 +34,7 @@ constexpr std::size_t kPreviews = 3;
 constexpr int kPreviewSide = 120;  // pixels of the shorter side
 
 float decayed(double from, double to, double fraction) {
-  return static_cast<float>(from * std::pow(to / from, std::clamp(2.0 * fraction - 1.0, 0.0, 1.0)));
+  return float(from * std::pow(to / from, std::clamp(2.0 * fraction - 1.0, 0.0, 1.0)));
 }
 
 std::vector<std::string> training_view_names(const Capture& capture) {
@@ -320,7 +320,7 @@ class Colorization {
     }
     const float total = std::accumulate(prior.begin(), prior.end(), 0.0f);
     for (float& p : prior) p /= total;
-    class_weights_ = rebalancing_weights(prior, static_cast<float>(options_.rebalancing));
+    class_weights_ = rebalancing_weights(prior, float(options_.rebalancing));
   }
 
   /// The colorizer answers about patches `first`, `first` + 1, … while others are trained on. One query is under way at
@@ -329,7 +329,7 @@ class Colorization {
     return std::async(std::launch::async, [this, first] {
       std::vector<PatchPlace> places;
       for (int i = 0; i < options_.colorizer_batch; ++i) {
-        const auto index = static_cast<std::uint64_t>(first + i);
+        const auto index = std::uint64_t(first + i);
         const CounterRng rng(std::uint64_t(options_.seed), index);
         places.push_back(random_patch(views_, rng.below(0, std::uint32_t(views_.size())), options_.scale_min,
                                       options_.scale_max, std::uint64_t(options_.seed), index));
@@ -377,7 +377,7 @@ class Colorization {
   /// @param is_accepted  false: only what is known is trained on
   void train_on(const AnsweredPatch& patch, bool is_accepted) {
     const CachedView& view = views_[patch.place.view];
-    const auto step = static_cast<std::uint64_t>(steps());
+    const auto step = std::uint64_t(steps());
     const PatchPixels picked = pick_pixels(view, patch.place, options_.patch_size, patch.ab, options_.rays_per_patch,
                                            std::uint64_t(options_.seed), step);
     std::vector<ViewPixel> wanted;
@@ -395,7 +395,7 @@ class Colorization {
       want({std::uint32_t(patch.place.view), picked.pixels[i]}, known != nullptr ? *known : picked.colors[i]);
     }
     if (const auto places = known_.places(); !places.empty()) {
-      const CounterRng rng(std::uint64_t(options_.seed) ^ 0x6b6e6f776eull, step);
+      const CounterRng rng(std::uint64_t(options_.seed) ^ named_stream("known"), step);
       const auto count = std::uint64_t(options_.known_share * options_.rays_per_patch);
       for (std::uint64_t i = 0; i < count; ++i) {
         const ViewPixel place = places[rng.below(i, std::uint32_t(places.size()))];
@@ -416,7 +416,7 @@ class Colorization {
 
   /// Random visible pixels of all views.
   [[nodiscard]] PixelSamples random_pixels(int count, std::uint64_t stream) const {
-    const CounterRng rng(std::uint64_t(options_.seed) ^ 0x64697374ull, stream);
+    const CounterRng rng(std::uint64_t(options_.seed) ^ named_stream("dist"), stream);
     std::vector<ViewPixel> wanted;
     for (int i = 0; i < count; ++i) {
       const std::uint32_t v = rng.below(2 * std::uint64_t(i), std::uint32_t(views_.size()));

@@ -56,7 +56,7 @@ CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
     for (std::size_t p = begin; p < end; ++p) rays[p] = ray_of(view, p);
   });
   std::vector<WeightedSample> samples;
-  engine.trace(rays, march, {kCacheTransmittance, static_cast<float>(share)}, samples, view.offsets);
+  engine.trace(rays, march, {kCacheTransmittance, float(share)}, samples, view.offsets);
   view.luminance.resize(rays.size());
   view.opacity.resize(rays.size());
   parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {

@@ -19,7 +19,7 @@ std::string printed(ProgressStyle style, Use use) {
   std::FILE* file = std::tmpfile();
   Reporter reporter(style, file);
   use(reporter);
-  std::string text(static_cast<std::size_t>(std::ftell(file)), '\0');
+  std::string text(std::size_t(std::ftell(file)), '\0');
   std::rewind(file);
   text.resize(std::fread(text.data(), 1, text.size(), file));
   std::fclose(file);

@@ -36,8 +36,7 @@ class AnalyticField : public ColorField {
   [[nodiscard]] bool may_be_occupied(Vec3f position) const override {
     constexpr float kMargin = 1.0f / 128;
     for (int corner = 0; corner < 27; ++corner) {
-      const Vec3f offset{static_cast<float>(corner / 9 - 1), static_cast<float>(corner / 3 % 3 - 1),
-                         static_cast<float>(corner % 3 - 1)};
+      const Vec3f offset{float(corner / 9 - 1), float(corner / 3 % 3 - 1), float(corner % 3 - 1)};
       if (density_(position + offset * kMargin) != 0) return true;  // also for NaN
     }
     return false;

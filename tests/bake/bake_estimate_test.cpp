@@ -33,7 +33,7 @@ TEST(BakeEstimate, VoxelsAreThoseOfTheBall) {
     options.resolution = resolution;
     const double h = plan_bake(ball(), options).voxel_size;
     const double expected = 4.0 / 3 * 3.14159265 / std::pow(h, 3);  // radius 1 in world units
-    EXPECT_NEAR(static_cast<double>(estimate_at(resolution).voxels), expected, 0.05 * expected) << resolution;
+    EXPECT_NEAR(double(estimate_at(resolution).voxels), expected, 0.05 * expected) << resolution;
   }
 }
 

@@ -39,7 +39,7 @@ std::vector<int> part(BakeJournal& journal, std::size_t number, const Make& make
 void fill(const fs::path& file, std::size_t parts) {
   BakeJournal journal(file, "one bake");
   for (std::size_t p = 0; p < parts; ++p) {
-    (void)part(journal, p, [p] { return numbers(10 * static_cast<int>(p)); });
+    (void)part(journal, p, [p] { return numbers(10 * int(p)); });
   }
 }
 
@@ -66,10 +66,10 @@ TEST(BakeJournal, PartsMadeAtTheSameTimeAreUsedInOrderAndLieAsIfMadeOneByOne) {
         1, 10, 4,
         [&](std::size_t i) {
           ++made;
-          return numbers(10 * static_cast<int>(i + 1));
+          return numbers(10 * int(i + 1));
         },
         [&](std::size_t i, const std::vector<int>& part) {
-          EXPECT_EQ(part, numbers(10 * static_cast<int>(i + 1)));
+          EXPECT_EQ(part, numbers(10 * int(i + 1)));
           used.push_back(i);
         });
     EXPECT_EQ(made, 8) << "parts 1 and 2 were there";
@@ -85,7 +85,7 @@ TEST(BakeJournal, APartThatFailsKeepsThoseBeforeIt) {
     BakeJournal journal(folder / "j", "one bake");
     const auto make = [](std::size_t i) {
       if (i == 5) throw InputError("bad part");
-      return numbers(static_cast<int>(i));
+      return numbers(int(i));
     };
     EXPECT_THROW(journal.parts<int>(0, 8, 3, make, [](std::size_t, const std::vector<int>&) {}), InputError);
   }
@@ -101,7 +101,7 @@ TEST(BakeJournal, SeveralThreadsReadAtTheSameTime) {
   set_thread_count(4);
   parallel_tasks(8 * kParts, [&](std::size_t task) {
     const std::size_t part = (7 * task) % kParts;
-    wrong += journal.read<int>(part) == numbers(10 * static_cast<int>(part)) ? 0 : 1;
+    wrong += journal.read<int>(part) == numbers(10 * int(part)) ? 0 : 1;
   });
   set_thread_count(0);
   EXPECT_EQ(wrong, 0);
@@ -125,11 +125,10 @@ TEST(BakeJournal, WhateverIsCutOffIsDroppedAndTheRestStays) {
     BakeJournal journal(folder / "cut", "one bake");
     ASSERT_GE(journal.found(), most) << bytes;
     most = journal.found();
-    for (std::size_t p = 0; p < journal.found(); ++p)
-      ASSERT_EQ(journal.read<int>(p), numbers(10 * static_cast<int>(p)));
+    for (std::size_t p = 0; p < journal.found(); ++p) ASSERT_EQ(journal.read<int>(p), numbers(10 * int(p)));
     if (bytes % 16 != 0) continue;
     for (std::size_t p = 0; p < 4; ++p) {
-      (void)part(journal, p, [p] { return numbers(10 * static_cast<int>(p)); });
+      (void)part(journal, p, [p] { return numbers(10 * int(p)); });
     }
     ASSERT_EQ(read_binary_file(folder / "cut"), whole) << bytes;
   }

@@ -94,7 +94,7 @@ TEST(BakeLevels, NoPlaceIsBakedTwice) {
 double squared_error(const VolumeImage& a, const VolumeImage& b) {
   double sum = 0;
   for (std::size_t i = 0; i < a.rgb.size(); ++i) sum += std::pow(double(a.rgb[i]) - b.rgb[i], 2);
-  return sum / static_cast<double>(a.rgb.size());
+  return sum / double(a.rgb.size());
 }
 
 TEST(BakeLevels, NestedGridsShowWhatOneFineGridShows) {

@@ -37,7 +37,7 @@ TEST(Resample, KeepsDensityColourAndPlaceAtAnyRatio) {
   for (const int resolution : {4, 5, 7, 11}) {
     const BakedVolume small = resample_volume(volume, resolution);
     EXPECT_EQ(small.resolution, (Vec3i{resolution, resolution, resolution}));
-    EXPECT_EQ(small.voxels.size(), static_cast<std::size_t>(std::pow(resolution, 3)));
+    EXPECT_EQ(small.voxels.size(), std::size_t(std::pow(resolution, 3)));
     EXPECT_NEAR(small.voxel_size * resolution, 1.2, 1e-12);
     EXPECT_EQ(small.origin, volume.origin);
     for (const BakedVoxel& voxel : small.voxels) {

@@ -56,7 +56,7 @@ TEST(ViewAverage, IsWhatABakePutsIntoItsVoxels) {
   std::vector<Vec3f> centres;
   std::vector<float> baked;
   for (const BakedVoxel& voxel : volume.voxels) {
-    if (voxel.sigma < 0.999f * 400 * static_cast<float>(kFrame.unit_per_world)) continue;  // full: colour of its middle
+    if (voxel.sigma < 0.999f * 400 * float(kFrame.unit_per_world)) continue;  // full: colour of its middle
     const Vec3d world = volume.origin + Vec3d{voxel.i + 0.5, voxel.j + 0.5, voxel.k + 0.5} * volume.voxel_size;
     centres.push_back(kFrame.unit_from_world(world).cast<float>());
     baked.push_back(voxel.luminance);
@@ -65,8 +65,8 @@ TEST(ViewAverage, IsWhatABakePutsIntoItsVoxels) {
   const std::vector<float> luminance = averages(*average, centres);
   double different = 0, varied = 0;
   for (std::size_t v = 0; v < baked.size(); ++v) {
-    different += std::abs(luminance[v] - baked[v]) / static_cast<double>(baked.size());
-    varied += std::abs(baked[v] - 0.4) / static_cast<double>(baked.size());
+    different += std::abs(luminance[v] - baked[v]) / double(baked.size());
+    varied += std::abs(baked[v] - 0.4) / double(baked.size());
   }
   EXPECT_GT(varied, 0.05);
   EXPECT_LT(different, 0.001) << "but for a 256th of a voxel";
@@ -77,8 +77,8 @@ TEST(ViewAverage, DoesNotDependOnThreadsOrOnWhatElseIsAsked) {
   const auto average = make_view_average(field, two_cameras(), coarse());
   std::vector<Vec3f> positions;
   for (int i = 0; i < 200; ++i) {
-    const float turn = 0.1f * static_cast<float>(i);
-    positions.push_back(kMiddle + Vec3f{std::cos(turn), std::sin(turn), 0.002f * static_cast<float>(i)} * 0.24f);
+    const float turn = 0.1f * float(i);
+    positions.push_back(kMiddle + Vec3f{std::cos(turn), std::sin(turn), 0.002f * float(i)} * 0.24f);
   }
   set_thread_count(1);
   const std::vector<float> together = averages(*average, positions);

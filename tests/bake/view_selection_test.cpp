@@ -37,8 +37,8 @@ TEST(Transmittance, SkippingEmptyBricksChangesNothing) {
   BrickGrid<float> full = wall(4, 0.3f);
   for (std::size_t b = 0; b < full.brick_count(); ++b) full.make_brick(b);
   for (int i = 0; i < 50; ++i) {
-    const Vec3f from{1.3f, 3.0f + static_cast<float>(i), 40.2f};
-    const Vec3f to{61.0f, 60.0f - static_cast<float>(i), 3.7f};
+    const Vec3f from{1.3f, 3.0f + float(i), 40.2f};
+    const Vec3f to{61.0f, 60.0f - float(i), 3.7f};
     EXPECT_NEAR(transmittance_between(sparse, 1, from, to, 1e-6f), transmittance_between(full, 1, from, to, 1e-6f),
                 1e-6f);
   }

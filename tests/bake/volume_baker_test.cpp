@@ -36,7 +36,7 @@ BakeOptions slab_options() {
 std::map<std::pair<int, int>, double> column_depths(const BakedVolume& volume) {
   std::map<std::pair<int, int>, double> depths;
   for (const BakedVoxel& v : volume.voxels) {
-    if (v.sigma > 0) depths[{v.j, v.k}] += static_cast<double>(v.sigma) * volume.voxel_size;
+    if (v.sigma > 0) depths[{v.j, v.k}] += double(v.sigma) * volume.voxel_size;
   }
   return depths;
 }

@@ -8,7 +8,7 @@ namespace {
 
 std::vector<std::uint8_t> some_bytes() {
   std::vector<std::uint8_t> bytes(700'000);
-  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(i * i >> 3);
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = std::uint8_t(i * i >> 3);
   return bytes;
 }
 constexpr std::size_t kMost = 1 << 24;

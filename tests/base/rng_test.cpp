@@ -26,6 +26,13 @@ TEST(CounterRng, MixesAsSplitMix64) {
   EXPECT_EQ(mix_bits(0x9e3779b97f4a7c15ull), 0x6e789e6aa1b965f4ull);
 }
 
+TEST(CounterRng, NamedStreamsAreTheLettersOfTheirNames) {
+  static_assert(named_stream("A") == 65);
+  static_assert(named_stream("AB") == 65 * 256 + 66);
+  static_assert(named_stream("A\0") == 65 * 256);
+  EXPECT_NE(named_stream("known"), named_stream("pixel"));
+}
+
 TEST(CounterRng, SeedAndStreamAreNotInterchangeable) {
   EXPECT_NE(CounterRng(1, 2).key, CounterRng(2, 1).key);
 }

@@ -29,7 +29,8 @@ inline std::vector<float> positions_along_rays(std::size_t n, float spacing, std
   std::vector<float> positions;
   SequentialRng rng(seed, 1);
   while (positions.size() < 3 * n) {
-    const Vec3f from = {rng.uniform(), rng.uniform(), rng.uniform()}, to = {rng.uniform(), rng.uniform(), rng.uniform()};
+    const Vec3f from = {rng.uniform(), rng.uniform(), rng.uniform()},
+                to = {rng.uniform(), rng.uniform(), rng.uniform()};
     const float distance = length(to - from);
     for (float t = 0; t < distance && positions.size() < 3 * n; t += spacing) {
       const Vec3f p = from + (to - from) * (t / distance);

@@ -40,7 +40,7 @@ RenderedImage read_render(const std::filesystem::path& folder, const View& view)
     const LinearImage channel = read_exr_channel(folder / name, kNames[c]);
     image.baked_rgb.resize(3 * channel.values.size());
     for (std::size_t p = 0; p < channel.values.size(); ++p) {
-      image.baked_rgb[3 * p + static_cast<std::size_t>(c)] = channel.values[p];
+      image.baked_rgb[3 * p + std::size_t(c)] = channel.values[p];
     }
   }
   const LinearImage alpha = read_exr_channel(folder / name, "A");

@@ -54,7 +54,8 @@ float normal(SequentialRng& rng) {
 cv::Mat1b codes_of(const cv::Mat1f& light, double gain, double grain, SequentialRng& rng) {
   cv::Mat1b codes(light.size());
   for (int p = 0; p < int(light.total()); ++p) {
-    const double code = 255 * cnerf::srgb_from_linear(std::clamp(double(light(p / light.cols, p % light.cols)) * gain, 0.0, 1.0));
+    const double code =
+        255 * cnerf::srgb_from_linear(std::clamp(double(light(p / light.cols, p % light.cols)) * gain, 0.0, 1.0));
     codes(p) = cv::saturate_cast<std::uint8_t>(code + (grain > 0 ? grain * double(normal(rng)) : 0));
   }
   return codes;
@@ -158,8 +159,9 @@ int main(int argc, char** argv) {
                                                                {"height", 0},
                                                                {"seed", 1}});
   if (files.size() != 2) {
-    std::puts("film_clip CAPTURE OUT.mp4|OUT.dat|FOLDER [fps=24] [flicker=%] [grain=codes] [letterbox=rows] "
-              "[duplicates=N] [pan=frames] [ticks=64] [frames=60] [x= y= width= height=] [seed=1]");
+    std::puts(
+        "film_clip CAPTURE OUT.mp4|OUT.dat|FOLDER [fps=24] [flicker=%] [grain=codes] [letterbox=rows] "
+        "[duplicates=N] [pan=frames] [ticks=64] [frames=60] [x= y= width= height=] [seed=1]");
     return 64;
   }
   const Capture capture = cnerf::load_capture(files[0]);

@@ -87,7 +87,8 @@ void ForwardAndBackward(benchmark::State& state, const MlpLayout& layout) {
   for (auto _ : state) {
     const double peak = peak_rate();
     const double seconds = bench::best_seconds(kRepeats, [&] { work.step(); });
-    const double operations = 3 * 2.0 * double(layout.weight_count()) * samples;  // forward, inputs', weights' gradients
+    const double operations =
+        3 * 2.0 * double(layout.weight_count()) * samples;  // forward, inputs', weights' gradients
     state.counters["ns_a_sample"] = 1e9 * seconds / samples;
     state.counters["GFLOP_s"] = 1e-9 * operations / seconds;
     state.counters["peak_GFLOP_s"] = 1e-9 * peak;
@@ -95,7 +96,9 @@ void ForwardAndBackward(benchmark::State& state, const MlpLayout& layout) {
     state.SetLabel(to_string(active_isa()));
   }
 }
-BENCHMARK_CAPTURE(ForwardAndBackward, density_net, MlpLayout{{32, 64, 16}})->Iterations(1)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(ForwardAndBackward, density_net, MlpLayout{{32, 64, 16}})
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(ForwardAndBackward, luminance_net, MlpLayout{{32, 64, 64, 4}})
     ->Iterations(1)
     ->Unit(benchmark::kMillisecond);

@@ -87,8 +87,8 @@ int main(int argc, char** argv) {
     std::puts("reconstruction CAPTURE [downscale=N] [holdout=N] [seconds=S | samples=M,...] [option=value ...]");
     return 64;
   }
-  std::map<std::string, double> own = {{"downscale", 1},  {"holdout", 8}, {"seconds", 60},
-                                       {"eval_every", 1}, {"verbose", 0}, {"first", 0.25}, {"validation", 0}};
+  std::map<std::string, double> own = {{"downscale", 1}, {"holdout", 8},  {"seconds", 60},  {"eval_every", 1},
+                                       {"verbose", 0},   {"first", 0.25}, {"validation", 0}};
   std::vector<double> marks;  // of the training's length: million samples if given, else seconds
   nlohmann::json json = cnerf::options_to_json(cnerf::Stage1Options{});
   for (int i = 2; i < argc; ++i) {

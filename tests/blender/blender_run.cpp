@@ -49,7 +49,7 @@ RenderedExr read_exr(const fs::path& file) {
   RenderedExr image;
   image.width = window.max.x - window.min.x + 1;
   image.height = window.max.y - window.min.y + 1;
-  image.rgba.resize(4 * static_cast<std::size_t>(image.width) * image.height);
+  image.rgba.resize(4 * std::size_t(image.width) * image.height);
   Imf::FrameBuffer frame;
   const std::array<const char*, 4> names{"R", "G", "B", "A"};
   for (std::size_t c = 0; c < names.size(); ++c) {
@@ -57,7 +57,7 @@ RenderedExr read_exr(const fs::path& file) {
       throw std::runtime_error(file.string() + ": no channel " + names[c]);
     }
     frame.insert(names[c], Imf::Slice::Make(Imf::FLOAT, image.rgba.data() + c, window, 4 * sizeof(float),
-                                            4 * sizeof(float) * static_cast<std::size_t>(image.width)));
+                                            4 * sizeof(float) * std::size_t(image.width)));
   }
   input.setFrameBuffer(frame);
   input.readPixels(window.min.y, window.max.y);

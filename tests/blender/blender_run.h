@@ -13,7 +13,7 @@ struct RenderedExr {
   int width = 0, height = 0;
   std::vector<float> rgba;  ///< [H, W, 4]
 
-  [[nodiscard]] const float* pixel(int x, int y) const { return &rgba[4 * (static_cast<std::size_t>(y) * width + x)]; }
+  [[nodiscard]] const float* pixel(int x, int y) const { return &rgba[4 * (std::size_t(y) * width + x)]; }
 };
 
 /// The Blender of $PATH, if there is one.

@@ -97,7 +97,7 @@ struct Edges {
 
 Edges find_edges(const RenderedExr& image, double inside) {
   const int middle = image.width / 2;
-  const auto depth = [&](int x, int y) { return -std::log1p(-static_cast<double>(image.pixel(x, y)[3])); };
+  const auto depth = [&](int x, int y) { return -std::log1p(-double(image.pixel(x, y)[3])); };
   const auto across = [&](int i) { return depth(i, middle); };
   const auto down = [&](int i) { return depth(middle, i); };
   return {half_crossing(0, 1, inside, across), half_crossing(image.width - 1, -1, inside, across),
@@ -183,15 +183,15 @@ Comparison compare(const RenderedExr& cycles, const VolumeImage& ours) {
   double squared = 0;
   for (int y = 0; y < ours.height; ++y) {
     for (int x = 0; x < ours.width; ++x) {
-      const std::size_t at = static_cast<std::size_t>(y) * ours.width + x;
+      const std::size_t at = std::size_t(y) * ours.width + x;
       const float* p = cycles.pixel(x, y);
       if (ours.opacity[at] <= 0.01f && p[3] <= 0.01f) continue;
       ++result.pixels;
-      for (int c = 0; c < 3; ++c) squared += std::pow(static_cast<double>(p[c]) - ours.rgb[3 * at + c], 2);
+      for (int c = 0; c < 3; ++c) squared += std::pow(double(p[c]) - ours.rgb[3 * at + c], 2);
       result.worst_opacity = std::max<double>(result.worst_opacity, std::abs(p[3] - ours.opacity[at]));
     }
   }
-  result.psnr = -10 * std::log10(squared / static_cast<double>(3 * result.pixels));
+  result.psnr = -10 * std::log10(squared / double(3 * result.pixels));
   return result;
 }
 
@@ -207,7 +207,7 @@ TEST(Blender, CyclesAndOurIntegratorAgree) {
   const RenderedExr cycles = render_exact(bake.blender_setup, "--step-rate 0.25 --samples 64");
   const VolumeImage ours = integrate_volume(volume, camera.intrinsics, camera.world_from_camera);
   const Comparison equal = compare(cycles, ours);
-  RecordProperty("psnr_millidecibel", static_cast<int>(1000 * equal.psnr));
+  RecordProperty("psnr_millidecibel", int(1000 * equal.psnr));
   std::printf("Cycles against our integrator: %.2f dB over %zu pixels, opacity within %.4f\n", equal.psnr, equal.pixels,
               equal.worst_opacity);
   EXPECT_GT(equal.pixels, 2000u);

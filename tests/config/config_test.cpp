@@ -165,7 +165,8 @@ TEST(Config, PresetsAreFoundByName) {
     (void)preset_file("qick");
     FAIL() << "an unknown preset was found";
   } catch (const UsageError& error) {
-    EXPECT_THAT(error.what(), testing::AllOf(HasSubstr("did you mean 'quick'"), HasSubstr("default, gpu, quality, quick")));
+    EXPECT_THAT(error.what(),
+                testing::AllOf(HasSubstr("did you mean 'quick'"), HasSubstr("default, gpu, quality, quick")));
   }
 }
 

@@ -99,7 +99,7 @@ void check_distribution(int levels, int count, const ChromaLossWeights& more, bo
     expect_below(what, relative_distance(found, expected), bound);
   };
   const auto compare_colors = [&](const char* what, float temperature, double bound) {
-    std::vector<Ab> expected(static_cast<std::size_t>(count)), found(expected.size());
+    std::vector<Ab> expected(std::size_t(count)), found(expected.size());
     cpu->decode(pixels, temperature, expected);
     cuda->decode(pixels, temperature, found);
     std::vector<double> distances;
@@ -159,7 +159,7 @@ void check_chromaticity(int levels, int count, AbLoss loss, bool quick) {
   for (int i = 0; i < 100; ++i) step(*cpu, 1e-2f);
   copy_state(*cpu, *cuda);
 
-  std::vector<Ab> expected(static_cast<std::size_t>(count)), found(expected.size());
+  std::vector<Ab> expected(std::size_t(count)), found(expected.size());
   cpu->composite(pixels, expected);
   cuda->composite(pixels, found);
   double furthest = 0;

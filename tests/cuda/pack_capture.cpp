@@ -2,7 +2,8 @@
 //
 //   pack_capture CAPTURE FOLDER [downscale=1] [holdout=8] [validation=N]
 //
-// With `validation` every N-th of the views to be trained on is judged instead of the held-out ones: for choosing settings.
+// With `validation` every N-th of the views to be trained on is judged instead of the held-out ones: for choosing
+// settings.
 
 #include <cstdio>
 #include <string>
@@ -24,8 +25,9 @@ int main(int argc, char** argv) {
     const std::string argument = argv[i];
     const std::size_t equals = argument.find('=');
     const std::string name = argument.substr(0, equals);
-    (name == "downscale" ? options.downscale : name == "validation" ? validation : options.holdout) =
-        std::stoi(argument.substr(equals + 1));
+    (name == "downscale"    ? options.downscale
+     : name == "validation" ? validation
+                            : options.holdout) = std::stoi(argument.substr(equals + 1));
   }
   cnerf::test::PackedCapture packed;
   packed.capture = cnerf::load_capture(argv[1], options);

@@ -136,7 +136,9 @@ void check_table_update() {
     }
     for (int f = 0; f < 4; ++f) moments.push_back(rng.uniform(0.1f, 1));
   }
-  const auto on_device = [](const AlignedVector<float>& v) { return uploaded(std::vector(v.begin(), v.end()), "test"); };
+  const auto on_device = [](const AlignedVector<float>& v) {
+    return uploaded(std::vector(v.begin(), v.end()), "test");
+  };
   const auto d_table = on_device(table), d_gradient = on_device(gradient), d_moments = on_device(moments);
   DeviceBuffer<std::uint16_t> halves(table.size(), "test");
   const auto d_step = uploaded(std::vector<AdamStep>{step}, "test");

@@ -111,7 +111,7 @@ std::vector<Case> cases() {
 class BadInput : public testing::TestWithParam<int> {};
 
 TEST_P(BadInput, IsRefusedByNameWithItsExitCode) {
-  const Case bad = cases()[static_cast<std::size_t>(GetParam())];
+  const Case bad = cases()[std::size_t(GetParam())];
   SCOPED_TRACE(bad.name);
   const TempDir folder;
   const fs::path capture = folder / "capture", out = folder / "out";
@@ -129,12 +129,12 @@ TEST_P(BadInput, IsRefusedByNameWithItsExitCode) {
 }
 
 std::string case_name(const testing::TestParamInfo<int>& info) {
-  std::string name = cases()[static_cast<std::size_t>(info.param)].name;
+  std::string name = cases()[std::size_t(info.param)].name;
   std::erase_if(name, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; });
   return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(Table, BadInput, testing::Range(0, static_cast<int>(cases().size())), case_name);
+INSTANTIATE_TEST_SUITE_P(Table, BadInput, testing::Range(0, int(cases().size())), case_name);
 
 TEST(BadColorizer, OneThatFailsLeavesNoTake) {
   const TempDir folder;

@@ -41,7 +41,7 @@ struct Palette {
     for (std::uint64_t i = 0; i < 200000; ++i) {
       const Color8 color = {int(rng.below(3 * i, 256)), int(rng.below(3 * i + 1, 256)), int(rng.below(3 * i + 2, 256))};
       const double code = grey_code(color);
-      const auto whole = static_cast<std::size_t>(std::lround(code));
+      const auto whole = std::size_t(std::lround(code));
       if (std::abs(code - double(whole)) > 0.3) continue;
       if (color.r - color.b > red[whole].r - red[whole].b) red[whole] = color;
       if (color.b - color.r > blue[whole].b - blue[whole].r) blue[whole] = color;
@@ -58,8 +58,7 @@ void paint(const fs::path& capture, const std::array<Color8, 256>& colors) {
     for (int y = 0; y < grey.rows; ++y) {
       for (int x = 0; x < grey.cols; ++x) {
         const Color8 color = colors[grey.at<std::uint8_t>(y, x)];
-        painted.at<cv::Vec3b>(y, x) = cv::Vec3b(static_cast<std::uint8_t>(color.b), static_cast<std::uint8_t>(color.g),
-                                                static_cast<std::uint8_t>(color.r));
+        painted.at<cv::Vec3b>(y, x) = cv::Vec3b(std::uint8_t(color.b), std::uint8_t(color.g), std::uint8_t(color.r));
       }
     }
     cv::imwrite(entry.path().string(), painted);

@@ -104,8 +104,8 @@ TEST(Prepare, LooksForMotionAlsoAfterwards) {
   cv::Mat picture = cv::imread(disturbed.string(), cv::IMREAD_UNCHANGED);
   picture(cv::Rect(picture.cols / 3, picture.rows / 3, picture.cols / 3, picture.rows / 3)) = cv::Scalar::all(255);
   cv::imwrite(disturbed.string(), picture);
-  std::vector<std::string> words = {"prepare", user.photos.string(), "-o", out.string(), "--colmap-model",
-                                    user.model.string()};
+  std::vector<std::string> words = {"prepare",    user.photos.string(), "-o",
+                                    out.string(), "--colmap-model",     user.model.string()};
   ASSERT_EQ(cnerf(words).exit_code, 0);
   words.insert(words.end(), {"--resume", "--motion-masks", "--motion-steps", "50"});
   const ProgramResult result = cnerf(words);

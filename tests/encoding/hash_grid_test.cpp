@@ -163,7 +163,8 @@ TEST(HashGridAdam, MovesOnlyRowsWithGradientAndMatchesTheFormula) {
   for (const IsaLevel isa : test::available_isas()) {
     const test::ScopedIsa scope(isa);
     AlignedVector<float> table(8, 1.0f), d_rows = {0.5f, -0.25f, 0, 1, 0, 0, 0, 0}, moments(16, 0.0f);
-    hash_grid_kernels().adam_rows(table.data(), d_rows.data(), moments.data(), 2, 1.0f, 0.1f, 0.9f, 0.99f, 1e-15f, 100.0f);
+    hash_grid_kernels().adam_rows(table.data(), d_rows.data(), moments.data(), 2, 1.0f, 0.1f, 0.9f, 0.99f, 1e-15f,
+                                  100.0f);
     // First step: first moment 0.1 g, second 0.01 g^2, corrected by 100: the quotient is 0.1 sign(g).
     EXPECT_NEAR(table[0], 1.0f - 0.1f * 0.1f, 1e-6f);
     EXPECT_NEAR(table[1], 1.0f + 0.1f * 0.1f, 1e-6f);

@@ -42,8 +42,8 @@ std::pair<std::vector<float>, std::vector<float>> textures() {
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       const double value = ((x * 7 + y * 13) % 32) / 31.0;
-      a.push_back(static_cast<float>(value));
-      b.push_back(static_cast<float>(std::clamp(value + ((x * x + 3 * y) % 11 - 5) / 40.0, 0.0, 1.0)));
+      a.push_back(float(value));
+      b.push_back(float(std::clamp(value + ((x * x + 3 * y) % 11 - 5) / 40.0, 0.0, 1.0)));
     }
   }
   return {a, b};
@@ -87,7 +87,7 @@ TEST(ColourfulnessMetric, EqualsAnIndependentEvaluation) {
   std::vector<std::uint8_t> rgb;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
-      for (const int value : {x * 11, y * 13, x * y}) rgb.push_back(static_cast<std::uint8_t>(value % 256));
+      for (const int value : {x * 11, y * 13, x * y}) rgb.push_back(std::uint8_t(value % 256));
     }
   }
   EXPECT_NEAR(colourfulness(rgb).standard, 125.63076180222536, 1e-6);

@@ -25,10 +25,10 @@ namespace fs = std::filesystem;
 std::vector<float> read_level(const fs::path& file, const std::string& channel, int level) {
   Imf::TiledInputFile input(file.c_str());
   const int width = input.levelWidth(level), height = input.levelHeight(level);
-  std::vector<float> values(static_cast<std::size_t>(width) * height);
+  std::vector<float> values(std::size_t(width) * height);
   Imf::FrameBuffer frame;
   frame.insert(channel, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float),
-                                   sizeof(float) * static_cast<std::size_t>(width)));
+                                   sizeof(float) * std::size_t(width)));
   input.setFrameBuffer(frame);
   input.readTiles(0, input.numXTiles(level) - 1, 0, input.numYTiles(level) - 1, level);
   return values;
@@ -38,8 +38,8 @@ std::vector<float> read_channel(const fs::path& file, const std::string& channel
   Imf::InputFile input(file.c_str());
   EXPECT_NE(input.header().channels().findChannel(channel), nullptr) << channel;
   const Imath::Box2i window = input.header().dataWindow();
-  const auto width = static_cast<std::size_t>(window.max.x + 1);
-  std::vector<float> values(width * static_cast<std::size_t>(window.max.y + 1));
+  const auto width = std::size_t(window.max.x + 1);
+  std::vector<float> values(width * std::size_t(window.max.y + 1));
   Imf::FrameBuffer frame;
   frame.insert(channel,
                Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float), sizeof(float) * width));
@@ -102,7 +102,7 @@ TEST(ExrWriter, MipMapsAreMeansDownToOnePixel) {
   const TempDir folder;
   const int width = 100, height = 70;  // neither powers of two nor whole tiles
   std::vector<float> values;
-  for (int i = 0; i < width * height; ++i) values.push_back(static_cast<float>(i % width));
+  for (int i = 0; i < width * height; ++i) values.push_back(float(i % width));
   write_exr(folder / "a.exr", {width, height, {{"Y", values}}, {}}, /*mip=*/true);
   const Imf::TiledInputFile input((folder / "a.exr").c_str());
   EXPECT_EQ(input.tileXSize(), 64u);

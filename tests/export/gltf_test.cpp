@@ -50,8 +50,8 @@ tinygltf::Model load(const fs::path& file) {
 }
 
 std::vector<float> floats_of(const tinygltf::Model& model, int accessor) {
-  const tinygltf::Accessor& a = model.accessors[static_cast<std::size_t>(accessor)];
-  const tinygltf::BufferView& view = model.bufferViews[static_cast<std::size_t>(a.bufferView)];
+  const tinygltf::Accessor& a = model.accessors[std::size_t(accessor)];
+  const tinygltf::BufferView& view = model.bufferViews[std::size_t(a.bufferView)];
   std::vector<float> values(view.byteLength / sizeof(float));
   std::memcpy(values.data(), model.buffers[0].data.data() + view.byteOffset, view.byteLength);
   return values;
@@ -71,7 +71,7 @@ TEST(Gltf, BothFormsHoldTheMeshYUp) {
       EXPECT_EQ(positions[3 * v + 1], mesh.positions[v].z);
       EXPECT_EQ(positions[3 * v + 2], -mesh.positions[v].y);
     }
-    const tinygltf::Accessor& accessor = model.accessors[static_cast<std::size_t>(primitive.attributes.at("POSITION"))];
+    const tinygltf::Accessor& accessor = model.accessors[std::size_t(primitive.attributes.at("POSITION"))];
     EXPECT_EQ(accessor.minValues, (std::vector<double>{1, 3, -4}));
     EXPECT_EQ(accessor.maxValues, (std::vector<double>{2, 6, -2}));
     const std::vector<float> uvs = floats_of(model, primitive.attributes.at("TEXCOORD_0"));

@@ -198,8 +198,8 @@ TEST(Vdb, OneThreadOrSeveralWriteTheSame) {
   const TempDir folder;
   BakedVolume volume = block_volume({3, 5, 6}, {150, 9, 11}, 2);  // 19 planes of bricks
   for (BakedVoxel& voxel : volume.voxels) {
-    voxel.sigma = 1 + static_cast<float>(voxel.i % 7);
-    voxel.a = static_cast<float>(voxel.i - voxel.k);
+    voxel.sigma = 1 + float(voxel.i % 7);
+    voxel.a = float(voxel.i - voxel.k);
   }
   VolumePlanes planes = planes_of(volume);
   set_thread_count(4);

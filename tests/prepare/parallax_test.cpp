@@ -49,7 +49,8 @@ TEST(Parallax, PhotographsTakenFromOnePlaceAreToldWhateverTheirZoom) {
   CNERF_REQUIRE_DATA(fox, "scenes/fox");
   const cv::Mat1b scene = photograph(fox / "images" / "0001.jpg", 1);
   std::vector<cv::Mat1b> pictures;
-  for (int i = 0; i < 9; ++i) pictures.push_back(turned(scene, 1375, 0.04 * (i - 4), 0.03 * ((i % 3) - 1), 1 + 0.02 * i));
+  for (int i = 0; i < 9; ++i)
+    pictures.push_back(turned(scene, 1375, 0.04 * (i - 4), 0.03 * ((i % 3) - 1), 1 + 0.02 * i));
   const test::TempDir folder;
   const ParallaxSurvey survey = survey_parallax(images_in(folder.path(), pictures), folder.path());
   EXPECT_GE(survey.judged, 8);
@@ -64,7 +65,8 @@ TEST_P(RealCaptures, ShowParallax) {
   for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
   std::ranges::sort(files);
   std::vector<cv::Mat1b> pictures;
-  for (std::size_t i = 0; i < std::min<std::size_t>(files.size(), 16); ++i) pictures.push_back(photograph(files[i], 0.4));
+  for (std::size_t i = 0; i < std::min<std::size_t>(files.size(), 16); ++i)
+    pictures.push_back(photograph(files[i], 0.4));
   const test::TempDir capture;
   const ParallaxSurvey survey = survey_parallax(images_in(capture.path(), pictures), capture.path());
   EXPECT_GE(survey.judged, 4);

@@ -31,7 +31,7 @@ inline Capture toy_capture(int views = 4, int width = 24, int height = 20, bool 
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
         const double shade = 0.5 + 0.3 * std::sin(0.4 * x + v) * std::cos(0.3 * y);
-        view.image.u8.push_back(static_cast<std::uint8_t>(255 * shade));
+        view.image.u8.push_back(std::uint8_t(255 * shade));
         const bool inside = std::hypot(x - 0.5 * width, y - 0.5 * height) < 0.4 * height;
         if (with_alpha) view.image.alpha.push_back(inside ? 255 : 0);
         if (with_alpha && !inside) view.image.u8.back() = 0;

@@ -89,9 +89,9 @@ TEST(NearPatch, LiesInTheViewAndShowsMostOfTheSamePlace) {
     const auto shared = [](int a, int b, int side_a, int side_b) {
       return std::min(a + side_a, b + side_b) - std::max(a, b);
     };
-    EXPECT_GE(shared(place.left, other.left, place.side, other.side) *
-                  shared(place.top, other.top, place.side, other.side),
-              0.8 * place.side * place.side);
+    EXPECT_GE(
+        shared(place.left, other.left, place.side, other.side) * shared(place.top, other.top, place.side, other.side),
+        0.8 * place.side * place.side);
     lefts.insert(other.left - place.left);
   }
   EXPECT_GE(lefts.size(), 4u) << "they differ";

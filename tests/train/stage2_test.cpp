@@ -46,8 +46,8 @@ class Erring final : public Colorizer {
     ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
     for (const PatchOrigin& origin : patches.origins) {
       const bool is_base = origin.query >= std::uint64_t(1) << 32, is_first = is_base && origin.query >> 33 == 0;
-      const bool is_wrong = is_first || (is_base && origin.view == "toy0" && origin.query % 8 < 5) ||
-                            (!is_base && origin.query % 3 == 0);
+      const bool is_wrong =
+          is_first || (is_base && origin.view == "toy0" && origin.query % 8 < 5) || (!is_base && origin.query % 3 == 0);
       const Ab color = is_wrong ? Ab{-40, 30} : kAnswer;
       answer.ab.insert(answer.ab.end(), pixels, color.a);
       answer.ab.insert(answer.ab.end(), pixels, color.b);

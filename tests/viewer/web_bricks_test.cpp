@@ -19,10 +19,10 @@ struct Place {
 };
 Place place_of(const WebBricks& bricks, Vec3i v) {
   const Vec3i n = bricks.counts;
-  const std::size_t cell = (static_cast<std::size_t>(v.z / 8) * n.y + v.y / 8) * n.x + v.x / 8;
+  const std::size_t cell = (std::size_t(v.z / 8) * n.y + v.y / 8) * n.x + v.x / 8;
   std::size_t number = 0;
   for (std::size_t c = 0; c < cell; ++c) number += bricks.distance[c] == 0;
-  return {cell, number, static_cast<std::size_t>((v.z % 8 * 8 + v.y % 8) * 8 + v.x % 8)};
+  return {cell, number, std::size_t((v.z % 8 * 8 + v.y % 8) * 8 + v.x % 8)};
 }
 
 TEST(WebBricks, TheGridBeginsOneVoxelBeforeTheFirst) {
@@ -37,8 +37,8 @@ TEST(WebBricks, TheGridBeginsOneVoxelBeforeTheFirst) {
 TEST(WebBricks, ValuesComeBackWithinTheirSteps) {
   BakedVolume volume = test::block_volume({0, 0, 0}, {9, 9, 9}, 5);
   for (BakedVoxel& voxel : volume.voxels) {
-    voxel.sigma = 0.5f + static_cast<float>(voxel.i * voxel.j);  // optical depth 0.025 to 3.2
-    voxel.rgb = {0.1f + 0.05f * static_cast<float>(voxel.i), 0.4f, 0.9f - 0.06f * static_cast<float>(voxel.k)};
+    voxel.sigma = 0.5f + float(voxel.i * voxel.j);  // optical depth 0.025 to 3.2
+    voxel.rgb = {0.1f + 0.05f * float(voxel.i), 0.4f, 0.9f - 0.06f * float(voxel.k)};
     const Lab<float> lab = lab_from_linear_rgb(voxel.rgb);
     voxel.a = lab.a;
     voxel.b = lab.b;
@@ -57,7 +57,7 @@ TEST(WebBricks, ValuesComeBackWithinTheirSteps) {
         EXPECT_NEAR(bricks.density[at], code, (sigma * volume.voxel_size > 6 ? 4.5 : 1.5) + 1e-4);
       } else {
         Imath::half half;
-        half.setBits(static_cast<std::uint16_t>(bricks.density[at] | bricks.density[plane + at] << 8));
+        half.setBits(std::uint16_t(bricks.density[at] | bricks.density[plane + at] << 8));
         sigma = half;
         EXPECT_NEAR(sigma, voxel.sigma, voxel.sigma * 0x1p-11);
       }
@@ -90,10 +90,10 @@ TEST(WebBricks, DistancesAreThoseToTheNearestStoredBrick) {
         for (int w = 0; w < n.z; ++w)
           for (int v = 0; v < n.y; ++v)
             for (int u = 0; u < n.x; ++u) {
-              if (bricks.distance[(static_cast<std::size_t>(w) * n.y + v) * n.x + u] != 0) continue;
+              if (bricks.distance[(std::size_t(w) * n.y + v) * n.x + u] != 0) continue;
               nearest = std::min(nearest, std::max({std::abs(u - x), std::abs(v - y), std::abs(w - z)}));
             }
-        EXPECT_EQ(bricks.distance[(static_cast<std::size_t>(z) * n.y + y) * n.x + x], nearest);
+        EXPECT_EQ(bricks.distance[(std::size_t(z) * n.y + y) * n.x + x], nearest);
       }
 }
 
@@ -118,14 +118,14 @@ TEST(WebBricks, SimplifyingMakesNeitherHazeNorHoles) {
 
 TEST(WebBricks, DifferencesUndoneGiveTheSame) {
   std::vector<std::uint8_t> bricks(3 * kWebBrickVoxels);
-  for (std::size_t i = 0; i < bricks.size(); ++i) bricks[i] = static_cast<std::uint8_t>(i * i * 31 + i / 7);
+  for (std::size_t i = 0; i < bricks.size(); ++i) bricks[i] = std::uint8_t(i * i * 31 + i / 7);
   const std::vector<std::uint8_t> before = bricks;
   to_differences(bricks);
   EXPECT_NE(bricks, before);
   for (std::size_t begin = 0; begin < bricks.size(); begin += kWebBrickVoxels) {
     for (std::size_t i = 1; i < kWebBrickVoxels; ++i) {
       const std::size_t step = i % 8 ? 1 : i % 64 ? 8 : 64;
-      bricks[begin + i] = static_cast<std::uint8_t>(bricks[begin + i] + bricks[begin + i - step]);
+      bricks[begin + i] = std::uint8_t(bricks[begin + i] + bricks[begin + i - step]);
     }
   }
   EXPECT_EQ(bricks, before);

@@ -67,10 +67,10 @@ TEST(WebBundle, ItsSizeIsEstimatedWell) {
   BakedVolume volume = test::block_volume({0, 0, 0}, {80, 80, 80}, 9);
   for (BakedVoxel& voxel : volume.voxels) {
     // Noise that does not repeat: what does packs better the more of it there is.
-    auto h = static_cast<std::uint32_t>((voxel.i * 80 + voxel.j) * 80 + voxel.k) * 2654435761u;
+    auto h = std::uint32_t((voxel.i * 80 + voxel.j) * 80 + voxel.k) * 2654435761u;
     h = (h ^ h >> 15) * 2246822519u;
     h = (h ^ h >> 13) * 3266489917u;
-    voxel.sigma = 1 + static_cast<float>((h ^ h >> 16) % 97);
+    voxel.sigma = 1 + float((h ^ h >> 16) % 97);
   }
   const WebBricks bricks = make_web_bricks(volume);
   const test::TempDir folder;
@@ -108,7 +108,7 @@ TEST(WebBundle, APhotographLosesItsDistortionAndKeepsItsTone) {
   std::vector<float> luminance(200 * 100, 0.2f);
   for (int y = -2; y <= 2; ++y)
     for (int x = -2; x <= 2; ++x) {
-      luminance[static_cast<std::size_t>((int(seen->y) + y) * 200 + int(seen->x) + x)] = 1.0f;
+      luminance[std::size_t((int(seen->y) + y) * 200 + int(seen->x) + x)] = 1.0f;
     }
   const WebPhoto photo = make_web_photo(lens, luminance, 200, 95);
   std::vector<std::uint8_t> bytes(photo.jpeg.size());

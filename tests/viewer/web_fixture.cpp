@@ -37,11 +37,10 @@ BakedVolume ball() {
         const double r = std::sqrt(x * x + y * y + z * z);
         const bool fog = i >= 34;
         if (!fog && (r > 13 || (std::abs(x) < 3 && std::abs(y) < 3))) continue;
-        const Vec3f rgb{static_cast<float>(0.15 + 0.8 * i / 40), static_cast<float>(0.1 + 0.6 * j / 36),
-                        static_cast<float>(0.9 - 0.8 * k / 32)};
+        const Vec3f rgb{float(0.15 + 0.8 * i / 40), float(0.1 + 0.6 * j / 36), float(0.9 - 0.8 * k / 32)};
         const Lab<float> lab = lab_from_linear_rgb(rgb);
         volume.voxels.push_back(
-            {i, j, k, fog ? 0.4f : static_cast<float>(120.0 * (1.05 - r / 14)), luminance_of(rgb), rgb, lab.a, lab.b});
+            {i, j, k, fog ? 0.4f : float(120.0 * (1.05 - r / 14)), luminance_of(rgb), rgb, lab.a, lab.b});
       }
   return volume;
 }

@@ -35,7 +35,7 @@ std::string raw_answer(int port, const std::string& bytes) {
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
-  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_port = htons(std::uint16_t(port));
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   timeval patience{8, 0};
   ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
@@ -43,8 +43,7 @@ std::string raw_answer(int port, const std::string& bytes) {
   if (::connect(socket, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0) {
     (void)::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     char block[4096];
-    for (ssize_t n; (n = ::recv(socket, block, sizeof block, 0)) > 0;)
-      answer.append(block, static_cast<std::size_t>(n));
+    for (ssize_t n; (n = ::recv(socket, block, sizeof block, 0)) > 0;) answer.append(block, std::size_t(n));
   }
   ::close(socket);
   return answer;

@@ -30,7 +30,7 @@ double fraction(double x) {
 
 /// A value in [0, 1) for each cell of the integer lattice.
 double lattice(std::int64_t x, std::int64_t y, std::int64_t z) {
-  const auto bits = [](std::int64_t v) { return static_cast<std::uint64_t>(v); };
+  const auto bits = [](std::int64_t v) { return std::uint64_t(v); };
   return double(mix_bits(bits(x) * 0x9e3779b1u ^ bits(y) * 0x85ebca77u << 16 ^ bits(z) * 0xc2b2ae3du << 32) >> 40) *
          0x1p-24;
 }

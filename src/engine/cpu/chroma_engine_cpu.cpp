@@ -30,7 +30,7 @@ class ChromaEngineCpu final : public ChromaEngine {
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
-    const float scale = 1.0f / static_cast<float>(pixels.pixels());
+    const float scale = 1.0f / float(pixels.pixels());
     chunks_.run(pixels.pixels(), kBlockPixels, features_.weight_count() + head_.layout().weight_count(),
                 [&](StepChunk& chunk, std::size_t begin, std::size_t end) {
                   Work& work = works_.local();

@@ -22,7 +22,7 @@ class ChromaticityEngineCpu final : public ChromaticityEngine {
   double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
               AbLoss loss, float learning_rate) override {
     CNERF_CHECK_EQ(targets.size(), pixels.pixels());
-    const float scale = 1.0f / static_cast<float>(pixels.pixels());
+    const float scale = 1.0f / float(pixels.pixels());
     chunks_.run(pixels.pixels(), kBlockPixels, field_.weight_count(),
                 [&](StepChunk& chunk, std::size_t begin, std::size_t end) {
                   PointWorkspace& work = works_.local();

@@ -5,9 +5,7 @@
 
 namespace cnerf {
 HashGridCpu::HashGridCpu(const HashGridOptions& options, std::uint64_t seed)
-    : levels_(hash_grid_levels(options)),
-      decay_(static_cast<float>(options.decay)),
-      kernels_(&hash_grid_kernels()) {
+    : levels_(hash_grid_levels(options)), decay_(float(options.decay)), kernels_(&hash_grid_kernels()) {
   const std::size_t rows = total_rows(levels_);
   const std::vector<float> initial = initial_table(levels_, seed);
   table_.assign(initial.begin(), initial.end());
@@ -26,9 +24,8 @@ void HashGridCpu::backward_and_update(const std::vector<EncodedSamples>& runs, c
       kernels_->scatter_level(level, run.positions, run.d_encoded, run.groups, channels(), 4 * int(l), d_rows);
     }
     kernels_->adam_rows(table_.data() + 4 * std::size_t(level.first_row), d_rows,
-                        moments_.data() + 8 * std::size_t(level.first_row), level.rows,
-                        1 - step.learning_rate * decay_, step.step_size, adam.beta1,
-                        adam.beta2, adam.epsilon, step.second_correction);
+                        moments_.data() + 8 * std::size_t(level.first_row), level.rows, 1 - step.learning_rate * decay_,
+                        step.step_size, adam.beta1, adam.beta2, adam.epsilon, step.second_correction);
   });
 }
 

@@ -8,8 +8,8 @@
 #include "encoding/cpu/hash_grid_kernels.h"
 #include "encoding/hash_grid_levels.h"
 #include "src/base/aligned.h"
-#include "src/field/adam.h"
 #include "src/engine/state.h"
+#include "src/field/adam.h"
 
 namespace cnerf {
 
@@ -24,7 +24,7 @@ class HashGridCpu {
  public:
   HashGridCpu(const HashGridOptions& options, std::uint64_t seed);
 
-  [[nodiscard]] int channels() const { return 4 * static_cast<int>(levels_.size()); }
+  [[nodiscard]] int channels() const { return 4 * int(levels_.size()); }
   [[nodiscard]] const std::vector<GridLevel>& levels() const { return levels_; }
 
   /// @param encoded  [G, channels(), 16]

@@ -203,7 +203,7 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
 
 void LuminanceEngineCpu::accumulate(const std::vector<TrainingView>& views) {
   CNERF_CHECK(!views.empty(), "no training views");
-  const auto rays = static_cast<std::size_t>(counters_[1]);
+  const auto rays = std::size_t(counters_[1]);
   const std::size_t n_blocks = (rays + kBlockRays - 1) / kBlockRays;
   parallel_tasks(kChunks, [&](std::size_t c) {
     Chunk& chunk = chunks_[c];
@@ -214,14 +214,14 @@ void LuminanceEngineCpu::accumulate(const std::vector<TrainingView>& views) {
       std::array<ObservedRay, kBlockRays> observed;
       const std::size_t first = b * kBlockRays, last = std::min(rays, first + kBlockRays);
       for (std::size_t r = first; r < last; ++r) observed[r - first] = observe(views, r);
-      train_block({observed.data(), last - first}, 1.0f / static_cast<float>(rays), blocks_.local(), chunk);
+      train_block({observed.data(), last - first}, 1.0f / float(rays), blocks_.local(), chunk);
     }
   });
 }
 
 StepReport LuminanceEngineCpu::report() const {
   StepReport report;
-  report.rays = static_cast<std::size_t>(counters_[1]);
+  report.rays = std::size_t(counters_[1]);
   for (const Chunk& chunk : chunks_) {
     report.loss += chunk.loss / double(report.rays);
     report.squared_error += chunk.squared_error / double(report.rays);
@@ -247,7 +247,7 @@ StepReport LuminanceEngineCpu::step(const std::vector<TrainingView>& views, floa
 
   // As many rays next time as fill the wanted number of samples.
   const double fill = double(options_.samples_per_step) / double(std::max<std::size_t>(done.trained_samples, 64));
-  const auto wanted = static_cast<std::int64_t>(double(done.rays) * std::clamp(fill, 0.5, 2.0));
+  const auto wanted = std::int64_t(double(done.rays) * std::clamp(fill, 0.5, 2.0));
   counters_[1] = std::clamp<std::int64_t>(wanted / 16 * 16, 64, kMostRays);
   return done;
 }

@@ -33,7 +33,7 @@ class LuminanceEngineCpu final : public LuminanceEngine {
 
   /// The rays of the next step: a pure function of the step number.
   [[nodiscard]] ObservedRay observe(const std::vector<TrainingView>& views, std::size_t ray) const {
-    return observe_ray(views, options_.sampling(), options_.seed, static_cast<std::uint64_t>(step_count()), ray);
+    return observe_ray(views, options_.sampling(), options_.seed, std::uint64_t(step_count()), ray);
   }
 
   /// Gradients of one step without applying them, for tests.

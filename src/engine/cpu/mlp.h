@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "src/base/aligned.h"
-#include "src/field/adam.h"
 #include "src/engine/state.h"
+#include "src/field/adam.h"
 #include "src/field/cpu/mlp_kernels.h"
 #include "src/field/mlp_layout.h"
 

@@ -9,7 +9,7 @@ PointNetCpu::PointNetCpu(const HashGridOptions& grid, int outputs, bool relu_out
     : outputs_(outputs),
       relu_output_(relu_output),
       grid_(grid, seed),
-      net_(point_net_layout(static_cast<int>(grid_.levels().size()), outputs), seed, kPointNetStream, relu_output) {}
+      net_(point_net_layout(int(grid_.levels().size()), outputs), seed, kPointNetStream, relu_output) {}
 
 void PointNetCpu::set_points(std::span<const Vec3f> points, PointWorkspace& work) const {
   work.groups = (points.size() + kGroup - 1) / kGroup;

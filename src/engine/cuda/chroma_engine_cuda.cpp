@@ -40,7 +40,7 @@ class ChromaEngineCuda final : public ChromaEngine {
     d_head_.reserve(std::size_t(parts) * std::size_t(chroma_head_weight_count()), "nets");
 
     features_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/true, stream_);
-    const float scale = 1.0f / static_cast<float>(n);
+    const float scale = 1.0f / float(n);
     chroma_loss(head_job(),
                 {labels_.data(), batch_.upload_weights(pixel_weights, stream_), centres_.data(), scale, more.spread,
                  more.regression, d_composited_.data(), d_head_.data(), &stream_.step()->loss},

@@ -34,7 +34,7 @@ class ChromaticityEngineCuda final : public ChromaticityEngine {
     auto* d_logs = reinterpret_cast<float2*>(d_logs_.data());
 
     field_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/true, stream_);
-    const float scale = 1.0f / static_cast<float>(n);
+    const float scale = 1.0f / float(n);
     chromaticity_loss(
         batch_.arrays(), field_.numbers(),
         {colors_.data(), batch_.upload_weights(pixel_weights, stream_), loss, scale, d_logs, &stream_.step()->loss},

@@ -32,10 +32,6 @@ const char* const kSampleAdvice = "the samples of a step; lower stage1.samples_p
 const char* const kImageAdvice = "the training images; raise capture.downscale";
 const char* const kRayAdvice = "rays";
 
-}  // namespace
-
-namespace {
-
 /// Puts traced samples in the order of their rays and leaves out the light ones.
 void append_heaviest(std::span<const TracedRay> rays, const WeightedSample* found, const RenderEffort& effort,
                      std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) {

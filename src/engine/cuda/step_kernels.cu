@@ -127,7 +127,7 @@ __global__ void end(StepState* state, std::uint32_t wanted_samples, std::uint32_
   reports[state->step % kStepRing] = {
       state->loss / rays, state->squared_error / rays, state->rays, state->marched, trained, state->dropped};
   const double fill = double(wanted_samples) / double(max(state->samples, 64u));
-  const auto next = static_cast<std::int64_t>(rays * (fill < 0.5 ? 0.5 : fill > 2.0 ? 2.0 : fill)) / 16 * 16;
+  const auto next = std::int64_t(rays * (fill < 0.5 ? 0.5 : fill > 2.0 ? 2.0 : fill)) / 16 * 16;
   state->rays = std::uint32_t(next < 64 ? 64 : next > most_rays ? most_rays : next);
   state->step += 1;
 }

@@ -97,9 +97,8 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
     sums.marched += unsigned(ray.marched);
     sums.dropped += ray.has_room ? 0u : 1u;
   }
-  const float d_seen =
-      ray.has_room ? 2.0f * error * lightness_derivative(seen) / (100.0f * static_cast<float>(n_rays)) : 0.0f;
-  const float d_distortion = ray.has_room ? job.distortion_weight / static_cast<float>(n_rays) : 0.0f;
+  const float d_seen = ray.has_room ? 2.0f * error * lightness_derivative(seen) / (100.0f * float(n_rays)) : 0.0f;
+  const float d_distortion = ray.has_room ? job.distortion_weight / float(n_rays) : 0.0f;
   // By Euler's theorem, the derivatives of the distortion by the weights, times the weights, sum up to twice itself.
   float distortion_behind = 2.0f * distortion.value;
   RunDistortion again;
@@ -295,7 +294,7 @@ __global__ void sum_densities(std::size_t cells, const float* density, double* t
   atomicAdd(&totals[2 * blockIdx.y + 1], double(included));
 }
 
-/// Early in training nothing reaches the threshold; then the densest half is what is worth sampling.
+/// Early in training nothing reaches the threshold; then cells denser than the mean are what is worth sampling.
 /// @param totals  null: the threshold alone counts
 __global__ void set_bits(OccupancyLayout layout, float optical_thickness, const float* density, const double* totals,
                          std::uint32_t* bits) {
@@ -304,7 +303,7 @@ __global__ void set_bits(OccupancyLayout layout, float optical_thickness, const 
   const int cascade = int(cell / layout.cells_of_cascade());
   float threshold = optical_thickness / layout.cell_side(cascade);
   if (totals != nullptr) {
-    threshold = fminf(threshold, static_cast<float>(totals[2 * cascade] / (1.0 + totals[2 * cascade + 1])));
+    threshold = fminf(threshold, float(totals[2 * cascade] / (1.0 + totals[2 * cascade + 1])));
   }
   const unsigned word = __ballot_sync(~0u, density[cell] > threshold);
   if (threadIdx.x % 32 == 0) bits[cell / 32] = word;

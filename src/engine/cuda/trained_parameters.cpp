@@ -24,7 +24,7 @@ void TrainedNet::upload() const {
 
 TrainedGrid::TrainedGrid(const HashGridOptions& options, std::uint64_t seed, const std::string& use)
     : levels_(hash_grid_levels(options)),
-      decay_(static_cast<float>(options.decay)),
+      decay_(float(options.decay)),
       table_(initial_table(levels_, seed), use),
       moments_(std::vector<float>(rows() * std::size_t(8), 0.0f), use),
       d_table_(rows() * std::size_t(4), use),
@@ -36,8 +36,9 @@ void TrainedGrid::backward(const float4* places, SampleCount samples, const void
 }
 
 void TrainedGrid::update(const AdamStep* adam, cudaStream_t stream) const {
-  update_table(adam, rows(), decay_, reinterpret_cast<float4*>(table_.data()), reinterpret_cast<float4*>(d_table_.data()),
-               reinterpret_cast<float4*>(moments_.data()), reinterpret_cast<uint2*>(halves_.data()), stream);
+  update_table(adam, rows(), decay_, reinterpret_cast<float4*>(table_.data()),
+               reinterpret_cast<float4*>(d_table_.data()), reinterpret_cast<float4*>(moments_.data()),
+               reinterpret_cast<uint2*>(halves_.data()), stream);
 }
 
 void TrainedGrid::append_state(const std::string& prefix, std::vector<StatePiece>& state) {

@@ -23,7 +23,7 @@ constexpr std::int64_t kEncodedPosition = 3 * (1 + 2 * kPositionFrequencies);
 constexpr std::int64_t kEncodedDirection = 3 * (1 + 2 * kDirectionFrequencies);
 constexpr float kNearOfSurroundings = 0.02f;      // unit lengths, where a capture has no near bound
 constexpr std::int64_t kPointsAtATime = 1 << 17;  // bounds the memory of activations without gradients
-constexpr std::uint64_t kChromaStream = 0x6368726f6d61ull;
+constexpr std::uint64_t kChromaStream = named_stream("chroma");
 
 torch::Device device() {
   return torch::cuda::is_available() ? torch::kCUDA : torch::kCPU;
@@ -569,7 +569,7 @@ class PositionalChromaEngine final : public ChromaEngine {
 }  // namespace
 
 PositionalRays positional_rays(const Capture& capture, const SceneFrame& frame) {
-  if (capture.depth_range) return {static_cast<float>(0.9 * capture.depth_range->near * frame.unit_per_world), true};
+  if (capture.depth_range) return {float(0.9 * capture.depth_range->near * frame.unit_per_world), true};
   if (frame.cascades == 1) return {};
   return {kNearOfSurroundings, true};
 }

@@ -52,7 +52,7 @@ __device__ inline std::uint32_t bfloats_of_halves(std::uint32_t halves) {
 
 /// Loads a left operand [16, 16] from shared memory.  @param row_of_lane  the row `lane % 16`, at column 8 (lane / 16)
 __device__ inline void load_operand(std::uint32_t (&a)[4], const void* row_of_lane) {
-  const auto address = static_cast<std::uint32_t>(__cvta_generic_to_shared(row_of_lane));
+  const auto address = std::uint32_t(__cvta_generic_to_shared(row_of_lane));
   asm volatile("ldmatrix.sync.aligned.m8n8.x4.shared.b16 {%0,%1,%2,%3}, [%4];"
                : "=r"(a[0]), "=r"(a[1]), "=r"(a[2]), "=r"(a[3])
                : "r"(address)
@@ -60,14 +60,14 @@ __device__ inline void load_operand(std::uint32_t (&a)[4], const void* row_of_la
 }
 /// Four 8 x 8 matrices, each transposed.
 __device__ inline void load_transposed(std::uint32_t (&a)[4], const void* row_of_lane) {
-  const auto address = static_cast<std::uint32_t>(__cvta_generic_to_shared(row_of_lane));
+  const auto address = std::uint32_t(__cvta_generic_to_shared(row_of_lane));
   asm volatile("ldmatrix.sync.aligned.m8n8.x4.trans.shared.b16 {%0,%1,%2,%3}, [%4];"
                : "=r"(a[0]), "=r"(a[1]), "=r"(a[2]), "=r"(a[3])
                : "r"(address)
                : "memory");
 }
 __device__ inline uint2 load_transposed_pair(const void* row_of_lane) {
-  const auto address = static_cast<std::uint32_t>(__cvta_generic_to_shared(row_of_lane));
+  const auto address = std::uint32_t(__cvta_generic_to_shared(row_of_lane));
   uint2 b;
   asm volatile("ldmatrix.sync.aligned.m8n8.x2.trans.shared.b16 {%0,%1}, [%2];"
                : "=r"(b.x), "=r"(b.y)

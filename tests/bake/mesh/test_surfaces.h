@@ -20,8 +20,7 @@ inline BrickGrid<float> covered_voxels(Vec3i size, const std::function<double(Ve
     for (int y = 2; y < size.y - 2; ++y)
       for (int z = 2; z < size.z - 2; ++z) {
         const double covered = share({x + 0.5, y + 0.5, z + 0.5});
-        if (covered > 0)
-          sigma.set({x, y, z}, static_cast<float>(std::min(kOpaque, -std::log1p(-std::min(covered, 1 - 1e-9)))));
+        if (covered > 0) sigma.set({x, y, z}, float(std::min(kOpaque, -std::log1p(-std::min(covered, 1 - 1e-9)))));
       }
   return sigma;
 }

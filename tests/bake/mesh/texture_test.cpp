@@ -65,8 +65,8 @@ TEST(MeshBake, ASphereWearsItsColours) {
     double worst = 0;
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
       EXPECT_NEAR(length(mesh.positions[v] - Vec3f{1, 2, 3}), 0.6, 0.02) << "world units";
-      const int x = static_cast<int>(mesh.uvs[v].u * texture.size), y = static_cast<int>(mesh.uvs[v].v * texture.size);
-      const Vec3f color = texture.rgb[static_cast<std::size_t>(y) * texture.size + x];
+      const int x = int(mesh.uvs[v].u * texture.size), y = int(mesh.uvs[v].v * texture.size);
+      const Vec3f color = texture.rgb[std::size_t(y) * texture.size + x];
       const Vec3f expected = sphere_color(kFrame.unit_from_world(mesh.positions[v].cast<double>()).cast<float>());
       for (int c = 0; c < 3; ++c) worst = std::max<double>(worst, std::abs(color[c] - expected[c]));
     }
@@ -160,7 +160,7 @@ TEST(FillIn, ColoursReachOverTheGutterAndTheRestIsTheirMean) {
   texture.rgb.resize(256);
   texture.coverage.resize(256);
   for (auto* map : {&texture.luminance, &texture.a, &texture.b}) map->resize(256);
-  const auto at = [](int x, int y) { return static_cast<std::size_t>(y) * 16 + x; };
+  const auto at = [](int x, int y) { return std::size_t(y) * 16 + x; };
   texture.rgb[at(3, 3)] = {1, 0, 0};
   texture.rgb[at(12, 12)] = {0, 0, 1};
   texture.coverage[at(3, 3)] = texture.coverage[at(12, 12)] = 1;

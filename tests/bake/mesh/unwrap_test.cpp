@@ -28,7 +28,7 @@ SurfaceMesh test_mesh(int which) {
 std::size_t doubly_covered(const UnwrappedMesh& mesh) {
   constexpr int kFiner = 4;
   const int side = mesh.size * kFiner;
-  std::vector<std::uint8_t> hits(static_cast<std::size_t>(side) * side, 0);
+  std::vector<std::uint8_t> hits(std::size_t(side) * side, 0);
   for (std::size_t f = 0; f < mesh.mesh.triangles.size(); ++f) {
     const PlanarTriangle t = mesh.texture_triangle(f);
     const double area = signed_area(t);
@@ -41,11 +41,11 @@ std::size_t doubly_covered(const UnwrappedMesh& mesh) {
         const Point2 p{(x + 0.5f) / kFiner, (y + 0.5f) / kFiner};
         bool is_inside = true;
         for (int c = 0; c < 3; ++c) is_inside = is_inside && signed_area({t[c], t[(c + 1) % 3], p}) / area > 1e-3;
-        if (is_inside) ++hits[static_cast<std::size_t>(y) * side + x];
+        if (is_inside) ++hits[std::size_t(y) * side + x];
       }
     }
   }
-  return static_cast<std::size_t>(std::count_if(hits.begin(), hits.end(), [](auto n) { return n > 1; }));
+  return std::size_t(std::count_if(hits.begin(), hits.end(), [](auto n) { return n > 1; }));
 }
 
 class Unwrap : public testing::TestWithParam<int> {};
@@ -70,20 +70,20 @@ TEST_P(Unwrap, EveryFaceIsInOneChartAndNoTwoOverlap) {
 
 TEST_P(Unwrap, ChartsKeepTheirDistance) {
   const UnwrappedMesh mesh = unwrap(test_mesh(GetParam()), kSize, kGutter);
-  std::vector<int> owner(static_cast<std::size_t>(kSize) * kSize, -1);
+  std::vector<int> owner(std::size_t(kSize) * kSize, -1);
   for (const SurfaceTexel& texel : surface_texels(mesh)) {
-    owner[static_cast<std::size_t>(texel.row) * kSize + texel.column] = int(mesh.chart[texel.triangle]);
+    owner[std::size_t(texel.row) * kSize + texel.column] = int(mesh.chart[texel.triangle]);
     EXPECT_TRUE(texel.column >= kGutter && texel.row >= kGutter && texel.column < kSize - kGutter &&
                 texel.row < kSize - kGutter);
   }
   for (int y = 0; y < kSize; ++y) {
     for (int x = 0; x < kSize; ++x) {
-      const int chart = owner[static_cast<std::size_t>(y) * kSize + x];
+      const int chart = owner[std::size_t(y) * kSize + x];
       if (chart < 0) continue;
       for (int dy = 0; dy <= 2 * kGutter && y + dy < kSize; ++dy) {
         for (int dx = -2 * kGutter; dx <= 2 * kGutter; ++dx) {
           if (x + dx < 0 || x + dx >= kSize) continue;
-          const int other = owner[static_cast<std::size_t>(y + dy) * kSize + x + dx];
+          const int other = owner[std::size_t(y + dy) * kSize + x + dx];
           ASSERT_TRUE(other < 0 || other == chart) << x << ", " << y << " and " << dx << ", " << dy;
         }
       }
@@ -115,7 +115,7 @@ TEST(UnwrapChecks, OverlapsAreNoticed) {
   UnwrappedMesh mesh = unwrap(sphere_surface(24, 8), kSize, kGutter);
   for (Point2& texel : mesh.texels) texel = texel * 0.5f + Point2{100, 100};
   UnwrappedMesh twice = mesh;
-  const auto first = static_cast<std::uint32_t>(mesh.texels.size());
+  const auto first = std::uint32_t(mesh.texels.size());
   for (const Point2 texel : mesh.texels) twice.texels.push_back(texel + Point2{3, 1});
   for (const Triangle& t : mesh.mesh.triangles)
     twice.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
