@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# From a bare Debian 12 to a colour volume: installs what is missing, builds, makes the sample capture and runs it.
+# From a bare Debian 12 or 13 to a colour volume: installs what is missing, builds, makes the sample capture and runs it.
 #   bash scripts/demo.sh [FOLDER]    results go to FOLDER, else to out/demo
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -19,4 +19,8 @@ echo "volume (OpenVDB):    $(ls "$out"/run/bakes/*/*.vdb)"
 echo "before and after:    $out/run/contact_sheet.png"
 echo "turntable video:     $(ls "$out"/run/renders/*/turntable.mp4)"
 echo "metrics:             $out/run/metrics.json"
-echo "in a browser:        $cnerf view $out/run"
+if [ -f build/release/viewer/page/index.html ]; then
+  echo "in a browser:        $cnerf view $out/run"
+else
+  echo "in a browser:        not yet: the viewer's page could not be built; it wants npm and what 'npm ci --prefix viewer' gets"
+fi
