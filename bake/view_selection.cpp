@@ -95,7 +95,7 @@ void ViewSelection::find(std::size_t level, const SightBatch& batch, SeenBatch& 
 std::unique_ptr<ViewSelection> select_views(const std::vector<BakeCamera>& cameras, std::vector<DensityLevel> levels,
                                             const BakeOptions& options) {
 #if CNERF_CUDA_BAKE
-  if (engine_device() == EngineDevice::kCuda) {
+  if (engine_device() == Device::kCuda) {
     try {
       return std::make_unique<ViewSelectionCuda>(cameras, levels, options);
     } catch (const DeviceError&) {

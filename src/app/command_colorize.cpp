@@ -33,8 +33,7 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
   if (arguments.view) {
     live.emplace("Colorizing " + context.capture.root.filename().string() + ", take " + take, arguments.browser,
                  reporter);
-    context.watcher = live->watching(reporter.sink());
-    context.previews = live->previews();
+    context.watcher = &*live;
   }
   colorize_step(context, take, arguments.existing);
   reporter.next("cnerf bake " + arguments.run.run + " --take " + take);

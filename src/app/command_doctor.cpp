@@ -15,7 +15,7 @@
 #include "src/base/parallel.h"
 #include "src/base/program.h"
 #include "src/config/config.h"
-#include "src/engine/select_engine.h"
+#include "src/engine/engines.h"
 #include "viewer/server/page_folder.h"
 
 namespace cnerf {
@@ -74,12 +74,19 @@ std::string presets_text() {
   return text.empty() ? "none found" : text + " in " + preset_file(preset_names().front()).parent_path().string();
 }
 
+std::string cuda_text() {
+  if (!has_cuda_engines()) return "not built in; fields are trained on the processor";
+  const Engines* cuda = cuda_engines();
+  return cuda != nullptr ? cuda->description()
+                         : "built in, but no GPU that can be used was found; fields are trained on the processor";
+}
+
 void doctor() {
   line("cnerf", version_text());
-  line("processor", fmt::format("{} threads, {}", thread_count(), to_string(detected_isa())));
+  line("processor", cpu_engines().description());
   line("memory", memory_text());
   line("disk", disk_text());
-  line("CUDA", cuda_engine_text());
+  line("CUDA", cuda_text());
   line("LibTorch", CNERF_TORCH_VERSION);
   line("BLAS", blas_text());
   line("OpenCV", CV_VERSION);

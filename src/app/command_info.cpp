@@ -75,7 +75,7 @@ void print_capture(const Capture& capture, const Config& config) {
 }
 
 void print_scene(const fs::path& stage1, const fs::path& take) {
-  const auto scene = Scene::load(stage1, take);
+  const auto scene = Scene::load(stage1, take, cpu_engines());
   print_frame(scene->frame());
   if (scene->is_colorized()) line("colorizer", "{}", scene->colorizer());
 }

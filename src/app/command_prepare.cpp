@@ -18,7 +18,7 @@ struct PrepareArguments {
 void prepare(const PrepareArguments& arguments) {
   Reporter reporter(progress_style(arguments.progress, stdout));
   set_thread_count(arguments.threads);
-  prepare_step(arguments.source, arguments.out, arguments.options, arguments.existing, reporter);
+  prepare_step(arguments.source, arguments.out, arguments.options, arguments.existing, engines_for("auto"), reporter);
   reporter.next("cnerf run " + arguments.out + " -o run --preset quick");
 }
 

@@ -63,7 +63,7 @@ void render_bake(const RenderArguments& arguments, Reporter& reporter) {
   const fs::path folder = (arguments.out.empty() ? bake / "renders" : fs::path(arguments.out)) / path.name;
   refuse_existing(folder, arguments.overwrite);
   const std::vector<BakedVolume> volumes = read_volumes(bake);
-  const ProgressSink progress = reporter.sink();
+  const ProgressSink progress = reporter.progress_sink();
   for (std::size_t i = 0; i < path.cameras.size(); ++i) {
     const PathCamera& camera = path.cameras[i];
     const VolumeImage image = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);

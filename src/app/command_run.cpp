@@ -55,7 +55,8 @@ void run(RunArguments arguments) {
   arguments.capture = capture_of(arguments.capture, arguments.out, reporter).string();
 
   Capture capture = read_capture(arguments.capture, config, reporter);
-  RunContext context{RunDirectory(arguments.out), config, std::move(capture), arguments.command_line, reporter};
+  RunContext context{RunDirectory(arguments.out), config,   std::move(capture),
+                     arguments.command_line,      reporter, engines_for(config.device)};
   // Made before the training: what cannot be made or read should not cost an hour.
   if (!arguments.grey) (void)load_known_colors(context.capture, context.config.colorizer);
   auto colorizer = needs_colorizer(arguments, context.directory) ? colorizer_of(context) : nullptr;

@@ -22,7 +22,7 @@ void sample(const SampleArguments& arguments) {
   Reporter reporter(progress_style(arguments.progress, stdout));
   set_thread_count(arguments.threads);
   refuse_existing(fs::path(arguments.out) / "transforms.json", arguments.overwrite);
-  write_sample_scene(arguments.out, arguments.options, reporter.sink());
+  write_sample_scene(arguments.out, arguments.options, reporter.progress_sink());
   reporter.wrote("capture", arguments.out);
   reporter.next("cnerf run " + arguments.out + " -o run --preset quick");
 }

@@ -21,13 +21,13 @@ void train(const TrainArguments& arguments, const std::vector<std::string>& comm
   RunDirectory directory(arguments.out);
   const bool goes_on = arguments.existing.resume && directory.exists();
   const Config config = resolve_config(arguments.config, goes_on ? directory.config() : Config{});
-  RunContext context{directory, config, read_capture(arguments.capture, config, reporter), command_line, reporter};
+  RunContext context{directory,    config,   read_capture(arguments.capture, config, reporter),
+                     command_line, reporter, engines_for(config.device)};
   check_run_folder(directory, arguments.existing);
   std::optional<LiveSession> live;
   if (arguments.view) {
     live.emplace("Training " + context.capture.root.filename().string(), arguments.browser, reporter);
-    context.watcher = live->watching(reporter.sink());
-    context.previews = live->previews();
+    context.watcher = &*live;
   }
   begin_run(context, arguments.capture, arguments.existing);
   train_step(context, arguments.existing.resume);

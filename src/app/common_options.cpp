@@ -88,7 +88,7 @@ Config resolve_config(const ConfigArguments& arguments, Config base) {
   for (const std::string& setting : arguments.settings) apply_setting(setting, base);
   for (const std::string& setting : arguments.short_forms) apply_setting(setting, base);
   check_consistency(base);
-  select_engine_device(base.device);
+  select_engine_device(engines_for(base.device).device());
   set_thread_count(base.threads);
   return base;
 }

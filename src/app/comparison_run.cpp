@@ -109,19 +109,18 @@ std::vector<LearningPoint> read_curve(const fs::path& file) {
 
 /// Trains stage 1, and leaves the curve of its PSNR beside the snapshot.
 Stage1Report train_measured(const Capture& capture, std::span<const View* const> views, const Stage1Options& options,
-                            const fs::path& snapshot, const EngineMakers& makers, const ProgressSink& progress) {
+                            const fs::path& snapshot, const Engines& engines, Observer& observer) {
   const SceneFrame frame = place_scene(capture, options.placement);
   const HeldOutPixels pixels(views, frame, kMeasuredPixels);
   const MarchSettings march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
-  EngineWatch engines;
-  LearningCurve curve([&] { return pixels.psnr(*engines.luminance, march); });
-  const Stage1Report report =
-      train_stage1(capture, options, snapshot, true, curve.watching("stage 1", progress), {}, engines.over(makers));
+  const WatchedEngines watched(engines);
+  LearningCurve curve("stage 1", observer, [&] { return pixels.psnr(watched.luminance(), march); });
+  const Stage1Report report = train_stage1({capture, options, snapshot, true}, watched, curve);
   // The engine is gone; what it came to is in the snapshot. What an earlier part of the training took comes first.
   const double before = curve.points().empty() ? report.seconds : report.seconds - curve.seconds();
   std::vector<LearningPoint> points = curve.points();
   for (LearningPoint& point : points) point.seconds += std::max(before, 0.0);
-  points.push_back({report.seconds, pixels.psnr(*LuminanceModel::load(snapshot, makers).engine, march)});
+  points.push_back({report.seconds, pixels.psnr(*LuminanceModel::load(snapshot, engines).engine, march)});
   write_file(fs::path(snapshot).replace_extension(".curve"), to_text(points));
   return report;
 }
@@ -179,9 +178,9 @@ struct ComparisonRun::Geometry {
 
 /// What a method's colours stand on.
 struct ComparisonRun::Field {
-  fs::path stage1;      ///< snapshot
-  EngineMakers makers;  ///< of it and of the colours
-  EngineMakers own;     ///< of a stage 1 of its own
+  fs::path stage1;                         ///< snapshot
+  std::shared_ptr<const Engines> own;      ///< of a stage 1 of its own, and of colours on it
+  std::shared_ptr<const Engines> engines;  ///< of `stage1` and of the colours
   bool is_shared = true;
 };
 
@@ -189,13 +188,14 @@ ComparisonRun::Field ComparisonRun::field_of(const Subject& subject, const Metho
                                              const Geometry& geometry) const {
   Field field;
   field.stage1 = geometry.folder / "stage1.snapshot";
+  field.engines = {std::shared_ptr<void>(), &engines_};  // not owned
   if (!method.has_own_field) return field;
-  const SceneFrame frame = place_scene(subject.capture, config_.stage1.placement);
-  field.own = positional_engines(positional_rays(subject.capture, frame), config_.compare.positional_trains_encoding);
-  field.makers = field.own;
+  const PositionalRays rays = positional_rays(subject.capture, place_scene(subject.capture, config_.stage1.placement));
+  const bool trains_encoding = config_.compare.positional_trains_encoding;
+  field.own = field.engines = positional_engines(rays, trains_encoding);
   field.is_shared = config_.compare.positional_geometry == "shared";
   if (field.is_shared) {
-    field.makers.luminance = make_luminance_engine;
+    field.engines = positional_engines(rays, trains_encoding, &engines_);
   } else {
     field.stage1 = geometry.folder / method.name / "stage1.snapshot";
   }
@@ -203,7 +203,7 @@ ComparisonRun::Field ComparisonRun::field_of(const Subject& subject, const Metho
 }
 
 ComparisonRun::ComparisonRun(ComparisonPlan plan, Config config, Reporter& reporter)
-    : plan_(std::move(plan)), config_(std::move(config)), reporter_(reporter) {
+    : plan_(std::move(plan)), config_(std::move(config)), reporter_(reporter), engines_(engines_for(config_.device)) {
   if (!plan_.lpips_weights.empty()) lpips_ = std::make_unique<Lpips>(plan_.lpips_weights);
   if (is_simulated(config_.colorizer.spec)) (void)simulation_of(config_.colorizer.spec);
   for (const auto& [path, downscale] : plan_.captures) {
@@ -273,7 +273,7 @@ std::string ComparisonRun::train(const Subject& subject, int seed, const fs::pat
   begin_folder(folder, settings);
   reporter_.say(fmt::format("{}, seed {}: stage 1", subject.name, seed));
   const Stage1Report report =
-      train_measured(subject.capture, subject.evaluated, options, folder / "stage1.snapshot", {}, reporter_.sink());
+      train_measured(subject.capture, subject.evaluated, options, folder / "stage1.snapshot", engines_, reporter_);
   write_file(done, fmt::format("{} steps, {:.1f} s, {:.2f} dB on training pixels\n", report.steps, report.seconds,
                                report.train_psnr));
   return settings;
@@ -326,18 +326,18 @@ std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, 
 }
 
 /// Stage 1 of a method that has a field of its own: some times as long as the shared one took.
-void ComparisonRun::train_own_field(const Subject& subject, int seed, const Geometry& geometry,
-                                    const EngineMakers& makers, ComparisonCell& cell) const {
+void ComparisonRun::train_own_field(const Subject& subject, int seed, const Geometry& geometry, const Engines& engines,
+                                    ComparisonCell& cell) const {
   Stage1Options options = config_.stage1;
   options.seed = seed;
   options.steps = kManySteps;
   options.checkpoint_every = 0;
   options.max_seconds =
-      config_.compare.positional_budget * LuminanceModel::load(geometry.folder / "stage1.snapshot").seconds;
+      config_.compare.positional_budget * LuminanceModel::load(geometry.folder / "stage1.snapshot", engines_).seconds;
   options.learning_rate = config_.compare.positional_learning_rate;
   options.final_learning_rate = config_.compare.positional_final_learning_rate;
   const fs::path snapshot = geometry.folder / cell.method / "stage1.snapshot";
-  (void)train_measured(subject.capture, subject.evaluated, options, snapshot, makers, reporter_.sink());
+  (void)train_measured(subject.capture, subject.evaluated, options, snapshot, engines, reporter_);
   cell.stage1_curve = read_curve(fs::path(snapshot).replace_extension(".curve"));
 }
 
@@ -350,10 +350,12 @@ StyleReport ComparisonRun::transfer(const Subject& subject, const fs::path& stag
     throw UsageError(
         "style-transfer: needs a network of features: --lpips-weights of AlexNet, or compare.style_network");
   }
-  const LabPicture reference = compare.style_reference.empty() ? colorized_view(subject.capture, stage1, colorizer)
-                                                               : reference_image(compare.style_reference);
+  const LabPicture reference = compare.style_reference.empty()
+                                   ? colorized_view(subject.capture, stage1, colorizer, engines_)
+                                   : reference_image(compare.style_reference);
   const StyleLoss loss(network, reference);
-  return transfer_style(subject.capture, stage1, loss, reference, options, compare.style_steps, take, reporter_.sink());
+  return transfer_style(subject.capture, stage1, loss, reference, options, compare.style_steps, take, engines_,
+                        reporter_);
 }
 
 void ComparisonRun::colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry,
@@ -361,7 +363,7 @@ void ComparisonRun::colorize(const Subject& subject, const Method& method, int s
   Stage2Options options = stage2_of(method, config_.stage2, config_.compare);
   options.seed = seed;
   Field field = field_of(subject, method, geometry);
-  if (method.has_own_field) train_own_field(subject, seed, geometry, field.own, cell);
+  if (method.has_own_field) train_own_field(subject, seed, geometry, *field.own, cell);
   const auto colorizer = colorizer_for(subject, method, seed);
   const fs::path take = geometry.folder / method.name / "take.snapshot";
   if (method.matches_features) {
@@ -373,23 +375,29 @@ void ComparisonRun::colorize(const Subject& subject, const Method& method, int s
 
   const bool is_measured = method.has_own_field || std::string(method.name) == kMethods[0].name;
   std::optional<HeldOutPixels> pixels;
-  EngineWatch engines;
-  LearningCurve curve([&] { return pixels->ab_error(*engines.chroma, float(options.decode_temperature)); });
-  ProgressSink progress = reporter_.sink();
+  const WatchedEngines engines(*field.engines);
+  LearningCurve curve("stage 2", reporter_,
+                      [&] { return pixels->ab_error(engines.color_bins(), float(options.decode_temperature)); });
   if (is_measured && options.injection == "classification") {
-    const LuminanceModel model = LuminanceModel::load(field.stage1, field.makers);
+    const LuminanceModel model = LuminanceModel::load(field.stage1, *field.engines);
     pixels.emplace(subject.evaluated, model.frame, kMeasuredPixels);
     pixels->trace(*model.engine, model.march());
-    progress = curve.watching("stage 2", progress);
   }
   if (pixels) fs::remove(take);  // a curve is of one training from its beginning
   std::vector<CachedView> own_views;
-  const Stage2Report report =
-      train_stage2(subject.capture, field.stage1, options, *colorizer, {}, take, true, progress, {},
-                   field.is_shared ? &geometry.training_views : &own_views, engines.over(field.makers));
+  Observer& observer = pixels ? static_cast<Observer&>(curve) : reporter_;
+  const Stage2Report report = train_stage2({subject.capture,
+                                            field.stage1,
+                                            options,
+                                            *colorizer,
+                                            {},
+                                            take,
+                                            true,
+                                            field.is_shared ? &geometry.training_views : &own_views},
+                                           engines, observer);
   if (pixels && !curve.points().empty()) {
     cell.stage2_curve = curve.points();
-    const ColorModel model = ColorModel::load(take, field.makers);
+    const ColorModel model = ColorModel::load(take, *field.engines);
     cell.stage2_curve.push_back({curve.seconds(), pixels->ab_error(*model.chroma, float(options.decode_temperature))});
   }
   if (std::string(method.name) == kMethods[0].name) {
@@ -406,7 +414,7 @@ void ComparisonRun::look(const Subject& subject, const Method& method, Geometry&
   const fs::path folder = geometry.folder / method.name;
   const Field field = field_of(subject, method, geometry);
   const auto scene = Scene::load(field.stage1, method.is_colored ? folder / "take.snapshot" : fs::path(),
-                                 field.is_shared ? geometry.traces : nullptr, field.makers);
+                                 *field.engines, field.is_shared ? geometry.traces : nullptr);
   EvaluateOptions options;
   options.render = render_options(config_);
   options.lpips = lpips_.get();
@@ -421,7 +429,7 @@ void ComparisonRun::look(const Subject& subject, const Method& method, Geometry&
                picture_of(view.ours, ShownColor::kDecoded), kPictureWidth, kPictureQuality);
   };
   const std::string colorizer = cell.metrics.colorizer;
-  cell.metrics = evaluate(*scene, subject.capture, options, keep_shown, reporter_.sink());
+  cell.metrics = evaluate(*scene, subject.capture, options, keep_shown, reporter_.progress_sink());
   cell.metrics.take = method.name;
   cell.metrics.colorizer = colorizer;
 
@@ -435,7 +443,7 @@ void ComparisonRun::look(const Subject& subject, const Method& method, Geometry&
     write_jpeg(folder / "turntable" / numbered(frames.size() - 1), picture_of(frames.back(), ShownColor::kDecoded),
                kPictureWidth, kFrameQuality);
     seen.push_back({&frames.back(), camera.intrinsics, camera.world_from_camera});
-    reporter_.sink()({"turntable", double(frames.size()) / double(path.cameras.size()), {}});
+    reporter_.progress_sink()({"turntable", double(frames.size()) / double(path.cameras.size()), {}});
   }
   if (!method.is_colored) return;
   cell.short_range = consistency(seen, 1);

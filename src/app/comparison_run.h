@@ -64,7 +64,7 @@ class ComparisonRun {
   void run_capture(const Subject& subject, int seed);
   void collect(const Subject& subject, int seed);
   [[nodiscard]] std::string train(const Subject& subject, int seed, const std::filesystem::path& folder) const;
-  void train_own_field(const Subject& subject, int seed, const Geometry& geometry, const EngineMakers& makers,
+  void train_own_field(const Subject& subject, int seed, const Geometry& geometry, const Engines& engines,
                        ComparisonCell& cell) const;
   [[nodiscard]] ComparisonCell run_cell(const Subject& subject, const Method& method, int seed, Geometry& geometry,
                                         const std::string& settings) const;
@@ -83,6 +83,7 @@ class ComparisonRun {
   ComparisonPlan plan_;
   Config config_;
   Reporter& reporter_;
+  const Engines& engines_;
   std::unique_ptr<Lpips> lpips_;
   std::vector<std::shared_ptr<Subject>> subjects_;
   std::vector<ComparisonCell> cells_;

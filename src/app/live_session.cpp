@@ -6,7 +6,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
-#include "src/base/interruption.h"
 #include "src/base/usage.h"
 #include "src/evaluate/contact_sheet.h"
 #include "viewer/server/page_folder.h"
@@ -47,30 +46,24 @@ void add_browser_options(CLI::App& app, BrowserArguments& arguments) {
   app.add_flag("--no-browser", arguments.no_browser, "Only print the address");
 }
 
-LiveSession::LiveSession(const std::string& title, const BrowserArguments& arguments, Reporter& reporter)
-    : feed_(title), server_({find_page()}, arguments.server, &feed_) {
+LiveSession::LiveSession(const std::string& title, const BrowserArguments& arguments, Observer& inner)
+    : inner_(inner), feed_(title), server_({find_page()}, arguments.server, &feed_) {
   server_.start();
-  reporter.say("view: " + server_.address());
-  if (find_page().empty()) reporter.say("note: this cnerf was built without the page; the address serves data only");
+  inner_.say("view: " + server_.address());
+  if (find_page().empty()) inner_.say("note: this cnerf was built without the page; the address serves data only");
   if (!arguments.no_browser) open_browser(server_.address());
 }
 
 LiveSession::~LiveSession() {
-  feed_.say(interruption_requested()         ? "Stopped and saved. The same command with --resume goes on."
+  feed_.say(is_cancelled()                   ? "Stopped and saved. The same command with --resume goes on."
             : std::uncaught_exceptions() > 0 ? "Ended with an error; the terminal says which."
                                              : "Finished.",
             true);
   std::this_thread::sleep_for(std::chrono::milliseconds(700));  // so that tabs hear it
 }
 
-ProgressSink LiveSession::watching(ProgressSink inner) {
-  return [this, inner = std::move(inner)](const Progress& progress) {
-    inner(progress);
-    look(progress);
-  };
-}
-
-void LiveSession::look(const Progress& progress) {
+void LiveSession::report_progress(const Progress& progress) {
+  inner_.report_progress(progress);
   const auto now = Clock::now();
   const bool is_new = progress.task != task_;
   if (is_new || progress.fraction >= 1 || now - last_shown_ >= kBetweenReports) {
@@ -79,17 +72,14 @@ void LiveSession::look(const Progress& progress) {
     feed_.progress(progress);
   }
   feed_.wait_while_paused();
-  if (feed_.stop_requested()) request_interruption();
 }
 
-PreviewSink LiveSession::previews() {
-  return [this](const DrawPreview& draw) {
-    if (Clock::now() < next_picture_) return;
-    const Stopwatch watch;
-    show(draw(drawn_++));
-    const double pause = std::max(kLeastBetweenPictures, watch.seconds() / kPictureShare);
-    next_picture_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(pause));
-  };
+void LiveSession::offer_preview(const DrawPreview& draw) {
+  if (Clock::now() < next_picture_) return;
+  const Stopwatch watch;
+  show(draw(drawn_++));
+  const double pause = std::max(kLeastBetweenPictures, watch.seconds() / kPictureShare);
+  next_picture_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(pause));
 }
 
 void LiveSession::show(const PreviewPicture& picture) {

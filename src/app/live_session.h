@@ -6,9 +6,7 @@
 #include <cstddef>
 #include <string>
 
-#include "src/app/reporter.h"
-#include "src/base/preview.h"
-#include "src/base/progress.h"
+#include "src/base/observer.h"
 #include "viewer/server/live_feed.h"
 #include "viewer/server/web_server.h"
 
@@ -24,25 +22,29 @@ void add_browser_options(CLI::App& app, BrowserArguments& arguments);
 
 /// Serves a command's progress from its construction to its end. Looking costs at most 3 % of the time: pictures are
 /// drawn when the time since the last one is 50 times what it took.
-class LiveSession {
+class LiveSession final : public Observer {
  public:
-  /// Says where to look.  @throws UsageError, DeviceError.
-  LiveSession(const std::string& title, const BrowserArguments& arguments, Reporter& reporter);
-  ~LiveSession();
+  /// Says where to look, on `inner`, which hears all that this hears.  @throws UsageError, DeviceError.
+  LiveSession(const std::string& title, const BrowserArguments& arguments, Observer& inner);
+  ~LiveSession() override;
   LiveSession(const LiveSession&) = delete;
   LiveSession& operator=(const LiveSession&) = delete;
 
-  /// Reports to `inner` and to the browser, waits while the browser asks for a pause, and asks for an interruption when
-  /// it asks to stop. Refers to this object.
-  [[nodiscard]] ProgressSink watching(ProgressSink inner);
-  /// Has pictures drawn for the browser, now and then. Refers to this object.
-  [[nodiscard]] PreviewSink previews();
+  /// Reports to the browser as well, and waits while the browser asks for a pause.
+  void report_progress(const Progress& progress) override;
+  void say(const std::string& text) override { inner_.say(text); }
+  void wrote(const std::string& what, const std::filesystem::path& path) override { inner_.wrote(what, path); }
+  /// Has pictures drawn for the browser, now and then.
+  void offer_preview(const DrawPreview& draw) override;
+  [[nodiscard]] bool wants_previews() const override { return true; }
+  /// Also when the browser asks to stop.
+  [[nodiscard]] bool is_cancelled() const override { return feed_.stop_requested() || inner_.is_cancelled(); }
 
  private:
   using Clock = std::chrono::steady_clock;
-  void look(const Progress& progress);
   void show(const PreviewPicture& picture);
 
+  Observer& inner_;
   LiveFeed feed_;
   WebServer server_;
   std::size_t drawn_ = 0;

@@ -94,7 +94,7 @@ ColorizerOptions colorizer_options(const Config& config, const fs::path& working
   options.reference_on_builtin = config.colorizer.reference_on_builtin;
   options.seed = std::uint64_t(config.stage2.seed);
   options.cache_folder = cache_folder;
-  options.progress = reporter.sink();
+  options.progress = reporter.progress_sink();
   return options;
 }
 
@@ -107,8 +107,8 @@ void train_step(RunContext& context, bool resume) {
   const RunDirectory& directory = context.directory;
   RunRecord record = directory.record();
   if (!record.stage1_finished || !resume) {
-    record.stage1 = train_stage1(context.capture, context.config.stage1, directory.stage1_snapshot(), resume,
-                                 context.training_sink(), context.previews);
+    record.stage1 = train_stage1({context.capture, context.config.stage1, directory.stage1_snapshot(), resume},
+                                 context.engines, context.training_observer());
     record.stage1_finished = true;
     directory.save(record);
   }
@@ -137,8 +137,9 @@ std::string take_to_write(const RunContext& context, const std::string& named, c
 void show_bases(const RunContext& context) {
   const RunDirectory& directory = context.directory;
   const fs::path gallery = directory.root() / "bases.png";
-  write_base_candidates(context.capture, directory.stage1_snapshot(), context.config.stage2, *colorizer_of(context),
-                        gallery, context.reporter.sink());
+  const auto colorizer = colorizer_of(context);
+  write_base_candidates({context.capture, directory.stage1_snapshot(), context.config.stage2, *colorizer, {}, gallery},
+                        context.engines, context.reporter);
   context.reporter.wrote("base candidates", gallery);
   context.reporter.next("cnerf colorize " + directory.root().string() + " --bases 2,5,7");
 }
@@ -153,10 +154,10 @@ void colorize_step(RunContext& context, const std::string& take, const ExistingO
     if (!colorizer) colorizer = colorizer_of(context);
     if (existing.overwrite) fs::remove_all(directory.take_folder(take));
     write_file(directory.take_config_file(take), to_toml(context.config));
-    const Stage2Report report =
-        train_stage2(context.capture, directory.stage1_snapshot(), context.config.stage2, *colorizer, known,
-                     directory.take_snapshot(take), existing.resume, context.training_sink(), context.previews);
-    context.training_sink()({"stage 2", 1.0, {}});
+    const Stage2Report report = train_stage2({context.capture, directory.stage1_snapshot(), context.config.stage2,
+                                              *colorizer, known, directory.take_snapshot(take), existing.resume},
+                                             context.engines, context.training_observer());
+    context.training_observer().report_progress({"stage 2", 1.0, {}});
     finished = TakeRecord{take, colorizer->name() + describe(known), report};
     directory.save(*finished);
     RunRecord record = directory.record();

@@ -26,11 +26,11 @@ struct RunContext {
   Capture capture;
   std::vector<std::string> command_line;
   Reporter& reporter;
-  ProgressSink watcher = nullptr;  ///< of the training, instead of the reporter's own sink
-  PreviewSink previews = nullptr;  ///< has pictures of the training drawn
+  const Engines& engines;
+  Observer* watcher = nullptr;  ///< of the training, instead of the reporter
 
   /// Who is told how the training goes.
-  [[nodiscard]] ProgressSink training_sink() const { return watcher ? watcher : reporter.sink(); }
+  [[nodiscard]] Observer& training_observer() const { return watcher != nullptr ? *watcher : reporter; }
 };
 
 /// What to do about output that is already there.

@@ -179,7 +179,7 @@ void write_web(const BakedVolume& volume, WebScene scene, const fs::path& folder
 
 void bake_step(const RunContext& context, const std::string& take, const fs::path& folder, const BakeFormats& formats) {
   const Stopwatch watch;
-  const auto scene = load_scene(context.directory, take);
+  const auto scene = load_scene(context.directory, take, context.engines);
   const Config& config = context.config;
   const std::vector<BakeCamera> cameras = cameras_of(context.capture);
   const BakeOptions options = volume_options(config, formats);
@@ -195,10 +195,11 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   if (journal.found() > 0) context.reporter.say("bake: going on where it was stopped");
   BakeFolder bake(folder, cameras, context.command_line, config.vdb.units, config.vdb.up_axis);
   std::vector<BakeLevel> levels = drop_journal_on_bad_input(
-      unfinished, [&] { return bake_levels(*scene, plans, options, journal, context.reporter.sink()); });
+      unfinished, [&] { return bake_levels(*scene, plans, options, journal, context.reporter.progress_sink()); });
   if (formats.vdb || formats.web) {
-    std::vector<VolumePlanes> volumes = drop_journal_on_bad_input(
-        unfinished, [&] { return bake_volumes(*scene, cameras, levels, options, journal, context.reporter.sink()); });
+    std::vector<VolumePlanes> volumes = drop_journal_on_bad_input(unfinished, [&] {
+      return bake_volumes(*scene, cameras, levels, options, journal, context.reporter.progress_sink());
+    });
     if (!formats.gltf) levels.clear();  // grids of files need the memory
     // Density that was given back is still the process's, and is what the grids will take.
     if (formats.vdb) check_writing_memory(volumes, formats.gltf ? held_memory_bytes() : held, options);
@@ -211,8 +212,8 @@ void bake_step(const RunContext& context, const std::string& take, const fs::pat
   }
   if (formats.gltf) {
     const BakeLevel level = merged_level(std::move(levels), options);  // a surface needs all of it on one lattice
-    write_mesh(bake_mesh(*scene, cameras, level, options, config.mesh, context.reporter.sink()), origin, formats,
-               context, bake);
+    write_mesh(bake_mesh(*scene, cameras, level, options, config.mesh, context.reporter.progress_sink()), origin,
+               formats, context, bake);
   }
   if (formats.vdb || formats.gltf) {
     if (config.vdb.plates) add_plates(context.capture, bake);

@@ -83,7 +83,7 @@ void evaluate_step(const RunContext& context, const std::string& take, const std
   const Stopwatch watch;
   std::optional<Lpips> lpips;
   if (!lpips_weights.empty()) lpips.emplace(lpips_weights);  // read first: what is missing costs no rendering
-  const auto scene = load_scene(directory, take);
+  const auto scene = load_scene(directory, take, context.engines);
   EvaluateOptions options;
   options.lpips = lpips ? &*lpips : nullptr;
   options.render = render_options(context.config);
@@ -94,7 +94,7 @@ void evaluate_step(const RunContext& context, const std::string& take, const std
         view.truth ? picture_from_linear(view.truth->width, view.truth->height, view.truth->rgb) : Picture{};
     sheet.add_row({grey_picture(view.view.image), picture_of(view.ours, ShownColor::kDecoded), truth});
   };
-  Metrics metrics = evaluate(*scene, context.capture, options, add_to_sheet, context.reporter.sink());
+  Metrics metrics = evaluate(*scene, context.capture, options, add_to_sheet, context.reporter.progress_sink());
   metrics.take = take;
   metrics.colorizer = colorizer_name(directory, take);
 
@@ -111,18 +111,19 @@ void evaluate_step(const RunContext& context, const std::string& take, const std
 void render_step(const RunContext& context, const std::string& take, const CameraPath& path,
                  const RenderOutput& output) {
   const Stopwatch watch;
-  const auto scene = load_scene(context.directory, take);
+  const auto scene = load_scene(context.directory, take, context.engines);
   RenderOptions options = render_options(context.config);
   options.color = scene->is_colorized() && output.color == ShownColor::kDecoded;
   options.baked_color = scene->is_colorized() && output.color == ShownColor::kBaked;
   std::unique_ptr<ViewAverage> average;
   if (output.view_averaged) {
-    average = make_view_average(*scene, cameras_of(context.capture), context.config.bake, context.reporter.sink());
+    average =
+        make_view_average(*scene, cameras_of(context.capture), context.config.bake, context.reporter.progress_sink());
     options.luminance = [&average](auto positions, auto luminance) { average->query(positions, luminance); };
   }
   const std::string color_origin = color_origin_text(colorizer_name(context.directory, take), take);
   RenderFiles files(output, path.name, color_origin, context.config.render.fps, context.reporter);
-  const ProgressSink progress = context.reporter.sink();
+  const ProgressSink progress = context.reporter.progress_sink();
   for (std::size_t i = 0; i < path.cameras.size(); ++i) {
     if (interruption_requested()) throw Interrupted("rendering stopped; the video was not written");
     const PathCamera& camera = path.cameras[i];

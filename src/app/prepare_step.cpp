@@ -36,13 +36,14 @@ cv::Mat1b still_part(const MotionMask& mask, const MonoImage& image) {
 }
 
 /// Masks what moves, in files of the pictures' own size beside those that are there, and names them in transforms.json.
-void mask_motion(const fs::path& capture, const MotionMaskOptions& options, Reporter& reporter) {
+void mask_motion(const fs::path& capture, const MotionMaskOptions& options, const Engines& engines,
+                 Reporter& reporter) {
   CaptureOptions reading;
   const Capture full = load_capture(capture, reading);
   int longest = 0;
   for (const View& view : full.views) longest = std::max({longest, view.image.width, view.image.height});
   reading.downscale = std::max(1, longest / options.motion_side);
-  const auto masks = find_motion(load_capture(capture, reading), options, capture / "work", reporter.sink());
+  const auto masks = find_motion(load_capture(capture, reading), options, capture / "work", engines, reporter);
 
   auto transforms = nlohmann::ordered_json::parse(read_text_file(capture / "transforms.json"));
   auto record = nlohmann::ordered_json::parse(read_text_file(capture / "prepare.json"));
@@ -72,7 +73,7 @@ void mask_motion(const fs::path& capture, const MotionMaskOptions& options, Repo
 }  // namespace
 
 void prepare_step(const fs::path& source, const fs::path& out, const PrepareStepOptions& options,
-                  const ExistingOutput& existing, Reporter& reporter) {
+                  const ExistingOutput& existing, const Engines& engines, Reporter& reporter) {
   if (!fs::exists(source)) throw MissingInputError(source.string() + ": no such file or folder");
   const bool finished = fs::exists(out / "transforms.json");
   const bool ours = fs::exists(out / kMark);
@@ -84,7 +85,7 @@ void prepare_step(const fs::path& source, const fs::path& out, const PrepareStep
   if (finished && ours && existing.resume) {
     reporter.say("capture: " + out.string() + " was prepared before");
     const auto record = nlohmann::json::parse(read_text_file(out / "prepare.json"));
-    if (options.motion_masks && !record.contains("motion")) mask_motion(out, options.motion, reporter);
+    if (options.motion_masks && !record.contains("motion")) mask_motion(out, options.motion, engines, reporter);
     return;
   }
   if (!is_empty_or_missing(out)) {
@@ -101,8 +102,9 @@ void prepare_step(const fs::path& source, const fs::path& out, const PrepareStep
     }
   }
   write_file(out / kMark, origin);
-  prepare_capture(source, out, options.prepare, reporter.sink(), [&](const std::string& text) { reporter.say(text); });
-  if (options.motion_masks) mask_motion(out, options.motion, reporter);
+  prepare_capture(source, out, options.prepare, reporter.progress_sink(),
+                  [&](const std::string& text) { reporter.say(text); });
+  if (options.motion_masks) mask_motion(out, options.motion, engines, reporter);
   reporter.wrote("contact sheet", out / "contact_sheet.png");
   reporter.wrote("capture", out);
 }
@@ -113,7 +115,7 @@ fs::path capture_of(const fs::path& source, const fs::path& run, Reporter& repor
   if (folder.filename().empty()) folder = folder.parent_path();
   const fs::path capture = folder.parent_path() / (folder.filename().string() + "-capture");
   reporter.say("no camera poses in " + source.string() + ": preparing a capture (cnerf prepare has options for this)");
-  prepare_step(source, capture, {}, {.resume = true}, reporter);
+  prepare_step(source, capture, {}, {.resume = true}, cpu_engines(), reporter);
   return capture;
 }
 

@@ -26,7 +26,8 @@ struct PrepareStepOptions {
 /// @throws UsageError  when there is a capture, or anything else, and neither choice is made; when `existing.resume` is
 ///                     set and the folder was begun for another source; and as `prepare_capture`.
 void prepare_step(const std::filesystem::path& source, const std::filesystem::path& out,
-                  const PrepareStepOptions& options, const ExistingOutput& existing, Reporter& reporter);
+                  const PrepareStepOptions& options, const ExistingOutput& existing, const Engines& engines,
+                  Reporter& reporter);
 
 /// What a run works on: `source` itself if it is a capture; else the capture that is made of it beside the run's
 /// folder, or was made by an earlier call.  @throws  as `prepare_step`.

@@ -51,11 +51,7 @@ std::string duration_text(double seconds) {
   return fmt::format("{} s", whole);
 }
 
-ProgressSink Reporter::sink() {
-  return [this](const Progress& progress) { report(progress); };
-}
-
-void Reporter::report(const Progress& progress) {
+void Reporter::report_progress(const Progress& progress) {
   if (style_ == ProgressStyle::kQuiet) return;
   const auto now = Clock::now();
   const bool is_new = progress.task != task_ || progress.fraction < start_fraction_;

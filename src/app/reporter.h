@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "src/base/progress.h"
+#include "src/base/observer.h"
 
 namespace cnerf {
 
@@ -24,23 +24,19 @@ enum class ProgressStyle {
 /// "1 h 02 min", "3 min 20 s", "12 s".
 [[nodiscard]] std::string duration_text(double seconds);
 
-class Reporter {
+class Reporter : public Observer {
  public:
   explicit Reporter(ProgressStyle style, std::FILE* out = stdout) : style_(style), out_(out) {}
 
-  /// The sink to hand to long work. It refers to this object.
-  [[nodiscard]] ProgressSink sink();
-  /// A sentence about what happens.
-  void say(const std::string& text);
-  /// A file or folder the command leaves behind.
-  void wrote(const std::string& what, const std::filesystem::path& path);
+  void report_progress(const Progress& progress) override;
+  void say(const std::string& text) override;
+  void wrote(const std::string& what, const std::filesystem::path& path) override;
   /// What the user may want to do now.
   void next(const std::string& text);
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  void report(const Progress& progress);
   [[nodiscard]] double remaining_seconds(const Progress& progress) const;
   void print_progress(const Progress& progress, double remaining);
   void print_json(const std::string& json);

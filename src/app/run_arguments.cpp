@@ -23,7 +23,8 @@ RunContext open_run(const RunFolderArguments& arguments, const std::string& take
   Config config = resolve_config(arguments.config, directory.config(take));
   Capture capture =
       read_capture(arguments.capture.empty() ? record.capture : fs::path(arguments.capture), config, reporter);
-  return {std::move(directory), std::move(config), std::move(capture), std::move(command_line), reporter};
+  const Engines& engines = engines_for(config.device);
+  return {std::move(directory), std::move(config), std::move(capture), std::move(command_line), reporter, engines};
 }
 
 void refuse_existing(const fs::path& output, bool overwrite) {

@@ -2,9 +2,9 @@
 
 namespace cnerf {
 
-std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::string& take) {
+std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::string& take, const Engines& engines) {
   return Scene::load(directory.stage1_snapshot(),
-                     take.empty() ? std::filesystem::path() : directory.take_snapshot(take));
+                     take.empty() ? std::filesystem::path() : directory.take_snapshot(take), engines);
 }
 
 std::string colorizer_name(const RunDirectory& directory, const std::string& take) {

@@ -11,7 +11,8 @@
 namespace cnerf {
 
 /// @param take  empty = luminance only.  @throws MissingInputError, SnapshotError.
-[[nodiscard]] std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::string& take);
+[[nodiscard]] std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::string& take,
+                                                const Engines& engines);
 
 /// Who coloured a take; empty when nobody did.
 [[nodiscard]] std::string colorizer_name(const RunDirectory& directory, const std::string& take);

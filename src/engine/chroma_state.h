@@ -1,5 +1,5 @@
 #pragma once
-/// What a snapshot holds of a ChromaEngine: the same pieces under the same names on every device.
+/// What a snapshot holds of a ColorBinEngine: the same pieces under the same names on every device.
 
 #include <cstdint>
 #include <vector>

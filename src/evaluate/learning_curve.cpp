@@ -88,7 +88,7 @@ void HeldOutPixels::trace(const LuminanceEngine& engine, const MarchSettings& ma
   samples_ = pixel_samples(rays_, samples, offsets);
 }
 
-double HeldOutPixels::ab_error(const ChromaEngine& engine, float temperature) const {
+double HeldOutPixels::ab_error(const ColorBinEngine& engine, float temperature) const {
   CNERF_CHECK_EQ(samples_.pixels(), rays_.size());
   CNERF_CHECK_EQ(colors_.size(), rays_.size());
   std::vector<Ab> decoded(rays_.size());
@@ -104,16 +104,14 @@ double HeldOutPixels::ab_error(const ChromaEngine& engine, float temperature) co
   return sum / double(decoded.size());
 }
 
-ProgressSink LearningCurve::watching(std::string task, ProgressSink inner) {
-  return [this, task = std::move(task), inner = std::move(inner)](const Progress& progress) {
-    if (inner) inner(progress);
-    const bool is_training = progress.task == task;
-    if (!is_training && points_.empty()) clock_.emplace();  // training begins after this
-    if (!is_training) return;
-    if (!clock_) clock_.emplace();
-    last_ = clock_->seconds() - paused_;
-    if (last_ >= next_) measure(last_);
-  };
+void LearningCurve::report_progress(const Progress& progress) {
+  inner_.report_progress(progress);
+  const bool is_training = progress.task == task_;
+  if (!is_training && points_.empty()) clock_.emplace();  // training begins after this
+  if (!is_training) return;
+  if (!clock_) clock_.emplace();
+  last_ = clock_->seconds() - paused_;
+  if (last_ >= next_) measure(last_);
 }
 
 void LearningCurve::measure(double now) {
@@ -124,19 +122,16 @@ void LearningCurve::measure(double now) {
   paused_ += watch.seconds();
 }
 
-EngineMakers EngineWatch::over(EngineMakers makers) {
-  EngineMakers watched;
-  watched.luminance = [this, make = std::move(makers.luminance)](const LuminanceEngineOptions& options) {
-    auto engine = make(options);
-    luminance = engine.get();
-    return engine;
-  };
-  watched.chroma = [this, make = std::move(makers.chroma)](const HashGridOptions& grid, std::uint64_t seed) {
-    auto engine = make(grid, seed);
-    chroma = engine.get();
-    return engine;
-  };
-  return watched;
+std::unique_ptr<LuminanceEngine> WatchedEngines::make_luminance(const LuminanceEngineOptions& options) const {
+  auto engine = inner_.make_luminance(options);
+  luminance_ = engine.get();
+  return engine;
+}
+
+std::unique_ptr<ColorBinEngine> WatchedEngines::make_color_bins(const HashGridOptions& grid, std::uint64_t seed) const {
+  auto engine = inner_.make_color_bins(grid, seed);
+  color_bins_ = engine.get();
+  return engine;
 }
 
 }  // namespace cnerf

@@ -6,13 +6,14 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "src/base/progress.h"
+#include "src/base/observer.h"
 #include "src/base/usage.h"
 #include "src/capture/capture.h"
+#include "src/engine/engines.h"
 #include "src/engine/pixel_samples.h"
-#include "src/engine/select_engine.h"
 #include "src/field/scene_frame.h"
 
 namespace cnerf {
@@ -43,7 +44,7 @@ class HeldOutPixels {
   /// Keeps what the rays of the pixels meet, for `ab_error`.
   void trace(const LuminanceEngine& engine, const MarchSettings& march);
   /// Mean ab distance of the decoded colours to the true ones.  @param temperature  of the decoding
-  [[nodiscard]] double ab_error(const ChromaEngine& engine, float temperature) const;
+  [[nodiscard]] double ab_error(const ColorBinEngine& engine, float temperature) const;
 
  private:
   std::vector<Ray> rays_;
@@ -53,13 +54,14 @@ class HeldOutPixels {
 };
 
 /// Measures at times that grow by a factor, and for no longer than there is training.
-class LearningCurve {
+class LearningCurve final : public Observer {
  public:
-  explicit LearningCurve(std::function<double()> measure) : measure_(std::move(measure)) {}
-
-  /// A sink that passes on to `inner` and measures between steps of `task`; the clock stands still before that task and
-  /// while it measures.
-  [[nodiscard]] ProgressSink watching(std::string task, ProgressSink inner);
+  /// Passes on to `inner` and measures between steps of `task`; the clock stands still before that task and while it
+  /// measures.
+  LearningCurve(std::string task, Observer& inner, std::function<double()> measure)
+      : task_(std::move(task)), inner_(inner), measure_(std::move(measure)) {}
+  void report_progress(const Progress& progress) override;
+  [[nodiscard]] bool is_cancelled() const override { return inner_.is_cancelled(); }
   /// Training time up to the last step.
   [[nodiscard]] double seconds() const { return last_; }
   [[nodiscard]] const std::vector<LearningPoint>& points() const { return points_; }
@@ -67,6 +69,8 @@ class LearningCurve {
  private:
   void measure(double now);
 
+  std::string task_;
+  Observer& inner_;
   std::function<double()> measure_;
   std::vector<LearningPoint> points_;
   std::optional<Stopwatch> clock_;
@@ -74,13 +78,29 @@ class LearningCurve {
   double last_ = 0, next_ = 0;
 };
 
-/// Engines pass through it: who made them keeps sight of them.
-struct EngineWatch {
-  const LuminanceEngine* luminance = nullptr;  ///< made last, and not owned
-  const ChromaEngine* chroma = nullptr;
+/// Engines that remain visible to who handed them on.
+class WatchedEngines final : public Engines {
+ public:
+  /// @param inner  makes them; must outlive this
+  explicit WatchedEngines(const Engines& inner) : inner_(inner) {}
+  [[nodiscard]] Device device() const override { return inner_.device(); }
+  [[nodiscard]] std::string description() const override { return inner_.description(); }
+  [[nodiscard]] std::unique_ptr<LuminanceEngine> make_luminance(const LuminanceEngineOptions& options) const override;
+  [[nodiscard]] std::unique_ptr<ColorBinEngine> make_color_bins(const HashGridOptions& grid,
+                                                                std::uint64_t seed) const override;
+  [[nodiscard]] std::unique_ptr<ColorFieldEngine> make_color_field(const HashGridOptions& grid,
+                                                                   std::uint64_t seed) const override {
+    return inner_.make_color_field(grid, seed);
+  }
 
-  /// Makers that note what they made. The watch must outlive them.
-  [[nodiscard]] EngineMakers over(EngineMakers makers);
+  /// Those made last; not owned.
+  [[nodiscard]] const LuminanceEngine& luminance() const { return *luminance_; }
+  [[nodiscard]] const ColorBinEngine& color_bins() const { return *color_bins_; }
+
+ private:
+  const Engines& inner_;
+  mutable const LuminanceEngine* luminance_ = nullptr;
+  mutable const ColorBinEngine* color_bins_ = nullptr;
 };
 
 }  // namespace cnerf

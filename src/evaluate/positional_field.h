@@ -7,8 +7,10 @@
 /// that what differs is the field. Stage 2 is the paper's Theta_Z: two layers of 128 and 313 classes on the point
 /// encoding w of the fixed luminance field. It sees no directions, as no chroma field here does.
 
+#include <memory>
+
 #include "src/capture/capture.h"
-#include "src/engine/select_engine.h"
+#include "src/engine/engines.h"
 #include "src/field/scene_frame.h"
 
 namespace cnerf {
@@ -24,12 +26,14 @@ struct PositionalRays {
 /// Objects in a single box: evenly in distance. All else: in disparity, from the capture's near bound where it has one.
 [[nodiscard]] PositionalRays positional_rays(const Capture& capture, const SceneFrame& frame);
 
-/// Engines of that field. A chroma engine takes over w of the luminance engine that these makers made or loaded last,
+/// Engines of that field. A chroma engine takes over w of the luminance engine that they made or loaded last,
 /// and starts from random weights where there was none; a snapshot holds it in either case.
 ///
 /// Of LuminanceEngineOptions, the grid, the marching and the occupancy mean nothing to it; `render` and `trace` take
 /// their samples as training does. Snapshots continue bit for bit on the processor.
 /// @param trains_encoding  true: stage 2 changes its copy of w; false: w stays fixed, as in the paper
-[[nodiscard]] EngineMakers positional_engines(const PositionalRays& rays, bool trains_encoding = false);
+/// @param luminance  makes the luminance engines instead, where colours stand on another geometry; may be null
+[[nodiscard]] std::unique_ptr<Engines> positional_engines(const PositionalRays& rays, bool trains_encoding = false,
+                                                          const Engines* luminance = nullptr);
 
 }  // namespace cnerf

@@ -29,12 +29,11 @@ struct StyledView {
   LabPicture picture;  // lightness as rendered; ab is written at each step
 };
 
-std::vector<StyledView> styled_views(const Capture& capture, const LuminanceModel& luminance,
-                                     const ProgressSink& progress) {
+std::vector<StyledView> styled_views(const Capture& capture, const LuminanceModel& luminance, Observer& observer) {
   std::vector<StyledView> styled;
   const std::vector<TrainingView> views = training_views(capture, luminance.frame);
   for (const TrainingView& view : views) {
-    if (interruption_requested()) throw Interrupted("style transfer stopped; nothing was written");
+    if (observer.is_cancelled()) throw Interrupted("style transfer stopped; nothing was written");
     StyledView one;
     one.view = cache_view(*luminance.engine, luminance.march(), view.camera, kStyleSide, kCachedWeight);
     ignore_masked(one.view, *view.image);
@@ -47,7 +46,7 @@ std::vector<StyledView> styled_views(const Capture& capture, const LuminanceMode
     }
     one.picture.ab.resize(2 * all.size());
     styled.push_back(std::move(one));
-    if (progress) progress({"style: views", double(styled.size()) / double(views.size()), {}});
+    observer.report_progress({"style: views", double(styled.size()) / double(views.size()), {}});
   }
   if (styled.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
   return styled;
@@ -98,12 +97,12 @@ std::vector<Ab> targets_of(const LabPicture& picture, std::span<const float> gra
 
 StyleReport transfer_style(const Capture& capture, const std::filesystem::path& stage1_snapshot, const StyleLoss& loss,
                            const LabPicture& reference, const Stage2Options& options, int steps,
-                           const std::filesystem::path& take_snapshot, const ProgressSink& progress) {
+                           const std::filesystem::path& take_snapshot, const Engines& engines, Observer& observer) {
   const Stopwatch watch;
-  std::vector<StyledView> views = styled_views(capture, LuminanceModel::load(stage1_snapshot), progress);
+  std::vector<StyledView> views = styled_views(capture, LuminanceModel::load(stage1_snapshot, engines), observer);
   Stage2Options photometric = options;
   photometric.injection = "photometric";
-  ColorModel model = ColorModel::create(photometric);
+  ColorModel model = ColorModel::create(photometric, engines);
   model.colorizer = "style:" + loss.network();
   model.stage1_sha256 = sha256(read_binary_file(stage1_snapshot));
 
@@ -114,7 +113,7 @@ StyleReport transfer_style(const Capture& capture, const std::filesystem::path& 
   StyleReport report;
   std::vector<double> losses;
   for (int step = 0; step < steps; ++step) {
-    if (interruption_requested()) throw Interrupted("style transfer stopped; nothing was written");
+    if (observer.is_cancelled()) throw Interrupted("style transfer stopped; nothing was written");
     StyledView& view = views[std::size_t(step) % views.size()];
     const std::size_t n = view.picture.lightness.size();
     std::vector<Ab> targets(n);
@@ -137,8 +136,8 @@ StyleReport transfer_style(const Capture& capture, const std::filesystem::path& 
     const double fraction = std::clamp(2.0 * step / steps - 1.0, 0.0, 1.0);
     const double rate = options.learning_rate * std::pow(options.final_learning_rate / options.learning_rate, fraction);
     (void)model.chromaticity->step(view.pixels, targets, view.view.opacity, AbLoss::kSquared, float(rate));
-    if (progress)
-      progress({"style transfer", double(step + 1) / steps, {{"loss", losses.empty() ? 0 : losses.back()}}});
+    observer.report_progress(
+        {"style transfer", double(step + 1) / steps, {{"loss", losses.empty() ? 0 : losses.back()}}});
   }
   const auto some = std::ptrdiff_t(std::min(views.size(), losses.size()));
   if (some > 0) {
@@ -150,8 +149,9 @@ StyleReport transfer_style(const Capture& capture, const std::filesystem::path& 
   return report;
 }
 
-LabPicture colorized_view(const Capture& capture, const std::filesystem::path& stage1_snapshot, Colorizer& colorizer) {
-  const LuminanceModel luminance = LuminanceModel::load(stage1_snapshot);
+LabPicture colorized_view(const Capture& capture, const std::filesystem::path& stage1_snapshot, Colorizer& colorizer,
+                          const Engines& engines) {
+  const LuminanceModel luminance = LuminanceModel::load(stage1_snapshot, engines);
   std::vector<const View*> training;
   for (const View& view : capture.views) {
     if (!view.held_out) training.push_back(&view);

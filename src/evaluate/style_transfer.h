@@ -27,11 +27,11 @@ struct StyleReport {
 /// @throws Interrupted  without leaving anything; SnapshotError; UsageError for views that are too small.
 StyleReport transfer_style(const Capture& capture, const std::filesystem::path& stage1_snapshot, const StyleLoss& loss,
                            const LabPicture& reference, const Stage2Options& options, int steps,
-                           const std::filesystem::path& take_snapshot, const ProgressSink& progress);
+                           const std::filesystem::path& take_snapshot, const Engines& engines, Observer& observer);
 
 /// A training view as the colorizer colours it: the middle one of the list.
 [[nodiscard]] LabPicture colorized_view(const Capture& capture, const std::filesystem::path& stage1_snapshot,
-                                        Colorizer& colorizer);
+                                        Colorizer& colorizer, const Engines& engines);
 /// A colour image, its shorter side at most `kStyleSide` pixels.  @throws MissingInputError, InputError.
 [[nodiscard]] LabPicture reference_image(const std::filesystem::path& file);
 

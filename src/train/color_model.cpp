@@ -37,12 +37,12 @@ std::vector<float> pixel_luminance(const PixelSamples& pixels) {
   return luminance;
 }
 
-ColorModel ColorModel::create(const Stage2Options& options, const EngineMakers& makers) {
+ColorModel ColorModel::create(const Stage2Options& options, const Engines& engines) {
   ColorModel model;
   model.options = options;
   const auto seed = std::uint64_t(options.seed);
-  model.chroma = makers.chroma(options.grid, seed ^ named_stream("chr"));
-  model.chromaticity = make_chromaticity_engine(options.grid, seed ^ named_stream("xyz"));
+  model.chroma = engines.make_color_bins(options.grid, seed ^ named_stream("chr"));
+  model.chromaticity = engines.make_color_field(options.grid, seed ^ named_stream("xyz"));
   return model;
 }
 
@@ -53,11 +53,11 @@ std::vector<StatePiece> ColorModel::state() {
   return pieces;
 }
 
-ColorModel ColorModel::load(const std::filesystem::path& file, const EngineMakers& makers) {
+ColorModel ColorModel::load(const std::filesystem::path& file, const Engines& engines) {
   const Snapshot snapshot(file, kKind);
   ColorModel model;
   try {
-    model = create(options_from_json<Stage2Options>(snapshot.header().at("options")), makers);
+    model = create(options_from_json<Stage2Options>(snapshot.header().at("options")), engines);
     const nlohmann::json& report = snapshot.header().at("report");
     SnapshotTimes times = load_times(file);
     model.report = {report.at("accepted"),      report.at("rejected"),   times["seconds"],

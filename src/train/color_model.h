@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "src/engine/chroma_engine.h"
-#include "src/engine/select_engine.h"
+#include "src/engine/color_engines.h"
+#include "src/engine/engines.h"
 #include "src/train/snapshot.h"
 #include "src/train/stage2.h"
 
@@ -18,12 +18,12 @@ struct ColorModel {
   std::string stage1_sha256;  ///< of the stage 1 snapshot it belongs to
   Stage2Report report;
   std::vector<std::int64_t> queries = {0};  ///< patches the colorizer was asked for, and the next patch's index
-  std::unique_ptr<ChromaEngine> chroma;
-  std::unique_ptr<ChromaticityEngine> chromaticity;
+  std::unique_ptr<ColorBinEngine> chroma;
+  std::unique_ptr<ColorFieldEngine> chromaticity;
 
-  static ColorModel create(const Stage2Options& options, const EngineMakers& makers = {});
+  static ColorModel create(const Stage2Options& options, const Engines& engines);
   /// @throws MissingInputError, SnapshotError
-  static ColorModel load(const std::filesystem::path& snapshot, const EngineMakers& makers = {});
+  static ColorModel load(const std::filesystem::path& snapshot, const Engines& engines);
   void save(const std::filesystem::path& snapshot);
 
   /// Whether colours are learnt as such, without a distribution (stage2.injection = "photometric").

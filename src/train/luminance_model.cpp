@@ -10,7 +10,7 @@ namespace {
 constexpr const char* kKind = "stage1";
 
 std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stage1Options& options, float max_luminance,
-                                             const EngineMakers& makers) {
+                                             const Engines& engines) {
   LuminanceEngineOptions engine;
   engine.grid = options.grid;
   engine.occupancy = options.occupancy;
@@ -21,7 +21,7 @@ std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stag
   engine.distortion_weight = float(options.distortion_weight);
   engine.max_luminance = max_luminance;
   engine.seed = std::uint64_t(options.seed);
-  return makers.luminance(engine);
+  return engines.make_luminance(engine);
 }
 
 /// White of integer images; floating point ones may be brighter.
@@ -94,13 +94,12 @@ SceneFrame frame_from_json(const nlohmann::json& json) {
           json.at("cascades").get<int>()};
 }
 
-LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options,
-                                      const EngineMakers& makers) {
+LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options, const Engines& engines) {
   LuminanceModel model;
   model.frame = place_scene(capture, options.placement);
   model.options = options;
   model.max_luminance = brightest(capture);
-  model.engine = make_engine(model.frame, options, model.max_luminance, makers);
+  model.engine = make_engine(model.frame, options, model.max_luminance, engines);
   exclude_unseen(capture, model);
   return model;
 }
@@ -114,7 +113,7 @@ Stage1Options LuminanceModel::options_in(const std::filesystem::path& file) {
   }
 }
 
-LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const EngineMakers& makers) {
+LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Engines& engines) {
   const Snapshot snapshot(file, kKind);
   LuminanceModel model;
   try {
@@ -126,7 +125,7 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   model.max_luminance = header_field<float>(snapshot, "max_luminance");
   model.seconds = load_times(file)["seconds"];
   model.trained_samples = header_field<double>(snapshot, "trained_samples");
-  model.engine = make_engine(model.frame, model.options, model.max_luminance, makers);
+  model.engine = make_engine(model.frame, model.options, model.max_luminance, engines);
   snapshot.restore(model.engine->state());
   model.engine->state_loaded();
   return model;

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <memory>
 
+#include "src/engine/engines.h"
 #include "src/engine/luminance_engine.h"
-#include "src/engine/select_engine.h"
 #include "src/train/snapshot.h"
 #include "src/train/stage1.h"
 
@@ -20,9 +20,9 @@ struct LuminanceModel {
   std::unique_ptr<LuminanceEngine> engine;
 
   /// A fresh model for a capture.
-  static LuminanceModel create(const Capture& capture, const Stage1Options& options, const EngineMakers& makers = {});
+  static LuminanceModel create(const Capture& capture, const Stage1Options& options, const Engines& engines);
   /// @throws MissingInputError, SnapshotError
-  static LuminanceModel load(const std::filesystem::path& snapshot, const EngineMakers& makers = {});
+  static LuminanceModel load(const std::filesystem::path& snapshot, const Engines& engines);
   /// Only what it was trained with.  @throws MissingInputError, SnapshotError
   static Stage1Options options_in(const std::filesystem::path& snapshot);
   void save(const std::filesystem::path& snapshot) const;

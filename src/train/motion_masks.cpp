@@ -48,6 +48,20 @@ cv::Mat1f disagreement(const View& view, const RenderedImage& field) {
   return cv::abs(difference);
 }
 
+/// Reports the progress of a part of the work as that of the whole.
+class PartOfMotion final : public Observer {
+ public:
+  PartOfMotion(Observer& whole, double from, double to) : whole_(whole), from_(from), to_(to) {}
+  void report_progress(const Progress& progress) override {
+    whole_.report_progress({"motion", from_ + (to_ - from_) * progress.fraction, {}});
+  }
+  [[nodiscard]] bool is_cancelled() const override { return whole_.is_cancelled(); }
+
+ private:
+  Observer& whole_;
+  double from_, to_;
+};
+
 /// What a share of all pixels stays below.
 double percentile(const std::vector<cv::Mat1f>& images, double share) {
   std::vector<float> values;
@@ -87,23 +101,19 @@ cv::Mat1b moving_parts(const cv::Mat1f& disagreement, double threshold) {
 }  // namespace
 
 std::vector<MotionMask> find_motion(const Capture& capture, const MotionMaskOptions& options, const fs::path& work,
-                                    const ProgressSink& progress) {
+                                    const Engines& engines, Observer& observer) {
   const fs::path snapshot = work / "motion.snapshot";
-  const auto part = [&](double from, double to) {
-    return [&progress, from, to](const Progress& p) {
-      if (progress) progress({"motion", from + (to - from) * p.fraction, {}});
-    };
-  };
+  PartOfMotion fit(observer, 0, 0.8), comparison(observer, 0.8, 1);
   fs::create_directories(work);
   Capture all = capture;  // held-out views move too, and are told best by a fit that has seen them
   for (View& view : all.views) view.held_out = false;
-  train_stage1(all, quick_fit(options), snapshot, false, part(0, 0.8));
-  const auto scene = Scene::load(snapshot);
+  train_stage1({all, quick_fit(options), snapshot}, engines, fit);
+  const auto scene = Scene::load(snapshot, {}, engines);
   std::vector<cv::Mat1f> differences;
   for (const View& view : capture.views) {
-    if (interruption_requested()) throw Interrupted("stopped while looking for motion");
+    if (observer.is_cancelled()) throw Interrupted("stopped while looking for motion");
     differences.push_back(disagreement(view, scene->render(view.intrinsics, view.world_from_camera, {.color = false})));
-    part(0.8, 1)({"", double(differences.size()) / double(capture.views.size()), {}});
+    comparison.report_progress({"", double(differences.size()) / double(capture.views.size()), {}});
   }
   fs::remove(snapshot);
   const double threshold = std::max(options.motion_difference, kUsualFactor * percentile(differences, kUsualShare));

@@ -5,9 +5,10 @@
 #include <filesystem>
 #include <vector>
 
+#include "src/base/observer.h"
 #include "src/base/options.h"
-#include "src/base/progress.h"
 #include "src/capture/capture.h"
+#include "src/engine/engines.h"
 
 namespace cnerf {
 
@@ -39,6 +40,7 @@ struct MotionMask {
 /// @param work     folder for the fit's snapshot
 /// @return         one for each view.  @throws Interrupted.
 [[nodiscard]] std::vector<MotionMask> find_motion(const Capture& capture, const MotionMaskOptions& options,
-                                                  const std::filesystem::path& work, const ProgressSink& progress);
+                                                  const std::filesystem::path& work, const Engines& engines,
+                                                  Observer& observer);
 
 }  // namespace cnerf

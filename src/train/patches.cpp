@@ -7,7 +7,7 @@
 
 #include "src/base/rng.h"
 #include "src/color/colorspace_math.h"
-#include "src/engine/chroma_engine.h"
+#include "src/engine/color_engines.h"
 
 namespace cnerf {
 namespace {

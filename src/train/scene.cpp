@@ -83,9 +83,9 @@ void put_colors(const std::vector<Ab>& colors, const std::vector<float>& luminan
 class TrainedScene final : public Scene {
  public:
   TrainedScene(const std::filesystem::path& stage1_snapshot, const std::filesystem::path& take_snapshot,
-               std::shared_ptr<TraceMemory> memory, const EngineMakers& makers)
-      : luminance_(LuminanceModel::load(stage1_snapshot, makers)), memory_(std::move(memory)) {
-    if (!take_snapshot.empty()) color_ = ColorModel::load(take_snapshot, makers);
+               const Engines& engines, std::shared_ptr<TraceMemory> memory)
+      : luminance_(LuminanceModel::load(stage1_snapshot, engines)), memory_(std::move(memory)) {
+    if (!take_snapshot.empty()) color_ = ColorModel::load(take_snapshot, engines);
   }
 
   [[nodiscard]] const SceneFrame& frame() const override { return luminance_.frame; }
@@ -205,9 +205,9 @@ class TrainedScene final : public Scene {
 }  // namespace
 
 std::unique_ptr<Scene> Scene::load(const std::filesystem::path& stage1_snapshot,
-                                   const std::filesystem::path& take_snapshot, std::shared_ptr<TraceMemory> memory,
-                                   const EngineMakers& makers) {
-  return std::make_unique<TrainedScene>(stage1_snapshot, take_snapshot, std::move(memory), makers);
+                                   const std::filesystem::path& take_snapshot, const Engines& engines,
+                                   std::shared_ptr<TraceMemory> memory) {
+  return std::make_unique<TrainedScene>(stage1_snapshot, take_snapshot, engines, std::move(memory));
 }
 
 }  // namespace cnerf

@@ -10,7 +10,7 @@
 #include "src/base/options.h"
 #include "src/base/progress.h"
 #include "src/capture/camera.h"
-#include "src/engine/select_engine.h"
+#include "src/engine/engines.h"
 #include "src/field/color_field.h"
 
 namespace cnerf {
@@ -43,11 +43,11 @@ class TraceMemory;
 class Scene : public ColorField {
  public:
   /// @param take_snapshot  of stage 2; empty = luminance only.
-  /// @param memory         of views that are rendered again, for other takes of the same stage 1; may be null
-  /// @throws MissingInputError, SnapshotError.
+  /// @param memory  of views that are rendered again, for other takes of the same stage 1; may be null
+  /// @throws MissingInputError, SnapshotError, DeviceError.
   static std::unique_ptr<Scene> load(const std::filesystem::path& stage1_snapshot,
-                                     const std::filesystem::path& take_snapshot = {},
-                                     std::shared_ptr<TraceMemory> memory = nullptr, const EngineMakers& makers = {});
+                                     const std::filesystem::path& take_snapshot, const Engines& engines,
+                                     std::shared_ptr<TraceMemory> memory = nullptr);
 
   [[nodiscard]] virtual bool is_colorized() const = 0;
   [[nodiscard]] virtual std::string colorizer() const = 0;  ///< name of the colorizer; empty when not colorized

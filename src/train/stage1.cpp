@@ -84,13 +84,38 @@ void refuse_others(const std::filesystem::path& snapshot, const Stage1Options& s
                       ": was trained with other stage1 options; run with the same ones, or without --resume");
 }
 
-LuminanceModel start_or_resume(const Capture& capture, const Stage1Options& options,
-                               const std::filesystem::path& snapshot, bool resume, const EngineMakers& makers) {
-  if (!resume || !std::filesystem::exists(snapshot)) return LuminanceModel::create(capture, options, makers);
-  LuminanceModel model = LuminanceModel::load(snapshot, makers);
-  refuse_others(snapshot, model.options, options);
-  model.options = options;
+LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines) {
+  if (!job.resume || !std::filesystem::exists(job.snapshot)) {
+    return LuminanceModel::create(job.capture, job.options, engines);
+  }
+  LuminanceModel model = LuminanceModel::load(job.snapshot, engines);
+  refuse_others(job.snapshot, model.options, job.options);
+  model.options = job.options;
   return model;
+}
+
+/// Training time: a clock that stands still while an observer looks.
+class TrainingClock {
+ public:
+  explicit TrainingClock(double before) : before_(before) {}
+  [[nodiscard]] double seconds_of_this_part() const { return watch_.seconds() - paused_; }
+  [[nodiscard]] double seconds() const { return before_ + seconds_of_this_part(); }
+  template <typename Work>
+  void pause_for(Work&& work) {
+    const Stopwatch pause;
+    work();
+    paused_ += pause.seconds();
+  }
+
+ private:
+  double before_, paused_ = 0;
+  Stopwatch watch_;
+};
+
+/// Done so far, of the steps or of the time, whichever is nearer to its end.
+double fraction_done(const LuminanceModel& model, const Stage1Options& options) {
+  const double of_steps = double(model.engine->step_count()) / options.steps;
+  return options.max_seconds > 0 ? std::max(of_steps, model.seconds / options.max_seconds) : of_steps;
 }
 
 }  // namespace
@@ -99,53 +124,45 @@ void check_continues(const std::filesystem::path& snapshot, const Stage1Options&
   if (std::filesystem::exists(snapshot)) refuse_others(snapshot, LuminanceModel::options_in(snapshot), options);
 }
 
-Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, const std::filesystem::path& snapshot,
-                          bool resume, const ProgressSink& progress, const PreviewSink& previews,
-                          const EngineMakers& makers) {
-  LuminanceModel model = start_or_resume(capture, options, snapshot, resume, makers);
-  const std::vector<TrainingView> views = training_views(capture, model.frame);
+Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer& observer) {
+  const Stage1Options& options = job.options;
+  LuminanceModel model = start_or_resume(job, engines);
+  const std::vector<TrainingView> views = training_views(job.capture, model.frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
 
-  const double seconds_before = model.seconds;
-  const Stopwatch watch;
-  double told_seconds = 0;  // an observer's pauses and pictures are no training
-  const std::vector<const View*> shown = preview_views(capture);
+  TrainingClock clock(model.seconds);
+  const std::vector<const View*> shown = preview_views(job.capture);
   const DrawPreview preview = [&](std::size_t index) { return preview_of(model, *shown[index % shown.size()]); };
   double rays = 0;
   RunningPsnr psnr;
   while (model.engine->step_count() < options.steps) {
-    double fraction = double(model.engine->step_count()) / options.steps;
-    if (options.max_seconds > 0) {
-      if (model.seconds >= options.max_seconds) break;
-      fraction = std::max(fraction, model.seconds / options.max_seconds);
-    }
+    if (options.max_seconds > 0 && model.seconds >= options.max_seconds) break;
+    const double fraction = fraction_done(model, options);
     const StepReport step = model.engine->step(views, learning_rate(options, fraction));
     model.trained_samples += double(step.trained_samples);
-    model.seconds = seconds_before + watch.seconds() - told_seconds;
+    model.seconds = clock.seconds();
     rays += double(step.rays);
     psnr.add(step.squared_error);
+    clock.pause_for([&] {
+      observer.report_progress({"stage 1",
+                                fraction,
+                                {{"psnr", psnr.value()},
+                                 {"loss", step.loss},
+                                 {"rays/s", rays / clock.seconds_of_this_part()},
+                                 {"samples", model.trained_samples}}});
+      observer.offer_preview(preview);
+    });
 
     const long done = model.engine->step_count();
-    if (progress) {
-      const Stopwatch telling;
-      progress({"stage 1",
-                fraction,
-                {{"psnr", psnr.value()},
-                 {"loss", step.loss},
-                 {"rays/s", rays / (watch.seconds() - told_seconds)},
-                 {"samples", model.trained_samples}}});
-      if (previews) previews(preview);
-      told_seconds += telling.seconds();
-    }
-    if (interruption_requested()) {
-      model.save(snapshot);
-      throw Interrupted("stopped at step " + std::to_string(done) + "; saved " + snapshot.string() +
+    if (observer.is_cancelled()) {
+      model.save(job.snapshot);
+      throw Interrupted("stopped at step " + std::to_string(done) + "; saved " + job.snapshot.string() +
                         ", continue with --resume");
     }
-    if (options.checkpoint_every > 0 && done % options.checkpoint_every == 0) model.save(snapshot);
+    if (options.checkpoint_every > 0 && done % options.checkpoint_every == 0) model.save(job.snapshot);
   }
-  model.save(snapshot);
-  if (progress) progress({"stage 1", 1.0, {{"psnr", psnr.value()}}});
+  model.save(job.snapshot);
+  observer.report_progress({"stage 1", 1.0, {{"psnr", psnr.value()}}});
   return {int(model.engine->step_count()), model.seconds, model.trained_samples, psnr.value()};
 }
 

@@ -6,12 +6,11 @@
 #include <string>
 
 #include "encoding/hash_grid_levels.h"
+#include "src/base/observer.h"
 #include "src/base/options.h"
-#include "src/base/preview.h"
-#include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/capture/focus.h"
-#include "src/engine/select_engine.h"
+#include "src/engine/engines.h"
 #include "src/field/scene_frame.h"
 #include "src/render/occupancy_grid.h"
 
@@ -88,13 +87,18 @@ struct Stage1Report {
 /// @throws SnapshotError  it is of another version, damaged, or of a training with other options.
 void check_continues(const std::filesystem::path& snapshot, const Stage1Options& options);
 
-/// Trains (or goes on training, when `snapshot` exists and `resume` is set) and leaves the result in `snapshot`.
-/// What `progress` and `previews` take is no training time; previews show held-out views, or some of all.
-/// Resuming continues bit for bit on the CPU, whatever the number of threads.
-/// @throws Interrupted    after saving, when the user asked to stop.
-/// @throws SnapshotError  `snapshot` is of another version, cut short, or of another configuration.
-Stage1Report train_stage1(const Capture& capture, const Stage1Options& options, const std::filesystem::path& snapshot,
-                          bool resume, const ProgressSink& progress = {}, const PreviewSink& previews = {},
-                          const EngineMakers& makers = {});
+/// What stage 1 works on.
+struct Stage1Job {
+  const Capture& capture;
+  const Stage1Options& options;
+  std::filesystem::path snapshot;  ///< that the result goes to
+  bool resume = false;             ///< go on with the snapshot, if there is one
+};
+
+/// Trains and leaves the result in the job's snapshot. What the observer takes is no training time; previews show
+/// held-out views, or some of all. Resuming continues bit for bit on the CPU, whatever the number of threads.
+/// @throws Interrupted    after saving, when the observer cancelled.
+/// @throws SnapshotError  the snapshot is of another version, cut short, or of another configuration.
+Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer& observer);
 
 }  // namespace cnerf

@@ -60,24 +60,21 @@ struct Answers {
 /// One run of stage 2.
 class Colorization {
  public:
-  Colorization(const Stage2Options& options, Colorizer& colorizer, std::filesystem::path take_snapshot,
-               const ProgressSink& progress, const PreviewSink& watcher = {}, std::vector<CachedView>* shared = nullptr,
-               EngineMakers makers = {})
-      : options_(options),
-        colorizer_(colorizer),
-        file_(std::move(take_snapshot)),
-        progress_(progress),
-        watcher_(watcher),
-        makers_(std::move(makers)),
-        views_(shared != nullptr ? *shared : own_views_) {}
+  Colorization(const Stage2Job& job, const Engines& engines, Observer& observer)
+      : job_(job),
+        engines_(engines),
+        observer_(observer),
+        options_(job.options),
+        colorizer_(job.colorizer),
+        file_(job.take),
+        views_(job.shared != nullptr ? *job.shared : own_views_) {}
 
-  Stage2Report run(const Capture& capture, const std::filesystem::path& stage1_snapshot,
-                   std::span<const KnownColors> known, bool resume) {
-    start_or_resume(sha256_of_file(stage1_snapshot), colorizer_.name() + describe(known), resume);
+  Stage2Report run() {
+    start_or_resume(sha256_of_file(job_.stage1), colorizer_.name() + describe(job_.known));
     seconds_before_ = model_.report.seconds;
-    cache_views(capture, LuminanceModel::load(stage1_snapshot, makers_));
-    names_ = training_view_names(capture);
-    known_ = KnownColorMap(views_, names_, known);
+    cache_views(LuminanceModel::load(job_.stage1, engines_));
+    names_ = training_view_names(job_.capture);
+    known_ = KnownColorMap(views_, names_, job_.known);
 
     if (options_.questions == "views") ask_about_views();
     const std::vector<AnsweredPatch> bases = choose_bases();
@@ -92,16 +89,16 @@ class Colorization {
     return model_.report;
   }
 
-  void only_bases(const Capture& capture, const std::filesystem::path& stage1_snapshot) {
-    cache_views(capture, LuminanceModel::load(stage1_snapshot, makers_));
-    names_ = training_view_names(capture);
+  void only_bases() {
+    cache_views(LuminanceModel::load(job_.stage1, engines_));
+    names_ = training_view_names(job_.capture);
     write_candidates(ask_candidates(), file_);
   }
 
  private:
-  void start_or_resume(const std::string& stage1_digest, const std::string& source, bool resume) {
-    if (resume && std::filesystem::exists(file_)) {
-      model_ = ColorModel::load(file_, makers_);
+  void start_or_resume(const std::string& stage1_digest, const std::string& source) {
+    if (job_.resume && std::filesystem::exists(file_)) {
+      model_ = ColorModel::load(file_, engines_);
       if (model_.stage1_sha256 != stage1_digest) {
         throw SnapshotError(file_.string() + ": colorizes another stage 1 snapshot; run without --resume");
       }
@@ -112,16 +109,16 @@ class Colorization {
       }
       return;
     }
-    model_ = ColorModel::create(options_, makers_);
+    model_ = ColorModel::create(options_, engines_);
     model_.colorizer = source;
     model_.stage1_sha256 = stage1_digest;
   }
 
-  void cache_views(const Capture& capture, const LuminanceModel& luminance) {
-    const std::vector<TrainingView> views = training_views(capture, luminance.frame);
+  void cache_views(const LuminanceModel& luminance) {
+    const std::vector<TrainingView> views = training_views(job_.capture, luminance.frame);
     if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
     const MarchSettings march = luminance.march();
-    if (watcher_) cache_previews(capture, luminance);
+    if (observer_.wants_previews()) cache_previews(luminance);
     for (std::size_t v = views_.size(); v < views.size(); ++v) {
       views_.push_back(
           cache_view(*luminance.engine, march, views[v].camera, options_.working_resolution, options_.cached_weight));
@@ -132,8 +129,8 @@ class Colorization {
   }
 
   /// Held-out views, small: what an observer may want to see.
-  void cache_previews(const Capture& capture, const LuminanceModel& luminance) {
-    for (const View& view : capture.views) {
+  void cache_previews(const LuminanceModel& luminance) {
+    for (const View& view : job_.capture.views) {
       if (!view.held_out || previews_.size() >= kPreviews) continue;
       const UnitCamera camera(view.intrinsics, view.world_from_camera, luminance.frame);
       previews_.push_back({view.name, cache_view(*luminance.engine, luminance.march(), camera, kPreviewSide, 0.95)});
@@ -462,15 +459,14 @@ class Colorization {
   }
 
   void tell(const std::string& task, double fraction, std::vector<std::pair<std::string, double>> figures) const {
-    if (!progress_) return;
     const Stopwatch telling;
-    progress_({task, std::min(fraction, 1.0), std::move(figures)});
-    if (watcher_ && !previews_.empty()) watcher_([this](std::size_t index) { return preview(index); });
+    observer_.report_progress({task, std::min(fraction, 1.0), std::move(figures)});
+    if (!previews_.empty()) observer_.offer_preview([this](std::size_t index) { return preview(index); });
     told_seconds_ += telling.seconds();
   }
 
   void stop_if_asked() {
-    if (!interruption_requested()) return;
+    if (!observer_.is_cancelled()) return;
     save();
     throw Interrupted("stopped; saved " + file_.string() + ", continue with --resume");
   }
@@ -488,12 +484,12 @@ class Colorization {
     if (tiles.size() < kGalleryTiles) tiles.push_back(tile_of(patch, ""));
   }
 
-  Stage2Options options_;
+  const Stage2Job& job_;
+  const Engines& engines_;
+  Observer& observer_;
+  const Stage2Options& options_;
   Colorizer& colorizer_;
   std::filesystem::path file_;
-  ProgressSink progress_;
-  PreviewSink watcher_;
-  EngineMakers makers_;
   ColorModel model_;
   std::vector<CachedView> own_views_;
   std::vector<CachedView>& views_;
@@ -511,18 +507,12 @@ class Colorization {
 
 }  // namespace
 
-Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
-                          const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
-                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress,
-                          const PreviewSink& previews, std::vector<CachedView>* shared, const EngineMakers& makers) {
-  return Colorization(options, colorizer, take_snapshot, progress, previews, shared, makers)
-      .run(capture, stage1_snapshot, known, resume);
+Stage2Report train_stage2(const Stage2Job& job, const Engines& engines, Observer& observer) {
+  return Colorization(job, engines, observer).run();
 }
 
-void write_base_candidates(const Capture& capture, const std::filesystem::path& stage1_snapshot,
-                           const Stage2Options& options, Colorizer& colorizer, const std::filesystem::path& gallery,
-                           const ProgressSink& progress) {
-  Colorization(options, colorizer, gallery, progress).only_bases(capture, stage1_snapshot);
+void write_base_candidates(const Stage2Job& job, const Engines& engines, Observer& observer) {
+  Colorization(job, engines, observer).only_bases();
 }
 
 }  // namespace cnerf

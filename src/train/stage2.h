@@ -5,13 +5,12 @@
 #include <string>
 
 #include "encoding/hash_grid_levels.h"
+#include "src/base/observer.h"
 #include "src/base/options.h"
-#include "src/base/preview.h"
-#include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/colorizer/colorizer.h"
 #include "src/colorizer/purify.h"
-#include "src/engine/select_engine.h"
+#include "src/engine/engines.h"
 #include "src/train/known_colors.h"
 
 namespace cnerf {
@@ -76,24 +75,28 @@ struct Stage2Report {
   double bake_ab_distance = 0;   ///< mean ab distance of the baked contract's colour to the per-pixel decode
 };
 
-/// Colorizes a trained scene and leaves the result in `take_snapshot`; galleries of base, accepted and rejected patches
-/// are written beside it as PNG.
-/// @param known     colours that overrule the colorizer's; key frames among them are the purification's bases
-/// @param previews  is offered pictures of held-out views, where there are any
-/// @param shared    where several colorizations of one stage 1 keep its traced views, for as long as working_resolution
-///                  and cached_weight are the same; empty at first; null = none of it is kept
-/// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
-Stage2Report train_stage2(const Capture& capture, const std::filesystem::path& stage1_snapshot,
-                          const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
-                          const std::filesystem::path& take_snapshot, bool resume, const ProgressSink& progress = {},
-                          const PreviewSink& previews = {}, std::vector<CachedView>* shared = nullptr,
-                          const EngineMakers& makers = {});
+/// What stage 2 works on.
+struct Stage2Job {
+  const Capture& capture;
+  std::filesystem::path stage1;  ///< snapshot of the trained scene
+  const Stage2Options& options;
+  Colorizer& colorizer;
+  std::span<const KnownColors> known;  ///< overrule the colorizer; key frames among them are the purification's bases
+  std::filesystem::path take;          ///< snapshot that the result goes to; galleries of patches lie beside it
+  bool resume = false;                 ///< go on with the take, if there is one
+  /// Where several colorizations of one stage 1 keep its traced views, for as long as working_resolution and
+  /// cached_weight are the same; empty at first; null = none of it is kept.
+  std::vector<CachedView>* shared = nullptr;
+};
 
-/// Only asks for the base candidates, twelve patches spread over the views, and writes their gallery: what the whole
-/// scene would be coloured like, in a minute. `stage2.purify.picked_bases` then picks those that are liked.
+/// Colorizes a trained scene. The observer is offered pictures of held-out views, where there are any.
 /// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
-void write_base_candidates(const Capture& capture, const std::filesystem::path& stage1_snapshot,
-                           const Stage2Options& options, Colorizer& colorizer, const std::filesystem::path& gallery,
-                           const ProgressSink& progress = {});
+Stage2Report train_stage2(const Stage2Job& job, const Engines& engines, Observer& observer);
+
+/// Only asks for the base candidates, twelve patches spread over the views, and writes their gallery to `job.take`:
+/// what the whole scene would be coloured like, in a minute. `stage2.purify.picked_bases` then picks those that are
+/// liked.
+/// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
+void write_base_candidates(const Stage2Job& job, const Engines& engines, Observer& observer);
 
 }  // namespace cnerf

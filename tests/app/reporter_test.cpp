@@ -27,7 +27,7 @@ std::string printed(ProgressStyle style, Use use) {
 }
 
 void work(Reporter& reporter) {
-  const ProgressSink sink = reporter.sink();
+  const ProgressSink sink = reporter.progress_sink();
   for (int i = 0; i <= 100; ++i) sink({"stage 1", i / 100.0, {{"psnr", 20.0 + i}, {"rays/s", 213456.0}}});
   reporter.say("a \"message\"");
   reporter.wrote("volume", "/x/volume.vdb");
@@ -50,7 +50,7 @@ TEST(ReporterTest, JsonIsOneObjectALine) {
 
 TEST(ReporterTest, NumbersThatJsonCannotHoldBecomeNull) {
   const std::string text = printed(ProgressStyle::kJson, [](Reporter& reporter) {
-    reporter.sink()({"stage 1", 0.5, {{"psnr", std::numeric_limits<double>::quiet_NaN()}}});
+    reporter.progress_sink()({"stage 1", 0.5, {{"psnr", std::numeric_limits<double>::quiet_NaN()}}});
   });
   EXPECT_TRUE(nlohmann::json::parse(text).at("figures").at("psnr").is_null());
 }

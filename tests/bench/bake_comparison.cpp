@@ -90,7 +90,7 @@ int main(int argc, char** argv) {
   capture_options.downscale = options["downscale"];
   capture_options.holdout = options["holdout"];
   const cnerf::Capture capture = cnerf::load_capture(files[1], capture_options);
-  const auto scene = cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "");
+  const auto scene = cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "", cnerf::cpu_engines());
   const std::vector<cnerf::BakedVolume> levels = cnerf::read_volumes(bake);
   const auto average = options["averaged"] != 0
                            ? cnerf::bench::average_behind(cnerf::read_manifest(bake / "manifest.json"), *scene, capture)

@@ -78,8 +78,9 @@ int main(int argc, char** argv) {
   const cnerf::Capture capture = cnerf::load_capture(files[1], capture_options);
   const std::vector<cnerf::BakedVolume> volumes = cnerf::read_volumes(bake);
   const bool has_renders = files.size() > 2 && std::filesystem::is_directory(files[2]);
-  const auto scene =
-      files.size() > 2 && !has_renders ? cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "") : nullptr;
+  const auto scene = files.size() > 2 && !has_renders
+                         ? cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "", cnerf::cpu_engines())
+                         : nullptr;
   const auto average = scene && options["averaged"] != 0
                            ? cnerf::bench::average_behind(cnerf::read_manifest(bake / "manifest.json"), *scene, capture)
                            : nullptr;

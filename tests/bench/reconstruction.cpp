@@ -115,7 +115,7 @@ int main(int argc, char** argv) {
   capture_options.holdout = int(own["holdout"]);
   cnerf::Capture capture = cnerf::load_capture(argv[1], capture_options);
   if (own["validation"] > 0) cnerf::test::hold_out_of_training(capture, int(own["validation"]));
-  cnerf::LuminanceModel model = cnerf::LuminanceModel::create(capture, options);
+  cnerf::LuminanceModel model = cnerf::LuminanceModel::create(capture, options, cnerf::cpu_engines());
   const auto views = cnerf::training_views(capture, model.frame);
   std::printf("%zu training views of %dx%d, %d cascades, side %.3f world units\n", views.size(), views[0].image->width,
               views[0].image->height, model.frame.cascades, 1 / model.frame.unit_per_world);

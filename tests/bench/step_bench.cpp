@@ -30,7 +30,7 @@ constexpr float kLearningRate = 1e-2f, kTrainingTransmittance = 1e-4f;
 struct Training {
   Training(const std::filesystem::path& folder, int downscale)
       : capture(load_capture(folder, {.downscale = downscale, .holdout = 8})),
-        model(LuminanceModel::create(capture, Stage1Options{})),
+        model(LuminanceModel::create(capture, Stage1Options{}, cpu_engines())),
         views(training_views(capture, model.frame)),
         engine(dynamic_cast<LuminanceEngineCpu&>(*model.engine)) {
     for (int i = 0; i < kWarmUpSteps; ++i) engine.step(views, kLearningRate);

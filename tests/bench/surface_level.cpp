@@ -95,7 +95,7 @@ int main(int argc, char** argv) {
     options.at(argument.substr(0, argument.find('='))) = std::stoi(argument.substr(argument.find('=') + 1));
   }
   const cnerf::Capture capture = cnerf::load_capture(argv[1], {});
-  const auto scene = cnerf::Scene::load(argv[2]);
+  const auto scene = cnerf::Scene::load(argv[2], {}, cnerf::cpu_engines());
   cnerf::BakeOptions bake;
   bake.resolution = options["resolution"];
   const cnerf::BakePlan plan = cnerf::plan_bake(*scene, bake);

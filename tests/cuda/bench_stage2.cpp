@@ -6,7 +6,7 @@
 
 #include "src/base/parallel.h"
 #include "src/base/rng.h"
-#include "src/engine/chroma_engine.h"
+#include "src/engine/color_engines.h"
 #include "src/engine/cuda/luminance_engine_cuda.h"
 #include "src/train/view_cache.h"
 #include "tests/cuda/check.h"
@@ -49,8 +49,8 @@ std::vector<SoftLabel> labels_of(const PixelSamples& pixels) {
   return labels;
 }
 
-void time_engines(const char* device, const PixelSamples& patch, const PixelSamples& distilled, ChromaEngine& chroma,
-                  ChromaticityEngine& chromaticity, int repetitions) {
+void time_engines(const char* device, const PixelSamples& patch, const PixelSamples& distilled, ColorBinEngine& chroma,
+                  ColorFieldEngine& chromaticity, int repetitions) {
   const std::vector<SoftLabel> labels = labels_of(patch);
   const std::vector<Ab> targets = colors_of(distilled);
   std::vector<Ab> colors(distilled.pixels());
@@ -69,8 +69,8 @@ void time_engines(const char* device, const PixelSamples& patch, const PixelSamp
 /// All that stage 2 does but for asking a colorizer.
 void time_stage2(const std::vector<CachedView>& views, const HashGridOptions& grid, int patches, int rays,
                  int distillation_steps) {
-  const auto chroma = make_cuda_chroma_engine(grid, 1);
-  const auto chromaticity = make_cuda_chromaticity_engine(grid, 2);
+  const auto chroma = make_cuda_color_bin_engine(grid, 1);
+  const auto chromaticity = make_cuda_color_field_engine(grid, 2);
   double loss = 0, distance = 0;
   const double injection = milliseconds([&] {
     for (int i = 0; i < patches; ++i) {
@@ -120,9 +120,9 @@ int bench_stage2(const Arguments& arguments) {
   grid.log2_rows = int(arguments.number("chroma_log2_rows", grid.log2_rows));
   const int rays = int(arguments.number("rays", 4096));
   const PixelSamples patch = visible_pixels(cached, rays, 1), distilled = visible_pixels(cached, 2 * rays, 2);
-  time_engines("CUDA", patch, distilled, *make_cuda_chroma_engine(grid, 1), *make_cuda_chromaticity_engine(grid, 2),
+  time_engines("CUDA", patch, distilled, *make_cuda_color_bin_engine(grid, 1), *make_cuda_color_field_engine(grid, 2),
                50);
-  time_engines("CPU", patch, distilled, *make_cpu_chroma_engine(grid, 1), *make_cpu_chromaticity_engine(grid, 2), 5);
+  time_engines("CPU", patch, distilled, *make_cpu_color_bin_engine(grid, 1), *make_cpu_color_field_engine(grid, 2), 5);
   time_stage2(cached, grid, int(arguments.number("patches", 600)), rays, int(arguments.number("distill_steps", 1000)));
   return 0;
 }

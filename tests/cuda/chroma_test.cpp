@@ -1,7 +1,7 @@
 // Stage 2's engines against the CPU's, on random pixels. Bounds are two to ten times what was seen on an H200
 // (docs/performance.md); what is seen comes from rounding to 16 bits, as in self_test.cpp.
 
-#include "src/engine/chroma_engine.h"
+#include "src/engine/color_engines.h"
 
 #include <cstring>
 #include <numeric>
@@ -81,8 +81,10 @@ void check_distribution(int levels, int count, const ChromaLossWeights& more, bo
     weights.push_back(rng.uniform(0.0f, 2.0f));
   }
   weights.front() = 0;
-  const auto cpu = make_cpu_chroma_engine(grid_of(levels), 5), cuda = make_cuda_chroma_engine(grid_of(levels), 5);
-  const auto step = [&](ChromaEngine& engine, float rate) { return engine.step(pixels, labels, weights, more, rate); };
+  const auto cpu = make_cpu_color_bin_engine(grid_of(levels), 5), cuda = make_cuda_color_bin_engine(grid_of(levels), 5);
+  const auto step = [&](ColorBinEngine& engine, float rate) {
+    return engine.step(pixels, labels, weights, more, rate);
+  };
 
   const auto compare_logits = [&](const char* what, double bound) {
     std::vector<float> expected(std::size_t(count) * kAbBinCount), found(expected.size());
@@ -125,8 +127,8 @@ void check_distribution(int levels, int count, const ChromaLossWeights& more, bo
   compare_steps(*cpu, *cuda, step, more.spread > 1 ? 5e-2 : 2e-2);
   if (quick) return;
 
-  const auto fresh_cpu = make_cpu_chroma_engine(grid_of(levels), 6);
-  const auto fresh = make_cuda_chroma_engine(grid_of(levels), 6);
+  const auto fresh_cpu = make_cpu_color_bin_engine(grid_of(levels), 6);
+  const auto fresh = make_cuda_color_bin_engine(grid_of(levels), 6);
   const double first = step(*fresh, 1e-2f);
   step(*fresh_cpu, 1e-2f);
   double last = 0, of_cpu = 0;
@@ -145,15 +147,15 @@ void check_chromaticity(int levels, int count, AbLoss loss, bool quick) {
   std::vector<float> weights;
   SequentialRng rng(4, 2);
   for (int p = 0; p < count; ++p) weights.push_back(rng.uniform(0.0f, 2.0f));
-  const auto cpu = make_cpu_chromaticity_engine(grid_of(levels), 5);
-  const auto cuda = make_cuda_chromaticity_engine(grid_of(levels), 5);
-  const auto step = [&](ChromaticityEngine& engine, float rate) {
+  const auto cpu = make_cpu_color_field_engine(grid_of(levels), 5);
+  const auto cuda = make_cuda_color_field_engine(grid_of(levels), 5);
+  const auto step = [&](ColorFieldEngine& engine, float rate) {
     return engine.step(pixels, targets, weights, loss, rate);
   };
   // Where targets are met a gradient is what rounding leaves; so gradients are compared away from them.
   std::vector<Ab> moved = targets;
   for (Ab& color : moved) color = {color.a + 12, color.b - 9};
-  const auto step_to_moved = [&](ChromaticityEngine& engine, float rate) {
+  const auto step_to_moved = [&](ColorFieldEngine& engine, float rate) {
     return engine.step(pixels, moved, weights, loss, rate);
   };
   for (int i = 0; i < 100; ++i) step(*cpu, 1e-2f);
@@ -179,8 +181,8 @@ void check_chromaticity(int levels, int count, AbLoss loss, bool quick) {
   compare_steps(*cpu, *cuda, step_to_moved);
   if (quick) return;
 
-  const auto fresh = make_cuda_chromaticity_engine(grid_of(levels), 6);
-  const auto fresh_cpu = make_cpu_chromaticity_engine(grid_of(levels), 6);
+  const auto fresh = make_cuda_color_field_engine(grid_of(levels), 6);
+  const auto fresh_cpu = make_cpu_color_field_engine(grid_of(levels), 6);
   double last = 0, of_same = 0;
   for (int i = 0; i < 300; ++i) {
     const float rate = i < 200 ? 1e-2f : 1e-3f;
@@ -193,10 +195,10 @@ void check_chromaticity(int levels, int count, AbLoss loss, bool quick) {
 void check_empty_pixels() {
   PixelSamples pixels;
   pixels.offsets.assign(18, 0);
-  const auto engine = make_cuda_chroma_engine(grid_of(3), 5);
+  const auto engine = make_cuda_color_bin_engine(grid_of(3), 5);
   const double loss = engine->step(pixels, std::vector<SoftLabel>(17, soft_label({20, 20})), {}, 1e-2f);
   expect_below("loss of pixels without samples: away from uniform", std::abs(loss / std::log(313.0) - 1), 0.3);
-  const auto field = make_cuda_chromaticity_engine(grid_of(3), 5);
+  const auto field = make_cuda_color_field_engine(grid_of(3), 5);
   std::vector<Ab> colors(17);
   field->composite(pixels, colors);
   expect_below("colour of pixels without samples", std::hypot(colors[3].a, colors[3].b), 1e-6);

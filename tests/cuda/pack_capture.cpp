@@ -33,7 +33,7 @@ int main(int argc, char** argv) {
   packed.capture = cnerf::load_capture(argv[1], options);
   if (validation > 0) cnerf::test::hold_out_of_training(packed.capture, validation);
   cnerf::Stage1Options stage1;
-  const auto model = cnerf::LuminanceModel::create(packed.capture, stage1);
+  const auto model = cnerf::LuminanceModel::create(packed.capture, stage1, cnerf::cpu_engines());
   packed.frame = model.frame;
   packed.occupancy_resolution = stage1.occupancy.resolution;
   for (const float density : model.engine->occupancy().densities()) {

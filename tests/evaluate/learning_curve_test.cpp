@@ -32,12 +32,15 @@ TEST(LearningCurve, ValueAtATime) {
 TEST(LearningCurve, MeasuringAndWhatComesBeforeAreNoTraining) {
   using namespace std::chrono_literals;
   int measured = 0;
-  LearningCurve curve([&] {
+  struct Counting final : Observer {
+    int reports = 0;
+    void report_progress(const Progress& /*progress*/) override { ++reports; }
+  } counting;
+  LearningCurve curve("train", counting, [&] {
     std::this_thread::sleep_for(60ms);
     return double(++measured);
   });
-  int passed_on = 0;
-  const ProgressSink sink = curve.watching("train", [&](const Progress&) { ++passed_on; });
+  const ProgressSink sink = curve.progress_sink();
   sink({"cache", 0.5, {}});
   std::this_thread::sleep_for(120ms);
   sink({"cache", 1, {}});
@@ -46,7 +49,7 @@ TEST(LearningCurve, MeasuringAndWhatComesBeforeAreNoTraining) {
     sink({"train", step / 40.0, {}});
   }
   const double whole = curve.seconds();
-  EXPECT_EQ(passed_on, 42);
+  EXPECT_EQ(counting.reports, 42);
   ASSERT_GE(curve.points().size(), 3u);
   EXPECT_LT(curve.points().size(), 20u) << "not at every step";
   EXPECT_LT(curve.points().front().seconds, 0.1) << "the caching counted";

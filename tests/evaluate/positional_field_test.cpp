@@ -188,12 +188,12 @@ class PositionalField : public testing::Test {
 
   Capture capture_ = test::toy_capture(4, 24, 20);
   SceneFrame frame_;
-  EngineMakers makers_ = positional_engines(PositionalRays{});
+  std::unique_ptr<Engines> engines_ = positional_engines(PositionalRays{});
 };
 
 TEST_F(PositionalField, Learns) {
   for (View& view : capture_.views) std::ranges::fill(view.image.u8, std::uint8_t(200));  // one grey wall all around
-  const auto engine = makers_.luminance(options());
+  const auto engine = engines_->make_luminance(options());
   std::vector<double> losses;
   for (int i = 0; i < 60; ++i) losses.push_back(engine->step(views(), 2e-3f).loss);
   const double first = std::accumulate(losses.begin(), losses.begin() + 6, 0.0);
@@ -206,10 +206,10 @@ TEST_F(PositionalField, Learns) {
 }
 
 TEST_F(PositionalField, ASnapshotContinuesAsIfNothingHadHappened) {
-  const auto whole = makers_.luminance(options());
+  const auto whole = engines_->make_luminance(options());
   for (int i = 0; i < 6; ++i) (void)whole->step(views(), 1e-3f);
 
-  const auto first = makers_.luminance(options()), second = makers_.luminance(options());
+  const auto first = engines_->make_luminance(options()), second = engines_->make_luminance(options());
   for (int i = 0; i < 3; ++i) (void)first->step(views(), 1e-3f);
   const std::vector<StatePiece> from = first->state(), to = second->state();
   ASSERT_EQ(from.size(), to.size());
@@ -226,7 +226,7 @@ TEST_F(PositionalField, ASnapshotContinuesAsIfNothingHadHappened) {
 }
 
 TEST_F(PositionalField, TracesAreWhatRenderingSums) {
-  const auto engine = makers_.luminance(options());
+  const auto engine = engines_->make_luminance(options());
   for (int i = 0; i < 5; ++i) (void)engine->step(views(), 1e-3f);
   const auto seen = looked_at(*engine);
   std::vector<WeightedSample> samples;
@@ -263,7 +263,7 @@ PixelSamples two_pixels() {
 }
 
 TEST_F(PositionalField, LogitsOfAPixelAreTheMeanOfItsSamples) {
-  const auto engine = makers_.chroma({}, 3);
+  const auto engine = engines_->make_color_bins({}, 3);
   const PixelSamples pixels = two_pixels();
   std::vector<float> together(2 * kAbBinCount);
   engine->logits(pixels, together);
@@ -284,14 +284,14 @@ TEST_F(PositionalField, LogitsOfAPixelAreTheMeanOfItsSamples) {
 TEST_F(PositionalField, SpreadIsWhatTheLossGrowsByAndWhatTrainingLowers) {
   const std::vector<SoftLabel> labels = {soft_label({30, -20}), soft_label({-10, 40})};
   const auto loss = [&](float spread_weight) {
-    return makers_.chroma({}, 3)->step(two_pixels(), labels, {}, {spread_weight}, 1e-9f);
+    return engines_->make_color_bins({}, 3)->step(two_pixels(), labels, {}, {spread_weight}, 1e-9f);
   };
   const double none = loss(0), once = loss(1), twice = loss(2);
   EXPECT_GT(once, none);
   EXPECT_NEAR(twice - none, 2 * (once - none), 1e-3 * (twice - none) + 1e-6);
 
   const auto spread_after = [&](float spread_weight) {
-    const auto engine = makers_.chroma({}, 3);
+    const auto engine = engines_->make_color_bins({}, 3);
     for (int i = 0; i < 60; ++i) (void)engine->step(two_pixels(), labels, {}, {spread_weight}, 3e-3f);
     // Steps of next to nothing: what the loss grows by is the spread.
     const double without = engine->step(two_pixels(), labels, {}, {}, 1e-12f);
@@ -303,10 +303,10 @@ TEST_F(PositionalField, SpreadIsWhatTheLossGrowsByAndWhatTrainingLowers) {
 TEST_F(PositionalField, RegressionIsSmoothL1OfTheMean) {
   const std::vector<SoftLabel> labels = {soft_label({30, -20}), soft_label({-10, 40})};
   const auto loss = [&](float weight) {
-    return makers_.chroma({}, 3)->step(two_pixels(), labels, {}, {.regression = weight}, 1e-9f);
+    return engines_->make_color_bins({}, 3)->step(two_pixels(), labels, {}, {.regression = weight}, 1e-9f);
   };
   std::vector<Ab> means(2);
-  makers_.chroma({}, 3)->decode(two_pixels(), 1.0f, means);
+  engines_->make_color_bins({}, 3)->decode(two_pixels(), 1.0f, means);
   double expected = 0;
   for (std::size_t p = 0; p < means.size(); ++p) {
     const Ab wanted = mean_of(labels[p]);
@@ -319,10 +319,10 @@ TEST_F(PositionalField, RegressionIsSmoothL1OfTheMean) {
 }
 
 TEST_F(PositionalField, LearnsColoursAndLeavesTheEncodingAlone) {
-  const auto luminance = makers_.luminance(options());
+  const auto luminance = engines_->make_luminance(options());
   for (int i = 0; i < 5; ++i) (void)luminance->step(views(), 1e-3f);
   const auto before = looked_at(*luminance);
-  const auto chroma = makers_.chroma({}, 3);
+  const auto chroma = engines_->make_color_bins({}, 3);
   const std::vector<Ab> wanted = {{30, -20}, {-10, 40}};
   const std::vector<SoftLabel> labels = {soft_label(wanted[0]), soft_label(wanted[1])};
   for (int i = 0; i < 120; ++i) (void)chroma->step(two_pixels(), labels, {}, 3e-3f);
@@ -337,15 +337,15 @@ TEST_F(PositionalField, LearnsColoursAndLeavesTheEncodingAlone) {
   for (std::size_t r = 0; r < before.size(); ++r) EXPECT_EQ(before[r].luminance, after[r].luminance);
 
   // Its encoding is that of the luminance field, and only training it changes it.
-  const auto bytes_of_encoding = [&](ChromaEngine& engine) {
+  const auto bytes_of_encoding = [&](ColorBinEngine& engine) {
     const StatePiece values = engine.state().front();
     constexpr std::size_t kHead = 4 * (256 * 128 + 128 + 128 * 128 + 128 + 128 * 313 + 313);
     return std::vector<std::byte>(values.bytes.begin() + kHead, values.bytes.end());
   };
-  const auto fresh = makers_.chroma({}, 9);
+  const auto fresh = engines_->make_color_bins({}, 9);
   EXPECT_EQ(bytes_of_encoding(*fresh), bytes_of_encoding(*chroma));
-  EngineMakers training = positional_engines(PositionalRays{}, /*trains_encoding=*/true);
-  const auto tuned = training.chroma({}, 9);
+  const auto training = positional_engines(PositionalRays{}, /*trains_encoding=*/true);
+  const auto tuned = training->make_color_bins({}, 9);
   const auto untrained = bytes_of_encoding(*tuned);
   EXPECT_NE(untrained, bytes_of_encoding(*fresh)) << "without a luminance field it starts from random weights";
   (void)tuned->step(two_pixels(), labels, {}, 3e-3f);
@@ -363,7 +363,7 @@ TEST_F(PositionalField, RaysOfCapturesWithABoundAreSpreadInDisparity) {
   EXPECT_GT(positional_rays(capture_, frame_).near, 0);
 
   // No sample lies nearer than that, and all lie in the box.
-  const auto engine = positional_engines({0.3f, true}).luminance(options());
+  const auto engine = positional_engines({0.3f, true})->make_luminance(options());
   std::vector<WeightedSample> samples;
   std::vector<std::size_t> offsets;
   engine->trace(this->rays(), {}, {0, 1.0f}, samples, offsets);

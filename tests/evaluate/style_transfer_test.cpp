@@ -115,18 +115,19 @@ TEST_F(StyleTransfer, BringsAFieldNearerToItsReference) {
   stage1.steps_per_box = 64;
   stage1.grid = {.levels = 3, .log2_rows = 10, .coarsest_resolution = 4, .finest_resolution = 32};
   stage1.occupancy.resolution = 32;
-  (void)train_stage1(capture, stage1, folder / "stage1.snapshot", false);
+  Observer observer;
+  (void)train_stage1({capture, stage1, folder / "stage1.snapshot"}, cpu_engines(), observer);
 
   const LabPicture reference = plain({40, 30});
   const StyleLoss loss(weights_, reference);
   Stage2Options options;
   options.grid = stage1.grid;
-  const StyleReport report =
-      transfer_style(capture, folder / "stage1.snapshot", loss, reference, options, 40, folder / "take.snapshot", {});
+  const StyleReport report = transfer_style(capture, folder / "stage1.snapshot", loss, reference, options, 40,
+                                            folder / "take.snapshot", cpu_engines(), observer);
   EXPECT_GT(report.seconds, 0);
   EXPECT_GT(report.first_loss, 0);
 
-  const auto scene = Scene::load(folder / "stage1.snapshot", folder / "take.snapshot");
+  const auto scene = Scene::load(folder / "stage1.snapshot", folder / "take.snapshot", cpu_engines());
   const View& view = capture.views[1];
   const RenderedImage image = scene->render(view.intrinsics, view.world_from_camera);
   double a = 0, b = 0, n = 0;

@@ -67,7 +67,7 @@ class Stage2 : public testing::Test {
     options.grid = small_grid();
     options.occupancy.resolution = 32;
     capture_.views.back().held_out = true;
-    (void)train_stage1(capture_, options, stage1(), false);
+    (void)train_stage1({capture_, options, stage1()}, cpu_engines(), observer_);
   }
 
   static HashGridOptions small_grid() {
@@ -88,9 +88,16 @@ class Stage2 : public testing::Test {
     return folder_ / (name + "/take.snapshot");
   }
 
+  Stage2Report colorize(const Stage2Options& options, Colorizer& colorizer, std::span<const KnownColors> known,
+                        const std::filesystem::path& take, bool resume, std::vector<CachedView>* shared = nullptr) {
+    return train_stage2({capture_, stage1(), options, colorizer, known, take, resume, shared}, cpu_engines(),
+                        observer_);
+  }
+
   [[nodiscard]] RenderedImage rendered(const std::string& name, std::shared_ptr<TraceMemory> memory = nullptr) const {
     const View& view = capture_.views.back();
-    return Scene::load(stage1(), take(name), std::move(memory))->render(view.intrinsics, view.world_from_camera);
+    return Scene::load(stage1(), take(name), cpu_engines(), std::move(memory))
+        ->render(view.intrinsics, view.world_from_camera);
   }
   /// Mean ab distance to the answer where a pixel is opaque and light enough to have that colour.
   [[nodiscard]] double distance_to_answer(const std::string& name) const {
@@ -107,13 +114,14 @@ class Stage2 : public testing::Test {
     return sum / count;
   }
 
+  Observer observer_;
   test::TempDir folder_;
   Capture capture_ = test::toy_capture(6, 48, 40);
 };
 
 TEST_F(Stage2, PatchesSayWhereTheyComeFrom) {
   Listening colorizer;
-  (void)train_stage2(capture_, stage1(), small_options(), colorizer, {}, take("a"), false);
+  (void)colorize(small_options(), colorizer, {}, take("a"), false);
   std::set<std::uint64_t> queries;
   for (const PatchOrigin& origin : colorizer.origins) {
     queries.insert(origin.query);
@@ -130,7 +138,7 @@ TEST_F(Stage2, ViewsAreAskedAboutWholeAndOnceFromNeighbourToNeighbour) {
   Stage2Options options = small_options();
   options.questions = "views";
   Listening colorizer;
-  (void)train_stage2(capture_, stage1(), options, colorizer, {}, take("a"), false);
+  (void)colorize(options, colorizer, {}, take("a"), false);
   std::vector<std::string> asked;
   for (const PatchOrigin& origin : colorizer.origins) {
     asked.push_back(origin.view);
@@ -149,7 +157,7 @@ TEST_F(Stage2, LearnsTheAnswerByClassificationAndPhotometrically) {
       options.questions = questions;
       Listening colorizer;
       const std::string name = std::string(injection) + "-" + questions;
-      (void)train_stage2(capture_, stage1(), options, colorizer, {}, take(name), false);
+      (void)colorize(options, colorizer, {}, take(name), false);
       EXPECT_LT(distance_to_answer(name), 5) << name << "; grey is " << std::hypot(kAnswer.a, kAnswer.b);
     }
   }
@@ -159,11 +167,11 @@ TEST_F(Stage2, BasesAreWhatTheAnswersAboutAllPlacesAgreeOn) {
   Stage2Options options = small_options();
   options.purify.opinions = 8;
   Erring colorizer;
-  const Stage2Report report = train_stage2(capture_, stage1(), options, colorizer, {}, take("agreed"), false);
+  const Stage2Report report = colorize(options, colorizer, {}, take("agreed"), false);
   EXPECT_GE(report.rejected, 20) << "a third of the answers is wrong, and no base is like them";
   EXPECT_LT(distance_to_answer("agreed"), 5);
   options.purify.opinions = 1;
-  (void)train_stage2(capture_, stage1(), options, colorizer, {}, take("first"), false);
+  (void)colorize(options, colorizer, {}, take("first"), false);
   EXPECT_GT(distance_to_answer("first"), 30) << "the first answers are wrong, and so is what is like them";
 }
 
@@ -172,7 +180,7 @@ TEST_F(Stage2, SpreadWeightReachesTheField) {
   for (const double weight : {0.0, 20.0}) {
     options.spread_weight = weight;
     Listening colorizer;
-    (void)train_stage2(capture_, stage1(), options, colorizer, {}, take(weight > 0 ? "close" : "free"), false);
+    (void)colorize(options, colorizer, {}, take(weight > 0 ? "close" : "free"), false);
   }
   EXPECT_NE(rendered("free").rgb, rendered("close").rgb);
   EXPECT_LT(distance_to_answer("close"), 5);
@@ -182,8 +190,7 @@ TEST_F(Stage2, SharedViewsAndRememberedTracesChangeNothing) {
   std::vector<CachedView> shared;
   for (const char* name : {"alone", "first", "second"}) {
     Listening colorizer;
-    (void)train_stage2(capture_, stage1(), small_options(), colorizer, {}, take(name), false, {}, {},
-                       name == std::string("alone") ? nullptr : &shared);
+    (void)colorize(small_options(), colorizer, {}, take(name), false, name == std::string("alone") ? nullptr : &shared);
   }
   EXPECT_EQ(shared.size(), 5u);
   const RenderedImage alone = rendered("alone");

@@ -427,10 +427,11 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
   OccupancyGrid occupancy_;
 };
 
-class PositionalChromaEngine final : public ChromaEngine {
+class PositionalColorBinEngine final : public ColorBinEngine {
  public:
   /// @param encoding  w to begin with; empty = random
-  PositionalChromaEngine(std::uint64_t seed, Trunk encoding, bool trains_encoding) : trains_encoding_(trains_encoding) {
+  PositionalColorBinEngine(std::uint64_t seed, Trunk encoding, bool trains_encoding)
+      : trains_encoding_(trains_encoding) {
     trunk_->to(device());
     net_->to(device());
     initialise(*trunk_, seed ^ kChromaStream);
@@ -444,7 +445,7 @@ class PositionalChromaEngine final : public ChromaEngine {
     trained_ = std::make_unique<Trained>(joined(net_->parameters(), trunk_->parameters()));
   }
 
-  using ChromaEngine::step;
+  using ColorBinEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
@@ -566,6 +567,34 @@ class PositionalChromaEngine final : public ChromaEngine {
   std::vector<std::int64_t> steps_ = {0};
 };
 
+class PositionalEngines final : public Engines {
+ public:
+  PositionalEngines(const PositionalRays& rays, bool trains_encoding, const Engines* luminance)
+      : rays_(rays), trains_encoding_(trains_encoding), luminance_(luminance) {}
+  [[nodiscard]] Device device() const override { return Device::kCpu; }
+  [[nodiscard]] std::string description() const override { return "positional encoding, LibTorch"; }
+  [[nodiscard]] std::unique_ptr<LuminanceEngine> make_luminance(const LuminanceEngineOptions& options) const override {
+    if (luminance_ != nullptr) return luminance_->make_luminance(options);
+    auto engine = std::make_unique<PositionalLuminanceEngine>(options, rays_);
+    encoding_ = engine->encoding();
+    return engine;
+  }
+  [[nodiscard]] std::unique_ptr<ColorBinEngine> make_color_bins(const HashGridOptions& /*grid*/,
+                                                                std::uint64_t seed) const override {
+    return std::make_unique<PositionalColorBinEngine>(seed, encoding_, trains_encoding_);
+  }
+  [[nodiscard]] std::unique_ptr<ColorFieldEngine> make_color_field(const HashGridOptions& grid,
+                                                                   std::uint64_t seed) const override {
+    return (luminance_ != nullptr ? *luminance_ : cpu_engines()).make_color_field(grid, seed);
+  }
+
+ private:
+  PositionalRays rays_;
+  bool trains_encoding_;
+  const Engines* luminance_;
+  mutable Trunk encoding_ = nullptr;  // of the luminance engine made last
+};
+
 }  // namespace
 
 PositionalRays positional_rays(const Capture& capture, const SceneFrame& frame) {
@@ -574,18 +603,9 @@ PositionalRays positional_rays(const Capture& capture, const SceneFrame& frame) 
   return {kNearOfSurroundings, true};
 }
 
-EngineMakers positional_engines(const PositionalRays& rays, bool trains_encoding) {
-  const auto encoding = std::make_shared<Trunk>(nullptr);  // of the luminance engine made last
-  EngineMakers makers;
-  makers.luminance = [rays, encoding](const LuminanceEngineOptions& options) {
-    auto engine = std::make_unique<PositionalLuminanceEngine>(options, rays);
-    *encoding = engine->encoding();
-    return engine;
-  };
-  makers.chroma = [encoding, trains_encoding](const HashGridOptions&, std::uint64_t seed) {
-    return std::make_unique<PositionalChromaEngine>(seed, *encoding, trains_encoding);
-  };
-  return makers;
+std::unique_ptr<Engines> positional_engines(const PositionalRays& rays, bool trains_encoding,
+                                            const Engines* luminance) {
+  return std::make_unique<PositionalEngines>(rays, trains_encoding, luminance);
 }
 
 }  // namespace cnerf

@@ -1,7 +1,7 @@
 #include <mutex>
 
 #include "src/base/check.h"
-#include "src/engine/chroma_engine.h"
+#include "src/engine/color_engines.h"
 #include "src/engine/cuda/chroma_stream.h"
 #include "src/engine/cuda/pixel_batch.h"
 #include "src/engine/cuda/point_net.h"
@@ -13,13 +13,13 @@ namespace {
 constexpr std::size_t kPixelsAtATime = 1 << 16;
 constexpr std::size_t kPointsAtATime = 1 << 20;
 
-class ChromaticityEngineCuda final : public ChromaticityEngine {
+class ColorFieldEngineCuda final : public ColorFieldEngine {
  public:
-  ChromaticityEngineCuda(const HashGridOptions& grid, std::uint64_t seed) : field_(grid, PointOutputs::kNumbers, seed) {
+  ColorFieldEngineCuda(const HashGridOptions& grid, std::uint64_t seed) : field_(grid, PointOutputs::kNumbers, seed) {
     state_loaded();
   }
 
-  using ChromaticityEngine::step;
+  using ColorFieldEngine::step;
   double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
               AbLoss loss, float learning_rate) override {
     CNERF_CHECK_EQ(targets.size(), pixels.pixels());
@@ -102,9 +102,9 @@ class ChromaticityEngineCuda final : public ChromaticityEngine {
 
 }  // namespace
 
-std::unique_ptr<ChromaticityEngine> make_cuda_chromaticity_engine(const HashGridOptions& grid, std::uint64_t seed) {
+std::unique_ptr<ColorFieldEngine> make_cuda_color_field_engine(const HashGridOptions& grid, std::uint64_t seed) {
   if (!has_cuda_device()) throw DeviceError("no CUDA device: no driver, or no GPU it can use");
-  return std::make_unique<ChromaticityEngineCuda>(grid, seed);
+  return std::make_unique<ColorFieldEngineCuda>(grid, seed);
 }
 
 }  // namespace cnerf

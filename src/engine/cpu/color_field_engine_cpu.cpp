@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "src/base/check.h"
-#include "src/engine/chroma_engine.h"
+#include "src/engine/color_engines.h"
 #include "src/engine/cpu/point_net.h"
 #include "src/engine/cpu/step_chunks.h"
 #include "src/engine/initial_state.h"
@@ -13,12 +13,12 @@ namespace {
 
 constexpr std::size_t kBlockPixels = 64;
 
-class ChromaticityEngineCpu final : public ChromaticityEngine {
+class ColorFieldEngineCpu final : public ColorFieldEngine {
  public:
-  ChromaticityEngineCpu(const HashGridOptions& grid, std::uint64_t seed)
+  ColorFieldEngineCpu(const HashGridOptions& grid, std::uint64_t seed)
       : field_(grid, kChromaticityOutputs, /*relu_output=*/false, seed) {}
 
-  using ChromaticityEngine::step;
+  using ColorFieldEngine::step;
   double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
               AbLoss loss, float learning_rate) override {
     CNERF_CHECK_EQ(targets.size(), pixels.pixels());
@@ -115,8 +115,8 @@ class ChromaticityEngineCpu final : public ChromaticityEngine {
 
 }  // namespace
 
-std::unique_ptr<ChromaticityEngine> make_cpu_chromaticity_engine(const HashGridOptions& grid, std::uint64_t seed) {
-  return std::make_unique<ChromaticityEngineCpu>(grid, seed);
+std::unique_ptr<ColorFieldEngine> make_cpu_color_field_engine(const HashGridOptions& grid, std::uint64_t seed) {
+  return std::make_unique<ColorFieldEngineCpu>(grid, seed);
 }
 
 }  // namespace cnerf

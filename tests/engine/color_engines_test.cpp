@@ -9,7 +9,7 @@
 #include "src/base/parallel.h"
 #include "src/base/rng.h"
 #include "src/color/colorspace_math.h"
-#include "src/engine/chroma_engine.h"
+#include "src/engine/color_engines.h"
 #include "src/engine/cpu/mlp.h"
 #include "src/field/adam.h"
 
@@ -53,8 +53,8 @@ std::vector<SoftLabel> two_halves(int n) {
   return labels;
 }
 
-TEST(ChromaEngine, CompositingFeaturesEqualsCompositingLogits) {
-  const auto engine = make_cpu_chroma_engine(small_grid(), 3);
+TEST(ColorBinEngine, CompositingFeaturesEqualsCompositingLogits) {
+  const auto engine = make_cpu_color_bin_engine(small_grid(), 3);
   const PixelSamples pixels = row_of_pixels(40);
   for (int i = 0; i < 20; ++i) engine->step(pixels, two_halves(40), {}, 1e-2f);
 
@@ -70,8 +70,8 @@ TEST(ChromaEngine, CompositingFeaturesEqualsCompositingLogits) {
   }
 }
 
-TEST(ChromaEngine, LearnsTwoColours) {
-  const auto engine = make_cpu_chroma_engine(small_grid(), 3);
+TEST(ColorBinEngine, LearnsTwoColours) {
+  const auto engine = make_cpu_color_bin_engine(small_grid(), 3);
   const PixelSamples pixels = row_of_pixels(64);
   const double first = engine->step(pixels, two_halves(64), {}, 1e-2f);
   EXPECT_NEAR(first, std::log(double(kAbBinCount)), 1.5);  // nearly uniform, less the label's own entropy
@@ -89,7 +89,7 @@ struct Parameters {
   std::span<float> values;
   std::vector<float> gradient;
 };
-std::vector<Parameters> parameters_of(ChromaEngine& engine) {
+std::vector<Parameters> parameters_of(ColorBinEngine& engine) {
   const auto floats = [](const StatePiece& piece) {
     return std::span(reinterpret_cast<float*>(piece.bytes.data()), piece.bytes.size() / sizeof(float));
   };
@@ -112,10 +112,10 @@ std::vector<Parameters> parameters_of(ChromaEngine& engine) {
   return parameters;
 }
 
-TEST(ChromaEngine, GradientIsTheLossesDerivativeAndThatOfWhatIsAdded) {
+TEST(ColorBinEngine, GradientIsTheLossesDerivativeAndThatOfWhatIsAdded) {
   const PixelSamples pixels = row_of_pixels(48);
   for (const ChromaLossWeights more : {ChromaLossWeights{}, {.spread = 30}, {.regression = 1}, {3, 0.1f}}) {
-    const auto engine = make_cpu_chroma_engine(small_grid(), 5);
+    const auto engine = make_cpu_color_bin_engine(small_grid(), 5);
     for (int i = 0; i < 20; ++i) engine->step(pixels, two_halves(48), {}, 1e-2f);
     for (const StatePiece& piece : engine->state()) {
       if (piece.name.find("moments") != std::string::npos) std::ranges::fill(piece.bytes, std::byte{0});
@@ -146,14 +146,14 @@ TEST(ChromaEngine, GradientIsTheLossesDerivativeAndThatOfWhatIsAdded) {
   }
 }
 
-TEST(ChromaEngine, RegressionIsSmoothL1OfTheMean) {
+TEST(ColorBinEngine, RegressionIsSmoothL1OfTheMean) {
   const PixelSamples pixels = row_of_pixels(48);
   const std::vector<SoftLabel> labels = two_halves(48);
   const auto loss = [&](float weight) {
-    return make_cpu_chroma_engine(small_grid(), 5)->step(pixels, labels, {}, {.regression = weight}, 1e-9f);
+    return make_cpu_color_bin_engine(small_grid(), 5)->step(pixels, labels, {}, {.regression = weight}, 1e-9f);
   };
   std::vector<Ab> means(pixels.pixels());
-  make_cpu_chroma_engine(small_grid(), 5)->decode(pixels, 1.0f, means);
+  make_cpu_color_bin_engine(small_grid(), 5)->decode(pixels, 1.0f, means);
   double expected = 0;
   for (std::size_t p = 0; p < means.size(); ++p) {
     const Ab wanted = mean_of(labels[p]);
@@ -165,10 +165,11 @@ TEST(ChromaEngine, RegressionIsSmoothL1OfTheMean) {
   EXPECT_NEAR(loss(1) - loss(0), expected, 1e-3 * expected);
 }
 
-TEST(ChromaEngine, SpreadIsWhatTheLossGrowsBy) {
+TEST(ColorBinEngine, SpreadIsWhatTheLossGrowsBy) {
   const PixelSamples pixels = row_of_pixels(48);
   const auto loss = [&](const PixelSamples& of, float spread_weight) {
-    return make_cpu_chroma_engine(small_grid(), 5)->step(of, two_halves(int(of.pixels())), {}, {spread_weight}, 1e-9f);
+    return make_cpu_color_bin_engine(small_grid(), 5)
+        ->step(of, two_halves(int(of.pixels())), {}, {spread_weight}, 1e-9f);
   };
   const double none = loss(pixels, 0), once = loss(pixels, 1), twice = loss(pixels, 2);
   EXPECT_GT(once, none);
@@ -176,10 +177,10 @@ TEST(ChromaEngine, SpreadIsWhatTheLossGrowsBy) {
   EXPECT_NEAR(loss(single_samples(pixels), 100), loss(single_samples(pixels), 0), 1e-5) << "one sample has no spread";
 }
 
-TEST(ChromaEngine, SpreadMakesTheSamplesOfAPixelAgree) {
+TEST(ColorBinEngine, SpreadMakesTheSamplesOfAPixelAgree) {
   const PixelSamples pixels = row_of_pixels(64), samples = single_samples(pixels);
   const auto disagreement = [&](float spread_weight) {
-    const auto engine = make_cpu_chroma_engine(small_grid(), 3);
+    const auto engine = make_cpu_color_bin_engine(small_grid(), 3);
     double last = 0;
     for (int i = 0; i < 150; ++i) last = engine->step(pixels, two_halves(64), {}, {spread_weight}, 1e-2f);
     EXPECT_LT(last, 0.3) << "what is wanted is still learnt";
@@ -194,11 +195,11 @@ TEST(ChromaEngine, SpreadMakesTheSamplesOfAPixelAgree) {
   EXPECT_LT(disagreement(1.0f), 0.5 * disagreement(0));
 }
 
-TEST(ChromaEngine, StepsAreBitEqualForAnyNumberOfThreads) {
+TEST(ColorBinEngine, StepsAreBitEqualForAnyNumberOfThreads) {
   std::vector<double> losses;
   for (const int threads : {1, 2, 4}) {
     set_thread_count(threads);
-    const auto engine = make_cpu_chroma_engine(small_grid(), 3);
+    const auto engine = make_cpu_color_bin_engine(small_grid(), 3);
     double loss = 0;
     for (int i = 0; i < 20; ++i) loss = engine->step(row_of_pixels(300), two_halves(300), {}, 1e-2f);
     losses.push_back(loss);
@@ -208,8 +209,8 @@ TEST(ChromaEngine, StepsAreBitEqualForAnyNumberOfThreads) {
   EXPECT_EQ(losses[0], losses[2]);
 }
 
-TEST(ChromaticityEngine, StartsGreyAndReachesTheTargets) {
-  const auto engine = make_cpu_chromaticity_engine(small_grid(), 3);
+TEST(ColorFieldEngine, StartsGreyAndReachesTheTargets) {
+  const auto engine = make_cpu_color_field_engine(small_grid(), 3);
   const PixelSamples pixels = row_of_pixels(64);
   std::vector<Ab> seen(64), targets;
   engine->composite(pixels, seen);
@@ -226,11 +227,11 @@ TEST(ChromaticityEngine, StartsGreyAndReachesTheTargets) {
 /// The contract of the bake: compositing the samples' XYZ in linear light gives the pixel's ab and its luminance.
 /// Two answers of three say one colour, the third says another: the photometric loss takes their mean, Huber's stays
 /// with the majority.
-TEST(ChromaticityEngine, SquaredLossTakesTheMeanAndHubersTheMajority) {
+TEST(ColorFieldEngine, SquaredLossTakesTheMeanAndHubersTheMajority) {
   const Ab often{30, 10}, seldom{-30, -10};
   const PixelSamples pixels = row_of_pixels(12);
   const auto learnt = [&](AbLoss loss) {
-    const auto engine = make_cpu_chromaticity_engine(small_grid(), 5);
+    const auto engine = make_cpu_color_field_engine(small_grid(), 5);
     for (int i = 0; i < 600; ++i) {
       const std::vector<Ab> targets(12, i % 3 == 2 ? seldom : often);
       engine->step(pixels, targets, {}, loss, i < 400 ? 1e-2f : 1e-3f);
@@ -246,12 +247,12 @@ TEST(ChromaticityEngine, SquaredLossTakesTheMeanAndHubersTheMajority) {
   }
 }
 
-TEST(ChromaticityEngine, APixelWithoutWeightDoesNotCount) {
+TEST(ColorFieldEngine, APixelWithoutWeightDoesNotCount) {
   const PixelSamples pixels = row_of_pixels(2);
-  const auto engine = make_cpu_chromaticity_engine(small_grid(), 5);
+  const auto engine = make_cpu_color_field_engine(small_grid(), 5);
   const std::vector<float> weights = {1, 0};
   for (int i = 0; i < 200; ++i) engine->step(pixels, std::vector<Ab>(2, {30, 10}), weights, AbLoss::kSquared, 1e-2f);
-  const auto unweighted = make_cpu_chromaticity_engine(small_grid(), 5);
+  const auto unweighted = make_cpu_color_field_engine(small_grid(), 5);
   PixelSamples first = row_of_pixels(2);
   first.offsets.resize(2);
   first.positions.resize(2);
@@ -264,8 +265,8 @@ TEST(ChromaticityEngine, APixelWithoutWeightDoesNotCount) {
   for (int p = 0; p < 2; ++p) EXPECT_NEAR(with[p].a, without[p].a, 1.0) << p;
 }
 
-TEST(ChromaticityEngine, PixelColourIsTheCompositeOfTheSamplesLight) {
-  const auto engine = make_cpu_chromaticity_engine(small_grid(), 3);
+TEST(ColorFieldEngine, PixelColourIsTheCompositeOfTheSamplesLight) {
+  const auto engine = make_cpu_color_field_engine(small_grid(), 3);
   const PixelSamples pixels = row_of_pixels(16);
   const std::vector<Ab> targets(16, Ab{30, -25});
   for (int i = 0; i < 100; ++i) engine->step(pixels, targets, 1e-2f);

@@ -1,8 +1,8 @@
 #include <mutex>
 
 #include "src/base/check.h"
-#include "src/engine/chroma_engine.h"
 #include "src/engine/chroma_state.h"
+#include "src/engine/color_engines.h"
 #include "src/engine/cuda/chroma_stream.h"
 #include "src/engine/cuda/pixel_batch.h"
 #include "src/engine/cuda/point_net.h"
@@ -14,9 +14,9 @@ namespace {
 
 constexpr std::size_t kPixelsAtATime = 1 << 14;  // that are asked about
 
-class ChromaEngineCuda final : public ChromaEngine {
+class ColorBinEngineCuda final : public ColorBinEngine {
  public:
-  ChromaEngineCuda(const HashGridOptions& grid, std::uint64_t seed)
+  ColorBinEngineCuda(const HashGridOptions& grid, std::uint64_t seed)
       : features_(grid, PointOutputs::kFeatures, seed),
         head_(initial_chroma_head(seed)),
         forward_(std::size_t(chroma_head_weight_count()), "nets"),
@@ -24,7 +24,7 @@ class ChromaEngineCuda final : public ChromaEngine {
     state_loaded();
   }
 
-  using ChromaEngine::step;
+  using ColorBinEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
@@ -123,9 +123,9 @@ class ChromaEngineCuda final : public ChromaEngine {
 
 }  // namespace
 
-std::unique_ptr<ChromaEngine> make_cuda_chroma_engine(const HashGridOptions& grid, std::uint64_t seed) {
+std::unique_ptr<ColorBinEngine> make_cuda_color_bin_engine(const HashGridOptions& grid, std::uint64_t seed) {
   if (!has_cuda_device()) throw DeviceError("no CUDA device: no driver, or no GPU it can use");
-  return std::make_unique<ChromaEngineCuda>(grid, seed);
+  return std::make_unique<ColorBinEngineCuda>(grid, seed);
 }
 
 }  // namespace cnerf

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "src/base/check.h"
-#include "src/engine/chroma_engine.h"
 #include "src/engine/chroma_state.h"
+#include "src/engine/color_engines.h"
 #include "src/engine/cpu/point_net.h"
 #include "src/engine/cpu/step_chunks.h"
 #include "src/engine/initial_state.h"
@@ -18,15 +18,15 @@ constexpr int kHeadInputs = kChromaHeadInputs;
 constexpr int kHeadOutputs = kChromaHeadOutputs;
 constexpr std::size_t kBlockPixels = 64;  // four groups: their logits stay in L2
 
-class ChromaEngineCpu final : public ChromaEngine {
+class ColorBinEngineCpu final : public ColorBinEngine {
  public:
-  ChromaEngineCpu(const HashGridOptions& grid, std::uint64_t seed)
+  ColorBinEngineCpu(const HashGridOptions& grid, std::uint64_t seed)
       : features_(grid, kFeatures, /*relu_output=*/true, seed),
         head_({{kHeadInputs, kHeadOutputs}}, seed, kChromaHeadStream) {
     head_.set_weights(initial_chroma_head(seed));
   }
 
-  using ChromaEngine::step;
+  using ColorBinEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
@@ -214,8 +214,8 @@ class ChromaEngineCpu final : public ChromaEngine {
 
 }  // namespace
 
-std::unique_ptr<ChromaEngine> make_cpu_chroma_engine(const HashGridOptions& grid, std::uint64_t seed) {
-  return std::make_unique<ChromaEngineCpu>(grid, seed);
+std::unique_ptr<ColorBinEngine> make_cpu_color_bin_engine(const HashGridOptions& grid, std::uint64_t seed) {
+  return std::make_unique<ColorBinEngineCpu>(grid, seed);
 }
 
 }  // namespace cnerf

@@ -25,9 +25,9 @@ struct ChromaLossWeights {
 /// Classification-based injection (paper, Eq. color classification loss, read as KL(Z || Z_hat), mean over pixels).
 /// Hidden features of samples are composited once, a linear head is applied once a pixel: the same as compositing
 /// logits, since the head is linear: W sum(w h) / A + b = sum(w (W h + b)) / A.
-class ChromaEngine {
+class ColorBinEngine {
  public:
-  virtual ~ChromaEngine() = default;
+  virtual ~ColorBinEngine() = default;
   /// One optimiser step; returns the mean loss.
   /// @param labels         [R] soft labels of the pixels
   /// @param pixel_weights  [R] factors of the pixels' losses (class rebalancing, opacity); may be empty = all 1
@@ -48,9 +48,9 @@ class ChromaEngine {
 
 /// Per-sample chromaticity, fitted so that compositing it reproduces the pixels' decoded colours (what is baked is what
 /// is seen). XYZ of samples composite linearly, so this is exact for every emission-absorption renderer.
-class ChromaticityEngine {
+class ColorFieldEngine {
  public:
-  virtual ~ChromaticityEngine() = default;
+  virtual ~ColorFieldEngine() = default;
   /// One optimiser step towards target ab values at the pixels' own luminance; returns the mean ab distance.
   /// @param pixel_weights  [R] factors of the pixels' losses; may be empty = all 1
   virtual double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
@@ -66,12 +66,14 @@ class ChromaticityEngine {
   virtual void state_loaded() = 0;
 };
 
-[[nodiscard]] std::unique_ptr<ChromaEngine> make_cpu_chroma_engine(const HashGridOptions& grid, std::uint64_t seed);
-[[nodiscard]] std::unique_ptr<ChromaticityEngine> make_cpu_chromaticity_engine(const HashGridOptions& grid,
-                                                                               std::uint64_t seed);
+[[nodiscard]] std::unique_ptr<ColorBinEngine> make_cpu_color_bin_engine(const HashGridOptions& grid,
+                                                                        std::uint64_t seed);
+[[nodiscard]] std::unique_ptr<ColorFieldEngine> make_cpu_color_field_engine(const HashGridOptions& grid,
+                                                                            std::uint64_t seed);
 /// @throws DeviceError  without a usable GPU, or when its memory does not suffice
-[[nodiscard]] std::unique_ptr<ChromaEngine> make_cuda_chroma_engine(const HashGridOptions& grid, std::uint64_t seed);
-[[nodiscard]] std::unique_ptr<ChromaticityEngine> make_cuda_chromaticity_engine(const HashGridOptions& grid,
-                                                                                std::uint64_t seed);
+[[nodiscard]] std::unique_ptr<ColorBinEngine> make_cuda_color_bin_engine(const HashGridOptions& grid,
+                                                                         std::uint64_t seed);
+[[nodiscard]] std::unique_ptr<ColorFieldEngine> make_cuda_color_field_engine(const HashGridOptions& grid,
+                                                                             std::uint64_t seed);
 
 }  // namespace cnerf
