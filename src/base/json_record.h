@@ -1,0 +1,194 @@
+#pragma once
+/// Records to and from JSON by their one list of fields, a static member template:
+///
+///     template <typename Self, typename Visitor>
+///     static void visit(Self& self, Visitor&& v) {
+///       v("pixels", self.pixels);           // required
+///       v("error", self.error, kOptional);  // left out where it equals its default
+///     }
+///
+/// A field is a record itself, a std::optional (left out where it is empty), a std::vector, std::array or
+/// std::map<std::string, ...> of fields, a path, or whatever nlohmann::json converts. Keys that no field has are
+/// ignored.
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+
+namespace cnerf {
+
+/// Marks a field that may be absent; it then keeps its default.
+struct OptionalField {};
+inline constexpr OptionalField kOptional;
+
+namespace json_record {
+using Json = nlohmann::ordered_json;
+
+/// A field that is missing or of another type.
+struct FieldError : std::runtime_error {
+  FieldError(std::string where, const std::string& problem) : std::runtime_error(problem), field(std::move(where)) {}
+  std::string field;  ///< "metrics.views[3].psnr_rgb"
+};
+
+struct AnyField {
+  void operator()(const char* name, auto& field, auto... optional);
+};
+template <typename T>
+concept Record = requires(T& record) {
+  T::visit(record, AnyField{});
+};
+
+template <typename T>
+inline constexpr bool is_optional = false;
+template <typename T>
+inline constexpr bool is_optional<std::optional<T>> = true;
+
+template <typename T>
+inline constexpr bool is_list = false;
+template <typename T>
+inline constexpr bool is_list<std::vector<T>> = true;
+template <typename T, std::size_t N>
+inline constexpr bool is_list<std::array<T, N>> = true;
+
+template <typename T>
+inline constexpr bool is_map = false;
+template <typename T>
+inline constexpr bool is_map<std::map<std::string, T>> = true;
+
+template <typename T>
+Json written(const T& value) {
+  if constexpr (Record<const T>) {
+    Json json = Json::object();
+    T::visit(value, [&]<typename Field>(const char* name, const Field& field, auto... optional) {
+      if constexpr (is_optional<Field>) {
+        if (field) json[name] = written(*field);
+      } else if constexpr (sizeof...(optional) > 0) {
+        if (Json text = written(field); text != written(Field{})) json[name] = std::move(text);
+      } else {
+        json[name] = written(field);
+      }
+    });
+    return json;
+  } else if constexpr (is_list<T>) {
+    Json json = Json::array();
+    for (const auto& element : value) json.push_back(written(element));
+    return json;
+  } else if constexpr (is_map<T>) {
+    Json json = Json::object();
+    for (const auto& [name, element] : value) json[name] = written(element);
+    return json;
+  } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
+    return value.string();
+  } else {
+    return value;
+  }
+}
+
+template <typename T>
+void read(const Json& json, const std::string& where, T& value);
+
+template <typename T>
+void read_list(const Json& json, const std::string& where, T& list) {
+  if (!json.is_array()) throw FieldError(where, "expected a list, got " + json.dump());
+  if constexpr (requires { list.resize(json.size()); }) list.resize(json.size());
+  if (json.size() != list.size()) {
+    throw FieldError(where, "expected " + std::to_string(list.size()) + " values, got " + json.dump());
+  }
+  for (std::size_t i = 0; i < list.size(); ++i) read(json[i], where + "[" + std::to_string(i) + "]", list[i]);
+}
+
+template <typename T>
+void read_record(const Json& json, const std::string& where, T& record) {
+  if (!json.is_object()) throw FieldError(where, "expected an object, got " + json.dump());
+  T::visit(record, [&]<typename Field>(const char* name, Field& field, auto... optional) {
+    const std::string inner = where.empty() ? name : where + "." + name;
+    const auto found = json.find(name);
+    if (found != json.end()) {
+      if constexpr (is_optional<Field>) {
+        read(*found, inner, field.emplace());
+      } else {
+        read(*found, inner, field);
+      }
+    } else if (!is_optional<Field> && sizeof...(optional) == 0) {
+      throw FieldError(inner, "is missing");
+    }
+  });
+}
+
+template <typename T>
+void read(const Json& json, const std::string& where, T& value) {
+  if constexpr (Record<T>) {
+    read_record(json, where, value);
+  } else if constexpr (is_list<T>) {
+    read_list(json, where, value);
+  } else if constexpr (is_map<T>) {
+    if (!json.is_object()) throw FieldError(where, "expected an object, got " + json.dump());
+    value.clear();
+    for (const auto& [name, element] : json.items()) read(element, where + "." + name, value[name]);
+  } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
+    std::string text;
+    read(json, where, text);
+    value = text;
+  } else {
+    // A number is not a truth value, and 1.5 no count.
+    const bool is_other_type = std::is_same_v<T, bool> != json.is_boolean() ||
+                               (std::is_integral_v<T> && !std::is_same_v<T, bool> && !json.is_number_integer());
+    try {
+      if (std::is_arithmetic_v<T> && is_other_type) throw FieldError(where, "got " + json.dump());
+      json.get_to(value);
+    } catch (const nlohmann::json::exception&) {
+      throw FieldError(where, "got " + json.dump());
+    }
+  }
+}
+
+}  // namespace json_record
+
+/// A record as JSON, its fields in the order of `visit`.
+template <json_record::Record Record>
+[[nodiscard]] nlohmann::ordered_json to_json(const Record& record) {
+  return json_record::written(record);
+}
+
+/// A record out of JSON.
+/// @param file  that errors name
+/// @throws Problem  "file: field: what is wrong"; any type that is made of a message
+template <json_record::Record Record, typename Problem = InputError>
+[[nodiscard]] Record from_json(const nlohmann::ordered_json& json, const std::filesystem::path& file) {
+  try {
+    Record record;
+    json_record::read(json, "", record);
+    return record;
+  } catch (const json_record::FieldError& error) {
+    const std::string field = error.field.empty() ? "" : error.field + ": ";
+    throw Problem(file.string() + ": " + field + error.what());
+  }
+}
+
+/// A JSON file.  @throws MissingInputError, and Problem  where it holds no JSON.
+template <typename Problem = InputError>
+[[nodiscard]] nlohmann::ordered_json read_json(const std::filesystem::path& file) {
+  try {
+    return nlohmann::ordered_json::parse(read_text_file(file));
+  } catch (const nlohmann::json::exception& error) {
+    throw Problem(file.string() + ": " + error.what());
+  }
+}
+
+/// The record that a JSON file holds.  @throws MissingInputError, and Problem as `from_json`.
+template <json_record::Record Record, typename Problem = InputError>
+[[nodiscard]] Record read_record(const std::filesystem::path& file) {
+  return from_json<Record, Problem>(read_json<Problem>(file), file);
+}
+
+}  // namespace cnerf
