@@ -11,7 +11,9 @@ namespace cnerf {
 namespace fs = std::filesystem;
 
 const std::vector<RetiredKey>& retired_keys() {
-  static const std::vector<RetiredKey> keys{{"vdb.dilation", "bake.dilation"}};
+  static const std::vector<RetiredKey> keys{
+      {"vdb.dilation", "bake.dilation", "", ""},
+  };
   return keys;
 }
 
@@ -19,8 +21,8 @@ void read_config_file(const fs::path& file, Config& config) {
   read_toml(read_text_file(file), file.string(), fields_of(config), retired_keys());
 }
 
-void read_run_config(const fs::path& file, Config& config) {
-  read_toml(read_text_file(file), file.string(), fields_of(config), retired_keys(), Retired::kAllowedIfEqual);
+std::vector<std::string> read_run_config(const fs::path& file, Config& config) {
+  return read_toml(read_text_file(file), file.string(), fields_of(config), retired_keys(), Retired::kLeftOut);
 }
 
 void apply_setting(std::string_view setting, Config& config) {

@@ -95,13 +95,14 @@ struct Config {
   }
 };
 
-/// Keys that options had once; using one is an error that names its successor.
+/// Keys that options had once; using one is an error that says what to do instead.
 [[nodiscard]] const std::vector<RetiredKey>& retired_keys();
 
 /// Reads a file over `config`.  @throws MissingInputError, UsageError naming file, key, value and what is legal.
 void read_config_file(const std::filesystem::path& file, Config& config);
 /// The same for what `to_toml` wrote into a run's folder, perhaps before some keys were retired.
-void read_run_config(const std::filesystem::path& file, Config& config);
+/// @return  notes for the user: what it says that is no option any more
+std::vector<std::string> read_run_config(const std::filesystem::path& file, Config& config);
 
 /// Applies one `key.path=value`.  @throws UsageError.
 void apply_setting(std::string_view setting, Config& config);

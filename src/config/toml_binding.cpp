@@ -181,10 +181,12 @@ std::string section_of(const std::string& key) {
 }
 
 [[noreturn]] void refuse_retired(const RetiredKey& old, const std::string& value, const std::string& source) {
-  Origin{source, old.key}.refuse("is no option any more, use '" + old.now + "'; got " + value);
+  const std::string instead = old.now.empty() ? old.instead : "use '" + old.now + "'";
+  Origin{source, old.key}.refuse("is no option any more, " + instead + "; got " + value);
 }
 
-/// Removes a key from a table and returns its value as text; nothing where the key is not there.
+/// Removes a key from a table, with its section if that is empty then, and returns its value as text; nothing where the
+/// key is not there.
 std::optional<std::string> take_out(toml::table& table, const std::string& key) {
   const std::string section = section_of(key);
   toml::table* home = section.empty() ? &table : table.at_path(section).as_table();
@@ -192,6 +194,7 @@ std::optional<std::string> take_out(toml::table& table, const std::string& key) 
   if (node == nullptr) return std::nullopt;
   std::string value = text_of(*node);
   home->erase(last_name(key));
+  if (!section.empty() && home->empty()) take_out(table, section);
   return value;
 }
 
@@ -237,8 +240,8 @@ std::string setting_as_toml(const Field& field, const std::string& value) {
 
 }  // namespace
 
-void read_toml(std::string_view text, const std::string& source, const std::vector<Field>& fields,
-               const std::vector<RetiredKey>& retired, Retired treatment) {
+std::vector<std::string> read_toml(std::string_view text, const std::string& source, const std::vector<Field>& fields,
+                                   const std::vector<RetiredKey>& retired, Retired treatment) {
   toml::table table = parse(text, source);
   std::vector<std::pair<RetiredKey, std::string>> found;
   for (const RetiredKey& old : retired) {
@@ -248,10 +251,17 @@ void read_toml(std::string_view text, const std::string& source, const std::vect
     found.emplace_back(old, *value);
   }
   read_table(table, "", source, fields);
+  std::vector<std::string> notes;
   for (const auto& [old, value] : found) {
+    if (old.now.empty()) {
+      if (value != old.was)
+        notes.push_back(source + ": " + old.key + " = " + value + " is no option any more: left out");
+      continue;
+    }
     const auto successor = std::ranges::find(fields, old.now, &Field::key);
     if (successor == fields.end() || value_text(*successor) != value) refuse_retired(old, value, source);
   }
+  return notes;
 }
 
 void apply_setting(std::string_view setting, const std::vector<Field>& fields, const std::vector<RetiredKey>& retired) {

@@ -9,22 +9,27 @@
 
 namespace cnerf {
 
-/// A key that options used to have, and the one that has its meaning now.
+/// A key that options used to have.
 struct RetiredKey {
-  std::string key, now;
+  std::string key;
+  std::string now;      ///< the key that has its meaning; empty = none has
+  std::string was;      ///< where `now` is empty: its default as TOML, with which it says nothing
+  std::string instead;  ///< where `now` is empty: what to do without it
 };
 
 /// What to do with retired keys: people are told; but what the program wrote itself, before a key was retired, holds
-/// every key, and may say the same twice.
-enum class Retired { kRefused, kAllowedIfEqual };
+/// every key. There one with a successor has to say the same as that; others are left out, with a note where they
+/// differ from their default.
+enum class Retired { kRefused, kLeftOut };
 
 /// Reads `text` over `fields`: keys that are absent keep their value.
 /// @param source  what errors call the text: a file name.
 /// @throws UsageError  broken TOML, an unknown key (names the nearest known one), a retired one (and its successor), a
 ///                     wrong type, a value out of range; the message reads `source: key: what was expected, what was
 ///                     found`. Fields read before the faulty one keep their new values.
-void read_toml(std::string_view text, const std::string& source, const std::vector<Field>& fields,
-               const std::vector<RetiredKey>& retired = {}, Retired treatment = Retired::kRefused);
+/// @return  notes on retired keys that were left out
+std::vector<std::string> read_toml(std::string_view text, const std::string& source, const std::vector<Field>& fields,
+                                   const std::vector<RetiredKey>& retired = {}, Retired treatment = Retired::kRefused);
 
 /// Applies one `key.path=value` of the command line. Strings need no quotes; lists are TOML arrays or comma-separated.
 /// @throws UsageError  as `read_toml`.

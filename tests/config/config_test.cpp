@@ -121,7 +121,8 @@ TEST(Config, RetiredKeysAreGoneAndTheirSuccessorsAreThere) {
   const auto is_option = [&](const std::string& key) { return std::ranges::count(fields, key, &Field::key) > 0; };
   for (const RetiredKey& old : retired_keys()) {
     EXPECT_FALSE(is_option(old.key)) << old.key;
-    EXPECT_TRUE(is_option(old.now)) << old.now;
+    EXPECT_EQ(is_option(old.now), !old.now.empty()) << old.now;
+    EXPECT_NE(old.instead.empty(), old.now.empty()) << old.key << " says not what to do instead";
   }
 }
 

@@ -145,7 +145,10 @@ TEST(TomlBinding, RoundTripIsExact) {
   EXPECT_EQ(write_toml(fields_of(read)), text);
 }
 
-const std::vector<RetiredKey> kRetired{{"pace", "inner.rate"}, {"inner.speed", "inner.rate"}};
+const std::vector<RetiredKey> kRetired{{"pace", "inner.rate", "", ""},
+                                       {"inner.speed", "inner.rate", "", ""},
+                                       {"old.part.decay", "", "0.5", "it is 0.5 always"},
+                                       {"old.kind", "", "'ab'", "there is one kind"}};
 
 TEST(TomlBinding, RetiredKeysNameTheirSuccessor) {
   TestOptions options;
@@ -163,11 +166,31 @@ TEST(TomlBinding, WhatTheProgramWroteMaySayTheSameTwice) {
   TestOptions options;
   const auto fields = fields_of(options);
   const auto reading_back = [&](const char* text) {
-    return message_of([&] { read_toml(text, "run.toml", fields, kRetired, Retired::kAllowedIfEqual); });
+    return message_of([&] { read_toml(text, "run.toml", fields, kRetired, Retired::kLeftOut); });
   };
   EXPECT_THAT(reading_back("pace = 0.5\n[inner]\nrate = 0.5\nspeed = 0.5"), HasSubstr("nothing was thrown"));
   EXPECT_EQ(options.inner.rate, 0.5);
   EXPECT_THAT(reading_back("[inner]\nrate = 0.5\nspeed = 0.75"), HasSubstr("run.toml: inner.speed: is no option"));
+}
+
+TEST(TomlBinding, RetiredKeysWithoutASuccessorSayWhatToDo) {
+  TestOptions options;
+  const auto fields = fields_of(options);
+  const std::string toml = "[old]\nkind = 'rgb'\n[old.part]\ndecay = 0.5\n";
+  EXPECT_THAT(message_of([&] { read_toml(toml, "my.toml", fields, kRetired); }),
+              HasSubstr("my.toml: old.part.decay: is no option any more, it is 0.5 always; got 0.5"));
+  EXPECT_THAT(message_of([&] { apply_setting("old.kind=ab", fields, kRetired); }), HasSubstr("there is one kind"));
+}
+
+TEST(TomlBinding, WhatTheProgramWroteIsReadWithoutThem) {
+  TestOptions options;
+  const auto notes_of = [&](const char* text) {
+    return read_toml(text, "run.toml", fields_of(options), kRetired, Retired::kLeftOut);
+  };
+  EXPECT_THAT(notes_of("steps = 7\n[old]\nkind = 'ab'\n[old.part]\ndecay = 0.5\n"), testing::IsEmpty());
+  EXPECT_EQ(options.steps, 7);
+  EXPECT_THAT(notes_of("[old]\nkind = 'rgb'\n[old.part]\ndecay = 0.5\n"),
+              testing::ElementsAre("run.toml: old.kind = 'rgb' is no option any more: left out"));
 }
 
 TEST(TomlBinding, NearestNameKnowsItsLimit) {
