@@ -1,0 +1,94 @@
+#!/usr/bin/env bash
+# Tries the project on a bare Debian: makes a root with debootstrap, copies what git tracks of HEAD into it, and runs set-up,
+# demo and tests there. Prints a row of CONTRIBUTING's table. Needs root, debootstrap, and 20 GB in $ROOTS (/var/tmp).
+#   scripts/try_debian.sh 12|13 [packages|demo|tests]...      stages to run; demo and tests if not given
+# Each stage begins with scripts/install_dependencies.sh, apt included. $CNERF_DATA, if set, is mounted read-only for the
+# tests. The root stays, so that a later call goes on in it; FRESH=1 makes it anew.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+release=${1:-}
+case $release in
+  12) suite=bookworm ;;
+  13) suite=trixie ;;
+  *) sed -n '2,6p' "$0" >&2; exit 64 ;;
+esac
+shift
+stages=("$@")
+if [ ${#stages[@]} -eq 0 ]; then stages=(demo tests); fi
+[ "$EUID" -eq 0 ] || { echo "$0: needs root for chroot and mount" >&2; exit 77; }
+
+root=${ROOTS:-/var/tmp}/cnerf-debian-$release
+tree=/home/cnerf
+mounts=()
+release_mounts() {
+  local folder
+  for folder in "${mounts[@]}"; do umount -l "$folder" || true; done
+}
+trap release_mounts EXIT
+
+mount_in() {  # mount_in FOLDER mount-options...
+  mkdir -p "$root$1"
+  mount "${@:2}" "$root$1"
+  mounts+=("$root$1")
+}
+
+make_root() {
+  debootstrap --variant=minbase --include=ca-certificates "$suite" "$root" http://deb.debian.org/debian > "$root.log"
+  # Security updates, where libraries that Debian rebuilds are kept.
+  echo "deb http://deb.debian.org/debian-security $suite-security main" > "$root/etc/apt/sources.list.d/security.list"
+  printf '#!/bin/sh\nexit 101\n' > "$root/usr/sbin/policy-rc.d"  # no services are started in here
+  chmod +x "$root/usr/sbin/policy-rc.d"
+  # Certificates that this machine trusts beyond Debian's.
+  cp /usr/local/share/ca-certificates/*.crt "$root/usr/local/share/ca-certificates/" 2> /dev/null || true
+  chroot "$root" update-ca-certificates > /dev/null
+}
+
+# Runs a command in the tree of the root; what it prints goes to ROOT-NAME.log.  inside NAME command...
+inside() {
+  local name=$1
+  shift
+  local environment=(HOME=/root LANG=C.UTF-8 PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
+    NODE_EXTRA_CA_CERTS=/etc/ssl/certs/ca-certificates.crt)
+  if [ -n "${CNERF_DATA:-}" ]; then environment+=(CNERF_DATA=/data); fi
+  chroot "$root" env -i "${environment[@]}" bash -c "cd $tree && exec \"\$@\"" - "$@" > "$root-$name.log" 2>&1
+}
+
+as_minutes() { printf '%d min %02d s' $(($1 / 60)) $(($1 % 60)); }
+
+if [ "${FRESH:-0}" = 1 ]; then rm -rf --one-file-system "$root"; fi
+if [ ! -e "$root/usr/sbin/policy-rc.d" ]; then make_root; fi
+cp /etc/resolv.conf "$root/etc/resolv.conf"
+mount_in /proc -t proc proc
+mount_in /dev --bind /dev
+mount_in /dev/shm -t tmpfs tmpfs  # for Chromium
+if [ -n "${CNERF_DATA:-}" ]; then mount_in /data --bind -o ro "$CNERF_DATA"; fi
+rm -rf "${root:?}$tree"
+mkdir -p "$root$tree"
+git archive HEAD | tar -x -C "$root$tree"
+
+declare -A outcome=([packages]=- [demo]=- [tests]=-)
+failures=0
+for stage in "${stages[@]}"; do
+  case $stage in
+    packages) command=(bash scripts/install_dependencies.sh) ;;
+    demo) command=(bash scripts/demo.sh) ;;
+    tests) command=(bash scripts/test.sh) ;;
+    *) echo "$0: no stage '$stage'" >&2; exit 64 ;;
+  esac
+  begin=$SECONDS
+  verdict=passes
+  inside "$stage" "${command[@]}" || { verdict=FAILS; failures=1; }
+  outcome[$stage]="$verdict, $(as_minutes $((SECONDS - begin)))"
+  echo "Debian $release: $stage ${outcome[$stage]}; $root-$stage.log" >&2
+  tail -n 4 "$root-$stage.log" >&2
+done
+
+version_of() { chroot "$root" dpkg-query -W -f '${Version}' "$1" 2> /dev/null | sed 's/^[0-9]*://; s/[-+~].*//' || true; }
+echo "| Debian | g++ | CMake | LibTorch | OpenCV | COLMAP | Blender | node | packages | demo | tests |"
+echo "|---|---|---|---|---|---|---|---|---|---|---|"
+printf '| %s |' "$release" "$(version_of g++)" "$(version_of cmake)" "$(version_of libtorch-dev)" "$(version_of libopencv-dev)" \
+  "$(version_of colmap)" "$(version_of blender)" "$(version_of nodejs)" "${outcome[packages]}" "${outcome[demo]}" "${outcome[tests]}" |
+  sed 's/||/|/g'
+echo
+exit $failures
