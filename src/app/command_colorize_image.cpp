@@ -11,7 +11,7 @@
 #include "src/app/pipeline.h"
 #include "src/app/run_arguments.h"
 #include "src/capture/image_io.h"
-#include "src/color/colorspace_math.h"
+#include "src/picture/encode.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -24,33 +24,31 @@ struct ColorizeImageArguments {
   bool overwrite = false;
 };
 
+std::vector<float> lightness_of(const LinearImage& luminance) {
+  std::vector<float> lightness;
+  for (const float y : luminance.values) lightness.push_back(std::clamp(lightness_from_luminance(y), 0.0f, 100.0f));
+  return lightness;
+}
+
 /// L* of a picture, its short side at most `short_side` pixels.
 LightnessBatch question_about(const LinearImage& luminance, int short_side) {
   const double factor = std::min(1.0, double(short_side) / std::min(luminance.width, luminance.height));
   const int width = std::max(2, int(std::lround(luminance.width * factor)));
   const int height = std::max(2, int(std::lround(luminance.height * factor)));
-  LightnessBatch question{1, height, width, area_resized(luminance, width, height).values};
-  for (float& value : question.lightness) value = std::clamp(lightness_from_luminance(value), 0.0f, 100.0f);
-  return question;
+  return {1, height, width, lightness_of(area_resized(luminance, width, height))};
 }
 
 /// The picture's own lightness with the answer's chroma, brought to its size.
 Picture colored(const LinearImage& luminance, const ChromaBatch& answer) {
   std::vector<float> ab = ab_of(answer, 0);
   const std::size_t small = ab.size() / 2;
-  cv::Mat planes[2];
+  std::vector<float> whole(2 * luminance.pixel_count());
   for (std::size_t c = 0; c < 2; ++c) {
     const cv::Mat plane(answer.height, answer.width, CV_32F, ab.data() + c * small);
-    cv::resize(plane, planes[c], {luminance.width, luminance.height}, 0, 0, cv::INTER_LINEAR);
+    cv::Mat resized(luminance.height, luminance.width, CV_32F, whole.data() + c * luminance.pixel_count());
+    cv::resize(plane, resized, resized.size(), 0, 0, cv::INTER_LINEAR);
   }
-  std::vector<float> linear;
-  for (std::size_t p = 0; p < luminance.pixel_count(); ++p) {
-    const float lightness = std::clamp(lightness_from_luminance(luminance.values[p]), 0.0f, 100.0f);
-    const Vec3<float> rgb =
-        gamut_mapped_linear_rgb_from_lab(Lab<float>{lightness, planes[0].ptr<float>()[p], planes[1].ptr<float>()[p]});
-    for (int c = 0; c < 3; ++c) linear.push_back(rgb[c]);
-  }
-  return picture_from_linear(luminance.width, luminance.height, linear);
+  return picture_from_linear(luminance.width, luminance.height, linear_rgb_from_lab(lightness_of(luminance), whole));
 }
 
 void colorize_image(const ColorizeImageArguments& arguments) {

@@ -11,7 +11,7 @@
 #include "src/app/run_arguments.h"
 #include "src/base/error.h"
 #include "src/base/progress.h"
-#include "src/evaluate/contact_sheet.h"
+#include "src/picture/encode.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;

@@ -5,7 +5,7 @@
 #include "src/app/run_arguments.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
-#include "src/capture/sample_scene.h"
+#include "src/sample/sample_scene.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;

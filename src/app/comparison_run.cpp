@@ -11,15 +11,13 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/capture/color_truth.h"
-#include "src/capture/luminance_plane.h"
-#include "src/color/colorspace_math.h"
-#include "src/colorizer/gallery.h"
-#include "src/evaluate/contact_sheet.h"
 #include "src/evaluate/flow_colorizer.h"
 #include "src/evaluate/positional_field.h"
 #include "src/evaluate/rating_sheet.h"
 #include "src/evaluate/simulated_colorizer.h"
 #include "src/evaluate/style_transfer.h"
+#include "src/picture/contact_sheet.h"
+#include "src/picture/encode.h"
 #include "src/train/color_model.h"
 #include "src/train/luminance_model.h"
 #include "src/train/options_json.h"
@@ -126,18 +124,8 @@ Stage1Report train_measured(const Capture& capture, std::span<const View* const>
 }
 
 /// A small tile of a picture in linear light.
-GalleryTile tile_of(int width, int height, const std::vector<float>& linear, std::string caption) {
-  const Picture small = scaled_down(picture_from_linear(width, height, linear), kStripWidth);
-  const std::size_t n = small.rgb.size() / 3;
-  GalleryTile tile{small.height, small.width, std::vector<float>(n), std::vector<float>(2 * n), std::move(caption)};
-  for (std::size_t p = 0; p < n; ++p) {
-    const auto light = [&](std::size_t c) { return linear_from_srgb(float(small.rgb[3 * p + c]) / 255.0f); };
-    const Lab<float> lab = lab_from_linear_rgb(Vec3f{light(0), light(1), light(2)});
-    tile.lightness[p] = lab.lightness;
-    tile.ab[p] = lab.a;
-    tile.ab[n + p] = lab.b;
-  }
-  return tile;
+Tile tile_of(int width, int height, const std::vector<float>& linear, std::string caption) {
+  return {scaled_down(picture_from_linear(width, height, linear), kStripWidth), std::move(caption)};
 }
 
 /// An empty folder unless it was made with these settings.
@@ -490,7 +478,7 @@ ReportCapture ComparisonRun::report_of(const Subject& subject) const {
 /// The first shown view by every method beside the input and the truth, for documents.
 fs::path ComparisonRun::write_strip(const Subject& subject) const {
   const View& view = *subject.evaluated[subject.shown().front()];
-  std::vector<GalleryTile> tiles;
+  std::vector<Tile> tiles;
   tiles.push_back(tile_of(view.image.width, view.image.height, luminance_plane(view.image), "input"));
   for (const Method* method : plan_.methods) {
     const fs::path file = folder_of(subject, plan_.seeds.front()) / method->name / "views" / numbered(0);
@@ -502,7 +490,7 @@ fs::path ComparisonRun::write_strip(const Subject& subject) const {
     tiles.push_back(tile_of(truth->width, truth->height, truth->rgb, "truth"));
   }
   const fs::path file = plan_.report / ("strip-" + subject.name + ".png");
-  write_gallery(file, tiles, kStripColumns);
+  write_png(file, tiled(tiles, kStripColumns));
   return file;
 }
 

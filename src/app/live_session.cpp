@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cctype>
 #include <exception>
-#include <opencv2/imgcodecs.hpp>
 #include <thread>
 
 #include "src/base/usage.h"
-#include "src/evaluate/contact_sheet.h"
+#include "src/picture/encode.h"
 #include "viewer/server/page_folder.h"
 
 namespace cnerf {
@@ -15,15 +14,12 @@ namespace {
 
 constexpr auto kBetweenReports = std::chrono::milliseconds(250);
 constexpr double kLeastBetweenPictures = 1.5;  // seconds
+constexpr int kQuality = 85;                   // of JPEG
 constexpr double kPictureShare = 0.02;         // of the time, at most; reports take next to none
 
 std::string jpeg_of(int width, int height, const std::vector<float>& linear) {
-  Picture picture = picture_from_linear(width, height, linear);
-  for (std::size_t i = 0; i + 2 < picture.rgb.size(); i += 3) std::swap(picture.rgb[i], picture.rgb[i + 2]);
-  const cv::Mat bgr(height, width, CV_8UC3, picture.rgb.data());
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".jpg", bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
-  return {bytes.begin(), bytes.end()};
+  const std::vector<std::byte> bytes = jpeg_bytes(picture_from_linear(width, height, linear), kQuality);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 /// "images/view 1.png" -> "images_view_1"

@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <span>
 
@@ -10,7 +9,7 @@
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/capture/luminance_plane.h"
+#include "src/picture/encode.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -77,10 +76,7 @@ bool VideoFile::add(const Picture& picture) {
   CNERF_CHECK_EQ(encoder_->size.width, picture.width);
   CNERF_CHECK_EQ(encoder_->size.height, picture.height);
   if (!encoder_->writer.isOpened()) return false;
-  const cv::Mat rgb(picture.height, picture.width, CV_8UC3, const_cast<std::uint8_t*>(picture.rgb.data()));
-  cv::Mat bgr;
-  cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-  encoder_->writer.write(bgr);
+  encoder_->writer.write(bgr_of(picture));
   return true;
 }
 

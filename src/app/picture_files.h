@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "src/capture/mono_image.h"
-#include "src/evaluate/contact_sheet.h"
+#include "src/picture/picture.h"
 #include "src/train/scene.h"
 
 namespace cnerf {

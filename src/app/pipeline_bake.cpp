@@ -21,7 +21,6 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/parallel.h"
-#include "src/capture/luminance_plane.h"
 #include "src/config/fields.h"
 #include "src/config/toml_binding.h"
 #include "viewer/server/page_folder.h"

@@ -11,8 +11,9 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/usage.h"
-#include "src/capture/luminance_plane.h"
 #include "src/evaluate/evaluate.h"
+#include "src/picture/contact_sheet.h"
+#include "src/picture/encode.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;

@@ -9,7 +9,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/capture/load_capture.h"
-#include "src/prepare/grey_image.h"
+#include "src/picture/encode.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;

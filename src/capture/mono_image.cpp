@@ -68,4 +68,10 @@ float MonoImage::stored_luminance(std::size_t index) const {
   return f32[index];
 }
 
+std::vector<float> luminance_plane(const MonoImage& image) {
+  std::vector<float> luminance(image.pixel_count());
+  for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = image.luminance(i);
+  return luminance;
+}
+
 }  // namespace cnerf

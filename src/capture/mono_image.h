@@ -42,6 +42,9 @@ struct MonoImage {
   [[nodiscard]] bool valid(std::size_t index) const { return mask.empty() || mask[index] != 0; }
 };
 
+/// Linear luminance of every pixel.  [H, W]
+[[nodiscard]] std::vector<float> luminance_plane(const MonoImage& image);
+
 /// Linear light of an encoded value in [0, 1], and back.
 [[nodiscard]] float decode_transfer(Transfer transfer, float value);
 [[nodiscard]] float encode_transfer(Transfer transfer, float luminance);

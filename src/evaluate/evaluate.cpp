@@ -7,7 +7,7 @@
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
-#include "src/capture/luminance_plane.h"
+#include "src/picture/picture.h"
 
 namespace cnerf {
 namespace {

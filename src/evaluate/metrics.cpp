@@ -176,11 +176,4 @@ std::vector<float> encoded(std::span<const float> linear) {
   return out;
 }
 
-std::vector<std::uint8_t> srgb8_from_linear(std::span<const float> linear) {
-  std::vector<std::uint8_t> out(linear.size());
-  std::ranges::transform(linear, out.begin(),
-                         [](float v) { return std::uint8_t(std::lround(255.0f * encoded_value(v))); });
-  return out;
-}
-
 }  // namespace cnerf

@@ -38,8 +38,6 @@ struct Colourfulness {
 [[nodiscard]] double mean_ab_distance(std::span<const float> ours, std::span<const float> truth,
                                       std::span<const std::uint8_t> valid = {});
 
-/// 8-bit sRGB of linear light, clamped and rounded.
-[[nodiscard]] std::vector<std::uint8_t> srgb8_from_linear(std::span<const float> linear);
 /// sRGB-encoded values of linear light, clamped to [0, 1].
 [[nodiscard]] std::vector<float> encoded(std::span<const float> linear);
 

@@ -9,6 +9,8 @@
 #include "src/base/error.h"
 #include "src/base/parallel.h"
 #include "src/capture/image_io.h"
+#include "src/picture/contact_sheet.h"
+#include "src/picture/encode.h"
 #include "src/prepare/grey_image.h"
 
 namespace cnerf {
@@ -52,8 +54,8 @@ Json lens_of(const View& view) {
 // ---- contact sheet ------------------------------------------------------------------------------------------------
 
 constexpr int kThumbnail = 160, kColumns = 8, kGap = 4, kPlan = 480;
-const cv::Scalar kBackground(24, 24, 24), kBoxColor(60, 200, 255), kCameraColor(255, 180, 80),
-    kPointColor(130, 130, 130), kTextColor(230, 230, 230);
+const cv::Scalar kBackground = cv::Scalar::all(kSheetBackground), kPointColor = cv::Scalar::all(130),
+                 kTextColor = cv::Scalar::all(230), kBoxColor(255, 200, 60), kCameraColor(80, 180, 255);  // RGB
 
 std::array<std::pair<Vec3d, Vec3d>, 12> edges_of(const Aabbd& box) {
   std::array<std::pair<Vec3d, Vec3d>, 12> edges;
@@ -90,13 +92,13 @@ void draw_box(cv::Mat& picture, const View& view, const Aabbd& box) {
   }
 }
 
-cv::Mat thumbnail(const fs::path& capture, const View& view, const std::optional<SubjectBox>& subject) {
+Tile thumbnail(const fs::path& capture, const View& view, const std::optional<SubjectBox>& subject) {
   const LinearImage image = luminance_image(read_linear_image(capture / "images" / view.name, Transfer::kSrgb));
   cv::Mat picture;
-  cv::cvtColor(reduced_to(grey_codes(image), kThumbnail), picture, cv::COLOR_GRAY2BGR);
+  cv::cvtColor(reduced_to(grey_codes(image), kThumbnail), picture, cv::COLOR_GRAY2RGB);
   if (subject) draw_box(picture, view, subject->box);
   cv::putText(picture, view.name, {3, 11}, cv::FONT_HERSHEY_SIMPLEX, 0.3, kTextColor, 1, cv::LINE_AA);
-  return picture;
+  return {{picture.cols, picture.rows, {picture.data, picture.data + 3 * picture.total()}}, {}};
 }
 
 /// Cameras, points and box as two of the axes show them.
@@ -178,26 +180,22 @@ Json transforms_json(const std::vector<View>& views, const std::vector<PreparedI
 
 void write_contact_sheet(const fs::path& file, const fs::path& capture, const std::vector<View>& views,
                          const std::vector<Vec3d>& points, const std::optional<SubjectBox>& subject) {
-  std::vector<cv::Mat> thumbnails(views.size());
+  std::vector<Tile> thumbnails(views.size());
   parallel_tasks(views.size(), [&](std::size_t i) { thumbnails[i] = thumbnail(capture, views[i], subject); });
-  const int rows = (int(views.size()) + kColumns - 1) / kColumns;
-  int cell_height = 1;
-  for (const cv::Mat& picture : thumbnails) cell_height = std::max(cell_height, picture.rows);
+  Picture tiles = tiled(thumbnails, kColumns);
+  const cv::Mat below(tiles.height, tiles.width, CV_8UC3, tiles.rgb.data());
 
   Aabbd shown = subject ? subject->box : Aabbd::empty();
   for (const View& view : views) shown.grow(view.world_from_camera.translation);
   const cv::Mat above = plan_of("from above (x, y)", 0, 1, shown, views, points, subject);
   const cv::Mat side = plan_of("from the side (x, z)", 0, 2, shown, views, points, subject);
 
-  const int width = std::max(kColumns * (kThumbnail + kGap) + kGap, 2 * kPlan + 3 * kGap);
-  cv::Mat sheet(kPlan + 2 * kGap + rows * (cell_height + kGap), width, CV_8UC3, kBackground);
+  const int width = std::max(below.cols, 2 * kPlan + 3 * kGap);
+  cv::Mat sheet(kPlan + kGap + below.rows, width, CV_8UC3, kBackground);
   above.copyTo(sheet({kGap, kGap, kPlan, kPlan}));
   side.copyTo(sheet({2 * kGap + kPlan, kGap, kPlan, kPlan}));
-  for (std::size_t i = 0; i < thumbnails.size(); ++i) {
-    const int x = kGap + int(i % kColumns) * (kThumbnail + kGap);
-    const int y = kPlan + 2 * kGap + int(i / kColumns) * (cell_height + kGap);
-    thumbnails[i].copyTo(sheet({x, y, thumbnails[i].cols, thumbnails[i].rows}));
-  }
+  below.copyTo(sheet({0, kPlan + kGap, below.cols, below.rows}));
+  cv::cvtColor(sheet, sheet, cv::COLOR_RGB2BGR);
   write_png(file, sheet);
 }
 

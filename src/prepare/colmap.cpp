@@ -17,6 +17,7 @@
 #include "src/base/usage.h"
 #include "src/capture/image_io.h"
 #include "src/capture/listing.h"
+#include "src/picture/encode.h"
 #include "src/prepare/grey_image.h"
 #include "src/prepare/image_pairs.h"
 

@@ -2,14 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <vector>
 
 #include "src/base/check.h"
-#include "src/base/error.h"
-#include "src/base/files.h"
-#include "src/color/colorspace_math.h"
+#include "src/picture/picture.h"
 
 namespace cnerf {
 
@@ -17,10 +13,7 @@ cv::Mat1b grey_codes(const LinearImage& luminance, float gain) {
   CNERF_CHECK_EQ(luminance.channels, 1);
   cv::Mat1b out(luminance.height, luminance.width);
   std::size_t i = 0;
-  for (std::uint8_t& code : out) {
-    const float encoded = srgb_from_linear(std::clamp(luminance.values[i++] * gain, 0.0f, 1.0f));
-    code = std::uint8_t(std::lround(encoded * 255));
-  }
+  for (std::uint8_t& code : out) code = srgb8_from_linear(luminance.values[i++] * gain);
   return out;
 }
 
@@ -43,12 +36,6 @@ cv::Mat1b reduced_to(const cv::Mat1b& picture, int longest) {
              {std::max(1, int(std::lround(picture.cols * scale))), std::max(1, int(std::lround(picture.rows * scale)))},
              0, 0, cv::INTER_AREA);
   return out;
-}
-
-void write_png(const std::filesystem::path& file, const cv::Mat& picture) {
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", picture, bytes)) throw OutputError(file.string() + ": cannot be encoded");
-  write_file(file, std::as_bytes(std::span(bytes)));
 }
 
 }  // namespace cnerf

@@ -2,7 +2,6 @@
 /// Eight-bit grey pictures for looking at: what frames, features and contact sheets are judged and drawn by. OpenCV's
 /// type, since all that is done with them is OpenCV's.
 
-#include <filesystem>
 #include <opencv2/core.hpp>
 
 #include "src/capture/image_io.h"
@@ -18,8 +17,5 @@ namespace cnerf {
 
 /// Reduced by area averaging until the longer side is at most `longest`; the picture itself if it is.
 [[nodiscard]] cv::Mat1b reduced_to(const cv::Mat1b& picture, int longest);
-
-/// @throws OutputError.
-void write_png(const std::filesystem::path& file, const cv::Mat& picture);
 
 }  // namespace cnerf

@@ -12,6 +12,7 @@
 #include "src/capture/exr_io.h"
 #include "src/capture/image_io.h"
 #include "src/capture/listing.h"
+#include "src/picture/encode.h"
 #include "src/prepare/grey_image.h"
 
 namespace cnerf {

@@ -9,6 +9,7 @@
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
+#include "src/picture/encode.h"
 #include "src/prepare/grey_image.h"
 
 namespace cnerf {

@@ -12,7 +12,7 @@
 
 #include "src/base/error.h"
 #include "src/capture/image_io.h"
-#include "src/color/colorspace_math.h"
+#include "src/picture/encode.h"
 #include "src/prepare/camera_motion.h"
 #include "src/prepare/grey_image.h"
 
@@ -50,7 +50,7 @@ cv::Mat1b grey_of(const cv::Mat& frame) {
     const auto* row = frame.ptr<cv::Vec3b>(y);
     for (int x = 0; x < frame.cols; ++x) {
       const float luminance = luminance_of<float>({linear[row[x][2]], linear[row[x][1]], linear[row[x][0]]});
-      out(y, x) = std::uint8_t(std::lround(255 * srgb_from_linear(luminance)));
+      out(y, x) = srgb8_from_linear(luminance);
     }
   }
   return out;
@@ -234,8 +234,7 @@ cv::Mat1b code_table(const VideoOptions& options, const SensorOptions& sensor) {
   cv::Mat1b table(1, 256);
   for (int code = 0; code < 256; ++code) {
     const double value = std::clamp((code - black) / (white - black), 0.0, 1.0);
-    const float encoded = encode_transfer(Transfer::kSrgb, decode_transfer(transfer, float(value)));
-    table(code) = std::uint8_t(std::lround(255 * std::clamp(encoded, 0.0f, 1.0f)));
+    table(code) = srgb8_from_linear(decode_transfer(transfer, float(value)));
   }
   return table;
 }

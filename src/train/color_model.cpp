@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "src/base/parallel.h"
-#include "src/color/colorspace_math.h"
+#include "src/picture/picture.h"
 #include "src/train/options_json.h"
 
 namespace cnerf {
@@ -20,7 +20,7 @@ float pixel_opacity(const PixelSamples& pixels, std::size_t p) {
 }  // namespace
 
 Ab in_gamut(Ab color, float luminance) {
-  const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness_from_luminance(luminance), color.a, color.b});
+  const Vec3f rgb = linear_rgb_at(luminance, color);
   const Lab<float> lab = lab_from_linear_rgb(rgb);
   return {lab.a, lab.b};
 }

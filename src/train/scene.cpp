@@ -6,7 +6,7 @@
 #include <type_traits>
 
 #include "src/base/parallel.h"
-#include "src/color/colorspace_math.h"
+#include "src/picture/picture.h"
 #include "src/train/color_model.h"
 #include "src/train/luminance_model.h"
 #include "src/train/view_cache.h"
@@ -73,8 +73,7 @@ void put_colors(const std::vector<Ab>& colors, const std::vector<float>& luminan
                 std::vector<float>& image) {
   parallel_ranges(colors.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const float lightness = lightness_from_luminance(luminance[first + i]);
-      const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness, colors[i].a, colors[i].b});
+      const Vec3f rgb = linear_rgb_at(luminance[first + i], colors[i]);
       for (int c = 0; c < 3; ++c) image[3 * (first + i) + std::size_t(c)] = rgb[c];
     }
   });

@@ -12,7 +12,8 @@
 #include "src/base/rng.h"
 #include "src/base/usage.h"
 #include "src/color/colorspace_math.h"
-#include "src/colorizer/gallery.h"
+#include "src/picture/contact_sheet.h"
+#include "src/picture/encode.h"
 #include "src/train/color_model.h"
 #include "src/train/luminance_model.h"
 #include "src/train/options_json.h"
@@ -145,8 +146,7 @@ class Colorization {
     const std::vector<Ab> colors = model_.decode(pixel_samples(std::span(&view, 1), all));
     for (std::size_t p = 0; p < all.size(); ++p) {
       const Ab ab = view.opacity[p] < kLeastColoredOpacity ? Ab{} : colors[p];
-      const float lightness = lightness_from_luminance(view.luminance[p]);
-      const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness, ab.a, ab.b});
+      const Vec3f rgb = linear_rgb_at(view.luminance[p], ab);
       picture.ours.insert(picture.ours.end(), {rgb.x, rgb.y, rgb.z});
     }
     return picture;
@@ -228,13 +228,13 @@ class Colorization {
     const std::size_t typical = most_typical(options_.purify, views);
     const Purifier like_it(options_.purify, std::span(views).subspan(typical, 1));
     std::vector<AnsweredPatch> bases;
-    std::vector<GalleryTile> tiles;
+    std::vector<Tile> tiles;
     for (auto of_place = answered.begin(); of_place != answered.end(); of_place += opinions) {
       const auto likeness = [&](const AnsweredPatch& answer) { return like_it.similarity(view_of(answer)); };
       bases.push_back(*std::ranges::max_element(of_place, of_place + opinions, {}, likeness));
       tiles.push_back(tile_of(bases.back(), "of " + std::to_string(opinions)));
     }
-    write_gallery(file_.parent_path() / "bases.png", tiles);
+    write_png(file_.parent_path() / "bases.png", tiled(tiles));
     return bases;
   }
 
@@ -280,9 +280,9 @@ class Colorization {
   }
 
   void write_candidates(const std::vector<AnsweredPatch>& patches, const std::filesystem::path& file) const {
-    std::vector<GalleryTile> tiles;
+    std::vector<Tile> tiles;
     for (std::size_t i = 0; i < patches.size(); ++i) tiles.push_back(tile_of(patches[i], "base " + std::to_string(i)));
-    write_gallery(file, tiles);
+    write_png(file, tiled(tiles));
   }
 
   [[nodiscard]] std::vector<int> picked_bases(int candidates) const {
@@ -362,8 +362,8 @@ class Colorization {
       }
       after_step(steps(), options_.patches);
     }
-    write_gallery(file_.parent_path() / "accepted.png", accepted_);
-    write_gallery(file_.parent_path() / "rejected.png", rejected_);
+    write_png(file_.parent_path() / "accepted.png", tiled(accepted_));
+    write_png(file_.parent_path() / "rejected.png", tiled(rejected_));
   }
 
   /// Patches trained on so far.
@@ -476,11 +476,12 @@ class Colorization {
     model_.save(file_);
   }
 
-  [[nodiscard]] GalleryTile tile_of(const AnsweredPatch& patch, std::string caption) const {
-    return {options_.patch_size, options_.patch_size, patch.shown.lightness, patch.ab, std::move(caption)};
+  [[nodiscard]] Tile tile_of(const AnsweredPatch& patch, std::string caption) const {
+    const int side = options_.patch_size;
+    return {picture_from_linear(side, side, linear_rgb_from_lab(patch.shown.lightness, patch.ab)), std::move(caption)};
   }
 
-  void remember(std::vector<GalleryTile>& tiles, const AnsweredPatch& patch) const {
+  void remember(std::vector<Tile>& tiles, const AnsweredPatch& patch) const {
     if (tiles.size() < kGalleryTiles) tiles.push_back(tile_of(patch, ""));
   }
 
@@ -497,7 +498,7 @@ class Colorization {
   std::vector<std::vector<float>> view_answers_;  // [2, H, W] of each view; empty: patches are asked about
   KnownColorMap known_;
   std::vector<float> class_weights_;  // [313]; empty = all alike
-  std::vector<GalleryTile> accepted_, rejected_;
+  std::vector<Tile> accepted_, rejected_;
   double loss_ = 0;
   Stopwatch watch_;
   double seconds_before_ = 0;

@@ -9,7 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "src/base/error.h"
-#include "src/evaluate/contact_sheet.h"
+#include "src/picture/encode.h"
 #include "tests/support/data.h"
 
 namespace cnerf {

@@ -15,7 +15,8 @@
 #include "export/manifest.h"
 #include "src/capture/capture.h"
 #include "src/color/colorspace_math.h"
-#include "src/evaluate/contact_sheet.h"
+#include "src/picture/contact_sheet.h"
+#include "src/picture/encode.h"
 #include "src/train/scene.h"
 
 namespace cnerf::bench {

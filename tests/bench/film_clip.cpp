@@ -28,8 +28,8 @@
 #include "src/base/rng.h"
 #include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
+#include "src/picture/encode.h"
 #include "src/prepare/capture_writer.h"
-#include "src/prepare/grey_image.h"
 #include "tests/bench/comparison_support.h"
 
 namespace {

@@ -6,7 +6,7 @@
 
 #include "src/base/rng.h"
 #include "src/capture/load_capture.h"
-#include "src/capture/sample_scene.h"
+#include "src/sample/sample_scene.h"
 #include "tests/support/data.h"
 
 namespace cnerf {

@@ -16,8 +16,9 @@
 #include <string>
 #include <vector>
 
-#include "src/colorizer/gallery.h"
 #include "src/colorizer/reference_network.h"
+#include "src/picture/contact_sheet.h"
+#include "src/picture/encode.h"
 
 namespace {
 
@@ -103,6 +104,10 @@ struct Tally {
   }
 };
 
+Picture picture_of(const LightnessBatch& question, const std::vector<float>& ab) {
+  return picture_from_linear(question.width, question.height, linear_rgb_from_lab(question.lightness, ab));
+}
+
 LightnessBatch whole_view(const LabImage& image, std::vector<float>& truth) {
   const std::size_t n = image.lab.size() / 3;
   LightnessBatch batch{1, image.height, image.width, std::vector<float>(n)};
@@ -152,7 +157,7 @@ int main(int argc, char** argv) {
 
   Tally whole, patches;
   double patch_seconds = 0;
-  std::vector<GalleryTile> tiles;
+  std::vector<Tile> tiles;
   const int size = 128;
   const std::size_t pixels = size * size;
   PatchDistortion none{0.3, 0.7, 0, 0, false, 0, 0, 0, 0};
@@ -164,8 +169,8 @@ int main(int argc, char** argv) {
     const LightnessBatch question = whole_view(view[0].levels[0], view_truth);
     const std::vector<float> answer = network.colorize(question, s.mirror);
     whole.add(answer, view_truth);
-    tiles.push_back({question.height, question.width, question.lightness, view_truth, "truth"});
-    tiles.push_back({question.height, question.width, question.lightness, answer, "answer"});
+    tiles.push_back({picture_of(question, view_truth), "truth"});
+    tiles.push_back({picture_of(question, answer), "answer"});
     for (int i = 0; i < s.patches_per_view; ++i) {
       LightnessBatch patch{1, size, size, std::vector<float>(pixels)};
       sample_reference_patch(view, none, size, rng, patch.lightness, truth);
@@ -178,6 +183,6 @@ int main(int argc, char** argv) {
   whole.print("whole views");
   patches.print("patches");
   std::printf("%.1f ms a patch, asked one by one\n", 1000 * patch_seconds / (double(patches.pixels) / double(pixels)));
-  if (!s.picture.empty()) write_gallery(s.picture, tiles, 4);
+  if (!s.picture.empty()) write_png(s.picture, tiled(tiles, 4));
   return 0;
 }

@@ -7,8 +7,8 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/evaluate/contact_sheet.h"
 #include "src/evaluate/evaluate.h"
+#include "src/picture/encode.h"
 #include "tests/evaluate/painted_scene.h"
 #include "tests/support/data.h"
 

@@ -10,7 +10,7 @@
 #include "src/base/rng.h"
 #include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
-#include "src/prepare/grey_image.h"
+#include "src/picture/encode.h"
 #include "tests/support/data.h"
 
 namespace cnerf {

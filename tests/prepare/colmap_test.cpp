@@ -12,8 +12,8 @@
 #include "src/base/program.h"
 #include "src/base/usage.h"
 #include "src/capture/load_capture.h"
-#include "src/capture/sample_scene.h"
 #include "src/prepare/prepare.h"
+#include "src/sample/sample_scene.h"
 #include "tests/support/data.h"
 
 namespace cnerf {

@@ -3,7 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "src/capture/load_capture.h"
-#include "src/capture/sample_scene.h"
+#include "src/engine/engines.h"
+#include "src/sample/sample_scene.h"
 #include "tests/support/data.h"
 
 namespace cnerf {
@@ -46,7 +47,8 @@ Disturbed disturbed_sample(const std::filesystem::path& folder, bool disturb) {
 TEST(Motion, IsFoundWhereItIsAndHardlyElsewhere) {
   const test::TempDir folder;
   const Disturbed scene = disturbed_sample(folder / "sample", true);
-  const auto masks = find_motion(scene.capture, {}, folder / "work", {});
+  Observer observer;
+  const auto masks = find_motion(scene.capture, {}, folder / "work", cpu_engines(), observer);
   ASSERT_EQ(masks.size(), scene.capture.views.size());
   double found = 0, all = 0, wrong = 0, still = 0;
   for (std::size_t v = 0; v < masks.size(); ++v) {
@@ -69,7 +71,9 @@ TEST(Motion, IsFoundWhereItIsAndHardlyElsewhere) {
 TEST(Motion, AStillSceneIsLeftAlone) {
   const test::TempDir folder;
   double hidden = 0;
-  const auto masks = find_motion(disturbed_sample(folder / "sample", false).capture, {}, folder / "work", {});
+  Observer observer;
+  const auto masks =
+      find_motion(disturbed_sample(folder / "sample", false).capture, {}, folder / "work", cpu_engines(), observer);
   for (const MotionMask& mask : masks) hidden += mask.share / double(masks.size());
   std::printf("%.2f %% hidden\n", 100 * hidden);
   EXPECT_LT(hidden, 0.03);

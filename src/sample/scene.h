@@ -7,8 +7,8 @@
 
 #include "src/base/aabb.h"
 #include "src/capture/camera.h"
-#include "src/capture/sample/shapes.h"
-#include "src/capture/sample/textures.h"
+#include "src/sample/shapes.h"
+#include "src/sample/textures.h"
 
 namespace cnerf::sample {
 

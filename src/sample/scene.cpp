@@ -1,4 +1,4 @@
-#include "src/capture/sample/scene.h"
+#include "src/sample/scene.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "src/capture/sample_scene.h"
+#include "src/sample/sample_scene.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include "src/capture/color_truth.h"
 #include "src/capture/exr_io.h"
 #include "src/capture/load_capture.h"
-#include "src/capture/sample/scene.h"
 #include "src/color/colorspace_math.h"
+#include "src/sample/scene.h"
 #include "tests/support/data.h"
 
 namespace cnerf {

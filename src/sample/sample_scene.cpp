@@ -1,20 +1,19 @@
-#include "src/capture/sample_scene.h"
+#include "src/sample/sample_scene.h"
 
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 
-#include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/base/rng.h"
 #include "src/capture/exr_io.h"
-#include "src/capture/sample/scene.h"
-#include "src/color/colorspace_math.h"
+#include "src/picture/encode.h"
+#include "src/sample/scene.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -89,30 +88,25 @@ RenderedView render_view(const SampleSceneOptions& options, int view) {
   return out;
 }
 
-std::uint8_t byte_of(double value) {
-  return std::uint8_t(std::lround(std::clamp(value, 0.0, 1.0) * 255));
-}
-
 /// B G R A of a pixel. PNG wants colours that are not multiplied by alpha.
 cv::Vec4b stored_pixel(const PixelColor& color, bool grey) {
   if (color.alpha == 0) return {0, 0, 0, 0};
   Vec3d rgb = color.rgb / color.alpha;
   if (grey) rgb = Vec3d{1, 1, 1} * luminance_of(rgb);
-  const auto code = [](double v) { return byte_of(srgb_from_linear(v)); };
-  return {code(rgb.z), code(rgb.y), code(rgb.x), byte_of(color.alpha)};
+  const double alpha = std::clamp(color.alpha, 0.0, 1.0);
+  return {srgb8_from_linear(rgb.z), srgb8_from_linear(rgb.y), srgb8_from_linear(rgb.x),
+          std::uint8_t(std::lround(alpha * 255))};
 }
 
-void write_png(const fs::path& file, const SampleSceneOptions& options, const RenderedView& view, bool grey) {
+void write_picture(const fs::path& file, const SampleSceneOptions& options, const RenderedView& view, bool grey) {
   cv::Mat4b image(options.height, options.width);
   for (int i = 0; i < options.width * options.height; ++i) image(i) = stored_pixel(view.color[std::size_t(i)], grey);
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", image, bytes)) throw OutputError(file.string() + ": cannot be encoded");
-  write_file(file, std::as_bytes(std::span(bytes)));
+  write_png(file, image);
 }
 
 void write_view(const fs::path& folder, const SampleSceneOptions& options, int index, const RenderedView& view) {
-  write_png(folder / "images" / file_name(index, "png"), options, view, /*grey=*/true);
-  write_png(folder / "color" / file_name(index, "png"), options, view, /*grey=*/false);
+  write_picture(folder / "images" / file_name(index, "png"), options, view, /*grey=*/true);
+  write_picture(folder / "color" / file_name(index, "png"), options, view, /*grey=*/false);
   write_atomically(folder / "depth" / file_name(index, "exr"), [&](const fs::path& temporary) {
     write_exr_channel(temporary, "Z", options.width, options.height, view.depth);
   });
@@ -165,7 +159,7 @@ void write_sample_scene(const fs::path& folder, const SampleSceneOptions& option
     const RenderedView rendered = render_view(options, view);
     write_view(folder, options, view, rendered);
     if (view >= kFirstReference && view < kFirstReference + kReferences) {
-      write_png(folder / "references" / file_name(view, "png"), options, rendered, /*grey=*/false);
+      write_picture(folder / "references" / file_name(view, "png"), options, rendered, /*grey=*/false);
     }
     if (progress) progress({"sample", double(view + 1) / options.views, {}});
   }

@@ -1,4 +1,4 @@
-#include "src/capture/sample/shapes.h"
+#include "src/sample/shapes.h"
 
 #include <algorithm>
 #include <cmath>

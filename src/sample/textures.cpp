@@ -1,4 +1,4 @@
-#include "src/capture/sample/textures.h"
+#include "src/sample/textures.h"
 
 #include <algorithm>
 #include <cmath>

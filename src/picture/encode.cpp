@@ -1,0 +1,71 @@
+#include "src/picture/encode.h"
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+
+namespace cnerf {
+namespace {
+
+/// @param format  a file extension
+/// @param who     named in an error
+std::vector<std::uint8_t> encoded(const std::string& format, const cv::Mat& picture, const std::vector<int>& options,
+                                  const std::string& who = {}) {
+  std::vector<std::uint8_t> bytes;
+  bool done = false;
+  try {
+    done = cv::imencode(format, picture, bytes, options);
+  } catch (const cv::Exception&) {  // a size or type that the format has not
+  }
+  if (!done) {
+    throw OutputError((who.empty() ? "" : who + ": ") + "a picture of " + std::to_string(picture.cols) + " x " +
+                      std::to_string(picture.rows) + " pixels cannot be encoded as " + format.substr(1));
+  }
+  return bytes;
+}
+
+std::vector<std::byte> as_vector(const std::vector<std::uint8_t>& bytes) {
+  const auto raw = std::as_bytes(std::span(bytes));
+  return {raw.begin(), raw.end()};
+}
+
+}  // namespace
+
+cv::Mat bgr_of(const Picture& picture) {
+  const cv::Mat rgb(picture.height, picture.width, CV_8UC3, const_cast<std::uint8_t*>(picture.rgb.data()));
+  cv::Mat bgr;
+  cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
+  return bgr;
+}
+
+std::vector<std::byte> png_bytes(const Picture& picture, PngEffort save) {
+  std::vector<int> options;
+  if (save == PngEffort::kBytes) options = {cv::IMWRITE_PNG_COMPRESSION, 9};
+  return as_vector(encoded(".png", bgr_of(picture), options));
+}
+
+std::vector<std::byte> jpeg_bytes(const cv::Mat& picture, int quality) {
+  return as_vector(encoded(".jpg", picture, {cv::IMWRITE_JPEG_QUALITY, quality}));
+}
+
+std::vector<std::byte> jpeg_bytes(const Picture& picture, int quality) {
+  return jpeg_bytes(bgr_of(picture), quality);
+}
+
+std::vector<std::byte> webp_bytes(const cv::Mat& picture, int quality) {
+  return as_vector(encoded(".webp", picture, {cv::IMWRITE_WEBP_QUALITY, quality}));
+}
+
+void write_png(const std::filesystem::path& file, const cv::Mat& picture) {
+  const std::vector<std::uint8_t> bytes = encoded(".png", picture, {}, file.string());
+  write_file(file, std::as_bytes(std::span(bytes)));
+}
+
+void write_png(const std::filesystem::path& file, const Picture& picture) {
+  write_png(file, bgr_of(picture));
+}
+
+}  // namespace cnerf

@@ -1,0 +1,44 @@
+#pragma once
+/// Pictures of 8-bit sRGB, and the ways there from linear light and from CIELAB.
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "src/color/ab_bins.h"
+#include "src/color/colorspace_math.h"
+
+namespace cnerf {
+
+/// 8-bit sRGB, [H, W, 3].
+struct Picture {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> rgb;
+};
+
+/// The 8-bit sRGB code of linear light, clamped and rounded.
+template <std::floating_point Real>
+[[nodiscard]] std::uint8_t srgb8_from_linear(Real linear) {
+  return std::uint8_t(std::lround(Real(255) * srgb_from_linear(std::clamp(linear, Real(0), Real(1)))));
+}
+[[nodiscard]] std::vector<std::uint8_t> srgb8_from_linear(std::span<const float> linear);
+
+/// @param linear  [H, W] luminance or [H, W, 3] Rec.709, told apart by size.
+[[nodiscard]] Picture picture_from_linear(int width, int height, std::span<const float> linear);
+
+/// Linear Rec.709 of a colour at a luminance; chroma that leaves the gamut is reduced.
+[[nodiscard]] inline Vec3f linear_rgb_at(float luminance, Ab color) {
+  return gamut_mapped_linear_rgb_from_lab<float>({lightness_from_luminance(luminance), color.a, color.b});
+}
+/// Linear Rec.709, [N, 3], of planes of CIELAB; chroma that leaves the gamut is reduced.
+/// @param lightness  [N] L* 0..100
+/// @param ab         [2, N]; empty = grey
+[[nodiscard]] std::vector<float> linear_rgb_from_lab(std::span<const float> lightness, std::span<const float> ab);
+
+/// The picture, scaled down to `width` where it is wider.
+[[nodiscard]] Picture scaled_down(const Picture& picture, int width);
+
+}  // namespace cnerf

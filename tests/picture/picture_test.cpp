@@ -1,0 +1,77 @@
+#include "src/picture/picture.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/picture/encode.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+
+Picture red_and_blue() {
+  return {2, 1, {200, 30, 10, 10, 30, 200}};
+}
+
+cv::Mat decoded(const std::vector<std::byte>& bytes) {
+  return cv::imdecode(cv::Mat(1, int(bytes.size()), CV_8U, const_cast<std::byte*>(bytes.data())), cv::IMREAD_COLOR);
+}
+
+TEST(Picture, CodesAreRoundedAndClamped) {
+  EXPECT_EQ(srgb8_from_linear(std::vector<float>{-1, 0, 0.318547f, 1, 9}),
+            (std::vector<std::uint8_t>{0, 0, 153, 255, 255}));
+  EXPECT_EQ(srgb8_from_linear(0.318547), 153);
+}
+
+TEST(Picture, GreyAndColourComeFromLinearLight) {
+  EXPECT_EQ(picture_from_linear(1, 2, std::vector{1.0f, 0.0f}).rgb,
+            (std::vector<std::uint8_t>{255, 255, 255, 0, 0, 0}));
+  // 0.318547 is the linear light of sRGB 0.6, which is 153.
+  EXPECT_EQ(picture_from_linear(1, 1, std::vector{0.318547f, 0.0f, 2.0f}).rgb,
+            (std::vector<std::uint8_t>{153, 0, 255}));
+}
+
+TEST(Picture, PlanesOfLabBecomeInterleavedLight) {
+  // L*a*b* of sRGB red (color check values of CIE 1976), and L* 50, which is sRGB 119.
+  const std::vector<float> linear =
+      linear_rgb_from_lab(std::vector{53.241f, 50.0f}, std::vector{80.094f, 0.0f, 67.203f, 0.0f});
+  ASSERT_EQ(linear.size(), 6u);
+  EXPECT_NEAR(linear[0], 1, 0.02);
+  EXPECT_NEAR(linear[1], 0, 0.01);
+  EXPECT_NEAR(linear[2], 0, 0.01);
+  EXPECT_EQ(srgb8_from_linear(linear[4]), 119);
+  EXPECT_EQ(linear_rgb_from_lab(std::vector{50.0f}, {})[2], linear[5]);
+  EXPECT_THROW((void)linear_rgb_from_lab(std::vector{50.0f}, std::vector{1.0f}), ContractError);
+}
+
+TEST(Encode, KeepsTheOrderOfChannels) {
+  for (const auto& bytes : {png_bytes(red_and_blue()), png_bytes(red_and_blue(), PngEffort::kBytes)}) {
+    EXPECT_EQ(decoded(bytes).at<cv::Vec3b>(0, 0), cv::Vec3b(10, 30, 200));
+  }
+  EXPECT_GT(decoded(jpeg_bytes(Picture{1, 1, {220, 20, 20}}, 95)).at<cv::Vec3b>(0, 0)[2], 150);
+}
+
+TEST(Encode, WritesAPngOrNothing) {
+  const test::TempDir folder;
+  write_png(folder / "picture.png", red_and_blue());
+  EXPECT_EQ(decoded(read_binary_file(folder / "picture.png")).at<cv::Vec3b>(0, 1), cv::Vec3b(200, 30, 10));
+  write_file(folder / "a-file", std::string_view("x"));
+  EXPECT_THROW(write_png(folder / "a-file" / "picture.png", red_and_blue()), OutputError);
+}
+
+TEST(Encode, ErrorsNameTheFileAndTheSize) {
+  const test::TempDir folder;
+  try {
+    write_png(folder / "none.png", cv::Mat());
+    FAIL() << "a picture without pixels was written";
+  } catch (const OutputError& error) {
+    EXPECT_NE(std::string(error.what()).find("none.png: a picture of 0 x 0 pixels"), std::string::npos) << error.what();
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "none.png"));
+}
+
+}  // namespace
+}  // namespace cnerf
