@@ -5,10 +5,11 @@
 #include "src/app/comparison_run.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/evaluate/rating_sheet.h"
+#include "src/compare/rating.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
+using namespace compare;
 namespace {
 
 struct CompareArguments {
@@ -46,7 +47,7 @@ void check_folder(const CompareArguments& arguments) {
   }
 }
 
-void compare(const CompareArguments& arguments, const std::vector<std::string>& command_line) {
+void run_comparison(const CompareArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
   if (!arguments.ratings.empty()) return read_ratings_back(arguments, reporter);
   if (arguments.captures.empty()) throw UsageError("CAPTURE: at least one is needed");
@@ -96,7 +97,7 @@ Work declare_compare(CLI::App& app) {
   app.add_flag("--only-report", arguments->only_report, "Train nothing; make the report of what is there");
   app.add_flag("--overwrite", arguments->overwrite, "Start again where a comparison is already");
   add_config_options(app, arguments->config);
-  return [arguments](const auto& command_line) { compare(*arguments, command_line); };
+  return [arguments](const auto& command_line) { run_comparison(*arguments, command_line); };
 }
 
 }  // namespace cnerf

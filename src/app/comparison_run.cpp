@@ -11,18 +11,18 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/capture/color_truth.h"
-#include "src/evaluate/flow_colorizer.h"
-#include "src/evaluate/positional_field.h"
-#include "src/evaluate/rating_sheet.h"
-#include "src/evaluate/simulated_colorizer.h"
-#include "src/evaluate/style_transfer.h"
+#include "src/compare/baselines/flow.h"
+#include "src/compare/baselines/positional_field.h"
+#include "src/compare/baselines/simulated.h"
+#include "src/compare/baselines/style_transfer.h"
+#include "src/compare/rating.h"
 #include "src/picture/contact_sheet.h"
 #include "src/picture/encode.h"
 #include "src/train/color_model.h"
 #include "src/train/luminance_model.h"
 #include "src/train/options_json.h"
 
-namespace cnerf {
+namespace cnerf::compare {
 namespace fs = std::filesystem;
 namespace {
 
@@ -522,4 +522,4 @@ void ComparisonRun::write_rating_sheet() const {
   reporter_.wrote("its key, not for raters", plan_.report / "rating_key.json");
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::compare

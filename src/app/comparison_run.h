@@ -15,14 +15,14 @@
 
 #include "src/app/reporter.h"
 #include "src/capture/capture.h"
+#include "src/compare/baselines/style_transfer.h"
+#include "src/compare/methods.h"
+#include "src/compare/report.h"
+#include "src/compare/table.h"
 #include "src/config/config.h"
-#include "src/evaluate/comparison.h"
-#include "src/evaluate/comparison_report.h"
 #include "src/evaluate/lpips.h"
-#include "src/evaluate/methods.h"
-#include "src/evaluate/style_transfer.h"
 
-namespace cnerf {
+namespace cnerf::compare {
 
 /// A capture to compare on.
 struct ComparedCapture {
@@ -89,4 +89,4 @@ class ComparisonRun {
   std::vector<ComparisonCell> cells_;
 };
 
-}  // namespace cnerf
+}  // namespace cnerf::compare

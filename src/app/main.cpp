@@ -23,7 +23,9 @@ constexpr Command kCommands[] = {
     {"colorize-image", "One picture, to judge a colorizer", declare_colorize_image, false},
     {"render", "Pictures and videos of a run", declare_render, false},
     {"eval", "Numbers against held-out views, and a contact sheet", declare_eval, false},
+#if CNERF_COMPARE
     {"compare", "The paper's method, its ablations and baselines, in one table", declare_compare, true},
+#endif
     {"bake", "A run as an OpenVDB volume for Blender and others", declare_bake, false},
     {"view", "A bake or a run in the browser", declare_view, false},
     {"info", "What a capture, run, snapshot or VDB holds", declare_info, false},

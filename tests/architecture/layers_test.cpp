@@ -23,7 +23,7 @@ const std::vector<std::string> kLayers = {"src/base",   "src/color",    "src/pic
                                           "src/sample", "src/prepare",  "encoding",      "src/field",
                                           "src/render", "src/engine",   "src/colorizer", "src/colorizer_training",
                                           "src/train",  "src/evaluate", "bake",          "export",
-                                          "viewer",     "src/config",   "src/app"};
+                                          "viewer",     "src/config",   "src/compare",   "src/app"};
 
 constexpr const char* kColorTruth = "color_truth.h";
 const std::vector<std::string> kTrainingFolders = {"src/train", "src/engine", "src/field", "src/render", "encoding"};
@@ -91,7 +91,7 @@ bool misplaces_torch(const Include& include) {
   const bool is_torch =
       include.target.starts_with("torch/") || include.target.starts_with("ATen/") || include.target.starts_with("c10/");
   const bool is_allowed = include.file.starts_with("src/colorizer") || include.file.starts_with("encoding/torch") ||
-                          include.file.starts_with("src/evaluate/torch");
+                          include.file.starts_with("src/compare/baselines");
   return is_torch && !is_allowed;
 }
 
@@ -133,9 +133,9 @@ TEST(Architecture, RulesRecogniseWhatTheyForbid) {
   EXPECT_TRUE(leaks_truth({"src/train/stage2.cpp", "src/capture/color_truth.h"}));
   EXPECT_FALSE(leaks_truth({"src/evaluate/evaluate.cpp", "src/capture/color_truth.h"}));
   EXPECT_TRUE(misplaces_torch({"src/train/stage2.cpp", "torch/torch.h"}));
-  EXPECT_TRUE(misplaces_torch({"src/evaluate/methods.cpp", "torch/torch.h"}));
+  EXPECT_TRUE(misplaces_torch({"src/compare/methods.cpp", "torch/torch.h"}));
   EXPECT_FALSE(misplaces_torch({"src/colorizer/network.cpp", "torch/torch.h"}));
-  EXPECT_FALSE(misplaces_torch({"src/evaluate/torch/positional_engines.cpp", "torch/torch.h"}));
+  EXPECT_FALSE(misplaces_torch({"src/compare/baselines/positional_field.cpp", "torch/torch.h"}));
 }
 
 }  // namespace

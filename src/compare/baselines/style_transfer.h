@@ -1,0 +1,40 @@
+#pragma once
+/// ARF (Zhang et al. 2022) for fields whose luminance is given: colours are changed until pictures' features are those
+/// of a reference image.
+///
+/// As in ARF: colours are first matched to the reference's (there: mean and covariance; here, where luminance stays, by
+/// the regression of its ab on its L*), then nearest-neighbour feature matching follows, with deferred
+/// back-propagation: a picture is rendered whole without gradients, the loss's derivative is taken for its pixels, and
+/// only that goes through the field. Unlike ARF: density stays too, which makes its content loss idle.
+
+#include <filesystem>
+
+#include "src/base/progress.h"
+#include "src/capture/capture.h"
+#include "src/compare/baselines/style_loss.h"
+#include "src/train/stage2.h"
+
+namespace cnerf::compare {
+
+struct StyleReport {
+  double seconds = 0;
+  double first_loss = 0, last_loss = 0;  ///< means over as many steps as there are views, at the beginning and the end
+};
+
+/// Trains a photometric colour field on the style loss and leaves it in `take_snapshot`.
+/// @param options  of stage 2; the field's size, learning rates and seed are used
+/// @param steps    pictures, of training views in turn
+/// @throws Interrupted  without leaving anything; SnapshotError; UsageError for views that are too small.
+StyleReport transfer_style(const Capture& capture, const std::filesystem::path& stage1_snapshot, const StyleLoss& loss,
+                           const LabPicture& reference, const Stage2Options& options, int steps,
+                           const std::filesystem::path& take_snapshot, const Engines& engines, Observer& observer);
+
+/// A training view as the colorizer colours it: the middle one of the list.
+[[nodiscard]] LabPicture colorized_view(const Capture& capture, const std::filesystem::path& stage1_snapshot,
+                                        Colorizer& colorizer, const Engines& engines);
+/// A colour image, its shorter side at most `kStyleSide` pixels.  @throws MissingInputError, InputError.
+[[nodiscard]] LabPicture reference_image(const std::filesystem::path& file);
+
+inline constexpr int kStyleSide = 192;  ///< pixels of the shorter side at which features are compared
+
+}  // namespace cnerf::compare

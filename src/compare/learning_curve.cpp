@@ -1,0 +1,137 @@
+#include "src/compare/learning_curve.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/base/check.h"
+#include "src/base/rng.h"
+#include "src/capture/color_truth.h"
+#include "src/color/colorspace_math.h"
+#include "src/render/training_views.h"
+#include "src/train/color_model.h"
+#include "src/train/view_cache.h"
+
+namespace cnerf::compare {
+namespace {
+
+constexpr double kFirstMeasurement = 0.1;  // seconds of training
+constexpr double kNextMeasurement = 1.4;   // times the last one's
+constexpr RenderEffort kEffort = {1e-3f, 0.995f};
+constexpr std::uint64_t kPixelSeed = named_stream("held");
+
+float encoded(float luminance) {
+  return srgb_from_linear(std::clamp(luminance, 0.0f, 1.0f));
+}
+
+Ab true_color(const ColorImage& truth, std::size_t pixel) {
+  const float* rgb = truth.rgb.data() + 3 * pixel;
+  const Lab<float> lab = lab_from_linear_rgb(Vec3f{rgb[0], rgb[1], rgb[2]});
+  return {lab.a, lab.b};
+}
+
+}  // namespace
+
+std::optional<double> seconds_to(std::span<const LearningPoint> curve, double wanted, int better) {
+  for (std::size_t i = 0; i < curve.size(); ++i) {
+    if (better * (curve[i].value - wanted) < 0) continue;
+    if (i == 0) return curve[0].seconds;
+    const LearningPoint &before = curve[i - 1], &after = curve[i];
+    const double share = (wanted - before.value) / (after.value - before.value);
+    return before.seconds + share * (after.seconds - before.seconds);
+  }
+  return std::nullopt;
+}
+
+double value_at(std::span<const LearningPoint> curve, double seconds) {
+  CNERF_CHECK(!curve.empty(), "a curve without points");
+  const auto after = std::ranges::find_if(curve, [&](const LearningPoint& point) { return point.seconds >= seconds; });
+  if (after == curve.end()) return curve.back().value;
+  if (after == curve.begin()) return curve.front().value;
+  const LearningPoint& before = *std::prev(after);
+  const double share = (seconds - before.seconds) / (after->seconds - before.seconds);
+  return before.value + share * (after->value - before.value);
+}
+
+HeldOutPixels::HeldOutPixels(std::span<const View* const> views, const SceneFrame& frame, std::size_t count) {
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const View& view = *views[v];
+    const UnitCamera camera(view.intrinsics, view.world_from_camera, frame);
+    const std::optional<ColorImage> truth = load_color_truth(view);
+    const CounterRng rng(kPixelSeed, v);
+    for (std::size_t i = v * count / views.size(); i < (v + 1) * count / views.size(); ++i) {
+      const std::size_t pixel = rng.below(i, std::uint32_t(view.image.pixel_count()));
+      if (!view.image.valid(pixel)) continue;
+      const auto width = std::size_t(view.image.width);
+      rays_.push_back(camera.ray({double(pixel % width) + 0.5, double(pixel / width) + 0.5}));
+      luminance_.push_back(view.image.luminance(pixel));
+      if (truth) colors_.push_back(true_color(*truth, pixel));
+    }
+  }
+  CNERF_CHECK(!rays_.empty(), "no pixel to look at");
+}
+
+double HeldOutPixels::psnr(const LuminanceEngine& engine, const MarchSettings& march) const {
+  std::vector<RayResult> seen(rays_.size());
+  engine.render(rays_, march, kEffort, seen);
+  double sum = 0;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const double error = double(encoded(seen[i].luminance)) - double(encoded(luminance_[i]));
+    sum += error * error;
+  }
+  return -10 * std::log10(std::max(sum / double(seen.size()), 1e-10));
+}
+
+void HeldOutPixels::trace(const LuminanceEngine& engine, const MarchSettings& march) {
+  std::vector<WeightedSample> samples;
+  std::vector<std::size_t> offsets;
+  engine.trace(rays_, march, kEffort, samples, offsets);
+  samples_ = pixel_samples(rays_, samples, offsets);
+}
+
+double HeldOutPixels::ab_error(const ColorBinEngine& engine, float temperature) const {
+  CNERF_CHECK_EQ(samples_.pixels(), rays_.size());
+  CNERF_CHECK_EQ(colors_.size(), rays_.size());
+  std::vector<Ab> decoded(rays_.size());
+  engine.decode(samples_, temperature, decoded);
+  const std::vector<float> luminance = pixel_luminance(samples_);
+  double sum = 0;
+  for (std::size_t i = 0; i < decoded.size(); ++i) {
+    float opacity = 0;
+    for (std::size_t s = samples_.offsets[i]; s < samples_.offsets[i + 1]; ++s) opacity += samples_.weights[s];
+    const Ab ours = opacity < kLeastColoredOpacity ? Ab{} : in_gamut(decoded[i], luminance[i]);
+    sum += std::hypot(double(ours.a - colors_[i].a), double(ours.b - colors_[i].b));
+  }
+  return sum / double(decoded.size());
+}
+
+void LearningCurve::report_progress(const Progress& progress) {
+  inner_.report_progress(progress);
+  const bool is_training = progress.task == task_;
+  if (!is_training && points_.empty()) clock_.emplace();  // training begins after this
+  if (!is_training) return;
+  if (!clock_) clock_.emplace();
+  last_ = clock_->seconds() - paused_;
+  if (last_ >= next_) measure(last_);
+}
+
+void LearningCurve::measure(double now) {
+  const Stopwatch watch;
+  points_.push_back({now, measure_()});
+  // Not longer measuring than training.
+  next_ = std::max({kFirstMeasurement, kNextMeasurement * now, now + watch.seconds()});
+  paused_ += watch.seconds();
+}
+
+std::unique_ptr<LuminanceEngine> WatchedEngines::make_luminance(const LuminanceEngineOptions& options) const {
+  auto engine = inner_.make_luminance(options);
+  luminance_ = engine.get();
+  return engine;
+}
+
+std::unique_ptr<ColorBinEngine> WatchedEngines::make_color_bins(const HashGridOptions& grid, std::uint64_t seed) const {
+  auto engine = inner_.make_color_bins(grid, seed);
+  color_bins_ = engine.get();
+  return engine;
+}
+
+}  // namespace cnerf::compare

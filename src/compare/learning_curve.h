@@ -1,0 +1,106 @@
+#pragma once
+/// How well a field does on pixels it is not trained on, while it trains: what "trains faster" means in numbers.
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/base/observer.h"
+#include "src/base/usage.h"
+#include "src/capture/capture.h"
+#include "src/engine/engines.h"
+#include "src/engine/pixel_samples.h"
+#include "src/field/scene_frame.h"
+
+namespace cnerf::compare {
+
+/// A measurement after some training.
+struct LearningPoint {
+  double seconds = 0;  ///< of training; measuring does not count
+  double value = 0;    ///< dB or ab units
+};
+
+/// When a curve first gets as good as `wanted`, between its points linearly; nothing where it never does.
+/// @param better  1: higher is better, -1: lower is
+[[nodiscard]] std::optional<double> seconds_to(std::span<const LearningPoint> curve, double wanted, int better);
+/// A curve's value at a time, between its points linearly; its first or last value outside.
+/// @param curve  not empty
+[[nodiscard]] double value_at(std::span<const LearningPoint> curve, double seconds);
+
+/// Some pixels of the evaluated views, the same for every field, with what they should show.
+class HeldOutPixels {
+ public:
+  /// @param views  of which `count` pixels are drawn in all; masked ones are left out
+  HeldOutPixels(std::span<const View* const> views, const SceneFrame& frame, std::size_t count);
+
+  /// PSNR of sRGB-encoded luminance over all the pixels at once, dB. A view's PSNR is the mean of its own dB, so this
+  /// differs from a table's by some tenths.
+  [[nodiscard]] double psnr(const LuminanceEngine& engine, const MarchSettings& march) const;
+
+  /// Keeps what the rays of the pixels meet, for `ab_error`.
+  void trace(const LuminanceEngine& engine, const MarchSettings& march);
+  /// Mean ab distance of the decoded colours to the true ones.  @param temperature  of the decoding
+  [[nodiscard]] double ab_error(const ColorBinEngine& engine, float temperature) const;
+
+ private:
+  std::vector<Ray> rays_;
+  std::vector<float> luminance_;  // linear, over black
+  std::vector<Ab> colors_;        // empty where a view has none
+  PixelSamples samples_;
+};
+
+/// Measures at times that grow by a factor, and for no longer than there is training.
+class LearningCurve final : public Observer {
+ public:
+  /// Passes on to `inner` and measures between steps of `task`; the clock stands still before that task and while it
+  /// measures.
+  LearningCurve(std::string task, Observer& inner, std::function<double()> measure)
+      : task_(std::move(task)), inner_(inner), measure_(std::move(measure)) {}
+  void report_progress(const Progress& progress) override;
+  [[nodiscard]] bool is_cancelled() const override { return inner_.is_cancelled(); }
+  /// Training time up to the last step.
+  [[nodiscard]] double seconds() const { return last_; }
+  [[nodiscard]] const std::vector<LearningPoint>& points() const { return points_; }
+
+ private:
+  void measure(double now);
+
+  std::string task_;
+  Observer& inner_;
+  std::function<double()> measure_;
+  std::vector<LearningPoint> points_;
+  std::optional<Stopwatch> clock_;
+  double paused_ = 0;  // seconds of the clock that were no training
+  double last_ = 0, next_ = 0;
+};
+
+/// Engines that remain visible to who handed them on.
+class WatchedEngines final : public Engines {
+ public:
+  /// @param inner  makes them; must outlive this
+  explicit WatchedEngines(const Engines& inner) : inner_(inner) {}
+  [[nodiscard]] Device device() const override { return inner_.device(); }
+  [[nodiscard]] std::string description() const override { return inner_.description(); }
+  [[nodiscard]] std::unique_ptr<LuminanceEngine> make_luminance(const LuminanceEngineOptions& options) const override;
+  [[nodiscard]] std::unique_ptr<ColorBinEngine> make_color_bins(const HashGridOptions& grid,
+                                                                std::uint64_t seed) const override;
+  [[nodiscard]] std::unique_ptr<ColorFieldEngine> make_color_field(const HashGridOptions& grid,
+                                                                   std::uint64_t seed) const override {
+    return inner_.make_color_field(grid, seed);
+  }
+
+  /// Those made last; not owned.
+  [[nodiscard]] const LuminanceEngine& luminance() const { return *luminance_; }
+  [[nodiscard]] const ColorBinEngine& color_bins() const { return *color_bins_; }
+
+ private:
+  const Engines& inner_;
+  mutable const LuminanceEngine* luminance_ = nullptr;
+  mutable const ColorBinEngine* color_bins_ = nullptr;
+};
+
+}  // namespace cnerf::compare

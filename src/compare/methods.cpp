@@ -1,0 +1,62 @@
+#include "src/compare/methods.h"
+
+#include <algorithm>
+#include <sstream>
+
+#include "src/base/error.h"
+
+namespace cnerf::compare {
+
+std::vector<std::string> method_names() {
+  std::vector<std::string> names;
+  for (const Method& method : kMethods) names.emplace_back(method.name);
+  return names;
+}
+
+std::vector<const Method*> parse_methods(const std::string& list) {
+  std::vector<const Method*> methods;
+  for (const Method& method : kMethods) {
+    if (list == "all") methods.push_back(&method);
+  }
+  std::istringstream words(list);
+  for (std::string word; list != "all" && std::getline(words, word, ',');) {
+    const auto* found = std::ranges::find(kMethods, word, &Method::name);
+    if (found == std::end(kMethods)) {
+      std::string known;
+      for (const std::string& name : method_names()) known += (known.empty() ? "" : ", ") + name;
+      throw UsageError("--methods: no method '" + word + "'; there are: " + known);
+    }
+    if (std::ranges::find(methods, found) == methods.end()) methods.push_back(found);
+  }
+  if (methods.empty()) throw UsageError("--methods: expected names, or all");
+  return methods;
+}
+
+Stage2Options stage2_of(const Method& method, Stage2Options configured, const CompareOptions& compare) {
+  const std::string name = method.name, configured_injection = configured.injection;
+  Stage2Options options = std::move(configured);
+  if (name == "colornerf-paper") {
+    options.decode_temperature = options.spread_weight = options.regression_weight = 0;
+    options.purify.opinions = 1;
+  }
+  if (name == "without-purification") options.purify.enabled = false;
+  if (name == "without-classification") options.injection = "photometric";
+  if (name == "colorize-then-fuse" || name == "video-then-fuse") {
+    options.questions = "views";
+    options.injection = "photometric";
+    options.purify.enabled = false;
+  }
+  if (options.injection == "photometric" && configured_injection == "classification") {
+    // The photometric loss is not to lose because of a step size chosen for classes: docs/decisions.md, 33.
+    options.learning_rate = Stage2Options{}.learning_rate;
+    options.final_learning_rate = Stage2Options{}.final_learning_rate;
+  }
+  if (method.has_own_field) {
+    options.learning_rate = compare.positional_learning_rate;
+    options.final_learning_rate = compare.positional_final_learning_rate;
+  }
+  options.distill_steps = 0;  // nothing is baked
+  return options;
+}
+
+}  // namespace cnerf::compare

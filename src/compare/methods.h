@@ -1,0 +1,63 @@
+#pragma once
+/// The methods a comparison runs: the paper's, its ablations and its baselines, as differences from one configuration.
+/// All share stage 1, the colorizer and the number of steps.
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/capture/capture.h"
+#include "src/colorizer/colorizer.h"
+#include "src/config/compare_options.h"
+#include "src/train/stage2.h"
+
+namespace cnerf::compare {
+
+struct Method {
+  const char* name;     ///< "without-purification": of rows and folders
+  const char* summary;  ///< a sentence for the report
+  bool is_colored = true;
+  bool knows_truth = false;       ///< asks a colorizer that answers the true colours
+  bool follows_flow = false;      ///< carries colours from view to view
+  bool has_own_field = false;     ///< the paper's MLP instead of the hash grid
+  bool matches_features = false;  ///< style transfer: asks no colorizer about patches
+};
+
+/// Own method first; the order of rows.
+inline constexpr Method kMethods[] = {
+    {"colornerf", "the full method, as configured"},
+    {"colornerf-paper",
+     "with the paper's choices: the most probable colour instead of the annealed mean, bases as they come, no loss on "
+     "spread"},
+    {"without-purification", "every answer of the colorizer is trained on"},
+    {"without-classification", "a photometric ab loss instead of the distribution over colours"},
+    {"colorize-then-fuse",
+     "each training view is colorized once and whole, and fused with a photometric loss, as the paper's CT2+NeRF"},
+    {"video-then-fuse",
+     "as colorize-then-fuse, with colours carried from view to view by optical flow; stands in for a video "
+     "colorization "
+     "network (the paper's Vid+NeRF)",
+     true, false, true},
+    {.name = "style-transfer",
+     .summary =
+         "ARF: colours are changed until the features of pictures are those of a reference image (nearest-neighbour "
+         "feature matching), which is a training view coloured by the colorizer unless another is given",
+     .matches_features = true},
+    {.name = "positional-encoding",
+     .summary = "the paper's own field, an MLP of eight layers of 256 with positional encoding, in place of the hash "
+                "grid; as many patches; see the table of training times",
+     .has_own_field = true},
+    {"grey", "no colour at all: the lower bound", false},
+    {"oracle", "the full method, its colorizer answering the true colours: the upper bound", true, true},
+};
+
+/// Names in the order of rows.
+[[nodiscard]] std::vector<std::string> method_names();
+/// "colornerf,grey", or "all".  @throws UsageError  naming an unknown one and those there are.
+[[nodiscard]] std::vector<const Method*> parse_methods(const std::string& list);
+
+/// What stage 2 does differently for a method.
+[[nodiscard]] Stage2Options stage2_of(const Method& method, Stage2Options configured, const CompareOptions& compare);
+
+}  // namespace cnerf::compare
