@@ -1,7 +1,5 @@
 // The CPU kernels, written once over lanes and compiled once per instruction set. See hash_grid_kernels.h.
 
-#include <cmath>
-
 #include "encoding/cpu/hash_grid_kernels.h"
 #include "encoding/cpu/lanes.h"
 #include "encoding/hash_grid_math.h"
@@ -102,25 +100,8 @@ void scatter_level(const GridLevel& level, const float* positions, const float* 
   run.write(d_rows);
 }
 
-void adam_rows(float* table, float* d_rows, float* moments, std::size_t rows, float kept, float step_size, float beta1,
-               float beta2, float epsilon, float second_correction) {
-  for (std::size_t r = 0; r < rows; ++r) {
-    float* d = d_rows + 4 * r;
-    if (d[0] == 0 && d[1] == 0 && d[2] == 0 && d[3] == 0) continue;
-    float* first = moments + 8 * r;
-    float* second = first + 4;
-    float* parameter = table + 4 * r;
-    for (int f = 0; f < 4; ++f) {
-      first[f] = beta1 * first[f] + (1 - beta1) * d[f];
-      second[f] = beta2 * second[f] + (1 - beta2) * d[f] * d[f];
-      parameter[f] = kept * parameter[f] - step_size * first[f] / (std::sqrt(second[f] * second_correction) + epsilon);
-      d[f] = 0;
-    }
-  }
-}
-
 }  // namespace
 
-const HashGridKernels kHashGridKernels = {encode, scatter_level, adam_rows};
+const HashGridKernels kHashGridKernels = {encode, scatter_level};
 
 }  // namespace cnerf::CNERF_ISA

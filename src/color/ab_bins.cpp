@@ -86,14 +86,6 @@ const NearBins& near_bins() {
   return bins;
 }
 
-/// exp(logit / temperature) up to a common factor, in double: 313 terms of very different size.
-std::array<double, kAbBinCount> tempered_softmax(std::span<const float> logits, float temperature) {
-  const double largest = *std::max_element(logits.begin(), logits.end());
-  std::array<double, kAbBinCount> p{};
-  for (std::size_t i = 0; i < p.size(); ++i) p[i] = std::exp((logits[i] - largest) / temperature);
-  return p;
-}
-
 }  // namespace
 
 const std::array<Ab, kAbBinCount>& ab_bin_centres() {
@@ -126,16 +118,6 @@ SoftLabel soft_label(Ab color) {
   return label;
 }
 
-Ab mean_of(const SoftLabel& label) {
-  Ab mean;
-  for (std::size_t i = 0; i < label.bin.size(); ++i) {
-    const Ab centre = ab_bin_centres()[std::size_t(label.bin[i])];
-    mean.a += label.weight[i] * centre.a;
-    mean.b += label.weight[i] * centre.b;
-  }
-  return mean;
-}
-
 int nearest_bin(Ab color) {
   int best = 0;
   float best_distance = std::numeric_limits<float>::infinity();
@@ -157,14 +139,14 @@ Ab decode_arg_max(std::span<const float> logits) {
 Ab decode_annealed_mean(std::span<const float> logits, float temperature) {
   CNERF_CHECK_EQ(logits.size(), std::size_t(kAbBinCount));
   CNERF_CHECK(temperature > 0, "the annealed mean needs a positive temperature");
-  const std::array<double, kAbBinCount> p = tempered_softmax(logits, temperature);
-  double sum = 0;
-  double a = 0;
-  double b = 0;
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    sum += p[i];
-    a += p[i] * double(ab_bin_centres()[i].a);
-    b += p[i] * double(ab_bin_centres()[i].b);
+  // In double: 313 terms of very different size.
+  const double largest = *std::max_element(logits.begin(), logits.end());
+  double sum = 0, a = 0, b = 0;
+  for (std::size_t i = 0; i < logits.size(); ++i) {
+    const double p = annealed_weight<double>(logits[i], largest, temperature);
+    sum += p;
+    a += p * double(ab_bin_centres()[i].a);
+    b += p * double(ab_bin_centres()[i].b);
   }
   return {float(a / sum), float(b / sum)};
 }

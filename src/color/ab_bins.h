@@ -2,8 +2,11 @@
 /// The 313 quantised ab colours of Zhang et al. 2016, soft labels over them, and ways back to one colour.
 
 #include <array>
+#include <cmath>
 #include <span>
 #include <vector>
+
+#include "src/base/host_device.h"
 
 namespace cnerf {
 
@@ -25,12 +28,29 @@ struct SoftLabel {
   std::array<float, kSoftLabelBins> weight{};
 };
 [[nodiscard]] SoftLabel soft_label(Ab color);
-/// The weighted mean of a label's bins.
-[[nodiscard]] Ab mean_of(const SoftLabel& label);
+/// The weighted mean of a label's bins.  @param centres  [313] of the bins
+[[nodiscard]] CNERF_HD inline Ab mean_of(const SoftLabel& label, const Ab* centres) {
+  Ab mean;
+  for (int i = 0; i < kSoftLabelBins; ++i) {
+    const Ab centre = centres[label.bin[i]];
+    mean.a += label.weight[i] * centre.a;
+    mean.b += label.weight[i] * centre.b;
+  }
+  return mean;
+}
+[[nodiscard]] inline Ab mean_of(const SoftLabel& label) {
+  return mean_of(label, ab_bin_centres().data());
+}
 /// Index of the nearest bin.
 [[nodiscard]] int nearest_bin(Ab color);
 
-/// Colour of the most probable bin (paper, Eq. z to y).  @param logits  [313], any scale or offset.
+/// Weight of a bin in the annealed mean: softmax(log p / temperature), up to a common factor.
+template <typename Real>
+[[nodiscard]] CNERF_HD Real annealed_weight(Real logit, Real largest, Real temperature) {
+  return std::exp((logit - largest) / temperature);
+}
+/// Colour of the most probable bin, of several equally probable ones the first (paper, Eq. z to y).  @param logits
+/// [313], any scale or offset.
 [[nodiscard]] Ab decode_arg_max(std::span<const float> logits);
 /// Mean of the centres under softmax(log p / temperature) (Zhang et al. 2016, Eq. 5). Temperature 1 is the mean,
 /// towards 0 the mode.

@@ -1,5 +1,11 @@
 #pragma once
-/// The maths of stage 2's engines, once for every device.
+/// The losses of stage 2 and their gradients, once for every device.
+///
+/// Bins:   L = w (KL(label || softmax(logits)) + regression_weight R + spread_weight S),   mean over the pixels of a
+/// step Field:  L = w |ab(composited XYZ) - target|, as Huber's loss or squared
+///
+/// w is the pixel's weight, R what it costs that the mean colour of its distribution is away from the label's, S the
+/// spread of its samples' features.
 
 #include <cmath>
 
@@ -16,6 +22,21 @@ inline constexpr float kLeastColoredOpacity = 0.01f;
 CNERF_HD inline float inverse_opacity(float opacity) {
   return opacity < kLeastColoredOpacity ? 0.0f : 1.0f / opacity;
 }
+
+/// p_q = softmax(logits)_q of one pixel.
+struct Softmax {
+  float largest = 0;  ///< logit
+  float sum = 1;      ///< of the exponentials
+  float log_sum = 0;
+
+  Softmax() = default;
+  CNERF_HD Softmax(float largest_logit, float sum_of_exponentials)
+      : largest(largest_logit), sum(sum_of_exponentials), log_sum(std::log(sum_of_exponentials)) {}
+
+  [[nodiscard]] CNERF_HD static float exponential(float logit, float largest) { return std::exp(logit - largest); }
+  [[nodiscard]] CNERF_HD float probability(float exponential) const { return exponential / sum; }
+  [[nodiscard]] CNERF_HD float log_probability(float logit) const { return logit - largest - log_sum; }
+};
 
 /// A bin's part of KL(label || p).  @param label  > 0
 CNERF_HD inline float divergence(float label, float log_probability) {
@@ -41,10 +62,34 @@ CNERF_HD inline float mean_cost(float d) {
 CNERF_HD inline float mean_slope(float d) {
   return d < -kSmoothMean ? -1.0f : d > kSmoothMean ? 1.0f : d / kSmoothMean;
 }
-/// Derivative of a function of the mean by a logit: dL/dmean . (p_q (c_q - mean)).
-/// @param d_mean  dL/dmean
-CNERF_HD inline float logit_slope(float probability, Ab centre, Ab mean, Ab d_mean) {
-  return probability * (d_mean.a * (centre.a - mean.a) + d_mean.b * (centre.b - mean.b));
+
+/// The regression part of a pixel's loss, R.
+struct MeanError {
+  Ab mean;         ///< of the distribution
+  Ab d_mean;       ///< derivative of regression_weight R by it
+  float cost = 0;  ///< R
+
+  MeanError() = default;
+  /// @param wanted  the label's mean
+  CNERF_HD MeanError(Ab of_distribution, Ab wanted, float regression_weight) : mean(of_distribution) {
+    const Ab away = {mean.a - wanted.a, mean.b - wanted.b};
+    d_mean = {regression_weight * mean_slope(away.a), regression_weight * mean_slope(away.b)};
+    cost = mean_cost(away.a) + mean_cost(away.b);
+  }
+  /// Derivative of regression_weight R by a logit: d_mean . p_q (c_q - mean).
+  [[nodiscard]] CNERF_HD float by_logit(float probability, Ab centre) const {
+    return probability * (d_mean.a * (centre.a - mean.a) + d_mean.b * (centre.b - mean.b));
+  }
+};
+
+/// Derivative of `scale` times a pixel's loss by a logit: scale (p_q + dR/dlogit_q - z_q), in two parts, for a label
+/// has few bins.
+CNERF_HD inline float logit_gradient(float probability, float by_regression, float scale) {
+  return (probability + by_regression) * scale;
+}
+/// @param label  z_q
+CNERF_HD inline float label_gradient(float label, float scale) {
+  return -scale * label;
 }
 
 /// What an ab distance of d costs.

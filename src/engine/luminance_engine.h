@@ -10,8 +10,8 @@
 #include "encoding/hash_grid_levels.h"
 #include "src/engine/state.h"
 #include "src/render/march.h"
+#include "src/render/observed_ray.h"
 #include "src/render/occupancy_grid.h"
-#include "src/render/pixel_sampler.h"
 #include "src/render/training_views.h"
 
 namespace cnerf {

@@ -7,7 +7,6 @@
 
 #include "src/base/check.h"
 #include "src/base/parallel.h"
-#include "src/base/rng.h"
 
 namespace cnerf {
 namespace {
@@ -65,25 +64,20 @@ double OccupancyGrid::occupied_share() const {
   return double(count) / double(density_.size());
 }
 
-void OccupancyGrid::update(std::size_t stride, std::size_t phase, std::uint64_t jitter_seed,
+void OccupancyGrid::update(const OccupancyUpdate& update,
                            const std::function<void(std::span<const Vec3f>, std::span<float>)>& density) {
-  const std::size_t looked_at = (density_.size() - phase + stride - 1) / stride;
-  const CounterRng rng = occupancy_rng(jitter_seed);
   constexpr std::size_t kPiece = 4096;
-  parallel_ranges(looked_at, kPiece, [&](std::size_t begin, std::size_t end) {
+  parallel_ranges(update.count(density_.size()), kPiece, [&](std::size_t begin, std::size_t end) {
     std::vector<Vec3f> points(end - begin);
     std::vector<float> sigma(end - begin);
     for (std::size_t i = begin; i < end; ++i) {
-      const std::size_t cell = phase + i * stride;
-      const Vec3f jitter = {rng.uniform(3 * cell), rng.uniform(3 * cell + 1), rng.uniform(3 * cell + 2)};
-      points[i - begin] = layout_.point_in(cell, jitter);
+      const std::size_t cell = update.cell(i);
+      points[i - begin] = layout_.point_in(cell, update.place_in(cell));
     }
     density(points, sigma);
     for (std::size_t i = begin; i < end; ++i) {
-      float& remembered = density_[phase + i * stride];
-      if (remembered == kExcludedCell) continue;
-      const float before = remembered == kNeverSeenCell ? 0.0f : remembered * options_.decay;
-      remembered = std::max(before, sigma[i - begin]);
+      float& remembered = density_[update.cell(i)];
+      remembered = remembered_density(remembered, sigma[i - begin], options_.decay);
     }
   });
   refresh_bits();
@@ -120,15 +114,9 @@ void OccupancyGrid::refresh_bits() {
   std::fill(blocks_.begin(), blocks_.end(), std::uint8_t(0));
   parallel_tasks(std::size_t(layout_.cascades), [&](std::size_t k) {
     const float* density = density_.data() + k * cells;
-    // Early in training nothing reaches the threshold; then cells denser than the mean are what is worth sampling.
-    double total = 0;
-    std::size_t included = 1;
-    for (std::size_t i = 0; i < cells; ++i) {
-      if (density[i] == kExcludedCell) continue;
-      total += std::min(density[i], 1e4f);
-      ++included;
-    }
-    const float threshold = std::min(options_.optical_thickness / cell_side(int(k)), float(total / double(included)));
+    MeanDensity<double> mean;
+    for (std::size_t i = 0; i < cells; ++i) mean.add(density[i]);
+    const float threshold = occupancy_threshold(options_.optical_thickness, cell_side(int(k)), mean.value());
     for (std::size_t word = 0; word < cells / 64; ++word) {
       std::uint64_t bits = 0;
       for (std::size_t bit = 0; bit < 64; ++bit) {

@@ -9,20 +9,21 @@
 
 #include "src/base/options.h"
 #include "src/base/vec3.h"
-#include "src/render/occupancy_layout.h"
+#include "src/render/occupancy_math.h"
 
 namespace cnerf {
 
 struct OccupancyOptions {
-  int resolution = 128;             ///< cells along a side of a cascade; a multiple of 8
-  float decay = 0.5f;               ///< of a cell's remembered density, each time it is looked at again
-  float optical_thickness = 0.03f;  ///< of a cell, below which it counts as empty
+  int resolution = 128;
+  float decay = 0.5f;
+  float optical_thickness = 0.03f;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
-    v("resolution", resolution, Range{16, 512}, "cells along a side of a cascade");
-    v("decay", decay, Range{0, 1}, "of a cell's remembered density at each look");
-    v("optical_thickness", optical_thickness, Range{0, 10}, "of a cell, below which it counts as empty");
+    v("resolution", resolution, Range{16, 512}, "cells along a side of a cascade; a multiple of 16");
+    v("decay", decay, Range{0, 1}, "share of a cell's remembered density that is left at each visit");
+    v("optical_thickness", optical_thickness, Range{0, 10},
+      "optical thickness of a cell below which it counts as empty");
   }
 };
 
@@ -51,10 +52,9 @@ class OccupancyGrid {
   [[nodiscard]] float cascade_side(int cascade) const { return layout_.side(cascade); }
   [[nodiscard]] double occupied_share() const;
 
-  /// Looks at every `stride`-th cell, starting with cell `phase`: asks `density` for sigma at a jittered point of each,
-  /// remembers max(decayed, new), and refreshes the bits of the whole grid.
-  /// @param jitter_seed  selects the points; the result is a pure function of the arguments and the state.
-  void update(std::size_t stride, std::size_t phase, std::uint64_t jitter_seed,
+  /// Asks `density` for sigma at a point of each cell that the update visits, and refreshes the bits of the whole grid.
+  /// The result is a pure function of the arguments and the state.
+  void update(const OccupancyUpdate& update,
               const std::function<void(std::span<const Vec3f>, std::span<float>)>& density);
 
   /// Declares space empty for good where `wanted(centre, radius)`, asked for the sphere around each 4^3 block of cells,

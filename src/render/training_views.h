@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "src/capture/camera.h"
+#include "src/capture/camera_math.h"
 #include "src/capture/capture.h"
 #include "src/capture/mono_image.h"
 #include "src/field/scene_frame.h"
@@ -23,8 +23,8 @@ struct UnitCamera {
         unit_from_camera(world_from_camera.linear),
         origin(frame.unit_from_world(world_from_camera.translation)) {}
 
-  [[nodiscard]] Ray ray(PixelPosition pixel) const {
-    return {origin.cast<float>(), normalized(unit_from_camera * ray_direction(intrinsics, pixel)).cast<float>()};
+  [[nodiscard]] CNERF_HD Ray ray(PixelPosition pixel) const {
+    return {origin.cast<float>(), normalized(unit_from_camera * lens::ray_direction(intrinsics, pixel)).cast<float>()};
   }
 };
 

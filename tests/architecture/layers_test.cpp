@@ -19,11 +19,27 @@ namespace fs = std::filesystem;
 
 /// From the bottom to the top, as add_subdirectory has them in the root CMakeLists.txt; a file may include its own
 /// folder and those before it.
-const std::vector<std::string> kLayers = {"src/base",   "src/color",    "src/picture",   "src/capture",
-                                          "src/sample", "src/prepare",  "encoding",      "src/field",
-                                          "src/render", "src/engine",   "src/colorizer", "src/colorizer_training",
-                                          "src/train",  "src/evaluate", "bake",          "export",
-                                          "viewer",     "src/config",   "src/compare",   "src/app"};
+const std::vector<std::string> kLayers = {"src/base",
+                                          "src/color",
+                                          "src/picture",
+                                          "src/capture",
+                                          "src/sample",
+                                          "src/prepare",
+                                          "encoding",
+                                          "src/optim",
+                                          "src/field",
+                                          "src/render",
+                                          "src/engine",
+                                          "src/colorizer",
+                                          "src/colorizer_training",
+                                          "src/train",
+                                          "src/evaluate",
+                                          "bake",
+                                          "export",
+                                          "viewer",
+                                          "src/config",
+                                          "src/compare",
+                                          "src/app"};
 
 constexpr const char* kColorTruth = "color_truth.h";
 const std::vector<std::string> kTrainingFolders = {"src/train", "src/engine", "src/field", "src/render", "encoding"};

@@ -111,8 +111,8 @@ class TorchStep {
         dt.push_back(sample.dt);
         ray_of.push_back(std::int64_t(r));
       }
-      targets.push_back(observed.target + (1 - observed.coverage) * observed.background);
-      backgrounds.push_back(observed.background);
+      targets.push_back(observed.target.wanted());
+      backgrounds.push_back(observed.target.background);
       directions.push_back(test::harmonics(observed.ray.direction.cast<double>()).to(torch::kFloat32));
     }
     positions_ = torch::tensor(positions).view({-1, 3});

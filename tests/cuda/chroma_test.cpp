@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "src/base/rng.h"
-#include "src/field/adam.h"
+#include "src/optim/adam.h"
 #include "tests/cuda/check.h"
 #include "tests/cuda/expect.h"
 #include "tests/cuda/random_pixels.h"
@@ -18,7 +18,7 @@ namespace {
 /// A gradient, seen through Adam: the first moments after a step from moments of zero are a tenth of it.
 /// @param name  of the engine's state piece of moments; a hash grid's are [rows, 8], the first ones in front
 std::vector<float> gradient_in(const std::vector<StatePiece>& state, const std::string& name) {
-  constexpr float kShare = 1 - AdamSettings{}.beta1;
+  constexpr float kShare = 1 - kAdamBeta1;
   std::vector<float> gradient;
   for (const StatePiece& piece : state) {
     if (piece.name != name) continue;

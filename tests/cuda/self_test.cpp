@@ -17,7 +17,8 @@
 #include "src/engine/cpu/luminance_engine_cpu.h"
 #include "src/engine/cuda/luminance_engine_cuda.h"
 #include "src/engine/cuda/step_kernels.h"
-#include "src/field/adam.h"
+#include "src/optim/cuda/row_adam_cuda.h"
+#include "src/optim/row_adam.h"
 #include "tests/cuda/check.h"
 #include "tests/cuda/expect.h"
 #include "tests/support/toy_capture.h"
@@ -124,8 +125,7 @@ void check_hash_grid(int levels, int log2_rows) {
 void check_table_update() {
   constexpr std::uint32_t kRows = 4099;
   constexpr float kDecay = 30;  // a step then takes 30 % of a row: no rounding hides a missing decay
-  const AdamSettings settings;
-  const AdamStep step(settings, 1e-2f, 5);
+  const AdamStep step(1e-2f, 5);
   SequentialRng rng(13, 1);
   AlignedVector<float> table, gradient, moments;
   for (std::uint32_t row = 0; row < kRows; ++row) {
@@ -142,13 +142,11 @@ void check_table_update() {
   const auto d_table = on_device(table), d_gradient = on_device(gradient), d_moments = on_device(moments);
   DeviceBuffer<std::uint16_t> halves(table.size(), "test");
   const auto d_step = uploaded(std::vector<AdamStep>{step}, "test");
-  update_table(d_step.data(), kRows, kDecay, reinterpret_cast<float4*>(d_table.data()),
-               reinterpret_cast<float4*>(d_gradient.data()), reinterpret_cast<float4*>(d_moments.data()),
-               reinterpret_cast<uint2*>(halves.data()), nullptr);
+  update_rows({reinterpret_cast<float4*>(d_table.data()), reinterpret_cast<float4*>(d_gradient.data()),
+               reinterpret_cast<float4*>(d_moments.data()), reinterpret_cast<uint2*>(halves.data()), kRows},
+              d_step.data(), kDecay, nullptr);
   CNERF_CUDA(cudaDeviceSynchronize());
-  hash_grid_kernels().adam_rows(table.data(), gradient.data(), moments.data(), kRows, 1 - step.learning_rate * kDecay,
-                                step.step_size, settings.beta1, settings.beta2, settings.epsilon,
-                                step.second_correction);
+  update_rows({table.data(), gradient.data(), moments.data(), kRows}, step, kDecay);
   expect_below("table after Adam and decay", relative_distance(d_table.downloaded(), table), 1e-5);
   expect_below("its moments", relative_distance(d_moments.downloaded(), moments), 1e-5);
 }

@@ -13,7 +13,6 @@ namespace cnerf {
 namespace {
 
 using test::from_groups;
-using test::groups_of;
 using test::to_groups;
 
 HashGridOptions small_options() {
@@ -158,30 +157,6 @@ INSTANTIATE_TEST_SUITE_P(All, HashGridBackends,
                            return to_string(std::get<0>(param_info.param)) + "_" +
                                   std::to_string(std::get<1>(param_info.param));
                          });
-
-TEST(HashGridAdam, MovesOnlyRowsWithGradientAndMatchesTheFormula) {
-  for (const IsaLevel isa : test::available_isas()) {
-    const test::ScopedIsa scope(isa);
-    AlignedVector<float> table(8, 1.0f), d_rows = {0.5f, -0.25f, 0, 1, 0, 0, 0, 0}, moments(16, 0.0f);
-    hash_grid_kernels().adam_rows(table.data(), d_rows.data(), moments.data(), 2, 1.0f, 0.1f, 0.9f, 0.99f, 1e-15f,
-                                  100.0f);
-    // First step: first moment 0.1 g, second 0.01 g^2, corrected by 100: the quotient is 0.1 sign(g).
-    EXPECT_NEAR(table[0], 1.0f - 0.1f * 0.1f, 1e-6f);
-    EXPECT_NEAR(table[1], 1.0f + 0.1f * 0.1f, 1e-6f);
-    EXPECT_EQ(table[2], 1.0f);
-    for (int i = 4; i < 8; ++i) EXPECT_EQ(table[i], 1.0f);
-    for (const float d : d_rows) EXPECT_EQ(d, 0.0f);
-
-    // The same step once more, with decay: what was there shrinks where there is a gradient, and nowhere else.
-    AlignedVector<float> shrunk(8, 1.0f);
-    d_rows = {0.5f, -0.25f, 0, 1, 0, 0, 0, 0};
-    std::fill(moments.begin(), moments.end(), 0.0f);
-    hash_grid_kernels().adam_rows(shrunk.data(), d_rows.data(), moments.data(), 2, 0.75f, 0.1f, 0.9f, 0.99f, 1e-15f,
-                                  100.0f);
-    for (int i = 0; i < 4; ++i) EXPECT_NEAR(shrunk[i], table[i] - 0.25f, 1e-6f);
-    for (int i = 4; i < 8; ++i) EXPECT_EQ(shrunk[i], 1.0f);
-  }
-}
 
 }  // namespace
 }  // namespace cnerf

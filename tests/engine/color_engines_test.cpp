@@ -11,7 +11,7 @@
 #include "src/color/colorspace_math.h"
 #include "src/engine/color_engines.h"
 #include "src/engine/cpu/mlp.h"
-#include "src/field/adam.h"
+#include "src/optim/adam.h"
 
 namespace cnerf {
 namespace {
@@ -105,7 +105,7 @@ std::vector<Parameters> parameters_of(ColorBinEngine& engine) {
     Parameters found{piece(moments.name.substr(0, dot) + (is_grid ? ".table" : ".weights")), {}};
     const std::span<float> values = floats(moments);
     for (std::size_t i = 0; i < values.size(); ++i) {
-      if (!is_grid || i % 8 < 4) found.gradient.push_back(values[i] / (1 - AdamSettings{}.beta1));
+      if (!is_grid || i % 8 < 4) found.gradient.push_back(values[i] / (1 - kAdamBeta1));
     }
     parameters.push_back(std::move(found));
   }

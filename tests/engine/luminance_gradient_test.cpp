@@ -77,8 +77,8 @@ class LossInDouble {
             seen.add(alpha_of(sigma, double(sample.dt)), activation.value(luminance_net.forward(features).back()[0]));
         distortion.add(weight, {double(sample.t), double(sample.dt)});
       }
-      const double background = rays_[r].background;
-      const double wanted = rays_[r].target + (1.0 - rays_[r].coverage) * background;
+      const double background = rays_[r].target.background;
+      const double wanted = rays_[r].target.luminance + (1.0 - rays_[r].target.coverage) * background;
       const double error =
           (lightness_from_luminance(seen.value + seen.transmittance * background) - lightness_from_luminance(wanted)) /
           100.0;

@@ -11,7 +11,6 @@ namespace cnerf {
 namespace {
 
 using test::from_groups;
-using test::groups_of;
 using test::to_groups;
 
 const MlpLayout kLayout = {{12, 20, 16, 4}};

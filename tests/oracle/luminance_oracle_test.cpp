@@ -97,8 +97,8 @@ TEST(TorchOracle, GradientOfAWholeStep) {
       seen = ((before - behind) * y).sum();
       end = behind.select(0, -1);
     }
-    const torch::Tensor wanted = torch::full({}, ray.target + (1.0 - ray.coverage) * ray.background, f64);
-    loss = loss + ((test::lightness(seen + end * double(ray.background)) - test::lightness(wanted)) / 100).square();
+    const torch::Tensor wanted = torch::full({}, ray.target.luminance + (1.0 - ray.target.coverage) * ray.target.background, f64);
+    loss = loss + ((test::lightness(seen + end * double(ray.target.background)) - test::lightness(wanted)) / 100).square();
   }
   loss = loss / double(analytic.report.rays);
   loss.backward();

@@ -19,7 +19,7 @@ OccupancyGrid ball(int cascades) {
   options.resolution = 32;
   OccupancyGrid grid(options, cascades);
   for (std::size_t phase = 0; phase < 2; ++phase) {
-    grid.update(2, phase, 7, [](std::span<const Vec3f> points, std::span<float> sigma) {
+    grid.update({2, phase, 7}, [](std::span<const Vec3f> points, std::span<float> sigma) {
       for (std::size_t i = 0; i < points.size(); ++i) {
         sigma[i] = length(points[i] - Vec3f{0.45f, 0.5f, 0.62f}) < 0.2f ? 1000.0f : 0.0f;
       }

@@ -225,8 +225,8 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
       for (std::size_t r = begin; r < end; ++r) {
         const ObservedRay observed =
             observe_ray(views, options_.sampling(), options_.seed, std::uint64_t(counters_[0]), r);
-        rays[r] = observed.ray, backgrounds[r] = observed.background;
-        targets[r] = observed.target, wanted_light[r] = observed.wanted();
+        rays[r] = observed.ray, backgrounds[r] = observed.target.background;
+        targets[r] = observed.target.luminance, wanted_light[r] = observed.target.wanted();
       }
     });
     const torch::Tensor behind = tensor_of(backgrounds, {std::int64_t(n)}, torch::kFloat32);

@@ -47,8 +47,7 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     const std::vector<float> d_weights = chunks_.d_weights();
     const auto split = std::ptrdiff_t(features_.weight_count());
     features_.update(chunks_.runs(), {d_weights.begin(), d_weights.begin() + split}, learning_rate, steps_.front());
-    const AdamSettings adam;
-    head_.update({d_weights.begin() + split, d_weights.end()}, adam, AdamStep(adam, learning_rate, steps_.front()));
+    head_.update({d_weights.begin() + split, d_weights.end()}, AdamStep(learning_rate, steps_.front()));
     return chunks_.loss() * scale;
   }
 
@@ -57,8 +56,9 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     parallel_ranges(pixels.pixels(), kBlockPixels, [&](std::size_t begin, std::size_t end) {
       Work& work = works_.local();
       forward(pixels, begin, end, work);
+      const GroupedView<const float> of_block(work.logits, kHeadOutputs);
       for (std::size_t p = begin; p < end; ++p) {
-        for (int q = 0; q < kAbBinCount; ++q) logits[p * kAbBinCount + q] = work.logits[logit_at(p - begin, q)];
+        for (int q = 0; q < kAbBinCount; ++q) logits[p * kAbBinCount + q] = of_block.at(p - begin, q);
       }
     });
   }
@@ -68,9 +68,10 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     parallel_ranges(pixels.pixels(), kBlockPixels, [&](std::size_t begin, std::size_t end) {
       Work& work = works_.local();
       forward(pixels, begin, end, work);
+      const GroupedView<const float> logits(work.logits, kHeadOutputs);
       std::array<float, kAbBinCount> of_pixel;
       for (std::size_t p = begin; p < end; ++p) {
-        for (int q = 0; q < kAbBinCount; ++q) of_pixel[std::size_t(q)] = work.logits[logit_at(p - begin, q)];
+        for (int q = 0; q < kAbBinCount; ++q) of_pixel[std::size_t(q)] = logits.at(p - begin, q);
         colors[p] = temperature > 0 ? decode_annealed_mean(of_pixel, temperature) : decode_arg_max(of_pixel);
       }
     });
@@ -89,12 +90,6 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     AlignedVector<float> composited, logits, d_composited, d_logits;  // pixels as lanes
   };
 
-  static std::size_t logit_at(std::size_t pixel, int bin) {
-    return (pixel / kGroup * kHeadOutputs + std::size_t(bin)) * kGroup + pixel % kGroup;
-  }
-  static std::size_t head_input_at(std::size_t pixel, int channel) {
-    return (pixel / kGroup * kHeadInputs + std::size_t(channel)) * kGroup + pixel % kGroup;
-  }
   static float inverse_opacity_of(const PixelSamples& pixels, std::size_t p) {
     float opacity = 0;
     for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) opacity += pixels.weights[s];
@@ -106,73 +101,75 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     features_.set_points(std::span(pixels.positions).subspan(first, pixels.offsets[end] - first), work.points);
     features_.forward(work.points);
 
-    const std::size_t groups = (end - begin + kGroup - 1) / kGroup;
+    const std::size_t groups = groups_of(end - begin);
     ensure_size(work.composited, groups * kHeadInputs * kGroup);
     std::fill_n(work.composited.begin(), groups * kHeadInputs * kGroup, 0.0f);
+    const GroupedView<float> composited(work.composited, kHeadInputs);
+    const GroupedView<const float> features(work.points.output, kFeatures);
     for (std::size_t p = begin; p < end; ++p) {
       const float inverse = inverse_opacity_of(pixels, p);
       for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
         const float weight = pixels.weights[s] * inverse;
         for (int c = 0; c < kFeatures; ++c) {
-          work.composited[head_input_at(p - begin, c)] +=
-              weight * work.points.output[features_.output_at(s - first, c)];
+          composited.at(p - begin, c) += weight * features.at(s - first, c);
         }
       }
-      work.composited[head_input_at(p - begin, kFeatures)] = 1.0f;
+      composited.at(p - begin, kFeatures) = 1.0f;
     }
     ensure_size(work.logits, groups * kHeadOutputs * kGroup);
     head_.forward({{work.composited.data(), kHeadInputs}, {work.logits.data(), kHeadOutputs}}, groups);
   }
 
-  /// KL(label || softmax(logits)) of one pixel and the cost of its mean; writes the gradient times `scale`.
+  /// Loss of one pixel; writes the gradient times `scale`.
   static double loss_gradient(Work& work, std::size_t pixel, const SoftLabel& label, float regression, float scale) {
     ensure_size(work.d_logits, work.logits.size());
-    float largest = work.logits[logit_at(pixel, 0)];
-    for (int q = 1; q < kAbBinCount; ++q) largest = std::max(largest, work.logits[logit_at(pixel, q)]);
+    const GroupedView<const float> logits(work.logits, kHeadOutputs);
+    const GroupedView<float> d(work.d_logits, kHeadOutputs);  // exponentials, then probabilities, then the gradient
+    float largest = logits.at(pixel, 0);
+    for (int q = 1; q < kAbBinCount; ++q) largest = std::max(largest, logits.at(pixel, q));
     float sum = 0;
     for (int q = 0; q < kAbBinCount; ++q) {
-      const float e = std::exp(work.logits[logit_at(pixel, q)] - largest);
-      work.d_logits[logit_at(pixel, q)] = e;
+      const float e = Softmax::exponential(logits.at(pixel, q), largest);
+      d.at(pixel, q) = e;
       sum += e;
     }
-    double loss = 0;
-    for (int q = 0; q < kAbBinCount; ++q) work.d_logits[logit_at(pixel, q)] /= sum;
-    if (regression > 0) loss += regression * add_mean_gradient(work, pixel, mean_of(label), regression);
-    for (int q = 0; q < kAbBinCount; ++q) work.d_logits[logit_at(pixel, q)] *= scale;
+    const Softmax softmax(largest, sum);
+    for (int q = 0; q < kAbBinCount; ++q) d.at(pixel, q) = softmax.probability(d.at(pixel, q));
+
+    MeanError mean;
+    if (regression > 0) mean = {mean_of_bins(d, pixel), mean_of(label), regression};
+    double loss = regression * double(mean.cost);
+    const std::array<Ab, kAbBinCount>& centres = ab_bin_centres();
+    for (int q = 0; q < kAbBinCount; ++q) {
+      float& p = d.at(pixel, q);
+      p = logit_gradient(p, regression > 0 ? mean.by_logit(p, centres[std::size_t(q)]) : 0, scale);
+    }
     for (int i = 0; i < kSoftLabelBins; ++i) {
-      const std::size_t at = logit_at(pixel, label.bin[i]);
       const float z = label.weight[i];
       if (z <= 0) continue;
-      loss += divergence(z, work.logits[at] - largest - std::log(sum));
-      work.d_logits[at] -= scale * z;
+      loss += divergence(z, softmax.log_probability(logits.at(pixel, label.bin[i])));
+      d.at(pixel, label.bin[i]) += label_gradient(z, scale);
     }
-    for (int pad = kAbBinCount; pad < kHeadOutputs; ++pad) work.d_logits[logit_at(pixel, pad)] = 0;
+    for (int pad = kAbBinCount; pad < kHeadOutputs; ++pad) d.at(pixel, pad) = 0;
     return loss;
   }
 
-  /// Cost of the mean of the pixel's probabilities, which lie where its gradient by the logits goes: adds to them the
-  /// cost's derivative times `weight`.
-  static double add_mean_gradient(Work& work, std::size_t pixel, Ab wanted, float weight) {
+  /// Mean colour of a pixel's distribution.
+  static Ab mean_of_bins(const GroupedView<float>& probabilities, std::size_t pixel) {
     const std::array<Ab, kAbBinCount>& centres = ab_bin_centres();
     Ab mean;
     for (int q = 0; q < kAbBinCount; ++q) {
-      const float p = work.d_logits[logit_at(pixel, q)];
+      const float p = probabilities.at(pixel, q);
       mean.a += p * centres[std::size_t(q)].a;
       mean.b += p * centres[std::size_t(q)].b;
     }
-    const Ab away = {mean.a - wanted.a, mean.b - wanted.b};
-    const Ab d_mean = {weight * mean_slope(away.a), weight * mean_slope(away.b)};
-    for (int q = 0; q < kAbBinCount; ++q) {
-      float& p = work.d_logits[logit_at(pixel, q)];
-      p += logit_slope(p, centres[std::size_t(q)], mean, d_mean);
-    }
-    return mean_cost(away.a) + mean_cost(away.b);
+    return mean;
   }
 
   static void clear_padding(Work& work, std::size_t pixels) {
-    const std::size_t lanes = (pixels + kGroup - 1) / kGroup * kGroup;
+    const std::size_t lanes = groups_of(pixels) * kGroup;
     for (std::size_t p = pixels; p < lanes; ++p) {
-      for (int q = 0; q < kHeadOutputs; ++q) work.d_logits[logit_at(p, q)] = 0;
+      for (int q = 0; q < kHeadOutputs; ++q) GroupedView<float>(work.d_logits, kHeadOutputs).at(p, q) = 0;
     }
   }
 
@@ -182,9 +179,13 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     ensure_size(work.d_composited, work.composited.size());
     head_.backward({{work.composited.data(), kHeadInputs}, {work.logits.data(), kHeadOutputs}},
                    {{work.d_composited.data(), kHeadInputs}, {work.d_logits.data(), kHeadOutputs}},
-                   (end - begin + kGroup - 1) / kGroup, chunk.d_weights.data() + features_.weight_count());
+                   groups_of(end - begin), chunk.d_weights.data() + features_.weight_count());
     const std::size_t first = pixels.offsets[begin];
     std::fill(work.points.d_output.begin(), work.points.d_output.end(), 0.0f);
+    const GroupedView<const float> features(work.points.output, kFeatures);
+    const GroupedView<float> d_features(work.points.d_output, kFeatures);
+    const GroupedView<const float> composited(work.composited, kHeadInputs);
+    const GroupedView<const float> d_composited(work.d_composited, kHeadInputs);
     double spread = 0;
     for (std::size_t p = begin; p < end; ++p) {
       const float inverse = inverse_opacity_of(pixels, p);
@@ -192,10 +193,9 @@ class ColorBinEngineCpu final : public ColorBinEngine {
         const float share = pixels.weights[s] * inverse;
         float squared_distance = 0;
         for (int c = 0; c < kFeatures; ++c) {
-          const std::size_t of_sample = features_.output_at(s - first, c), of_pixel = head_input_at(p - begin, c);
-          const float distance = work.points.output[of_sample] - work.composited[of_pixel];
+          const float distance = features.at(s - first, c) - composited.at(p - begin, c);
           squared_distance += distance * distance;
-          work.points.d_output[of_sample] = share * (work.d_composited[of_pixel] + spread_slope * distance);
+          d_features.at(s - first, c) = share * (d_composited.at(p - begin, c) + spread_slope * distance);
         }
         spread += double(share * squared_distance);
       }

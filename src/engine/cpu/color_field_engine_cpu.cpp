@@ -57,9 +57,9 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
       const std::size_t count = std::min(kPiece, positions.size() - first);
       field_.set_points(positions.subspan(first, count), work);
       field_.forward(work);
+      const GroupedView<const float> logs(work.output, kChromaticityOutputs);
       for (std::size_t i = 0; i < count; ++i) {
-        chromaticity[first + i] = {ratio_of(work.output[field_.output_at(i, 0)]),
-                                   ratio_of(work.output[field_.output_at(i, 1)])};
+        chromaticity[first + i] = {ratio_of(logs.at(i, 0)), ratio_of(logs.at(i, 1))};
       }
     }
   }
@@ -83,12 +83,13 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
 
   [[nodiscard]] PixelXyz xyz_of(const PixelSamples& pixels, std::size_t p, std::size_t first,
                                 const PointWorkspace& work) const {
+    const GroupedView<const float> logs(work.output, kChromaticityOutputs);
     PixelXyz sum;
     for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
       const float light = pixels.weights[s] * pixels.luminance[s];
-      sum.x += light * ratio_of(work.output[field_.output_at(s - first, 0)]);
+      sum.x += light * ratio_of(logs.at(s - first, 0));
       sum.y += light;
-      sum.z += light * ratio_of(work.output[field_.output_at(s - first, 1)]);
+      sum.z += light * ratio_of(logs.at(s - first, 1));
     }
     return sum;
   }
@@ -98,11 +99,12 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
                        float scale, PointWorkspace& work) const {
     const PixelXyz seen = xyz_of(pixels, p, first, work);
     const AbError error = ab_error(seen, target, loss, scale);
+    const GroupedView<const float> logs(work.output, kChromaticityOutputs);
+    const GroupedView<float> d_logs(work.d_output, kChromaticityOutputs);
     for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
       const float light = pixels.weights[s] * pixels.luminance[s];
-      const std::size_t at_x = field_.output_at(s - first, 0), at_z = field_.output_at(s - first, 1);
-      work.d_output[at_x] = error.d_x * light * ratio_derivative(work.output[at_x]);
-      work.d_output[at_z] = error.d_z * light * ratio_derivative(work.output[at_z]);
+      d_logs.at(s - first, 0) = error.d_x * light * ratio_derivative(logs.at(s - first, 0));
+      d_logs.at(s - first, 1) = error.d_z * light * ratio_derivative(logs.at(s - first, 1));
     }
     return error.distance;
   }

@@ -13,8 +13,7 @@ HashGridCpu::HashGridCpu(const HashGridOptions& options, std::uint64_t seed)
   moments_.assign(rows * 8, 0.0f);
 }
 
-void HashGridCpu::backward_and_update(const std::vector<EncodedSamples>& runs, const AdamSettings& adam,
-                                      const AdamStep& step) {
+void HashGridCpu::backward_and_update(const std::vector<EncodedSamples>& runs, const AdamStep& step) {
   // Finest levels first: they take longest.
   parallel_tasks(levels_.size(), [&](std::size_t task) {
     const std::size_t l = levels_.size() - 1 - task;
@@ -23,9 +22,9 @@ void HashGridCpu::backward_and_update(const std::vector<EncodedSamples>& runs, c
     for (const EncodedSamples& run : runs) {
       kernels_->scatter_level(level, run.positions, run.d_encoded, run.groups, channels(), 4 * int(l), d_rows);
     }
-    kernels_->adam_rows(table_.data() + 4 * std::size_t(level.first_row), d_rows,
-                        moments_.data() + 8 * std::size_t(level.first_row), level.rows, 1 - step.learning_rate * decay_,
-                        step.step_size, adam.beta1, adam.beta2, adam.epsilon, step.second_correction);
+    update_rows({table_.data() + 4 * std::size_t(level.first_row), d_rows,
+                 moments_.data() + 8 * std::size_t(level.first_row), level.rows},
+                step, decay_);
   });
 }
 

@@ -9,7 +9,7 @@
 #include "encoding/hash_grid_levels.h"
 #include "src/base/aligned.h"
 #include "src/engine/state.h"
-#include "src/field/adam.h"
+#include "src/optim/row_adam.h"
 
 namespace cnerf {
 
@@ -33,7 +33,7 @@ class HashGridCpu {
   }
   /// Scatters all runs and applies Adam, one task a level, so that a level's rows stay in one core's cache and sums are
   /// made in the order of the runs whatever the number of threads.
-  void backward_and_update(const std::vector<EncodedSamples>& runs, const AdamSettings& adam, const AdamStep& step);
+  void backward_and_update(const std::vector<EncodedSamples>& runs, const AdamStep& step);
   /// Only the gradient, for tests.  [rows, 4]
   [[nodiscard]] std::vector<float> gradient(const std::vector<EncodedSamples>& runs) const;
 

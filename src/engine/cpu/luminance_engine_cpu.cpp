@@ -6,29 +6,20 @@
 
 #include "src/base/check.h"
 #include "src/base/parallel.h"
-#include "src/color/colorspace_math.h"
 #include "src/engine/heaviest_samples.h"
-#include "src/render/composite_math.h"
-#include "src/render/distortion_math.h"
+#include "src/engine/stage1_loss.h"
+#include "src/engine/stage1_schedule.h"
 
 namespace cnerf {
 namespace {
 
 constexpr std::size_t kWaveSamples = 8;  // samples a ray adds to one wave of the density-first pass
 constexpr std::size_t kMostSamplesPerRay = 1024;
-constexpr float kTrainingTransmittance = 1e-4f;  // a training ray ends below this
-constexpr int kOccupancyEvery = 16;              // steps
-constexpr int kOccupancyWarmUp = 256;            // steps during which the grid is looked at more densely
-constexpr std::int64_t kMostRays = 1 << 16;
-
-std::size_t groups_of(std::size_t samples) {
-  return (samples + kGroup - 1) / kGroup;
-}
 
 /// Positions must lie in [0, 1]; rounding may carry the last sample of a ray just outside.
 void set_position(float* positions, std::size_t sample, Vec3f p) {
-  float* group = positions + sample / kGroup * 3 * kGroup + sample % kGroup;
-  for (int axis = 0; axis < 3; ++axis) group[axis * kGroup] = std::clamp(p[axis], 0.0f, 1.0f);
+  const GroupedView<float> grouped(positions, 3);
+  for (int axis = 0; axis < 3; ++axis) grouped.at(sample, axis) = std::clamp(p[axis], 0.0f, 1.0f);
 }
 
 /// Fills the unused lanes of the last group with a legal position.
@@ -43,7 +34,7 @@ LuminanceEngineCpu::LuminanceEngineCpu(const LuminanceEngineOptions& options)
     : options_(options),
       field_(options.grid, 1.0f / std::ldexp(1.0f, 1 - options.cascades), options.max_luminance, options.seed),
       occupancy_(options.occupancy, options.cascades),
-      counters_{0, std::clamp<std::int64_t>(options.samples_per_step / 256, 64, kMostRays)},
+      counters_{0, first_rays(options.samples_per_step)},
       chunks_(kChunks) {}
 
 void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
@@ -157,33 +148,28 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
       const float weight = ray.add(alpha, field_.luminance(block.work, s));
       if (options_.distortion_weight > 0) distortion.add(weight, {sample.t, sample.dt});
     }
-    const float background = rays[r].background;
-    const float seen = ray.value + ray.transmittance * background;
-    const float error = (lightness_from_luminance(seen) - lightness_from_luminance(rays[r].wanted())) / 100.0f;
-    const float encoded_error =
-        srgb_from_linear(std::clamp(ray.value, 0.0f, 1.0f)) - srgb_from_linear(std::clamp(rays[r].target, 0.0f, 1.0f));
-    chunk.loss += error * error + options_.distortion_weight * distortion.value;
-    chunk.squared_error += encoded_error * encoded_error;
+    const SeenRay seen{ray.value, ray.transmittance};
+    const RayError error(seen, rays[r].target);
+    chunk.loss += ray_loss(error, distortion.value, options_.distortion_weight);
+    chunk.squared_error += squared_error(seen, rays[r].target);
 
-    const float d_seen = gradient_scale * 2.0f * error * lightness_derivative(seen) / 100.0f;
-    const float d_distortion = gradient_scale * options_.distortion_weight;
-    // By Euler's theorem, the derivatives of the distortion by the weights, times the weights, sum up to twice itself.
-    float distortion_behind = 2.0f * distortion.value;
+    const RayGradient gradient(error, distortion, options_.distortion_weight, gradient_scale);
+    float distortion_behind = gradient.distortion_of_all();
     Compositor<float> again;
     Distortion<float> before;
     for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
-      const float dt = block.samples[s].dt;
-      const float luminance = field_.luminance(block.work, s);
+      const float dt = block.samples[s].dt, luminance = field_.luminance(block.work, s);
       const float weight = again.add(alpha_of(field_.sigma(block.work, s), dt), luminance);
-      float d_sigma = d_seen * density_derivative(dt, again.transmittance, luminance, seen - again.value);
-      if (d_distortion > 0) {
+      const LitSample sample{dt, luminance, weight, again.transmittance, again.value};
+      float d_sigma = gradient.by_density(sample);
+      if (options_.distortion_weight > 0) {
         const LogInterval<float> at(block.samples[s].t, dt);
-        const float d_weight = distortion_derivative(weight, at, before.weight, before.moment, distortion);
+        const float slope = gradient.distortion_by_weight(weight, at, before);
         before.add(weight, at);
-        distortion_behind -= weight * d_weight;
-        d_sigma += d_distortion * density_derivative(dt, again.transmittance, d_weight, distortion_behind);
+        distortion_behind -= weight * slope;
+        d_sigma += gradient.by_density_of_distortion(sample, slope, distortion_behind);
       }
-      field_.set_gradient(block.work, s, d_sigma, d_seen * weight);
+      field_.set_gradient(block.work, s, d_sigma, gradient.by_luminance(sample));
     }
   }
   for (std::size_t s = block.samples.size(); s < block.work.groups * kGroup; ++s) {
@@ -232,7 +218,10 @@ StepReport LuminanceEngineCpu::report() const {
 }
 
 StepReport LuminanceEngineCpu::step(const std::vector<TrainingView>& views, float learning_rate) {
-  if (step_count() % kOccupancyEvery == 0) update_occupancy();
+  if (updates_occupancy(step_count())) {
+    occupancy_.update(occupancy_update(step_count(), options_.seed),
+                      [this](std::span<const Vec3f> points, std::span<float> sigma) { query_density(points, sigma); });
+  }
   accumulate(views);
   const StepReport done = report();
 
@@ -245,19 +234,8 @@ StepReport LuminanceEngineCpu::step(const std::vector<TrainingView>& views, floa
   counters_[0] += 1;
   field_.update(runs, d_weights, learning_rate, counters_[0]);
 
-  // As many rays next time as fill the wanted number of samples.
-  const double fill = double(options_.samples_per_step) / double(std::max<std::size_t>(done.trained_samples, 64));
-  const auto wanted = std::int64_t(double(done.rays) * std::clamp(fill, 0.5, 2.0));
-  counters_[1] = std::clamp<std::int64_t>(wanted / 16 * 16, 64, kMostRays);
+  counters_[1] = next_rays(counters_[1], std::int64_t(done.trained_samples), options_.samples_per_step);
   return done;
-}
-
-void LuminanceEngineCpu::update_occupancy() {
-  const long update = step_count() / kOccupancyEvery;
-  const std::size_t stride = step_count() == 0 ? 1 : step_count() < kOccupancyWarmUp ? 4 : 16;
-  const std::size_t phase = std::size_t(update) % stride;
-  occupancy_.update(stride, phase, options_.seed ^ mix_bits(std::uint64_t(update)),
-                    [this](std::span<const Vec3f> points, std::span<float> sigma) { query_density(points, sigma); });
 }
 
 LuminanceEngineCpu::Gradients LuminanceEngineCpu::gradients(const std::vector<TrainingView>& views) {

@@ -85,7 +85,6 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   void train_block(std::span<const ObservedRay> rays, float gradient_scale, Block& block, Chunk& chunk) const;
   void accumulate(const std::vector<TrainingView>& views);
   [[nodiscard]] StepReport report() const;
-  void update_occupancy();
 
   LuminanceEngineOptions options_;
   LuminanceFieldCpu field_;

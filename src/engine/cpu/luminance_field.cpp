@@ -7,11 +7,6 @@ namespace {
 
 constexpr int kFeatureChannels = kGeometryChannels + kSphericalHarmonics;
 
-/// Place of a sample's value in a grouped array.
-std::size_t at(std::size_t sample, int channels, int channel) {
-  return (sample / kGroup * std::size_t(channels) + std::size_t(channel)) * kGroup + sample % kGroup;
-}
-
 }  // namespace
 
 void LuminanceWorkspace::resize(std::size_t wanted_groups, int encoded_channels) {
@@ -45,9 +40,9 @@ void LuminanceFieldCpu::density(const float* positions, std::size_t groups, Lumi
 }
 
 void LuminanceFieldCpu::set_direction(LuminanceWorkspace& work, std::size_t sample, Vec3f direction) {
-  spherical_harmonics(direction.x, direction.y, direction.z, [&](int i, float value) {
-    work.features[at(sample, kFeatureChannels, kGeometryChannels + i)] = value;
-  });
+  const GroupedView<float> features(work.features, kFeatureChannels);
+  spherical_harmonics(direction.x, direction.y, direction.z,
+                      [&](int i, float value) { features.at(sample, kGeometryChannels + i) = value; });
 }
 
 void LuminanceFieldCpu::forward(const float* positions, LuminanceWorkspace& work) const {
@@ -64,19 +59,19 @@ void LuminanceFieldCpu::forward(const float* positions, LuminanceWorkspace& work
 }
 
 float LuminanceFieldCpu::sigma(const LuminanceWorkspace& work, std::size_t sample) const {
-  return density_from_raw(work.features[at(sample, kFeatureChannels, 0)], density_scale_);
+  return density_from_raw(GroupedView<const float>(work.features, kFeatureChannels).at(sample, 0), density_scale_);
 }
 
 float LuminanceFieldCpu::luminance(const LuminanceWorkspace& work, std::size_t sample) const {
-  return luminance_activation_.value(work.raw_luminance[at(sample, kLuminanceOutputs, 0)]);
+  return luminance_activation_.value(GroupedView<const float>(work.raw_luminance, kLuminanceOutputs).at(sample, 0));
 }
 
 void LuminanceFieldCpu::set_gradient(LuminanceWorkspace& work, std::size_t sample, float d_sigma,
                                      float d_luminance) const {
-  const float raw_luminance = work.raw_luminance[at(sample, kLuminanceOutputs, 0)];
-  work.d_raw_luminance[at(sample, kLuminanceOutputs, 0)] =
-      d_luminance * luminance_activation_.derivative(raw_luminance);
-  for (int pad = 1; pad < kLuminanceOutputs; ++pad) work.d_raw_luminance[at(sample, kLuminanceOutputs, pad)] = 0;
+  const float raw_luminance = GroupedView<const float>(work.raw_luminance, kLuminanceOutputs).at(sample, 0);
+  const GroupedView<float> d_raw(work.d_raw_luminance, kLuminanceOutputs);
+  d_raw.at(sample, 0) = d_luminance * luminance_activation_.derivative(raw_luminance);
+  for (int pad = 1; pad < kLuminanceOutputs; ++pad) d_raw.at(sample, pad) = 0;
   work.d_log_density[sample] = d_sigma * sigma(work, sample);
 }
 
@@ -90,9 +85,8 @@ void LuminanceFieldCpu::backward(LuminanceWorkspace& work, float* d_encoded, flo
                            {work.d_luminance_hidden.data() + kHiddenWidth * kGroup, 2 * kHiddenWidth},
                            {work.d_raw_luminance.data(), kLuminanceOutputs}},
                           work.groups, d_weights + density_net_.layout().weight_count());
-  for (std::size_t s = 0; s < work.groups * kGroup; ++s) {
-    work.d_features[at(s, kFeatureChannels, 0)] += work.d_log_density[s];
-  }
+  const GroupedView<float> d_features(work.d_features, kFeatureChannels);
+  for (std::size_t s = 0; s < work.groups * kGroup; ++s) d_features.at(s, 0) += work.d_log_density[s];
   density_net_.backward(
       {{work.encoded.data(), grid_.channels()},
        {work.hidden.data(), kHiddenWidth},
@@ -103,12 +97,11 @@ void LuminanceFieldCpu::backward(LuminanceWorkspace& work, float* d_encoded, flo
 
 void LuminanceFieldCpu::update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights,
                                float learning_rate, long step) {
-  const AdamSettings adam;
-  const AdamStep adam_step(adam, learning_rate, step);
-  grid_.backward_and_update(runs, adam, adam_step);
+  const AdamStep adam(learning_rate, step);
+  grid_.backward_and_update(runs, adam);
   const std::size_t split = density_net_.layout().weight_count();
-  density_net_.update({d_weights.begin(), d_weights.begin() + std::ptrdiff_t(split)}, adam, adam_step);
-  luminance_net_.update({d_weights.begin() + std::ptrdiff_t(split), d_weights.end()}, adam, adam_step);
+  density_net_.update({d_weights.begin(), d_weights.begin() + std::ptrdiff_t(split)}, adam);
+  luminance_net_.update({d_weights.begin() + std::ptrdiff_t(split), d_weights.end()}, adam);
 }
 
 void LuminanceFieldCpu::append_state(std::vector<StatePiece>& state) {

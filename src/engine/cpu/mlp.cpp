@@ -51,9 +51,9 @@ void MlpCpu::backward(const std::vector<Channels>& activations, const std::vecto
   }
 }
 
-void MlpCpu::update(const std::vector<float>& d_weights, const AdamSettings& adam, const AdamStep& step) {
+void MlpCpu::update(const std::vector<float>& d_weights, const AdamStep& step) {
   for (std::size_t i = 0; i < weights_.size(); ++i) {
-    step.apply(adam, d_weights[i], first_moments_[i], second_moments_[i], weights_[i]);
+    step.apply(d_weights[i], first_moments_[i], second_moments_[i], weights_[i]);
   }
   transpose_weights();
 }

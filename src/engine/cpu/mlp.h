@@ -7,9 +7,9 @@
 
 #include "src/base/aligned.h"
 #include "src/engine/state.h"
-#include "src/field/adam.h"
 #include "src/field/cpu/mlp_kernels.h"
 #include "src/field/mlp_layout.h"
+#include "src/optim/adam.h"
 
 namespace cnerf {
 
@@ -34,7 +34,7 @@ class MlpCpu {
   /// @param d_weights  [weight_count], added to
   void backward(const std::vector<Channels>& activations, const std::vector<Channels>& gradients, std::size_t groups,
                 float* d_weights) const;
-  void update(const std::vector<float>& d_weights, const AdamSettings& adam, const AdamStep& step);
+  void update(const std::vector<float>& d_weights, const AdamStep& step);
 
   [[nodiscard]] const AlignedVector<float>& weights() const { return weights_; }
   void set_weights(const std::vector<float>& weights);

@@ -12,16 +12,16 @@ PointNetCpu::PointNetCpu(const HashGridOptions& grid, int outputs, bool relu_out
       net_(point_net_layout(int(grid_.levels().size()), outputs), seed, kPointNetStream, relu_output) {}
 
 void PointNetCpu::set_points(std::span<const Vec3f> points, PointWorkspace& work) const {
-  work.groups = (points.size() + kGroup - 1) / kGroup;
+  work.groups = groups_of(points.size());
   const std::size_t lanes = work.groups * kGroup;
   ensure_size(work.positions, lanes * 3);
   ensure_size(work.encoded, lanes * std::size_t(encoded_channels()));
   for (auto* buffer : {&work.hidden, &work.d_hidden}) ensure_size(*buffer, lanes * kHiddenWidth);
   for (auto* buffer : {&work.output, &work.d_output}) ensure_size(*buffer, lanes * std::size_t(outputs_));
+  const GroupedView<float> positions(work.positions, 3);
   for (std::size_t i = 0; i < lanes; ++i) {
     const Vec3f p = i < points.size() ? points[i] : Vec3f{0.5f, 0.5f, 0.5f};
-    float* group = work.positions.data() + i / kGroup * 3 * kGroup + i % kGroup;
-    for (int axis = 0; axis < 3; ++axis) group[axis * kGroup] = std::clamp(p[axis], 0.0f, 1.0f);
+    for (int axis = 0; axis < 3; ++axis) positions.at(i, axis) = std::clamp(p[axis], 0.0f, 1.0f);
   }
 }
 
@@ -48,10 +48,9 @@ void PointNetCpu::backward(PointWorkspace& work, float* d_encoded, float* d_weig
 
 void PointNetCpu::update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights,
                          float learning_rate, long step) {
-  const AdamSettings adam;
-  const AdamStep adam_step(adam, learning_rate, step);
-  grid_.backward_and_update(runs, adam, adam_step);
-  net_.update(d_weights, adam, adam_step);
+  const AdamStep adam(learning_rate, step);
+  grid_.backward_and_update(runs, adam);
+  net_.update(d_weights, adam);
 }
 
 void PointNetCpu::append_state(const std::string& prefix, std::vector<StatePiece>& state) {

@@ -35,10 +35,6 @@ class PointNetCpu {
   void update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights, float learning_rate,
               long step);
 
-  /// Value of one point's output channel in a grouped array of `outputs()` channels.
-  [[nodiscard]] std::size_t output_at(std::size_t point, int channel) const {
-    return (point / kGroup * std::size_t(outputs_) + std::size_t(channel)) * kGroup + point % kGroup;
-  }
   [[nodiscard]] int encoded_channels() const { return grid_.channels(); }
   [[nodiscard]] std::size_t weight_count() const { return net_.layout().weight_count(); }
   [[nodiscard]] const HashGridCpu& grid() const { return grid_; }

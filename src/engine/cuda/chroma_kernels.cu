@@ -190,61 +190,48 @@ __device__ float sum_of_row(float value, int half, float (&of_warps)[kWarps][kPi
   return of_row(value, half, of_warps, [](float a, float b) { return a + b; });
 }
 
-/// Of one row's distribution: what it costs that its mean is away from the label's, and that cost's derivative.
-struct MeanColor {
-  Ab at, slope;
-  float cost = 0;
-};
-__device__ MeanColor mean_color(float log_sum, int half, const SoftLabel& label, const Ab* centres, HeadShared& shared,
-                                Logits& logits) {
-  MeanColor mean;
+/// Of one row's distribution: what it costs that its mean is away from the label's.
+__device__ MeanError mean_error(const Softmax& softmax, int half, const SoftLabel& label, const ChromaTargets& targets,
+                                HeadShared& shared, Logits& logits) {
+  Ab mean;
   logits.for_row(half, [&](int q, float& logit) {
     if (q >= kAbBinCount) return;
-    const float probability = expf(logit - log_sum);
-    mean.at.a += probability * centres[q].a;
-    mean.at.b += probability * centres[q].b;
+    const float probability = softmax.probability(Softmax::exponential(logit, softmax.largest));
+    mean.a += probability * targets.centres[q].a;
+    mean.b += probability * targets.centres[q].b;
   });
-  mean.at = {sum_of_row(mean.at.a, half, shared.sum[1]), sum_of_row(mean.at.b, half, shared.sum[2])};
-  Ab away = mean.at;
-#pragma unroll
-  for (int i = 0; i < kSoftLabelBins; ++i) {
-    away.a -= label.weight[i] * centres[label.bin[i]].a;
-    away.b -= label.weight[i] * centres[label.bin[i]].b;
-  }
-  mean.slope = {mean_slope(away.a), mean_slope(away.b)};
-  mean.cost = mean_cost(away.a) + mean_cost(away.b);
-  return mean;
+  mean = {sum_of_row(mean.a, half, shared.sum[1]), sum_of_row(mean.b, half, shared.sum[2])};
+  return {mean, mean_of(label, targets.centres), targets.regression_weight};
 }
 
 /// Turns logits into the gradient of the pixels' losses by them; returns this lane's part of the losses.
-__device__ float softmax_gradient(std::uint32_t first, std::uint32_t pixels, const ChromaTargets& targets,
-                                  HeadShared& shared, Logits& logits) {
+__device__ float loss_gradient(std::uint32_t first, std::uint32_t pixels, const ChromaTargets& targets,
+                               HeadShared& shared, Logits& logits) {
   float loss = 0;
 #pragma unroll
   for (int half = 0; half < 2; ++half) {
     const float largest = largest_of_row(logits, half, shared);
     float sum = 0;
-    logits.for_row(half, [&](int q, float& logit) { sum += q < kAbBinCount ? expf(logit - largest) : 0.0f; });
-    const float log_sum = largest + logf(sum_of_row(sum, half, shared.sum[0]));
+    logits.for_row(half,
+                   [&](int q, float& logit) { sum += q < kAbBinCount ? Softmax::exponential(logit, largest) : 0.0f; });
+    const Softmax softmax(largest, sum_of_row(sum, half, shared.sum[0]));
 
     const std::uint32_t pixel = first + threadIdx.x % 32 / 4 + 8 * half;
     const float weight = pixel < pixels ? targets.pixel_weights[pixel] : 0.0f;
-    const float factor = weight * targets.scale;
+    const float scale = weight * targets.scale;
     const SoftLabel& label = targets.labels[min(pixel, pixels - 1)];
-    const MeanColor mean =
-        targets.regression_weight > 0 ? mean_color(log_sum, half, label, targets.centres, shared, logits) : MeanColor{};
+    const bool has_regression = targets.regression_weight > 0;
+    const MeanError mean = has_regression ? mean_error(softmax, half, label, targets, shared, logits) : MeanError{};
     loss += threadIdx.x < 32 && threadIdx.x % 4 == 0 ? weight * targets.regression_weight * mean.cost : 0.0f;
     logits.for_row(half, [&](int q, float& logit) {
-      const float log_probability = logit - log_sum;
-      const float probability = q < kAbBinCount ? expf(log_probability) : 0.0f;
-      logit = factor * probability;
-      if (targets.regression_weight > 0 && q < kAbBinCount) {
-        logit += factor * targets.regression_weight * logit_slope(probability, targets.centres[q], mean.at, mean.slope);
-      }
+      const bool is_bin = q < kAbBinCount;
+      const float log_probability = softmax.log_probability(logit);
+      const float p = is_bin ? softmax.probability(Softmax::exponential(logit, largest)) : 0.0f;
+      logit = logit_gradient(p, has_regression && is_bin ? mean.by_logit(p, targets.centres[q]) : 0.0f, scale);
 #pragma unroll
       for (int i = 0; i < kSoftLabelBins; ++i) {
         if (label.bin[i] != q || label.weight[i] <= 0 || weight == 0) continue;
-        logit -= factor * label.weight[i];
+        logit += label_gradient(label.weight[i], scale);
         loss += weight * divergence(label.weight[i], log_probability);
       }
     });
@@ -252,18 +239,27 @@ __device__ float softmax_gradient(std::uint32_t first, std::uint32_t pixels, con
   return loss;
 }
 
-/// The mean of the bins' centres under softmax(logits / temperature) (Zhang et al. 2016, Eq. 5).
+/// As decode_arg_max and decode_annealed_mean (ab_bins.h).
 __device__ void write_colors(std::uint32_t first, std::uint32_t pixels, const ChromaDecoding& decoding,
                              HeadShared& shared, Logits& logits) {
 #pragma unroll
   for (int half = 0; half < 2; ++half) {
     const float largest = largest_of_row(logits, half, shared);
+    const std::uint32_t pixel = first + threadIdx.x % 32 / 4 + 8 * half;
+    const bool writes = pixel < pixels && threadIdx.x < 32 && threadIdx.x % 4 == 0;
+    if (decoding.temperature <= 0) {
+      float most_probable = kAbBinCount;
+      logits.for_row(half, [&](int q, float& logit) {
+        if (q < kAbBinCount && logit == largest) most_probable = fminf(most_probable, float(q));
+      });
+      most_probable = of_row(most_probable, half, shared.sum[0], [](float a, float b) { return fminf(a, b); });
+      if (writes) decoding.colors[pixel] = decoding.centres[min(int(most_probable), kAbBinCount - 1)];  // NaN: none is
+      continue;
+    }
     float sum = 0, a = 0, b = 0;
     logits.for_row(half, [&](int q, float& logit) {
       if (q >= kAbBinCount) return;
-      const float weight = decoding.temperature > 0 ? expf((logit - largest) / decoding.temperature)
-                           : logit == largest       ? 1.0f
-                                                    : 0.0f;
+      const float weight = annealed_weight(logit, largest, decoding.temperature);
       const Ab centre = decoding.centres[q];
       sum += weight;
       a += weight * centre.a;
@@ -272,8 +268,7 @@ __device__ void write_colors(std::uint32_t first, std::uint32_t pixels, const Ch
     sum = sum_of_row(sum, half, shared.sum[0]);
     a = sum_of_row(a, half, shared.sum[1]);
     b = sum_of_row(b, half, shared.sum[2]);
-    const std::uint32_t pixel = first + threadIdx.x % 32 / 4 + 8 * half;
-    if (pixel < pixels && threadIdx.x < 32 && threadIdx.x % 4 == 0) decoding.colors[pixel] = {a / sum, b / sum};
+    if (writes) decoding.colors[pixel] = {a / sum, b / sum};
   }
 }
 
@@ -344,7 +339,7 @@ __global__ void __launch_bounds__(kThreads, 1) head(const ChromaHeadJob job, con
     if constexpr (std::is_same_v<Use, float*>) write_logits(first, pixels, use, logits);
     if constexpr (std::is_same_v<Use, ChromaDecoding>) write_colors(first, pixels, use, shared, logits);
     if constexpr (kTrain) {
-      loss += softmax_gradient(first, pixels, use, shared, logits) + use.spread_weight * spread;
+      loss += loss_gradient(first, pixels, use, shared, logits) + use.spread_weight * spread;
 #pragma unroll
       for (int i = 0; i < 2; ++i) {
         std::uint32_t operand[4];

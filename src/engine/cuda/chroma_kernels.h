@@ -44,7 +44,7 @@ struct ChromaHeadJob {
 void chroma_logits(const ChromaHeadJob& job, float* logits, cudaStream_t stream);
 
 struct ChromaDecoding {
-  float temperature;  ///< 0: the most probable bin; of equals, their mean
+  float temperature;  ///< 0: the most probable bin, of equals the first
   const Ab* centres;  ///< [313] of the bins
   Ab* colors;         ///< [pixels], written
 };

@@ -22,7 +22,7 @@ class ChromaStream {
   void wait() const { CNERF_CUDA(cudaStreamSynchronize(stream_)); }
 
   void begin_step(float learning_rate, long step, std::uint32_t samples) const {
-    const ChromaStep told{{AdamSettings{}, learning_rate, step}, samples, 0};
+    const ChromaStep told{{learning_rate, step}, samples, 0};
     step_.upload(&told, 1, stream_);
   }
   /// The sum of the step's losses; waits for it.

@@ -6,23 +6,18 @@
 
 #include "src/base/check.h"
 #include "src/base/parallel.h"
-#include "src/base/rng.h"
 #include "src/engine/cuda/render_kernel.h"
 #include "src/engine/cuda/trained_parameters.h"
 #include "src/engine/heaviest_samples.h"
 #include "src/engine/initial_state.h"
+#include "src/engine/stage1_schedule.h"
 #include "src/field/cuda/channel_tiles.h"
 #include "src/field/cuda/field_backward.h"
 #include "src/field/mlp_layout.h"
-#include "src/render/composite_math.h"
 
 namespace cnerf {
 namespace {
 
-constexpr float kTrainingTransmittance = 1e-4f;  // a training ray ends below this
-constexpr int kOccupancyEvery = 16;              // steps
-constexpr int kOccupancyWarmUp = 256;            // steps during which the grid is looked at more densely
-constexpr std::uint32_t kMostRays = 1 << 16;
 constexpr std::uint32_t kRaysAtATime = 1 << 18;    // of a rendering
 constexpr std::uint32_t kPointsAtATime = 1 << 20;  // of a query
 constexpr long kMostAhead = kStepRing / 2;
@@ -80,8 +75,8 @@ struct LuminanceEngineCuda::Memory {
   DeviceBuffer<std::uint32_t> directions;  // 8 a ray
   // Occupancy.
   DeviceBuffer<float> cells;
-  DeviceBuffer<std::uint32_t> bits, render_bits;
-  DeviceBuffer<double> totals;
+  DeviceBuffer<std::uint32_t> bits;
+  DeviceBuffer<MeanDensity<double>> means;
   // Rendering and queries, made when first asked for.
   DeviceBuffer<StepState> trace_state;
   DeviceBuffer<Ray> plain_rays;
@@ -124,9 +119,9 @@ struct LuminanceEngineCuda::Memory {
   void for_each_buffer(Visit&& visit) const {
     visit(grid), visit(density), visit(luminance), visit(forward), visit(backward), visit(last_layer), visit(d_weights),
         visit(state), visit(places), visit(gradients), visit(encoded), visit(d_encoded), visit(rays), visit(directions),
-        visit(cells), visit(bits), visit(render_bits), visit(totals), visit(trace_state), visit(plain_rays),
-        visit(trace_rays), visit(trace_directions), visit(results), visit(weighted), visit(traced), visit(points),
-        visit(point_directions), visit(answers);
+        visit(cells), visit(bits), visit(means), visit(trace_state), visit(plain_rays), visit(trace_rays),
+        visit(trace_directions), visit(results), visit(weighted), visit(traced), visit(points), visit(point_directions),
+        visit(answers);
   }
 };
 
@@ -171,14 +166,14 @@ LuminanceEngineCuda::LuminanceEngineCuda(const LuminanceEngineOptions& options)
   m.gradients = {capacity_ * std::size_t(2), kSampleAdvice};
   m.encoded = {capacity_ * channels, kSampleAdvice};
   m.d_encoded = {capacity_ * std::size_t(4 * levels), kSampleAdvice};
-  m.rays = {kMostRays, kRayAdvice};
-  m.directions = {kMostRays * std::size_t(8), kRayAdvice};
+  m.rays = {std::size_t(kMostRays), kRayAdvice};
+  m.directions = {std::size_t(8 * kMostRays), kRayAdvice};
 
   m.cells = {occupancy_.densities().size(), "the occupancy grid; lower stage1.occupancy.resolution"};
   m.bits = {occupancy_.densities().size() / 32, "the occupancy grid; lower stage1.occupancy.resolution"};
-  m.totals = {2 * std::size_t(options.cascades), "the occupancy grid"};
+  m.means = {std::size_t(options.cascades), "the occupancy grid"};
 
-  counters_ = {0, std::clamp<std::int64_t>(options.samples_per_step / 256, 64, kMostRays)};
+  counters_ = {0, first_rays(options.samples_per_step)};
   state_loaded();
 }
 
@@ -217,7 +212,7 @@ void LuminanceEngineCuda::draw(cudaStream_t stream) {
                options_.seed,
                m.rays.data(),
                reinterpret_cast<DirectionCode*>(m.directions.data())};
-  draw_training_rays(draw, kMostRays, stream);
+  draw_training_rays(draw, stream);
 }
 
 void LuminanceEngineCuda::follow_rays(cudaStream_t stream) {
@@ -265,14 +260,18 @@ void LuminanceEngineCuda::update_table(cudaStream_t stream) {
   memory_->grid.update(&memory_->state.data()->adam, stream);
 }
 
-void LuminanceEngineCuda::look_at_occupancy(cudaStream_t stream) {
+OccupancyCells LuminanceEngineCuda::occupancy_cells() const {
   const Memory& m = *memory_;
-  const long update = steps_ / kOccupancyEvery;
-  const long stride = steps_ == 0 ? 1 : steps_ < kOccupancyWarmUp ? 4 : 16;
-  update_occupancy(field(), OccupancyLayout(options_.occupancy.resolution, options_.cascades), options_.occupancy,
-                   std::uint32_t(stride), std::uint32_t(update % stride),
-                   options_.seed ^ mix_bits(std::uint64_t(update)), m.cells.data(), m.totals.data(), m.bits.data(),
-                   stream);
+  return {OccupancyLayout(options_.occupancy.resolution, options_.cascades),
+          options_.occupancy.decay,
+          options_.occupancy.optical_thickness,
+          m.cells.data(),
+          m.means.data(),
+          m.bits.data()};
+}
+
+void LuminanceEngineCuda::visit_occupancy(cudaStream_t stream) {
+  update_occupancy(field(), occupancy_cells(), occupancy_update(steps_, options_.seed), stream);
   occupancy_is_old_ = true;
 }
 
@@ -289,8 +288,7 @@ void LuminanceEngineCuda::launch_step() {
   grid_backward(m.stream);
   update_table(m.stream);
   CNERF_CUDA(cudaStreamWaitEvent(m.stream, m.join, 0));
-  end_step(m.state.data(), std::uint32_t(options_.samples_per_step), capacity_, kMostRays, m.reports.on_device(),
-           m.stream);
+  end_step(m.state.data(), std::uint32_t(options_.samples_per_step), capacity_, m.reports.on_device(), m.stream);
 }
 
 void LuminanceEngineCuda::capture_step() {
@@ -374,7 +372,7 @@ StepReport LuminanceEngineCuda::step(const std::vector<TrainingView>& views, flo
   const long known = std::max(0L, steps_ - kMostAhead);
   if (steps_ >= kMostAhead) CNERF_CUDA(cudaEventSynchronize(m.done[known % kStepRing]));
   m.learning_rates[std::size_t(steps_ % kStepRing)] = learning_rate;
-  if (steps_ % kOccupancyEvery == 0) look_at_occupancy(m.stream);
+  if (updates_occupancy(steps_)) visit_occupancy(m.stream);
   if (!is_warm_) {
     launch_step();  // loads the kernels, which a capture must not do
     is_warm_ = true;
@@ -452,7 +450,7 @@ CudaStepTimes LuminanceEngineCuda::time_parts(const std::vector<TrainingView>& v
     timed(times.nets_update, [&] { update_nets(m.stream, false); });
     timed(times.grid_backward, [&] { grid_backward(m.stream); });
     timed(times.table_update, [&] { update_table(m.stream); });
-    timed(times.occupancy, [&] { look_at_occupancy(m.stream); });
+    timed(times.occupancy, [&] { visit_occupancy(m.stream); });
   }
   cudaEventDestroy(begin);
   cudaEventDestroy(end);
@@ -509,7 +507,7 @@ void LuminanceEngineCuda::render(std::span<const Ray> rays, const MarchSettings&
 }
 
 void LuminanceEngineCuda::render_view(const UnitCamera& camera, const MarchSettings& march, float min_transmittance,
-                                      std::span<RayResult> results, float least_optical_thickness) const {
+                                      std::span<RayResult> results) const {
   const std::lock_guard lock(mutex_);
   Memory& m = *memory_;
   const auto count = std::uint32_t(camera.intrinsics.width) * std::uint32_t(camera.intrinsics.height);
@@ -523,11 +521,6 @@ void LuminanceEngineCuda::render_view(const UnitCamera& camera, const MarchSetti
   trace.directions = directions;
   trace.state = m.trace_state.data();
   trace.results = m.results.data();
-  if (least_optical_thickness > 0) {
-    if (m.render_bits.size() == 0) m.render_bits = {m.bits.size(), kRayAdvice};
-    threshold_occupancy(trace.layout, least_optical_thickness, m.cells.data(), m.render_bits.data(), m.stream);
-    trace.occupied = m.render_bits.data();
-  }
   render_rays(trace, m.stream);
   if (!results.empty()) {
     CNERF_CUDA(
@@ -637,8 +630,7 @@ void LuminanceEngineCuda::exclude(const std::function<bool(Vec3f, float)>& wante
   occupancy_.exclude(wanted);
   const Memory& m = *memory_;
   m.cells.upload(occupancy_.densities().data(), occupancy_.densities().size());
-  refresh_occupancy_bits(OccupancyLayout(options_.occupancy.resolution, options_.cascades), options_.occupancy,
-                         m.cells.data(), m.totals.data(), m.bits.data(), m.stream);
+  refresh_occupancy_bits(occupancy_cells(), m.stream);
   m.wait();
 }
 
@@ -674,8 +666,7 @@ void LuminanceEngineCuda::state_loaded() {
   occupancy_.refresh_bits();
   occupancy_is_old_ = false;
   update_nets(m.stream, true);
-  refresh_occupancy_bits(OccupancyLayout(options_.occupancy.resolution, options_.cascades), options_.occupancy,
-                         m.cells.data(), m.totals.data(), m.bits.data(), m.stream);
+  refresh_occupancy_bits(occupancy_cells(), m.stream);
   m.wait();
 }
 

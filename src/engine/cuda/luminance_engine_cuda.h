@@ -55,10 +55,9 @@ class LuminanceEngineCuda final : public LuminanceEngine {
   /// Waits until every step is done; returns the last one's report.
   StepReport finish() const;
   /// Renders a view whose rays are made on the GPU.
-  /// @param results            [height, width]; may be empty, for timing
-  /// @param least_optical_thickness  of cells that are looked into; 0: as in training
+  /// @param results  [height, width]; may be empty, for timing
   void render_view(const UnitCamera& camera, const MarchSettings& march, float min_transmittance,
-                   std::span<RayResult> results, float least_optical_thickness = 0) const;
+                   std::span<RayResult> results) const;
   /// What the next step would do.
   CudaGradients gradients(const std::vector<TrainingView>& views);
   /// Times the parts of steps on their own, one after another, without training.
@@ -71,7 +70,7 @@ class LuminanceEngineCuda final : public LuminanceEngine {
   struct Views;
 
   void upload_views(const std::vector<TrainingView>& views);
-  void look_at_occupancy(cudaStream_t stream);
+  void visit_occupancy(cudaStream_t stream);
   void fetch_occupancy() const;
   void draw(cudaStream_t stream);
   void follow_rays(cudaStream_t stream);
@@ -84,6 +83,7 @@ class LuminanceEngineCuda final : public LuminanceEngine {
   void reset_graph();
 
   [[nodiscard]] FieldView field() const;
+  [[nodiscard]] OccupancyCells occupancy_cells() const;
   [[nodiscard]] TraceJob job(const MarchSettings& march, float min_transmittance) const;
   void start_trace(std::uint32_t rays) const;
   /// Uploads rays and makes a job that traces them; what the job answers with is still to be set.

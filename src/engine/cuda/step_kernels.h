@@ -1,5 +1,5 @@
 #pragma once
-/// The small kernels around a training step: its rays, its bookkeeping and the hash table's optimiser.
+/// The small kernels around a training step: its rays and its bookkeeping.
 
 #include <cuda_runtime_api.h>
 
@@ -8,7 +8,7 @@
 #include "src/engine/cuda/step_state.h"
 #include "src/engine/luminance_engine.h"
 #include "src/render/cuda/ray_record.h"
-#include "src/render/pixel_sampler.h"
+#include "src/render/observed_ray.h"
 
 namespace cnerf {
 
@@ -46,8 +46,8 @@ struct DrawJob {
   RayRecord* rays;
   DirectionCode* directions;
 };
-/// The rays of the step: the same pixels, jitter and backgrounds as the CPU draws.
-void draw_training_rays(const DrawJob& job, std::uint32_t most_rays, cudaStream_t stream);
+/// The rays of the step (observed_ray.h), at most kMostRays.
+void draw_training_rays(const DrawJob& job, cudaStream_t stream);
 /// Plain rays, to be marched from the middle of the first step.
 void prepare_rays(const Ray* rays, std::uint32_t count, RayRecord* records, DirectionCode* directions,
                   cudaStream_t stream);
@@ -55,16 +55,9 @@ void prepare_rays(const Ray* rays, std::uint32_t count, RayRecord* records, Dire
 void camera_rays(const UnitCamera& camera, std::uint32_t first, std::uint32_t count, RayRecord* records,
                  DirectionCode* directions, cudaStream_t stream);
 
-/// Adam on rows of four features whose gradient is not zero; clears the gradient and renews the halves.
-/// @param decay    see HashGridOptions
-/// @param moments  [rows, 8]: first moments, then second ones
-void update_table(const AdamStep* adam, std::uint32_t rows, float decay, float4* table, float4* d_table,
-                  float4* moments, uint2* halves, cudaStream_t stream);
-/// Only the halves.
-void round_table(std::uint32_t rows, const float4* table, uint2* halves, cudaStream_t stream);
-
-/// Reports the step and chooses how many rays fill the wanted number of samples next time, as the CPU does.
-void end_step(StepState* state, std::uint32_t wanted_samples, std::uint32_t capacity, std::uint32_t most_rays,
-              StepRecord* reports, cudaStream_t stream);
+/// Reports the step and chooses how many rays the next one takes.
+/// @param capacity  of the arrays of samples
+void end_step(StepState* state, std::uint32_t wanted_samples, std::uint32_t capacity, StepRecord* reports,
+              cudaStream_t stream);
 
 }  // namespace cnerf

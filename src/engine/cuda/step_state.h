@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "src/field/adam.h"
+#include "src/optim/adam.h"
 
 namespace cnerf {
 

@@ -3,12 +3,11 @@
 #include "src/base/cuda/device_memory.h"
 #include "src/base/cuda/launch.h"
 #include "src/base/cuda/warp.cuh"
-#include "src/color/colorspace_math.h"
+#include "src/engine/stage1_loss.h"
 #include "src/field/cuda/channel_tiles.h"
 #include "src/field/cuda/field_forward.cuh"
 #include "src/render/cuda/run_optics.cuh"
 #include "src/render/cuda/warp_march.cuh"
-#include "src/render/distortion_math.h"
 
 namespace cnerf {
 namespace {
@@ -85,22 +84,18 @@ __device__ void keep_for_training(const SampleArrays& samples, const WarpField<K
 __device__ void train_ray(const TraceJob& job, const RayRecord& record, const RayProgress& ray, std::uint32_t n_rays,
                           StepState& sums) {
   const unsigned lane = threadIdx.x % 32;
-  const float luminance = warp_sum(ray.luminance);
-  const float seen = luminance + expf(-ray.depth) * record.background;
-  const float wanted = record.target + (1.0f - record.coverage) * record.background;
-  const float error = (lightness_from_luminance(seen) - lightness_from_luminance(wanted)) / 100.0f;
+  const SeenRay seen{warp_sum(ray.luminance), expf(-ray.depth)};
+  const RayError error(seen, record.target);
   const Distortion<float> distortion = ray.distortion.total();
   if (lane == 0) {
-    const float encoded_error = srgb_from_linear(__saturatef(luminance)) - srgb_from_linear(__saturatef(record.target));
-    sums.loss += error * error + job.distortion_weight * distortion.value;
-    sums.squared_error += encoded_error * encoded_error;
+    sums.loss += ray_loss(error, distortion.value, job.distortion_weight);
+    sums.squared_error += squared_error(seen, record.target);
     sums.marched += unsigned(ray.marched);
     sums.dropped += ray.has_room ? 0u : 1u;
   }
-  const float d_seen = ray.has_room ? 2.0f * error * lightness_derivative(seen) / (100.0f * float(n_rays)) : 0.0f;
-  const float d_distortion = ray.has_room ? job.distortion_weight / float(n_rays) : 0.0f;
-  // By Euler's theorem, the derivatives of the distortion by the weights, times the weights, sum up to twice itself.
-  float distortion_behind = 2.0f * distortion.value;
+  const float scale = ray.has_room ? 1.0f / float(n_rays) : 0.0f;
+  const RayGradient gradient(error, distortion, job.distortion_weight, scale);
+  float distortion_behind = gradient.distortion_of_all();
   RunDistortion again;
   float depth = 0, composited = 0;
   for (int first = 0; first < ray.samples; first += 32) {
@@ -108,26 +103,23 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
     const bool mine = first + int(lane) < ray.samples && at < job.samples.capacity;
     const float2 stored = mine ? job.samples.gradients[at] : make_float2(0, 0);
     const RunOptics<> optics(depth, stored.x);
-    const float value = job.field.activation.value(stored.y);
-    const float weight = optics.weight();
-    const float through = composited + warp_prefix_sum(weight * value);
-    float d_log_density =
-        stored.x * d_seen * density_derivative(1.0f, optics.transmittance_after(), value, seen - through);
+    LitSample sample{1.0f, job.field.activation.value(stored.y), optics.weight(), optics.transmittance_after()};
+    sample.composited = composited + warp_prefix_sum(sample.weight * sample.luminance);
+    float d_depth = gradient.by_density(sample);
     if (job.distortion_weight > 0) {
       const float4 place = mine ? job.samples.places[at] : make_float4(0, 0, 0, 0);
       const float t = dot(Vec3f{place.x, place.y, place.z} - record.ray.origin, record.ray.direction);
       const LogInterval<float> interval(t, march_step(job.march, t));
-      const Distortion<float> before = again.add(weight, interval);
-      const float d_weight = distortion_derivative(weight, interval, before.weight, before.moment, distortion);
-      const float taken = warp_prefix_sum(weight * d_weight);
-      d_log_density += stored.x * d_distortion *
-                       density_derivative(1.0f, optics.transmittance_after(), d_weight, distortion_behind - taken);
+      const Distortion<float> before = again.add(sample.weight, interval);
+      const float slope = gradient.distortion_by_weight(sample.weight, interval, before);
+      const float taken = warp_prefix_sum(sample.weight * slope);
+      d_depth += gradient.by_density_of_distortion(sample, slope, distortion_behind - taken);
       distortion_behind -= __shfl_sync(~0u, taken, 31);
     }
-    const float d_raw = d_seen * weight * job.field.activation.derivative(stored.y);
-    if (mine) job.samples.gradients[at] = make_float2(d_raw, d_log_density);
+    const float d_raw = gradient.by_luminance(sample) * job.field.activation.derivative(stored.y);
+    if (mine) job.samples.gradients[at] = make_float2(d_raw, stored.x * d_depth);
     depth = optics.depth_at(31);
-    composited = __shfl_sync(~0u, through, 31);
+    composited = __shfl_sync(~0u, sample.composited, 31);
   }
 }
 
@@ -249,64 +241,52 @@ __global__ void __launch_bounds__(kThreads, 2)
 
 template <int KT>
 __global__ void __launch_bounds__(kThreads, 2)
-    look_at_cells(const __grid_constant__ GridLevels levels, const FieldView field, const OccupancyLayout layout,
-                  float decay, std::uint32_t stride, std::uint32_t phase, CounterRng rng, float* density) {
+    visit_cells(const __grid_constant__ GridLevels levels, const FieldView field, const OccupancyCells cells,
+                const OccupancyUpdate update) {
   extern __shared__ uint4 memory[];
   auto& shared = *reinterpret_cast<QueryShared<KT>*>(memory);
   shared.field.load(field.nets);
   const unsigned lane = threadIdx.x % 32;
   WarpField<KT>& warp = shared.field.warp[threadIdx.x / 32];
   const FieldNets<KT> nets(shared.field.weights, shared.field.last_layer);
-  const std::size_t cells = layout.cells_of_cascade() * std::size_t(layout.cascades);
-  const std::size_t count = (cells - phase + stride - 1) / stride;
+  const std::size_t count = update.count(cells.count());
   for (std::size_t first = (std::size_t(blockIdx.x) * kWarps + threadIdx.x / 32) * 32; first < count;
        first += std::size_t(gridDim.x) * kThreads) {
-    const std::size_t cell = phase + min(first + lane, count - 1) * stride;
-    const float remembered = density[cell];
+    const std::size_t cell = update.cell(min(first + lane, count - 1));
+    const float remembered = cells.density[cell];
     if (__all_sync(~0u, remembered == kExcludedCell)) continue;
-    const Vec3f within = {rng.uniform(3 * cell), rng.uniform(3 * cell + 1), rng.uniform(3 * cell + 2)};
-    warp.encode(levels, field.table, in_box(layout.point_in(cell, within)), lane);
+    warp.encode(levels, field.table, in_box(cells.layout.point_in(cell, update.place_in(cell))), lane);
     __syncwarp();
     typename FieldNets<KT>::Geometry unused;
     const float sigma = density_from_raw(nets.density(warp, unused), field.density_scale);
-    if (first + lane < count && remembered != kExcludedCell) {
-      density[cell] = fmaxf(remembered == kNeverSeenCell ? 0.0f : remembered * decay, sigma);
-    }
+    if (first + lane < count) cells.density[cell] = remembered_density(remembered, sigma, cells.decay);
     __syncwarp();
   }
 }
 
-/// Sum and number of the densities that are not excluded, a cascade a blockIdx.y.
-__global__ void sum_densities(std::size_t cells, const float* density, double* totals) {
-  const float* of_cascade = density + blockIdx.y * cells;
-  float sum = 0, included = 0;
-  for (std::size_t i = blockIdx.x * std::size_t(blockDim.x) + threadIdx.x; i < cells;
+/// Adds up the densities of a cascade, one per blockIdx.y.
+__global__ void sum_densities(const OccupancyCells cells) {
+  const std::size_t of_cascade = cells.layout.cells_of_cascade();
+  const float* density = cells.density + blockIdx.y * of_cascade;
+  MeanDensity<float> mean;
+  for (std::size_t i = blockIdx.x * std::size_t(blockDim.x) + threadIdx.x; i < of_cascade;
        i += std::size_t(gridDim.x) * blockDim.x) {
-    const float d = of_cascade[i];
-    if (d == kExcludedCell) continue;
-    sum += fminf(d, 1e4f);
-    included += 1;
+    mean.add(density[i]);
   }
-  sum = warp_sum(sum);
-  included = warp_sum(included);
+  const float sum = warp_sum(mean.sum), included = warp_sum(mean.cells);
   if (threadIdx.x % 32 != 0) return;
-  atomicAdd(&totals[2 * blockIdx.y], double(sum));
-  atomicAdd(&totals[2 * blockIdx.y + 1], double(included));
+  atomicAdd(&cells.means[blockIdx.y].sum, double(sum));
+  atomicAdd(&cells.means[blockIdx.y].cells, double(included));
 }
 
-/// Early in training nothing reaches the threshold; then cells denser than the mean are what is worth sampling.
-/// @param totals  null: the threshold alone counts
-__global__ void set_bits(OccupancyLayout layout, float optical_thickness, const float* density, const double* totals,
-                         std::uint32_t* bits) {
+__global__ void set_bits(const OccupancyCells cells) {
   const std::size_t cell = blockIdx.x * std::size_t(blockDim.x) + threadIdx.x;  // cells are a multiple of 32
-  if (cell >= layout.cells_of_cascade() * std::size_t(layout.cascades)) return;
-  const int cascade = int(cell / layout.cells_of_cascade());
-  float threshold = optical_thickness / layout.cell_side(cascade);
-  if (totals != nullptr) {
-    threshold = fminf(threshold, float(totals[2 * cascade] / (1.0 + totals[2 * cascade + 1])));
-  }
-  const unsigned word = __ballot_sync(~0u, density[cell] > threshold);
-  if (threadIdx.x % 32 == 0) bits[cell / 32] = word;
+  if (cell >= cells.count()) return;
+  const int cascade = int(cell / cells.layout.cells_of_cascade());
+  const float threshold =
+      occupancy_threshold(cells.optical_thickness, cells.layout.cell_side(cascade), cells.means[cascade].value());
+  const unsigned word = __ballot_sync(~0u, cells.density[cell] > threshold);
+  if (threadIdx.x % 32 == 0) cells.bits[cell / 32] = word;
 }
 
 GridLevels levels_of(const FieldView& field) {
@@ -346,34 +326,23 @@ void query_field(const FieldView& field, const Vec3f* positions, const Vec3f* di
   });
 }
 
-void update_occupancy(const FieldView& field, const OccupancyLayout& layout, const OccupancyOptions& options,
-                      std::uint32_t stride, std::uint32_t phase, std::uint64_t jitter_seed, float* density,
-                      double* totals, std::uint32_t* bits, cudaStream_t stream) {
+void update_occupancy(const FieldView& field, const OccupancyCells& cells, const OccupancyUpdate& update,
+                      cudaStream_t stream) {
   with_channel_tiles(field.n_levels, [&](auto tiles) {
     constexpr int KT = decltype(tiles)::value;
     using Shared = QueryShared<KT>;
-    const unsigned blocks = resident_blocks<look_at_cells<KT>>(kThreads, sizeof(Shared));
-    look_at_cells<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field, layout, options.decay,
-                                                                    stride, phase, occupancy_rng(jitter_seed), density);
+    const unsigned blocks = resident_blocks<visit_cells<KT>>(kThreads, sizeof(Shared));
+    visit_cells<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field, cells, update);
     CNERF_CUDA(cudaGetLastError());
   });
-  refresh_occupancy_bits(layout, options, density, totals, bits, stream);
+  refresh_occupancy_bits(cells, stream);
 }
 
-void threshold_occupancy(const OccupancyLayout& layout, float optical_thickness, const float* density,
-                         std::uint32_t* bits, cudaStream_t stream) {
-  const unsigned blocks = unsigned((layout.cells_of_cascade() * std::size_t(layout.cascades) + 255) / 256);
-  set_bits<<<blocks, 256, 0, stream>>>(layout, optical_thickness, density, nullptr, bits);
-  CNERF_CUDA(cudaGetLastError());
-}
-
-void refresh_occupancy_bits(const OccupancyLayout& layout, const OccupancyOptions& options, const float* density,
-                            double* totals, std::uint32_t* bits, cudaStream_t stream) {
-  const std::size_t cells = layout.cells_of_cascade();
-  CNERF_CUDA(cudaMemsetAsync(totals, 0, 2 * sizeof(double) * std::size_t(layout.cascades), stream));
-  sum_densities<<<dim3(128, unsigned(layout.cascades)), 256, 0, stream>>>(cells, density, totals);
-  const unsigned blocks = unsigned((cells * std::size_t(layout.cascades) + 255) / 256);
-  set_bits<<<blocks, 256, 0, stream>>>(layout, options.optical_thickness, density, totals, bits);
+void refresh_occupancy_bits(const OccupancyCells& cells, cudaStream_t stream) {
+  const auto cascades = std::size_t(cells.layout.cascades);
+  CNERF_CUDA(cudaMemsetAsync(cells.means, 0, cascades * sizeof(*cells.means), stream));
+  sum_densities<<<dim3(128, unsigned(cascades)), 256, 0, stream>>>(cells);
+  set_bits<<<unsigned((cells.count() + 255) / 256), 256, 0, stream>>>(cells);
   CNERF_CUDA(cudaGetLastError());
 }
 

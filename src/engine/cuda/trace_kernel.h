@@ -13,7 +13,7 @@
 #include "src/field/luminance_activation.h"
 #include "src/render/cuda/ray_record.h"
 #include "src/render/march.h"
-#include "src/render/occupancy_layout.h"
+#include "src/render/occupancy_math.h"
 
 namespace cnerf {
 
@@ -71,16 +71,20 @@ void trace_to_samples(const TraceJob& job, cudaStream_t stream);
 void query_field(const FieldView& field, const Vec3f* positions, const Vec3f* directions, std::uint32_t count,
                  float* sigma, float* luminance, cudaStream_t stream);
 
-/// Looks at every `stride`-th cell from `phase` on, as OccupancyGrid::update does, then renews the bits.
-/// @param totals  [2 cascades] scratch
-void update_occupancy(const FieldView& field, const OccupancyLayout& layout, const OccupancyOptions& options,
-                      std::uint32_t stride, std::uint32_t phase, std::uint64_t jitter_seed, float* density,
-                      double* totals, std::uint32_t* bits, cudaStream_t stream);
-/// Bits of the cells of at least this optical thickness, for rendering.
-void threshold_occupancy(const OccupancyLayout& layout, float optical_thickness, const float* density,
-                         std::uint32_t* bits, cudaStream_t stream);
+/// The occupancy grid in device memory.
+struct OccupancyCells {
+  OccupancyLayout layout;
+  float decay = 0, optical_thickness = 0;  ///< see OccupancyOptions
+  float* density = nullptr;                ///< [cascades, R, R, R]
+  MeanDensity<double>* means = nullptr;    ///< [cascades], scratch
+  std::uint32_t* bits = nullptr;           ///< one per cell
+
+  [[nodiscard]] CNERF_HD std::size_t count() const { return layout.cells_of_cascade() * std::size_t(layout.cascades); }
+};
+/// As OccupancyGrid::update: visits cells, then renews the bits.
+void update_occupancy(const FieldView& field, const OccupancyCells& cells, const OccupancyUpdate& update,
+                      cudaStream_t stream);
 /// Only the bits.
-void refresh_occupancy_bits(const OccupancyLayout& layout, const OccupancyOptions& options, const float* density,
-                            double* totals, std::uint32_t* bits, cudaStream_t stream);
+void refresh_occupancy_bits(const OccupancyCells& cells, cudaStream_t stream);
 
 }  // namespace cnerf

@@ -1,6 +1,5 @@
 #include "src/engine/cuda/trained_parameters.h"
 
-#include "src/engine/cuda/step_kernels.h"
 #include "src/engine/initial_state.h"
 
 namespace cnerf {
@@ -36,9 +35,12 @@ void TrainedGrid::backward(const float4* places, SampleCount samples, const void
 }
 
 void TrainedGrid::update(const AdamStep* adam, cudaStream_t stream) const {
-  update_table(adam, rows(), decay_, reinterpret_cast<float4*>(table_.data()),
-               reinterpret_cast<float4*>(d_table_.data()), reinterpret_cast<float4*>(moments_.data()),
-               reinterpret_cast<uint2*>(halves_.data()), stream);
+  update_rows(table_rows(), adam, decay_, stream);
+}
+
+TableRowsCuda TrainedGrid::table_rows() const {
+  return {reinterpret_cast<float4*>(table_.data()), reinterpret_cast<float4*>(d_table_.data()),
+          reinterpret_cast<float4*>(moments_.data()), reinterpret_cast<uint2*>(halves_.data()), rows()};
 }
 
 void TrainedGrid::append_state(const std::string& prefix, std::vector<StatePiece>& state) {
@@ -49,7 +51,7 @@ void TrainedGrid::append_state(const std::string& prefix, std::vector<StatePiece
 void TrainedGrid::upload(cudaStream_t stream) const {
   table_.upload();
   moments_.upload();
-  round_table(rows(), reinterpret_cast<const float4*>(table_.data()), reinterpret_cast<uint2*>(halves_.data()), stream);
+  round_rows(table_rows(), stream);
 }
 
 }  // namespace cnerf

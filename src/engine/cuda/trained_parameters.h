@@ -10,6 +10,7 @@
 #include "src/base/cuda/device_memory.h"
 #include "src/engine/state.h"
 #include "src/field/cuda/dense_layer.h"
+#include "src/optim/cuda/row_adam_cuda.h"
 
 namespace cnerf {
 
@@ -77,6 +78,7 @@ class TrainedGrid {
 
  private:
   [[nodiscard]] std::uint32_t rows() const { return total_rows(levels_); }
+  [[nodiscard]] TableRowsCuda table_rows() const;
 
   std::vector<GridLevel> levels_;
   float decay_ = 0;

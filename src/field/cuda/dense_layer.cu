@@ -56,7 +56,7 @@ __global__ void update(const __grid_constant__ UpdateJob job) {
   if (job.d_weights != nullptr) {
     float d = 0;
     for (int slice = 0; slice < kSlices; ++slice) d += sums[slice][threadIdx.x];
-    job.adam->apply(AdamSettings{}, d, trained.first_moments[at], trained.second_moments[at], value);
+    job.adam->apply(d, trained.first_moments[at], trained.second_moments[at], value);
     trained.values[at] = value;
   }
   pack(*layer, out, in, value);

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "src/base/host_device.h"
-#include "src/field/adam.h"
+#include "src/optim/adam.h"
 
 namespace cnerf {
 

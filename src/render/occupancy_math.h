@@ -1,5 +1,6 @@
 #pragma once
-/// Where a point lies in the occupancy grid: the arithmetic of OccupancyGrid, shared with kernels.
+/// The rules of the occupancy grid, once for every device: where a point lies, which cells an update visits, what a
+/// cell remembers, and from which density on it counts as occupied.
 
 #include <cmath>
 #include <cstdint>
@@ -13,11 +14,48 @@ namespace cnerf {
 inline constexpr float kExcludedCell = -1.0f;  ///< density of a cell that is empty for good
 inline constexpr float kNeverSeenCell = 1e9f;  ///< before its first look, a cell counts as occupied
 
-inline constexpr std::uint64_t kOccupancyStream = 204;
+/// Which cells one update visits: every `stride`-th, from cell `phase` on.
+struct OccupancyUpdate {
+  std::size_t stride = 1, phase = 0;
+  std::uint64_t jitter_seed = 0;  ///< selects the points inside the cells
 
-/// Where in a cell an update looks: at 3 cell .. 3 cell + 2.
-[[nodiscard]] CNERF_HD inline CounterRng occupancy_rng(std::uint64_t jitter_seed) {
-  return {jitter_seed, kOccupancyStream};
+  /// Cells that are visited, of `cells`.
+  [[nodiscard]] CNERF_HD std::size_t count(std::size_t cells) const { return (cells - phase + stride - 1) / stride; }
+  [[nodiscard]] CNERF_HD std::size_t cell(std::size_t index) const { return phase + index * stride; }
+  /// Where the update looks inside a cell, in [0, 1)^3 of it.
+  [[nodiscard]] CNERF_HD Vec3f place_in(std::size_t cell) const {
+    constexpr std::uint64_t kStream = 204;
+    const CounterRng rng(jitter_seed, kStream);
+    return {rng.uniform(3 * cell), rng.uniform(3 * cell + 1), rng.uniform(3 * cell + 2)};
+  }
+};
+
+/// A cell's density after a visit that found `sigma`: the larger of it and what is left of the old one.
+[[nodiscard]] CNERF_HD inline float remembered_density(float before, float sigma, float decay) {
+  if (before == kExcludedCell) return before;
+  const float left = before == kNeverSeenCell ? 0.0f : before * decay;
+  return left < sigma ? sigma : left;
+}
+
+/// Mean density of a cascade's cells that are not excluded.
+template <typename Real>
+struct MeanDensity {
+  Real sum = 0, cells = 0;
+
+  CNERF_HD void add(float density) {
+    if (density == kExcludedCell) return;
+    const float most = 1e4f;  // a single solid cell is not to decide about all others
+    sum += density < most ? density : most;
+    cells += 1;
+  }
+  [[nodiscard]] CNERF_HD float value() const { return float(sum / (1 + cells)); }
+};
+
+/// Density above which a cell is occupied. Early in training nothing reaches the optical thickness asked for; then
+/// cells denser than the mean are what is worth sampling.
+[[nodiscard]] CNERF_HD inline float occupancy_threshold(float optical_thickness, float cell_side, float mean_density) {
+  const float dense = optical_thickness / cell_side;
+  return mean_density < dense ? mean_density : dense;
 }
 
 struct OccupancyLayout {

@@ -1,0 +1,28 @@
+#pragma once
+/// Adam on the rows of a hash grid's table, on the GPU. Kernels gather rows rounded to halves.
+
+#include <cuda_runtime_api.h>
+
+#include <cstdint>
+
+#include "src/optim/adam.h"
+
+namespace cnerf {
+
+/// A table in device memory with its gradient and moments.
+struct TableRowsCuda {
+  float4* values = nullptr;    ///< [count]
+  float4* gradient = nullptr;  ///< [count]
+  float4* moments = nullptr;   ///< [count, 2]: first moments, then second ones
+  uint2* halves = nullptr;     ///< [count], the values rounded to four halves
+  std::uint32_t count = 0;
+};
+
+/// Adam on rows whose gradient is not zero; clears the gradient and renews the halves.
+/// @param adam   device memory
+/// @param decay  weight decay, in units of the learning rate
+void update_rows(const TableRowsCuda& rows, const AdamStep* adam, float decay, cudaStream_t stream);
+/// Only the halves.
+void round_rows(const TableRowsCuda& rows, cudaStream_t stream);
+
+}  // namespace cnerf
