@@ -8,6 +8,7 @@
 
 #include "src/app/path_file.h"
 #include "src/base/error.h"
+#include "src/base/statistics.h"
 
 namespace cnerf {
 namespace {
@@ -32,11 +33,6 @@ Vec3d mean_over(const Capture& capture, Of of) {
   Vec3d sum{};
   for (const View& view : capture.views) sum += of(view);
   return sum / double(capture.views.size());
-}
-
-double quantile(std::vector<double> values, double share) {
-  std::ranges::sort(values);
-  return values[std::size_t(share * double(values.size() - 1))];
 }
 
 /// Distance ahead of the cameras at which most of the scene lies.

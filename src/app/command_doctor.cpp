@@ -13,7 +13,7 @@
 #include "src/app/version.h"
 #include "src/base/cpu_features.h"
 #include "src/base/parallel.h"
-#include "src/base/program.h"
+#include "src/base/process.h"
 #include "src/config/config.h"
 #include "src/engine/engines.h"
 #include "viewer/server/page_folder.h"

@@ -3,17 +3,12 @@
 #include <algorithm>
 
 #include "src/base/parallel.h"
+#include "src/base/text.h"
 #include "src/config/toml_binding.h"
 #include "src/engine/select_engine.h"
 
 namespace cnerf {
 namespace {
-
-std::string joined(const std::vector<std::string>& words, const std::string& separator) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : separator) + word;
-  return text;
-}
 
 /// What stands right of `name = ` in TOML.
 std::string default_text(const Field& field) {

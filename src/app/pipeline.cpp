@@ -8,17 +8,12 @@
 #include "src/app/version.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/text.h"
 #include "src/capture/load_capture.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
 namespace {
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
-  return text;
-}
 
 bool holds_something(const fs::path& folder) {
   std::error_code failure;

@@ -3,8 +3,6 @@
 #include <csignal>
 #include <cstdlib>
 
-#include "src/base/interruption.h"
-
 namespace cnerf {
 namespace {
 

@@ -1,5 +1,5 @@
 #pragma once
-/// What long work tells the outside while it runs. The work only calls `report`; how it looks is the caller's matter.
+/// Progress of long work, and the request to end it.
 
 #include <functional>
 #include <string>
@@ -14,11 +14,13 @@ struct Progress {
   std::vector<std::pair<std::string, double>> figures;  ///< "psnr" -> 27.1, "rays/s" -> 2.1e5
 };
 
-/// Watches long work. May throw Interrupted to stop it at a safe point; the work saves its state first if it can.
+/// Receives the progress. May throw Interrupted to stop the work at a safe point; it saves its state first if it can.
 using ProgressSink = std::function<void(const Progress&)>;
 
 /// True once the user pressed Ctrl-C. Long loops ask between steps, save and throw Interrupted.
 [[nodiscard]] bool interruption_requested();
+/// The same from within the program.
+void request_interruption();
 /// Installs the SIGINT and SIGTERM handlers behind `interruption_requested`; a second signal ends the program at once.
 void install_interruption_handler();
 

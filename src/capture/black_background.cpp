@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "src/base/parallel.h"
+#include "src/base/statistics.h"
 #include "src/color/colorspace_math.h"
 
 namespace cnerf {
@@ -47,12 +48,6 @@ cv::Mat1b rim_of(cv::Size size) {
   return rim;
 }
 
-float quantile(std::vector<float> values, double share) {
-  const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 /// 255 where the view shows nothing; no value if it does not stand before black.
 std::optional<cv::Mat1b> empty_part(const MonoImage& image) {
   if (!image.alpha.empty() || image.width < 8 * kRim || image.height < 8 * kRim) return std::nullopt;
@@ -65,7 +60,8 @@ std::optional<cv::Mat1b> empty_part(const MonoImage& image) {
     }
   }
   const float level = quantile(at_rim, 0.5);
-  if (level > kBlackest || level > kAgainstLight * quantile({codes.begin(), codes.end()}, 0.99)) return std::nullopt;
+  if (level > kBlackest || level > kAgainstLight * quantile(std::vector(codes.begin(), codes.end()), 0.99))
+    return std::nullopt;
   // The darker half of the rim lies below its median: its spread is that of the grain.
   const double grain = 1.5 * (level - quantile(at_rim, 0.16));
   const double limit = level + std::max(kLeastReach, kGrainReach * grain);

@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "src/base/error.h"
+#include "src/base/process.h"
 #include "src/color/ab_bins.h"
-#include "src/colorizer/child_process.h"
 #include "src/colorizer/kinds.h"
 
 namespace cnerf {
@@ -31,13 +31,6 @@ struct AnswerHeader {
 };
 static_assert(sizeof(QuestionHeader) == 20 && sizeof(AnswerHeader) == 24);
 
-/// A text as one word of the shell.
-std::string quoted(const std::string& text) {
-  std::string word = "'";
-  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return word + "'";
-}
-
 class ExecColorizer final : public Colorizer {
  public:
   ExecColorizer(std::string command, double timeout_seconds)
@@ -49,8 +42,8 @@ class ExecColorizer final : public Colorizer {
     for (int attempt = 1;; ++attempt) {
       if (!child_) child_.emplace(command_);
       ChromaBatch answer;
-      const ChildTrouble trouble = ask(patches, answer);
-      if (trouble == ChildTrouble::kNone) {
+      const PipeTrouble trouble = ask(patches, answer);
+      if (trouble == PipeTrouble::kNone) {
         check_or_stop(patches, answer);
         return answer;
       }
@@ -63,19 +56,19 @@ class ExecColorizer final : public Colorizer {
   [[nodiscard]] std::string name() const override { return "exec:" + command_; }
 
  private:
-  ChildTrouble ask(const LightnessBatch& patches, ChromaBatch& answer) {
+  PipeTrouble ask(const LightnessBatch& patches, ChromaBatch& answer) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::milliseconds>(
                                                                  std::chrono::duration<double>(timeout_seconds_));
     const QuestionHeader question{kQuestionMagic, kVersion, std::uint32_t(patches.batch), std::uint32_t(patches.height),
                                   std::uint32_t(patches.width)};
-    ChildTrouble trouble = child_->write_all(std::as_bytes(std::span(&question, 1)), deadline);
-    if (trouble != ChildTrouble::kNone) return trouble;
+    PipeTrouble trouble = child_->write_all(std::as_bytes(std::span(&question, 1)), deadline);
+    if (trouble != PipeTrouble::kNone) return trouble;
     trouble = child_->write_all(std::as_bytes(std::span(patches.lightness)), deadline);
-    if (trouble != ChildTrouble::kNone) return trouble;
+    if (trouble != PipeTrouble::kNone) return trouble;
 
     AnswerHeader header{};
     trouble = child_->read_all(std::as_writable_bytes(std::span(&header, 1)), deadline);
-    if (trouble != ChildTrouble::kNone) return trouble;
+    if (trouble != PipeTrouble::kNone) return trouble;
     check_header(patches, header);
     answer = {patches.batch, patches.height, patches.width, {}, {}};
     std::vector<float>& values = header.kind == kLogitsKind ? answer.logits : answer.ab;
@@ -118,29 +111,29 @@ class ExecColorizer final : public Colorizer {
   /// A program that breaks the protocol is not asked again.
   [[noreturn]] void stop(const std::string& problem) {
     const std::string words = child_->last_words();
-    child_->kill_group();
+    child_->process().kill_group();
     child_.reset();
     throw ColorizerError(name() + ": " + problem + words);
   }
 
-  std::string describe(ChildTrouble trouble) {
+  std::string describe(PipeTrouble trouble) {
     std::string problem;
-    if (trouble == ChildTrouble::kTimedOut) {
+    if (trouble == PipeTrouble::kTimedOut) {
       std::array<char, 32> seconds{};
       std::snprintf(seconds.data(), seconds.size(), "%g", timeout_seconds_);
       problem = std::string("gave no complete answer within ") + seconds.data() + " s and was killed";
-      child_->kill_group();
+      child_->process().kill_group();
     } else {
-      const std::string fate = child_->fate();
+      const std::string fate = child_->process().fate();
       problem = "ended before it had answered completely: it " + fate;
-      child_->kill_group();
+      child_->process().kill_group();
     }
     return name() + ": " + problem + child_->last_words();
   }
 
   std::string command_;
   double timeout_seconds_;
-  std::optional<ChildProcess> child_;
+  std::optional<PipedProcess> child_;
 };
 
 }  // namespace
@@ -152,7 +145,7 @@ bool takes_prompt(const std::string& command) {
 std::unique_ptr<Colorizer> make_exec_colorizer(const std::string& argument, const ColorizerOptions& options) {
   std::string command = argument;
   if (const auto place = command.find(kPromptPlace); place != std::string::npos) {
-    command.replace(place, kPromptPlace.size(), quoted(options.prompt));
+    command.replace(place, kPromptPlace.size(), shell_word(options.prompt));
   }
   return std::make_unique<ExecColorizer>(command, options.timeout_seconds);
 }

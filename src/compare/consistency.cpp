@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "src/base/check.h"
+#include "src/base/statistics.h"
 #include "src/color/ab_bins.h"
 #include "src/color/colorspace_math.h"
 
@@ -105,9 +106,7 @@ Consistency consistency(std::span<const SeenView> sequence, std::size_t step) {
   }
   result.mean = std::accumulate(all.begin(), all.end(), 0.0) / double(all.size());
   result.chroma = chroma / double(all.size());
-  const auto at95 = all.begin() + std::ptrdiff_t(0.95 * double(all.size() - 1));
-  std::nth_element(all.begin(), at95, all.end());
-  result.p95 = *at95;
+  result.p95 = quantile(std::move(all), 0.95);
   return result;
 }
 

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "src/base/error.h"
+#include "src/base/text.h"
 
 namespace cnerf {
 namespace {
@@ -32,12 +33,6 @@ std::string shortest_text(Number value) {
 
 std::string text_of(const Range& range) {
   return "[" + shortest_text(range.min) + ", " + shortest_text(range.max) + "]";
-}
-
-std::string text_of(const std::vector<std::string>& values) {
-  std::string text;
-  for (const std::string& value : values) text += (text.empty() ? "" : ", ") + value;
-  return text;
 }
 
 std::string text_of(const toml::node& node) {
@@ -84,7 +79,7 @@ void assign(const Field& field, std::string& target, const toml::node& node, con
   const auto value = node.value_exact<std::string>();
   const bool allowed = value && (field.choices.empty() || std::ranges::count(field.choices, *value) > 0);
   if (!allowed) {
-    const std::string expected = field.choices.empty() ? "a string" : "one of " + text_of(field.choices);
+    const std::string expected = field.choices.empty() ? "a string" : "one of " + joined(field.choices, ", ");
     origin.refuse("expected " + expected + ", got " + text_of(node));
   }
   target = *value;

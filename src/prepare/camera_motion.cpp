@@ -6,6 +6,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "src/base/check.h"
+#include "src/base/statistics.h"
 
 namespace cnerf {
 namespace {
@@ -62,12 +63,6 @@ std::vector<double> errors_of(const Turn& turn, const std::vector<cv::Point2f>& 
 
 double share_below(const std::vector<double>& errors, double limit) {
   return double(std::ranges::count_if(errors, [&](double e) { return e < limit; })) / double(errors.size());
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// At most `count` of them, evenly picked.

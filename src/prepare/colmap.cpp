@@ -13,7 +13,8 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/parallel.h"
-#include "src/base/program.h"
+#include "src/base/process.h"
+#include "src/base/statistics.h"
 #include "src/base/usage.h"
 #include "src/capture/image_io.h"
 #include "src/capture/listing.h"
@@ -169,10 +170,8 @@ class Steps {
 
 /// The gain that brings the brightest thousandth of a picture to white; 1 where it is there nearly.
 float display_gain(const LinearImage& image) {
-  std::vector<float> values = image.values;
-  const auto at = values.begin() + std::ptrdiff_t(double(values.size() - 1) * 0.999);
-  std::nth_element(values.begin(), at, values.end());
-  return *at > 0 && *at < 0.5f ? 1 / *at : 1.0f;
+  const float brightest = quantile(image.values, 0.999);
+  return brightest > 0 && brightest < 0.5f ? 1 / brightest : 1.0f;
 }
 
 /// COLMAP looks at 8-bit copies of one brightness: it cannot read deep grey images, and sees little in dark ones.

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/parallel.h"
+#include "src/base/statistics.h"
 #include "src/capture/byte_reader.h"
 #include "src/capture/image_io.h"
 
@@ -20,13 +21,6 @@ constexpr double kHeld = 1e-9;         ///< of a view's weight, pulling its loga
 constexpr double kExact = 0.01;        ///< difference of logarithms below which all sightings count fully
 constexpr double kSettled = 1e-6;      ///< largest change of a logarithm in a round
 constexpr float kDarkest = 0.004f, kLightest = 0.9f;  ///< luminance between noise and clipping
-
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
 
 /// Mean light around pixel positions of an image: 5 x 5 pixels, so that grain averages out.
 cv::Mat1f smoothed(const fs::path& file) {

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/check.h"
+#include "src/base/statistics.h"
 #include "src/color/colorspace_math.h"
 #include "src/prepare/grey_image.h"
 
@@ -17,13 +18,6 @@ constexpr double kCutLikeness = 0.6, kCutDrop = 0.25;
 constexpr double kDuplicateShare = 1.0 / 6, kDuplicateCodes = 1.5;
 constexpr double kBorderChange = 3, kBorderSpread = 4;  ///< standard deviations in time and along the line, codes
 constexpr int kWindow = 4;                              ///< frames on each side of running medians and means
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double mean_linear(const cv::Mat1b& picture) {
   static const std::array<double, 256> linear = [] {
@@ -81,7 +75,7 @@ std::vector<Shot> find_shots(const std::vector<FrameFacts>& frames) {
   const auto likeness = [&](int i) { return frames[std::size_t(std::clamp(i, 1, std::max(1, count - 1)))].likeness; };
   for (int i = 1; i <= count; ++i) {
     if (i < count) {
-      const double around = median({likeness(i - 3), likeness(i - 2), likeness(i + 2), likeness(i + 3)});
+      const double around = median(std::vector{likeness(i - 3), likeness(i - 2), likeness(i + 2), likeness(i + 3)});
       const double here = frames[std::size_t(i)].likeness;
       if (here > kCutLikeness || here > around - kCutDrop) continue;
     }
@@ -95,7 +89,7 @@ std::vector<bool> find_duplicates(const std::vector<FrameFacts>& frames, const S
   std::vector<bool> out(frames.size());
   std::vector<double> changes;
   for (int i = shot.begin + 1; i < shot.end; ++i) changes.push_back(frames[std::size_t(i)].change);
-  const double usual = median(changes);
+  const double usual = changes.empty() ? 0 : median(changes);
   for (int i = shot.begin + 1; i < shot.end; ++i) {
     const double change = frames[std::size_t(i)].change;
     out[std::size_t(i)] = change < kDuplicateShare * usual && change < kDuplicateCodes;
@@ -210,7 +204,7 @@ FilmMarks film_marks(const std::vector<FrameFacts>& frames, const Shot& shot) {
     shaken += off.dot(off);
   }
   out.weave = counted > 0 ? std::sqrt(shaken / counted) : 0;
-  out.grain = median(grain);
+  out.grain = grain.empty() ? 0 : median(grain);
   out.scratched = shot.size() > 0 ? double(scratched) / shot.size() : 0;
   return out;
 }

@@ -10,6 +10,7 @@
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/rng.h"
+#include "src/base/statistics.h"
 #include "src/capture/focus.h"
 
 namespace cnerf {
@@ -25,19 +26,6 @@ constexpr double kGroundWithin = 30 * kDegree;  ///< of a ground's normal and up
 constexpr double kGroundThickness = 0.02;       ///< of the points' median distance from their middle
 constexpr double kGroundShare = 0.12, kBelowGround = 0.05;
 constexpr double kForwardWithin = 30 * kDegree;  ///< of every optical axis and their mean, in forward-facing captures
-
-double median(std::vector<double> values) {
-  CNERF_CHECK(!values.empty(), "a median of nothing");
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-double percentile(std::vector<double> values, double share) {
-  const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 Vec3d median_of(const std::vector<Vec3d>& points) {
   Vec3d out;
@@ -164,7 +152,7 @@ Vec3d place_by_points(const SeenAt& seen, const std::vector<Vec3d>& points) {
                     seen.x, seen.y, view.name, reach, depths.size()));
   }
   const Vec3d direction = ray_direction(view.intrinsics, {seen.x, seen.y});
-  return view.world_from_camera.point(direction * (percentile(std::move(depths), 0.3) / direction.z));
+  return view.world_from_camera.point(direction * (quantile(std::move(depths), 0.3) / direction.z));
 }
 
 Vec3d place_of(const std::vector<SeenAt>& sightings, const std::vector<Vec3d>& points) {
@@ -362,12 +350,12 @@ std::optional<SubjectBox> find_subject(const std::vector<View>& views, const std
     if (seen >= enough && length(point - subject) < reach) inside.push_back(point);
   }
   if (inside.size() < 20) return std::nullopt;
-  out.near = 0.9 * percentile(depths, 0.001);
-  out.far = 1.1 * percentile(depths, 0.999);
+  out.near = 0.9 * quantile(depths, 0.001);
+  out.far = 1.1 * quantile(depths, 0.999);
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const Vec3d& point : inside) values.push_back(point[axis]);
-    const double low = percentile(values, 0.01), high = percentile(values, 0.99);
+    const double low = quantile(values, 0.01), high = quantile(values, 0.99);
     const double pad = 0.05 * (high - low) + 1e-9;
     out.box.min[axis] = low - pad;
     out.box.max[axis] = high + pad;

@@ -11,6 +11,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "src/base/error.h"
+#include "src/base/statistics.h"
 #include "src/capture/image_io.h"
 #include "src/picture/encode.h"
 #include "src/prepare/camera_motion.h"
@@ -135,9 +136,7 @@ class MotionObserver {
   [[nodiscard]] double moved() const {
     std::vector<double> moves;
     for (std::size_t i = 0; i < here_.size(); ++i) moves.push_back(cv::norm(here_[i] - at_start_[i]));
-    const auto middle = moves.begin() + std::ptrdiff_t(moves.size() / 2);
-    std::nth_element(moves.begin(), middle, moves.end());
-    return *middle / std::hypot(before_.cols, before_.rows);
+    return median(std::move(moves)) / std::hypot(before_.cols, before_.rows);
   }
   void judge() {
     if (here_.size() < kFewestTracks || here_.size() != at_start_.size() || followed_ == 0) return;
@@ -203,10 +202,7 @@ ShotReport report_of(const Survey& clip, const Shot& range) {
     }
   }
   out.parallax = out.judged > 0 ? double(parallax) / out.judged : 0;
-  if (!moves.empty()) {
-    std::nth_element(moves.begin(), moves.begin() + std::ptrdiff_t(moves.size() / 2), moves.end());
-    out.moved = moves[moves.size() / 2];
-  }
+  if (!moves.empty()) out.moved = median(std::move(moves));
   return out;
 }
 

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/error.h"
+#include "src/base/statistics.h"
 #include "src/color/colorspace_math.h"
 #include "src/train/scene.h"
 #include "src/train/stage1.h"
@@ -62,13 +63,10 @@ class PartOfMotion final : public Observer {
   double from_, to_;
 };
 
-/// What a share of all pixels stays below.
-double percentile(const std::vector<cv::Mat1f>& images, double share) {
+std::vector<float> values_of(const std::vector<cv::Mat1f>& images) {
   std::vector<float> values;
   for (const cv::Mat1f& image : images) values.insert(values.end(), image.begin(), image.end());
-  const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
+  return values;
 }
 
 /// Parts above the lower threshold that are large enough and reach the upper one somewhere, with a margin.
@@ -116,7 +114,8 @@ std::vector<MotionMask> find_motion(const Capture& capture, const MotionMaskOpti
     comparison.report_progress({"", double(differences.size()) / double(capture.views.size()), {}});
   }
   fs::remove(snapshot);
-  const double threshold = std::max(options.motion_difference, kUsualFactor * percentile(differences, kUsualShare));
+  const double threshold =
+      std::max(options.motion_difference, kUsualFactor * double(quantile(values_of(differences), kUsualShare)));
   std::vector<MotionMask> masks;
   for (const cv::Mat1f& difference : differences) {
     const cv::Mat1b moving = moving_parts(difference, threshold);

@@ -9,7 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/error.h"
-#include "src/base/program.h"
+#include "src/base/process.h"
 #include "src/base/usage.h"
 #include "src/capture/load_capture.h"
 #include "src/prepare/prepare.h"

@@ -1,4 +1,4 @@
-#include "src/base/program.h"
+#include "src/base/process.h"
 
 #include <gtest/gtest.h>
 

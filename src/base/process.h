@@ -1,0 +1,109 @@
+#pragma once
+/// Other programs of the system: finding one, running one to its end, talking to one over pipes. POSIX only.
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace cnerf {
+
+/// The executable that `name` stands for: on $PATH, or itself where it holds a slash; nothing when there is none.
+[[nodiscard]] std::optional<std::filesystem::path> find_program(const std::string& name);
+
+/// Runs `words` (the program and its arguments; no shell) with both of its outputs appended to `log`, no input and no
+/// screen. `watch` is called a few times per second meanwhile; when it throws, the program and all it started are
+/// killed and the exception goes on.
+/// @return  its exit status; 128 + n when signal n killed it.
+/// @throws OutputError  when the log cannot be written.  @throws DeviceError  when the program cannot be started.
+int run_program(const std::vector<std::string>& words, const std::filesystem::path& log,
+                const std::function<void()>& watch = {});
+
+/// A descriptor that closes itself, and on exec: no other program inherits it and keeps a pipe open.
+class FileDescriptor {
+ public:
+  explicit FileDescriptor(int number = -1) : number_(number) {}
+  ~FileDescriptor() { reset(); }
+  FileDescriptor(const FileDescriptor&) = delete;
+  FileDescriptor& operator=(const FileDescriptor&) = delete;
+  void reset(int number = -1);
+  [[nodiscard]] int number() const { return number_; }
+
+ private:
+  int number_;
+};
+
+/// A started program, the leader of a process group of its own: Ctrl-C reaches it through us only.
+class Process {
+ public:
+  /// Descriptors that become its standard streams;
+  struct Streams {
+    int input, output, errors;
+  };
+  /// @param variables  "NAME=value", over those of our environment.  @throws DeviceError  when it cannot be started.
+  Process(std::vector<std::string> words, const Streams& streams, const std::vector<std::string>& variables = {});
+  /// Kills the group.
+  ~Process() { kill_group(); }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  /// Its status as a shell has it, 128 + n after signal n; nothing while it runs. Looks for `patience` at most.
+  std::optional<int> exit_status(std::chrono::milliseconds patience = {});
+  /// "exited with 3", "was killed by signal 11", "is still running".
+  [[nodiscard]] std::string fate();
+  /// Kills it and all it started.
+  void kill_group();
+
+ private:
+  bool has_ended(int options);
+
+  pid_t pid_ = -1;
+  bool ended_ = false;
+  int status_ = 0;  // of waitpid
+};
+
+/// What went wrong while talking to a program.
+enum class PipeTrouble {
+  kNone,
+  kTimedOut,  ///< no answer in time
+  kEnded,     ///< the program closed its output or died before it had answered
+};
+
+/// A program on the other end of three pipes.
+class PipedProcess {
+ public:
+  using Deadline = std::chrono::steady_clock::time_point;
+
+  /// Starts `/bin/sh -c command` in the current folder.  @throws DeviceError  when it cannot be started.
+  explicit PipedProcess(const std::string& command);
+  /// Closes the program's input, gives it a moment to end, then kills its process group.
+  ~PipedProcess();
+
+  /// Both move every byte or report trouble; what the program says on stderr is passed through meanwhile. A program
+  /// that stops reading gives kEnded, never SIGPIPE.
+  PipeTrouble write_all(std::span<const std::byte> bytes, Deadline deadline);
+  PipeTrouble read_all(std::span<std::byte> bytes, Deadline deadline);
+
+  /// The last lines of stderr, ready to be appended to a message; empty when there were none.
+  [[nodiscard]] std::string last_words();
+  [[nodiscard]] Process& process() { return *process_; }
+
+ private:
+  void drain_errors();
+  bool wait_for(int descriptor, short events, Deadline deadline);
+
+  FileDescriptor input_, output_, errors_;  // our ends
+  std::optional<Process> process_;
+  std::string stderr_tail_;
+};
+
+/// A text as one word of the shell.
+[[nodiscard]] std::string shell_word(const std::string& text);
+
+}  // namespace cnerf
