@@ -9,22 +9,68 @@ function(cnerf_add_library name)
   target_link_libraries(${name} PUBLIC ${arg_PUBLIC} PRIVATE cnerf_options ${arg_PRIVATE})
 endfunction()
 
-# cnerf_add_test(NAME SOURCES … LINK … [LABELS …] [TIMEOUT seconds])
-# One executable of GoogleTest cases; every case is a CTest test of its own.
+# cnerf_suites_of(OUT sources …): the GoogleTest suites of these sources, read from their text: configuring runs no test.
+function(cnerf_suites_of out)
+  set(suites "")
+  foreach(source ${ARGN})
+    get_filename_component(file ${source} ABSOLUTE)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+    file(READ ${file} text)
+    string(REGEX MATCHALL "(^|\n)(TEST|TEST_F|TEST_P|TYPED_TEST)\\([ \n]*[A-Za-z0-9_]+" found "${text}")
+    list(TRANSFORM found REPLACE "^[^(]*\\([ \n]*" "")
+    list(APPEND suites ${found})
+  endforeach()
+  list(REMOVE_DUPLICATES suites)
+  set(${out} ${suites} PARENT_SCOPE)
+endfunction()
+
+# cnerf_add_test(NAME SOURCES … LINK … [LABELS …] [TIMEOUT seconds] [PROCESSORS n])
+# One executable of GoogleTest cases; every suite of it is a CTest test of its own, NAME.SUITE. A suite that CTest would
+# not run fails the others: tests/support/gtest_main.cpp knows the list.
 function(cnerf_add_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINK;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "" "TIMEOUT;PROCESSORS" "SOURCES;LINK;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
-    set(arg_TIMEOUT 120)
+    set(arg_TIMEOUT 300)
   endif()
   if(NOT arg_LABELS)
     set(arg_LABELS unit)
   endif()
+  if(NOT arg_PROCESSORS)
+    set(arg_PROCESSORS 1)
+  endif()
   add_executable(${name} ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE cnerf_options cnerf_test_support ${arg_LINK})
-  # Torch takes seconds to load on a busy machine.
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
-    PROPERTIES LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT})
+  cnerf_suites_of(suites ${arg_SOURCES})
+  list(JOIN suites ":" all)
+  foreach(suite ${suites})
+    add_test(NAME ${name}.${suite} COMMAND ${name} --gtest_filter=${suite}.*:*/${suite}.*:${suite}/*.*)
+    set_tests_properties(${name}.${suite} PROPERTIES
+      LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT} PROCESSORS ${arg_PROCESSORS} SKIP_RETURN_CODE 77
+      ENVIRONMENT "CNERF_SUITES=${all};CNERF_CASES=${PROJECT_BINARY_DIR}/Testing/cases/${name}.${suite}")
+  endforeach()
+endfunction()
+
+# cnerf_precompile_torch(NAME sources …): these sources of NAME begin with LibTorch's header, which is compiled once for all
+# of them. It takes longer than everything else in them.
+function(cnerf_precompile_torch name)
+  if(NOT TARGET cnerf_torch_header)
+    file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/torch_header.cpp CONTENT "// Holds the precompiled header.\n")
+    add_library(cnerf_torch_header OBJECT ${PROJECT_BINARY_DIR}/torch_header.cpp)
+    target_link_libraries(cnerf_torch_header PRIVATE cnerf_options ${TORCH_LIBRARIES})
+    target_precompile_headers(cnerf_torch_header PRIVATE <torch/torch.h>)
+    target_compile_options(cnerf_torch_header PRIVATE ${CNERF_PRECOMPILED_OPTIONS})
+  endif()
+  get_target_property(others ${name} SOURCES)
+  list(REMOVE_ITEM others ${ARGN})
+  set_source_files_properties(${others} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS "${CNERF_PRECOMPILED_OPTIONS}")
+  get_target_property(type ${name} TYPE)
+  if(type STREQUAL EXECUTABLE)  # -fPIE would not fit the header
+    set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+    target_compile_options(${name} PRIVATE -fPIC)
+  endif()
+  target_precompile_headers(${name} REUSE_FROM cnerf_torch_header)
 endfunction()
 
 # cnerf_compile_per_isa(GENERIC AVX2 AVX512): instruction sets of three files that include one kernel text.

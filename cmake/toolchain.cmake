@@ -10,6 +10,9 @@ endif()
 find_program(CNERF_CCACHE ccache)
 if(CNERF_CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CNERF_CCACHE})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    set(CNERF_PRECOMPILED_OPTIONS -fpch-preprocess)  # ccache wants it with precompiled headers
+  endif()
 endif()
 
 # Every target of ours links this one; packages' headers are SYSTEM and stay out of it.

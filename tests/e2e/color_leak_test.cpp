@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <opencv2/imgcodecs.hpp>
 
 #include "src/base/files.h"
@@ -65,23 +66,33 @@ void paint(const fs::path& capture, const std::array<Color8, 256>& colors) {
   }
 }
 
+/// A red and a blue capture, and a run of the red one.
 class ColorLeak : public testing::Test {
  protected:
-  void SetUp() override {
+  static void SetUpTestSuite() {
+    shared_ = std::make_unique<TempDir>();
     const Palette palette;
-    for (const char* name : {"red", "blue"}) {
-      fs::copy(tiny_capture(), folder_ / name, fs::copy_options::recursive);
-    }
-    paint(folder_ / "red", palette.red);
-    paint(folder_ / "blue", palette.blue);
-    fs::copy_file(tiny_capture() / "references/view_001.png", folder_ / "reference.png");
+    paint(copied(tiny_capture(), path("red")), palette.red);
+    paint(copied(tiny_capture(), path("blue")), palette.blue);
+    fs::copy_file(tiny_capture() / "references/view_001.png", path("reference.png"));
+    train("red");
+  }
+  static void TearDownTestSuite() { shared_.reset(); }
+
+  /// Trains NAME-run on the capture NAME.
+  static void train(const std::string& name) {
+    const ProgramResult trained =
+        cnerf(concatenated({"train", path(name).string(), "-o", path(name + "-run").string()}, tiny_options()));
+    ASSERT_EQ(trained.exit_code, 0) << trained.err;
   }
 
-  TempDir folder_;
+  static fs::path path(const std::string& name) { return *shared_ / name; }
+
+  inline static std::unique_ptr<TempDir> shared_;
 };
 
 TEST_F(ColorLeak, TheCapturesDifferInColourAndNotInGrey) {
-  const Capture red = load_capture(folder_ / "red"), blue = load_capture(folder_ / "blue");
+  const Capture red = load_capture(path("red")), blue = load_capture(path("blue"));
   ASSERT_EQ(red.views.size(), blue.views.size());
   for (std::size_t i = 0; i < red.views.size(); ++i) {
     EXPECT_EQ(red.views[i].image.u8, blue.views[i].image.u8);
@@ -90,37 +101,30 @@ TEST_F(ColorLeak, TheCapturesDifferInColourAndNotInGrey) {
 }
 
 TEST_F(ColorLeak, BothGiveTheSameSnapshotsByteForByte) {
-  for (const char* name : {"red", "blue"}) {
-    const std::string run = (folder_ / (std::string(name) + "-run")).string();
-    const ProgramResult trained = cnerf(concatenated({"train", (folder_ / name).string(), "-o", run}, tiny_options()));
-    ASSERT_EQ(trained.exit_code, 0) << trained.err;
+  train("blue");
+  for (const char* run : {"red-run", "blue-run"}) {
     // The reference is the same file for both: its fit, which takes the longest here, is done once.
-    if (name == std::string("blue")) fs::copy(folder_ / "red-run/cache", fs::path(run) / "cache");
-    const ProgramResult colorized =
-        cnerf({"colorize", run, "--take", "t", "--colorizer", "reference:" + (folder_ / "reference.png").string()});
+    if (run == std::string("blue-run")) fs::copy(path("red-run/cache"), path("blue-run/cache"));
+    const ProgramResult colorized = cnerf(
+        {"colorize", path(run).string(), "--take", "t", "--colorizer", "reference:" + path("reference.png").string()});
     ASSERT_EQ(colorized.exit_code, 0) << colorized.err;
   }
-  EXPECT_TRUE(read_binary_file(folder_ / "red-run/stage1.snapshot") ==
-              read_binary_file(folder_ / "blue-run/stage1.snapshot"));
-  EXPECT_TRUE(read_binary_file(folder_ / "red-run/takes/t/take.snapshot") ==
-              read_binary_file(folder_ / "blue-run/takes/t/take.snapshot"));
+  EXPECT_TRUE(read_binary_file(path("red-run/stage1.snapshot")) == read_binary_file(path("blue-run/stage1.snapshot")));
+  EXPECT_TRUE(read_binary_file(path("red-run/takes/t/take.snapshot")) ==
+              read_binary_file(path("blue-run/takes/t/take.snapshot")));
 }
 
 /// The comparison can fail: other grey values change the snapshot.
 TEST_F(ColorLeak, AnotherGreyGivesAnotherSnapshot) {
-  const fs::path changed = folder_ / "changed";
-  fs::copy(folder_ / "red", changed, fs::copy_options::recursive);
+  const fs::path changed = copied(path("red"), path("changed"));
   for (const auto& entry : fs::directory_iterator(changed / "images")) {
     cv::Mat image = cv::imread(entry.path().string());
     image += cv::Scalar(40, 40, 40);
     cv::imwrite(entry.path().string(), image);
   }
-  for (const char* name : {"red", "changed"}) {
-    const std::string run = (folder_ / (std::string(name) + "-run")).string();
-    ASSERT_EQ(cnerf(concatenated({"train", (folder_ / name).string(), "-o", run}, tiny_options())).exit_code, 0);
-  }
-  EXPECT_TRUE(read_binary_file(folder_ / "red-run/stage1.snapshot") !=
-              read_binary_file(folder_ / "changed-run/stage1.snapshot"));
+  train("changed");
+  EXPECT_TRUE(read_binary_file(path("red-run/stage1.snapshot")) !=
+              read_binary_file(path("changed-run/stage1.snapshot")));
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "src/base/files.h"
@@ -33,12 +35,37 @@ nlohmann::json row_of(const nlohmann::json& table, const std::string& method) {
   return {};
 }
 
-TEST(Compare, EveryMethodLeavesARowAndTheReportStandsAlone) {
-  const TempDir folder;
-  const ProgramResult result = compare(folder / "out", "all", {"--rating-sheet"});
-  ASSERT_EQ(result.exit_code, 0) << result.err << result.out;
-  EXPECT_THAT(result.out, HasSubstr("simulated")) << "says who colours";
-  const auto table = json_of(folder / "out/table.json");
+/// A comparison of every method, which the cases begin with.
+class Compare : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = std::make_unique<TempDir>();
+    made_ = compare(*shared_ / "out", "all", {"--rating-sheet"});
+  }
+  static void TearDownTestSuite() { shared_.reset(); }
+
+  /// A copy of it that holds these methods alone.
+  fs::path comparison_of(const std::vector<std::string>& methods) const {
+    fs::path out = copied(*shared_ / "out", folder_ / "out");
+    const fs::path runs = out / "runs" / tiny_capture().filename() / "seed-1";
+    for (const fs::path& run : fs::directory_iterator(runs)) {
+      if (fs::exists(run / "cell.json") && std::ranges::find(methods, run.filename().string()) == methods.end()) {
+        fs::remove_all(run);
+      }
+    }
+    return out;
+  }
+
+  inline static std::unique_ptr<TempDir> shared_;
+  inline static ProgramResult made_;
+  const TempDir folder_;
+};
+
+TEST_F(Compare, EveryMethodLeavesARowAndTheReportStandsAlone) {
+  ASSERT_EQ(made_.exit_code, 0) << made_.err << made_.out;
+  EXPECT_THAT(made_.out, HasSubstr("simulated")) << "says who colours";
+  const fs::path out = copied(*shared_ / "out", folder_ / "out");
+  const auto table = json_of(out / "table.json");
   ASSERT_EQ(table["tables"].size(), 1u);
   for (const auto& row : table["tables"][0]["rows"]) {
     if (row["method"] == "style-transfer") continue;
@@ -52,55 +79,52 @@ TEST(Compare, EveryMethodLeavesARowAndTheReportStandsAlone) {
     EXPECT_GT(race["hash_grid"]["seconds"], 0) << race.dump();
     EXPECT_GT(race["mlp"]["seconds"], 0) << race.dump();
   }
-  EXPECT_THAT(read_text_file(folder / "out/table.md"), HasSubstr("## Training times"));
+  EXPECT_THAT(read_text_file(out / "table.md"), HasSubstr("## Training times"));
   EXPECT_EQ(row_of(table, "grey")["colourfulness"]["mean"], 0);
   EXPECT_FALSE(row_of(table, "grey").contains("lpips")) << "no weights were given";
-  const std::string report = read_text_file(folder / "out/report.html");
+  const std::string report = read_text_file(out / "report.html");
   EXPECT_THAT(report, HasSubstr("data:image/jpeg"));
   EXPECT_THAT(report, HasSubstr("colorize-then-fuse"));
-  EXPECT_THAT(files_below(folder / "out"), Contains("rating_sheet.html"));
+  EXPECT_THAT(files_below(out), Contains("rating_sheet.html"));
 
   // Two raters who like one method, and no other.
-  const auto key = json_of(folder / "out/rating_key.json");
+  const auto key = json_of(out / "rating_key.json");
   for (const char* name : {"a.json", "b.json"}) {
     nlohmann::json answers = {{"sheet", key["sheet"]}, {"answers", nlohmann::json::array()}};
     for (const auto& [item, what] : key["items"].items()) {
       const int grade = what["method"] == "colornerf" ? 5 : 2;
       answers["answers"].push_back({{"item", item}, {"plausibility", grade}, {"vividness", grade}});
     }
-    write_file(folder / name, answers.dump());
+    write_file(folder_ / name, answers.dump());
   }
-  const ProgramResult rated = cnerf({"compare", "-o", (folder / "out").string(), "--ratings",
-                                     (folder / "a.json").string(), (folder / "b.json").string()});
+  const ProgramResult rated =
+      cnerf({"compare", "-o", out.string(), "--ratings", (folder_ / "a.json").string(), (folder_ / "b.json").string()});
   ASSERT_EQ(rated.exit_code, 0) << rated.err;
-  EXPECT_THAT(read_text_file(folder / "out/ratings.md"), HasSubstr("| colornerf | 5.00"));
+  EXPECT_THAT(read_text_file(out / "ratings.md"), HasSubstr("| colornerf | 5.00"));
 }
 
-TEST(Compare, StyleTransferFollowsTheReferenceItIsGiven) {
+TEST_F(Compare, StyleTransferFollowsTheReferenceItIsGiven) {
   CNERF_REQUIRE_DATA(weights, "lpips/lpips_alex_f32.bin");
-  const TempDir folder;
   const std::string reference = (tiny_capture() / "references/view_001.png").string();
   const ProgramResult result =
-      compare(folder / "out", "style-transfer,grey",
+      compare(folder_ / "out", "style-transfer,grey",
               {"--lpips-weights", weights.string(), "--style-reference", reference, "--set", "compare.style_steps=8"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto table = json_of(folder / "out/table.json");
+  const auto table = json_of(folder_ / "out/table.json");
   const auto row = row_of(table, "style-transfer");
   EXPECT_FALSE(row.contains("error")) << row.dump();
   EXPECT_GT(row["colourfulness"]["mean"], 1);
   EXPECT_TRUE(row.contains("lpips"));
 
-  const ProgramResult missing = compare(folder / "other", "style-transfer",
+  const ProgramResult missing = compare(folder_ / "other", "style-transfer",
                                         {"--lpips-weights", weights.string(), "--style-reference", "missing.png"});
-  EXPECT_THAT(row_of(json_of(folder / "other/table.json"), "style-transfer")["error"], HasSubstr("missing.png"));
+  EXPECT_THAT(row_of(json_of(folder_ / "other/table.json"), "style-transfer")["error"], HasSubstr("missing.png"));
 }
 
 /// Parts that ran side by side in one folder make one table.
-TEST(Compare, SeedsOfSeveralRunsAreJoined) {
-  const TempDir folder;
-  const fs::path out = folder / "out";
+TEST_F(Compare, SeedsOfSeveralRunsAreJoined) {
+  const fs::path out = comparison_of({"colornerf"});  // seed 1
   ASSERT_EQ(compare(out, "colornerf", {"--first-seed", "2", "--resume"}).exit_code, 0);
-  ASSERT_EQ(compare(out, "colornerf", {"--resume"}).exit_code, 0);
   const fs::path cell = out / "runs" / tiny_capture().filename() / "seed-2/colornerf/cell.json";
   const auto before = fs::last_write_time(cell);
   ASSERT_EQ(compare(out, "colornerf,grey", {"--seeds", "3", "--only-report"}).exit_code, 0);
@@ -108,13 +132,11 @@ TEST(Compare, SeedsOfSeveralRunsAreJoined) {
   const auto table = json_of(out / "table.json");
   EXPECT_EQ(row_of(table, "colornerf")["psnr_rgb"]["n"], 2);
   EXPECT_EQ(table["tables"][0]["rows"].size(), 1u) << "of grey there is nothing";
-  EXPECT_EQ(compare(folder / "empty", "colornerf", {"--only-report"}).exit_code, 64);
+  EXPECT_EQ(compare(folder_ / "empty", "colornerf", {"--only-report"}).exit_code, 64);
 }
 
-TEST(Compare, ResumingMakesOnlyWhatIsMissing) {
-  const TempDir folder;
-  const fs::path out = folder / "out";
-  ASSERT_EQ(compare(out, "colornerf,grey").exit_code, 0);
+TEST_F(Compare, ResumingMakesOnlyWhatIsMissing) {
+  const fs::path out = comparison_of({"colornerf", "grey"});
   EXPECT_EQ(compare(out, "colornerf,grey").exit_code, 64) << "neither --resume nor --overwrite";
   const fs::path cell = out / "runs" / tiny_capture().filename() / "seed-1/colornerf/cell.json";
   const auto before = fs::last_write_time(cell);
@@ -132,56 +154,52 @@ TEST(Compare, ResumingMakesOnlyWhatIsMissing) {
   EXPECT_NE(read_text_file(cell), content);
 }
 
-TEST(Compare, SeedsGiveConfidenceAndTheSameSeedTheSameNumbers) {
-  const TempDir folder;
-  for (const char* name : {"a", "b"}) {
-    ASSERT_EQ(compare(folder / name, "colornerf", {"--seeds", "2"}).exit_code, 0);
-  }
-  const auto a = json_of(folder / "a/table.json"), b = json_of(folder / "b/table.json");
+TEST_F(Compare, SeedsGiveConfidenceAndTheSameSeedTheSameNumbers) {
+  const fs::path out = comparison_of({"colornerf"});  // seed 1
+  ASSERT_EQ(compare(folder_ / "a", "colornerf", {"--seeds", "2"}).exit_code, 0);
+  ASSERT_EQ(compare(out, "colornerf", {"--seeds", "2", "--resume"}).exit_code, 0);
+  const auto a = json_of(folder_ / "a/table.json"), b = json_of(out / "table.json");
   EXPECT_EQ(row_of(a, "colornerf")["psnr_rgb"]["n"], 2);
   EXPECT_GT(row_of(a, "colornerf")["psnr_rgb"]["ci95"], 0);
   EXPECT_EQ(row_of(a, "colornerf")["psnr_rgb"], row_of(b, "colornerf")["psnr_rgb"]);
 }
 
-TEST(Compare, AMethodThatFailsLeavesARowThatSaysSo) {
-  const TempDir folder;
-  const ProgramResult result = compare(folder / "out", "colornerf,grey", {"--colorizer", "exec:false"});
+TEST_F(Compare, AMethodThatFailsLeavesARowThatSaysSo) {
+  const ProgramResult result = compare(folder_ / "out", "colornerf,grey", {"--colorizer", "exec:false"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto table = json_of(folder / "out/table.json");
+  const auto table = json_of(folder_ / "out/table.json");
   EXPECT_THAT(row_of(table, "colornerf")["error"], HasSubstr("exec:false"));
   EXPECT_TRUE(row_of(table, "grey").contains("psnr_rgb"));
 }
 
-TEST(Compare, ACaptureMayHaveASizeOfItsOwn) {
-  const TempDir folder;
+TEST_F(Compare, ACaptureMayHaveASizeOfItsOwn) {
   const std::string small = tiny_capture().string() + "@2";
   const ProgramResult result = cnerf(
-      concatenated({"compare", tiny_capture().string(), small, "-o", (folder / "out").string(), "--methods", "grey"},
+      concatenated({"compare", tiny_capture().string(), small, "-o", (folder_ / "out").string(), "--methods", "grey"},
                    tiny_options()));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out + result.err, HasSubstr("24 x 18"));
-  EXPECT_EQ(json_of(folder / "out/table.json")["tables"].size(), 3u) << "two captures and both together";
-  EXPECT_EQ(cnerf({"compare", tiny_capture().string() + "@0", "-o", (folder / "no").string()}).exit_code, 64);
+  EXPECT_EQ(json_of(folder_ / "out/table.json")["tables"].size(), 3u) << "two captures and both together";
+  EXPECT_EQ(cnerf({"compare", tiny_capture().string() + "@0", "-o", (folder_ / "no").string()}).exit_code, 64);
 }
 
-TEST(Compare, WhatCannotBeComparedIsRefusedBeforeTraining) {
-  const TempDir folder;
-  EXPECT_EQ(compare(folder / "out", "colornef").exit_code, 64);
-  EXPECT_EQ(compare(folder / "out", "grey", {"--colorizer", "simulated:hues=3"}).exit_code, 64);
-  EXPECT_EQ(compare(folder / "out", "grey", {"--lpips-weights", "missing.bin"}).exit_code, 66);
-  EXPECT_EQ(cnerf({"compare", "-o", (folder / "out").string()}).exit_code, 64);
-  EXPECT_FALSE(fs::exists(folder / "out"));
+TEST_F(Compare, WhatCannotBeComparedIsRefusedBeforeTraining) {
+  EXPECT_EQ(compare(folder_ / "out", "colornef").exit_code, 64);
+  EXPECT_EQ(compare(folder_ / "out", "grey", {"--colorizer", "simulated:hues=3"}).exit_code, 64);
+  EXPECT_EQ(compare(folder_ / "out", "grey", {"--lpips-weights", "missing.bin"}).exit_code, 66);
+  EXPECT_EQ(cnerf({"compare", "-o", (folder_ / "out").string()}).exit_code, 64);
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
 
-  fs::copy(tiny_capture(), folder / "grey", fs::copy_options::recursive);
-  fs::remove_all(folder / "grey/color");
-  const ProgramResult grey = cnerf({"compare", (folder / "grey").string(), "-o", (folder / "out").string()});
+  fs::copy(tiny_capture(), folder_ / "grey", fs::copy_options::recursive);
+  fs::remove_all(folder_ / "grey/color");
+  const ProgramResult grey = cnerf({"compare", (folder_ / "grey").string(), "-o", (folder_ / "out").string()});
   EXPECT_EQ(grey.exit_code, 65);
   EXPECT_THAT(grey.err, HasSubstr("grey"));
 
-  fs::create_directory(folder / "full");
-  write_file(folder / "full/mine.txt", std::string("mine"));
-  EXPECT_EQ(compare(folder / "full", "grey", {"--overwrite"}).exit_code, 64);
-  EXPECT_TRUE(fs::exists(folder / "full/mine.txt"));
+  fs::create_directory(folder_ / "full");
+  write_file(folder_ / "full/mine.txt", std::string("mine"));
+  EXPECT_EQ(compare(folder_ / "full", "grey", {"--overwrite"}).exit_code, 64);
+  EXPECT_TRUE(fs::exists(folder_ / "full/mine.txt"));
   EXPECT_EQ(cnerf({"colorize", "x", "--colorizer", "simulated:"}).exit_code, 66);  // no such run
 }
 

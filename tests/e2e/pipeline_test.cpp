@@ -68,8 +68,7 @@ TEST(Pipeline, RunLeavesEverythingItSays) {
 
 TEST(Pipeline, StepsOneByOneWithoutColour) {
   const TempDir folder;
-  const std::string out = (folder / "run").string();
-  ASSERT_EQ(train(tiny_capture(), out).exit_code, 0);
+  const std::string out = copied(tiny_run(), folder / "run").string();
   EXPECT_EQ(cnerf({"eval", out}).exit_code, 0);
   EXPECT_FALSE(json_of(folder / "run/metrics.json").at("mean").contains("psnr_rgb"));
   EXPECT_EQ(cnerf({"bake", out}).exit_code, 0);
@@ -90,8 +89,7 @@ TEST(Pipeline, StepsOneByOneWithoutColour) {
 
 TEST(Pipeline, TakesStandSideBySide) {
   const TempDir folder;
-  const std::string out = (folder / "run").string();
-  ASSERT_EQ(train(tiny_capture(), out).exit_code, 0);
+  const std::string out = copied(tiny_run(), folder / "run").string();
   const auto colorize = [&](const std::vector<std::string>& more) {
     return cnerf(concatenated({"colorize", out, "--colorizer", "grey"}, more)).exit_code;
   };
@@ -108,9 +106,7 @@ TEST(Pipeline, TakesStandSideBySide) {
 TEST(Pipeline, EvaluationMeasuresLpipsWithWeights) {
   CNERF_REQUIRE_DATA(weights, "lpips/lpips_alex_f32.bin");
   const TempDir folder;
-  const std::string out = (folder / "run").string();
-  ASSERT_EQ(train(tiny_capture(), out).exit_code, 0);
-  ASSERT_EQ(cnerf({"colorize", out, "--colorizer", "grey", "--take", "grey"}).exit_code, 0);
+  const std::string out = copied(tiny_take(), folder / "run").string();
   ASSERT_EQ(cnerf({"eval", out}).exit_code, 0);
   EXPECT_FALSE(json_of(folder / "run/metrics.json").at("mean").contains("lpips"));
   const ProgramResult result = cnerf({"eval", out, "--lpips-weights", weights.string()});
@@ -120,7 +116,7 @@ TEST(Pipeline, EvaluationMeasuresLpipsWithWeights) {
   EXPECT_EQ(cnerf({"eval", out, "--lpips-weights", "missing.bin"}).exit_code, 66);
 }
 
-TEST(Pipeline, KeyFramesAndHintsOverruleTheColorizer) {
+TEST(KeyFrames, AndHintsOverruleTheColorizer) {
   const TempDir folder;
   const std::string out = (folder / "run").string();
   ASSERT_EQ(train(tiny_capture(), out, {"--set", "stage1.steps=600"}).exit_code, 0) << "enough to have surfaces";
@@ -151,8 +147,7 @@ TEST(Pipeline, KeyFramesAndHintsOverruleTheColorizer) {
 
 TEST(Pipeline, BaseCandidatesAreShownWithoutMakingATake) {
   const TempDir folder;
-  const std::string out = (folder / "run").string();
-  ASSERT_EQ(train(tiny_capture(), out).exit_code, 0);
+  const std::string out = copied(tiny_run(), folder / "run").string();
   const ProgramResult result = cnerf({"colorize", out, "--colorizer", "grey", "--bases-only"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_FALSE(cv::imread((folder / "run/bases.png").string()).empty());
@@ -160,7 +155,7 @@ TEST(Pipeline, BaseCandidatesAreShownWithoutMakingATake) {
   EXPECT_EQ(cnerf({"colorize", out, "--colorizer", "grey", "--bases", "2,99"}).exit_code, 64);
 }
 
-TEST(Program, ColorizesOnePicture) {
+TEST(ColorizeImage, ColorizesOnePicture) {
   const TempDir folder;
   const std::string in = (tiny_capture() / "images/view_000.png").string(), out = (folder / "out.png").string();
   // A program that answers a = L / 4, b = -10 everywhere.
@@ -206,73 +201,6 @@ TEST(Pipeline, ProgressAsJson) {
     if (json.at("event") == "progress") last = json.at("fraction");
   }
   EXPECT_EQ(last, 1.0);
-}
-
-/// Interrupted and resumed, with another number of threads, gives the bytes of an uninterrupted run.
-TEST(Pipeline, ResumingIsExact) {
-  const TempDir folder;
-  ASSERT_EQ(train(tiny_capture(), folder / "whole").exit_code, 0);
-  const auto arguments =
-      concatenated({"train", tiny_capture().string(), "-o", (folder / "parts").string(), "--progress", "json"},
-                   concatenated(tiny_options(), {"--threads", "1"}));
-  const ProgramResult stopped = cnerf_interrupted_at(arguments, "\"progress\"");
-  if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
-  EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
-  EXPECT_THAT(stopped.err, HasSubstr("--resume"));
-  const std::string config = read_text_file(folder / "parts/config.toml");
-  const ProgramResult other = cnerf(concatenated(arguments, {"--resume", "--set", "stage1.seed=99"}));
-  EXPECT_NE(other.exit_code, 0);
-  EXPECT_THAT(other.err, HasSubstr("other stage1 options"));
-  EXPECT_EQ(read_text_file(folder / "parts/config.toml"), config) << "a refused continuation changes nothing";
-  const ProgramResult resumed = cnerf(concatenated(arguments, {"--resume"}));
-  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
-  EXPECT_TRUE(read_binary_file(folder / "parts/stage1.snapshot") == read_binary_file(folder / "whole/stage1.snapshot"));
-}
-
-TEST(Pipeline, ResumingAColorizationIsExact) {
-  const TempDir folder;
-  const fs::path whole = folder / "whole", parts = folder / "parts";
-  ASSERT_EQ(train(tiny_capture(), whole).exit_code, 0);
-  const auto colorize = [](const fs::path& run) {
-    return std::vector<std::string>{"colorize",    run.string(),           "--take",     "t",
-                                    "--colorizer", "reference:references", "--progress", "json"};
-  };
-  fs::copy(whole, parts, fs::copy_options::recursive);
-  ASSERT_EQ(cnerf(colorize(whole)).exit_code, 0);
-  fs::copy(whole / "cache", parts / "cache");
-  const ProgramResult stopped = cnerf_interrupted_at(colorize(parts), "\"stage 2\"");
-  if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
-  EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
-  EXPECT_FALSE(fs::exists(parts / "takes/t/take.json")) << "only a finished take has one";
-  const ProgramResult resumed = cnerf(concatenated(colorize(parts), {"--resume"}));
-  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
-  EXPECT_TRUE(read_binary_file(parts / "takes/t/take.snapshot") == read_binary_file(whole / "takes/t/take.snapshot"));
-}
-
-/// The snapshot does not fit on the disk: named, nothing half-written, and the run goes on once there is room.
-TEST(Pipeline, FullDiskLosesNothing) {
-  const TempDir folder;
-  const fs::path out = folder / "run";
-  const auto arguments = concatenated({"train", tiny_capture().string(), "-o", out.string()}, tiny_options());
-  const ProgramResult full = cnerf_with_file_limit(arguments, 40'000);
-  EXPECT_EQ(full.exit_code, 73) << full.err;
-  EXPECT_THAT(full.err, HasSubstr("stage1.snapshot"));
-  EXPECT_THAT(files_below(out), testing::UnorderedElementsAre("config.toml", "run.json"));
-  const ProgramResult resumed = cnerf(concatenated(arguments, {"--resume"}));
-  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
-}
-
-TEST(Pipeline, DamagedSnapshotsAreRefusedByName) {
-  const TempDir folder;
-  const fs::path out = folder / "run", snapshot = out / "stage1.snapshot";
-  ASSERT_EQ(train(tiny_capture(), out).exit_code, 0);
-  fs::resize_file(snapshot, fs::file_size(snapshot) / 2);
-  const ProgramResult cut = cnerf({"eval", out.string()});
-  EXPECT_EQ(cut.exit_code, 78);
-  EXPECT_THAT(cut.err, HasSubstr("stage1.snapshot"));
-  write_file(snapshot, std::string_view("something else"));
-  EXPECT_EQ(cnerf({"bake", out.string()}).exit_code, 78);
-  EXPECT_TRUE(files_below(out / "bakes").empty());
 }
 
 }  // namespace

@@ -9,7 +9,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <memory>
+#include <cstdlib>
+#include <functional>
 #include <thread>
 
 #include "src/base/files.h"
@@ -71,6 +72,17 @@ ProgramResult run(const std::vector<std::string>& arguments, const std::string& 
   return {code, read_text_file(out), read_text_file(err)};
 }
 
+/// Makes `name` below the folder of fixtures, unless it is there.
+fs::path fixture(const std::string& name, const std::function<ProgramResult(const fs::path& folder)>& make) {
+  static const TempDir own;
+  const char* shared = std::getenv("CNERF_E2E");
+  const fs::path folder = shared != nullptr ? fs::path(shared) / name : own / name;
+  if (fs::exists(folder)) return folder;
+  const ProgramResult made = make(folder);
+  EXPECT_EQ(made.exit_code, 0) << name << ": " << made.err;
+  return folder;
+}
+
 }  // namespace
 
 ProgramResult cnerf(const std::vector<std::string>& arguments) {
@@ -115,27 +127,38 @@ std::vector<std::string> tiny_options() {
   return options;
 }
 
+fs::path copied(const fs::path& from, const fs::path& to) {
+  fs::copy(from, to, fs::copy_options::recursive);
+  return to;
+}
+
 const fs::path& tiny_capture() {
-  static const auto folder = std::make_unique<TempDir>();
-  static const fs::path capture = [] {
-    const ProgramResult made = cnerf({"sample", "-o", (*folder / "capture").string(), "--views", "9", "--width", "48",
-                                      "--height", "36", "--samples-per-pixel", "1"});
-    EXPECT_EQ(made.exit_code, 0) << made.err;
-    return *folder / "capture";
-  }();
+  static const fs::path capture = fixture("capture", [](const fs::path& folder) {
+    return cnerf({"sample", "-o", folder.string(), "--views", "9", "--width", "48", "--height", "36",
+                  "--samples-per-pixel", "1"});
+  });
   return capture;
 }
 
 const fs::path& tiny_run() {
-  static const auto folder = std::make_unique<TempDir>();
-  static const fs::path run = [] {
-    const fs::path out = *folder / "run";
-    const ProgramResult made =
-        cnerf(concatenated({"train", tiny_capture().string(), "-o", out.string()}, tiny_options()));
-    EXPECT_EQ(made.exit_code, 0) << made.err;
-    return out;
-  }();
+  static const fs::path run = fixture("run", [](const fs::path& folder) {
+    return cnerf(concatenated({"train", tiny_capture().string(), "-o", folder.string()}, tiny_options()));
+  });
   return run;
+}
+
+const fs::path& tiny_take() {
+  static const fs::path take = fixture("take", [](const fs::path& folder) {
+    return cnerf({"colorize", copied(tiny_run(), folder).string(), "--take", "grey", "--colorizer", "grey"});
+  });
+  return take;
+}
+
+const fs::path& tiny_bake() {
+  static const fs::path bake = fixture("bake", [](const fs::path& folder) {
+    return cnerf({"bake", tiny_run().string(), "-o", folder.string()});
+  });
+  return bake;
 }
 
 std::vector<std::string> files_below(const fs::path& folder) {

@@ -26,11 +26,17 @@ struct ProgramResult {
 /// Options that make every part of a run as short as it can be and still do its work.
 [[nodiscard]] std::vector<std::string> tiny_options();
 
-/// A sample capture of few, small views, made once for all tests of this process.
-[[nodiscard]] const std::filesystem::path& tiny_capture();
+/// What many tests begin with. CTest makes each once for all processes (e2e_fixture) and names their folder in
+/// $CNERF_E2E; without it a process makes what it asks for itself. Tests copy what they change.
+/// @{
+[[nodiscard]] const std::filesystem::path& tiny_capture();  ///< a sample capture of few, small views
+[[nodiscard]] const std::filesystem::path& tiny_run();      ///< a grey run of it
+[[nodiscard]] const std::filesystem::path& tiny_take();     ///< that run, with a take "grey"
+[[nodiscard]] const std::filesystem::path& tiny_bake();     ///< its volume
+/// @}
 
-/// A grey run of it, made once for all tests of this process.
-[[nodiscard]] const std::filesystem::path& tiny_run();
+/// A copy of a folder, `to`.
+std::filesystem::path copied(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// All files below a folder, relative, sorted.
 [[nodiscard]] std::vector<std::string> files_below(const std::filesystem::path& folder);

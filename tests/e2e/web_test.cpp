@@ -40,8 +40,7 @@ TEST(Web, ABakeForBrowsersIsABundleWithPhotographs) {
 
 TEST(Web, ViewMakesTheBundleOfABakeAndEndsWithCtrlC) {
   const TempDir folder;
-  const fs::path bake = folder / "bake";
-  ASSERT_EQ(cnerf({"bake", tiny_run().string(), "-o", bake.string()}).exit_code, 0);
+  const fs::path bake = copied(tiny_bake(), folder / "bake");
   EXPECT_FALSE(fs::exists(bake / "web"));
   const ProgramResult shown = cnerf_interrupted_at({"view", bake.string(), "--no-browser"}, "Ctrl-C ends it");
   if (shown.err.find("page was not built") != std::string::npos) GTEST_SKIP() << "the page is not built";
@@ -71,8 +70,7 @@ TEST(Web, WhatCannotBeShownIsSaidByName) {
 
 TEST(Web, ABakeIsRenderedFromItsVoxels) {
   const TempDir folder;
-  const fs::path bake = folder / "bake";
-  ASSERT_EQ(cnerf({"bake", tiny_run().string(), "-o", bake.string()}).exit_code, 0);
+  const fs::path bake = copied(tiny_bake(), folder / "bake");
   const ProgramResult result = cnerf({"render", bake.string(), "-o", (folder / "out").string()});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const std::vector<std::string> files = files_below(folder / "out" / "cameras");

@@ -1,0 +1,79 @@
+/// Runs that are stopped, run out of disk or are damaged.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "src/base/files.h"
+#include "tests/e2e/program.h"
+#include "tests/support/data.h"
+
+namespace cnerf::test {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// Interrupted and resumed, with another number of threads, gives the bytes of an uninterrupted run.
+TEST(Resuming, TrainingIsExact) {
+  const TempDir folder;
+  const auto arguments =
+      concatenated({"train", tiny_capture().string(), "-o", (folder / "parts").string(), "--progress", "json"},
+                   concatenated(tiny_options(), {"--threads", "1"}));
+  const ProgramResult stopped = cnerf_interrupted_at(arguments, "\"progress\"");
+  if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
+  EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
+  EXPECT_THAT(stopped.err, HasSubstr("--resume"));
+  const std::string config = read_text_file(folder / "parts/config.toml");
+  const ProgramResult other = cnerf(concatenated(arguments, {"--resume", "--set", "stage1.seed=99"}));
+  EXPECT_NE(other.exit_code, 0);
+  EXPECT_THAT(other.err, HasSubstr("other stage1 options"));
+  EXPECT_EQ(read_text_file(folder / "parts/config.toml"), config) << "a refused continuation changes nothing";
+  const ProgramResult resumed = cnerf(concatenated(arguments, {"--resume"}));
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_TRUE(read_binary_file(folder / "parts/stage1.snapshot") == read_binary_file(tiny_run() / "stage1.snapshot"));
+}
+
+TEST(Resuming, AColorizationIsExact) {
+  const TempDir folder;
+  const fs::path whole = copied(tiny_run(), folder / "whole"), parts = copied(tiny_run(), folder / "parts");
+  const auto colorize = [](const fs::path& run) {
+    return std::vector<std::string>{"colorize",    run.string(),           "--take",     "t",
+                                    "--colorizer", "reference:references", "--progress", "json"};
+  };
+  ASSERT_EQ(cnerf(colorize(whole)).exit_code, 0);
+  fs::copy(whole / "cache", parts / "cache");
+  const ProgramResult stopped = cnerf_interrupted_at(colorize(parts), "\"stage 2\"");
+  if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
+  EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
+  EXPECT_FALSE(fs::exists(parts / "takes/t/take.json")) << "only a finished take has one";
+  const ProgramResult resumed = cnerf(concatenated(colorize(parts), {"--resume"}));
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_TRUE(read_binary_file(parts / "takes/t/take.snapshot") == read_binary_file(whole / "takes/t/take.snapshot"));
+}
+
+/// The snapshot does not fit on the disk: named, nothing half-written, and the run goes on once there is room.
+TEST(Resuming, FullDiskLosesNothing) {
+  const TempDir folder;
+  const fs::path out = folder / "run";
+  const auto arguments = concatenated({"train", tiny_capture().string(), "-o", out.string()}, tiny_options());
+  const ProgramResult full = cnerf_with_file_limit(arguments, 40'000);
+  EXPECT_EQ(full.exit_code, 73) << full.err;
+  EXPECT_THAT(full.err, HasSubstr("stage1.snapshot"));
+  EXPECT_THAT(files_below(out), testing::UnorderedElementsAre("config.toml", "run.json"));
+  const ProgramResult resumed = cnerf(concatenated(arguments, {"--resume"}));
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+}
+
+TEST(Resuming, DamagedSnapshotsAreRefusedByName) {
+  const TempDir folder;
+  const fs::path out = copied(tiny_run(), folder / "run"), snapshot = out / "stage1.snapshot";
+  fs::resize_file(snapshot, fs::file_size(snapshot) / 2);
+  const ProgramResult cut = cnerf({"eval", out.string()});
+  EXPECT_EQ(cut.exit_code, 78);
+  EXPECT_THAT(cut.err, HasSubstr("stage1.snapshot"));
+  write_file(snapshot, std::string_view("something else"));
+  EXPECT_EQ(cnerf({"bake", out.string()}).exit_code, 78);
+  EXPECT_TRUE(files_below(out / "bakes").empty());
+}
+
+}  // namespace
+}  // namespace cnerf::test
