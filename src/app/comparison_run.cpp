@@ -10,11 +10,13 @@
 #include "src/app/pipeline.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/json_record.h"
 #include "src/capture/color_truth.h"
 #include "src/compare/baselines/flow.h"
 #include "src/compare/baselines/positional_field.h"
 #include "src/compare/baselines/simulated.h"
 #include "src/compare/baselines/style_transfer.h"
+#include "src/compare/page.h"
 #include "src/compare/rating.h"
 #include "src/picture/contact_sheet.h"
 #include "src/picture/encode.h"
@@ -49,16 +51,16 @@ SimulationOptions simulation_of(const std::string& spec) {
   return parse_simulation(colon == std::string::npos ? "" : spec.substr(colon + 1));
 }
 
-EncodedPicture read_picture(const fs::path& file, const char* type) {
-  return {type, read_binary_file(file)};
+std::string read_picture(const fs::path& file, const char* type) {
+  return data_uri(type, read_binary_file(file));
 }
 
-std::vector<EncodedPicture> read_pictures(const fs::path& folder) {
+std::vector<std::string> read_pictures(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code failure;
   for (const auto& entry : fs::directory_iterator(folder, failure)) files.push_back(entry.path());
   std::ranges::sort(files);
-  std::vector<EncodedPicture> pictures;
+  std::vector<std::string> pictures;
   for (const fs::path& file : files) pictures.push_back(read_picture(file, "jpeg"));
   return pictures;
 }
@@ -247,7 +249,7 @@ void ComparisonRun::run_capture(const Subject& subject, int seed) {
 void ComparisonRun::collect(const Subject& subject, int seed) {
   for (const Method* method : plan_.methods) {
     const fs::path file = folder_of(subject, seed) / method->name / "cell.json";
-    if (fs::exists(file)) cells_.push_back(read_cell(file));
+    if (fs::exists(file)) cells_.push_back(read_record<Cell>(file));
   }
 }
 
@@ -267,17 +269,17 @@ std::string ComparisonRun::train(const Subject& subject, int seed, const fs::pat
   return settings;
 }
 
-ComparisonCell ComparisonRun::run_cell(const Subject& subject, const Method& method, int seed, Geometry& geometry,
-                                       const std::string& settings) const {
+Cell ComparisonRun::run_cell(const Subject& subject, const Method& method, int seed, Geometry& geometry,
+                             const std::string& settings) const {
   const fs::path folder = geometry.folder / method.name;
   const fs::path file = folder / "cell.json";
   if (fs::exists(file) && settings_in(folder) == settings) {
-    ComparisonCell finished = read_cell(file);
+    Cell finished = read_record<Cell>(file);
     if (finished.error.empty()) return finished;
   }
   begin_folder(folder, settings);
   reporter_.say(fmt::format("{}, seed {}: {}", subject.name, seed, method.name));
-  ComparisonCell cell;
+  Cell cell;
   cell.capture = subject.name;
   cell.method = method.name;
   cell.seed = seed;
@@ -291,7 +293,7 @@ ComparisonCell ComparisonRun::run_cell(const Subject& subject, const Method& met
     cell.error = problem.what();
     reporter_.say(fmt::format("{} failed: {}", method.name, problem.what()));
   }
-  write_file(file, to_json(cell));
+  write_file(file, to_json(cell).dump(2) + "\n");
   return cell;
 }
 
@@ -315,7 +317,7 @@ std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, 
 
 /// Stage 1 of a method that has a field of its own: some times as long as the shared one took.
 void ComparisonRun::train_own_field(const Subject& subject, int seed, const Geometry& geometry, const Engines& engines,
-                                    ComparisonCell& cell) const {
+                                    Cell& cell) const {
   Stage1Options options = config_.stage1;
   options.seed = seed;
   options.steps = kManySteps;
@@ -347,7 +349,7 @@ StyleReport ComparisonRun::transfer(const Subject& subject, const fs::path& stag
 }
 
 void ComparisonRun::colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry,
-                             ComparisonCell& cell) const {
+                             Cell& cell) const {
   Stage2Options options = stage2_of(method, config_.stage2, config_.compare);
   options.seed = seed;
   Field field = field_of(subject, method, geometry);
@@ -398,7 +400,7 @@ void ComparisonRun::colorize(const Subject& subject, const Method& method, int s
 }
 
 /// Measures the views, and renders what is shown of a method.
-void ComparisonRun::look(const Subject& subject, const Method& method, Geometry& geometry, ComparisonCell& cell) const {
+void ComparisonRun::look(const Subject& subject, const Method& method, Geometry& geometry, Cell& cell) const {
   const fs::path folder = geometry.folder / method.name;
   const Field field = field_of(subject, method, geometry);
   const auto scene = Scene::load(field.stage1, method.is_colored ? folder / "take.snapshot" : fs::path(),
@@ -438,7 +440,7 @@ void ComparisonRun::look(const Subject& subject, const Method& method, Geometry&
   cell.long_range = consistency(seen, std::max<std::size_t>(2, path.cameras.size() / kLongRange));
 }
 
-ComparisonSummary ComparisonRun::summary() const {
+Summary ComparisonRun::summary() const {
   const std::string& spec = config_.colorizer.spec;
   const std::string colorizer = is_simulated(spec) ? "simulated:" + to_text(simulation_of(spec)) : spec;
   return {colorizer, lpips_ ? lpips_->network() : "", plan_.command_line};
@@ -451,13 +453,13 @@ ReportCapture ComparisonRun::report_of(const Subject& subject) const {
   report.frames_per_second = kFramesPerSecond;
   for (const std::size_t index : subject.shown()) {
     const View& view = *subject.evaluated[index];
-    report.view_names.push_back(view.name);
+    report.views.push_back(view.name);
     report.inputs.push_back(
-        {"jpeg", jpeg_bytes(scaled_down(grey_picture(view.image), kPictureWidth), kPictureQuality)});
+        data_uri("jpeg", jpeg_bytes(scaled_down(grey_picture(view.image), kPictureWidth), kPictureQuality)));
     const std::optional<ColorImage> truth = load_color_truth(view);
     if (!truth) continue;
     const Picture picture = picture_from_linear(truth->width, truth->height, truth->rgb);
-    report.truths.push_back({"jpeg", jpeg_bytes(scaled_down(picture, kPictureWidth), kPictureQuality)});
+    report.truths.push_back(data_uri("jpeg", jpeg_bytes(scaled_down(picture, kPictureWidth), kPictureQuality)));
   }
   if (report.truths.size() != report.inputs.size()) report.truths.clear();
   const fs::path runs = folder_of(subject, plan_.seeds.front());
@@ -498,9 +500,9 @@ void ComparisonRun::write_report() const {
   for (const auto& subject : subjects_) reporter_.wrote("pictures", write_strip(*subject));
   std::vector<ReportCapture> captures;
   for (const auto& subject : subjects_) captures.push_back(report_of(*subject));
-  write_file(plan_.report / "table.json", table_json(cells_, summary()));
+  write_file(plan_.report / "table.json", table_json(cells_, summary()).dump(2) + "\n");
   write_file(plan_.report / "table.md", table_markdown(cells_, summary()));
-  write_file(plan_.report / "report.html", comparison_html(cells_, summary(), captures));
+  write_file(plan_.report / "report.html", report_html(cells_, summary(), captures));
   for (const char* file : {"table.json", "table.md", "report.html"}) reporter_.wrote("comparison", plan_.report / file);
 }
 
@@ -511,7 +513,7 @@ void ComparisonRun::write_rating_sheet() const {
     for (const ReportMethod& method : report.methods) {
       const bool is_bound = method.name == "grey" || method.name == "oracle";
       for (std::size_t v = 0; v < method.views.size() && !is_bound; ++v) {
-        pictures.push_back({subject->name, report.view_names[v], method.name, method.views[v]});
+        pictures.push_back({subject->name, report.views[v], method.name, method.views[v]});
       }
     }
   }

@@ -18,7 +18,6 @@
 #include "src/compare/baselines/style_transfer.h"
 #include "src/compare/methods.h"
 #include "src/compare/report.h"
-#include "src/compare/table.h"
 #include "src/config/config.h"
 #include "src/evaluate/lpips.h"
 
@@ -65,20 +64,20 @@ class ComparisonRun {
   void collect(const Subject& subject, int seed);
   [[nodiscard]] std::string train(const Subject& subject, int seed, const std::filesystem::path& folder) const;
   void train_own_field(const Subject& subject, int seed, const Geometry& geometry, const Engines& engines,
-                       ComparisonCell& cell) const;
-  [[nodiscard]] ComparisonCell run_cell(const Subject& subject, const Method& method, int seed, Geometry& geometry,
-                                        const std::string& settings) const;
+                       Cell& cell) const;
+  [[nodiscard]] Cell run_cell(const Subject& subject, const Method& method, int seed, Geometry& geometry,
+                              const std::string& settings) const;
   [[nodiscard]] StyleReport transfer(const Subject& subject, const std::filesystem::path& stage1,
                                      const Stage2Options& options, Colorizer& colorizer,
                                      const std::filesystem::path& take) const;
   [[nodiscard]] Field field_of(const Subject& subject, const Method& method, const Geometry& geometry) const;
-  void colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry, ComparisonCell& cell) const;
-  void look(const Subject& subject, const Method& method, Geometry& geometry, ComparisonCell& cell) const;
+  void colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry, Cell& cell) const;
+  void look(const Subject& subject, const Method& method, Geometry& geometry, Cell& cell) const;
   [[nodiscard]] std::unique_ptr<Colorizer> colorizer_for(const Subject& subject, const Method& method, int seed) const;
   [[nodiscard]] std::filesystem::path folder_of(const Subject& subject, int seed) const;
   [[nodiscard]] std::filesystem::path write_strip(const Subject& subject) const;
   [[nodiscard]] ReportCapture report_of(const Subject& subject) const;
-  [[nodiscard]] ComparisonSummary summary() const;
+  [[nodiscard]] Summary summary() const;
 
   ComparisonPlan plan_;
   Config config_;
@@ -86,7 +85,7 @@ class ComparisonRun {
   const Engines& engines_;
   std::unique_ptr<Lpips> lpips_;
   std::vector<std::shared_ptr<Subject>> subjects_;
-  std::vector<ComparisonCell> cells_;
+  std::vector<Cell> cells_;
 };
 
 }  // namespace cnerf::compare

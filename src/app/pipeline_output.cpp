@@ -10,6 +10,7 @@
 #include "src/app/run_scene.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/json_record.h"
 #include "src/base/usage.h"
 #include "src/evaluate/evaluate.h"
 #include "src/picture/contact_sheet.h"
@@ -99,7 +100,7 @@ void evaluate_step(const RunContext& context, const std::string& take, const std
   metrics.take = take;
   metrics.colorizer = colorizer_name(directory, take);
 
-  const std::string json = to_json(metrics);
+  const std::string json = to_json(metrics).dump(2) + "\n";
   if (!take.empty()) write_file(directory.take_folder(take) / "metrics.json", json);
   write_file(directory.metrics_file(), json);
   write_png(directory.contact_sheet(), sheet.compose());

@@ -1,11 +1,5 @@
 #pragma once
-/// Records to and from JSON by their one list of fields, a static member template:
-///
-///     template <typename Self, typename Visitor>
-///     static void visit(Self& self, Visitor&& v) {
-///       v("pixels", self.pixels);           // required
-///       v("error", self.error, kOptional);  // left out where it equals its default
-///     }
+/// Records to and from JSON by their one list of fields (src/base/record.h).
 ///
 /// A field is a record itself, a std::optional (left out where it is empty), a std::vector, std::array or
 /// std::map<std::string, ...> of fields, a path, or whatever nlohmann::json converts. Keys that no field has are
@@ -24,12 +18,9 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/record.h"
 
 namespace cnerf {
-
-/// Marks a field that may be absent; it then keeps its default.
-struct OptionalField {};
-inline constexpr OptionalField kOptional;
 
 namespace json_record {
 using Json = nlohmann::ordered_json;

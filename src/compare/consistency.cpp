@@ -98,12 +98,9 @@ Consistency consistency(std::span<const SeenView> sequence, std::size_t step) {
       }
     }
   }
+  if (all.empty()) return {};
   Consistency result;
   result.pixels = all.size();
-  if (all.empty()) {
-    result.mean = result.p95 = std::numeric_limits<double>::quiet_NaN();
-    return result;
-  }
   result.mean = std::accumulate(all.begin(), all.end(), 0.0) / double(all.size());
   result.chroma = chroma / double(all.size());
   result.p95 = quantile(std::move(all), 0.95);

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "src/base/record.h"
 #include "src/capture/camera.h"
 #include "src/train/scene.h"
 
@@ -22,13 +23,21 @@ struct SeenView {
 
 /// Lab ab distances of carried pixels.
 struct Consistency {
-  double mean = 0, p95 = 0;  ///< ab units; NaN without any pixel
+  double mean = 0, p95 = 0;  ///< ab units
   std::size_t pixels = 0;    ///< carried and found visible
   double chroma = 0;         ///< mean chroma of these pixels: of two methods, the greyer one has the smaller distances
 
   /// Percent of the chroma: 0 = consistent, 141 = two colours of random hue; nothing for a grey picture.
   [[nodiscard]] std::optional<double> relative() const {
     return pixels > 0 && chroma > 0.1 ? std::optional(100 * mean / chroma) : std::nullopt;
+  }
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("pixels", self.pixels);
+    v("mean", self.mean, kOptional);
+    v("p95", self.p95, kOptional);
+    v("chroma", self.chroma, kOptional);
   }
 };
 

@@ -22,6 +22,13 @@ namespace cnerf::compare {
 struct LearningPoint {
   double seconds = 0;  ///< of training; measuring does not count
   double value = 0;    ///< dB or ab units
+
+  // As JSON: [seconds, value].
+  friend void to_json(auto& json, const LearningPoint& point) { json = {point.seconds, point.value}; }
+  friend void from_json(const auto& json, LearningPoint& point) {
+    json.at(0).get_to(point.seconds);
+    json.at(1).get_to(point.value);
+  }
 };
 
 /// When a curve first gets as good as `wanted`, between its points linearly; nothing where it never does.

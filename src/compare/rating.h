@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "src/compare/report.h"
 #include "src/compare/table.h"
 
 namespace cnerf::compare {
@@ -16,7 +15,7 @@ namespace cnerf::compare {
 /// A picture to judge.
 struct RatedPicture {
   std::string capture, view, method;
-  EncodedPicture picture;
+  std::string picture;  ///< `data:` URI
 };
 
 struct RatingSheet {

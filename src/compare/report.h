@@ -1,47 +1,59 @@
 #pragma once
 /// The comparison as one HTML file that needs nothing else: tables, pictures, a before/after slider, turntables, plots.
+/// What it shows is made here; how, by pages/report.html and pages/report.js.
 
-#include <cstddef>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "src/compare/table.h"
+#include "src/compare/results.h"
 
 namespace cnerf::compare {
 
-/// Bytes of a picture file.
-struct EncodedPicture {
-  std::string type;  ///< "jpeg" or "png"
-  std::vector<std::byte> bytes;
-};
-
-/// What one method shows of a capture.
+/// What one method shows of a capture. Pictures are `data:` URIs.
 struct ReportMethod {
-  std::string name;
-  std::vector<EncodedPicture> views;      ///< as `ReportCapture::view_names`; empty when the method failed
-  std::vector<EncodedPicture> turntable;  ///< frames in order
   struct Gallery {
-    std::string title;
-    EncodedPicture picture;
+    std::string title, picture;
+
+    template <typename Self, typename Visitor>
+    static void visit(Self& self, Visitor&& v) {
+      v("title", self.title);
+      v("picture", self.picture);
+    }
   };
-  std::vector<Gallery> galleries;  ///< of purification
+  std::string name;
+  std::vector<std::string> views;      ///< as `ReportCapture::views`; empty when the method failed
+  std::vector<std::string> turntable;  ///< frames in order
+  std::vector<Gallery> galleries;      ///< of purification
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("name", self.name);
+    v("views", self.views);
+    v("turntable", self.turntable);
+    v("galleries", self.galleries);
+  }
 };
 
 struct ReportCapture {
   std::string name;
-  std::vector<std::string> view_names;
-  std::vector<EncodedPicture> inputs, truths;  ///< as `view_names`; truths may be empty
+  std::vector<std::string> views;           ///< names
+  std::vector<std::string> inputs, truths;  ///< as `views`; truths may be empty
   std::vector<ReportMethod> methods;
   int frames_per_second = 12;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("name", self.name);
+    v("views", self.views);
+    v("inputs", self.inputs);
+    v("truths", self.truths);
+    v("methods", self.methods);
+    v("frames_per_second", self.frames_per_second);
+  }
 };
 
-[[nodiscard]] std::string comparison_html(std::span<const ComparisonCell> cells, const ComparisonSummary& summary,
-                                          std::span<const ReportCapture> captures);
-
-/// `data:` URI of a picture.
-[[nodiscard]] std::string data_uri(const EncodedPicture& picture);
-/// Text as HTML shows it.
-[[nodiscard]] std::string html_text(const std::string& text);
+[[nodiscard]] std::string report_html(std::span<const Cell> cells, const Summary& summary,
+                                      std::span<const ReportCapture> captures);
 
 }  // namespace cnerf::compare

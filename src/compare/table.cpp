@@ -4,22 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "src/base/error.h"
-#include "src/base/files.h"
+#include "src/base/check.h"
 #include "src/compare/methods.h"
 
 namespace cnerf::compare {
 namespace {
-using Json = nlohmann::ordered_json;
 
-constexpr int kTableSchemaVersion = 1;
 constexpr const char *kOwnMethod = "colornerf", *kOwnField = "positional-encoding";
 
 /// Mean of |difference| over views: views that are too colourful do not make up for those that are too grey.
-std::optional<double> colourfulness_gap(const ComparisonCell& cell) {
+std::optional<double> colourfulness_gap(const Cell& cell) {
   double sum = 0;
   int count = 0;
   for (const ViewMetrics& view : cell.metrics.views) {
@@ -34,79 +30,41 @@ std::optional<double> if_any(const Consistency& found, double Consistency::*valu
   return found.pixels > 0 ? std::optional(found.*value) : std::nullopt;
 }
 
-std::optional<double> acceptance(const ComparisonCell& cell) {
+std::optional<double> acceptance(const Cell& cell) {
   const int asked = cell.accepted + cell.rejected;
   return asked > 0 ? std::optional(100.0 * cell.accepted / asked) : std::nullopt;
 }
 
-constexpr ComparisonColumn kColumns[] = {
+constexpr Column kColumns[] = {
     {"psnr_rgb", "PSNR", 1, 2, "dB, of sRGB-encoded values of all three channels, mean over views",
-     [](const ComparisonCell& c) { return c.metrics.mean.psnr_rgb; }},
+     [](const Cell& c) { return c.metrics.mean.psnr_rgb; }},
     {"ssim_rgb", "SSIM", 1, 3, "Wang et al. 2004: Gaussian window 11 x 11, sigma 1.5; mean of the encoded channels",
-     [](const ComparisonCell& c) { return c.metrics.mean.ssim_rgb; }},
-    {"lpips", "LPIPS", -1, 3, "Zhang et al. 2018, version 0.1",
-     [](const ComparisonCell& c) { return c.metrics.mean.lpips; }},
+     [](const Cell& c) { return c.metrics.mean.ssim_rgb; }},
+    {"lpips", "LPIPS", -1, 3, "Zhang et al. 2018, version 0.1", [](const Cell& c) { return c.metrics.mean.lpips; }},
     {"colourfulness", "Colourful", 0, 2, "Hasler and Suesstrunk 2003",
-     [](const ComparisonCell& c) { return c.metrics.mean.colourfulness; }},
+     [](const Cell& c) { return c.metrics.mean.colourfulness; }},
     {"colourfulness_gap", "Δ Colourful", -1, 2, "mean over views of the absolute difference to the truth's",
      colourfulness_gap},
     {"ab_error", "ab error", -1, 2, "mean Lab ab distance to the truth",
-     [](const ComparisonCell& c) { return c.metrics.mean.ab_error; }},
+     [](const Cell& c) { return c.metrics.mean.ab_error; }},
     {"short_range", "Short", -1, 2, "cross-view consistency, neighbouring frames of the turntable: mean ab distance",
-     [](const ComparisonCell& c) { return if_any(c.short_range, &Consistency::mean); }},
+     [](const Cell& c) { return if_any(c.short_range, &Consistency::mean); }},
     {"short_range_p95", "Short 95 %", -1, 2, "its 95th percentile",
-     [](const ComparisonCell& c) { return if_any(c.short_range, &Consistency::p95); }},
+     [](const Cell& c) { return if_any(c.short_range, &Consistency::p95); }},
     {"long_range", "Long", -1, 2, "the same for frames an eighth of the turntable apart",
-     [](const ComparisonCell& c) { return if_any(c.long_range, &Consistency::mean); }},
+     [](const Cell& c) { return if_any(c.long_range, &Consistency::mean); }},
     {"long_range_p95", "Long 95 %", -1, 2, "its 95th percentile",
-     [](const ComparisonCell& c) { return if_any(c.long_range, &Consistency::p95); }},
+     [](const Cell& c) { return if_any(c.long_range, &Consistency::p95); }},
     {"short_relative", "Short %", -1, 1, "short-range mean distance in percent of the mean chroma: grey hides flicker",
-     [](const ComparisonCell& c) { return c.short_range.relative(); }},
+     [](const Cell& c) { return c.short_range.relative(); }},
     {"long_relative", "Long %", -1, 1, "the same of the long range",
-     [](const ComparisonCell& c) { return c.long_range.relative(); }},
+     [](const Cell& c) { return c.long_range.relative(); }},
     {"acceptance", "Accepted", 0, 0, "percent of the colorizer's answers that purification let pass", acceptance},
     {"seconds", "Stage 2", 0, 0, "seconds",
-     [](const ComparisonCell& c) { return c.seconds > 0 ? std::optional(c.seconds) : std::nullopt; }},
+     [](const Cell& c) { return c.seconds > 0 ? std::optional(c.seconds) : std::nullopt; }},
 };
 constexpr const char* kClaims[] = {"lpips",          "colourfulness_gap", "short_range", "long_range",
                                    "short_relative", "long_relative",     "psnr_rgb"};
-
-constexpr const char* kRacesMeaning =
-    "The hash grid (`colornerf`) against the paper's field (`positional-encoding`), on the same held-out pixels while "
-    "they train: PSNR of luminance in stage 1, ab error in stage 2. Seconds of training alone; means over seeds.";
-
-Json json_of(const Consistency& found) {
-  Json json = {{"pixels", found.pixels}};
-  if (found.pixels > 0) json.update({{"mean", found.mean}, {"p95", found.p95}, {"chroma", found.chroma}});
-  return json;
-}
-
-Consistency consistency_of(const Json& json) {
-  return {json.value("mean", 0.0), json.value("p95", 0.0), json.at("pixels").get<std::size_t>(),
-          json.value("chroma", 0.0)};
-}
-
-/// [[seconds, value], ...]
-Json json_of(const std::vector<LearningPoint>& curve) {
-  Json json = Json::array();
-  for (const LearningPoint& point : curve) json.push_back({point.seconds, point.value});
-  return json;
-}
-
-std::vector<LearningPoint> curve_of(const Json& json) {
-  std::vector<LearningPoint> curve;
-  for (const Json& point : json) curve.push_back({point.at(0), point.at(1)});
-  return curve;
-}
-
-ViewMetrics view_metrics_of(const Json& json) {
-  ViewMetrics metrics;
-  metrics.view = json.value("view", "");
-  ViewMetrics::visit(metrics, [&](const char* name, std::optional<double>& value) {
-    if (const auto found = json.find(name); found != json.end()) value = found->get<double>();
-  });
-  return metrics;
-}
 
 /// Upper 2.5 % point of Student's t.
 double student_t(int degrees) {
@@ -115,22 +73,26 @@ double student_t(int degrees) {
   return 1.960 + 2.37 / degrees + 2.82 / (double(degrees) * degrees);  // within 0.002 of the tables
 }
 
-std::vector<std::string> methods_of(std::span<const ComparisonCell> cells) {
+double mean_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
+}
+
+std::vector<std::string> methods_of(std::span<const Cell> cells) {
   std::vector<std::string> present;
   for (const std::string& name : method_names()) {
-    if (std::ranges::find(cells, name, &ComparisonCell::method) != cells.end()) present.push_back(name);
+    if (std::ranges::find(cells, name, &Cell::method) != cells.end()) present.push_back(name);
   }
-  for (const ComparisonCell& cell : cells) {
+  for (const Cell& cell : cells) {
     if (std::ranges::find(present, cell.method) == present.end()) present.push_back(cell.method);
   }
   return present;
 }
 
-/// One value a seed: of the capture, or the mean over the captures that have one of that seed.
-std::vector<double> values_by_seed(std::span<const ComparisonCell> cells, const std::string& method,
-                                   const std::string& capture, const ComparisonColumn& column) {
+/// One value per seed: of the capture, or the mean over the captures that have one of that seed.
+std::vector<double> values_by_seed(std::span<const Cell> cells, const std::string& method, const std::string& capture,
+                                   const Column& column) {
   std::vector<std::pair<int, std::vector<double>>> seeds;
-  for (const ComparisonCell& cell : cells) {
+  for (const Cell& cell : cells) {
     if (cell.method != method || !cell.error.empty() || (!capture.empty() && cell.capture != capture)) continue;
     const std::optional<double> value = column.value(cell);
     if (!value) continue;
@@ -139,9 +101,7 @@ std::vector<double> values_by_seed(std::span<const ComparisonCell> cells, const 
     seed->second.push_back(*value);
   }
   std::vector<double> means;
-  for (const auto& [seed, values] : seeds) {
-    means.push_back(std::accumulate(values.begin(), values.end(), 0.0) / double(values.size()));
-  }
+  for (const auto& [seed, values] : seeds) means.push_back(mean_of(values));
   return means;
 }
 
@@ -149,81 +109,74 @@ bool is_rival(const std::string& method) {
   return method != kOwnMethod && method != "grey" && method != "oracle";
 }
 
-std::string text_of(const std::optional<Estimate>& value, int digits) {
-  if (!value) return "";
-  const std::string mean = fmt::format("{:.{}f}", value->mean, digits);
-  return value->n > 1 ? fmt::format("{} ± {:.{}f}", mean, value->half_width, digits) : mean;
+/// Calls `use(own, other)` for the cells of the own and another method of equal capture and seed that did not fail.
+template <typename Use>
+void for_pairs(std::span<const Cell> cells, const std::string& method, Use&& use) {
+  for (const Cell& own : cells) {
+    if (own.method != kOwnMethod || !own.error.empty()) continue;
+    for (const Cell& other : cells) {
+      const bool is_pair = other.method == method && other.capture == own.capture && other.seed == own.seed;
+      if (is_pair && other.error.empty()) use(own, other);
+    }
+  }
 }
 
-std::string markdown_rows(const std::vector<ComparisonRow>& rows) {
-  std::string text = "| Method |", line = "|---|";
-  for (const ComparisonColumn& column : kColumns) {
-    text += fmt::format(" {}{} |", column.title, column.better > 0 ? " ↑" : column.better < 0 ? " ↓" : "");
-    line += "---|";
+Duel duel_of(std::span<const Cell> cells, const std::string& method, const Column& column) {
+  Duel duel{method, column.name};
+  for_pairs(cells, method, [&](const Cell& own, const Cell& other) {
+    const auto ours = column.value(own), theirs = column.value(other);
+    if (!ours || !theirs) return;
+    const double gain = column.better * (*ours - *theirs);
+    duel.wins += gain > 0 ? 1 : 0;
+    duel.pairs += 1;
+    duel.mean_gain += gain;
+  });
+  duel.mean_gain /= std::max(duel.pairs, 1);
+  return duel;
+}
+
+TrainingRace race_of(std::span<const Cell> cells, const std::string& capture, int stage) {
+  TrainingRace race;
+  race.capture = capture;
+  race.stage = stage;
+  for_pairs(cells, kOwnField, [&](const Cell& own, const Cell& other) {
+    const auto& ours = stage == 1 ? own.stage1_curve : own.stage2_curve;
+    const auto& theirs = stage == 1 ? other.stage1_curve : other.stage2_curve;
+    if (own.capture != capture || ours.empty() || theirs.empty()) return;
+    ++race.seeds;
+    race.grid.seconds += ours.back().seconds;
+    race.grid.value += ours.back().value;
+    race.field.seconds += theirs.back().seconds;
+    race.field.value += theirs.back().value;
+    race.grid_after_tenth += value_at(ours, theirs.back().seconds / 10);
+    const std::optional<double> reached = seconds_to(theirs, ours.back().value, stage == 1 ? 1 : -1);
+    race.reached += reached ? 1 : 0;
+    race.reached_after += reached.value_or(0);
+  });
+  for (double* sum :
+       {&race.grid.seconds, &race.grid.value, &race.field.seconds, &race.field.value, &race.grid_after_tenth}) {
+    *sum /= std::max(race.seeds, 1);
   }
-  text += "\n" + line + "\n";
-  for (const ComparisonRow& row : rows) {
-    text += "| " + row.method + " |";
-    for (std::size_t c = 0; c < row.columns.size(); ++c)
-      text += " " + text_of(row.columns[c], kColumns[c].digits) + " |";
-    text += "\n";
-  }
-  for (const ComparisonRow& row : rows) {
-    if (!row.error.empty()) text += "\n`" + row.method + "` failed: " + row.error + "\n";
-  }
-  return text;
+  race.reached_after /= std::max(race.reached, 1);
+  return race;
 }
 
 }  // namespace
 
-std::span<const ComparisonColumn> comparison_columns() {
+std::span<const Column> columns() {
   return kColumns;
 }
 
-std::string to_json(const ComparisonCell& cell) {
-  Json json = {{"capture", cell.capture}, {"method", cell.method}, {"seed", cell.seed}, {"settings", cell.settings}};
-  if (!cell.error.empty()) json["error"] = cell.error;
-  json["metrics"] = Json::parse(to_json(cell.metrics));
-  json["short_range"] = json_of(cell.short_range);
-  json["long_range"] = json_of(cell.long_range);
-  json["accepted"] = cell.accepted;
-  json["rejected"] = cell.rejected;
-  json["seconds"] = cell.seconds;
-  if (!cell.stage1_curve.empty()) json["stage1_curve"] = json_of(cell.stage1_curve);
-  if (!cell.stage2_curve.empty()) json["stage2_curve"] = json_of(cell.stage2_curve);
-  return json.dump(2) + "\n";
-}
-
-ComparisonCell read_cell(const std::filesystem::path& file) {
-  try {
-    const Json json = Json::parse(read_text_file(file));
-    ComparisonCell cell;
-    cell.capture = json.at("capture");
-    cell.method = json.at("method");
-    cell.seed = json.at("seed");
-    cell.settings = json.at("settings");
-    cell.error = json.value("error", "");
-    const Json& metrics = json.at("metrics");
-    cell.metrics = {
-        metrics.at("split"), metrics.at("take"), metrics.at("colorizer"), view_metrics_of(metrics.at("mean")), {}};
-    for (const Json& view : metrics.at("views")) cell.metrics.views.push_back(view_metrics_of(view));
-    cell.short_range = consistency_of(json.at("short_range"));
-    cell.long_range = consistency_of(json.at("long_range"));
-    cell.accepted = json.at("accepted");
-    cell.rejected = json.at("rejected");
-    cell.seconds = json.at("seconds");
-    cell.stage1_curve = curve_of(json.value("stage1_curve", Json::array()));
-    cell.stage2_curve = curve_of(json.value("stage2_curve", Json::array()));
-    return cell;
-  } catch (const nlohmann::json::exception& problem) {
-    throw InputError(file.string() + ": " + problem.what());
-  }
+const Column& column_named(const std::string& name) {
+  const auto* column = std::ranges::find_if(kColumns, [&](const Column& each) { return each.name == name; });
+  CNERF_CHECK(column != std::end(kColumns), "no column of that name");
+  return *column;
 }
 
 std::optional<Estimate> estimate(std::span<const double> values) {
   if (values.empty()) return std::nullopt;
   const auto n = int(values.size());
-  Estimate result{std::accumulate(values.begin(), values.end(), 0.0) / n, 0, n};
+  Estimate result{mean_of({values.begin(), values.end()}), n, {}};
   if (n == 1) return result;
   double squares = 0;
   for (const double value : values) squares += (value - result.mean) * (value - result.mean);
@@ -231,23 +184,29 @@ std::optional<Estimate> estimate(std::span<const double> values) {
   return result;
 }
 
-std::vector<std::string> captures_of(std::span<const ComparisonCell> cells) {
+std::string text_of(const std::optional<Estimate>& value, int digits) {
+  if (!value) return "";
+  const std::string mean = fmt::format("{:.{}f}", value->mean, digits);
+  return value->half_width ? fmt::format("{} ± {:.{}f}", mean, *value->half_width, digits) : mean;
+}
+
+std::vector<std::string> captures_of(std::span<const Cell> cells) {
   std::vector<std::string> captures;
-  for (const ComparisonCell& cell : cells) {
+  for (const Cell& cell : cells) {
     if (std::ranges::find(captures, cell.capture) == captures.end()) captures.push_back(cell.capture);
   }
   return captures;
 }
 
-std::vector<ComparisonRow> table_rows(std::span<const ComparisonCell> cells, const std::string& capture) {
-  std::vector<ComparisonRow> rows;
+std::vector<Row> table_rows(std::span<const Cell> cells, const std::string& capture) {
+  std::vector<Row> rows;
   for (const std::string& method : methods_of(cells)) {
-    ComparisonRow row{method, {}, {}};
-    for (const ComparisonCell& cell : cells) {
+    Row row{method, {}, {}};
+    for (const Cell& cell : cells) {
       const bool is_of_row = cell.method == method && (capture.empty() || cell.capture == capture);
       if (is_of_row && row.error.empty()) row.error = cell.error;
     }
-    for (const ComparisonColumn& column : kColumns) {
+    for (const Column& column : kColumns) {
       row.columns.push_back(estimate(values_by_seed(cells, method, capture, column)));
     }
     rows.push_back(std::move(row));
@@ -255,165 +214,26 @@ std::vector<ComparisonRow> table_rows(std::span<const ComparisonCell> cells, con
   return rows;
 }
 
-std::vector<Duel> duels(std::span<const ComparisonCell> cells) {
+std::vector<Duel> duels(std::span<const Cell> cells) {
   std::vector<Duel> all;
   for (const std::string& method : methods_of(cells)) {
-    if (!is_rival(method)) continue;
     for (const char* name : kClaims) {
-      const auto* column = std::ranges::find(kColumns, std::string_view(name),
-                                             [](const ComparisonColumn& c) { return std::string_view(c.name); });
-      Duel duel{method, column, 0, 0, 0};
-      for (const ComparisonCell& own : cells) {
-        if (own.method != kOwnMethod || !own.error.empty()) continue;
-        for (const ComparisonCell& other : cells) {
-          const bool is_pair = other.method == method && other.capture == own.capture && other.seed == own.seed;
-          if (!is_pair || !other.error.empty()) continue;
-          const auto ours = column->value(own), theirs = column->value(other);
-          if (!ours || !theirs) continue;
-          const double gain = column->better * (*ours - *theirs);
-          duel.wins += gain > 0 ? 1 : 0;
-          duel.pairs += 1;
-          duel.mean_gain += gain;
-        }
-      }
-      if (duel.pairs == 0) continue;
-      duel.mean_gain /= duel.pairs;
-      all.push_back(duel);
+      const Duel duel = duel_of(cells, method, column_named(name));
+      if (is_rival(method) && duel.pairs > 0) all.push_back(duel);
     }
   }
   return all;
 }
 
-std::vector<TrainingRace> training_races(std::span<const ComparisonCell> cells) {
+std::vector<TrainingRace> training_races(std::span<const Cell> cells) {
   std::vector<TrainingRace> races;
   for (const std::string& capture : captures_of(cells)) {
     for (const int stage : {1, 2}) {
-      const int better = stage == 1 ? 1 : -1;
-      TrainingRace race{.capture = capture, .stage = stage};
-      for (const ComparisonCell& grid : cells) {
-        if (grid.capture != capture || grid.method != kOwnMethod || !grid.error.empty()) continue;
-        for (const ComparisonCell& field : cells) {
-          const bool is_pair = field.capture == capture && field.method == kOwnField && field.seed == grid.seed;
-          const auto& ours = stage == 1 ? grid.stage1_curve : grid.stage2_curve;
-          const auto& theirs = stage == 1 ? field.stage1_curve : field.stage2_curve;
-          if (!is_pair || !field.error.empty() || ours.empty() || theirs.empty()) continue;
-          ++race.seeds;
-          race.grid_seconds += ours.back().seconds;
-          race.grid_value += ours.back().value;
-          race.field_seconds += theirs.back().seconds;
-          race.field_value += theirs.back().value;
-          race.grid_after_tenth += value_at(ours, theirs.back().seconds / 10);
-          const std::optional<double> reached = seconds_to(theirs, ours.back().value, better);
-          race.reached += reached ? 1 : 0;
-          race.reached_after += reached.value_or(0);
-        }
-      }
-      if (race.seeds == 0) continue;
-      for (double* sum :
-           {&race.grid_seconds, &race.grid_value, &race.field_seconds, &race.field_value, &race.grid_after_tenth}) {
-        *sum /= race.seeds;
-      }
-      race.reached_after /= std::max(race.reached, 1);
-      races.push_back(std::move(race));
+      TrainingRace race = race_of(cells, capture, stage);
+      if (race.seeds > 0) races.push_back(std::move(race));
     }
   }
   return races;
-}
-
-std::string races_markdown(std::span<const ComparisonCell> cells) {
-  const std::vector<TrainingRace> races = training_races(cells);
-  if (races.empty()) return "";
-  std::string text =
-      "| Capture | Stage | hash grid | comes to | MLP | comes to | of the hash grid's time | as good as the hash grid "
-      "after | hash grid after 1/10 of the MLP's time |\n|---|---|---|---|---|---|---|---|---|\n";
-  for (const TrainingRace& race : races) {
-    const char* unit = race.stage == 1 ? " dB" : " ab";
-    const std::string reached = race.reached == 0 ? "never"
-                                : race.reached == race.seeds
-                                    ? fmt::format("{:.1f} s", race.reached_after)
-                                    : fmt::format("{:.1f} s in {} of {}", race.reached_after, race.reached, race.seeds);
-    text +=
-        fmt::format("| {} | {} | {:.1f} s | {:.2f}{} | {:.1f} s | {:.2f}{} | {:.1f} | {} | {:.2f}{} |\n", race.capture,
-                    race.stage, race.grid_seconds, race.grid_value, unit, race.field_seconds, race.field_value, unit,
-                    race.field_seconds / std::max(race.grid_seconds, 1e-9), reached, race.grid_after_tenth, unit);
-  }
-  return text;
-}
-
-std::string table_json(std::span<const ComparisonCell> cells, const ComparisonSummary& summary) {
-  Json json = {{"schema_version", kTableSchemaVersion},
-               {"colorizer", summary.colorizer},
-               {"lpips", summary.lpips},
-               {"command_line", summary.command_line}};
-  for (const ComparisonColumn& column : kColumns) {
-    json["columns"].push_back(
-        {{"name", column.name}, {"title", column.title}, {"better", column.better}, {"help", column.help}});
-  }
-  std::vector<std::string> captures = captures_of(cells);
-  if (captures.size() > 1) captures.emplace_back();
-  for (const std::string& capture : captures) {
-    Json table = {{"capture", capture.empty() ? "all" : capture}, {"rows", Json::array()}};
-    for (const ComparisonRow& row : table_rows(cells, capture)) {
-      Json entry = {{"method", row.method}};
-      if (!row.error.empty()) entry["error"] = row.error;
-      for (std::size_t c = 0; c < row.columns.size(); ++c) {
-        if (!row.columns[c]) continue;
-        entry[kColumns[c].name] = {{"mean", row.columns[c]->mean}, {"n", row.columns[c]->n}};
-        if (row.columns[c]->n > 1) entry[kColumns[c].name]["ci95"] = row.columns[c]->half_width;
-      }
-      table["rows"].push_back(std::move(entry));
-    }
-    json["tables"].push_back(std::move(table));
-  }
-  json["duels"] = Json::array();
-  for (const Duel& duel : duels(cells)) {
-    json["duels"].push_back({{"against", duel.method},
-                             {"column", duel.column->name},
-                             {"wins", duel.wins},
-                             {"pairs", duel.pairs},
-                             {"mean_gain", duel.mean_gain}});
-  }
-  for (const TrainingRace& race : training_races(cells)) {
-    json["training_times"].push_back({{"capture", race.capture},
-                                      {"stage", race.stage},
-                                      {"seeds", race.seeds},
-                                      {"hash_grid", {{"seconds", race.grid_seconds}, {"value", race.grid_value}}},
-                                      {"mlp", {{"seconds", race.field_seconds}, {"value", race.field_value}}},
-                                      {"reached", race.reached},
-                                      {"reached_after", race.reached_after},
-                                      {"hash_grid_after_tenth", race.grid_after_tenth}});
-  }
-  json["cells"] = Json::array();
-  for (const ComparisonCell& cell : cells) json["cells"].push_back(Json::parse(to_json(cell)));
-  return json.dump(2) + "\n";
-}
-
-std::string table_markdown(std::span<const ComparisonCell> cells, const ComparisonSummary& summary) {
-  std::string text = "Colorizer: `" + summary.colorizer + "`" +
-                     (summary.lpips.empty() ? "; LPIPS not measured (--lpips-weights)" : "; LPIPS: " + summary.lpips) +
-                     "\n";
-  for (const std::string& capture : captures_of(cells)) {
-    text += "\n## " + capture + "\n\n" + markdown_rows(table_rows(cells, capture));
-  }
-  if (captures_of(cells).size() > 1) text += "\n## All captures\n\n" + markdown_rows(table_rows(cells, ""));
-  const std::vector<Duel> all = duels(cells);
-  if (!all.empty()) {
-    text +=
-        "\n## colornerf against the others\n\n"
-        "Pairs of equal capture and seed in which colornerf is better, and by how much on average (above 0: "
-        "better).\n\n| Against | Number | Better in | Mean gain |\n|---|---|---|---|\n";
-    for (const Duel& duel : all) {
-      text += fmt::format("| {} | {} | {} of {} | {:+.{}f} |\n", duel.method, duel.column->title, duel.wins, duel.pairs,
-                          duel.mean_gain, duel.column->digits + 1);
-    }
-  }
-  if (const std::string races = races_markdown(cells); !races.empty()) {
-    text += "\n## Training times\n\n" + std::string(kRacesMeaning) + "\n\n" + races;
-  }
-  text += "\n## What the numbers mean\n\n";
-  for (const ComparisonColumn& column : kColumns) text += fmt::format("* **{}**: {}\n", column.title, column.help);
-  text += "* ±: 95 % confidence interval of the mean over seeds (Student's t)\n";
-  return text;
 }
 
 }  // namespace cnerf::compare

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "src/base/check.h"
 #include "src/base/error.h"
@@ -78,7 +77,7 @@ void measure_by_network(const EvaluatedView& pictures, const Lpips& lpips, ViewM
 
 /// A number without a pixel behind it is no number.
 void drop_nan(ViewMetrics& metrics) {
-  ViewMetrics::visit(metrics, [](const char*, std::optional<double>& value) {
+  ViewMetrics::visit_numbers(metrics, [](const char*, std::optional<double>& value) {
     if (value && !std::isfinite(*value)) value.reset();
   });
 }
@@ -97,15 +96,6 @@ void paint_grey(RenderedImage& image) {
   for (const float y : image.luminance) image.rgb.insert(image.rgb.end(), {y, y, y});
 }
 
-nlohmann::ordered_json json_of(const ViewMetrics& metrics) {
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  if (!metrics.view.empty()) json["view"] = metrics.view;
-  ViewMetrics::visit(metrics, [&](const char* name, const std::optional<double>& value) {
-    if (value) json[name] = *value;
-  });
-  return json;
-}
-
 }  // namespace
 
 ViewMetrics mean_of(const std::vector<ViewMetrics>& views) {
@@ -116,7 +106,7 @@ ViewMetrics mean_of(const std::vector<ViewMetrics>& views) {
   std::vector<std::pair<std::string, Sum>> sums;
   for (const ViewMetrics& view : views) {
     std::size_t index = 0;
-    ViewMetrics::visit(view, [&](const char* name, const std::optional<double>& value) {
+    ViewMetrics::visit_numbers(view, [&](const char* name, const std::optional<double>& value) {
       if (index == sums.size()) sums.emplace_back(name, Sum{});
       if (value) sums[index].second = {sums[index].second.sum + *value, sums[index].second.count + 1};
       ++index;
@@ -124,7 +114,7 @@ ViewMetrics mean_of(const std::vector<ViewMetrics>& views) {
   }
   ViewMetrics mean;
   std::size_t index = 0;
-  ViewMetrics::visit(mean, [&](const char*, std::optional<double>& value) {
+  ViewMetrics::visit_numbers(mean, [&](const char*, std::optional<double>& value) {
     if (index < sums.size() && sums[index].second.count > 0) value = sums[index].second.sum / sums[index].second.count;
     ++index;
   });
@@ -197,18 +187,6 @@ Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptio
   }
   metrics.mean = mean_of(metrics.views);
   return metrics;
-}
-
-std::string to_json(const Metrics& metrics) {
-  nlohmann::ordered_json json;
-  json["schema_version"] = kMetricsSchemaVersion;
-  json["split"] = metrics.split;
-  json["take"] = metrics.take;
-  json["colorizer"] = metrics.colorizer;
-  json["mean"] = json_of(metrics.mean);
-  json["views"] = nlohmann::ordered_json::array();
-  for (const ViewMetrics& view : metrics.views) json["views"].push_back(json_of(view));
-  return json.dump(2) + "\n";
 }
 
 }  // namespace cnerf

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "src/base/progress.h"
+#include "src/base/record.h"
 #include "src/capture/capture.h"
 #include "src/capture/color_truth.h"
 #include "src/evaluate/lpips.h"
@@ -32,9 +33,14 @@ struct ViewMetrics {
   std::optional<double> ab_error_grey;     ///< what an all-grey picture would get
   std::optional<double> bake_ab_distance;  ///< per-pixel decode against composited per-sample colour, opacity >= 0.01
 
-  /// Calls `visitor(name, number)` for each number; the one list of them.
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& visitor) {
+    visitor("view", self.view, kOptional);
+    visit_numbers(self, visitor);
+  }
+  /// Calls `visitor(name, number)` for each number; the one list of them.
+  template <typename Self, typename Visitor>
+  static void visit_numbers(Self& self, Visitor&& visitor) {
     visitor("psnr_luminance", self.psnr_luminance);
     visitor("psnr_rgb", self.psnr_rgb);
     visitor("ssim", self.ssim);
@@ -53,10 +59,22 @@ struct ViewMetrics {
 };
 
 struct Metrics {
+  int schema_version = kMetricsSchemaVersion;
   std::string split;            ///< "held-out", or "train" when nothing was held out
   std::string take, colorizer;  ///< filled in by the caller; empty = not colorized
   ViewMetrics mean;             ///< mean over the views that have the number; of dB for PSNR
   std::vector<ViewMetrics> views;
+
+  /// metrics.json
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor("schema_version", self.schema_version);
+    visitor("split", self.split);
+    visitor("take", self.take);
+    visitor("colorizer", self.colorizer);
+    visitor("mean", self.mean);
+    visitor("views", self.views);
+  }
 };
 
 /// The pictures behind one view's numbers.
@@ -88,8 +106,5 @@ struct EvaluateOptions {
 
 /// The mean over the views that have a number, for each number.
 [[nodiscard]] ViewMetrics mean_of(const std::vector<ViewMetrics>& views);
-
-/// `{"schema_version": 1, "split", "take", "colorizer", "mean": {...}, "views": [...]}`; absent numbers are left out.
-[[nodiscard]] std::string to_json(const Metrics& metrics);
 
 }  // namespace cnerf
