@@ -9,47 +9,17 @@
 #include "src/app/path_file.h"
 #include "src/base/error.h"
 #include "src/base/statistics.h"
+#include "src/capture/arrangement.h"
 
 namespace cnerf {
 namespace {
 
 constexpr double kTwoPi = 2 * std::numbers::pi;
-constexpr double kForwardFacingCosine =
-    0.85;                                // mean of viewing directions is longer than this: within about 30 degrees
 constexpr double kOpenGap = kTwoPi / 3;  // an arc without cameras wider than this is not flown through
 
 Vec3d position_of(const View& view) {
   return view.world_from_camera.translation;
 }
-Vec3d forward_of(const View& view) {
-  return view.world_from_camera.linear.column(2);
-}
-Vec3d up_of(const View& view) {
-  return -view.world_from_camera.linear.column(1);
-}
-
-template <typename Of>
-Vec3d mean_over(const Capture& capture, Of of) {
-  Vec3d sum{};
-  for (const View& view : capture.views) sum += of(view);
-  return sum / double(capture.views.size());
-}
-
-/// Distance ahead of the cameras at which most of the scene lies.
-double typical_depth(const Capture& capture, Vec3d eye, Vec3d forward) {
-  // Depth is perceived by its inverse; LLFF weighs near and far the same way.
-  if (capture.depth_range) return 1 / (0.25 / capture.depth_range->near + 0.75 / capture.depth_range->far);
-  std::vector<double> depths;
-  for (const Vec3d& point : capture.points) {
-    const double depth = dot(point - eye, forward);
-    if (depth > 0) depths.push_back(depth);
-  }
-  if (!depths.empty()) return quantile(depths, 0.5);
-  double spread = 0;
-  for (const View& view : capture.views) spread = std::max(spread, length(position_of(view) - eye));
-  return 4 * spread;
-}
-
 /// A pinhole of the first view's field of view, at the size the configuration asks for, even for video codecs.
 Intrinsics path_intrinsics(const Capture& capture, const RenderConfig& config) {
   const Intrinsics& source = capture.views.front().intrinsics;
@@ -121,33 +91,9 @@ Affined look_at(Vec3d position, Vec3d target, Vec3d up) {
   return {Mat3d::from_columns(right, cross(forward, right), forward), position};
 }
 
-bool is_forward_facing(const Capture& capture) {
-  return length(mean_over(capture, forward_of)) > kForwardFacingCosine;
-}
-
-Vec3d focus_point(const Capture& capture) {
-  const Vec3d eye = mean_over(capture, position_of);
-  const Vec3d mean_forward = mean_over(capture, forward_of);
-  if (is_forward_facing(capture)) {
-    const Vec3d forward = normalized(mean_forward);
-    return eye + forward * typical_depth(capture, eye, forward);
-  }
-  Mat3d normal_matrix{};
-  Vec3d right_side{};
-  for (const View& view : capture.views) {
-    const Vec3d d = forward_of(view);
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) normal_matrix.rows[i][j] += (i == j ? 1.0 : 0.0) - d[i] * d[j];
-      right_side[i] += position_of(view)[i] - d[i] * dot(d, position_of(view));
-    }
-  }
-  return normal_matrix.inverse() * right_side;
-}
-
 CameraPath spiral_path(const Capture& capture, const RenderConfig& config) {
-  const Vec3d eye = mean_over(capture, position_of);
-  const Vec3d focus = focus_point(capture);
-  const Vec3d up = normalized(mean_over(capture, up_of));
+  const CameraArrangement cameras = arrangement_of(capture);
+  const Vec3d eye = cameras.eye, focus = cameras.focus, up = cameras.up;
   const Mat3d axes = look_at(eye, focus, up).linear;
   Vec3d reach{};
   for (int axis = 0; axis < 3; ++axis) {
@@ -166,8 +112,8 @@ CameraPath spiral_path(const Capture& capture, const RenderConfig& config) {
 }
 
 CameraPath orbit_path(const Capture& capture, const RenderConfig& config) {
-  const Vec3d focus = focus_point(capture);
-  const Cylinder cylinder = cylinder_about(focus, normalized(mean_over(capture, up_of)));
+  const CameraArrangement cameras = arrangement_of(capture);
+  const Cylinder cylinder = cylinder_about(cameras.focus, cameras.up);
   std::vector<double> angles, radii, heights;
   for (const View& view : capture.views) {
     angles.push_back(cylinder.angle(position_of(view)));
@@ -180,13 +126,13 @@ CameraPath orbit_path(const Capture& capture, const RenderConfig& config) {
   for (int i = 0; i < config.frames; ++i) {
     const Vec3d position =
         cylinder.point(angle_on(arc, double(i) / config.frames), quantile(radii, 0.5), quantile(heights, 0.5));
-    path.cameras.push_back({frame_name(i), intrinsics, look_at(position, focus, cylinder.up)});
+    path.cameras.push_back({frame_name(i), intrinsics, look_at(position, cameras.focus, cameras.up)});
   }
   return path;
 }
 
 CameraPath turntable_path(const Capture& capture, const RenderConfig& config) {
-  CameraPath path = is_forward_facing(capture) ? spiral_path(capture, config) : orbit_path(capture, config);
+  CameraPath path = arrangement_of(capture).forward_facing ? spiral_path(capture, config) : orbit_path(capture, config);
   path.name = "turntable";
   return path;
 }

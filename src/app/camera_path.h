@@ -21,13 +21,6 @@ struct CameraPath {
   std::vector<PathCamera> cameras;
 };
 
-/// True when all cameras look about the same way, as in a capture of a facade: an orbit would leave what was seen.
-[[nodiscard]] bool is_forward_facing(const Capture& capture);
-
-/// The point the optical axes of all views pass closest to (least squares); for nearly parallel axes a point ahead of
-/// the cameras at the depth the capture states or its points have.
-[[nodiscard]] Vec3d focus_point(const Capture& capture);
-
 /// A closed ellipse in the plane of the cameras, looking at the focus (Mildenhall et al. 2019).
 [[nodiscard]] CameraPath spiral_path(const Capture& capture, const RenderConfig& config);
 /// A circle about the focus at the cameras' median distance and height. Where the cameras leave more than a third of

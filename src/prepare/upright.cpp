@@ -11,7 +11,6 @@
 #include "src/base/error.h"
 #include "src/base/rng.h"
 #include "src/base/statistics.h"
-#include "src/capture/focus.h"
 
 namespace cnerf {
 namespace {
@@ -24,8 +23,8 @@ constexpr double kAxesSpread = 0.02;
 constexpr double kLevelWithin = 60 * kDegree;   ///< of up by axes and up by tops, or the axes mislead (upright formats)
 constexpr double kGroundWithin = 30 * kDegree;  ///< of a ground's normal and up by cameras
 constexpr double kGroundThickness = 0.02;       ///< of the points' median distance from their middle
+constexpr double kLeastSpread = 1e-10;          ///< of rays that meet, see nearest_point
 constexpr double kGroundShare = 0.12, kBelowGround = 0.05;
-constexpr double kForwardWithin = 30 * kDegree;  ///< of every optical axis and their mean, in forward-facing captures
 
 Vec3d median_of(const std::vector<Vec3d>& points) {
   Vec3d out;
@@ -41,20 +40,6 @@ void add_outer(Mat3d& sum, Vec3d v) {
   for (int row = 0; row < 3; ++row) sum.rows[row] += v * v[row];
 }
 
-Vec3d mean_axis(const std::vector<View>& views) {
-  Vec3d sum{};
-  for (const View& view : views) sum += view.world_from_camera.linear.column(2);
-  return sum / double(views.size());
-}
-
-bool is_forward_facing(const std::vector<View>& views) {
-  const Vec3d mean = mean_axis(views);
-  if (length(mean) < 0.5) return false;
-  return std::ranges::all_of(views, [&](const View& view) {
-    return dot(view.world_from_camera.linear.column(2), normalized(mean)) > std::cos(kForwardWithin);
-  });
-}
-
 /// Whether a view shows a point, and how deep.
 std::optional<double> depth_in_view(const View& view, Vec3d point) {
   const Vec3d in_camera = view.world_from_camera.inverse().point(point);
@@ -65,23 +50,6 @@ std::optional<double> depth_in_view(const View& view, Vec3d point) {
     return std::nullopt;
   }
   return in_camera.z;
-}
-
-/// What the cameras look at. Parallel axes meet nowhere: there the points in view tell how far the subject is.
-Vec3d subject_point(const std::vector<View>& views, const std::vector<Vec3d>& points) {
-  if (!is_forward_facing(views) || points.empty()) return focus_point(views);
-  std::vector<Vec3d> seen;
-  for (const Vec3d& point : points) {
-    const auto sees = [&](const View& view) { return depth_in_view(view, point).has_value(); };
-    if (std::size_t(std::ranges::count_if(views, sees)) * 2 >= views.size()) seen.push_back(point);
-  }
-  return seen.empty() ? focus_point(views) : median_of(seen);
-}
-
-double camera_distance(const std::vector<View>& views, Vec3d point) {
-  double sum = 0;
-  for (const View& view : views) sum += length(view.world_from_camera.translation - point);
-  return sum / double(views.size());
 }
 
 std::optional<Vec3d> parse_direction(const std::string& text) {
@@ -223,23 +191,15 @@ std::optional<GroundPlane> find_ground(const std::vector<Vec3d>& points, Vec3d r
 
 Triangulated triangulate(const std::vector<WorldRay>& rays) {
   CNERF_CHECK(rays.size() >= 2, "a place is triangulated from two rays at least");
-  Mat3d normal{};
-  Vec3d right{};
   double least_cosine = 1;
-  for (const WorldRay& ray : rays) {
-    const Vec3d d = ray.direction;
-    for (int i = 0; i < 3; ++i) {
-      Vec3d row = d * -d[i];
-      row[i] += 1;
-      normal.rows[i] += row;
-      right[i] += dot(row, ray.origin);
-    }
-    for (const WorldRay& other : rays) least_cosine = std::min(least_cosine, dot(d, other.direction));
+  for (const WorldRay& a : rays) {
+    for (const WorldRay& b : rays) least_cosine = std::min(least_cosine, dot(a.direction, b.direction));
   }
   Triangulated out;
   out.widest_degrees = std::acos(std::clamp(least_cosine, -1.0, 1.0)) / kDegree;
-  if (!(normal.determinant() > 1e-9)) throw InputError("triangulation: the rays are parallel, so they meet nowhere");
-  out.point = normal.inverse() * right;
+  const std::optional<Vec3d> nearest = nearest_point(rays, kLeastSpread);
+  if (!nearest) throw InputError("triangulation: the rays are parallel, so they meet nowhere");
+  out.point = *nearest;
   double squared = 0;
   for (const WorldRay& ray : rays) {
     const Vec3d off = cross(out.point - ray.origin, ray.direction);
@@ -266,14 +226,14 @@ double units_per_metre(const std::string& measure, const std::vector<View>& view
   if (!(metres > 0)) throw UsageError("measure: expected a length above 0, found '" + match[3].str() + "'");
   const Vec3d a = place_of(parse_end(match[1], views), points), b = place_of(parse_end(match[2], views), points);
   const double units = length(a - b);
-  if (!(units > 1e-9 * camera_distance(views, a))) throw UsageError("measure: both ends are the same place");
+  if (!(units > 1e-9 * mean_distance(views, a))) throw UsageError("measure: both ends are the same place");
   return units / metres;
 }
 
 FrameChoice choose_frame(const std::vector<View>& views, const std::vector<Vec3d>& points,
                          const FrameOptions& options) {
-  const Vec3d subject = subject_point(views, points);
-  const double distance = camera_distance(views, subject);
+  const Vec3d subject = arrangement_of(views, points).focus;
+  const double distance = mean_distance(views, subject);
   std::vector<Vec3d> near_points;
   for (const Vec3d& point : points) {
     if (length(point - subject) < distance) near_points.push_back(point);
@@ -334,9 +294,10 @@ Aabbd parse_box(const std::string& text) {
 
 std::optional<SubjectBox> find_subject(const std::vector<View>& views, const std::vector<Vec3d>& points) {
   SubjectBox out;
-  out.forward_facing = is_forward_facing(views);
-  const Vec3d subject = subject_point(views, points);
-  const double reach = out.forward_facing ? std::numeric_limits<double>::infinity() : camera_distance(views, subject);
+  const CameraArrangement cameras = arrangement_of(views, points);
+  out.forward_facing = cameras.forward_facing;
+  const double reach =
+      out.forward_facing ? std::numeric_limits<double>::infinity() : mean_distance(views, cameras.focus);
   std::vector<Vec3d> inside;
   std::vector<double> depths;
   for (const Vec3d& point : points) {
@@ -347,7 +308,7 @@ std::optional<SubjectBox> find_subject(const std::vector<View>& views, const std
       seen += depth ? 1 : 0;
     }
     const std::size_t enough = std::max<std::size_t>(2, views.size() * 3 / 10);
-    if (seen >= enough && length(point - subject) < reach) inside.push_back(point);
+    if (seen >= enough && length(point - cameras.focus) < reach) inside.push_back(point);
   }
   if (inside.size() < 20) return std::nullopt;
   out.near = 0.9 * quantile(depths, 0.001);

@@ -8,7 +8,7 @@
 
 #include "src/base/aabb.h"
 #include "src/base/options.h"
-#include "src/capture/capture.h"
+#include "src/capture/arrangement.h"
 #include "src/prepare/similarity.h"
 
 namespace cnerf {
@@ -58,9 +58,6 @@ struct Triangulated {
   Vec3d point;
   double distance = 0;        ///< root mean square, units of the rays
   double widest_degrees = 0;  ///< between two of the rays: below about 1 the depth is a guess
-};
-struct WorldRay {
-  Vec3d origin, direction;  ///< unit length
 };
 /// @param rays  at least two, not all parallel.  @throws InputError.
 [[nodiscard]] Triangulated triangulate(const std::vector<WorldRay>& rays);

@@ -48,7 +48,7 @@ void exclude_unseen(const Capture& capture, LuminanceModel& model) {
     double focus;  ///< distance of what the views look at
   };
   const double world_per_unit = 1.0 / model.frame.unit_per_world;
-  const Vec3d focus = focus_point(capture.views);
+  const Vec3d focus = arrangement_of(capture).meeting_point;
   std::vector<Eye> eyes;
   for (const View& view : capture.views) {
     if (view.held_out) continue;

@@ -4,20 +4,11 @@
 #include <cmath>
 
 #include "src/base/parallel.h"
+#include "src/capture/arrangement.h"
 #include "src/train/stage1.h"
 
 namespace cnerf {
 namespace {
-
-Vec3d optical_axis(const View& view) {
-  return view.world_from_camera.linear.column(2);
-}
-
-double mean_distance(const std::vector<View>& views, Vec3d point) {
-  double total = 0;
-  for (const View& view : views) total += length(view.world_from_camera.translation - point);
-  return total / double(views.size());
-}
 
 SceneFrame cube(Vec3d centre, double side, int cascades) {
   return {centre, 1.0 / side, cascades};
@@ -25,14 +16,9 @@ SceneFrame cube(Vec3d centre, double side, int cascades) {
 
 /// Forward-facing captures: the box reaches from the cameras to behind the far plane. 1.21 times the far distance,
 /// centred half-way, holds what a lens of 60 to 70 degrees sees there.
-SceneFrame place_forward_facing(const Capture& capture) {
-  Vec3d position{}, axis{};
-  for (const View& view : capture.views) {
-    position += view.world_from_camera.translation / double(capture.views.size());
-    axis += optical_axis(view) / double(capture.views.size());
-  }
+SceneFrame place_forward_facing(const Capture& capture, const CameraArrangement& cameras) {
   const double far = capture.depth_range->far;
-  return cube(position + normalized(axis) * (0.5 * far), 1.21 * far, 2);
+  return cube(cameras.eye + cameras.forward * (0.5 * far), 1.21 * far, 2);
 }
 
 /// Bounds of what no view sees as fully transparent (the visual hull), on a coarse grid over `box`.
@@ -75,8 +61,7 @@ Aabbd visual_hull_bounds(const Capture& capture, const Aabbd& box) {
 }
 
 /// Objects with alpha: a cube around the visual hull.
-SceneFrame place_object(const Capture& capture) {
-  const Vec3d focus = focus_point(capture.views);
+SceneFrame place_object(const Capture& capture, Vec3d focus) {
   double half = 0;
   for (const View& view : capture.views) {
     const double distance = length(view.world_from_camera.translation - focus);
@@ -92,17 +77,18 @@ SceneFrame place_object(const Capture& capture) {
 }
 
 /// All else: nested boxes around what the cameras look at, reaching behind the cameras.
-SceneFrame place_surroundings(const Capture& capture) {
-  const Vec3d focus = focus_point(capture.views);
+SceneFrame place_surroundings(const Capture& capture, Vec3d focus) {
   return cube(focus, 3.0 * mean_distance(capture.views, focus), 3);
 }
 
 }  // namespace
 
 SceneFrame place_scene(const Capture& capture, const PlacementOptions& options) {
-  SceneFrame frame = capture.depth_range         ? place_forward_facing(capture)
-                     : capture.is_bounded_object ? place_object(capture)
-                                                 : place_surroundings(capture);
+  const CameraArrangement cameras = arrangement_of(capture);
+  const bool is_before_the_scene = cameras.forward_facing && capture.depth_range;
+  SceneFrame frame = is_before_the_scene         ? place_forward_facing(capture, cameras)
+                     : capture.is_bounded_object ? place_object(capture, cameras.meeting_point)
+                                                 : place_surroundings(capture, cameras.meeting_point);
   if (options.fixed_centre) frame.world_centre = {options.centre_x, options.centre_y, options.centre_z};
   if (options.scale > 0) frame.unit_per_world = options.scale;
   if (options.cascades > 0) frame.cascades = options.cascades;

@@ -8,6 +8,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/capture/arrangement.h"
 #include "tests/support/data.h"
 
 namespace cnerf {
@@ -67,10 +68,10 @@ TEST(CameraPathTest, LookAtFollowsTheConventions) {
 }
 
 TEST(CameraPathTest, TheFocusIsWhereTheAxesMeet) {
-  expect_near(focus_point(ring(0, kTwoPi, 24)), {1, 2, 0}, 1e-9);
-  EXPECT_TRUE(is_forward_facing(wall()));
-  EXPECT_FALSE(is_forward_facing(ring(0, kTwoPi, 24)));
-  expect_near(focus_point(wall()), {0, 0, 1 / (0.25 / 2 + 0.75 / 8)}, 1e-9);
+  expect_near(arrangement_of(ring(0, kTwoPi, 24)).focus, {1, 2, 0}, 1e-9);
+  EXPECT_TRUE(arrangement_of(wall()).forward_facing);
+  EXPECT_FALSE(arrangement_of(ring(0, kTwoPi, 24)).forward_facing);
+  expect_near(arrangement_of(wall()).focus, {0, 0, 1 / (0.25 / 2 + 0.75 / 8)}, 1e-9);
 }
 
 TEST(CameraPathTest, AnOrbitKeepsDistanceAndHeightAndClosesTheCircle) {
@@ -101,7 +102,7 @@ TEST(CameraPathTest, AnOrbitDoesNotEnterAnArcWithoutCameras) {
 TEST(CameraPathTest, ASpiralStaysAmongTheCamerasAndLooksAtTheFocus) {
   const Capture capture = wall();
   const CameraPath path = spiral_path(capture, config_of(20));
-  const Vec3d focus = focus_point(capture);
+  const Vec3d focus = arrangement_of(capture).focus;
   double widest = 0;
   for (const PathCamera& camera : path.cameras) {
     const Vec3d p = camera.world_from_camera.translation;

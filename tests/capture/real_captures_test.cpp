@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "src/capture/arrangement.h"
 #include "src/capture/color_truth.h"
 #include "src/capture/load_capture.h"
 #include "tests/support/data.h"
@@ -31,6 +32,7 @@ TEST(RealCaptures, FoxListsMoreImagesThanItHas) {
   EXPECT_EQ(capture.views[0].intrinsics.model, LensModel::kOpenCv);
   EXPECT_EQ(capture.views[0].image.width, 135);
   EXPECT_EQ(capture.aabb_scale, 4);
+  EXPECT_FALSE(arrangement_of(capture).forward_facing);
   EXPECT_TRUE(load_color_truth(capture.views[3]));
 }
 
@@ -43,9 +45,7 @@ TEST(RealCaptures, FlowerTakesTheFolderOfItsSize) {
   EXPECT_EQ(capture.views[0].image_file.parent_path().filename(), "images_8");
   ASSERT_TRUE(capture.depth_range);
   EXPECT_GT(capture.depth_range->far, capture.depth_range->near);
-  // Forward-facing: all cameras look much the same way.
-  const Vec3d first = capture.views[0].world_from_camera.direction({0, 0, 1});
-  for (const View& view : capture.views) EXPECT_GT(dot(first, view.world_from_camera.direction({0, 0, 1})), 0.8);
+  EXPECT_TRUE(arrangement_of(capture).forward_facing);
 }
 
 TEST(RealCaptures, LegoIsABoundedObjectWithATestSplit) {
@@ -54,6 +54,7 @@ TEST(RealCaptures, LegoIsABoundedObjectWithATestSplit) {
   EXPECT_EQ(capture.views.size(), 125u);
   EXPECT_EQ(held_out(capture), 25);
   EXPECT_TRUE(capture.is_bounded_object);
+  EXPECT_FALSE(arrangement_of(capture).forward_facing);
   for (const View& view : capture.views) {  // the model stands at the origin, and every camera sees it
     const auto pixel = project(view.intrinsics, view.world_from_camera.inverse().point({0, 0, 0}));
     ASSERT_TRUE(pixel);
@@ -68,10 +69,16 @@ TEST(RealCaptures, RobovisionIsMonochromeWithIntrinsicsOfEachFrame) {
   EXPECT_EQ(capture.views.size(), 12u);
   EXPECT_NE(capture.views[0].intrinsics.fx, capture.views[1].intrinsics.fx);
   EXPECT_FALSE(capture.is_bounded_object);
+  EXPECT_FALSE(arrangement_of(capture).forward_facing);
   const MonoImage& image = capture.views[0].image;
   EXPECT_FALSE(image.valid(0)) << "alpha hides the border that undistorting left";
   EXPECT_TRUE(image.valid(image.pixel_count() / 2 + std::size_t(image.width) / 2));
   EXPECT_FALSE(load_color_truth(capture.views[0]));
+}
+
+TEST(RealCaptures, FruitIsSeenFromAllAround) {
+  CNERF_REQUIRE_DATA(folder, "scenes/fruit");
+  EXPECT_FALSE(arrangement_of(load_capture(folder, {.downscale = 8})).forward_facing);
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ TEST_F(Exclusion, WhatOneViewAloneSeesInFrontOfTheObjectIsLeftOut) {
 }
 
 TEST_F(Exclusion, WhatTheViewsLookAtAndWhatIsBehindItStays) {
-  const Vec3d focus = focus_point(capture_.views);
+  const Vec3d focus = arrangement_of(capture_).meeting_point;
   EXPECT_NEAR(length(focus), 0, 1e-6);
   const double distance = length(capture_.views.front().world_from_camera.translation - focus);
   EXPECT_FALSE(is_left_out(focus));
