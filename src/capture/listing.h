@@ -33,6 +33,7 @@ struct CaptureListing {
   std::filesystem::path source;  ///< the poses file or model folder
   std::string format;
   std::vector<ListedView> views;
+  std::size_t listed_images = 0;  ///< also those whose files do not exist
   std::vector<Vec3d> points;
   std::optional<DepthRange> depth_range;
   std::optional<double> aabb_scale;

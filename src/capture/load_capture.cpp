@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 
 #include "src/base/error.h"
 #include "src/base/parallel.h"
@@ -41,19 +42,27 @@ std::vector<fs::path> find_colmap_models(const fs::path& root) {
 }
 
 fs::path largest_model(const std::vector<fs::path>& models) {
-  return *std::max_element(models.begin(), models.end(), [](const fs::path& a, const fs::path& b) {
-    return colmap_image_count(a) < colmap_image_count(b);
-  });
+  const auto images = [](const fs::path& model) -> std::size_t {
+    try {
+      return colmap_image_count(model);
+    } catch (const Error&) {
+      return 0;  // an incomplete one
+    }
+  };
+  return *std::ranges::max_element(models, {}, images);
 }
 
-Source find_in_folder(const fs::path& root) {
+/// All there are, the preferred one first: a capture may carry poses in several conventions.
+std::vector<Source> sources_in_folder(const fs::path& root) {
+  std::vector<Source> sources;
   for (const char* marker : {"transforms.json", "transforms_train.json"}) {
-    if (fs::exists(root / marker)) return {Format::kTransforms, root, root / marker};
+    if (sources.empty() && fs::exists(root / marker)) sources.push_back({Format::kTransforms, root, root / marker});
   }
   if (const std::vector<fs::path> models = find_colmap_models(root); !models.empty()) {
-    return {Format::kColmap, root, largest_model(models)};
+    sources.push_back({Format::kColmap, root, largest_model(models)});
   }
-  if (fs::exists(root / "poses_bounds.npy")) return {Format::kLlff, root, root / "poses_bounds.npy"};
+  if (fs::exists(root / "poses_bounds.npy")) sources.push_back({Format::kLlff, root, root / "poses_bounds.npy"});
+  if (!sources.empty()) return sources;
   const std::string state = fs::is_empty(root) ? ": the folder is empty; " : ": no poses found; ";
   throw MissingInputError(
       root.string() + state +
@@ -62,13 +71,13 @@ Source find_in_folder(const fs::path& root) {
       "photographs or a film clip");
 }
 
-Source recognise(const fs::path& path) {
+std::vector<Source> recognise(const fs::path& path) {
   if (!fs::exists(path)) throw MissingInputError(path.string() + ": no such file or folder");
-  if (fs::is_directory(path)) return find_in_folder(path);
+  if (fs::is_directory(path)) return sources_in_folder(path);
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  if (path.extension() == ".json") return {Format::kTransforms, folder, path};
-  if (path.extension() == ".npy") return {Format::kLlff, folder, path};
-  if (is_colmap_model(folder)) return {Format::kColmap, folder, folder};
+  if (path.extension() == ".json") return {{Format::kTransforms, folder, path}};
+  if (path.extension() == ".npy") return {{Format::kLlff, folder, path}};
+  if (is_colmap_model(folder)) return {{Format::kColmap, folder, folder}};
   throw InputError(path, "", "expected a folder, a transforms.json, a file of a COLMAP model or a poses_bounds.npy");
 }
 
@@ -94,7 +103,6 @@ CaptureListing read_listing(const Source& source, int downscale) {
 
 /// Drops views whose image does not exist, and says so.
 void drop_missing_images(CaptureListing& listing) {
-  const std::size_t listed = listing.views.size();
   std::string first;
   const std::size_t missing = std::erase_if(listing.views, [&](const ListedView& view) {
     if (fs::is_regular_file(view.image_file)) return false;
@@ -102,15 +110,15 @@ void drop_missing_images(CaptureListing& listing) {
     return true;
   });
   if (missing == 0) return;
-  listing.notes.push_back(std::to_string(missing) + " of " + std::to_string(listed) +
+  listing.notes.push_back(std::to_string(missing) + " of " + std::to_string(listing.listed_images) +
                           " listed images do not exist and were skipped, the first: " + first);
 }
 
-void refuse_too_few(const CaptureListing& listing, std::size_t listed) {
+void refuse_too_few(const CaptureListing& listing) {
   if (listing.views.size() >= 2) return;
   throw InputError(listing.source, "views",
                    "expected at least 2 usable images, found " + std::to_string(listing.views.size()) + " (of " +
-                       std::to_string(listed) + " listed)");
+                       std::to_string(listing.listed_images) + " listed)");
 }
 
 void choose_held_out(std::vector<ListedView>& views, int holdout) {
@@ -123,6 +131,27 @@ void choose_held_out(std::vector<ListedView>& views, int holdout) {
                            " views for training; at least 2 are needed";
   if (holdout > 0) throw UsageError("holdout " + std::to_string(holdout) + " " + left);
   throw InputError(views.front().poses_file, "split", left);
+}
+
+/// The first source with at least two usable views, and a note where that is not the preferred one.
+/// @throws InputError, MissingInputError  what is wrong with the preferred one, where none is whole.
+CaptureListing first_whole(const std::vector<Source>& sources, int downscale) {
+  std::exception_ptr first_problem;
+  std::string aside;
+  for (const Source& source : sources) {
+    try {
+      CaptureListing listing = read_listing(source, downscale);
+      listing.listed_images = listing.views.size();
+      drop_missing_images(listing);
+      refuse_too_few(listing);
+      if (!aside.empty()) listing.notes.push_back("poses: " + listing.source.string() + " is taken" + aside);
+      return listing;
+    } catch (const Error& problem) {
+      if (!first_problem) first_problem = std::current_exception();
+      aside += "; left aside as incomplete: " + std::string(problem.what());
+    }
+  }
+  std::rethrow_exception(first_problem);
 }
 
 // Images and intrinsics.
@@ -234,23 +263,20 @@ Capture load_capture(const fs::path& path, const CaptureOptions& options) {
   const Transfer transfer = transfer_named(options.transfer);
   if (options.downscale < 1)
     throw UsageError("downscale: expected at least 1, found " + std::to_string(options.downscale));
-  const Source source = recognise(path);
-  CaptureListing listing = read_listing(source, options.downscale);
-  const std::size_t listed = listing.views.size();
-  drop_missing_images(listing);
-  refuse_too_few(listing, listed);
+  const std::vector<Source> sources = recognise(path);
+  CaptureListing listing = first_whole(sources, options.downscale);
   std::stable_sort(listing.views.begin(), listing.views.end(),
                    [](const ListedView& a, const ListedView& b) { return a.name < b.name; });
   choose_held_out(listing.views, options.holdout);
 
   Capture capture;
-  capture.root = source.root;
+  capture.root = sources.front().root;
   capture.format = listing.format;
   capture.points = std::move(listing.points);
   capture.depth_range = listing.depth_range;
   capture.aabb_scale = listing.aabb_scale;
   capture.bounds = listing.bounds;
-  capture.listed_images = int(listed);
+  capture.listed_images = int(listing.listed_images);
   capture.notes = std::move(listing.notes);
   load_views(listing.views, transfer, capture);
   if (options.cut_out_of_black && !capture.depth_range && cut_out_of_black(capture.views)) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "src/base/error.h"
 #include "src/capture/load_capture.h"
 #include "tests/capture/fixtures.h"
 #include "tests/support/data.h"
@@ -90,6 +91,30 @@ TEST(Llff, FortranOrderedPosesAreTheSame) {
   }
   test::write_npy(folder / "poses_bounds.npy", "<f8", true, "4, 17", test::bytes_of(columns));
   EXPECT_EQ(load_capture(folder.path()).views[3].world_from_camera, wanted.views[3].world_from_camera);
+}
+
+TEST(Llff, IsTakenWhereAModelBesideItIsIncomplete) {
+  const test::TempDir folder;
+  test::write_llff(folder.path());
+  test::write_colmap_binary(folder / "sparse/0");
+  std::filesystem::remove(folder / "sparse/0/images.bin");
+  const Capture capture = load_capture(folder.path());
+  EXPECT_EQ(capture.format, "llff");
+  EXPECT_THAT(capture.notes, Contains(testing::AllOf(HasSubstr("poses_bounds.npy is taken"), HasSubstr("images.bin"))));
+}
+
+TEST(Llff, WhereNothingIsWholeThePreferredPosesAreNamed) {
+  const test::TempDir folder;
+  test::write_llff(folder.path());
+  test::truncate_file(folder / "poses_bounds.npy", 0.5);
+  test::write_colmap_binary(folder / "sparse/0");
+  std::filesystem::remove(folder / "sparse/0/images.bin");
+  try {
+    (void)load_capture(folder.path());
+    FAIL() << "no poses were whole";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("images.bin"));
+  }
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ Capture long_lenses() {
 class Exclusion : public testing::Test {
  protected:
   explicit Exclusion(const Capture& capture = long_lenses())
-      : capture_(capture), model_(LuminanceModel::create(capture_, small_options(), cpu_engines()))) {}
+      : capture_(capture), model_(LuminanceModel::create(capture_, small_options(), cpu_engines())) {}
 
   static Stage1Options small_options() {
     Stage1Options options;
