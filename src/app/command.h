@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace cnerf {
+namespace cnerf::app {
 
 /// The work of a command, given the words of the command line for its records.
 using Work = std::function<void(const std::vector<std::string>& command_line)>;
@@ -35,4 +35,4 @@ Work declare_view(CLI::App& app);
 Work declare_info(CLI::App& app);
 Work declare_doctor(CLI::App& app);
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -2,9 +2,9 @@
 
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
-#include "src/base/error.h"
+#include "src/pipeline/bake_step.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace fs = std::filesystem;
 namespace {
 
@@ -15,15 +15,15 @@ struct BakeArguments {
 };
 
 void bake(const BakeArguments& arguments, const std::vector<std::string>& command_line) {
-  const BakeFormats formats = parse_bake_formats(arguments.format);
+  const pipeline::BakeFormats formats = pipeline::parse_bake_formats(arguments.format);
   Reporter reporter = make_reporter(arguments.run.config);
-  const RunDirectory directory = RunDirectory::open(arguments.run.run);
+  const pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.run.run);
   const std::string take = directory.choose_take(arguments.run.take);
   const fs::path folder = arguments.out.empty() ? directory.bakes(take) : fs::path(arguments.out);
-  refuse_existing(last_file(folder, formats), arguments.overwrite);
-  const RunContext context = open_run(arguments.run, take, command_line, reporter);
-  bake_step(context, take, folder, formats);
-  if (formats.web) reporter.next("cnerf view " + web_folder(folder).string());
+  refuse_existing(pipeline::last_file(folder, formats), arguments.overwrite);
+  const pipeline::RunContext context = open_run(arguments.run, take, command_line, reporter);
+  pipeline::bake_step(context, {take, folder, formats}, engines_for(context.config.device), reporter);
+  if (formats.web) reporter.next("cnerf view " + pipeline::web_folder(folder).string());
   if (formats.vdb || formats.gltf) reporter.next("blender --python " + (folder / "blender_setup.py").string());
 }
 
@@ -64,4 +64,4 @@ Work declare_bake(CLI::App& app) {
   return [arguments](const auto& command_line) { bake(*arguments, command_line); };
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

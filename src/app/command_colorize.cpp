@@ -1,41 +1,44 @@
 /// cnerf colorize: stage 2, one take of colours for a trained run.
 
 #include "src/app/command.h"
-#include "src/app/default_colorizer.h"
-#include "src/app/live_session.h"
 #include "src/app/run_arguments.h"
+#include "src/pipeline/colorize_step.h"
+#include "src/pipeline/default_colorizer.h"
+#include "viewer/server/live_session.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace {
 
 struct ColorizeArguments {
   RunFolderArguments run;
-  ExistingOutput existing;
+  pipeline::ExistingOutput existing;
   std::string bases;
   bool bases_only = false;
   bool view = false;
-  BrowserArguments browser;
+  BrowserOptions browser;
 };
 
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
   // A take that is gone on with has its own configuration; a new one starts from the run's.
   const std::string base = arguments.existing.resume ? arguments.run.take : "";
-  RunContext context = open_run(arguments.run, base, command_line, reporter);
-  choose_colorizer(context.capture.root, context.config, reporter);
+  pipeline::RunContext context = open_run(arguments.run, base, command_line, reporter);
+  const Engines& engines = engines_for(context.config.device);
+  pipeline::choose_colorizer(context.capture.root, context.config, reporter);
   if (!arguments.bases.empty()) context.config.stage2.purify.picked_bases = arguments.bases;
   if (arguments.bases_only) {
-    show_bases(context);
+    pipeline::show_bases(context, engines, reporter);
+    reporter.next("cnerf colorize " + arguments.run.run + " --bases 2,5,7");
     return;
   }
-  const std::string take = take_to_write(context, arguments.run.take, arguments.existing);
+  const std::string take = pipeline::take_to_write(context, arguments.run.take, arguments.existing);
   std::optional<LiveSession> live;
   if (arguments.view) {
     live.emplace("Colorizing " + context.capture.root.filename().string() + ", take " + take, arguments.browser,
                  reporter);
-    context.watcher = &*live;
   }
-  colorize_step(context, take, arguments.existing);
+  Observer& observer = live ? static_cast<Observer&>(*live) : reporter;
+  pipeline::colorize_step(context, {take, arguments.existing}, engines, observer);
   reporter.next("cnerf bake " + arguments.run.run + " --take " + take);
 }
 
@@ -55,4 +58,4 @@ Work declare_colorize(CLI::App& app) {
   return [arguments](const auto& command_line) { colorize(*arguments, command_line); };
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -7,13 +7,12 @@
 #include <opencv2/imgproc.hpp>
 
 #include "src/app/command.h"
-#include "src/app/default_colorizer.h"
-#include "src/app/pipeline.h"
 #include "src/app/run_arguments.h"
 #include "src/capture/image_io.h"
 #include "src/picture/encode.h"
+#include "src/pipeline/colorize_step.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace fs = std::filesystem;
 namespace {
 
@@ -57,7 +56,7 @@ void colorize_image(const ColorizeImageArguments& arguments) {
   const LinearImage luminance = luminance_image(read_linear_image(arguments.in, Transfer::kSrgb));
   Config config = resolve_config(arguments.config);
   if (config.colorizer.spec.empty()) config.colorizer.spec = "builtin";
-  const auto colorizer = make_colorizer(colorizer_options(config, {}, {}, reporter));
+  const auto colorizer = make_colorizer(pipeline::colorizer_options(config, {}, {}, reporter));
   const LightnessBatch question = question_about(luminance, arguments.short_side);
   const ChromaBatch answer = colorizer->colorize(question);
   check_answer(colorizer->name(), question, answer);
@@ -81,4 +80,4 @@ Work declare_colorize_image(CLI::App& app) {
   return [arguments](const auto&) { colorize_image(*arguments); };
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -7,7 +7,7 @@
 #include "src/base/files.h"
 #include "src/compare/rating.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace fs = std::filesystem;
 using namespace compare;
 namespace {
@@ -100,4 +100,4 @@ Work declare_compare(CLI::App& app) {
   return [arguments](const auto& command_line) { run_comparison(*arguments, command_line); };
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -10,15 +10,15 @@
 #include <set>
 
 #include "src/app/command.h"
-#include "src/app/version.h"
 #include "src/base/cpu_features.h"
 #include "src/base/parallel.h"
 #include "src/base/process.h"
 #include "src/config/config.h"
 #include "src/engine/engines.h"
+#include "src/pipeline/version.h"
 #include "viewer/server/page_folder.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace fs = std::filesystem;
 namespace {
 
@@ -82,7 +82,7 @@ std::string cuda_text() {
 }
 
 void doctor() {
-  line("cnerf", version_text());
+  line("cnerf", pipeline::version_text());
   line("processor", cpu_engines().description());
   line("memory", memory_text());
   line("disk", disk_text());
@@ -106,4 +106,4 @@ Work declare_doctor(CLI::App&) {
   return [](const auto&) { doctor(); };
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -2,8 +2,9 @@
 
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
+#include "src/pipeline/evaluate_step.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace {
 
 struct EvalArguments : RunFolderArguments {
@@ -12,9 +13,9 @@ struct EvalArguments : RunFolderArguments {
 
 void eval(const EvalArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
-  const std::string take = RunDirectory::open(arguments.run).choose_take(arguments.take);
-  const RunContext context = open_run(arguments, take, command_line, reporter);
-  evaluate_step(context, take, arguments.lpips_weights);
+  const std::string take = pipeline::RunDirectory::open(arguments.run).choose_take(arguments.take);
+  const pipeline::RunContext context = open_run(arguments, take, command_line, reporter);
+  pipeline::evaluate_step(context, {take, arguments.lpips_weights}, engines_for(context.config.device), reporter);
   reporter.next("cnerf render " + arguments.run + " --path turntable");
 }
 
@@ -28,4 +29,4 @@ Work declare_eval(CLI::App& app) {
   return [arguments](const auto& command_line) { eval(*arguments, command_line); };
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

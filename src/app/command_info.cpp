@@ -7,13 +7,14 @@
 #include "export/vdb_reader.h"
 #include "src/app/command.h"
 #include "src/app/common_options.h"
-#include "src/app/run_directory.h"
 #include "src/base/error.h"
+#include "src/base/text.h"
 #include "src/capture/load_capture.h"
+#include "src/pipeline/run_directory.h"
 #include "src/train/scene.h"
 #include "src/train/stage1.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace fs = std::filesystem;
 namespace {
 
@@ -80,8 +81,8 @@ void print_scene(const fs::path& stage1, const fs::path& take) {
   if (scene->is_colorized()) line("colorizer", "{}", scene->colorizer());
 }
 
-void print_run(const RunDirectory& directory) {
-  const RunRecord record = directory.record();
+void print_run(const pipeline::RunDirectory& directory) {
+  const pipeline::RunRecord record = directory.record();
   line("run", "{} (cnerf {})", directory.root().string(), record.program_version);
   line("capture", "{}", record.capture.string());
   line("command", "{}", record.command_line);
@@ -130,7 +131,7 @@ void info(const InfoArguments& arguments) {
   const Config config = resolve_config(arguments.config);
   const fs::path what = arguments.what;
   if (!fs::exists(what)) throw MissingInputError(what.string() + ": no such file or folder");
-  if (RunDirectory(what).exists()) return print_run(RunDirectory(what));
+  if (pipeline::RunDirectory(what).exists()) return print_run(pipeline::RunDirectory(what));
   if (what.extension() == ".vdb") return print_vdb(what);
   if (is_snapshot(what)) return print_snapshot(what);
   print_capture(load_capture(what, config.capture), config);
@@ -147,4 +148,4 @@ Work declare_info(CLI::App& app) {
   return [arguments](const auto&) { info(*arguments); };
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -12,8 +12,9 @@
 #include "src/base/error.h"
 #include "src/base/progress.h"
 #include "src/picture/encode.h"
+#include "src/pipeline/render_step.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace fs = std::filesystem;
 namespace {
 
@@ -24,8 +25,8 @@ struct RenderArguments {
 };
 
 /// "png,exr" as flags. Without a format a moving camera gives a video, single views give pictures.
-RenderOutput output_of(const RenderArguments& arguments) {
-  RenderOutput output;
+pipeline::RenderOutput output_of(const RenderArguments& arguments) {
+  pipeline::RenderOutput output;
   const bool is_moving = arguments.path != "held-out";
   std::istringstream list(arguments.format.empty() ? (is_moving ? "mp4" : "png") : arguments.format);
   for (std::string format; std::getline(list, format, ',');) {
@@ -36,7 +37,8 @@ RenderOutput output_of(const RenderArguments& arguments) {
     if (flag == nullptr) throw UsageError("--format: expected png, exr or mp4, got '" + format + "'");
     *flag = true;
   }
-  output.color = arguments.baked || arguments.view_averaged ? ShownColor::kBaked : ShownColor::kDecoded;
+  output.color =
+      arguments.baked || arguments.view_averaged ? pipeline::ShownColor::kBaked : pipeline::ShownColor::kDecoded;
   output.view_averaged = arguments.view_averaged;
   return output;
 }
@@ -77,18 +79,18 @@ void render_bake(const RenderArguments& arguments, Reporter& reporter) {
 void render(const RenderArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
   const fs::path folder = arguments.run.run;
-  if (!RunDirectory(folder).exists() && fs::exists(folder / "manifest.json")) {
+  if (!pipeline::RunDirectory(folder).exists() && fs::exists(folder / "manifest.json")) {
     return render_bake(arguments, reporter);
   }
-  RenderOutput output = output_of(arguments);
-  const RunDirectory directory = RunDirectory::open(arguments.run.run);
+  pipeline::RenderOutput output = output_of(arguments);
+  const pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.run.run);
   const std::string take = directory.choose_take(arguments.run.take);
   output.folder = arguments.out.empty() ? directory.renders(take) : fs::path(arguments.out);
-  const RunContext context = open_run(arguments.run, take, command_line, reporter);
+  const pipeline::RunContext context = open_run(arguments.run, take, command_line, reporter);
   const CameraPath path = make_path(arguments.path, context.capture, context.config.render);
   if (output.mp4) refuse_existing(output.folder / (path.name + ".mp4"), arguments.overwrite);
   if (output.png || output.exr) refuse_existing(output.folder / path.name, arguments.overwrite);
-  render_step(context, take, path, output);
+  pipeline::render_step(context, {take, path, output}, engines_for(context.config.device), reporter);
   reporter.next("cnerf bake " + arguments.run.run);
 }
 
@@ -109,4 +111,4 @@ Work declare_render(CLI::App& app) {
   return [arguments](const auto& command_line) { render(*arguments, command_line); };
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -7,7 +7,7 @@
 #include "src/base/parallel.h"
 #include "src/sample/sample_scene.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace fs = std::filesystem;
 namespace {
 
@@ -39,4 +39,4 @@ Work declare_sample(CLI::App& app) {
   return [arguments](const auto&) { sample(*arguments); };
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -2,35 +2,36 @@
 
 #include "src/app/command.h"
 #include "src/app/common_options.h"
-#include "src/app/live_session.h"
-#include "src/app/pipeline.h"
+#include "src/pipeline/train_step.h"
+#include "viewer/server/live_session.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace {
 
 struct TrainArguments {
   ConfigArguments config;
   std::string capture, out;
-  ExistingOutput existing;
+  pipeline::ExistingOutput existing;
   bool view = false;
-  BrowserArguments browser;
+  BrowserOptions browser;
 };
 
 void train(const TrainArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
-  RunDirectory directory(arguments.out);
+  pipeline::RunDirectory directory(arguments.out);
   const bool goes_on = arguments.existing.resume && directory.exists();
   const Config config = resolve_config(arguments.config, goes_on ? directory.config() : Config{});
-  RunContext context{directory,    config,   read_capture(arguments.capture, config, reporter),
-                     command_line, reporter, engines_for(config.device)};
-  check_run_folder(directory, arguments.existing);
+  const Engines& engines = engines_for(config.device);
+  const pipeline::RunContext context{directory, config, pipeline::read_capture(arguments.capture, config, reporter),
+                                     command_line};
+  pipeline::check_run_folder(directory, arguments.existing);
   std::optional<LiveSession> live;
   if (arguments.view) {
     live.emplace("Training " + context.capture.root.filename().string(), arguments.browser, reporter);
-    context.watcher = &*live;
   }
-  begin_run(context, arguments.capture, arguments.existing);
-  train_step(context, arguments.existing.resume);
+  pipeline::begin_run(context, arguments.capture, arguments.existing);
+  Observer& observer = live ? static_cast<Observer&>(*live) : reporter;
+  pipeline::train_step(context, arguments.existing.resume, engines, observer);
   reporter.next("cnerf colorize " + arguments.out + " --colorizer reference:PHOTO.jpg");
 }
 
@@ -51,4 +52,4 @@ Work declare_train(CLI::App& app) {
   return [arguments](const auto& command_line) { train(*arguments, command_line); };
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

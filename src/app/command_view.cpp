@@ -7,18 +7,18 @@
 #include "export/vdb_reader.h"
 #include "src/app/command.h"
 #include "src/app/common_options.h"
-#include "src/app/live_session.h"
-#include "src/app/pipeline.h"
 #include "src/base/error.h"
+#include "src/pipeline/bake_step.h"
+#include "viewer/server/live_session.h"
 #include "viewer/server/page_folder.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace fs = std::filesystem;
 namespace {
 
 struct ViewArguments {
   ConfigArguments config;
-  BrowserArguments browser;
+  BrowserOptions browser;
   std::string what, take;
 };
 
@@ -32,7 +32,7 @@ bool is_bake(const fs::path& folder) {
 /// The bundle of a bake: the one beside it, made anew where there is none or it is older than the bake.
 fs::path bundle_of_bake(const fs::path& bake, const Config& config, const std::vector<std::string>& command_line,
                         Reporter& reporter) {
-  const fs::path folder = web_folder(bake);
+  const fs::path folder = pipeline::web_folder(bake);
   const fs::path manifest_file = bake / "manifest.json";
   if (is_bundle(folder) && fs::last_write_time(folder / kWebManifest) >= fs::last_write_time(manifest_file))
     return folder;
@@ -41,16 +41,17 @@ fs::path bundle_of_bake(const fs::path& bake, const Config& config, const std::v
     throw InputError(manifest_file, "volume", "this bake has none; bake with --format vdb or --format web");
   }
   const BakedVolume volume = merged_volume(read_volumes(bake));
-  write_web(volume, {bake.filename().string(), manifest.cameras, {}, command_line, manifest.units, manifest.up_axis},
-            folder, config.web, reporter);
+  pipeline::write_web(volume,
+                      {bake.filename().string(), manifest.cameras, {}, command_line, manifest.units, manifest.up_axis},
+                      folder, config.web, reporter);
   reporter.say("note: the photographs are with the capture; cnerf bake RUN --format web adds them");
   return folder;
 }
 
 fs::path bake_of_run(const ViewArguments& arguments) {
-  const RunDirectory directory = RunDirectory::open(arguments.what);
+  const pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.what);
   const fs::path bake = directory.bakes(directory.choose_take(arguments.take));
-  if (!is_bake(bake) && !is_bundle(web_folder(bake))) {
+  if (!is_bake(bake) && !is_bundle(pipeline::web_folder(bake))) {
     throw MissingInputError(bake.string() + ": nothing is baked yet; run: cnerf bake " + arguments.what +
                             " --format web");
   }
@@ -65,9 +66,9 @@ fs::path bundle_to_show(const ViewArguments& arguments, const Config& config,
     what = what.parent_path().empty() ? fs::path(".") : what.parent_path();
   }
   if (is_bundle(what)) return what;
-  if (RunDirectory(what).exists()) what = bake_of_run(arguments);
+  if (pipeline::RunDirectory(what).exists()) what = bake_of_run(arguments);
   if (is_bake(what)) return bundle_of_bake(what, config, command_line, reporter);
-  if (is_bundle(web_folder(what))) return web_folder(what);
+  if (is_bundle(pipeline::web_folder(what))) return pipeline::web_folder(what);
   throw MissingInputError(what.string() +
                           ": neither a web bundle (bundle.json), a bake (manifest.json) nor a run (run.json)");
 }
@@ -105,4 +106,4 @@ Work declare_view(CLI::App& app) {
   return [arguments](const auto& command_line) { view(*arguments, command_line); };
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

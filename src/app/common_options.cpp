@@ -7,7 +7,7 @@
 #include "src/config/toml_binding.h"
 #include "src/engine/select_engine.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace {
 
 /// What stands right of `name = ` in TOML.
@@ -47,6 +47,13 @@ void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string&
          help + " (" + key + ")")
       ->allow_extra_args(false)
       ->take_all();
+}
+
+void add_browser_options(CLI::App& app, BrowserOptions& options) {
+  app.add_option("--port", options.server.port, "Port of the page; 0 chooses a free one")->check(CLI::Range(0, 65535));
+  app.add_option("--host", options.server.host, "Address to listen on; other than this machine's own it needs --token");
+  app.add_option("--token", options.server.token, "Secret that visitors of the page need, 16 letters or more");
+  app.add_flag("--no-browser", options.no_browser, "Only print the address");
 }
 
 void add_colorizer_options(CLI::App& app, ConfigArguments& arguments) {
@@ -92,4 +99,4 @@ Reporter make_reporter(const ConfigArguments& arguments) {
   return Reporter(progress_style(arguments.progress, stdout));
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -9,8 +9,9 @@
 #include "src/app/reporter.h"
 #include "src/config/config.h"
 #include "src/config/fields.h"
+#include "viewer/server/live_session.h"
 
-namespace cnerf {
+namespace cnerf::app {
 
 /// Everything on the command line that says something about the configuration. Later ones win: preset, file, --set,
 /// short forms.
@@ -31,6 +32,8 @@ void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string&
                    const std::string& help);
 /// Declares --colorizer, --prompt, --keyframe, --hint and --hint-image.
 void add_colorizer_options(CLI::App& app, ConfigArguments& arguments);
+/// Declares --port, --host, --token and --no-browser.
+void add_browser_options(CLI::App& app, BrowserOptions& options);
 /// Declares one option a field, named like the field with `-` for `_`; legal values and defaults go to the help. A bool
 /// becomes a flag that sets it.
 /// @param fields  must outlive the parsing.
@@ -42,4 +45,4 @@ void add_field_options(CLI::App& app, const std::vector<Field>& fields);
 
 [[nodiscard]] Reporter make_reporter(const ConfigArguments& arguments);
 
-}  // namespace cnerf
+}  // namespace cnerf::app

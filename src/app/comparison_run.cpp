@@ -5,12 +5,10 @@
 #include <algorithm>
 #include <sstream>
 
-#include "src/app/camera_path.h"
-#include "src/app/picture_files.h"
-#include "src/app/pipeline.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/json_record.h"
+#include "src/base/text.h"
 #include "src/capture/color_truth.h"
 #include "src/compare/baselines/flow.h"
 #include "src/compare/baselines/positional_field.h"
@@ -20,11 +18,16 @@
 #include "src/compare/rating.h"
 #include "src/picture/contact_sheet.h"
 #include "src/picture/encode.h"
+#include "src/pipeline/colorize_step.h"
+#include "src/pipeline/picture_files.h"
+#include "src/pipeline/render_step.h"
+#include "src/render/camera_path.h"
 #include "src/train/color_model.h"
 #include "src/train/luminance_model.h"
 #include "src/train/options_json.h"
 
 namespace cnerf::compare {
+using namespace pipeline;
 namespace fs = std::filesystem;
 namespace {
 

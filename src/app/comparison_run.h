@@ -22,6 +22,7 @@
 #include "src/evaluate/lpips.h"
 
 namespace cnerf::compare {
+using app::Reporter;
 
 /// A capture to compare on.
 struct ComparedCapture {

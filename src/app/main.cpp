@@ -6,12 +6,12 @@
 #include <new>
 
 #include "src/app/command.h"
-#include "src/app/version.h"
 #include "src/base/error.h"
 #include "src/base/progress.h"
 #include "src/config/toml_binding.h"
+#include "src/pipeline/version.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace {
 
 constexpr Command kCommands[] = {
@@ -67,7 +67,7 @@ void refuse_unknown_words(const CLI::App& app) {
 
 void run_program(CLI::App& program, int argc, char** argv) {
   program.allow_extras();
-  program.set_version_flag("--version", "cnerf " + version_text());
+  program.set_version_flag("--version", "cnerf " + pipeline::version_text());
   program.set_help_flag("-h,--help", "Show what there is");
   const std::vector<ParsedCommand> commands = declare_commands(program);
   program.parse(argc, argv);
@@ -112,9 +112,9 @@ int guarded_main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::app
 
 int main(int argc, char** argv) {
   cnerf::install_interruption_handler();
-  return cnerf::guarded_main(argc, argv);
+  return cnerf::app::guarded_main(argc, argv);
 }

@@ -7,8 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "src/base/error.h"
+#include "src/base/text.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -42,13 +43,6 @@ ProgressStyle progress_style(const std::string& name, std::FILE* out) {
   if (name == "json") return ProgressStyle::kJson;
   if (name == "quiet") return ProgressStyle::kQuiet;
   throw UsageError("--progress: expected auto, line, plain, json or quiet, got '" + name + "'");
-}
-
-std::string duration_text(double seconds) {
-  const auto whole = long(std::lround(seconds));
-  if (whole >= 3600) return fmt::format("{} h {:02} min", whole / 3600, whole % 3600 / 60);
-  if (whole >= 60) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
-  return fmt::format("{} s", whole);
 }
 
 void Reporter::report_progress(const Progress& progress) {
@@ -130,4 +124,4 @@ void Reporter::next(const std::string& text) {
   std::fflush(out_);
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -9,7 +9,7 @@
 
 #include "src/base/observer.h"
 
-namespace cnerf {
+namespace cnerf::app {
 
 enum class ProgressStyle {
   kLine,   ///< one line that rewrites itself, for a terminal
@@ -20,9 +20,6 @@ enum class ProgressStyle {
 
 /// Of "auto", "line", "plain", "json", "quiet"; "auto" looks at whether `out` is a terminal.  @throws UsageError.
 [[nodiscard]] ProgressStyle progress_style(const std::string& name, std::FILE* out);
-
-/// "1 h 02 min", "3 min 20 s", "12 s".
-[[nodiscard]] std::string duration_text(double seconds);
 
 class Reporter : public Observer {
  public:
@@ -51,4 +48,4 @@ class Reporter : public Observer {
   bool line_open_ = false;  ///< a rewriting line waits for its end
 };
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -2,7 +2,7 @@
 
 #include "src/base/error.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace fs = std::filesystem;
 
 void add_run_folder_options(CLI::App& app, RunFolderArguments& arguments) {
@@ -12,19 +12,18 @@ void add_run_folder_options(CLI::App& app, RunFolderArguments& arguments) {
   add_config_options(app, arguments.config);
 }
 
-RunContext open_run(const RunFolderArguments& arguments, const std::string& take, std::vector<std::string> command_line,
-                    Reporter& reporter) {
-  RunDirectory directory = RunDirectory::open(arguments.run);
-  const RunRecord record = directory.record();
+pipeline::RunContext open_run(const RunFolderArguments& arguments, const std::string& take,
+                              std::vector<std::string> command_line, Reporter& reporter) {
+  pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.run);
+  const pipeline::RunRecord record = directory.record();
   if (!record.stage1_finished) {
     throw MissingInputError(arguments.run + ": stage 1 is not finished; go on with: cnerf train " +
                             record.capture.string() + " -o " + arguments.run + " --resume");
   }
   Config config = resolve_config(arguments.config, directory.config(take));
-  Capture capture =
-      read_capture(arguments.capture.empty() ? record.capture : fs::path(arguments.capture), config, reporter);
-  const Engines& engines = engines_for(config.device);
-  return {std::move(directory), std::move(config), std::move(capture), std::move(command_line), reporter, engines};
+  Capture capture = pipeline::read_capture(arguments.capture.empty() ? record.capture : fs::path(arguments.capture),
+                                           config, reporter);
+  return {std::move(directory), std::move(config), std::move(capture), std::move(command_line)};
 }
 
 void refuse_existing(const fs::path& output, bool overwrite) {
@@ -32,4 +31,4 @@ void refuse_existing(const fs::path& output, bool overwrite) {
   throw UsageError(output.string() + ": exists already; pass --overwrite to replace it, or another folder with -o");
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "src/app/common_options.h"
-#include "src/app/pipeline.h"
+#include "src/pipeline/run_context.h"
 
-namespace cnerf {
+namespace cnerf::app {
 
 struct RunFolderArguments {
   ConfigArguments config;
@@ -21,10 +21,10 @@ void add_run_folder_options(CLI::App& app, RunFolderArguments& arguments);
 
 /// Opens the run, its configuration (of `take` where it has one) changed by the arguments, and its capture.
 /// @throws MissingInputError, SnapshotError, UsageError, InputError; also when stage 1 is not finished.
-[[nodiscard]] RunContext open_run(const RunFolderArguments& arguments, const std::string& take,
-                                  std::vector<std::string> command_line, Reporter& reporter);
+[[nodiscard]] pipeline::RunContext open_run(const RunFolderArguments& arguments, const std::string& take,
+                                            std::vector<std::string> command_line, Reporter& reporter);
 
 /// Refuses `output` that exists unless `overwrite`.  @throws UsageError.
 void refuse_existing(const std::filesystem::path& output, bool overwrite);
 
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -1,5 +1,5 @@
 #pragma once
-/// Texts put together.
+/// Numbers and lists as people read them.
 
 #include <string>
 #include <vector>
@@ -12,5 +12,8 @@ namespace cnerf {
   for (const std::string& word : words) text += (text.empty() ? "" : separator) + word;
   return text;
 }
+
+/// "1 h 02 min", "3 min 20 s", "12 s".
+[[nodiscard]] std::string duration_text(double seconds);
 
 }  // namespace cnerf

@@ -14,7 +14,7 @@
 #include "src/capture/load_capture.h"
 #include "src/config/compare_options.h"
 #include "src/config/toml_binding.h"
-#include "src/train/scene.h"
+#include "src/render/picture_options.h"
 #include "src/train/stage1.h"
 #include "src/train/stage2.h"
 
@@ -44,24 +44,6 @@ struct ColorizerConfig {
   }
 };
 
-/// Pictures and videos.
-struct RenderConfig {
-  int frames = 72;       ///< of a spiral or an orbit
-  int fps = 24;          ///< of videos
-  int short_side = 270;  ///< pixels of a spiral or an orbit; never more than the capture's
-  int steps_per_box = RenderOptions{}.steps_per_box;
-  double min_transmittance = RenderOptions{}.min_transmittance;
-
-  template <typename Visitor>
-  void visit(Visitor&& v) {
-    v("frames", frames, Range{1, 100000}, "pictures of a spiral or an orbit");
-    v("fps", fps, Range{1, 240}, "pictures a second of a video");
-    v("short_side", short_side, Range{16, 8192}, "pixels of a spiral or an orbit, at most the capture's");
-    v("steps_per_box", steps_per_box, Range{16, 8192}, "march steps across the side of the innermost cascade");
-    v("min_transmittance", min_transmittance, Range{0, 0.5}, "a ray ends below this, and counts as opaque");
-  }
-};
-
 struct Config {
   std::string device = "auto";
   int threads = 0;
@@ -74,7 +56,7 @@ struct Config {
   MeshOptions mesh;
   ExrOptions exr;
   WebOptions web;
-  RenderConfig render;
+  PictureOptions render;
   CompareOptions compare;
 
   template <typename Visitor>

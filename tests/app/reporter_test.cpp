@@ -8,7 +8,7 @@
 
 #include "src/base/error.h"
 
-namespace cnerf {
+namespace cnerf::app {
 namespace {
 
 using testing::HasSubstr;
@@ -73,11 +73,5 @@ TEST(ReporterTest, StylesHaveNames) {
   std::fclose(file);
 }
 
-TEST(ReporterTest, DurationsAreReadable) {
-  EXPECT_EQ(duration_text(12.4), "12 s");
-  EXPECT_EQ(duration_text(200), "3 min 20 s");
-  EXPECT_EQ(duration_text(3725), "1 h 02 min");
-}
-
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::app

@@ -38,6 +38,7 @@ const std::vector<std::string> kLayers = {"src/base",
                                           "export",
                                           "viewer",
                                           "src/config",
+                                          "src/pipeline",
                                           "src/compare",
                                           "src/app"};
 

@@ -1,0 +1,119 @@
+#include "src/pipeline/colorize_step.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/base/text.h"
+#include "src/pipeline/known_color_files.h"
+#include "src/train/stage2.h"
+
+namespace cnerf::pipeline {
+namespace fs = std::filesystem;
+namespace {
+
+/// "reference:a.png" -> "reference".
+std::string kind_of(const std::string& spec) {
+  return spec.substr(0, spec.find(':'));
+}
+
+/// A take that was begun and not finished; empty when there is none.
+std::string unfinished_take(const RunDirectory& directory) {
+  std::vector<std::string> names;
+  std::error_code failure;
+  for (const auto& entry : fs::directory_iterator(directory.root() / "takes", failure)) {
+    const std::string name = entry.path().filename().string();
+    if (!directory.take_record(name)) names.push_back(name);
+  }
+  std::ranges::sort(names);
+  return names.empty() ? "" : names.back();
+}
+
+/// @return  what the take's record says
+TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Engines& engines, Observer& observer) {
+  const RunDirectory& directory = context.directory;
+  // Before anything is written: they may refuse.
+  const std::vector<KnownColors> known = load_known_colors(context.capture, context.config.colorizer);
+  std::unique_ptr<Colorizer> made;
+  if (job.colorizer == nullptr) made = colorizer_of(context, observer);
+  Colorizer& colorizer = job.colorizer != nullptr ? *job.colorizer : *made;
+  if (job.existing.overwrite) fs::remove_all(directory.take_folder(job.take));
+  write_file(directory.take_config_file(job.take), to_toml(context.config));
+  const Stage2Report report = train_stage2({context.capture, directory.stage1_snapshot(), context.config.stage2,
+                                            colorizer, known, directory.take_snapshot(job.take), job.existing.resume},
+                                           engines, observer);
+  observer.report_progress({"stage 2", 1.0, {}});
+  return {job.take, colorizer.name() + describe(known), report};
+}
+
+}  // namespace
+
+ColorizerOptions colorizer_options(const Config& config, const fs::path& working_folder, const fs::path& cache_folder,
+                                   Observer& observer) {
+  ColorizerOptions options;
+  options.spec = config.colorizer.spec;
+  options.prompt = config.colorizer.prompt;
+  options.working_folder = working_folder;
+  options.timeout_seconds = config.colorizer.timeout_seconds;
+  options.reference_steps = config.colorizer.reference_steps;
+  options.reference_on_builtin = config.colorizer.reference_on_builtin;
+  options.seed = std::uint64_t(config.stage2.seed);
+  options.cache_folder = cache_folder;
+  options.progress = observer.progress_sink();
+  return options;
+}
+
+std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& observer) {
+  return make_colorizer(
+      colorizer_options(context.config, context.capture.root, context.directory.colorizer_cache(), observer));
+}
+
+std::string take_to_write(const RunContext& context, const std::string& named, const ExistingOutput& existing) {
+  const RunDirectory& directory = context.directory;
+  if (!named.empty()) {
+    check_take_name(named);
+    if (directory.take_record(named) && !existing.resume && !existing.overwrite) {
+      throw UsageError(directory.take_folder(named).string() +
+                       ": this take is finished; pass --overwrite, or choose another --take NAME");
+    }
+    return named;
+  }
+  if (existing.resume) {
+    if (const std::string unfinished = unfinished_take(directory); !unfinished.empty()) return unfinished;
+    if (const std::string current = directory.record().current_take; !current.empty()) return current;
+  }
+  return directory.free_take_name(kind_of(context.config.colorizer.spec));
+}
+
+void show_bases(const RunContext& context, const Engines& engines, Observer& observer) {
+  const fs::path gallery = context.directory.root() / "bases.png";
+  const auto colorizer = colorizer_of(context, observer);
+  write_base_candidates(
+      {context.capture, context.directory.stage1_snapshot(), context.config.stage2, *colorizer, {}, gallery}, engines,
+      observer);
+  observer.wrote("base candidates", gallery);
+}
+
+void colorize_step(const RunContext& context, const ColorizeJob& job, const Engines& engines, Observer& observer) {
+  const RunDirectory& directory = context.directory;
+  std::optional<TakeRecord> take = directory.take_record(job.take);
+  if (!take || !job.existing.resume) {
+    take = colorize(context, job, engines, observer);
+    directory.save(*take);
+    RunRecord record = directory.record();
+    record.current_take = job.take;
+    directory.save(record);
+  }
+  const Stage2Report& report = take->stage2;
+  observer.say(
+      fmt::format("take {}: {}, {:.0f} s of them waiting for {}, {} patches accepted, {} rejected; baked colour is "
+                  "{:.2f} ab from the per-pixel decode",
+                  job.take, duration_text(report.seconds), report.waited_seconds, take->colorizer, report.accepted,
+                  report.rejected, report.bake_ab_distance));
+  observer.wrote("take", directory.take_folder(job.take));
+}
+
+}  // namespace cnerf::pipeline

@@ -1,0 +1,38 @@
+#pragma once
+/// Stage 2 as a step of a run.
+
+#include <memory>
+#include <string>
+
+#include "src/colorizer/colorizer.h"
+#include "src/engine/engines.h"
+#include "src/pipeline/run_context.h"
+
+namespace cnerf::pipeline {
+
+/// What the configuration says of its colorizer. The folders are those of `ColorizerOptions`; empty = none.
+[[nodiscard]] ColorizerOptions colorizer_options(const Config& config, const std::filesystem::path& working_folder,
+                                                 const std::filesystem::path& cache_folder, Observer& observer);
+/// The colorizer the configuration names. What it learns is kept in the run's folder, for the next time.
+/// @throws UsageError, MissingInputError, ColorizerError.
+[[nodiscard]] std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& observer);
+
+/// The take a colorization goes to: the named one, else a free name after the colorizer's kind; with `resume` the take
+/// that was not finished.  @throws UsageError  when the named take is finished and neither is set.
+[[nodiscard]] std::string take_to_write(const RunContext& context, const std::string& named,
+                                        const ExistingOutput& existing);
+
+/// Writes the gallery of base candidates beside the takes, bases.png; touches none of them.
+void show_bases(const RunContext& context, const Engines& engines, Observer& observer);
+
+struct ColorizeJob {
+  std::string take;
+  ExistingOutput existing;
+  Colorizer* colorizer = nullptr;  ///< null: `colorizer_of` the run is made when it is needed
+};
+
+/// Stage 2 into a take, unless it is finished. Makes it the current one.
+/// @throws  as `train_stage2`, `load_known_colors` and `colorizer_of`.
+void colorize_step(const RunContext& context, const ColorizeJob& job, const Engines& engines, Observer& observer);
+
+}  // namespace cnerf::pipeline

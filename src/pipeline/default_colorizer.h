@@ -1,0 +1,16 @@
+#pragma once
+/// What colours a capture when the user names nothing.
+
+#include <filesystem>
+
+#include "src/base/observer.h"
+#include "src/config/config.h"
+
+namespace cnerf::pipeline {
+
+/// Leaves a given `config.colorizer.spec` alone; else takes the key frames as references, or the photographs in the
+/// capture's folder `references`, which `cnerf sample` writes there, or, without any, the built-in network. Says what
+/// it chose.
+void choose_colorizer(const std::filesystem::path& capture, Config& config, Observer& observer);
+
+}  // namespace cnerf::pipeline

@@ -1,0 +1,20 @@
+#pragma once
+/// Evaluation as a step of a run.
+
+#include <filesystem>
+#include <string>
+
+#include "src/engine/engines.h"
+#include "src/pipeline/run_context.h"
+
+namespace cnerf::pipeline {
+
+struct EvaluateJob {
+  std::string take;                     ///< empty = luminance only
+  std::filesystem::path lpips_weights;  ///< see `Lpips`; empty = LPIPS is not measured
+};
+
+/// Measures a take and writes metrics.json and the contact sheet.
+void evaluate_step(const RunContext& context, const EvaluateJob& job, const Engines& engines, Observer& observer);
+
+}  // namespace cnerf::pipeline

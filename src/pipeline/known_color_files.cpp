@@ -1,0 +1,171 @@
+#include "src/pipeline/known_color_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "src/base/error.h"
+#include "src/capture/image_io.h"
+#include "src/color/colorspace_math.h"
+
+namespace cnerf::pipeline {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr float kStrokeAlpha = 0.5f;      // of a hint image: what is painted on
+constexpr double kHintRadius = 0.01;      // of a hint's dot, as a share of the short side
+constexpr float kLeastMeanChroma = 1.0f;  // a key frame of less is grey
+
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, separator);) {
+    const auto first = part.find_first_not_of(' '), last = part.find_last_not_of(' ');
+    if (first != std::string::npos) parts.push_back(part.substr(first, last - first + 1));
+  }
+  return parts;
+}
+
+const View& training_view(const Capture& capture, const std::string& name, const std::string& entry) {
+  const auto is_named = [&](const View& view) {
+    const fs::path path(view.name);
+    return view.name == name || path.filename() == name || path.stem() == name;
+  };
+  const auto count = std::ranges::count_if(capture.views, is_named);
+  if (count != 1) {
+    throw UsageError(fmt::format("{}: {} views of the capture are called {}; they have names like {}", entry,
+                                 count == 0 ? "no" : std::to_string(count), name, capture.views.front().name));
+  }
+  const View& view = *std::ranges::find_if(capture.views, is_named);
+  if (view.held_out) {
+    throw UsageError(entry + ": " + view.name + " is held out for evaluation; name a view that is trained on");
+  }
+  return view;
+}
+
+struct NamedFile {
+  std::string view, entry;
+  fs::path file;
+};
+
+/// "NAME=FILE;NAME=FILE"
+std::vector<NamedFile> named_files(const std::string& list, const char* option) {
+  std::vector<NamedFile> files;
+  for (const std::string& item : split(list, ';')) {
+    const auto equals = item.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == item.size()) {
+      throw UsageError(fmt::format("{} {}: expected VIEW=FILE", option, item));
+    }
+    files.push_back({item.substr(0, equals), fmt::format("{} {}", option, item), item.substr(equals + 1)});
+  }
+  return files;
+}
+
+Ab ab_of_linear(Vec3f rgb) {
+  const Lab<float> lab = lab_from_linear_rgb(rgb);
+  return {lab.a, lab.b};
+}
+
+/// @param kind  strokes: only what is painted on counts
+KnownColors load_colors(const NamedFile& named, KnownColorKind kind, const View& view) {
+  const LinearImage image = read_linear_image(named.file, Transfer::kSrgb);
+  const Intrinsics& lens = view.intrinsics;
+  const double ratio = double(image.width) * lens.height / (double(image.height) * lens.width);
+  if (std::abs(ratio - 1) > 0.02) {
+    throw InputError(named.file, "size",
+                     fmt::format("{} x {} is not the shape of {}, {} x {}", image.width, image.height, view.name,
+                                 lens.width, lens.height));
+  }
+  if (image.channels != 3) throw InputError(named.file, "channels", "expected a colour picture, found a grey one");
+  KnownColors known{kind, view.name, image.width, image.height, {}, {}};
+  double chroma = 0, painted = 0;
+  for (std::size_t p = 0; p < image.pixel_count(); ++p) {
+    const float alpha = image.alpha.empty() ? 1.0f : image.alpha[p];
+    const bool counts = alpha > kStrokeAlpha;
+    const float* rgb = &image.values[3 * p];
+    const Ab color = counts ? ab_of_linear({rgb[0] / alpha, rgb[1] / alpha, rgb[2] / alpha}) : Ab{};
+    known.ab.push_back(color);
+    known.is_known.push_back(counts ? 1 : 0);
+    chroma += std::hypot(color.a, color.b);
+    painted += counts ? 1 : 0;
+  }
+  if (painted == 0) throw InputError(named.file, "alpha", "nothing is painted on it");
+  if (kind == KnownColorKind::kStrokes && painted == double(image.pixel_count())) {
+    throw InputError(named.file, "alpha", "a hint picture is transparent except for its strokes; this one is opaque");
+  }
+  if (kind == KnownColorKind::kKeyFrame && chroma / painted < kLeastMeanChroma) {
+    throw InputError(named.file, "colour", "a key frame must be in colour; this one is grey");
+  }
+  return known;
+}
+
+double number_of(const std::string& text, const std::string& entry) {
+  double value = 0;
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (failure != std::errc() || end != text.data() + text.size()) {
+    throw UsageError(entry + ": expected x,y,VIEW,#rrggbb, found " + text + " for a number");
+  }
+  return value;
+}
+
+Ab color_of(const std::string& text, const std::string& entry) {
+  unsigned rgb = 0;
+  const bool is_hex = text.size() == 7 && text[0] == '#' &&
+                      std::from_chars(text.data() + 1, text.data() + 7, rgb, 16).ptr == text.data() + 7;
+  if (!is_hex) throw UsageError(entry + ": expected a colour like #c08040, found " + text);
+  const auto channel = [&](int shift) { return linear_from_srgb(float((rgb >> shift) & 255u) / 255.0f); };
+  return ab_of_linear({channel(16), channel(8), channel(0)});
+}
+
+/// "x,y,VIEW,#rrggbb": a dot, in pixels of the view's image file.
+KnownColors dot_of(const std::string& hint, const Capture& capture) {
+  const std::string entry = "--hint " + hint;
+  const std::vector<std::string> parts = split(hint, ',');
+  if (parts.size() != 4) throw UsageError(entry + ": expected x,y,VIEW,#rrggbb");
+  const View& view = training_view(capture, parts[2], entry);
+  const LinearImage file = read_linear_image(view.image_file, Transfer::kSrgb);
+  const double x = number_of(parts[0], entry), y = number_of(parts[1], entry);
+  if (x < 0 || y < 0 || x >= file.width || y >= file.height) {
+    throw UsageError(fmt::format("{}: the picture has {} x {} pixels", entry, file.width, file.height));
+  }
+  const Intrinsics& lens = view.intrinsics;
+  KnownColors known{KnownColorKind::kStrokes, view.name, lens.width, lens.height, {}, {}};
+  const auto pixels = std::size_t(lens.width) * std::size_t(lens.height);
+  known.ab.assign(pixels, color_of(parts[3], entry));
+  known.is_known.assign(pixels, 0);
+  const double cx = x * lens.width / file.width, cy = y * lens.height / file.height;
+  const double radius = std::max(1.5, kHintRadius * std::min(lens.width, lens.height));
+  for (int py = 0; py < lens.height; ++py) {
+    for (int px = 0; px < lens.width; ++px) {
+      const bool is_near = std::hypot(px + 0.5 - cx, py + 0.5 - cy) <= radius;
+      known.is_known[std::size_t(py) * std::size_t(lens.width) + std::size_t(px)] = is_near ? 1 : 0;
+    }
+  }
+  return known;
+}
+
+}  // namespace
+
+std::vector<KnownColors> load_known_colors(const Capture& capture, const ColorizerConfig& config) {
+  std::vector<KnownColors> known;
+  const auto load = [&](const std::string& list, const char* option, KnownColorKind kind) {
+    for (const NamedFile& named : named_files(list, option)) {
+      known.push_back(load_colors(named, kind, training_view(capture, named.view, named.entry)));
+    }
+  };
+  load(config.keyframes, "--keyframe", KnownColorKind::kKeyFrame);
+  load(config.hint_images, "--hint-image", KnownColorKind::kStrokes);
+  for (const std::string& hint : split(config.hints, ';')) known.push_back(dot_of(hint, capture));
+  return known;
+}
+
+std::vector<fs::path> key_frame_files(const ColorizerConfig& config) {
+  std::vector<fs::path> files;
+  for (const NamedFile& named : named_files(config.keyframes, "--keyframe")) files.push_back(named.file);
+  return files;
+}
+
+}  // namespace cnerf::pipeline

@@ -1,0 +1,21 @@
+#pragma once
+/// Key frames and hints as a user names them, made into colours of views.
+
+#include <vector>
+
+#include "src/capture/capture.h"
+#include "src/config/config.h"
+#include "src/train/known_colors.h"
+
+namespace cnerf::pipeline {
+
+/// What `config.colorizer.keyframes`, `hint_images` and `hints` name; key frames come first, since hints correct them.
+/// Views are named as the capture names them, or by their file's name with or without extension.
+/// @throws UsageError         an entry that cannot be read, a view that is not there, or is held out.
+/// @throws MissingInputError, InputError  a file that is not there, not a picture, of another shape, or without colour.
+[[nodiscard]] std::vector<KnownColors> load_known_colors(const Capture& capture, const ColorizerConfig& config);
+
+/// The files `config.keyframes` names.  @throws UsageError.
+[[nodiscard]] std::vector<std::filesystem::path> key_frame_files(const ColorizerConfig& config);
+
+}  // namespace cnerf::pipeline

@@ -1,0 +1,94 @@
+#include "src/pipeline/picture_files.h"
+
+#include <unistd.h>
+
+#include <opencv2/videoio.hpp>
+#include <span>
+
+#include "export/exr_writer.h"
+#include "src/base/check.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/picture/encode.h"
+
+namespace cnerf::pipeline {
+namespace fs = std::filesystem;
+
+std::vector<float> shown_rgb(const RenderedImage& image, ShownColor color) {
+  if (color == ShownColor::kBaked && !image.baked_rgb.empty()) return image.baked_rgb;
+  if (color == ShownColor::kDecoded && !image.rgb.empty()) return image.rgb;
+  std::vector<float> grey;
+  grey.reserve(3 * image.luminance.size());
+  for (const float y : image.luminance) grey.insert(grey.end(), {y, y, y});
+  return grey;
+}
+
+Picture grey_picture(const MonoImage& image) {
+  return picture_from_linear(image.width, image.height, luminance_plane(image));
+}
+
+Picture picture_of(const RenderedImage& image, ShownColor color) {
+  return picture_from_linear(image.width, image.height, shown_rgb(image, color));
+}
+
+void write_exr(const fs::path& file, const RenderedImage& image, ShownColor color, const std::string& color_origin) {
+  const std::vector<float> values = shown_rgb(image, color);
+  const std::span<const float> rgb(values);
+  cnerf::write_exr(
+      file, {image.width,
+             image.height,
+             {{"R", rgb, 3, true},
+              {"G", rgb.subspan(1), 3, true},
+              {"B", rgb.subspan(2), 3, true},
+              {"A", image.opacity, 1, true},
+              {"Z", image.depth}},
+             {{"software", "cnerf " CNERF_VERSION}, {"colorOrigin", color_origin}, {"colorSpace", "lin_rec709"}}});
+}
+
+struct VideoFile::Encoder {
+  fs::path file, temporary;
+  int fps = 0;
+  cv::Size size;
+  cv::VideoWriter writer;
+};
+
+VideoFile::VideoFile(const fs::path& file, int fps) : encoder_(std::make_unique<Encoder>()) {
+  encoder_->file = file;
+  encoder_->temporary = file.parent_path() / ("." + file.stem().string() + ".partial-" + std::to_string(::getpid()) +
+                                              file.extension().string());
+  encoder_->fps = fps;
+}
+
+VideoFile::~VideoFile() {
+  encoder_->writer.release();
+  std::error_code ignored;
+  fs::remove(encoder_->temporary, ignored);
+}
+
+bool VideoFile::add(const Picture& picture) {
+  if (encoder_->size.empty()) {
+    std::error_code ignored;
+    fs::create_directories(encoder_->file.parent_path(), ignored);
+    encoder_->size = {picture.width, picture.height};
+    encoder_->writer.open(encoder_->temporary.string(), cv::VideoWriter::fourcc('m', 'p', '4', 'v'), encoder_->fps,
+                          encoder_->size);
+  }
+  CNERF_CHECK_EQ(encoder_->size.width, picture.width);
+  CNERF_CHECK_EQ(encoder_->size.height, picture.height);
+  if (!encoder_->writer.isOpened()) return false;
+  encoder_->writer.write(bgr_of(picture));
+  return true;
+}
+
+void VideoFile::finish() {
+  encoder_->writer.release();
+  std::error_code failure;
+  // OpenCV reports no write errors; a file that cannot be opened again is what a full disk leaves.
+  if (!cv::VideoCapture(encoder_->temporary.string()).isOpened()) {
+    throw OutputError(encoder_->file.string() + ": cannot be written: the video is not readable, is the disk full?");
+  }
+  fs::rename(encoder_->temporary, encoder_->file, failure);
+  if (failure) throw OutputError(encoder_->file.string() + ": cannot be written: " + failure.message());
+}
+
+}  // namespace cnerf::pipeline

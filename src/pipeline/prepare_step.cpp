@@ -1,0 +1,130 @@
+#include "src/pipeline/prepare_step.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/capture/load_capture.h"
+#include "src/picture/encode.h"
+
+namespace cnerf::pipeline {
+namespace fs = std::filesystem;
+namespace {
+
+/// The mark of a folder that preparing began, so that nothing else is ever cleared.
+constexpr const char* kMark = "work/source.txt";
+
+bool is_empty_or_missing(const fs::path& folder) {
+  std::error_code failure;
+  return !fs::exists(folder, failure) || (fs::is_directory(folder, failure) && fs::is_empty(folder, failure));
+}
+
+/// What moved in a view, together with what was masked already, at the size of the view.
+cv::Mat1b still_part(const MotionMask& mask, const MonoImage& image) {
+  std::vector<std::uint8_t> codes = mask.valid;
+  cv::Mat1b still;
+  cv::resize(cv::Mat1b(mask.height, mask.width, codes.data()), still, {image.width, image.height}, 0, 0,
+             cv::INTER_NEAREST);
+  for (std::size_t p = 0; p < image.pixel_count(); ++p) {
+    if (!image.valid(p)) still(int(p) / still.cols, int(p) % still.cols) = 0;
+  }
+  return still;
+}
+
+/// Masks what moves, in files of the pictures' own size beside those that are there, and names them in transforms.json.
+void mask_motion(const fs::path& capture, const MotionMaskOptions& options, const Engines& engines,
+                 Observer& observer) {
+  CaptureOptions reading;
+  const Capture full = load_capture(capture, reading);
+  int longest = 0;
+  for (const View& view : full.views) longest = std::max({longest, view.image.width, view.image.height});
+  reading.downscale = std::max(1, longest / options.motion_side);
+  const auto masks = find_motion(load_capture(capture, reading), options, capture / "work", engines, observer);
+
+  auto transforms = nlohmann::ordered_json::parse(read_text_file(capture / "transforms.json"));
+  auto record = nlohmann::ordered_json::parse(read_text_file(capture / "prepare.json"));
+  double share = 0;
+  std::string left_alone;
+  for (std::size_t v = 0; v < masks.size(); ++v) {
+    const View& view = full.views[v];
+    const MotionMask& mask = masks[v];
+    if (mask.valid.empty()) left_alone += (left_alone.empty() ? "" : ", ") + view.name;
+    if (mask.valid.empty() || mask.share == 0) continue;
+    share += mask.share / double(masks.size());
+    const fs::path file = fs::path("masks") / ("still_" + fs::path(view.name).stem().string() + ".png");
+    write_png(capture / file, still_part(mask, view.image));
+    for (auto& frame : transforms.at("frames")) {
+      if (frame.at("file_path") == view.name) frame["mask_path"] = file.generic_string();
+    }
+    record["motion"]["shares"][view.name] = mask.share;
+  }
+  record["motion"]["difference"] = options.motion_difference;
+  record["motion"]["steps"] = options.motion_steps;
+  write_file(capture / "prepare.json", record.dump(1) + "\n");
+  write_file(capture / "transforms.json", transforms.dump(1) + "\n");
+  observer.say(fmt::format("motion: {:.1f} % of the pictures is masked (masks/still_*.png)", 100 * share));
+  if (!left_alone.empty()) observer.say("motion: fitted too badly to tell, not masked: " + left_alone);
+}
+
+/// Whether a folder may take the capture; clears what is to be made again.
+/// @return  false where the capture is finished and stays
+bool begin_folder(const PrepareJob& job) {
+  const auto& [source, out, options, existing] = job;
+  if (!fs::exists(source)) throw MissingInputError(source.string() + ": no such file or folder");
+  const bool finished = fs::exists(out / "transforms.json");
+  const bool ours = fs::exists(out / kMark);
+  const std::string origin = fs::absolute(source).lexically_normal().string() + "\n";
+  if (ours && existing.resume && read_text_file(out / kMark) != origin) {
+    throw UsageError(out.string() + ": was begun for another source, " + read_text_file(out / kMark) +
+                     "pass --overwrite, or choose another folder");
+  }
+  if (finished && ours && existing.resume) return false;
+  if (!is_empty_or_missing(out)) {
+    if (!ours) throw UsageError(out.string() + ": is not empty and holds no prepared capture; choose another folder");
+    if (!existing.resume && !existing.overwrite) {
+      throw UsageError(out.string() +
+                       (finished ? ": holds a capture already; pass --overwrite to make it again"
+                                 : ": was begun already; pass --resume to go on or --overwrite to start again"));
+    }
+    if (existing.overwrite) {
+      for (const char* made : {"images", "masks", "work", "transforms.json", "prepare.json", "contact_sheet.png"}) {
+        fs::remove_all(out / made);
+      }
+    }
+  }
+  write_file(out / kMark, origin);
+  return true;
+}
+
+}  // namespace
+
+void prepare_step(const PrepareJob& job, const Engines& engines, Observer& observer) {
+  const PrepareStepOptions& options = job.options;
+  if (!begin_folder(job)) {
+    observer.say("capture: " + job.out.string() + " was prepared before");
+    const auto record = nlohmann::json::parse(read_text_file(job.out / "prepare.json"));
+    if (options.motion_masks && !record.contains("motion")) mask_motion(job.out, options.motion, engines, observer);
+    return;
+  }
+  prepare_capture(job.source, job.out, options.prepare, observer.progress_sink(),
+                  [&](const std::string& text) { observer.say(text); });
+  if (options.motion_masks) mask_motion(job.out, options.motion, engines, observer);
+  observer.wrote("contact sheet", job.out / "contact_sheet.png");
+  observer.wrote("capture", job.out);
+}
+
+fs::path capture_of(const fs::path& source, const fs::path& run, Observer& observer) {
+  if (!needs_preparing(source)) return source;
+  fs::path folder = fs::absolute(run).lexically_normal();
+  if (folder.filename().empty()) folder = folder.parent_path();
+  const fs::path capture = folder.parent_path() / (folder.filename().string() + "-capture");
+  observer.say("no camera poses in " + source.string() + ": preparing a capture (cnerf prepare has options for this)");
+  prepare_step({source, capture, {}, {.resume = true}}, cpu_engines(), observer);
+  return capture;
+}
+
+}  // namespace cnerf::pipeline

@@ -1,0 +1,43 @@
+#pragma once
+/// Preparing as a step of a run, or alone.
+
+#include <filesystem>
+
+#include "src/engine/engines.h"
+#include "src/pipeline/run_context.h"
+#include "src/prepare/prepare.h"
+#include "src/train/motion_masks.h"
+
+namespace cnerf::pipeline {
+
+struct PrepareStepOptions {
+  PrepareOptions prepare;
+  bool motion_masks = false;  ///< find what moves, by a quick fit, and mask it
+  MotionMaskOptions motion;
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    prepare.visit(v);
+    v("motion_masks", motion_masks, "find what moves by a quick fit of the scene, and leave it out");
+    motion.visit(v);
+  }
+};
+
+struct PrepareJob {
+  std::filesystem::path source;  ///< photographs or a clip
+  std::filesystem::path out;     ///< folder of the capture
+  PrepareStepOptions options;
+  ExistingOutput existing;
+};
+
+/// Makes a capture, unless it is there and `existing.resume` is set, and says what it wrote.
+/// @throws UsageError  when there is a capture, or anything else, and neither choice is made; when `existing.resume` is
+///                     set and the folder was begun for another source; and as `prepare_capture`.
+void prepare_step(const PrepareJob& job, const Engines& engines, Observer& observer);
+
+/// What a run works on: `source` itself if it is a capture; else the capture that is made of it beside the run's
+/// folder, or was made by an earlier call.  @throws  as `prepare_step`.
+[[nodiscard]] std::filesystem::path capture_of(const std::filesystem::path& source, const std::filesystem::path& run,
+                                               Observer& observer);
+
+}  // namespace cnerf::pipeline

@@ -1,0 +1,57 @@
+#include "src/pipeline/run.h"
+
+#include "src/pipeline/colorize_step.h"
+#include "src/pipeline/default_colorizer.h"
+#include "src/pipeline/evaluate_step.h"
+#include "src/pipeline/known_color_files.h"
+#include "src/pipeline/prepare_step.h"
+#include "src/pipeline/render_step.h"
+#include "src/pipeline/train_step.h"
+
+namespace cnerf::pipeline {
+namespace fs = std::filesystem;
+namespace {
+
+/// Outputs of an earlier, interrupted call that need not be made again.
+bool is_done(const RunJob& job, const fs::path& output) {
+  return job.existing.resume && fs::exists(output);
+}
+
+bool needs_colorizer(const RunJob& job, const RunDirectory& directory) {
+  if (job.grey) return false;
+  const bool is_colorized = directory.exists() && !directory.record().current_take.empty();
+  return !(job.existing.resume && is_colorized);
+}
+
+}  // namespace
+
+fs::path run(RunJob job, Config config, const Engines& engines, Observer& observer) {
+  const RunDirectory directory(job.out);
+  check_run_folder(directory, job.existing);
+  if (!job.grey) choose_colorizer(job.capture, config, observer);
+  job.capture = capture_of(job.capture, job.out, observer);
+
+  const RunContext context{directory, config, read_capture(job.capture, config, observer), job.command_line};
+  // Made before the training: what cannot be made or read should not cost an hour.
+  if (!job.grey) (void)load_known_colors(context.capture, context.config.colorizer);
+  const auto colorizer = needs_colorizer(job, directory) ? colorizer_of(context, observer) : nullptr;
+  begin_run(context, job.capture, job.existing);
+  train_step(context, job.existing.resume, engines, observer);
+
+  std::string take;
+  if (!job.grey) {
+    take = take_to_write(context, "", job.existing);
+    colorize_step(context, {take, job.existing, colorizer.get()}, engines, observer);
+  }
+  if (!is_done(job, directory.metrics_file())) evaluate_step(context, {take, {}}, engines, observer);
+  const fs::path bake = directory.bakes(take);
+  if (!is_done(job, last_file(bake, job.formats))) bake_step(context, {take, bake, job.formats}, engines, observer);
+  const fs::path renders = directory.renders(take);
+  if (!is_done(job, renders / "turntable.mp4")) {
+    const RenderOutput video{.folder = renders, .mp4 = true};
+    render_step(context, {take, turntable_path(context.capture, config.render), video}, engines, observer);
+  }
+  return bake;
+}
+
+}  // namespace cnerf::pipeline

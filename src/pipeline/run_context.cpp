@@ -1,0 +1,64 @@
+#include "src/pipeline/run_context.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/base/text.h"
+#include "src/capture/load_capture.h"
+#include "src/pipeline/version.h"
+#include "src/train/stage1.h"
+
+namespace cnerf::pipeline {
+namespace fs = std::filesystem;
+namespace {
+
+bool holds_something(const fs::path& folder) {
+  std::error_code failure;
+  return fs::exists(folder, failure) && (!fs::is_directory(folder, failure) || !fs::is_empty(folder, failure));
+}
+
+}  // namespace
+
+Capture read_capture(const fs::path& path, const Config& config, Observer& observer) {
+  Capture capture = load_capture(path, config.capture);
+  const auto held_out = std::ranges::count_if(capture.views, [](const View& view) { return view.held_out; });
+  const Intrinsics& first = capture.views.front().intrinsics;
+  observer.say(fmt::format("capture: {} ({}, {} views of {} x {}, {} held out)", path.string(), capture.format,
+                           capture.views.size(), first.width, first.height, held_out));
+  for (const std::string& note : capture.notes) observer.say("note: " + note);
+  return capture;
+}
+
+void check_run_folder(const RunDirectory& directory, const ExistingOutput& existing) {
+  const fs::path& root = directory.root();
+  if (directory.exists()) {
+    if (existing.resume || existing.overwrite) return;
+    throw UsageError(root.string() +
+                     ": holds a run already; pass --resume to go on with it or --overwrite to start again");
+  }
+  if (holds_something(root)) {
+    throw UsageError(root.string() + ": is not empty and holds no run; choose another folder");
+  }
+}
+
+void begin_run(const RunContext& context, const fs::path& capture_path, const ExistingOutput& existing) {
+  const RunDirectory& directory = context.directory;
+  const bool goes_on = directory.exists() && existing.resume;
+  if (directory.exists() && !goes_on) directory.clear();
+  // Before the configuration is written: what is refused must not take the place of what the run was made with.
+  if (goes_on && !directory.record().stage1_finished) {
+    check_continues(directory.stage1_snapshot(), context.config.stage1);
+  }
+  write_file(directory.config_file(), to_toml(context.config));
+  if (goes_on) return;
+  RunRecord record;
+  record.capture = fs::absolute(capture_path).lexically_normal();
+  record.program_version = version_text();
+  record.command_line = joined(context.command_line);
+  directory.save(record);
+}
+
+}  // namespace cnerf::pipeline

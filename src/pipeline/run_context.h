@@ -1,0 +1,38 @@
+#pragma once
+/// What the steps of a run work on, and the start of a run. Each step is usable alone: `cnerf run` does one after
+/// another, the other commands do one each.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "src/base/observer.h"
+#include "src/capture/capture.h"
+#include "src/config/config.h"
+#include "src/pipeline/run_directory.h"
+
+namespace cnerf::pipeline {
+
+struct RunContext {
+  RunDirectory directory;
+  Config config;
+  Capture capture;
+  std::vector<std::string> command_line;  ///< for records
+};
+
+/// What to do about output that is already there.
+struct ExistingOutput {
+  bool resume = false;     ///< go on where it stopped; what is finished stays
+  bool overwrite = false;  ///< start again
+};
+
+/// Reads a capture and says what was found, with the reader's notes.
+[[nodiscard]] Capture read_capture(const std::filesystem::path& path, const Config& config, Observer& observer);
+
+/// Whether a run may go to the folder; nothing is changed yet.
+/// @throws UsageError  when there is a run and neither is set, or the folder holds something else.
+void check_run_folder(const RunDirectory& directory, const ExistingOutput& existing);
+/// Makes the folder of a run ready: clears it to overwrite, writes config.toml and run.json.
+void begin_run(const RunContext& context, const std::filesystem::path& capture_path, const ExistingOutput& existing);
+
+}  // namespace cnerf::pipeline

@@ -1,0 +1,105 @@
+#pragma once
+/// The folder of a run and what lies where in it:
+///
+///   config.toml          every option the run was made with
+///   run.json             capture, program version, how far stage 1 came, the current take
+///   stage1.snapshot      luminance and density
+///   takes/NAME/          one colorization each: take.snapshot, take.json, config.toml, galleries, metrics.json
+///   cache/               what a colorizer learnt, by content; may be deleted
+///   renders/NAME/        pictures and videos of a take ("grey": of none)
+///   bakes/NAME/          volumes of a take
+///   metrics.json, contact_sheet.png   of the take evaluated last
+///   bases.png            base candidates, when only those were asked for
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "src/base/usage.h"
+#include "src/config/config.h"
+#include "src/engine/engines.h"
+#include "src/train/scene.h"
+
+namespace cnerf::pipeline {
+
+inline constexpr int kRunSchemaVersion = 1;
+inline constexpr const char* kGreyTake = "grey";  ///< names the outputs of an uncoloured scene
+
+/// Content of run.json.
+struct RunRecord {
+  std::filesystem::path capture;  ///< absolute
+  std::string program_version;
+  std::string command_line;  ///< that started the run
+  bool stage1_finished = false;
+  Stage1Report stage1;
+  std::string current_take;                        ///< colorized last; empty = none yet
+  std::map<std::string, double> seconds_of_steps;  ///< evaluate, bake, render: what each took last
+  std::size_t peak_memory_bytes = 0;               ///< the most any step's process held
+};
+
+/// Content of takes/NAME/take.json; the file exists once the take is finished.
+struct TakeRecord {
+  std::string name;
+  std::string colorizer;
+  Stage2Report stage2;
+};
+
+class RunDirectory {
+ public:
+  explicit RunDirectory(std::filesystem::path root) : root_(std::move(root)) {}
+
+  /// A folder that holds a run.  @throws MissingInputError  when it does not; SnapshotError for a newer run.json.
+  static RunDirectory open(const std::filesystem::path& root);
+
+  [[nodiscard]] const std::filesystem::path& root() const { return root_; }
+  [[nodiscard]] std::filesystem::path config_file() const { return root_ / "config.toml"; }
+  [[nodiscard]] std::filesystem::path record_file() const { return root_ / "run.json"; }
+  [[nodiscard]] std::filesystem::path stage1_snapshot() const { return root_ / "stage1.snapshot"; }
+  [[nodiscard]] std::filesystem::path metrics_file() const { return root_ / "metrics.json"; }
+  [[nodiscard]] std::filesystem::path contact_sheet() const { return root_ / "contact_sheet.png"; }
+  [[nodiscard]] std::filesystem::path take_folder(const std::string& take) const { return root_ / "takes" / take; }
+  [[nodiscard]] std::filesystem::path take_snapshot(const std::string& take) const;
+  [[nodiscard]] std::filesystem::path take_record_file(const std::string& take) const;
+  [[nodiscard]] std::filesystem::path take_config_file(const std::string& take) const;
+  [[nodiscard]] std::filesystem::path colorizer_cache() const { return root_ / "cache"; }
+  [[nodiscard]] std::filesystem::path renders(const std::string& take) const;
+  [[nodiscard]] std::filesystem::path bakes(const std::string& take) const;
+
+  [[nodiscard]] bool exists() const;
+  [[nodiscard]] RunRecord record() const;
+  void save(const RunRecord& record) const;
+  [[nodiscard]] std::optional<TakeRecord> take_record(const std::string& take) const;
+  void save(const TakeRecord& record) const;
+
+  /// The configuration of the run, or of one of its takes.
+  [[nodiscard]] Config config(const std::string& take = {}) const;
+  /// A take the user names, or the current one, or "" when the run is not colorized.
+  /// @throws MissingInputError  when the named take is not finished; lists those that are.
+  [[nodiscard]] std::string choose_take(const std::string& wanted) const;
+  /// `base`, or `base-2`, `base-3`, … where no take of that name exists.
+  [[nodiscard]] std::string free_take_name(const std::string& base) const;
+  /// Removes everything a run writes but the cache, and nothing else.
+  void clear() const;
+
+ private:
+  std::filesystem::path root_;
+};
+
+/// The trained scene of a run.
+/// @param take  empty = luminance only.  @throws MissingInputError, SnapshotError.
+[[nodiscard]] std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::string& take,
+                                                const Engines& engines);
+
+/// Who coloured a take; empty when nobody did.
+[[nodiscard]] std::string colorizer_name(const RunDirectory& directory, const std::string& take);
+
+/// Keeps in the run's record how long a step took.
+void note_time(const RunDirectory& directory, const char* step, const Stopwatch& watch);
+
+/// Take names become folder names.  @throws UsageError  when `name` is empty, `.`-led or holds other characters than
+/// letters, digits, `-`, `_` and `.`.
+void check_take_name(const std::string& name);
+
+}  // namespace cnerf::pipeline

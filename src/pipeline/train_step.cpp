@@ -1,0 +1,24 @@
+#include "src/pipeline/train_step.h"
+
+#include <fmt/format.h>
+
+#include "src/base/text.h"
+#include "src/train/stage1.h"
+
+namespace cnerf::pipeline {
+
+void train_step(const RunContext& context, bool resume, const Engines& engines, Observer& observer) {
+  const RunDirectory& directory = context.directory;
+  RunRecord record = directory.record();
+  if (!record.stage1_finished || !resume) {
+    record.stage1 =
+        train_stage1({context.capture, context.config.stage1, directory.stage1_snapshot(), resume}, engines, observer);
+    record.stage1_finished = true;
+    directory.save(record);
+  }
+  observer.say(fmt::format("stage 1: {} steps in {}, {:.1f} dB on training pixels", record.stage1.steps,
+                           duration_text(record.stage1.seconds), record.stage1.train_psnr));
+  observer.wrote("snapshot", directory.stage1_snapshot());
+}
+
+}  // namespace cnerf::pipeline

@@ -1,0 +1,11 @@
+#pragma once
+/// What this build is.
+
+#include <string>
+
+namespace cnerf::pipeline {
+
+/// "0.1.0", by semantic versioning.
+[[nodiscard]] std::string version_text();
+
+}  // namespace cnerf::pipeline

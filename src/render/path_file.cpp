@@ -1,0 +1,118 @@
+#include "src/render/path_file.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+
+namespace cnerf {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kRotationTolerance = 1e-3;  // |R R^T - 1|, of matrices written with few digits
+
+/// One frame of the file and the file's own values behind it.
+class Frame {
+ public:
+  Frame(const std::filesystem::path& file, const Json& whole, const Json& frame, std::size_t index)
+      : file_(file), whole_(whole), frame_(frame), name_(fmt::format("frames[{}]", index)) {}
+
+  [[noreturn]] void refuse(const std::string& field, const std::string& problem) const {
+    throw InputError(file_, name_ + "." + field, problem);
+  }
+
+  [[nodiscard]] std::optional<double> number(const char* field) const {
+    for (const Json* json : {&frame_, &whole_}) {
+      if (!json->contains(field)) continue;
+      const Json& value = json->at(field);
+      if (!value.is_number()) refuse(field, "expected a number, got " + value.dump());
+      return value.get<double>();
+    }
+    return std::nullopt;
+  }
+
+  [[nodiscard]] Intrinsics intrinsics() const {
+    const auto w = number("w"), h = number("h");
+    if (!w || !h || *w < 1 || *h < 1) refuse("w, h", "expected the size of the picture in pixels");
+    Intrinsics result;
+    result.width = int(*w);
+    result.height = int(*h);
+    if (const auto fl_x = number("fl_x")) {
+      result.fx = *fl_x;
+    } else if (const auto angle = number("camera_angle_x")) {
+      result.fx = *w / (2 * std::tan(*angle / 2));
+    }
+    if (!(result.fx > 0)) refuse("fl_x", "expected a positive focal length, or camera_angle_x");
+    result.fy = number("fl_y").value_or(result.fx);
+    result.cx = number("cx").value_or(*w / 2);
+    result.cy = number("cy").value_or(*h / 2);
+    return result;
+  }
+
+  [[nodiscard]] Affined world_from_camera() const {
+    const char* field = "transform_matrix";
+    const Json matrix = frame_.is_object() ? frame_.value(field, Json()) : Json();
+    if (!matrix.is_array() || matrix.size() < 3) refuse(field, "expected a 4x4 matrix");
+    Affined pose;
+    for (int i = 0; i < 3; ++i) {
+      if (!matrix[i].is_array() || matrix[i].size() != 4) refuse(field, "expected a 4x4 matrix");
+      double row[4];
+      for (int j = 0; j < 4; ++j) {
+        if (!matrix[i][j].is_number()) refuse(field, "expected numbers, got " + matrix[i][j].dump());
+        row[j] = matrix[i][j].get<double>();
+      }
+      pose.linear.rows[i] = {row[0], -row[1], -row[2]};  // OpenGL's camera axes to OpenCV's
+      pose.translation[i] = row[3];
+    }
+    check_rotation(pose.linear, field);
+    return pose;
+  }
+
+ private:
+  void check_rotation(const Mat3d& rotation, const char* field) const {
+    if (rotation.determinant() < 0) refuse(field, "its 3x3 part mirrors");
+    const Mat3d product = rotation * rotation.transposed();
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        // Written so that NaN fails.
+        if (!(std::abs(product.rows[i][j] - (i == j ? 1 : 0)) < kRotationTolerance)) {
+          refuse(field, "its 3x3 part is not a rotation");
+        }
+      }
+    }
+  }
+
+  const std::filesystem::path& file_;
+  const Json& whole_;
+  const Json& frame_;
+  std::string name_;
+};
+
+Json parse(const std::filesystem::path& file) {
+  try {
+    return Json::parse(read_text_file(file));
+  } catch (const Json::exception& error) {
+    throw InputError(file, "", error.what());
+  }
+}
+
+}  // namespace
+
+std::vector<PathCamera> read_path_file(const std::filesystem::path& file) {
+  const Json json = parse(file);
+  const Json frames = json.is_object() ? json.value("frames", Json()) : Json();
+  if (!frames.is_array() || frames.empty()) throw InputError(file, "frames", "expected a list of cameras");
+  std::vector<PathCamera> cameras;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Frame frame(file, json, frames[i], i);
+    cameras.push_back({fmt::format("frame_{:04}", i), frame.intrinsics(), frame.world_from_camera()});
+  }
+  return cameras;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,38 @@
+#include "src/pipeline/default_colorizer.h"
+
+#include <gtest/gtest.h>
+
+#include "src/base/files.h"
+#include "tests/support/data.h"
+
+namespace cnerf::pipeline {
+namespace {
+
+class DefaultColorizer : public testing::Test {
+ protected:
+  [[nodiscard]] std::string chosen(const std::string& given = "") {
+    Config config;
+    config.colorizer.spec = given;
+    choose_colorizer(capture_.path(), config, observer_);
+    return config.colorizer.spec;
+  }
+  test::TempDir capture_;
+  Observer observer_;
+};
+
+TEST_F(DefaultColorizer, IsTheBuiltInNetwork) {
+  EXPECT_EQ(chosen(), "builtin");
+}
+
+TEST_F(DefaultColorizer, IsTheCapturesOwnPhotographsWhereItHasSome) {
+  write_file(capture_ / "references/a.png", "pixels");
+  EXPECT_EQ(chosen(), "reference:" + (capture_ / "references").string());
+}
+
+TEST_F(DefaultColorizer, WhatIsGivenStays) {
+  write_file(capture_ / "references/a.png", "pixels");
+  EXPECT_EQ(chosen("exec:paint"), "exec:paint");
+}
+
+}  // namespace
+}  // namespace cnerf::pipeline

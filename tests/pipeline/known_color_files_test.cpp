@@ -1,0 +1,116 @@
+// Key frames and hints as a user names them.
+
+#include "src/pipeline/known_color_files.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <opencv2/imgcodecs.hpp>
+
+#include "src/base/error.h"
+#include "src/picture/encode.h"
+#include "tests/support/data.h"
+
+namespace cnerf::pipeline {
+namespace {
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+/// A picture of one colour.
+Picture plain(int width, int height, std::uint8_t r, std::uint8_t g, std::uint8_t b) {
+  Picture picture{width, height, {}};
+  for (int i = 0; i < width * height; ++i) picture.rgb.insert(picture.rgb.end(), {r, g, b});
+  return picture;
+}
+
+class KnownColorFiles : public ::testing::Test {
+ protected:
+  KnownColorFiles() {
+    for (const char* name : {"images/a.png", "images/b.png", "images/held.png"}) {
+      View view;
+      view.name = name;
+      view.image_file = folder_ / fs::path(name).filename().string();
+      view.intrinsics.width = 20, view.intrinsics.height = 10;
+      view.held_out = view.name == "images/held.png";
+      write_png(view.image_file, plain(40, 20, 90, 90, 90));
+      capture_.views.push_back(view);
+    }
+    write_png(folder_ / "red.png", plain(40, 20, 200, 30, 30));
+    write_png(folder_ / "grey.png", plain(40, 20, 90, 90, 90));
+    write_png(folder_ / "square.png", plain(20, 20, 200, 30, 30));
+  }
+  std::string at(const std::string& name) { return (folder_ / name).string(); }
+  template <typename E>
+  std::string refusal(const ColorizerConfig& config) {
+    try {
+      (void)load_known_colors(capture_, config);
+    } catch (const E& error) {
+      return error.what();
+    }
+    ADD_FAILURE() << "was not refused, or by another error";
+    return "";
+  }
+  test::TempDir folder_;
+  Capture capture_;
+};
+
+TEST_F(KnownColorFiles, KeyFramesComeFirstThenHints) {
+  ColorizerConfig config;
+  config.keyframes = "b=" + at("red.png") + "; images/a.png=" + at("red.png");
+  config.hints = "10,10,a,#00ff00;39.5,0,b.png,#0000ff";
+  const std::vector<KnownColors> known = load_known_colors(capture_, config);
+  ASSERT_EQ(known.size(), 4u);
+  EXPECT_EQ(known[0].view, "images/b.png");
+  EXPECT_EQ(known[1].view, "images/a.png");
+  EXPECT_EQ(known[0].kind, KnownColorKind::kKeyFrame);
+  EXPECT_GT(known[0].ab[0].a, 40) << "red";
+  EXPECT_EQ(known[2].kind, KnownColorKind::kStrokes);
+  // (10, 10) of a file of 40 x 20 is (5, 5) of the view of 20 x 10.
+  EXPECT_EQ(known[2].is_known[5 * 20 + 5], 1);
+  EXPECT_EQ(known[2].is_known[0], 0);
+  EXPECT_LT(known[2].ab[5 * 20 + 5].a, -50) << "green";
+  EXPECT_EQ(known[3].is_known[19], 1) << "the corner";
+}
+
+TEST_F(KnownColorFiles, OfAHintPictureOnlyTheStrokesCount) {
+  cv::Mat4b strokes(20, 40, cv::Vec4b(0, 0, 0, 0));
+  strokes.at<cv::Vec4b>(6, 31) = {30, 30, 200, 255};  // B G R A
+  strokes.at<cv::Vec4b>(7, 31) = {30, 30, 200, 60};   // too faint
+  cv::imwrite(at("strokes.png"), strokes);
+  ColorizerConfig config;
+  config.hint_images = "a=" + at("strokes.png");
+  const std::vector<KnownColors> known = load_known_colors(capture_, config);
+  ASSERT_EQ(known.size(), 1u);
+  EXPECT_EQ(known[0].kind, KnownColorKind::kStrokes);
+  EXPECT_EQ(std::accumulate(known[0].is_known.begin(), known[0].is_known.end(), 0), 1);
+  EXPECT_EQ(known[0].is_known[6 * 40 + 31], 1);
+  EXPECT_GT(known[0].ab[6 * 40 + 31].a, 40) << "red";
+
+  cv::imwrite(at("empty.png"), cv::Mat4b(20, 40, cv::Vec4b(0, 0, 0, 0)));
+  config.hint_images = "a=" + at("empty.png");
+  EXPECT_THAT(refusal<InputError>(config), HasSubstr("nothing is painted"));
+}
+
+TEST_F(KnownColorFiles, BadEntriesAreRefusedByName) {
+  const auto with = [](std::string ColorizerConfig::*option, const std::string& value) {
+    ColorizerConfig config;
+    config.*option = value;
+    return config;
+  };
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::keyframes, "a")), HasSubstr("expected VIEW=FILE"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::keyframes, "zebra=" + at("red.png"))), HasSubstr("zebra"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::keyframes, "held=" + at("red.png"))), HasSubstr("held out"));
+  EXPECT_THAT(refusal<InputError>(with(&ColorizerConfig::keyframes, "a=" + at("grey.png"))), HasSubstr("grey"));
+  EXPECT_THAT(refusal<InputError>(with(&ColorizerConfig::keyframes, "a=" + at("square.png"))), HasSubstr("shape"));
+  EXPECT_THAT(refusal<InputError>(with(&ColorizerConfig::hint_images, "a=" + at("red.png"))), HasSubstr("opaque"));
+  EXPECT_THAT(refusal<MissingInputError>(with(&ColorizerConfig::keyframes, "a=" + at("none.png"))),
+              HasSubstr("none.png"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::hints, "1,2,a")), HasSubstr("x,y,VIEW,#rrggbb"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::hints, "1,two,a,#ff0000")), HasSubstr("two"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::hints, "1,2,a,red")), HasSubstr("red"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::hints, "40,2,a,#ff0000")), HasSubstr("40 x 20"));
+}
+
+}  // namespace
+}  // namespace cnerf::pipeline
