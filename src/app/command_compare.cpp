@@ -1,10 +1,13 @@
 /// cnerf compare: the paper's table, its baselines and ablations.
 
+#include <algorithm>
+
 #include "src/app/command.h"
 #include "src/app/common_options.h"
 #include "src/app/comparison_run.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/compare/options.h"
 #include "src/compare/rating.h"
 
 namespace cnerf::app {
@@ -47,13 +50,24 @@ void check_folder(const CompareArguments& arguments) {
   }
 }
 
+/// As resolve_config, with the section [compare].
+CompareConfig resolve_compare_config(const ConfigArguments& arguments) {
+  CompareConfig config;
+  const std::vector<Field> fields = fields_of(config);
+  std::vector<RetiredKey> retired = retired_keys();
+  std::erase_if(retired, [&](const RetiredKey& old) { return std::ranges::count(fields, old.key, &Field::key) > 0; });
+  read_settings(arguments, fields, retired);
+  apply_config(config.run);
+  return config;
+}
+
 void run_comparison(const CompareArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
   if (!arguments.ratings.empty()) return read_ratings_back(arguments, reporter);
   if (arguments.captures.empty()) throw UsageError("CAPTURE: at least one is needed");
-  Config config = resolve_config(arguments.config);
-  if (config.colorizer.spec.empty()) {
-    config.colorizer.spec = "simulated:";
+  CompareConfig config = resolve_compare_config(arguments.config);
+  if (config.run.colorizer.spec.empty()) {
+    config.run.colorizer.spec = "simulated:";
     reporter.say("no --colorizer given: a simulated one disturbs the true colours (docs/evaluation.md)");
   }
   ComparisonPlan plan;
@@ -66,7 +80,7 @@ void run_comparison(const CompareArguments& arguments, const std::vector<std::st
   for (const std::string& word : command_line) plan.command_line += (plan.command_line.empty() ? "" : " ") + word;
   check_folder(arguments);
   ComparisonRun comparison(std::move(plan), config, reporter);
-  write_file(fs::path(arguments.out) / "config.toml", to_toml(config));
+  write_file(fs::path(arguments.out) / "config.toml", write_toml(fields_of(config)));
   comparison.run();
   comparison.write_report();
   if (arguments.rating_sheet) comparison.write_rating_sheet();

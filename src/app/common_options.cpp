@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/base/text.h"
 #include "src/config/toml_binding.h"
@@ -84,14 +85,26 @@ void add_field_options(CLI::App& app, const std::vector<Field>& fields) {
   }
 }
 
+void read_settings(const ConfigArguments& arguments, const std::vector<Field>& fields,
+                   const std::vector<RetiredKey>& retired) {
+  const auto read_file = [&](const std::filesystem::path& file) {
+    read_toml(read_text_file(file), file.string(), fields, retired);
+  };
+  if (!arguments.preset.empty()) read_file(preset_file(arguments.preset));
+  if (!arguments.file.empty()) read_file(arguments.file);
+  for (const std::string& setting : arguments.settings) apply_setting(setting, fields, retired);
+  for (const std::string& setting : arguments.short_forms) apply_setting(setting, fields, retired);
+}
+
+void apply_config(const Config& config) {
+  check_consistency(config);
+  select_engine_device(engines_for(config.device).device());
+  set_thread_count(config.threads);
+}
+
 Config resolve_config(const ConfigArguments& arguments, Config base) {
-  if (!arguments.preset.empty()) read_config_file(preset_file(arguments.preset), base);
-  if (!arguments.file.empty()) read_config_file(arguments.file, base);
-  for (const std::string& setting : arguments.settings) apply_setting(setting, base);
-  for (const std::string& setting : arguments.short_forms) apply_setting(setting, base);
-  check_consistency(base);
-  select_engine_device(engines_for(base.device).device());
-  set_thread_count(base.threads);
+  read_settings(arguments, fields_of(base), retired_keys());
+  apply_config(base);
   return base;
 }
 

@@ -174,7 +174,6 @@ struct ComparisonRun::Field {
   fs::path stage1;                         ///< snapshot
   std::shared_ptr<const Engines> own;      ///< of a stage 1 of its own, and of colours on it
   std::shared_ptr<const Engines> engines;  ///< of `stage1` and of the colours
-  bool is_shared = true;
 };
 
 ComparisonRun::Field ComparisonRun::field_of(const Subject& subject, const Method& method,
@@ -183,28 +182,26 @@ ComparisonRun::Field ComparisonRun::field_of(const Subject& subject, const Metho
   field.stage1 = geometry.folder / "stage1.snapshot";
   field.engines = {std::shared_ptr<void>(), &engines_};  // not owned
   if (!method.has_own_field) return field;
-  const PositionalRays rays = positional_rays(subject.capture, place_scene(subject.capture, config_.stage1.placement));
-  const bool trains_encoding = config_.compare.positional_trains_encoding;
-  field.own = field.engines = positional_engines(rays, trains_encoding);
-  field.is_shared = config_.compare.positional_geometry == "shared";
-  if (field.is_shared) {
-    field.engines = positional_engines(rays, trains_encoding, &engines_);
-  } else {
-    field.stage1 = geometry.folder / method.name / "stage1.snapshot";
-  }
+  const PositionalRays rays =
+      positional_rays(subject.capture, place_scene(subject.capture, config_.run.stage1.placement));
+  field.own = positional_engines(rays);
+  field.engines = positional_engines(rays, false, &engines_);
   return field;
 }
 
-ComparisonRun::ComparisonRun(ComparisonPlan plan, Config config, Reporter& reporter)
-    : plan_(std::move(plan)), config_(std::move(config)), reporter_(reporter), engines_(engines_for(config_.device)) {
+ComparisonRun::ComparisonRun(ComparisonPlan plan, CompareConfig config, Reporter& reporter)
+    : plan_(std::move(plan)),
+      config_(std::move(config)),
+      reporter_(reporter),
+      engines_(engines_for(config_.run.device)) {
   if (!plan_.lpips_weights.empty()) lpips_ = std::make_unique<Lpips>(plan_.lpips_weights);
-  if (is_simulated(config_.colorizer.spec)) (void)simulation_of(config_.colorizer.spec);
+  if (is_simulated(config_.run.colorizer.spec)) (void)simulation_of(config_.run.colorizer.spec);
   for (const auto& [path, downscale] : plan_.captures) {
     auto subject = std::make_shared<Subject>();
-    Config of_subject = config_;
+    Config of_subject = config_.run;
     if (downscale > 0) of_subject.capture.downscale = downscale;
     subject->capture = read_capture(path, of_subject, reporter_);
-    if (!any_held_out(subject->capture) && config_.capture.holdout == 0) {
+    if (!any_held_out(subject->capture) && config_.run.capture.holdout == 0) {
       of_subject.capture.holdout = kUsualHoldout;
       reporter_.say(fmt::format("nothing is held out by the capture: every {}th view is", kUsualHoldout));
       subject->capture = load_capture(path, of_subject.capture);
@@ -240,11 +237,11 @@ void ComparisonRun::run_capture(const Subject& subject, int seed) {
   Geometry geometry{folder_of(subject, seed), {}};
   const std::string stage1_settings = train(subject, seed, geometry.folder);
   for (const Method* method : plan_.methods) {
-    const std::string settings = digest(
-        stage1_settings + method->name + options_to_json(stage2_of(*method, config_.stage2, config_.compare)).dump() +
-        (method->has_own_field || method->matches_features ? options_to_json(config_.compare).dump() : "") +
-        options_to_json(config_.colorizer).dump() + options_to_json(config_.render).dump() +
-        (lpips_ ? lpips_->network() : ""));
+    const std::string settings =
+        digest(stage1_settings + method->name + options_to_json(stage2_of(*method, config_.run.stage2)).dump() +
+               (method->has_own_field || method->matches_features ? options_to_json(config_.own).dump() : "") +
+               options_to_json(config_.run.colorizer).dump() + options_to_json(config_.run.render).dump() +
+               (lpips_ ? lpips_->network() : ""));
     cells_.push_back(run_cell(subject, *method, seed, geometry, settings));
   }
 }
@@ -257,7 +254,7 @@ void ComparisonRun::collect(const Subject& subject, int seed) {
 }
 
 std::string ComparisonRun::train(const Subject& subject, int seed, const fs::path& folder) const {
-  Stage1Options options = config_.stage1;
+  Stage1Options options = config_.run.stage1;
   options.seed = seed;
   const std::string settings = digest(fs::absolute(subject.capture.root).string() + options_to_json(options).dump() +
                                       options_to_json(subject.options).dump());
@@ -301,7 +298,7 @@ Cell ComparisonRun::run_cell(const Subject& subject, const Method& method, int s
 }
 
 std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, const Method& method, int seed) const {
-  const std::string& spec = config_.colorizer.spec;
+  const std::string& spec = config_.run.colorizer.spec;
   if (method.knows_truth) return make_simulated_colorizer(subject.capture, oracle_simulation());
   std::unique_ptr<Colorizer> colorizer;
   if (is_simulated(spec)) {
@@ -309,7 +306,7 @@ std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, 
     options.seed += seed - 1;  // each seed meets other errors
     colorizer = make_simulated_colorizer(subject.capture, options);
   } else {
-    Config of_seed = config_;
+    Config of_seed = config_.run;
     of_seed.stage2.seed = seed;
     colorizer =
         make_colorizer(colorizer_options(of_seed, subject.capture.root, folder_of(subject, seed) / "cache", reporter_));
@@ -321,14 +318,14 @@ std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, 
 /// Stage 1 of a method that has a field of its own: some times as long as the shared one took.
 void ComparisonRun::train_own_field(const Subject& subject, int seed, const Geometry& geometry, const Engines& engines,
                                     Cell& cell) const {
-  Stage1Options options = config_.stage1;
+  Stage1Options options = config_.run.stage1;
   options.seed = seed;
   options.steps = kManySteps;
   options.checkpoint_every = 0;
   options.max_seconds =
-      config_.compare.positional_budget * LuminanceModel::load(geometry.folder / "stage1.snapshot", engines_).seconds;
-  options.learning_rate = config_.compare.positional_learning_rate;
-  options.final_learning_rate = config_.compare.positional_final_learning_rate;
+      config_.own.positional_budget * LuminanceModel::load(geometry.folder / "stage1.snapshot", engines_).seconds;
+  options.learning_rate = kPositionalLearningRate;
+  options.final_learning_rate = kPositionalFinalLearningRate;
   const fs::path snapshot = geometry.folder / cell.method / "stage1.snapshot";
   (void)train_measured(subject.capture, subject.evaluated, options, snapshot, engines, reporter_);
   cell.stage1_curve = read_curve(fs::path(snapshot).replace_extension(".curve"));
@@ -337,7 +334,7 @@ void ComparisonRun::train_own_field(const Subject& subject, int seed, const Geom
 /// ARF in place of stage 2.
 StyleReport ComparisonRun::transfer(const Subject& subject, const fs::path& stage1, const Stage2Options& options,
                                     Colorizer& colorizer, const fs::path& take) const {
-  const CompareOptions& compare = config_.compare;
+  const CompareOptions& compare = config_.own;
   const fs::path network = compare.style_network.empty() ? plan_.lpips_weights : fs::path(compare.style_network);
   if (network.empty()) {
     throw UsageError(
@@ -353,7 +350,7 @@ StyleReport ComparisonRun::transfer(const Subject& subject, const fs::path& stag
 
 void ComparisonRun::colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry,
                              Cell& cell) const {
-  Stage2Options options = stage2_of(method, config_.stage2, config_.compare);
+  Stage2Options options = stage2_of(method, config_.run.stage2);
   options.seed = seed;
   Field field = field_of(subject, method, geometry);
   if (method.has_own_field) train_own_field(subject, seed, geometry, *field.own, cell);
@@ -377,17 +374,10 @@ void ComparisonRun::colorize(const Subject& subject, const Method& method, int s
     pixels->trace(*model.engine, model.march());
   }
   if (pixels) fs::remove(take);  // a curve is of one training from its beginning
-  std::vector<CachedView> own_views;
   Observer& observer = pixels ? static_cast<Observer&>(curve) : reporter_;
-  const Stage2Report report = train_stage2({subject.capture,
-                                            field.stage1,
-                                            options,
-                                            *colorizer,
-                                            {},
-                                            take,
-                                            true,
-                                            field.is_shared ? &geometry.training_views : &own_views},
-                                           engines, observer);
+  const Stage2Report report =
+      train_stage2({subject.capture, field.stage1, options, *colorizer, {}, take, true, &geometry.training_views},
+                   engines, observer);
   if (pixels && !curve.points().empty()) {
     cell.stage2_curve = curve.points();
     const ColorModel model = ColorModel::load(take, *field.engines);
@@ -407,9 +397,9 @@ void ComparisonRun::look(const Subject& subject, const Method& method, Geometry&
   const fs::path folder = geometry.folder / method.name;
   const Field field = field_of(subject, method, geometry);
   const auto scene = Scene::load(field.stage1, method.is_colored ? folder / "take.snapshot" : fs::path(),
-                                 *field.engines, field.is_shared ? geometry.traces : nullptr);
+                                 *field.engines, geometry.traces);
   EvaluateOptions options;
-  options.render = render_options(config_);
+  options.render = render_options(config_.run);
   options.lpips = lpips_.get();
   options.with_baked = false;
   options.grey_as_color = true;
@@ -426,7 +416,7 @@ void ComparisonRun::look(const Subject& subject, const Method& method, Geometry&
   cell.metrics.take = method.name;
   cell.metrics.colorizer = colorizer;
 
-  const CameraPath path = turntable_path(subject.capture, config_.render);
+  const CameraPath path = turntable_path(subject.capture, config_.run.render);
   std::vector<RenderedImage> frames;
   std::vector<SeenView> seen;
   frames.reserve(path.cameras.size());
@@ -444,7 +434,7 @@ void ComparisonRun::look(const Subject& subject, const Method& method, Geometry&
 }
 
 Summary ComparisonRun::summary() const {
-  const std::string& spec = config_.colorizer.spec;
+  const std::string& spec = config_.run.colorizer.spec;
   const std::string colorizer = is_simulated(spec) ? "simulated:" + to_text(simulation_of(spec)) : spec;
   return {colorizer, lpips_ ? lpips_->network() : "", plan_.command_line};
 }
@@ -472,7 +462,7 @@ ReportCapture ComparisonRun::report_of(const Subject& subject) const {
     for (const auto& [file, title] : {std::pair{"bases.png", "base images"},
                                       {"accepted.png", "accepted answers"},
                                       {"rejected.png", "rejected answers"}}) {
-      const bool purifies = method->is_colored && stage2_of(*method, config_.stage2, config_.compare).purify.enabled;
+      const bool purifies = method->is_colored && stage2_of(*method, config_.run.stage2).purify.enabled;
       if (purifies && fs::exists(folder / file)) shown.galleries.push_back({title, read_picture(folder / file, "png")});
     }
     report.methods.push_back(std::move(shown));

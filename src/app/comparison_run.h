@@ -17,8 +17,8 @@
 #include "src/capture/capture.h"
 #include "src/compare/baselines/style_transfer.h"
 #include "src/compare/methods.h"
+#include "src/compare/options.h"
 #include "src/compare/report.h"
-#include "src/config/config.h"
 #include "src/evaluate/lpips.h"
 
 namespace cnerf::compare {
@@ -47,7 +47,7 @@ class ComparisonRun {
  public:
   /// Reads the captures, so that what is missing costs no training.
   /// @throws UsageError, MissingInputError, InputError  also for a capture without any colour.
-  ComparisonRun(ComparisonPlan plan, Config config, Reporter& reporter);
+  ComparisonRun(ComparisonPlan plan, CompareConfig config, Reporter& reporter);
 
   /// All cells; a method that fails leaves one that says why.  @throws Interrupted  what is finished stays.
   void run();
@@ -81,7 +81,7 @@ class ComparisonRun {
   [[nodiscard]] Summary summary() const;
 
   ComparisonPlan plan_;
-  Config config_;
+  CompareConfig config_;
   Reporter& reporter_;
   const Engines& engines_;
   std::unique_ptr<Lpips> lpips_;

@@ -32,7 +32,7 @@ std::vector<const Method*> parse_methods(const std::string& list) {
   return methods;
 }
 
-Stage2Options stage2_of(const Method& method, Stage2Options configured, const CompareOptions& compare) {
+Stage2Options stage2_of(const Method& method, Stage2Options configured) {
   const std::string name = method.name, configured_injection = configured.injection;
   Stage2Options options = std::move(configured);
   if (name == "colornerf-paper") {
@@ -52,8 +52,8 @@ Stage2Options stage2_of(const Method& method, Stage2Options configured, const Co
     options.final_learning_rate = Stage2Options{}.final_learning_rate;
   }
   if (method.has_own_field) {
-    options.learning_rate = compare.positional_learning_rate;
-    options.final_learning_rate = compare.positional_final_learning_rate;
+    options.learning_rate = kPositionalLearningRate;
+    options.final_learning_rate = kPositionalFinalLearningRate;
   }
   options.distill_steps = 0;  // nothing is baked
   return options;

@@ -9,7 +9,6 @@
 
 #include "src/capture/capture.h"
 #include "src/colorizer/colorizer.h"
-#include "src/config/compare_options.h"
 #include "src/train/stage2.h"
 
 namespace cnerf::compare {
@@ -52,12 +51,15 @@ inline constexpr Method kMethods[] = {
     {"oracle", "the full method, its colorizer answering the true colours: the upper bound", true, true},
 };
 
+/// Step sizes of the paper's field at the start and at the end of both stages (Mildenhall et al. 2020).
+inline constexpr double kPositionalLearningRate = 5e-4, kPositionalFinalLearningRate = 5e-5;
+
 /// Names in the order of rows.
 [[nodiscard]] std::vector<std::string> method_names();
 /// "colornerf,grey", or "all".  @throws UsageError  naming an unknown one and those there are.
 [[nodiscard]] std::vector<const Method*> parse_methods(const std::string& list);
 
 /// What stage 2 does differently for a method.
-[[nodiscard]] Stage2Options stage2_of(const Method& method, Stage2Options configured, const CompareOptions& compare);
+[[nodiscard]] Stage2Options stage2_of(const Method& method, Stage2Options configured);
 
 }  // namespace cnerf::compare

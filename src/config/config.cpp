@@ -9,10 +9,23 @@
 
 namespace cnerf {
 namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kOfCompare = "it is one of `cnerf compare` alone";
+
+}  // namespace
 
 const std::vector<RetiredKey>& retired_keys() {
   static const std::vector<RetiredKey> keys{
       {"vdb.dilation", "bake.dilation", "", ""},
+      {"compare.positional_budget", "", "4.0", kOfCompare},
+      {"compare.positional_learning_rate", "", "5e-04", "it is that of Mildenhall et al. 2020"},
+      {"compare.positional_final_learning_rate", "", "5e-05", "it is that of Mildenhall et al. 2020"},
+      {"compare.positional_geometry", "", "'shared'", "colours stand on the stage 1 that all methods share"},
+      {"compare.positional_trains_encoding", "", "false", "the encoding stays fixed, as in the paper"},
+      {"compare.style_reference", "", "''", kOfCompare},
+      {"compare.style_network", "", "''", kOfCompare},
+      {"compare.style_steps", "", "160", kOfCompare},
   };
   return keys;
 }

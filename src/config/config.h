@@ -12,7 +12,6 @@
 #include "export/vdb_writer.h"
 #include "export/web_options.h"
 #include "src/capture/load_capture.h"
-#include "src/config/compare_options.h"
 #include "src/config/toml_binding.h"
 #include "src/render/picture_options.h"
 #include "src/train/stage1.h"
@@ -57,7 +56,6 @@ struct Config {
   ExrOptions exr;
   WebOptions web;
   PictureOptions render;
-  CompareOptions compare;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -73,7 +71,6 @@ struct Config {
     v.section("exr", exr);
     v.section("web", web);
     v.section("render", render);
-    v.section("compare", compare);
   }
 };
 

@@ -35,7 +35,14 @@ std::string text_of(const Range& range) {
   return "[" + shortest_text(range.min) + ", " + shortest_text(range.max) + "]";
 }
 
+template <std::floating_point Number>
+std::string number_text(Number value) {
+  const std::string text = shortest_text(value);
+  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;  // TOML tells 1 from 1.0
+}
+
 std::string text_of(const toml::node& node) {
+  if (const auto* number = node.as_floating_point()) return number_text(number->get());
   std::ostringstream text;
   node.visit([&](const auto& concrete) { text << concrete; });
   return text.str();
@@ -197,12 +204,6 @@ std::string toml_string(const std::string& text) {
   std::ostringstream out;
   out << toml::value<std::string>(text);
   return out.str();
-}
-
-template <std::floating_point Number>
-std::string number_text(Number value) {
-  const std::string text = shortest_text(value);
-  return text.find_first_of(".e") == std::string::npos ? text + ".0" : text;  // TOML tells 1 from 1.0
 }
 
 std::string value_text(const Field& field) {

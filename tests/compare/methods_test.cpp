@@ -17,7 +17,7 @@ TEST(Methods, ListsAreReadAndUnknownOnesRefused) {
 }
 
 TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
-  const auto of = [](const char* name) { return stage2_of(*parse_methods(name).front(), Stage2Options{}, {}); };
+  const auto of = [](const char* name) { return stage2_of(*parse_methods(name).front(), Stage2Options{}); };
   const Stage2Options full = of("colornerf");
   EXPECT_TRUE(full.purify.enabled);
   EXPECT_EQ(full.questions, "patches");
@@ -32,19 +32,17 @@ TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
   Stage2Options smooth;
   smooth.spread_weight = 2;
   smooth.regression_weight = 3;
-  EXPECT_EQ(stage2_of(*parse_methods("colornerf-paper").front(), smooth, {}).spread_weight, 0) << "not in the paper";
-  EXPECT_EQ(stage2_of(*parse_methods("colornerf-paper").front(), smooth, {}).regression_weight, 0);
-  EXPECT_EQ(stage2_of(*parse_methods("without-purification").front(), smooth, {}).spread_weight, 2);
+  EXPECT_EQ(stage2_of(*parse_methods("colornerf-paper").front(), smooth).spread_weight, 0) << "not in the paper";
+  EXPECT_EQ(stage2_of(*parse_methods("colornerf-paper").front(), smooth).regression_weight, 0);
+  EXPECT_EQ(stage2_of(*parse_methods("without-purification").front(), smooth).spread_weight, 2);
   EXPECT_EQ(of("oracle").patches, full.patches);
   EXPECT_EQ(of("positional-encoding").patches, full.patches);
   Stage2Options fast;
   fast.learning_rate = 0.05;
-  const auto rate_of = [&](const char* name) {
-    return stage2_of(*parse_methods(name).front(), fast, {}).learning_rate;
-  };
+  const auto rate_of = [&](const char* name) { return stage2_of(*parse_methods(name).front(), fast).learning_rate; };
   EXPECT_EQ(rate_of("without-purification"), 0.05);
   EXPECT_EQ(rate_of("without-classification"), Stage2Options{}.learning_rate) << "its own best step size";
-  EXPECT_EQ(of("positional-encoding").learning_rate, CompareOptions{}.positional_learning_rate);
+  EXPECT_EQ(of("positional-encoding").learning_rate, kPositionalLearningRate);
   EXPECT_EQ(of("positional-encoding").injection, full.injection);
 }
 

@@ -10,6 +10,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/compare/options.h"
 #include "src/config/toml_binding.h"
 #include "tests/support/data.h"
 
@@ -77,11 +78,9 @@ TEST(Config, DefaultsAreInTheirRanges) {
   EXPECT_GT(keys.size(), 40u);
 }
 
-/// docs/configuration.md holds a table of every option. Set CNERF_UPDATE_DOCS=1 to write it anew.
-std::string option_table() {
-  Config config;
+std::string option_table(const std::vector<Field>& fields) {
   std::string text = "| option | default | legal | what |\n|---|---|---|---|\n";
-  for (const Field& field : fields_of(config)) {
+  for (const Field& field : fields) {
     const std::string line = write_toml({field});
     const auto begin = line.find(" = ") + 3;
     const std::string value = line.substr(begin, line.find("  # ") - begin);
@@ -93,13 +92,22 @@ std::string option_table() {
   return text;
 }
 
+/// docs/configuration.md holds a table of every option. Set CNERF_UPDATE_DOCS=1 to write it anew.
+std::string option_tables() {
+  Config config;
+  compare::CompareConfig comparison;
+  std::vector<Field> of_compare = fields_of(comparison);
+  std::erase_if(of_compare, [](const Field& field) { return !field.key.starts_with("compare."); });
+  return option_table(fields_of(config)) + "\n## Options of `cnerf compare` alone\n\n" + option_table(of_compare);
+}
+
 TEST(Config, TheDocumentedTableIsTheRealOne) {
   const fs::path file = fs::path(CNERF_SOURCE_DIR) / "docs" / "configuration.md";
   const std::string text = read_text_file(file);
   const auto begin = text.find("| option |");
   ASSERT_NE(begin, std::string::npos);
-  if (std::getenv("CNERF_UPDATE_DOCS") != nullptr) write_file(file, text.substr(0, begin) + option_table());
-  EXPECT_EQ(read_text_file(file).substr(begin), option_table()) << "run this test with CNERF_UPDATE_DOCS=1";
+  if (std::getenv("CNERF_UPDATE_DOCS") != nullptr) write_file(file, text.substr(0, begin) + option_tables());
+  EXPECT_EQ(read_text_file(file).substr(begin), option_tables()) << "run this test with CNERF_UPDATE_DOCS=1";
 }
 
 TEST(Config, ErrorsOfAFileNameTheFile) {
@@ -147,6 +155,24 @@ TEST(Config, TheDilationHasOneKey) {
   write_file(folder / "old_run.toml", std::string_view("[bake]\ndilation = 4\n[vdb]\ndilation = 4\n"));
   EXPECT_NO_THROW(read_run_config(folder / "old_run.toml", config));
   EXPECT_EQ(config.bake.dilation, 4);
+}
+
+/// Options of the comparison stood in each run's file until they got a section of their own.
+TEST(Config, OptionsOfTheComparisonAreRefusedByNameAndReadInOldRuns) {
+  const test::TempDir folder;
+  write_file(folder / "run.toml",
+             std::string_view("[compare]\nstyle_steps = 160\npositional_geometry = 'shared'\n"
+                              "positional_budget = 4.0\npositional_learning_rate = 5e-04\n"
+                              "positional_final_learning_rate = 5e-05\npositional_trains_encoding = false\n"
+                              "style_network = ''\nstyle_reference = ''\n"));
+  Config config;
+  EXPECT_THAT(read_run_config(folder / "run.toml", config), testing::IsEmpty());
+  try {
+    apply_setting("compare.style_steps=20", config);
+    FAIL() << "a run takes an option of the comparison";
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("cnerf compare"));
+  }
 }
 
 TEST(Config, RelationsBetweenOptionsAreChecked) {
