@@ -4,11 +4,11 @@
 
 #include "src/app/command.h"
 #include "src/app/common_options.h"
-#include "src/app/comparison_run.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/compare/options.h"
 #include "src/compare/rating.h"
+#include "src/compare/run.h"
 
 namespace cnerf::app {
 namespace fs = std::filesystem;
@@ -70,7 +70,7 @@ void run_comparison(const CompareArguments& arguments, const std::vector<std::st
     config.run.colorizer.spec = "simulated:";
     reporter.say("no --colorizer given: a simulated one disturbs the true colours (docs/evaluation.md)");
   }
-  ComparisonPlan plan;
+  Plan plan;
   for (const std::string& text : arguments.captures) plan.captures.push_back(parse_compared_capture(text));
   plan.only_report = arguments.only_report;
   plan.report = arguments.out;
@@ -79,7 +79,7 @@ void run_comparison(const CompareArguments& arguments, const std::vector<std::st
   plan.lpips_weights = arguments.lpips_weights;
   for (const std::string& word : command_line) plan.command_line += (plan.command_line.empty() ? "" : " ") + word;
   check_folder(arguments);
-  ComparisonRun comparison(std::move(plan), config, reporter);
+  Run comparison(std::move(plan), config, reporter);
   write_file(fs::path(arguments.out) / "config.toml", write_toml(fields_of(config)));
   comparison.run();
   comparison.write_report();

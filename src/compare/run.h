@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "src/app/reporter.h"
+#include "src/base/observer.h"
 #include "src/capture/capture.h"
 #include "src/compare/baselines/style_transfer.h"
 #include "src/compare/methods.h"
@@ -22,7 +22,6 @@
 #include "src/evaluate/lpips.h"
 
 namespace cnerf::compare {
-using app::Reporter;
 
 /// A capture to compare on.
 struct ComparedCapture {
@@ -33,7 +32,7 @@ struct ComparedCapture {
 /// @throws UsageError
 [[nodiscard]] ComparedCapture parse_compared_capture(const std::string& text);
 
-struct ComparisonPlan {
+struct Plan {
   std::vector<ComparedCapture> captures;
   std::filesystem::path report;  ///< folder
   std::vector<const Method*> methods;
@@ -43,11 +42,11 @@ struct ComparisonPlan {
   bool only_report = false;  ///< nothing is trained: the report is made of the cells that are there
 };
 
-class ComparisonRun {
+class Run {
  public:
   /// Reads the captures, so that what is missing costs no training.
   /// @throws UsageError, MissingInputError, InputError  also for a capture without any colour.
-  ComparisonRun(ComparisonPlan plan, CompareConfig config, Reporter& reporter);
+  Run(Plan plan, CompareConfig config, Observer& observer);
 
   /// All cells; a method that fails leaves one that says why.  @throws Interrupted  what is finished stays.
   void run();
@@ -80,9 +79,9 @@ class ComparisonRun {
   [[nodiscard]] ReportCapture report_of(const Subject& subject) const;
   [[nodiscard]] Summary summary() const;
 
-  ComparisonPlan plan_;
+  Plan plan_;
   CompareConfig config_;
-  Reporter& reporter_;
+  Observer& observer_;
   const Engines& engines_;
   std::unique_ptr<Lpips> lpips_;
   std::vector<std::shared_ptr<Subject>> subjects_;

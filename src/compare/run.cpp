@@ -1,4 +1,4 @@
-#include "src/app/comparison_run.h"
+#include "src/compare/run.h"
 
 #include <fmt/format.h>
 
@@ -154,7 +154,7 @@ ComparedCapture parse_compared_capture(const std::string& text) {
   return {text.substr(0, at), std::stoi(digits)};
 }
 
-struct ComparisonRun::Subject {
+struct Run::Subject {
   std::string name;
   CaptureOptions options;
   Capture capture;
@@ -163,21 +163,20 @@ struct ComparisonRun::Subject {
   [[nodiscard]] std::vector<std::size_t> shown() const { return some_of(evaluated.size(), kShownViews); }
 };
 
-struct ComparisonRun::Geometry {
+struct Run::Geometry {
   fs::path folder;
   std::vector<CachedView> training_views;
   std::shared_ptr<TraceMemory> traces = make_trace_memory();
 };
 
 /// What a method's colours stand on.
-struct ComparisonRun::Field {
+struct Run::Field {
   fs::path stage1;                         ///< snapshot
   std::shared_ptr<const Engines> own;      ///< of a stage 1 of its own, and of colours on it
   std::shared_ptr<const Engines> engines;  ///< of `stage1` and of the colours
 };
 
-ComparisonRun::Field ComparisonRun::field_of(const Subject& subject, const Method& method,
-                                             const Geometry& geometry) const {
+Run::Field Run::field_of(const Subject& subject, const Method& method, const Geometry& geometry) const {
   Field field;
   field.stage1 = geometry.folder / "stage1.snapshot";
   field.engines = {std::shared_ptr<void>(), &engines_};  // not owned
@@ -189,10 +188,10 @@ ComparisonRun::Field ComparisonRun::field_of(const Subject& subject, const Metho
   return field;
 }
 
-ComparisonRun::ComparisonRun(ComparisonPlan plan, CompareConfig config, Reporter& reporter)
+Run::Run(Plan plan, CompareConfig config, Observer& observer)
     : plan_(std::move(plan)),
       config_(std::move(config)),
-      reporter_(reporter),
+      observer_(observer),
       engines_(engines_for(config_.run.device)) {
   if (!plan_.lpips_weights.empty()) lpips_ = std::make_unique<Lpips>(plan_.lpips_weights);
   if (is_simulated(config_.run.colorizer.spec)) (void)simulation_of(config_.run.colorizer.spec);
@@ -200,10 +199,10 @@ ComparisonRun::ComparisonRun(ComparisonPlan plan, CompareConfig config, Reporter
     auto subject = std::make_shared<Subject>();
     Config of_subject = config_.run;
     if (downscale > 0) of_subject.capture.downscale = downscale;
-    subject->capture = read_capture(path, of_subject, reporter_);
+    subject->capture = read_capture(path, of_subject, observer_);
     if (!any_held_out(subject->capture) && config_.run.capture.holdout == 0) {
       of_subject.capture.holdout = kUsualHoldout;
-      reporter_.say(fmt::format("nothing is held out by the capture: every {}th view is", kUsualHoldout));
+      observer_.say(fmt::format("nothing is held out by the capture: every {}th view is", kUsualHoldout));
       subject->capture = load_capture(path, of_subject.capture);
     }
     subject->options = of_subject.capture;
@@ -222,18 +221,18 @@ ComparisonRun::ComparisonRun(ComparisonPlan plan, CompareConfig config, Reporter
   }
 }
 
-void ComparisonRun::run() {
+void Run::run() {
   for (const auto& subject : subjects_) {
     for (const int seed : plan_.seeds) plan_.only_report ? collect(*subject, seed) : run_capture(*subject, seed);
   }
   if (cells_.empty()) throw UsageError(plan_.report.string() + ": no finished method of these captures and seeds");
 }
 
-fs::path ComparisonRun::folder_of(const Subject& subject, int seed) const {
+fs::path Run::folder_of(const Subject& subject, int seed) const {
   return plan_.report / "runs" / subject.name / fmt::format("seed-{}", seed);
 }
 
-void ComparisonRun::run_capture(const Subject& subject, int seed) {
+void Run::run_capture(const Subject& subject, int seed) {
   Geometry geometry{folder_of(subject, seed), {}};
   const std::string stage1_settings = train(subject, seed, geometry.folder);
   for (const Method* method : plan_.methods) {
@@ -246,14 +245,14 @@ void ComparisonRun::run_capture(const Subject& subject, int seed) {
   }
 }
 
-void ComparisonRun::collect(const Subject& subject, int seed) {
+void Run::collect(const Subject& subject, int seed) {
   for (const Method* method : plan_.methods) {
     const fs::path file = folder_of(subject, seed) / method->name / "cell.json";
     if (fs::exists(file)) cells_.push_back(read_record<Cell>(file));
   }
 }
 
-std::string ComparisonRun::train(const Subject& subject, int seed, const fs::path& folder) const {
+std::string Run::train(const Subject& subject, int seed, const fs::path& folder) const {
   Stage1Options options = config_.run.stage1;
   options.seed = seed;
   const std::string settings = digest(fs::absolute(subject.capture.root).string() + options_to_json(options).dump() +
@@ -261,16 +260,16 @@ std::string ComparisonRun::train(const Subject& subject, int seed, const fs::pat
   const fs::path done = folder / "stage1.txt";
   if (settings_in(folder) == settings && fs::exists(done)) return settings;
   begin_folder(folder, settings);
-  reporter_.say(fmt::format("{}, seed {}: stage 1", subject.name, seed));
+  observer_.say(fmt::format("{}, seed {}: stage 1", subject.name, seed));
   const Stage1Report report =
-      train_measured(subject.capture, subject.evaluated, options, folder / "stage1.snapshot", engines_, reporter_);
+      train_measured(subject.capture, subject.evaluated, options, folder / "stage1.snapshot", engines_, observer_);
   write_file(done, fmt::format("{} steps, {:.1f} s, {:.2f} dB on training pixels\n", report.steps, report.seconds,
                                report.train_psnr));
   return settings;
 }
 
-Cell ComparisonRun::run_cell(const Subject& subject, const Method& method, int seed, Geometry& geometry,
-                             const std::string& settings) const {
+Cell Run::run_cell(const Subject& subject, const Method& method, int seed, Geometry& geometry,
+                   const std::string& settings) const {
   const fs::path folder = geometry.folder / method.name;
   const fs::path file = folder / "cell.json";
   if (fs::exists(file) && settings_in(folder) == settings) {
@@ -278,7 +277,7 @@ Cell ComparisonRun::run_cell(const Subject& subject, const Method& method, int s
     if (finished.error.empty()) return finished;
   }
   begin_folder(folder, settings);
-  reporter_.say(fmt::format("{}, seed {}: {}", subject.name, seed, method.name));
+  observer_.say(fmt::format("{}, seed {}: {}", subject.name, seed, method.name));
   Cell cell;
   cell.capture = subject.name;
   cell.method = method.name;
@@ -291,13 +290,13 @@ Cell ComparisonRun::run_cell(const Subject& subject, const Method& method, int s
     throw;
   } catch (const std::exception& problem) {
     cell.error = problem.what();
-    reporter_.say(fmt::format("{} failed: {}", method.name, problem.what()));
+    observer_.say(fmt::format("{} failed: {}", method.name, problem.what()));
   }
   write_file(file, to_json(cell).dump(2) + "\n");
   return cell;
 }
 
-std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, const Method& method, int seed) const {
+std::unique_ptr<Colorizer> Run::colorizer_for(const Subject& subject, const Method& method, int seed) const {
   const std::string& spec = config_.run.colorizer.spec;
   if (method.knows_truth) return make_simulated_colorizer(subject.capture, oracle_simulation());
   std::unique_ptr<Colorizer> colorizer;
@@ -309,15 +308,15 @@ std::unique_ptr<Colorizer> ComparisonRun::colorizer_for(const Subject& subject, 
     Config of_seed = config_.run;
     of_seed.stage2.seed = seed;
     colorizer =
-        make_colorizer(colorizer_options(of_seed, subject.capture.root, folder_of(subject, seed) / "cache", reporter_));
+        make_colorizer(colorizer_options(of_seed, subject.capture.root, folder_of(subject, seed) / "cache", observer_));
   }
   if (!method.follows_flow) return colorizer;
   return std::make_unique<FlowColorizer>(std::move(colorizer));
 }
 
 /// Stage 1 of a method that has a field of its own: some times as long as the shared one took.
-void ComparisonRun::train_own_field(const Subject& subject, int seed, const Geometry& geometry, const Engines& engines,
-                                    Cell& cell) const {
+void Run::train_own_field(const Subject& subject, int seed, const Geometry& geometry, const Engines& engines,
+                          Cell& cell) const {
   Stage1Options options = config_.run.stage1;
   options.seed = seed;
   options.steps = kManySteps;
@@ -327,13 +326,13 @@ void ComparisonRun::train_own_field(const Subject& subject, int seed, const Geom
   options.learning_rate = kPositionalLearningRate;
   options.final_learning_rate = kPositionalFinalLearningRate;
   const fs::path snapshot = geometry.folder / cell.method / "stage1.snapshot";
-  (void)train_measured(subject.capture, subject.evaluated, options, snapshot, engines, reporter_);
+  (void)train_measured(subject.capture, subject.evaluated, options, snapshot, engines, observer_);
   cell.stage1_curve = read_curve(fs::path(snapshot).replace_extension(".curve"));
 }
 
 /// ARF in place of stage 2.
-StyleReport ComparisonRun::transfer(const Subject& subject, const fs::path& stage1, const Stage2Options& options,
-                                    Colorizer& colorizer, const fs::path& take) const {
+StyleReport Run::transfer(const Subject& subject, const fs::path& stage1, const Stage2Options& options,
+                          Colorizer& colorizer, const fs::path& take) const {
   const CompareOptions& compare = config_.own;
   const fs::path network = compare.style_network.empty() ? plan_.lpips_weights : fs::path(compare.style_network);
   if (network.empty()) {
@@ -345,11 +344,10 @@ StyleReport ComparisonRun::transfer(const Subject& subject, const fs::path& stag
                                    : reference_image(compare.style_reference);
   const StyleLoss loss(network, reference);
   return transfer_style(subject.capture, stage1, loss, reference, options, compare.style_steps, take, engines_,
-                        reporter_);
+                        observer_);
 }
 
-void ComparisonRun::colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry,
-                             Cell& cell) const {
+void Run::colorize(const Subject& subject, const Method& method, int seed, Geometry& geometry, Cell& cell) const {
   Stage2Options options = stage2_of(method, config_.run.stage2);
   options.seed = seed;
   Field field = field_of(subject, method, geometry);
@@ -366,7 +364,7 @@ void ComparisonRun::colorize(const Subject& subject, const Method& method, int s
   const bool is_measured = method.has_own_field || std::string(method.name) == kMethods[0].name;
   std::optional<HeldOutPixels> pixels;
   const WatchedEngines engines(*field.engines);
-  LearningCurve curve("stage 2", reporter_,
+  LearningCurve curve("stage 2", observer_,
                       [&] { return pixels->ab_error(engines.color_bins(), float(options.decode_temperature)); });
   if (is_measured && options.injection == "classification") {
     const LuminanceModel model = LuminanceModel::load(field.stage1, *field.engines);
@@ -374,7 +372,7 @@ void ComparisonRun::colorize(const Subject& subject, const Method& method, int s
     pixels->trace(*model.engine, model.march());
   }
   if (pixels) fs::remove(take);  // a curve is of one training from its beginning
-  Observer& observer = pixels ? static_cast<Observer&>(curve) : reporter_;
+  Observer& observer = pixels ? static_cast<Observer&>(curve) : observer_;
   const Stage2Report report =
       train_stage2({subject.capture, field.stage1, options, *colorizer, {}, take, true, &geometry.training_views},
                    engines, observer);
@@ -393,7 +391,7 @@ void ComparisonRun::colorize(const Subject& subject, const Method& method, int s
 }
 
 /// Measures the views, and renders what is shown of a method.
-void ComparisonRun::look(const Subject& subject, const Method& method, Geometry& geometry, Cell& cell) const {
+void Run::look(const Subject& subject, const Method& method, Geometry& geometry, Cell& cell) const {
   const fs::path folder = geometry.folder / method.name;
   const Field field = field_of(subject, method, geometry);
   const auto scene = Scene::load(field.stage1, method.is_colored ? folder / "take.snapshot" : fs::path(),
@@ -412,7 +410,7 @@ void ComparisonRun::look(const Subject& subject, const Method& method, Geometry&
                picture_of(view.ours, ShownColor::kDecoded), kPictureWidth, kPictureQuality);
   };
   const std::string colorizer = cell.metrics.colorizer;
-  cell.metrics = evaluate(*scene, subject.capture, options, keep_shown, reporter_.progress_sink());
+  cell.metrics = evaluate(*scene, subject.capture, options, keep_shown, observer_.progress_sink());
   cell.metrics.take = method.name;
   cell.metrics.colorizer = colorizer;
 
@@ -421,26 +419,26 @@ void ComparisonRun::look(const Subject& subject, const Method& method, Geometry&
   std::vector<SeenView> seen;
   frames.reserve(path.cameras.size());
   for (const PathCamera& camera : path.cameras) {
-    if (interruption_requested()) throw Interrupted("comparison stopped");
+    if (observer_.is_cancelled()) throw Interrupted("comparison stopped");
     frames.push_back(scene->render(camera.intrinsics, camera.world_from_camera, options.render));
     write_jpeg(folder / "turntable" / numbered(frames.size() - 1), picture_of(frames.back(), ShownColor::kDecoded),
                kPictureWidth, kFrameQuality);
     seen.push_back({&frames.back(), camera.intrinsics, camera.world_from_camera});
-    reporter_.progress_sink()({"turntable", double(frames.size()) / double(path.cameras.size()), {}});
+    observer_.progress_sink()({"turntable", double(frames.size()) / double(path.cameras.size()), {}});
   }
   if (!method.is_colored) return;
   cell.short_range = consistency(seen, 1);
   cell.long_range = consistency(seen, std::max<std::size_t>(2, path.cameras.size() / kLongRange));
 }
 
-Summary ComparisonRun::summary() const {
+Summary Run::summary() const {
   const std::string& spec = config_.run.colorizer.spec;
   const std::string colorizer = is_simulated(spec) ? "simulated:" + to_text(simulation_of(spec)) : spec;
   return {colorizer, lpips_ ? lpips_->network() : "", plan_.command_line};
 }
 
 /// Pictures of the first seed.
-ReportCapture ComparisonRun::report_of(const Subject& subject) const {
+ReportCapture Run::report_of(const Subject& subject) const {
   ReportCapture report;
   report.name = subject.name;
   report.frames_per_second = kFramesPerSecond;
@@ -471,7 +469,7 @@ ReportCapture ComparisonRun::report_of(const Subject& subject) const {
 }
 
 /// The first shown view by every method beside the input and the truth, for documents.
-fs::path ComparisonRun::write_strip(const Subject& subject) const {
+fs::path Run::write_strip(const Subject& subject) const {
   const View& view = *subject.evaluated[subject.shown().front()];
   std::vector<Tile> tiles;
   tiles.push_back(tile_of(view.image.width, view.image.height, luminance_plane(view.image), "input"));
@@ -489,17 +487,17 @@ fs::path ComparisonRun::write_strip(const Subject& subject) const {
   return file;
 }
 
-void ComparisonRun::write_report() const {
-  for (const auto& subject : subjects_) reporter_.wrote("pictures", write_strip(*subject));
+void Run::write_report() const {
+  for (const auto& subject : subjects_) observer_.wrote("pictures", write_strip(*subject));
   std::vector<ReportCapture> captures;
   for (const auto& subject : subjects_) captures.push_back(report_of(*subject));
   write_file(plan_.report / "table.json", table_json(cells_, summary()).dump(2) + "\n");
   write_file(plan_.report / "table.md", table_markdown(cells_, summary()));
   write_file(plan_.report / "report.html", report_html(cells_, summary(), captures));
-  for (const char* file : {"table.json", "table.md", "report.html"}) reporter_.wrote("comparison", plan_.report / file);
+  for (const char* file : {"table.json", "table.md", "report.html"}) observer_.wrote("comparison", plan_.report / file);
 }
 
-void ComparisonRun::write_rating_sheet() const {
+void Run::write_rating_sheet() const {
   std::vector<RatedPicture> pictures;
   for (const auto& subject : subjects_) {
     const ReportCapture report = report_of(*subject);
@@ -513,8 +511,8 @@ void ComparisonRun::write_rating_sheet() const {
   const RatingSheet sheet = make_rating_sheet(std::move(pictures), std::uint64_t(plan_.seeds.front()));
   write_file(plan_.report / "rating_sheet.html", sheet.html);
   write_file(plan_.report / "rating_key.json", sheet.key);
-  reporter_.wrote("rating sheet, for raters", plan_.report / "rating_sheet.html");
-  reporter_.wrote("its key, not for raters", plan_.report / "rating_key.json");
+  observer_.wrote("rating sheet, for raters", plan_.report / "rating_sheet.html");
+  observer_.wrote("its key, not for raters", plan_.report / "rating_key.json");
 }
 
 }  // namespace cnerf::compare
