@@ -23,14 +23,14 @@ tree=/home/cnerf
 mounts=()
 release_mounts() {
   local folder
-  for folder in "${mounts[@]}"; do umount -l "$folder" || true; done
+  for folder in "${mounts[@]}"; do umount -l "$folder" || true; done  # the last one first
 }
 trap release_mounts EXIT
 
 mount_in() {  # mount_in FOLDER mount-options...
   mkdir -p "$root$1"
   mount "${@:2}" "$root$1"
-  mounts+=("$root$1")
+  mounts=("$root$1" "${mounts[@]}")
 }
 
 make_root() {
