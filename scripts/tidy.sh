@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # clang-tidy with the checks of .clang-tidy, every warning an error, on sources that build/release compiles.
-#   scripts/tidy.sh                 all of them, a quarter of an hour per core and hundred files
+#   scripts/tidy.sh                 all of them, some hours of a core
 #   scripts/tidy.sh FILE...         these
 #   scripts/tidy.sh --changed       those changed since origin/main, or since the last commit where HEAD is origin/main
 # LIMIT=seconds ends it early; the files that were not reached are named and do not count as failures.
