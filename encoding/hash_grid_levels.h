@@ -12,17 +12,16 @@ namespace cnerf {
 inline constexpr int kMaxGridLevels = 16;
 
 struct HashGridOptions {
-  int levels = 8;                ///< L
-  int features = 4;              ///< F, floats a row
-  int log2_rows = 15;            ///< log2 T: rows a level has at most
-  int coarsest_resolution = 16;  ///< N_min, cells an axis
-  int finest_resolution = 1024;  ///< N_max, cells an axis
-  double decay = 0;              ///< of a row that a step moves, in units of the learning rate (decoupled)
+  int levels = 8;
+  int features = 4;  // F, a 16-byte row, which the kernels are written for
+  int log2_rows = 15;
+  int coarsest_resolution = 16;
+  int finest_resolution = 1024;
+  double decay = 0;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("levels", levels, Range{1, kMaxGridLevels}, "levels of the hash grid (L)");
-    v("features", features, Range{4, 4}, "features a row (F); the kernels are written for 4, a 16-byte row");
     v("log2_rows", log2_rows, Range{8, 24}, "log2 of the rows a level has at most (T)");
     v("coarsest_resolution", coarsest_resolution, Range{2, 1024}, "cells along an axis of the coarsest level (N_min)");
     v("finest_resolution", finest_resolution, Range{2, 65536}, "cells along an axis of the finest level (N_max)");

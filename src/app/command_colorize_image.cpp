@@ -72,7 +72,7 @@ Work declare_colorize_image(CLI::App& app) {
   app.add_option("IN", arguments->in, "A picture; its colours, if any, are not looked at")->required();
   app.add_option("OUT", arguments->out, "PNG to write")->required();
   add_config_options(app, arguments->config);
-  add_short_form(app, arguments->config, "--colorizer", "colorizer.spec", "Who colours; builtin if not given");
+  add_short_form(app, arguments->config, "--colorizer", "colorizer.spec");
   app.add_option("--short-side", arguments->short_side, "The colorizer is shown the picture at this size, pixels")
       ->check(CLI::Range(32, 2048))
       ->capture_default_str();

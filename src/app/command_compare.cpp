@@ -103,10 +103,9 @@ Work declare_compare(CLI::App& app) {
   app.add_flag("--rating-sheet", arguments->rating_sheet, "Also write a page on which people judge unnamed pictures");
   app.add_option("--ratings", arguments->ratings, "Only make a table of these files of answers to the rating sheet");
   add_colorizer_options(app, arguments->config);
-  add_short_form(app, arguments->config, "--style-reference", "compare.style_reference",
-                 "Image whose style style-transfer takes");
-  add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");
-  add_short_form(app, arguments->config, "--holdout", "capture.holdout", "Keep every N-th view for evaluation");
+  add_short_form(app, arguments->config, "--style-reference", "compare.style_reference");
+  add_short_form(app, arguments->config, "--downscale", "capture.downscale");
+  add_short_form(app, arguments->config, "--holdout", "capture.holdout");
   app.add_flag("--resume", arguments->resume, "Go on with a comparison; what is finished and unchanged stays");
   app.add_flag("--only-report", arguments->only_report, "Train nothing; make the report of what is there");
   app.add_flag("--overwrite", arguments->overwrite, "Start again where a comparison is already");

@@ -86,7 +86,7 @@ void print_run(const pipeline::RunDirectory& directory) {
   line("run", "{} (cnerf {})", directory.root().string(), record.program_version);
   line("capture", "{}", record.capture.string());
   line("command", "{}", record.command_line);
-  if (!record.stage1_finished) return line("stage 1", "not finished; cnerf train ... --resume goes on");
+  if (!record.stage1.finished) return line("stage 1", "not finished; cnerf train ... --resume goes on");
   line("stage 1", "{} steps, {}, {:.2f} dB on training pixels", record.stage1.steps,
        duration_text(record.stage1.seconds), record.stage1.train_psnr);
   print_scene(directory.stage1_snapshot(), {});
@@ -142,8 +142,8 @@ void info(const InfoArguments& arguments) {
 Work declare_info(CLI::App& app) {
   auto arguments = std::make_shared<InfoArguments>();
   app.add_option("WHAT", arguments->what, "A capture, a run, a .snapshot or a .vdb")->required();
-  add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");
-  add_short_form(app, arguments->config, "--holdout", "capture.holdout", "Keep every N-th view for evaluation");
+  add_short_form(app, arguments->config, "--downscale", "capture.downscale");
+  add_short_form(app, arguments->config, "--holdout", "capture.holdout");
   add_config_options(app, arguments->config);
   return [arguments](const auto&) { info(*arguments); };
 }

@@ -20,7 +20,7 @@ void run(RunArguments arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
   const pipeline::RunDirectory directory(job.out);
   const bool goes_on = job.existing.resume && directory.exists();
-  const Config config = resolve_config(arguments.config, goes_on ? directory.config() : Config{});
+  const Config config = resolve_config(arguments.config, goes_on ? directory.config("", reporter) : Config{});
   const auto bake = pipeline::run(job, config, engines_for(config.device), reporter);
   reporter.next("cnerf view " + job.out.string());
   if (job.formats.vdb || job.formats.gltf) {
@@ -40,9 +40,9 @@ Work declare_run(CLI::App& app) {
   add_colorizer_options(app, arguments->config);
   app.add_flag("--grey", job.grey, "Stay grey: no colorizer");
   app.add_option("--format", arguments->format, "What to bake: vdb, gltf, exr, web or several, comma-separated");
-  add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");
-  add_short_form(app, arguments->config, "--holdout", "capture.holdout", "Keep every N-th view for evaluation");
-  add_short_form(app, arguments->config, "--transfer", "capture.transfer", "How grey values encode luminance");
+  add_short_form(app, arguments->config, "--downscale", "capture.downscale");
+  add_short_form(app, arguments->config, "--holdout", "capture.holdout");
+  add_short_form(app, arguments->config, "--transfer", "capture.transfer");
   app.add_flag("--resume", job.existing.resume, "Go on with a run that was stopped");
   app.add_flag("--overwrite", job.existing.overwrite, "Start again where a run is already");
   add_config_options(app, arguments->config);

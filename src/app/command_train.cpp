@@ -20,7 +20,7 @@ void train(const TrainArguments& arguments, const std::vector<std::string>& comm
   Reporter reporter = make_reporter(arguments.config);
   pipeline::RunDirectory directory(arguments.out);
   const bool goes_on = arguments.existing.resume && directory.exists();
-  const Config config = resolve_config(arguments.config, goes_on ? directory.config() : Config{});
+  const Config config = resolve_config(arguments.config, goes_on ? directory.config("", reporter) : Config{});
   const Engines& engines = engines_for(config.device);
   const pipeline::RunContext context{directory, config, pipeline::read_capture(arguments.capture, config, reporter),
                                      command_line};
@@ -41,9 +41,9 @@ Work declare_train(CLI::App& app) {
   auto arguments = std::make_shared<TrainArguments>();
   app.add_option("CAPTURE", arguments->capture, "Folder of photographs and camera poses")->required();
   app.add_option("-o,--out", arguments->out, "Folder of the run, made if needed")->required();
-  add_short_form(app, arguments->config, "--downscale", "capture.downscale", "Divide image sizes by this");
-  add_short_form(app, arguments->config, "--holdout", "capture.holdout", "Keep every N-th view for evaluation");
-  add_short_form(app, arguments->config, "--transfer", "capture.transfer", "How grey values encode luminance");
+  add_short_form(app, arguments->config, "--downscale", "capture.downscale");
+  add_short_form(app, arguments->config, "--holdout", "capture.holdout");
+  add_short_form(app, arguments->config, "--transfer", "capture.transfer");
   app.add_flag("--resume", arguments->existing.resume, "Go on with a run that was stopped");
   app.add_flag("--overwrite", arguments->existing.overwrite, "Start again where a run is already");
   app.add_flag("--view", arguments->view, "Show the training in the browser, with buttons to pause and to stop");

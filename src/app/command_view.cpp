@@ -100,8 +100,7 @@ Work declare_view(CLI::App& app) {
   app.add_option("WHAT", arguments->what, "Folder of a bake, of a web bundle or of a run")->required();
   app.add_option("--take", arguments->take, "Of a run: name of a colorization; the last one if not given");
   add_browser_options(app, arguments->browser);
-  add_short_form(app, arguments->config, "--web-resolution", "web.resolution",
-                 "Voxels along the longest axis, at most; for a bake that has no bundle yet");
+  add_short_form(app, arguments->config, "--web-resolution", "web.resolution");
   add_config_options(app, arguments->config);
   return [arguments](const auto& command_line) { view(*arguments, command_line); };
 }

@@ -1,7 +1,10 @@
 #include "src/app/common_options.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
+#include "src/base/check.h"
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/base/text.h"
@@ -18,6 +21,23 @@ std::string default_text(const Field& field) {
   return line.substr(begin, line.find("  # ") - begin);
 }
 
+/// "triangles of the mesh, about [60000; 16 to 1e+08]"
+std::string described(const Field& field) {
+  std::string legal = joined(field.choices, ", ");
+  if (field.range) legal = fmt::format("{:g} to {:g}", field.range->min, field.range->max);
+  if (std::holds_alternative<bool*>(field.value)) return field.help;
+  return field.help + " [" + default_text(field) + (legal.empty() ? "" : "; " + legal) + "]";
+}
+
+/// What the configuration says of one of its keys.
+std::string help_of(const std::string& key) {
+  Config config;
+  const std::vector<Field> fields = fields_of(config);
+  const auto field = std::ranges::find(fields, key, &Field::key);
+  CNERF_CHECK(field != fields.end(), key);
+  return described(*field) + " (" + key + ")";
+}
+
 }  // namespace
 
 void add_config_options(CLI::App& app, ConfigArguments& arguments) {
@@ -26,26 +46,29 @@ void add_config_options(CLI::App& app, ConfigArguments& arguments) {
   app.add_option("--set", arguments.settings, "One option, key.path=value; may be repeated")
       ->allow_extra_args(false)
       ->take_all();
-  add_short_form(app, arguments, "--device", "device", "auto, cpu or cuda");
-  add_short_form(app, arguments, "--threads", "threads", "Threads to use; 0 = all cores");
+  add_short_form(app, arguments, "--device", "device");
+  add_short_form(app, arguments, "--threads", "threads");
   app.add_option("--progress", arguments.progress, "auto, line, plain, json or quiet");
 }
 
-void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
-                    const std::string& help) {
+void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key) {
   app.add_option_function<std::string>(
       option, [&arguments, key](const std::string& value) { arguments.short_forms.push_back(key + "=" + value); },
-      help + " (" + key + ")");
+      help_of(key));
 }
 
-void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
-                   const std::string& help) {
+void add_flag_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key) {
+  app.add_flag_callback(
+      option, [&arguments, key] { arguments.short_forms.push_back(key + "=true"); }, help_of(key));
+}
+
+void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key) {
   app.add_option_function<std::vector<std::string>>(
          option,
          [&arguments, key](const std::vector<std::string>& values) {
            arguments.short_forms.push_back(key + "=" + joined(values, ";"));
          },
-         help + " (" + key + ")")
+         help_of(key) + "; may be repeated")
       ->allow_extra_args(false)
       ->take_all();
 }
@@ -58,16 +81,11 @@ void add_browser_options(CLI::App& app, BrowserOptions& options) {
 }
 
 void add_colorizer_options(CLI::App& app, ConfigArguments& arguments) {
-  add_short_form(
-      app, arguments, "--colorizer", "colorizer.spec",
-      "Who colours: builtin, reference:IMAGE..., torchscript:FILE, onnx:FILE, caffe:PROTO,MODEL, exec:COMMAND");
-  add_short_form(app, arguments, "--prompt", "colorizer.prompt", "A text for colorizers that take one");
-  add_list_form(app, arguments, "--keyframe", "colorizer.keyframes",
-                "VIEW=FILE, a painted frame of the capture; may be repeated");
-  add_list_form(app, arguments, "--hint", "colorizer.hints",
-                "x,y,VIEW,#rrggbb: the thing at that pixel of the view's file has that colour; may be repeated");
-  add_list_form(app, arguments, "--hint-image", "colorizer.hint_images",
-                "VIEW=FILE, a picture that is transparent except for strokes; may be repeated");
+  add_short_form(app, arguments, "--colorizer", "colorizer.spec");
+  add_short_form(app, arguments, "--prompt", "colorizer.prompt");
+  add_list_form(app, arguments, "--keyframe", "colorizer.keyframes");
+  add_list_form(app, arguments, "--hint", "colorizer.hints");
+  add_list_form(app, arguments, "--hint-image", "colorizer.hint_images");
 }
 
 void add_field_options(CLI::App& app, const std::vector<Field>& fields) {
@@ -80,8 +98,7 @@ void add_field_options(CLI::App& app, const std::vector<Field>& fields) {
       continue;
     }
     app.add_option_function<std::string>(
-        name, [field](const std::string& value) { apply_setting(field.key + "=" + value, {field}); },
-        field.help + " [" + default_text(field) + "]");
+        name, [field](const std::string& value) { apply_setting(field.key + "=" + value, {field}); }, described(field));
   }
 }
 

@@ -24,12 +24,12 @@ struct ConfigArguments {
 
 /// Declares --preset, --config, --set, --device, --threads and --progress.
 void add_config_options(CLI::App& app, ConfigArguments& arguments);
-/// Declares `option` as a short form of the config key `key`.
-void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
-                    const std::string& help);
-/// Declares `option`, which may be repeated, as a short form of a config key that holds a list separated by `;`.
-void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
-                   const std::string& help);
+/// Declares `option` as a short form of the config key `key`, which brings its help and what is legal along.
+void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
+/// The same for a key that is true or false: the option sets it.
+void add_flag_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
+/// The same for a key that holds a list separated by `;`: the option may be repeated.
+void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
 /// Declares --colorizer, --prompt, --keyframe, --hint and --hint-image.
 void add_colorizer_options(CLI::App& app, ConfigArguments& arguments);
 /// Declares --port, --host, --token and --no-browser.

@@ -16,11 +16,11 @@ pipeline::RunContext open_run(const RunFolderArguments& arguments, const std::st
                               std::vector<std::string> command_line, Reporter& reporter) {
   pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.run);
   const pipeline::RunRecord record = directory.record();
-  if (!record.stage1_finished) {
+  if (!record.stage1.finished) {
     throw MissingInputError(arguments.run + ": stage 1 is not finished; go on with: cnerf train " +
                             record.capture.string() + " -o " + arguments.run + " --resume");
   }
-  Config config = resolve_config(arguments.config, directory.config(take));
+  Config config = resolve_config(arguments.config, directory.config(take, reporter));
   Capture capture = pipeline::read_capture(arguments.capture.empty() ? record.capture : fs::path(arguments.capture),
                                            config, reporter);
   return {std::move(directory), std::move(config), std::move(capture), std::move(command_line)};

@@ -26,6 +26,9 @@ const std::vector<RetiredKey>& retired_keys() {
       {"compare.style_reference", "", "''", kOfCompare},
       {"compare.style_network", "", "''", kOfCompare},
       {"compare.style_steps", "", "160", kOfCompare},
+      {"stage1.grid.features", "", "4", "a row has 4 features"},
+      {"stage2.grid.features", "", "4", "a row has 4 features"},
+      {"render.min_transmittance", "", "0.001", "it is a constant"},
   };
   return keys;
 }

@@ -249,13 +249,10 @@ std::vector<std::string> read_toml(std::string_view text, const std::string& sou
   read_table(table, "", source, fields);
   std::vector<std::string> notes;
   for (const auto& [old, value] : found) {
-    if (old.now.empty()) {
-      if (value != old.was)
-        notes.push_back(source + ": " + old.key + " = " + value + " is no option any more: left out");
-      continue;
-    }
     const auto successor = std::ranges::find(fields, old.now, &Field::key);
-    if (successor == fields.end() || value_text(*successor) != value) refuse_retired(old, value, source);
+    if (value == old.was || (successor != fields.end() && value_text(*successor) == value)) continue;
+    if (old.was.empty()) refuse_retired(old, value, source);
+    notes.push_back(source + ": " + old.key + " = " + value + " is no option any more: left out");
   }
   return notes;
 }

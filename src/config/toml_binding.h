@@ -13,13 +13,12 @@ namespace cnerf {
 struct RetiredKey {
   std::string key;
   std::string now;      ///< the key that has its meaning; empty = none has
-  std::string was;      ///< where `now` is empty: its default as TOML, with which it says nothing
+  std::string was;      ///< its default as TOML, with which it says nothing; empty = it always said something
   std::string instead;  ///< where `now` is empty: what to do without it
 };
 
 /// What to do with retired keys: people are told; but what the program wrote itself, before a key was retired, holds
-/// every key. There one with a successor has to say the same as that; others are left out, with a note where they
-/// differ from their default.
+/// every key. There it is left out, with a note where it says something that no successor says.
 enum class Retired { kRefused, kLeftOut };
 
 /// Reads `text` over `fields`: keys that are absent keep their value.

@@ -84,7 +84,6 @@ void render_step(const RunContext& context, const RenderJob& job, const Engines&
 RenderOptions render_options(const Config& config) {
   RenderOptions options;
   options.steps_per_box = config.render.steps_per_box;
-  options.min_transmittance = config.render.min_transmittance;
   return options;
 }
 

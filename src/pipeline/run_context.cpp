@@ -49,7 +49,7 @@ void begin_run(const RunContext& context, const fs::path& capture_path, const Ex
   const bool goes_on = directory.exists() && existing.resume;
   if (directory.exists() && !goes_on) directory.clear();
   // Before the configuration is written: what is refused must not take the place of what the run was made with.
-  if (goes_on && !directory.record().stage1_finished) {
+  if (goes_on && !directory.record().stage1.finished) {
     check_continues(directory.stage1_snapshot(), context.config.stage1);
   }
   write_file(directory.config_file(), to_toml(context.config));

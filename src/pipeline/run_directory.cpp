@@ -1,7 +1,8 @@
 #include "src/pipeline/run_directory.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -12,31 +13,30 @@ namespace cnerf::pipeline {
 namespace fs = std::filesystem;
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-Json read_json(const fs::path& file) {
-  try {
-    Json json = Json::parse(read_text_file(file));
-    const int version = json.at("schema_version").get<int>();
-    if (version > kRunSchemaVersion) {
-      throw SnapshotError(file.string() + ": schema_version: this program reads up to " +
-                          std::to_string(kRunSchemaVersion) + ", the file has " + std::to_string(version) +
-                          "; it was written by a newer cnerf");
-    }
-    return json;
-  } catch (const nlohmann::json::exception& error) {
-    throw SnapshotError(file.string() + ": " + error.what());
+struct Version {
+  int schema_version = 0;
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("schema_version", self.schema_version);
   }
+};
+
+/// @throws SnapshotError  naming the field; also for a record of a newer program
+template <typename Record>
+Record read_run_record(const fs::path& file) {
+  const auto json = read_json<SnapshotError>(file);
+  const int version = from_json<Version, SnapshotError>(json, file).schema_version;
+  if (version > kRunSchemaVersion) {
+    throw SnapshotError(
+        fmt::format("{}: schema_version: this program reads up to {}, the file has {}; it was written by a newer cnerf",
+                    file.string(), kRunSchemaVersion, version));
+  }
+  return from_json<Record, SnapshotError>(json, file);
 }
 
-/// Reads fields; a missing or mistyped one is the file's fault.
-template <typename Read>
-auto fields_from(const fs::path& file, const Json& json, Read&& read) {
-  try {
-    return read(json);
-  } catch (const nlohmann::json::exception& error) {
-    throw SnapshotError(file.string() + ": " + error.what());
-  }
+template <typename Record>
+void write_run_record(const fs::path& file, const Record& record) {
+  write_file(file, to_json(record).dump(2) + "\n");
 }
 
 bool is_folder_name_character(char c) {
@@ -75,77 +75,37 @@ bool RunDirectory::exists() const {
 }
 
 RunRecord RunDirectory::record() const {
-  return fields_from(record_file(), read_json(record_file()), [](const Json& json) {
-    RunRecord record;
-    record.capture = json.at("capture").get<std::string>();
-    record.program_version = json.at("program_version").get<std::string>();
-    record.command_line = json.at("command_line").get<std::string>();
-    record.current_take = json.at("current_take").get<std::string>();
-    record.seconds_of_steps = json.at("seconds_of_steps").get<std::map<std::string, double>>();
-    record.peak_memory_bytes = json.at("peak_memory_bytes").get<std::size_t>();
-    const Json& stage1 = json.at("stage1");
-    record.stage1_finished = stage1.at("finished").get<bool>();
-    record.stage1 = {stage1.at("steps").get<int>(), stage1.at("seconds").get<double>(),
-                     stage1.at("trained_samples").get<double>(), stage1.at("train_psnr").get<double>()};
-    return record;
-  });
+  return read_run_record<RunRecord>(record_file());
 }
 
-void RunDirectory::save(const RunRecord& record) const {
-  const Stage1Report& stage1 = record.stage1;
-  const Json json{{"schema_version", kRunSchemaVersion},
-                  {"program_version", record.program_version},
-                  {"command_line", record.command_line},
-                  {"capture", record.capture.string()},
-                  {"current_take", record.current_take},
-                  {"seconds_of_steps", record.seconds_of_steps},
-                  {"peak_memory_bytes", std::max(record.peak_memory_bytes, peak_memory_bytes())},
-                  {"stage1",
-                   {{"finished", record.stage1_finished},
-                    {"steps", stage1.steps},
-                    {"seconds", stage1.seconds},
-                    {"trained_samples", stage1.trained_samples},
-                    {"train_psnr", stage1.train_psnr}}}};
-  write_file(record_file(), json.dump(2) + "\n");
+void RunDirectory::save(RunRecord record) const {
+  record.schema_version = kRunSchemaVersion;
+  record.peak_memory_bytes = std::max(record.peak_memory_bytes, peak_memory_bytes());
+  write_run_record(record_file(), record);
 }
 
 std::optional<TakeRecord> RunDirectory::take_record(const std::string& take) const {
   const fs::path file = take_record_file(take);
   std::error_code failure;
   if (!fs::is_regular_file(file, failure)) return std::nullopt;
-  return fields_from(file, read_json(file), [](const Json& json) {
-    TakeRecord record;
-    record.name = json.at("name").get<std::string>();
-    record.colorizer = json.at("colorizer").get<std::string>();
-    record.stage2 = {json.at("accepted_patches").get<int>(), json.at("rejected_patches").get<int>(),
-                     json.at("seconds").get<double>(),       json.at("colorizer_seconds").get<double>(),
-                     json.value("waited_seconds", 0.0),      json.at("bake_ab_distance").get<double>()};
-    return record;
-  });
+  return read_run_record<TakeRecord>(file);
 }
 
-void RunDirectory::save(const TakeRecord& record) const {
-  const Stage2Report& stage2 = record.stage2;
-  const int answers = std::max(1, stage2.accepted + stage2.rejected);
-  const Json json{{"schema_version", kRunSchemaVersion},
-                  {"program_version", version_text()},
-                  {"name", record.name},
-                  {"colorizer", record.colorizer},
-                  {"accepted_patches", stage2.accepted},
-                  {"rejected_patches", stage2.rejected},
-                  {"acceptance_rate", double(stage2.accepted) / answers},
-                  {"seconds", stage2.seconds},
-                  {"colorizer_seconds", stage2.colorizer_seconds},
-                  {"waited_seconds", stage2.waited_seconds},
-                  {"bake_ab_distance", stage2.bake_ab_distance}};
-  write_file(take_record_file(record.name), json.dump(2) + "\n");
+void RunDirectory::save(TakeRecord record) const {
+  record.schema_version = kRunSchemaVersion;
+  record.program_version = version_text();
+  record.acceptance_rate =
+      double(record.stage2.accepted) / std::max(1, record.stage2.accepted + record.stage2.rejected);
+  write_run_record(take_record_file(record.name), record);
 }
 
-Config RunDirectory::config(const std::string& take) const {
+Config RunDirectory::config(const std::string& take, Observer& observer) const {
   Config config;
   std::error_code failure;
   const bool of_take = !take.empty() && fs::is_regular_file(take_config_file(take), failure);
-  read_run_config(of_take ? take_config_file(take) : config_file(), config);
+  for (const std::string& note : read_run_config(of_take ? take_config_file(take) : config_file(), config)) {
+    observer.say("note: " + note);
+  }
   return config;
 }
 

@@ -17,6 +17,8 @@
 #include <optional>
 #include <string>
 
+#include "src/base/json_record.h"
+#include "src/base/observer.h"
 #include "src/base/usage.h"
 #include "src/config/config.h"
 #include "src/engine/engines.h"
@@ -27,16 +29,41 @@ namespace cnerf::pipeline {
 inline constexpr int kRunSchemaVersion = 1;
 inline constexpr const char* kGreyTake = "grey";  ///< names the outputs of an uncoloured scene
 
+struct Stage1Record : Stage1Report {
+  bool finished = false;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("finished", self.finished);
+    v("steps", self.steps);
+    v("seconds", self.seconds);
+    v("trained_samples", self.trained_samples);
+    v("train_psnr", self.train_psnr);
+  }
+};
+
 /// Content of run.json.
 struct RunRecord {
-  std::filesystem::path capture;  ///< absolute
+  int schema_version = kRunSchemaVersion;
   std::string program_version;
-  std::string command_line;  ///< that started the run
-  bool stage1_finished = false;
-  Stage1Report stage1;
+  std::string command_line;                        ///< that started the run
+  std::filesystem::path capture;                   ///< absolute
   std::string current_take;                        ///< colorized last; empty = none yet
   std::map<std::string, double> seconds_of_steps;  ///< evaluate, bake, render: what each took last
   std::size_t peak_memory_bytes = 0;               ///< the most any step's process held
+  Stage1Record stage1;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("schema_version", self.schema_version);
+    v("program_version", self.program_version);
+    v("command_line", self.command_line);
+    v("capture", self.capture);
+    v("current_take", self.current_take);
+    v("seconds_of_steps", self.seconds_of_steps);
+    v("peak_memory_bytes", self.peak_memory_bytes);
+    v("stage1", self.stage1);
+  }
 };
 
 /// Content of takes/NAME/take.json; the file exists once the take is finished.
@@ -44,6 +71,24 @@ struct TakeRecord {
   std::string name;
   std::string colorizer;
   Stage2Report stage2;
+  double acceptance_rate = 0;  ///< of the colorizer's answers; follows from `stage2` when the record is saved
+  int schema_version = kRunSchemaVersion;
+  std::string program_version = {};
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("schema_version", self.schema_version);
+    v("program_version", self.program_version);
+    v("name", self.name);
+    v("colorizer", self.colorizer);
+    v("accepted_patches", self.stage2.accepted);
+    v("rejected_patches", self.stage2.rejected);
+    v("acceptance_rate", self.acceptance_rate);
+    v("seconds", self.stage2.seconds);
+    v("colorizer_seconds", self.stage2.colorizer_seconds);
+    v("waited_seconds", self.stage2.waited_seconds, kOptional);
+    v("bake_ab_distance", self.stage2.bake_ab_distance);
+  }
 };
 
 class RunDirectory {
@@ -69,12 +114,13 @@ class RunDirectory {
 
   [[nodiscard]] bool exists() const;
   [[nodiscard]] RunRecord record() const;
-  void save(const RunRecord& record) const;
+  void save(RunRecord record) const;
   [[nodiscard]] std::optional<TakeRecord> take_record(const std::string& take) const;
-  void save(const TakeRecord& record) const;
+  void save(TakeRecord record) const;
 
   /// The configuration of the run, or of one of its takes.
-  [[nodiscard]] Config config(const std::string& take = {}) const;
+  /// @param observer  is told what it says that is no option any more
+  [[nodiscard]] Config config(const std::string& take, Observer& observer) const;
   /// A take the user names, or the current one, or "" when the run is not colorized.
   /// @throws MissingInputError  when the named take is not finished; lists those that are.
   [[nodiscard]] std::string choose_take(const std::string& wanted) const;

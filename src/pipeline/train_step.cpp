@@ -10,10 +10,9 @@ namespace cnerf::pipeline {
 void train_step(const RunContext& context, bool resume, const Engines& engines, Observer& observer) {
   const RunDirectory& directory = context.directory;
   RunRecord record = directory.record();
-  if (!record.stage1_finished || !resume) {
-    record.stage1 =
-        train_stage1({context.capture, context.config.stage1, directory.stage1_snapshot(), resume}, engines, observer);
-    record.stage1_finished = true;
+  if (!record.stage1.finished || !resume) {
+    const Stage1Job job{context.capture, context.config.stage1, directory.stage1_snapshot(), resume};
+    record.stage1 = {train_stage1(job, engines, observer), true};
     directory.save(record);
   }
   observer.say(fmt::format("stage 1: {} steps in {}, {:.1f} dB on training pixels", record.stage1.steps,

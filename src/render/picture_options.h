@@ -10,7 +10,6 @@ struct PictureOptions {
   int fps = 24;
   int short_side = 270;
   int steps_per_box = 512;
-  double min_transmittance = 1e-3;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -18,7 +17,6 @@ struct PictureOptions {
     v("fps", fps, Range{1, 240}, "pictures per second of a video");
     v("short_side", short_side, Range{16, 8192}, "pixels of a spiral or an orbit, at most the capture's");
     v("steps_per_box", steps_per_box, Range{16, 8192}, "march steps across the side of the innermost cascade");
-    v("min_transmittance", min_transmittance, Range{0, 0.5}, "a ray ends below this, and counts as opaque");
   }
 };
 

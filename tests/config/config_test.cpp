@@ -134,6 +134,19 @@ TEST(Config, RetiredKeysAreGoneAndTheirSuccessorsAreThere) {
   }
 }
 
+/// Every run of an earlier version holds them.
+TEST(Config, DefaultsOfRetiredKeysSayNothing) {
+  const test::TempDir folder;
+  for (const RetiredKey& old : retired_keys()) {
+    if (old.was.empty()) continue;
+    const auto dot = old.key.rfind('.');
+    write_file(folder / "old_run.toml",
+               "[" + old.key.substr(0, dot) + "]\n" + old.key.substr(dot + 1) + " = " + old.was);
+    Config config;
+    EXPECT_THAT(read_run_config(folder / "old_run.toml", config), testing::IsEmpty());
+  }
+}
+
 TEST(Config, TheDilationHasOneKey) {
   const test::TempDir folder;
   write_file(folder / "mine.toml", std::string_view("[vdb]\ndilation = 3\n"));

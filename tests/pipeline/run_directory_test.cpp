@@ -20,14 +20,13 @@ TEST(RunDirectoryTest, RecordsReturnAsTheyWereSaved) {
   record.capture = "/captures/a";
   record.program_version = "0.1.0";
   record.command_line = "cnerf run \"a b\"";
-  record.stage1_finished = true;
-  record.stage1 = {120, 1.5, 2e9, 27.25};
+  record.stage1 = {{120, 1.5, 2e9, 27.25}, true};
   record.current_take = "reference";
   run.save(record);
   const RunRecord read = RunDirectory::open(folder / "run").record();
   EXPECT_EQ(read.capture, record.capture);
   EXPECT_EQ(read.command_line, record.command_line);
-  EXPECT_TRUE(read.stage1_finished);
+  EXPECT_TRUE(read.stage1.finished);
   EXPECT_EQ(read.stage1.steps, 120);
   EXPECT_EQ(read.stage1.train_psnr, 27.25);
   EXPECT_EQ(read.current_take, "reference");
@@ -64,14 +63,15 @@ TEST(RunDirectoryTest, NewerOrBrokenRecordsAreRefusedByName) {
   };
   EXPECT_THAT(message_for("{\"schema_version\": 99}"), testing::AllOf(HasSubstr("run.json"), HasSubstr("99")));
   EXPECT_THAT(message_for("{\"schema_version\": 1"), HasSubstr("run.json"));
-  EXPECT_THAT(message_for("{\"schema_version\": 1}"), HasSubstr("capture")) << "the missing field is named";
+  EXPECT_THAT(message_for("{\"schema_version\": 1}"), HasSubstr("run.json: program_version: is missing"));
 }
 
 TEST(RunDirectoryTest, RunsFromBeforeAKeyWasRetiredAreRead) {
   const test::TempDir folder;
   const RunDirectory run(folder.path());
   write_file(run.config_file(), std::string_view("[bake]\nresolution = 99\ndilation = 2\n[vdb]\ndilation = 2\n"));
-  EXPECT_EQ(run.config("").bake.resolution, 99);
+  Observer observer;
+  EXPECT_EQ(run.config("", observer).bake.resolution, 99);
 }
 
 TEST(RunDirectoryTest, TakesStandSideBySide) {
