@@ -1,8 +1,10 @@
-import { createHash } from "node:crypto";
+import { createHash, webcrypto } from "node:crypto";
 import { gzipSync } from "node:zlib";
 import { afterEach, describe, expect, it, vi } from "vitest";
 import { BundleError, bundleSchema, loadVolume, parseBundle } from "../../src/bundle";
 import { expected, manifestText } from "./fixture";
+
+globalThis.crypto ??= webcrypto as Crypto;  // node 18 has it by another name
 
 const parts: Record<string, Uint8Array> = { "occupancy.bin": new Uint8Array([0]), "density.bin": new Uint8Array(512).fill(9), "color.bin": new Uint8Array(1536) };
 const packedParts = Object.fromEntries(Object.entries(parts).map(([name, raw]) => [name, new Uint8Array(gzipSync(raw))]));
