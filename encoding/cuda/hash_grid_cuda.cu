@@ -14,16 +14,6 @@ unsigned blocks_for(std::uint32_t items) {
   return (items + kThreads - 1) / kThreads;
 }
 
-__global__ void encode(const __grid_constant__ GridLevels levels, const uint2* __restrict__ table,
-                       const float4* __restrict__ places, const std::uint32_t* count, uint2* __restrict__ encoded) {
-  const std::uint32_t sample = blockIdx.x * kThreads + threadIdx.x;
-  if (sample >= *count) return;
-  const float4 place = places[sample];
-  const float position[3] = {place.x, place.y, place.z};
-  const int l = int(blockIdx.y);
-  encoded[std::size_t(sample) * levels.count + l] = gather(levels.level[l], table, position);
-}
-
 /// Blocks of one level follow one another, so that the gradients of that level stay in L2.
 __global__ void __launch_bounds__(kThreads)
     scatter(const __grid_constant__ GridLevels levels, const float4* __restrict__ places, const std::uint32_t* count,
@@ -55,14 +45,6 @@ __global__ void __launch_bounds__(kThreads)
 }
 
 }  // namespace
-
-void encode_cuda(const std::vector<GridLevel>& levels, const void* table, const float* places, SampleCount samples,
-                 void* encoded, cudaStream_t stream) {
-  const dim3 grid(blocks_for(samples.most), unsigned(levels.size()));
-  encode<<<grid, kThreads, 0, stream>>>(GridLevels(levels.data(), levels.size()), static_cast<const uint2*>(table),
-                                        reinterpret_cast<const float4*>(places), samples.count,
-                                        static_cast<uint2*>(encoded));
-}
 
 void encode_backward_cuda(const std::vector<GridLevel>& levels, const float* places, SampleCount samples,
                           const void* d_encoded, float* d_table, cudaStream_t stream) {

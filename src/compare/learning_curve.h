@@ -12,8 +12,8 @@
 #include "src/base/observer.h"
 #include "src/base/usage.h"
 #include "src/capture/capture.h"
+#include "src/engine/color_engines.h"
 #include "src/engine/engines.h"
-#include "src/engine/pixel_samples.h"
 #include "src/field/scene_frame.h"
 
 namespace cnerf::compare {

@@ -1,5 +1,5 @@
 #pragma once
-/// Stage 2's inner loops on frozen geometry: a distribution over the 313 ab bins a pixel, and the per-sample colour
+/// The engines of stage 2, on frozen geometry: a distribution over the 313 ab bins per pixel, and the colour per sample
 /// that a bake needs.
 
 #include <cstdint>
@@ -10,11 +10,21 @@
 #include "encoding/hash_grid_levels.h"
 #include "src/color/ab_bins.h"
 #include "src/engine/chroma_math.h"
-#include "src/engine/pixel_samples.h"
-#include "src/engine/state.h"
 #include "src/field/color_field.h"
+#include "src/field/state.h"
 
 namespace cnerf {
+
+/// What stage 2 knows of R pixels: the few samples that carry their opacity, with frozen weights; pixel by pixel, front
+/// to back.
+struct PixelSamples {
+  std::vector<Vec3f> positions;            ///< [S], unit space
+  std::vector<float> weights;              ///< [S], w_i >= 0; a pixel's sum is its opacity
+  std::vector<float> luminance;            ///< [S], linear Y
+  std::vector<std::size_t> offsets = {0};  ///< [R + 1]
+
+  [[nodiscard]] std::size_t pixels() const { return offsets.size() - 1; }
+};
 
 /// What a step adds to the cross entropy.
 struct ChromaLossWeights {
@@ -23,7 +33,7 @@ struct ChromaLossWeights {
 };
 
 /// Classification-based injection (paper, Eq. color classification loss, read as KL(Z || Z_hat), mean over pixels).
-/// Hidden features of samples are composited once, a linear head is applied once a pixel: the same as compositing
+/// Hidden features of samples are composited once, a linear head is applied once per pixel: the same as compositing
 /// logits, since the head is linear: W sum(w h) / A + b = sum(w (W h + b)) / A.
 class ColorBinEngine {
  public:
@@ -39,7 +49,7 @@ class ColorBinEngine {
   }
   /// @param logits  [R, 313]; of pixels below kLeastColoredOpacity they mean nothing
   virtual void logits(const PixelSamples& pixels, std::span<float> logits) const = 0;
-  /// One colour a pixel, of the same pixels: see `decode_annealed_mean`; temperature 0 is `decode_arg_max`.
+  /// One colour per pixel, of the same pixels: see `decode_annealed_mean`; temperature 0 is `decode_arg_max`.
   virtual void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const = 0;
   [[nodiscard]] virtual long step_count() const = 0;
   [[nodiscard]] virtual std::vector<StatePiece> state() = 0;

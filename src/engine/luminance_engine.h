@@ -1,5 +1,6 @@
 #pragma once
-/// Stage 1's inner loop, one implementation a device: march, encode, nets, composite, loss, gradients, Adam, occupancy.
+/// The engine of stage 1, one implementation per device: march, hash grid, nets, compositing, loss, gradients, Adam,
+/// occupancy.
 
 #include <functional>
 #include <memory>
@@ -8,7 +9,7 @@
 #include <vector>
 
 #include "encoding/hash_grid_levels.h"
-#include "src/engine/state.h"
+#include "src/field/state.h"
 #include "src/render/march.h"
 #include "src/render/observed_ray.h"
 #include "src/render/occupancy_grid.h"
@@ -21,7 +22,7 @@ struct LuminanceEngineOptions {
   OccupancyOptions occupancy;
   int cascades = 1;
   MarchSettings march;
-  int samples_per_step = 1 << 16;  ///< trained samples a step aims at
+  int samples_per_step = 1 << 16;  ///< trained samples that a step aims at
   int patch_size = 0;  ///< 0: independent pixels; K: pixels come as K x K patches (paper, Eq. patch sampling)
   float patch_scale_min = 0.3f, patch_scale_max = 0.7f;  ///< s, share of the image's short side
   float max_luminance = 1.0f;                            ///< of the images; the field emits at most a little more
@@ -69,13 +70,18 @@ class LuminanceEngine {
  public:
   virtual ~LuminanceEngine() = default;
 
-  /// One optimiser step on pixels drawn from `views`. The same step number draws the same pixels.
-  virtual StepReport step(const std::vector<TrainingView>& views, float learning_rate) = 0;
+  /// What steps draw their pixels from. To be called before the first step; the images must outlive the steps.
+  virtual void set_views(const std::vector<TrainingView>& views) = 0;
+  /// One optimiser step. The same step number draws the same pixels.
+  virtual StepReport step(float learning_rate) = 0;
   [[nodiscard]] virtual long step_count() const = 0;
 
   /// @param march  may step otherwise than training did
   virtual void render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                       std::span<RayResult> results) const = 0;
+  /// `render` for every pixel of a camera, row by row.
+  virtual void render_view(const UnitCamera& camera, const MarchSettings& march, const RenderEffort& effort,
+                           std::span<RayResult> results) const;
   /// The samples behind `render`'s results, ray by ray in order; `offsets` has rays + 1 entries.
   virtual void trace(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                      std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const = 0;

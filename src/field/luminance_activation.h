@@ -1,6 +1,5 @@
 #pragma once
-/// From the luminance net's output to light. The net answers in L*, as the loss asks: the gradient then fades only at
-/// both ends of the sigmoid, and a dark capture learns as fast as a bright one.
+/// From the outputs of stage 1's nets to density and light.
 
 #include <cmath>
 
@@ -9,6 +8,15 @@
 
 namespace cnerf {
 
+/// Density of the density net's first output; 1/unit length. Clamped so that neither sigma nor its gradient overflows.
+template <typename Real>
+CNERF_HD Real density_from_raw(Real raw, Real scale) {
+  const Real most = Real(15);
+  return std::exp(raw > most ? most : raw < -most ? -most : raw) * scale;
+}
+
+/// The luminance net answers in L*, as the loss asks: the gradient then fades only at both ends of the sigmoid, and a
+/// dark capture learns as fast as a bright one.
 template <typename Real>
 struct LuminanceActivation {
   Real brightest;  ///< L* at sigmoid = 1; above 100 for light brighter than white

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "src/base/error.h"
-#include "src/engine/state.h"
+#include "src/field/state.h"
 
 namespace cnerf {
 

@@ -63,17 +63,15 @@ PreviewPicture preview_of(const LuminanceModel& model, const View& view) {
   const Intrinsics lens = resized(full, std::max(1, int(full.width * scale)), std::max(1, int(full.height * scale)));
   const UnitCamera camera(lens, view.world_from_camera, model.frame);
   PreviewPicture picture{view.name, lens.width, lens.height, {}, {}};
-  std::vector<Ray> rays;
   for (int y = 0; y < lens.height; ++y) {
     for (int x = 0; x < lens.width; ++x) {
-      rays.push_back(camera.ray({x + 0.5, y + 0.5}));
       const std::size_t column = std::size_t((x + 0.5) / lens.width * view.image.width);
       const std::size_t row = std::size_t((y + 0.5) / lens.height * view.image.height);
       picture.input.push_back(view.image.luminance(row * std::size_t(view.image.width) + column));
     }
   }
-  std::vector<RayResult> results(rays.size());
-  model.engine->render(rays, model.march(), {1e-2f, 0.9f}, results);
+  std::vector<RayResult> results(picture.input.size());
+  model.engine->render_view(camera, model.march(), {1e-2f, 0.9f}, results);
   for (const RayResult& result : results) picture.ours.push_back(result.luminance);
   return picture;
 }
@@ -129,6 +127,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   LuminanceModel model = start_or_resume(job, engines);
   const std::vector<TrainingView> views = training_views(job.capture, model.frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
+  model.engine->set_views(views);
 
   TrainingClock clock(model.seconds);
   const std::vector<const View*> shown = preview_views(job.capture);
@@ -138,7 +137,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   while (model.engine->step_count() < options.steps) {
     if (options.max_seconds > 0 && model.seconds >= options.max_seconds) break;
     const double fraction = fraction_done(model, options);
-    const StepReport step = model.engine->step(views, learning_rate(options, fraction));
+    const StepReport step = model.engine->step(learning_rate(options, fraction));
     model.trained_samples += double(step.trained_samples);
     model.seconds = clock.seconds();
     rays += double(step.rays);

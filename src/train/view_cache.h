@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "src/engine/color_engines.h"
 #include "src/engine/luminance_engine.h"
-#include "src/engine/pixel_samples.h"
 #include "src/render/training_views.h"
 
 namespace cnerf {

@@ -107,8 +107,8 @@ bool leaks_truth(const Include& include) {
 bool misplaces_torch(const Include& include) {
   const bool is_torch =
       include.target.starts_with("torch/") || include.target.starts_with("ATen/") || include.target.starts_with("c10/");
-  const bool is_allowed = include.file.starts_with("src/colorizer") || include.file.starts_with("encoding/torch") ||
-                          include.file.starts_with("src/compare/baselines");
+  const bool is_allowed =
+      include.file.starts_with("src/colorizer") || include.file.starts_with("src/compare/baselines");
   return is_torch && !is_allowed;
 }
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "src/base/cpu_features.h"
-#include "src/engine/cpu/mlp.h"
+#include "src/field/cpu/mlp.h"
 #include "src/field/mlp_reference.h"
 #include "tests/bench/bench_support.h"
 #include "tests/support/grouped.h"

@@ -117,6 +117,7 @@ int main(int argc, char** argv) {
   if (own["validation"] > 0) cnerf::test::hold_out_of_training(capture, int(own["validation"]));
   cnerf::LuminanceModel model = cnerf::LuminanceModel::create(capture, options, cnerf::cpu_engines());
   const auto views = cnerf::training_views(capture, model.frame);
+  model.engine->set_views(views);
   std::printf("%zu training views of %dx%d, %d cascades, side %.3f world units\n", views.size(), views[0].image->width,
               views[0].image->height, model.frame.cascades, 1 / model.frame.unit_per_world);
 
@@ -130,7 +131,7 @@ int main(int argc, char** argv) {
     const double decay = std::clamp(2.0 * fraction - 1.0, 0.0, 1.0);
     const auto rate =
         float(options.learning_rate * std::pow(options.final_learning_rate / options.learning_rate, decay));
-    const cnerf::StepReport step = model.engine->step(views, rate);
+    const cnerf::StepReport step = model.engine->step(rate);
     elapsed += seconds_since(start);
     processor += processor_seconds() - processor_start;
     trained += double(step.trained_samples);

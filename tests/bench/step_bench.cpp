@@ -14,9 +14,11 @@
 #include "encoding/cpu/hash_grid_kernels.h"
 #include "src/base/parallel.h"
 #include "src/capture/load_capture.h"
-#include "src/engine/cpu/luminance_engine_cpu.h"
+#include "src/engine/luminance_engine.h"
+#include "src/field/nets.h"
 #include "src/train/luminance_model.h"
 #include "tests/bench/bench_support.h"
+#include "tests/support/engine_state.h"
 #include "tests/support/torch_oracle.h"
 
 namespace cnerf {
@@ -32,14 +34,21 @@ struct Training {
       : capture(load_capture(folder, {.downscale = downscale, .holdout = 8})),
         model(LuminanceModel::create(capture, Stage1Options{}, cpu_engines())),
         views(training_views(capture, model.frame)),
-        engine(dynamic_cast<LuminanceEngineCpu&>(*model.engine)) {
-    for (int i = 0; i < kWarmUpSteps; ++i) engine.step(views, kLearningRate);
+        engine(*model.engine) {
+    options.grid = model.options.grid;
+    options.cascades = model.frame.cascades;
+    options.march = model.march();
+    options.max_luminance = model.max_luminance;
+    options.seed = std::uint64_t(model.options.seed);
+    engine.set_views(views);
+    for (int i = 0; i < kWarmUpSteps; ++i) engine.step(kLearningRate);
   }
 
   Capture capture;
   LuminanceModel model;
   std::vector<TrainingView> views;
-  LuminanceEngineCpu& engine;
+  LuminanceEngine& engine;
+  LuminanceEngineOptions options;
 };
 
 /// Seconds a trained sample over a few steps.
@@ -48,7 +57,7 @@ double engine_seconds(Training& training, int threads) {
   double samples = 0;
   const double seconds = bench::best_seconds(1, [&] {
     for (int i = 0; i < kStepsARound; ++i) {
-      samples += double(training.engine.step(training.views, kLearningRate).trained_samples);
+      samples += double(training.engine.step(kLearningRate).trained_samples);
     }
   });
   set_thread_count(0);
@@ -58,15 +67,17 @@ double engine_seconds(Training& training, int threads) {
 /// The engine's next step in LibTorch.
 class TorchStep {
  public:
-  explicit TorchStep(Training& training) : engine_(training.engine) {
-    wanted_ = engine_.gradients(training.views);
+  explicit TorchStep(Training& training)
+      : engine_(training.engine), options_(training.options), levels_(hash_grid_levels(options_.grid)) {
+    wanted_ = test::gradients_of_next_step(engine_);
     march(training);
     const std::vector<StatePiece> state = engine_.state();
-    const auto* values = reinterpret_cast<const float*>(state.front().bytes.data());
-    const auto count = std::int64_t(state.front().bytes.size() / sizeof(float));
-    table_ = torch::tensor(std::vector<float>(values, values + count)).view({-1, 4}).requires_grad_(true);
-    density_layers_ = test::layers_of(engine_.field().density_net(), torch::kFloat32);
-    luminance_layers_ = test::layers_of(engine_.field().luminance_net(), torch::kFloat32);
+    const std::span<const float> table = test::floats_of(state, "grid.table");
+    table_ = torch::tensor(std::vector<float>(table.begin(), table.end())).view({-1, 4}).requires_grad_(true);
+    density_layers_ = test::layers_of(density_net_layout(options_.grid.levels),
+                                      test::floats_of(state, "density_net.weights"), torch::kFloat32);
+    luminance_layers_ =
+        test::layers_of(luminance_net_layout(), test::floats_of(state, "luminance_net.weights"), torch::kFloat32);
     std::vector<torch::Tensor> parameters = {table_};
     for (const auto* layers : {&density_layers_, &luminance_layers_}) {
       parameters.insert(parameters.end(), layers->begin(), layers->end());
@@ -103,8 +114,9 @@ class TorchStep {
     std::vector<std::int64_t> ray_of;
     std::vector<torch::Tensor> directions;
     for (std::size_t r = 0; r < wanted_.report.rays; ++r) {
-      const auto observed = engine_.observe(training.views, r);
-      RayMarcher marcher(engine_.occupancy(), engine_.options().march, observed.ray, observed.jitter);
+      const ObservedRay observed =
+          observe_ray(training.views, options_.sampling(), options_.seed, std::uint64_t(engine_.step_count()), r);
+      RayMarcher marcher(engine_.occupancy(), options_.march, observed.ray, observed.jitter);
       for (RaySample sample; marcher.next(sample);) {
         const Vec3f p = observed.ray.at(sample.t);
         for (int axis = 0; axis < 3; ++axis) positions.push_back(std::clamp(p[axis], 0.0f, 1.0f));
@@ -124,11 +136,10 @@ class TorchStep {
   }
 
   torch::Tensor features_at(const torch::Tensor& positions) const {
-    const auto& levels = engine_.field().grid().levels();
-    return test::run_layers(density_layers_, test::encode_by_index_select(levels, table_, positions));
+    return test::run_layers(density_layers_, test::encode_by_index_select(levels_, table_, positions));
   }
   torch::Tensor optical_depth(const torch::Tensor& features, const torch::Tensor& dt) const {
-    const double scale = std::ldexp(1.0, engine_.options().cascades - 1);
+    const double scale = std::ldexp(1.0, options_.cascades - 1);
     return features.select(1, 0).clamp(-15, 15).exp() * dt * scale;
   }
   struct Walk {
@@ -157,15 +168,17 @@ class TorchStep {
     const torch::Tensor directions = directions_.index_select(0, ray);
     const torch::Tensor raw = test::run_layers(luminance_layers_, torch::cat({features, directions}, 1)).select(1, 0);
     const Walk through = walk(optical_depth(features, dt_.index_select(0, kept)), ray);
-    const torch::Tensor light = (through.before - through.behind).to(torch::kFloat32) *
-                                test::luminance_activation(raw, engine_.options().max_luminance);
+    const torch::Tensor light =
+        (through.before - through.behind).to(torch::kFloat32) * test::luminance_activation(raw, options_.max_luminance);
     const torch::Tensor seen = torch::zeros_like(target_).index_add(0, ray, light) +
                                torch::exp(-through.of_ray).to(torch::kFloat32) * background_;
     return ((test::lightness(seen) - test::lightness(target_)) / 100).square().mean();
   }
 
-  LuminanceEngineCpu& engine_;
-  LuminanceEngineCpu::Gradients wanted_;
+  LuminanceEngine& engine_;
+  const LuminanceEngineOptions& options_;
+  std::vector<GridLevel> levels_;
+  test::Stage1Gradients wanted_;
   torch::Tensor positions_, dt_, ray_, target_, background_, directions_, table_;
   std::vector<torch::Tensor> density_layers_, luminance_layers_;
   std::unique_ptr<torch::optim::Adam> adam_;

@@ -13,7 +13,6 @@
 
 #include "src/color/colorspace_math.h"
 #include "src/compare/baselines/positional_math.h"
-#include "src/field/density_activation.h"
 #include "src/field/luminance_activation.h"
 #include "src/render/composite_math.h"
 #include "tests/support/finite_difference.h"
@@ -173,6 +172,11 @@ class PositionalField : public testing::Test {
   PositionalField() { frame_.unit_per_world = 0.25; }
 
   [[nodiscard]] std::vector<TrainingView> views() const { return training_views(capture_, frame_); }
+  [[nodiscard]] std::unique_ptr<LuminanceEngine> make_luminance() const {
+    auto engine = engines_->make_luminance(options());
+    engine->set_views(views());
+    return engine;
+  }
   [[nodiscard]] std::vector<Ray> rays() const {
     std::vector<Ray> rays;
     for (const TrainingView& view : views()) {
@@ -193,9 +197,9 @@ class PositionalField : public testing::Test {
 
 TEST_F(PositionalField, Learns) {
   for (View& view : capture_.views) std::ranges::fill(view.image.u8, std::uint8_t(200));  // one grey wall all around
-  const auto engine = engines_->make_luminance(options());
+  const auto engine = make_luminance();
   std::vector<double> losses;
-  for (int i = 0; i < 60; ++i) losses.push_back(engine->step(views(), 2e-3f).loss);
+  for (int i = 0; i < 60; ++i) losses.push_back(engine->step(2e-3f).loss);
   const double first = std::accumulate(losses.begin(), losses.begin() + 6, 0.0);
   const double last = std::accumulate(losses.end() - 6, losses.end(), 0.0);
   EXPECT_LT(last, 0.3 * first);
@@ -206,11 +210,11 @@ TEST_F(PositionalField, Learns) {
 }
 
 TEST_F(PositionalField, ASnapshotContinuesAsIfNothingHadHappened) {
-  const auto whole = engines_->make_luminance(options());
-  for (int i = 0; i < 6; ++i) (void)whole->step(views(), 1e-3f);
+  const auto whole = make_luminance();
+  for (int i = 0; i < 6; ++i) (void)whole->step(1e-3f);
 
-  const auto first = engines_->make_luminance(options()), second = engines_->make_luminance(options());
-  for (int i = 0; i < 3; ++i) (void)first->step(views(), 1e-3f);
+  const auto first = make_luminance(), second = make_luminance();
+  for (int i = 0; i < 3; ++i) (void)first->step(1e-3f);
   const std::vector<StatePiece> from = first->state(), to = second->state();
   ASSERT_EQ(from.size(), to.size());
   for (std::size_t i = 0; i < from.size(); ++i) {
@@ -220,14 +224,14 @@ TEST_F(PositionalField, ASnapshotContinuesAsIfNothingHadHappened) {
   }
   second->state_loaded();
   EXPECT_EQ(second->step_count(), 3);
-  for (int i = 0; i < 3; ++i) (void)second->step(views(), 1e-3f);
+  for (int i = 0; i < 3; ++i) (void)second->step(1e-3f);
   const auto a = looked_at(*whole), b = looked_at(*second);
   for (std::size_t r = 0; r < a.size(); ++r) EXPECT_NEAR(a[r].luminance, b[r].luminance, 1e-6);
 }
 
 TEST_F(PositionalField, TracesAreWhatRenderingSums) {
-  const auto engine = engines_->make_luminance(options());
-  for (int i = 0; i < 5; ++i) (void)engine->step(views(), 1e-3f);
+  const auto engine = make_luminance();
+  for (int i = 0; i < 5; ++i) (void)engine->step(1e-3f);
   const auto seen = looked_at(*engine);
   std::vector<WeightedSample> samples;
   std::vector<std::size_t> offsets;
@@ -319,8 +323,8 @@ TEST_F(PositionalField, RegressionIsSmoothL1OfTheMean) {
 }
 
 TEST_F(PositionalField, LearnsColoursAndLeavesTheEncodingAlone) {
-  const auto luminance = engines_->make_luminance(options());
-  for (int i = 0; i < 5; ++i) (void)luminance->step(views(), 1e-3f);
+  const auto luminance = make_luminance();
+  for (int i = 0; i < 5; ++i) (void)luminance->step(1e-3f);
   const auto before = looked_at(*luminance);
   const auto chroma = engines_->make_color_bins({}, 3);
   const std::vector<Ab> wanted = {{30, -20}, {-10, 40}};

@@ -7,11 +7,10 @@
 #include "src/base/parallel.h"
 #include "src/base/rng.h"
 #include "src/engine/color_engines.h"
-#include "src/engine/cuda/luminance_engine_cuda.h"
 #include "src/train/view_cache.h"
 #include "tests/cuda/check.h"
 #include "tests/cuda/packed_capture.h"
-#include "tests/cuda/random_pixels.h"
+#include "tests/support/random_pixels.h"
 
 namespace cnerf::test {
 namespace {
@@ -96,18 +95,19 @@ int bench_stage2(const Arguments& arguments) {
   const PackedCapture packed = read_packed(arguments.text("capture", "."));
   const std::vector<TrainingView> views = training_views(packed.capture, packed.frame);
   const LuminanceEngineOptions options = engine_options(arguments, packed.frame.cascades);
-  LuminanceEngineCuda luminance(options);
+  const auto luminance = make_cuda_luminance_engine(options);
+  luminance->set_views(views);
   const int steps = int(arguments.number("steps", 3000));
   for (int i = 0; i < steps; ++i) {
-    luminance.step(views, float(1e-2 * std::pow(0.05, std::max(0.0, 2.0 * i / steps - 1))));
+    luminance->step(float(1e-2 * std::pow(0.05, std::max(0.0, 2.0 * i / steps - 1))));
   }
-  luminance.finish();
+  wait_for(*luminance);
 
   std::vector<CachedView> cached;
   const int side = int(arguments.number("working_resolution", 384));
   const double caching = milliseconds([&] {
     for (const TrainingView& view : views) {
-      cached.push_back(cache_view(luminance, options.march, view.camera, side, arguments.number("share", 0.99)));
+      cached.push_back(cache_view(*luminance, options.march, view.camera, side, arguments.number("share", 0.99)));
     }
   });
   std::size_t pixels = 0, samples = 0;

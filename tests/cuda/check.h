@@ -1,5 +1,5 @@
 #pragma once
-/// The parts of cnerf-cuda-check: one executable that needs nothing but a driver.
+/// The parts of cnerf-cuda-check: one executable of benchmarks that needs nothing but a driver.
 
 #include <map>
 #include <string>
@@ -35,13 +35,10 @@ class Arguments {
 /// Engine options from arguments: levels, log2_rows, coarsest, finest, samples, steps_per_box, cone_angle, seed.
 [[nodiscard]] LuminanceEngineOptions engine_options(const Arguments& arguments, int cascades);
 
-/// Compares every kernel with the CPU; returns the number of failures.
-int self_test(const Arguments& arguments);
-/// Its part about stage 2.
-void check_chroma(bool quick);
-/// Its part about bakes.
-void check_sights();
-/// Times the kernels on a packed capture after some training.
+/// Waits until every step is done.
+void wait_for(const LuminanceEngine& engine);
+
+/// Times steps and pictures on a packed capture after some training.
 int bench(const Arguments& arguments);
 /// Times stage 2 on a packed capture: caching its views, steps of both engines on either device, colours of pixels.
 int bench_stage2(const Arguments& arguments);

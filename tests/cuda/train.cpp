@@ -3,8 +3,9 @@
 #include <cmath>
 #include <cstdio>
 
+#include "src/base/cuda/device_memory.h"
+
 #include "src/color/colorspace_math.h"
-#include "src/engine/cuda/luminance_engine_cuda.h"
 #include "tests/cuda/check.h"
 #include "tests/cuda/packed_capture.h"
 
@@ -17,16 +18,22 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Mean dB of the held-out views (decision 1 of docs/decisions.md).
-double held_out_psnr(const PackedCapture& packed, const LuminanceEngineCuda& engine, const MarchSettings& march,
-                     double min_transmittance, double thickness = 0) {
+std::size_t free_bytes() {
+  std::size_t free = 0, total = 0;
+  CNERF_CUDA(cudaMemGetInfo(&free, &total));
+  return free;
+}
+
+/// Mean dB of the held-out views.
+double held_out_psnr(const PackedCapture& packed, const LuminanceEngine& engine, const MarchSettings& march,
+                     double min_transmittance) {
   double total = 0;
   int views = 0;
   for (const View& view : packed.capture.views) {
     if (!view.held_out) continue;
     const UnitCamera camera(view.intrinsics, view.world_from_camera, packed.frame);
     std::vector<RayResult> results(view.image.pixel_count());
-    engine.render_view(camera, march, float(min_transmittance), results, float(thickness));
+    engine.render_view(camera, march, {float(min_transmittance)}, results);
     double squared = 0;
     for (std::size_t p = 0; p < results.size(); ++p) {
       const float seen = srgb_from_linear(std::clamp(results[p].luminance, 0.0f, 1.0f));
@@ -40,7 +47,7 @@ double held_out_psnr(const PackedCapture& packed, const LuminanceEngineCuda& eng
 }
 
 /// @param near  unit space; what is nearer to a camera is empty as well
-void exclude(const PackedCapture& packed, LuminanceEngineCuda& engine, const OccupancyOptions& options, double near) {
+void exclude(const PackedCapture& packed, LuminanceEngine& engine, const OccupancyOptions& options, double near) {
   const OccupancyLayout layout(options.resolution, packed.frame.cascades);
   const std::vector<TrainingView> views = training_views(packed.capture, packed.frame);
   engine.exclude([&](Vec3f centre, float radius) {
@@ -68,7 +75,10 @@ int train(const Arguments& arguments) {
   for (int seed = 1; seed <= int(arguments.number("seeds", 1)); ++seed) {
     LuminanceEngineOptions options = engine_options(arguments, packed.frame.cascades);
     options.seed = std::uint64_t(seed);
-    LuminanceEngineCuda engine(options);
+    const std::size_t free_before = free_bytes();
+    const auto made = make_cuda_luminance_engine(options);
+    LuminanceEngine& engine = *made;
+    engine.set_views(views);
     exclude(packed, engine, options.occupancy, arguments.number("near", 0));
     double elapsed = 0;
     std::size_t next = 0;
@@ -80,12 +90,12 @@ int train(const Arguments& arguments) {
       while (elapsed + seconds_since(start) < report_at[next]) {
         const double fraction = (elapsed + seconds_since(start)) / seconds;
         const double decay = std::clamp((fraction - hold) / (1 - hold), 0.0, 1.0);
-        report = engine.step(views, float(rate * std::pow(final_rate / rate, decay)));
+        report = engine.step(float(rate * std::pow(final_rate / rate, decay)));
         trained += double(report.trained_samples);
         marched += double(report.marched_samples);
         rays += double(report.rays);
       }
-      engine.finish();
+      wait_for(engine);
       elapsed += seconds_since(start);
       std::printf("  %.0f s %ld steps %.2f dB", report_at[next], engine.step_count(),
                   held_out_psnr(packed, engine, options.march, arguments.number("min_transmittance", 1e-3)));
@@ -94,7 +104,7 @@ int train(const Arguments& arguments) {
     }
     std::printf("  | %.0f steps/s, %.0f rays a step, %.1f samples a ray, %.2f marched, %.0f MiB, occupied %.4f\n",
                 double(engine.step_count()) / elapsed, rays / double(engine.step_count()), trained / rays,
-                marched / trained, double(engine.device_bytes()) / (1 << 20), engine.occupancy().occupied_share());
+                marched / trained, double(free_before - free_bytes()) / (1 << 20), engine.occupancy().occupied_share());
   }
   return 0;
 }
@@ -103,54 +113,42 @@ int bench(const Arguments& arguments) {
   const PackedCapture packed = read_packed(arguments.text("capture", "."));
   const std::vector<TrainingView> views = training_views(packed.capture, packed.frame);
   const LuminanceEngineOptions options = engine_options(arguments, packed.frame.cascades);
-  const Clock::time_point made = Clock::now();
-  LuminanceEngineCuda engine(options);
+  const std::size_t free_before = free_bytes();
+  const Clock::time_point begin = Clock::now();
+  const auto made = make_cuda_luminance_engine(options);
+  LuminanceEngine& engine = *made;
   exclude(packed, engine, options.occupancy, arguments.number("near", 0));
-  std::printf("set up in %.2f s, %.0f MiB without images\n", seconds_since(made),
-              double(engine.device_bytes()) / (1 << 20));
+  engine.set_views(views);
+  std::printf("set up in %.2f s\n", seconds_since(begin));
   const int steps = int(arguments.number("steps", 1000));
-  for (int i = 0; i < steps; ++i) engine.step(views, float(1e-2 * std::pow(0.05, std::max(0.0, 2.0 * i / steps - 1))));
-  const StepReport report = engine.finish();
+  for (int i = 0; i < steps; ++i) engine.step(float(1e-2 * std::pow(0.05, std::max(0.0, 2.0 * i / steps - 1))));
+  wait_for(engine);
   const Clock::time_point start = Clock::now();
   constexpr int kTimed = 320;
-  for (int i = 0; i < kTimed; ++i) engine.step(views, 5e-4f);
-  engine.finish();
+  StepReport report;
+  for (int i = 0; i < kTimed; ++i) report = engine.step(5e-4f);
+  wait_for(engine);
   const double per_step = 1e3 * seconds_since(start) / kTimed;
   std::printf("after %d steps: %zu rays, %zu marched, %zu trained, loss %.5f, occupied %.4f, %.0f MiB\n", steps,
               report.rays, report.marched_samples, report.trained_samples, report.loss,
-              engine.occupancy().occupied_share(), double(engine.device_bytes()) / (1 << 20));
+              engine.occupancy().occupied_share(), double(free_before - free_bytes()) / (1 << 20));
   std::printf("step %.3f ms = %.0f steps/s\n", per_step, 1e3 / per_step);
-  const CudaStepTimes t = engine.time_parts(views, 50);
-  std::printf(
-      "ms a step: draw %.4f  trace %.4f  nets backward %.4f  nets update %.4f  grid backward %.4f  table update %.4f  "
-      "occupancy (every 16) %.4f\n",
-      t.draw, t.trace, t.nets_backward, t.nets_update, t.grid_backward, t.table_update, t.occupancy);
-
-  for (const double thickness : {0.0, 0.03}) {
-    for (const double min_transmittance : {1e-4, 1e-3, 1e-2, 3e-2}) {
-      const double psnr = held_out_psnr(packed, engine, options.march, min_transmittance, thickness);
-      const View& view = packed.capture.views.front();
-      const UnitCamera camera(view.intrinsics, view.world_from_camera, packed.frame);
-      const Clock::time_point begin = Clock::now();
-      for (int i = 0; i < 5; ++i) {
-        engine.render_view(camera, options.march, float(min_transmittance), {}, float(thickness));
-      }
-      std::printf("render cells of thickness %.2f to transmittance %.0e: %.3f dB, %.2f ms\n", thickness,
-                  min_transmittance, psnr, 1e3 * seconds_since(begin) / 5);
-    }
+  for (const double min_transmittance : {1e-4, 1e-3, 1e-2, 3e-2}) {
+    std::printf("rendered to transmittance %.0e: %.3f dB\n", min_transmittance,
+                held_out_psnr(packed, engine, options.march, min_transmittance));
   }
   const View& view = packed.capture.views.front();
   const UnitCamera camera(view.intrinsics, view.world_from_camera, packed.frame);
   std::vector<RayResult> results(view.image.pixel_count());
-  for (const double min_transmittance : {1e-4, 1e-3, 1e-2}) {
+  for (const double min_transmittance : {1e-4, 1e-3, 1e-2, 3e-2}) {
     double times[2] = {1e9, 1e9};
     for (int i = 0; i < 10; ++i) {
-      Clock::time_point begin = Clock::now();
-      engine.render_view(camera, options.march, float(min_transmittance), {});
-      times[0] = std::min(times[0], 1e3 * seconds_since(begin));
-      begin = Clock::now();
-      engine.render_view(camera, options.march, float(min_transmittance), results);
-      times[1] = std::min(times[1], 1e3 * seconds_since(begin));
+      Clock::time_point before = Clock::now();
+      engine.render_view(camera, options.march, {float(min_transmittance)}, {});
+      times[0] = std::min(times[0], 1e3 * seconds_since(before));
+      before = Clock::now();
+      engine.render_view(camera, options.march, {float(min_transmittance)}, results);
+      times[1] = std::min(times[1], 1e3 * seconds_since(before));
     }
     std::printf("render %dx%d to transmittance %.0e: %.2f ms on the GPU, %.2f ms with the download\n", view.image.width,
                 view.image.height, min_transmittance, times[0], times[1]);

@@ -10,8 +10,7 @@
 #include "src/base/rng.h"
 #include "src/color/colorspace_math.h"
 #include "src/engine/color_engines.h"
-#include "src/engine/cpu/mlp.h"
-#include "src/optim/adam.h"
+#include "tests/support/engine_state.h"
 
 namespace cnerf {
 namespace {
@@ -84,30 +83,19 @@ TEST(ColorBinEngine, LearnsTwoColours) {
   EXPECT_EQ(decode_arg_max(std::span(logits).last(kAbBinCount)).a, -30);
 }
 
-/// The engine's parameters and, after a step from zero moments, their gradient: a tenth of it is in the first moments.
+/// The engine's parameters and, after a step from zero moments, their gradient.
 struct Parameters {
   std::span<float> values;
   std::vector<float> gradient;
 };
 std::vector<Parameters> parameters_of(ColorBinEngine& engine) {
-  const auto floats = [](const StatePiece& piece) {
-    return std::span(reinterpret_cast<float*>(piece.bytes.data()), piece.bytes.size() / sizeof(float));
-  };
   const std::vector<StatePiece> state = engine.state();
-  const auto piece = [&](const std::string& name) {
-    return floats(*std::ranges::find(state, name, &StatePiece::name));
-  };
   std::vector<Parameters> parameters;
-  for (const StatePiece& moments : state) {
-    const bool is_grid = moments.name.ends_with("grid.moments");  // [rows, 8], the first moments in front
-    const auto dot = moments.name.rfind('.');
-    if (!is_grid && !moments.name.ends_with("first_moments")) continue;
-    Parameters found{piece(moments.name.substr(0, dot) + (is_grid ? ".table" : ".weights")), {}};
-    const std::span<float> values = floats(moments);
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (!is_grid || i % 8 < 4) found.gradient.push_back(values[i] / (1 - kAdamBeta1));
-    }
-    parameters.push_back(std::move(found));
+  parameters.push_back(
+      {test::floats_of(state, "features.grid.table"), test::gradient_in(state, "features.grid.moments")});
+  for (const char* net : {"features.net", "head"}) {
+    parameters.push_back({test::floats_of(state, std::string(net) + ".weights"),
+                          test::gradient_in(state, std::string(net) + ".first_moments")});
   }
   return parameters;
 }
@@ -117,9 +105,7 @@ TEST(ColorBinEngine, GradientIsTheLossesDerivativeAndThatOfWhatIsAdded) {
   for (const ChromaLossWeights more : {ChromaLossWeights{}, {.spread = 30}, {.regression = 1}, {3, 0.1f}}) {
     const auto engine = make_cpu_color_bin_engine(small_grid(), 5);
     for (int i = 0; i < 20; ++i) engine->step(pixels, two_halves(48), {}, 1e-2f);
-    for (const StatePiece& piece : engine->state()) {
-      if (piece.name.find("moments") != std::string::npos) std::ranges::fill(piece.bytes, std::byte{0});
-    }
+    test::forget_moments(*engine);
     const auto loss = [&] {
       engine->state_loaded();
       return engine->step(pixels, two_halves(48), {}, more, 1e-12f);

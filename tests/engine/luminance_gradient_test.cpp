@@ -9,10 +9,13 @@
 #include "encoding/hash_grid_reference.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
-#include "src/engine/cpu/luminance_engine_cpu.h"
+#include "src/engine/luminance_engine.h"
+#include "src/field/luminance_activation.h"
 #include "src/field/mlp_reference.h"
+#include "src/field/nets.h"
 #include "src/render/composite_math.h"
 #include "src/render/distortion_math.h"
+#include "tests/support/engine_state.h"
 #include "tests/support/finite_difference.h"
 #include "tests/support/isa.h"
 #include "tests/support/toy_capture.h"
@@ -35,15 +38,16 @@ LuminanceEngineOptions small_engine() {
 /// The loss of the engine's next step, as a function of its parameters, in double.
 class LossInDouble {
  public:
-  LossInDouble(const LuminanceEngineCpu& engine, const std::vector<TrainingView>& views, std::size_t n_rays)
-      : levels_(engine.field().grid().levels()),
-        density_(engine.field().density_net().layout()),
-        luminance_(engine.field().luminance_net().layout()),
-        max_luminance_(engine.options().max_luminance),
-        distortion_weight_(engine.options().distortion_weight) {
+  LossInDouble(const LuminanceEngine& engine, const LuminanceEngineOptions& options,
+               const std::vector<TrainingView>& views, std::size_t n_rays)
+      : levels_(hash_grid_levels(options.grid)),
+        density_(density_net_layout(options.grid.levels)),
+        luminance_(luminance_net_layout()),
+        max_luminance_(options.max_luminance),
+        distortion_weight_(options.distortion_weight) {
     for (std::size_t r = 0; r < n_rays; ++r) {
-      rays_.push_back(engine.observe(views, r));
-      RayMarcher marcher(engine.occupancy(), engine.options().march, rays_.back().ray, rays_.back().jitter);
+      rays_.push_back(observe_ray(views, options.sampling(), options.seed, std::uint64_t(engine.step_count()), r));
+      RayMarcher marcher(engine.occupancy(), options.march, rays_.back().ray, rays_.back().jitter);
       samples_.emplace_back();
       for (RaySample sample; marcher.next(sample);) samples_.back().push_back(sample);
     }
@@ -122,24 +126,23 @@ TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
   const std::vector<TrainingView> views = training_views(capture, frame);
   for (const IsaLevel isa : test::available_isas()) {
     const test::ScopedIsa scope(isa);
-    LuminanceEngineCpu engine(options);
-    for (int i = 0; i < 12; ++i) engine.step(views, 1e-2f);  // away from the symmetric start
-    const LuminanceEngineCpu::Gradients analytic = engine.gradients(views);
+    const auto engine = make_cpu_luminance_engine(options);
+    engine->set_views(views);
+    for (int i = 0; i < 12; ++i) engine->step(1e-2f);  // away from the symmetric start
+    const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);
     ASSERT_GT(analytic.report.trained_samples, 500u);
 
     std::vector<double> parameters;
-    for (const StatePiece& piece : engine.state()) {
-      if (piece.name != "grid.table" && piece.name != "density_net.weights" && piece.name != "luminance_net.weights") {
-        continue;
-      }
-      const auto* values = reinterpret_cast<const float*>(piece.bytes.data());
-      parameters.insert(parameters.end(), values, values + piece.bytes.size() / sizeof(float));
+    const std::vector<StatePiece> state = engine->state();
+    for (const char* piece : {"grid.table", "density_net.weights", "luminance_net.weights"}) {
+      const std::span<const float> values = test::floats_of(state, piece);
+      parameters.insert(parameters.end(), values.begin(), values.end());
     }
     std::vector<double> gradient(analytic.table.begin(), analytic.table.end());
     gradient.insert(gradient.end(), analytic.weights.begin(), analytic.weights.end());
     ASSERT_EQ(gradient.size(), parameters.size());
 
-    const LossInDouble loss(engine, views, analytic.report.rays);
+    const LossInDouble loss(*engine, options, views, analytic.report.rays);
     // The engine drops samples behind transmittance 1e-4: their part of the loss is below its square root.
     EXPECT_NEAR(loss(parameters), analytic.report.loss, 1e-4 * analytic.report.loss + 1e-6);
 
@@ -168,9 +171,10 @@ TEST(LuminanceEngine, StepsAreBitEqualForAnyNumberOfThreads) {
   std::vector<std::vector<std::byte>> tables;
   for (const int threads : {1, 2, 4}) {
     set_thread_count(threads);
-    LuminanceEngineCpu engine(small_engine());
-    for (int i = 0; i < 40; ++i) engine.step(views, 1e-2f);
-    const StatePiece table = engine.state().front();
+    const auto engine = make_cpu_luminance_engine(small_engine());
+    engine->set_views(views);
+    for (int i = 0; i < 40; ++i) engine->step(1e-2f);
+    const StatePiece table = engine->state().front();
     tables.emplace_back(table.bytes.begin(), table.bytes.end());
   }
   set_thread_count(0);
@@ -186,22 +190,25 @@ TEST(LuminanceEngine, LearnsAndRendersWhatItLearned) {
   LuminanceEngineOptions options = small_engine();
   options.march = march_settings(1, 64, 0);
   options.samples_per_step = 8192;
-  LuminanceEngineCpu engine(options);
-  const double first = engine.step(views, 1e-2f).loss;
+  const auto engine = make_cpu_luminance_engine(options);
+  engine->set_views(views);
+  const double first = engine->step(1e-2f).loss;
   double last = first;
-  for (int i = 0; i < 150; ++i) last = engine.step(views, 1e-2f).loss;
+  for (int i = 0; i < 150; ++i) last = engine->step(1e-2f).loss;
   EXPECT_LT(last, 0.3 * first);
 
   std::vector<Ray> rays;
   for (int i = 0; i < 32; ++i) rays.push_back(views[0].camera.ray({i + 0.5, 16.5}));
-  std::vector<RayResult> results(rays.size());
-  engine.render(rays, options.march, {}, results);
+  std::vector<RayResult> results(rays.size()), of_view(32 * 32);
+  engine->render_view(views[0].camera, options.march, {}, of_view);
+  engine->render(rays, options.march, {}, results);
   EXPECT_LT(results.front().opacity, 0.5f);  // transparent corner
   EXPECT_GT(results[16].opacity, 0.5f);      // the disc
+  EXPECT_EQ(of_view[16 * 32 + 16].luminance, results[16].luminance);
 
   std::vector<WeightedSample> samples;
   std::vector<std::size_t> offsets;
-  engine.trace(rays, options.march, {}, samples, offsets);
+  engine->trace(rays, options.march, {}, samples, offsets);
   ASSERT_EQ(offsets.size(), rays.size() + 1);
   for (std::size_t r = 0; r < rays.size(); ++r) {
     float luminance = 0, opacity = 0;
@@ -219,7 +226,7 @@ TEST(LuminanceEngine, LearnsAndRendersWhatItLearned) {
   // Shading only what weighs something saves samples, keeps each ray's opacity and hardly changes its light.
   std::vector<WeightedSample> heavy;
   std::vector<std::size_t> heavy_offsets;
-  engine.trace(rays, options.march, {1e-3f, 0.98f}, heavy, heavy_offsets);
+  engine->trace(rays, options.march, {1e-3f, 0.98f}, heavy, heavy_offsets);
   EXPECT_LT(heavy.size(), samples.size());
   for (std::size_t r = 0; r < rays.size(); ++r) {
     float luminance = 0, opacity = 0;

@@ -5,10 +5,12 @@
 
 #include <cmath>
 
-#include "encoding/torch/hash_grid.h"
-#include "src/base/error.h"
-#include "src/engine/cpu/luminance_engine_cpu.h"
+#include "encoding/cpu/hash_grid_kernels.h"
+#include "src/engine/luminance_engine.h"
+#include "src/field/nets.h"
+#include "tests/support/engine_state.h"
 #include "tests/support/finite_difference.h"
+#include "tests/support/grouped.h"
 #include "tests/support/torch_oracle.h"
 #include "tests/support/toy_capture.h"
 
@@ -19,32 +21,37 @@ HashGridOptions small_grid() {
   return {.levels = 4, .log2_rows = 9, .coarsest_resolution = 3, .finest_resolution = 40};
 }
 
-TEST(TorchOracle, HashGridModuleForwardAndBackward) {
+TEST(TorchOracle, HashGridForwardAndBackward) {
   torch::manual_seed(3);
-  HashGrid grid(small_grid());
-  {
-    const torch::NoGradGuard guard;
-    grid->table.uniform_(-1, 1);
+  const std::vector<GridLevel> levels = hash_grid_levels(small_grid());
+  const int channels = 4 * int(levels.size());
+  const std::int64_t n = 1000;
+  const torch::Tensor table = torch::empty({std::int64_t(total_rows(levels)), 4}).uniform_(-1, 1);
+  const torch::Tensor positions = torch::rand({n, 3}), upstream = torch::randn({n, channels});
+  const auto values_of = [](const torch::Tensor& tensor) {
+    return std::vector<float>(tensor.data_ptr<float>(), tensor.data_ptr<float>() + tensor.numel());
+  };
+  const AlignedVector<float> grouped = test::to_groups(values_of(positions), 3);
+  const AlignedVector<float> d_encoded = test::to_groups(values_of(upstream), channels, 0.0f);
+  const std::size_t groups = groups_of(std::size_t(n));
+  AlignedVector<float> encoded(d_encoded.size()), d_table(std::size_t(table.numel()), 0.0f);
+  const std::vector<float> plain_table = values_of(table);
+  const AlignedVector<float> aligned_table(plain_table.begin(), plain_table.end());
+  const HashGridKernels& kernels = hash_grid_kernels();
+  kernels.encode(levels.data(), levels.size(), aligned_table.data(), grouped.data(), groups, encoded.data(), channels);
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    kernels.scatter_level(levels[l], grouped.data(), d_encoded.data(), groups, channels, 4 * int(l),
+                          d_table.data() + 4 * std::size_t(levels[l].first_row));
   }
-  const torch::Tensor positions = torch::rand({1000, 3});
-  const torch::Tensor upstream = torch::randn({1000, 16});
-  const torch::Tensor encoded = grid->forward(positions);
-  (encoded * upstream).sum().backward();
 
-  const torch::Tensor table = grid->table.detach().to(torch::kFloat64).requires_grad_(true);
-  const torch::Tensor expected = test::encode_by_index_select(grid->levels(), table, positions.to(torch::kFloat64));
+  const torch::Tensor leaf = table.to(torch::kFloat64).requires_grad_(true);
+  const torch::Tensor expected = test::encode_by_index_select(levels, leaf, positions.to(torch::kFloat64));
   (expected * upstream.to(torch::kFloat64)).sum().backward();
-  EXPECT_LT((encoded - expected).abs().max().item<double>(), 1e-4);  // float positions at 40 cells: 40 * 2^-24 * 8
-  EXPECT_LT(((grid->table.grad() - table.grad()).norm() / table.grad().norm()).item<double>(), 1e-4);
-  EXPECT_GT(table.grad().norm().item<double>(), 1.0);
-}
-
-TEST(TorchOracle, HashGridModuleRefusesWhatItCannotTake) {
-  HashGrid grid(small_grid());
-  EXPECT_THROW(grid->forward(torch::rand({5, 2})), ContractError);
-  EXPECT_THROW(grid->forward(torch::rand({5, 3}, torch::kFloat64)), ContractError);
-  EXPECT_THROW(grid->forward(torch::rand({5, 3}) + 1), ContractError);
-  EXPECT_EQ(grid->forward(torch::rand({0, 3})).size(0), 0);
+  const torch::Tensor found = torch::tensor(test::from_groups(encoded, channels, std::size_t(n))).view({n, channels});
+  const torch::Tensor gradient = torch::tensor(std::vector<float>(d_table.begin(), d_table.end())).view({-1, 4});
+  EXPECT_LT((found - expected).abs().max().item<double>(), 1e-4);  // float positions at 40 cells: 40 * 2^-24 * 8
+  EXPECT_LT(((gradient - leaf.grad()).norm() / leaf.grad().norm()).item<double>(), 1e-4);
+  EXPECT_GT(leaf.grad().norm().item<double>(), 1.0);
 }
 
 TEST(TorchOracle, GradientOfAWholeStep) {
@@ -57,26 +64,29 @@ TEST(TorchOracle, GradientOfAWholeStep) {
   options.occupancy.resolution = 16;
   options.march = march_settings(1, 24, 0);
   options.samples_per_step = 1024;
-  LuminanceEngineCpu engine(options);
-  for (int i = 0; i < 10; ++i) engine.step(views, 1e-2f);
-  const LuminanceEngineCpu::Gradients analytic = engine.gradients(views);
+  const auto engine = make_cpu_luminance_engine(options);
+  engine->set_views(views);
+  for (int i = 0; i < 10; ++i) engine->step(1e-2f);
+  const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);
 
   const auto f64 = torch::TensorOptions().dtype(torch::kFloat64);
   const auto parameter = [&](const auto& values, std::int64_t rows) {
     const std::vector<double> copy(values.begin(), values.end());
     return torch::tensor(copy, f64).view({rows, -1}).requires_grad_(true);
   };
-  std::vector<StatePiece> state = engine.state();
-  const auto* table_values = reinterpret_cast<const float*>(state.front().bytes.data());
-  const std::vector<float> table_copy(table_values, table_values + state.front().bytes.size() / sizeof(float));
-  const torch::Tensor table = parameter(table_copy, std::int64_t(table_copy.size() / 4));
-  const std::vector<torch::Tensor> density_layers = test::layers_of(engine.field().density_net(), torch::kFloat64);
-  const std::vector<torch::Tensor> luminance_layers = test::layers_of(engine.field().luminance_net(), torch::kFloat64);
+  const std::vector<StatePiece> state = engine->state();
+  const std::vector<GridLevel> levels = hash_grid_levels(options.grid);
+  const torch::Tensor table = parameter(test::floats_of(state, "grid.table"), std::int64_t(total_rows(levels)));
+  const std::vector<torch::Tensor> density_layers = test::layers_of(
+      density_net_layout(options.grid.levels), test::floats_of(state, "density_net.weights"), torch::kFloat64);
+  const std::vector<torch::Tensor> luminance_layers =
+      test::layers_of(luminance_net_layout(), test::floats_of(state, "luminance_net.weights"), torch::kFloat64);
 
   torch::Tensor loss = torch::zeros({}, f64);
   for (std::size_t r = 0; r < analytic.report.rays; ++r) {
-    const auto ray = engine.observe(views, r);
-    RayMarcher marcher(engine.occupancy(), options.march, ray.ray, ray.jitter);
+    const ObservedRay ray =
+        observe_ray(views, options.sampling(), options.seed, std::uint64_t(engine->step_count()), r);
+    RayMarcher marcher(engine->occupancy(), options.march, ray.ray, ray.jitter);
     std::vector<double> positions, dt;
     for (RaySample sample; marcher.next(sample);) {
       const Vec3f p = ray.ray.at(sample.t);
@@ -86,8 +96,7 @@ TEST(TorchOracle, GradientOfAWholeStep) {
     torch::Tensor seen = torch::zeros({}, f64), end = torch::ones({}, f64);
     if (!dt.empty()) {
       const torch::Tensor x = torch::tensor(positions, f64).view({-1, 3});
-      const torch::Tensor features =
-          test::run_layers(density_layers, test::encode_by_index_select(engine.field().grid().levels(), table, x));
+      const torch::Tensor features = test::run_layers(density_layers, test::encode_by_index_select(levels, table, x));
       const torch::Tensor tau = features.select(1, 0).clamp(-15, 15).exp() * torch::tensor(dt, f64);
       const torch::Tensor direction = test::harmonics(ray.ray.direction.cast<double>()).expand({x.size(0), -1});
       const torch::Tensor raw = test::run_layers(luminance_layers, torch::cat({features, direction}, 1)).select(1, 0);
@@ -97,8 +106,10 @@ TEST(TorchOracle, GradientOfAWholeStep) {
       seen = ((before - behind) * y).sum();
       end = behind.select(0, -1);
     }
-    const torch::Tensor wanted = torch::full({}, ray.target.luminance + (1.0 - ray.target.coverage) * ray.target.background, f64);
-    loss = loss + ((test::lightness(seen + end * double(ray.target.background)) - test::lightness(wanted)) / 100).square();
+    const torch::Tensor wanted =
+        torch::full({}, ray.target.luminance + (1.0 - ray.target.coverage) * ray.target.background, f64);
+    loss =
+        loss + ((test::lightness(seen + end * double(ray.target.background)) - test::lightness(wanted)) / 100).square();
   }
   loss = loss / double(analytic.report.rays);
   loss.backward();

@@ -5,12 +5,13 @@
 #include <torch/torch.h>
 
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "encoding/hash_grid_levels.h"
 #include "encoding/spherical_harmonics_math.h"
 #include "src/base/vec3.h"
-#include "src/engine/cpu/mlp.h"
+#include "src/field/mlp_layout.h"
 
 namespace cnerf::test {
 
@@ -52,12 +53,13 @@ inline torch::Tensor encode_by_index_select(const std::vector<GridLevel>& levels
 }
 
 /// The net's layers as leaves that want gradients: [out, in] each.
-inline std::vector<torch::Tensor> layers_of(const MlpCpu& net, torch::Dtype dtype) {
+inline std::vector<torch::Tensor> layers_of(const MlpLayout& layout, std::span<const float> weights,
+                                            torch::Dtype dtype) {
   std::vector<torch::Tensor> layers;
-  for (int l = 0; l < net.layout().layers(); ++l) {
-    const std::vector<float> w(net.weights().begin() + long(net.layout().weight_offset(l)),
-                               net.weights().begin() + long(net.layout().weight_offset(l + 1)));
-    const std::int64_t outputs = net.layout().widths[std::size_t(l) + 1];
+  for (int l = 0; l < layout.layers(); ++l) {
+    const std::vector<float> w(weights.begin() + long(layout.weight_offset(l)),
+                               weights.begin() + long(layout.weight_offset(l + 1)));
+    const std::int64_t outputs = layout.widths[std::size_t(l) + 1];
     layers.push_back(torch::tensor(w).to(dtype).view({outputs, -1}).requires_grad_(true));
   }
   return layers;

@@ -214,8 +214,9 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
         trained_(joined(coarse_->parameters(), fine_->parameters())),
         occupancy_(options.occupancy, options.cascades) {}
 
-  StepReport step(const std::vector<TrainingView>& views, float learning_rate) override {
-    CNERF_CHECK(!views.empty(), "no training views");
+  void set_views(const std::vector<TrainingView>& views) override { views_ = views; }
+  StepReport step(float learning_rate) override {
+    CNERF_CHECK(!views_.empty(), "no training views");
     const FastProducts fast;
     const std::size_t n = rays_a_step();
     // The same pixels and backgrounds as the hash grid's engines draw.
@@ -224,7 +225,7 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
     parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
       for (std::size_t r = begin; r < end; ++r) {
         const ObservedRay observed =
-            observe_ray(views, options_.sampling(), options_.seed, std::uint64_t(counters_[0]), r);
+            observe_ray(views_, options_.sampling(), options_.seed, std::uint64_t(counters_[0]), r);
         rays[r] = observed.ray, backgrounds[r] = observed.target.background;
         targets[r] = observed.target.luminance, wanted_light[r] = observed.target.wanted();
       }
@@ -423,6 +424,7 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
   mutable LuminanceNet coarse_, fine_;  // modules know no const
   Trained trained_;
   std::vector<std::int64_t> counters_ = {0};  // steps
+  std::vector<TrainingView> views_;
   OccupancyGrid occupancy_;
 };
 

@@ -4,11 +4,10 @@
 #include <cmath>
 
 #include "src/base/check.h"
-#include "src/engine/chroma_state.h"
 #include "src/engine/color_engines.h"
-#include "src/engine/cpu/point_net.h"
 #include "src/engine/cpu/step_chunks.h"
-#include "src/engine/initial_state.h"
+#include "src/field/cpu/point_net.h"
+#include "src/field/nets.h"
 
 namespace cnerf {
 namespace {
@@ -78,7 +77,13 @@ class ColorBinEngineCpu final : public ColorBinEngine {
   }
 
   [[nodiscard]] long step_count() const override { return steps_.front(); }
-  [[nodiscard]] std::vector<StatePiece> state() override { return chroma_state(features_, head_, steps_); }
+  [[nodiscard]] std::vector<StatePiece> state() override {
+    std::vector<StatePiece> state;
+    features_.append_state("features", state);
+    head_.append_state("head", state);
+    state.push_back(state_piece("chroma_steps", steps_));
+    return state;
+  }
   void state_loaded() override {
     features_.state_loaded();
     head_.transpose_weights();

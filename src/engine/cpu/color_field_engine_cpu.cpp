@@ -4,9 +4,9 @@
 
 #include "src/base/check.h"
 #include "src/engine/color_engines.h"
-#include "src/engine/cpu/point_net.h"
 #include "src/engine/cpu/step_chunks.h"
-#include "src/engine/initial_state.h"
+#include "src/field/cpu/point_net.h"
+#include "src/field/nets.h"
 
 namespace cnerf {
 namespace {

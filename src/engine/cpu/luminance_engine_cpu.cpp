@@ -1,4 +1,6 @@
-#include "src/engine/cpu/luminance_engine_cpu.h"
+// The engine of stage 1 on the processor. Rays are worked on in blocks of 16, whose samples and activations stay in L2.
+
+#include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
 #include <array>
@@ -6,14 +8,18 @@
 
 #include "src/base/check.h"
 #include "src/base/parallel.h"
+#include "src/engine/cpu/step_chunks.h"
 #include "src/engine/heaviest_samples.h"
+#include "src/engine/luminance_engine.h"
 #include "src/engine/stage1_loss.h"
 #include "src/engine/stage1_schedule.h"
+#include "src/field/cpu/luminance_field.h"
 
 namespace cnerf {
 namespace {
 
-constexpr std::size_t kWaveSamples = 8;  // samples a ray adds to one wave of the density-first pass
+constexpr std::size_t kBlockRays = 16;
+constexpr std::size_t kWaveSamples = 8;  // that a ray adds to a wave, see `collect`
 constexpr std::size_t kMostSamplesPerRay = 1024;
 
 /// Positions must lie in [0, 1]; rounding may carry the last sample of a ray just outside.
@@ -28,14 +34,75 @@ void pad_positions(AlignedVector<float>& positions, std::size_t samples) {
     set_position(positions.data(), s, {0.5f, 0.5f, 0.5f});
 }
 
-}  // namespace
+class LuminanceEngineCpu final : public LuminanceEngine {
+ public:
+  explicit LuminanceEngineCpu(const LuminanceEngineOptions& options);
+
+  void set_views(const std::vector<TrainingView>& views) override { views_ = views; }
+  StepReport step(float learning_rate) override;
+  [[nodiscard]] long step_count() const override { return counters_.front(); }
+
+  void render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
+              std::span<RayResult> results) const override;
+  void trace(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
+             std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const override;
+  void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override;
+  void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
+                       std::span<float> luminance) const override;
+  [[nodiscard]] const OccupancyGrid& occupancy() const override { return occupancy_; }
+  void exclude(const std::function<bool(Vec3f, float)>& wanted) override { occupancy_.exclude(wanted); }
+  [[nodiscard]] std::vector<StatePiece> state() override;
+  void state_loaded() override;
+
+ private:
+  /// A step of a ray, and the weight that the density-first pass found.
+  struct MarchedSample {
+    float t = 0, dt = 0, weight = 0;
+  };
+  /// Samples of a block's rays that survive early termination, ray by ray.
+  struct Block {
+    std::vector<MarchedSample> samples;
+    std::vector<std::size_t> offsets;  // [rays + 1]
+    std::size_t marched = 0;
+    AlignedVector<float> positions;  // [G, 3, 16]
+    LuminanceWorkspace work;
+    // Scratch of the density-first pass.
+    std::vector<std::vector<MarchedSample>> of_ray;
+    AlignedVector<float> wave_positions, wave_sigma;
+  };
+
+  /// Marches rays together and keeps the samples in front of the point where a ray becomes opaque.
+  ///
+  /// How many samples a ray needs is only known once their densities are, and densities are computed 16 at a time. So
+  /// the block's rays advance in waves: each ray that still lets light through adds up to kWaveSamples to the wave, the
+  /// densities of the whole wave are computed at once, then each ray composites its part. What is hidden behind a
+  /// surface costs at most the rest of one wave.
+  void collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
+               float min_transmittance, Block& block) const;
+  /// `collect` from the middle of each step, and of what it keeps the heaviest samples.
+  void collect_for_picture(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
+                           Block& block) const;
+  void shade(std::span<const Ray> rays, Block& block) const;
+  /// Samples, loss and gradients of a block's rays.
+  void train_block(std::span<const ObservedRay> rays, float gradient_scale, Block& block, StepChunk& chunk) const;
+  /// Loss of one ray of a shaded block; sets the gradients of its samples.
+  void train_ray(const ObservedRay& ray, std::size_t index, float gradient_scale, Block& block, StepChunk& chunk) const;
+  [[nodiscard]] StepReport report() const;
+
+  LuminanceEngineOptions options_;
+  LuminanceFieldCpu field_;
+  OccupancyGrid occupancy_;
+  std::vector<TrainingView> views_;
+  std::vector<std::int64_t> counters_;  // steps done, rays of the next step
+  StepChunks chunks_;
+  mutable tbb::enumerable_thread_specific<Block> blocks_;
+};
 
 LuminanceEngineCpu::LuminanceEngineCpu(const LuminanceEngineOptions& options)
     : options_(options),
       field_(options.grid, 1.0f / std::ldexp(1.0f, 1 - options.cascades), options.max_luminance, options.seed),
       occupancy_(options.occupancy, options.cascades),
-      counters_{0, first_rays(options.samples_per_step)},
-      chunks_(kChunks) {}
+      counters_{0, first_rays(options.samples_per_step)} {}
 
 void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
                                  float min_transmittance, Block& block) const {
@@ -113,7 +180,7 @@ void LuminanceEngineCpu::collect_for_picture(std::span<const Ray> rays, const Ma
 void LuminanceEngineCpu::shade(std::span<const Ray> rays, Block& block) const {
   const std::size_t groups = groups_of(block.samples.size());
   ensure_size(block.positions, groups * 3 * kGroup);
-  block.work.resize(groups, field_.grid().channels());
+  block.work.resize(groups, field_.encoded_channels());
   for (std::size_t r = 0; r < rays.size(); ++r) {
     for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
       set_position(block.positions.data(), s, rays[r].at(block.samples[s].t));
@@ -128,9 +195,9 @@ void LuminanceEngineCpu::shade(std::span<const Ray> rays, Block& block) const {
 }
 
 void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gradient_scale, Block& block,
-                                     Chunk& chunk) const {
+                                     StepChunk& chunk) const {
   std::array<Ray, kBlockRays> plain_rays;
-  std::array<float, kBlockRays> jitter;
+  std::array<float, kBlockRays> jitter{};
   for (std::size_t r = 0; r < rays.size(); ++r) {
     plain_rays[r] = rays[r].ray;
     jitter[r] = rays[r].jitter;
@@ -139,76 +206,57 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
   collect(block_rays, jitter, options_.march, kTrainingTransmittance, block);
   shade(block_rays, block);
 
-  for (std::size_t r = 0; r < rays.size(); ++r) {
-    Compositor<float> ray;
-    Distortion<float> distortion;
-    for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
-      const MarchedSample& sample = block.samples[s];
-      const float alpha = alpha_of(field_.sigma(block.work, s), sample.dt);
-      const float weight = ray.add(alpha, field_.luminance(block.work, s));
-      if (options_.distortion_weight > 0) distortion.add(weight, {sample.t, sample.dt});
-    }
-    const SeenRay seen{ray.value, ray.transmittance};
-    const RayError error(seen, rays[r].target);
-    chunk.loss += ray_loss(error, distortion.value, options_.distortion_weight);
-    chunk.squared_error += squared_error(seen, rays[r].target);
-
-    const RayGradient gradient(error, distortion, options_.distortion_weight, gradient_scale);
-    float distortion_behind = gradient.distortion_of_all();
-    Compositor<float> again;
-    Distortion<float> before;
-    for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
-      const float dt = block.samples[s].dt, luminance = field_.luminance(block.work, s);
-      const float weight = again.add(alpha_of(field_.sigma(block.work, s), dt), luminance);
-      const LitSample sample{dt, luminance, weight, again.transmittance, again.value};
-      float d_sigma = gradient.by_density(sample);
-      if (options_.distortion_weight > 0) {
-        const LogInterval<float> at(block.samples[s].t, dt);
-        const float slope = gradient.distortion_by_weight(weight, at, before);
-        before.add(weight, at);
-        distortion_behind -= weight * slope;
-        d_sigma += gradient.by_density_of_distortion(sample, slope, distortion_behind);
-      }
-      field_.set_gradient(block.work, s, d_sigma, gradient.by_luminance(sample));
-    }
-  }
+  for (std::size_t r = 0; r < rays.size(); ++r) train_ray(rays[r], r, gradient_scale, block, chunk);
   for (std::size_t s = block.samples.size(); s < block.work.groups * kGroup; ++s) {
     field_.set_gradient(block.work, s, 0.0f, 0.0f);
   }
-
-  const std::size_t group_channels = std::size_t(field_.grid().channels()) * kGroup;
-  ensure_size(chunk.positions, (chunk.groups + block.work.groups) * 3 * kGroup);
-  ensure_size(chunk.d_encoded, (chunk.groups + block.work.groups) * group_channels);
-  std::copy_n(block.positions.begin(), block.work.groups * 3 * kGroup,
-              chunk.positions.begin() + std::ptrdiff_t(chunk.groups * 3 * kGroup));
-  field_.backward(block.work, chunk.d_encoded.data() + chunk.groups * group_channels, chunk.d_weights.data());
-  chunk.groups += block.work.groups;
+  float* d_encoded = chunk.append(block.positions, block.work.groups, field_.encoded_channels());
+  field_.backward(block.work, d_encoded, chunk.d_weights.data());
   chunk.marched += block.marched;
   chunk.trained += block.samples.size();
 }
 
-void LuminanceEngineCpu::accumulate(const std::vector<TrainingView>& views) {
-  CNERF_CHECK(!views.empty(), "no training views");
-  const auto rays = std::size_t(counters_[1]);
-  const std::size_t n_blocks = (rays + kBlockRays - 1) / kBlockRays;
-  parallel_tasks(kChunks, [&](std::size_t c) {
-    Chunk& chunk = chunks_[c];
-    chunk.groups = chunk.marched = chunk.trained = 0;
-    chunk.loss = chunk.squared_error = 0;
-    chunk.d_weights.assign(field_.weight_count(), 0.0f);
-    for (std::size_t b = c * n_blocks / kChunks; b < (c + 1) * n_blocks / kChunks; ++b) {
-      std::array<ObservedRay, kBlockRays> observed;
-      const std::size_t first = b * kBlockRays, last = std::min(rays, first + kBlockRays);
-      for (std::size_t r = first; r < last; ++r) observed[r - first] = observe(views, r);
-      train_block({observed.data(), last - first}, 1.0f / float(rays), blocks_.local(), chunk);
+void LuminanceEngineCpu::train_ray(const ObservedRay& ray, std::size_t index, float gradient_scale, Block& block,
+                                   StepChunk& chunk) const {
+  const std::size_t begin = block.offsets[index], end = block.offsets[index + 1];
+  const float distortion_weight = options_.distortion_weight;
+  Compositor<float> light;
+  Distortion<float> distortion;
+  for (std::size_t s = begin; s < end; ++s) {
+    const MarchedSample& sample = block.samples[s];
+    const float alpha = alpha_of(field_.sigma(block.work, s), sample.dt);
+    const float weight = light.add(alpha, field_.luminance(block.work, s));
+    if (distortion_weight > 0) distortion.add(weight, {sample.t, sample.dt});
+  }
+  const SeenRay seen{light.value, light.transmittance};
+  const RayError error(seen, ray.target);
+  chunk.loss += ray_loss(error, distortion.value, distortion_weight);
+  chunk.squared_error += squared_error(seen, ray.target);
+
+  const RayGradient gradient(error, distortion, distortion_weight, gradient_scale);
+  float distortion_behind = gradient.distortion_of_all();
+  light = {};
+  Distortion<float> before;
+  for (std::size_t s = begin; s < end; ++s) {
+    const float dt = block.samples[s].dt, luminance = field_.luminance(block.work, s);
+    const float weight = light.add(alpha_of(field_.sigma(block.work, s), dt), luminance);
+    const LitSample sample{dt, luminance, weight, light.transmittance, light.value};
+    float d_sigma = gradient.by_density(sample);
+    if (distortion_weight > 0) {
+      const LogInterval<float> at(block.samples[s].t, dt);
+      const float slope = gradient.distortion_by_weight(weight, at, before);
+      before.add(weight, at);
+      distortion_behind -= weight * slope;
+      d_sigma += gradient.by_density_of_distortion(sample, slope, distortion_behind);
     }
-  });
+    field_.set_gradient(block.work, s, d_sigma, gradient.by_luminance(sample));
+  }
 }
 
 StepReport LuminanceEngineCpu::report() const {
   StepReport report;
   report.rays = std::size_t(counters_[1]);
-  for (const Chunk& chunk : chunks_) {
+  for (const StepChunk& chunk : chunks_.all()) {
     report.loss += chunk.loss / double(report.rays);
     report.squared_error += chunk.squared_error / double(report.rays);
     report.marched_samples += chunk.marched;
@@ -217,39 +265,26 @@ StepReport LuminanceEngineCpu::report() const {
   return report;
 }
 
-StepReport LuminanceEngineCpu::step(const std::vector<TrainingView>& views, float learning_rate) {
+StepReport LuminanceEngineCpu::step(float learning_rate) {
+  CNERF_CHECK(!views_.empty(), "no training views");
+  const auto step = std::uint64_t(step_count());
   if (updates_occupancy(step_count())) {
     occupancy_.update(occupancy_update(step_count(), options_.seed),
                       [this](std::span<const Vec3f> points, std::span<float> sigma) { query_density(points, sigma); });
   }
-  accumulate(views);
+  const auto rays = std::size_t(counters_[1]);
+  chunks_.run(rays, kBlockRays, field_.weight_count(), [&](StepChunk& chunk, std::size_t begin, std::size_t end) {
+    std::array<ObservedRay, kBlockRays> observed;
+    for (std::size_t r = begin; r < end; ++r) {
+      observed[r - begin] = observe_ray(views_, options_.sampling(), options_.seed, step, r);
+    }
+    train_block({observed.data(), end - begin}, 1.0f / float(rays), blocks_.local(), chunk);
+  });
   const StepReport done = report();
-
-  std::vector<EncodedSamples> runs;
-  std::vector<float> d_weights(field_.weight_count(), 0.0f);
-  for (const Chunk& chunk : chunks_) {
-    runs.push_back({chunk.positions.data(), chunk.d_encoded.data(), chunk.groups});
-    for (std::size_t i = 0; i < d_weights.size(); ++i) d_weights[i] += chunk.d_weights[i];
-  }
   counters_[0] += 1;
-  field_.update(runs, d_weights, learning_rate, counters_[0]);
-
+  field_.update(chunks_.runs(), chunks_.d_weights(), learning_rate, counters_[0]);
   counters_[1] = next_rays(counters_[1], std::int64_t(done.trained_samples), options_.samples_per_step);
   return done;
-}
-
-LuminanceEngineCpu::Gradients LuminanceEngineCpu::gradients(const std::vector<TrainingView>& views) {
-  accumulate(views);
-  Gradients result;
-  result.report = report();
-  result.weights.assign(field_.weight_count(), 0.0f);
-  std::vector<EncodedSamples> runs;
-  for (const Chunk& chunk : chunks_) {
-    runs.push_back({chunk.positions.data(), chunk.d_encoded.data(), chunk.groups});
-    for (std::size_t i = 0; i < result.weights.size(); ++i) result.weights[i] += chunk.d_weights[i];
-  }
-  result.table = field_.grid().gradient(runs);
-  return result;
 }
 
 void LuminanceEngineCpu::render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
@@ -325,7 +360,7 @@ void LuminanceEngineCpu::query_luminance(std::span<const Vec3f> positions, std::
   for (std::size_t first = 0; first < positions.size(); first += kPiece) {
     const std::size_t count = std::min(kPiece, positions.size() - first);
     ensure_size(block.positions, groups_of(count) * 3 * kGroup);
-    block.work.resize(groups_of(count), field_.grid().channels());
+    block.work.resize(groups_of(count), field_.encoded_channels());
     for (std::size_t i = 0; i < groups_of(count) * kGroup; ++i) {
       const std::size_t from = first + std::min(i, count - 1);
       set_position(block.positions.data(), i, positions[from]);
@@ -348,6 +383,8 @@ void LuminanceEngineCpu::state_loaded() {
   field_.state_loaded();
   occupancy_.refresh_bits();
 }
+
+}  // namespace
 
 std::unique_ptr<LuminanceEngine> make_cpu_luminance_engine(const LuminanceEngineOptions& options) {
   return std::make_unique<LuminanceEngineCpu>(options);

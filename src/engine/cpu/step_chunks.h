@@ -9,20 +9,21 @@
 
 #include "src/base/aligned.h"
 #include "src/base/parallel.h"
-#include "src/engine/cpu/hash_grid.h"
+#include "src/field/cpu/hash_grid.h"
 
 namespace cnerf {
 
-/// What one chunk adds up: scattered gradients as runs, weight gradients and a loss.
+/// What one chunk adds up: gradients to be scattered as runs, weight gradients, losses and counts.
 struct StepChunk {
   AlignedVector<float> positions, d_encoded;
   std::size_t groups = 0;
   std::vector<float> d_weights;
-  double loss = 0;
+  double loss = 0, squared_error = 0;
+  std::size_t marched = 0, trained = 0;  ///< samples
 
   void clear(std::size_t weight_count) {
-    groups = 0;
-    loss = 0;
+    groups = marched = trained = 0;
+    loss = squared_error = 0;
     d_weights.assign(weight_count, 0.0f);
   }
   /// Appends a block's positions; returns where its gradient belongs.
@@ -53,10 +54,12 @@ class StepChunks {
       }
     });
   }
+  [[nodiscard]] const std::array<StepChunk, kCount>& all() const { return chunks_; }
   [[nodiscard]] std::vector<EncodedSamples> runs() const {
     std::vector<EncodedSamples> all;
-    for (const StepChunk& chunk : chunks_)
+    for (const StepChunk& chunk : chunks_) {
       all.push_back({chunk.positions.data(), chunk.d_encoded.data(), chunk.groups});
+    }
     return all;
   }
   [[nodiscard]] std::vector<float> d_weights() const {

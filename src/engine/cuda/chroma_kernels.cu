@@ -4,8 +4,8 @@
 
 #include "src/base/cuda/launch.h"
 #include "src/base/cuda/warp.cuh"
-#include "src/engine/initial_state.h"
 #include "src/field/cuda/net_backward.cuh"
+#include "src/field/nets.h"
 
 namespace cnerf {
 namespace {

@@ -1,13 +1,11 @@
 #include <mutex>
 
 #include "src/base/check.h"
-#include "src/engine/chroma_state.h"
 #include "src/engine/color_engines.h"
 #include "src/engine/cuda/chroma_stream.h"
 #include "src/engine/cuda/pixel_batch.h"
-#include "src/engine/cuda/point_net.h"
-#include "src/engine/initial_state.h"
-#include "src/engine/luminance_engine.h"
+#include "src/field/cuda/point_net.h"
+#include "src/field/nets.h"
 
 namespace cnerf {
 namespace {
@@ -72,7 +70,11 @@ class ColorBinEngineCuda final : public ColorBinEngine {
   [[nodiscard]] long step_count() const override { return steps_.front(); }
   [[nodiscard]] std::vector<StatePiece> state() override {
     const std::lock_guard lock(mutex_);
-    return chroma_state(features_, head_, steps_);
+    std::vector<StatePiece> state;
+    features_.append_state("features", state);
+    head_.append_state("head", state);
+    state.push_back(state_piece("chroma_steps", steps_));
+    return state;
   }
   void state_loaded() override {
     const std::lock_guard lock(mutex_);
@@ -124,7 +126,6 @@ class ColorBinEngineCuda final : public ColorBinEngine {
 }  // namespace
 
 std::unique_ptr<ColorBinEngine> make_cuda_color_bin_engine(const HashGridOptions& grid, std::uint64_t seed) {
-  if (!has_cuda_device()) throw DeviceError("no CUDA device: no driver, or no GPU it can use");
   return std::make_unique<ColorBinEngineCuda>(grid, seed);
 }
 

@@ -4,8 +4,7 @@
 #include "src/engine/color_engines.h"
 #include "src/engine/cuda/chroma_stream.h"
 #include "src/engine/cuda/pixel_batch.h"
-#include "src/engine/cuda/point_net.h"
-#include "src/engine/luminance_engine.h"
+#include "src/field/cuda/point_net.h"
 
 namespace cnerf {
 namespace {
@@ -103,7 +102,6 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
 }  // namespace
 
 std::unique_ptr<ColorFieldEngine> make_cuda_color_field_engine(const HashGridOptions& grid, std::uint64_t seed) {
-  if (!has_cuda_device()) throw DeviceError("no CUDA device: no driver, or no GPU it can use");
   return std::make_unique<ColorFieldEngineCuda>(grid, seed);
 }
 

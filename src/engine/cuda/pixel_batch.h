@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "src/base/cuda/device_memory.h"
+#include "src/engine/color_engines.h"
 #include "src/engine/cuda/chroma_kernels.h"
-#include "src/engine/pixel_samples.h"
 
 namespace cnerf {
 

@@ -1,4 +1,4 @@
-#include "src/engine/cuda/render_kernel.h"
+#include "src/engine/cuda/trace_kernel.h"
 
 #include "src/base/cuda/device_memory.h"
 #include "src/base/cuda/launch.h"

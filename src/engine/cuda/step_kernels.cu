@@ -80,13 +80,13 @@ __global__ void prepare(const Ray* rays, std::uint32_t count, RayRecord* records
   directions[ray] = encode_direction(record.ray.direction);
 }
 
-__global__ void of_camera(const __grid_constant__ UnitCamera camera, std::uint32_t first, std::uint32_t count,
-                          RayRecord* records, DirectionCode* directions) {
+__global__ void of_camera(const __grid_constant__ UnitCamera camera, std::uint32_t count, RayRecord* records,
+                          DirectionCode* directions) {
   const std::uint32_t ray = blockIdx.x * kThreads + threadIdx.x;
   if (ray >= count) return;
   const auto width = std::uint32_t(camera.intrinsics.width);
   RayRecord record;
-  record.ray = camera.ray({(first + ray) % width + 0.5, (first + ray) / width + 0.5});
+  record.ray = camera.ray({ray % width + 0.5, ray / width + 0.5});
   clip(record);
   records[ray] = record;
   directions[ray] = encode_direction(record.ray.direction);
@@ -118,9 +118,9 @@ void prepare_rays(const Ray* rays, std::uint32_t count, RayRecord* records, Dire
   CNERF_CUDA(cudaGetLastError());
 }
 
-void camera_rays(const UnitCamera& camera, std::uint32_t first, std::uint32_t count, RayRecord* records,
-                 DirectionCode* directions, cudaStream_t stream) {
-  of_camera<<<blocks_for(count), kThreads, 0, stream>>>(camera, first, count, records, directions);
+void camera_rays(const UnitCamera& camera, std::uint32_t count, RayRecord* records, DirectionCode* directions,
+                 cudaStream_t stream) {
+  of_camera<<<blocks_for(count), kThreads, 0, stream>>>(camera, count, records, directions);
   CNERF_CUDA(cudaGetLastError());
 }
 

@@ -5,14 +5,25 @@
 
 #include <cstdint>
 
-#include "src/engine/cuda/step_state.h"
 #include "src/engine/luminance_engine.h"
+#include "src/field/cuda/field_weights.h"
+#include "src/optim/adam.h"
 #include "src/render/cuda/ray_record.h"
 #include "src/render/observed_ray.h"
 
 namespace cnerf {
 
-struct DirectionCode;
+/// What a training step knows about itself, on the GPU.
+struct StepState {
+  std::int64_t step = 0;       ///< steps done
+  std::uint32_t rays = 0;      ///< of this step
+  std::uint32_t next_ray = 0;  ///< not yet taken by a warp
+  std::uint32_t samples = 0;   ///< allocated; may exceed the capacity
+  std::uint32_t dropped = 0;   ///< rays that found no room
+  double loss = 0, squared_error = 0;
+  unsigned long long marched = 0;
+  AdamStep adam;
+};
 
 /// A training view on the GPU; images keep the depth they came in.
 struct ViewRecord {
@@ -51,9 +62,9 @@ void draw_training_rays(const DrawJob& job, cudaStream_t stream);
 /// Plain rays, to be marched from the middle of the first step.
 void prepare_rays(const Ray* rays, std::uint32_t count, RayRecord* records, DirectionCode* directions,
                   cudaStream_t stream);
-/// The rays of an image's pixels from `first` on, row by row.
-void camera_rays(const UnitCamera& camera, std::uint32_t first, std::uint32_t count, RayRecord* records,
-                 DirectionCode* directions, cudaStream_t stream);
+/// The rays of an image's pixels, row by row.
+void camera_rays(const UnitCamera& camera, std::uint32_t count, RayRecord* records, DirectionCode* directions,
+                 cudaStream_t stream);
 
 /// Reports the step and chooses how many rays the next one takes.
 /// @param capacity  of the arrays of samples

@@ -214,26 +214,25 @@ struct QueryShared {
 
 template <int KT>
 __global__ void __launch_bounds__(kThreads, 2)
-    query(const __grid_constant__ GridLevels levels, const FieldView field, const Vec3f* positions,
-          const Vec3f* directions, std::uint32_t count, float* sigma, float* luminance) {
+    query(const __grid_constant__ GridLevels levels, const FieldView field, const QueryJob job) {
   extern __shared__ uint4 memory[];
   auto& shared = *reinterpret_cast<QueryShared<KT>*>(memory);
   shared.field.load(field.nets);
   const unsigned lane = threadIdx.x % 32;
   WarpField<KT>& warp = shared.field.warp[threadIdx.x / 32];
   const FieldNets<KT> nets(shared.field.weights, shared.field.last_layer);
-  for (std::uint32_t first = (blockIdx.x * kWarps + threadIdx.x / 32) * 32; first < count;
+  for (std::uint32_t first = (blockIdx.x * kWarps + threadIdx.x / 32) * 32; first < job.count;
        first += gridDim.x * kThreads) {
-    const std::uint32_t i = min(first + lane, count - 1);
-    warp.encode(levels, field.table, in_box(positions[i]), lane);
-    if (directions != nullptr) warp.set_direction(directions[i], lane);
+    const std::uint32_t i = min(first + lane, job.count - 1);
+    warp.encode(levels, field.table, in_box(job.positions[i]), lane);
+    if (job.directions != nullptr) warp.set_direction(job.directions[i], lane);
     __syncwarp();
     typename FieldNets<KT>::Geometry geometry;
     const float raw_density = nets.density(warp, geometry);
-    const float raw_luminance = directions != nullptr ? nets.luminance(warp, geometry, nullptr) : 0.0f;
-    if (first + lane < count) {
-      if (sigma != nullptr) sigma[i] = density_from_raw(raw_density, field.density_scale);
-      if (luminance != nullptr) luminance[i] = field.activation.value(raw_luminance);
+    const float raw_luminance = job.directions != nullptr ? nets.luminance(warp, geometry, nullptr) : 0.0f;
+    if (first + lane < job.count) {
+      job.answers[i] = job.directions != nullptr ? field.activation.value(raw_luminance)
+                                                 : density_from_raw(raw_density, field.density_scale);
     }
     __syncwarp();
   }
@@ -313,15 +312,13 @@ void trace_to_samples(const TraceJob& job, cudaStream_t stream) {
   launch_trace<Keep::kSamples>(job, stream);
 }
 
-void query_field(const FieldView& field, const Vec3f* positions, const Vec3f* directions, std::uint32_t count,
-                 float* sigma, float* luminance, cudaStream_t stream) {
+void query_field(const FieldView& field, const QueryJob& job, cudaStream_t stream) {
   with_channel_tiles(field.n_levels, [&](auto tiles) {
     constexpr int KT = decltype(tiles)::value;
     using Shared = QueryShared<KT>;
-    const unsigned blocks =
-        std::min(resident_blocks<query<KT>>(kThreads, sizeof(Shared)), (count + kThreads - 1) / kThreads);
-    query<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field, positions, directions, count,
-                                                            sigma, luminance);
+    const unsigned most = resident_blocks<query<KT>>(kThreads, sizeof(Shared));
+    const unsigned blocks = std::min(most, (job.count + kThreads - 1) / kThreads);
+    query<KT><<<blocks, kThreads, sizeof(Shared), stream>>>(levels_of(field), field, job);
     CNERF_CUDA(cudaGetLastError());
   });
 }

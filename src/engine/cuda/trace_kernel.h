@@ -1,33 +1,20 @@
 #pragma once
-/// The kernel that follows rays and keeps their samples: march, hash grid, nets and compositing, a warp a ray. Training
-/// and tracing differ in what they keep.
+/// The kernels that follow rays: march, hash grid, nets and compositing. Training and tracing take a warp per ray and
+/// differ in what they keep of its samples; rendering (render_kernel.cu) keeps nothing of what lies between.
 
 #include <cuda_runtime_api.h>
 
 #include <cstdint>
 
 #include "encoding/hash_grid_levels.h"
-#include "src/engine/cuda/step_state.h"
+#include "src/engine/cuda/step_kernels.h"
 #include "src/engine/luminance_engine.h"
 #include "src/field/cuda/field_weights.h"
-#include "src/field/luminance_activation.h"
 #include "src/render/cuda/ray_record.h"
 #include "src/render/march.h"
 #include "src/render/occupancy_math.h"
 
 namespace cnerf {
-
-struct DirectionCode;
-
-/// The field as kernels see it.
-struct FieldView {
-  const GridLevel* levels;  ///< host memory, [n_levels]
-  int n_levels;
-  const uint2* table;  ///< [rows, 4] halves
-  PackedField nets;
-  float density_scale;
-  LuminanceActivation<float> activation;
-};
 
 /// Samples of training rays, in runs of up to 32 of one ray.
 struct SampleArrays {
@@ -67,9 +54,18 @@ struct TraceJob {
 void trace_training_rays(const TraceJob& job, cudaStream_t stream);
 void trace_to_samples(const TraceJob& job, cudaStream_t stream);
 
-/// Density and luminance at points. `directions` null: density only.
-void query_field(const FieldView& field, const Vec3f* positions, const Vec3f* directions, std::uint32_t count,
-                 float* sigma, float* luminance, cudaStream_t stream);
+/// Follows rays to `results`. Answers differ from those of traced samples in what is left dark, 16 samples at a time
+/// that together add less than a tenth of an 8-bit step to a pixel, and in that samples are not counted: a ray goes on
+/// until it is opaque or leaves the box.
+void render_rays(const TraceJob& job, cudaStream_t stream);
+
+struct QueryJob {
+  const Vec3f* positions;   ///< [count]
+  const Vec3f* directions;  ///< [count]; null: density is asked for
+  std::uint32_t count;
+  float* answers;  ///< [count], written: density, or the luminance seen along the directions
+};
+void query_field(const FieldView& field, const QueryJob& job, cudaStream_t stream);
 
 /// The occupancy grid in device memory.
 struct OccupancyCells {

@@ -12,8 +12,6 @@
 
 namespace cnerf {
 
-struct DirectionCode;
-
 struct FieldBackwardJob {
   int levels;
   PackedField nets;

@@ -2,9 +2,11 @@
 /// Where the weights of stage 1's nets lie on the GPU, layer by layer (dense_layer.h). The luminance net's last layer
 /// has one output that counts; it stays in floats.
 
+#include "encoding/hash_grid_levels.h"
 #include "encoding/spherical_harmonics_math.h"
 #include "src/field/cuda/dense_layer.h"
-#include "src/field/density_activation.h"
+#include "src/field/luminance_activation.h"
+#include "src/field/nets.h"
 
 namespace cnerf {
 
@@ -30,10 +32,23 @@ struct FieldShape {
   static constexpr int kPackedLuminance2 = kLuminance2 / 4;
 };
 
+/// Encoded direction of a ray (field_forward.cuh).
+struct DirectionCode;
+
 /// What kernels read.
 struct PackedField {
   PackedWeights weights;    ///< [kPacked]
   const float* last_layer;  ///< [64]
+};
+
+/// The field as kernels see it.
+struct FieldView {
+  const GridLevel* levels = nullptr;  ///< host memory, [n_levels]
+  int n_levels = 0;
+  const uint2* table = nullptr;  ///< [rows, 4] halves
+  PackedField nets{};
+  float density_scale = 1;
+  LuminanceActivation<float> activation{};
 };
 
 }  // namespace cnerf

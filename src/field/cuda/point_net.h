@@ -1,59 +1,52 @@
 #pragma once
-/// A hash grid and a small net over points, 4 L -> 64 -> outputs, on the GPU: what the chroma fields of stage 2 are
-/// made of. There are two of them: 64 features behind a ReLU, and two plain numbers (log chromaticity).
-
-#include <cuda_runtime_api.h>
+/// A trainable hash grid and small net over points on the GPU: the counterpart of the CPU's PointNetCpu.
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
-#include "encoding/cuda/hash_grid_cuda.h"
-#include "src/base/vec3.h"
-#include "src/field/cuda/dense_layer.h"
+#include "src/field/cuda/point_kernels.h"
+#include "src/field/cuda/trained_parameters.h"
 
 namespace cnerf {
 
-enum class PointOutputs { kFeatures, kNumbers };
+class PointNetCuda {
+ public:
+  PointNetCuda(const HashGridOptions& grid, PointOutputs outputs, std::uint64_t seed);
 
-inline constexpr int kPointFeatures = 64;
-inline constexpr int kPointNumbers = 4;  ///< two, padded to what the CPU's kernels want
+  /// @param for_training  keeps what `backward` needs
+  void forward(const Vec3f* positions, std::uint32_t count, bool for_training, cudaStream_t stream);
+  /// Of the latest `forward`; features or numbers, whichever the net has.
+  [[nodiscard]] const std::uint32_t* features() const { return features_.data(); }  ///< [count, 64] halves
+  [[nodiscard]] const float2* numbers() const { return reinterpret_cast<const float2*>(numbers_.data()); }
 
-struct PointForwardJob {
-  const std::vector<GridLevel>* levels;
-  const uint2* table;      ///< [rows, 4] halves
-  const uint2* weights;    ///< packed forward weights
-  const Vec3f* positions;  ///< [count], unit space; clamped to [0, 1]
-  std::uint32_t count;
-  uint4* encoded = nullptr;           ///< [count, 16 KT] halves, written; null: nobody needs them
-  std::uint32_t* features = nullptr;  ///< [count, 64] halves, written by nets of features
-  float2* numbers = nullptr;          ///< [count], written by nets of two numbers
+  /// Gradient of the outputs, where it comes from.
+  struct OutputGradient {
+    const float* shares = nullptr;        ///< of features, see PointBackwardJob
+    const float* d_composited = nullptr;  ///< likewise
+    float d_feature = 0;                  ///< likewise
+    const float2* d_numbers = nullptr;    ///< of numbers
+  };
+  /// @param samples  those of the latest `forward`
+  void backward(const float4* places, SampleCount samples, const OutputGradient& gradient, cudaStream_t stream);
+  /// Adam, after `backward`.  @param adam  device memory
+  void update(const AdamStep* adam, cudaStream_t stream) const;
+
+  void append_state(const std::string& prefix, std::vector<StatePiece>& state);
+  void upload(cudaStream_t stream) const;
+
+ private:
+  [[nodiscard]] int levels() const { return int(grid_.levels().size()); }
+  void update_net(const AdamStep* adam, const float* d_weights, cudaStream_t stream) const;
+
+  PointOutputs outputs_;
+  TrainedGrid grid_;
+  TrainedNet net_;
+  DeviceBuffer<std::uint16_t> forward_, backward_;  // packed weights
+  DeviceBuffer<float> d_weights_;
+  DeviceBuffer<std::uint16_t> encoded_, d_encoded_;
+  DeviceBuffer<std::uint32_t> features_;
+  DeviceBuffer<float> numbers_;  // 2 a point
 };
-void point_forward(PointOutputs outputs, const PointForwardJob& job, cudaStream_t stream);
-
-struct PointBackwardJob {
-  int levels;
-  PackedWeights weights;
-  SampleCount samples;
-  const uint4* encoded;  ///< [most, 16 KT] halves
-  // Of features: a sample's gradient is its share of its pixel's.
-  const float4* places = nullptr;       ///< w holds the bits of the pixel's number
-  const float* shares = nullptr;        ///< [most]
-  const float* d_composited = nullptr;  ///< [pixels, 64]
-  float d_feature = 0;                  ///< a sample's share of this times its features is added
-  // Of numbers:
-  const float2* d_numbers = nullptr;  ///< [most]
-  void* d_encoded;                    ///< [levels, most, 4] of bfloat16, written
-  float* d_weights;  ///< [point_backward_blocks(), point_weight_count()], written: a part of each block
-};
-void point_backward(PointOutputs outputs, const PointBackwardJob& job, cudaStream_t stream);
-
-/// Parts that the gradient of the weights comes in.
-[[nodiscard]] int point_backward_blocks();
-/// Padded weights of both layers; as many 16-bit numbers are packed.
-[[nodiscard]] int point_weight_count(PointOutputs outputs, int levels);
-/// Both layers, for their optimiser.
-/// @param forward, backward  [point_weight_count()] packed
-[[nodiscard]] std::vector<DenseLayer> point_layers(PointOutputs outputs, int levels, TrainedWeights trained,
-                                                   uint2* forward, uint2* backward);
 
 }  // namespace cnerf

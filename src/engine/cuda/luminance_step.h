@@ -1,0 +1,70 @@
+#pragma once
+/// A training step of stage 1 on the GPU: one graph of kernels. Rays are drawn and followed (march, hash grid, nets,
+/// loss and its gradient), then come the nets backward, the hash grid backward, Adam. The host only says the learning
+/// rate and never waits for a step, except that it keeps no more than a few ahead.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "src/base/cuda/stream.h"
+#include "src/engine/cuda/trace_kernel.h"
+#include "src/engine/cuda/view_images.h"
+#include "src/engine/luminance_engine.h"
+#include "src/field/cuda/luminance_field.h"
+
+namespace cnerf {
+
+/// Room for samples of a step: an average one may take twice as many as wanted.
+[[nodiscard]] inline std::uint32_t sample_capacity(const LuminanceEngineOptions& options) {
+  return std::uint32_t(options.samples_per_step) * 2;
+}
+
+class LuminanceStepCuda {
+ public:
+  /// @param field  with room for `sample_capacity` samples; must outlive this, as `stream` must
+  LuminanceStepCuda(const LuminanceEngineOptions& options, const LuminanceFieldCuda& field, cudaStream_t stream);
+  ~LuminanceStepCuda();
+  LuminanceStepCuda(const LuminanceStepCuda&) = delete;
+  LuminanceStepCuda& operator=(const LuminanceStepCuda&) = delete;
+
+  void set_views(const std::vector<TrainingView>& views);
+  /// Goes on from here.  @param rays  of the next step
+  void restart(long step, std::int64_t rays);
+  [[nodiscard]] long steps() const { return steps_; }
+  /// Of the next step; waits.
+  [[nodiscard]] std::int64_t rays() const { return state_.downloaded().front().rays; }
+
+  /// @param occupied  the occupancy grid's bits; the same memory each time
+  /// @return  the report of the latest step that is known to be done, at most a few steps ago
+  StepReport run(float learning_rate, const std::uint32_t* occupied);
+
+ private:
+  void launch(const std::uint32_t* occupied);
+  void capture(const std::uint32_t* occupied);
+  void forget_graph();
+  [[nodiscard]] TraceJob trace_job(const std::uint32_t* occupied) const;
+  [[nodiscard]] FieldSamples samples() const;
+
+  LuminanceEngineOptions options_;
+  std::uint32_t capacity_;
+  const LuminanceFieldCuda& field_;
+  cudaStream_t stream_;
+  ViewImages views_;
+
+  DeviceBuffer<StepState> state_;
+  DeviceBuffer<float> places_, gradients_;  // 4 and 2 per sample
+  DeviceBuffer<std::uint16_t> encoded_;
+  DeviceBuffer<RayRecord> rays_;
+  DeviceBuffer<std::uint32_t> directions_;  // 8 per ray
+
+  MappedBuffer<float> learning_rates_{kStepRing};
+  MappedBuffer<StepRecord> reports_{kStepRing};
+  CudaStream side_;
+  CudaEvent done_[kStepRing], fork_, join_;
+  cudaGraphExec_t graph_ = nullptr;
+  bool is_warm_ = false;  // every kernel of a step has run once
+  long steps_ = 0, restarted_at_ = 0;
+};
+
+}  // namespace cnerf

@@ -1,0 +1,48 @@
+#pragma once
+/// A trainable hash grid on the CPU: the table, its gradient and its optimiser state.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "encoding/cpu/hash_grid_kernels.h"
+#include "encoding/hash_grid_levels.h"
+#include "src/base/aligned.h"
+#include "src/field/state.h"
+#include "src/optim/row_adam.h"
+
+namespace cnerf {
+
+/// One run of samples whose gradients a step scatters.
+struct EncodedSamples {
+  const float* positions;  ///< [G, 3, 16]
+  const float* d_encoded;  ///< [G, channels, 16]
+  std::size_t groups;
+};
+
+class HashGridCpu {
+ public:
+  HashGridCpu(const HashGridOptions& options, std::uint64_t seed);
+
+  [[nodiscard]] int channels() const { return 4 * int(levels_.size()); }
+  [[nodiscard]] const std::vector<GridLevel>& levels() const { return levels_; }
+
+  /// @param encoded  [G, channels(), 16]
+  void encode(const float* positions, std::size_t groups, float* encoded) const {
+    kernels_->encode(levels_.data(), levels_.size(), table_.data(), positions, groups, encoded, channels());
+  }
+  /// Scatters all runs and applies Adam, one task per level, so that a level's rows stay in one core's cache and sums
+  /// are made in the order of the runs whatever the number of threads.
+  void backward_and_update(const std::vector<EncodedSamples>& runs, const AdamStep& step);
+  void append_state(const std::string& prefix, std::vector<StatePiece>& state);
+
+ private:
+  std::vector<GridLevel> levels_;
+  float decay_;
+  const HashGridKernels* kernels_;
+  AlignedVector<float> table_;    ///< [rows, 4]
+  AlignedVector<float> d_table_;  ///< [rows, 4], zero between steps
+  AlignedVector<float> moments_;  ///< [rows, 8]
+};
+
+}  // namespace cnerf

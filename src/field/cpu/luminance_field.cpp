@@ -1,0 +1,116 @@
+#include "src/field/cpu/luminance_field.h"
+
+#include "src/field/nets.h"
+
+namespace cnerf {
+namespace {
+
+constexpr int kFeatureChannels = kGeometryChannels + kSphericalHarmonics;
+
+}  // namespace
+
+void LuminanceWorkspace::resize(std::size_t wanted_groups, int encoded_channels) {
+  groups = wanted_groups;
+  const std::size_t lanes = groups * kGroup;
+  ensure_size(d_log_density, lanes);
+  ensure_size(encoded, lanes * std::size_t(encoded_channels));
+  for (auto* buffer : {&hidden, &d_hidden}) ensure_size(*buffer, lanes * kHiddenWidth);
+  for (auto* buffer : {&features, &d_features}) ensure_size(*buffer, lanes * kFeatureChannels);
+  for (auto* buffer : {&luminance_hidden, &d_luminance_hidden}) ensure_size(*buffer, lanes * 2 * kHiddenWidth);
+  for (auto* buffer : {&raw_luminance, &d_raw_luminance}) ensure_size(*buffer, lanes * kLuminanceOutputs);
+}
+
+LuminanceFieldCpu::LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float max_luminance,
+                                     std::uint64_t seed)
+    : grid_(grid, seed),
+      density_net_(density_net_layout(grid_.channels() / 4), seed, kDensityNetStream),
+      luminance_net_(luminance_net_layout(), seed, kLuminanceNetStream),
+      density_scale_(density_scale),
+      luminance_activation_(LuminanceActivation<float>::up_to(max_luminance)) {}
+
+std::vector<Channels> LuminanceFieldCpu::density_layers(LuminanceWorkspace& work) const {
+  return {{work.encoded.data(), grid_.channels()},
+          {work.hidden.data(), kHiddenWidth},
+          {work.features.data(), kFeatureChannels}};
+}
+
+std::vector<Channels> LuminanceFieldCpu::luminance_layers(LuminanceWorkspace& work) {
+  return {{work.features.data(), kFeatureChannels},
+          {work.luminance_hidden.data(), 2 * kHiddenWidth},
+          {work.luminance_hidden.data() + kHiddenWidth * kGroup, 2 * kHiddenWidth},
+          {work.raw_luminance.data(), kLuminanceOutputs}};
+}
+
+void LuminanceFieldCpu::density(const float* positions, std::size_t groups, LuminanceWorkspace& work,
+                                float* sigma) const {
+  work.resize(groups, grid_.channels());
+  grid_.encode(positions, groups, work.encoded.data());
+  density_net_.forward(density_layers(work), groups);
+  for (std::size_t s = 0; s < groups * kGroup; ++s) sigma[s] = this->sigma(work, s);
+}
+
+void LuminanceFieldCpu::set_direction(LuminanceWorkspace& work, std::size_t sample, Vec3f direction) {
+  const GroupedView<float> features(work.features, kFeatureChannels);
+  spherical_harmonics(direction.x, direction.y, direction.z,
+                      [&](int i, float value) { features.at(sample, kGeometryChannels + i) = value; });
+}
+
+void LuminanceFieldCpu::forward(const float* positions, LuminanceWorkspace& work) const {
+  grid_.encode(positions, work.groups, work.encoded.data());
+  density_net_.forward(density_layers(work), work.groups);
+  luminance_net_.forward(luminance_layers(work), work.groups);
+}
+
+float LuminanceFieldCpu::sigma(const LuminanceWorkspace& work, std::size_t sample) const {
+  return density_from_raw(GroupedView<const float>(work.features, kFeatureChannels).at(sample, 0), density_scale_);
+}
+
+float LuminanceFieldCpu::luminance(const LuminanceWorkspace& work, std::size_t sample) const {
+  return luminance_activation_.value(GroupedView<const float>(work.raw_luminance, kLuminanceOutputs).at(sample, 0));
+}
+
+void LuminanceFieldCpu::set_gradient(LuminanceWorkspace& work, std::size_t sample, float d_sigma,
+                                     float d_luminance) const {
+  const float raw_luminance = GroupedView<const float>(work.raw_luminance, kLuminanceOutputs).at(sample, 0);
+  const GroupedView<float> d_raw(work.d_raw_luminance, kLuminanceOutputs);
+  d_raw.at(sample, 0) = d_luminance * luminance_activation_.derivative(raw_luminance);
+  for (int pad = 1; pad < kLuminanceOutputs; ++pad) d_raw.at(sample, pad) = 0;
+  work.d_log_density[sample] = d_sigma * sigma(work, sample);
+}
+
+void LuminanceFieldCpu::backward(LuminanceWorkspace& work, float* d_encoded, float* d_weights) const {
+  luminance_net_.backward(luminance_layers(work),
+                          {{work.d_features.data(), kFeatureChannels},
+                           {work.d_luminance_hidden.data(), 2 * kHiddenWidth},
+                           {work.d_luminance_hidden.data() + kHiddenWidth * kGroup, 2 * kHiddenWidth},
+                           {work.d_raw_luminance.data(), kLuminanceOutputs}},
+                          work.groups, d_weights + density_net_.layout().weight_count());
+  const GroupedView<float> d_features(work.d_features, kFeatureChannels);
+  for (std::size_t s = 0; s < work.groups * kGroup; ++s) d_features.at(s, 0) += work.d_log_density[s];
+  density_net_.backward(
+      density_layers(work),
+      {{d_encoded, grid_.channels()}, {work.d_hidden.data(), kHiddenWidth}, {work.d_features.data(), kFeatureChannels}},
+      work.groups, d_weights);
+}
+
+void LuminanceFieldCpu::update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights,
+                               float learning_rate, long step) {
+  const AdamStep adam(learning_rate, step);
+  grid_.backward_and_update(runs, adam);
+  const std::size_t split = density_net_.layout().weight_count();
+  density_net_.update({d_weights.begin(), d_weights.begin() + std::ptrdiff_t(split)}, adam);
+  luminance_net_.update({d_weights.begin() + std::ptrdiff_t(split), d_weights.end()}, adam);
+}
+
+void LuminanceFieldCpu::append_state(std::vector<StatePiece>& state) {
+  grid_.append_state("grid", state);
+  density_net_.append_state("density_net", state);
+  luminance_net_.append_state("luminance_net", state);
+}
+
+void LuminanceFieldCpu::state_loaded() {
+  density_net_.transpose_weights();
+  luminance_net_.transpose_weights();
+}
+
+}  // namespace cnerf

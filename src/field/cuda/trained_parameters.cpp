@@ -1,0 +1,57 @@
+#include "src/field/cuda/trained_parameters.h"
+
+#include "src/field/nets.h"
+
+namespace cnerf {
+
+TrainedNet::TrainedNet(std::vector<float> initial) {
+  const std::vector<float> zeros(initial.size(), 0.0f);
+  weights_ = {std::move(initial), "nets"};
+  first_ = {zeros, "nets"};
+  second_ = {zeros, "nets"};
+}
+
+void TrainedNet::append_state(const std::string& prefix, std::vector<StatePiece>& state) {
+  state.push_back(weights_.fetched(prefix + ".weights"));
+  state.push_back(first_.fetched(prefix + ".first_moments"));
+  state.push_back(second_.fetched(prefix + ".second_moments"));
+}
+
+void TrainedNet::upload() const {
+  for (const StateBuffer* buffer : {&weights_, &first_, &second_}) buffer->upload();
+}
+
+TrainedGrid::TrainedGrid(const HashGridOptions& options, std::uint64_t seed, const std::string& use)
+    : levels_(hash_grid_levels(options)),
+      decay_(float(options.decay)),
+      table_(initial_table(levels_, seed), use),
+      moments_(std::vector<float>(rows() * std::size_t(8), 0.0f), use),
+      d_table_(rows() * std::size_t(4), use),
+      halves_(rows() * std::size_t(4), use) {}
+
+void TrainedGrid::backward(const float4* places, SampleCount samples, const void* d_encoded,
+                           cudaStream_t stream) const {
+  encode_backward_cuda(levels_, reinterpret_cast<const float*>(places), samples, d_encoded, d_table_.data(), stream);
+}
+
+void TrainedGrid::update(const AdamStep* adam, cudaStream_t stream) const {
+  update_rows(table_rows(), adam, decay_, stream);
+}
+
+TableRowsCuda TrainedGrid::table_rows() const {
+  return {reinterpret_cast<float4*>(table_.data()), reinterpret_cast<float4*>(d_table_.data()),
+          reinterpret_cast<float4*>(moments_.data()), reinterpret_cast<uint2*>(halves_.data()), rows()};
+}
+
+void TrainedGrid::append_state(const std::string& prefix, std::vector<StatePiece>& state) {
+  state.push_back(table_.fetched(prefix + ".table"));
+  state.push_back(moments_.fetched(prefix + ".moments"));
+}
+
+void TrainedGrid::upload(cudaStream_t stream) const {
+  table_.upload();
+  moments_.upload();
+  round_rows(table_rows(), stream);
+}
+
+}  // namespace cnerf

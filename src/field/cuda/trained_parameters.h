@@ -1,0 +1,81 @@
+#pragma once
+/// What Adam moves on the GPU, with the host's copy of it that snapshots read and write. Names and shapes of the pieces
+/// are those of the CPU's HashGridCpu and MlpCpu: a snapshot of one device loads on the other.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "encoding/cuda/hash_grid_cuda.h"
+#include "src/base/cuda/device_memory.h"
+#include "src/field/cuda/dense_layer.h"
+#include "src/field/state.h"
+#include "src/optim/cuda/row_adam_cuda.h"
+
+namespace cnerf {
+
+/// Floats on the GPU and their copy on the host.
+class StateBuffer {
+ public:
+  StateBuffer() = default;
+  /// @param use  for the error message, see DeviceBuffer
+  StateBuffer(std::vector<float> initial, const std::string& use)
+      : host_(std::move(initial)), device_(uploaded(host_, use)) {}
+
+  [[nodiscard]] float* data() const { return device_.data(); }
+  /// The copy, brought up to date. What is written into it counts after `upload`.
+  [[nodiscard]] StatePiece fetched(std::string name) {
+    device_.download(host_.data(), host_.size());
+    return state_piece(std::move(name), host_);
+  }
+  void upload() const { device_.upload(host_.data(), host_.size()); }
+
+ private:
+  std::vector<float> host_;
+  DeviceBuffer<float> device_;
+};
+
+/// A net's weights.
+class TrainedNet {
+ public:
+  TrainedNet() = default;
+  explicit TrainedNet(std::vector<float> initial);
+
+  [[nodiscard]] TrainedWeights weights() const { return {weights_.data(), first_.data(), second_.data()}; }
+  void append_state(const std::string& prefix, std::vector<StatePiece>& state);
+  void upload() const;
+
+ private:
+  StateBuffer weights_, first_, second_;
+};
+
+/// A hash grid: its table, rounded for kernels, its gradient and its moments.
+class TrainedGrid {
+ public:
+  TrainedGrid() = default;
+  /// @param use  for the error message, see DeviceBuffer
+  TrainedGrid(const HashGridOptions& options, std::uint64_t seed, const std::string& use);
+
+  [[nodiscard]] const std::vector<GridLevel>& levels() const { return levels_; }
+  /// [rows, 4] halves
+  [[nodiscard]] const uint2* table() const { return reinterpret_cast<const uint2*>(halves_.data()); }
+
+  /// Adds to the gradient, as encode_backward_cuda does.
+  void backward(const float4* places, SampleCount samples, const void* d_encoded, cudaStream_t stream) const;
+  /// Adam on what has a gradient.  @param adam  device memory
+  void update(const AdamStep* adam, cudaStream_t stream) const;
+  void append_state(const std::string& prefix, std::vector<StatePiece>& state);
+  void upload(cudaStream_t stream) const;
+
+ private:
+  [[nodiscard]] std::uint32_t rows() const { return total_rows(levels_); }
+  [[nodiscard]] TableRowsCuda table_rows() const;
+
+  std::vector<GridLevel> levels_;
+  float decay_ = 0;
+  StateBuffer table_, moments_;  // [rows, 4], [rows, 8]
+  DeviceBuffer<float> d_table_;
+  DeviceBuffer<std::uint16_t> halves_;
+};
+
+}  // namespace cnerf

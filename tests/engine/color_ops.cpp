@@ -1,0 +1,247 @@
+// The engines of stage 2 on random pixels.
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <numeric>
+
+#include "src/base/rng.h"
+#include "tests/engine/backend_ops.h"
+#include "tests/support/engine_state.h"
+#include "tests/support/random_pixels.h"
+
+namespace cnerf::test {
+namespace {
+
+HashGridOptions grid_of(int levels) {
+  return {.levels = levels, .log2_rows = 12, .coarsest_resolution = 4, .finest_resolution = 128};
+}
+
+std::vector<float> random_weights(int count) {
+  SequentialRng rng(4, 1);
+  std::vector<float> weights;
+  for (int p = 0; p < count; ++p) weights.push_back(rng.uniform(0.0f, 2.0f));
+  weights.front() = 0;
+  return weights;
+}
+
+/// Gradients of a step, then what some steps make of the parameters.
+/// @param step  (engine, learning rate) -> loss
+template <typename Engine, typename Step>
+void append_steps(Engine& engine, Step&& step, std::vector<Result>& results) {
+  forget_moments(engine);
+  results.push_back({"loss", {step(engine, 1e-9f)}});
+  for (const StatePiece& piece : engine.state()) {
+    if (!piece.name.ends_with("first_moments") && !piece.name.ends_with("grid.moments")) continue;
+    results.push_back({"gradient: " + piece.name, doubles(gradient_in(engine.state(), piece.name))});
+  }
+  for (int i = 0; i < 4; ++i) step(engine, 1e-3f);
+  for (const StatePiece& piece : engine.state()) {
+    if (!piece.name.ends_with("steps")) results.push_back({"after steps: " + piece.name, doubles(floats_of(piece))});
+  }
+}
+/// @param nets  by name; the grid is the first one's
+void append_bounds(const std::string& grid, const std::vector<std::string>& nets, double gradient, Op& op) {
+  op.bounds.push_back({"loss", 1e-4, 1e-3});
+  op.bounds.push_back({"gradient: " + grid + ".moments", 1e-3, gradient, Measure::kGradient});
+  for (const std::string& net : nets) {
+    op.bounds.push_back({"gradient: " + net + ".first_moments", 1e-3, gradient, Measure::kGradient});
+  }
+  op.bounds.push_back({"after steps: " + grid + ".table", 2e-3, 2e-3});
+  op.bounds.push_back({"after steps: " + grid + ".moments", 2e-2, 2e-2});
+  for (const std::string& net : nets) {
+    op.bounds.push_back({"after steps: " + net + ".weights", 2e-3, 2e-3});
+    op.bounds.push_back({"after steps: " + net + ".first_moments", 2e-2, 2e-2});
+    op.bounds.push_back({"after steps: " + net + ".second_moments", 2e-2, 2e-2});
+  }
+}
+
+struct BinProblem {
+  const char* name;
+  int levels, count;
+  ChromaLossWeights more;
+};
+
+class BinScene {
+ public:
+  explicit BinScene(const BinProblem& problem)
+      : problem_(problem), pixels_(random_pixels(problem.count, 24, 3)), weights_(random_weights(problem.count)) {
+    for (const Ab& color : colors_of(pixels_)) labels_.push_back(soft_label(color));
+  }
+  double step(ColorBinEngine& engine, float rate) const {
+    return engine.step(pixels_, labels_, weights_, problem_.more, rate);
+  }
+  [[nodiscard]] std::unique_ptr<ColorBinEngine> fresh(const Backend& backend) const {
+    if (backend.isa) force_isa(*backend.isa);
+    return backend.engines().make_color_bins(grid_of(problem_.levels), 5);
+  }
+  [[nodiscard]] std::unique_ptr<ColorBinEngine> trained(const Backend& backend) {
+    if (!trainer_) trainer_ = fresh(reference_backend());
+    while (trainer_->step_count() < 30) step(*trainer_, 1e-2f);
+    auto engine = fresh(backend);
+    copy_state(*trainer_, *engine);
+    return engine;
+  }
+  /// Without what all logits of a pixel have in common, which a softmax does not see.
+  [[nodiscard]] std::vector<double> logits(const ColorBinEngine& engine) const {
+    std::vector<float> logits(pixels_.pixels() * kAbBinCount);
+    engine.logits(pixels_, logits);
+    std::vector<double> centred = doubles(logits);
+    for (auto pixel = centred.begin(); pixel != centred.end(); pixel += kAbBinCount) {
+      const double mean = std::accumulate(pixel, pixel + kAbBinCount, 0.0) / kAbBinCount;
+      for (auto logit = pixel; logit != pixel + kAbBinCount; ++logit) *logit -= mean;
+    }
+    return centred;
+  }
+  /// Of pixels that have a colour.
+  [[nodiscard]] std::vector<double> colors(const ColorBinEngine& engine, float temperature) const {
+    std::vector<Ab> decoded(pixels_.pixels());
+    engine.decode(pixels_, temperature, decoded);
+    std::vector<double> colors;
+    for (std::size_t p = 0; p < decoded.size(); ++p) {
+      const auto weights = pixels_.weights.begin();
+      const float opacity = std::accumulate(weights + std::ptrdiff_t(pixels_.offsets[p]),
+                                            weights + std::ptrdiff_t(pixels_.offsets[p + 1]), 0.0f);
+      if (opacity >= kLeastColoredOpacity) colors.insert(colors.end(), {decoded[p].a, decoded[p].b});
+    }
+    return colors;
+  }
+
+ private:
+  BinProblem problem_;
+  PixelSamples pixels_;
+  std::vector<float> weights_;
+  std::vector<SoftLabel> labels_;
+  std::unique_ptr<ColorBinEngine> trainer_;
+};
+
+Op color_bins(const BinProblem& problem) {
+  const auto scene = std::make_shared<BinScene>(problem);
+  Op op;
+  op.name = problem.name;
+  op.run = [scene](const Backend& backend) {
+    const auto engine = scene->trained(backend);
+    std::vector<Result> results = {{"logits at the start", scene->logits(*scene->fresh(backend))},
+                                   {"logits after training", scene->logits(*engine)},
+                                   {"annealed mean", scene->colors(*engine, 0.38f)},
+                                   {"most probable bin", scene->colors(*engine, 0)}};
+    append_steps(
+        *engine, [&](ColorBinEngine& e, float rate) { return scene->step(e, rate); }, results);
+    return results;
+  };
+  // Two bins may be equally probable but for rounding.
+  op.bounds = {{"logits at the start", 1e-4, 1e-3},
+               {"logits after training", 1e-4, 1e-3},
+               {"annealed mean", 1e-2, 0.1, Measure::kPercentile99},
+               {"most probable bin", 1e-3, 1e-3, Measure::kPercentile99}};
+  // The spread is a matter of differences of features, which are rounded to half precision.
+  append_bounds("features.grid", {"features.net", "head"}, problem.more.spread > 1 ? 5e-2 : 2e-2, op);
+  return op;
+}
+
+struct FieldProblem {
+  const char* name;
+  int levels, count;
+  AbLoss loss;
+};
+
+Op color_field(const FieldProblem& problem) {
+  const PixelSamples pixels = random_pixels(problem.count, 24, 3);
+  const std::vector<Ab> targets = colors_of(pixels);
+  const std::vector<float> weights = problem.count > 1 ? random_weights(problem.count) : std::vector<float>{1};
+  // Where targets are met a gradient is what rounding leaves; so gradients are compared away from them.
+  std::vector<Ab> moved = targets;
+  for (Ab& color : moved) color = {color.a + 12, color.b - 9};
+  const auto trainer = std::make_shared<std::unique_ptr<ColorFieldEngine>>();
+  Op op;
+  op.name = problem.name;
+  op.run = [=](const Backend& backend) {
+    if (!*trainer) {
+      force_isa(IsaLevel::kGeneric);
+      *trainer = cpu_engines().make_color_field(grid_of(problem.levels), 5);
+      for (int i = 0; i < 100; ++i) (*trainer)->step(pixels, targets, weights, problem.loss, 1e-2f);
+    }
+    if (backend.isa) force_isa(*backend.isa);
+    const auto engine = backend.engines().make_color_field(grid_of(problem.levels), 5);
+    copy_state(**trainer, *engine);
+    std::vector<Ab> composited(pixels.pixels());
+    engine->composite(pixels, composited);
+    std::vector<Chromaticity> ratios(pixels.positions.size());
+    engine->query(pixels.positions, ratios);
+    std::vector<Result> results = {{"composited colours", {}}, {"chromaticity of points", {}}};
+    for (const Ab& color : composited) results[0].values.insert(results[0].values.end(), {color.a, color.b});
+    for (const Chromaticity& ratio : ratios) results[1].values.insert(results[1].values.end(), {ratio.x, ratio.z});
+    append_steps(
+        *engine, [&](ColorFieldEngine& e, float rate) { return e.step(pixels, moved, weights, problem.loss, rate); },
+        results);
+    return results;
+  };
+  op.bounds = {{"composited colours", 1e-3, 5e-3}, {"chromaticity of points", 1e-4, 4e-3}};
+  append_bounds("chromaticity.grid", {"chromaticity.net"}, 2e-2, op);
+  return op;
+}
+
+/// Losses after training from the same start.
+Op color_learning() {
+  const auto bins = std::make_shared<BinScene>(BinProblem{"", 8, 777, {}});
+  const PixelSamples pixels = random_pixels(777, 24, 3);
+  const std::vector<Ab> targets = colors_of(pixels);
+  Op op;
+  op.name = "ColorsAreLearnt";
+  op.is_gpu_only = true;
+  op.run = [=](const Backend& backend) -> std::vector<Result> {
+    const auto engine = bins->fresh(backend);
+    const double first = bins->step(*engine, 1e-2f);
+    double last = 0, distance = 0;
+    for (int i = 0; i < 150; ++i) last = bins->step(*engine, 1e-2f);
+    EXPECT_LT(last, 0.5 * first);
+    const auto field = backend.engines().make_color_field(grid_of(8), 6);
+    for (int i = 0; i < 300; ++i) distance = field->step(pixels, targets, i < 200 ? 1e-2f : 1e-3f);
+    const auto processor = bins->fresh(reference_backend());  // reads what the back end trained
+    copy_state(*engine, *processor);
+    return {{"loss after 150 steps", {last}},
+            {"ab distance after 300 steps", {distance}},
+            {"snapshot", {relative_distance(bins->logits(*processor), bins->logits(*engine)) < 1e-3 ? 1.0 : 0.0}}};
+  };
+  op.bounds = {{"loss after 150 steps", 0, 0.1},
+               {"ab distance after 300 steps", 0, 0.2, Measure::kPercentile99},
+               {"snapshot", 0, 0}};
+  return op;
+}
+
+/// Pixels without samples, or none that count, are no error and change nothing of the hash grid.
+Op empty_pixels() {
+  Op op;
+  op.name = "PixelsWithoutSamples";
+  op.run = [](const Backend& backend) -> std::vector<Result> {
+    PixelSamples pixels;
+    pixels.offsets.assign(18, 0);
+    if (backend.isa) force_isa(*backend.isa);
+    const auto engine = backend.engines().make_color_bins(grid_of(3), 5);
+    const double loss = engine->step(pixels, std::vector<SoftLabel>(17, soft_label({20, 20})), {}, 1e-2f);
+    const auto field = backend.engines().make_color_field(grid_of(3), 5);
+    std::vector<Ab> colors(17);
+    field->composite(pixels, colors);
+    return {{"loss", {loss}}, {"colour", {1 + colors[3].a, 1 + colors[3].b}}};
+  };
+  op.expected = []() -> std::vector<Result> { return {{"loss", {std::log(313.0)}}, {"colour", {1, 1}}}; };
+  op.bounds = {{"loss", 0.3, 0.3}, {"colour", 1e-6, 1e-6}};
+  return op;
+}
+
+}  // namespace
+
+std::vector<Op> color_ops() {
+  return {color_bins({"ColorBins", 8, 777, {}}),
+          color_bins({"ColorBinsWithSpread", 8, 777, {.spread = 3}}),
+          color_bins({"ColorBinsWithRegression", 8, 777, {.regression = 0.3f}}),
+          color_bins({"ColorBinsOfFewLevels", 3, 16, {}}),
+          color_bins({"ColorBinsOfManyLevels", 16, 4096, {0.3f, 0.1f}}),
+          color_field({"ColorField", 8, 777, AbLoss::kHuber}),
+          color_field({"ColorFieldOfOnePixel", 3, 1, AbLoss::kSquared}),
+          color_field({"ColorFieldOfManyLevels", 13, 3000, AbLoss::kSquared}),
+          color_learning(),
+          empty_pixels()};
+}
+
+}  // namespace cnerf::test

@@ -1,0 +1,238 @@
+// The engine of stage 1: a step's gradients, queries, pictures, and what a step makes of the parameters.
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "src/base/error.h"
+#include "src/base/rng.h"
+#include "tests/engine/backend_ops.h"
+#include "tests/support/engine_state.h"
+#include "tests/support/toy_capture.h"
+
+#if CNERF_CUDA_ENGINE
+#include "src/base/cuda/device_memory.h"
+#endif
+
+namespace cnerf::test {
+namespace {
+
+struct Problem {
+  const char* name;
+  int levels, log2_rows, finest, cascades, patch;
+  bool with_alpha = false, with_lens = false, with_exposures = false;
+  float distortion_weight = 0;
+};
+
+/// Views, options, and engines that share a state that the generic processor trained.
+class Scene {
+ public:
+  explicit Scene(const Problem& problem) : capture_(toy_capture(6, 48, 40, problem.with_alpha)) {
+    for (std::size_t v = 0; v < capture_.views.size(); ++v) {
+      View& view = capture_.views[v];
+      if (problem.with_exposures) view.image.exposure = 0.7f + 0.15f * float(v % 5);
+      if (!problem.with_lens) continue;
+      view.intrinsics.model = LensModel::kOpenCv;
+      view.intrinsics.distortion = {-0.1, 0.02, 1e-3, -2e-3, 0, 0, 0, 0};
+      view.image.mask.assign(view.image.pixel_count(), 255);
+      for (std::size_t i = 0; i < view.image.mask.size(); i += 3) view.image.mask[i] = 0;
+    }
+    SceneFrame frame;
+    frame.unit_per_world = problem.cascades > 1 ? 0.12 : 0.4;
+    frame.cascades = problem.cascades;
+    views_ = training_views(capture_, frame);
+    options_.grid.levels = problem.levels;
+    options_.grid.log2_rows = problem.log2_rows;
+    options_.grid.coarsest_resolution = 4;
+    options_.grid.finest_resolution = problem.finest;
+    options_.occupancy.resolution = 32;
+    options_.cascades = problem.cascades;
+    options_.march = march_settings(problem.cascades, 64, 1.0 / 64);
+    options_.samples_per_step = 16384;
+    options_.patch_size = problem.patch;
+    options_.distortion_weight = problem.distortion_weight;
+  }
+
+  [[nodiscard]] const std::vector<TrainingView>& views() const { return views_; }
+  [[nodiscard]] const LuminanceEngineOptions& options() const { return options_; }
+  [[nodiscard]] std::unique_ptr<LuminanceEngine> fresh(const Backend& backend) const {
+    if (backend.isa) force_isa(*backend.isa);
+    auto engine = backend.engines().make_luminance(options_);
+    engine->set_views(views_);
+    return engine;
+  }
+  /// After so many steps on the generic processor.
+  [[nodiscard]] std::unique_ptr<LuminanceEngine> trained(const Backend& backend, long steps) {
+    if (!trainer_) trainer_ = fresh(reference_backend());
+    while (trainer_->step_count() < steps) trainer_->step(steps > 40 ? 1e-3f : 1e-2f);
+    auto engine = fresh(backend);
+    copy_state(*trainer_, *engine);
+    return engine;
+  }
+
+ private:
+  Capture capture_;
+  std::vector<TrainingView> views_;
+  LuminanceEngineOptions options_;
+  std::unique_ptr<LuminanceEngine> trainer_;
+};
+
+void append_gradients(LuminanceEngine& engine, std::vector<Result>& results) {
+  const Stage1Gradients found = gradients_of_next_step(engine);
+  results.push_back({"rays", {double(found.report.rays)}});
+  results.push_back({"trained samples", {double(found.report.trained_samples)}});
+  results.push_back({"loss", {found.report.loss}});
+  results.push_back({"squared error", {found.report.squared_error}});
+  results.push_back({"gradient of the table", doubles(found.table)});
+  results.push_back({"gradient of the nets", doubles(found.weights)});
+}
+
+void append_queries(const LuminanceEngine& engine, std::vector<Result>& results) {
+  SequentialRng rng(11, 3);
+  std::vector<Vec3f> points, directions;
+  for (int i = 0; i < 5003; ++i) {
+    points.push_back({rng.uniform(), rng.uniform(), rng.uniform()});
+    directions.push_back(normalized(Vec3f{rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)}));
+  }
+  std::vector<float> answers(points.size());
+  engine.query_density(points, answers);
+  results.push_back({"density of points", doubles(answers)});
+  engine.query_luminance(points, directions, answers);
+  results.push_back({"luminance of points", doubles(answers)});
+}
+
+void append_pictures(const Scene& scene, const LuminanceEngine& engine, std::vector<Result>& results) {
+  const UnitCamera& camera = scene.views()[1].camera;
+  std::vector<Ray> rays;
+  for (int y = 0; y < 40; ++y) {
+    for (int x = 0; x < 48; ++x) rays.push_back(camera.ray({x + 0.5, y + 0.5}));
+  }
+  std::vector<RayResult> seen(rays.size()), of_view(rays.size());
+  engine.render(rays, scene.options().march, {}, seen);
+  engine.render_view(camera, scene.options().march, {}, of_view);
+  std::vector<double> luminance, opacity, depth, luminance_of_view, traced(rays.size(), 0.0);
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    luminance.push_back(seen[r].luminance);
+    luminance_of_view.push_back(of_view[r].luminance);
+    opacity.push_back(seen[r].opacity);
+    depth.push_back(seen[r].depth * seen[r].opacity);
+  }
+  EXPECT_LT(relative_distance(luminance_of_view, luminance), 1e-5) << "a view is its rays";
+
+  std::vector<WeightedSample> samples;
+  std::vector<std::size_t> offsets;
+  engine.trace(rays, scene.options().march, {}, samples, offsets);
+  ASSERT_EQ(offsets.size(), rays.size() + 1);
+  ASSERT_EQ(offsets.back(), samples.size());
+  bool in_order = true;
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
+      traced[r] += double(samples[s].weight) * samples[s].luminance;
+      in_order = in_order && (s == offsets[r] || samples[s].t > samples[s - 1].t);
+    }
+  }
+  EXPECT_TRUE(in_order) << "traced samples";
+  EXPECT_LT(relative_distance(traced, luminance), 1e-4) << "traced samples add up to the picture";
+  results.push_back({"rendered luminance", luminance});
+  results.push_back({"rendered opacity", opacity});
+  results.push_back({"rendered depth", depth});
+}
+
+/// A step with an update of the occupancy grid.
+void append_step(LuminanceEngine& engine, std::vector<Result>& results) {
+  engine.step(1e-3f);
+  for (const StatePiece& piece : engine.state()) {
+    if (piece.name != "counters") results.push_back({"after a step: " + piece.name, doubles(floats_of(piece))});
+  }
+}
+
+Op stage1(const Problem& problem) {
+  const auto scene = std::make_shared<Scene>(problem);
+  Op op;
+  op.name = problem.name;
+  op.run = [scene](const Backend& backend) {
+    std::vector<Result> results;
+    const auto engine = scene->trained(backend, 40);
+    append_gradients(*engine, results);
+    append_queries(*engine, results);
+    append_pictures(*scene, *engine, results);
+    append_step(*scene->trained(backend, 48), results);
+    return results;
+  };
+  // Lattice points on the face of a cell may fall on either side; a ray may end one sample earlier.
+  op.bounds = {{"rays", 0, 0},
+               {"trained samples", 1e-3, 5e-3},
+               {"loss", 1e-3, 5e-3},
+               {"squared error", 1e-3, 5e-3},
+               {"gradient of the table", 1e-3, 3e-2},
+               {"gradient of the nets", 1e-3, 3e-2, Measure::kGradient},
+               {"density of points", 1e-4, 1e-2},
+               {"luminance of points", 1e-4, 5e-3},
+               {"rendered luminance", 1e-3, 1e-2},
+               {"rendered opacity", 1e-3, 1e-2},
+               {"rendered depth", 1e-3, 1e-2}};
+  // Where gradients are mostly noise, Adam's step has either sign.
+  for (const char* piece :
+       {"grid.table", "grid.moments", "density_net.weights", "density_net.first_moments", "density_net.second_moments",
+        "luminance_net.weights", "luminance_net.first_moments", "luminance_net.second_moments", "occupancy"}) {
+    const std::string name = "after a step: " + std::string(piece);
+    op.bounds.push_back({name, 1e-2, name.ends_with("moments") ? 3e-2 : 1e-2});
+  }
+  return op;
+}
+
+/// Rounding sends back ends apart. Losses are averaged, since a step's depends mostly on the pixels it drew.
+Op stage1_learning(const Problem& problem) {
+  const auto scene = std::make_shared<Scene>(problem);
+  Op op;
+  op.name = problem.name;
+  op.is_gpu_only = true;
+  op.run = [scene](const Backend& backend) -> std::vector<Result> {
+    const auto engine = scene->fresh(backend);
+    const double first = engine->step(1e-2f).loss;
+    for (int i = 0; i < 250; ++i) engine->step(1e-2f);
+    double last = 0;
+    for (int i = 0; i < 50; ++i) last += engine->step(1e-2f).loss / 50;
+    EXPECT_LT(last, 0.5 * first);
+    return {{"loss after 300 steps", {last}}};
+  };
+  op.bounds = {{"loss after 300 steps", 0, 0.6}};
+  return op;
+}
+
+Op out_of_memory() {
+  Op op;
+  op.name = "OutOfMemorySaysWhatToLower";
+  op.is_gpu_only = true;
+  op.run = [](const Backend& backend) -> std::vector<Result> {
+    std::string message;
+#if CNERF_CUDA_ENGINE
+    try {
+      if (backend.is_gpu()) {
+        const DeviceBuffer<float> huge(std::size_t(1) << 42, "the hash grid; lower stage1.grid.log2_rows");
+      }
+    } catch (const DeviceError& failure) {
+      message = failure.what();
+    }
+#endif
+    const bool is_said = message.find("lower stage1.grid.log2_rows") != std::string::npos;
+    return {{"message", {is_said || !backend.is_gpu() ? 1.0 : 0.0}}};
+  };
+  op.bounds = {{"message", 0, 0}};
+  return op;
+}
+
+}  // namespace
+
+std::vector<Op> luminance_ops() {
+  return {stage1({"Stage1WithExposures", 8, 14, 64, 1, 0, false, false, true}),
+          stage1({"Stage1WithDistortionLoss", 8, 14, 64, 2, 0, false, false, false, 0.3f}),
+          stage1({"Stage1WithAlpha", 3, 12, 20, 1, 0, true}),
+          stage1({"Stage1WithCascadesLensAndMask", 12, 14, 128, 3, 0, false, true}),
+          stage1({"Stage1WithPatches", 16, 13, 128, 2, 8}),
+          stage1_learning({"Stage1Learns", 8, 14, 64, 1, 0, false, false, true}),
+          stage1_learning({"Stage1LearnsWithCascades", 12, 14, 128, 3, 0, false, true}),
+          out_of_memory()};
+}
+
+}  // namespace cnerf::test
