@@ -3,68 +3,52 @@
 #include <algorithm>
 
 #include "export/blender_setup.h"
-#include "export/color_origin.h"
 #include "export/nvdb_writer.h"
+#include "export/texture_writer.h"
 #include "export/usd_writer.h"
+#include "export/vdb_writer.h"
 #include "src/base/files.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace fs = std::filesystem;
 
-BakeFolder::BakeFolder(fs::path folder, std::vector<BakeCamera> cameras, std::vector<std::string> command_line,
-                       const std::string& units, const std::string& up_axis)
-    : folder_(std::move(folder)) {
+BakeFolder::BakeFolder(fs::path folder, std::vector<bake::Camera> cameras, Label label) : folder_(std::move(folder)) {
   manifest_.cameras = std::move(cameras);
-  manifest_.command_line = std::move(command_line);
-  manifest_.units = units;
-  manifest_.up_axis = up_axis;
+  manifest_.label = std::move(label);
 }
 
-fs::path BakeFolder::write_grids(const VolumePlanes& volume, const std::string& name, const VdbOptions& options) {
+ManifestVolume BakeFolder::write_grids(const bake::VolumePlanes& volume, const std::string& name,
+                                       const VdbOptions& options) {
   const fs::path vdb = folder_ / (name + ".vdb");
-  write_vdb(volume, vdb, options);
+  write_vdb(volume, vdb, options, manifest_.label);
   list(vdb);
   if (options.nvdb) {
     const fs::path nvdb = folder_ / (name + ".nvdb");
-    write_nvdb(volume, nvdb, options);
+    write_nvdb(volume, nvdb, options, manifest_.label);
     list(nvdb);
   }
-  return vdb;
+  return describe_volume(volume, vdb.filename().string(), options, manifest_.label.world);
 }
 
-fs::path BakeFolder::add_volume(const VolumePlanes& volume, const std::string& name, const VdbOptions& options) {
-  const fs::path vdb = write_grids(volume, name, options);
-  manifest_.colorizer = volume.colorizer;
-  manifest_.take = volume.take;
-  manifest_.frame = volume.frame;
-  manifest_.volume = describe_volume(volume, vdb.filename().string(), options);
-  return vdb;
-}
-
-fs::path BakeFolder::add_volume(const BakedVolume& volume, const std::string& name, const VdbOptions& options) {
-  return add_volume(planes_of(volume), name, options);
-}
-
-std::vector<fs::path> BakeFolder::add_volumes(const std::vector<VolumePlanes>& volumes, const std::string& name,
+std::vector<fs::path> BakeFolder::add_volumes(const std::vector<bake::VolumePlanes>& volumes, const std::string& name,
                                               const VdbOptions& options) {
-  std::vector<fs::path> files{add_volume(volumes.back(), name, options)};
+  const bake::VolumePlanes& coarsest = volumes.back();
+  manifest_.frame = coarsest.frame;
+  manifest_.volume = write_grids(coarsest, name, options);
+  std::vector<ManifestVolume> all{*manifest_.volume};  // coarsest first
   for (std::size_t finer = 1; finer < volumes.size(); ++finer) {
-    const VolumePlanes& volume = volumes[volumes.size() - 1 - finer];
-    const fs::path vdb = write_grids(volume, name + "_fine" + std::to_string(finer), options);
-    manifest_.finer_volumes.insert(manifest_.finer_volumes.begin(),
-                                   describe_volume(volume, vdb.filename().string(), options));
-    files.push_back(vdb);
+    all.push_back(write_grids(volumes[volumes.size() - 1 - finer], name + "_fine" + std::to_string(finer), options));
   }
+  std::vector<fs::path> files;
+  for (const ManifestVolume& volume : all) files.push_back(folder_ / volume.file);
+  std::ranges::reverse(all);
+  manifest_.finer_volumes.assign(all.begin(), all.end() - 1);
   if (options.usd) {
-    std::vector<ManifestVolume> all = manifest_.finer_volumes;
-    all.push_back(*manifest_.volume);
     const fs::path usd = folder_ / (name + ".usda");
-    write_usd(all, options.up == "poses" ? manifest_.up_axis : options.up, options.metres_per_unit,
-              color_origin_text(manifest_.colorizer, manifest_.take), usd);
+    write_usd(all, up_axis_of_file(options, manifest_.label.world), manifest_.label, usd);
     list(usd);
     files.push_back(usd);
   }
-  manifest_.metres_per_unit = options.metres_per_unit;
   return files;
 }
 
@@ -78,17 +62,15 @@ void BakeFolder::add_plate(const std::string& camera, const std::vector<std::byt
   manifest_.plates[camera] = file;
 }
 
-GltfFiles BakeFolder::add_mesh(const BakedMesh& mesh, const std::string& name, const MeshExportOptions& options) {
-  const std::string color_origin = color_origin_text(mesh.colorizer, mesh.take);
+GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, const std::optional<ExrOptions>& exr) {
   GltfScene scene;
   scene.cameras = manifest_.cameras;
   scene.basecolor_png = basecolor_png(mesh.texture);
-  scene.up_axis = manifest_.up_axis;
-  scene.units = manifest_.units;
-  scene.color_origin = color_origin;
+  scene.label = manifest_.label;
   if (manifest_.volume) scene.vdb = manifest_.volume->file;
-  if (options.exr) {
-    const TextureFiles textures = write_exr_textures(mesh.texture, color_origin, folder_, name, options.textures);
+  if (exr) {
+    const TextureFiles textures =
+        write_exr_textures(mesh.texture, color_origin_text(manifest_.label.provenance), folder_, name, *exr);
     scene.rgb_exr = textures.rgb.filename().string();
     scene.luminance_exr = textures.luminance.filename().string();
     scene.lab_exr = textures.lab.filename().string();
@@ -97,8 +79,6 @@ GltfFiles BakeFolder::add_mesh(const BakedMesh& mesh, const std::string& name, c
   const GltfFiles files = write_gltf(mesh, scene, folder_, name);
   for (const fs::path& file : {files.glb, files.gltf, files.buffer, files.basecolor}) list(file);
 
-  manifest_.colorizer = mesh.colorizer;
-  manifest_.take = mesh.take;
   manifest_.frame = mesh.frame;
   ManifestMesh described = describe_mesh(mesh);
   described.gltf = files.gltf.filename().string();
@@ -107,7 +87,7 @@ GltfFiles BakeFolder::add_mesh(const BakedMesh& mesh, const std::string& name, c
   described.rgb_exr = scene.rgb_exr;
   described.luminance_exr = scene.luminance_exr;
   described.lab_exr = scene.lab_exr;
-  described.gltf_from_world = gltf_from_world(manifest_.up_axis);
+  described.gltf_from_world = gltf_from_world(manifest_.label.world.up_axis);
   manifest_.mesh = described;
   return files;
 }
@@ -130,4 +110,4 @@ void BakeFolder::finish() {
   }
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

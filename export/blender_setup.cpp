@@ -5,7 +5,7 @@
 #include "src/base/check.h"
 #include "src/base/files.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace fs = std::filesystem;
 
 fs::path write_blender_setup(const fs::path& folder) {
@@ -21,4 +21,4 @@ fs::path write_blender_setup(const fs::path& folder) {
   return target;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-namespace cnerf {
+namespace cnerf::exporting {
 
 /// Text of export/blender_setup.py.
 [[nodiscard]] const std::string& blender_setup_text();
@@ -14,4 +14,4 @@ namespace cnerf {
 /// @throws OutputError.
 std::filesystem::path write_blender_setup(const std::filesystem::path& folder);
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

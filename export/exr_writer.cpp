@@ -17,7 +17,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace {
 
 constexpr float kLargestHalf = 65504;
@@ -158,4 +158,4 @@ void write_exr(const std::filesystem::path& file, const ExrImage& image, bool mi
   write_file(file, stream.bytes());
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

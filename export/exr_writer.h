@@ -7,22 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "src/base/options.h"
-
-namespace cnerf {
-
-struct ExrOptions {
-  bool mip = false;               ///< tiles of 64 x 64 with mip-map levels, for renderers that page textures
-  std::string lab_names = "lab";  ///< "lab": Lab.L, Lab.a, Lab.b; "xyz": Lab.X, Lab.Y, Lab.Z, for Blender up to 3.4,
-                                  ///< which sorts L, a, b the wrong way round
-
-  template <typename Visitor>
-  void visit(Visitor&& v) {
-    v("mip", mip, "textures as tiles with mip-map levels");
-    v("lab_names", lab_names, Choice{"lab", "xyz"},
-      "channels of Lab textures: Lab.L Lab.a Lab.b, or Lab.X Lab.Y Lab.Z, whose order Blender keeps");
-  }
-};
+namespace cnerf::exporting {
 
 struct ExrChannel {
   std::string name;
@@ -43,4 +28,4 @@ struct ExrImage {
 /// @throws OutputError    when the file cannot be written.
 void write_exr(const std::filesystem::path& file, const ExrImage& image, bool mip = false);
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

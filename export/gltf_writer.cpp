@@ -13,7 +13,7 @@
 #include "src/base/check.h"
 #include "src/base/files.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace {
 
 using Json = nlohmann::json;
@@ -85,7 +85,7 @@ std::vector<Vec3f> mapped(const std::vector<Vec3f>& values, const Mat3d& rotatio
   return result;
 }
 
-void add_mesh(const BakedMesh& mesh, const Mat3d& rotation, BufferBuilder& buffer, tinygltf::Model& model) {
+void add_mesh(const bake::Mesh& mesh, const Mat3d& rotation, BufferBuilder& buffer, tinygltf::Model& model) {
   tinygltf::Primitive primitive;
   const std::vector<Vec3f> positions = mapped(mesh.positions, rotation);
   Aabbf box = Aabbf::empty();
@@ -96,10 +96,10 @@ void add_mesh(const BakedMesh& mesh, const Mat3d& rotation, BufferBuilder& buffe
   primitive.attributes["POSITION"] = position;
   primitive.attributes["NORMAL"] = buffer.add_vectors(mapped(mesh.normals, rotation));
   const int uv_view =
-      buffer.add_view(mesh.uvs.data(), mesh.uvs.size() * sizeof(TextureCoordinate), TINYGLTF_TARGET_ARRAY_BUFFER);
+      buffer.add_view(mesh.uvs.data(), mesh.uvs.size() * sizeof(bake::TextureCoordinate), TINYGLTF_TARGET_ARRAY_BUFFER);
   primitive.attributes["TEXCOORD_0"] =
       buffer.add_accessor(uv_view, mesh.uvs.size(), TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC2);
-  const int index_view = buffer.add_view(mesh.triangles.data(), mesh.triangles.size() * sizeof(Triangle),
+  const int index_view = buffer.add_view(mesh.triangles.data(), mesh.triangles.size() * sizeof(bake::Triangle),
                                          TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
   primitive.indices = buffer.add_accessor(index_view, 3 * mesh.triangles.size(), TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT,
                                           TINYGLTF_TYPE_SCALAR);
@@ -128,7 +128,7 @@ void add_material(const GltfScene& scene, tinygltf::Model& model) {
   material.pbrMetallicRoughness.roughnessFactor = 1;
   material.pbrMetallicRoughness.baseColorTexture.index = 0;
   Json ours = named_files(scene);
-  ours["color"] = scene.color_origin;
+  ours["color"] = color_origin_text(scene.label.provenance);
   material.extras = extras(ours);
   model.extensionsUsed = {"KHR_materials_unlit"};
   model.materials = {material};
@@ -178,12 +178,13 @@ int camera_index(const Intrinsics& lens, double near, double far, tinygltf::Mode
 }
 
 /// Node of a camera: glTF's look along -Z with +Y up, ours along +Z with +Y down.
-void add_cameras(const std::vector<BakeCamera>& cameras, const Affined& from_world, double size,
+void add_cameras(const std::vector<bake::Camera>& cameras, const Affined& from_world, double size,
                  tinygltf::Model& model) {
   const Affined opencv_from_gltf{{{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}}, {}};
   double farthest = size;
-  for (const BakeCamera& camera : cameras) farthest = std::max(farthest, length(camera.world_from_camera.translation));
-  for (const BakeCamera& camera : cameras) {
+  for (const bake::Camera& camera : cameras)
+    farthest = std::max(farthest, length(camera.world_from_camera.translation));
+  for (const bake::Camera& camera : cameras) {
     const Affined placed = from_world * camera.world_from_camera * opencv_from_gltf;
     tinygltf::Node node;
     node.name = camera.name;
@@ -195,23 +196,23 @@ void add_cameras(const std::vector<BakeCamera>& cameras, const Affined& from_wor
   }
 }
 
-double diagonal(const BakedMesh& mesh) {
+double diagonal(const bake::Mesh& mesh) {
   Aabbf box = Aabbf::empty();
   for (const Vec3f& p : mesh.positions) box.grow(p);
   return length(box.size());
 }
 
 /// Everything but the image.
-tinygltf::Model model_of(const BakedMesh& mesh, const GltfScene& scene) {
-  const Affined from_world = gltf_from_world(scene.up_axis);
+tinygltf::Model model_of(const bake::Mesh& mesh, const GltfScene& scene) {
+  const Affined from_world = gltf_from_world(scene.label.world.up_axis);
   tinygltf::Model model;
   model.asset.version = "2.0";
   model.asset.generator = "cnerf " CNERF_VERSION;
-  model.asset.extras = extras({{"color", scene.color_origin},
-                               {"units", scene.units},
-                               {"up_axis_of_the_poses", scene.up_axis},
-                               {"colorizer", mesh.colorizer},
-                               {"take", mesh.take}});
+  model.asset.extras = extras({{"color", color_origin_text(scene.label.provenance)},
+                               {"units", scene.label.world.units},
+                               {"up_axis_of_the_poses", scene.label.world.up_axis},
+                               {"colorizer", scene.label.provenance.colorizer},
+                               {"take", scene.label.provenance.take}});
   BufferBuilder buffer(model);
   add_mesh(mesh, from_world.linear, buffer, model);
   add_material(scene, model);
@@ -262,7 +263,7 @@ Affined gltf_from_world(const std::string& up_axis) {
   return turned_up(up_axis, "y");
 }
 
-GltfFiles write_gltf(const BakedMesh& mesh, const GltfScene& scene, const std::filesystem::path& folder,
+GltfFiles write_gltf(const bake::Mesh& mesh, const GltfScene& scene, const std::filesystem::path& folder,
                      const std::string& name) {
   CNERF_CHECK(!mesh.triangles.empty(), "an empty mesh cannot be written");
   CNERF_CHECK_EQ(mesh.normals.size(), mesh.positions.size());
@@ -277,4 +278,4 @@ GltfFiles write_gltf(const BakedMesh& mesh, const GltfScene& scene, const std::f
   return files;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

@@ -6,10 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "bake/bake_camera.h"
-#include "bake/baked_mesh.h"
+#include "bake/camera.h"
+#include "bake/mesh.h"
+#include "export/label.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 
 /// glTF is Y-up. The rotation that turns the poses' up axis ("x", "y" or "z") to +Y; for "z" (x, y, z) -> (x, z, -y),
 /// which Blender's importer undoes.
@@ -17,11 +18,9 @@ namespace cnerf {
 
 /// What goes into the files beside the mesh.
 struct GltfScene {
-  std::vector<BakeCamera> cameras;                   ///< of the capture
-  std::vector<std::byte> basecolor_png;              ///< 8-bit sRGB
-  std::string up_axis = "z";                         ///< of the world
-  std::string units = "scene units";                 ///< what a world unit is; recorded only
-  std::string color_origin;                          ///< see color_origin_text
+  std::vector<bake::Camera> cameras;     ///< of the capture
+  std::vector<std::byte> basecolor_png;  ///< 8-bit sRGB
+  Label label;
   std::string rgb_exr, luminance_exr, lab_exr, vdb;  ///< names of files beside these, for `extras`; empty = none
 };
 
@@ -35,7 +34,7 @@ struct GltfFiles {
 /// principal point, which glTF has no place for, stand in its `extras`.
 /// Every file is whole or not there, and a .gltf is written after what it refers to.
 /// @throws ContractError  on an empty mesh or values that are not finite.  @throws OutputError.
-GltfFiles write_gltf(const BakedMesh& mesh, const GltfScene& scene, const std::filesystem::path& folder,
+GltfFiles write_gltf(const bake::Mesh& mesh, const GltfScene& scene, const std::filesystem::path& folder,
                      const std::string& name);
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

@@ -5,213 +5,260 @@
 #include "export/manifest_json.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/json_record.h"
+
+namespace nlohmann {
+
+template <typename Number>
+struct adl_serializer<cnerf::Vec3<Number>> {
+  template <typename Json>
+  static void to_json(Json& json, const cnerf::Vec3<Number>& v) {
+    json = {v.x, v.y, v.z};
+  }
+  template <typename Json>
+  static void from_json(const Json& json, cnerf::Vec3<Number>& v) {
+    for (int axis = 0; axis < 3; ++axis) json.at(std::size_t(axis)).get_to(v[axis]);
+  }
+};
+
+template <>
+struct adl_serializer<cnerf::Aabbd> {
+  template <typename Json>
+  static void to_json(Json& json, const cnerf::Aabbd& box) {
+    json = {{"min", box.min}, {"max", box.max}};
+  }
+  template <typename Json>
+  static void from_json(const Json& json, cnerf::Aabbd& box) {
+    json.at("min").get_to(box.min);
+    json.at("max").get_to(box.max);
+  }
+};
+
+/// Four rows; applies to column vectors.
+template <>
+struct adl_serializer<cnerf::Affined> {
+  template <typename Json>
+  static void to_json(Json& json, const cnerf::Affined& map) {
+    json = Json::array();
+    for (int i = 0; i < 3; ++i) {
+      const cnerf::Vec3d& row = map.linear.rows[i];
+      json.push_back({row.x, row.y, row.z, map.translation[i]});
+    }
+    json.push_back({0.0, 0.0, 0.0, 1.0});
+  }
+  template <typename Json>
+  static void from_json(const Json& json, cnerf::Affined& map) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Json& row = json.at(i);
+      for (std::size_t column = 0; column < 3; ++column) row.at(column).get_to(map.linear.rows[i][int(column)]);
+      row.at(3).get_to(map.translation[int(i)]);
+    }
+  }
+};
+
+}  // namespace nlohmann
 
 namespace cnerf {
+
+NLOHMANN_JSON_SERIALIZE_ENUM(LensModel, {{LensModel::kPinhole, "pinhole"},
+                                         {LensModel::kOpenCv, "opencv"},
+                                         {LensModel::kOpenCvFisheye, "opencv_fisheye"}})
+
+}  // namespace cnerf
+
+namespace cnerf::exporting {
 namespace {
 
 using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
-Json to_json(Vec3d v) {
-  return {v.x, v.y, v.z};
-}
-Vec3d vec3_from(const Json& j) {
-  return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()};
-}
+/// What says how to read a file and is the same in all of them.
+using Text = const std::string;
 
-/// Four rows; applies to column vectors.
-Json to_json(const Affined& map) {
-  Json rows = Json::array();
-  for (int i = 0; i < 3; ++i) {
-    const Vec3d& row = map.linear.rows[i];
-    rows.push_back({row.x, row.y, row.z, map.translation[i]});
+/// A camera of the capture and what shows behind its view.
+struct CameraRecord {
+  bake::Camera camera;
+  std::optional<std::string> plate;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    auto& lens = self.camera.intrinsics;
+    v("name", self.camera.name);
+    v("width", lens.width);
+    v("height", lens.height);
+    v("fx", lens.fx);
+    v("fy", lens.fy);
+    v("cx", lens.cx);
+    v("cy", lens.cy);
+    v("model", lens.model);
+    v("distortion", lens.distortion);
+    v("world_from_camera", self.camera.world_from_camera);
+    v("plate", self.plate);
   }
-  rows.push_back({0.0, 0.0, 0.0, 1.0});
-  return rows;
-}
-Affined affine_from(const Json& rows) {
-  Affined map;
-  for (int i = 0; i < 3; ++i) {
-    map.linear.rows[i] = vec3_from(rows.at(i));
-    map.translation[i] = rows.at(i).at(3).get<double>();
+};
+
+struct FrameRecord {
+  SceneFrame frame;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    static Text name = "source", meaning = "world is the frame the camera poses came in";
+    const SceneFrame& frame = self.frame;
+    const Affined unit_from_world{Mat3d::identity() * frame.unit_per_world, frame.unit_from_world({0, 0, 0})};
+    const Affined world_from_unit = unit_from_world.inverse();
+    v("name", name, kWritten);
+    v("meaning", meaning, kWritten);
+    v("world_centre", self.frame.world_centre);
+    v("unit_per_world", self.frame.unit_per_world);
+    v("cascades", self.frame.cascades);
+    v("unit_from_world", unit_from_world, kWritten);
+    v("world_from_unit", world_from_unit, kWritten);
   }
-  return map;
-}
+};
 
-const std::vector<std::pair<LensModel, std::string>> kLensNames{
-    {LensModel::kPinhole, "pinhole"}, {LensModel::kOpenCv, "opencv"}, {LensModel::kOpenCvFisheye, "opencv_fisheye"}};
+struct ColorRecord {
+  std::string colorizer, take;
 
-Json to_json(const BakeCamera& camera) {
-  const Intrinsics& lens = camera.intrinsics;
-  std::string model;
-  for (const auto& [value, name] : kLensNames) {
-    if (value == lens.model) model = name;
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    static Text space = "lin_rec709", white = "D65";
+    const bool is_inferred = !self.colorizer.empty();
+    v("space", space, kWritten);
+    v("white", white, kWritten);
+    v("inferred", is_inferred, kWritten);
+    v("colorizer", self.colorizer);
+    v("take", self.take);
   }
-  return {{"name", camera.name},
-          {"width", lens.width},
-          {"height", lens.height},
-          {"fx", lens.fx},
-          {"fy", lens.fy},
-          {"cx", lens.cx},
-          {"cy", lens.cy},
-          {"model", model},
-          {"distortion", lens.distortion},
-          {"world_from_camera", to_json(camera.world_from_camera)}};
-}
+};
 
-BakeCamera camera_from(const Json& j) {
-  BakeCamera camera;
-  Intrinsics& lens = camera.intrinsics;
-  camera.name = j.at("name").get<std::string>();
-  lens.width = j.at("width").get<int>();
-  lens.height = j.at("height").get<int>();
-  lens.fx = j.at("fx").get<double>();
-  lens.fy = j.at("fy").get<double>();
-  lens.cx = j.at("cx").get<double>();
-  lens.cy = j.at("cy").get<double>();
-  for (const auto& [value, name] : kLensNames) {
-    if (name == j.at("model").get<std::string>()) lens.model = value;
+struct TextureRecord {
+  std::string file, space;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("file", self.file);
+    v("space", self.space, kLater);
   }
-  lens.distortion = j.at("distortion").get<std::array<double, 8>>();
-  camera.world_from_camera = affine_from(j.at("world_from_camera"));
-  return camera;
-}
+};
 
-Json to_json(const ManifestVolume& volume) {
-  return {{"file", volume.file},
-          {"bounds", {{"min", to_json(volume.bounds.min)}, {"max", to_json(volume.bounds.max)}}},
-          {"voxel_size", volume.voxel_size},
-          {"resolution", {volume.resolution.x, volume.resolution.y, volume.resolution.z}},
-          {"voxels", volume.voxels},
-          {"max_density", volume.max_density},
-          {"density_unit", "1/world unit"},
-          {"voxel_origin", volume.voxel_origin},
-          {"half_density", volume.half_density},
-          {"density_scale", volume.density_scale},
-          {"file_from_world", to_json(volume.file_from_world)},
-          {"world_from_file", to_json(volume.file_from_world.inverse())}};
-}
+struct TexturesRecord {
+  TextureRecord basecolor, rgb, luminance, lab;
 
-ManifestVolume volume_from(const Json& j) {
-  ManifestVolume volume;
-  volume.file = j.at("file").get<std::string>();
-  volume.bounds = {vec3_from(j.at("bounds").at("min")), vec3_from(j.at("bounds").at("max"))};
-  volume.voxel_size = j.at("voxel_size").get<double>();
-  volume.resolution = vec3_from(j.at("resolution")).cast<int>();
-  volume.voxels = j.at("voxels").get<std::size_t>();
-  volume.max_density = j.at("max_density").get<double>();
-  volume.voxel_origin = j.at("voxel_origin").get<std::string>();
-  volume.half_density = j.at("half_density").get<bool>();
-  volume.density_scale = j.value("density_scale", 1.0);
-  if (j.contains("file_from_world")) volume.file_from_world = affine_from(j.at("file_from_world"));
-  return volume;
-}
-
-Json to_json(const ManifestMesh& mesh) {
-  const Json textures{{"basecolor", {{"file", mesh.basecolor}, {"space", "sRGB, 8 bit"}}},
-                      {"rgb", {{"file", mesh.rgb_exr}, {"space", "lin_rec709"}}},
-                      {"luminance", {{"file", mesh.luminance_exr}, {"space", "linear luminance, Rec.709 Y"}}},
-                      {"lab", {{"file", mesh.lab_exr}, {"space", "CIE 1976 L*a*b*, D65, 2 degrees; data"}}}};
-  return {{"gltf", mesh.gltf},
-          {"glb", mesh.glb},
-          {"textures", textures},
-          {"bounds", {{"min", to_json(mesh.bounds.min)}, {"max", to_json(mesh.bounds.max)}}},
-          {"vertices", mesh.vertices},
-          {"faces", mesh.faces},
-          {"texture_size", mesh.texture_size},
-          {"gutter", mesh.gutter},
-          {"charts", mesh.charts},
-          {"voxel_size", mesh.voxel_size},
-          {"gltf_from_world", to_json(mesh.gltf_from_world)},
-          {"world_from_gltf", to_json(mesh.gltf_from_world.inverse())}};
-}
-
-ManifestMesh mesh_from(const Json& j) {
-  ManifestMesh mesh;
-  const auto texture = [&](const char* name) { return j.at("textures").at(name).at("file").get<std::string>(); };
-  mesh.gltf = j.at("gltf").get<std::string>();
-  mesh.glb = j.at("glb").get<std::string>();
-  mesh.basecolor = texture("basecolor");
-  mesh.rgb_exr = texture("rgb");
-  mesh.luminance_exr = texture("luminance");
-  mesh.lab_exr = texture("lab");
-  mesh.bounds = {vec3_from(j.at("bounds").at("min")), vec3_from(j.at("bounds").at("max"))};
-  mesh.vertices = j.at("vertices").get<std::size_t>();
-  mesh.faces = j.at("faces").get<std::size_t>();
-  mesh.texture_size = j.at("texture_size").get<int>();
-  mesh.gutter = j.at("gutter").get<int>();
-  mesh.charts = j.at("charts").get<int>();
-  mesh.voxel_size = j.at("voxel_size").get<double>();
-  mesh.gltf_from_world = affine_from(j.at("gltf_from_world"));
-  return mesh;
-}
-
-Json to_json(const SceneFrame& frame) {
-  const double scale = frame.unit_per_world;
-  const Affined unit_from_world{Mat3d::identity() * scale, frame.unit_from_world({0, 0, 0})};
-  return {{"name", "source"},
-          {"meaning", "world is the frame the camera poses came in"},
-          {"world_centre", to_json(frame.world_centre)},
-          {"unit_per_world", scale},
-          {"cascades", frame.cascades},
-          {"unit_from_world", to_json(unit_from_world)},
-          {"world_from_unit", to_json(unit_from_world.inverse())}};
-}
-
-SceneFrame frame_from(const Json& j) {
-  return {vec3_from(j.at("world_centre")), j.at("unit_per_world").get<double>(), j.at("cascades").get<int>()};
-}
-
-Json describe_files(const std::vector<std::string>& files, const fs::path& folder) {
-  Json list = Json::array();
-  for (const std::string& name : files) {
-    const std::string checksum = sha256_of_file(folder / name);
-    list.push_back({{"name", name}, {"bytes", fs::file_size(folder / name)}, {"sha256", checksum}});
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("basecolor", self.basecolor);
+    v("rgb", self.rgb);
+    v("luminance", self.luminance);
+    v("lab", self.lab);
   }
-  return list;
-}
+};
 
-BakeManifest manifest_from(const Json& j) {
+struct FileRecord {
+  std::string name;
+  std::uintmax_t bytes = 0;
+  std::string sha256;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("name", self.name);
+    v("bytes", self.bytes, kLater);
+    v("sha256", self.sha256, kLater);
+  }
+};
+
+/// All of the file.
+struct ManifestRecord {
+  int schema = kManifestSchema;
   BakeManifest manifest;
-  manifest.command_line = j.at("command_line").get<std::vector<std::string>>();
-  for (const Json& file : j.at("files")) manifest.files.push_back(file.at("name").get<std::string>());
-  manifest.units = j.at("units").get<std::string>();
-  manifest.up_axis = j.at("up_axis").get<std::string>();
-  manifest.colorizer = j.at("color").at("colorizer").get<std::string>();
-  manifest.take = j.at("color").at("take").get<std::string>();
-  manifest.frame = frame_from(j.at("frame"));
-  manifest.metres_per_unit = j.value("metres_per_unit", 1.0);
-  for (const Json& camera : j.at("cameras")) {
-    manifest.cameras.push_back(camera_from(camera));
-    if (camera.contains("plate")) manifest.plates[manifest.cameras.back().name] = camera.at("plate").get<std::string>();
+  std::vector<FileRecord> files;
+  ColorRecord color;
+  FrameRecord frame;
+  std::vector<CameraRecord> cameras;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    static Text program = "cnerf", version = CNERF_VERSION;
+    static Text axes = "+X right, +Y down, +Z forward; centre of the first pixel at (0.5, 0.5)";
+    auto& [provenance, world] = self.manifest.label;
+    v("schema", self.schema);
+    v("program", program, kWritten);
+    v("program_version", version, kWritten);
+    v("command_line", provenance.command_line);
+    v("files", self.files);
+    v("units", world.units);
+    v("up_axis", world.up_axis);
+    v("metres_per_unit", world.metres_per_unit, kLater);
+    v("color", self.color);
+    v("frame", self.frame);
+    v("volume", self.manifest.volume, kNullable);
+    v("finer_volumes", self.manifest.finer_volumes, kLater);
+    v("mesh", self.manifest.mesh, kNullable);
+    v("camera_axes", axes, kWritten);
+    v("cameras", self.cameras);
   }
-  if (!j.at("volume").is_null()) manifest.volume = volume_from(j.at("volume"));
-  if (j.contains("finer_volumes")) {
-    for (const Json& volume : j.at("finer_volumes")) manifest.finer_volumes.push_back(volume_from(volume));
-  }
-  if (j.contains("mesh") && !j.at("mesh").is_null()) manifest.mesh = mesh_from(j.at("mesh"));
-  return manifest;
-}
+};
 
 }  // namespace
 
-Json camera_json(const BakeCamera& camera) {
-  return to_json(camera);
-}
-Json frame_json(const SceneFrame& frame) {
-  return to_json(frame);
-}
-Json color_json(const std::string& colorizer, const std::string& take) {
-  return {{"space", "lin_rec709"},
-          {"white", "D65"},
-          {"inferred", !colorizer.empty()},
-          {"colorizer", colorizer},
-          {"take", take}};
+template <typename Self, typename Visitor>
+void ManifestVolume::visit(Self& self, Visitor&& v) {
+  static Text unit = "1/world unit";
+  const Affined world_from_file = self.file_from_world.inverse();
+  v("file", self.file);
+  v("bounds", self.bounds);
+  v("voxel_size", self.voxel_size);
+  v("resolution", self.resolution);
+  v("voxels", self.voxels);
+  v("max_density", self.max_density);
+  v("density_unit", unit, kWritten);
+  v("voxel_origin", self.voxel_origin);
+  v("half_density", self.half_density);
+  v("density_scale", self.density_scale, kLater);
+  v("file_from_world", self.file_from_world, kLater);
+  v("world_from_file", world_from_file, kWritten);
 }
 
-ManifestVolume describe_volume(const VolumePlanes& volume, const std::string& file, const VdbOptions& options) {
-  const VolumeStatistics statistics = statistics_of(volume);
-  const VoxelBox& box = statistics.dense;
+template <typename Self, typename Visitor>
+void ManifestMesh::visit(Self& self, Visitor&& v) {
+  TexturesRecord textures{{self.basecolor, "sRGB, 8 bit"},
+                          {self.rgb_exr, "lin_rec709"},
+                          {self.luminance_exr, "linear luminance, Rec.709 Y"},
+                          {self.lab_exr, "CIE 1976 L*a*b*, D65, 2 degrees; data"}};
+  const Affined world_from_gltf = self.gltf_from_world.inverse();
+  v("gltf", self.gltf);
+  v("glb", self.glb);
+  v("textures", textures);
+  v("bounds", self.bounds);
+  v("vertices", self.vertices);
+  v("faces", self.faces);
+  v("texture_size", self.texture_size);
+  v("gutter", self.gutter);
+  v("charts", self.charts);
+  v("voxel_size", self.voxel_size);
+  v("gltf_from_world", self.gltf_from_world);
+  v("world_from_gltf", world_from_gltf, kWritten);
+  if constexpr (!std::is_const_v<Self>) {
+    self.basecolor = textures.basecolor.file;
+    self.rgb_exr = textures.rgb.file;
+    self.luminance_exr = textures.luminance.file;
+    self.lab_exr = textures.lab.file;
+  }
+}
+
+Json camera_json(const bake::Camera& camera) {
+  return to_json(CameraRecord{camera, {}});
+}
+Json frame_json(const SceneFrame& frame) {
+  return to_json(FrameRecord{frame});
+}
+Json color_json(const bake::Provenance& provenance) {
+  return to_json(ColorRecord{provenance.colorizer, provenance.take});
+}
+
+ManifestVolume describe_volume(const bake::VolumePlanes& volume, const std::string& file, const VdbOptions& options,
+                               const WorldConvention& world) {
+  const bake::VolumeStatistics& statistics = volume.statistics;
+  const bake::VoxelBox& box = statistics.dense;
   const double h = volume.voxel_size;
   ManifestVolume described;
   described.file = file;
@@ -223,12 +270,11 @@ ManifestVolume describe_volume(const VolumePlanes& volume, const std::string& fi
   described.max_density = statistics.max_sigma;
   described.voxel_origin = options.voxel_origin;
   described.half_density = density_fits_half(statistics, options);
-  described.density_scale = density_scale(statistics, options);
-  described.file_from_world = file_from_world(options);
+  described.file_from_world = file_from_world(options, world);
   return described;
 }
 
-ManifestMesh describe_mesh(const BakedMesh& mesh) {
+ManifestMesh describe_mesh(const bake::Mesh& mesh) {
   ManifestMesh described;
   described.bounds = Aabbd::empty();
   for (const Vec3f& p : mesh.positions) described.bounds.grow(p.cast<double>());
@@ -242,48 +288,41 @@ ManifestMesh describe_mesh(const BakedMesh& mesh) {
 }
 
 fs::path write_manifest(const BakeManifest& manifest, const fs::path& folder) {
-  Json cameras = Json::array();
-  for (const BakeCamera& camera : manifest.cameras) {
-    cameras.push_back(to_json(camera));
-    const auto plate = manifest.plates.find(camera.name);
-    if (plate != manifest.plates.end()) cameras.back()["plate"] = plate->second;
+  ManifestRecord record{
+      kManifestSchema,  manifest, {}, {manifest.label.provenance.colorizer, manifest.label.provenance.take},
+      {manifest.frame}, {}};
+  for (const std::string& name : manifest.files) {
+    std::string checksum = sha256_of_file(folder / name);
+    record.files.push_back({name, fs::file_size(folder / name), std::move(checksum)});
   }
-  Json finer = Json::array();
-  for (const ManifestVolume& volume : manifest.finer_volumes) finer.push_back(to_json(volume));
-  const Json j{{"schema", kManifestSchema},
-               {"program", "cnerf"},
-               {"program_version", CNERF_VERSION},
-               {"command_line", manifest.command_line},
-               {"files", describe_files(manifest.files, folder)},
-               {"units", manifest.units},
-               {"up_axis", manifest.up_axis},
-               {"metres_per_unit", manifest.metres_per_unit},
-               {"color", color_json(manifest.colorizer, manifest.take)},
-               {"frame", to_json(manifest.frame)},
-               {"volume", manifest.volume ? to_json(*manifest.volume) : Json(nullptr)},
-               {"finer_volumes", finer},
-               {"mesh", manifest.mesh ? to_json(*manifest.mesh) : Json(nullptr)},
-               {"camera_axes", "+X right, +Y down, +Z forward; centre of the first pixel at (0.5, 0.5)"},
-               {"cameras", cameras}};
+  for (const bake::Camera& camera : manifest.cameras) {
+    const auto plate = manifest.plates.find(camera.name);
+    record.cameras.push_back({camera, plate == manifest.plates.end() ? std::nullopt : std::optional(plate->second)});
+  }
   const fs::path file = folder / "manifest.json";
-  write_file(file, j.dump(2) + "\n");
+  write_file(file, to_json(record).dump(2) + "\n");
   return file;
 }
 
 BakeManifest read_manifest(const fs::path& file) {
-  const std::string text = read_text_file(file);
-  try {
-    const Json j = Json::parse(text);
-    const int schema = j.at("schema").get<int>();
-    if (schema > kManifestSchema) {
-      throw InputError(file, "schema",
-                       "expected at most " + std::to_string(kManifestSchema) + ", found " + std::to_string(schema) +
-                           ": written by a newer cnerf");
-    }
-    return manifest_from(j);
-  } catch (const nlohmann::json::exception& failure) {
-    throw InputError(file, "", failure.what());
+  const Json json = read_json(file);
+  const Json schema = json.is_object() ? json.value("schema", Json()) : Json();
+  if (schema.is_number_integer() && schema.get<int>() > kManifestSchema) {
+    throw InputError(file, "schema",
+                     "expected at most " + std::to_string(kManifestSchema) + ", found " + schema.dump() +
+                         ": written by a newer cnerf");
   }
+  auto record = from_json<ManifestRecord>(json, file);
+  BakeManifest& manifest = record.manifest;
+  manifest.label.provenance.colorizer = record.color.colorizer;
+  manifest.label.provenance.take = record.color.take;
+  manifest.frame = record.frame.frame;
+  for (const FileRecord& each : record.files) manifest.files.push_back(each.name);
+  for (const CameraRecord& each : record.cameras) {
+    manifest.cameras.push_back(each.camera);
+    if (each.plate) manifest.plates[each.camera.name] = *each.plate;
+  }
+  return std::move(manifest);
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

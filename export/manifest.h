@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "bake/bake_camera.h"
-#include "bake/baked_mesh.h"
-#include "bake/baked_volume.h"
+#include "bake/camera.h"
+#include "bake/mesh.h"
+#include "bake/volume.h"
 #include "export/vdb_writer.h"
 #include "src/base/aabb.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 
 inline constexpr int kManifestSchema = 1;
 
@@ -27,11 +27,14 @@ struct ManifestVolume {
   double max_density = 0;    ///< 1/world unit
   std::string voxel_origin;  ///< "center" or "corner", see VdbOptions
   bool half_density = true;  ///< density is stored in 16 bits
-  double density_scale = 1;  ///< what the file's density is to be multiplied with, 1/world unit
+  double density_scale = 1;  ///< what the file's density is to be multiplied with; earlier versions could normalize it
   Affined file_from_world;   ///< a rotation, see VdbOptions::up
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v);
 };
-[[nodiscard]] ManifestVolume describe_volume(const VolumePlanes& volume, const std::string& file,
-                                             const VdbOptions& options);
+[[nodiscard]] ManifestVolume describe_volume(const bake::VolumePlanes& volume, const std::string& file,
+                                             const VdbOptions& options, const WorldConvention& world);
 
 /// The mesh of a bake. File names are relative to the manifest; empty = not written.
 struct ManifestMesh {
@@ -42,20 +45,18 @@ struct ManifestMesh {
   int texture_size = 0, gutter = 0, charts = 0;
   double voxel_size = 0;    ///< world units; of the density it was cut from
   Affined gltf_from_world;  ///< a rotation: glTF is Y-up
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v);
 };
 /// All but the names of files and the rotation.
-[[nodiscard]] ManifestMesh describe_mesh(const BakedMesh& mesh);
+[[nodiscard]] ManifestMesh describe_mesh(const bake::Mesh& mesh);
 
 struct BakeManifest {
-  std::vector<std::string> command_line;
+  Label label;
   std::vector<std::string> files;  ///< relative to the manifest; their sizes and SHA-256 are added when writing
-  std::string units = "scene units";
-  std::string up_axis = "z";
-  double metres_per_unit = 1;  ///< of the world; 1 where nobody knows
-  std::string colorizer;       ///< empty = not colorized
-  std::string take;
   SceneFrame frame;
-  std::vector<BakeCamera> cameras;            ///< of the capture
+  std::vector<bake::Camera> cameras;          ///< of the capture
   std::map<std::string, std::string> plates;  ///< camera's name -> its photograph without lens distortion, a file
   std::optional<ManifestVolume> volume;       ///< the only grid, or the coarsest of nested ones
   std::vector<ManifestVolume> finer_volumes;  ///< inside of it, finest first; each coarser one is empty there
@@ -69,4 +70,4 @@ std::filesystem::path write_manifest(const BakeManifest& manifest, const std::fi
 /// Reads it back.  @throws MissingInputError, InputError  naming the field; also for a newer schema.
 [[nodiscard]] BakeManifest read_manifest(const std::filesystem::path& file);
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

@@ -2,15 +2,15 @@
 /// The parts of manifest.json that bundle.json repeats word by word.
 
 #include <nlohmann/json.hpp>
-#include <string>
 
-#include "bake/bake_camera.h"
+#include "bake/camera.h"
+#include "bake/provenance.h"
 #include "src/field/scene_frame.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 
-[[nodiscard]] nlohmann::ordered_json camera_json(const BakeCamera& camera);
+[[nodiscard]] nlohmann::ordered_json camera_json(const bake::Camera& camera);
 [[nodiscard]] nlohmann::ordered_json frame_json(const SceneFrame& frame);
-[[nodiscard]] nlohmann::ordered_json color_json(const std::string& colorizer, const std::string& take);
+[[nodiscard]] nlohmann::ordered_json color_json(const bake::Provenance& provenance);
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

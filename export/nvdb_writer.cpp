@@ -11,7 +11,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace {
 
 /// One of the two kinds of grids that a bake has.
@@ -23,8 +23,9 @@ nanovdb::GridHandle<> nano_grid(const openvdb::GridBase::Ptr& grid) {
 
 }  // namespace
 
-void write_nvdb(const VolumePlanes& volume, const std::filesystem::path& path, const VdbOptions& options) {
-  const VdbGrids grids(volume, options);
+void write_nvdb(const bake::VolumePlanes& volume, const std::filesystem::path& path, const VdbOptions& options,
+                const Label& label) {
+  const VdbGrids grids(volume, options, label);
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     errno = 0;
     std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
@@ -36,4 +37,4 @@ void write_nvdb(const VolumePlanes& volume, const std::filesystem::path& path, c
   });
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

@@ -2,7 +2,7 @@
 
 #include "src/base/check.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace {
 
 constexpr Mat3d kYUpFromX{{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}};
@@ -22,4 +22,4 @@ Affined turned_up(const std::string& up_axis, const std::string& to) {
   return {to == "y" ? y_up : kYUpFromZ.transposed() * y_up, {}};
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

@@ -4,7 +4,7 @@
 
 #include "src/base/files.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace {
 
 struct Field {
@@ -50,13 +50,13 @@ std::string volume_prim(const ManifestVolume& volume, std::size_t number) {
 
 }  // namespace
 
-void write_usd(const std::vector<ManifestVolume>& volumes, const std::string& up_axis, double metres_per_unit,
-               const std::string& color_origin, const std::filesystem::path& file) {
+void write_usd(const std::vector<ManifestVolume>& volumes, const std::string& up_axis, const Label& label,
+               const std::filesystem::path& file) {
   const bool x_up = up_axis == "x";
   std::string text = fmt::format(
       "#usda 1.0\n(\n    defaultPrim = \"cnerf\"\n    doc = {}\n    metersPerUnit = {}\n    upAxis = \"{}\"\n)\n\n"
       "def Xform \"cnerf\"\n{{\n",
-      quoted(color_origin), metres_per_unit, up_axis == "y" ? "Y" : "Z");
+      quoted(color_origin_text(label.provenance)), label.world.metres_per_unit, up_axis == "y" ? "Y" : "Z");
   if (x_up) {
     text += "    double3 xformOp:rotateXYZ = (0, -90, 0)\n    uniform token[] xformOpOrder = [\"xformOp:rotateXYZ\"]\n";
   }
@@ -64,4 +64,4 @@ void write_usd(const std::vector<ManifestVolume>& volumes, const std::string& up
   write_file(file, text + "}\n");
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

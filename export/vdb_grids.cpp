@@ -5,12 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bake/dilate.h"
 #include "export/up_axis.h"
 #include "src/base/check.h"
 #include "src/base/parallel.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 
 class VdbGrids::Builder {
  public:
@@ -20,7 +19,7 @@ class VdbGrids::Builder {
   Builder& operator=(const Builder&) = delete;
 
   /// Of one part of the volume; parts may be added at the same time.
-  virtual void add(std::size_t part, std::span<const BakedVoxel> voxels) = 0;
+  virtual void add(std::size_t part, std::span<const bake::Voxel> voxels) = 0;
   [[nodiscard]] virtual openvdb::GridBase::Ptr finish() = 0;
 };
 
@@ -29,40 +28,23 @@ namespace {
 using Content = VdbGrids::Content;
 using BuilderPtr = std::unique_ptr<VdbGrids::Builder>;
 
+constexpr int kPadding = 1;  ///< voxels of zeros around what is active
 constexpr float kHalfMax = 65504.0f;
 constexpr float kHalfMinNormal = 0x1p-14f;  ///< below it a half loses digits
-
-VoxelBox grown(const VoxelBox& box, int margin) {
-  const Vec3i m{margin, margin, margin};
-  return {box.min - m, box.size + m + m};
-}
-
-VoxelBox both(const VoxelBox& a, const VoxelBox& b) {
-  VoxelBox box;
-  for (int axis = 0; axis < 3; ++axis) {
-    box.min[axis] = std::min(a.min[axis], b.min[axis]);
-    box.size[axis] = std::max(a.min[axis] + a.size[axis], b.min[axis] + b.size[axis]) - box.min[axis];
-  }
-  return box;
-}
 
 void check_options(const VdbOptions& options) {
   CNERF_CHECK(options.voxel_origin == "center" || options.voxel_origin == "corner", options.voxel_origin);
   CNERF_CHECK(options.compression == "blosc" || options.compression == "zip" || options.compression == "none",
               options.compression);
   CNERF_CHECK(options.up == "poses" || options.up == "y" || options.up == "z", options.up);
-  CNERF_CHECK(options.dilation >= 2 && options.padding >= 1, "dilation must be at least 2, padding at least 1");
 }
 
-Content content_of(const VolumePlanes& volume, const VdbOptions& options) {
+Content content_of(const bake::VolumePlanes& volume, const VdbOptions& options, const Label& label) {
   check_options(options);
   CNERF_CHECK(std::isfinite(volume.voxel_size) && volume.voxel_size > 0, "voxel size must be positive");
+  CNERF_CHECK(!volume.statistics.all.is_empty(), "an empty volume cannot be written");
   openvdb::initialize();
-  const VolumeStatistics statistics = statistics_of(volume);
-  CNERF_CHECK(statistics.all.size.x > 0, "an empty volume cannot be written");
-  VoxelBox active = statistics.all;
-  if (statistics.voxels > 0) active = both(active, grown(statistics.dense, options.dilation));
-  return {dilated(volume, options.dilation), statistics, grown(active, options.padding), options};
+  return {volume, volume.statistics.all.grown(kPadding), options, label};
 }
 
 openvdb::Mat4d row_vector_matrix(const Affined& map) {
@@ -74,11 +56,12 @@ openvdb::Mat4d row_vector_matrix(const Affined& map) {
   return matrix;
 }
 
-openvdb::math::Transform::Ptr transform_of(const VolumeHeader& volume, const VdbOptions& options) {
+openvdb::math::Transform::Ptr transform_of(const bake::VolumeHeader& volume, const VdbOptions& options,
+                                           const WorldConvention& world) {
   const double shift = options.voxel_origin == "center" ? volume.voxel_size / 2 : 0;
   auto transform = openvdb::math::Transform::createLinearTransform(volume.voxel_size);
   transform->postTranslate({volume.origin.x + shift, volume.origin.y + shift, volume.origin.z + shift});
-  const Affined turn = file_from_world(options);
+  const Affined turn = file_from_world(options, world);
   if (!(turn.linear == Mat3d::identity())) transform->postMult(row_vector_matrix(turn));
   return transform;
 }
@@ -99,15 +82,15 @@ class GridBuilder final : public VdbGrids::Builder {
   }
   [[nodiscard]] Grid& grid() { return *grid_; }
 
-  void add(std::size_t part, std::span<const BakedVoxel> voxels) override {
+  void add(std::size_t part, std::span<const bake::Voxel> voxels) override {
     openvdb::tree::ValueAccessor<Tree> accessor(*trees_[part]);
-    for (const BakedVoxel& voxel : voxels) accessor.setValueOn({voxel.i, voxel.j, voxel.k}, value_of_(voxel));
+    for (const bake::Voxel& voxel : voxels) accessor.setValueOn({voxel.i, voxel.j, voxel.k}, value_of_(voxel));
   }
   [[nodiscard]] openvdb::GridBase::Ptr finish() override {
     for (const auto& tree : trees_) grid_->tree().merge(*tree, openvdb::MERGE_ACTIVE_STATES);
     const Vec3i low = box_.min, high = low + box_.size - Vec3i{1, 1, 1};
     for (const Vec3i corner : {low, high}) {
-      grid_->tree().setValueOn({corner.x, corner.y, corner.z}, value_of_(BakedVoxel{}));
+      grid_->tree().setValueOn({corner.x, corner.y, corner.z}, value_of_(bake::Voxel{}));
     }
     openvdb::tools::prune(grid_->tree());  // full leaves of one value, as the insides of a grey bake's colours
     return grid_;
@@ -117,7 +100,7 @@ class GridBuilder final : public VdbGrids::Builder {
   using Tree = typename Grid::TreeType;
 
   typename Grid::Ptr grid_;
-  VoxelBox box_;
+  bake::VoxelBox box_;
   ValueOf value_of_;
   std::vector<typename Tree::Ptr> trees_;  ///< of the parts, which end where leaves do: no leaf is in two of them
 };
@@ -136,7 +119,7 @@ struct Stored {
 
 BuilderPtr color_grid(const std::string& name, const Content& content) {
   auto builder =
-      grid_builder<openvdb::Vec3SGrid>(name, content, [stored = Stored{content.options.half}](const BakedVoxel& v) {
+      grid_builder<openvdb::Vec3SGrid>(name, content, [stored = Stored{content.options.half}](const bake::Voxel& v) {
         return openvdb::Vec3s(stored(v.rgb.x), stored(v.rgb.y), stored(v.rgb.z));
       });
   builder->grid().setVectorType(openvdb::VEC_INVARIANT);
@@ -144,67 +127,48 @@ BuilderPtr color_grid(const std::string& name, const Content& content) {
   return builder;
 }
 
-BuilderPtr emission_grid(const Content& content) {
-  auto builder = grid_builder<openvdb::Vec3SGrid>(
-      "emission", content, [stored = Stored{content.options.half}](const BakedVoxel& v) {
-        const Vec3f emission = v.rgb * v.sigma;
-        return openvdb::Vec3s(stored(emission.x), stored(emission.y), stored(emission.z));
-      });
-  builder->grid().setVectorType(openvdb::VEC_INVARIANT);
-  builder->grid().insertMeta("colorspace", openvdb::StringMetadata("lin_rec709"));
-  builder->grid().insertMeta("meaning", openvdb::StringMetadata("density times color, per world unit"));
-  return builder;
-}
-
 BuilderPtr float_grid(const std::string& name, const std::string& meaning, const Content& content,
-                      float BakedVoxel::*member) {
+                      float bake::Voxel::*member) {
   auto builder = grid_builder<openvdb::FloatGrid>(
       name, content,
-      [stored = Stored{content.options.half}, member](const BakedVoxel& v) { return stored(v.*member); });
+      [stored = Stored{content.options.half}, member](const bake::Voxel& v) { return stored(v.*member); });
   builder->grid().insertMeta("meaning", openvdb::StringMetadata(meaning));
   return builder;
 }
 
 BuilderPtr density_grid(const Content& content) {
-  auto builder = grid_builder<openvdb::FloatGrid>(
-      "density", content, [scale = density_scale(content.statistics, content.options)](const BakedVoxel& v) {
-        return float(v.sigma / scale);
-      });
-  builder->grid().insertMeta("meaning", openvdb::StringMetadata(content.options.normalize_density
-                                                                    ? "extinction in units of cnerf_density_scale"
-                                                                    : "extinction, 1/world unit"));
+  auto builder = grid_builder<openvdb::FloatGrid>("density", content, [](const bake::Voxel& v) { return v.sigma; });
+  builder->grid().insertMeta("meaning", openvdb::StringMetadata("extinction, 1/world unit"));
   return builder;
 }
 
 }  // namespace
 
-Affined file_from_world(const VdbOptions& options) {
-  return options.up == "poses" ? Affined{} : turned_up(options.up_axis, options.up);
+Affined file_from_world(const VdbOptions& options, const WorldConvention& world) {
+  return options.up == "poses" ? Affined{} : turned_up(world.up_axis, options.up);
 }
 
-double density_scale(const VolumeStatistics& volume, const VdbOptions& options) {
-  return options.normalize_density && volume.max_sigma > 0 ? volume.max_sigma : 1;
+std::string up_axis_of_file(const VdbOptions& options, const WorldConvention& world) {
+  return options.up == "poses" ? world.up_axis : options.up;
 }
 
-bool density_fits_half(const VolumeStatistics& volume, const VdbOptions& options) {
+bool density_fits_half(const bake::VolumeStatistics& volume, const VdbOptions& options) {
   if (!options.half || volume.voxels == 0) return options.half;
-  const auto scale = float(density_scale(volume, options));
-  return volume.max_sigma / scale <= kHalfMax && volume.min_sigma / scale >= kHalfMinNormal;
+  return volume.max_sigma <= kHalfMax && volume.min_sigma >= kHalfMinNormal;
 }
 
-VdbGrids::VdbGrids(const VolumePlanes& volume, const VdbOptions& options)
-    : content_(content_of(volume, options)), transform_(transform_of(volume, options)) {
+VdbGrids::VdbGrids(const bake::VolumePlanes& volume, const VdbOptions& options, const Label& label)
+    : content_(content_of(volume, options, label)), transform_(transform_of(volume, options, label.world)) {
   const auto color = [](const char* name) { return [name](const Content& c) { return color_grid(name, c); }; };
-  const auto scalar = [](const char* name, const char* meaning, float BakedVoxel::*member) {
+  const auto scalar = [](const char* name, const char* meaning, float bake::Voxel::*member) {
     return [=](const Content& c) { return float_grid(name, meaning, c, member); };
   };
   const bool half = options.half;
-  recipes_ = {{density_grid, density_fits_half(content_.statistics, options)}, {color("color"), half}};
+  recipes_ = {{density_grid, density_fits_half(volume.statistics, options)}, {color("color"), half}};
   if (options.houdini) recipes_.push_back({color("Cd"), half});
-  if (options.emission) recipes_.push_back({emission_grid, half});
-  recipes_.push_back({scalar("lab_a", "CIE 1976 a, D65", &BakedVoxel::a), half});
-  recipes_.push_back({scalar("lab_b", "CIE 1976 b, D65", &BakedVoxel::b), half});
-  recipes_.push_back({scalar("luminance", "linear Y", &BakedVoxel::luminance), half});
+  recipes_.push_back({scalar("lab_a", "CIE 1976 a, D65", &bake::Voxel::a), half});
+  recipes_.push_back({scalar("lab_b", "CIE 1976 b, D65", &bake::Voxel::b), half});
+  recipes_.push_back({scalar("luminance", "linear Y", &bake::Voxel::luminance), half});
 }
 
 openvdb::GridBase::Ptr VdbGrids::make(std::size_t number) const {
@@ -218,7 +182,7 @@ std::vector<openvdb::GridBase::Ptr> VdbGrids::make_all() const {
 std::vector<openvdb::GridBase::Ptr> VdbGrids::make(std::span<const Recipe> recipes) const {
   std::vector<BuilderPtr> builders;
   for (const Recipe& recipe : recipes) builders.push_back(recipe.begin(content_));
-  visit_parts(content_.volume, [&](std::size_t part, const std::vector<BakedVoxel>& voxels) {
+  visit_parts(content_.volume, [&](std::size_t part, const std::vector<bake::Voxel>& voxels) {
     for (const BuilderPtr& builder : builders) builder->add(part, voxels);
   });
   std::vector<openvdb::GridBase::Ptr> grids(recipes.size());
@@ -232,30 +196,33 @@ std::vector<openvdb::GridBase::Ptr> VdbGrids::make(std::span<const Recipe> recip
 
 openvdb::MetaMap VdbGrids::file_metadata() const {
   using Text = openvdb::StringMetadata;
-  const VolumePlanes& volume = content_.volume;
+  const bake::VolumePlanes& volume = content_.volume;
   const VdbOptions& options = content_.options;
+  const WorldConvention& world = content_.label.world;
+  const bake::Provenance& provenance = content_.label.provenance;
   const SceneFrame& frame = volume.frame;
   openvdb::MetaMap meta;
   meta.insertMeta("cnerf_version", Text(CNERF_VERSION));
   meta.insertMeta("cnerf_world_to_source",
-                  openvdb::Mat4DMetadata(row_vector_matrix(file_from_world(options).inverse())));
+                  openvdb::Mat4DMetadata(row_vector_matrix(file_from_world(options, world).inverse())));
   meta.insertMeta("cnerf_unit_per_world", openvdb::DoubleMetadata(frame.unit_per_world));
   meta.insertMeta("cnerf_world_centre", openvdb::Vec3DMetadata(openvdb::Vec3d(
                                             frame.world_centre.x, frame.world_centre.y, frame.world_centre.z)));
   meta.insertMeta("cnerf_cascades", openvdb::Int32Metadata(frame.cascades));
   meta.insertMeta("cnerf_resolution", openvdb::Vec3IMetadata(openvdb::Vec3i(volume.resolution.x, volume.resolution.y,
                                                                             volume.resolution.z)));
-  meta.insertMeta("cnerf_density_scale", openvdb::DoubleMetadata(density_scale(content_.statistics, options)));
-  meta.insertMeta("units", Text(options.units));
-  meta.insertMeta("up_axis", Text(options.up == "poses" ? options.up_axis : options.up));
-  meta.insertMeta("up_axis_of_the_poses", Text(options.up_axis));
+  meta.insertMeta("cnerf_density_scale", openvdb::DoubleMetadata(1));
+  meta.insertMeta("units", Text(world.units));
+  meta.insertMeta("up_axis", Text(up_axis_of_file(options, world)));
+  meta.insertMeta("up_axis_of_the_poses", Text(world.up_axis));
   meta.insertMeta("colorspace", Text("lin_rec709"));
   meta.insertMeta("white", Text("D65"));
   meta.insertMeta("voxel_origin", Text(options.voxel_origin));
-  meta.insertMeta("color_origin", Text(volume.colorizer.empty() ? "grey: not colorized" : "inferred by a colorizer"));
-  meta.insertMeta("colorizer", Text(volume.colorizer));
-  meta.insertMeta("take", Text(volume.take));
+  meta.insertMeta("color_origin",
+                  Text(provenance.colorizer.empty() ? "grey: not colorized" : "inferred by a colorizer"));
+  meta.insertMeta("colorizer", Text(provenance.colorizer));
+  meta.insertMeta("take", Text(provenance.take));
   return meta;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

@@ -11,28 +11,28 @@
 
 #include "export/vdb_writer.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 
 class VdbGrids {
  public:
   /// @throws ContractError  as write_vdb.
-  VdbGrids(const VolumePlanes& volume, const VdbOptions& options);
+  VdbGrids(const bake::VolumePlanes& volume, const VdbOptions& options, const Label& label);
 
   [[nodiscard]] std::size_t count() const { return recipes_.size(); }
   /// Whether only one grid should be in memory.
   [[nodiscard]] bool is_sparing() const { return content_.volume.is_sparing; }
   /// One grid with its transform, precision and metadata; names and order as write_vdb says.
   [[nodiscard]] openvdb::GridBase::Ptr make(std::size_t number) const;
-  /// The same for all of them. The volume is read and dilated once.
+  /// The same for all of them. The volume is read once.
   [[nodiscard]] std::vector<openvdb::GridBase::Ptr> make_all() const;
   [[nodiscard]] openvdb::MetaMap file_metadata() const;
 
   /// Everything about a volume that has to be known before its first voxel is written.
   struct Content {
-    VolumePlanes volume;  ///< dilated
-    VolumeStatistics statistics;
-    VoxelBox box;  ///< of all active voxels
+    bake::VolumePlanes volume;
+    bake::VoxelBox box;  ///< of all active voxels
     VdbOptions options;
+    Label label;
   };
   /// A grid that is being made, part by part.
   class Builder;
@@ -50,4 +50,4 @@ class VdbGrids {
   openvdb::math::Transform::Ptr transform_;
 };
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <functional>
 
-#include "bake/dilate.h"
+#include "bake/volume/dilate.h"
 #include "export/manifest.h"
 #include "src/base/error.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace {
 
 struct OpenedFile {
@@ -46,19 +46,17 @@ T meta_or(const openvdb::MetaMap& meta, const std::string& name, T fallback) {
   return found ? found->value() : fallback;
 }
 
-void read_frame(const OpenedFile& file, BakedVolume& volume) {
+void read_frame(const OpenedFile& file, bake::Volume& volume) {
   const auto centre = meta_or<openvdb::Vec3d>(file.metadata, "cnerf_world_centre", openvdb::Vec3d(0, 0, 0));
   const auto resolution = meta_or<openvdb::Vec3i>(file.metadata, "cnerf_resolution", openvdb::Vec3i(0, 0, 0));
   volume.frame.world_centre = {centre.x(), centre.y(), centre.z()};
   volume.frame.unit_per_world = meta_or<double>(file.metadata, "cnerf_unit_per_world", 1.0);
   volume.frame.cascades = meta_or<std::int32_t>(file.metadata, "cnerf_cascades", 1);
   volume.resolution = {resolution.x(), resolution.y(), resolution.z()};
-  volume.colorizer = meta_or<std::string>(file.metadata, "colorizer", "");
-  volume.take = meta_or<std::string>(file.metadata, "take", "");
 }
 
 void read_transform(const std::filesystem::path& path, const OpenedFile& file, const openvdb::GridBase& density,
-                    BakedVolume& volume) {
+                    bake::Volume& volume) {
   const openvdb::math::Transform& transform = density.transform();
   if (!transform.isLinear() || !transform.hasUniformScale()) {
     throw InputError(path, "density", "expected a transform with cubic voxels");
@@ -91,7 +89,7 @@ void for_each_active(const Grid& grid, const std::function<void(const openvdb::C
   }
 }
 
-void read_voxels(const OpenedFile& file, const openvdb::FloatGrid& density, BakedVolume& volume) {
+void read_voxels(const OpenedFile& file, const openvdb::FloatGrid& density, bake::Volume& volume) {
   const auto color = find_grid<openvdb::Vec3SGrid>(file, "color");
   const auto values = [&](const std::string& name) {
     const auto grid = find_grid<openvdb::FloatGrid>(file, name);
@@ -166,23 +164,23 @@ VdbGridSummary summary_of(const openvdb::GridBase& grid) {
 
 }  // namespace
 
-BakedVolume read_vdb(const std::filesystem::path& path) {
+bake::Volume read_vdb(const std::filesystem::path& path) {
   const OpenedFile file = open_vdb(path);
   const auto density = find_grid<openvdb::FloatGrid>(file, "density");
   if (!density) throw InputError(path, "density", "expected a float grid of this name");
-  BakedVolume volume;
+  bake::Volume volume;
   read_frame(file, volume);
   read_transform(path, file, *density, volume);
   read_voxels(file, *density, volume);
   return volume;
 }
 
-std::vector<BakedVolume> read_volumes(const std::filesystem::path& bake_folder) {
+std::vector<bake::Volume> read_volumes(const std::filesystem::path& bake_folder) {
   const BakeManifest manifest = read_manifest(bake_folder / "manifest.json");
   if (!manifest.volume) {
     throw InputError(bake_folder / "manifest.json", "volume", "this bake has none; bake with --format vdb");
   }
-  std::vector<BakedVolume> volumes;
+  std::vector<bake::Volume> volumes;
   for (const ManifestVolume& finer : manifest.finer_volumes) volumes.push_back(read_vdb(bake_folder / finer.file));
   volumes.push_back(read_vdb(bake_folder / manifest.volume->file));
   return volumes;
@@ -196,4 +194,4 @@ VdbSummary summarize_vdb(const std::filesystem::path& path) {
   return summary;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

@@ -7,19 +7,19 @@
 #include <string>
 #include <vector>
 
-#include "bake/baked_volume.h"
+#include "bake/volume.h"
 #include "src/base/aabb.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 
 /// The active voxels of a file with a `density` grid; `color`, `lab_a`, `lab_b` and `luminance` are 0 where missing.
 /// Files that do not say where their values sit are taken as centred.
 /// @throws MissingInputError, InputError  e.g. without `density`, or with a transform that is not uniform or turned.
-[[nodiscard]] BakedVolume read_vdb(const std::filesystem::path& path);
+[[nodiscard]] bake::Volume read_vdb(const std::filesystem::path& path);
 
 /// The grids of a bake by its manifest, finest first.
 /// @throws MissingInputError, InputError  also when the bake has no volume.
-[[nodiscard]] std::vector<BakedVolume> read_volumes(const std::filesystem::path& bake_folder);
+[[nodiscard]] std::vector<bake::Volume> read_volumes(const std::filesystem::path& bake_folder);
 
 struct VdbGridSummary {
   std::string name, type, grid_class;  ///< "density", "float", "fog volume"
@@ -40,4 +40,4 @@ struct VdbSummary {
 /// @throws MissingInputError, InputError.
 [[nodiscard]] VdbSummary summarize_vdb(const std::filesystem::path& path);
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

@@ -12,7 +12,7 @@
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace {
 
 std::uint32_t compression_flags(const std::string& name) {
@@ -89,8 +89,9 @@ class CheckedArchive : public openvdb::io::Archive {
 
 }  // namespace
 
-void write_vdb(const VolumePlanes& volume, const std::filesystem::path& path, const VdbOptions& options) {
-  const VdbGrids grids(volume, options);
+void write_vdb(const bake::VolumePlanes& volume, const std::filesystem::path& path, const VdbOptions& options,
+               const Label& label) {
+  const VdbGrids grids(volume, options, label);
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     try {
       CheckedArchive(compression_flags(options.compression)).save(temporary, grids);
@@ -102,8 +103,4 @@ void write_vdb(const VolumePlanes& volume, const std::filesystem::path& path, co
   });
 }
 
-void write_vdb(const BakedVolume& volume, const std::filesystem::path& path, const VdbOptions& options) {
-  write_vdb(planes_of(volume), path, options);
-}
-
-}  // namespace cnerf
+}  // namespace cnerf::exporting

@@ -7,11 +7,11 @@
 #include <cstdlib>
 #include <span>
 
-#include "bake/dilate.h"
+#include "bake/volume/dilate.h"
 #include "src/base/check.h"
 #include "src/color/colorspace_math.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace {
 
 constexpr int kSide = kWebBrickSide;
@@ -27,14 +27,14 @@ int floor_div(int value, int side) {
 }
 
 /// Fills in counts, origin and distance == 0 of the bricks to store. @return the voxel the grid begins at.
-Vec3i lay_out(const BakedVolume& volume, WebBricks& bricks) {
-  std::vector<BakedVoxel> dense;
-  for (const BakedVoxel& voxel : volume.voxels) {
+Vec3i lay_out(const bake::Volume& volume, WebBricks& bricks) {
+  std::vector<bake::Voxel> dense;
+  for (const bake::Voxel& voxel : volume.voxels) {
     if (voxel.sigma > 0) dense.push_back(voxel);
   }
   CNERF_CHECK(!dense.empty(), "no voxel has density");
   bricks.voxels = dense.size();
-  const VoxelBox box = bounding_box(dense);
+  const bake::VoxelBox box = bounding_box(dense);
   const Vec3i first = box.min - Vec3i{1, 1, 1};  // interpolation reaches one voxel beyond
   const Vec3i size = box.size + Vec3i{2, 2, 2};
   for (int axis = 0; axis < 3; ++axis) bricks.counts[axis] = (size[axis] + kSide - 1) / kSide;
@@ -42,7 +42,7 @@ Vec3i lay_out(const BakedVolume& volume, WebBricks& bricks) {
   bricks.origin = volume.origin + first.cast<double>() * volume.voxel_size;
   const Vec3i n = bricks.counts;
   bricks.distance.assign(std::size_t(n.x) * n.y * n.z, 255);
-  for (const BakedVoxel& voxel : dense) {
+  for (const bake::Voxel& voxel : dense) {
     const Vec3i v = Vec3i{voxel.i, voxel.j, voxel.k} - first;
     for (int z = floor_div(v.z - 1, kSide); z <= floor_div(v.z + 1, kSide); ++z) {
       for (int y = floor_div(v.y - 1, kSide); y <= floor_div(v.y + 1, kSide); ++y) {
@@ -118,7 +118,7 @@ void simplify(std::span<std::uint8_t> plane, const std::vector<Tolerance>& toler
 
 }  // namespace
 
-WebBricks make_web_bricks(const BakedVolume& volume, const std::string& density) {
+WebBricks make_web_bricks(const bake::Volume& volume, const std::string& density) {
   CNERF_CHECK(density == "r8" || density == "r16f", density);
   WebBricks bricks;
   const Vec3i first = lay_out(volume, bricks);
@@ -126,7 +126,7 @@ WebBricks make_web_bricks(const BakedVolume& volume, const std::string& density)
   std::size_t stored = 0;
   const std::vector<std::int32_t> numbers = numbers_of(bricks, stored);
 
-  for (const BakedVoxel& voxel : volume.voxels) bricks.max_density = std::max<double>(bricks.max_density, voxel.sigma);
+  for (const bake::Voxel& voxel : volume.voxels) bricks.max_density = std::max<double>(bricks.max_density, voxel.sigma);
   bricks.density_scale = std::min(bricks.max_density, kOpaqueDepth / bricks.voxel_size);
   const bool half = density == "r16f";
   const std::size_t plane = stored * kWebBrickVoxels;
@@ -134,11 +134,11 @@ WebBricks make_web_bricks(const BakedVolume& volume, const std::string& density)
   bricks.lab.assign(3 * plane, 128);
   std::vector<Tolerance> tolerances(plane, kGap);
 
-  BakedVolume padded = volume;
-  std::erase_if(padded.voxels, [](const BakedVoxel& voxel) { return !(voxel.sigma > 0); });
+  bake::Volume padded = volume;
+  std::erase_if(padded.voxels, [](const bake::Voxel& voxel) { return !(voxel.sigma > 0); });
   dilate_colors(padded, 1);  // colour and density are interpolated apart: neighbours of density need colour too
   const Vec3i n = bricks.counts;
-  for (const BakedVoxel& voxel : padded.voxels) {
+  for (const bake::Voxel& voxel : padded.voxels) {
     const Vec3i v = Vec3i{voxel.i, voxel.j, voxel.k} - first;
     if (v.x < 0 || v.y < 0 || v.z < 0) continue;
     const Vec3i brick{v.x / kSide, v.y / kSide, v.z / kSide};
@@ -179,4 +179,4 @@ void to_differences(std::vector<std::uint8_t>& bricks) {
   }
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

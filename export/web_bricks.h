@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "bake/baked_volume.h"
+#include "bake/volume.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 
 inline constexpr int kWebBrickSide = 8;
 inline constexpr int kWebBrickVoxels = kWebBrickSide * kWebBrickSide * kWebBrickSide;
@@ -34,11 +34,11 @@ struct WebBricks {
 /// a fiftieth of a pixel's light can come from a voxel; its density by 1.5 codes of r8, and 4.5 where it is opaque.
 /// @param density  "r8" or "r16f".
 /// @throws ContractError  when no voxel has density, or on another `density`.
-[[nodiscard]] WebBricks make_web_bricks(const BakedVolume& volume, const std::string& density = "r8");
+[[nodiscard]] WebBricks make_web_bricks(const bake::Volume& volume, const std::string& density = "r8");
 
 /// Replaces every value of bricks of 8^3 by its difference, modulo 256, to the one before it: along x, at the start of
 /// a row along y, at the start of a layer along z. The first of a brick stays. Neighbours are alike, so this packs
 /// better.
 void to_differences(std::vector<std::uint8_t>& bricks);
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

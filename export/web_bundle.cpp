@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
+#include "bake/volume/resample.h"
 #include "export/manifest_json.h"
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/gzip.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -114,9 +115,9 @@ WebEstimate estimate_web(const WebBricks& bricks) {
           bricks.stored() * kTexels * (2 + 4) + 4 * bricks.distance.size()};
 }
 
-WebReport write_web_bundle(const BakedVolume& volume, const WebBricks& bricks, const WebScene& scene,
+WebReport write_web_bundle(const bake::Volume& volume, const WebBricks& bricks, const WebScene& scene,
                            const fs::path& folder, const fs::path& page, const WebOptions& options) {
-  CNERF_CHECK(scene.photos.empty() || scene.photos.size() == scene.cameras.size(), "one photograph a camera");
+  CNERF_CHECK(scene.photos.empty() || scene.photos.size() == scene.cameras.size(), "one photograph per camera");
   std::error_code ignored;
   fs::remove(folder / kWebManifest, ignored);  // a manifest never names files of another bundle
   BundleFiles files(folder);
@@ -143,10 +144,10 @@ WebReport write_web_bundle(const BakedVolume& volume, const WebBricks& bricks, c
                   {"program", "cnerf"},
                   {"program_version", CNERF_VERSION},
                   {"title", scene.title},
-                  {"command_line", scene.command_line},
-                  {"units", scene.units},
-                  {"up_axis", scene.up_axis},
-                  {"color", color_json(volume.colorizer, volume.take)},
+                  {"command_line", scene.label.provenance.command_line},
+                  {"units", scene.label.world.units},
+                  {"up_axis", scene.label.world.up_axis},
+                  {"color", color_json(scene.label.provenance)},
                   {"frame", frame_json(volume.frame)},
                   {"volume", volume_json(bricks, options)},
                   {"poster", poster},
@@ -158,4 +159,23 @@ WebReport write_web_bundle(const BakedVolume& volume, const WebBricks& bricks, c
   return report;
 }
 
-}  // namespace cnerf
+void write_web(const bake::Volume& volume, const WebScene& scene, const fs::path& folder, const fs::path& page,
+               const WebOptions& options, Observer& observer) {
+  const bake::Volume small = resample_volume(volume, options.resolution);
+  const WebBricks bricks = make_web_bricks(small, options.density);
+  const WebEstimate estimate = estimate_web(bricks);
+  const auto mib = [](std::size_t bytes) { return double(bytes) / (1 << 20); };
+  observer.say(
+      fmt::format("web: {} x {} x {} voxels, {} bricks; about {:.1f} MiB to load, {:.0f} MiB of graphics memory",
+                  small.resolution.x, small.resolution.y, small.resolution.z, bricks.stored(),
+                  mib(estimate.download_bytes), mib(estimate.texture_bytes)));
+  if (page.empty()) {
+    observer.say("note: this cnerf was built without the page (CNERF_VIEWER); the bundle holds data only");
+  }
+  const WebReport report = write_web_bundle(small, bricks, scene, folder, page, options);
+  observer.say(fmt::format("web: {:.2f} MiB of volume, {:.2f} MiB of photographs, {:.0f} KiB of page",
+                           mib(report.volume_bytes), mib(report.photo_bytes), double(report.page_bytes) / 1024));
+  observer.wrote("web bundle", folder);
+}
+
+}  // namespace cnerf::exporting

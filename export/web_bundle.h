@@ -6,13 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "bake/bake_camera.h"
-#include "bake/baked_volume.h"
+#include "bake/camera.h"
+#include "bake/volume.h"
+#include "export/label.h"
+#include "export/options.h"
 #include "export/web_bricks.h"
-#include "export/web_options.h"
 #include "export/web_pictures.h"
+#include "src/base/observer.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 
 inline constexpr int kWebSchema = 1;
 inline constexpr const char* kWebManifest = "bundle.json";
@@ -27,10 +29,9 @@ struct WebEstimate {
 /// What a bundle says besides the volume.
 struct WebScene {
   std::string title;
-  std::vector<BakeCamera> cameras;        ///< of the capture
-  std::vector<WebPhoto> photos;           ///< one a camera, or none at all
-  std::vector<std::string> command_line;  ///< recorded
-  std::string units = "scene units", up_axis = "z";
+  std::vector<bake::Camera> cameras;  ///< of the capture
+  std::vector<WebPhoto> photos;       ///< one a camera, or none at all
+  Label label;
 };
 
 struct WebReport {
@@ -46,8 +47,14 @@ struct WebReport {
 /// @param bricks  of `volume`; the volume itself is only looked at for the poster.
 /// @param page    folder of the built page; empty = none, the bundle then needs `cnerf view` to be looked at.
 /// @throws ContractError  when photos and cameras disagree in number.  @throws OutputError, MissingInputError.
-WebReport write_web_bundle(const BakedVolume& volume, const WebBricks& bricks, const WebScene& scene,
+WebReport write_web_bundle(const bake::Volume& volume, const WebBricks& bricks, const WebScene& scene,
                            const std::filesystem::path& folder, const std::filesystem::path& page,
                            const WebOptions& options);
 
-}  // namespace cnerf
+/// The bundle of any volume, which is averaged to `options.resolution` first. The observer hears sizes before and
+/// after.
+/// @throws as write_web_bundle.
+void write_web(const bake::Volume& volume, const WebScene& scene, const std::filesystem::path& folder,
+               const std::filesystem::path& page, const WebOptions& options, Observer& observer);
+
+}  // namespace cnerf::exporting

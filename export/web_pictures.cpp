@@ -2,27 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "bake/volume_integrator.h"
+#include "bake/volume/integrate.h"
 #include "src/base/check.h"
-#include "src/color/colorspace_math.h"
+#include "src/base/parallel.h"
+#include "src/capture/mono_image.h"
+#include "src/picture/encode.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 namespace {
 
-std::vector<std::byte> encoded(const char* extension, const cv::Mat& image, const std::vector<int>& options) {
-  std::vector<std::uint8_t> bytes;
-  CNERF_CHECK(cv::imencode(extension, image, bytes, options), std::string("OpenCV cannot write ") + extension);
-  std::vector<std::byte> result(bytes.size());
-  std::ranges::transform(bytes, result.begin(), [](std::uint8_t b) { return static_cast<std::byte>(b); });
-  return result;
-}
-
-std::uint8_t srgb_byte(float linear) {
-  return std::uint8_t(std::lround(255 * srgb_from_linear(std::clamp(linear, 0.0f, 1.0f))));
-}
+constexpr int kPosterQuality = 80;
 
 /// The camera for a picture whose longer side is `side` pixels at most.
 Intrinsics fitted(const Intrinsics& intrinsics, int side) {
@@ -69,29 +60,37 @@ WebPhoto make_web_photo(const Intrinsics& intrinsics, const std::vector<float>& 
   cv::Mat grey(shown.rows, shown.cols, CV_8U);
   for (int row = 0; row < shown.rows; ++row) {
     for (int column = 0; column < shown.cols; ++column) {
-      grey.at<std::uint8_t>(row, column) = srgb_byte(shown.at<float>(row, column));
+      grey.at<std::uint8_t>(row, column) = srgb8_from_linear(shown.at<float>(row, column));
     }
   }
-  return {encoded(".jpg", grey, {cv::IMWRITE_JPEG_QUALITY, quality}), grey.cols, grey.rows};
+  return {jpeg_bytes(grey, quality), grey.cols, grey.rows};
 }
 
-std::vector<std::byte> make_poster(const BakedVolume& volume, const BakeCamera& camera, int side) {
+std::vector<WebPhoto> make_web_photos(std::span<const View> views, int side, int quality) {
+  std::vector<WebPhoto> photos(views.size());
+  parallel_tasks(views.size(), [&](std::size_t i) {
+    photos[i] = make_web_photo(views[i].intrinsics, luminance_plane(views[i].image), side, quality);
+  });
+  return photos;
+}
+
+std::vector<std::byte> make_poster(const bake::Volume& volume, const bake::Camera& camera, int side) {
   const Intrinsics pinhole = without_distortion(fitted(camera.intrinsics, side));
-  IntegratorOptions options;
+  bake::IntegratorOptions options;
   options.step = 0.5;
   options.samples_per_axis = 1;
-  const VolumeImage image = integrate_volume(volume, pinhole, camera.world_from_camera, options);
+  const bake::VolumeImage image = integrate_volume(volume, pinhole, camera.world_from_camera, options);
   cv::Mat bgra(image.height, image.width, CV_8UC4);
   for (int i = 0; i < image.width * image.height; ++i) {
     const float opacity = image.opacity[std::size_t(i)];
     std::uint8_t* pixel = bgra.data + 4 * i;
     for (int c = 0; c < 3; ++c) {
       const float premultiplied = image.rgb[std::size_t(3 * i + c)];
-      pixel[2 - c] = srgb_byte(opacity > 0 ? premultiplied / opacity : 0.0f);
+      pixel[2 - c] = srgb8_from_linear(opacity > 0 ? premultiplied / opacity : 0.0f);
     }
     pixel[3] = std::uint8_t(std::lround(255 * std::clamp(opacity, 0.0f, 1.0f)));
   }
-  return encoded(".webp", bgra, {cv::IMWRITE_WEBP_QUALITY, 80});
+  return webp_bytes(bgra, kPosterQuality);
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::exporting

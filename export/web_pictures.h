@@ -2,12 +2,14 @@
 /// The pictures of a web bundle: photographs to lay over the volume, and a poster to show while it loads.
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
-#include "bake/bake_camera.h"
-#include "bake/baked_volume.h"
+#include "bake/camera.h"
+#include "bake/volume.h"
+#include "src/capture/capture.h"
 
-namespace cnerf {
+namespace cnerf::exporting {
 
 /// A photograph as the page shows it, or none.
 struct WebPhoto {
@@ -23,7 +25,10 @@ struct WebPhoto {
 [[nodiscard]] WebPhoto make_web_photo(const Intrinsics& intrinsics, const std::vector<float>& luminance, int side,
                                       int quality);
 
-/// WebP with alpha of what a camera sees of a volume, `side` pixels long at most: sRGB, not premultiplied.
-[[nodiscard]] std::vector<std::byte> make_poster(const BakedVolume& volume, const BakeCamera& camera, int side);
+/// Of views, as the program sees them; made by all threads.
+[[nodiscard]] std::vector<WebPhoto> make_web_photos(std::span<const View> views, int side, int quality);
 
-}  // namespace cnerf
+/// WebP with alpha of what a camera sees of a volume, `side` pixels long at most: sRGB, not premultiplied.
+[[nodiscard]] std::vector<std::byte> make_poster(const bake::Volume& volume, const bake::Camera& camera, int side);
+
+}  // namespace cnerf::exporting

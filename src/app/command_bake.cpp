@@ -14,17 +14,17 @@ struct BakeArguments {
   bool overwrite = false;
 };
 
-void bake(const BakeArguments& arguments, const std::vector<std::string>& command_line) {
-  const pipeline::BakeFormats formats = pipeline::parse_bake_formats(arguments.format);
+void bake_take(const BakeArguments& arguments, const std::vector<std::string>& command_line) {
+  const exporting::Formats formats = exporting::parse_formats(arguments.format);
   Reporter reporter = make_reporter(arguments.run.config);
   const pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.run.run);
   const std::string take = directory.choose_take(arguments.run.take);
   const fs::path folder = arguments.out.empty() ? directory.bakes(take) : fs::path(arguments.out);
-  refuse_existing(pipeline::last_file(folder, formats), arguments.overwrite);
+  refuse_existing(last_file(folder, formats), arguments.overwrite);
   const pipeline::RunContext context = open_run(arguments.run, take, command_line, reporter);
   pipeline::bake_step(context, {take, folder, formats}, engines_for(context.config.device), reporter);
-  if (formats.web) reporter.next("cnerf view " + pipeline::web_folder(folder).string());
-  if (formats.vdb || formats.gltf) reporter.next("blender --python " + (folder / "blender_setup.py").string());
+  if (formats.web) reporter.next("cnerf view " + exporting::web_folder(folder).string());
+  if (formats.has_manifest()) reporter.next("blender --python " + (folder / "blender_setup.py").string());
 }
 
 }  // namespace
@@ -41,8 +41,6 @@ Work declare_bake(CLI::App& app) {
   add_short_form(app, arguments->run.config, "--budget", "bake.budget");
   add_short_form(app, arguments->run.config, "--max-memory", "bake.max_memory");
   add_flag_form(app, arguments->run.config, "--keep-unseen", "bake.keep_unseen");
-  add_flag_form(app, arguments->run.config, "--emission", "vdb.emission");
-  add_flag_form(app, arguments->run.config, "--normalize-density", "vdb.normalize_density");
   add_flag_form(app, arguments->run.config, "--nvdb", "vdb.nvdb");
   add_flag_form(app, arguments->run.config, "--usd", "vdb.usd");
   add_flag_form(app, arguments->run.config, "--houdini", "vdb.houdini");
@@ -53,7 +51,7 @@ Work declare_bake(CLI::App& app) {
   add_short_form(app, arguments->run.config, "--faces", "mesh.faces");
   add_short_form(app, arguments->run.config, "--texture-size", "mesh.texture_size");
   app.add_flag("--overwrite", arguments->overwrite, "Replace a bake that is there");
-  return [arguments](const auto& command_line) { bake(*arguments, command_line); };
+  return [arguments](const auto& command_line) { bake_take(*arguments, command_line); };
 }
 
 }  // namespace cnerf::app

@@ -104,10 +104,10 @@ void print_run(const pipeline::RunDirectory& directory) {
 }
 
 void print_vdb(const fs::path& file) {
-  const VdbSummary summary = summarize_vdb(file);
+  const exporting::VdbSummary summary = exporting::summarize_vdb(file);
   line("volume", "{}", file.string());
   for (const auto& [name, value] : summary.metadata) line("  " + name, "{}", value);
-  for (const VdbGridSummary& grid : summary.grids) {
+  for (const exporting::VdbGridSummary& grid : summary.grids) {
     line(grid.name, "{}{}, {} voxels of {:.4g}, {}", grid.type, grid.half ? " as half" : "", grid.active_voxels,
          grid.voxel_size.x, text_of(grid.world_box));
     for (std::size_t c = 0; c < grid.min_value.size(); ++c) {

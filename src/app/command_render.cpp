@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "bake/volume_integrator.h"
+#include "bake/volume/integrate.h"
 #include "export/manifest.h"
 #include "export/vdb_reader.h"
 #include "export/web_pictures.h"
@@ -49,12 +49,12 @@ void render_bake(const RenderArguments& arguments, Reporter& reporter) {
   if (!arguments.format.empty() && arguments.format != "png") {
     throw UsageError("--format: expected png, as all that is rendered of a bake, got '" + arguments.format + "'");
   }
-  const BakeManifest manifest = read_manifest(bake / "manifest.json");
+  const exporting::BakeManifest manifest = exporting::read_manifest(bake / "manifest.json");
   if (!manifest.volume)
     throw InputError(bake / "manifest.json", "volume", "this bake has none; bake with --format vdb");
   CameraPath path{"cameras", {}};
   if (arguments.path == "cameras" || arguments.path == RenderArguments{}.path) {
-    for (const BakeCamera& camera : manifest.cameras) {
+    for (const bake::Camera& camera : manifest.cameras) {
       std::string name = fs::path(camera.name).replace_extension().string();
       std::ranges::replace(name, '/', '_');
       path.cameras.push_back({name, without_distortion(camera.intrinsics), camera.world_from_camera});
@@ -64,11 +64,11 @@ void render_bake(const RenderArguments& arguments, Reporter& reporter) {
   }
   const fs::path folder = (arguments.out.empty() ? bake / "renders" : fs::path(arguments.out)) / path.name;
   refuse_existing(folder, arguments.overwrite);
-  const std::vector<BakedVolume> volumes = read_volumes(bake);
+  const std::vector<bake::Volume> volumes = exporting::read_volumes(bake);
   const ProgressSink progress = reporter.progress_sink();
   for (std::size_t i = 0; i < path.cameras.size(); ++i) {
     const PathCamera& camera = path.cameras[i];
-    const VolumeImage image = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);
+    const bake::VolumeImage image = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);
     write_png(folder / (camera.name + ".png"), picture_from_linear(image.width, image.height, image.rgb));
     progress({"render", double(i + 1) / double(path.cameras.size()), {}});
     if (interruption_requested()) throw Interrupted("stopped");

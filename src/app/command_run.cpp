@@ -15,7 +15,7 @@ struct RunArguments {
 
 void run(RunArguments arguments, const std::vector<std::string>& command_line) {
   pipeline::RunJob& job = arguments.job;
-  job.formats = pipeline::parse_bake_formats(arguments.format);
+  job.formats = exporting::parse_formats(arguments.format);
   job.command_line = command_line;
   Reporter reporter = make_reporter(arguments.config);
   const pipeline::RunDirectory directory(job.out);
@@ -23,7 +23,7 @@ void run(RunArguments arguments, const std::vector<std::string>& command_line) {
   const Config config = resolve_config(arguments.config, goes_on ? directory.config("", reporter) : Config{});
   const auto bake = pipeline::run(job, config, engines_for(config.device), reporter);
   reporter.next("cnerf view " + job.out.string());
-  if (job.formats.vdb || job.formats.gltf) {
+  if (job.formats.has_manifest()) {
     reporter.next("blender --python " + (bake / "blender_setup.py").string());
   }
 }

@@ -2,9 +2,11 @@
 
 #include <thread>
 
-#include "bake/resample.h"
+#include "bake/volume/resample.h"
+#include "export/bake_output.h"
 #include "export/manifest.h"
 #include "export/vdb_reader.h"
+#include "export/web_bundle.h"
 #include "src/app/command.h"
 #include "src/app/common_options.h"
 #include "src/base/error.h"
@@ -23,7 +25,7 @@ struct ViewArguments {
 };
 
 bool is_bundle(const fs::path& folder) {
-  return fs::exists(folder / kWebManifest);
+  return fs::exists(folder / exporting::kWebManifest);
 }
 bool is_bake(const fs::path& folder) {
   return fs::exists(folder / "manifest.json");
@@ -32,18 +34,18 @@ bool is_bake(const fs::path& folder) {
 /// The bundle of a bake: the one beside it, made anew where there is none or it is older than the bake.
 fs::path bundle_of_bake(const fs::path& bake, const Config& config, const std::vector<std::string>& command_line,
                         Reporter& reporter) {
-  const fs::path folder = pipeline::web_folder(bake);
+  const fs::path folder = exporting::web_folder(bake);
   const fs::path manifest_file = bake / "manifest.json";
-  if (is_bundle(folder) && fs::last_write_time(folder / kWebManifest) >= fs::last_write_time(manifest_file))
+  if (is_bundle(folder) && fs::last_write_time(folder / exporting::kWebManifest) >= fs::last_write_time(manifest_file))
     return folder;
-  const BakeManifest manifest = read_manifest(manifest_file);
+  const exporting::BakeManifest manifest = exporting::read_manifest(manifest_file);
   if (!manifest.volume) {
     throw InputError(manifest_file, "volume", "this bake has none; bake with --format vdb or --format web");
   }
-  const BakedVolume volume = merged_volume(read_volumes(bake));
-  pipeline::write_web(volume,
-                      {bake.filename().string(), manifest.cameras, {}, command_line, manifest.units, manifest.up_axis},
-                      folder, config.web, reporter);
+  const bake::Volume volume = merged_volume(exporting::read_volumes(bake));
+  exporting::WebScene scene{bake.filename().string(), manifest.cameras, {}, manifest.label};
+  scene.label.provenance.command_line = command_line;
+  write_web(volume, scene, folder, find_page(), config.web, reporter);
   reporter.say("note: the photographs are with the capture; cnerf bake RUN --format web adds them");
   return folder;
 }
@@ -51,7 +53,7 @@ fs::path bundle_of_bake(const fs::path& bake, const Config& config, const std::v
 fs::path bake_of_run(const ViewArguments& arguments) {
   const pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.what);
   const fs::path bake = directory.bakes(directory.choose_take(arguments.take));
-  if (!is_bake(bake) && !is_bundle(pipeline::web_folder(bake))) {
+  if (!is_bake(bake) && !is_bundle(exporting::web_folder(bake))) {
     throw MissingInputError(bake.string() + ": nothing is baked yet; run: cnerf bake " + arguments.what +
                             " --format web");
   }
@@ -62,13 +64,13 @@ fs::path bundle_to_show(const ViewArguments& arguments, const Config& config,
                         const std::vector<std::string>& command_line, Reporter& reporter) {
   fs::path what = arguments.what;
   if (!fs::exists(what)) throw MissingInputError(what.string() + ": no such file or folder");
-  if (what.extension() == ".vdb" || what.filename() == "manifest.json" || what.filename() == kWebManifest) {
+  if (what.extension() == ".vdb" || what.filename() == "manifest.json" || what.filename() == exporting::kWebManifest) {
     what = what.parent_path().empty() ? fs::path(".") : what.parent_path();
   }
   if (is_bundle(what)) return what;
   if (pipeline::RunDirectory(what).exists()) what = bake_of_run(arguments);
   if (is_bake(what)) return bundle_of_bake(what, config, command_line, reporter);
-  if (is_bundle(pipeline::web_folder(what))) return pipeline::web_folder(what);
+  if (is_bundle(exporting::web_folder(what))) return exporting::web_folder(what);
   throw MissingInputError(what.string() +
                           ": neither a web bundle (bundle.json), a bake (manifest.json) nor a run (run.json)");
 }

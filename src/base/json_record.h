@@ -56,14 +56,21 @@ inline constexpr bool is_map = false;
 template <typename T>
 inline constexpr bool is_map<std::map<std::string, T>> = true;
 
+template <typename Mark, typename... Marks>
+inline constexpr bool has_mark = (std::is_same_v<Mark, Marks> || ...);
+
 template <typename T>
 Json written(const T& value) {
   if constexpr (Record<const T>) {
     Json json = Json::object();
-    T::visit(value, [&]<typename Field>(const char* name, const Field& field, auto... optional) {
+    T::visit(value, [&]<typename Field, typename... Marks>(const char* name, const Field& field, Marks...) {
       if constexpr (is_optional<Field>) {
-        if (field) json[name] = written(*field);
-      } else if constexpr (sizeof...(optional) > 0) {
+        if (field) {
+          json[name] = written(*field);
+        } else if (has_mark<NullableField, Marks...>) {
+          json[name] = nullptr;
+        }
+      } else if constexpr (has_mark<OptionalField, Marks...>) {
         if (Json text = written(field); text != written(Field{})) json[name] = std::move(text);
       } else {
         json[name] = written(field);
@@ -101,17 +108,20 @@ void read_list(const Json& json, const std::string& where, T& list) {
 template <typename T>
 void read_record(const Json& json, const std::string& where, T& record) {
   if (!json.is_object()) throw FieldError(where, "expected an object, got " + json.dump());
-  T::visit(record, [&]<typename Field>(const char* name, Field& field, auto... optional) {
-    const std::string inner = where.empty() ? name : where + "." + name;
-    const auto found = json.find(name);
-    if (found != json.end()) {
-      if constexpr (is_optional<Field>) {
-        read(*found, inner, field.emplace());
-      } else {
-        read(*found, inner, field);
+  T::visit(record, [&]<typename Field, typename... Marks>(const char* name, Field& field, Marks...) {
+    if constexpr (!has_mark<WrittenField, Marks...>) {
+      const std::string inner = where.empty() ? name : where + "." + name;
+      const auto found = json.find(name);
+      if (found != json.end()) {
+        if constexpr (is_optional<Field>) {
+          if (found->is_null()) return field.reset();
+          read(*found, inner, field.emplace());
+        } else {
+          read(*found, inner, field);
+        }
+      } else if (!is_optional<Field> && sizeof...(Marks) == 0) {
+        throw FieldError(inner, "is missing");
       }
-    } else if (!is_optional<Field> && sizeof...(optional) == 0) {
-      throw FieldError(inner, "is missing");
     }
   });
 }

@@ -17,6 +17,10 @@ constexpr const char* kOfCompare = "it is one of `cnerf compare` alone";
 
 const std::vector<RetiredKey>& retired_keys() {
   static const std::vector<RetiredKey> keys{
+      {"exr.lab_names", "", "'lab'", "the channels are Lab.L, Lab.a and Lab.b"},
+      {"mesh.adaptivity", "", "0.02", "flat parts are merged as far as two hundredths"},
+      {"mesh.ray_inside", "", "4.0", "a texel's ray ends four voxels inside the surface"},
+      {"mesh.ray_outside", "", "2.0", "a texel's ray starts two voxels outside the surface"},
       {"vdb.dilation", "bake.dilation", "", ""},
       {"compare.positional_budget", "", "4.0", kOfCompare},
       {"compare.positional_learning_rate", "", "5e-04", "it is that of Mildenhall et al. 2020"},
@@ -29,6 +33,9 @@ const std::vector<RetiredKey>& retired_keys() {
       {"stage1.grid.features", "", "4", "a row has 4 features"},
       {"stage2.grid.features", "", "4", "a row has 4 features"},
       {"render.min_transmittance", "", "0.001", "it is a constant"},
+      {"vdb.emission", "", "false", "multiply density and color where the volume is rendered"},
+      {"vdb.normalize_density", "", "false", "divide by the manifest's max_density where the volume is read"},
+      {"vdb.padding", "", "1", "grids have one voxel of zeros around them"},
   };
   return keys;
 }

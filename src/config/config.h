@@ -6,11 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "bake/bake_options.h"
-#include "bake/mesh/mesh_options.h"
-#include "export/exr_writer.h"
-#include "export/vdb_writer.h"
-#include "export/web_options.h"
+#include "bake/mesh/options.h"
+#include "bake/options.h"
+#include "export/options.h"
 #include "src/capture/load_capture.h"
 #include "src/config/toml_binding.h"
 #include "src/render/picture_options.h"
@@ -50,11 +48,12 @@ struct Config {
   Stage1Options stage1;
   ColorizerConfig colorizer;
   Stage2Options stage2;
-  BakeOptions bake;
-  VdbOptions vdb;
-  MeshOptions mesh;
-  ExrOptions exr;
-  WebOptions web;
+  cnerf::bake::Options bake;
+  exporting::VdbOptions vdb;
+  exporting::WorldConvention world;
+  cnerf::bake::MeshOptions mesh;
+  exporting::ExrOptions exr;
+  exporting::WebOptions web;
   PictureOptions render;
 
   template <typename Visitor>
@@ -67,6 +66,7 @@ struct Config {
     v.section("stage2", stage2);
     v.section("bake", bake);
     v.section("vdb", vdb);
+    v.section("vdb", world);  // the keys that users know
     v.section("mesh", mesh);
     v.section("exr", exr);
     v.section("web", web);

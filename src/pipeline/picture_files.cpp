@@ -34,7 +34,7 @@ Picture picture_of(const RenderedImage& image, ShownColor color) {
 void write_exr(const fs::path& file, const RenderedImage& image, ShownColor color, const std::string& color_origin) {
   const std::vector<float> values = shown_rgb(image, color);
   const std::span<const float> rgb(values);
-  cnerf::write_exr(
+  exporting::write_exr(
       file, {image.width,
              image.height,
              {{"R", rgb, 3, true},

@@ -1,7 +1,7 @@
 #include "src/pipeline/render_step.h"
 
-#include "bake/view_average.h"
-#include "export/color_origin.h"
+#include "bake/color/view_average.h"
+#include "bake/provenance.h"
 #include "src/base/error.h"
 #include "src/base/usage.h"
 #include "src/picture/encode.h"
@@ -63,12 +63,12 @@ void render_step(const RunContext& context, const RenderJob& job, const Engines&
   RenderOptions options = render_options(context.config);
   options.color = scene->is_colorized() && output.color == ShownColor::kDecoded;
   options.baked_color = scene->is_colorized() && output.color == ShownColor::kBaked;
-  std::unique_ptr<ViewAverage> average;
+  std::unique_ptr<bake::ViewAverage> average;
   if (output.view_averaged) {
-    average = make_view_average(*scene, cameras_of(context.capture), context.config.bake, observer.progress_sink());
+    average = make_view_average(*scene, bake::cameras_of(context.capture), context.config.bake, engines, observer);
     options.luminance = [&average](auto positions, auto luminance) { average->query(positions, luminance); };
   }
-  const std::string color_origin = color_origin_text(colorizer_name(context.directory, job.take), job.take);
+  const std::string color_origin = bake::color_origin_text(colorizer_name(context.directory, job.take), job.take);
   RenderFiles files(output, job.path.name, color_origin, context.config.render.fps, observer);
   const ProgressSink progress = observer.progress_sink();
   for (std::size_t i = 0; i < job.path.cameras.size(); ++i) {

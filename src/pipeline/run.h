@@ -14,7 +14,7 @@ struct RunJob {
   std::filesystem::path capture;  ///< or photographs, or a clip: then it is prepared first
   std::filesystem::path out;      ///< folder of the run
   bool grey = false;              ///< no colours
-  BakeFormats formats;
+  exporting::Formats formats;
   ExistingOutput existing;
   std::vector<std::string> command_line;  ///< for records
 };

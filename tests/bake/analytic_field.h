@@ -6,10 +6,10 @@
 #include <string>
 #include <utility>
 
-#include "bake/bake_camera.h"
+#include "bake/camera.h"
 #include "src/field/color_field.h"
 
-namespace cnerf::test {
+namespace cnerf::bake::test {
 
 /// Everything in unit space. Occupied where density is positive anywhere within `occupancy_margin` along an axis.
 class AnalyticField : public ColorField {
@@ -69,11 +69,11 @@ inline AnalyticField::Density sphere_density(Vec3f centre, float radius, float s
 }
 
 /// A pinhole camera at `eye` that looks at `target`; `focal` in pixels, principal point in the middle.
-inline BakeCamera camera_at(const std::string& name, Vec3d eye, Vec3d target, int width, int height, double focal) {
+inline Camera camera_at(const std::string& name, Vec3d eye, Vec3d target, int width, int height, double focal) {
   const Vec3d forward = normalized(target - eye);
   const Vec3d up = std::abs(forward.z) < 0.9 ? Vec3d{0, 0, 1} : Vec3d{0, 1, 0};
   const Vec3d right = normalized(cross(forward, up));
-  BakeCamera camera;
+  Camera camera;
   camera.name = name;
   camera.intrinsics.width = width;
   camera.intrinsics.height = height;
@@ -84,4 +84,4 @@ inline BakeCamera camera_at(const std::string& name, Vec3d eye, Vec3d target, in
   return camera;
 }
 
-}  // namespace cnerf::test
+}  // namespace cnerf::bake::test

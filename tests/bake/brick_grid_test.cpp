@@ -1,10 +1,10 @@
-#include "bake/brick_grid.h"
+#include "bake/lattice/brick_grid.h"
 
 #include <gtest/gtest.h>
 
 #include "src/base/error.h"
 
-namespace cnerf {
+namespace cnerf::bake {
 namespace {
 
 TEST(BrickGrid, ReadsBackWhatWasWrittenAndBackgroundElsewhere) {
@@ -42,4 +42,4 @@ TEST(BrickGrid, OnlyWrittenBricksExist) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::bake

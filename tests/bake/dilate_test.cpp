@@ -1,4 +1,4 @@
-#include "bake/dilate.h"
+#include "bake/volume/dilate.h"
 
 #include <gtest/gtest.h>
 
@@ -10,11 +10,11 @@
 
 #include "src/base/error.h"
 
-namespace cnerf {
+namespace cnerf::bake {
 namespace {
 
-BakedVolume two_voxels() {
-  BakedVolume volume;
+Volume two_voxels() {
+  Volume volume;
   volume.voxel_size = 1;
   volume.resolution = {16, 16, 16};
   volume.voxels.push_back({7, 7, 7, 3.0f, 0.2f, {1, 0, 0}, 10, 20});
@@ -22,15 +22,15 @@ BakedVolume two_voxels() {
   return volume;
 }
 
-const BakedVoxel* find(const BakedVolume& volume, int i, int j, int k) {
-  for (const BakedVoxel& v : volume.voxels) {
+const Voxel* find(const Volume& volume, int i, int j, int k) {
+  for (const Voxel& v : volume.voxels) {
     if (v.i == i && v.j == j && v.k == k) return &v;
   }
   return nullptr;
 }
 
 TEST(Dilate, ReachesTwoVoxelsInEveryDirectionAndNoFurther) {
-  BakedVolume volume = two_voxels();
+  Volume volume = two_voxels();
   dilate_colors(volume, 2);
   // Two cubes of 5^3 that overlap in 2 x 5 x 5.
   EXPECT_EQ(volume.voxels.size(), 125u + 125u - 50u);
@@ -42,9 +42,9 @@ TEST(Dilate, ReachesTwoVoxelsInEveryDirectionAndNoFurther) {
 }
 
 TEST(Dilate, NewVoxelsHaveTheNearestColorAndNoDensity) {
-  BakedVolume volume = two_voxels();
+  Volume volume = two_voxels();
   dilate_colors(volume, 2);
-  for (const BakedVoxel& v : volume.voxels) {
+  for (const Voxel& v : volume.voxels) {
     const bool original = v.j == 7 && v.k == 7 && (v.i == 7 || v.i == 10);
     EXPECT_EQ(v.sigma > 0, original);
     const int i = std::abs(v.i - 7) < std::abs(v.i - 10) ? v.i - 7 : v.i - 10;
@@ -59,11 +59,11 @@ TEST(Dilate, NewVoxelsHaveTheNearestColorAndNoDensity) {
 }
 
 TEST(Dilate, BeyondInterpolationABrickHasOneColor) {
-  BakedVolume volume = two_voxels();
+  Volume volume = two_voxels();
   dilate_colors(volume, 2);
   std::map<std::tuple<int, int, int>, Vec3f> of_brick;
   std::size_t outer = 0;
-  for (const BakedVoxel& v : volume.voxels) {
+  for (const Voxel& v : volume.voxels) {
     const int i = std::abs(v.i - 7) < std::abs(v.i - 10) ? v.i - 7 : v.i - 10;
     if (i * i + (v.j - 7) * (v.j - 7) + (v.k - 7) * (v.k - 7) < 4) continue;
     ++outer;
@@ -74,9 +74,9 @@ TEST(Dilate, BeyondInterpolationABrickHasOneColor) {
 }
 
 TEST(Dilate, TwiceIsOnceAndGrowingLaterIsTheSame) {
-  BakedVolume once = two_voxels();
+  Volume once = two_voxels();
   dilate_colors(once, 3);
-  BakedVolume steps = two_voxels();
+  Volume steps = two_voxels();
   dilate_colors(steps, 2);
   dilate_colors(steps, 2);
   EXPECT_EQ(steps.voxels.size(), 200u);
@@ -86,10 +86,10 @@ TEST(Dilate, TwiceIsOnceAndGrowingLaterIsTheSame) {
 }
 
 TEST(Dilate, RefusesDuplicates) {
-  BakedVolume volume = two_voxels();
+  Volume volume = two_voxels();
   volume.voxels.push_back(volume.voxels.front());
   EXPECT_THROW(dilate_colors(volume, 2), ContractError);
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::bake

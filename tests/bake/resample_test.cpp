@@ -1,4 +1,4 @@
-#include "bake/resample.h"
+#include "bake/volume/resample.h"
 
 #include <gtest/gtest.h>
 
@@ -6,11 +6,11 @@
 
 #include "src/base/check.h"
 
-namespace cnerf {
+namespace cnerf::bake {
 namespace {
 
-BakedVolume cube(int side, float sigma, Vec3f rgb) {
-  BakedVolume volume;
+Volume cube(int side, float sigma, Vec3f rgb) {
+  Volume volume;
   volume.origin = {1, 2, 3};
   volume.voxel_size = 0.1;
   volume.resolution = {side, side, side};
@@ -20,27 +20,27 @@ BakedVolume cube(int side, float sigma, Vec3f rgb) {
   return volume;
 }
 
-double total_optical(const BakedVolume& volume) {
+double total_optical(const Volume& volume) {
   double total = 0;
-  for (const BakedVoxel& voxel : volume.voxels) total += voxel.sigma * std::pow(volume.voxel_size, 3);
+  for (const Voxel& voxel : volume.voxels) total += voxel.sigma * std::pow(volume.voxel_size, 3);
   return total;
 }
 
 TEST(Resample, LeavesWhatIsSmallEnoughAsItIs) {
-  const BakedVolume volume = cube(8, 2, {0.2f, 0.5f, 0.8f});
+  const Volume volume = cube(8, 2, {0.2f, 0.5f, 0.8f});
   EXPECT_EQ(resample_volume(volume, 8).voxels, volume.voxels);
   EXPECT_EQ(resample_volume(volume, 64).voxel_size, volume.voxel_size);
 }
 
 TEST(Resample, KeepsDensityColourAndPlaceAtAnyRatio) {
-  const BakedVolume volume = cube(12, 2, {0.2f, 0.5f, 0.8f});
+  const Volume volume = cube(12, 2, {0.2f, 0.5f, 0.8f});
   for (const int resolution : {4, 5, 7, 11}) {
-    const BakedVolume small = resample_volume(volume, resolution);
+    const Volume small = resample_volume(volume, resolution);
     EXPECT_EQ(small.resolution, (Vec3i{resolution, resolution, resolution}));
     EXPECT_EQ(small.voxels.size(), std::size_t(std::pow(resolution, 3)));
     EXPECT_NEAR(small.voxel_size * resolution, 1.2, 1e-12);
     EXPECT_EQ(small.origin, volume.origin);
-    for (const BakedVoxel& voxel : small.voxels) {
+    for (const Voxel& voxel : small.voxels) {
       EXPECT_NEAR(voxel.sigma, 2, 1e-5);
       EXPECT_NEAR(voxel.rgb.z, 0.8, 1e-5);
       EXPECT_NEAR(voxel.luminance, 0.3, 1e-5);
@@ -51,9 +51,9 @@ TEST(Resample, KeepsDensityColourAndPlaceAtAnyRatio) {
 
 /// One voxel in four of a 2 x 2 x 1 block: a quarter of the density, all of the colour.
 TEST(Resample, ThinMatterGetsThinnerNotDarker) {
-  BakedVolume volume = cube(4, 0, {0, 0, 0});
+  Volume volume = cube(4, 0, {0, 0, 0});
   volume.voxels = {{0, 0, 0, 8, 0.4f, {1, 0, 0}, 0, 0}, {1, 0, 0, 0, 0.9f, {0, 1, 0}, 0, 0}};
-  const BakedVolume small = resample_volume(volume, 2);
+  const Volume small = resample_volume(volume, 2);
   ASSERT_EQ(small.voxels.size(), 1u);
   EXPECT_NEAR(small.voxels[0].sigma, 1, 1e-6);  // 8 / 2^3
   EXPECT_NEAR(small.voxels[0].rgb.x, 1, 1e-6);
@@ -61,9 +61,9 @@ TEST(Resample, ThinMatterGetsThinnerNotDarker) {
 }
 
 TEST(Resample, IndicesBelowZeroStayWhereTheyAre) {
-  BakedVolume volume = cube(4, 0, {0, 0, 0});
+  Volume volume = cube(4, 0, {0, 0, 0});
   volume.voxels = {{-2, -1, 3, 5, 0.4f, {1, 1, 1}, 0, 0}};
-  const BakedVolume small = resample_volume(volume, 2);
+  const Volume small = resample_volume(volume, 2);
   ASSERT_EQ(small.voxels.size(), 1u);
   EXPECT_EQ(small.voxels[0].i, -1);
   EXPECT_EQ(small.voxels[0].j, -1);
@@ -71,8 +71,8 @@ TEST(Resample, IndicesBelowZeroStayWhereTheyAre) {
 }
 
 TEST(Resample, AnEmptyVolumeIsRefused) {
-  EXPECT_THROW((void)resample_volume(BakedVolume{}, 8), ContractError);
+  EXPECT_THROW((void)resample_volume(Volume{}, 8), ContractError);
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::bake

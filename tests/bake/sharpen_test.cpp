@@ -1,24 +1,24 @@
-#include "bake/sharpen.h"
+#include "bake/density/sharpen.h"
 
 #include <gtest/gtest.h>
 
 #include <functional>
 #include <numbers>
 
-#include "bake/volume_baker.h"
-#include "bake/volume_integrator.h"
+#include "bake/volume/integrate.h"
 #include "tests/bake/analytic_field.h"
+#include "tests/bake/whole_bake.h"
 
-namespace cnerf::test {
+namespace cnerf::bake::test {
 namespace {
 
 /// A lattice of 12 voxels along each axis, 1 world unit each.
-BakeLevel level_of(const std::function<float(Vec3i)>& density) {
-  BakePlan plan;
+Level level_of(const std::function<float(Vec3i)>& density) {
+  Plan plan;
   plan.voxel_size = 1;
   plan.resolution = {12, 12, 12};
   plan.box = {{0, 0, 0}, {12, 12, 12}};
-  BakeLevel level{plan, {{0, 0, 0}, plan.resolution, 0.0f}};
+  Level level{plan, {{0, 0, 0}, plan.resolution, 0.0f}};
   for (int i = 0; i < 12 * 12 * 12; ++i) {
     const Vec3i at{i / 144, i / 12 % 12, i % 12};
     level.sigma.set(at, density(at));
@@ -70,9 +70,9 @@ TEST(Sharpen, AnOpaqueBallKeepsItsSize) {
   constexpr double kRadius = 0.1734, kDistance = 50, kFocal = 9600;  // 0.0026 world units a pixel
   const AnalyticField ball({{0, 0, 0}, 0.5, 1}, sphere_density({0.513f, 0.491f, 0.507f}, float(0.5 * kRadius), 2000));
   const Vec3d centre = ball.frame().world_from_unit(Vec3d{0.513, 0.491, 0.507});
-  const BakeCamera camera = camera_at("far", centre + Vec3d{0.6, -0.7, 0.4} * kDistance, centre, 100, 100, kFocal);
+  const Camera camera = camera_at("far", centre + Vec3d{0.6, -0.7, 0.4} * kDistance, centre, 100, 100, kFocal);
   const auto grown_by = [&](double sharpening) {  // voxels
-    BakeOptions options;
+    Options options;
     options.voxel_size = 0.0127;
     options.sharpening = sharpening;
     const VolumeImage image =
@@ -89,4 +89,4 @@ TEST(Sharpen, AnOpaqueBallKeepsItsSize) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::bake::test

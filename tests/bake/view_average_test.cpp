@@ -1,15 +1,23 @@
 /// The view-averaged field: what a bake is made from.
 
-#include "bake/view_average.h"
+#include "bake/color/view_average.h"
+#include "bake/density/nested.h"
 
 #include <gtest/gtest.h>
 
-#include "bake/volume_baker.h"
 #include "src/base/parallel.h"
 #include "tests/bake/analytic_field.h"
+#include "tests/bake/processor_alone.h"
+#include "tests/bake/whole_bake.h"
 
-namespace cnerf::test {
+namespace cnerf::bake::test {
 namespace {
+
+std::unique_ptr<ViewAverage> view_average(const ColorField& field, const std::vector<Camera>& cameras,
+                                          const Options& options) {
+  Observer nobody;
+  return make_view_average(field, cameras, options, ProcessorAlone(), nobody);
+}
 
 const SceneFrame kFrame{{0, 0, 0}, 0.25, 1};  // world box: 4 units around the origin
 constexpr Vec3f kMiddle{0.5f, 0.5f, 0.5f};
@@ -21,12 +29,12 @@ AnalyticField shining_ball() {
   return field;
 }
 
-std::vector<BakeCamera> two_cameras() {
+std::vector<Camera> two_cameras() {
   return {camera_at("x", {8, 0, 0}, {0, 0, 0}, 64, 64, 100), camera_at("y", {0, 8, 0}, {0, 0, 0}, 64, 64, 100)};
 }
 
-BakeOptions coarse() {
-  BakeOptions options;
+Options coarse() {
+  Options options;
   options.resolution = 48;
   return options;
 }
@@ -39,7 +47,7 @@ std::vector<float> averages(const ViewAverage& average, const std::vector<Vec3f>
 
 TEST(ViewAverage, IsTheMeanOfTheViewsThatSeeAPoint) {
   const AnalyticField field = shining_ball();
-  const auto average = make_view_average(field, two_cameras(), coarse());
+  const auto average = view_average(field, two_cameras(), coarse());
   const auto on_ball = [](Vec3f direction) { return kMiddle + normalized(direction) * 0.25f; };
   const auto luminance =
       averages(*average, {on_ball({1, 0, 0}), on_ball({0, 1, 0}), on_ball({1, 1, 0}), on_ball({-1, -1, 0})});
@@ -51,11 +59,11 @@ TEST(ViewAverage, IsTheMeanOfTheViewsThatSeeAPoint) {
 
 TEST(ViewAverage, IsWhatABakePutsIntoItsVoxels) {
   const AnalyticField field = shining_ball();
-  const BakedVolume volume = bake_volume(field, two_cameras(), coarse());
-  const auto average = make_view_average(field, two_cameras(), coarse());
+  const Volume volume = bake_volume(field, two_cameras(), coarse());
+  const auto average = view_average(field, two_cameras(), coarse());
   std::vector<Vec3f> centres;
   std::vector<float> baked;
-  for (const BakedVoxel& voxel : volume.voxels) {
+  for (const Voxel& voxel : volume.voxels) {
     if (voxel.sigma < 0.999f * 400 * float(kFrame.unit_per_world)) continue;  // full: colour of its middle
     const Vec3d world = volume.origin + Vec3d{voxel.i + 0.5, voxel.j + 0.5, voxel.k + 0.5} * volume.voxel_size;
     centres.push_back(kFrame.unit_from_world(world).cast<float>());
@@ -74,7 +82,7 @@ TEST(ViewAverage, IsWhatABakePutsIntoItsVoxels) {
 
 TEST(ViewAverage, DoesNotDependOnThreadsOrOnWhatElseIsAsked) {
   const AnalyticField field = shining_ball();
-  const auto average = make_view_average(field, two_cameras(), coarse());
+  const auto average = view_average(field, two_cameras(), coarse());
   std::vector<Vec3f> positions;
   for (int i = 0; i < 200; ++i) {
     const float turn = 0.1f * float(i);
@@ -95,12 +103,12 @@ TEST(ViewAverage, NestedGridsHideOneBehindTheOther) {
   const auto wall = box_density({0.1f, 0.9f, 0.1f}, {0.9f, 0.94f, 0.9f}, 2000);
   AnalyticField field(frame, [=](Vec3f p) { return std::max(ball(p), wall(p)); });
   field.with_luminance([](Vec3f, Vec3f d) { return d.y > 0.9f ? 0.9f : 0.3f; });
-  const std::vector<BakeCamera> cameras{camera_at("eye", {0, 0, 0}, {0, 4, 0}, 48, 48, 50),
-                                        camera_at("beside", {0.2, 0, 0}, {0.2, 4, 0}, 48, 48, 50)};
-  BakeOptions options;
+  const std::vector<Camera> cameras{camera_at("eye", {0, 0, 0}, {0, 4, 0}, 48, 48, 50),
+                                    camera_at("beside", {0.2, 0, 0}, {0.2, 4, 0}, 48, 48, 50)};
+  Options options;
   options.resolution = 40;
   ASSERT_GT(plan_levels(field, cameras, options).size(), 1u);
-  const auto average = make_view_average(field, cameras, options);
+  const auto average = view_average(field, cameras, options);
   const auto luminance = averages(*average, {{0.5f, 0.1f, 0.5f}, {0.6f, 0.9f, 0.5f}, {0.5f, 0.149f, 0.5f}});
   EXPECT_FLOAT_EQ(luminance[0], 0.9f) << "the front of the ball";
   EXPECT_FLOAT_EQ(luminance[1], 0.9f) << "the wall beside it";
@@ -108,4 +116,4 @@ TEST(ViewAverage, NestedGridsHideOneBehindTheOther) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::bake::test

@@ -1,10 +1,10 @@
-#include "bake/view_selection.h"
+#include "bake/visibility/view_selection.h"
 
 #include <gtest/gtest.h>
 
 #include "tests/bake/analytic_field.h"
 
-namespace cnerf::test {
+namespace cnerf::bake::test {
 namespace {
 
 /// A wall of `thickness` voxels, x in [32, 32 + thickness), in a lattice of 64^3.
@@ -45,8 +45,8 @@ TEST(Transmittance, SkippingEmptyBricksChangesNothing) {
 }
 
 struct Ring {
-  BakePlan plan;
-  std::vector<BakeCamera> cameras;
+  Plan plan;
+  std::vector<Camera> cameras;
 };
 
 /// Eight cameras around the middle of a lattice of 64^3 voxels of size 1.
@@ -65,7 +65,7 @@ Ring ring() {
 
 /// Who sees points of the ring's lattice, filled with `sigma`.
 ViewSelection onlookers(const Ring& r, const BrickGrid<float>& sigma, int views) {
-  BakeOptions options;
+  Options options;
   options.views_per_voxel = views;
   return {r.cameras, {{&sigma, r.plan.origin, r.plan.voxel_size}}, options};
 }
@@ -134,4 +134,4 @@ TEST(ViewSelection, ManyPointsAreAnsweredLikeOneByOne) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::bake::test

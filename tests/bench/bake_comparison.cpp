@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "bake/volume_integrator.h"
+#include "bake/volume/integrate.h"
 #include "export/vdb_reader.h"
 #include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
@@ -40,7 +40,7 @@ struct Sums {
   }
 };
 
-std::vector<float> rgba_of(const cnerf::VolumeImage& image) {
+std::vector<float> rgba_of(const cnerf::bake::VolumeImage& image) {
   std::vector<float> rgba;
   for (std::size_t p = 0; p < image.opacity.size(); ++p) {
     for (std::size_t c = 0; c < 3; ++c) rgba.push_back(image.rgb[3 * p + c]);
@@ -91,17 +91,18 @@ int main(int argc, char** argv) {
   capture_options.holdout = options["holdout"];
   const cnerf::Capture capture = cnerf::load_capture(files[1], capture_options);
   const auto scene = cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "", cnerf::cpu_engines());
-  const std::vector<cnerf::BakedVolume> levels = cnerf::read_volumes(bake);
-  const auto average = options["averaged"] != 0
-                           ? cnerf::bench::average_behind(cnerf::read_manifest(bake / "manifest.json"), *scene, capture)
-                           : nullptr;
+  const std::vector<cnerf::bake::Volume> levels = cnerf::exporting::read_volumes(bake);
+  const auto average =
+      options["averaged"] != 0
+          ? cnerf::bench::average_behind(cnerf::exporting::read_manifest(bake / "manifest.json"), *scene, capture)
+          : nullptr;
   const cnerf::RenderOptions render = cnerf::bench::field_options(*scene, average.get());
   const auto views = cnerf::bench::views_to_compare(capture, options["trained"] != 0, options["views"]);
 
   Sums all;
   cnerf::ContactSheet sheet({"bake", "field", "difference x 2"}, 1000);
   for (const cnerf::View* view : views) {
-    const std::vector<float> bake_rgba = rgba_of(cnerf::integrate_volumes(
+    const std::vector<float> bake_rgba = rgba_of(cnerf::bake::integrate_volumes(
         levels, view->intrinsics, view->world_from_camera, {options["percent_of_step"] / 100.0, options["rays"]}));
     const cnerf::RenderedImage field = scene->render(view->intrinsics, view->world_from_camera, render);
     const Sums sums = compare(bake_rgba, field, *view);

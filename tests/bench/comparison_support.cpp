@@ -14,7 +14,7 @@ std::vector<float> rgb_of(const RenderedImage& image) {
   return rgb;
 }
 
-RenderOptions field_options(const Scene& scene, const ViewAverage* average) {
+RenderOptions field_options(const Scene& scene, const bake::ViewAverage* average) {
   RenderOptions options;
   options.color = false;
   options.baked_color = scene.is_colorized();
@@ -24,11 +24,13 @@ RenderOptions field_options(const Scene& scene, const ViewAverage* average) {
   return options;
 }
 
-std::unique_ptr<ViewAverage> average_behind(const BakeManifest& bake, const Scene& scene, const Capture& capture) {
-  BakeOptions options;
+std::unique_ptr<bake::ViewAverage> average_behind(const exporting::BakeManifest& bake, const Scene& scene,
+                                                  const Capture& capture) {
+  bake::Options options;
   options.voxel_size = bake.volume ? bake.volume->voxel_size : bake.mesh->voxel_size;
   options.grids = bake.finer_volumes.empty() ? "one" : "nested";
-  return make_view_average(scene, cameras_of(capture), options);
+  Observer nobody;
+  return make_view_average(scene, bake::cameras_of(capture), options, cpu_engines(), nobody);
 }
 
 RenderedImage read_render(const std::filesystem::path& folder, const View& view) {

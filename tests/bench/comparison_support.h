@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "bake/view_average.h"
+#include "bake/color/view_average.h"
 #include "export/manifest.h"
 #include "src/capture/capture.h"
 #include "src/color/colorspace_math.h"
@@ -36,11 +36,11 @@ inline double decibels(double squared, std::size_t values) {
 
 /// How to render a field for comparisons with a bake: colours of samples, and luminance as it is or averaged.
 /// @param average  null, or what `render` is to show; must outlive the result.
-[[nodiscard]] RenderOptions field_options(const Scene& scene, const ViewAverage* average);
+[[nodiscard]] RenderOptions field_options(const Scene& scene, const bake::ViewAverage* average);
 
 /// The view-averaged field behind a bake, on lattices like its own.
-[[nodiscard]] std::unique_ptr<ViewAverage> average_behind(const BakeManifest& bake, const Scene& scene,
-                                                          const Capture& capture);
+[[nodiscard]] std::unique_ptr<bake::ViewAverage> average_behind(const exporting::BakeManifest& bake, const Scene& scene,
+                                                                const Capture& capture);
 
 /// A view of the field as `cnerf render --path held-out --format exr` leaves it in a folder.
 /// @throws MissingInputError, InputError.

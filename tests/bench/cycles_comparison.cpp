@@ -18,7 +18,7 @@
 #include <optional>
 #include <string>
 
-#include "bake/volume_integrator.h"
+#include "bake/volume/integrate.h"
 #include "export/vdb_reader.h"
 #include "src/capture/color_truth.h"
 #include "src/capture/load_capture.h"
@@ -38,7 +38,7 @@ struct Differences {
   std::size_t values = 0;
 };
 
-Differences differences(const RenderedExr& cycles, const cnerf::VolumeImage& ours,
+Differences differences(const RenderedExr& cycles, const cnerf::bake::VolumeImage& ours,
                         const std::optional<cnerf::ColorImage>& truth) {
   Differences sums;
   for (std::size_t p = 0; p < ours.opacity.size(); ++p) {
@@ -76,14 +76,15 @@ int main(int argc, char** argv) {
   capture_options.downscale = options["downscale"];
   capture_options.holdout = options["holdout"];
   const cnerf::Capture capture = cnerf::load_capture(files[1], capture_options);
-  const std::vector<cnerf::BakedVolume> volumes = cnerf::read_volumes(bake);
+  const std::vector<cnerf::bake::Volume> volumes = cnerf::exporting::read_volumes(bake);
   const bool has_renders = files.size() > 2 && std::filesystem::is_directory(files[2]);
   const auto scene = files.size() > 2 && !has_renders
                          ? cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "", cnerf::cpu_engines())
                          : nullptr;
-  const auto average = scene && options["averaged"] != 0
-                           ? cnerf::bench::average_behind(cnerf::read_manifest(bake / "manifest.json"), *scene, capture)
-                           : nullptr;
+  const auto average =
+      scene && options["averaged"] != 0
+          ? cnerf::bench::average_behind(cnerf::exporting::read_manifest(bake / "manifest.json"), *scene, capture)
+          : nullptr;
   const auto views = cnerf::bench::views_to_compare(capture, options["trained"] != 0, options["views"]);
 
   cnerf::ContactSheet sheet({"Cycles", "field", "difference x 2"}, 1000);
@@ -92,7 +93,7 @@ int main(int argc, char** argv) {
         bake / "blender_setup.py",
         "--camera '" + view->name + "' --samples " + std::to_string(options["samples"]) + " --step-rate 0.25");
     if (options["ours"] != 0) {
-      const auto ours = cnerf::integrate_volumes(volumes, view->intrinsics, view->world_from_camera);
+      const auto ours = cnerf::bake::integrate_volumes(volumes, view->intrinsics, view->world_from_camera);
       const auto truth = cnerf::load_color_truth(*view);
       const Differences sums = differences(cycles, ours, truth);
       std::printf("%s: Cycles against our integrator %.2f dB (linear)", view->name.c_str(),

@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
   capture_options.downscale = options["downscale"];
   capture_options.holdout = options["holdout"];
   const cnerf::Capture capture = cnerf::load_capture(files[1], capture_options);
-  const cnerf::BakeManifest manifest = cnerf::read_manifest(bake / "manifest.json");
+  const cnerf::exporting::BakeManifest manifest = cnerf::exporting::read_manifest(bake / "manifest.json");
   const auto scene = cnerf::Scene::load(files[2], files.size() > 3 ? files[3] : "", cnerf::cpu_engines());
   const auto average = options["averaged"] != 0 ? cnerf::bench::average_behind(manifest, *scene, capture) : nullptr;
   const cnerf::RenderOptions render = cnerf::bench::field_options(*scene, average.get());

@@ -13,7 +13,7 @@
 #include <optional>
 #include <string>
 
-#include "bake/density_pass.h"
+#include "bake/density/density_pass.h"
 #include "src/base/rng.h"
 #include "src/capture/load_capture.h"
 #include "src/train/scene.h"
@@ -30,7 +30,7 @@ struct Line {
 
 constexpr double kStep = 0.25;  // voxels
 
-double interpolated(const cnerf::BrickGrid<float>& sigma, double path, Vec3d p) {
+double interpolated(const cnerf::bake::BrickGrid<float>& sigma, double path, Vec3d p) {
   const Vec3d q = p - Vec3d{0.5, 0.5, 0.5};
   const Vec3i base{int(std::floor(q.x)), int(std::floor(q.y)), int(std::floor(q.z))};
   const Vec3d t = q - base.cast<double>();
@@ -44,7 +44,7 @@ double interpolated(const cnerf::BrickGrid<float>& sigma, double path, Vec3d p) 
 }
 
 /// First depth at which the share of light taken by `depth` voxels reaches one half.
-std::optional<double> level_depth(const cnerf::BrickGrid<float>& sigma, double path, const Line& line) {
+std::optional<double> level_depth(const cnerf::bake::BrickGrid<float>& sigma, double path, const Line& line) {
   double before = 0;
   for (double t = line.begin; t < line.end; t += kStep) {
     const double value = interpolated(sigma, path, line.origin + line.direction * t);
@@ -55,7 +55,7 @@ std::optional<double> level_depth(const cnerf::BrickGrid<float>& sigma, double p
 }
 
 /// Depth at which the field lets half of the light through.
-std::optional<double> field_depth(const cnerf::Scene& scene, const cnerf::BakePlan& plan, const Line& line) {
+std::optional<double> field_depth(const cnerf::Scene& scene, const cnerf::bake::Plan& plan, const Line& line) {
   std::vector<cnerf::Vec3f> positions;
   std::vector<double> depths;
   for (double t = line.begin + kStep / 2; t < line.end; t += kStep) {
@@ -96,10 +96,10 @@ int main(int argc, char** argv) {
   }
   const cnerf::Capture capture = cnerf::load_capture(argv[1], {});
   const auto scene = cnerf::Scene::load(argv[2], {}, cnerf::cpu_engines());
-  cnerf::BakeOptions bake;
+  cnerf::bake::Options bake;
   bake.resolution = options["resolution"];
-  const cnerf::BakePlan plan = cnerf::plan_bake(*scene, bake);
-  const cnerf::BrickGrid<float> sigma = cnerf::bake_density(*scene, plan, bake, [](double) {});
+  const cnerf::bake::Plan plan = cnerf::bake::plan_bake(*scene, bake);
+  const cnerf::bake::BrickGrid<float> sigma = cnerf::bake::bake_density(*scene, plan, bake, [](double) {});
   const cnerf::Aabbd box{{0, 0, 0}, plan.resolution.cast<double>()};
 
   std::vector<Line> lines;

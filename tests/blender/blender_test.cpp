@@ -5,35 +5,38 @@
 #include <cmath>
 #include <fstream>
 
-#include "bake/dilate.h"
-#include "bake/volume_baker.h"
-#include "bake/volume_integrator.h"
+#include "bake/density/nested.h"
+#include "bake/volume/dilate.h"
+#include "bake/volume/integrate.h"
 #include "export/bake_folder.h"
-#include "export/volume_export.h"
 #include "export/web_pictures.h"
 #include "src/base/files.h"
 #include "src/color/colorspace_math.h"
 #include "tests/bake/analytic_field.h"
+#include "tests/bake/whole_bake.h"
 #include "tests/blender/blender_run.h"
 #include "tests/export/test_volumes.h"
+#include "tests/export/whole_export.h"
 #include "tests/support/data.h"
 
-namespace cnerf::test {
+namespace cnerf::exporting::test {
+using namespace cnerf::test;
+using namespace bake::test;
 namespace {
 
 const Vec3f kColor{0.2f, 0.5f, 0.8f};
 
-Vec3d voxel_position(const BakedVolume& volume, Vec3d voxel) {
+Vec3d voxel_position(const bake::Volume& volume, Vec3d voxel) {
   return volume.origin + voxel * volume.voxel_size;
 }
 
 TEST(Blender, SlabIsBeerAndLambertThroughAnOrthographicCamera) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
-  const BakedVolume volume = block_volume({0, 0, 0}, {40, 40, 10}, 1.0f);  // 2 x 2 x 0.5 world units
+  const bake::Volume volume = block_volume({0, 0, 0}, {40, 40, 10}, 1.0f);  // 2 x 2 x 0.5 world units
   const Vec3d middle = voxel_position(volume, {20, 20, 5});
-  const BakeCamera camera = camera_at("above", middle + Vec3d{0, 0, 4}, middle, 33, 33, 60);
-  const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "slab");
+  const bake::Camera camera = camera_at("above", middle + Vec3d{0, 0, 4}, middle, 33, 33, 60);
+  const VolumeExport bake = export_volume(volume, {camera}, folder.path(), "slab");
 
   std::ofstream(folder / "ortho.py") << "import bpy\n"
                                         "scene = bpy.context.scene\n"
@@ -61,11 +64,11 @@ TEST(Blender, DenseSphereHasItsColorFromCoreToRim) {
   const Vec3f xyz = relative_xyz_from_linear_rgb(kColor);
   const AnalyticField sphere({{0, 0, 0}, 0.5, 1}, sphere_density({0.5f, 0.5f, 0.5f}, 0.2f, 400), xyz.y,
                              {xyz.x / xyz.y, xyz.z / xyz.y});  // 200 per world unit
-  BakeOptions options;
+  bake::Options options;
   options.voxel_size = 1.0 / 64;
-  const BakedVolume volume = bake_volume(sphere, {}, options);
-  const BakeCamera camera = camera_at("front", {0, -3, 0}, {0, 0, 0}, 96, 96, 300);
-  const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "sphere");
+  const bake::Volume volume = bake_volume(sphere, {}, options);
+  const bake::Camera camera = camera_at("front", {0, -3, 0}, {0, 0, 0}, 96, 96, 300);
+  const VolumeExport bake = export_volume(volume, {camera}, folder.path(), "sphere");
   const RenderedExr image = render_exact(bake.blender_setup, "--step-rate 0.25 --samples 64");
 
   int core = 0, rim = 0;
@@ -109,15 +112,15 @@ class VoxelOrigin : public testing::TestWithParam<const char*> {};
 TEST_P(VoxelOrigin, EdgesAreWithinATenthOfAVoxel) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
-  const BakedVolume volume = block_volume({2, 3, 4}, {14, 15, 16}, 2.0f);  // 12 voxels of 0.05 along each axis
+  const bake::Volume volume = block_volume({2, 3, 4}, {14, 15, 16}, 2.0f);  // 12 voxels of 0.05 along each axis
   const Vec3d middle = voxel_position(volume, {8, 9, 10});
   const double far = 500, pixels_per_voxel = 4;
   const double focal = pixels_per_voxel * far / volume.voxel_size;
-  const std::vector<BakeCamera> cameras{camera_at("z", middle + Vec3d{0, 0, far}, middle, 72, 72, focal),
-                                        camera_at("x", middle + Vec3d{far, 0, 0}, middle, 72, 72, focal)};
+  const std::vector<bake::Camera> cameras{camera_at("z", middle + Vec3d{0, 0, far}, middle, 72, 72, focal),
+                                          camera_at("x", middle + Vec3d{far, 0, 0}, middle, 72, 72, focal)};
   VdbOptions options;
   options.voxel_origin = GetParam();
-  const VolumeExport bake = export_volume(volume, cameras, {}, folder.path(), "block", options);
+  const VolumeExport bake = export_volume(volume, cameras, folder.path(), "block", options);
   const double inside = 2.0 * 12 * volume.voxel_size;
   const double near_face = 36 - 6 * pixels_per_voxel, far_face = 36 + 6 * pixels_per_voxel;
   const double tenth = 0.1 * pixels_per_voxel;
@@ -134,7 +137,7 @@ TEST_P(VoxelOrigin, EdgesAreWithinATenthOfAVoxel) {
 INSTANTIATE_TEST_SUITE_P(Blender, VoxelOrigin, testing::Values("center", "corner"));
 
 /// Three soft balls of different colours and densities.
-BakedVolume soft_scene() {
+bake::Volume soft_scene() {
   struct Ball {
     Vec3f centre;
     float radius, sigma;
@@ -166,7 +169,7 @@ BakedVolume soft_scene() {
     const Vec3f xyz = color(p);
     return xyz.y > 0 ? Chromaticity{xyz.x / xyz.y, xyz.z / xyz.y} : Chromaticity{};
   });
-  BakeOptions options;
+  bake::Options options;
   options.resolution = 56;
   return bake_volume(field, {}, options);
 }
@@ -178,7 +181,7 @@ struct Comparison {
 };
 
 /// Over the pixels that hold something in either picture.
-Comparison compare(const RenderedExr& cycles, const VolumeImage& ours) {
+Comparison compare(const RenderedExr& cycles, const bake::VolumeImage& ours) {
   Comparison result;
   double squared = 0;
   for (int y = 0; y < ours.height; ++y) {
@@ -198,14 +201,14 @@ Comparison compare(const RenderedExr& cycles, const VolumeImage& ours) {
 TEST(Blender, CyclesAndOurIntegratorAgree) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
-  const BakedVolume volume = soft_scene();
-  BakeCamera camera = camera_at("three quarters", {3.6, -3.4, 1.9}, {2, -1, 0.5}, 160, 120, 260);
+  const bake::Volume volume = soft_scene();
+  bake::Camera camera = camera_at("three quarters", {3.6, -3.4, 1.9}, {2, -1, 0.5}, 160, 120, 260);
   camera.intrinsics.fy = 234;  // pixels that are not square, axis off the middle
   camera.intrinsics.cx = 71;
   camera.intrinsics.cy = 66.5;
-  const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "balls");
+  const VolumeExport bake = export_volume(volume, {camera}, folder.path(), "balls");
   const RenderedExr cycles = render_exact(bake.blender_setup, "--step-rate 0.25 --samples 64");
-  const VolumeImage ours = integrate_volume(volume, camera.intrinsics, camera.world_from_camera);
+  const bake::VolumeImage ours = integrate_volume(volume, camera.intrinsics, camera.world_from_camera);
   const Comparison equal = compare(cycles, ours);
   RecordProperty("psnr_millidecibel", int(1000 * equal.psnr));
   std::printf("Cycles against our integrator: %.2f dB over %zu pixels, opacity within %.4f\n", equal.psnr, equal.pixels,
@@ -214,7 +217,7 @@ TEST(Blender, CyclesAndOurIntegratorAgree) {
   EXPECT_GE(equal.psnr, 40);
 
   // The measure must notice half a voxel.
-  BakedVolume shifted = volume;
+  bake::Volume shifted = volume;
   shifted.origin = shifted.origin + Vec3d{0.5, 0.5, 0.5} * shifted.voxel_size;
   EXPECT_LT(compare(cycles, integrate_volume(shifted, camera.intrinsics, camera.world_from_camera)).psnr, 40);
 }
@@ -223,12 +226,11 @@ TEST(Blender, CyclesAndOurIntegratorAgree) {
 TEST(Blender, AFileThatStandsUpLiesWhereThePosesHaveIt) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
-  const BakedVolume volume = soft_scene();
-  const BakeCamera camera = camera_at("three quarters", {3.6, -3.4, 1.9}, {2, -1, 0.5}, 80, 60, 130);
+  const bake::Volume volume = soft_scene();
+  const bake::Camera camera = camera_at("three quarters", {3.6, -3.4, 1.9}, {2, -1, 0.5}, 80, 60, 130);
   VdbOptions options;
-  options.up_axis = "z";
   options.up = "y";
-  const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "balls", options);
+  const VolumeExport bake = export_volume(volume, {camera}, folder.path(), "balls", options);
   const RenderedExr cycles = render_exact(bake.blender_setup, "--step-rate 0.25 --samples 32");
   const Comparison equal = compare(cycles, integrate_volume(volume, camera.intrinsics, camera.world_from_camera));
   EXPECT_GT(equal.pixels, 500u);
@@ -238,10 +240,10 @@ TEST(Blender, AFileThatStandsUpLiesWhereThePosesHaveIt) {
 TEST(Blender, TheSceneShowsColoursAsTheyAreAndSkipsNoVoxel) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
-  BakedVolume volume = block_volume({0, 0, 0}, {4, 4, 4}, 1);
+  bake::Volume volume = block_volume({0, 0, 0}, {4, 4, 4}, 1);
   volume.voxels.push_back(volume.voxels.back());
   volume.voxels.back().i = 1400;  // the diagonal has more voxels than Cycles has steps by default
-  const VolumeExport bake = export_volume(volume, {}, {}, folder.path(), "block");
+  const VolumeExport bake = export_volume(volume, {}, folder.path(), "block");
   std::ofstream(folder / "check.py")
       << "import bpy\n"
          "scene = bpy.data.scenes['cnerf']\n"
@@ -264,21 +266,23 @@ TEST(Blender, NestedGridsAgreeWithOurIntegrator) {
     return q < 0.3f ? 12 * (1 - q / 0.3f) : 0.0f;
   });
   field.with_luminance([](Vec3f p, Vec3f) { return 0.2f + 0.5f * p.x; });
-  const BakeCamera camera = camera_at("front", {0.5, -6, 0.7}, {0, 0, 0}, 96, 96, 180);
-  BakeOptions options;
+  const bake::Camera camera = camera_at("front", {0.5, -6, 0.7}, {0, 0, 0}, 96, 96, 180);
+  bake::Options options;
   options.resolution = 32;
-  const std::vector<BakeCamera> cameras{camera, camera_at("right", {6, 0.4, 0}, {0, 0, 0}, 96, 96, 180)};
-  BakeJournal journal;
+  const std::vector<bake::Camera> cameras{camera, camera_at("right", {6, 0.4, 0}, {0, 0, 0}, 96, 96, 180)};
+  bake::Journal journal;
   const auto levels = bake_levels(field, plan_levels(field, cameras, options), options, journal);
-  const std::vector<VolumePlanes> planes = bake_volumes(field, cameras, levels, options, journal);
+  const std::vector<bake::VolumePlanes> planes = bake_volumes(field, cameras, levels, options, journal);
   ASSERT_GT(planes.size(), 1u);
-  std::vector<BakedVolume> volumes;
-  for (const VolumePlanes& level : planes) volumes.push_back(whole_volume(dilated(level, options.dilation)));
-  BakeFolder bake(folder.path(), cameras, {}, "units", "y");  // stands up: the Empty turns everything with it
-  bake.add_volumes(planes, "volume", {});
+  std::vector<bake::VolumePlanes> wide;
+  for (const bake::VolumePlanes& level : planes) wide.push_back(dilated(level, options.dilation));
+  std::vector<bake::Volume> volumes;
+  for (const bake::VolumePlanes& level : wide) volumes.push_back(whole_volume(level));
+  BakeFolder bake(folder.path(), cameras, label_of_first("y"));  // stands up: the Empty turns everything with it
+  bake.add_volumes(wide, "volume", {});
   bake.finish();
   const RenderedExr cycles = render_exact(bake.blender_setup(), "--step-rate 0.25 --samples 64");
-  const VolumeImage ours = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);
+  const bake::VolumeImage ours = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);
   const Comparison equal = compare(cycles, ours);
   std::printf("Nested grids, Cycles against our integrator: %.2f dB over %zu pixels\n", equal.psnr, equal.pixels);
   EXPECT_GT(equal.pixels, 1000u);
@@ -288,16 +292,16 @@ TEST(Blender, NestedGridsAgreeWithOurIntegrator) {
 TEST(Blender, RegradingRebuildsTheColorAndTurnsItGrey) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
-  BakedVolume volume = block_volume({0, 0, 0}, {20, 20, 20}, 40);
+  bake::Volume volume = block_volume({0, 0, 0}, {20, 20, 20}, 40);
   const Lab<float> lab = lab_from_linear_rgb(kColor);
-  for (BakedVoxel& v : volume.voxels) {
+  for (bake::Voxel& v : volume.voxels) {
     v.luminance = luminance_of(kColor);
     v.a = lab.a;
     v.b = lab.b;
   }
   const Vec3d middle = voxel_position(volume, {10, 10, 10});
-  const BakeCamera camera = camera_at("front", middle + Vec3d{0, -5, 0}, middle, 16, 16, 60);
-  const VolumeExport bake = export_volume(volume, {camera}, {}, folder.path(), "block");
+  const bake::Camera camera = camera_at("front", middle + Vec3d{0, -5, 0}, middle, 16, 16, 60);
+  const VolumeExport bake = export_volume(volume, {camera}, folder.path(), "block");
   const auto centre = [&](const std::string& grade) {
     const RenderedExr image = render_exact(bake.blender_setup, "--samples 16 " + grade);
     const float* p = image.pixel(8, 8);
@@ -316,16 +320,16 @@ TEST(Blender, RegradingRebuildsTheColorAndTurnsItGrey) {
 TEST(Blender, NumberedPicturesBecomeAFilmWithPlatesUnderAnUprightEmpty) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
-  std::vector<BakeCamera> cameras;
+  std::vector<bake::Camera> cameras;
   for (const int frame : {3, 4, 7}) {
     cameras.push_back(
         camera_at("images/frame_" + std::to_string(frame) + ".png", {double(frame), 2, 9}, {1, 2, 3}, 8, 8, 9));
   }
-  VdbOptions options;
-  options.metres_per_unit = 0.01;
-  BakeFolder bake(folder.path(), cameras, {}, "cm", "y");
-  const BakedVolume block = block_volume({0, 0, 0}, {4, 4, 4}, 1);
-  bake.add_volumes({planes_of(block)}, "volume", options);
+  Label label = label_of_first("y", "cm");
+  label.world.metres_per_unit = 0.01;
+  BakeFolder bake(folder.path(), cameras, label);
+  const bake::Volume block = block_volume({0, 0, 0}, {4, 4, 4}, 1);
+  bake.add_volumes({planes_of(block)}, "volume", {});
   bake.add_plate(cameras[1].name, make_web_photo(cameras[1].intrinsics, std::vector<float>(64, 0.5f), 8, 90).jpeg);
   bake.finish();
   std::ofstream(folder / "check.py")
@@ -345,7 +349,7 @@ TEST(Blender, NumberedPicturesBecomeAFilmWithPlatesUnderAnUprightEmpty) {
 }
 
 /// A white ball before black, as a camera with a lens would have photographed it.
-std::vector<float> photograph_of_ball(const BakeCamera& camera, Vec3d centre, double radius) {
+std::vector<float> photograph_of_ball(const bake::Camera& camera, Vec3d centre, double radius) {
   const Intrinsics& lens = camera.intrinsics;
   const Vec3d to_centre = centre - camera.world_from_camera.translation;
   std::vector<float> luminance;
@@ -365,21 +369,21 @@ TEST(Blender, ThePhotographLiesUnderWhatItShows) {
   const TempDir folder;
   const AnalyticField ball({{0, 0, 0}, 0.5, 1}, sphere_density({0.7f, 0.55f, 0.65f}, 0.12f, 400), 0.6f);
   const Vec3d centre = ball.frame().world_from_unit(Vec3d{0.7, 0.55, 0.65});
-  BakeOptions options;
+  bake::Options options;
   options.voxel_size = 1.0 / 128;  // an opaque ball grows by less than half a voxel
-  BakeCamera camera = camera_at("front", {0, -1.6, 0}, {0, 0, 0}, 120, 160, 100);
+  bake::Camera camera = camera_at("front", {0, -1.6, 0}, {0, 0, 0}, 120, 160, 100);
   camera.intrinsics.fy = 90;
   camera.intrinsics.cx = 52;
   camera.intrinsics.cy = 87.5;
-  BakeCamera bent = camera;
+  bake::Camera bent = camera;
   bent.intrinsics.model = LensModel::kOpenCv;
   bent.intrinsics.distortion = {0.8};
   const std::vector<float> photograph = photograph_of_ball(bent, centre, 0.24);
-  const BakedVolume volume = bake_volume(ball, {}, options);
+  const bake::Volume volume = bake_volume(ball, {}, options);
 
-  const auto overlap_of = [&](const BakeCamera& shown_as, const std::string& name) {
-    BakeFolder bake(folder / name, {shown_as}, {}, "scene units", "y");
-    bake.add_volume(volume, "volume", {});
+  const auto overlap_of = [&](const bake::Camera& shown_as, const std::string& name) {
+    BakeFolder bake(folder / name, {shown_as}, label_of_first("y"));
+    bake.add_volumes({planes_of(volume)}, "volume", {});
     bake.add_plate("front", make_web_photo(shown_as.intrinsics, photograph, 4096, 95).jpeg);
     bake.finish();
     const RenderedExr ours = render_exact(bake.blender_setup(), "--samples 16");
@@ -405,7 +409,7 @@ TEST(Blender, ThePhotographLiesUnderWhatItShows) {
 TEST(Blender, TheAddOnImportsABakeIntoASceneOfItsOwn) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
-  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, {}, folder.path(), "block");
+  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
   std::ofstream(folder / "import.py") << "import bpy, importlib.util\n"
                                          "spec = importlib.util.spec_from_file_location('cnerf_bake', r'" +
                                              bake.blender_setup.string() +
@@ -426,7 +430,7 @@ TEST(Blender, TheAddOnImportsABakeIntoASceneOfItsOwn) {
 TEST(Blender, PastedIntoTheTextEditorItMakesASceneOfItsOwn) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
-  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, {}, folder.path(), "block");
+  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
   // As the text editor runs it: no __file__, and a scene that must not be touched.
   std::ofstream(folder / "paste.py")
       << "import bpy, sys\n"
@@ -448,7 +452,7 @@ TEST(Blender, PastedIntoTheTextEditorItMakesASceneOfItsOwn) {
 TEST(Blender, FailuresEndWithAnExitStatus) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
-  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, {}, folder.path(), "block");
+  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
   EXPECT_NE(run_blender(bake.blender_setup, "--camera 7"), 0);
   EXPECT_NE(run_blender(bake.blender_setup, "--manifest /nowhere/manifest.json"), 0);
   EXPECT_NE(run_blender(bake.blender_setup, "--over-plate 1"), 0) << "there is no photograph";
@@ -458,4 +462,4 @@ TEST(Blender, FailuresEndWithAnExitStatus) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::exporting::test

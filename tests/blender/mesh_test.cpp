@@ -5,16 +5,17 @@
 #include <cmath>
 #include <fstream>
 
-#include "bake/mesh/mesh_baker.h"
-#include "bake/volume_baker.h"
 #include "export/bake_folder.h"
 #include "src/base/files.h"
 #include "src/color/colorspace_math.h"
 #include "tests/bake/analytic_field.h"
+#include "tests/bake/whole_bake.h"
 #include "tests/blender/blender_run.h"
 #include "tests/support/data.h"
 
-namespace cnerf::test {
+namespace cnerf::exporting::test {
+using namespace cnerf::test;
+using namespace bake::test;
 namespace {
 
 /// An L of a box and a ball: nothing about it is symmetric, and each half has its own colour.
@@ -60,18 +61,19 @@ TEST_P(MeshBesideVolume, SilhouettesAndColoursAgree) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
   const AnalyticField field = l_shape();
-  const std::vector<BakeCamera> cameras{camera_at("a", {5.2, -4.4, 2.1}, {2, -1, 0.5}, 160, 120, 330),
-                                        camera_at("b", {-0.5, 1.9, 3.2}, {2, -1, 0.5}, 160, 120, 330)};
-  BakeOptions options;
+  const std::vector<bake::Camera> cameras{camera_at("a", {5.2, -4.4, 2.1}, {2, -1, 0.5}, 160, 120, 330),
+                                          camera_at("b", {-0.5, 1.9, 3.2}, {2, -1, 0.5}, 160, 120, 330)};
+  bake::Options options;
   options.resolution = 128;  // interpolation widens an opaque volume by about half a voxel all around, a mesh not
-  MeshOptions mesh_options;
+  bake::MeshOptions mesh_options;
   mesh_options.faces = 12000;
   mesh_options.texture_size = 512;
-  VdbOptions vdb;
-  vdb.up_axis = GetParam();  // turns the glTF, and must not turn what Blender shows
-  BakeFolder bake(folder.path(), cameras, {}, vdb.units, vdb.up_axis);
-  bake.add_volume(bake_volume(field, cameras, options), "volume", vdb);
-  bake.add_mesh(bake_mesh(field, cameras, options, mesh_options), "mesh", {});
+  Label label;
+  label.world.up_axis = GetParam();  // turns the glTF, and must not turn what Blender shows
+  BakeFolder bake(folder.path(), cameras, label);
+  const bake::Volume baked = bake_volume(field, cameras, options);
+  bake.add_volumes({planes_of(baked)}, "volume", {});
+  bake.add_mesh(bake_mesh(field, cameras, options, mesh_options), "mesh", ExrOptions{});
   bake.finish();
   for (const char* camera : {"a", "b"}) {
     const std::string look = std::string("--samples 16 --camera ") + camera;
@@ -91,13 +93,13 @@ TEST(BlenderMesh, UsesOfTheMesh) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
   const AnalyticField field = l_shape();
-  BakeOptions options;
+  bake::Options options;
   options.resolution = 32;
-  MeshOptions mesh_options;
+  bake::MeshOptions mesh_options;
   mesh_options.faces = 1000;
   mesh_options.texture_size = 128;
-  BakeFolder bake(folder.path(), {camera_at("a", {5, -4, 2}, {2, -1, 0.5}, 64, 48, 130)}, {}, "scene units", "z");
-  bake.add_mesh(bake_mesh(field, {}, options, mesh_options), "mesh", {});
+  BakeFolder bake(folder.path(), {camera_at("a", {5, -4, 2}, {2, -1, 0.5}, 64, 48, 130)}, {});
+  bake.add_mesh(bake_mesh(field, {}, options, mesh_options), "mesh", ExrOptions{});
   bake.finish();
   std::ofstream(folder / "check.py")
       << "import bpy\n"
@@ -114,4 +116,4 @@ TEST(BlenderMesh, UsesOfTheMesh) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::exporting::test

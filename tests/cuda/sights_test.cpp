@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "bake/cuda/view_selection_cuda.h"
+#include "bake/visibility/cuda/view_selection_cuda.h"
 #include "src/base/rng.h"
 #include "src/engine/luminance_engine.h"
 
@@ -12,9 +12,9 @@ namespace cnerf::test {
 namespace {
 
 /// Fog and specks of matter in about a third of the bricks.
-BrickGrid<float> speckled(int side, std::uint64_t seed) {
+bake::BrickGrid<float> speckled(int side, std::uint64_t seed) {
   SequentialRng rng(seed, 1);
-  BrickGrid<float> grid({0, 0, 0}, {side, side - 3, side}, 0.0f);
+  bake::BrickGrid<float> grid({0, 0, 0}, {side, side - 3, side}, 0.0f);
   for (std::size_t b = 0; b < grid.brick_count(); ++b) {
     if (rng.uniform() > 0.35) continue;
     for (float& sigma : grid.make_brick(b)) {
@@ -24,11 +24,11 @@ BrickGrid<float> speckled(int side, std::uint64_t seed) {
   return grid;
 }
 
-std::vector<BakeCamera> cameras_around(Vec3d middle, double distance) {
-  std::vector<BakeCamera> cameras;
+std::vector<bake::Camera> cameras_around(Vec3d middle, double distance) {
+  std::vector<bake::Camera> cameras;
   for (int c = 0; c < 20; ++c) {
     const double angle = 0.7 * c;
-    BakeCamera camera;
+    bake::Camera camera;
     const Vec3d back = normalized(Vec3d{std::cos(angle), std::sin(angle), 0.3 * std::cos(2.1 * c)});
     const Vec3d right = normalized(cross(Vec3d{0, 0, 1}, back));
     camera.world_from_camera = {Mat3d::from_columns(right, cross(right, back), -back), middle + back * distance};
@@ -41,15 +41,15 @@ std::vector<BakeCamera> cameras_around(Vec3d middle, double distance) {
 
 TEST(Sights, AreThoseOfTheProcessor) {
   if (!has_cuda_device()) GTEST_SKIP() << "no GPU that can be used";
-  const BrickGrid<float> fine = speckled(64, 3), coarse = speckled(48, 4);
-  const std::vector<DensityLevel> levels = {{&fine, {0, 0, 0}, 0.5}, {&coarse, {-8, -8, -8}, 1}};
-  BakeOptions options;
+  const bake::BrickGrid<float> fine = speckled(64, 3), coarse = speckled(48, 4);
+  const std::vector<bake::DensityLevel> levels = {{&fine, {0, 0, 0}, 0.5}, {&coarse, {-8, -8, -8}, 1}};
+  bake::Options options;
   options.views_per_voxel = 5;
-  const std::vector<BakeCamera> cameras = cameras_around({16, 16, 16}, 45);
-  const ViewSelection cpu(cameras, levels, options);
-  const ViewSelectionCuda cuda(cameras, levels, options);
+  const std::vector<bake::Camera> cameras = cameras_around({16, 16, 16}, 45);
+  const bake::ViewSelection cpu(cameras, levels, options);
+  const bake::ViewSelectionCuda cuda(cameras, levels, options);
 
-  SightBatch batch;
+  bake::SightBatch batch;
   SequentialRng rng(9, 2);
   for (std::uint32_t order = 0; order < 40; ++order) {
     const Vec3d centre{32 * rng.uniform(), 32 * rng.uniform(), 32 * rng.uniform()};
@@ -60,7 +60,7 @@ TEST(Sights, AreThoseOfTheProcessor) {
       batch.sights.push_back({centre + beside, i % 4 == 0 ? 0.3f : 0.0f, order});
     }
   }
-  SeenBatch expected, found;
+  bake::SeenBatch expected, found;
   for (std::size_t level = 0; level < levels.size(); ++level) {
     cpu.find(level, batch, expected);
     cuda.find(level, batch, found);
@@ -69,7 +69,7 @@ TEST(Sights, AreThoseOfTheProcessor) {
     for (std::size_t i = 0; i < batch.sights.size(); ++i) {
       bool same = expected.counts[i] == found.counts[i];
       for (int s = 0; same && s < expected.counts[i]; ++s) {
-        const SeenBy a = expected.seen[5 * i + s], b = found.seen[5 * i + s];
+        const bake::SeenBy a = expected.seen[5 * i + s], b = found.seen[5 * i + s];
         same = a.camera == b.camera;
         error = std::max(error, same ? std::abs(double(a.transmittance) - b.transmittance) / a.transmittance : 0.0);
       }

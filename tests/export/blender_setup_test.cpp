@@ -5,7 +5,8 @@
 #include "src/base/files.h"
 #include "tests/support/data.h"
 
-namespace cnerf::test {
+namespace cnerf::exporting::test {
+using namespace cnerf::test;
 namespace {
 
 TEST(BlenderSetup, IsTheScriptOfTheRepositoryWithTheFolderFilledIn) {
@@ -23,4 +24,4 @@ TEST(BlenderSetup, IsTheScriptOfTheRepositoryWithTheFolderFilledIn) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::exporting::test

@@ -14,7 +14,8 @@
 #include "tests/export/test_meshes.h"
 #include "tests/support/data.h"
 
-namespace cnerf::test {
+namespace cnerf::exporting::test {
+using namespace cnerf::test;
 namespace {
 
 constexpr double kTolerance = 1e-4;  // pixels
@@ -71,11 +72,11 @@ TEST(ExportedCameras, PointsOfAColmapModelLandOnTheirPixels) {
   const ColmapModel model{4, "OPENCV", {20, 21, 8.25, 5.75, 0.05, -0.02, 0.003, -0.001}, 4};
   write_colmap_images(folder / "capture/images");
   write_colmap_text(folder / "capture/sparse/0", model);
-  std::vector<BakeCamera> cameras;
+  std::vector<bake::Camera> cameras;
   for (const View& view : load_capture(folder / "capture").views) {
     cameras.push_back({view.name, view.intrinsics, view.world_from_camera});
   }
-  BakeFolder bake(folder / "bake", cameras, {}, "units", "z");
+  BakeFolder bake(folder / "bake", cameras, {});
   const GltfFiles files = bake.add_mesh(tetrahedron(), "mesh", {});
   bake.finish();
 
@@ -112,4 +113,4 @@ TEST(ExportedCameras, PointsOfAColmapModelLandOnTheirPixels) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::exporting::test

@@ -12,13 +12,14 @@
 #include <fstream>
 #include <limits>
 
-#include "export/color_origin.h"
+#include "bake/provenance.h"
 #include "export/texture_writer.h"
 #include "src/base/error.h"
 #include "tests/export/test_meshes.h"
 #include "tests/support/data.h"
 
-namespace cnerf::test {
+namespace cnerf::exporting::test {
+using namespace cnerf::test;
 namespace {
 namespace fs = std::filesystem;
 
@@ -55,8 +56,9 @@ std::string text_attribute(const Imf::Header& header, const char* name) {
 
 TEST(ExrTextures, HoldTheChannelsThatTheirNamesSay) {
   const TempDir folder;
-  const BakedTexture texture = tetrahedron().texture;
-  const TextureFiles files = write_exr_textures(texture, color_origin_text("builtin", "first"), folder.path(), "mesh");
+  const bake::Texture texture = tetrahedron().texture;
+  const TextureFiles files =
+      write_exr_textures(texture, bake::color_origin_text("builtin", "first"), folder.path(), "mesh");
   EXPECT_EQ(files.rgb.filename(), "mesh_rgb.exr");
   EXPECT_EQ(files.luminance.filename(), "mesh_lum.exr");
   EXPECT_EQ(files.lab.filename(), "mesh_lab.exr");
@@ -76,7 +78,7 @@ TEST(ExrTextures, HoldTheChannelsThatTheirNamesSay) {
 TEST(ExrTextures, SayWhatTheyAre) {
   const TempDir folder;
   const TextureFiles files =
-      write_exr_textures(tetrahedron().texture, color_origin_text("builtin", "first"), folder.path(), "mesh");
+      write_exr_textures(tetrahedron().texture, bake::color_origin_text("builtin", "first"), folder.path(), "mesh");
   for (const fs::path& file : {files.rgb, files.luminance, files.lab}) {
     const Imf::InputFile input(file.c_str());
     const Imf::Header& header = input.header();
@@ -87,15 +89,6 @@ TEST(ExrTextures, SayWhatTheyAre) {
     EXPECT_EQ(text_attribute(header, "colorOrigin"), "colour is inferred, by colorizer builtin, take first");
     EXPECT_NE(text_attribute(header, "colorSpace"), "missing");
   }
-}
-
-TEST(ExrTextures, LabChannelsMayHaveNamesWhoseOrderBlenderKeeps) {
-  const TempDir folder;
-  const BakedTexture texture = tetrahedron().texture;
-  ExrOptions options;
-  options.lab_names = "xyz";
-  const TextureFiles files = write_exr_textures(texture, "", folder.path(), "mesh", options);
-  EXPECT_EQ(read_channel(files.lab, "Lab.Y"), texture.a);
 }
 
 TEST(ExrWriter, MipMapsAreMeansDownToOnePixel) {
@@ -129,4 +122,4 @@ TEST(ExrWriter, LargeValuesFitIntoHalfAndBrokenOnesAreRefused) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::exporting::test

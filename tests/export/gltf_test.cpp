@@ -17,22 +17,23 @@
 #include "tests/export/test_volumes.h"
 #include "tests/support/data.h"
 
-namespace cnerf::test {
+namespace cnerf::exporting::test {
+using namespace cnerf::test;
+using namespace bake::test;
 namespace {
 namespace fs = std::filesystem;
 
-std::vector<BakeCamera> two_cameras() {
-  BakeCamera a = camera_at("images/0001.jpg", {5, 2, 3}, {1, 2, 3}, 64, 48, 100);
-  BakeCamera b = camera_at("images/0002.jpg", {1, 7, 4}, {1, 2, 3}, 64, 48, 100);
+std::vector<bake::Camera> two_cameras() {
+  bake::Camera a = camera_at("images/0001.jpg", {5, 2, 3}, {1, 2, 3}, 64, 48, 100);
+  bake::Camera b = camera_at("images/0002.jpg", {1, 7, 4}, {1, 2, 3}, 64, 48, 100);
   return {a, b};
 }
 
-GltfScene scene_for(const BakedMesh& mesh, const std::string& up = "z") {
+GltfScene scene_for(const bake::Mesh& mesh, const std::string& up = "z") {
   GltfScene scene;
   scene.cameras = two_cameras();
   scene.basecolor_png = basecolor_png(mesh.texture);
-  scene.up_axis = up;
-  scene.color_origin = "colour is inferred";
+  scene.label = label_of_first(up);
   scene.lab_exr = "mesh_lab.exr";
   scene.vdb = "volume.vdb";
   return scene;
@@ -59,7 +60,7 @@ std::vector<float> floats_of(const tinygltf::Model& model, int accessor) {
 
 TEST(Gltf, BothFormsHoldTheMeshYUp) {
   const TempDir folder;
-  const BakedMesh mesh = tetrahedron();
+  const bake::Mesh mesh = tetrahedron();
   const GltfFiles files = write_gltf(mesh, scene_for(mesh), folder.path(), "mesh");
   for (const fs::path& file : {files.gltf, files.glb}) {
     const tinygltf::Model model = load(file);
@@ -92,7 +93,7 @@ TEST(Gltf, BothFormsHoldTheMeshYUp) {
 /// A camera's node maps glTF camera axes to where the pixel rays of the capture go.
 TEST(Gltf, CamerasLookWhereTheCaptureDid) {
   const TempDir folder;
-  const BakedMesh mesh = tetrahedron();
+  const bake::Mesh mesh = tetrahedron();
   for (const char* up : {"x", "y", "z"}) {
     const tinygltf::Model model = load(write_gltf(mesh, scene_for(mesh, up), folder.path(), "mesh").glb);
     ASSERT_EQ(model.cameras.size(), 1u) << "both share their intrinsics";
@@ -100,7 +101,7 @@ TEST(Gltf, CamerasLookWhereTheCaptureDid) {
     EXPECT_NEAR(model.cameras[0].perspective.aspectRatio, 64.0 / 48, 1e-12);
     for (std::size_t c = 0; c < 2; ++c) {
       const tinygltf::Node& node = model.nodes[c + 1];
-      const BakeCamera camera = two_cameras()[c];
+      const bake::Camera camera = two_cameras()[c];
       EXPECT_EQ(node.name, camera.name);
       const Vec3d q{node.rotation[0], node.rotation[1], node.rotation[2]};
       const auto turned = [&](Vec3d v) { return v + (cross(q, cross(q, v) + v * node.rotation[3])) * 2.0; };
@@ -138,7 +139,7 @@ TEST(Gltf, TheBaseColourIsEncodedSrgb) {
 
 TEST(Gltf, ABrokenMeshIsRefusedAndLeavesNothing) {
   const TempDir folder;
-  BakedMesh mesh = tetrahedron();
+  bake::Mesh mesh = tetrahedron();
   const GltfScene scene = scene_for(mesh);
   mesh.positions[2].y = std::nanf("");
   EXPECT_THROW(write_gltf(mesh, scene, folder.path(), "mesh"), ContractError);
@@ -147,9 +148,10 @@ TEST(Gltf, ABrokenMeshIsRefusedAndLeavesNothing) {
 
 TEST(BakeFolder, TheManifestNamesEverythingThatWasWritten) {
   const TempDir folder;
-  BakeFolder bake(folder.path(), two_cameras(), {"cnerf", "bake", "run"}, "metres", "y");
-  bake.add_volume(block_volume({4, 5, 6}, {12, 13, 14}, 2), "volume", {});
-  bake.add_mesh(tetrahedron(), "mesh", {});
+  BakeFolder bake(folder.path(), two_cameras(), label_of_first("y", "metres"));
+  const bake::Volume volume = block_volume({4, 5, 6}, {12, 13, 14}, 2);
+  bake.add_volumes({planes_of(volume)}, "volume", {});
+  bake.add_mesh(tetrahedron(), "mesh", ExrOptions{});
   bake.finish();
   const BakeManifest manifest = read_manifest(bake.manifest());
   std::size_t others = 0;
@@ -166,7 +168,7 @@ TEST(BakeFolder, TheManifestNamesEverythingThatWasWritten) {
   EXPECT_EQ(manifest.mesh->bounds.min, (Vec3d{1, 2, 3}));
   EXPECT_EQ(manifest.mesh->bounds.max, (Vec3d{2, 4, 6}));
   EXPECT_EQ(manifest.mesh->gltf_from_world, gltf_from_world("y"));
-  EXPECT_EQ(manifest.units, "metres");
+  EXPECT_EQ(manifest.label.world.units, "metres");
   const auto json = nlohmann::json::parse(read_text_file(bake.manifest()));
   EXPECT_EQ(json["mesh"]["textures"]["rgb"]["space"], "lin_rec709");
   EXPECT_TRUE(json["mesh"].contains("world_from_gltf"));
@@ -175,4 +177,4 @@ TEST(BakeFolder, TheManifestNamesEverythingThatWasWritten) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::exporting::test

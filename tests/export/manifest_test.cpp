@@ -7,21 +7,23 @@
 
 #include "export/bake_folder.h"
 #include "export/vdb_reader.h"
-#include "export/volume_export.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "tests/bake/analytic_field.h"
 #include "tests/export/test_volumes.h"
+#include "tests/export/whole_export.h"
 #include "tests/support/data.h"
 
-namespace cnerf::test {
+namespace cnerf::exporting::test {
+using namespace cnerf::test;
+using namespace bake::test;
 namespace {
 
 nlohmann::json exported(const TempDir& folder) {
-  BakeCamera camera = camera_at("images/0001.jpg", {5, 2, 3}, {1, 2, 3}, 64, 48, 100);
+  bake::Camera camera = camera_at("images/0001.jpg", {5, 2, 3}, {1, 2, 3}, 64, 48, 100);
   camera.intrinsics.model = LensModel::kOpenCv;
   camera.intrinsics.distortion[1] = 0.25;
-  export_volume(block_volume({4, 5, 6}, {12, 13, 14}, 2), {camera}, {"cnerf", "bake", "run"}, folder / "out", "scene");
+  export_volume(block_volume({4, 5, 6}, {12, 13, 14}, 2), {camera}, folder / "out", "scene");
   return nlohmann::json::parse(read_text_file(folder / "out" / "manifest.json"));
 }
 
@@ -75,7 +77,7 @@ TEST(Manifest, ReadsBack) {
   EXPECT_EQ(manifest.files, (std::vector<std::string>{"scene.vdb", "blender_setup.py"}));
   EXPECT_EQ(manifest.frame, (SceneFrame{{1.5, 2.5, 3.5}, 0.125, 2}));
   ASSERT_EQ(manifest.cameras.size(), 1u);
-  const BakeCamera expected = camera_at("images/0001.jpg", {5, 2, 3}, {1, 2, 3}, 64, 48, 100);
+  const bake::Camera expected = camera_at("images/0001.jpg", {5, 2, 3}, {1, 2, 3}, 64, 48, 100);
   EXPECT_EQ(manifest.cameras[0].name, expected.name);
   EXPECT_EQ(manifest.cameras[0].intrinsics.model, LensModel::kOpenCv);
   EXPECT_EQ(manifest.cameras[0].intrinsics.distortion[1], 0.25);
@@ -108,16 +110,16 @@ TEST(Manifest, AMissingFileIsNotListed) {
 
 TEST(BakeFolder, NestedGridsAreListedAndReadBackFinestFirst) {
   const TempDir folder;
-  const BakedVolume coarse = block_volume({0, 0, 0}, {6, 6, 6}, 1, 0.1),
-                    fine = block_volume({0, 0, 0}, {4, 4, 4}, 2, 0.05);
+  const bake::Volume coarse = block_volume({0, 0, 0}, {6, 6, 6}, 1, 0.1),
+                     fine = block_volume({0, 0, 0}, {4, 4, 4}, 2, 0.05);
   VdbOptions options;
   options.usd = true;
-  BakeFolder bake(folder.path(), {camera_at("a", {5, 5, 5}, {0, 0, 0}, 8, 8, 9)}, {}, "cm", "y");
+  BakeFolder bake(folder.path(), {camera_at("a", {5, 5, 5}, {0, 0, 0}, 8, 8, 9)}, label_of_first("y", "cm"));
   const auto files = bake.add_volumes({planes_of(fine), planes_of(coarse)}, "volume", options);
   bake.add_plate("images/a.png", std::vector<std::byte>(7));
   bake.finish();
   EXPECT_EQ(files.size(), 3u);
-  const std::vector<BakedVolume> read = read_volumes(folder.path());
+  const std::vector<bake::Volume> read = read_volumes(folder.path());
   ASSERT_EQ(read.size(), 2u);
   EXPECT_NEAR(read[0].voxel_size, 0.05, 1e-12);
   EXPECT_NEAR(read[1].voxel_size, 0.1, 1e-12);
@@ -131,14 +133,14 @@ TEST(BakeFolder, NestedGridsAreListedAndReadBackFinestFirst) {
 
 TEST(BakeFolder, ASecondBakeLeavesNothingOfTheFirst) {
   const TempDir folder;
-  const BakedVolume volume = block_volume({0, 0, 0}, {4, 4, 4}, 2);
+  const bake::Volume volume = block_volume({0, 0, 0}, {4, 4, 4}, 2);
   std::ofstream(folder / "mine.txt") << "not of a bake";
-  BakeFolder first(folder.path(), {}, {}, "m", "z");
+  BakeFolder first(folder.path(), {}, {});
   first.add_volumes({planes_of(volume), planes_of(volume)}, "volume", {});
   first.add_plate("images/a.png", std::vector<std::byte>(7));
   first.finish();
   EXPECT_TRUE(std::filesystem::exists(folder / "plates" / "images_a.jpg"));
-  BakeFolder second(folder.path(), {}, {}, "m", "z");
+  BakeFolder second(folder.path(), {}, {});
   second.add_volumes({planes_of(volume)}, "volume", {});
   second.finish();
   EXPECT_TRUE(std::filesystem::exists(folder / "volume.vdb"));
@@ -148,4 +150,4 @@ TEST(BakeFolder, ASecondBakeLeavesNothingOfTheFirst) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::exporting::test

@@ -9,14 +9,15 @@
 #include "tests/export/test_volumes.h"
 #include "tests/support/data.h"
 
-namespace cnerf::test {
+namespace cnerf::exporting::test {
+using namespace cnerf::test;
 namespace {
 
 /// The block with a value of its own in every voxel.
-BakedVolume varied_block() {
-  BakedVolume volume = block_volume({4, 5, 6}, {12, 13, 14}, 2);
+bake::Volume varied_block() {
+  bake::Volume volume = block_volume({4, 5, 6}, {12, 13, 14}, 2);
   float number = 0;
-  for (BakedVoxel& v : volume.voxels) {
+  for (bake::Voxel& v : volume.voxels) {
     v.sigma = 2 + ++number / 8;
     v.rgb = {number / 1024, 0.5f, 0.25f};
     v.a = -number / 8;
@@ -26,8 +27,8 @@ BakedVolume varied_block() {
 
 TEST(NanoVdb, HoldsTheGridsOfTheVdbWithTheirValues) {
   const TempDir folder;
-  const BakedVolume volume = varied_block();
-  write_nvdb(planes_of(volume), folder / "a.nvdb", {.up_axis = "z", .up = "y"});
+  const bake::Volume volume = varied_block();
+  write_nvdb(dilated(planes_of(volume), 2), folder / "a.nvdb", {.up = "y"}, label_of_first("z"));
   const auto handles = nanovdb::io::readGrids((folder / "a.nvdb").string());
   std::vector<std::string> names;
   for (const auto& handle : handles) names.emplace_back(handle.gridMetaData()->shortGridName());
@@ -39,7 +40,7 @@ TEST(NanoVdb, HoldsTheGridsOfTheVdbWithTheirValues) {
   EXPECT_TRUE(density->isFogVolume());
   const auto of_density = density->getAccessor(), of_a = a->getAccessor();
   const auto of_color = color->getAccessor();
-  for (const BakedVoxel& v : volume.voxels) {
+  for (const bake::Voxel& v : volume.voxels) {
     const nanovdb::Coord at(v.i, v.j, v.k);
     ASSERT_EQ(of_density.getValue(at), v.sigma);
     ASSERT_EQ(of_a.getValue(at), v.a);
@@ -58,9 +59,9 @@ TEST(NanoVdb, HoldsTheGridsOfTheVdbWithTheirValues) {
 TEST(NanoVdb, AFolderThatCannotBeWrittenIsAnOutputError) {
   const TempDir folder;
   std::ofstream(folder / "file") << "not a folder";
-  const BakedVolume volume = varied_block();
+  const bake::Volume volume = varied_block();
   EXPECT_THROW(write_nvdb(planes_of(volume), folder / "file" / "a.nvdb"), OutputError);
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::exporting::test

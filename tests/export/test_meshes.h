@@ -1,14 +1,14 @@
 #pragma once
 /// A small textured mesh with known content.
 
-#include "bake/baked_mesh.h"
+#include "bake/mesh.h"
 #include "src/color/colorspace_math.h"
 
-namespace cnerf::test {
+namespace cnerf::exporting::test {
 
 /// A tetrahedron with a corner at (1, 2, 3) and legs of 1, 2 and 3 world units, each face with a piece of the texture.
-inline BakedMesh tetrahedron(int texture_size = 64) {
-  BakedMesh mesh;
+inline bake::Mesh tetrahedron(int texture_size = 64) {
+  bake::Mesh mesh;
   const Vec3f corners[4] = {{1, 2, 3}, {2, 2, 3}, {1, 4, 3}, {1, 2, 6}};
   const int faces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
   for (int f = 0; f < 4; ++f) {
@@ -20,7 +20,7 @@ inline BakedMesh tetrahedron(int texture_size = 64) {
     mesh.uvs.insert(mesh.uvs.end(), {{u, v}, {u + 0.3f, v}, {u, v + 0.3f}});
     mesh.triangles.push_back({first, first + 1, first + 2});
   }
-  BakedTexture& texture = mesh.texture;
+  bake::Texture& texture = mesh.texture;
   texture.size = texture_size;
   for (int y = 0; y < texture_size; ++y) {
     for (int x = 0; x < texture_size; ++x) {
@@ -38,9 +38,7 @@ inline BakedMesh tetrahedron(int texture_size = 64) {
   mesh.charts = 4;
   mesh.gutter = 2;
   mesh.frame = {{1.5, 2.5, 3.5}, 0.125, 2};
-  mesh.colorizer = "builtin";
-  mesh.take = "first";
   return mesh;
 }
 
-}  // namespace cnerf::test
+}  // namespace cnerf::exporting::test

@@ -16,11 +16,12 @@
 #include "tests/export/test_volumes.h"
 #include "tests/support/data.h"
 
-namespace cnerf::test {
+namespace cnerf::exporting::test {
+using namespace cnerf::test;
 namespace {
 namespace fs = std::filesystem;
 
-BakedVolume block(float sigma = 2) {
+bake::Volume block(float sigma = 2) {
   return block_volume({4, 5, 6}, {12, 13, 14}, sigma);
 }
 
@@ -47,7 +48,7 @@ const VdbGridSummary& summary_named(const VdbSummary& summary, const std::string
 
 TEST(Vdb, GridsHaveTheirNamesTypesAndClasses) {
   const TempDir folder;
-  write_vdb(block(), folder / "a.vdb");
+  write_dilated(block(), folder / "a.vdb");
   std::map<std::string, std::string> types;
   for (const auto& grid : read_grids(folder / "a.vdb")) {
     types[grid->getName()] = grid->valueType();
@@ -65,14 +66,14 @@ TEST(Vdb, HoudiniGetsCdAsWell) {
   const TempDir folder;
   VdbOptions options;
   options.houdini = true;
-  write_vdb(block(), folder / "a.vdb", options);
+  write_dilated(block(), folder / "a.vdb", options);
   ASSERT_NE(grid_named(folder / "a.vdb", "Cd"), nullptr);
   EXPECT_NE(grid_named(folder / "a.vdb", "color"), nullptr);
 }
 
 TEST(Vdb, AllGridsShareTheTransformAndTheActiveVoxels) {
   const TempDir folder;
-  write_vdb(block(), folder / "a.vdb");
+  write_dilated(block(), folder / "a.vdb");
   const auto grids = read_grids(folder / "a.vdb");
   for (const auto& grid : grids) {
     EXPECT_EQ(grid->transform(), grids.front()->transform());
@@ -85,8 +86,8 @@ TEST(Vdb, CentreRuleAndCornerRule) {
   const TempDir folder;
   VdbOptions corner;
   corner.voxel_origin = "corner";
-  write_vdb(block(), folder / "center.vdb");
-  write_vdb(block(), folder / "corner.vdb", corner);
+  write_dilated(block(), folder / "center.vdb");
+  write_dilated(block(), folder / "corner.vdb", corner);
   const auto at = [&](const char* file) {
     return grid_named(folder / file, "density")->indexToWorld(openvdb::Coord(0, 0, 0));
   };
@@ -102,9 +103,9 @@ TEST_P(VdbUp, TheFileStandsUpAndComesBackAsItWas) {
   const auto [up_axis, up] = GetParam();
   const TempDir folder;
   VdbOptions options;
-  options.up_axis = up_axis;
   options.up = up;
-  write_vdb(block(), folder / "a.vdb", options);
+  const Label label = label_of_first(up_axis);
+  write_dilated(block(), folder / "a.vdb", options, 2, label);
   const auto density = grid_named(folder / "a.vdb", "density");
   const auto position = [&](Vec3i at) { return density->indexToWorld(openvdb::Coord(at.x, at.y, at.z)); };
   Vec3i upwards{};
@@ -113,12 +114,12 @@ TEST_P(VdbUp, TheFileStandsUpAndComesBackAsItWas) {
   openvdb::Vec3d expected(0, 0, 0);
   expected[*up - 'x'] = 0.05;
   EXPECT_NEAR((step - expected).length(), 0, 1e-12);
-  const Affined turn = file_from_world(options);
+  const Affined turn = file_from_world(options, label.world);
   EXPECT_NEAR(dot(turn.linear.rows[0], cross(turn.linear.rows[1], turn.linear.rows[2])), 1, 1e-15) << "not mirrored";
   const Vec3d first = turn.point({1.025, 2.025, 3.025});
   EXPECT_NEAR((position({0, 0, 0}) - openvdb::Vec3d(first.x, first.y, first.z)).length(), 0, 1e-12);
   EXPECT_EQ(summarize_vdb(folder / "a.vdb").metadata.at("up_axis"), up);
-  const BakedVolume read = read_vdb(folder / "a.vdb");
+  const bake::Volume read = read_vdb(folder / "a.vdb");
   EXPECT_NEAR(length(read.origin - block().origin), 0, 1e-12) << "in the poses' frame again";
 }
 
@@ -142,12 +143,11 @@ class VdbDilation : public testing::TestWithParam<int> {};
 
 TEST_P(VdbDilation, ColorReachesBeyondDensityAndDensityIsPadded) {
   const TempDir folder;
-  VdbOptions options;
-  const int reach = options.dilation = GetParam();
+  const int reach = GetParam();
   const auto box = [](int margin) {  // around the block
     return openvdb::CoordBBox(4 - margin, 5 - margin, 6 - margin, 11 + margin, 12 + margin, 13 + margin);
   };
-  write_vdb(block(), folder / "a.vdb", options);
+  write_dilated(block(), folder / "a.vdb", {}, reach);
   const auto density = openvdb::gridPtrCast<openvdb::FloatGrid>(grid_named(folder / "a.vdb", "density"));
   const auto color = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid_named(folder / "a.vdb", "color"));
   EXPECT_EQ(density->evalActiveVoxelBoundingBox(), box(reach + 1));
@@ -171,20 +171,18 @@ INSTANTIATE_TEST_SUITE_P(Vdb, VdbDilation, testing::Values(2, 3, 8));
 
 TEST(Vdb, ReadsBackWhatWasWritten) {
   const TempDir folder;
-  BakedVolume volume = block();
+  bake::Volume volume = block();
   volume.voxels.push_back({40, 5, 6, 7.25f, 0.1f, {0.1f, 0.11f, 0.12f}, 1, 2});  // apart from the rest
-  write_vdb(volume, folder / "a.vdb");
-  const BakedVolume read = read_vdb(folder / "a.vdb");
+  write_dilated(volume, folder / "a.vdb");
+  const bake::Volume read = read_vdb(folder / "a.vdb");
   EXPECT_NEAR(length(read.origin - volume.origin), 0, 1e-12);
   EXPECT_NEAR(read.voxel_size, volume.voxel_size, 1e-15);
   EXPECT_EQ(read.resolution, volume.resolution);
   EXPECT_EQ(read.frame, volume.frame);
-  EXPECT_EQ(read.colorizer, "builtin");
-  EXPECT_EQ(read.take, "first");
-  std::map<std::tuple<int, int, int>, BakedVoxel> found;
-  for (const BakedVoxel& v : read.voxels) found[{v.i, v.j, v.k}] = v;
-  for (const BakedVoxel& v : volume.voxels) {
-    const BakedVoxel& r = found.at({v.i, v.j, v.k});
+  std::map<std::tuple<int, int, int>, bake::Voxel> found;
+  for (const bake::Voxel& v : read.voxels) found[{v.i, v.j, v.k}] = v;
+  for (const bake::Voxel& v : volume.voxels) {
+    const bake::Voxel& r = found.at({v.i, v.j, v.k});
     EXPECT_EQ(r.sigma, v.sigma);  // both are halfs
     EXPECT_NEAR(length(r.rgb - v.rgb), 0, 5e-4);
     EXPECT_NEAR(r.luminance, v.luminance, 3e-4);
@@ -196,12 +194,12 @@ TEST(Vdb, ReadsBackWhatWasWritten) {
 
 TEST(Vdb, OneThreadOrSeveralWriteTheSame) {
   const TempDir folder;
-  BakedVolume volume = block_volume({3, 5, 6}, {150, 9, 11}, 2);  // 19 planes of bricks
-  for (BakedVoxel& voxel : volume.voxels) {
+  bake::Volume volume = block_volume({3, 5, 6}, {150, 9, 11}, 2);  // 19 planes of bricks
+  for (bake::Voxel& voxel : volume.voxels) {
     voxel.sigma = 1 + float(voxel.i % 7);
     voxel.a = float(voxel.i - voxel.k);
   }
-  VolumePlanes planes = planes_of(volume);
+  bake::VolumePlanes planes = dilated(planes_of(volume), 2);
   set_thread_count(4);
   EXPECT_EQ(part_count(planes), 4u);
   write_vdb(planes, folder / "several.vdb");
@@ -209,7 +207,7 @@ TEST(Vdb, OneThreadOrSeveralWriteTheSame) {
   EXPECT_EQ(part_count(planes), 1u);
   write_vdb(planes, folder / "one.vdb");
   set_thread_count(0);
-  const BakedVolume several = read_vdb(folder / "several.vdb"), one = read_vdb(folder / "one.vdb");
+  const bake::Volume several = read_vdb(folder / "several.vdb"), one = read_vdb(folder / "one.vdb");
   EXPECT_GT(several.voxels.size(), volume.voxels.size()) << "colours reach beyond";
   EXPECT_EQ(several.voxels, one.voxels);
 
@@ -223,7 +221,7 @@ TEST(Vdb, OneThreadOrSeveralWriteTheSame) {
 
 TEST(Vdb, HugeDensitiesStayFinite) {
   const TempDir folder;
-  write_vdb(block(1e6f), folder / "a.vdb");
+  write_dilated(block(1e6f), folder / "a.vdb");
   const VdbSummary summary = summarize_vdb(folder / "a.vdb");
   const VdbGridSummary& density = summary_named(summary, "density");
   EXPECT_EQ(density.max_value, std::vector<double>{1e6});
@@ -233,13 +231,13 @@ TEST(Vdb, HugeDensitiesStayFinite) {
 
 TEST(Vdb, TinyDensitiesKeepTheirDigits) {
   const TempDir folder;
-  write_vdb(block(1.2345e-7f), folder / "a.vdb");
+  write_dilated(block(1.2345e-7f), folder / "a.vdb");
   EXPECT_EQ(summary_named(summarize_vdb(folder / "a.vdb"), "density").max_value.at(0), double(1.2345e-7f));
 }
 
 TEST(Vdb, MetadataSaysWhatTheFileIs) {
   const TempDir folder;
-  write_vdb(block(), folder / "a.vdb");
+  write_dilated(block(), folder / "a.vdb");
   const auto meta = summarize_vdb(folder / "a.vdb").metadata;
   EXPECT_EQ(meta.at("colorspace"), "lin_rec709");
   EXPECT_EQ(meta.at("white"), "D65");
@@ -254,7 +252,7 @@ TEST(Vdb, MetadataSaysWhatTheFileIs) {
 
 TEST(Vdb, SummaryDescribesEveryGrid) {
   const TempDir folder;
-  write_vdb(block(), folder / "a.vdb");
+  write_dilated(block(), folder / "a.vdb");
   const VdbSummary summary = summarize_vdb(folder / "a.vdb");
   const VdbGridSummary& color = summary_named(summary, "color");
   EXPECT_EQ(color.type, "vec3s");
@@ -267,41 +265,12 @@ TEST(Vdb, SummaryDescribesEveryGrid) {
   EXPECT_EQ(summary_named(summary, "lab_b").min_value.at(0), -31.25);
 }
 
-TEST(Vdb, EmissionIsDensityTimesColor) {
-  const TempDir folder;
-  write_vdb(block(4), folder / "a.vdb", {.emission = true});
-  const auto emission = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid_named(folder / "a.vdb", "emission"));
-  ASSERT_NE(emission, nullptr);
-  EXPECT_NEAR((emission->tree().getValue(openvdb::Coord(7, 7, 7)) - openvdb::Vec3s(0.8f, 2.0f, 3.2f)).length(), 0,
-              3e-3);
-  EXPECT_EQ(emission->tree().getValue(openvdb::Coord(2, 7, 7)), openvdb::Vec3s(0)) << "where density is 0";
-  EXPECT_EQ(emission->evalActiveVoxelBoundingBox(),
-            grid_named(folder / "a.vdb", "density")->evalActiveVoxelBoundingBox());
-}
-
-TEST(Vdb, NormalizedDensityComesBackInWorldUnits) {
-  const TempDir folder;
-  BakedVolume volume = block(500);
-  volume.voxels[0].sigma = 2e6f;  // beyond half precision, unless normalized
-  write_vdb(volume, folder / "a.vdb", {.normalize_density = true});
-  const VdbSummary summary = summarize_vdb(folder / "a.vdb");
-  EXPECT_EQ(summary_named(summary, "density").max_value.at(0), 1.0);
-  float largest = 0;
-  for (const BakedVoxel& v : read_vdb(folder / "a.vdb").voxels) {
-    largest = std::max(largest, v.sigma);
-    if (v.i == 7 && v.j == 7 && v.k == 7) {
-      EXPECT_NEAR(v.sigma, 500, 0.5);
-    }
-  }
-  EXPECT_EQ(largest, 2e6f);
-}
-
 TEST(Vdb, EveryCompressionReadsBack) {
   const TempDir folder;
   for (const char* compression : {"blosc", "zip", "none"}) {
     VdbOptions options;
     options.compression = compression;
-    write_vdb(block(), folder / "a.vdb", options);
+    write_dilated(block(), folder / "a.vdb", options);
     EXPECT_EQ(read_vdb(folder / "a.vdb").voxels.size(), 12u * 12 * 12 + 2) << compression;
   }
 }
@@ -309,20 +278,20 @@ TEST(Vdb, EveryCompressionReadsBack) {
 TEST(Vdb, RefusesValuesThatAreNone) {
   const TempDir folder;
   for (const float bad : {std::nanf(""), std::numeric_limits<float>::infinity(), -1.0f}) {
-    EXPECT_THROW(write_vdb(block(bad), folder / "a.vdb"), ContractError) << bad;
+    EXPECT_THROW(write_dilated(block(bad), folder / "a.vdb"), ContractError) << bad;
   }
-  BakedVolume volume = block();
+  bake::Volume volume = block();
   volume.voxels[3].rgb.y = std::nanf("");
-  EXPECT_THROW(write_vdb(volume, folder / "a.vdb"), ContractError);
-  EXPECT_THROW(write_vdb(BakedVolume{}, folder / "a.vdb"), ContractError);
+  EXPECT_THROW(write_dilated(volume, folder / "a.vdb"), ContractError);
+  EXPECT_THROW(write_dilated(bake::Volume{}, folder / "a.vdb"), ContractError);
   EXPECT_TRUE(fs::is_empty(folder.path()));
 }
 
 TEST(Vdb, AFolderThatCannotBeWrittenIsAnOutputError) {
   const TempDir folder;
   std::ofstream(folder / "file") << "not a folder";
-  EXPECT_THROW(write_vdb(block(), folder / "file" / "a.vdb"), OutputError);
-  EXPECT_THROW(write_vdb(block(), fs::path("/proc/cnerf/a.vdb")), OutputError);
+  EXPECT_THROW(write_dilated(block(), folder / "file" / "a.vdb"), OutputError);
+  EXPECT_THROW(write_dilated(block(), fs::path("/proc/cnerf/a.vdb")), OutputError);
 }
 
 /// Files of this process cannot grow beyond `bytes` while this lives: what a full disk does.
@@ -351,7 +320,7 @@ TEST(Vdb, AFullDiskIsAnOutputErrorAndLeavesNothing) {
   const TempDir folder;
   for (const rlim_t room : {rlim_t{0}, rlim_t{1000}, rlim_t{9000}}) {
     const FullDisk full(room);
-    EXPECT_THROW(write_vdb(block(), folder / "a.vdb", {.compression = "none"}), OutputError) << room;
+    EXPECT_THROW(write_dilated(block(), folder / "a.vdb", {.compression = "none"}), OutputError) << room;
     EXPECT_TRUE(fs::is_empty(folder.path())) << room;
   }
 }
@@ -368,4 +337,4 @@ TEST(Vdb, ReadingSaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::exporting::test

@@ -6,14 +6,16 @@
 #include <cstdlib>
 #include <optional>
 
-#include "bake/mesh/mesh_baker.h"
 #include "export/bake_folder.h"
 #include "src/base/files.h"
 #include "tests/bake/analytic_field.h"
+#include "tests/bake/whole_bake.h"
 #include "tests/export/test_meshes.h"
 #include "tests/support/data.h"
 
-namespace cnerf::test {
+namespace cnerf::exporting::test {
+using namespace cnerf::test;
+using namespace bake::test;
 namespace {
 namespace fs = std::filesystem;
 
@@ -42,18 +44,16 @@ TEST(GltfValidator, ABakedMeshHasNoErrorsAndNoWarnings) {
   CNERF_REQUIRE_VALIDATOR();
   const TempDir folder;
   const AnalyticField field({{1, 2, 3}, 0.5, 1}, sphere_density({0.5f, 0.5f, 0.5f}, 0.3f, 600), 0.4f, {1.1f, 0.8f});
-  const std::vector<BakeCamera> cameras{camera_at("a b/ä.png", {6, 2, 3}, {1, 2, 3}, 64, 48, 100),
-                                        camera_at("b", {1, 7, 3}, {1, 2, 3}, 32, 48, 90)};
-  BakeOptions options;
+  const std::vector<bake::Camera> cameras{camera_at("a b/ä.png", {6, 2, 3}, {1, 2, 3}, 64, 48, 100),
+                                          camera_at("b", {1, 7, 3}, {1, 2, 3}, 32, 48, 90)};
+  bake::Options options;
   options.resolution = 32;
-  MeshOptions mesh_options;
+  bake::MeshOptions mesh_options;
   mesh_options.faces = 800;
   mesh_options.texture_size = 200;  // not a power of two
-  BakedMesh mesh = bake_mesh(field, cameras, options, mesh_options);
-  mesh.colorizer = "reference:\"a\".png";
-  mesh.take = "first";
-  BakeFolder bake(folder.path(), cameras, {"cnerf", "bake"}, "scene units", "z");
-  const GltfFiles files = bake.add_mesh(mesh, "mesh", {});
+  const bake::Mesh mesh = bake_mesh(field, cameras, options, mesh_options);
+  BakeFolder bake(folder.path(), cameras, {{"reference:\"a\".png", "first", {"cnerf", "bake"}}, {}});
+  const GltfFiles files = bake.add_mesh(mesh, "mesh", ExrOptions{});
   EXPECT_EQ(validate({files.gltf, files.glb}, folder / "log"), 0) << read_text_file(folder / "log");
 }
 
@@ -61,8 +61,8 @@ TEST(GltfValidator, ABakedMeshHasNoErrorsAndNoWarnings) {
 TEST(GltfValidator, NoticesWhatIsWrong) {
   CNERF_REQUIRE_VALIDATOR();
   const TempDir folder;
-  BakeFolder bake(folder.path(), {}, {}, "scene units", "z");
-  const GltfFiles files = bake.add_mesh(tetrahedron(), "mesh", {});
+  BakeFolder bake(folder.path(), {}, {});
+  const GltfFiles files = bake.add_mesh(tetrahedron(), "mesh", ExrOptions{});
   EXPECT_EQ(validate({files.gltf, files.glb}, folder / "log"), 0) << read_text_file(folder / "log");
   std::string text = read_text_file(files.gltf);
   const std::size_t maximum = text.find("\"max\"");
@@ -74,4 +74,4 @@ TEST(GltfValidator, NoticesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::exporting::test

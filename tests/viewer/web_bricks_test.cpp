@@ -11,6 +11,7 @@
 #include "tests/export/test_volumes.h"
 
 namespace cnerf {
+using namespace exporting;
 namespace {
 
 /// Number of the brick of a voxel given from the grid's beginning, and the voxel's place in it.
@@ -26,7 +27,7 @@ Place place_of(const WebBricks& bricks, Vec3i v) {
 }
 
 TEST(WebBricks, TheGridBeginsOneVoxelBeforeTheFirst) {
-  const BakedVolume volume = test::block_volume({10, 20, 30}, {14, 24, 34}, 5);
+  const bake::Volume volume = exporting::test::block_volume({10, 20, 30}, {14, 24, 34}, 5);
   const WebBricks bricks = make_web_bricks(volume);
   EXPECT_NEAR(bricks.origin.x, 1 + 9 * 0.05, 1e-12);
   EXPECT_NEAR(bricks.origin.z, 3 + 29 * 0.05, 1e-12);
@@ -35,8 +36,8 @@ TEST(WebBricks, TheGridBeginsOneVoxelBeforeTheFirst) {
 }
 
 TEST(WebBricks, ValuesComeBackWithinTheirSteps) {
-  BakedVolume volume = test::block_volume({0, 0, 0}, {9, 9, 9}, 5);
-  for (BakedVoxel& voxel : volume.voxels) {
+  bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {9, 9, 9}, 5);
+  for (bake::Voxel& voxel : volume.voxels) {
     voxel.sigma = 0.5f + float(voxel.i * voxel.j);  // optical depth 0.025 to 3.2
     voxel.rgb = {0.1f + 0.05f * float(voxel.i), 0.4f, 0.9f - 0.06f * float(voxel.k)};
     const Lab<float> lab = lab_from_linear_rgb(voxel.rgb);
@@ -46,7 +47,7 @@ TEST(WebBricks, ValuesComeBackWithinTheirSteps) {
   for (const char* encoding : {"r8", "r16f"}) {
     const WebBricks bricks = make_web_bricks(volume, encoding);
     const std::size_t plane = bricks.stored() * kWebBrickVoxels;
-    for (const BakedVoxel& voxel : volume.voxels) {
+    for (const bake::Voxel& voxel : volume.voxels) {
       const Place place = place_of(bricks, {voxel.i + 1, voxel.j + 1, voxel.k + 1});
       ASSERT_EQ(bricks.distance[place.cell], 0);
       const std::size_t at = place.number * kWebBrickVoxels + place.local;
@@ -70,7 +71,7 @@ TEST(WebBricks, ValuesComeBackWithinTheirSteps) {
 
 /// A voxel at the corner of a brick reaches into its seven neighbours, and into no other.
 TEST(WebBricks, WhatInterpolationReachesIsStored) {
-  BakedVolume volume = test::block_volume({0, 0, 0}, {1, 1, 1}, 5);
+  bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {1, 1, 1}, 5);
   volume.voxels.push_back({7 + 31, 0, 0, 5, 0.4f, {1, 1, 1}, 0, 0});  // from the grid's beginning: 39 = 4 * 8 + 7
   const WebBricks bricks = make_web_bricks(volume);
   EXPECT_EQ(bricks.counts, (Vec3i{6, 1, 1}));
@@ -79,7 +80,7 @@ TEST(WebBricks, WhatInterpolationReachesIsStored) {
 }
 
 TEST(WebBricks, DistancesAreThoseToTheNearestStoredBrick) {
-  BakedVolume volume = test::block_volume({0, 0, 0}, {1, 1, 1}, 5);
+  bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {1, 1, 1}, 5);
   volume.voxels.push_back({60, 40, 25, 5, 0.4f, {1, 1, 1}, 0, 0});
   const WebBricks bricks = make_web_bricks(volume);
   const Vec3i n = bricks.counts;
@@ -98,7 +99,7 @@ TEST(WebBricks, DistancesAreThoseToTheNearestStoredBrick) {
 }
 
 TEST(WebBricks, ColourReachesBeyondDensity) {
-  const BakedVolume volume = test::block_volume({0, 0, 0}, {4, 4, 4}, 5);
+  const bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {4, 4, 4}, 5);
   const WebBricks bricks = make_web_bricks(volume);
   const Place inside = place_of(bricks, {2, 2, 2}), beyond = place_of(bricks, {5, 2, 2});
   EXPECT_EQ(bricks.density[beyond.local], 0);
@@ -107,7 +108,7 @@ TEST(WebBricks, ColourReachesBeyondDensity) {
 
 /// What is nothing stays nothing and what is something stays something, or rays would find haze or holes.
 TEST(WebBricks, SimplifyingMakesNeitherHazeNorHoles) {
-  BakedVolume volume = test::block_volume({0, 0, 0}, {8, 8, 8}, 0.001f);
+  bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {8, 8, 8}, 0.001f);
   volume.voxels.push_back({20, 0, 0, 400, 0.4f, {1, 1, 1}, 0, 0});
   const WebBricks bricks = make_web_bricks(volume);
   const Place beside = place_of(bricks, {9, 2, 2});

@@ -16,6 +16,7 @@
 #include "tests/support/data.h"
 
 namespace cnerf {
+using namespace exporting;
 namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
@@ -26,23 +27,24 @@ std::vector<std::uint8_t> unpacked(const std::vector<std::byte>& packed) {
   return bytes.value_or(std::vector<std::uint8_t>());
 }
 
-BakeCamera camera() {
-  BakeCamera made{"images/a.png", {LensModel::kPinhole, 64, 48, 80, 80, 32, 24, {}}, {}};
+bake::Camera camera() {
+  bake::Camera made{"images/a.png", {LensModel::kPinhole, 64, 48, 80, 80, 32, 24, {}}, {}};
   made.world_from_camera = {Mat3d::identity(), {1.1, 2.1, 1}};
   return made;
 }
 
 struct Written {
-  test::TempDir folder;
-  BakedVolume volume = test::block_volume({0, 0, 0}, {5, 5, 5}, 9);
+  cnerf::test::TempDir folder;
+  bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {5, 5, 5}, 9);
   WebBricks bricks = make_web_bricks(volume);
   WebReport report;
   Json json;
 
   explicit Written(const fs::path& page = {}) {
     const WebPhoto photo = make_web_photo(camera().intrinsics, std::vector<float>(64 * 48, 0.25f), 32, 80);
-    report = write_web_bundle(volume, bricks, {"block", {camera()}, {photo}, {"cnerf", "bake"}, "metres", "y"},
-                              folder.path(), page, {});
+    report =
+        write_web_bundle(volume, bricks, {"block", {camera()}, {photo}, exporting::test::label_of_first("y", "metres")},
+                         folder.path(), page, {});
     json = Json::parse(read_text_file(report.manifest));
   }
 };
@@ -64,8 +66,8 @@ TEST(WebBundle, ListsWhatItWroteWithChecksums) {
 }
 
 TEST(WebBundle, ItsSizeIsEstimatedWell) {
-  BakedVolume volume = test::block_volume({0, 0, 0}, {80, 80, 80}, 9);
-  for (BakedVoxel& voxel : volume.voxels) {
+  bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {80, 80, 80}, 9);
+  for (bake::Voxel& voxel : volume.voxels) {
     // Noise that does not repeat: what does packs better the more of it there is.
     auto h = std::uint32_t((voxel.i * 80 + voxel.j) * 80 + voxel.k) * 2654435761u;
     h = (h ^ h >> 15) * 2246822519u;
@@ -73,7 +75,7 @@ TEST(WebBundle, ItsSizeIsEstimatedWell) {
     voxel.sigma = 1 + float((h ^ h >> 16) % 97);
   }
   const WebBricks bricks = make_web_bricks(volume);
-  const test::TempDir folder;
+  const cnerf::test::TempDir folder;
   const WebReport report = write_web_bundle(volume, bricks, {}, folder.path(), {}, {});
   const double estimate = double(estimate_web(bricks).download_bytes);
   EXPECT_NEAR(estimate / double(report.volume_bytes), 1, 0.25);
@@ -123,7 +125,7 @@ TEST(WebBundle, APhotographLosesItsDistortionAndKeepsItsTone) {
 }
 
 TEST(WebBundle, CopiesThePage) {
-  const test::TempDir page;
+  const cnerf::test::TempDir page;
   write_file(page / "index.html", std::string_view("<p>"));
   fs::create_directories(page / "assets");
   write_file(page / "assets" / "a.js", std::string_view("1;"));
@@ -134,8 +136,8 @@ TEST(WebBundle, CopiesThePage) {
 }
 
 TEST(WebBundle, RefusesWhatDoesNotFit) {
-  const test::TempDir folder, empty;
-  const BakedVolume volume = test::block_volume({0, 0, 0}, {2, 2, 2}, 9);
+  const cnerf::test::TempDir folder, empty;
+  const bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {2, 2, 2}, 9);
   const WebBricks bricks = make_web_bricks(volume);
   EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {{}, {}}, {}}, folder.path(), {}, {}), ContractError);
   EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {}, {}}, folder.path(), empty.path(), {}),

@@ -7,9 +7,9 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "bake/dilate.h"
-#include "bake/resample.h"
-#include "bake/volume_integrator.h"
+#include "bake/volume/dilate.h"
+#include "bake/volume/integrate.h"
+#include "bake/volume/resample.h"
 #include "export/manifest.h"
 #include "export/vdb_reader.h"
 #include "export/web_bundle.h"
@@ -17,19 +17,18 @@
 #include "src/color/colorspace_math.h"
 
 namespace cnerf {
+using namespace exporting;
 namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 /// A ball of changing colour with a hole, beside a thin fog.
-BakedVolume ball() {
-  BakedVolume volume;
+bake::Volume ball() {
+  bake::Volume volume;
   volume.origin = {1, 2, 3};
   volume.voxel_size = 0.05;
   volume.resolution = {40, 36, 32};
   volume.frame = {{2, 2.9, 3.8}, 0.4, 1};
-  volume.colorizer = "reference:a.png";
-  volume.take = "warm";
   for (int i = 0; i < 40; ++i)
     for (int j = 0; j < 36; ++j)
       for (int k = 0; k < 32; ++k) {
@@ -45,9 +44,9 @@ BakedVolume ball() {
   return volume;
 }
 
-BakeCamera camera(const std::string& name, Vec3d eye, Vec3d target) {
+bake::Camera camera(const std::string& name, Vec3d eye, Vec3d target) {
   const Vec3d forward = normalized(target - eye), right = normalized(cross(forward, Vec3d{0, 0, 1}));
-  BakeCamera made{name, {LensModel::kPinhole, 160, 120, 190, 180, 84, 57, {}}, {}};
+  bake::Camera made{name, {LensModel::kPinhole, 160, 120, 190, 180, 84, 57, {}}, {}};
   made.world_from_camera = {Mat3d::from_columns(right, cross(forward, right), forward), eye};
   return made;
 }
@@ -58,21 +57,21 @@ Json rows_of(const std::vector<float>& values) {
   return list;
 }
 
-void write_expected(const fs::path& file, const BakedVolume& volume, const std::vector<BakeCamera>& cameras) {
+void write_expected(const fs::path& file, const bake::Volume& volume, const std::vector<bake::Camera>& cameras) {
   Json projections = Json::array(), images = Json::array(), voxels = Json::array();
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     for (const Vec3d p : {Vec3d{1.5, 2.5, 3.5}, Vec3d{2.9, 3.7, 4.4}, Vec3d{1.9, 2.9, 3.8}}) {
       const auto pixel = project(cameras[c].intrinsics, cameras[c].world_from_camera.inverse().point(p));
       projections.push_back({{"camera", c}, {"point", {p.x, p.y, p.z}}, {"pixel", {pixel->x, pixel->y}}});
     }
-    const VolumeImage image = integrate_volume(volume, cameras[c].intrinsics, cameras[c].world_from_camera);
+    const bake::VolumeImage image = integrate_volume(volume, cameras[c].intrinsics, cameras[c].world_from_camera);
     images.push_back({{"width", image.width},
                       {"height", image.height},
                       {"rgb", rows_of(image.rgb)},
                       {"opacity", rows_of(image.opacity)}});
   }
   for (std::size_t v = 0; v < volume.voxels.size(); v += 997) {
-    const BakedVoxel& voxel = volume.voxels[v];
+    const bake::Voxel& voxel = volume.voxels[v];
     const Vec3d centre = volume.origin + Vec3d{voxel.i + 0.5, voxel.j + 0.5, voxel.k + 0.5} * volume.voxel_size;
     voxels.push_back({{"centre", {centre.x, centre.y, centre.z}},
                       {"sigma", voxel.sigma},
@@ -84,36 +83,36 @@ void write_expected(const fs::path& file, const BakedVolume& volume, const std::
 }
 
 void write_small(const fs::path& folder) {
-  const BakedVolume volume = ball();
-  const std::vector<BakeCamera> cameras{camera("images/a.png", {-2, 2.5, 4.5}, {1.9, 2.9, 3.8}),
-                                        camera("images/b.png", {2.2, -1.5, 5.2}, {1.9, 2.9, 3.8}),
-                                        camera("images/c.png", {5.5, 4.5, 2.9}, {1.9, 2.9, 3.8})};
+  const bake::Volume volume = ball();
+  const std::vector<bake::Camera> cameras{camera("images/a.png", {-2, 2.5, 4.5}, {1.9, 2.9, 3.8}),
+                                          camera("images/b.png", {2.2, -1.5, 5.2}, {1.9, 2.9, 3.8}),
+                                          camera("images/c.png", {5.5, 4.5, 2.9}, {1.9, 2.9, 3.8})};
   std::vector<WebPhoto> photos;
-  for (const BakeCamera& each : cameras) {
-    const VolumeImage seen = integrate_volume(volume, each.intrinsics, each.world_from_camera);
+  for (const bake::Camera& each : cameras) {
+    const bake::VolumeImage seen = integrate_volume(volume, each.intrinsics, each.world_from_camera);
     std::vector<float> luminance;
     for (std::size_t p = 0; p < seen.opacity.size(); ++p) {
       luminance.push_back(luminance_of(Vec3f{seen.rgb[3 * p], seen.rgb[3 * p + 1], seen.rgb[3 * p + 2]}));
     }
     photos.push_back(make_web_photo(each.intrinsics, luminance, 160, 90));
   }
-  const WebScene scene{"ball", cameras, photos, {"cnerf", "bake"}, "metres", "z"};
+  const WebScene scene{"ball", cameras, photos, {{"reference:a.png", "warm", {"cnerf", "bake"}}, {"metres"}}};
   for (const char* density : {"r8", "r16f"}) {
     WebOptions options;
     options.density = density;
     write_web_bundle(volume, make_web_bricks(volume, density), scene, folder / density, {}, options);
   }
-  BakedVolume padded = volume;
+  bake::Volume padded = volume;
   dilate_colors(padded, 3);
   write_expected(folder / "expected.json", padded, cameras);
 }
 
 void write_of_bake(const fs::path& folder, const fs::path& bake, int resolution) {
   const BakeManifest manifest = read_manifest(bake / "manifest.json");
-  const BakedVolume volume = resample_volume(read_vdb(bake / manifest.volume->file), resolution);
+  const bake::Volume volume = resample_volume(read_vdb(bake / manifest.volume->file), resolution);
   const WebBricks bricks = make_web_bricks(volume);
   const WebEstimate estimate = estimate_web(bricks);
-  const WebScene scene{bake.filename().string(), manifest.cameras, {}, {}, manifest.units, manifest.up_axis};
+  const WebScene scene{bake.filename().string(), manifest.cameras, {}, manifest.label};
   const WebReport report = write_web_bundle(volume, bricks, scene, folder, {}, {});
   std::printf("%zu voxels, %zu bricks, %.2f MiB (estimated %.2f), textures %.1f MiB\n", bricks.voxels, bricks.stored(),
               double(report.volume_bytes) / (1 << 20), double(estimate.download_bytes) / (1 << 20),

@@ -4,12 +4,12 @@
 
 #include <numbers>
 
-#include "bake/mesh/refine.h"
-#include "bake/mesh/solidify.h"
+#include "bake/mesh/surface/refine.h"
+#include "bake/mesh/surface/solidify.h"
 #include "tests/bake/analytic_field.h"
 #include "tests/bake/mesh/test_surfaces.h"
 
-namespace cnerf::test {
+namespace cnerf::bake::test {
 namespace {
 
 double ball_volume(double radius) {
@@ -89,10 +89,10 @@ TEST(Solidify, HiddenDebrisIsFilledAndOpenSpaceIsNot) {
     return (in_box && !in_hollow) || is_debris || is_roof ? 1.0 : 0.0;
   };
   const BrickGrid<float> sigma = covered_voxels({48, 28, 28}, shape);
-  BakePlan plan;
+  Plan plan;
   plan.voxel_size = 1;
   plan.resolution = sigma.size();
-  const std::vector<BakeCamera> cameras{camera_at("above", {24, 14, 200}, {24, 14, 14}, 64, 64, 200)};
+  const std::vector<Camera> cameras{camera_at("above", {24, 14, 200}, {24, 14, 14}, 64, 64, 200)};
   const BrickGrid<float> solid = solidified(sigma, cameras, plan, {});
   EXPECT_GT(solid.at({14, 14, 14}), 1) << "inside the box";
   EXPECT_GT(solid.at({12, 13, 14}), 1);
@@ -104,4 +104,4 @@ TEST(Solidify, HiddenDebrisIsFilledAndOpenSpaceIsNot) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::bake::test

@@ -6,11 +6,11 @@
 #include <map>
 #include <utility>
 
-#include "bake/brick_grid.h"
-#include "bake/mesh/isosurface.h"
-#include "bake/mesh/surface_mesh.h"
+#include "bake/lattice/brick_grid.h"
+#include "bake/mesh/surface/isosurface.h"
+#include "bake/mesh/surface/surface_mesh.h"
 
-namespace cnerf::test {
+namespace cnerf::bake::test {
 
 /// Voxels of side 1 whose light is `share(centre)` taken by something opaque; 0 means empty.
 inline BrickGrid<float> covered_voxels(Vec3i size, const std::function<double(Vec3d)>& share) {
@@ -65,4 +65,4 @@ inline bool is_closed(const SurfaceMesh& mesh) {
   return !edges.empty();
 }
 
-}  // namespace cnerf::test
+}  // namespace cnerf::bake::test

@@ -2,16 +2,16 @@
 
 #include <gtest/gtest.h>
 
-#include "bake/density_pass.h"
-#include "bake/mesh/mesh_baker.h"
-#include "bake/mesh/texture_baker.h"
+#include "bake/density/density_pass.h"
+#include "bake/mesh/texture/texture_baker.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
 #include "tests/bake/analytic_field.h"
 #include "tests/bake/mesh/test_surfaces.h"
+#include "tests/bake/whole_bake.h"
 
-namespace cnerf::test {
+namespace cnerf::bake::test {
 namespace {
 
 const SceneFrame kFrame{{1, 2, 3}, 0.5, 1};  // world box: 2 units around (1, 2, 3)
@@ -33,8 +33,8 @@ AnalyticField coloured_sphere() {
   return field;
 }
 
-BakeOptions coarse() {
-  BakeOptions options;
+Options coarse() {
+  Options options;
   options.resolution = 48;
   return options;
 }
@@ -46,8 +46,8 @@ MeshOptions small_texture() {
   return options;
 }
 
-std::vector<BakeCamera> cameras_around() {
-  std::vector<BakeCamera> cameras;
+std::vector<Camera> cameras_around() {
+  std::vector<Camera> cameras;
   for (const Vec3d eye :
        {Vec3d{6, 2, 3}, Vec3d{-4, 2, 3}, Vec3d{1, 7, 3}, Vec3d{1, -3, 3}, Vec3d{1, 2, 8}, Vec3d{1, 2, -2}}) {
     cameras.push_back(camera_at("view", eye, {1, 2, 3}, 64, 64, 100));
@@ -58,9 +58,9 @@ std::vector<BakeCamera> cameras_around() {
 TEST(MeshBake, ASphereWearsItsColours) {
   const AnalyticField field = coloured_sphere();
   for (const bool with_cameras : {false, true}) {
-    const BakedMesh mesh =
-        bake_mesh(field, with_cameras ? cameras_around() : std::vector<BakeCamera>{}, coarse(), small_texture());
-    const BakedTexture& texture = mesh.texture;
+    const Mesh mesh =
+        bake_mesh(field, with_cameras ? cameras_around() : std::vector<Camera>{}, coarse(), small_texture());
+    const Texture& texture = mesh.texture;
     ASSERT_EQ(mesh.positions.size(), mesh.uvs.size());
     double worst = 0;
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
@@ -82,9 +82,9 @@ TEST(MeshBake, ASphereWearsItsColours) {
 TEST(MeshBake, DoesNotDependOnThreads) {
   const AnalyticField field = coloured_sphere();
   set_thread_count(1);
-  const BakedMesh one = bake_mesh(field, cameras_around(), coarse(), small_texture());
+  const Mesh one = bake_mesh(field, cameras_around(), coarse(), small_texture());
   set_thread_count(3);
-  const BakedMesh three = bake_mesh(field, cameras_around(), coarse(), small_texture());
+  const Mesh three = bake_mesh(field, cameras_around(), coarse(), small_texture());
   set_thread_count(0);
   EXPECT_EQ(one.positions, three.positions);
   EXPECT_EQ(one.triangles, three.triangles);
@@ -93,7 +93,7 @@ TEST(MeshBake, DoesNotDependOnThreads) {
 
 TEST(MeshBake, GreyHasNoColourAtAll) {
   const AnalyticField field(kFrame, sphere_density(kMiddle, 0.3f, 600), 0.37f);
-  const BakedMesh mesh = bake_mesh(field, cameras_around(), coarse(), small_texture());
+  const Mesh mesh = bake_mesh(field, cameras_around(), coarse(), small_texture());
   for (std::size_t i = 0; i < mesh.texture.rgb.size(); ++i) {
     ASSERT_EQ(mesh.texture.a[i], 0);
     ASSERT_EQ(mesh.texture.b[i], 0);
@@ -110,14 +110,14 @@ TEST(MeshBake, NothingOpaqueIsAnInputError) {
 struct Stage {
   explicit Stage(const AnalyticField& field)
       : plan(plan_bake(field, coarse())), sigma(bake_density(field, plan, coarse(), [](double) {})) {}
-  BakePlan plan;
+  Plan plan;
   BrickGrid<float> sigma;
 };
 
 TEST(TexelShader, FindsTheSurfaceFromALittleOff) {
   const AnalyticField field = coloured_sphere();
   const Stage stage(field);
-  const TexelShader shader(field, {}, stage.plan, coarse(), {}, stage.sigma);
+  const TexelShader shader(field, {}, stage.plan, coarse(), 6, stage.sigma);
   const Vec3f direction = normalized(Vec3f{1, -2, 0.5f});
   const Vec3f expected = sphere_color(kMiddle + direction * 0.3f);
   std::vector<SurfacePoint> points;
@@ -139,10 +139,10 @@ TEST(TexelShader, AveragesOverTheViewsThatSeeThePoint) {
   AnalyticField field(kFrame, sphere_density(kMiddle, 0.3f, 600));
   field.with_luminance([](Vec3f, Vec3f d) { return d.x < -0.5f ? 0.2f : d.y < -0.5f ? 0.6f : 9.0f; });
   const Stage stage(field);
-  const std::vector<BakeCamera> cameras{camera_at("x", {6, 2, 3}, {1, 2, 3}, 64, 64, 100),
-                                        camera_at("y", {1, 7, 3}, {1, 2, 3}, 64, 64, 100),
-                                        camera_at("hidden", {1, -3, 3}, {1, 2, 3}, 64, 64, 100)};
-  const TexelShader shader(field, cameras, stage.plan, coarse(), {}, stage.sigma);
+  const std::vector<Camera> cameras{camera_at("x", {6, 2, 3}, {1, 2, 3}, 64, 64, 100),
+                                    camera_at("y", {1, 7, 3}, {1, 2, 3}, 64, 64, 100),
+                                    camera_at("hidden", {1, -3, 3}, {1, 2, 3}, 64, 64, 100)};
+  const TexelShader shader(field, cameras, stage.plan, coarse(), 6, stage.sigma);
   const auto at = [&](Vec3f direction) {
     const Vec3d world = kFrame.world_from_unit((kMiddle + direction * 0.3f).cast<double>());
     return SurfacePoint{((world - stage.plan.origin) / stage.plan.voxel_size).cast<float>(), direction};
@@ -155,7 +155,7 @@ TEST(TexelShader, AveragesOverTheViewsThatSeeThePoint) {
 }
 
 TEST(FillIn, ColoursReachOverTheGutterAndTheRestIsTheirMean) {
-  BakedTexture texture;
+  Texture texture;
   texture.size = 16;
   texture.rgb.resize(256);
   texture.coverage.resize(256);
@@ -173,4 +173,4 @@ TEST(FillIn, ColoursReachOverTheGutterAndTheRestIsTheirMean) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::bake::test

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <set>
 
-#include "bake/mesh/refine.h"
-#include "bake/mesh/texel_map.h"
-#include "bake/mesh/unwrap.h"
+#include "bake/mesh/surface/refine.h"
+#include "bake/mesh/texture/texel_map.h"
+#include "bake/mesh/uv/unwrap.h"
 #include "src/base/error.h"
 #include "tests/bake/mesh/test_surfaces.h"
 
-namespace cnerf::test {
+namespace cnerf::bake::test {
 namespace {
 
 constexpr int kSize = 512, kGutter = 2;
@@ -141,4 +141,4 @@ TEST(UnwrapChecks, ATextureTooSmallIsRefused) {
 }
 
 }  // namespace
-}  // namespace cnerf::test
+}  // namespace cnerf::bake::test

@@ -1,0 +1,33 @@
+#pragma once
+/// Weighted means of a field's luminance over the directions that points are looked at along.
+
+#include <span>
+#include <vector>
+
+#include "src/field/color_field.h"
+
+namespace cnerf::bake {
+
+/// Points, each with the directions it is looked at along, for one question to the field.
+class ViewMeans {
+ public:
+  /// Adds a direction (unit length, away from the camera) to the point at hand.
+  void look_along(Vec3f unit, Vec3f direction, float weight);
+  /// Adds the six directions of the axes: for points that no camera sees.
+  void look_from_all_sides(Vec3f unit);
+  /// The point at hand is complete: it has at least one direction.
+  void next_point() { ends_.push_back(positions_.size()); }
+  /// Adds another list's points.
+  void append(const ViewMeans& others);
+
+  /// [points] linear Y, >= 0: the weighted mean over each point's directions. Asked by as many threads as are free.
+  /// @throws ContractError  when the field answers a luminance that is not finite.
+  [[nodiscard]] std::vector<float> luminance(const ColorField& field) const;
+
+ private:
+  std::vector<Vec3f> positions_, directions_;
+  std::vector<float> weights_;
+  std::vector<std::size_t> ends_;  // of each point's directions
+};
+
+}  // namespace cnerf::bake

@@ -1,0 +1,51 @@
+#include "bake/density/levels.h"
+
+#include <algorithm>
+
+#include "bake/density/density_pass.h"
+#include "bake/progress.h"
+#include "src/base/error.h"
+#include "src/base/parallel.h"
+
+namespace cnerf::bake {
+
+std::size_t plane_count(std::span<const Level> levels) {
+  std::size_t planes = 0;
+  for (const Level& level : levels) planes += std::size_t(plane_count(level.plan));
+  return planes;
+}
+
+std::size_t planes_at_a_time(const Options& options) {
+  constexpr int kThreadsOfPlane = 4, kMost = 4;
+  if (!options.max_memory.empty()) return 1;
+  return std::size_t(std::clamp(thread_count() / kThreadsOfPlane, 1, kMost));
+}
+
+// The journal's parts are the planes of the density pass, level by level, then those of the radiance pass.
+
+std::vector<Level> bake_levels(const ColorField& field, const std::vector<Plan>& plans, const Options& options,
+                               Journal& journal, const ProgressSink& sink) {
+  std::vector<Level> levels;
+  for (const Plan& plan : plans) levels.push_back({plan, empty_density(plan)});
+  const PassProgress progress = volume_progress(sink, 0, kDensityPassShare);
+  const std::size_t all = plane_count(levels);
+  std::size_t done = 0;
+  std::size_t first = 0;
+  bool any = false;
+  for (Level& level : levels) {
+    const auto planes = std::size_t(plane_count(level.plan));
+    journal.parts<DenseVoxel>(
+        first, planes, planes_at_a_time(options),
+        [&](std::size_t plane) { return bake_density_plane(field, level.plan, options, int(plane)); },
+        [&](std::size_t plane, const std::vector<DenseVoxel>& voxels) {
+          put_plane(voxels, int(plane), level.sigma);
+          any = any || !voxels.empty();
+          progress.report(double(++done) / double(all));
+        });
+    first += planes;
+  }
+  if (!any) throw InputError("bake: no voxel is as opaque as opacity_threshold; lower it, or check --aabb");
+  return levels;
+}
+
+}  // namespace cnerf::bake

@@ -1,0 +1,61 @@
+#include "bake/mesh/bake_mesh.h"
+
+#include "bake/density/density_pass.h"
+#include "bake/lattice/plan.h"
+#include "bake/mesh/surface/isosurface.h"
+#include "bake/mesh/surface/refine.h"
+#include "bake/mesh/surface/solidify.h"
+#include "bake/mesh/texture/texture_baker.h"
+#include "bake/progress.h"
+#include "src/base/error.h"
+
+namespace cnerf::bake {
+namespace {
+
+constexpr double kAdaptivity = 0.02;        ///< how far flat parts are merged when the surface is extracted, of 1
+constexpr double kDensityShare = 0.25;      ///< of the progress line, when density is baked before
+constexpr double kSurfaceShare = 2.0 / 15;  ///< of the rest
+
+SurfaceMesh make_surface(const BrickGrid<float>& sigma, const Plan& plan, const MeshOptions& options) {
+  SurfaceMesh surface = extract_surface(sigma, plan.voxel_size, options.surface_depth, kAdaptivity);
+  if (surface.triangles.empty()) {
+    throw InputError("mesh: nothing is opaque enough to have a surface; raise mesh.surface_depth, or check --aabb");
+  }
+  surface = without_loose_parts(surface, options.smallest_part);
+  smooth(surface, options.smoothing);
+  return decimated(surface, options.faces);
+}
+
+void put_into_world(const UnwrappedMesh& unwrapped, const Plan& plan, Mesh& mesh) {
+  for (const Vec3f& p : unwrapped.mesh.positions) {
+    mesh.positions.push_back(plan.world_from_voxel(p.cast<double>()).cast<float>());
+  }
+  mesh.normals = unwrapped.normals;
+  mesh.triangles = unwrapped.mesh.triangles;
+  const auto size = float(unwrapped.size);
+  for (const Point2 texel : unwrapped.texels) mesh.uvs.push_back({texel.x / size, texel.y / size});
+}
+
+}  // namespace
+
+Mesh bake_mesh(const ColorField& field, const std::vector<Camera>& cameras, const Level& level, const Options& bake,
+               const MeshOptions& options, const ProgressSink& sink) {
+  const PassProgress progress(sink, "mesh", kDensityShare, 1, "bake stopped: the mesh was not written, run it again");
+  const auto& [plan, sigma] = level;
+  const SurfaceMesh surface = make_surface(solidified(sigma, cameras, plan, bake), plan, options);
+  const UnwrappedMesh unwrapped = unwrap(surface, options.texture_size, options.gutter);
+  progress.report(kSurfaceShare);
+
+  Mesh mesh;
+  put_into_world(unwrapped, plan, mesh);
+  const TexelShader shader(field, cameras, plan, bake, options.views_per_texel, sigma);
+  mesh.texture = bake_texture(unwrapped, shader, options.gutter,
+                              [&](double share) { progress.report(kSurfaceShare + (1 - kSurfaceShare) * share); });
+  mesh.voxel_size = plan.voxel_size;
+  mesh.charts = unwrapped.charts;
+  mesh.gutter = options.gutter;
+  mesh.frame = field.frame();
+  return mesh;
+}
+
+}  // namespace cnerf::bake

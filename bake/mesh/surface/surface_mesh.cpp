@@ -1,0 +1,109 @@
+#include "bake/mesh/surface/surface_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace cnerf::bake {
+namespace {
+
+constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
+
+float angle_between(Vec3f a, Vec3f b) {
+  const float product = length(a) * length(b);
+  return product > 0 ? std::acos(std::clamp(dot(a, b) / product, -1.0f, 1.0f)) : 0.0f;
+}
+
+/// Union-find with path halving.
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
+  [[nodiscard]] std::uint32_t root(std::uint32_t x) {
+    while (parent_[x] != x) x = parent_[x] = parent_[parent_[x]];
+    return x;
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    a = root(a);
+    b = root(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+}  // namespace
+
+std::vector<Vec3f> vertex_normals(const SurfaceMesh& mesh) {
+  std::vector<Vec3f> normals(mesh.positions.size());
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3f normal = face_normal(mesh, t);
+    for (int corner = 0; corner < 3; ++corner) {
+      const Vec3f& at = mesh.positions[t[corner]];
+      const Vec3f to_next = mesh.positions[t[(corner + 1) % 3]] - at;
+      const Vec3f to_previous = mesh.positions[t[(corner + 2) % 3]] - at;
+      normals[t[corner]] += normal * angle_between(to_next, to_previous);
+    }
+  }
+  for (Vec3f& normal : normals) {
+    const float size = length(normal);
+    normal = size > 0 ? normal / size : Vec3f{0, 0, 1};
+  }
+  return normals;
+}
+
+double signed_volume(const SurfaceMesh& mesh) {
+  double volume = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const auto corner = [&](int c) { return mesh.positions[t[c]].cast<double>(); };
+    volume += dot(corner(0), cross(corner(1), corner(2))) / 6;
+  }
+  return volume;
+}
+
+void compact(SurfaceMesh& mesh) {
+  std::erase_if(mesh.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+  std::vector<std::uint32_t> renamed(mesh.positions.size(), kUnused);
+  for (const Triangle& t : mesh.triangles) {
+    for (const std::uint32_t vertex : t) renamed[vertex] = 0;
+  }
+  std::uint32_t used = 0;
+  for (std::size_t v = 0; v < renamed.size(); ++v) {
+    if (renamed[v] == kUnused) continue;
+    mesh.positions[used] = mesh.positions[v];
+    renamed[v] = used++;
+  }
+  mesh.positions.resize(used);
+  for (Triangle& t : mesh.triangles) {
+    for (std::uint32_t& vertex : t) vertex = renamed[vertex];
+  }
+}
+
+std::vector<SurfaceMesh> connected_parts(const SurfaceMesh& mesh) {
+  DisjointSets sets(mesh.positions.size());
+  for (const Triangle& t : mesh.triangles) {
+    sets.join(t[0], t[1]);
+    sets.join(t[0], t[2]);
+  }
+  std::vector<std::uint32_t> part_of_root(mesh.positions.size(), kUnused), renamed(mesh.positions.size(), kUnused);
+  std::vector<SurfaceMesh> parts;
+  for (Triangle t : mesh.triangles) {
+    std::uint32_t& part = part_of_root[sets.root(t[0])];
+    if (part == kUnused) {
+      part = std::uint32_t(parts.size());
+      parts.emplace_back();
+    }
+    for (std::uint32_t& vertex : t) {
+      if (renamed[vertex] == kUnused) {
+        renamed[vertex] = std::uint32_t(parts[part].positions.size());
+        parts[part].positions.push_back(mesh.positions[vertex]);
+      }
+      vertex = renamed[vertex];
+    }
+    parts[part].triangles.push_back(t);
+  }
+  return parts;
+}
+
+}  // namespace cnerf::bake

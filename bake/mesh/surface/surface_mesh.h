@@ -1,0 +1,42 @@
+#pragma once
+/// A triangle mesh while it is being made: shared vertices, no normals, no texture.
+
+#include <cstdint>
+#include <vector>
+
+#include "bake/mesh.h"
+#include "src/base/vec3.h"
+
+namespace cnerf::bake {
+
+struct SurfaceMesh {
+  std::vector<Vec3f> positions;  ///< voxel coordinates: voxel ijk covers [ijk, ijk + 1)
+  std::vector<Triangle> triangles;
+};
+
+/// Twice the area, along the normal.
+[[nodiscard]] inline Vec3f area_vector(const SurfaceMesh& mesh, const Triangle& t) {
+  const Vec3f& a = mesh.positions[t[0]];
+  return cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a);
+}
+
+/// Unit normal; (0, 0, 0) for a triangle without area.
+[[nodiscard]] inline Vec3f face_normal(const SurfaceMesh& mesh, const Triangle& t) {
+  const Vec3f area = area_vector(mesh, t);
+  const float size = length(area);
+  return size > 0 ? area / size : Vec3f{};
+}
+
+/// Normals of vertices: of the faces around them, weighted by their angle there.  [positions]
+[[nodiscard]] std::vector<Vec3f> vertex_normals(const SurfaceMesh& mesh);
+
+/// Volume inside, positive when the surface faces outward; of closed surfaces.
+[[nodiscard]] double signed_volume(const SurfaceMesh& mesh);
+
+/// Removes vertices that no triangle uses and triangles that use one twice; the order of the rest stays.
+void compact(SurfaceMesh& mesh);
+
+/// Splits a mesh into parts that share no vertex, each in the order of its first triangle.
+[[nodiscard]] std::vector<SurfaceMesh> connected_parts(const SurfaceMesh& mesh);
+
+}  // namespace cnerf::bake

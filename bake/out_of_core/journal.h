@@ -1,0 +1,91 @@
+#pragma once
+/// Finished parts of a bake on disk, so that a bake holds little in memory and goes on where it was stopped.
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "src/base/error.h"
+#include "src/base/parallel.h"
+
+namespace cnerf::bake {
+
+/// A list of byte strings in a file that only grows. A process may be killed at any time: what is cut off or damaged is
+/// dropped when the file is opened again, and everything before it is still there. Several threads may read finished
+/// parts while none is written.
+class Journal {
+ public:
+  /// In a file without a name, gone with the object.  @throws OutputError.
+  Journal();
+  /// Continues `file` if it was begun under the same `identity`, else begins it anew.
+  /// @param identity  says all that the parts depend on; any text.  @throws OutputError.
+  Journal(const std::filesystem::path& file, const std::string& identity);
+  ~Journal();
+  Journal(Journal&&) noexcept;
+  Journal& operator=(Journal&&) noexcept;
+
+  [[nodiscard]] std::size_t size() const;
+  /// How many parts there were when the file was opened.
+  [[nodiscard]] std::size_t found() const;
+
+  /// Calls `use(i, part first + i)` for each i below `count`, in order. A part is read if it is finished, else made and
+  /// written, which has to happen in order and without gaps. `at_a_time` parts are made at the same time: `make(i)` is
+  /// called by several threads.
+  /// @throws OutputError  when one cannot be written, e.g. on a full disk; and whatever `make` and `use` throw.
+  template <typename T>
+  void parts(std::size_t first, std::size_t count, std::size_t at_a_time,
+             const std::function<std::vector<T>(std::size_t)>& make,
+             const std::function<void(std::size_t, const std::vector<T>&)>& use) {
+    for (std::size_t begin = 0; begin < count; begin += at_a_time) {
+      std::vector<std::optional<std::vector<T>>> some(std::min(at_a_time, count - begin));
+      const std::size_t finished = size();
+      std::exception_ptr failure;
+      try {
+        parallel_tasks(some.size(), [&](std::size_t i) {
+          const std::size_t number = first + begin + i;
+          some[i] = number < finished ? read<T>(number) : make(begin + i);
+        });
+      } catch (...) {
+        failure = std::current_exception();
+      }
+      // What is made is kept, whoever stops the bake.
+      for (std::size_t i = 0; i < some.size() && some[i]; ++i) {
+        const std::size_t number = first + begin + i;
+        if (number >= finished) append(number, std::as_bytes(std::span<const T>(*some[i])));
+      }
+      if (failure) std::rethrow_exception(failure);
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        use(begin + i, *some[i]);
+        some[i].reset();
+      }
+    }
+  }
+  /// A finished part.  @throws InputError  when it cannot be read any more.
+  template <typename T>
+  [[nodiscard]] std::vector<T> read(std::size_t number) const {
+    static_assert(std::is_trivially_copyable_v<T>, "parts are stored as they lie in memory");
+    const std::vector<std::byte> bytes = read_bytes(number);
+    std::vector<T> values(bytes.size() / sizeof(T));
+    if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
+    return values;
+  }
+
+ private:
+  struct File;
+  void append(std::size_t number, std::span<const std::byte> bytes);
+  [[nodiscard]] std::vector<std::byte> read_bytes(std::size_t number) const;
+
+  std::unique_ptr<File> file_;
+};
+
+}  // namespace cnerf::bake

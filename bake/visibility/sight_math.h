@@ -1,0 +1,182 @@
+#pragma once
+/// Which cameras see a point through baked density: the arithmetic that processor and kernels share. `Grid` is what
+/// find_brick, min and size of BrickGrid<float> say.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "bake/lattice/brick_grid.h"
+#include "src/base/host_device.h"
+#include "src/base/vec3.h"
+#include "src/capture/camera_math.h"
+
+namespace cnerf::bake {
+
+/// A camera of a bake.
+struct Eye {
+  Intrinsics intrinsics;
+  Affined camera_from_world;
+  Vec3d centre{};  ///< world
+};
+
+/// A point, and what makes a camera see it.
+struct Sight {
+  Vec3d world{};            ///< world units
+  float least = 0;          ///< transmittance below which a camera does not count, if above `seen_transmittance`
+  std::uint32_t order = 0;  ///< which order of cameras is tried
+};
+
+/// A camera and how much of a point's light reaches it.
+struct SeenBy {
+  std::int32_t camera = 0;
+  float transmittance = 0;
+};
+
+/// Density that light passes, on its lattice: voxel ijk covers [ijk, ijk + 1) * voxel_size + origin, world units.
+template <typename Grid>
+struct SightLevel {
+  const Grid* sigma = nullptr;
+  Vec3d origin{};
+  double voxel_size = 0;
+
+  [[nodiscard]] CNERF_HD Vec3f voxel_from_world(Vec3d p) const {
+    return ((p - origin) / voxel_size).template cast<float>();
+  }
+};
+
+/// All that a point's visibility depends on.
+template <typename Grid>
+struct SightScene {
+  const Eye* eyes = nullptr;
+  int eye_count = 0;
+  const SightLevel<Grid>* levels = nullptr;
+  int level_count = 0;
+  int views = 0;                 ///< cameras wanted for a point
+  float seen_transmittance = 0;  ///< below which a camera does not see a point
+};
+
+namespace sight {
+
+inline constexpr float kGoodTransmittance = 0.5f;  ///< a view with less is replaced when a better one is found
+inline constexpr int kTriesPerView = 3;  ///< cameras tried for each view wanted, once there are enough dim ones
+
+/// Steps until the ray leaves the brick that starts at `low`, at least one. Rays stay on the lattice of whole steps, so
+/// that skipping changes nothing.
+CNERF_HD inline int steps_across_brick(Vec3i low, Vec3f p, Vec3f inverse_direction) {
+  float exit = std::numeric_limits<float>::max();
+  for (int axis = 0; axis < 3; ++axis) {
+    const float face = float(low[axis] + (inverse_direction[axis] > 0 ? kBrickSide : 0));
+    const float distance = (face - p[axis]) * inverse_direction[axis];
+    if (distance >= 0) exit = std::min(exit, distance);  // not for NaN: parallel to the face and on it
+  }
+  return std::max(1, int(std::min(exit, 1e6f)));
+}
+
+/// Where a ray from `p` comes into [0, size); 0 when it starts there, infinity when it misses.
+CNERF_HD inline float entry(Vec3f p, Vec3f inverse_direction, Vec3f size) {
+  float enter = 0, leave = std::numeric_limits<float>::max();
+  for (int axis = 0; axis < 3; ++axis) {
+    const float a = -p[axis] * inverse_direction[axis], b = (size[axis] - p[axis]) * inverse_direction[axis];
+    if (std::isnan(a) || std::isnan(b)) continue;  // parallel to a face and on it
+    enter = std::max(enter, std::min(a, b));
+    leave = std::min(leave, std::max(a, b));
+  }
+  return enter <= leave ? enter : std::numeric_limits<float>::infinity();
+}
+
+CNERF_HD inline bool inside(Vec3f p, Vec3f size) {
+  return p.x >= 0 && p.y >= 0 && p.z >= 0 && p.x < size.x && p.y < size.y && p.z < size.z;
+}
+
+}  // namespace sight
+
+/// Transmittance between two points in voxel coordinates, by steps of one voxel with nearest-neighbour densities. The
+/// first voxel's length after `from` is left out: a surface must not hide itself.
+/// @param voxel_size  world units.  @return in [0, 1]; 0 once it falls below `stop_below`.
+template <typename Grid>
+[[nodiscard]] CNERF_HD float transmittance_between(const Grid& sigma, double voxel_size, Vec3f from, Vec3f to,
+                                                   float stop_below) {
+  const Vec3f path = to - from;
+  const float distance = length(path);
+  if (!(distance > 1.0f)) return 1.0f;
+  const Vec3f d = path / distance;
+  const Vec3f inverse{1 / d.x, 1 / d.y, 1 / d.z};
+  const Vec3f start = from - sigma.min().template cast<float>();
+  const Vec3f size = sigma.size().template cast<float>();
+  const auto h = float(voxel_size);
+  const float deepest = -std::log(stop_below);
+  float depth = 0;
+  // Whole steps from the start, so that where a ray comes in does not matter; the first may round to just outside.
+  const float enter = std::max(1.0f, std::ceil(sight::entry(start, inverse, size)));
+  for (float t = enter; t < distance;) {
+    const Vec3f p = start + d * t;
+    if (!sight::inside(p, size)) break;  // the box is convex: what left it does not come back
+    const Vec3i voxel = p.template cast<int>();
+    const float* brick = sigma.find_brick(voxel);
+    if (brick == nullptr) {
+      const Vec3i low{voxel.x & ~(kBrickSide - 1), voxel.y & ~(kBrickSide - 1), voxel.z & ~(kBrickSide - 1)};
+      t += float(sight::steps_across_brick(low, p, inverse));
+      continue;
+    }
+    depth += brick[brick_offset(local_part(voxel))] * h;
+    if (depth > deepest) return 0;
+    t += 1;
+  }
+  return std::exp(-depth);
+}
+
+/// From a point of level `own` to a camera, through all levels; anything below `least` once it falls below that.
+template <typename Grid>
+[[nodiscard]] CNERF_HD float transmittance_to(const SightScene<Grid>& scene, int own, const Eye& eye, Vec3d world,
+                                              float least) {
+  float transmittance = 1;
+  for (int turn = 0; turn < scene.level_count; ++turn) {
+    const int other = turn == 0     ? own
+                      : turn <= own ? turn - 1
+                                    : turn;  // its own first: it is the most likely to hide it
+    const SightLevel<Grid>& level = scene.levels[other];
+    transmittance *= transmittance_between(*level.sigma, level.voxel_size, level.voxel_from_world(world),
+                                           level.voxel_from_world(eye.centre), least);
+    if (transmittance < least) break;
+  }
+  return transmittance;
+}
+
+[[nodiscard]] CNERF_HD inline bool has_in_picture(const Eye& eye, Vec3d world) {
+  const auto pixel = lens::project(eye.intrinsics, eye.camera_from_world.point(world));
+  return pixel && pixel->x >= 0 && pixel->y >= 0 && pixel->x <= eye.intrinsics.width &&
+         pixel->y <= eye.intrinsics.height;
+}
+
+/// At most `scene.views` cameras that have the point in their picture and see it, best first.
+/// @param order  [scene.eye_count] cameras as they are worth trying
+/// @param least  transmittance below which a camera does not count, if above `scene.seen_transmittance`
+/// @param seen   [scene.views] the answer.  @return how many there are.
+template <typename Grid>
+CNERF_HD int find_seeing(const SightScene<Grid>& scene, int own, Vec3d world, const std::int32_t* order, float least,
+                         SeenBy* seen) {
+  least = std::max(least, scene.seen_transmittance);
+  int count = 0, good = 0, tried = 0;
+  for (int turn = 0; turn < scene.eye_count; ++turn) {
+    const Eye& eye = scene.eyes[order[turn]];
+    if (!has_in_picture(eye, world)) continue;
+    // Matter just below a surface is seen dimly by many: the cameras tried so far surround it already.
+    if (++tried > sight::kTriesPerView * scene.views && count == scene.views) break;
+    const float transmittance = transmittance_to(scene, own, eye, world, least);
+    if (transmittance < least) continue;
+    int place = count;  // behind all that are as good
+    while (place > 0 && seen[place - 1].transmittance < transmittance) --place;
+    if (place < scene.views) {
+      count = std::min(count + 1, scene.views);
+      for (int i = count - 1; i > place; --i) seen[i] = seen[i - 1];
+      seen[place] = {order[turn], transmittance};
+    }
+    good += transmittance >= sight::kGoodTransmittance ? 1 : 0;
+    if (good == scene.views) break;
+  }
+  return count;
+}
+
+}  // namespace cnerf::bake

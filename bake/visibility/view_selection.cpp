@@ -1,0 +1,90 @@
+#include "bake/visibility/view_selection.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "src/base/parallel.h"
+
+namespace cnerf::bake {
+namespace {
+
+constexpr std::size_t kSpreadViews = 32;  ///< views picked by spread; the rest follows by distance
+constexpr std::size_t kSightsAtATime = 256;
+
+}  // namespace
+
+std::vector<Eye> eyes_of(const std::vector<Camera>& cameras) {
+  std::vector<Eye> eyes;
+  for (const Camera& camera : cameras) {
+    eyes.push_back({camera.intrinsics, camera.world_from_camera.inverse(), camera.world_from_camera.translation});
+  }
+  return eyes;
+}
+
+Vec3f direction_to(const Eye& eye, Vec3d world) {
+  return normalized(world - eye.centre).cast<float>();
+}
+
+std::vector<std::int32_t> try_order(std::span<const Eye> eyes, Vec3d world) {
+  const std::size_t n = eyes.size();
+  std::vector<Vec3d> directions(n);
+  std::vector<double> footprint(n);  // size of a pixel there, world units
+  for (std::size_t i = 0; i < n; ++i) {
+    const double distance = std::max(length(world - eyes[i].centre), 1e-12);
+    directions[i] = (world - eyes[i].centre) / distance;
+    footprint[i] = distance / eyes[i].intrinsics.fx;
+  }
+  std::vector<std::int32_t> order(n);
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return footprint[a] < footprint[b]; });
+
+  std::vector<double> closest(n, -1);  // largest cosine to a camera picked so far
+  for (std::size_t picked = 1; picked < std::min(n, kSpreadViews); ++picked) {
+    for (std::size_t i = picked; i < n; ++i) {
+      closest[order[i]] = std::max(closest[order[i]], dot(directions[order[i]], directions[order[picked - 1]]));
+    }
+    const auto farthest = std::min_element(order.begin() + std::ptrdiff_t(picked), order.end(),
+                                           [&](int a, int b) { return closest[a] < closest[b]; });
+    std::rotate(order.begin() + std::ptrdiff_t(picked), farthest, farthest + 1);
+  }
+  return order;
+}
+
+std::vector<DensityLevel> density_levels(std::span<const Level> levels) {
+  std::vector<DensityLevel> result;
+  for (const Level& level : levels) result.push_back({&level.sigma, level.plan.origin, level.plan.voxel_size});
+  return result;
+}
+
+ViewSelection::ViewSelection(const std::vector<Camera>& cameras, std::vector<DensityLevel> levels,
+                             const Options& options)
+    : eyes_(eyes_of(cameras)),
+      levels_(std::move(levels)),
+      views_per_voxel_(options.views_per_voxel),
+      seen_transmittance_(float(std::max(options.seen_transmittance, 1e-8))) {}
+
+SightScene<BrickGrid<float>> ViewSelection::scene() const {
+  return {eyes_.data(), int(eyes_.size()), levels_.data(), int(levels_.size()), views_per_voxel_, seen_transmittance_};
+}
+
+std::vector<SeenBy> ViewSelection::seen_by(std::size_t level, Vec3d world, std::span<const std::int32_t> order,
+                                           float least) const {
+  std::vector<SeenBy> seen(views_per_voxel_);
+  seen.resize(find_seeing(scene(), int(level), world, order.data(), least, seen.data()));
+  return seen;
+}
+
+void ViewSelection::find(std::size_t level, const SightBatch& batch, SeenBatch& answer) const {
+  answer.seen.resize(batch.sights.size() * views_per_voxel_);
+  answer.counts.resize(batch.sights.size());
+  const SightScene<BrickGrid<float>> all = scene();
+  parallel_ranges(batch.sights.size(), kSightsAtATime, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Sight& sight = batch.sights[i];
+      answer.counts[i] = find_seeing(all, int(level), sight.world, batch.orders.data() + sight.order * eyes_.size(),
+                                     sight.least, answer.seen.data() + i * views_per_voxel_);
+    }
+  });
+}
+
+}  // namespace cnerf::bake

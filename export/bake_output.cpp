@@ -1,0 +1,97 @@
+#include "export/bake_output.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+#include <sstream>
+
+#include "bake/volume/resample.h"
+#include "export/web_bundle.h"
+#include "src/base/error.h"
+#include "src/base/parallel.h"
+
+namespace cnerf::exporting {
+namespace fs = std::filesystem;
+
+Formats parse_formats(const std::string& list) {
+  Formats formats;
+  std::istringstream words(list);
+  for (std::string format; std::getline(words, format, ',');) {
+    bool* flag = format == "vdb"    ? &formats.vdb
+                 : format == "gltf" ? &formats.gltf
+                 : format == "exr"  ? &formats.exr
+                 : format == "web"  ? &formats.web
+                                    : nullptr;
+    if (flag == nullptr) throw UsageError("--format: expected vdb, gltf, exr or web, got '" + format + "'");
+    *flag = true;
+  }
+  if (!formats.vdb && !formats.gltf && !formats.exr && !formats.web) {
+    throw UsageError("--format: expected vdb, gltf, exr or web, got none");
+  }
+  formats.gltf = formats.gltf || formats.exr;
+  return formats;
+}
+
+fs::path web_folder(const fs::path& bake) {
+  return bake / "web";
+}
+
+fs::path last_file(const fs::path& folder, const Formats& formats) {
+  return formats.has_manifest() ? folder / "manifest.json" : web_folder(folder) / kWebManifest;
+}
+
+BakeOutput::BakeOutput(fs::path folder, const Formats& formats, OutputOptions options, const Capture& capture,
+                       const Label& label, Observer& observer)
+    : folder_(std::move(folder)),
+      formats_(formats),
+      options_(std::move(options)),
+      capture_(capture),
+      label_(label),
+      bake_(folder_, bake::cameras_of(capture), label),
+      observer_(observer) {}
+
+void BakeOutput::take_volumes(const std::vector<bake::VolumePlanes>& volumes) {
+  if (formats_.vdb) {
+    for (const fs::path& file : bake_.add_volumes(volumes, "volume", options_.vdb)) observer_.wrote("volume", file);
+  }
+  if (formats_.web) write_bundle(volumes);
+}
+
+void BakeOutput::write_bundle(const std::vector<bake::VolumePlanes>& volumes) {
+  std::vector<bake::Volume> whole;
+  for (const bake::VolumePlanes& volume : volumes) whole.push_back(whole_volume(volume));
+  WebScene scene{capture_.root.filename().string(), bake::cameras_of(capture_), {}, label_};
+  if (options_.web.photo_side > 0) {
+    scene.photos = make_web_photos(capture_.views, options_.web.photo_side, options_.web.photo_quality);
+  }
+  write_web(merged_volume(std::move(whole)), scene, web_folder(folder_), options_.page, options_.web, observer_);
+}
+
+void BakeOutput::take_mesh(const bake::Mesh& mesh) {
+  const GltfFiles files = bake_.add_mesh(mesh, "mesh", formats_.exr ? std::optional(options_.exr) : std::nullopt);
+  observer_.say(fmt::format("mesh: {} faces, {} charts in {} x {} texels", mesh.triangles.size(), mesh.charts,
+                            mesh.texture.size, mesh.texture.size));
+  observer_.wrote("mesh", files.glb);
+  observer_.wrote("mesh", files.gltf);
+}
+
+void BakeOutput::add_plates() {
+  constexpr int kPlateSide = 4096, kPlateQuality = 92;
+  const std::span<const View> views = capture_.views;
+  const auto at_a_time = std::size_t(thread_count());
+  for (std::size_t begin = 0; begin < views.size(); begin += at_a_time) {
+    const auto some = views.subspan(begin, std::min(at_a_time, views.size() - begin));
+    const std::vector<WebPhoto> photos = make_web_photos(some, kPlateSide, kPlateQuality);
+    for (std::size_t i = 0; i < some.size(); ++i) bake_.add_plate(some[i].name, photos[i].jpeg);
+  }
+}
+
+void BakeOutput::finish() {
+  if (!formats_.has_manifest()) return;
+  if (options_.vdb.plates) add_plates();
+  bake_.finish();
+  observer_.wrote("Blender set-up", bake_.blender_setup());
+}
+
+}  // namespace cnerf::exporting

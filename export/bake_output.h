@@ -1,0 +1,68 @@
+#pragma once
+/// A bake job's results as the files of a folder: volumes, mesh and textures, web bundle, and what names them.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bake/job/job.h"
+#include "export/bake_folder.h"
+#include "export/label.h"
+#include "export/options.h"
+#include "src/base/observer.h"
+#include "src/capture/capture.h"
+
+namespace cnerf::exporting {
+
+/// What a bake writes.
+struct Formats {
+  bool vdb = false;   ///< the volume
+  bool gltf = false;  ///< a textured mesh, as .gltf and .glb
+  bool exr = false;   ///< the mesh's textures in floating point, beside the mesh
+  bool web = false;   ///< a folder with a page, for browsers
+
+  [[nodiscard]] bool has_manifest() const { return vdb || gltf; }
+  [[nodiscard]] bake::VolumeUse volumes() const {
+    return vdb ? bake::VolumeUse::kGrids : web ? bake::VolumeUse::kRead : bake::VolumeUse::kNone;
+  }
+};
+/// "vdb,gltf,exr,web" or some of them; exr brings the mesh along.  @throws UsageError.
+[[nodiscard]] Formats parse_formats(const std::string& list);
+
+/// The file that a bake of these formats writes last: once it is there, all of it is.
+[[nodiscard]] std::filesystem::path last_file(const std::filesystem::path& folder, const Formats& formats);
+/// The folder of the web bundle of a bake.
+[[nodiscard]] std::filesystem::path web_folder(const std::filesystem::path& bake);
+
+/// How files are written.
+struct OutputOptions {
+  VdbOptions vdb;
+  ExrOptions exr;
+  WebOptions web;
+  std::filesystem::path page;  ///< folder of the built page of web bundles; empty = none
+};
+
+class BakeOutput final : public bake::Output {
+ public:
+  /// @param capture   whose cameras and photographs stand beside the results; must outlive this object, as `observer`
+  BakeOutput(std::filesystem::path folder, const Formats& formats, OutputOptions options, const Capture& capture,
+             const Label& label, Observer& observer);
+
+  void take_volumes(const std::vector<bake::VolumePlanes>& volumes) override;
+  void take_mesh(const bake::Mesh& mesh) override;
+  void finish() override;
+
+ private:
+  void write_bundle(const std::vector<bake::VolumePlanes>& volumes);
+  void add_plates();
+
+  std::filesystem::path folder_;
+  Formats formats_;
+  OutputOptions options_;
+  const Capture& capture_;
+  Label label_;
+  BakeFolder bake_;
+  Observer& observer_;
+};
+
+}  // namespace cnerf::exporting

@@ -1,0 +1,157 @@
+#include "bake/out_of_core/journal.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <fstream>
+#include <numeric>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/base/parallel.h"
+#include "tests/support/data.h"
+
+namespace cnerf::bake::test {
+namespace {
+namespace fs = std::filesystem;
+
+std::vector<int> numbers(int count) {
+  std::vector<int> made(static_cast<std::size_t>(count));
+  std::iota(made.begin(), made.end(), count);
+  return made;
+}
+
+std::vector<int> never_made() {
+  ADD_FAILURE() << "a finished part was made again";
+  return {};
+}
+
+/// One part, by itself.
+template <typename Make>
+std::vector<int> part(Journal& journal, std::size_t number, const Make& make) {
+  std::vector<int> made;
+  journal.parts<int>(
+      number, 1, 1, [&](std::size_t) { return make(); }, [&](std::size_t, const std::vector<int>& it) { made = it; });
+  return made;
+}
+
+/// Parts of 0, 10, 20, ... numbers.
+void fill(const fs::path& file, std::size_t parts) {
+  Journal journal(file, "one bake");
+  for (std::size_t p = 0; p < parts; ++p) {
+    (void)part(journal, p, [p] { return numbers(10 * int(p)); });
+  }
+}
+
+TEST(Journal, FinishedPartsAreReadNotMade) {
+  const cnerf::test::TempDir folder;
+  fill(folder / "j", 4);
+  Journal journal(folder / "j", "one bake");
+  EXPECT_EQ(journal.found(), 4u);
+  EXPECT_EQ(part(journal, 3, never_made), numbers(30));
+  EXPECT_EQ(part(journal, 0, never_made), numbers(0));
+  EXPECT_EQ(part(journal, 4, [] { return numbers(40); }), numbers(40));
+  EXPECT_EQ(journal.size(), 5u);
+}
+
+TEST(Journal, PartsMadeAtTheSameTimeAreUsedInOrderAndLieAsIfMadeOneByOne) {
+  const cnerf::test::TempDir folder;
+  fill(folder / "one by one", 11);
+  fill(folder / "together", 3);
+  {
+    Journal journal(folder / "together", "one bake");
+    std::atomic<int> made = 0;
+    std::vector<std::size_t> used;
+    journal.parts<int>(
+        1, 10, 4,
+        [&](std::size_t i) {
+          ++made;
+          return numbers(10 * int(i + 1));
+        },
+        [&](std::size_t i, const std::vector<int>& part) {
+          EXPECT_EQ(part, numbers(10 * int(i + 1)));
+          used.push_back(i);
+        });
+    EXPECT_EQ(made, 8) << "parts 1 and 2 were there";
+    EXPECT_TRUE(std::is_sorted(used.begin(), used.end()));
+    EXPECT_EQ(used.size(), 10u);
+  }
+  EXPECT_EQ(read_binary_file(folder / "together"), read_binary_file(folder / "one by one"));
+}
+
+TEST(Journal, APartThatFailsKeepsThoseBeforeIt) {
+  const cnerf::test::TempDir folder;
+  {
+    Journal journal(folder / "j", "one bake");
+    const auto make = [](std::size_t i) {
+      if (i == 5) throw InputError("bad part");
+      return numbers(int(i));
+    };
+    EXPECT_THROW(journal.parts<int>(0, 8, 3, make, [](std::size_t, const std::vector<int>&) {}), InputError);
+  }
+  EXPECT_EQ(Journal(folder / "j", "one bake").found(), 5u);
+}
+
+TEST(Journal, SeveralThreadsReadAtTheSameTime) {
+  const cnerf::test::TempDir folder;
+  constexpr std::size_t kParts = 200;
+  fill(folder / "j", kParts);
+  const Journal journal(folder / "j", "one bake");
+  std::atomic<int> wrong = 0;
+  set_thread_count(4);
+  parallel_tasks(8 * kParts, [&](std::size_t task) {
+    const std::size_t part = (7 * task) % kParts;
+    wrong += journal.read<int>(part) == numbers(10 * int(part)) ? 0 : 1;
+  });
+  set_thread_count(0);
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST(Journal, AnotherBakeBeginsAnew) {
+  const cnerf::test::TempDir folder;
+  fill(folder / "j", 4);
+  const Journal journal(folder / "j", "another bake");
+  EXPECT_EQ(journal.size(), 0u);
+  EXPECT_EQ(Journal(folder / "j", "another bake").found(), 0u);
+}
+
+TEST(Journal, WhateverIsCutOffIsDroppedAndTheRestStays) {
+  const cnerf::test::TempDir folder;
+  fill(folder / "whole", 4);
+  const auto whole = read_binary_file(folder / "whole");
+  std::size_t most = 0;
+  for (std::size_t bytes = 0; bytes <= whole.size(); ++bytes) {
+    write_file(folder / "cut", std::span(whole).first(bytes));
+    Journal journal(folder / "cut", "one bake");
+    ASSERT_GE(journal.found(), most) << bytes;
+    most = journal.found();
+    for (std::size_t p = 0; p < journal.found(); ++p) ASSERT_EQ(journal.read<int>(p), numbers(10 * int(p)));
+    if (bytes % 16 != 0) continue;
+    for (std::size_t p = 0; p < 4; ++p) {
+      (void)part(journal, p, [p] { return numbers(10 * int(p)); });
+    }
+    ASSERT_EQ(read_binary_file(folder / "cut"), whole) << bytes;
+  }
+  EXPECT_EQ(most, 4u);
+}
+
+TEST(Journal, DamagedPartsAreDropped) {
+  const cnerf::test::TempDir folder;
+  fill(folder / "whole", 4);
+  auto bytes = read_binary_file(folder / "whole");
+  bytes[bytes.size() - 1] ^= std::byte{1};
+  write_file(folder / "damaged", bytes);
+  EXPECT_EQ(Journal(folder / "damaged", "one bake").found(), 3u);
+}
+
+TEST(Journal, PlacesThatCannotBeWrittenAreOutputErrors) {
+  const cnerf::test::TempDir folder;
+  std::ofstream(folder / "file") << "no folder";
+  EXPECT_THROW(Journal(folder / "file" / "j", "one bake"), OutputError);
+  Journal journal;
+  EXPECT_THROW((void)part(journal, 1, [] { return numbers(1); }), ContractError) << "parts have an order";
+  EXPECT_THROW((void)journal.read<int>(0), ContractError);
+}
+
+}  // namespace
+}  // namespace cnerf::bake::test
