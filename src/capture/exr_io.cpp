@@ -1,6 +1,5 @@
 #include "src/capture/exr_io.h"
 
-#include <ImfArray.h>
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -79,38 +78,18 @@ LinearImage read_picture(Imf::InputFile& input, const fs::path& file) {
   return image;
 }
 
-LinearImage read_single(Imf::InputFile& input, const fs::path& file, const char* channel) {
-  const Imf::ChannelList& channels = input.header().channels();
-  if (channels.findChannel(channel) == nullptr) {
-    throw InputError(file, "channels", std::string("expected ") + channel + ", found " + channel_names(channels));
-  }
-  LinearImage image = empty_image(input, 1);
-  read_channel(input, channel, image.values.data(), 1);
-  return image;
-}
+}  // namespace
 
-/// Opens a file for `read`, and turns the library's exceptions into ours.
-template <typename Read>
-LinearImage with_open_file(const fs::path& file, Read&& read) {
+LinearImage read_exr(const fs::path& file) {
   if (!fs::exists(file)) throw MissingInputError(file.string() + ": no such file");
   try {
     Imf::InputFile input(file.c_str());
-    return read(input);
+    return read_picture(input, file);
   } catch (const Error&) {
     throw;
   } catch (const std::exception& failure) {
     throw InputError(file, "", std::string("cannot be read: ") + failure.what());
   }
-}
-
-}  // namespace
-
-LinearImage read_exr(const fs::path& file) {
-  return with_open_file(file, [&](Imf::InputFile& input) { return read_picture(input, file); });
-}
-
-LinearImage read_exr_channel(const fs::path& file, const char* channel) {
-  return with_open_file(file, [&](Imf::InputFile& input) { return read_single(input, file, channel); });
 }
 
 void write_exr_channel(const fs::path& file, const char* channel, int width, int height,

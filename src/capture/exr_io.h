@@ -12,9 +12,6 @@ namespace cnerf {
 /// @throws MissingInputError, InputError.
 [[nodiscard]] LinearImage read_exr(const std::filesystem::path& file);
 
-/// Reads one channel as it is, e.g. a depth.  @throws MissingInputError, InputError.
-[[nodiscard]] LinearImage read_exr_channel(const std::filesystem::path& file, const char* channel);
-
 /// Writes one float channel, ZIP compressed.  @param values  [height, width].
 /// @throws OutputError.
 void write_exr_channel(const std::filesystem::path& file, const char* channel, int width, int height,

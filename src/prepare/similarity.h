@@ -1,9 +1,5 @@
 #pragma once
-/// Similarities: rotation, uniform scale, translation. What structure from motion leaves open, and how two sets of
-/// poses of the same cameras are compared.
-
-#include <span>
-#include <vector>
+/// Similarities: rotation, uniform scale, translation. What structure from motion leaves open.
 
 #include "src/base/vec3.h"
 
@@ -35,22 +31,5 @@ struct SymmetricEigen {
 /// The rotation that turns unit vector `from` into unit vector `to` along the shortest way; half a turn about any
 /// perpendicular axis where they are opposite.
 [[nodiscard]] Mat3d rotation_between(Vec3d from, Vec3d to);
-
-/// Angle of a rotation, radians, in [0, pi].
-[[nodiscard]] double rotation_angle(const Mat3d& rotation);
-
-/// The similarity with the least squared distance of `target[i]` from the image of `source[i]` (Umeyama 1991).
-/// @param source, target  the same number of points, at least 3, not all on one line.
-/// @throws ContractError  on sizes.  @throws InputError  when the points determine no similarity.
-[[nodiscard]] Similarity fit_similarity(std::span<const Vec3d> source, std::span<const Vec3d> target);
-
-/// How far poses are from the true ones once a similarity between the camera centres is taken out.
-struct PoseComparison {
-  Similarity truth_from_poses;
-  std::vector<double> rotation_degrees;  ///< by view
-  std::vector<double> centre_errors;     ///< by view, over the diagonal of the true centres' bounding box
-};
-/// @param poses, truth  the same cameras in the same order, at least 3 of them, centres not on one line.
-[[nodiscard]] PoseComparison compare_poses(std::span<const Affined> poses, std::span<const Affined> truth);
 
 }  // namespace cnerf

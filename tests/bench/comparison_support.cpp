@@ -36,24 +36,17 @@ std::unique_ptr<bake::ViewAverage> average_behind(const exporting::BakeManifest&
 RenderedImage read_render(const std::filesystem::path& folder, const View& view) {
   std::string name = std::filesystem::path(view.name).replace_extension(".exr").string();
   std::ranges::replace(name, '/', '_');
-  RenderedImage image;
-  for (int c = 0; c < 3; ++c) {
-    constexpr const char* kNames[] = {"R", "G", "B"};
-    const LinearImage channel = read_exr_channel(folder / name, kNames[c]);
-    image.baked_rgb.resize(3 * channel.values.size());
-    for (std::size_t p = 0; p < channel.values.size(); ++p) {
-      image.baked_rgb[3 * p + std::size_t(c)] = channel.values[p];
-    }
-  }
-  const LinearImage alpha = read_exr_channel(folder / name, "A");
-  if (alpha.width != view.intrinsics.width || alpha.height != view.intrinsics.height) {
+  LinearImage read = read_exr(folder / name);
+  if (read.width != view.intrinsics.width || read.height != view.intrinsics.height) {
     throw InputError(folder / name, "size",
                      fmt::format("expected {} x {} as the view, found {} x {}", view.intrinsics.width,
-                                 view.intrinsics.height, alpha.width, alpha.height));
+                                 view.intrinsics.height, read.width, read.height));
   }
-  image.width = alpha.width;
-  image.height = alpha.height;
-  image.opacity = alpha.values;
+  RenderedImage image;
+  image.width = read.width;
+  image.height = read.height;
+  image.baked_rgb = std::move(read.values);
+  image.opacity = std::move(read.alpha);
   return image;
 }
 

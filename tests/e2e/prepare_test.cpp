@@ -15,6 +15,7 @@
 #include "src/prepare/similarity.h"
 #include "tests/e2e/program.h"
 #include "tests/support/data.h"
+#include "tests/support/pose_comparison.h"
 
 namespace cnerf::test {
 namespace {
@@ -81,7 +82,7 @@ TEST(Prepare, TakesAReadyModelAndSetsItUpright) {
     truth.push_back(given.views[i].world_from_camera);
     EXPECT_EQ(prepared.views[i].image.u8, given.views[i].image.u8);
   }
-  const PoseComparison comparison = compare_poses(poses, truth);
+  const test::PoseComparison comparison = test::compare_poses(poses, truth);
   for (const double degrees : comparison.rotation_degrees) EXPECT_LT(degrees, 1e-6);
   for (const double error : comparison.centre_errors) EXPECT_LT(error, 1e-9);
   // The sample's cameras are level about Z, so Z stays up.

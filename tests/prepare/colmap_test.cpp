@@ -15,6 +15,7 @@
 #include "src/prepare/prepare.h"
 #include "src/sample/sample_scene.h"
 #include "tests/support/data.h"
+#include "tests/support/pose_comparison.h"
 
 namespace cnerf {
 namespace {
@@ -43,7 +44,7 @@ PrepareReport prepare(const fs::path& source, const fs::path& out, const Prepare
   return prepare_capture(source, out, options, {}, [](const std::string& line) { std::puts(line.c_str()); });
 }
 
-PoseComparison compare_with(const fs::path& truth_folder, const fs::path& prepared) {
+test::PoseComparison compare_with(const fs::path& truth_folder, const fs::path& prepared) {
   std::map<std::string, Affined> truth;
   for (const View& view : load_capture(truth_folder).views) {
     truth[fs::path(view.name).stem().string()] = view.world_from_camera;
@@ -53,7 +54,7 @@ PoseComparison compare_with(const fs::path& truth_folder, const fs::path& prepar
     found.push_back(view.world_from_camera);
     given.push_back(truth.at(fs::path(view.name).stem().string()));
   }
-  const PoseComparison out = compare_poses(found, given);
+  const test::PoseComparison out = test::compare_poses(found, given);
   std::printf("%zu views; largest differences: %.3f degrees, %.3f %% of the capture's size\n", found.size(),
               *std::ranges::max_element(out.rotation_degrees), 100 * *std::ranges::max_element(out.centre_errors));
   return out;
@@ -65,7 +66,7 @@ TEST(Colmap, FindsThePosesOfAFewSmallViews) {
   const test::TempDir folder;
   write_grey_copies(fox / "images", folder / "photos", 0.25, 12);
   EXPECT_EQ(prepare(folder / "photos", folder / "capture").registered, 12u);
-  const PoseComparison poses = compare_with(fox, folder / "capture");
+  const test::PoseComparison poses = compare_with(fox, folder / "capture");
   for (const double degrees : poses.rotation_degrees) EXPECT_LT(degrees, 2);
   for (const double error : poses.centre_errors) EXPECT_LT(error, 0.05);
 }
@@ -88,7 +89,7 @@ TEST(Colmap, FindsTheLensOfAnOrbit) {
   std::printf("focal lengths %.1f, %.1f; true %.1f\n", found.fx, found.fy, truth.fx);
   EXPECT_NEAR(found.fx / truth.fx, 1, 0.03);
   EXPECT_NEAR(found.fy / truth.fx, 1, 0.03);
-  const PoseComparison poses = compare_with(folder / "sample", folder / "capture");
+  const test::PoseComparison poses = compare_with(folder / "sample", folder / "capture");
   for (const double degrees : poses.rotation_degrees) EXPECT_LT(degrees, 1.5);
   for (const double error : poses.centre_errors) EXPECT_LT(error, 0.02);
 }
@@ -103,7 +104,7 @@ TEST(Colmap, FindsThePosesOfFox) {
   const PrepareReport report = prepare(folder / "photos", folder / "capture");
   std::printf("%.0f s\n", watch.seconds());
   EXPECT_EQ(report.registered, 50u);
-  const PoseComparison poses = compare_with(fox, folder / "capture");
+  const test::PoseComparison poses = compare_with(fox, folder / "capture");
   for (const double degrees : poses.rotation_degrees) EXPECT_LT(degrees, 0.5);
   for (const double error : poses.centre_errors) EXPECT_LT(error, 0.01);
 }

@@ -6,6 +6,7 @@
 
 #include "src/base/error.h"
 #include "src/base/rng.h"
+#include "tests/support/pose_comparison.h"
 
 namespace cnerf {
 namespace {
@@ -62,7 +63,8 @@ TEST(FitSimilarity, FindsWhatMadeThePoints) {
     const std::vector<Vec3d> source = random_points(rng, 3 + trial % 8);
     std::vector<Vec3d> target;
     for (const Vec3d& p : source) target.push_back(truth.point(p));
-    EXPECT_LT(distance(fit_similarity(source, target), truth), 1e-6) << trial;  // measured 5e-9, nearly collinear sets
+    EXPECT_LT(distance(test::fit_similarity(source, target), truth), 1e-6)
+        << trial;  // measured 5e-9, nearly collinear sets
   }
 }
 
@@ -73,7 +75,7 @@ TEST(FitSimilarity, PlanarPointsGiveARotationNotAMirror) {
   const Similarity truth = random_similarity(rng);
   std::vector<Vec3d> target;
   for (const Vec3d& p : source) target.push_back(truth.point(p));
-  const Similarity found = fit_similarity(source, target);
+  const Similarity found = test::fit_similarity(source, target);
   EXPECT_NEAR(found.rotation.determinant(), 1, kExact);
   EXPECT_LT(distance(found, truth), 1e-7);
 }
@@ -92,7 +94,7 @@ TEST(FitSimilarity, NoNearbySimilarityFitsNoisyPointsBetter) {
     }
     return sum;
   };
-  const Similarity best = fit_similarity(source, target);
+  const Similarity best = test::fit_similarity(source, target);
   for (int trial = 0; trial < 200; ++trial) {
     Similarity other = best;
     const Vec3d axis = normalized(Vec3d{0, 0, 1} + random_vector(rng) * 0.01);
@@ -105,7 +107,7 @@ TEST(FitSimilarity, NoNearbySimilarityFitsNoisyPointsBetter) {
 
 TEST(FitSimilarity, PointsOnALineAreRefused) {
   const std::vector<Vec3d> line = {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}};
-  EXPECT_THROW((void)fit_similarity(line, line), InputError);
+  EXPECT_THROW((void)test::fit_similarity(line, line), InputError);
 }
 
 TEST(SymmetricEigen, VectorsSolveTheEquation) {
@@ -132,7 +134,7 @@ TEST(RotationBetween, TurnsOneIntoTheOtherBySmallestAngle) {
     const Vec3d a = normalized(random_vector(rng)), b = normalized(random_vector(rng));
     const Mat3d r = rotation_between(a, b);
     EXPECT_LT(length(r * a - b), kExact);
-    EXPECT_NEAR(rotation_angle(r), std::acos(dot(a, b)), 1e-6);
+    EXPECT_NEAR(test::rotation_angle(r), std::acos(dot(a, b)), 1e-6);
   }
   const Mat3d half_turn = rotation_between({0, 0, 1}, {0, 0, -1});
   EXPECT_LT(length(half_turn * Vec3d{0, 0, 1} - Vec3d{0, 0, -1}), kExact);
@@ -146,12 +148,12 @@ TEST(ComparePoses, SeesATurnAndAShiftOfOneCamera) {
   const Similarity s = random_similarity(rng);
   std::vector<Affined> poses;
   for (const Affined& pose : truth) poses.push_back(s.pose(pose));
-  const PoseComparison same = compare_poses(poses, truth);
+  const test::PoseComparison same = test::compare_poses(poses, truth);
   for (const double degrees : same.rotation_degrees) EXPECT_LT(degrees, 1e-6);
   for (const double error : same.centre_errors) EXPECT_LT(error, 1e-9);
 
   poses[5].linear = rotation_between({0, 0, 1}, normalized(Vec3d{0, std::tan(0.05), 1})) * poses[5].linear;
-  EXPECT_NEAR(compare_poses(poses, truth).rotation_degrees[5], 0.05 * 180 / 3.14159265358979, 1e-6);
+  EXPECT_NEAR(test::compare_poses(poses, truth).rotation_degrees[5], 0.05 * 180 / 3.14159265358979, 1e-6);
 }
 
 }  // namespace

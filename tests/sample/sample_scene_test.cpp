@@ -9,11 +9,11 @@
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/capture/color_truth.h"
-#include "src/capture/exr_io.h"
 #include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
 #include "src/sample/scene.h"
 #include "tests/support/data.h"
+#include "tests/support/exr_channel.h"
 
 namespace cnerf {
 namespace {
@@ -59,7 +59,7 @@ TEST(SampleScene, SeedChangesTheSamplingOnly) {
   options.seed = 2;
   write_sample_scene(folder.path(), options);
   EXPECT_NE(read_binary_file(folder / "images/view_000.png"), read_binary_file(small_scene() / "images/view_000.png"));
-  EXPECT_EQ(read_exr_channel(folder / "depth/view_000.exr", "Z").width, kSmall.width);
+  EXPECT_EQ(test::read_exr_channel(folder / "depth/view_000.exr", "Z").width, kSmall.width);
 }
 
 TEST(SampleScene, LoadsAsACapture) {
@@ -89,7 +89,7 @@ TEST(SampleScene, GreyIsTheLuminanceOfItsColourTruth) {
 TEST(SampleScene, DepthsOfTwoViewsAgree) {
   const Capture capture = load_capture(small_scene());
   const auto depth_of = [](int view) {
-    return read_exr_channel(small_scene() / "depth" / ("view_00" + std::to_string(view) + ".exr"), "Z");
+    return test::read_exr_channel(small_scene() / "depth" / ("view_00" + std::to_string(view) + ".exr"), "Z");
   };
   // Neighbours on the orbit; a surface point of one, seen by the other, is at its depth or behind something.
   const View& from = capture.views[1];
@@ -132,7 +132,7 @@ TEST(SampleScene, DepthIsExactAlongTheOpticalAxis) {
 
 TEST(SampleScene, DepthOfPixelsAgreesWithAlpha) {
   const Capture capture = load_capture(small_scene());
-  const LinearImage depth = read_exr_channel(small_scene() / "depth/view_002.exr", "Z");
+  const test::ExrChannel depth = test::read_exr_channel(small_scene() / "depth/view_002.exr", "Z");
   const MonoImage& image = capture.views[2].image;
   for (std::size_t i = 0; i < image.pixel_count(); ++i) {
     // Samples are inside the pixel, depth is at its centre: only a pixel that is partly covered may go either way.
