@@ -110,7 +110,7 @@ void prepare_step(const PrepareJob& job, const Engines& engines, Observer& obser
     if (options.motion_masks && !record.contains("motion")) mask_motion(job.out, options.motion, engines, observer);
     return;
   }
-  prepare_capture(job.source, job.out, options.prepare, observer.progress_sink(),
+  prepare_capture(job.source, job.out, options.capture, observer.progress_sink(),
                   [&](const std::string& text) { observer.say(text); });
   if (options.motion_masks) mask_motion(job.out, options.motion, engines, observer);
   observer.wrote("contact sheet", job.out / "contact_sheet.png");
@@ -118,7 +118,7 @@ void prepare_step(const PrepareJob& job, const Engines& engines, Observer& obser
 }
 
 fs::path capture_of(const fs::path& source, const fs::path& run, Observer& observer) {
-  if (!needs_preparing(source)) return source;
+  if (!prepare::needs_preparing(source)) return source;
   fs::path folder = fs::absolute(run).lexically_normal();
   if (folder.filename().empty()) folder = folder.parent_path();
   const fs::path capture = folder.parent_path() / (folder.filename().string() + "-capture");

@@ -11,13 +11,13 @@
 namespace cnerf::pipeline {
 
 struct PrepareStepOptions {
-  PrepareOptions prepare;
-  bool motion_masks = false;  ///< find what moves, by a quick fit, and mask it
+  prepare::PrepareOptions capture;  ///< how it is made
+  bool motion_masks = false;        ///< find what moves, by a quick fit, and mask it
   MotionMaskOptions motion;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
-    prepare.visit(v);
+    capture.visit(v);
     v("motion_masks", motion_masks, "find what moves by a quick fit of the scene, and leave it out");
     motion.visit(v);
   }

@@ -8,7 +8,7 @@
 #include "src/base/check.h"
 #include "src/base/statistics.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 constexpr double kStillBelow = 0.005;  ///< of the diagonal
@@ -147,4 +147,4 @@ MotionVerdict judge_motion(const std::vector<cv::Point2f>& before, const std::ve
   return out;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

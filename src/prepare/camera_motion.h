@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 enum class Motion {
   kStill,     ///< nothing moved to speak of
@@ -24,4 +24,4 @@ struct MotionVerdict {
 [[nodiscard]] MotionVerdict judge_motion(const std::vector<cv::Point2f>& before, const std::vector<cv::Point2f>& after,
                                          cv::Size picture);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

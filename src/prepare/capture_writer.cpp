@@ -13,7 +13,7 @@
 #include "src/picture/encode.h"
 #include "src/prepare/grey_image.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace fs = std::filesystem;
 namespace {
 
@@ -199,4 +199,4 @@ void write_contact_sheet(const fs::path& file, const fs::path& capture, const st
   write_png(file, sheet);
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -10,7 +10,7 @@
 #include "src/prepare/photographs.h"
 #include "src/prepare/upright.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 /// transforms.json of views whose `name` is a file below `images/`, in the frame of their poses. Reading it back with
 /// `load_capture` gives the same cameras.
@@ -26,4 +26,4 @@ void write_contact_sheet(const std::filesystem::path& file, const std::filesyste
                          const std::vector<View>& views, const std::vector<Vec3d>& points,
                          const std::optional<SubjectBox>& subject);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -22,7 +22,7 @@
 #include "src/prepare/grey_image.h"
 #include "src/prepare/image_pairs.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace fs = std::filesystem;
 namespace {
 
@@ -462,4 +462,4 @@ PoseRecovery recover_poses(const std::vector<PreparedImage>& images, const fs::p
   return out;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

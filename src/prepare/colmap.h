@@ -10,7 +10,7 @@
 #include "src/base/progress.h"
 #include "src/prepare/photographs.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 struct PoseOptions {
   std::string colmap = "colmap";  ///< program
@@ -60,4 +60,4 @@ struct PoseRecovery {
 /// @param images  in all, for the last.  Public for its test.
 [[nodiscard]] double share_in_log(std::string_view log, std::size_t images);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 using Bytes = std::span<const std::byte>;
@@ -112,4 +112,4 @@ double focal_pixels(const ExifFacts& exif, int longer_side) {
   return exif.focal_35mm > 0 ? exif.focal_35mm / 36.0 * longer_side : 0;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 struct ExifFacts {
   int orientation = 1;    ///< 1 to 8, as EXIF numbers them: how stored pixels have to be turned to stand upright
@@ -21,4 +21,4 @@ struct ExifFacts {
 /// Focal length in pixels of an image whose longer side is `longer_side` pixels; 0 when the notes do not tell it.
 [[nodiscard]] double focal_pixels(const ExifFacts& exif, int longer_side);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

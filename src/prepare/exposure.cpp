@@ -10,7 +10,7 @@
 #include "src/capture/byte_reader.h"
 #include "src/capture/image_io.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace fs = std::filesystem;
 namespace {
 
@@ -250,4 +250,4 @@ std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, con
   return spread;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

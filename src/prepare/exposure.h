@@ -9,7 +9,7 @@
 
 #include "src/prepare/photographs.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 /// The light a view shows of a place.
 struct Sighting {
@@ -53,4 +53,4 @@ inline constexpr double kNotedExposure = 0.02;
 std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, const std::filesystem::path& capture,
                                          const std::filesystem::path& model, bool with_haze);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -10,7 +10,7 @@
 #include "src/color/colorspace_math.h"
 #include "src/prepare/grey_image.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 constexpr int kShortestShot = 5;
@@ -226,4 +226,4 @@ std::vector<int> choose_frames(const std::vector<FrameFacts>& frames, const Shot
   return chosen;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 /// What is kept of every frame.
 struct FrameFacts {
@@ -81,4 +81,4 @@ struct FilmMarks {
 [[nodiscard]] std::vector<int> choose_frames(const std::vector<FrameFacts>& frames, const Shot& shot,
                                              const std::vector<bool>& left_out, int count);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

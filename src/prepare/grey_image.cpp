@@ -7,7 +7,7 @@
 #include "src/base/check.h"
 #include "src/picture/picture.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 cv::Mat1b grey_codes(const LinearImage& luminance, float gain) {
   CNERF_CHECK_EQ(luminance.channels, 1);
@@ -38,4 +38,4 @@ cv::Mat1b reduced_to(const cv::Mat1b& picture, int longest) {
   return out;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -6,7 +6,7 @@
 
 #include "src/capture/image_io.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 /// sRGB codes of a luminance image times `gain`, clamped to 8 bits.
 [[nodiscard]] cv::Mat1b grey_codes(const LinearImage& luminance, float gain = 1);
@@ -18,4 +18,4 @@ namespace cnerf {
 /// Reduced by area averaging until the longer side is at most `longest`; the picture itself if it is.
 [[nodiscard]] cv::Mat1b reduced_to(const cv::Mat1b& picture, int longest);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -8,7 +8,7 @@
 
 #include "src/prepare/grey_image.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 constexpr int kGrid = 4, kDirections = 8;
@@ -61,4 +61,4 @@ std::vector<std::pair<int, int>> choose_pairs(const std::vector<LookVector>& loo
   return {pairs.begin(), pairs.end()};
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

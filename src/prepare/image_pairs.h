@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 /// What a picture looks like from afar: histograms of gradient directions on a 4 x 4 grid, of length 1.
 using LookVector = std::vector<float>;
@@ -22,4 +22,4 @@ struct PairOptions {
 [[nodiscard]] std::vector<std::pair<int, int>> choose_pairs(const std::vector<LookVector>& looks,
                                                             const PairOptions& options);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

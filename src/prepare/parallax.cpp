@@ -11,7 +11,7 @@
 #include "src/prepare/camera_motion.h"
 #include "src/prepare/grey_image.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace fs = std::filesystem;
 namespace {
 
@@ -119,4 +119,4 @@ ParallaxSurvey survey_parallax(const std::vector<PreparedImage>& images, const f
   return out;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -6,7 +6,7 @@
 
 #include "src/prepare/photographs.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 /// What pairs of photographs tell about how the camera moved between them.
 struct ParallaxSurvey {
@@ -22,4 +22,4 @@ struct ParallaxSurvey {
 [[nodiscard]] ParallaxSurvey survey_parallax(const std::vector<PreparedImage>& images,
                                              const std::filesystem::path& capture);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

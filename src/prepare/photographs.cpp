@@ -15,7 +15,7 @@
 #include "src/picture/encode.h"
 #include "src/prepare/grey_image.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace fs = std::filesystem;
 namespace {
 
@@ -303,4 +303,4 @@ PhotographSet import_photographs(const std::vector<fs::path>& files, const fs::p
   return set;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

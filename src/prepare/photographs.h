@@ -11,7 +11,7 @@
 #include "src/base/progress.h"
 #include "src/prepare/exif.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 /// How stored values become luminance.
 struct SensorOptions {
@@ -83,4 +83,4 @@ struct Upright {
   [[nodiscard]] std::size_t stored_index(int x, int y) const;
 };
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

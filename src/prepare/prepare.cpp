@@ -13,7 +13,7 @@
 #include "src/prepare/exposure.h"
 #include "src/prepare/parallax.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace fs = std::filesystem;
 namespace {
 
@@ -332,4 +332,4 @@ PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, c
   return {material.set.images.size(), poses.views.size()};
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

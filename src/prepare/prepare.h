@@ -14,7 +14,7 @@
 #include "src/prepare/upright.h"
 #include "src/prepare/video.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 struct PrepareOptions {
   std::string masks;         ///< folder, or one picture for all frames of a clip; empty: none
@@ -63,4 +63,4 @@ struct PrepareReport {
 PrepareReport prepare_capture(const std::filesystem::path& source, const std::filesystem::path& capture,
                               const PrepareOptions& options, const ProgressSink& progress, const Say& say);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 cv::Matx33d matx(const Mat3d& m) {
@@ -53,4 +53,4 @@ Mat3d rotation_between(Vec3d from, Vec3d to) {
   return out;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -3,7 +3,7 @@
 
 #include "src/base/vec3.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 /// `target = scale * rotation * source + translation`.
 struct Similarity {
@@ -32,4 +32,4 @@ struct SymmetricEigen {
 /// perpendicular axis where they are opposite.
 [[nodiscard]] Mat3d rotation_between(Vec3d from, Vec3d to);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -12,7 +12,7 @@
 #include "src/picture/encode.h"
 #include "src/prepare/grey_image.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace fs = std::filesystem;
 namespace {
 
@@ -100,4 +100,4 @@ PhotographSet import_spikes(const fs::path& stream, const fs::path& capture, con
   return set;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -12,7 +12,7 @@
 #include "src/capture/image_io.h"
 #include "src/prepare/photographs.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 struct SpikeOptions {
   int spike_width = 0, spike_height = 0;  ///< pixels; a stream does not say
@@ -41,4 +41,4 @@ struct SpikeOptions {
 [[nodiscard]] PhotographSet import_spikes(const std::filesystem::path& stream, const std::filesystem::path& capture,
                                           const SpikeOptions& options, int count, const ProgressSink& progress);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -12,7 +12,7 @@
 #include "src/base/rng.h"
 #include "src/base/statistics.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -324,4 +324,4 @@ std::optional<SubjectBox> find_subject(const std::vector<View>& views, const std
   return out;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -11,7 +11,7 @@
 #include "src/capture/arrangement.h"
 #include "src/prepare/similarity.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 struct FrameOptions {
   std::string up = "auto";  ///< auto, cameras, none, or x,y,z in the frame of the poses
@@ -86,4 +86,4 @@ struct SubjectBox {
 };
 [[nodiscard]] std::optional<SubjectBox> find_subject(const std::vector<View>& views, const std::vector<Vec3d>& points);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -17,7 +17,7 @@
 #include "src/prepare/camera_motion.h"
 #include "src/prepare/grey_image.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace fs = std::filesystem;
 namespace {
 
@@ -398,4 +398,4 @@ ClipImport import_clip(const fs::path& file, const fs::path& capture, const fs::
   return out;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

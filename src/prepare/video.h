@@ -10,7 +10,7 @@
 #include "src/prepare/film.h"
 #include "src/prepare/photographs.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 
 struct VideoOptions {
   int shot = 0;     ///< 1 is the first; 0 = the longest in which the camera travels
@@ -80,4 +80,4 @@ struct ClipImport {
 /// The shots as lines for the user, each with its frames, seconds and what speaks against it.
 [[nodiscard]] std::vector<std::string> shot_lines(const ClipReport& report);
 
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -135,7 +135,7 @@ void write_capture(const Capture& capture, const fs::path& folder, const Options
     lens.cx -= kept.x, lens.cy -= kept.y, lens.width = kept.width, lens.height = kept.height;
     views.push_back(std::move(view));
   }
-  nlohmann::ordered_json transforms = cnerf::transforms_json(views, {}, std::nullopt);
+  nlohmann::ordered_json transforms = cnerf::prepare::transforms_json(views, {}, std::nullopt);
   const cnerf::Aabbd& box = *capture.bounds;
   transforms["aabb"] = {{box.min.x, box.min.y, box.min.z}, {box.max.x, box.max.y, box.max.z}};
   cnerf::write_file(folder / "transforms.json", transforms.dump(1) + "\n");

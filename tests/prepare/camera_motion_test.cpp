@@ -7,7 +7,7 @@
 #include "src/base/rng.h"
 #include "src/base/vec3.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 const cv::Size kPicture(640, 480);
@@ -95,4 +95,4 @@ TEST(CameraMotion, NothingMovedIsStill) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -12,8 +12,9 @@
 #include "src/color/colorspace_math.h"
 #include "src/picture/encode.h"
 #include "tests/support/data.h"
+#include "tests/support/pose_comparison.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 std::vector<View> views_of(LensModel model, bool two_cameras) {
@@ -65,7 +66,7 @@ TEST(CaptureWriter, WhatIsWrittenReadsBack) {
       for (std::size_t i = 0; i < views.size(); ++i) {
         EXPECT_EQ(capture.views[i].intrinsics, views[i].intrinsics);
         const Affined difference = capture.views[i].world_from_camera.inverse() * views[i].world_from_camera;
-        EXPECT_LT(rotation_angle(difference.linear) + length(difference.translation), 1e-12);
+        EXPECT_LT(test::rotation_angle(difference.linear) + length(difference.translation), 1e-12);
         const float light = linear_from_srgb(90 / 255.0f);
         EXPECT_NEAR(capture.views[i].image.luminance(5), light / (1 + 0.25 * double(i)), 1e-7);
         EXPECT_FALSE(capture.views[i].image.valid(0));
@@ -104,4 +105,4 @@ TEST(CaptureWriter, ContactSheetShowsTheBoxInTheViews) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

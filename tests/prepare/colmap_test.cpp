@@ -17,7 +17,7 @@
 #include "tests/support/data.h"
 #include "tests/support/pose_comparison.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 namespace fs = std::filesystem;
 
@@ -160,4 +160,4 @@ TEST(NoColmap, SaysHowToInstallItAndKeepsTheImages) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

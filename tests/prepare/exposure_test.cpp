@@ -7,7 +7,7 @@
 
 #include "src/base/rng.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 struct Problem {
@@ -89,4 +89,4 @@ TEST(Exposures, ViewsThatShareNothingKeepOne) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

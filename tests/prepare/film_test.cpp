@@ -8,7 +8,7 @@
 
 #include "src/base/rng.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 using testing::ElementsAre;
@@ -162,4 +162,4 @@ TEST(ChooseFrames, TakesTheSharpestOfEachWindow) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -8,7 +8,7 @@
 #include "src/base/rng.h"
 #include "src/prepare/colmap.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 cv::Mat1b lines_at(double angle) {
@@ -64,4 +64,4 @@ TEST(ColmapLog, TellsTheDoneShare) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

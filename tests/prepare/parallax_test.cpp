@@ -8,7 +8,7 @@
 
 #include "tests/support/data.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 namespace fs = std::filesystem;
 
@@ -83,4 +83,4 @@ TEST(Parallax, WithoutPairsThatTellNothingIsRefused) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -12,7 +12,7 @@
 #include "src/color/colorspace_math.h"
 #include "tests/support/data.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -229,4 +229,4 @@ TEST(Photographs, AFolderWithoutAnyIsRefused) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

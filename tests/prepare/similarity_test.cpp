@@ -8,7 +8,7 @@
 #include "src/base/rng.h"
 #include "tests/support/pose_comparison.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 constexpr double kExact = 1e-9;  // measured 1e-14; doubles, numbers of order 1 to 100
@@ -157,4 +157,4 @@ TEST(ComparePoses, SeesATurnAndAShiftOfOneCamera) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -11,7 +11,7 @@
 #include "src/color/colorspace_math.h"
 #include "tests/support/data.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 /// What a spike camera makes of constant light: it gathers, fires when full, and keeps the rest.
@@ -79,4 +79,4 @@ TEST(Spikes, AStreamBecomesPictures) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -8,7 +8,7 @@
 #include "src/base/error.h"
 #include "src/base/rng.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -264,4 +264,4 @@ TEST(Box, IsReadFromItsCornersInAnyOrder) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

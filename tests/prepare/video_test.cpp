@@ -15,7 +15,7 @@
 #include "src/base/vec3.h"
 #include "tests/support/data.h"
 
-namespace cnerf {
+namespace cnerf::prepare {
 namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -242,4 +242,4 @@ TEST_F(Clip, OtherFilesAreRefused) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::prepare

@@ -35,7 +35,7 @@ inline double rotation_angle(const Mat3d& r) {
 /// The similarity with the least squared distance of `target[i]` from the image of `source[i]` (Umeyama 1991).
 /// @param source, target  the same number of points, at least 3, not all on one line.
 /// @throws ContractError  on sizes.  @throws InputError  when the points determine no similarity.
-inline Similarity fit_similarity(std::span<const Vec3d> source, std::span<const Vec3d> target) {
+inline prepare::Similarity fit_similarity(std::span<const Vec3d> source, std::span<const Vec3d> target) {
   CNERF_CHECK_EQ(source.size(), target.size());
   CNERF_CHECK(source.size() >= 3, "a similarity takes three points");
   const Vec3d source_mean = mean_of(source), target_mean = mean_of(target);
@@ -57,7 +57,7 @@ inline Similarity fit_similarity(std::span<const Vec3d> source, std::span<const 
   // A reflection would fit better where the determinants differ: the weakest direction is turned round instead.
   const double handed = cv::determinant(u) * cv::determinant(vt) < 0 ? -1 : 1;
   const cv::Matx33d sign(1, 0, 0, 0, 1, 0, 0, 0, handed);
-  Similarity out;
+  prepare::Similarity out;
   out.rotation = mat3(u * sign * vt);
   out.scale = (singular(0) + singular(1) + handed * singular(2)) / variance;
   out.translation = target_mean - out.scale * (out.rotation * source_mean);
@@ -65,7 +65,7 @@ inline Similarity fit_similarity(std::span<const Vec3d> source, std::span<const 
 }
 
 struct PoseComparison {
-  Similarity truth_from_poses;
+  prepare::Similarity truth_from_poses;
   std::vector<double> rotation_degrees;  ///< by view
   std::vector<double> centre_errors;     ///< by view, over the diagonal of the true centres' bounding box
 };
