@@ -187,7 +187,7 @@ Cameras read_cameras_text(const fs::path& file) {
   return cameras;
 }
 
-/// Two lines an image: pose and name, then its observations, which may be empty and are not needed.
+/// Two lines per image: pose and name, then its observations, which may be empty and are not needed.
 std::vector<Registered> read_images_text(const fs::path& file) {
   std::vector<Registered> images;
   const std::vector<Line> lines = read_lines(file);

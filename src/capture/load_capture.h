@@ -9,10 +9,10 @@
 namespace cnerf {
 
 struct CaptureOptions {
-  int downscale = 1;              ///< divides image sizes; picks LLFF's images_N or resizes by area averaging
-  std::string transfer = "srgb";  ///< how grey values encode luminance
-  bool cut_out_of_black = true;   ///< what lies black around an object is nothing; see black_background.h
-  int holdout = 0;  ///< every N-th view of the sorted existing files is held out; 0 = the data set's split
+  int downscale = 1;
+  std::string transfer = "srgb";
+  bool cut_out_of_black = true;
+  int holdout = 0;
 
   template <typename Visitor>
   void visit(Visitor&& v) {

@@ -15,12 +15,12 @@ namespace {
 constexpr const char *kOwnMethod = "colornerf", *kOwnField = "positional-encoding";
 
 /// Mean of |difference| over views: views that are too colourful do not make up for those that are too grey.
-std::optional<double> colourfulness_gap(const Cell& cell) {
+std::optional<double> colorfulness_gap(const Cell& cell) {
   double sum = 0;
   int count = 0;
   for (const ViewMetrics& view : cell.metrics.views) {
-    if (!view.colourfulness_difference) continue;
-    sum += std::abs(*view.colourfulness_difference);
+    if (!view.colorfulness_difference) continue;
+    sum += std::abs(*view.colorfulness_difference);
     ++count;
   }
   return count > 0 ? std::optional(sum / count) : std::nullopt;
@@ -42,9 +42,9 @@ constexpr Column kColumns[] = {
      [](const Cell& c) { return c.metrics.mean.ssim_rgb; }},
     {"lpips", "LPIPS", -1, 3, "Zhang et al. 2018, version 0.1", [](const Cell& c) { return c.metrics.mean.lpips; }},
     {"colourfulness", "Colourful", 0, 2, "Hasler and Suesstrunk 2003",
-     [](const Cell& c) { return c.metrics.mean.colourfulness; }},
+     [](const Cell& c) { return c.metrics.mean.colorfulness; }},
     {"colourfulness_gap", "Δ Colourful", -1, 2, "mean over views of the absolute difference to the truth's",
-     colourfulness_gap},
+     colorfulness_gap},
     {"ab_error", "ab error", -1, 2, "mean Lab ab distance to the truth",
      [](const Cell& c) { return c.metrics.mean.ab_error; }},
     {"short_range", "Short", -1, 2, "cross-view consistency, neighbouring frames of the turntable: mean ab distance",

@@ -13,7 +13,7 @@ namespace {
 
 /// Pixels below this opacity have no colour of their own (design: the decode divides by opacity).
 constexpr float kColouredOpacity = 0.01f;
-/// Of views that are measured at the same time; each holds a hundred bytes a pixel meanwhile.
+/// Of views that are measured at the same time; each holds a hundred bytes per pixel meanwhile.
 constexpr std::size_t kPixelsAtATime = std::size_t(1) << 24;
 
 std::vector<float> channel(std::span<const float> rgb, int index) {
@@ -51,17 +51,17 @@ void measure_luminance(const EvaluatedView& pictures, ViewMetrics& metrics) {
 void measure_colour(const EvaluatedView& pictures, ViewMetrics& metrics) {
   const std::vector<std::uint8_t>& valid = pictures.view.image.mask;
   const std::vector<float>& ours = pictures.ours.rgb;
-  const Colourfulness colourful = colourfulness(srgb8_from_linear(ours), valid);
-  metrics.colourfulness = colourful.standard;
-  metrics.colourfulness_magnitude = colourful.magnitude;
+  const Colorfulness colorful = colorfulness(srgb8_from_linear(ours), valid);
+  metrics.colorfulness = colorful.standard;
+  metrics.colorfulness_magnitude = colorful.magnitude;
   if (!pictures.truth) return;
 
   const std::vector<float>& truth = pictures.truth->rgb;
-  const Colourfulness wanted = colourfulness(srgb8_from_linear(truth), valid);
-  metrics.colourfulness_truth = wanted.standard;
-  metrics.colourfulness_magnitude_truth = wanted.magnitude;
-  metrics.colourfulness_difference = colourful.standard - wanted.standard;
-  metrics.colourfulness_magnitude_difference = colourful.magnitude - wanted.magnitude;
+  const Colorfulness wanted = colorfulness(srgb8_from_linear(truth), valid);
+  metrics.colorfulness_truth = wanted.standard;
+  metrics.colorfulness_magnitude_truth = wanted.magnitude;
+  metrics.colorfulness_difference = colorful.standard - wanted.standard;
+  metrics.colorfulness_magnitude_difference = colorful.magnitude - wanted.magnitude;
   metrics.psnr_rgb = psnr_from_mse(encoded_mse(ours, truth, 3, valid));
   metrics.ssim_rgb = ssim_of_channels(encoded(ours), encoded(truth), pictures.ours.width, pictures.ours.height, valid);
   metrics.ab_error = mean_ab_distance(ours, truth, valid);

@@ -27,8 +27,8 @@ struct ViewMetrics {
   std::optional<double> ssim;            ///< of encoded luminance
   std::optional<double> ssim_rgb;        ///< mean of the three encoded channels
   std::optional<double> lpips;           ///< of 8-bit sRGB, where weights were given
-  std::optional<double> colourfulness, colourfulness_truth, colourfulness_difference;  ///< difference: ours - truth
-  std::optional<double> colourfulness_magnitude, colourfulness_magnitude_truth, colourfulness_magnitude_difference;
+  std::optional<double> colorfulness, colorfulness_truth, colorfulness_difference;  ///< difference: ours - truth
+  std::optional<double> colorfulness_magnitude, colorfulness_magnitude_truth, colorfulness_magnitude_difference;
   std::optional<double> ab_error;          ///< mean Lab ab distance to the truth
   std::optional<double> ab_error_grey;     ///< what an all-grey picture would get
   std::optional<double> bake_ab_distance;  ///< per-pixel decode against composited per-sample colour, opacity >= 0.01
@@ -46,12 +46,12 @@ struct ViewMetrics {
     visitor("ssim", self.ssim);
     visitor("ssim_rgb", self.ssim_rgb);
     visitor("lpips", self.lpips);
-    visitor("colourfulness", self.colourfulness);
-    visitor("colourfulness_truth", self.colourfulness_truth);
-    visitor("colourfulness_difference", self.colourfulness_difference);
-    visitor("colourfulness_magnitude", self.colourfulness_magnitude);
-    visitor("colourfulness_magnitude_truth", self.colourfulness_magnitude_truth);
-    visitor("colourfulness_magnitude_difference", self.colourfulness_magnitude_difference);
+    visitor("colourfulness", self.colorfulness);
+    visitor("colourfulness_truth", self.colorfulness_truth);
+    visitor("colourfulness_difference", self.colorfulness_difference);
+    visitor("colourfulness_magnitude", self.colorfulness_magnitude);
+    visitor("colourfulness_magnitude_truth", self.colorfulness_magnitude_truth);
+    visitor("colourfulness_magnitude_difference", self.colorfulness_magnitude_difference);
     visitor("ab_error", self.ab_error);
     visitor("ab_error_grey", self.ab_error_grey);
     visitor("bake_ab_distance", self.bake_ab_distance);

@@ -34,7 +34,7 @@ struct Moments {
   [[nodiscard]] double variance() const { return std::max(0.0, sum_of_squares / double(count) - mean() * mean()); }
 };
 
-double colourfulness_of(const Moments& rg, const Moments& yb) {
+double colorfulness_of(const Moments& rg, const Moments& yb) {
   return std::sqrt(rg.variance() + yb.variance()) + 0.3 * std::hypot(rg.mean(), yb.mean());
 }
 
@@ -143,7 +143,7 @@ std::optional<double> ssim(std::span<const float> ours, std::span<const float> t
   return similarity.mean();
 }
 
-Colourfulness colourfulness(std::span<const std::uint8_t> rgb, std::span<const std::uint8_t> valid) {
+Colorfulness colorfulness(std::span<const std::uint8_t> rgb, std::span<const std::uint8_t> valid) {
   Moments rg, yb, rg_magnitude, yb_magnitude;
   for (std::size_t pixel = 0; pixel < rgb.size() / 3; ++pixel) {
     if (!counts(valid, pixel)) continue;
@@ -154,7 +154,7 @@ Colourfulness colourfulness(std::span<const std::uint8_t> rgb, std::span<const s
     rg_magnitude.add(std::abs(red_green));
     yb_magnitude.add(std::abs(yellow_blue));
   }
-  return {colourfulness_of(rg, yb), colourfulness_of(rg_magnitude, yb_magnitude)};
+  return {colorfulness_of(rg, yb), colorfulness_of(rg_magnitude, yb_magnitude)};
 }
 
 double mean_ab_distance(std::span<const float> ours, std::span<const float> truth,

@@ -26,12 +26,12 @@ namespace cnerf {
                                          int height, std::span<const std::uint8_t> valid = {});
 
 /// Colourfulness (Hasler and Suesstrunk 2003), from 8-bit sRGB values.
-struct Colourfulness {
+struct Colorfulness {
   double standard = 0;   ///< with signed rg and yb, as published
   double magnitude = 0;  ///< with |rg| and |yb|, as the code of CT2 and ColorNeRF computes it
 };
 /// @param rgb  [N, 3] 8-bit sRGB.
-[[nodiscard]] Colourfulness colourfulness(std::span<const std::uint8_t> rgb, std::span<const std::uint8_t> valid = {});
+[[nodiscard]] Colorfulness colorfulness(std::span<const std::uint8_t> rgb, std::span<const std::uint8_t> valid = {});
 
 /// Mean Euclidean distance of Lab a and b.
 /// @param ours, truth  [N, 3] linear Rec.709; `truth` empty compares with grey, i.e. gives the mean chroma of `ours`.

@@ -1,6 +1,6 @@
 #pragma once
-/// How a camera moved between two pictures, from what stayed where: a camera that only turns or zooms sees no parallax,
-/// and no amount of such pictures tells depth.
+/// Motion of a camera between two pictures, judged by tracked places: a camera that only turns or zooms sees no
+/// parallax, and no amount of such pictures tells depth.
 
 #include <opencv2/core.hpp>
 #include <vector>

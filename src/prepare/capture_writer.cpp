@@ -124,9 +124,8 @@ class Plan {
   double scale_;
 };
 
-cv::Mat plan_of(const std::string& title, int across, int up, const Aabbd& shown, const std::vector<View>& views,
-                const std::vector<Vec3d>& points, const std::optional<SubjectBox>& subject) {
-  Plan plan(across, up, shown);
+cv::Mat drawn(Plan plan, const std::string& title, const std::vector<View>& views, const std::vector<Vec3d>& points,
+              const std::optional<SubjectBox>& subject) {
   for (const Vec3d& point : points) cv::circle(plan.picture, plan.at(point), 0, kPointColor, cv::FILLED);
   for (const View& view : views) {
     const Vec3d eye = view.world_from_camera.translation;
@@ -187,8 +186,8 @@ void write_contact_sheet(const fs::path& file, const fs::path& capture, const st
 
   Aabbd shown = subject ? subject->box : Aabbd::empty();
   for (const View& view : views) shown.grow(view.world_from_camera.translation);
-  const cv::Mat above = plan_of("from above (x, y)", 0, 1, shown, views, points, subject);
-  const cv::Mat side = plan_of("from the side (x, z)", 0, 2, shown, views, points, subject);
+  const cv::Mat above = drawn({0, 1, shown}, "from above (x, y)", views, points, subject);
+  const cv::Mat side = drawn({0, 2, shown}, "from the side (x, z)", views, points, subject);
 
   const int width = std::max(below.cols, 2 * kPlan + 3 * kGap);
   cv::Mat sheet(kPlan + kGap + below.rows, width, CV_8UC3, kBackground);

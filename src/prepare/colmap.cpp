@@ -375,7 +375,7 @@ fs::path free_lenses(Colmap& colmap, const fs::path& model, const std::vector<Pr
   return plausible ? adjusted : model;
 }
 
-/// Of the lines "Features: 4218" of the log, one an image.
+/// Of the lines "Features: 4218" of the log, one per image. Only the log tells them where no model was found.
 double median_features(const fs::path& log) {
   const std::string text = fs::exists(log) ? read_text_file(log) : "";
   std::vector<double> counts;

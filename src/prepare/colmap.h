@@ -13,14 +13,14 @@
 namespace cnerf::prepare {
 
 struct PoseOptions {
-  std::string colmap = "colmap";  ///< program
+  std::string colmap = "colmap";
   std::string matching = "auto";
   std::string camera_model = "OPENCV";
-  int exhaustive_up_to = 100;  ///< images
-  int neighbours = 10;         ///< images matched on each side, where not all pairs are
-  int alike = 20;              ///< images matched by look, where not all pairs are
-  int features = 8192;         ///< an image, at most
-  int longest_side = 1600;     ///< pixels at which features are looked for
+  int exhaustive_up_to = 100;
+  int neighbours = 10;
+  int alike = 20;
+  int features = 8192;
+  int longest_side = 1600;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -32,7 +32,7 @@ struct PoseOptions {
     v("exhaustive_up_to", exhaustive_up_to, Range{2, 10000}, "images up to which all pairs are matched");
     v("neighbours", neighbours, Range{1, 1000}, "images matched on each side, where not all pairs are");
     v("alike", alike, Range{0, 1000}, "images matched by look, where not all pairs are");
-    v("features", features, Range{100, 100000}, "features an image, at most");
+    v("features", features, Range{100, 100000}, "features per image, at most");
     v("longest_side", longest_side, Range{100, 20000}, "pixels at which features are looked for");
   }
 };
@@ -43,7 +43,7 @@ struct PoseRecovery {
   std::string matching;                  ///< what was chosen
   std::size_t pairs = 0;                 ///< matched
   double seconds = 0;
-  double median_features = 0;  ///< an image; few mean blur or bare surfaces
+  double median_features = 0;  ///< per image; few mean blur or bare surfaces
 };
 
 /// Extracts features, matches and maps. Works in `work`, which keeps the database, the models and `colmap.log`; what an

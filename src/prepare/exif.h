@@ -1,5 +1,5 @@
 #pragma once
-/// What a photograph's EXIF block says that poses need. Through libexif.
+/// EXIF notes of a photograph that help to find poses, read by libexif.
 
 #include <cstddef>
 #include <span>

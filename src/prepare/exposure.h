@@ -1,6 +1,6 @@
 #pragma once
-/// How much lighter or darker each view was taken than the others: shutter, iris, a flickering film. Told by what
-/// several views show of the same places.
+/// Relative exposures of the views, which differ by shutter, iris or the flicker of a film, estimated from places that
+/// several views show.
 
 #include <filesystem>
 #include <optional>

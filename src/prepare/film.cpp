@@ -44,7 +44,7 @@ cv::Mat1f normalised(const cv::Mat1b& picture, cv::Size size) {
 
 }  // namespace
 
-FrameFacts FrameObserver::look_at(const cv::Mat1b& frame) {
+FrameFacts FrameObserver::measure(const cv::Mat1b& frame) {
   FrameFacts facts;
   const cv::Mat1b small = reduced_to(frame, 320);
   facts.brightness = mean_linear(small);
@@ -135,7 +135,7 @@ bool has_scratch(const cv::Mat1b& frame) {
   return false;
 }
 
-void BorderFinder::look_at(const cv::Mat1b& frame) {
+void BorderFinder::add(const cv::Mat1b& frame) {
   cv::Mat1f values;
   frame.convertTo(values, CV_32F);
   if (sum_.empty()) {

@@ -1,6 +1,6 @@
 #pragma once
-/// What single frames and their order tell about a clip: cuts, repeated frames, interlacing, borders, and the marks of
-/// old film. Works on 8-bit grey frames; times are frame numbers.
+/// Analysis of the frames of a clip: cuts, repeated frames, interlacing, borders, and the marks of old film. Works on
+/// 8-bit grey frames; times are frame numbers.
 
 #include <opencv2/core.hpp>
 #include <vector>
@@ -22,7 +22,7 @@ struct FrameFacts {
 /// Looks at frames one after another.
 class FrameObserver {
  public:
-  [[nodiscard]] FrameFacts look_at(const cv::Mat1b& frame);
+  [[nodiscard]] FrameFacts measure(const cv::Mat1b& frame);
 
  private:
   cv::Mat1b small_before_;
@@ -56,7 +56,7 @@ struct Shot {
 /// Collects what never changes at the edges.
 class BorderFinder {
  public:
-  void look_at(const cv::Mat1b& frame);
+  void add(const cv::Mat1b& frame);
   /// The picture without bars that are uniform and unchanged throughout; all of it where there are none, or where less
   /// than a quarter would be left.
   [[nodiscard]] cv::Rect picture() const;

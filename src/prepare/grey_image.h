@@ -1,5 +1,5 @@
 #pragma once
-/// Eight-bit grey pictures for looking at: what frames, features and contact sheets are judged and drawn by. OpenCV's
+/// Eight-bit grey pictures, by which frames are judged, features found and contact sheets drawn. OpenCV's
 /// type, since all that is done with them is OpenCV's.
 
 #include <opencv2/core.hpp>

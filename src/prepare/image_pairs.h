@@ -1,6 +1,6 @@
 #pragma once
-/// Which pairs of images are worth matching when there are too many for all of them: neighbours in order, and those
-/// that look alike. No vocabulary file is needed.
+/// Selection of image pairs to match where there are too many for all of them: neighbours in order, and pairs that look
+/// alike. No vocabulary file is needed.
 
 #include <opencv2/core.hpp>
 #include <string>

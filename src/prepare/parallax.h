@@ -1,5 +1,5 @@
 #pragma once
-/// Whether a set of photographs can tell depth at all: looked at before hours are spent on finding poses.
+/// Survey of parallax among photographs: whether they can tell depth at all, before hours are spent on finding poses.
 
 #include <filesystem>
 #include <vector>

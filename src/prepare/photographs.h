@@ -15,9 +15,9 @@ namespace cnerf::prepare {
 
 /// How stored values become luminance.
 struct SensorOptions {
-  std::string transfer = "srgb";  ///< of the source
-  double black_level = 0;         ///< code that means no light
-  double white_level = 0;         ///< code that means 1; 0 = the largest of the file's depth
+  std::string transfer = "srgb";
+  double black_level = 0;
+  double white_level = 0;
 
   template <typename Visitor>
   void visit(Visitor&& v) {

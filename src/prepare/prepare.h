@@ -17,10 +17,10 @@
 namespace cnerf::prepare {
 
 struct PrepareOptions {
-  std::string masks;         ///< folder, or one picture for all frames of a clip; empty: none
-  std::string colmap_model;  ///< a ready model; empty: made by COLMAP
-  bool no_exposure = false;  ///< take all views as equally exposed
-  bool haze = false;         ///< besides exposures, estimate light that lies over each view
+  std::string masks;
+  std::string colmap_model;
+  bool no_exposure = false;
+  bool haze = false;
   SensorOptions sensor;
   VideoOptions video;
   SpikeOptions spikes;

@@ -1,6 +1,6 @@
 #pragma once
-/// Streams of spike cameras: one bit a pixel and tick, 1 where the pixel had gathered a full measure of light (Huang et
-/// al. 2022). A window of ticks becomes a picture.
+/// Streams of spike cameras: one bit per pixel and tick, 1 where the pixel had gathered a full measure of light (Huang
+/// et al. 2022). A window of ticks becomes a picture.
 
 #include <cstddef>
 #include <filesystem>
@@ -15,8 +15,8 @@
 namespace cnerf::prepare {
 
 struct SpikeOptions {
-  int spike_width = 0, spike_height = 0;  ///< pixels; a stream does not say
-  int spike_window = 64;                  ///< ticks gathered to a picture
+  int spike_width = 0, spike_height = 0;
+  int spike_window = 64;
   bool spike_flip = false;
 
   template <typename Visitor>

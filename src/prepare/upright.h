@@ -1,6 +1,6 @@
 #pragma once
-/// Which way is up, how large a unit is and where the subject lies: one similarity from COLMAP's frame, which has none
-/// of these, to the capture's, which is Z-up.
+/// The frame of a prepared capture: Z-up, with a unit and the subject near the origin. One similarity leads there from
+/// COLMAP's frame, which has none of these.
 
 #include <optional>
 #include <string>
@@ -14,15 +14,15 @@
 namespace cnerf::prepare {
 
 struct FrameOptions {
-  std::string up = "auto";  ///< auto, cameras, none, or x,y,z in the frame of the poses
-  double scale = 0;         ///< capture units a unit of the poses; 0 = cameras' mean distance to the subject becomes 1
-  std::string measure;      ///< "x1,y1,view1 x2,y2,view2 = 1.2m"
-  std::string box;          ///< "x,y,z x,y,z": two corners in the frame of the capture; empty: found
+  std::string up = "auto";
+  double scale = 0;
+  std::string measure;
+  std::string box;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("up", up, "which way is up: auto, cameras, none, or x,y,z in the frame of the poses");
-    v("scale", scale, Range{0, 1e12}, "units of the capture a unit of the poses; 0 = cameras are 1 from the subject");
+    v("scale", scale, Range{0, 1e12}, "units of the capture per unit of the poses; 0 = cameras are 1 from the subject");
     v("measure", measure,
       "a known length, 'x1,y1,view1 x2,y2,view2 = 1.2m' in pixels of the prepared images; the scene is then in metres");
     v("box", box, "the subject's box, 'x,y,z x,y,z' in units of the capture, instead of the one that is found");

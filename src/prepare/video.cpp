@@ -78,7 +78,7 @@ cv::Mat1b evened_out(const cv::Mat1b& picture, cv::Mat1b& textured) {
 /// Follows places through a shot and judges pairs of frames between which they moved enough.
 class MotionObserver {
  public:
-  void look_at(const cv::Mat1b& frame) {
+  void follow(const cv::Mat1b& frame) {
     const cv::Mat1b small = evened_out(reduced_to(frame, kTrackedWidth), textured_);
     if (!before_.empty() && !here_.empty()) follow(small);
     before_ = small;
@@ -167,13 +167,13 @@ Survey survey(const fs::path& file, const ProgressSink& progress) {
   for (cv::Mat frame; clip.read(frame);) {
     if (interruption_requested()) throw Interrupted("stopped while reading the clip");
     const cv::Mat1b grey = grey_of(frame);
-    out.frames.push_back(observer.look_at(grey));
-    borders.look_at(grey);
+    out.frames.push_back(observer.measure(grey));
+    borders.add(grey);
     if (out.frames.back().likeness < kSurelyNoCut && !out.verdicts.empty()) {
       motion.cut();
       out.verdicts.back() = motion.taken(std::move(out.verdicts.back()));
     }
-    motion.look_at(grey);
+    motion.follow(grey);
     out.verdicts.push_back(motion.taken({}));
     if (progress) progress({"clip", 0.8 * std::min(1.0, double(out.frames.size()) / expected), {}});
   }
@@ -244,13 +244,12 @@ cv::Mat1b kept_part(const cv::Mat1b& frame, const ClipReport& report) {
   return field;
 }
 
-PreparedImage describe(const ClipReport& report, const cv::Mat1b& picture, int frame, double sharpness) {
+PreparedImage describe(const ClipReport& report, const cv::Mat1b& picture, int frame) {
   PreparedImage image;
   image.name = fmt::format("frame_{:06}.png", frame);
   image.width = picture.cols;
   image.height = picture.rows;
   image.frame = frame;
-  image.sharpness = sharpness;
   image.uncropped = std::max(report.width, report.height);
   image.pixel_aspect = report.pixel_aspect * (report.interlaced ? 0.5 : 1);
   // The optical axis goes through the middle of the frame as it was stored, wherever borders were cut.
@@ -299,11 +298,10 @@ class FrameMasks {
   int used_ = 0;
 };
 
-void write_frames(const fs::path& file, const fs::path& capture, const fs::path& masks, const VideoOptions& options,
-                  const SensorOptions& sensor, const Survey& clip, ClipImport& out, const ProgressSink& progress) {
+/// @param table  codes of a decoded frame -> sRGB codes
+void write_frames(const fs::path& file, const fs::path& capture, FrameMasks& masks, const cv::Mat1b& table,
+                  ClipImport& out, const ProgressSink& progress) {
   cv::VideoCapture frames = open_clip(file);
-  const cv::Mat1b table = code_table(options, sensor);
-  FrameMasks frame_masks(masks, capture, out.report);
   std::size_t next = 0;
   const std::vector<int>& kept = out.report.kept;
   for (int number = 0; next < kept.size() && frames.grab(); ++number) {
@@ -312,16 +310,15 @@ void write_frames(const fs::path& file, const fs::path& capture, const fs::path&
     if (!frames.retrieve(frame)) break;
     cv::Mat1b codes;
     cv::LUT(kept_part(grey_of(frame), out.report), table, codes);
-    PreparedImage image = describe(out.report, codes, number, clip.frames[std::size_t(number)].sharpness);
+    PreparedImage image = describe(out.report, codes, number);
     image.source = file;
-    image.mask = frame_masks.of(image.name);
+    image.mask = masks.of(image.name);
     write_png(capture / "images" / image.name, codes);
     out.set.images.push_back(std::move(image));
     ++next;
     if (progress) progress({"clip", 0.8 + 0.2 * double(next) / double(kept.size()), {}});
     if (interruption_requested()) throw Interrupted("stopped while writing frames");
   }
-  if (!out.set.images.empty()) frame_masks.check_used(masks, out.set.images.front().name);
 }
 
 }  // namespace
@@ -391,7 +388,10 @@ ClipImport import_clip(const fs::path& file, const fs::path& capture, const fs::
   const double seconds = shot.range.size() / (report.fps > 0 ? report.fps : 24);
   const int count = options.fps > 0 ? std::max(2, int(std::lround(seconds * options.fps))) : options.frames;
   report.kept = choose_frames(clip.frames, shot.range, find_duplicates(clip.frames, shot.range), count);
-  write_frames(file, capture, masks, options, sensor, clip, out, progress);
+  FrameMasks frame_masks(masks, capture, report);
+  write_frames(file, capture, frame_masks, code_table(options, sensor), out, progress);
+  for (PreparedImage& image : out.set.images) image.sharpness = clip.frames[std::size_t(image.frame)].sharpness;
+  if (!out.set.images.empty()) frame_masks.check_used(masks, out.set.images.front().name);
   if (out.set.images.size() < 2) {
     throw InputError(file, "frames", fmt::format("expected at least 2 to keep, found {}", out.set.images.size()));
   }

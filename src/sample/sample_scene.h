@@ -11,9 +11,9 @@ namespace cnerf {
 
 struct SampleSceneOptions {
   int views = 40;
-  std::string path = "around";    ///< around: by the golden angle, any number evenly; orbit: one turn, view after view
-  int width = 320, height = 240;  ///< pixels
-  int samples_per_pixel = 16;     ///< a square number; stratified
+  std::string path = "around";
+  int width = 320, height = 240;
+  int samples_per_pixel = 16;
   int seed = 1;
 
   template <typename Visitor>

@@ -23,9 +23,9 @@ Cell cell(const std::string& capture, const std::string& method, int seed, doubl
   view.view = "v<1>";
   view.psnr_rgb = psnr;
   view.lpips = lpips;
-  view.colourfulness_difference = -3;
+  view.colorfulness_difference = -3;
   ViewMetrics other = view;
-  other.colourfulness_difference = 5;
+  other.colorfulness_difference = 5;
   made.metrics.split = "held-out";
   made.metrics.colorizer = "simulated:";
   made.metrics.mean = mean_of({view, other});

@@ -46,7 +46,7 @@ TEST(Evaluate, AGreySceneHasNumbersOfLuminanceOnly) {
       PaintedScene(linear_from_srgb(0.3f), false).render(capture.views[0].intrinsics, {}, {.color = false});
   const ViewMetrics metrics = measure({capture.views[0], ours, std::nullopt});
   EXPECT_NEAR(metrics.psnr_luminance.value(), 20.0, 1e-4) << "0.3 against 0.2";
-  EXPECT_FALSE(metrics.colourfulness.has_value());
+  EXPECT_FALSE(metrics.colorfulness.has_value());
   EXPECT_FALSE(metrics.ab_error.has_value());
 }
 
@@ -61,7 +61,7 @@ TEST(Evaluate, AColouredSceneIsComparedWithTruthAndBake) {
   EXPECT_NEAR(metrics.ab_error.value(), 0, 1e-9);
   EXPECT_GT(metrics.ab_error_grey.value(), 20) << "red is far from grey";
   EXPECT_NEAR(metrics.bake_ab_distance.value(), metrics.ab_error_grey.value(), 1e-3) << "the bake is grey";
-  EXPECT_NEAR(metrics.colourfulness_difference.value(), 0, 1e-9);
+  EXPECT_NEAR(metrics.colorfulness_difference.value(), 0, 1e-9);
 }
 
 TEST(Evaluate, MaskedPixelsDoNotCount) {

@@ -73,25 +73,25 @@ TEST(Ssim, NeedsAWindowThatFitsAndCounts) {
   EXPECT_FALSE(ssim(small, small, 10, 40).has_value());
 }
 
-TEST(ColourfulnessMetric, ClosedForms) {
+TEST(ColorfulnessMetric, ClosedForms) {
   // Half red, half green: rg = +-255 (deviation 255), yb = 127.5 (deviation 0).
   const std::vector<std::uint8_t> halves = {255, 0, 0, 0, 255, 0};
-  EXPECT_NEAR(colourfulness(halves).standard, 255 + 0.3 * 127.5, 1e-9);
-  EXPECT_NEAR(colourfulness(halves).magnitude, 0.3 * std::hypot(255, 127.5), 1e-9);
+  EXPECT_NEAR(colorfulness(halves).standard, 255 + 0.3 * 127.5, 1e-9);
+  EXPECT_NEAR(colorfulness(halves).magnitude, 0.3 * std::hypot(255, 127.5), 1e-9);
   const std::vector<std::uint8_t> grey = {7, 7, 7, 200, 200, 200};
-  EXPECT_EQ(colourfulness(grey).standard, 0);
-  EXPECT_EQ(colourfulness(grey).magnitude, 0);
+  EXPECT_EQ(colorfulness(grey).standard, 0);
+  EXPECT_EQ(colorfulness(grey).magnitude, 0);
 }
 
-TEST(ColourfulnessMetric, EqualsAnIndependentEvaluation) {
+TEST(ColorfulnessMetric, EqualsAnIndependentEvaluation) {
   std::vector<std::uint8_t> rgb;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       for (const int value : {x * 11, y * 13, x * y}) rgb.push_back(std::uint8_t(value % 256));
     }
   }
-  EXPECT_NEAR(colourfulness(rgb).standard, 125.63076180222536, 1e-6);
-  EXPECT_NEAR(colourfulness(rgb).magnitude, 100.5214370614793, 1e-6);
+  EXPECT_NEAR(colorfulness(rgb).standard, 125.63076180222536, 1e-6);
+  EXPECT_NEAR(colorfulness(rgb).magnitude, 100.5214370614793, 1e-6);
 }
 
 TEST(AbDistance, MatchesKnownLabValues) {

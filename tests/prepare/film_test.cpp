@@ -38,7 +38,7 @@ void add_grain(cv::Mat1b& frame, double codes, int seed) {
 std::vector<FrameFacts> facts_of(const std::vector<cv::Mat1b>& frames) {
   FrameObserver observer;
   std::vector<FrameFacts> facts;
-  for (const cv::Mat1b& frame : frames) facts.push_back(observer.look_at(frame));
+  for (const cv::Mat1b& frame : frames) facts.push_back(observer.measure(frame));
   return facts;
 }
 
@@ -112,7 +112,7 @@ TEST(Borders, LetterboxIsCut) {
     cv::Mat1b frame(240, 320, std::uint8_t(16));
     picture(1, 5 * i, 0, {320, 180}).copyTo(frame.rowRange(30, 210));
     add_grain(frame, 1, i);
-    borders.look_at(frame);
+    borders.add(frame);
   }
   const cv::Rect kept = borders.picture();
   EXPECT_EQ(kept.x, 0);
@@ -123,7 +123,7 @@ TEST(Borders, LetterboxIsCut) {
 
 TEST(Borders, APictureWithoutBarsStaysWhole) {
   BorderFinder borders;
-  for (int i = 0; i < 12; ++i) borders.look_at(picture(1, 5 * i));
+  for (int i = 0; i < 12; ++i) borders.add(picture(1, 5 * i));
   EXPECT_EQ(borders.picture(), cv::Rect(0, 0, 320, 240));
 }
 

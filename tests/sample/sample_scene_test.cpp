@@ -94,8 +94,8 @@ TEST(SampleScene, DepthsOfTwoViewsAgree) {
   // Neighbours on the orbit; a surface point of one, seen by the other, is at its depth or behind something.
   const View& from = capture.views[1];
   const View& to = capture.views[9];
-  const LinearImage from_depth = depth_of(1);
-  const LinearImage to_depth = depth_of(9);
+  const test::ExrChannel from_depth = depth_of(1);
+  const test::ExrChannel to_depth = depth_of(9);
   int agree = 0;
   int hidden = 0;
   int in_front = 0;
