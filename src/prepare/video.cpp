@@ -78,7 +78,7 @@ cv::Mat1b evened_out(const cv::Mat1b& picture, cv::Mat1b& textured) {
 /// Follows places through a shot and judges pairs of frames between which they moved enough.
 class MotionObserver {
  public:
-  void follow(const cv::Mat1b& frame) {
+  void add(const cv::Mat1b& frame) {
     const cv::Mat1b small = evened_out(reduced_to(frame, kTrackedWidth), textured_);
     if (!before_.empty() && !here_.empty()) follow(small);
     before_ = small;
@@ -173,7 +173,7 @@ Survey survey(const fs::path& file, const ProgressSink& progress) {
       motion.cut();
       out.verdicts.back() = motion.taken(std::move(out.verdicts.back()));
     }
-    motion.follow(grey);
+    motion.add(grey);
     out.verdicts.push_back(motion.taken({}));
     if (progress) progress({"clip", 0.8 * std::min(1.0, double(out.frames.size()) / expected), {}});
   }
