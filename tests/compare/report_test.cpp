@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "src/base/json_record.h"
-#include "src/base/program.h"
+#include "src/base/process.h"
 #include "src/compare/page.h"
 #include "src/compare/rating.h"
 #include "tests/support/data.h"
