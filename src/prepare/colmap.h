@@ -16,9 +16,9 @@ struct PoseOptions {
   std::string colmap = "colmap";
   std::string matching = "auto";
   std::string camera_model = "OPENCV";
-  int exhaustive_up_to = 100;
-  int neighbours = 10;
-  int alike = 20;
+  int exhaustive_up_to = 100;  // images up to which all pairs are matched
+  int neighbours = 10;         // images matched on each side, where not all pairs are
+  int alike = 20;              // images matched by look, where not all pairs are
   int features = 8192;
   int longest_side = 1600;
 
@@ -26,12 +26,9 @@ struct PoseOptions {
   void visit(Visitor&& v) {
     v("colmap", colmap, "the COLMAP program");
     v("matching", matching, Choice{"auto", "exhaustive", "guided", "sequential"},
-      "pairs to match: all; neighbours and those alike; neighbours. auto: all up to exhaustive_up_to, then guided");
+      "pairs to match: all; neighbours and those alike; neighbours. auto: all up to 100 images, then guided");
     v("camera_model", camera_model, Choice{"SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE"},
       "lens model to estimate");
-    v("exhaustive_up_to", exhaustive_up_to, Range{2, 10000}, "images up to which all pairs are matched");
-    v("neighbours", neighbours, Range{1, 1000}, "images matched on each side, where not all pairs are");
-    v("alike", alike, Range{0, 1000}, "images matched by look, where not all pairs are");
     v("features", features, Range{100, 100000}, "features per image, at most");
     v("longest_side", longest_side, Range{100, 20000}, "pixels at which features are looked for");
   }

@@ -16,7 +16,7 @@ namespace cnerf::prepare {
 
 struct SpikeOptions {
   int spike_width = 0, spike_height = 0;
-  int spike_window = 64;
+  int spike_window = 64;  // ticks that are gathered to a picture
   bool spike_flip = false;
 
   template <typename Visitor>
@@ -24,7 +24,6 @@ struct SpikeOptions {
     v("spike_width", spike_width, Range{0, 100000},
       "pixels across of a spike stream (.dat), which does not say itself");
     v("spike_height", spike_height, Range{0, 100000}, "pixels down of a spike stream");
-    v("spike_window", spike_window, Range{2, 100000}, "ticks of a spike stream that are gathered to a picture");
     v("spike_flip", spike_flip, "the stream's first row is the lowest");
   }
 };

@@ -15,14 +15,13 @@ namespace cnerf::prepare {
 
 struct FrameOptions {
   std::string up = "auto";
-  double scale = 0;
+  double scale = 0;  // capture units per unit of the poses; 0 = cameras are 1 from the subject
   std::string measure;
   std::string box;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("up", up, "which way is up: auto, cameras, none, or x,y,z in the frame of the poses");
-    v("scale", scale, Range{0, 1e12}, "units of the capture per unit of the poses; 0 = cameras are 1 from the subject");
     v("measure", measure,
       "a known length, 'x1,y1,view1 x2,y2,view2 = 1.2m' in pixels of the prepared images; the scene is then in metres");
     v("box", box, "the subject's box, 'x,y,z x,y,z' in units of the capture, instead of the one that is found");

@@ -364,7 +364,7 @@ ClipImport import_clip(const fs::path& file, const fs::path& capture, const fs::
   report.frames = int(clip.frames.size());
   report.width = clip.size.width;
   report.height = clip.size.height;
-  report.picture = options.keep_borders ? cv::Rect(0, 0, report.width, report.height) : clip.picture;
+  report.picture = clip.picture;
   const auto combed = std::ranges::count_if(clip.frames, [](const FrameFacts& f) { return f.comb > kCombed; });
   report.combed = double(combed) / report.frames;
   report.interlaced = report.combed > kInterlacedShare;

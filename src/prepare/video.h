@@ -17,17 +17,16 @@ struct VideoOptions {
   int frames = 60;
   double fps = 0;
   std::string video_range = "auto";
-  bool keep_borders = false;
   bool allow_no_parallax = false;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
-    v("shot", shot, Range{0, 100000}, "shot of a clip to use; 0 = the longest in which the camera travels");
+    v("shot", shot, Range{0, 100000},
+      "shot of a clip to use, 1 is the first; 0 = the longest in which the camera travels");
     v("frames", frames, Range{2, 10000}, "frames of a clip to keep, the sharpest of each window");
     v("fps", fps, Range{0, 1000}, "frames to keep per second, instead of a number; 0 = by number");
     v("video_range", video_range, Choice{"auto", "full", "limited"},
       "codes of black and white: as the clip says, 0 to 255, or 16 to 235 that the decoder did not expand");
-    v("keep_borders", keep_borders, "leave letterbox bars in the pictures");
     v("allow_no_parallax", allow_no_parallax,
       "go on with a shot, or photographs, between which the camera seems only to turn");
   }

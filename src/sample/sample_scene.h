@@ -19,11 +19,11 @@ struct SampleSceneOptions {
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("views", views, Range{2, 1000}, "camera positions");
-    v("path", path, Choice{"around", "orbit"}, "views spread all around, or one after another along a circle");
+    v("path", path, Choice{"around", "orbit"},
+      "views spread all around by the golden angle, or one after another along a circle");
     v("width", width, Range{16, 4096}, "pixels");
     v("height", height, Range{16, 4096}, "pixels");
     v("samples_per_pixel", samples_per_pixel, Range{1, 1024}, "square number of stratified samples");
-    v("seed", seed, Range{0, 1e9}, "seed of the sampling pattern");
   }
 };
 
