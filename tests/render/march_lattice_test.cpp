@@ -1,6 +1,6 @@
 // The lattice by number against the same lattice walked step by step.
 
-#include "src/render/march_lattice.h"
+#include "src/render/march.h"
 
 #include <gtest/gtest.h>
 
@@ -37,6 +37,55 @@ TEST(MarchLattice, EqualsAWalkThroughConstantGrowingAndConstantSteps) {
   MarchSettings other = settings;
   other.cone_angle *= 1.1f;
   EXPECT_NEAR(MarchLattice(other, 0.5f, 0).step(0.5f), 1.1f * MarchLattice(settings, 0.5f, 0).step(0.5f), 1e-6f);
+}
+
+TEST(MarchLattice, KnowsTheNumbersOfItsPoints) {
+  for (const int cascades : {1, 3}) {
+    const MarchSettings settings = march_settings(cascades, 256, 1.0 / 64);
+    const MarchLattice lattice(settings, 0.01f, 0.3f);
+    for (int index = 0; index < 400; ++index) {
+      const float t = lattice.t_at(index);
+      EXPECT_EQ(lattice.index_at(t + 0.5f * lattice.step(t)), index + 1);
+      EXPECT_EQ(lattice.index_at(t - 0.5f * lattice.step(t)), index);
+    }
+  }
+}
+
+TEST(RayMarcher, VisitsTheOccupiedPointsOfTheLattice) {
+  for (const int cascades : {1, 3}) {
+    OccupancyOptions options;
+    options.resolution = 32;
+    OccupancyGrid grid(options, cascades);
+    grid.update({1, 0, 7}, [](std::span<const Vec3f> points, std::span<float> sigma) {
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const bool in_ball = length(points[i] - Vec3f{0.45f, 0.5f, 0.62f}) < 0.2f;
+        sigma[i] = in_ball || points[i].x > 0.9f ? 1000.0f : 0.0f;
+      }
+    });
+    const MarchSettings settings = march_settings(cascades, 128, 1.0 / 64);
+    const Ray ray{{-0.3f, 0.41f, 0.5f}, normalized(Vec3f{1, 0.07f, 0.13f})};
+    const auto inside = intersect(Aabbf{{0, 0, 0}, {1, 1, 1}}, ray.origin, ray.direction);
+    ASSERT_TRUE(inside);
+    const MarchLattice lattice(settings, inside->begin, 0.6f);
+    RayMarcher marcher(grid, settings, ray, 0.6f);
+    RaySample sample;
+    int visited = 0, skipped = 0;
+    for (int index = 0; lattice.t_at(index) < inside->end; ++index) {
+      const float t = lattice.t_at(index);
+      const Vec3f p = ray.at(t);
+      if (!grid.occupied(grid.cascade_of(p), p)) {
+        ++skipped;
+        continue;
+      }
+      ASSERT_TRUE(marcher.next(sample)) << index;
+      EXPECT_EQ(sample.t, t);
+      EXPECT_EQ(sample.dt, lattice.step(t));
+      ++visited;
+    }
+    EXPECT_FALSE(marcher.next(sample));
+    EXPECT_GT(visited, 20);
+    EXPECT_GT(skipped, 20);
+  }
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 #include "src/base/cuda/warp.cuh"
 #include "src/render/cuda/ray_record.h"
-#include "src/render/march_lattice.h"
+#include "src/render/march.h"
 #include "src/render/occupancy_math.h"
 
 namespace cnerf {
