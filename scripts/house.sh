@@ -59,9 +59,9 @@ formula "Adam" 'sqrtf?\(second'
 formula "initial table" 'kInitialReach ='
 row "copies of formulas between processor and CUDA" $copies 1
 
-row "options" "$(grep -cE '^\| `[a-z0-9_]+(\.[a-z0-9_]+)*` \|' docs/configuration.md)" 123
+row "options" "$(grep -cE '^\| `[a-z0-9_]+(\.[a-z0-9_]+)*` \|' docs/configuration.md)" 116
 row "seeds in ASCII hex" "$(code '0x[67][0-9a-f]([2-7][0-9a-f])+u?ll\b' "${product[@]}")" 0
-row "process-global device" "$(code 'std::atomic<Device>' "${product[@]}")" 1
+row "process-global device" "$(code 'std::atomic<Device>' "${product[@]}")" 0
 row "is_photometric in src/train" "$(code '\bis_photometric\b' src/train)" 6
 row "core linking the comparison" "$(find src bake export viewer -name CMakeLists.txt ! -path 'src/app/*' ! -path 'src/compare/*' ! -path '*/node_modules/*' |
   xargs grep -l cnerf_compare | wc -l)" 0

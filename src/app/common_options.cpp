@@ -9,7 +9,7 @@
 #include "src/base/parallel.h"
 #include "src/base/text.h"
 #include "src/config/toml_binding.h"
-#include "src/engine/select_engine.h"
+#include "src/engine/engines.h"
 
 namespace cnerf::app {
 namespace {
@@ -115,7 +115,7 @@ void read_settings(const ConfigArguments& arguments, const std::vector<Field>& f
 
 void apply_config(const Config& config) {
   check_consistency(config);
-  select_engine_device(engines_for(config.device).device());
+  (void)engines_for(config.device);  // refuses a device that is not there
   set_thread_count(config.threads);
 }
 
