@@ -13,7 +13,6 @@ inline constexpr int kMaxGridLevels = 16;
 
 struct HashGridOptions {
   int levels = 8;
-  int features = 4;  // F, a 16-byte row, which the kernels are written for
   int log2_rows = 15;
   int coarsest_resolution = 16;
   int finest_resolution = 1024;

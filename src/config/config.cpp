@@ -32,6 +32,8 @@ const std::vector<RetiredKey>& retired_keys() {
       {"compare.style_steps", "", "160", kOfCompare},
       {"stage1.grid.features", "", "4", "a row has 4 features"},
       {"stage2.grid.features", "", "4", "a row has 4 features"},
+      {"stage1.occupancy.decay", "", "0.5", "it is a constant"},
+      {"stage1.occupancy.optical_thickness", "", "0.03", "it is a constant"},
       {"render.min_transmittance", "", "0.001", "it is a constant"},
       {"vdb.emission", "", "false", "multiply density and color where the volume is rendered"},
       {"vdb.normalize_density", "", "false", "divide by the manifest's max_density where the volume is read"},

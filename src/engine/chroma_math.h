@@ -56,8 +56,8 @@ CNERF_HD inline float spread_slope(float spread_weight, float scale) {
 /// a and in b, quadratic below a few units. The colorizer's training has the same term (colorizer_training/losses.h).
 inline constexpr float kSmoothMean = 10.0f;
 CNERF_HD inline float mean_cost(float d) {
-  const float far = std::abs(d);
-  return far < kSmoothMean ? 0.5f * d * d / kSmoothMean : far - 0.5f * kSmoothMean;
+  const float distance = std::abs(d);
+  return distance < kSmoothMean ? 0.5f * d * d / kSmoothMean : distance - 0.5f * kSmoothMean;
 }
 CNERF_HD inline float mean_slope(float d) {
   return d < -kSmoothMean ? -1.0f : d > kSmoothMean ? 1.0f : d / kSmoothMean;
@@ -94,8 +94,8 @@ CNERF_HD inline float label_gradient(float label, float scale) {
 
 /// What an ab distance of d costs.
 enum class AbLoss {
-  kHuber,    ///< d^2 below a few units, d above: what a few wrong pixels say hardly counts
-  kSquared,  ///< d^2, the photometric loss: the mean of what is said
+  kHuber,    ///< d^2 below a few units, d above: a few wrong pixels hardly count
+  kSquared,  ///< d^2, the photometric loss: its minimum is the mean of the targets
 };
 
 inline constexpr float kLogRatioLimit = 3.0f;   ///< chromaticity stays within e^-3 .. e^3: far beyond Rec.709

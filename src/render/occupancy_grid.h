@@ -15,15 +15,12 @@ namespace cnerf {
 
 struct OccupancyOptions {
   int resolution = 128;
-  float decay = 0.5f;
-  float optical_thickness = 0.03f;
+  float decay = 0.5f;               ///< share of a cell's remembered density that is left at each visit
+  float optical_thickness = 0.03f;  ///< of a cell, below which it counts as empty
 
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("resolution", resolution, Range{16, 512}, "cells along a side of a cascade; a multiple of 16");
-    v("decay", decay, Range{0, 1}, "share of a cell's remembered density that is left at each visit");
-    v("optical_thickness", optical_thickness, Range{0, 10},
-      "optical thickness of a cell below which it counts as empty");
   }
 };
 
@@ -70,7 +67,7 @@ class OccupancyGrid {
   OccupancyOptions options_;
   OccupancyLayout layout_;
   std::vector<float> density_;        ///< [cascades, R, R, R], sigma; x fastest; kExcludedCell where nothing can be
-  std::vector<std::uint64_t> bits_;   ///< one bit a cell, same order
+  std::vector<std::uint64_t> bits_;   ///< one bit per cell, same order
   std::vector<std::uint8_t> blocks_;  ///< [cascades, R/8, R/8, R/8], 1 = some cell is occupied
 };
 

@@ -10,7 +10,8 @@
 namespace cnerf {
 namespace {
 
-// Samples of pixels: a warp a pixel -----------------------------------------------------------------------------------
+// Samples of pixels, one warp per pixel
+// -----------------------------------------------------------------------------------
 
 constexpr int kPixelWarps = 8;
 

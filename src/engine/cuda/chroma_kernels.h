@@ -1,5 +1,5 @@
 #pragma once
-/// What stage 2 does with pixels on the GPU: composites what their samples say, compares it with what is wanted.
+/// Kernels of stage 2: compositing of the samples of pixels, losses and gradients.
 
 #include <cuda_runtime_api.h>
 
@@ -13,7 +13,7 @@
 
 namespace cnerf {
 
-/// PixelSamples (pixel_samples.h) in device memory.
+/// PixelSamples (color_engines.h) in device memory.
 struct PixelArrays {
   std::uint32_t pixels = 0;
   const Vec3f* positions = nullptr;
@@ -25,7 +25,7 @@ struct PixelArrays {
   float* shares = nullptr;   ///< w / A: of its pixel's features; 0 in pixels without colour
 };
 
-/// What a step is told and what it says, in device memory.
+/// Input and result of a step, in device memory.
 struct ChromaStep {
   AdamStep adam;
   std::uint32_t samples = 0;
@@ -34,7 +34,7 @@ struct ChromaStep {
 
 void prepare_samples(const PixelArrays& pixels, cudaStream_t stream);
 
-/// The linear head: 64 composited features and a constant to 313 logits. It works on 16 pixels a block.
+/// The linear head: 64 composited features and a constant to 313 logits. It works on 16 pixels per block.
 struct ChromaHeadJob {
   PixelArrays pixels;
   const std::uint32_t* features;  ///< [samples, 64] halves

@@ -50,16 +50,16 @@ struct HalfWarpRay {
 
 /// Writes the rays of the halves that have one and for which `ends`; those are free for others then. What is left of a
 /// ray that became opaque is taken to look like what was seen of it.
-__device__ void finish(HalfWarpRay& mine, bool ends, bool is_opaque, RayResult* results) {
-  ends = ends && mine.is_open;
-  const float luminance = warp_sum<kLanes>(mine.luminance), weighted_t = warp_sum<kLanes>(mine.weighted_t);
+__device__ void finish(HalfWarpRay& open_ray, bool ends, bool is_opaque, RayResult* results) {
+  ends = ends && open_ray.is_open;
+  const float luminance = warp_sum<kLanes>(open_ray.luminance), weighted_t = warp_sum<kLanes>(open_ray.weighted_t);
   if (!ends) return;
-  const float weight = 1.0f - expf(-mine.depth);
+  const float weight = 1.0f - expf(-open_ray.depth);
   if (threadIdx.x % kLanes == 0) {
-    results[mine.index] = {is_opaque ? luminance / weight : luminance, is_opaque ? 1.0f : weight,
-                           weight > 0 ? weighted_t / weight : 0.0f};
+    results[open_ray.index] = {is_opaque ? luminance / weight : luminance, is_opaque ? 1.0f : weight,
+                               weight > 0 ? weighted_t / weight : 0.0f};
   }
-  mine.is_open = false;
+  open_ray.is_open = false;
 }
 
 template <int KT>
@@ -77,47 +77,47 @@ __global__ void __launch_bounds__(kThreads, 2)
   // Neighbouring pixels go to one multiprocessor at about the same time: they look up the same cells.
   const std::uint32_t n_rays = job.state->rays, stride = gridDim.x * kWarps * kRaysOfWarp;
   std::uint32_t next = (blockIdx.x * kWarps + threadIdx.x / 32) * kRaysOfWarp + group;
-  HalfWarpRay mine;
+  HalfWarpRay open_ray;
   RaySample sample;
   bool is_done = false;
   while (true) {
     int count = 0;
     while (__any_sync(~0u, count == 0 && !is_done)) {
-      if (!mine.is_open && !is_done) {
+      if (!open_ray.is_open && !is_done) {
         is_done = next >= n_rays;
-        if (!is_done) mine.start(next, job.rays[next], space, job.march);
+        if (!is_done) open_ray.start(next, job.rays[next], space, job.march);
         next += stride;
       }
-      const bool wants = count == 0 && mine.is_open;
-      const int found = mine.marcher.next(sample, queue, wants);
+      const bool wants = count == 0 && open_ray.is_open;
+      const int found = open_ray.marcher.next(sample, queue, wants);
       if (wants) count = found;
-      finish(mine, count == 0, false, job.results);
+      finish(open_ray, count == 0, false, job.results);
     }
-    if (!__any_sync(~0u, mine.is_open)) break;
+    if (!__any_sync(~0u, open_ray.is_open)) break;
 
     uint2 directions[kRaysOfWarp];
 #pragma unroll
     for (int r = 0; r < kRaysOfWarp; ++r) {
-      directions[r] = job.directions[__shfl_sync(~0u, mine.index, r * kLanes)].share_of_lane();
+      directions[r] = job.directions[__shfl_sync(~0u, open_ray.index, r * kLanes)].share_of_lane();
     }
-    warp.encode(levels, job.field.table, in_box(mine.ray.at(sample.t)), lane);
+    warp.encode(levels, job.field.table, in_box(open_ray.ray.at(sample.t)), lane);
     __syncwarp();
     typename FieldNets<KT>::Geometry geometry;
     const float depth = density_from_raw(nets.density(warp, geometry), job.field.density_scale) * sample.dt;
     const bool is_sample = int(lane % kLanes) < count;
-    const RunOptics<kLanes> optics(mine.depth, is_sample ? depth : 0.0f);
+    const RunOptics<kLanes> optics(open_ray.depth, is_sample ? depth : 0.0f);
     const unsigned opaque = warp_ballot<kLanes>(optics.transmittance_after() < job.min_transmittance);
     const bool ends = opaque != 0 && __ffs(opaque) <= count;
     if (ends) count = __ffs(opaque);  // the sample at which the ray becomes opaque is the last one
     const float weight = int(lane % kLanes) < count ? optics.weight() : 0.0f;
     const bool is_seen = __any_sync(~0u, warp_sum<kLanes>(weight) > kLeastSeen);
     if (is_seen) {
-      mine.luminance += weight * job.field.activation.value(nets.luminance(warp, geometry, directions));
+      open_ray.luminance += weight * job.field.activation.value(nets.luminance(warp, geometry, directions));
     }
-    mine.weighted_t += weight * sample.t;
+    open_ray.weighted_t += weight * sample.t;
     const float through = optics.depth_at(max(count, 1) - 1);
-    if (count > 0) mine.depth = through;
-    finish(mine, ends, true, job.results);
+    if (count > 0) open_ray.depth = through;
+    finish(open_ray, ends, true, job.results);
     __syncwarp();
   }
 }

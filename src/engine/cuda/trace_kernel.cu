@@ -27,7 +27,7 @@ struct TraceShared {
 struct RunDistortion {
   Distortion<float> of_runs;  ///< weight and moment of the runs so far; of the value this lane's share
 
-  /// Adds a run, a sample a lane; returns the sums in front of this lane's sample.
+  /// Adds a run, one sample per lane; returns the sums in front of this lane's sample.
   __device__ Distortion<float> add(float w, const LogInterval<float>& at) {
     const float own = w * at.place, weight = warp_prefix_sum(w), moment = warp_prefix_sum(own);
     Distortion<float> before = {of_runs.weight + weight - w, of_runs.moment + moment - own, of_runs.value};
@@ -71,8 +71,7 @@ __device__ void keep_for_training(const SampleArrays& samples, const WarpField<K
   const unsigned lane = threadIdx.x % 32;
   ray.has_room = allocate_run(ray, count, samples.capacity, allocated);
   const std::uint32_t begin = __shfl_sync(~0u, ray.run_begin, ray.samples / 32);
-  const bool mine = int(lane) < count && begin + lane < samples.capacity;
-  if (mine) {
+  if (int(lane) < count && begin + lane < samples.capacity) {
     samples.places[begin + lane] = make_float4(place.x, place.y, place.z, __uint_as_float(ray_index));
     samples.gradients[begin + lane] = make_float2(depth, raw_luminance);
   }
@@ -96,28 +95,28 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
   const float scale = ray.has_room ? 1.0f / float(n_rays) : 0.0f;
   const RayGradient gradient(error, distortion, job.distortion_weight, scale);
   float distortion_behind = gradient.distortion_of_all();
-  RunDistortion again;
+  RunDistortion passed;
   float depth = 0, composited = 0;
   for (int first = 0; first < ray.samples; first += 32) {
     const std::uint32_t at = __shfl_sync(~0u, ray.run_begin, first / 32) + lane;
-    const bool mine = first + int(lane) < ray.samples && at < job.samples.capacity;
-    const float2 stored = mine ? job.samples.gradients[at] : make_float2(0, 0);
+    const bool has_sample = first + int(lane) < ray.samples && at < job.samples.capacity;
+    const float2 stored = has_sample ? job.samples.gradients[at] : make_float2(0, 0);
     const RunOptics<> optics(depth, stored.x);
     LitSample sample{1.0f, job.field.activation.value(stored.y), optics.weight(), optics.transmittance_after()};
     sample.composited = composited + warp_prefix_sum(sample.weight * sample.luminance);
     float d_depth = gradient.by_density(sample);
     if (job.distortion_weight > 0) {
-      const float4 place = mine ? job.samples.places[at] : make_float4(0, 0, 0, 0);
+      const float4 place = has_sample ? job.samples.places[at] : make_float4(0, 0, 0, 0);
       const float t = dot(Vec3f{place.x, place.y, place.z} - record.ray.origin, record.ray.direction);
       const LogInterval<float> interval(t, march_step(job.march, t));
-      const Distortion<float> before = again.add(sample.weight, interval);
+      const Distortion<float> before = passed.add(sample.weight, interval);
       const float slope = gradient.distortion_by_weight(sample.weight, interval, before);
       const float taken = warp_prefix_sum(sample.weight * slope);
       d_depth += gradient.by_density_of_distortion(sample, slope, distortion_behind - taken);
       distortion_behind -= __shfl_sync(~0u, taken, 31);
     }
     const float d_raw = gradient.by_luminance(sample) * job.field.activation.derivative(stored.y);
-    if (mine) job.samples.gradients[at] = make_float2(d_raw, stored.x * d_depth);
+    if (has_sample) job.samples.gradients[at] = make_float2(d_raw, stored.x * d_depth);
     depth = optics.depth_at(31);
     composited = __shfl_sync(~0u, sample.composited, 31);
   }

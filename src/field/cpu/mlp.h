@@ -30,7 +30,7 @@ class MlpCpu {
   void forward(const std::vector<Channels>& activations, std::size_t groups) const;
   /// @param gradients  layers() + 1 arrays beside the activations: the last one is given (behind its ReLU, if
   ///                   it has one, it must be zero where the activation is), the others are written;
-  ///                   [0] may have null data when nobody needs the input's gradient.
+  ///                   [0] may have null data where the input's gradient is not needed.
   /// @param d_weights  [weight_count], added to
   void backward(const std::vector<Channels>& activations, const std::vector<Channels>& gradients, std::size_t groups,
                 float* d_weights) const;

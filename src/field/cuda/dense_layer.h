@@ -37,7 +37,7 @@ struct TrainedWeights {
 struct DenseLayer {
   int inputs = 0, outputs = 0;                ///< of the floats
   int padded_inputs = 0, padded_outputs = 0;  ///< of the packed weights, and of the gradient
-  int backward_inputs = 0;                    ///< padded ones whose gradient somebody asks for
+  int backward_inputs = 0;                    ///< padded ones whose gradient is needed
   TrainedWeights trained;                     ///< [outputs, inputs]
   uint2* forward = nullptr;                   ///< [padded_inputs, padded_outputs] halves; null: not packed
   uint2* backward = nullptr;                  ///< [padded_outputs, backward_inputs] bfloat16

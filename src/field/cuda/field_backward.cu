@@ -14,7 +14,7 @@ namespace {
 // A weight gradient is shared out over the warps and stays in their registers until all tiles are done.
 constexpr int kWarps = 8;
 constexpr int kThreads = 32 * kWarps;
-constexpr int kTiles = 1;                    // of 16 rows a warp
+constexpr int kTiles = 1;                    // of 16 rows, per warp
 constexpr int kRows = 16 * kTiles * kWarps;  // of a block's tile
 constexpr int kWide = kHiddenWidth + 8;      // padded: 8 rows fall into different banks
 constexpr int kFeatureStride = 32 + 8;
@@ -37,6 +37,7 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
   using Shape = FieldShape<KT>;
   extern __shared__ uint4 memory[];
   auto& shared = *reinterpret_cast<BackwardShared<KT>*>(memory);
+  // Load the weights of both nets.
   for (unsigned i = threadIdx.x; i < Shape::kPacked; i += kThreads) {
     shared.forward[i] = job.nets.weights.forward[i];
     shared.backward[i] = job.nets.weights.backward[i];
@@ -58,6 +59,7 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
     std::uint32_t hidden_bits[kTiles], first_bits[kTiles];
     std::uint32_t d_second[kTiles][4][4];
     {
+      // Load this warp's rows: gradients of the nets' outputs, encoded positions, directions.
       std::uint32_t in[kTiles][KT][4], features[kTiles][2][4];
 #pragma unroll
       for (int m = 0; m < kTiles; ++m) {
@@ -74,6 +76,7 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
         }
         store_halves<16 * KT + 8, KT>(shared.encoded, 16 * (warp * kTiles + m), in[m]);
       }
+      // Forward through the density net and the luminance net's first layer.
       std::uint32_t hidden[kTiles][4][4];
       dense<Half, kTiles, KT, 4>(in, shared.forward + Shape::kPackedDensity1,
                                  [&](int m, int i, const float(&s)[2][4]) { pack_relu<Half>(s, hidden[m][i]); });
@@ -82,6 +85,7 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
       std::uint32_t first[kTiles][4][4];
       dense<Half, kTiles, 2, 4>(features, shared.forward + Shape::kPackedLuminance1,
                                 [&](int m, int i, const float(&s)[2][4]) { pack_relu<Half>(s, first[m][i]); });
+      // Share what the weight gradients need of all rows, and remember where ReLUs let through.
 #pragma unroll
       for (int m = 0; m < kTiles; ++m) {
         const int row = 16 * (warp * kTiles + m);
@@ -91,7 +95,8 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
         store_halves<kFeatureStride, 2>(shared.features, row, features[m]);
         store_halves<kWide, 4>(shared.first, row, first[m]);
       }
-      // The last layer has one output, so its gradients are products, not matrices.
+      // Forward through the second layer and backward through the last one. That has one output, so its gradients are
+      // products, not matrices.
       dense<Half, kTiles, 4, 4>(
           first, shared.forward + Shape::kPackedLuminance2, [&](int m, int i, const float(&s)[2][4]) {
 #pragma unroll
@@ -114,7 +119,7 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
     }
     __syncthreads();
 
-    // Luminance net, second layer.
+    // Backward through the luminance net's second layer.
     std::uint32_t d_first[kTiles][4][4];
     dense<Bfloat, kTiles, 4, 4>(d_second, shared.backward + Shape::kPackedLuminance2,
                                 [&](int m, int i, const float(&s)[2][4]) {
@@ -127,7 +132,8 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
     add_weight_gradient<kRows>(d_luminance2, shared.gradient[0], out, shared.first, 32 * part);
     __syncthreads();
 
-    // Luminance net, first layer; nothing is wanted of the direction. Log density joins the geometry's gradient.
+    // Backward through the luminance net's first layer, but not to the direction. The gradient of log density joins
+    // that of the geometry.
     std::uint32_t d_geometry[kTiles][1][4];
     dense<Bfloat, kTiles, 4, 1>(d_first, shared.backward + Shape::kPackedLuminance1,
                                 [&](int m, int, const float(&s)[2][4]) {
@@ -144,7 +150,7 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
     add_weight_gradient<kRows>(d_luminance1, shared.gradient[1], out, shared.features, 16 * part);
     __syncthreads();
 
-    // Density net, second layer.
+    // Backward through the density net's second layer.
     std::uint32_t d_hidden[kTiles][4][4];
     dense<Bfloat, kTiles, 1, 4>(d_geometry, shared.backward + Shape::kPackedDensity2,
                                 [&](int m, int i, const float(&s)[2][4]) {
@@ -157,7 +163,7 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
     add_weight_gradient<kRows>(d_density2, shared.gradient[0], 0, shared.hidden, 8 * warp);
     __syncthreads();
 
-    // Density net, first layer, and what the hash grid's levels receive.
+    // Backward through the density net's first layer, to the hash grid's levels.
     dense<Bfloat, kTiles, 4, KT>(
         d_hidden, shared.backward + Shape::kPackedDensity1, [&](int m, int i, const float(&s)[2][4]) {
           write_level_gradients(s, i, job.levels, sample[m], n, job.samples.most, job.d_encoded);
@@ -208,28 +214,31 @@ void field_backward(const FieldBackwardJob& job, cudaStream_t stream) {
 
 std::vector<DenseLayer> field_layers(int levels, const FieldParameters& p) {
   const int channels = 4 * levels;
-  const auto packed = [&](TrainedWeights trained, int inputs, int padded_inputs, int outputs, int backward_inputs,
-                          int first) {
-    return DenseLayer{inputs,  outputs,           padded_inputs,      outputs, backward_inputs,
-                      trained, p.forward + first, p.backward + first, nullptr};
-  };
-  DenseLayer last;
-  last.inputs = last.padded_inputs = kHiddenWidth;
-  last.outputs = last.padded_outputs = 1;
-  last.plain = p.last_layer;
   std::vector<DenseLayer> layers;
+  /// A packed layer whose inputs and outputs all count and are asked for in the backward pass.
+  const auto add = [&](TrainedWeights trained, int inputs, int outputs, int first_packed) -> DenseLayer& {
+    DenseLayer& layer = layers.emplace_back();
+    layer.inputs = layer.padded_inputs = layer.backward_inputs = inputs;
+    layer.outputs = layer.padded_outputs = outputs;
+    layer.trained = trained;
+    layer.forward = p.forward + first_packed;
+    layer.backward = p.backward + first_packed;
+    return layer;
+  };
   with_channel_tiles(levels, [&](auto tiles) {
     using Shape = FieldShape<decltype(tiles)::value>;
+    DenseLayer& encoding = add(p.density, channels, kHiddenWidth, Shape::kPackedDensity1);
+    encoding.padded_inputs = encoding.backward_inputs = Shape::kEncoded;
+    add(p.density.from(kHiddenWidth * channels), kHiddenWidth, kGeometryChannels, Shape::kPackedDensity2);
+    DenseLayer& features = add(p.luminance, Shape::kFeatures, kHiddenWidth, Shape::kPackedLuminance1);
+    features.backward_inputs = kGeometryChannels;  // the direction's gradient is not needed
+    add(p.luminance.from(kHiddenWidth * Shape::kFeatures), kHiddenWidth, kHiddenWidth, Shape::kPackedLuminance2);
+
+    DenseLayer& last = layers.emplace_back();
+    last.inputs = last.padded_inputs = kHiddenWidth;
+    last.outputs = last.padded_outputs = 1;
     last.trained = p.luminance.from(kHiddenWidth * (Shape::kFeatures + kHiddenWidth));
-    layers = {packed(p.density, channels, Shape::kEncoded, kHiddenWidth, Shape::kEncoded, Shape::kPackedDensity1),
-              packed(p.density.from(kHiddenWidth * channels), kHiddenWidth, kHiddenWidth, kGeometryChannels,
-                     kHiddenWidth, Shape::kPackedDensity2),
-              // Nobody asks for the gradient of the direction.
-              packed(p.luminance, Shape::kFeatures, Shape::kFeatures, kHiddenWidth, kGeometryChannels,
-                     Shape::kPackedLuminance1),
-              packed(p.luminance.from(kHiddenWidth * Shape::kFeatures), kHiddenWidth, kHiddenWidth, kHiddenWidth,
-                     kHiddenWidth, Shape::kPackedLuminance2),
-              last};
+    last.plain = p.last_layer;
   });
   return layers;
 }

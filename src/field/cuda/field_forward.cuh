@@ -1,5 +1,5 @@
 #pragma once
-/// Stage 1's field for 32 samples of a warp, one a lane: hash grid, density net, luminance net.
+/// Stage 1's field for 32 samples of a warp, one per lane: hash grid, density net, luminance net.
 
 #include "encoding/cuda/hash_grid_device.cuh"
 #include "src/base/vec3.h"
@@ -8,7 +8,7 @@
 
 namespace cnerf {
 
-/// The direction's part of the luminance net's input: 16 halves, two a word.
+/// The direction's part of the luminance net's input: 16 halves, two per word.
 struct alignas(16) DirectionCode {
   std::uint32_t pair[kSphericalHarmonics / 2];
 
@@ -36,7 +36,7 @@ inline constexpr int kWarpTiles = 2;
 template <int KT>
 struct WarpEncoding {
   static constexpr int kStride = 16 * KT + 8;  // padded: rows of 8 fall into different banks
-  alignas(16) __half encoded[32][kStride];     ///< a row a sample; channels behind the last level's must be zero
+  alignas(16) __half encoded[32][kStride];     ///< a row per sample; channels behind the last level's must be zero
 
   __device__ void clear(unsigned lane) {
     for (int c = 0; c < kStride; ++c) encoded[lane][c] = __half(0.0f);

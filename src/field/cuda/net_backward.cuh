@@ -1,6 +1,6 @@
 #pragma once
-/// What backward passes of nets share. Inputs and gradients of layers lie in shared memory as rows of bfloat16, a row a
-/// sample; a warp has its share of a weight gradient in registers.
+/// What backward passes of nets share. Inputs and gradients of layers lie in shared memory as rows of bfloat16, one row
+/// per sample; a warp has its share of a weight gradient in registers.
 
 #include "src/field/cuda/tensor_core.cuh"
 
@@ -16,7 +16,7 @@ __device__ void load_encoded(std::uint32_t (&operand)[KT][4], int half, const ui
     operand[k][half + 2] = row[8 * k + threadIdx.x % 4 + 4];
   }
 }
-/// Hands the hash grid's levels their share of a result's 16 columns from `16 tile` on: four channels a level.
+/// Hands the hash grid's levels their share of a result's 16 columns from `16 tile` on: four channels per level.
 /// @param sample     of rows g and g + 8; those from n on do not exist
 /// @param d_encoded  [levels, most, 4] of bfloat16
 __device__ inline void write_level_gradients(const float (&sums)[2][4], int tile, int levels,

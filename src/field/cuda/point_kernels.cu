@@ -134,8 +134,8 @@ __device__ void output_gradient(const PointBackwardJob& job, const std::uint32_t
                                 const std::uint32_t (&)[1][4][4], const uint2*, std::uint32_t (&d_outputs)[1][1][4]) {
 #pragma unroll
   for (int half = 0; half < 2; ++half) {
-    const bool mine = threadIdx.x % 4 == 0 && sample[half] < n;
-    const float2 d = mine ? job.d_numbers[sample[half]] : make_float2(0, 0);
+    const bool has_numbers = threadIdx.x % 4 == 0 && sample[half] < n;
+    const float2 d = has_numbers ? job.d_numbers[sample[half]] : make_float2(0, 0);
     d_outputs[0][0][half] = Bfloat::pack(d.x, d.y);
     d_outputs[0][0][half + 2] = 0;
   }

@@ -24,7 +24,7 @@ struct PointForwardJob {
   const uint2* weights;    ///< packed forward weights
   const Vec3f* positions;  ///< [count], unit space; clamped to [0, 1]
   std::uint32_t count;
-  uint4* encoded = nullptr;           ///< [count, 16 KT] halves, written; null: nobody needs them
+  uint4* encoded = nullptr;           ///< [count, 16 KT] halves, written where it is not null
   std::uint32_t* features = nullptr;  ///< [count, 64] halves, written by nets of features
   float2* numbers = nullptr;          ///< [count], written by nets of two numbers
 };

@@ -2,7 +2,7 @@
 /// The tensor cores' instructions, and what a lane of a warp holds of their operands.
 ///
 /// One instruction multiplies 16 samples x 16 inputs by 16 inputs x 8 outputs. With g = lane / 4 and t = lane % 4 a
-/// lane holds, two 16-bit numbers a register,
+/// lane holds, two 16-bit numbers per register,
 ///   of the left operand   rows g, g + 8, g, g + 8 at columns 2t, 2t + 1 (registers 0, 1) and 2t + 8, 2t + 9 (2, 3);
 ///   of the right operand  column g at rows 2t, 2t + 1 (register 0) and 2t + 8, 2t + 9 (1);
 ///   of the result         row g at columns 2t, 2t + 1 (floats 0, 1) and row g + 8 (2, 3).

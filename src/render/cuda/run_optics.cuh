@@ -6,7 +6,7 @@
 
 namespace cnerf {
 
-/// Optical depths of a run of samples, one a lane, and with them the light that comes through.
+/// Optical depths of a run of samples, one per lane, and with them the light that comes through.
 template <int kLanes = 32>
 struct RunOptics {
   float depth;          ///< sigma dt of this lane's sample; 0 where there is none

@@ -13,7 +13,7 @@ namespace cnerf {
 
 struct OccupiedSpace {
   OccupancyLayout layout;
-  const std::uint32_t* bits;  ///< one a cell
+  const std::uint32_t* bits;  ///< one per cell
 
   __device__ bool holds(Vec3f p) const {
     const std::size_t cell = layout.cell_of(layout.cascade_of(p), p);
@@ -35,7 +35,7 @@ class WarpMarcher {
   __device__ WarpMarcher(const OccupiedSpace& space, const MarchSettings& settings, const RayRecord& record)
       : lattice_(settings, record.begin, record.jitter), ray_(record.ray), end_(record.end), space_(&space) {}
 
-  /// Hands out the next samples of the ray, one a lane; returns how many there are, 0 at the ray's end.
+  /// Hands out the next samples of the ray, one per lane; returns how many there are, 0 at the ray's end.
   /// @param wanted  whether this lane's group wants any; the whole warp calls the function
   __device__ int next(RaySample& sample, MarchQueue& warp_queue, bool wanted = true) {
     const unsigned lane = threadIdx.x % kLanes;
