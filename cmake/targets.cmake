@@ -28,6 +28,20 @@ function(cnerf_suites_of out)
   set(${out} ${suites} PARENT_SCOPE)
 endfunction()
 
+# cnerf_add_plugin(NAME SOURCES … LINK …)
+# A part of the program that is loaded when it is needed: libNAME.so, see src/base/plugin.h.
+set(CNERF_PLUGIN_FOLDER ${PROJECT_BINARY_DIR})
+function(cnerf_add_plugin name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})
+  add_library(${name} MODULE ${arg_SOURCES})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${name} PRIVATE cnerf_options ${arg_LINK})
+  target_link_options(${name} PRIVATE LINKER:-z,defs)  # what the program lacks must not be missed at run time
+  set_target_properties(${name} PROPERTIES
+    LIBRARY_OUTPUT_DIRECTORY ${CNERF_PLUGIN_FOLDER} INSTALL_RPATH_USE_LINK_PATH ON)
+  install(TARGETS ${name} LIBRARY DESTINATION lib/cnerf)
+endfunction()
+
 # cnerf_add_test(NAME SOURCES … LINK … [LABELS …] [TIMEOUT seconds] [PROCESSORS n])
 # One executable of GoogleTest cases; every suite of it is a CTest test of its own, NAME.SUITE. A suite that CTest would
 # not run fails the others: tests/support/gtest_main.cpp knows the list.

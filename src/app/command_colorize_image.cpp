@@ -56,7 +56,7 @@ void colorize_image(const ColorizeImageArguments& arguments) {
   const LinearImage luminance = luminance_image(read_linear_image(arguments.in, Transfer::kSrgb));
   Config config = resolve_config(arguments.config);
   if (config.colorizer.spec.empty()) config.colorizer.spec = "builtin";
-  const auto colorizer = make_colorizer(pipeline::colorizer_options(config, {}, {}, reporter));
+  const auto colorizer = make_colorizer(config.colorizer, pipeline::colorizer_context(config, {}, {}, reporter));
   const LightnessBatch question = question_about(luminance, arguments.short_side);
   const ChromaBatch answer = colorizer->colorize(question);
   check_answer(colorizer->name(), question, answer);

@@ -11,8 +11,10 @@
 
 #include "src/app/command.h"
 #include "src/base/cpu_features.h"
+#include "src/base/error.h"
 #include "src/base/parallel.h"
 #include "src/base/process.h"
+#include "src/colorizer/colorizer.h"
 #include "src/config/config.h"
 #include "src/engine/engines.h"
 #include "src/pipeline/version.h"
@@ -81,19 +83,28 @@ std::string cuda_text() {
                          : "built in, but no GPU that can be used was found; fields are trained on the processor";
 }
 
+/// Loads the plug-in that brings LibTorch, and its BLAS with it.
+void print_torch() {
+  try {
+    line("LibTorch", torch_version());
+    line("BLAS", blas_text());
+  } catch (const DeviceError& problem) {
+    line("LibTorch", std::string("cannot be used: ") + problem.what());
+  }
+}
+
 void doctor() {
   line("cnerf", pipeline::version_text());
   line("processor", cpu_engines().description());
   line("memory", memory_text());
   line("disk", disk_text());
   line("CUDA", cuda_text());
-  line("LibTorch", CNERF_TORCH_VERSION);
-  line("BLAS", blas_text());
+  print_torch();
   line("OpenCV", CV_VERSION);
   line("OpenVDB", CNERF_OPENVDB_VERSION);
   line("OpenEXR", OPENEXR_VERSION_STRING);
   line("presets", presets_text());
-  const fs::path page = web::find_page();
+  const fs::path page = find_page();
   line("viewer page", page.empty() ? "not built (CNERF_VIEWER, npm)" : page.string());
   print_program("blender", "shows bakes");
   print_program("colmap", "finds camera poses");

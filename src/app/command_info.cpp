@@ -11,8 +11,9 @@
 #include "src/base/text.h"
 #include "src/capture/load_capture.h"
 #include "src/pipeline/run_directory.h"
+#include "src/train/luminance/placement.h"
+#include "src/train/luminance/stage1.h"
 #include "src/train/scene.h"
-#include "src/train/stage1.h"
 
 namespace cnerf::app {
 namespace fs = std::filesystem;

@@ -14,6 +14,7 @@
 #include "src/base/files.h"
 #include "src/capture/exr_io.h"
 #include "src/color/colorspace_math.h"
+#include "src/picture/codecs.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -51,7 +52,7 @@ cv::Mat decode_file(const fs::path& file, int flags) {
   cv::Mat image;
   try {
     const cv::Mat bytes(1, int(content.size()), CV_8U, const_cast<std::byte*>(content.data()));
-    image = cv::imdecode(bytes, flags);
+    image = decode_image(bytes, flags);
   } catch (const cv::Exception& failure) {
     throw InputError(file, "", std::string("the image cannot be decoded: ") + failure.what());
   }

@@ -1,5 +1,5 @@
 #pragma once
-/// What stage 2 asks for colours. Any 2-D colorizer fits behind it; none of its kinds is visible here.
+/// Colorizer: what stage 2 asks for colours. Any 2-D colorizer fits behind it; none of its kinds is visible here.
 
 #include <cstdint>
 #include <filesystem>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "src/base/progress.h"
+#include "src/colorizer/colorizer_options.h"
 
 namespace cnerf {
 
@@ -47,14 +48,10 @@ class Colorizer {
   [[nodiscard]] virtual std::string name() const = 0;
 };
 
-struct ColorizerOptions {
-  std::string spec;                      ///< "builtin", "reference:IMAGE…", "torchscript:FILE", …: see kinds.h
-  std::string prompt;                    ///< a text for kinds that take one; the others refuse it
+/// What a colorizer is made for, beside the user's options.
+struct ColorizerContext {
   std::filesystem::path working_folder;  ///< relative files of the spec are looked up here, then as given
   std::filesystem::path cache_folder;    ///< a fitted reference: network is kept here; empty = refit every time
-  double timeout_seconds = 60;           ///< for one batch of an exec: colorizer
-  int reference_steps = 480;             ///< optimiser steps of that fit
-  bool reference_on_builtin = true;      ///< that fit reads what the built-in network makes of a picture
   std::uint64_t seed = 1;                ///< of the fit of a reference: network
   ProgressSink progress;                 ///< watches that fit; may throw Interrupted
 };
@@ -66,12 +63,20 @@ struct ColorizerOptions {
 /// @throws MissingInputError  a file the spec names does not exist.
 /// @throws InputError         a file the spec names cannot be used: not an image, no colour in it.
 /// @throws ColorizerError     the back end could not start.
-[[nodiscard]] std::unique_ptr<Colorizer> make_colorizer(const ColorizerOptions& options);
+/// @throws DeviceError        the plug-in with the kinds that need LibTorch is missing or cannot be loaded.
+[[nodiscard]] std::unique_ptr<Colorizer> make_colorizer(const ColorizerOptions& options,
+                                                        const ColorizerContext& context = {});
+
+/// Version of the LibTorch that colorizers use. Loads it.  @throws DeviceError  as make_colorizer.
+[[nodiscard]] std::string torch_version();
 
 /// Checks shape, size and finiteness of an answer.  @throws ColorizerError  naming the colorizer.
 void check_answer(const std::string& colorizer, const LightnessBatch& question, const ChromaBatch& answer);
 
-/// The ab image of entry `index` of an answer, decoding a distribution by annealed mean at `temperature`.  [2, H, W]
-[[nodiscard]] std::vector<float> ab_of(const ChromaBatch& answer, int index, float temperature = 0.38f);
+/// At which a colorizer's distribution becomes one colour: annealed mean, Zhang et al. 2016, Sec. 2.3.
+inline constexpr float kAnswerTemperature = 0.38f;
+
+/// The ab image of entry `index` of an answer; a distribution is decoded at kAnswerTemperature.  [2, H, W]
+[[nodiscard]] std::vector<float> ab_of(const ChromaBatch& answer, int index);
 
 }  // namespace cnerf

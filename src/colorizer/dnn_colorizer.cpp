@@ -55,17 +55,19 @@ std::unique_ptr<Colorizer> read_network(const std::string& name, const fs::path&
 
 }  // namespace
 
-std::unique_ptr<Colorizer> make_onnx_colorizer(const std::string& argument, const ColorizerOptions& options) {
-  const fs::path file = find_spec_file(argument, options);
-  return read_network("onnx:" + argument, file, "export it with opset 11 to 13 and fixed kernel shapes",
+std::unique_ptr<Colorizer> make_onnx_colorizer(const ColorizerRequest& request) {
+  const fs::path file = find_spec_file(request.argument, request);
+  return read_network("onnx:" + request.argument, file, "export it with opset 11 to 13 and fixed kernel shapes",
                       [&] { return cv::dnn::readNetFromONNX(file.string()); });
 }
 
-std::unique_ptr<Colorizer> make_caffe_colorizer(const std::string& argument, const ColorizerOptions& options) {
+std::unique_ptr<Colorizer> make_caffe_colorizer(const ColorizerRequest& request) {
+  const std::string& argument = request.argument;
   const auto comma = argument.find(',');
-  if (comma == std::string::npos) throw UsageError("colorizer \"" + options.spec + "\": expected caffe:PROTO,MODEL");
-  const fs::path description = find_spec_file(argument.substr(0, comma), options);
-  const fs::path weights = find_spec_file(argument.substr(comma + 1), options);
+  if (comma == std::string::npos)
+    throw UsageError("colorizer \"" + request.options.spec + "\": expected caffe:PROTO,MODEL");
+  const fs::path description = find_spec_file(argument.substr(0, comma), request);
+  const fs::path weights = find_spec_file(argument.substr(comma + 1), request);
   return read_network("caffe:" + argument, weights, "expected a text description and its binary weights, in this order",
                       [&] { return cv::dnn::readNetFromCaffe(description.string(), weights.string()); });
 }

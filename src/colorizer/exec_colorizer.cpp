@@ -142,12 +142,12 @@ bool takes_prompt(const std::string& command) {
   return command.find(kPromptPlace) != std::string::npos;
 }
 
-std::unique_ptr<Colorizer> make_exec_colorizer(const std::string& argument, const ColorizerOptions& options) {
-  std::string command = argument;
+std::unique_ptr<Colorizer> make_exec_colorizer(const ColorizerRequest& request) {
+  std::string command = request.argument;
   if (const auto place = command.find(kPromptPlace); place != std::string::npos) {
-    command.replace(place, kPromptPlace.size(), shell_word(options.prompt));
+    command.replace(place, kPromptPlace.size(), shell_word(request.options.prompt));
   }
-  return std::make_unique<ExecColorizer>(command, options.timeout_seconds);
+  return std::make_unique<ExecColorizer>(command, request.options.timeout_seconds);
 }
 
 }  // namespace cnerf

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "src/base/check.h"
-#include "src/color/colorspace_math.h"
 
 namespace cnerf {
 namespace {
@@ -13,15 +12,13 @@ namespace {
 // ab from -130 to 130: wider than the sRGB gamut, so that the smear has room and no real colour is clamped.
 constexpr int kCells = 27;
 constexpr float kStep = 10.0f, kLowest = -130.0f;
-constexpr int kRgbCells = 8;
 constexpr double kLeastVisible = 0.01;
 
-void check_sizes(const ColorPatchView& patch, bool needs_lightness) {
+void check_sizes(const ColorPatchView& patch) {
   const std::size_t pixels = std::size_t(patch.height) * std::size_t(patch.width);
   CNERF_CHECK(patch.height > 0 && patch.width > 0, "empty patch");
   CNERF_CHECK_EQ(patch.ab.size(), 2 * pixels);
   if (!patch.opacity.empty()) CNERF_CHECK_EQ(patch.opacity.size(), pixels);
-  if (needs_lightness || !patch.lightness.empty()) CNERF_CHECK_EQ(patch.lightness.size(), pixels);
 }
 
 float opacity_of(const ColorPatchView& patch, std::size_t pixel) {
@@ -80,12 +77,11 @@ void normalise(std::vector<float>& bins) {
   for (float& value : bins) value = float(value / sum);
 }
 
-/// Paper, Eq. histcomparison; `centre` subtracts the means first (Pearson).
-double correlation(const std::vector<float>& p, const std::vector<float>& q, bool centre) {
-  const double mean = centre ? 1.0 / double(p.size()) : 0.0;  // of normalised histograms
+/// Paper, Eq. histcomparison.
+double correlation(const std::vector<float>& p, const std::vector<float>& q) {
   double pq = 0, pp = 0, qq = 0;
   for (std::size_t i = 0; i < p.size(); ++i) {
-    const double x = p[i] - mean, y = q[i] - mean;
+    const double x = p[i], y = q[i];
     pq += x * y;
     pp += x * x;
     qq += y * y;
@@ -100,8 +96,8 @@ double share_correlation(double chromatic_p, double chromatic_q) {
          (std::hypot(chromatic_p, neutral_p) * std::hypot(chromatic_q, neutral_q));
 }
 
-double ab_similarity(const ColorHistogram& base, const ColorHistogram& answer) {
-  const double by_color = correlation(base.bins, answer.bins, false);
+double similarity_of(const ColorHistogram& base, const ColorHistogram& answer) {
+  const double by_color = correlation(base.bins, answer.bins);
   const double trust = std::min(1.0, answer.chromatic / Purifier::kFewChromatic);
   if (trust >= 1) return by_color;
   return trust * by_color + (1 - trust) * share_correlation(base.chromatic, answer.chromatic);
@@ -110,7 +106,7 @@ double ab_similarity(const ColorHistogram& base, const ColorHistogram& answer) {
 }  // namespace
 
 ColorHistogram ab_histogram(const ColorPatchView& patch) {
-  check_sizes(patch, false);
+  check_sizes(patch);
   const std::size_t pixels = std::size_t(patch.height) * std::size_t(patch.width);
   ColorHistogram result;
   std::vector<float> bins(kCells * kCells, 0.0f);
@@ -130,71 +126,38 @@ ColorHistogram ab_histogram(const ColorPatchView& patch) {
   return result;
 }
 
-ColorHistogram rgb_histogram(const ColorPatchView& patch) {
-  check_sizes(patch, true);
-  const std::size_t pixels = std::size_t(patch.height) * std::size_t(patch.width);
-  ColorHistogram result;
-  result.bins.assign(kRgbCells * kRgbCells * kRgbCells, 0.0f);
-  result.chromatic = 1;
-  double visible = 0;
-  for (std::size_t i = 0; i < pixels; ++i) {
-    const Vec3<float> rgb =
-        gamut_mapped_linear_rgb_from_lab(Lab<float>{patch.lightness[i], patch.ab[i], patch.ab[pixels + i]});
-    std::size_t cell = 0;
-    for (int c = 0; c < 3; ++c) {
-      const int level = std::clamp(int(srgb_from_linear(rgb[c]) * kRgbCells), 0, kRgbCells - 1);
-      cell = cell * kRgbCells + std::size_t(level);
-    }
-    const float opacity = opacity_of(patch, i);
-    result.bins[cell] += opacity;
-    visible += opacity;
-  }
-  normalise(result.bins);
-  result.visible = visible / double(pixels);
-  return result;
-}
-
 namespace {
 
-std::vector<ColorHistogram> histograms_of(const PurifyOptions& options, std::span<const ColorPatchView> patches) {
-  if (options.histogram != "ab" && options.histogram != "rgb") {
-    throw UsageError("purify.histogram: expected \"ab\" or \"rgb\", got \"" + options.histogram + "\"");
-  }
+std::vector<ColorHistogram> histograms_of(std::span<const ColorPatchView> patches) {
   std::vector<ColorHistogram> histograms;
-  for (const ColorPatchView& patch : patches) {
-    histograms.push_back(options.histogram == "rgb" ? rgb_histogram(patch) : ab_histogram(patch));
-  }
+  for (const ColorPatchView& patch : patches) histograms.push_back(ab_histogram(patch));
   return histograms;
-}
-
-double similarity_of(const PurifyOptions& options, const ColorHistogram& base, const ColorHistogram& answer) {
-  return options.histogram == "rgb" ? correlation(base.bins, answer.bins, true) : ab_similarity(base, answer);
 }
 
 }  // namespace
 
-std::size_t most_typical(const PurifyOptions& options, std::span<const ColorPatchView> answers) {
+std::size_t most_typical(std::span<const ColorPatchView> answers) {
   CNERF_CHECK(!answers.empty(), "nothing to choose from");
-  const std::vector<ColorHistogram> histograms = histograms_of(options, answers);
+  const std::vector<ColorHistogram> histograms = histograms_of(answers);
   std::vector<double> agreement(answers.size(), 0.0);
   for (std::size_t i = 0; i < answers.size(); ++i) {
     for (std::size_t j = 0; j < answers.size(); ++j) {
-      if (j != i) agreement[j] += similarity_of(options, histograms[i], histograms[j]);
+      if (j != i) agreement[j] += similarity_of(histograms[i], histograms[j]);
     }
   }
   return std::size_t(std::ranges::max_element(agreement) - agreement.begin());
 }
 
 Purifier::Purifier(const PurifyOptions& options, std::span<const ColorPatchView> bases)
-    : options_(options), bases_(histograms_of(options, bases)) {
+    : options_(options), bases_(histograms_of(bases)) {
   CNERF_CHECK(!bases.empty(), "purification needs base patches");
 }
 
 double Purifier::similarity(const ColorPatchView& answer) const {
-  const ColorHistogram histogram = histograms_of(options_, {&answer, 1}).front();
+  const ColorHistogram histogram = ab_histogram(answer);
   if (histogram.visible < kLeastVisible) return 0;
   double best = -1;
-  for (const ColorHistogram& base : bases_) best = std::max(best, similarity_of(options_, base, histogram));
+  for (const ColorHistogram& base : bases_) best = std::max(best, similarity_of(base, histogram));
   return best;
 }
 

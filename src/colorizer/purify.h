@@ -6,49 +6,24 @@
 /// only when there is hardly anything else to compare (see `Purifier::similarity`).
 
 #include <span>
-#include <string>
 #include <vector>
 
-#include "src/base/options.h"
+#include "src/colorizer/purify_options.h"
 
 namespace cnerf {
-
-struct PurifyOptions {
-  bool enabled = true;
-  int base_images = 5;
-  double base_scale = 0.7;       ///< s of the base patches
-  int opinions = 16;             ///< answers a base is chosen from; 1 = whatever comes first, as in the paper
-  double threshold = 0.80;       ///< T
-  std::string histogram = "ab";  ///< opacity-masked 2-D ab histogram, or 8x8x8 RGB as in the published code
-  std::string picked_bases;      ///< "2,5,7" of the candidates; empty = chosen to cover the views
-
-  template <typename Visitor>
-  void visit(Visitor&& v) {
-    v("enabled", enabled, "reject outlier answers of the colorizer");
-    v("base_images", base_images, Range{1, 64}, "patches answers are compared with");
-    v("base_scale", base_scale, Range{0.05, 1}, "share of the short side a base patch covers");
-    v("opinions", opinions, Range{1, 256},
-      "answers about the place of a base, of which it is the most typical one; 1 = the first one");
-    v("threshold", threshold, Range{-1, 1}, "histogram similarity an answer must exceed");
-    v("histogram", histogram, Choice{"ab", "rgb"},
-      "opacity-masked ab histogram, or 8x8x8 RGB as in the published code");
-    v("picked_bases", picked_bases, "comma-separated candidates to use as bases; empty chooses");
-  }
-};
 
 /// A coloured patch that lives elsewhere.
 struct ColorPatchView {
   int height = 0, width = 0;
-  std::span<const float> ab;         ///< [2, H, W] Lab a and b
-  std::span<const float> lightness;  ///< [H, W] L* 0..100; only the "rgb" histogram needs it, may be empty for "ab"
-  std::span<const float> opacity;    ///< [H, W] in [0, 1]; empty = opaque
+  std::span<const float> ab;       ///< [2, H, W] Lab a and b
+  std::span<const float> opacity;  ///< [H, W] in [0, 1]; empty = opaque
 };
 
 /// Colours of one patch as the purification sees them.
 struct ColorHistogram {
   std::vector<float> bins;  ///< normalised to sum 1; all 0 when no pixel counts
   double visible = 0;       ///< mean opacity
-  double chromatic = 0;     ///< share of the opacity that is not near neutral, in [0, 1]; always 1 for "rgb"
+  double chromatic = 0;     ///< share of the opacity that is not near neutral, in [0, 1]
 };
 
 /// Histogram over an ab grid of step 10. A pixel is split over the four nearest bins, so that a colour on the border of
@@ -58,29 +33,22 @@ inline constexpr float kHistogramSmear = 6.0f;
 inline constexpr float kNeutralChroma = 3.0f, kChromaticChroma = 6.0f;
 [[nodiscard]] ColorHistogram ab_histogram(const ColorPatchView& patch);
 
-/// 8x8x8 histogram of sRGB, as in the published code.
-[[nodiscard]] ColorHistogram rgb_histogram(const ColorPatchView& patch);
-
 /// Of several answers, the one most like the others: their medoid under the similarity below, the first of equals. A
 /// base that is an outlier would let all of its like pass, and a base's hue is off by what its answer's is.
-/// @throws UsageError     when the options name an unknown histogram.
 /// @throws ContractError  when there is no answer.
-[[nodiscard]] std::size_t most_typical(const PurifyOptions& options, std::span<const ColorPatchView> answers);
+[[nodiscard]] std::size_t most_typical(std::span<const ColorPatchView> answers);
 
 /// Compares answers with base patches.
 class Purifier {
  public:
-  /// @throws UsageError     when the options name an unknown histogram.
   /// @throws ContractError  when there is no base or sizes disagree.
   Purifier(const PurifyOptions& options, std::span<const ColorPatchView> bases);
 
-  /// The highest similarity with a base.
-  /// "ab": normalised correlation of the histograms, in [0, 1]. A patch with almost no chromatic pixels (below
-  /// `kFewChromatic`) has no histogram to speak of; the shares of neutral and chromatic pixels are compared by the same
-  /// formula instead, blended in so that nothing jumps: a grey answer passes where the bases are mostly grey and fails
-  /// where they are not.
-  /// "rgb": Pearson correlation, in [-1, 1].
-  /// A patch in which nothing is visible (mean opacity below 1 %) has similarity 0.
+  /// The highest similarity with a base, in [0, 1]: normalised correlation of the histograms. A patch with almost no
+  /// chromatic pixels (below `kFewChromatic`) has no histogram to speak of; the shares of neutral and chromatic pixels
+  /// are compared by the same formula instead, blended in so that nothing jumps: a grey answer passes where the bases
+  /// are mostly grey and fails where they are not. A patch in which nothing is visible (mean opacity below 1 %) has
+  /// similarity 0.
   [[nodiscard]] double similarity(const ColorPatchView& answer) const;
 
   /// similarity > T; always true when purification is off.

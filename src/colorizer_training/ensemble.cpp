@@ -1,7 +1,7 @@
 #include "src/colorizer_training/ensemble.h"
 
 #include "src/color/ab_bins.h"
-#include "src/colorizer/network_weights.h"
+#include "src/colorizer/torch/network_weights.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "src/base/rng.h"
-#include "src/colorizer/network.h"
+#include "src/colorizer/torch/network.h"
 
 namespace cnerf {
 

@@ -1,8 +1,8 @@
 #include "src/colorizer_training/losses.h"
 
 #include "src/color/ab_bins.h"
-#include "src/colorizer/network.h"
-#include "src/colorizer/network_decode.h"
+#include "src/colorizer/torch/network.h"
+#include "src/colorizer/torch/network_decode.h"
 #include "src/colorizer_training/batch.h"
 
 namespace cnerf {

@@ -11,7 +11,7 @@
 #include "src/base/files.h"
 #include "src/base/progress.h"
 #include "src/color/ab_bins.h"
-#include "src/colorizer/network_weights.h"
+#include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer_training/report.h"
 #include "src/colorizer_training/trainer.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "src/colorizer/network_decode.h"
+#include "src/colorizer/torch/network_decode.h"
 #include "src/colorizer_training/image_set.h"
 #include "src/colorizer_training/losses.h"
 

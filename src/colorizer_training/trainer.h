@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "src/colorizer/network.h"
+#include "src/colorizer/torch/network.h"
 #include "src/colorizer_training/batch.h"
 #include "src/colorizer_training/ensemble.h"
 #include "src/colorizer_training/feature_teacher.h"

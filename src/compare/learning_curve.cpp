@@ -8,8 +8,8 @@
 #include "src/capture/color_truth.h"
 #include "src/color/colorspace_math.h"
 #include "src/render/training_views.h"
-#include "src/train/color_model.h"
-#include "src/train/view_cache.h"
+#include "src/train/chroma/color_model.h"
+#include "src/train/luminance/view_cache.h"
 
 namespace cnerf::compare {
 namespace {

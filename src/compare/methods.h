@@ -9,7 +9,7 @@
 
 #include "src/capture/capture.h"
 #include "src/colorizer/colorizer.h"
-#include "src/train/stage2.h"
+#include "src/train/chroma/stage2.h"
 
 namespace cnerf::compare {
 
@@ -59,7 +59,11 @@ inline constexpr double kPositionalLearningRate = 5e-4, kPositionalFinalLearning
 /// "colornerf,grey", or "all".  @throws UsageError  naming an unknown one and those there are.
 [[nodiscard]] std::vector<const Method*> parse_methods(const std::string& list);
 
-/// What stage 2 does differently for a method.
+/// Whether its colorizer sees each view whole and once: ViewQuestions of stage2_variants.h.
+[[nodiscard]] bool asks_about_views(const Method& method);
+/// Whether it learns by the Photometric injection of stage2_variants.h.
+[[nodiscard]] bool is_photometric(const Method& method);
+/// The options of a method's stage 2.
 [[nodiscard]] Stage2Options stage2_of(const Method& method, Stage2Options configured);
 
 }  // namespace cnerf::compare

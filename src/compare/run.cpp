@@ -16,15 +16,17 @@
 #include "src/compare/baselines/style_transfer.h"
 #include "src/compare/page.h"
 #include "src/compare/rating.h"
+#include "src/compare/stage2_variants.h"
 #include "src/picture/contact_sheet.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/picture_files.h"
 #include "src/pipeline/render_step.h"
 #include "src/render/camera_path.h"
-#include "src/train/color_model.h"
-#include "src/train/luminance_model.h"
-#include "src/train/options_json.h"
+#include "src/train/chroma/color_model.h"
+#include "src/train/luminance/luminance_model.h"
+#include "src/train/luminance/options_json.h"
+#include "src/train/luminance/placement.h"
 
 namespace cnerf::compare {
 using namespace pipeline;
@@ -165,8 +167,7 @@ struct Run::Subject {
 
 struct Run::Geometry {
   fs::path folder;
-  std::vector<CachedView> training_views;
-  std::shared_ptr<TraceMemory> traces = make_trace_memory();
+  ViewCache training_views;
 };
 
 /// What a method's colours stand on.
@@ -307,8 +308,8 @@ std::unique_ptr<Colorizer> Run::colorizer_for(const Subject& subject, const Meth
   } else {
     Config of_seed = config_.run;
     of_seed.stage2.seed = seed;
-    colorizer =
-        make_colorizer(colorizer_options(of_seed, subject.capture.root, folder_of(subject, seed) / "cache", observer_));
+    colorizer = make_colorizer(of_seed.colorizer, colorizer_context(of_seed, subject.capture.root,
+                                                                    folder_of(subject, seed) / "cache", observer_));
   }
   if (!method.follows_flow) return colorizer;
   return std::make_unique<FlowColorizer>(std::move(colorizer));
@@ -366,16 +367,26 @@ void Run::colorize(const Subject& subject, const Method& method, int seed, Geome
   const WatchedEngines engines(*field.engines);
   LearningCurve curve("stage 2", observer_,
                       [&] { return pixels->ab_error(engines.color_bins(), float(options.decode_temperature)); });
-  if (is_measured && options.injection == "classification") {
+  if (is_measured && !is_photometric(method)) {
     const LuminanceModel model = LuminanceModel::load(field.stage1, *field.engines);
     pixels.emplace(subject.evaluated, model.frame, kMeasuredPixels);
     pixels->trace(*model.engine, model.march());
   }
   if (pixels) fs::remove(take);  // a curve is of one training from its beginning
+  const Photometric photometric;
+  ViewQuestions whole_views;
   Observer& observer = pixels ? static_cast<Observer&>(curve) : observer_;
-  const Stage2Report report =
-      train_stage2({subject.capture, field.stage1, options, *colorizer, {}, take, true, &geometry.training_views},
-                   engines, observer);
+  const Stage2Report report = train_stage2({subject.capture,
+                                            field.stage1,
+                                            options,
+                                            *colorizer,
+                                            {},
+                                            take,
+                                            true,
+                                            &geometry.training_views,
+                                            asks_about_views(method) ? &whole_views : nullptr,
+                                            is_photometric(method) ? &photometric : nullptr},
+                                           engines, observer);
   if (pixels && !curve.points().empty()) {
     cell.stage2_curve = curve.points();
     const ColorModel model = ColorModel::load(take, *field.engines);
@@ -394,8 +405,8 @@ void Run::colorize(const Subject& subject, const Method& method, int seed, Geome
 void Run::look(const Subject& subject, const Method& method, Geometry& geometry, Cell& cell) const {
   const fs::path folder = geometry.folder / method.name;
   const Field field = field_of(subject, method, geometry);
-  const auto scene = Scene::load(field.stage1, method.is_colored ? folder / "take.snapshot" : fs::path(),
-                                 *field.engines, geometry.traces);
+  const auto scene =
+      Scene::load(field.stage1, method.is_colored ? folder / "take.snapshot" : fs::path(), *field.engines);
   EvaluateOptions options;
   options.render = render_options(config_.run);
   options.lpips = lpips_.get();

@@ -10,43 +10,20 @@
 #include "bake/options.h"
 #include "export/options.h"
 #include "src/capture/load_capture.h"
+#include "src/colorizer/colorizer_options.h"
 #include "src/config/toml_binding.h"
 #include "src/render/picture_options.h"
-#include "src/train/stage1.h"
-#include "src/train/stage2.h"
+#include "src/train/chroma/stage2_options.h"
+#include "src/train/luminance/stage1_options.h"
 
 namespace cnerf {
-
-struct ColorizerConfig {
-  std::string spec;                  ///< "builtin", "reference:IMAGE…", "torchscript:FILE", …; empty = none given
-  std::string keyframes;             ///< "VIEW=FILE;…": painted frames of the capture
-  std::string hint_images;           ///< "VIEW=FILE;…": pictures that are transparent except for strokes
-  std::string hints;                 ///< "x,y,VIEW,#rrggbb;…": dots, in pixels of the view's image file
-  std::string prompt;                ///< a text for colorizers that take one
-  double timeout_seconds = 60;       ///< for one batch of an exec: colorizer
-  int reference_steps = 480;         ///< optimiser steps of a reference: colorizer's fit
-  bool reference_on_builtin = true;  ///< that fit builds on the built-in network
-
-  template <typename Visitor>
-  void visit(Visitor&& v) {
-    v("spec", spec,
-      "builtin, reference:IMAGE..., torchscript:FILE, onnx:FILE, caffe:PROTO,MODEL, exec:COMMAND or grey");
-    v("keyframes", keyframes, "painted frames of the capture, VIEW=FILE;...");
-    v("hint_images", hint_images, "pictures that are transparent except for strokes, VIEW=FILE;...");
-    v("hints", hints, "dots of colour, x,y,VIEW,#rrggbb;... in pixels of the view's image file");
-    v("prompt", prompt, "a text for colorizers that take one: exec: commands with {prompt} in them");
-    v("timeout_seconds", timeout_seconds, Range{0.1, 1e6}, "an exec: colorizer that takes longer for a batch failed");
-    v("reference_steps", reference_steps, Range{1, 1e6}, "optimiser steps of the fit to a reference: photograph");
-    v("reference_on_builtin", reference_on_builtin, "that fit builds on what the built-in network makes of a picture");
-  }
-};
 
 struct Config {
   std::string device = "auto";
   int threads = 0;
   CaptureOptions capture;
   Stage1Options stage1;
-  ColorizerConfig colorizer;
+  ColorizerOptions colorizer;
   Stage2Options stage2;
   cnerf::bake::Options bake;
   exporting::VdbOptions vdb;

@@ -6,6 +6,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/picture/codecs.h"
 
 namespace cnerf {
 namespace {
@@ -17,7 +18,7 @@ std::vector<std::uint8_t> encoded(const std::string& format, const cv::Mat& pict
   std::vector<std::uint8_t> bytes;
   bool done = false;
   try {
-    done = cv::imencode(format, picture, bytes, options);
+    done = encode_image(format, picture, bytes, options);
   } catch (const cv::Exception&) {  // a size or type that the format has not
   }
   if (!done) {

@@ -9,7 +9,7 @@
 #include "src/base/files.h"
 #include "src/base/text.h"
 #include "src/pipeline/known_color_files.h"
-#include "src/train/stage2.h"
+#include "src/train/chroma/stage2.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
@@ -51,24 +51,14 @@ TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Eng
 
 }  // namespace
 
-ColorizerOptions colorizer_options(const Config& config, const fs::path& working_folder, const fs::path& cache_folder,
+ColorizerContext colorizer_context(const Config& config, const fs::path& working_folder, const fs::path& cache_folder,
                                    Observer& observer) {
-  ColorizerOptions options;
-  options.spec = config.colorizer.spec;
-  options.prompt = config.colorizer.prompt;
-  options.working_folder = working_folder;
-  options.timeout_seconds = config.colorizer.timeout_seconds;
-  options.reference_steps = config.colorizer.reference_steps;
-  options.reference_on_builtin = config.colorizer.reference_on_builtin;
-  options.seed = std::uint64_t(config.stage2.seed);
-  options.cache_folder = cache_folder;
-  options.progress = observer.progress_sink();
-  return options;
+  return {working_folder, cache_folder, std::uint64_t(config.stage2.seed), observer.progress_sink()};
 }
 
 std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& observer) {
-  return make_colorizer(
-      colorizer_options(context.config, context.capture.root, context.directory.colorizer_cache(), observer));
+  return make_colorizer(context.config.colorizer, colorizer_context(context.config, context.capture.root,
+                                                                    context.directory.colorizer_cache(), observer));
 }
 
 std::string take_to_write(const RunContext& context, const std::string& named, const ExistingOutput& existing) {

@@ -10,8 +10,8 @@
 
 namespace cnerf::pipeline {
 
-/// What the configuration says of its colorizer. The folders are those of `ColorizerOptions`; empty = none.
-[[nodiscard]] ColorizerOptions colorizer_options(const Config& config, const std::filesystem::path& working_folder,
+/// What a colorizer of this configuration is made for. The folders are those of `ColorizerContext`; empty = none.
+[[nodiscard]] ColorizerContext colorizer_context(const Config& config, const std::filesystem::path& working_folder,
                                                  const std::filesystem::path& cache_folder, Observer& observer);
 /// The colorizer the configuration names. What it learns is kept in the run's folder, for the next time.
 /// @throws UsageError, MissingInputError, ColorizerError.

@@ -149,7 +149,7 @@ KnownColors dot_of(const std::string& hint, const Capture& capture) {
 
 }  // namespace
 
-std::vector<KnownColors> load_known_colors(const Capture& capture, const ColorizerConfig& config) {
+std::vector<KnownColors> load_known_colors(const Capture& capture, const ColorizerOptions& config) {
   std::vector<KnownColors> known;
   const auto load = [&](const std::string& list, const char* option, KnownColorKind kind) {
     for (const NamedFile& named : named_files(list, option)) {
@@ -162,7 +162,7 @@ std::vector<KnownColors> load_known_colors(const Capture& capture, const Coloriz
   return known;
 }
 
-std::vector<fs::path> key_frame_files(const ColorizerConfig& config) {
+std::vector<fs::path> key_frame_files(const ColorizerOptions& config) {
   std::vector<fs::path> files;
   for (const NamedFile& named : named_files(config.keyframes, "--keyframe")) files.push_back(named.file);
   return files;

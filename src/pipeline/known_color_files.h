@@ -5,7 +5,7 @@
 
 #include "src/capture/capture.h"
 #include "src/config/config.h"
-#include "src/train/known_colors.h"
+#include "src/train/chroma/known_colors.h"
 
 namespace cnerf::pipeline {
 
@@ -13,9 +13,9 @@ namespace cnerf::pipeline {
 /// Views are named as the capture names them, or by their file's name with or without extension.
 /// @throws UsageError         an entry that cannot be read, a view that is not there, or is held out.
 /// @throws MissingInputError, InputError  a file that is not there, not a picture, of another shape, or without colour.
-[[nodiscard]] std::vector<KnownColors> load_known_colors(const Capture& capture, const ColorizerConfig& config);
+[[nodiscard]] std::vector<KnownColors> load_known_colors(const Capture& capture, const ColorizerOptions& config);
 
 /// The files `config.keyframes` names.  @throws UsageError.
-[[nodiscard]] std::vector<std::filesystem::path> key_frame_files(const ColorizerConfig& config);
+[[nodiscard]] std::vector<std::filesystem::path> key_frame_files(const ColorizerOptions& config);
 
 }  // namespace cnerf::pipeline

@@ -9,6 +9,7 @@
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/picture/codecs.h"
 #include "src/picture/encode.h"
 
 namespace cnerf::pipeline {
@@ -49,7 +50,7 @@ struct VideoFile::Encoder {
   fs::path file, temporary;
   int fps = 0;
   cv::Size size;
-  cv::VideoWriter writer;
+  std::shared_ptr<cv::VideoWriter> writer;
 };
 
 VideoFile::VideoFile(const fs::path& file, int fps) : encoder_(std::make_unique<Encoder>()) {
@@ -60,7 +61,7 @@ VideoFile::VideoFile(const fs::path& file, int fps) : encoder_(std::make_unique<
 }
 
 VideoFile::~VideoFile() {
-  encoder_->writer.release();
+  encoder_->writer.reset();
   std::error_code ignored;
   fs::remove(encoder_->temporary, ignored);
 }
@@ -70,21 +71,20 @@ bool VideoFile::add(const Picture& picture) {
     std::error_code ignored;
     fs::create_directories(encoder_->file.parent_path(), ignored);
     encoder_->size = {picture.width, picture.height};
-    encoder_->writer.open(encoder_->temporary.string(), cv::VideoWriter::fourcc('m', 'p', '4', 'v'), encoder_->fps,
-                          encoder_->size);
+    encoder_->writer = create_video(encoder_->temporary.string(), encoder_->fps, encoder_->size);
   }
   CNERF_CHECK_EQ(encoder_->size.width, picture.width);
   CNERF_CHECK_EQ(encoder_->size.height, picture.height);
-  if (!encoder_->writer.isOpened()) return false;
-  encoder_->writer.write(bgr_of(picture));
+  if (!encoder_->writer->isOpened()) return false;
+  encoder_->writer->write(bgr_of(picture));
   return true;
 }
 
 void VideoFile::finish() {
-  encoder_->writer.release();
+  encoder_->writer.reset();
   std::error_code failure;
   // OpenCV reports no write errors; a file that cannot be opened again is what a full disk leaves.
-  if (!cv::VideoCapture(encoder_->temporary.string()).isOpened()) {
+  if (!open_video(encoder_->temporary.string(), cv::CAP_ANY)->isOpened()) {
     throw OutputError(encoder_->file.string() + ": cannot be written: the video is not readable, is the disk full?");
   }
   fs::rename(encoder_->temporary, encoder_->file, failure);

@@ -24,7 +24,7 @@ bool is_empty_or_missing(const fs::path& folder) {
 }
 
 /// What moved in a view, together with what was masked already, at the size of the view.
-cv::Mat1b still_part(const MotionMask& mask, const MonoImage& image) {
+cv::Mat1b still_part(const prepare::MotionMask& mask, const MonoImage& image) {
   std::vector<std::uint8_t> codes = mask.valid;
   cv::Mat1b still;
   cv::resize(cv::Mat1b(mask.height, mask.width, codes.data()), still, {image.width, image.height}, 0, 0,
@@ -36,14 +36,14 @@ cv::Mat1b still_part(const MotionMask& mask, const MonoImage& image) {
 }
 
 /// Masks what moves, in files of the pictures' own size beside those that are there, and names them in transforms.json.
-void mask_motion(const fs::path& capture, const MotionMaskOptions& options, const Engines& engines,
+void mask_motion(const fs::path& capture, const prepare::MotionMaskOptions& options, const Engines& engines,
                  Observer& observer) {
   CaptureOptions reading;
   const Capture full = load_capture(capture, reading);
   int longest = 0;
   for (const View& view : full.views) longest = std::max({longest, view.image.width, view.image.height});
   reading.downscale = std::max(1, longest / options.motion_side);
-  const auto masks = find_motion(load_capture(capture, reading), options, capture / "work", engines, observer);
+  const auto masks = prepare::find_motion(load_capture(capture, reading), options, capture / "work", engines, observer);
 
   auto transforms = nlohmann::ordered_json::parse(read_text_file(capture / "transforms.json"));
   auto record = nlohmann::ordered_json::parse(read_text_file(capture / "prepare.json"));
@@ -51,7 +51,7 @@ void mask_motion(const fs::path& capture, const MotionMaskOptions& options, cons
   std::string left_alone;
   for (std::size_t v = 0; v < masks.size(); ++v) {
     const View& view = full.views[v];
-    const MotionMask& mask = masks[v];
+    const prepare::MotionMask& mask = masks[v];
     if (mask.valid.empty()) left_alone += (left_alone.empty() ? "" : ", ") + view.name;
     if (mask.valid.empty() || mask.share == 0) continue;
     share += mask.share / double(masks.size());

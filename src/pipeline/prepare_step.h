@@ -5,15 +5,15 @@
 
 #include "src/engine/engines.h"
 #include "src/pipeline/run_context.h"
+#include "src/prepare/motion_masks.h"
 #include "src/prepare/prepare.h"
-#include "src/train/motion_masks.h"
 
 namespace cnerf::pipeline {
 
 struct PrepareStepOptions {
   prepare::PrepareOptions capture;  ///< how it is made
   bool motion_masks = false;        ///< find what moves, by a quick fit, and mask it
-  MotionMaskOptions motion;
+  prepare::MotionMaskOptions motion;
 
   template <typename Visitor>
   void visit(Visitor&& v) {

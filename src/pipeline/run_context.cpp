@@ -9,7 +9,7 @@
 #include "src/base/text.h"
 #include "src/capture/load_capture.h"
 #include "src/pipeline/version.h"
-#include "src/train/stage1.h"
+#include "src/train/luminance/stage1.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;

@@ -22,6 +22,8 @@
 #include "src/base/usage.h"
 #include "src/config/config.h"
 #include "src/engine/engines.h"
+#include "src/train/chroma/stage2.h"
+#include "src/train/luminance/stage1.h"
 #include "src/train/scene.h"
 
 namespace cnerf::pipeline {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "src/base/text.h"
-#include "src/train/stage1.h"
+#include "src/train/luminance/stage1.h"
 
 namespace cnerf::pipeline {
 

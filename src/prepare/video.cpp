@@ -13,6 +13,7 @@
 #include "src/base/error.h"
 #include "src/base/statistics.h"
 #include "src/capture/image_io.h"
+#include "src/picture/codecs.h"
 #include "src/picture/encode.h"
 #include "src/prepare/camera_motion.h"
 #include "src/prepare/grey_image.h"
@@ -29,9 +30,9 @@ constexpr double kSurelyNoCut = 0.6;      ///< likeness to the frame before, abo
 constexpr int kTrackedWidth = 480;
 constexpr int kMostTracks = 400, kFewestTracks = 60;
 
-cv::VideoCapture open_clip(const fs::path& file) {
-  cv::VideoCapture clip(file.string(), cv::CAP_FFMPEG);
-  if (!clip.isOpened()) throw InputError(file, "", "expected a film clip, found a file that FFmpeg cannot open");
+std::shared_ptr<cv::VideoCapture> open_clip(const fs::path& file) {
+  auto clip = open_video(file.string(), cv::CAP_FFMPEG);
+  if (!clip->isOpened()) throw InputError(file, "", "expected a film clip, found a file that FFmpeg cannot open");
   return clip;
 }
 
@@ -158,13 +159,13 @@ struct Survey {
 };
 
 Survey survey(const fs::path& file, const ProgressSink& progress) {
-  cv::VideoCapture clip = open_clip(file);
-  const double expected = std::max(1.0, clip.get(cv::CAP_PROP_FRAME_COUNT));
+  const auto clip = open_clip(file);
+  const double expected = std::max(1.0, clip->get(cv::CAP_PROP_FRAME_COUNT));
   Survey out;
   FrameObserver observer;
   MotionObserver motion;
   BorderFinder borders;
-  for (cv::Mat frame; clip.read(frame);) {
+  for (cv::Mat frame; clip->read(frame);) {
     if (interruption_requested()) throw Interrupted("stopped while reading the clip");
     const cv::Mat1b grey = grey_of(frame);
     out.frames.push_back(observer.measure(grey));
@@ -301,13 +302,13 @@ class FrameMasks {
 /// @param table  codes of a decoded frame -> sRGB codes
 void write_frames(const fs::path& file, const fs::path& capture, FrameMasks& masks, const cv::Mat1b& table,
                   ClipImport& out, const ProgressSink& progress) {
-  cv::VideoCapture frames = open_clip(file);
+  const auto frames = open_clip(file);
   std::size_t next = 0;
   const std::vector<int>& kept = out.report.kept;
-  for (int number = 0; next < kept.size() && frames.grab(); ++number) {
+  for (int number = 0; next < kept.size() && frames->grab(); ++number) {
     if (number != kept[next]) continue;
     cv::Mat frame;
-    if (!frames.retrieve(frame)) break;
+    if (!frames->retrieve(frame)) break;
     cv::Mat1b codes;
     cv::LUT(kept_part(grey_of(frame), out.report), table, codes);
     PreparedImage image = describe(out.report, codes, number);
@@ -333,7 +334,7 @@ std::string ShotReport::refusal() const {
 
 bool is_clip(const fs::path& file) {
   std::error_code failure;
-  return fs::is_regular_file(file, failure) && cv::VideoCapture(file.string(), cv::CAP_FFMPEG).isOpened();
+  return fs::is_regular_file(file, failure) && open_video(file.string(), cv::CAP_FFMPEG)->isOpened();
 }
 
 std::vector<std::string> shot_lines(const ClipReport& report) {
@@ -355,9 +356,9 @@ ClipImport import_clip(const fs::path& file, const fs::path& capture, const fs::
   ClipImport out;
   ClipReport& report = out.report;
   {
-    const cv::VideoCapture clip = open_clip(file);
-    report.fps = clip.get(cv::CAP_PROP_FPS);
-    const double across = clip.get(cv::CAP_PROP_SAR_NUM), up = clip.get(cv::CAP_PROP_SAR_DEN);
+    const auto clip = open_clip(file);
+    report.fps = clip->get(cv::CAP_PROP_FPS);
+    const double across = clip->get(cv::CAP_PROP_SAR_NUM), up = clip->get(cv::CAP_PROP_SAR_DEN);
     if (across > 0 && up > 0) report.pixel_aspect = across / up;
   }
   const Survey clip = survey(file, progress);

@@ -14,14 +14,9 @@
 namespace cnerf {
 
 struct OccupancyOptions {
-  int resolution = 128;
+  int resolution = 128;             ///< cells along a side of a cascade; a multiple of 16
   float decay = 0.5f;               ///< share of a cell's remembered density that is left at each visit
   float optical_thickness = 0.03f;  ///< of a cell, below which it counts as empty
-
-  template <typename Visitor>
-  void visit(Visitor&& v) {
-    v("resolution", resolution, Range{16, 512}, "cells along a side of a cascade; a multiple of 16");
-  }
 };
 
 class OccupancyGrid {

@@ -1,68 +1,17 @@
 #include "src/train/scene.h"
 
 #include <algorithm>
-#include <map>
 #include <optional>
-#include <type_traits>
 
 #include "src/base/parallel.h"
 #include "src/picture/picture.h"
-#include "src/train/color_model.h"
-#include "src/train/luminance_model.h"
-#include "src/train/view_cache.h"
+#include "src/train/chroma/color_model.h"
+#include "src/train/luminance/luminance_model.h"
+#include "src/train/luminance/view_cache.h"
 
 namespace cnerf {
 
-/// By camera, effort and part of the picture.
-class TraceMemory {
- public:
-  struct Trace {
-    std::vector<WeightedSample> samples;
-    std::vector<std::size_t> offsets;
-  };
-
-  explicit TraceMemory(std::size_t most_samples) : left_(most_samples) {}
-
-  [[nodiscard]] const Trace* find(const std::string& key) const {
-    const auto found = traces_.find(key);
-    return found == traces_.end() ? nullptr : &found->second;
-  }
-  void keep(const std::string& key, const Trace& trace) {
-    if (trace.samples.size() > left_) return;
-    left_ -= trace.samples.size();
-    traces_.emplace(key, trace);
-  }
-
- private:
-  std::size_t left_;
-  std::map<std::string, Trace> traces_;
-};
-
-std::shared_ptr<TraceMemory> make_trace_memory(std::size_t most_samples) {
-  return std::make_shared<TraceMemory>(most_samples);
-}
-
 namespace {
-
-/// Bytes that tell one part of one view from all others.
-std::string trace_key(const UnitCamera& camera, const RenderOptions& options, std::size_t first) {
-  std::string key;
-  const auto add = [&](const auto& value) {
-    static_assert(std::is_arithmetic_v<std::remove_cvref_t<decltype(value)>>);
-    key.append(reinterpret_cast<const char*>(&value), sizeof(value));
-  };
-  const Intrinsics& lens = camera.intrinsics;
-  add(int(lens.model));
-  for (const int value : {lens.width, lens.height, options.steps_per_box}) add(value);
-  for (const double value : {lens.fx, lens.fy, lens.cx, lens.cy, options.min_transmittance}) add(value);
-  for (const double value : lens.distortion) add(value);
-  for (int axis = 0; axis < 3; ++axis) {
-    add(camera.origin[axis]);
-    for (int column = 0; column < 3; ++column) add(camera.unit_from_camera.rows[axis][column]);
-  }
-  add(first);
-  return key;
-}
 
 constexpr std::size_t kGrain = 256;          // rays of a parallel piece of work
 constexpr std::size_t kRaysAtATime = 16384;  // bounds the memory of traced samples
@@ -79,11 +28,17 @@ void put_colors(const std::vector<Ab>& colors, const std::vector<float>& luminan
   });
 }
 
+/// What rays met.
+struct Trace {
+  std::vector<WeightedSample> samples;
+  std::vector<std::size_t> offsets;
+};
+
 class TrainedScene final : public Scene {
  public:
   TrainedScene(const std::filesystem::path& stage1_snapshot, const std::filesystem::path& take_snapshot,
-               const Engines& engines, std::shared_ptr<TraceMemory> memory)
-      : luminance_(LuminanceModel::load(stage1_snapshot, engines)), memory_(std::move(memory)) {
+               const Engines& engines)
+      : luminance_(LuminanceModel::load(stage1_snapshot, engines)) {
     if (!take_snapshot.empty()) color_ = ColorModel::load(take_snapshot, engines);
   }
 
@@ -132,20 +87,7 @@ class TrainedScene final : public Scene {
   }
 
  private:
-  [[nodiscard]] TraceMemory::Trace trace(const UnitCamera& camera, std::span<const Ray> rays,
-                                         const RenderOptions& options, std::size_t first) const {
-    const std::string key = memory_ ? trace_key(camera, options, first) : "";
-    if (memory_) {
-      if (const TraceMemory::Trace* known = memory_->find(key)) return *known;
-    }
-    TraceMemory::Trace trace;
-    luminance_.engine->trace(rays, luminance_.march(options.steps_per_box),
-                             {float(options.min_transmittance), kShadedShare}, trace.samples, trace.offsets);
-    if (memory_) memory_->keep(key, trace);
-    return trace;
-  }
-
-  static void replace_luminance(std::span<const Ray> rays, const RenderOptions& options, TraceMemory::Trace& traced) {
+  static void replace_luminance(std::span<const Ray> rays, const RenderOptions& options, Trace& traced) {
     std::vector<Vec3f> positions;
     for (std::size_t r = 0; r < rays.size(); ++r) {
       for (std::size_t s = traced.offsets[r]; s < traced.offsets[r + 1]; ++s) {
@@ -166,7 +108,9 @@ class TrainedScene final : public Scene {
         rays[r] = camera.ray({double(p % width) + 0.5, double(p / width) + 0.5});
       }
     });
-    TraceMemory::Trace traced = trace(camera, rays, options, first);
+    Trace traced;
+    luminance_.engine->trace(rays, luminance_.march(options.steps_per_box),
+                             {float(options.min_transmittance), kShadedShare}, traced.samples, traced.offsets);
     if (options.luminance) replace_luminance(rays, options, traced);
     const std::vector<WeightedSample>& samples = traced.samples;
     const std::vector<std::size_t>& offsets = traced.offsets;
@@ -198,15 +142,13 @@ class TrainedScene final : public Scene {
 
   LuminanceModel luminance_;
   std::optional<ColorModel> color_;
-  std::shared_ptr<TraceMemory> memory_;
 };
 
 }  // namespace
 
 std::unique_ptr<Scene> Scene::load(const std::filesystem::path& stage1_snapshot,
-                                   const std::filesystem::path& take_snapshot, const Engines& engines,
-                                   std::shared_ptr<TraceMemory> memory) {
-  return std::make_unique<TrainedScene>(stage1_snapshot, take_snapshot, engines, std::move(memory));
+                                   const std::filesystem::path& take_snapshot, const Engines& engines) {
+  return std::make_unique<TrainedScene>(stage1_snapshot, take_snapshot, engines);
 }
 
 }  // namespace cnerf

@@ -34,20 +34,12 @@ struct RenderOptions {
   std::function<void(std::span<const Vec3f> positions, std::span<float> luminance)> luminance = {};
 };
 
-/// What the rays of rendered views met. Scenes of one stage 1 that share it march through a view once; each further
-/// take only decodes its colours. Not for several threads.
-class TraceMemory;
-/// @param most_samples  views beyond that many samples (12 bytes each) are not kept
-[[nodiscard]] std::shared_ptr<TraceMemory> make_trace_memory(std::size_t most_samples = std::size_t(1) << 27);
-
 class Scene : public ColorField {
  public:
   /// @param take_snapshot  of stage 2; empty = luminance only.
-  /// @param memory  of views that are rendered again, for other takes of the same stage 1; may be null
   /// @throws MissingInputError, SnapshotError, DeviceError.
   static std::unique_ptr<Scene> load(const std::filesystem::path& stage1_snapshot,
-                                     const std::filesystem::path& take_snapshot, const Engines& engines,
-                                     std::shared_ptr<TraceMemory> memory = nullptr);
+                                     const std::filesystem::path& take_snapshot, const Engines& engines);
 
   [[nodiscard]] virtual bool is_colorized() const = 0;
   [[nodiscard]] virtual std::string colorizer() const = 0;  ///< name of the colorizer; empty when not colorized

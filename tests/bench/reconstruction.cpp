@@ -20,8 +20,8 @@
 
 #include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
-#include "src/train/luminance_model.h"
-#include "src/train/options_json.h"
+#include "src/train/luminance/luminance_model.h"
+#include "src/train/luminance/options_json.h"
 #include "tests/support/validation_fold.h"
 
 namespace {

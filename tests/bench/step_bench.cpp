@@ -16,7 +16,7 @@
 #include "src/capture/load_capture.h"
 #include "src/engine/luminance_engine.h"
 #include "src/field/nets.h"
-#include "src/train/luminance_model.h"
+#include "src/train/luminance/luminance_model.h"
 #include "tests/bench/bench_support.h"
 #include "tests/support/engine_state.h"
 #include "tests/support/torch_oracle.h"

@@ -44,8 +44,9 @@ TEST(Colorizer, MissingFilesAreNamed) {
   for (const char* spec : {"reference:no_such.jpg", "torchscript:no_such.pt"}) {
     ColorizerOptions options;
     options.spec = spec;
-    options.working_folder = "/no/such/folder";
-    EXPECT_THAT(message_of<MissingInputError>([&] { (void)make_colorizer(options); }),
+    EXPECT_THAT(message_of<MissingInputError>([&] {
+                  (void)make_colorizer(options, {"/no/such/folder", {}, 1, {}});
+                }),
                 AllOf(HasSubstr("no_such"), HasSubstr("/no/such/folder")));
   }
 }

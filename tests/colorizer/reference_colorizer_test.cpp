@@ -9,10 +9,10 @@
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
-#include "src/colorizer/builtin_colorizer.h"
-#include "src/colorizer/reference_colorizer.h"
-#include "src/colorizer/reference_images.h"
-#include "src/colorizer/reference_network.h"
+#include "src/colorizer/torch/builtin_colorizer.h"
+#include "src/colorizer/torch/reference_colorizer.h"
+#include "src/colorizer/torch/reference_images.h"
+#include "src/colorizer/torch/reference_network.h"
 #include "tests/colorizer/questions.h"
 #include "tests/support/data.h"
 
@@ -210,13 +210,11 @@ TEST(ReferenceColorizer, KeepsWhatItFittedAndFitsAgainWhenThatIsDamaged) {
   const auto make = [&](const std::string& images, bool stop) {
     ColorizerOptions options;
     options.spec = "reference:" + images;
-    options.working_folder = folder.path();
-    options.cache_folder = folder / "cache";
-    options.progress = [&](const Progress&) {
-      ++reports;
-      if (stop) throw Stop{};
-    };
-    return make_reference_colorizer(images, options, short_recipe(30));
+    const ColorizerContext context{folder.path(), folder / "cache", 1, [&](const Progress&) {
+                                     ++reports;
+                                     if (stop) throw Stop{};
+                                   }};
+    return fit_reference_colorizer({images, options, context}, short_recipe(30));
   };
   EXPECT_THROW(make("one.png", true), Stop);
   EXPECT_EQ(reports, 1) << "it had begun to fit";

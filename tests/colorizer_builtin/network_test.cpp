@@ -7,8 +7,8 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/colorizer/builtin_colorizer.h"
-#include "src/colorizer/network_weights.h"
+#include "src/colorizer/torch/builtin_colorizer.h"
+#include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer_training/score.h"
 #include "tests/support/data.h"
 

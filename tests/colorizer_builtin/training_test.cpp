@@ -6,7 +6,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/color/ab_bins.h"
-#include "src/colorizer/network_weights.h"
+#include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer_training/score.h"
 #include "src/colorizer_training/tar_reader.h"
 #include "src/colorizer_training/trainer.h"

@@ -20,13 +20,14 @@ TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
   const auto of = [](const char* name) { return stage2_of(*parse_methods(name).front(), Stage2Options{}); };
   const Stage2Options full = of("colornerf");
   EXPECT_TRUE(full.purify.enabled);
-  EXPECT_EQ(full.questions, "patches");
-  EXPECT_EQ(full.injection, "classification");
   EXPECT_FALSE(of("without-purification").purify.enabled);
-  EXPECT_EQ(of("without-purification").injection, full.injection);
-  EXPECT_EQ(of("without-classification").injection, "photometric");
+  const auto method = [](const char* name) -> const Method& { return *parse_methods(name).front(); };
+  EXPECT_FALSE(is_photometric(method("colornerf")));
+  EXPECT_FALSE(is_photometric(method("without-purification")));
+  EXPECT_TRUE(is_photometric(method("without-classification")));
   EXPECT_TRUE(of("without-classification").purify.enabled);
-  EXPECT_EQ(of("colorize-then-fuse").questions, "views");
+  EXPECT_FALSE(asks_about_views(method("without-classification")));
+  EXPECT_TRUE(asks_about_views(method("colorize-then-fuse")) && is_photometric(method("colorize-then-fuse")));
   EXPECT_EQ(of("colornerf-paper").decode_temperature, 0);
   EXPECT_EQ(of("colornerf-paper").purify.opinions, 1);
   Stage2Options smooth;
@@ -43,7 +44,7 @@ TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
   EXPECT_EQ(rate_of("without-purification"), 0.05);
   EXPECT_EQ(rate_of("without-classification"), Stage2Options{}.learning_rate) << "its own best step size";
   EXPECT_EQ(of("positional-encoding").learning_rate, kPositionalLearningRate);
-  EXPECT_EQ(of("positional-encoding").injection, full.injection);
+  EXPECT_FALSE(is_photometric(method("positional-encoding")));
 }
 
 }  // namespace

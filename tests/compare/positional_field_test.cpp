@@ -12,7 +12,7 @@
 #include <numeric>
 
 #include "src/color/colorspace_math.h"
-#include "src/compare/baselines/positional_math.h"
+#include "src/compare/baselines/torch/positional_math.h"
 #include "src/field/luminance_activation.h"
 #include "src/render/composite_math.h"
 #include "tests/support/finite_difference.h"

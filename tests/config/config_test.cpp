@@ -191,9 +191,6 @@ TEST(Config, OptionsOfTheComparisonAreRefusedByNameAndReadInOldRuns) {
 TEST(Config, RelationsBetweenOptionsAreChecked) {
   Config config;
   EXPECT_NO_THROW(check_consistency(config));
-  config.stage2.scale_min = 0.9;
-  EXPECT_THROW(check_consistency(config), UsageError);
-  config = {};
   config.stage1.grid.finest_resolution = config.stage1.grid.coarsest_resolution - 1;
   EXPECT_THROW(check_consistency(config), UsageError);
 }

@@ -7,7 +7,7 @@
 #include "src/base/parallel.h"
 #include "src/base/rng.h"
 #include "src/engine/color_engines.h"
-#include "src/train/view_cache.h"
+#include "src/train/luminance/view_cache.h"
 #include "tests/cuda/check.h"
 #include "tests/cuda/packed_capture.h"
 #include "tests/support/random_pixels.h"

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "src/capture/load_capture.h"
-#include "src/train/luminance_model.h"
+#include "src/train/luminance/luminance_model.h"
 #include "tests/cuda/packed_capture.h"
 #include "tests/support/validation_fold.h"
 

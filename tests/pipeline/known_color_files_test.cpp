@@ -42,7 +42,7 @@ class KnownColorFiles : public ::testing::Test {
   }
   std::string at(const std::string& name) { return (folder_ / name).string(); }
   template <typename E>
-  std::string refusal(const ColorizerConfig& config) {
+  std::string refusal(const ColorizerOptions& config) {
     try {
       (void)load_known_colors(capture_, config);
     } catch (const E& error) {
@@ -56,7 +56,7 @@ class KnownColorFiles : public ::testing::Test {
 };
 
 TEST_F(KnownColorFiles, KeyFramesComeFirstThenHints) {
-  ColorizerConfig config;
+  ColorizerOptions config;
   config.keyframes = "b=" + at("red.png") + "; images/a.png=" + at("red.png");
   config.hints = "10,10,a,#00ff00;39.5,0,b.png,#0000ff";
   const std::vector<KnownColors> known = load_known_colors(capture_, config);
@@ -78,7 +78,7 @@ TEST_F(KnownColorFiles, OfAHintPictureOnlyTheStrokesCount) {
   strokes.at<cv::Vec4b>(6, 31) = {30, 30, 200, 255};  // B G R A
   strokes.at<cv::Vec4b>(7, 31) = {30, 30, 200, 60};   // too faint
   cv::imwrite(at("strokes.png"), strokes);
-  ColorizerConfig config;
+  ColorizerOptions config;
   config.hint_images = "a=" + at("strokes.png");
   const std::vector<KnownColors> known = load_known_colors(capture_, config);
   ASSERT_EQ(known.size(), 1u);
@@ -93,23 +93,23 @@ TEST_F(KnownColorFiles, OfAHintPictureOnlyTheStrokesCount) {
 }
 
 TEST_F(KnownColorFiles, BadEntriesAreRefusedByName) {
-  const auto with = [](std::string ColorizerConfig::*option, const std::string& value) {
-    ColorizerConfig config;
+  const auto with = [](std::string ColorizerOptions::*option, const std::string& value) {
+    ColorizerOptions config;
     config.*option = value;
     return config;
   };
-  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::keyframes, "a")), HasSubstr("expected VIEW=FILE"));
-  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::keyframes, "zebra=" + at("red.png"))), HasSubstr("zebra"));
-  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::keyframes, "held=" + at("red.png"))), HasSubstr("held out"));
-  EXPECT_THAT(refusal<InputError>(with(&ColorizerConfig::keyframes, "a=" + at("grey.png"))), HasSubstr("grey"));
-  EXPECT_THAT(refusal<InputError>(with(&ColorizerConfig::keyframes, "a=" + at("square.png"))), HasSubstr("shape"));
-  EXPECT_THAT(refusal<InputError>(with(&ColorizerConfig::hint_images, "a=" + at("red.png"))), HasSubstr("opaque"));
-  EXPECT_THAT(refusal<MissingInputError>(with(&ColorizerConfig::keyframes, "a=" + at("none.png"))),
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerOptions::keyframes, "a")), HasSubstr("expected VIEW=FILE"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerOptions::keyframes, "zebra=" + at("red.png"))), HasSubstr("zebra"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerOptions::keyframes, "held=" + at("red.png"))), HasSubstr("held out"));
+  EXPECT_THAT(refusal<InputError>(with(&ColorizerOptions::keyframes, "a=" + at("grey.png"))), HasSubstr("grey"));
+  EXPECT_THAT(refusal<InputError>(with(&ColorizerOptions::keyframes, "a=" + at("square.png"))), HasSubstr("shape"));
+  EXPECT_THAT(refusal<InputError>(with(&ColorizerOptions::hint_images, "a=" + at("red.png"))), HasSubstr("opaque"));
+  EXPECT_THAT(refusal<MissingInputError>(with(&ColorizerOptions::keyframes, "a=" + at("none.png"))),
               HasSubstr("none.png"));
-  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::hints, "1,2,a")), HasSubstr("x,y,VIEW,#rrggbb"));
-  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::hints, "1,two,a,#ff0000")), HasSubstr("two"));
-  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::hints, "1,2,a,red")), HasSubstr("red"));
-  EXPECT_THAT(refusal<UsageError>(with(&ColorizerConfig::hints, "40,2,a,#ff0000")), HasSubstr("40 x 20"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerOptions::hints, "1,2,a")), HasSubstr("x,y,VIEW,#rrggbb"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerOptions::hints, "1,two,a,#ff0000")), HasSubstr("two"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerOptions::hints, "1,2,a,red")), HasSubstr("red"));
+  EXPECT_THAT(refusal<UsageError>(with(&ColorizerOptions::hints, "40,2,a,#ff0000")), HasSubstr("40 x 20"));
 }
 
 }  // namespace

@@ -2,7 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "src/train/luminance_model.h"
+#include "src/capture/arrangement.h"
+#include "src/train/luminance/luminance_model.h"
 #include "tests/support/toy_capture.h"
 
 namespace cnerf {

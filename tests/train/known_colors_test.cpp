@@ -1,6 +1,6 @@
 // Key frames and hints, carried from view to view over a scene whose geometry is known.
 
-#include "src/train/known_colors.h"
+#include "src/train/chroma/known_color_map.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Patches of query-based colorization.
 
-#include "src/train/patches.h"
+#include "src/train/chroma/patches.h"
 
 #include <gtest/gtest.h>
 
@@ -36,8 +36,8 @@ TEST(IgnoreMasked, NoPixelOfAMaskedPlaceIsPicked) {
     for (int x = 81; x < 120; ++x) image.mask[std::size_t(y) * 160 + std::size_t(x)] = 0;
   }
   ignore_masked(view, image);
-  const std::vector<float> ab(2 * 8 * 8, 5.0f);
-  const PatchPixels picked = pick_pixels(view, {0, 20, 0, 60}, 8, ab, 4000, 1, 1);
+  const AnsweredPatch patch = {{0, 20, 0, 60}, 8, {}, std::vector<float>(2 * 8 * 8, 5.0f)};
+  const PatchPixels picked = pick_pixels(view, patch, 4000, 1, 1);
   bool left = false, right = false;
   for (const std::uint32_t pixel : picked.pixels) {
     const int x = int(pixel % 80);
@@ -54,7 +54,7 @@ TEST(RandomPatch, LiesInTheViewHasTheAskedSizeAndReachesEveryBorder) {
   std::set<int> sides;
   bool left = false, right = false, top = false, bottom = false;
   for (std::uint64_t i = 0; i < 3000; ++i) {
-    const PatchPlace place = random_patch(views, 0, 0.3, 0.7, 7, i);
+    const PatchPlace place = random_patch(views, 0, {0.3, 0.7}, 7, i);
     sides.insert(place.side);
     ASSERT_TRUE(place.left >= 0 && place.left + place.side <= 80 && place.top >= 0 && place.top + place.side <= 60);
     left |= place.left == 0;
@@ -70,7 +70,7 @@ TEST(RandomPatch, LiesInTheViewHasTheAskedSizeAndReachesEveryBorder) {
 TEST(RandomPatch, IsAFunctionOfSeedAndIndex) {
   const std::vector<CachedView> views = {some_view()};
   const auto text = [&](std::uint64_t seed, std::uint64_t index) {
-    const PatchPlace place = random_patch(views, 0, 0.3, 0.7, seed, index);
+    const PatchPlace place = random_patch(views, 0, {0.3, 0.7}, seed, index);
     return std::to_string(place.left) + "," + std::to_string(place.top) + "," + std::to_string(place.side);
   };
   EXPECT_EQ(text(1, 5), text(1, 5));
@@ -82,7 +82,7 @@ TEST(NearPatch, LiesInTheViewAndShowsMostOfTheSamePlace) {
   const std::vector<CachedView> views = {some_view()};
   std::set<int> lefts;
   for (std::uint64_t i = 0; i < 500; ++i) {
-    const PatchPlace place = random_patch(views, 0, 0.7, 0.7, 7, i), other = near_patch(views, place, 7, 1000 + i);
+    const PatchPlace place = random_patch(views, 0, {0.7, 0.7}, 7, i), other = near_patch(views, place, 7, 1000 + i);
     ASSERT_TRUE(other.left >= 0 && other.left + other.side <= 80 && other.top >= 0 && other.top + other.side <= 60);
     EXPECT_EQ(other.view, place.view);
     EXPECT_EQ(other.index, 1000 + i);
@@ -116,7 +116,7 @@ TEST(PickPixels, TakesVisiblePixelsOfTheSquareWithTheirOwnColours) {
       ab[std::size_t(k * k + y * k + x)] = float(place.top) + (float(y) + 0.5f) * 0.5f - 0.5f;
     }
   }
-  const PatchPixels picked = pick_pixels(view, place, k, ab, 2000, 3, 4);
+  const PatchPixels picked = pick_pixels(view, {place, k, {}, ab}, 2000, 3, 4);
   ASSERT_EQ(picked.pixels.size(), picked.colors.size());
   EXPECT_GT(picked.pixels.size(), 1000u);
   for (std::size_t i = 0; i < picked.pixels.size(); ++i) {

@@ -10,7 +10,7 @@
 #include "src/base/files.h"
 #include "tests/support/data.h"
 
-namespace cnerf::web {
+namespace cnerf {
 namespace {
 namespace fs = std::filesystem;
 
@@ -203,4 +203,4 @@ TEST(WebServer, EventsFollowTheFeed) {
 }
 
 }  // namespace
-}  // namespace cnerf::web
+}  // namespace cnerf

@@ -2,7 +2,7 @@
 
 #include <cstdlib>
 
-namespace cnerf::web {
+namespace cnerf {
 namespace fs = std::filesystem;
 
 std::vector<fs::path> page_folders() {
@@ -23,4 +23,4 @@ fs::path find_page() {
   return {};
 }
 
-}  // namespace cnerf::web
+}  // namespace cnerf

@@ -16,8 +16,10 @@ struct LabPicture {
   std::vector<float> ab;         ///< [2, H, W]
 };
 
+struct StyleNetwork;
+
 /// Mean over feature vectors of 1 - cosine to the most similar feature vector of the reference (ARF, Eq. 1), summed
-/// over layers. LibTorch computes it, on CUDA where it can.
+/// over layers. LibTorch computes it, in a plug-in, on CUDA where it can.
 class StyleLoss {
  public:
   static constexpr int kLeastSide = 32;  ///< pixels of a picture's shorter side
@@ -37,8 +39,7 @@ class StyleLoss {
   [[nodiscard]] const std::string& network() const;  ///< "AlexNet", or the file's name
 
  private:
-  struct Network;
-  std::unique_ptr<Network> network_;
+  std::unique_ptr<StyleNetwork> network_;
 };
 
 }  // namespace cnerf::compare

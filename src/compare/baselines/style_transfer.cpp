@@ -10,9 +10,10 @@
 #include "src/base/usage.h"
 #include "src/capture/color_truth.h"
 #include "src/color/colorspace_math.h"
-#include "src/train/color_model.h"
-#include "src/train/luminance_model.h"
-#include "src/train/patches.h"
+#include "src/compare/stage2_variants.h"
+#include "src/train/chroma/color_model.h"
+#include "src/train/chroma/patches.h"
+#include "src/train/luminance/luminance_model.h"
 
 namespace cnerf::compare {
 namespace {
@@ -100,9 +101,8 @@ StyleReport transfer_style(const Capture& capture, const std::filesystem::path& 
                            const std::filesystem::path& take_snapshot, const Engines& engines, Observer& observer) {
   const Stopwatch watch;
   std::vector<StyledView> views = styled_views(capture, LuminanceModel::load(stage1_snapshot, engines), observer);
-  Stage2Options photometric = options;
-  photometric.injection = "photometric";
-  ColorModel model = ColorModel::create(photometric, engines);
+  ColorModel model = ColorModel::create(options, engines);
+  model.pixel_colors = PixelColors::kField;
   model.colorizer = "style:" + loss.network();
   model.stage1_sha256 = sha256(read_binary_file(stage1_snapshot));
 

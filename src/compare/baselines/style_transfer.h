@@ -12,7 +12,7 @@
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/compare/baselines/style_loss.h"
-#include "src/train/stage2.h"
+#include "src/train/chroma/stage2.h"
 
 namespace cnerf::compare {
 

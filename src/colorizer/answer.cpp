@@ -1,0 +1,71 @@
+// What every answer is held to: its shape and values, and how it becomes one colour per pixel.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "src/base/check.h"
+#include "src/base/error.h"
+#include "src/color/ab_bins.h"
+#include "src/colorizer/colorizer.h"
+
+namespace cnerf {
+namespace {
+
+std::string size_text(int batch, int height, int width) {
+  return std::to_string(batch) + " patches of " + std::to_string(width) + "x" + std::to_string(height);
+}
+
+void check_values(const std::string& colorizer, const char* what, const std::vector<float>& values, int channels,
+                  const ChromaBatch& answer) {
+  const std::size_t expected =
+      std::size_t(answer.batch) * std::size_t(channels) * std::size_t(answer.height) * std::size_t(answer.width);
+  if (values.size() != expected) {
+    throw ColorizerError(colorizer + ": expected " + std::to_string(expected) + " values of " + what + ", got " +
+                         std::to_string(values.size()));
+  }
+  const auto bad = std::find_if_not(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
+  if (bad != values.end()) {
+    throw ColorizerError(colorizer + ": " + what + " value " + std::to_string(bad - values.begin()) +
+                         " is not a finite number");
+  }
+}
+
+}  // namespace
+
+void check_answer(const std::string& colorizer, const LightnessBatch& question, const ChromaBatch& answer) {
+  if (answer.batch != question.batch || answer.height != question.height || answer.width != question.width) {
+    throw ColorizerError(colorizer + ": asked about " + size_text(question.batch, question.height, question.width) +
+                         ", answered " + size_text(answer.batch, answer.height, answer.width));
+  }
+  if (answer.ab.empty() == answer.logits.empty() && !question.lightness.empty()) {
+    throw ColorizerError(colorizer + ": expected either ab or a distribution over " + std::to_string(kAbBinCount) +
+                         " bins, got " + (answer.ab.empty() ? "neither" : "both"));
+  }
+  if (answer.has_distribution()) {
+    check_values(colorizer, "logits", answer.logits, kAbBinCount, answer);
+  } else {
+    check_values(colorizer, "ab", answer.ab, 2, answer);
+  }
+}
+
+std::vector<float> ab_of(const ChromaBatch& answer, int index) {
+  CNERF_CHECK(index >= 0 && index < answer.batch, "entry " + std::to_string(index));
+  const std::size_t pixels = std::size_t(answer.height) * std::size_t(answer.width);
+  if (!answer.has_distribution()) {
+    const float* first = answer.ab.data() + std::size_t(index) * 2 * pixels;
+    return {first, first + 2 * pixels};
+  }
+  const float* logits = answer.logits.data() + std::size_t(index) * kAbBinCount * pixels;
+  std::vector<float> ab(2 * pixels);
+  std::array<float, kAbBinCount> of_pixel{};
+  for (std::size_t i = 0; i < pixels; ++i) {
+    for (std::size_t bin = 0; bin < kAbBinCount; ++bin) of_pixel[bin] = logits[bin * pixels + i];
+    const Ab color = decode_annealed_mean(of_pixel, kAnswerTemperature);
+    ab[i] = color.a;
+    ab[pixels + i] = color.b;
+  }
+  return ab;
+}
+
+}  // namespace cnerf

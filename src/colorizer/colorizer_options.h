@@ -1,0 +1,31 @@
+#pragma once
+/// What a user says about colours: which colorizer, and what is known already.
+
+#include <string>
+
+#include "src/base/options.h"
+
+namespace cnerf {
+
+struct ColorizerOptions {
+  std::string spec;  // empty = none given
+  std::string keyframes, hint_images, hints, prompt;
+  double timeout_seconds = 60;
+  int reference_steps = 480;
+  bool reference_on_builtin = true;
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("spec", spec,
+      "builtin, reference:IMAGE..., torchscript:FILE, onnx:FILE, caffe:PROTO,MODEL, exec:COMMAND or grey");
+    v("keyframes", keyframes, "painted frames of the capture, VIEW=FILE;...");
+    v("hint_images", hint_images, "pictures that are transparent except for strokes, VIEW=FILE;...");
+    v("hints", hints, "dots of colour, x,y,VIEW,#rrggbb;... in pixels of the view's image file");
+    v("prompt", prompt, "a text for colorizers that take one: exec: commands with {prompt} in them");
+    v("timeout_seconds", timeout_seconds, Range{0.1, 1e6}, "an exec: colorizer that takes longer for a batch failed");
+    v("reference_steps", reference_steps, Range{1, 1e6}, "optimiser steps of the fit to a reference: photograph");
+    v("reference_on_builtin", reference_on_builtin, "that fit builds on what the built-in network makes of a picture");
+  }
+};
+
+}  // namespace cnerf

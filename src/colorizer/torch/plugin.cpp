@@ -1,0 +1,11 @@
+// The one symbol that the program asks libcnerf_torch.so for.
+
+#include <torch/version.h>
+
+#include "src/colorizer/torch_plugin.h"
+
+extern "C" __attribute__((visibility("default"))) const cnerf::TorchColorizers* cnerf_torch_colorizers() {
+  static const cnerf::TorchColorizers colorizers{cnerf::make_builtin_colorizer, cnerf::make_reference_colorizer,
+                                                 cnerf::make_torchscript_colorizer, TORCH_VERSION};
+  return &colorizers;
+}

@@ -1,0 +1,141 @@
+// Fitted weights are kept in the cache folder, so that a resumed run asks the very network the first one fitted.
+
+#include "src/colorizer/torch/reference_colorizer.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <optional>
+#include <span>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/colorizer/kinds.h"
+#include "src/colorizer/torch/builtin_colorizer.h"
+#include "src/colorizer/torch/reference_images.h"
+
+namespace cnerf {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The files of a folder in the order of their names, or the file itself.
+std::vector<fs::path> files_of(const fs::path& place) {
+  if (!fs::is_directory(place)) return {place};
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(place)) {
+    const bool hidden = entry.path().filename().string().front() == '.';
+    if (entry.is_regular_file() && !hidden) files.push_back(entry.path());
+  }
+  if (files.empty()) throw MissingInputError(place.string() + ": holds no reference photographs");
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// `a.jpg,b.jpg` or a folder; a file whose own name holds commas is found before the text is split.
+std::vector<fs::path> reference_files(const ColorizerRequest& request) {
+  const std::string& argument = request.argument;
+  const fs::path& folder = request.context.working_folder;
+  if (fs::exists(argument) || (!folder.empty() && fs::exists(folder / argument))) {
+    return files_of(find_spec_file(argument, request));
+  }
+  std::vector<fs::path> files;
+  for (std::size_t begin = 0; begin <= argument.size();) {
+    const std::size_t end = std::min(argument.find(',', begin), argument.size());
+    if (end > begin) files.push_back(find_spec_file(argument.substr(begin, end - begin), request));
+    begin = end + 1;
+  }
+  if (files.empty()) throw UsageError("colorizer \"" + request.options.spec + "\": names no image");
+  return files;
+}
+
+std::string hash_of(const std::string& text) {
+  return sha256(std::as_bytes(std::span(text)));
+}
+
+/// All that decides the weights: the photographs' bytes, in their order, the recipe and the seed.
+std::string cache_key(const std::vector<fs::path>& files, const ReferenceRecipe& recipe, std::uint64_t seed) {
+  std::string text = recipe.text() + "; seed " + std::to_string(seed);
+  for (const fs::path& file : files) text += "; " + sha256(read_binary_file(file));
+  return hash_of(text).substr(0, 16);
+}
+
+constexpr std::array<char, 8> kWeightsMagic{'C', 'N', 'R', 'E', 'F', 'N', 'E', '1'};
+constexpr std::size_t kHashLength = 64;
+
+void save_weights(const fs::path& file, const std::vector<float>& weights) {
+  const auto bytes = std::as_bytes(std::span(weights));
+  const std::string hash = sha256(bytes);
+  std::vector<std::byte> content(kWeightsMagic.size() + hash.size() + bytes.size());
+  std::memcpy(content.data(), kWeightsMagic.data(), kWeightsMagic.size());
+  std::memcpy(content.data() + kWeightsMagic.size(), hash.data(), hash.size());
+  std::memcpy(content.data() + kWeightsMagic.size() + hash.size(), bytes.data(), bytes.size());
+  write_file(file, content);
+}
+
+/// Nothing when the file is missing, damaged or of another network: it is a cache, the fit can be repeated.
+std::optional<std::vector<float>> load_weights(const fs::path& file, std::size_t count) {
+  if (!fs::exists(file)) return std::nullopt;
+  const std::vector<std::byte> content = read_binary_file(file);
+  const std::size_t header = kWeightsMagic.size() + kHashLength;
+  if (content.size() != header + count * sizeof(float)) return std::nullopt;
+  if (std::memcmp(content.data(), kWeightsMagic.data(), kWeightsMagic.size()) != 0) return std::nullopt;
+  const auto payload = std::span(content).subspan(header);
+  if (std::memcmp(content.data() + kWeightsMagic.size(), sha256(payload).data(), kHashLength) != 0) {
+    return std::nullopt;
+  }
+  std::vector<float> weights(count);
+  std::memcpy(weights.data(), payload.data(), payload.size());
+  return weights;
+}
+
+class ReferenceColorizer final : public Colorizer {
+ public:
+  ReferenceColorizer(std::string name, ReferenceNetwork network)
+      : name_(std::move(name)), network_(std::move(network)) {}
+
+  ChromaBatch colorize(const LightnessBatch& patches) override {
+    ChromaBatch answer{patches.batch, patches.height, patches.width, network_.colorize(patches), {}};
+    check_answer(name_, patches, answer);
+    return answer;
+  }
+  [[nodiscard]] std::string name() const override { return name_; }
+
+ private:
+  std::string name_;
+  ReferenceNetwork network_;
+};
+
+}  // namespace
+
+std::unique_ptr<Colorizer> make_reference_colorizer(const ColorizerRequest& request) {
+  ReferenceRecipe recipe;
+  recipe.steps = request.options.reference_steps;
+  if (request.options.reference_on_builtin) recipe.builtin = builtin_weights_file();
+  return fit_reference_colorizer(request, recipe);
+}
+
+std::unique_ptr<Colorizer> fit_reference_colorizer(const ColorizerRequest& request, const ReferenceRecipe& recipe) {
+  const std::vector<fs::path> files = reference_files(request);
+  std::vector<ReferenceImage> images;
+  for (const fs::path& file : files) images.push_back(load_reference_image(file));
+
+  const ColorizerContext& context = request.context;
+  const std::string name = "reference:" + request.argument;
+  ReferenceNetwork network(recipe, images, context.seed);
+  const fs::path cache =
+      context.cache_folder.empty()
+          ? fs::path()
+          : context.cache_folder / ("reference-" + cache_key(files, recipe, context.seed) + ".weights");
+  if (!cache.empty()) {
+    if (const auto weights = load_weights(cache, network.weights().size())) {
+      network.set_weights(*weights);
+      return std::make_unique<ReferenceColorizer>(name, std::move(network));
+    }
+  }
+  network.fit(images, context.progress);
+  if (!cache.empty()) save_weights(cache, network.weights());
+  return std::make_unique<ReferenceColorizer>(name, std::move(network));
+}
+
+}  // namespace cnerf

@@ -1,0 +1,398 @@
+#include "src/colorizer/torch/reference_network.h"
+
+#include <torch/torch.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <sstream>
+
+#include "src/base/check.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/base/parallel.h"
+#include "src/color/ab_bins.h"
+#include "src/colorizer/torch/network_weights.h"
+#include "src/colorizer/torch/single_threaded_ops.h"
+
+namespace cnerf {
+namespace {
+
+namespace nn = torch::nn;
+using torch::Tensor;
+
+constexpr float kAbScale = 40.0f;  // network units of ab: keeps outputs near 1
+
+/// Convolution, SiLU. No normalisation: with it, the same time of fitting ends at colours a tenth further from the
+/// truth.
+struct BlockImpl : nn::Module {
+  BlockImpl(int in, int out, int stride, int dilation = 1)
+      : conv(register_module(
+            "conv", nn::Conv2d(nn::Conv2dOptions(in, out, 3).stride(stride).padding(dilation).dilation(dilation)))) {}
+  Tensor forward(const Tensor& x) { return torch::silu(conv(x)); }
+
+  nn::Conv2d conv;
+};
+TORCH_MODULE(Block);
+
+/// What the frozen built-in network makes of a picture; empty without one.
+struct Guidance {
+  static constexpr std::size_t kSemanticLevel = 3, kAbLevel = 1;  // of the U-Net, at the same resolution
+  Tensor semantic;  ///< [B, ColorizerNetImpl::kSemanticChannels, H/16, W/16]
+  Tensor ab;        ///< [B, 2, H/4, W/4], network units
+};
+
+/// U-Net from lightness at full size to `outputs` channels at half size.
+struct UNetImpl : nn::Module {
+  UNetImpl(const ReferenceRecipe& recipe, int outputs) : recipe_(recipe) {
+    const auto& c = recipe.channels;
+    int in = recipe.local_statistics ? 5 : 1;
+    for (std::size_t level = 0; level < c.size(); ++level) {
+      down.push_back(register_module("down" + std::to_string(level), Block(in, c[level], 2)));
+      encode.push_back(register_module("encode" + std::to_string(level), Block(c[level], c[level], 1)));
+      in = c[level];
+    }
+    wide = register_module("wide", Block(in, in, 1, 2));
+    global = register_module("global", nn::Conv2d(nn::Conv2dOptions(in, in, 1)));
+    for (std::size_t level = c.size() - 1; level-- > 0;) {
+      const std::string name = std::to_string(level);
+      lateral.push_back(
+          register_module("lateral" + name, nn::Conv2d(nn::Conv2dOptions(c[level + 1], c[level], 1).bias(false))));
+      decode.push_back(register_module("decode" + name, Block(c[level], c[level], 1)));
+    }
+    head = register_module("head", nn::Conv2d(nn::Conv2dOptions(c[0], outputs, 1)));
+    if (recipe.builtin.empty()) return;
+    CNERF_CHECK(c.size() > Guidance::kSemanticLevel, "as many levels as the built-in network's features need");
+    CNERF_CHECK_EQ(recipe.patch_size % ColorizerNetImpl::kInputMultiple, 0);
+    guide_semantic = register_module("guide_semantic", nn::Conv2d(nn::Conv2dOptions(ColorizerNetImpl::kSemanticChannels,
+                                                                                    c[Guidance::kSemanticLevel], 1)));
+    guide_ab = register_module("guide_ab", nn::Conv2d(nn::Conv2dOptions(2, c[Guidance::kAbLevel], 3).padding(1)));
+  }
+
+  /// @param lightness  [B, 1, H, W] L*, H and W multiples of 2^levels.   @return [B, outputs, H/2, W/2]
+  Tensor forward(const Tensor& lightness, const Guidance& guidance) {
+    Tensor x = features(lightness);
+    x = x.contiguous(at::MemoryFormat::ChannelsLast);
+    std::vector<Tensor> skips;
+    for (std::size_t level = 0; level < down.size(); ++level) {
+      x = down[level](x);
+      if (guide_semantic && level == Guidance::kSemanticLevel) x = x + guide_semantic(guidance.semantic);
+      if (guide_ab && level == Guidance::kAbLevel) x = x + guide_ab(guidance.ab);
+      x = x + encode[level](x);
+      skips.push_back(x);
+    }
+    x = x + wide(x);
+    x = x + global(x.mean({2, 3}, true));
+    for (std::size_t i = 0; i < decode.size(); ++i) {
+      const Tensor& skip = skips[skips.size() - 2 - i];
+      x = torch::upsample_nearest2d(lateral[i](x), {skip.size(2), skip.size(3)}) + skip;
+      x = x + decode[i](x);
+    }
+    return head(x);
+  }
+
+  /// Lightness, what stands out of its surroundings at two scales, and how busy those are.
+  [[nodiscard]] Tensor features(const Tensor& lightness) const {
+    const Tensor level = (lightness - 50) / 50;
+    if (!recipe_.local_statistics) return level;
+    std::vector<Tensor> all{level};
+    for (const int reach : {3, 10}) {
+      const auto box = [reach = reach](const Tensor& x) {
+        // One axis after the other: the pooling itself is a plain loop over the window.
+        const Tensor padded = torch::replication_pad2d(x, {reach, reach, reach, reach});
+        return torch::avg_pool2d(torch::avg_pool2d(padded, {1, 2 * reach + 1}, {1, 1}), {2 * reach + 1, 1}, {1, 1});
+      };
+      const Tensor mean = box(level);
+      const Tensor deviation = (box(level * level) - mean * mean).clamp_min(0).add(1e-4).sqrt();
+      all.push_back((level - mean) / (deviation + 0.05));
+      all.push_back(deviation.log() * 0.5 + 1);
+    }
+    return torch::cat(all, 1);
+  }
+
+  std::vector<Block> down, encode, decode;
+  std::vector<nn::Conv2d> lateral;
+  Block wide{nullptr};
+  nn::Conv2d global{nullptr};
+  nn::Conv2d head{nullptr};
+  nn::Conv2d guide_semantic{nullptr}, guide_ab{nullptr};  // empty without guidance
+
+ private:
+  ReferenceRecipe recipe_;
+};
+TORCH_MODULE(UNet);
+
+/// Draws weights without touching LibTorch's global generator: convolutions before a SiLU by He et al. 2015, the others
+/// smaller. Biases start at 0.
+void initialise(UNet& net, std::uint64_t seed) {
+  torch::NoGradGuard no_grad;
+  SequentialRng rng(seed, named_stream("init"));
+  for (auto& item : net->named_parameters()) {
+    Tensor& parameter = item.value();
+    if (parameter.dim() < 2) {
+      parameter.zero_();
+      continue;
+    }
+    const double fan_in = double(parameter.numel()) / double(parameter.size(0));
+    const bool guide = item.key().rfind("guide", 0) == 0;
+    const bool last = item.key().rfind("head", 0) == 0, before_silu = item.key().find(".conv.") != std::string::npos;
+    const double gain = guide ? 0 : last ? 0.1 : before_silu ? 1.4 : 0.6;
+    Tensor values = torch::empty(parameter.sizes());
+    float* value = values.data_ptr<float>();
+    for (int64_t i = 0; i < values.numel(); ++i) value[i] = float(gain / std::sqrt(fan_in)) * rng.normal();
+    parameter.copy_(values);
+  }
+}
+
+/// The bins that occur in the photographs: the classes of a network that classifies.
+std::vector<int> bins_in(std::span<const ReferenceImage> images) {
+  std::vector<std::size_t> count(kAbBinCount, 0);
+  std::size_t pixels = 0;
+  for (const ReferenceImage& image : images) {
+    const LabImage& level = image.levels[std::min<std::size_t>(1, image.levels.size() - 1)];
+    for (std::size_t i = 0; i < level.lab.size(); i += 3) {
+      ++count[std::size_t(nearest_bin({level.lab[i + 1], level.lab[i + 2]}))];
+      ++pixels;
+    }
+  }
+  std::vector<int> bins;
+  for (int bin = 0; bin < kAbBinCount; ++bin) {
+    if (count[std::size_t(bin)] * 20000 > pixels) bins.push_back(bin);
+  }
+  return bins;
+}
+
+/// Soft labels over the classes, looked up by ab rounded to whole units: searching the bins for every pixel of every
+/// patch would take a tenth of the fit.
+class LabelTable {
+ public:
+  struct Entry {
+    std::array<int64_t, kSoftLabelBins> index{};
+    std::array<float, kSoftLabelBins> weight{};  // bins that are no class have none
+  };
+
+  explicit LabelTable(const std::vector<int>& class_of) : entries_(std::size_t(kSide) * kSide) {
+    for (int a = 0; a < kSide; ++a) {
+      for (int b = 0; b < kSide; ++b) {
+        const SoftLabel label = soft_label({float(a - kReach), float(b - kReach)});
+        Entry& entry = entries_[std::size_t(a) * kSide + std::size_t(b)];
+        for (std::size_t k = 0; k < kSoftLabelBins; ++k) {
+          const int found = class_of[std::size_t(label.bin[k])];
+          entry.index[k] = std::max(found, 0);
+          entry.weight[k] = found < 0 ? 0.0f : label.weight[k];
+        }
+      }
+    }
+  }
+  [[nodiscard]] const Entry& at(float a, float b) const {
+    const auto cell = [](float v) { return std::size_t(std::clamp(int(std::lround(v)) + kReach, 0, kSide - 1)); };
+    return entries_[cell(a) * kSide + cell(b)];
+  }
+
+ private:
+  static constexpr int kReach = 115, kSide = 2 * kReach + 1;
+  std::vector<Entry> entries_;
+};
+
+}  // namespace
+
+std::string ReferenceRecipe::text() const {
+  std::ostringstream text;
+  text << "reference network 3; channels";
+  for (int c : channels) text << ' ' << c;
+  text << "; patch " << patch_size << "; steps " << steps << "; batch " << batch << '/' << shards << "; rate "
+       << learning_rate << "; decay " << weight_decay << "; classify " << classify << ' ' << temperature
+       << "; statistics " << local_statistics << "; share " << distortion.share_min << ' ' << distortion.share_max
+       << "; rotation " << distortion.rotation << "; stretch " << distortion.stretch << "; flip " << distortion.flip
+       << "; tone " << distortion.log_gamma << ' ' << distortion.contrast << "; blur " << distortion.blur << "; noise "
+       << distortion.noise;
+  if (!builtin.empty()) text << "; on " << sha256(read_binary_file(builtin));
+  return text.str();
+}
+
+struct ReferenceNetwork::Parts {
+  ReferenceRecipe recipe;
+  std::uint64_t seed = 0;
+  std::vector<int> bins;               // classes; empty when it regresses
+  std::unique_ptr<LabelTable> labels;  // likewise
+  Tensor centres;                      // [2, classes, 1, 1]
+  UNet net{nullptr};
+  std::optional<ColorizerWeights> builtin;
+
+  [[nodiscard]] Guidance guidance(const Tensor& lightness) const {
+    if (!builtin) return {};
+    const torch::NoGradGuard no_grad;
+    const ColorizerFeatures features = ColorizerNet(builtin->network)->features(lightness);
+    return {features.semantic, decode_ab(features.logits, builtin->decoding) / kAbScale};
+  }
+  [[nodiscard]] Tensor decode(const Tensor& out) const {
+    if (!recipe.classify) return out * kAbScale;
+    const Tensor p = torch::softmax(out / recipe.temperature, 1);
+    return torch::conv2d(p, centres);
+  }
+  [[nodiscard]] Tensor loss(const Tensor& out, const Tensor& ab) const {
+    return recipe.classify ? class_loss(out, ab) : distance_loss(out, ab);
+  }
+  /// Mean ab distance, smooth below 1: what the fit is measured by, and robust, so that colours stay vivid.
+  [[nodiscard]] Tensor distance_loss(const Tensor& out, const Tensor& ab) const {
+    return ((out * kAbScale - ab).square().sum(1) + 1).sqrt().mean() / kAbScale;
+  }
+  [[nodiscard]] Tensor class_loss(const Tensor& out, const Tensor& ab) const;
+  [[nodiscard]] std::vector<Tensor> shard_gradients(std::span<const ReferenceImage> images, int step, int shard,
+                                                    double* loss) const;
+};
+
+Tensor ReferenceNetwork::Parts::class_loss(const Tensor& out, const Tensor& ab) const {
+  const int64_t pixels = ab.size(2) * ab.size(3), batch = ab.size(0);
+  Tensor index = torch::empty({batch, kSoftLabelBins, ab.size(2), ab.size(3)}, torch::kInt64);
+  Tensor weight = torch::empty({batch, kSoftLabelBins, ab.size(2), ab.size(3)});
+  const Tensor source = ab.contiguous();
+  for (int64_t n = 0; n < batch; ++n) {
+    const float* color = source.data_ptr<float>() + n * 2 * pixels;
+    int64_t* to_index = index.data_ptr<int64_t>() + n * kSoftLabelBins * pixels;
+    float* to_weight = weight.data_ptr<float>() + n * kSoftLabelBins * pixels;
+    for (int64_t i = 0; i < pixels; ++i) {
+      const LabelTable::Entry& label = labels->at(color[i], color[pixels + i]);
+      for (std::size_t k = 0; k < kSoftLabelBins; ++k) {
+        to_index[int64_t(k) * pixels + i] = label.index[k];
+        to_weight[int64_t(k) * pixels + i] = label.weight[k];
+      }
+    }
+  }
+  const Tensor log_p = torch::log_softmax(out, 1);
+  return -(log_p.gather(1, index) * weight).sum(1).mean();
+}
+
+std::vector<Tensor> ReferenceNetwork::Parts::shard_gradients(std::span<const ReferenceImage> images, int step,
+                                                             int shard, double* loss_value) const {
+  const int count = recipe.batch / recipe.shards, size = recipe.patch_size;
+  const std::size_t pixels = std::size_t(size) * std::size_t(size);
+  Tensor lightness = torch::empty({count, 1, size, size}), ab = torch::empty({count, 2, size, size});
+  for (int i = 0; i < count; ++i) {
+    SequentialRng rng(seed, (std::uint64_t(step) << 16) + std::uint64_t(shard * count + i) + 1);
+    sample_reference_patch(images, recipe.distortion, size, rng,
+                           {lightness.data_ptr<float>() + std::size_t(i) * pixels, pixels},
+                           {ab.data_ptr<float>() + std::size_t(i) * 2 * pixels, 2 * pixels});
+  }
+  const Tensor value = loss(UNet(net)->forward(lightness, guidance(lightness)), torch::avg_pool2d(ab, {2, 2}));
+  *loss_value = value.item<double>();
+  return torch::autograd::grad({value}, net->parameters());
+}
+
+ReferenceNetwork::ReferenceNetwork(const ReferenceRecipe& recipe, std::span<const ReferenceImage> images,
+                                   std::uint64_t seed)
+    : parts_(std::make_unique<Parts>()) {
+  CNERF_CHECK_EQ(recipe.batch % recipe.shards, 0);
+  parts_->recipe = recipe;
+  parts_->seed = seed;
+  if (recipe.classify) {
+    parts_->bins = bins_in(images);
+    std::vector<int> class_of(kAbBinCount, -1);
+    parts_->centres = torch::empty({2, int64_t(parts_->bins.size()), 1, 1});
+    for (std::size_t i = 0; i < parts_->bins.size(); ++i) {
+      const Ab centre = ab_bin_centres()[std::size_t(parts_->bins[i])];
+      class_of[std::size_t(parts_->bins[i])] = int(i);
+      parts_->centres[0][int64_t(i)] = centre.a;
+      parts_->centres[1][int64_t(i)] = centre.b;
+    }
+    parts_->labels = std::make_unique<LabelTable>(class_of);
+  }
+  if (!recipe.builtin.empty()) {
+    parts_->builtin = load_colorizer_weights(recipe.builtin);
+    // Once here, instead of in every convolution of every step.
+    for (Tensor& parameter : parts_->builtin->network->parameters()) {
+      parameter.set_requires_grad(false);
+      if (parameter.dim() == 4) parameter.set_data(parameter.contiguous(at::MemoryFormat::ChannelsLast));
+    }
+  }
+  parts_->net = UNet(recipe, recipe.classify ? int(parts_->bins.size()) : 2);
+  initialise(parts_->net, seed);
+}
+
+ReferenceNetwork::~ReferenceNetwork() = default;
+ReferenceNetwork::ReferenceNetwork(ReferenceNetwork&&) noexcept = default;
+
+void ReferenceNetwork::fit(std::span<const ReferenceImage> images, const ProgressSink& progress) {
+  const ReferenceRecipe& recipe = parts_->recipe;
+  const SingleThreadedOps single;
+  std::vector<Tensor> parameters = parts_->net->parameters();
+  torch::optim::AdamW optimizer(
+      parameters,
+      torch::optim::AdamWOptions(recipe.learning_rate).weight_decay(recipe.weight_decay).betas({0.9, 0.99}));
+  double smoothed = 0;
+  for (int step = 0; step < recipe.steps; ++step) {
+    if (interruption_requested()) throw Interrupted("stopped while fitting the reference network; nothing was kept");
+    std::vector<std::vector<Tensor>> gradients(std::size_t(recipe.shards));
+    std::vector<double> losses(std::size_t(recipe.shards));
+    parallel_tasks(std::size_t(recipe.shards), [&](std::size_t shard) {
+      at::init_num_threads();
+      gradients[shard] = parts_->shard_gradients(images, step, int(shard), &losses[shard]);
+    });
+    torch::NoGradGuard no_grad;
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      Tensor sum = gradients[0][i].clone();
+      for (std::size_t shard = 1; shard < gradients.size(); ++shard) sum += gradients[shard][i];
+      parameters[i].mutable_grad() = sum / recipe.shards;
+    }
+    const double done = double(step) / recipe.steps, warm = std::min(1.0, (step + 1) / 30.0);
+    const double rate = recipe.learning_rate * warm * 0.5 * (1 + std::cos(std::numbers::pi * done));
+    static_cast<torch::optim::AdamWOptions&>(optimizer.param_groups()[0].options()).lr(rate);
+    torch::nn::utils::clip_grad_norm_(parameters, 1.0);
+    optimizer.step();
+    double loss = 0;
+    for (double value : losses) loss += value / recipe.shards;
+    smoothed = step == 0 ? loss : 0.95 * smoothed + 0.05 * loss;
+    if (progress && step % 10 == 9) {
+      progress({"reference colorizer", double(step + 1) / recipe.steps, {{"loss", smoothed}}});
+    }
+  }
+}
+
+std::vector<float> ReferenceNetwork::colorize(const LightnessBatch& patches, bool mirror) const {
+  const SingleThreadedOps single;
+  const int64_t height = patches.height, width = patches.width, pixels = height * width;
+  const int64_t multiple =
+      std::max(int64_t(1) << parts_->recipe.channels.size(), parts_->builtin ? ColorizerNetImpl::kInputMultiple : 1);
+  const auto rounded = [&](int64_t n) { return (n + multiple - 1) / multiple * multiple; };
+  std::vector<float> answer(std::size_t(patches.batch) * 2 * std::size_t(pixels));
+  parallel_tasks(std::size_t(patches.batch), [&](std::size_t i) {
+    at::init_num_threads();
+    torch::NoGradGuard no_grad;
+    Tensor lightness =
+        torch::from_blob(const_cast<float*>(patches.lightness.data()) + i * std::size_t(pixels), {1, 1, height, width});
+    lightness = torch::replication_pad2d(lightness, {0, rounded(width) - width, 0, rounded(height) - height});
+    if (mirror) lightness = torch::cat({lightness, lightness.flip({3})});
+    UNet net(parts_->net);
+    Tensor ab = parts_->decode(net->forward(lightness, parts_->guidance(lightness)));
+    if (mirror) ab = (ab.slice(0, 0, 1) + ab.slice(0, 1, 2).flip({3})) / 2;
+    ab = torch::upsample_bilinear2d(ab, {rounded(height), rounded(width)}, false);
+    ab = ab.slice(2, 0, height).slice(3, 0, width).contiguous();
+    std::copy_n(ab.data_ptr<float>(), 2 * pixels, answer.data() + i * 2 * std::size_t(pixels));
+  });
+  return answer;
+}
+
+std::vector<float> ReferenceNetwork::weights() const {
+  std::vector<float> all;
+  for (const Tensor& parameter : parts_->net->parameters()) {
+    const Tensor flat = parameter.detach().contiguous();
+    all.insert(all.end(), flat.data_ptr<float>(), flat.data_ptr<float>() + flat.numel());
+  }
+  return all;
+}
+
+void ReferenceNetwork::set_weights(std::span<const float> weights) {
+  torch::NoGradGuard no_grad;
+  std::size_t at = 0;
+  for (Tensor& parameter : parts_->net->parameters()) {
+    const auto count = std::size_t(parameter.numel());
+    CNERF_CHECK(at + count <= weights.size(), "too few weights");
+    parameter.copy_(torch::from_blob(const_cast<float*>(weights.data()) + at, parameter.sizes()));
+    at += count;
+  }
+  CNERF_CHECK_EQ(at, weights.size());
+}
+
+}  // namespace cnerf

@@ -1,0 +1,64 @@
+#pragma once
+/// A small convolutional network fitted to a few photographs of one scene, from lightness to ab. Torch stays in the
+/// .cpp.
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/base/progress.h"
+#include "src/colorizer/colorizer.h"
+#include "src/colorizer/torch/reference_images.h"
+
+namespace cnerf {
+
+/// Everything that decides what a fit gives, besides photographs and seed.
+struct ReferenceRecipe {
+  std::vector<int> channels = {24, 48, 64, 96, 96};  ///< per level; the first is at half the patch's size
+  int patch_size = 128;
+  int steps = 480;
+  int batch = 4;
+  int shards = 4;  ///< a batch's fixed parts; each is one task, so that results do not depend on the threads
+  double learning_rate = 4e-3;
+  double weight_decay = 1e-2;
+  bool classify = true;    ///< soft labels over the photographs' bins, instead of ab itself
+  double temperature = 1;  ///< of the annealed mean, when it classifies
+  bool local_statistics = true;
+  /// Weights of the built-in network; empty = none. It is frozen, and the network fitted here reads what it makes of
+  /// the picture: its inner features and its colours (ladder side-tuning, Sung et al. 2022). These paths start at zero,
+  /// so that the photographs decide how much of it is used.
+  std::filesystem::path builtin;
+  PatchDistortion distortion;
+
+  /// All settings as text: part of a cache's key.
+  [[nodiscard]] std::string text() const;
+};
+
+class ReferenceNetwork {
+ public:
+  /// Untrained, with weights drawn from `seed`.
+  ReferenceNetwork(const ReferenceRecipe& recipe, std::span<const ReferenceImage> images, std::uint64_t seed);
+  ~ReferenceNetwork();
+  ReferenceNetwork(ReferenceNetwork&&) noexcept;
+
+  /// Deterministic: the same photographs, recipe and seed give the same weights with any number of threads.
+  /// @throws Interrupted  on Ctrl-C.
+  void fit(std::span<const ReferenceImage> images, const ProgressSink& progress);
+
+  /// ab [B, 2, H, W] of lightness patches of any size; averages over the mirrored patch when `mirror`.
+  [[nodiscard]] std::vector<float> colorize(const LightnessBatch& patches, bool mirror = true) const;
+
+  /// All weights, in a fixed order, and back.  @throws ContractError  on another count.
+  [[nodiscard]] std::vector<float> weights() const;
+  void set_weights(std::span<const float> weights);
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace cnerf

@@ -1,0 +1,75 @@
+// torchscript:FILE, a scripted LibTorch module; docs/colorizers.md describes FILE.toml.
+
+#include <torch/script.h>
+#include <torch/version.h>
+
+#include "src/base/error.h"
+#include "src/colorizer/kinds.h"
+#include "src/colorizer/network_contract.h"
+
+namespace cnerf {
+namespace {
+
+namespace fs = std::filesystem;
+using torch::Tensor;
+
+/// What the interpreter reports: its own message stands last, below the stack.
+std::string script_message(const std::string& text) {
+  const std::size_t found = text.rfind("RuntimeError: ");
+  return first_line(found == std::string::npos ? text : text.substr(found));
+}
+
+std::string shape_text(const Tensor& tensor) {
+  std::string text = "[";
+  for (int64_t i = 0; i < tensor.dim(); ++i) text += (i > 0 ? ", " : "") + std::to_string(tensor.size(i));
+  return text + "]";
+}
+
+class TorchScriptColorizer final : public NetworkColorizer {
+ public:
+  TorchScriptColorizer(const fs::path& file, const std::string& shown)
+      : NetworkColorizer("torchscript:" + shown, contract_beside(file)) {
+    try {
+      module_ = torch::jit::load(file.string(), torch::kCPU);
+      module_.eval();
+    } catch (const std::exception& error) {
+      throw ColorizerError(name_ + ": not a TorchScript module LibTorch " TORCH_VERSION " can load, or cut short: " +
+                           first_line(error.what()));
+    }
+  }
+
+ private:
+  Planes run(const Planes& input) override {
+    const torch::NoGradGuard no_grad;
+    const Tensor question = torch::from_blob(const_cast<float*>(input.values.data()),
+                                             {input.batch, input.channels, input.height, input.width}, torch::kFloat32);
+    Tensor answer;
+    try {
+      const torch::IValue result = module_.forward({question});
+      if (result.isTensor()) answer = result.toTensor().to(torch::kCPU, torch::kFloat32).contiguous();
+    } catch (const std::exception& error) {
+      throw ColorizerError(name_ + ": failed on an input of " + input.shape_text() + ": " +
+                           script_message(error.what()));
+    }
+    if (!answer.defined()) throw ColorizerError(name_ + ": expected a tensor, got something else");
+    if (answer.dim() != 4) {
+      throw ColorizerError(name_ + ": expected four dimensions, [B, C, H, W], got " + shape_text(answer));
+    }
+    const auto* values = answer.data_ptr<float>();
+    return {int(answer.size(0)),
+            int(answer.size(1)),
+            int(answer.size(2)),
+            int(answer.size(3)),
+            {values, values + answer.numel()}};
+  }
+
+  torch::jit::Module module_;
+};
+
+}  // namespace
+
+std::unique_ptr<Colorizer> make_torchscript_colorizer(const ColorizerRequest& request) {
+  return std::make_unique<TorchScriptColorizer>(find_spec_file(request.argument, request), request.argument);
+}
+
+}  // namespace cnerf

@@ -1,0 +1,118 @@
+#include "src/train/chroma/color_model.h"
+
+#include <cmath>
+
+#include "src/base/parallel.h"
+#include "src/picture/picture.h"
+#include "src/train/luminance/options_json.h"
+
+namespace cnerf {
+namespace {
+
+constexpr const char* kKind = "take";
+
+constexpr const char* kFieldColors = "field";
+
+/// Takes of earlier versions say it by an option.
+PixelColors pixel_colors_of(const nlohmann::json& header) {
+  const bool is_field =
+      header.value("pixel_colors", "") == kFieldColors || header.at("options").value("injection", "") == "photometric";
+  return is_field ? PixelColors::kField : PixelColors::kDistribution;
+}
+
+float pixel_opacity(const PixelSamples& pixels, std::size_t p) {
+  float opacity = 0;
+  for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) opacity += pixels.weights[s];
+  return opacity;
+}
+
+}  // namespace
+
+Ab in_gamut(Ab color, float luminance) {
+  const Vec3f rgb = linear_rgb_at(luminance, color);
+  const Lab<float> lab = lab_from_linear_rgb(rgb);
+  return {lab.a, lab.b};
+}
+
+std::vector<float> pixel_luminance(const PixelSamples& pixels) {
+  std::vector<float> luminance(pixels.pixels(), 0.0f);
+  parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
+        luminance[p] += pixels.weights[s] * pixels.luminance[s];
+      }
+    }
+  });
+  return luminance;
+}
+
+ColorModel ColorModel::create(const Stage2Options& options, const Engines& engines) {
+  ColorModel model;
+  model.options = options;
+  const auto seed = std::uint64_t(options.seed);
+  model.chroma = engines.make_color_bins(options.grid, seed ^ named_stream("chr"));
+  model.chromaticity = engines.make_color_field(options.grid, seed ^ named_stream("xyz"));
+  return model;
+}
+
+std::vector<StatePiece> ColorModel::state() {
+  std::vector<StatePiece> pieces = chroma->state();
+  for (StatePiece& piece : chromaticity->state()) pieces.push_back(std::move(piece));
+  pieces.push_back(state_piece("queries", queries));
+  return pieces;
+}
+
+ColorModel ColorModel::load(const std::filesystem::path& file, const Engines& engines) {
+  const Snapshot snapshot(file, kKind);
+  ColorModel model;
+  try {
+    model = create(options_from_json<Stage2Options>(snapshot.header().at("options")), engines);
+    model.pixel_colors = pixel_colors_of(snapshot.header());
+    const nlohmann::json& report = snapshot.header().at("report");
+    SnapshotTimes times = load_times(file);
+    model.report = {report.at("accepted"),      report.at("rejected"),   times["seconds"],
+                    times["colorizer_seconds"], times["waited_seconds"], report.at("bake_ab_distance")};
+  } catch (const nlohmann::json::exception& problem) {
+    throw SnapshotError(file.string() + ": header: " + problem.what());
+  }
+  model.colorizer = header_field<std::string>(snapshot, "colorizer");
+  model.stage1_sha256 = header_field<std::string>(snapshot, "stage1_sha256");
+  snapshot.restore(model.state());
+  model.chroma->state_loaded();
+  model.chromaticity->state_loaded();
+  return model;
+}
+
+void ColorModel::save(const std::filesystem::path& file) {
+  save_snapshot(
+      file, kKind,
+      {{"options", options_to_json(options)},
+       {"pixel_colors", pixel_colors == PixelColors::kField ? kFieldColors : "distribution"},
+       {"colorizer", colorizer},
+       {"stage1_sha256", stage1_sha256},
+       {"report",
+        {{"accepted", report.accepted}, {"rejected", report.rejected}, {"bake_ab_distance", report.bake_ab_distance}}}},
+      state());
+  save_times(file, {{"seconds", report.seconds},
+                    {"colorizer_seconds", report.colorizer_seconds},
+                    {"waited_seconds", report.waited_seconds}});
+}
+
+std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {
+  std::vector<Ab> colors(pixels.pixels());
+  if (pixel_colors == PixelColors::kField) {
+    chromaticity->composite(pixels, colors);
+  } else {
+    chroma->decode(pixels, float(options.decode_temperature), colors);
+  }
+  const std::vector<float> luminance = pixel_luminance(pixels);
+  parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      const bool is_colored = pixel_opacity(pixels, p) >= kLeastColoredOpacity;
+      colors[p] = is_colored ? in_gamut(colors[p], luminance[p]) : Ab{};
+    }
+  });
+  return colors;
+}
+
+}  // namespace cnerf

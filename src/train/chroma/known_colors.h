@@ -1,0 +1,56 @@
+#pragma once
+/// Colours the user knows: painted frames of the capture (key frames) and strokes on its views (hints). They are
+/// trained on directly, through the camera of their view, and in every other view that shows the same surface. So one
+/// painted photograph colours the scene, and one stroke an object.
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/color/ab_bins.h"
+#include "src/train/luminance/view_cache.h"
+
+namespace cnerf {
+
+enum class KnownColorKind {
+  kKeyFrame,  ///< a whole picture
+  kStrokes,   ///< some pixels; their colours run over the surface around them
+};
+
+/// Colours of one training view, at any size of the view's shape.
+struct KnownColors {
+  KnownColorKind kind = KnownColorKind::kKeyFrame;
+  std::string view;  ///< name of the view, as the capture has it
+  int width = 0, height = 0;
+  std::vector<Ab> ab;                  ///< [H, W]
+  std::vector<std::uint8_t> is_known;  ///< [H, W] 0 or 1
+};
+
+/// For logs, metadata and comparing runs: " + key frame images/0007.png (1a2b3c4d)"; empty without any.
+[[nodiscard]] std::string describe(std::span<const KnownColors> known);
+
+/// How far a stroke's colour runs: until the way to a pixel has cost 1, where each of these costs as much.
+struct StrokeReach {
+  float share_of_short_side = 0.5f;  ///< of the picture, in the plane
+  float lightness = 12;              ///< L* up and down
+  float depth = 0.1f;                ///< of the distance, nearer and farther
+};
+
+/// Gives pixels around the strokes the colour of the stroke that is nearest by that cost.
+/// @param strokes  at the view's size
+/// @param surface  `surface_distance(view)`
+[[nodiscard]] KnownColors spread(const KnownColors& strokes, const CachedView& view, std::span<const float> surface,
+                                 const StrokeReach& reach = {});
+
+/// L* of a pixel, 0..100.
+[[nodiscard]] float lightness_at(const CachedView& view, std::size_t pixel);
+
+/// Distance to where half of a pixel's weight lies, unit space; 0 for a pixel that is hardly opaque.  [H, W]
+[[nodiscard]] std::vector<float> surface_distance(const CachedView& view);
+
+/// The colours at the size of a cached view; a pixel is known where most of what it covers is, and has the mean of
+/// that.
+[[nodiscard]] KnownColors resized_to(const KnownColors& known, const CachedView& view);
+
+}  // namespace cnerf

@@ -1,0 +1,75 @@
+#include "src/train/chroma/questioner.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "src/base/rng.h"
+#include "src/base/usage.h"
+
+namespace cnerf {
+namespace {
+
+// s of the training's patches (paper, Eq. patch sampling).
+constexpr double kSmallestPatch = 0.3, kLargestPatch = 0.7;
+
+}  // namespace
+
+void PatchQuestions::answer(const Session& session, std::span<AnsweredPatch> patches) {
+  const int k = session.options.patch_size;
+  LightnessBatch question{int(patches.size()), k, k, {}, {}};
+  for (const AnsweredPatch& patch : patches) {
+    const PatchPlace& place = patch.place;
+    const CachedView& view = session.views()[place.view];
+    const std::vector<float>& lightness = patch.shown.lightness;
+    question.lightness.insert(question.lightness.end(), lightness.begin(), lightness.end());
+    const double w = view.width, h = view.height;
+    question.origins.push_back(
+        {session.names()[place.view], place.left / w, place.top / h, place.side / w, place.side / h, place.index});
+  }
+  const ChromaBatch answer = session.colorizer.colorize(question);
+  check_answer(session.colorizer.name(), question, answer);
+  for (std::size_t i = 0; i < patches.size(); ++i) patches[i].ab = ab_of(answer, int(i));
+}
+
+Questioner::Questioner(Session& session, Questions& questions) : session_(session), questions_(questions) {
+  questions_.prepare(session_);
+}
+
+Answers Questioner::ask(std::span<const PatchPlace> places) const {
+  const Stopwatch watch;
+  Answers answers;
+  const int k = session_.options.patch_size;
+  for (const PatchPlace& place : places) {
+    answers.patches.push_back({place, k, render_patch(session_.views()[place.view], place, k), {}});
+  }
+  questions_.answer(session_, answers.patches);
+  answers.seconds = watch.seconds();
+  return answers;
+}
+
+std::vector<AnsweredPatch> Questioner::ask_all(const std::vector<PatchPlace>& places) {
+  const auto batch = std::size_t(session_.options.colorizer_batch);
+  std::vector<AnsweredPatch> answered;
+  for (std::size_t first = 0; first < places.size(); first += batch) {
+    Answers answers = ask(std::span(places).subspan(first, std::min(batch, places.size() - first)));
+    session_.model.report.colorizer_seconds += answers.seconds;
+    std::ranges::move(answers.patches, std::back_inserter(answered));
+  }
+  return answered;
+}
+
+void Questioner::ask_ahead(std::int64_t first) {
+  coming_ = std::async(std::launch::async, [this, first] {
+    const auto seed = std::uint64_t(session_.options.seed);
+    std::vector<PatchPlace> places;
+    for (int i = 0; i < session_.options.colorizer_batch; ++i) {
+      const auto index = std::uint64_t(first + i);
+      const CounterRng rng(seed, index);
+      const std::size_t view = rng.below(0, std::uint32_t(session_.views().size()));
+      places.push_back(random_patch(session_.views(), view, {kSmallestPatch, kLargestPatch}, seed, index));
+    }
+    return ask(places);
+  });
+}
+
+}  // namespace cnerf

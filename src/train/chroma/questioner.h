@@ -1,0 +1,58 @@
+#pragma once
+/// Questioner: shows patches to the colorizer, some of them ahead of their use.
+
+#include <future>
+#include <span>
+#include <vector>
+
+#include "src/train/chroma/patches.h"
+#include "src/train/chroma/session.h"
+
+namespace cnerf {
+
+/// Finds out the colours of patches. An extension point: the comparison has another one.
+class Questions {
+ public:
+  virtual ~Questions() = default;
+  /// Is called once, before the first question, with the views that there are to ask about.
+  virtual void prepare(Session& /*session*/) {}
+  /// One query. Is called from one thread at a time, but not always the same.
+  /// @param patches  have no colours yet
+  virtual void answer(const Session& session, std::span<AnsweredPatch> patches) = 0;
+};
+
+/// The method's own: the colorizer is asked about each patch.
+class PatchQuestions final : public Questions {
+ public:
+  void answer(const Session& session, std::span<AnsweredPatch> patches) override;
+};
+
+/// The answer to one query.
+struct Answers {
+  std::vector<AnsweredPatch> patches;
+  double seconds = 0;  ///< that rendering and colouring them took
+};
+
+class Questioner {
+ public:
+  /// Both are referred to.
+  Questioner(Session& session, Questions& questions);
+
+  /// Asks about places in queries of the options' size, one after another.
+  [[nodiscard]] std::vector<AnsweredPatch> ask_all(const std::vector<PatchPlace>& places);
+
+  /// The colorizer answers about the patches of numbers `first`, `first` + 1, … while others are trained on. One query
+  /// is under way at a time; which patches it shows depends on their numbers alone.
+  void ask_ahead(std::int64_t first);
+  /// Waits for what was asked ahead.
+  [[nodiscard]] Answers next() { return coming_.get(); }
+
+ private:
+  [[nodiscard]] Answers ask(std::span<const PatchPlace> places) const;
+
+  Session& session_;
+  Questions& questions_;
+  std::future<Answers> coming_;
+};
+
+}  // namespace cnerf

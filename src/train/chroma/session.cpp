@@ -1,0 +1,109 @@
+#include "src/train/chroma/session.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/picture/picture.h"
+#include "src/train/luminance/options_json.h"
+
+namespace cnerf {
+namespace {
+
+constexpr std::size_t kPreviews = 3;
+constexpr int kPreviewSide = 120;       // pixels of the shorter side
+constexpr double kPreviewShare = 0.95;  // of a pixel's weight
+
+}  // namespace
+
+float decayed(double from, double to, double fraction) {
+  return float(from * std::pow(to / from, std::clamp(2.0 * fraction - 1.0, 0.0, 1.0)));
+}
+
+Session::Session(const Stage2Job& job, Observer& observer)
+    : options(job.options),
+      colorizer(job.colorizer),
+      job_(job),
+      observer_(observer),
+      views_(job.views != nullptr ? *job.views : own_views_) {}
+
+void Session::start_or_resume(const Engines& engines, PixelColors pixel_colors) {
+  const std::string digest = sha256_of_file(job_.stage1), source = colorizer.name() + describe(job_.known);
+  const std::filesystem::path& file = job_.take;
+  if (!job_.resume || !std::filesystem::exists(file)) {
+    model = ColorModel::create(options, engines);
+    model.colorizer = source;
+    model.stage1_sha256 = digest;
+    model.pixel_colors = pixel_colors;
+    return;
+  }
+  model = ColorModel::load(file, engines);
+  if (model.stage1_sha256 != digest) {
+    throw SnapshotError(file.string() + ": colorizes another stage 1 snapshot; run without --resume");
+  }
+  if (model.colorizer != source || model.pixel_colors != pixel_colors ||
+      options_to_json(model.options) != options_to_json(options)) {
+    throw SnapshotError(file.string() +
+                        ": was made with another colorizer or other stage2 options; run with the "
+                        "same ones, or without --resume");
+  }
+  seconds_before_ = model.report.seconds;
+}
+
+void Session::cache_views(const Engines& engines) {
+  const LuminanceModel luminance = LuminanceModel::load(job_.stage1, engines);
+  if (observer_.wants_previews() && model.chroma) cache_previews(luminance);
+  views_.fill(*luminance.engine, luminance.march(), job_.capture, luminance.frame, options.working_resolution,
+              [this](double fraction) { report("stage 2: caching views", fraction); });
+}
+
+void Session::cache_previews(const LuminanceModel& luminance) {
+  for (const View& view : job_.capture.views) {
+    if (!view.held_out || previews_.size() >= kPreviews) continue;
+    const UnitCamera camera(view.intrinsics, view.world_from_camera, luminance.frame);
+    previews_.push_back(
+        {view.name, cache_view(*luminance.engine, luminance.march(), camera, kPreviewSide, kPreviewShare)});
+  }
+}
+
+PreviewPicture Session::preview(std::size_t index) const {
+  const auto& [name, view] = previews_[index % previews_.size()];
+  PreviewPicture picture{name, view.width, view.height, {}, view.luminance};
+  std::vector<ViewPixel> all(view.luminance.size());
+  for (std::size_t p = 0; p < all.size(); ++p) all[p].pixel = std::uint32_t(p);
+  const std::vector<Ab> colors = model.decode(pixel_samples(std::span(&view, 1), all));
+  for (std::size_t p = 0; p < all.size(); ++p) {
+    const Ab ab = view.opacity[p] < kLeastColoredOpacity ? Ab{} : colors[p];
+    const Vec3f rgb = linear_rgb_at(view.luminance[p], ab);
+    picture.ours.insert(picture.ours.end(), {rgb.x, rgb.y, rgb.z});
+  }
+  return picture;
+}
+
+void Session::report(const std::string& task, double fraction, Figures figures) {
+  const Stopwatch telling;
+  observer_.report_progress({task, std::min(fraction, 1.0), std::move(figures)});
+  if (!previews_.empty()) observer_.offer_preview([this](std::size_t index) { return preview(index); });
+  told_seconds_ += telling.seconds();
+  if (!observer_.is_cancelled()) return;
+  if (!model.chroma) throw Interrupted("stopped; nothing was written");
+  save();
+  throw Interrupted("stopped; saved " + job_.take.string() + ", continue with --resume");
+}
+
+void Session::after_step(const std::string& task, const std::string& loss_name, long done, int all) {
+  const Stage2Report& so_far = model.report;
+  const int asked = so_far.accepted + so_far.rejected;
+  report(task, double(done) / all,
+         {{loss_name, loss},
+          {"accepted", double(so_far.accepted) / std::max(asked, 1)},
+          {"waited s", so_far.waited_seconds}});
+}
+
+void Session::save() {
+  model.report.seconds = seconds_before_ + watch_.seconds() - told_seconds_;
+  model.save(job_.take);
+}
+
+}  // namespace cnerf

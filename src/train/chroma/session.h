@@ -1,0 +1,62 @@
+#pragma once
+/// Session: what all phases of one stage 2 share: the views, the model that grows, its clock, and who watches.
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "src/base/usage.h"
+#include "src/train/chroma/color_model.h"
+#include "src/train/chroma/stage2.h"
+#include "src/train/luminance/luminance_model.h"
+
+namespace cnerf {
+
+/// A step size that stays for the first half and then falls exponentially.
+/// @param fraction  of the steps that are done
+[[nodiscard]] float decayed(double from, double to, double fraction);
+
+class Session {
+ public:
+  /// Refers to both.
+  Session(const Stage2Job& job, Observer& observer);
+
+  /// A fresh model, or the take's where the job goes on with one.
+  /// @throws SnapshotError  the take was made otherwise.
+  void start_or_resume(const Engines& engines, PixelColors pixel_colors);
+  /// Traces what the views see, unless the job brings it.
+  void cache_views(const Engines& engines);
+
+  [[nodiscard]] std::span<const CachedView> views() const { return views_.views(); }
+  [[nodiscard]] std::span<const std::string> names() const { return views_.names(); }
+  [[nodiscard]] std::filesystem::path folder() const { return job_.take.parent_path(); }
+
+  using Figures = std::vector<std::pair<std::string, double>>;
+  /// Tells the observer, and saves and stops when it cancelled. Without a model there is nothing to save.  @throws
+  /// Interrupted.
+  void report(const std::string& task, double fraction, Figures figures = {});
+  /// The same with the figures of a step.
+  void after_step(const std::string& task, const std::string& loss_name, long done, int all);
+  void save();
+
+  const Stage2Options& options;
+  Colorizer& colorizer;
+  ColorModel model;
+  double loss = 0;  ///< of the last step
+
+ private:
+  void cache_previews(const LuminanceModel& luminance);
+  [[nodiscard]] PreviewPicture preview(std::size_t index) const;
+
+  const Stage2Job& job_;
+  Observer& observer_;
+  ViewCache own_views_;
+  ViewCache& views_;
+  std::vector<std::pair<std::string, CachedView>> previews_;  // of held-out views, small
+  Stopwatch watch_;
+  double seconds_before_ = 0, told_seconds_ = 0;  // an observer's pauses and pictures are no training
+};
+
+}  // namespace cnerf

@@ -1,0 +1,49 @@
+#include "src/train/chroma/stage2.h"
+
+#include "src/colorizer/purify.h"
+#include "src/train/chroma/base_chooser.h"
+#include "src/train/chroma/distillation.h"
+#include "src/train/chroma/galleries.h"
+#include "src/train/chroma/injection.h"
+
+namespace cnerf {
+namespace {
+
+Purifier purifier_of(const PurifyOptions& options, const std::vector<AnsweredPatch>& bases) {
+  std::vector<ColorPatchView> views;
+  for (const AnsweredPatch& base : bases) views.push_back(base.view());
+  return {options, views};
+}
+
+Stage2Report colorize(Session& session, const KnownColorMap& known, Questions& questions, const Injection& injection) {
+  Questioner questioner(session, questions);
+  const Purifier purifier = purifier_of(session.options.purify, BaseChooser(session, questioner).choose(known));
+  PatchTraining(session, injection, questioner, purifier, known).run();
+  if (injection.pixel_colors() == PixelColors::kDistribution) distill(session);
+  session.model.report.bake_ab_distance = bake_ab_distance(session);
+  session.save();
+  return session.model.report;
+}
+
+}  // namespace
+
+Stage2Report train_stage2(const Stage2Job& job, const Engines& engines, Observer& observer) {
+  PatchQuestions patches;
+  const Classification classification(job.options);
+  const Injection& injection = job.injection != nullptr ? *job.injection : classification;
+  Session session(job, observer);
+  session.start_or_resume(engines, injection.pixel_colors());
+  session.cache_views(engines);
+  const KnownColorMap known(session.views(), session.names(), job.known);
+  return colorize(session, known, job.questions != nullptr ? *job.questions : patches, injection);
+}
+
+void write_base_candidates(const Stage2Job& job, const Engines& engines, Observer& observer) {
+  PatchQuestions questions;
+  Session session(job, observer);
+  session.cache_views(engines);
+  Questioner questioner(session, questions);
+  write_candidates(job.take, BaseChooser(session, questioner).ask_candidates());
+}
+
+}  // namespace cnerf

@@ -1,0 +1,71 @@
+#include "src/train/luminance/exclusion.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "src/capture/arrangement.h"
+
+namespace cnerf {
+namespace {
+
+constexpr std::ptrdiff_t kAgreeingViews = 3;  // have to see what is in front of what they look at
+constexpr std::ptrdiff_t kViewsPerVote = 4;   // of small captures: one of so many has to
+constexpr double kNearShare = 0.9;            // of the near bound: it was measured, and not exactly
+constexpr double kSurroundedRadii = 2;        // a lens so close to the ball counts as seeing it
+constexpr double kConeMargin = 1.2;           // on the ball's radius in the image: lenses are not linear
+
+/// A training view, as seen from unit space.
+struct SeeingView {
+  Affined camera_from_unit;
+  const Intrinsics* lens;
+  double focus_distance;  ///< to what the views look at, world units
+};
+
+/// A cell of the occupancy grid, in the axes of a camera; world units.
+struct Ball {
+  Vec3d centre;
+  double radius;
+};
+
+/// Whether what the lens sees reaches into the ball.
+bool cone_overlaps_ball(const Intrinsics& lens, const Ball& ball) {
+  if (length(ball.centre) < kSurroundedRadii * ball.radius) return true;
+  const auto pixel = project(lens, ball.centre);
+  if (!pixel) return false;
+  const double margin = kConeMargin * ball.radius / ball.centre.z * lens.fx;
+  return pixel->x >= -margin && pixel->y >= -margin && pixel->x <= lens.width + margin &&
+         pixel->y <= lens.height + margin;
+}
+
+std::vector<SeeingView> seeing_views(const Capture& capture, const SceneFrame& frame) {
+  const Vec3d focus = arrangement_of(capture).meeting_point;
+  const Affined world_from_unit = {Mat3d::identity() * (1.0 / frame.unit_per_world), frame.world_from_unit({0, 0, 0})};
+  std::vector<SeeingView> views;
+  for (const View& view : capture.views) {
+    if (view.held_out) continue;
+    views.push_back({view.world_from_camera.inverse() * world_from_unit, &view.intrinsics,
+                     length(view.world_from_camera.translation - focus)});
+  }
+  return views;
+}
+
+}  // namespace
+
+void exclude_unseen(const Capture& capture, const SceneFrame& frame, LuminanceEngine& engine) {
+  const std::vector<SeeingView> views = seeing_views(capture, frame);
+  const auto agreeing = std::min(kAgreeingViews, std::ptrdiff_t(views.size()) / kViewsPerVote);
+  const double world_per_unit = 1.0 / frame.unit_per_world;
+  const double near = capture.depth_range ? kNearShare * capture.depth_range->near : 0.0;
+  engine.exclude([&](Vec3f centre, float radius) {
+    std::ptrdiff_t seeing_in_front = 0;
+    for (const SeeingView& view : views) {
+      const Ball ball{view.camera_from_unit.point(centre.cast<double>()), double(radius) * world_per_unit};
+      if (ball.centre.z + ball.radius < near || !cone_overlaps_ball(*view.lens, ball)) continue;
+      const bool is_behind_focus = length(ball.centre) + ball.radius > view.focus_distance;
+      if (is_behind_focus || ++seeing_in_front >= agreeing) return true;
+    }
+    return false;
+  });
+}
+
+}  // namespace cnerf

@@ -1,0 +1,122 @@
+#include "src/train/luminance/luminance_model.h"
+
+#include <algorithm>
+
+#include "src/train/luminance/exclusion.h"
+#include "src/train/luminance/options_json.h"
+#include "src/train/luminance/placement.h"
+
+namespace cnerf {
+namespace {
+
+constexpr const char* kKind = "stage1";
+
+std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stage1Options& options, float max_luminance,
+                                             const Engines& engines) {
+  LuminanceEngineOptions engine;
+  engine.grid = options.grid;
+  engine.occupancy = options.occupancy;
+  engine.cascades = frame.cascades;
+  engine.march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
+  engine.samples_per_step = options.samples_per_step;
+  engine.distortion_weight = float(options.distortion_weight);
+  engine.max_luminance = max_luminance;
+  engine.seed = std::uint64_t(options.seed);
+  return engines.make_luminance(engine);
+}
+
+/// White of integer images; floating point ones may be brighter.
+float brightest(const Capture& capture) {
+  float brightest = 1.0f;
+  for (const View& view : capture.views) {
+    if (view.held_out || view.image.depth != PixelDepth::kF32) continue;
+    for (const float value : view.image.f32) brightest = std::max(brightest, value);
+  }
+  return brightest;
+}
+
+/// What shapes the occupancy grid, which is part of a snapshot but no option of a user's.
+nlohmann::json occupancy_to_json(const OccupancyOptions& options) {
+  return {
+      {"resolution", options.resolution}, {"decay", options.decay}, {"optical_thickness", options.optical_thickness}};
+}
+
+/// Earlier versions kept it among the options.
+OccupancyOptions occupancy_of(const nlohmann::json& header) {
+  const nlohmann::json& json =
+      header.contains("occupancy") ? header.at("occupancy") : header.at("options").at("occupancy");
+  return {json.at("resolution").get<int>(), json.at("decay").get<float>(), json.at("optical_thickness").get<float>()};
+}
+
+/// @throws nlohmann::json::exception
+Stage1Options stored_options(const Snapshot& snapshot) {
+  auto options = options_from_json<Stage1Options>(snapshot.header().at("options"));
+  options.occupancy = occupancy_of(snapshot.header());
+  return options;
+}
+
+}  // namespace
+
+nlohmann::json frame_to_json(const SceneFrame& frame) {
+  return {{"world_centre", {frame.world_centre.x, frame.world_centre.y, frame.world_centre.z}},
+          {"unit_per_world", frame.unit_per_world},
+          {"cascades", frame.cascades}};
+}
+
+SceneFrame frame_from_json(const nlohmann::json& json) {
+  const auto& centre = json.at("world_centre");
+  return {{centre.at(0).get<double>(), centre.at(1).get<double>(), centre.at(2).get<double>()},
+          json.at("unit_per_world").get<double>(),
+          json.at("cascades").get<int>()};
+}
+
+LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options, const Engines& engines) {
+  LuminanceModel model;
+  model.frame = place_scene(capture, options.placement);
+  model.options = options;
+  model.max_luminance = brightest(capture);
+  model.engine = make_engine(model.frame, options, model.max_luminance, engines);
+  exclude_unseen(capture, model.frame, *model.engine);
+  return model;
+}
+
+Stage1Options LuminanceModel::options_in(const std::filesystem::path& file) {
+  const Snapshot snapshot(file, kKind);
+  try {
+    return stored_options(snapshot);
+  } catch (const nlohmann::json::exception& problem) {
+    throw SnapshotError(file.string() + ": header: " + problem.what());
+  }
+}
+
+LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Engines& engines) {
+  const Snapshot snapshot(file, kKind);
+  LuminanceModel model;
+  try {
+    model.frame = frame_from_json(snapshot.header().at("frame"));
+    model.options = stored_options(snapshot);
+  } catch (const nlohmann::json::exception& problem) {
+    throw SnapshotError(file.string() + ": header: " + problem.what());
+  }
+  model.max_luminance = header_field<float>(snapshot, "max_luminance");
+  model.seconds = load_times(file)["seconds"];
+  model.trained_samples = header_field<double>(snapshot, "trained_samples");
+  model.engine = make_engine(model.frame, model.options, model.max_luminance, engines);
+  snapshot.restore(model.engine->state());
+  model.engine->state_loaded();
+  return model;
+}
+
+void LuminanceModel::save(const std::filesystem::path& file) const {
+  save_snapshot(file, kKind,
+                {{"frame", frame_to_json(frame)},
+                 {"options", options_to_json(options)},
+                 {"occupancy", occupancy_to_json(options.occupancy)},
+                 {"max_luminance", max_luminance},
+                 {"trained_samples", trained_samples},
+                 {"step", engine->step_count()}},
+                engine->state());
+  save_times(file, {{"seconds", seconds}});
+}
+
+}  // namespace cnerf

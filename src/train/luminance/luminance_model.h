@@ -1,0 +1,43 @@
+#pragma once
+/// Stage 1's result in memory: where the box lies, how to march, and the engine. Both stages and the Scene build on it.
+
+#include <filesystem>
+#include <memory>
+
+#include "src/capture/capture.h"
+#include "src/engine/engines.h"
+#include "src/engine/luminance_engine.h"
+#include "src/field/scene_frame.h"
+#include "src/train/luminance/snapshot.h"
+#include "src/train/luminance/stage1_options.h"
+
+namespace cnerf {
+
+struct LuminanceModel {
+  SceneFrame frame;
+  Stage1Options options;
+  float max_luminance = 1;
+  double seconds = 0;          ///< training time so far
+  double trained_samples = 0;  ///< so far
+  std::unique_ptr<LuminanceEngine> engine;
+
+  /// A fresh model for a capture.
+  static LuminanceModel create(const Capture& capture, const Stage1Options& options, const Engines& engines);
+  /// @throws MissingInputError, SnapshotError
+  static LuminanceModel load(const std::filesystem::path& snapshot, const Engines& engines);
+  /// Only what it was trained with.  @throws MissingInputError, SnapshotError
+  static Stage1Options options_in(const std::filesystem::path& snapshot);
+  void save(const std::filesystem::path& snapshot) const;
+
+  /// How to march; `steps_per_box` = 0 as in training.
+  [[nodiscard]] MarchSettings march(int steps_per_box = 0) const {
+    return march_settings(frame.cascades, steps_per_box > 0 ? steps_per_box : options.steps_per_box,
+                          options.cone_angle);
+  }
+};
+
+/// SceneFrame in snapshot headers.
+[[nodiscard]] nlohmann::json frame_to_json(const SceneFrame& frame);
+[[nodiscard]] SceneFrame frame_from_json(const nlohmann::json& json);
+
+}  // namespace cnerf

@@ -1,0 +1,168 @@
+#include "src/train/luminance/stage1.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+
+#include "src/base/error.h"
+#include "src/base/usage.h"
+#include "src/train/luminance/luminance_model.h"
+#include "src/train/luminance/options_json.h"
+
+namespace cnerf {
+namespace {
+
+/// Constant over the first half of the steps, then an exponential decay.
+float learning_rate(const Stage1Options& options, double fraction) {
+  const double decay = std::clamp(2.0 * fraction - 1.0, 0.0, 1.0);
+  return float(options.learning_rate * std::pow(options.final_learning_rate / options.learning_rate, decay));
+}
+
+/// Options that may differ between a run and its continuation: they say how long, not what.
+nlohmann::json comparable(const Stage1Options& options) {
+  nlohmann::json json = options_to_json(options);
+  for (const char* duration : {"max_seconds", "checkpoint_every"}) json.erase(duration);
+  return json;
+}
+
+/// Mean of the last values, as dB.
+class RunningPsnr {
+ public:
+  void add(double squared_error) {
+    window_.push_back(squared_error);
+    if (window_.size() > 100) window_.pop_front();
+  }
+  [[nodiscard]] double value() const {
+    double total = 0;
+    for (const double error : window_) total += error;
+    return window_.empty() ? 0 : -10 * std::log10(std::max(total / double(window_.size()), 1e-10));
+  }
+
+ private:
+  std::deque<double> window_;
+};
+
+constexpr int kPreviews = 4;
+constexpr int kPreviewSide = 200;  ///< pixels of the longer side
+
+/// The views that previews show: held-out ones, else some of all.
+std::vector<const View*> preview_views(const Capture& capture) {
+  std::vector<const View*> held_out, all;
+  for (const View& view : capture.views) (view.held_out ? held_out : all).push_back(&view);
+  const std::vector<const View*>& from = held_out.empty() ? all : held_out;
+  std::vector<const View*> chosen;
+  for (std::size_t i = 0; i < kPreviews && i < from.size(); ++i) {
+    chosen.push_back(from[i * from.size() / std::min<std::size_t>(kPreviews, from.size())]);
+  }
+  return chosen;
+}
+
+PreviewPicture preview_of(const LuminanceModel& model, const View& view) {
+  const Intrinsics& full = view.intrinsics;
+  const double scale = std::min(1.0, double(kPreviewSide) / std::max(full.width, full.height));
+  const Intrinsics lens = resized(full, std::max(1, int(full.width * scale)), std::max(1, int(full.height * scale)));
+  const UnitCamera camera(lens, view.world_from_camera, model.frame);
+  PreviewPicture picture{view.name, lens.width, lens.height, {}, {}};
+  for (int y = 0; y < lens.height; ++y) {
+    for (int x = 0; x < lens.width; ++x) {
+      const std::size_t column = std::size_t((x + 0.5) / lens.width * view.image.width);
+      const std::size_t row = std::size_t((y + 0.5) / lens.height * view.image.height);
+      picture.input.push_back(view.image.luminance(row * std::size_t(view.image.width) + column));
+    }
+  }
+  std::vector<RayResult> results(picture.input.size());
+  model.engine->render_view(camera, model.march(), {1e-2f, 0.9f}, results);
+  for (const RayResult& result : results) picture.ours.push_back(result.luminance);
+  return picture;
+}
+
+void refuse_others(const std::filesystem::path& snapshot, const Stage1Options& stored, const Stage1Options& options) {
+  if (comparable(stored) == comparable(options)) return;
+  throw SnapshotError(snapshot.string() +
+                      ": was trained with other stage1 options; run with the same ones, or without --resume");
+}
+
+LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines) {
+  if (!job.resume || !std::filesystem::exists(job.snapshot)) {
+    return LuminanceModel::create(job.capture, job.options, engines);
+  }
+  LuminanceModel model = LuminanceModel::load(job.snapshot, engines);
+  refuse_others(job.snapshot, model.options, job.options);
+  model.options = job.options;
+  return model;
+}
+
+/// Training time: a clock that stands still while an observer looks.
+class TrainingClock {
+ public:
+  explicit TrainingClock(double before) : before_(before) {}
+  [[nodiscard]] double seconds_of_this_part() const { return watch_.seconds() - paused_; }
+  [[nodiscard]] double seconds() const { return before_ + seconds_of_this_part(); }
+  template <typename Work>
+  void pause_for(Work&& work) {
+    const Stopwatch pause;
+    work();
+    paused_ += pause.seconds();
+  }
+
+ private:
+  double before_, paused_ = 0;
+  Stopwatch watch_;
+};
+
+/// Done so far, of the steps or of the time, whichever is nearer to its end.
+double fraction_done(const LuminanceModel& model, const Stage1Options& options) {
+  const double of_steps = double(model.engine->step_count()) / options.steps;
+  return options.max_seconds > 0 ? std::max(of_steps, model.seconds / options.max_seconds) : of_steps;
+}
+
+}  // namespace
+
+void check_continues(const std::filesystem::path& snapshot, const Stage1Options& options) {
+  if (std::filesystem::exists(snapshot)) refuse_others(snapshot, LuminanceModel::options_in(snapshot), options);
+}
+
+Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer& observer) {
+  const Stage1Options& options = job.options;
+  LuminanceModel model = start_or_resume(job, engines);
+  const std::vector<TrainingView> views = training_views(job.capture, model.frame);
+  if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
+  model.engine->set_views(views);
+
+  TrainingClock clock(model.seconds);
+  const std::vector<const View*> shown = preview_views(job.capture);
+  const DrawPreview preview = [&](std::size_t index) { return preview_of(model, *shown[index % shown.size()]); };
+  double rays = 0;
+  RunningPsnr psnr;
+  while (model.engine->step_count() < options.steps) {
+    if (options.max_seconds > 0 && model.seconds >= options.max_seconds) break;
+    const double fraction = fraction_done(model, options);
+    const StepReport step = model.engine->step(learning_rate(options, fraction));
+    model.trained_samples += double(step.trained_samples);
+    model.seconds = clock.seconds();
+    rays += double(step.rays);
+    psnr.add(step.squared_error);
+    clock.pause_for([&] {
+      observer.report_progress({"stage 1",
+                                fraction,
+                                {{"psnr", psnr.value()},
+                                 {"loss", step.loss},
+                                 {"rays/s", rays / clock.seconds_of_this_part()},
+                                 {"samples", model.trained_samples}}});
+      observer.offer_preview(preview);
+    });
+
+    const long done = model.engine->step_count();
+    if (observer.is_cancelled()) {
+      model.save(job.snapshot);
+      throw Interrupted("stopped at step " + std::to_string(done) + "; saved " + job.snapshot.string() +
+                        ", continue with --resume");
+    }
+    if (options.checkpoint_every > 0 && done % options.checkpoint_every == 0) model.save(job.snapshot);
+  }
+  model.save(job.snapshot);
+  observer.report_progress({"stage 1", 1.0, {{"psnr", psnr.value()}}});
+  return {int(model.engine->step_count()), model.seconds, model.trained_samples, psnr.value()};
+}
+
+}  // namespace cnerf

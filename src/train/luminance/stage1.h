@@ -1,0 +1,38 @@
+#pragma once
+/// Stage 1: luminance and density from monochrome views (paper, Sec. "Luminance and density representation").
+
+#include <filesystem>
+
+#include "src/base/observer.h"
+#include "src/capture/capture.h"
+#include "src/engine/engines.h"
+#include "src/train/luminance/stage1_options.h"
+
+namespace cnerf {
+
+struct Stage1Report {
+  int steps = 0;
+  double seconds = 0;  ///< training time only, over all resumed parts
+  double trained_samples = 0;
+  double train_psnr = 0;  ///< luminance dB over the last 100 steps' rays
+};
+
+/// Whether a training with these options may go on from `snapshot`, if there is one.
+/// @throws SnapshotError  it is of another version, damaged, or of a training with other options.
+void check_continues(const std::filesystem::path& snapshot, const Stage1Options& options);
+
+/// What stage 1 works on.
+struct Stage1Job {
+  const Capture& capture;
+  const Stage1Options& options;
+  std::filesystem::path snapshot;  ///< that the result goes to
+  bool resume = false;             ///< go on with the snapshot, if there is one
+};
+
+/// Trains and leaves the result in the job's snapshot. What the observer takes is no training time; previews show
+/// held-out views, or some of all. Resuming continues bit for bit on the CPU, whatever the number of threads.
+/// @throws Interrupted    after saving, when the observer cancelled.
+/// @throws SnapshotError  the snapshot is of another version, cut short, or of another configuration.
+Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer& observer);
+
+}  // namespace cnerf

@@ -1,0 +1,139 @@
+#include "src/train/luminance/view_cache.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/base/error.h"
+#include "src/base/parallel.h"
+
+namespace cnerf {
+namespace {
+
+constexpr float kFullScale = 65535.0f;
+constexpr float kCacheTransmittance = 2e-3f;  // what lies behind is not worth a sample
+constexpr std::size_t kGrain = 512;           // pixels of a parallel piece of work
+
+void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
+  view.brightest = 1e-6f;
+  for (const WeightedSample& sample : samples) view.brightest = std::max(view.brightest, sample.luminance);
+  view.samples.resize(samples.size());
+  parallel_ranges(samples.size(), 16 * kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      view.samples[s] = {samples[s].t, std::uint16_t(std::lround(std::min(samples[s].weight, 1.0f) * kFullScale)),
+                         std::uint16_t(std::lround(samples[s].luminance / view.brightest * kFullScale))};
+    }
+  });
+}
+
+PixelSamples with_room_for(std::vector<std::size_t> offsets) {
+  PixelSamples pixels;
+  pixels.positions.resize(offsets.back());
+  pixels.weights.resize(offsets.back());
+  pixels.luminance.resize(offsets.back());
+  pixels.offsets = std::move(offsets);
+  return pixels;
+}
+
+}  // namespace
+
+Ray ray_of(const CachedView& view, std::size_t pixel) {
+  const auto width = std::size_t(view.width);
+  return view.camera.ray({double(pixel % width) + 0.5, double(pixel / width) + 0.5});
+}
+
+CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march, const UnitCamera& full_size_camera,
+                      int short_side, double share) {
+  CachedView view;
+  view.camera = full_size_camera;
+  const Intrinsics& lens = full_size_camera.intrinsics;
+  const double factor = std::min(1.0, double(short_side) / std::min(lens.width, lens.height));
+  view.width = std::max(1, int(std::lround(lens.width * factor)));
+  view.height = std::max(1, int(std::lround(lens.height * factor)));
+  view.camera.intrinsics = resized(lens, view.width, view.height);
+
+  std::vector<Ray> rays(std::size_t(view.width) * std::size_t(view.height));
+  parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) rays[p] = ray_of(view, p);
+  });
+  std::vector<WeightedSample> samples;
+  engine.trace(rays, march, {kCacheTransmittance, float(share)}, samples, view.offsets);
+  view.luminance.resize(rays.size());
+  view.opacity.resize(rays.size());
+  parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s) {
+        view.luminance[p] += samples[s].weight * samples[s].luminance;
+        view.opacity[p] += samples[s].weight;
+      }
+    }
+  });
+  pack(samples, view);
+  return view;
+}
+
+void ViewCache::fill(const LuminanceEngine& engine, const MarchSettings& march, const Capture& capture,
+                     const SceneFrame& frame, int short_side, const std::function<void(double fraction)>& report) {
+  const std::vector<TrainingView> views = training_views(capture, frame);
+  if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
+  if (short_side != short_side_) views_.clear();
+  short_side_ = short_side;
+  names_.clear();
+  for (const View& view : capture.views) {
+    if (!view.held_out) names_.push_back(view.name);
+  }
+  for (std::size_t v = views_.size(); v < views.size(); ++v) {
+    views_.push_back(cache_view(engine, march, views[v].camera, short_side, kCachedWeight));
+    ignore_masked(views_.back(), *views[v].image);
+    report(double(v + 1) / double(views.size()));
+  }
+}
+
+void ignore_masked(CachedView& view, const MonoImage& image) {
+  if (image.mask.empty()) return;
+  for (std::size_t i = 0; i < image.pixel_count(); ++i) {
+    if (image.valid(i)) continue;
+    const auto x = std::int64_t(i) % image.width, y = std::int64_t(i) / image.width;
+    const auto column = std::size_t(x * view.width / image.width), row = std::size_t(y * view.height / image.height);
+    view.opacity[row * std::size_t(view.width) + column] = 0;
+  }
+}
+
+PixelSamples pixel_samples(std::span<const Ray> rays, std::span<const WeightedSample> samples,
+                           std::span<const std::size_t> offsets) {
+  PixelSamples pixels = with_room_for({offsets.begin(), offsets.end()});
+  parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t r = begin; r < end; ++r) {
+      for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
+        pixels.positions[s] = rays[r].at(samples[s].t);
+        pixels.weights[s] = samples[s].weight;
+        pixels.luminance[s] = samples[s].luminance;
+      }
+    }
+  });
+  return pixels;
+}
+
+PixelSamples pixel_samples(std::span<const CachedView> views, std::span<const ViewPixel> wanted) {
+  std::vector<std::size_t> offsets = {0};
+  for (const auto& [v, p] : wanted) {
+    offsets.push_back(offsets.back() + views[v].offsets[p + 1] - views[v].offsets[p]);
+  }
+  PixelSamples pixels = with_room_for(std::move(offsets));
+  parallel_ranges(wanted.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const CachedView& view = views[wanted[i].view];
+      const std::uint32_t p = wanted[i].pixel;
+      const Ray ray = ray_of(view, p);
+      std::size_t at = pixels.offsets[i];
+      for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s, ++at) {
+        const CachedSample& sample = view.samples[s];
+        pixels.positions[at] = ray.at(sample.t);
+        pixels.weights[at] = float(sample.weight) / kFullScale;
+        pixels.luminance[at] = float(sample.luminance) / kFullScale * view.brightest;
+      }
+    }
+  });
+  return pixels;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,81 @@
+#pragma once
+/// View cache: what each training view sees of frozen geometry at a working resolution, and the few samples behind each
+/// pixel.
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/engine/color_engines.h"
+#include "src/engine/luminance_engine.h"
+#include "src/render/training_views.h"
+
+namespace cnerf {
+
+/// A sample in 8 bytes: captures of millions of pixels have hundreds of millions of them.
+struct CachedSample {
+  float t = 0;                  ///< unit space
+  std::uint16_t weight = 0;     ///< of 65535
+  std::uint16_t luminance = 0;  ///< of 65535, times the view's `brightest`
+};
+
+/// One view at working resolution. Arrays are [H, W].
+struct CachedView {
+  UnitCamera camera;
+  int width = 0, height = 0;
+  std::vector<float> luminance;  ///< linear Y over black
+  std::vector<float> opacity;
+  float brightest = 1;                ///< luminance of the brightest sample
+  std::vector<CachedSample> samples;  ///< pixel by pixel, front to back
+  std::vector<std::size_t> offsets;   ///< [H W + 1]
+
+  [[nodiscard]] int short_side() const { return std::min(width, height); }
+};
+
+/// Through the middle of a pixel.  @param pixel  y * width + x
+[[nodiscard]] Ray ray_of(const CachedView& view, std::size_t pixel);
+
+/// Renders a view with its short side at most `short_side` pixels. Of each pixel the heaviest samples are kept that
+/// carry `share` of its weight.
+[[nodiscard]] CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
+                                    const UnitCamera& full_size_camera, int short_side, double share);
+
+inline constexpr double kCachedWeight = 0.99;  ///< share of a pixel's weight that the samples of a ViewCache carry
+
+/// The training views of a capture. Who colours one stage 1 several times keeps it, so that they are traced once.
+class ViewCache {
+ public:
+  /// Traces the views, unless it holds them already at this size.
+  /// @param short_side     pixels of their shorter side, at most
+  /// @param report         is told the share that is done, after each view; may throw, and a later call goes on
+  /// @throws UsageError    every view is held out.
+  void fill(const LuminanceEngine& engine, const MarchSettings& march, const Capture& capture, const SceneFrame& frame,
+            int short_side, const std::function<void(double fraction)>& report);
+  [[nodiscard]] std::span<const CachedView> views() const { return views_; }
+  [[nodiscard]] std::span<const std::string> names() const { return names_; }  ///< as the capture has them
+
+ private:
+  int short_side_ = 0;
+  std::vector<CachedView> views_;
+  std::vector<std::string> names_;
+};
+
+/// Makes pixels transparent that the view's mask says to ignore, wholly or in part: nothing there is learnt from, and
+/// no histogram counts it. What a colorizer is shown stays.
+void ignore_masked(CachedView& view, const MonoImage& image);
+
+/// Traced samples as the chroma engines want them.
+[[nodiscard]] PixelSamples pixel_samples(std::span<const Ray> rays, std::span<const WeightedSample> samples,
+                                         std::span<const std::size_t> offsets);
+
+/// A pixel of one of several views.
+struct ViewPixel {
+  std::uint32_t view = 0;
+  std::uint32_t pixel = 0;  ///< y * width + x
+};
+/// Samples of some pixels of cached views.
+[[nodiscard]] PixelSamples pixel_samples(std::span<const CachedView> views, std::span<const ViewPixel> pixels);
+
+}  // namespace cnerf

@@ -1,0 +1,105 @@
+#pragma once
+/// Stage 2 on a capture of next to nothing, with a colorizer that answers one colour.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "src/color/colorspace_math.h"
+#include "src/train/chroma/injection.h"
+#include "src/train/chroma/questioner.h"
+#include "src/train/chroma/stage2.h"
+#include "src/train/luminance/stage1.h"
+#include "src/train/scene.h"
+#include "tests/support/data.h"
+#include "tests/support/toy_capture.h"
+
+namespace cnerf::test {
+
+inline constexpr Ab kAnswer = {12, -9};
+
+/// Answers one colour and keeps the questions' origins.
+class Listening final : public Colorizer {
+ public:
+  ChromaBatch colorize(const LightnessBatch& patches) override {
+    origins.insert(origins.end(), patches.origins.begin(), patches.origins.end());
+    const std::size_t pixels = patches.lightness.size() / std::size_t(patches.batch);
+    ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
+    for (int i = 0; i < patches.batch; ++i) {
+      answer.ab.insert(answer.ab.end(), pixels, kAnswer.a);
+      answer.ab.insert(answer.ab.end(), pixels, kAnswer.b);
+    }
+    return answer;
+  }
+  [[nodiscard]] std::string name() const override { return "listening"; }
+
+  std::vector<PatchOrigin> origins;
+};
+
+class Stage2Fixture : public testing::Test {
+ protected:
+  void SetUp() override {
+    Stage1Options options;
+    options.steps = 40;
+    options.samples_per_step = 2048;
+    options.steps_per_box = 64;
+    options.grid = small_grid();
+    options.occupancy.resolution = 32;
+    capture_.views.back().held_out = true;
+    (void)train_stage1({capture_, options, stage1()}, cpu_engines(), observer_);
+  }
+
+  static HashGridOptions small_grid() {
+    return {.levels = 3, .log2_rows = 10, .coarsest_resolution = 4, .finest_resolution = 32};
+  }
+  static Stage2Options small_options() {
+    Stage2Options options;
+    options.patches = 60;
+    options.patch_size = 16;
+    options.rays_per_patch = 128;
+    options.working_resolution = 40;  // the pictures themselves
+    options.distill_steps = 0;
+    options.grid = small_grid();
+    return options;
+  }
+  [[nodiscard]] std::filesystem::path stage1() const { return folder_ / "stage1.snapshot"; }
+  [[nodiscard]] std::filesystem::path take(const std::string& name) const {
+    return folder_ / (name + "/take.snapshot");
+  }
+
+  /// @param views, questions, injection  as in Stage2Job
+  Stage2Report colorize(const Stage2Options& options, Colorizer& colorizer, const std::filesystem::path& take,
+                        ViewCache* views = nullptr, Questions* questions = nullptr,
+                        const Injection* injection = nullptr) {
+    return train_stage2({capture_, stage1(), options, colorizer, {}, take, false, views, questions, injection},
+                        cpu_engines(), observer_);
+  }
+
+  [[nodiscard]] RenderedImage rendered(const std::string& name) const {
+    const View& view = capture_.views.back();
+    return Scene::load(stage1(), take(name), cpu_engines())->render(view.intrinsics, view.world_from_camera);
+  }
+  /// Mean ab distance to the answer where a pixel is opaque and light enough to have that colour.
+  [[nodiscard]] double distance_to_answer(const std::string& name) const {
+    const RenderedImage image = rendered(name);
+    double sum = 0;
+    int count = 0;
+    for (std::size_t p = 0; p < image.opacity.size(); ++p) {
+      if (image.opacity[p] < 0.9f || image.luminance[p] < 0.1f) continue;
+      const Lab<float> lab = lab_from_linear_rgb(Vec3f{image.rgb[3 * p], image.rgb[3 * p + 1], image.rgb[3 * p + 2]});
+      sum += std::hypot(lab.a - kAnswer.a, lab.b - kAnswer.b);
+      ++count;
+    }
+    EXPECT_GT(count, 50);
+    return sum / count;
+  }
+
+  Observer observer_;
+  test::TempDir folder_;
+  Capture capture_ = test::toy_capture(6, 48, 40);
+};
+
+}  // namespace cnerf::test
