@@ -15,7 +15,7 @@ struct ColorizeArguments {
   std::string bases;
   bool bases_only = false;
   bool view = false;
-  BrowserOptions browser;
+  web::BrowserOptions browser;
 };
 
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
@@ -32,7 +32,7 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
     return;
   }
   const std::string take = pipeline::take_to_write(context, arguments.run.take, arguments.existing);
-  std::optional<LiveSession> live;
+  std::optional<web::LiveSession> live;
   if (arguments.view) {
     live.emplace("Colorizing " + context.capture.root.filename().string() + ", take " + take, arguments.browser,
                  reporter);

@@ -104,7 +104,7 @@ void doctor() {
   line("OpenVDB", CNERF_OPENVDB_VERSION);
   line("OpenEXR", OPENEXR_VERSION_STRING);
   line("presets", presets_text());
-  const fs::path page = find_page();
+  const fs::path page = web::find_page();
   line("viewer page", page.empty() ? "not built (CNERF_VIEWER, npm)" : page.string());
   print_program("blender", "shows bakes");
   print_program("colmap", "finds camera poses");

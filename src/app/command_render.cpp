@@ -1,17 +1,11 @@
 /// cnerf render: pictures and videos of a take.
 
-#include <algorithm>
 #include <sstream>
 
-#include "bake/volume/integrate.h"
-#include "export/manifest.h"
-#include "export/vdb_reader.h"
-#include "export/web_pictures.h"
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
 #include "src/base/error.h"
-#include "src/base/progress.h"
-#include "src/picture/encode.h"
+#include "src/pipeline/render_bake.h"
 #include "src/pipeline/render_step.h"
 
 namespace cnerf::app {
@@ -43,37 +37,17 @@ pipeline::RenderOutput output_of(const RenderArguments& arguments) {
   return output;
 }
 
-/// Pictures of a bake, straight from its voxels: what every viewer of it should show.
 void render_bake(const RenderArguments& arguments, Reporter& reporter) {
   const fs::path bake = arguments.run.run;
   if (!arguments.format.empty() && arguments.format != "png") {
     throw UsageError("--format: expected png, as all that is rendered of a bake, got '" + arguments.format + "'");
   }
-  const exporting::BakeManifest manifest = exporting::read_manifest(bake / "manifest.json");
-  if (!manifest.volume)
-    throw InputError(bake / "manifest.json", "volume", "this bake has none; bake with --format vdb");
-  CameraPath path{"cameras", {}};
-  if (arguments.path == "cameras" || arguments.path == RenderArguments{}.path) {
-    for (const bake::Camera& camera : manifest.cameras) {
-      std::string name = fs::path(camera.name).replace_extension().string();
-      std::ranges::replace(name, '/', '_');
-      path.cameras.push_back({name, without_distortion(camera.intrinsics), camera.world_from_camera});
-    }
-  } else {
-    path = path_from_file(arguments.path);
-  }
+  CameraPath path = pipeline::cameras_of_bake(bake);
+  const bool is_default = arguments.path == "cameras" || arguments.path == RenderArguments{}.path;
+  if (!is_default) path = path_from_file(arguments.path);
   const fs::path folder = (arguments.out.empty() ? bake / "renders" : fs::path(arguments.out)) / path.name;
   refuse_existing(folder, arguments.overwrite);
-  const std::vector<bake::Volume> volumes = exporting::read_volumes(bake);
-  const ProgressSink progress = reporter.progress_sink();
-  for (std::size_t i = 0; i < path.cameras.size(); ++i) {
-    const PathCamera& camera = path.cameras[i];
-    const bake::VolumeImage image = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);
-    write_png(folder / (camera.name + ".png"), picture_from_linear(image.width, image.height, image.rgb));
-    progress({"render", double(i + 1) / double(path.cameras.size()), {}});
-    if (interruption_requested()) throw Interrupted("stopped");
-  }
-  reporter.wrote("pictures", folder);
+  pipeline::render_bake(bake, path, folder, reporter);
 }
 
 void render(const RenderArguments& arguments, const std::vector<std::string>& command_line) {

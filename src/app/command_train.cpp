@@ -13,7 +13,7 @@ struct TrainArguments {
   std::string capture, out;
   pipeline::ExistingOutput existing;
   bool view = false;
-  BrowserOptions browser;
+  web::BrowserOptions browser;
 };
 
 void train(const TrainArguments& arguments, const std::vector<std::string>& command_line) {
@@ -25,7 +25,7 @@ void train(const TrainArguments& arguments, const std::vector<std::string>& comm
   const pipeline::RunContext context{directory, config, pipeline::read_capture(arguments.capture, config, reporter),
                                      command_line};
   pipeline::check_run_folder(directory, arguments.existing);
-  std::optional<LiveSession> live;
+  std::optional<web::LiveSession> live;
   if (arguments.view) {
     live.emplace("Training " + context.capture.root.filename().string(), arguments.browser, reporter);
   }

@@ -73,7 +73,7 @@ void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string&
       ->take_all();
 }
 
-void add_browser_options(CLI::App& app, BrowserOptions& options) {
+void add_browser_options(CLI::App& app, web::BrowserOptions& options) {
   app.add_option("--port", options.server.port, "Port of the page; 0 chooses a free one")->check(CLI::Range(0, 65535));
   app.add_option("--host", options.server.host, "Address to listen on; other than this machine's own it needs --token");
   app.add_option("--token", options.server.token, "Secret that visitors of the page need, 16 letters or more");

@@ -33,7 +33,7 @@ void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string&
 /// Declares --colorizer, --prompt, --keyframe, --hint and --hint-image.
 void add_colorizer_options(CLI::App& app, ConfigArguments& arguments);
 /// Declares --port, --host, --token and --no-browser.
-void add_browser_options(CLI::App& app, BrowserOptions& options);
+void add_browser_options(CLI::App& app, web::BrowserOptions& options);
 /// Declares one option a field, named like the field with `-` for `_`; legal values and defaults go to the help. A bool
 /// becomes a flag that sets it.
 /// @param fields  must outlive the parsing.

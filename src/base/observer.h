@@ -1,6 +1,6 @@
 #pragma once
-/// Watches a job: training, colouring, baking, a step of the pipeline. A job calls it from one thread, between pieces of
-/// its work. The defaults watch nothing and let Ctrl-C cancel.
+/// Watches a job: training, colouring, baking, a step of the pipeline. A job calls it from one thread, between pieces
+/// of its work. The defaults watch nothing and let Ctrl-C cancel.
 
 #include <filesystem>
 #include <string>

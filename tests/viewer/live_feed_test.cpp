@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-namespace cnerf {
+namespace cnerf::web {
 namespace {
 using Json = nlohmann::json;
 
@@ -82,4 +82,4 @@ TEST(LiveFeed, FinishedWorkCannotBePaused) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::web

@@ -10,7 +10,7 @@
 #include "src/base/files.h"
 #include "tests/support/data.h"
 
-namespace cnerf {
+namespace cnerf::web {
 namespace {
 namespace fs = std::filesystem;
 
@@ -203,4 +203,4 @@ TEST(WebServer, EventsFollowTheFeed) {
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::web

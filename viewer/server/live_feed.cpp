@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-namespace cnerf {
+namespace cnerf::web {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -137,4 +137,4 @@ bool LiveFeed::closed() const {
   return closed_;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::web

@@ -15,7 +15,7 @@
 
 #include "src/base/progress.h"
 
-namespace cnerf {
+namespace cnerf::web {
 
 /// A point of a curve.
 struct CurvePoint {
@@ -73,4 +73,4 @@ class LiveFeed {
   bool paused_ = false, stop_ = false, finished_ = false, closed_ = false;
 };
 
-}  // namespace cnerf
+}  // namespace cnerf::web

@@ -9,7 +9,7 @@
 #include "src/picture/encode.h"
 #include "viewer/server/page_folder.h"
 
-namespace cnerf {
+namespace cnerf::web {
 namespace {
 
 constexpr auto kBetweenReports = std::chrono::milliseconds(250);
@@ -77,4 +77,4 @@ void LiveSession::show(const PreviewPicture& picture) {
   feed_.picture(name + ".ours", jpeg_of(picture.width, picture.height, picture.ours));
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::web

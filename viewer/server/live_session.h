@@ -9,7 +9,7 @@
 #include "viewer/server/live_feed.h"
 #include "viewer/server/web_server.h"
 
-namespace cnerf {
+namespace cnerf::web {
 
 /// Options of everything that opens the browser.
 struct BrowserOptions {
@@ -49,4 +49,4 @@ class LiveSession final : public Observer {
   std::string task_;
 };
 
-}  // namespace cnerf
+}  // namespace cnerf::web

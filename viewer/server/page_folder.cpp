@@ -2,7 +2,7 @@
 
 #include <cstdlib>
 
-namespace cnerf {
+namespace cnerf::web {
 namespace fs = std::filesystem;
 
 std::vector<fs::path> page_folders() {
@@ -23,4 +23,4 @@ fs::path find_page() {
   return {};
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::web

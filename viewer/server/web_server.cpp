@@ -16,7 +16,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 
-namespace cnerf {
+namespace cnerf::web {
 namespace {
 namespace fs = std::filesystem;
 
@@ -310,4 +310,4 @@ bool open_browser(const std::string& address) {
   ::_exit(0);
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::web

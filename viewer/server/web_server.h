@@ -9,7 +9,7 @@
 
 #include "viewer/server/live_feed.h"
 
-namespace cnerf {
+namespace cnerf::web {
 
 struct WebServerOptions {
   std::string host = "127.0.0.1";
@@ -53,4 +53,4 @@ class WebServer {
 /// Opens an address in the user's browser, where there is a desktop. @return whether something was started.
 bool open_browser(const std::string& address);
 
-}  // namespace cnerf
+}  // namespace cnerf::web

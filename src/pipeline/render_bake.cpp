@@ -1,0 +1,42 @@
+#include "src/pipeline/render_bake.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "bake/volume/integrate.h"
+#include "export/manifest.h"
+#include "export/vdb_reader.h"
+#include "export/web_pictures.h"
+#include "src/base/error.h"
+#include "src/picture/encode.h"
+
+namespace cnerf::pipeline {
+namespace fs = std::filesystem;
+
+CameraPath cameras_of_bake(const fs::path& bake) {
+  const exporting::BakeManifest manifest = exporting::read_manifest(bake / "manifest.json");
+  if (!manifest.volume) {
+    throw InputError(bake / "manifest.json", "volume", "this bake has none; bake with --format vdb");
+  }
+  CameraPath path{"cameras", {}};
+  for (const bake::Camera& camera : manifest.cameras) {
+    std::string name = fs::path(camera.name).replace_extension().string();
+    std::ranges::replace(name, '/', '_');
+    path.cameras.push_back({name, exporting::without_distortion(camera.intrinsics), camera.world_from_camera});
+  }
+  return path;
+}
+
+void render_bake(const fs::path& bake, const CameraPath& path, const fs::path& folder, Observer& observer) {
+  const std::vector<bake::Volume> volumes = exporting::read_volumes(bake);
+  for (std::size_t i = 0; i < path.cameras.size(); ++i) {
+    const PathCamera& camera = path.cameras[i];
+    const bake::VolumeImage image = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);
+    write_png(folder / (camera.name + ".png"), picture_from_linear(image.width, image.height, image.rgb));
+    observer.report_progress({"render", double(i + 1) / double(path.cameras.size()), {}});
+    if (observer.is_cancelled()) throw Interrupted("stopped");
+  }
+  observer.wrote("pictures", folder);
+}
+
+}  // namespace cnerf::pipeline

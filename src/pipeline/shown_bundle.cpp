@@ -1,0 +1,70 @@
+#include "src/pipeline/shown_bundle.h"
+
+#include "bake/volume/resample.h"
+#include "export/bake_output.h"
+#include "export/manifest.h"
+#include "export/vdb_reader.h"
+#include "export/web_bundle.h"
+#include "src/base/error.h"
+#include "src/pipeline/run_directory.h"
+#include "viewer/server/page_folder.h"
+
+namespace cnerf::pipeline {
+namespace fs = std::filesystem;
+namespace {
+
+bool is_bundle(const fs::path& folder) {
+  return fs::exists(folder / exporting::kWebManifest);
+}
+bool is_bake(const fs::path& folder) {
+  return fs::exists(folder / "manifest.json");
+}
+
+/// The bundle of a bake: the one beside it, made anew where there is none or it is older than the bake.
+fs::path bundle_of_bake(const fs::path& bake, const ShowJob& job, const exporting::WebOptions& options,
+                        Observer& observer) {
+  const fs::path folder = exporting::web_folder(bake);
+  const fs::path manifest_file = bake / "manifest.json";
+  if (is_bundle(folder) &&
+      fs::last_write_time(folder / exporting::kWebManifest) >= fs::last_write_time(manifest_file)) {
+    return folder;
+  }
+  const exporting::BakeManifest manifest = exporting::read_manifest(manifest_file);
+  if (!manifest.volume) {
+    throw InputError(manifest_file, "volume", "this bake has none; bake with --format vdb or --format web");
+  }
+  const bake::Volume volume = merged_volume(exporting::read_volumes(bake));
+  exporting::WebScene scene{bake.filename().string(), manifest.cameras, {}, manifest.label};
+  scene.label.provenance.command_line = job.command_line;
+  write_web(volume, scene, folder, web::find_page(), options, observer);
+  observer.say("note: the photographs are with the capture; cnerf bake RUN --format web adds them");
+  return folder;
+}
+
+fs::path bake_of_run(const fs::path& run, const std::string& take) {
+  const RunDirectory directory = RunDirectory::open(run);
+  const fs::path bake = directory.bakes(directory.choose_take(take));
+  if (!is_bake(bake) && !is_bundle(exporting::web_folder(bake))) {
+    throw MissingInputError(bake.string() + ": nothing is baked yet; run: cnerf bake " + run.string() +
+                            " --format web");
+  }
+  return bake;
+}
+
+}  // namespace
+
+fs::path bundle_to_show(const ShowJob& job, const exporting::WebOptions& options, Observer& observer) {
+  fs::path what = job.what;
+  if (!fs::exists(what)) throw MissingInputError(what.string() + ": no such file or folder");
+  if (what.extension() == ".vdb" || what.filename() == "manifest.json" || what.filename() == exporting::kWebManifest) {
+    what = what.parent_path().empty() ? fs::path(".") : what.parent_path();
+  }
+  if (is_bundle(what)) return what;
+  if (RunDirectory(what).exists()) what = bake_of_run(job.what, job.take);
+  if (is_bake(what)) return bundle_of_bake(what, job, options, observer);
+  if (is_bundle(exporting::web_folder(what))) return exporting::web_folder(what);
+  throw MissingInputError(what.string() +
+                          ": neither a web bundle (bundle.json), a bake (manifest.json) nor a run (run.json)");
+}
+
+}  // namespace cnerf::pipeline
