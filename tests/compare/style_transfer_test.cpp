@@ -122,8 +122,9 @@ TEST_F(StyleTransfer, BringsAFieldNearerToItsReference) {
   const StyleLoss loss(weights_, reference);
   Stage2Options options;
   options.grid = stage1.grid;
-  const StyleReport report = transfer_style(capture, folder / "stage1.snapshot", loss, reference, options, 40,
-                                            folder / "take.snapshot", cpu_engines(), observer);
+  const StyleReport report =
+      transfer_style({capture, folder / "stage1.snapshot", loss, reference, options, 40, folder / "take.snapshot"},
+                     cpu_engines(), observer);
   EXPECT_GT(report.seconds, 0);
   EXPECT_GT(report.first_loss, 0);
 

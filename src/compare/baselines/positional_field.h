@@ -26,14 +26,36 @@ struct PositionalRays {
 /// Objects in a single box: evenly in distance. All else: in disparity, from the capture's near bound where it has one.
 [[nodiscard]] PositionalRays positional_rays(const Capture& capture, const SceneFrame& frame);
 
-/// Engines of that field. A chroma engine takes over w of the luminance engine that they made or loaded last,
-/// and starts from random weights where there was none; a snapshot holds it in either case.
+/// Engines of that field. Colours take over w of the luminance engine that they made or loaded last, and keep it fixed;
+/// they start from random weights where there was none. A snapshot holds w in either case.
 ///
 /// Of LuminanceEngineOptions, the grid, the marching and the occupancy mean nothing to it; `render` and `trace` take
 /// their samples as training does. Snapshots continue bit for bit on the processor.
-/// @param trains_encoding  true: stage 2 changes its copy of w; false: w stays fixed, as in the paper
-/// @param luminance  makes the luminance engines instead, where colours stand on another geometry; may be null
-[[nodiscard]] std::unique_ptr<Engines> positional_engines(const PositionalRays& rays, bool trains_encoding = false,
-                                                          const Engines* luminance = nullptr);
+/// @param others  make the per-sample colour; must outlive these
+[[nodiscard]] std::unique_ptr<Engines> positional_engines(const PositionalRays& rays,
+                                                          const Engines& others = cpu_engines());
+
+/// Engines of which the distributions of colours come from elsewhere.
+class MixedEngines final : public Engines {
+ public:
+  MixedEngines(std::shared_ptr<const Engines> usual, std::shared_ptr<const Engines> color_bins)
+      : usual_(std::move(usual)), color_bins_(std::move(color_bins)) {}
+  [[nodiscard]] Device device() const override { return usual_->device(); }
+  [[nodiscard]] std::string description() const override { return usual_->description(); }
+  [[nodiscard]] std::unique_ptr<LuminanceEngine> make_luminance(const LuminanceEngineOptions& options) const override {
+    return usual_->make_luminance(options);
+  }
+  [[nodiscard]] std::unique_ptr<ColorBinEngine> make_color_bins(const HashGridOptions& grid,
+                                                                std::uint64_t seed) const override {
+    return color_bins_->make_color_bins(grid, seed);
+  }
+  [[nodiscard]] std::unique_ptr<ColorFieldEngine> make_color_field(const HashGridOptions& grid,
+                                                                   std::uint64_t seed) const override {
+    return usual_->make_color_field(grid, seed);
+  }
+
+ private:
+  std::shared_ptr<const Engines> usual_, color_bins_;
+};
 
 }  // namespace cnerf::compare

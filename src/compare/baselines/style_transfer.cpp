@@ -94,58 +94,77 @@ std::vector<Ab> targets_of(const LabPicture& picture, std::span<const float> gra
   return targets;
 }
 
+/// Colours towards which ARF's first steps go: the reference's as a function of lightness.
+class MatchedColors {
+ public:
+  explicit MatchedColors(const LabPicture& reference) {
+    const std::span<const float> ab(reference.ab);
+    a_ = regression(reference.lightness, ab.first(reference.lightness.size()));
+    b_ = regression(reference.lightness, ab.last(reference.lightness.size()));
+  }
+  [[nodiscard]] std::vector<Ab> of(const LabPicture& picture) const {
+    std::vector<Ab> colors;
+    for (const double lightness : picture.lightness) {
+      colors.push_back({float(a_.first + a_.second * lightness), float(b_.first + b_.second * lightness)});
+    }
+    return colors;
+  }
+
+ private:
+  std::pair<double, double> a_, b_;  // value at 0, slope
+};
+
+/// Writes the field's colours to the picture.
+void show(const ColorModel& model, StyledView& view) {
+  const std::size_t n = view.picture.lightness.size();
+  std::vector<Ab> colors(n);
+  model.chromaticity->composite(view.pixels, colors);
+  for (std::size_t p = 0; p < n; ++p) {
+    view.picture.ab[p] = colors[p].a;
+    view.picture.ab[n + p] = colors[p].b;
+  }
+}
+
 }  // namespace
 
-StyleReport transfer_style(const Capture& capture, const std::filesystem::path& stage1_snapshot, const StyleLoss& loss,
-                           const LabPicture& reference, const Stage2Options& options, int steps,
-                           const std::filesystem::path& take_snapshot, const Engines& engines, Observer& observer) {
+StyleReport transfer_style(const StyleJob& job, const Engines& engines, Observer& observer) {
   const Stopwatch watch;
-  std::vector<StyledView> views = styled_views(capture, LuminanceModel::load(stage1_snapshot, engines), observer);
-  ColorModel model = ColorModel::create(options, engines);
+  std::vector<StyledView> views = styled_views(job.capture, LuminanceModel::load(job.stage1, engines), observer);
+  ColorModel model = ColorModel::create(job.options, engines);
   model.pixel_colors = PixelColors::kField;
-  model.colorizer = "style:" + loss.network();
-  model.stage1_sha256 = sha256(read_binary_file(stage1_snapshot));
+  model.colorizer = "style:" + job.loss.network();
+  model.stage1_sha256 = sha256(read_binary_file(job.stage1));
 
-  const std::span<const float> ab(reference.ab);
-  const auto [a0, a1] = regression(reference.lightness, ab.first(reference.lightness.size()));
-  const auto [b0, b1] = regression(reference.lightness, ab.last(reference.lightness.size()));
-  const int matching = int(kMatchingShare * steps);
-  StyleReport report;
+  const MatchedColors matched(job.reference);
+  const int matching = int(kMatchingShare * job.steps);
   std::vector<double> losses;
-  for (int step = 0; step < steps; ++step) {
+  for (int step = 0; step < job.steps; ++step) {
     if (observer.is_cancelled()) throw Interrupted("style transfer stopped; nothing was written");
     StyledView& view = views[std::size_t(step) % views.size()];
-    const std::size_t n = view.picture.lightness.size();
-    std::vector<Ab> targets(n);
+    std::vector<Ab> targets;
     if (step < matching) {
-      for (std::size_t p = 0; p < n; ++p) {
-        const double lightness = view.picture.lightness[p];
-        targets[p] = {float(a0 + a1 * lightness), float(b0 + b1 * lightness)};
-      }
+      targets = matched.of(view.picture);
     } else {
-      std::vector<Ab> colors(n);
-      model.chromaticity->composite(view.pixels, colors);
-      for (std::size_t p = 0; p < n; ++p) {
-        view.picture.ab[p] = colors[p].a;
-        view.picture.ab[n + p] = colors[p].b;
-      }
-      std::vector<float> gradient(2 * n);
-      losses.push_back(loss(view.picture, gradient));
+      show(model, view);
+      std::vector<float> gradient(view.picture.ab.size());
+      losses.push_back(job.loss(view.picture, gradient));
       targets = targets_of(view.picture, gradient);
     }
-    const double fraction = std::clamp(2.0 * step / steps - 1.0, 0.0, 1.0);
-    const double rate = options.learning_rate * std::pow(options.final_learning_rate / options.learning_rate, fraction);
-    (void)model.chromaticity->step(view.pixels, targets, view.view.opacity, AbLoss::kSquared, float(rate));
+    const double fraction = std::clamp(2.0 * step / job.steps - 1.0, 0.0, 1.0);
+    const double from = job.options.learning_rate, to = job.options.final_learning_rate;
+    (void)model.chromaticity->step(view.pixels, targets, view.view.opacity, AbLoss::kSquared,
+                                   float(from * std::pow(to / from, fraction)));
     observer.report_progress(
-        {"style transfer", double(step + 1) / steps, {{"loss", losses.empty() ? 0 : losses.back()}}});
+        {"style transfer", double(step + 1) / job.steps, {{"loss", losses.empty() ? 0 : losses.back()}}});
   }
+  StyleReport report;
   const auto some = std::ptrdiff_t(std::min(views.size(), losses.size()));
   if (some > 0) {
     report.first_loss = std::accumulate(losses.begin(), losses.begin() + some, 0.0) / double(some);
     report.last_loss = std::accumulate(losses.end() - some, losses.end(), 0.0) / double(some);
   }
   report.seconds = model.report.seconds = watch.seconds();
-  model.save(take_snapshot);
+  model.save(job.take);
   return report;
 }
 

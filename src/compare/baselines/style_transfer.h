@@ -21,13 +21,19 @@ struct StyleReport {
   double first_loss = 0, last_loss = 0;  ///< means over as many steps as there are views, at the beginning and the end
 };
 
-/// Trains a photometric colour field on the style loss and leaves it in `take_snapshot`.
-/// @param options  of stage 2; the field's size, learning rates and seed are used
-/// @param steps    pictures, of training views in turn
+/// What is transferred to what.
+struct StyleJob {
+  const Capture& capture;
+  std::filesystem::path stage1;  ///< snapshot
+  const StyleLoss& loss;
+  const LabPicture& reference;
+  const Stage2Options& options;  ///< the field's size, learning rates and seed are used
+  int steps = 0;                 ///< pictures, of training views in turn
+  std::filesystem::path take;    ///< snapshot that the result goes to
+};
+/// Trains a photometric colour field on the style loss.
 /// @throws Interrupted  without leaving anything; SnapshotError; UsageError for views that are too small.
-StyleReport transfer_style(const Capture& capture, const std::filesystem::path& stage1_snapshot, const StyleLoss& loss,
-                           const LabPicture& reference, const Stage2Options& options, int steps,
-                           const std::filesystem::path& take_snapshot, const Engines& engines, Observer& observer);
+StyleReport transfer_style(const StyleJob& job, const Engines& engines, Observer& observer);
 
 /// A training view as the colorizer colours it: the middle one of the list.
 [[nodiscard]] LabPicture colorized_view(const Capture& capture, const std::filesystem::path& stage1_snapshot,

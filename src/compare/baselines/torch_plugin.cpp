@@ -19,10 +19,8 @@ PositionalRays positional_rays(const Capture& capture, const SceneFrame& frame) 
   return {kNearOfSurroundings, true};
 }
 
-std::unique_ptr<Engines> positional_engines(const PositionalRays& rays, bool trains_encoding,
-                                            const Engines* luminance) {
-  return torch_baselines().positional_engines(rays, trains_encoding, luminance,
-                                              luminance != nullptr ? *luminance : cpu_engines());
+std::unique_ptr<Engines> positional_engines(const PositionalRays& rays, const Engines& others) {
+  return torch_baselines().positional_engines(rays, others);
 }
 
 StyleLoss::StyleLoss(const std::filesystem::path& network, const LabPicture& reference)

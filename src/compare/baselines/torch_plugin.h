@@ -19,9 +19,7 @@ struct StyleNetwork {
 };
 
 struct TorchBaselines {
-  /// @param luminance  as in positional_engines  @param colors  makes the per-sample colour
-  std::unique_ptr<Engines> (*positional_engines)(const PositionalRays& rays, bool trains_encoding,
-                                                 const Engines* luminance, const Engines& colors);
+  std::unique_ptr<Engines> (*positional_engines)(const PositionalRays& rays, const Engines& others);
   std::unique_ptr<StyleNetwork> (*style_network)(const std::filesystem::path& network, const LabPicture& reference);
 };
 /// Loads the plug-in.  @throws DeviceError  it is missing or cannot be loaded.

@@ -5,8 +5,7 @@
 
 namespace cnerf::compare {
 
-[[nodiscard]] std::unique_ptr<Engines> make_positional_engines(const PositionalRays& rays, bool trains_encoding,
-                                                               const Engines* luminance, const Engines& colors);
+[[nodiscard]] std::unique_ptr<Engines> make_positional_engines(const PositionalRays& rays, const Engines& others);
 [[nodiscard]] std::unique_ptr<StyleNetwork> make_style_network(const std::filesystem::path& network,
                                                                const LabPicture& reference);
 

@@ -1,0 +1,323 @@
+#include "src/compare/seed_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "src/base/error.h"
+#include "src/base/json_record.h"
+#include "src/compare/baselines/flow.h"
+#include "src/compare/baselines/positional_field.h"
+#include "src/compare/baselines/simulated.h"
+#include "src/compare/stage2_variants.h"
+#include "src/picture/encode.h"
+#include "src/pipeline/colorize_step.h"
+#include "src/pipeline/picture_files.h"
+#include "src/pipeline/render_step.h"
+#include "src/render/camera_path.h"
+#include "src/train/chroma/color_model.h"
+#include "src/train/luminance/luminance_model.h"
+#include "src/train/luminance/options_json.h"
+#include "src/train/luminance/placement.h"
+#include "src/train/luminance/stage1.h"
+
+namespace cnerf::compare {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kPictureWidth = 480;             // pixels
+constexpr int kPictureQuality = 88;            // of JPEG
+constexpr int kFrameQuality = 80;              // of a turntable's
+constexpr std::size_t kLongRange = 8;          // the turntable's share that long-range consistency looks across
+constexpr std::size_t kMeasuredPixels = 1024;  // of a learning curve: rendering them by an MLP takes seconds
+constexpr int kManySteps = 100'000'000;        // the time ends a training, not these
+
+std::string digest(const std::string& text) {
+  return sha256(std::as_bytes(std::span(text)));
+}
+
+/// The settings that a folder was made with; empty when it was not.
+std::string settings_in(const fs::path& folder) {
+  const fs::path file = folder / "settings.txt";
+  return fs::exists(file) ? read_text_file(file) : "";
+}
+
+/// An empty folder unless it was made with these settings.
+void begin_folder(const fs::path& folder, const std::string& settings) {
+  if (settings_in(folder) == settings) return;
+  fs::remove_all(folder);
+  write_file(folder / "settings.txt", settings);
+}
+
+void write_jpeg(const fs::path& file, const RenderedImage& image, int quality) {
+  const Picture picture = scaled_down(pipeline::picture_of(image, pipeline::ShownColor::kDecoded), kPictureWidth);
+  write_file(file, std::span<const std::byte>(jpeg_bytes(picture, quality)));
+}
+
+std::string to_text(const std::vector<LearningPoint>& curve) {
+  std::string text;
+  for (const LearningPoint& point : curve) text += fmt::format("{:.6g} {:.6g}\n", point.seconds, point.value);
+  return text;
+}
+std::vector<LearningPoint> read_curve(const fs::path& snapshot) {
+  const fs::path file = fs::path(snapshot).replace_extension(".curve");
+  std::vector<LearningPoint> curve;
+  std::istringstream lines(fs::exists(file) ? read_text_file(file) : "");
+  for (LearningPoint point; lines >> point.seconds >> point.value;) curve.push_back(point);
+  return curve;
+}
+
+/// Trains stage 1, and leaves the curve of its PSNR beside the snapshot.
+Stage1Report train_measured(const Subject& subject, const Stage1Options& options, const fs::path& snapshot,
+                            const Engines& engines, Observer& observer) {
+  const SceneFrame frame = place_scene(subject.capture, options.placement);
+  const HeldOutPixels pixels(subject.evaluated, frame, kMeasuredPixels);
+  const MarchSettings march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
+  const WatchedEngines watched(engines);
+  LearningCurve curve("stage 1", observer, [&] { return pixels.psnr(watched.luminance(), march); });
+  const Stage1Report report = train_stage1({subject.capture, options, snapshot, true}, watched, curve);
+  // The engine is gone; what it came to is in the snapshot. What an earlier part of the training took comes first.
+  const double before = curve.points().empty() ? report.seconds : report.seconds - curve.seconds();
+  std::vector<LearningPoint> points = curve.points();
+  for (LearningPoint& point : points) point.seconds += std::max(before, 0.0);
+  points.push_back({report.seconds, pixels.psnr(*LuminanceModel::load(snapshot, engines).engine, march)});
+  write_file(fs::path(snapshot).replace_extension(".curve"), to_text(points));
+  return report;
+}
+
+bool is_own(const Method& method) {
+  return &method == &kMethods[0];
+}
+
+}  // namespace
+
+bool is_simulated(const std::string& spec) {
+  return spec == "simulated" || spec.starts_with("simulated:");
+}
+
+SimulationOptions simulation_of(const std::string& spec) {
+  const std::size_t colon = spec.find(':');
+  return parse_simulation(colon == std::string::npos ? "" : spec.substr(colon + 1));
+}
+
+std::string numbered(std::size_t index) {
+  return fmt::format("{:04}.jpg", index);
+}
+
+/// What a method's colours stand on.
+struct SeedRun::Field {
+  std::shared_ptr<const Engines> own;      ///< of a stage 1 of its own
+  std::shared_ptr<const Engines> engines;  ///< of the shared stage 1 and of the colours
+};
+
+SeedRun::SeedRun(const Bench& bench, const Subject& subject, int seed, fs::path folder)
+    : bench_(bench),
+      subject_(subject),
+      seed_(seed),
+      folder_(std::move(folder)),
+      stage1_(folder_ / "stage1.snapshot"),
+      rendering_(bench.engines) {}
+
+SeedRun::Field SeedRun::field_of(const Method& method) const {
+  const std::shared_ptr<const Engines> usual(std::shared_ptr<void>(), &bench_.engines);  // not owned
+  if (!method.has_own_field) return {nullptr, usual};
+  const SceneFrame frame = place_scene(subject_.capture, bench_.config.run.stage1.placement);
+  const std::shared_ptr<const Engines> own =
+      positional_engines(positional_rays(subject_.capture, frame), bench_.engines);
+  return {own, std::make_shared<MixedEngines>(usual, own)};
+}
+
+void SeedRun::train() {
+  Stage1Options options = bench_.config.run.stage1;
+  options.seed = seed_;
+  stage1_settings_ = digest(fs::absolute(subject_.capture.root).string() + options_to_json(options).dump() +
+                            options_to_json(subject_.options).dump());
+  const fs::path done = folder_ / "stage1.txt";
+  if (settings_in(folder_) == stage1_settings_ && fs::exists(done)) return;
+  begin_folder(folder_, stage1_settings_);
+  bench_.observer.say(fmt::format("{}, seed {}: stage 1", subject_.name, seed_));
+  const Stage1Report report = train_measured(subject_, options, stage1_, bench_.engines, bench_.observer);
+  write_file(done, fmt::format("{} steps, {:.1f} s, {:.2f} dB on training pixels\n", report.steps, report.seconds,
+                               report.train_psnr));
+}
+
+std::string SeedRun::settings_of(const Method& method) const {
+  const Config& run = bench_.config.run;
+  const bool has_options = method.has_own_field || method.matches_features;
+  return digest(stage1_settings_ + method.name + options_to_json(stage2_of(method, run.stage2)).dump() +
+                (has_options ? options_to_json(bench_.config.own).dump() : "") + options_to_json(run.colorizer).dump() +
+                options_to_json(run.render).dump() + (bench_.lpips != nullptr ? bench_.lpips->network() : ""));
+}
+
+Cell SeedRun::make(const Method& method) {
+  const fs::path folder = folder_ / method.name, file = folder / "cell.json";
+  const std::string settings = settings_of(method);
+  if (fs::exists(file) && settings_in(folder) == settings) {
+    const auto finished = read_record<Cell>(file);
+    if (finished.error.empty()) return finished;
+  }
+  begin_folder(folder, settings);
+  bench_.observer.say(fmt::format("{}, seed {}: {}", subject_.name, seed_, method.name));
+  Cell cell;
+  cell.capture = subject_.name;
+  cell.method = method.name;
+  cell.seed = seed_;
+  cell.settings = settings;
+  try {
+    if (method.is_colored) colorize(method, cell);
+    // Colours stand on the shared stage 1; MixedEngines differ from the usual ones in their colours alone.
+    const Field field = field_of(method);
+    const MixedEngines rendering(std::shared_ptr<const Engines>(std::shared_ptr<void>(), &rendering_), field.engines);
+    const auto scene = Scene::load(stage1_, method.is_colored ? folder / "take.snapshot" : fs::path(), rendering);
+    evaluate_views(method, *scene, cell);
+    evaluate_turntable(method, *scene, cell);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::exception& problem) {
+    cell.error = problem.what();
+    bench_.observer.say(fmt::format("{} failed: {}", method.name, problem.what()));
+  }
+  write_file(file, to_json(cell).dump(2) + "\n");
+  return cell;
+}
+
+std::unique_ptr<Colorizer> SeedRun::colorizer_for(const Method& method) const {
+  if (method.knows_truth) return make_simulated_colorizer(subject_.capture, oracle_simulation());
+  Config config = bench_.config.run;
+  std::unique_ptr<Colorizer> colorizer;
+  if (is_simulated(config.colorizer.spec)) {
+    SimulationOptions options = simulation_of(config.colorizer.spec);
+    options.seed += seed_ - 1;  // each seed meets other errors
+    colorizer = make_simulated_colorizer(subject_.capture, options);
+  } else {
+    config.stage2.seed = seed_;
+    colorizer = make_colorizer(config.colorizer, pipeline::colorizer_context(config, subject_.capture.root,
+                                                                             folder_ / "cache", bench_.observer));
+  }
+  if (!method.follows_flow) return colorizer;
+  return std::make_unique<FlowColorizer>(std::move(colorizer));
+}
+
+/// Stage 1 of a method that has a field of its own: some times as long as the shared one took.
+void SeedRun::train_own_field(const Engines& engines, Cell& cell) const {
+  Stage1Options options = bench_.config.run.stage1;
+  options.seed = seed_;
+  options.steps = kManySteps;
+  options.checkpoint_every = 0;
+  options.max_seconds = bench_.config.own.positional_budget * LuminanceModel::load(stage1_, bench_.engines).seconds;
+  options.learning_rate = kPositionalLearningRate;
+  options.final_learning_rate = kPositionalFinalLearningRate;
+  const fs::path snapshot = folder_ / cell.method / "stage1.snapshot";
+  (void)train_measured(subject_, options, snapshot, engines, bench_.observer);
+  cell.stage1_curve = read_curve(snapshot);
+}
+
+/// ARF in place of stage 2.
+StyleReport SeedRun::transfer(const Stage2Options& options, Colorizer& colorizer, const fs::path& take) const {
+  const CompareOptions& own = bench_.config.own;
+  const fs::path network = own.style_network.empty() ? bench_.lpips_weights : fs::path(own.style_network);
+  if (network.empty()) {
+    throw UsageError(
+        "style-transfer: needs a network of features: --lpips-weights of AlexNet, or compare.style_network");
+  }
+  const LabPicture reference = own.style_reference.empty()
+                                   ? colorized_view(subject_.capture, stage1_, colorizer, bench_.engines)
+                                   : reference_image(own.style_reference);
+  const StyleLoss loss(network, reference);
+  return transfer_style({subject_.capture, stage1_, loss, reference, options, own.style_steps, take}, bench_.engines,
+                        bench_.observer);
+}
+
+void SeedRun::colorize(const Method& method, Cell& cell) {
+  const Field field = field_of(method);
+  if (field.own) train_own_field(*field.own, cell);
+  if (is_own(method)) cell.stage1_curve = read_curve(stage1_);
+  const auto colorizer = colorizer_for(method);
+  if (method.matches_features) {
+    Stage2Options options = stage2_of(method, bench_.config.run.stage2);
+    options.seed = seed_;
+    cell.seconds = transfer(options, *colorizer, folder_ / method.name / "take.snapshot").seconds;
+  } else {
+    train_colors(method, field, *colorizer, cell);
+  }
+  cell.metrics.colorizer = colorizer->name();
+}
+
+/// Stage 2; of the own method and of those with a field of their own, also the curve of its ab error.
+void SeedRun::train_colors(const Method& method, const Field& field, Colorizer& colorizer, Cell& cell) {
+  Stage2Options options = stage2_of(method, bench_.config.run.stage2);
+  options.seed = seed_;
+  const fs::path take = folder_ / method.name / "take.snapshot";
+  const auto temperature = float(options.decode_temperature);
+  std::optional<HeldOutPixels> pixels;
+  const WatchedEngines engines(*field.engines);
+  LearningCurve curve("stage 2", bench_.observer, [&] { return pixels->ab_error(engines.color_bins(), temperature); });
+  if (field.own || is_own(method)) {
+    const LuminanceModel model = LuminanceModel::load(stage1_, bench_.engines);
+    pixels.emplace(subject_.evaluated, model.frame, kMeasuredPixels);
+    pixels->trace(*model.engine, model.march());
+    fs::remove(take);  // a curve is of one training from its beginning
+  }
+  const Photometric photometric;
+  ViewQuestions whole_views;
+  const Stage2Job job{.capture = subject_.capture,
+                      .stage1 = stage1_,
+                      .options = options,
+                      .colorizer = colorizer,
+                      .known = {},
+                      .take = take,
+                      .resume = true,
+                      .views = &training_views_,
+                      .questions = asks_about_views(method) ? &whole_views : nullptr,
+                      .injection = is_photometric(method) ? &photometric : nullptr};
+  const Stage2Report report = train_stage2(job, engines, pixels ? static_cast<Observer&>(curve) : bench_.observer);
+  if (pixels && !curve.points().empty()) {
+    cell.stage2_curve = curve.points();
+    const ColorModel model = ColorModel::load(take, *field.engines);
+    cell.stage2_curve.push_back({curve.seconds(), pixels->ab_error(*model.chroma, temperature)});
+  }
+  cell.accepted = report.accepted;
+  cell.rejected = report.rejected;
+  cell.seconds = report.seconds;
+}
+
+void SeedRun::evaluate_views(const Method& method, const Scene& scene, Cell& cell) const {
+  EvaluateOptions options;
+  options.render = pipeline::render_options(bench_.config.run);
+  options.lpips = bench_.lpips;
+  options.with_baked = false;
+  options.grey_as_color = true;
+  const std::vector<std::size_t> shown = subject_.shown();
+  std::size_t index = 0;
+  const auto keep_shown = [&](const EvaluatedView& view) {
+    const auto place = std::ranges::find(shown, index++);
+    if (place == shown.end()) return;
+    const fs::path file = folder_ / method.name / "views" / numbered(std::size_t(place - shown.begin()));
+    write_jpeg(file, view.ours, kPictureQuality);
+  };
+  const std::string colorizer = cell.metrics.colorizer;
+  cell.metrics = evaluate(scene, subject_.capture, options, keep_shown, bench_.observer.progress_sink());
+  cell.metrics.take = method.name;
+  cell.metrics.colorizer = colorizer;
+}
+
+void SeedRun::evaluate_turntable(const Method& method, const Scene& scene, Cell& cell) const {
+  const CameraPath path = turntable_path(subject_.capture, bench_.config.run.render);
+  const RenderOptions options = pipeline::render_options(bench_.config.run);
+  std::vector<RenderedImage> frames;
+  std::vector<SeenView> seen;
+  frames.reserve(path.cameras.size());
+  for (const PathCamera& camera : path.cameras) {
+    if (bench_.observer.is_cancelled()) throw Interrupted("comparison stopped");
+    frames.push_back(scene.render(camera.intrinsics, camera.world_from_camera, options));
+    write_jpeg(folder_ / method.name / "turntable" / numbered(frames.size() - 1), frames.back(), kFrameQuality);
+    seen.push_back({&frames.back(), camera.intrinsics, camera.world_from_camera});
+    bench_.observer.report_progress({"turntable", double(frames.size()) / double(path.cameras.size()), {}});
+  }
+  if (!method.is_colored) return;
+  cell.short_range = consistency(seen, 1);
+  cell.long_range = consistency(seen, std::max<std::size_t>(2, path.cameras.size() / kLongRange));
+}
+
+}  // namespace cnerf::compare
