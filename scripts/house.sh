@@ -59,7 +59,7 @@ formula "Adam" 'sqrtf?\(second'
 formula "initial table" 'kInitialReach ='
 row "copies of formulas between processor and CUDA" $copies 0
 
-row "options" "$(grep -cE '^\| `[a-z0-9_]+(\.[a-z0-9_]+)*` \|' docs/configuration.md)" 116
+row "options" "$(grep -cE '^\| `[a-z0-9_]+(\.[a-z0-9_]+)*` \|' docs/configuration.md)" 110
 row "seeds in ASCII hex" "$(code '0x[67][0-9a-f]([2-7][0-9a-f])+u?ll\b' "${product[@]}")" 0
 row "process-global device" "$(code 'std::atomic<Device>' "${product[@]}")" 0
 row "is_photometric in src/train" "$(code '\bis_photometric\b' src/train)" 6
