@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,8 @@ struct Op {
   std::function<std::vector<Result>()> expected;  ///< empty: what the generic processor computes
   std::vector<Bound> bounds;
   bool is_gpu_only = false;  ///< on the processor there is nothing to compare
+
+  friend void PrintTo(const Op& op, std::ostream* out) { *out << op.name; }
 };
 
 [[nodiscard]] inline Backend reference_backend() {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <memory>
 
 #include "src/base/error.h"
@@ -48,7 +49,7 @@ class Scene {
     options_.occupancy.resolution = 32;
     options_.cascades = problem.cascades;
     options_.march = march_settings(problem.cascades, 64, 1.0 / 64);
-    options_.samples_per_step = 16384;
+    options_.samples_per_step = 8192;
     options_.patch_size = problem.patch;
     options_.distortion_weight = problem.distortion_weight;
   }
@@ -63,10 +64,15 @@ class Scene {
   }
   /// After so many steps on the generic processor.
   [[nodiscard]] std::unique_ptr<LuminanceEngine> trained(const Backend& backend, long steps) {
-    if (!trainer_) trainer_ = fresh(reference_backend());
-    while (trainer_->step_count() < steps) trainer_->step(steps > 40 ? 1e-3f : 1e-2f);
+    std::unique_ptr<LuminanceEngine>& trainer = trained_[steps];
+    if (!trainer) {
+      trainer = fresh(reference_backend());
+      const auto earlier = trained_.find(40);
+      if (steps > 40 && earlier != trained_.end()) copy_state(*earlier->second, *trainer);
+      while (trainer->step_count() < steps) trainer->step(trainer->step_count() < 40 ? 1e-2f : 1e-3f);
+    }
     auto engine = fresh(backend);
-    copy_state(*trainer_, *engine);
+    copy_state(*trainer, *engine);
     return engine;
   }
 
@@ -74,7 +80,7 @@ class Scene {
   Capture capture_;
   std::vector<TrainingView> views_;
   LuminanceEngineOptions options_;
-  std::unique_ptr<LuminanceEngine> trainer_;
+  std::map<long, std::unique_ptr<LuminanceEngine>> trained_;  // by steps
 };
 
 void append_gradients(LuminanceEngine& engine, std::vector<Result>& results) {
