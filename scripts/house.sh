@@ -62,7 +62,7 @@ row "copies of formulas between processor and CUDA" $copies 0
 row "options" "$(grep -cE '^\| `[a-z0-9_]+(\.[a-z0-9_]+)*` \|' docs/configuration.md)" 110
 row "seeds in ASCII hex" "$(code '0x[67][0-9a-f]([2-7][0-9a-f])+u?ll\b' "${product[@]}")" 0
 row "process-global device" "$(code 'std::atomic<Device>' "${product[@]}")" 0
-row "is_photometric in src/train" "$(code '\bis_photometric\b' src/train)" 6
+row "is_photometric in src/train" "$(code '\bis_photometric\b' src/train)" 0
 row "core linking the comparison" "$(find src bake export viewer -name CMakeLists.txt ! -path 'src/app/*' ! -path 'src/compare/*' ! -path '*/node_modules/*' |
   xargs grep -l cnerf_compare | wc -l)" 0
 row "definitions of median" "$(code '\bmedian\((std::(vector|span)<[^()]*>|const [^()]*) [a-z]+\) \{' "${product[@]}")" 1
@@ -72,8 +72,8 @@ row "files that read JSON records field by field" \
   "$(sources "${product[@]}" | xargs grep -cE '\.at\("[a-z_0-9]+"\)\.get|\.value\("[a-z_0-9]+",' | awk -F: '$2 > 3 { n++ } END { print n + 0 }')" 1
 sizes=$(sources "${product[@]}" | grep -vE 'kernels\.inl$' | xargs perl scripts/functions.pl)
 row "functions of more than 60 lines, kernels excepted" "$(awk '$1 > 60' <<< "$sizes" | wc -l)" 1
-row "functions of more than 6 parameters, kernels excepted" "$(awk '$2 > 6' <<< "$sizes" | wc -l)" 6
+row "functions of more than 6 parameters, kernels excepted" "$(awk '$2 > 6' <<< "$sizes" | wc -l)" 5
 awk '$1 > 60 || $2 > 6 { print "  " $3, $4 ": " $1 " lines, " $2 " parameters" }' <<< "$sizes"
 row "product lines" "$(find src encoding bake export viewer -type f -regex '.*\.\(h\|cpp\|inl\|cu\|cuh\|py\|ts\|css\|html\|js\)' \
-  ! -path '*/node_modules/*' ! -path '*/dist/*' ! -path 'viewer/tests/*' -print0 | xargs -0 cat | wc -l)" 49000
+  ! -path '*/node_modules/*' ! -path '*/dist/*' ! -path 'viewer/tests/*' -print0 | xargs -0 cat | wc -l)" 50000
 exit $((failures > 0))
