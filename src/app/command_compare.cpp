@@ -103,7 +103,8 @@ Work declare_compare(CLI::App& app) {
   app.add_flag("--rating-sheet", arguments->rating_sheet, "Also write a page on which people judge unnamed pictures");
   app.add_option("--ratings", arguments->ratings, "Only make a table of these files of answers to the rating sheet");
   add_colorizer_options(app, arguments->config);
-  add_short_form(app, arguments->config, "--style-reference", "compare.style_reference");
+  CompareConfig defaults;
+  add_short_form(app, arguments->config, "--style-reference", "compare.style_reference", fields_of(defaults));
   add_short_form(app, arguments->config, "--downscale", "capture.downscale");
   add_short_form(app, arguments->config, "--holdout", "capture.holdout");
   app.add_flag("--resume", arguments->resume, "Go on with a comparison; what is finished and unchanged stays");

@@ -29,13 +29,17 @@ std::string described(const Field& field) {
   return field.help + " [" + default_text(field) + (legal.empty() ? "" : "; " + legal) + "]";
 }
 
-/// What the configuration says of one of its keys.
-std::string help_of(const std::string& key) {
-  Config config;
-  const std::vector<Field> fields = fields_of(config);
+/// What fields say of one of their keys.
+std::string help_of(const std::vector<Field>& fields, const std::string& key) {
   const auto field = std::ranges::find(fields, key, &Field::key);
   CNERF_CHECK(field != fields.end(), key);
   return described(*field) + " (" + key + ")";
+}
+
+/// What the configuration says of one of its keys.
+std::string help_of(const std::string& key) {
+  Config config;
+  return help_of(fields_of(config), key);
 }
 
 }  // namespace
@@ -52,9 +56,15 @@ void add_config_options(CLI::App& app, ConfigArguments& arguments) {
 }
 
 void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key) {
+  Config config;
+  add_short_form(app, arguments, option, key, fields_of(config));
+}
+
+void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
+                    const std::vector<Field>& fields) {
   app.add_option_function<std::string>(
       option, [&arguments, key](const std::string& value) { arguments.short_forms.push_back(key + "=" + value); },
-      help_of(key));
+      help_of(fields, key));
 }
 
 void add_flag_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key) {

@@ -26,6 +26,9 @@ struct ConfigArguments {
 void add_config_options(CLI::App& app, ConfigArguments& arguments);
 /// Declares `option` as a short form of the config key `key`, which brings its help and what is legal along.
 void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
+/// The same for a key of other fields than the configuration's.
+void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
+                    const std::vector<Field>& fields);
 /// The same for a key that is true or false: the option sets it.
 void add_flag_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
 /// The same for a key that holds a list separated by `;`: the option may be repeated.
