@@ -36,11 +36,6 @@ PixelSamples with_room_for(std::vector<std::size_t> offsets) {
 
 }  // namespace
 
-Ray ray_of(const CachedView& view, std::size_t pixel) {
-  const auto width = std::size_t(view.width);
-  return view.camera.ray({double(pixel % width) + 0.5, double(pixel / width) + 0.5});
-}
-
 CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march, const UnitCamera& full_size_camera,
                       int short_side, double share) {
   CachedView view;
