@@ -3,7 +3,7 @@
 /// reference, the SIMD lanes and CUDA kernels use this very text and differ only in who loops.
 ///
 /// `Real` is float, double or a lane class of floats; `Index` the matching unsigned 32-bit type. For lane classes,
-/// `to_index` and `to_real` are found by argument-dependent lookup.
+/// `to_index`, `smaller` and `to_real` are found by argument-dependent lookup.
 
 #include <cstdint>
 
@@ -17,6 +17,9 @@ CNERF_HD inline std::uint32_t to_index(float x) {
 }
 CNERF_HD inline std::uint32_t to_index(double x) {
   return std::uint32_t(std::int32_t(x));
+}
+CNERF_HD inline std::uint32_t smaller(std::uint32_t a, std::uint32_t b) {
+  return a < b ? a : b;
 }
 CNERF_HD inline void to_real(std::uint32_t i, float& x) {
   x = float(i);
@@ -32,14 +35,15 @@ struct GridCell {
   Real fraction[3];  ///< in [0, 1]
 };
 
-/// @param position  in [0, 1] on each axis; x = 1 falls on the upper face of the last cell by way of fraction 0 in the
-///                  row of points behind it, which exists (levels have cells + 1 points).
+/// @param position  in [0, 1] on each axis; x = 1 is the upper face of the last cell, fraction 1: there is no point
+/// behind
+///                  it, and in a dense level its row would be another level's.
 template <typename Index, typename Real>
 CNERF_HD GridCell<Real, Index> locate(const GridLevel& level, const Real position[3]) {
   GridCell<Real, Index> cell;
   for (int axis = 0; axis < 3; ++axis) {
     const Real scaled = position[axis] * Real(float(level.cells));
-    cell.corner[axis] = to_index(scaled);
+    cell.corner[axis] = smaller(to_index(scaled), Index(level.cells - 1u));
     Real floor;
     to_real(cell.corner[axis], floor);
     cell.fraction[axis] = scaled - floor;

@@ -41,6 +41,7 @@ struct LanesU32 {
   friend LanesU32 operator*(LanesU32 a, LanesU32 b) { return LanesU32(a.raw * b.raw); }
   friend LanesU32 operator^(LanesU32 a, LanesU32 b) { return LanesU32(a.raw ^ b.raw); }
   friend LanesU32 operator&(LanesU32 a, LanesU32 b) { return LanesU32(a.raw & b.raw); }
+  friend LanesU32 smaller(LanesU32 a, LanesU32 b) { return LanesU32(a.raw < b.raw ? a.raw : b.raw); }
 };
 
 /// kWidth floats.
