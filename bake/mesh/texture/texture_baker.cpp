@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "bake/mesh/texture/texel_map.h"
 #include "bake/color/voxel_color.h"
+#include "bake/mesh/texture/texel_map.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
 
