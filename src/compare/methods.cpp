@@ -51,7 +51,7 @@ Stage2Options stage2_of(const Method& method, Stage2Options configured) {
   if (name == "without-purification") options.purify.enabled = false;
   if (asks_about_views(method)) options.purify.enabled = false;
   if (is_photometric(method)) {
-    // The photometric loss is not to lose because of a step size chosen for classes: docs/decisions.md, 33.
+    // The photometric loss is not to lose because of a step size chosen for classes.
     options.learning_rate = Stage2Options{}.learning_rate;
     options.final_learning_rate = Stage2Options{}.final_learning_rate;
   }
