@@ -62,8 +62,11 @@ function(cnerf_add_test name)
   add_executable(${name} ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE cnerf_options cnerf_test_support ${arg_LINK})
+  target_compile_options(${name} PRIVATE ${CNERF_TEST_OPTIMISATION})
   if("torch" IN_LIST arg_LINK)
     cnerf_precompile_torch(${name})
+  else()
+    cnerf_precompile_gtest(${name})
   endif()
   cnerf_suites_of(suites ${arg_SOURCES})
   list(JOIN suites ":" all)
@@ -73,6 +76,23 @@ function(cnerf_add_test name)
       LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT} PROCESSORS ${arg_PROCESSORS} SKIP_RETURN_CODE 77
       ENVIRONMENT "CNERF_SUITES=${all};CNERF_CASES=${PROJECT_BINARY_DIR}/Testing/cases/${name}.${suite}")
   endforeach()
+endfunction()
+
+# A test runs once and is compiled often.
+set(CNERF_TEST_OPTIMISATION $<$<AND:$<CONFIG:Release>,$<COMPILE_LANGUAGE:CXX>>:-O1>)
+
+# cnerf_precompile_gtest(NAME): sources of a test begin with GoogleTest's header and those of std that most tests include.
+function(cnerf_precompile_gtest name)
+  if(NOT TARGET cnerf_gtest_header)
+    file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/gtest_header.cpp CONTENT "int main() {}  // holds the precompiled header\n")
+    add_executable(cnerf_gtest_header ${PROJECT_BINARY_DIR}/gtest_header.cpp)  # an executable, for -fPIE
+    target_link_libraries(cnerf_gtest_header PRIVATE cnerf_options GTest::gmock)
+    target_precompile_headers(cnerf_gtest_header PRIVATE <gmock/gmock.h> <gtest/gtest.h>
+      <algorithm> <array> <cmath> <filesystem> <fstream> <functional> <map> <numeric> <random> <span> <sstream> <string> <vector>)
+    target_compile_options(cnerf_gtest_header PRIVATE ${CNERF_TEST_OPTIMISATION} ${CNERF_PRECOMPILED_OPTIONS})
+  endif()
+  target_compile_options(${name} PRIVATE ${CNERF_PRECOMPILED_OPTIONS})
+  target_precompile_headers(${name} REUSE_FROM cnerf_gtest_header)
 endfunction()
 
 # cnerf_includes_torch(OUT FILE): whether a file includes <torch/…>, itself or by a header of ours.

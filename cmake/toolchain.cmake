@@ -9,7 +9,8 @@ endif()
 
 find_program(CNERF_CCACHE ccache)
 if(CNERF_CCACHE)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CNERF_CCACHE})
+  # ccache stores what begins with a precompiled header only if it is told that this is meant.
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CNERF_CCACHE})
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     set(CNERF_PRECOMPILED_OPTIONS -fpch-preprocess)  # ccache wants it with precompiled headers
   endif()
@@ -24,8 +25,9 @@ if(CNERF_WARNINGS_AS_ERRORS)
   target_compile_options(cnerf_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Werror>)
 endif()
 if(CNERF_SANITIZE)
+  # GCC takes what a sanitizer adds for uninitialised (GCC 105562).
   target_compile_options(cnerf_options INTERFACE
-                         $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=${CNERF_SANITIZE};-fno-omit-frame-pointer>)
+                         $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=${CNERF_SANITIZE};-fno-omit-frame-pointer;-Wno-maybe-uninitialized>)
   target_link_options(cnerf_options INTERFACE -fsanitize=${CNERF_SANITIZE})
 endif()
 
