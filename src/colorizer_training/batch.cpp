@@ -1,9 +1,11 @@
 #include "src/colorizer_training/batch.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <optional>
 
 #include "src/base/rng.h"
 #include "src/color/colorspace_math.h"
@@ -80,8 +82,22 @@ Tensor change_lightness(const Tensor& lightness, const Tensor& rows) {
   return l.clamp(0, 100);
 }
 
+/// Begin and end of a rectangle's rows and columns.
+using Box = std::array<std::int64_t, 4>;
+
+/// A rectangle on the grid of the quarter-resolution targets, at most half of the crop wide and high.
+Box draw_box(int crop_side, SequentialRng& rng) {
+  Box box{};
+  for (std::size_t axis = 0; axis < 4; axis += 2) {
+    const std::int64_t length = 4 * (crop_side / 16 + rng.below(std::uint32_t(crop_side / 8)));
+    box[axis] = 4 * rng.below(std::uint32_t((crop_side - length) / 4 + 1));
+    box[axis + 1] = box[axis] + length;
+  }
+  return box;
+}
+
 /// CutMix (Yun et al. 2019) inside one source's part of the batch: the next image's rectangle over each image.
-void cut_and_paste(Tensor rgb, int first, int count, const std::int64_t box[4]) {
+void cut_and_paste(Tensor rgb, int first, int count, const Box& box) {
   if (count < 2) return;
   const Tensor part = rgb.slice(0, first, first + count);
   const Tensor target = part.slice(2, box[0], box[1]).slice(3, box[2], box[3]);
@@ -163,54 +179,47 @@ RgbImage image_from_lab(const Tensor& lightness, const Tensor& ab) {
   return image;
 }
 
-Batch make_batch(const std::vector<const ResidentImages*>& sources, const std::vector<int>& counts, int crop_side,
-                 const AugmentOptions& options, std::uint64_t seed, std::int64_t step, torch::Device device) {
+Batch make_batch(const std::vector<BatchPart>& parts, int crop_side, const AugmentOptions& options, std::uint64_t seed,
+                 std::int64_t step) {
   const torch::NoGradGuard no_grad;
+  const torch::Device device = parts.front().images->device();
   SequentialRng rng(seed, std::uint64_t(step));
   Batch batch;
   std::vector<Tensor> crops;
   std::vector<float> lightness_rows;
-  std::int64_t box[4] = {0, 0, 0, 0};
-  const bool mix = rng.uniform() < options.cutmix;
-  if (mix) {
-    // Borders on the grid of the quarter-resolution targets.
-    const auto span = [&](std::int64_t* out) {
-      const std::int64_t length = 4 * (crop_side / 16 + rng.below(std::uint32_t(crop_side / 8)));
-      out[0] = 4 * rng.below(std::uint32_t((crop_side - length) / 4 + 1));
-      out[1] = out[0] + length;
-    };
-    span(box);
-    span(box + 2);
-    batch.mixed_share = double((box[1] - box[0]) * (box[3] - box[2])) / (double(crop_side) * crop_side);
+  std::optional<Box> box;
+  if (rng.uniform() < options.cutmix) {
+    box = draw_box(crop_side, rng);
+    batch.mixed_share = double(((*box)[1] - (*box)[0]) * ((*box)[3] - (*box)[2])) / (double(crop_side) * crop_side);
   }
-  for (std::size_t s = 0; s < sources.size(); ++s) {
-    if (counts[s] == 0) continue;
+  for (const auto& [images, count] : parts) {
+    if (count == 0) continue;
     std::vector<std::int64_t> index;
     std::vector<float> theta;
-    for (int i = 0; i < counts[s]; ++i) {
-      index.push_back(sources[s]->draw(rng.uniform()));
-      append_crop(options, sources[s]->aspect[std::size_t(index.back())], rng, theta);
+    for (int i = 0; i < count; ++i) {
+      index.push_back(images->draw(rng.uniform()));
+      append_crop(options, images->aspect[std::size_t(index.back())], rng, theta);
       append_lightness(options, rng, lightness_rows);
-      batch.label.push_back(sources[s]->label[std::size_t(index.back())]);
+      batch.label.push_back(images->label[std::size_t(index.back())]);
     }
-    const Tensor images = sources[s]->gather(upload(torch::tensor(index), device));
-    const Tensor grid = F::affine_grid(upload(torch::tensor(theta).view({counts[s], 2, 3}), device),
-                                       {counts[s], 3, crop_side, crop_side},
-                                       /*align_corners=*/false);
+    const Tensor whole = images->gather(upload(torch::tensor(index), device));
+    const Tensor grid =
+        F::affine_grid(upload(torch::tensor(theta).view({count, 2, 3}), device), {count, 3, crop_side, crop_side},
+                       /*align_corners=*/false);
     crops.push_back(F::grid_sample(
-        images, grid,
+        whole, grid,
         F::GridSampleFuncOptions().mode(torch::kBilinear).padding_mode(torch::kReflection).align_corners(false)));
   }
   batch.rgb = torch::cat(crops);
   batch.mixed_label = batch.label;
   int first = 0;
-  for (const int count : counts) {
-    if (mix) {
-      cut_and_paste(batch.rgb, first, count, box);
-      std::rotate(batch.mixed_label.begin() + first, batch.mixed_label.begin() + first + (count > 0),
-                  batch.mixed_label.begin() + first + count);
+  for (const BatchPart& part : parts) {
+    if (box) {
+      cut_and_paste(batch.rgb, first, part.count, *box);
+      const auto begin = batch.mixed_label.begin() + first;
+      std::rotate(begin, begin + (part.count > 0), begin + part.count);
     }
-    first += count;
+    first += part.count;
   }
   const LabPlanes lab = lab_from_srgb(batch.rgb);
   batch.ab = torch::avg_pool2d(lab.ab, 4);

@@ -32,6 +32,7 @@ class ResidentImages {
 
   /// The image that a uniform number in [0, 1) draws.
   [[nodiscard]] std::int64_t draw(float uniform) const;
+  [[nodiscard]] torch::Device device() const { return rgb_.device(); }
 
   std::vector<float> aspect;
   std::vector<int> label;
@@ -62,10 +63,14 @@ struct LabPlanes {
 /// sRGB bytes of Lab planes [1, H, W], [2, H, W], clamped: for pictures to look at.
 [[nodiscard]] RgbImage image_from_lab(const torch::Tensor& lightness, const torch::Tensor& ab);
 
-/// The batch of one step: a pure function of the images, the seed and the step.
-/// @param counts  images taken from each of `sources`; their crops follow one another in the batch.
-[[nodiscard]] Batch make_batch(const std::vector<const ResidentImages*>& sources, const std::vector<int>& counts,
-                               int crop_side, const AugmentOptions& options, std::uint64_t seed, std::int64_t step,
-                               torch::Device device);
+/// Images of a batch that are drawn from one set.
+struct BatchPart {
+  const ResidentImages* images = nullptr;
+  int count = 0;
+};
+/// The batch of one step: a pure function of the images, the seed and the step. Crops of its parts follow one another,
+/// on the device of the images.
+[[nodiscard]] Batch make_batch(const std::vector<BatchPart>& parts, int crop_side, const AugmentOptions& options,
+                               std::uint64_t seed, std::int64_t step);
 
 }  // namespace cnerf

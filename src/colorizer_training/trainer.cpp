@@ -92,13 +92,11 @@ ColorizerTrainer::ColorizerTrainer(const ImageSet& images, std::unique_ptr<Featu
 Batch ColorizerTrainer::batch_of(std::uint64_t seed, std::int64_t step, double tile_share) const {
   SequentialRng rng(seed ^ kCropStream, std::uint64_t(step));
   if (rng.uniform() < tile_share) {
-    return make_batch({&tiles_}, {options_.tiles_per_step}, options_.tile_crop_side, options_.tile_augment, seed, step,
-                      device_);
+    return make_batch({{&tiles_, options_.tiles_per_step}}, options_.tile_crop_side, options_.tile_augment, seed, step);
   }
   const int side = options_.crop_sides.at(rng.below(std::uint32_t(options_.crop_sides.size())));
   const int tiles = options_.tile_share == 0 ? options_.tiles_per_step : 0;
-  return make_batch({&photos_, &tiles_}, {options_.photos_per_step, tiles}, side, options_.augment, seed, step,
-                    device_);
+  return make_batch({{&photos_, options_.photos_per_step}, {&tiles_, tiles}}, side, options_.augment, seed, step);
 }
 
 Tensor ColorizerTrainer::measure_class_weights() const {

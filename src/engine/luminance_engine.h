@@ -23,13 +23,9 @@ struct LuminanceEngineOptions {
   int cascades = 1;
   MarchSettings march;
   int samples_per_step = 1 << 16;  ///< trained samples that a step aims at
-  int patch_size = 0;  ///< 0: independent pixels; K: pixels come as K x K patches (paper, Eq. patch sampling)
-  float patch_scale_min = 0.3f, patch_scale_max = 0.7f;  ///< s, share of the image's short side
-  float max_luminance = 1.0f;                            ///< of the images; the field emits at most a little more
-  float distortion_weight = 0;                           ///< of each ray's distortion (distortion_math.h) in the loss
+  float max_luminance = 1.0f;      ///< of the images; the field emits at most a little more
+  float distortion_weight = 0;     ///< of each ray's distortion (distortion_math.h) in the loss
   std::uint64_t seed = 1;
-
-  [[nodiscard]] PixelSampling sampling() const { return {patch_size, patch_scale_min, patch_scale_max}; }
 };
 
 /// What a step did.

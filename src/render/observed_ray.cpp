@@ -17,9 +17,9 @@ struct HostViews {
 
 }  // namespace
 
-ObservedRay observe_ray(const std::vector<TrainingView>& views, const PixelSampling& sampling, std::uint64_t seed,
-                        std::uint64_t step, std::uint64_t ray) {
-  return observe_ray(HostViews{views}, sampling, seed, step, ray);
+ObservedRay observe_ray(const std::vector<TrainingView>& views, std::uint64_t seed, std::uint64_t step,
+                        std::uint64_t ray) {
+  return observe_ray(HostViews{views}, seed, step, ray);
 }
 
 }  // namespace cnerf

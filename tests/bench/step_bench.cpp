@@ -114,8 +114,7 @@ class TorchStep {
     std::vector<std::int64_t> ray_of;
     std::vector<torch::Tensor> directions;
     for (std::size_t r = 0; r < wanted_.report.rays; ++r) {
-      const ObservedRay observed =
-          observe_ray(training.views, options_.sampling(), options_.seed, std::uint64_t(engine_.step_count()), r);
+      const ObservedRay observed = observe_ray(training.views, options_.seed, std::uint64_t(engine_.step_count()), r);
       RayMarcher marcher(engine_.occupancy(), options_.march, observed.ray, observed.jitter);
       for (RaySample sample; marcher.next(sample);) {
         const Vec3f p = observed.ray.at(sample.t);

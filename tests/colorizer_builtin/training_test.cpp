@@ -184,9 +184,7 @@ TEST(LoadImageSet, HoldsOutMoreOnRequestAndNeverAnImageTwice) {
 TEST(MakeBatch, IsAPureFunctionOfTheStep) {
   const ImageSet set = tiny_set();
   const ResidentImages photos(set.photos, torch::kCPU);
-  const auto batch = [&](std::int64_t step) {
-    return make_batch({&photos}, {3}, 32, AugmentOptions{}, 9, step, torch::kCPU);
-  };
+  const auto batch = [&](std::int64_t step) { return make_batch({{&photos, 3}}, 32, AugmentOptions{}, 9, step); };
   EXPECT_TRUE(torch::equal(batch(4).lightness, batch(4).lightness));
   EXPECT_FALSE(torch::equal(batch(4).lightness, batch(5).lightness));
   EXPECT_EQ(batch(4).ab.sizes(), (std::vector<std::int64_t>{3, 2, 8, 8}));

@@ -46,7 +46,7 @@ class LossInDouble {
         max_luminance_(options.max_luminance),
         distortion_weight_(options.distortion_weight) {
     for (std::size_t r = 0; r < n_rays; ++r) {
-      rays_.push_back(observe_ray(views, options.sampling(), options.seed, std::uint64_t(engine.step_count()), r));
+      rays_.push_back(observe_ray(views, options.seed, std::uint64_t(engine.step_count()), r));
       RayMarcher marcher(engine.occupancy(), options.march, rays_.back().ray, rays_.back().jitter);
       samples_.emplace_back();
       for (RaySample sample; marcher.next(sample);) samples_.back().push_back(sample);

@@ -84,8 +84,7 @@ TEST(TorchOracle, GradientOfAWholeStep) {
 
   torch::Tensor loss = torch::zeros({}, f64);
   for (std::size_t r = 0; r < analytic.report.rays; ++r) {
-    const ObservedRay ray =
-        observe_ray(views, options.sampling(), options.seed, std::uint64_t(engine->step_count()), r);
+    const ObservedRay ray = observe_ray(views, options.seed, std::uint64_t(engine->step_count()), r);
     RayMarcher marcher(engine->occupancy(), options.march, ray.ray, ray.jitter);
     std::vector<double> positions, dt;
     for (RaySample sample; marcher.next(sample);) {

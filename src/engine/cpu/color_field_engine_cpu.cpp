@@ -30,7 +30,9 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
                   std::fill(work.d_output.begin(), work.d_output.end(), 0.0f);
                   for (std::size_t p = begin; p < end; ++p) {
                     const float weight = pixel_weights.empty() ? 1.0f : pixel_weights[p];
-                    chunk.loss += loss_gradient(pixels, p, first, targets[p], loss, weight * scale, work);
+                    const AbError error = ab_error(xyz_of(pixels, p, first, work), targets[p], loss, weight * scale);
+                    set_gradient(pixels, p, first, error, work);
+                    chunk.loss += error.distance;
                   }
                   float* d_encoded = chunk.append(work.positions, work.groups, field_.encoded_channels());
                   field_.backward(work, d_encoded, chunk.d_weights.data());
@@ -94,11 +96,9 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
     return sum;
   }
 
-  /// ab distance of one pixel; adds the gradient of its loss, times `scale`, to the samples' outputs.
-  double loss_gradient(const PixelSamples& pixels, std::size_t p, std::size_t first, Ab target, AbLoss loss,
-                       float scale, PointWorkspace& work) const {
-    const PixelXyz seen = xyz_of(pixels, p, first, work);
-    const AbError error = ab_error(seen, target, loss, scale);
+  /// Gradient of a pixel's loss by the outputs of its samples.
+  static void set_gradient(const PixelSamples& pixels, std::size_t p, std::size_t first, const AbError& error,
+                           PointWorkspace& work) {
     const GroupedView<const float> logs(work.output, kChromaticityOutputs);
     const GroupedView<float> d_logs(work.d_output, kChromaticityOutputs);
     for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
@@ -106,7 +106,6 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
       d_logs.at(s - first, 0) = error.d_x * light * ratio_derivative(logs.at(s - first, 0));
       d_logs.at(s - first, 1) = error.d_z * light * ratio_derivative(logs.at(s - first, 1));
     }
-    return error.distance;
   }
 
   PointNetCpu field_;

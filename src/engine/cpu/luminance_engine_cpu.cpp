@@ -70,6 +70,14 @@ class LuminanceEngineCpu final : public LuminanceEngine {
     std::vector<std::vector<MarchedSample>> of_ray;
     AlignedVector<float> wave_positions, wave_sigma;
   };
+  /// A ray on its way through the density-first pass.
+  struct Walk {
+    RayMarcher marcher;
+    float transmittance = 1;
+    bool active = true;
+    std::size_t wave_begin = 0, wave_end = 0;  ///< its samples of this wave
+  };
+  using Walks = std::array<Walk, kBlockRays>;
 
   /// Marches rays together and keeps the samples in front of the point where a ray becomes opaque.
   ///
@@ -79,6 +87,11 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   /// surface costs at most the rest of one wave.
   void collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
                float min_transmittance, Block& block) const;
+  /// Takes the wave's samples of each active ray.  @return how many in all
+  static std::size_t march_wave(std::span<const Ray> rays, Walks& walks, Block& block);
+  /// Composites what a ray has in the wave.
+  static void composite_wave(Walk& walk, std::vector<MarchedSample>& kept, std::span<const float> sigma,
+                             float min_transmittance);
   /// `collect` from the middle of each step, and of what it keeps the heaviest samples.
   void collect_for_picture(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                            Block& block) const;
@@ -104,14 +117,43 @@ LuminanceEngineCpu::LuminanceEngineCpu(const LuminanceEngineOptions& options)
       occupancy_(options.occupancy, options.cascades),
       counters_{0, first_rays(options.samples_per_step)} {}
 
+std::size_t LuminanceEngineCpu::march_wave(std::span<const Ray> rays, Walks& walks, Block& block) {
+  std::size_t count = 0;
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    Walk& walk = walks[r];
+    walk.wave_begin = count;
+    RaySample sample;
+    for (std::size_t i = 0; walk.active && i < kWaveSamples; ++i) {
+      if (block.of_ray[r].size() >= kMostSamplesPerRay || !walk.marcher.next(sample)) {
+        walk.active = false;
+        break;
+      }
+      set_position(block.wave_positions.data(), count++, rays[r].at(sample.t));
+      block.of_ray[r].push_back({sample.t, sample.dt, 0.0f});
+    }
+    walk.wave_end = count;
+  }
+  return count;
+}
+
+void LuminanceEngineCpu::composite_wave(Walk& walk, std::vector<MarchedSample>& kept, std::span<const float> sigma,
+                                        float min_transmittance) {
+  std::size_t at = kept.size() - (walk.wave_end - walk.wave_begin);
+  for (std::size_t s = walk.wave_begin; s < walk.wave_end; ++s, ++at) {
+    const float alpha = alpha_of(sigma[s], kept[at].dt);
+    kept[at].weight = walk.transmittance * alpha;
+    walk.transmittance *= 1.0f - alpha;
+    if (walk.transmittance < min_transmittance) {
+      kept.resize(at + 1);
+      walk.active = false;
+      return;
+    }
+  }
+}
+
 void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
                                  float min_transmittance, Block& block) const {
-  struct Walk {
-    RayMarcher marcher;
-    float transmittance = 1;
-    bool active = true;
-  };
-  std::array<Walk, kBlockRays> walks;
+  Walks walks;
   block.of_ray.resize(kBlockRays);
   for (std::size_t r = 0; r < rays.size(); ++r) {
     walks[r].marcher = RayMarcher(occupancy_, march, rays[r], jitter[r]);
@@ -120,44 +162,12 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
   block.marched = 0;
   ensure_size(block.wave_positions, kBlockRays * kWaveSamples * 3);
   ensure_size(block.wave_sigma, kBlockRays * kWaveSamples);
-
-  bool any_active = true;
-  while (any_active) {
-    std::array<std::size_t, kBlockRays + 1> begin{};
-    std::size_t count = 0;
-    for (std::size_t r = 0; r < rays.size(); ++r) {
-      begin[r] = count;
-      RaySample sample;
-      for (std::size_t i = 0; walks[r].active && i < kWaveSamples; ++i) {
-        if (block.of_ray[r].size() >= kMostSamplesPerRay || !walks[r].marcher.next(sample)) {
-          walks[r].active = false;
-          break;
-        }
-        set_position(block.wave_positions.data(), count++, rays[r].at(sample.t));
-        block.of_ray[r].push_back({sample.t, sample.dt, 0.0f});
-      }
-    }
-    begin[rays.size()] = count;
+  while (const std::size_t count = march_wave(rays, walks, block)) {
     block.marched += count;
-    if (count == 0) break;
     pad_positions(block.wave_positions, count);
     field_.density(block.wave_positions.data(), groups_of(count), block.work, block.wave_sigma.data());
-
-    any_active = false;
     for (std::size_t r = 0; r < rays.size(); ++r) {
-      std::vector<MarchedSample>& kept = block.of_ray[r];
-      std::size_t at = kept.size() - (begin[r + 1] - begin[r]);
-      for (std::size_t s = begin[r]; s < begin[r + 1]; ++s, ++at) {
-        const float alpha = alpha_of(block.wave_sigma[s], kept[at].dt);
-        kept[at].weight = walks[r].transmittance * alpha;
-        walks[r].transmittance *= 1.0f - alpha;
-        if (walks[r].transmittance < min_transmittance) {
-          kept.resize(at + 1);
-          walks[r].active = false;
-          break;
-        }
-      }
-      any_active |= walks[r].active;
+      composite_wave(walks[r], block.of_ray[r], block.wave_sigma, min_transmittance);
     }
   }
 
@@ -276,7 +286,7 @@ StepReport LuminanceEngineCpu::step(float learning_rate) {
   chunks_.run(rays, kBlockRays, field_.weight_count(), [&](StepChunk& chunk, std::size_t begin, std::size_t end) {
     std::array<ObservedRay, kBlockRays> observed;
     for (std::size_t r = begin; r < end; ++r) {
-      observed[r - begin] = observe_ray(views_, options_.sampling(), options_.seed, step, r);
+      observed[r - begin] = observe_ray(views_, options_.seed, step, r);
     }
     train_block({observed.data(), end - begin}, 1.0f / float(rays), blocks_.local(), chunk);
   });

@@ -74,7 +74,7 @@ FieldSamples LuminanceStepCuda::samples() const {
 void LuminanceStepCuda::launch(const std::uint32_t* occupied) {
   const AdamStep* adam = &state_.data()->adam;
   begin_step(state_.data(), learning_rates_.on_device(), stream_);
-  draw_training_rays({state_.data(), views_.records(), views_.count(), options_.sampling(), options_.seed, rays_.data(),
+  draw_training_rays({state_.data(), views_.records(), views_.count(), options_.seed, rays_.data(),
                       reinterpret_cast<DirectionCode*>(directions_.data())},
                      stream_);
   trace_training_rays(trace_job(occupied), stream_);

@@ -59,8 +59,8 @@ __device__ void clip(RayRecord& record) {
 __global__ void draw(const DrawJob job) {
   const std::uint32_t ray = blockIdx.x * kThreads + threadIdx.x;
   if (ray >= job.state->rays) return;
-  const ObservedRay observed = observe_ray(DeviceViews{job.views, job.n_views}, job.sampling, job.seed,
-                                           std::uint64_t(job.state->step), std::uint64_t(ray));
+  const ObservedRay observed =
+      observe_ray(DeviceViews{job.views, job.n_views}, job.seed, std::uint64_t(job.state->step), std::uint64_t(ray));
   RayRecord record;
   record.ray = observed.ray;
   record.jitter = observed.jitter;

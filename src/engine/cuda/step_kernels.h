@@ -52,7 +52,6 @@ struct DrawJob {
   const StepState* state;
   const ViewRecord* views;
   std::uint32_t n_views;
-  PixelSampling sampling;
   std::uint64_t seed;
   RayRecord* rays;
   DirectionCode* directions;

@@ -64,19 +64,27 @@ __device__ bool allocate_run(RayProgress& ray, int count, std::uint32_t capacity
   return begin + std::uint32_t(count) <= capacity;
 }
 
+/// What the backward pass needs of a lane's sample, in the first `count` lanes of a run.
+struct RunSample {
+  std::uint32_t ray_index;
+  int count;
+  Vec3f place;
+  float depth, raw_luminance;
+};
+
 template <int KT>
-__device__ void keep_for_training(const SampleArrays& samples, const WarpField<KT>& warp, RayProgress& ray,
-                                  std::uint32_t ray_index, int count, Vec3f place, float depth, float raw_luminance,
-                                  std::uint32_t* allocated) {
+__device__ void keep_for_training(const TraceJob& job, const WarpField<KT>& warp, RayProgress& ray,
+                                  const RunSample& run) {
   const unsigned lane = threadIdx.x % 32;
-  ray.has_room = allocate_run(ray, count, samples.capacity, allocated);
+  const SampleArrays& samples = job.samples;
+  ray.has_room = allocate_run(ray, run.count, samples.capacity, &job.state->samples);
   const std::uint32_t begin = __shfl_sync(~0u, ray.run_begin, ray.samples / 32);
-  if (int(lane) < count && begin + lane < samples.capacity) {
-    samples.places[begin + lane] = make_float4(place.x, place.y, place.z, __uint_as_float(ray_index));
-    samples.gradients[begin + lane] = make_float2(depth, raw_luminance);
+  if (int(lane) < run.count && begin + lane < samples.capacity) {
+    samples.places[begin + lane] = make_float4(run.place.x, run.place.y, run.place.z, __uint_as_float(run.ray_index));
+    samples.gradients[begin + lane] = make_float2(run.depth, run.raw_luminance);
   }
   const std::uint32_t room = samples.capacity - min(begin, samples.capacity);
-  warp.store(samples.encoded + std::size_t(begin) * (2 * KT), unsigned(count), room, lane);
+  warp.store(samples.encoded + std::size_t(begin) * (2 * KT), unsigned(run.count), room, lane);
 }
 
 /// Loss of a finished training ray and its gradient by what its samples emit and absorb.
@@ -159,7 +167,7 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
 
     if constexpr (kKeep == Keep::kTraining) {
       if (job.distortion_weight > 0) ray.distortion.add(weight, {sample.t, sample.dt});
-      keep_for_training(job.samples, warp, ray, ray_index, count, place, depth, raw_luminance, &job.state->samples);
+      keep_for_training(job, warp, ray, {ray_index, count, place, depth, raw_luminance});
       is_open = is_open && ray.has_room;
     }
     if constexpr (kKeep == Keep::kSamples) {

@@ -166,7 +166,7 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const FieldBackwardJob j
     // Backward through the density net's first layer, to the hash grid's levels.
     dense<Bfloat, kTiles, 4, KT>(
         d_hidden, shared.backward + Shape::kPackedDensity1, [&](int m, int i, const float(&s)[2][4]) {
-          write_level_gradients(s, i, job.levels, sample[m], n, job.samples.most, job.d_encoded);
+          write_level_gradients(s, i, sample[m], {job.d_encoded, job.levels, n, job.samples.most});
         });
     add_weight_gradient<kRows>(d_density1, shared.gradient[1], out, shared.encoded, 8 * KT * part);
     __syncthreads();

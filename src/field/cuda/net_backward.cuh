@@ -16,21 +16,27 @@ __device__ void load_encoded(std::uint32_t (&operand)[KT][4], int half, const ui
     operand[k][half + 2] = row[8 * k + threadIdx.x % 4 + 4];
   }
 }
-/// Hands the hash grid's levels their share of a result's 16 columns from `16 tile` on: four channels per level.
-/// @param sample     of rows g and g + 8; those from n on do not exist
-/// @param d_encoded  [levels, most, 4] of bfloat16
-__device__ inline void write_level_gradients(const float (&sums)[2][4], int tile, int levels,
-                                             const std::uint32_t (&sample)[2], std::uint32_t n, std::uint32_t most,
-                                             void* d_encoded) {
+
+/// Gradients by what the hash grid's levels encode, for the first `samples` of at most `most` samples.
+struct LevelGradients {
+  void* values;  ///< [levels, most, 4] of bfloat16
+  int levels;
+  std::uint32_t samples, most;
+};
+
+/// Hands the levels their share of a result's 16 columns from `16 tile` on: four channels per level.
+/// @param sample  of rows g and g + 8; those beyond the last one do not exist
+__device__ inline void write_level_gradients(const float (&sums)[2][4], int tile, const std::uint32_t (&sample)[2],
+                                             const LevelGradients& out) {
   const int t = int(threadIdx.x) % 4;
 #pragma unroll
   for (int block = 0; block < 2; ++block) {
     const int level = 4 * tile + 2 * block + t / 2;  // of two lanes
-    if (level >= levels) continue;
+    if (level >= out.levels) continue;
 #pragma unroll
     for (int half = 0; half < 2; ++half) {
-      if (sample[half] >= n) continue;
-      static_cast<std::uint32_t*>(d_encoded)[(std::size_t(level) * most + sample[half]) * 2 + t % 2] =
+      if (sample[half] >= out.samples) continue;
+      static_cast<std::uint32_t*>(out.values)[(std::size_t(level) * out.most + sample[half]) * 2 + t % 2] =
           Bfloat::pack(sums[block][2 * half], sums[block][2 * half + 1]);
     }
   }

@@ -186,7 +186,7 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const PointBackwardJob j
                                         store_rows(shared.d_hidden, 16 * warp, 16 * i, d_hidden[0][i]);
                                       });
     dense<Bfloat, 1, 4, KT>(d_hidden, shared.backward + Shape::kPackedFirst, [&](int, int i, const float(&s)[2][4]) {
-      write_level_gradients(s, i, job.levels, sample, n, job.samples.most, job.d_encoded);
+      write_level_gradients(s, i, sample, {job.d_encoded, job.levels, n, job.samples.most});
     });
     __syncthreads();
     add_weight_gradient<kRows>(d_second, shared.d_outputs, second_out, shared.hidden, second_in);

@@ -42,8 +42,7 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
     std::vector<float> backgrounds(n), targets(n), wanted_light(n);
     parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
       for (std::size_t r = begin; r < end; ++r) {
-        const ObservedRay observed =
-            observe_ray(views_, options_.sampling(), options_.seed, std::uint64_t(counters_[0]), r);
+        const ObservedRay observed = observe_ray(views_, options_.seed, std::uint64_t(counters_[0]), r);
         rays[r] = observed.ray, backgrounds[r] = observed.target.background;
         targets[r] = observed.target.luminance, wanted_light[r] = observed.target.wanted();
       }
