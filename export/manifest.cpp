@@ -309,7 +309,7 @@ BakeManifest read_manifest(const fs::path& file) {
   const Json schema = json.is_object() ? json.value("schema", Json()) : Json();
   if (schema.is_number_integer() && schema.get<int>() > kManifestSchema) {
     throw InputError(file, "schema",
-                     "expected at most " + std::to_string(kManifestSchema) + ", found " + schema.dump() +
+                     "expected at most " + std::to_string(kManifestSchema) + ", found " + excerpt(schema) +
                          ": written by a newer cnerf");
   }
   auto record = from_json<ManifestRecord>(json, file);

@@ -16,8 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "src/base/error.h"
-#include "src/base/files.h"
+#include "src/base/json.h"
 #include "src/base/record.h"
 
 namespace cnerf {
@@ -97,17 +96,17 @@ void read(const Json& json, const std::string& where, T& value);
 
 template <typename T>
 void read_list(const Json& json, const std::string& where, T& list) {
-  if (!json.is_array()) throw FieldError(where, "expected a list, got " + json.dump());
+  if (!json.is_array()) throw FieldError(where, "expected a list, got " + excerpt(json));
   if constexpr (requires { list.resize(json.size()); }) list.resize(json.size());
   if (json.size() != list.size()) {
-    throw FieldError(where, "expected " + std::to_string(list.size()) + " values, got " + json.dump());
+    throw FieldError(where, "expected " + std::to_string(list.size()) + " values, got " + excerpt(json));
   }
   for (std::size_t i = 0; i < list.size(); ++i) read(json[i], where + "[" + std::to_string(i) + "]", list[i]);
 }
 
 template <typename T>
 void read_record(const Json& json, const std::string& where, T& record) {
-  if (!json.is_object()) throw FieldError(where, "expected an object, got " + json.dump());
+  if (!json.is_object()) throw FieldError(where, "expected an object, got " + excerpt(json));
   T::visit(record, [&]<typename Field, typename... Marks>(const char* name, Field& field, Marks...) {
     if constexpr (!has_mark<WrittenField, Marks...>) {
       const std::string inner = where.empty() ? name : where + "." + name;
@@ -133,7 +132,7 @@ void read(const Json& json, const std::string& where, T& value) {
   } else if constexpr (is_list<T>) {
     read_list(json, where, value);
   } else if constexpr (is_map<T>) {
-    if (!json.is_object()) throw FieldError(where, "expected an object, got " + json.dump());
+    if (!json.is_object()) throw FieldError(where, "expected an object, got " + excerpt(json));
     value.clear();
     for (const auto& [name, element] : json.items()) read(element, where + "." + name, value[name]);
   } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
@@ -145,10 +144,10 @@ void read(const Json& json, const std::string& where, T& value) {
     const bool is_other_type = std::is_same_v<T, bool> != json.is_boolean() ||
                                (std::is_integral_v<T> && !std::is_same_v<T, bool> && !json.is_number_integer());
     try {
-      if (std::is_arithmetic_v<T> && is_other_type) throw FieldError(where, "got " + json.dump());
+      if (std::is_arithmetic_v<T> && is_other_type) throw FieldError(where, "got " + excerpt(json));
       json.get_to(value);
     } catch (const nlohmann::json::exception&) {
-      throw FieldError(where, "got " + json.dump());
+      throw FieldError(where, "got " + excerpt(json));
     }
   }
 }
@@ -173,16 +172,6 @@ template <json_record::Record Record, typename Problem = InputError>
   } catch (const json_record::FieldError& error) {
     const std::string field = error.field.empty() ? "" : error.field + ": ";
     throw Problem(file.string() + ": " + field + error.what());
-  }
-}
-
-/// A JSON file.  @throws MissingInputError, and Problem  where it holds no JSON.
-template <typename Problem = InputError>
-[[nodiscard]] nlohmann::ordered_json read_json(const std::filesystem::path& file) {
-  try {
-    return nlohmann::ordered_json::parse(read_text_file(file));
-  } catch (const nlohmann::json::exception& error) {
-    throw Problem(file.string() + ": " + error.what());
   }
 }
 

@@ -255,9 +255,10 @@ fs::path find_image_folder(const fs::path& root, const fs::path& model_folder, c
   std::vector<fs::path> places = {root, model_folder};
   fs::path above = fs::absolute(model_folder).lexically_normal();
   for (int level = 0; level < 3; ++level) places.push_back(above = above.parent_path());
+  std::error_code failure;  // a name too long for the file system is of no file
   for (const fs::path& place : places) {
     for (const char* name : {"images", "input", "."}) {
-      if (fs::exists(place / name / first_image)) return (place / name).lexically_normal();
+      if (fs::exists(place / name / first_image, failure)) return (place / name).lexically_normal();
     }
   }
   for (const fs::path& place : places) {

@@ -3,10 +3,15 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfStdIO.h>
+#include <ImfVersion.h>
+#include <ImfXdr.h>
 
 #include <algorithm>
+#include <cctype>
 #include <string>
 
 #include "src/base/check.h"
@@ -16,26 +21,55 @@ namespace cnerf {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr std::int64_t kSmallPicture = 1 << 24;  ///< pixels that are taken for any file
+constexpr std::int64_t kMostAroundData = 64;     ///< pixels of larger pictures for each one that is stored
+
+struct Extent {
+  std::int64_t width = 0, height = 0;
+};
+
+Extent extent_of(const Imath::Box2i& window) {
+  return {std::int64_t(window.max.x) - window.min.x + 1, std::int64_t(window.max.y) - window.min.y + 1};
+}
+
+/// Before the library takes memory for what a header states.
+Imf::Header checked_header(const fs::path& file) {
+  Imf::StdIFStream stream(file.c_str());
+  int magic = 0, version = 0;
+  Imf::Xdr::read<Imf::StreamIO>(stream, magic);
+  Imf::Xdr::read<Imf::StreamIO>(stream, version);
+  if (magic != Imf::MAGIC) throw InputError(file, "", "expected an OpenEXR file, found other bytes");
+  Imf::Header header;
+  header.readFrom(stream, version);
+  const Extent display = extent_of(header.displayWindow()), data = extent_of(header.dataWindow());
+  check_image_size(file, display.width, display.height, "displayWindow");
+  check_image_size(file, data.width, data.height, "dataWindow");
+  const std::int64_t pixels = display.width * display.height;
+  if (pixels > kSmallPicture && pixels / kMostAroundData > data.width * data.height) {
+    throw InputError(file, "displayWindow",
+                     "expected at most " + std::to_string(kMostAroundData) + " times the pixels of the dataWindow, " +
+                         size_text(data.width, data.height) + ", found " + size_text(display.width, display.height));
+  }
+  return header;
+}
+
 /// Reads one channel of the data window into every `stride`-th float of `target`, which is laid out as the display
 /// window; what the data window leaves out stays 0.
 void read_channel(Imf::InputFile& input, const char* name, float* target, int stride) {
   const Imath::Box2i data = input.header().dataWindow();
   const Imath::Box2i display = input.header().displayWindow();
-  const int width = data.max.x - data.min.x + 1;
-  const int height = data.max.y - data.min.y + 1;
-  std::vector<float> values(std::size_t(width) * std::size_t(height));
+  const std::size_t width = std::size_t(extent_of(data).width), height = std::size_t(extent_of(data).height);
+  std::vector<float> values(width * height);
   Imf::FrameBuffer frame;
-  frame.insert(name,
-               Imf::Slice::Make(Imf::FLOAT, values.data(), data, sizeof(float), sizeof(float) * std::size_t(width)));
+  frame.insert(name, Imf::Slice::Make(Imf::FLOAT, values.data(), data, sizeof(float), sizeof(float) * width));
   input.setFrameBuffer(frame);
   input.readPixels(data.min.y, data.max.y);
 
-  const int display_width = display.max.x - display.min.x + 1;
+  const std::size_t display_width = std::size_t(extent_of(display).width);
   for (int y = std::max(data.min.y, display.min.y); y <= std::min(data.max.y, display.max.y); ++y) {
     for (int x = std::max(data.min.x, display.min.x); x <= std::min(data.max.x, display.max.x); ++x) {
-      const int to = (y - display.min.y) * display_width + (x - display.min.x);
-      target[std::size_t(to) * std::size_t(stride)] =
-          values[std::size_t(y - data.min.y) * std::size_t(width) + std::size_t(x - data.min.x)];
+      const std::size_t to = std::size_t(y - display.min.y) * display_width + std::size_t(x - display.min.x);
+      target[to * std::size_t(stride)] = values[std::size_t(y - data.min.y) * width + std::size_t(x - data.min.x)];
     }
   }
 }
@@ -46,50 +80,66 @@ std::string channel_names(const Imf::ChannelList& channels) {
   return names;
 }
 
-LinearImage empty_image(const Imf::InputFile& input, int channels) {
-  const Imath::Box2i display = input.header().displayWindow();
-  LinearImage image;
-  image.width = display.max.x - display.min.x + 1;
-  image.height = display.max.y - display.min.y + 1;
-  image.depth = PixelDepth::kF32;
-  image.channels = channels;
-  image.values.resize(image.pixel_count() * std::size_t(channels));
-  return image;
+/// @throws InputError  when there is neither Y nor R, G and B.
+bool has_color(const Imf::ChannelList& channels, const fs::path& file) {
+  if (channels.findChannel("R") && channels.findChannel("G") && channels.findChannel("B")) return true;
+  if (channels.findChannel("Y") != nullptr) return false;
+  throw InputError(file, "channels", "expected Y or R G B, found " + channel_names(channels));
 }
 
-LinearImage read_picture(Imf::InputFile& input, const fs::path& file) {
-  const Imf::ChannelList& channels = input.header().channels();
-  const bool has_color = channels.findChannel("R") && channels.findChannel("G") && channels.findChannel("B");
-  if (!has_color && channels.findChannel("Y") == nullptr) {
-    throw InputError(file, "channels", "expected Y or R G B, found " + channel_names(channels));
-  }
-  LinearImage image = empty_image(input, has_color ? 3 : 1);
-  if (has_color) {
+LinearImage read_picture(Imf::InputFile& input, const ImageHeader& header) {
+  LinearImage image = {header.width, header.height, header.has_color ? 3 : 1, PixelDepth::kF32, {}, {}};
+  image.values.resize(image.pixel_count() * std::size_t(image.channels));
+  if (header.has_color) {
     read_channel(input, "R", image.values.data(), 3);
     read_channel(input, "G", image.values.data() + 1, 3);
     read_channel(input, "B", image.values.data() + 2, 3);
   } else {
     read_channel(input, "Y", image.values.data(), 1);
   }
-  if (channels.findChannel("A") != nullptr) {
+  if (header.has_alpha) {
     image.alpha.resize(image.pixel_count());
     read_channel(input, "A", image.alpha.data(), 1);
   }
   return image;
 }
 
-}  // namespace
-
-LinearImage read_exr(const fs::path& file) {
+/// What the library throws as an error that names the file.
+template <typename Read>
+auto guarded(const fs::path& file, Read&& read) {
   if (!fs::exists(file)) throw MissingInputError(file.string() + ": no such file");
   try {
-    Imf::InputFile input(file.c_str());
-    return read_picture(input, file);
+    return read();
   } catch (const Error&) {
     throw;
   } catch (const std::exception& failure) {
     throw InputError(file, "", std::string("cannot be read: ") + failure.what());
   }
+}
+
+}  // namespace
+
+bool is_exr(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  return extension == ".exr";
+}
+
+ImageHeader exr_header(const fs::path& file) {
+  return guarded(file, [&] {
+    const Imf::Header header = checked_header(file);
+    const Extent size = extent_of(header.displayWindow());
+    return ImageHeader{int(size.width), int(size.height), PixelDepth::kF32, has_color(header.channels(), file),
+                       header.channels().findChannel("A") != nullptr};
+  });
+}
+
+LinearImage read_exr(const fs::path& file) {
+  const ImageHeader header = exr_header(file);
+  return guarded(file, [&] {
+    Imf::InputFile input(file.c_str());
+    return read_picture(input, header);
+  });
 }
 
 void write_exr_channel(const fs::path& file, const char* channel, int width, int height,

@@ -13,19 +13,13 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/capture/exr_io.h"
+#include "src/capture/image_header.h"
 #include "src/color/colorspace_math.h"
 #include "src/picture/codecs.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
 namespace {
-
-bool has_extension(const fs::path& file, std::string_view wanted) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return extension == wanted;
-}
 
 /// True for a JPEG file without its end-of-image marker. libjpeg fills the rest with grey and only warns.
 bool is_truncated_jpeg(const std::vector<std::byte>& content) {
@@ -46,6 +40,7 @@ bool is_truncated_jpeg(const std::vector<std::byte>& content) {
 }
 
 cv::Mat decode_file(const fs::path& file, int flags) {
+  (void)stated_header(file);  // which refuses a size that no picture has
   const std::vector<std::byte> content = read_binary_file(file);
   if (content.empty()) throw InputError(file, "", "expected an image, found an empty file");
   if (is_truncated_jpeg(content)) throw InputError(file, "", "the image is cut short");
@@ -57,6 +52,7 @@ cv::Mat decode_file(const fs::path& file, int flags) {
     throw InputError(file, "", std::string("the image cannot be decoded: ") + failure.what());
   }
   if (image.empty()) throw InputError(file, "", "expected an image, found other or truncated data");
+  check_image_size(file, image.cols, image.rows);
   return image;
 }
 
@@ -171,7 +167,7 @@ class ByteEncoder {
 }  // namespace
 
 LinearImage read_linear_image(const fs::path& file, Transfer transfer) {
-  LinearImage image = has_extension(file, ".exr") ? read_exr(file) : read_with_opencv(file, transfer);
+  LinearImage image = is_exr(file) ? read_exr(file) : read_with_opencv(file, transfer);
   if (image.depth == PixelDepth::kF32) refuse_non_finite(image, file);
   return image;
 }
@@ -240,12 +236,15 @@ MonoImage encode_mono(const LinearImage& image, Transfer transfer) {
 }
 
 std::vector<std::uint8_t> read_mask(const fs::path& file, int width, int height) {
-  const cv::Mat stored = decode_file(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
-  if (!same_shape(width, height, stored.cols, stored.rows)) {
+  const auto check_shape = [&](int found_width, int found_height) {
+    if (same_shape(width, height, found_width, found_height)) return;
     throw InputError(file, "size",
-                     "expected the shape of its image, " + std::to_string(width) + "x" + std::to_string(height) +
-                         ", found " + std::to_string(stored.cols) + "x" + std::to_string(stored.rows));
-  }
+                     "expected the shape of its image, " + size_text(width, height) + ", found " +
+                         size_text(found_width, found_height));
+  };
+  if (const auto header = stated_header(file)) check_shape(header->width, header->height);
+  const cv::Mat stored = decode_file(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+  check_shape(stored.cols, stored.rows);
   cv::Mat binary = (stored >= 128) / 255;  // lossy masks are not exactly black and white
   cv::Mat counts;
   binary.convertTo(counts, CV_32F);

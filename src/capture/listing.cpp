@@ -29,11 +29,12 @@ void make_poses_rigid(CaptureListing& listing, const std::string& matrix_name) {
 std::optional<fs::path> reduced_copy(const fs::path& image_file, int downscale) {
   const fs::path folder = image_file.parent_path();
   const fs::path sibling = folder.parent_path() / (folder.filename().string() + "_" + std::to_string(downscale));
-  if (fs::exists(sibling / image_file.filename())) return sibling / image_file.filename();
+  std::error_code failure;  // a name too long for the file system is of no file
+  if (fs::exists(sibling / image_file.filename(), failure)) return sibling / image_file.filename();
   // LLFF and Mip-NeRF 360 reduce IMG_1.JPG to IMG_1.png.
   for (const std::string& extension : image_extensions()) {
     const fs::path other = sibling / (image_file.stem().string() + extension);
-    if (fs::exists(other)) return other;
+    if (fs::exists(other, failure)) return other;
   }
   return std::nullopt;
 }

@@ -7,6 +7,7 @@
 #include "src/base/error.h"
 #include "src/base/parallel.h"
 #include "src/capture/black_background.h"
+#include "src/capture/image_header.h"
 #include "src/capture/image_io.h"
 #include "src/capture/listing.h"
 
@@ -105,7 +106,8 @@ CaptureListing read_listing(const Source& source, int downscale) {
 void drop_missing_images(CaptureListing& listing) {
   std::string first;
   const std::size_t missing = std::erase_if(listing.views, [&](const ListedView& view) {
-    if (fs::is_regular_file(view.image_file)) return false;
+    std::error_code failure;  // a name too long for the file system is of no file
+    if (fs::is_regular_file(view.image_file, failure)) return false;
     if (first.empty()) first = view.name;
     return true;
   });
@@ -163,10 +165,6 @@ Transfer transfer_named(const std::string& name) {
   throw UsageError("transfer: expected srgb, linear or gamma22, found " + name);
 }
 
-std::string size_text(int width, int height) {
-  return std::to_string(width) + "x" + std::to_string(height);
-}
-
 /// Intrinsics for the image as stored: what the file leaves out follows from the size, and the numbers are checked.
 Intrinsics complete_intrinsics(const ListedView& view, int width, int height) {
   Intrinsics out = view.intrinsics;
@@ -200,29 +198,48 @@ int reduced(int size, double downscale) {
   return std::max(1, int(std::lround(size / downscale)));
 }
 
+/// A view without its pixels.  @param header  of its file
+View surveyed_view(const ListedView& listed, const ImageHeader& header) {
+  View out;
+  out.name = listed.name;
+  out.image_file = listed.image_file;
+  out.world_from_camera = listed.world_from_camera;
+  out.held_out = listed.held_out;
+  out.intrinsics = complete_intrinsics(listed, header.width, header.height);
+  out.image.width = reduced(header.width, listed.downscale);
+  out.image.height = reduced(header.height, listed.downscale);
+  out.intrinsics = resized(out.intrinsics, out.image.width, out.image.height);
+  out.image.depth = header.depth;
+  return out;
+}
+
+ImageHeader header_of(const LinearImage& image) {
+  return {image.width, image.height, image.depth, image.channels == 3, !image.alpha.empty()};
+}
+
+/// The header of a file, decoded where nothing else tells.
+ImageHeader header_of(const fs::path& file) {
+  const auto stated = stated_header(file);
+  return stated ? *stated : header_of(read_linear_image(file, Transfer::kLinear));
+}
+
 struct LoadedView {
   View view;
   bool had_color = false;
 };
 
 LoadedView load_view(const ListedView& listed, Transfer transfer) {
-  LoadedView out;
-  out.view.name = listed.name;
-  out.view.image_file = listed.image_file;
-  out.view.world_from_camera = listed.world_from_camera;
-  out.view.held_out = listed.held_out;
+  // A picture of another shape is refused before it is decoded.
+  if (const auto header = stated_header(listed.image_file)) (void)surveyed_view(listed, *header);
   LinearImage image = read_linear_image(listed.image_file, transfer);
-  out.view.intrinsics = complete_intrinsics(listed, image.width, image.height);
-  out.had_color = !is_monochrome(image);
+  LoadedView out = {surveyed_view(listed, header_of(image)), !is_monochrome(image)};
+  const int width = out.view.image.width, height = out.view.image.height;
   image = luminance_image(std::move(image));
-  if (listed.downscale > 1) {
-    image = area_resized(image, reduced(image.width, listed.downscale), reduced(image.height, listed.downscale));
-    out.view.intrinsics = resized(out.view.intrinsics, image.width, image.height);
-  }
+  if (listed.downscale > 1) image = area_resized(image, width, height);
   out.view.image = encode_mono(image, transfer);
   out.view.image.exposure = float(listed.exposure);
   out.view.image.haze = float(listed.haze);
-  if (!listed.mask_file.empty()) out.view.image.mask = read_mask(listed.mask_file, image.width, image.height);
+  if (!listed.mask_file.empty()) out.view.image.mask = read_mask(listed.mask_file, width, height);
   return out;
 }
 
@@ -257,28 +274,54 @@ void load_views(const std::vector<ListedView>& listed, Transfer transfer, Captur
   for (LoadedView& view : loaded) capture.views.push_back(std::move(view.view));
 }
 
-}  // namespace
+/// A listing with its views in order, some of them held out.
+struct Found {
+  fs::path root;
+  CaptureListing listing;
+};
 
-Capture load_capture(const fs::path& path, const CaptureOptions& options) {
-  const Transfer transfer = transfer_named(options.transfer);
+Found find_views(const fs::path& path, const CaptureOptions& options) {
   if (options.downscale < 1)
     throw UsageError("downscale: expected at least 1, found " + std::to_string(options.downscale));
   const std::vector<Source> sources = recognise(path);
-  CaptureListing listing = first_whole(sources, options.downscale);
-  std::stable_sort(listing.views.begin(), listing.views.end(),
-                   [](const ListedView& a, const ListedView& b) { return a.name < b.name; });
-  choose_held_out(listing.views, options.holdout);
+  Found found = {sources.front().root, first_whole(sources, options.downscale)};
+  std::ranges::stable_sort(found.listing.views, {}, &ListedView::name);
+  choose_held_out(found.listing.views, options.holdout);
+  return found;
+}
 
+/// All but the views.
+Capture capture_without_views(Found&& found) {
   Capture capture;
-  capture.root = sources.front().root;
-  capture.format = listing.format;
-  capture.points = std::move(listing.points);
-  capture.depth_range = listing.depth_range;
-  capture.aabb_scale = listing.aabb_scale;
-  capture.bounds = listing.bounds;
-  capture.listed_images = int(listing.listed_images);
-  capture.notes = std::move(listing.notes);
-  load_views(listing.views, transfer, capture);
+  capture.root = std::move(found.root);
+  capture.format = std::move(found.listing.format);
+  capture.points = std::move(found.listing.points);
+  capture.depth_range = found.listing.depth_range;
+  capture.aabb_scale = found.listing.aabb_scale;
+  capture.bounds = found.listing.bounds;
+  capture.listed_images = int(found.listing.listed_images);
+  capture.notes = std::move(found.listing.notes);
+  return capture;
+}
+
+}  // namespace
+
+Capture survey_capture(const fs::path& path, const CaptureOptions& options) {
+  Found found = find_views(path, options);
+  const std::vector<ListedView> listed = std::move(found.listing.views);
+  Capture capture = capture_without_views(std::move(found));
+  capture.views.resize(listed.size());
+  parallel_tasks(listed.size(),
+                 [&](std::size_t i) { capture.views[i] = surveyed_view(listed[i], header_of(listed[i].image_file)); });
+  return capture;
+}
+
+Capture load_capture(const fs::path& path, const CaptureOptions& options) {
+  const Transfer transfer = transfer_named(options.transfer);
+  Found found = find_views(path, options);
+  const std::vector<ListedView> listed = std::move(found.listing.views);
+  Capture capture = capture_without_views(std::move(found));
+  load_views(listed, transfer, capture);
   if (options.cut_out_of_black && !capture.depth_range && cut_out_of_black(capture.views)) {
     capture.notes.push_back(
         "all views show an object before black, which is taken as empty (capture.cut_out_of_black)");

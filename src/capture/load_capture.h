@@ -31,4 +31,8 @@ struct CaptureOptions {
 /// @throws InputError         fewer than 2 usable views, bad poses, truncated files; names file, field and value.
 [[nodiscard]] Capture load_capture(const std::filesystem::path& path, const CaptureOptions& options = {});
 
+/// The same without pixels, from the headers of the images: views tell size and depth, and what pixels decide (whether
+/// the subject is cut out, which images have colours) is left out.  @throws  as `load_capture`, but for bad pixels.
+[[nodiscard]] Capture survey_capture(const std::filesystem::path& path, const CaptureOptions& options = {});
+
 }  // namespace cnerf

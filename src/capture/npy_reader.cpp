@@ -1,8 +1,8 @@
 #include "src/capture/npy_reader.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <regex>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,6 +14,9 @@ namespace cnerf {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr std::size_t kLongestHeader = 10'000;  ///< bytes; as NumPy's own limit
+constexpr std::size_t kQuoted = 120;            ///< letters of it that messages quote
+
 struct Header {
   std::string dtype;
   bool fortran_order = false;
@@ -22,7 +25,7 @@ struct Header {
 };
 
 /// The part of the file that describes the array: magic, version, length, and a Python dictionary as text.
-std::string header_text(const fs::path& file, std::span<const std::byte> content, std::size_t& header_size) {
+std::string_view header_text(const fs::path& file, std::span<const std::byte> content, std::size_t& header_size) {
   const auto byte = [&](std::size_t i) { return std::size_t(content[i]); };
   constexpr std::string_view kMagic = "\x93NUMPY";
   if (content.size() < 10 || std::memcmp(content.data(), kMagic.data(), kMagic.size()) != 0) {
@@ -36,35 +39,60 @@ std::string header_text(const fs::path& file, std::span<const std::byte> content
   if (content.size() < start) throw InputError(file, "header", "the file is cut short");
   std::size_t length = byte(8) | byte(9) << 8;
   if (version > 1) length |= byte(10) << 16 | byte(11) << 24;
+  if (length > kLongestHeader) {
+    throw InputError(file, "header",
+                     "expected at most " + std::to_string(kLongestHeader) + " bytes, found " + std::to_string(length));
+  }
   header_size = start + length;
   if (header_size > content.size()) throw InputError(file, "header", "the file is cut short");
   return {reinterpret_cast<const char*>(content.data()) + start, length};
 }
 
-std::string match(const fs::path& file, const std::string& text, const char* field, const char* pattern) {
-  std::smatch found;
-  if (!std::regex_search(text, found, std::regex(pattern))) {
-    throw InputError(file, field, "expected in the header, found " + text);
+/// The header's text from the value of `key` on.
+std::string_view value_of(const fs::path& file, std::string_view text, const std::string& key) {
+  constexpr std::string_view kBlanks = " \t\n";
+  const std::string quoted = "'" + key + "'";
+  const auto skip_blanks = [](std::string_view rest) {
+    return rest.substr(std::min(rest.find_first_not_of(kBlanks), rest.size()));
+  };
+  if (const std::size_t at = text.find(quoted); at != std::string_view::npos) {
+    const std::string_view rest = skip_blanks(text.substr(at + quoted.size()));
+    if (rest.starts_with(':')) return skip_blanks(rest.substr(1));
   }
-  return found[1];
+  throw InputError(file, key, "expected in the header, found " + std::string(text.substr(0, kQuoted)));
 }
 
-std::vector<std::size_t> parse_shape(const fs::path& file, const std::string& text) {
+/// What stands between two marks at the beginning of a value.
+std::string_view between(const fs::path& file, std::string_view value, const char* key, char begin, char end) {
+  const std::size_t at = value.find(end, 1);
+  if (value.starts_with(begin) && at != std::string_view::npos) return value.substr(1, at - 1);
+  throw InputError(file, key, "expected a value of the header, found " + std::string(value.substr(0, kQuoted)));
+}
+
+std::vector<std::size_t> parse_shape(const fs::path& file, std::string_view text) {
   std::vector<std::size_t> shape;
-  const std::regex number("[0-9]+");
-  for (std::sregex_iterator i(text.begin(), text.end(), number), end; i != end; ++i) {
-    if (i->length() > 12) throw InputError(file, "shape", "expected sizes of a file, found (" + text + ")");
-    shape.push_back(std::stoull(i->str()));
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  for (auto at = std::ranges::find_if(text, is_digit); at != text.end(); at = std::find_if(at, text.end(), is_digit)) {
+    const std::string number(at, std::find_if_not(at, text.end(), is_digit));
+    if (number.size() > 12) {
+      throw InputError(file, "shape", "expected sizes of a file, found (" + std::string(text.substr(0, kQuoted)) + ")");
+    }
+    shape.push_back(std::stoull(number));
+    at += std::ptrdiff_t(number.size());
   }
   return shape;
 }
 
 Header parse_header(const fs::path& file, std::span<const std::byte> content) {
   Header header;
-  const std::string text = header_text(file, content, header.size);
-  header.dtype = match(file, text, "descr", R"('descr'\s*:\s*'([^']*)')");
-  header.fortran_order = match(file, text, "fortran_order", R"('fortran_order'\s*:\s*(True|False))") == "True";
-  header.shape = parse_shape(file, match(file, text, "shape", R"('shape'\s*:\s*\(([^)]*)\))"));
+  const std::string_view text = header_text(file, content, header.size);
+  header.dtype = between(file, value_of(file, text, "descr"), "descr", '\'', '\'');
+  const std::string_view order = value_of(file, text, "fortran_order");
+  header.fortran_order = order.starts_with("True");
+  if (!header.fortran_order && !order.starts_with("False")) {
+    throw InputError(file, "fortran_order", "expected True or False, found " + std::string(order.substr(0, kQuoted)));
+  }
+  header.shape = parse_shape(file, between(file, value_of(file, text, "shape"), "shape", '(', ')'));
   return header;
 }
 

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <string_view>
 
 #include "src/base/error.h"
-#include "src/base/files.h"
+#include "src/base/json.h"
 #include "src/capture/listing.h"
 #include "src/capture/pose.h"
 
@@ -15,16 +14,7 @@ namespace cnerf {
 namespace fs = std::filesystem;
 namespace {
 
-using Json = nlohmann::json;
-
-Json parse_json(const fs::path& file) {
-  const std::string text = read_text_file(file);
-  try {
-    return Json::parse(text, nullptr, /*allow_exceptions=*/true, /*ignore_comments=*/true);
-  } catch (const Json::exception& failure) {
-    throw InputError(file, "", std::string("expected JSON, found ") + failure.what());
-  }
-}
+using Json = nlohmann::ordered_json;
 
 /// Looks fields up in a frame first, then in the whole file: every one of them may stand in either.
 class Fields {
@@ -40,20 +30,20 @@ class Fields {
   [[nodiscard]] double number(const char* key, double fallback) const {
     const Json* value = find(key);
     if (value == nullptr) return fallback;
-    if (!value->is_number()) throw error(key, std::string("expected a number, found ") + value->dump());
+    if (!value->is_number()) throw error(key, "expected a number, found " + excerpt(*value));
     return value->get<double>();
   }
   [[nodiscard]] int size(const char* key) const {
     const double value = number(key, 0);
     if (value < 0 || value > 1e5 || value != std::floor(value)) {
-      throw error(key, "expected a size in pixels, found " + find(key)->dump());
+      throw error(key, "expected a size in pixels, found " + excerpt(*find(key)));
     }
     return int(value);
   }
   [[nodiscard]] std::string text(const char* key) const {
     const Json* value = find(key);
     if (value == nullptr) return "";
-    if (!value->is_string()) throw error(key, std::string("expected a text, found ") + value->dump());
+    if (!value->is_string()) throw error(key, "expected a text, found " + excerpt(*value));
     return value->get<std::string>();
   }
   [[nodiscard]] bool flag(const char* key) const {
@@ -127,7 +117,7 @@ void read_intrinsics(const Fields& fields, ListedView& view) {
 
 /// The number at a place of a matrix. Not-a-number is not JSON, so the parser has refused it already.
 double entry(const Json& value, const fs::path& file, const std::string& field) {
-  if (!value.is_number()) throw InputError(file, field, "expected numbers, found " + value.dump());
+  if (!value.is_number()) throw InputError(file, field, "expected numbers, found " + excerpt(value));
   return value.get<double>();
 }
 
@@ -148,7 +138,7 @@ Affined read_matrix(const Json& frame, const fs::path& file, const std::string& 
     for (std::size_t c = 0; c < 4; ++c) m[r][c] = entry(rows[r][c], file, field);
   }
   if (std::abs(m[3][0]) + std::abs(m[3][1]) + std::abs(m[3][2]) + std::abs(m[3][3] - 1) > 1e-6) {
-    throw InputError(file, field, "expected a last row of 0 0 0 1, found " + rows[3].dump());
+    throw InputError(file, field, "expected a last row of 0 0 0 1, found " + excerpt(rows[3]));
   }
   Affined pose;
   for (int r = 0; r < 3; ++r) pose.linear.rows[r] = {m[r][0], m[r][1], m[r][2]};
@@ -156,15 +146,20 @@ Affined read_matrix(const Json& frame, const fs::path& file, const std::string& 
   return pose;
 }
 
+bool is_there(const fs::path& file) {
+  std::error_code failure;  // a name too long for the file system is of no file
+  return fs::exists(file, failure);
+}
+
 /// The named file; without it, the same name with an extension appended (synthetic sets leave it out).
 fs::path resolve_image(const fs::path& folder, std::string name) {
   std::replace(name.begin(), name.end(), '\\', '/');
   const fs::path plain = (folder / name).lexically_normal();
-  if (fs::exists(plain)) return plain;
+  if (is_there(plain)) return plain;
   for (const std::string& extension : image_extensions()) {
     fs::path with_extension = plain;
     with_extension += extension;
-    if (fs::exists(with_extension)) return with_extension;
+    if (is_there(with_extension)) return with_extension;
   }
   return plain;
 }
@@ -186,11 +181,11 @@ ListedView read_frame(const fs::path& file, const Json& top, const Json& frame, 
   read_intrinsics(fields, view);
   view.exposure = fields.number("exposure", 1);
   if (!(view.exposure > 0)) {
-    throw fields.error("exposure", "expected a number above 0, found " + fields.find("exposure")->dump());
+    throw fields.error("exposure", "expected a number above 0, found " + excerpt(*fields.find("exposure")));
   }
   view.haze = fields.number("haze", 0);
   if (!(view.haze >= 0 && view.haze < 1)) {
-    throw fields.error("haze", "expected a number from 0 to below 1, found " + fields.find("haze")->dump());
+    throw fields.error("haze", "expected a number from 0 to below 1, found " + excerpt(*fields.find("haze")));
   }
   return view;
 }
@@ -218,7 +213,7 @@ std::set<std::string> filename_list(const fs::path& file, const Json& top, const
   if (list == top.end() || list->is_null()) return names;
   if (!list->is_array()) throw InputError(file, key, std::string("expected a list, found ") + list->type_name());
   for (const Json& name : *list) {
-    if (!name.is_string()) throw InputError(file, key, "expected file names, found " + name.dump());
+    if (!name.is_string()) throw InputError(file, key, "expected file names, found " + excerpt(name));
     names.insert(comparable(name.get<std::string>()));
   }
   return names;
@@ -247,14 +242,14 @@ std::optional<Aabbd> read_bounds(const fs::path& file, const Json& top) {
   if (box == top.end() || box->is_null()) return std::nullopt;
   const auto is_corner = [](const Json& corner) { return corner.is_array() && corner.size() == 3; };
   if (!box->is_array() || box->size() != 2 || !is_corner((*box)[0]) || !is_corner((*box)[1])) {
-    throw InputError(file, "aabb", "expected [[x, y, z], [x, y, z]], found " + box->dump());
+    throw InputError(file, "aabb", "expected [[x, y, z], [x, y, z]], found " + excerpt(*box));
   }
   Aabbd bounds;
   for (int axis = 0; axis < 3; ++axis) {
     bounds.min[axis] = entry((*box)[0][std::size_t(axis)], file, "aabb");
     bounds.max[axis] = entry((*box)[1][std::size_t(axis)], file, "aabb");
     if (!(bounds.min[axis] < bounds.max[axis]))
-      throw InputError(file, "aabb", "expected min < max, found " + box->dump());
+      throw InputError(file, "aabb", "expected min < max, found " + excerpt(*box));
   }
   return bounds;
 }
@@ -264,11 +259,11 @@ std::optional<DepthRange> read_depth_range(const fs::path& file, const Json& top
   const auto range = top.find("depth_range");
   if (range == top.end() || range->is_null()) return std::nullopt;
   if (!range->is_array() || range->size() != 2) {
-    throw InputError(file, "depth_range", "expected [near, far], found " + range->dump());
+    throw InputError(file, "depth_range", "expected [near, far], found " + excerpt(*range));
   }
   const DepthRange out = {entry((*range)[0], file, "depth_range"), entry((*range)[1], file, "depth_range")};
   if (!(out.near > 0 && out.near < out.far)) {
-    throw InputError(file, "depth_range", "expected 0 < near < far, found " + range->dump());
+    throw InputError(file, "depth_range", "expected 0 < near < far, found " + excerpt(*range));
   }
   return out;
 }
@@ -286,7 +281,7 @@ void read_hints(const fs::path& file, const Json& top, CaptureListing& listing) 
 
 /// Appends the frames of one file.
 Json append_file(const fs::path& file, bool held_out, CaptureListing& listing) {
-  Json top = parse_json(file);
+  Json top = read_json(file);
   if (!top.is_object()) throw InputError(file, "", std::string("expected an object, found ") + top.type_name());
   for (ListedView& view : read_frames(file, top)) {
     view.held_out = held_out;

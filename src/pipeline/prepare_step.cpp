@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/json.h"
 #include "src/capture/load_capture.h"
 #include "src/picture/encode.h"
 
@@ -45,8 +45,8 @@ void mask_motion(const fs::path& capture, const prepare::MotionMaskOptions& opti
   reading.downscale = std::max(1, longest / options.motion_side);
   const auto masks = prepare::find_motion(load_capture(capture, reading), options, capture / "work", engines, observer);
 
-  auto transforms = nlohmann::ordered_json::parse(read_text_file(capture / "transforms.json"));
-  auto record = nlohmann::ordered_json::parse(read_text_file(capture / "prepare.json"));
+  auto transforms = read_json(capture / "transforms.json");
+  auto record = read_json(capture / "prepare.json");
   double share = 0;
   std::string left_alone;
   for (std::size_t v = 0; v < masks.size(); ++v) {
@@ -106,7 +106,7 @@ void prepare_step(const PrepareJob& job, const Engines& engines, Observer& obser
   const PrepareStepOptions& options = job.options;
   if (!begin_folder(job)) {
     observer.say("capture: " + job.out.string() + " was prepared before");
-    const auto record = nlohmann::json::parse(read_text_file(job.out / "prepare.json"));
+    const auto record = read_json(job.out / "prepare.json");
     if (options.motion_masks && !record.contains("motion")) mask_motion(job.out, options.motion, engines, observer);
     return;
   }

@@ -3,16 +3,15 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "src/base/error.h"
-#include "src/base/files.h"
+#include "src/base/json.h"
 
 namespace cnerf {
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 constexpr double kRotationTolerance = 1e-3;  // |R R^T - 1|, of matrices written with few digits
 
@@ -30,7 +29,7 @@ class Frame {
     for (const Json* json : {&frame_, &whole_}) {
       if (!json->contains(field)) continue;
       const Json& value = json->at(field);
-      if (!value.is_number()) refuse(field, "expected a number, got " + value.dump());
+      if (!value.is_number()) refuse(field, "expected a number, got " + excerpt(value));
       return value.get<double>();
     }
     return std::nullopt;
@@ -63,7 +62,7 @@ class Frame {
       if (!matrix[i].is_array() || matrix[i].size() != 4) refuse(field, "expected a 4x4 matrix");
       double row[4];
       for (int j = 0; j < 4; ++j) {
-        if (!matrix[i][j].is_number()) refuse(field, "expected numbers, got " + matrix[i][j].dump());
+        if (!matrix[i][j].is_number()) refuse(field, "expected numbers, got " + excerpt(matrix[i][j]));
         row[j] = matrix[i][j].get<double>();
       }
       pose.linear.rows[i] = {row[0], -row[1], -row[2]};  // OpenGL's camera axes to OpenCV's
@@ -93,18 +92,10 @@ class Frame {
   std::string name_;
 };
 
-Json parse(const std::filesystem::path& file) {
-  try {
-    return Json::parse(read_text_file(file));
-  } catch (const Json::exception& error) {
-    throw InputError(file, "", error.what());
-  }
-}
-
 }  // namespace
 
 std::vector<PathCamera> read_path_file(const std::filesystem::path& file) {
-  const Json json = parse(file);
+  const Json json = read_json(file);
   const Json frames = json.is_object() ? json.value("frames", Json()) : Json();
   if (!frames.is_array() || frames.empty()) throw InputError(file, "frames", "expected a list of cameras");
   std::vector<PathCamera> cameras;

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
@@ -105,6 +106,27 @@ std::vector<BadCapture> bad_captures() {
        transforms_then([](const fs::path& folder) { truncated("transforms.json", 0.7)(folder); }),
        kInput,
        {"transforms.json", "expected JSON", "line"}},
+      {"json_too_deep",
+       transforms_then([](const fs::path& folder) {
+         replace_in(folder / "transforms.json", "{",
+                    "{\"x\": " + std::string(200'000, '[') + std::string(200'000, ']') + ",");
+       }),
+       kInput,
+       {"transforms.json", "at most 64 levels"}},
+      {"json_long_value",
+       spoiled_json([](json& top) { top["fl_x"] = std::string(100'000, 'x'); }),
+       kInput,
+       {"fl_x", "expected a number", "xxx…"}},
+      {"name_too_long",
+       spoiled_json([](json& top) {
+         for (json& frame : top["frames"]) frame["file_path"] = std::string(300, 'x');
+       }),
+       kInput,
+       {"found 0 (of 4 listed)"}},
+      {"pipe",
+       [](const fs::path& folder) { ASSERT_EQ(::mkfifo((folder / "transforms.json").c_str(), 0600), 0); },
+       kInput,
+       {"transforms.json", "pipe"}},
       {"json_is_a_list",
        [](const fs::path& folder) { write_file(folder / "transforms.json", "[]"); },
        kInput,

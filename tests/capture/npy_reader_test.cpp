@@ -90,6 +90,23 @@ TEST_F(Npy, SenselessShapesDoNotOverflow) {
   expect_refused("shape");
 }
 
+TEST_F(Npy, LongHeadersAreRefused) {
+  for (const char letter : {' ', 'x', '1', '\''}) {
+    const std::string padding(60'000, letter);
+    test::write_npy(file_, "<f8" + padding, false, "1,", bytes_of<double>({1}));
+    expect_refused("at most 10000 bytes");
+  }
+}
+
+TEST_F(Npy, HeadersWithoutWhatIsNeededAreRefused) {
+  for (const std::string key : {"descr", "fortran_order", "shape"}) {
+    test::write_npy(file_, "<f8", false, "1,", bytes_of<double>({1}));
+    std::string content = read_text_file(file_);
+    write_file(file_, content.replace(content.find("'" + key + "'") + 1, 1, "_"));
+    expect_refused(key + ": expected in the header");
+  }
+}
+
 TEST_F(Npy, OtherFilesAreRefused) {
   write_file(file_, "this is a text file of some length");
   expect_refused("expected a NumPy .npy file");

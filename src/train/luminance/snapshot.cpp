@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "src/base/files.h"
+#include "src/base/json.h"
 
 namespace cnerf {
 namespace {
@@ -64,8 +65,8 @@ Snapshot::Snapshot(const std::filesystem::path& file, const std::string& kind)
   if (header_size > content_.size() - kFixedSize) fail("cut short: the header is incomplete");
   pieces_begin_ = kFixedSize + header_size;
   try {
-    header_ = nlohmann::json::parse(reinterpret_cast<const char*>(content_.data()) + kFixedSize,
-                                    reinterpret_cast<const char*>(content_.data()) + pieces_begin_);
+    header_ = parse_json<SnapshotError, nlohmann::json>(
+        {reinterpret_cast<const char*>(content_.data()) + kFixedSize, header_size}, file_);
     std::size_t expected = pieces_begin_ + kDigestSize;
     for (const auto& piece : header_.at("pieces")) expected += piece.at("bytes").get<std::size_t>();
     if (content_.size() != expected) {
@@ -115,8 +116,8 @@ void save_times(const std::filesystem::path& snapshot, const SnapshotTimes& time
 
 SnapshotTimes load_times(const std::filesystem::path& snapshot) {
   try {
-    return nlohmann::json::parse(read_text_file(times_file(snapshot))).get<SnapshotTimes>();
-  } catch (const MissingInputError&) {
+    return read_json<InputError, nlohmann::json>(times_file(snapshot)).get<SnapshotTimes>();
+  } catch (const Error&) {
     return {};
   } catch (const nlohmann::json::exception&) {
     return {};

@@ -1,0 +1,61 @@
+#pragma once
+/// JSON that others wrote: files of any content are read without harm, and quoted in messages without flooding them.
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+
+namespace cnerf {
+
+/// Lists and objects may nest this deep. What walks or copies a value recurses, so that a few hundred kilobytes of
+/// brackets would overflow the stack.
+inline constexpr int kDeepestJson = 64;
+
+/// A text as JSON; comments are allowed.
+/// @param file  that errors name
+/// @throws Problem  where it is no JSON, or nests deeper than kDeepestJson; any type that is made of a message
+template <typename Problem = InputError, typename Json = nlohmann::ordered_json>
+[[nodiscard]] Json parse_json(std::string_view text, const std::filesystem::path& file) {
+  bool too_deep = false;
+  // What lies deeper is not kept, so that nothing ever recurses into it.
+  const auto is_kept = [&](int depth, typename Json::parse_event_t, Json&) {
+    too_deep = too_deep || depth > kDeepestJson;
+    return depth <= kDeepestJson;
+  };
+  try {
+    Json json = Json::parse(text, is_kept, /*allow_exceptions=*/true, /*ignore_comments=*/true);
+    if (!too_deep) return json;
+  } catch (const nlohmann::json::exception& failure) {
+    throw Problem(file.string() + ": expected JSON, found " + failure.what());
+  }
+  throw Problem(file.string() + ": expected JSON of at most " + std::to_string(kDeepestJson) +
+                " levels, found deeper lists or objects");
+}
+
+/// The same of a file.  @throws MissingInputError, InputError, and Problem as `parse_json`.
+template <typename Problem = InputError, typename Json = nlohmann::ordered_json>
+[[nodiscard]] Json read_json(const std::filesystem::path& file) {
+  std::error_code failure;
+  if (std::filesystem::exists(file, failure) && !std::filesystem::is_regular_file(file, failure)) {
+    throw InputError(file, "", "expected a file, found a folder, pipe or device");  // a pipe might never end
+  }
+  return parse_json<Problem, Json>(read_text_file(file), file);
+}
+
+/// A value as a message quotes it: its beginning where it is long.
+template <typename Json>
+[[nodiscard]] std::string excerpt(const Json& value) {
+  constexpr std::size_t kLongest = 120;
+  std::string text = value.dump(-1, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace);
+  if (text.size() <= kLongest) return text;
+  std::size_t end = kLongest;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;  // within a character
+  return text.substr(0, end) + "…";
+}
+
+}  // namespace cnerf
