@@ -32,7 +32,6 @@ struct Capture {
   std::vector<View> views;                ///< sorted by name within the source's own order; at least 2
   std::vector<Vec3d> points;              ///< sparse points of structure from motion, world; may be empty
   std::optional<DepthRange> depth_range;  ///< LLFF's bounds
-  std::optional<double> aabb_scale;       ///< hint of instant-ngp's transforms.json: side of its box in its units
   std::optional<Aabbd> bounds;     ///< the source's own box around its subject ("aabb" of transforms.json), world
   bool is_bounded_object = false;  ///< every view has alpha: nothing outside the object matters
   int listed_images = 0;           ///< images the poses file lists, of which `views.size()` exist

@@ -11,7 +11,6 @@
 #include <ImfXdr.h>
 
 #include <algorithm>
-#include <cctype>
 #include <string>
 
 #include "src/base/check.h"
@@ -120,9 +119,7 @@ auto guarded(const fs::path& file, Read&& read) {
 }  // namespace
 
 bool is_exr(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
-  return extension == ".exr";
+  return lower_extension(file) == ".exr";
 }
 
 ImageHeader exr_header(const fs::path& file) {

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <span>
 
-#include "src/capture/image_header.h"
 #include "src/capture/image_io.h"
 
 namespace cnerf {

@@ -1,5 +1,7 @@
 #include "src/capture/image_header.h"
 
+#include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <string>
 #include <system_error>
@@ -65,6 +67,12 @@ std::optional<ImageHeader> jpeg_header(Bytes& bytes, const fs::path& file) {
 }
 
 }  // namespace
+
+std::string lower_extension(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  return extension;
+}
 
 std::string size_text(std::int64_t width, std::int64_t height) {
   return std::to_string(width) + "x" + std::to_string(height);

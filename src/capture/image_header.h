@@ -25,6 +25,9 @@ struct ImageHeader {
 /// @throws MissingInputError, InputError  no such file; a size that no picture has, naming it.
 [[nodiscard]] std::optional<ImageHeader> stated_header(const std::filesystem::path& file);
 
+/// ".jpg" of "A.JPG".
+[[nodiscard]] std::string lower_extension(const std::filesystem::path& file);
+
 /// "640x480"
 [[nodiscard]] std::string size_text(std::int64_t width, std::int64_t height);
 

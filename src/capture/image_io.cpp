@@ -13,7 +13,6 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/capture/exr_io.h"
-#include "src/capture/image_header.h"
 #include "src/color/colorspace_math.h"
 #include "src/picture/codecs.h"
 
@@ -170,6 +169,15 @@ LinearImage read_linear_image(const fs::path& file, Transfer transfer) {
   LinearImage image = is_exr(file) ? read_exr(file) : read_with_opencv(file, transfer);
   if (image.depth == PixelDepth::kF32) refuse_non_finite(image, file);
   return image;
+}
+
+ImageHeader image_header(const LinearImage& image) {
+  return {image.width, image.height, image.depth, image.channels == 3, !image.alpha.empty()};
+}
+
+ImageHeader image_header(const fs::path& file) {
+  const auto stated = stated_header(file);
+  return stated ? *stated : image_header(read_linear_image(file, Transfer::kLinear));
 }
 
 bool is_monochrome(const LinearImage& image) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "src/capture/image_header.h"
 #include "src/capture/mono_image.h"
 
 namespace cnerf {
@@ -24,6 +25,12 @@ struct LinearImage {
 /// `transfer` decodes integer files; float files are linear.
 /// @throws MissingInputError, InputError  unreadable, cut short, not finite, or of a type no capture has.
 [[nodiscard]] LinearImage read_linear_image(const std::filesystem::path& file, Transfer transfer);
+
+/// What a header would say of the image.
+[[nodiscard]] ImageHeader image_header(const LinearImage& image);
+/// The header of any file that `read_linear_image` reads; of formats that `stated_header` leaves out it is decoded.
+/// @throws  as `read_linear_image`.
+[[nodiscard]] ImageHeader image_header(const std::filesystem::path& file);
 
 /// True when no pixel has a colour: one channel, or three equal ones everywhere.
 [[nodiscard]] bool is_monochrome(const LinearImage& image);

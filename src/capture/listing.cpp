@@ -1,9 +1,9 @@
 #include "src/capture/listing.h"
 
 #include <algorithm>
-#include <cctype>
 #include <sstream>
 
+#include "src/capture/image_header.h"
 #include "src/capture/pose.h"
 
 namespace cnerf {
@@ -46,11 +46,7 @@ const std::vector<std::string>& image_extensions() {
 }
 
 bool is_image_file(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  const auto& known = image_extensions();
-  return std::find(known.begin(), known.end(), extension) != known.end();
+  return std::ranges::count(image_extensions(), lower_extension(file)) > 0;
 }
 
 }  // namespace cnerf

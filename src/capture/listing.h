@@ -36,7 +36,6 @@ struct CaptureListing {
   std::size_t listed_images = 0;  ///< also those whose files do not exist
   std::vector<Vec3d> points;
   std::optional<DepthRange> depth_range;
-  std::optional<double> aabb_scale;
   std::optional<Aabbd> bounds;
   std::vector<std::string> notes;
 };

@@ -7,7 +7,6 @@
 #include "src/base/error.h"
 #include "src/base/parallel.h"
 #include "src/capture/black_background.h"
-#include "src/capture/image_header.h"
 #include "src/capture/image_io.h"
 #include "src/capture/listing.h"
 
@@ -158,13 +157,6 @@ CaptureListing first_whole(const std::vector<Source>& sources, int downscale) {
 
 // Images and intrinsics.
 
-Transfer transfer_named(const std::string& name) {
-  if (name == "srgb") return Transfer::kSrgb;
-  if (name == "linear") return Transfer::kLinear;
-  if (name == "gamma22") return Transfer::kGamma22;
-  throw UsageError("transfer: expected srgb, linear or gamma22, found " + name);
-}
-
 /// Intrinsics for the image as stored: what the file leaves out follows from the size, and the numbers are checked.
 Intrinsics complete_intrinsics(const ListedView& view, int width, int height) {
   Intrinsics out = view.intrinsics;
@@ -213,16 +205,6 @@ View surveyed_view(const ListedView& listed, const ImageHeader& header) {
   return out;
 }
 
-ImageHeader header_of(const LinearImage& image) {
-  return {image.width, image.height, image.depth, image.channels == 3, !image.alpha.empty()};
-}
-
-/// The header of a file, decoded where nothing else tells.
-ImageHeader header_of(const fs::path& file) {
-  const auto stated = stated_header(file);
-  return stated ? *stated : header_of(read_linear_image(file, Transfer::kLinear));
-}
-
 struct LoadedView {
   View view;
   bool had_color = false;
@@ -232,7 +214,7 @@ LoadedView load_view(const ListedView& listed, Transfer transfer) {
   // A picture of another shape is refused before it is decoded.
   if (const auto header = stated_header(listed.image_file)) (void)surveyed_view(listed, *header);
   LinearImage image = read_linear_image(listed.image_file, transfer);
-  LoadedView out = {surveyed_view(listed, header_of(image)), !is_monochrome(image)};
+  LoadedView out = {surveyed_view(listed, image_header(image)), !is_monochrome(image)};
   const int width = out.view.image.width, height = out.view.image.height;
   image = luminance_image(std::move(image));
   if (listed.downscale > 1) image = area_resized(image, width, height);
@@ -297,7 +279,6 @@ Capture capture_without_views(Found&& found) {
   capture.format = std::move(found.listing.format);
   capture.points = std::move(found.listing.points);
   capture.depth_range = found.listing.depth_range;
-  capture.aabb_scale = found.listing.aabb_scale;
   capture.bounds = found.listing.bounds;
   capture.listed_images = int(found.listing.listed_images);
   capture.notes = std::move(found.listing.notes);
@@ -311,8 +292,9 @@ Capture survey_capture(const fs::path& path, const CaptureOptions& options) {
   const std::vector<ListedView> listed = std::move(found.listing.views);
   Capture capture = capture_without_views(std::move(found));
   capture.views.resize(listed.size());
-  parallel_tasks(listed.size(),
-                 [&](std::size_t i) { capture.views[i] = surveyed_view(listed[i], header_of(listed[i].image_file)); });
+  parallel_tasks(listed.size(), [&](std::size_t i) {
+    capture.views[i] = surveyed_view(listed[i], image_header(listed[i].image_file));
+  });
   return capture;
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "src/base/error.h"
 #include "src/color/colorspace_math.h"
 
 namespace cnerf {
@@ -31,6 +32,13 @@ const std::array<float, 256>& decode_table(Transfer transfer) {
 }
 
 }  // namespace
+
+Transfer transfer_named(const std::string& name) {
+  if (name == "srgb") return Transfer::kSrgb;
+  if (name == "linear") return Transfer::kLinear;
+  if (name == "gamma22") return Transfer::kGamma22;
+  throw UsageError("transfer: expected srgb, linear or gamma22, found " + name);
+}
 
 float decode_transfer(Transfer transfer, float value) {
   switch (transfer) {

@@ -16,6 +16,9 @@ enum class Transfer {
   kGamma22,  ///< value = luminance^(1/2.2)
 };
 
+/// "srgb", "linear" or "gamma22", as options call it.  @throws UsageError.
+[[nodiscard]] Transfer transfer_named(const std::string& name);
+
 enum class PixelDepth { kU8, kU16, kF32 };
 
 struct MonoImage {

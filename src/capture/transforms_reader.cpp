@@ -271,7 +271,6 @@ std::optional<DepthRange> read_depth_range(const fs::path& file, const Json& top
 void read_hints(const fs::path& file, const Json& top, CaptureListing& listing) {
   const Json no_frame = Json::object();
   const Fields fields(file, top, no_frame, "");
-  if (fields.find("aabb_scale") != nullptr) listing.aabb_scale = fields.number("aabb_scale", 1);
   listing.bounds = read_bounds(file, top);
   listing.depth_range = read_depth_range(file, top);
   if (fields.find("applied_transform") != nullptr) {

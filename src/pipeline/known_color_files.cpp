@@ -126,7 +126,7 @@ KnownColors dot_of(const std::string& hint, const Capture& capture) {
   const std::vector<std::string> parts = split(hint, ',');
   if (parts.size() != 4) throw UsageError(entry + ": expected x,y,VIEW,#rrggbb");
   const View& view = training_view(capture, parts[2], entry);
-  const LinearImage file = read_linear_image(view.image_file, Transfer::kSrgb);
+  const ImageHeader file = image_header(view.image_file);
   const double x = number_of(parts[0], entry), y = number_of(parts[1], entry);
   if (x < 0 || y < 0 || x >= file.width || y >= file.height) {
     throw UsageError(fmt::format("{}: the picture has {} x {} pixels", entry, file.width, file.height));

@@ -31,7 +31,6 @@ TEST(RealCaptures, FoxListsMoreImagesThanItHas) {
   EXPECT_THAT(capture.notes, Contains(HasSubstr("17 of 67")));
   EXPECT_EQ(capture.views[0].intrinsics.model, LensModel::kOpenCv);
   EXPECT_EQ(capture.views[0].image.width, 135);
-  EXPECT_EQ(capture.aabb_scale, 4);
   EXPECT_FALSE(arrangement_of(capture).forward_facing);
   EXPECT_TRUE(load_color_truth(capture.views[3]));
 }

@@ -239,11 +239,9 @@ TEST_F(Transforms, SmallPoseErrorsAreRepairedAndNoted) {
 }
 
 TEST_F(Transforms, HintsArePassedOn) {
-  top_["aabb_scale"] = 4;
   top_["aabb"] = {{-1, -2, -3}, {1, 2, 3}};
   top_["applied_transform"] = {{1, 0, 0, 0}, {0, 0, 1, 0}, {0, -1, 0, 0}};
   const Capture capture = load();
-  EXPECT_EQ(capture.aabb_scale, 4);
   ASSERT_TRUE(capture.bounds);
   EXPECT_EQ(capture.bounds->max, (Vec3d{1, 2, 3}));
   EXPECT_THAT(capture.notes, Contains(HasSubstr("applied_transform")));
