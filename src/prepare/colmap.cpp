@@ -27,7 +27,12 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kPairsACall = 40;   ///< matched by one call of COLMAP, at least
+constexpr int kExhaustiveImages = 100;    ///< up to which all pairs are matched
 constexpr int kExhaustiveFrames = 40;     ///< of a clip: where neighbours are known, all pairs are soon a waste
+constexpr int kNeighbours = 10;           ///< matched on each side, where not all pairs are
+constexpr int kAlike = 20;                ///< matched by look, where not all pairs are
+constexpr int kFeatures = 8192;           ///< of an image, at most
+constexpr int kLongestSide = 1600;        ///< pixels at which features are looked for
 constexpr int kViewsForLens = 6;          ///< of a camera, from which more than one number of its lens can be told
 constexpr int kViewsForCentre = 15;       ///< the same, from which its principal point can be told from its turns
 constexpr double kFarthestCentre = 0.05;  ///< of the longer side, by which a principal point may be off the middle
@@ -111,19 +116,16 @@ class Colmap {
   std::map<std::string, std::string> help_;  ///< by command
 };
 
-Colmap find_colmap(const PoseOptions& options, const fs::path& work) {
-  const auto program = find_program(options.colmap);
-  if (program) return {*program, work / "colmap.log"};
-  throw DeviceError("no program '" + options.colmap +
-                    "', which finds camera poses; install it (Debian: apt install colmap) or name it with --colmap. "
-                    "The images are kept: the same command with --resume goes on");
+Colmap find_colmap(const fs::path& work) {
+  if (const auto program = find_program("colmap")) return {*program, work / "colmap.log"};
+  throw DeviceError(
+      "no program colmap, which finds camera poses, on $PATH; install it (Debian: apt install colmap). The images are "
+      "kept: the same command with --resume goes on");
 }
 
 /// What results depend on: another one means that earlier work is of no use.
-std::string fingerprint(const std::vector<PreparedImage>& images, const fs::path& capture, const PoseOptions& options) {
+std::string fingerprint(const std::vector<PreparedImage>& images, const fs::path& capture) {
   std::ostringstream text;
-  text << options.camera_model << ' ' << options.features << ' ' << options.longest_side << ' ' << options.matching
-       << ' ' << options.neighbours << ' ' << options.alike << ' ' << options.exhaustive_up_to << '\n';
   for (const PreparedImage& image : images) {
     text << image.name << ' ' << image.camera << ' ' << image.focal << ' ' << image.mask.string() << ' '
          << sha256(read_binary_file(capture / "images" / image.name)) << '\n';
@@ -198,25 +200,22 @@ void write_masks(const std::vector<PreparedImage>& images, const fs::path& captu
 
 /// The start of an estimate: focal length from the file's notes, else COLMAP's rule of thumb of 1.2 times the longer
 /// side; pixels that are not square give two.
-std::string first_parameters(const PreparedImage& image, const std::string& model) {
+std::string first_parameters(const PreparedImage& image) {
   const double focal = image.focal > 0 ? image.focal : 1.2 * std::max({image.width, image.height, image.uncropped});
   const bool centred = image.centre_x == 0 && image.centre_y == 0;
   const double cx = centred ? 0.5 * image.width : image.centre_x, cy = centred ? 0.5 * image.height : image.centre_y;
-  if (model == "SIMPLE_RADIAL") return fmt::format("{},{},{},0", focal, cx, cy);
-  if (model == "RADIAL") return fmt::format("{},{},{},0,0", focal, cx, cy);
+  if (image.pixel_aspect == 1) return fmt::format("{},{},{},0", focal, cx, cy);
   return fmt::format("{},{},{},{},0,0,0,0", focal / image.pixel_aspect, focal, cx, cy);
 }
 
 /// The lens that poses are found with. One focal length where pixels are known to be square: on an orbit, two of them
 /// trade against the shape of the scene, and COLMAP settles on a wrong one. `free_lenses` frees the rest afterwards.
-std::string mapping_model(const PreparedImage& image, const PoseOptions& options) {
-  if (options.camera_model == "OPENCV_FISHEYE") return options.camera_model;
-  if (image.pixel_aspect != 1) return "OPENCV";
-  return options.camera_model == "OPENCV" ? "SIMPLE_RADIAL" : options.camera_model;
+const char* mapping_model(const PreparedImage& image) {
+  return image.pixel_aspect == 1 ? "SIMPLE_RADIAL" : "OPENCV";
 }
 
 void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, const fs::path& work,
-                      const PoseOptions& options, const ProgressSink& progress) {
+                      const ProgressSink& progress) {
   std::map<int, std::vector<const PreparedImage*>> cameras;
   for (const PreparedImage& image : images) cameras[image.camera].push_back(&image);
   std::size_t before = 0;
@@ -225,7 +224,6 @@ void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, 
     for (const PreparedImage* image : members) list += image->name + "\n";
     const fs::path list_file = work / fmt::format("camera_{}.txt", number);
     write_file(list_file, list);
-    const std::string model = mapping_model(*members.front(), options);
     const char* command = "feature_extractor";
     std::vector<std::string> words = {command,
                                       "--database_path",
@@ -237,17 +235,17 @@ void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, 
                                       "--ImageReader.single_camera",
                                       "1",
                                       "--ImageReader.camera_model",
-                                      model,
+                                      mapping_model(*members.front()),
                                       "--ImageReader.camera_params",
-                                      first_parameters(*members.front(), model)};
+                                      first_parameters(*members.front())};
     if (fs::exists(work / "masks")) words.insert(words.end(), {"--ImageReader.mask_path", work / "masks"});
     const auto add = [&](std::initializer_list<const char*> names, const std::string& value) {
       if (const auto name = colmap.option(command, names)) words.insert(words.end(), {*name, value});
     };
     add({"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"}, "0");
     add({"SiftExtraction.num_threads", "FeatureExtraction.num_threads"}, std::to_string(thread_count()));
-    add({"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"}, std::to_string(options.longest_side));
-    add({"SiftExtraction.max_num_features"}, std::to_string(options.features));
+    add({"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"}, std::to_string(kLongestSide));
+    add({"SiftExtraction.max_num_features"}, std::to_string(kFeatures));
     const auto scaled = [&](const Progress& part) {
       if (!progress) return;
       const double done = double(before) + part.fraction * double(members.size());
@@ -256,12 +254,6 @@ void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, 
     (void)colmap.run(words, "features", members.size(), scaled);
     before += members.size();
   }
-}
-
-std::vector<std::pair<int, int>> pairs_to_match(const std::string& matching, const std::vector<LookVector>& looks,
-                                                const PoseOptions& options) {
-  if (matching == "exhaustive") return choose_pairs(looks, {int(looks.size()), 0});
-  return choose_pairs(looks, {options.neighbours, matching == "guided" ? options.alike : 0});
 }
 
 /// In portions, each a call of its own: COLMAP's log tells nothing within one, and a finished one need not be repeated.
@@ -419,27 +411,24 @@ double share_in_log(std::string_view log, std::size_t images) {
 }
 
 PoseRecovery recover_poses(const std::vector<PreparedImage>& images, const fs::path& capture, const fs::path& work,
-                           bool ordered, const PoseOptions& options, const ProgressSink& progress) {
+                           bool ordered, const ProgressSink& progress) {
   const Stopwatch watch;
   fs::create_directories(work);
-  Colmap colmap = find_colmap(options, work);
-  Steps steps(work, fingerprint(images, capture, options));
+  Colmap colmap = find_colmap(work);
+  Steps steps(work, fingerprint(images, capture));
 
   PoseRecovery out;
-  out.matching = options.matching;
-  if (out.matching == "auto") {
-    const int most = ordered ? std::min(kExhaustiveFrames, options.exhaustive_up_to) : options.exhaustive_up_to;
-    out.matching = int(images.size()) <= most ? "exhaustive" : "guided";
-  }
-
+  const int count = int(images.size());
+  const bool all_pairs = count <= (ordered ? kExhaustiveFrames : kExhaustiveImages);
+  out.matching = all_pairs ? "exhaustive" : "guided";
   const std::vector<LookVector> looks = write_pictures(images, capture, work / "pictures");
   write_masks(images, capture, work / "masks");
-  const auto pairs = pairs_to_match(out.matching, looks, options);
+  const auto pairs = all_pairs ? choose_pairs(looks, {count, 0}) : choose_pairs(looks, {kNeighbours, kAlike});
   out.pairs = pairs.size();
   if (!steps.has("features")) {
     // Going on in the middle of a camera's images would give it a second lens.
     for (const char* file : {"database.db", "database.db-shm", "database.db-wal"}) fs::remove(work / file);
-    extract_features(colmap, images, work, options, progress);
+    extract_features(colmap, images, work, progress);
     steps.finish("features");
   }
   if (!steps.has("matches")) {
@@ -450,14 +439,12 @@ PoseRecovery recover_poses(const std::vector<PreparedImage>& images, const fs::p
     map_images(colmap, images, work, progress);
     steps.finish("poses");
   }
-  for (const auto& [count, model] : models_in(work / "sparse")) {
+  for (const auto& [registered, model] : models_in(work / "sparse")) {
     if (out.model.empty()) out.model = model;
-    out.model_sizes.push_back(count);
+    out.model_sizes.push_back(registered);
   }
   out.median_features = median_features(work / "colmap.log");
-  if (!out.model.empty() && options.camera_model == "OPENCV") {
-    out.model = free_lenses(colmap, out.model, images, work, progress);
-  }
+  if (!out.model.empty()) out.model = free_lenses(colmap, out.model, images, work, progress);
   out.seconds = watch.seconds();
   return out;
 }

@@ -1,13 +1,10 @@
 #include "src/prepare/film.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/check.h"
 #include "src/base/statistics.h"
-#include "src/color/colorspace_math.h"
 #include "src/prepare/grey_image.h"
 
 namespace cnerf::prepare {
@@ -17,18 +14,6 @@ constexpr int kShortestShot = 5;
 constexpr double kCutLikeness = 0.6, kCutDrop = 0.25;
 constexpr double kDuplicateShare = 1.0 / 6, kDuplicateCodes = 1.5;
 constexpr double kBorderChange = 3, kBorderSpread = 4;  ///< standard deviations in time and along the line, codes
-constexpr int kWindow = 4;                              ///< frames on each side of running medians and means
-
-double mean_linear(const cv::Mat1b& picture) {
-  static const std::array<double, 256> linear = [] {
-    std::array<double, 256> table{};
-    for (std::size_t i = 0; i < table.size(); ++i) table[i] = linear_from_srgb(double(i) / 255);
-    return table;
-  }();
-  double sum = 0;
-  for (const std::uint8_t code : picture) sum += linear[code];
-  return sum / double(picture.total());
-}
 
 /// Mean 0, length 1: brightness and contrast do not count.
 cv::Mat1f normalised(const cv::Mat1b& picture, cv::Size size) {
@@ -47,24 +32,15 @@ cv::Mat1f normalised(const cv::Mat1b& picture, cv::Size size) {
 FrameFacts FrameObserver::measure(const cv::Mat1b& frame) {
   FrameFacts facts;
   const cv::Mat1b small = reduced_to(frame, 320);
-  facts.brightness = mean_linear(small);
   facts.sharpness = sharpness(frame);
   facts.comb = comb_ratio(frame);
-  facts.grain = grain_codes(frame);
-  facts.scratched = has_scratch(frame);
   const cv::Mat1f blurred = normalised(small, {32, 24});
-  cv::Mat1f whole;
-  small.convertTo(whole, CV_32F);
   if (!small_before_.empty()) {
     facts.change = cv::norm(small, small_before_, cv::NORM_L1) / double(small.total());
     facts.likeness = blurred.dot(blurred_before_);
-    if (window_.empty()) cv::createHanningWindow(window_, whole.size(), CV_32F);
-    const double scale = double(frame.cols) / small.cols;
-    facts.shift = cv::phaseCorrelate(shift_before_, whole, window_) * scale;
   }
   small_before_ = small.clone();
   blurred_before_ = blurred;
-  shift_before_ = whole;
   return facts;
 }
 
@@ -107,34 +83,6 @@ double comb_ratio(const cv::Mat1b& frame) {
   return next_but_one > 0 ? difference(1) / next_but_one : 0;
 }
 
-double grain_codes(const cv::Mat1b& frame) {
-  static const cv::Matx33f mask(1, -2, 1, -2, 4, -2, 1, -2, 1);
-  if (frame.cols < 3 || frame.rows < 3) return 0;
-  cv::Mat response;
-  cv::filter2D(frame, response, CV_32F, mask);
-  const cv::Mat inner = response(cv::Rect(1, 1, frame.cols - 2, frame.rows - 2));
-  return std::sqrt(CV_PI / 2) / 6 * cv::norm(inner, cv::NORM_L1) / double(inner.total());
-}
-
-bool has_scratch(const cv::Mat1b& frame) {
-  constexpr int kReach = 4;         // columns on each side that a line is compared with
-  constexpr double kContrast = 10;  // codes
-  if (frame.cols < 4 * kReach) return false;
-  cv::Mat1b level;  // grain averaged along the line, in 32 bands
-  cv::resize(frame, level, {frame.cols, 32}, 0, 0, cv::INTER_AREA);
-  for (int x = kReach; x < frame.cols - kReach; ++x) {
-    int above = 0, below = 0;
-    for (int y = 0; y < level.rows; ++y) {
-      const int around = std::max(level(y, x - kReach), level(y, x + kReach));
-      const int around_low = std::min(level(y, x - kReach), level(y, x + kReach));
-      above += level(y, x) > around + kContrast ? 1 : 0;
-      below += level(y, x) < around_low - kContrast ? 1 : 0;
-    }
-    if (std::max(above, below) >= int(0.8 * level.rows)) return true;
-  }
-  return false;
-}
-
 void BorderFinder::add(const cv::Mat1b& frame) {
   cv::Mat1f values;
   frame.convertTo(values, CV_32F);
@@ -171,42 +119,6 @@ cv::Rect BorderFinder::picture() const {
   if (right < columns) right -= kMixed;
   const bool is_plausible = right - left > columns / 2 && bottom - top > rows / 2;
   return is_plausible ? cv::Rect(left, top, right - left, bottom - top) : cv::Rect(0, 0, columns, rows);
-}
-
-FilmMarks film_marks(const std::vector<FrameFacts>& frames, const Shot& shot) {
-  FilmMarks out;
-  std::vector<double> grain, ratios;
-  std::vector<cv::Point2d> path;
-  cv::Point2d at{};
-  int scratched = 0;
-  for (int i = shot.begin; i < shot.end; ++i) {
-    const FrameFacts& frame = frames[std::size_t(i)];
-    std::vector<double> around;
-    for (int j = std::max(shot.begin, i - kWindow); j < std::min(shot.end, i + kWindow + 1); ++j) {
-      around.push_back(frames[std::size_t(j)].brightness);
-    }
-    const double usual = median(around);
-    if (usual > 0) ratios.push_back(frame.brightness / usual);
-    grain.push_back(frame.grain);
-    scratched += frame.scratched ? 1 : 0;
-    if (i > shot.begin) at += frame.shift;
-    path.push_back(at);
-  }
-  double squared = 0;
-  for (const double ratio : ratios) squared += (ratio - 1) * (ratio - 1);
-  out.flicker = ratios.empty() ? 0 : std::sqrt(squared / double(ratios.size()));
-  double shaken = 0;
-  int counted = 0;
-  for (int i = kWindow; i + kWindow < int(path.size()); ++i, ++counted) {
-    cv::Point2d mean{};
-    for (int j = i - kWindow; j <= i + kWindow; ++j) mean += path[std::size_t(j)] / (2.0 * kWindow + 1);
-    const cv::Point2d off = path[std::size_t(i)] - mean;
-    shaken += off.dot(off);
-  }
-  out.weave = counted > 0 ? std::sqrt(shaken / counted) : 0;
-  out.grain = grain.empty() ? 0 : median(grain);
-  out.scratched = shot.size() > 0 ? double(scratched) / shot.size() : 0;
-  return out;
 }
 
 std::vector<int> choose_frames(const std::vector<FrameFacts>& frames, const Shot& shot,

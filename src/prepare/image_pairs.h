@@ -1,6 +1,7 @@
 #pragma once
 /// Selection of image pairs to match where there are too many for all of them: neighbours in order, and pairs that look
-/// alike. No vocabulary file is needed.
+/// alike. COLMAP's own retrieval
+/// needs a vocabulary file that it would have to download.
 
 #include <opencv2/core.hpp>
 #include <string>
@@ -14,8 +15,8 @@ using LookVector = std::vector<float>;
 [[nodiscard]] LookVector look_of(const cv::Mat1b& picture);
 
 struct PairOptions {
-  int neighbours = 10;  ///< on each side in the order of the images; and at distances 16, 32, 64, …
-  int alike = 20;       ///< per image, by look
+  int neighbours = 0;  ///< on each side in the order of the images; and at distances 16, 32, 64, …
+  int alike = 0;       ///< per image, by look
 };
 
 /// Pairs (i, j), i < j, each once, sorted.

@@ -19,12 +19,6 @@ namespace cnerf::prepare {
 namespace fs = std::filesystem;
 namespace {
 
-std::string lower_extension(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
-  return extension;
-}
-
 bool is_heic(const fs::path& file) {
   const std::string extension = lower_extension(file);
   return extension == ".heic" || extension == ".heif" || extension == ".hif" || extension == ".avif";
@@ -52,17 +46,13 @@ void refuse_heic(const fs::path& folder, const std::vector<fs::path>& files) {
           "}.jpg\" && mv \"$f\" \"$f.done\"; done");
 }
 
-Transfer source_transfer(const std::string& name) {
-  return name == "linear" ? Transfer::kLinear : name == "gamma22" ? Transfer::kGamma22 : Transfer::kSrgb;
-}
-
 /// Stored codes, read as if they were linear, to luminance.
 void apply_levels(LinearImage& image, const SensorOptions& sensor) {
   if (image.depth == PixelDepth::kF32) return;
   const double largest = image.depth == PixelDepth::kU8 ? 255 : 65535;
   const double black = sensor.black_level / largest;
   const double white = sensor.white_level > 0 ? sensor.white_level / largest : 1;
-  const Transfer transfer = source_transfer(sensor.transfer);
+  const Transfer transfer = transfer_named(sensor.transfer);
   const auto decoded = [&](float code) {
     return decode_transfer(transfer, std::clamp(float((code - black) / (white - black)), 0.0f, 1.0f));
   };

@@ -10,6 +10,7 @@
 #include "src/base/files.h"
 #include "src/capture/listing.h"
 #include "src/prepare/capture_writer.h"
+#include "src/prepare/colmap.h"
 #include "src/prepare/exposure.h"
 #include "src/prepare/parallax.h"
 
@@ -66,11 +67,7 @@ Material read_material(const fs::path& source, const fs::path& capture, const Pr
   say(fmt::format("clip: {} frames of {} x {}, {:.3g} a second, {} shot{}", report.frames, report.width, report.height,
                   report.fps, report.shots.size(), report.shots.size() == 1 ? "" : "s"));
   for (const std::string& line : shot_lines(report)) say(line);
-  const FilmMarks& marks = report.shots[std::size_t(report.shot - 1)].marks;
-  say(fmt::format(
-      "shot {} is used, {} frames kept; flicker {:.1f} %, weave {:.2f} pixels, grain up to {:.1f} codes, "
-      "scratches in {:.0f} % of frames",
-      report.shot, report.kept.size(), 100 * marks.flicker, marks.weave, marks.grain, 100 * marks.scratched));
+  say(fmt::format("shot {} is used, {} frames kept", report.shot, report.kept.size()));
   if (report.picture.width != report.width || report.picture.height != report.height) {
     say(fmt::format("borders cropped: {} x {} at {}, {} is left", report.picture.width, report.picture.height,
                     report.picture.x, report.picture.y));
@@ -171,7 +168,7 @@ Poses find_poses(const Material& material, const fs::path& capture, const fs::pa
   }
   const bool is_clip = material.ordered;
   if (!is_clip && !options.video.allow_no_parallax) refuse_turns(images, capture);
-  const PoseRecovery recovery = recover_poses(images, capture, work, is_clip, options.poses, progress);
+  const PoseRecovery recovery = recover_poses(images, capture, work, is_clip, progress);
   Poses out;
   if (!recovery.model.empty()) out = poses_of_model(recovery.model, capture, images);
   out.recovery = recovery;
@@ -212,10 +209,6 @@ Json json_of(const ClipReport& clip) {
                      {"pairs_judged", shot.judged},
                      {"parallax_share", shot.parallax},
                      {"moved", shot.moved},
-                     {"flicker", shot.marks.flicker},
-                     {"weave_pixels", shot.marks.weave},
-                     {"grain_codes", shot.marks.grain},
-                     {"scratched_share", shot.marks.scratched},
                      {"refusal", shot.refusal()}});
   }
   return {{"width", clip.width},
@@ -266,18 +259,11 @@ Json record_of(const fs::path& source, const PrepareOptions& options, const Mate
   found["placed"] = poses.views.size();
   found["images"] = material.set.images.size();
   if (poses.recovery) {
-    const PoseOptions& used = options.poses;
     found.update(Json{{"matching", poses.recovery->matching},
                       {"pairs", poses.recovery->pairs},
                       {"model_sizes", poses.recovery->model_sizes},
                       {"median_features", poses.recovery->median_features},
-                      {"seconds", poses.recovery->seconds},
-                      {"camera_model", used.camera_model},
-                      {"features", used.features},
-                      {"longest_side", used.longest_side},
-                      {"exhaustive_up_to", used.exhaustive_up_to},
-                      {"neighbours", used.neighbours},
-                      {"alike", used.alike}});
+                      {"seconds", poses.recovery->seconds}});
   }
   out["frame"] = {{"up_by", frame.up_by},
                   {"ground_share", frame.ground_share},

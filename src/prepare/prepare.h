@@ -8,7 +8,6 @@
 
 #include "src/base/options.h"
 #include "src/base/progress.h"
-#include "src/prepare/colmap.h"
 #include "src/prepare/photographs.h"
 #include "src/prepare/spike_stream.h"
 #include "src/prepare/upright.h"
@@ -24,7 +23,6 @@ struct PrepareOptions {
   SensorOptions sensor;
   VideoOptions video;
   SpikeOptions spikes;
-  PoseOptions poses;
   FrameOptions frame;
 
   template <typename Visitor>
@@ -37,7 +35,6 @@ struct PrepareOptions {
     sensor.visit(v);
     video.visit(v);
     spikes.visit(v);
-    poses.visit(v);
     frame.visit(v);
   }
 };

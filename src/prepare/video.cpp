@@ -191,7 +191,6 @@ ShotReport report_of(const Survey& clip, const Shot& range) {
   out.range = range;
   const std::vector<bool> duplicates = find_duplicates(clip.frames, range);
   out.duplicates = int(std::ranges::count(duplicates, true));
-  out.marks = film_marks(clip.frames, range);
   int parallax = 0;
   std::vector<double> moves;
   for (int i = range.begin + 1; i < range.end; ++i) {
@@ -225,9 +224,7 @@ std::size_t choose_shot(const std::vector<ShotReport>& shots, int wanted, const 
 cv::Mat1b code_table(const VideoOptions& options, const SensorOptions& sensor) {
   const double black = options.video_range == "limited" ? 16 : sensor.black_level;
   const double white = options.video_range == "limited" ? 235 : sensor.white_level > 0 ? sensor.white_level : 255;
-  const Transfer transfer = sensor.transfer == "linear"    ? Transfer::kLinear
-                            : sensor.transfer == "gamma22" ? Transfer::kGamma22
-                                                           : Transfer::kSrgb;
+  const Transfer transfer = transfer_named(sensor.transfer);
   cv::Mat1b table(1, 256);
   for (int code = 0; code < 256; ++code) {
     const double value = std::clamp((code - black) / (white - black), 0.0, 1.0);
@@ -386,9 +383,7 @@ ClipImport import_clip(const fs::path& file, const fs::path& capture, const fs::
         "same." +
         list);
   }
-  const double seconds = shot.range.size() / (report.fps > 0 ? report.fps : 24);
-  const int count = options.fps > 0 ? std::max(2, int(std::lround(seconds * options.fps))) : options.frames;
-  report.kept = choose_frames(clip.frames, shot.range, find_duplicates(clip.frames, shot.range), count);
+  report.kept = choose_frames(clip.frames, shot.range, find_duplicates(clip.frames, shot.range), options.frames);
   FrameMasks frame_masks(masks, capture, report);
   write_frames(file, capture, frame_masks, code_table(options, sensor), out, progress);
   for (PreparedImage& image : out.set.images) image.sharpness = clip.frames[std::size_t(image.frame)].sharpness;

@@ -15,7 +15,6 @@ namespace cnerf::prepare {
 struct VideoOptions {
   int shot = 0;
   int frames = 60;
-  double fps = 0;
   std::string video_range = "auto";
   bool allow_no_parallax = false;
 
@@ -24,7 +23,6 @@ struct VideoOptions {
     v("shot", shot, Range{0, 100000},
       "shot of a clip to use, 1 is the first; 0 = the longest in which the camera travels");
     v("frames", frames, Range{2, 10000}, "frames of a clip to keep, the sharpest of each window");
-    v("fps", fps, Range{0, 1000}, "frames to keep per second, instead of a number; 0 = by number");
     v("video_range", video_range, Choice{"auto", "full", "limited"},
       "codes of black and white: as the clip says, 0 to 255, or 16 to 235 that the decoder did not expand");
     v("allow_no_parallax", allow_no_parallax,
@@ -39,7 +37,6 @@ struct ShotReport {
   double parallax = 0;  ///< share of them with parallax
   double moved = -1;    ///< median displacement of places, share of the diagonal; -1: none could be followed
   int duplicates = 0;
-  FilmMarks marks;
 
   /// Why the shot cannot be reconstructed; empty if it can.
   [[nodiscard]] std::string refusal() const;

@@ -15,6 +15,7 @@
 #include "src/prepare/similarity.h"
 #include "tests/e2e/program.h"
 #include "tests/support/data.h"
+#include "tests/support/no_programs.h"
 #include "tests/support/pose_comparison.h"
 
 namespace cnerf::test {
@@ -126,7 +127,10 @@ TEST(Prepare, WithoutColmapSaysHowToGetItAndGoesOnLater) {
   const TempDir folder;
   const UserFolder user = without_poses(folder.path());
   const std::string out = (folder / "capture").string();
-  const ProgramResult result = cnerf({"prepare", user.photos.string(), "-o", out, "--colmap", "/absent/colmap"});
+  const ProgramResult result = [&] {
+    const NoPrograms none;
+    return cnerf({"prepare", user.photos.string(), "-o", out});
+  }();
   EXPECT_EQ(result.exit_code, 69);
   EXPECT_THAT(result.err, HasSubstr("apt install colmap"));
   EXPECT_TRUE(fs::exists(fs::path(out) / "images"));

@@ -15,6 +15,7 @@
 #include "src/prepare/prepare.h"
 #include "src/sample/sample_scene.h"
 #include "tests/support/data.h"
+#include "tests/support/no_programs.h"
 #include "tests/support/pose_comparison.h"
 
 namespace cnerf::prepare {
@@ -148,10 +149,9 @@ TEST(NoColmap, SaysHowToInstallItAndKeepsTheImages) {
   for (const char* name : {"a.png", "b.png"}) {
     cv::imwrite((folder / "photos" / name).string(), cv::Mat1b(40, 60, std::uint8_t(99)));
   }
-  PrepareOptions options;
-  options.poses.colmap = "no-such-colmap";
+  const test::NoPrograms none;
   try {
-    (void)prepare(folder / "photos", folder / "capture", options);
+    (void)prepare(folder / "photos", folder / "capture", PrepareOptions{});
     FAIL() << "not refused";
   } catch (const DeviceError& error) {
     EXPECT_NE(std::string(error.what()).find("apt install colmap"), std::string::npos) << error.what();

@@ -87,25 +87,6 @@ TEST(Comb, WovenFieldsStandOut) {
   EXPECT_GT(comb_ratio(woven), 1.2);
 }
 
-TEST(Grain, IsMeasuredOnAFlatPicture) {
-  for (const double codes : {2.0, 6.0}) {
-    cv::Mat1b flat(240, 320, std::uint8_t(120));
-    add_grain(flat, codes, 3);
-    EXPECT_NEAR(grain_codes(flat), codes, 0.1 * codes);
-  }
-}
-
-TEST(Scratch, ALineThroughTheFrameIsFoundAndAnEdgeIsNot) {
-  cv::Mat1b frame = picture(1);
-  add_grain(frame, 3, 1);
-  EXPECT_FALSE(has_scratch(frame));
-  cv::Mat1b edge = frame.clone();
-  edge.colRange(0, 100) = 20;
-  EXPECT_FALSE(has_scratch(edge));
-  frame.colRange(150, 152) = 250;
-  EXPECT_TRUE(has_scratch(frame));
-}
-
 TEST(Borders, LetterboxIsCut) {
   BorderFinder borders;
   for (int i = 0; i < 12; ++i) {
@@ -125,30 +106,6 @@ TEST(Borders, APictureWithoutBarsStaysWhole) {
   BorderFinder borders;
   for (int i = 0; i < 12; ++i) borders.add(picture(1, 5 * i));
   EXPECT_EQ(borders.picture(), cv::Rect(0, 0, 320, 240));
-}
-
-TEST(FilmMarks, FlickerIsMeasured) {
-  std::vector<cv::Mat1b> steady, flickering;
-  SequentialRng rng(9, 0);
-  for (int i = 0; i < 40; ++i) {
-    steady.push_back(picture(1, 2 * i));
-    flickering.push_back(cv::Mat1b(picture(1, 2 * i) * (0.9 + 0.2 * rng.uniform())));
-  }
-  const auto calm = facts_of(steady), uneasy = facts_of(flickering);
-  EXPECT_LT(film_marks(calm, whole(calm)).flicker, 0.02);
-  EXPECT_GT(film_marks(uneasy, whole(uneasy)).flicker, 0.06);  // codes by +-10 % are light by about +-22 %
-}
-
-TEST(FilmMarks, WeaveIsMeasuredAndASteadyPanHasNone) {
-  std::vector<cv::Mat1b> pan, weaving;
-  SequentialRng rng(10, 0);
-  for (int i = 0; i < 40; ++i) {
-    pan.push_back(picture(1, 2 * i));
-    weaving.push_back(picture(1, 2 * i + 2 * rng.normal(), 2 * rng.normal()));
-  }
-  const auto calm = facts_of(pan), uneasy = facts_of(weaving);
-  EXPECT_LT(film_marks(calm, whole(calm)).weave, 0.5);
-  EXPECT_NEAR(film_marks(uneasy, whole(uneasy)).weave, std::sqrt(8.0), 1.0);  // 2 pixels on each axis
 }
 
 TEST(ChooseFrames, TakesTheSharpestOfEachWindow) {

@@ -207,7 +207,7 @@ TEST_F(Clip, RepeatedFramesAreNotKept) {
   EXPECT_EQ(clip.set.images.size(), 40u);
 }
 
-TEST_F(Clip, FlickerAndGrainDoNotHideParallaxAndAreReported) {
+TEST_F(Clip, FlickerAndGrainDoNotHideParallax) {
   SequentialRng rng(5, 0);
   std::vector<cv::Mat1b> frames = travelling(40);
   for (cv::Mat1b& frame : frames) {
@@ -215,10 +215,7 @@ TEST_F(Clip, FlickerAndGrainDoNotHideParallaxAndAreReported) {
     for (std::uint8_t& code : frame) code = cv::saturate_cast<std::uint8_t>(gain * code + 4 * rng.normal());
   }
   const ClipImport clip = import_frames(frames);
-  const ShotReport& shot = clip.report.shots.at(0);
-  EXPECT_GT(shot.parallax, 0.5);
-  EXPECT_GT(shot.marks.flicker, 0.05);
-  EXPECT_GT(shot.marks.grain, 1);
+  EXPECT_GT(clip.report.shots.at(0).parallax, 0.5);
 }
 
 TEST_F(Clip, WovenFieldsAreTakenApart) {
