@@ -59,16 +59,8 @@ const std::vector<RetiredKey>& retired_keys() {
   return keys;
 }
 
-void read_config_file(const fs::path& file, Config& config) {
-  read_toml(read_text_file(file), file.string(), fields_of(config), retired_keys());
-}
-
 std::vector<std::string> read_run_config(const fs::path& file, Config& config) {
   return read_toml(read_text_file(file), file.string(), fields_of(config), retired_keys(), Retired::kLeftOut);
-}
-
-void apply_setting(std::string_view setting, Config& config) {
-  apply_setting(setting, fields_of(config), retired_keys());
 }
 
 std::string to_toml(const Config& config) {

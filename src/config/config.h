@@ -54,14 +54,10 @@ struct Config {
 /// Keys that options had once; using one is an error that says what to do instead.
 [[nodiscard]] const std::vector<RetiredKey>& retired_keys();
 
-/// Reads a file over `config`.  @throws MissingInputError, UsageError naming file, key, value and what is legal.
-void read_config_file(const std::filesystem::path& file, Config& config);
-/// The same for what `to_toml` wrote into a run's folder, perhaps before some keys were retired.
+/// Reads what `to_toml` wrote into a run's folder, perhaps before some keys were retired, over `config`.
 /// @return  notes for the user: what it says that is no option any more
+/// @throws MissingInputError, UsageError naming file, key, value and what is legal.
 std::vector<std::string> read_run_config(const std::filesystem::path& file, Config& config);
-
-/// Applies one `key.path=value`.  @throws UsageError.
-void apply_setting(std::string_view setting, Config& config);
 
 /// The whole configuration as TOML. Reading it back gives an equal Config, bit for bit.
 [[nodiscard]] std::string to_toml(const Config& config);

@@ -16,6 +16,13 @@
 
 namespace cnerf {
 namespace {
+
+void read_config_file(const std::filesystem::path& file, Config& config) {
+  read_toml(read_text_file(file), file.string(), fields_of(config), retired_keys());
+}
+void apply_setting(std::string_view setting, Config& config) {
+  cnerf::apply_setting(setting, fields_of(config), retired_keys());
+}
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
