@@ -21,6 +21,19 @@ struct Command {
   bool resumable;  ///< after Ctrl-C, the same line with --resume goes on
 };
 
+/// A command that `app` stands for.
+struct ParsedCommand {
+  const Command* command;
+  CLI::App* app;
+  Work work;
+};
+
+/// Declares every command on `program`.
+[[nodiscard]] std::vector<ParsedCommand> declare_commands(CLI::App& program);
+/// The command that was named when `program` parsed its line.
+/// @throws UsageError  none, or one with words that it does not know; with what may be meant
+[[nodiscard]] const ParsedCommand& chosen_command(const CLI::App& program, const std::vector<ParsedCommand>& commands);
+
 Work declare_run(CLI::App& app);
 Work declare_prepare(CLI::App& app);
 Work declare_sample(CLI::App& app);

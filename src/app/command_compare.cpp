@@ -6,6 +6,7 @@
 #include "src/app/common_options.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/text.h"
 #include "src/compare/options.h"
 #include "src/compare/rating.h"
 #include "src/compare/run.h"
@@ -23,33 +24,6 @@ struct CompareArguments {
   bool rating_sheet = false, resume = false, overwrite = false, only_report = false;
 };
 
-void read_ratings_back(const CompareArguments& arguments, Reporter& reporter) {
-  const fs::path folder = arguments.out;
-  const std::vector<fs::path> answers(arguments.ratings.begin(), arguments.ratings.end());
-  const std::vector<MethodRating> ratings = read_ratings(folder / "rating_key.json", answers);
-  write_file(folder / "ratings.json", ratings_json(ratings));
-  write_file(folder / "ratings.md", ratings_markdown(ratings));
-  reporter.say(ratings_markdown(ratings));
-  reporter.wrote("ratings", folder / "ratings.json");
-  reporter.wrote("ratings", folder / "ratings.md");
-}
-
-/// A comparison that is there already is gone on with, or made anew, only when that is asked for.
-void check_folder(const CompareArguments& arguments) {
-  const fs::path folder = arguments.out;
-  std::error_code failure;
-  if (!fs::exists(folder, failure) || fs::is_empty(folder, failure)) return;
-  if (!fs::is_directory(folder / "runs", failure)) {
-    throw UsageError(arguments.out + ": is not empty and holds no comparison; choose another folder");
-  }
-  if (arguments.overwrite) {
-    fs::remove_all(folder / "runs");
-  } else if (!arguments.resume && !arguments.only_report) {
-    throw UsageError(arguments.out +
-                     ": holds a comparison already; pass --resume to go on with it or --overwrite to start again");
-  }
-}
-
 /// As resolve_config, with the section [compare].
 CompareConfig resolve_compare_config(const ConfigArguments& arguments) {
   CompareConfig config;
@@ -63,7 +37,9 @@ CompareConfig resolve_compare_config(const ConfigArguments& arguments) {
 
 void run_comparison(const CompareArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
-  if (!arguments.ratings.empty()) return read_ratings_back(arguments, reporter);
+  if (!arguments.ratings.empty()) {
+    return write_ratings(arguments.out, {arguments.ratings.begin(), arguments.ratings.end()}, reporter);
+  }
   if (arguments.captures.empty()) throw UsageError("CAPTURE: at least one is needed");
   CompareConfig config = resolve_compare_config(arguments.config);
   if (config.run.colorizer.spec.empty()) {
@@ -77,8 +53,8 @@ void run_comparison(const CompareArguments& arguments, const std::vector<std::st
   plan.methods = parse_methods(arguments.methods);
   for (int i = 0; i < arguments.seeds; ++i) plan.seeds.push_back(arguments.first_seed + i);
   plan.lpips_weights = arguments.lpips_weights;
-  for (const std::string& word : command_line) plan.command_line += (plan.command_line.empty() ? "" : " ") + word;
-  check_folder(arguments);
+  plan.command_line = joined(command_line);
+  begin_report(plan.report, {arguments.resume || arguments.only_report, arguments.overwrite});
   Run comparison(std::move(plan), config, reporter);
   write_file(fs::path(arguments.out) / "config.toml", write_toml(fields_of(config)));
   comparison.run();

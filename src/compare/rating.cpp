@@ -176,4 +176,14 @@ std::string ratings_markdown(std::span<const MethodRating> ratings) {
                      raters == 1 ? "" : "s");
 }
 
+void write_ratings(const std::filesystem::path& report, const std::vector<std::filesystem::path>& answers,
+                   Observer& observer) {
+  const std::vector<MethodRating> ratings = read_ratings(report / "rating_key.json", answers);
+  write_file(report / "ratings.json", ratings_json(ratings));
+  write_file(report / "ratings.md", ratings_markdown(ratings));
+  observer.say(ratings_markdown(ratings));
+  observer.wrote("ratings", report / "ratings.json");
+  observer.wrote("ratings", report / "ratings.md");
+}
+
 }  // namespace cnerf::compare

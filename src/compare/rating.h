@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "src/base/observer.h"
 #include "src/compare/table.h"
 
 namespace cnerf::compare {
@@ -39,5 +40,10 @@ struct MethodRating {
                                                      std::span<const std::filesystem::path> answers);
 [[nodiscard]] std::string ratings_json(std::span<const MethodRating> ratings);
 [[nodiscard]] std::string ratings_markdown(std::span<const MethodRating> ratings);
+
+/// Makes the tables of the answers to the rating sheet in a report's folder: ratings.json, ratings.md.
+/// @throws  as `read_ratings`
+void write_ratings(const std::filesystem::path& report, const std::vector<std::filesystem::path>& answers,
+                   Observer& observer);
 
 }  // namespace cnerf::compare

@@ -12,6 +12,20 @@
 namespace cnerf::compare {
 namespace fs = std::filesystem;
 
+void begin_report(const fs::path& folder, ExistingReport existing) {
+  std::error_code failure;
+  if (!fs::exists(folder, failure) || fs::is_empty(folder, failure)) return;
+  if (!fs::is_directory(folder / "runs", failure)) {
+    throw UsageError(folder.string() + ": is not empty and holds no comparison; choose another folder");
+  }
+  if (existing.is_cleared) {
+    fs::remove_all(folder / "runs");
+  } else if (!existing.is_kept) {
+    throw UsageError(folder.string() +
+                     ": holds a comparison already; pass --resume to go on with it or --overwrite to start again");
+  }
+}
+
 Run::Run(Plan plan, CompareConfig config, Observer& observer)
     : plan_(std::move(plan)),
       config_(std::move(config)),

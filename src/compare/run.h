@@ -33,6 +33,13 @@ struct Plan {
   bool only_report = false;  ///< nothing is trained: the report is made of the cells that are there
 };
 
+/// A comparison that is there already is gone on with, or made anew, only when that is asked for.
+struct ExistingReport {
+  bool is_kept = false, is_cleared = false;
+};
+/// @throws UsageError  a folder of something else, or a comparison without either choice
+void begin_report(const std::filesystem::path& folder, ExistingReport existing);
+
 class Run {
  public:
   /// Reads the captures, so that what is missing costs no training.

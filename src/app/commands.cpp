@@ -1,0 +1,65 @@
+#include "src/app/command.h"
+#include "src/base/error.h"
+#include "src/config/toml_binding.h"
+
+namespace cnerf::app {
+namespace {
+
+constexpr Command kCommands[] = {
+    {"run", "All of the below: train, colorize, evaluate, bake, render", declare_run, true},
+    {"sample", "Write the embedded sample capture, with colour ground truth", declare_sample, false},
+    {"prepare", "Photographs or a film clip to a capture: camera poses by COLMAP", declare_prepare, true},
+    {"train", "Stage 1: luminance and density from a capture", declare_train, true},
+    {"colorize", "Stage 2: colours for a trained run; takes stand side by side", declare_colorize, true},
+    {"colorize-image", "One picture, to judge a colorizer", declare_colorize_image, false},
+    {"render", "Pictures and videos of a run", declare_render, false},
+    {"eval", "Numbers against held-out views, and a contact sheet", declare_eval, false},
+#if CNERF_COMPARE
+    {"compare", "The paper's method, its ablations and baselines, in one table", declare_compare, true},
+#endif
+    {"bake", "A run as an OpenVDB volume for Blender and others", declare_bake, false},
+    {"view", "A bake or a run in the browser", declare_view, false},
+    {"info", "What a capture, run, snapshot or VDB holds", declare_info, false},
+    {"doctor", "What this machine and build can do", declare_doctor, false},
+};
+
+void refuse_unknown_command(const std::string& word) {
+  std::vector<std::string> names;
+  for (const Command& command : kCommands) names.emplace_back(command.name);
+  const std::string meant = nearest_name(word, names);
+  throw UsageError("unknown command '" + word + "'" + (meant.empty() ? "" : "; did you mean '" + meant + "'?"));
+}
+
+void refuse_unknown_words(const CLI::App& app) {
+  const std::vector<std::string> words = app.remaining();
+  if (words.empty()) return;
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) names.push_back(option->get_name());
+  const std::string meant = nearest_name(words.front(), names);
+  throw UsageError("unexpected '" + words.front() + "'" + (meant.empty() ? "" : "; did you mean '" + meant + "'?") +
+                   " (cnerf " + app.get_name() + " --help lists the options)");
+}
+
+}  // namespace
+
+std::vector<ParsedCommand> declare_commands(CLI::App& program) {
+  std::vector<ParsedCommand> commands;
+  for (const Command& command : kCommands) {
+    CLI::App* app = program.add_subcommand(command.name, command.summary);
+    app->allow_extras();  // unknown words are refused below, with a suggestion
+    commands.push_back({&command, app, command.declare(*app)});
+  }
+  return commands;
+}
+
+const ParsedCommand& chosen_command(const CLI::App& program, const std::vector<ParsedCommand>& commands) {
+  for (const ParsedCommand& each : commands) {
+    if (!each.app->parsed()) continue;
+    refuse_unknown_words(*each.app);
+    return each;
+  }
+  if (!program.remaining().empty()) refuse_unknown_command(program.remaining().front());
+  throw UsageError("a command is needed\n\n" + program.help());
+}
+
+}  // namespace cnerf::app

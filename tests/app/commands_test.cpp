@@ -1,0 +1,42 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "src/app/command.h"
+#include "src/base/error.h"
+
+namespace cnerf::app {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// What the words of a line choose.
+std::string chosen(const std::string& line) {
+  CLI::App program;
+  program.allow_extras();
+  const std::vector<ParsedCommand> commands = declare_commands(program);
+  program.parse(line);
+  return chosen_command(program, commands).command->name;
+}
+
+/// A short form of an option that is gone aborts where it is declared, and each start declares all commands.
+TEST(Commands, AreAllDeclaredWithHelp) {
+  CLI::App program;
+  const std::vector<ParsedCommand> commands = declare_commands(program);
+  EXPECT_GE(commands.size(), 12u);
+  for (const ParsedCommand& each : commands) {
+    EXPECT_TRUE(each.work) << each.command->name;
+    EXPECT_THAT(each.app->help(), HasSubstr(each.command->summary));
+  }
+}
+
+TEST(Commands, AreChosenByName) {
+  EXPECT_EQ(chosen("doctor"), "doctor");
+  EXPECT_EQ(chosen("info somewhere"), "info");
+  EXPECT_THAT([] { (void)chosen("docter"); }, ThrowsMessage<UsageError>(HasSubstr("did you mean 'doctor'")));
+  EXPECT_THAT([] { (void)chosen("info a --downscal 2"); }, ThrowsMessage<UsageError>(HasSubstr("--downscale")));
+  EXPECT_THAT([] { (void)chosen(""); }, ThrowsMessage<UsageError>(HasSubstr("a command is needed")));
+}
+
+}  // namespace
+}  // namespace cnerf::app
