@@ -4,11 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "src/capture/camera.h"
-
-namespace cnerf {
-struct Capture;
-}
+#include "src/capture/capture.h"
 
 namespace cnerf::bake {
 
@@ -19,6 +15,10 @@ struct Camera {
 };
 
 /// Of all views, held-out ones included: no photograph is looked at.
-[[nodiscard]] std::vector<Camera> cameras_of(const Capture& capture);
+[[nodiscard]] inline std::vector<Camera> cameras_of(const Capture& capture) {
+  std::vector<Camera> cameras;
+  for (const View& view : capture.views) cameras.push_back({view.name, view.intrinsics, view.world_from_camera});
+  return cameras;
+}
 
 }  // namespace cnerf::bake

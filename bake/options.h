@@ -1,5 +1,5 @@
 #pragma once
-/// Options of the volume bake.
+/// Options of bakes.
 
 #include <algorithm>
 #include <cmath>
@@ -28,7 +28,6 @@ struct Options {
   double sharpening = 1;
   int subsamples = 2;
   int views_per_voxel = 8;
-  double seen_transmittance = 1e-3;
   bool keep_unseen = false;
 
   template <typename Visitor>
@@ -51,9 +50,25 @@ struct Options {
     v("sharpening", sharpening, Range{0, 4}, "of density at rims, which renderers widen by interpolation; 0 = none");
     v("subsamples", subsamples, Range{1, 8}, "density samples along each axis of a voxel");
     v("views_per_voxel", views_per_voxel, Range{1, 256}, "views that a voxel's luminance is averaged over, at most");
-    v("seen_transmittance", seen_transmittance, Range{0, 1},
-      "share of a voxel's light that has to reach a camera for it to see the voxel");
     v("keep_unseen", keep_unseen, "keep voxels that no camera sees, with luminance from six directions");
+  }
+};
+
+struct MeshOptions {
+  int faces = 60000;
+  double surface_depth = 2;
+  double smallest_part = 0.03;
+  int smoothing = 4;
+  int texture_size = 2048;
+
+  template <typename Visitor>
+  void visit(Visitor&& v) {
+    v("faces", faces, Range{16, 1e8}, "triangles of the mesh, about");
+    v("surface_depth", surface_depth, Range{0.05, 64}, "voxels of matter that halve the light at the surface");
+    v("smallest_part", smallest_part, Range{0, 1},
+      "diagonal of a loose part, in diagonals of the whole, below which it is dropped");
+    v("smoothing", smoothing, Range{0, 100}, "rounds of smoothing that keeps the volume, against voxel steps");
+    v("texture_size", texture_size, Range{64, 16384}, "texels along a side of the textures");
   }
 };
 

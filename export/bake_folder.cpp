@@ -1,16 +1,30 @@
 #include "export/bake_folder.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
-#include "export/blender_setup.h"
-#include "export/nvdb_writer.h"
 #include "export/texture_writer.h"
+#include "export/up_axis.h"
 #include "export/usd_writer.h"
 #include "export/vdb_writer.h"
+#include "src/base/check.h"
 #include "src/base/files.h"
 
 namespace cnerf::exporting {
 namespace fs = std::filesystem;
+
+fs::path write_blender_setup(const fs::path& folder) {
+  const std::string marker = "BAKE_FOLDER = \"\"";
+  std::string text = blender_setup_text();
+  const std::size_t at = text.find(marker);
+  CNERF_CHECK(at != std::string::npos, "blender_setup.py lost its BAKE_FOLDER line");
+  // An ASCII JSON string is a Python string literal as well.
+  const std::string literal = nlohmann::json(fs::absolute(folder).lexically_normal().string()).dump(-1, ' ', true);
+  text.replace(at, marker.size(), "BAKE_FOLDER = " + literal);
+  const fs::path target = folder / "blender_setup.py";
+  write_file(target, text);
+  return target;
+}
 
 BakeFolder::BakeFolder(fs::path folder, std::vector<bake::Camera> cameras, Label label) : folder_(std::move(folder)) {
   manifest_.cameras = std::move(cameras);
@@ -62,7 +76,7 @@ void BakeFolder::add_plate(const std::string& camera, const std::vector<std::byt
   manifest_.plates[camera] = file;
 }
 
-GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, const std::optional<ExrOptions>& exr) {
+GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, bool exr) {
   GltfScene scene;
   scene.cameras = manifest_.cameras;
   scene.basecolor_png = basecolor_png(mesh.texture);
@@ -70,7 +84,7 @@ GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, 
   if (manifest_.volume) scene.vdb = manifest_.volume->file;
   if (exr) {
     const TextureFiles textures =
-        write_exr_textures(mesh.texture, color_origin_text(manifest_.label.provenance), folder_, name, *exr);
+        write_exr_textures(mesh.texture, color_origin_text(manifest_.label.provenance), folder_, name);
     scene.rgb_exr = textures.rgb.filename().string();
     scene.luminance_exr = textures.luminance.filename().string();
     scene.lab_exr = textures.lab.filename().string();
@@ -87,7 +101,7 @@ GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, 
   described.rgb_exr = scene.rgb_exr;
   described.luminance_exr = scene.luminance_exr;
   described.lab_exr = scene.lab_exr;
-  described.gltf_from_world = gltf_from_world(manifest_.label.world.up_axis);
+  described.gltf_from_world = turned_up(manifest_.label.world.up_axis, "y");
   manifest_.mesh = described;
   return files;
 }

@@ -2,18 +2,22 @@
 /// A whole bake on disk: volume, mesh, textures, the manifest that names them and the set-up script for Blender.
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "bake/mesh.h"
 #include "bake/out_of_core/planes.h"
 #include "export/gltf_writer.h"
-#include "export/label.h"
 #include "export/manifest.h"
 #include "export/options.h"
 
 namespace cnerf::exporting {
+
+/// Text of export/blender_setup.py, the Python script that shows a bake in Blender as it was trained.
+[[nodiscard]] const std::string& blender_setup_text();
+/// Writes it into the folder of a bake, beside its manifest.json, and returns its path. The script knows that folder,
+/// so that it also works pasted into Blender's text editor.  @throws OutputError.
+std::filesystem::path write_blender_setup(const std::filesystem::path& folder);
 
 /// Takes one result after another, so that the caller need not hold them together. Files appear whole; the manifest,
 /// by which others find them, comes last and lists exactly what this object wrote.
@@ -26,10 +30,10 @@ class BakeFolder {
   /// @return  the files, coarsest first.  @throws ContractError, OutputError  as write_vdb.
   std::vector<std::filesystem::path> add_volumes(const std::vector<bake::VolumePlanes>& volumes,
                                                  const std::string& name, const VdbOptions& options);
-  /// Writes `name`.gltf, .bin, .glb, `name`_basecolor.png and, with options for them, `name`_rgb.exr, _lum.exr and
+  /// Writes `name`.gltf, .bin, .glb, `name`_basecolor.png and, if asked for, `name`_rgb.exr, _lum.exr and
   /// _lab.exr. To be called after add_volumes, where there is a volume: the mesh then names it.
   /// @throws ContractError, OutputError.
-  GltfFiles add_mesh(const bake::Mesh& mesh, const std::string& name, const std::optional<ExrOptions>& exr);
+  GltfFiles add_mesh(const bake::Mesh& mesh, const std::string& name, bool exr);
   /// A camera's photograph without lens distortion, as plates/`stem`.jpg: what Blender shows behind its view.
   /// @throws OutputError.
   void add_plate(const std::string& camera, const std::vector<std::byte>& jpeg);

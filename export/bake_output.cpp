@@ -63,13 +63,14 @@ void BakeOutput::write_bundle(const std::vector<bake::VolumePlanes>& volumes) {
   for (const bake::VolumePlanes& volume : volumes) whole.push_back(whole_volume(volume));
   WebScene scene{capture_.root.filename().string(), bake::cameras_of(capture_), {}, label_};
   if (options_.web.photo_side > 0) {
-    scene.photos = make_web_photos(capture_.views, options_.web.photo_side, options_.web.photo_quality);
+    constexpr int kQuality = 82;  // of JPEG: photographs are laid over the volume, and loaded with it
+    scene.photos = make_web_photos(capture_.views, options_.web.photo_side, kQuality);
   }
   write_web(merged_volume(std::move(whole)), scene, web_folder(folder_), options_.page, options_.web, observer_);
 }
 
 void BakeOutput::take_mesh(const bake::Mesh& mesh) {
-  const GltfFiles files = bake_.add_mesh(mesh, "mesh", formats_.exr ? std::optional(options_.exr) : std::nullopt);
+  const GltfFiles files = bake_.add_mesh(mesh, "mesh", formats_.exr);
   observer_.say(fmt::format("mesh: {} faces, {} charts in {} x {} texels", mesh.triangles.size(), mesh.charts,
                             mesh.texture.size, mesh.texture.size));
   observer_.wrote("mesh", files.glb);

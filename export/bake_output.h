@@ -7,7 +7,6 @@
 
 #include "bake/job/job.h"
 #include "export/bake_folder.h"
-#include "export/label.h"
 #include "export/options.h"
 #include "src/base/observer.h"
 #include "src/capture/capture.h"
@@ -37,7 +36,6 @@ struct Formats {
 /// How files are written.
 struct OutputOptions {
   VdbOptions vdb;
-  ExrOptions exr;
   WebOptions web;
   std::filesystem::path page;  ///< folder of the built page of web bundles; empty = none
 };

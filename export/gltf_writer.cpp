@@ -204,7 +204,7 @@ double diagonal(const bake::Mesh& mesh) {
 
 /// Everything but the image.
 tinygltf::Model model_of(const bake::Mesh& mesh, const GltfScene& scene) {
-  const Affined from_world = gltf_from_world(scene.label.world.up_axis);
+  const Affined from_world = turned_up(scene.label.world.up_axis, "y");
   tinygltf::Model model;
   model.asset.version = "2.0";
   model.asset.generator = "cnerf " CNERF_VERSION;
@@ -258,10 +258,6 @@ std::string gltf_of(tinygltf::Model model, const std::string& buffer_name, const
 }
 
 }  // namespace
-
-Affined gltf_from_world(const std::string& up_axis) {
-  return turned_up(up_axis, "y");
-}
 
 GltfFiles write_gltf(const bake::Mesh& mesh, const GltfScene& scene, const std::filesystem::path& folder,
                      const std::string& name) {

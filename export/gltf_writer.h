@@ -8,13 +8,9 @@
 
 #include "bake/camera.h"
 #include "bake/mesh.h"
-#include "export/label.h"
+#include "export/options.h"
 
 namespace cnerf::exporting {
-
-/// glTF is Y-up. The rotation that turns the poses' up axis ("x", "y" or "z") to +Y; for "z" (x, y, z) -> (x, z, -y),
-/// which Blender's importer undoes.
-[[nodiscard]] Affined gltf_from_world(const std::string& up_axis);
 
 /// What goes into the files beside the mesh.
 struct GltfScene {
@@ -30,9 +26,9 @@ struct GltfFiles {
 };
 
 /// Writes both forms into `folder`: an unlit material (KHR_materials_unlit; the light is in the texture), indexed
-/// triangles with normals and texture coordinates, and a node for every camera. A camera's lens distortion and
-/// principal point, which glTF has no place for, stand in its `extras`.
-/// Every file is whole or not there, and a .gltf is written after what it refers to.
+/// triangles with normals and texture coordinates, and a node for every camera. glTF is Y-up: all of it is turned_up to
+/// "y". A camera's lens distortion and principal point, which glTF has no place for, stand in its `extras`. Every file
+/// is whole or not there, and a .gltf is written after what it refers to.
 /// @throws ContractError  on an empty mesh or values that are not finite.  @throws OutputError.
 GltfFiles write_gltf(const bake::Mesh& mesh, const GltfScene& scene, const std::filesystem::path& folder,
                      const std::string& name);

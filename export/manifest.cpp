@@ -2,7 +2,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "export/manifest_json.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/json_record.h"
@@ -269,7 +268,7 @@ ManifestVolume describe_volume(const bake::VolumePlanes& volume, const std::stri
   described.voxels = statistics.voxels;
   described.max_density = statistics.max_sigma;
   described.voxel_origin = options.voxel_origin;
-  described.half_density = density_fits_half(statistics, options);
+  described.half_density = density_fits_half(statistics);
   described.file_from_world = file_from_world(options, world);
   return described;
 }

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -69,5 +70,10 @@ std::filesystem::path write_manifest(const BakeManifest& manifest, const std::fi
 
 /// Reads it back.  @throws MissingInputError, InputError  naming the field; also for a newer schema.
 [[nodiscard]] BakeManifest read_manifest(const std::filesystem::path& file);
+
+/// The parts that the manifest of a web bundle repeats word by word.
+[[nodiscard]] nlohmann::ordered_json camera_json(const bake::Camera& camera);
+[[nodiscard]] nlohmann::ordered_json frame_json(const SceneFrame& frame);
+[[nodiscard]] nlohmann::ordered_json color_json(const bake::Provenance& provenance);
 
 }  // namespace cnerf::exporting

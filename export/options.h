@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "bake/provenance.h"
 #include "src/base/options.h"
 
 namespace cnerf::exporting {
@@ -22,10 +23,15 @@ struct WorldConvention {
   }
 };
 
+/// What every file of a bake says about itself.
+struct Label {
+  bake::Provenance provenance;
+  WorldConvention world;
+};
+
 struct VdbOptions {
   std::string voxel_origin = "center";
   std::string compression = "blosc";
-  bool half = true;
   bool houdini = false;
   bool nvdb = false;
   bool usd = false;
@@ -37,7 +43,6 @@ struct VdbOptions {
     v("voxel_origin", voxel_origin, Choice{"center", "corner"},
       "where a voxel's value sits: center as OpenVDB says, corner as Blender up to 4.4 draws it");
     v("compression", compression, Choice{"blosc", "zip", "none"}, "of the VDB; zip for readers without blosc");
-    v("half", half, "16-bit values, where their range allows it");
     v("houdini", houdini, "also write the colour grid under Houdini's name, Cd");
     v("nvdb", nvdb, "also the same grids as NanoVDB, .nvdb");
     v("usd", usd, "also a .usda with an OpenVDBAsset for each grid");
@@ -46,27 +51,14 @@ struct VdbOptions {
   }
 };
 
-struct ExrOptions {
-  bool mip = false;
-
-  template <typename Visitor>
-  void visit(Visitor&& v) {
-    v("mip", mip, "textures as tiles with mip-map levels, for renderers that page textures");
-  }
-};
-
 struct WebOptions {
   int resolution = 256;
-  std::string density = "r8";
   int photo_side = 640;
-  int photo_quality = 82;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("resolution", resolution, Range{16, 1024}, "voxels along the longest axis, at most those of the bake");
-    v("density", density, Choice{"r8", "r16f"}, "8 bits on a cubic scale, or 16-bit floats");
     v("photo_side", photo_side, Range{0, 8192}, "pixels of a photograph's long side; 0 leaves them out");
-    v("photo_quality", photo_quality, Range{1, 100}, "of JPEG");
   }
 };
 

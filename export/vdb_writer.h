@@ -1,11 +1,11 @@
 #pragma once
-/// Baked voxels -> OpenVDB, as Blender and Houdini read it.
+/// Baked voxels -> OpenVDB, as Blender and Houdini read it, and NanoVDB, as renderers on graphics cards do.
 
 #include <filesystem>
 #include <string>
 
 #include "bake/out_of_core/planes.h"
-#include "export/label.h"
+#include "export/options.h"
 #include "src/base/vec3.h"
 
 namespace cnerf::exporting {
@@ -29,7 +29,14 @@ namespace cnerf::exporting {
 void write_vdb(const bake::VolumePlanes& volume, const std::filesystem::path& path, const VdbOptions& options = {},
                const Label& label = {});
 
+/// The same grids, with the same names, transform and active voxels, as NanoVDB: in 32 bits and not compressed, which
+/// every reader of it knows. The format has no place for text, so the manifest alone says where the colours come from.
+/// The file is whole or not there.
+/// @throws ContractError, OutputError  as write_vdb.
+void write_nvdb(const bake::VolumePlanes& volume, const std::filesystem::path& path, const VdbOptions& options = {},
+                const Label& label = {});
+
 /// Whether `density` of this volume is stored in 16 bits.
-[[nodiscard]] bool density_fits_half(const bake::VolumeStatistics& volume, const VdbOptions& options);
+[[nodiscard]] bool density_fits_half(const bake::VolumeStatistics& volume);
 
 }  // namespace cnerf::exporting

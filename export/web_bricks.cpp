@@ -1,7 +1,5 @@
 #include "export/web_bricks.h"
 
-#include <Imath/half.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -16,7 +14,6 @@ namespace {
 
 constexpr int kSide = kWebBrickSide;
 constexpr double kOpaqueDepth = 24;  ///< optical depth of one voxel that no picture tells from more
-constexpr float kHalfMax = 65504.0f;
 
 std::uint8_t byte_of(float value) {
   return std::uint8_t(std::lround(std::clamp(value, 0.0f, 255.0f)));
@@ -118,8 +115,7 @@ void simplify(std::span<std::uint8_t> plane, const std::vector<Tolerance>& toler
 
 }  // namespace
 
-WebBricks make_web_bricks(const bake::Volume& volume, const std::string& density) {
-  CNERF_CHECK(density == "r8" || density == "r16f", density);
+WebBricks make_web_bricks(const bake::Volume& volume) {
   WebBricks bricks;
   const Vec3i first = lay_out(volume, bricks);
   fill_distances(bricks);
@@ -128,9 +124,8 @@ WebBricks make_web_bricks(const bake::Volume& volume, const std::string& density
 
   for (const bake::Voxel& voxel : volume.voxels) bricks.max_density = std::max<double>(bricks.max_density, voxel.sigma);
   bricks.density_scale = std::min(bricks.max_density, kOpaqueDepth / bricks.voxel_size);
-  const bool half = density == "r16f";
   const std::size_t plane = stored * kWebBrickVoxels;
-  bricks.density.assign(half ? 2 * plane : plane, 0);
+  bricks.density.assign(plane, 0);
   bricks.lab.assign(3 * plane, 128);
   std::vector<Tolerance> tolerances(plane, kGap);
 
@@ -147,13 +142,7 @@ WebBricks make_web_bricks(const bake::Volume& volume, const std::string& density
     if (number < 0) continue;
     const int local = ((v.z % kSide) * kSide + v.y % kSide) * kSide + v.x % kSide;
     const std::size_t at = std::size_t(number) * kWebBrickVoxels + std::size_t(local);
-    if (half) {
-      const std::uint16_t bits = Imath::half(std::min(voxel.sigma, kHalfMax)).bits();
-      bricks.density[at] = std::uint8_t(bits & 255);
-      bricks.density[plane + at] = std::uint8_t(bits >> 8);
-    } else {
-      bricks.density[at] = byte_of(255 * std::cbrt(voxel.sigma / float(bricks.density_scale)));
-    }
+    bricks.density[at] = byte_of(255 * std::cbrt(voxel.sigma / float(bricks.density_scale)));
     const float lightness = lightness_from_luminance(luminance_of(voxel.rgb));
     bricks.lab[at] = byte_of(lightness * 2.55f);
     bricks.lab[plane + at] = byte_of(voxel.a + 128);
@@ -164,7 +153,7 @@ WebBricks make_web_bricks(const bake::Volume& volume, const std::string& density
   simplify(lab.subspan(0, plane), tolerances, &Tolerance::lightness);
   simplify(lab.subspan(plane, plane), tolerances, &Tolerance::ab);
   simplify(lab.subspan(2 * plane, plane), tolerances, &Tolerance::ab);
-  if (!half) simplify(bricks.density, tolerances, &Tolerance::density);
+  simplify(bricks.density, tolerances, &Tolerance::density);
   return bricks;
 }
 

@@ -2,7 +2,6 @@
 /// Baked voxels -> the quantised bricks that the page turns into textures. Plain arrays, no files.
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "bake/volume.h"
@@ -20,10 +19,10 @@ struct WebBricks {
   Vec3i counts{};            ///< bricks along each axis
   std::size_t voxels = 0;    ///< with density
   double max_density = 0;    ///< 1/world unit, of the volume
-  double density_scale = 0;  ///< r8: density = density_scale * (code / 255)^3; beyond it, nothing can be told apart
+  double density_scale = 0;  ///< density = density_scale * (code / 255)^3; beyond it, nothing can be told apart
   /// [counts] 0 = stored; else how many bricks away, along any axis, the nearest stored one is, at most 255.
   std::vector<std::uint8_t> distance;
-  std::vector<std::uint8_t> density;  ///< r8: [N, 512] codes; r16f: [N, 512] low bytes, then [N, 512] high bytes
+  std::vector<std::uint8_t> density;  ///< [N, 512] codes
   /// [3, N, 512]: L* 255 / 100; a + 128; b + 128. Where nothing is, whatever packs best.
   std::vector<std::uint8_t> lab;
 
@@ -31,10 +30,9 @@ struct WebBricks {
 };
 
 /// Values within a code or two of their neighbour's take it: L* changes by 0.6 at most, a and b by 2.5, where more than
-/// a fiftieth of a pixel's light can come from a voxel; its density by 1.5 codes of r8, and 4.5 where it is opaque.
-/// @param density  "r8" or "r16f".
-/// @throws ContractError  when no voxel has density, or on another `density`.
-[[nodiscard]] WebBricks make_web_bricks(const bake::Volume& volume, const std::string& density = "r8");
+/// a fiftieth of a pixel's light can come from a voxel; its density by 1.5 codes, and 4.5 where it is opaque.
+/// @throws ContractError  when no voxel has density.
+[[nodiscard]] WebBricks make_web_bricks(const bake::Volume& volume);
 
 /// Replaces every value of bricks of 8^3 by its difference, modulo 256, to the one before it: along x, at the start of
 /// a row along y, at the start of a layer along z. The first of a brick stays. Neighbours are alike, so this packs

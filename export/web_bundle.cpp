@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "bake/volume/resample.h"
-#include "export/manifest_json.h"
+#include "export/manifest.h"
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -57,13 +59,10 @@ std::size_t copy_page(const fs::path& page, const fs::path& folder) {
   return bytes;
 }
 
-Json volume_json(const WebBricks& bricks, const WebOptions& options) {
-  Json density{{"file", "density.bin"}, {"encoding", options.density}, {"unit", "1/world unit"}};
-  if (options.density == "r8") {
-    density["formula"] = "scale * (code / 255)^3";
-    density["scale"] = bricks.density_scale;
-  }
-  density["max"] = bricks.max_density;
+Json volume_json(const WebBricks& bricks) {
+  const Json density{{"file", "density.bin"},         {"encoding", "r8"},
+                     {"unit", "1/world unit"},        {"formula", "scale * (code / 255)^3"},
+                     {"scale", bricks.density_scale}, {"max", bricks.max_density}};
   const Vec3i n = bricks.counts;
   const double side = bricks.voxel_size * kWebBrickSide;
   const Vec3d end = bricks.origin + Vec3d{n.x * side, n.y * side, n.z * side};
@@ -91,32 +90,16 @@ Json cameras_json(const WebScene& scene) {
   return cameras;
 }
 
-/// Every sixteenth brick.
-std::vector<std::uint8_t> sample_of(const std::vector<std::uint8_t>& bricks) {
-  std::vector<std::uint8_t> sample;
-  for (std::size_t begin = 0; begin < bricks.size(); begin += 16 * kWebBrickVoxels) {
-    sample.insert(sample.end(), bricks.begin() + std::ptrdiff_t(begin),
-                  bricks.begin() + std::ptrdiff_t(begin + kWebBrickVoxels));
-  }
-  to_differences(sample);
-  return sample;
-}
-
-std::size_t packed_size(const std::vector<std::uint8_t>& bricks) {
-  const std::vector<std::uint8_t> sample = sample_of(bricks);
-  return std::size_t(double(gzip(sample).size()) * double(bricks.size()) / double(sample.size()));
+/// Of the page's textures.
+std::size_t graphics_bytes(const WebBricks& bricks) {
+  constexpr std::size_t kTexels = (kWebBrickSide + 2) * (kWebBrickSide + 2) * (kWebBrickSide + 2);  // with neighbours
+  return bricks.stored() * kTexels * (2 + 4) + 4 * bricks.distance.size();
 }
 
 }  // namespace
 
-WebEstimate estimate_web(const WebBricks& bricks) {
-  constexpr std::size_t kTexels = (kWebBrickSide + 2) * (kWebBrickSide + 2) * (kWebBrickSide + 2);  // with neighbours
-  return {packed_size(bricks.density) + packed_size(bricks.lab) + gzip(bricks.distance).size(),
-          bricks.stored() * kTexels * (2 + 4) + 4 * bricks.distance.size()};
-}
-
 WebReport write_web_bundle(const bake::Volume& volume, const WebBricks& bricks, const WebScene& scene,
-                           const fs::path& folder, const fs::path& page, const WebOptions& options) {
+                           const fs::path& folder, const fs::path& page) {
   CNERF_CHECK(scene.photos.empty() || scene.photos.size() == scene.cameras.size(), "one photograph per camera");
   std::error_code ignored;
   fs::remove(folder / kWebManifest, ignored);  // a manifest never names files of another bundle
@@ -149,7 +132,7 @@ WebReport write_web_bundle(const bake::Volume& volume, const WebBricks& bricks, 
                   {"up_axis", scene.label.world.up_axis},
                   {"color", color_json(scene.label.provenance)},
                   {"frame", frame_json(volume.frame)},
-                  {"volume", volume_json(bricks, options)},
+                  {"volume", volume_json(bricks)},
                   {"poster", poster},
                   {"files", files.list()},
                   {"camera_axes", "+X right, +Y down, +Z forward; centre of the first pixel at (0.5, 0.5)"},
@@ -162,17 +145,14 @@ WebReport write_web_bundle(const bake::Volume& volume, const WebBricks& bricks, 
 void write_web(const bake::Volume& volume, const WebScene& scene, const fs::path& folder, const fs::path& page,
                const WebOptions& options, Observer& observer) {
   const bake::Volume small = resample_volume(volume, options.resolution);
-  const WebBricks bricks = make_web_bricks(small, options.density);
-  const WebEstimate estimate = estimate_web(bricks);
+  const WebBricks bricks = make_web_bricks(small);
   const auto mib = [](std::size_t bytes) { return double(bytes) / (1 << 20); };
-  observer.say(
-      fmt::format("web: {} x {} x {} voxels, {} bricks; about {:.1f} MiB to load, {:.0f} MiB of graphics memory",
-                  small.resolution.x, small.resolution.y, small.resolution.z, bricks.stored(),
-                  mib(estimate.download_bytes), mib(estimate.texture_bytes)));
+  observer.say(fmt::format("web: {} x {} x {} voxels, {} bricks; {:.0f} MiB of graphics memory", small.resolution.x,
+                           small.resolution.y, small.resolution.z, bricks.stored(), mib(graphics_bytes(bricks))));
   if (page.empty()) {
     observer.say("note: this cnerf was built without the page (CNERF_VIEWER); the bundle holds data only");
   }
-  const WebReport report = write_web_bundle(small, bricks, scene, folder, page, options);
+  const WebReport report = write_web_bundle(small, bricks, scene, folder, page);
   observer.say(fmt::format("web: {:.2f} MiB of volume, {:.2f} MiB of photographs, {:.0f} KiB of page",
                            mib(report.volume_bytes), mib(report.photo_bytes), double(report.page_bytes) / 1024));
   observer.wrote("web bundle", folder);

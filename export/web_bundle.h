@@ -8,7 +8,6 @@
 
 #include "bake/camera.h"
 #include "bake/volume.h"
-#include "export/label.h"
 #include "export/options.h"
 #include "export/web_bricks.h"
 #include "export/web_pictures.h"
@@ -18,13 +17,6 @@ namespace cnerf::exporting {
 
 inline constexpr int kWebSchema = 1;
 inline constexpr const char* kWebManifest = "bundle.json";
-
-/// How large a bundle will be.
-struct WebEstimate {
-  std::size_t download_bytes = 0;  ///< of the volume, from every sixteenth brick
-  std::size_t texture_bytes = 0;   ///< in the browser's graphics memory
-};
-[[nodiscard]] WebEstimate estimate_web(const WebBricks& bricks);
 
 /// What a bundle says besides the volume.
 struct WebScene {
@@ -48,11 +40,9 @@ struct WebReport {
 /// @param page    folder of the built page; empty = none, the bundle then needs `cnerf view` to be looked at.
 /// @throws ContractError  when photos and cameras disagree in number.  @throws OutputError, MissingInputError.
 WebReport write_web_bundle(const bake::Volume& volume, const WebBricks& bricks, const WebScene& scene,
-                           const std::filesystem::path& folder, const std::filesystem::path& page,
-                           const WebOptions& options);
+                           const std::filesystem::path& folder, const std::filesystem::path& page);
 
-/// The bundle of any volume, which is averaged to `options.resolution` first. The observer hears sizes before and
-/// after.
+/// The bundle of any volume, which is averaged to `options.resolution` first. The observer hears sizes.
 /// @throws as write_web_bundle.
 void write_web(const bake::Volume& volume, const WebScene& scene, const std::filesystem::path& folder,
                const std::filesystem::path& page, const WebOptions& options, Observer& observer);

@@ -6,9 +6,9 @@
 #include <map>
 #include <utility>
 
-#include "bake/color/view_means.h"
+#include "bake/color/point_color.h"
 #include "bake/density/nested.h"
-#include "bake/visibility/select_views.h"
+#include "bake/visibility/view_selection.h"
 #include "src/base/parallel.h"
 
 namespace cnerf::bake {

@@ -10,7 +10,6 @@
 #include "bake/visibility/view_selection.h"
 #include "bake/volume.h"
 #include "bake/volume/bake_volumes.h"
-#include "bake/volume/radiance_pass.h"
 #include "src/base/byte_count.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"

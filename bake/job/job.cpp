@@ -7,7 +7,7 @@
 #include "bake/density/nested.h"
 #include "bake/job/estimate.h"
 #include "bake/mesh/bake_mesh.h"
-#include "bake/visibility/select_views.h"
+#include "bake/visibility/view_selection.h"
 #include "bake/volume/bake_volumes.h"
 #include "bake/volume/dilate.h"
 #include "src/base/byte_count.h"

@@ -9,7 +9,6 @@
 
 #include "bake/camera.h"
 #include "bake/mesh.h"
-#include "bake/mesh/options.h"
 #include "bake/options.h"
 #include "bake/out_of_core/planes.h"
 #include "src/base/observer.h"

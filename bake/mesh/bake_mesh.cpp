@@ -3,8 +3,7 @@
 #include "bake/density/density_pass.h"
 #include "bake/lattice/plan.h"
 #include "bake/mesh/surface/isosurface.h"
-#include "bake/mesh/surface/refine.h"
-#include "bake/mesh/surface/solidify.h"
+#include "bake/mesh/surface/surface_mesh.h"
 #include "bake/mesh/texture/texture_baker.h"
 #include "bake/progress.h"
 #include "src/base/error.h"
@@ -13,6 +12,7 @@ namespace cnerf::bake {
 namespace {
 
 constexpr double kAdaptivity = 0.02;        ///< how far flat parts are merged when the surface is extracted, of 1
+constexpr int kGutter = 2;                  ///< texels around a chart that belong to no other
 constexpr double kDensityShare = 0.25;      ///< of the progress line, when density is baked before
 constexpr double kSurfaceShare = 2.0 / 15;  ///< of the rest
 
@@ -43,17 +43,17 @@ Mesh bake_mesh(const ColorField& field, const std::vector<Camera>& cameras, cons
   const PassProgress progress(sink, "mesh", kDensityShare, 1, "bake stopped: the mesh was not written, run it again");
   const auto& [plan, sigma] = level;
   const SurfaceMesh surface = make_surface(solidified(sigma, cameras, plan, bake), plan, options);
-  const UnwrappedMesh unwrapped = unwrap(surface, options.texture_size, options.gutter);
+  const UnwrappedMesh unwrapped = unwrap(surface, options.texture_size, kGutter);
   progress.report(kSurfaceShare);
 
   Mesh mesh;
   put_into_world(unwrapped, plan, mesh);
-  const TexelShader shader(field, cameras, plan, bake, options.views_per_texel, sigma);
-  mesh.texture = bake_texture(unwrapped, shader, options.gutter,
+  const TexelShader shader(field, cameras, plan, bake, sigma);
+  mesh.texture = bake_texture(unwrapped, shader, kGutter,
                               [&](double share) { progress.report(kSurfaceShare + (1 - kSurfaceShare) * share); });
   mesh.voxel_size = plan.voxel_size;
   mesh.charts = unwrapped.charts;
-  mesh.gutter = options.gutter;
+  mesh.gutter = kGutter;
   mesh.frame = field.frame();
   return mesh;
 }

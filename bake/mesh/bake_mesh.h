@@ -6,7 +6,7 @@
 #include "bake/camera.h"
 #include "bake/density/levels.h"
 #include "bake/mesh.h"
-#include "bake/mesh/options.h"
+#include "bake/options.h"
 #include "src/base/progress.h"
 #include "src/field/color_field.h"
 

@@ -24,7 +24,7 @@ struct Eye {
 /// A point, and what makes a camera see it.
 struct Sight {
   Vec3d world{};            ///< world units
-  float least = 0;          ///< transmittance below which a camera does not count, if above `seen_transmittance`
+  float least = 0;          ///< transmittance below which a camera does not count, if above kSeenTransmittance
   std::uint32_t order = 0;  ///< which order of cameras is tried
 };
 
@@ -53,13 +53,13 @@ struct SightScene {
   int eye_count = 0;
   const SightLevel<Grid>* levels = nullptr;
   int level_count = 0;
-  int views = 0;                 ///< cameras wanted for a point
-  float seen_transmittance = 0;  ///< below which a camera does not see a point
+  int views = 0;  ///< cameras wanted for a point
 };
 
 namespace sight {
 
-inline constexpr float kGoodTransmittance = 0.5f;  ///< a view with less is replaced when a better one is found
+inline constexpr float kSeenTransmittance = 1e-3f;  ///< below which a camera does not see a point
+inline constexpr float kGoodTransmittance = 0.5f;   ///< a view with less is replaced when a better one is found
 inline constexpr int kTriesPerView = 3;  ///< cameras tried for each view wanted, once there are enough dim ones
 
 /// Steps until the ray leaves the brick that starts at `low`, at least one. Rays stay on the lattice of whole steps, so
@@ -152,12 +152,12 @@ template <typename Grid>
 
 /// At most `scene.views` cameras that have the point in their picture and see it, best first.
 /// @param order  [scene.eye_count] cameras as they are worth trying
-/// @param least  transmittance below which a camera does not count, if above `scene.seen_transmittance`
+/// @param least  transmittance below which a camera does not count, if above kSeenTransmittance
 /// @param seen   [scene.views] the answer.  @return how many there are.
 template <typename Grid>
 CNERF_HD int find_seeing(const SightScene<Grid>& scene, int own, Vec3d world, const std::int32_t* order, float least,
                          SeenBy* seen) {
-  least = std::max(least, scene.seen_transmittance);
+  if (least < sight::kSeenTransmittance) least = sight::kSeenTransmittance;
   int count = 0, good = 0, tried = 0;
   for (int turn = 0; turn < scene.eye_count; ++turn) {
     const Eye& eye = scene.eyes[order[turn]];

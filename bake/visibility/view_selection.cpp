@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <numeric>
+#include <string>
 
+#include "src/base/error.h"
 #include "src/base/parallel.h"
 
 namespace cnerf::bake {
@@ -58,13 +60,10 @@ std::vector<DensityLevel> density_levels(std::span<const Level> levels) {
 
 ViewSelection::ViewSelection(const std::vector<Camera>& cameras, std::vector<DensityLevel> levels,
                              const Options& options)
-    : eyes_(eyes_of(cameras)),
-      levels_(std::move(levels)),
-      views_per_voxel_(options.views_per_voxel),
-      seen_transmittance_(float(std::max(options.seen_transmittance, 1e-8))) {}
+    : eyes_(eyes_of(cameras)), levels_(std::move(levels)), views_per_voxel_(options.views_per_voxel) {}
 
 SightScene<BrickGrid<float>> ViewSelection::scene() const {
-  return {eyes_.data(), int(eyes_.size()), levels_.data(), int(levels_.size()), views_per_voxel_, seen_transmittance_};
+  return {eyes_.data(), int(eyes_.size()), levels_.data(), int(levels_.size()), views_per_voxel_};
 }
 
 std::vector<SeenBy> ViewSelection::seen_by(std::size_t level, Vec3d world, std::span<const std::int32_t> order,
@@ -85,6 +84,22 @@ void ViewSelection::find(std::size_t level, const SightBatch& batch, SeenBatch& 
                                      sight.least, answer.seen.data() + i * views_per_voxel_);
     }
   });
+}
+
+std::unique_ptr<ViewSelection> select_views(const std::vector<Camera>& cameras, const std::vector<DensityLevel>& levels,
+                                            const Options& options, [[maybe_unused]] const Engines& engines,
+                                            [[maybe_unused]] Observer& observer) {
+#if CNERF_CUDA_BAKE
+  if (engines.device() == Device::kCuda) {
+    try {
+      return make_view_selection_cuda(cameras, levels, options);
+    } catch (const DeviceError& failure) {
+      observer.say(std::string("bake: the processor works out which cameras see what, which is slower: ") +
+                   failure.what());
+    }
+  }
+#endif
+  return std::make_unique<ViewSelection>(cameras, levels, options);
 }
 
 }  // namespace cnerf::bake

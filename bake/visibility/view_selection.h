@@ -8,6 +8,8 @@
 #include "bake/camera.h"
 #include "bake/density/levels.h"
 #include "bake/visibility/sight_math.h"
+#include "src/base/observer.h"
+#include "src/engine/engines.h"
 
 namespace cnerf::bake {
 
@@ -68,7 +70,17 @@ class ViewSelection {
   std::vector<Eye> eyes_;
   std::vector<DensityLevel> levels_;
   int views_per_voxel_;
-  float seen_transmittance_;
 };
+
+/// Answers on the GPU, which gets a copy of all levels.  @throws DeviceError  when its memory does not suffice.
+[[nodiscard]] std::unique_ptr<ViewSelection> make_view_selection_cuda(const std::vector<Camera>& cameras,
+                                                                      const std::vector<DensityLevel>& levels,
+                                                                      const Options& options);
+/// On the GPU if the engines run there; on the processor where they do, and where the GPU's memory does not suffice,
+/// which the observer is told.
+[[nodiscard]] std::unique_ptr<ViewSelection> select_views(const std::vector<Camera>& cameras,
+                                                          const std::vector<DensityLevel>& levels,
+                                                          const Options& options, const Engines& engines,
+                                                          Observer& observer);
 
 }  // namespace cnerf::bake

@@ -1,14 +1,188 @@
 #include "bake/volume/bake_volumes.h"
 
 #include <algorithm>
+#include <cmath>
+#include <span>
 
+#include "bake/color/point_color.h"
 #include "bake/density/density_pass.h"
 #include "bake/progress.h"
-#include "bake/volume/radiance_pass.h"
+#include "bake/volume/dilate.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
+#include "src/color/colorspace_math.h"
 
 namespace cnerf::bake {
+namespace {
+
+/// Voxels of a brick that may be kept.
+struct Candidates {
+  std::vector<Vec3i> voxels;
+  std::vector<float> sigma;  ///< as it was baked, 1/world unit
+  std::vector<Sight> sights;
+  std::vector<std::int32_t> order;  ///< of cameras, for them all
+};
+
+/// Those that a camera sees, and what is asked of the field for them.
+struct Kept {
+  std::vector<Voxel> voxels;     ///< colours are still missing
+  std::vector<Vec3f> centroids;  ///< unit space
+  ViewMeans means;
+
+  void append(const Kept& others) {
+    voxels.insert(voxels.end(), others.voxels.begin(), others.voxels.end());
+    centroids.insert(centroids.end(), others.centroids.begin(), others.centroids.end());
+    means.append(others.means);
+  }
+};
+
+/// Second pass over one level of a bake. Voxels that no camera sees are left out unless `keep_unseen`. So are those
+/// that give less than `weight_threshold` of a pixel's light (transmittance times opacity) even to the camera that sees
+/// them best. Luminance is the mean over the cameras that see the voxel, weighted by transmittance; where none does,
+/// and everywhere when there are no cameras, over the six axis directions. Light passes through density as it was
+/// baked, but what voxels are given is sharpened. Those fainter than `opacity_threshold` then keep their colour alone,
+/// which is better than that of a neighbour.
+class RadiancePass {
+ public:
+  /// @param levels  all levels of the bake; `level` is the one to bake, the others stand in its light
+  /// @param views   who sees the points of these levels.  All three must outlive this object.
+  RadiancePass(const ColorField& field, const std::vector<Level>& levels, std::size_t level, const ViewSelection& views,
+               const Options& options);
+
+  /// The voxels of a plane of the density pass with their colours, sorted by (i, j, k).
+  /// @throws ContractError  when the field answers a luminance or chromaticity that is not finite.
+  /// @throws DeviceError    as ViewSelection::find.
+  [[nodiscard]] std::vector<Voxel> bake_plane(std::span<const DenseVoxel> dense, int plane) const;
+
+ private:
+  void bake_bricks(std::span<const std::span<const DenseVoxel>> bricks, int plane, std::vector<Voxel>& voxels) const;
+  [[nodiscard]] Kept seen_of(std::span<const std::span<const DenseVoxel>> bricks, int plane) const;
+  [[nodiscard]] Candidates candidates_of(std::span<const DenseVoxel> brick, int plane) const;
+  [[nodiscard]] Kept kept_of(const Candidates& candidates, const SeenBatch& seen, std::size_t first) const;
+
+  const ColorField& field_;
+  const Level& level_;
+  std::size_t level_number_;
+  const ViewSelection& views_;
+  double weight_threshold_;
+  double sharpening_;
+  double faintest_;  ///< density that is kept, 1/world unit
+  bool keep_unseen_;
+};
+
+RadiancePass::RadiancePass(const ColorField& field, const std::vector<Level>& levels, std::size_t level,
+                           const ViewSelection& views, const Options& options)
+    : field_(field),
+      level_(levels[level]),
+      level_number_(level),
+      views_(views),
+      weight_threshold_(options.weight_threshold),
+      sharpening_(options.sharpening),
+      faintest_(faintest_density(options.opacity_threshold, level_.plan.voxel_size)),
+      keep_unseen_(options.keep_unseen || views.eyes().empty()) {}
+
+std::vector<Voxel> RadiancePass::bake_plane(std::span<const DenseVoxel> dense, int plane) const {
+  const std::size_t most = kViewsAtATime / std::size_t(views_.views_per_voxel());
+  std::vector<Voxel> voxels;
+  std::vector<std::span<const DenseVoxel>> bricks;
+  std::size_t waiting = 0;
+  for (std::size_t begin = 0, end = 0; begin < dense.size(); begin = end) {
+    while (end < dense.size() && dense[end].brick == dense[begin].brick) ++end;
+    bricks.push_back(dense.subspan(begin, end - begin));
+    waiting += end - begin;
+    if (waiting < most && end < dense.size()) continue;
+    bake_bricks(bricks, plane, voxels);
+    bricks.clear();
+    waiting = 0;
+  }
+  sort_voxels(voxels);
+  return voxels;
+}
+
+void RadiancePass::bake_bricks(std::span<const std::span<const DenseVoxel>> bricks, int plane,
+                               std::vector<Voxel>& voxels) const {
+  Kept kept = seen_of(bricks, plane);
+  const std::vector<float> luminance = kept.means.luminance(field_);
+  const std::vector<Chromaticity> chromaticity = chromaticity_of(field_, kept.centroids);
+  parallel_ranges(kept.voxels.size(), kBrickVoxels, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      const VoxelColor color = voxel_color(luminance[v], chromaticity[v]);
+      Voxel& voxel = kept.voxels[v];
+      voxel.luminance = luminance_of(color.rgb);
+      voxel.rgb = color.rgb;
+      voxel.a = color.a;
+      voxel.b = color.b;
+    }
+  });
+  voxels.insert(voxels.end(), kept.voxels.begin(), kept.voxels.end());
+}
+
+Kept RadiancePass::seen_of(std::span<const std::span<const DenseVoxel>> bricks, int plane) const {
+  std::vector<Candidates> candidates(bricks.size());
+  parallel_tasks(bricks.size(), [&](std::size_t b) { candidates[b] = candidates_of(bricks[b], plane); });
+  SightBatch batch;
+  std::vector<std::size_t> first;  // sight of each brick
+  for (std::uint32_t b = 0; b < candidates.size(); ++b) {
+    first.push_back(batch.sights.size());
+    for (Sight sight : candidates[b].sights) {
+      sight.order = b;
+      batch.sights.push_back(sight);
+    }
+    batch.orders.insert(batch.orders.end(), candidates[b].order.begin(), candidates[b].order.end());
+  }
+  SeenBatch seen;
+  views_.find(level_number_, batch, seen);
+
+  std::vector<Kept> of_bricks(bricks.size());
+  parallel_tasks(bricks.size(), [&](std::size_t b) { of_bricks[b] = kept_of(candidates[b], seen, first[b]); });
+  Kept kept;
+  for (const Kept& of_brick : of_bricks) kept.append(of_brick);
+  return kept;
+}
+
+Candidates RadiancePass::candidates_of(std::span<const DenseVoxel> brick, int plane) const {
+  constexpr double kHalf = kBrickSide / 2.0;
+  const Plan& plan = level_.plan;
+  const Vec3i brick_min = brick_min_of(plan, plane, brick.front().brick);
+  const Vec3d centre = plan.world_from_voxel(brick_min.cast<double>() + Vec3d{kHalf, kHalf, kHalf});
+  Candidates candidates;
+  candidates.order = try_order(views_.eyes(), centre);
+  for (const DenseVoxel& voxel : brick) {
+    const double opacity = -std::expm1(-voxel.sigma * plan.voxel_size);
+    const auto least = float(weight_threshold_ / opacity);
+    if (least > 1 && !keep_unseen_) continue;
+    const Vec3i at = brick_min + brick_local(voxel.offset);
+    const Vec3d world = plan.world_from_voxel(at.cast<double>() + voxel.centroid_in_voxel());
+    candidates.voxels.push_back(at);
+    candidates.sigma.push_back(voxel.sigma);
+    candidates.sights.push_back({world, keep_unseen_ ? 0 : least});
+  }
+  return candidates;
+}
+
+Kept RadiancePass::kept_of(const Candidates& candidates, const SeenBatch& seen, std::size_t first) const {
+  Kept kept;
+  for (std::size_t c = 0; c < candidates.voxels.size(); ++c) {
+    const std::int32_t count = seen.counts[first + c];
+    if (count == 0 && !keep_unseen_) continue;
+    const Vec3d world = candidates.sights[c].world;
+    const Vec3f unit = field_.frame().unit_from_world(world).cast<float>();
+    const SeenBy* views = seen.seen.data() + (first + c) * std::size_t(views_.views_per_voxel());
+    for (const SeenBy& view : std::span(views, std::size_t(count))) {
+      kept.means.look_along(unit, direction_to(views_.eyes()[view.camera], world), view.transmittance);
+    }
+    if (count == 0) kept.means.look_from_all_sides(unit);
+    kept.means.next_point();
+    kept.centroids.push_back(unit);
+    const Vec3i at = candidates.voxels[c];
+    const float sigma = sharpening_ > 0 ? sharpened_density(level_, at, sharpening_) : candidates.sigma[c];
+    kept.voxels.push_back({at.x, at.y, at.z, sigma < faintest_ ? 0.0f : sigma});
+  }
+  return kept;
+}
+
+}  // namespace
+
 std::vector<VolumePlanes> bake_volumes(const ColorField& field, const ViewSelection& views,
                                        const std::vector<Level>& levels, const Options& options, Journal& journal,
                                        const ProgressSink& sink) {

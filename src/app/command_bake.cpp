@@ -44,7 +44,6 @@ Work declare_bake(CLI::App& app) {
   add_flag_form(app, arguments->run.config, "--nvdb", "vdb.nvdb");
   add_flag_form(app, arguments->run.config, "--usd", "vdb.usd");
   add_flag_form(app, arguments->run.config, "--houdini", "vdb.houdini");
-  add_flag_form(app, arguments->run.config, "--exr-mip", "exr.mip");
   add_short_form(app, arguments->run.config, "--up", "vdb.up");
   add_short_form(app, arguments->run.config, "--voxel-origin", "vdb.voxel_origin");
   add_short_form(app, arguments->run.config, "--web-resolution", "web.resolution");

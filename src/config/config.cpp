@@ -18,6 +18,13 @@ constexpr const char* kOfCompare = "it is one of `cnerf compare` alone";
 const std::vector<RetiredKey>& retired_keys() {
   static const std::vector<RetiredKey> keys{
       {"exr.lab_names", "", "'lab'", "the channels are Lab.L, Lab.a and Lab.b"},
+      {"exr.mip", "", "false", "textures are written as lines; tools of OpenEXR make tiles of them"},
+      {"web.density", "", "'r8'", "density has 8 bits on a cubic scale"},
+      {"web.photo_quality", "", "82", "it is a constant; web.photo_side says how large photographs are"},
+      {"bake.seen_transmittance", "", "0.001", "it is a constant"},
+      {"vdb.half", "", "true", "values have 16 bits, density 32 where 16 do not hold it"},
+      {"mesh.gutter", "", "2", "charts lie two texels apart on each side"},
+      {"mesh.views_per_texel", "", "6", "a texel is averaged over six views"},
       {"mesh.adaptivity", "", "0.02", "flat parts are merged as far as two hundredths"},
       {"mesh.ray_inside", "", "4.0", "a texel's ray ends four voxels inside the surface"},
       {"mesh.ray_outside", "", "2.0", "a texel's ray starts two voxels outside the surface"},

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "bake/mesh/options.h"
 #include "bake/options.h"
 #include "export/options.h"
 #include "src/capture/load_capture.h"
@@ -29,7 +28,6 @@ struct Config {
   exporting::VdbOptions vdb;
   exporting::WorldConvention world;
   cnerf::bake::MeshOptions mesh;
-  exporting::ExrOptions exr;
   exporting::WebOptions web;
   PictureOptions render;
 
@@ -45,7 +43,6 @@ struct Config {
     v.section("vdb", vdb);
     v.section("vdb", world);  // the keys that users know
     v.section("mesh", mesh);
-    v.section("exr", exr);
     v.section("web", web);
     v.section("render", render);
   }

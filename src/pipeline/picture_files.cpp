@@ -5,7 +5,7 @@
 #include <opencv2/videoio.hpp>
 #include <span>
 
-#include "export/exr_writer.h"
+#include "export/texture_writer.h"
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"

@@ -6,7 +6,7 @@
 #include <map>
 #include <tuple>
 
-#include "bake/color/voxel_color.h"
+#include "bake/color/point_color.h"
 #include "bake/density/density_pass.h"
 #include "bake/volume/dilate.h"
 #include "src/base/error.h"

@@ -1,4 +1,4 @@
-#include "bake/density/sharpen.h"
+#include "bake/density/levels.h"
 
 #include <gtest/gtest.h>
 

@@ -73,7 +73,7 @@ TEST_P(MeshBesideVolume, SilhouettesAndColoursAgree) {
   BakeFolder bake(folder.path(), cameras, label);
   const bake::Volume baked = bake_volume(field, cameras, options);
   bake.add_volumes({planes_of(baked)}, "volume", {});
-  bake.add_mesh(bake_mesh(field, cameras, options, mesh_options), "mesh", ExrOptions{});
+  bake.add_mesh(bake_mesh(field, cameras, options, mesh_options), "mesh", true);
   bake.finish();
   for (const char* camera : {"a", "b"}) {
     const std::string look = std::string("--samples 16 --camera ") + camera;
@@ -99,7 +99,7 @@ TEST(BlenderMesh, UsesOfTheMesh) {
   mesh_options.faces = 1000;
   mesh_options.texture_size = 128;
   BakeFolder bake(folder.path(), {camera_at("a", {5, -4, 2}, {2, -1, 0.5}, 64, 48, 130)}, {});
-  bake.add_mesh(bake_mesh(field, {}, options, mesh_options), "mesh", ExrOptions{});
+  bake.add_mesh(bake_mesh(field, {}, options, mesh_options), "mesh", true);
   bake.finish();
   std::ofstream(folder / "check.py")
       << "import bpy\n"

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "bake/visibility/cuda/view_selection_cuda.h"
+#include "bake/visibility/view_selection.h"
 #include "src/base/rng.h"
 #include "src/engine/luminance_engine.h"
 
@@ -47,7 +47,7 @@ TEST(Sights, AreThoseOfTheProcessor) {
   options.views_per_voxel = 5;
   const std::vector<bake::Camera> cameras = cameras_around({16, 16, 16}, 45);
   const bake::ViewSelection cpu(cameras, levels, options);
-  const bake::ViewSelectionCuda cuda(cameras, levels, options);
+  const auto cuda = make_view_selection_cuda(cameras, levels, options);
 
   bake::SightBatch batch;
   SequentialRng rng(9, 2);
@@ -63,7 +63,7 @@ TEST(Sights, AreThoseOfTheProcessor) {
   bake::SeenBatch expected, found;
   for (std::size_t level = 0; level < levels.size(); ++level) {
     cpu.find(level, batch, expected);
-    cuda.find(level, batch, found);
+    cuda->find(level, batch, found);
     // A position rounded otherwise may fall into the next voxel: single points differ, and little.
     double differing = 0, seen = 0, error = 0;
     for (std::size_t i = 0; i < batch.sights.size(); ++i) {

@@ -23,7 +23,7 @@ TEST(Web, ABakeForBrowsersIsABundleWithPhotographs) {
                                            "-o",   bake.string(),       "--web-resolution", "24"};
   const ProgramResult result = cnerf(arguments);
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("graphics memory")) << "the size is estimated";
+  EXPECT_THAT(result.out, HasSubstr("graphics memory")) << "what the browser will need";
   EXPECT_THAT(result.out, HasSubstr("cnerf view")) << "and what to do is said";
   const auto json = nlohmann::json::parse(read_text_file(bake / "web" / "bundle.json"));
   EXPECT_EQ(json.at("cameras").size(), 9u);

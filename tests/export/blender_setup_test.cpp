@@ -1,4 +1,4 @@
-#include "export/blender_setup.h"
+#include "export/bake_folder.h"
 
 #include <gtest/gtest.h>
 

@@ -77,7 +77,7 @@ TEST(ExportedCameras, PointsOfAColmapModelLandOnTheirPixels) {
     cameras.push_back({view.name, view.intrinsics, view.world_from_camera});
   }
   BakeFolder bake(folder / "bake", cameras, {});
-  const GltfFiles files = bake.add_mesh(tetrahedron(), "mesh", {});
+  const GltfFiles files = bake.add_mesh(tetrahedron(), "mesh", false);
   bake.finish();
 
   const BakeManifest manifest = read_manifest(bake.manifest());
@@ -103,7 +103,7 @@ TEST(ExportedCameras, PointsOfAColmapModelLandOnTheirPixels) {
       EXPECT_NEAR(pixel->x, truth.x, kTolerance);
       EXPECT_NEAR(pixel->y, truth.y, kTolerance);
       const PixelPosition straight = colmap_pixel(in_camera, model.parameters, false);
-      const PixelPosition seen = gltf_pixel(*node, gltf.cameras[node->camera], gltf_from_world("z").point(p));
+      const PixelPosition seen = gltf_pixel(*node, gltf.cameras[node->camera], turned_up("z", "y").point(p));
       EXPECT_NEAR(seen.x, straight.x, kTolerance);
       EXPECT_NEAR(seen.y, straight.y, kTolerance);
       ++compared;

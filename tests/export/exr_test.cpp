@@ -1,11 +1,10 @@
-#include "export/exr_writer.h"
+#include "export/texture_writer.h"
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfInputFile.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
-#include <ImfTiledInputFile.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +12,6 @@
 #include <limits>
 
 #include "bake/provenance.h"
-#include "export/texture_writer.h"
 #include "src/base/error.h"
 #include "tests/export/test_meshes.h"
 #include "tests/support/data.h"
@@ -22,18 +20,6 @@ namespace cnerf::exporting::test {
 using namespace cnerf::test;
 namespace {
 namespace fs = std::filesystem;
-
-std::vector<float> read_level(const fs::path& file, const std::string& channel, int level) {
-  Imf::TiledInputFile input(file.c_str());
-  const int width = input.levelWidth(level), height = input.levelHeight(level);
-  std::vector<float> values(std::size_t(width) * height);
-  Imf::FrameBuffer frame;
-  frame.insert(channel, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float),
-                                   sizeof(float) * std::size_t(width)));
-  input.setFrameBuffer(frame);
-  input.readTiles(0, input.numXTiles(level) - 1, 0, input.numYTiles(level) - 1, level);
-  return values;
-}
 
 std::vector<float> read_channel(const fs::path& file, const std::string& channel) {
   Imf::InputFile input(file.c_str());
@@ -89,23 +75,6 @@ TEST(ExrTextures, SayWhatTheyAre) {
     EXPECT_EQ(text_attribute(header, "colorOrigin"), "colour is inferred, by colorizer builtin, take first");
     EXPECT_NE(text_attribute(header, "colorSpace"), "missing");
   }
-}
-
-TEST(ExrWriter, MipMapsAreMeansDownToOnePixel) {
-  const TempDir folder;
-  const int width = 100, height = 70;  // neither powers of two nor whole tiles
-  std::vector<float> values;
-  for (int i = 0; i < width * height; ++i) values.push_back(float(i % width));
-  write_exr(folder / "a.exr", {width, height, {{"Y", values}}, {}}, /*mip=*/true);
-  const Imf::TiledInputFile input((folder / "a.exr").c_str());
-  EXPECT_EQ(input.tileXSize(), 64u);
-  EXPECT_EQ(input.numLevels(), 7) << "100, 50, 25, 12, 6, 3, 1";
-  EXPECT_EQ(read_level(folder / "a.exr", "Y", 0), values);
-  const std::vector<float> half_size = read_level(folder / "a.exr", "Y", 1);
-  ASSERT_EQ(half_size.size(), 50u * 35u);
-  EXPECT_FLOAT_EQ(half_size[0], 0.5f);
-  EXPECT_FLOAT_EQ(half_size[50 + 7], 14.5f);
-  EXPECT_EQ(read_level(folder / "a.exr", "Y", 6).size(), 1u);
 }
 
 TEST(ExrWriter, LargeValuesFitIntoHalfAndBrokenOnesAreRefused) {

@@ -105,7 +105,7 @@ TEST(Gltf, CamerasLookWhereTheCaptureDid) {
       EXPECT_EQ(node.name, camera.name);
       const Vec3d q{node.rotation[0], node.rotation[1], node.rotation[2]};
       const auto turned = [&](Vec3d v) { return v + (cross(q, cross(q, v) + v * node.rotation[3])) * 2.0; };
-      const Mat3d rotation = gltf_from_world(up).linear;
+      const Mat3d rotation = turned_up(up, "y").linear;
       const Vec3d forward = rotation * camera.world_from_camera.linear.column(2);
       const Vec3d down = rotation * camera.world_from_camera.linear.column(1);
       EXPECT_NEAR(length(turned({0, 0, -1}) - forward), 0, 1e-12);
@@ -120,7 +120,7 @@ TEST(Gltf, UpTurnsToYByARotation) {
   const Vec3d axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   const char* names[3] = {"x", "y", "z"};
   for (int axis = 0; axis < 3; ++axis) {
-    const Affined map = gltf_from_world(names[axis]);
+    const Affined map = turned_up(names[axis], "y");
     EXPECT_EQ(map.direction(axes[axis]), (Vec3d{0, 1, 0}));
     EXPECT_EQ(map.linear.determinant(), 1);
     EXPECT_EQ(map.linear * map.linear.transposed(), Mat3d::identity());
@@ -151,7 +151,7 @@ TEST(BakeFolder, TheManifestNamesEverythingThatWasWritten) {
   BakeFolder bake(folder.path(), two_cameras(), label_of_first("y", "metres"));
   const bake::Volume volume = block_volume({4, 5, 6}, {12, 13, 14}, 2);
   bake.add_volumes({planes_of(volume)}, "volume", {});
-  bake.add_mesh(tetrahedron(), "mesh", ExrOptions{});
+  bake.add_mesh(tetrahedron(), "mesh", true);
   bake.finish();
   const BakeManifest manifest = read_manifest(bake.manifest());
   std::size_t others = 0;
@@ -167,7 +167,7 @@ TEST(BakeFolder, TheManifestNamesEverythingThatWasWritten) {
   EXPECT_EQ(manifest.mesh->faces, 4u);
   EXPECT_EQ(manifest.mesh->bounds.min, (Vec3d{1, 2, 3}));
   EXPECT_EQ(manifest.mesh->bounds.max, (Vec3d{2, 4, 6}));
-  EXPECT_EQ(manifest.mesh->gltf_from_world, gltf_from_world("y"));
+  EXPECT_EQ(manifest.mesh->gltf_from_world, turned_up("y", "y"));
   EXPECT_EQ(manifest.label.world.units, "metres");
   const auto json = nlohmann::json::parse(read_text_file(bake.manifest()));
   EXPECT_EQ(json["mesh"]["textures"]["rgb"]["space"], "lin_rec709");

@@ -1,4 +1,4 @@
-#include "export/nvdb_writer.h"
+#include "export/vdb_writer.h"
 
 #include <gtest/gtest.h>
 #include <nanovdb/util/IO.h>

@@ -53,7 +53,7 @@ TEST(GltfValidator, ABakedMeshHasNoErrorsAndNoWarnings) {
   mesh_options.texture_size = 200;  // not a power of two
   const bake::Mesh mesh = bake_mesh(field, cameras, options, mesh_options);
   BakeFolder bake(folder.path(), cameras, {{"reference:\"a\".png", "first", {"cnerf", "bake"}}, {}});
-  const GltfFiles files = bake.add_mesh(mesh, "mesh", ExrOptions{});
+  const GltfFiles files = bake.add_mesh(mesh, "mesh", true);
   EXPECT_EQ(validate({files.gltf, files.glb}, folder / "log"), 0) << read_text_file(folder / "log");
 }
 
@@ -62,7 +62,7 @@ TEST(GltfValidator, NoticesWhatIsWrong) {
   CNERF_REQUIRE_VALIDATOR();
   const TempDir folder;
   BakeFolder bake(folder.path(), {}, {});
-  const GltfFiles files = bake.add_mesh(tetrahedron(), "mesh", ExrOptions{});
+  const GltfFiles files = bake.add_mesh(tetrahedron(), "mesh", true);
   EXPECT_EQ(validate({files.gltf, files.glb}, folder / "log"), 0) << read_text_file(folder / "log");
   std::string text = read_text_file(files.gltf);
   const std::size_t maximum = text.find("\"max\"");

@@ -44,7 +44,7 @@ struct Written {
     const WebPhoto photo = make_web_photo(camera().intrinsics, std::vector<float>(64 * 48, 0.25f), 32, 80);
     report =
         write_web_bundle(volume, bricks, {"block", {camera()}, {photo}, exporting::test::label_of_first("y", "metres")},
-                         folder.path(), page, {});
+                         folder.path(), page);
     json = Json::parse(read_text_file(report.manifest));
   }
 };
@@ -63,22 +63,6 @@ TEST(WebBundle, ListsWhatItWroteWithChecksums) {
   std::vector<std::uint8_t> density = written.bricks.density;
   to_differences(density);
   EXPECT_EQ(unpacked(read_binary_file(written.folder / "density.bin")), density);
-}
-
-TEST(WebBundle, ItsSizeIsEstimatedWell) {
-  bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {80, 80, 80}, 9);
-  for (bake::Voxel& voxel : volume.voxels) {
-    // Noise that does not repeat: what does packs better the more of it there is.
-    auto h = std::uint32_t((voxel.i * 80 + voxel.j) * 80 + voxel.k) * 2654435761u;
-    h = (h ^ h >> 15) * 2246822519u;
-    h = (h ^ h >> 13) * 3266489917u;
-    voxel.sigma = 1 + float((h ^ h >> 16) % 97);
-  }
-  const WebBricks bricks = make_web_bricks(volume);
-  const cnerf::test::TempDir folder;
-  const WebReport report = write_web_bundle(volume, bricks, {}, folder.path(), {}, {});
-  const double estimate = double(estimate_web(bricks).download_bytes);
-  EXPECT_NEAR(estimate / double(report.volume_bytes), 1, 0.25);
 }
 
 TEST(WebBundle, SaysFrameCamerasAndOriginOfTheColour) {
@@ -139,11 +123,11 @@ TEST(WebBundle, RefusesWhatDoesNotFit) {
   const cnerf::test::TempDir folder, empty;
   const bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {2, 2, 2}, 9);
   const WebBricks bricks = make_web_bricks(volume);
-  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {{}, {}}, {}}, folder.path(), {}, {}), ContractError);
-  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {}, {}}, folder.path(), empty.path(), {}),
+  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {{}, {}}, {}}, folder.path(), {}), ContractError);
+  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {}, {}}, folder.path(), empty.path()),
                MissingInputError);
   EXPECT_FALSE(fs::exists(folder / "bundle.json")) << "the manifest comes last";
-  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {}, {}}, "/proc/nowhere", {}, {}), OutputError);
+  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {}, {}}, "/proc/nowhere", {}), OutputError);
 }
 
 }  // namespace

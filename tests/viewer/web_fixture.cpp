@@ -97,11 +97,7 @@ void write_small(const fs::path& folder) {
     photos.push_back(make_web_photo(each.intrinsics, luminance, 160, 90));
   }
   const WebScene scene{"ball", cameras, photos, {{"reference:a.png", "warm", {"cnerf", "bake"}}, {"metres"}}};
-  for (const char* density : {"r8", "r16f"}) {
-    WebOptions options;
-    options.density = density;
-    write_web_bundle(volume, make_web_bricks(volume, density), scene, folder / density, {}, options);
-  }
+  write_web_bundle(volume, make_web_bricks(volume), scene, folder / "r8", {});
   bake::Volume padded = volume;
   dilate_colors(padded, 3);
   write_expected(folder / "expected.json", padded, cameras);
@@ -111,12 +107,10 @@ void write_of_bake(const fs::path& folder, const fs::path& bake, int resolution)
   const BakeManifest manifest = read_manifest(bake / "manifest.json");
   const bake::Volume volume = resample_volume(read_vdb(bake / manifest.volume->file), resolution);
   const WebBricks bricks = make_web_bricks(volume);
-  const WebEstimate estimate = estimate_web(bricks);
   const WebScene scene{bake.filename().string(), manifest.cameras, {}, manifest.label};
-  const WebReport report = write_web_bundle(volume, bricks, scene, folder, {}, {});
-  std::printf("%zu voxels, %zu bricks, %.2f MiB (estimated %.2f), textures %.1f MiB\n", bricks.voxels, bricks.stored(),
-              double(report.volume_bytes) / (1 << 20), double(estimate.download_bytes) / (1 << 20),
-              double(estimate.texture_bytes) / (1 << 20));
+  const WebReport report = write_web_bundle(volume, bricks, scene, folder, {});
+  std::printf("%zu voxels, %zu bricks, %.2f MiB\n", bricks.voxels, bricks.stored(),
+              double(report.volume_bytes) / (1 << 20));
 }
 
 }  // namespace

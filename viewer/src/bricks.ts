@@ -43,19 +43,11 @@ export function halfBits(value: number): number {
   }
   return mantissa < 1024 ? mantissa : ((e + 15) << 10) | (mantissa - 1024);
 }
-export function halfValue(bits: number): number {
-  const exponent = (bits >> 10) & 31;
-  const mantissa = bits & 1023;
-  return exponent === 0 ? (mantissa / 1024) * 2 ** -14 : (1 + mantissa / 1024) * 2 ** (exponent - 15);
-}
 
-/** Optical depth of a voxel, as a half float, by code (r8) or by half float of the density (r16f). */
+/** Optical depth of a voxel, as a half float, by code. */
 export function opticalTable(bundle: Bundle): Uint16Array {
   const { density, voxelSize } = bundle.volume;
-  if (density.encoding === "r8") {
-    return Uint16Array.from({ length: 256 }, (_, code) => halfBits(density.scale * (code / 255) ** 3 * voxelSize));
-  }
-  return Uint16Array.from({ length: 65536 }, (_, bits) => halfBits(halfValue(bits & 0x7fff) * voxelSize));
+  return Uint16Array.from({ length: 256 }, (_, code) => halfBits(density.scale * (code / 255) ** 3 * voxelSize));
 }
 
 /** Bricks along each axis of a box that is as near to a cube as it gets. */
@@ -71,10 +63,9 @@ export function atlasCounts(bricks: number, limit: number): Vec3 | null {
  * @throws BundleError  when the parts contradict each other, or the volume does not fit.
  */
 export function makeAtlas(bundle: Bundle, packed: Packed, maxTexture: number): Atlas {
-  const { bricks, storedBricks, density } = bundle.volume;
+  const { bricks, storedBricks } = bundle.volume;
   const [nx, ny, nz] = bricks;
   const cells = nx * ny * nz;
-  const planes = density.encoding === "r16f" ? 2 : 1;
   const plane = storedBricks * voxelsOfBrick;
   const stored: number[] = [];
   const numbers = new Int32Array(cells).fill(-1);
@@ -84,7 +75,7 @@ export function makeAtlas(bundle: Bundle, packed: Packed, maxTexture: number): A
   if (packed.occupancy.length !== cells || stored.length !== storedBricks) {
     throw new BundleError("occupancy.bin: does not fit bundle.json: it was written by another bake");
   }
-  if (packed.density.length !== planes * plane || packed.color.length !== 3 * plane) {
+  if (packed.density.length !== plane || packed.color.length !== 3 * plane) {
     throw new BundleError("density.bin, color.bin: do not fit bundle.json: they were written by another bake");
   }
   const limit = Math.min(255, Math.floor(maxTexture / brickTexels));
@@ -145,7 +136,7 @@ export function makeAtlas(bundle: Bundle, packed: Packed, maxTexture: number): A
           let at: number;
           if (from >= 0) {
             at = from * voxelsOfBrick + ((z & 7) << 6) + ((y & 7) << 3) + (x & 7);
-            result.density[to] = table[planes === 1 ? source[at] : source[at] | (source[plane + at] << 8)];
+            result.density[to] = table[source[at]];
           } else {
             // Nothing is there: no density; the colour of the voxel beside it.
             const clampTo = (v: number) => (v < 0 ? 0 : v > 7 ? 7 : v);

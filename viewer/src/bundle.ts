@@ -35,7 +35,7 @@ export interface Bundle {
     bricks: Vec3;
     storedBricks: number;
     voxels: number;
-    density: { encoding: "r8" | "r16f"; scale: number; max: number };
+    density: { scale: number; max: number };
   };
   poster: string | null;
   files: Map<string, BundleFile>;
@@ -111,7 +111,7 @@ export function parseBundle(source: string): Bundle {
   const volume = object(json, "volume");
   const density = object(volume, "density");
   const encoding = text(density, "encoding");
-  if (encoding !== "r8" && encoding !== "r16f") fail("volume.density.encoding", `expected r8 or r16f, found ${encoding}`);
+  if (encoding !== "r8") fail("volume.density.encoding", `expected r8, found ${encoding}`);
   if (number(volume, "brick_side") !== 8) fail("volume.brick_side", "this page reads bricks of 8");
   const color = object(json, "color");
   const files = new Map<string, BundleFile>();
@@ -140,7 +140,7 @@ export function parseBundle(source: string): Bundle {
       bricks,
       storedBricks: number(volume, "stored_bricks", true),
       voxels: number(volume, "voxels"),
-      density: { encoding, scale: encoding === "r8" ? number(density, "scale", true) : 1, max: number(density, "max") },
+      density: { scale: number(density, "scale", true), max: number(density, "max") },
     },
     poster: poster ? text(poster, "file") : null,
     files,

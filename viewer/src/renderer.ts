@@ -383,27 +383,6 @@ export class Renderer {
     return result;
   }
 
-  /** Milliseconds of one frame at full resolution, as while moving: the median of several. */
-  async measure(width: number, height: number, frames = 5): Promise<number> {
-    const target = this.target(null, width, height);
-    const times: number[] = [];
-    const pixel = new Uint8Array(16);
-    for (let i = 0; i <= frames; ++i) {
-      const begin = performance.now();
-      this.bindMarch(target, stepMoving, [0.5, 0.5], 0.5, 1 / 128);
-      this.draw();
-      const bytes = this.target(null, 1, 1, true);
-      this.gl.bindFramebuffer(this.gl.FRAMEBUFFER, bytes.framebuffer);
-      this.displayTo(target, 1, 1, "#000000");
-      this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, pixel);  // waits for all of it
-      this.free(bytes);
-      if (i > 0) times.push(performance.now() - begin);  // the first compiles
-    }
-    this.free(target);
-    times.sort((a, b) => a - b);
-    return times[Math.floor(times.length / 2)];
-  }
-
   private drained(): Promise<void> {
     const { gl } = this;
     const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0)!;

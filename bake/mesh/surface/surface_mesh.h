@@ -1,5 +1,6 @@
 #pragma once
-/// A triangle mesh while it is being made: shared vertices, no normals, no texture.
+/// A triangle mesh while it is being made: shared vertices, no normals, no texture. And what makes the raw surface of a
+/// density one worth texturing.
 
 #include <cstdint>
 #include <vector>
@@ -38,5 +39,18 @@ void compact(SurfaceMesh& mesh);
 
 /// Splits a mesh into parts that share no vertex, each in the order of its first triangle.
 [[nodiscard]] std::vector<SurfaceMesh> connected_parts(const SurfaceMesh& mesh);
+
+/// Drops parts that share no vertex with the rest and whose bounding box is small, and the walls of closed cavities,
+/// which nobody outside can see.
+/// @param smallest  diagonal of a part's box, as a share of the diagonal of the whole mesh's. The largest part stays.
+[[nodiscard]] SurfaceMesh without_loose_parts(const SurfaceMesh& mesh, double smallest);
+
+/// Taubin 1995: a shrinking and a growing step of Laplacian smoothing each round, so that steps between voxels go and
+/// the volume stays.
+void smooth(SurfaceMesh& mesh, int rounds);
+
+/// At most about `faces` triangles by edge collapses (meshoptimizer), keeping topology; a mesh that cannot be reduced
+/// further without losing it keeps more.
+[[nodiscard]] SurfaceMesh decimated(const SurfaceMesh& mesh, int faces);
 
 }  // namespace cnerf::bake

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bake/color/view_means.h"
+#include "bake/color/point_color.h"
 #include "src/base/check.h"
 
 namespace cnerf::bake {
@@ -15,9 +15,10 @@ constexpr double kSamplesPerVoxel = 4;
 constexpr float kLeastTransmittance = 0.01f;  ///< a ray ends below this
 constexpr float kLeastWeight = 1e-3f;         ///< of a sample, to be looked up
 constexpr float kLeastCosine = 0.05f;         ///< a view that looks along the surface still counts a little
+constexpr int kViewsOfTexel = 6;              ///< that it is averaged over, at most
 
-Options with_views(Options bake, int views) {
-  bake.views_per_voxel = views;
+Options with_views(Options bake) {
+  bake.views_per_voxel = kViewsOfTexel;
   return bake;
 }
 
@@ -39,11 +40,11 @@ struct TexelShader::View {
 };
 
 TexelShader::TexelShader(const ColorField& field, const std::vector<Camera>& cameras, const Plan& plan,
-                         const Options& bake, int views_per_texel, const BrickGrid<float>& sigma)
+                         const Options& bake, const BrickGrid<float>& sigma)
     : field_(field),
       plan_(plan),
       sigma_(sigma),
-      views_(cameras, {{&sigma, plan.origin, plan.voxel_size}}, with_views(bake, views_per_texel)) {}
+      views_(cameras, {{&sigma, plan.origin, plan.voxel_size}}, with_views(bake)) {}
 
 std::vector<TexelShader::Sample> TexelShader::samples_along_rays(std::span<const SurfacePoint> points,
                                                                  std::vector<SurfaceColor>& colors) const {
@@ -118,14 +119,12 @@ std::vector<SurfaceColor> TexelShader::shade(std::span<const SurfacePoint> point
     means.next_point();
   }
   const std::vector<float> luminance = means.luminance(field_);
-  std::vector<Chromaticity> chromaticity(samples.size());
-  field_.query_chromaticity(positions, chromaticity);
+  const std::vector<Chromaticity> chromaticity = chromaticity_of(field_, positions);
 
   std::vector<Vec3d> light(points.size());  // XYZ relative to white, times opacity
   for (std::size_t s = 0; s < samples.size(); ++s) {
     const double y = double(luminance[s]) * samples[s].weight;
     const Chromaticity& c = chromaticity[s];
-    CNERF_CHECK(std::isfinite(c.x) && std::isfinite(c.z), "the field answered a chromaticity that is not finite");
     light[samples[s].point] += Vec3d{y * c.x, y, y * c.z};
   }
   for (std::size_t p = 0; p < points.size(); ++p) {

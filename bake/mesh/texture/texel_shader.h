@@ -29,7 +29,7 @@ class TexelShader {
  public:
   /// All references have to outlive the shader.
   TexelShader(const ColorField& field, const std::vector<Camera>& cameras, const Plan& plan, const Options& bake,
-              int views_per_texel, const BrickGrid<float>& sigma);
+              const BrickGrid<float>& sigma);
 
   /// Thread-safe. Points that lie close together are answered faster in one call.
   /// @throws ContractError  when the field answers something that is not finite.

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "bake/mesh/uv/planar_triangles.h"
+#include "bake/mesh/uv/uv_charts.h"
 
 namespace cnerf::bake {
 

@@ -24,8 +24,8 @@ std::vector<std::vector<PlanarTriangle>> projected(const SurfaceMesh& mesh, cons
 
 }  // namespace
 
-UnwrappedMesh unwrap(const SurfaceMesh& mesh, int size, int gutter, const ChartOptions& options) {
-  const std::vector<UvChart> charts = make_charts(mesh, options);
+UnwrappedMesh unwrap(const SurfaceMesh& mesh, int size, int gutter) {
+  const std::vector<UvChart> charts = make_charts(mesh);
   const Atlas atlas = pack_charts(projected(mesh, charts), size, gutter);
   const std::vector<Vec3f> normals = vertex_normals(mesh);
 

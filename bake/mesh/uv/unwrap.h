@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "bake/mesh/surface/surface_mesh.h"
-#include "bake/mesh/uv/planar_triangles.h"
 #include "bake/mesh/uv/uv_charts.h"
 
 namespace cnerf::bake {
@@ -26,6 +25,6 @@ struct UnwrappedMesh {
 
 /// Charts and packing in one. Triangles without area are left out.
 /// @throws UsageError  when the charts do not go into a texture of this size, see pack_charts.
-[[nodiscard]] UnwrappedMesh unwrap(const SurfaceMesh& mesh, int size, int gutter, const ChartOptions& options = {});
+[[nodiscard]] UnwrappedMesh unwrap(const SurfaceMesh& mesh, int size, int gutter);
 
 }  // namespace cnerf::bake

@@ -11,6 +11,29 @@
 namespace cnerf::bake {
 namespace {
 
+PlanarTriangle shrunk(const PlanarTriangle& t) {
+  constexpr float kShrink = 1e-3f;
+  const Point2 middle = (t[0] + t[1] + t[2]) * (1.0f / 3);
+  PlanarTriangle result;
+  for (int corner = 0; corner < 3; ++corner) result[corner] = t[corner] + (middle - t[corner]) * kShrink;
+  return result;
+}
+
+/// Whether an edge of `a` has all of `b` on its far side (separating axis theorem).
+bool an_edge_separates(const PlanarTriangle& a, const PlanarTriangle& b) {
+  for (int corner = 0; corner < 3; ++corner) {
+    const Point2 edge = a[(corner + 1) % 3] - a[corner];
+    Point2 outward{edge.y, -edge.x};
+    if (dot(outward, a[(corner + 2) % 3] - a[corner]) > 0) outward = outward * -1.0f;
+    const auto is_beyond = [&](Point2 p) { return dot(outward, p - a[corner]) >= 0; };
+    if (is_beyond(b[0]) && is_beyond(b[1]) && is_beyond(b[2])) return true;
+  }
+  return false;
+}
+
+constexpr float kGrowDegrees = 60;  ///< a chart grows over faces whose normal is within this of its own
+constexpr float kMergeDegrees =
+    80;  ///< one that fits into a neighbour within this is merged: fewer seams, more stretch
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 float cosine_of_degrees(float degrees) {
@@ -62,8 +85,8 @@ struct Patch {
 
 class ChartMaker {
  public:
-  ChartMaker(const SurfaceMesh& mesh, const ChartOptions& options)
-      : mesh_(mesh), options_(options), neighbours_(face_neighbours(mesh)), patch_of_(mesh.triangles.size(), kNone) {
+  explicit ChartMaker(const SurfaceMesh& mesh)
+      : mesh_(mesh), neighbours_(face_neighbours(mesh)), patch_of_(mesh.triangles.size(), kNone) {
     double area = 0;
     for (const Triangle& t : mesh.triangles) {
       const Vec3f vector = area_vector(mesh, t);
@@ -96,7 +119,7 @@ class ChartMaker {
 
   /// Faces around a seed, those nearest to the patch's mean normal first.
   [[nodiscard]] std::vector<std::uint32_t> grown_from(std::uint32_t seed) const {
-    const float least_cosine = cosine_of_degrees(options_.grow_degrees);
+    const float least_cosine = cosine_of_degrees(kGrowDegrees);
     using Candidate = std::pair<float, std::uint32_t>;  // cosine when it was found
     std::priority_queue<Candidate> front;
     std::vector<std::uint32_t> faces;
@@ -125,7 +148,7 @@ class ChartMaker {
   }
 
   [[nodiscard]] bool faces_plane(std::uint32_t face, const ChartPlane& plane) const {
-    return dot(normals_[face], plane.normal()) >= cosine_of_degrees(options_.merge_degrees);
+    return dot(normals_[face], plane.normal()) >= cosine_of_degrees(kMergeDegrees);
   }
 
   /// Lays faces into one plane; those that would overlap stay free for later patches.
@@ -222,7 +245,6 @@ class ChartMaker {
   }
 
   const SurfaceMesh& mesh_;
-  ChartOptions options_;
   std::vector<std::array<std::uint32_t, 3>> neighbours_;
   std::vector<std::uint32_t> patch_of_;
   std::vector<float> areas_;
@@ -233,8 +255,42 @@ class ChartMaker {
 
 }  // namespace
 
-std::vector<UvChart> make_charts(const SurfaceMesh& mesh, const ChartOptions& options) {
-  return ChartMaker(mesh, options).make();
+bool overlap(const PlanarTriangle& a, const PlanarTriangle& b) {
+  const PlanarTriangle small_a = shrunk(a), small_b = shrunk(b);
+  return !an_edge_separates(small_a, small_b) && !an_edge_separates(small_b, small_a);
+}
+
+PlanarTriangles::Buckets PlanarTriangles::buckets_of(const PlanarTriangle& t) const {
+  const auto bucket = [&](float value) { return std::int32_t(std::floor(value / cell_)); };
+  return {bucket(std::min({t[0].x, t[1].x, t[2].x})), bucket(std::min({t[0].y, t[1].y, t[2].y})),
+          bucket(std::max({t[0].x, t[1].x, t[2].x})), bucket(std::max({t[0].y, t[1].y, t[2].y}))};
+}
+
+bool PlanarTriangles::fits(const PlanarTriangle& triangle) const {
+  const Buckets range = buckets_of(triangle);
+  for (std::int32_t x = range.x0; x <= range.x1; ++x) {
+    for (std::int32_t y = range.y0; y <= range.y1; ++y) {
+      const auto bucket = buckets_.find(key(x, y));
+      if (bucket == buckets_.end()) continue;
+      for (const std::uint32_t other : bucket->second) {
+        if (overlap(triangle, triangles_[other])) return false;
+      }
+    }
+  }
+  return true;
+}
+
+void PlanarTriangles::add(const PlanarTriangle& triangle) {
+  const auto index = std::uint32_t(triangles_.size());
+  triangles_.push_back(triangle);
+  const Buckets range = buckets_of(triangle);
+  for (std::int32_t x = range.x0; x <= range.x1; ++x) {
+    for (std::int32_t y = range.y0; y <= range.y1; ++y) buckets_[key(x, y)].push_back(index);
+  }
+}
+
+std::vector<UvChart> make_charts(const SurfaceMesh& mesh) {
+  return ChartMaker(mesh).make();
 }
 
 }  // namespace cnerf::bake

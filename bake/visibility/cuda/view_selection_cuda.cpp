@@ -1,9 +1,9 @@
-#include "bake/visibility/cuda/view_selection_cuda.h"
-
 #include <algorithm>
+#include <memory>
 #include <mutex>
 
 #include "bake/visibility/cuda/sight_kernel.h"
+#include "bake/visibility/view_selection.h"
 #include "src/base/check.h"
 #include "src/base/cuda/device_memory.h"
 #include "src/base/parallel.h"
@@ -43,63 +43,71 @@ LevelMemory uploaded_bricks(const BrickGrid<float>& sigma) {
   return memory;
 }
 
-}  // namespace
+/// ViewSelection for many points at once.
+class ViewSelectionCuda final : public ViewSelection {
+ public:
+  ViewSelectionCuda(const std::vector<Camera>& cameras, std::vector<DensityLevel> levels, const Options& options);
+  void find(std::size_t level, const SightBatch& batch, SeenBatch& answer) const override;
 
-struct ViewSelectionCuda::Memory {
-  std::vector<LevelMemory> bricks;
-  DeviceBuffer<DeviceBricks> grids;
-  DeviceBuffer<SightLevel<DeviceBricks>> levels;
-  DeviceBuffer<Eye> eyes;
-  SightScene<DeviceBricks> scene;
+ private:
+  std::vector<LevelMemory> bricks_;
+  DeviceBuffer<DeviceBricks> grids_;
+  DeviceBuffer<SightLevel<DeviceBricks>> levels_;
+  DeviceBuffer<Eye> eyes_;
+  SightScene<DeviceBricks> scene_;
   // Of a question.
-  std::mutex mutex;
-  DeviceBuffer<Sight> sights;
-  DeviceBuffer<std::int32_t> orders, counts;
-  DeviceBuffer<SeenBy> seen;
+  mutable std::mutex mutex_;
+  mutable DeviceBuffer<Sight> sights_;
+  mutable DeviceBuffer<std::int32_t> orders_, counts_;
+  mutable DeviceBuffer<SeenBy> seen_;
 };
 
 ViewSelectionCuda::ViewSelectionCuda(const std::vector<Camera>& cameras, std::vector<DensityLevel> levels,
                                      const Options& options)
-    : ViewSelection(cameras, std::move(levels), options), memory_(std::make_unique<Memory>()) {
-  Memory& m = *memory_;
+    : ViewSelection(cameras, std::move(levels), options) {
   const SightScene<BrickGrid<float>> host = scene();
   std::vector<DeviceBricks> grids;
   for (int i = 0; i < host.level_count; ++i) {
     const BrickGrid<float>& sigma = *host.levels[i].sigma;
     CNERF_CHECK(sigma.min() == Vec3i{}, "the lattice of a bake starts at 0");
-    const LevelMemory& bricks = m.bricks.emplace_back(uploaded_bricks(sigma));
+    const LevelMemory& bricks = bricks_.emplace_back(uploaded_bricks(sigma));
     grids.push_back({bricks.numbers.data(), bricks.values.data(), sigma.size(), sigma.brick_counts()});
   }
-  m.grids = uploaded(grids, kAdvice);
+  grids_ = uploaded(grids, kAdvice);
   std::vector<SightLevel<DeviceBricks>> on_device;
   for (int i = 0; i < host.level_count; ++i) {
-    on_device.push_back({m.grids.data() + i, host.levels[i].origin, host.levels[i].voxel_size});
+    on_device.push_back({grids_.data() + i, host.levels[i].origin, host.levels[i].voxel_size});
   }
-  m.levels = uploaded(on_device, kAdvice);
-  m.eyes = uploaded(eyes(), kAdvice);
-  m.scene = {m.eyes.data(), host.eye_count, m.levels.data(), host.level_count, host.views, host.seen_transmittance};
+  levels_ = uploaded(on_device, kAdvice);
+  eyes_ = uploaded(eyes(), kAdvice);
+  scene_ = {eyes_.data(), host.eye_count, levels_.data(), host.level_count, host.views};
 }
-
-ViewSelectionCuda::~ViewSelectionCuda() = default;
 
 void ViewSelectionCuda::find(std::size_t level, const SightBatch& batch, SeenBatch& answer) const {
   const std::size_t count = batch.sights.size(), views = std::size_t(views_per_voxel());
   answer.seen.resize(count * views);
   answer.counts.resize(count);
-  Memory& m = *memory_;
-  const std::lock_guard lock(m.mutex);
-  m.sights.reserve(count, kPointAdvice);
-  m.counts.reserve(count, kPointAdvice);
-  m.seen.reserve(count * views, kPointAdvice);
-  m.orders.reserve(batch.orders.size(), kPointAdvice);
-  m.sights.upload(batch.sights.data(), count, nullptr);
-  m.orders.upload(batch.orders.data(), batch.orders.size(), nullptr);
+  const std::lock_guard lock(mutex_);
+  sights_.reserve(count, kPointAdvice);
+  counts_.reserve(count, kPointAdvice);
+  seen_.reserve(count * views, kPointAdvice);
+  orders_.reserve(batch.orders.size(), kPointAdvice);
+  sights_.upload(batch.sights.data(), count, nullptr);
+  orders_.upload(batch.orders.data(), batch.orders.size(), nullptr);
   find_seeing_all(
-      {m.scene, int(level), m.sights.data(), m.orders.data(), std::uint32_t(count), m.seen.data(), m.counts.data()},
+      {scene_, int(level), sights_.data(), orders_.data(), std::uint32_t(count), seen_.data(), counts_.data()},
       nullptr);
-  m.counts.download(answer.counts.data(), count, nullptr);
-  m.seen.download(answer.seen.data(), count * views, nullptr);
+  counts_.download(answer.counts.data(), count, nullptr);
+  seen_.download(answer.seen.data(), count * views, nullptr);
   CNERF_CUDA(cudaStreamSynchronize(nullptr));
+}
+
+}  // namespace
+
+std::unique_ptr<ViewSelection> make_view_selection_cuda(const std::vector<Camera>& cameras,
+                                                        const std::vector<DensityLevel>& levels,
+                                                        const Options& options) {
+  return std::make_unique<ViewSelectionCuda>(cameras, levels, options);
 }
 
 }  // namespace cnerf::bake

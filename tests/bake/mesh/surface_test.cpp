@@ -4,8 +4,8 @@
 
 #include <numbers>
 
-#include "bake/mesh/surface/refine.h"
-#include "bake/mesh/surface/solidify.h"
+#include "bake/mesh/surface/isosurface.h"
+#include "bake/mesh/surface/surface_mesh.h"
 #include "tests/bake/analytic_field.h"
 #include "tests/bake/mesh/test_surfaces.h"
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <set>
 
-#include "bake/mesh/surface/refine.h"
-#include "bake/mesh/texture/texel_map.h"
+#include "bake/mesh/surface/surface_mesh.h"
+#include "bake/mesh/texture/texture_baker.h"
 #include "bake/mesh/uv/unwrap.h"
 #include "src/base/error.h"
 #include "tests/bake/mesh/test_surfaces.h"

@@ -32,11 +32,11 @@ afterEach(() => vi.unstubAllGlobals());
 describe("manifest", () => {
   it("is read", () => expect(parsed(() => {})().volume.density.scale).toBe(10));
   it.skipIf(!expected)("is read as C++ writes it", () => {
-    const bundle = parseBundle(manifestText("r16f"));
+    const bundle = parseBundle(manifestText());
     expect(bundle.cameras).toHaveLength(3);
     expect(bundle.cameras[1].photo).toBe("photos/001.jpg");
     expect(bundle.upAxis).toBe("z");
-    expect(bundle.volume.density.encoding).toBe("r16f");
+    expect(bundle.volume.density.scale).toBeGreaterThan(0);
     expect(bundle.colorizer).toBe("reference:a.png");
   });
   const wrong: [string, (json: any) => void, RegExp][] = [
@@ -44,7 +44,7 @@ describe("manifest", () => {
     ["a missing number", (j) => delete j.volume.voxel_size, /voxel_size/],
     ["a number that is none", (j) => (j.volume.voxel_size = "x"), /voxel_size.*"x"/],
     ["a size of 0", (j) => (j.volume.voxel_size = 0), /voxel_size.*positive/],
-    ["another encoding", (j) => (j.volume.density.encoding = "r4"), /encoding.*r4/],
+    ["another encoding", (j) => (j.volume.density.encoding = "r16f"), /encoding.*r16f/],
     ["a file outside", (j) => j.files.push({ name: "../x", bytes: 1, sha256: "" }), /leaves the bundle/],
     ["a missing part", (j) => j.files.pop(), /color\.bin/],
     ["a camera without a pose", (j) => j.cameras.push({ name: "a", width: 1, height: 1, fx: 1, fy: 1, cx: 0, cy: 0 }), /cameras\[0\]/],

@@ -15,11 +15,11 @@ interface Expected {
   images: { width: number; height: number; rgb: number[]; opacity: number[] }[];
 }
 
-export const manifestText = (kind: "r8" | "r16f") => readFileSync(join(folder, kind, "bundle.json"), "utf8");
-export const bundle = there ? parseBundle(manifestText("r8")) : null;
+export const manifestText = () => readFileSync(join(folder, "r8", "bundle.json"), "utf8");
+export const bundle = there ? parseBundle(manifestText()) : null;
 export const expected = there ? (JSON.parse(readFileSync(join(folder, "expected.json"), "utf8")) as Expected) : null;
 
-export function packed(kind: "r8" | "r16f"): Packed {
-  const read = (name: string) => new Uint8Array(gunzipSync(readFileSync(join(folder, kind, name))));
+export function packed(): Packed {
+  const read = (name: string) => new Uint8Array(gunzipSync(readFileSync(join(folder, "r8", name))));
   return { occupancy: read("occupancy.bin"), density: read("density.bin"), color: read("color.bin") };
 }

@@ -1,4 +1,4 @@
-#include "bake/color/view_means.h"
+#include "bake/color/point_color.h"
 
 #include <algorithm>
 #include <array>
@@ -6,13 +6,47 @@
 
 #include "src/base/check.h"
 #include "src/base/parallel.h"
+#include "src/color/colorspace_math.h"
 
 namespace cnerf::bake {
 namespace {
 
 constexpr std::array<Vec3f, 6> kAllSides{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
 
+bool in_gamut(Vec3f rgb, float luminance) {
+  const float top = std::max(1.0f, luminance);
+  for (int channel = 0; channel < 3; ++channel) {
+    if (rgb[channel] < 0 || rgb[channel] > top) return false;
+  }
+  return true;
+}
+
 }  // namespace
+
+VoxelColor voxel_color(float luminance, Chromaticity chromaticity) {
+  if (chromaticity.x == 1 && chromaticity.z == 1) return {{luminance, luminance, luminance}, 0, 0};
+  const Vec3f xyz{luminance * chromaticity.x, luminance, luminance * chromaticity.z};
+  VoxelColor color;
+  color.rgb = linear_rgb_from_relative_xyz(xyz);
+  if (!in_gamut(color.rgb, luminance)) {
+    color.rgb = gamut_mapped_linear_rgb_from_lab(lab_from_linear_rgb(color.rgb));
+  }
+  const Lab<float> lab = lab_from_linear_rgb(color.rgb);
+  color.a = lab.a;
+  color.b = lab.b;
+  return color;
+}
+
+std::vector<Chromaticity> chromaticity_of(const ColorField& field, std::span<const Vec3f> points) {
+  std::vector<Chromaticity> answers(points.size());
+  parallel_ranges(points.size(), field.points_at_a_time(), [&](std::size_t begin, std::size_t end) {
+    field.query_chromaticity(points.subspan(begin, end - begin), std::span(answers).subspan(begin, end - begin));
+  });
+  for (const Chromaticity& c : answers) {
+    CNERF_CHECK(std::isfinite(c.x) && std::isfinite(c.z), "the field answered a chromaticity that is not finite");
+  }
+  return answers;
+}
 
 void ViewMeans::look_along(Vec3f unit, Vec3f direction, float weight) {
   positions_.push_back(unit);

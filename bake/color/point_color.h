@@ -1,5 +1,6 @@
 #pragma once
-/// Weighted means of a field's luminance over the directions that points are looked at along.
+/// What a field answers about points: luminance over the directions they are looked at along, chromaticity, and the
+/// colour that these two give.
 
 #include <span>
 #include <vector>
@@ -7,6 +8,18 @@
 #include "src/field/color_field.h"
 
 namespace cnerf::bake {
+
+/// Linear Rec.709 and its Lab a, b for a luminance and a chromaticity. In gamut: chroma gives way at constant lightness
+/// and hue. Grey gives three equal numbers and a = b = 0 exactly.
+struct VoxelColor {
+  Vec3f rgb{};
+  float a = 0, b = 0;
+};
+[[nodiscard]] VoxelColor voxel_color(float luminance, Chromaticity chromaticity);
+
+/// Chromaticity of points in unit space, by as many threads as are free.
+/// @throws ContractError  when the field answers one that is not finite.
+[[nodiscard]] std::vector<Chromaticity> chromaticity_of(const ColorField& field, std::span<const Vec3f> points);
 
 /// Points, each with the directions it is looked at along, for one question to the field.
 class ViewMeans {
