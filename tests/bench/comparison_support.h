@@ -1,10 +1,10 @@
 #pragma once
-/// What the benchmarks that compare pictures share: their command lines, the views and renders they compare with, and
-/// their measure.
+/// What the benchmarks that compare pictures share: the whole program but for the picture of a bake, and the measure.
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
@@ -15,7 +15,6 @@
 #include "export/manifest.h"
 #include "src/capture/capture.h"
 #include "src/color/colorspace_math.h"
-#include "src/picture/contact_sheet.h"
 #include "src/picture/encode.h"
 #include "src/train/scene.h"
 
@@ -30,24 +29,6 @@ inline double encoded(float linear) {
 inline double decibels(double squared, std::size_t values) {
   return -10 * std::log10(std::max(squared / double(std::max<std::size_t>(values, 1)), 1e-12));
 }
-
-/// The field over black, linear RGB; grey where it has no colour.  [H, W, 3]
-[[nodiscard]] std::vector<float> rgb_of(const RenderedImage& image);
-
-/// How to render a field for comparisons with a bake: colours of samples, and luminance as it is or averaged.
-/// @param average  null, or what `render` is to show; must outlive the result.
-[[nodiscard]] RenderOptions field_options(const Scene& scene, const bake::ViewAverage* average);
-
-/// The view-averaged field behind a bake, on lattices like its own.
-[[nodiscard]] std::unique_ptr<bake::ViewAverage> average_behind(const exporting::BakeManifest& bake, const Scene& scene,
-                                                                const Capture& capture);
-
-/// A view of the field as `cnerf render --path held-out --format exr` leaves it in a folder.
-/// @throws MissingInputError, InputError.
-[[nodiscard]] RenderedImage read_render(const std::filesystem::path& folder, const View& view);
-
-/// The first held-out views (of all views where none is), or trained ones, evenly spread; at most `most`.
-[[nodiscard]] std::vector<const View*> views_to_compare(const Capture& capture, bool trained, int most);
 
 /// How like the field's render a picture is, pixel by pixel: squared differences of sRGB-encoded colour over black, and
 /// how far their silhouettes (opacity above a half) overlap.
@@ -76,9 +57,33 @@ class Likeness {
 
 /// @param rgba  [H, W, 4] of the view that `field` was rendered from, see Likeness::add.
 [[nodiscard]] Likeness likeness_of(std::span<const float> rgba, const RenderedImage& field);
-/// A row of three pictures: this one, the field, and what this one adds to the field's sRGB-encoded colour, at twice
-/// the contrast; grey where it adds nothing.
-void add_row(ContactSheet& sheet, std::span<const float> rgba, const RenderedImage& field);
+/// What every comparison has: a bake, the capture behind it, and the field, as snapshots or as a folder of its
+/// pictures.
+struct Comparison {
+  std::filesystem::path bake, renders;  ///< folders; renders: empty where there are snapshots
+  std::map<std::string, int> options;
+  exporting::BakeManifest manifest;
+  Capture capture;
+  std::unique_ptr<Scene> scene;                ///< null without snapshots
+  std::unique_ptr<bake::ViewAverage> average;  ///< of the scene with averaged=1, else null
+
+  [[nodiscard]] bool has_field() const { return scene != nullptr || !renders.empty(); }
+  /// The field's picture of a view: colours of samples, and luminance as it is or averaged.
+  /// @throws MissingInputError, InputError  where it is to be read.
+  [[nodiscard]] RenderedImage field_of(const View& view) const;
+};
+
+/// The program `name`_comparison: reads `BAKE CAPTURE [STAGE1.snapshot [TAKE.snapshot] | RENDERS] key=value...` and
+/// calls `each` for the views to compare, with the field's picture of them (null where there is no field), which are
+/// the first held-out ones (of all where none is), with trained=1 some of the others, evenly spread. RENDERS is a
+/// folder with the field's pictures instead of snapshots, as `cnerf render RUN
+/// --view-averaged --path held-out --format exr` leaves them: made on a GPU, say. Of the pictures that `each` returns,
+/// [H, W, 4] or nothing, pictures=1 writes BAKE/`name`_comparison.png: picture, field, and what the picture adds to the
+/// field's sRGB-encoded colour, at twice the contrast; grey where it adds nothing.
+/// @param options  of this comparison; all have views=3, downscale=1, holdout=0, trained=0, averaged=0 and pictures=0.
+/// @return  the program's exit status.
+int compare_views(int argc, char** argv, const std::string& name, std::map<std::string, int> options,
+                  const std::function<std::vector<float>(Comparison&, const View&, const RenderedImage*)>& each);
 
 /// `FILE... key=value...` behind the program's name.
 struct Arguments {
