@@ -261,8 +261,7 @@ ManifestVolume describe_volume(const bake::VolumePlanes& volume, const std::stri
   const double h = volume.voxel_size;
   ManifestVolume described;
   described.file = file;
-  described.bounds = {volume.origin + box.min.cast<double>() * h,
-                      volume.origin + (box.min + box.size).cast<double>() * h};
+  described.bounds = {volume.origin + box.low.cast<double>() * h, volume.origin + box.high.cast<double>() * h};
   described.voxel_size = h;
   described.resolution = volume.resolution;
   described.voxels = statistics.voxels;

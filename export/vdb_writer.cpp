@@ -108,8 +108,7 @@ class GridBuilder final : public Builder {
   }
   [[nodiscard]] openvdb::GridBase::Ptr finish() override {
     for (const auto& tree : trees_) grid_->tree().merge(*tree, openvdb::MERGE_ACTIVE_STATES);
-    const Vec3i low = box_.min, high = low + box_.size - Vec3i{1, 1, 1};
-    for (const Vec3i corner : {low, high}) {
+    for (const Vec3i corner : {box_.low, box_.high - Vec3i{1, 1, 1}}) {
       grid_->tree().setValueOn({corner.x, corner.y, corner.z}, value_of_(bake::Voxel{}));
     }
     openvdb::tools::prune(grid_->tree());  // full leaves of one value, as the insides of a grey bake's colours

@@ -32,8 +32,8 @@ Vec3i lay_out(const bake::Volume& volume, WebBricks& bricks) {
   CNERF_CHECK(!dense.empty(), "no voxel has density");
   bricks.voxels = dense.size();
   const bake::VoxelBox box = bounding_box(dense);
-  const Vec3i first = box.min - Vec3i{1, 1, 1};  // interpolation reaches one voxel beyond
-  const Vec3i size = box.size + Vec3i{2, 2, 2};
+  const Vec3i first = box.low - Vec3i{1, 1, 1};  // interpolation reaches one voxel beyond
+  const Vec3i size = box.size() + Vec3i{2, 2, 2};
   for (int axis = 0; axis < 3; ++axis) bricks.counts[axis] = (size[axis] + kSide - 1) / kSide;
   bricks.voxel_size = volume.voxel_size;
   bricks.origin = volume.origin + first.cast<double>() * volume.voxel_size;

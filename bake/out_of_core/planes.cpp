@@ -13,26 +13,6 @@ namespace {
 
 constexpr int kPlanesOfPart = 4;  ///< at least: neighbours are read by both of two parts
 
-/// Around voxels, by its corners.
-class GrowingBox {
- public:
-  void add(const Voxel& voxel) {
-    const Vec3i at{voxel.i, voxel.j, voxel.k};
-    for (int axis = 0; axis < 3; ++axis) {
-      low_[axis] = std::min(low_[axis], at[axis]);
-      high_[axis] = std::max(high_[axis], at[axis]);
-    }
-  }
-  [[nodiscard]] VoxelBox box() const {
-    if (low_.x > high_.x) return {};
-    return {low_, high_ - low_ + Vec3i{1, 1, 1}};
-  }
-
- private:
-  static constexpr int kMost = std::numeric_limits<int>::max();
-  Vec3i low_{kMost, kMost, kMost}, high_{-kMost, -kMost, -kMost};
-};
-
 void check_voxel(const Voxel& v) {
   const bool finite = std::isfinite(v.sigma) && std::isfinite(v.luminance) && std::isfinite(v.rgb.x) &&
                       std::isfinite(v.rgb.y) && std::isfinite(v.rgb.z) && std::isfinite(v.a) && std::isfinite(v.b);
@@ -47,37 +27,16 @@ int plane_of(int i) {
 
 }  // namespace
 
-VoxelBox VoxelBox::grown(int margin) const {
-  const Vec3i m{margin, margin, margin};
-  return {min - m, size + m + m};
-}
-
-void VoxelBox::add(const VoxelBox& other) {
-  if (other.is_empty()) return;
-  if (is_empty()) {
-    *this = other;
-    return;
-  }
-  for (int axis = 0; axis < 3; ++axis) {
-    const int end = std::max(min[axis] + size[axis], other.min[axis] + other.size[axis]);
-    min[axis] = std::min(min[axis], other.min[axis]);
-    size[axis] = end - min[axis];
-  }
-}
-
 void VolumeStatistics::add(const std::vector<Voxel>& more) {
-  GrowingBox every, with_density;
   for (const Voxel& voxel : more) {
     check_voxel(voxel);
-    every.add(voxel);
+    all.add(voxel);
     if (!(voxel.sigma > 0)) continue;
-    with_density.add(voxel);
+    dense.add(voxel);
     ++voxels;
     min_sigma = std::min(min_sigma, voxel.sigma);
     max_sigma = std::max(max_sigma, voxel.sigma);
   }
-  all.add(every.box());
-  dense.add(with_density.box());
 }
 
 VolumePlanes planes_of(const Volume& volume) {
@@ -127,9 +86,9 @@ Volume whole_volume(const VolumePlanes& volume) {
 }
 
 VoxelBox bounding_box(const std::vector<Voxel>& voxels) {
-  GrowingBox box;
+  VoxelBox box;
   for (const Voxel& voxel : voxels) box.add(voxel);
-  return box.box();
+  return box;
 }
 
 }  // namespace cnerf::bake

@@ -1,6 +1,7 @@
 #pragma once
 /// Baked volumes read piece by piece: what is written to a file grid by grid need not be in memory at once.
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <vector>
@@ -9,14 +10,26 @@
 
 namespace cnerf::bake {
 
-/// A box of voxels [min, min + size); none when `size` is 0.
+/// A box of voxels [low, high); holds nothing until voxels are added.
 struct VoxelBox {
-  Vec3i min{}, size{};
+  static constexpr int kMost = std::numeric_limits<int>::max();
+  Vec3i low{kMost, kMost, kMost}, high{-kMost, -kMost, -kMost};
 
-  [[nodiscard]] bool is_empty() const { return size.x == 0; }
-  [[nodiscard]] VoxelBox grown(int margin) const;
+  [[nodiscard]] bool is_empty() const { return low.x >= high.x; }
+  [[nodiscard]] Vec3i size() const { return high - low; }
+  /// Of a box that is not empty.
+  [[nodiscard]] VoxelBox grown(int margin) const {
+    const Vec3i m{margin, margin, margin};
+    return {low - m, high + m};
+  }
   /// Grows so that it holds the other.
-  void add(const VoxelBox& other);
+  void add(const VoxelBox& other) {
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], other.low[axis]);
+      high[axis] = std::max(high[axis], other.high[axis]);
+    }
+  }
+  void add(const Voxel& v) { add({{v.i, v.j, v.k}, {v.i + 1, v.j + 1, v.k + 1}}); }
 };
 /// Around all voxels.
 [[nodiscard]] VoxelBox bounding_box(const std::vector<Voxel>& voxels);

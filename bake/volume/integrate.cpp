@@ -86,7 +86,7 @@ class VoxelMedium {
   static BrickGrid<Sample> fill(const Volume& volume) {
     const VoxelBox box = bounding_box(volume.voxels);
     // One voxel of margin: interpolation reaches half a voxel beyond the outermost centres.
-    BrickGrid<Sample> grid(box.min - Vec3i{1, 1, 1}, box.size + Vec3i{2, 2, 2}, Sample{});
+    BrickGrid<Sample> grid(box.low - Vec3i{1, 1, 1}, box.size() + Vec3i{2, 2, 2}, Sample{});
     for (const Voxel& voxel : volume.voxels) grid.set({voxel.i, voxel.j, voxel.k}, {voxel.sigma, voxel.rgb});
     return grid;
   }

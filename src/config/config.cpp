@@ -18,7 +18,7 @@ constexpr const char* kOfCompare = "it is one of `cnerf compare` alone";
 const std::vector<RetiredKey>& retired_keys() {
   static const std::vector<RetiredKey> keys{
       {"exr.lab_names", "", "'lab'", "the channels are Lab.L, Lab.a and Lab.b"},
-      {"exr.mip", "", "false", "textures are written as lines; tools of OpenEXR make tiles of them"},
+      {"exr.mip", "", "false", "textures are written as lines; exrmaketiled of OpenEXR makes mip-map levels"},
       {"web.density", "", "'r8'", "density has 8 bits on a cubic scale"},
       {"web.photo_quality", "", "82", "it is a constant; web.photo_side says how large photographs are"},
       {"bake.seen_transmittance", "", "0.001", "it is a constant"},

@@ -281,7 +281,7 @@ TEST(BakeVolume, IsTheSameReadInPlanesAndWhole) {
   const VolumePlanes planes = bake_volumes(field, {}, levels, options, journal).front();
   EXPECT_EQ(whole_volume(dilated(planes, options.dilation)).voxels, bake_volume(field, {}, options).voxels);
   EXPECT_EQ(planes.statistics.voxels, 40u * 20 * 20);
-  EXPECT_EQ(planes.statistics.dense.size, (Vec3i{40, 20, 20}));
+  EXPECT_EQ(planes.statistics.dense.size(), (Vec3i{40, 20, 20}));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "export/bake_folder.h"
 #include "export/manifest.h"
+#include "export/up_axis.h"
 #include "src/base/files.h"
 #include "src/capture/load_capture.h"
 #include "tests/capture/fixtures.h"

@@ -10,6 +10,7 @@
 
 #include "export/bake_folder.h"
 #include "export/texture_writer.h"
+#include "export/up_axis.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "tests/bake/analytic_field.h"

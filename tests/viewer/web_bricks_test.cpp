@@ -125,7 +125,6 @@ TEST(WebBricks, DifferencesUndoneGiveTheSame) {
 
 TEST(WebBricks, AVolumeWithoutDensityIsRefused) {
   EXPECT_THROW((void)make_web_bricks(test::block_volume({0, 0, 0}, {2, 2, 2}, 0)), ContractError);
-  EXPECT_THROW((void)make_web_bricks(test::block_volume({0, 0, 0}, {2, 2, 2}, 1), "r32f"), ContractError);
 }
 
 }  // namespace

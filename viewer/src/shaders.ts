@@ -1,4 +1,4 @@
-/** GLSL. The colour maths is that of src/color/colorspace_math.h, the integral that of bake/volume_integrator.h. */
+/** GLSL. The colour maths is that of src/color/colorspace_math.h, the integral that of bake/volume/integrate.h. */
 
 export const fullScreen = `#version 300 es
 void main() {

@@ -117,7 +117,7 @@ struct Stage {
 TEST(TexelShader, FindsTheSurfaceFromALittleOff) {
   const AnalyticField field = coloured_sphere();
   const Stage stage(field);
-  const TexelShader shader(field, {}, stage.plan, coarse(), 6, stage.sigma);
+  const TexelShader shader(field, {}, stage.plan, coarse(), stage.sigma);
   const Vec3f direction = normalized(Vec3f{1, -2, 0.5f});
   const Vec3f expected = sphere_color(kMiddle + direction * 0.3f);
   std::vector<SurfacePoint> points;
@@ -142,7 +142,7 @@ TEST(TexelShader, AveragesOverTheViewsThatSeeThePoint) {
   const std::vector<Camera> cameras{camera_at("x", {6, 2, 3}, {1, 2, 3}, 64, 64, 100),
                                     camera_at("y", {1, 7, 3}, {1, 2, 3}, 64, 64, 100),
                                     camera_at("hidden", {1, -3, 3}, {1, 2, 3}, 64, 64, 100)};
-  const TexelShader shader(field, cameras, stage.plan, coarse(), 6, stage.sigma);
+  const TexelShader shader(field, cameras, stage.plan, coarse(), stage.sigma);
   const auto at = [&](Vec3f direction) {
     const Vec3d world = kFrame.world_from_unit((kMiddle + direction * 0.3f).cast<double>());
     return SurfacePoint{((world - stage.plan.origin) / stage.plan.voxel_size).cast<float>(), direction};
