@@ -1,6 +1,6 @@
 #pragma once
-/// A box of voxels stored in bricks of 8^3, of which only those that were written to exist. Not a VDB tree, because rays
-/// look bricks up out of order: one index finds them, and the GPU gets the same layout.
+/// A box of voxels stored in bricks of 8^3, of which only those that were written to exist. Not a VDB tree, because
+/// rays look bricks up out of order: one index finds them, and the GPU gets the same layout.
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,6 @@
 #pragma once
-/// A baked volume at fewer voxels, for viewers. OpenVDB's resampleToMatch samples; this averages, colours by their light.
+/// A baked volume at fewer voxels, for viewers. OpenVDB's resampleToMatch samples; this averages, colours by their
+/// light.
 
 #include "bake/volume.h"
 
