@@ -35,9 +35,8 @@ struct GridCell {
   Real fraction[3];  ///< in [0, 1]
 };
 
-/// @param position  in [0, 1] on each axis; x = 1 is the upper face of the last cell, fraction 1: there is no point
-/// behind
-///                  it, and in a dense level its row would be another level's.
+/// @param position  in [0, 1] on each axis; 1 is the upper face of the last cell, at fraction 1: a cell beyond it would
+///                  have grid points outside the level, whose rows may belong to another level.
 template <typename Index, typename Real>
 CNERF_HD GridCell<Real, Index> locate(const GridLevel& level, const Real position[3]) {
   GridCell<Real, Index> cell;

@@ -26,9 +26,6 @@ struct HashGridKernels {
                         int channels, int first_channel, float* d_rows);
 };
 
-/// The kernels of `active_isa()`.
-[[nodiscard]] const HashGridKernels& hash_grid_kernels();
-
 namespace generic {
 extern const HashGridKernels kHashGridKernels;
 }
@@ -37,6 +34,11 @@ extern const HashGridKernels kHashGridKernels;
 }
 namespace avx512 {
 extern const HashGridKernels kHashGridKernels;
+}
+
+/// The kernels of `active_isa()`.
+[[nodiscard]] inline const HashGridKernels& hash_grid_kernels() {
+  return kernels_of_isa(generic::kHashGridKernels, avx2::kHashGridKernels, avx512::kHashGridKernels);
 }
 
 }  // namespace cnerf

@@ -2,6 +2,7 @@
 
 #include "encoding/cuda/hash_grid_cuda.h"
 #include "encoding/cuda/hash_grid_device.cuh"
+#include "src/base/cuda/launch.h"
 
 namespace cnerf {
 namespace {
@@ -9,10 +10,6 @@ namespace {
 constexpr int kThreads = 256;
 constexpr int kRun = 16;    // successive samples of eight threads of the backward kernel
 constexpr int kLoaded = 4;  // of them at once
-
-unsigned blocks_for(std::uint32_t items) {
-  return (items + kThreads - 1) / kThreads;
-}
 
 /// Blocks of one level follow one another, so that the gradients of that level stay in L2.
 __global__ void __launch_bounds__(kThreads)
@@ -46,12 +43,11 @@ __global__ void __launch_bounds__(kThreads)
 
 }  // namespace
 
-void encode_backward_cuda(const std::vector<GridLevel>& levels, const float* places, SampleCount samples,
-                          const void* d_encoded, float* d_table, cudaStream_t stream) {
-  const dim3 grid(blocks_for((samples.most + kRun - 1) / kRun * 8), unsigned(levels.size()));
-  scatter<<<grid, kThreads, 0, stream>>>(GridLevels(levels.data(), levels.size()),
-                                         reinterpret_cast<const float4*>(places), samples.count, samples.most,
-                                         static_cast<const uint2*>(d_encoded), d_table);
+void encode_backward_cuda(const std::vector<GridLevel>& levels, const float4* places, SampleCount samples,
+                          const void* d_encoded, float4* d_table, cudaStream_t stream) {
+  const dim3 grid(blocks_for((samples.most + kRun - 1) / kRun * 8, kThreads), unsigned(levels.size()));
+  scatter<<<grid, kThreads, 0, stream>>>(GridLevels(levels.data(), levels.size()), places, samples.count, samples.most,
+                                         static_cast<const uint2*>(d_encoded), reinterpret_cast<float*>(d_table));
 }
 
 }  // namespace cnerf

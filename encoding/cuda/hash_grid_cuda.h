@@ -17,9 +17,10 @@ struct SampleCount {
 };
 
 /// Adds the gradient of the table, run by run: float sums in an order that varies from call to call.
+/// @param places     [most] x, y, z in [0, 1]
 /// @param d_encoded  [L, most, 4] of bfloat16
-/// @param d_table    [rows, 4] floats
-void encode_backward_cuda(const std::vector<GridLevel>& levels, const float* places, SampleCount samples,
-                          const void* d_encoded, float* d_table, cudaStream_t stream);
+/// @param d_table    [rows]
+void encode_backward_cuda(const std::vector<GridLevel>& levels, const float4* places, SampleCount samples,
+                          const void* d_encoded, float4* d_table, cudaStream_t stream);
 
 }  // namespace cnerf

@@ -1,5 +1,5 @@
 #pragma once
-/// Vectors whose storage starts on a cache line.
+/// Vectors aligned to cache lines.
 
 #include <cstddef>
 #include <new>
@@ -23,8 +23,8 @@ struct CacheLineAllocator {
 template <typename T>
 using AlignedVector = std::vector<T, CacheLineAllocator<T>>;
 
-/// Makes a scratch buffer hold at least `size` elements. It never shrinks: a vector that is resized up and down would
-/// write zeros each time, which costs more than the work on small blocks.
+/// Makes a scratch buffer hold at least `size` elements. It never shrinks: resizing a vector up and down would write
+/// zeros each time, which costs more than the work on small blocks.
 template <typename T>
 void ensure_size(AlignedVector<T>& buffer, std::size_t size) {
   if (buffer.size() < size) buffer.resize(size);

@@ -1,5 +1,5 @@
 #pragma once
-/// Amounts of memory as people write them.
+/// Amounts of memory, parsed from and formatted for people.
 
 #include <cstddef>
 #include <string>
@@ -7,7 +7,7 @@
 namespace cnerf {
 
 /// "4G", "500M", "64k" (powers of 1024) or a number of bytes.
-/// @param option  whose value `text` is, for the message.  @throws UsageError  when it is no positive amount.
+/// @param option  that `text` is the value of, for the message  @throws UsageError  not a positive amount.
 [[nodiscard]] std::size_t bytes_from(const std::string& option, const std::string& text);
 
 /// "1.25 GiB", "37 MiB".

@@ -1,5 +1,5 @@
 #pragma once
-/// Checks at module borders. A failed one throws ContractError with the expression and what it compared.
+/// Checks of preconditions. A failed one throws ContractError with the expression and the values it compared.
 
 #include <sstream>
 #include <string>

@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <optional>
 #include <string_view>
 
 namespace cnerf {
 namespace {
-
-std::optional<IsaLevel> forced_level;  // NOLINT: a process-wide choice, set by tests and by the environment
 
 IsaLevel level_from_environment() {
   const char* value = std::getenv("CNERF_ISA");
@@ -32,12 +29,8 @@ IsaLevel detected_isa() {
 }
 
 IsaLevel active_isa() {
-  static const IsaLevel allowed = std::min(detected_isa(), level_from_environment());
-  return forced_level ? std::min(*forced_level, detected_isa()) : allowed;
-}
-
-void force_isa(IsaLevel level) {
-  forced_level = level;
+  static const IsaLevel detected = detected_isa();
+  return std::min(detected, level_from_environment());
 }
 
 std::string to_string(IsaLevel level) {

@@ -1,5 +1,5 @@
 #pragma once
-/// Which instruction set the CPU back ends run on.
+/// The instruction set that the processor's kernels use.
 
 #include <string>
 
@@ -9,10 +9,16 @@ enum class IsaLevel { kGeneric = 0, kAvx2 = 1, kAvx512 = 2 };
 
 /// The best level this processor and operating system support.
 [[nodiscard]] IsaLevel detected_isa();
-/// The level in use: the detected one, or lower when `force_isa` or $CNERF_ISA (generic, avx2, avx512) says so.
+/// The level that an engine made now uses: the detected one, or a lower one that $CNERF_ISA (generic, avx2, avx512)
+/// asks for.
 [[nodiscard]] IsaLevel active_isa();
-/// Lowers the level for tests and comparisons; levels above the detected one are capped to it.
-void force_isa(IsaLevel level);
 [[nodiscard]] std::string to_string(IsaLevel level);
+
+/// Of what is compiled once per instruction set, the one for `active_isa()`.
+template <typename Kernels>
+const Kernels& kernels_of_isa(const Kernels& generic, const Kernels& avx2, const Kernels& avx512) {
+  const IsaLevel level = active_isa();
+  return level == IsaLevel::kAvx512 ? avx512 : level == IsaLevel::kAvx2 ? avx2 : generic;
+}
 
 }  // namespace cnerf

@@ -1,6 +1,6 @@
 #pragma once
-/// What can go wrong, whose fault it is, and the exit code it ends with.
-/// `main` holds the only catch that turns these into messages; nothing else exits.
+/// The types of errors and their exit codes. Only `main` catches them and turns them into messages; nothing else exits
+/// the program.
 
 #include <filesystem>
 #include <stdexcept>
@@ -79,7 +79,7 @@ struct Interrupted : Error {
   explicit Interrupted(const std::string& message) : Error(ExitCode::kInterrupted, message) {}
 };
 
-/// A broken promise between two parts of this program: always a bug.
+/// A violated precondition inside this program: always a bug.
 class ContractError : public std::logic_error {
  public:
   using std::logic_error::logic_error;

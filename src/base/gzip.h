@@ -1,5 +1,5 @@
 #pragma once
-/// gzip, which browsers undo by themselves and whose checksum they verify.
+/// gzip, which browsers decompress and verify by themselves.
 
 #include <cstddef>
 #include <cstdint>
@@ -9,11 +9,11 @@
 
 namespace cnerf {
 
-/// One gzip member at the highest level, tuned for differences of neighbours. The same bytes give the same result: no
-/// name, no time.
+/// One gzip member at the highest level, with the filter strategy for differences of neighbours. Deterministic: the
+/// header holds neither name nor time.
 [[nodiscard]] std::vector<std::byte> gzip(std::span<const std::uint8_t> bytes);
 
-/// What one gzip member holds. Nothing when it is damaged, cut short, or holds more than `most` bytes.
+/// The content of one gzip member; nothing when it is damaged, cut short, or longer than `most` bytes.
 [[nodiscard]] std::optional<std::vector<std::uint8_t>> gunzip(std::span<const std::byte> packed, std::size_t most);
 
 }  // namespace cnerf

@@ -1,5 +1,5 @@
 #pragma once
-/// CNERF_HD marks the functions that a CUDA kernel shares with the CPU. The only place where the keywords occur.
+/// CNERF_HD marks functions that CUDA kernels share with the processor. The CUDA keywords occur here only.
 
 #if defined(__CUDACC__)
 #define CNERF_HD __host__ __device__

@@ -1,5 +1,5 @@
 #pragma once
-/// Records to and from JSON by their one list of fields (src/base/record.h).
+/// Conversion of records to and from JSON by their list of fields (src/base/record.h).
 ///
 /// A field is a record itself, a std::optional (left out where it is empty), a std::vector, std::array or
 /// std::map<std::string, ...> of fields, a path, or whatever nlohmann::json converts. Keys that no field has are

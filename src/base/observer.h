@@ -1,31 +1,46 @@
 #pragma once
-/// Watches a job: training, colouring, baking, a step of the pipeline. A job calls it from one thread, between pieces
-/// of its work. The defaults watch nothing and let Ctrl-C cancel.
+/// The observer of a job (training, colouring, baking, a step of the pipeline): receives progress, messages and
+/// previews and may cancel. A job calls it from one thread, between pieces of its work. The defaults ignore everything
+/// and let Ctrl-C cancel.
 
+#include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
+#include <vector>
 
-#include "src/base/preview.h"
 #include "src/base/progress.h"
 
 namespace cnerf {
+
+/// A small picture of the current result beside its target. Linear light.
+struct PreviewPicture {
+  std::string name;
+  int width = 0, height = 0;
+  std::vector<float> ours;   ///< [H, W] luminance or [H, W, 3] Rec.709
+  std::vector<float> input;  ///< [H, W] luminance
+};
+
+/// Draws one of a few pictures; the index wraps around.
+using DrawPreview = std::function<PreviewPicture(std::size_t index)>;
 
 class Observer {
  public:
   virtual ~Observer() = default;
   virtual void report_progress(const Progress& /*progress*/) {}
-  /// A sentence about what happens.
+  /// A message for the user.
   virtual void say(const std::string& /*text*/) {}
-  /// A file or folder that the job leaves behind.
+  /// Reports a file or folder that the job has written.
   virtual void wrote(const std::string& /*what*/, const std::filesystem::path& /*path*/) {}
-  /// Offers pictures of what the job has made so far; `draw` may be called until this returns.
+  /// Offers previews of the current result. Drawing takes time, so the observer decides; `draw` is valid until this
+  /// returns.
   virtual void offer_preview(const DrawPreview& /*draw*/) {}
-  /// Whether offering is worth the preparation that previews take.
+  /// Whether the job should prepare for previews at all.
   [[nodiscard]] virtual bool wants_previews() const { return false; }
-  /// Asked often; once it is true the job saves what it can and throws Interrupted.
+  /// Polled often; once it is true the job saves what it can and throws Interrupted.
   [[nodiscard]] virtual bool is_cancelled() const { return interruption_requested(); }
 
-  /// For work that wants no more of an observer than its progress. Refers to this object.
+  /// For functions that only report progress. Refers to this object.
   [[nodiscard]] ProgressSink progress_sink() {
     return [this](const Progress& progress) { report_progress(progress); };
   }

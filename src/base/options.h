@@ -1,5 +1,5 @@
 #pragma once
-/// How an option struct tells the config binding, the help text and the tests about its fields: one member template
+/// How an option struct lists its fields for the config binding, the help text and the tests: one member template
 ///
 ///     template <typename Visitor>
 ///     void visit(Visitor&& v) {

@@ -1,21 +1,21 @@
 #pragma once
-/// Parts of the program that are loaded when they are needed: shared libraries of ours, libcnerf_NAME.so, for what
-/// takes long to load and few commands use.
+/// Plug-ins: our own shared libraries, libcnerf_NAME.so, for parts that take long to load and few commands use. They
+/// are loaded on first use.
 ///
-/// A plug-in holds copies of the lower rooms that it needs. The program exports its own (cmake/exported_symbols.txt),
-/// and the loader prefers those: the number of threads, Ctrl-C and the types of errors are the same on both sides.
+/// A plug-in links copies of the lower rooms that it needs. The program exports the symbols of its own copies
+/// (cmake/exported_symbols.txt), and the loader prefers those, so that the number of threads, the state of Ctrl-C and
+/// the types of errors are the same on both sides.
 
 #include <string>
 
 namespace cnerf {
 
-/// The address of a symbol of libcnerf_`plugin`.so, which stays loaded. The library is looked for beside the program,
-/// in
-/// ../lib/cnerf and in the build tree.
-/// @throws DeviceError  no such file, it cannot be loaded, or it lacks the symbol; says where it was looked for.
+/// The address of a symbol of libcnerf_`plugin`.so, which stays loaded. The library is searched for beside the program,
+/// in ../lib/cnerf and in the build tree.
+/// @throws DeviceError  the file is missing, cannot be loaded or lacks the symbol; the message lists the folders.
 [[nodiscard]] void* plugin_symbol(const std::string& plugin, const std::string& symbol);
 
-/// What a plug-in offers: a table of functions, the result of its `extern "C"` function `entry`.
+/// The table of functions that a plug-in offers: the result of its `extern "C"` function `entry`.
 template <typename Table>
 const Table& plugin_table(const std::string& plugin, const std::string& entry) {
   return *reinterpret_cast<const Table* (*)()>(plugin_symbol(plugin, entry))();

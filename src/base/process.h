@@ -1,5 +1,5 @@
 #pragma once
-/// Other programs of the system: finding one, running one to its end, talking to one over pipes. POSIX only.
+/// Child processes: finding a program, running it to its end, talking to it over pipes. POSIX only.
 
 #include <sys/types.h>
 
@@ -14,18 +14,18 @@
 
 namespace cnerf {
 
-/// The executable that `name` stands for: on $PATH, or itself where it holds a slash; nothing when there is none.
+/// The executable `name`, searched for on $PATH unless it contains a slash; nothing when there is none.
 [[nodiscard]] std::optional<std::filesystem::path> find_program(const std::string& name);
 
-/// Runs `words` (the program and its arguments; no shell) with both of its outputs appended to `log`, no input and no
-/// screen. `watch` is called a few times per second meanwhile; when it throws, the program and all it started are
-/// killed and the exception goes on.
+/// Runs `words` (the program and its arguments; no shell) with stdout and stderr appended to `log`, without input or
+/// display. `watch` is called a few times per second meanwhile; when it throws, the program and its children are killed
+/// and the exception is rethrown.
 /// @return  its exit status; 128 + n when signal n killed it.
 /// @throws OutputError  when the log cannot be written.  @throws DeviceError  when the program cannot be started.
 int run_program(const std::vector<std::string>& words, const std::filesystem::path& log,
                 const std::function<void()>& watch = {});
 
-/// A descriptor that closes itself, and on exec: no other program inherits it and keeps a pipe open.
+/// An owned file descriptor, closed on exec as well: no other program inherits it and keeps a pipe open.
 class FileDescriptor {
  public:
   explicit FileDescriptor(int number = -1) : number_(number) {}
@@ -39,10 +39,10 @@ class FileDescriptor {
   int number_;
 };
 
-/// A started program, the leader of a process group of its own: Ctrl-C reaches it through us only.
+/// A running program in a process group of its own: Ctrl-C reaches it through us only.
 class Process {
  public:
-  /// Descriptors that become its standard streams;
+  /// Descriptors that become its standard streams.
   struct Streams {
     int input, output, errors;
   };
@@ -53,11 +53,11 @@ class Process {
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  /// Its status as a shell has it, 128 + n after signal n; nothing while it runs. Looks for `patience` at most.
+  /// Its exit status as a shell reports it, 128 + n after signal n; nothing while it runs. Waits at most `patience`.
   std::optional<int> exit_status(std::chrono::milliseconds patience = {});
   /// "exited with 3", "was killed by signal 11", "is still running".
   [[nodiscard]] std::string fate();
-  /// Kills it and all it started.
+  /// Kills it and its children.
   void kill_group();
 
  private:
@@ -85,8 +85,8 @@ class PipedProcess {
   /// Closes the program's input, gives it a moment to end, then kills its process group.
   ~PipedProcess();
 
-  /// Both move every byte or report trouble; what the program says on stderr is passed through meanwhile. A program
-  /// that stops reading gives kEnded, never SIGPIPE.
+  /// Both transfer every byte or report trouble; the program's stderr is passed through meanwhile. A program that stops
+  /// reading gives kEnded, never SIGPIPE.
   PipeTrouble write_all(std::span<const std::byte> bytes, Deadline deadline);
   PipeTrouble read_all(std::span<std::byte> bytes, Deadline deadline);
 
@@ -103,7 +103,7 @@ class PipedProcess {
   std::string stderr_tail_;
 };
 
-/// A text as one word of the shell.
+/// Quotes a text as one word of the shell.
 [[nodiscard]] std::string shell_word(const std::string& text);
 
 }  // namespace cnerf

@@ -19,10 +19,6 @@ bool interruption_requested() {
   return interruption != 0;
 }
 
-void request_interruption() {
-  interruption = 1;
-}
-
 void install_interruption_handler() {
   std::signal(SIGINT, handle_signal);
   std::signal(SIGTERM, handle_signal);

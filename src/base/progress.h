@@ -1,5 +1,5 @@
 #pragma once
-/// Progress of long work, and the request to end it.
+/// Progress of long work, and requests to stop it.
 
 #include <functional>
 #include <string>
@@ -10,17 +10,15 @@ namespace cnerf {
 
 struct Progress {
   std::string task;                                     ///< "stage 1", "bake"
-  double fraction = 0;                                  ///< done, in [0, 1]
+  double fraction = 0;                                  ///< of the work that is done, in [0, 1]
   std::vector<std::pair<std::string, double>> figures;  ///< "psnr" -> 27.1, "rays/s" -> 2.1e5
 };
 
-/// Receives the progress. May throw Interrupted to stop the work at a safe point; it saves its state first if it can.
+/// Receives the progress. It may throw Interrupted, which stops the work at a safe point, after saving if it can.
 using ProgressSink = std::function<void(const Progress&)>;
 
-/// True once the user pressed Ctrl-C. Long loops ask between steps, save and throw Interrupted.
+/// Whether the user has pressed Ctrl-C. Long loops check it between steps, save and throw Interrupted.
 [[nodiscard]] bool interruption_requested();
-/// The same from within the program.
-void request_interruption();
 /// Installs the SIGINT and SIGTERM handlers behind `interruption_requested`; a second signal ends the program at once.
 void install_interruption_handler();
 

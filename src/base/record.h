@@ -1,5 +1,5 @@
 #pragma once
-/// How a record names its fields for those that write and read it (src/base/json_record.h): one static member template
+/// How a record lists its fields for serialisation (src/base/json_record.h): one static member template
 ///
 ///     template <typename Self, typename Visitor>
 ///     static void visit(Self& self, Visitor&& v) {
@@ -18,7 +18,7 @@ inline constexpr LaterField kLater;
 /// Marks a std::optional that is written as null where it is empty.
 struct NullableField {};
 inline constexpr NullableField kNullable;
-/// Marks what is written for other programs and follows from the rest: it is not read.
+/// Marks a derived field that is written for other programs and not read.
 struct WrittenField {};
 inline constexpr WrittenField kWritten;
 

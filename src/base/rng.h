@@ -17,8 +17,8 @@ CNERF_HD constexpr std::uint64_t mix_bits(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// The number of a purpose's draws: the letters of its name, first letter highest. Purposes of other names draw other
-/// numbers, under the same seed.
+/// The stream of random numbers for a purpose: its name's letters as one number, the first letter highest. Under one
+/// seed, purposes of different names draw different numbers.
 template <std::size_t size>
 CNERF_HD constexpr std::uint64_t named_stream(const char (&name)[size]) {
   static_assert(size <= 9, "eight letters at most");
@@ -46,7 +46,7 @@ struct CounterRng {
   }
 };
 
-/// A sequence of draws for host code that only needs "the next one".
+/// Successive draws, for host code.
 class SequentialRng {
  public:
   SequentialRng(std::uint64_t seed, std::uint64_t stream) : rng_(seed, stream) {}

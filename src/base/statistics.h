@@ -1,5 +1,5 @@
 #pragma once
-/// Order statistics. One rule: between two values in order, what lies between them is a straight line.
+/// Order statistics, with linear interpolation between neighbouring values.
 
 #include <algorithm>
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace cnerf {
 
-/// What a share of the values lies below: 0 gives the least, 1 the largest. The place share * (n - 1) in their order;
-/// a place between two values is interpolated.
+/// The value below which `share` of the values lie: 0 gives the smallest, 1 the largest. It is the one at position
+/// share * (n - 1) of the sorted values, interpolated between two of them.
 /// @param values  at least one
 template <typename Real>
 [[nodiscard]] Real quantile(std::vector<Real> values, double share) {
@@ -23,7 +23,7 @@ template <typename Real>
   return Real(*below + part * (*std::min_element(below + 1, values.end()) - *below));
 }
 
-/// The value in the middle; the mean of the two in the middle where their number is even.
+/// The middle value; of an even number of values the mean of the two middle ones.
 template <typename Real>
 [[nodiscard]] Real median(std::vector<Real> values) {
   return quantile(std::move(values), 0.5);

@@ -1,5 +1,5 @@
 #pragma once
-/// Numbers and lists as people read them.
+/// Numbers and lists formatted for people.
 
 #include <string>
 #include <vector>

@@ -1,17 +1,17 @@
 #pragma once
-/// What the process has used so far.
+/// Time and memory that the process has used.
 
 #include <chrono>
 #include <cstddef>
 
 namespace cnerf {
 
-/// The most memory the process ever held resident, bytes.
+/// Largest resident memory of the process so far, bytes.
 [[nodiscard]] std::size_t peak_memory_bytes();
-/// Memory it holds resident now, bytes; 0 where the system does not tell.
+/// Resident memory of the process now, bytes; 0 where the system does not report it.
 [[nodiscard]] std::size_t held_memory_bytes();
 
-/// Seconds since it was made.
+/// Measures seconds since its construction.
 class Stopwatch {
  public:
   [[nodiscard]] double seconds() const {
@@ -20,6 +20,22 @@ class Stopwatch {
 
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// The time of a training: a clock that stands still while an observer looks.
+class TrainingClock {
+ public:
+  [[nodiscard]] double seconds() const { return watch_.seconds() - paused_; }
+  template <typename Work>
+  void pause_for(Work&& work) {
+    const Stopwatch pause;
+    work();
+    paused_ += pause.seconds();
+  }
+
+ private:
+  Stopwatch watch_;
+  double paused_ = 0;
 };
 
 }  // namespace cnerf

@@ -74,7 +74,6 @@ CNERF_HD constexpr Mat3<R> operator*(const Mat3<R>& a, R s) {
   return {{a.rows[0] * s, a.rows[1] * s, a.rows[2] * s}};
 }
 
-using Mat3f = Mat3<float>;
 using Mat3d = Mat3<double>;
 
 /// Affine map `target = linear * source + translation`. Named `target_from_source`, so products read by cancellation.
@@ -98,6 +97,5 @@ CNERF_HD constexpr Affine<R> operator*(const Affine<R>& a, const Affine<R>& b) {
 }
 
 using Affined = Affine<double>;
-using Affinef = Affine<float>;
 
 }  // namespace cnerf

@@ -1,8 +1,10 @@
 #pragma once
 /// The losses of stage 2 and their gradients, once for every device.
 ///
-/// Bins:   L = w (KL(label || softmax(logits)) + regression_weight R + spread_weight S),   mean over the pixels of a
-/// step Field:  L = w |ab(composited XYZ) - target|, as Huber's loss or squared
+///   bins:   L = w (KL(label || softmax(logits)) + regression_weight R + spread_weight S)
+///   field:  L = w |ab(composited XYZ) - target|, as Huber's loss or squared
+///
+/// Both are means over the pixels of a step.
 ///
 /// w is the pixel's weight, R what it costs that the mean colour of its distribution is away from the label's, S the
 /// spread of its samples' features.

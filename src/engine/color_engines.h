@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,10 @@ struct PixelSamples {
   std::vector<std::size_t> offsets = {0};  ///< [R + 1]
 
   [[nodiscard]] std::size_t pixels() const { return offsets.size() - 1; }
+  [[nodiscard]] float opacity(std::size_t pixel) const {
+    return std::accumulate(weights.begin() + std::ptrdiff_t(offsets[pixel]),
+                           weights.begin() + std::ptrdiff_t(offsets[pixel + 1]), 0.0f);
+  }
 };
 
 /// What a step adds to the cross entropy.
@@ -43,10 +48,6 @@ class ColorBinEngine {
   /// @param pixel_weights  [R] factors of the pixels' losses (class rebalancing, opacity); may be empty = all 1
   virtual double step(const PixelSamples& pixels, std::span<const SoftLabel> labels,
                       std::span<const float> pixel_weights, const ChromaLossWeights& more, float learning_rate) = 0;
-  double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
-              float learning_rate) {
-    return step(pixels, labels, pixel_weights, {}, learning_rate);
-  }
   /// @param logits  [R, 313]; of pixels below kLeastColoredOpacity they mean nothing
   virtual void logits(const PixelSamples& pixels, std::span<float> logits) const = 0;
   /// One colour per pixel, of the same pixels: see `decode_annealed_mean`; temperature 0 is `decode_arg_max`.

@@ -6,12 +6,9 @@ namespace cnerf {
 
 void LuminanceEngine::render_view(const UnitCamera& camera, const MarchSettings& march, const RenderEffort& effort,
                                   std::span<RayResult> results) const {
-  const auto width = std::size_t(camera.intrinsics.width);
   std::vector<Ray> rays(results.size());
   parallel_ranges(rays.size(), 512, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      rays[p] = camera.ray({double(p % width) + 0.5, double(p / width) + 0.5});
-    }
+    for (std::size_t p = begin; p < end; ++p) rays[p] = camera.ray_of_pixel(p);
   });
   render(rays, march, effort, results);
 }

@@ -33,7 +33,7 @@ struct StepReport {
   double loss = 0;           ///< mean over rays of ((L* - L*_observed) / 100)^2 + distortion_weight * distortion
   double squared_error = 0;  ///< mean over rays, on sRGB-encoded luminance clamped to [0, 1]
   std::size_t rays = 0;
-  std::size_t marched_samples = 0, trained_samples = 0;
+  std::size_t trained_samples = 0;
 };
 
 /// What a ray sees. Linear light, over black.

@@ -1,5 +1,5 @@
 #pragma once
-/// What the bake, the viewer and evaluation need of a trained scene: point queries. Engines implement it.
+/// The point queries of a trained scene that bakes, the viewer and evaluation use.
 
 #include <cstddef>
 #include <cstdint>
@@ -22,11 +22,11 @@ class ColorField {
   virtual ~ColorField() = default;
 
   [[nodiscard]] virtual const SceneFrame& frame() const = 0;
-  /// Points worth asking for at once, by one of many threads.
+  /// The batch size at which queries by one of many threads are efficient.
   [[nodiscard]] virtual std::size_t points_at_a_time() const { return std::size_t(1) << 12; }
-  /// False where the occupancy grid knows the cell that holds `position` to be empty.
+  /// False where the occupancy grid says that the cell around `position` is empty.
   [[nodiscard]] virtual bool may_be_occupied(Vec3f position) const = 0;
-  /// The same for all points of a lattice.  @param marks  [x][y][z], written: 1 where `may_be_occupied`
+  /// `may_be_occupied` for all points of a lattice.  @param marks  [x][y][z], written: 1 where `may_be_occupied`
   virtual void mark_occupied(std::span<const float> x, std::span<const float> y, std::span<const float> z,
                              std::span<std::uint8_t> marks) const {
     std::size_t at = 0;

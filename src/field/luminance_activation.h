@@ -1,5 +1,5 @@
 #pragma once
-/// From the outputs of stage 1's nets to density and light.
+/// Output activations of stage 1's nets: density and luminance.
 
 #include <cmath>
 
@@ -8,20 +8,21 @@
 
 namespace cnerf {
 
-/// Density of the density net's first output; 1/unit length. Clamped so that neither sigma nor its gradient overflows.
+/// Density, 1/unit length, from the density net's first output. Clamped so that neither sigma nor its gradient
+/// overflows.
 template <typename Real>
 CNERF_HD Real density_from_raw(Real raw, Real scale) {
   const Real most = Real(15);
   return std::exp(raw > most ? most : raw < -most ? -most : raw) * scale;
 }
 
-/// The luminance net answers in L*, as the loss asks: the gradient then fades only at both ends of the sigmoid, and a
-/// dark capture learns as fast as a bright one.
+/// The luminance net predicts L*, in which the loss is measured: the gradient then vanishes only at both ends of the
+/// sigmoid, and dark captures learn as fast as bright ones.
 template <typename Real>
 struct LuminanceActivation {
   Real brightest;  ///< L* at sigmoid = 1; above 100 for light brighter than white
 
-  /// @param luminance  the brightest that images hold, linear; samples may emit a little more
+  /// @param luminance  linear luminance of the brightest pixel; samples may emit a little more
   [[nodiscard]] static LuminanceActivation up_to(Real luminance) {
     return {lightness_from_luminance(Real(1.05) * luminance)};
   }

@@ -12,7 +12,6 @@ struct MlpLayout {
 
   [[nodiscard]] int layers() const { return int(widths.size()) - 1; }
   [[nodiscard]] int inputs() const { return widths.front(); }
-  [[nodiscard]] int outputs() const { return widths.back(); }
   /// Offset, in floats, of the [out, in] weights of a layer; `weight_offset(layers())` is the number of weights.
   [[nodiscard]] std::size_t weight_offset(int layer) const {
     std::size_t offset = 0;

@@ -1,5 +1,5 @@
 #pragma once
-/// Shapes of the fields' nets and tables, and how they start: the same numbers on every device.
+/// Shapes and initial values of the fields' nets and tables, the same numbers on every device.
 
 #include <cstdint>
 #include <vector>
@@ -18,7 +18,7 @@ inline constexpr int kHiddenWidth = 64;
 inline constexpr std::uint64_t kDensityNetStream = 1, kLuminanceNetStream = 2, kPointNetStream = 3,
                                kChromaHeadStream = 4;
 inline constexpr std::uint64_t kTableStream = 2469;  ///< of `initial_table`
-inline constexpr int kLuminanceOutputs = 4;          ///< one, padded to what the CPU's kernels want
+inline constexpr int kLuminanceOutputs = 4;          ///< one, padded to the block size of the CPU's kernels
 
 /// The nets of stage 1's field.
 [[nodiscard]] inline MlpLayout density_net_layout(int levels) {

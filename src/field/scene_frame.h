@@ -1,6 +1,6 @@
 #pragma once
-/// The similarity between the frame the poses came in ("world") and the unit cube the field lives in ("unit").
-/// It is stored with every snapshot and bake, so that every export goes back to the source frame.
+/// The similarity transform between the frame of the camera poses ("world") and the unit cube of the field ("unit").
+/// Every snapshot and bake stores it, so that exports return to the source frame.
 
 #include "src/base/aabb.h"
 #include "src/base/vec3.h"

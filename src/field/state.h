@@ -1,5 +1,5 @@
 #pragma once
-/// The mutable state of an engine as named pieces of memory, for snapshots.
+/// The state of an engine as named pieces of memory, for snapshots.
 
 #include <cstddef>
 #include <span>
@@ -10,7 +10,7 @@ namespace cnerf {
 
 struct StatePiece {
   std::string name;            ///< unique within one engine
-  std::span<std::byte> bytes;  ///< the memory itself: written to when a snapshot is loaded
+  std::span<std::byte> bytes;  ///< the engine's own memory; loading a snapshot writes to it
 };
 
 template <typename T, typename Allocator>

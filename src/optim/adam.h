@@ -2,6 +2,7 @@
 /// Adam (Kingma and Ba 2015), once for every device and for both kinds of parameters: weights of nets and rows of hash
 /// grids.
 
+#include <algorithm>
 #include <cmath>
 
 #include "src/base/host_device.h"
@@ -25,11 +26,11 @@ struct AdamStep {
         step_size(float(rate / (1.0 - std::pow(double(kAdamBeta1), double(step))))),
         second_correction(float(1.0 / (1.0 - std::pow(double(kAdamBeta2), double(step))))) {}
 
-  /// Share of a parameter that decoupled weight decay leaves.  @param decay  in units of the learning rate
+  /// The factor that decoupled weight decay applies to a parameter.  @param decay  in units of the learning rate
   [[nodiscard]] CNERF_HD float kept(float decay) const { return 1 - learning_rate * decay; }
 
-  /// Moves one parameter against its gradient `d`.
-  /// @param kept  what weight decay leaves of the parameter, 1 without
+  /// Updates one parameter by its gradient `d`.
+  /// @param kept  factor of weight decay; 1 without
   CNERF_HD void apply(float d, float& first_moment, float& second_moment, float& parameter, float kept = 1) const {
     first_moment = kAdamBeta1 * first_moment + (1 - kAdamBeta1) * d;
     second_moment = kAdamBeta2 * second_moment + (1 - kAdamBeta2) * d * d;
@@ -37,5 +38,11 @@ struct AdamStep {
         kept * parameter - step_size * first_moment / (std::sqrt(second_moment * second_correction) + kAdamEpsilon);
   }
 };
+
+/// A step size that is constant for the first half of a training and then falls exponentially.
+/// @param fraction  of the training that is done
+[[nodiscard]] inline float decayed_rate(double from, double to, double fraction) {
+  return float(from * std::pow(to / from, std::clamp(2.0 * fraction - 1.0, 0.0, 1.0)));
+}
 
 }  // namespace cnerf

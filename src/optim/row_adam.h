@@ -15,7 +15,7 @@ struct TableRows {
   std::size_t count = 0;
 };
 
-/// Adam on the rows whose gradient is not zero; those gradients are set to zero. Rows without gradient keep their
+/// Updates the rows whose gradient is not zero, and sets those gradients to zero. Rows without gradient keep their
 /// moments, as in Mueller et al. 2022, Sec. 4.
 /// @param decay  weight decay, in units of the learning rate
 void update_rows(const TableRows& rows, const AdamStep& step, float decay);

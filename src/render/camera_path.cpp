@@ -9,7 +9,6 @@
 #include "src/base/error.h"
 #include "src/base/statistics.h"
 #include "src/capture/arrangement.h"
-#include "src/render/path_file.h"
 
 namespace cnerf {
 namespace {
@@ -149,10 +148,6 @@ CameraPath held_out_path(const Capture& capture) {
     throw InputError(capture.root.string() + ": no view is held out; train with --holdout N to keep some");
   }
   return path;
-}
-
-CameraPath path_from_file(const std::filesystem::path& file) {
-  return {file.stem().string(), read_path_file(file)};
 }
 
 CameraPath make_path(const std::string& kind, const Capture& capture, const PictureOptions& config) {

@@ -37,6 +37,8 @@ struct PickedPixel {
   int x = 0, y = 0;
 };
 
+/// A random pixel of a random view.
+/// @param views    see `observe_ray`
 /// @param attempt  draws again when the first pick was masked out
 template <typename Views>
 CNERF_HD PickedPixel pick_pixel(const Views& views, const CounterRng& rng, std::uint64_t ray, int attempt) {

@@ -1,9 +1,7 @@
 #include "src/render/occupancy_grid.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <numeric>
 
 #include "src/base/check.h"
 #include "src/base/parallel.h"
@@ -58,12 +56,6 @@ void OccupancyGrid::mark_occupied(std::span<const float> x, std::span<const floa
   }
 }
 
-double OccupancyGrid::occupied_share() const {
-  std::size_t count = 0;
-  for (const std::uint64_t word : bits_) count += std::size_t(std::popcount(word));
-  return double(count) / double(density_.size());
-}
-
 void OccupancyGrid::update(const OccupancyUpdate& update,
                            const std::function<void(std::span<const Vec3f>, std::span<float>)>& density) {
   constexpr std::size_t kPiece = 4096;
@@ -110,7 +102,7 @@ void OccupancyGrid::exclude(const std::function<bool(Vec3f, float)>& wanted) {
 void OccupancyGrid::refresh_bits() {
   const std::size_t r = std::size_t(options_.resolution);
   const std::size_t cells = r * r * r;
-  const std::size_t blocks_a_side = r / kBlockSide;
+  const std::size_t blocks_per_side = r / kBlockSide;
   std::fill(blocks_.begin(), blocks_.end(), std::uint8_t(0));
   parallel_tasks(std::size_t(layout_.cascades), [&](std::size_t k) {
     const float* density = density_.data() + k * cells;
@@ -128,7 +120,7 @@ void OccupancyGrid::refresh_bits() {
       const std::size_t word = (k * cells + i) / 64;
       if (((bits_[word] >> (i % 64)) & 0xffu) == 0) continue;
       const std::size_t x = i % r, y = i / r % r, z = i / (r * r);
-      blocks_[((k * blocks_a_side + z / kBlockSide) * blocks_a_side + y / kBlockSide) * blocks_a_side +
+      blocks_[((k * blocks_per_side + z / kBlockSide) * blocks_per_side + y / kBlockSide) * blocks_per_side +
               x / kBlockSide] = 1;
     }
   });

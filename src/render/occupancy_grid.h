@@ -23,9 +23,6 @@ class OccupancyGrid {
  public:
   OccupancyGrid(const OccupancyOptions& options, int cascades);
 
-  [[nodiscard]] int cascades() const { return layout_.cascades; }
-  [[nodiscard]] int resolution() const { return options_.resolution; }
-
   /// The innermost cascade whose box holds `p`, of [0, 1]^3.
   [[nodiscard]] int cascade_of(Vec3f p) const { return layout_.cascade_of(p); }
   [[nodiscard]] bool occupied(int cascade, Vec3f p) const {
@@ -39,10 +36,8 @@ class OccupancyGrid {
   /// False when all 8^3 cells around `p` are empty as well: a marcher may leave the whole block at once.
   [[nodiscard]] bool block_occupied(int cascade, Vec3f p) const { return blocks_[layout_.block_of(cascade, p)] != 0; }
 
-  /// Side of a cell, and of the 8^3 block, of a cascade; unit space.
+  /// Side of a cell of a cascade, unit space.
   [[nodiscard]] float cell_side(int cascade) const { return layout_.cell_side(cascade); }
-  [[nodiscard]] float cascade_side(int cascade) const { return layout_.side(cascade); }
-  [[nodiscard]] double occupied_share() const;
 
   /// Asks `density` for sigma at a point of each cell that the update visits, and refreshes the bits of the whole grid.
   /// The result is a pure function of the arguments and the state.

@@ -64,8 +64,8 @@ struct OccupancyLayout {
   float innermost = 1;  ///< side of cascade 0's cube, unit space
 
   OccupancyLayout() = default;
-  OccupancyLayout(int cells_a_side, int n_cascades)
-      : resolution(cells_a_side), cascades(n_cascades), innermost(std::ldexp(1.0f, 1 - n_cascades)) {}
+  OccupancyLayout(int cells_per_side, int n_cascades)
+      : resolution(cells_per_side), cascades(n_cascades), innermost(std::ldexp(1.0f, 1 - n_cascades)) {}
 
   /// Side of a cascade's cube, unit space.
   [[nodiscard]] CNERF_HD float side(int cascade) const { return float(1u << unsigned(cascade)) * innermost; }

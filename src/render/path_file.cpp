@@ -1,19 +1,18 @@
-#include "src/render/path_file.h"
+// Camera paths on disk, in the manner of transforms.json.
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <optional>
 
-#include "src/base/error.h"
 #include "src/base/json.h"
+#include "src/capture/pose.h"
+#include "src/render/camera_path.h"
 
 namespace cnerf {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr double kRotationTolerance = 1e-3;  // |R R^T - 1|, of matrices written with few digits
 
 /// One frame of the file and the file's own values behind it.
 class Frame {
@@ -29,7 +28,6 @@ class Frame {
     for (const Json* json : {&frame_, &whole_}) {
       if (!json->contains(field)) continue;
       const Json& value = json->at(field);
-      if (!value.is_number()) refuse(field, "expected a number, got " + excerpt(value));
       return value.get<double>();
     }
     return std::nullopt;
@@ -60,32 +58,15 @@ class Frame {
     Affined pose;
     for (int i = 0; i < 3; ++i) {
       if (!matrix[i].is_array() || matrix[i].size() != 4) refuse(field, "expected a 4x4 matrix");
-      double row[4];
       for (int j = 0; j < 4; ++j) {
         if (!matrix[i][j].is_number()) refuse(field, "expected numbers, got " + excerpt(matrix[i][j]));
-        row[j] = matrix[i][j].get<double>();
+        (j < 3 ? pose.linear.rows[i][j] : pose.translation[i]) = matrix[i][j].get<double>();
       }
-      pose.linear.rows[i] = {row[0], -row[1], -row[2]};  // OpenGL's camera axes to OpenCV's
-      pose.translation[i] = row[3];
     }
-    check_rotation(pose.linear, field);
-    return pose;
+    return opencv_from_opengl_camera(rigid_pose(pose, file_, name_ + "." + field));
   }
 
  private:
-  void check_rotation(const Mat3d& rotation, const char* field) const {
-    if (rotation.determinant() < 0) refuse(field, "its 3x3 part mirrors");
-    const Mat3d product = rotation * rotation.transposed();
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        // Written so that NaN fails.
-        if (!(std::abs(product.rows[i][j] - (i == j ? 1 : 0)) < kRotationTolerance)) {
-          refuse(field, "its 3x3 part is not a rotation");
-        }
-      }
-    }
-  }
-
   const std::filesystem::path& file_;
   const Json& whole_;
   const Json& frame_;
@@ -94,16 +75,16 @@ class Frame {
 
 }  // namespace
 
-std::vector<PathCamera> read_path_file(const std::filesystem::path& file) {
+CameraPath path_from_file(const std::filesystem::path& file) {
   const Json json = read_json(file);
   const Json frames = json.is_object() ? json.value("frames", Json()) : Json();
   if (!frames.is_array() || frames.empty()) throw InputError(file, "frames", "expected a list of cameras");
-  std::vector<PathCamera> cameras;
+  CameraPath path{file.stem().string(), {}};
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Frame frame(file, json, frames[i], i);
-    cameras.push_back({fmt::format("frame_{:04}", i), frame.intrinsics(), frame.world_from_camera()});
+    path.cameras.push_back({fmt::format("frame_{:04}", i), frame.intrinsics(), frame.world_from_camera()});
   }
-  return cameras;
+  return path;
 }
 
 }  // namespace cnerf

@@ -26,6 +26,11 @@ struct UnitCamera {
   [[nodiscard]] CNERF_HD Ray ray(PixelPosition pixel) const {
     return {origin.cast<float>(), normalized(unit_from_camera * lens::ray_direction(intrinsics, pixel)).cast<float>()};
   }
+  /// Through the middle of a pixel.  @param index  y * width + x
+  [[nodiscard]] Ray ray_of_pixel(std::size_t index) const {
+    const auto width = std::size_t(intrinsics.width);
+    return ray({double(index % width) + 0.5, double(index / width) + 0.5});
+  }
 };
 
 struct TrainingView {

@@ -103,10 +103,7 @@ class TrainedScene final : public Scene {
                    RenderedImage& image) const {
     std::vector<Ray> rays(last - first);
     parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) {
-        const std::size_t p = first + r, width = std::size_t(image.width);
-        rays[r] = camera.ray({double(p % width) + 0.5, double(p / width) + 0.5});
-      }
+      for (std::size_t r = begin; r < end; ++r) rays[r] = camera.ray_of_pixel(first + r);
     });
     Trace traced;
     luminance_.engine->trace(rays, luminance_.march(options.steps_per_box),

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "encoding/cpu/hash_grid_kernels.h"
-#include "encoding/hash_grid_reference.h"
 #include "tests/bench/bench_support.h"
 #include "tests/support/grouped.h"
+#include "tests/support/hash_grid_reference.h"
 
 namespace cnerf {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "src/base/cpu_features.h"
 #include "src/field/cpu/mlp.h"
-#include "src/field/mlp_reference.h"
 #include "tests/bench/bench_support.h"
 #include "tests/support/grouped.h"
+#include "tests/support/mlp_reference.h"
 
 namespace cnerf {
 namespace {

@@ -22,6 +22,7 @@
 #include "src/color/colorspace_math.h"
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/options_json.h"
+#include "tests/support/occupied_share.h"
 #include "tests/support/validation_fold.h"
 
 namespace {
@@ -122,7 +123,8 @@ int main(int argc, char** argv) {
               views[0].image->height, model.frame.cascades, 1 / model.frame.unit_per_world);
 
   const cnerf::RenderEffort all = {1e-4f, 1.0f}, quick = {1e-3f, 0.995f};  // what is left out is measured at the end
-  double trained = 0, marched = 0, rays = 0, elapsed = 0, processor = 0;
+  double trained = 0, rays = 0, elapsed = 0, processor = 0;
+  const cnerf::OccupancyLayout layout(options.occupancy.resolution, model.frame.cascades);
   const auto length = [&] { return by_samples ? trained / 1e6 : elapsed; };
   for (std::size_t reached = 0; reached < marks.size();) {
     const Clock::time_point start = Clock::now();
@@ -135,23 +137,23 @@ int main(int argc, char** argv) {
     elapsed += seconds_since(start);
     processor += processor_seconds() - processor_start;
     trained += double(step.trained_samples);
-    marched += double(step.marched_samples);
     rays += double(step.rays);
     if (own["verbose"] > 0 && model.engine->step_count() % int(own["verbose"]) == 0) {
-      std::printf("step %ld  %.2f s  rays %zu  marched %zu  trained %zu  loss %.5f  occupied %.4f\n",
-                  model.engine->step_count(), elapsed, step.rays, step.marched_samples, step.trained_samples, step.loss,
-                  model.engine->occupancy().occupied_share());
+      std::printf("step %ld  %.2f s  rays %zu  trained %zu  loss %.5f  occupied %.4f\n", model.engine->step_count(),
+                  elapsed, step.rays, step.trained_samples, step.loss,
+                  cnerf::test::occupied_share(model.engine->occupancy(), layout));
     }
     if (length() < marks[reached]) continue;
     ++reached;
     const Clock::time_point eval_start = Clock::now();
     const double psnr = held_out_psnr(capture, model, int(own["eval_every"]), quick);
     std::printf(
-        "%7.1f s  %5ld steps  %7.1f M samples  %5.1f a ray, %.2f marched  %.3f us/sample (%.3f of processor)  occupied "
+        "%7.1f s  %5ld steps  %7.1f M samples  %5.1f per ray  %.3f us/sample (%.3f of processor)  occupied "
         "%.4f  "
         "PSNR %.2f dB  (eval %.1f s)\n",
-        elapsed, model.engine->step_count(), trained / 1e6, trained / rays, marched / trained, 1e6 * elapsed / trained,
-        1e6 * processor / trained, model.engine->occupancy().occupied_share(), psnr, seconds_since(eval_start));
+        elapsed, model.engine->step_count(), trained / 1e6, trained / rays, 1e6 * elapsed / trained,
+        1e6 * processor / trained, cnerf::test::occupied_share(model.engine->occupancy(), layout), psnr,
+        seconds_since(eval_start));
     std::fflush(stdout);
   }
   for (const auto& [name, effort] : {std::pair("every sample shaded", all), std::pair("as pictures are", quick)}) {

@@ -329,7 +329,7 @@ TEST_F(PositionalField, LearnsColoursAndLeavesTheEncodingAlone) {
   const auto chroma = engines_->make_color_bins({}, 3);
   const std::vector<Ab> wanted = {{30, -20}, {-10, 40}};
   const std::vector<SoftLabel> labels = {soft_label(wanted[0]), soft_label(wanted[1])};
-  for (int i = 0; i < 120; ++i) (void)chroma->step(two_pixels(), labels, {}, 3e-3f);
+  for (int i = 0; i < 120; ++i) (void)chroma->step(two_pixels(), labels, {}, {}, 3e-3f);
   EXPECT_EQ(chroma->step_count(), 120);
   std::vector<Ab> colors(2);
   chroma->decode(two_pixels(), 0.38f, colors);

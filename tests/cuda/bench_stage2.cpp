@@ -55,7 +55,7 @@ void time_engines(const char* device, const PixelSamples& patch, const PixelSamp
   std::vector<Ab> colors(distilled.pixels());
   std::vector<Chromaticity> ratios(distilled.positions.size());
   std::printf("%s: step on %zu pixels %.3f ms", device, patch.pixels(),
-              median_milliseconds(repetitions, [&] { chroma.step(patch, labels, {}, 1e-3f); }));
+              median_milliseconds(repetitions, [&] { chroma.step(patch, labels, {}, {}, 1e-3f); }));
   std::printf("  distillation step on %zu pixels %.3f ms", distilled.pixels(),
               median_milliseconds(repetitions, [&] { chromaticity.step(distilled, targets, 1e-3f); }));
   std::printf("  decoding them %.3f ms",
@@ -74,7 +74,7 @@ void time_stage2(const std::vector<CachedView>& views, const HashGridOptions& gr
   const double injection = milliseconds([&] {
     for (int i = 0; i < patches; ++i) {
       const PixelSamples pixels = visible_pixels(views, rays, std::uint64_t(i));
-      loss = chroma->step(pixels, labels_of(pixels), {}, 1e-2f);
+      loss = chroma->step(pixels, labels_of(pixels), {}, {}, 1e-2f);
     }
   });
   const double distillation = milliseconds([&] {

@@ -8,6 +8,7 @@
 #include "src/color/colorspace_math.h"
 #include "tests/cuda/check.h"
 #include "tests/cuda/packed_capture.h"
+#include "tests/support/occupied_share.h"
 
 namespace cnerf::test {
 namespace {
@@ -83,7 +84,7 @@ int train(const Arguments& arguments) {
     double elapsed = 0;
     std::size_t next = 0;
     StepReport report;
-    double trained = 0, marched = 0, rays = 0;
+    double trained = 0, rays = 0;
     std::printf("seed %d:", seed);
     while (next < report_at.size()) {
       const Clock::time_point start = Clock::now();
@@ -92,7 +93,6 @@ int train(const Arguments& arguments) {
         const double decay = std::clamp((fraction - hold) / (1 - hold), 0.0, 1.0);
         report = engine.step(float(rate * std::pow(final_rate / rate, decay)));
         trained += double(report.trained_samples);
-        marched += double(report.marched_samples);
         rays += double(report.rays);
       }
       wait_for(engine);
@@ -102,9 +102,10 @@ int train(const Arguments& arguments) {
       std::fflush(stdout);
       ++next;
     }
-    std::printf("  | %.0f steps/s, %.0f rays a step, %.1f samples a ray, %.2f marched, %.0f MiB, occupied %.4f\n",
+    std::printf("  | %.0f steps/s, %.0f rays a step, %.1f samples per ray, %.0f MiB, occupied %.4f\n",
                 double(engine.step_count()) / elapsed, rays / double(engine.step_count()), trained / rays,
-                marched / trained, double(free_before - free_bytes()) / (1 << 20), engine.occupancy().occupied_share());
+                double(free_before - free_bytes()) / (1 << 20),
+                occupied_share(engine.occupancy(), {options.occupancy.resolution, options.cascades}));
   }
   return 0;
 }
@@ -129,9 +130,10 @@ int bench(const Arguments& arguments) {
   for (int i = 0; i < kTimed; ++i) report = engine.step(5e-4f);
   wait_for(engine);
   const double per_step = 1e3 * seconds_since(start) / kTimed;
-  std::printf("after %d steps: %zu rays, %zu marched, %zu trained, loss %.5f, occupied %.4f, %.0f MiB\n", steps,
-              report.rays, report.marched_samples, report.trained_samples, report.loss,
-              engine.occupancy().occupied_share(), double(free_before - free_bytes()) / (1 << 20));
+  std::printf("after %d steps: %zu rays, %zu trained samples, loss %.5f, occupied %.4f, %.0f MiB\n", steps, report.rays,
+              report.trained_samples, report.loss,
+              occupied_share(engine.occupancy(), {options.occupancy.resolution, options.cascades}),
+              double(free_before - free_bytes()) / (1 << 20));
   std::printf("step %.3f ms = %.0f steps/s\n", per_step, 1e3 / per_step);
   for (const double min_transmittance : {1e-4, 1e-3, 1e-2, 3e-2}) {
     std::printf("rendered to transmittance %.0e: %.3f dB\n", min_transmittance,

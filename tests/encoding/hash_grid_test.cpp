@@ -3,10 +3,10 @@
 #include <numeric>
 
 #include "encoding/cpu/hash_grid_kernels.h"
-#include "encoding/hash_grid_reference.h"
 #include "src/base/rng.h"
 #include "tests/support/finite_difference.h"
 #include "tests/support/grouped.h"
+#include "tests/support/hash_grid_reference.h"
 #include "tests/support/isa.h"
 
 namespace cnerf {

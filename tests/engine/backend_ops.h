@@ -23,6 +23,13 @@ struct Backend {
   [[nodiscard]] bool is_gpu() const { return !isa; }
   /// @throws DeviceError  where there is no such GPU
   [[nodiscard]] const Engines& engines() const { return engines_for(is_gpu() ? "cuda" : "cpu"); }
+  /// An engine of this back end.  @param make  (Engines) -> engine
+  template <typename Make>
+  [[nodiscard]] auto make(Make&& make) const {
+    std::optional<ScopedIsa> scope;
+    if (isa) scope.emplace(*isa);
+    return make(engines());
+  }
 };
 
 /// A named array that an operation computes.

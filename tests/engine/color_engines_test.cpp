@@ -55,7 +55,7 @@ std::vector<SoftLabel> two_halves(int n) {
 TEST(ColorBinEngine, CompositingFeaturesEqualsCompositingLogits) {
   const auto engine = make_cpu_color_bin_engine(small_grid(), 3);
   const PixelSamples pixels = row_of_pixels(40);
-  for (int i = 0; i < 20; ++i) engine->step(pixels, two_halves(40), {}, 1e-2f);
+  for (int i = 0; i < 20; ++i) engine->step(pixels, two_halves(40), {}, {}, 1e-2f);
 
   std::vector<float> composited(40 * kAbBinCount), of_samples(80 * kAbBinCount);
   engine->logits(pixels, composited);
@@ -72,10 +72,10 @@ TEST(ColorBinEngine, CompositingFeaturesEqualsCompositingLogits) {
 TEST(ColorBinEngine, LearnsTwoColours) {
   const auto engine = make_cpu_color_bin_engine(small_grid(), 3);
   const PixelSamples pixels = row_of_pixels(64);
-  const double first = engine->step(pixels, two_halves(64), {}, 1e-2f);
+  const double first = engine->step(pixels, two_halves(64), {}, {}, 1e-2f);
   EXPECT_NEAR(first, std::log(double(kAbBinCount)), 1.5);  // nearly uniform, less the label's own entropy
   double last = first;
-  for (int i = 0; i < 150; ++i) last = engine->step(pixels, two_halves(64), {}, 1e-2f);
+  for (int i = 0; i < 150; ++i) last = engine->step(pixels, two_halves(64), {}, {}, 1e-2f);
   EXPECT_LT(last, 0.2);
   std::vector<float> logits(64 * kAbBinCount);
   engine->logits(pixels, logits);
@@ -104,7 +104,7 @@ TEST(ColorBinEngine, GradientIsTheLossesDerivativeAndThatOfWhatIsAdded) {
   const PixelSamples pixels = row_of_pixels(48);
   for (const ChromaLossWeights more : {ChromaLossWeights{}, {.spread = 30}, {.regression = 1}, {3, 0.1f}}) {
     const auto engine = make_cpu_color_bin_engine(small_grid(), 5);
-    for (int i = 0; i < 20; ++i) engine->step(pixels, two_halves(48), {}, 1e-2f);
+    for (int i = 0; i < 20; ++i) engine->step(pixels, two_halves(48), {}, {}, 1e-2f);
     test::forget_moments(*engine);
     const auto loss = [&] {
       engine->state_loaded();
@@ -187,7 +187,7 @@ TEST(ColorBinEngine, StepsAreBitEqualForAnyNumberOfThreads) {
     set_thread_count(threads);
     const auto engine = make_cpu_color_bin_engine(small_grid(), 3);
     double loss = 0;
-    for (int i = 0; i < 20; ++i) loss = engine->step(row_of_pixels(300), two_halves(300), {}, 1e-2f);
+    for (int i = 0; i < 20; ++i) loss = engine->step(row_of_pixels(300), two_halves(300), {}, {}, 1e-2f);
     losses.push_back(loss);
   }
   set_thread_count(0);

@@ -92,8 +92,8 @@ std::vector<float> gpu_encode_backward(const std::vector<GridLevel>& levels, con
   const auto d_gradients = uploaded(gradients, "test");
   const auto d_count = uploaded(std::vector<std::uint32_t>{std::uint32_t(count)}, "test");
   const DeviceBuffer<float> d_table(std::size_t(total_rows(levels)) * 4, "test");
-  encode_backward_cuda(levels, d_places.data(), {d_count.data(), std::uint32_t(capacity)}, d_gradients.data(),
-                       d_table.data(), nullptr);
+  encode_backward_cuda(levels, as<float4>(d_places), {d_count.data(), std::uint32_t(capacity)}, d_gradients.data(),
+                       as<float4>(d_table), nullptr);
   CNERF_CUDA(cudaDeviceSynchronize());
   return d_table.downloaded();
 }

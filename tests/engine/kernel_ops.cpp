@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "encoding/cpu/hash_grid_kernels.h"
-#include "encoding/hash_grid_reference.h"
 #include "src/base/rng.h"
 #include "src/base/vec3.h"
 #include "src/optim/row_adam.h"
 #include "tests/engine/backend_ops.h"
 #include "tests/engine/gpu_kernels.h"
 #include "tests/support/grouped.h"
+#include "tests/support/hash_grid_reference.h"
 
 namespace cnerf::test {
 namespace {

@@ -6,18 +6,18 @@
 #include <algorithm>
 #include <numeric>
 
-#include "encoding/hash_grid_reference.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
 #include "src/engine/luminance_engine.h"
 #include "src/field/luminance_activation.h"
-#include "src/field/mlp_reference.h"
 #include "src/field/nets.h"
 #include "src/render/composite_math.h"
 #include "src/render/distortion_math.h"
 #include "tests/support/engine_state.h"
 #include "tests/support/finite_difference.h"
+#include "tests/support/hash_grid_reference.h"
 #include "tests/support/isa.h"
+#include "tests/support/mlp_reference.h"
 #include "tests/support/toy_capture.h"
 
 namespace cnerf {

@@ -20,7 +20,7 @@ namespace {
 
 struct Problem {
   const char* name;
-  int levels, log2_rows, finest, cascades, patch;
+  int levels, log2_rows, finest, cascades;
   bool with_alpha = false, with_lens = false, with_exposures = false;
   float distortion_weight = 0;
 };
@@ -50,15 +50,13 @@ class Scene {
     options_.cascades = problem.cascades;
     options_.march = march_settings(problem.cascades, 64, 1.0 / 64);
     options_.samples_per_step = 8192;
-    options_.patch_size = problem.patch;
     options_.distortion_weight = problem.distortion_weight;
   }
 
   [[nodiscard]] const std::vector<TrainingView>& views() const { return views_; }
   [[nodiscard]] const LuminanceEngineOptions& options() const { return options_; }
   [[nodiscard]] std::unique_ptr<LuminanceEngine> fresh(const Backend& backend) const {
-    if (backend.isa) force_isa(*backend.isa);
-    auto engine = backend.engines().make_luminance(options_);
+    auto engine = backend.make([&](const Engines& engines) { return engines.make_luminance(options_); });
     engine->set_views(views_);
     return engine;
   }
@@ -231,13 +229,13 @@ Op out_of_memory() {
 }  // namespace
 
 std::vector<Op> luminance_ops() {
-  return {stage1({"Stage1WithExposures", 8, 14, 64, 1, 0, false, false, true}),
-          stage1({"Stage1WithDistortionLoss", 8, 14, 64, 2, 0, false, false, false, 0.3f}),
-          stage1({"Stage1WithAlpha", 3, 12, 20, 1, 0, true}),
-          stage1({"Stage1WithCascadesLensAndMask", 12, 14, 128, 3, 0, false, true}),
-          stage1({"Stage1WithPatches", 16, 13, 128, 2, 8}),
-          stage1_learning({"Stage1Learns", 8, 14, 64, 1, 0, false, false, true}),
-          stage1_learning({"Stage1LearnsWithCascades", 12, 14, 128, 3, 0, false, true}),
+  return {stage1({"Stage1WithExposures", 8, 14, 64, 1, false, false, true}),
+          stage1({"Stage1WithDistortionLoss", 8, 14, 64, 2, false, false, false, 0.3f}),
+          stage1({"Stage1WithAlpha", 3, 12, 20, 1, true}),
+          stage1({"Stage1WithCascadesLensAndMask", 12, 14, 128, 3, false, true}),
+          stage1({"Stage1WithManyLevels", 16, 13, 128, 2}),
+          stage1_learning({"Stage1Learns", 8, 14, 64, 1, false, false, true}),
+          stage1_learning({"Stage1LearnsWithCascades", 12, 14, 128, 3, false, true}),
           out_of_memory()};
 }
 

@@ -2,10 +2,10 @@
 
 #include "src/base/rng.h"
 #include "src/field/cpu/mlp_kernels.h"
-#include "src/field/mlp_reference.h"
 #include "tests/support/finite_difference.h"
 #include "tests/support/grouped.h"
 #include "tests/support/isa.h"
+#include "tests/support/mlp_reference.h"
 
 namespace cnerf {
 namespace {

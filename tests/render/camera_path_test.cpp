@@ -168,8 +168,8 @@ TEST(PathFile, ErrorsNameFileAndField) {
   EXPECT_THAT(message_for(R"({"frames": [{}]})"), HasSubstr("frames[0].w, h"));
   EXPECT_THAT(message_for(R"({"w": 9, "h": 9, "frames": [{}]})"), HasSubstr("frames[0].fl_x"));
   EXPECT_THAT(message_for(start + "[[1,0,0],[0,1,0],[0,0,1]]}]}"), HasSubstr("frames[0].transform_matrix"));
-  EXPECT_THAT(message_for(start + "[[2,0,0,0],[0,1,0,0],[0,0,1,0]]}]}"), HasSubstr("not a rotation"));
-  EXPECT_THAT(message_for(start + "[[-1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}"), HasSubstr("mirrors"));
+  EXPECT_THAT(message_for(start + "[[2,0,0,0],[0,1,0,0],[0,0,1,0]]}]}"), HasSubstr("not orthonormal"));
+  EXPECT_THAT(message_for(start + "[[-1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}"), HasSubstr("mirrored"));
   EXPECT_THAT(message_for(start + "[[1,0,0,0],[0,1,0,0],[0,0,1,\"x\"]]}]}"), HasSubstr("expected numbers"));
   EXPECT_THROW((void)path_from_file("/absent/path.json"), MissingInputError);
 }

@@ -1,6 +1,9 @@
 #pragma once
 /// Every instruction set this machine can run, for parametrised tests.
 
+#include <cstdlib>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "src/base/cpu_features.h"
@@ -15,13 +18,26 @@ inline std::vector<IsaLevel> available_isas() {
   return levels;
 }
 
-/// Forces a level for the scope.
+/// Engines that are made in this scope use this instruction set.
 class ScopedIsa {
  public:
-  explicit ScopedIsa(IsaLevel level) { force_isa(level); }
-  ~ScopedIsa() { force_isa(detected_isa()); }
+  explicit ScopedIsa(IsaLevel level) {
+    if (const char* before = std::getenv(kName)) before_ = before;
+    ::setenv(kName, to_string(level).c_str(), 1);
+  }
+  ~ScopedIsa() {
+    if (before_) {
+      ::setenv(kName, before_->c_str(), 1);
+    } else {
+      ::unsetenv(kName);
+    }
+  }
   ScopedIsa(const ScopedIsa&) = delete;
   ScopedIsa& operator=(const ScopedIsa&) = delete;
+
+ private:
+  static constexpr const char* kName = "CNERF_ISA";
+  std::optional<std::string> before_;
 };
 
 }  // namespace cnerf::test

@@ -1,5 +1,5 @@
 #pragma once
-/// Memory of the GPU with owners, and CUDA calls that throw DeviceError.
+/// RAII for memory of the GPU, and CUDA calls that throw DeviceError.
 
 #include <cuda_runtime_api.h>
 
@@ -13,21 +13,21 @@
 
 namespace cnerf {
 
-/// @throws DeviceError  naming the call and the driver's own words.
+/// @throws DeviceError  naming the call and quoting the driver.
 inline void cuda_check(cudaError_t result, const char* call) {
   if (result == cudaSuccess) return;
-  cudaGetLastError();  // otherwise the next, innocent call reports it again
+  cudaGetLastError();  // clears the error, which the next call would report again
   throw DeviceError(std::string(call) + ": " + cudaGetErrorString(result));
 }
 #define CNERF_CUDA(call) ::cnerf::cuda_check((call), #call)
 
-/// Plain device memory of trivially copyable elements. What the constructor and `upload` write has arrived when they
-/// return: they use the default stream, for which the engine's own streams do not wait.
+/// Device memory of trivially copyable elements. The constructor and the `upload` without a stream are synchronous:
+/// they use the default stream, which the engines' non-blocking streams do not wait for.
 template <typename T>
 class DeviceBuffer {
  public:
   DeviceBuffer() = default;
-  /// Zeroed memory.  @param use  what for, and what to lower when there is not enough, for the error message
+  /// Zeroed memory.  @param use  for the error message: what the memory is for, and which option lowers it
   DeviceBuffer(std::size_t size, const std::string& use) : size_(size) {
     if (size == 0) return;
     const cudaError_t result = cudaMalloc(reinterpret_cast<void**>(&data_), size * sizeof(T));
@@ -55,16 +55,16 @@ class DeviceBuffer {
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::size_t bytes() const { return size_ * sizeof(T); }
 
-  /// Makes room for `size` elements; what was there is lost when it has to grow.
+  /// Makes room for at least `size` elements. Growing discards the content.
   void reserve(std::size_t size, const std::string& use) {
     if (size_ < size) *this = DeviceBuffer(size + size / 4, use);
   }
 
-  /// In the order of a stream; `from` may be changed at once.
+  /// Ordered by the stream; `from` may be changed after the call.
   void upload(const T* from, std::size_t count, cudaStream_t stream) const {
     if (count > 0) CNERF_CUDA(cudaMemcpyAsync(data_, from, count * sizeof(T), cudaMemcpyHostToDevice, stream));
   }
-  /// In the order of a stream; there when that has been waited for.
+  /// Ordered by the stream; `to` is complete once the stream has been waited for.
   void download(T* to, std::size_t count, cudaStream_t stream) const {
     if (count > 0) CNERF_CUDA(cudaMemcpyAsync(to, data_, count * sizeof(T), cudaMemcpyDeviceToHost, stream));
   }

@@ -1,11 +1,16 @@
 #pragma once
-/// How many blocks a kernel is launched with. Calls of every launch: what the driver says is asked for once.
+/// How many blocks a kernel is launched with. Driver queries are cached, since every launch needs them.
 
 #include <algorithm>
 
 #include "src/base/cuda/device_memory.h"
 
 namespace cnerf {
+
+/// Blocks of `threads` threads that cover so many items.
+constexpr unsigned blocks_for(std::size_t items, unsigned threads) {
+  return unsigned((items + threads - 1) / threads);
+}
 
 inline int multiprocessors() {
   static const int count = [] {
@@ -17,7 +22,7 @@ inline int multiprocessors() {
   return count;
 }
 
-/// Blocks of a kernel that fill the GPU; allows it that much shared memory.
+/// The number of blocks of a kernel that fill the GPU. Also raises the kernel's limit of shared memory.
 template <auto kKernel>
 unsigned resident_blocks(int threads, std::size_t shared_bytes) {
   static const unsigned blocks = [&] {

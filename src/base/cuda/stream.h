@@ -1,5 +1,5 @@
 #pragma once
-/// Streams and events of the GPU with owners.
+/// RAII for streams and events of the GPU.
 
 #include <cuda_runtime_api.h>
 
@@ -7,7 +7,7 @@
 
 namespace cnerf {
 
-/// Work that runs in order, beside that of other streams.
+/// A queue of work that runs in order, concurrently with other streams.
 class CudaStream {
  public:
   CudaStream() { CNERF_CUDA(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking)); }
@@ -34,7 +34,7 @@ class CudaEvent {
 
   void record(cudaStream_t stream) const { CNERF_CUDA(cudaEventRecord(event_, stream)); }
   void wait() const { CNERF_CUDA(cudaEventSynchronize(event_)); }
-  /// Lets a stream wait, not the caller.
+  /// Makes a stream wait, not the caller.
   void hold(cudaStream_t stream) const { CNERF_CUDA(cudaStreamWaitEvent(stream, event_, 0)); }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
-/// Sums across a warp, or across groups of its lanes that each work on something of their own. All 32 lanes call them
-/// together.
+/// Sums and ballots over a warp, or over groups of its lanes that work on separate problems. All 32 lanes must call
+/// them together.
 
 namespace cnerf {
 
@@ -22,7 +22,7 @@ __device__ inline float warp_prefix_sum(float value) {
   }
   return value;
 }
-/// A bit a lane of the group, lowest first.
+/// One bit per lane of the group, lane 0 lowest.
 template <int kLanes = 32>
 __device__ inline unsigned warp_ballot(bool yes) {
   const unsigned all = __ballot_sync(~0u, yes);

@@ -25,7 +25,6 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     head_.set_weights(initial_chroma_head(seed));
   }
 
-  using ColorBinEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
@@ -95,12 +94,6 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     AlignedVector<float> composited, logits, d_composited, d_logits;  // pixels as lanes
   };
 
-  static float inverse_opacity_of(const PixelSamples& pixels, std::size_t p) {
-    float opacity = 0;
-    for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) opacity += pixels.weights[s];
-    return inverse_opacity(opacity);
-  }
-
   void forward(const PixelSamples& pixels, std::size_t begin, std::size_t end, Work& work) const {
     const std::size_t first = pixels.offsets[begin];
     features_.set_points(std::span(pixels.positions).subspan(first, pixels.offsets[end] - first), work.points);
@@ -112,7 +105,7 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     const GroupedView<float> composited(work.composited, kHeadInputs);
     const GroupedView<const float> features(work.points.output, kFeatures);
     for (std::size_t p = begin; p < end; ++p) {
-      const float inverse = inverse_opacity_of(pixels, p);
+      const float inverse = inverse_opacity(pixels.opacity(p));
       for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
         const float weight = pixels.weights[s] * inverse;
         for (int c = 0; c < kFeatures; ++c) {
@@ -193,7 +186,7 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     const GroupedView<const float> d_composited(work.d_composited, kHeadInputs);
     double spread = 0;
     for (std::size_t p = begin; p < end; ++p) {
-      const float inverse = inverse_opacity_of(pixels, p);
+      const float inverse = inverse_opacity(pixels.opacity(p));
       for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
         const float share = pixels.weights[s] * inverse;
         float squared_distance = 0;

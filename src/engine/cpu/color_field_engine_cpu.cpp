@@ -96,7 +96,7 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
     return sum;
   }
 
-  /// Gradient of a pixel's loss by the outputs of its samples.
+  /// Sets the gradient of the outputs of a pixel's samples.
   static void set_gradient(const PixelSamples& pixels, std::size_t p, std::size_t first, const AbError& error,
                            PointWorkspace& work) {
     const GroupedView<const float> logs(work.output, kChromaticityOutputs);

@@ -63,35 +63,34 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   struct Block {
     std::vector<MarchedSample> samples;
     std::vector<std::size_t> offsets;  // [rays + 1]
-    std::size_t marched = 0;
-    AlignedVector<float> positions;  // [G, 3, 16]
+    AlignedVector<float> positions;    // [G, 3, 16]
     LuminanceWorkspace work;
     // Scratch of the density-first pass.
     std::vector<std::vector<MarchedSample>> of_ray;
     AlignedVector<float> wave_positions, wave_sigma;
   };
-  /// A ray on its way through the density-first pass.
+
+  /// A ray on its way through occupied space.
   struct Walk {
     RayMarcher marcher;
-    float transmittance = 1;
-    bool active = true;
-    std::size_t wave_begin = 0, wave_end = 0;  ///< its samples of this wave
+    float transmittance = 1;  // behind the composited samples
+    bool is_open = true;      // lets light through, and has samples left
+    std::size_t in_wave = 0;  // samples it added to the wave
   };
   using Walks = std::array<Walk, kBlockRays>;
 
   /// Marches rays together and keeps the samples in front of the point where a ray becomes opaque.
   ///
   /// How many samples a ray needs is only known once their densities are, and densities are computed 16 at a time. So
-  /// the block's rays advance in waves: each ray that still lets light through adds up to kWaveSamples to the wave, the
-  /// densities of the whole wave are computed at once, then each ray composites its part. What is hidden behind a
-  /// surface costs at most the rest of one wave.
+  /// the block's rays advance in waves: each open ray adds up to kWaveSamples samples to the wave (`march_wave`), one
+  /// call computes the densities of the whole wave, then each ray composites its own samples and closes where it
+  /// becomes opaque (`composite_wave`). What lies hidden behind a surface costs at most the rest of one wave.
   void collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
                float min_transmittance, Block& block) const;
-  /// Takes the wave's samples of each active ray.  @return how many in all
+  /// Returns the number of samples in the wave; their positions go to `block.wave_positions`.
   static std::size_t march_wave(std::span<const Ray> rays, Walks& walks, Block& block);
-  /// Composites what a ray has in the wave.
-  static void composite_wave(Walk& walk, std::vector<MarchedSample>& kept, std::span<const float> sigma,
-                             float min_transmittance);
+  /// Weights the wave's samples by the densities in `block.wave_sigma`; drops those behind the end of a ray.
+  static void composite_wave(float min_transmittance, std::span<Walk> walks, Block& block);
   /// `collect` from the middle of each step, and of what it keeps the heaviest samples.
   void collect_for_picture(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                            Block& block) const;
@@ -117,40 +116,6 @@ LuminanceEngineCpu::LuminanceEngineCpu(const LuminanceEngineOptions& options)
       occupancy_(options.occupancy, options.cascades),
       counters_{0, first_rays(options.samples_per_step)} {}
 
-std::size_t LuminanceEngineCpu::march_wave(std::span<const Ray> rays, Walks& walks, Block& block) {
-  std::size_t count = 0;
-  for (std::size_t r = 0; r < rays.size(); ++r) {
-    Walk& walk = walks[r];
-    walk.wave_begin = count;
-    RaySample sample;
-    for (std::size_t i = 0; walk.active && i < kWaveSamples; ++i) {
-      if (block.of_ray[r].size() >= kMostSamplesPerRay || !walk.marcher.next(sample)) {
-        walk.active = false;
-        break;
-      }
-      set_position(block.wave_positions.data(), count++, rays[r].at(sample.t));
-      block.of_ray[r].push_back({sample.t, sample.dt, 0.0f});
-    }
-    walk.wave_end = count;
-  }
-  return count;
-}
-
-void LuminanceEngineCpu::composite_wave(Walk& walk, std::vector<MarchedSample>& kept, std::span<const float> sigma,
-                                        float min_transmittance) {
-  std::size_t at = kept.size() - (walk.wave_end - walk.wave_begin);
-  for (std::size_t s = walk.wave_begin; s < walk.wave_end; ++s, ++at) {
-    const float alpha = alpha_of(sigma[s], kept[at].dt);
-    kept[at].weight = walk.transmittance * alpha;
-    walk.transmittance *= 1.0f - alpha;
-    if (walk.transmittance < min_transmittance) {
-      kept.resize(at + 1);
-      walk.active = false;
-      return;
-    }
-  }
-}
-
 void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
                                  float min_transmittance, Block& block) const {
   Walks walks;
@@ -159,16 +124,13 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
     walks[r].marcher = RayMarcher(occupancy_, march, rays[r], jitter[r]);
     block.of_ray[r].clear();
   }
-  block.marched = 0;
   ensure_size(block.wave_positions, kBlockRays * kWaveSamples * 3);
   ensure_size(block.wave_sigma, kBlockRays * kWaveSamples);
+
   while (const std::size_t count = march_wave(rays, walks, block)) {
-    block.marched += count;
     pad_positions(block.wave_positions, count);
     field_.density(block.wave_positions.data(), groups_of(count), block.work, block.wave_sigma.data());
-    for (std::size_t r = 0; r < rays.size(); ++r) {
-      composite_wave(walks[r], block.of_ray[r], block.wave_sigma, min_transmittance);
-    }
+    composite_wave(min_transmittance, std::span(walks).first(rays.size()), block);
   }
 
   block.samples.clear();
@@ -176,6 +138,44 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
   for (std::size_t r = 0; r < rays.size(); ++r) {
     block.samples.insert(block.samples.end(), block.of_ray[r].begin(), block.of_ray[r].end());
     block.offsets.push_back(block.samples.size());
+  }
+}
+
+std::size_t LuminanceEngineCpu::march_wave(std::span<const Ray> rays, Walks& walks, Block& block) {
+  std::size_t count = 0;
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    Walk& walk = walks[r];
+    RaySample sample;
+    for (walk.in_wave = 0; walk.is_open && walk.in_wave < kWaveSamples; ++walk.in_wave) {
+      if (block.of_ray[r].size() >= kMostSamplesPerRay || !walk.marcher.next(sample)) {
+        walk.is_open = false;
+        break;
+      }
+      set_position(block.wave_positions.data(), count++, rays[r].at(sample.t));
+      block.of_ray[r].push_back({sample.t, sample.dt, 0.0f});
+    }
+  }
+  return count;
+}
+
+void LuminanceEngineCpu::composite_wave(float min_transmittance, std::span<Walk> walks, Block& block) {
+  const float* sigma = block.wave_sigma.data();
+  for (std::size_t r = 0; r < walks.size(); ++r) {
+    Walk& walk = walks[r];
+    std::vector<MarchedSample>& kept = block.of_ray[r];
+    const std::size_t first = kept.size() - walk.in_wave;
+    for (std::size_t i = 0; i < walk.in_wave; ++i) {
+      MarchedSample& sample = kept[first + i];
+      const float alpha = alpha_of(sigma[i], sample.dt);
+      sample.weight = walk.transmittance * alpha;
+      walk.transmittance *= 1.0f - alpha;
+      if (walk.transmittance < min_transmittance) {
+        kept.resize(first + i + 1);
+        walk.is_open = false;
+        break;
+      }
+    }
+    sigma += walk.in_wave;
   }
 }
 
@@ -222,7 +222,6 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
   }
   float* d_encoded = chunk.append(block.positions, block.work.groups, field_.encoded_channels());
   field_.backward(block.work, d_encoded, chunk.d_weights.data());
-  chunk.marched += block.marched;
   chunk.trained += block.samples.size();
 }
 
@@ -269,7 +268,6 @@ StepReport LuminanceEngineCpu::report() const {
   for (const StepChunk& chunk : chunks_.all()) {
     report.loss += chunk.loss / double(report.rays);
     report.squared_error += chunk.squared_error / double(report.rays);
-    report.marched_samples += chunk.marched;
     report.trained_samples += chunk.trained;
   }
   return report;

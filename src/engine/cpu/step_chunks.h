@@ -19,10 +19,10 @@ struct StepChunk {
   std::size_t groups = 0;
   std::vector<float> d_weights;
   double loss = 0, squared_error = 0;
-  std::size_t marched = 0, trained = 0;  ///< samples
+  std::size_t trained = 0;  ///< samples
 
   void clear(std::size_t weight_count) {
-    groups = marched = trained = 0;
+    groups = trained = 0;
     loss = squared_error = 0;
     d_weights.assign(weight_count, 0.0f);
   }

@@ -23,8 +23,8 @@ __device__ void for_each_pixel(std::uint32_t pixels, Work&& work) {
   }
 }
 unsigned pixel_blocks(std::uint32_t pixels) {
-  constexpr unsigned kBlocksAProcessor = 8;
-  return std::min(kBlocksAProcessor * unsigned(multiprocessors()), (pixels + kPixelWarps - 1) / kPixelWarps);
+  constexpr unsigned kBlocksPerProcessor = 8;
+  return std::min(kBlocksPerProcessor * unsigned(multiprocessors()), (pixels + kPixelWarps - 1) / kPixelWarps);
 }
 
 __global__ void prepare(const PixelArrays pixels) {
@@ -397,8 +397,9 @@ int chroma_head_parts(std::uint32_t pixels) {
 int chroma_head_weight_count() {
   return kHeadWeights;
 }
-DenseLayer chroma_head_layer(TrainedWeights trained, uint2* forward, uint2* backward) {
-  return {kChromaHeadInputs, kChromaHeadOutputs, kInputs, kOutputs, kFeatures, trained, forward, backward, nullptr};
+DenseLayer chroma_head_layer(TrainedWeights trained, PackedWeights packed) {
+  return {kChromaHeadInputs, kChromaHeadOutputs, kInputs,         kOutputs, kFeatures,
+          trained,           packed.forward,     packed.backward, nullptr};
 }
 
 void composite_chromaticity(const PixelArrays& pixels, const float2* logs, Ab* colors, cudaStream_t stream) {

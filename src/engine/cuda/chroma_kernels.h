@@ -66,8 +66,8 @@ void chroma_loss(const ChromaHeadJob& job, const ChromaTargets& targets, cudaStr
 
 [[nodiscard]] int chroma_head_parts(std::uint32_t pixels);
 [[nodiscard]] int chroma_head_weight_count();
-/// @param forward, backward  [chroma_head_weight_count()] packed
-[[nodiscard]] DenseLayer chroma_head_layer(TrainedWeights trained, uint2* forward, uint2* backward);
+/// @param packed  [chroma_head_weight_count()]
+[[nodiscard]] DenseLayer chroma_head_layer(TrainedWeights trained, PackedWeights packed);
 
 /// ab of the pixels' composited XYZ.
 /// @param logs    [samples] log x, log z

@@ -17,12 +17,10 @@ class ColorBinEngineCuda final : public ColorBinEngine {
   ColorBinEngineCuda(const HashGridOptions& grid, std::uint64_t seed)
       : features_(grid, PointOutputs::kFeatures, seed),
         head_(initial_chroma_head(seed)),
-        forward_(std::size_t(chroma_head_weight_count()), "nets"),
-        backward_(std::size_t(chroma_head_weight_count()), "nets") {
+        packed_head_(chroma_head_weight_count()) {
     state_loaded();
   }
 
-  using ColorBinEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
@@ -98,21 +96,18 @@ class ColorBinEngineCuda final : public ColorBinEngine {
     }
   }
   [[nodiscard]] ChromaHeadJob head_job() const {
-    return {batch_.arrays(),
-            features_.features(),
-            {reinterpret_cast<const uint2*>(forward_.data()), reinterpret_cast<const uint2*>(backward_.data())}};
+    return {batch_.arrays(), features_.features(), packed_head_.weights()};
   }
   /// @param gradient  null: only packs the weights
   void update_head(const float* gradient, int parts) const {
-    update_layers({chroma_head_layer(head_.weights(), reinterpret_cast<uint2*>(forward_.data()),
-                                     reinterpret_cast<uint2*>(backward_.data()))},
-                  gradient, parts, &stream_.step()->adam, stream_);
+    update_layers({chroma_head_layer(head_.weights(), packed_head_.weights())}, gradient, parts, &stream_.step()->adam,
+                  stream_);
   }
 
   ChromaStream stream_;
   mutable PointNetCuda features_;
   TrainedNet head_;
-  DeviceBuffer<std::uint16_t> forward_, backward_;  // the head's packed weights
+  PackedBuffers packed_head_;
   DeviceBuffer<float> d_head_, d_composited_;
   DeviceBuffer<SoftLabel> labels_;
   std::vector<std::int64_t> steps_ = {0};

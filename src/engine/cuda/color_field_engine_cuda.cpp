@@ -29,16 +29,15 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
     stream_.begin_step(learning_rate, steps_.front(), batch_.samples());
     colors_.reserve(n, "pixels");
     colors_.upload(targets.data(), n, stream_);
-    d_logs_.reserve(2 * std::size_t(batch_.samples()), "samples");
-    auto* d_logs = reinterpret_cast<float2*>(d_logs_.data());
+    d_logs_.reserve(batch_.samples(), "samples");
 
     field_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/true, stream_);
     const float scale = 1.0f / float(n);
-    chromaticity_loss(
-        batch_.arrays(), field_.numbers(),
-        {colors_.data(), batch_.upload_weights(pixel_weights, stream_), loss, scale, d_logs, &stream_.step()->loss},
-        stream_);
-    field_.backward(batch_.arrays().places, {&stream_.step()->samples, batch_.samples()}, {.d_numbers = d_logs},
+    chromaticity_loss(batch_.arrays(), field_.numbers(),
+                      {colors_.data(), batch_.upload_weights(pixel_weights, stream_), loss, scale, d_logs_.data(),
+                       &stream_.step()->loss},
+                      stream_);
+    field_.backward(batch_.arrays().places, {&stream_.step()->samples, batch_.samples()}, {.d_numbers = d_logs_.data()},
                     stream_);
     field_.update(&stream_.step()->adam, stream_);
     return stream_.end_step() * scale;
@@ -90,7 +89,7 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
  private:
   ChromaStream stream_;
   mutable PointNetCuda field_;
-  DeviceBuffer<float> d_logs_;  // 2 a sample
+  DeviceBuffer<float2> d_logs_;
   std::vector<std::int64_t> steps_ = {0};
   mutable PixelBatch batch_;
   mutable DeviceBuffer<Ab> colors_;

@@ -20,11 +20,11 @@ LuminanceStepCuda::LuminanceStepCuda(const LuminanceEngineOptions& options, cons
       field_(field),
       stream_(stream),
       state_(1, "nets"),
-      places_(capacity_ * std::size_t(4), kSampleAdvice),
-      gradients_(capacity_ * std::size_t(2), kSampleAdvice),
-      encoded_(capacity_ * std::size_t(16 * channel_tiles(field.levels())), kSampleAdvice),
+      places_(capacity_, kSampleAdvice),
+      gradients_(capacity_, kSampleAdvice),
+      encoded_(capacity_ * std::size_t(2 * channel_tiles(field.levels())), kSampleAdvice),
       rays_(std::size_t(kMostRays), kRayAdvice),
-      directions_(std::size_t(8 * kMostRays), kRayAdvice) {}
+      directions_(std::size_t(kMostRays), kRayAdvice) {}
 
 LuminanceStepCuda::~LuminanceStepCuda() {
   cudaStreamSynchronize(stream_);
@@ -53,29 +53,22 @@ TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
   job.march = options_.march;
   job.min_transmittance = kTrainingTransmittance;
   job.rays = rays_.data();
-  job.directions = reinterpret_cast<const DirectionCode*>(directions_.data());
+  job.directions = directions_.data();
   job.state = state_.data();
-  job.samples = {capacity_, reinterpret_cast<float4*>(places_.data()), reinterpret_cast<uint4*>(encoded_.data()),
-                 reinterpret_cast<float2*>(gradients_.data())};
+  job.samples = {capacity_, places_.data(), encoded_.data(), gradients_.data()};
   job.distortion_weight = options_.distortion_weight;
   return job;
 }
 
 FieldSamples LuminanceStepCuda::samples() const {
-  const TraceJob job = trace_job(nullptr);
-  return {{&state_.data()->samples, capacity_},
-          job.samples.places,
-          job.directions,
-          job.samples.encoded,
-          job.samples.gradients};
+  return {{&state_.data()->samples, capacity_}, places_.data(), directions_.data(), encoded_.data(), gradients_.data()};
 }
 
 /// The nets' optimiser and the hash grid's backward pass need the same gradients and nothing of each other.
 void LuminanceStepCuda::launch(const std::uint32_t* occupied) {
   const AdamStep* adam = &state_.data()->adam;
   begin_step(state_.data(), learning_rates_.on_device(), stream_);
-  draw_training_rays({state_.data(), views_.records(), views_.count(), options_.seed, rays_.data(),
-                      reinterpret_cast<DirectionCode*>(directions_.data())},
+  draw_training_rays({state_.data(), views_.records(), views_.count(), options_.seed, rays_.data(), directions_.data()},
                      stream_);
   trace_training_rays(trace_job(occupied), stream_);
   field_.nets_backward(samples(), stream_);
@@ -120,7 +113,7 @@ StepReport LuminanceStepCuda::run(float learning_rate, const std::uint32_t* occu
   const long reported = is_early ? steps_ : steps_ - kMostAhead;
   ++steps_;
   const StepRecord& r = reports_[std::size_t(reported % kStepRing)];
-  return {r.loss, r.squared_error, r.rays, r.marched, r.trained};
+  return {r.loss, r.squared_error, r.rays, r.trained};
 }
 
 }  // namespace cnerf

@@ -53,10 +53,11 @@ class LuminanceStepCuda {
   ViewImages views_;
 
   DeviceBuffer<StepState> state_;
-  DeviceBuffer<float> places_, gradients_;  // 4 and 2 per sample
-  DeviceBuffer<std::uint16_t> encoded_;
+  DeviceBuffer<float4> places_;
+  DeviceBuffer<float2> gradients_;
+  DeviceBuffer<uint4> encoded_;
   DeviceBuffer<RayRecord> rays_;
-  DeviceBuffer<std::uint32_t> directions_;  // 8 per ray
+  DeviceBuffer<DirectionCode> directions_;
 
   MappedBuffer<float> learning_rates_{kStepRing};
   MappedBuffer<StepRecord> reports_{kStepRing};

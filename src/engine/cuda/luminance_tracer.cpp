@@ -51,7 +51,7 @@ TraceJob LuminanceTracerCuda::job(const FieldView& field, std::uint32_t rays, co
                                   const RenderEffort& effort) {
   state_.reserve(1, kRayAdvice);
   rays_.reserve(rays, kRayAdvice);
-  directions_.reserve(rays * std::size_t(8), kRayAdvice);
+  directions_.reserve(rays, kRayAdvice);
   StepState state;
   state.rays = rays;
   state_.upload(&state, 1, stream_);
@@ -62,7 +62,7 @@ TraceJob LuminanceTracerCuda::job(const FieldView& field, std::uint32_t rays, co
   job.march = march;
   job.min_transmittance = effort.min_transmittance;
   job.rays = rays_.data();
-  job.directions = reinterpret_cast<const DirectionCode*>(directions_.data());
+  job.directions = directions_.data();
   job.state = state_.data();
   return job;
 }
@@ -73,7 +73,7 @@ TraceJob LuminanceTracerCuda::job_of_rays(const FieldView& field, std::span<cons
   const TraceJob trace = job(field, count, march, effort);
   plain_rays_.reserve(count, kRayAdvice);
   plain_rays_.upload(rays.data(), count, stream_);
-  prepare_rays(plain_rays_.data(), count, rays_.data(), reinterpret_cast<DirectionCode*>(directions_.data()), stream_);
+  prepare_rays(plain_rays_.data(), count, rays_.data(), directions_.data(), stream_);
   return trace;
 }
 
@@ -95,7 +95,7 @@ void LuminanceTracerCuda::render_view(const FieldView& field, const UnitCamera& 
   const auto count = std::uint32_t(camera.intrinsics.width) * std::uint32_t(camera.intrinsics.height);
   results_.reserve(count, kRayAdvice);
   TraceJob trace = job(field, count, march, effort);
-  camera_rays(camera, count, rays_.data(), reinterpret_cast<DirectionCode*>(directions_.data()), stream_);
+  camera_rays(camera, count, rays_.data(), directions_.data(), stream_);
   trace.results = results_.data();
   render_rays(trace, stream_);
   results_.download(results.data(), results.size(), stream_);

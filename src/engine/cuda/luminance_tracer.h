@@ -48,7 +48,7 @@ class LuminanceTracerCuda {
   DeviceBuffer<StepState> state_;
   DeviceBuffer<Ray> plain_rays_;
   DeviceBuffer<RayRecord> rays_;
-  DeviceBuffer<std::uint32_t> directions_;  // 8 per ray
+  DeviceBuffer<DirectionCode> directions_;
   DeviceBuffer<RayResult> results_;
   DeviceBuffer<WeightedSample> weighted_;
   DeviceBuffer<TracedRay> traced_;

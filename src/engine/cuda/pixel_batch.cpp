@@ -18,7 +18,7 @@ void PixelBatch::upload(const PixelSamples& pixels, std::size_t begin, std::size
 
   positions_.reserve(count, kAdvice);
   for (auto* buffer : {&weights_, &luminance_, &shares_}) buffer->reserve(count, kAdvice);
-  places_.reserve(4 * count, kAdvice);
+  places_.reserve(count, kAdvice);
   offsets_.reserve(host_offsets_.size(), kAdvice);
   positions_.upload(pixels.positions.data() + first, count, stream);
   weights_.upload(pixels.weights.data() + first, count, stream);
@@ -29,7 +29,7 @@ void PixelBatch::upload(const PixelSamples& pixels, std::size_t begin, std::size
              weights_.data(),
              luminance_.data(),
              offsets_.data(),
-             reinterpret_cast<float4*>(places_.data()),
+             places_.data(),
              shares_.data()};
   prepare_samples(arrays_, stream);
 }

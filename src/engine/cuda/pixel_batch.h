@@ -29,7 +29,7 @@ class PixelBatch {
   DeviceBuffer<Vec3f> positions_;
   DeviceBuffer<float> weights_, luminance_, shares_, pixel_weights_;
   DeviceBuffer<std::uint32_t> offsets_;
-  DeviceBuffer<float> places_;  // 4 a sample
+  DeviceBuffer<float4> places_;
 };
 
 }  // namespace cnerf

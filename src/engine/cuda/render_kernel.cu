@@ -98,7 +98,7 @@ __global__ void __launch_bounds__(kThreads, 2)
     uint2 directions[kRaysOfWarp];
 #pragma unroll
     for (int r = 0; r < kRaysOfWarp; ++r) {
-      directions[r] = job.directions[__shfl_sync(~0u, open_ray.index, r * kLanes)].share_of_lane();
+      directions[r] = share_of_lane(job.directions[__shfl_sync(~0u, open_ray.index, r * kLanes)]);
     }
     warp.encode(levels, job.field.table, in_box(open_ray.ray.at(sample.t)), lane);
     __syncwarp();

@@ -1,6 +1,6 @@
 #include "src/engine/cuda/step_kernels.h"
 
-#include "src/base/cuda/device_memory.h"
+#include "src/base/cuda/launch.h"
 #include "src/engine/stage1_schedule.h"
 #include "src/field/cuda/field_forward.cuh"
 
@@ -9,15 +9,10 @@ namespace {
 
 constexpr unsigned kThreads = 128;
 
-unsigned blocks_for(std::size_t items) {
-  return unsigned((items + kThreads - 1) / kThreads);
-}
-
 __global__ void begin(StepState* state, const float* learning_rates) {
   const float rate = learning_rates[state->step % kStepRing];
-  state->next_ray = state->samples = state->dropped = 0;
+  state->next_ray = state->samples = 0;
   state->loss = state->squared_error = 0;
-  state->marched = 0;
   state->adam = AdamStep(rate, state->step + 1);
 }
 
@@ -94,8 +89,8 @@ __global__ void of_camera(const __grid_constant__ UnitCamera camera, std::uint32
 
 __global__ void end(StepState* state, std::uint32_t wanted_samples, std::uint32_t capacity, StepRecord* reports) {
   const double rays = state->rays;
-  reports[state->step % kStepRing] = {state->loss / rays, state->squared_error / rays,   state->rays,
-                                      state->marched,     min(state->samples, capacity), state->dropped};
+  reports[state->step % kStepRing] = {state->loss / rays, state->squared_error / rays, state->rays,
+                                      min(state->samples, capacity)};
   state->rays = std::uint32_t(next_rays(state->rays, state->samples, wanted_samples));
   state->step += 1;
 }
@@ -108,19 +103,19 @@ void begin_step(StepState* state, const float* learning_rates, cudaStream_t stre
 }
 
 void draw_training_rays(const DrawJob& job, cudaStream_t stream) {
-  draw<<<blocks_for(kMostRays), kThreads, 0, stream>>>(job);
+  draw<<<blocks_for(kMostRays, kThreads), kThreads, 0, stream>>>(job);
   CNERF_CUDA(cudaGetLastError());
 }
 
 void prepare_rays(const Ray* rays, std::uint32_t count, RayRecord* records, DirectionCode* directions,
                   cudaStream_t stream) {
-  prepare<<<blocks_for(count), kThreads, 0, stream>>>(rays, count, records, directions);
+  prepare<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(rays, count, records, directions);
   CNERF_CUDA(cudaGetLastError());
 }
 
 void camera_rays(const UnitCamera& camera, std::uint32_t count, RayRecord* records, DirectionCode* directions,
                  cudaStream_t stream) {
-  of_camera<<<blocks_for(count), kThreads, 0, stream>>>(camera, count, records, directions);
+  of_camera<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(camera, count, records, directions);
   CNERF_CUDA(cudaGetLastError());
 }
 

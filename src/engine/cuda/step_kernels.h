@@ -19,9 +19,7 @@ struct StepState {
   std::uint32_t rays = 0;      ///< of this step
   std::uint32_t next_ray = 0;  ///< not yet taken by a warp
   std::uint32_t samples = 0;   ///< allocated; may exceed the capacity
-  std::uint32_t dropped = 0;   ///< rays that found no room
   double loss = 0, squared_error = 0;
-  unsigned long long marched = 0;
   AdamStep adam;
 };
 
@@ -39,7 +37,7 @@ struct ViewRecord {
 /// What a step reports, in host memory that kernels write to.
 struct StepRecord {
   double loss = 0, squared_error = 0;
-  unsigned long long rays = 0, marched = 0, trained = 0, dropped = 0;
+  unsigned long long rays = 0, trained = 0;
 };
 
 /// Steps that may be under way at once: places in the rings of learning rates and reports.

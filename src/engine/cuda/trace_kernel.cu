@@ -49,7 +49,7 @@ struct RayProgress {
   float depth = 0;           ///< optical
   float luminance = 0;       ///< this lane's share
   RunDistortion distortion;  ///< of training rays
-  int samples = 0, marched = 0;
+  int samples = 0;
   std::uint32_t run_begin = 0;
   bool has_room = true;
 };
@@ -64,27 +64,27 @@ __device__ bool allocate_run(RayProgress& ray, int count, std::uint32_t capacity
   return begin + std::uint32_t(count) <= capacity;
 }
 
-/// What the backward pass needs of a lane's sample, in the first `count` lanes of a run.
-struct RunSample {
-  std::uint32_t ray_index;
-  int count;
+/// What a lane found at its sample.
+struct FoundSample {
   Vec3f place;
   float depth, raw_luminance;
 };
 
+/// Keeps a run of `count` samples, one per lane, for the backward pass.
 template <int KT>
-__device__ void keep_for_training(const TraceJob& job, const WarpField<KT>& warp, RayProgress& ray,
-                                  const RunSample& run) {
+__device__ void keep_for_training(const TraceJob& job, const WarpField<KT>& warp, std::uint32_t ray_index,
+                                  const FoundSample& found, int count, RayProgress& ray) {
   const unsigned lane = threadIdx.x % 32;
   const SampleArrays& samples = job.samples;
-  ray.has_room = allocate_run(ray, run.count, samples.capacity, &job.state->samples);
+  ray.has_room = allocate_run(ray, count, samples.capacity, &job.state->samples);
   const std::uint32_t begin = __shfl_sync(~0u, ray.run_begin, ray.samples / 32);
-  if (int(lane) < run.count && begin + lane < samples.capacity) {
-    samples.places[begin + lane] = make_float4(run.place.x, run.place.y, run.place.z, __uint_as_float(run.ray_index));
-    samples.gradients[begin + lane] = make_float2(run.depth, run.raw_luminance);
+  if (int(lane) < count && begin + lane < samples.capacity) {
+    const Vec3f place = found.place;
+    samples.places[begin + lane] = make_float4(place.x, place.y, place.z, __uint_as_float(ray_index));
+    samples.gradients[begin + lane] = make_float2(found.depth, found.raw_luminance);
   }
   const std::uint32_t room = samples.capacity - min(begin, samples.capacity);
-  warp.store(samples.encoded + std::size_t(begin) * (2 * KT), unsigned(run.count), room, lane);
+  warp.store(samples.encoded + std::size_t(begin) * (2 * KT), unsigned(count), room, lane);
 }
 
 /// Loss of a finished training ray and its gradient by what its samples emit and absorb.
@@ -97,8 +97,6 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
   if (lane == 0) {
     sums.loss += ray_loss(error, distortion.value, job.distortion_weight);
     sums.squared_error += squared_error(seen, record.target);
-    sums.marched += unsigned(ray.marched);
-    sums.dropped += ray.has_room ? 0u : 1u;
   }
   const float scale = ray.has_room ? 1.0f / float(n_rays) : 0.0f;
   const RayGradient gradient(error, distortion, job.distortion_weight, scale);
@@ -138,7 +136,7 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
   const FieldNets<KT> nets(shared.field.weights, shared.field.last_layer);
   const OccupiedSpace space = {job.layout, job.occupied};
   uint2 directions[kWarpTiles];
-  for (uint2& direction : directions) direction = job.directions[ray_index].share_of_lane();
+  for (uint2& direction : directions) direction = share_of_lane(job.directions[ray_index]);
   WarpMarcher<> marcher(space, job.march, record);
 
   RayProgress ray;
@@ -147,7 +145,6 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
   while (is_open && ray.samples < 32 * kMostRuns) {
     int count = marcher.next(sample, shared.queue[threadIdx.x / 32]);
     if (count == 0) break;
-    ray.marched += count;
     const Vec3f place = in_box(record.ray.at(sample.t));
     warp.encode(levels, job.field.table, place, lane);
     __syncwarp();
@@ -167,7 +164,7 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
 
     if constexpr (kKeep == Keep::kTraining) {
       if (job.distortion_weight > 0) ray.distortion.add(weight, {sample.t, sample.dt});
-      keep_for_training(job, warp, ray, {ray_index, count, place, depth, raw_luminance});
+      keep_for_training(job, warp, ray_index, {place, depth, raw_luminance}, count, ray);
       is_open = is_open && ray.has_room;
     }
     if constexpr (kKeep == Keep::kSamples) {
@@ -209,8 +206,6 @@ __global__ void __launch_bounds__(kThreads, 2)
     if (lane != 0) return;
     atomicAdd(&job.state->loss, sums.loss);
     atomicAdd(&job.state->squared_error, sums.squared_error);
-    atomicAdd(&job.state->marched, sums.marched);
-    if (sums.dropped > 0) atomicAdd(&job.state->dropped, sums.dropped);
   }
 }
 

@@ -13,7 +13,7 @@
 
 namespace cnerf {
 
-/// One run of samples whose gradients a step scatters.
+/// A run of samples whose gradients are scattered into the table.
 struct EncodedSamples {
   const float* positions;  ///< [G, 3, 16]
   const float* d_encoded;  ///< [G, channels, 16]
@@ -31,8 +31,8 @@ class HashGridCpu {
   void encode(const float* positions, std::size_t groups, float* encoded) const {
     kernels_->encode(levels_.data(), levels_.size(), table_.data(), positions, groups, encoded, channels());
   }
-  /// Scatters all runs and applies Adam, one task per level, so that a level's rows stay in one core's cache and sums
-  /// are made in the order of the runs whatever the number of threads.
+  /// Scatters all runs and applies Adam, one task per level: a level's rows stay in one core's cache, and sums are made
+  /// in the order of the runs for any number of threads.
   void backward_and_update(const std::vector<EncodedSamples>& runs, const AdamStep& step);
   void append_state(const std::string& prefix, std::vector<StatePiece>& state);
 

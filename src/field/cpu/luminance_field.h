@@ -30,14 +30,14 @@ class LuminanceFieldCpu {
   /// Density only.  @param positions [G, 3, 16]  @param sigma [16 G]
   void density(const float* positions, std::size_t groups, LuminanceWorkspace& work, float* sigma) const;
 
-  /// Writes the direction's encoding for one sample; to be done for all samples before `forward`.
+  /// Writes the encoded direction of one sample; to be called for all samples before `forward`.
   static void set_direction(LuminanceWorkspace& work, std::size_t sample, Vec3f direction);
   /// Fills the activations in `work`.
   void forward(const float* positions, LuminanceWorkspace& work) const;
   [[nodiscard]] float sigma(const LuminanceWorkspace& work, std::size_t sample) const;
   [[nodiscard]] float luminance(const LuminanceWorkspace& work, std::size_t sample) const;
 
-  /// Sets the loss's gradient with respect to one sample's sigma and luminance; for all samples before `backward`.
+  /// Sets the gradient of the loss by one sample's sigma and luminance; to be called for all samples before `backward`.
   void set_gradient(LuminanceWorkspace& work, std::size_t sample, float d_sigma, float d_luminance) const;
   /// @param d_encoded  [G, channels, 16], written
   /// @param d_weights  [weight_count], added to: the density net's weights, then the luminance net's

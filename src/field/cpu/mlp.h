@@ -1,5 +1,5 @@
 #pragma once
-/// A trainable small net on the CPU: weights, both layouts the kernels want, and optimiser state.
+/// A small trainable net on the CPU: weights in the two layouts that the kernels read, and optimiser state.
 
 #include <cstdint>
 #include <string>

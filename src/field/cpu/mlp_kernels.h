@@ -5,6 +5,8 @@
 
 #include <cstddef>
 
+#include "src/base/cpu_features.h"
+
 namespace cnerf {
 
 struct MlpKernels {
@@ -23,9 +25,6 @@ struct MlpKernels {
                            int inputs, int outputs, float* d_w);
 };
 
-/// The kernels of `active_isa()`.
-[[nodiscard]] const MlpKernels& mlp_kernels();
-
 namespace generic {
 extern const MlpKernels kMlpKernels;
 }
@@ -34,6 +33,11 @@ extern const MlpKernels kMlpKernels;
 }
 namespace avx512 {
 extern const MlpKernels kMlpKernels;
+}
+
+/// The kernels of `active_isa()`.
+[[nodiscard]] inline const MlpKernels& mlp_kernels() {
+  return kernels_of_isa(generic::kMlpKernels, avx2::kMlpKernels, avx512::kMlpKernels);
 }
 
 }  // namespace cnerf

@@ -1,5 +1,5 @@
 #pragma once
-/// A hash grid and a small net over points: what the chroma fields of stage 2 are made of.
+/// A hash grid and a small net over points, of which the colour fields of stage 2 consist.
 
 #include <cstdint>
 #include <string>
@@ -24,7 +24,6 @@ class PointNetCpu {
   /// @param relu_output  ReLU behind the output as well
   PointNetCpu(const HashGridOptions& grid, int outputs, bool relu_output, std::uint64_t seed);
 
-  [[nodiscard]] int outputs() const { return outputs_; }
   /// Makes room and sets the positions; lanes beyond `points.size()` are padded.
   void set_points(std::span<const Vec3f> points, PointWorkspace& work) const;
   /// Fills `work.output`.

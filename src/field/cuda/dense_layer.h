@@ -1,5 +1,5 @@
 #pragma once
-/// Weights of a net's layer on the GPU: as floats for the optimiser, and packed in 16 bits in the order in which lanes
+/// The weights of a layer on the GPU: as floats for the optimiser, and packed in 16 bits in the order in which lanes
 /// read the tensor cores' right operands.
 
 #include <cuda_runtime_api.h>
@@ -18,13 +18,13 @@ CNERF_HD constexpr int packed_place(int k, int n, int outputs) {
   return (((tile * 32 + lane) * 2) + k % 16 / 8) * 2 + k % 2;
 }
 
-/// Packed weights of a net, as kernels read them.
+/// Packed weights of a net.
 struct PackedWeights {
-  const uint2* forward;   ///< halves
-  const uint2* backward;  ///< bfloat16, transposed: inputs and outputs change places
+  uint2* forward;   ///< halves
+  uint2* backward;  ///< bfloat16, transposed: inputs and outputs change places
 };
 
-/// What the optimiser moves.
+/// Parameters and their optimiser state.
 struct TrainedWeights {
   float *values = nullptr, *first_moments = nullptr, *second_moments = nullptr;
 
@@ -33,18 +33,18 @@ struct TrainedWeights {
   }
 };
 
-/// One layer without biases. Kernels see multiples of 16 inputs and outputs; those that pad have weight 0.
+/// One layer without biases. Kernels work on multiples of 16 inputs and outputs; padding has weight 0.
 struct DenseLayer {
   int inputs = 0, outputs = 0;                ///< of the floats
   int padded_inputs = 0, padded_outputs = 0;  ///< of the packed weights, and of the gradient
-  int backward_inputs = 0;                    ///< padded ones whose gradient is needed
+  int backward_inputs = 0;                    ///< leading padded inputs whose gradient is needed
   TrainedWeights trained;                     ///< [outputs, inputs]
   uint2* forward = nullptr;                   ///< [padded_inputs, padded_outputs] halves; null: not packed
   uint2* backward = nullptr;                  ///< [padded_outputs, backward_inputs] bfloat16
   float* plain = nullptr;                     ///< [padded_outputs, padded_inputs] floats, of a layer that is not packed
 };
 
-/// A step of Adam on layers: sums up the parts of their gradient, moves the weights, packs them anew.
+/// A step of Adam on layers: sums the parts of their gradient, updates the weights and packs them again.
 /// @param d_weights  [parts][layer][padded_outputs, padded_inputs]; null: only pack
 /// @param adam       device memory
 void update_layers(const std::vector<DenseLayer>& layers, const float* d_weights, int parts, const AdamStep* adam,

@@ -12,27 +12,32 @@
 
 namespace cnerf {
 
+/// Samples of a training step with the gradient of the loss, in device memory.
+struct FieldSamples {
+  SampleCount count;
+  const float4* places = nullptr;             ///< x, y, z in [0, 1]; w holds the bits of the ray's number
+  const DirectionCode* directions = nullptr;  ///< of the rays
+  const uint4* encoded = nullptr;             ///< [most, 16 KT] halves
+  const float2* gradients = nullptr;          ///< by the luminance net's raw output and by log density
+};
+
 struct FieldBackwardJob {
   int levels;
   PackedField nets;
-  SampleCount samples;
-  const float4* places;             ///< w holds the bits of the ray's number
-  const DirectionCode* directions;  ///< of the rays
-  const uint4* encoded;             ///< [most, 16 KT] halves
-  const float2* gradients;          ///< by the luminance net's raw output and by log density
-  void* d_encoded;                  ///< [levels, most, 4] of bfloat16, written
-  float* d_weights;                 ///< [field_backward_blocks(), FieldShape::kWeights], written: a part of each block
+  FieldSamples samples;
+  void* d_encoded;   ///< [levels, most, 4] of bfloat16, written
+  float* d_weights;  ///< [field_backward_blocks(), FieldShape::kWeights], written: a part of each block
 };
 
-/// Parts that the gradient of the weights comes in.
+/// Number of parts in which the gradient of the weights is written.
 [[nodiscard]] int field_backward_blocks();
 [[nodiscard]] int field_weight_count(int levels);
 void field_backward(const FieldBackwardJob& job, cudaStream_t stream);
 
-/// Where the weights of the field lie on the GPU.
+/// The field's parameters in device memory.
 struct FieldParameters {
   TrainedWeights density, luminance;  ///< as mlp_layout.h orders them
-  uint2 *forward, *backward;          ///< packed
+  PackedWeights packed;
   float* last_layer;
 };
 /// The layers of both nets, in the order of their gradient.

@@ -8,13 +8,10 @@
 
 namespace cnerf {
 
-/// The direction's part of the luminance net's input: 16 halves, two per word.
-struct alignas(16) DirectionCode {
-  std::uint32_t pair[kSphericalHarmonics / 2];
-
-  /// What this lane holds of a left operand all of whose rows are this direction.
-  __device__ uint2 share_of_lane() const { return make_uint2(pair[threadIdx.x % 4], pair[threadIdx.x % 4 + 4]); }
-};
+/// What this lane holds of a left operand all of whose rows are this direction.
+__device__ inline uint2 share_of_lane(const DirectionCode& direction) {
+  return make_uint2(direction.pair[threadIdx.x % 4], direction.pair[threadIdx.x % 4 + 4]);
+}
 __device__ inline DirectionCode encode_direction(Vec3f direction) {
   float value[kSphericalHarmonics];
   spherical_harmonics(direction.x, direction.y, direction.z, [&](int i, float v) { value[i] = v; });
@@ -117,7 +114,7 @@ class FieldNets {
     return warp.density[lane];
   }
   /// The luminance net's raw output for this lane's sample.
-  /// @param directions  [tiles] share_of_lane() of the direction all samples of a tile have; null: each sample has its
+  /// @param directions  [tiles] share_of_lane of the direction all samples of a tile have; null: each sample has its
   ///                    own in `warp.direction`
   __device__ float luminance(WarpField<KT>& warp, const Geometry& geometry, const uint2* directions) const {
     const unsigned lane = threadIdx.x % 32;

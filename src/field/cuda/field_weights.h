@@ -1,6 +1,8 @@
 #pragma once
-/// Where the weights of stage 1's nets lie on the GPU, layer by layer (dense_layer.h). The luminance net's last layer
-/// has one output that counts; it stays in floats.
+/// The memory layout of the weights of stage 1's nets on the GPU, layer by layer (dense_layer.h). The luminance net's
+/// last layer has a single real output and stays in floats.
+
+#include <cstdint>
 
 #include "encoding/hash_grid_levels.h"
 #include "encoding/spherical_harmonics_math.h"
@@ -16,7 +18,7 @@ struct FieldShape {
   static constexpr int kEncoded = 16 * KT;
   static constexpr int kFeatures = kGeometryChannels + kSphericalHarmonics;
 
-  // Gradients of a block, [out, in] a layer.
+  // Gradients of a block, [out, in] per layer.
   static constexpr int kDensity1 = 0;
   static constexpr int kDensity2 = kDensity1 + kHiddenWidth * kEncoded;
   static constexpr int kLuminance1 = kDensity2 + kGeometryChannels * kHiddenWidth;
@@ -32,8 +34,10 @@ struct FieldShape {
   static constexpr int kPackedLuminance2 = kLuminance2 / 4;
 };
 
-/// Encoded direction of a ray (field_forward.cuh).
-struct DirectionCode;
+/// Encoded direction of a ray, its part of the luminance net's input: 16 halves, two per word.
+struct alignas(16) DirectionCode {
+  std::uint32_t pair[kSphericalHarmonics / 2];
+};
 
 /// What kernels read.
 struct PackedField {

@@ -16,40 +16,25 @@ LuminanceFieldCuda::LuminanceFieldCuda(const HashGridOptions& grid, float densit
       activation_(LuminanceActivation<float>::up_to(max_luminance)),
       grid_(grid, seed, kGridAdvice),
       density_(initial_weights(density_net_layout(levels()), seed, kDensityNetStream)),
-      luminance_(initial_weights(luminance_net_layout(), seed, kLuminanceNetStream)) {
-  const auto weights = std::size_t(field_weight_count(levels()));
-  forward_ = {weights, "nets"};
-  backward_ = {weights, "nets"};
-  last_layer_ = {kHiddenWidth, "nets"};
-  d_weights_ = {weights * std::size_t(field_backward_blocks()), "nets"};
-  d_encoded_ = {most_samples * std::size_t(4 * levels()), kSampleAdvice};
-}
+      luminance_(initial_weights(luminance_net_layout(), seed, kLuminanceNetStream)),
+      packed_(field_weight_count(levels())),
+      last_layer_(kHiddenWidth, "nets"),
+      d_weights_(std::size_t(field_weight_count(levels())) * std::size_t(field_backward_blocks()), "nets"),
+      d_encoded_(most_samples * std::size_t(4 * levels()), kSampleAdvice) {}
 
 FieldView LuminanceFieldCuda::view() const {
   FieldView view;
   view.levels = grid_.levels().data();
   view.n_levels = levels();
   view.table = grid_.table();
-  view.nets.weights = {reinterpret_cast<const uint2*>(forward_.data()),
-                       reinterpret_cast<const uint2*>(backward_.data())};
-  view.nets.last_layer = last_layer_.data();
+  view.nets = {packed_.weights(), last_layer_.data()};
   view.density_scale = density_scale_;
   view.activation = activation_;
   return view;
 }
 
 void LuminanceFieldCuda::nets_backward(const FieldSamples& samples, cudaStream_t stream) const {
-  FieldBackwardJob job{};
-  job.levels = levels();
-  job.nets = view().nets;
-  job.samples = samples.count;
-  job.places = samples.places;
-  job.directions = samples.directions;
-  job.encoded = samples.encoded;
-  job.gradients = samples.gradients;
-  job.d_encoded = d_encoded_.data();
-  job.d_weights = d_weights_.data();
-  field_backward(job, stream);
+  field_backward({levels(), view().nets, samples, d_encoded_.data(), d_weights_.data()}, stream);
 }
 
 void LuminanceFieldCuda::grid_backward(const FieldSamples& samples, cudaStream_t stream) const {
@@ -58,12 +43,7 @@ void LuminanceFieldCuda::grid_backward(const FieldSamples& samples, cudaStream_t
 
 void LuminanceFieldCuda::update_layers_of_nets(const float* d_weights, const AdamStep* adam,
                                                cudaStream_t stream) const {
-  FieldParameters parameters{};
-  parameters.density = density_.weights();
-  parameters.luminance = luminance_.weights();
-  parameters.forward = reinterpret_cast<uint2*>(forward_.data());
-  parameters.backward = reinterpret_cast<uint2*>(backward_.data());
-  parameters.last_layer = last_layer_.data();
+  const FieldParameters parameters = {density_.weights(), luminance_.weights(), packed_.weights(), last_layer_.data()};
   update_layers(field_layers(levels(), parameters), d_weights, field_backward_blocks(), adam, stream);
 }
 

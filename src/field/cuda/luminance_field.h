@@ -1,6 +1,6 @@
 #pragma once
-/// Stage 1's field on the GPU, as LuminanceFieldCpu is it on the processor: hash grid, density net, luminance net, and
-/// what Adam keeps of them.
+/// Stage 1's field on the GPU, the counterpart of LuminanceFieldCpu: hash grid, density net, luminance net, and their
+/// optimiser state.
 
 #include <cstdint>
 #include <vector>
@@ -9,15 +9,6 @@
 #include "src/field/cuda/trained_parameters.h"
 
 namespace cnerf {
-
-/// Samples of a training step with the gradient of the loss, in device memory.
-struct FieldSamples {
-  SampleCount count;
-  const float4* places = nullptr;             ///< x, y, z in [0, 1]; w holds the bits of the ray's number
-  const DirectionCode* directions = nullptr;  ///< of the rays
-  const uint4* encoded = nullptr;             ///< [most, 16 KT] halves
-  const float2* gradients = nullptr;          ///< by the luminance net's raw output and by log density
-};
 
 class LuminanceFieldCuda {
  public:
@@ -31,14 +22,14 @@ class LuminanceFieldCuda {
 
   /// Gradients of the weights, and of what the hash grid's levels receive.
   void nets_backward(const FieldSamples& samples, cudaStream_t stream) const;
-  /// After `nets_backward`: the gradient of the table. Needs nothing of `update_nets`, nor the other way round.
+  /// The gradient of the table; after `nets_backward`. Independent of `update_nets`.
   void grid_backward(const FieldSamples& samples, cudaStream_t stream) const;
   /// @param adam  device memory
   void update_nets(const AdamStep* adam, cudaStream_t stream) const;
   void update_grid(const AdamStep* adam, cudaStream_t stream) const { grid_.update(adam, stream); }
 
   void append_state(std::vector<StatePiece>& state);
-  /// What was written into the state goes to the GPU.
+  /// Copies the state, after it was written to, to the GPU.
   void upload(cudaStream_t stream) const;
 
  private:
@@ -49,7 +40,7 @@ class LuminanceFieldCuda {
   LuminanceActivation<float> activation_;
   TrainedGrid grid_;
   TrainedNet density_, luminance_;
-  DeviceBuffer<std::uint16_t> forward_, backward_;  // packed weights
+  PackedBuffers packed_;
   DeviceBuffer<float> last_layer_, d_weights_;
   DeviceBuffer<std::uint16_t> d_encoded_;
 };

@@ -1,6 +1,6 @@
 #pragma once
-/// What backward passes of nets share. Inputs and gradients of layers lie in shared memory as rows of bfloat16, one row
-/// per sample; a warp has its share of a weight gradient in registers.
+/// Building blocks of the nets' backward passes. Inputs and gradients of layers lie in shared memory as rows of
+/// bfloat16, one row per sample; a warp keeps its part of a weight gradient in registers.
 
 #include "src/field/cuda/tensor_core.cuh"
 
@@ -17,30 +17,28 @@ __device__ void load_encoded(std::uint32_t (&operand)[KT][4], int half, const ui
   }
 }
 
-/// Gradients by what the hash grid's levels encode, for the first `samples` of at most `most` samples.
+/// Where the hash grid's levels receive their gradients: four channels per level.
 struct LevelGradients {
-  void* values;  ///< [levels, most, 4] of bfloat16
   int levels;
-  std::uint32_t samples, most;
-};
+  std::uint32_t count, most;  ///< samples there are, and the array's capacity
+  void* d_encoded;            ///< [levels, most, 4] of bfloat16
 
-/// Hands the levels their share of a result's 16 columns from `16 tile` on: four channels per level.
-/// @param sample  of rows g and g + 8; those beyond the last one do not exist
-__device__ inline void write_level_gradients(const float (&sums)[2][4], int tile, const std::uint32_t (&sample)[2],
-                                             const LevelGradients& out) {
-  const int t = int(threadIdx.x) % 4;
+  /// A result's 16 columns from `16 tile` on.  @param sample  of rows g and g + 8; those from `count` on do not exist
+  __device__ void write(const float (&sums)[2][4], int tile, const std::uint32_t (&sample)[2]) const {
+    const int t = int(threadIdx.x) % 4;
 #pragma unroll
-  for (int block = 0; block < 2; ++block) {
-    const int level = 4 * tile + 2 * block + t / 2;  // of two lanes
-    if (level >= out.levels) continue;
+    for (int block = 0; block < 2; ++block) {
+      const int level = 4 * tile + 2 * block + t / 2;  // of two lanes
+      if (level >= levels) continue;
 #pragma unroll
-    for (int half = 0; half < 2; ++half) {
-      if (sample[half] >= out.samples) continue;
-      static_cast<std::uint32_t*>(out.values)[(std::size_t(level) * out.most + sample[half]) * 2 + t % 2] =
-          Bfloat::pack(sums[block][2 * half], sums[block][2 * half + 1]);
+      for (int half = 0; half < 2; ++half) {
+        if (sample[half] >= count) continue;
+        static_cast<std::uint32_t*>(d_encoded)[(std::size_t(level) * most + sample[half]) * 2 + t % 2] =
+            Bfloat::pack(sums[block][2 * half], sums[block][2 * half + 1]);
+      }
     }
   }
-}
+};
 
 /// Which numbers of a left operand of 64 columns are positive: bit 4 k + register of either half word.
 __device__ inline std::uint32_t positive_bits(const std::uint32_t (&halves)[4][4]) {
@@ -68,6 +66,17 @@ __device__ void store_rows(__nv_bfloat16 (*rows)[stride], int row, int column, c
   for (int r = 0; r < 4; ++r) {
     *reinterpret_cast<std::uint32_t*>(&rows[row + g + 8 * (r % 2)][column + 2 * t + 8 * (r / 2)]) = bfloats[r];
   }
+}
+/// From a gradient by 16 outputs of a hidden layer, from `16 tile` on, to that in front of its ReLU: as a left operand,
+/// and as rows.
+/// @param bits  `positive_bits` of the layer
+template <int stride>
+__device__ void through_relu(const float (&sums)[2][4], std::uint32_t bits, int tile, std::uint32_t (&operand)[4],
+                             __nv_bfloat16 (*rows)[stride], int row) {
+  pack_operand<Bfloat>(sums, operand);
+#pragma unroll
+  for (int r = 0; r < 4; ++r) operand[r] = gate(operand[r], bits, tile, r);
+  store_rows(rows, row, 16 * tile, operand);
 }
 template <int stride, int K>
 __device__ void store_halves(__nv_bfloat16 (*rows)[stride], int row, const std::uint32_t (&halves)[K][4]) {

@@ -112,8 +112,8 @@ __device__ void output_gradient(const PointBackwardJob& job, const std::uint32_t
 #pragma unroll
   for (int half = 0; half < 2; ++half) {
     const std::uint32_t at = min(sample[half], n - 1);
-    share[half] = sample[half] < n ? job.shares[at] : 0.0f;
-    d_pixel[half] = job.d_composited + std::size_t(__float_as_uint(job.places[at].w)) * kPointFeatures;
+    share[half] = sample[half] < n ? job.gradient.shares[at] : 0.0f;
+    d_pixel[half] = job.gradient.d_composited + std::size_t(__float_as_uint(job.places[at].w)) * kPointFeatures;
   }
   dense<Half, 1, 4, 4>(hidden, weights, [&](int, int i, const float(&sums)[2][4]) {
 #pragma unroll
@@ -123,8 +123,9 @@ __device__ void output_gradient(const PointBackwardJob& job, const std::uint32_t
         const float2 d = *reinterpret_cast<const float2*>(d_pixel[half] + 16 * i + 8 * block + 2 * t);
         // Features as they were composited: rounded.
         const float2 h = floats_of_halves(Half::pack(sums[block][2 * half], sums[block][2 * half + 1]));
-        d_outputs[0][i][2 * block + half] = Bfloat::pack(h.x > 0 ? share[half] * (d.x + job.d_feature * h.x) : 0.0f,
-                                                         h.y > 0 ? share[half] * (d.y + job.d_feature * h.y) : 0.0f);
+        d_outputs[0][i][2 * block + half] =
+            Bfloat::pack(h.x > 0 ? share[half] * (d.x + job.gradient.d_feature * h.x) : 0.0f,
+                         h.y > 0 ? share[half] * (d.y + job.gradient.d_feature * h.y) : 0.0f);
       }
     }
   });
@@ -135,7 +136,7 @@ __device__ void output_gradient(const PointBackwardJob& job, const std::uint32_t
 #pragma unroll
   for (int half = 0; half < 2; ++half) {
     const bool has_numbers = threadIdx.x % 4 == 0 && sample[half] < n;
-    const float2 d = has_numbers ? job.d_numbers[sample[half]] : make_float2(0, 0);
+    const float2 d = has_numbers ? job.gradient.d_numbers[sample[half]] : make_float2(0, 0);
     d_outputs[0][0][half] = Bfloat::pack(d.x, d.y);
     d_outputs[0][0][half + 2] = 0;
   }
@@ -155,6 +156,7 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const PointBackwardJob j
   __syncthreads();
 
   const std::uint32_t n = min(*job.samples.count, job.samples.most);
+  const LevelGradients level_gradients{job.levels, n, job.samples.most, job.d_encoded};
   const int warp = int(threadIdx.x) / 32, g = int(threadIdx.x) % 32 / 4;
   // This warp's share of each weight gradient: 16 outputs by N x 8 inputs.
   float d_second[kOutputTiles][4] = {}, d_first[KT][4] = {};
@@ -178,16 +180,10 @@ __global__ void __launch_bounds__(kThreads, 1) backward(const PointBackwardJob j
     std::uint32_t d_hidden[1][4][4];
     dense<Bfloat, 1, kOutputTiles, 4>(d_outputs, shared.backward + Shape::kPackedSecond,
                                       [&](int, int i, const float(&s)[2][4]) {
-                                        pack_operand<Bfloat>(s, d_hidden[0][i]);
-#pragma unroll
-                                        for (int r = 0; r < 4; ++r) {
-                                          d_hidden[0][i][r] = gate(d_hidden[0][i][r], hidden_bits, i, r);
-                                        }
-                                        store_rows(shared.d_hidden, 16 * warp, 16 * i, d_hidden[0][i]);
+                                        through_relu(s, hidden_bits, i, d_hidden[0][i], shared.d_hidden, 16 * warp);
                                       });
-    dense<Bfloat, 1, 4, KT>(d_hidden, shared.backward + Shape::kPackedFirst, [&](int, int i, const float(&s)[2][4]) {
-      write_level_gradients(s, i, sample, {job.d_encoded, job.levels, n, job.samples.most});
-    });
+    dense<Bfloat, 1, 4, KT>(d_hidden, shared.backward + Shape::kPackedFirst,
+                            [&](int, int i, const float(&s)[2][4]) { level_gradients.write(s, i, sample); });
     __syncthreads();
     add_weight_gradient<kRows>(d_second, shared.d_outputs, second_out, shared.hidden, second_in);
     add_weight_gradient<kRows>(d_first, shared.d_hidden, out, shared.encoded, 8 * KT * part);
@@ -231,18 +227,17 @@ void point_backward(PointOutputs outputs, const PointBackwardJob& job, cudaStrea
   });
 }
 
-std::vector<DenseLayer> point_layers(PointOutputs outputs, int levels, TrainedWeights trained, uint2* forward,
-                                     uint2* backward) {
+std::vector<DenseLayer> point_layers(PointOutputs outputs, int levels, TrainedWeights trained, PackedWeights packed) {
   std::vector<DenseLayer> layers;
   const int channels = 4 * levels;
   const int numbers = outputs == PointOutputs::kFeatures ? kPointFeatures : kPointNumbers;
   with_shape(outputs, levels, [&](auto shape) {
     using Shape = decltype(shape);
     layers = {{channels, kHiddenWidth, Shape::kEncoded, kHiddenWidth, Shape::kEncoded, trained,
-               forward + Shape::kPackedFirst, backward + Shape::kPackedFirst, nullptr},
+               packed.forward + Shape::kPackedFirst, packed.backward + Shape::kPackedFirst, nullptr},
               {kHiddenWidth, numbers, kHiddenWidth, 16 * Shape::kOutputTiles, kHiddenWidth,
-               trained.from(kHiddenWidth * channels), forward + Shape::kPackedSecond, backward + Shape::kPackedSecond,
-               nullptr}};
+               trained.from(kHiddenWidth * channels), packed.forward + Shape::kPackedSecond,
+               packed.backward + Shape::kPackedSecond, nullptr}};
   });
   return layers;
 }

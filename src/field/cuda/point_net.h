@@ -18,17 +18,10 @@ class PointNetCuda {
   void forward(const Vec3f* positions, std::uint32_t count, bool for_training, cudaStream_t stream);
   /// Of the latest `forward`; features or numbers, whichever the net has.
   [[nodiscard]] const std::uint32_t* features() const { return features_.data(); }  ///< [count, 64] halves
-  [[nodiscard]] const float2* numbers() const { return reinterpret_cast<const float2*>(numbers_.data()); }
+  [[nodiscard]] const float2* numbers() const { return numbers_.data(); }
 
-  /// Gradient of the outputs, where it comes from.
-  struct OutputGradient {
-    const float* shares = nullptr;        ///< of features, see PointBackwardJob
-    const float* d_composited = nullptr;  ///< likewise
-    float d_feature = 0;                  ///< likewise
-    const float2* d_numbers = nullptr;    ///< of numbers
-  };
   /// @param samples  those of the latest `forward`
-  void backward(const float4* places, SampleCount samples, const OutputGradient& gradient, cudaStream_t stream);
+  void backward(const float4* places, SampleCount samples, const PointGradient& gradient, cudaStream_t stream);
   /// Adam, after `backward`.  @param adam  device memory
   void update(const AdamStep* adam, cudaStream_t stream) const;
 
@@ -42,11 +35,12 @@ class PointNetCuda {
   PointOutputs outputs_;
   TrainedGrid grid_;
   TrainedNet net_;
-  DeviceBuffer<std::uint16_t> forward_, backward_;  // packed weights
+  PackedBuffers packed_;
   DeviceBuffer<float> d_weights_;
-  DeviceBuffer<std::uint16_t> encoded_, d_encoded_;
+  DeviceBuffer<uint4> encoded_;
+  DeviceBuffer<std::uint16_t> d_encoded_;
   DeviceBuffer<std::uint32_t> features_;
-  DeviceBuffer<float> numbers_;  // 2 a point
+  DeviceBuffer<float2> numbers_;
 };
 
 }  // namespace cnerf

@@ -26,12 +26,12 @@ TrainedGrid::TrainedGrid(const HashGridOptions& options, std::uint64_t seed, con
       decay_(float(options.decay)),
       table_(initial_table(levels_, seed), use),
       moments_(std::vector<float>(rows() * std::size_t(8), 0.0f), use),
-      d_table_(rows() * std::size_t(4), use),
-      halves_(rows() * std::size_t(4), use) {}
+      d_table_(rows(), use),
+      halves_(rows(), use) {}
 
 void TrainedGrid::backward(const float4* places, SampleCount samples, const void* d_encoded,
                            cudaStream_t stream) const {
-  encode_backward_cuda(levels_, reinterpret_cast<const float*>(places), samples, d_encoded, d_table_.data(), stream);
+  encode_backward_cuda(levels_, places, samples, d_encoded, d_table_.data(), stream);
 }
 
 void TrainedGrid::update(const AdamStep* adam, cudaStream_t stream) const {
@@ -39,8 +39,8 @@ void TrainedGrid::update(const AdamStep* adam, cudaStream_t stream) const {
 }
 
 TableRowsCuda TrainedGrid::table_rows() const {
-  return {reinterpret_cast<float4*>(table_.data()), reinterpret_cast<float4*>(d_table_.data()),
-          reinterpret_cast<float4*>(moments_.data()), reinterpret_cast<uint2*>(halves_.data()), rows()};
+  return {reinterpret_cast<float4*>(table_.data()), d_table_.data(), reinterpret_cast<float4*>(moments_.data()),
+          halves_.data(), rows()};
 }
 
 void TrainedGrid::append_state(const std::string& prefix, std::vector<StatePiece>& state) {

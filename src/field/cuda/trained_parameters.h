@@ -1,6 +1,6 @@
 #pragma once
-/// What Adam moves on the GPU, with the host's copy of it that snapshots read and write. Names and shapes of the pieces
-/// are those of the CPU's HashGridCpu and MlpCpu: a snapshot of one device loads on the other.
+/// Trainable parameters on the GPU, with the host copies that snapshots read and write. Names and shapes of the pieces
+/// equal those of HashGridCpu and MlpCpu, so that a snapshot of one device loads on the other.
 
 #include <cstdint>
 #include <string>
@@ -23,7 +23,7 @@ class StateBuffer {
       : host_(std::move(initial)), device_(uploaded(host_, use)) {}
 
   [[nodiscard]] float* data() const { return device_.data(); }
-  /// The copy, brought up to date. What is written into it counts after `upload`.
+  /// The host copy, updated from the GPU. Changes to it take effect with `upload`.
   [[nodiscard]] StatePiece fetched(std::string name) {
     device_.download(host_.data(), host_.size());
     return state_piece(std::move(name), host_);
@@ -33,6 +33,19 @@ class StateBuffer {
  private:
   std::vector<float> host_;
   DeviceBuffer<float> device_;
+};
+
+/// Owns packed weights.
+class PackedBuffers {
+ public:
+  /// @param weights  a multiple of 4
+  explicit PackedBuffers(int weights)
+      : forward_(std::size_t(weights) / 4, "nets"), backward_(std::size_t(weights) / 4, "nets") {}
+
+  [[nodiscard]] PackedWeights weights() const { return {forward_.data(), backward_.data()}; }
+
+ private:
+  DeviceBuffer<uint2> forward_, backward_;
 };
 
 /// A net's weights.
@@ -58,7 +71,7 @@ class TrainedGrid {
 
   [[nodiscard]] const std::vector<GridLevel>& levels() const { return levels_; }
   /// [rows, 4] halves
-  [[nodiscard]] const uint2* table() const { return reinterpret_cast<const uint2*>(halves_.data()); }
+  [[nodiscard]] const uint2* table() const { return halves_.data(); }
 
   /// Adds to the gradient, as encode_backward_cuda does.
   void backward(const float4* places, SampleCount samples, const void* d_encoded, cudaStream_t stream) const;
@@ -74,8 +87,8 @@ class TrainedGrid {
   std::vector<GridLevel> levels_;
   float decay_ = 0;
   StateBuffer table_, moments_;  // [rows, 4], [rows, 8]
-  DeviceBuffer<float> d_table_;
-  DeviceBuffer<std::uint16_t> halves_;
+  DeviceBuffer<float4> d_table_;
+  DeviceBuffer<uint2> halves_;
 };
 
 }  // namespace cnerf

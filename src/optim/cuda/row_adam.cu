@@ -1,15 +1,11 @@
 #include "encoding/cuda/hash_grid_device.cuh"
-#include "src/base/cuda/device_memory.h"
+#include "src/base/cuda/launch.h"
 #include "src/optim/cuda/row_adam_cuda.h"
 
 namespace cnerf {
 namespace {
 
 constexpr unsigned kThreads = 128;
-
-unsigned blocks_for(std::uint32_t rows) {
-  return (rows + kThreads - 1) / kThreads;
-}
 
 __global__ void update(const TableRowsCuda rows, const AdamStep* adam, float decay) {
   const std::uint32_t row = blockIdx.x * kThreads + threadIdx.x;
@@ -39,12 +35,12 @@ __global__ void round(const TableRowsCuda rows) {
 }  // namespace
 
 void update_rows(const TableRowsCuda& rows, const AdamStep* adam, float decay, cudaStream_t stream) {
-  update<<<blocks_for(rows.count), kThreads, 0, stream>>>(rows, adam, decay);
+  update<<<blocks_for(rows.count, kThreads), kThreads, 0, stream>>>(rows, adam, decay);
   CNERF_CUDA(cudaGetLastError());
 }
 
 void round_rows(const TableRowsCuda& rows, cudaStream_t stream) {
-  round<<<blocks_for(rows.count), kThreads, 0, stream>>>(rows);
+  round<<<blocks_for(rows.count, kThreads), kThreads, 0, stream>>>(rows);
   CNERF_CUDA(cudaGetLastError());
 }
 

@@ -18,11 +18,11 @@ struct TableRowsCuda {
   std::uint32_t count = 0;
 };
 
-/// Adam on rows whose gradient is not zero; clears the gradient and renews the halves.
+/// Updates the rows whose gradient is not zero, clears the gradient and rounds the values again.
 /// @param adam   device memory
 /// @param decay  weight decay, in units of the learning rate
 void update_rows(const TableRowsCuda& rows, const AdamStep* adam, float decay, cudaStream_t stream);
-/// Only the halves.
+/// Only rounds the values.
 void round_rows(const TableRowsCuda& rows, cudaStream_t stream);
 
 }  // namespace cnerf

@@ -20,12 +20,6 @@ PixelColors pixel_colors_of(const nlohmann::json& header) {
   return is_field ? PixelColors::kField : PixelColors::kDistribution;
 }
 
-float pixel_opacity(const PixelSamples& pixels, std::size_t p) {
-  float opacity = 0;
-  for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) opacity += pixels.weights[s];
-  return opacity;
-}
-
 }  // namespace
 
 Ab in_gamut(Ab color, float luminance) {
@@ -108,7 +102,7 @@ std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {
   const std::vector<float> luminance = pixel_luminance(pixels);
   parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
-      const bool is_colored = pixel_opacity(pixels, p) >= kLeastColoredOpacity;
+      const bool is_colored = pixels.opacity(p) >= kLeastColoredOpacity;
       colors[p] = is_colored ? in_gamut(colors[p], luminance[p]) : Ab{};
     }
   });

@@ -4,11 +4,12 @@
 #include <cmath>
 
 #include "src/base/rng.h"
+#include "src/optim/adam.h"
 
 namespace cnerf {
 namespace {
 
-constexpr int kPixels = 8192;  // a step
+constexpr int kPixels = 8192;  // per step
 constexpr int kMeasuredPixels = 4 * kPixels;
 constexpr double kRate = 1e-2, kFinalRate = 1e-3;  // of its own: distances want smaller steps than classes
 constexpr std::uint64_t kMeasuredStream = std::uint64_t(1) << 40;  // apart from the steps'
@@ -36,7 +37,8 @@ void distill(Session& session) {
     const long step = field.step_count();
     const PixelSamples pixels = random_pixels(session, kPixels, std::uint64_t(step));
     if (pixels.pixels() == 0) break;
-    session.loss = field.step(pixels, session.model.decode(pixels), decayed(kRate, kFinalRate, double(step) / steps));
+    session.loss =
+        field.step(pixels, session.model.decode(pixels), decayed_rate(kRate, kFinalRate, double(step) / steps));
     session.after_step("stage 2: colour for baking", "ab distance", step + 1, steps);
   }
 }

@@ -6,6 +6,7 @@
 #include "src/base/error.h"
 #include "src/base/rng.h"
 #include "src/base/usage.h"
+#include "src/optim/adam.h"
 
 namespace cnerf {
 namespace {
@@ -38,7 +39,8 @@ void PatchTraining::run() {
     for (const AnsweredPatch& patch : answers.patches) {
       const bool is_accepted = purifier_.accepts(patch.view());
       if (!judge(patch, is_accepted) || steps() >= options.patches) continue;
-      const float rate = decayed(options.learning_rate, options.final_learning_rate, double(steps()) / options.patches);
+      const float rate =
+          decayed_rate(options.learning_rate, options.final_learning_rate, double(steps()) / options.patches);
       session_.loss = injection_.step(model, pixels_of(patch, is_accepted), rate);
     }
     session_.after_step("stage 2", "loss", steps(), options.patches);

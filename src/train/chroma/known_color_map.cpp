@@ -85,7 +85,7 @@ KnownColorMap::ViewColors KnownColorMap::colors_seen_in(std::size_t v, std::span
       auto from = long(p);
       if (sources[s].view != v) {
         if (surfaces[v][p] <= 0) break;
-        const Vec3f point = ray_of(view, p).at(surfaces[v][p]);
+        const Vec3f point = view.camera.ray_of_pixel(p).at(surfaces[v][p]);
         from = sights[s].pixel_of(point.cast<double>(), lightness_at(view, p));
       }
       if (from < 0 || sources[s].colors.is_known[std::size_t(from)] == 0) continue;

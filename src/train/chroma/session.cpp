@@ -17,10 +17,6 @@ constexpr double kPreviewShare = 0.95;  // of a pixel's weight
 
 }  // namespace
 
-float decayed(double from, double to, double fraction) {
-  return float(from * std::pow(to / from, std::clamp(2.0 * fraction - 1.0, 0.0, 1.0)));
-}
-
 Session::Session(const Stage2Job& job, Observer& observer)
     : options(job.options),
       colorizer(job.colorizer),
@@ -82,10 +78,10 @@ PreviewPicture Session::preview(std::size_t index) const {
 }
 
 void Session::report(const std::string& task, double fraction, Figures figures) {
-  const Stopwatch telling;
-  observer_.report_progress({task, std::min(fraction, 1.0), std::move(figures)});
-  if (!previews_.empty()) observer_.offer_preview([this](std::size_t index) { return preview(index); });
-  told_seconds_ += telling.seconds();
+  clock_.pause_for([&] {
+    observer_.report_progress({task, std::min(fraction, 1.0), std::move(figures)});
+    if (!previews_.empty()) observer_.offer_preview([this](std::size_t index) { return preview(index); });
+  });
   if (!observer_.is_cancelled()) return;
   if (!model.chroma) throw Interrupted("stopped; nothing was written");
   save();
@@ -102,7 +98,7 @@ void Session::after_step(const std::string& task, const std::string& loss_name, 
 }
 
 void Session::save() {
-  model.report.seconds = seconds_before_ + watch_.seconds() - told_seconds_;
+  model.report.seconds = seconds_before_ + clock_.seconds();
   model.save(job_.take);
 }
 

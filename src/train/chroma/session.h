@@ -14,10 +14,6 @@
 
 namespace cnerf {
 
-/// A step size that stays for the first half and then falls exponentially.
-/// @param fraction  of the steps that are done
-[[nodiscard]] float decayed(double from, double to, double fraction);
-
 class Session {
  public:
   /// Refers to both.
@@ -55,8 +51,8 @@ class Session {
   ViewCache own_views_;
   ViewCache& views_;
   std::vector<std::pair<std::string, CachedView>> previews_;  // of held-out views, small
-  Stopwatch watch_;
-  double seconds_before_ = 0, told_seconds_ = 0;  // an observer's pauses and pictures are no training
+  TrainingClock clock_;
+  double seconds_before_ = 0;
 };
 
 }  // namespace cnerf

@@ -6,17 +6,12 @@
 
 #include "src/base/error.h"
 #include "src/base/usage.h"
+#include "src/optim/adam.h"
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/options_json.h"
 
 namespace cnerf {
 namespace {
-
-/// Constant over the first half of the steps, then an exponential decay.
-float learning_rate(const Stage1Options& options, double fraction) {
-  const double decay = std::clamp(2.0 * fraction - 1.0, 0.0, 1.0);
-  return float(options.learning_rate * std::pow(options.final_learning_rate / options.learning_rate, decay));
-}
 
 /// Options that may differ between a run and its continuation: they say how long, not what.
 nlohmann::json comparable(const Stage1Options& options) {
@@ -92,24 +87,6 @@ LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines) {
   return model;
 }
 
-/// Training time: a clock that stands still while an observer looks.
-class TrainingClock {
- public:
-  explicit TrainingClock(double before) : before_(before) {}
-  [[nodiscard]] double seconds_of_this_part() const { return watch_.seconds() - paused_; }
-  [[nodiscard]] double seconds() const { return before_ + seconds_of_this_part(); }
-  template <typename Work>
-  void pause_for(Work&& work) {
-    const Stopwatch pause;
-    work();
-    paused_ += pause.seconds();
-  }
-
- private:
-  double before_, paused_ = 0;
-  Stopwatch watch_;
-};
-
 /// Done so far, of the steps or of the time, whichever is nearer to its end.
 double fraction_done(const LuminanceModel& model, const Stage1Options& options) {
   const double of_steps = double(model.engine->step_count()) / options.steps;
@@ -129,7 +106,8 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
   model.engine->set_views(views);
 
-  TrainingClock clock(model.seconds);
+  TrainingClock clock;
+  const double seconds_before = model.seconds;
   const std::vector<const View*> shown = preview_views(job.capture);
   const DrawPreview preview = [&](std::size_t index) { return preview_of(model, *shown[index % shown.size()]); };
   double rays = 0;
@@ -137,9 +115,10 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   while (model.engine->step_count() < options.steps) {
     if (options.max_seconds > 0 && model.seconds >= options.max_seconds) break;
     const double fraction = fraction_done(model, options);
-    const StepReport step = model.engine->step(learning_rate(options, fraction));
+    const StepReport step =
+        model.engine->step(decayed_rate(options.learning_rate, options.final_learning_rate, fraction));
     model.trained_samples += double(step.trained_samples);
-    model.seconds = clock.seconds();
+    model.seconds = seconds_before + clock.seconds();
     rays += double(step.rays);
     psnr.add(step.squared_error);
     clock.pause_for([&] {
@@ -147,7 +126,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
                                 fraction,
                                 {{"psnr", psnr.value()},
                                  {"loss", step.loss},
-                                 {"rays/s", rays / clock.seconds_of_this_part()},
+                                 {"rays/s", rays / clock.seconds()},
                                  {"samples", model.trained_samples}}});
       observer.offer_preview(preview);
     });

@@ -48,7 +48,7 @@ CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
 
   std::vector<Ray> rays(std::size_t(view.width) * std::size_t(view.height));
   parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) rays[p] = ray_of(view, p);
+    for (std::size_t p = begin; p < end; ++p) rays[p] = view.camera.ray_of_pixel(p);
   });
   std::vector<WeightedSample> samples;
   engine.trace(rays, march, {kCacheTransmittance, float(share)}, samples, view.offsets);
@@ -118,7 +118,7 @@ PixelSamples pixel_samples(std::span<const CachedView> views, std::span<const Vi
     for (std::size_t i = begin; i < end; ++i) {
       const CachedView& view = views[wanted[i].view];
       const std::uint32_t p = wanted[i].pixel;
-      const Ray ray = ray_of(view, p);
+      const Ray ray = view.camera.ray_of_pixel(p);
       std::size_t at = pixels.offsets[i];
       for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s, ++at) {
         const CachedSample& sample = view.samples[s];

@@ -34,12 +34,6 @@ struct CachedView {
   [[nodiscard]] int short_side() const { return std::min(width, height); }
 };
 
-/// Through the middle of a pixel.  @param pixel  y * width + x
-[[nodiscard]] inline Ray ray_of(const CachedView& view, std::size_t pixel) {
-  const auto width = std::size_t(view.width);
-  return view.camera.ray({double(pixel % width) + 0.5, double(pixel / width) + 0.5});
-}
-
 /// Renders a view with its short side at most `short_side` pixels. Of each pixel the heaviest samples are kept that
 /// carry `share` of its weight.
 [[nodiscard]] CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,

@@ -29,7 +29,6 @@ class PositionalColorBinEngine final : public ColorBinEngine {
     trained_ = std::make_unique<Trained>(joined(net_->parameters(), trunk_->parameters()));
   }
 
-  using ColorBinEngine::step;
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());

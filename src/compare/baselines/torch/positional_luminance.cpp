@@ -74,7 +74,7 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
       report.squared_error += error * error / double(n);
     }
     report.rays = n;
-    report.marched_samples = report.trained_samples = n * (2 * kCoarseSamples + kFineSamples);
+    report.trained_samples = n * (2 * kCoarseSamples + kFineSamples);
     return report;
   }
   [[nodiscard]] long step_count() const override { return counters_[0]; }
