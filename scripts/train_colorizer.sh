@@ -4,13 +4,12 @@
 #
 #   scripts/train_colorizer.sh DATA OUTPUT [options of cnerf-train-colorizer]
 #
-# DATA holds colorizer/ (image archives) and lpips/ (SqueezeNet weights for the auxiliary feature loss). The trainer is
-# built from src/colorizer_training as a project of its own, with the LibTorch of TORCH_PREFIX (a CMake prefix path;
-# python3's torch when empty). It needs OpenSSL, zlib, libjpeg, libwebp and CLI11 beside it.
+# DATA holds colorizer/ (archives of images, unpacked to OUTPUT/images) and lpips/ (SqueezeNet weights for the auxiliary
+# feature loss). The trainer is a target of the project's build: BUILD names the folder, build/release if it is not set.
 set -euo pipefail
 
 if [ $# -lt 2 ]; then
-  sed -n '2,9p' "$0" >&2
+  sed -n '2,8p' "$0" >&2
   exit 64
 fi
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -18,16 +17,23 @@ data=$1
 output=$2
 shift 2
 
-prefix=${TORCH_PREFIX:-$(python3 -c 'import torch; print(torch.utils.cmake_prefix_path)' 2>/dev/null || true)}
-build=${BUILD:-$root/build/colorizer-training}
-cmake -S "$root/src/colorizer_training" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
-  ${prefix:+-DCMAKE_PREFIX_PATH="$prefix"}
-ninja -C "$build"
+build=${BUILD:-$root/build/release}
+if [ ! -f "$build/CMakeCache.txt" ]; then cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release; fi
+ninja -C "$build" cnerf-train-colorizer cnerf_images
 
-exec "$build/cnerf-train-colorizer" \
-  --photos "$data"/colorizer/photos-128px-{0,1}.tar \
-  --mosaics "$data"/colorizer/objects-64px-{0,1}.tar \
+images=$output/images
+for archive in "$data"/colorizer/*.tar; do
+  folder=$images/$(basename "$archive" .tar)
+  [ -d "$folder" ] && continue
+  mkdir -p "$folder.part"
+  tar -xf "$archive" -C "$folder.part"
+  mv "$folder.part" "$folder"
+done
+
+exec "$(find "$build" -name cnerf-train-colorizer -type f -executable | head -1)" \
+  --photos "$images"/photos-128px-{0,1} \
+  --mosaics "$images"/objects-64px-{0,1} \
   --mosaic-labels "$data"/colorizer/objects-64px-labels.npy \
-  --evaluation "$data"/colorizer/eval-kodak-384px.tar \
+  --evaluation "$images"/eval-kodak-384px \
   --teacher "$data"/lpips/lpips_sq_f32.bin \
   --steps 59498 --epoch-steps 10000 --output "$output" "$@"

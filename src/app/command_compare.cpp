@@ -1,13 +1,11 @@
 /// cnerf compare: the paper's table, its baselines and ablations.
 
-#include <algorithm>
-
 #include "src/app/command.h"
 #include "src/app/common_options.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/text.h"
-#include "src/compare/options.h"
+#include "src/compare/baselines/simulated.h"
 #include "src/compare/rating.h"
 #include "src/compare/run.h"
 
@@ -19,21 +17,10 @@ namespace {
 struct CompareArguments {
   ConfigArguments config;
   std::vector<std::string> captures, ratings;
-  std::string out, methods = "all", lpips_weights;
+  std::string out, methods = "all", lpips_weights, style_reference;
   int seeds = 1, first_seed = 1;
   bool rating_sheet = false, resume = false, overwrite = false, only_report = false;
 };
-
-/// As resolve_config, with the section [compare].
-CompareConfig resolve_compare_config(const ConfigArguments& arguments) {
-  CompareConfig config;
-  const std::vector<Field> fields = fields_of(config);
-  std::vector<RetiredKey> retired = retired_keys();
-  std::erase_if(retired, [&](const RetiredKey& old) { return std::ranges::count(fields, old.key, &Field::key) > 0; });
-  read_settings(arguments, fields, retired);
-  apply_config(config.run);
-  return config;
-}
 
 void run_comparison(const CompareArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
@@ -41,9 +28,9 @@ void run_comparison(const CompareArguments& arguments, const std::vector<std::st
     return write_ratings(arguments.out, {arguments.ratings.begin(), arguments.ratings.end()}, reporter);
   }
   if (arguments.captures.empty()) throw UsageError("CAPTURE: at least one is needed");
-  CompareConfig config = resolve_compare_config(arguments.config);
-  if (config.run.colorizer.spec.empty()) {
-    config.run.colorizer.spec = "simulated:";
+  Config config = resolve_config(arguments.config);
+  if (config.colorizer.spec.empty()) {
+    config.colorizer.spec = kSimulated;
     reporter.say("no --colorizer given: a simulated one disturbs the true colours (docs/evaluation.md)");
   }
   Plan plan;
@@ -53,10 +40,11 @@ void run_comparison(const CompareArguments& arguments, const std::vector<std::st
   plan.methods = parse_methods(arguments.methods);
   for (int i = 0; i < arguments.seeds; ++i) plan.seeds.push_back(arguments.first_seed + i);
   plan.lpips_weights = arguments.lpips_weights;
+  plan.style_reference = arguments.style_reference;
   plan.command_line = joined(command_line);
   begin_report(plan.report, {arguments.resume || arguments.only_report, arguments.overwrite});
   Run comparison(std::move(plan), config, reporter);
-  write_file(fs::path(arguments.out) / "config.toml", write_toml(fields_of(config)));
+  write_file(fs::path(arguments.out) / "config.toml", to_toml(config));
   comparison.run();
   comparison.write_report();
   if (arguments.rating_sheet) comparison.write_rating_sheet();
@@ -79,8 +67,8 @@ Work declare_compare(CLI::App& app) {
   app.add_flag("--rating-sheet", arguments->rating_sheet, "Also write a page on which people judge unnamed pictures");
   app.add_option("--ratings", arguments->ratings, "Only make a table of these files of answers to the rating sheet");
   add_colorizer_options(app, arguments->config);
-  CompareConfig defaults;
-  add_short_form(app, arguments->config, "--style-reference", "compare.style_reference", fields_of(defaults));
+  app.add_option("--style-reference", arguments->style_reference,
+                 "Image whose style is transferred [the middle training view, coloured by the colorizer]");
   add_short_form(app, arguments->config, "--downscale", "capture.downscale");
   add_short_form(app, arguments->config, "--holdout", "capture.holdout");
   app.add_flag("--resume", arguments->resume, "Go on with a comparison; what is finished and unchanged stays");

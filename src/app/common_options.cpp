@@ -57,14 +57,9 @@ void add_config_options(CLI::App& app, ConfigArguments& arguments) {
 
 void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key) {
   Config config;
-  add_short_form(app, arguments, option, key, fields_of(config));
-}
-
-void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
-                    const std::vector<Field>& fields) {
   app.add_option_function<std::string>(
       option, [&arguments, key](const std::string& value) { arguments.short_forms.push_back(key + "=" + value); },
-      help_of(fields, key));
+      help_of(fields_of(config), key));
 }
 
 void add_flag_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key) {
@@ -112,26 +107,14 @@ void add_field_options(CLI::App& app, const std::vector<Field>& fields) {
   }
 }
 
-void read_settings(const ConfigArguments& arguments, const std::vector<Field>& fields,
-                   const std::vector<RetiredKey>& retired) {
-  const auto read_file = [&](const std::filesystem::path& file) {
-    read_toml(read_text_file(file), file.string(), fields, retired);
-  };
-  if (!arguments.preset.empty()) read_file(preset_file(arguments.preset));
-  if (!arguments.file.empty()) read_file(arguments.file);
-  for (const std::string& setting : arguments.settings) apply_setting(setting, fields, retired);
-  for (const std::string& setting : arguments.short_forms) apply_setting(setting, fields, retired);
-}
-
-void apply_config(const Config& config) {
-  check_consistency(config);
-  (void)engines_for(config.device);  // refuses a device that is not there
-  set_thread_count(config.threads);
-}
-
 Config resolve_config(const ConfigArguments& arguments, Config base) {
-  read_settings(arguments, fields_of(base), retired_keys());
-  apply_config(base);
+  if (!arguments.preset.empty()) read_config_file(preset_file(arguments.preset), base);
+  if (!arguments.file.empty()) read_config_file(arguments.file, base);
+  for (const std::string& setting : arguments.settings) apply_setting(setting, base);
+  for (const std::string& setting : arguments.short_forms) apply_setting(setting, base);
+  check_consistency(base);
+  (void)engines_for(base.device);  // refuses a device that is not there
+  set_thread_count(base.threads);
   return base;
 }
 

@@ -26,9 +26,6 @@ struct ConfigArguments {
 void add_config_options(CLI::App& app, ConfigArguments& arguments);
 /// Declares `option` as a short form of the config key `key`, which brings its help and what is legal along.
 void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
-/// The same for a key of other fields than the configuration's.
-void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key,
-                    const std::vector<Field>& fields);
 /// The same for a key that is true or false: the option sets it.
 void add_flag_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
 /// The same for a key that holds a list separated by `;`: the option may be repeated.
@@ -42,13 +39,6 @@ void add_browser_options(CLI::App& app, web::BrowserOptions& options);
 /// @param fields  must outlive the parsing.
 void add_field_options(CLI::App& app, const std::vector<Field>& fields);
 
-/// Reads the arguments over fields: the preset, the file, --set and short forms.
-/// @throws UsageError, MissingInputError
-void read_settings(const ConfigArguments& arguments, const std::vector<Field>& fields,
-                   const std::vector<RetiredKey>& retired);
-/// Checks the configuration; also sets the number of threads and refuses a device that is not there.
-/// @throws UsageError, DeviceError.
-void apply_config(const Config& config);
 /// `base` changed by the arguments, checked; also sets the number of threads and refuses a device that is not there.
 /// @throws UsageError, MissingInputError, DeviceError.
 [[nodiscard]] Config resolve_config(const ConfigArguments& arguments, Config base = {});

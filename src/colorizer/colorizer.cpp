@@ -3,13 +3,12 @@
 #include "src/base/error.h"
 #include "src/base/plugin.h"
 #include "src/colorizer/kinds.h"
-#include "src/colorizer/torch_plugin.h"
 
 namespace cnerf {
 namespace {
 
 const TorchColorizers& torch_colorizers() {
-  return plugin_table<TorchColorizers>(kTorchPlugin, kTorchColorizersEntry);
+  return plugin_table<TorchColorizers>("torch", "cnerf_torch_colorizers");
 }
 
 template <MakeColorizer* TorchColorizers::*Make>

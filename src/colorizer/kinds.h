@@ -25,6 +25,14 @@ MakeColorizer make_caffe_colorizer;        ///< `PROTO,MODEL`: a Caffe network, 
 /// `COMMAND`: any program that speaks the pipe protocol of docs/colorizers.md. `{prompt}` in it becomes the prompt.
 MakeColorizer make_exec_colorizer;
 
+/// What libcnerf_torch.so offers: the colorizers that need LibTorch.
+struct TorchColorizers {
+  MakeColorizer* builtin;
+  MakeColorizer* reference;
+  MakeColorizer* torchscript;
+  const char* version;  ///< of LibTorch
+};
+
 /// Whether a command says that it takes a prompt.
 [[nodiscard]] bool takes_prompt(const std::string& command);
 

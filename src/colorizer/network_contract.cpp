@@ -9,6 +9,7 @@
 #include "src/base/error.h"
 #include "src/color/ab_bins.h"
 #include "src/color/colorspace_math.h"
+#include "src/colorizer/kinds.h"
 
 namespace cnerf {
 namespace {
@@ -172,6 +173,16 @@ ChromaBatch chroma_of(const NetworkContract& contract, const Planes& raw, const 
   (contract.output == "logits313" ? chroma.logits : chroma.ab) = std::move(answer.values);
   check_answer(colorizer, question, chroma);
   return chroma;
+}
+
+fs::path find_spec_file(const std::string& name, const ColorizerRequest& request) {
+  const fs::path& folder = request.context.working_folder;
+  const fs::path beside = folder / name;
+  if (!folder.empty() && fs::exists(beside)) return beside;
+  if (fs::exists(name)) return name;
+  std::string message = "colorizer \"" + request.options.spec + "\": no file " + name;
+  if (!folder.empty() && beside != name) message += ", nor " + beside.string();
+  throw MissingInputError(message);
 }
 
 std::string first_line(const std::string& text) {

@@ -1,13 +1,8 @@
 #include "src/colorizer_training/feature_teacher.h"
 
-#include <cstring>
-#include <sstream>
 #include <vector>
 
-#include "src/base/error.h"
-#include "src/base/files.h"
-
-namespace cnerf {
+namespace cnerf::colorizer_training {
 namespace fs = std::filesystem;
 namespace F = torch::nn::functional;
 using torch::Tensor;
@@ -16,40 +11,17 @@ namespace {
 
 constexpr std::int64_t kInputSide = 192;  // small pictures are enlarged: the classifier knows 224 pixels
 
-std::vector<std::int64_t> parse_shape(const std::string& text) {
-  std::vector<std::int64_t> shape;
-  std::istringstream in(text);
-  for (std::string part; std::getline(in, part, 'x');) shape.push_back(std::stoll(part));
-  return shape;
-}
-
-fs::path manifest_of(const fs::path& weights) {
-  std::string stem = weights.stem().string();
-  if (stem.ends_with("_f32")) stem.resize(stem.size() - 4);
-  return weights.parent_path() / (stem + "_manifest.txt");
-}
-
 }  // namespace
 
-FeatureTeacher::FeatureTeacher(const fs::path& weights, torch::Device device) : file_(weights) {
-  const std::vector<std::byte> content = read_binary_file(weights);
-  std::istringstream manifest(read_text_file(manifest_of(weights)));
-  std::string name, shape_text;
-  std::size_t offset = 0;
-  while (manifest >> name >> shape_text >> offset) {
-    Tensor tensor = torch::empty(parse_shape(shape_text));
-    if (offset * sizeof(float) + tensor.nbytes() > content.size()) {
-      throw InputError(weights, name, "lies beyond the end of the file");
-    }
-    std::memcpy(tensor.data_ptr(), content.data() + offset * sizeof(float), tensor.nbytes());
-    weights_[name] = tensor.to(device);
-  }
-}
+FeatureTeacher::FeatureTeacher(const fs::path& weights, torch::Device device) : file_(weights), device_(device) {}
 
 const Tensor& FeatureTeacher::at(const std::string& name) const {
-  const auto found = weights_.find(name);
-  if (found == weights_.end()) throw InputError(file_, name, "missing; expected LPIPS's SqueezeNet 1.1");
-  return found->second;
+  const auto known = weights_.find(name);
+  if (known != weights_.end()) return known->second;
+  const TensorFile::Tensor& tensor = file_.get(name);
+  const std::vector<std::int64_t> shape(tensor.shape.begin(), tensor.shape.end());
+  const Tensor values = torch::from_blob(const_cast<float*>(tensor.values.data()), shape);
+  return weights_[name] = values.to(device_, values.scalar_type(), /*non_blocking=*/false, /*copy=*/true);
 }
 
 Tensor FeatureTeacher::fire(const Tensor& x, const std::string& name) const {
@@ -80,4 +52,4 @@ Tensor FeatureTeacher::features(const Tensor& srgb, std::int64_t rows, std::int6
   return torch::adaptive_avg_pool2d(x.to(torch::kFloat32), {rows, columns});
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

@@ -8,13 +8,15 @@
 #include <map>
 #include <string>
 
-namespace cnerf {
+#include "src/base/tensor_file.h"
+
+namespace cnerf::colorizer_training {
 
 class FeatureTeacher {
  public:
   static constexpr std::int64_t kChannels = 512;
 
-  /// @param weights  LPIPS's SqueezeNet weights as floats, beside them `..._manifest.txt` with name, shape, offset.
+  /// @param weights  LPIPS's SqueezeNet weights, a TensorFile.
   /// @throws MissingInputError, InputError.
   FeatureTeacher(const std::filesystem::path& weights, torch::Device device);
 
@@ -25,8 +27,9 @@ class FeatureTeacher {
   [[nodiscard]] const torch::Tensor& at(const std::string& name) const;
   [[nodiscard]] torch::Tensor fire(const torch::Tensor& x, const std::string& name) const;
 
-  std::filesystem::path file_;
-  std::map<std::string, torch::Tensor> weights_;
+  TensorFile file_;
+  torch::Device device_;
+  mutable std::map<std::string, torch::Tensor> weights_;  // those of `file_` that were used, on the device
 };
 
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

@@ -2,10 +2,12 @@
 
 #include <cmath>
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 using torch::Tensor;
 
 namespace {
+
+constexpr double kWeightDecay = 0.05, kBeta1 = 0.9, kBeta2 = 0.98, kEpsilon = 1e-8, kClipNorm = 1;
 
 /// A view of `flat` at `offset` with the shape of `like`; convolution weights lie channels-last in it.
 Tensor view_like(const Tensor& flat, std::int64_t offset, const Tensor& like) {
@@ -55,24 +57,23 @@ FlatParameters::FlatParameters(const std::vector<torch::nn::Module*>& modules) {
   }
 }
 
-FlatAdamW::FlatAdamW(FlatParameters& parameters, const AdamWOptions& options)
+FlatAdamW::FlatAdamW(FlatParameters& parameters)
     : first_moment(torch::zeros_like(parameters.values)),
       second_moment(torch::zeros_like(parameters.values)),
-      parameters_(parameters),
-      options_(options) {}
+      parameters_(parameters) {}
 
 void FlatAdamW::step(double learning_rate, std::int64_t step) {
   const torch::NoGradGuard no_grad;
   Tensor& gradient = parameters_.gradients;
-  gradient.mul_((options_.clip_norm / (gradient.norm() + 1e-6)).clamp_max(1));
-  first_moment.lerp_(gradient, 1 - options_.beta1);
-  second_moment.mul_(options_.beta2).addcmul_(gradient, gradient, 1 - options_.beta2);
-  const double correction1 = 1 - std::pow(options_.beta1, double(step));
-  const double correction2 = 1 - std::pow(options_.beta2, double(step));
-  parameters_.values.mul_(1 - learning_rate * options_.weight_decay * parameters_.decay_mask);
-  const Tensor denominator = (second_moment / correction2).sqrt_().add_(options_.epsilon);
+  gradient.mul_((kClipNorm / (gradient.norm() + 1e-6)).clamp_max(1));
+  first_moment.lerp_(gradient, 1 - kBeta1);
+  second_moment.mul_(kBeta2).addcmul_(gradient, gradient, 1 - kBeta2);
+  const double correction1 = 1 - std::pow(kBeta1, double(step));
+  const double correction2 = 1 - std::pow(kBeta2, double(step));
+  parameters_.values.mul_(1 - learning_rate * kWeightDecay * parameters_.decay_mask);
+  const Tensor denominator = (second_moment / correction2).sqrt_().add_(kEpsilon);
   parameters_.values.addcdiv_(first_moment, denominator, -learning_rate / correction1);
   gradient.zero_();
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

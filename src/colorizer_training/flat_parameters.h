@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 
 /// Rebinds the modules' parameters, gradients and float buffers to views of flat tensors. Modules must not be moved to
 /// another device afterwards.
@@ -19,16 +19,10 @@ class FlatParameters {
   torch::Tensor decay_mask;  ///< [N] 1 for weights of matrices and convolutions, 0 for biases and norms
 };
 
-/// AdamW (Loshchilov and Hutter 2019) with a clipped gradient norm, and an average of the weights over time.
-struct AdamWOptions {
-  double weight_decay = 0.05;
-  double beta1 = 0.9, beta2 = 0.98, epsilon = 1e-8;
-  double clip_norm = 1;
-};
-
+/// AdamW (Loshchilov and Hutter 2019) with a clipped gradient norm.
 class FlatAdamW {
  public:
-  FlatAdamW(FlatParameters& parameters, const AdamWOptions& options);
+  explicit FlatAdamW(FlatParameters& parameters);
   /// @param step  counted from 1.
   void step(double learning_rate, std::int64_t step);
 
@@ -36,7 +30,6 @@ class FlatAdamW {
 
  private:
   FlatParameters& parameters_;
-  AdamWOptions options_;
 };
 
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

@@ -1,46 +1,28 @@
 #include "src/colorizer_training/image_set.h"
 
+#include <torch/torch.h>
+
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
-#include <functional>
-#include <mutex>
+#include <cstring>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <set>
-#include <thread>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/parallel.h"
 #include "src/base/rng.h"
-#include "src/colorizer_training/tar_reader.h"
+#include "src/colorizer/torch/single_threaded_ops.h"
+#include "src/picture/codecs.h"
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 namespace fs = std::filesystem;
-
 namespace {
 
+constexpr int kPhotoCanvas = 176;  // side of a training photograph's square canvas, pixels
 constexpr const char* kTileSet = "objects";
 constexpr const char* kUnlabelled[] = {"-", "BACKGROUND_Google"};
-
-/// `task(i)` for i in [0, count) on all cores; the first exception is rethrown.
-void on_all_cores(std::size_t count, const std::function<void(std::size_t)>& task) {
-  std::atomic<std::size_t> next = 0;
-  std::exception_ptr failure;
-  std::mutex failure_mutex;
-  const auto work = [&] {
-    try {
-      for (std::size_t i = next++; i < count; i = next++) task(i);
-    } catch (...) {
-      const std::lock_guard lock(failure_mutex);
-      failure = std::current_exception();
-      next = count;
-    }
-  };
-  std::vector<std::thread> threads(std::max(1u, std::thread::hardware_concurrency()));
-  for (auto& thread : threads) thread = std::thread(work);
-  for (auto& thread : threads) thread.join();
-  if (failure) std::rethrow_exception(failure);
-}
 
 bool is_held_out(const std::string& name, int parts) {
   std::uint64_t hash = 0xcbf29ce484222325ull;  // FNV-1a
@@ -48,17 +30,44 @@ bool is_held_out(const std::string& name, int parts) {
   return int(mix_bits(hash) % kHeldOutParts) < parts;
 }
 
-RgbImage decode_or_throw(const fs::path& source, const NamedBytes& entry) {
-  auto image = decode_image(entry.content);
-  if (!image) throw InputError(source, entry.name, "not an image of a known format");
-  return *std::move(image);
+/// Paths of all files below a folder, '/' between their parts, sorted.
+std::vector<std::string> files_below(const fs::path& folder) {
+  if (!fs::is_directory(folder)) throw MissingInputError(folder.string() + ": no such folder");
+  std::vector<std::string> names;
+  for (const auto& item : fs::recursive_directory_iterator(folder)) {
+    if (item.is_regular_file()) names.push_back(fs::relative(item.path(), folder).generic_string());
+  }
+  std::ranges::sort(names);
+  return names;
 }
 
-RgbImage at_evaluation_size(const RgbImage& image) {
-  const double scale = double(kEvaluationSide) / image.short_side();
+Picture load_picture(const fs::path& file) {
+  const std::vector<std::byte> content = read_binary_file(file);
+  cv::Mat image;
+  if (!content.empty()) {
+    const cv::Mat bytes(1, int(content.size()), CV_8U, const_cast<std::byte*>(content.data()));
+    image = decode_image(bytes, cv::IMREAD_COLOR);
+  }
+  if (image.empty()) throw InputError(file, "", "not an image of a known format");
+  cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
+  return {image.cols, image.rows, {image.datastart, image.dataend}};
+}
+
+/// `task(i)` for i in [0, count) on all cores, one thread for each operator.
+template <typename Task>
+void on_all_cores(std::size_t count, const Task& task) {
+  const SingleThreadedOps single;
+  parallel_tasks(count, [&](std::size_t i) {
+    at::init_num_threads();
+    task(i);
+  });
+}
+
+Picture at_evaluation_size(const Picture& picture) {
+  const double scale = double(kEvaluationSide) / std::min(picture.width, picture.height);
   // Multiples of four: the network answers in blocks of 4x4.
   const auto scaled = [&](int side) { return std::max(kEvaluationSide, int(std::lround(side * scale / 4)) * 4); };
-  return resize_image(image, scaled(image.width), scaled(image.height));
+  return resized(picture, scaled(picture.width), scaled(picture.height));
 }
 
 struct PhotoName {
@@ -72,32 +81,30 @@ PhotoName parse_photo_name(const std::string& name) {
   PhotoName parsed{name.substr(0, first), ""};
   if (second == std::string::npos) return parsed;
   const std::string label = name.substr(first + 1, second - first - 1);
-  if (std::find(std::begin(kUnlabelled), std::end(kUnlabelled), label) == std::end(kUnlabelled)) {
-    parsed.label = parsed.set + "/" + label;
-  }
+  if (std::ranges::find(kUnlabelled, label) == std::end(kUnlabelled)) parsed.label = parsed.set + "/" + label;
   return parsed;
 }
 
 struct DecodedPhoto {
   std::string name;
-  RgbImage image;  ///< canvas or evaluation size
+  Picture picture;  ///< canvas or evaluation size
   float aspect = 1;
   bool held_out = false;
 };
 
-std::vector<DecodedPhoto> decode_photos(const std::vector<fs::path>& sources, int held_out) {
+std::vector<DecodedPhoto> decode_photos(const std::vector<fs::path>& folders, int held_out) {
   std::vector<DecodedPhoto> photos;
-  for (const fs::path& source : sources) {
-    const std::vector<NamedBytes> entries = read_tar_or_folder(source);
+  for (const fs::path& folder : folders) {
+    const std::vector<std::string> names = files_below(folder);
     const std::size_t first = photos.size();
-    photos.resize(first + entries.size());
-    on_all_cores(entries.size(), [&](std::size_t i) {
-      const RgbImage image = decode_or_throw(source, entries[i]);
+    photos.resize(first + names.size());
+    on_all_cores(names.size(), [&](std::size_t i) {
+      const Picture picture = load_picture(folder / names[i]);
       DecodedPhoto& photo = photos[first + i];
-      photo.name = entries[i].name;
-      photo.aspect = float(image.width) / float(image.height);
+      photo.name = names[i];
+      photo.aspect = float(picture.width) / float(picture.height);
       photo.held_out = is_held_out(photo.name, held_out);
-      photo.image = photo.held_out ? at_evaluation_size(image) : resize_image(image, kPhotoCanvas, kPhotoCanvas);
+      photo.picture = photo.held_out ? at_evaluation_size(picture) : resized(picture, kPhotoCanvas, kPhotoCanvas);
     });
   }
   return photos;
@@ -122,33 +129,27 @@ std::map<std::string, int> number_labels(const std::vector<DecodedPhoto>& photos
   return numbers;
 }
 
-/// Otherwise small sets of whole scenes drown in large ones of single things.
-void weigh_by_set(const std::vector<std::string>& set_of_photo, TrainingImages& photos) {
-  std::map<std::string, double> counts;
-  for (const std::string& name : set_of_photo) counts[name] += 1;
-  for (const std::string& name : set_of_photo) photos.weight.push_back(1 / std::sqrt(counts[name]));
+void add_training_image(const std::vector<std::uint8_t>& rgb, float aspect, int label, TrainingImages& images) {
+  images.rgb.insert(images.rgb.end(), rgb.begin(), rgb.end());
+  images.aspect.push_back(aspect);
+  images.label.push_back(label);
 }
 
 void add_photos(const ImageSources& sources, ImageSet& set) {
   set.photos.side = kPhotoCanvas;
   std::vector<DecodedPhoto> photos = decode_photos(sources.photos, sources.held_out);
   const std::map<std::string, int> numbers = number_labels(photos, set.classes);
-  std::vector<std::string> set_of_photo;
   for (auto& photo : photos) {
     const PhotoName name = parse_photo_name(photo.name);
     if (photo.held_out) {
-      set.validation[name.set].push_back(std::move(photo.image));
-      continue;
+      set.validation[name.set].push_back(std::move(photo.picture));
+    } else {
+      add_training_image(photo.picture.rgb, photo.aspect, name.label.empty() ? -1 : numbers.at(name.label), set.photos);
     }
-    set.photos.rgb.insert(set.photos.rgb.end(), photo.image.rgb.begin(), photo.image.rgb.end());
-    set.photos.aspect.push_back(photo.aspect);
-    set.photos.label.push_back(name.label.empty() ? -1 : numbers.at(name.label));
-    set_of_photo.push_back(name.set);
   }
-  if (sources.balance_sets) weigh_by_set(set_of_photo, set.photos);
 }
 
-/// One byte a tile: the data of a version 1 .npy file of uint8.
+/// One byte per tile: the data of a version 1 .npy file of uint8.
 std::vector<int> read_labels(const fs::path& file) {
   const std::vector<std::byte> content = read_binary_file(file);
   if (content.size() < 10) throw InputError(file.string() + ": not a .npy file");
@@ -160,39 +161,41 @@ std::vector<int> read_labels(const fs::path& file) {
   return labels;
 }
 
-void add_tile(const RgbImage& tile, const std::string& name, int label, int held_out, ImageSet& set) {
-  if (is_held_out(name, held_out)) {
-    set.validation[kTileSet].push_back(at_evaluation_size(tile));
-    return;
+/// The tiles of a mosaic, row by row.
+std::vector<Picture> tiles_of(const Picture& mosaic, int side) {
+  std::vector<Picture> tiles;
+  const cv::Mat whole(mosaic.height, mosaic.width, CV_8UC3, const_cast<std::uint8_t*>(mosaic.rgb.data()));
+  for (int y = 0; y + side <= mosaic.height; y += side) {
+    for (int x = 0; x + side <= mosaic.width; x += side) {
+      const cv::Mat tile = whole(cv::Rect(x, y, side, side)).clone();
+      tiles.push_back({side, side, {tile.datastart, tile.dataend}});
+    }
   }
-  set.tiles.rgb.insert(set.tiles.rgb.end(), tile.rgb.begin(), tile.rgb.end());
-  set.tiles.aspect.push_back(1);
-  set.tiles.label.push_back(label);
+  return tiles;
 }
 
 void add_mosaics(const ImageSources& sources, ImageSet& set) {
   set.tiles.side = sources.tile_side;
-  const std::vector<int> labels =
-      sources.mosaic_labels.empty() ? std::vector<int>{} : read_labels(sources.mosaic_labels);
+  const auto labels = sources.mosaic_labels.empty() ? std::vector<int>{} : read_labels(sources.mosaic_labels);
   const int first_class = int(set.classes.names.size());
-  int tile_number = 0;
-  for (const fs::path& source : sources.mosaics) {
-    const std::vector<NamedBytes> entries = read_tar_or_folder(source);
-    std::vector<RgbImage> mosaics(entries.size());
-    on_all_cores(entries.size(), [&](std::size_t i) { mosaics[i] = decode_or_throw(source, entries[i]); });
-    for (const RgbImage& mosaic : mosaics) {
-      for (int y = 0; y + sources.tile_side <= mosaic.height; y += sources.tile_side) {
-        for (int x = 0; x + sources.tile_side <= mosaic.width; x += sources.tile_side, ++tile_number) {
-          const bool labelled = std::size_t(tile_number) < labels.size();
-          add_tile(crop_image(mosaic, x, y, sources.tile_side, sources.tile_side),
-                   std::string(kTileSet) + "/" + std::to_string(tile_number),
-                   labelled ? first_class + labels[std::size_t(tile_number)] : -1, sources.held_out, set);
+  std::size_t number = 0;
+  for (const fs::path& folder : sources.mosaics) {
+    const std::vector<std::string> names = files_below(folder);
+    std::vector<Picture> mosaics(names.size());
+    on_all_cores(names.size(), [&](std::size_t i) { mosaics[i] = load_picture(folder / names[i]); });
+    for (const Picture& mosaic : mosaics) {
+      for (const Picture& tile : tiles_of(mosaic, sources.tile_side)) {
+        const int label = number < labels.size() ? first_class + labels[number] : -1;
+        if (is_held_out(std::string(kTileSet) + "/" + std::to_string(number++), sources.held_out)) {
+          set.validation[kTileSet].push_back(at_evaluation_size(tile));
+        } else {
+          add_training_image(tile.rgb, 1, label, set.tiles);
         }
       }
     }
   }
-  if (labels.empty() || tile_number == 0) return;
-  const int count = 1 + *std::max_element(labels.begin(), labels.end());
+  if (labels.empty() || number == 0) return;
+  const int count = 1 + *std::ranges::max_element(labels);
   for (int i = 0; i < count; ++i) set.classes.names.push_back(std::string(kTileSet) + "/" + std::to_string(i));
   set.classes.set_ranges.emplace_back(first_class, first_class + count);
 }
@@ -210,15 +213,35 @@ ImageSet load_image_set(const ImageSources& sources) {
   ImageSet set;
   add_photos(sources, set);
   add_mosaics(sources, set);
+  for (const fs::path& folder : sources.evaluation) {
+    const std::string name = fs::absolute(folder / "").lexically_normal().parent_path().filename().string();
+    set.evaluation[name] = load_evaluation_images(folder);
+  }
   return set;
 }
 
-std::vector<RgbImage> load_evaluation_images(const fs::path& path) {
-  const std::vector<NamedBytes> entries = read_tar_or_folder(path);
-  std::vector<RgbImage> images(entries.size());
-  on_all_cores(entries.size(),
-               [&](std::size_t i) { images[i] = at_evaluation_size(decode_or_throw(path, entries[i])); });
-  return images;
+std::vector<Picture> load_evaluation_images(const fs::path& folder) {
+  const std::vector<std::string> names = files_below(folder);
+  std::vector<Picture> pictures(names.size());
+  on_all_cores(names.size(), [&](std::size_t i) { pictures[i] = at_evaluation_size(load_picture(folder / names[i])); });
+  return pictures;
 }
 
-}  // namespace cnerf
+Picture resized(const Picture& picture, int width, int height) {
+  namespace F = torch::nn::functional;
+  if (picture.width == width && picture.height == height) return picture;
+  const torch::NoGradGuard no_grad;
+  auto* bytes = const_cast<std::uint8_t*>(picture.rgb.data());
+  const torch::Tensor whole = torch::from_blob(bytes, {1, picture.height, picture.width, 3}, torch::kUInt8);
+  const auto options = F::InterpolateFuncOptions()
+                           .size(std::vector<std::int64_t>{height, width})
+                           .mode(torch::kBilinear)
+                           .align_corners(false)
+                           .antialias(true);
+  const torch::Tensor values = F::interpolate(whole.permute({0, 3, 1, 2}).to(torch::kFloat32).contiguous(), options);
+  const torch::Tensor codes = values.permute({0, 2, 3, 1}).round().clamp(0, 255).to(torch::kUInt8).contiguous();
+  const auto* first = codes.data_ptr<std::uint8_t>();
+  return {width, height, {first, first + codes.numel()}};
+}
+
+}  // namespace cnerf::colorizer_training

@@ -1,17 +1,17 @@
 #pragma once
-/// The images a colorizer is trained and judged on, decoded, labelled and split. No Torch.
+/// The images a colorizer is trained and judged on, decoded, labelled and split.
 
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "src/colorizer_training/rgb_image.h"
+#include "src/picture/picture.h"
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 
-inline constexpr int kPhotoCanvas = 176;     ///< side of a training photograph's square canvas, pixels
 inline constexpr int kEvaluationSide = 160;  ///< short side of images that are judged, pixels
 inline constexpr int kHeldOutParts = 20;     ///< of every set; some of them, chosen by name, are for validation
 
@@ -28,26 +28,26 @@ struct TrainingImages {
   std::vector<std::uint8_t> rgb;  ///< [N, side, side, 3] sRGB
   std::vector<float> aspect;      ///< [N] width / height of the photograph
   std::vector<int> label;         ///< [N] into ClassList; -1 = unknown
-  std::vector<double> weight;     ///< [N] how often an image is drawn, relative to others; empty = all the same
 
   [[nodiscard]] std::size_t size() const { return aspect.size(); }
 };
 
 /// Images to judge, by the set they come from, short side kEvaluationSide.
-using EvaluationSets = std::map<std::string, std::vector<RgbImage>>;
+using EvaluationSets = std::map<std::string, std::vector<Picture>>;
 
 struct ImageSources {
-  std::vector<std::filesystem::path> photos;   ///< tars or folders of `set/class/name.ext`; class "-" = unknown
-  std::vector<std::filesystem::path> mosaics;  ///< tars or folders of mosaics of square tiles, in this order
-  std::filesystem::path mosaic_labels;         ///< .npy, uint8, one a tile; empty = no labels
+  std::vector<std::filesystem::path> photos;      ///< folders of `set/class/name.ext`; class "-" = unknown
+  std::vector<std::filesystem::path> mosaics;     ///< folders of mosaics of square tiles, in this order
+  std::filesystem::path mosaic_labels;            ///< .npy, uint8, one per tile; empty = no labels
+  std::vector<std::filesystem::path> evaluation;  ///< folders of images that are never trained on
   int tile_side = 64;
-  int held_out = 1;           ///< of kHeldOutParts
-  bool balance_sets = false;  ///< draw a set of n photographs sqrt(n), not n, times as often as one of a single one
+  int held_out = 1;  ///< of kHeldOutParts
 };
 
 struct ImageSet {
   TrainingImages photos, tiles;
-  EvaluationSets validation;
+  EvaluationSets validation;  ///< what was held out
+  EvaluationSets evaluation;  ///< by the folders' names
   ClassList classes;
 };
 
@@ -55,7 +55,10 @@ struct ImageSet {
 /// @throws MissingInputError, InputError  naming the file; images that cannot be decoded are errors, too.
 [[nodiscard]] ImageSet load_image_set(const ImageSources& sources);
 
-/// All images of a tar or folder at evaluation size, for sets that are never trained on.
-[[nodiscard]] std::vector<RgbImage> load_evaluation_images(const std::filesystem::path& path);
+/// All images of a folder at evaluation size, in the order of their names.
+[[nodiscard]] std::vector<Picture> load_evaluation_images(const std::filesystem::path& folder);
 
-}  // namespace cnerf
+/// Any aspect; a tent filter, as wide as a target pixel when shrinking and as a source pixel when growing.
+[[nodiscard]] Picture resized(const Picture& picture, int width, int height);
+
+}  // namespace cnerf::colorizer_training

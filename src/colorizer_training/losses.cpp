@@ -5,7 +5,7 @@
 #include "src/colorizer/torch/network_decode.h"
 #include "src/colorizer_training/batch.h"
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 namespace nn = torch::nn;
 namespace F = torch::nn::functional;
 using torch::Tensor;
@@ -74,12 +74,6 @@ ColorLoss color_loss(const Tensor& logits, const Tensor& ab, const SoftLabelTabl
   return {(cross_entropy * weight).mean(), regression};
 }
 
-Tensor distillation_loss(const Tensor& logits, const Tensor& probability, const Tensor& class_weights) {
-  const Tensor cross_entropy = -(probability * log_probability_rows(logits)).sum(1);
-  const Tensor weight = 1 / torch::matmul(probability, 1 / class_weights);
-  return (cross_entropy * weight).mean();
-}
-
 AuxiliaryHeadsImpl::AuxiliaryHeadsImpl(std::int64_t classes, std::int64_t feature_channels) {
   constexpr std::int64_t kHidden = 512;
   hidden_ = register_module("hidden", nn::Linear(ColorizerNetImpl::kGlobalChannels, kHidden));
@@ -136,4 +130,4 @@ Tensor feature_loss(const Tensor& predicted, const Tensor& teacher) {
                  .mean();
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

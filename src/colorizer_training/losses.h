@@ -7,7 +7,7 @@
 
 #include "src/colorizer_training/image_set.h"
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 
 /// Soft labels of ab colours by table: one entry a unit of ab, which is a tenth of a bin.
 class SoftLabelTable {
@@ -20,6 +20,7 @@ class SoftLabelTable {
   };
   /// @param ab  [B, 2, h, w].  @return  for the P = B h w colours, row by row.
   [[nodiscard]] Targets look_up(const torch::Tensor& ab) const;
+  [[nodiscard]] torch::Device device() const { return centres_.device(); }
   /// [313, 2] f32.
   [[nodiscard]] const torch::Tensor& centres() const { return centres_; }
 
@@ -38,14 +39,6 @@ struct ColorLoss {
 /// @param logits  [B, 313, h, w].  @param class_weights [313].
 [[nodiscard]] ColorLoss color_loss(const torch::Tensor& logits, const torch::Tensor& ab, const SoftLabelTable& table,
                                    const torch::Tensor& class_weights);
-
-/// `color_loss`'s classification with the truth drawn from a known distribution instead of seen (Hinton et al. 2015):
-/// what the rebalanced loss is on average over pictures of one lightness, if `probability` is the rebalanced
-/// distribution of their colours. A pixel then weighs the sum over classes of probability times class weight before
-/// the rebalancing, which is 1 / sum(probability / weight).
-/// @param probability  [B h w, 313] row by row, of networks trained with the same class weights.
-[[nodiscard]] torch::Tensor distillation_loss(const torch::Tensor& logits, const torch::Tensor& probability,
-                                              const torch::Tensor& class_weights);
 
 /// Heads that only training has: the class of the picture, and a frozen classifier's features of its colours.
 class AuxiliaryHeadsImpl : public torch::nn::Module {
@@ -75,4 +68,4 @@ class LabelLoss {
 /// 1 - cosine between standardised teacher features and their prediction, both [B, F, h, w].
 [[nodiscard]] torch::Tensor feature_loss(const torch::Tensor& predicted, const torch::Tensor& teacher);
 
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <cstring>
 #include <limits>
 
 #include "src/colorizer_training/batch.h"
+#include "src/picture/contact_sheet.h"
+#include "src/picture/encode.h"
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 using torch::Tensor;
 
 namespace {
@@ -17,8 +18,8 @@ constexpr const char* kTileSet = "objects";
 constexpr const char* kSceneSets[] = {"bsds500", "cid22", "imagenet1000"};  // whole scenes, not single things
 constexpr std::size_t kMostTiles = 1000;  // enlarged 64-pixel images; more would only take time
 
-std::vector<RgbImage> photographs(const EvaluationSets& sets, bool scenes_only) {
-  std::vector<RgbImage> all;
+std::vector<Picture> photographs(const EvaluationSets& sets, bool scenes_only) {
+  std::vector<Picture> all;
   for (const auto& [name, images] : sets) {
     const bool scene = std::find(std::begin(kSceneSets), std::end(kSceneSets), name) != std::end(kSceneSets);
     if (name != kTileSet && (scene || !scenes_only)) all.insert(all.end(), images.begin(), images.end());
@@ -26,25 +27,16 @@ std::vector<RgbImage> photographs(const EvaluationSets& sets, bool scenes_only) 
   return all;
 }
 
-SetScore score_set(const std::string& name, const std::vector<RgbImage>& images, ColorizerNet& network,
-                   const AbDecoding& decoding, const SoftLabelTable& table, torch::Device device) {
-  const std::vector<ChromaScore> scores = score_network(network, images, {{0, decoding}}, {}, table, device);
-  return {name, int(images.size()), scores[0], score_baselines(images, table, device)};
-}
-
-/// Pastes `image` at (x, y), cut to what fits.
-void paste(RgbImage& sheet, const RgbImage& image, int x, int y) {
-  const int width = std::min(image.width, sheet.width - x), height = std::min(image.height, sheet.height - y);
-  for (int row = 0; row < height; ++row) {
-    std::memcpy(&sheet.rgb[(std::size_t(y + row) * std::size_t(sheet.width) + std::size_t(x)) * 3],
-                &image.rgb[std::size_t(row) * std::size_t(image.width) * 3], std::size_t(width) * 3);
-  }
+SetScore score_set(const std::string& name, const std::vector<Picture>& images, ColorizerNet& network,
+                   const AbDecoding& decoding, const SoftLabelTable& table) {
+  const std::vector<ChromaScore> scores = score_network(network, images, {{0, decoding}}, {}, table);
+  return {name, int(images.size()), scores[0], score_baselines(images, table)};
 }
 
 }  // namespace
 
 DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& validation, const Tensor& log_weights,
-                               const SoftLabelTable& table, torch::Device device) {
+                               const SoftLabelTable& table) {
   std::vector<DecodingChoice> choices;
   for (const int short_side : {192, 224, 256, 288, 320}) {
     for (const double share : {0.0, 0.15, 0.3, 0.45, 0.6}) {
@@ -55,11 +47,11 @@ DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& vali
     }
   }
   // Scenes: the large sets of single things have near duplicates among the training images.
-  std::vector<RgbImage> images = photographs(validation, true);
+  std::vector<Picture> images = photographs(validation, true);
   if (images.empty()) images = photographs(validation, false);
   if (images.empty()) return {};
-  const ChromaScore grey = score_grey(images, table, device);
-  const std::vector<ChromaScore> scores = score_network(network, images, choices, log_weights, table, device);
+  const ChromaScore grey = score_baselines(images, table).grey;
+  const std::vector<ChromaScore> scores = score_network(network, images, choices, log_weights, table);
   std::size_t best = 0;
   for (std::size_t i = 0; i < choices.size(); ++i) {
     if (merit(scores[i], grey) > merit(scores[best], grey)) best = i;
@@ -72,55 +64,50 @@ DecodingChoice choose_decoding(ColorizerNet& network, const EvaluationSets& vali
   return choices[best];
 }
 
-std::vector<SetScore> score_sets(ColorizerNet& network, const AbDecoding& decoding, const EvaluationSets& sets,
-                                 const SoftLabelTable& table, torch::Device device) {
+std::vector<SetScore> score_sets(ColorizerNet& network, const AbDecoding& decoding, const ImageSet& images,
+                                 const SoftLabelTable& table) {
   std::vector<SetScore> scores;
-  for (const auto& [name, images] : sets) {
-    const std::vector<RgbImage> some(images.begin(),
-                                     images.begin() + std::ptrdiff_t(std::min(images.size(), kMostTiles)));
-    scores.push_back(score_set(name, some, network, decoding, table, device));
+  const auto score = [&](const std::string& name, const std::vector<Picture>& pictures) {
+    scores.push_back(score_set(name, pictures, network, decoding, table));
+  };
+  for (const auto& [name, pictures] : images.validation) {
+    score(name, {pictures.begin(), pictures.begin() + std::ptrdiff_t(std::min(pictures.size(), kMostTiles))});
   }
-  if (sets.size() > 2) {
-    scores.push_back(score_set("all photographs held out", photographs(sets, false), network, decoding, table, device));
-    scores.push_back(score_set("scenes held out", photographs(sets, true), network, decoding, table, device));
+  if (images.validation.size() > 2) {
+    score("all photographs held out", photographs(images.validation, false));
+    score("scenes held out", photographs(images.validation, true));
   }
+  for (const auto& [name, pictures] : images.evaluation) score(name, pictures);
   return scores;
 }
 
 void write_sample_sheet(const std::filesystem::path& file, ColorizerNet& network, const AbDecoding& decoding,
                         const EvaluationSets& sets, int images_per_set, torch::Device device) {
   const torch::NoGradGuard no_grad;
-  std::vector<RgbImage> rows;
+  std::vector<Tile> tiles;
   for (const auto& [name, images] : sets) {
     for (std::size_t i = 0; i < std::min(images.size(), std::size_t(images_per_set)); ++i) {
-      const RgbImage& truth = images[i * images.size() / std::size_t(images_per_set)];
+      const Picture& truth = images[i * images.size() / std::size_t(images_per_set)];
       const Tensor bytes = torch::tensor(torch::ArrayRef<std::uint8_t>(truth.rgb), torch::kUInt8);
       const Tensor srgb =
           bytes.view({1, truth.height, truth.width, 3}).permute({0, 3, 1, 2}).to(device, torch::kFloat32) / 255;
       const Tensor lightness = lab_from_srgb(srgb).lightness;
       const Tensor ab = colorize_lightness(network, lightness, decoding);
-      RgbImage row{3 * kEvaluationSide * 3 / 2, kEvaluationSide, {}};
-      row.rgb.assign(std::size_t(row.width) * std::size_t(row.height) * 3, 0);
-      paste(row, image_from_lab(lightness[0], torch::zeros_like(ab[0])), 0, 0);
-      paste(row, image_from_lab(lightness[0], ab[0]), row.width / 3, 0);
-      paste(row, truth, 2 * row.width / 3, 0);
-      rows.push_back(std::move(row));
+      tiles.push_back({picture_from_lab(lightness[0], torch::zeros_like(ab[0])), ""});
+      tiles.push_back({picture_from_lab(lightness[0], ab[0]), ""});
+      tiles.push_back({truth, name});
     }
   }
-  if (rows.empty()) return;
-  RgbImage sheet{rows[0].width, int(rows.size()) * kEvaluationSide, {}};
-  for (const RgbImage& row : rows) sheet.rgb.insert(sheet.rgb.end(), row.rgb.begin(), row.rgb.end());
-  write_png(file, sheet);
+  if (!tiles.empty()) write_png(file, tiled(tiles, 3));
 }
 
-std::string validation_line(ColorizerNet& network, const EvaluationSets& validation, const SoftLabelTable& table,
-                            torch::Device device) {
+std::string validation_line(ColorizerNet& network, const EvaluationSets& validation, const SoftLabelTable& table) {
   std::string text;
   for (const bool scenes : {false, true}) {
-    const std::vector<RgbImage> images = photographs(validation, scenes);
+    const std::vector<Picture> images = photographs(validation, scenes);
     if (images.empty()) continue;
-    const ChromaScore grey = score_grey(images, table, device);
-    const ChromaScore score = score_network(network, images, {DecodingChoice{}}, {}, table, device)[0];
+    const ChromaScore grey = score_baselines(images, table).grey;
+    const ChromaScore score = score_network(network, images, {DecodingChoice{}}, {}, table)[0];
     char line[200];
     std::snprintf(line, sizeof line, "%s raw %+.2f balanced %+.2f rmse %.3f merit %.2f",
                   scenes ? " | scenes" : "photographs", score.raw_auc - grey.raw_auc,
@@ -144,4 +131,4 @@ double patch_milliseconds(ColorizerNet& network, const AbDecoding& decoding, tor
   return least;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

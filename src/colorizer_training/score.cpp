@@ -9,7 +9,7 @@
 #include "src/color/ab_bins.h"
 #include "src/colorizer_training/batch.h"
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 using torch::Tensor;
 
 namespace {
@@ -19,9 +19,9 @@ constexpr std::size_t kImagesPerPass = 16;
 
 /// Calls `visit(lightness [B,1,H,W], ab [B,2,H,W])` over batches of images of one size.
 template <typename Visit>
-void for_each_batch(const std::vector<RgbImage>& images, torch::Device device, const Visit& visit) {
-  std::map<std::pair<int, int>, std::vector<const RgbImage*>> by_size;
-  for (const RgbImage& image : images) by_size[{image.width, image.height}].push_back(&image);
+void for_each_batch(const std::vector<Picture>& images, torch::Device device, const Visit& visit) {
+  std::map<std::pair<int, int>, std::vector<const Picture*>> by_size;
+  for (const Picture& image : images) by_size[{image.width, image.height}].push_back(&image);
   for (const auto& [size, group] : by_size) {
     for (std::size_t first = 0; first < group.size(); first += kImagesPerPass) {
       const std::size_t count = std::min(kImagesPerPass, group.size() - first);
@@ -70,7 +70,7 @@ Tensor error_column(const Tensor& distance) {
 constexpr int kGridLimit = 110, kGridSide = 2 * kGridLimit + 1;
 
 /// True colours of all pixels, counted on a grid of one ab unit.  [kGridSide^2] f64
-Tensor color_histogram(const std::vector<RgbImage>& images, torch::Device device) {
+Tensor color_histogram(const std::vector<Picture>& images, torch::Device device) {
   Tensor counts = torch::zeros({kGridSide * kGridSide}, torch::TensorOptions(torch::kFloat64).device(device));
   for_each_batch(images, device, [&](const Tensor&, const Tensor& ab) {
     const Tensor cell = (ab.round().clamp(-kGridLimit, kGridLimit) + kGridLimit).to(torch::kInt64);
@@ -86,13 +86,13 @@ struct ColorCounts {
   Tensor grid;    ///< [N, 2] f32 ab
   Tensor bins;    ///< [N] i64
 };
-ColorCounts count_colors(const std::vector<RgbImage>& images, const SoftLabelTable& table, torch::Device device) {
-  const Tensor all = color_histogram(images, device);
+ColorCounts count_colors(const std::vector<Picture>& images, const SoftLabelTable& table) {
+  const Tensor all = color_histogram(images, table.device());
   const Tensor used = (all > 0).nonzero().squeeze(1);
   const Tensor grid =
       torch::stack({used.div(kGridSide, "floor") - kGridLimit, used.remainder(kGridSide) - kGridLimit}, 1)
           .to(torch::kFloat32);
-  const Tensor bins = table.look_up(grid.t().view({1, 2, -1, 1}).to(device)).bin.select(1, 0).cpu();
+  const Tensor bins = table.look_up(grid.t().view({1, 2, -1, 1}).to(table.device())).bin.select(1, 0).cpu();
   return {all.index_select(0, used), grid, bins};
 }
 
@@ -108,40 +108,50 @@ ChromaScore score_constant(const ColorCounts& colors, Ab color) {
           0};
 }
 
+/// Collects errors of one set of images.
+class ChromaScorer {
+ public:
+  explicit ChromaScorer(const SoftLabelTable& table) : table_(table) {
+    const auto options = torch::TensorOptions(torch::kFloat64).device(table.device());
+    histogram_ = torch::zeros({kAbBinCount * (kThresholds + 2)}, options);
+    squared_ = torch::zeros({}, options);
+    colorfulness_ = torch::zeros({}, options);
+    true_colorfulness_ = torch::zeros({}, options);
+  }
+  /// @param truth, answer  [B, 2, H, W] ab   @param lightness  [B, 1, H, W]
+  void add(const Tensor& truth, const Tensor& answer, const Tensor& lightness) {
+    const Tensor distance = (answer - truth).square().sum(1).sqrt().flatten();
+    const Tensor index = table_.look_up(truth).bin.select(1, 0) * (kThresholds + 2) + error_column(distance);
+    histogram_ += torch::bincount(index, {}, kAbBinCount * (kThresholds + 2));
+    squared_ += distance.to(torch::kFloat64).square().sum();
+    pixels_ += double(distance.numel());
+    images_ += double(truth.size(0));
+    colorfulness_ += colorfulness_of(lightness, answer).sum();
+    true_colorfulness_ += colorfulness_of(lightness, truth).sum();
+  }
+  [[nodiscard]] ChromaScore score() const {
+    const AucPair auc = auc_of(histogram_.cpu().view({kAbBinCount, kThresholds + 2}));
+    return {auc.raw, auc.balanced, std::sqrt(squared_.item<double>() / (2 * pixels_)),
+            colorfulness_.item<double>() / images_, true_colorfulness_.item<double>() / images_};
+  }
+
+ private:
+  const SoftLabelTable& table_;
+  Tensor histogram_;  // [313 * 152] f64: pixels by true bin and by error
+  Tensor squared_;    // f64 sum
+  double pixels_ = 0, images_ = 0;
+  Tensor colorfulness_, true_colorfulness_;
+};
+
 }  // namespace
 
-ChromaScorer::ChromaScorer(const SoftLabelTable& table, torch::Device device) : table_(table) {
-  const auto options = torch::TensorOptions(torch::kFloat64).device(device);
-  histogram_ = torch::zeros({kAbBinCount * (kThresholds + 2)}, options);
-  squared_ = torch::zeros({}, options);
-  colorfulness_ = torch::zeros({}, options);
-  true_colorfulness_ = torch::zeros({}, options);
-}
-
-void ChromaScorer::add(const Tensor& truth, const Tensor& answer, const Tensor& lightness) {
-  const Tensor distance = (answer - truth).square().sum(1).sqrt().flatten();
-  const Tensor bin = table_.look_up(truth).bin.select(1, 0);
-  histogram_ += torch::bincount(bin * (kThresholds + 2) + error_column(distance), {}, kAbBinCount * (kThresholds + 2));
-  squared_ += distance.to(torch::kFloat64).square().sum();
-  pixels_ += double(distance.numel());
-  images_ += double(truth.size(0));
-  colorfulness_ += colorfulness_of(lightness, answer).sum();
-  true_colorfulness_ += colorfulness_of(lightness, truth).sum();
-}
-
-ChromaScore ChromaScorer::score() const {
-  const AucPair auc = auc_of(histogram_.cpu().view({kAbBinCount, kThresholds + 2}));
-  return {auc.raw, auc.balanced, std::sqrt(squared_.item<double>() / (2 * pixels_)),
-          colorfulness_.item<double>() / images_, true_colorfulness_.item<double>() / images_};
-}
-
-std::vector<ChromaScore> score_network(ColorizerNet& network, const std::vector<RgbImage>& images,
+std::vector<ChromaScore> score_network(ColorizerNet& network, const std::vector<Picture>& images,
                                        const std::vector<DecodingChoice>& choices, const Tensor& log_weights,
-                                       const SoftLabelTable& table, torch::Device device) {
+                                       const SoftLabelTable& table) {
   const torch::NoGradGuard no_grad;
   std::vector<ChromaScorer> scorers;
-  for (std::size_t i = 0; i < choices.size(); ++i) scorers.emplace_back(table, device);
-  for_each_batch(images, device, [&](const Tensor& lightness, const Tensor& ab) {
+  for (std::size_t i = 0; i < choices.size(); ++i) scorers.emplace_back(table);
+  for_each_batch(images, table.device(), [&](const Tensor& lightness, const Tensor& ab) {
     std::map<int, Tensor> logits;  // by the short side asked at
     for (std::size_t i = 0; i < choices.size(); ++i) {
       const auto& [prior_share, decoding] = choices[i];
@@ -156,14 +166,9 @@ std::vector<ChromaScore> score_network(ColorizerNet& network, const std::vector<
   return scores;
 }
 
-ChromaScore score_grey(const std::vector<RgbImage>& images, const SoftLabelTable& table, torch::Device device) {
+Baselines score_baselines(const std::vector<Picture>& images, const SoftLabelTable& table) {
   const torch::NoGradGuard no_grad;
-  return score_constant(count_colors(images, table, device), {0, 0});
-}
-
-Baselines score_baselines(const std::vector<RgbImage>& images, const SoftLabelTable& table, torch::Device device) {
-  const torch::NoGradGuard no_grad;
-  const ColorCounts colors = count_colors(images, table, device);
+  const ColorCounts colors = count_colors(images, table);
   Baselines baselines{score_constant(colors, {0, 0}), {}};
   ChromaScore& best = baselines.best_constant;
   best = baselines.grey;
@@ -201,4 +206,4 @@ std::string score_table(const std::vector<SetScore>& sets) {
   return table;
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

@@ -10,7 +10,7 @@
 #include "src/colorizer_training/image_set.h"
 #include "src/colorizer_training/losses.h"
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 
 struct ChromaScore {
   double raw_auc = 0;       ///< percent: share of pixels with ab error under a threshold, averaged over 0..150
@@ -18,22 +18,6 @@ struct ChromaScore {
   double rmse = 0;          ///< root of the mean square over pixels and the two channels
   double colorfulness = 0;  ///< mean over the images, of the answer
   double true_colorfulness = 0;
-};
-
-/// Collects errors of one set of images.
-class ChromaScorer {
- public:
-  explicit ChromaScorer(const SoftLabelTable& table, torch::Device device);
-  /// @param truth, answer  [B, 2, H, W] ab.  @param lightness [B, 1, H, W].
-  void add(const torch::Tensor& truth, const torch::Tensor& answer, const torch::Tensor& lightness);
-  [[nodiscard]] ChromaScore score() const;
-
- private:
-  const SoftLabelTable& table_;
-  torch::Tensor histogram_;  ///< [313 * 152] f64: pixels by true bin and by error
-  torch::Tensor squared_;    ///< f64 sum
-  double pixels_ = 0, images_ = 0;
-  torch::Tensor colorfulness_, true_colorfulness_;
 };
 
 /// What an answer of one colour everywhere scores: no colour, and the best colour for each measure by itself.
@@ -54,24 +38,19 @@ struct DecodingChoice {
   AbDecoding decoding;
 };
 
-/// Scores all `choices` in one pass over the images.
+/// Scores all `choices` in one pass over the images, on the table's device.
 /// @param log_weights  [313] log of the rebalancing weights used in training; empty where every prior_share is 0.
-[[nodiscard]] std::vector<ChromaScore> score_network(ColorizerNet& network, const std::vector<RgbImage>& images,
+[[nodiscard]] std::vector<ChromaScore> score_network(ColorizerNet& network, const std::vector<Picture>& images,
                                                      const std::vector<DecodingChoice>& choices,
-                                                     const torch::Tensor& log_weights, const SoftLabelTable& table,
-                                                     torch::Device device);
-[[nodiscard]] Baselines score_baselines(const std::vector<RgbImage>& images, const SoftLabelTable& table,
-                                        torch::Device device);
-
-[[nodiscard]] ChromaScore score_grey(const std::vector<RgbImage>& images, const SoftLabelTable& table,
-                                     torch::Device device);
+                                                     const torch::Tensor& log_weights, const SoftLabelTable& table);
+[[nodiscard]] Baselines score_baselines(const std::vector<Picture>& images, const SoftLabelTable& table);
 
 /// One number to choose by: points of balanced AuC above grey's, less one point for every 0.01 of grey's RMSE above
-/// 0.82 and two for every point of raw AuC that is missing at +1.5. Laxer limits choose garish colours
-/// (docs/decisions.md, 51).
+/// 0.82 and two for every point of raw AuC that is missing at +1.5. Laxer limits (0.85, +0.3) chose colours that put
+/// rainbows on white walls.
 [[nodiscard]] double merit(const ChromaScore& network, const ChromaScore& grey);
 
 /// The table of the model card (Markdown).
 [[nodiscard]] std::string score_table(const std::vector<SetScore>& sets);
 
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

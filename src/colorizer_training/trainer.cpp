@@ -14,16 +14,18 @@
 #include "src/base/rng.h"
 #include "src/color/ab_bins.h"
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 namespace fs = std::filesystem;
 using torch::Tensor;
 
 namespace {
 
-constexpr int kPriorBatches = 100, kStatisticsBatches = 60;
-constexpr std::uint64_t kCropStream = named_stream("crop");     // the size of each step's crops
-constexpr std::uint64_t kEnsembleStream = named_stream("ens");  // the members that each step asks
-constexpr std::uint64_t kPriorStream = named_stream("prior");   // batches that only measure
+constexpr int kPriorBatches = 100;
+constexpr float kRebalancing = 0.5f;                           // lambda of the class weights
+constexpr double kFinalShare = 0.01;                           // of the learning rate, at the end of the cosine
+constexpr double kAverageDecay = 0.999;                        // of the weights that are kept, per step
+constexpr std::uint64_t kCropStream = named_stream("crop");    // the size of each step's crops
+constexpr std::uint64_t kPriorStream = named_stream("prior");  // batches that only measure
 
 /// bf16 for matrix products and convolutions on CUDA while it lives; weights and losses stay f32.
 class MixedPrecision {
@@ -64,13 +66,11 @@ AuxiliaryHeads make_heads(const ImageSet& images, bool teacher, torch::Device de
 
 }  // namespace
 
-ColorizerTrainer::ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher, Ensemble ensemble,
+ColorizerTrainer::ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher,
                                    const TrainerOptions& options, torch::Device device)
     : options_(options),
       device_(device),
-      images_(images),
       teacher_(std::move(teacher)),
-      ensemble_(std::move(ensemble)),
       photos_(images.photos, device),
       tiles_(images.tiles, device),
       table_(device),
@@ -80,33 +80,26 @@ ColorizerTrainer::ColorizerTrainer(const ImageSet& images, std::unique_ptr<Featu
       heads_(make_heads(images, teacher_ != nullptr, device)),
       parameters_({network_.get(), heads_.get()}),
       averaged_parameters_({averaged_.get()}),
-      optimizer_(parameters_, options.adamw) {
+      optimizer_(parameters_) {
   if (images.photos.size() == 0) options_.photos_per_step = 0;
   if (images.tiles.size() == 0) options_.tiles_per_step = 0;
-  if (images.photos.size() == 0 || images.tiles.size() == 0) options_.tile_share = 0;
   CNERF_CHECK(options_.photos_per_step + options_.tiles_per_step > 0, "there are images to train on");
   averaged_->eval();
   class_weights_ = measure_class_weights();
 }
 
-Batch ColorizerTrainer::batch_of(std::uint64_t seed, std::int64_t step, double tile_share) const {
-  SequentialRng rng(seed ^ kCropStream, std::uint64_t(step));
-  if (rng.uniform() < tile_share) {
-    return make_batch({{&tiles_, options_.tiles_per_step}}, options_.tile_crop_side, options_.tile_augment, seed, step);
-  }
-  const int side = options_.crop_sides.at(rng.below(std::uint32_t(options_.crop_sides.size())));
-  const int tiles = options_.tile_share == 0 ? options_.tiles_per_step : 0;
-  return make_batch({{&photos_, options_.photos_per_step}, {&tiles_, tiles}}, side, options_.augment, seed, step);
+Batch ColorizerTrainer::batch_of(std::uint64_t seed, std::int64_t step) const {
+  const CounterRng rng(seed ^ kCropStream, std::uint64_t(step));
+  const int side = options_.crop_sides.at(rng.below(1, std::uint32_t(options_.crop_sides.size())));
+  return make_batch({{&photos_, options_.photos_per_step}, {&tiles_, options_.tiles_per_step}}, side, seed, step);
 }
 
 Tensor ColorizerTrainer::measure_class_weights() const {
   std::vector<Tensor> samples;
-  for (int i = 0; i < kPriorBatches; ++i) {
-    samples.push_back(batch_of(options_.seed ^ kPriorStream, i, options_.tile_share).ab);
-  }
+  for (int i = 0; i < kPriorBatches; ++i) samples.push_back(batch_of(options_.seed ^ kPriorStream, i).ab);
   const Tensor prior = measure_prior(samples, table_).contiguous();
   const std::vector<float> weights =
-      rebalancing_weights(std::span(prior.data_ptr<float>(), std::size_t(kAbBinCount)), float(options_.rebalancing));
+      rebalancing_weights(std::span(prior.data_ptr<float>(), std::size_t(kAbBinCount)), kRebalancing);
   return torch::tensor(weights).to(device_);
 }
 
@@ -114,23 +107,19 @@ double ColorizerTrainer::learning_rate() const {
   const double warm = std::min(1.0, double(step_ + 1) / options_.warmup_steps);
   const double done = std::min(1.0, double(step_) / options_.steps);
   const double cosine = 0.5 * (1 + std::cos(std::numbers::pi * done));
-  return options_.learning_rate * warm * (options_.final_share + (1 - options_.final_share) * cosine);
+  return options_.learning_rate * warm * (kFinalShare + (1 - kFinalShare) * cosine);
 }
 
 StepLosses ColorizerTrainer::step() {
   network_->train();
   heads_->train();
   // Also seeds the generators that dropout draws from.
-  const Batch batch = batch_of(options_.seed, step_, options_.tile_share);
+  const Batch batch = batch_of(options_.seed, step_);
   ColorizerFeatures features;
-  Tensor labels, predicted, teacher, ensemble;
+  Tensor labels, predicted, teacher;
   {
     const MixedPrecision mixed(device_);
     features = network_->features(batch.lightness);
-    if (!ensemble_.empty()) {
-      SequentialRng rng(options_.seed ^ kEnsembleStream, std::uint64_t(step_));
-      ensemble = ensemble_.probability(batch.lightness, rng);
-    }
     labels = heads_->classify(features.global);
     if (teacher_) {
       predicted = heads_->predict_features(features.semantic);
@@ -141,40 +130,18 @@ StepLosses ColorizerTrainer::step() {
   const Tensor label = (1 - batch.mixed_share) * label_loss_(labels, batch.label) +
                        batch.mixed_share * label_loss_(labels, batch.mixed_label);
   const Tensor feature = teacher_ ? feature_loss(predicted, teacher) : torch::zeros({}, batch.ab.options());
-  Tensor classification = color.classification;
-  if (ensemble.defined()) {
-    classification =
-        classification.lerp(distillation_loss(features.logits, ensemble, class_weights_), options_.distillation_share);
-  }
-  const Tensor total = classification + options_.regression_weight * color.regression + options_.label_weight * label +
-                       options_.feature_weight * feature;
+  const Tensor total = color.classification + options_.regression_weight * color.regression + label + feature;
   total.backward();
   optimizer_.step(learning_rate(), step_ + 1);
   average_weights();
   ++step_;
-  return {classification.detach(), color.regression.detach(), label.detach(), feature.detach()};
-}
-
-void ColorizerTrainer::measure_statistics() {
-  if (options_.tile_share == 0) return;
-  const torch::NoGradGuard no_grad;
-  const MixedPrecision mixed(device_);
-  std::vector<torch::nn::BatchNorm2dImpl*> norms;
-  for (const auto& module : averaged_->modules()) {
-    if (auto* norm = module->as<torch::nn::BatchNorm2dImpl>()) norms.push_back(norm);
-  }
-  for (auto* norm : norms) norm->train();  // nothing else: no dropout, no dropped paths
-  for (int i = 0; i < kStatisticsBatches; ++i) {
-    for (auto* norm : norms) norm->options.momentum(1.0 / (i + 1));  // a plain mean over the batches
-    (void)averaged_->forward(batch_of(options_.seed ^ kPriorStream, i, 0).lightness);
-  }
-  averaged_->eval();
+  return {color.classification.detach(), color.regression.detach(), label.detach(), feature.detach()};
 }
 
 void ColorizerTrainer::average_weights() {
   const torch::NoGradGuard no_grad;
   // Starts short, so that the first weights are soon forgotten.
-  const double decay = std::min(options_.average_decay, double(1 + step_) / double(10 + step_));
+  const double decay = std::min(kAverageDecay, double(1 + step_) / double(10 + step_));
   Tensor& average = averaged_parameters_.values;
   average.lerp_(parameters_.values.narrow(0, 0, average.numel()), 1 - decay);
   averaged_parameters_.buffers.lerp_(parameters_.buffers, 1 - decay);
@@ -207,7 +174,7 @@ void ColorizerTrainer::load(const fs::path& checkpoint) {
   if (!fits) throw SnapshotError(checkpoint.string() + ": a checkpoint of another network or other classes");
   for (std::size_t i = 0; i < own.size(); ++i) own[i].copy_(tensors[i]);
   step_ = tensors.back()[0].item<std::int64_t>();
-  set_total_steps(tensors.back()[1].item<std::int64_t>());
+  options_.steps = int(tensors.back()[1].item<std::int64_t>());  // where the cosine ends
 }
 
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

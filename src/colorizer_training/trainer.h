@@ -11,32 +11,21 @@
 
 #include "src/colorizer/torch/network.h"
 #include "src/colorizer_training/batch.h"
-#include "src/colorizer_training/ensemble.h"
 #include "src/colorizer_training/feature_teacher.h"
 #include "src/colorizer_training/flat_parameters.h"
 #include "src/colorizer_training/losses.h"
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 
 struct TrainerOptions {
   int steps = 60000;
   int photos_per_step = 96, tiles_per_step = 56;
-  std::vector<int> crop_sides = {128, 128, 128, 160, 160};  ///< one a step; multiples of 32
-  double tile_share = 0;    ///< of the steps, with tiles alone, at their own size; 0 = some of both in every step
-  int tile_crop_side = 64;  ///< of such steps
-  double learning_rate = 1e-3, final_share = 0.01;  ///< cosine from the first to first * share
+  std::vector<int> crop_sides = {128, 128, 128, 160, 160};  ///< one is drawn per step; multiples of 32
+  double learning_rate = 1e-3;                              ///< at the start of the cosine
   int warmup_steps = 500;
-  double rebalancing = 0.5;  ///< lambda
   double regression_weight = 0.01;
-  double label_weight = 1.0;
-  double feature_weight = 1.0;      ///< of the teacher's features; without a teacher file there is none
-  double distillation_share = 0.7;  ///< of the classification loss, where there is an ensemble to learn from
-  double average_decay = 0.999;     ///< of the weights that are kept, a step
-  int epoch_steps = 2000;           ///< between checkpoints, scores and pictures
+  int epoch_steps = 2000;  ///< between checkpoints, scores and pictures
   std::uint64_t seed = 1;
-  AugmentOptions augment;
-  AugmentOptions tile_augment{.patch_share = 0, .blur_sigma = 0.8};  ///< of steps with tiles alone
-  AdamWOptions adamw;
 };
 
 /// What one step cost, before weights.
@@ -48,21 +37,17 @@ struct StepLosses {
 /// checkpoint repeats the uninterrupted one bit for bit on the CPU.
 class ColorizerTrainer {
  public:
-  /// @param images  must outlive the trainer.  @param teacher  may be null.  @param ensemble  may be empty.
-  ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher, Ensemble ensemble,
-                   const TrainerOptions& options, torch::Device device);
+  /// @param images   must outlive the trainer
+  /// @param teacher  may be null
+  ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher, const TrainerOptions& options,
+                   torch::Device device);
 
   StepLosses step();
   [[nodiscard]] std::int64_t steps_done() const { return step_; }
   [[nodiscard]] std::int64_t total_steps() const { return options_.steps; }
-  /// Moves the end of the cosine; the checkpoint keeps it.
-  void set_total_steps(std::int64_t steps) { options_.steps = int(steps); }
 
   /// The averaged network, in evaluation mode, on the training device.
   [[nodiscard]] ColorizerNet& averaged() { return averaged_; }
-  /// Where steps held tiles alone: measures the averaged network's normalisation statistics on photographs, which those
-  /// gathered in training are a mixture for. Repeating it changes nothing.
-  void measure_statistics();
   [[nodiscard]] const SoftLabelTable& table() const { return table_; }
   /// [313] f32 on the device: the class weights of the loss.
   [[nodiscard]] const torch::Tensor& class_weights() const { return class_weights_; }
@@ -72,7 +57,7 @@ class ColorizerTrainer {
   void load(const std::filesystem::path& checkpoint);
 
  private:
-  [[nodiscard]] Batch batch_of(std::uint64_t seed, std::int64_t step, double tile_share) const;
+  [[nodiscard]] Batch batch_of(std::uint64_t seed, std::int64_t step) const;
   [[nodiscard]] double learning_rate() const;
   [[nodiscard]] torch::Tensor measure_class_weights() const;
   void average_weights();
@@ -80,9 +65,7 @@ class ColorizerTrainer {
 
   TrainerOptions options_;
   torch::Device device_;
-  const ImageSet& images_;
   std::unique_ptr<FeatureTeacher> teacher_;
-  Ensemble ensemble_;
   ResidentImages photos_, tiles_;
   SoftLabelTable table_;
   LabelLoss label_loss_;
@@ -94,4 +77,4 @@ class ColorizerTrainer {
   std::int64_t step_ = 0;
 };
 
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

@@ -122,16 +122,4 @@ void LearningCurve::measure(double now) {
   paused_ += watch.seconds();
 }
 
-std::unique_ptr<LuminanceEngine> WatchedEngines::make_luminance(const LuminanceEngineOptions& options) const {
-  auto engine = inner_.make_luminance(options);
-  luminance_ = engine.get();
-  return engine;
-}
-
-std::unique_ptr<ColorBinEngine> WatchedEngines::make_color_bins(const HashGridOptions& grid, std::uint64_t seed) const {
-  auto engine = inner_.make_color_bins(grid, seed);
-  color_bins_ = engine.get();
-  return engine;
-}
-
 }  // namespace cnerf::compare

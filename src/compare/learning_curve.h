@@ -85,29 +85,4 @@ class LearningCurve final : public Observer {
   double last_ = 0, next_ = 0;
 };
 
-/// Engines that remain visible to who handed them on.
-class WatchedEngines final : public Engines {
- public:
-  /// @param inner  makes them; must outlive this
-  explicit WatchedEngines(const Engines& inner) : inner_(inner) {}
-  [[nodiscard]] Device device() const override { return inner_.device(); }
-  [[nodiscard]] std::string description() const override { return inner_.description(); }
-  [[nodiscard]] std::unique_ptr<LuminanceEngine> make_luminance(const LuminanceEngineOptions& options) const override;
-  [[nodiscard]] std::unique_ptr<ColorBinEngine> make_color_bins(const HashGridOptions& grid,
-                                                                std::uint64_t seed) const override;
-  [[nodiscard]] std::unique_ptr<ColorFieldEngine> make_color_field(const HashGridOptions& grid,
-                                                                   std::uint64_t seed) const override {
-    return inner_.make_color_field(grid, seed);
-  }
-
-  /// Those made last; not owned.
-  [[nodiscard]] const LuminanceEngine& luminance() const { return *luminance_; }
-  [[nodiscard]] const ColorBinEngine& color_bins() const { return *color_bins_; }
-
- private:
-  const Engines& inner_;
-  mutable const LuminanceEngine* luminance_ = nullptr;
-  mutable const ColorBinEngine* color_bins_ = nullptr;
-};
-
 }  // namespace cnerf::compare

@@ -32,25 +32,14 @@ std::vector<const Method*> parse_methods(const std::string& list) {
   return methods;
 }
 
-bool asks_about_views(const Method& method) {
-  const std::string name = method.name;
-  return name == "colorize-then-fuse" || name == "video-then-fuse";
-}
-
-bool is_photometric(const Method& method) {
-  return asks_about_views(method) || std::string(method.name) == "without-classification";
-}
-
 Stage2Options stage2_of(const Method& method, Stage2Options configured) {
-  const std::string name = method.name;
   Stage2Options options = std::move(configured);
-  if (name == "colornerf-paper") {
+  if (std::string_view(method.name) == "colornerf-paper") {
     options.decode_temperature = options.spread_weight = options.regression_weight = 0;
     options.purify.opinions = 1;
   }
-  if (name == "without-purification") options.purify.enabled = false;
-  if (asks_about_views(method)) options.purify.enabled = false;
-  if (is_photometric(method)) {
+  options.purify.enabled = options.purify.enabled && method.is_purified;
+  if (method.is_photometric) {
     // The photometric loss is not to lose because of a step size chosen for classes.
     options.learning_rate = Stage2Options{}.learning_rate;
     options.final_learning_rate = Stage2Options{}.final_learning_rate;

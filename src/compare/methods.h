@@ -17,10 +17,13 @@ struct Method {
   const char* name;     ///< "without-purification": of rows and folders
   const char* summary;  ///< a sentence for the report
   bool is_colored = true;
-  bool knows_truth = false;       ///< asks a colorizer that answers the true colours
+  bool is_purified = true;        ///< as configured; else every answer is trained on
+  bool is_photometric = false;    ///< the Photometric injection of stage2_variants.h
+  bool asks_about_views = false;  ///< its colorizer sees each view whole and once: ViewQuestions of stage2_variants.h
   bool follows_flow = false;      ///< carries colours from view to view
-  bool has_own_field = false;     ///< the paper's MLP instead of the hash grid
   bool matches_features = false;  ///< style transfer: asks no colorizer about patches
+  bool has_own_field = false;     ///< the paper's MLP instead of the hash grid
+  bool knows_truth = false;       ///< asks a colorizer that answers the true colours
 };
 
 /// Own method first; the order of rows.
@@ -29,15 +32,23 @@ inline constexpr Method kMethods[] = {
     {"colornerf-paper",
      "with the paper's choices: the most probable colour instead of the annealed mean, bases as they come, no loss on "
      "spread"},
-    {"without-purification", "every answer of the colorizer is trained on"},
-    {"without-classification", "a photometric ab loss instead of the distribution over colours"},
-    {"colorize-then-fuse",
-     "each training view is colorized once and whole, and fused with a photometric loss, as the paper's CT2+NeRF"},
-    {"video-then-fuse",
-     "as colorize-then-fuse, with colours carried from view to view by optical flow; stands in for a video "
-     "colorization "
-     "network (the paper's Vid+NeRF)",
-     true, false, true},
+    {.name = "without-purification", .summary = "every answer of the colorizer is trained on", .is_purified = false},
+    {.name = "without-classification",
+     .summary = "a photometric ab loss instead of the distribution over colours",
+     .is_photometric = true},
+    {.name = "colorize-then-fuse",
+     .summary = "each training view is colorized once and whole, and fused with a photometric loss, as the paper's "
+                "CT2+NeRF",
+     .is_purified = false,
+     .is_photometric = true,
+     .asks_about_views = true},
+    {.name = "video-then-fuse",
+     .summary = "as colorize-then-fuse, with colours carried from view to view by optical flow; stands in for a video "
+                "colorization network (the paper's Vid+NeRF)",
+     .is_purified = false,
+     .is_photometric = true,
+     .asks_about_views = true,
+     .follows_flow = true},
     {.name = "style-transfer",
      .summary =
          "ARF: colours are changed until the features of pictures are those of a reference image (nearest-neighbour "
@@ -47,8 +58,10 @@ inline constexpr Method kMethods[] = {
      .summary = "the paper's own field, an MLP of eight layers of 256 with positional encoding, in place of the hash "
                 "grid; as many patches; see the table of training times",
      .has_own_field = true},
-    {"grey", "no colour at all: the lower bound", false},
-    {"oracle", "the full method, its colorizer answering the true colours: the upper bound", true, true},
+    {.name = "grey", .summary = "no colour at all: the lower bound", .is_colored = false},
+    {.name = "oracle",
+     .summary = "the full method, its colorizer answering the true colours: the upper bound",
+     .knows_truth = true},
 };
 
 /// Step sizes of the paper's field at the start and at the end of both stages (Mildenhall et al. 2020).
@@ -59,10 +72,6 @@ inline constexpr double kPositionalLearningRate = 5e-4, kPositionalFinalLearning
 /// "colornerf,grey", or "all".  @throws UsageError  naming an unknown one and those there are.
 [[nodiscard]] std::vector<const Method*> parse_methods(const std::string& list);
 
-/// Whether its colorizer sees each view whole and once: ViewQuestions of stage2_variants.h.
-[[nodiscard]] bool asks_about_views(const Method& method);
-/// Whether it learns by the Photometric injection of stage2_variants.h.
-[[nodiscard]] bool is_photometric(const Method& method);
 /// The options of a method's stage 2.
 [[nodiscard]] Stage2Options stage2_of(const Method& method, Stage2Options configured);
 

@@ -2,11 +2,14 @@
 /// The comparison as one HTML file that needs nothing else: tables, pictures, a before/after slider, turntables, plots.
 /// What it shows is made here; how, by pages/report.html and pages/report.js.
 
+#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "src/compare/methods.h"
 #include "src/compare/results.h"
+#include "src/compare/subject.h"
 
 namespace cnerf::compare {
 
@@ -52,6 +55,15 @@ struct ReportCapture {
     v("frames_per_second", self.frames_per_second);
   }
 };
+
+/// What the cells of one seed left of a capture, beside the input and the truth.
+/// @param stage2  as configured  @param cells  folder of a capture's seed
+[[nodiscard]] ReportCapture exhibit(const Subject& subject, std::span<const Method* const> methods,
+                                    const Stage2Options& stage2, const std::filesystem::path& cells);
+
+/// The first shown view by every method beside the input and the truth as one PNG, for documents.
+void write_strip(const Subject& subject, std::span<const Method* const> methods, const std::filesystem::path& cells,
+                 const std::filesystem::path& file);
 
 [[nodiscard]] std::string report_html(std::span<const Cell> cells, const Summary& summary,
                                       std::span<const ReportCapture> captures);

@@ -12,10 +12,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int kTableSchemaVersion = 1;
-constexpr const char* kRacesMeaning =
-    "The hash grid (`colornerf`) against the paper's field (`positional-encoding`), on the same held-out pixels while "
-    "they train: PSNR of luminance in stage 1, ab error in stage 2. Seconds of training alone; means over seeds.";
-
 template <typename Record>
 Json list_of(const std::vector<Record>& records) {
   Json list = Json::array();
@@ -47,35 +43,6 @@ std::string rows_markdown(const std::vector<Row>& rows) {
     if (!row.error.empty()) failures += "\n`" + row.method + "` failed: " + row.error + "\n";
   }
   return markdown(head, lines) + failures;
-}
-
-std::string duels_markdown(const std::vector<Duel>& duels) {
-  std::vector<std::vector<std::string>> lines;
-  for (const Duel& duel : duels) {
-    const Column& column = column_named(duel.column);
-    lines.push_back({duel.method, column.title, fmt::format("{} of {}", duel.wins, duel.pairs),
-                     fmt::format("{:+.{}f}", duel.mean_gain, column.digits + 1)});
-  }
-  return "Pairs of equal capture and seed in which colornerf is better, and by how much on average (above 0: "
-         "better).\n\n" +
-         markdown({"Against", "Number", "Better in", "Mean gain"}, lines);
-}
-
-std::string races_markdown(const std::vector<TrainingRace>& races) {
-  std::vector<std::vector<std::string>> lines;
-  for (const TrainingRace& race : races) {
-    const auto seconds = [](double time) { return fmt::format("{:.1f} s", time); };
-    const auto value = [&](double number) { return fmt::format("{:.2f} {}", number, race.stage == 1 ? "dB" : "ab"); };
-    const std::string some = race.reached < race.seeds ? fmt::format(" in {} of {}", race.reached, race.seeds) : "";
-    lines.push_back({race.capture, std::to_string(race.stage), seconds(race.grid.seconds), value(race.grid.value),
-                     seconds(race.field.seconds), value(race.field.value),
-                     fmt::format("{:.1f}", race.field.seconds / std::max(race.grid.seconds, 1e-9)),
-                     race.reached == 0 ? "never" : seconds(race.reached_after) + some, value(race.grid_after_tenth)});
-  }
-  return std::string(kRacesMeaning) + "\n\n" +
-         markdown({"Capture", "Stage", "hash grid", "comes to", "MLP", "comes to", "of the hash grid's time",
-                   "as good as the hash grid after", "hash grid after 1/10 of the MLP's time"},
-                  lines);
 }
 
 }  // namespace
@@ -125,12 +92,6 @@ std::string table_markdown(std::span<const Cell> cells, const Summary& summary) 
     text += "\n## " + capture + "\n\n" + rows_markdown(table_rows(cells, capture));
   }
   if (captures.size() > 1) text += "\n## All captures\n\n" + rows_markdown(table_rows(cells, ""));
-  if (const auto all = duels(cells); !all.empty()) {
-    text += "\n## colornerf against the others\n\n" + duels_markdown(all);
-  }
-  if (const auto races = training_races(cells); !races.empty()) {
-    text += "\n## Training times\n\n" + races_markdown(races);
-  }
   text += "\n## What the numbers mean\n\n";
   for (const Column& column : columns()) text += fmt::format("* **{}**: {}\n", column.title, column.help);
   text += "* ±: 95 % confidence interval of the mean over seeds (Student's t)\n";

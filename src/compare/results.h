@@ -20,7 +20,7 @@ struct Summary {
 /// {"schema_version", "colorizer", "lpips", "command_line", "columns", "tables": [{"capture", "rows"}], "duels",
 /// "training_times", "cells"}; of several captures, the last table is that of all of them.
 [[nodiscard]] nlohmann::ordered_json table_json(std::span<const Cell> cells, const Summary& summary);
-/// The same for people, with the meaning of each number below the tables.
+/// The rows of each table for people, with the meaning of each number below; report.html has the rest.
 [[nodiscard]] std::string table_markdown(std::span<const Cell> cells, const Summary& summary);
 
 /// A table of Markdown; each row has as many texts as `head`.

@@ -4,7 +4,7 @@
 
 #include "src/base/error.h"
 #include "src/base/json_record.h"
-#include "src/compare/exhibit.h"
+#include "src/compare/baselines/simulated.h"
 #include "src/compare/rating.h"
 #include "src/compare/report.h"
 #include "src/compare/seed_run.h"
@@ -26,14 +26,13 @@ void begin_report(const fs::path& folder, ExistingReport existing) {
   }
 }
 
-Run::Run(Plan plan, CompareConfig config, Observer& observer)
-    : plan_(std::move(plan)),
-      config_(std::move(config)),
-      observer_(observer),
-      engines_(engines_for(config_.run.device)) {
+Run::Run(Plan plan, Config config, Observer& observer)
+    : plan_(std::move(plan)), config_(std::move(config)), observer_(observer), engines_(engines_for(config_.device)) {
   if (!plan_.lpips_weights.empty()) lpips_ = std::make_unique<Lpips>(plan_.lpips_weights);
-  if (is_simulated(config_.run.colorizer.spec)) (void)simulation_of(config_.run.colorizer.spec);
-  subjects_ = read_subjects(plan_.captures, config_.run, observer_);
+  if (config_.colorizer.spec.starts_with(std::string(kSimulated) + ":")) {
+    throw UsageError("colorizer \"" + config_.colorizer.spec + "\": simulated takes nothing after it");
+  }
+  subjects_ = read_subjects(plan_.captures, config_, observer_);
 }
 
 void Run::run() {
@@ -48,7 +47,7 @@ fs::path Run::folder_of(const Subject& subject, int seed) const {
 }
 
 void Run::make_cells(const Subject& subject, int seed) {
-  const Bench bench{config_, engines_, lpips_.get(), plan_.lpips_weights, observer_};
+  const Bench bench{plan_, config_, engines_, lpips_.get(), observer_};
   SeedRun seed_run(bench, subject, seed, folder_of(subject, seed));
   seed_run.train();
   for (const Method* method : plan_.methods) cells_.push_back(seed_run.make(*method));
@@ -61,12 +60,6 @@ void Run::read_cells(const Subject& subject, int seed) {
   }
 }
 
-Summary Run::summary() const {
-  const std::string& spec = config_.run.colorizer.spec;
-  const std::string colorizer = is_simulated(spec) ? "simulated:" + to_text(simulation_of(spec)) : spec;
-  return {colorizer, lpips_ ? lpips_->network() : "", plan_.command_line};
-}
-
 void Run::write_report() const {
   std::vector<ReportCapture> captures;
   for (const auto& subject : subjects_) {
@@ -74,11 +67,12 @@ void Run::write_report() const {
     const fs::path strip = plan_.report / ("strip-" + subject->name + ".png");
     write_strip(*subject, plan_.methods, cells, strip);
     observer_.wrote("pictures", strip);
-    captures.push_back(exhibit(*subject, plan_.methods, config_.run.stage2, cells));
+    captures.push_back(exhibit(*subject, plan_.methods, config_.stage2, cells));
   }
-  write_file(plan_.report / "table.json", table_json(cells_, summary()).dump(2) + "\n");
-  write_file(plan_.report / "table.md", table_markdown(cells_, summary()));
-  write_file(plan_.report / "report.html", report_html(cells_, summary(), captures));
+  const Summary summary{config_.colorizer.spec, lpips_ ? lpips_->network() : "", plan_.command_line};
+  write_file(plan_.report / "table.json", table_json(cells_, summary).dump(2) + "\n");
+  write_file(plan_.report / "table.md", table_markdown(cells_, summary));
+  write_file(plan_.report / "report.html", report_html(cells_, summary, captures));
   for (const char* file : {"table.json", "table.md", "report.html"}) observer_.wrote("comparison", plan_.report / file);
 }
 
@@ -86,7 +80,7 @@ void Run::write_rating_sheet() const {
   std::vector<RatedPicture> pictures;
   for (const auto& subject : subjects_) {
     const ReportCapture shown =
-        exhibit(*subject, plan_.methods, config_.run.stage2, folder_of(*subject, plan_.seeds.front()));
+        exhibit(*subject, plan_.methods, config_.stage2, folder_of(*subject, plan_.seeds.front()));
     for (const ReportMethod& method : shown.methods) {
       const bool is_bound = method.name == "grey" || method.name == "oracle";
       for (std::size_t v = 0; v < method.views.size() && !is_bound; ++v) {

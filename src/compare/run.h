@@ -14,24 +14,14 @@
 #include <vector>
 
 #include "src/base/observer.h"
+#include "src/compare/cell.h"
 #include "src/compare/methods.h"
-#include "src/compare/options.h"
-#include "src/compare/results.h"
+#include "src/compare/seed_run.h"
 #include "src/compare/subject.h"
 #include "src/engine/engines.h"
 #include "src/evaluate/lpips.h"
 
 namespace cnerf::compare {
-
-struct Plan {
-  std::vector<ComparedCapture> captures;
-  std::filesystem::path report;  ///< folder
-  std::vector<const Method*> methods;
-  std::vector<int> seeds;
-  std::filesystem::path lpips_weights;  ///< empty = LPIPS is not measured
-  std::string command_line;
-  bool only_report = false;  ///< nothing is trained: the report is made of the cells that are there
-};
 
 /// A comparison that is there already is gone on with, or made anew, only when that is asked for.
 struct ExistingReport {
@@ -44,7 +34,7 @@ class Run {
  public:
   /// Reads the captures, so that what is missing costs no training.
   /// @throws UsageError, MissingInputError, InputError  also for a capture without any colour.
-  Run(Plan plan, CompareConfig config, Observer& observer);
+  Run(Plan plan, Config config, Observer& observer);
 
   /// All cells; a method that fails leaves one that says why.  @throws Interrupted  what is finished stays.
   void run();
@@ -57,10 +47,9 @@ class Run {
   void make_cells(const Subject& subject, int seed);
   void read_cells(const Subject& subject, int seed);
   [[nodiscard]] std::filesystem::path folder_of(const Subject& subject, int seed) const;
-  [[nodiscard]] Summary summary() const;
 
   Plan plan_;
-  CompareConfig config_;
+  Config config_;
   Observer& observer_;
   const Engines& engines_;
   std::unique_ptr<Lpips> lpips_;

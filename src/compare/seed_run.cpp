@@ -10,6 +10,7 @@
 #include "src/compare/baselines/flow.h"
 #include "src/compare/baselines/positional_field.h"
 #include "src/compare/baselines/simulated.h"
+#include "src/compare/derived_engines.h"
 #include "src/compare/stage2_variants.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/colorize_step.h"
@@ -31,7 +32,10 @@ constexpr int kPictureQuality = 88;            // of JPEG
 constexpr int kFrameQuality = 80;              // of a turntable's
 constexpr std::size_t kLongRange = 8;          // the turntable's share that long-range consistency looks across
 constexpr std::size_t kMeasuredPixels = 1024;  // of a learning curve: rendering them by an MLP takes seconds
-constexpr int kManySteps = 100'000'000;        // the time ends a training, not these
+constexpr double kPositionalBudget = 4;        // of the paper's field: training time in times of the hash grid's
+constexpr double kStyleStepsPerPatch = 0.08;   // style transfer follows whole pictures, other methods patches
+constexpr int kFewestStyleSteps = 8;
+constexpr int kManySteps = 100'000'000;  // the time ends a training, not these
 
 std::string digest(const std::string& text) {
   return sha256(std::as_bytes(std::span(text)));
@@ -92,44 +96,31 @@ bool is_own(const Method& method) {
 
 }  // namespace
 
-bool is_simulated(const std::string& spec) {
-  return spec == "simulated" || spec.starts_with("simulated:");
-}
-
-SimulationOptions simulation_of(const std::string& spec) {
-  const std::size_t colon = spec.find(':');
-  return parse_simulation(colon == std::string::npos ? "" : spec.substr(colon + 1));
-}
-
 std::string numbered(std::size_t index) {
   return fmt::format("{:04}.jpg", index);
 }
 
 /// What a method's colours stand on.
 struct SeedRun::Field {
-  std::shared_ptr<const Engines> own;      ///< of a stage 1 of its own
-  std::shared_ptr<const Engines> engines;  ///< of the shared stage 1 and of the colours
+  std::unique_ptr<const Engines> own;    ///< of a stage 1 of its own; null where it shares one
+  std::unique_ptr<const Engines> mixed;  ///< of the shared stage 1, and of colours of its own
+  const Engines* engines;                ///< of the shared stage 1 and of the colours
 };
 
 SeedRun::SeedRun(const Bench& bench, const Subject& subject, int seed, fs::path folder)
-    : bench_(bench),
-      subject_(subject),
-      seed_(seed),
-      folder_(std::move(folder)),
-      stage1_(folder_ / "stage1.snapshot"),
-      rendering_(bench.engines) {}
+    : bench_(bench), subject_(subject), seed_(seed), folder_(std::move(folder)), stage1_(folder_ / "stage1.snapshot") {}
 
 SeedRun::Field SeedRun::field_of(const Method& method) const {
-  const std::shared_ptr<const Engines> usual(std::shared_ptr<void>(), &bench_.engines);  // not owned
-  if (!method.has_own_field) return {nullptr, usual};
-  const SceneFrame frame = place_scene(subject_.capture, bench_.config.run.stage1.placement);
-  const std::shared_ptr<const Engines> own =
-      positional_engines(positional_rays(subject_.capture, frame), bench_.engines);
-  return {own, std::make_shared<MixedEngines>(usual, own)};
+  if (!method.has_own_field) return {nullptr, nullptr, &bench_.engines};
+  const SceneFrame frame = place_scene(subject_.capture, bench_.config.stage1.placement);
+  Field field{positional_engines(positional_rays(subject_.capture, frame), bench_.engines), nullptr, nullptr};
+  field.mixed = std::make_unique<MixedEngines>(bench_.engines, *field.own);
+  field.engines = field.mixed.get();
+  return field;
 }
 
 void SeedRun::train() {
-  Stage1Options options = bench_.config.run.stage1;
+  Stage1Options options = bench_.config.stage1;
   options.seed = seed_;
   stage1_settings_ = digest(fs::absolute(subject_.capture.root).string() + options_to_json(options).dump() +
                             options_to_json(subject_.options).dump());
@@ -143,11 +134,11 @@ void SeedRun::train() {
 }
 
 std::string SeedRun::settings_of(const Method& method) const {
-  const Config& run = bench_.config.run;
-  const bool has_options = method.has_own_field || method.matches_features;
+  const Config& run = bench_.config;
   return digest(stage1_settings_ + method.name + options_to_json(stage2_of(method, run.stage2)).dump() +
-                (has_options ? options_to_json(bench_.config.own).dump() : "") + options_to_json(run.colorizer).dump() +
-                options_to_json(run.render).dump() + (bench_.lpips != nullptr ? bench_.lpips->network() : ""));
+                (method.matches_features ? bench_.plan.style_reference.string() : "") +
+                options_to_json(run.colorizer).dump() + options_to_json(run.render).dump() +
+                (bench_.lpips != nullptr ? bench_.lpips->network() : ""));
 }
 
 Cell SeedRun::make(const Method& method) {
@@ -166,10 +157,8 @@ Cell SeedRun::make(const Method& method) {
   cell.settings = settings;
   try {
     if (method.is_colored) colorize(method, cell);
-    // Colours stand on the shared stage 1; MixedEngines differ from the usual ones in their colours alone.
     const Field field = field_of(method);
-    const MixedEngines rendering(std::shared_ptr<const Engines>(std::shared_ptr<void>(), &rendering_), field.engines);
-    const auto scene = Scene::load(stage1_, method.is_colored ? folder / "take.snapshot" : fs::path(), rendering);
+    const auto scene = Scene::load(stage1_, method.is_colored ? folder / "take.snapshot" : fs::path(), *field.engines);
     evaluate_views(method, *scene, cell);
     evaluate_turntable(method, *scene, cell);
   } catch (const Interrupted&) {
@@ -184,11 +173,11 @@ Cell SeedRun::make(const Method& method) {
 
 std::unique_ptr<Colorizer> SeedRun::colorizer_for(const Method& method) const {
   if (method.knows_truth) return make_simulated_colorizer(subject_.capture, oracle_simulation());
-  Config config = bench_.config.run;
+  Config config = bench_.config;
   std::unique_ptr<Colorizer> colorizer;
-  if (is_simulated(config.colorizer.spec)) {
-    SimulationOptions options = simulation_of(config.colorizer.spec);
-    options.seed += seed_ - 1;  // each seed meets other errors
+  if (config.colorizer.spec == kSimulated) {
+    SimulationOptions options;
+    options.seed = seed_;  // each seed meets other errors
     colorizer = make_simulated_colorizer(subject_.capture, options);
   } else {
     config.stage2.seed = seed_;
@@ -201,11 +190,11 @@ std::unique_ptr<Colorizer> SeedRun::colorizer_for(const Method& method) const {
 
 /// Stage 1 of a method that has a field of its own: some times as long as the shared one took.
 void SeedRun::train_own_field(const Engines& engines, Cell& cell) const {
-  Stage1Options options = bench_.config.run.stage1;
+  Stage1Options options = bench_.config.stage1;
   options.seed = seed_;
   options.steps = kManySteps;
   options.checkpoint_every = 0;
-  options.max_seconds = bench_.config.own.positional_budget * LuminanceModel::load(stage1_, bench_.engines).seconds;
+  options.max_seconds = kPositionalBudget * LuminanceModel::load(stage1_, bench_.engines).seconds;
   options.learning_rate = kPositionalLearningRate;
   options.final_learning_rate = kPositionalFinalLearningRate;
   const fs::path snapshot = folder_ / cell.method / "stage1.snapshot";
@@ -214,18 +203,17 @@ void SeedRun::train_own_field(const Engines& engines, Cell& cell) const {
 }
 
 /// ARF in place of stage 2.
-StyleReport SeedRun::transfer(const Stage2Options& options, Colorizer& colorizer, const fs::path& take) const {
-  const CompareOptions& own = bench_.config.own;
-  const fs::path network = own.style_network.empty() ? bench_.lpips_weights : fs::path(own.style_network);
-  if (network.empty()) {
-    throw UsageError(
-        "style-transfer: needs a network of features: --lpips-weights of AlexNet, or compare.style_network");
+double SeedRun::transfer(const Stage2Options& options, Colorizer& colorizer, const fs::path& take) const {
+  const Plan& plan = bench_.plan;
+  if (plan.lpips_weights.empty()) {
+    throw UsageError("style-transfer: needs a network of features: --lpips-weights of AlexNet");
   }
-  const LabPicture reference = own.style_reference.empty()
+  const LabPicture reference = plan.style_reference.empty()
                                    ? colorized_view(subject_.capture, stage1_, colorizer, bench_.engines)
-                                   : reference_image(own.style_reference);
-  const StyleLoss loss(network, reference);
-  return transfer_style({subject_.capture, stage1_, loss, reference, options, own.style_steps, take}, bench_.engines,
+                                   : reference_image(plan.style_reference);
+  const auto loss = make_style_loss(plan.lpips_weights, reference);
+  const int steps = std::max(kFewestStyleSteps, int(kStyleStepsPerPatch * options.patches));
+  return transfer_style({subject_.capture, stage1_, *loss, reference, options, steps, take}, bench_.engines,
                         bench_.observer);
 }
 
@@ -235,9 +223,9 @@ void SeedRun::colorize(const Method& method, Cell& cell) {
   if (is_own(method)) cell.stage1_curve = read_curve(stage1_);
   const auto colorizer = colorizer_for(method);
   if (method.matches_features) {
-    Stage2Options options = stage2_of(method, bench_.config.run.stage2);
+    Stage2Options options = stage2_of(method, bench_.config.stage2);
     options.seed = seed_;
-    cell.seconds = transfer(options, *colorizer, folder_ / method.name / "take.snapshot").seconds;
+    cell.seconds = transfer(options, *colorizer, folder_ / method.name / "take.snapshot");
   } else {
     train_colors(method, field, *colorizer, cell);
   }
@@ -246,7 +234,7 @@ void SeedRun::colorize(const Method& method, Cell& cell) {
 
 /// Stage 2; of the own method and of those with a field of their own, also the curve of its ab error.
 void SeedRun::train_colors(const Method& method, const Field& field, Colorizer& colorizer, Cell& cell) {
-  Stage2Options options = stage2_of(method, bench_.config.run.stage2);
+  Stage2Options options = stage2_of(method, bench_.config.stage2);
   options.seed = seed_;
   const fs::path take = folder_ / method.name / "take.snapshot";
   const auto temperature = float(options.decode_temperature);
@@ -269,8 +257,8 @@ void SeedRun::train_colors(const Method& method, const Field& field, Colorizer& 
                       .take = take,
                       .resume = true,
                       .views = &training_views_,
-                      .questions = asks_about_views(method) ? &whole_views : nullptr,
-                      .injection = is_photometric(method) ? &photometric : nullptr};
+                      .questions = method.asks_about_views ? &whole_views : nullptr,
+                      .injection = method.is_photometric ? &photometric : nullptr};
   const Stage2Report report = train_stage2(job, engines, pixels ? static_cast<Observer&>(curve) : bench_.observer);
   if (pixels && !curve.points().empty()) {
     cell.stage2_curve = curve.points();
@@ -284,7 +272,7 @@ void SeedRun::train_colors(const Method& method, const Field& field, Colorizer& 
 
 void SeedRun::evaluate_views(const Method& method, const Scene& scene, Cell& cell) const {
   EvaluateOptions options;
-  options.render = pipeline::render_options(bench_.config.run);
+  options.render = pipeline::render_options(bench_.config);
   options.lpips = bench_.lpips;
   options.with_baked = false;
   options.grey_as_color = true;
@@ -303,8 +291,8 @@ void SeedRun::evaluate_views(const Method& method, const Scene& scene, Cell& cel
 }
 
 void SeedRun::evaluate_turntable(const Method& method, const Scene& scene, Cell& cell) const {
-  const CameraPath path = turntable_path(subject_.capture, bench_.config.run.render);
-  const RenderOptions options = pipeline::render_options(bench_.config.run);
+  const CameraPath path = turntable_path(subject_.capture, bench_.config.render);
+  const RenderOptions options = pipeline::render_options(bench_.config);
   std::vector<RenderedImage> frames;
   std::vector<SeenView> seen;
   frames.reserve(path.cameras.size());

@@ -7,31 +7,35 @@
 
 #include "src/base/observer.h"
 #include "src/colorizer/colorizer.h"
-#include "src/compare/baselines/simulated.h"
 #include "src/compare/baselines/style_transfer.h"
 #include "src/compare/cell.h"
 #include "src/compare/methods.h"
-#include "src/compare/options.h"
-#include "src/compare/remembered_rays.h"
 #include "src/compare/subject.h"
 #include "src/evaluate/lpips.h"
 #include "src/train/luminance/view_cache.h"
 
 namespace cnerf::compare {
 
-/// What all cells of a comparison share. All is referred to.
-struct Bench {
-  const CompareConfig& config;
-  const Engines& engines;
-  const Lpips* lpips;                   ///< null = LPIPS is not measured
-  std::filesystem::path lpips_weights;  ///< of `lpips`
-  Observer& observer;
+/// What to compare.
+struct Plan {
+  std::vector<ComparedCapture> captures;
+  std::filesystem::path report;  ///< folder
+  std::vector<const Method*> methods;
+  std::vector<int> seeds;
+  std::filesystem::path lpips_weights;    ///< empty = LPIPS is not measured
+  std::filesystem::path style_reference;  ///< empty = the middle training view, coloured by the colorizer
+  std::string command_line;
+  bool only_report = false;  ///< nothing is trained: the report is made of the cells that are there
 };
 
-/// Whether a colorizer's spec names the one that errs on purpose.
-[[nodiscard]] bool is_simulated(const std::string& spec);
-/// Its options.  @throws UsageError
-[[nodiscard]] SimulationOptions simulation_of(const std::string& spec);
+/// What all cells of a comparison share. All is referred to.
+struct Bench {
+  const Plan& plan;
+  const Config& config;
+  const Engines& engines;
+  const Lpips* lpips;  ///< null = LPIPS is not measured
+  Observer& observer;
+};
 
 /// "0003.jpg": a view or a frame of a turntable in a cell's folder.
 [[nodiscard]] std::string numbered(std::size_t index);
@@ -54,8 +58,8 @@ class SeedRun {
   [[nodiscard]] Field field_of(const Method& method) const;
   [[nodiscard]] std::string settings_of(const Method& method) const;
   [[nodiscard]] std::unique_ptr<Colorizer> colorizer_for(const Method& method) const;
-  [[nodiscard]] StyleReport transfer(const Stage2Options& options, Colorizer& colorizer,
-                                     const std::filesystem::path& take) const;
+  [[nodiscard]] double transfer(const Stage2Options& options, Colorizer& colorizer,
+                                const std::filesystem::path& take) const;
   void train_own_field(const Engines& engines, Cell& cell) const;
   void colorize(const Method& method, Cell& cell);
   void train_colors(const Method& method, const Field& field, Colorizer& colorizer, Cell& cell);
@@ -68,7 +72,6 @@ class SeedRun {
   std::filesystem::path folder_, stage1_;  // the snapshot
   std::string stage1_settings_;
   ViewCache training_views_;
-  RememberingEngines rendering_;
 };
 
 }  // namespace cnerf::compare

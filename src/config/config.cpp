@@ -9,12 +9,6 @@
 
 namespace cnerf {
 namespace fs = std::filesystem;
-namespace {
-
-constexpr const char* kOfCompare = "it is one of `cnerf compare` alone";
-
-}  // namespace
-
 const std::vector<RetiredKey>& retired_keys() {
   static const std::vector<RetiredKey> keys{
       {"exr.lab_names", "", "'lab'", "the channels are Lab.L, Lab.a and Lab.b"},
@@ -29,14 +23,14 @@ const std::vector<RetiredKey>& retired_keys() {
       {"mesh.ray_inside", "", "4.0", "a texel's ray ends four voxels inside the surface"},
       {"mesh.ray_outside", "", "2.0", "a texel's ray starts two voxels outside the surface"},
       {"vdb.dilation", "bake.dilation", "", ""},
-      {"compare.positional_budget", "", "4.0", kOfCompare},
+      {"compare.positional_budget", "", "4.0", "it is a constant"},
       {"compare.positional_learning_rate", "", "5e-04", "it is that of Mildenhall et al. 2020"},
       {"compare.positional_final_learning_rate", "", "5e-05", "it is that of Mildenhall et al. 2020"},
       {"compare.positional_geometry", "", "'shared'", "colours stand on the stage 1 that all methods share"},
       {"compare.positional_trains_encoding", "", "false", "the encoding stays fixed, as in the paper"},
-      {"compare.style_reference", "", "''", kOfCompare},
-      {"compare.style_network", "", "''", kOfCompare},
-      {"compare.style_steps", "", "160", kOfCompare},
+      {"compare.style_reference", "", "''", "cnerf compare has --style-reference"},
+      {"compare.style_network", "", "''", "features are those of the AlexNet of --lpips-weights"},
+      {"compare.style_steps", "", "160", "in cnerf compare they follow stage2.patches"},
       {"stage1.grid.features", "", "4", "a row has 4 features"},
       {"stage2.grid.features", "", "4", "a row has 4 features"},
       {"stage1.occupancy.decay", "", "0.5", "it is a constant"},

@@ -8,7 +8,7 @@
 
 #include "src/base/check.h"
 #include "src/base/error.h"
-#include "src/evaluate/tensor_file.h"
+#include "src/base/tensor_file.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;

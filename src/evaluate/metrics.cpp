@@ -1,8 +1,8 @@
 #include "src/evaluate/metrics.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "src/base/check.h"
 #include "src/color/colorspace_math.h"
@@ -41,56 +41,18 @@ double colorfulness_of(const Moments& rg, const Moments& yb) {
 constexpr int kWindow = 11;
 constexpr double kWindowSigma = 1.5;
 
-std::array<double, kWindow> gaussian_window() {
-  std::array<double, kWindow> weights{};
-  double sum = 0;
-  for (int i = 0; i < kWindow; ++i) {
-    const double x = i - kWindow / 2;
-    sum += weights[i] = std::exp(-x * x / (2 * kWindowSigma * kWindowSigma));
-  }
-  for (double& weight : weights) weight /= sum;
-  return weights;
+cv::Mat plane_of(std::span<const float> values, int width, int height) {
+  cv::Mat plane;
+  cv::Mat(height, width, CV_32F, const_cast<float*>(values.data())).convertTo(plane, CV_64F);
+  return plane;
 }
 
-/// A picture of doubles that filtering shrinks.
-struct Plane {
-  int width = 0, height = 0;
-  std::vector<double> values;
-};
-
-/// Gaussian filter without padding: the result is smaller by `kWindow - 1` along both axes.
-Plane filtered(const Plane& in) {
-  static const std::array<double, kWindow> weights = gaussian_window();
-  Plane rows{in.width - kWindow + 1, in.height, {}};
-  rows.values.resize(std::size_t(rows.width) * rows.height);
-  for (int y = 0; y < rows.height; ++y) {
-    for (int x = 0; x < rows.width; ++x) {
-      double sum = 0;
-      for (int i = 0; i < kWindow; ++i) sum += weights[i] * in.values[std::size_t(y) * in.width + x + i];
-      rows.values[std::size_t(y) * rows.width + x] = sum;
-    }
-  }
-  Plane out{rows.width, in.height - kWindow + 1, {}};
-  out.values.resize(std::size_t(out.width) * out.height);
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) {
-      double sum = 0;
-      for (int i = 0; i < kWindow; ++i) sum += weights[i] * rows.values[std::size_t(y + i) * rows.width + x];
-      out.values[std::size_t(y) * out.width + x] = sum;
-    }
-  }
-  return out;
-}
-
-Plane filtered_product(std::span<const float> a, std::span<const float> b, int width, int height) {
-  Plane product{width, height, {}};
-  product.values.reserve(a.size());
-  for (std::size_t i = 0; i < a.size(); ++i) product.values.push_back(double(a[i]) * double(b[i]));
-  return filtered(product);
-}
-
-Plane filtered_plane(std::span<const float> a, int width, int height) {
-  return filtered({width, height, {a.begin(), a.end()}});
+/// Gaussian means over the windows that lie inside: the result is smaller by `kWindow - 1` along both axes.
+cv::Mat filtered(const cv::Mat& plane) {
+  constexpr int kBorder = kWindow / 2;
+  cv::Mat means;
+  cv::GaussianBlur(plane, means, {kWindow, kWindow}, kWindowSigma);
+  return means(cv::Rect(kBorder, kBorder, plane.cols - 2 * kBorder, plane.rows - 2 * kBorder));
 }
 
 Lab<double> lab_at(std::span<const float> rgb, std::size_t pixel) {
@@ -124,18 +86,17 @@ std::optional<double> ssim(std::span<const float> ours, std::span<const float> t
   CNERF_CHECK_EQ(ours.size(), std::size_t(width) * std::size_t(height));
   if (width < kWindow || height < kWindow) return std::nullopt;
   constexpr double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;
-  const Plane mean_a = filtered_plane(ours, width, height), mean_b = filtered_plane(truth, width, height);
-  const Plane aa = filtered_product(ours, ours, width, height), bb = filtered_product(truth, truth, width, height);
-  const Plane ab = filtered_product(ours, truth, width, height);
+  const cv::Mat a = plane_of(ours, width, height), b = plane_of(truth, width, height);
+  const cv::Mat mean_a = filtered(a), mean_b = filtered(b);
+  const cv::Mat aa = filtered(a.mul(a)), bb = filtered(b.mul(b)), ab = filtered(a.mul(b));
 
   Moments similarity;
-  for (int y = 0; y < mean_a.height; ++y) {
-    for (int x = 0; x < mean_a.width; ++x) {
+  for (int y = 0; y < mean_a.rows; ++y) {
+    for (int x = 0; x < mean_a.cols; ++x) {
       if (!counts(valid, std::size_t(y + kWindow / 2) * width + x + kWindow / 2)) continue;
-      const std::size_t i = std::size_t(y) * mean_a.width + x;
-      const double ma = mean_a.values[i], mb = mean_b.values[i];
-      const double variances = aa.values[i] - ma * ma + bb.values[i] - mb * mb;
-      const double covariance = ab.values[i] - ma * mb;
+      const auto ma = mean_a.at<double>(y, x), mb = mean_b.at<double>(y, x);
+      const double variances = aa.at<double>(y, x) - ma * ma + bb.at<double>(y, x) - mb * mb;
+      const double covariance = ab.at<double>(y, x) - ma * mb;
       similarity.add((2 * ma * mb + c1) * (2 * covariance + c2) / ((ma * ma + mb * mb + c1) * (variances + c2)));
     }
   }

@@ -28,6 +28,7 @@ class Frame {
     for (const Json* json : {&frame_, &whole_}) {
       if (!json->contains(field)) continue;
       const Json& value = json->at(field);
+      if (!value.is_number()) refuse(field, "expected a number, got " + excerpt(value));
       return value.get<double>();
     }
     return std::nullopt;

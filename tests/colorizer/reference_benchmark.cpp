@@ -34,7 +34,6 @@ struct Settings {
   bool held = false;
   int views = 8, patches_per_view = 6;
   std::uint64_t seed = 1;
-  bool mirror = true;
   ReferenceRecipe recipe;
 };
 
@@ -52,7 +51,6 @@ Settings parse(int argc, char** argv) {
   const std::map<std::string, std::function<void(const std::string&)>> setters = {
       {"views", [&](auto& v) { s.views = std::stoi(v); }},
       {"seed", [&](auto& v) { s.seed = std::stoull(v); }},
-      {"mirror", [&](auto& v) { s.mirror = std::stoi(v) != 0; }},
       {"picture", [&](auto& v) { s.picture = v; }},
       {"steps", [&](auto& v) { r.steps = std::stoi(v); }},
       {"batch", [&](auto& v) { r.batch = std::stoi(v); }},
@@ -60,9 +58,6 @@ Settings parse(int argc, char** argv) {
       {"size", [&](auto& v) { r.patch_size = std::stoi(v); }},
       {"rate", [&](auto& v) { r.learning_rate = std::stod(v); }},
       {"decay", [&](auto& v) { r.weight_decay = std::stod(v); }},
-      {"classify", [&](auto& v) { r.classify = std::stoi(v) != 0; }},
-      {"temperature", [&](auto& v) { r.temperature = std::stod(v); }},
-      {"statistics", [&](auto& v) { r.local_statistics = std::stoi(v) != 0; }},
       {"builtin", [&](auto& v) { r.builtin = v; }},
       {"channels", [&](auto& v) { r.channels = numbers(v); }},
       {"share_min", [&](auto& v) { r.distortion.share_min = std::stod(v); }},
@@ -167,7 +162,7 @@ int main(int argc, char** argv) {
     const std::vector<ReferenceImage> view{load_reference_image(file)};
     std::vector<float> view_truth;
     const LightnessBatch question = whole_view(view[0].levels[0], view_truth);
-    const std::vector<float> answer = network.colorize(question, s.mirror);
+    const std::vector<float> answer = network.colorize(question);
     whole.add(answer, view_truth);
     tiles.push_back({picture_of(question, view_truth), "truth"});
     tiles.push_back({picture_of(question, answer), "answer"});
@@ -175,7 +170,7 @@ int main(int argc, char** argv) {
       LightnessBatch patch{1, size, size, std::vector<float>(pixels)};
       sample_reference_patch(view, none, size, rng, patch.lightness, truth);
       const auto asked = Clock::now();
-      const std::vector<float> patch_answer = network.colorize(patch, s.mirror);
+      const std::vector<float> patch_answer = network.colorize(patch);
       patch_seconds += seconds_since(asked);
       patches.add(patch_answer, truth);
     }

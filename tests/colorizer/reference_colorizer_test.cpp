@@ -9,8 +9,7 @@
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
-#include "src/colorizer/torch/builtin_colorizer.h"
-#include "src/colorizer/torch/reference_colorizer.h"
+#include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer/torch/reference_images.h"
 #include "src/colorizer/torch/reference_network.h"
 #include "tests/colorizer/questions.h"
@@ -89,15 +88,16 @@ ReferenceRecipe short_recipe(int steps) {
   return recipe;
 }
 
-class ReferenceNetworks : public ::testing::TestWithParam<bool> {};
-INSTANTIATE_TEST_SUITE_P(Losses, ReferenceNetworks, ::testing::Bool(),
-                         [](const auto& parameter) { return parameter.param ? "Classifying" : "Regressing"; });
+ReferenceImage photograph_of(const Toy& toy) {
+  const test::TempDir folder;
+  save_png(toy, folder / "toy.png");
+  return load_reference_image(folder / "toy.png");
+}
 
-TEST_P(ReferenceNetworks, LearnsColourFromTextureAndCarriesItToAnotherView) {
+TEST(ReferenceNetwork, LearnsColourFromTextureAndCarriesItToAnotherView) {
   const Toy seen = toy_scene(1), unseen = toy_scene(2);
-  const std::vector<ReferenceImage> images{make_reference_image(seen.side, seen.side, seen.linear_rgb)};
-  ReferenceRecipe recipe = short_recipe(250);
-  recipe.classify = GetParam();
+  const std::vector<ReferenceImage> images{photograph_of(seen)};
+  const ReferenceRecipe recipe = short_recipe(250);
   ReferenceNetwork network(recipe, images, 1);
   const std::vector<float> grey(unseen.ab.size(), 0.0f);
   const double of_grey = mean_distance(grey, unseen.ab);
@@ -106,11 +106,10 @@ TEST_P(ReferenceNetworks, LearnsColourFromTextureAndCarriesItToAnotherView) {
   EXPECT_LT(mean_distance(network.colorize(unseen.question), unseen.ab), 0.35 * of_grey);
 }
 
-TEST_P(ReferenceNetworks, TheSameSeedGivesTheSameWeightsWithAnyNumberOfThreads) {
+TEST(ReferenceNetwork, TheSameSeedGivesTheSameWeightsWithAnyNumberOfThreads) {
   const Toy toy = toy_scene(1);
-  const std::vector<ReferenceImage> images{make_reference_image(toy.side, toy.side, toy.linear_rgb)};
-  ReferenceRecipe recipe = short_recipe(4);
-  recipe.classify = GetParam();
+  const std::vector<ReferenceImage> images{photograph_of(toy)};
+  const ReferenceRecipe recipe = short_recipe(4);
   const auto fitted = [&](int threads, std::uint64_t seed) {
     set_thread_count(threads);
     ReferenceNetwork network(recipe, images, seed);
@@ -126,7 +125,7 @@ TEST_P(ReferenceNetworks, TheSameSeedGivesTheSameWeightsWithAnyNumberOfThreads) 
 
 TEST(ReferenceNetwork, StartsAsItWouldWithoutTheBuiltinNetworkAndLearnsToUseIt) {
   const Toy toy = toy_scene(1);
-  const std::vector<ReferenceImage> images{make_reference_image(toy.side, toy.side, toy.linear_rgb)};
+  const std::vector<ReferenceImage> images{photograph_of(toy)};
   const ReferenceRecipe alone = short_recipe(4);
   ReferenceRecipe guided = alone;
   guided.builtin = builtin_weights_file();
@@ -154,7 +153,7 @@ TEST(ReferenceNetwork, StartsAsItWouldWithoutTheBuiltinNetworkAndLearnsToUseIt) 
 
 TEST(ReferenceNetwork, AnswersAnySizeAndWeightsComeBack) {
   const Toy toy = toy_scene(1);
-  const std::vector<ReferenceImage> images{make_reference_image(toy.side, toy.side, toy.linear_rgb)};
+  const std::vector<ReferenceImage> images{photograph_of(toy)};
   ReferenceNetwork network(short_recipe(3), images, 1), other(short_recipe(3), images, 2);
   network.fit(images, {});
   for (const auto& question : {test::some_question(3, 64, 64), test::some_question(1, 37, 81)}) {
@@ -167,10 +166,11 @@ TEST(ReferenceNetwork, AnswersAnySizeAndWeightsComeBack) {
 
 TEST(ReferenceImages, PatchesKeepColoursAndHoldThePlaceTheyShow) {
   // Left half red, right half blue, no distortion of tone: colours of a patch are those two.
-  const int width = 400, height = 300;
-  std::vector<float> rgb(std::size_t(width * height * 3), 0.0f);
-  for (int i = 0; i < width * height; ++i) rgb[std::size_t(3 * i + (i % width < width / 2 ? 0 : 2))] = 0.5f;
-  const std::vector<ReferenceImage> images{make_reference_image(width, height, rgb)};
+  const test::TempDir folder;
+  cv::Mat halves(300, 400, CV_8UC3, cv::Scalar(0, 0, 188));
+  halves(cv::Rect(200, 0, 200, 300)).setTo(cv::Scalar(188, 0, 0));
+  cv::imwrite((folder / "halves.png").string(), halves);
+  const std::vector<ReferenceImage> images{load_reference_image(folder / "halves.png")};
   const PatchDistortion none{0.9, 1.0, 0, 0, false, 0, 0, 0, 0};
   std::vector<float> lightness(64 * 64), ab(2 * 64 * 64);
   SequentialRng rng(1, 1);

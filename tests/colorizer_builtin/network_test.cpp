@@ -7,7 +7,8 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/colorizer/torch/builtin_colorizer.h"
+#include "src/base/process.h"
+#include "src/colorizer/kinds.h"
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer_training/score.h"
 #include "tests/support/data.h"
@@ -15,10 +16,16 @@
 namespace cnerf {
 namespace {
 
+using namespace colorizer_training;
+
 using torch::Tensor;
 
 constexpr std::int64_t kMostParameters = 6'500'000;
 constexpr std::uintmax_t kMostBytes = 13'000'000;
+
+std::unique_ptr<Colorizer> builtin_colorizer() {
+  return make_builtin_colorizer({"", ColorizerOptions{}, ColorizerContext{}});
+}
 
 Tensor random_lightness(std::int64_t batch, std::int64_t height, std::int64_t width) {
   torch::manual_seed(3);
@@ -175,7 +182,7 @@ LightnessBatch ramp_batch(int batch, int height, int width) {
 }
 
 TEST(BuiltinColorizer, AnswersFiniteColorsOfTheRightShape) {
-  const auto colorizer = load_builtin_colorizer(builtin_weights_file());
+  const auto colorizer = builtin_colorizer();
   EXPECT_THAT(colorizer->name(), testing::StartsWith("builtin"));
   for (const auto& [batch, height, width] : {std::tuple{1, 128, 128}, {9, 32, 48}, {2, 33, 31}}) {
     const LightnessBatch patches = ramp_batch(batch, height, width);
@@ -185,7 +192,7 @@ TEST(BuiltinColorizer, AnswersFiniteColorsOfTheRightShape) {
 }
 
 TEST(BuiltinColorizer, AnswerDoesNotDependOnTheRestOfTheBatch) {
-  const auto colorizer = load_builtin_colorizer(builtin_weights_file());
+  const auto colorizer = builtin_colorizer();
   const LightnessBatch all = ramp_batch(3, 32, 32);
   LightnessBatch last{1, 32, 32, {all.lightness.begin() + 2 * 32 * 32, all.lightness.end()}};
   const std::vector<float> together = colorizer->colorize(all).ab, alone = colorizer->colorize(last).ab;
@@ -205,7 +212,7 @@ LightnessBatch blobs(int side) {
 }
 
 TEST(BuiltinColorizer, AnswerDoesNotDependOnThePicturesResolution) {
-  const auto colorizer = load_builtin_colorizer(builtin_weights_file());
+  const auto colorizer = builtin_colorizer();
   const std::vector<float> coarse = colorizer->colorize(blobs(96)).ab, fine = colorizer->colorize(blobs(288)).ab;
   double difference = 0, chroma = 0;
   for (int channel = 0; channel < 2; ++channel) {
@@ -222,28 +229,35 @@ TEST(BuiltinColorizer, AnswerDoesNotDependOnThePicturesResolution) {
 }
 
 TEST(BuiltinColorizer, FlatGreyGetsNearlyNoColor) {
-  const auto colorizer = load_builtin_colorizer(builtin_weights_file());
+  const auto colorizer = builtin_colorizer();
   const LightnessBatch flat{1, 64, 64, std::vector<float>(64 * 64, 55.0f)};
   const std::vector<float> ab = colorizer->colorize(flat).ab;
   for (const float value : ab) ASSERT_LT(std::abs(value), 40.0f);
 }
 
+/// The pictures of an archive.
+std::vector<Picture> kodak_pictures(const std::filesystem::path& archive) {
+  const test::TempDir folder;
+  std::filesystem::create_directory(folder / "images");
+  EXPECT_EQ(run_program({"tar", "-xf", archive.string(), "-C", (folder / "images").string()}, folder / "log"), 0);
+  return load_evaluation_images(folder / "images");
+}
+
 TEST(BuiltinColorizer, BeatsGreyOnPhotographsItNeverSaw) {
   CNERF_REQUIRE_DATA(kodak, "colorizer/eval-kodak-384px.tar");
-  std::vector<RgbImage> images = load_evaluation_images(kodak);
+  std::vector<Picture> images = kodak_pictures(kodak);
   images.resize(8);
   const SoftLabelTable table(torch::kCPU);
   ColorizerWeights weights = load_colorizer_weights(builtin_weights_file());
-  const ChromaScore score = score_network(weights.network, images, {{0, weights.decoding}}, {}, table, torch::kCPU)[0];
-  const ChromaScore grey = score_baselines(images, table, torch::kCPU).grey;
+  const ChromaScore score = score_network(weights.network, images, {{0, weights.decoding}}, {}, table)[0];
+  const ChromaScore grey = score_baselines(images, table).grey;
   EXPECT_GT(score.balanced_auc, grey.balanced_auc + 3);
   EXPECT_LT(score.rmse, 0.9 * grey.rmse);
 }
 
 TEST(Score, GreyOnKodakIsWhatOthersMeasure) {
   CNERF_REQUIRE_DATA(kodak, "colorizer/eval-kodak-384px.tar");
-  const SoftLabelTable table(torch::kCPU);
-  const ChromaScore grey = score_baselines(load_evaluation_images(kodak), table, torch::kCPU).grey;
+  const ChromaScore grey = score_baselines(kodak_pictures(kodak), SoftLabelTable(torch::kCPU)).grey;
   EXPECT_NEAR(grey.rmse, 15.34, 0.2);  // an independent measurement at the same size, by another resize filter
   EXPECT_NEAR(grey.raw_auc, 88.65, 0.3);
 }

@@ -8,11 +8,11 @@
 #include "src/color/ab_bins.h"
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer_training/score.h"
-#include "src/colorizer_training/tar_reader.h"
 #include "src/colorizer_training/trainer.h"
+#include "src/picture/encode.h"
 #include "tests/support/data.h"
 
-namespace cnerf {
+namespace cnerf::colorizer_training {
 namespace {
 
 /// Two classes that lightness tells apart: dark red pictures with a bright spot, bright blue ones with a dark spot.
@@ -49,14 +49,13 @@ TrainerOptions tiny_options() {
   options.steps = 40;
   options.photos_per_step = options.tiles_per_step = 2;
   options.crop_sides = {32};
-  options.tile_crop_side = 32;
   options.warmup_steps = 5;
   return options;
 }
 
 TEST(ColorizerTrainer, LearnsATinySet) {
   const ImageSet set = tiny_set();
-  ColorizerTrainer trainer(set, nullptr, {}, tiny_options(), torch::kCPU);
+  ColorizerTrainer trainer(set, nullptr, tiny_options(), torch::kCPU);
   const auto mean_loss = [&](int steps) {
     double sum = 0;
     for (int i = 0; i < steps; ++i) sum += trainer.step().classification.item<double>();
@@ -70,12 +69,12 @@ TEST(ColorizerTrainer, LearnsATinySet) {
 TEST(ColorizerTrainer, ContinuesBitForBit) {
   const test::TempDir folder;
   const ImageSet set = tiny_set();
-  ColorizerTrainer straight(set, nullptr, {}, tiny_options(), torch::kCPU);
+  ColorizerTrainer straight(set, nullptr, tiny_options(), torch::kCPU);
   for (int i = 0; i < 3; ++i) straight.step();
   straight.save(folder / "checkpoint.pt");
   const double expected = (straight.step(), straight.step()).classification.item<double>();
 
-  ColorizerTrainer resumed(set, nullptr, {}, tiny_options(), torch::kCPU);
+  ColorizerTrainer resumed(set, nullptr, tiny_options(), torch::kCPU);
   resumed.load(folder / "checkpoint.pt");
   EXPECT_EQ(resumed.steps_done(), 3);
   EXPECT_EQ((resumed.step(), resumed.step()).classification.item<double>(), expected);
@@ -83,79 +82,10 @@ TEST(ColorizerTrainer, ContinuesBitForBit) {
   for (std::size_t i = 0; i < a.size(); ++i) ASSERT_TRUE(torch::equal(a[i], b[i]));
 }
 
-TEST(ColorizerTrainer, MeasuresStatisticsWhereTilesCameAlone) {
-  const ImageSet set = tiny_set();
-  const torch::Tensor lightness = 100 * torch::rand({1, 1, 32, 32});
-  const torch::NoGradGuard no_grad;
-  for (const double tile_share : {0.0, 0.5}) {
-    TrainerOptions options = tiny_options();
-    options.tile_share = tile_share;
-    ColorizerTrainer trainer(set, nullptr, {}, options, torch::kCPU);
-    {
-      const torch::AutoGradMode with_gradients(true);
-      for (int i = 0; i < 4; ++i) trainer.step();
-    }
-    const torch::Tensor before = trainer.averaged()->forward(lightness);
-    trainer.measure_statistics();
-    const torch::Tensor measured = trainer.averaged()->forward(lightness);
-    EXPECT_EQ(torch::equal(before, measured), tile_share == 0);
-    trainer.measure_statistics();
-    EXPECT_TRUE(torch::equal(trainer.averaged()->forward(lightness), measured));
-  }
-}
-
-TEST(DistillationLoss, IsTheRebalancedLossAveragedOverTheTruth) {
-  torch::manual_seed(3);
-  const SoftLabelTable table(torch::kCPU);
-  const torch::Tensor logits = torch::randn({1, kAbBinCount, 1, 1}), weights = 0.2 + 3 * torch::rand({kAbBinCount});
-  // Half of the pictures show one colour here, half another.
-  const std::vector<torch::Tensor> truths = {torch::tensor({20.0f, 31.0f}).view({1, 2, 1, 1}),
-                                             torch::tensor({-42.0f, 13.0f}).view({1, 2, 1, 1})};
-  torch::Tensor average = torch::zeros({}), rebalanced = torch::zeros({kAbBinCount});
-  for (const torch::Tensor& truth : truths) {
-    average += 0.5 * color_loss(logits, truth, table, weights).classification;
-    const auto target = table.look_up(truth);
-    const torch::Tensor weight = weights.index_select(0, target.bin.select(1, 0));
-    rebalanced.index_add_(0, target.bin[0], 0.5 * weight * target.weight[0]);
-  }
-  const torch::Tensor probability = (rebalanced / rebalanced.sum()).view({1, -1});
-  const torch::Tensor flat = torch::ones({kAbBinCount});
-  const torch::Tensor unweighted = -(probability * torch::log_softmax(logits.view({1, -1}), 1)).sum();
-  EXPECT_NEAR(distillation_loss(logits, probability, flat).item<double>(), unweighted.item<double>(), 1e-5);
-  const double emphasis = 1 / (probability.flatten() / weights).sum().item<double>();
-  EXPECT_NEAR(distillation_loss(logits, probability, weights).item<double>(), emphasis * unweighted.item<double>(),
-              1e-4);
-  EXPECT_NEAR(average.item<double>(), (rebalanced.sum() * unweighted).item<double>(), 1e-4);
-}
-
-TEST(ColorizerTrainer, LearnsFromAnEnsembleWhatTheTruthDoesNotSay) {
-  const test::TempDir folder;
-  const ImageSet set = tiny_set();
-  torch::manual_seed(4);
-  ColorizerNet always_green(Normalisation::kFolded);
-  {
-    const torch::NoGradGuard no_grad;
-    torch::Tensor offsets = torch::zeros({kAbBinCount});
-    offsets[nearest_bin({-50, 40})] = 30;
-    always_green->shift_logits(offsets);
-  }
-  save_colorizer_weights(folder / "green.weights", always_green, {});
-  TrainerOptions options = tiny_options();
-  options.distillation_share = 1;
-  options.regression_weight = 0;
-  ColorizerTrainer trainer(set, nullptr, Ensemble({folder / "green.weights"}, torch::kCPU), options, torch::kCPU);
-  const double before = trainer.step().classification.item<double>();
-  double after = before;
-  for (int i = 1; i < options.steps; ++i) after = trainer.step().classification.item<double>();
-  // The pictures themselves are red and blue: without the ensemble the answer of one green would stay wrong.
-  EXPECT_LT(after, 0.5 * before);
-  EXPECT_THROW(Ensemble({folder / "none.weights"}, torch::kCPU), MissingInputError);
-}
-
 TEST(ColorizerTrainer, RefusesOtherCheckpoints) {
   const test::TempDir folder;
   const ImageSet set = tiny_set();
-  ColorizerTrainer trainer(set, nullptr, {}, tiny_options(), torch::kCPU);
+  ColorizerTrainer trainer(set, nullptr, tiny_options(), torch::kCPU);
   EXPECT_THROW(trainer.load(folder / "none.pt"), MissingInputError);
   write_file(folder / "short.pt", std::string_view("not a checkpoint"));
   EXPECT_THROW(trainer.load(folder / "short.pt"), SnapshotError);
@@ -184,7 +114,7 @@ TEST(LoadImageSet, HoldsOutMoreOnRequestAndNeverAnImageTwice) {
 TEST(MakeBatch, IsAPureFunctionOfTheStep) {
   const ImageSet set = tiny_set();
   const ResidentImages photos(set.photos, torch::kCPU);
-  const auto batch = [&](std::int64_t step) { return make_batch({{&photos, 3}}, 32, AugmentOptions{}, 9, step); };
+  const auto batch = [&](std::int64_t step) { return make_batch({{&photos, 3}}, 32, 9, step); };
   EXPECT_TRUE(torch::equal(batch(4).lightness, batch(4).lightness));
   EXPECT_FALSE(torch::equal(batch(4).lightness, batch(5).lightness));
   EXPECT_EQ(batch(4).ab.sizes(), (std::vector<std::int64_t>{3, 2, 8, 8}));
@@ -197,15 +127,13 @@ TEST(Merit, IsBalancedAucUnlessRawAucOrRmseFallShort) {
   EXPECT_NEAR(merit({88.5, 67, 8, 20, 30}, grey), 7 - 2, 1e-9);
 }
 
-TEST(ScoreGrey, IsTheBaseline) {
-  RgbImage image{16, 16, {}};
+TEST(ScoreBaselines, NoConstantIsWorseThanGrey) {
+  Picture image{16, 16, {}};
   for (int i = 0; i < 16 * 16 * 3; ++i) image.rgb.push_back(std::uint8_t((i * 37) % 256));
-  const SoftLabelTable table(torch::kCPU);
-  const ChromaScore grey = score_grey({image}, table, torch::kCPU),
-                    baseline = score_baselines({image}, table, torch::kCPU).grey;
-  EXPECT_EQ(grey.rmse, baseline.rmse);
-  EXPECT_EQ(grey.balanced_auc, baseline.balanced_auc);
-  EXPECT_GT(grey.rmse, 0);
+  const Baselines baselines = score_baselines({image}, SoftLabelTable(torch::kCPU));
+  EXPECT_GT(baselines.grey.rmse, 0);
+  EXPECT_LE(baselines.best_constant.rmse, baselines.grey.rmse);
+  EXPECT_GE(baselines.best_constant.balanced_auc, baselines.grey.balanced_auc);
 }
 
 TEST(LabFromSrgb, GreyHasNoColorAndRedIsRed) {
@@ -219,31 +147,47 @@ TEST(LabFromSrgb, GreyHasNoColorAndRedIsRed) {
   EXPECT_NEAR(back[0][1].item<float>(), 0, 1e-2f);
 }
 
-TEST(TarReader, ReadsWhatIsThereAndRefusesTheRest) {
+TEST(LoadImageSet, CutsMosaicsIntoLabelledTilesAndRefusesWhatIsNoPicture) {
   const test::TempDir folder;
-  write_file(folder / "bad.tar", std::string(1024, 'x'));
-  EXPECT_THROW((void)read_tar_or_folder(folder / "bad.tar"), InputError);
-  EXPECT_THROW((void)read_tar_or_folder(folder / "none.tar"), MissingInputError);
-  write_file(folder / "set/b.txt", std::string_view("bb"));
-  write_file(folder / "set/a/x.txt", std::string_view("a"));
-  const auto entries = read_tar_or_folder(folder / "set");
-  ASSERT_EQ(entries.size(), 2u);
-  EXPECT_EQ(entries[0].name, "a/x.txt");
-  EXPECT_EQ(entries[1].content.size(), 2u);
+  Picture mosaic{32, 16, {}};  // a dark tile beside a bright one
+  for (int i = 0; i < 32 * 16 * 3; ++i) mosaic.rgb.push_back(i / 3 % 32 < 16 ? 20 : 200);
+  std::filesystem::create_directories(folder / "mosaics");
+  for (const char* name : {"b.png", "a.png"}) write_png(folder / "mosaics" / name, mosaic);
+  std::string labels("\x93NUMPY\1\0\x76\0", 10);
+  labels += "{'descr': '|u1', 'fortran_order': False, 'shape': (4,), }";
+  labels.resize(128, ' ');
+  write_file(folder / "labels.npy", labels + std::string({4, 1, 2, 3}));
+  ImageSources sources;
+  sources.mosaics = {folder / "mosaics"};
+  sources.mosaic_labels = folder / "labels.npy";
+  sources.tile_side = 16;
+  const ImageSet set = load_image_set(sources);
+  const auto held_out = set.validation.contains("objects") ? set.validation.at("objects").size() : 0;
+  ASSERT_EQ(set.tiles.size() + held_out, 4u);
+  EXPECT_EQ(set.classes.names.size(), 5u);
+  for (std::size_t i = 0; i < set.tiles.size(); ++i) {
+    const int shade = set.tiles.rgb[i * 16 * 16 * 3];
+    EXPECT_EQ(shade == 20, set.tiles.label[i] % 2 == 0) << "a tile's label went to its neighbour";
+  }
+
+  write_file(folder / "mosaics/c.png", std::string_view("no picture"));
+  EXPECT_THROW((void)load_image_set(sources), InputError);
+  sources.mosaics = {folder / "none"};
+  EXPECT_THROW((void)load_image_set(sources), MissingInputError);
 }
 
-TEST(RgbImage, ResizingKeepsTheMean) {
-  RgbImage image{9, 6, {}};
+TEST(Resized, KeepsTheMean) {
+  Picture image{9, 6, {}};
   for (int i = 0; i < 9 * 6 * 3; ++i) image.rgb.push_back(std::uint8_t((i * 37) % 256));
-  const auto mean = [](const RgbImage& of) {
+  const auto mean = [](const Picture& of) {
     double sum = 0;
     for (const std::uint8_t value : of.rgb) sum += value;
     return sum / double(of.rgb.size());
   };
-  EXPECT_NEAR(mean(resize_image(image, 3, 2)), mean(image), 6);
-  EXPECT_NEAR(mean(resize_image(image, 27, 18)), mean(image), 3);
-  EXPECT_EQ(resize_image(image, 9, 6).rgb, image.rgb);
+  EXPECT_NEAR(mean(resized(image, 3, 2)), mean(image), 6);
+  EXPECT_NEAR(mean(resized(image, 27, 18)), mean(image), 3);
+  EXPECT_EQ(resized(image, 9, 6).rgb, image.rgb);
 }
 
 }  // namespace
-}  // namespace cnerf
+}  // namespace cnerf::colorizer_training

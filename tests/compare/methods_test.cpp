@@ -22,12 +22,12 @@ TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
   EXPECT_TRUE(full.purify.enabled);
   EXPECT_FALSE(of("without-purification").purify.enabled);
   const auto method = [](const char* name) -> const Method& { return *parse_methods(name).front(); };
-  EXPECT_FALSE(is_photometric(method("colornerf")));
-  EXPECT_FALSE(is_photometric(method("without-purification")));
-  EXPECT_TRUE(is_photometric(method("without-classification")));
+  EXPECT_FALSE(method("colornerf").is_photometric);
+  EXPECT_FALSE(method("without-purification").is_photometric);
+  EXPECT_TRUE(method("without-classification").is_photometric);
   EXPECT_TRUE(of("without-classification").purify.enabled);
-  EXPECT_FALSE(asks_about_views(method("without-classification")));
-  EXPECT_TRUE(asks_about_views(method("colorize-then-fuse")) && is_photometric(method("colorize-then-fuse")));
+  EXPECT_FALSE(method("without-classification").asks_about_views);
+  EXPECT_TRUE(method("colorize-then-fuse").asks_about_views && method("colorize-then-fuse").is_photometric);
   EXPECT_EQ(of("colornerf-paper").decode_temperature, 0);
   EXPECT_EQ(of("colornerf-paper").purify.opinions, 1);
   Stage2Options smooth;
@@ -44,7 +44,7 @@ TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
   EXPECT_EQ(rate_of("without-purification"), 0.05);
   EXPECT_EQ(rate_of("without-classification"), Stage2Options{}.learning_rate) << "its own best step size";
   EXPECT_EQ(of("positional-encoding").learning_rate, kPositionalLearningRate);
-  EXPECT_FALSE(is_photometric(method("positional-encoding")));
+  EXPECT_FALSE(method("positional-encoding").is_photometric);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 
 #include "src/color/colorspace_math.h"
 #include "src/compare/baselines/torch/positional_math.h"
+#include "src/compare/derived_engines.h"
 #include "src/field/luminance_activation.h"
 #include "src/render/composite_math.h"
 #include "tests/support/finite_difference.h"
@@ -353,8 +354,7 @@ TEST_F(PositionalField, LearnsColoursAndLeavesTheEncodingAlone) {
       << "without a luminance field it starts from random weights";
 
   // Also where colours stand on another geometry.
-  const std::shared_ptr<const Engines> usual(std::shared_ptr<void>(), &cpu_engines());
-  const MixedEngines mixed(usual, {std::shared_ptr<void>(), engines_.get()});
+  const MixedEngines mixed(cpu_engines(), *engines_);
   EXPECT_EQ(bytes_of_encoding(*mixed.make_color_bins({}, 9)), bytes_of_encoding(*chroma));
 }
 

@@ -41,7 +41,7 @@ std::string report() {
   capture.inputs = {"data:image/png;base64,AA=="};
   capture.truths = {"data:image/png;base64,AQ=="};
   capture.methods = {{"colornerf", {"data:image/png;base64,Ag=="}, {"data:image/png;base64,Aw=="}, {{"bases", "x"}}}};
-  return report_html(cells, {"simulated:", "AlexNet", "cnerf compare a"}, std::span(&capture, 1));
+  return report_html(cells, {"simulated", "AlexNet", "cnerf compare a"}, std::span(&capture, 1));
 }
 
 /// The elements that a browser has after the page's script.

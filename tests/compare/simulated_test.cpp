@@ -149,21 +149,9 @@ TEST_F(SimulatedColorizerTest, HeldOutViewsAreNotLookedAt) {
   EXPECT_THROW((void)colorizer->colorize(question(1, false, "b")), ColorizerError);
 }
 
-TEST(SimulatedColorizer, SettingsAreReadAndRefused) {
-  const SimulationOptions options = parse_simulation("hue=40,outliers=0.5,seed=7");
-  EXPECT_EQ(options.hue, 40);
-  EXPECT_EQ(options.outliers, 0.5);
-  EXPECT_EQ(options.seed, 7);
-  EXPECT_EQ(options.modes, SimulationOptions{}.modes);
-  EXPECT_EQ(to_text(parse_simulation(to_text(options))), to_text(options));
-  for (const char* bad : {"hues=3", "hue=", "hue=x", "hue=181", "outliers=-0.1", "hue=nan", "seed=1.5", "hue"}) {
-    EXPECT_THROW((void)parse_simulation(bad), UsageError) << bad;
-  }
-}
-
 TEST(SimulatedColorizer, IsNoColorizerAUserCanTrainWith) {
   ColorizerOptions options;
-  options.spec = "simulated:hue=3";
+  options.spec = kSimulated;
   EXPECT_THROW((void)make_colorizer(options), UsageError);
 }
 

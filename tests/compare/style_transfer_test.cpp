@@ -86,8 +86,8 @@ class StyleTransfer : public testing::Test {
 };
 
 TEST_F(StyleTransfer, TheGradientPointsAwayFromTheReference) {
-  const StyleLoss loss(weights_, plain({40, 30}));
-  EXPECT_EQ(loss.network(), "AlexNet");
+  const auto made = make_style_loss(weights_, plain({40, 30}));
+  const StyleLoss& loss = *made;
   std::vector<float> gradient(2 * 64 * 56);
   EXPECT_NEAR(loss(plain({40, 30}), gradient), 0, 1e-4);
   const double grey = loss(plain({0, 0}), gradient);
@@ -119,14 +119,13 @@ TEST_F(StyleTransfer, BringsAFieldNearerToItsReference) {
   (void)train_stage1({capture, stage1, folder / "stage1.snapshot"}, cpu_engines(), observer);
 
   const LabPicture reference = plain({40, 30});
-  const StyleLoss loss(weights_, reference);
+  const auto loss = make_style_loss(weights_, reference);
   Stage2Options options;
   options.grid = stage1.grid;
-  const StyleReport report =
-      transfer_style({capture, folder / "stage1.snapshot", loss, reference, options, 40, folder / "take.snapshot"},
+  const double seconds =
+      transfer_style({capture, folder / "stage1.snapshot", *loss, reference, options, 40, folder / "take.snapshot"},
                      cpu_engines(), observer);
-  EXPECT_GT(report.seconds, 0);
-  EXPECT_GT(report.first_loss, 0);
+  EXPECT_GT(seconds, 0);
 
   const auto scene = Scene::load(folder / "stage1.snapshot", folder / "take.snapshot", cpu_engines());
   const View& view = capture.views[1];
@@ -144,14 +143,21 @@ TEST_F(StyleTransfer, BringsAFieldNearerToItsReference) {
   EXPECT_GT(b / n, 10);
 }
 
-TEST_F(StyleTransfer, WhatCannotBeUsedIsRefused) {
-  EXPECT_THROW(StyleLoss("missing.bin", plain({})), MissingInputError);
-  LabPicture small{20, 20, std::vector<float>(400, 50.0f), std::vector<float>(800, 0.0f)};
-  EXPECT_THROW(StyleLoss(weights_, small), InputError);
+/// What the plug-in throws is caught here by its type: both sides have the same types of errors.
+TEST(StyleLossPlugin, WhatCannotBeUsedIsRefusedByAnErrorOfTheProgram) {
+  EXPECT_THROW((void)make_style_loss("missing.bin", plain({})), MissingInputError);
   const test::TempDir folder;
-  const fs::path text = folder / "network.pt";
-  write_file(text, "no network");
-  EXPECT_THROW(StyleLoss(text, plain({})), InputError);
+  write_file(folder / "short.bin", "no weights");
+  write_file(folder / "short.txt", "conv1.weight 64x3x11x11 0\n");
+  EXPECT_THROW((void)make_style_loss(folder / "short.bin", plain({})), InputError);
+  write_file(folder / "other.bin", "1234");
+  write_file(folder / "other.txt", "core.weight 1 0\n");
+  EXPECT_THROW((void)make_style_loss(folder / "other.bin", plain({})), InputError);
+}
+
+TEST_F(StyleTransfer, ASmallReferenceIsRefused) {
+  const LabPicture small{20, 20, std::vector<float>(400, 50.0f), std::vector<float>(800, 0.0f)};
+  EXPECT_THROW((void)make_style_loss(weights_, small), InputError);
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ Cell cell(const std::string& capture, const std::string& method, int seed, doubl
   ViewMetrics other = view;
   other.colorfulness_difference = 5;
   made.metrics.split = "held-out";
-  made.metrics.colorizer = "simulated:";
+  made.metrics.colorizer = "simulated";
   made.metrics.mean = mean_of({view, other});
   made.metrics.views = {view, other};
   made.short_range = {1.5, 4, 1000, 10};

@@ -10,7 +10,6 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/compare/options.h"
 #include "src/config/toml_binding.h"
 #include "tests/support/data.h"
 
@@ -102,10 +101,7 @@ std::string option_table(const std::vector<Field>& fields) {
 /// docs/configuration.md holds a table of every option. Set CNERF_UPDATE_DOCS=1 to write it anew.
 std::string option_tables() {
   Config config;
-  compare::CompareConfig comparison;
-  std::vector<Field> of_compare = fields_of(comparison);
-  std::erase_if(of_compare, [](const Field& field) { return !field.key.starts_with("compare."); });
-  return option_table(fields_of(config)) + "\n## Options of `cnerf compare` alone\n\n" + option_table(of_compare);
+  return option_table(fields_of(config));
 }
 
 TEST(Config, TheDocumentedTableIsTheRealOne) {

@@ -1,4 +1,4 @@
-#include "src/colorizer/torch/builtin_colorizer.h"
+// The colorizer that needs no download: a small network whose weights come with the program.
 
 #include <algorithm>
 #include <cstdlib>
@@ -20,6 +20,8 @@ namespace {
 constexpr const char* kWeightsName = "colorizer.weights";
 constexpr int kPatchesPerPass = 8;  // on a GPU
 
+/// A batch of 8 patches of 128x128 is one pass; larger batches are split. Runs on CUDA where LibTorch has it, else on
+/// the CPU. Answers ab by the decoding stored with the weights; the same input gives the same answer.
 class BuiltinColorizer final : public Colorizer {
  public:
   explicit BuiltinColorizer(const fs::path& file)
@@ -88,13 +90,9 @@ fs::path builtin_weights_file() {
   throw MissingInputError("weights of the built-in colorizer not found; looked at" + looked);
 }
 
-std::unique_ptr<Colorizer> load_builtin_colorizer(const fs::path& weights) {
-  return std::make_unique<BuiltinColorizer>(weights);
-}
-
 std::unique_ptr<Colorizer> make_builtin_colorizer(const ColorizerRequest& request) {
-  return load_builtin_colorizer(request.argument.empty() ? builtin_weights_file()
-                                                         : find_spec_file(request.argument, request));
+  return std::make_unique<BuiltinColorizer>(request.argument.empty() ? builtin_weights_file()
+                                                                     : find_spec_file(request.argument, request));
 }
 
 }  // namespace cnerf

@@ -27,4 +27,9 @@ void save_colorizer_weights(const std::filesystem::path& file, const ColorizerNe
 /// @throws InputError         another format or version, a wrong checksum, parameters of another network.
 [[nodiscard]] ColorizerWeights load_colorizer_weights(const std::filesystem::path& file);
 
+/// Where the program's own weights lie: $CNERF_COLORIZER_WEIGHTS, beside the installed program in `../share/cnerf/`, or
+/// in the source tree it was built from.
+/// @throws MissingInputError  naming the places it looked at.
+[[nodiscard]] std::filesystem::path builtin_weights_file();
+
 }  // namespace cnerf

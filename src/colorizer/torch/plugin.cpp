@@ -2,7 +2,7 @@
 
 #include <torch/version.h>
 
-#include "src/colorizer/torch_plugin.h"
+#include "src/colorizer/kinds.h"
 
 extern "C" __attribute__((visibility("default"))) const cnerf::TorchColorizers* cnerf_torch_colorizers() {
   static const cnerf::TorchColorizers colorizers{cnerf::make_builtin_colorizer, cnerf::make_reference_colorizer,

@@ -1,7 +1,5 @@
 // Fitted weights are kept in the cache folder, so that a resumed run asks the very network the first one fitted.
 
-#include "src/colorizer/torch/reference_colorizer.h"
-
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -10,9 +8,9 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/colorizer/kinds.h"
-#include "src/colorizer/torch/builtin_colorizer.h"
+#include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer/torch/reference_images.h"
+#include "src/colorizer/torch/reference_network.h"
 
 namespace cnerf {
 namespace {
@@ -49,15 +47,11 @@ std::vector<fs::path> reference_files(const ColorizerRequest& request) {
   return files;
 }
 
-std::string hash_of(const std::string& text) {
-  return sha256(std::as_bytes(std::span(text)));
-}
-
 /// All that decides the weights: the photographs' bytes, in their order, the recipe and the seed.
 std::string cache_key(const std::vector<fs::path>& files, const ReferenceRecipe& recipe, std::uint64_t seed) {
   std::string text = recipe.text() + "; seed " + std::to_string(seed);
   for (const fs::path& file : files) text += "; " + sha256(read_binary_file(file));
-  return hash_of(text).substr(0, 16);
+  return sha256(std::as_bytes(std::span(text))).substr(0, 16);
 }
 
 constexpr std::array<char, 8> kWeightsMagic{'C', 'N', 'R', 'E', 'F', 'N', 'E', '1'};

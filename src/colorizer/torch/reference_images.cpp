@@ -111,6 +111,14 @@ void distort_lightness(cv::Mat& lightness, const PatchDistortion& distortion, Se
   }
 }
 
+/// Mean |ab|: how far grey is from it.
+double mean_chroma(const LabImage& image) {
+  double sum = 0;
+  const std::size_t pixels = image.lab.size() / 3;
+  for (std::size_t i = 0; i < pixels; ++i) sum += std::hypot(image.lab[3 * i + 1], image.lab[3 * i + 2]);
+  return sum / double(std::max<std::size_t>(pixels, 1));
+}
+
 }  // namespace
 
 ReferenceImage load_reference_image(const std::filesystem::path& file) {
@@ -119,12 +127,6 @@ ReferenceImage load_reference_image(const std::filesystem::path& file) {
     throw InputError(file, "", "a reference must be a colour photograph; this one is grey");
   }
   return image;
-}
-
-ReferenceImage make_reference_image(int width, int height, std::span<const float> linear_rgb) {
-  CNERF_CHECK(width > 0 && height > 0, "empty image");
-  CNERF_CHECK_EQ(linear_rgb.size(), std::size_t(width) * std::size_t(height) * 3);
-  return pyramid_of(cv::Mat(height, width, CV_32FC3, const_cast<float*>(linear_rgb.data())).clone());
 }
 
 void sample_reference_patch(std::span<const ReferenceImage> images, const PatchDistortion& distortion, int size,
@@ -144,13 +146,6 @@ void sample_reference_patch(std::span<const ReferenceImage> images, const PatchD
                        cv::Mat(size, size, CV_32F, ab.data() + pixels)};
   cv::split(patch, planes);
   distort_lightness(planes[0], distortion, rng);
-}
-
-double mean_chroma(const LabImage& image) {
-  double sum = 0;
-  const std::size_t pixels = image.lab.size() / 3;
-  for (std::size_t i = 0; i < pixels; ++i) sum += std::hypot(image.lab[3 * i + 1], image.lab[3 * i + 2]);
-  return sum / double(std::max<std::size_t>(pixels, 1));
 }
 
 }  // namespace cnerf

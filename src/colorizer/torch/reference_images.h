@@ -26,8 +26,6 @@ inline constexpr int kReferenceShortSide = 640;
 
 /// @throws MissingInputError, InputError  also when the photograph is monochrome.
 [[nodiscard]] ReferenceImage load_reference_image(const std::filesystem::path& file);
-/// From linear Rec.709, [H, W, 3] interleaved in [0, 1].  @throws ContractError  on an empty image.
-[[nodiscard]] ReferenceImage make_reference_image(int width, int height, std::span<const float> linear_rgb);
 
 /// How far a training patch may be from the photograph.
 struct PatchDistortion {
@@ -44,8 +42,5 @@ struct PatchDistortion {
 /// Writes one patch of a random photograph: `lightness` [size, size] in L*, `ab` [2, size, size].
 void sample_reference_patch(std::span<const ReferenceImage> images, const PatchDistortion& distortion, int size,
                             SequentialRng& rng, std::span<float> lightness, std::span<float> ab);
-
-/// Mean |ab| of a photograph: how far grey is from it.
-[[nodiscard]] double mean_chroma(const LabImage& image);
 
 }  // namespace cnerf

@@ -46,9 +46,9 @@ struct Guidance {
 
 /// U-Net from lightness at full size to `outputs` channels at half size.
 struct UNetImpl : nn::Module {
-  UNetImpl(const ReferenceRecipe& recipe, int outputs) : recipe_(recipe) {
+  UNetImpl(const ReferenceRecipe& recipe, int outputs) {
     const auto& c = recipe.channels;
-    int in = recipe.local_statistics ? 5 : 1;
+    int in = 5;  // of features()
     for (std::size_t level = 0; level < c.size(); ++level) {
       down.push_back(register_module("down" + std::to_string(level), Block(in, c[level], 2)));
       encode.push_back(register_module("encode" + std::to_string(level), Block(c[level], c[level], 1)));
@@ -94,9 +94,8 @@ struct UNetImpl : nn::Module {
   }
 
   /// Lightness, what stands out of its surroundings at two scales, and how busy those are.
-  [[nodiscard]] Tensor features(const Tensor& lightness) const {
+  [[nodiscard]] static Tensor features(const Tensor& lightness) {
     const Tensor level = (lightness - 50) / 50;
-    if (!recipe_.local_statistics) return level;
     std::vector<Tensor> all{level};
     for (const int reach : {3, 10}) {
       const auto box = [reach = reach](const Tensor& x) {
@@ -118,9 +117,6 @@ struct UNetImpl : nn::Module {
   nn::Conv2d global{nullptr};
   nn::Conv2d head{nullptr};
   nn::Conv2d guide_semantic{nullptr}, guide_ab{nullptr};  // empty without guidance
-
- private:
-  ReferenceRecipe recipe_;
 };
 TORCH_MODULE(UNet);
 
@@ -146,7 +142,7 @@ void initialise(UNet& net, std::uint64_t seed) {
   }
 }
 
-/// The bins that occur in the photographs: the classes of a network that classifies.
+/// The bins that occur in the photographs: the network's classes.
 std::vector<int> bins_in(std::span<const ReferenceImage> images) {
   std::vector<std::size_t> count(kAbBinCount, 0);
   std::size_t pixels = 0;
@@ -200,14 +196,13 @@ class LabelTable {
 
 std::string ReferenceRecipe::text() const {
   std::ostringstream text;
-  text << "reference network 3; channels";
+  text << "reference network 4; channels";
   for (int c : channels) text << ' ' << c;
   text << "; patch " << patch_size << "; steps " << steps << "; batch " << batch << '/' << shards << "; rate "
-       << learning_rate << "; decay " << weight_decay << "; classify " << classify << ' ' << temperature
-       << "; statistics " << local_statistics << "; share " << distortion.share_min << ' ' << distortion.share_max
-       << "; rotation " << distortion.rotation << "; stretch " << distortion.stretch << "; flip " << distortion.flip
-       << "; tone " << distortion.log_gamma << ' ' << distortion.contrast << "; blur " << distortion.blur << "; noise "
-       << distortion.noise;
+       << learning_rate << "; decay " << weight_decay << "; share " << distortion.share_min << ' '
+       << distortion.share_max << "; rotation " << distortion.rotation << "; stretch " << distortion.stretch
+       << "; flip " << distortion.flip << "; tone " << distortion.log_gamma << ' ' << distortion.contrast << "; blur "
+       << distortion.blur << "; noise " << distortion.noise;
   if (!builtin.empty()) text << "; on " << sha256(read_binary_file(builtin));
   return text.str();
 }
@@ -215,9 +210,8 @@ std::string ReferenceRecipe::text() const {
 struct ReferenceNetwork::Parts {
   ReferenceRecipe recipe;
   std::uint64_t seed = 0;
-  std::vector<int> bins;               // classes; empty when it regresses
-  std::unique_ptr<LabelTable> labels;  // likewise
-  Tensor centres;                      // [2, classes, 1, 1]
+  std::unique_ptr<LabelTable> labels;
+  Tensor centres;  // [2, classes, 1, 1]
   UNet net{nullptr};
   std::optional<ColorizerWeights> builtin;
 
@@ -227,24 +221,13 @@ struct ReferenceNetwork::Parts {
     const ColorizerFeatures features = ColorizerNet(builtin->network)->features(lightness);
     return {features.semantic, decode_ab(features.logits, builtin->decoding) / kAbScale};
   }
-  [[nodiscard]] Tensor decode(const Tensor& out) const {
-    if (!recipe.classify) return out * kAbScale;
-    const Tensor p = torch::softmax(out / recipe.temperature, 1);
-    return torch::conv2d(p, centres);
-  }
-  [[nodiscard]] Tensor loss(const Tensor& out, const Tensor& ab) const {
-    return recipe.classify ? class_loss(out, ab) : distance_loss(out, ab);
-  }
-  /// Mean ab distance, smooth below 1: what the fit is measured by, and robust, so that colours stay vivid.
-  [[nodiscard]] Tensor distance_loss(const Tensor& out, const Tensor& ab) const {
-    return ((out * kAbScale - ab).square().sum(1) + 1).sqrt().mean() / kAbScale;
-  }
-  [[nodiscard]] Tensor class_loss(const Tensor& out, const Tensor& ab) const;
+  [[nodiscard]] Tensor decode(const Tensor& out) const { return torch::conv2d(torch::softmax(out, 1), centres); }
+  [[nodiscard]] Tensor loss(const Tensor& out, const Tensor& ab) const;
   [[nodiscard]] std::vector<Tensor> shard_gradients(std::span<const ReferenceImage> images, int step, int shard,
                                                     double* loss) const;
 };
 
-Tensor ReferenceNetwork::Parts::class_loss(const Tensor& out, const Tensor& ab) const {
+Tensor ReferenceNetwork::Parts::loss(const Tensor& out, const Tensor& ab) const {
   const int64_t pixels = ab.size(2) * ab.size(3), batch = ab.size(0);
   Tensor index = torch::empty({batch, kSoftLabelBins, ab.size(2), ab.size(3)}, torch::kInt64);
   Tensor weight = torch::empty({batch, kSoftLabelBins, ab.size(2), ab.size(3)});
@@ -287,18 +270,16 @@ ReferenceNetwork::ReferenceNetwork(const ReferenceRecipe& recipe, std::span<cons
   CNERF_CHECK_EQ(recipe.batch % recipe.shards, 0);
   parts_->recipe = recipe;
   parts_->seed = seed;
-  if (recipe.classify) {
-    parts_->bins = bins_in(images);
-    std::vector<int> class_of(kAbBinCount, -1);
-    parts_->centres = torch::empty({2, int64_t(parts_->bins.size()), 1, 1});
-    for (std::size_t i = 0; i < parts_->bins.size(); ++i) {
-      const Ab centre = ab_bin_centres()[std::size_t(parts_->bins[i])];
-      class_of[std::size_t(parts_->bins[i])] = int(i);
-      parts_->centres[0][int64_t(i)] = centre.a;
-      parts_->centres[1][int64_t(i)] = centre.b;
-    }
-    parts_->labels = std::make_unique<LabelTable>(class_of);
+  const std::vector<int> bins = bins_in(images);
+  std::vector<int> class_of(kAbBinCount, -1);
+  parts_->centres = torch::empty({2, int64_t(bins.size()), 1, 1});
+  for (std::size_t i = 0; i < bins.size(); ++i) {
+    const Ab centre = ab_bin_centres()[std::size_t(bins[i])];
+    class_of[std::size_t(bins[i])] = int(i);
+    parts_->centres[0][int64_t(i)] = centre.a;
+    parts_->centres[1][int64_t(i)] = centre.b;
   }
+  parts_->labels = std::make_unique<LabelTable>(class_of);
   if (!recipe.builtin.empty()) {
     parts_->builtin = load_colorizer_weights(recipe.builtin);
     // Once here, instead of in every convolution of every step.
@@ -307,7 +288,7 @@ ReferenceNetwork::ReferenceNetwork(const ReferenceRecipe& recipe, std::span<cons
       if (parameter.dim() == 4) parameter.set_data(parameter.contiguous(at::MemoryFormat::ChannelsLast));
     }
   }
-  parts_->net = UNet(recipe, recipe.classify ? int(parts_->bins.size()) : 2);
+  parts_->net = UNet(recipe, int(bins.size()));
   initialise(parts_->net, seed);
 }
 
@@ -350,7 +331,7 @@ void ReferenceNetwork::fit(std::span<const ReferenceImage> images, const Progres
   }
 }
 
-std::vector<float> ReferenceNetwork::colorize(const LightnessBatch& patches, bool mirror) const {
+std::vector<float> ReferenceNetwork::colorize(const LightnessBatch& patches) const {
   const SingleThreadedOps single;
   const int64_t height = patches.height, width = patches.width, pixels = height * width;
   const int64_t multiple =
@@ -363,10 +344,10 @@ std::vector<float> ReferenceNetwork::colorize(const LightnessBatch& patches, boo
     Tensor lightness =
         torch::from_blob(const_cast<float*>(patches.lightness.data()) + i * std::size_t(pixels), {1, 1, height, width});
     lightness = torch::replication_pad2d(lightness, {0, rounded(width) - width, 0, rounded(height) - height});
-    if (mirror) lightness = torch::cat({lightness, lightness.flip({3})});
+    lightness = torch::cat({lightness, lightness.flip({3})});
     UNet net(parts_->net);
     Tensor ab = parts_->decode(net->forward(lightness, parts_->guidance(lightness)));
-    if (mirror) ab = (ab.slice(0, 0, 1) + ab.slice(0, 1, 2).flip({3})) / 2;
+    ab = (ab.slice(0, 0, 1) + ab.slice(0, 1, 2).flip({3})) / 2;
     ab = torch::upsample_bilinear2d(ab, {rounded(height), rounded(width)}, false);
     ab = ab.slice(2, 0, height).slice(3, 0, width).contiguous();
     std::copy_n(ab.data_ptr<float>(), 2 * pixels, answer.data() + i * 2 * std::size_t(pixels));

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "src/base/progress.h"
-#include "src/colorizer/colorizer.h"
+#include "src/colorizer/kinds.h"
 #include "src/colorizer/torch/reference_images.h"
 
 namespace cnerf {
@@ -25,9 +25,6 @@ struct ReferenceRecipe {
   int shards = 4;  ///< a batch's fixed parts; each is one task, so that results do not depend on the threads
   double learning_rate = 4e-3;
   double weight_decay = 1e-2;
-  bool classify = true;    ///< soft labels over the photographs' bins, instead of ab itself
-  double temperature = 1;  ///< of the annealed mean, when it classifies
-  bool local_statistics = true;
   /// Weights of the built-in network; empty = none. It is frozen, and the network fitted here reads what it makes of
   /// the picture: its inner features and its colours (ladder side-tuning, Sung et al. 2022). These paths start at zero,
   /// so that the photographs decide how much of it is used.
@@ -49,8 +46,8 @@ class ReferenceNetwork {
   /// @throws Interrupted  on Ctrl-C.
   void fit(std::span<const ReferenceImage> images, const ProgressSink& progress);
 
-  /// ab [B, 2, H, W] of lightness patches of any size; averages over the mirrored patch when `mirror`.
-  [[nodiscard]] std::vector<float> colorize(const LightnessBatch& patches, bool mirror = true) const;
+  /// ab [B, 2, H, W] of lightness patches of any size: the mean of the answers about a patch and its mirror image.
+  [[nodiscard]] std::vector<float> colorize(const LightnessBatch& patches) const;
 
   /// All weights, in a fixed order, and back.  @throws ContractError  on another count.
   [[nodiscard]] std::vector<float> weights() const;
@@ -60,5 +57,12 @@ class ReferenceNetwork {
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };
+
+/// The colorizer of a network fitted to the images of the request's argument, or of the weights that an earlier fit to
+/// the same images with the same recipe and seed left in the request's cache folder.
+/// @throws UsageError, MissingInputError, InputError  see make_colorizer.
+/// @throws Interrupted  on Ctrl-C; nothing is kept of the fit.
+[[nodiscard]] std::unique_ptr<Colorizer> fit_reference_colorizer(const ColorizerRequest& request,
+                                                                 const ReferenceRecipe& recipe);
 
 }  // namespace cnerf

@@ -35,27 +35,4 @@ struct PositionalRays {
 [[nodiscard]] std::unique_ptr<Engines> positional_engines(const PositionalRays& rays,
                                                           const Engines& others = cpu_engines());
 
-/// Engines of which the distributions of colours come from elsewhere.
-class MixedEngines final : public Engines {
- public:
-  MixedEngines(std::shared_ptr<const Engines> usual, std::shared_ptr<const Engines> color_bins)
-      : usual_(std::move(usual)), color_bins_(std::move(color_bins)) {}
-  [[nodiscard]] Device device() const override { return usual_->device(); }
-  [[nodiscard]] std::string description() const override { return usual_->description(); }
-  [[nodiscard]] std::unique_ptr<LuminanceEngine> make_luminance(const LuminanceEngineOptions& options) const override {
-    return usual_->make_luminance(options);
-  }
-  [[nodiscard]] std::unique_ptr<ColorBinEngine> make_color_bins(const HashGridOptions& grid,
-                                                                std::uint64_t seed) const override {
-    return color_bins_->make_color_bins(grid, seed);
-  }
-  [[nodiscard]] std::unique_ptr<ColorFieldEngine> make_color_field(const HashGridOptions& grid,
-                                                                   std::uint64_t seed) const override {
-    return usual_->make_color_field(grid, seed);
-  }
-
- private:
-  std::shared_ptr<const Engines> usual_, color_bins_;
-};
-
 }  // namespace cnerf::compare

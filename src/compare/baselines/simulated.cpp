@@ -1,12 +1,10 @@
 #include "src/compare/baselines/simulated.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
-#include <sstream>
 
 #include "src/base/error.h"
 #include "src/base/parallel.h"
@@ -23,39 +21,6 @@ constexpr Ab kBrown = {6, 14};              // and what is added to it
 constexpr float kCastChroma = 25;           // of an outlier's colour cast
 constexpr float kBiasPeriod = 2.0f / 3;     // of the content-locked bias, over the hue circle and the range of L*
 constexpr double kDegree = std::numbers::pi / 180;
-
-/// Reads one "key=value" into the options.
-class SettingReader {
- public:
-  SettingReader(const std::string& setting, const std::string& spec) : spec_(spec) {
-    const std::size_t equals = setting.find('=');
-    key_ = setting.substr(0, equals);
-    value_ = equals == std::string::npos ? "" : setting.substr(equals + 1);
-  }
-
-  template <typename Number>
-  void operator()(const char* name, Number& target, Range range, const char* /*help*/) {
-    known_ += (known_.empty() ? "" : ", ") + std::string(name);
-    if (key_ != name) return;
-    found_ = true;
-    const char* end = value_.data() + value_.size();
-    const auto [stop, problem] = std::from_chars(value_.data(), end, target);
-    if (problem != std::errc() || stop != end || !(target >= range.min && target <= range.max)) {
-      std::ostringstream message;
-      message << "colorizer \"" << spec_ << "\": " << name << ": expected a number from " << range.min << " to "
-              << range.max << ", got '" << value_ << "'";
-      throw UsageError(message.str());
-    }
-  }
-
-  void check_found() const {
-    if (!found_) throw UsageError("colorizer \"" + spec_ + "\": '" + key_ + "' is none of " + known_);
-  }
-
- private:
-  std::string spec_, key_, value_, known_;
-  bool found_ = false;
-};
 
 /// What one answer is disturbed by, apart from the bias.
 struct Disturbance {
@@ -146,7 +111,7 @@ class SimulatedColorizer final : public Colorizer {
     return answer;
   }
 
-  [[nodiscard]] std::string name() const override { return "simulated:" + to_text(options_); }
+  [[nodiscard]] std::string name() const override { return "simulated"; }
 
  private:
   void colorize_one(const LightnessBatch& patches, const PatchOrigin& origin, std::span<const float> lightness,
@@ -179,25 +144,6 @@ class SimulatedColorizer final : public Colorizer {
 };
 
 }  // namespace
-
-SimulationOptions parse_simulation(const std::string& argument) {
-  SimulationOptions options;
-  std::istringstream settings(argument);
-  for (std::string setting; std::getline(settings, setting, ',');) {
-    SettingReader reader(setting, "simulated:" + argument);
-    options.visit(reader);
-    reader.check_found();
-  }
-  return options;
-}
-
-std::string to_text(SimulationOptions options) {
-  std::ostringstream text;
-  options.visit([&](const char* name, const auto& value, const Range&, const char*) {
-    text << (text.tellp() > 0 ? "," : "") << name << '=' << value;
-  });
-  return text.str();
-}
 
 std::unique_ptr<Colorizer> make_simulated_colorizer(const Capture& capture, const SimulationOptions& options) {
   return std::make_unique<SimulatedColorizer>(capture, options);

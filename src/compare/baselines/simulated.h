@@ -4,9 +4,7 @@
 /// colours cannot reach an ordinary training.
 
 #include <memory>
-#include <string>
 
-#include "src/base/options.h"
 #include "src/capture/capture.h"
 #include "src/colorizer/colorizer.h"
 
@@ -21,23 +19,7 @@ struct SimulationOptions {
   double bias = 10;         ///< degrees; hues are off by up to this as a function of the content, in every answer alike
   double outliers = 0.15;   ///< share of answers that are wrong altogether: hues turned by 90 to 270 degrees and a cast
   int seed = 1;
-
-  template <typename Visitor>
-  void visit(Visitor&& v) {
-    v("hue", hue, Range{0, 180}, "degrees by which an answer's hues turn at most");
-    v("desaturate", desaturate, Range{0, 1}, "share by which an answer's chroma shrinks at most");
-    v("modes", modes, Range{0, 1}, "share of answers that are washed out and brownish");
-    v("bias", bias, Range{0, 180}, "degrees by which hues are always off, as a function of the content");
-    v("outliers", outliers, Range{0, 1}, "share of answers of wrong colours");
-    v("seed", seed, Range{0, 1e9}, "of all draws");
-  }
 };
-
-/// "hue=25,outliers=0.15": differences from the defaults; empty = the defaults.
-/// @throws UsageError  naming the key and what is legal.
-[[nodiscard]] SimulationOptions parse_simulation(const std::string& argument);
-/// All values, "hue=25,desaturate=0.2,…".
-[[nodiscard]] std::string to_text(SimulationOptions options);
 
 /// Without any disturbance: the true colours as an answer, the upper bound of every method.
 [[nodiscard]] constexpr SimulationOptions oracle_simulation() {
@@ -50,5 +32,6 @@ struct SimulationOptions {
 [[nodiscard]] std::unique_ptr<Colorizer> make_simulated_colorizer(const Capture& capture,
                                                                   const SimulationOptions& options);
 inline constexpr int kTruthSide = 384;
+inline constexpr const char* kSimulated = "simulated";  ///< its spec, of `cnerf compare` alone
 
 }  // namespace cnerf::compare

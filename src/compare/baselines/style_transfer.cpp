@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/error.h"
@@ -127,17 +126,17 @@ void show(const ColorModel& model, StyledView& view) {
 
 }  // namespace
 
-StyleReport transfer_style(const StyleJob& job, const Engines& engines, Observer& observer) {
+double transfer_style(const StyleJob& job, const Engines& engines, Observer& observer) {
   const Stopwatch watch;
   std::vector<StyledView> views = styled_views(job.capture, LuminanceModel::load(job.stage1, engines), observer);
   ColorModel model = ColorModel::create(job.options, engines);
   model.pixel_colors = PixelColors::kField;
-  model.colorizer = "style:" + job.loss.network();
+  model.colorizer = "style:AlexNet";
   model.stage1_sha256 = sha256(read_binary_file(job.stage1));
 
   const MatchedColors matched(job.reference);
   const int matching = int(kMatchingShare * job.steps);
-  std::vector<double> losses;
+  double loss = 0;
   for (int step = 0; step < job.steps; ++step) {
     if (observer.is_cancelled()) throw Interrupted("style transfer stopped; nothing was written");
     StyledView& view = views[std::size_t(step) % views.size()];
@@ -147,25 +146,18 @@ StyleReport transfer_style(const StyleJob& job, const Engines& engines, Observer
     } else {
       show(model, view);
       std::vector<float> gradient(view.picture.ab.size());
-      losses.push_back(job.loss(view.picture, gradient));
+      loss = job.loss(view.picture, gradient);
       targets = targets_of(view.picture, gradient);
     }
     const double fraction = std::clamp(2.0 * step / job.steps - 1.0, 0.0, 1.0);
     const double from = job.options.learning_rate, to = job.options.final_learning_rate;
     (void)model.chromaticity->step(view.pixels, targets, view.view.opacity, AbLoss::kSquared,
                                    float(from * std::pow(to / from, fraction)));
-    observer.report_progress(
-        {"style transfer", double(step + 1) / job.steps, {{"loss", losses.empty() ? 0 : losses.back()}}});
+    observer.report_progress({"style transfer", double(step + 1) / job.steps, {{"loss", loss}}});
   }
-  StyleReport report;
-  const auto some = std::ptrdiff_t(std::min(views.size(), losses.size()));
-  if (some > 0) {
-    report.first_loss = std::accumulate(losses.begin(), losses.begin() + some, 0.0) / double(some);
-    report.last_loss = std::accumulate(losses.end() - some, losses.end(), 0.0) / double(some);
-  }
-  report.seconds = model.report.seconds = watch.seconds();
+  model.report.seconds = watch.seconds();
   model.save(job.take);
-  return report;
+  return model.report.seconds;
 }
 
 LabPicture colorized_view(const Capture& capture, const std::filesystem::path& stage1_snapshot, Colorizer& colorizer,

@@ -16,11 +16,6 @@
 
 namespace cnerf::compare {
 
-struct StyleReport {
-  double seconds = 0;
-  double first_loss = 0, last_loss = 0;  ///< means over as many steps as there are views, at the beginning and the end
-};
-
 /// What is transferred to what.
 struct StyleJob {
   const Capture& capture;
@@ -32,8 +27,9 @@ struct StyleJob {
   std::filesystem::path take;    ///< snapshot that the result goes to
 };
 /// Trains a photometric colour field on the style loss.
+/// @return  seconds
 /// @throws Interrupted  without leaving anything; SnapshotError; UsageError for views that are too small.
-StyleReport transfer_style(const StyleJob& job, const Engines& engines, Observer& observer);
+double transfer_style(const StyleJob& job, const Engines& engines, Observer& observer);
 
 /// A training view as the colorizer colours it: the middle one of the list.
 [[nodiscard]] LabPicture colorized_view(const Capture& capture, const std::filesystem::path& stage1_snapshot,

@@ -7,11 +7,11 @@ namespace {
 
 constexpr float kNearOfSurroundings = 0.02f;  // unit lengths, where a capture has no near bound
 
-}  // namespace
-
 const TorchBaselines& torch_baselines() {
   return plugin_table<TorchBaselines>("compare_torch", "cnerf_torch_baselines");
 }
+
+}  // namespace
 
 PositionalRays positional_rays(const Capture& capture, const SceneFrame& frame) {
   if (capture.depth_range) return {float(0.9 * capture.depth_range->near * frame.unit_per_world), true};
@@ -20,20 +20,11 @@ PositionalRays positional_rays(const Capture& capture, const SceneFrame& frame) 
 }
 
 std::unique_ptr<Engines> positional_engines(const PositionalRays& rays, const Engines& others) {
-  return torch_baselines().positional_engines(rays, others);
+  return torch_baselines().positional(rays, others);
 }
 
-StyleLoss::StyleLoss(const std::filesystem::path& network, const LabPicture& reference)
-    : network_(torch_baselines().style_network(network, reference)) {}
-
-StyleLoss::~StyleLoss() = default;
-
-const std::string& StyleLoss::network() const {
-  return network_->name();
-}
-
-double StyleLoss::operator()(const LabPicture& picture, std::span<float> gradient) const {
-  return network_->loss(picture, gradient);
+std::unique_ptr<StyleLoss> make_style_loss(const std::filesystem::path& weights, const LabPicture& reference) {
+  return torch_baselines().style(weights, reference);
 }
 
 }  // namespace cnerf::compare

@@ -1,4 +1,4 @@
-#include "src/evaluate/tensor_file.h"
+#include "src/base/tensor_file.h"
 
 #include <cstring>
 #include <sstream>

@@ -1,13 +1,12 @@
 // ARF's style loss by LibTorch: see style_loss.h.
 
-#include <torch/script.h>
 #include <torch/torch.h>
 
 #include "src/base/check.h"
 #include "src/base/error.h"
-#include "src/compare/baselines/torch/factories.h"
+#include "src/base/tensor_file.h"
 #include "src/compare/baselines/torch/style_math.h"
-#include "src/evaluate/tensor_file.h"
+#include "src/compare/baselines/torch_plugin.h"
 
 namespace cnerf::compare {
 namespace fs = std::filesystem;
@@ -51,69 +50,30 @@ class AlexNet {
   torch::Tensor shift_, scale_;
 };
 
-std::vector<torch::Tensor> tensors_of(const torch::IValue& value, const fs::path& file) {
-  if (value.isTensor()) return {value.toTensor()};
-  if (value.isTensorList()) return value.toTensorVector();
-  std::vector<torch::Tensor> tensors;
-  if (value.isTuple()) {
-    for (const torch::IValue& element : value.toTupleRef().elements()) {
-      if (element.isTensor()) tensors.push_back(element.toTensor());
-    }
+/// AlexNet's weights.  @throws MissingInputError, InputError
+TensorFile alexnet_file(const fs::path& weights) {
+  if (!fs::exists(weights)) throw MissingInputError(weights.string() + ": no such file");
+  TensorFile file(weights);
+  if (!file.has("conv1.weight")) {
+    throw InputError(weights, "conv1.weight", "no such tensor; of the LPIPS networks, style transfer takes AlexNet");
   }
-  if (tensors.empty()) throw InputError(file, "forward", "expected a tensor or a tuple of tensors as features");
-  return tensors;
+  return file;
 }
 
-/// The user's own network.
-class ScriptedNetwork {
+class TorchStyleLoss final : public StyleLoss {
  public:
-  explicit ScriptedNetwork(const fs::path& file) : file_(file) {
-    try {
-      module_ = torch::jit::load(file.string(), device());
-      module_.eval();
-    } catch (const c10::Error& problem) {
-      throw InputError(file, "module", std::string("is no TorchScript module: ") + problem.what_without_backtrace());
-    }
-  }
-  [[nodiscard]] std::vector<torch::Tensor> operator()(const torch::Tensor& srgb) const {
-    return tensors_of(torch::jit::Module(module_).forward({srgb}), file_);
-  }
-
- private:
-  fs::path file_;
-  torch::jit::Module module_;
-};
-
-class TorchStyleNetwork final : public StyleNetwork {
- public:
-  TorchStyleNetwork(const fs::path& network, const LabPicture& reference) {
-    if (!fs::exists(network)) throw MissingInputError(network.string() + ": no such file");
-    if (network.extension() == ".bin") {
-      const TensorFile file(network);
-      if (!file.has("conv1.weight")) {
-        throw InputError(network, "conv1.weight",
-                         "no such tensor; of the LPIPS networks, style transfer takes AlexNet");
-      }
-      name_ = "AlexNet";
-      features_ = AlexNet(file);
-    } else {
-      name_ = network.filename().string();
-      features_ = ScriptedNetwork(network);
-    }
-    if (std::min(reference.width, reference.height) < StyleLoss::kLeastSide) {
-      throw InputError(network, "reference", "style transfer needs a reference of at least 32 x 32 pixels");
+  TorchStyleLoss(const fs::path& weights, const LabPicture& reference) : features_(alexnet_file(weights)) {
+    if (std::min(reference.width, reference.height) < kLeastSide) {
+      throw InputError(weights, "reference", "style transfer needs a reference of at least 32 x 32 pixels");
     }
     const torch::NoGradGuard no_gradient;
     reference_ = vectors(style::srgb(image(reference.lightness, {reference.height, reference.width}),
                                      image(reference.ab, {2, reference.height, reference.width})));
   }
 
-  [[nodiscard]] const std::string& name() const override { return name_; }
-
-  [[nodiscard]] double loss(const LabPicture& picture, std::span<float> gradient) const override {
+  [[nodiscard]] double operator()(const LabPicture& picture, std::span<float> gradient) const override {
     CNERF_CHECK_EQ(gradient.size(), picture.ab.size());
-    CNERF_CHECK(std::min(picture.width, picture.height) >= StyleLoss::kLeastSide,
-                "pictures of at least 32 x 32 pixels");
+    CNERF_CHECK(std::min(picture.width, picture.height) >= kLeastSide, "pictures of at least 32 x 32 pixels");
     torch::Tensor ab = image(picture.ab, {2, picture.height, picture.width}).requires_grad_(true);
     const auto layers = vectors(style::srgb(image(picture.lightness, {picture.height, picture.width}), ab));
     torch::Tensor loss = torch::zeros({}, ab.options().requires_grad(false));
@@ -133,15 +93,14 @@ class TorchStyleNetwork final : public StyleNetwork {
     return all;
   }
 
-  std::string name_;
-  std::function<std::vector<torch::Tensor>(const torch::Tensor&)> features_;
+  AlexNet features_;
   std::vector<torch::Tensor> reference_;  // unit vectors of each layer
 };
 
 }  // namespace
 
-std::unique_ptr<StyleNetwork> make_style_network(const fs::path& network, const LabPicture& reference) {
-  return std::make_unique<TorchStyleNetwork>(network, reference);
+std::unique_ptr<StyleLoss> make_torch_style_loss(const fs::path& weights, const LabPicture& reference) {
+  return std::make_unique<TorchStyleLoss>(weights, reference);
 }
 
 }  // namespace cnerf::compare
