@@ -182,9 +182,8 @@ void BakeFolder::finish() {
   }
   write_manifest(manifest_, folder_);
   for (const std::string& file : former) {
-    const fs::path inside = fs::path(file).lexically_normal();
-    const bool stays = std::ranges::find(manifest_.files, file) != manifest_.files.end();
-    if (!stays && inside.is_relative() && *inside.begin() != "..") fs::remove(folder_ / inside);
+    if (std::ranges::find(manifest_.files, file) != manifest_.files.end()) continue;
+    if (const auto ours = file_below(folder_, file)) fs::remove(*ours);  // a manifest may come from anybody
   }
 }
 

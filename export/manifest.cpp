@@ -1,37 +1,15 @@
 #include "export/manifest.h"
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "export/vec3_json.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/json_record.h"
 
 namespace nlohmann {
-
-template <typename Number>
-struct adl_serializer<cnerf::Vec3<Number>> {
-  template <typename Json>
-  static void to_json(Json& json, const cnerf::Vec3<Number>& v) {
-    json = {v.x, v.y, v.z};
-  }
-  template <typename Json>
-  static void from_json(const Json& json, cnerf::Vec3<Number>& v) {
-    for (int axis = 0; axis < 3; ++axis) json.at(std::size_t(axis)).get_to(v[axis]);
-  }
-};
-
-template <>
-struct adl_serializer<cnerf::Aabbd> {
-  template <typename Json>
-  static void to_json(Json& json, const cnerf::Aabbd& box) {
-    json = {{"min", box.min}, {"max", box.max}};
-  }
-  template <typename Json>
-  static void from_json(const Json& json, cnerf::Aabbd& box) {
-    json.at("min").get_to(box.min);
-    json.at("max").get_to(box.max);
-  }
-};
 
 /// Four rows; applies to column vectors.
 template <>
@@ -197,6 +175,33 @@ struct ManifestRecord {
   }
 };
 
+/// @throws InputError  for a camera that no picture can be rendered for
+void check_camera(const fs::path& file, std::size_t number, const bake::Camera& camera) {
+  constexpr int kLargestSide = 1 << 15;
+  constexpr double kMostPixels = 1 << 28, kLargest = 1e9;
+  const auto refuse = [&](const std::string& field, const std::string& problem) {
+    throw InputError(file, "cameras[" + std::to_string(number) + "]." + field, problem);
+  };
+  const Intrinsics& lens = camera.intrinsics;
+  const auto is_side = [](int side) { return side > 0 && side <= kLargestSide; };
+  if (!is_side(lens.width) || !is_side(lens.height) || double(lens.width) * lens.height > kMostPixels) {
+    refuse("width, height", "expected 1 to 32768 pixels each and at most 2^28, found " + std::to_string(lens.width) +
+                                " x " + std::to_string(lens.height));
+  }
+  const auto is_small = [](double value) { return std::abs(value) <= kLargest; };  // nor NaN
+  if (!is_small(lens.fx) || !is_small(lens.fy) || lens.fx < 1 / kLargest || lens.fy < 1 / kLargest) {
+    refuse("fx, fy", "expected focal lengths of 1e-9 to 1e9 pixels");
+  }
+  if (!is_small(lens.cx) || !is_small(lens.cy)) refuse("cx, cy", "expected at most 1e9 pixels");
+  if (!std::ranges::all_of(lens.distortion, is_small)) refuse("distortion", "expected at most 1e9");
+  const auto& [linear, centre] = camera.world_from_camera;
+  for (const Vec3d& row : {linear.rows[0], linear.rows[1], linear.rows[2], centre}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!std::isfinite(row[axis])) refuse("world_from_camera", "expected finite numbers");
+    }
+  }
+}
+
 }  // namespace
 
 template <typename Self, typename Visitor>
@@ -315,12 +320,54 @@ BakeManifest read_manifest(const fs::path& file) {
   manifest.label.provenance.colorizer = record.color.colorizer;
   manifest.label.provenance.take = record.color.take;
   manifest.frame = record.frame.frame;
-  for (const FileRecord& each : record.files) manifest.files.push_back(each.name);
+  for (const FileRecord& each : record.files) {
+    manifest.files.push_back(each.name);
+    if (!each.sha256.empty()) manifest.states[each.name] = {each.bytes, each.sha256};
+  }
   for (const CameraRecord& each : record.cameras) {
+    check_camera(file, manifest.cameras.size(), each.camera);
     manifest.cameras.push_back(each.camera);
     if (each.plate) manifest.plates[each.camera.name] = *each.plate;
   }
   return std::move(manifest);
+}
+
+std::optional<fs::path> file_below(const fs::path& folder, const std::string& name) {
+  const fs::path inside = fs::path(name).lexically_normal();
+  if (name.empty() || inside.is_absolute() || !inside.has_filename() || *inside.begin() == "..") return std::nullopt;
+  std::error_code failure;
+  const fs::path root = fs::canonical(folder, failure);
+  const fs::path parent = fs::canonical(root / inside.parent_path(), failure);  // resolves links
+  if (failure || std::mismatch(root.begin(), root.end(), parent.begin(), parent.end()).first != root.end()) {
+    return std::nullopt;
+  }
+  fs::path file = parent / inside.filename();
+  if (!fs::is_regular_file(fs::symlink_status(file, failure))) return std::nullopt;
+  return file;
+}
+
+void check_listed_file(const BakeManifest& manifest, const fs::path& folder, const std::string& name) {
+  const fs::path manifest_file = folder / "manifest.json";
+  const auto state = manifest.states.find(name);
+  std::error_code failure;
+  if (std::ranges::find(manifest.files, name) == manifest.files.end()) {
+    throw InputError(manifest_file, "files", "expected " + name + " among them");
+  }
+  if (fs::symlink_status(folder / name, failure).type() == fs::file_type::not_found) {
+    throw MissingInputError((folder / name).string() + ": no such file");
+  }
+  const auto file = file_below(folder, name);
+  if (!file) throw InputError(manifest_file, "files", name + " is no file in this folder");
+  if (state == manifest.states.end()) return;
+  const std::uintmax_t bytes = fs::file_size(*file, failure);
+  if (bytes != state->second.bytes) {
+    throw InputError(*file, "size",
+                     "expected " + std::to_string(state->second.bytes) + " bytes as the manifest says, found " +
+                         std::to_string(bytes));
+  }
+  if (sha256_of_file(*file) != state->second.sha256) {
+    throw InputError(*file, "SHA-256", "is not the manifest's: the file was changed after the bake");
+  }
 }
 
 }  // namespace cnerf::exporting

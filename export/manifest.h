@@ -1,6 +1,7 @@
 #pragma once
 /// manifest.json: what a bake consists of and where it lies. Everything else that reads a bake starts here.
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
@@ -55,6 +56,12 @@ struct ManifestMesh {
 
 struct BakeManifest {
   Label label;
+  /// What a file was when the manifest was written.
+  struct FileState {
+    std::uintmax_t bytes = 0;
+    std::string sha256;
+  };
+  std::map<std::string, FileState> states;  ///< of files, once it is read; earlier versions wrote none
   std::vector<std::string> files;  ///< relative to the manifest; their sizes and SHA-256 are added when writing
   SceneFrame frame;
   std::vector<bake::Camera> cameras;          ///< of the capture
@@ -68,12 +75,24 @@ struct BakeManifest {
 /// @throws MissingInputError  when a listed file is not there.  @throws OutputError.
 std::filesystem::path write_manifest(const BakeManifest& manifest, const std::filesystem::path& folder);
 
-/// Reads it back.  @throws MissingInputError, InputError  naming the field; also for a newer schema.
+/// Reads it back.
+/// @throws MissingInputError, InputError  naming the field; also for a newer schema, and cameras that nothing can be
+///                                        rendered for.
 [[nodiscard]] BakeManifest read_manifest(const std::filesystem::path& file);
 
 /// The parts that the manifest of a web bundle repeats word by word.
 [[nodiscard]] nlohmann::ordered_json camera_json(const bake::Camera& camera);
 [[nodiscard]] nlohmann::ordered_json frame_json(const SceneFrame& frame);
 [[nodiscard]] nlohmann::ordered_json color_json(const bake::Provenance& provenance);
+
+/// A file of a bake, before it is opened.
+/// @throws InputError  unless the manifest lists it, as it is now, and it lies in the folder.  @throws
+/// MissingInputError.
+void check_listed_file(const BakeManifest& manifest, const std::filesystem::path& folder, const std::string& name);
+
+/// The file that a name means below a folder; nothing where the name leads out of it, through links too, or means no
+/// file.
+[[nodiscard]] std::optional<std::filesystem::path> file_below(const std::filesystem::path& folder,
+                                                              const std::string& name);
 
 }  // namespace cnerf::exporting

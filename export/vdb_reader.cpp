@@ -1,197 +1,171 @@
 #include "export/vdb_reader.h"
 
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <csignal>
+#include <tuple>
 
-#include "bake/volume/dilate.h"
+#include "bake/out_of_core/planes.h"
 #include "export/manifest.h"
+#include "export/vdb_answer.h"
+#include "export/vdb_limits.h"
 #include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/base/json_record.h"
+#include "src/base/plugin.h"
+#include "src/base/process.h"
+#include "src/base/progress.h"
 
 namespace cnerf::exporting {
 namespace {
+namespace fs = std::filesystem;
 
-struct OpenedFile {
-  openvdb::GridPtrVec grids;
-  openvdb::MetaMap metadata;
+/// The program that reads a file (vdb_reader_main.cpp), at the other end of a pipe.
+class Reader {
+ public:
+  Reader(const char* what, const fs::path& file)
+      : file_(file),
+        cpu_(limits_of(false, file).cpu),
+        process_("exec " + shell_word(program_part("cnerf-vdb-reader").string()) + " " + what + " " +
+                 shell_word(file.string()) + " 2>/dev/null"),
+        deadline_(std::chrono::steady_clock::now() + 6 * cpu_) {}
+
+  /// The size of the answer.  @throws Error  what it says, where that is an error
+  std::uint64_t begin() {
+    VdbAnswerHeader header;
+    read(std::as_writable_bytes(std::span(&header, 1)));
+    if (header.version != VdbAnswerHeader{}.version) fail("answered in another version's words");
+    if (header.status == 0) return header.bytes;
+    const std::string message = text(header.bytes);
+    if (header.status == int(ExitCode::kMissingInput)) throw MissingInputError(message);
+    throw InputError(message);
+  }
+  void read(std::span<std::byte> bytes) {
+    constexpr std::size_t kPiece = std::size_t(1) << 24;
+    while (!bytes.empty()) {
+      if (interruption_requested()) throw Interrupted("stopped");
+      const std::span<std::byte> piece = bytes.first(std::min(kPiece, bytes.size()));
+      const PipeTrouble trouble = process_.read_all(piece, deadline_);
+      if (trouble == PipeTrouble::kTimedOut) fail_in_time();
+      if (trouble == PipeTrouble::kEnded) {
+        if (process_.process().exit_status(std::chrono::seconds(1)) == 128 + SIGXCPU) fail_in_time();
+        fail(process_.process().fate());
+      }
+      bytes = bytes.subspan(piece.size());
+    }
+  }
+  std::string text(std::uint64_t bytes) {
+    if (bytes > kLongestText) fail("answered too much");
+    std::string said(bytes, ' ');
+    read(std::as_writable_bytes(std::span(said)));
+    return said;
+  }
+  [[noreturn]] void fail(const std::string& what) const {
+    throw InputError(file_.string() + ": damaged, or made to do harm: the program that reads it " + what);
+  }
+
+ private:
+  [[noreturn]] void fail_in_time() const { fail("took longer than " + std::to_string(cpu_.count()) + " s"); }
+
+  fs::path file_;
+  std::chrono::seconds cpu_;
+  PipedProcess process_;
+  PipedProcess::Deadline deadline_;
 };
 
-OpenedFile open_vdb(const std::filesystem::path& path) {
-  if (!std::filesystem::exists(path)) throw MissingInputError(path.string() + ": no such file");
-  openvdb::initialize();
-  try {
-    openvdb::io::File file(path.string());
-    file.open(/*delayLoad=*/false);
-    OpenedFile opened{*file.getGrids(), *file.getMetadata()};
-    file.close();
-    return opened;
-  } catch (const std::exception& failure) {
-    throw InputError(path.string() + ": not a readable OpenVDB file: " + failure.what());
+void check_exists(const fs::path& path) {
+  std::error_code failure;
+  if (!fs::exists(path, failure)) throw MissingInputError(path.string() + ": no such file");
+  if (!fs::is_regular_file(path, failure)) throw InputError(path.string() + ": is no file");
+}
+
+bool is_finite(const Vec3d& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// Which grid holds the value for which a voxel is not valid.
+const char* wrong_grid(const bake::Voxel& v) {
+  if (!std::isfinite(v.sigma) || v.sigma < 0) return "density";
+  if (!std::isfinite(v.luminance)) return "luminance";
+  return std::isfinite(v.a) && std::isfinite(v.b) ? "color" : "lab_a, lab_b";
+}
+
+/// @throws InputError  where a volume cannot be rendered, whatever the reader says
+void check_volume(const fs::path& path, const bake::Volume& volume) {
+  if (!(volume.voxel_size > 0) || !std::isfinite(volume.voxel_size) || !is_finite(volume.origin) ||
+      !is_finite(volume.frame.world_centre) || !std::isfinite(volume.frame.unit_per_world)) {
+    throw InputError(path, "transform", "expected finite numbers and voxels that are larger than nothing");
   }
-}
-
-template <typename Grid>
-typename Grid::Ptr find_grid(const OpenedFile& file, const std::string& name) {
-  for (const auto& grid : file.grids) {
-    if (grid->getName() == name) return openvdb::gridPtrCast<Grid>(grid);
-  }
-  return nullptr;
-}
-
-template <typename T>
-T meta_or(const openvdb::MetaMap& meta, const std::string& name, T fallback) {
-  const auto found = meta.getMetadata<openvdb::TypedMetadata<T>>(name);
-  return found ? found->value() : fallback;
-}
-
-void read_frame(const OpenedFile& file, bake::Volume& volume) {
-  const auto centre = meta_or<openvdb::Vec3d>(file.metadata, "cnerf_world_centre", openvdb::Vec3d(0, 0, 0));
-  const auto resolution = meta_or<openvdb::Vec3i>(file.metadata, "cnerf_resolution", openvdb::Vec3i(0, 0, 0));
-  volume.frame.world_centre = {centre.x(), centre.y(), centre.z()};
-  volume.frame.unit_per_world = meta_or<double>(file.metadata, "cnerf_unit_per_world", 1.0);
-  volume.frame.cascades = meta_or<std::int32_t>(file.metadata, "cnerf_cascades", 1);
-  volume.resolution = {resolution.x(), resolution.y(), resolution.z()};
-}
-
-void read_transform(const std::filesystem::path& path, const OpenedFile& file, const openvdb::GridBase& density,
-                    bake::Volume& volume) {
-  const openvdb::math::Transform& transform = density.transform();
-  if (!transform.isLinear() || !transform.hasUniformScale()) {
-    throw InputError(path, "density", "expected a transform with cubic voxels");
-  }
-  volume.voxel_size = transform.voxelSize().x();
-  const bool centred = meta_or<std::string>(file.metadata, "voxel_origin", "center") == "center";
-  const auto upright = meta_or<openvdb::Mat4d>(file.metadata, "cnerf_world_to_source", openvdb::Mat4d::identity());
-  const auto world = [&](double i, double j, double k) {
-    return upright.transform(transform.indexToWorld(openvdb::Vec3d(i, j, k)));
-  };
-  const openvdb::Vec3d first = world(0, 0, 0);
-  const double h = volume.voxel_size;
-  const openvdb::Vec3d expected[] = {{h, 0, 0}, {0, h, 0}, {0, 0, h}};
-  const openvdb::Vec3d steps[] = {world(1, 0, 0) - first, world(0, 1, 0) - first, world(0, 0, 1) - first};
-  for (int axis = 0; axis < 3; ++axis) {
-    if ((steps[axis] - expected[axis]).length() > 1e-6 * h) {
-      throw InputError(path, "density", "expected voxels along the axes of the poses' frame");
+  if (volume.voxels.empty()) throw InputError(path, "density", "holds no voxels");
+  Vec3i low{volume.voxels[0].i, volume.voxels[0].j, volume.voxels[0].k}, high = low;
+  const bake::Voxel* before = nullptr;
+  for (const bake::Voxel& v : volume.voxels) {
+    const Vec3i at{v.i, v.j, v.k};
+    if (!is_valid(v)) {
+      throw InputError(path, wrong_grid(v),
+                       "expected finite values, and no negative density, found another at voxel " +
+                           std::to_string(v.i) + ", " + std::to_string(v.j) + ", " + std::to_string(v.k));
     }
-  }
-  const double shift = centred ? volume.voxel_size / 2 : 0;
-  volume.origin = {first.x() - shift, first.y() - shift, first.z() - shift};
-}
-
-/// Every active voxel of a grid, those of tiles one by one.
-template <typename Grid>
-void for_each_active(const Grid& grid, const std::function<void(const openvdb::Coord&)>& visit) {
-  for (auto it = grid.cbeginValueOn(); it; ++it) {
-    const openvdb::CoordBBox box = it.getBoundingBox();
-    for (auto at = box.begin(); at; ++at) visit(*at);
-  }
-}
-
-void read_voxels(const OpenedFile& file, const openvdb::FloatGrid& density, bake::Volume& volume) {
-  const auto color = find_grid<openvdb::Vec3SGrid>(file, "color");
-  const auto values = [&](const std::string& name) {
-    const auto grid = find_grid<openvdb::FloatGrid>(file, name);
-    return grid ? grid : openvdb::FloatGrid::create();
-  };
-  const auto a = values("lab_a"), b = values("lab_b"), luminance = values("luminance");
-  const auto of_density = density.getConstAccessor();
-  const auto of_color = (color ? color : openvdb::Vec3SGrid::create())->getConstAccessor();
-  const auto of_a = a->getConstAccessor(), of_b = b->getConstAccessor();
-  const auto of_luminance = luminance->getConstAccessor();
-  const auto scale = float(meta_or<double>(file.metadata, "cnerf_density_scale", 1.0));
-  for_each_active(density, [&](const openvdb::Coord& at) {
-    const openvdb::Vec3s rgb = color ? of_color.getValue(at) : openvdb::Vec3s(0, 0, 0);
-    volume.voxels.push_back({at.x(),
-                             at.y(),
-                             at.z(),
-                             of_density.getValue(at) * scale,
-                             of_luminance.getValue(at),
-                             {rgb.x(), rgb.y(), rgb.z()},
-                             of_a.getValue(at),
-                             of_b.getValue(at)});
-  });
-  sort_voxels(volume.voxels);
-}
-
-std::map<std::string, std::string> text_of(const openvdb::MetaMap& meta) {
-  std::map<std::string, std::string> text;
-  for (auto it = meta.beginMeta(); it != meta.endMeta(); ++it) text[it->first] = it->second->str();
-  return text;
-}
-
-void widen(VdbGridSummary& summary, std::size_t component, double value) {
-  summary.min_value[component] = std::min(summary.min_value[component], value);
-  summary.max_value[component] = std::max(summary.max_value[component], value);
-}
-
-void start_range(VdbGridSummary& summary, std::size_t components) {
-  summary.min_value.assign(components, std::numeric_limits<double>::infinity());
-  summary.max_value.assign(components, -std::numeric_limits<double>::infinity());
-}
-
-void value_range(const openvdb::GridBase& grid, VdbGridSummary& summary) {
-  if (const auto* scalar = dynamic_cast<const openvdb::FloatGrid*>(&grid)) {
-    start_range(summary, 1);
-    for (auto it = scalar->cbeginValueOn(); it; ++it) widen(summary, 0, *it);
-  } else if (const auto* vector = dynamic_cast<const openvdb::Vec3SGrid*>(&grid)) {
-    start_range(summary, 3);
-    for (auto it = vector->cbeginValueOn(); it; ++it) {
-      for (int c = 0; c < 3; ++c) widen(summary, std::size_t(c), (*it)[c]);
+    if (before != nullptr && std::tie(before->i, before->j, before->k) >= std::tie(v.i, v.j, v.k)) {
+      throw InputError(path, "density", "its voxels are out of order");
     }
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], at[axis]);
+      high[axis] = std::max(high[axis], at[axis]);
+    }
+    before = &v;
   }
+  if (!is_legal_box(low, high)) throw InputError(path, "density", "its voxels lie too far apart");
 }
 
-VdbGridSummary summary_of(const openvdb::GridBase& grid) {
-  VdbGridSummary summary;
-  summary.name = grid.getName();
-  summary.type = grid.valueType();
-  summary.grid_class = openvdb::GridBase::gridClassToString(grid.getGridClass());
-  summary.half = grid.saveFloatAsHalf();
-  summary.active_voxels = grid.activeVoxelCount();
-  const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
-  summary.index_min = {box.min().x(), box.min().y(), box.min().z()};
-  summary.index_max = {box.max().x(), box.max().y(), box.max().z()};
-  const openvdb::Vec3d size = grid.voxelSize();
-  summary.voxel_size = {size.x(), size.y(), size.z()};
-  const openvdb::Vec3d low = grid.indexToWorld(box.min()), high = grid.indexToWorld(box.max());
-  summary.world_box = {{low.x(), low.y(), low.z()}, {high.x(), high.y(), high.z()}};
-  value_range(grid, summary);
-  summary.metadata = text_of(grid);
-  return summary;
+/// Reads a file of a bake if it is the one that the manifest lists.
+bake::Volume read_listed(const fs::path& folder, const BakeManifest& manifest, const std::string& name) {
+  check_listed_file(manifest, folder, name);
+  return read_vdb(folder / name);
 }
 
 }  // namespace
 
-bake::Volume read_vdb(const std::filesystem::path& path) {
-  const OpenedFile file = open_vdb(path);
-  const auto density = find_grid<openvdb::FloatGrid>(file, "density");
-  if (!density) throw InputError(path, "density", "expected a float grid of this name");
+bake::Volume read_vdb(const fs::path& path) {
+  check_exists(path);
+  Reader reader("volume", path);
+  const std::uint64_t bytes = reader.begin();
+  if (bytes < sizeof(VdbVolumeHeader) || (bytes - sizeof(VdbVolumeHeader)) % sizeof(bake::Voxel) != 0 ||
+      bytes / sizeof(bake::Voxel) > kMostVoxels) {
+    reader.fail("answered something else");
+  }
   bake::Volume volume;
-  read_frame(file, volume);
-  read_transform(path, file, *density, volume);
-  read_voxels(file, *density, volume);
+  VdbVolumeHeader header;
+  reader.read(std::as_writable_bytes(std::span(&header, 1)));
+  static_cast<VdbVolumeHeader&>(volume) = header;
+  volume.voxels.resize((bytes - sizeof header) / sizeof(bake::Voxel));
+  reader.read(std::as_writable_bytes(std::span(volume.voxels)));
+  check_volume(path, volume);
   return volume;
 }
 
-std::vector<bake::Volume> read_volumes(const std::filesystem::path& bake_folder) {
+std::vector<bake::Volume> read_volumes(const fs::path& bake_folder) {
   const BakeManifest manifest = read_manifest(bake_folder / "manifest.json");
   if (!manifest.volume) {
     throw InputError(bake_folder / "manifest.json", "volume", "this bake has none; bake with --format vdb");
   }
   std::vector<bake::Volume> volumes;
-  for (const ManifestVolume& finer : manifest.finer_volumes) volumes.push_back(read_vdb(bake_folder / finer.file));
-  volumes.push_back(read_vdb(bake_folder / manifest.volume->file));
+  for (const ManifestVolume& finer : manifest.finer_volumes) {
+    volumes.push_back(read_listed(bake_folder, manifest, finer.file));
+  }
+  volumes.push_back(read_listed(bake_folder, manifest, manifest.volume->file));
   return volumes;
 }
 
-VdbSummary summarize_vdb(const std::filesystem::path& path) {
-  const OpenedFile file = open_vdb(path);
-  VdbSummary summary;
-  summary.metadata = text_of(file.metadata);
-  for (const auto& grid : file.grids) summary.grids.push_back(summary_of(*grid));
-  return summary;
+VdbSummary summarize_vdb(const fs::path& path) {
+  check_exists(path);
+  Reader reader("summary", path);
+  const std::string text = reader.text(reader.begin());
+  try {
+    return from_json<VdbSummary>(nlohmann::ordered_json::parse(text), path);
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(path.string() + ": cannot be described: " + error.what());
+  }
 }
 
 }  // namespace cnerf::exporting

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 
 #include "src/base/parallel.h"
 
@@ -194,6 +195,18 @@ void put_plane(std::span<const DenseVoxel> voxels, int plane, BrickGrid<float>& 
   const Vec3i counts = sigma.brick_counts();
   const std::size_t first = std::size_t(plane) * counts.y * counts.z;
   for (const DenseVoxel& voxel : voxels) sigma.make_brick(first + voxel.brick)[voxel.offset] = voxel.sigma;
+}
+
+bool is_plane_of(const Plan& plan, std::span<const DenseVoxel> voxels) {
+  const Vec3i counts = plane_bricks(plan);
+  const std::size_t bricks = std::size_t(counts.y) * counts.z;
+  const auto is_sound = [&](const DenseVoxel& voxel) {
+    return voxel.brick < bricks && voxel.offset < kBrickVoxels && std::isfinite(voxel.sigma) && voxel.sigma > 0;
+  };
+  const auto is_not_before = [](const DenseVoxel& a, const DenseVoxel& b) {
+    return std::tie(a.brick, a.offset) >= std::tie(b.brick, b.offset);
+  };
+  return std::ranges::all_of(voxels, is_sound) && std::ranges::adjacent_find(voxels, is_not_before) == voxels.end();
 }
 
 BrickGrid<float> bake_density(const ColorField& field, const Plan& plan, const Options& options,

@@ -49,6 +49,9 @@ struct DenseVoxel {
 [[nodiscard]] BrickGrid<float> empty_density(const Plan& plan);
 void put_plane(std::span<const DenseVoxel> voxels, int plane, BrickGrid<float>& sigma);
 
+/// Whether voxels can be what a plane of a plan came to: in order, inside of its bricks, of finite density.
+[[nodiscard]] bool is_plane_of(const Plan& plan, std::span<const DenseVoxel> voxels);
+
 /// All planes.  @param advance  told the share done, in [0, 1], between planes; may throw.
 [[nodiscard]] BrickGrid<float> bake_density(const ColorField& field, const Plan& plan, const Options& options,
                                             const std::function<void(double)>& advance);

@@ -51,7 +51,8 @@ std::vector<Level> bake_levels(const ColorField& field, const std::vector<Plan>&
           put_plane(voxels, int(plane), level.sigma);
           any = any || !voxels.empty();
           progress.report(double(++done) / double(all));
-        });
+        },
+        [&](std::size_t, const std::vector<DenseVoxel>& voxels) { return is_plane_of(level.plan, voxels); });
     first += planes;
   }
   if (!any) throw InputError("bake: no voxel is as opaque as opacity_threshold; lower it, or check --aabb");

@@ -27,6 +27,7 @@ struct Level {
 /// First half of a bake: density on each lattice of plan_levels, 1/world unit. What the journal has of it is not made
 /// again; what is made goes there.
 /// @param journal  of this bake and no other, see journal.h.
+/// @throws JournalError   when the journal holds what this bake cannot have made.
 /// @throws InputError     when nothing is as opaque as `opacity_threshold`.
 /// @throws ContractError  when the field answers NaN, infinity or a negative density.
 /// @throws OutputError    when the journal cannot be written.

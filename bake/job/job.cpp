@@ -79,6 +79,31 @@ std::vector<VolumePlanes> make_volumes(const Job& job, const std::vector<Level>&
   return bake_volumes(job.field, *views, levels, job.options, journal, observer.progress_sink());
 }
 
+/// What is made of the field, all of which is in the journal afterwards.
+struct Passes {
+  std::vector<Level> levels;
+  std::vector<VolumePlanes> volumes;
+};
+
+Passes make_passes(const Job& job, const std::vector<Plan>& plans, Journal& journal, Observer& observer) {
+  Passes passes{bake_levels(job.field, plans, job.options, journal, observer.progress_sink()), {}};
+  if (job.volumes != VolumeUse::kNone) passes.volumes = make_volumes(job, passes.levels, journal, observer);
+  return passes;
+}
+
+/// A journal that this bake cannot have written is not believed: all is made anew.
+Passes go_on(const Job& job, const std::vector<Plan>& plans, Journal& journal, Observer& observer) {
+  if (journal.found() == 0) return make_passes(job, plans, journal, observer);
+  observer.say("bake: going on where it was stopped");
+  try {
+    return make_passes(job, plans, journal, observer);
+  } catch (const JournalError& error) {
+    observer.say(std::string("bake: ") + error.what() + "; starting anew");
+    journal.restart();
+    return make_passes(job, plans, journal, observer);
+  }
+}
+
 }  // namespace
 
 void run(const Job& job, Output& output, Observer& observer) {
@@ -90,12 +115,8 @@ void run(const Job& job, Output& output, Observer& observer) {
   check_memory(estimate, held, options);
 
   Journal journal(job.journal, identity_of(job, plans));
-  if (journal.found() > 0) observer.say("bake: going on where it was stopped");
-  std::vector<Level> levels = drop_on_bad_input(
-      job.journal, [&] { return bake_levels(job.field, plans, options, journal, observer.progress_sink()); });
+  auto [levels, volumes] = drop_on_bad_input(job.journal, [&] { return go_on(job, plans, journal, observer); });
   if (job.volumes != VolumeUse::kNone) {
-    std::vector<VolumePlanes> volumes =
-        drop_on_bad_input(job.journal, [&] { return make_volumes(job, levels, journal, observer); });
     if (!job.mesh) levels.clear();  // grids of files need the memory
     // Density that was given back is still the process's, and is what the grids will take.
     if (job.volumes == VolumeUse::kGrids) check_writing_memory(volumes, job.mesh ? held_memory_bytes() : held, options);

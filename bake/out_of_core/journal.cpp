@@ -1,5 +1,7 @@
 #include "bake/out_of_core/journal.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -20,9 +22,10 @@ struct PartHeader {
 };
 
 /// FNV-1a, a word at a time: finds what a killed process left half written, not what somebody forged.
-std::uint64_t checksum_of(std::span<const std::byte> bytes) {
+/// @param seed  what the bytes have to belong to
+std::uint64_t checksum_of(std::span<const std::byte> bytes, std::uint64_t seed) {
   constexpr std::uint64_t kPrime = 0x100000001b3;
-  std::uint64_t hash = 0xcbf29ce484222325 ^ bytes.size();
+  std::uint64_t hash = (0xcbf29ce484222325 ^ bytes.size() ^ seed) * kPrime;
   for (std::size_t at = 0; at < bytes.size(); at += sizeof(std::uint64_t)) {
     std::uint64_t word = 0;
     std::memcpy(&word, bytes.data() + at, std::min(sizeof word, bytes.size() - at));
@@ -40,8 +43,10 @@ struct Journal::File {
   struct Place {
     long begin = 0;
     std::size_t bytes = 0;
+    std::uint64_t checksum = 0;
   };
   std::vector<Place> parts;
+  std::string identity;
   long end = 0;  ///< where the next part goes
   std::size_t found = 0;
 
@@ -53,14 +58,19 @@ struct Journal::File {
     throw OutputError(name + ": " + what + ": " + (errno != 0 ? std::strerror(errno) : "failed"));
   }
 
+  /// A part's checksum is of this bake and of its place in it.
+  [[nodiscard]] std::uint64_t checksum_at(std::size_t number, std::span<const std::byte> bytes) const {
+    return checksum_of(bytes, checksum_of(std::as_bytes(std::span(identity)), number));
+  }
+
   void append(std::span<const std::byte> bytes) {
-    const PartHeader header{bytes.size(), checksum_of(bytes)};
+    const PartHeader header{bytes.size(), checksum_at(parts.size(), bytes)};
     errno = 0;
     const bool written = std::fseek(stream, end, SEEK_SET) == 0 &&
                          std::fwrite(&header, sizeof header, 1, stream) == 1 &&
                          std::fwrite(bytes.data(), 1, bytes.size(), stream) == bytes.size() && std::fflush(stream) == 0;
     if (!written) fail("cannot be written");
-    parts.push_back({end + long(sizeof header), bytes.size()});
+    parts.push_back({end + long(sizeof header), bytes.size(), header.checksum});
     end = parts.back().begin + long(bytes.size());
   }
 
@@ -77,26 +87,32 @@ struct Journal::File {
     return true;
   }
 
-  /// The part that begins at `end`, if it is whole.
+  /// The part that begins at `end`, if it is whole and this bake's.
   [[nodiscard]] bool read_next(std::size_t file_bytes, std::vector<std::byte>& bytes) {
     PartHeader header;
     if (std::fseek(stream, end, SEEK_SET) != 0 || std::fread(&header, sizeof header, 1, stream) != 1) return false;
-    const Place place{end + long(sizeof header), header.bytes};
-    if (header.bytes > file_bytes || !read(place, bytes) || checksum_of(bytes) != header.checksum) return false;
+    const Place place{end + long(sizeof header), header.bytes, header.checksum};
+    if (header.bytes > file_bytes || !read(place, bytes) || checksum_at(parts.size(), bytes) != header.checksum)
+      return false;
     parts.push_back(place);
     end = place.begin + long(place.bytes);
     return true;
   }
 
-  void begin(const std::string& identity) {
+  void begin() {
     end = 0;
+    found = 0;
+    parts.clear();
     append(std::as_bytes(std::span(identity)));
     parts.clear();
+    if (::ftruncate(::fileno(stream), end) != 0) fail("cannot be shortened");
   }
 
   /// Whether the file was begun under this identity; then also finds its parts.
-  [[nodiscard]] bool resume(const std::string& identity) {
-    const std::size_t file_bytes = fs::file_size(name);
+  [[nodiscard]] bool resume() {
+    struct stat state {};
+    if (::fstat(::fileno(stream), &state) != 0) fail("cannot be read");
+    const auto file_bytes = std::size_t(state.st_size);
     std::vector<std::byte> bytes;
     if (!read_next(file_bytes, bytes)) return false;
     if (std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()) != identity) return false;
@@ -104,7 +120,18 @@ struct Journal::File {
     while (read_next(file_bytes, bytes)) {
     }
     found = parts.size();
+    if (::ftruncate(::fileno(stream), end) != 0) fail("cannot be shortened");
     return true;
+  }
+
+  /// Neither through a link, which may lead to any file of the user's, nor anything but a file.
+  void open() {
+    const int descriptor = ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0644);
+    struct stat state {};
+    if (descriptor < 0 || ::fstat(descriptor, &state) != 0) fail("cannot be opened");
+    stream = ::fdopen(descriptor, "r+b");
+    errno = 0;
+    if (stream == nullptr || !S_ISREG(state.st_mode)) fail("is no file to write to");
   }
 };
 
@@ -119,10 +146,9 @@ Journal::Journal(const fs::path& file, const std::string& identity) : file_(std:
   if (file.has_parent_path()) fs::create_directories(file.parent_path(), failure);
   if (failure) throw OutputError(file.parent_path().string() + ": cannot make the folder: " + failure.message());
   file_->name = file.string();
-  file_->stream = std::fopen(file.c_str(), fs::exists(file) ? "r+b" : "w+b");
-  if (file_->stream == nullptr) file_->fail("cannot be opened");
-  if (!file_->resume(identity)) file_->begin(identity);
-  if (::ftruncate(::fileno(file_->stream), file_->end) != 0) file_->fail("cannot be shortened");
+  file_->identity = identity;
+  file_->open();
+  if (!file_->resume()) file_->begin();
 }
 
 Journal::~Journal() = default;
@@ -136,6 +162,10 @@ std::size_t Journal::found() const {
   return file_->found;
 }
 
+void Journal::restart() {
+  file_->begin();
+}
+
 void Journal::append(std::size_t number, std::span<const std::byte> bytes) {
   CNERF_CHECK(number == size(), "parts of a bake are made in order");
   file_->append(bytes);
@@ -144,8 +174,15 @@ void Journal::append(std::size_t number, std::span<const std::byte> bytes) {
 std::vector<std::byte> Journal::read_bytes(std::size_t number) const {
   CNERF_CHECK(number < size(), "this part of the bake is not finished");
   std::vector<std::byte> bytes;
-  if (!file_->read(file_->parts[number], bytes)) throw InputError(file_->name + ": cannot be read any more");
+  const File::Place& place = file_->parts[number];
+  if (!file_->read(place, bytes) || file_->checksum_at(number, bytes) != place.checksum) {
+    throw JournalError(file_->name + ": part " + std::to_string(number) + " was changed since it was written");
+  }
   return bytes;
+}
+
+void Journal::refuse(std::size_t number) const {
+  throw JournalError(file_->name + ": part " + std::to_string(number) + " is none that this bake can have made");
 }
 
 }  // namespace cnerf::bake

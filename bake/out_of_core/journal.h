@@ -20,9 +20,15 @@
 
 namespace cnerf::bake {
 
+/// A journal that holds what no bake of ours wrote: damaged, forged, or changed by somebody meanwhile.
+struct JournalError : InputError {
+  using InputError::InputError;
+};
+
 /// A list of byte strings in a file that only grows. A process may be killed at any time: what is cut off or damaged is
 /// dropped when the file is opened again, and everything before it is still there. Several threads may read finished
-/// parts while none is written.
+/// parts while none is written. Checksums find accidents and another bake's parts; against who forges a file, parts are
+/// checked before they are used.
 class Journal {
  public:
   /// In a file without a name, gone with the object.  @throws OutputError.
@@ -35,17 +41,23 @@ class Journal {
   Journal& operator=(Journal&&) noexcept;
 
   [[nodiscard]] std::size_t size() const;
+  /// Forgets all parts, those of the file too.  @throws OutputError.
+  void restart();
   /// How many parts there were when the file was opened.
   [[nodiscard]] std::size_t found() const;
 
   /// Calls `use(i, part first + i)` for each i below `count`, in order. A part is read if it is finished, else made and
   /// written, which has to happen in order and without gaps. `at_a_time` parts are made at the same time: `make(i)` is
   /// called by several threads.
+  /// @param is_sound  asked of each part that was read, before it is used: whether this bake can have made it; no
+  ///                  answer needed where none is given
+  /// @throws JournalError  when a part was not sound.
   /// @throws OutputError  when one cannot be written, e.g. on a full disk; and whatever `make` and `use` throw.
   template <typename T>
   void parts(std::size_t first, std::size_t count, std::size_t at_a_time,
              const std::function<std::vector<T>(std::size_t)>& make,
-             const std::function<void(std::size_t, const std::vector<T>&)>& use) {
+             const std::function<void(std::size_t, const std::vector<T>&)>& use,
+             const std::function<bool(std::size_t, const std::vector<T>&)>& is_sound = {}) {
     for (std::size_t begin = 0; begin < count; begin += at_a_time) {
       std::vector<std::optional<std::vector<T>>> some(std::min(at_a_time, count - begin));
       const std::size_t finished = size();
@@ -53,7 +65,13 @@ class Journal {
       try {
         parallel_tasks(some.size(), [&](std::size_t i) {
           const std::size_t number = first + begin + i;
-          some[i] = number < finished ? read<T>(number) : make(begin + i);
+          if (number >= finished) {
+            some[i] = make(begin + i);
+            return;
+          }
+          std::vector<T> part = read<T>(number);
+          if (is_sound && !is_sound(begin + i, part)) refuse(number);
+          some[i] = std::move(part);
         });
       } catch (...) {
         failure = std::current_exception();
@@ -70,11 +88,12 @@ class Journal {
       }
     }
   }
-  /// A finished part.  @throws InputError  when it cannot be read any more.
+  /// A finished part.  @throws JournalError  when it cannot be read any more, or is no list of T.
   template <typename T>
   [[nodiscard]] std::vector<T> read(std::size_t number) const {
     static_assert(std::is_trivially_copyable_v<T>, "parts are stored as they lie in memory");
     const std::vector<std::byte> bytes = read_bytes(number);
+    if (bytes.size() % sizeof(T) != 0) refuse(number);
     std::vector<T> values(bytes.size() / sizeof(T));
     if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
     return values;
@@ -84,6 +103,7 @@ class Journal {
   struct File;
   void append(std::size_t number, std::span<const std::byte> bytes);
   [[nodiscard]] std::vector<std::byte> read_bytes(std::size_t number) const;
+  [[noreturn]] void refuse(std::size_t number) const;
 
   std::unique_ptr<File> file_;
 };

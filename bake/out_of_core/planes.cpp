@@ -14,10 +14,8 @@ namespace {
 constexpr int kPlanesOfPart = 4;  ///< at least: neighbours are read by both of two parts
 
 void check_voxel(const Voxel& v) {
-  const bool finite = std::isfinite(v.sigma) && std::isfinite(v.luminance) && std::isfinite(v.rgb.x) &&
-                      std::isfinite(v.rgb.y) && std::isfinite(v.rgb.z) && std::isfinite(v.a) && std::isfinite(v.b);
-  CNERF_CHECK(finite && v.sigma >= 0, "voxel with NaN, infinity or negative density at " + std::to_string(v.i) + ", " +
-                                          std::to_string(v.j) + ", " + std::to_string(v.k));
+  CNERF_CHECK(is_valid(v), "voxel with NaN, infinity or negative density at " + std::to_string(v.i) + ", " +
+                               std::to_string(v.j) + ", " + std::to_string(v.k));
 }
 
 int plane_of(int i) {
@@ -26,6 +24,12 @@ int plane_of(int i) {
 }
 
 }  // namespace
+
+bool is_valid(const Voxel& v) {
+  const bool finite = std::isfinite(v.sigma) && std::isfinite(v.luminance) && std::isfinite(v.rgb.x) &&
+                      std::isfinite(v.rgb.y) && std::isfinite(v.rgb.z) && std::isfinite(v.a) && std::isfinite(v.b);
+  return finite && v.sigma >= 0;
+}
 
 void VolumeStatistics::add(const std::vector<Voxel>& more) {
   for (const Voxel& voxel : more) {

@@ -31,6 +31,8 @@ struct VoxelBox {
   }
   void add(const Voxel& v) { add({{v.i, v.j, v.k}, {v.i + 1, v.j + 1, v.k + 1}}); }
 };
+/// Whether all values are finite and density is not negative.
+[[nodiscard]] bool is_valid(const Voxel& voxel);
 /// Around all voxels.
 [[nodiscard]] VoxelBox bounding_box(const std::vector<Voxel>& voxels);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <tuple>
 
 #include "bake/color/point_color.h"
 #include "bake/density/density_pass.h"
@@ -181,6 +182,23 @@ Kept RadiancePass::kept_of(const Candidates& candidates, const SeenBatch& seen, 
   return kept;
 }
 
+/// Whether voxels can be what a plane of a plan came to: in order, inside of the lattice, of finite values.
+bool is_plane_of(const Plan& plan, std::size_t plane, const std::vector<Voxel>& voxels) {
+  const Vec3i low{int(plane) * kBrickSide, 0, 0};
+  const Vec3i size = plane_bricks(plan) * kBrickSide;
+  const auto is_sound = [&](const Voxel& voxel) {
+    const Vec3i at = Vec3i{voxel.i, voxel.j, voxel.k};
+    for (int axis = 0; axis < 3; ++axis) {
+      if (at[axis] < low[axis] || at[axis] >= low[axis] + size[axis]) return false;
+    }
+    return is_valid(voxel);
+  };
+  const auto is_not_before = [](const Voxel& a, const Voxel& b) {
+    return std::tie(a.i, a.j, a.k) >= std::tie(b.i, b.j, b.k);
+  };
+  return std::ranges::all_of(voxels, is_sound) && std::ranges::adjacent_find(voxels, is_not_before) == voxels.end();
+}
+
 }  // namespace
 
 std::vector<VolumePlanes> bake_volumes(const ColorField& field, const ViewSelection& views,
@@ -206,7 +224,8 @@ std::vector<VolumePlanes> bake_volumes(const ColorField& field, const ViewSelect
         [&](std::size_t, const std::vector<Voxel>& voxels) {
           volume.statistics.add(voxels);
           progress.report(double(++done) / double(planes_of_density));
-        });
+        },
+        [&](std::size_t plane, const std::vector<Voxel>& voxels) { return is_plane_of(plan, plane, voxels); });
     dense_first += planes;
     if (volume.statistics.all.is_empty()) continue;
     volume.read = [&journal, first, end = volume.end](int plane) {

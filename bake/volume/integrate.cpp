@@ -157,6 +157,7 @@ Radiance integrate_ray(const std::vector<VoxelMedium>& media, Vec3d origin, Vec3
       result.rgb += mixture.emission * (result.transmittance * alpha / mixture.sigma);
       result.transmittance *= 1 - alpha;
     }
+    if (begin + length == begin) break;  // the camera is too far away for steps of this size
     begin += length;
   }
   return result;

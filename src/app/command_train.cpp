@@ -24,7 +24,7 @@ void train(const TrainArguments& arguments, const std::vector<std::string>& comm
   const Engines& engines = engines_for(config.device);
   const pipeline::RunContext context{directory, config, pipeline::read_capture(arguments.capture, config, reporter),
                                      command_line};
-  pipeline::check_run_folder(directory, arguments.existing);
+  const FolderLock lock = pipeline::claim_run_folder(directory, arguments.existing, reporter);
   std::optional<web::LiveSession> live;
   if (arguments.view) {
     live.emplace("Training " + context.capture.root.filename().string(), arguments.browser, reporter);

@@ -36,7 +36,7 @@ void view(const ViewArguments& arguments, const std::vector<std::string>& comman
   server.start();
   reporter.say("view: " + server.address());
   reporter.say("Ctrl-C ends it");
-  if (!arguments.browser.no_browser) web::open_browser(server.address());
+  if (!arguments.browser.no_browser && arguments.browser.server.token.empty()) web::open_browser(server.address());
   while (!interruption_requested()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
 }
 

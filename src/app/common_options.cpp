@@ -36,6 +36,11 @@ std::string help_of(const std::vector<Field>& fields, const std::string& key) {
   return described(*field) + " (" + key + ")";
 }
 
+std::string first_line(const std::string& file) {
+  const std::string text = read_text_file(file);
+  return text.substr(0, text.find_first_of("\r\n"));
+}
+
 /// What the configuration says of one of its keys.
 std::string help_of(const std::string& key) {
   Config config;
@@ -81,7 +86,13 @@ void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string&
 void add_browser_options(CLI::App& app, web::BrowserOptions& options) {
   app.add_option("--port", options.server.port, "Port of the page; 0 chooses a free one")->check(CLI::Range(0, 65535));
   app.add_option("--host", options.server.host, "Address to listen on; other than this machine's own it needs --token");
-  app.add_option("--token", options.server.token, "Secret that visitors of the page need, 16 letters or more");
+  app.add_option(
+         "--token", options.server.token,
+         "Secret that visitors of the page need, 16 letters or more; others see it in ps, so rather set CNERF_TOKEN")
+      ->envname("CNERF_TOKEN");
+  app.add_option_function<std::string>(
+      "--token-file", [&options](const std::string& file) { options.server.token = first_line(file); },
+      "File whose first line is the token");
   app.add_flag("--no-browser", options.no_browser, "Only print the address");
 }
 

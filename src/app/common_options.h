@@ -32,7 +32,7 @@ void add_flag_form(CLI::App& app, ConfigArguments& arguments, const std::string&
 void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
 /// Declares --colorizer, --prompt, --keyframe, --hint and --hint-image.
 void add_colorizer_options(CLI::App& app, ConfigArguments& arguments);
-/// Declares --port, --host, --token and --no-browser.
+/// Declares --port, --host, --token, --token-file and --no-browser.
 void add_browser_options(CLI::App& app, web::BrowserOptions& options);
 /// Declares one option a field, named like the field with `-` for `_`; legal values and defaults go to the help. A bool
 /// becomes a flag that sets it.

@@ -12,6 +12,15 @@
 namespace cnerf::app {
 namespace {
 
+/// Words for records, which others may read: what protects the page is no part of them.
+std::vector<std::string> without_token(std::vector<std::string> words) {
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (words[i].starts_with("--token=")) words[i] = "--token=...";
+    if (words[i] == "--token" && i + 1 < words.size()) words[++i] = "...";
+  }
+  return words;
+}
+
 void run_program(CLI::App& program, int argc, char** argv) {
   program.allow_extras();
   program.set_version_flag("--version", "cnerf " + pipeline::version_text());
@@ -21,7 +30,7 @@ void run_program(CLI::App& program, int argc, char** argv) {
 
   const ParsedCommand& chosen = chosen_command(program, commands);
   try {
-    chosen.work({argv, argv + argc});
+    chosen.work(without_token({argv, argv + argc}));
   } catch (const Interrupted& interruption) {
     const std::string hint = chosen.command->resumable ? "; the same command with --resume goes on" : "";
     throw Interrupted(interruption.what() + hint);

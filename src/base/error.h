@@ -17,6 +17,7 @@ enum class ExitCode : int {
   kDevice = 69,        ///< a device that was asked for is not there, or failed
   kInternal = 70,      ///< our own contract was broken: a bug
   kOutput = 73,        ///< the output cannot be written: permissions, full disk
+  kBusy = 75,          ///< another cnerf works in the same folder; later it may go
   kColorizer = 76,     ///< a colorizer failed, timed out or answered nonsense
   kPoses = 77,         ///< no camera poses can be found: no overlap, no parallax, too few views placed
   kSnapshot = 78,      ///< a snapshot of another version, or cut short
@@ -57,6 +58,11 @@ struct DeviceError : Error {
 /// An output that cannot be written. Nothing half-written is left under the final name.
 struct OutputError : Error {
   explicit OutputError(const std::string& message) : Error(ExitCode::kOutput, message) {}
+};
+
+/// A folder that another process of this program works in.
+struct BusyError : Error {
+  explicit BusyError(const std::string& message) : Error(ExitCode::kBusy, message) {}
 };
 
 /// A colorizer that failed, hung or answered with wrong shapes or values.

@@ -22,8 +22,9 @@ std::vector<fs::path> plugin_folders() {
   return folders;
 }
 
-fs::path find_plugin(const std::string& plugin) {
-  const std::string name = "libcnerf_" + plugin + ".so";
+}  // namespace
+
+fs::path program_part(const std::string& name) {
   std::string looked;
   for (const fs::path& folder : plugin_folders()) {
     if (fs::exists(folder / name)) return folder / name;
@@ -32,10 +33,8 @@ fs::path find_plugin(const std::string& plugin) {
   throw DeviceError(name + ", a part of this program, is missing; looked in" + looked);
 }
 
-}  // namespace
-
 void* plugin_symbol(const std::string& plugin, const std::string& symbol) {
-  const fs::path file = find_plugin(plugin);
+  const fs::path file = program_part("libcnerf_" + plugin + ".so");
   void* library = ::dlopen(file.c_str(), RTLD_LAZY | RTLD_LOCAL);  // a second time gives the first one's handle
   if (library == nullptr) throw DeviceError(file.string() + " cannot be loaded: " + ::dlerror());
   void* address = ::dlsym(library, symbol.c_str());

@@ -6,13 +6,17 @@
 /// (cmake/exported_symbols.txt), and the loader prefers those, so that the number of threads, the state of Ctrl-C and
 /// the types of errors are the same on both sides.
 
+#include <filesystem>
 #include <string>
 
 namespace cnerf {
 
-/// The address of a symbol of libcnerf_`plugin`.so, which stays loaded. The library is searched for beside the program,
-/// in ../lib/cnerf and in the build tree.
-/// @throws DeviceError  the file is missing, cannot be loaded or lacks the symbol; the message lists the folders.
+/// A file of the program's: looked for beside it, in ../lib/cnerf and in the build tree.
+/// @throws DeviceError  saying where it was looked for.
+[[nodiscard]] std::filesystem::path program_part(const std::string& name);
+
+/// The address of a symbol of libcnerf_`plugin`.so, which stays loaded.
+/// @throws DeviceError  no such file, it cannot be loaded, or it lacks the symbol.
 [[nodiscard]] void* plugin_symbol(const std::string& plugin, const std::string& symbol);
 
 /// The table of functions that a plug-in offers: the result of its `extern "C"` function `entry`.

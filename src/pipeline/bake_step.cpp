@@ -32,6 +32,7 @@ bake::Options volume_options(const Config& config, const exporting::Formats& for
 
 void bake_step(const RunContext& context, const BakeJob& job, const Engines& engines, Observer& observer) {
   const auto& [take, folder, formats] = job;
+  const StepLocks locks(context.directory, folder, observer);
   const Stopwatch watch;
   const auto scene = load_scene(context.directory, take, engines);
   const Config& config = context.config;

@@ -40,7 +40,7 @@ TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Eng
   std::unique_ptr<Colorizer> made;
   if (job.colorizer == nullptr) made = colorizer_of(context, observer);
   Colorizer& colorizer = job.colorizer != nullptr ? *job.colorizer : *made;
-  if (job.existing.overwrite) fs::remove_all(directory.take_folder(job.take));
+  if (job.existing.overwrite) clear_folder(directory.take_folder(job.take));
   write_file(directory.take_config_file(job.take), to_toml(context.config));
   const Stage2Report report = train_stage2({context.capture, directory.stage1_snapshot(), context.config.stage2,
                                             colorizer, known, directory.take_snapshot(job.take), job.existing.resume},
@@ -89,13 +89,13 @@ void show_bases(const RunContext& context, const Engines& engines, Observer& obs
 
 void colorize_step(const RunContext& context, const ColorizeJob& job, const Engines& engines, Observer& observer) {
   const RunDirectory& directory = context.directory;
+  const StepLocks locks(directory, directory.take_folder(job.take), observer);
+  (void)take_to_write(context, job.take, job.existing);  // again, now that nobody can finish it meanwhile
   std::optional<TakeRecord> take = directory.take_record(job.take);
   if (!take || !job.existing.resume) {
     take = colorize(context, job, engines, observer);
     directory.save(*take);
-    RunRecord record = directory.record();
-    record.current_take = job.take;
-    directory.save(record);
+    directory.update([&](RunRecord& record) { record.current_take = job.take; });
   }
   const Stage2Report& report = take->stage2;
   observer.say(

@@ -33,6 +33,7 @@ void say_metrics(const Metrics& metrics, Observer& observer) {
 
 void evaluate_step(const RunContext& context, const EvaluateJob& job, const Engines& engines, Observer& observer) {
   const RunDirectory& directory = context.directory;
+  const StepLocks locks(directory, job.take.empty() ? directory.root() : directory.take_folder(job.take), observer);
   const Stopwatch watch;
   std::optional<Lpips> lpips;
   if (!job.lpips_weights.empty()) lpips.emplace(job.lpips_weights);  // read first: what is missing costs no rendering

@@ -118,6 +118,7 @@ void add_vdb(Report& report, const fs::path& file) {
   for (const exporting::VdbGridSummary& grid : summary.grids) {
     report.line(grid.name, "{}{}, {} voxels of {:.4g}, {}", grid.type, grid.half ? " as half" : "", grid.active_voxels,
                 grid.voxel_size.x, text_of(grid.world_box));
+    if (grid.not_finite > 0) report.line("", "{} values are not finite", grid.not_finite);
     for (std::size_t c = 0; c < grid.min_value.size(); ++c) {
       report.line("", "component {}: {:.5g} to {:.5g}", c, grid.min_value[c], grid.max_value[c]);
     }

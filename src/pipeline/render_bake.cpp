@@ -9,6 +9,7 @@
 #include "export/web_pictures.h"
 #include "src/base/error.h"
 #include "src/picture/encode.h"
+#include "src/pipeline/run_context.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
@@ -28,6 +29,7 @@ CameraPath cameras_of_bake(const fs::path& bake) {
 }
 
 void render_bake(const fs::path& bake, const CameraPath& path, const fs::path& folder, Observer& observer) {
+  const FolderLock lock = lock_folder(folder.parent_path(), FolderLock::Mode::kAlone, observer);
   const std::vector<bake::Volume> volumes = exporting::read_volumes(bake);
   for (std::size_t i = 0; i < path.cameras.size(); ++i) {
     const PathCamera& camera = path.cameras[i];

@@ -58,6 +58,7 @@ class RenderFiles {
 
 void render_step(const RunContext& context, const RenderJob& job, const Engines& engines, Observer& observer) {
   const RenderOutput& output = job.output;
+  const StepLocks locks(context.directory, output.folder, observer);
   const Stopwatch watch;
   const auto scene = load_scene(context.directory, job.take, engines);
   RenderOptions options = render_options(context.config);

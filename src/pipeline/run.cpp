@@ -27,7 +27,7 @@ bool needs_colorizer(const RunJob& job, const RunDirectory& directory) {
 
 fs::path run(RunJob job, Config config, const Engines& engines, Observer& observer) {
   const RunDirectory directory(job.out);
-  check_run_folder(directory, job.existing);
+  const FolderLock lock = claim_run_folder(directory, job.existing, observer);
   if (!job.grey) choose_colorizer(job.capture, config, observer);
   job.capture = capture_of(job.capture, job.out, observer);
 

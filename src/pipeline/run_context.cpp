@@ -13,14 +13,20 @@
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
-namespace {
 
-bool holds_something(const fs::path& folder) {
-  std::error_code failure;
-  return fs::exists(folder, failure) && (!fs::is_directory(folder, failure) || !fs::is_empty(folder, failure));
+FolderLock lock_folder(const fs::path& folder, FolderLock::Mode mode, Observer& observer) {
+  FolderLock lock(folder, mode);
+  if (!lock.is_held()) {
+    observer.say("note: " + folder.string() +
+                 ": this file system has no locks; take care that no other cnerf writes there");
+  }
+  return lock;
 }
 
-}  // namespace
+StepLocks::StepLocks(const RunDirectory& directory, const fs::path& folder, Observer& observer)
+    : run(lock_folder(directory.root(), FolderLock::Mode::kShared, observer)) {
+  if (folder != directory.root()) own = lock_folder(folder, FolderLock::Mode::kAlone, observer);
+}
 
 Capture read_capture(const fs::path& path, const Config& config, Observer& observer) {
   Capture capture = load_capture(path, config.capture);
@@ -39,13 +45,21 @@ void check_run_folder(const RunDirectory& directory, const ExistingOutput& exist
     throw UsageError(root.string() +
                      ": holds a run already; pass --resume to go on with it or --overwrite to start again");
   }
-  if (holds_something(root)) {
+  if (!is_vacant(root)) {
     throw UsageError(root.string() + ": is not empty and holds no run; choose another folder");
   }
 }
 
+FolderLock claim_run_folder(const RunDirectory& directory, const ExistingOutput& existing, Observer& observer) {
+  check_run_folder(directory, existing);
+  FolderLock lock = lock_folder(directory.root(), FolderLock::Mode::kAlone, observer);
+  check_run_folder(directory, existing);  // again, now that nobody can change the answer
+  return lock;
+}
+
 void begin_run(const RunContext& context, const fs::path& capture_path, const ExistingOutput& existing) {
   const RunDirectory& directory = context.directory;
+  const FolderLock lock(directory.root());
   const bool goes_on = directory.exists() && existing.resume;
   if (directory.exists() && !goes_on) directory.clear();
   // Before the configuration is written: what is refused must not take the place of what the run was made with.

@@ -3,9 +3,11 @@
 /// another, the other commands do one each.
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "src/base/folder_lock.h"
 #include "src/base/observer.h"
 #include "src/capture/capture.h"
 #include "src/config/config.h"
@@ -29,9 +31,22 @@ struct ExistingOutput {
 /// Reads a capture and says what was found, with the reader's notes.
 [[nodiscard]] Capture read_capture(const std::filesystem::path& path, const Config& config, Observer& observer);
 
+/// FolderLock; says so where the file system has no locks.
+[[nodiscard]] FolderLock lock_folder(const std::filesystem::path& folder, FolderLock::Mode mode, Observer& observer);
+/// For a step that works on a run and writes a folder of its own, which may lie in the run: holds that one alone, and
+/// keeps the run from being cleared.
+struct StepLocks {
+  StepLocks(const RunDirectory& directory, const std::filesystem::path& folder, Observer& observer);
+  FolderLock run;
+  std::optional<FolderLock> own;  ///< none where it is the run's folder itself, of which single files are written
+};
+
 /// Whether a run may go to the folder; nothing is changed yet.
 /// @throws UsageError  when there is a run and neither is set, or the folder holds something else.
 void check_run_folder(const RunDirectory& directory, const ExistingOutput& existing);
+/// Holds a folder that a run may go to.  @throws UsageError as check_run_folder, BusyError, OutputError
+[[nodiscard]] FolderLock claim_run_folder(const RunDirectory& directory, const ExistingOutput& existing,
+                                          Observer& observer);
 /// Makes the folder of a run ready: clears it to overwrite, writes config.toml and run.json.
 void begin_run(const RunContext& context, const std::filesystem::path& capture_path, const ExistingOutput& existing);
 

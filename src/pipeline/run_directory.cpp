@@ -6,6 +6,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/folder_lock.h"
 #include "src/base/usage.h"
 #include "src/pipeline/version.h"
 
@@ -84,6 +85,13 @@ void RunDirectory::save(RunRecord record) const {
   write_run_record(record_file(), record);
 }
 
+void RunDirectory::update(const std::function<void(RunRecord&)>& change) const {
+  const RecordTurn turn(root_);
+  RunRecord changed = record();
+  change(changed);
+  save(std::move(changed));
+}
+
 std::optional<TakeRecord> RunDirectory::take_record(const std::string& take) const {
   const fs::path file = take_record_file(take);
   std::error_code failure;
@@ -149,9 +157,7 @@ std::string colorizer_name(const RunDirectory& directory, const std::string& tak
 }
 
 void note_time(const RunDirectory& directory, const char* step, const Stopwatch& watch) {
-  RunRecord record = directory.record();
-  record.seconds_of_steps[step] = watch.seconds();
-  directory.save(record);
+  directory.update([&](RunRecord& record) { record.seconds_of_steps[step] = watch.seconds(); });
 }
 
 void check_take_name(const std::string& name) {

@@ -12,6 +12,7 @@
 ///   bases.png            base candidates, when only those were asked for
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -117,6 +118,8 @@ class RunDirectory {
   [[nodiscard]] bool exists() const;
   [[nodiscard]] RunRecord record() const;
   void save(RunRecord record) const;
+  /// Reads, changes and saves the record as one, whoever else does so at the same time.
+  void update(const std::function<void(RunRecord&)>& change) const;
   [[nodiscard]] std::optional<TakeRecord> take_record(const std::string& take) const;
   void save(TakeRecord record) const;
 

@@ -6,7 +6,7 @@
 #include "export/vdb_reader.h"
 #include "export/web_bundle.h"
 #include "src/base/error.h"
-#include "src/pipeline/run_directory.h"
+#include "src/pipeline/run_context.h"
 #include "viewer/server/page_folder.h"
 
 namespace cnerf::pipeline {
@@ -29,6 +29,7 @@ fs::path bundle_of_bake(const fs::path& bake, const ShowJob& job, const exportin
       fs::last_write_time(folder / exporting::kWebManifest) >= fs::last_write_time(manifest_file)) {
     return folder;
   }
+  const FolderLock lock = lock_folder(bake, FolderLock::Mode::kAlone, observer);
   const exporting::BakeManifest manifest = exporting::read_manifest(manifest_file);
   if (!manifest.volume) {
     throw InputError(manifest_file, "volume", "this bake has none; bake with --format vdb or --format web");

@@ -9,6 +9,7 @@ namespace cnerf::pipeline {
 
 void train_step(const RunContext& context, bool resume, const Engines& engines, Observer& observer) {
   const RunDirectory& directory = context.directory;
+  const FolderLock lock = lock_folder(directory.root(), FolderLock::Mode::kAlone, observer);
   RunRecord record = directory.record();
   if (!record.stage1.finished || !resume) {
     const Stage1Job job{context.capture, context.config.stage1, directory.stage1_snapshot(), resume};

@@ -1,6 +1,7 @@
 #include "bake/out_of_core/journal.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <atomic>
 #include <fstream>
@@ -142,6 +143,53 @@ TEST(Journal, DamagedPartsAreDropped) {
   bytes[bytes.size() - 1] ^= std::byte{1};
   write_file(folder / "damaged", bytes);
   EXPECT_EQ(Journal(folder / "damaged", "one bake").found(), 3u);
+}
+
+TEST(Journal, PartsOfAnotherPlaceAreNotTaken) {
+  const cnerf::test::TempDir folder;
+  fill(folder / "j", 3);
+  auto bytes = read_binary_file(folder / "j");
+  {  // the last two parts, 10 and 20 numbers behind a header of 16 bytes each, change places
+    const std::size_t second = 16 + 40, third = 16 + 80;
+    std::rotate(bytes.end() - std::ptrdiff_t(second + third), bytes.end() - std::ptrdiff_t(third), bytes.end());
+  }
+  write_file(folder / "turned", bytes);
+  EXPECT_EQ(Journal(folder / "turned", "one bake").found(), 1u);
+}
+
+TEST(Journal, WhatIsReadIsWhatThisBakeWrote) {
+  const cnerf::test::TempDir folder;
+  Journal journal(folder / "j", "one bake");
+  (void)part(journal, 0, [] { return numbers(10); });
+  { Journal(folder / "j", "another bake"); }  // whoever takes no lock
+  EXPECT_THROW((void)journal.read<int>(0), JournalError);
+}
+
+TEST(Journal, PartsThatAreNotSoundAreRefusedAndARestartForgetsThem) {
+  const cnerf::test::TempDir folder;
+  fill(folder / "j", 3);
+  Journal journal(folder / "j", "one bake");
+  struct Three {
+    std::byte bytes[3];
+  };
+  EXPECT_THROW((void)journal.read<Three>(1), JournalError) << "40 bytes are no list of 3";
+  const auto make = [](std::size_t) { return never_made(); };
+  const auto use = [](std::size_t i, const std::vector<int>&) { EXPECT_LT(i, 1u); };
+  EXPECT_THROW(journal.parts<int>(0, 3, 1, make, use, [](std::size_t i, const auto&) { return i < 1; }), JournalError);
+  journal.restart();
+  EXPECT_EQ(journal.size(), 0u);
+  EXPECT_EQ(Journal(folder / "j", "one bake").found(), 0u);
+}
+
+TEST(Journal, LinksAndFoldersAreNotWrittenTo) {
+  const cnerf::test::TempDir folder;
+  write_file(folder / "precious", std::string_view("text"));
+  fs::create_symlink(folder / "precious", folder / "j");
+  EXPECT_THROW(Journal(folder / "j", "one bake"), OutputError);
+  EXPECT_EQ(read_text_file(folder / "precious"), "text");
+  EXPECT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  EXPECT_THROW(Journal(folder / "pipe", "one bake"), OutputError);
+  EXPECT_THROW(Journal(folder.path(), "one bake"), OutputError);
 }
 
 TEST(Journal, PlacesThatCannotBeWrittenAreOutputErrors) {

@@ -3,12 +3,19 @@
 #include <gtest/gtest.h>
 #include <httplib.h>
 
+#include <array>
+#include <cerrno>
 #include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "tests/support/data.h"
+#include "viewer/server/http_server.h"
 
 namespace cnerf::web {
 namespace {
@@ -153,6 +160,213 @@ TEST(WebServer, AnotherHostNeedsATokenAndVisitorsToo) {
   EXPECT_EQ(status_of(raw_answer(port, request("GET /", "Host: a\r\nCookie: x=1; cnerf_token=" + token + "\r\n"))),
             200);
   EXPECT_NE(server.address().find("?token=" + token), std::string::npos);
+}
+
+TEST(WebServer, NamesThatBeginLikeAnAddressAreNames) {
+  const Site site;
+  WebServer server({site.root}, {});
+  server.start();
+  const auto status = [&](const std::string& host) {
+    return status_of(raw_answer(server.port(), request("GET /", "Host: " + host + "\r\n")));
+  };
+  for (const char* host :
+       {"127.attacker.example", "127.attacker.example:80", "127.0.0.1.example", "127.1.example:1", "127.0.0.1:80x",
+        "127.0.0.1:1@evil", "[::1", "[::1]x", "[::2]:80", "128.0.0.1", "127.0.0.1\r\nHost: b"}) {
+    EXPECT_EQ(status(host), 421) << host;
+  }
+  for (const char* host : {"127.0.0.1", "127.3.2.1:80", "[::1]:80", "[::1]", "localhost:80"})
+    EXPECT_EQ(status(host), 200) << host;
+  EXPECT_THROW(check_web_server_options({"127.attacker.example", 0, ""}), UsageError);
+  check_web_server_options({"127.0.0.9", 0, ""});
+}
+
+TEST(WebServer, OrdersComeFromItsOwnPage) {
+  LiveFeed feed("train");
+  WebServer server({}, {}, &feed);
+  server.start();
+  const auto stop = [&](const std::string& origin) {
+    return status_of(
+        raw_answer(server.port(), "POST /live/control HTTP/1.1\r\nHost: 127.0.0.1:80\r\nX-Cnerf: 1\r\n" + origin +
+                                      "Connection: close\r\nContent-Length: 17\r\n\r\n{\"action\":\"stop\"}"));
+  };
+  EXPECT_EQ(stop("Origin: http://evil.example\r\n"), 403);
+  EXPECT_EQ(stop("Origin: null\r\n"), 403);
+  EXPECT_EQ(stop("Origin: http://127.0.0.1:81\r\n"), 403);
+  EXPECT_FALSE(feed.stop_requested());
+  EXPECT_EQ(stop("Origin: http://127.0.0.1:80\r\n"), 200);
+  EXPECT_TRUE(feed.stop_requested());
+}
+
+std::string body_of(const std::string& answer) {
+  return answer.substr(std::min(answer.size(), answer.find("\r\n\r\n") + 4));
+}
+
+TEST(WebServer, OnePartOfAFileAtMost) {
+  const Site site;
+  write_file(site.root / "ten.txt", std::string_view("0123456789"));
+  write_file(site.root / "none.txt", std::string_view());
+  WebServer server({site.root}, {});
+  server.start();
+  const auto part = [&](const std::string& range, const std::string& file = "ten.txt") {
+    return raw_answer(server.port(), request("GET /" + file, "Host: localhost\r\nRange: bytes=" + range + "\r\n"));
+  };
+  EXPECT_EQ(body_of(part("2-4")), "234");
+  EXPECT_EQ(status_of(part("2-4")), 206);
+  EXPECT_NE(part("2-4").find("Content-Range: bytes 2-4/10\r\n"), std::string::npos);
+  EXPECT_EQ(body_of(part("7-")), "789");
+  EXPECT_EQ(body_of(part("7-4000000000")), "789");
+  EXPECT_EQ(body_of(part("-3")), "789");
+  EXPECT_EQ(body_of(part("-30")), "0123456789");
+  EXPECT_EQ(status_of(part("10-")), 416);
+  EXPECT_EQ(status_of(part("-0")), 416);
+  EXPECT_EQ(status_of(part("0-", "none.txt")), 200);
+  std::string many = "0-";
+  for (int i = 0; i < 500; ++i) many += ",0-";
+  EXPECT_EQ(body_of(part(many)), "0123456789") << "several parts are the whole, once";
+  EXPECT_LT(part("1-2", "missing").size(), 2000u);
+}
+
+std::size_t held_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  std::size_t pages = 0;
+  statm >> pages >> pages;
+  return pages * std::size_t(::sysconf(_SC_PAGESIZE));
+}
+
+TEST(WebServer, MemoryDoesNotGrowWithFiles) {
+  const Site site;
+  constexpr std::size_t kBytes = std::size_t(192) << 20;
+  std::ofstream(site.root / "large.bin");
+  fs::resize_file(site.root / "large.bin", kBytes);
+  WebServer server({site.root}, {});
+  server.start();
+  const std::size_t before = held_bytes();
+  std::size_t most = 0;
+  std::vector<std::thread> visitors;
+  std::array<std::size_t, 2> got{};
+  for (std::size_t& bytes : got) {
+    visitors.emplace_back([&] {
+      httplib::Client client("127.0.0.1", server.port());
+      (void)client.Get("/large.bin", [&](const char*, std::size_t size) {
+        bytes += size;
+        return true;
+      });
+    });
+  }
+  for (int look = 0; look < 20; ++look) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    most = std::max(most, held_bytes());
+  }
+  for (std::thread& visitor : visitors) visitor.join();
+  EXPECT_EQ(got[0], kBytes);
+  EXPECT_EQ(got[1], kBytes);
+  EXPECT_LT(std::max(most, held_bytes()), before + (std::size_t(32) << 20));
+}
+
+/// A client that connects and says no more than this.
+class Slow {
+ public:
+  Slow(int port, const std::string& says) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(std::uint16_t(port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::connect(socket_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    (void)say(says);
+  }
+  ~Slow() { ::close(socket_); }
+  Slow(const Slow&) = delete;
+  Slow& operator=(const Slow&) = delete;
+  bool say(const std::string& text) {
+    return ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL) == ssize_t(text.size());
+  }
+  /// Whether the server has closed it.
+  [[nodiscard]] bool is_closed() const {
+    char byte;
+    const ssize_t got = ::recv(socket_, &byte, 1, MSG_DONTWAIT);
+    return got == 0 || (got == -1 && errno != EAGAIN);
+  }
+
+ private:
+  int socket_;
+};
+
+double seconds_of(const std::function<void()>& work) {
+  const auto begin = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+TEST(WebServer, SlowClientsKeepNobodyOut) {
+  const Site site;
+  WebServer server({site.root}, {});
+  server.start();
+  for (const char* says : {"", "GET / HTTP/1.1\r\nHo", "GET /live/events HTTP/1.1\r\nHost: localhost\r\n\r\nGET"}) {
+    std::vector<std::unique_ptr<Slow>> clients;
+    for (int i = 0; i < 100; ++i) clients.push_back(std::make_unique<Slow>(server.port(), says));
+    EXPECT_LT(seconds_of([&] { EXPECT_EQ(status_of(raw_answer(server.port(), request("GET /"))), 200); }), 2) << says;
+  }
+  EXPECT_LT(seconds_of([&] { server.stop(); }), 2);
+}
+
+TEST(WebServer, TabsThatFollowKeepNobodyOut) {
+  const Site site;
+  LiveFeed feed("train");
+  WebServer server({site.root}, {}, &feed);
+  server.start();
+  std::vector<std::unique_ptr<Slow>> tabs;
+  for (int i = 0; i < 100; ++i) {
+    tabs.push_back(std::make_unique<Slow>(server.port(), "GET /live/events HTTP/1.1\r\nHost: localhost\r\n\r\n"));
+  }
+  EXPECT_LT(seconds_of([&] { EXPECT_EQ(status_of(raw_answer(server.port(), request("GET /"))), 200); }), 2);
+}
+
+TEST(WebServer, ARequestHasATimeAsAWhole) {
+  const Site site;
+  ConnectionLimits limits;
+  limits.request = std::chrono::seconds(1);
+  HttpServer server(limits);
+  const int port = server.bind_to_any_port("127.0.0.1");
+  std::thread thread([&] { server.listen_after_bind(); });
+  Slow client(port, "G");
+  EXPECT_LT(seconds_of([&] {
+              for (int i = 0; i < 100 && !client.is_closed(); ++i) {
+                (void)client.say("x");
+                std::this_thread::sleep_for(std::chrono::milliseconds(50));
+              }
+            }),
+            3);
+  EXPECT_TRUE(client.is_closed());
+  server.end();
+  thread.join();
+}
+
+TEST(WebServer, WhoIsRefusedHoldsNoThread) {
+  const Site site;
+  WebServer server({site.root}, {});
+  server.start();
+  const std::string kept = "GET /nothing HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  std::string answer;
+  EXPECT_LT(seconds_of([&] { answer = raw_answer(server.port(), kept); }), 2) << "closed at once, not when it is idle";
+  EXPECT_EQ(status_of(answer), 404);
+  EXPECT_NE(answer.find("Connection: close"), std::string::npos);
+}
+
+TEST(WebServer, ATokenLeadsToOwnPathsOnly) {
+  const Site site;
+  const std::string token = random_token();
+  WebServer server({site.root}, {"127.0.0.1", 0, token});
+  server.start();
+  const auto location = [&](const std::string& path) {
+    const std::string answer = raw_answer(server.port(), request("GET " + path + "?token=" + token));
+    const std::size_t begin = answer.find("Location: ") + 10;
+    return answer.substr(begin, answer.find("\r\n", begin) - begin);
+  };
+  EXPECT_EQ(location("/"), "/");
+  EXPECT_EQ(location("/photos/000.jpg"), "/photos/000.jpg");
+  for (const char* path : {"//evil.com/", "///evil.com", "/%5cevil.com", "/%2fevil.com", "/a%0d%0aX:%20y"}) {
+    EXPECT_EQ(location(path), "/") << path;
+  }
 }
 
 TEST(WebServer, ATakenPortIsSaidToBe) {

@@ -38,7 +38,7 @@ LiveSession::LiveSession(const std::string& title, const BrowserOptions& options
   server_.start();
   inner_.say("view: " + server_.address());
   if (find_page().empty()) inner_.say("note: this cnerf was built without the page; the address serves data only");
-  if (!options.no_browser) open_browser(server_.address());
+  if (!options.no_browser && options.server.token.empty()) open_browser(server_.address());
 }
 
 LiveSession::~LiveSession() {

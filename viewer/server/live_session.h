@@ -14,7 +14,7 @@ namespace cnerf::web {
 /// Options of everything that opens the browser.
 struct BrowserOptions {
   WebServerOptions server;
-  bool no_browser = false;
+  bool no_browser = false;  ///< nor where there is a token: others would see it among the browser's arguments
 };
 
 /// Serves a command's progress from its construction to its end. Looking costs at most 3 % of the time: pictures are

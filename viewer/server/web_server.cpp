@@ -1,20 +1,28 @@
 #include "viewer/server/web_server.h"
 
+#include <arpa/inet.h>
+#include <fcntl.h>
 #include <fmt/format.h>
-#include <httplib.h>
+#include <netinet/in.h>
 #include <openssl/crypto.h>
 #include <openssl/rand.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <charconv>
+#include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
 #include "src/base/error.h"
-#include "src/base/files.h"
+#include "src/base/process.h"
+#include "viewer/server/http_server.h"
 
 namespace cnerf::web {
 namespace {
@@ -23,11 +31,15 @@ namespace fs = std::filesystem;
 constexpr std::size_t kLargestBody = 4096;
 constexpr std::size_t kLeastToken = 16;
 constexpr int kMostListeners = 8;  ///< tabs that follow a feed; each holds a thread
-constexpr int kThreads = 24;
 constexpr const char* kCookie = "cnerf_token";
 
+/// By the address, not by how it begins: 127.example.org is a name like any other.
 bool is_loopback(const std::string& host) {
-  return host == "localhost" || host == "::1" || host.starts_with("127.");
+  in_addr v4{};
+  in6_addr v6{};
+  if (host == "localhost") return true;
+  if (::inet_pton(AF_INET, host.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
+  return ::inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
 }
 
 const char* content_type(const fs::path& file) {
@@ -46,10 +58,48 @@ const char* content_type(const fs::path& file) {
   return found == types.end() ? "application/octet-stream" : found->second;
 }
 
-/// "name:port" without the port.
+/// "name:port" and "[address]:port" without the port; empty where it is neither.
 std::string host_name(const std::string& header) {
-  if (header.starts_with('[')) return header.substr(1, header.find(']') - 1);
-  return header.substr(0, header.find(':'));
+  const bool is_bracketed = header.starts_with('[');
+  const std::size_t end = std::min(header.find(is_bracketed ? ']' : ':'), header.size());
+  const std::string port = header.substr(std::min(end + (is_bracketed ? 1 : 0), header.size()));
+  const bool has_plain_port =
+      port.empty() ||
+      (port[0] == ':' && std::all_of(port.begin() + 1, port.end(), [](char c) { return c >= '0' && c <= '9'; }));
+  if (!has_plain_port || (is_bracketed && end == header.size())) return {};
+  return is_bracketed ? header.substr(1, end - 1) : header.substr(0, end);
+}
+
+/// Bytes [begin, begin + count) of a file.
+struct Part {
+  std::size_t begin = 0, count = 0;
+};
+
+/// What a Range header asks for; all of it where that is not one range in bytes, which HTTP allows.
+/// @return  nothing where the file has no such part
+std::optional<Part> part_of(const std::string& header, std::size_t size) {
+  constexpr std::string_view kUnit = "bytes=";
+  const Part whole{0, size};
+  const std::size_t dash = header.find('-');
+  if (!header.starts_with(kUnit) || dash == std::string::npos) return whole;
+  const auto number = [&](std::size_t begin, std::size_t end) -> std::optional<std::size_t> {
+    std::size_t value = 0;
+    const auto [stop, failure] = std::from_chars(header.data() + begin, header.data() + end, value);
+    return failure == std::errc() && stop == header.data() + end ? std::optional(value) : std::nullopt;
+  };
+  const bool has_begin = dash > kUnit.size(), has_end = dash + 1 < header.size();
+  const auto first = number(kUnit.size(), dash), last = number(dash + 1, header.size());
+  if ((has_begin && !first) || (has_end && !last) || (!has_begin && !has_end)) return whole;
+  if (!has_begin)
+    return *last == 0 ? std::nullopt : std::optional(Part{size - std::min(size, *last), std::min(size, *last)});
+  if (*first >= size || (has_end && *last < *first)) return std::nullopt;
+  return Part{*first, (has_end ? std::min(*last, size - 1) : size - 1) - *first + 1};
+}
+
+/// A path of this server to lead a browser to. One that begins with two slashes would be another server's.
+std::string own_path(const std::string& path) {
+  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || std::strchr("/-_.", c) != nullptr; };
+  return std::ranges::all_of(path, is_plain) && !path.starts_with("//") && path.starts_with('/') ? path : "/";
 }
 
 bool equal_in_constant_time(const std::string& a, const std::string& b) {
@@ -71,6 +121,7 @@ std::string cookie_of(const httplib::Request& request) {
 
 void refuse(httplib::Response& response, int status, const std::string& why) {
   response.status = status;
+  response.set_header("Connection", "close");  // a thread is not to wait for who was refused
   response.set_content(why + "\n", "text/plain; charset=utf-8");
 }
 
@@ -102,7 +153,7 @@ struct WebServer::State {
   std::vector<fs::path> folders;
   WebServerOptions options;
   LiveFeed* feed;
-  httplib::Server server;
+  HttpServer server;
   std::thread thread;
   int port = 0;
   std::atomic<int> listeners{0};
@@ -130,7 +181,7 @@ struct WebServer::State {
 
   [[nodiscard]] bool is_known_host(const httplib::Request& request) const {
     const std::string host = host_name(request.get_header_value("Host"));
-    if (host.empty()) return false;
+    if (host.empty() || request.get_header_value_count("Host") != 1) return false;
     return !is_loopback(options.host) || is_loopback(host);
   }
 
@@ -151,11 +202,17 @@ struct WebServer::State {
       refuse(response, 421, "this server answers to its own name only");
       return true;
     }
+    // Browsers say where a request comes from, programs need not.
+    if (control && request.has_header("Origin") &&
+        request.get_header_value("Origin") != "http://" + request.get_header_value("Host")) {
+      refuse(response, 403, "orders come from the server's own page only");
+      return true;
+    }
     if (options.token.empty()) return false;
     if (equal_in_constant_time(request.get_param_value("token"), options.token)) {
       response.set_header("Set-Cookie",
                           std::string(kCookie) + "=" + options.token + "; HttpOnly; SameSite=Strict; Path=/");
-      response.set_redirect(request.path, 303);
+      response.set_redirect(own_path(request.path), 303);
       return true;
     }
     if (equal_in_constant_time(cookie_of(request), options.token)) return false;
@@ -166,8 +223,34 @@ struct WebServer::State {
   void serve_file(const httplib::Request& request, httplib::Response& response) const {
     const fs::path file = find(request.path);
     if (file.empty()) return refuse(response, 404, "not here");
-    const std::vector<std::byte> bytes = read_binary_file(file);
-    response.set_content(reinterpret_cast<const char*>(bytes.data()), bytes.size(), content_type(file));
+    const auto opened =
+        std::make_shared<FileDescriptor>(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW));
+    struct stat state {};
+    if (opened->number() < 0 || ::fstat(opened->number(), &state) != 0 || !S_ISREG(state.st_mode)) {
+      return refuse(response, 404, "not here");
+    }
+    const auto size = std::size_t(state.st_size);
+    response.set_header("Accept-Ranges", "bytes");
+    if (size == 0) return response.set_content("", content_type(file));
+    const std::optional<Part> part = part_of(request.get_header_value("Range"), size);
+    if (!part) {
+      response.set_header("Content-Range", fmt::format("bytes */{}", size));
+      return refuse(response, 416, "the file has no such part");
+    }
+    if (part->count < size) {
+      response.status = 206;
+      response.set_header("Content-Range",
+                          fmt::format("bytes {}-{}/{}", part->begin, part->begin + part->count - 1, size));
+    }
+    // Piece by piece: memory does not grow with files and visitors.
+    response.set_content_provider(
+        part->count, content_type(file),
+        [opened, begin = part->begin](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
+          std::array<char, 65536> piece;
+          const ::ssize_t got = ::pread(opened->number(), piece.data(), std::min(length, piece.size()),
+                                        static_cast<::off_t>(begin + offset));
+          return got > 0 && sink.write(piece.data(), std::size_t(got));
+        });
   }
 
   void follow(httplib::Response& response) {
@@ -218,12 +301,8 @@ struct WebServer::State {
       const int yes = 1;
       ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
     });
-    server.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
     server.set_payload_max_length(kLargestBody);
-    server.set_read_timeout(5);
-    server.set_write_timeout(30);
     server.set_keep_alive_max_count(200);
-    server.set_keep_alive_timeout(5);
     server.set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
       return check(request, response) ? httplib::Server::HandlerResponse::Handled
                                       : httplib::Server::HandlerResponse::Unhandled;
@@ -275,6 +354,7 @@ void WebServer::start() {
     throw DeviceError(fmt::format("{}:{}: cannot be listened on; is the port in use, or the address another machine's?",
                                   host, s.options.port > 0 ? std::to_string(s.options.port) : "any"));
   }
+  s.server.widen_queue();
   s.thread = std::thread([&s] { s.server.listen_after_bind(); });
   while (!s.server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
@@ -282,7 +362,7 @@ void WebServer::start() {
 void WebServer::stop() {
   if (!state_->thread.joinable()) return;
   if (state_->feed != nullptr) state_->feed->close();
-  state_->server.stop();
+  state_->server.end();
   state_->thread.join();
 }
 

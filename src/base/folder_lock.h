@@ -1,0 +1,52 @@
+#pragma once
+/// One writer in a folder at a time: two programs that write the same files make a mixture of both.
+
+#include <filesystem>
+#include <memory>
+
+namespace cnerf {
+
+/// Holds a folder while it lives, by a lock of the operating system on `.cnerf.lock` in it: who dies lets go, and
+/// whoever only reads is not asked. A process that holds a folder may hold it again, as what it has or less.
+class FolderLock {
+ public:
+  enum class Mode {
+    kAlone,   ///< for who writes the folder's own files, or clears it
+    kShared,  ///< for who works in a folder below, which it holds alone
+  };
+
+  /// Makes the folder if needed; one that is left empty goes again.
+  /// @throws BusyError    at once when another process holds it, naming that process.
+  /// @throws OutputError  when nothing can be written there.
+  explicit FolderLock(const std::filesystem::path& folder, Mode mode = Mode::kAlone);
+
+  /// False on a file system that knows no locks (some network shares): the user has to take care.
+  [[nodiscard]] bool is_held() const;
+
+  /// The lock file's name, for who asks whether a folder is empty.
+  static constexpr const char* kFile = ".cnerf.lock";
+
+ private:
+  struct Held;
+  std::shared_ptr<Held> held_;
+};
+
+/// Removes what a folder holds, but not the lock of who clears it.  @throws OutputError.
+void clear_folder(const std::filesystem::path& folder);
+
+/// Whether a folder is missing or holds nothing but, perhaps, a lock.
+[[nodiscard]] bool is_vacant(const std::filesystem::path& folder);
+
+/// Waits until no other process changes a record of the folder: for reading, changing and writing it as one.
+class RecordTurn {
+ public:
+  explicit RecordTurn(const std::filesystem::path& folder);
+  ~RecordTurn();
+  RecordTurn(const RecordTurn&) = delete;
+  RecordTurn& operator=(const RecordTurn&) = delete;
+
+ private:
+  int folder_;
+};
+
+}  // namespace cnerf
