@@ -118,11 +118,19 @@ void add_field_options(CLI::App& app, const std::vector<Field>& fields) {
   }
 }
 
+void read_settings(const ConfigArguments& arguments, const std::vector<Field>& fields,
+                   const std::vector<RetiredKey>& retired) {
+  const auto read_file = [&](const std::filesystem::path& file) {
+    read_toml(read_text_file(file), file.string(), fields, retired);
+  };
+  if (!arguments.preset.empty()) read_file(preset_file(arguments.preset));
+  if (!arguments.file.empty()) read_file(arguments.file);
+  for (const std::string& setting : arguments.settings) apply_setting(setting, fields, retired);
+  for (const std::string& setting : arguments.short_forms) apply_setting(setting, fields, retired);
+}
+
 Config resolve_config(const ConfigArguments& arguments, Config base) {
-  if (!arguments.preset.empty()) read_config_file(preset_file(arguments.preset), base);
-  if (!arguments.file.empty()) read_config_file(arguments.file, base);
-  for (const std::string& setting : arguments.settings) apply_setting(setting, base);
-  for (const std::string& setting : arguments.short_forms) apply_setting(setting, base);
+  read_settings(arguments, fields_of(base), retired_keys());
   check_consistency(base);
   (void)engines_for(base.device);  // refuses a device that is not there
   set_thread_count(base.threads);

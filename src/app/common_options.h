@@ -39,6 +39,10 @@ void add_browser_options(CLI::App& app, web::BrowserOptions& options);
 /// @param fields  must outlive the parsing.
 void add_field_options(CLI::App& app, const std::vector<Field>& fields);
 
+/// Reads the arguments over fields: the preset, the file, --set and short forms.
+/// @throws UsageError, MissingInputError
+void read_settings(const ConfigArguments& arguments, const std::vector<Field>& fields,
+                   const std::vector<RetiredKey>& retired);
 /// `base` changed by the arguments, checked; also sets the number of threads and refuses a device that is not there.
 /// @throws UsageError, MissingInputError, DeviceError.
 [[nodiscard]] Config resolve_config(const ConfigArguments& arguments, Config base = {});

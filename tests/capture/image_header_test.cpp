@@ -81,7 +81,7 @@ TEST_F(Headers, TellWhatDecodingTells) {
 TEST_F(Headers, OfJpegFilesMayStandBehindOtherSegments) {
   const std::string plain = read_text_file(write("a.jpg", CV_8UC1));
   std::string content = plain.substr(0, 2);
-  for (int i = 0; i < 9; ++i) content += std::string("\xFF\xE2\xFF\xF0", 4) + std::string(0xFFEE, '\xFF');
+  for (int i = 0; i < 9; ++i) content.append("\xFF\xE2\xFF\xF0", 4).append(0xFFEE, '\xFF');
   write_file(folder_ / "a.jpg", content + "\xFF\xFF" + plain.substr(2));
   expect_header(folder_ / "a.jpg", PixelDepth::kU8, false, false);
 }

@@ -15,11 +15,13 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/process.h"
+#include "tests/bake/analytic_field.h"
 #include "tests/export/test_volumes.h"
 #include "tests/support/data.h"
 
 namespace cnerf::exporting::test {
 using namespace cnerf::test;
+using namespace bake::test;
 namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
