@@ -11,6 +11,7 @@
 #include "export/vdb_limits.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/json.h"
 #include "src/base/json_record.h"
 #include "src/base/plugin.h"
 #include "src/base/process.h"
@@ -161,11 +162,7 @@ VdbSummary summarize_vdb(const fs::path& path) {
   check_exists(path);
   Reader reader("summary", path);
   const std::string text = reader.text(reader.begin());
-  try {
-    return from_json<VdbSummary>(nlohmann::ordered_json::parse(text), path);
-  } catch (const nlohmann::json::exception& error) {
-    throw InputError(path.string() + ": cannot be described: " + error.what());
-  }
+  return from_json<VdbSummary>(parse_json(text, path), path);
 }
 
 }  // namespace cnerf::exporting

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <new>
 #include <span>
@@ -22,11 +21,12 @@
 namespace cnerf::exporting {
 namespace {
 
-void limit(int resource, rlim_t most) {
+template <typename Resource>
+void limit(Resource resource, rlim_t most) {
   rlimit now{};
-  ::getrlimit(__rlimit_resource_t(resource), &now);
+  ::getrlimit(resource, &now);
   now.rlim_cur = std::min(most, now.rlim_max);
-  ::setrlimit(__rlimit_resource_t(resource), &now);
+  ::setrlimit(resource, &now);
 }
 
 /// What is mapped already: libraries for the most part.

@@ -14,7 +14,6 @@
 #include <array>
 #include <atomic>
 #include <charconv>
-#include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -98,7 +97,8 @@ std::optional<Part> part_of(const std::string& header, std::size_t size) {
 
 /// A path of this server to lead a browser to. One that begins with two slashes would be another server's.
 std::string own_path(const std::string& path) {
-  const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || std::strchr("/-_.", c) != nullptr; };
+  constexpr std::string_view kPlain = "/-_.";
+  const auto is_plain = [&](unsigned char c) { return std::isalnum(c) != 0 || kPlain.find(char(c)) != kPlain.npos; };
   return std::ranges::all_of(path, is_plain) && !path.starts_with("//") && path.starts_with('/') ? path : "/";
 }
 
