@@ -250,13 +250,13 @@ void ManifestMesh::visit(Self& self, Visitor&& v) {
 }
 
 Json camera_json(const bake::Camera& camera) {
-  return to_json(CameraRecord{camera, {}});
+  return json_of(CameraRecord{camera, {}});
 }
 Json frame_json(const SceneFrame& frame) {
-  return to_json(FrameRecord{frame});
+  return json_of(FrameRecord{frame});
 }
 Json color_json(const bake::Provenance& provenance) {
-  return to_json(ColorRecord{provenance.colorizer, provenance.take});
+  return json_of(ColorRecord{provenance.colorizer, provenance.take});
 }
 
 ManifestVolume describe_volume(const bake::VolumePlanes& volume, const std::string& file, const VdbOptions& options,
@@ -303,7 +303,7 @@ fs::path write_manifest(const BakeManifest& manifest, const fs::path& folder) {
     record.cameras.push_back({camera, plate == manifest.plates.end() ? std::nullopt : std::optional(plate->second)});
   }
   const fs::path file = folder / "manifest.json";
-  write_file(file, to_json(record).dump(2) + "\n");
+  write_file(file, json_of(record).dump(2) + "\n");
   return file;
 }
 
@@ -315,7 +315,7 @@ BakeManifest read_manifest(const fs::path& file) {
                      "expected at most " + std::to_string(kManifestSchema) + ", found " + excerpt(schema) +
                          ": written by a newer cnerf");
   }
-  auto record = from_json<ManifestRecord>(json, file);
+  auto record = record_of<ManifestRecord>(json, file);
   BakeManifest& manifest = record.manifest;
   manifest.label.provenance.colorizer = record.color.colorizer;
   manifest.label.provenance.take = record.color.take;

@@ -162,7 +162,7 @@ VdbSummary summarize_vdb(const fs::path& path) {
   check_exists(path);
   Reader reader("summary", path);
   const std::string text = reader.text(reader.begin());
-  return from_json<VdbSummary>(parse_json(text, path), path);
+  return record_of<VdbSummary>(parse_json(text, path), path);
 }
 
 }  // namespace cnerf::exporting

@@ -67,7 +67,7 @@ void answer(const bake::Volume& volume) {
 void read(const std::string& what, const std::filesystem::path& file) {
   if (what == "volume") return answer(volume_in(file));
   // Text in a file is anybody's; JSON holds UTF-8 only.
-  answer(0, to_json(summary_in(file)).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  answer(0, json_of(summary_in(file)).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
 int guarded_main(const std::string& what, const std::filesystem::path& file) {

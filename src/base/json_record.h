@@ -156,7 +156,7 @@ void read(const Json& json, const std::string& where, T& value) {
 
 /// A record as JSON, its fields in the order of `visit`.
 template <json_record::Record Record>
-[[nodiscard]] nlohmann::ordered_json to_json(const Record& record) {
+[[nodiscard]] nlohmann::ordered_json json_of(const Record& record) {
   return json_record::written(record);
 }
 
@@ -164,7 +164,7 @@ template <json_record::Record Record>
 /// @param file  that errors name
 /// @throws Problem  "file: field: what is wrong"; any type that is made of a message
 template <json_record::Record Record, typename Problem = InputError>
-[[nodiscard]] Record from_json(const nlohmann::ordered_json& json, const std::filesystem::path& file) {
+[[nodiscard]] Record record_of(const nlohmann::ordered_json& json, const std::filesystem::path& file) {
   try {
     Record record;
     json_record::read(json, "", record);
@@ -175,10 +175,10 @@ template <json_record::Record Record, typename Problem = InputError>
   }
 }
 
-/// The record that a JSON file holds.  @throws MissingInputError, and Problem as `from_json`.
+/// The record that a JSON file holds.  @throws MissingInputError, and Problem as `record_of`.
 template <json_record::Record Record, typename Problem = InputError>
 [[nodiscard]] Record read_record(const std::filesystem::path& file) {
-  return from_json<Record, Problem>(read_json<Problem>(file), file);
+  return record_of<Record, Problem>(read_json<Problem>(file), file);
 }
 
 }  // namespace cnerf

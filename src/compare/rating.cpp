@@ -131,7 +131,7 @@ RatingSheet make_rating_sheet(std::vector<RatedPicture> pictures, std::uint64_t 
   }
   const std::string shown = views.dump();
   key.sheet = sha256(std::as_bytes(std::span(shown))).substr(0, 16);
-  return {page_with(kRatingPage, {{"sheet", key.sheet}, {"views", views}}), to_json(key).dump(1) + "\n"};
+  return {page_with(kRatingPage, {{"sheet", key.sheet}, {"views", views}}), json_of(key).dump(1) + "\n"};
 }
 
 std::vector<MethodRating> read_ratings(const fs::path& key_file, std::span<const fs::path> answers) {
@@ -151,7 +151,7 @@ std::vector<MethodRating> read_ratings(const fs::path& key_file, std::span<const
 
 std::string ratings_json(std::span<const MethodRating> ratings) {
   const auto scale = [](Estimate estimate) {
-    Json json = to_json(estimate);
+    Json json = json_of(estimate);
     json.erase("n");  // stands in "raters"
     return json;
   };

@@ -94,7 +94,7 @@ std::string report_html(std::span<const Cell> cells, const Summary& summary, std
     if (std::ranges::find(cells, std::string(method.name), &Cell::method) == cells.end()) continue;
     data["methods"].push_back({{"name", method.name}, {"summary", method.summary}});
   }
-  for (const ReportCapture& capture : captures) data["captures"].push_back(to_json(capture));
+  for (const ReportCapture& capture : captures) data["captures"].push_back(json_of(capture));
   return page_with(kReportPage, data);
 }
 

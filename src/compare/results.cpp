@@ -15,7 +15,7 @@ constexpr int kTableSchemaVersion = 1;
 template <typename Record>
 Json list_of(const std::vector<Record>& records) {
   Json list = Json::array();
-  for (const Record& record : records) list.push_back(to_json(record));
+  for (const Record& record : records) list.push_back(json_of(record));
   return list;
 }
 
@@ -23,7 +23,7 @@ Json json_of(const Row& row) {
   Json json = {{"method", row.method}};
   if (!row.error.empty()) json["error"] = row.error;
   for (std::size_t c = 0; c < row.columns.size(); ++c) {
-    if (row.columns[c]) json[columns()[c].name] = to_json(*row.columns[c]);
+    if (row.columns[c]) json[columns()[c].name] = json_of(*row.columns[c]);
   }
   return json;
 }

@@ -167,7 +167,7 @@ Cell SeedRun::make(const Method& method) {
     cell.error = problem.what();
     bench_.observer.say(fmt::format("{} failed: {}", method.name, problem.what()));
   }
-  write_file(file, to_json(cell).dump(2) + "\n");
+  write_file(file, json_of(cell).dump(2) + "\n");
   return cell;
 }
 

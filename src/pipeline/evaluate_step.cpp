@@ -52,7 +52,7 @@ void evaluate_step(const RunContext& context, const EvaluateJob& job, const Engi
   metrics.take = job.take;
   metrics.colorizer = colorizer_name(directory, job.take);
 
-  const std::string json = to_json(metrics).dump(2) + "\n";
+  const std::string json = json_of(metrics).dump(2) + "\n";
   if (!job.take.empty()) write_file(directory.take_folder(job.take) / "metrics.json", json);
   write_file(directory.metrics_file(), json);
   write_png(directory.contact_sheet(), sheet.compose());

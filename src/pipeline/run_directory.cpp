@@ -26,18 +26,18 @@ struct Version {
 template <typename Record>
 Record read_run_record(const fs::path& file) {
   const auto json = read_json<SnapshotError>(file);
-  const int version = from_json<Version, SnapshotError>(json, file).schema_version;
+  const int version = record_of<Version, SnapshotError>(json, file).schema_version;
   if (version > kRunSchemaVersion) {
     throw SnapshotError(
         fmt::format("{}: schema_version: this program reads up to {}, the file has {}; it was written by a newer cnerf",
                     file.string(), kRunSchemaVersion, version));
   }
-  return from_json<Record, SnapshotError>(json, file);
+  return record_of<Record, SnapshotError>(json, file);
 }
 
 template <typename Record>
 void write_run_record(const fs::path& file, const Record& record) {
-  write_file(file, to_json(record).dump(2) + "\n");
+  write_file(file, json_of(record).dump(2) + "\n");
 }
 
 bool is_folder_name_character(char c) {

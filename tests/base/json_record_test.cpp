@@ -51,10 +51,10 @@ Outer filled() {
 }
 
 std::string refusal(const std::function<void(Json&)>& change) {
-  Json json = to_json(filled());
+  Json json = json_of(filled());
   change(json);
   try {
-    (void)from_json<Outer>(json, "cell.json");
+    (void)record_of<Outer>(json, "cell.json");
   } catch (const InputError& error) {
     return error.what();
   }
@@ -62,15 +62,15 @@ std::string refusal(const std::function<void(Json&)>& change) {
 }
 
 TEST(JsonRecord, WritesFieldsInOrderAndLeavesOutWhatIsEmpty) {
-  EXPECT_EQ(to_json(filled()).dump(),
+  EXPECT_EQ(json_of(filled()).dump(),
             R"({"seed":3,"is_done":true,"best":{"name":"a","psnr":20.5},"all":[{"name":"b"},{"name":"c","psnr":1.0}],)"
             R"("size":[1.5,2.0],"seconds":{"train":1.25},"file":"x/y"})");
 }
 
 TEST(JsonRecord, ReadsWhatItWrote) {
   const test::TempDir folder;
-  write_file(folder / "cell.json", to_json(filled()).dump());
-  EXPECT_EQ(to_json(read_record<Outer>(folder / "cell.json")), to_json(filled()));
+  write_file(folder / "cell.json", json_of(filled()).dump());
+  EXPECT_EQ(json_of(read_record<Outer>(folder / "cell.json")), json_of(filled()));
 }
 
 TEST(JsonRecord, ErrorsNameFileAndField) {

@@ -60,9 +60,9 @@ TEST(Comparison, ACellSurvivesItsFile) {
   Cell written = cell("flower", "colornerf", 2, 20.5, 0.25);
   written.error = "a \"quoted\" reason";
   written.stage1_curve = {{0.5, 20}, {1, 21}};
-  write_file(folder / "cell.json", to_json(written).dump(2));
+  write_file(folder / "cell.json", json_of(written).dump(2));
   const auto read = read_record<Cell>(folder / "cell.json");
-  EXPECT_EQ(to_json(read), to_json(written));
+  EXPECT_EQ(json_of(read), json_of(written));
   EXPECT_EQ(read.long_range.pixels, 0u);
   EXPECT_EQ(read.stage1_curve[1].value, 21);
   write_file(folder / "cell.json", std::string("{\"capture\": \"flower\"}"));

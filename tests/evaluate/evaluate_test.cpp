@@ -93,7 +93,7 @@ TEST(Evaluate, JsonHoldsWhatWasMeasuredAndNothingElse) {
   view.psnr_luminance = 26.5;
   view.ssim = 0.75;
   metrics.views.push_back(view);
-  const auto json = to_json(metrics);
+  const auto json = json_of(metrics);
   EXPECT_EQ(json.at("schema_version"), kMetricsSchemaVersion);
   EXPECT_EQ(json.at("mean").at("psnr_luminance"), 26.5);
   EXPECT_FALSE(json.at("mean").contains("psnr_rgb"));
