@@ -142,9 +142,7 @@ Journal::Journal() : file_(std::make_unique<File>()) {
 }
 
 Journal::Journal(const fs::path& file, const std::string& identity) : file_(std::make_unique<File>()) {
-  std::error_code failure;
-  if (file.has_parent_path()) fs::create_directories(file.parent_path(), failure);
-  if (failure) throw OutputError(file.parent_path().string() + ": cannot make the folder: " + failure.message());
+  if (file.has_parent_path()) make_folders(file.parent_path());
   file_->name = file.string();
   file_->identity = identity;
   file_->open();

@@ -39,7 +39,6 @@ Work declare_bake(CLI::App& app) {
   add_short_form(app, arguments->run.config, "--voxel-size", "bake.voxel_size");
   add_short_form(app, arguments->run.config, "--grids", "bake.grids");
   add_short_form(app, arguments->run.config, "--budget", "bake.budget");
-  add_short_form(app, arguments->run.config, "--max-memory", "bake.max_memory");
   add_flag_form(app, arguments->run.config, "--keep-unseen", "bake.keep_unseen");
   add_flag_form(app, arguments->run.config, "--nvdb", "vdb.nvdb");
   add_flag_form(app, arguments->run.config, "--usd", "vdb.usd");

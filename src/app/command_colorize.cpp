@@ -23,6 +23,7 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
   // A take that is gone on with has its own configuration; a new one starts from the run's.
   const std::string base = arguments.existing.resume ? arguments.run.take : "";
   pipeline::RunContext context = open_run(arguments.run, base, command_line, reporter);
+  refuse_colorizer_of_others(arguments.run.config, context.config);
   const Engines& engines = engines_for(context.config.device);
   pipeline::choose_colorizer(context.capture.root, context.config, reporter);
   if (!arguments.bases.empty()) context.config.stage2.purify.picked_bases = arguments.bases;

@@ -8,6 +8,7 @@
 #include "src/compare/baselines/simulated.h"
 #include "src/compare/rating.h"
 #include "src/compare/run.h"
+#include "src/pipeline/run_context.h"
 
 namespace cnerf::app {
 namespace fs = std::filesystem;
@@ -42,6 +43,9 @@ void run_comparison(const CompareArguments& arguments, const std::vector<std::st
   plan.lpips_weights = arguments.lpips_weights;
   plan.style_reference = arguments.style_reference;
   plan.command_line = joined(command_line);
+  // Parts with other seeds may run side by side.
+  const auto mode = arguments.overwrite ? FolderLock::Mode::kAlone : FolderLock::Mode::kShared;
+  const FolderLock lock = pipeline::lock_folder(plan.report, mode, reporter);
   begin_report(plan.report, {arguments.resume || arguments.only_report, arguments.overwrite});
   Run comparison(std::move(plan), config, reporter);
   write_file(fs::path(arguments.out) / "config.toml", to_toml(config));

@@ -21,6 +21,7 @@ void run(RunArguments arguments, const std::vector<std::string>& command_line) {
   const pipeline::RunDirectory directory(job.out);
   const bool goes_on = job.existing.resume && directory.exists();
   const Config config = resolve_config(arguments.config, goes_on ? directory.config("", reporter) : Config{});
+  refuse_colorizer_of_others(arguments.config, config);
   const auto bake = pipeline::run(job, config, engines_for(config.device), reporter);
   reporter.next("cnerf view " + job.out.string());
   if (job.formats.has_manifest()) {

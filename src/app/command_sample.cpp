@@ -21,6 +21,7 @@ struct SampleArguments {
 void sample(const SampleArguments& arguments) {
   Reporter reporter(progress_style(arguments.progress, stdout));
   set_thread_count(arguments.threads);
+  const FolderLock lock = pipeline::lock_folder(arguments.out, FolderLock::Mode::kAlone, reporter);
   refuse_existing(fs::path(arguments.out) / "transforms.json", arguments.overwrite);
   write_sample_scene(arguments.out, arguments.options, reporter.progress_sink());
   reporter.wrote("capture", arguments.out);

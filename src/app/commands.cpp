@@ -40,6 +40,17 @@ void refuse_unknown_words(const CLI::App& app) {
                    " (cnerf " + app.get_name() + " --help lists the options)");
 }
 
+/// What an unset variable of a shell leaves: a folder of no name would be the one the user stands in.
+void refuse_empty_values(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& value : option->results()) {
+      if (value.empty() && option->get_name() != "--prompt") {
+        throw UsageError(option->get_name(true) + ": expected a value, found nothing between the quotes");
+      }
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<ParsedCommand> declare_commands(CLI::App& program) {
@@ -56,6 +67,7 @@ const ParsedCommand& chosen_command(const CLI::App& program, const std::vector<P
   for (const ParsedCommand& each : commands) {
     if (!each.app->parsed()) continue;
     refuse_unknown_words(*each.app);
+    refuse_empty_values(*each.app);
     return each;
   }
   if (!program.remaining().empty()) refuse_unknown_command(program.remaining().front());

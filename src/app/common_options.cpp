@@ -8,6 +8,7 @@
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/base/text.h"
+#include "src/base/usage.h"
 #include "src/config/toml_binding.h"
 #include "src/engine/engines.h"
 
@@ -57,6 +58,7 @@ void add_config_options(CLI::App& app, ConfigArguments& arguments) {
       ->take_all();
   add_short_form(app, arguments, "--device", "device");
   add_short_form(app, arguments, "--threads", "threads");
+  add_short_form(app, arguments, "--max-memory", "max_memory");
   app.add_option("--progress", arguments.progress, "auto, line, plain, json or quiet");
 }
 
@@ -98,6 +100,7 @@ void add_browser_options(CLI::App& app, web::BrowserOptions& options) {
 
 void add_colorizer_options(CLI::App& app, ConfigArguments& arguments) {
   add_short_form(app, arguments, "--colorizer", "colorizer.spec");
+  app.add_flag("--trust", arguments.is_trusting, "Ask the program or script that the run's own configuration names");
   add_short_form(app, arguments, "--prompt", "colorizer.prompt");
   add_list_form(app, arguments, "--keyframe", "colorizer.keyframes");
   add_list_form(app, arguments, "--hint", "colorizer.hints");
@@ -134,7 +137,19 @@ Config resolve_config(const ConfigArguments& arguments, Config base) {
   check_consistency(base);
   (void)engines_for(base.device);  // refuses a device that is not there
   set_thread_count(base.threads);
+  if (!base.max_memory.empty()) limit_memory(base.max_memory);
   return base;
+}
+
+void refuse_colorizer_of_others(const ConfigArguments& arguments, const Config& config) {
+  const std::string& spec = config.colorizer.spec;
+  const bool is_code = spec.starts_with("exec:") || spec.starts_with("torchscript:");
+  if (!is_code || arguments.is_trusting) return;
+  Config named_by_user;
+  read_settings(arguments, fields_of(named_by_user), retired_keys());
+  if (named_by_user.colorizer.spec == spec) return;
+  throw UsageError("the run's configuration names the colorizer " + printable(spec) +
+                   ", which would run with your rights; pass --trust if you know who made the run, or --colorizer");
 }
 
 Reporter make_reporter(const ConfigArguments& arguments) {

@@ -20,9 +20,10 @@ struct ConfigArguments {
   std::vector<std::string> settings;     ///< of --set
   std::vector<std::string> short_forms;  ///< "--downscale 2" as "capture.downscale=2"
   std::string progress = "auto";
+  bool is_trusting = false;  ///< whoever made the run folder, whose colorizer is code
 };
 
-/// Declares --preset, --config, --set, --device, --threads and --progress.
+/// Declares --preset, --config, --set, --device, --threads, --max-memory and --progress.
 void add_config_options(CLI::App& app, ConfigArguments& arguments);
 /// Declares `option` as a short form of the config key `key`, which brings its help and what is legal along.
 void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
@@ -30,7 +31,7 @@ void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string
 void add_flag_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
 /// The same for a key that holds a list separated by `;`: the option may be repeated.
 void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
-/// Declares --colorizer, --prompt, --keyframe, --hint and --hint-image.
+/// Declares --colorizer, --trust, --prompt, --keyframe, --hint and --hint-image.
 void add_colorizer_options(CLI::App& app, ConfigArguments& arguments);
 /// Declares --port, --host, --token, --token-file and --no-browser.
 void add_browser_options(CLI::App& app, web::BrowserOptions& options);
@@ -46,6 +47,10 @@ void read_settings(const ConfigArguments& arguments, const std::vector<Field>& f
 /// `base` changed by the arguments, checked; also sets the number of threads and refuses a device that is not there.
 /// @throws UsageError, MissingInputError, DeviceError.
 [[nodiscard]] Config resolve_config(const ConfigArguments& arguments, Config base = {});
+
+/// A run's folder is data, whoever made it, but for the colorizer that its configuration may name.
+/// @throws UsageError  where that one runs a program or a script, and the user neither named it nor passed --trust.
+void refuse_colorizer_of_others(const ConfigArguments& arguments, const Config& config);
 
 [[nodiscard]] Reporter make_reporter(const ConfigArguments& arguments);
 

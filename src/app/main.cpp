@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
+#include <filesystem>
 #include <new>
 
 #include "src/app/command.h"
 #include "src/base/error.h"
 #include "src/base/progress.h"
+#include "src/base/text.h"
 #include "src/pipeline/version.h"
 
 namespace cnerf::app {
@@ -21,7 +24,23 @@ std::vector<std::string> without_token(std::vector<std::string> words) {
   return words;
 }
 
+/// What holds for every word: names go into JSON, glTF and VDB files, which hold UTF-8.
+void check_words(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    if (!is_utf8(argv[i])) throw UsageError("expected words in UTF-8, found '" + printable(argv[i]) + "'");
+  }
+}
+
+/// Libraries say by their own exceptions that memory did not suffice.
+bool is_shortage_of_memory(const std::exception& error) {
+  const std::string text = error.what();
+  const auto has = [&](const char* words) { return text.find(words) != std::string::npos; };
+  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr || has("can't allocate memory") ||
+         has("not enough memory") || has("Insufficient memory") || has("Failed to allocate");
+}
+
 void run_program(CLI::App& program, int argc, char** argv) {
+  check_words(argc, argv);
   program.allow_extras();
   program.set_version_flag("--version", "cnerf " + pipeline::version_text());
   program.set_help_flag("-h,--help", "Show what there is");
@@ -54,9 +73,14 @@ int guarded_main(int argc, char** argv) {
     return failed(error.exit_code(), error.what());
   } catch (const Error& error) {
     return failed(error.exit_code(), std::string("error: ") + error.what());
-  } catch (const std::bad_alloc&) {
-    return failed(ExitCode::kDevice, "error: out of memory; a larger --downscale or a smaller preset needs less");
+  } catch (const std::filesystem::filesystem_error& error) {
+    const bool is_missing = error.code() == std::errc::no_such_file_or_directory;
+    return failed(is_missing ? ExitCode::kMissingInput : ExitCode::kOutput,
+                  "error: " + error.path1().string() + ": " + error.code().message());
   } catch (const std::exception& error) {
+    if (is_shortage_of_memory(error)) {
+      return failed(ExitCode::kMemory, "error: out of memory; a larger --downscale or a smaller preset needs less");
+    }
     return failed(ExitCode::kInternal, std::string("internal error, please report it: ") + error.what());
   }
 }
@@ -66,5 +90,9 @@ int guarded_main(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   cnerf::install_interruption_handler();
-  return cnerf::app::guarded_main(argc, argv);
+  const int code = cnerf::app::guarded_main(argc, argv);
+  std::fflush(nullptr);
+  // A network that gave no answer in time may still be computing, in a thread that cannot be stopped.
+  if (code == int(cnerf::ExitCode::kColorizer)) std::_Exit(code);
+  return code;
 }

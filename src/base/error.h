@@ -16,11 +16,13 @@ enum class ExitCode : int {
   kMissingInput = 66,  ///< a file or folder that should exist does not
   kDevice = 69,        ///< a device that was asked for is not there, or failed
   kInternal = 70,      ///< our own contract was broken: a bug
+  kMemory = 71,        ///< memory did not suffice
   kOutput = 73,        ///< the output cannot be written: permissions, full disk
   kBusy = 75,          ///< another cnerf works in the same folder; later it may go
   kColorizer = 76,     ///< a colorizer failed, timed out or answered nonsense
   kPoses = 77,         ///< no camera poses can be found: no overlap, no parallax, too few views placed
   kSnapshot = 78,      ///< a snapshot of another version, or cut short
+  kDiverged = 79,      ///< training ran into numbers that are not finite; the last good snapshot is kept
   kInterrupted = 130,  ///< Ctrl-C; progress was saved
 };
 
@@ -78,6 +80,11 @@ struct PosesError : Error {
 /// A snapshot this program cannot continue from.
 struct SnapshotError : Error {
   explicit SnapshotError(const std::string& message) : Error(ExitCode::kSnapshot, message) {}
+};
+
+/// A training whose loss or parameters are no longer finite.
+struct DivergedError : Error {
+  explicit DivergedError(const std::string& message) : Error(ExitCode::kDiverged, message) {}
 };
 
 /// Raised after the state was saved when the user pressed Ctrl-C.

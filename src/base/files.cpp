@@ -1,6 +1,9 @@
 #include "src/base/files.h"
 
+#include <fcntl.h>
 #include <openssl/evp.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -54,27 +57,91 @@ class Sha256 {
   std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
 };
 
+constexpr const char* kMark = ".partial-";  // in the names of temporary files
+
+/// The time of a temporary file that nobody has opened for writing yet.
+constexpr ::timespec kUntouched[2] = {{0, 0}, {0, 0}};
+
+OutputError cannot_be_written(const fs::path& file) {
+  return OutputError(file.string() + ": cannot be written: " + std::strerror(errno));
+}
+
+/// The folder that a name is in.
+fs::path folder_of(const fs::path& path) {
+  const fs::path folder = path.parent_path();
+  return folder.empty() ? fs::path(".") : folder;
+}
+
+/// Waits until the content is on the disk. False with errno; what cannot be synchronised (a pipe, some network shares)
+/// has nothing to wait for.
+bool synced(const FileDescriptor& file) {
+  return ::fsync(file.number()) == 0 || errno == EINVAL || errno == ENOTSUP || errno == EROFS;
+}
+
+/// Waits until the names in a folder are on the disk.
+void sync_folder(const fs::path& folder) {
+  const FileDescriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (file.number() >= 0 && !synced(file)) throw cannot_be_written(folder);  // without leave to read it, nothing to do
+}
+
 }  // namespace
 
-void write_atomically(const fs::path& target, const std::function<void(const fs::path&)>& write) {
-  std::error_code failure;
-  if (target.has_parent_path()) fs::create_directories(target.parent_path(), failure);
-  if (failure) throw OutputError(target.parent_path().string() + ": cannot make the folder: " + failure.message());
+NewFile::NewFile(fs::path target)
+    : target_(std::move(target)),
+      temporary_(target_.parent_path() /
+                 ("." + target_.stem().string() + kMark + std::to_string(::getpid()) + target_.extension().string())) {
+  if (target_.has_parent_path()) make_folders(target_.parent_path());
+  bool is_locked = true;
+  do {
+    file_.reset(::open(temporary_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666));
+    if (file_.number() < 0) throw cannot_be_written(target_);
+    is_locked = file_.lock(LOCK_EX);                      // false where there are no locks
+  } while (is_locked && !file_.is_still_at(temporary_));  // somebody took it for a leftover in between
+  (void)::futimens(file_.number(), kUntouched);
+}
 
-  const fs::path temporary = target.parent_path() / ("." + target.stem().string() + ".partial-" +
-                                                     std::to_string(::getpid()) + target.extension().string());
-  try {
-    write(temporary);
-  } catch (...) {
-    fs::remove(temporary, failure);
-    throw;
+NewFile::~NewFile() {
+  if (!is_committed_) ::unlink(temporary_.c_str());
+}
+
+void NewFile::commit() {
+  struct stat state {};
+  if (::fstat(file_.number(), &state) == 0 && state.st_mtime == 0) {
+    throw OutputError(target_.string() + ": cannot be written: nothing was");
   }
-  fs::rename(temporary, target, failure);
-  if (failure) {
-    const std::string reason = failure.message();
-    fs::remove(temporary, failure);
-    throw OutputError(target.string() + ": cannot be written: " + reason);
+  if (!file_.is_still_at(temporary_)) file_.reset(::open(temporary_.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+  if (!synced(file_) || ::rename(temporary_.c_str(), target_.c_str()) != 0) throw cannot_be_written(target_);
+  is_committed_ = true;
+  sync_folder(folder_of(target_));
+}
+
+void write_atomically(const fs::path& target, const std::function<void(const fs::path&)>& write) {
+  NewFile file(target);
+  write(file.temporary());
+  file.commit();
+}
+
+void remove_leftovers(const fs::path& folder, int depth) {
+  std::error_code failure;
+  for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end; entry.increment(failure)) {
+    const fs::path& path = entry->path();
+    const std::string name = path.filename().string();
+    if (depth > 0 && entry->is_directory(failure) && !entry->is_symlink(failure)) remove_leftovers(path, depth - 1);
+    if (!name.starts_with('.') || name.find(kMark) == std::string::npos) continue;
+    const FileDescriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    if (file.lock(LOCK_EX | LOCK_NB) && file.is_still_at(path)) ::unlink(path.c_str());
   }
+}
+
+bool make_folders(const fs::path& folder) {
+  std::error_code failure;
+  if (fs::is_directory(folder, failure)) return false;
+  const fs::path above = folder_of(folder);
+  if (above != folder) make_folders(above);
+  fs::create_directory(folder, failure);
+  if (failure) throw OutputError(folder.string() + ": cannot make the folder: " + failure.message());
+  sync_folder(above);
+  return true;
 }
 
 void write_file(const fs::path& target, std::span<const std::byte> content) {

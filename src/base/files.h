@@ -9,14 +9,44 @@
 #include <string_view>
 #include <vector>
 
+#include "src/base/file_descriptor.h"
+
 namespace cnerf {
 
-/// Lets `write` fill a temporary file beside `target`, then renames it over `target`.
-/// When `write` throws, the temporary file is removed and `target` stays as it was. The temporary name keeps the
-/// extension of `target`, since libraries choose a format by it. Missing parent folders are made.
-/// @throws OutputError  when the folder cannot be made or the file cannot be renamed.
+/// A file that comes into being whole. What is written goes to a temporary file beside the target and takes its place
+/// at `commit`, when it is on the disk: neither a kill nor a power cut leaves half a file, or none where one was.
+class NewFile {
+ public:
+  /// Missing parent folders are made.  @throws OutputError  when the temporary file cannot be made.
+  explicit NewFile(std::filesystem::path target);
+  /// Without `commit`, the temporary file goes and the target stays as it was.
+  ~NewFile();
+  NewFile(const NewFile&) = delete;
+  NewFile& operator=(const NewFile&) = delete;
+
+  /// To be opened and written by whoever makes the content. It has the extension of the target, since libraries choose
+  /// a format by it.
+  [[nodiscard]] const std::filesystem::path& temporary() const { return temporary_; }
+  /// @throws OutputError  naming the target, e.g. on a full disk; the target stays as it was.
+  void commit();
+
+ private:
+  std::filesystem::path target_, temporary_;
+  FileDescriptor file_;  ///< of the temporary file, locked while its writer lives
+  bool is_committed_ = false;
+};
+
+/// Lets `write` fill a NewFile, and commits it.  @throws OutputError, and what `write` throws.
 void write_atomically(const std::filesystem::path& target,
                       const std::function<void(const std::filesystem::path& temporary)>& write);
+
+/// Removes what writers that were killed left in a folder and, at most `depth` levels, below it: temporary files of
+/// NewFile that nobody writes to any more.
+void remove_leftovers(const std::filesystem::path& folder, int depth = 0);
+
+/// Makes a folder and those above it; their names are on the disk when it returns.
+/// @return  whether it is new  @throws OutputError
+bool make_folders(const std::filesystem::path& folder);
 
 /// Writes `content` by `write_atomically`.  @throws OutputError  naming the file, e.g. on a full disk.
 void write_file(const std::filesystem::path& target, std::span<const std::byte> content);

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,7 +15,8 @@
 
 #include "src/base/check.h"
 #include "src/base/error.h"
-#include "src/base/process.h"
+#include "src/base/file_descriptor.h"
+#include "src/base/files.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -46,21 +46,6 @@ std::string holder_of(int file) {
   return holder.empty() ? "" : " (" + holder + ")";
 }
 
-bool is_still_at(int file, const fs::path& path) {
-  struct stat ours {
-  }, there{};
-  return ::fstat(file, &ours) == 0 && ::lstat(path.c_str(), &there) == 0 && ours.st_ino == there.st_ino &&
-         ours.st_dev == there.st_dev;
-}
-
-int lock(int file, int operation) {
-  int result = 0;
-  do {
-    result = ::flock(file, operation);
-  } while (result == -1 && errno == EINTR);
-  return result;
-}
-
 }  // namespace
 
 struct FolderLock::Held {
@@ -78,7 +63,7 @@ struct FolderLock::Held {
       }
       take();
       // Whoever let go in between may have removed the file that is locked now.
-    } while (is_locked && !is_still_at(file.number(), path));
+    } while (is_locked && !file.is_still_at(path));
     if (!is_locked) return;
     const std::string holder = this_process().substr(0, kLongestHolder);
     // Only for messages: a full disk must not keep anybody from working.
@@ -86,7 +71,7 @@ struct FolderLock::Held {
   }
   /// The last one removes the file, while nobody else can have locked it.
   ~Held() {
-    if (!is_locked || lock(file.number(), LOCK_EX | LOCK_NB) != 0) return;
+    if (!is_locked || !file.lock(LOCK_EX | LOCK_NB)) return;
     ::unlink(path.c_str());
     if (is_new) ::rmdir(path.parent_path().c_str());  // if it is empty
   }
@@ -95,7 +80,7 @@ struct FolderLock::Held {
 
  private:
   void take() {
-    if (lock(file.number(), (mode == Mode::kAlone ? LOCK_EX : LOCK_SH) | LOCK_NB) == 0) return;
+    if (file.lock((mode == Mode::kAlone ? LOCK_EX : LOCK_SH) | LOCK_NB)) return;
     if (errno == EWOULDBLOCK) {
       throw BusyError("another cnerf" + holder_of(file.number()) + " works in " + path.parent_path().string());
     }
@@ -104,10 +89,10 @@ struct FolderLock::Held {
 };
 
 FolderLock::FolderLock(const fs::path& folder, Mode mode) {
+  const bool is_new = make_folders(folder);
   std::error_code failure;
-  const bool is_new = fs::create_directories(folder, failure);
   const fs::path path = fs::canonical(folder, failure) / kFile;
-  if (failure) throw OutputError(folder.string() + ": cannot make the folder: " + failure.message());
+  if (failure) throw OutputError(folder.string() + ": cannot be written to: " + failure.message());
 
   static std::mutex mutex;
   static std::map<fs::path, std::weak_ptr<Held>> held_here;
@@ -144,11 +129,7 @@ bool is_vacant(const fs::path& folder) {
 }
 
 RecordTurn::RecordTurn(const fs::path& folder) : folder_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-  if (folder_ >= 0) (void)lock(folder_, LOCK_EX);  // where there are no locks, there is no turn to wait for
-}
-
-RecordTurn::~RecordTurn() {
-  if (folder_ >= 0) ::close(folder_);
+  (void)folder_.lock(LOCK_EX);  // where there are no locks, there is no turn to wait for
 }
 
 }  // namespace cnerf

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <memory>
 
+#include "src/base/file_descriptor.h"
+
 namespace cnerf {
 
 /// Holds a folder while it lives, by a lock of the operating system on `.cnerf.lock` in it: who dies lets go, and
@@ -41,12 +43,9 @@ void clear_folder(const std::filesystem::path& folder);
 class RecordTurn {
  public:
   explicit RecordTurn(const std::filesystem::path& folder);
-  ~RecordTurn();
-  RecordTurn(const RecordTurn&) = delete;
-  RecordTurn& operator=(const RecordTurn&) = delete;
 
  private:
-  int folder_;
+  FileDescriptor folder_;
 };
 
 }  // namespace cnerf

@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "src/base/error.h"
+#include "src/base/text.h"
 
 extern char** environ;  // NOLINT: POSIX
 
@@ -98,11 +99,6 @@ std::string shell_word(const std::string& text) {
   std::string word = "'";
   for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return word + "'";
-}
-
-void FileDescriptor::reset(int number) {
-  if (number_ >= 0) ::close(number_);
-  number_ = number;
 }
 
 // ---- a started program --------------------------------------------------------------------------------------------
@@ -212,10 +208,11 @@ void PipedProcess::drain_errors() {
     if (got == -1 && errno == EINTR) continue;
     if (got == 0) errors_.reset();
     if (got <= 0) return;
-    stderr_tail_.append(buffer, std::size_t(got));
+    const std::string text = printable({buffer, std::size_t(got)});
+    stderr_tail_ += text;
     if (stderr_tail_.size() > kKeptErrorBytes) stderr_tail_.erase(0, stderr_tail_.size() - kKeptErrorBytes);
     for (ssize_t done = 0; done < got;) {
-      const ssize_t put = ::write(STDERR_FILENO, buffer + done, std::size_t(got - done));
+      const ssize_t put = ::write(STDERR_FILENO, text.data() + done, std::size_t(got - done));
       if (put <= 0) break;  // without a reader the tail is kept all the same
       done += put;
     }
@@ -256,6 +253,11 @@ PipeTrouble PipedProcess::read_all(std::span<std::byte> bytes, Deadline deadline
     bytes = bytes.subspan(std::size_t(got));
   }
   return PipeTrouble::kNone;
+}
+
+bool PipedProcess::has_unread_output() const {
+  pollfd waiting{output_.number(), POLLIN, 0};
+  return ::poll(&waiting, 1, 0) > 0 && (waiting.revents & POLLIN) != 0;
 }
 
 std::string PipedProcess::last_words() {

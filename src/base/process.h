@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "src/base/file_descriptor.h"
+
 namespace cnerf {
 
 /// The executable `name`, searched for on $PATH unless it contains a slash; nothing when there is none.
@@ -24,20 +26,6 @@ namespace cnerf {
 /// @throws OutputError  when the log cannot be written.  @throws DeviceError  when the program cannot be started.
 int run_program(const std::vector<std::string>& words, const std::filesystem::path& log,
                 const std::function<void()>& watch = {});
-
-/// An owned file descriptor, closed on exec as well: no other program inherits it and keeps a pipe open.
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int number = -1) : number_(number) {}
-  ~FileDescriptor() { reset(); }
-  FileDescriptor(const FileDescriptor&) = delete;
-  FileDescriptor& operator=(const FileDescriptor&) = delete;
-  void reset(int number = -1);
-  [[nodiscard]] int number() const { return number_; }
-
- private:
-  int number_;
-};
 
 /// A running program in a process group of its own: Ctrl-C reaches it through us only.
 class Process {
@@ -90,6 +78,8 @@ class PipedProcess {
   PipeTrouble write_all(std::span<const std::byte> bytes, Deadline deadline);
   PipeTrouble read_all(std::span<std::byte> bytes, Deadline deadline);
 
+  /// Whether it wrote something that nobody has read yet.
+  [[nodiscard]] bool has_unread_output() const;
   /// The last lines of stderr, ready to be appended to a message; empty when there were none.
   [[nodiscard]] std::string last_words();
   [[nodiscard]] Process& process() { return *process_; }

@@ -11,6 +11,34 @@ std::string two_digits(long number) {
 
 }  // namespace
 
+bool is_utf8(std::string_view text) {
+  for (std::size_t at = 0; at < text.size();) {
+    const auto first = static_cast<unsigned char>(text[at]);
+    const int more = first < 0x80 ? 0 : first < 0xC2 ? -1 : first < 0xE0 ? 1 : first < 0xF0 ? 2 : first < 0xF5 ? 3 : -1;
+    if (more < 0 || at + std::size_t(more) >= text.size()) return false;
+    char32_t character = more == 0 ? first : first & (0x3Fu >> more);
+    for (int i = 1; i <= more; ++i) {
+      const auto next = static_cast<unsigned char>(text[at + std::size_t(i)]);
+      if ((next & 0xC0) != 0x80) return false;
+      character = character << 6 | (next & 0x3Fu);
+    }
+    constexpr char32_t kSmallest[] = {0, 0x80, 0x800, 0x10000};
+    const bool is_surrogate = character >= 0xD800 && character < 0xE000;
+    if (character < kSmallest[more] || is_surrogate || character > 0x10FFFF) return false;
+    at += std::size_t(more) + 1;
+  }
+  return true;
+}
+
+std::string printable(std::string text) {
+  for (char& c : text) {
+    if (c == '\r') c = '\n';
+    const bool is_control = (c >= 0 && c < ' ') || c == 0x7F;
+    if (is_control && c != '\n' && c != '\t') c = '?';
+  }
+  return text;
+}
+
 std::string duration_text(double seconds) {
   const auto whole = std::lround(seconds);
   if (whole >= 3600) return std::to_string(whole / 3600) + " h " + two_digits(whole % 3600 / 60) + " min";

@@ -2,6 +2,7 @@
 /// Numbers and lists formatted for people.
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace cnerf {
@@ -12,6 +13,13 @@ namespace cnerf {
   for (const std::string& word : words) text += (text.empty() ? "" : separator) + word;
   return text;
 }
+
+/// Whether a text is UTF-8, as the names in JSON, TOML, VDB and glTF files have to be.
+[[nodiscard]] bool is_utf8(std::string_view text);
+
+/// A text as a terminal may show it: control characters, which may come from anybody's file or
+/// program, become `?`, and carriage returns ends of lines.
+[[nodiscard]] std::string printable(std::string text);
 
 /// "1 h 02 min", "3 min 20 s", "12 s".
 [[nodiscard]] std::string duration_text(double seconds);

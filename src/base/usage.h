@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <string>
 
 namespace cnerf {
 
@@ -10,6 +11,12 @@ namespace cnerf {
 [[nodiscard]] std::size_t peak_memory_bytes();
 /// Resident memory of the process now, bytes; 0 where the system does not report it.
 [[nodiscard]] std::size_t held_memory_bytes();
+
+/// Lets allocations fail (std::bad_alloc) where the process would come to hold more than this; memory of a GPU and what
+/// is reserved without being used do not count.
+/// @param amount  as `bytes_from` reads it
+/// @throws UsageError  naming `max_memory`, when the process holds more than that already
+void limit_memory(const std::string& amount);
 
 /// Measures seconds since its construction.
 class Stopwatch {

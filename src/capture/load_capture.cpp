@@ -1,11 +1,14 @@
 #include "src/capture/load_capture.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <exception>
 
 #include "src/base/error.h"
 #include "src/base/parallel.h"
+#include "src/base/text.h"
 #include "src/capture/black_background.h"
 #include "src/capture/image_io.h"
 #include "src/capture/listing.h"
@@ -143,6 +146,11 @@ CaptureListing first_whole(const std::vector<Source>& sources, int downscale) {
     try {
       CaptureListing listing = read_listing(source, downscale);
       listing.listed_images = listing.views.size();
+      for (const ListedView& view : listing.views) {
+        if (!is_utf8(view.name)) {
+          throw InputError(view.poses_file, printable(view.field), "expected an image name in UTF-8");
+        }
+      }
       drop_missing_images(listing);
       refuse_too_few(listing);
       if (!aside.empty()) listing.notes.push_back("poses: " + listing.source.string() + " is taken" + aside);
@@ -156,6 +164,23 @@ CaptureListing first_whole(const std::vector<Source>& sources, int downscale) {
 }
 
 // Images and intrinsics.
+
+/// What no camera has is a mistake in the file: with it, training would run into an empty field, or numbers that are
+/// none.
+void check_plausible(const ListedView& view, const Intrinsics& lens) {
+  const auto expect = [&](const char* field, double value, double least, double most) {
+    if (value >= least && value <= most) return;  // false for NaN
+    throw InputError(view.poses_file, view.field + "." + field,
+                     fmt::format("expected a number from {:g} to {:g}, found {:g}", least, most, value));
+  };
+  const double side = std::max(lens.width, lens.height);
+  for (const double focal : {lens.fx, lens.fy}) expect("focal length", focal, 0.01 * side, 1000 * side);
+  // A crop of a larger picture has its axis outside.
+  for (const double centre : {lens.cx, lens.cy}) expect("principal point", centre, -10 * side, 11 * side);
+  for (const double coefficient : lens.distortion) expect("distortion", coefficient, -1000, 1000);
+  for (int axis = 0; axis < 3; ++axis) expect("position", view.world_from_camera.translation[axis], -1e9, 1e9);
+  expect("exposure", view.exposure, 1e-4, 1e4);
+}
 
 /// Intrinsics for the image as stored: what the file leaves out follows from the size, and the numbers are checked.
 Intrinsics complete_intrinsics(const ListedView& view, int width, int height) {
@@ -174,15 +199,7 @@ Intrinsics complete_intrinsics(const ListedView& view, int width, int height) {
   if (out.fx == 0) out.fx = out.fy;
   if (out.cx == kCentred) out.cx = 0.5 * out.width;
   if (out.cy == kCentred) out.cy = 0.5 * out.height;
-  const auto is_positive = [](double v) { return std::isfinite(v) && v > 0; };
-  if (!is_positive(out.fx) || !is_positive(out.fy)) {
-    throw InputError(view.poses_file, view.field + ".focal length",
-                     "expected a positive number, found " + std::to_string(is_positive(out.fx) ? out.fy : out.fx));
-  }
-  if (!std::isfinite(out.cx) || !std::isfinite(out.cy) ||
-      !std::all_of(out.distortion.begin(), out.distortion.end(), [](double k) { return std::isfinite(k); })) {
-    throw InputError(view.poses_file, view.field + ".intrinsics", "expected finite numbers, found NaN or infinity");
-  }
+  check_plausible(view, out);
   return resized(out, width, height);
 }
 

@@ -16,18 +16,31 @@ std::string size_text(int batch, int height, int width) {
   return std::to_string(batch) + " patches of " + std::to_string(width) + "x" + std::to_string(height);
 }
 
-void check_values(const std::string& colorizer, const char* what, const std::vector<float>& values, int channels,
-                  const ChromaBatch& answer) {
+/// No colour of a screen is beyond +-110 in a or b, and files of Lab end at 128; networks overshoot a little.
+constexpr float kLargestAb = 160;
+constexpr float kLargestLogit = 1e6f;
+
+/// One of the two kinds of values that an answer may hold.
+struct Values {
+  const char* what;
+  const std::vector<float>& values;
+  int channels;
+  float largest;
+};
+
+void check_values(const std::string& colorizer, const Values& given, const ChromaBatch& answer) {
+  const auto& [what, values, channels, largest] = given;
   const std::size_t expected =
       std::size_t(answer.batch) * std::size_t(channels) * std::size_t(answer.height) * std::size_t(answer.width);
   if (values.size() != expected) {
     throw ColorizerError(colorizer + ": expected " + std::to_string(expected) + " values of " + what + ", got " +
                          std::to_string(values.size()));
   }
-  const auto bad = std::find_if_not(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
+  const auto bad = std::ranges::find_if_not(values, [&](float v) { return std::abs(v) <= largest; });  // nor NaN
   if (bad != values.end()) {
-    throw ColorizerError(colorizer + ": " + what + " value " + std::to_string(bad - values.begin()) +
-                         " is not a finite number");
+    throw ColorizerError(colorizer + ": " + what + " value " + std::to_string(bad - values.begin()) + ": expected a " +
+                         "number from " + std::to_string(-int(largest)) + " to " + std::to_string(int(largest)) +
+                         ", got " + std::to_string(*bad));
   }
 }
 
@@ -43,9 +56,9 @@ void check_answer(const std::string& colorizer, const LightnessBatch& question, 
                          " bins, got " + (answer.ab.empty() ? "neither" : "both"));
   }
   if (answer.has_distribution()) {
-    check_values(colorizer, "logits", answer.logits, kAbBinCount, answer);
+    check_values(colorizer, {"logits", answer.logits, kAbBinCount, kLargestLogit}, answer);
   } else {
-    check_values(colorizer, "ab", answer.ab, 2, answer);
+    check_values(colorizer, {"ab", answer.ab, 2, kLargestAb}, answer);
   }
 }
 

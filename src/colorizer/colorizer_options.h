@@ -22,7 +22,8 @@ struct ColorizerOptions {
     v("hint_images", hint_images, "pictures that are transparent except for strokes, VIEW=FILE;...");
     v("hints", hints, "dots of colour, x,y,VIEW,#rrggbb;... in pixels of the view's image file");
     v("prompt", prompt, "a text for colorizers that take one: exec: commands with {prompt} in them");
-    v("timeout_seconds", timeout_seconds, Range{0.1, 1e6}, "an exec: colorizer that takes longer for a batch failed");
+    v("timeout_seconds", timeout_seconds, Range{0.1, 1e6},
+      "an exec: or torchscript: colorizer that takes longer for a batch failed");
     v("reference_steps", reference_steps, Range{1, 1e6}, "optimiser steps of the fit to a reference: photograph");
     v("reference_on_builtin", reference_on_builtin, "that fit builds on what the built-in network makes of a picture");
   }

@@ -61,6 +61,7 @@ class ExecColorizer final : public Colorizer {
                                                                  std::chrono::duration<double>(timeout_seconds_));
     const QuestionHeader question{kQuestionMagic, kVersion, std::uint32_t(patches.batch), std::uint32_t(patches.height),
                                   std::uint32_t(patches.width)};
+    if (child_->has_unread_output()) stop("wrote more than it was asked for; does it print to standard output?");
     PipeTrouble trouble = child_->write_all(std::as_bytes(std::span(&question, 1)), deadline);
     if (trouble != PipeTrouble::kNone) return trouble;
     trouble = child_->write_all(std::as_bytes(std::span(patches.lightness)), deadline);

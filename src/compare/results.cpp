@@ -19,7 +19,7 @@ Json list_of(const std::vector<Record>& records) {
   return list;
 }
 
-Json json_of(const Row& row) {
+Json row_json(const Row& row) {
   Json json = {{"method", row.method}};
   if (!row.error.empty()) json["error"] = row.error;
   for (std::size_t c = 0; c < row.columns.size(); ++c) {
@@ -74,7 +74,7 @@ Json table_json(std::span<const Cell> cells, const Summary& summary) {
   if (captures.size() > 1) captures.emplace_back();
   for (const std::string& capture : captures) {
     Json rows = Json::array();
-    for (const Row& row : table_rows(cells, capture)) rows.push_back(json_of(row));
+    for (const Row& row : table_rows(cells, capture)) rows.push_back(row_json(row));
     json["tables"].push_back({{"capture", capture.empty() ? "all" : capture}, {"rows", std::move(rows)}});
   }
   json["duels"] = list_of(duels(cells));

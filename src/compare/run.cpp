@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/base/folder_lock.h"
 #include "src/base/json_record.h"
 #include "src/compare/baselines/simulated.h"
 #include "src/compare/rating.h"
@@ -11,10 +13,15 @@
 
 namespace cnerf::compare {
 namespace fs = std::filesystem;
+namespace {
+
+constexpr int kDeepestCell = 3;  // folders between a seed's and its files
+
+}  // namespace
 
 void begin_report(const fs::path& folder, ExistingReport existing) {
   std::error_code failure;
-  if (!fs::exists(folder, failure) || fs::is_empty(folder, failure)) return;
+  if (is_vacant(folder)) return;
   if (!fs::is_directory(folder / "runs", failure)) {
     throw UsageError(folder.string() + ": is not empty and holds no comparison; choose another folder");
   }
@@ -47,6 +54,8 @@ fs::path Run::folder_of(const Subject& subject, int seed) const {
 }
 
 void Run::make_cells(const Subject& subject, int seed) {
+  const FolderLock lock(folder_of(subject, seed));
+  remove_leftovers(folder_of(subject, seed), kDeepestCell);
   const Bench bench{plan_, config_, engines_, lpips_.get(), observer_};
   SeedRun seed_run(bench, subject, seed, folder_of(subject, seed));
   seed_run.train();

@@ -20,6 +20,7 @@ namespace cnerf {
 struct Config {
   std::string device = "auto";
   int threads = 0;
+  std::string max_memory;
   CaptureOptions capture;
   Stage1Options stage1;
   ColorizerOptions colorizer;
@@ -35,6 +36,7 @@ struct Config {
   void visit(Visitor&& v) {
     v("device", device, Choice{"auto", "cpu", "cuda"}, "where fields are trained, rendered and baked");
     v("threads", threads, Range{0, 4096}, "threads to use; 0 = all cores");
+    v("max_memory", max_memory, "memory the program may take, as 8G; needing more ends it with exit code 71");
     v.section("capture", capture);
     v.section("stage1", stage1);
     v.section("colorizer", colorizer);

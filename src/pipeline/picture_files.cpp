@@ -1,8 +1,7 @@
 #include "src/pipeline/picture_files.h"
 
-#include <unistd.h>
-
 #include <opencv2/videoio.hpp>
+#include <optional>
 #include <span>
 
 #include "export/texture_writer.h"
@@ -47,31 +46,25 @@ void write_exr(const fs::path& file, const RenderedImage& image, ShownColor colo
 }
 
 struct VideoFile::Encoder {
-  fs::path file, temporary;
+  fs::path file;
   int fps = 0;
   cv::Size size;
-  std::shared_ptr<cv::VideoWriter> writer;
+  std::optional<NewFile> output;
+  std::shared_ptr<cv::VideoWriter> writer;  ///< goes first
 };
 
 VideoFile::VideoFile(const fs::path& file, int fps) : encoder_(std::make_unique<Encoder>()) {
   encoder_->file = file;
-  encoder_->temporary = file.parent_path() / ("." + file.stem().string() + ".partial-" + std::to_string(::getpid()) +
-                                              file.extension().string());
   encoder_->fps = fps;
 }
 
-VideoFile::~VideoFile() {
-  encoder_->writer.reset();
-  std::error_code ignored;
-  fs::remove(encoder_->temporary, ignored);
-}
+VideoFile::~VideoFile() = default;
 
 bool VideoFile::add(const Picture& picture) {
   if (encoder_->size.empty()) {
-    std::error_code ignored;
-    fs::create_directories(encoder_->file.parent_path(), ignored);
     encoder_->size = {picture.width, picture.height};
-    encoder_->writer = create_video(encoder_->temporary.string(), encoder_->fps, encoder_->size);
+    encoder_->output.emplace(encoder_->file);
+    encoder_->writer = create_video(encoder_->output->temporary().string(), encoder_->fps, encoder_->size);
   }
   CNERF_CHECK_EQ(encoder_->size.width, picture.width);
   CNERF_CHECK_EQ(encoder_->size.height, picture.height);
@@ -82,13 +75,11 @@ bool VideoFile::add(const Picture& picture) {
 
 void VideoFile::finish() {
   encoder_->writer.reset();
-  std::error_code failure;
   // OpenCV reports no write errors; a file that cannot be opened again is what a full disk leaves.
-  if (!open_video(encoder_->temporary.string(), cv::CAP_ANY)->isOpened()) {
+  if (!open_video(encoder_->output->temporary().string(), cv::CAP_ANY)->isOpened()) {
     throw OutputError(encoder_->file.string() + ": cannot be written: the video is not readable, is the disk full?");
   }
-  fs::rename(encoder_->temporary, encoder_->file, failure);
-  if (failure) throw OutputError(encoder_->file.string() + ": cannot be written: " + failure.message());
+  encoder_->output->commit();
 }
 
 }  // namespace cnerf::pipeline

@@ -10,6 +10,7 @@
 #include "src/base/json.h"
 #include "src/capture/load_capture.h"
 #include "src/picture/encode.h"
+#include "src/pipeline/run_context.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
@@ -17,11 +18,6 @@ namespace {
 
 /// The mark of a folder that preparing began, so that nothing else is ever cleared.
 constexpr const char* kMark = "work/source.txt";
-
-bool is_empty_or_missing(const fs::path& folder) {
-  std::error_code failure;
-  return !fs::exists(folder, failure) || (fs::is_directory(folder, failure) && fs::is_empty(folder, failure));
-}
 
 /// What moved in a view, together with what was masked already, at the size of the view.
 cv::Mat1b still_part(const prepare::MotionMask& mask, const MonoImage& image) {
@@ -74,7 +70,6 @@ void mask_motion(const fs::path& capture, const prepare::MotionMaskOptions& opti
 /// @return  false where the capture is finished and stays
 bool begin_folder(const PrepareJob& job) {
   const auto& [source, out, options, existing] = job;
-  if (!fs::exists(source)) throw MissingInputError(source.string() + ": no such file or folder");
   const bool finished = fs::exists(out / "transforms.json");
   const bool ours = fs::exists(out / kMark);
   const std::string origin = fs::absolute(source).lexically_normal().string() + "\n";
@@ -83,7 +78,7 @@ bool begin_folder(const PrepareJob& job) {
                      "pass --overwrite, or choose another folder");
   }
   if (finished && ours && existing.resume) return false;
-  if (!is_empty_or_missing(out)) {
+  if (!is_vacant(out)) {
     if (!ours) throw UsageError(out.string() + ": is not empty and holds no prepared capture; choose another folder");
     if (!existing.resume && !existing.overwrite) {
       throw UsageError(out.string() +
@@ -104,6 +99,8 @@ bool begin_folder(const PrepareJob& job) {
 
 void prepare_step(const PrepareJob& job, const Engines& engines, Observer& observer) {
   const PrepareStepOptions& options = job.options;
+  if (!fs::exists(job.source)) throw MissingInputError(job.source.string() + ": no such file or folder");
+  const FolderLock lock = lock_folder(job.out, FolderLock::Mode::kAlone, observer);
   if (!begin_folder(job)) {
     observer.say("capture: " + job.out.string() + " was prepared before");
     const auto record = read_json(job.out / "prepare.json");

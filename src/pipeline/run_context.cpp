@@ -14,12 +14,16 @@
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
 
+/// Folders between one that a step holds and the files it writes: renders/NAME/PATH, bakes/NAME/web/LEVEL.
+constexpr int kDeepestOutput = 3;
+
 FolderLock lock_folder(const fs::path& folder, FolderLock::Mode mode, Observer& observer) {
   FolderLock lock(folder, mode);
   if (!lock.is_held()) {
     observer.say("note: " + folder.string() +
                  ": this file system has no locks; take care that no other cnerf writes there");
   }
+  remove_leftovers(folder, kDeepestOutput);
   return lock;
 }
 

@@ -31,7 +31,7 @@ struct ExistingOutput {
 /// Reads a capture and says what was found, with the reader's notes.
 [[nodiscard]] Capture read_capture(const std::filesystem::path& path, const Config& config, Observer& observer);
 
-/// FolderLock; says so where the file system has no locks.
+/// FolderLock; says so where the file system has no locks. Clears away what killed writers left there.
 [[nodiscard]] FolderLock lock_folder(const std::filesystem::path& folder, FolderLock::Mode mode, Observer& observer);
 /// For a step that works on a run and writes a folder of its own, which may lie in the run: holds that one alone, and
 /// keeps the run from being cleared.

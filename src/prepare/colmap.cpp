@@ -193,7 +193,7 @@ std::vector<LookVector> write_pictures(const std::vector<PreparedImage>& images,
 void write_masks(const std::vector<PreparedImage>& images, const fs::path& capture, const fs::path& folder) {
   for (const PreparedImage& image : images) {
     if (image.mask.empty()) continue;
-    fs::create_directories(folder);
+    make_folders(folder);
     fs::copy_file(capture / image.mask, folder / (image.name + ".png"), fs::copy_options::overwrite_existing);
   }
 }
@@ -287,7 +287,7 @@ void match_features(Colmap& colmap, const std::vector<PreparedImage>& images,
 void map_images(Colmap& colmap, const std::vector<PreparedImage>& images, const fs::path& work,
                 const ProgressSink& progress) {
   fs::remove_all(work / "sparse");
-  fs::create_directories(work / "sparse");
+  make_folders(work / "sparse");
   const char* command = "mapper";
   std::vector<std::string> words = {command,           "--database_path", work / "database.db", "--image_path",
                                     work / "pictures", "--output_path",   work / "sparse"};
@@ -349,7 +349,7 @@ fs::path free_lenses(Colmap& colmap, const fs::path& model, const std::vector<Pr
   const fs::path start = work / "free", adjusted = work / "adjusted";
   for (const fs::path& folder : {start, adjusted}) {
     fs::remove_all(folder);
-    fs::create_directories(folder);
+    make_folders(folder);
   }
   (void)colmap.run({"model_converter", "--input_path", model, "--output_path", start, "--output_type", "TXT"}, "lenses",
                    images.size(), progress);
@@ -413,7 +413,7 @@ double share_in_log(std::string_view log, std::size_t images) {
 PoseRecovery recover_poses(const std::vector<PreparedImage>& images, const fs::path& capture, const fs::path& work,
                            bool ordered, const ProgressSink& progress) {
   const Stopwatch watch;
-  fs::create_directories(work);
+  make_folders(work);
   Colmap colmap = find_colmap(work);
   Steps steps(work, fingerprint(images, capture));
 

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/base/statistics.h"
 #include "src/color/colorspace_math.h"
 #include "src/train/luminance/luminance_model.h"
@@ -116,7 +117,7 @@ std::vector<MotionMask> find_motion(const Capture& capture, const MotionMaskOpti
                                     const Engines& engines, Observer& observer) {
   const fs::path snapshot = work / "motion.snapshot";
   PartOfMotion fit(observer, 0, 0.8), comparison(observer, 0.8, 1);
-  fs::create_directories(work);
+  make_folders(work);
   Capture all = capture;  // held-out views move too, and are told best by a fit that has seen them
   for (View& view : all.views) view.held_out = false;
   train_stage1({all, quick_fit(options), snapshot}, engines, fit);

@@ -82,6 +82,42 @@ TEST(Files, TemporaryNameIsAnotherOneWithTheSameExtension) {
   });
 }
 
+TEST(Files, WhatAKilledWriterLeftGoesAndWhatIsBeingWrittenStays) {
+  const test::TempDir folder;
+  write_file(folder / "a/b/.hidden", "a user's");
+  const fs::path left = folder / "a/b/.x.partial-4194304.exr";
+  std::ofstream(left) << "half";
+  NewFile alive(folder / "a/b/y.exr");
+  std::ofstream(alive.temporary()) << "whole";
+
+  remove_leftovers(folder.path(), 1);
+  EXPECT_TRUE(fs::exists(left)) << "deeper than asked";
+  remove_leftovers(folder.path(), 2);
+  EXPECT_FALSE(fs::exists(left));
+  EXPECT_TRUE(fs::exists(folder / "a/b/.hidden"));
+  alive.commit();
+  EXPECT_EQ(read_text_file(folder / "a/b/y.exr"), "whole");
+  EXPECT_EQ(entries(folder / "a/b"), 2u);
+}
+
+TEST(Files, WhatIsAnotherFilesIsNoLeftover) {
+  const test::TempDir folder;
+  write_file(folder / "other/file", "kept");
+  fs::create_symlink(folder / "other/file", folder / ".x.partial-4194304.txt");
+  fs::create_directory_symlink(folder / "other", folder / "link");
+  std::ofstream(folder / "other/.x.partial-4194304.txt") << "half";
+  remove_leftovers(folder.path(), 0);
+  EXPECT_EQ(read_text_file(folder / "other/file"), "kept");
+  EXPECT_TRUE(fs::exists(folder / "other/.x.partial-4194304.txt")) << "links are not followed";
+}
+
+TEST(Files, MakesFoldersAndSaysWhichAreNew) {
+  const test::TempDir folder;
+  EXPECT_TRUE(make_folders(folder / "a/b/c/"));
+  EXPECT_FALSE(make_folders(folder / "a/b/c"));
+  EXPECT_THROW((void)make_folders(""), OutputError);
+}
+
 TEST(Files, WriterThatWritesNothingIsAnOutputError) {
   const test::TempDir folder;
   EXPECT_THROW(write_atomically(folder / "a.txt", [](const fs::path&) {}), OutputError);

@@ -134,10 +134,31 @@ TEST_F(ExecColorizer, AHugeShapeAllocatesNothing) {
   EXPECT_THAT(failure_of("    put(0, (2**31, 2, 2**31, 2**31), [])\n"), HasSubstr("2147483648"));
 }
 
+TEST_F(ExecColorizer, ColoursBeyondLabAreAnError) {
+  EXPECT_THAT(failure_of("    put(0, (B, 2, H, W), [1e30] * (B * 2 * H * W))\n"),
+              AllOf(HasSubstr("program.py"), HasSubstr("-160 to 160"), HasSubstr("1000000")));
+}
+
+TEST_F(ExecColorizer, MoreThanAskedForIsAnError) {
+  const auto colorizer =
+      test::colorizer_of(command("    put(0, (B, 2, H, W), [0.0] * (B * 2 * H * W))\n"
+                                 "    sink.write(b'more'); sink.flush()\n"
+                                 "    open('" +
+                                 (folder_ / "written").string() + "', 'w').close()\n"));
+  (void)colorizer->colorize(some_question());
+  while (!std::filesystem::exists(folder_ / "written")) std::this_thread::yield();
+  EXPECT_THAT(message_of<ColorizerError>([&] { (void)colorizer->colorize(some_question()); }),
+              HasSubstr("more than it was asked for"));
+}
+
+TEST_F(ExecColorizer, WhatItSaysCannotRuleTheTerminal) {
+  EXPECT_THAT(failure_of("    sys.stderr.write('\\x1b[2Jcleared'); sys.exit(3)\n"), HasSubstr("?[2Jcleared"));
+}
+
 TEST_F(ExecColorizer, NotANumberIsAnError) {
   EXPECT_THAT(failure_of("    sys.stderr.write('diverged\\n'); sys.stderr.flush()\n"
                          "    put(0, (B, 2, H, W), [float('nan')] * (B * 2 * H * W))\n"),
-              AllOf(HasSubstr("program.py"), HasSubstr("finite"), HasSubstr("diverged")));
+              AllOf(HasSubstr("program.py"), HasSubstr("got nan"), HasSubstr("diverged")));
 }
 
 TEST_F(ExecColorizer, PrintingToStandardOutputIsExplained) {

@@ -100,7 +100,23 @@ TEST_F(TorchScriptColorizer, AWrongShapeIsExplained) {
 TEST_F(TorchScriptColorizer, FailuresOfTheModuleAreNamed) {
   EXPECT_THAT(failure_of(module_of("    assert x.size(1) == 3, \"no such mood\"\n    return x\n")),
               AllOf(HasSubstr("module1.pt"), HasSubstr("[2, 1, 6, 5]"), HasSubstr("no such mood")));
-  EXPECT_THAT(failure_of(module_of("    return torch.cat([x, x / 0.0 * 0.0], 1)\n")), HasSubstr("finite"));
+  EXPECT_THAT(failure_of(module_of("    return torch.cat([x, x / 0.0 * 0.0], 1)\n")), HasSubstr("got nan"));
+}
+
+/// In a process of its own: the thread that never ends goes with it.
+TEST_F(TorchScriptColorizer, AScriptThatNeverEndsIsAnErrorInTime) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto ask = [&] {
+    const std::string endless = module_of("    while bool((x == x).all()):\n        x = x + 1\n    return x\n");
+    try {
+      (void)test::colorizer_of(endless, 0.3)->colorize(some_question());
+    } catch (const ColorizerError& error) {
+      std::fprintf(stderr, "%s\n", error.what());
+      std::_Exit(int(error.exit_code()));
+    }
+    std::_Exit(0);
+  };
+  EXPECT_EXIT(ask(), testing::ExitedWithCode(int(ExitCode::kColorizer)), "gave no answer within 0.3 s");
 }
 
 TEST_F(TorchScriptColorizer, FilesThatAreNoModules) {

@@ -52,6 +52,49 @@ TEST(Busy, StepsOfARunWorkSideBySideButNotOnTheSame) {
   EXPECT_EQ(other.exit_code, 0) << other.err;
 }
 
+TEST(Busy, NobodyMakesACaptureOrAComparisonWhereOneIsMade) {
+  const TempDir folder;
+  const FolderLock capture(folder / "capture"), report(folder / "report");
+  expect_busy({"sample", "-o", (folder / "capture").string()});
+  expect_busy({"prepare", tiny_capture().string() + "/images", "-o", (folder / "capture").string()});
+#if CNERF_COMPARE
+  expect_busy({"compare", tiny_capture().string(), "-o", (folder / "report").string()});
+#endif
+}
+
+TEST(Busy, WhatAKilledWriterLeftGoesWithTheNextStep) {
+  const TempDir folder;
+  const fs::path run = copied(tiny_take(), folder / "run");
+  for (const char* left : {".stage1.partial-4194304.snapshot", "takes/other/.take.partial-4194304.snapshot"}) {
+    write_file(run / left, std::string_view("half"));
+  }
+  const ProgramResult result = cnerf({"colorize", run.string(), "--take", "other", "--colorizer", "grey"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  for (const std::string& file : files_below(run)) EXPECT_THAT(file, testing::Not(HasSubstr(".partial-")));
+}
+
+/// A run's folder may come from anybody.
+TEST(Trust, TheColorizerOfARunIsNotRunUnasked) {
+  const TempDir folder;
+  const fs::path run = copied(tiny_run(), folder / "run"), proof = folder / "ran";
+  const std::string spec = "exec:touch " + proof.string();
+  std::string config = read_text_file(run / "config.toml");
+  const std::string none = "spec = ''";
+  ASSERT_NE(config.find(none), std::string::npos);
+  config.replace(config.find(none), none.size(), "spec = '" + spec + "'");
+  write_file(run / "config.toml", config);
+
+  const ProgramResult unasked = cnerf({"colorize", run.string()});
+  EXPECT_EQ(unasked.exit_code, 64) << unasked.err;
+  EXPECT_THAT(unasked.err, testing::AllOf(HasSubstr(spec), HasSubstr("--trust")));
+  EXPECT_FALSE(fs::exists(proof));
+  EXPECT_EQ(cnerf({"colorize", run.string(), "--colorizer", spec}).exit_code, 76) << "it answers nothing";
+  EXPECT_TRUE(fs::exists(proof)) << "the user named it";
+  fs::remove(proof);
+  EXPECT_EQ(cnerf({"colorize", run.string(), "--trust", "--overwrite"}).exit_code, 76);
+  EXPECT_TRUE(fs::exists(proof));
+}
+
 TEST(Busy, ABakeIsShownAndRenderedByOneWriterAtATime) {
   const TempDir folder;
   const fs::path bake = copied(tiny_bake(), folder / "bake");

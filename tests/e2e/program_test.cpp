@@ -43,6 +43,22 @@ TEST(Program, DoctorNamesLibrariesAndPrograms) {
   EXPECT_THAT(result.out, HasSubstr("quick")) << "presets are found from the build tree";
 }
 
+TEST(Program, WordsThatSayNothingAreRefused) {
+  const TempDir folder;
+  for (const std::vector<std::string>& words :
+       std::vector<std::vector<std::string>>{{"sample", "-o", ""},
+                                             {"train", tiny_capture().string(), "-o", ""},
+                                             {"train", "", "-o", (folder / "x").string()}}) {
+    const ProgramResult result = cnerf(words);
+    EXPECT_EQ(result.exit_code, 64) << result.err;
+    EXPECT_THAT(result.err, HasSubstr("expected a value, found nothing"));
+  }
+  const ProgramResult other = cnerf({"sample", "-o", (folder / "gr\xFCn").string()});
+  EXPECT_EQ(other.exit_code, 64);
+  EXPECT_THAT(other.err, HasSubstr("UTF-8"));
+  EXPECT_THAT(files_below(folder.path()), testing::IsEmpty());
+}
+
 TEST(Program, InfoDescribesACapture) {
   const ProgramResult result = cnerf({"info", tiny_capture().string()});
   EXPECT_EQ(result.exit_code, 0) << result.err;

@@ -50,6 +50,19 @@ TEST(Resuming, AColorizationIsExact) {
   EXPECT_TRUE(read_binary_file(parts / "takes/t/take.snapshot") == read_binary_file(whole / "takes/t/take.snapshot"));
 }
 
+TEST(Resuming, AShortageOfMemoryIsNoCrash) {
+  const TempDir folder;
+  const auto arguments = concatenated(
+      {"train", tiny_capture().string(), "-o", (folder / "run").string(), "--max-memory", "300M"}, tiny_options());
+  const ProgramResult small = cnerf(arguments);
+  EXPECT_EQ(small.exit_code, 0) << small.err;
+  const ProgramResult large = cnerf(
+      concatenated(arguments, {"--overwrite", "--set", "stage1.grid.log2_rows=23", "--set", "stage1.grid.levels=16"}));
+  EXPECT_EQ(large.exit_code, 71) << large.err;
+  EXPECT_THAT(large.err, HasSubstr("out of memory"));
+  EXPECT_THAT(files_below(folder / "run"), testing::Each(testing::Not(HasSubstr("partial"))));
+}
+
 /// The snapshot does not fit on the disk: named, nothing half-written, and the run goes on once there is room.
 TEST(Resuming, FullDiskLosesNothing) {
   const TempDir folder;

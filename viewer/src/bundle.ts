@@ -44,6 +44,10 @@ export interface Bundle {
 
 export const bundleSchema = 1;
 
+/** What a bundle may state, so that one that somebody else made takes no more of the browser than a large one of ours. */
+const limits = { cells: 2 ** 26, storedBricks: 2 ** 18, cameras: 10_000, side: 100_000 };
+const voxelsOfBrick = 512;
+
 type Json = { [key: string]: unknown };
 
 function fail(field: string, problem: string): never {
@@ -54,15 +58,23 @@ function object(json: Json, field: string): Json {
   if (typeof value !== "object" || value === null || Array.isArray(value)) fail(field, "expected an object");
   return value as Json;
 }
+/** The beginning of a value, for messages. */
+const shown = (value: unknown) => String(JSON.stringify(value)).slice(0, 80);
+
 function number(json: Json, field: string, positive = false): number {
   const value = json[field];
-  if (typeof value !== "number" || !Number.isFinite(value)) fail(field, `expected a number, found ${JSON.stringify(value)}`);
+  if (typeof value !== "number" || !Number.isFinite(value)) fail(field, `expected a number, found ${shown(value)}`);
   if (positive && value <= 0) fail(field, `expected a positive number, found ${value}`);
+  return value;
+}
+function count(json: Json, field: string, most: number): number {
+  const value = number(json, field, true);
+  if (!Number.isInteger(value) || value > most) fail(field, `expected a whole number up to ${most}, found ${value}`);
   return value;
 }
 function text(json: Json, field: string): string {
   const value = json[field];
-  if (typeof value !== "string") fail(field, `expected text, found ${JSON.stringify(value)}`);
+  if (typeof value !== "string") fail(field, `expected text, found ${shown(value)}`);
   return value;
 }
 function vector(value: unknown, field: string): Vec3 {
@@ -74,27 +86,47 @@ function vector(value: unknown, field: string): Vec3 {
 function list(json: Json, field: string): Json[] {
   const value = json[field];
   if (!Array.isArray(value)) fail(field, "expected a list");
+  value.forEach((entry, i) => {
+    if (typeof entry !== "object" || entry === null) fail(`${field}[${i}]`, "expected an object");
+  });
   return value as Json[];
+}
+/** A file of the bundle. */
+function inside(name: string, field: string): string {
+  if (name.startsWith("/") || name.startsWith("\\") || name.includes("..") || name.includes(":")) fail(field, `${name} leaves the bundle`);
+  return name;
+}
+
+/** The parts of the volume, whose sizes follow from its bricks. */
+function checkParts(files: Map<string, BundleFile>, cells: number, storedBricks: number): void {
+  const sizes = { "occupancy.bin": cells, "density.bin": storedBricks * voxelsOfBrick, "color.bin": 3 * storedBricks * voxelsOfBrick };
+  for (const [name, size] of Object.entries(sizes)) {
+    const file = files.get(name);
+    if (!file) fail("files", `${name} is not listed`);
+    if (file.rawBytes !== size) fail("files", `${name}: expected ${size} bytes unpacked, found ${file.rawBytes}`);
+    if (file.bytes > 1.1 * size + 1024) fail("files", `${name}: ${file.bytes} bytes are more than gzip makes of ${size}`);
+  }
 }
 
 function cameraOf(json: Json, index: number): CaptureCamera {
   const rows = json.world_from_camera;
   const field = `cameras[${index}].world_from_camera`;
   if (!Array.isArray(rows) || rows.length < 3) fail(field, "expected a 4x4 matrix");
+  const place = [0, 1, 2].map((i) => (Array.isArray(rows[i]) ? rows[i][3] : null));
   const rotation = [0, 1, 2].map((i) => vector(rows[i], field)) as Mat3;
   return {
     name: text(json, "name"),
     lens: {
-      width: number(json, "width", true),
-      height: number(json, "height", true),
+      width: count(json, "width", limits.side),
+      height: count(json, "height", limits.side),
       fx: number(json, "fx", true),
       fy: number(json, "fy", true),
       cx: number(json, "cx"),
       cy: number(json, "cy"),
     },
     rotation,
-    position: [rows[0][3], rows[1][3], rows[2][3]],
-    photo: typeof json.photo === "string" ? json.photo : null,
+    position: vector(place, field),
+    photo: typeof json.photo === "string" ? inside(json.photo, `cameras[${index}].photo`) : null,
   };
 }
 
@@ -116,16 +148,17 @@ export function parseBundle(source: string): Bundle {
   const color = object(json, "color");
   const files = new Map<string, BundleFile>();
   for (const entry of list(json, "files")) {
-    const file = { name: text(entry, "name"), bytes: number(entry, "bytes"), sha256: text(entry, "sha256"), rawBytes: Number(entry.raw_bytes ?? 0) };
-    if (file.name.startsWith("/") || file.name.includes("..") || file.name.includes(":")) fail("files", `${file.name} leaves the bundle`);
+    const file = { name: inside(text(entry, "name"), "files"), bytes: number(entry, "bytes"), sha256: text(entry, "sha256"), rawBytes: Number(entry.raw_bytes ?? 0) };
     files.set(file.name, file);
   }
-  for (const name of ["occupancy.bin", "density.bin", "color.bin"]) {
-    if (!files.has(name)) fail("files", `${name} is not listed`);
-  }
   const bricks = vector(volume.bricks, "volume.bricks");
-  if (!bricks.every((n) => Number.isInteger(n) && n > 0 && n <= 4096)) fail("volume.bricks", "expected counts");
-  const poster = json.poster as Json | null;
+  const cells = bricks[0] * bricks[1] * bricks[2];
+  if (!bricks.every((n) => Number.isInteger(n) && n > 0) || cells > limits.cells) fail("volume.bricks", "expected counts of at most 2^26 bricks in all");
+  const storedBricks = count(volume, "stored_bricks", limits.storedBricks);
+  checkParts(files, cells, storedBricks);
+  const cameras = list(json, "cameras");
+  if (cameras.length > limits.cameras) fail("cameras", `expected at most ${limits.cameras}, found ${cameras.length}`);
+  const poster = json.poster == null ? null : object(json, "poster");
   return {
     title: text(json, "title"),
     program: `cnerf ${text(json, "program_version")}`,
@@ -138,13 +171,13 @@ export function parseBundle(source: string): Bundle {
       origin: vector(volume.origin, "volume.origin"),
       voxelSize: number(volume, "voxel_size", true),
       bricks,
-      storedBricks: number(volume, "stored_bricks", true),
+      storedBricks,
       voxels: number(volume, "voxels"),
       density: { scale: number(density, "scale", true), max: number(density, "max") },
     },
-    poster: poster ? text(poster, "file") : null,
+    poster: poster ? inside(text(poster, "file"), "poster.file") : null,
     files,
-    cameras: list(json, "cameras").map(cameraOf),
+    cameras: cameras.map(cameraOf),
   };
 }
 
@@ -161,7 +194,25 @@ async function sha256(bytes: Uint8Array<ArrayBuffer>): Promise<string | null> {
   return Array.from(digest, (b) => b.toString(16).padStart(2, "0")).join("");
 }
 
-async function fetched(url: string, name: string, onBytes: (count: number) => void): Promise<Uint8Array<ArrayBuffer>> {
+/** The chunks of a stream as one array, of which nothing is kept beyond `size`. @returns null where there is more or less. */
+async function filled(stream: ReadableStream<Uint8Array>, size: number, onBytes: (count: number) => void): Promise<Uint8Array<ArrayBuffer> | null> {
+  const whole = new Uint8Array(size);
+  let at = 0;
+  const reader = stream.getReader();
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) return at === size ? whole : null;
+    if (at + value.length > size) {
+      await reader.cancel();
+      return null;
+    }
+    whole.set(value, at);
+    at += value.length;
+    onBytes(value.length);
+  }
+}
+
+async function fetched(url: string, { name, bytes }: BundleFile, onBytes: (count: number) => void): Promise<Uint8Array<ArrayBuffer> | null> {
   let response: Response;
   try {
     response = await fetch(url);
@@ -169,48 +220,32 @@ async function fetched(url: string, name: string, onBytes: (count: number) => vo
     throw new BundleError(`${name}: cannot be loaded: the server does not answer`);
   }
   if (!response.ok) throw new BundleError(`${name}: cannot be loaded: the server says ${response.status} ${response.statusText}`);
-  if (!response.body) return new Uint8Array(await response.arrayBuffer());
-  const parts: Uint8Array[] = [];
-  let size = 0;
-  const reader = response.body.getReader();
+  if (!response.body) return null;
+  let come = 0;
   try {
-    for (;;) {
-      const { done, value } = await reader.read();
-      if (done) break;
-      parts.push(value);
-      size += value.length;
-      onBytes(value.length);
-    }
+    return await filled(response.body, bytes, (count) => ((come += count), onBytes(count)));
   } catch {
-    throw new BundleError(`${name}: the connection broke after ${size} bytes`);
+    throw new BundleError(`${name}: the connection broke after ${come} bytes`);
   }
-  const whole = new Uint8Array(size);
-  let at = 0;
-  for (const part of parts) {
-    whole.set(part, at);
-    at += part.length;
-  }
-  return whole;
 }
 
-export async function gunzipped(bytes: Uint8Array<ArrayBuffer>, name: string): Promise<Uint8Array> {
+async function gunzipped(bytes: Uint8Array<ArrayBuffer>, { name, rawBytes }: BundleFile): Promise<Uint8Array | null> {
   try {
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-    return new Uint8Array(await new Response(stream).arrayBuffer());
+    return await filled(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")), rawBytes, () => {});
   } catch {
     throw new BundleError(`${name}: is damaged: its compressed data cannot be read. Write the bundle again with cnerf bake --format web`);
   }
 }
 
 async function loadFile(base: string, file: BundleFile, onBytes: (count: number) => void): Promise<Uint8Array> {
-  const bytes = await fetched(base + file.name, file.name, onBytes);
+  const bytes = await fetched(base + file.name, file, onBytes);
   const damaged = (what: string) =>
     new BundleError(`${file.name}: is damaged: ${what}. Copy the bundle again, or write it again with cnerf bake --format web`);
-  if (bytes.length !== file.bytes) throw damaged(`${bytes.length} bytes instead of ${file.bytes}`);
+  if (bytes === null) throw damaged(`more or less than its ${file.bytes} bytes`);
   const digest = await sha256(bytes);
   if (digest !== null && digest !== file.sha256) throw damaged("its SHA-256 is not the one in bundle.json");
-  const raw = await gunzipped(bytes, file.name);
-  if (raw.length !== file.rawBytes) throw damaged(`${raw.length} unpacked bytes instead of ${file.rawBytes}`);
+  const raw = await gunzipped(bytes, file);
+  if (raw === null) throw damaged(`more or less than ${file.rawBytes} bytes unpacked`);
   return raw;
 }
 

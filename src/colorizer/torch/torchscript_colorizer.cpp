@@ -1,7 +1,12 @@
 // torchscript:FILE, a scripted LibTorch module; docs/colorizers.md describes FILE.toml.
 
+#include <fmt/format.h>
 #include <torch/script.h>
 #include <torch/version.h>
+
+#include <chrono>
+#include <future>
+#include <thread>
 
 #include "src/base/error.h"
 #include "src/colorizer/kinds.h"
@@ -27,8 +32,8 @@ std::string shape_text(const Tensor& tensor) {
 
 class TorchScriptColorizer final : public NetworkColorizer {
  public:
-  TorchScriptColorizer(const fs::path& file, const std::string& shown)
-      : NetworkColorizer("torchscript:" + shown, contract_beside(file)) {
+  TorchScriptColorizer(const fs::path& file, const std::string& shown, double timeout_seconds)
+      : NetworkColorizer("torchscript:" + shown, contract_beside(file)), timeout_(timeout_seconds) {
     try {
       module_ = torch::jit::load(file.string(), torch::kCPU);
       module_.eval();
@@ -40,13 +45,15 @@ class TorchScriptColorizer final : public NetworkColorizer {
 
  private:
   Planes run(const Planes& input) override {
-    const torch::NoGradGuard no_grad;
     const Tensor question = torch::from_blob(const_cast<float*>(input.values.data()),
-                                             {input.batch, input.channels, input.height, input.width}, torch::kFloat32);
+                                             {input.batch, input.channels, input.height, input.width}, torch::kFloat32)
+                                .clone();  // outlives this call where there is no answer in time
     Tensor answer;
     try {
-      const torch::IValue result = module_.forward({question});
+      const torch::IValue result = forward(question);
       if (result.isTensor()) answer = result.toTensor().to(torch::kCPU, torch::kFloat32).contiguous();
+    } catch (const ColorizerError&) {
+      throw;
     } catch (const std::exception& error) {
       throw ColorizerError(name_ + ": failed on an input of " + input.shape_text() + ": " +
                            script_message(error.what()));
@@ -63,13 +70,32 @@ class TorchScriptColorizer final : public NetworkColorizer {
             {values, values + answer.numel()}};
   }
 
+  /// A script may run for ever, and nothing stops a thread of it: it is left behind, and the program ends soon.
+  torch::IValue forward(const Tensor& question) {
+    std::packaged_task<torch::IValue()> task([module = module_, question, threads = at::get_num_threads()]() mutable {
+      at::set_num_threads(threads);  // a thread begins with all cores
+      const torch::NoGradGuard no_grad;
+      return module.forward({question});
+    });
+    std::future<torch::IValue> result = task.get_future();
+    std::thread thread(std::move(task));
+    if (result.wait_for(timeout_) == std::future_status::ready) {
+      thread.join();
+      return result.get();
+    }
+    thread.detach();
+    throw ColorizerError(fmt::format("{}: gave no answer within {:g} s", name_, timeout_.count()));
+  }
+
   torch::jit::Module module_;
+  std::chrono::duration<double> timeout_;
 };
 
 }  // namespace
 
 std::unique_ptr<Colorizer> make_torchscript_colorizer(const ColorizerRequest& request) {
-  return std::make_unique<TorchScriptColorizer>(find_spec_file(request.argument, request), request.argument);
+  return std::make_unique<TorchScriptColorizer>(find_spec_file(request.argument, request), request.argument,
+                                                request.options.timeout_seconds);
 }
 
 }  // namespace cnerf

@@ -89,6 +89,10 @@ void Session::report(const std::string& task, double fraction, Figures figures) 
 }
 
 void Session::after_step(const std::string& task, const std::string& loss_name, long done, int all) {
+  if (!std::isfinite(loss)) {
+    throw DivergedError(task + ": the " + loss_name + " is not finite after " + std::to_string(done) + " of " +
+                        std::to_string(all) + " steps; what was saved last is kept");
+  }
   const Stage2Report& so_far = model.report;
   const int asked = so_far.accepted + so_far.rejected;
   report(task, double(done) / all,

@@ -34,6 +34,11 @@ T read_at(const std::vector<std::byte>& from, std::size_t offset) {
 
 void save_snapshot(const std::filesystem::path& file, const std::string& kind, nlohmann::json header,
                    const std::vector<StatePiece>& pieces) {
+  for (const StatePiece& piece : pieces) {
+    if (piece.is_finite()) continue;
+    throw DivergedError(file.string() + ": not written, what is there stays: the training's " + piece.name +
+                        " holds numbers that are not finite");
+  }
   header["kind"] = kind;
   header["pieces"] = nlohmann::json::array();
   for (const StatePiece& piece : pieces) {
@@ -68,7 +73,10 @@ Snapshot::Snapshot(const std::filesystem::path& file, const std::string& kind)
     header_ = parse_json<SnapshotError, nlohmann::json>(
         {reinterpret_cast<const char*>(content_.data()) + kFixedSize, header_size}, file_);
     std::size_t expected = pieces_begin_ + kDigestSize;
-    for (const auto& piece : header_.at("pieces")) expected += piece.at("bytes").get<std::size_t>();
+    for (const auto& piece : header_.at("pieces")) {
+      (void)piece.at("name").get<std::string>();
+      expected += piece.at("bytes").get<std::size_t>();
+    }
     if (content_.size() != expected) {
       fail("cut short: " + std::to_string(content_.size()) + " bytes, expected " + std::to_string(expected));
     }
@@ -99,6 +107,9 @@ void Snapshot::restore(const std::vector<StatePiece>& pieces) const {
     }
     std::memcpy(pieces[i].bytes.data(), content_.data() + offset, bytes);
     offset += bytes;
+    if (!pieces[i].is_finite()) {
+      throw SnapshotError(file_.string() + ": piece '" + name + "' holds numbers that are not finite");
+    }
   }
 }
 

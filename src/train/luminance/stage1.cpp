@@ -1,5 +1,7 @@
 #include "src/train/luminance/stage1.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -87,6 +89,28 @@ LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines) {
   return model;
 }
 
+float brightest_pixel(const View& view) {
+  float brightest = 0;
+  for (std::size_t p = 0; p < view.image.pixel_count() && std::isfinite(brightest); ++p) {
+    const float luminance = view.image.luminance(p);
+    if (!(luminance <= brightest)) brightest = luminance;  // or no number
+  }
+  return brightest;
+}
+
+/// Parameters that are not finite say no more where it began: the view furthest from what photographs hold is named.
+[[noreturn]] void stop_diverged(const Capture& capture, long step, double loss) {
+  const View* suspect = nullptr;
+  for (const View& view : capture.views) {
+    if (view.held_out || (suspect != nullptr && !std::isfinite(brightest_pixel(*suspect)))) continue;
+    if (suspect == nullptr || !(brightest_pixel(view) <= brightest_pixel(*suspect))) suspect = &view;
+  }
+  throw DivergedError(fmt::format(
+      "stage 1: the loss is {} at step {}; the brightest view is {} with a luminance of {:g} (white is 1). The last "
+      "snapshot is kept; a lower stage1.learning_rate may help",
+      loss, step, suspect->name, brightest_pixel(*suspect)));
+}
+
 /// Done so far, of the steps or of the time, whichever is nearer to its end.
 double fraction_done(const LuminanceModel& model, const Stage1Options& options) {
   const double of_steps = double(model.engine->step_count()) / options.steps;
@@ -121,6 +145,9 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
     model.seconds = seconds_before + clock.seconds();
     rays += double(step.rays);
     psnr.add(step.squared_error);
+    if (!std::isfinite(step.loss + step.squared_error)) {
+      stop_diverged(job.capture, model.engine->step_count(), step.loss);
+    }
     clock.pause_for([&] {
       observer.report_progress({"stage 1",
                                 fraction,

@@ -312,6 +312,9 @@ describe("trouble", () => {
     ["a cut part", (path, bytes) => (path === "/density.bin" ? bytes.subarray(0, 500) : bytes), /density\.bin.*damaged/],
     ["a missing part", (path, bytes) => (path === "/occupancy.bin" ? null : bytes), /occupancy\.bin.*404/],
     ["a cut manifest", (path, bytes) => (path === "/bundle.json" ? bytes.subarray(0, 700) : bytes), /bundle\.json.*not JSON/],
+    ["parts that others wrote", (path, bytes) => (path === "/bundle.json" ? Buffer.from(bytes.toString().replace(/("stored_bricks": *)[0-9]+/, "$11")) : bytes), /bundle\.json.*bytes unpacked/],
+    ["deep JSON", (path, bytes) => (path === "/bundle.json" ? Buffer.from(`{"schema": ${"[".repeat(1e6)}`) : bytes), /bundle\.json.*not JSON/],
+    ["a list for a manifest", (path, bytes) => (path === "/bundle.json" ? Buffer.from("[]") : bytes), /bundle\.json: schema/],
     ["no bundle at all", (path, bytes) => (path === "/bundle.json" ? null : bytes), /no bundle\.json/],
   ]) {
     it(`${what} is said to be`, async () => {
