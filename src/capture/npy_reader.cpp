@@ -50,7 +50,7 @@ std::string_view header_text(const fs::path& file, std::span<const std::byte> co
 
 /// The header's text from the value of `key` on.
 std::string_view value_of(const fs::path& file, std::string_view text, const std::string& key) {
-  constexpr std::string_view kBlanks = " \t\n";
+  static constexpr std::string_view kBlanks = " \t\n";
   const std::string quoted = "'" + key + "'";
   const auto skip_blanks = [](std::string_view rest) {
     return rest.substr(std::min(rest.find_first_not_of(kBlanks), rest.size()));
