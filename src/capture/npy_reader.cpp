@@ -145,13 +145,16 @@ NpyArray read_npy(const fs::path& file) {
   const std::size_t size = element_size(file, header.dtype);
   const std::size_t available = (content.size() - header.size) / size;
   std::size_t count = 1;
+  const auto check_count = [&] {
+    if (count <= available) return;
+    throw InputError(file, "values",
+                     "the shape needs at least " + std::to_string(count) + ", found " + std::to_string(available) +
+                         ": the file is cut short");
+  };
+  check_count();  // of an array without axes, which holds one value
   for (const std::size_t extent : header.shape) {
     count *= extent;
-    if (count > available) {  // checked at each step, so that a senseless shape cannot overflow
-      throw InputError(file, "values",
-                       "the shape needs at least " + std::to_string(count) + ", found " + std::to_string(available) +
-                           ": the file is cut short");
-    }
+    check_count();  // at each step, so that a senseless shape cannot overflow
   }
   NpyArray array;
   array.shape = header.shape;
