@@ -12,7 +12,8 @@ CNERF_FUZZ_TARGET(tensor_file) {
   (void)fuzz::scratch_file("tensors.txt", pieces[0]);
   const auto file = fuzz::scratch_file("tensors.bin", pieces[1]);
   fuzz::read_or_refuse(file.parent_path() / "tensors", [&] {
-    const auto values = TensorFile(file).get("weight").values;
+    const TensorFile tensors(file);
+    const auto values = tensors.get("weight").values;
     volatile float sum = std::accumulate(values.begin(), values.end(), 0.0f);
     (void)sum;
   });
