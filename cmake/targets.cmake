@@ -36,7 +36,9 @@ function(cnerf_add_plugin name)
   add_library(${name} MODULE ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE cnerf_options ${arg_LINK})
-  target_link_options(${name} PRIVATE LINKER:-z,defs)  # what the program lacks must not be missed at run time
+  if(NOT CNERF_FUZZ)  # clang leaves the sanitizers to the program
+    target_link_options(${name} PRIVATE LINKER:-z,defs)  # what the program lacks must not be missed at run time
+  endif()
   set_target_properties(${name} PROPERTIES
     LIBRARY_OUTPUT_DIRECTORY ${CNERF_PLUGIN_FOLDER} INSTALL_RPATH_USE_LINK_PATH ON)
   install(TARGETS ${name} LIBRARY DESTINATION lib/cnerf)

@@ -33,6 +33,17 @@ if(CNERF_SANITIZE)
   target_link_options(cnerf_options INTERFACE -fsanitize=${CNERF_SANITIZE})
 endif()
 
+if(CNERF_FUZZ)
+  if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    message(FATAL_ERROR "CNERF_FUZZ needs libFuzzer: configure with -DCMAKE_CXX_COMPILER=clang++")
+  endif()
+  # Counts of edges in everything of ours; the fuzzer's own main is linked by the targets of tests/fuzz alone.
+  set(fuzz_sanitizers address,undefined,float-cast-overflow)
+  target_compile_options(cnerf_options INTERFACE
+    $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=fuzzer-no-link,${fuzz_sanitizers};-fno-sanitize-recover=all;-fno-omit-frame-pointer>)
+  target_link_options(cnerf_options INTERFACE -fsanitize=${fuzz_sanitizers})
+endif()
+
 if(CNERF_CUDA)
   enable_language(CUDA)
   if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)  # CMake before 3.26 does not know nvcc's C++20

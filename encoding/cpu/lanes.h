@@ -98,7 +98,6 @@ inline float sum(Lanes a) {
 /// The four features of one row of the hash table.
 struct Row4 {
   using Raw = float __attribute__((vector_size(16)));
-  using Shuffle = std::int32_t __attribute__((vector_size(16)));
   Raw raw;
 
   static Row4 zero() { return {Raw{}}; }
@@ -122,15 +121,14 @@ inline Row4 fma(float weight, Row4 row, Row4 sum) {
 
 /// Transposes four rows: afterwards row f holds feature f of the four.
 inline void transpose(Row4& a, Row4& b, Row4& c, Row4& d) {
-  using S = Row4::Shuffle;
-  const Row4::Raw ab_low = __builtin_shuffle(a.raw, b.raw, S{0, 4, 1, 5});
-  const Row4::Raw ab_high = __builtin_shuffle(a.raw, b.raw, S{2, 6, 3, 7});
-  const Row4::Raw cd_low = __builtin_shuffle(c.raw, d.raw, S{0, 4, 1, 5});
-  const Row4::Raw cd_high = __builtin_shuffle(c.raw, d.raw, S{2, 6, 3, 7});
-  a.raw = __builtin_shuffle(ab_low, cd_low, S{0, 1, 4, 5});
-  b.raw = __builtin_shuffle(ab_low, cd_low, S{2, 3, 6, 7});
-  c.raw = __builtin_shuffle(ab_high, cd_high, S{0, 1, 4, 5});
-  d.raw = __builtin_shuffle(ab_high, cd_high, S{2, 3, 6, 7});
+  const Row4::Raw ab_low = __builtin_shufflevector(a.raw, b.raw, 0, 4, 1, 5);
+  const Row4::Raw ab_high = __builtin_shufflevector(a.raw, b.raw, 2, 6, 3, 7);
+  const Row4::Raw cd_low = __builtin_shufflevector(c.raw, d.raw, 0, 4, 1, 5);
+  const Row4::Raw cd_high = __builtin_shufflevector(c.raw, d.raw, 2, 6, 3, 7);
+  a.raw = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
+  b.raw = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
+  c.raw = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
+  d.raw = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
 }
 
 }  // namespace cnerf::CNERF_ISA

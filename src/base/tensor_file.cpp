@@ -21,7 +21,7 @@ fs::path manifest_of(const fs::path& weights) {
 TensorFile::TensorFile(const fs::path& weights) : file_(weights), manifest_(manifest_of(weights)) {
   const std::vector<std::byte> bytes = read_binary_file(weights);
   values_.resize(bytes.size() / sizeof(float));
-  std::memcpy(values_.data(), bytes.data(), values_.size() * sizeof(float));
+  if (!values_.empty()) std::memcpy(values_.data(), bytes.data(), values_.size() * sizeof(float));
   std::istringstream lines(read_text_file(manifest_));
   for (std::string line; std::getline(lines, line);) {
     if (!line.empty()) add(line);

@@ -11,6 +11,9 @@
 #include <ImfXdr.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <fstream>
+#include <optional>
 #include <string>
 
 #include "src/base/check.h"
@@ -22,6 +25,7 @@ namespace {
 
 constexpr std::int64_t kSmallPicture = 1 << 24;  ///< pixels that are taken for any file
 constexpr std::int64_t kMostAroundData = 64;     ///< pixels of larger pictures for each one that is stored
+constexpr std::int64_t kMostPerByte = 1 << 16;   ///< stored pixels of larger pictures for each byte of the file
 
 struct Extent {
   std::int64_t width = 0, height = 0;
@@ -31,13 +35,47 @@ Extent extent_of(const Imath::Box2i& window) {
   return {std::int64_t(window.max.x) - window.min.x + 1, std::int64_t(window.max.y) - window.min.y + 1};
 }
 
+/// Text up to the next zero byte; nothing behind the end of the file, or where it is longer than any of the format.
+std::optional<std::string> next_text(std::ifstream& in) {
+  constexpr std::size_t kLongest = 255;
+  std::string text;
+  for (int c = in.get(); c > 0 && text.size() <= kLongest; c = in.get()) text += char(c);
+  return in && text.size() <= kLongest ? std::optional(text) : std::nullopt;
+}
+
+/// The attributes of a file's headers: name, type, size and so many bytes. The library takes memory for whatever size
+/// they state.
+void check_attributes(const fs::path& file, std::uintmax_t file_bytes, bool has_parts) {
+  constexpr std::streamoff kBegin = 8;  // behind the magic number and the version
+  std::ifstream in(file, std::ios::binary);
+  in.seekg(kBegin);
+  for (bool is_first = true;;) {
+    const auto name = next_text(in);
+    if (name && name->empty()) {  // the end of a header, or of all
+      if (!has_parts || is_first) return;
+      is_first = true;
+      continue;
+    }
+    is_first = false;
+    const auto type = next_text(in);
+    std::uint32_t bytes = 0;
+    in.read(reinterpret_cast<char*>(&bytes), sizeof bytes);
+    if (!name || !type || !in || bytes > file_bytes - std::uintmax_t(in.tellg())) {
+      throw InputError(file, "header", "expected an attribute, found the end of the file: it is cut short");
+    }
+    in.seekg(bytes, std::ios::cur);
+  }
+}
+
 /// Before the library takes memory for what a header states.
 Imf::Header checked_header(const fs::path& file) {
+  const std::uintmax_t file_bytes = fs::file_size(file);
   Imf::StdIFStream stream(file.c_str());
   int magic = 0, version = 0;
   Imf::Xdr::read<Imf::StreamIO>(stream, magic);
   Imf::Xdr::read<Imf::StreamIO>(stream, version);
   if (magic != Imf::MAGIC) throw InputError(file, "", "expected an OpenEXR file, found other bytes");
+  check_attributes(file, file_bytes, Imf::isMultiPart(version));
   Imf::Header header;
   header.readFrom(stream, version);
   const Extent display = extent_of(header.displayWindow()), data = extent_of(header.dataWindow());
@@ -48,6 +86,12 @@ Imf::Header checked_header(const fs::path& file) {
     throw InputError(file, "displayWindow",
                      "expected at most " + std::to_string(kMostAroundData) + " times the pixels of the dataWindow, " +
                          size_text(data.width, data.height) + ", found " + size_text(display.width, display.height));
+  }
+  const std::int64_t stored = data.width * data.height;
+  if (stored > kSmallPicture && std::uintmax_t(stored / kMostPerByte) > file_bytes) {
+    throw InputError(file, "dataWindow",
+                     "expected at most " + std::to_string(kMostPerByte) + " pixels for each of the file's " +
+                         std::to_string(file_bytes) + " bytes, found " + size_text(data.width, data.height));
   }
   return header;
 }

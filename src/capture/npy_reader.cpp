@@ -50,7 +50,7 @@ std::string_view header_text(const fs::path& file, std::span<const std::byte> co
 
 /// The header's text from the value of `key` on.
 std::string_view value_of(const fs::path& file, std::string_view text, const std::string& key) {
-  constexpr std::string_view kBlanks = " \t\n";
+  static constexpr std::string_view kBlanks = " \t\n";
   const std::string quoted = "'" + key + "'";
   const auto skip_blanks = [](std::string_view rest) {
     return rest.substr(std::min(rest.find_first_not_of(kBlanks), rest.size()));
@@ -145,13 +145,16 @@ NpyArray read_npy(const fs::path& file) {
   const std::size_t size = element_size(file, header.dtype);
   const std::size_t available = (content.size() - header.size) / size;
   std::size_t count = 1;
+  const auto check_count = [&] {
+    if (count <= available) return;
+    throw InputError(file, "values",
+                     "the shape needs at least " + std::to_string(count) + ", found " + std::to_string(available) +
+                         ": the file is cut short");
+  };
+  check_count();  // of an array without axes, which holds one value
   for (const std::size_t extent : header.shape) {
     count *= extent;
-    if (count > available) {  // checked at each step, so that a senseless shape cannot overflow
-      throw InputError(file, "values",
-                       "the shape needs at least " + std::to_string(count) + ", found " + std::to_string(available) +
-                           ": the file is cut short");
-    }
+    check_count();  // at each step, so that a senseless shape cannot overflow
   }
   NpyArray array;
   array.shape = header.shape;

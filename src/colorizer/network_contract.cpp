@@ -33,7 +33,7 @@ void read_name(const toml::node& node, const fs::path& file, const std::string& 
 }
 
 void read_count(const toml::node& node, const fs::path& file, const std::string& key, int lowest, int& value) {
-  const auto found = node.value<std::int64_t>();
+  const auto found = node.value_exact<std::int64_t>();  // a float might be none that the type holds
   if (!found || *found < lowest || *found > 4096) {
     throw InputError(file, key, "expected a whole number from " + std::to_string(lowest) + " to 4096");
   }

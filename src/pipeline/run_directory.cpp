@@ -44,6 +44,10 @@ bool is_folder_name_character(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
 }
 
+bool is_take_name(const std::string& name) {
+  return !name.empty() && name[0] != '.' && std::ranges::all_of(name, is_folder_name_character);
+}
+
 }  // namespace
 
 RunDirectory RunDirectory::open(const fs::path& root) {
@@ -76,7 +80,13 @@ bool RunDirectory::exists() const {
 }
 
 RunRecord RunDirectory::record() const {
-  return read_run_record<RunRecord>(record_file());
+  auto record = read_run_record<RunRecord>(record_file());
+  // It becomes the name of folders, in which later commands read, write and clear.
+  if (!record.current_take.empty() && !is_take_name(record.current_take)) {
+    throw SnapshotError(record_file().string() + ": current_take: expected letters, digits, '-', '_' and '.', found " +
+                        excerpt(nlohmann::json(record.current_take)));
+  }
+  return record;
 }
 
 void RunDirectory::save(RunRecord record) const {
@@ -161,7 +171,7 @@ void note_time(const RunDirectory& directory, const char* step, const Stopwatch&
 }
 
 void check_take_name(const std::string& name) {
-  if (!name.empty() && name[0] != '.' && std::ranges::all_of(name, is_folder_name_character)) return;
+  if (is_take_name(name)) return;
   throw UsageError("--take: expected letters, digits, '-', '_' and '.', got '" + name + "'");
 }
 

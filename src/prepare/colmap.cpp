@@ -246,9 +246,9 @@ void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, 
     add({"SiftExtraction.num_threads", "FeatureExtraction.num_threads"}, std::to_string(thread_count()));
     add({"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"}, std::to_string(kLongestSide));
     add({"SiftExtraction.max_num_features"}, std::to_string(kFeatures));
-    const auto scaled = [&](const Progress& part) {
+    const auto scaled = [&, count = members.size()](const Progress& part) {
       if (!progress) return;
-      const double done = double(before) + part.fraction * double(members.size());
+      const double done = double(before) + part.fraction * double(count);
       progress({part.task, done / double(images.size()), {}});
     };
     (void)colmap.run(words, "features", members.size(), scaled);

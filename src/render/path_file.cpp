@@ -14,6 +14,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr int kLargestSide = 1 << 15;  ///< pixels
+
 /// One frame of the file and the file's own values behind it.
 class Frame {
  public:
@@ -36,7 +38,10 @@ class Frame {
 
   [[nodiscard]] Intrinsics intrinsics() const {
     const auto w = number("w"), h = number("h");
-    if (!w || !h || *w < 1 || *h < 1) refuse("w, h", "expected the size of the picture in pixels");
+    const auto is_side = [](const std::optional<double>& side) { return side && *side >= 1 && *side <= kLargestSide; };
+    if (!is_side(w) || !is_side(h)) {
+      refuse("w, h", fmt::format("expected the size of the picture, 1 to {} pixels each", kLargestSide));
+    }
     Intrinsics result;
     result.width = int(*w);
     result.height = int(*h);
@@ -45,7 +50,8 @@ class Frame {
     } else if (const auto angle = number("camera_angle_x")) {
       result.fx = *w / (2 * std::tan(*angle / 2));
     }
-    if (!(result.fx > 0)) refuse("fl_x", "expected a positive focal length, or camera_angle_x");
+    if (!(result.fx > 0) || !std::isfinite(result.fx))
+      refuse("fl_x", "expected a positive focal length, or camera_angle_x");
     result.fy = number("fl_y").value_or(result.fx);
     result.cx = number("cx").value_or(*w / 2);
     result.cy = number("cy").value_or(*h / 2);

@@ -1,10 +1,5 @@
 #pragma once
-/// Weights of the built-in network on disk: fp16, checksummed, readable on any machine.
-///
-/// Format, little-endian: 8 bytes "CNERFCW3"; 64 bytes hex SHA-256 of the content; one gzip member of the content's
-/// bytes at even places, then of those at odd ones (a half's sign, exponent and first digits pack well, the rest does
-/// not). The content: f64 temperature, f64 gain, u32 short side; u32 count; then for each parameter u32 name length,
-/// name, u32 dimensions, u32 sizes, fp16 values in C order.
+/// Weights of the built-in network on disk: fp16, checksummed, readable on any machine. weights_content.h has the format.
 
 #include <filesystem>
 #include <string>

@@ -5,6 +5,7 @@
 #include "src/base/parallel.h"
 #include "src/picture/picture.h"
 #include "src/train/luminance/options_json.h"
+#include "src/train/luminance/stored_grid.h"
 
 namespace cnerf {
 namespace {
@@ -60,12 +61,16 @@ ColorModel ColorModel::load(const std::filesystem::path& file, const Engines& en
   const Snapshot snapshot(file, kKind);
   ColorModel model;
   try {
-    model = create(options_from_json<Stage2Options>(snapshot.header().at("options")), engines);
+    const auto options = options_from_json<Stage2Options>(snapshot.header().at("options"));
+    check_stored_grid(snapshot, options.grid);
+    model = create(options, engines);
     model.pixel_colors = pixel_colors_of(snapshot.header());
     const nlohmann::json& report = snapshot.header().at("report");
     SnapshotTimes times = load_times(file);
-    model.report = {report.at("accepted"),      report.at("rejected"),   times["seconds"],
-                    times["colorizer_seconds"], times["waited_seconds"], report.at("bake_ab_distance")};
+    model.report = {
+        0, 0, times["seconds"], times["colorizer_seconds"], times["waited_seconds"], report.at("bake_ab_distance")};
+    read_exactly(report.at("accepted"), model.report.accepted);
+    read_exactly(report.at("rejected"), model.report.rejected);
   } catch (const nlohmann::json::exception& problem) {
     throw SnapshotError(file.string() + ": header: " + problem.what());
   }

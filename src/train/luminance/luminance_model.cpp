@@ -1,10 +1,12 @@
 #include "src/train/luminance/luminance_model.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "src/train/luminance/exclusion.h"
 #include "src/train/luminance/options_json.h"
 #include "src/train/luminance/placement.h"
+#include "src/train/luminance/stored_grid.h"
 
 namespace cnerf {
 namespace {
@@ -45,7 +47,9 @@ nlohmann::json occupancy_to_json(const OccupancyOptions& options) {
 OccupancyOptions occupancy_of(const nlohmann::json& header) {
   const nlohmann::json& json =
       header.contains("occupancy") ? header.at("occupancy") : header.at("options").at("occupancy");
-  return {json.at("resolution").get<int>(), json.at("decay").get<float>(), json.at("optical_thickness").get<float>()};
+  OccupancyOptions options{0, json.at("decay").get<float>(), json.at("optical_thickness").get<float>()};
+  read_exactly(json.at("resolution"), options.resolution);
+  return options;
 }
 
 /// @throws nlohmann::json::exception
@@ -53,6 +57,33 @@ Stage1Options stored_options(const Snapshot& snapshot) {
   auto options = options_from_json<Stage1Options>(snapshot.header().at("options"));
   options.occupancy = occupancy_of(snapshot.header());
   return options;
+}
+
+/// Of what decides how much memory an engine takes, and of what it divides by.
+void check_stored(const Snapshot& snapshot, const LuminanceModel& model) {
+  constexpr int kMostCascades = 8, kBlock = 16, kMostResolution = 1 << 10, kMostSamples = 1 << 24, kMostSteps = 1 << 16;
+  const auto require = [&](bool holds, const char* what) {
+    if (!holds) throw SnapshotError(snapshot.file().string() + ": header: " + what);
+  };
+  const SceneFrame& frame = model.frame;
+  const Vec3d& centre = frame.world_centre;
+  require(std::isfinite(centre.x) && std::isfinite(centre.y) && std::isfinite(centre.z) && frame.unit_per_world > 0 &&
+              std::isfinite(frame.unit_per_world),
+          "frame: expected finite numbers and a positive scale");
+  require(frame.cascades >= 1 && frame.cascades <= kMostCascades, "frame.cascades: expected 1 to 8");
+  require(model.max_luminance > 0 && std::isfinite(model.max_luminance), "max_luminance: expected a positive number");
+  const Stage1Options& options = model.options;
+  require(options.samples_per_step >= 1 && options.samples_per_step <= kMostSamples,
+          "options.samples_per_step: expected 1 to 2^24");
+  require(options.steps_per_box >= 1 && options.steps_per_box <= kMostSteps,
+          "options.steps_per_box: expected 1 to 2^16");
+  require(options.cone_angle > 0 && options.cone_angle <= 1, "options.cone_angle: expected a number of 0 to 1");
+  check_stored_grid(snapshot, options.grid);
+  const int side = options.occupancy.resolution;
+  require(side >= kBlock && side <= kMostResolution && side % kBlock == 0,
+          "occupancy.resolution: expected a multiple of 16 up to 1024");
+  const double cells = double(frame.cascades) * side * side * side;
+  require(cells * sizeof(float) <= double(snapshot.bytes()), "occupancy.resolution: the file is too small for it");
 }
 
 }  // namespace
@@ -65,9 +96,11 @@ nlohmann::json frame_to_json(const SceneFrame& frame) {
 
 SceneFrame frame_from_json(const nlohmann::json& json) {
   const auto& centre = json.at("world_centre");
-  return {{centre.at(0).get<double>(), centre.at(1).get<double>(), centre.at(2).get<double>()},
-          json.at("unit_per_world").get<double>(),
-          json.at("cascades").get<int>()};
+  SceneFrame frame{{centre.at(0).get<double>(), centre.at(1).get<double>(), centre.at(2).get<double>()},
+                   json.at("unit_per_world").get<double>(),
+                   0};
+  read_exactly(json.at("cascades"), frame.cascades);
+  return frame;
 }
 
 LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options, const Engines& engines) {
@@ -101,6 +134,7 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   model.max_luminance = header_field<float>(snapshot, "max_luminance");
   model.seconds = load_times(file)["seconds"];
   model.trained_samples = header_field<double>(snapshot, "trained_samples");
+  check_stored(snapshot, model);
   model.engine = make_engine(model.frame, model.options, model.max_luminance, engines);
   snapshot.restore(model.engine->state());
   model.engine->state_loaded();

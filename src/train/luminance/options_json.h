@@ -3,8 +3,19 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <type_traits>
 
 namespace cnerf {
+
+/// Reads a value, which `get` would also make of a fraction, or of a number that the type does not hold.
+/// @throws nlohmann::json::exception
+template <typename T>
+void read_exactly(const nlohmann::json& json, T& value) {
+  if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>) {
+    (void)json.get_ref<const nlohmann::json::number_integer_t&>();  // throws for any other
+  }
+  json.get_to(value);
+}
 
 class OptionsToJson {
  public:
@@ -27,7 +38,7 @@ class OptionsFromJson {
   explicit OptionsFromJson(const nlohmann::json& json) : json_(json) {}
   template <typename T, typename... Rest>
   void operator()(const char* name, T& value, const Rest&...) {
-    if (const auto found = json_.find(name); found != json_.end()) found->get_to(value);
+    if (const auto found = json_.find(name); found != json_.end()) read_exactly(*found, value);
   }
   template <typename Nested>
   void section(const char* name, Nested& nested) {

@@ -73,15 +73,19 @@ Snapshot::Snapshot(const std::filesystem::path& file, const std::string& kind)
     header_ = parse_json<SnapshotError, nlohmann::json>(
         {reinterpret_cast<const char*>(content_.data()) + kFixedSize, header_size}, file_);
     std::size_t expected = pieces_begin_ + kDigestSize;
+    if (!header_.at("pieces").is_array()) fail("damaged header: its pieces are no list");
     for (const auto& piece : header_.at("pieces")) {
-      (void)piece.at("name").get<std::string>();
-      expected += piece.at("bytes").get<std::size_t>();
+      (void)piece.at("name").get_ref<const std::string&>();
+      // Sizes that no file has could add up to this one's; a fraction is no size.
+      const auto bytes = piece.at("bytes").get_ref<const nlohmann::json::number_unsigned_t&>();
+      if (bytes > content_.size()) fail("cut short: a piece of " + std::to_string(bytes) + " bytes is incomplete");
+      expected += bytes;
     }
     if (content_.size() != expected) {
       fail("cut short: " + std::to_string(content_.size()) + " bytes, expected " + std::to_string(expected));
     }
     if (header_.at("kind") != kind) {
-      fail("is a snapshot of kind '" + header_.at("kind").get<std::string>() + "', expected '" + kind + "'");
+      fail("is a snapshot of kind " + excerpt(header_.at("kind")) + ", expected '" + kind + "'");
     }
   } catch (const nlohmann::json::exception& problem) {
     fail(std::string("damaged header: ") + problem.what());
@@ -102,8 +106,8 @@ void Snapshot::restore(const std::vector<StatePiece>& pieces) const {
     const auto name = stored[i].at("name").get<std::string>();
     const auto bytes = stored[i].at("bytes").get<std::size_t>();
     if (name != pieces[i].name || bytes != pieces[i].bytes.size()) {
-      throw SnapshotError(file_.string() + ": piece '" + name + "' of " + std::to_string(bytes) + " bytes, expected '" +
-                          pieces[i].name + "' of " + std::to_string(pieces[i].bytes.size()));
+      throw SnapshotError(file_.string() + ": piece " + excerpt(stored[i].at("name")) + " of " + std::to_string(bytes) +
+                          " bytes, expected '" + pieces[i].name + "' of " + std::to_string(pieces[i].bytes.size()));
     }
     std::memcpy(pieces[i].bytes.data(), content_.data() + offset, bytes);
     offset += bytes;

@@ -31,6 +31,8 @@ class Snapshot {
   /// @throws SnapshotError  when a piece is missing or of another size than the engine's.
   void restore(const std::vector<StatePiece>& pieces) const;
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+  /// Of the file.
+  [[nodiscard]] std::size_t bytes() const { return content_.size(); }
 
  private:
   std::filesystem::path file_;
