@@ -109,7 +109,8 @@ class Campaign {
         const fs::path folder = options_.folder / "work" / std::to_string(worker);
         for (std::size_t task; (task = next++) < kinds_.size() * options_.per_kind;) {
           const std::size_t kind = task / options_.per_kind, number = task % options_.per_kind;
-          if (!options_.number || *options_.number == number) add(kind, number, read_mutant(kinds_[kind], number, folder), folder);
+          if (!options_.number || *options_.number == number)
+            add(kind, number, read_mutant(kinds_[kind], number, folder), folder);
         }
         fs::remove_all(folder);
       });
@@ -177,10 +178,12 @@ class Campaign {
     row.peak_bytes = std::max(row.peak_bytes, finding.peak_bytes);
     const std::string name = fmt::format("{} {}", row.kind, number);
     if (finding.verdict == Verdict::kAccepted) {
-      accepted_ << fmt::format("{} | {} | {}\n", name, plain(finding.change, 160), plain(finding.said, 160)) << std::flush;
+      accepted_ << fmt::format("{} | {} | {}\n", name, plain(finding.change, 160), plain(finding.said, 160))
+                << std::flush;
     }
     if (is_violation(finding.verdict)) keep(kinds_[kind], number, finding, folder);
-    if (++finished_ % 200 == 0) options_.say(fmt::format("{} of {} mutants", finished_, kinds_.size() * options_.per_kind));
+    if (++finished_ % 200 == 0)
+      options_.say(fmt::format("{} of {} mutants", finished_, kinds_.size() * options_.per_kind));
   }
 
   /// The mutant and all that is needed to see it again.
@@ -193,11 +196,12 @@ class Campaign {
     write_file(kept / "report.txt",
                fmt::format("verdict: {}\nkind: {}\nagain: --seed {} --kinds {} --number {}\nchange: {}\ncommand: {}\n"
                            "exit code: {}\nsignal: {}\ntimed out: {}\nseconds: {:.2f}\npeak MiB: {}\n\n{}\n{}\n",
-                           kNames[std::size_t(finding.verdict)], kind.name, options_.seed, shell_word(kind.name), number,
-                           plain(finding.change, 400), command, finding.outcome.exit_code, finding.outcome.signal,
-                           finding.outcome.timed_out, finding.outcome.seconds, finding.outcome.peak_bytes >> 20,
-                           finding.outcome.err, finding.outcome.out));
-    options_.say(fmt::format("{}: {} {}: {}", kNames[std::size_t(finding.verdict)], kind.name, number, plain(finding.said, 200)));
+                           kNames[std::size_t(finding.verdict)], kind.name, options_.seed, shell_word(kind.name),
+                           number, plain(finding.change, 400), command, finding.outcome.exit_code,
+                           finding.outcome.signal, finding.outcome.timed_out, finding.outcome.seconds,
+                           finding.outcome.peak_bytes >> 20, finding.outcome.err, finding.outcome.out));
+    options_.say(fmt::format("{}: {} {}: {}", kNames[std::size_t(finding.verdict)], kind.name, number,
+                             plain(finding.said, 200)));
   }
 
   CampaignOptions options_;
@@ -232,8 +236,10 @@ std::vector<Row> run_campaign(const CampaignOptions& options) {
 }
 
 std::string table_of(const std::vector<Row>& rows) {
-  std::string table = "| target | mutants | refused | accepted | crash | hang | exit 70 | memory | unnamed | seconds a mutant | peak MiB |\n"
-                      "|---|---|---|---|---|---|---|---|---|---|---|\n";
+  std::string table =
+      "| target | mutants | refused | accepted | crash | hang | exit 70 | memory | unnamed | seconds a mutant | peak "
+      "MiB |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n";
   Row all{"**all**"};
   const auto add = [&](const Row& row) {
     std::size_t mutants = 0;

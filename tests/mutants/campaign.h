@@ -40,8 +40,8 @@ inline constexpr std::size_t kVerdicts = 7;
 struct Row {
   std::string kind;
   std::array<std::size_t, kVerdicts> counts{};
-  double seconds = 0;           ///< of all runs
-  std::size_t peak_bytes = 0;   ///< the most of one
+  double seconds = 0;          ///< of all runs
+  std::size_t peak_bytes = 0;  ///< the most of one
   [[nodiscard]] std::size_t of(Verdict verdict) const { return counts[std::size_t(verdict)]; }
   [[nodiscard]] std::size_t violations() const;
 };

@@ -30,7 +30,8 @@ std::string digest_of(const std::string& bytes) {
   return sha256(std::as_bytes(std::span(bytes)));
 }
 
-// ---- snapshots: magic, version, size of the header, header, pieces, digest -------------------------------------------
+// ---- snapshots: magic, version, size of the header, header, pieces, digest
+// -------------------------------------------
 
 std::optional<Envelope> opened_snapshot(const std::string& file) {
   constexpr std::size_t kSize = 12, kHeader = 20;
@@ -100,7 +101,8 @@ std::optional<Envelope> opened_weights(const std::string& file) {
   return envelope;
 }
 
-// ---- journals: size, checksum and bytes of each part; the first is the bake's identity -------------------------------
+// ---- journals: size, checksum and bytes of each part; the first is the bake's identity
+// -------------------------------
 
 std::uint64_t checksum_of(std::string_view bytes, std::uint64_t seed) {
   constexpr std::uint64_t kPrime = 0x100000001b3;

@@ -55,7 +55,8 @@ void limit(int resource, std::size_t most) {
 }
 
 /// Only what may be done between fork and exec of a program with threads.
-[[noreturn]] void become(char** words, char** variables, const fs::path& out, const fs::path& err, const Limits& limits) {
+[[noreturn]] void become(char** words, char** variables, const fs::path& out, const fs::path& err,
+                         const Limits& limits) {
   ::setpgid(0, 0);
   ::dup2(::open("/dev/null", O_RDONLY), STDIN_FILENO);
   ::dup2(::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);

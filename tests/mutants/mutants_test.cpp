@@ -1,5 +1,5 @@
-/// A small part of the campaigns, always the same, and the campaigns' own parts: a check that finds nothing must be able
-/// to find something.
+/// A small part of the campaigns, always the same, and the campaigns' own parts: a check that finds nothing must be
+/// able to find something.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -47,21 +47,35 @@ Mutant with_other_bytes(const std::string& original, Random& random) {
   Mutant mutant{original, "bytes:"};
   for (std::size_t n = 1 + random.below(4); n > 0; --n) {
     const std::size_t at = random.below(original.size());
-    mutant.bytes[at] = random.chance(2) ? random.byte() : random.of("\0\xFF\x7F\x80" "09-\"");
+    mutant.bytes[at] = random.chance(2) ? random.byte()
+                                        : random.of(
+                                              "\0\xFF\x7F\x80"
+                                              "09-\"");
     mutant.change += fmt::format(" {} is {}", at, int(std::uint8_t(mutant.bytes[at])));
   }
   return mutant;
 }
 
 Mutant with_extreme_number(const std::string& original, Random& random) {
-  static const std::vector<std::string> numbers = {
-      bytes_of(std::uint32_t(0)),          bytes_of(std::uint32_t(1)),     bytes_of(~std::uint32_t(0)),
-      bytes_of(std::uint32_t(1) << 31),    bytes_of(~std::uint32_t(0) / 2), bytes_of(std::uint64_t(0)),
-      bytes_of(~std::uint64_t(0)),         bytes_of(std::uint64_t(1) << 63), bytes_of(std::uint64_t(1) << 40),
-      bytes_of(std::uint64_t(1) << 32),    bytes_of(std::uint16_t(0xFFFF)), bytes_of(1e308),
-      bytes_of(-1.0),                      bytes_of(1e-308),               bytes_of(std::numeric_limits<double>::quiet_NaN()),
-      bytes_of(std::numeric_limits<double>::infinity()), bytes_of(1e30F),   bytes_of(std::numeric_limits<float>::quiet_NaN()),
-      bytes_of(-std::numeric_limits<float>::infinity())};
+  static const std::vector<std::string> numbers = {bytes_of(std::uint32_t(0)),
+                                                   bytes_of(std::uint32_t(1)),
+                                                   bytes_of(~std::uint32_t(0)),
+                                                   bytes_of(std::uint32_t(1) << 31),
+                                                   bytes_of(~std::uint32_t(0) / 2),
+                                                   bytes_of(std::uint64_t(0)),
+                                                   bytes_of(~std::uint64_t(0)),
+                                                   bytes_of(std::uint64_t(1) << 63),
+                                                   bytes_of(std::uint64_t(1) << 40),
+                                                   bytes_of(std::uint64_t(1) << 32),
+                                                   bytes_of(std::uint16_t(0xFFFF)),
+                                                   bytes_of(1e308),
+                                                   bytes_of(-1.0),
+                                                   bytes_of(1e-308),
+                                                   bytes_of(std::numeric_limits<double>::quiet_NaN()),
+                                                   bytes_of(std::numeric_limits<double>::infinity()),
+                                                   bytes_of(1e30F),
+                                                   bytes_of(std::numeric_limits<float>::quiet_NaN()),
+                                                   bytes_of(-std::numeric_limits<float>::infinity())};
   const std::size_t which = random.below(numbers.size());
   const std::string& number = numbers[which];
   const std::size_t align = random.chance(2) ? number.size() : 1;
@@ -72,8 +86,9 @@ Mutant with_extreme_number(const std::string& original, Random& random) {
 }
 
 Mutant cut(const std::string& original, Random& random) {
-  const std::size_t left = random.chance(4) ? original.size() - std::min<std::size_t>(original.size(), 1 + random.below(8))
-                                            : random.below(original.size());
+  const std::size_t left = random.chance(4)
+                               ? original.size() - std::min<std::size_t>(original.size(), 1 + random.below(8))
+                               : random.below(original.size());
   return {original.substr(0, left), fmt::format("cut to {} of {} bytes", left, original.size())};
 }
 
@@ -112,7 +127,8 @@ Mutant with_swapped_blocks(const std::string& original, Random& random) {
   return mutant;
 }
 
-// ---- of text ---------------------------------------------------------------------------------------------------------
+// ---- of text
+// ---------------------------------------------------------------------------------------------------------
 
 /// Numbers and quoted words.
 std::vector<Block> values_of(const std::string& text) {
@@ -152,15 +168,33 @@ bool is_word(const std::string& text, Block value) {
 }
 
 Mutant with_extreme_value(const std::string& original, Random& random) {
-  static const std::vector<std::string> numbers = {"0",          "-1",         "1",     "1e308", "-1e308",
-                                                   "1e-308",     "nan",        "NaN",   "inf",   "-inf",
-                                                   "2147483647", "2147483648", "-2147483649", "4294967296",
-                                                   "9223372036854775807", "9223372036854775808",
-                                                   "18446744073709551616", "1e400", "0.5", "99999999999999999999999",
-                                                   "1e9", "32768", "65536"};
-  static const std::vector<std::string> words = {"\"\"", "\".\"", "\"..\"", "\"/\"", "\"../../../etc/passwd\"",
-                                                 "\"/dev/zero\"", "\"a\\u0000b\"", "\"\\ud800\"", "\"\xC3\xA9\"",
-                                                 "\"%s%n\"", "\" \"", "\"\\n\"", "\"nonsense\"", "\"-1\""};
+  static const std::vector<std::string> numbers = {"0",
+                                                   "-1",
+                                                   "1",
+                                                   "1e308",
+                                                   "-1e308",
+                                                   "1e-308",
+                                                   "nan",
+                                                   "NaN",
+                                                   "inf",
+                                                   "-inf",
+                                                   "2147483647",
+                                                   "2147483648",
+                                                   "-2147483649",
+                                                   "4294967296",
+                                                   "9223372036854775807",
+                                                   "9223372036854775808",
+                                                   "18446744073709551616",
+                                                   "1e400",
+                                                   "0.5",
+                                                   "99999999999999999999999",
+                                                   "1e9",
+                                                   "32768",
+                                                   "65536"};
+  static const std::vector<std::string> words = {
+      "\"\"",          "\".\"",         "\"..\"",       "\"/\"",        "\"../../../etc/passwd\"",
+      "\"/dev/zero\"", "\"a\\u0000b\"", "\"\\ud800\"",  "\"\xC3\xA9\"", "\"%s%n\"",
+      "\" \"",         "\"\\n\"",       "\"nonsense\"", "\"-1\""};
   const std::vector<Block> values = values_of(original);
   if (values.empty()) return mutate_bytes(original, random);
   const Block place = random.of(values);
@@ -192,7 +226,8 @@ Mutant with_depth(const std::string& original, Random& random) {
 }
 
 Mutant with_other_type(const std::string& original, Random& random) {
-  static const std::vector<std::string> others = {"null", "true", "[]", "{}", "\"word\"", "3", "[1, 2, 3]", "", "{\"a\": 1}"};
+  static const std::vector<std::string> others = {"null", "true",      "[]", "{}",        "\"word\"",
+                                                  "3",    "[1, 2, 3]", "",   "{\"a\": 1}"};
   const std::vector<Block> values = values_of(original);
   if (values.empty()) return mutate_bytes(original, random);
   return with_value(original, random.of(values), random.of(others));
@@ -206,7 +241,8 @@ Mutant with_swapped_values(const std::string& original, Random& random) {
   const auto [first, second] = std::minmax(i, j);
   const Block a = values[first], b = values[second];
   const std::string text_a = original.substr(a.begin, a.size), text_b = original.substr(b.begin, b.size);
-  Mutant mutant{original, fmt::format("'{}' at {} and '{}' at {} swapped", excerpt(text_a), a.begin, excerpt(text_b), b.begin)};
+  Mutant mutant{original,
+                fmt::format("'{}' at {} and '{}' at {} swapped", excerpt(text_a), a.begin, excerpt(text_b), b.begin)};
   mutant.bytes.replace(b.begin, b.size, text_a);
   mutant.bytes.replace(a.begin, a.size, text_b);
   return mutant;
@@ -236,19 +272,17 @@ Mutant with_pieces_changed(const std::string& original, Random& random) {
 }  // namespace
 
 Mutant mutate_bytes(const std::string& original, Random& random) {
-  static const std::vector<Change> changes = {with_flipped_bits,    with_flipped_bits,   with_other_bytes,
-                                              with_extreme_number,  with_extreme_number, cut,
-                                              with_inserted_block,  with_doubled_block,  without_block,
-                                              with_swapped_blocks};
+  static const std::vector<Change> changes = {
+      with_flipped_bits,   with_flipped_bits,  with_other_bytes, with_extreme_number, with_extreme_number, cut,
+      with_inserted_block, with_doubled_block, without_block,    with_swapped_blocks};
   if (original.empty()) return with_inserted_block(original, random);
   return random.of(changes)(original, random);
 }
 
 Mutant mutate_text(const std::string& original, Random& random) {
-  static const std::vector<Change> changes = {with_extreme_value, with_extreme_value,  with_extreme_value,
-                                              with_extreme_value, with_long_word,      with_depth,
-                                              with_other_type,    with_swapped_values, with_pieces_changed,
-                                              mutate_bytes};
+  static const std::vector<Change> changes = {
+      with_extreme_value, with_extreme_value, with_extreme_value,  with_extreme_value,  with_long_word,
+      with_depth,         with_other_type,    with_swapped_values, with_pieces_changed, mutate_bytes};
   if (original.empty()) return with_inserted_block(original, random);
   return random.of(changes)(original, random);
 }

@@ -25,8 +25,9 @@ Words joined(Words a, const Words& b) {
 }
 
 void call(const Workshop& workshop, const Words& arguments) {
-  const Outcome outcome = run_limited(joined({workshop.program.string()}, arguments), workshop.folder / "calls",
-                                      {workshop.limits.wall * 4, workshop.limits.address_bytes, workshop.limits.sanitized});
+  const Outcome outcome =
+      run_limited(joined({workshop.program.string()}, arguments), workshop.folder / "calls",
+                  {workshop.limits.wall * 4, workshop.limits.address_bytes, workshop.limits.sanitized});
   if (outcome.exit_code == 0) return;
   throw InputError(workshop.program.string(), arguments.front(),
                    fmt::format("an original cannot be made: exit code {}, signal {}: {}", outcome.exit_code,
@@ -39,7 +40,8 @@ fs::path copied(const fs::path& from, const fs::path& to) {
   return to;
 }
 
-// ---- captures --------------------------------------------------------------------------------------------------------
+// ---- captures
+// --------------------------------------------------------------------------------------------------------
 
 /// A capture whose first image is `images/0.EXTENSION`; the others are PNG.
 fs::path capture_with_image(const fs::path& folder, const std::string& extension,
@@ -76,7 +78,8 @@ fs::path colmap_capture(const fs::path& folder, bool is_text) {
   return folder;
 }
 
-// ---- colorizers ------------------------------------------------------------------------------------------------------
+// ---- colorizers
+// ------------------------------------------------------------------------------------------------------
 
 /// A message in the wire format of protocol buffers.
 class Message {
@@ -151,7 +154,8 @@ Step coloring_by(const std::string& spec) {
   return {{"colorize-image", "{}/picture.png", "{}/out.png", "--colorizer", spec, "--threads", "1"}, ""};
 }
 
-// ---- runs and bakes --------------------------------------------------------------------------------------------------
+// ---- runs and bakes
+// --------------------------------------------------------------------------------------------------
 
 Words quiet() {
   return {"--threads", "1", "--progress", "quiet"};
@@ -206,7 +210,8 @@ void add_captures(const Workshop& workshop, std::vector<Kind>& kinds) {
       {joined(reading("train", {"{}", "-o", "{}/run", "--device", "cpu"}), least_options()), ""}};
   const fs::path sample = make_capture(workshop);
   kinds.push_back({"transforms.json", sample, "transforms.json", true, Format::kPlain, steps});
-  const fs::path binary = colmap_capture(folder / "colmap-binary", false), text = colmap_capture(folder / "colmap-text", true);
+  const fs::path binary = colmap_capture(folder / "colmap-binary", false),
+                 text = colmap_capture(folder / "colmap-text", true);
   for (const char* name : {"cameras", "images", "points3D"}) {
     const std::string file = std::string("sparse/") + name;
     kinds.push_back({std::string("colmap ") + name + ".bin", binary, file + ".bin", false, Format::kPlain, steps});
@@ -233,13 +238,22 @@ void add_runs(const Workshop& workshop, std::vector<Kind>& kinds) {
 
   const Step info{reading("info", {"{}/run"}), ""};
   const auto info_of = [](const std::string& file) { return Step{reading("info", {"{}/" + file}), ""}; };
-  const Step coloring{joined(reading("colorize", {"{}/run", "--take", "new", "--colorizer", "grey", "--device", "cpu"}), least_options()), ""};
-  const Step training{joined(reading("train", {capture.string(), "-o", "{}/again", "--config", "{}/options.toml", "--device", "cpu"}), least_options()), ""};
-  const Step path{joined(reading("render", {"{}/run", "--path", "{}/path.json", "--format", "png", "-o", "{}/out", "--device", "cpu"}), least_options()), ""};
+  const Step coloring{joined(reading("colorize", {"{}/run", "--take", "new", "--colorizer", "grey", "--device", "cpu"}),
+                             least_options()),
+                      ""};
+  const Step training{
+      joined(reading("train", {capture.string(), "-o", "{}/again", "--config", "{}/options.toml", "--device", "cpu"}),
+             least_options()),
+      ""};
+  const Step path{joined(reading("render", {"{}/run", "--path", "{}/path.json", "--format", "png", "-o", "{}/out",
+                                            "--device", "cpu"}),
+                         least_options()),
+                  ""};
   const auto add = [&](const char* name, const char* file, bool is_text, Format format, std::vector<Step> steps) {
     kinds.push_back({name, stage, file, is_text, format, std::move(steps)});
   };
-  add("stage1.snapshot", "run/stage1.snapshot", false, Format::kSnapshot, {info_of("run/stage1.snapshot"), rendering({})});
+  add("stage1.snapshot", "run/stage1.snapshot", false, Format::kSnapshot,
+      {info_of("run/stage1.snapshot"), rendering({})});
   add("take.snapshot", "run/takes/grey/take.snapshot", false, Format::kSnapshot,
       {info_of("run/takes/grey/take.snapshot"), rendering({"--baked"})});
   add("run.json", "run/run.json", true, Format::kPlain, {info, rendering({})});
@@ -255,11 +269,18 @@ void add_runs(const Workshop& workshop, std::vector<Kind>& kinds) {
   const fs::path stopped = copied(stage, workshop.folder / "stopped");
   fs::create_directories(stopped / "run/bakes/grey");
   fs::rename(workshop.folder / "kept.bake", stopped / "run/bakes/grey/unfinished.bake");
-  kinds.push_back({"unfinished.bake", stopped, "run/bakes/grey/unfinished.bake", false, Format::kJournal, {{baking, ""}}});
+  kinds.push_back(
+      {"unfinished.bake", stopped, "run/bakes/grey/unfinished.bake", false, Format::kJournal, {{baking, ""}}});
 
   const fs::path bake = copied(baked / "run/bakes/grey", workshop.folder / "bake");
   const Step voxels{reading("render", {"{}", "--path", "cameras", "--format", "png", "-o", "{}/out"}), ""};
-  kinds.push_back({"volume.vdb", bake, "volume.vdb", false, Format::kPlain, {{reading("info", {"{}/volume.vdb"}), ""}, voxels}, sign_volume});
+  kinds.push_back({"volume.vdb",
+                   bake,
+                   "volume.vdb",
+                   false,
+                   Format::kPlain,
+                   {{reading("info", {"{}/volume.vdb"}), ""}, voxels},
+                   sign_volume});
   const Step view{{"view", "{}", "--no-browser", "--set", "web.resolution=16"}, "Ctrl-C ends it"};
   kinds.push_back({"manifest.json", bake, "manifest.json", true, Format::kPlain, {voxels, view}});
   kinds.push_back({"bundle.json (view)", make_bundle(workshop), "bundle.json", true, Format::kPlain, {view}});
@@ -286,7 +307,8 @@ void add_old_files(const Workshop& workshop, std::vector<Kind>& kinds) {
   const Step render = rendering({"--capture", "{}/capture"}), info{reading("info", {"{}/run"}), ""};
   const Step voxels{reading("render", {"{}/run/bakes/reference", "-o", "{}/out"}), ""};
   const auto add = [&](const char* name, const char* file, bool is_text, Format format, std::vector<Step> steps) {
-    kinds.push_back({std::string("649cb93 ") + name, old, std::string("run/") + file, is_text, format, std::move(steps)});
+    kinds.push_back(
+        {std::string("649cb93 ") + name, old, std::string("run/") + file, is_text, format, std::move(steps)});
   };
   add("run.json", "run.json", true, Format::kPlain, {info, render});
   add("stage1.snapshot", "stage1.snapshot", false, Format::kSnapshot, {info, render});
@@ -294,7 +316,8 @@ void add_old_files(const Workshop& workshop, std::vector<Kind>& kinds) {
   add("take.json", "takes/reference/take.json", true, Format::kPlain, {info, render});
   add("take config.toml", "takes/reference/config.toml", true, Format::kPlain, {render});
   add("manifest.json", "bakes/reference/manifest.json", true, Format::kPlain, {voxels});
-  add("volume.vdb", "bakes/reference/volume.vdb", false, Format::kPlain, {{reading("info", {"{}/run/bakes/reference/volume.vdb"}), ""}, voxels});
+  add("volume.vdb", "bakes/reference/volume.vdb", false, Format::kPlain,
+      {{reading("info", {"{}/run/bakes/reference/volume.vdb"}), ""}, voxels});
   kinds.back().amend = [](const fs::path& stage) { sign_volume(stage / "run/bakes/reference"); };
 }
 
@@ -302,14 +325,30 @@ void add_old_files(const Workshop& workshop, std::vector<Kind>& kinds) {
 
 Words least_options() {
   Words options;
-  for (const char* setting :
-       {"stage1.steps=4", "stage1.samples_per_step=1024", "stage1.checkpoint_every=2", "stage1.steps_per_box=32",
-        "stage1.grid.levels=2", "stage1.grid.log2_rows=10", "stage1.grid.finest_resolution=32",
-        "colorizer.reference_steps=2", "stage2.patches=2", "stage2.patch_size=16", "stage2.rays_per_patch=64",
-        "stage2.working_resolution=16", "stage2.distill_steps=2", "stage2.colorizer_batch=2", "stage2.grid.levels=2",
-        "stage2.grid.log2_rows=10", "stage2.grid.finest_resolution=32", "stage2.purify.enabled=false",
-        "stage2.purify.base_images=2", "bake.resolution=16", "web.resolution=16", "render.frames=2",
-        "render.short_side=16", "render.steps_per_box=32"}) {
+  for (const char* setting : {"stage1.steps=4",
+                              "stage1.samples_per_step=1024",
+                              "stage1.checkpoint_every=2",
+                              "stage1.steps_per_box=32",
+                              "stage1.grid.levels=2",
+                              "stage1.grid.log2_rows=10",
+                              "stage1.grid.finest_resolution=32",
+                              "colorizer.reference_steps=2",
+                              "stage2.patches=2",
+                              "stage2.patch_size=16",
+                              "stage2.rays_per_patch=64",
+                              "stage2.working_resolution=16",
+                              "stage2.distill_steps=2",
+                              "stage2.colorizer_batch=2",
+                              "stage2.grid.levels=2",
+                              "stage2.grid.log2_rows=10",
+                              "stage2.grid.finest_resolution=32",
+                              "stage2.purify.enabled=false",
+                              "stage2.purify.base_images=2",
+                              "bake.resolution=16",
+                              "web.resolution=16",
+                              "render.frames=2",
+                              "render.short_side=16",
+                              "render.steps_per_box=32"}) {
     options.insert(options.end(), {"--set", setting});
   }
   return options;

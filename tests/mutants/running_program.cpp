@@ -55,7 +55,8 @@ bool RunningProgram::is_alive() {
 std::optional<int> RunningProgram::interrupt(std::chrono::seconds patience) {
   const auto end = std::chrono::steady_clock::now() + patience;
   if (is_alive()) ::kill(pid_, SIGINT);
-  while (is_alive() && std::chrono::steady_clock::now() < end) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  while (is_alive() && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   return status_;
 }
 

@@ -36,7 +36,8 @@ double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-// ---- a client --------------------------------------------------------------------------------------------------------
+// ---- a client
+// --------------------------------------------------------------------------------------------------------
 
 /// A TCP connection to the server.
 class Client {
@@ -113,7 +114,8 @@ void count(ServerRow& row, const std::string& answer) {
   if (answer.find(kSecret) != std::string::npos || answer.find("root:x:0") != std::string::npos) ++row.leaks;
 }
 
-// ---- the server and who looks at it ----------------------------------------------------------------------------------
+// ---- the server and who looks at it
+// ----------------------------------------------------------------------------------
 
 /// Asks for the page all the time.
 class Visitor {
@@ -156,7 +158,8 @@ class Visitor {
 class Server {
  public:
   Server(const ServerOptions& options, const std::string& name, std::vector<std::string> arguments)
-      : options_(options), program_(with_program(options.program, std::move(arguments)), options.folder / (name + ".txt")) {
+      : options_(options),
+        program_(with_program(options.program, std::move(arguments)), options.folder / (name + ".txt")) {
     constexpr const char* kBefore = "http://127.0.0.1:";
     for (int look = 0; look < 6000 && port_ == 0; ++look) {
       const std::string text = program_.printed();
@@ -198,12 +201,13 @@ class Server {
   /// How much the server holds meanwhile.
   class Watch {
    public:
-    explicit Watch(const RunningProgram& program) : thread_([this, &program] {
-      while (!is_stopped_) {
-        most_ = std::max(most_, program.resident_bytes());
-        std::this_thread::sleep_for(milliseconds(20));
-      }
-    }) {}
+    explicit Watch(const RunningProgram& program)
+        : thread_([this, &program] {
+            while (!is_stopped_) {
+              most_ = std::max(most_, program.resident_bytes());
+              std::this_thread::sleep_for(milliseconds(20));
+            }
+          }) {}
     std::size_t most() {
       is_stopped_ = true;
       thread_.join();
@@ -221,9 +225,7 @@ class Server {
     return arguments;
   }
 
-  void settle() const {
-    std::this_thread::sleep_for(milliseconds(300));
-  }
+  void settle() const { std::this_thread::sleep_for(milliseconds(300)); }
 
   void judge(ServerRow& row) {
     const auto violated = [&](bool is_violated, const std::string& what) {
@@ -232,8 +234,9 @@ class Server {
     violated(!program_.is_alive(), "the server ended: " + program_.printed());
     violated(row.leaks > 0, fmt::format("{} answers hold what lies outside", row.leaks));
     violated(row.wrong > 0, fmt::format("{} answers should not have been given", row.wrong));
-    violated(row.failed_visits > 0, fmt::format("{} of {} visits of the page failed or took more than {} s, the slowest {:.2f} s",
-                                                row.failed_visits, row.visits, options_.patience, row.slowest_visit));
+    violated(row.failed_visits > 0,
+             fmt::format("{} of {} visits of the page failed or took more than {} s, the slowest {:.2f} s",
+                         row.failed_visits, row.visits, options_.patience, row.slowest_visit));
     violated(row.growth > options_.most_growth, fmt::format("the server grew by {} MiB", row.growth >> 20));
     violated(row.descriptors_after > row.descriptors_before,
              fmt::format("{} descriptors were open before, {} after", row.descriptors_before, row.descriptors_after));
@@ -256,23 +259,67 @@ void for_each_client(int count, const std::function<void(int)>& one) {
   for (std::thread& thread : threads) thread.join();
 }
 
-// ---- what is done to it ----------------------------------------------------------------------------------------------
+// ---- what is done to it
+// ----------------------------------------------------------------------------------------------
 
-const std::vector<std::string> kTraversals = {
-    "/../secret.txt", "/../../secret.txt", "/photos/../../secret.txt", "/%2e%2e/secret.txt", "/%2E%2E/secret.txt",
-    "/..%2fsecret.txt", "/..%2Fsecret.txt", "/%2e%2e%2fsecret.txt", "/%252e%252e%252fsecret.txt", "/..\\secret.txt",
-    "/..%5csecret.txt", "/%2e%2e%5csecret.txt", "/....//secret.txt", "/...//secret.txt", "/.%2e/secret.txt",
-    "/./../secret.txt", "/photos/%2e%2e/%2e%2e/secret.txt", "/photos/..%2f..%2fsecret.txt", "//../secret.txt",
-    "///secret.txt", "//etc/passwd", "/etc/passwd", "/../../../../../../../../etc/passwd",
-    "/%2e%2e/%2e%2e/%2e%2e/%2e%2e/%2e%2e/%2e%2e/etc/passwd", "/..%c0%af..%c0%afetc/passwd", "/%c0%ae%c0%ae/secret.txt",
-    "/..%00/secret.txt", "/index.html%00/../../secret.txt", "/link.txt", "/up/secret.txt", "/up/../secret.txt",
-    "/index.html/../../secret.txt", "/?/../../secret.txt", "/#/../../secret.txt", "http://127.0.0.1/../secret.txt",
-    "file:///etc/passwd", "/.hidden"};
+const std::vector<std::string> kTraversals = {"/../secret.txt",
+                                              "/../../secret.txt",
+                                              "/photos/../../secret.txt",
+                                              "/%2e%2e/secret.txt",
+                                              "/%2E%2E/secret.txt",
+                                              "/..%2fsecret.txt",
+                                              "/..%2Fsecret.txt",
+                                              "/%2e%2e%2fsecret.txt",
+                                              "/%252e%252e%252fsecret.txt",
+                                              "/..\\secret.txt",
+                                              "/..%5csecret.txt",
+                                              "/%2e%2e%5csecret.txt",
+                                              "/....//secret.txt",
+                                              "/...//secret.txt",
+                                              "/.%2e/secret.txt",
+                                              "/./../secret.txt",
+                                              "/photos/%2e%2e/%2e%2e/secret.txt",
+                                              "/photos/..%2f..%2fsecret.txt",
+                                              "//../secret.txt",
+                                              "///secret.txt",
+                                              "//etc/passwd",
+                                              "/etc/passwd",
+                                              "/../../../../../../../../etc/passwd",
+                                              "/%2e%2e/%2e%2e/%2e%2e/%2e%2e/%2e%2e/%2e%2e/etc/passwd",
+                                              "/..%c0%af..%c0%afetc/passwd",
+                                              "/%c0%ae%c0%ae/secret.txt",
+                                              "/..%00/secret.txt",
+                                              "/index.html%00/../../secret.txt",
+                                              "/link.txt",
+                                              "/up/secret.txt",
+                                              "/up/../secret.txt",
+                                              "/index.html/../../secret.txt",
+                                              "/?/../../secret.txt",
+                                              "/#/../../secret.txt",
+                                              "http://127.0.0.1/../secret.txt",
+                                              "file:///etc/passwd",
+                                              "/.hidden"};
 
-const std::vector<std::string> kForeignHosts = {
-    "evil.example", "evil.example:80", "127.attacker.example", "127.0.0.1.example", "127.0.0.1@evil.example",
-    "localhost.example", "128.0.0.1", "0x7f.1.example", "[::2]", "[::1", "[::1]x", "127.0.0.1:80x", "10.0.0.1:80",
-    "", " ", "127.0.0.1, evil.example", "xn--localhost-.example", "localhost:80:80", "[::ffff:10.0.0.1]", "2130706433.example"};
+const std::vector<std::string> kForeignHosts = {"evil.example",
+                                                "evil.example:80",
+                                                "127.attacker.example",
+                                                "127.0.0.1.example",
+                                                "127.0.0.1@evil.example",
+                                                "localhost.example",
+                                                "128.0.0.1",
+                                                "0x7f.1.example",
+                                                "[::2]",
+                                                "[::1",
+                                                "[::1]x",
+                                                "127.0.0.1:80x",
+                                                "10.0.0.1:80",
+                                                "",
+                                                " ",
+                                                "127.0.0.1, evil.example",
+                                                "xn--localhost-.example",
+                                                "localhost:80:80",
+                                                "[::ffff:10.0.0.1]",
+                                                "2130706433.example"};
 
 void try_traversals(int port, ServerRow& row) {
   for (const std::string& path : kTraversals) count(row, ask(port, get(path)));
@@ -300,8 +347,9 @@ void try_foreign_orders(int port, ServerRow& row) {
     row.wrong += status_of(answer) < 400 && status_of(answer) != 0 ? 1 : 0;
   };
   const std::string own = "127.0.0.1:" + std::to_string(port);
-  for (const char* origin : {"http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1", "http://localhost",
-                             "file://", "", "http://127.0.0.1.evil.example", "http://evil.example:80"}) {
+  for (const char* origin :
+       {"http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1", "http://localhost", "file://", "",
+        "http://127.0.0.1.evil.example", "http://evil.example:80"}) {
     order(own, std::string("X-Cnerf: 1\r\nOrigin: ") + origin + "\r\n");
   }
   order(own, "");
@@ -341,11 +389,30 @@ void try_ranges(int port, ServerRow& row, const fs::path& bundle) {
     many += ",0-";
     apart += fmt::format(",{0}-{0}", 2 * i);
   }
-  const std::vector<std::string> ranges = {
-      "bytes=" + many, "bytes=" + apart, "bytes=0-", "bytes=-1", "bytes=-0", "bytes=5-2", "bytes=0-99999999999999999999",
-      "bytes=18446744073709551615-", "bytes=-18446744073709551615", "bytes=9223372036854775808-9223372036854775809", "bytes=",
-      "bytes=-", "bytes=a-b", "bytes=1-2-3", "bits=0-1", "bytes=0-1,", "bytes=,", "bytes= 0-1", "bytes=0x1-0x2",
-      "bytes=-9999", "bytes=99999999-", "bytes=+1-2", "bytes=1e3-2e3", ""};
+  const std::vector<std::string> ranges = {"bytes=" + many,
+                                           "bytes=" + apart,
+                                           "bytes=0-",
+                                           "bytes=-1",
+                                           "bytes=-0",
+                                           "bytes=5-2",
+                                           "bytes=0-99999999999999999999",
+                                           "bytes=18446744073709551615-",
+                                           "bytes=-18446744073709551615",
+                                           "bytes=9223372036854775808-9223372036854775809",
+                                           "bytes=",
+                                           "bytes=-",
+                                           "bytes=a-b",
+                                           "bytes=1-2-3",
+                                           "bits=0-1",
+                                           "bytes=0-1,",
+                                           "bytes=,",
+                                           "bytes= 0-1",
+                                           "bytes=0x1-0x2",
+                                           "bytes=-9999",
+                                           "bytes=99999999-",
+                                           "bytes=+1-2",
+                                           "bytes=1e3-2e3",
+                                           ""};
   for (const auto& entry : fs::recursive_directory_iterator(bundle)) {
     if (!entry.is_regular_file() || entry.is_symlink()) continue;
     const std::string path = "/" + fs::relative(entry.path(), bundle).generic_string();
@@ -374,12 +441,17 @@ void try_aborts(int port, ServerRow& row, int clients, const std::string& file) 
 
 void send_garbage(int port, ServerRow& row, const ServerOptions& options) {
   const std::vector<std::string> requests = {
-      get("/"), get("/bundle.json", "Range: bytes=0-9\r\nAccept-Encoding: gzip\r\n"),
-      "POST /live/control HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Cnerf: 1\r\nContent-Length: 18\r\nConnection: close\r\n\r\n{\"action\":\"pause\"}",
-      "POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\nConnection: close\r\n\r\n4\r\nabcd\r\n0\r\n\r\n",
-      "POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: multipart/form-data; boundary=a\r\nContent-Length: 60\r\nConnection: close\r\n\r\n--a\r\nContent-Disposition: form-data; name=\"b\"\r\n\r\nc\r\n--a--\r\n",
+      get("/"),
+      get("/bundle.json", "Range: bytes=0-9\r\nAccept-Encoding: gzip\r\n"),
+      "POST /live/control HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Cnerf: 1\r\nContent-Length: 18\r\nConnection: "
+      "close\r\n\r\n{\"action\":\"pause\"}",
+      "POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\nConnection: "
+      "close\r\n\r\n4\r\nabcd\r\n0\r\n\r\n",
+      "POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: multipart/form-data; boundary=a\r\nContent-Length: "
+      "60\r\nConnection: close\r\n\r\n--a\r\nContent-Disposition: form-data; name=\"b\"\r\n\r\nc\r\n--a--\r\n",
       "HEAD /../secret.txt HTTP/1.0\r\nHost: 127.0.0.1\r\nCookie: cnerf_token=a\r\n\r\n",
-      get("/live/events?token=abc&x=%41"), get("/photos/%2e%2e/secret.txt", "If-Range: a\r\nExpect: 100-continue\r\n")};
+      get("/live/events?token=abc&x=%41"),
+      get("/photos/%2e%2e/secret.txt", "If-Range: a\r\nExpect: 100-continue\r\n")};
   std::mutex mutex;
   for_each_client(options.garbage, [&](int i) {
     Random random(options.seed, "garbage", std::size_t(i));
@@ -416,7 +488,8 @@ void lay_secrets(const fs::path& bundle) {
 }
 
 std::vector<std::string> endless_training(const fs::path& capture, const fs::path& run) {
-  std::vector<std::string> words = {"train", capture.string(), "-o", run.string(), "--view", "--no-browser", "--overwrite", "--threads", "1", "--device", "cpu"};
+  std::vector<std::string> words = {"train",       capture.string(), "-o", run.string(), "--view", "--no-browser",
+                                    "--overwrite", "--threads",      "1",  "--device",   "cpu"};
   const std::vector<std::string> options = least_options();
   words.insert(words.end(), options.begin(), options.end());
   words.insert(words.end(), {"--set", "stage1.steps=1000000", "--set", "stage1.checkpoint_every=1000000"});
@@ -443,30 +516,38 @@ std::vector<ServerRow> run_server_campaign(const ServerOptions& options) {
     rows.push_back(server.run("path traversals", try_traversals));
     rows.push_back(server.run("foreign Host", try_foreign_names));
     rows.push_back(server.run("ranges", [&](int port, ServerRow& row) { try_ranges(port, row, bundle); }));
-    rows.push_back(server.run("aborts", [&](int port, ServerRow& row) { try_aborts(port, row, options.aborts, photo); }));
+    rows.push_back(
+        server.run("aborts", [&](int port, ServerRow& row) { try_aborts(port, row, options.aborts, photo); }));
     rows.push_back(server.run("garbage", [&](int port, ServerRow& row) { send_garbage(port, row, options); }));
     rows.push_back(server.run("slow sockets", [&](int port, ServerRow& row) {
-      hold_open(port, row, options.slow, options.seconds, "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: aaaaaaaaaaaaaaaaaaaa");
+      hold_open(port, row, options.slow, options.seconds,
+                "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: aaaaaaaaaaaaaaaaaaaa");
     }));
-    rows.push_back(server.run("silent sockets", [&](int port, ServerRow& row) { hold_open(port, row, options.silent, options.seconds, ""); }));
+    rows.push_back(server.run("silent sockets", [&](int port, ServerRow& row) {
+      hold_open(port, row, options.silent, options.seconds, "");
+    }));
     const auto status = server.end();
     if (status != 0) rows.back().violations.push_back(fmt::format("view: ended with {}", status.value_or(-1)));
   }
   Server training(options, "train", endless_training(workshop.folder / "capture", options.folder / "followed"));
   rows.push_back(training.run("orders from other pages", try_foreign_orders));
-  rows.push_back(training.run("event streams", [&](int port, ServerRow& row) { follow(port, row, options.streams, options.seconds); }));
+  rows.push_back(training.run("event streams",
+                              [&](int port, ServerRow& row) { follow(port, row, options.streams, options.seconds); }));
   const auto status = training.end();
   if (status != 130) rows.back().violations.push_back(fmt::format("training: ended with {}", status.value_or(-1)));
   return rows;
 }
 
 std::string table_of(const std::vector<ServerRow>& rows) {
-  std::string table = "| part | clients | served | refused | no answer | leaks | wrong | visits of / | failed | slowest, s | growth, MiB | descriptors |\n"
-                      "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+  std::string table =
+      "| part | clients | served | refused | no answer | leaks | wrong | visits of / | failed | slowest, s | growth, "
+      "MiB | descriptors |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const ServerRow& row : rows) {
-    table += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.1f} | {} -> {} |\n", row.part, row.clients,
-                         row.served, row.refused, row.unanswered, row.leaks, row.wrong, row.visits, row.failed_visits,
-                         row.slowest_visit, double(row.growth) / (1 << 20), row.descriptors_before, row.descriptors_after);
+    table += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.2f} | {:.1f} | {} -> {} |\n", row.part,
+                         row.clients, row.served, row.refused, row.unanswered, row.leaks, row.wrong, row.visits,
+                         row.failed_visits, row.slowest_visit, double(row.growth) / (1 << 20), row.descriptors_before,
+                         row.descriptors_after);
   }
   return table;
 }
