@@ -98,14 +98,14 @@ between() { echo $(($1 + RANDOM % ($2 - $1 + 1))); }
 random_options() {
   options=(--threads 1 --progress "$(pick quiet plain json line)" --device cpu)
   local setting
-  for setting in "stage1.steps=$(between 4 400)" "stage1.samples_per_step=$(pick 512 1024 4096)" \
+  for setting in "stage1.steps=$(between 4 400)" "stage1.samples_per_step=$(pick 1024 2048 4096)" \
     "stage1.checkpoint_every=$(between 1 50)" stage1.steps_per_box=32 "stage1.grid.levels=$(between 1 4)" \
     "stage1.grid.log2_rows=$(between 8 12)" stage1.grid.finest_resolution=32 colorizer.reference_steps=2 \
-    "stage2.patches=$(between 1 12)" stage2.patch_size=16 stage2.rays_per_patch=64 stage2.working_resolution=16 \
+    "stage2.patches=$(between 1 12)" stage2.patch_size=16 stage2.rays_per_patch=64 stage2.working_resolution=32 \
     "stage2.distill_steps=$(between 1 20)" "stage2.colorizer_batch=$(between 1 4)" stage2.grid.levels=2 \
     stage2.grid.log2_rows=10 stage2.grid.finest_resolution=32 "stage2.purify.enabled=$(pick true false false)" \
     stage2.purify.base_images=2 web.resolution=16 "render.frames=$(between 1 4)" render.short_side=16 \
-    render.steps_per_box=32 "bake.resolution=$(between 8 48)" "seed=$(between 1 99999)"; do
+    render.steps_per_box=32 "bake.resolution=$(between 16 48)" "stage1.seed=$(between 1 99999)" mesh.texture_size=64 mesh.faces=500; do
     options+=(--set "$setting")
   done
 }

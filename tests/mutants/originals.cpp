@@ -336,7 +336,7 @@ Words least_options() {
                               "stage2.patches=2",
                               "stage2.patch_size=16",
                               "stage2.rays_per_patch=64",
-                              "stage2.working_resolution=16",
+                              "stage2.working_resolution=32",
                               "stage2.distill_steps=2",
                               "stage2.colorizer_batch=2",
                               "stage2.grid.levels=2",
