@@ -10,7 +10,7 @@
 namespace cnerf::mutants {
 
 struct Limits {
-  std::chrono::seconds wall{30};
+  std::chrono::seconds wall{30};  ///< without the time in which it was ready and others had the processors
   std::size_t address_bytes = std::size_t(12) << 30;  ///< 0 = none, as the address sanitizer needs
   bool sanitized = false;                             ///< the program is one of the address sanitizer
 };
