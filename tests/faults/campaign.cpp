@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
   app.add_option("--count", options.count, "Trials of kills (500) and pairs (200)");
   app.add_option("--every", options.every, "Only every K-th operation or allocation")->check(CLI::PositiveNumber);
   app.add_option("--commands", options.commands, "Only these, comma-separated")->delimiter(',');
-  app.add_option("--kinds", options.kinds, "Of operations: only eio, enospc, edquot, short, kill, power")->delimiter(',');
+  app.add_option("--kinds", options.kinds, "Of operations: only eio, enospc, edquot, short, kill, power, power-names")->delimiter(',');
   app.add_option("--memory-code", options.out_of_memory, "Exit codes that mean out of memory [69,71]")->delimiter(',');
   app.add_option("-j,--jobs", options.jobs, "Trials at a time")->check(CLI::Range(1, 7));
   CLI11_PARSE(app, argc, argv);

@@ -223,7 +223,11 @@ void judge_refusal(const Slot::Operation& operation, const Ending& ending, Verdi
   if (!is_named) verdict.violated("unnamed", operation.path + ": " + last_line(ending.said));
 }
 
-const std::vector<std::string> kAllKinds = {"eio", "enospc", "short", "kill", "power"};
+const std::vector<std::string> kAllKinds = {"eio", "enospc", "short", "kill", "power", "power-names"};
+
+bool is_power_cut(const std::string& kind) {
+  return kind.starts_with("power");
+}
 
 std::vector<std::string> kinds_of(const CampaignOptions& options) {
   return options.kinds.empty() ? kAllKinds : options.kinds;
@@ -249,7 +253,7 @@ Trial trial_of_operation(const CampaignOptions& options, const Fixtures& fixture
             const Ending ending = slot.run(options.subject, command.words, plan);
             Verdict verdict;
             verdict.ending = std::to_string(ending.code);
-            const bool kills = kind == "kill" || kind == "power";
+            const bool kills = kind == "kill" || is_power_cut(kind);
             const auto operations = slot.operations();
             if (!kills && long(operations.size()) >= number) {
               judge_refusal(operations[std::size_t(number) - 1], ending, verdict);
@@ -302,7 +306,7 @@ Report disturb_operations(const CampaignOptions& options) {
         if (number > long(operations.size())) break;
         trials.push_back(trial_of_operation(options, fixtures, command, world, kind, number));
       }
-      if (kind == "power") trials.push_back(trial_of_operation(options, fixtures, command, world, kind, 0));
+      if (is_power_cut(kind)) trials.push_back(trial_of_operation(options, fixtures, command, world, kind, 0));
     }
     add(report, judged(options, trials));
   }

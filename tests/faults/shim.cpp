@@ -2,7 +2,7 @@
 /// files below one folder and lets one of them go wrong. It knows nothing of the product.
 ///
 ///   CNERF_FAULT_ROOT      the folder that counts; without it nothing happens
-///   CNERF_FAULT_KIND      count (nothing fails), eio, enospc, edquot, short, kill, power, slow, memory
+///   CNERF_FAULT_KIND      count (nothing fails), eio, enospc, edquot, short, kill, power, power-names, slow, memory
 ///   CNERF_FAULT_AT        number of the operation, from 1; "end" cuts the power when the program has ended
 ///   CNERF_FAULT_COUNT     file for the number of operations, written at the end of the program
 ///   CNERF_FAULT_LOG       file for a line per operation: number, what, bytes, path
@@ -16,7 +16,8 @@
 /// its bytes, then as enospc. kill: the process dies, in the middle if the operation is a write. power: what no fsync
 /// made lasting is taken back, then the process dies: files are cut to the length they had at their last fsync, and names
 /// made, replaced or removed in a folder since its last fsync are as before. A new folder lasts once anything below it
-/// was synced, as with the journals of file systems. memory: allocations are counted instead, from main on.
+/// was synced, as with the journals of file systems. power-names: names last at once and only what is in files is lost,
+/// as where names are journalled and data is not: who renames before an fsync is left with an empty file. memory: allocations are counted instead, from main on.
 
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
@@ -55,7 +56,7 @@ void* __libc_memalign(size_t, size_t);
 
 namespace {
 
-enum class Kind { kOff, kCount, kEio, kEnospc, kEdquot, kShort, kKill, kPower, kSlow, kMemory };
+enum class Kind { kOff, kCount, kEio, kEnospc, kEdquot, kShort, kKill, kPower, kPowerNames, kSlow, kMemory };
 
 struct Settings {
   Kind kind = Kind::kOff;
@@ -215,6 +216,7 @@ class Unsynced {
         (void)!REAL(ftruncate)(data.file, data.synced);
       }
     }
+    if (settings.kind == Kind::kPowerNames) return;
     for (auto change = changes_.rbegin(); change != changes_.rend(); ++change) {
       const char* path = change->path.c_str();
       switch (change->what) {
@@ -246,10 +248,14 @@ Unsynced& unsynced() {
   return *all;
 }
 
+bool keeps_record() {
+  return settings.kind == Kind::kPower || settings.kind == Kind::kPowerNames;
+}
+
 /// One operation at a time while a power cut is planned: what it takes back has an order.
 class Turn {
  public:
-  Turn() : is_taken_(settings.kind == Kind::kPower) {
+  Turn() : is_taken_(keeps_record()) {
     if (is_taken_) unsynced().mutex.lock();
   }
   ~Turn() {
@@ -263,10 +269,6 @@ class Turn {
  private:
   bool is_taken_;
 };
-bool keeps_record() {
-  return settings.kind == Kind::kPower;
-}
-
 // ---------------------------------------------------------------------------------------------------- decisions
 
 void log_line(long number, const char* what, std::size_t bytes, const std::string& path) {
@@ -310,6 +312,7 @@ Decision decide(What what, std::size_t bytes, const std::string& path) {
       decision.half = decision.dies = true;
       break;
     case Kind::kPower:
+    case Kind::kPowerNames:
       if (!is_it) break;
       unsynced().take_back();
       die();
@@ -487,8 +490,8 @@ const char* variable(const char* name) {
 Kind kind_of(const char* word) {
   const std::pair<const char*, Kind> kinds[] = {
       {"count", Kind::kCount}, {"eio", Kind::kEio},     {"enospc", Kind::kEnospc}, {"edquot", Kind::kEdquot},
-      {"short", Kind::kShort}, {"kill", Kind::kKill},   {"power", Kind::kPower},   {"slow", Kind::kSlow},
-      {"memory", Kind::kMemory}};
+      {"short", Kind::kShort}, {"kill", Kind::kKill},   {"power", Kind::kPower},   {"power-names", Kind::kPowerNames},
+      {"slow", Kind::kSlow},   {"memory", Kind::kMemory}};
   for (const auto& [name, kind] : kinds) {
     if (std::strcmp(word, name) == 0) return kind;
   }
@@ -535,7 +538,7 @@ __attribute__((destructor)) void end() {
     const std::string text = std::to_string(operations.load()) + "\n";
     if (file >= 0) (void)!REAL(write)(file, text.data(), text.size());
   }
-  if (settings.kind == Kind::kPower && settings.at_end) unsynced().take_back();
+  if (keeps_record() && settings.at_end) unsynced().take_back();
   is_active = false;
 }
 
