@@ -1,5 +1,5 @@
-/// cnerf-fault-campaign: disturbs the program in many ways and judges what it leaves. Prints tables in Markdown and ends
-/// with 1 when anything was violated; what was is kept below the folder.
+/// cnerf-fault-campaign: disturbs the program in many ways and judges what it leaves. Prints tables in Markdown and
+/// ends with 1 when anything was violated; what was is kept below the folder.
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -16,10 +16,8 @@ int main(int argc, char** argv) {
   CampaignOptions options;
   options.subject = {CNERF_PROGRAM, CNERF_FAULT_SHIM};
   options.scratch = std::filesystem::temp_directory_path() / "cnerf-faults";
-  const std::map<std::string, Report (*)(const CampaignOptions&)> campaigns = {{"operations", disturb_operations},
-                                                                              {"kills", kill_at_random},
-                                                                              {"pairs", run_pairs},
-                                                                              {"allocations", starve}};
+  const std::map<std::string, Report (*)(const CampaignOptions&)> campaigns = {
+      {"operations", disturb_operations}, {"kills", kill_at_random}, {"pairs", run_pairs}, {"allocations", starve}};
   app.add_option("CAMPAIGN", "operations, kills, pairs or allocations")
       ->required()
       ->check(CLI::IsMember({"operations", "kills", "pairs", "allocations"}));
@@ -29,7 +27,8 @@ int main(int argc, char** argv) {
   app.add_option("--count", options.count, "Trials of kills (500) and pairs (200)");
   app.add_option("--every", options.every, "Only every K-th operation or allocation")->check(CLI::PositiveNumber);
   app.add_option("--commands", options.commands, "Only these, comma-separated")->delimiter(',');
-  app.add_option("--kinds", options.kinds, "Of operations: only eio, enospc, edquot, short, kill, power, power-names")->delimiter(',');
+  app.add_option("--kinds", options.kinds, "Of operations: only eio, enospc, edquot, short, kill, power, power-names")
+      ->delimiter(',');
   app.add_option("--memory-code", options.out_of_memory, "Exit codes that mean out of memory [69,71]")->delimiter(',');
   app.add_option("-j,--jobs", options.jobs, "Trials at a time")->check(CLI::Range(1, 7));
   CLI11_PARSE(app, argc, argv);

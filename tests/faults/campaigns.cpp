@@ -86,14 +86,16 @@ struct World {
   double seconds = 0;
 };
 
-World world_of(const CampaignOptions& options, const Fixtures& fixtures, const Command& command, const Stop& stop = {}) {
+World world_of(const CampaignOptions& options, const Fixtures& fixtures, const Command& command,
+               const Stop& stop = {}) {
   const Slot slot(options.scratch, 8);
   fixtures.lay_out(slot, command);
   World world;
   world.before = content_of(slot.root());
   const Ending ending = slot.run(options.subject, command.words, {}, stop);
   if (ending.code != 0) {
-    throw std::runtime_error(command.name + " ends with " + std::to_string(ending.code) + " undisturbed: " + ending.said);
+    throw std::runtime_error(command.name + " ends with " + std::to_string(ending.code) +
+                             " undisturbed: " + ending.said);
   }
   world.after = content_of(slot.root());
   world.seconds = ending.seconds;
@@ -104,8 +106,8 @@ World world_of(const CampaignOptions& options, const Fixtures& fixtures, const C
 /// command and others have to be able to read them at any time.
 bool grows(const std::string& file) {
   const std::string name = fs::path(file).filename().string();
-  static const std::set<std::string> names = {"stage1.snapshot", "take.snapshot",   "stage1.seconds.json",
-                                              "run.json",        "take.json",       "take.seconds.json",
+  static const std::set<std::string> names = {"stage1.snapshot", "take.snapshot", "stage1.seconds.json",
+                                              "run.json",        "take.json",     "take.seconds.json",
                                               "unfinished.bake", "prepare.json"};
   return names.contains(name) || name.starts_with(".") || name.ends_with(".log");
 }
@@ -196,7 +198,8 @@ void judge_disturbed(const CampaignOptions& options, const Slot& slot, const Com
   judge_what_is_there(options, slot, command, world, verdict);
   const Ending second = again(options, slot, command);
   if (second.code != 0) {
-    verdict.violated("again", "the same command ends with " + std::to_string(second.code) + ": " + last_line(second.said));
+    verdict.violated("again",
+                     "the same command ends with " + std::to_string(second.code) + ": " + last_line(second.said));
     return;
   }
   judge_result(slot, world, "after the same command again:", verdict);
@@ -214,8 +217,8 @@ std::string final_name(const std::string& path) {
 void judge_refusal(const Slot::Operation& operation, const Ending& ending, Verdict& verdict) {
   if (ending.code == 0) return;
   if (ending.code != kOutput) {
-    verdict.violated("exit", std::to_string(ending.code) + " instead of 73 at " + operation.what + " " + operation.path +
-                                 ": " + last_line(ending.said));
+    verdict.violated("exit", std::to_string(ending.code) + " instead of 73 at " + operation.what + " " +
+                                 operation.path + ": " + last_line(ending.said));
     return;
   }
   const bool is_named = ending.said.find(final_name(operation.path)) != std::string::npos ||
@@ -317,10 +320,9 @@ Report kill_at_random(const CampaignOptions& options) {
   constexpr int kSlowWrite = 40;  // milliseconds
   const Fixtures fixtures(options.subject, options.scratch);
   std::mt19937_64 random(options.seed);
-  std::vector<Command> commands =
-      fixtures.commands(options.commands.empty()
-                            ? std::vector<std::string>{"train", "colorize", "bake", "prepare", "web", "compare"}
-                            : options.commands);
+  std::vector<Command> commands = fixtures.commands(
+      options.commands.empty() ? std::vector<std::string>{"train", "colorize", "bake", "prepare", "web", "compare"}
+                               : options.commands);
   std::vector<World> worlds;
   for (const Command& command : commands) worlds.push_back(world_of(options, fixtures, command));
   std::vector<Trial> trials;
@@ -421,7 +423,8 @@ Report run_pairs(const CampaignOptions& options) {
   Report report;
   const Stop ctrl_c = {SIGINT, [](double seconds) { return seconds > 3; }};
   for (const Command& command : fixtures.neighbours()) {
-    if (!options.commands.empty() && std::ranges::find(options.commands, command.name) == options.commands.end()) continue;
+    if (!options.commands.empty() && std::ranges::find(options.commands, command.name) == options.commands.end())
+      continue;
     try {
       // Only a page is there to be shown; where it was not built, nothing is.
       worlds.push_back(world_of(options, fixtures, command, command.name == "view" ? ctrl_c : Stop{}));
@@ -442,31 +445,30 @@ Report run_pairs(const CampaignOptions& options) {
     const auto [a, b] = pairs[std::size_t(i) % pairs.size()];
     const double offset = std::uniform_real_distribution<>(0, 1)(random) * worlds[a].seconds;
     const std::string row = commands[a].name + " + " + commands[b].name;
-    trials.push_back({row, std::to_string(offset) + " s later", [&, a = a, b = b, offset](const Slot& slot) {
-                        fixtures.lay_out(slot, commands[a]);
-                        const Slot& same = slot;
-                        std::array<Ending, 2> endings;
-                        const auto stop = [&](std::size_t which) {
-                          return commands[which].name == "view" ? ctrl_c : Stop{};
-                        };
-                        std::thread first([&] { endings[0] = same.run(options.subject, commands[a].words, {}, stop(a)); });
-                        std::this_thread::sleep_for(std::chrono::duration<double>(offset));
-                        endings[1] = same.run(options.subject, commands[b].words, {}, stop(b), "output-2");
-                        first.join();
-                        Verdict verdict;
-                        verdict.ending = std::to_string(endings[0].code) + "+" + std::to_string(endings[1].code);
-                        for (const Ending& ending : endings) {
-                          if (ending.hung) verdict.violated("hang", "");
-                          if (ending.code == kInternal || !kDocumented.contains(ending.code)) {
-                            verdict.violated("exit", std::to_string(ending.code) + ": " + last_line(ending.said));
-                          }
-                          const bool names = ending.said.find("another cnerf") != std::string::npos &&
-                                             ending.said.find(slot.root().string()) != std::string::npos;
-                          if (ending.code == kBusy && !names) verdict.violated("unnamed", last_line(ending.said));
-                        }
-                        judge_pair(content_of(slot.root()), {&worlds[a], &worlds[b]}, endings, verdict);
-                        return verdict;
-                      }});
+    trials.push_back(
+        {row, std::to_string(offset) + " s later", [&, a = a, b = b, offset](const Slot& slot) {
+           fixtures.lay_out(slot, commands[a]);
+           const Slot& same = slot;
+           std::array<Ending, 2> endings;
+           const auto stop = [&](std::size_t which) { return commands[which].name == "view" ? ctrl_c : Stop{}; };
+           std::thread first([&] { endings[0] = same.run(options.subject, commands[a].words, {}, stop(a)); });
+           std::this_thread::sleep_for(std::chrono::duration<double>(offset));
+           endings[1] = same.run(options.subject, commands[b].words, {}, stop(b), "output-2");
+           first.join();
+           Verdict verdict;
+           verdict.ending = std::to_string(endings[0].code) + "+" + std::to_string(endings[1].code);
+           for (const Ending& ending : endings) {
+             if (ending.hung) verdict.violated("hang", "");
+             if (ending.code == kInternal || !kDocumented.contains(ending.code)) {
+               verdict.violated("exit", std::to_string(ending.code) + ": " + last_line(ending.said));
+             }
+             const bool names = ending.said.find("another cnerf") != std::string::npos &&
+                                ending.said.find(slot.root().string()) != std::string::npos;
+             if (ending.code == kBusy && !names) verdict.violated("unnamed", last_line(ending.said));
+           }
+           judge_pair(content_of(slot.root()), {&worlds[a], &worlds[b]}, endings, verdict);
+           return verdict;
+         }});
   }
   Report more = judged(options, trials);
   more.remarks = report.remarks;
@@ -495,21 +497,21 @@ Report starve(const CampaignOptions& options) {
     report.remarks.push_back(command.name + ": " + std::to_string(allocations) + " large allocations");
     std::vector<Trial> trials;
     for (long number = first_of(options, random); number <= long(allocations); number += options.every) {
-      trials.push_back({command.name + " | memory", "allocation " + std::to_string(number),
-                        [&, number](const Slot& slot) {
-                          fixtures.lay_out(slot, command);
-                          Plan plan;
-                          plan.kind = "memory";
-                          plan.at = number;
-                          const Ending ending = slot.run(options.subject, command.words, plan);
-                          Verdict verdict;
-                          verdict.ending = std::to_string(ending.code);
-                          if (ending.code != 0 && !options.out_of_memory.contains(ending.code)) {
-                            verdict.violated("exit", std::to_string(ending.code) + ": " + last_line(ending.said));
-                          }
-                          judge_disturbed(options, slot, command, world, ending, verdict);
-                          return verdict;
-                        }});
+      trials.push_back(
+          {command.name + " | memory", "allocation " + std::to_string(number), [&, number](const Slot& slot) {
+             fixtures.lay_out(slot, command);
+             Plan plan;
+             plan.kind = "memory";
+             plan.at = number;
+             const Ending ending = slot.run(options.subject, command.words, plan);
+             Verdict verdict;
+             verdict.ending = std::to_string(ending.code);
+             if (ending.code != 0 && !options.out_of_memory.contains(ending.code)) {
+               verdict.violated("exit", std::to_string(ending.code) + ": " + last_line(ending.said));
+             }
+             judge_disturbed(options, slot, command, world, ending, verdict);
+             return verdict;
+           }});
     }
     add(report, judged(options, trials));
   }

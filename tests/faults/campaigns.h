@@ -17,10 +17,10 @@ struct CampaignOptions {
   Subject subject;
   std::filesystem::path scratch;
   std::uint64_t seed = 1;
-  int count = 0;                       ///< trials; of kills and pairs
-  int every = 1;                       ///< stride over operations and allocations; where it begins is drawn by the seed
-  std::vector<std::string> commands;   ///< none = all
-  std::vector<std::string> kinds;      ///< of faults; none = all
+  int count = 0;                      ///< trials; of kills and pairs
+  int every = 1;                      ///< stride over operations and allocations; where it begins is drawn by the seed
+  std::vector<std::string> commands;  ///< none = all
+  std::vector<std::string> kinds;     ///< of faults; none = all
   std::set<int> out_of_memory = {69, 71};
   int jobs = 2;
   bool is_quiet = false;

@@ -20,14 +20,29 @@ Words joined(Words a, const Words& b) {
 /// As tiny_options of tests/e2e, and one thread, so that operations come in the same order.
 Words tiny() {
   Words words;
-  for (const char* setting :
-       {"stage1.steps=30", "stage1.samples_per_step=2048", "stage1.checkpoint_every=10", "stage1.steps_per_box=64",
-        "stage1.grid.levels=4", "stage1.grid.log2_rows=10", "stage1.grid.finest_resolution=64",
-        "colorizer.reference_steps=20", "stage2.patches=6", "stage2.patch_size=32",
-        "stage2.rays_per_patch=256", "stage2.working_resolution=32", "stage2.distill_steps=10",
-        "stage2.colorizer_batch=2", "stage2.grid.levels=4", "stage2.grid.log2_rows=10",
-        "stage2.grid.finest_resolution=64", "stage2.purify.enabled=false", "stage2.purify.base_images=2",
-        "bake.resolution=32", "render.frames=3", "render.short_side=32", "render.steps_per_box=64"}) {
+  for (const char* setting : {"stage1.steps=30",
+                              "stage1.samples_per_step=2048",
+                              "stage1.checkpoint_every=10",
+                              "stage1.steps_per_box=64",
+                              "stage1.grid.levels=4",
+                              "stage1.grid.log2_rows=10",
+                              "stage1.grid.finest_resolution=64",
+                              "colorizer.reference_steps=20",
+                              "stage2.patches=6",
+                              "stage2.patch_size=32",
+                              "stage2.rays_per_patch=256",
+                              "stage2.working_resolution=32",
+                              "stage2.distill_steps=10",
+                              "stage2.colorizer_batch=2",
+                              "stage2.grid.levels=4",
+                              "stage2.grid.log2_rows=10",
+                              "stage2.grid.finest_resolution=64",
+                              "stage2.purify.enabled=false",
+                              "stage2.purify.base_images=2",
+                              "bake.resolution=32",
+                              "render.frames=3",
+                              "render.short_side=32",
+                              "render.steps_per_box=64"}) {
     words.insert(words.end(), {"--set", setting});
   }
   return words;
@@ -39,7 +54,8 @@ constexpr const char* kColorizer = "reference:references";
 /// w x y z of a rotation; good for half turns too.
 std::array<double, 4> quaternion_of(const std::array<std::array<double, 3>, 3>& m) {
   const auto part = [](double square) { return std::sqrt(std::max(square, 0.0)) / 2; };
-  return {part(1 + m[0][0] + m[1][1] + m[2][2]), std::copysign(part(1 + m[0][0] - m[1][1] - m[2][2]), m[2][1] - m[1][2]),
+  return {part(1 + m[0][0] + m[1][1] + m[2][2]),
+          std::copysign(part(1 + m[0][0] - m[1][1] - m[2][2]), m[2][1] - m[1][2]),
           std::copysign(part(1 - m[0][0] + m[1][1] - m[2][2]), m[0][2] - m[2][0]),
           std::copysign(part(1 - m[0][0] - m[1][1] + m[2][2]), m[1][0] - m[0][1])};
 }
@@ -91,7 +107,9 @@ Fixtures::Fixtures(const Subject& subject, const fs::path& scratch) : folder_(fs
   };
   make({"sample", "-o", "@/capture", "--views", "6", "--width", "48", "--height", "36", "--samples-per-pixel", "1"});
   fs::create_directories(folder_);
-  const auto move = [&](const char* name) { fs::copy(slot.root() / name, folder_ / name, fs::copy_options::recursive); };
+  const auto move = [&](const char* name) {
+    fs::copy(slot.root() / name, folder_ / name, fs::copy_options::recursive);
+  };
   move("capture");
   make_photographs(folder_ / "capture", folder_ / "photographs", folder_ / "model");
   make(joined({"train", (folder_ / "capture").string(), "-o", "@/run"}, joined(tiny(), kOneThread)));
@@ -108,10 +126,16 @@ std::vector<Command> Fixtures::commands() const {
     return Words{"bake", "@/run", "--take", "t", "--format", format, "-o", "@/bake", "--threads", "1"};
   };
   return {
-      {"sample", "", {"sample", "-o", "@/capture", "--views", "3", "--width", "24", "--height", "18",
-                      "--samples-per-pixel", "1", "--threads", "1"}, {"capture"}},
-      {"prepare", "", {"prepare", (folder_ / "photographs").string(), "-o", "@/capture", "--colmap-model",
-                       (folder_ / "model").string(), "--threads", "1"}, {"capture"}},
+      {"sample",
+       "",
+       {"sample", "-o", "@/capture", "--views", "3", "--width", "24", "--height", "18", "--samples-per-pixel", "1",
+        "--threads", "1"},
+       {"capture"}},
+      {"prepare",
+       "",
+       {"prepare", (folder_ / "photographs").string(), "-o", "@/capture", "--colmap-model",
+        (folder_ / "model").string(), "--threads", "1"},
+       {"capture"}},
       {"train", "", joined({"train", capture, "-o", "@/run"}, joined(tiny(), kOneThread)), {"run"}},
       {"colorize", "run", joined({"colorize", "@/run", "--take", "t", "--colorizer", kColorizer}, kOneThread), {"run"}},
       {"bake", "take", joined(bake("vdb"), {"--nvdb"}), {"run", "bake/volume.vdb"}},
@@ -120,10 +144,15 @@ std::vector<Command> Fixtures::commands() const {
       {"exr", "take", bake("exr"), {"run"}},
       {"eval", "take", joined({"eval", "@/run", "--take", "t"}, kOneThread), {"run"}},
       {"render", "take", joined({"render", "@/run", "--take", "t", "--format", "png,exr,mp4"}, kOneThread), {"run"}},
-      {"run", "", joined({"run", capture, "-o", "@/run", "--colorizer", kColorizer, "--format", "vdb"},
-                         joined(tiny(), kOneThread)), {"run"}},
-      {"compare", "", joined({"compare", capture, "-o", "@/out", "--methods", "colornerf,grey"},
-                             joined(tiny(), kOneThread)), {}},
+      {"run",
+       "",
+       joined({"run", capture, "-o", "@/run", "--colorizer", kColorizer, "--format", "vdb"},
+              joined(tiny(), kOneThread)),
+       {"run"}},
+      {"compare",
+       "",
+       joined({"compare", capture, "-o", "@/out", "--methods", "colornerf,grey"}, joined(tiny(), kOneThread)),
+       {}},
   };
 }
 

@@ -40,7 +40,8 @@ std::vector<std::string> environment_of(const Subject& subject, const fs::path& 
   std::vector<std::string> all;
   for (char** variable = environ; *variable != nullptr; ++variable) {
     const std::string_view text = *variable;
-    if (text.starts_with("CNERF_FAULT_") || text.starts_with("LD_PRELOAD=") || text.starts_with("CUDA_VISIBLE_DEVICES="))
+    if (text.starts_with("CNERF_FAULT_") || text.starts_with("LD_PRELOAD=") ||
+        text.starts_with("CUDA_VISIBLE_DEVICES="))
       continue;
     all.emplace_back(text);
   }
@@ -128,8 +129,8 @@ void Slot::clear() const {
   fs::create_directories(folder_ / "shadow");
 }
 
-Ending Slot::run(const Subject& subject, const std::vector<std::string>& words, const Plan& plan,
-                 const Stop& stop, const std::string& output) const {
+Ending Slot::run(const Subject& subject, const std::vector<std::string>& words, const Plan& plan, const Stop& stop,
+                 const std::string& output) const {
   std::vector<std::string> all = {subject.program.string()};
   for (std::string word : words) {
     if (word.starts_with("@")) word.replace(0, 1, root().string());
@@ -162,7 +163,8 @@ std::vector<Slot::Operation> Slot::operations() const {
   std::vector<Operation> all;
   std::ifstream in(folder_ / "operations");
   std::string number;
-  for (Operation one; in >> number >> one.what >> one.bytes && std::getline(in >> std::ws, one.path);) all.push_back(one);
+  for (Operation one; in >> number >> one.what >> one.bytes && std::getline(in >> std::ws, one.path);)
+    all.push_back(one);
   return all;
 }
 
@@ -177,7 +179,8 @@ fs::path Slot::keep(const std::string& name, const std::string& text) const {
 }
 
 const std::vector<std::string>& varying_keys() {
-  static const std::vector<std::string> keys = {"seconds"};
+  static const std::vector<std::string> keys = {"seconds",        "seconds_of_steps", "colorizer_seconds",
+                                                "waited_seconds", "command_line",     "peak_memory_bytes"};
   return keys;
 }
 

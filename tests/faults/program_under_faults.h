@@ -62,14 +62,15 @@ class Slot {
   std::filesystem::path scratch_, folder_;
 };
 
-/// Files below a folder, relative, and a digest of what they hold, but what may differ between two runs that did the same:
+/// Files below a folder, relative, and a digest of what they hold, but what may differ between two runs that did the
+/// same:
 ///   *.vdb               bytes 21 to 56: the identifier that OpenVDB draws at random
 ///   *.json, *.html, *.md: names of the slot; in JSON the keys of `varying_keys()`, and a checksum of volume.vdb
 /// Empty folders are none.
 using Content = std::map<std::string, std::string>;
 constexpr const char* kNoJson = "no JSON, ";  ///< in front of the digest of a .json that is none
 [[nodiscard]] Content content_of(const std::filesystem::path& folder);
-/// Keys of JSON files that hold times, or sums over files that do.
+/// Keys of JSON files that hold times, memory, and the command line, which has --resume the second time.
 [[nodiscard]] const std::vector<std::string>& varying_keys();
 
 /// Names of files that differ or are in one alone; "" when there are none.

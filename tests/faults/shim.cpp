@@ -12,12 +12,13 @@
 ///   CNERF_FAULT_PROGRAM   name of the executable that is meant  [cnerf]; other programs that inherit this work as ever
 ///   CNERF_FAULT_CHILDREN  1: every program that inherits this counts, each on its own
 ///
-/// eio: the operation fails once. enospc, edquot: it and all later ones that need room fail. short: a write takes half of
-/// its bytes, then as enospc. kill: the process dies, in the middle if the operation is a write. power: what no fsync
-/// made lasting is taken back, then the process dies: files are cut to the length they had at their last fsync, and names
-/// made, replaced or removed in a folder since its last fsync are as before. A new folder lasts once anything below it
-/// was synced, as with the journals of file systems. power-names: names last at once and only what is in files is lost,
-/// as where names are journalled and data is not: who renames before an fsync is left with an empty file. memory: allocations are counted instead, from main on.
+/// eio: the operation fails once. enospc, edquot: it and all later ones that need room fail. short: a write takes half
+/// of its bytes, then as enospc. kill: the process dies, in the middle if the operation is a write. power: what no
+/// fsync made lasting is taken back, then the process dies: files are cut to the length they had at their last fsync,
+/// and names made, replaced or removed in a folder since its last fsync are as before. A new folder lasts once anything
+/// below it was synced, as with the journals of file systems. power-names: names last at once and only what is in files
+/// is lost, as where names are journalled and data is not: who renames before an fsync is left with an empty file.
+/// memory: allocations are counted instead, from main on.
 
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
@@ -83,20 +84,32 @@ template <typename Function>
 Function* next_of(const char* name) {
   return reinterpret_cast<Function*>(::dlsym(RTLD_NEXT, name));
 }
-#define REAL(name) ([] { static auto* const function = next_of<decltype(::name)>(#name); return function; }())
+#define REAL(name)                                                  \
+  ([] {                                                             \
+    static auto* const function = next_of<decltype(::name)>(#name); \
+    return function;                                                \
+  }())
 
 /// What the operation is to `decide`.
 enum class What { kCreate, kWrite, kResize, kRename, kRemove, kMakeFolder, kLink, kSync };
 const char* name_of(What what) {
   switch (what) {
-    case What::kCreate: return "create";
-    case What::kWrite: return "write";
-    case What::kResize: return "resize";
-    case What::kRename: return "rename";
-    case What::kRemove: return "remove";
-    case What::kMakeFolder: return "mkdir";
-    case What::kLink: return "link";
-    case What::kSync: return "sync";
+    case What::kCreate:
+      return "create";
+    case What::kWrite:
+      return "write";
+    case What::kResize:
+      return "resize";
+    case What::kRename:
+      return "rename";
+    case What::kRemove:
+      return "remove";
+    case What::kMakeFolder:
+      return "mkdir";
+    case What::kLink:
+      return "link";
+    case What::kSync:
+      return "sync";
   }
   return "?";
 }
@@ -191,7 +204,8 @@ class Unsynced {
       }
     }
     std::erase_if(changes_, [&](const Change& change) {
-      if (change.what == Change::kFolder) return (path + "/").compare(0, change.path.size() + 1, change.path + "/") == 0;
+      if (change.what == Change::kFolder)
+        return (path + "/").compare(0, change.path.size() + 1, change.path + "/") == 0;
       return is_folder && parent_of(change.path) == path;
     });
   }
@@ -220,9 +234,15 @@ class Unsynced {
     for (auto change = changes_.rbegin(); change != changes_.rend(); ++change) {
       const char* path = change->path.c_str();
       switch (change->what) {
-        case Change::kNew: REAL(unlink)(path); break;
-        case Change::kFolder: REAL(rmdir)(path); break;
-        case Change::kGone: REAL(link)(change->kept.c_str(), path); break;
+        case Change::kNew:
+          REAL(unlink)(path);
+          break;
+        case Change::kFolder:
+          REAL(rmdir)(path);
+          break;
+        case Change::kGone:
+          REAL(link)(change->kept.c_str(), path);
+          break;
         case Change::kMoved:
           REAL(rename)(path, change->from.c_str());
           if (!change->kept.empty()) REAL(link)(change->kept.c_str(), path);
@@ -273,8 +293,7 @@ class Turn {
 
 void log_line(long number, const char* what, std::size_t bytes, const std::string& path) {
   if (settings.log < 0) return;
-  const std::string line =
-      std::to_string(number) + " " + what + " " + std::to_string(bytes) + " " + path + "\n";
+  const std::string line = std::to_string(number) + " " + what + " " + std::to_string(bytes) + " " + path + "\n";
   (void)!REAL(write)(settings.log, line.data(), line.size());
 }
 
@@ -286,7 +305,8 @@ Decision decide(What what, std::size_t bytes, const std::string& path) {
   switch (settings.kind) {
     case Kind::kOff:
     case Kind::kCount:
-    case Kind::kMemory: break;
+    case Kind::kMemory:
+      break;
     case Kind::kEio:
       if (is_it) decision.error = EIO;
       break;
@@ -316,7 +336,9 @@ Decision decide(What what, std::size_t bytes, const std::string& path) {
       if (!is_it) break;
       unsynced().take_back();
       die();
-    case Kind::kSlow: decision.slow = what == What::kWrite; break;
+    case Kind::kSlow:
+      decision.slow = what == What::kWrite;
+      break;
   }
   return decision;
 }
@@ -379,7 +401,8 @@ int counted_open(int folder, const char* name, int flags, const Real& real) {
   struct stat before {};
   const bool was_there = ::lstat(path->c_str(), &before) == 0;
   const Decision decision = decide(What::kCreate, 0, *path);
-  if (decision.error != 0 && !(was_there && decision.error != EIO)) {  // a file that is there can be opened on a full disk
+  if (decision.error != 0 &&
+      !(was_there && decision.error != EIO)) {  // a file that is there can be opened on a full disk
     errno = decision.error;
     return -1;
   }
@@ -393,8 +416,8 @@ int counted_open(int folder, const char* name, int flags, const Real& real) {
 
 // ---------------------------------------------------------------------------------------------------- streams
 
-/// Streams of the C library write by calls that nobody can stand before. What is written to those below the root goes to
-/// the file at once.
+/// Streams of the C library write by calls that nobody can stand before. What is written to those below the root goes
+/// to the file at once.
 constexpr std::size_t kStreams = 512;
 std::array<std::atomic<FILE*>, kStreams> streams{};
 
@@ -421,9 +444,12 @@ void forget(FILE* stream) {
 int flags_of(const char* mode) {
   const bool both = std::strchr(mode, '+') != nullptr;
   switch (mode[0]) {
-    case 'r': return both ? O_RDWR : O_RDONLY;
-    case 'w': return (both ? O_RDWR : O_WRONLY) | O_CREAT | O_TRUNC;
-    default: return (both ? O_RDWR : O_WRONLY) | O_CREAT | O_APPEND;
+    case 'r':
+      return both ? O_RDWR : O_RDONLY;
+    case 'w':
+      return (both ? O_RDWR : O_WRONLY) | O_CREAT | O_TRUNC;
+    default:
+      return (both ? O_RDWR : O_WRONLY) | O_CREAT | O_APPEND;
   }
 }
 
@@ -489,8 +515,8 @@ const char* variable(const char* name) {
 
 Kind kind_of(const char* word) {
   const std::pair<const char*, Kind> kinds[] = {
-      {"count", Kind::kCount}, {"eio", Kind::kEio},     {"enospc", Kind::kEnospc}, {"edquot", Kind::kEdquot},
-      {"short", Kind::kShort}, {"kill", Kind::kKill},   {"power", Kind::kPower},   {"power-names", Kind::kPowerNames},
+      {"count", Kind::kCount}, {"eio", Kind::kEio},      {"enospc", Kind::kEnospc}, {"edquot", Kind::kEdquot},
+      {"short", Kind::kShort}, {"kill", Kind::kKill},    {"power", Kind::kPower},   {"power-names", Kind::kPowerNames},
       {"slow", Kind::kSlow},   {"memory", Kind::kMemory}};
   for (const auto& [name, kind] : kinds) {
     if (std::strcmp(word, name) == 0) return kind;
@@ -596,13 +622,13 @@ int posix_memalign(void** result, std::size_t alignment, std::size_t bytes) noex
   return *result == nullptr ? ENOMEM : 0;
 }
 
-#define MODE_OF(flags)                               \
-  mode_t mode = 0;                                   \
-  if (((flags) & (O_CREAT | O_TMPFILE)) != 0) {      \
-    va_list more;                                    \
-    va_start(more, flags);                           \
-    mode = va_arg(more, mode_t);                     \
-    va_end(more);                                    \
+#define MODE_OF(flags)                          \
+  mode_t mode = 0;                              \
+  if (((flags) & (O_CREAT | O_TMPFILE)) != 0) { \
+    va_list more;                               \
+    va_start(more, flags);                      \
+    mode = va_arg(more, mode_t);                \
+    va_end(more);                               \
   }
 
 int open(const char* name, int flags, ...) {
@@ -687,7 +713,8 @@ ssize_t writev(int file, const iovec* pieces, int count) {
   return write(file, all.data(), all.size());
 }
 ssize_t sendfile(int to, int from, off_t* place, std::size_t bytes) noexcept {
-  return counted_write(to, bytes, [&](std::size_t, std::size_t count) { return REAL(sendfile)(to, from, place, count); });
+  return counted_write(to, bytes,
+                       [&](std::size_t, std::size_t count) { return REAL(sendfile)(to, from, place, count); });
 }
 ssize_t sendfile64(int to, int from, off64_t* place, std::size_t bytes) noexcept {
   return sendfile(to, from, place, bytes);
