@@ -18,6 +18,7 @@
 
 #include "src/base/check.h"
 #include "src/base/error.h"
+#include "src/base/files.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -194,9 +195,16 @@ void write_exr_channel(const fs::path& file, const char* channel, int width, int
     // The library wants a mutable pointer for both directions; it only reads here.
     frame.insert(channel, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(values.data())),
                                      sizeof(float), sizeof(float) * std::size_t(width)));
-    Imf::OutputFile output(file.c_str(), header);
-    output.setFrameBuffer(frame);
-    output.writePixels(height);
+    // In memory first: the library writes its table of lines in a destructor, which tells nobody of a full disk.
+    Imf::StdOSStream stream;
+    {
+      Imf::OutputFile output(stream, header);
+      output.setFrameBuffer(frame);
+      output.writePixels(height);
+    }
+    write_file(file, stream.str());
+  } catch (const Error&) {
+    throw;
   } catch (const std::exception& failure) {
     throw OutputError(file.string() + ": cannot be written: " + failure.what());
   }

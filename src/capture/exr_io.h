@@ -19,7 +19,7 @@ namespace cnerf {
 /// @throws MissingInputError, InputError.
 [[nodiscard]] LinearImage read_exr(const std::filesystem::path& file);
 
-/// Writes one float channel, ZIP compressed.  @param values  [height, width].
+/// Writes one float channel, ZIP compressed, whole or not at all.  @param values  [height, width].
 /// @throws OutputError.
 void write_exr_channel(const std::filesystem::path& file, const char* channel, int width, int height,
                        std::span<const float> values);

@@ -106,9 +106,7 @@ bool stays_eight_bit(const LinearImage& image, const SensorOptions& sensor) {
 
 void write_image(const fs::path& file, const LinearImage& image, bool eight_bit) {
   if (image.depth == PixelDepth::kF32) {
-    write_atomically(file, [&](const fs::path& temporary) {
-      write_exr_channel(temporary, "Y", image.width, image.height, image.values);
-    });
+    write_exr_channel(file, "Y", image.width, image.height, image.values);
   } else {
     write_png(file,
               eight_bit ? encoded<std::uint8_t>(image, CV_8U, 255) : encoded<std::uint16_t>(image, CV_16U, 65535));

@@ -107,9 +107,7 @@ void write_picture(const fs::path& file, const SampleSceneOptions& options, cons
 void write_view(const fs::path& folder, const SampleSceneOptions& options, int index, const RenderedView& view) {
   write_picture(folder / "images" / file_name(index, "png"), options, view, /*grey=*/true);
   write_picture(folder / "color" / file_name(index, "png"), options, view, /*grey=*/false);
-  write_atomically(folder / "depth" / file_name(index, "exr"), [&](const fs::path& temporary) {
-    write_exr_channel(temporary, "Z", options.width, options.height, view.depth);
-  });
+  write_exr_channel(folder / "depth" / file_name(index, "exr"), "Z", options.width, options.height, view.depth);
 }
 
 /// Rows of the 4x4 matrix in the convention of transforms.json: the camera looks along -Z, +Y is up.
