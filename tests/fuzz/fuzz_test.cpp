@@ -138,7 +138,7 @@ TEST_P(FuzzTargets, TakeOrRefuseMutations) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, FuzzTargets, testing::ValuesIn(targets()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& each) { return std::string(each.param.name); });
 
 TEST(FuzzCorpus, BelongsToTargets) {
   std::vector<std::string> names, folders;
