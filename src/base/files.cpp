@@ -121,13 +121,17 @@ void write_atomically(const fs::path& target, const std::function<void(const fs:
   file.commit();
 }
 
+bool is_temporary(const fs::path& file) {
+  const std::string name = file.filename().string();
+  return name.starts_with('.') && name.find(kMark) != std::string::npos;
+}
+
 void remove_leftovers(const fs::path& folder, int depth) {
   std::error_code failure;
   for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end; entry.increment(failure)) {
     const fs::path& path = entry->path();
-    const std::string name = path.filename().string();
     if (depth > 0 && entry->is_directory(failure) && !entry->is_symlink(failure)) remove_leftovers(path, depth - 1);
-    if (!name.starts_with('.') || name.find(kMark) == std::string::npos) continue;
+    if (!is_temporary(path)) continue;
     const FileDescriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
     if (file.lock(LOCK_EX | LOCK_NB) && file.is_still_at(path)) ::unlink(path.c_str());
   }

@@ -40,6 +40,9 @@ class NewFile {
 void write_atomically(const std::filesystem::path& target,
                       const std::function<void(const std::filesystem::path& temporary)>& write);
 
+/// Whether a name is one of NewFile's temporary files.
+[[nodiscard]] bool is_temporary(const std::filesystem::path& file);
+
 /// Removes what writers that were killed left in a folder and, at most `depth` levels, below it: temporary files of
 /// NewFile that nobody writes to any more.
 void remove_leftovers(const std::filesystem::path& folder, int depth = 0);

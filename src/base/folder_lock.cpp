@@ -120,12 +120,14 @@ void clear_folder(const fs::path& folder) {
   }
 }
 
-bool is_vacant(const fs::path& folder) {
+bool is_vacant(const fs::path& folder, const fs::path& besides) {
   std::error_code failure;
   if (!fs::exists(folder, failure)) return true;
   const fs::directory_iterator entries(folder, failure);
-  return !failure && std::all_of(begin(entries), end(entries),
-                                 [](const auto& entry) { return entry.path().filename() == FolderLock::kFile; });
+  return !failure && std::all_of(begin(entries), end(entries), [&](const auto& entry) {
+    const fs::path name = entry.path().filename();
+    return name == FolderLock::kFile || name == besides || is_temporary(name);
+  });
 }
 
 RecordTurn::RecordTurn(const fs::path& folder) : folder_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {

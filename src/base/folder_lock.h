@@ -36,8 +36,9 @@ class FolderLock {
 /// Removes what a folder holds, but not the lock of who clears it.  @throws OutputError.
 void clear_folder(const std::filesystem::path& folder);
 
-/// Whether a folder is missing or holds nothing but, perhaps, a lock.
-[[nodiscard]] bool is_vacant(const std::filesystem::path& folder);
+/// Whether a folder is missing or holds nothing but, perhaps, a lock, what killed writers left, and a file or folder of
+/// the name `besides`, with which one begins that was killed at once.
+[[nodiscard]] bool is_vacant(const std::filesystem::path& folder, const std::filesystem::path& besides = {});
 
 /// Waits until no other process changes a record of the folder: for reading, changing and writing it as one.
 class RecordTurn {

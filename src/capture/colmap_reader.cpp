@@ -267,21 +267,27 @@ fs::path find_image_folder(const fs::path& root, const fs::path& model_folder, c
   return root / "images";
 }
 
-ListedView list_view(const Registered& image, const Cameras& cameras, const fs::path& images_file,
+/// The files of a model.
+struct ModelFiles {
+  fs::path cameras, images;
+};
+
+ListedView list_view(const Registered& image, const Cameras& cameras, const ModelFiles& files,
                      const fs::path& image_folder) {
   ListedView view;
   view.name = image.name;
   view.field = "image " + image.name;
-  view.poses_file = images_file;
+  view.poses_file = files.images;
   view.image_file = image_folder / image.name;
   const auto camera = cameras.find(image.camera);
   if (camera == cameras.end()) {
-    throw InputError(images_file, view.field,
-                     "expected a camera of the model, found number " + std::to_string(image.camera));
+    throw InputError(
+        files.images, view.field,
+        "expected a camera of " + files.cameras.string() + ", found number " + std::to_string(image.camera));
   }
   view.intrinsics = camera->second;
   const auto [w, x, y, z] = image.quaternion;
-  const Affined camera_from_world = {rotation_from_quaternion(w, x, y, z, images_file, view.field), image.translation};
+  const Affined camera_from_world = {rotation_from_quaternion(w, x, y, z, files.images, view.field), image.translation};
   view.world_from_camera = camera_from_world.inverse();
   return view;
 }
@@ -306,7 +312,8 @@ CaptureListing read_colmap(const fs::path& root, const fs::path& model_folder) {
   listing.format = "colmap";
   listing.points = read_points(model_folder);
   const fs::path folder = find_image_folder(root, model_folder, images.empty() ? "" : images.front().name);
-  for (const Registered& image : images) listing.views.push_back(list_view(image, cameras, images_file, folder));
+  for (const Registered& image : images)
+    listing.views.push_back(list_view(image, cameras, {cameras_file, images_file}, folder));
   make_poses_rigid(listing, "");
   return listing;
 }

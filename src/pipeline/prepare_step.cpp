@@ -78,7 +78,8 @@ bool begin_folder(const PrepareJob& job) {
                      "pass --overwrite, or choose another folder");
   }
   if (finished && ours && existing.resume) return false;
-  if (!is_vacant(out)) {
+  const fs::path work = fs::path(kMark).parent_path();
+  if (ours || !is_vacant(out, work) || !is_vacant(out / work)) {
     if (!ours) throw UsageError(out.string() + ": is not empty and holds no prepared capture; choose another folder");
     if (!existing.resume && !existing.overwrite) {
       throw UsageError(out.string() +

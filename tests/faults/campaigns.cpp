@@ -175,6 +175,13 @@ Ending again(const CampaignOptions& options, const Slot& slot, const Command& co
   return ending;
 }
 
+/// A power cut right after the end may bring back what was removed last: the lock's file, which locks nothing by
+/// itself, and the journal of a bake that is finished, which the next bake there takes or drops.
+bool may_come_back(const std::string& name) {
+  const std::string file = fs::path(name).filename().string();
+  return file == ".cnerf.lock" || file == "unfinished.bake";
+}
+
 void judge_result(const Slot& slot, const World& world, const std::string& when, Verdict& verdict) {
   const Content found = content_of(slot.root());
   const std::string left = leftovers(found);
@@ -192,6 +199,9 @@ void judge_disturbed(const CampaignOptions& options, const Slot& slot, const Com
                      const Ending& ending, Verdict& verdict) {
   if (ending.hung) verdict.violated("hang", "for " + std::to_string(ending.seconds) + " s");
   if (ending.code == 0) {
+    for (const auto& [name, content] : content_of(slot.root())) {
+      if (may_come_back(name)) fs::remove(slot.root() / name);
+    }
     judge_result(slot, world, "after exit 0:", verdict);
     return;
   }

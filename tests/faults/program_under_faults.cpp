@@ -87,7 +87,8 @@ void drop_varying(Json& json) {
   if (json.is_object()) {
     for (const std::string& key : varying_keys()) json.erase(key);
     const auto name = json.find("name");
-    if (name != json.end() && *name == "volume.vdb") json.erase("sha256");
+    // The first holds an identifier of its own, the second the name of its folder.
+    if (name != json.end() && (*name == "volume.vdb" || *name == "blender_setup.py")) json.erase("sha256");
   }
   if (json.is_structured()) {
     for (Json& part : json) drop_varying(part);
@@ -180,7 +181,8 @@ fs::path Slot::keep(const std::string& name, const std::string& text) const {
 
 const std::vector<std::string>& varying_keys() {
   static const std::vector<std::string> keys = {"seconds",        "seconds_of_steps", "colorizer_seconds",
-                                                "waited_seconds", "command_line",     "peak_memory_bytes"};
+                                                "waited_seconds", "command_line",     "peak_memory_bytes",
+                                                "train_psnr"};
   return keys;
 }
 

@@ -65,7 +65,8 @@ class Slot {
 /// Files below a folder, relative, and a digest of what they hold, but what may differ between two runs that did the
 /// same:
 ///   *.vdb               bytes 21 to 56: the identifier that OpenVDB draws at random
-///   *.json, *.html, *.md: names of the slot; in JSON the keys of `varying_keys()`, and a checksum of volume.vdb
+///   *.json, *.html, *.md: names of the slot; in JSON the keys of `varying_keys()`, and checksums of volume.vdb
+///                       and blender_setup.py
 /// Empty folders are none.
 using Content = std::map<std::string, std::string>;
 constexpr const char* kNoJson = "no JSON, ";  ///< in front of the digest of a .json that is none

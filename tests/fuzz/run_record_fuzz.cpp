@@ -8,7 +8,7 @@ CNERF_FUZZ_TARGET(run_record) {
   const auto file = fuzz::scratch_file("run/run.json", input);
   const pipeline::RunDirectory run(file.parent_path());
   fuzz::read_or_refuse(file.parent_path(), [&] {
-    (void)to_json(run.record()).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+    (void)json_of(run.record()).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
     const std::filesystem::path folder = run.take_folder(run.record().current_take).lexically_normal();
     if (!folder.string().starts_with((file.parent_path() / "takes").string())) {
       throw fuzz::Finding("a run's take lies outside of the run: " + folder.string());

@@ -53,7 +53,9 @@ TEST(Divergence, TrainingNamesStepAndViewAndKeepsTheLastSnapshot) {
   MonoImage& broken = capture.views[2].image;
   broken.depth = PixelDepth::kF32;
   broken.f32.assign(broken.pixel_count(), std::numeric_limits<float>::quiet_NaN());
-  EXPECT_THAT(message_of([&] { (void)train_stage1({capture, options, good.snapshot}, cpu_engines(), silent); }),
+  EXPECT_THAT(message_of([&] {
+                (void)train_stage1({capture, options, good.snapshot}, cpu_engines(), silent);
+              }),
               AllOf(HasSubstr("at step"), HasSubstr("toy2"), HasSubstr("is kept")));
   EXPECT_EQ(sha256_of_file(good.snapshot), before);
 }
@@ -65,7 +67,8 @@ TEST(Divergence, ParametersThatAreNotFiniteAreNotSavedOverGoodOnes) {
   model.save(file);
   const std::string before = sha256_of_file(file);
   test::floats_of(model.engine->state(), "density_net.weights")[3] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THAT(message_of([&] { model.save(file); }), AllOf(HasSubstr("stage1.snapshot"), HasSubstr("density_net.weights")));
+  EXPECT_THAT(message_of([&] { model.save(file); }),
+              AllOf(HasSubstr("stage1.snapshot"), HasSubstr("density_net.weights")));
   EXPECT_EQ(sha256_of_file(file), before);
 }
 

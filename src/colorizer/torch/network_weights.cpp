@@ -95,9 +95,9 @@ ColorizerWeights load_colorizer_weights(const fs::path& file) {
   const torch::NoGradGuard no_grad;
   auto parameters = weights.network->named_parameters();
   if (content.parameters.size() != parameters.size()) {
-    throw InputError(file, "parameters",
-                     "expected " + std::to_string(parameters.size()) + ", found " +
-                         std::to_string(content.parameters.size()));
+    throw InputError(
+        file, "parameters",
+        "expected " + std::to_string(parameters.size()) + ", found " + std::to_string(content.parameters.size()));
   }
   for (const WeightsContent::Parameter& stored : content.parameters) copy_parameter(file, stored, parameters);
   weights.network->eval();

@@ -1,5 +1,6 @@
 #pragma once
-/// Weights of the built-in network on disk: fp16, checksummed, readable on any machine. weights_content.h has the format.
+/// Weights of the built-in network on disk: fp16, checksummed, readable on any machine. weights_content.h has the
+/// format.
 
 #include <filesystem>
 #include <string>

@@ -14,7 +14,7 @@ struct Stage1Report {
   int steps = 0;
   double seconds = 0;  ///< training time only, over all resumed parts
   double trained_samples = 0;
-  double train_psnr = 0;  ///< luminance dB over the last 100 steps' rays
+  double train_psnr = 0;  ///< luminance dB over the rays of the last 100 steps since it began or went on
 };
 
 /// Whether a training with these options may go on from `snapshot`, if there is one.
