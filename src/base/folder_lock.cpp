@@ -120,13 +120,13 @@ void clear_folder(const fs::path& folder) {
   }
 }
 
-bool is_vacant(const fs::path& folder, const fs::path& besides) {
+bool is_vacant(const fs::path& folder, std::initializer_list<fs::path> besides) {
   std::error_code failure;
   if (!fs::exists(folder, failure)) return true;
   const fs::directory_iterator entries(folder, failure);
   return !failure && std::all_of(begin(entries), end(entries), [&](const auto& entry) {
     const fs::path name = entry.path().filename();
-    return name == FolderLock::kFile || name == besides || is_temporary(name);
+    return name == FolderLock::kFile || std::ranges::find(besides, name) != besides.end() || is_temporary(name);
   });
 }
 

@@ -2,6 +2,7 @@
 /// One writer in a folder at a time: two programs that write the same files make a mixture of both.
 
 #include <filesystem>
+#include <initializer_list>
 #include <memory>
 
 #include "src/base/file_descriptor.h"
@@ -36,9 +37,10 @@ class FolderLock {
 /// Removes what a folder holds, but not the lock of who clears it.  @throws OutputError.
 void clear_folder(const std::filesystem::path& folder);
 
-/// Whether a folder is missing or holds nothing but, perhaps, a lock, what killed writers left, and a file or folder of
-/// the name `besides`, with which one begins that was killed at once.
-[[nodiscard]] bool is_vacant(const std::filesystem::path& folder, const std::filesystem::path& besides = {});
+/// Whether a folder is missing or holds nothing but, perhaps, a lock, what killed writers left, and files or folders of
+/// the names `besides`, with which work begins there that was killed at once.
+[[nodiscard]] bool is_vacant(const std::filesystem::path& folder,
+                             std::initializer_list<std::filesystem::path> besides = {});
 
 /// Waits until no other process changes a record of the folder: for reading, changing and writing it as one.
 class RecordTurn {

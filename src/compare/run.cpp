@@ -21,7 +21,7 @@ constexpr int kDeepestCell = 3;  // folders between a seed's and its files
 
 void begin_report(const fs::path& folder, ExistingReport existing) {
   std::error_code failure;
-  if (is_vacant(folder, "config.toml")) return;
+  if (is_vacant(folder, {"config.toml"})) return;
   if (!fs::is_directory(folder / "runs", failure)) {
     throw UsageError(folder.string() + ": is not empty and holds no comparison; choose another folder");
   }

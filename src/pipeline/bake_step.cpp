@@ -12,6 +12,8 @@ namespace cnerf::pipeline {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr const char* kJournal = "unfinished.bake";
+
 /// Of which field a bake is.
 std::string field_identity(const RunDirectory& directory, const std::string& take) {
   std::string identity = "cnerf " + version_text() + "\n" + sha256_of_file(directory.stage1_snapshot()) + "\n";
@@ -40,13 +42,18 @@ void bake_step(const RunContext& context, const BakeJob& job, const Engines& eng
   bake::Job bake{*scene, engines, bake::cameras_of(context.capture), volume_options(config, formats)};
   bake.volumes = formats.volumes();
   if (formats.gltf) bake.mesh = config.mesh;
-  bake.journal = folder / "unfinished.bake";
+  bake.journal = folder / kJournal;
   bake.identity = field_identity(context.directory, take);
   const exporting::Label label{{colorizer_name(context.directory, take), take, context.command_line}, config.world};
   exporting::BakeOutput output(folder, formats, {config.vdb, config.web, web::find_page()}, context.capture, label,
                                observer);
   bake::run(bake, output, observer);
   note_time(context.directory, "bake", watch);
+}
+
+void end_bake(const RunDirectory& directory, const fs::path& folder, Observer& observer) {
+  const StepLocks locks(directory, folder, observer);
+  fs::remove(folder / kJournal);
 }
 
 }  // namespace cnerf::pipeline

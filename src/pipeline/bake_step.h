@@ -19,4 +19,7 @@ struct BakeJob {
 /// Bakes a take and writes the set-up script and the manifest beside it.
 void bake_step(const RunContext& context, const BakeJob& job, const Engines& engines, Observer& observer);
 
+/// What is left to do where a bake is finished: a power cut may have brought its journal back.
+void end_bake(const RunDirectory& directory, const std::filesystem::path& folder, Observer& observer);
+
 }  // namespace cnerf::pipeline

@@ -20,13 +20,13 @@ std::string kind_of(const std::string& spec) {
   return spec.substr(0, spec.find(':'));
 }
 
-/// A take that was begun and not finished; empty when there is none.
-std::string unfinished_take(const RunDirectory& directory) {
+/// The last by name of the takes that are finished, or of those that were begun; empty when there is none.
+std::string last_take(const RunDirectory& directory, bool is_finished) {
   std::vector<std::string> names;
   std::error_code failure;
   for (const auto& entry : fs::directory_iterator(directory.root() / "takes", failure)) {
     const std::string name = entry.path().filename().string();
-    if (!directory.take_record(name)) names.push_back(name);
+    if (directory.take_record(name).has_value() == is_finished) names.push_back(name);
   }
   std::ranges::sort(names);
   return names.empty() ? "" : names.back();
@@ -72,8 +72,10 @@ std::string take_to_write(const RunContext& context, const std::string& named, c
     return named;
   }
   if (existing.resume) {
-    if (const std::string unfinished = unfinished_take(directory); !unfinished.empty()) return unfinished;
+    if (const std::string begun = last_take(directory, false); !begun.empty()) return begun;
     if (const std::string current = directory.record().current_take; !current.empty()) return current;
+    // Killed when the take was finished and the run's record did not name it yet.
+    if (const std::string finished = last_take(directory, true); !finished.empty()) return finished;
   }
   return directory.free_take_name(kind_of(context.config.colorizer.spec));
 }
@@ -95,6 +97,8 @@ void colorize_step(const RunContext& context, const ColorizeJob& job, const Engi
   if (!take || !job.existing.resume) {
     take = colorize(context, job, engines, observer);
     directory.save(*take);
+  }
+  if (directory.record().current_take != job.take) {
     directory.update([&](RunRecord& record) { record.current_take = job.take; });
   }
   const Stage2Report& report = take->stage2;

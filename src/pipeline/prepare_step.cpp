@@ -79,7 +79,7 @@ bool begin_folder(const PrepareJob& job) {
   }
   if (finished && ours && existing.resume) return false;
   const fs::path work = fs::path(kMark).parent_path();
-  if (ours || !is_vacant(out, work) || !is_vacant(out / work)) {
+  if (ours || !is_vacant(out, {work}) || !is_vacant(out / work)) {
     if (!ours) throw UsageError(out.string() + ": is not empty and holds no prepared capture; choose another folder");
     if (!existing.resume && !existing.overwrite) {
       throw UsageError(out.string() +

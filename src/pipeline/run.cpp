@@ -45,7 +45,11 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& observ
   }
   if (!is_done(job, directory.metrics_file())) evaluate_step(context, {take, {}}, engines, observer);
   const fs::path bake = directory.bakes(take);
-  if (!is_done(job, last_file(bake, job.formats))) bake_step(context, {take, bake, job.formats}, engines, observer);
+  if (is_done(job, last_file(bake, job.formats))) {
+    end_bake(directory, bake, observer);
+  } else {
+    bake_step(context, {take, bake, job.formats}, engines, observer);
+  }
   const fs::path renders = directory.renders(take);
   if (!is_done(job, renders / "turntable.mp4")) {
     const RenderOutput video{.folder = renders, .mp4 = true};

@@ -49,7 +49,7 @@ void check_run_folder(const RunDirectory& directory, const ExistingOutput& exist
     throw UsageError(root.string() +
                      ": holds a run already; pass --resume to go on with it or --overwrite to start again");
   }
-  if (!is_vacant(root, directory.config_file().filename())) {
+  if (!is_vacant(root, {directory.config_file().filename(), directory.colorizer_cache().filename()})) {
     throw UsageError(root.string() + ": is not empty and holds no run; choose another folder");
   }
 }

@@ -145,10 +145,10 @@ TEST(FolderLock, AFolderWithALockAloneIsVacant) {
   write_file(folder / "file", std::string_view("x"));
   EXPECT_FALSE(is_vacant(folder.path()));
   EXPECT_FALSE(is_vacant(folder / "file"));
-  EXPECT_TRUE(is_vacant(folder.path(), "file")) << "one began here";
+  EXPECT_TRUE(is_vacant(folder.path(), {"file"})) << "one began here";
   write_file(folder / "begun/.x.partial-7.toml", std::string_view("half"));
   EXPECT_TRUE(is_vacant(folder / "begun"));
-  EXPECT_FALSE(is_vacant(folder.path(), "file"));
+  EXPECT_FALSE(is_vacant(folder.path(), {"file"}));
 }
 
 TEST(FolderLock, WhoClearsAFolderKeepsItsLock) {

@@ -67,6 +67,7 @@ class Slot {
 ///   *.vdb               bytes 21 to 56: the identifier that OpenVDB draws at random
 ///   *.json, *.html, *.md: names of the slot; in JSON the keys of `varying_keys()`, and checksums of volume.vdb
 ///                       and blender_setup.py
+///   accepted.png, rejected.png: of a take, they show answers since it began or went on
 /// Empty folders are none.
 using Content = std::map<std::string, std::string>;
 constexpr const char* kNoJson = "no JSON, ";  ///< in front of the digest of a .json that is none
