@@ -31,7 +31,7 @@ fail() {
 # documented COMMAND CODE SIGNAL: whether an end is one the program may have; SIGNAL is what was sent to it, or 0.
 documented() {
   case $2 in
-    0 | 64 | 65 | 66 | 69 | 71 | 73 | 75 | 76 | 77 | 78) return 0 ;;
+    0 | 64 | 65 | 66 | 69 | 71 | 73 | 75 | 76 | 77 | 78 | 79) return 0 ;;
     130) [ "$3" = INT ] || [ "$3" = TERM ] ;;
     137) [ "$3" = KILL ] ;;
     143) [ "$3" = TERM ] ;;

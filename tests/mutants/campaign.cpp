@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Those of src/base/error.h that a file may end the program with.
-constexpr std::array kDocumented = {64, 65, 66, 69, 71, 73, 75, 76, 77, 78};
+constexpr std::array kDocumented = {64, 65, 66, 69, 71, 73, 75, 76, 77, 78, 79};
 constexpr std::array<const char*, kVerdicts> kNames = {"refused", "accepted", "unnamed", "crash",
                                                        "hang",    "exit 70",  "memory"};
 

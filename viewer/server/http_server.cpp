@@ -18,13 +18,16 @@ namespace {
 
 using Clock = Connections::Clock;
 
+/// Whether a task was taken, or nothing in earlier versions of the library.
+using Accepted = decltype(std::declval<httplib::TaskQueue&>().enqueue({}));
+
 /// The library's threads, told of each connection before it waits for one of them.
 class Workers final : public httplib::TaskQueue {
  public:
   Workers(Connections& connections, int threads) : connections_(connections), pool_(std::size_t(threads)) {}
-  void enqueue(std::function<void()> work) override {
+  Accepted enqueue(std::function<void()> work) override {
     connections_.expect();
-    pool_.enqueue(std::move(work));
+    return pool_.enqueue(std::move(work));
   }
   void shutdown() override { pool_.shutdown(); }
 
@@ -221,7 +224,14 @@ bool HttpServer::process_and_close_socket(socket_t socket) {
   for (std::size_t left = keep_alive_max_count_; left > 0 && svr_sock_ != INVALID_SOCKET; --left) {
     bool is_closed = false;
     const auto take_ranges = [](httplib::Request& request) { request.ranges.clear(); };  // they are ours to serve
-    if (!connection.wait_for_request() || !process_request(connection, left == 1, is_closed, take_ranges)) return false;
+    const auto answer = [&]<typename Server>(Server& server) {
+      if constexpr (requires { server.process_request(connection, left == 1, is_closed, take_ranges); }) {
+        return server.process_request(connection, left == 1, is_closed, take_ranges);
+      } else {  // later versions want the addresses of both ends, which our handlers do not ask for
+        return server.process_request(connection, "", 0, "", 0, left == 1, is_closed, take_ranges);
+      }
+    };
+    if (!connection.wait_for_request() || !answer(*this)) return false;
     if (is_closed || is_last_answer) break;
   }
   return true;
