@@ -278,6 +278,7 @@ ListedView list_view(const Registered& image, const Cameras& cameras, const Mode
   view.name = image.name;
   view.field = "image " + image.name;
   view.poses_file = files.images;
+  view.lens_file = files.cameras;
   view.image_file = image_folder / image.name;
   const auto camera = cameras.find(image.camera);
   if (camera == cameras.end()) {

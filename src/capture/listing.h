@@ -14,6 +14,7 @@ struct ListedView {
   std::string name;                  ///< as the poses name it
   std::string field;                 ///< where in the poses file, e.g. "frames[3]"; for messages
   std::filesystem::path poses_file;  ///< the file that lists it; for messages
+  std::filesystem::path lens_file;   ///< the file that states the intrinsics, if it is another one; for messages
   std::filesystem::path image_file;  ///< may not exist
   std::filesystem::path mask_file;   ///< empty: none
   /// For the stated size. Without one (width 0) it is for the size of the image, and a principal point of
@@ -25,6 +26,8 @@ struct ListedView {
   double haze = 0;                  ///< linear light that lies over the image alone
   double downscale = 1;             ///< still to be applied to the image file
   bool held_out = false;
+
+  [[nodiscard]] const std::filesystem::path& file_of_lens() const { return lens_file.empty() ? poses_file : lens_file; }
 };
 /// A principal point that no file states.
 inline constexpr double kCentred = -1e30;

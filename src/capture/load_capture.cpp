@@ -168,9 +168,10 @@ CaptureListing first_whole(const std::vector<Source>& sources, int downscale) {
 /// What no camera has is a mistake in the file: with it, training would run into an empty field, or numbers that are
 /// none.
 void check_plausible(const ListedView& view, const Intrinsics& lens) {
+  const fs::path* file = &view.file_of_lens();
   const auto expect = [&](const char* field, double value, double least, double most) {
     if (value >= least && value <= most) return;  // false for NaN
-    throw InputError(view.poses_file, view.field + "." + field,
+    throw InputError(*file, view.field + "." + field,
                      fmt::format("expected a number from {:g} to {:g}, found {:g}", least, most, value));
   };
   const double side = std::max(lens.width, lens.height);
@@ -178,6 +179,7 @@ void check_plausible(const ListedView& view, const Intrinsics& lens) {
   // A crop of a larger picture has its axis outside.
   for (const double centre : {lens.cx, lens.cy}) expect("principal point", centre, -10 * side, 11 * side);
   for (const double coefficient : lens.distortion) expect("distortion", coefficient, -1000, 1000);
+  file = &view.poses_file;
   for (int axis = 0; axis < 3; ++axis) expect("position", view.world_from_camera.translation[axis], -1e9, 1e9);
   expect("exposure", view.exposure, 1e-4, 1e4);
 }
@@ -191,7 +193,7 @@ Intrinsics complete_intrinsics(const ListedView& view, int width, int height) {
   }
   if (!same_shape(width, height, out.width, out.height)) {
     throw InputError(view.image_file, "size",
-                     "expected " + size_text(out.width, out.height) + " as " + view.poses_file.filename().string() +
+                     "expected " + size_text(out.width, out.height) + " as " + view.file_of_lens().filename().string() +
                          " says, or the same shape, found " + size_text(width, height));
   }
   if (out.fx == 0 && view.angle_x != 0) out.fx = 0.5 * out.width / std::tan(0.5 * view.angle_x);
