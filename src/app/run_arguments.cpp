@@ -21,6 +21,11 @@ pipeline::RunContext open_run(const RunFolderArguments& arguments, const std::st
                             record.capture.string() + " -o " + arguments.run + " --resume");
   }
   Config config = resolve_config(arguments.config, directory.config(take, reporter));
+  std::error_code failure;
+  if (arguments.capture.empty() && !fs::exists(record.capture, failure)) {
+    throw MissingInputError(directory.record_file().string() + ": capture: " + record.capture.string() +
+                            ": no such file or folder; --capture says where it lies now");
+  }
   Capture capture = pipeline::read_capture(arguments.capture.empty() ? record.capture : fs::path(arguments.capture),
                                            config, reporter);
   return {std::move(directory), std::move(config), std::move(capture), std::move(command_line)};

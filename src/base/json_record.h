@@ -138,6 +138,7 @@ void read(const Json& json, const std::string& where, T& value) {
   } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
     std::string text;
     read(json, where, text);
+    if (text.find('\0') != std::string::npos) throw FieldError(where, "expected a path, got " + excerpt(json));
     value = text;
   } else {
     // A number is not a truth value, and 1.5 no count.

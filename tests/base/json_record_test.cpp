@@ -67,6 +67,11 @@ TEST(JsonRecord, WritesFieldsInOrderAndLeavesOutWhatIsEmpty) {
             R"("size":[1.5,2.0],"seconds":{"train":1.25},"file":"x/y"})");
 }
 
+TEST(JsonRecord, APathEndsWhereItsTextDoes) {
+  EXPECT_THAT(refusal([](Json& json) { json["file"] = std::string("a\0b", 3); }),
+              testing::HasSubstr("cell.json: file"));
+}
+
 TEST(JsonRecord, ReadsWhatItWrote) {
   const test::TempDir folder;
   write_file(folder / "cell.json", json_of(filled()).dump());

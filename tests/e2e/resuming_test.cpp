@@ -50,6 +50,20 @@ TEST(Resuming, AColorizationIsExact) {
   EXPECT_TRUE(read_binary_file(parts / "takes/t/take.snapshot") == read_binary_file(whole / "takes/t/take.snapshot"));
 }
 
+TEST(Resuming, ACaptureThatWasMovedIsAskedFor) {
+  const TempDir folder;
+  const fs::path run = copied(tiny_run(), folder / "run");
+  std::string record = read_text_file(run / "run.json");
+  const std::string capture = tiny_capture().string();
+  record.replace(record.rfind(capture), capture.size(), "/absent/capture");
+  write_file(run / "run.json", record);
+  const ProgramResult moved = cnerf({"eval", run.string()});
+  EXPECT_EQ(moved.exit_code, 66);
+  EXPECT_THAT(moved.err,
+              testing::AllOf(HasSubstr("run.json: capture"), HasSubstr("/absent/capture"), HasSubstr("--capture")));
+  EXPECT_EQ(cnerf({"eval", run.string(), "--capture", capture}).exit_code, 0);
+}
+
 TEST(Resuming, AShortageOfMemoryIsNoCrash) {
   const TempDir folder;
   const auto arguments = concatenated(
