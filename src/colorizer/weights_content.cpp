@@ -50,6 +50,15 @@ std::vector<std::byte> interleaved(std::span<const std::uint8_t> sorted) {
   return content;
 }
 
+/// Of numbers in half precision.
+bool are_finite(std::span<const std::byte> halves) {
+  constexpr std::byte kExponent{0x7C};  // in the second byte of each
+  for (std::size_t i = 1; i < halves.size(); i += 2) {
+    if ((halves[i] & kExponent) == kExponent) return false;
+  }
+  return true;
+}
+
 WeightsContent::Parameter next_parameter(Reader& reader) {
   constexpr std::size_t kHalf = 2;  // bytes
   WeightsContent::Parameter parameter;
@@ -83,9 +92,18 @@ WeightsContent read_weights_content(const fs::path& file) {
   Reader reader(file, content.bytes);
   content.temperature = reader.value<double>();
   content.gain = reader.value<double>();
+  for (const double value : {content.temperature, content.gain}) {
+    if (!(value > 0 && value < 1000)) {
+      throw InputError(file, "temperature, gain", "expected numbers above 0, found " + std::to_string(value));
+    }
+  }
   content.short_side = reader.value<std::uint32_t>();
   const auto count = reader.value<std::uint32_t>();
-  for (std::uint32_t i = 0; i < count; ++i) content.parameters.push_back(next_parameter(reader));
+  for (std::uint32_t i = 0; i < count; ++i) {
+    content.parameters.push_back(next_parameter(reader));
+    if (are_finite(content.parameters.back().halves)) continue;
+    throw InputError(file, content.parameters.back().name, "expected finite numbers, found others");
+  }
   return content;
 }
 

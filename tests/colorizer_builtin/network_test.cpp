@@ -161,6 +161,20 @@ TEST(ColorizerWeights, DamageIsRefusedWithTheFileNamed) {
   EXPECT_THROW((void)load_colorizer_weights(folder / "none.weights"), MissingInputError);
 }
 
+TEST(ColorizerWeights, NumbersThatAreNotFiniteAreRefused) {
+  const torch::NoGradGuard no_grad;
+  const test::TempDir folder;
+  ColorizerNet network(Normalisation::kFolded);
+  network->parameters()[0].fill_(std::numeric_limits<float>::quiet_NaN());
+  save_colorizer_weights(folder / "net.weights", network, {});
+  try {
+    (void)load_colorizer_weights(folder / "net.weights");
+    ADD_FAILURE() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("net.weights"), testing::HasSubstr("finite")));
+  }
+}
+
 TEST(ColorizerWeights, ASideNoPictureHasIsRefused) {
   const test::TempDir folder;
   for (const int side : {0, 5000}) {
