@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstdio>
 
+#include "bake/out_of_core/journal_checksum.h"
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -20,20 +21,6 @@ struct PartHeader {
   std::uint64_t bytes = 0;
   std::uint64_t checksum = 0;
 };
-
-/// FNV-1a, a word at a time: finds what a killed process left half written, not what somebody forged.
-/// @param seed  what the bytes have to belong to
-std::uint64_t checksum_of(std::span<const std::byte> bytes, std::uint64_t seed) {
-  constexpr std::uint64_t kPrime = 0x100000001b3;
-  std::uint64_t hash = (0xcbf29ce484222325 ^ bytes.size() ^ seed) * kPrime;
-  for (std::size_t at = 0; at < bytes.size(); at += sizeof(std::uint64_t)) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes.data() + at, std::min(sizeof word, bytes.size() - at));
-    hash = (hash ^ word) * kPrime;
-    hash ^= hash >> 32;
-  }
-  return hash;
-}
 
 }  // namespace
 
@@ -58,9 +45,8 @@ struct Journal::File {
     throw OutputError(name + ": " + what + ": " + (errno != 0 ? std::strerror(errno) : "failed"));
   }
 
-  /// A part's checksum is of this bake and of its place in it.
   [[nodiscard]] std::uint64_t checksum_at(std::size_t number, std::span<const std::byte> bytes) const {
-    return checksum_of(bytes, checksum_of(std::as_bytes(std::span(identity)), number));
+    return part_checksum(std::as_bytes(std::span(identity)), number, bytes);
   }
 
   void append(std::span<const std::byte> bytes) {

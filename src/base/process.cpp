@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "src/base/error.h"
+#include "src/base/pointers_to.h"
 #include "src/base/text.h"
 
 extern char** environ;  // NOLINT: POSIX
@@ -47,13 +48,6 @@ std::vector<std::string> environment_with(const std::vector<std::string>& variab
     if (std::ranges::none_of(variables, replaces)) all.emplace_back(entry);
   }
   return all;
-}
-
-std::vector<char*> pointers_to(std::vector<std::string>& words) {
-  std::vector<char*> pointers;
-  for (std::string& word : words) pointers.push_back(word.data());
-  pointers.push_back(nullptr);
-  return pointers;
 }
 
 /// SIGPIPE is held back in this thread while it lives, and swallowed if it came: no handler of the process changes.

@@ -6,6 +6,7 @@
 #include "src/base/files.h"
 #include "tests/colorizer/questions.h"
 #include "tests/support/data.h"
+#include "tests/support/onnx_model.h"
 
 namespace cnerf {
 namespace {
@@ -14,60 +15,9 @@ using test::message_of;
 using test::some_question;
 using ::testing::HasSubstr;
 
-/// A message in the wire format of protocol buffers.
-class Message {
- public:
-  Message& number(int field, std::uint64_t value) {
-    varint(std::uint64_t(field) << 3);
-    varint(value);
-    return *this;
-  }
-  Message& bytes(int field, const std::string& value) {
-    varint((std::uint64_t(field) << 3) | 2);
-    varint(value.size());
-    text_ += value;
-    return *this;
-  }
-  Message& message(int field, const Message& value) { return bytes(field, value.text_); }
-  [[nodiscard]] const std::string& text() const { return text_; }
-
- private:
-  void varint(std::uint64_t value) {
-    for (; value >= 128; value >>= 7) text_ += char((value & 127) | 128);
-    text_ += char(value);
-  }
-  std::string text_;
-};
-
-Message tensor(const std::string& name, const std::vector<int>& shape, const std::vector<float>& values) {
-  Message out;
-  for (const int size : shape) out.number(1, std::uint64_t(size));
-  std::string raw(values.size() * sizeof(float), '\0');
-  std::memcpy(raw.data(), values.data(), raw.size());
-  return out.number(2, 1).bytes(8, name).bytes(9, raw);
-}
-
-Message value_info(const std::string& name, const std::vector<int>& shape) {
-  Message sizes;
-  for (const int size : shape) sizes.message(1, Message().number(1, std::uint64_t(size)));
-  return Message().bytes(1, name).message(2, Message().message(1, Message().number(1, 1).message(2, sizes)));
-}
-
-/// An ONNX model of one 1x1 convolution: channel c answers weight[c] L + bias[c].
+/// An ONNX model for some_question(): channel c answers weight[c] L + bias[c].
 std::string convolution(const std::vector<float>& weights, const std::vector<float>& biases) {
-  const int out = int(weights.size());
-  const Message kernel = Message().bytes(1, "kernel_shape").number(8, 1).number(8, 1).number(20, 7);
-  const Message node =
-      Message().bytes(1, "x").bytes(1, "w").bytes(1, "b").bytes(2, "y").bytes(3, "conv").bytes(4, "Conv").message(
-          5, kernel);
-  const Message graph = Message()
-                            .message(1, node)
-                            .bytes(2, "g")
-                            .message(5, tensor("w", {out, 1, 1, 1}, weights))
-                            .message(5, tensor("b", {out}, biases))
-                            .message(11, value_info("x", {2, 1, 6, 5}))
-                            .message(12, value_info("y", {2, out, 6, 5}));
-  return Message().number(1, 7).message(7, graph).message(8, Message().bytes(1, "").number(2, 11)).text();
+  return test::onnx_convolution(weights, biases, {2, 6, 5});
 }
 
 class DnnColorizer : public ::testing::Test {
@@ -126,7 +76,8 @@ layer { name: "late" type: "Power" bottom: "a" top: "late" power_param { power: 
 )";
 
 TEST_F(DnnColorizer, CaffeIsReadWithItsLayerNamed) {
-  const std::string weights = file("net.caffemodel", Message().bytes(1, "shift").text(), "layer = \"ab\"\n");
+  const std::string weights =
+      file("net.caffemodel", test::ProtobufMessage().bytes(1, "shift").text(), "layer = \"ab\"\n");
   const auto colorizer = test::colorizer_of("caffe:" + file("net.prototxt", kCaffe) + "," + weights);
   const LightnessBatch question = some_question();
   const std::vector<float> ab = ab_of(colorizer->colorize(question), 1);
@@ -140,7 +91,7 @@ TEST_F(DnnColorizer, CaffeNeedsBothFiles) {
               HasSubstr("PROTO,MODEL"));
   EXPECT_THAT(message_of<ColorizerError>([&] {
                 (void)test::colorizer_of("caffe:" + file("bad.prototxt", "layer { nonsense") + "," +
-                                         file("w.caffemodel", Message().bytes(1, "shift").text()));
+                                         file("w.caffemodel", test::ProtobufMessage().bytes(1, "shift").text()));
               }),
               HasSubstr("in this order"));
 }

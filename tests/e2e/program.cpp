@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "src/base/files.h"
+#include "src/base/pointers_to.h"
 #include "tests/support/data.h"
 
 namespace cnerf::test {
@@ -27,9 +28,7 @@ pid_t start(const std::vector<std::string>& arguments, const fs::path& out, cons
             std::size_t file_limit) {
   std::vector<std::string> words = {CNERF_PROGRAM};
   words.insert(words.end(), arguments.begin(), arguments.end());
-  std::vector<char*> argv;
-  for (std::string& word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
+  std::vector<char*> argv = pointers_to(words);
   const pid_t child = ::fork();
   if (child != 0) return child;
   ::dup2(::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
@@ -95,36 +94,6 @@ ProgramResult cnerf_interrupted_at(const std::vector<std::string>& arguments, co
 
 ProgramResult cnerf_with_file_limit(const std::vector<std::string>& arguments, std::size_t bytes) {
   return run(arguments, "", bytes);
-}
-
-std::vector<std::string> tiny_options() {
-  std::vector<std::string> options;
-  for (const char* setting : {"stage1.steps=60",
-                              "stage1.samples_per_step=4096",
-                              "stage1.checkpoint_every=20",
-                              "stage1.steps_per_box=64",
-                              "stage1.grid.levels=4",
-                              "stage1.grid.log2_rows=12",
-                              "stage1.grid.finest_resolution=64",
-                              "colorizer.reference_steps=20",
-                              "stage2.patches=6",
-                              "stage2.patch_size=32",
-                              "stage2.rays_per_patch=256",
-                              "stage2.working_resolution=32",
-                              "stage2.distill_steps=10",
-                              "stage2.colorizer_batch=2",
-                              "stage2.grid.levels=4",
-                              "stage2.grid.log2_rows=12",
-                              "stage2.grid.finest_resolution=64",
-                              "stage2.purify.enabled=false",
-                              "stage2.purify.base_images=2",
-                              "bake.resolution=32",
-                              "render.frames=3",
-                              "render.short_side=32",
-                              "render.steps_per_box=64"}) {
-    options.insert(options.end(), {"--set", setting});
-  }
-  return options;
 }
 
 fs::path copied(const fs::path& from, const fs::path& to) {

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/tiny_options.h"
+
 namespace cnerf::test {
 
 struct ProgramResult {
@@ -22,9 +24,6 @@ struct ProgramResult {
 
 /// As `cnerf`, where no file may grow beyond `bytes`: what a full disk looks like from inside.
 [[nodiscard]] ProgramResult cnerf_with_file_limit(const std::vector<std::string>& arguments, std::size_t bytes);
-
-/// Options that make every part of a run as short as it can be and still do its work.
-[[nodiscard]] std::vector<std::string> tiny_options();
 
 /// What many tests begin with. CTest makes each once for all processes (e2e_fixture) and names their folder in
 /// $CNERF_E2E; without it a process makes what it asks for itself. Tests copy what they change.

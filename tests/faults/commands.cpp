@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "tests/support/tiny_options.h"
+
 namespace cnerf::faults {
 namespace fs = std::filesystem;
 namespace {
@@ -17,39 +19,15 @@ Words joined(Words a, const Words& b) {
   return a;
 }
 
-/// As tiny_options of tests/e2e, and one thread, so that operations come in the same order.
-Words tiny() {
-  Words words;
-  for (const char* setting : {"stage1.steps=30",
-                              "stage1.samples_per_step=2048",
-                              "stage1.checkpoint_every=10",
-                              "stage1.steps_per_box=64",
-                              "stage1.grid.levels=4",
-                              "stage1.grid.log2_rows=10",
-                              "stage1.grid.finest_resolution=64",
-                              "colorizer.reference_steps=20",
-                              "stage2.patches=6",
-                              "stage2.patch_size=32",
-                              "stage2.rays_per_patch=256",
-                              "stage2.working_resolution=32",
-                              "stage2.distill_steps=10",
-                              "stage2.colorizer_batch=2",
-                              "stage2.grid.levels=4",
-                              "stage2.grid.log2_rows=10",
-                              "stage2.grid.finest_resolution=64",
-                              "stage2.purify.enabled=false",
-                              "stage2.purify.base_images=2",
-                              "bake.resolution=32",
-                              "render.frames=3",
-                              "render.short_side=32",
-                              "render.steps_per_box=64"}) {
-    words.insert(words.end(), {"--set", setting});
-  }
-  return words;
-}
-
+/// One thread, so that operations come in the same order.
 const Words kOneThread = {"--threads", "1"};
 constexpr const char* kColorizer = "reference:references";
+
+Words tiny() {
+  return joined(test::tiny_options({"stage1.steps=30", "stage1.samples_per_step=2048", "stage1.checkpoint_every=10",
+                                    "stage1.grid.log2_rows=10", "stage2.grid.log2_rows=10"}),
+                kOneThread);
+}
 
 /// w x y z of a rotation; good for half turns too.
 std::array<double, 4> quaternion_of(const std::array<std::array<double, 3>, 3>& m) {
@@ -112,7 +90,7 @@ Fixtures::Fixtures(const Subject& subject, const fs::path& scratch) : folder_(fs
   };
   move("capture");
   make_photographs(folder_ / "capture", folder_ / "photographs", folder_ / "model");
-  make(joined({"train", (folder_ / "capture").string(), "-o", "@/run"}, joined(tiny(), kOneThread)));
+  make(joined({"train", (folder_ / "capture").string(), "-o", "@/run"}, tiny()));
   move("run");
   make(joined({"colorize", "@/run", "--take", "t", "--colorizer", kColorizer}, kOneThread));
   fs::copy(slot.root() / "run", folder_ / "take", fs::copy_options::recursive);
@@ -136,7 +114,7 @@ std::vector<Command> Fixtures::commands() const {
        {"prepare", (folder_ / "photographs").string(), "-o", "@/capture", "--colmap-model",
         (folder_ / "model").string(), "--threads", "1"},
        {"capture"}},
-      {"train", "", joined({"train", capture, "-o", "@/run"}, joined(tiny(), kOneThread)), {"run"}},
+      {"train", "", joined({"train", capture, "-o", "@/run"}, tiny()), {"run"}},
       {"colorize", "run", joined({"colorize", "@/run", "--take", "t", "--colorizer", kColorizer}, kOneThread), {"run"}},
       {"bake", "take", joined(bake("vdb"), {"--nvdb"}), {"run", "bake/volume.vdb"}},
       {"web", "take", joined(bake("web"), {"--web-resolution", "24"}), {"run"}},
@@ -146,13 +124,9 @@ std::vector<Command> Fixtures::commands() const {
       {"render", "take", joined({"render", "@/run", "--take", "t", "--format", "png,exr,mp4"}, kOneThread), {"run"}},
       {"run",
        "",
-       joined({"run", capture, "-o", "@/run", "--colorizer", kColorizer, "--format", "vdb"},
-              joined(tiny(), kOneThread)),
+       joined({"run", capture, "-o", "@/run", "--colorizer", kColorizer, "--format", "vdb"}, tiny()),
        {"run"}},
-      {"compare",
-       "",
-       joined({"compare", capture, "-o", "@/out", "--methods", "colornerf,grey"}, joined(tiny(), kOneThread)),
-       {}},
+      {"compare", "", joined({"compare", capture, "-o", "@/out", "--methods", "colornerf,grey"}, tiny()), {}},
   };
 }
 
@@ -171,7 +145,7 @@ std::vector<Command> Fixtures::neighbours() const {
   const std::string capture = (folder_ / "capture").string();
   const auto command = [](const char* name, const Words& words) { return Command{name, "take", words, {}}; };
   return {
-      command("train", joined({"train", capture, "-o", "@/run", "--overwrite"}, joined(tiny(), kOneThread))),
+      command("train", joined({"train", capture, "-o", "@/run", "--overwrite"}, tiny())),
       command("colorize", joined({"colorize", "@/run", "--take", "u", "--colorizer", kColorizer}, kOneThread)),
       command("colorize-other", joined({"colorize", "@/run", "--take", "v", "--colorizer", "grey"}, kOneThread)),
       command("bake", {"bake", "@/run", "--take", "t", "--threads", "1"}),

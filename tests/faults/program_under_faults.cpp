@@ -15,6 +15,8 @@
 #include <stdexcept>
 #include <thread>
 
+#include "src/base/pointers_to.h"
+
 extern char** environ;
 
 namespace cnerf::faults {
@@ -55,13 +57,6 @@ std::vector<std::string> environment_of(const Subject& subject, const fs::path& 
   all.push_back("CNERF_FAULT_LOG=" + (folder / "operations").string());
   all.push_back("CNERF_FAULT_SHADOW=" + (folder / "shadow").string());
   return all;
-}
-
-std::vector<char*> pointers_to(std::vector<std::string>& words) {
-  std::vector<char*> pointers;
-  for (std::string& word : words) pointers.push_back(word.data());
-  pointers.push_back(nullptr);
-  return pointers;
 }
 
 pid_t start(std::vector<std::string> words, std::vector<std::string> environment, const fs::path& output) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "bake/out_of_core/journal_checksum.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace {
@@ -14,22 +15,9 @@ using cnerf::fuzz::Bytes;
 
 constexpr std::string_view kIdentity = "the bake of a fuzz target";
 
-/// As journal.cpp has it.
-std::uint64_t checksum_of(Bytes bytes, std::uint64_t seed) {
-  constexpr std::uint64_t kPrime = 0x100000001b3;
-  std::uint64_t hash = (0xcbf29ce484222325 ^ bytes.size() ^ seed) * kPrime;
-  for (std::size_t at = 0; at < bytes.size(); at += sizeof(std::uint64_t)) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes.data() + at, std::min(sizeof word, bytes.size() - at));
-    hash = (hash ^ word) * kPrime;
-    hash ^= hash >> 32;
-  }
-  return hash;
-}
-
 void append_part(std::vector<std::byte>& file, std::size_t number, Bytes bytes) {
   cnerf::fuzz::append_value(file, std::uint64_t(bytes.size()));
-  cnerf::fuzz::append_value(file, checksum_of(bytes, checksum_of(cnerf::fuzz::bytes_of(kIdentity), number)));
+  cnerf::fuzz::append_value(file, cnerf::bake::part_checksum(cnerf::fuzz::bytes_of(kIdentity), number, bytes));
   cnerf::fuzz::append_bytes(file, bytes);
 }
 

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <span>
 
+#include "bake/out_of_core/journal_checksum.h"
 #include "src/base/files.h"
 #include "src/base/gzip.h"
 
@@ -26,12 +27,15 @@ void append(std::string& to, T value) {
   to.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-std::string digest_of(const std::string& bytes) {
-  return sha256(std::as_bytes(std::span(bytes)));
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
 }
 
-// ---- snapshots: magic, version, size of the header, header, pieces, digest
-// -------------------------------------------
+std::string digest_of(const std::string& bytes) {
+  return sha256(bytes_of(bytes));
+}
+
+// ---- snapshots: magic, version, size of the header, header, pieces, digest ------------------------------------------
 
 std::optional<Envelope> opened_snapshot(const std::string& file) {
   constexpr std::size_t kSize = 12, kHeader = 20;
@@ -101,20 +105,7 @@ std::optional<Envelope> opened_weights(const std::string& file) {
   return envelope;
 }
 
-// ---- journals: size, checksum and bytes of each part; the first is the bake's identity
-// -------------------------------
-
-std::uint64_t checksum_of(std::string_view bytes, std::uint64_t seed) {
-  constexpr std::uint64_t kPrime = 0x100000001b3;
-  std::uint64_t hash = (0xcbf29ce484222325 ^ bytes.size() ^ seed) * kPrime;
-  for (std::size_t at = 0; at < bytes.size(); at += sizeof(std::uint64_t)) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes.data() + at, std::min(sizeof word, bytes.size() - at));
-    hash = (hash ^ word) * kPrime;
-    hash ^= hash >> 32;
-  }
-  return hash;
-}
+// ---- journals: size, checksum and bytes of each part; the first is the bake's identity ------------------------------
 
 std::optional<Envelope> opened_journal(const std::string& file) {
   constexpr std::size_t kHeader = 16;
@@ -134,7 +125,7 @@ std::optional<Envelope> opened_journal(const std::string& file) {
     for (std::size_t i = 0; i < sections.size(); ++i) {
       const std::size_t number = i == 0 ? 0 : i - 1;  // the identity is not counted
       append(sealed, std::uint64_t(sections[i].bytes.size()));
-      append(sealed, checksum_of(sections[i].bytes, checksum_of(identity, number)));
+      append(sealed, bake::part_checksum(bytes_of(identity), number, bytes_of(sections[i].bytes)));
       sealed += sections[i].bytes;
     }
     return sealed;

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "src/base/error.h"
+#include "src/base/pointers_to.h"
 
 extern char** environ;
 
@@ -40,13 +41,6 @@ std::vector<std::string> environment(const Limits& limits) {
     variables.emplace_back("ASAN_OPTIONS=hard_rss_limit_mb=8192:detect_leaks=0");
   }
   return variables;
-}
-
-std::vector<char*> pointers_to(std::vector<std::string>& words) {
-  std::vector<char*> pointers;
-  for (std::string& word : words) pointers.push_back(word.data());
-  pointers.push_back(nullptr);
-  return pointers;
 }
 
 void limit(int resource, std::size_t most) {

@@ -31,7 +31,7 @@ std::string bytes_of(T value) {
   return {reinterpret_cast<const char*>(&value), sizeof value};
 }
 
-// ---- of any file ---------------------------------------------------------------------------------------------------
+// ---- of any file ----------------------------------------------------------------------------------------------------
 
 Mutant with_flipped_bits(const std::string& original, Random& random) {
   Mutant mutant{original, "bits:"};
@@ -127,8 +127,7 @@ Mutant with_swapped_blocks(const std::string& original, Random& random) {
   return mutant;
 }
 
-// ---- of text
-// ---------------------------------------------------------------------------------------------------------
+// ---- of text --------------------------------------------------------------------------------------------------------
 
 /// Numbers and quoted words.
 std::vector<Block> values_of(const std::string& text) {

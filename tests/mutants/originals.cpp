@@ -13,6 +13,7 @@
 #include "src/base/files.h"
 #include "src/capture/exr_io.h"
 #include "tests/capture/fixtures.h"
+#include "tests/support/onnx_model.h"
 
 namespace cnerf::mutants {
 namespace {
@@ -40,8 +41,7 @@ fs::path copied(const fs::path& from, const fs::path& to) {
   return to;
 }
 
-// ---- captures
-// --------------------------------------------------------------------------------------------------------
+// ---- captures -------------------------------------------------------------------------------------------------------
 
 /// A capture whose first image is `images/0.EXTENSION`; the others are PNG.
 fs::path capture_with_image(const fs::path& folder, const std::string& extension,
@@ -78,67 +78,13 @@ fs::path colmap_capture(const fs::path& folder, bool is_text) {
   return folder;
 }
 
-// ---- colorizers
-// ------------------------------------------------------------------------------------------------------
-
-/// A message in the wire format of protocol buffers.
-class Message {
- public:
-  Message& number(int field, std::uint64_t value) {
-    varint(std::uint64_t(field) << 3);
-    varint(value);
-    return *this;
-  }
-  Message& bytes(int field, const std::string& value) {
-    varint((std::uint64_t(field) << 3) | 2);
-    varint(value.size());
-    text_ += value;
-    return *this;
-  }
-  Message& message(int field, const Message& value) { return bytes(field, value.text_); }
-  [[nodiscard]] const std::string& text() const { return text_; }
-
- private:
-  void varint(std::uint64_t value) {
-    for (; value >= 128; value >>= 7) text_ += char((value & 127) | 128);
-    text_ += char(value);
-  }
-  std::string text_;
-};
-
-Message tensor(const std::string& name, const std::vector<int>& shape, const std::vector<float>& values) {
-  Message out;
-  for (const int size : shape) out.number(1, std::uint64_t(size));
-  return out.number(2, 1).bytes(8, name).bytes(9, test::bytes_of(values));
-}
-
-Message value_info(const std::string& name, const std::vector<int>& shape) {
-  Message sizes;
-  for (const int size : shape) sizes.message(1, Message().number(1, std::uint64_t(size)));
-  return Message().bytes(1, name).message(2, Message().message(1, Message().number(1, 1).message(2, sizes)));
-}
-
-/// A model in ONNX whose answer is L and -L.
-std::string onnx_model() {
-  const Message kernel = Message().bytes(1, "kernel_shape").number(8, 1).number(8, 1).number(20, 7);
-  const Message node =
-      Message().bytes(1, "x").bytes(1, "w").bytes(1, "b").bytes(2, "y").bytes(3, "conv").bytes(4, "Conv").message(
-          5, kernel);
-  const Message graph = Message()
-                            .message(1, node)
-                            .bytes(2, "g")
-                            .message(5, tensor("w", {2, 1, 1, 1}, {0.5F, -0.5F}))
-                            .message(5, tensor("b", {2}, {0, 0}))
-                            .message(11, value_info("x", {1, 1, 12, 16}))
-                            .message(12, value_info("y", {1, 2, 12, 16}));
-  return Message().number(1, 7).message(7, graph).message(8, Message().bytes(1, "").number(2, 11)).text();
-}
+// ---- colorizers -----------------------------------------------------------------------------------------------------
 
 fs::path colorizers(const fs::path& folder) {
   constexpr const char* kSidecar = "input = \"L100\"\noutput = \"ab\"\n";
   fs::create_directories(folder);
   test::write_grey_image(folder / "picture.png", 16, 12);
-  write_file(folder / "net.onnx", onnx_model());
+  write_file(folder / "net.onnx", test::onnx_convolution({0.5F, -0.5F}, {0, 0}, {1, 12, 16}));
   write_file(folder / "net.onnx.toml", kSidecar);
   fs::copy_file(fs::path(CNERF_SOURCE_DIR) / "src/colorizer/weights/colorizer.weights", folder / "net.weights");
   // TorchScript is written by a program of its own: few link LibTorch.
@@ -154,8 +100,7 @@ Step coloring_by(const std::string& spec) {
   return {{"colorize-image", "{}/picture.png", "{}/out.png", "--colorizer", spec, "--threads", "1"}, ""};
 }
 
-// ---- runs and bakes
-// --------------------------------------------------------------------------------------------------
+// ---- runs and bakes -------------------------------------------------------------------------------------------------
 
 Words quiet() {
   return {"--threads", "1", "--progress", "quiet"};

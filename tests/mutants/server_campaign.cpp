@@ -36,8 +36,7 @@ double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-// ---- a client
-// --------------------------------------------------------------------------------------------------------
+// ---- a client -------------------------------------------------------------------------------------------------------
 
 /// A TCP connection to the server.
 class Client {
@@ -113,8 +112,7 @@ void count(ServerRow& row, const std::string& answer) {
   if (answer.find(kSecret) != std::string::npos || answer.find("root:x:0") != std::string::npos) ++row.leaks;
 }
 
-// ---- the server and who looks at it
-// ----------------------------------------------------------------------------------
+// ---- the server and who looks at it ---------------------------------------------------------------------------------
 
 /// Asks for the page all the time.
 class Visitor {
@@ -258,8 +256,7 @@ void for_each_client(int count, const std::function<void(int)>& one) {
   for (std::thread& thread : threads) thread.join();
 }
 
-// ---- what is done to it
-// ----------------------------------------------------------------------------------------------
+// ---- what is done to it ---------------------------------------------------------------------------------------------
 
 const std::vector<std::string> kTraversals = {"/../secret.txt",
                                               "/../../secret.txt",

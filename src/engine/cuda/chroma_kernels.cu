@@ -10,8 +10,7 @@
 namespace cnerf {
 namespace {
 
-// Samples of pixels, one warp per pixel
-// -----------------------------------------------------------------------------------
+// ---- samples of pixels, one warp per pixel --------------------------------------------------------------------------
 
 constexpr int kPixelWarps = 8;
 
