@@ -85,7 +85,7 @@ fs::path write_blender_setup(const fs::path& folder) {
   // An ASCII JSON string is a Python string literal as well.
   const std::string literal = nlohmann::json(fs::absolute(folder).lexically_normal().string()).dump(-1, ' ', true);
   text.replace(at, marker.size(), "BAKE_FOLDER = " + literal);
-  const fs::path target = folder / "blender_setup.py";
+  fs::path target = folder / "blender_setup.py";
   write_file(target, text);
   return target;
 }
@@ -154,7 +154,7 @@ GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, 
     scene.lab_exr = textures.lab.filename().string();
     for (const fs::path& file : {textures.rgb, textures.luminance, textures.lab}) list(file);
   }
-  const GltfFiles files = write_gltf(mesh, scene, folder_, name);
+  GltfFiles files = write_gltf(mesh, scene, folder_, name);
   for (const fs::path& file : {files.glb, files.gltf, files.buffer, files.basecolor}) list(file);
 
   manifest_.frame = mesh.frame;

@@ -264,8 +264,8 @@ GltfFiles write_gltf(const bake::Mesh& mesh, const GltfScene& scene, const std::
   CNERF_CHECK(!mesh.triangles.empty(), "an empty mesh cannot be written");
   CNERF_CHECK_EQ(mesh.normals.size(), mesh.positions.size());
   CNERF_CHECK_EQ(mesh.uvs.size(), mesh.positions.size());
-  const GltfFiles files{folder / (name + ".gltf"), folder / (name + ".bin"), folder / (name + "_basecolor.png"),
-                        folder / (name + ".glb")};
+  GltfFiles files{folder / (name + ".gltf"), folder / (name + ".bin"), folder / (name + "_basecolor.png"),
+                  folder / (name + ".glb")};
   const tinygltf::Model model = model_of(mesh, scene);
   write_file(files.glb, glb_of(model, scene));
   write_file(files.basecolor, scene.basecolor_png);

@@ -302,7 +302,7 @@ fs::path write_manifest(const BakeManifest& manifest, const fs::path& folder) {
     const auto plate = manifest.plates.find(camera.name);
     record.cameras.push_back({camera, plate == manifest.plates.end() ? std::nullopt : std::optional(plate->second)});
   }
-  const fs::path file = folder / "manifest.json";
+  fs::path file = folder / "manifest.json";
   write_file(file, json_of(record).dump(2) + "\n");
   return file;
 }

@@ -116,7 +116,7 @@ std::vector<std::byte> basecolor_png(const bake::Texture& texture) {
 
 TextureFiles write_exr_textures(const bake::Texture& texture, const std::string& color_origin,
                                 const std::filesystem::path& folder, const std::string& name) {
-  const TextureFiles files{folder / (name + "_rgb.exr"), folder / (name + "_lum.exr"), folder / (name + "_lab.exr")};
+  TextureFiles files{folder / (name + "_rgb.exr"), folder / (name + "_lum.exr"), folder / (name + "_lab.exr")};
   const std::span<const float> rgb(&texture.rgb[0].x, 3 * texture.rgb.size());
   const std::vector<float> lightness = lightness_of(texture.luminance);
   const auto write = [&](const std::filesystem::path& file, const char* space, std::vector<ExrChannel> channels) {

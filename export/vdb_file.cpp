@@ -44,7 +44,7 @@ class CheckedInput : public openvdb::io::Archive {
   /// The next grid. @param is_wanted  of its name and type; others come empty
   openvdb::GridBase::Ptr next(const std::function<bool(const openvdb::GridBase&)>& is_wanted) {
     openvdb::io::GridDescriptor descriptor;
-    const openvdb::GridBase::Ptr grid = descriptor.read(in_);
+    openvdb::GridBase::Ptr grid = descriptor.read(in_);
     if (!grid) throw std::runtime_error("a grid without a type");
     grid->setName(descriptor.gridName());
     if (inputHasGridOffsets() && !is_wanted(*grid)) {

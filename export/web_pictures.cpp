@@ -81,11 +81,11 @@ std::vector<std::byte> make_poster(const bake::Volume& volume, const bake::Camer
   options.samples_per_axis = 1;
   const bake::VolumeImage image = integrate_volume(volume, pinhole, camera.world_from_camera, options);
   cv::Mat bgra(image.height, image.width, CV_8UC4);
-  for (int i = 0; i < image.width * image.height; ++i) {
-    const float opacity = image.opacity[std::size_t(i)];
+  for (std::size_t i = 0; i < image.opacity.size(); ++i) {
+    const float opacity = image.opacity[i];
     std::uint8_t* pixel = bgra.data + 4 * i;
-    for (int c = 0; c < 3; ++c) {
-      const float premultiplied = image.rgb[std::size_t(3 * i + c)];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float premultiplied = image.rgb[3 * i + c];
       pixel[2 - c] = srgb8_from_linear(opacity > 0 ? premultiplied / opacity : 0.0f);
     }
     pixel[3] = std::uint8_t(std::lround(255 * std::clamp(opacity, 0.0f, 1.0f)));

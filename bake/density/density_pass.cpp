@@ -37,7 +37,8 @@ AxisSamples axis_samples(const SceneFrame& frame, const Plan& plan, int subsampl
   AxisSamples samples;
   for (int i = 0; i < kBrickSide * subsamples; ++i) {
     Vec3d voxel;
-    voxel[axis] = brick_min[axis] + i / subsamples + (i % subsamples + 0.5) / subsamples;
+    const int whole = i / subsamples, part = i % subsamples;
+    voxel[axis] = brick_min[axis] + whole + (part + 0.5) / subsamples;
     const Vec3d world = plan.world_from_voxel(voxel);
     samples.is_inside.push_back(world[axis] >= plan.box.min[axis] && world[axis] <= plan.box.max[axis]);
     // Rounding may carry a point of the box's face just outside the field's domain.

@@ -33,8 +33,8 @@ std::vector<Look> looks_of(const Camera& camera, const Plan& plan, const BrickGr
   const Aabbd box{{0, 0, 0}, plan.resolution.cast<double>()};
   std::vector<Look> looks;
   for (int ray = 0; ray < kLookRays * kLookRays; ++ray) {
-    const PixelPosition pixel{(ray % kLookRays + 0.5) * lens.width / kLookRays,
-                              (ray / kLookRays + 0.5) * lens.height / kLookRays};
+    const int column = ray % kLookRays, row = ray / kLookRays;
+    const PixelPosition pixel{(column + 0.5) * lens.width / kLookRays, (row + 0.5) * lens.height / kLookRays};
     const Vec3d d = normalized(camera.world_from_camera.direction(ray_direction(lens, pixel)));
     const auto inside = intersect(box, origin, d);
     if (!inside) continue;

@@ -96,7 +96,8 @@ Estimate estimate_bake(const ColorField& field, const std::vector<Plan>& plans, 
   Estimate estimate;
   for (const Plan& plan : plans) {
     const Contents contents = probe(field, plan, coarse);
-    finding += contents.bricks * kBrickBytes + double(plan.lattice_voxels() / kBrickVoxels * sizeof(void*));
+    const auto bricks = double(plan.lattice_voxels()) / kBrickVoxels;
+    finding += contents.bricks * kBrickBytes + bricks * sizeof(void*);
     const double asked =
         std::min(contents.in_fullest_plane, double(kViewsAtATime) / options.views_per_voxel + kBrickVoxels);
     finding +=

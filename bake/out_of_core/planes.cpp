@@ -49,7 +49,7 @@ VolumePlanes planes_of(const Volume& volume) {
       std::is_sorted(voxels.begin(), voxels.end(),
                      [](const Voxel& a, const Voxel& b) { return std::tie(a.i, a.j, a.k) < std::tie(b.i, b.j, b.k); }),
       "voxels must be sorted by (i, j, k)");
-  VolumePlanes planes{volume, {}, 0, 0, false, {}};
+  VolumePlanes planes{static_cast<const VolumeHeader&>(volume), {}, 0, 0, false, {}};
   planes.statistics.add(voxels);
   if (!voxels.empty()) {
     planes.begin = plane_of(voxels.front().i);
@@ -81,7 +81,7 @@ void visit_parts(const VolumePlanes& volume, const std::function<void(std::size_
 }
 
 Volume whole_volume(const VolumePlanes& volume) {
-  Volume whole{volume, {}};
+  Volume whole{static_cast<const VolumeHeader&>(volume), {}};
   for (int plane = volume.begin; plane < volume.end; ++plane) {
     const std::vector<Voxel> voxels = volume.read(plane);
     whole.voxels.insert(whole.voxels.end(), voxels.begin(), voxels.end());

@@ -187,7 +187,8 @@ VolumeImage integrate_volumes(std::span<const Volume> volumes, const Intrinsics&
       Vec3d rgb{};
       double opacity = 0;
       for (int s = 0; s < n * n; ++s) {
-        const PixelPosition pixel{x + (s % n + 0.5) / n, double(y) + (s / n + 0.5) / n};
+        const int column = s % n, row = s / n;
+        const PixelPosition pixel{x + (column + 0.5) / n, double(y) + (row + 0.5) / n};
         const Vec3d direction = normalized(world_from_camera.direction(ray_direction(intrinsics, pixel)));
         const Radiance ray = integrate_ray(media, world_from_camera.translation, direction, options.step);
         rgb += ray.rgb;

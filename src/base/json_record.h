@@ -134,7 +134,8 @@ void read(const Json& json, const std::string& where, T& value) {
   } else if constexpr (is_map<T>) {
     if (!json.is_object()) throw FieldError(where, "expected an object, got " + excerpt(json));
     value.clear();
-    for (const auto& [name, element] : json.items()) read(element, where + "." + name, value[name]);
+    for (const auto& [name, element] : json.items())
+      read(element, std::string(where).append(1, '.').append(name), value[name]);
   } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
     std::string text;
     read(json, where, text);

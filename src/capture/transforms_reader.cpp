@@ -154,7 +154,7 @@ bool is_there(const fs::path& file) {
 /// The named file; without it, the same name with an extension appended (synthetic sets leave it out).
 fs::path resolve_image(const fs::path& folder, std::string name) {
   std::replace(name.begin(), name.end(), '\\', '/');
-  const fs::path plain = (folder / name).lexically_normal();
+  fs::path plain = (folder / name).lexically_normal();
   if (is_there(plain)) return plain;
   for (const std::string& extension : image_extensions()) {
     fs::path with_extension = plain;

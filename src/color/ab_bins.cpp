@@ -59,8 +59,8 @@ class NearBins {
   /// its nearest point of the cell. The margin of 1e-3 covers rounding of colours at the border of a cell.
   void fill(int index) {
     const float half = kAbGridStep / 2;
-    const Ab centre = {kOrigin + half + kAbGridStep * float(index / kCells),
-                       kOrigin + half + kAbGridStep * float(index % kCells)};
+    const int row = index / kCells, column = index % kCells;
+    const Ab centre = {kOrigin + half + kAbGridStep * float(row), kOrigin + half + kAbGridStep * float(column)};
     std::array<float, kAbBinCount> nearest{};
     std::array<float, kAbBinCount> farthest{};
     for (std::size_t bin = 0; bin < kAbBinCount; ++bin) {

@@ -29,7 +29,8 @@ struct Values {
 };
 
 void check_values(const std::string& colorizer, const Values& given, const ChromaBatch& answer) {
-  const auto& [what, values, channels, largest] = given;
+  const auto& [what, values, channels, most] = given;
+  const float largest = most;  // what a lambda holds has to be a variable
   const std::size_t expected =
       std::size_t(answer.batch) * std::size_t(channels) * std::size_t(answer.height) * std::size_t(answer.width);
   if (values.size() != expected) {

@@ -94,7 +94,9 @@ class RayMarcher {
 
   /// The next sample in occupied space; false at the end of the ray.
   bool next(RaySample& sample) {
-    for (float t = lattice_.t_at(index_); t < t_end_; t = lattice_.t_at(index_)) {
+    while (true) {
+      const float t = lattice_.t_at(index_);
+      if (!(t < t_end_)) return false;
       const Vec3f p = ray_.at(t);
       const int cascade = grid_->cascade_of(p);
       if (grid_->occupied(cascade, p)) {
@@ -106,7 +108,6 @@ class RayMarcher {
           grid_->block_occupied(cascade, p) ? grid_->cell_side(cascade) : 8.0f * grid_->cell_side(cascade);
       index_ = std::max(index_ + 1, lattice_.index_at(t + distance_to_exit(p, side)));
     }
-    return false;
   }
 
  private:

@@ -29,7 +29,8 @@ struct UnitCamera {
   /// Through the middle of a pixel.  @param index  y * width + x
   [[nodiscard]] Ray ray_of_pixel(std::size_t index) const {
     const auto width = std::size_t(intrinsics.width);
-    return ray({double(index % width) + 0.5, double(index / width) + 0.5});
+    const std::size_t column = index % width, row = index / width;
+    return ray({double(column) + 0.5, double(row) + 0.5});
   }
 };
 

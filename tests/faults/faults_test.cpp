@@ -25,28 +25,28 @@ class Faults : public testing::Test {
 
 TEST_F(Faults, OperationsOfABakeAndAColorization) {
   CampaignOptions some = options({"bake", "colorize"});
-  some.every = 130;
+  some.every = 260;
   const Report report = disturb_operations(some);
   EXPECT_TRUE(report.violations.empty()) << report.text();
 }
 
 TEST_F(Faults, KillsAtRandomMoments) {
   CampaignOptions some = options({"train", "bake"});
-  some.count = 4;
+  some.count = 2;
   const Report report = kill_at_random(some);
   EXPECT_TRUE(report.violations.empty()) << report.text();
 }
 
 TEST_F(Faults, TwoProgramsInOneFolder) {
   CampaignOptions some = options({"bake", "bake-smaller", "colorize", "info"});
-  some.count = 4;
+  some.count = 2;
   const Report report = run_pairs(some);
   EXPECT_TRUE(report.violations.empty()) << report.text();
 }
 
 TEST_F(Faults, LargeAllocationsOfABake) {
   CampaignOptions some = options({"bake"});
-  some.every = 1200;
+  some.every = 2400;
   const Report report = starve(some);
   EXPECT_TRUE(report.violations.empty()) << report.text();
 }

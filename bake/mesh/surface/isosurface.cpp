@@ -33,7 +33,8 @@ std::vector<Vec3f> ways_out() {
 
 class HiddenVoxels {
  public:
-  HiddenVoxels(const BrickGrid<float>& sigma, const std::vector<Camera>& cameras, const Plan& plan, Options options)
+  HiddenVoxels(const BrickGrid<float>& sigma, const std::vector<Camera>& cameras, const Plan& plan,
+               const Options& options)
       : sigma_(sigma), plan_(plan), views_(cameras, {{&sigma, plan.origin, plan.voxel_size}}, one_view(options)) {}
 
   /// Which voxels of a brick are hidden, by their offset.

@@ -41,10 +41,7 @@ struct TexelShader::View {
 
 TexelShader::TexelShader(const ColorField& field, const std::vector<Camera>& cameras, const Plan& plan,
                          const Options& bake, const BrickGrid<float>& sigma)
-    : field_(field),
-      plan_(plan),
-      sigma_(sigma),
-      views_(cameras, {{&sigma, plan.origin, plan.voxel_size}}, with_views(bake)) {}
+    : field_(field), plan_(plan), views_(cameras, {{&sigma, plan.origin, plan.voxel_size}}, with_views(bake)) {}
 
 std::vector<TexelShader::Sample> TexelShader::samples_along_rays(std::span<const SurfacePoint> points,
                                                                  std::vector<SurfaceColor>& colors) const {

@@ -44,7 +44,6 @@ class TexelShader {
 
   const ColorField& field_;
   const Plan& plan_;
-  const BrickGrid<float>& sigma_;
   ViewSelection views_;
 };
 
