@@ -29,7 +29,9 @@ results=$(mktemp -d)
 trap 'rm -rf "$results"' EXIT
 export results
 # clang cannot read the compiler's precompiled headers, and does not need them.
-sed -E 's| -Winvalid-pch -include [^ ]*cmake_pch\.hxx||' "$database" > "$results/compile_commands.json"
+sed -E -e 's| -Winvalid-pch -include [^ ]*cmake_pch\.hxx||' \
+  -e "s|^( *\"command\": \"[^ ]*)(.*/torch/csrc/)|\1 -include $PWD/cmake/torch_for_clang.h\2|" \
+  "$database" > "$results/compile_commands.json"
 deadline=$((SECONDS + ${LIMIT:-86400}))
 # One file; its result is a file "ok" or "bad" of its name.
 check() {

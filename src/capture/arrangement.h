@@ -30,7 +30,7 @@ struct CameraArrangement {
 [[nodiscard]] CameraArrangement arrangement_of(const std::vector<View>& views, const std::vector<Vec3d>& points = {},
                                                const std::optional<DepthRange>& depth_range = {});
 [[nodiscard]] inline CameraArrangement arrangement_of(const Capture& capture) {
-  return arrangement_of(capture.views, capture.points, capture.depth_range);
+  return arrangement_of(capture.views, positions_of(capture.points), capture.depth_range);
 }
 
 /// The views' mean distance from a point.

@@ -1,6 +1,7 @@
 #pragma once
 /// A monochrome multi-view capture: what every reader makes and all else consumes. Plain data.
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -21,6 +22,23 @@ struct View {
   bool held_out = false;  ///< only for evaluation, never trained on
 };
 
+/// A point of structure from motion.
+struct SparsePoint {
+  Vec3d position;                    ///< world
+  double error = 0;                  ///< mean distance from where pictures show it, pixels
+  std::vector<std::uint32_t> views;  ///< whose pictures show it: places in `Capture::views`, ascending
+
+  bool operator==(const SparsePoint&) const = default;
+};
+
+/// Where the points lie.
+[[nodiscard]] inline std::vector<Vec3d> positions_of(const std::vector<SparsePoint>& points) {
+  std::vector<Vec3d> positions;
+  positions.reserve(points.size());
+  for (const SparsePoint& point : points) positions.push_back(point.position);
+  return positions;
+}
+
 /// What a source says about depth along the optical axis, in world units.
 struct DepthRange {
   double near = 0, far = 0;
@@ -30,7 +48,7 @@ struct Capture {
   std::filesystem::path root;
   std::string format;                     ///< "transforms", "colmap", "llff"
   std::vector<View> views;                ///< sorted by name within the source's own order; at least 2
-  std::vector<Vec3d> points;              ///< sparse points of structure from motion, world; may be empty
+  std::vector<SparsePoint> points;        ///< of structure from motion; may be empty
   std::optional<DepthRange> depth_range;  ///< LLFF's bounds
   std::optional<Aabbd> bounds;     ///< the source's own box around its subject ("aabb" of transforms.json), world
   bool is_bounded_object = false;  ///< every view has alpha: nothing outside the object matters

@@ -86,7 +86,7 @@ using Cameras = std::map<std::uint32_t, Intrinsics>;
 struct Registered {
   std::array<double, 4> quaternion{};  // w x y z
   Vec3d translation;
-  std::uint32_t camera = 0;
+  std::uint32_t number = 0, camera = 0;
   std::string name;
 };
 
@@ -114,7 +114,7 @@ std::vector<Registered> read_images_binary(const fs::path& file) {
   for (std::uint64_t i = 0; i < count; ++i) {
     const std::string field = "image " + std::to_string(i + 1) + " of " + std::to_string(count);
     Registered image;
-    in.next<std::uint32_t>(field);  // the image's own number
+    image.number = in.next<std::uint32_t>(field);
     for (double& q : image.quaternion) q = in.next<double>(field);
     for (int axis = 0; axis < 3; ++axis) image.translation[axis] = in.next<double>(field);
     image.camera = in.next<std::uint32_t>(field);
@@ -126,18 +126,23 @@ std::vector<Registered> read_images_binary(const fs::path& file) {
   return images;
 }
 
-std::vector<Vec3d> read_points_binary(const fs::path& file) {
+std::vector<SparsePoint> read_points_binary(const fs::path& file) {
   ByteReader in(file);
-  std::vector<Vec3d> points;
+  std::vector<SparsePoint> points;
   const auto count = in.next<std::uint64_t>("number of points");
   for (std::uint64_t i = 0; i < count; ++i) {
     const std::string field = "point " + std::to_string(i + 1) + " of " + std::to_string(count);
     in.next<std::uint64_t>(field);  // the point's own number
-    Vec3d point;
-    for (int axis = 0; axis < 3; ++axis) point[axis] = in.next<double>(field);
-    in.skip(3 + sizeof(double), 1, field);  // colour, reprojection error
-    in.skip(in.next<std::uint64_t>(field), 2 * sizeof(std::uint32_t), field);
-    points.push_back(point);
+    SparsePoint point;
+    for (int axis = 0; axis < 3; ++axis) point.position[axis] = in.next<double>(field);
+    in.skip(3, 1, field);  // colour
+    point.error = in.next<double>(field);
+    const auto length = in.next<std::uint64_t>(field);
+    for (std::uint64_t k = 0; k < length; ++k) {
+      point.views.push_back(in.next<std::uint32_t>(field));
+      in.next<std::uint32_t>(field);  // which of the image's observations
+    }
+    points.push_back(std::move(point));
   }
   return points;
 }
@@ -198,7 +203,7 @@ std::vector<Registered> read_images_text(const fs::path& file) {
     }
     std::istringstream in(lines[i].text);
     Registered image;
-    parse<std::uint32_t>(in, file, lines[i].field);
+    image.number = parse<std::uint32_t>(in, file, lines[i].field);
     for (double& q : image.quaternion) q = parse<double>(in, file, lines[i].field);
     for (int axis = 0; axis < 3; ++axis) image.translation[axis] = parse<double>(in, file, lines[i].field);
     image.camera = parse<std::uint32_t>(in, file, lines[i].field);
@@ -209,15 +214,21 @@ std::vector<Registered> read_images_text(const fs::path& file) {
   return images;
 }
 
-std::vector<Vec3d> read_points_text(const fs::path& file) {
-  std::vector<Vec3d> points;
+/// Number, position, colour, error, and pairs of an image and one of its observations.
+std::vector<SparsePoint> read_points_text(const fs::path& file) {
+  std::vector<SparsePoint> points;
   for (const Line& line : read_lines(file)) {
     if (is_blank(line.text)) continue;
     std::istringstream in(line.text);
     parse<std::uint64_t>(in, file, line.field);
-    Vec3d point;
-    for (int axis = 0; axis < 3; ++axis) point[axis] = parse<double>(in, file, line.field);
-    points.push_back(point);
+    SparsePoint point;
+    for (int axis = 0; axis < 3; ++axis) point.position[axis] = parse<double>(in, file, line.field);
+    double unused = 0;
+    std::uint32_t image = 0, observation = 0;
+    if (in >> unused >> unused >> unused >> point.error) {
+      while (in >> image >> observation) point.views.push_back(image);
+    }
+    points.push_back(std::move(point));
   }
   return points;
 }
@@ -242,11 +253,14 @@ std::vector<Registered> read_images(const fs::path& file) {
   return file.extension() == ".bin" ? read_images_binary(file) : read_images_text(file);
 }
 
-std::vector<Vec3d> read_points(const fs::path& folder) {
+std::vector<SparsePoint> read_points(const fs::path& folder) {
   const auto file = model_file(folder, "points3D");
   if (!file) return {};
-  std::vector<Vec3d> points = file->extension() == ".bin" ? read_points_binary(*file) : read_points_text(*file);
-  std::erase_if(points, [](Vec3d p) { return !std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z); });
+  std::vector<SparsePoint> points = file->extension() == ".bin" ? read_points_binary(*file) : read_points_text(*file);
+  std::erase_if(points, [](const SparsePoint& point) {
+    const auto [x, y, z] = point.position;
+    return !std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z) || !std::isfinite(point.error);
+  });
   return points;
 }
 
@@ -276,6 +290,7 @@ ListedView list_view(const Registered& image, const Cameras& cameras, const Mode
                      const fs::path& image_folder) {
   ListedView view;
   view.name = image.name;
+  view.number = image.number;
   view.field = "image " + image.name;
   view.poses_file = files.images;
   view.lens_file = files.cameras;

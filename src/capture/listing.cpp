@@ -1,6 +1,8 @@
 #include "src/capture/listing.h"
 
 #include <algorithm>
+#include <map>
+#include <set>
 #include <sstream>
 
 #include "src/capture/image_header.h"
@@ -47,6 +49,20 @@ const std::vector<std::string>& image_extensions() {
 
 bool is_image_file(const fs::path& file) {
   return std::ranges::count(image_extensions(), lower_extension(file)) > 0;
+}
+
+std::vector<SparsePoint> points_by_place(const CaptureListing& listing) {
+  std::map<std::uint32_t, std::uint32_t> places;
+  for (std::uint32_t i = 0; i < listing.views.size(); ++i) places[listing.views[i].number] = i;
+  std::vector<SparsePoint> points = listing.points;
+  for (SparsePoint& point : points) {
+    std::set<std::uint32_t> seen_by;
+    for (const std::uint32_t number : point.views) {
+      if (const auto place = places.find(number); place != places.end()) seen_by.insert(place->second);
+    }
+    point.views.assign(seen_by.begin(), seen_by.end());
+  }
+  return points;
 }
 
 }  // namespace cnerf

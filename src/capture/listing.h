@@ -17,6 +17,7 @@ struct ListedView {
   std::filesystem::path lens_file;   ///< the file that states the intrinsics, if it is another one; for messages
   std::filesystem::path image_file;  ///< may not exist
   std::filesystem::path mask_file;   ///< empty: none
+  std::uint32_t number = 0;          ///< by which points name it
   /// For the stated size. Without one (width 0) it is for the size of the image, and a principal point of
   /// `kCentred` is its centre; without a focal length (fx 0) that follows from the angles of view.
   Intrinsics intrinsics;
@@ -36,12 +37,15 @@ struct CaptureListing {
   std::filesystem::path source;  ///< the poses file or model folder
   std::string format;
   std::vector<ListedView> views;
-  std::size_t listed_images = 0;  ///< also those whose files do not exist
-  std::vector<Vec3d> points;
+  std::size_t listed_images = 0;    ///< also those whose files do not exist
+  std::vector<SparsePoint> points;  ///< `views` are numbers of listed views, in any order
   std::optional<DepthRange> depth_range;
   std::optional<Aabbd> bounds;
   std::vector<std::string> notes;
 };
+
+/// The points of a listing with views by their places instead of their numbers; those that are not listed are left out.
+[[nodiscard]] std::vector<SparsePoint> points_by_place(const CaptureListing& listing);
 
 /// Makes the poses of a listing rigid and notes how far off they were.
 /// @throws InputError  as `rigid_pose` does, naming the view.

@@ -292,15 +292,15 @@ Found find_views(const fs::path& path, const CaptureOptions& options) {
 }
 
 /// All but the views.
-Capture capture_without_views(Found&& found) {
+Capture capture_without_views(const Found& found) {
   Capture capture;
-  capture.root = std::move(found.root);
-  capture.format = std::move(found.listing.format);
-  capture.points = std::move(found.listing.points);
+  capture.root = found.root;
+  capture.format = found.listing.format;
+  capture.points = points_by_place(found.listing);
   capture.depth_range = found.listing.depth_range;
   capture.bounds = found.listing.bounds;
   capture.listed_images = int(found.listing.listed_images);
-  capture.notes = std::move(found.listing.notes);
+  capture.notes = found.listing.notes;
   return capture;
 }
 
@@ -308,8 +308,8 @@ Capture capture_without_views(Found&& found) {
 
 Capture survey_capture(const fs::path& path, const CaptureOptions& options) {
   Found found = find_views(path, options);
-  const std::vector<ListedView> listed = std::move(found.listing.views);
-  Capture capture = capture_without_views(std::move(found));
+  Capture capture = capture_without_views(found);
+  const std::vector<ListedView>& listed = found.listing.views;
   capture.views.resize(listed.size());
   parallel_tasks(listed.size(), [&](std::size_t i) {
     capture.views[i] = surveyed_view(listed[i], image_header(listed[i].image_file));
@@ -320,8 +320,8 @@ Capture survey_capture(const fs::path& path, const CaptureOptions& options) {
 Capture load_capture(const fs::path& path, const CaptureOptions& options) {
   const Transfer transfer = transfer_named(options.transfer);
   Found found = find_views(path, options);
-  const std::vector<ListedView> listed = std::move(found.listing.views);
-  Capture capture = capture_without_views(std::move(found));
+  Capture capture = capture_without_views(found);
+  const std::vector<ListedView>& listed = found.listing.views;
   load_views(listed, transfer, capture);
   if (options.cut_out_of_black && !capture.depth_range && cut_out_of_black(capture.views)) {
     capture.notes.push_back(

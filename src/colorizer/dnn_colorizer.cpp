@@ -14,8 +14,8 @@ namespace fs = std::filesystem;
 
 class DnnColorizer final : public NetworkColorizer {
  public:
-  DnnColorizer(std::string name, NetworkContract contract, cv::dnn::Net network)
-      : NetworkColorizer(std::move(name), std::move(contract)), network_(std::move(network)) {
+  DnnColorizer(std::string name, NetworkContract contract, const cv::dnn::Net& network)
+      : NetworkColorizer(std::move(name), std::move(contract)), network_(network) {
     network_.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
     network_.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
   }

@@ -177,7 +177,7 @@ ChromaBatch chroma_of(const NetworkContract& contract, const Planes& raw, const 
 
 fs::path find_spec_file(const std::string& name, const ColorizerRequest& request) {
   const fs::path& folder = request.context.working_folder;
-  const fs::path beside = folder / name;
+  fs::path beside = folder / name;
   if (!folder.empty() && fs::exists(beside)) return beside;
   if (fs::exists(name)) return name;
   std::string message = "colorizer \"" + request.options.spec + "\": no file " + name;

@@ -16,6 +16,7 @@
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/picture_files.h"
 #include "src/pipeline/render_step.h"
+#include "src/prepare/sparse_points.h"
 #include "src/render/camera_path.h"
 #include "src/train/chroma/color_model.h"
 #include "src/train/luminance/luminance_model.h"
@@ -80,7 +81,11 @@ Stage1Report train_measured(const Subject& subject, const Stage1Options& options
   const MarchSettings march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
   const WatchedEngines watched(engines);
   LearningCurve curve("stage 1", observer, [&] { return pixels.psnr(watched.luminance(), march); });
-  const Stage1Report report = train_stage1({subject.capture, options, snapshot, true}, watched, curve);
+  Stage1Job job{subject.capture, options, snapshot, true};
+  if (options.free_space && !fs::exists(snapshot)) {
+    job.points = prepare::points_for_training(subject.capture, observer);
+  }
+  const Stage1Report report = train_stage1(job, watched, curve);
   // The engine is gone; what it came to is in the snapshot. What an earlier part of the training took comes first.
   const double before = curve.points().empty() ? report.seconds : report.seconds - curve.seconds();
   std::vector<LearningPoint> points = curve.points();

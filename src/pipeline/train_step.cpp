@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "src/base/text.h"
+#include "src/prepare/sparse_points.h"
 #include "src/train/luminance/stage1.h"
 
 namespace cnerf::pipeline {
@@ -12,7 +13,9 @@ void train_step(const RunContext& context, bool resume, const Engines& engines, 
   const FolderLock lock = lock_folder(directory.root(), FolderLock::Mode::kAlone, observer);
   RunRecord record = directory.record();
   if (!record.stage1.finished || !resume) {
-    const Stage1Job job{context.capture, context.config.stage1, directory.stage1_snapshot(), resume};
+    Stage1Job job{context.capture, context.config.stage1, directory.stage1_snapshot(), resume};
+    const bool is_begun = resume && std::filesystem::exists(job.snapshot);
+    if (job.options.free_space && !is_begun) job.points = prepare::points_for_training(context.capture, observer);
     record.stage1 = {train_stage1(job, engines, observer), true};
     directory.save(record);
   }

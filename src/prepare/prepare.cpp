@@ -86,7 +86,7 @@ Poses poses_of_model(const fs::path& model, const fs::path& capture, const std::
   Poses out;
   out.model = model;
   CaptureListing listing = read_colmap(capture, model);
-  out.points = std::move(listing.points);
+  out.points = positions_of(listing.points);
   for (const ListedView& listed : listing.views) {
     const auto found = by_name.find(fs::path(listed.name).stem().string());
     if (found == by_name.end()) continue;

@@ -3,10 +3,11 @@
 // `samples` the marks are millions of trained samples instead, which do not depend on what else the machine does.
 //
 //   reconstruction CAPTURE [downscale=1] [holdout=8] [seconds=60] [option=value ...]
-//   reconstruction CAPTURE [downscale=1] [holdout=8] samples=70,140,340 [option=value ...]
+//   reconstruction CAPTURE [downscale=1] [holdout=8] samples=70,140,340 [pictures=FOLDER] [option=value ...]
 //
-// With `validation=N` every N-th of the views to be trained on is judged instead of the held-out ones.
-// Options are stage 1's by their short names, e.g. grid.log2_rows=16 steps_per_box=512 samples_per_step=65536.
+// With `points=1` sparse points are triangulated first. With `validation=N` every N-th of the views to be trained on is
+// judged instead of the held-out ones. Options are stage 1's by their short names, e.g. grid.log2_rows=16
+// steps_per_box=512 samples_per_step=65536.
 
 #include <algorithm>
 #include <chrono>
@@ -20,8 +21,10 @@
 
 #include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
+#include "src/prepare/sparse_points.h"
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/options_json.h"
+#include "tests/support/held_out_views.h"
 #include "tests/support/occupied_share.h"
 #include "tests/support/validation_fold.h"
 
@@ -81,6 +84,22 @@ double held_out_psnr(const cnerf::Capture& capture, const cnerf::LuminanceModel&
   return views > 0 ? total / views : 0;
 }
 
+/// Triangulates sparse points, in place of those of the file.
+void print_points(cnerf::Capture& capture) {
+  const Clock::time_point start = Clock::now();
+  capture.points = cnerf::prepare::find_sparse_points(capture);
+  std::size_t of_three = 0, sightings = 0;
+  double error = 0;
+  for (const cnerf::SparsePoint& point : capture.points) {
+    of_three += point.views.size() >= 3 ? 1 : 0;
+    sightings += point.views.size();
+    error += point.error;
+  }
+  const auto all = double(std::max<std::size_t>(1, capture.points.size()));
+  std::printf("%zu points, %zu of three views or more, %.2f views each, %.3f pixels off, in %.1f s\n",
+              capture.points.size(), of_three, double(sightings) / all, error / all, seconds_since(start));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -88,8 +107,9 @@ int main(int argc, char** argv) {
     std::puts("reconstruction CAPTURE [downscale=N] [holdout=N] [seconds=S | samples=M,...] [option=value ...]");
     return 64;
   }
-  std::map<std::string, double> own = {{"downscale", 1}, {"holdout", 8},  {"seconds", 60},  {"eval_every", 1},
-                                       {"verbose", 0},   {"first", 0.25}, {"validation", 0}};
+  std::map<std::string, double> own = {{"downscale", 1}, {"holdout", 8}, {"seconds", 60}, {"eval_every", 1},
+                                       {"verbose", 0},   {"points", 0},  {"first", 0.25}, {"validation", 0}};
+  std::string pictures;       // a folder for what is seen of the held-out views
   std::vector<double> marks;  // of the training's length: million samples if given, else seconds
   nlohmann::json json = cnerf::options_to_json(cnerf::Stage1Options{});
   for (int i = 2; i < argc; ++i) {
@@ -99,6 +119,8 @@ int main(int argc, char** argv) {
     if (key == "samples") {
       std::stringstream list(value);
       for (std::string mark; std::getline(list, mark, ',');) marks.push_back(std::stod(mark));
+    } else if (key == "pictures") {
+      pictures = value;
     } else if (own.count(key) > 0) {
       own[key] = std::stod(value);
     } else {
@@ -116,6 +138,7 @@ int main(int argc, char** argv) {
   capture_options.holdout = int(own["holdout"]);
   cnerf::Capture capture = cnerf::load_capture(argv[1], capture_options);
   if (own["validation"] > 0) cnerf::test::hold_out_of_training(capture, int(own["validation"]));
+  if (own["points"] > 0) print_points(capture);
   cnerf::LuminanceModel model = cnerf::LuminanceModel::create(capture, options, cnerf::cpu_engines());
   const auto views = cnerf::training_views(capture, model.frame);
   model.engine->set_views(views);
@@ -159,7 +182,7 @@ int main(int argc, char** argv) {
   for (const auto& [name, effort] : {std::pair("every sample shaded", all), std::pair("as pictures are", quick)}) {
     const Clock::time_point start = Clock::now();
     std::vector<float> transmittance;
-    const double psnr = held_out_psnr(capture, model, 1, effort, &transmittance);
+    const double psnr = held_out_psnr(capture, model, int(own["eval_every"]), effort, &transmittance);
     const auto middle = transmittance.begin() + std::ptrdiff_t(transmittance.size() / 2);
     std::nth_element(transmittance.begin(), middle, transmittance.end());
     const auto held_out =
@@ -167,5 +190,7 @@ int main(int argc, char** argv) {
     std::printf("rendered, %s: %.3f dB, %.2f s a view, median transmittance %.5f\n", name, psnr,
                 seconds_since(start) / double(held_out), *middle);
   }
+  cnerf::test::print_held_out(
+      cnerf::test::judge_held_out(capture, model.frame, *model.engine, model.march(), quick, pictures));
   return 0;
 }

@@ -36,7 +36,7 @@ TEST_F(Colmap, ReadsBinaryModels) {
   expect_ring(capture, 4);
   EXPECT_EQ(capture.views[0].intrinsics.fy, 21);
   ASSERT_EQ(capture.points.size(), 2u);
-  EXPECT_EQ(capture.points[1], (Vec3d{1.5, -1, 2}));
+  EXPECT_EQ(capture.points[1], (SparsePoint{{1.5, -1, 2}, 0.7, {0}}));
 }
 
 TEST_F(Colmap, TextSaysTheSame) {

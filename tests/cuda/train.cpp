@@ -5,9 +5,9 @@
 
 #include "src/base/cuda/device_memory.h"
 
-#include "src/color/colorspace_math.h"
 #include "tests/cuda/check.h"
 #include "tests/cuda/packed_capture.h"
+#include "tests/support/held_out_views.h"
 #include "tests/support/occupied_share.h"
 
 namespace cnerf::test {
@@ -29,22 +29,10 @@ std::size_t free_bytes() {
 double held_out_psnr(const PackedCapture& packed, const LuminanceEngine& engine, const MarchSettings& march,
                      double min_transmittance) {
   double total = 0;
-  int views = 0;
-  for (const View& view : packed.capture.views) {
-    if (!view.held_out) continue;
-    const UnitCamera camera(view.intrinsics, view.world_from_camera, packed.frame);
-    std::vector<RayResult> results(view.image.pixel_count());
-    engine.render_view(camera, march, {float(min_transmittance)}, results);
-    double squared = 0;
-    for (std::size_t p = 0; p < results.size(); ++p) {
-      const float seen = srgb_from_linear(std::clamp(results[p].luminance, 0.0f, 1.0f));
-      const float truth = srgb_from_linear(std::clamp(view.image.luminance(p), 0.0f, 1.0f));
-      squared += (seen - truth) * (seen - truth);
-    }
-    total += -10 * std::log10(std::max(squared / double(results.size()), 1e-10));
-    ++views;
-  }
-  return views > 0 ? total / views : 0;
+  const std::vector<HeldOutView> views =
+      judge_held_out(packed.capture, packed.frame, engine, march, {float(min_transmittance)});
+  for (const HeldOutView& view : views) total += view.as_given;
+  return views.empty() ? 0 : total / double(views.size());
 }
 
 /// @param near  unit space; what is nearer to a camera is empty as well
@@ -106,6 +94,11 @@ int train(const Arguments& arguments) {
                 double(engine.step_count()) / elapsed, rays / double(engine.step_count()), trained / rays,
                 double(free_before - free_bytes()) / (1 << 20),
                 occupied_share(engine.occupancy(), {options.occupancy.resolution, options.cascades}));
+    if (arguments.number("views", 0) > 0) {
+      const std::string pictures = seed == 1 ? arguments.text("pictures", "") : "";
+      print_held_out(judge_held_out(packed.capture, packed.frame, engine, options.march,
+                                    {float(arguments.number("min_transmittance", 1e-3))}, pictures));
+    }
   }
   return 0;
 }

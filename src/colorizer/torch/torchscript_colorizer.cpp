@@ -1,5 +1,6 @@
 // torchscript:FILE, a scripted LibTorch module; docs/colorizers.md describes FILE.toml.
 
+#include <ATen/Parallel.h>
 #include <fmt/format.h>
 #include <torch/script.h>
 #include <torch/version.h>

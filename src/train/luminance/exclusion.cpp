@@ -51,12 +51,14 @@ std::vector<SeeingView> seeing_views(const Capture& capture, const SceneFrame& f
 
 }  // namespace
 
-void exclude_unseen(const Capture& capture, const SceneFrame& frame, LuminanceEngine& engine) {
+void exclude_empty(const Capture& capture, const SceneFrame& frame, const FreeSpace& free_space,
+                   LuminanceEngine& engine) {
   const std::vector<SeeingView> views = seeing_views(capture, frame);
   const auto agreeing = std::min(kAgreeingViews, std::ptrdiff_t(views.size()) / kViewsPerVote);
   const double world_per_unit = 1.0 / frame.unit_per_world;
   const double near = capture.depth_range ? kNearShare * capture.depth_range->near : 0.0;
   engine.exclude([&](Vec3f centre, float radius) {
+    if (free_space.holds(frame.world_from_unit(centre.cast<double>()), double(radius) * world_per_unit)) return false;
     std::ptrdiff_t seeing_in_front = 0;
     for (const SeeingView& view : views) {
       const Ball ball{view.camera_from_unit.point(centre.cast<double>()), double(radius) * world_per_unit};

@@ -104,12 +104,18 @@ SceneFrame frame_from_json(const nlohmann::json& json) {
 }
 
 LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options, const Engines& engines) {
+  return create(capture, options, engines, capture.points);
+}
+
+LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options, const Engines& engines,
+                                      const std::vector<SparsePoint>& points) {
   LuminanceModel model;
   model.frame = place_scene(capture, options.placement);
   model.options = options;
   model.max_luminance = brightest(capture);
   model.engine = make_engine(model.frame, options, model.max_luminance, engines);
-  exclude_unseen(capture, model.frame, *model.engine);
+  const auto known = options.free_space ? points : std::vector<SparsePoint>();
+  exclude_empty(capture, model.frame, FreeSpace(capture.views, known), *model.engine);
   return model;
 }
 

@@ -21,8 +21,10 @@ struct LuminanceModel {
   double trained_samples = 0;  ///< so far
   std::unique_ptr<LuminanceEngine> engine;
 
-  /// A fresh model for a capture.
+  /// A fresh model for a capture. The second form knows more points than the capture brings.
   static LuminanceModel create(const Capture& capture, const Stage1Options& options, const Engines& engines);
+  static LuminanceModel create(const Capture& capture, const Stage1Options& options, const Engines& engines,
+                               const std::vector<SparsePoint>& points);
   /// @throws MissingInputError, SnapshotError
   static LuminanceModel load(const std::filesystem::path& snapshot, const Engines& engines);
   /// Only what it was trained with.  @throws MissingInputError, SnapshotError

@@ -25,8 +25,9 @@ void check_continues(const std::filesystem::path& snapshot, const Stage1Options&
 struct Stage1Job {
   const Capture& capture;
   const Stage1Options& options;
-  std::filesystem::path snapshot;  ///< that the result goes to
-  bool resume = false;             ///< go on with the snapshot, if there is one
+  std::filesystem::path snapshot;        ///< that the result goes to
+  bool resume = false;                   ///< go on with the snapshot, if there is one
+  std::vector<SparsePoint> points = {};  ///< in place of the capture's, which has none
 };
 
 /// Trains and leaves the result in the job's snapshot. What the observer takes is no training time; previews show

@@ -29,6 +29,7 @@ struct Stage1Options {
   double distortion_weight = 3e-4;
   int steps_per_box = 256;
   double cone_angle = 1.0 / 64;
+  bool free_space = true;
   int checkpoint_every = 1000;
   int seed = 1;
   HashGridOptions grid = {.decay = 0.1};
@@ -48,6 +49,8 @@ struct Stage1Options {
       "of a loss on how far apart the samples of a ray lie: against fog and floaters");
     v("steps_per_box", steps_per_box, Range{16, 8192}, "march steps across the side of the innermost cascade");
     v("cone_angle", cone_angle, Range{1e-4, 1}, "march step over distance, in scenes of several cascades");
+    v("free_space", free_space,
+      "space before sparse points is empty; they are found first where a capture has none and nothing else bounds it");
     v("checkpoint_every", checkpoint_every, Range{0, 1e8}, "steps between snapshots; 0 = only at the end");
     v("seed", seed, Range{0, 1e9}, "of weights, rays and jitter");
     v.section("grid", grid);

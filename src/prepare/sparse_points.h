@@ -1,0 +1,22 @@
+#pragma once
+/// Sparse points of a capture whose poses are known: features of its training views, matched along epipolar lines and
+/// triangulated with the poses held.
+
+#include <vector>
+
+#include "src/base/observer.h"
+#include "src/base/progress.h"
+#include "src/capture/capture.h"
+
+namespace cnerf::prepare {
+
+/// Held-out views are not looked at. The same capture gives the same points.
+/// @return  points that at least three views show, from directions that differ
+/// @throws Interrupted
+[[nodiscard]] std::vector<SparsePoint> find_sparse_points(const Capture& capture, const ProgressSink& progress = {});
+
+/// What stage 1 is to know besides the capture: its points, where it has none of its own and neither outlines nor a depth
+/// range tell which space is free. Says how many were found.
+[[nodiscard]] std::vector<SparsePoint> points_for_training(const Capture& capture, Observer& observer);
+
+}  // namespace cnerf::prepare

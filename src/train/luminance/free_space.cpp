@@ -1,0 +1,113 @@
+#include "src/train/luminance/free_space.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cnerf {
+namespace {
+
+constexpr double kLargestError = 2;         // pixels, of a point that is believed
+constexpr std::size_t kShortestTrack = 3;   // views
+constexpr int kVotes = 2;                   // views that have to see through a place
+constexpr int kAcross = 64;                 // cells of a sight along the longer side of its picture
+constexpr double kWayRadius = 2.5;          // cells around a point that its view sees through as well
+constexpr double kWayShare = 0.9;           // of the way to a point: points are not exact, surfaces between them bend
+constexpr double kNearShare = 0.8;          // of the distance to the nearest of what a view shows
+constexpr double kNearQuantile = 0.02;      // of its points, which counts as the nearest: some points are wrong
+constexpr std::size_t kFewestPoints = 20;   // of a view that knows what is nearest
+
+/// Of the picture's corner farthest from the axis.
+double least_cosine_of(const Intrinsics& lens) {
+  double least = 1;
+  for (const double x : {0.0, double(lens.width)}) {
+    for (const double y : {0.0, double(lens.height)}) least = std::min(least, ray_direction(lens, {x, y}).z);
+  }
+  return least;
+}
+
+}  // namespace
+
+FreeSpace::Sight::Sight(const View& view, const std::vector<Vec3d>& shown)
+    : camera_from_world_(view.world_from_camera.inverse()),
+      lens_(&view.intrinsics),
+      cells_per_pixel_(double(kAcross) / std::max(lens_->width, lens_->height)),
+      width_(std::max(1, int(std::ceil(lens_->width * cells_per_pixel_)))),
+      height_(std::max(1, int(std::ceil(lens_->height * cells_per_pixel_)))),
+      clear_depth_(std::size_t(width_) * std::size_t(height_), 0.0f),
+      least_cosine_(least_cosine_of(*lens_)) {
+  std::vector<double> depths;
+  for (const Vec3d& point : shown) {
+    const Vec3d at = camera_from_world_.point(point);
+    const auto pixel = project(*lens_, at);
+    if (!pixel) continue;
+    depths.push_back(at.z);
+    clear_way_to(*pixel, at.z);
+  }
+  if (depths.size() >= kFewestPoints) clear_the_near(std::move(depths));
+}
+
+/// Where ways cross in the picture, the nearer point tells.
+void FreeSpace::Sight::clear_way_to(PixelPosition pixel, double depth) {
+  const double x = pixel.x * cells_per_pixel_, y = pixel.y * cells_per_pixel_;
+  const auto clear = float(kWayShare * depth);
+  for (int v = std::max(0, int(y - kWayRadius)); v < std::min<double>(height_, y + kWayRadius); ++v) {
+    for (int u = std::max(0, int(x - kWayRadius)); u < std::min<double>(width_, x + kWayRadius); ++u) {
+      if (std::hypot(u + 0.5 - x, v + 0.5 - y) > kWayRadius) continue;
+      float& known = clear_depth_[std::size_t(v) * std::size_t(width_) + std::size_t(u)];
+      known = known == 0 ? clear : std::min(known, clear);
+    }
+  }
+}
+
+void FreeSpace::Sight::clear_the_near(std::vector<double> depths) {
+  const auto nearest = depths.begin() + std::ptrdiff_t(kNearQuantile * double(depths.size()));
+  std::ranges::nth_element(depths, nearest);
+  near_ = kNearShare * *nearest;
+  for (float& known : clear_depth_) known = known == 0 ? float(near_) : known;
+}
+
+bool FreeSpace::Sight::sees_through(Vec3d centre, double radius) const {
+  const Vec3d at = camera_from_world_.point(centre);
+  const auto pixel = at.z > radius ? project(*lens_, at) : std::nullopt;
+  const double x = pixel ? pixel->x * cells_per_pixel_ : -1, y = pixel ? pixel->y * cells_per_pixel_ : -1;
+  if (x < 0 || y < 0 || x >= width_ || y >= height_) return is_near_lens(at, radius);
+  const double reach = radius / at.z * lens_->fx * cells_per_pixel_;
+  for (int v = std::max(0, int(y - reach)); v <= std::min(height_ - 1, int(y + reach)); ++v) {
+    for (int u = std::max(0, int(x - reach)); u <= std::min(width_ - 1, int(x + reach)); ++u) {
+      if (at.z + radius >= clear_depth_[std::size_t(v) * std::size_t(width_) + std::size_t(u)]) return false;
+    }
+  }
+  return true;
+}
+
+/// Beside the picture: a wall along the way of view is farther off where it enters the picture, by the sine of the
+/// angle of view.
+bool FreeSpace::Sight::is_near_lens(Vec3d at, double radius) const {
+  const double distance = length(at);
+  const bool is_ahead = at.z > least_cosine_ * distance;
+  const double near = is_ahead ? near_ : near_ * std::sqrt(1 - least_cosine_ * least_cosine_);
+  return at.z + radius > 0 && distance + radius < near;
+}
+
+FreeSpace::FreeSpace(const std::vector<View>& views, const std::vector<SparsePoint>& points) {
+  std::vector<std::vector<Vec3d>> shown(views.size());
+  for (const SparsePoint& point : points) {
+    if (point.error > kLargestError || point.views.size() < kShortestTrack) continue;
+    points_.push_back(point.position);
+    for (const std::uint32_t view : point.views) shown[view].push_back(point.position);
+  }
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    if (!views[i].held_out && !shown[i].empty()) sights_.emplace_back(views[i], shown[i]);
+  }
+}
+
+bool FreeSpace::holds(Vec3d centre, double radius) const {
+  int votes = 0;
+  for (const Sight& sight : sights_) {
+    if (votes < kVotes && sight.sees_through(centre, radius)) ++votes;
+  }
+  const auto is_inside = [&](Vec3d point) { return length(point - centre) < radius; };
+  return votes >= kVotes && std::ranges::none_of(points_, is_inside);
+}
+
+}  // namespace cnerf

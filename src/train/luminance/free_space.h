@@ -1,0 +1,47 @@
+#pragma once
+/// Space that sparse points prove empty.
+
+#include <vector>
+
+#include "src/capture/capture.h"
+
+namespace cnerf {
+
+/// A view that shows a sparse point sees through all that lies between: space around the way to it is empty, and what is
+/// nearer to the lens than all that the view shows. Views vote. Held-out views do not, and without points nothing is
+/// known. What has no features at all, such as a white thing before a picture's nearest point, is not protected.
+class FreeSpace {
+ public:
+  /// Refers to the views.  @param points  their `views` are places in `views`
+  FreeSpace(const std::vector<View>& views, const std::vector<SparsePoint>& points);
+
+  /// Whether enough views see through the whole ball, and no point lies in it. World space.
+  [[nodiscard]] bool holds(Vec3d centre, double radius) const;
+
+ private:
+  /// What a view sees through: a small picture of depths along its axis, up to which all is empty.
+  class Sight {
+   public:
+    Sight(const View& view, const std::vector<Vec3d>& shown);
+    [[nodiscard]] bool sees_through(Vec3d centre, double radius) const;
+
+   private:
+    /// @param at  in the camera's axes, not in its picture or partly behind its lens
+    [[nodiscard]] bool is_near_lens(Vec3d at, double radius) const;
+    void clear_way_to(PixelPosition pixel, double depth);
+    void clear_the_near(std::vector<double> depths);
+
+    Affined camera_from_world_;
+    const Intrinsics* lens_;
+    double cells_per_pixel_ = 0;
+    int width_ = 0, height_ = 0;
+    std::vector<float> clear_depth_;  ///< [height, width], world units; 0: nothing is known
+    double near_ = 0;                 ///< nothing that the view shows is nearer to its lens, world units
+    double least_cosine_ = 1;         ///< of what the lens sees, to its axis
+  };
+
+  std::vector<Sight> sights_;
+  std::vector<Vec3d> points_;
+};
+
+}  // namespace cnerf

@@ -1,0 +1,110 @@
+/// Sparse points of a textured plane, whose place is known, and of a real capture.
+
+#include "src/prepare/sparse_points.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/base/rng.h"
+#include "src/capture/load_capture.h"
+#include "tests/support/data.h"
+
+namespace cnerf::prepare {
+namespace {
+
+/// Smooth noise: blobs of every size from a tenth of a unit on.
+double texture_at(double x, double y) {
+  double value = 0;
+  for (int octave = 0; octave < 4; ++octave) {
+    const double scale = 3 << octave;
+    const CounterRng rng(1, std::uint64_t(octave));
+    const auto corner = [&](int i, int j) { return rng.uniform(std::uint64_t(i + 4096) * 8192 + std::uint64_t(j + 4096)); };
+    const int i = int(std::floor(x * scale)), j = int(std::floor(y * scale));
+    const double u = x * scale - i, v = y * scale - j;
+    value += ((1 - u) * (1 - v) * corner(i, j) + u * (1 - v) * corner(i + 1, j) + (1 - u) * v * corner(i, j + 1) +
+              u * v * corner(i + 1, j + 1)) / 4;
+  }
+  return value;
+}
+
+/// Cameras in a row that look down on the plane z = 0 from two units above.
+Capture plane_capture(int views) {
+  Capture capture;
+  for (int i = 0; i < views; ++i) {
+    View view;
+    view.name = std::to_string(i);
+    view.intrinsics.width = view.image.width = 200;
+    view.intrinsics.height = view.image.height = 160;
+    view.intrinsics.fx = view.intrinsics.fy = 180;
+    view.intrinsics.cx = 100;
+    view.intrinsics.cy = 80;
+    // x to the right, y down the picture, z along the axis: downwards.
+    view.world_from_camera = {Mat3d::from_columns({1, 0, 0}, {0, -1, 0}, {0, 0, -1}), {0.25 * i, 0.1 * (i % 2), 2}};
+    for (std::size_t p = 0; p < view.image.pixel_count(); ++p) {
+      const PixelPosition pixel{double(p % 200) + 0.5, std::floor(double(p) / 200) + 0.5};
+      const Vec3d d = view.world_from_camera.direction(ray_direction(view.intrinsics, pixel));
+      const Vec3d at = view.world_from_camera.translation + d * (2 / -d.z);
+      view.image.u8.push_back(std::uint8_t(std::lround(255 * texture_at(at.x, at.y))));
+    }
+    capture.views.push_back(std::move(view));
+  }
+  return capture;
+}
+
+TEST(SparsePoints, LieOnThePlaneThatThePicturesShow) {
+  Capture capture = plane_capture(8);
+  capture.views[3].held_out = true;
+  const std::vector<SparsePoint> points = find_sparse_points(capture);
+  ASSERT_GT(points.size(), 50u);
+  std::vector<double> heights;
+  for (const SparsePoint& point : points) {
+    EXPECT_GE(point.views.size(), 3u);
+    EXPECT_TRUE(std::ranges::is_sorted(point.views));
+    EXPECT_EQ(std::ranges::count(point.views, 3u), 0) << "held out";
+    EXPECT_LT(point.error, 4);
+    heights.push_back(std::abs(point.position.z));
+  }
+  std::ranges::sort(heights);
+  EXPECT_LT(heights[heights.size() / 2], 0.01);
+  EXPECT_LT(heights[heights.size() * 9 / 10], 0.05);
+  EXPECT_EQ(find_sparse_points(capture), points) << "the same each time";
+}
+
+TEST(SparsePoints, WrongPosesMakeFew) {
+  Capture capture = plane_capture(8);
+  const std::size_t right = find_sparse_points(capture).size();
+  for (std::size_t i = 0; i < 8; ++i) capture.views[i].world_from_camera.translation.y += 0.3 * double(i * i % 5);
+  EXPECT_LT(find_sparse_points(capture).size(), right / 2);
+}
+
+TEST(SparsePoints, AreNotLookedForWhereOutlinesOrDepthBoundSpace) {
+  Observer observer;
+  Capture capture = plane_capture(4);
+  EXPECT_FALSE(points_for_training(capture, observer).empty());
+  capture.is_bounded_object = true;
+  EXPECT_TRUE(points_for_training(capture, observer).empty());
+  capture.is_bounded_object = false;
+  capture.depth_range = {1, 3};
+  EXPECT_TRUE(points_for_training(capture, observer).empty());
+  capture.depth_range.reset();
+  capture.points = {{{0, 0, 0}, 0.5, {0, 1, 2}}};
+  EXPECT_TRUE(points_for_training(capture, observer).empty()) << "it has its own";
+}
+
+TEST(SparsePoints, OfARealCapture) {
+  CNERF_REQUIRE_DATA(fox, "scenes/fox");
+  CaptureOptions options;
+  options.downscale = 4;
+  options.holdout = 8;
+  const Capture capture = load_capture(fox, options);
+  const std::vector<SparsePoint> points = find_sparse_points(capture);
+  EXPECT_GT(points.size(), 1000u);
+  for (const SparsePoint& point : points) {
+    for (const std::uint32_t view : point.views) ASSERT_FALSE(capture.views[view].held_out);
+  }
+}
+
+}  // namespace
+}  // namespace cnerf::prepare
