@@ -1,5 +1,6 @@
-// Included first where clang reads LibTorch's headers, which scripts/tidy.sh does. They hold vectors of a type that is not
-// complete yet; clang looks into functions of std::vector too early when these are constexpr, as they are since C++20.
+// Included first where clang reads LibTorch's headers, which scripts/tidy.sh does. They hold vectors of a type that is
+// not complete yet; clang looks into functions of std::vector too early when these are constexpr, as they are since
+// C++20.
 #pragma once
 
 #include <string>

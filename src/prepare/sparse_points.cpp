@@ -20,15 +20,15 @@
 namespace cnerf::prepare {
 namespace {
 
-constexpr int kLongestSide = 1000;  // pixels at which features are looked for; tolerances below are of these pixels
-constexpr int kFeatures = 2000;     // of a view, at most
-constexpr std::size_t kPartners = 16;      // that a view is matched with
-constexpr double kSeesAlike = 0.5;         // cosine of optical axes, below which views are not matched
-constexpr double kEpipolarDistance = 4;  // pixels off the epipolar line
-constexpr float kRatio = 0.85f;            // of the best and second-best distance of descriptors
-constexpr double kReprojection = 4;      // pixels off a picture's feature
+constexpr int kLongestSide = 1000;     // pixels at which features are looked for; tolerances below are of these pixels
+constexpr int kFeatures = 2000;        // of a view, at most
+constexpr std::size_t kPartners = 16;  // that a view is matched with
+constexpr double kSeesAlike = 0.5;     // cosine of optical axes, below which views are not matched
+constexpr double kEpipolarDistance = 4;                       // pixels off the epipolar line
+constexpr float kRatio = 0.85f;                               // of the best and second-best distance of descriptors
+constexpr double kReprojection = 4;                           // pixels off a picture's feature
 constexpr double kLeastAngle = 1.5 * std::numbers::pi / 180;  // between two of a point's rays
-constexpr std::size_t kFewestViews = 3;  // of a point: of two, one in many is a coincidence
+constexpr std::size_t kFewestViews = 3;                       // of a point: of two, one in many is a coincidence
 
 struct Feature {
   PixelPosition pixel;  ///< of the view's own picture
@@ -221,7 +221,8 @@ class Triangulator {
   }
   void take_partners(Sighting of, Vec3d position, std::vector<Sighting>& sightings) const {
     for (const Sighting partner : partners_[of.view][of.feature]) {
-      const bool is_new = !is_used(partner) && std::ranges::find(sightings, partner.view, &Sighting::view) == sightings.end();
+      const bool is_new =
+          !is_used(partner) && std::ranges::find(sightings, partner.view, &Sighting::view) == sightings.end();
       if (is_new && error_of(partner, position) < kReprojection) sightings.push_back(partner);
     }
   }

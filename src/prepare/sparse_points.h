@@ -15,8 +15,8 @@ namespace cnerf::prepare {
 /// @throws Interrupted
 [[nodiscard]] std::vector<SparsePoint> find_sparse_points(const Capture& capture, const ProgressSink& progress = {});
 
-/// What stage 1 is to know besides the capture: its points, where it has none of its own and neither outlines nor a depth
-/// range tell which space is free. Says how many were found.
+/// What stage 1 is to know besides the capture: its points, where it has none of its own and neither outlines nor a
+/// depth range tell which space is free. Says how many were found.
 [[nodiscard]] std::vector<SparsePoint> points_for_training(const Capture& capture, Observer& observer);
 
 }  // namespace cnerf::prepare

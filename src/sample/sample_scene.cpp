@@ -27,6 +27,10 @@ constexpr Vec3d kLookAt = {0, 0, 0.12};
 constexpr std::array<double, 3> kElevations = {20, 36, 53};  ///< degrees above the plate
 constexpr double kOrbitElevation = 32;
 constexpr int kTestEvery = 8;
+constexpr double kClothHeight = -0.1;
+constexpr double kShadowDistance = 1.1, kShadowRadius = 0.7, kShadowDepth = 0.6;
+constexpr double kExposureSpread = 0.3;
+constexpr std::uint64_t kExposureDraw = std::uint64_t(1) << 40;  // beyond those of pixels
 constexpr int kFirstReference = 1, kReferences = 3;  // training views; the golden angle puts them around the scene
 
 struct RenderedView {
@@ -70,6 +74,42 @@ bool is_test_view(int view, int views) {
   return views > 2 && view % kTestEvery == 0;
 }
 
+/// The first surface at a pixel's centre: an object, or the cloth below all of them.
+Vec3d place_at(const Intrinsics& intrinsics, const Affined& pose, std::size_t x, std::size_t y, double depth) {
+  const Vec3d direction = ray_direction(intrinsics, {double(x) + 0.5, double(y) + 0.5});
+  const Vec3d along = pose.direction(direction / direction.z);
+  return pose.translation + along * (depth > 0 ? depth : (kClothHeight - pose.translation.z) / along.z);
+}
+
+/// Linings in two directions and blotches, which fade into their mean where pixels no longer resolve them.
+Vec3d cloth_at(Vec3d place) {
+  const double lining = 0.5 + 0.25 * std::sin(9 * place.x) + 0.25 * std::sin(7 * place.y + 2 * place.x);
+  const double blotch = sample::noise(place * 6.0, 3);
+  return Vec3d{0.34, 0.30, 0.26} * (0.4 + 0.6 * lining) * (0.5 + blotch);
+}
+
+/// How much light reaches a place beside the photographer, who stands at `pose`.
+double shadow_at(Vec3d place, const Affined& pose) {
+  const Vec3d outward = normalized(Vec3d{pose.translation.x, pose.translation.y, 0});
+  const double distance = length(Vec3d{place.x, place.y, 0} - outward * kShadowDistance);
+  return 1 - kShadowDepth * std::exp(-std::pow(distance / kShadowRadius, 2));
+}
+
+void lay_on_cloth(const Intrinsics& intrinsics, const Affined& pose, bool in_shadow, RenderedView& view) {
+  for (std::size_t p = 0; p < view.color.size(); ++p) {
+    PixelColor& color = view.color[p];
+    const std::size_t x = p % std::size_t(intrinsics.width), y = p / std::size_t(intrinsics.width);
+    const Vec3d cloth = cloth_at(place_at(intrinsics, pose, x, y, 0));
+    const Vec3d place = place_at(intrinsics, pose, x, y, view.depth[p]);
+    const double light = in_shadow ? shadow_at(place, pose) : 1;
+    color = {(color.rgb + cloth * (1 - color.alpha)) * light, 1};
+  }
+}
+
+void expose(double gain, RenderedView& view) {
+  for (PixelColor& color : view.color) color.rgb = color.rgb * gain;
+}
+
 RenderedView render_view(const SampleSceneOptions& options, int view) {
   const Intrinsics intrinsics = camera_of(options);
   const Affined pose = pose_of(options, view);
@@ -85,6 +125,8 @@ RenderedView render_view(const SampleSceneOptions& options, int view) {
       out.depth[pixel] = sample::depth_of_pixel(intrinsics, pose, int(x), int(y));
     }
   });
+  if (options.cloth || options.moving_shadow) lay_on_cloth(intrinsics, pose, options.moving_shadow, out);
+  if (options.exposures) expose(1 + kExposureSpread * (2 * double(seeds.uniform(kExposureDraw)) - 1), out);
   return out;
 }
 

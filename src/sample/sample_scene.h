@@ -14,6 +14,7 @@ struct SampleSceneOptions {
   std::string path = "around";
   int width = 320, height = 240;
   int samples_per_pixel = 16;
+  bool cloth = false, moving_shadow = false, exposures = false;
   int seed = 1;
 
   template <typename Visitor>
@@ -24,13 +25,17 @@ struct SampleSceneOptions {
     v("width", width, Range{16, 4096}, "pixels");
     v("height", height, Range{16, 4096}, "pixels");
     v("samples_per_pixel", samples_per_pixel, Range{1, 1024}, "square number of stratified samples");
+    v("cloth", cloth, "a cloth under the plate as far as one sees: nothing is cut out");
+    v("moving_shadow", moving_shadow, "on a cloth, with the photographer's shadow, which moves from view to view");
+    v("exposures", exposures, "each view exposed anew, by up to 30 % more or less light, as telephones do");
   }
 };
 
 /// Writes a capture a user could have made: `images/*.png` (grey), `transforms.json` (with bounds and a train/test
 /// split of every 8th view); beside it `color/*.png` (ground truth, same names), `depth/*.exr` (distance along the
 /// optical axis, world units, 0 = nothing hit) and `references/*.png`, three colour views from around the scene that
-/// serve as `reference:`. Same options, same bytes, on any number of threads.
+/// serve as `reference:`. Shadow and exposures are in the grey pictures and in the ground truth. Same options, same
+/// bytes, on any number of threads.
 void write_sample_scene(const std::filesystem::path& folder, const SampleSceneOptions& options,
                         const ProgressSink& progress = {});
 

@@ -228,5 +228,57 @@ INSTANTIATE_TEST_SUITE_P(All, Shapes,
                                          sample::ShapeKind::kCylinder, sample::ShapeKind::kCone,
                                          sample::ShapeKind::kCapsule, sample::ShapeKind::kTorus));
 
+Capture disturbed(const SampleSceneOptions& options) {
+  const test::TempDir folder;
+  write_sample_scene(folder.path(), options);
+  return load_capture(folder.path());
+}
+
+TEST(SampleScene, AClothLeavesNothingCutOut) {
+  SampleSceneOptions options = kSmall;
+  options.cloth = true;
+  const Capture capture = disturbed(options);
+  EXPECT_FALSE(capture.is_bounded_object);
+  for (const View& view : capture.views) {
+    for (std::size_t p = 0; p < view.image.pixel_count(); ++p) ASSERT_EQ(view.image.coverage(p), 1) << view.name;
+  }
+}
+
+/// Light of a view over that of the same view undisturbed, pixel by pixel.
+std::vector<double> ratios(const View& view, const View& undisturbed) {
+  std::vector<double> out;
+  for (std::size_t p = 0; p < view.image.pixel_count(); ++p) {
+    const double before = undisturbed.image.luminance(p);
+    if (before > 0.1 && before < 0.7) out.push_back(view.image.luminance(p) / before);  // not coarse, not clipped
+  }
+  return out;
+}
+
+TEST(SampleScene, ExposuresScaleAViewAndTheShadowDimsAPartOfIt) {
+  SampleSceneOptions options = kSmall;
+  options.cloth = true;
+  const Capture plain = disturbed(options);
+  options.exposures = true;
+  const Capture exposed = disturbed(options);
+  options.exposures = false;
+  options.moving_shadow = true;
+  const Capture shadowed = disturbed(options);
+  double least = 2, most = 0;
+  for (std::size_t v = 0; v < plain.views.size(); ++v) {
+    const std::vector<double> gains = ratios(exposed.views[v], plain.views[v]);
+    const auto [low, high] = std::ranges::minmax(gains);
+    EXPECT_LT(high - low, 0.1) << "one gain for the view";
+    least = std::min(least, low);
+    most = std::max(most, high);
+    const std::vector<double> dimmed = ratios(shadowed.views[v], plain.views[v]);
+    EXPECT_LT(std::ranges::min(dimmed), 0.6);
+    EXPECT_GT(std::ranges::max(dimmed), 0.95) << "far from the photographer";
+  }
+  EXPECT_LT(least, 0.9);
+  EXPECT_GT(most, 1.1);
+  EXPECT_GT(least, 0.65);
+  EXPECT_LT(most, 1.35);
+}
+
 }  // namespace
 }  // namespace cnerf

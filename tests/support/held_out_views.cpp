@@ -65,15 +65,16 @@ void write_pair(const std::vector<RayResult>& seen, const MonoImage& image, cons
   out << "P5 " << 2 * image.width << ' ' << image.height << " 255\n";
   for (int y = 0; y < image.height; ++y) {
     const std::size_t row = std::size_t(y) * std::size_t(image.width);
-    for (int x = 0; x < image.width; ++x) out.put(char(std::lround(255 * encoded(seen[row + std::size_t(x)].luminance))));
-    for (int x = 0; x < image.width; ++x) out.put(char(std::lround(255 * encoded(image.luminance(row + std::size_t(x))))));
+    for (int x = 0; x < image.width; ++x)
+      out.put(char(std::lround(255 * encoded(seen[row + std::size_t(x)].luminance))));
+    for (int x = 0; x < image.width; ++x)
+      out.put(char(std::lround(255 * encoded(image.luminance(row + std::size_t(x))))));
   }
 }
 
 }  // namespace
 
-std::vector<HeldOutView> judge_held_out(const Capture& capture, const SceneFrame& frame,
-                                        const LuminanceEngine& engine,
+std::vector<HeldOutView> judge_held_out(const Capture& capture, const SceneFrame& frame, const LuminanceEngine& engine,
                                         const MarchSettings& march, const RenderEffort& effort,
                                         const fs::path& pictures) {
   std::vector<HeldOutView> judged;
@@ -100,8 +101,8 @@ void print_held_out(const std::vector<HeldOutView>& views) {
   HeldOutView mean, worst;
   worst.as_given = worst.exposure_fitted = 1e9;
   for (const HeldOutView& view : views) {
-    std::printf("    %-24s as given %.2f dB, exposure fitted %.2f dB, opacity near the camera %.4f\n", view.name.c_str(),
-                view.as_given, view.exposure_fitted, view.near_opacity);
+    std::printf("    %-24s as given %.2f dB, exposure fitted %.2f dB, opacity near the camera %.4f\n",
+                view.name.c_str(), view.as_given, view.exposure_fitted, view.near_opacity);
     mean.as_given += view.as_given / double(views.size());
     mean.exposure_fitted += view.exposure_fitted / double(views.size());
     mean.near_opacity += view.near_opacity / double(views.size());

@@ -20,8 +20,8 @@ struct HeldOutView {
 /// Renders all held-out views.
 /// @param pictures  a folder for what was seen beside what was to be seen, PGM; empty: none
 [[nodiscard]] std::vector<HeldOutView> judge_held_out(const Capture& capture, const SceneFrame& frame,
-                                                      const LuminanceEngine& engine,
-                                                      const MarchSettings& march, const RenderEffort& effort,
+                                                      const LuminanceEngine& engine, const MarchSettings& march,
+                                                      const RenderEffort& effort,
                                                       const std::filesystem::path& pictures = {});
 
 /// A line per view, and one for their mean and the worst.

@@ -6,15 +6,15 @@
 namespace cnerf {
 namespace {
 
-constexpr double kLargestError = 2;         // pixels, of a point that is believed
-constexpr std::size_t kShortestTrack = 3;   // views
-constexpr int kVotes = 2;                   // views that have to see through a place
-constexpr int kAcross = 64;                 // cells of a sight along the longer side of its picture
-constexpr double kWayRadius = 2.5;          // cells around a point that its view sees through as well
-constexpr double kWayShare = 0.9;           // of the way to a point: points are not exact, surfaces between them bend
-constexpr double kNearShare = 0.8;          // of the distance to the nearest of what a view shows
-constexpr double kNearQuantile = 0.02;      // of its points, which counts as the nearest: some points are wrong
-constexpr std::size_t kFewestPoints = 20;   // of a view that knows what is nearest
+constexpr double kLargestError = 2;        // pixels, of a point that is believed
+constexpr std::size_t kShortestTrack = 3;  // views
+constexpr int kVotes = 2;                  // views that have to see through a place
+constexpr int kAcross = 64;                // cells of a sight along the longer side of its picture
+constexpr double kWayRadius = 2.5;         // cells around a point that its view sees through as well
+constexpr double kWayShare = 0.9;          // of the way to a point: points are not exact, surfaces between them bend
+constexpr double kNearShare = 0.8;         // of the distance to the nearest of what a view shows
+constexpr double kNearQuantile = 0.02;     // of its points, which counts as the nearest: some points are wrong
+constexpr std::size_t kFewestPoints = 20;  // of a view that knows what is nearest
 
 /// Of the picture's corner farthest from the axis.
 double least_cosine_of(const Intrinsics& lens) {

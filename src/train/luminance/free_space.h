@@ -7,8 +7,8 @@
 
 namespace cnerf {
 
-/// A view that shows a sparse point sees through all that lies between: space around the way to it is empty, and what is
-/// nearer to the lens than all that the view shows. Views vote. Held-out views do not, and without points nothing is
+/// A view that shows a sparse point sees through all that lies between: space around the way to it is empty, and what
+/// is nearer to the lens than all that the view shows. Views vote. Held-out views do not, and without points nothing is
 /// known. What has no features at all, such as a white thing before a picture's nearest point, is not protected.
 class FreeSpace {
  public:
