@@ -45,8 +45,11 @@ TEST_F(FreeSpaceTest, IsNotWhereNoViewLooks) {
 
 TEST_F(FreeSpaceTest, WhatTwoViewsDoNotAgreeOnIsNotFree) {
   for (SparsePoint& point : points_) point.views = {0, 1, 2};
-  EXPECT_TRUE(is_free({0.3, 0, 2}));
-  views_[1].held_out = views_[2].held_out = true;  // one vote is left
+  EXPECT_TRUE(is_free({0.3, 0, 3.4}));
+  views_[1].held_out = views_[2].held_out = true;  // one way is left
+  EXPECT_FALSE(is_free({0.3, 0, 3.4}));
+  EXPECT_TRUE(is_free({0.3, 0, 2})) << "much nearer than all that the view shows";
+  views_[0].held_out = true;
   EXPECT_FALSE(is_free({0.3, 0, 2}));
 }
 

@@ -8,12 +8,12 @@ namespace {
 
 constexpr double kLargestError = 2;        // pixels, of a point that is believed
 constexpr std::size_t kShortestTrack = 3;  // views
-constexpr int kVotes = 2;                  // views that have to see through a place
-constexpr int kAcross = 64;                // cells of a sight along the longer side of its picture
-constexpr double kWayRadius = 2.5;         // cells around a point that its view sees through as well
-constexpr double kWayShare = 0.9;          // of the way to a point: points are not exact, surfaces between them bend
-constexpr double kNearShare = 0.8;         // of the distance to the nearest of what a view shows
-constexpr double kNearQuantile = 0.02;     // of its points, which counts as the nearest: some points are wrong
+constexpr int kVotes = 2;               // that make a place free: a way to a point is one, all points of a view are two
+constexpr int kAcross = 64;             // cells of a sight along the longer side of its picture
+constexpr double kWayRadius = 2.5;      // cells around a point that its view sees through as well
+constexpr double kWayShare = 0.9;       // of the way to a point: points are not exact, surfaces between them bend
+constexpr double kNearShare = 0.8;      // of the distance to the nearest of what a view shows
+constexpr double kNearQuantile = 0.02;  // of its points, which counts as the nearest: some points are wrong
 constexpr std::size_t kFewestPoints = 20;  // of a view that knows what is nearest
 
 /// Of the picture's corner farthest from the axis.
@@ -66,26 +66,27 @@ void FreeSpace::Sight::clear_the_near(std::vector<double> depths) {
   for (float& known : clear_depth_) known = known == 0 ? float(near_) : known;
 }
 
-bool FreeSpace::Sight::sees_through(Vec3d centre, double radius) const {
+int FreeSpace::Sight::votes_for(Vec3d centre, double radius) const {
   const Vec3d at = camera_from_world_.point(centre);
   const auto pixel = at.z > radius ? project(*lens_, at) : std::nullopt;
   const double x = pixel ? pixel->x * cells_per_pixel_ : -1, y = pixel ? pixel->y * cells_per_pixel_ : -1;
-  if (x < 0 || y < 0 || x >= width_ || y >= height_) return is_near_lens(at, radius);
+  if (x < 0 || y < 0 || x >= width_ || y >= height_) return is_near_lens(at, radius) ? kVotes : 0;
   const double reach = radius / at.z * lens_->fx * cells_per_pixel_;
   for (int v = std::max(0, int(y - reach)); v <= std::min(height_ - 1, int(y + reach)); ++v) {
     for (int u = std::max(0, int(x - reach)); u <= std::min(width_ - 1, int(x + reach)); ++u) {
-      if (at.z + radius >= clear_depth_[std::size_t(v) * std::size_t(width_) + std::size_t(u)]) return false;
+      if (at.z + radius >= clear_depth_[std::size_t(v) * std::size_t(width_) + std::size_t(u)]) return 0;
     }
   }
-  return true;
+  return at.z + radius < near_ ? kVotes : 1;
 }
 
-/// Beside the picture: a wall along the way of view is farther off where it enters the picture, by the sine of the
-/// angle of view.
+/// Beside the picture less is known: a wall along the way of view that enters the picture at some depth is as far off
+/// as half the picture is wide there.
 bool FreeSpace::Sight::is_near_lens(Vec3d at, double radius) const {
   const double distance = length(at);
   const bool is_ahead = at.z > least_cosine_ * distance;
-  const double near = is_ahead ? near_ : near_ * std::sqrt(1 - least_cosine_ * least_cosine_);
+  const double half_width = 0.5 * std::min(lens_->width / lens_->fx, lens_->height / lens_->fy);
+  const double near = is_ahead ? near_ : near_ * std::min(half_width, 1.0);
   return at.z + radius > 0 && distance + radius < near;
 }
 
@@ -104,7 +105,7 @@ FreeSpace::FreeSpace(const std::vector<View>& views, const std::vector<SparsePoi
 bool FreeSpace::holds(Vec3d centre, double radius) const {
   int votes = 0;
   for (const Sight& sight : sights_) {
-    if (votes < kVotes && sight.sees_through(centre, radius)) ++votes;
+    if (votes < kVotes) votes += sight.votes_for(centre, radius);
   }
   const auto is_inside = [&](Vec3d point) { return length(point - centre) < radius; };
   return votes >= kVotes && std::ranges::none_of(points_, is_inside);

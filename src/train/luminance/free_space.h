@@ -8,8 +8,9 @@
 namespace cnerf {
 
 /// A view that shows a sparse point sees through all that lies between: space around the way to it is empty, and what
-/// is nearer to the lens than all that the view shows. Views vote. Held-out views do not, and without points nothing is
-/// known. What has no features at all, such as a white thing before a picture's nearest point, is not protected.
+/// is nearer to the lens than all that the view shows. Two ways have to agree, or one view's points together. Held-out
+/// views do not, and without points nothing is known. What has no features at all, such as a white thing before a
+/// picture's nearest point, is not protected.
 class FreeSpace {
  public:
   /// Refers to the views.  @param points  their `views` are places in `views`
@@ -23,7 +24,8 @@ class FreeSpace {
   class Sight {
    public:
     Sight(const View& view, const std::vector<Vec3d>& shown);
-    [[nodiscard]] bool sees_through(Vec3d centre, double radius) const;
+    /// How much it says for a ball's being empty.
+    [[nodiscard]] int votes_for(Vec3d centre, double radius) const;
 
    private:
     /// @param at  in the camera's axes, not in its picture or partly behind its lens
