@@ -82,9 +82,7 @@ Stage1Report train_measured(const Subject& subject, const Stage1Options& options
   const WatchedEngines watched(engines);
   LearningCurve curve("stage 1", observer, [&] { return pixels.psnr(watched.luminance(), march); });
   Stage1Job job{subject.capture, options, snapshot, true};
-  if (options.free_space && !fs::exists(snapshot)) {
-    job.points = prepare::points_for_training(subject.capture, observer);
-  }
+  job.points = prepare::points_for_training(job, observer);
   const Stage1Report report = train_stage1(job, watched, curve);
   // The engine is gone; what it came to is in the snapshot. What an earlier part of the training took comes first.
   const double before = curve.points().empty() ? report.seconds : report.seconds - curve.seconds();

@@ -14,8 +14,7 @@ void train_step(const RunContext& context, bool resume, const Engines& engines, 
   RunRecord record = directory.record();
   if (!record.stage1.finished || !resume) {
     Stage1Job job{context.capture, context.config.stage1, directory.stage1_snapshot(), resume};
-    const bool is_begun = resume && std::filesystem::exists(job.snapshot);
-    if (job.options.free_space && !is_begun) job.points = prepare::points_for_training(context.capture, observer);
+    job.points = prepare::points_for_training(job, observer);
     record.stage1 = {train_stage1(job, engines, observer), true};
     directory.save(record);
   }

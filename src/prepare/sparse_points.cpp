@@ -14,7 +14,6 @@
 #include "src/base/text.h"
 #include "src/base/usage.h"
 #include "src/capture/arrangement.h"
-#include "src/color/colorspace_math.h"
 #include "src/prepare/grey_image.h"
 
 namespace cnerf::prepare {
@@ -42,14 +41,6 @@ struct ViewFeatures {
   double pixel_per_own = 1;  ///< such a pixel's share of one of the view's own
 };
 
-cv::Mat1b codes_of(const MonoImage& image) {
-  cv::Mat1b codes(image.height, image.width);
-  for (std::size_t p = 0; p < image.pixel_count(); ++p) {
-    codes.data[p] = std::uint8_t(std::lround(255 * srgb_from_linear(std::clamp(image.luminance(p), 0.0f, 1.0f))));
-  }
-  return codes;
-}
-
 /// RootSIFT (Arandjelovic and Zisserman 2012): roots of shares, whose products are similarities.
 void take_roots(cv::Mat1f& descriptors) {
   for (int row = 0; row < descriptors.rows; ++row) {
@@ -66,8 +57,10 @@ bool shows_scene(const MonoImage& image, PixelPosition at) {
 }
 
 ViewFeatures features_of(const View& view) {
-  const cv::Mat1b picture = reduced_to(codes_of(view.image), kLongestSide);
-  const double own_per_pixel = double(view.image.width) / picture.cols;
+  const MonoImage& image = view.image;
+  const LinearImage luminance{image.width, image.height, 1, image.depth, luminance_plane(image), {}};
+  const cv::Mat1b picture = reduced_to(grey_codes(luminance), kLongestSide);
+  const double own_per_pixel = double(image.width) / picture.cols;
   std::vector<cv::KeyPoint> points;
   cv::Mat found;
   cv::SIFT::create(kFeatures)->detectAndCompute(picture, cv::noArray(), points, found);
@@ -78,7 +71,7 @@ ViewFeatures features_of(const View& view) {
     const cv::Point2f at = points[std::size_t(i)].pt;
     // OpenCV's pixels have their middles at whole numbers.
     const PixelPosition pixel{(at.x + 0.5) * own_per_pixel, (at.y + 0.5) * own_per_pixel};
-    if (!shows_scene(view.image, pixel)) continue;
+    if (!shows_scene(image, pixel)) continue;
     const Vec3d direction = normalized(view.world_from_camera.direction(ray_direction(view.intrinsics, pixel)));
     out.features.push_back({pixel, direction});
     out.descriptors.push_back(cv::Mat1f(found.row(i)));
@@ -296,8 +289,10 @@ std::vector<SparsePoint> find_sparse_points(const Capture& capture, const Progre
   return triangulator.points();
 }
 
-std::vector<SparsePoint> points_for_training(const Capture& capture, Observer& observer) {
-  if (!capture.points.empty() || capture.is_bounded_object || capture.depth_range) return {};
+std::vector<SparsePoint> points_for_training(const Stage1Job& job, Observer& observer) {
+  const Capture& capture = job.capture;
+  const bool is_bounded = capture.is_bounded_object || capture.depth_range;
+  if (!job.options.free_space || job.goes_on() || is_bounded || !capture.points.empty()) return {};
   const Stopwatch watch;
   std::vector<SparsePoint> points = find_sparse_points(capture, observer.progress_sink());
   observer.say(fmt::format("{} sparse points found in {}", points.size(), duration_text(watch.seconds())));

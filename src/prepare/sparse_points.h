@@ -7,6 +7,7 @@
 #include "src/base/observer.h"
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
+#include "src/train/luminance/stage1.h"
 
 namespace cnerf::prepare {
 
@@ -15,8 +16,8 @@ namespace cnerf::prepare {
 /// @throws Interrupted
 [[nodiscard]] std::vector<SparsePoint> find_sparse_points(const Capture& capture, const ProgressSink& progress = {});
 
-/// What stage 1 is to know besides the capture: its points, where it has none of its own and neither outlines nor a
-/// depth range tell which space is free. Says how many were found.
-[[nodiscard]] std::vector<SparsePoint> points_for_training(const Capture& capture, Observer& observer);
+/// What a stage 1 that begins is to know besides the capture: points, if the job wants free space known and the capture
+/// has no points of its own, and neither outlines nor a depth range bound its space. Says how many were found.
+[[nodiscard]] std::vector<SparsePoint> points_for_training(const Stage1Job& job, Observer& observer);
 
 }  // namespace cnerf::prepare

@@ -28,6 +28,7 @@ constexpr std::array<double, 3> kElevations = {20, 36, 53};  ///< degrees above 
 constexpr double kOrbitElevation = 32;
 constexpr int kTestEvery = 8;
 constexpr double kClothHeight = -0.1;
+constexpr double kLeastDown = 1e-3;  // of a ray, per depth: above the horizon lies what is there
 constexpr double kShadowDistance = 1.1, kShadowRadius = 0.7, kShadowDepth = 0.6;
 constexpr double kExposureSpread = 0.3;
 constexpr std::uint64_t kExposureDraw = std::uint64_t(1) << 40;  // beyond those of pixels
@@ -74,18 +75,24 @@ bool is_test_view(int view, int views) {
   return views > 2 && view % kTestEvery == 0;
 }
 
-/// The first surface at a pixel's centre: an object, or the cloth below all of them.
-Vec3d place_at(const Intrinsics& intrinsics, const Affined& pose, std::size_t x, std::size_t y, double depth) {
+/// Where a pixel's ray is at a depth along the axis.
+Vec3d place_at(const Intrinsics& intrinsics, const Affined& pose, std::size_t pixel, double depth) {
+  const std::size_t x = pixel % std::size_t(intrinsics.width), y = pixel / std::size_t(intrinsics.width);
   const Vec3d direction = ray_direction(intrinsics, {double(x) + 0.5, double(y) + 0.5});
-  const Vec3d along = pose.direction(direction / direction.z);
-  return pose.translation + along * (depth > 0 ? depth : (kClothHeight - pose.translation.z) / along.z);
+  return pose.translation + pose.direction(direction / direction.z) * depth;
 }
 
-/// Linings in two directions and blotches, which fade into their mean where pixels no longer resolve them.
+/// Depth of the cloth; that of the horizon for rays that go up.
+double cloth_depth(const Intrinsics& intrinsics, const Affined& pose, std::size_t pixel) {
+  const double down = pose.translation.z - place_at(intrinsics, pose, pixel, 1).z;
+  return (pose.translation.z - kClothHeight) / std::max(down, kLeastDown);
+}
+
+/// Stripes in two directions, and blotches.
 Vec3d cloth_at(Vec3d place) {
-  const double lining = 0.5 + 0.25 * std::sin(9 * place.x) + 0.25 * std::sin(7 * place.y + 2 * place.x);
+  const double stripes = 0.5 + 0.25 * std::sin(9 * place.x) + 0.25 * std::sin(7 * place.y + 2 * place.x);
   const double blotch = sample::noise(place * 6.0, 3);
-  return Vec3d{0.34, 0.30, 0.26} * (0.4 + 0.6 * lining) * (0.5 + blotch);
+  return Vec3d{0.34, 0.30, 0.26} * (0.4 + 0.6 * stripes) * (0.5 + blotch);
 }
 
 /// How much light reaches a place beside the photographer, who stands at `pose`.
@@ -98,9 +105,9 @@ double shadow_at(Vec3d place, const Affined& pose) {
 void lay_on_cloth(const Intrinsics& intrinsics, const Affined& pose, bool in_shadow, RenderedView& view) {
   for (std::size_t p = 0; p < view.color.size(); ++p) {
     PixelColor& color = view.color[p];
-    const std::size_t x = p % std::size_t(intrinsics.width), y = p / std::size_t(intrinsics.width);
-    const Vec3d cloth = cloth_at(place_at(intrinsics, pose, x, y, 0));
-    const Vec3d place = place_at(intrinsics, pose, x, y, view.depth[p]);
+    const double depth = cloth_depth(intrinsics, pose, p);
+    const Vec3d cloth = cloth_at(place_at(intrinsics, pose, p, depth));
+    const Vec3d place = place_at(intrinsics, pose, p, view.depth[p] > 0 ? view.depth[p] : depth);
     const double light = in_shadow ? shadow_at(place, pose) : 1;
     color = {(color.rgb + cloth * (1 - color.alpha)) * light, 1};
   }

@@ -20,7 +20,6 @@
 #include <vector>
 
 #include "src/capture/load_capture.h"
-#include "src/color/colorspace_math.h"
 #include "src/prepare/sparse_points.h"
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/options_json.h"
@@ -72,13 +71,7 @@ double held_out_psnr(const cnerf::Capture& capture, const cnerf::LuminanceModel&
     if (transmittance != nullptr) {
       for (const cnerf::RayResult& result : results) transmittance->push_back(1 - result.opacity);
     }
-    double squared = 0;
-    for (std::size_t p = 0; p < rays.size(); ++p) {
-      const float seen = cnerf::srgb_from_linear(std::clamp(results[p].luminance, 0.0f, 1.0f));
-      const float truth = cnerf::srgb_from_linear(std::clamp(view.image.luminance(p), 0.0f, 1.0f));
-      squared += (seen - truth) * (seen - truth);
-    }
-    total += -10 * std::log10(std::max(squared / double(rays.size()), 1e-10));
+    total += cnerf::test::psnr_of(results, view.image);
     ++views;
   }
   return views > 0 ? total / views : 0;

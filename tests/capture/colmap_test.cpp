@@ -50,6 +50,15 @@ TEST_F(Colmap, TextSaysTheSame) {
   EXPECT_EQ(text.views[3].intrinsics, binary.views[3].intrinsics);
 }
 
+TEST_F(Colmap, PointsForgetAViewWhoseImageIsMissing) {
+  test::write_colmap_binary(folder_ / "sparse/0");
+  std::filesystem::remove(folder_ / "images/0.png");  // the only view of the points
+  const Capture capture = load_capture(folder_.path());
+  ASSERT_EQ(capture.views.size(), 3u);
+  ASSERT_EQ(capture.points.size(), 2u);
+  EXPECT_TRUE(capture.points[0].views.empty());
+}
+
 TEST_F(Colmap, AllPlacesAreFound) {
   for (const char* place : {".", "sparse", "sparse/0", "colmap/sparse/0"}) {
     const test::TempDir folder;

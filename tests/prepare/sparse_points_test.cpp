@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/base/files.h"
 #include "src/base/rng.h"
 #include "src/capture/load_capture.h"
 #include "tests/support/data.h"
@@ -85,15 +86,30 @@ TEST(SparsePoints, WrongPosesMakeFew) {
 TEST(SparsePoints, AreNotLookedForWhereOutlinesOrDepthBoundSpace) {
   Observer observer;
   Capture capture = plane_capture(4);
-  EXPECT_FALSE(points_for_training(capture, observer).empty());
+  const Stage1Options options;
+  const Stage1Job job{capture, options, "no.snapshot"};
+  EXPECT_FALSE(points_for_training(job, observer).empty());
   capture.is_bounded_object = true;
-  EXPECT_TRUE(points_for_training(capture, observer).empty());
+  EXPECT_TRUE(points_for_training(job, observer).empty());
   capture.is_bounded_object = false;
   capture.depth_range = {1, 3};
-  EXPECT_TRUE(points_for_training(capture, observer).empty());
+  EXPECT_TRUE(points_for_training(job, observer).empty());
   capture.depth_range.reset();
   capture.points = {{{0, 0, 0}, 0.5, {0, 1, 2}}};
-  EXPECT_TRUE(points_for_training(capture, observer).empty()) << "it has its own";
+  EXPECT_TRUE(points_for_training(job, observer).empty()) << "it has its own";
+}
+
+TEST(SparsePoints, AreNotLookedForByATrainingThatGoesOnOrDoesNotWantThem) {
+  Observer observer;
+  const Capture capture = plane_capture(4);
+  const test::TempDir folder;
+  const std::filesystem::path snapshot = folder / "stage1.snapshot";
+  write_file(snapshot, std::string_view());
+  Stage1Options options;
+  EXPECT_TRUE(points_for_training({capture, options, snapshot, true}, observer).empty());
+  EXPECT_FALSE(points_for_training({capture, options, snapshot, false}, observer).empty()) << "anew";
+  options.free_space = false;
+  EXPECT_TRUE(points_for_training({capture, options, snapshot, false}, observer).empty());
 }
 
 TEST(SparsePoints, OfARealCapture) {

@@ -19,15 +19,6 @@ double encoded(double light) {
   return srgb_from_linear(std::clamp(float(light), 0.0f, 1.0f));
 }
 
-double psnr(const std::vector<RayResult>& seen, const MonoImage& image, double gain) {
-  double squared = 0;
-  for (std::size_t p = 0; p < seen.size(); ++p) {
-    const double off = encoded(gain * seen[p].luminance) - encoded(image.luminance(p));
-    squared += off * off;
-  }
-  return -10 * std::log10(std::max(squared / double(seen.size()), 1e-10));
-}
-
 /// Of linear light, by least squares.
 double fitted_gain(const std::vector<RayResult>& seen, const MonoImage& image) {
   double both = 0, own = 0;
@@ -74,6 +65,15 @@ void write_pair(const std::vector<RayResult>& seen, const MonoImage& image, cons
 
 }  // namespace
 
+double psnr_of(const std::vector<RayResult>& seen, const MonoImage& image, double gain) {
+  double squared = 0;
+  for (std::size_t p = 0; p < seen.size(); ++p) {
+    const double off = encoded(gain * seen[p].luminance) - encoded(image.luminance(p));
+    squared += off * off;
+  }
+  return -10 * std::log10(std::max(squared / double(seen.size()), 1e-10));
+}
+
 std::vector<HeldOutView> judge_held_out(const Capture& capture, const SceneFrame& frame, const LuminanceEngine& engine,
                                         const MarchSettings& march, const RenderEffort& effort,
                                         const fs::path& pictures) {
@@ -85,8 +85,8 @@ std::vector<HeldOutView> judge_held_out(const Capture& capture, const SceneFrame
     engine.render_view(camera, march, effort, seen);
     HeldOutView of;
     of.name = view.name;
-    of.as_given = psnr(seen, view.image, 1);
-    of.exposure_fitted = psnr(seen, view.image, fitted_gain(seen, view.image));
+    of.as_given = psnr_of(seen, view.image);
+    of.exposure_fitted = psnr_of(seen, view.image, fitted_gain(seen, view.image));
     of.near_opacity = near_opacity(engine, camera, view.image, march, effort);
     judged.push_back(of);
     if (!pictures.empty()) {

@@ -17,6 +17,9 @@ struct HeldOutView {
   double near_opacity = 0;     ///< mean opacity of the first tenth of rays' ways through the field's box
 };
 
+/// dB of sRGB-encoded luminance.  @param gain  of linear light, on what was seen
+[[nodiscard]] double psnr_of(const std::vector<RayResult>& seen, const MonoImage& image, double gain = 1);
+
 /// Renders all held-out views.
 /// @param pictures  a folder for what was seen beside what was to be seen, PGM; empty: none
 [[nodiscard]] std::vector<HeldOutView> judge_held_out(const Capture& capture, const SceneFrame& frame,

@@ -56,6 +56,25 @@ TEST_F(Exclusion, WhatTheViewsLookAtAndWhatIsBehindItStays) {
   EXPECT_FALSE(is_left_out(before_the_lens(1.4 * distance))) << "one view sees it, as background";
 }
 
+/// Points at the focus that all views show.
+TEST_F(Exclusion, TheWayToSparsePointsIsLeftOutUnlessTheOptionSaysNo) {
+  capture_ = test::toy_capture(12);
+  std::vector<SparsePoint> points;
+  for (int i = 0; i < 27; ++i) {
+    const int row = i / 3 % 3, layer = i / 9;
+    points.push_back({Vec3d{i % 3 - 1.0, row - 1.0, layer - 1.0} * 0.1, 0.5, {}});
+    for (std::uint32_t view = 0; view < 12; ++view) points.back().views.push_back(view);
+  }
+  Stage1Options options = small_options();
+  const double distance = length(capture_.views.front().world_from_camera.translation);
+  for (const bool free_space : {false, true}) {
+    options.free_space = free_space;
+    model_ = LuminanceModel::create(capture_, options, cpu_engines(), points);
+    EXPECT_EQ(is_left_out(before_the_lens(0.5 * distance)), free_space);
+    EXPECT_FALSE(is_left_out({0, 0, 0})) << "where points are";
+  }
+}
+
 TEST_F(Exclusion, WhatNoViewSeesIsLeftOut) {
   EXPECT_TRUE(is_left_out({0, 0, 3.5}));
 }

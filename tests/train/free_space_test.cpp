@@ -78,6 +78,17 @@ TEST_F(FreeSpaceTest, PointsOfFewViewsOrLargeErrorsSayNothing) {
   EXPECT_FALSE(is_free({0.3, 0, 2}));
 }
 
+/// A file may state that a view shows what lies far beside its picture.
+TEST_F(FreeSpaceTest, AViewThatDoesNotShowAPointSaysNothingAboutIt) {
+  EXPECT_TRUE(is_free({0.3, 0, 3.4}));
+  for (int i = 0; i < 9; ++i) {
+    points_.push_back({{1e12, 1e12, 1e-3}, 0.5, {0, 1, 2, 3}});
+    points_.push_back({{3, 0, 0.1}, 0.5, {0, 1, 2, 3}});
+  }
+  EXPECT_TRUE(is_free({0.3, 0, 3.4}));
+  EXPECT_TRUE(is_free({0.3, 0, 0.1})) << "they are not what is nearest";
+}
+
 /// A wall along the way of view enters the pictures far ahead; what of it lies beside the lenses stays.
 TEST_F(FreeSpaceTest, AWallBesideTheLensesStays) {
   points_.clear();

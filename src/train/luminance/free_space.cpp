@@ -25,6 +25,10 @@ double least_cosine_of(const Intrinsics& lens) {
   return least;
 }
 
+bool is_in_picture(const Intrinsics& lens, PixelPosition at) {
+  return at.x >= 0 && at.y >= 0 && at.x < lens.width && at.y < lens.height;
+}
+
 }  // namespace
 
 FreeSpace::Sight::Sight(const View& view, const std::vector<Vec3d>& shown)
@@ -39,7 +43,7 @@ FreeSpace::Sight::Sight(const View& view, const std::vector<Vec3d>& shown)
   for (const Vec3d& point : shown) {
     const Vec3d at = camera_from_world_.point(point);
     const auto pixel = project(*lens_, at);
-    if (!pixel) continue;
+    if (!pixel || !is_in_picture(*lens_, *pixel)) continue;  // a file may state anything
     depths.push_back(at.z);
     clear_way_to(*pixel, at.z);
   }
@@ -69,8 +73,8 @@ void FreeSpace::Sight::clear_the_near(std::vector<double> depths) {
 int FreeSpace::Sight::votes_for(Vec3d centre, double radius) const {
   const Vec3d at = camera_from_world_.point(centre);
   const auto pixel = at.z > radius ? project(*lens_, at) : std::nullopt;
-  const double x = pixel ? pixel->x * cells_per_pixel_ : -1, y = pixel ? pixel->y * cells_per_pixel_ : -1;
-  if (x < 0 || y < 0 || x >= width_ || y >= height_) return is_near_lens(at, radius) ? kVotes : 0;
+  if (!pixel || !is_in_picture(*lens_, *pixel)) return is_near_lens(at, radius) ? kVotes : 0;
+  const double x = pixel->x * cells_per_pixel_, y = pixel->y * cells_per_pixel_;
   const double reach = radius / at.z * lens_->fx * cells_per_pixel_;
   for (int v = std::max(0, int(y - reach)); v <= std::min(height_ - 1, int(y + reach)); ++v) {
     for (int u = std::max(0, int(x - reach)); u <= std::min(width_ - 1, int(x + reach)); ++u) {

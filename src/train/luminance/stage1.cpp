@@ -80,7 +80,7 @@ void refuse_others(const std::filesystem::path& snapshot, const Stage1Options& s
 }
 
 LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines) {
-  if (!job.resume || !std::filesystem::exists(job.snapshot)) {
+  if (!job.goes_on()) {
     const auto& points = job.points.empty() ? job.capture.points : job.points;
     return LuminanceModel::create(job.capture, job.options, engines, points);
   }

@@ -28,6 +28,8 @@ struct Stage1Job {
   std::filesystem::path snapshot;        ///< that the result goes to
   bool resume = false;                   ///< go on with the snapshot, if there is one
   std::vector<SparsePoint> points = {};  ///< in place of the capture's, which has none
+
+  [[nodiscard]] bool goes_on() const { return resume && std::filesystem::exists(snapshot); }
 };
 
 /// Trains and leaves the result in the job's snapshot. What the observer takes is no training time; previews show
