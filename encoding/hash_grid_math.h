@@ -78,4 +78,20 @@ CNERF_HD void for_each_corner(const GridLevel& level, const Real position[3], Vi
   }
 }
 
+/// Derivative of what trilinear interpolation makes of values at a cell's corners, by the place in the cell. Inside a
+/// cell it is exact; where cells meet it jumps.
+/// @param fraction   in [0, 1], see GridCell
+/// @param at_corner  bit 0 of the index = upper in x
+/// @param slope      written
+template <typename Real>
+CNERF_HD void trilinear_slope(const Real fraction[3], const Real at_corner[8], Real slope[3]) {
+  const Real one = Real(1.0f);
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const auto across = [&](int corner) { return at_corner[corner | (1 << axis)] - at_corner[corner]; };
+    slope[axis] = (one - fraction[v]) * ((one - fraction[u]) * across(0) + fraction[u] * across(1 << u)) +
+                  fraction[v] * ((one - fraction[u]) * across(1 << v) + fraction[u] * across((1 << u) | (1 << v)));
+  }
+}
+
 }  // namespace cnerf

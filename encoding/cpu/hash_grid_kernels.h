@@ -24,6 +24,11 @@ struct HashGridKernels {
   /// @param d_rows     [level.rows, 4], added to, in the order of the samples: deterministic
   void (*scatter_level)(const GridLevel& level, const float* positions, const float* d_encoded, std::size_t groups,
                         int channels, int first_channel, float* d_rows);
+  /// The gradient by the samples' positions, as far as these levels pass it on.
+  /// @param d_encoded    [G, channels, 16]; channels 0 .. 4 L - 1 are read
+  /// @param d_positions  [G, 3, 16], written
+  void (*position_gradient)(const GridLevel* levels, std::size_t n_levels, const float* table, const float* positions,
+                            const float* d_encoded, std::size_t groups, int channels, float* d_positions);
 };
 
 namespace generic {

@@ -100,8 +100,55 @@ void scatter_level(const GridLevel& level, const float* positions, const float* 
   run.write(d_rows);
 }
 
+/// d_features . rows of the 8 corners, for each sample of a group.
+inline void project_corners(const GroupCorners& corners, const float* rows, const float* d_group,
+                            float projected[8][kGroup]) {
+  for (int s = 0; s < kGroup; s += 4) {
+    Row4 d_features[4];
+    for (int f = 0; f < 4; ++f) d_features[f] = Row4::load(d_group + f * kGroup + s);
+    transpose(d_features[0], d_features[1], d_features[2], d_features[3]);
+    for (int c = 0; c < 8; ++c) {
+      Row4 product[4];
+      for (int i = 0; i < 4; ++i) {
+        product[i] = Row4::load(rows + 4 * std::size_t(corners.row[c][s + i])) * d_features[i];
+      }
+      transpose(product[0], product[1], product[2], product[3]);
+      ((product[0] + product[1]) + (product[2] + product[3])).store(&projected[c][s]);
+    }
+  }
+}
+
+void position_gradient(const GridLevel* levels, std::size_t n_levels, const float* table, const float* positions,
+                       const float* d_encoded, std::size_t groups, int channels, float* d_positions) {
+  GroupCorners corners;
+  alignas(64) float projected[8][kGroup];
+  for (std::size_t g = 0; g < groups; ++g) {
+    const float* position = positions + g * 3 * kGroup;
+    float* d_position = d_positions + g * 3 * kGroup;
+    for (int i = 0; i < 3 * kGroup; ++i) d_position[i] = 0;
+    for (std::size_t l = 0; l < n_levels; ++l) {
+      const GridLevel& level = levels[l];
+      find_corners(level, position, corners);
+      project_corners(corners, table + 4 * std::size_t(level.first_row),
+                      d_encoded + (g * std::size_t(channels) + 4 * l) * kGroup, projected);
+      for (int first = 0; first < kGroup; first += kWidth) {
+        const Lanes place[3] = {Lanes::load(position + first), Lanes::load(position + kGroup + first),
+                                Lanes::load(position + 2 * kGroup + first)};
+        Lanes at_corner[8], slope[3];
+        for (int c = 0; c < 8; ++c) at_corner[c] = Lanes::load(&projected[c][first]);
+        trilinear_slope(locate<LanesU32>(level, place).fraction, at_corner, slope);
+        const Lanes cells(float(level.cells));
+        for (int axis = 0; axis < 3; ++axis) {
+          float* to = d_position + axis * kGroup + first;
+          (Lanes::load(to) + cells * slope[axis]).store(to);
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 
-const HashGridKernels kHashGridKernels = {encode, scatter_level};
+const HashGridKernels kHashGridKernels = {encode, scatter_level, position_gradient};
 
 }  // namespace cnerf::CNERF_ISA

@@ -108,6 +108,7 @@ struct Row4 {
   }
   void store(float* to) const { std::memcpy(to, &raw, sizeof raw); }
   friend Row4 operator+(Row4 a, Row4 b) { return {a.raw + b.raw}; }
+  friend Row4 operator*(Row4 a, Row4 b) { return {a.raw * b.raw}; }
 };
 
 /// weight * row + sum, rounded once where the instruction set has it.

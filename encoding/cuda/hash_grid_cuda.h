@@ -23,4 +23,11 @@ struct SampleCount {
 void encode_backward_cuda(const std::vector<GridLevel>& levels, const float4* places, SampleCount samples,
                           const void* d_encoded, float4* d_table, cudaStream_t stream);
 
+/// What the gradient by samples' positions is made of.
+struct PositionSlopes {
+  std::vector<GridLevel> levels;     ///< that count, coarsest first
+  const uint2* table = nullptr;      ///< [rows, 4] halves
+  const uint2* d_encoded = nullptr;  ///< [L, most, 4] of bfloat16
+};
+
 }  // namespace cnerf

@@ -57,6 +57,23 @@ __device__ inline uint2 gather(const GridLevel& level, const uint2* __restrict__
   return make_uint2(*reinterpret_cast<const unsigned*>(&low), *reinterpret_cast<const unsigned*>(&high));
 }
 
+/// The gradient by a position, as one level passes it on.
+__device__ inline void add_position_gradient(const GridLevel& level, const uint2* __restrict__ table,
+                                             const float position[3], float4 d_features, float gradient[3]) {
+  const uint2* rows = table + level.first_row;
+  float projected[8];
+  for_each_corner<std::uint32_t>(level, position, [&](std::uint32_t corner, std::uint32_t at, float) {
+    const uint2 row = __ldg(rows + at);
+    const float2 low = __half22float2(*reinterpret_cast<const __half2*>(&row.x));
+    const float2 high = __half22float2(*reinterpret_cast<const __half2*>(&row.y));
+    projected[corner] = low.x * d_features.x + low.y * d_features.y + high.x * d_features.z + high.y * d_features.w;
+  });
+  float slope[3];
+  trilinear_slope(locate<std::uint32_t>(level, position).fraction, projected, slope);
+#pragma unroll
+  for (int axis = 0; axis < 3; ++axis) gradient[axis] += float(level.cells) * slope[axis];
+}
+
 /// Adds four floats to a row of a gradient; nothing waits for it.
 __device__ inline void add_to_row(float* row, float4 value) {
 #if __CUDA_ARCH__ >= 900

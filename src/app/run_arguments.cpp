@@ -28,7 +28,9 @@ pipeline::RunContext open_run(const RunFolderArguments& arguments, const std::st
   }
   Capture capture = pipeline::read_capture(arguments.capture.empty() ? record.capture : fs::path(arguments.capture),
                                            config, reporter);
-  return {std::move(directory), std::move(config), std::move(capture), std::move(command_line)};
+  pipeline::RunContext context{std::move(directory), std::move(config), std::move(capture), std::move(command_line)};
+  pipeline::use_learned_views(context, reporter);
+  return context;
 }
 
 void refuse_existing(const fs::path& output, bool overwrite) {

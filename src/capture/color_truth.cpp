@@ -32,7 +32,9 @@ std::optional<ColorImage> load_color_truth(const View& view) {
   if (!same_shape(view.image.width, view.image.height, image.width, image.height)) {
     throw InputError(view.image_file, "size", "the colour image has another shape than the grey one");
   }
-  return color_image(area_resized(image, view.image.width, view.image.height));
+  image = area_resized(image, view.image.width, view.image.height);
+  for (float& value : image.values) value = view.image.evened(value);
+  return color_image(std::move(image));
 }
 
 ColorImage load_color_image(const fs::path& file) {

@@ -125,6 +125,7 @@ SeedRun::Field SeedRun::field_of(const Method& method) const {
 void SeedRun::train() {
   Stage1Options options = bench_.config.stage1;
   options.seed = seed_;
+  options.exposures = options.poses = options.lenses = false;  // methods are compared on the views as given
   stage1_settings_ = digest(fs::absolute(subject_.capture.root).string() + options_to_json(options).dump() +
                             options_to_json(subject_.options).dump());
   const fs::path done = folder_ / "stage1.txt";

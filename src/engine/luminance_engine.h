@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "encoding/hash_grid_levels.h"
+#include "src/engine/view_learning.h"
 #include "src/field/state.h"
 #include "src/render/march.h"
 #include "src/render/observed_ray.h"
@@ -25,6 +26,7 @@ struct LuminanceEngineOptions {
   int samples_per_step = 1 << 16;  ///< trained samples that a step aims at
   float max_luminance = 1.0f;      ///< of the images; the field emits at most a little more
   float distortion_weight = 0;     ///< of each ray's distortion (distortion_math.h) in the loss
+  ViewLearning learning;
   std::uint64_t seed = 1;
 };
 
@@ -71,6 +73,10 @@ class LuminanceEngine {
   /// One optimiser step. The same step number draws the same pixels.
   virtual StepReport step(float learning_rate) = 0;
   [[nodiscard]] virtual long step_count() const = 0;
+  /// What was learned of the views, in their order. Empty where nothing is.
+  [[nodiscard]] virtual std::vector<ViewCorrection> view_corrections() const { return {}; }
+  /// And of the lenses that they share (TrainingView::lens).
+  [[nodiscard]] virtual std::vector<LensCorrection> lens_corrections() const { return {}; }
 
   /// @param march  may step otherwise than training did
   virtual void render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,

@@ -4,8 +4,8 @@
 ///
 ///   L = ((L*(seen) - L*(wanted)) / 100)^2 + distortion_weight D,   its mean over the rays of a step
 ///
-/// `seen` composites the field's luminance over a random background, `wanted` is the pixel over the same background,
-/// both as CIE lightness L*. D says how far apart the ray's samples lie (distortion_math.h).
+/// `seen` composites the field's luminance, times the view's gain, over a random background; `wanted` is the pixel over
+/// the same background, both as CIE lightness L*. D says how far apart the ray's samples lie (distortion_math.h).
 
 #include "src/base/host_device.h"
 #include "src/color/colorspace_math.h"
@@ -20,7 +20,11 @@ struct SeenRay {
   float luminance = 0;      ///< linear Y over black: sum of w Y
   float transmittance = 1;  ///< behind the last sample
 
-  [[nodiscard]] CNERF_HD float over(float background) const { return luminance + transmittance * background; }
+  /// As the target's view shows it.
+  [[nodiscard]] CNERF_HD float luminance_in(const RayTarget& target) const { return target.gain * luminance; }
+  [[nodiscard]] CNERF_HD float over_background(const RayTarget& target) const {
+    return luminance_in(target) + transmittance * target.background;
+  }
 };
 
 /// How far a ray is from its pixel.
@@ -29,7 +33,7 @@ struct RayError {
   float lightness = 0;  ///< (L*(seen) - L*(wanted)) / 100
 
   CNERF_HD RayError(const SeenRay& ray, const RayTarget& target)
-      : seen(ray.over(target.background)),
+      : seen(ray.over_background(target)),
         lightness((lightness_from_luminance(seen) - lightness_from_luminance(target.wanted())) / 100.0f) {}
 };
 
@@ -41,7 +45,7 @@ struct RayError {
 /// What PSNR is made of: on sRGB-encoded luminance over black, clamped to [0, 1].
 [[nodiscard]] CNERF_HD inline float squared_error(const SeenRay& ray, const RayTarget& target) {
   const auto encoded = [](float y) { return srgb_from_linear(y < 0.0f ? 0.0f : y > 1.0f ? 1.0f : y); };
-  const float error = encoded(ray.luminance) - encoded(target.luminance);
+  const float error = encoded(ray.luminance_in(target)) - encoded(target.luminance);
   return error * error;
 }
 
@@ -57,20 +61,25 @@ struct LitSample {
 /// Derivatives of `scale` times a ray's loss by what its samples emit and absorb.
 class RayGradient {
  public:
+  /// @param gain        of the ray's view
   /// @param scale       of the loss: 1 / rays of the step
   /// @param distortion  of the whole ray
-  CNERF_HD RayGradient(const RayError& error, const Distortion<float>& distortion, float distortion_weight, float scale)
+  CNERF_HD RayGradient(const RayError& error, float gain, const Distortion<float>& distortion, float distortion_weight,
+                       float scale)
       : seen_(error.seen),
+        gain_(gain),
         d_seen_(scale * 2.0f * error.lightness * lightness_derivative(seen_) / 100.0f),
         d_distortion_(scale * distortion_weight),
         distortion_(distortion) {}
 
   /// By the luminance that a sample emits.
-  [[nodiscard]] CNERF_HD float by_luminance(const LitSample& sample) const { return d_seen_ * sample.weight; }
+  [[nodiscard]] CNERF_HD float by_luminance(const LitSample& sample) const { return d_seen_ * gain_ * sample.weight; }
+  /// By the logarithm of the view's gain.
+  [[nodiscard]] CNERF_HD float by_log_gain(const SeenRay& ray) const { return d_seen_ * gain_ * ray.luminance; }
   /// By a sample's density, as far as it changes what is seen. What lies behind it counts, the background included.
   [[nodiscard]] CNERF_HD float by_density(const LitSample& sample) const {
-    return d_seen_ *
-           density_derivative(sample.dt, sample.transmittance_after, sample.luminance, seen_ - sample.composited);
+    return d_seen_ * density_derivative(sample.dt, sample.transmittance_after, gain_ * sample.luminance,
+                                        seen_ - gain_ * sample.composited);
   }
 
   /// The same of the distortion, which depends on densities through the weights w: dD/dw_i takes the place of the
@@ -88,7 +97,7 @@ class RayGradient {
   }
 
  private:
-  float seen_, d_seen_, d_distortion_;
+  float seen_, gain_, d_seen_, d_distortion_;
   Distortion<float> distortion_;
 };
 

@@ -23,10 +23,12 @@ inline constexpr int kMetricsSchemaVersion = 1;
 struct ViewMetrics {
   std::string view;
   std::optional<double> psnr_luminance;  ///< dB; sRGB-encoded Rec.709 Y, clamped to [0, 1]
-  std::optional<double> psnr_rgb;        ///< dB; sRGB-encoded values of all three channels
-  std::optional<double> ssim;            ///< of encoded luminance
-  std::optional<double> ssim_rgb;        ///< mean of the three encoded channels
-  std::optional<double> lpips;           ///< of 8-bit sRGB, where weights were given
+  /// The same with the one gain of linear light that fits the view best: of a picture whose exposure nobody knows.
+  std::optional<double> psnr_luminance_exposure_fitted;
+  std::optional<double> psnr_rgb;  ///< dB; sRGB-encoded values of all three channels
+  std::optional<double> ssim;      ///< of encoded luminance
+  std::optional<double> ssim_rgb;  ///< mean of the three encoded channels
+  std::optional<double> lpips;     ///< of 8-bit sRGB, where weights were given
   std::optional<double> colorfulness, colorfulness_truth, colorfulness_difference;  ///< difference: ours - truth
   std::optional<double> colorfulness_magnitude, colorfulness_magnitude_truth, colorfulness_magnitude_difference;
   std::optional<double> ab_error;          ///< mean Lab ab distance to the truth
@@ -42,6 +44,7 @@ struct ViewMetrics {
   template <typename Self, typename Visitor>
   static void visit_numbers(Self& self, Visitor&& visitor) {
     visitor("psnr_luminance", self.psnr_luminance);
+    visitor("psnr_luminance_exposure_fitted", self.psnr_luminance_exposure_fitted);
     visitor("psnr_rgb", self.psnr_rgb);
     visitor("ssim", self.ssim);
     visitor("ssim_rgb", self.ssim_rgb);

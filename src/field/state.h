@@ -14,15 +14,16 @@ namespace cnerf {
 struct StatePiece {
   std::string name;            ///< unique within one engine
   std::span<std::byte> bytes;  ///< the engine's own memory; loading a snapshot writes to it
-  bool holds_floats = false;
+  bool holds_floats = false;   ///< and nothing else
 
   /// False where one of its floats is infinite or not a number.
   [[nodiscard]] bool is_finite() const;
 };
 
+/// @tparam T  an integer, float, or a struct of floats
 template <typename T, typename Allocator>
 StatePiece state_piece(std::string name, std::vector<T, Allocator>& values) {
-  return {std::move(name), std::as_writable_bytes(std::span(values)), std::is_same_v<T, float>};
+  return {std::move(name), std::as_writable_bytes(std::span(values)), !std::is_integral_v<T>};
 }
 
 inline bool StatePiece::is_finite() const {

@@ -26,6 +26,13 @@ struct AdamStep {
         step_size(float(rate / (1.0 - std::pow(double(kAdamBeta1), double(step))))),
         second_correction(float(1.0 / (1.0 - std::pow(double(kAdamBeta2), double(step))))) {}
 
+  /// The same step for parameters that learn faster or slower.
+  [[nodiscard]] CNERF_HD AdamStep at_rate(float share) const {
+    AdamStep step = *this;
+    step.learning_rate *= share;
+    step.step_size *= share;
+    return step;
+  }
   /// The factor that decoupled weight decay applies to a parameter.  @param decay  in units of the learning rate
   [[nodiscard]] CNERF_HD float kept(float decay) const { return 1 - learning_rate * decay; }
 

@@ -10,6 +10,7 @@
 #include "src/capture/arrangement.h"
 #include "src/capture/image_header.h"
 #include "src/pipeline/run_directory.h"
+#include "src/train/luminance/learned_views.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
@@ -98,6 +99,9 @@ void add_run(Report& report, const RunDirectory& directory) {
   report.line("stage 1", "{} steps, {}, {:.2f} dB on training pixels", record.stage1.steps,
               duration_text(record.stage1.seconds), record.stage1.train_psnr);
   add_scene(report, directory.stage1_snapshot(), {});
+  for (const auto& [name, text] : facts_of(LuminanceModel::learned_views_in(directory.stage1_snapshot()))) {
+    report.line(name, "{}", text);
+  }
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(directory.root() / "takes", none)) {
     const std::string name = entry.path().filename().string();

@@ -31,12 +31,13 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& observ
   if (!job.grey) choose_colorizer(job.capture, config, observer);
   job.capture = capture_of(job.capture, job.out, observer);
 
-  const RunContext context{directory, config, read_capture(job.capture, config, observer), job.command_line};
+  RunContext context{directory, config, read_capture(job.capture, config, observer), job.command_line};
   // Made before the training: what cannot be made or read should not cost an hour.
   if (!job.grey) (void)load_known_colors(context.capture, context.config.colorizer);
   const auto colorizer = needs_colorizer(job, directory) ? colorizer_of(context, observer) : nullptr;
   begin_run(context, job.capture, job.existing);
   train_step(context, job.existing.resume, engines, observer);
+  use_learned_views(context, observer);
 
   std::string take;
   if (!job.grey) {

@@ -9,6 +9,7 @@
 #include "src/base/text.h"
 #include "src/capture/load_capture.h"
 #include "src/pipeline/version.h"
+#include "src/train/luminance/learned_views.h"
 #include "src/train/luminance/stage1.h"
 
 namespace cnerf::pipeline {
@@ -40,6 +41,12 @@ Capture read_capture(const fs::path& path, const Config& config, Observer& obser
                            capture.views.size(), first.width, first.height, held_out));
   for (const std::string& note : capture.notes) observer.say("note: " + note);
   return capture;
+}
+
+void use_learned_views(RunContext& context, Observer& observer) {
+  for (const std::string& line : apply_learned_views(context.capture, context.directory.stage1_snapshot())) {
+    observer.say(line);
+  }
 }
 
 void check_run_folder(const RunDirectory& directory, const ExistingOutput& existing) {

@@ -28,6 +28,10 @@ struct ExistingOutput {
   bool overwrite = false;  ///< start again
 };
 
+/// Puts what a finished stage 1 learned of its views into the context's capture, and says it. Not for going on with
+/// stage 1, which learns from the capture as it is.  @throws SnapshotError
+void use_learned_views(RunContext& context, Observer& observer);
+
 /// Reads a capture and says what was found, with the reader's notes.
 [[nodiscard]] Capture read_capture(const std::filesystem::path& path, const Config& config, Observer& observer);
 

@@ -6,10 +6,14 @@ namespace {
 /// The views of a capture in host memory.
 struct HostViews {
   const std::vector<TrainingView>& views;
+  std::span<const ViewCorrection> corrections;
 
   [[nodiscard]] std::uint32_t count() const { return std::uint32_t(views.size()); }
   [[nodiscard]] ImageSize size_of(std::uint32_t v) const { return {views[v].image->width, views[v].image->height}; }
   [[nodiscard]] const UnitCamera& camera(std::uint32_t v) const { return views[v].camera; }
+  [[nodiscard]] ViewCorrection correction(std::uint32_t v) const {
+    return corrections.empty() ? ViewCorrection() : corrections[v];
+  }
   [[nodiscard]] bool is_valid(std::uint32_t v, std::size_t pixel) const { return views[v].image->valid(pixel); }
   [[nodiscard]] float luminance(std::uint32_t v, std::size_t pixel) const { return views[v].image->luminance(pixel); }
   [[nodiscard]] float coverage(std::uint32_t v, std::size_t pixel) const { return views[v].image->coverage(pixel); }
@@ -18,8 +22,8 @@ struct HostViews {
 }  // namespace
 
 ObservedRay observe_ray(const std::vector<TrainingView>& views, std::uint64_t seed, std::uint64_t step,
-                        std::uint64_t ray) {
-  return observe_ray(HostViews{views}, seed, step, ray);
+                        std::uint64_t ray, std::span<const ViewCorrection> corrections) {
+  return observe_ray(HostViews{views, corrections}, seed, step, ray);
 }
 
 }  // namespace cnerf

@@ -4,12 +4,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "src/base/host_device.h"
 #include "src/base/rng.h"
 #include "src/color/colorspace_math.h"
 #include "src/render/training_views.h"
+#include "src/render/view_correction.h"
 
 namespace cnerf {
 
@@ -18,6 +20,7 @@ struct RayTarget {
   float luminance = 0;   ///< linear Y over black
   float coverage = 1;    ///< alpha of the pixel
   float background = 0;  ///< linear Y put behind ray and pixel alike
+  float gain = 1;        ///< of the view: its light over that of the scene
 
   /// What is to be seen with the background behind it; linear Y.
   [[nodiscard]] CNERF_HD float wanted() const { return luminance + (1.0f - coverage) * background; }
@@ -26,7 +29,8 @@ struct RayTarget {
 struct ObservedRay {
   Ray ray;
   RayTarget target;
-  float jitter = 0;  ///< in [0, 1): of the samples along the ray
+  float jitter = 0;        ///< in [0, 1): of the samples along the ray
+  std::uint32_t view = 0;  ///< that shows it
 };
 
 struct ImageSize {
@@ -48,8 +52,8 @@ CNERF_HD PickedPixel pick_pixel(const Views& views, const CounterRng& rng, std::
   return {v, int(rng.below(at + 1, std::uint32_t(image.width))), int(rng.below(at + 2, std::uint32_t(image.height)))};
 }
 
-/// @tparam Views  count(), and of view v: size_of(v), camera(v); of its pixel i = y * width + x: is_valid(v, i),
-///                luminance(v, i), coverage(v, i)
+/// @tparam Views  count(), and of view v: size_of(v), camera(v), correction(v); of its pixel i = y * width + x:
+///                is_valid(v, i), luminance(v, i), coverage(v, i)
 template <typename Views>
 [[nodiscard]] CNERF_HD ObservedRay observe_ray(const Views& views, std::uint64_t seed, std::uint64_t step,
                                                std::uint64_t ray) {
@@ -66,7 +70,10 @@ template <typename Views>
 
   const CounterRng rng(seed ^ named_stream("jitt"), step);
   ObservedRay observed;
-  observed.ray = views.camera(picked.view).ray({picked.x + 0.5, picked.y + 0.5});
+  const ViewCorrection correction = views.correction(picked.view);
+  observed.view = picked.view;
+  observed.ray = correction.applied_to(views.camera(picked.view).ray({picked.x + 0.5, picked.y + 0.5}));
+  observed.target.gain = correction.gain();
   observed.target.luminance = views.luminance(picked.view, pixel);
   observed.target.coverage = views.coverage(picked.view, pixel);
   observed.jitter = rng.uniform(2 * ray);
@@ -76,7 +83,8 @@ template <typename Views>
   return observed;
 }
 
+/// @param corrections  of the views; empty: none
 [[nodiscard]] ObservedRay observe_ray(const std::vector<TrainingView>& views, std::uint64_t seed, std::uint64_t step,
-                                      std::uint64_t ray);
+                                      std::uint64_t ray, std::span<const ViewCorrection> corrections = {});
 
 }  // namespace cnerf

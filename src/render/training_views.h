@@ -1,6 +1,7 @@
 #pragma once
 /// What a training step draws its pixels from: images and poses in unit space. No colour: MonoImage has none.
 
+#include <algorithm>
 #include <vector>
 
 #include "src/capture/camera_math.h"
@@ -37,14 +38,26 @@ struct UnitCamera {
 struct TrainingView {
   UnitCamera camera;
   const MonoImage* image = nullptr;
+  int lens = 0;  ///< its place among the lenses that views share
 };
+
+/// The lenses of the views that are not held out, each once.
+[[nodiscard]] inline std::vector<Intrinsics> lenses_of(const Capture& capture) {
+  std::vector<Intrinsics> lenses;
+  for (const View& view : capture.views) {
+    if (!view.held_out && std::ranges::find(lenses, view.intrinsics) == lenses.end()) lenses.push_back(view.intrinsics);
+  }
+  return lenses;
+}
 
 /// The views that are not held out. `capture` must outlive the result.
 [[nodiscard]] inline std::vector<TrainingView> training_views(const Capture& capture, const SceneFrame& frame) {
   std::vector<TrainingView> views;
+  const std::vector<Intrinsics> lenses = lenses_of(capture);
   for (const View& view : capture.views) {
     if (view.held_out) continue;
-    views.push_back({UnitCamera(view.intrinsics, view.world_from_camera, frame), &view.image});
+    views.push_back({UnitCamera(view.intrinsics, view.world_from_camera, frame), &view.image,
+                     int(std::ranges::find(lenses, view.intrinsics) - lenses.begin())});
   }
   return views;
 }

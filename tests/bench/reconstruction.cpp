@@ -5,9 +5,10 @@
 //   reconstruction CAPTURE [downscale=1] [holdout=8] [seconds=60] [option=value ...]
 //   reconstruction CAPTURE [downscale=1] [holdout=8] samples=70,140,340 [pictures=FOLDER] [option=value ...]
 //
-// With `points=1` sparse points are triangulated first. With `validation=N` every N-th of the views to be trained on is
-// judged instead of the held-out ones. Options are stage 1's by their short names, e.g. grid.log2_rows=16
-// steps_per_box=512 samples_per_step=65536.
+// `gain`, `degrees`, `shift` and `focal` make the capture worse first (Disturbance); `aligned=1` fits the poses of
+// held-out views. With `points=1` sparse points are triangulated first. With `validation=N` every N-th of the views to
+// be trained on is judged instead of the held-out ones. Options are stage 1's by their short names, e.g.
+// grid.log2_rows=16 steps_per_box=512 samples_per_step=65536.
 
 #include <algorithm>
 #include <chrono>
@@ -23,6 +24,7 @@
 #include "src/prepare/sparse_points.h"
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/options_json.h"
+#include "tests/support/disturbed_capture.h"
 #include "tests/support/held_out_views.h"
 #include "tests/support/occupied_share.h"
 #include "tests/support/validation_fold.h"
@@ -101,7 +103,9 @@ int main(int argc, char** argv) {
     return 64;
   }
   std::map<std::string, double> own = {{"downscale", 1}, {"holdout", 8}, {"seconds", 60}, {"eval_every", 1},
-                                       {"verbose", 0},   {"points", 0},  {"first", 0.25}, {"validation", 0}};
+                                       {"verbose", 0},   {"points", 0},  {"first", 0.25}, {"validation", 0},
+                                       {"gain", 0},      {"degrees", 0}, {"shift", 0},    {"aligned", 0},
+                                       {"focal", 0}};
   std::string pictures;       // a folder for what is seen of the held-out views
   std::vector<double> marks;  // of the training's length: million samples if given, else seconds
   nlohmann::json json = cnerf::options_to_json(cnerf::Stage1Options{});
@@ -132,6 +136,8 @@ int main(int argc, char** argv) {
   cnerf::Capture capture = cnerf::load_capture(argv[1], capture_options);
   if (own["validation"] > 0) cnerf::test::hold_out_of_training(capture, int(own["validation"]));
   if (own["points"] > 0) print_points(capture);
+  const std::vector<cnerf::Affined> truth = cnerf::test::training_poses(capture);
+  cnerf::test::disturb(capture, {own["gain"], own["degrees"], own["shift"], own["focal"]});
   cnerf::LuminanceModel model = cnerf::LuminanceModel::create(capture, options, cnerf::cpu_engines());
   const auto views = cnerf::training_views(capture, model.frame);
   model.engine->set_views(views);
@@ -183,7 +189,10 @@ int main(int argc, char** argv) {
     std::printf("rendered, %s: %.3f dB, %.2f s a view, median transmittance %.5f\n", name, psnr,
                 seconds_since(start) / double(held_out), *middle);
   }
-  cnerf::test::print_held_out(
-      cnerf::test::judge_held_out(capture, model.frame, *model.engine, model.march(), quick, pictures));
+  cnerf::test::Judge judge{capture, model.frame, *model.engine, model.march(), quick, pictures};
+  if (own["aligned"] > 0) {
+    judge.alignment = cnerf::test::print_alignment(judge, truth);
+  }
+  cnerf::test::print_held_out(judge.judge());
   return 0;
 }

@@ -7,6 +7,7 @@
 
 #include "tests/cuda/check.h"
 #include "tests/cuda/packed_capture.h"
+#include "tests/support/disturbed_capture.h"
 #include "tests/support/held_out_views.h"
 #include "tests/support/occupied_share.h"
 
@@ -30,7 +31,7 @@ double held_out_psnr(const PackedCapture& packed, const LuminanceEngine& engine,
                      double min_transmittance) {
   double total = 0;
   const std::vector<HeldOutView> views =
-      judge_held_out(packed.capture, packed.frame, engine, march, {float(min_transmittance)});
+      Judge{packed.capture, packed.frame, engine, march, {float(min_transmittance)}}.judge();
   for (const HeldOutView& view : views) total += view.as_given;
   return views.empty() ? 0 : total / double(views.size());
 }
@@ -50,10 +51,33 @@ void exclude(const PackedCapture& packed, LuminanceEngine& engine, const Occupan
   });
 }
 
+int lenses_among(const std::vector<TrainingView>& views) {
+  int most = 0;
+  for (const TrainingView& view : views) most = std::max(most, view.lens);
+  return most + 1;
+}
+
+void set_learning(LuminanceEngineOptions& options, const Arguments& arguments, const std::vector<TrainingView>& views) {
+  const bool exposures = arguments.number("exposures", 0) > 0, poses = arguments.number("poses", 0) > 0;
+  const bool lenses = arguments.number("lenses", 0) > 0;
+  if (!exposures && !poses && !lenses) return;
+  options.learning = {int(views.size()), lenses ? lenses_among(views) : 0, exposures, poses};
+  ViewLearning& learning = options.learning;
+  learning.gain_rate = float(arguments.number("gain_rate", learning.gain_rate));
+  learning.lens_rate = float(arguments.number("lens_rate", learning.lens_rate));
+  learning.pose_rate = float(arguments.number("pose_rate", learning.pose_rate));
+  learning.pose_warm_up = int(arguments.number("pose_warm_up", learning.pose_warm_up));
+  learning.finest_pose_cells = int(arguments.number("pose_cells", learning.finest_pose_cells));
+  learning.pose_blocks = int(arguments.number("pose_blocks", learning.pose_blocks));
+}
+
 }  // namespace
 
 int train(const Arguments& arguments) {
-  const PackedCapture packed = read_packed(arguments.text("capture", "."));
+  PackedCapture packed = read_packed(arguments.text("capture", "."));
+  const std::vector<Affined> truth = training_poses(packed.capture);
+  disturb(packed.capture, {arguments.number("gain", 0), arguments.number("degrees", 0), arguments.number("shift", 0),
+                           arguments.number("focal", 0)});
   const std::vector<TrainingView> views = training_views(packed.capture, packed.frame);
   const double seconds = arguments.number("seconds", 10), rate = arguments.number("rate", 1e-2);
   const double final_rate = arguments.number("final_rate", 5e-4), hold = arguments.number("hold", 0.5);
@@ -64,6 +88,7 @@ int train(const Arguments& arguments) {
   for (int seed = 1; seed <= int(arguments.number("seeds", 1)); ++seed) {
     LuminanceEngineOptions options = engine_options(arguments, packed.frame.cascades);
     options.seed = std::uint64_t(seed);
+    set_learning(options, arguments, views);
     const std::size_t free_before = free_bytes();
     const auto made = make_cuda_luminance_engine(options);
     LuminanceEngine& engine = *made;
@@ -96,8 +121,11 @@ int train(const Arguments& arguments) {
                 occupied_share(engine.occupancy(), {options.occupancy.resolution, options.cascades}));
     if (arguments.number("views", 0) > 0) {
       const std::string pictures = seed == 1 ? arguments.text("pictures", "") : "";
-      print_held_out(judge_held_out(packed.capture, packed.frame, engine, options.march,
-                                    {float(arguments.number("min_transmittance", 1e-3))}, pictures));
+      Judge judge{
+          packed.capture, packed.frame, engine, options.march, {float(arguments.number("min_transmittance", 1e-3))},
+          pictures};
+      if (arguments.number("aligned", 0) > 0) judge.alignment = print_alignment(judge, truth);
+      print_held_out(judge.judge());
     }
   }
   return 0;
@@ -106,7 +134,8 @@ int train(const Arguments& arguments) {
 int bench(const Arguments& arguments) {
   const PackedCapture packed = read_packed(arguments.text("capture", "."));
   const std::vector<TrainingView> views = training_views(packed.capture, packed.frame);
-  const LuminanceEngineOptions options = engine_options(arguments, packed.frame.cascades);
+  LuminanceEngineOptions options = engine_options(arguments, packed.frame.cascades);
+  set_learning(options, arguments, views);
   const std::size_t free_before = free_bytes();
   const Clock::time_point begin = Clock::now();
   const auto made = make_cuda_luminance_engine(options);

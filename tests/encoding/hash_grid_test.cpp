@@ -112,6 +112,24 @@ TEST(HashGridMath, BackwardMatchesCentralDifference) {
   EXPECT_GT(test::worst_relative_error(flipped, numeric), 0.5);
 }
 
+TEST(HashGridMath, PositionGradientMatchesCentralDifference) {
+  const std::vector<GridLevel> levels = hash_grid_levels(small_options());
+  const std::vector<double> table = random_values<double>(4 * total_rows(levels), 7, -1, 1);
+  const std::vector<double> positions = random_values<double>(3 * 20, 8, 0.01, 0.99);
+  const std::vector<double> d_encoded = random_values<double>(20 * 4 * levels.size(), 9, -1, 1);
+  const auto loss = [&](const std::vector<double>& places) {
+    const std::vector<double> encoded = encode_reference(levels, table, places);
+    return std::inner_product(encoded.begin(), encoded.end(), d_encoded.begin(), 0.0);
+  };
+  std::vector<std::size_t> all(positions.size());
+  std::iota(all.begin(), all.end(), std::size_t(0));
+  const std::vector<double> numeric = test::central_difference(positions, all, 1e-7, loss);
+  const std::vector<double> analytic = position_gradient_reference(levels, levels.size(), table, positions, d_encoded);
+  EXPECT_LT(test::worst_relative_error(analytic, numeric), 1e-5);  // linear along an axis: rounding only
+  const std::vector<double> of_coarse = position_gradient_reference(levels, 1, table, positions, d_encoded);
+  EXPECT_GT(test::worst_relative_error(of_coarse, numeric), 0.5);
+}
+
 class HashGridBackends : public testing::TestWithParam<std::tuple<IsaLevel, std::size_t>> {};
 
 TEST_P(HashGridBackends, EqualReference) {
@@ -135,6 +153,15 @@ TEST_P(HashGridBackends, EqualReference) {
 
   const std::vector<float> d_encoded = random_values<float>(n * channels, 13, -1, 1);
   const AlignedVector<float> d_grouped = to_groups(d_encoded, channels, 0.0f);
+  for (const std::size_t counted : {std::size_t(2), levels.size()}) {
+    AlignedVector<float> d_positions(groups_of(n) * 3 * kGroup, -1.0f);
+    hash_grid_kernels().position_gradient(levels.data(), counted, aligned_table.data(), grouped.data(),
+                                          d_grouped.data(), groups_of(n), channels, d_positions.data());
+    const std::vector<float> d_expected = position_gradient_reference(levels, counted, table, positions, d_encoded);
+    // Sums over levels of products with up to 61 cells.
+    const std::vector<float> d_got = from_groups(d_positions, 3, n);
+    for (std::size_t i = 0; i < d_expected.size(); ++i) ASSERT_NEAR(d_got[i], d_expected[i], 3e-4f) << i;
+  }
   AlignedVector<float> d_table(table.size(), 0.0f);
   for (std::size_t l = 0; l < levels.size(); ++l) {
     hash_grid_kernels().scatter_level(levels[l], grouped.data(), d_grouped.data(), groups_of(n), channels, 4 * int(l),

@@ -23,6 +23,7 @@ struct Problem {
   int levels, log2_rows, finest, cascades;
   bool with_alpha = false, with_lens = false, with_exposures = false;
   float distortion_weight = 0;
+  bool learns_views = false;
 };
 
 /// Views, options, and engines that share a state that the generic processor trained.
@@ -51,6 +52,7 @@ class Scene {
     options_.march = march_settings(problem.cascades, 64, 1.0 / 64);
     options_.samples_per_step = 8192;
     options_.distortion_weight = problem.distortion_weight;
+    if (problem.learns_views) options_.learning = {int(views_.size()), 1, true, true};
   }
 
   [[nodiscard]] const std::vector<TrainingView>& views() const { return views_; }
@@ -89,6 +91,14 @@ void append_gradients(LuminanceEngine& engine, std::vector<Result>& results) {
   results.push_back({"squared error", {found.report.squared_error}});
   results.push_back({"gradient of the table", doubles(found.table)});
   results.push_back({"gradient of the nets", doubles(found.weights)});
+  if (found.views.empty()) return;
+  std::vector<double> by_gain, by_pose;
+  for (std::size_t i = 0; i < found.views.size(); ++i) {
+    (i % kViewNumbers == 0 ? by_gain : by_pose).push_back(found.views[i]);
+  }
+  results.push_back({"gradient of the gains", by_gain});
+  results.push_back({"gradient of the poses", by_pose});
+  results.push_back({"gradient of the lens", doubles(found.lenses)});
 }
 
 void append_queries(const LuminanceEngine& engine, std::vector<Result>& results) {
@@ -169,18 +179,30 @@ Op stage1(const Problem& problem) {
                {"loss", 1e-3, 5e-3},
                {"squared error", 1e-3, 5e-3},
                {"gradient of the table", 1e-3, 3e-2},
-               {"gradient of the nets", 1e-3, 3e-2, Measure::kGradient},
-               {"density of points", 1e-4, 1e-2},
-               {"luminance of points", 1e-4, 5e-3},
-               {"rendered luminance", 1e-3, 1e-2},
-               {"rendered opacity", 1e-3, 1e-2},
-               {"rendered depth", 1e-3, 1e-2}};
+               {"gradient of the nets", 1e-3, 3e-2, Measure::kGradient}};
+  std::vector<std::string> pieces = {"grid.table",
+                                     "grid.moments",
+                                     "density_net.weights",
+                                     "density_net.first_moments",
+                                     "density_net.second_moments",
+                                     "luminance_net.weights",
+                                     "luminance_net.first_moments",
+                                     "luminance_net.second_moments",
+                                     "occupancy"};
+  if (problem.learns_views) {
+    op.bounds.push_back({"gradient of the gains", 1e-3, 1e-2, Measure::kGradient});
+    op.bounds.push_back({"gradient of the poses", 1e-3, 3e-2, Measure::kGradient});
+    op.bounds.push_back({"gradient of the lens", 1e-3, 3e-2, Measure::kGradient});
+    pieces.insert(pieces.end(), {"views", "views.moments", "lenses", "lenses.moments"});
+  }
+  op.bounds.push_back({"density of points", 1e-4, 1e-2});
+  op.bounds.push_back({"luminance of points", 1e-4, 5e-3});
+  for (const char* rendered : {"rendered luminance", "rendered opacity", "rendered depth"}) {
+    op.bounds.push_back({rendered, 1e-3, 1e-2});
+  }
   // Where gradients are mostly noise, Adam's step has either sign.
-  for (const char* piece :
-       {"grid.table", "grid.moments", "density_net.weights", "density_net.first_moments", "density_net.second_moments",
-        "luminance_net.weights", "luminance_net.first_moments", "luminance_net.second_moments", "occupancy"}) {
-    const std::string name = "after a step: " + std::string(piece);
-    op.bounds.push_back({name, 1e-2, name.ends_with("moments") ? 3e-2 : 1e-2});
+  for (const std::string& piece : pieces) {
+    op.bounds.push_back({"after a step: " + piece, 1e-2, piece.ends_with("moments") ? 3e-2 : 1e-2});
   }
   return op;
 }
@@ -234,6 +256,7 @@ std::vector<Op> luminance_ops() {
           stage1({"Stage1WithAlpha", 3, 12, 20, 1, true}),
           stage1({"Stage1WithCascadesLensAndMask", 12, 14, 128, 3, false, true}),
           stage1({"Stage1WithManyLevels", 16, 13, 128, 2}),
+          stage1({"Stage1WithLearnedViews", 8, 14, 64, 2, false, true, true, 0, true}),
           stage1_learning({"Stage1Learns", 8, 14, 64, 1, false, false, true}),
           stage1_learning({"Stage1LearnsWithCascades", 12, 14, 128, 3, false, true}),
           out_of_memory()};

@@ -34,6 +34,18 @@ namespace cnerf::test {
   return gradient;
 }
 
+/// The same of structs whose first and second moments take turns; empty where there is no such piece.
+[[nodiscard]] inline std::vector<float> gradient_of_structs(const std::vector<StatePiece>& state,
+                                                            const std::string& name, std::size_t numbers) {
+  std::vector<float> gradient;
+  if (std::ranges::find(state, name, &StatePiece::name) == state.end()) return gradient;
+  const std::vector<float> both = gradient_in(state, name);
+  for (std::size_t i = 0; i < both.size(); ++i) {
+    if (i % (2 * numbers) < numbers) gradient.push_back(both[i]);
+  }
+  return gradient;
+}
+
 /// Copies the state of one engine into another, as a snapshot does.
 template <typename From, typename To>
 void copy_state(From& from, To& to) {
@@ -60,6 +72,8 @@ void forget_moments(Engine& engine) {
 struct Stage1Gradients {
   std::vector<float> table;    ///< [rows, 4]
   std::vector<float> weights;  ///< density net, then luminance net
+  std::vector<float> views;    ///< of each view: log gain, turn, shift; empty where they are not learned
+  std::vector<float> lenses;   ///< of each lens, in LensCorrection's order; likewise
   StepReport report;
 };
 /// Leaves the engine as it was. Not for a step that updates the occupancy grid first.
@@ -75,6 +89,8 @@ struct Stage1Gradients {
     const std::vector<float> of_net = gradient_in(state, std::string(net) + ".first_moments");
     found.weights.insert(found.weights.end(), of_net.begin(), of_net.end());
   }
+  found.views = gradient_of_structs(state, "views.moments", kViewNumbers);
+  found.lenses = gradient_of_structs(state, "lenses.moments", kLensNumbers);
   for (std::size_t i = 0; i < kept.size(); ++i) std::ranges::copy(kept[i], state[i].bytes.begin());
   engine.state_loaded();
   return found;

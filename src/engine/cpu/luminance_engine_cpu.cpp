@@ -38,9 +38,11 @@ class LuminanceEngineCpu final : public LuminanceEngine {
  public:
   explicit LuminanceEngineCpu(const LuminanceEngineOptions& options);
 
-  void set_views(const std::vector<TrainingView>& views) override { views_ = views; }
+  void set_views(const std::vector<TrainingView>& views) override;
   StepReport step(float learning_rate) override;
   [[nodiscard]] long step_count() const override { return counters_.front(); }
+  [[nodiscard]] std::vector<ViewCorrection> view_corrections() const override { return corrections_; }
+  [[nodiscard]] std::vector<LensCorrection> lens_corrections() const override { return lenses_; }
 
   void render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
               std::span<RayResult> results) const override;
@@ -55,6 +57,13 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   void state_loaded() override;
 
  private:
+  /// Of which cameras' numbers a block's samples are asked.
+  struct Teaching {
+    bool camera = false, lens = false;  ///< the lens's are part of the camera's
+  };
+  [[nodiscard]] Teaching teaching(std::uint32_t ray) const {
+    return {options_.learning.teaches_camera(ray), options_.learning.teaches_lens(ray)};
+  }
   /// A step of a ray, and the weight that the density-first pass found.
   struct MarchedSample {
     float t = 0, dt = 0, weight = 0;
@@ -65,6 +74,7 @@ class LuminanceEngineCpu final : public LuminanceEngine {
     std::vector<std::size_t> offsets;  // [rays + 1]
     AlignedVector<float> positions;    // [G, 3, 16]
     LuminanceWorkspace work;
+    AlignedVector<float> d_positions;  // [G, 3, 16]
     // Scratch of the density-first pass.
     std::vector<std::vector<MarchedSample>> of_ray;
     AlignedVector<float> wave_positions, wave_sigma;
@@ -96,16 +106,29 @@ class LuminanceEngineCpu final : public LuminanceEngine {
                            Block& block) const;
   void shade(std::span<const Ray> rays, Block& block) const;
   /// Samples, loss and gradients of a block's rays.
-  void train_block(std::span<const ObservedRay> rays, float gradient_scale, Block& block, StepChunk& chunk) const;
+  void train_block(std::span<const ObservedRay> rays, float gradient_scale, Teaching teaching, Block& block,
+                   StepChunk& chunk) const;
   /// Loss of one ray of a shaded block; sets the gradients of its samples.
   void train_ray(const ObservedRay& ray, std::size_t index, float gradient_scale, Block& block, StepChunk& chunk) const;
+  /// What the block's samples say of the poses of their views, and of their lenses.
+  void add_camera_gradients(std::span<const ObservedRay> rays, const float* d_encoded, Teaching teaching, Block& block,
+                            StepChunk& chunk) const;
+  void update_corrections(float learning_rate);
+  void update_lenses(const AdamStep& adam);
+  /// Gives the views' cameras the lenses that were learned.
+  void use_lenses();
   [[nodiscard]] StepReport report() const;
 
   LuminanceEngineOptions options_;
   LuminanceFieldCpu field_;
   OccupancyGrid occupancy_;
   std::vector<TrainingView> views_;
-  std::vector<std::int64_t> counters_;  // steps done, rays of the next step
+  std::vector<ViewCorrection> corrections_;  // of the views, where they are learned
+  std::vector<ViewMoments> correction_moments_;
+  std::vector<LensCorrection> lenses_;  // likewise; the views' cameras have them
+  std::vector<LensMoments> lens_moments_;
+  std::vector<Intrinsics> given_lenses_;  // of each view
+  std::vector<std::int64_t> counters_;    // steps done, rays of the next step
   StepChunks chunks_;
   mutable tbb::enumerable_thread_specific<Block> blocks_;
 };
@@ -114,7 +137,27 @@ LuminanceEngineCpu::LuminanceEngineCpu(const LuminanceEngineOptions& options)
     : options_(options),
       field_(options.grid, 1.0f / std::ldexp(1.0f, 1 - options.cascades), options.max_luminance, options.seed),
       occupancy_(options.occupancy, options.cascades),
-      counters_{0, first_rays(options.samples_per_step)} {}
+      corrections_(std::size_t(options.learning.views)),
+      correction_moments_(std::size_t(options.learning.views)),
+      lenses_(std::size_t(options.learning.lenses)),
+      lens_moments_(std::size_t(options.learning.lenses)),
+      counters_{0, first_rays(options.samples_per_step)},
+      chunks_(std::size_t(options.learning.views), std::size_t(options.learning.lenses)) {}
+
+void LuminanceEngineCpu::set_views(const std::vector<TrainingView>& views) {
+  if (options_.learning.is_on()) CNERF_CHECK_EQ(views.size(), corrections_.size());
+  views_ = views;
+  given_lenses_.clear();
+  for (const TrainingView& view : views) given_lenses_.push_back(view.camera.intrinsics);
+  use_lenses();
+}
+
+void LuminanceEngineCpu::use_lenses() {
+  if (lenses_.empty()) return;
+  for (std::size_t v = 0; v < views_.size(); ++v) {
+    views_[v].camera.intrinsics = lenses_[std::size_t(views_[v].lens)].applied_to(given_lenses_[v]);
+  }
+}
 
 void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
                                  float min_transmittance, Block& block) const {
@@ -204,8 +247,8 @@ void LuminanceEngineCpu::shade(std::span<const Ray> rays, Block& block) const {
   field_.forward(block.positions.data(), block.work);
 }
 
-void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gradient_scale, Block& block,
-                                     StepChunk& chunk) const {
+void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gradient_scale, Teaching teaching,
+                                     Block& block, StepChunk& chunk) const {
   std::array<Ray, kBlockRays> plain_rays;
   std::array<float, kBlockRays> jitter{};
   for (std::size_t r = 0; r < rays.size(); ++r) {
@@ -222,6 +265,7 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
   }
   float* d_encoded = chunk.append(block.positions, block.work.groups, field_.encoded_channels());
   field_.backward(block.work, d_encoded, chunk.d_weights.data());
+  if (teaching.camera) add_camera_gradients(rays, d_encoded, teaching, block, chunk);
   chunk.trained += block.samples.size();
 }
 
@@ -242,7 +286,8 @@ void LuminanceEngineCpu::train_ray(const ObservedRay& ray, std::size_t index, fl
   chunk.loss += ray_loss(error, distortion.value, distortion_weight);
   chunk.squared_error += squared_error(seen, ray.target);
 
-  const RayGradient gradient(error, distortion, distortion_weight, gradient_scale);
+  const RayGradient gradient(error, ray.target.gain, distortion, distortion_weight, gradient_scale);
+  if (options_.learning.exposures) chunk.d_views[ray.view].by_log_gain += gradient.by_log_gain(seen);
   float distortion_behind = gradient.distortion_of_all();
   light = {};
   Distortion<float> before;
@@ -260,6 +305,60 @@ void LuminanceEngineCpu::train_ray(const ObservedRay& ray, std::size_t index, fl
     }
     field_.set_gradient(block.work, s, d_sigma, gradient.by_luminance(sample));
   }
+}
+
+void LuminanceEngineCpu::add_camera_gradients(std::span<const ObservedRay> rays, const float* d_encoded,
+                                              Teaching teaching, Block& block, StepChunk& chunk) const {
+  ensure_size(block.d_positions, block.work.groups * 3 * kGroup);
+  field_.position_gradient(options_.learning.pose_levels(field_.levels()), block.positions.data(), d_encoded,
+                           block.work.groups, block.d_positions.data());
+  const GroupedView<const float> positions(block.positions, 3), d_positions(block.d_positions, 3);
+  const auto at = [](const GroupedView<const float>& grouped, std::size_t s) {
+    return Vec3f{grouped.at(s, 0), grouped.at(s, 1), grouped.at(s, 2)};
+  };
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    ViewGradient& gradient = chunk.d_views[rays[r].view];
+    Vec3f by_direction;
+    for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
+      const Vec3f arm = at(positions, s) - rays[r].ray.origin, by_point = at(d_positions, s);
+      gradient.add(arm, by_point);
+      by_direction += length(arm) * by_point;
+    }
+    if (!teaching.lens) continue;
+    const TrainingView& view = views_[rays[r].view];
+    add_lens_gradient(view.camera, given_lenses_[rays[r].view], corrections_[rays[r].view].turn, rays[r].ray.direction,
+                      by_direction, chunk.d_lenses[std::size_t(view.lens)]);
+  }
+}
+
+void LuminanceEngineCpu::update_corrections(float learning_rate) {
+  const AdamStep adam(learning_rate, step_count());
+  const auto n = int(corrections_.size());
+  for (std::size_t v = 0; v < corrections_.size(); ++v) {
+    ViewGradient sum;
+    for (const StepChunk& chunk : chunks_.all()) sum += chunk.d_views[v];
+    update_view(options_.learning, adam, step_count(), sum, correction_moments_[v], corrections_[v]);
+  }
+  update_lenses(adam);
+  if (step_count() % kGaugeEvery != 0) return;
+  const auto origin = [&](int v) { return views_[std::size_t(v)].camera.origin.cast<float>(); };
+  ViewGauge gauge = pose_gauge(corrections_.data(), n, origin);
+  for (int v = 0; v < n; ++v) {
+    if (is_median_gain(corrections_.data(), n, v)) gauge.log_gain = corrections_[std::size_t(v)].log_gain;
+  }
+  for (int v = 0; v < n; ++v) gauge.take_off(origin(v), corrections_[std::size_t(v)]);
+}
+
+void LuminanceEngineCpu::update_lenses(const AdamStep& adam) {
+  for (std::size_t l = 0; l < lenses_.size(); ++l) {
+    LensGradient sum;
+    for (const StepChunk& chunk : chunks_.all()) sum += chunk.d_lenses[l];
+    const auto first = std::ranges::find(views_, int(l), &TrainingView::lens);
+    const Intrinsics& given = given_lenses_[std::size_t(first - views_.begin())];
+    update_lens(options_.learning.of_cameras(adam, options_.learning.lens_rate, step_count()), given, sum,
+                lens_moments_[l], lenses_[l]);
+  }
+  use_lenses();
 }
 
 StepReport LuminanceEngineCpu::report() const {
@@ -281,16 +380,19 @@ StepReport LuminanceEngineCpu::step(float learning_rate) {
                       [this](std::span<const Vec3f> points, std::span<float> sigma) { query_density(points, sigma); });
   }
   const auto rays = std::size_t(counters_[1]);
+  static_assert(kBlockRays == kPoseRayBlock);
   chunks_.run(rays, kBlockRays, field_.weight_count(), [&](StepChunk& chunk, std::size_t begin, std::size_t end) {
     std::array<ObservedRay, kBlockRays> observed;
     for (std::size_t r = begin; r < end; ++r) {
-      observed[r - begin] = observe_ray(views_, options_.seed, step, r);
+      observed[r - begin] = observe_ray(views_, options_.seed, step, r, corrections_);
     }
-    train_block({observed.data(), end - begin}, 1.0f / float(rays), blocks_.local(), chunk);
+    train_block({observed.data(), end - begin}, 1.0f / float(rays), teaching(std::uint32_t(begin)), blocks_.local(),
+                chunk);
   });
   const StepReport done = report();
   counters_[0] += 1;
   field_.update(chunks_.runs(), chunks_.d_weights(), learning_rate, counters_[0]);
+  if (options_.learning.is_on()) update_corrections(learning_rate);
   counters_[1] = next_rays(counters_[1], std::int64_t(done.trained_samples), options_.samples_per_step);
   return done;
 }
@@ -384,12 +486,21 @@ std::vector<StatePiece> LuminanceEngineCpu::state() {
   field_.append_state(state);
   state.push_back(state_piece("occupancy", occupancy_.densities()));
   state.push_back(state_piece("counters", counters_));
+  if (options_.learning.is_on()) {
+    state.push_back(state_piece("views", corrections_));
+    state.push_back(state_piece("views.moments", correction_moments_));
+  }
+  if (!lenses_.empty()) {
+    state.push_back(state_piece("lenses", lenses_));
+    state.push_back(state_piece("lenses.moments", lens_moments_));
+  }
   return state;
 }
 
 void LuminanceEngineCpu::state_loaded() {
   field_.state_loaded();
   occupancy_.refresh_bits();
+  use_lenses();
 }
 
 }  // namespace

@@ -34,7 +34,11 @@ class LuminanceEngineCuda final : public LuminanceEngine {
         occupancy_(options.occupancy, options.cascades),
         occupancy_memory_(occupancy_.densities().size(), options.cascades),
         tracer_({options.occupancy.resolution, options.cascades}, occupancy_memory_.bits.data(), stream_),
-        counters_{0, first_rays(options.samples_per_step)} {
+        counters_{0, first_rays(options.samples_per_step)},
+        corrections_(std::size_t(options.learning.views)),
+        correction_moments_(std::size_t(options.learning.views)),
+        lenses_(std::size_t(options.learning.lenses)),
+        lens_moments_(std::size_t(options.learning.lenses)) {
     state_loaded();
   }
 
@@ -52,6 +56,16 @@ class LuminanceEngineCuda final : public LuminanceEngine {
     return step_.run(learning_rate, occupancy_memory_.bits.data());
   }
   [[nodiscard]] long step_count() const override { return step_.steps(); }
+  [[nodiscard]] std::vector<ViewCorrection> view_corrections() const override {
+    const std::lock_guard lock(mutex_);
+    stream_.wait();
+    return step_.corrections();
+  }
+  [[nodiscard]] std::vector<LensCorrection> lens_corrections() const override {
+    const std::lock_guard lock(mutex_);
+    stream_.wait();
+    return step_.lenses();
+  }
 
   void render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
               std::span<RayResult> results) const override {
@@ -106,6 +120,18 @@ class LuminanceEngineCuda final : public LuminanceEngine {
     field_.append_state(state);
     state.push_back(state_piece("occupancy", occupancy_.densities()));
     state.push_back(state_piece("counters", counters_));
+    if (options_.learning.is_on()) {
+      corrections_ = step_.corrections();
+      correction_moments_ = step_.correction_moments();
+      state.push_back(state_piece("views", corrections_));
+      state.push_back(state_piece("views.moments", correction_moments_));
+    }
+    if (options_.learning.lenses > 0) {
+      lenses_ = step_.lenses();
+      lens_moments_ = step_.lens_moments();
+      state.push_back(state_piece("lenses", lenses_));
+      state.push_back(state_piece("lenses.moments", lens_moments_));
+    }
     return state;
   }
   void state_loaded() override {
@@ -113,6 +139,8 @@ class LuminanceEngineCuda final : public LuminanceEngine {
     stream_.wait();
     field_.upload(stream_);
     step_.restart(long(counters_[0]), counters_[1]);
+    step_.set_learned(corrections_, correction_moments_);
+    step_.set_lenses(lenses_, lens_moments_);
     occupancy_.refresh_bits();
     occupancy_is_old_ = false;
     upload_occupancy();
@@ -150,8 +178,12 @@ class LuminanceEngineCuda final : public LuminanceEngine {
   OccupancyMemory occupancy_memory_;
   mutable std::atomic<bool> occupancy_is_old_ = false;
   mutable LuminanceTracerCuda tracer_;
-  std::vector<std::int64_t> counters_;  // steps done, rays of the next step
-  mutable std::mutex mutex_;            // queries come from many threads
+  std::vector<std::int64_t> counters_;       // steps done, rays of the next step
+  std::vector<ViewCorrection> corrections_;  // as the last call of `state` or `state_loaded` left them
+  std::vector<ViewMoments> correction_moments_;
+  std::vector<LensCorrection> lenses_;  // likewise
+  std::vector<LensMoments> lens_moments_;
+  mutable std::mutex mutex_;  // queries come from many threads
 };
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "src/engine/cuda/luminance_step.h"
 
+#include "src/base/check.h"
+#include "src/engine/cuda/pose_kernel.h"
 #include "src/engine/stage1_schedule.h"
 #include "src/field/cuda/channel_tiles.h"
 
@@ -10,6 +12,7 @@ constexpr long kMostAhead = kStepRing / 2;
 
 const char* const kSampleAdvice = "the samples of a step; lower stage1.samples_per_step";
 const char* const kRayAdvice = "rays";
+const char* const kViewAdvice = "views";
 
 }  // namespace
 
@@ -24,7 +27,13 @@ LuminanceStepCuda::LuminanceStepCuda(const LuminanceEngineOptions& options, cons
       gradients_(capacity_, kSampleAdvice),
       encoded_(capacity_ * std::size_t(2 * channel_tiles(field.levels())), kSampleAdvice),
       rays_(std::size_t(kMostRays), kRayAdvice),
-      directions_(std::size_t(kMostRays), kRayAdvice) {}
+      directions_(std::size_t(kMostRays), kRayAdvice),
+      corrections_(std::size_t(options.learning.views), kViewAdvice),
+      correction_moments_(std::size_t(options.learning.views), kViewAdvice),
+      view_gradients_(std::size_t(options.learning.views), kViewAdvice),
+      lenses_(std::size_t(options.learning.lenses), kViewAdvice),
+      lens_moments_(std::size_t(options.learning.lenses), kViewAdvice),
+      lens_gradients_(std::size_t(options.learning.lenses), kViewAdvice) {}
 
 LuminanceStepCuda::~LuminanceStepCuda() {
   cudaStreamSynchronize(stream_);
@@ -32,8 +41,10 @@ LuminanceStepCuda::~LuminanceStepCuda() {
 }
 
 void LuminanceStepCuda::set_views(const std::vector<TrainingView>& views) {
+  if (options_.learning.is_on()) CNERF_CHECK_EQ(views.size(), std::size_t(options_.learning.views));
   forget_graph();
   views_ = ViewImages(views);
+  use_lenses(learned(), views_.records(), stream_);
 }
 
 void LuminanceStepCuda::restart(long step, std::int64_t rays) {
@@ -43,6 +54,23 @@ void LuminanceStepCuda::restart(long step, std::int64_t rays) {
   state.step = step;
   state.rays = std::uint32_t(rays);
   state_.upload(&state, 1);
+}
+
+void LuminanceStepCuda::set_learned(const std::vector<ViewCorrection>& corrections,
+                                    const std::vector<ViewMoments>& moments) {
+  corrections_.upload(corrections.data(), corrections.size());
+  correction_moments_.upload(moments.data(), moments.size());
+}
+
+void LuminanceStepCuda::set_lenses(const std::vector<LensCorrection>& lenses, const std::vector<LensMoments>& moments) {
+  lenses_.upload(lenses.data(), lenses.size());
+  lens_moments_.upload(moments.data(), moments.size());
+  use_lenses(learned(), views_.records(), stream_);
+}
+
+LearnedViews LuminanceStepCuda::learned() const {
+  return {options_.learning, corrections_.data(),  correction_moments_.data(), view_gradients_.data(),
+          lenses_.data(),    lens_moments_.data(), lens_gradients_.data()};
 }
 
 TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
@@ -57,6 +85,7 @@ TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
   job.state = state_.data();
   job.samples = {capacity_, places_.data(), encoded_.data(), gradients_.data()};
   job.distortion_weight = options_.distortion_weight;
+  if (options_.learning.exposures) job.view_gradients = view_gradients_.data();
   return job;
 }
 
@@ -64,21 +93,30 @@ FieldSamples LuminanceStepCuda::samples() const {
   return {{&state_.data()->samples, capacity_}, places_.data(), directions_.data(), encoded_.data(), gradients_.data()};
 }
 
-/// The nets' optimiser and the hash grid's backward pass need the same gradients and nothing of each other.
+/// The nets' optimiser, the hash grid's backward pass and the views need the same gradients and nothing of each other.
 void LuminanceStepCuda::launch(const std::uint32_t* occupied) {
   const AdamStep* adam = &state_.data()->adam;
   begin_step(state_.data(), learning_rates_.on_device(), stream_);
-  draw_training_rays({state_.data(), views_.records(), views_.count(), options_.seed, rays_.data(), directions_.data()},
-                     stream_);
+  const ViewLearning& learning = options_.learning;
+  const ViewCorrection* corrections = learning.is_on() ? corrections_.data() : nullptr;
+  draw_training_rays(
+      {state_.data(), views_.records(), corrections, views_.count(), options_.seed, rays_.data(), directions_.data()},
+      stream_);
   trace_training_rays(trace_job(occupied), stream_);
   field_.nets_backward(samples(), stream_);
   fork_.record(stream_);
   fork_.hold(side_);
   field_.update_nets(adam, side_);
+  if (learning.poses || learning.lenses > 0) {
+    add_camera_gradients(
+        field_.position_slopes(learning.pose_levels(field_.grid_levels())),
+        {learned(), views_.records(), {&state_.data()->samples, capacity_}, places_.data(), rays_.data()}, side_);
+  }
+  if (learning.is_on()) update_corrections(learned(), views_.records(), state_.data(), side_);
   join_.record(side_);
   field_.grid_backward(samples(), stream_);
+  join_.hold(stream_);  // what still reads the table
   field_.update_grid(adam, stream_);
-  join_.hold(stream_);
   end_step(state_.data(), std::uint32_t(options_.samples_per_step), capacity_, reports_.on_device(), stream_);
 }
 

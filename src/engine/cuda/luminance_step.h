@@ -34,6 +34,14 @@ class LuminanceStepCuda {
   [[nodiscard]] long steps() const { return steps_; }
   /// Of the next step; waits.
   [[nodiscard]] std::int64_t rays() const { return state_.downloaded().front().rays; }
+  /// What was learned of the views, and the moments; copies, to be given back to `set_learned`. Waits.
+  [[nodiscard]] std::vector<ViewCorrection> corrections() const { return corrections_.downloaded(); }
+  [[nodiscard]] std::vector<ViewMoments> correction_moments() const { return correction_moments_.downloaded(); }
+  void set_learned(const std::vector<ViewCorrection>& corrections, const std::vector<ViewMoments>& moments);
+  /// The same of the lenses.
+  [[nodiscard]] std::vector<LensCorrection> lenses() const { return lenses_.downloaded(); }
+  [[nodiscard]] std::vector<LensMoments> lens_moments() const { return lens_moments_.downloaded(); }
+  void set_lenses(const std::vector<LensCorrection>& lenses, const std::vector<LensMoments>& moments);
 
   /// @param occupied  the occupancy grid's bits; the same memory each time
   /// @return  the report of the latest step that is known to be done, at most a few steps ago
@@ -45,6 +53,7 @@ class LuminanceStepCuda {
   void forget_graph();
   [[nodiscard]] TraceJob trace_job(const std::uint32_t* occupied) const;
   [[nodiscard]] FieldSamples samples() const;
+  [[nodiscard]] LearnedViews learned() const;
 
   LuminanceEngineOptions options_;
   std::uint32_t capacity_;
@@ -58,6 +67,12 @@ class LuminanceStepCuda {
   DeviceBuffer<uint4> encoded_;
   DeviceBuffer<RayRecord> rays_;
   DeviceBuffer<DirectionCode> directions_;
+  DeviceBuffer<ViewCorrection> corrections_;  // of the views, where they are learned
+  DeviceBuffer<ViewMoments> correction_moments_;
+  DeviceBuffer<ViewGradient> view_gradients_;
+  DeviceBuffer<LensCorrection> lenses_;  // likewise
+  DeviceBuffer<LensMoments> lens_moments_;
+  DeviceBuffer<LensGradient> lens_gradients_;
 
   MappedBuffer<float> learning_rates_{kStepRing};
   MappedBuffer<StepRecord> reports_{kStepRing};

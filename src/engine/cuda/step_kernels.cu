@@ -19,9 +19,13 @@ __global__ void begin(StepState* state, const float* learning_rates) {
 /// The views in device memory.
 struct DeviceViews {
   const ViewRecord* views;
+  const ViewCorrection* corrections;
   std::uint32_t n_views;
 
   [[nodiscard]] __device__ std::uint32_t count() const { return n_views; }
+  [[nodiscard]] __device__ ViewCorrection correction(std::uint32_t v) const {
+    return corrections == nullptr ? ViewCorrection() : corrections[v];
+  }
   [[nodiscard]] __device__ ImageSize size_of(std::uint32_t v) const { return {views[v].width, views[v].height}; }
   [[nodiscard]] __device__ const UnitCamera& camera(std::uint32_t v) const { return views[v].camera; }
   [[nodiscard]] __device__ bool is_valid(std::uint32_t v, std::size_t pixel) const {
@@ -54,12 +58,13 @@ __device__ void clip(RayRecord& record) {
 __global__ void draw(const DrawJob job) {
   const std::uint32_t ray = blockIdx.x * kThreads + threadIdx.x;
   if (ray >= job.state->rays) return;
-  const ObservedRay observed =
-      observe_ray(DeviceViews{job.views, job.n_views}, job.seed, std::uint64_t(job.state->step), std::uint64_t(ray));
+  const ObservedRay observed = observe_ray(DeviceViews{job.views, job.corrections, job.n_views}, job.seed,
+                                           std::uint64_t(job.state->step), std::uint64_t(ray));
   RayRecord record;
   record.ray = observed.ray;
   record.jitter = observed.jitter;
   record.target = observed.target;
+  record.view = observed.view;
   clip(record);
   job.rays[ray] = record;
   job.directions[ray] = encode_direction(record.ray.direction);
@@ -85,6 +90,56 @@ __global__ void of_camera(const __grid_constant__ UnitCamera camera, std::uint32
   clip(record);
   records[ray] = record;
   directions[ray] = encode_direction(record.ray.direction);
+}
+
+constexpr unsigned kGaugeThreads = 256;
+
+__device__ void put_lenses(const LearnedViews& learned, ViewRecord* views) {
+  for (int v = int(threadIdx.x); v < learned.learning.views; v += kGaugeThreads) {
+    views[v].camera.intrinsics = learned.lenses[views[v].lens].applied_to(views[v].given);
+  }
+}
+
+/// A thread per lens, then a thread per view.
+__device__ void update_lenses(const LearnedViews& learned, ViewRecord* views, const AdamStep& adam, long step) {
+  if (learned.learning.lenses == 0) return;
+  for (int l = int(threadIdx.x); l < learned.learning.lenses; l += kGaugeThreads) {
+    int first = 0;
+    while (views[first].lens != l) ++first;  // every lens has a view
+    update_lens(learned.learning.of_cameras(adam, learned.learning.lens_rate, step), views[first].given,
+                learned.lens_gradients[l], learned.lens_moments[l], learned.lenses[l]);
+    learned.lens_gradients[l] = {};
+  }
+  __syncthreads();
+  put_lenses(learned, views);
+}
+
+__global__ void __launch_bounds__(kGaugeThreads) set_lenses(const LearnedViews learned, ViewRecord* views) {
+  put_lenses(learned, views);
+}
+
+/// One block.
+__global__ void __launch_bounds__(kGaugeThreads)
+    update_views(const LearnedViews learned, ViewRecord* views, const StepState* state) {
+  const long step = long(state->step) + 1;
+  const int n = learned.learning.views;
+  for (int v = int(threadIdx.x); v < n; v += kGaugeThreads) {
+    update_view(learned.learning, state->adam, step, learned.gradients[v], learned.moments[v], learned.corrections[v]);
+    learned.gradients[v] = {};
+  }
+  update_lenses(learned, views, state->adam, step);
+  if (step % kGaugeEvery != 0) return;
+  alignas(ViewGauge) __shared__ unsigned char memory[sizeof(ViewGauge)];
+  auto& gauge = *reinterpret_cast<ViewGauge*>(memory);
+  const auto origin = [&](int v) { return views[v].camera.origin.cast<float>(); };
+  __syncthreads();
+  if (threadIdx.x == 0) gauge = pose_gauge(learned.corrections, n, origin);
+  __syncthreads();
+  for (int v = int(threadIdx.x); v < n; v += kGaugeThreads) {
+    if (is_median_gain(learned.corrections, n, v)) gauge.log_gain = learned.corrections[v].log_gain;
+  }
+  __syncthreads();
+  for (int v = int(threadIdx.x); v < n; v += kGaugeThreads) gauge.take_off(origin(v), learned.corrections[v]);
 }
 
 __global__ void end(StepState* state, std::uint32_t wanted_samples, std::uint32_t capacity, StepRecord* reports) {
@@ -116,6 +171,17 @@ void prepare_rays(const Ray* rays, std::uint32_t count, RayRecord* records, Dire
 void camera_rays(const UnitCamera& camera, std::uint32_t count, RayRecord* records, DirectionCode* directions,
                  cudaStream_t stream) {
   of_camera<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(camera, count, records, directions);
+  CNERF_CUDA(cudaGetLastError());
+}
+
+void use_lenses(const LearnedViews& learned, ViewRecord* views, cudaStream_t stream) {
+  if (learned.learning.lenses == 0 || views == nullptr) return;
+  set_lenses<<<1, kGaugeThreads, 0, stream>>>(learned, views);
+  CNERF_CUDA(cudaGetLastError());
+}
+
+void update_corrections(const LearnedViews& learned, ViewRecord* views, const StepState* state, cudaStream_t stream) {
+  update_views<<<1, kGaugeThreads, 0, stream>>>(learned, views, state);
   CNERF_CUDA(cudaGetLastError());
 }
 

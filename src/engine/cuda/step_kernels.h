@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "src/engine/luminance_engine.h"
+#include "src/engine/view_learning.h"
 #include "src/field/cuda/field_weights.h"
 #include "src/optim/adam.h"
 #include "src/render/cuda/ray_record.h"
@@ -32,6 +33,8 @@ struct ViewRecord {
   const float* decoded = nullptr;       ///< linear luminance of every integer value; null for floats
   const std::uint8_t* alpha = nullptr;  ///< null: opaque
   const std::uint8_t* mask = nullptr;   ///< null: every pixel counts
+  int lens = 0;                         ///< see TrainingView
+  Intrinsics given;                     ///< the camera's, which are corrected as they are learned
 };
 
 /// What a step reports, in host memory that kernels write to.
@@ -49,6 +52,7 @@ void begin_step(StepState* state, const float* learning_rates, cudaStream_t stre
 struct DrawJob {
   const StepState* state;
   const ViewRecord* views;
+  const ViewCorrection* corrections;  ///< of the views; null: none
   std::uint32_t n_views;
   std::uint64_t seed;
   RayRecord* rays;
@@ -62,6 +66,22 @@ void prepare_rays(const Ray* rays, std::uint32_t count, RayRecord* records, Dire
 /// The rays of an image's pixels, row by row.
 void camera_rays(const UnitCamera& camera, std::uint32_t count, RayRecord* records, DirectionCode* directions,
                  cudaStream_t stream);
+
+/// Corrections of views in device memory, one per view.
+struct LearnedViews {
+  ViewLearning learning;
+  ViewCorrection* corrections = nullptr;
+  ViewMoments* moments = nullptr;
+  ViewGradient* gradients = nullptr;  ///< of the step; zero between steps
+  LensCorrection* lenses = nullptr;
+  LensMoments* lens_moments = nullptr;
+  LensGradient* lens_gradients = nullptr;  ///< likewise
+};
+/// Adam, every few steps the gauge (view_learning.h). The gradients are zero afterwards.
+/// @param views  their cameras get the lenses
+void update_corrections(const LearnedViews& learned, ViewRecord* views, const StepState* state, cudaStream_t stream);
+/// Gives the views' cameras the lenses as they are.
+void use_lenses(const LearnedViews& learned, ViewRecord* views, cudaStream_t stream);
 
 /// Reports the step and chooses how many rays the next one takes.
 /// @param capacity  of the arrays of samples

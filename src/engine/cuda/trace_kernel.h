@@ -43,6 +43,7 @@ struct TraceJob {
   // Training:
   SampleArrays samples;
   float distortion_weight = 0;
+  ViewGradient* view_gradients = nullptr;  ///< by the views' gains; null: not asked for
   // Rendering:
   RayResult* results = nullptr;
   // Tracing:

@@ -19,7 +19,13 @@ ViewImages::ViewImages(const std::vector<TrainingView>& views) {
 
 ViewRecord ViewImages::record_of(const TrainingView& view) {
   const MonoImage& image = *view.image;
-  ViewRecord record{view.camera, image.width, image.height, image.depth};
+  ViewRecord record;
+  record.camera = view.camera;
+  record.width = image.width;
+  record.height = image.height;
+  record.depth = image.depth;
+  record.given = view.camera.intrinsics;
+  record.lens = view.lens;
   if (image.depth == PixelDepth::kU8) {
     record.pixels = plane(image.u8.data(), image.u8.size());
     record.decoded = decoded(image);

@@ -14,7 +14,7 @@ class ViewImages {
   ViewImages() = default;
   explicit ViewImages(const std::vector<TrainingView>& views);
 
-  [[nodiscard]] const ViewRecord* records() const { return records_.data(); }
+  [[nodiscard]] ViewRecord* records() const { return records_.data(); }
   [[nodiscard]] std::uint32_t count() const { return std::uint32_t(records_.size()); }
 
  private:

@@ -34,6 +34,12 @@ class HashGridCpu {
   /// Scatters all runs and applies Adam, one task per level: a level's rows stay in one core's cache, and sums are made
   /// in the order of the runs for any number of threads.
   void backward_and_update(const std::vector<EncodedSamples>& runs, const AdamStep& step);
+  /// @param levels  that count, coarsest first
+  void position_gradient(int levels, const float* positions, const float* d_encoded, std::size_t groups,
+                         float* d_positions) const {
+    kernels_->position_gradient(levels_.data(), std::size_t(levels), table_.data(), positions, d_encoded, groups,
+                                channels(), d_positions);
+  }
   void append_state(const std::string& prefix, std::vector<StatePiece>& state);
 
  private:

@@ -43,6 +43,14 @@ class LuminanceFieldCpu {
   /// @param d_weights  [weight_count], added to: the density net's weights, then the luminance net's
   void backward(LuminanceWorkspace& work, float* d_encoded, float* d_weights) const;
 
+  /// The gradient by the samples' positions, after `backward`, through the coarsest levels alone.
+  /// @param d_positions  [G, 3, 16], written
+  void position_gradient(int levels, const float* positions, const float* d_encoded, std::size_t groups,
+                         float* d_positions) const {
+    grid_.position_gradient(levels, positions, d_encoded, groups, d_positions);
+  }
+  [[nodiscard]] const std::vector<GridLevel>& levels() const { return grid_.levels(); }
+
   void update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights, float learning_rate,
               long step);
 

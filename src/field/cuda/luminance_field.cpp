@@ -41,6 +41,12 @@ void LuminanceFieldCuda::grid_backward(const FieldSamples& samples, cudaStream_t
   grid_.backward(samples.places, samples.count, d_encoded_.data(), stream);
 }
 
+PositionSlopes LuminanceFieldCuda::position_slopes(int levels) const {
+  return {{grid_.levels().begin(), grid_.levels().begin() + levels},
+          grid_.table(),
+          reinterpret_cast<const uint2*>(d_encoded_.data())};
+}
+
 void LuminanceFieldCuda::update_layers_of_nets(const float* d_weights, const AdamStep* adam,
                                                cudaStream_t stream) const {
   const FieldParameters parameters = {density_.weights(), luminance_.weights(), packed_.weights(), last_layer_.data()};

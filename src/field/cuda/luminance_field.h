@@ -24,6 +24,9 @@ class LuminanceFieldCuda {
   void nets_backward(const FieldSamples& samples, cudaStream_t stream) const;
   /// The gradient of the table; after `nets_backward`. Independent of `update_nets`.
   void grid_backward(const FieldSamples& samples, cudaStream_t stream) const;
+  /// What the gradient by positions is made of, after `nets_backward` and before the updates.
+  [[nodiscard]] PositionSlopes position_slopes(int levels) const;
+  [[nodiscard]] const std::vector<GridLevel>& grid_levels() const { return grid_.levels(); }
   /// @param adam  device memory
   void update_nets(const AdamStep* adam, cudaStream_t stream) const;
   void update_grid(const AdamStep* adam, cudaStream_t stream) const { grid_.update(adam, stream); }

@@ -9,7 +9,8 @@ struct alignas(16) RayRecord {
   Ray ray;
   float begin = 0, end = -1;  ///< inside the box; begin > end on a miss
   float jitter = 0.5f;
-  RayTarget target;  ///< of training rays
+  RayTarget target;        ///< of training rays
+  std::uint32_t view = 0;  ///< of training rays
 };
 
 }  // namespace cnerf

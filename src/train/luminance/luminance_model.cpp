@@ -13,8 +13,9 @@ namespace {
 
 constexpr const char* kKind = "stage1";
 
-std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stage1Options& options, float max_luminance,
-                                             const Engines& engines) {
+std::unique_ptr<LuminanceEngine> make_engine(const LuminanceModel& model, const Engines& engines) {
+  const SceneFrame& frame = model.frame;
+  const Stage1Options& options = model.options;
   LuminanceEngineOptions engine;
   engine.grid = options.grid;
   engine.occupancy = options.occupancy;
@@ -22,7 +23,10 @@ std::unique_ptr<LuminanceEngine> make_engine(const SceneFrame& frame, const Stag
   engine.march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
   engine.samples_per_step = options.samples_per_step;
   engine.distortion_weight = float(options.distortion_weight);
-  engine.max_luminance = max_luminance;
+  engine.max_luminance = model.max_luminance;
+  if (model.learned_views > 0) {
+    engine.learning = {model.learned_views, model.learned_lenses, options.exposures, options.poses};
+  }
   engine.seed = std::uint64_t(options.seed);
   return engines.make_luminance(engine);
 }
@@ -59,6 +63,25 @@ Stage1Options stored_options(const Snapshot& snapshot) {
   return options;
 }
 
+/// How many views or lenses a training learned of; earlier versions learned nothing of them.
+int learned_count(const Snapshot& snapshot, const char* field) {
+  return snapshot.header().contains(field) ? header_field<int>(snapshot, field) : 0;
+}
+
+/// A piece of so many structs of floats; nothing is looked for where there are to be none.
+template <typename Numbers>
+std::vector<Numbers> stored_piece(const Snapshot& snapshot, const char* name, int count) {
+  if (count == 0) return {};
+  const std::span<const std::byte> stored = snapshot.piece(name);
+  std::vector<Numbers> values(stored.size() / sizeof(Numbers));
+  const StatePiece piece = state_piece(name, values);
+  std::ranges::copy(stored.first(piece.bytes.size()), piece.bytes.begin());
+  if (std::ptrdiff_t(values.size()) != count || !piece.is_finite()) {
+    throw SnapshotError(snapshot.file().string() + ": piece '" + name + "' is damaged");
+  }
+  return values;
+}
+
 /// Of what decides how much memory an engine takes, and of what it divides by.
 void check_stored(const Snapshot& snapshot, const LuminanceModel& model) {
   constexpr int kMostCascades = 8, kBlock = 16, kMostResolution = 1 << 10, kMostSamples = 1 << 24, kMostSteps = 1 << 16;
@@ -72,6 +95,10 @@ void check_stored(const Snapshot& snapshot, const LuminanceModel& model) {
           "frame: expected finite numbers and a positive scale");
   require(frame.cascades >= 1 && frame.cascades <= kMostCascades, "frame.cascades: expected 1 to 8");
   require(model.max_luminance > 0 && std::isfinite(model.max_luminance), "max_luminance: expected a positive number");
+  require(model.learned_views >= 0 && std::size_t(model.learned_views) <= snapshot.bytes() / sizeof(ViewMoments),
+          "learned_views: expected as many as the file can hold");
+  require(model.learned_lenses >= 0 && model.learned_lenses <= model.learned_views,
+          "learned_lenses: expected at most one per view");
   const Stage1Options& options = model.options;
   require(options.samples_per_step >= 1 && options.samples_per_step <= kMostSamples,
           "options.samples_per_step: expected 1 to 2^24");
@@ -113,7 +140,11 @@ LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Option
   model.frame = place_scene(capture, options.placement);
   model.options = options;
   model.max_luminance = brightest(capture);
-  model.engine = make_engine(model.frame, options, model.max_luminance, engines);
+  if (options.lenses) model.learned_lenses = int(lenses_of(capture).size());
+  if (options.exposures || options.poses || options.lenses) {
+    model.learned_views = int(std::ranges::count_if(capture.views, [](const View& view) { return !view.held_out; }));
+  }
+  model.engine = make_engine(model, engines);
   const auto known = options.free_space ? points : std::vector<SparsePoint>();
   exclude_empty(capture, model.frame, FreeSpace(capture.views, known), *model.engine);
   return model;
@@ -128,6 +159,22 @@ Stage1Options LuminanceModel::options_in(const std::filesystem::path& file) {
   }
 }
 
+LearnedViews LuminanceModel::learned_views_in(const std::filesystem::path& file) {
+  const Snapshot snapshot(file, kKind);
+  LearnedViews learned;
+  try {
+    learned.frame = frame_from_json(snapshot.header().at("frame"));
+  } catch (const nlohmann::json::exception& problem) {
+    throw SnapshotError(file.string() + ": header: " + problem.what());
+  }
+  learned.corrections = stored_piece<ViewCorrection>(snapshot, "views", learned_count(snapshot, "learned_views"));
+  learned.lenses = stored_piece<LensCorrection>(snapshot, "lenses", learned_count(snapshot, "learned_lenses"));
+  if (!(learned.frame.unit_per_world > 0)) {
+    throw SnapshotError(file.string() + ": header: frame: expected a positive scale");
+  }
+  return learned;
+}
+
 LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Engines& engines) {
   const Snapshot snapshot(file, kKind);
   LuminanceModel model;
@@ -140,8 +187,10 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   model.max_luminance = header_field<float>(snapshot, "max_luminance");
   model.seconds = load_times(file)["seconds"];
   model.trained_samples = header_field<double>(snapshot, "trained_samples");
+  model.learned_views = learned_count(snapshot, "learned_views");
+  model.learned_lenses = learned_count(snapshot, "learned_lenses");
   check_stored(snapshot, model);
-  model.engine = make_engine(model.frame, model.options, model.max_luminance, engines);
+  model.engine = make_engine(model, engines);
   snapshot.restore(model.engine->state());
   model.engine->state_loaded();
   return model;
@@ -153,6 +202,8 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
                  {"options", options_to_json(options)},
                  {"occupancy", occupancy_to_json(options.occupancy)},
                  {"max_luminance", max_luminance},
+                 {"learned_views", learned_views},
+                 {"learned_lenses", learned_lenses},
                  {"trained_samples", trained_samples},
                  {"step", engine->step_count()}},
                 engine->state());

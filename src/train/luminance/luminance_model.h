@@ -13,10 +13,19 @@
 
 namespace cnerf {
 
+/// What a training learned of its views.
+struct LearnedViews {
+  SceneFrame frame;
+  std::vector<ViewCorrection> corrections;  ///< of the training views in their order; empty where nothing was learned
+  std::vector<LensCorrection> lenses;       ///< as `lenses_of` lists them; likewise
+};
+
 struct LuminanceModel {
   SceneFrame frame;
   Stage1Options options;
   float max_luminance = 1;
+  int learned_views = 0;       ///< training views of which something is learned; 0: nothing is
+  int learned_lenses = 0;      ///< lenses that are learned
   double seconds = 0;          ///< training time so far
   double trained_samples = 0;  ///< so far
   std::unique_ptr<LuminanceEngine> engine;
@@ -29,6 +38,8 @@ struct LuminanceModel {
   static LuminanceModel load(const std::filesystem::path& snapshot, const Engines& engines);
   /// Only what it was trained with.  @throws MissingInputError, SnapshotError
   static Stage1Options options_in(const std::filesystem::path& snapshot);
+  /// Only what it learned of its views.  @throws MissingInputError, SnapshotError
+  static LearnedViews learned_views_in(const std::filesystem::path& snapshot);
   void save(const std::filesystem::path& snapshot) const;
 
   /// How to march; `steps_per_box` = 0 as in training.

@@ -95,6 +95,16 @@ Snapshot::Snapshot(const std::filesystem::path& file, const std::string& kind)
   if (std::memcmp(digest.data(), content_.data() + signed_size, kDigestSize) != 0) fail("damaged: checksum mismatch");
 }
 
+std::span<const std::byte> Snapshot::piece(const std::string& name) const {
+  std::size_t offset = pieces_begin_;
+  for (const nlohmann::json& stored : header_.at("pieces")) {
+    const auto bytes = stored.at("bytes").get<std::size_t>();
+    if (stored.at("name") == name) return std::span(content_).subspan(offset, bytes);
+    offset += bytes;
+  }
+  throw SnapshotError(file_.string() + ": holds no piece '" + name + "'");
+}
+
 void Snapshot::restore(const std::vector<StatePiece>& pieces) const {
   std::size_t offset = pieces_begin_;
   const auto& stored = header_.at("pieces");

@@ -30,6 +30,8 @@ class Snapshot {
   [[nodiscard]] const nlohmann::json& header() const { return header_; }
   /// @throws SnapshotError  when a piece is missing or of another size than the engine's.
   void restore(const std::vector<StatePiece>& pieces) const;
+  /// The bytes of one piece.  @throws SnapshotError  when there is none of that name
+  [[nodiscard]] std::span<const std::byte> piece(const std::string& name) const;
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   /// Of the file.
   [[nodiscard]] std::size_t bytes() const { return content_.size(); }

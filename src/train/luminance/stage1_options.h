@@ -30,6 +30,7 @@ struct Stage1Options {
   int steps_per_box = 256;
   double cone_angle = 1.0 / 64;
   bool free_space = true;
+  bool exposures = true, poses = false, lenses = false;
   int checkpoint_every = 1000;
   int seed = 1;
   HashGridOptions grid = {.decay = 0.1};
@@ -51,6 +52,9 @@ struct Stage1Options {
     v("cone_angle", cone_angle, Range{1e-4, 1}, "march step over distance, in scenes of several cascades");
     v("free_space", free_space,
       "space before sparse points is empty; they are found first where a capture has none and nothing else bounds it");
+    v("exposures", exposures, "the light of each training view is learned, over that of the median view");
+    v("poses", poses, "where cameras stood and looked is learned");
+    v("lenses", lenses, "focal lengths, principal points and distortion of the views' lenses are learned");
     v("checkpoint_every", checkpoint_every, Range{0, 1e8}, "steps between snapshots; 0 = only at the end");
     v("seed", seed, Range{0, 1e9}, "of weights, rays and jitter");
     v.section("grid", grid);

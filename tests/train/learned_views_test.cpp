@@ -1,0 +1,170 @@
+// What a training learned of its views reaches the capture that everything behind it reads, and no forged file reaches
+// it.
+
+#include "src/train/luminance/learned_views.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "src/train/luminance/luminance_model.h"
+#include "src/train/luminance/stage1.h"
+#include "tests/support/data.h"
+#include "tests/support/engine_state.h"
+#include "tests/support/toy_capture.h"
+
+namespace cnerf {
+namespace {
+
+using testing::HasSubstr;
+
+SceneFrame frame_of_half() {
+  SceneFrame frame;
+  frame.unit_per_world = 0.5;
+  return frame;
+}
+
+/// Seven views, the fourth held out.
+Capture clip() {
+  Capture capture = test::toy_capture(7);
+  capture.views[3].held_out = true;
+  return capture;
+}
+
+std::vector<ViewCorrection> gains(const std::vector<float>& logarithms) {
+  std::vector<ViewCorrection> corrections;
+  for (const float gain : logarithms) corrections.push_back({gain, {}, {}});
+  return corrections;
+}
+
+TEST(LearnedViews, NeighboursTellTheExposureOfAViewThatWasHeldOut) {
+  Capture capture = clip();
+  const std::vector<float> before = {0, 0.1f, 0.2f, 0.4f, 0.5f, 0.6f};
+  EXPECT_NEAR(log_gains(capture, gains(before))[3], 0.3f, 1e-6f) << "exposures that rise steadily";
+  const std::vector<float> any = {0.3f, -0.3f, 0.3f, 0.3f, -0.3f, 0.3f};
+  EXPECT_EQ(log_gains(capture, gains(any))[3], 0.0f) << "exposures that say nothing of their neighbours";
+
+  const float light = capture.views[3].image.luminance(5);
+  apply_learned_views(capture, {frame_of_half(), gains(before), {}});
+  EXPECT_NEAR(capture.views[3].image.luminance(5), light / std::exp(0.3f), 1e-6f);
+  EXPECT_EQ(capture.views[0].image.exposure, 1.0f);
+  EXPECT_NEAR(capture.views[6].image.exposure, std::exp(0.6f), 1e-6f);
+}
+
+TEST(LearnedViews, CamerasMoveAsTheirRaysDidInTraining) {
+  Capture capture = clip();
+  std::vector<ViewCorrection> corrections(6);
+  corrections[1] = {0, {0.01f, -0.02f, 0.03f}, {0.004f, 0, -0.002f}};
+  const SceneFrame frame = frame_of_half();
+  const View given = capture.views[1], held_out = capture.views[3];
+  const PixelPosition pixel = {3.5, 17.5};
+  const Ray in_training =
+      corrections[1].applied_to(UnitCamera(given.intrinsics, given.world_from_camera, frame).ray(pixel));
+  apply_learned_views(capture, {frame, corrections, {}});
+  const Ray behind = UnitCamera(given.intrinsics, capture.views[1].world_from_camera, frame).ray(pixel);
+  EXPECT_LT(length(behind.origin - in_training.origin), 1e-6f);
+  EXPECT_LT(length(behind.direction - in_training.direction), 1e-6f);
+  EXPECT_NEAR(capture.views[1].world_from_camera.linear.determinant(), 1, 1e-12);
+  EXPECT_EQ(capture.views[3].world_from_camera, held_out.world_from_camera) << "nobody knows where it stood";
+}
+
+Stage1Options few_steps() {
+  Stage1Options options;
+  options.steps = 24;
+  options.samples_per_step = 1024;
+  options.steps_per_box = 32;
+  options.grid = {.levels = 3, .log2_rows = 8, .coarsest_resolution = 4, .finest_resolution = 16};
+  options.occupancy.resolution = 32;
+  options.checkpoint_every = 0;
+  options.poses = true;
+  return options;
+}
+
+class StoredViews : public testing::Test {
+ protected:
+  StoredViews() : job_{capture_, options_, folder_ / "stage1.snapshot"} {
+    Observer observer;
+    train_stage1(job_, cpu_engines(), observer);
+  }
+
+  test::TempDir folder_;
+  Capture capture_ = clip();
+  Stage1Options options_ = few_steps();
+  Stage1Job job_;
+};
+
+TEST_F(StoredViews, AreReadFromTheSnapshotAlone) {
+  const LearnedViews stored = LuminanceModel::learned_views_in(job_.snapshot);
+  const auto model = LuminanceModel::load(job_.snapshot, cpu_engines());
+  const std::vector<ViewCorrection> learned = model.engine->view_corrections();
+  ASSERT_EQ(stored.corrections.size(), 6u);
+  float size = 0;
+  for (std::size_t v = 0; v < learned.size(); ++v) {
+    EXPECT_EQ(stored.corrections[v].log_gain, learned[v].log_gain);
+    EXPECT_EQ(stored.corrections[v].turn, learned[v].turn);
+    EXPECT_EQ(stored.corrections[v].shift, learned[v].shift);
+    size += length(learned[v].turn) + std::abs(learned[v].log_gain);
+  }
+  EXPECT_GT(size, 0);
+  EXPECT_EQ(stored.frame.unit_per_world, model.frame.unit_per_world);
+}
+
+TEST_F(StoredViews, GoOnBitForBit) {
+  const auto file = folder_ / "resumed.snapshot";
+  // Rates follow the steps of the whole training: the halves are steps of one engine, saved and loaded in between.
+  auto through = LuminanceModel::create(capture_, options_, cpu_engines());
+  through.engine->set_views(training_views(capture_, through.frame));
+  for (int i = 0; i < 12; ++i) through.engine->step(1e-2f);
+  through.save(file);
+  auto resumed = LuminanceModel::load(file, cpu_engines());
+  resumed.engine->set_views(training_views(capture_, resumed.frame));
+  for (int i = 0; i < 12; ++i) {
+    through.engine->step(1e-2f);
+    resumed.engine->step(1e-2f);
+  }
+  const std::vector<StatePiece> a = through.engine->state(), b = resumed.engine->state();
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_TRUE(std::ranges::equal(a[i].bytes, b[i].bytes)) << a[i].name;
+}
+
+TEST_F(StoredViews, OfAnotherNumberOfViewsAreRefused) {
+  capture_.views.pop_back();
+  try {
+    apply_learned_views(capture_, job_.snapshot);
+    FAIL();
+  } catch (const SnapshotError& refused) {
+    EXPECT_THAT(refused.what(), HasSubstr("learned of 6 views, but the capture has 5"));
+  }
+}
+
+TEST_F(StoredViews, ThatAreForgedAreRefused) {
+  const Snapshot good(job_.snapshot, "stage1");
+  auto model = LuminanceModel::load(job_.snapshot, cpu_engines());
+  for (const nlohmann::json& forged :
+       {nlohmann::json(-1), nlohmann::json(1 << 30), nlohmann::json(5), nlohmann::json("6"), nlohmann::json(0)}) {
+    nlohmann::json header = good.header();
+    header["learned_views"] = forged;
+    save_snapshot(folder_ / "forged.snapshot", "stage1", header, model.engine->state());
+    EXPECT_THROW((void)LuminanceModel::load(folder_ / "forged.snapshot", cpu_engines()), SnapshotError) << forged;
+  }
+  std::vector<StatePiece> state = model.engine->state();
+  test::floats_of(state, "views")[2] = std::numeric_limits<float>::infinity();
+  for (StatePiece& piece : state) piece.holds_floats = false;  // as a program would write that does not look
+  nlohmann::json header = good.header();
+  save_snapshot(folder_ / "forged.snapshot", "stage1", header, state);
+  EXPECT_THROW((void)LuminanceModel::learned_views_in(folder_ / "forged.snapshot"), SnapshotError);
+  EXPECT_THROW((void)LuminanceModel::load(folder_ / "forged.snapshot", cpu_engines()), SnapshotError);
+}
+
+TEST(LearnedViews, SayHowFarTheyAreFromWhatWasGiven) {
+  EXPECT_TRUE(facts_of({}).empty());
+  LearnedViews learned;
+  learned.corrections = gains({-0.2f, 0, 0.1f});
+  const std::vector<LearnedFact> facts = facts_of(learned);
+  ASSERT_EQ(facts.size(), 1u) << "poses were not learned";
+  EXPECT_EQ(facts[0].text, "0.82 to 1.11 of the median view's");
+}
+
+}  // namespace
+}  // namespace cnerf
