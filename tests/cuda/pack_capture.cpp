@@ -1,9 +1,10 @@
 // Packs a capture for cnerf-cuda-check: reads it as `cnerf train` does, places the box, excludes what no view sees.
 //
-//   pack_capture CAPTURE FOLDER [downscale=1] [holdout=8] [validation=N] [points=1]
+//   pack_capture CAPTURE FOLDER [downscale=1] [holdout=8] [validation=N] [few=N] [points=1]
 //
 // With `validation` every N-th of the views to be trained on is judged instead of the held-out ones: for choosing
-// settings. With `points` space before sparse points is excluded too; they are found where the capture has none.
+// settings. With `few` every N-th view alone is trained on. With `points` space before sparse points is excluded too;
+// they are found where the capture has none.
 
 #include <cstdio>
 #include <string>
@@ -16,12 +17,12 @@
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    std::puts("pack_capture CAPTURE FOLDER [downscale=N] [holdout=N] [validation=N] [points=1]");
+    std::puts("pack_capture CAPTURE FOLDER [downscale=N] [holdout=N] [validation=N] [few=N] [points=1]");
     return 64;
   }
   cnerf::CaptureOptions options;
   options.holdout = 8;
-  int validation = 0, points = 0;
+  int validation = 0, points = 0, few = 0;
   for (int i = 3; i < argc; ++i) {
     const std::string argument = argv[i];
     const std::size_t equals = argument.find('=');
@@ -29,11 +30,13 @@ int main(int argc, char** argv) {
     (name == "downscale"    ? options.downscale
      : name == "validation" ? validation
      : name == "points"     ? points
+     : name == "few"        ? few
                             : options.holdout) = std::stoi(argument.substr(equals + 1));
   }
   cnerf::test::PackedCapture packed;
   packed.capture = cnerf::load_capture(argv[1], options);
   if (validation > 0) cnerf::test::hold_out_of_training(packed.capture, validation);
+  if (few > 0) cnerf::test::train_on_few(packed.capture, few);
   cnerf::Stage1Options stage1;
   stage1.free_space = points > 0;
   if (points > 0 && packed.capture.points.empty()) {

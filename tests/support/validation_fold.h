@@ -25,4 +25,9 @@ inline void hold_out_of_training(Capture& capture, int every) {
   }
 }
 
+/// Trains on every `every`-th view alone and holds all others out: an album of a few photographs.
+inline void train_on_few(Capture& capture, int every) {
+  for (std::size_t i = 0; i < capture.views.size(); ++i) capture.views[i].held_out = i % std::size_t(every) != 0;
+}
+
 }  // namespace cnerf::test

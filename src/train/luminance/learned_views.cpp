@@ -97,10 +97,10 @@ std::vector<LearnedFact> facts_of(const LearnedViews& learned) {
 }
 
 std::vector<float> log_gains(const Capture& capture, std::span<const ViewCorrection> corrections) {
+  CNERF_CHECK_EQ(std::size_t(std::ranges::count(capture.views, false, &View::held_out)), corrections.size());
   std::vector<float> gains;
   std::size_t next = 0;
   for (const View& view : capture.views) gains.push_back(view.held_out ? kUnknown : corrections[next++].log_gain);
-  CNERF_CHECK_EQ(next, corrections.size());
   if (!neighbours_tell(gains)) {
     std::ranges::replace_if(
         gains, [](float gain) { return std::isnan(gain); }, 0.0f);
