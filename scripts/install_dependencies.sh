@@ -11,7 +11,7 @@ packages=(
   libopenvdb-dev libboost-iostreams-dev libopenvdb-tools libnanovdb-dev
   libopencv-dev libopenexr-dev libtinygltf-dev libmeshoptimizer-dev
   libexif-dev colmap
-  libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libfmt-dev libspdlog-dev
+  libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libpugixml-dev libfmt-dev libspdlog-dev
   libtbb-dev libssl-dev zlib1g-dev libcpp-httplib-dev
   libgtest-dev libgmock-dev libbenchmark-dev
 )

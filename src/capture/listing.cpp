@@ -1,6 +1,9 @@
 #include "src/capture/listing.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <sstream>
@@ -10,6 +13,14 @@
 
 namespace cnerf {
 namespace fs = std::filesystem;
+namespace {
+
+bool is_there(const fs::path& file) {
+  std::error_code failure;  // a name too long for the file system is of no file
+  return fs::exists(file, failure);
+}
+
+}  // namespace
 
 void make_poses_rigid(CaptureListing& listing, const std::string& matrix_name) {
   double worst = 0;
@@ -28,6 +39,20 @@ void make_poses_rigid(CaptureListing& listing, const std::string& matrix_name) {
   listing.notes.push_back(note.str());
 }
 
+void bring_near_origin(CaptureListing& listing) {
+  constexpr double kFar = 1e5;  // units of the poses
+  if (listing.views.empty()) return;
+  const Vec3d first = listing.views.front().world_from_camera.translation;
+  if (length(first) < kFar) return;
+  const Vec3d origin = {std::round(first.x), std::round(first.y), std::round(first.z)};
+  for (ListedView& view : listing.views) {
+    view.world_from_camera.translation = view.world_from_camera.translation - origin;
+  }
+  listing.notes.push_back(
+      fmt::format("the poses are far from their origin: positions are relative to {:.0f} {:.0f} {:.0f}", origin.x,
+                  origin.y, origin.z));
+}
+
 std::optional<fs::path> reduced_copy(const fs::path& image_file, int downscale) {
   const fs::path folder = image_file.parent_path();
   const fs::path sibling = folder.parent_path() / (folder.filename().string() + "_" + std::to_string(downscale));
@@ -39,6 +64,34 @@ std::optional<fs::path> reduced_copy(const fs::path& image_file, int downscale) 
     if (fs::exists(other, failure)) return other;
   }
   return std::nullopt;
+}
+
+fs::path named_image(const fs::path& folder, std::string name) {
+  std::ranges::replace(name, '\\', '/');
+  fs::path plain = (folder / name).lexically_normal();
+  if (is_there(plain)) return plain;
+  for (const std::string& extension : image_extensions()) {
+    fs::path with_extension = plain;
+    with_extension += extension;
+    if (is_there(with_extension)) return with_extension;
+  }
+  return plain;
+}
+
+fs::path image_near_poses(const fs::path& folder, const std::string& name) {
+  fs::path beside = named_image(folder, name);
+  fs::path below = named_image(folder / "images", name);
+  return is_there(below) && !is_there(beside) ? below : beside;
+}
+
+std::vector<fs::path> files_with_extension(const fs::path& folder, const std::string& extension) {
+  std::vector<fs::path> files;
+  if (!fs::is_directory(folder)) return files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file() && lower_extension(entry.path()) == extension) files.push_back(entry.path());
+  }
+  std::ranges::sort(files);
+  return files;
 }
 
 const std::vector<std::string>& image_extensions() {

@@ -51,6 +51,10 @@ struct CaptureListing {
 /// @throws InputError  as `rigid_pose` does, naming the view.
 void make_poses_rigid(CaptureListing& listing, const std::string& matrix_name);
 
+/// Moves poses that are so far from their origin that they can only be in a frame of the Earth or of a map, and notes
+/// by how much: 32-bit numbers of volumes and meshes would round such positions to centimetres or worse.
+void bring_near_origin(CaptureListing& listing);
+
 /// transforms.json in the dialects of NeRF, instant-ngp and nerfstudio. `transforms_train.json` brings its siblings for
 /// validation and test along.  @throws InputError.
 [[nodiscard]] CaptureListing read_transforms(const std::filesystem::path& json_file);
@@ -63,6 +67,38 @@ void make_poses_rigid(CaptureListing& listing, const std::string& matrix_name);
 
 /// LLFF's poses_bounds.npy; `downscale` chooses among images, images_2, ….  @throws InputError, MissingInputError.
 [[nodiscard]] CaptureListing read_llff(const std::filesystem::path& npy_file, int downscale);
+
+/// cameras.xml of Agisoft Metashape: frame and equidistant fisheye cameras, transforms of chunks and components.
+/// @throws MissingInputError, InputError.
+[[nodiscard]] CaptureListing read_metashape(const std::filesystem::path& xml_file);
+
+/// The table "Internal/External camera parameters" of RealityCapture and RealityScan, and their sidecars, one .xmp per
+/// image in a folder.  @throws MissingInputError, InputError.
+[[nodiscard]] CaptureListing read_realitycapture_table(const std::filesystem::path& csv_file);
+[[nodiscard]] CaptureListing read_realitycapture_sidecars(const std::filesystem::path& folder);
+/// The first such table of a folder; the folder of such sidecars, which is that of the capture or `images` in it.
+[[nodiscard]] std::optional<std::filesystem::path> find_realitycapture_table(const std::filesystem::path& root);
+[[nodiscard]] std::optional<std::filesystem::path> find_realitycapture_sidecars(const std::filesystem::path& root);
+
+/// Polycam's raw data: a folder with one .json per image, which lies in the folder of images beside it.
+/// @throws MissingInputError, InputError.
+[[nodiscard]] CaptureListing read_polycam(const std::filesystem::path& cameras_folder);
+/// The folder of a capture's corrected cameras, else that of those which the phone estimated.
+[[nodiscard]] std::optional<std::filesystem::path> find_polycam_cameras(const std::filesystem::path& root);
+
+/// metadata.json of Record3D, with images in `rgb` or `rgbd` beside it.  @throws MissingInputError, InputError.
+[[nodiscard]] CaptureListing read_record3d(const std::filesystem::path& json_file);
+[[nodiscard]] std::optional<std::filesystem::path> find_record3d_metadata(const std::filesystem::path& root);
+
+/// The image that `name` means in a folder: as it stands, else with an extension appended, which synthetic sets and
+/// labels leave out. Where there is none, the name as it stands.
+[[nodiscard]] std::filesystem::path named_image(const std::filesystem::path& folder, std::string name);
+/// The same, where images lie beside the poses or in `images`.
+[[nodiscard]] std::filesystem::path image_near_poses(const std::filesystem::path& folder, const std::string& name);
+
+/// The files of a folder with this extension, in either case, in the order of their names; none where there is none.
+[[nodiscard]] std::vector<std::filesystem::path> files_with_extension(const std::filesystem::path& folder,
+                                                                      const std::string& extension);
 
 /// A copy of the image reduced by `downscale` in a sibling folder `<folder>_<downscale>`; nothing when there is none.
 [[nodiscard]] std::optional<std::filesystem::path> reduced_copy(const std::filesystem::path& image_file, int downscale);

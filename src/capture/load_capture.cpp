@@ -19,11 +19,20 @@ namespace {
 
 // ---- recognising a capture ------------------------------------------------------------------------------------------
 
-enum class Format { kTransforms, kColmap, kLlff };
+enum class Format {
+  kTransforms,
+  kColmap,
+  kLlff,
+  kMetashape,
+  kRealityCaptureTable,
+  kRealityCaptureSidecars,
+  kPolycam,
+  kRecord3d
+};
 struct Source {
   Format format;
   fs::path root;  ///< the capture folder
-  fs::path path;  ///< marker file, or model folder
+  fs::path path;  ///< marker file, or folder of a model, of cameras or of sidecars
 };
 
 bool is_colmap_model(const fs::path& folder) {
@@ -65,23 +74,46 @@ std::vector<Source> sources_in_folder(const fs::path& root) {
     sources.push_back({Format::kColmap, root, largest_model(models)});
   }
   if (fs::exists(root / "poses_bounds.npy")) sources.push_back({Format::kLlff, root, root / "poses_bounds.npy"});
-  if (!sources.empty()) return sources;
+  if (fs::exists(root / "cameras.xml")) sources.push_back({Format::kMetashape, root, root / "cameras.xml"});
+  const auto add = [&](Format format, const std::optional<fs::path>& found) {
+    if (found) sources.push_back({format, root, *found});
+  };
+  add(Format::kRealityCaptureTable, find_realitycapture_table(root));
+  add(Format::kRealityCaptureSidecars, find_realitycapture_sidecars(root));
+  add(Format::kPolycam, find_polycam_cameras(root));
+  add(Format::kRecord3d, find_record3d_metadata(root));
+  return sources;
+}
+
+[[noreturn]] void refuse_without_poses(const fs::path& root) {
   const std::string state = fs::is_empty(root) ? ": the folder is empty; " : ": no poses found; ";
   throw MissingInputError(
       root.string() + state +
       "looked for transforms.json, transforms_train.json, a COLMAP model (cameras.bin or cameras.txt "
-      "here, in sparse/, sparse/*/ or colmap/sparse/*/) and poses_bounds.npy; cnerf prepare makes a capture of "
-      "photographs or a film clip");
+      "here, in sparse/, sparse/*/ or colmap/sparse/*/), poses_bounds.npy, Metashape's cameras.xml, RealityCapture's "
+      "table (*.csv that begins with #name) or sidecars (*.xmp here or in images/), Polycam's keyframes/ and "
+      "Record3D's "
+      "metadata.json beside rgb/; cnerf prepare makes a capture of photographs or a film clip");
 }
 
 std::vector<Source> recognise(const fs::path& path) {
   if (!fs::exists(path)) throw MissingInputError(path.string() + ": no such file or folder");
-  if (fs::is_directory(path)) return sources_in_folder(path);
+  if (fs::is_directory(path)) {
+    std::vector<Source> sources = sources_in_folder(path);
+    if (sources.empty()) refuse_without_poses(path);
+    return sources;
+  }
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  if (path.filename() == "metadata.json") return {{Format::kRecord3d, folder, path}};
   if (path.extension() == ".json") return {{Format::kTransforms, folder, path}};
   if (path.extension() == ".npy") return {{Format::kLlff, folder, path}};
+  if (lower_extension(path) == ".xml") return {{Format::kMetashape, folder, path}};
+  if (lower_extension(path) == ".csv") return {{Format::kRealityCaptureTable, folder, path}};
   if (is_colmap_model(folder)) return {{Format::kColmap, folder, folder}};
-  throw InputError(path, "", "expected a folder, a transforms.json, a file of a COLMAP model or a poses_bounds.npy");
+  throw InputError(
+      path, "",
+      "expected a folder, a transforms.json, a file of a COLMAP model, a poses_bounds.npy, Metashape's .xml, "
+      "RealityCapture's .csv or Record3D's metadata.json");
 }
 
 /// Takes copies in images_N folders where there are some, and leaves the rest to be resized.
@@ -95,10 +127,29 @@ void apply_downscale(CaptureListing& listing, int downscale) {
 }
 
 CaptureListing read_listing(const Source& source, int downscale) {
-  if (source.format == Format::kLlff) return read_llff(source.path, downscale);
-  CaptureListing listing =
-      source.format == Format::kColmap ? read_colmap(source.root, source.path) : read_transforms(source.path);
-  apply_downscale(listing, downscale);
+  const auto read = [&] {
+    switch (source.format) {
+      case Format::kTransforms:
+        return read_transforms(source.path);
+      case Format::kColmap:
+        return read_colmap(source.root, source.path);
+      case Format::kLlff:
+        return read_llff(source.path, downscale);
+      case Format::kMetashape:
+        return read_metashape(source.path);
+      case Format::kRealityCaptureTable:
+        return read_realitycapture_table(source.path);
+      case Format::kRealityCaptureSidecars:
+        return read_realitycapture_sidecars(source.path);
+      case Format::kPolycam:
+        return read_polycam(source.path);
+      case Format::kRecord3d:
+        return read_record3d(source.path);
+    }
+    throw ContractError("a format without a reader");
+  };
+  CaptureListing listing = read();
+  if (source.format != Format::kLlff) apply_downscale(listing, downscale);  // which has chosen by itself
   return listing;
 }
 
@@ -305,6 +356,10 @@ Capture capture_without_views(const Found& found) {
 }
 
 }  // namespace
+
+bool holds_poses(const fs::path& folder) {
+  return !sources_in_folder(folder).empty();
+}
 
 Capture survey_capture(const fs::path& path, const CaptureOptions& options) {
   Found found = find_views(path, options);

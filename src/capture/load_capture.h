@@ -26,10 +26,16 @@ struct CaptureOptions {
 
 /// Recognises the format by its marker file and reads it: `transforms.json` or `transforms_train.json` (NeRF,
 /// instant-ngp, nerfstudio), a COLMAP model (`cameras.bin|txt` here, or in `sparse/`, `sparse/N/`, `colmap/sparse/N/`),
-/// or `poses_bounds.npy` (LLFF). A path to the marker file itself works as well.
+/// `poses_bounds.npy` (LLFF), `cameras.xml` (Metashape), a `.csv` that begins with `#name` or `.xmp` sidecars here or
+/// in `images/` (RealityCapture, RealityScan), `keyframes/corrected_cameras/` or `keyframes/cameras/` (Polycam), or
+/// `metadata.json` beside `rgb/` (Record3D). A path to the marker file itself works as well; an `.xml` may have any
+/// name.
 /// @throws MissingInputError  no such folder, or no marker: the message lists what was looked for.
 /// @throws InputError         fewer than 2 usable views, bad poses, truncated files; names file, field and value.
 [[nodiscard]] Capture load_capture(const std::filesystem::path& path, const CaptureOptions& options = {});
+
+/// Whether a folder carries poses in one of these conventions, be they whole or not.
+[[nodiscard]] bool holds_poses(const std::filesystem::path& folder);
 
 /// The same without pixels, from the headers of the images: views tell size and depth, and what pixels decide (whether
 /// the subject is cut out, which images have colours) is left out.  @throws  as `load_capture`, but for bad pixels.

@@ -146,24 +146,6 @@ Affined read_matrix(const Json& frame, const fs::path& file, const std::string& 
   return pose;
 }
 
-bool is_there(const fs::path& file) {
-  std::error_code failure;  // a name too long for the file system is of no file
-  return fs::exists(file, failure);
-}
-
-/// The named file; without it, the same name with an extension appended (synthetic sets leave it out).
-fs::path resolve_image(const fs::path& folder, std::string name) {
-  std::replace(name.begin(), name.end(), '\\', '/');
-  fs::path plain = (folder / name).lexically_normal();
-  if (is_there(plain)) return plain;
-  for (const std::string& extension : image_extensions()) {
-    fs::path with_extension = plain;
-    with_extension += extension;
-    if (is_there(with_extension)) return with_extension;
-  }
-  return plain;
-}
-
 ListedView read_frame(const fs::path& file, const Json& top, const Json& frame, std::size_t index) {
   ListedView view;
   view.field = "frames[" + std::to_string(index) + "]";
@@ -173,9 +155,9 @@ ListedView read_frame(const fs::path& file, const Json& top, const Json& frame, 
   const Fields fields(file, top, frame, view.field);
   view.name = fields.text("file_path");
   if (view.name.empty()) throw InputError(file, view.field + ".file_path", "expected a file name, found nothing");
-  view.image_file = resolve_image(file.parent_path(), view.name);
+  view.image_file = named_image(file.parent_path(), view.name);
   if (const std::string mask = fields.text("mask_path"); !mask.empty()) {
-    view.mask_file = resolve_image(file.parent_path(), mask);
+    view.mask_file = named_image(file.parent_path(), mask);
   }
   view.world_from_camera = opencv_from_opengl_camera(read_matrix(frame, file, view.field));
   read_intrinsics(fields, view);

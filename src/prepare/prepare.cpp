@@ -9,6 +9,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/capture/listing.h"
+#include "src/capture/load_capture.h"
 #include "src/prepare/capture_writer.h"
 #include "src/prepare/colmap.h"
 #include "src/prepare/exposure.h"
@@ -285,15 +286,15 @@ bool needs_preparing(const fs::path& source) {
   std::error_code failure;
   if (fs::is_regular_file(source, failure)) {
     const std::string extension = source.extension().string();
-    const bool is_marker = extension == ".json" || extension == ".npy" || extension == ".bin" || extension == ".txt";
+    const bool is_marker = extension == ".json" || extension == ".npy" || extension == ".bin" || extension == ".txt" ||
+                           extension == ".xml" || extension == ".csv";
     return !is_marker && is_clip(source);
   }
   if (!fs::is_directory(source, failure)) return false;
-  for (const char* marker : {"transforms.json", "transforms_train.json", "poses_bounds.npy", "cameras.bin",
-                             "cameras.txt", "sparse", "colmap"}) {
+  for (const char* marker : {"sparse", "colmap"}) {  // be their models whole or not
     if (fs::exists(source / marker, failure)) return false;
   }
-  return holds_photographs(source);
+  return !holds_poses(source) && holds_photographs(source);
 }
 
 PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, const PrepareOptions& options,

@@ -32,10 +32,17 @@ class Bytes {
   std::string text_;
 };
 
-/// Hamilton quaternion w, x, y, z of a rotation; its trace must not be near -1, as that of no ring pose is.
-struct Quaternion {
-  double w, x, y, z;
+struct StoredPose {
+  Quaternion q;
+  Vec3d t;
 };
+StoredPose colmap_pose(int index, int count) {
+  const Affined camera_from_world = ring_pose(index, count).inverse();
+  return {quaternion_of(camera_from_world.linear), camera_from_world.translation};
+}
+
+}  // namespace
+
 Quaternion quaternion_of(const Mat3d& m) {
   const double xx = m.rows[0].x;
   const double yy = m.rows[1].y;
@@ -47,17 +54,6 @@ Quaternion quaternion_of(const Mat3d& m) {
   q.z = std::copysign(q.z, m.rows[1].x - m.rows[0].y);
   return q;
 }
-
-struct StoredPose {
-  Quaternion q;
-  Vec3d t;
-};
-StoredPose colmap_pose(int index, int count) {
-  const Affined camera_from_world = ring_pose(index, count).inverse();
-  return {quaternion_of(camera_from_world.linear), camera_from_world.translation};
-}
-
-}  // namespace
 
 Affined ring_pose(int index, int count) {
   const double angle = 2 * std::numbers::pi * (index + 0.3) / count;
@@ -189,6 +185,19 @@ void write_colmap_text(const fs::path& model_folder, const ColmapModel& model) {
   }
   write_file(model_folder / "images.txt", images.str());
   write_file(model_folder / "points3D.txt", "# Points\n1 0.5 -1 2 9 9 9 0.7 1 0\n2 1.5 -1 2 9 9 9 0.7 1 0\n");
+}
+
+std::string text_of(const std::vector<double>& numbers) {
+  std::ostringstream text;
+  text.precision(17);
+  for (const double number : numbers) text << (text.tellp() > 0 ? " " : "") << number;
+  return text.str();
+}
+
+std::vector<double> rows_of(const Mat3d& matrix) {
+  std::vector<double> numbers;
+  for (const Vec3d row : matrix.rows) numbers.insert(numbers.end(), {row.x, row.y, row.z});
+  return numbers;
 }
 
 void truncate_file(const fs::path& file, double share) {

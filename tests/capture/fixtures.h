@@ -54,6 +54,17 @@ void write_colmap_text(const std::filesystem::path& model_folder, const ColmapMo
 /// The images 0.png, 1.png, … that both models name.
 void write_colmap_images(const std::filesystem::path& image_folder, int images = 4);
 
+/// Hamilton quaternion w, x, y, z of a rotation; its trace must not be near -1, as that of no ring pose is.
+struct Quaternion {
+  double w, x, y, z;
+};
+[[nodiscard]] Quaternion quaternion_of(const Mat3d& rotation);
+
+/// Numbers with a blank between them, to 17 digits.
+[[nodiscard]] std::string text_of(const std::vector<double>& numbers);
+/// The nine numbers of a matrix, row by row.
+[[nodiscard]] std::vector<double> rows_of(const Mat3d& matrix);
+
 /// Cuts a file to its first `share`.
 void truncate_file(const std::filesystem::path& file, double share);
 
