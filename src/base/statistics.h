@@ -29,4 +29,17 @@ template <typename Real>
   return quantile(std::move(values), 0.5);
 }
 
+/// The factor that brings some values closest to others, by least squares.
+class GainFit {
+ public:
+  void add(double value, double wanted) {
+    both_ += value * wanted;
+    own_ += value * value;
+  }
+  [[nodiscard]] double gain() const { return own_ > 0 ? both_ / own_ : 1; }
+
+ private:
+  double both_ = 0, own_ = 0;
+};
+
 }  // namespace cnerf

@@ -6,6 +6,7 @@
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
+#include "src/base/statistics.h"
 #include "src/picture/picture.h"
 
 namespace cnerf {
@@ -44,14 +45,11 @@ std::vector<std::uint8_t> coloured_pixels(const RenderedImage& image, std::span<
 /// Luminance times the gain that brings it closest to the truth, by least squares over the pixels that count.
 std::vector<float> at_exposure_of(std::vector<float> luminance, const MonoImage& image,
                                   const std::vector<float>& truth) {
-  double both = 0, own = 0;
+  GainFit fit;
   for (std::size_t p = 0; p < truth.size(); ++p) {
-    if (!image.valid(p)) continue;
-    both += double(luminance[p]) * truth[p];
-    own += double(luminance[p]) * luminance[p];
+    if (image.valid(p)) fit.add(luminance[p], truth[p]);
   }
-  const auto gain = float(own > 0 ? both / own : 1);
-  for (float& value : luminance) value *= gain;
+  for (float& value : luminance) value *= float(fit.gain());
   return luminance;
 }
 

@@ -36,4 +36,11 @@ void expect_input_error(const fs::path& capture, const std::vector<std::string>&
   }
 }
 
+void expect_missing_image_left_out(const fs::path& capture, const fs::path& image) {
+  ASSERT_TRUE(fs::remove(image)) << image;
+  const Capture found = load_capture(capture);
+  EXPECT_EQ(found.views.size(), 3u);
+  EXPECT_THAT(found.notes, testing::Contains(testing::HasSubstr("1 of 4 listed images do not exist")));
+}
+
 }  // namespace cnerf::test

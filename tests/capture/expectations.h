@@ -16,4 +16,7 @@ void expect_same_lens(const Intrinsics& found, const Intrinsics& wanted);
 /// Expects an InputError whose message has all of these parts.
 void expect_input_error(const std::filesystem::path& capture, const std::vector<std::string>& parts);
 
+/// Expects a capture of four views to go on with three of them, and to say so, once one's image is gone.
+void expect_missing_image_left_out(const std::filesystem::path& capture, const std::filesystem::path& image);
+
 }  // namespace cnerf::test

@@ -166,10 +166,7 @@ TEST(RealityCaptureTable, LengthsAreThoseOfTheLongerSide) {
 TEST(RealityCaptureTable, MissingImagesAreLeftOut) {
   const test::TempDir folder;
   write_file(folder / "a.csv", ring_table(folder.path()));
-  fs::remove(folder / "images/1.png");
-  const Capture capture = load_capture(folder.path());
-  EXPECT_EQ(capture.views.size(), 3u);
-  EXPECT_THAT(capture.notes, Contains(HasSubstr("1 of 4 listed images do not exist")));
+  test::expect_missing_image_left_out(folder.path(), folder / "images/1.png");
 }
 
 TEST(RealityCaptureTable, PositionsOnAMapComeToTheOrigin) {

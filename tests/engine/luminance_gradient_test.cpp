@@ -56,7 +56,8 @@ class LossInDouble {
     }
   }
 
-  /// @param parameters  table, both nets' weights, then what corrects the views: gain, turn, shift
+  /// @param parameters  table, both nets' weights, then where they are learned: each view's gain, turn and shift, and
+  ///                    the lens's numbers
   double operator()(const std::vector<double>& parameters) const {
     const std::size_t table_size = std::size_t(total_rows(levels_)) * 4;
     const std::vector<double> table(parameters.begin(), parameters.begin() + long(table_size));
@@ -151,6 +152,20 @@ std::vector<std::size_t> telling_indices(const std::vector<double>& gradient, st
   return order;
 }
 
+/// As LossInDouble takes them.
+std::vector<double> parameters_of(LuminanceEngine& engine) {
+  std::vector<double> parameters;
+  for (const StatePiece& piece : engine.state()) {
+    const auto is_one_of = [&](const std::vector<std::string>& names) {
+      return std::ranges::find(names, piece.name) != names.end();
+    };
+    if (!is_one_of({"grid.table", "density_net.weights", "luminance_net.weights", "views", "lenses"})) continue;
+    const std::span<const float> values = test::floats_of(piece);
+    parameters.insert(parameters.end(), values.begin(), values.end());
+  }
+  return parameters;
+}
+
 struct Loss {
   const char* name;
   bool with_alpha;
@@ -174,12 +189,7 @@ TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
     const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);
     ASSERT_GT(analytic.report.trained_samples, 200u);
 
-    std::vector<double> parameters;
-    const std::vector<StatePiece> state = engine->state();
-    for (const char* piece : {"grid.table", "density_net.weights", "luminance_net.weights"}) {
-      const std::span<const float> values = test::floats_of(state, piece);
-      parameters.insert(parameters.end(), values.begin(), values.end());
-    }
+    const std::vector<double> parameters = parameters_of(*engine);
     std::vector<double> gradient(analytic.table.begin(), analytic.table.end());
     gradient.insert(gradient.end(), analytic.weights.begin(), analytic.weights.end());
     ASSERT_EQ(gradient.size(), parameters.size());
@@ -205,7 +215,7 @@ INSTANTIATE_TEST_SUITE_P(Of, LuminanceGradient,
                                          Loss{"Distortion", false, 0.3f}, Loss{"DistortionAndAlpha", true, 0.3f}),
                          [](const auto& param_info) { return param_info.param.name; });
 
-/// The rays that teach poses are those of the first blocks here, whose views the test compares.
+/// With a pinhole, whose distortion is learned from nothing, and with a lens that has some.
 class ViewLearningWithLens : public testing::TestWithParam<bool> {};
 
 TEST_P(ViewLearningWithLens, GradientsMatchFiniteDifferencesOfTheLoss) {
@@ -232,12 +242,7 @@ TEST_P(ViewLearningWithLens, GradientsMatchFiniteDifferencesOfTheLoss) {
     engine->state_loaded();
     const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);
 
-    std::vector<double> parameters;
-    const std::vector<StatePiece> state = engine->state();
-    for (const char* piece : {"grid.table", "density_net.weights", "luminance_net.weights", "views", "lenses"}) {
-      const std::span<const float> values = test::floats_of(state, piece);
-      parameters.insert(parameters.end(), values.begin(), values.end());
-    }
+    const std::vector<double> parameters = parameters_of(*engine);
     ASSERT_EQ(analytic.views.size(), 4u * kViewNumbers);
     ASSERT_EQ(analytic.lenses.size(), std::size_t(kLensNumbers));
     const LossInDouble loss(*engine, options, views, analytic.report.rays);
@@ -264,7 +269,6 @@ TEST_P(ViewLearningWithLens, GradientsMatchFiniteDifferencesOfTheLoss) {
   }
 }
 
-/// Corrections of the first view at random places of a sphere.
 INSTANTIATE_TEST_SUITE_P(Distorted, ViewLearningWithLens, testing::Bool());
 
 TEST(ViewLearning, AFurtherRotationIsTakenToTheRotationVector) {

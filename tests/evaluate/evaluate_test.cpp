@@ -50,6 +50,18 @@ TEST(Evaluate, AGreySceneHasNumbersOfLuminanceOnly) {
   EXPECT_FALSE(metrics.ab_error.has_value());
 }
 
+TEST(Evaluate, TheExposureThatFitsIsANumberOfItsOwn) {
+  Capture capture = grey_capture(2, 1);
+  const RenderedImage ours =
+      PaintedScene(linear_from_srgb(0.3f), false).render(capture.views[0].intrinsics, {}, {.color = false});
+  const ViewMetrics flat = measure({capture.views[0], ours, std::nullopt});
+  EXPECT_LT(flat.psnr_luminance.value(), 21);
+  EXPECT_GT(flat.psnr_luminance_exposure_fitted.value(), 60) << "one grey is another at another exposure";
+  for (std::size_t p = 0; p < capture.views[0].image.u8.size(); p += 2) capture.views[0].image.u8[p] = 102;
+  const ViewMetrics striped = measure({capture.views[0], ours, std::nullopt});
+  EXPECT_LT(striped.psnr_luminance_exposure_fitted.value(), 25) << "but no gain makes stripes of it";
+}
+
 TEST(Evaluate, AColouredSceneIsComparedWithTruthAndBake) {
   const Capture capture = grey_capture(2, 1);
   const float y = linear_from_srgb(0.2f);

@@ -8,6 +8,7 @@
 
 #include "src/base/aabb.h"
 #include "src/base/rng.h"
+#include "src/base/statistics.h"
 #include "src/color/colorspace_math.h"
 #include "src/train/luminance/learned_views.h"
 #include "tests/support/disturbed_capture.h"
@@ -25,12 +26,9 @@ double encoded(double light) {
 
 /// Of linear light, by least squares.
 double fitted_gain(const std::vector<RayResult>& seen, const MonoImage& image) {
-  double both = 0, own = 0;
-  for (std::size_t p = 0; p < seen.size(); ++p) {
-    both += double(seen[p].luminance) * image.luminance(p);
-    own += double(seen[p].luminance) * seen[p].luminance;
-  }
-  return own > 0 ? both / own : 1;
+  GainFit fit;
+  for (std::size_t p = 0; p < seen.size(); ++p) fit.add(seen[p].luminance, image.luminance(p));
+  return fit.gain();
 }
 
 double near_opacity(const LuminanceEngine& engine, const UnitCamera& camera, const MonoImage& image,

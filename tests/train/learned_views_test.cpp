@@ -70,6 +70,23 @@ TEST(LearnedViews, CamerasMoveAsTheirRaysDidInTraining) {
   EXPECT_EQ(capture.views[3].world_from_camera, held_out.world_from_camera) << "nobody knows where it stood";
 }
 
+TEST(LearnedViews, HeldOutViewsGetTheLensTheyShare) {
+  Capture capture = clip();
+  capture.views[5].intrinsics.fx = capture.views[5].intrinsics.fy = 40;  // another lens, the second one
+  capture.views[6].intrinsics.fx = 50;                                   // one that no training view has
+  capture.views[6].held_out = true;
+  LearnedViews learned{frame_of_half(), std::vector<ViewCorrection>(5), std::vector<LensCorrection>(2)};
+  learned.lenses[0].log_focal = 0.1f;
+  learned.lenses[1].k1 = 0.05f;
+  const Intrinsics first = capture.views[0].intrinsics, lone = capture.views[6].intrinsics;
+  apply_learned_views(capture, learned);
+  EXPECT_NEAR(capture.views[0].intrinsics.fx, first.fx * std::exp(0.1), 1e-6);
+  EXPECT_EQ(capture.views[3].intrinsics, capture.views[0].intrinsics) << "held out, the same lens";
+  EXPECT_EQ(capture.views[5].intrinsics.model, LensModel::kOpenCv);
+  EXPECT_NEAR(capture.views[5].intrinsics.distortion[0], 0.05, 1e-8);
+  EXPECT_EQ(capture.views[6].intrinsics, lone);
+}
+
 Stage1Options few_steps() {
   Stage1Options options;
   options.steps = 24;
@@ -78,7 +95,7 @@ Stage1Options few_steps() {
   options.grid = {.levels = 3, .log2_rows = 8, .coarsest_resolution = 4, .finest_resolution = 16};
   options.occupancy.resolution = 32;
   options.checkpoint_every = 0;
-  options.poses = true;
+  options.poses = options.lenses = true;
   return options;
 }
 
@@ -108,6 +125,11 @@ TEST_F(StoredViews, AreReadFromTheSnapshotAlone) {
     size += length(learned[v].turn) + std::abs(learned[v].log_gain);
   }
   EXPECT_GT(size, 0);
+  const std::vector<LensCorrection> lenses = model.engine->lens_corrections();
+  ASSERT_EQ(stored.lenses.size(), 1u);
+  EXPECT_EQ(stored.lenses[0].log_focal, lenses[0].log_focal);
+  EXPECT_EQ(stored.lenses[0].p2, lenses[0].p2);
+  EXPECT_NE(stored.lenses[0].log_focal, 0);
   EXPECT_EQ(stored.frame.unit_per_world, model.frame.unit_per_world);
 }
 
@@ -138,6 +160,26 @@ TEST_F(StoredViews, OfAnotherNumberOfViewsAreRefused) {
   }
 }
 
+TEST_F(StoredViews, OfAnotherNumberOfLensesAreRefused) {
+  capture_.views[0].intrinsics.fx *= 2;
+  EXPECT_THROW((void)apply_learned_views(capture_, job_.snapshot), SnapshotError);
+}
+
+TEST_F(StoredViews, TellWhatTheyAreAndNameCamerasThatMustBeWrong) {
+  Capture untouched = capture_;
+  const std::vector<std::string> lines = apply_learned_views(untouched, job_.snapshot);
+  EXPECT_THAT(lines, testing::Contains(HasSubstr("cameras: turned by")));
+  EXPECT_THAT(lines, testing::Contains(HasSubstr("lens: focal length times")));
+  EXPECT_THAT(lines, testing::Not(testing::Contains(HasSubstr("wrong"))));
+
+  auto model = LuminanceModel::load(job_.snapshot, cpu_engines());
+  test::floats_of(model.engine->state(), "views")[kViewNumbers * 3 + 1] = 0.1f;  // the fifth view turned by 6 degrees
+  model.engine->state_loaded();
+  model.save(job_.snapshot);
+  EXPECT_THAT(apply_learned_views(capture_, job_.snapshot),
+              testing::Contains(HasSubstr("wrong, by the look of it: toy4")));
+}
+
 TEST_F(StoredViews, ThatAreForgedAreRefused) {
   const Snapshot good(job_.snapshot, "stage1");
   auto model = LuminanceModel::load(job_.snapshot, cpu_engines());
@@ -145,6 +187,12 @@ TEST_F(StoredViews, ThatAreForgedAreRefused) {
        {nlohmann::json(-1), nlohmann::json(1 << 30), nlohmann::json(5), nlohmann::json("6"), nlohmann::json(0)}) {
     nlohmann::json header = good.header();
     header["learned_views"] = forged;
+    save_snapshot(folder_ / "forged.snapshot", "stage1", header, model.engine->state());
+    EXPECT_THROW((void)LuminanceModel::load(folder_ / "forged.snapshot", cpu_engines()), SnapshotError) << forged;
+  }
+  for (const nlohmann::json& forged : {nlohmann::json(-1), nlohmann::json(7), nlohmann::json(2), nlohmann::json(0)}) {
+    nlohmann::json header = good.header();
+    header["learned_lenses"] = forged;
     save_snapshot(folder_ / "forged.snapshot", "stage1", header, model.engine->state());
     EXPECT_THROW((void)LuminanceModel::load(folder_ / "forged.snapshot", cpu_engines()), SnapshotError) << forged;
   }
