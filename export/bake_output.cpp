@@ -6,7 +6,6 @@
 #include <span>
 #include <sstream>
 
-#include "bake/volume/resample.h"
 #include "export/web_bundle.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
@@ -66,7 +65,7 @@ void BakeOutput::write_bundle(const std::vector<bake::VolumePlanes>& volumes) {
     constexpr int kQuality = 82;  // of JPEG: photographs are laid over the volume, and loaded with it
     scene.photos = make_web_photos(capture_.views, options_.web.photo_side, kQuality);
   }
-  write_web(merged_volume(std::move(whole)), scene, web_folder(folder_), options_.page, options_.web, observer_);
+  write_web(std::move(whole), scene, web_folder(folder_), options_.page, options_.web, observer_);
 }
 
 void BakeOutput::take_mesh(const bake::Mesh& mesh) {

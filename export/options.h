@@ -57,7 +57,8 @@ struct WebOptions {
 
   template <typename Visitor>
   void visit(Visitor&& v) {
-    v("resolution", resolution, Range{16, 1024}, "voxels along the longest axis, at most those of the bake");
+    v("resolution", resolution, Range{16, 1024},
+      "voxels along the longest axis of each nested grid, at most those of the bake");
     v("photo_side", photo_side, Range{0, 8192}, "pixels of a photograph's long side; 0 leaves them out");
   }
 };

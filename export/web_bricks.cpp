@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <span>
 
+#include "bake/out_of_core/planes.h"
 #include "bake/volume/dilate.h"
 #include "src/base/check.h"
 #include "src/color/colorspace_math.h"
@@ -23,21 +24,37 @@ int floor_div(int value, int side) {
   return value >= 0 ? value / side : -((side - 1 - value) / side);
 }
 
-/// Fills in counts, origin and distance == 0 of the bricks to store. @return the voxel the grid begins at.
-Vec3i lay_out(const bake::Volume& volume, WebBricks& bricks) {
+/// The voxels that interpolation finds anything in, from a box that is asked for.
+bake::VoxelBox reach_of(const bake::Volume& volume, const Aabbd& cover) {
+  constexpr double kRounding = 1e-4;  // of faces on faces
+  bake::VoxelBox box;
+  const Vec3d low = (cover.min - volume.origin) / volume.voxel_size;
+  const Vec3d high = (cover.max - volume.origin) / volume.voxel_size;
+  for (int axis = 0; axis < 3; ++axis) {
+    box.low[axis] = int(std::floor(low[axis] + kRounding));
+    box.high[axis] = int(std::ceil(high[axis] - kRounding));
+  }
+  return box.grown(1);
+}
+
+/// Fills in counts, origin, cover and distance == 0 of the bricks to store. @return the voxel the grid begins at.
+Vec3i lay_out(const bake::Volume& volume, const std::optional<Aabbd>& cover, WebBricks& bricks) {
   std::vector<bake::Voxel> dense;
   for (const bake::Voxel& voxel : volume.voxels) {
     if (voxel.sigma > 0) dense.push_back(voxel);
   }
   CNERF_CHECK(!dense.empty(), "no voxel has density");
   bricks.voxels = dense.size();
-  const bake::VoxelBox box = bounding_box(dense);
-  const Vec3i first = box.low - Vec3i{1, 1, 1};  // interpolation reaches one voxel beyond
-  const Vec3i size = box.size() + Vec3i{2, 2, 2};
+  // Interpolation reaches one voxel beyond.
+  const bake::VoxelBox box = cover ? reach_of(volume, *cover) : bounding_box(dense).grown(1);
+  const Vec3i first = box.low;
+  const Vec3i size = box.size();
   for (int axis = 0; axis < 3; ++axis) bricks.counts[axis] = (size[axis] + kSide - 1) / kSide;
   bricks.voxel_size = volume.voxel_size;
   bricks.origin = volume.origin + first.cast<double>() * volume.voxel_size;
   const Vec3i n = bricks.counts;
+  const Vec3d end = bricks.origin + (n * kSide).cast<double>() * volume.voxel_size;
+  bricks.cover = cover.value_or(Aabbd{bricks.origin, end});
   bricks.distance.assign(std::size_t(n.x) * n.y * n.z, 255);
   for (const bake::Voxel& voxel : dense) {
     const Vec3i v = Vec3i{voxel.i, voxel.j, voxel.k} - first;
@@ -115,9 +132,9 @@ void simplify(std::span<std::uint8_t> plane, const std::vector<Tolerance>& toler
 
 }  // namespace
 
-WebBricks make_web_bricks(const bake::Volume& volume) {
+WebBricks make_web_bricks(const bake::Volume& volume, const std::optional<Aabbd>& cover) {
   WebBricks bricks;
-  const Vec3i first = lay_out(volume, bricks);
+  const Vec3i first = lay_out(volume, cover, bricks);
   fill_distances(bricks);
   std::size_t stored = 0;
   const std::vector<std::int32_t> numbers = numbers_of(bricks, stored);

@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "bake/volume/dilate.h"
 #include "bake/volume/resample.h"
 #include "export/manifest.h"
+#include "export/web_levels.h"
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -59,24 +62,63 @@ std::size_t copy_page(const fs::path& page, const fs::path& folder) {
   return bytes;
 }
 
-Json volume_json(const WebBricks& bricks) {
-  const Json density{{"file", "density.bin"},         {"encoding", "r8"},
-                     {"unit", "1/world unit"},        {"formula", "scale * (code / 255)^3"},
-                     {"scale", bricks.density_scale}, {"max", bricks.max_density}};
+/// File of a level, by the names that bake_folder.h has for grids: density.bin, density_fine1.bin.
+std::string part_name(const std::string& part, std::size_t level) {
+  return level == 0 ? part + ".bin" : fmt::format("{}_fine{}.bin", part, level);
+}
+
+constexpr const char* kParts[] = {"occupancy", "density", "color"};
+
+Json box_json(const Aabbd& box) {
+  return {{"min", to_json(box.min)}, {"max", to_json(box.max)}};
+}
+
+Json level_json(const WebBricks& bricks, std::size_t level) {
+  const Json density{{"file", part_name("density", level)},
+                     {"encoding", "r8"},
+                     {"unit", "1/world unit"},
+                     {"formula", "scale * (code / 255)^3"},
+                     {"scale", bricks.density_scale},
+                     {"max", bricks.max_density}};
   const Vec3i n = bricks.counts;
-  const double side = bricks.voxel_size * kWebBrickSide;
-  const Vec3d end = bricks.origin + Vec3d{n.x * side, n.y * side, n.z * side};
-  return {{"origin", to_json(bricks.origin)},
-          {"voxel_size", bricks.voxel_size},
-          {"brick_side", kWebBrickSide},
-          {"bricks", {n.x, n.y, n.z}},
-          {"stored_bricks", bricks.stored()},
-          {"voxels", bricks.voxels},
-          {"bounds", {{"min", to_json(bricks.origin)}, {"max", to_json(end)}}},
-          {"filter", "differences"},
-          {"occupancy", {{"file", "occupancy.bin"}, {"meaning", "bricks to the nearest stored one; 0 = stored"}}},
-          {"density", density},
-          {"color", {{"file", "color.bin"}, {"encoding", "L* 255/100, a + 128, b + 128; CIE 1976, D65"}}}};
+  const Vec3d end = bricks.origin + (n * kWebBrickSide).cast<double>() * bricks.voxel_size;
+  return {
+      {"origin", to_json(bricks.origin)},
+      {"voxel_size", bricks.voxel_size},
+      {"brick_side", kWebBrickSide},
+      {"bricks", {n.x, n.y, n.z}},
+      {"stored_bricks", bricks.stored()},
+      {"voxels", bricks.voxels},
+      {"bounds", box_json({bricks.origin, end})},
+      {"cover", box_json(bricks.cover)},
+      {"filter", "differences"},
+      {"occupancy",
+       {{"file", part_name("occupancy", level)}, {"meaning", "bricks to the nearest stored one; 0 = stored"}}},
+      {"density", density},
+      {"color", {{"file", part_name("color", level)}, {"encoding", "L* 255/100, a + 128, b + 128; CIE 1976, D65"}}}};
+}
+
+Json levels_json(const std::vector<WebBricks>& levels) {
+  Json list = Json::array();
+  for (std::size_t level = 0; level < levels.size(); ++level) list.push_back(level_json(levels[level], level));
+  return list;
+}
+
+/// @return bytes written.
+std::size_t add_level(const WebBricks& bricks, std::size_t level, BundleFiles& files) {
+  std::vector<std::uint8_t> density = bricks.density, lab = bricks.lab;
+  to_differences(density);
+  to_differences(lab);
+  return files.add_packed(part_name("occupancy", level), bricks.distance) +
+         files.add_packed(part_name("density", level), density) + files.add_packed(part_name("color", level), lab);
+}
+
+/// Those of a bundle that had more levels.
+void remove_levels_from(std::size_t level, const fs::path& folder) {
+  for (bool any = true; any; ++level) {
+    any = false;
+    for (const char* part : kParts) any = fs::remove(folder / part_name(part, level)) || any;
+  }
 }
 
 Json cameras_json(const WebScene& scene) {
@@ -98,23 +140,22 @@ std::size_t graphics_bytes(const WebBricks& bricks) {
 
 }  // namespace
 
-WebReport write_web_bundle(const bake::Volume& volume, const WebBricks& bricks, const WebScene& scene,
-                           const fs::path& folder, const fs::path& page) {
+WebReport write_web_bundle(const WebVolume& volume, const WebScene& scene, const fs::path& folder,
+                           const fs::path& page) {
+  CNERF_CHECK(!volume.levels.empty(), "a bundle has a level");
   CNERF_CHECK(scene.photos.empty() || scene.photos.size() == scene.cameras.size(), "one photograph per camera");
   std::error_code ignored;
   fs::remove(folder / kWebManifest, ignored);  // a manifest never names files of another bundle
   BundleFiles files(folder);
   WebReport report;
-  report.volume_bytes += files.add_packed("occupancy.bin", bricks.distance);
-  std::vector<std::uint8_t> density = bricks.density, lab = bricks.lab;
-  to_differences(density);
-  to_differences(lab);
-  report.volume_bytes += files.add_packed("density.bin", density);
-  report.volume_bytes += files.add_packed("color.bin", lab);
+  for (std::size_t level = 0; level < volume.levels.size(); ++level) {
+    report.volume_bytes += add_level(volume.levels[level], level, files);
+  }
+  remove_levels_from(volume.levels.size(), folder);
 
   Json poster(nullptr);
-  if (!scene.cameras.empty()) {
-    files.add("poster.webp", make_poster(volume, scene.cameras.front(), kPosterSide));
+  if (!volume.poster.empty()) {
+    files.add("poster.webp", volume.poster);
     poster = {{"file", "poster.webp"}, {"camera", 0}};
   }
   for (std::size_t i = 0; i < scene.photos.size(); ++i) {
@@ -132,7 +173,7 @@ WebReport write_web_bundle(const bake::Volume& volume, const WebBricks& bricks, 
                   {"up_axis", scene.label.world.up_axis},
                   {"color", color_json(scene.label.provenance)},
                   {"frame", frame_json(volume.frame)},
-                  {"volume", volume_json(bricks)},
+                  {"levels", levels_json(volume.levels)},
                   {"poster", poster},
                   {"files", files.list()},
                   {"camera_axes", "+X right, +Y down, +Z forward; centre of the first pixel at (0.5, 0.5)"},
@@ -142,17 +183,35 @@ WebReport write_web_bundle(const bake::Volume& volume, const WebBricks& bricks, 
   return report;
 }
 
-void write_web(const bake::Volume& volume, const WebScene& scene, const fs::path& folder, const fs::path& page,
+/// What a camera sees of nested grids that are at most as fine as the page's levels.
+std::vector<std::byte> poster_of(const std::vector<bake::Volume>& volumes, const bake::Camera& camera, int resolution) {
+  std::vector<bake::Volume> small;
+  for (const bake::Volume& volume : volumes) {
+    const Vec3i n = volume.resolution;
+    if (volume.voxels.empty()) continue;
+    small.push_back(resample_volume(volume, resolution));
+    if (std::max({n.x, n.y, n.z}) > resolution) dilate_colors(small.back(), 1);
+  }
+  return make_poster(small, camera, kPosterSide);
+}
+
+void write_web(std::vector<bake::Volume> volumes, const WebScene& scene, const fs::path& folder, const fs::path& page,
                const WebOptions& options, Observer& observer) {
-  const bake::Volume small = resample_volume(volume, options.resolution);
-  const WebBricks bricks = make_web_bricks(small);
+  WebVolume volume;
+  CNERF_CHECK(!volumes.empty(), "a bake has a grid");
+  volume.frame = volumes.back().frame;
+  if (!scene.cameras.empty()) volume.poster = poster_of(volumes, scene.cameras.front(), options.resolution);
+  volume.levels = make_web_levels(std::move(volumes), options.resolution);
   const auto mib = [](std::size_t bytes) { return double(bytes) / (1 << 20); };
-  observer.say(fmt::format("web: {} x {} x {} voxels, {} bricks; {:.0f} MiB of graphics memory", small.resolution.x,
-                           small.resolution.y, small.resolution.z, bricks.stored(), mib(graphics_bytes(bricks))));
+  for (const WebBricks& bricks : volume.levels) {
+    observer.say(fmt::format("web: {:.1f} M voxels of {:.4g} in {} bricks; {:.0f} MiB of graphics memory",
+                             1e-6 * double(bricks.voxels), bricks.voxel_size, bricks.stored(),
+                             mib(graphics_bytes(bricks))));
+  }
   if (page.empty()) {
     observer.say("note: this cnerf was built without the page (CNERF_VIEWER); the bundle holds data only");
   }
-  const WebReport report = write_web_bundle(small, bricks, scene, folder, page);
+  const WebReport report = write_web_bundle(volume, scene, folder, page);
   observer.say(fmt::format("web: {:.2f} MiB of volume, {:.2f} MiB of photographs, {:.0f} KiB of page",
                            mib(report.volume_bytes), mib(report.photo_bytes), double(report.page_bytes) / 1024));
   observer.wrote("web bundle", folder);

@@ -15,8 +15,15 @@
 
 namespace cnerf::exporting {
 
-inline constexpr int kWebSchema = 1;
+inline constexpr int kWebSchema = 2;
 inline constexpr const char* kWebManifest = "bundle.json";
+
+/// What the page shows of a bake.
+struct WebVolume {
+  std::vector<WebBricks> levels;  ///< coarsest first, as make_web_levels makes them
+  SceneFrame frame;
+  std::vector<std::byte> poster;  ///< WebP of what the first camera sees; empty = none
+};
 
 /// What a bundle says besides the volume.
 struct WebScene {
@@ -33,18 +40,21 @@ struct WebReport {
   std::size_t page_bytes = 0;
 };
 
-/// Writes `occupancy.bin`, `density.bin`, `color.bin` (each one gzip member; layouts in docs/viewer.md), `poster.webp`,
-/// `photos/NNN.jpg`, a copy of the page, and at the end bundle.json, which holds the SHA-256 of all of them, the frame,
-/// the cameras and the colour spaces. Every file is whole or not there.
-/// @param bricks  of `volume`; the volume itself is only looked at for the poster.
+/// Writes for each level `occupancy.bin`, `density.bin` and `color.bin`, of finer ones `occupancy_fine1.bin` and so on
+/// (each one gzip member; layouts in docs/viewer.md), `poster.webp`, `photos/NNN.jpg`, a copy of the page, and at the
+/// end bundle.json, which holds the SHA-256 of all of them, the frame, the cameras and the colour spaces. Every file is
+/// whole or not there; levels of a former bundle that this one does not have are removed.
 /// @param page    folder of the built page; empty = none, the bundle then needs `cnerf view` to be looked at.
-/// @throws ContractError  when photos and cameras disagree in number.  @throws OutputError, MissingInputError.
-WebReport write_web_bundle(const bake::Volume& volume, const WebBricks& bricks, const WebScene& scene,
-                           const std::filesystem::path& folder, const std::filesystem::path& page);
+/// @throws ContractError  when photos and cameras disagree in number, or there is no level.
+/// @throws OutputError, MissingInputError.
+WebReport write_web_bundle(const WebVolume& volume, const WebScene& scene, const std::filesystem::path& folder,
+                           const std::filesystem::path& page);
 
-/// The bundle of any volume, which is averaged to `options.resolution` first. The observer hears sizes.
+/// The bundle of the grids of a bake, each of which is averaged to `options.resolution` first. The observer hears
+/// sizes.
+/// @param volumes  nested grids, finest first; colours are dilated.
 /// @throws as write_web_bundle.
-void write_web(const bake::Volume& volume, const WebScene& scene, const std::filesystem::path& folder,
+void write_web(std::vector<bake::Volume> volumes, const WebScene& scene, const std::filesystem::path& folder,
                const std::filesystem::path& page, const WebOptions& options, Observer& observer);
 
 }  // namespace cnerf::exporting

@@ -74,12 +74,12 @@ std::vector<WebPhoto> make_web_photos(std::span<const View> views, int side, int
   return photos;
 }
 
-std::vector<std::byte> make_poster(const bake::Volume& volume, const bake::Camera& camera, int side) {
+std::vector<std::byte> make_poster(std::span<const bake::Volume> volumes, const bake::Camera& camera, int side) {
   const Intrinsics pinhole = without_distortion(fitted(camera.intrinsics, side));
   bake::IntegratorOptions options;
   options.step = 0.5;
   options.samples_per_axis = 1;
-  const bake::VolumeImage image = integrate_volume(volume, pinhole, camera.world_from_camera, options);
+  const bake::VolumeImage image = integrate_volumes(volumes, pinhole, camera.world_from_camera, options);
   cv::Mat bgra(image.height, image.width, CV_8UC4);
   for (std::size_t i = 0; i < image.opacity.size(); ++i) {
     const float opacity = image.opacity[i];

@@ -28,7 +28,8 @@ struct WebPhoto {
 /// Of views, as the program sees them; made by all threads.
 [[nodiscard]] std::vector<WebPhoto> make_web_photos(std::span<const View> views, int side, int quality);
 
-/// WebP with alpha of what a camera sees of a volume, `side` pixels long at most: sRGB, not premultiplied.
-[[nodiscard]] std::vector<std::byte> make_poster(const bake::Volume& volume, const bake::Camera& camera, int side);
+/// WebP with alpha of what a camera sees of nested volumes, `side` pixels long at most: sRGB, not premultiplied.
+[[nodiscard]] std::vector<std::byte> make_poster(std::span<const bake::Volume> volumes, const bake::Camera& camera,
+                                                 int side);
 
 }  // namespace cnerf::exporting

@@ -28,8 +28,9 @@ struct Overlap {
 
 /// An old voxel is no wider than a new one: it touches two at most.
 int overlaps_of(int old_index, double ratio, Overlap out[2]) {
+  constexpr double kRounding = 1e-6;  // sizes that come out of files are halves of each other to a few digits less
   const double begin = old_index * ratio, end = (old_index + 1) * ratio;
-  const int first = int(std::floor(begin));
+  const int first = int(std::floor(begin + kRounding));
   const double border = first + 1.0;
   if (end <= border) {
     out[0] = {first, end - begin};
@@ -37,7 +38,7 @@ int overlaps_of(int old_index, double ratio, Overlap out[2]) {
   }
   out[0] = {first, border - begin};
   out[1] = {first + 1, end - border};
-  return out[1].share > 1e-9 ? 2 : 1;
+  return out[1].share > kRounding ? 2 : 1;
 }
 
 std::uint64_t key_of(int i, int j, int k) {

@@ -45,6 +45,7 @@ Work declare_eval(CLI::App& app);
 Work declare_compare(CLI::App& app);
 Work declare_bake(CLI::App& app);
 Work declare_view(CLI::App& app);
+Work declare_studio(CLI::App& app);
 Work declare_info(CLI::App& app);
 Work declare_doctor(CLI::App& app);
 

@@ -2,8 +2,11 @@
 
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
+#include "src/base/error.h"
+#include "src/base/usage.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/default_colorizer.h"
+#include "src/studio/coloring.h"
 #include "viewer/server/live_session.h"
 
 namespace cnerf::app {
@@ -13,16 +16,41 @@ struct ColorizeArguments {
   RunFolderArguments run;
   pipeline::ExistingOutput existing;
   std::string bases;
+  std::string replay;
   bool bases_only = false;
   bool view = false;
   web::BrowserOptions browser;
 };
+
+/// What somebody did in the studio, done again: on the processor the take is the same bit for bit.
+void replay(const ColorizeArguments& arguments, const pipeline::RunContext& context, Reporter& reporter) {
+  const pipeline::RunDirectory& directory = context.directory;
+  const std::string of = directory.choose_take(arguments.replay);
+  std::vector<std::string> views;
+  for (const View& view : context.capture.views) {
+    if (!view.held_out) views.push_back(view.name);
+  }
+  const studio::Journal journal = studio::read_journal(directory.take_folder(of) / studio::kJournalFile, views);
+  const std::string take = pipeline::take_to_write(
+      context, arguments.run.take.empty() ? of + "-again" : arguments.run.take, arguments.existing);
+  const FolderLock lock = pipeline::lock_folder(directory.root(), FolderLock::Mode::kShared, reporter);
+  if (arguments.existing.overwrite) clear_folder(directory.take_folder(take));
+  const Stopwatch watch;
+  studio::Coloring coloring(context, engines_for(context.config.device));
+  coloring.replay(journal, {}, [&](double fraction) {
+    reporter.report_progress({"replay " + of, fraction, {}});
+    if (reporter.is_cancelled()) throw Interrupted("stopped; nothing was written");
+  });
+  coloring.keep(take, watch.seconds(), reporter);
+  reporter.wrote("take", directory.take_folder(take));
+}
 
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
   // A take that is gone on with has its own configuration; a new one starts from the run's.
   const std::string base = arguments.existing.resume ? arguments.run.take : "";
   pipeline::RunContext context = open_run(arguments.run, base, command_line, reporter);
+  if (!arguments.replay.empty()) return replay(arguments, context, reporter);
   refuse_colorizer_of_others(arguments.run.config, context.config);
   const Engines& engines = engines_for(context.config.device);
   pipeline::choose_colorizer(context.capture.root, context.config, reporter);
@@ -52,6 +80,7 @@ Work declare_colorize(CLI::App& app) {
   app.add_option("--bases", arguments->bases,
                  "2,5,7: base images whose colours you like, by their numbers in bases.png");
   app.add_flag("--bases-only", arguments->bases_only, "Only show the candidates of base images, in a minute");
+  app.add_option("--replay", arguments->replay, "Make a take of the studio again from its journal, as --take NAME");
   app.add_flag("--resume", arguments->existing.resume, "Go on with a take that was stopped");
   app.add_flag("--overwrite", arguments->existing.overwrite, "Start again where a take of this name is finished");
   app.add_flag("--view", arguments->view, "Show the work in the browser, with buttons to pause and to stop");

@@ -5,6 +5,7 @@
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
 #include "src/base/error.h"
+#include "src/pipeline/photographs_step.h"
 #include "src/pipeline/render_bake.h"
 #include "src/pipeline/render_step.h"
 
@@ -15,7 +16,8 @@ namespace {
 struct RenderArguments {
   RunFolderArguments run;
   std::string path = "turntable", format, out;
-  bool baked = false, view_averaged = false, overwrite = false;
+  std::vector<std::string> views;
+  bool photographs = false, baked = false, view_averaged = false, overwrite = false;
 };
 
 /// "png,exr" as flags. Without a format a moving camera gives a video, single views give pictures.
@@ -50,9 +52,40 @@ void render_bake(const RenderArguments& arguments, Reporter& reporter) {
   pipeline::render_bake(bake, path, folder, reporter);
 }
 
+/// What is said of photographs and of a path, but not of both.
+void check_photographs(const RenderArguments& arguments) {
+  if (!arguments.photographs) {
+    if (!arguments.views.empty()) throw UsageError("--views: is for --photographs; --path says where else to render");
+    return;
+  }
+  if (arguments.path != RenderArguments{}.path) {
+    throw UsageError("--photographs: are rendered at their own cameras, not along --path " + arguments.path);
+  }
+  if (arguments.baked || arguments.view_averaged) {
+    throw UsageError("--photographs: have the per-pixel colours, not those of --baked or --view-averaged");
+  }
+}
+
+void render_photographs(const RenderArguments& arguments, const std::vector<std::string>& command_line,
+                        Reporter& reporter) {
+  const pipeline::PhotographFormat format =
+      pipeline::photograph_format_named(arguments.format.empty() ? "png" : arguments.format);
+  const pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.run.run);
+  const std::string take = directory.choose_take(arguments.run.take);
+  pipeline::check_photographs_take(directory, take);
+  const fs::path folder =
+      arguments.out.empty() ? pipeline::photographs_folder(directory, take) : fs::path(arguments.out) / "photographs";
+  refuse_existing(folder, arguments.overwrite);
+  const pipeline::RunContext context = open_run(arguments.run, take, command_line, reporter);
+  pipeline::photographs_step(context, {take, arguments.views, folder, format, arguments.run.capture},
+                             engines_for(context.config.device), reporter);
+}
+
 void render(const RenderArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
   const fs::path folder = arguments.run.run;
+  check_photographs(arguments);
+  if (arguments.photographs) return render_photographs(arguments, command_line, reporter);
   if (!pipeline::RunDirectory(folder).exists() && fs::exists(folder / "manifest.json")) {
     return render_bake(arguments, reporter);
   }
@@ -76,7 +109,11 @@ Work declare_render(CLI::App& app) {
   app.add_option("--path", arguments->path,
                  "turntable (whichever of the next two suits), spiral, orbit, held-out, or a camera file (JSON); of a "
                  "bake instead of a run: a camera file, or cameras for all of the capture's, as png");
-  app.add_option("--format", arguments->format, "png, exr, mp4 or several, comma-separated");
+  app.add_flag("--photographs", arguments->photographs,
+               "Write the photographs of the capture in colour instead: full size, 16 bits, their own grey");
+  app.add_option("--views", arguments->views, "With --photographs: only these, comma-separated")->delimiter(',');
+  app.add_option("--format", arguments->format,
+                 "png, exr, mp4 or several, comma-separated; of --photographs: png or tiff");
   app.add_option("-o,--out", arguments->out, "Folder to write to; RUN/renders/TAKE if not given");
   app.add_flag("--baked", arguments->baked, "Show the colours of the bake instead of the per-pixel ones");
   app.add_flag("--view-averaged", arguments->view_averaged,

@@ -19,6 +19,7 @@ constexpr Command kCommands[] = {
 #endif
     {"bake", "A run as an OpenVDB volume for Blender and others", declare_bake, false},
     {"view", "A bake or a run in the browser", declare_view, false},
+    {"studio", "A run painted and coloured in the browser", declare_studio, false},
     {"info", "What a capture, run, snapshot or VDB holds", declare_info, false},
     {"doctor", "What this machine and build can do", declare_doctor, false},
 };

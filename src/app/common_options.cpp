@@ -105,6 +105,7 @@ void add_colorizer_options(CLI::App& app, ConfigArguments& arguments) {
   add_list_form(app, arguments, "--keyframe", "colorizer.keyframes");
   add_list_form(app, arguments, "--hint", "colorizer.hints");
   add_list_form(app, arguments, "--hint-image", "colorizer.hint_images");
+  add_short_form(app, arguments, "--strokes", "colorizer.strokes");
 }
 
 void add_field_options(CLI::App& app, const std::vector<Field>& fields) {

@@ -16,6 +16,7 @@ struct ListedView {
   std::filesystem::path poses_file;  ///< the file that lists it; for messages
   std::filesystem::path lens_file;   ///< the file that states the intrinsics, if it is another one; for messages
   std::filesystem::path image_file;  ///< may not exist
+  std::filesystem::path full_file;   ///< of which `image_file` is a reduced copy; empty: of none
   std::filesystem::path mask_file;   ///< empty: none
   std::uint32_t number = 0;          ///< by which points name it
   /// For the stated size. Without one (width 0) it is for the size of the image, and a principal point of

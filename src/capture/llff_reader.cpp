@@ -110,6 +110,10 @@ CaptureListing read_llff(const fs::path& npy_file, int downscale) {
                          folder.path.string() + ", found " + std::to_string(array.shape[0]));
   }
 
+  std::vector<fs::path> full_files;  // in the same order; names may differ
+  if (folder.path != folders.front().path) full_files = sorted_images(folders.front().path);
+  if (full_files.size() != files.size()) full_files.clear();
+
   CaptureListing listing;
   listing.source = npy_file;
   listing.format = "llff";
@@ -117,6 +121,7 @@ CaptureListing read_llff(const fs::path& npy_file, int downscale) {
     ListedView view = list_view(&array.values[i * kColumns], npy_file, i);
     view.name = fs::relative(files[i], root.empty() ? "." : root).generic_string();
     view.image_file = files[i];
+    if (!full_files.empty()) view.full_file = full_files[i];
     view.downscale = std::max(1.0, double(downscale) / folder.reduced_by);
     listing.views.push_back(std::move(view));
   }

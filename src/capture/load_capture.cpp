@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <utility>
 
 #include "src/base/error.h"
 #include "src/base/parallel.h"
@@ -121,7 +122,7 @@ void apply_downscale(CaptureListing& listing, int downscale) {
   if (downscale == 1) return;
   for (ListedView& view : listing.views) {
     const std::optional<fs::path> copy = reduced_copy(view.image_file, downscale);
-    if (copy) view.image_file = *copy;
+    if (copy) view.full_file = std::exchange(view.image_file, *copy);
     view.downscale = copy ? 1.0 : double(downscale);
   }
 }
@@ -370,6 +371,16 @@ Capture survey_capture(const fs::path& path, const CaptureOptions& options) {
     capture.views[i] = surveyed_view(listed[i], image_header(listed[i].image_file));
   });
   return capture;
+}
+
+std::vector<FullSizeImage> full_size_images(const fs::path& path, const CaptureOptions& options) {
+  std::vector<FullSizeImage> images;
+  std::error_code failure;
+  for (const ListedView& view : find_views(path, options).listing.views) {
+    const bool is_copy = !view.full_file.empty() && fs::is_regular_file(view.full_file, failure);
+    images.push_back({view.name, is_copy ? view.full_file : view.image_file});
+  }
+  return images;
 }
 
 Capture load_capture(const fs::path& path, const CaptureOptions& options) {

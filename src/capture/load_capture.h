@@ -2,6 +2,7 @@
 /// Turns a folder into a Capture, whatever convention it follows.
 
 #include <string>
+#include <vector>
 
 #include "src/base/options.h"
 #include "src/capture/capture.h"
@@ -40,5 +41,15 @@ struct CaptureOptions {
 /// The same without pixels, from the headers of the images: views tell size and depth, and what pixels decide (whether
 /// the subject is cut out, which images have colours) is left out.  @throws  as `load_capture`, but for bad pixels.
 [[nodiscard]] Capture survey_capture(const std::filesystem::path& path, const CaptureOptions& options = {});
+
+/// The photograph of a view as it was given.
+struct FullSizeImage {
+  std::string view;            ///< its name
+  std::filesystem::path file;  ///< the largest there is, whatever `CaptureOptions::downscale`
+};
+/// One for each view that `load_capture` finds with the same options, in its order. No image is opened.
+/// @throws  as `load_capture`, but for bad images.
+[[nodiscard]] std::vector<FullSizeImage> full_size_images(const std::filesystem::path& path,
+                                                          const CaptureOptions& options = {});
 
 }  // namespace cnerf

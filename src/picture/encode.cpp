@@ -1,5 +1,6 @@
 #include "src/picture/encode.h"
 
+#include <array>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -10,6 +11,11 @@
 
 namespace cnerf {
 namespace {
+
+/// The signature and the IHDR chunk of a PNG file, bytes; chunks about colour follow them.
+constexpr std::ptrdiff_t kPngHeader = 8 + 25;
+/// The chunk sRGB: its length, name, rendering intent (perceptual) and CRC (PNG specification, 11.3.2.5).
+constexpr std::array<std::uint8_t, 13> kSrgbChunk = {0, 0, 0, 1, 's', 'R', 'G', 'B', 0, 0xAE, 0xCE, 0x1C, 0xE9};
 
 /// @param format  a file extension
 /// @param who     named in an error
@@ -48,6 +54,10 @@ std::vector<std::byte> png_bytes(const Picture& picture, PngEffort save) {
   return as_vector(encoded(".png", bgr_of(picture), options));
 }
 
+std::vector<std::byte> png_bytes(const cv::Mat& picture) {
+  return as_vector(encoded(".png", picture, {}));
+}
+
 std::vector<std::byte> jpeg_bytes(const cv::Mat& picture, int quality) {
   return as_vector(encoded(".jpg", picture, {cv::IMWRITE_JPEG_QUALITY, quality}));
 }
@@ -62,6 +72,17 @@ std::vector<std::byte> webp_bytes(const cv::Mat& picture, int quality) {
 
 void write_png(const std::filesystem::path& file, const cv::Mat& picture) {
   const std::vector<std::uint8_t> bytes = encoded(".png", picture, {}, file.string());
+  write_file(file, std::as_bytes(std::span(bytes)));
+}
+
+void write_srgb_png(const std::filesystem::path& file, const cv::Mat& picture) {
+  std::vector<std::uint8_t> bytes = encoded(".png", picture, {}, file.string());
+  bytes.insert(bytes.begin() + kPngHeader, kSrgbChunk.begin(), kSrgbChunk.end());
+  write_file(file, std::as_bytes(std::span(bytes)));
+}
+
+void write_tiff(const std::filesystem::path& file, const cv::Mat& picture) {
+  const std::vector<std::uint8_t> bytes = encoded(".tiff", picture, {}, file.string());
   write_file(file, std::as_bytes(std::span(bytes)));
 }
 

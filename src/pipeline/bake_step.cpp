@@ -24,10 +24,7 @@ std::string field_identity(const RunDirectory& directory, const std::string& tak
 bake::Options volume_options(const Config& config, const exporting::Formats& formats) {
   bake::Options options = config.bake;
   if (options.max_memory.empty()) options.max_memory = config.max_memory;
-  if (formats.web && !formats.has_manifest()) {
-    options.resolution = std::min(options.resolution, config.web.resolution);
-    if (options.grids == "auto") options.grids = "one";  // the bundle would only average finer ones
-  }
+  if (formats.web && !formats.has_manifest()) options.resolution = std::min(options.resolution, config.web.resolution);
   return options;
 }
 

@@ -42,9 +42,10 @@ TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Eng
   Colorizer& colorizer = job.colorizer != nullptr ? *job.colorizer : *made;
   if (job.existing.overwrite) clear_folder(directory.take_folder(job.take));
   write_file(directory.take_config_file(job.take), to_toml(context.config));
-  const Stage2Report report = train_stage2({context.capture, directory.stage1_snapshot(), context.config.stage2,
-                                            colorizer, known, directory.take_snapshot(job.take), job.existing.resume},
-                                           engines, observer);
+  const Stage2Report report =
+      train_stage2({context.capture, directory.stage1_snapshot(), context.config.stage2, colorizer, known,
+                    directory.take_snapshot(job.take), job.existing.resume, job.views},
+                   engines, observer);
   observer.report_progress({"stage 2", 1.0, {}});
   return {job.take, colorizer.name() + describe(known), report};
 }

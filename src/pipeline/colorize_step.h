@@ -29,6 +29,7 @@ struct ColorizeJob {
   std::string take;
   ExistingOutput existing;
   Colorizer* colorizer = nullptr;  ///< null: `colorizer_of` the run is made when it is needed
+  ViewCache* views = nullptr;      ///< of the run's stage 1; null = one of its own
 };
 
 /// Stage 2 into a take, unless it is finished. Makes it the current one.

@@ -10,6 +10,7 @@
 #include "src/base/error.h"
 #include "src/capture/image_io.h"
 #include "src/color/colorspace_math.h"
+#include "src/train/chroma/strokes.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
@@ -112,12 +113,9 @@ double number_of(const std::string& text, const std::string& entry) {
 }
 
 Ab color_of(const std::string& text, const std::string& entry) {
-  unsigned rgb = 0;
-  const bool is_hex = text.size() == 7 && text[0] == '#' &&
-                      std::from_chars(text.data() + 1, text.data() + 7, rgb, 16).ptr == text.data() + 7;
-  if (!is_hex) throw UsageError(entry + ": expected a colour like #c08040, found " + text);
-  const auto channel = [&](int shift) { return linear_from_srgb(float((rgb >> shift) & 255u) / 255.0f); };
-  return ab_of_linear({channel(16), channel(8), channel(0)});
+  const std::optional<Ab> color = ab_of_hex(text);
+  if (!color) throw UsageError(entry + ": expected a colour like #c08040, found " + text);
+  return *color;
 }
 
 /// "x,y,VIEW,#rrggbb": a dot, in pixels of the view's image file.
@@ -147,6 +145,18 @@ KnownColors dot_of(const std::string& hint, const Capture& capture) {
   return known;
 }
 
+/// What a stroke file paints on the capture's training views.
+std::vector<KnownColors> painted_in(const fs::path& file, const Capture& capture) {
+  std::vector<std::string> names;
+  std::vector<Intrinsics> lenses;
+  for (const View& view : capture.views) {
+    if (view.held_out) continue;
+    names.push_back(view.name);
+    lenses.push_back(view.intrinsics);
+  }
+  return painted(read_strokes(file, names).strokes, names, lenses);
+}
+
 }  // namespace
 
 std::vector<KnownColors> load_known_colors(const Capture& capture, const ColorizerOptions& config) {
@@ -159,6 +169,8 @@ std::vector<KnownColors> load_known_colors(const Capture& capture, const Coloriz
   load(config.keyframes, "--keyframe", KnownColorKind::kKeyFrame);
   load(config.hint_images, "--hint-image", KnownColorKind::kStrokes);
   for (const std::string& hint : split(config.hints, ';')) known.push_back(dot_of(hint, capture));
+  if (config.strokes.empty()) return known;
+  for (KnownColors& paint : painted_in(config.strokes, capture)) known.push_back(std::move(paint));
   return known;
 }
 

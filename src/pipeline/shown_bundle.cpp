@@ -1,6 +1,5 @@
 #include "src/pipeline/shown_bundle.h"
 
-#include "bake/volume/resample.h"
 #include "export/bake_output.h"
 #include "export/manifest.h"
 #include "export/vdb_reader.h"
@@ -34,10 +33,9 @@ fs::path bundle_of_bake(const fs::path& bake, const ShowJob& job, const exportin
   if (!manifest.volume) {
     throw InputError(manifest_file, "volume", "this bake has none; bake with --format vdb or --format web");
   }
-  const bake::Volume volume = merged_volume(exporting::read_volumes(bake));
   exporting::WebScene scene{bake.filename().string(), manifest.cameras, {}, manifest.label};
   scene.label.provenance.command_line = job.command_line;
-  write_web(volume, scene, folder, web::find_page(), options, observer);
+  write_web(exporting::read_volumes(bake), scene, folder, web::find_page(), options, observer);
   observer.say("note: the photographs are with the capture; cnerf bake RUN --format web adds them");
   return folder;
 }

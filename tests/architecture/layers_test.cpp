@@ -49,6 +49,7 @@ const std::vector<std::string> kLayers = {"src/base",
                                           "viewer",
                                           "src/config",
                                           "src/pipeline",
+                                          "src/studio",
                                           "src/compare",
                                           "src/app"};
 

@@ -148,6 +148,23 @@ TEST(BakeLevels, MergingKeepsTheMatter) {
   EXPECT_DOUBLE_EQ(merged.voxel_size, nested.back().voxel_size);
 }
 
+/// A voxel size that went through a file is half of the other only nearly.
+TEST(BakeLevels, MergingMakesNoPlaceTwice) {
+  Volume coarse, fine;
+  coarse.voxel_size = 0.1;
+  coarse.resolution = fine.resolution = {64, 1, 1};
+  fine.voxel_size = 0.05 * (1 - 1e-14);
+  for (int i = 0; i < 64; ++i) {
+    (i < 32 ? fine : coarse).voxels.push_back({i, 0, 0, 1, 0.5f, {0.5f, 0.5f, 0.5f}, 0, 0});
+  }
+  for (int i = 32; i < 64; ++i) fine.voxels.push_back({i, 0, 0, 1, 0.5f, {0.5f, 0.5f, 0.5f}, 0, 0});
+  fine.origin = {1e-15, 0, 0};
+  EXPECT_EQ(merged_volume({fine, coarse}).voxels.size(), 64u);
+  for (Voxel& voxel : fine.voxels) voxel.i += 64;  // before and beyond what the coarse one has
+  for (Voxel& voxel : coarse.voxels) voxel.i -= 32;
+  EXPECT_EQ(merged_volume({fine, coarse}).voxels.size(), 64u);
+}
+
 TEST(BakeLevels, ABudgetMakesVoxelsLargerUntilTheyFit) {
   const AnalyticField field({{0, 0, 0}, 0.5, 1}, sphere_density({0.5f, 0.5f, 0.5f}, 0.25f, 100));
   Options options;

@@ -80,6 +80,23 @@ TEST(Llff, TheRestOfADownscaleIsResized) {
   EXPECT_EQ(view.intrinsics.fx, 5);
 }
 
+TEST(Llff, FullSizeImagesAreThoseOfTheLargestFolder) {
+  const test::TempDir folder;
+  test::write_llff(folder.path(), 4, "images_4", 4, 3);
+  test::write_llff(folder.path(), 4, "images_2", 8, 6);
+  for (const int downscale : {1, 2, 4, 8}) {
+    CaptureOptions options;
+    options.downscale = downscale;
+    const Capture capture = load_capture(folder.path(), options);
+    const std::vector<FullSizeImage> images = full_size_images(folder.path(), options);
+    ASSERT_EQ(images.size(), 4u);
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      EXPECT_EQ(images[i].view, capture.views[i].name);
+      EXPECT_EQ(images[i].file, folder / "images_2" / ("img" + std::to_string(i) + ".png")) << downscale;
+    }
+  }
+}
+
 TEST(Llff, FortranOrderedPosesAreTheSame) {
   const test::TempDir folder;
   test::write_llff(folder.path());

@@ -226,6 +226,9 @@ TEST_F(Transforms, DownscaleTakesReducedCopiesWhereThereAreSome) {
   EXPECT_EQ(view.image.u8[0], test::grey_value(0, 0, 51));
   EXPECT_EQ(view.intrinsics.fx, 10);
   EXPECT_EQ(view.name, "images/1.png");
+  const FullSizeImage full = full_size_images(folder_.path(), options).at(1);
+  EXPECT_EQ(full.view, view.name);
+  EXPECT_EQ(full.file.parent_path().filename(), "images");
 }
 
 TEST_F(Transforms, SmallerImagesThanStatedScaleTheCamera) {

@@ -116,6 +116,38 @@ TEST(Pipeline, EvaluationMeasuresLpipsWithWeights) {
   EXPECT_EQ(cnerf({"eval", out, "--lpips-weights", "missing.bin"}).exit_code, 66);
 }
 
+TEST(Pipeline, PhotographsInColour) {
+  const TempDir folder;
+  const std::string out = copied(tiny_take(), folder / "run").string();
+  const auto render = [&](const std::vector<std::string>& more) {
+    return cnerf(concatenated({"render", out, "--photographs"}, more));
+  };
+  const ProgramResult result = render({});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("renders/grey/photographs"));
+  EXPECT_EQ(files_below(folder / "run/renders/grey/photographs").size(), 9u);
+  const fs::path picture = folder / "run/renders/grey/photographs/view_000.png";
+  EXPECT_EQ(cv::imread(picture.string(), cv::IMREAD_UNCHANGED).depth(), CV_16U);
+  EXPECT_EQ(render({}).exit_code, 64) << "they are not overwritten";
+  EXPECT_EQ(render({"--overwrite", "--views", "view_000"}).exit_code, 0);
+
+  const std::string elsewhere = (folder / "elsewhere").string();
+  EXPECT_EQ(render({"--format", "tiff", "--views", "view_001,view_004", "-o", elsewhere}).exit_code, 0);
+  EXPECT_THAT(files_below(elsewhere), testing::ElementsAre("photographs/view_001.tiff", "photographs/view_004.tiff"));
+
+  for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
+           {"--format", "exr"}, {"--path", "orbit"}, {"--baked"}, {"--views", "zebra"}, {"--format", "png,tiff"}}) {
+    const ProgramResult refused = render(concatenated(wrong, {"-o", (folder / "other").string()}));
+    EXPECT_EQ(refused.exit_code, 64) << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr(wrong.back()));
+  }
+  EXPECT_EQ(render({"--take", "none"}).exit_code, 66);
+  EXPECT_EQ(cnerf({"render", out, "--views", "view_000"}).exit_code, 64) << "which a path has not";
+  const ProgramResult grey = cnerf({"render", tiny_run().string(), "--photographs"});
+  EXPECT_EQ(grey.exit_code, 64);
+  EXPECT_THAT(grey.err, HasSubstr("has no take yet"));
+}
+
 TEST(KeyFrames, AndHintsOverruleTheColorizer) {
   const TempDir folder;
   const std::string out = (folder / "run").string();

@@ -32,7 +32,7 @@ TEST(Web, ABakeForBrowsersIsABundleWithPhotographs) {
     EXPECT_EQ(sha256(content), file.at("sha256").get<std::string>());
   }
   EXPECT_TRUE(fs::exists(bake / "web" / "photos" / "008.jpg"));
-  const auto bricks = json.at("volume").at("bricks").get<std::vector<int>>();
+  const auto bricks = json.at("levels").at(0).at("bricks").get<std::vector<int>>();
   EXPECT_LE(*std::ranges::max_element(bricks), 5) << "24 voxels, their margin, and a voxel around";
   EXPECT_FALSE(fs::exists(bake / "manifest.json")) << "no volume for Blender was asked for";
   EXPECT_EQ(cnerf(arguments).exit_code, 64) << "it is not overwritten";

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "src/base/error.h"
@@ -59,7 +60,7 @@ const std::vector<std::string> kNames = {"left.png", "right.png"};
 TEST(KnownColors, AKeyFrameColorsWhatItShowsInOtherViewsAndNothingElse) {
   const std::vector<CachedView> views = {look(0.45f, true), look(0.55f, true)};
   const std::vector<KnownColors> known = {key_frame_of(views[0], kNames[0])};
-  const KnownColorMap map(views, kNames, known);
+  const KnownColorMap map = known_color_map(views, kNames, known);
   const double pixel = kWall / 50;  // of the wall, unit space
   int found = 0, hidden = 0;
   for (std::uint32_t p = 0; p < views[1].samples.size(); ++p) {
@@ -88,7 +89,7 @@ TEST(KnownColors, AKeyFrameColorsWhatItShowsInOtherViewsAndNothingElse) {
 TEST(KnownColors, WhatLooksDifferentIsNotTheSame) {
   const std::vector<CachedView> views = {look(0.45f, false, 0.1f), look(0.55f, false, 0.6f)};
   const std::vector<KnownColors> known = {key_frame_of(views[0], kNames[0])};
-  const KnownColorMap map(views, kNames, known);
+  const KnownColorMap map = known_color_map(views, kNames, known);
   for (std::uint32_t p = 0; p < views[1].samples.size(); ++p) EXPECT_EQ(map.find(1, p), nullptr);
 }
 
@@ -100,7 +101,8 @@ TEST(KnownColors, AKeyFrameMayHaveAnySizeOfTheShape) {
     for (int x = 0; x < large.width; ++x) large.ab.push_back(small.ab[std::size_t(y / 3 * kWidth + x / 3)]);
   }
   large.is_known.assign(large.ab.size(), 1);
-  const KnownColorMap of_small(views, kNames, std::span(&small, 1)), of_large(views, kNames, std::span(&large, 1));
+  const KnownColorMap of_small = known_color_map(views, kNames, std::span(&small, 1)),
+                      of_large = known_color_map(views, kNames, std::span(&large, 1));
   for (std::uint32_t p = 0; p < small.ab.size(); ++p) {
     ASSERT_NE(of_large.find(0, p), nullptr);
     EXPECT_NEAR(of_large.find(0, p)->a, of_small.find(0, p)->a, 1e-4);
@@ -118,18 +120,23 @@ KnownColors stroke_at(int x, int y, Ab color) {
   return strokes;
 }
 
+RunningColors grown_from(const KnownColors& strokes, const CachedView& view) {
+  RunningColors colors = running_colors(strokes);
+  run(colors, view, surface_distance(view));
+  return colors;
+}
+
 TEST(KnownColors, AStrokeStopsWhereLightnessOrDepthJumps) {
   CachedView view = look(0.5f, true);
   for (std::size_t p = 0; p < view.luminance.size(); ++p) {
     if (int(p) / kWidth >= kHeight / 2) view.luminance[p] = 0.9f;  // the lower half is bright
   }
-  const std::vector<float> surface = surface_distance(view);
-  const KnownColors grown = spread(stroke_at(5, 5, {40, -20}), view, surface);
+  const RunningColors grown = grown_from(stroke_at(5, 5, {40, -20}), view);
   int colored = 0;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       const auto p = std::uint32_t(y * kWidth + x);
-      if (grown.is_known[p] == 0) continue;
+      if (!grown.is_known(p)) continue;
       ++colored;
       EXPECT_LT(y, kHeight / 2);
       EXPECT_NEAR(point_at(view, p).z, kWall, 1e-3) << "the board is another thing";
@@ -139,21 +146,54 @@ TEST(KnownColors, AStrokeStopsWhereLightnessOrDepthJumps) {
   EXPECT_GT(colored, 200);
 }
 
+TEST(KnownColors, AStrokeRunsAsFarAsItsReach) {
+  const CachedView view = look(0.5f, false);
+  const auto reached = [](const RunningColors& colors) {
+    return std::ranges::count_if(colors.cost, [](float cost) { return cost < kUnreached; });
+  };
+  const auto size_of = [&](float reach) {
+    KnownColors stroke = stroke_at(30, 20, {50, 0});
+    stroke.reach.assign(stroke.ab.size(), reach);
+    return reached(grown_from(stroke, view));
+  };
+  EXPECT_EQ(size_of(0), 1) << "it stays where it was painted";
+  const auto usual = size_of(1);
+  EXPECT_EQ(usual, reached(grown_from(stroke_at(30, 20, {50, 0}), view)));
+  EXPECT_NEAR(double(size_of(0.5f)) / double(usual), 0.25, 0.1) << "an area, cut by the borders of the picture";
+}
+
 TEST(KnownColors, OfTwoStrokesTheNearerCounts) {
   const CachedView view = look(0.5f, false);
   KnownColors strokes = stroke_at(20, 20, {50, 0});
   strokes.ab[20 * kWidth + 32] = {-50, 0};
   strokes.is_known[20 * kWidth + 32] = 1;
-  const KnownColors grown = spread(strokes, view, surface_distance(view));
+  const RunningColors grown = grown_from(strokes, view);
   EXPECT_EQ(grown.ab[20 * kWidth + 24].a, 50);
   EXPECT_EQ(grown.ab[20 * kWidth + 29].a, -50);
-  EXPECT_EQ(grown.is_known[20 * kWidth + 59], 0) << "too far from both";
+  EXPECT_FALSE(grown.is_known(20 * kWidth + 59)) << "too far from both";
+}
+
+TEST(KnownColors, AStrokeRunsOnInOtherViewsBeyondTheBorderOfItsOwn) {
+  const std::vector<CachedView> views = {look(0.45f, false), look(0.55f, false)};
+  KnownColors stroke = stroke_at(kWidth - 4, 20, {50, 0});
+  const std::vector<KnownColors> known = {stroke};
+  const KnownColorMap map = known_color_map(views, kNames, known);
+  // What the left view has at its right border, the right view has further left.
+  const float seen_up_to = point_at(views[0], 20 * kWidth + kWidth - 1).x;
+  int beyond = 0;
+  for (std::uint32_t x = 0; x < kWidth; ++x) {
+    beyond += map.find(1, 20 * kWidth + x) != nullptr && point_at(views[1], 20 * kWidth + x).x > seen_up_to + 0.01f;
+  }
+  EXPECT_GT(beyond, 3);
+  stroke.reach.assign(stroke.ab.size(), 0.0f);
+  const std::vector<KnownColors> exact = {stroke};
+  EXPECT_LE(known_color_map(views, kNames, exact).places().size(), 4u) << "in each view where it was painted alone";
 }
 
 TEST(KnownColors, HintsCorrectKeyFrames) {
   const std::vector<CachedView> views = {look(0.45f, false), look(0.55f, false)};
   const std::vector<KnownColors> known = {key_frame_of(views[0], kNames[0]), stroke_at(30, 20, {-60, -60})};
-  const KnownColorMap map(views, kNames, known);
+  const KnownColorMap map = known_color_map(views, kNames, known);
   ASSERT_NE(map.find(0, 20 * kWidth + 30), nullptr);
   EXPECT_EQ(map.find(0, 20 * kWidth + 30)->a, -60);
   EXPECT_GT(map.find(0, 0)->b, -60) << "far from the stroke the key frame holds";
@@ -162,7 +202,7 @@ TEST(KnownColors, HintsCorrectKeyFrames) {
 TEST(KnownColors, AViewThatIsNotThereIsNamed) {
   const std::vector<CachedView> views = {look(0.5f, false), look(0.5f, false)};
   const std::vector<KnownColors> known = {key_frame_of(views[0], "middle.png")};
-  EXPECT_THROW(KnownColorMap(views, kNames, known), UsageError);
+  EXPECT_THROW((void)known_color_map(views, kNames, known), UsageError);
 }
 
 TEST(KnownColors, TheirDescriptionTellsThemApart) {

@@ -33,18 +33,28 @@ bake::Camera camera() {
   return made;
 }
 
+WebVolume shown(const bake::Volume& volume) {
+  return {{make_web_bricks(volume)}, volume.frame, make_poster({&volume, 1}, camera(), 640)};
+}
+
+/// A fine block of 16^3 voxels, and a coarse one that goes on where it ends.
+std::vector<bake::Volume> two_grids() {
+  bake::Volume coarse = exporting::test::block_volume({0, 0, 0}, {16, 8, 8}, 5, 0.1);
+  std::erase_if(coarse.voxels, [](const bake::Voxel& voxel) { return voxel.i < 8; });
+  return {exporting::test::block_volume({0, 0, 0}, {16, 16, 16}, 9, 0.05), coarse};
+}
+
 struct Written {
   cnerf::test::TempDir folder;
-  bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {5, 5, 5}, 9);
-  WebBricks bricks = make_web_bricks(volume);
+  WebVolume volume = shown(exporting::test::block_volume({0, 0, 0}, {5, 5, 5}, 9));
+  const WebBricks& bricks = volume.levels.front();
   WebReport report;
   Json json;
 
   explicit Written(const fs::path& page = {}) {
     const WebPhoto photo = make_web_photo(camera().intrinsics, std::vector<float>(64 * 48, 0.25f), 32, 80);
-    report =
-        write_web_bundle(volume, bricks, {"block", {camera()}, {photo}, exporting::test::label_of_first("y", "metres")},
-                         folder.path(), page);
+    report = write_web_bundle(volume, {"block", {camera()}, {photo}, exporting::test::label_of_first("y", "metres")},
+                              folder.path(), page);
     json = Json::parse(read_text_file(report.manifest));
   }
 };
@@ -73,7 +83,31 @@ TEST(WebBundle, SaysFrameCamerasAndOriginOfTheColour) {
   EXPECT_EQ(json.at("cameras").at(0).at("photo"), "photos/000.jpg");
   EXPECT_EQ(json.at("cameras").at(0).at("world_from_camera").at(2).at(3), 1.0);
   EXPECT_EQ(json.at("frame").at("world_centre").at(2), 3.5);
-  EXPECT_NEAR(json.at("volume").at("voxel_size").get<double>(), 0.05, 1e-15);
+  ASSERT_EQ(json.at("levels").size(), 1u);
+  EXPECT_NEAR(json.at("levels").at(0).at("voxel_size").get<double>(), 0.05, 1e-15);
+}
+
+TEST(WebBundle, HasALevelForEachGridCoarsestFirst) {
+  const cnerf::test::TempDir folder;
+  const WebScene scene{"two", {camera()}, {}, {}};
+  Observer observer;
+  write_web(two_grids(), scene, folder.path(), {}, {}, observer);
+  const Json levels = Json::parse(read_text_file(folder / "bundle.json")).at("levels");
+  ASSERT_EQ(levels.size(), 2u);
+  EXPECT_NEAR(levels.at(0).at("voxel_size").get<double>(), 0.1, 1e-12);
+  EXPECT_NEAR(levels.at(1).at("voxel_size").get<double>(), 0.05, 1e-12);
+  EXPECT_NEAR(levels.at(1).at("cover").at("max").at(0).get<double>(), 1 + 8 * 0.1, 1e-12);
+  for (const Json& level : levels) {
+    const std::size_t voxels = level.at("stored_bricks").get<std::size_t>() * kWebBrickVoxels;
+    const auto bytes_of = [&](const char* part) {
+      return unpacked(read_binary_file(folder / level.at(part).at("file").get<std::string>())).size();
+    };
+    EXPECT_EQ(bytes_of("density"), voxels);
+    EXPECT_EQ(bytes_of("color"), 3 * voxels);
+  }
+  EXPECT_TRUE(fs::exists(folder / "density_fine1.bin"));
+  write_web({two_grids().front()}, scene, folder.path(), {}, {}, observer);
+  EXPECT_FALSE(fs::exists(folder / "density_fine1.bin")) << "no part of another bundle stays";
 }
 
 TEST(WebBundle, PosterIsThePictureWithAlpha) {
@@ -121,13 +155,12 @@ TEST(WebBundle, CopiesThePage) {
 
 TEST(WebBundle, RefusesWhatDoesNotFit) {
   const cnerf::test::TempDir folder, empty;
-  const bake::Volume volume = exporting::test::block_volume({0, 0, 0}, {2, 2, 2}, 9);
-  const WebBricks bricks = make_web_bricks(volume);
-  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {{}, {}}, {}}, folder.path(), {}), ContractError);
-  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {}, {}}, folder.path(), empty.path()),
-               MissingInputError);
+  const WebVolume volume = shown(exporting::test::block_volume({0, 0, 0}, {2, 2, 2}, 9));
+  EXPECT_THROW(write_web_bundle(volume, {"", {camera()}, {{}, {}}, {}}, folder.path(), {}), ContractError);
+  EXPECT_THROW(write_web_bundle(volume, {"", {camera()}, {}, {}}, folder.path(), empty.path()), MissingInputError);
   EXPECT_FALSE(fs::exists(folder / "bundle.json")) << "the manifest comes last";
-  EXPECT_THROW(write_web_bundle(volume, bricks, {"", {camera()}, {}, {}}, "/proc/nowhere", {}), OutputError);
+  EXPECT_THROW(write_web_bundle({}, {"", {camera()}, {}, {}}, folder.path(), {}), ContractError);
+  EXPECT_THROW(write_web_bundle(volume, {"", {camera()}, {}, {}}, "/proc/nowhere", {}), OutputError);
 }
 
 }  // namespace

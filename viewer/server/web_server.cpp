@@ -14,6 +14,8 @@
 #include <array>
 #include <atomic>
 #include <charconv>
+#include <functional>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -27,7 +29,8 @@ namespace cnerf::web {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLargestBody = 4096;
+constexpr std::size_t kLargestBody = 4096;                     ///< of the live page's orders
+constexpr std::size_t kLargestUpload = std::size_t(64) << 20;  ///< of a page API, whatever it says
 constexpr std::size_t kLeastToken = 16;
 constexpr int kMostListeners = 8;  ///< tabs that follow a feed; each holds a thread
 constexpr const char* kCookie = "cnerf_token";
@@ -119,6 +122,22 @@ std::string cookie_of(const httplib::Request& request) {
   return {};
 }
 
+/// A decimal number; nothing where the text is none.
+std::optional<std::size_t> count_of(const std::string& text) {
+  std::size_t value = 0;
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool is_number = !text.empty() && failure == std::errc() && end == text.data() + text.size();
+  return is_number ? std::optional(value) : std::nullopt;
+}
+
+/// The name a page gave itself; empty where that is none. An event stream cannot send headers.
+std::string client_of(const httplib::Request& request) {
+  const std::string name = request.has_header("X-Cnerf-Client") ? request.get_header_value("X-Cnerf-Client")
+                                                                : request.get_param_value("client");
+  const bool is_plain = std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) != 0; });
+  return is_plain && name.size() >= 8 && name.size() <= 32 ? name : "";
+}
+
 void refuse(httplib::Response& response, int status, const std::string& why) {
   response.status = status;
   response.set_header("Connection", "close");  // a thread is not to wait for who was refused
@@ -149,10 +168,22 @@ std::string random_token() {
   return token;
 }
 
+/// What a server with uploads takes from a client.
+ConnectionLimits limits_for(const PageApi* api) {
+  ConnectionLimits limits;
+  if (api == nullptr) return limits;
+  limits.request_bytes += kLargestUpload;
+  limits.request = std::chrono::seconds(60);
+  return limits;
+}
+
 struct WebServer::State {
+  explicit State(PageApi* of_page) : api(of_page), server(limits_for(of_page)) {}
+
   std::vector<fs::path> folders;
   WebServerOptions options;
-  LiveFeed* feed;
+  LiveFeed* feed = nullptr;
+  PageApi* api;
   HttpServer server;
   std::thread thread;
   int port = 0;
@@ -194,8 +225,23 @@ struct WebServer::State {
                         "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
                         "frame-ancestors 'none'; base-uri 'none'; form-action 'none'");
     const bool control = request.method == "POST" && request.path == "/live/control";
-    if (request.method != "GET" && request.method != "HEAD" && !control) {
+    const std::optional<std::size_t> of_api =
+        api != nullptr ? api->largest_body(request.method, request.path) : std::nullopt;
+    const bool is_order = control || (of_api && request.method != "GET");
+    if (request.method != "GET" && request.method != "HEAD" && !is_order) {
       refuse(response, 405, "only GET and HEAD");
+      return true;
+    }
+    // Before the body is read: a client may promise gigabytes, or not say how many.
+    const std::string stated = request.get_header_value("Content-Length");
+    const std::optional<std::size_t> length = count_of(stated);
+    if (is_order && !length) {
+      refuse(response, 411, "the length of the body is not stated");
+      return true;
+    }
+    const std::size_t largest = of_api ? *of_api : kLargestBody;
+    if (length.value_or(0) > largest) {
+      refuse(response, 413, fmt::format("at most {} bytes are taken here", largest));
       return true;
     }
     if (!is_known_host(request)) {
@@ -203,7 +249,7 @@ struct WebServer::State {
       return true;
     }
     // Browsers say where a request comes from, programs need not.
-    if (control && request.has_header("Origin") &&
+    if (is_order && request.has_header("Origin") &&
         request.get_header_value("Origin") != "http://" + request.get_header_value("Host")) {
       refuse(response, 403, "orders come from the server's own page only");
       return true;
@@ -223,6 +269,10 @@ struct WebServer::State {
   void serve_file(const httplib::Request& request, httplib::Response& response) const {
     const fs::path file = find(request.path);
     if (file.empty()) return refuse(response, 404, "not here");
+    send_file(file, request, response);
+  }
+
+  static void send_file(const fs::path& file, const httplib::Request& request, httplib::Response& response) {
     const auto opened =
         std::make_shared<FileDescriptor>(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW));
     struct stat state {};
@@ -253,17 +303,22 @@ struct WebServer::State {
         });
   }
 
-  void follow(httplib::Response& response) {
+  /// Sends the news of `source`, a feed or an API, as they come.
+  /// @param pause  between two of them
+  /// @param end    is called when nobody follows any more
+  template <typename Source>
+  void follow(Source* source, std::chrono::milliseconds pause, httplib::Response& response, std::function<void()> end) {
     if (listeners.fetch_add(1) >= kMostListeners) {
       listeners.fetch_sub(1);
+      end();
       return refuse(response, 503, "too many tabs follow already");
     }
     auto version = std::make_shared<std::uint64_t>(0);
     response.set_chunked_content_provider(
         "text/event-stream",
-        [this, version](std::size_t, httplib::DataSink& sink) {
-          const auto news = feed->wait_for_news(*version, 2.0);
-          if (!news && (feed->closed() || !server.is_running())) {
+        [this, source, pause, version](std::size_t, httplib::DataSink& sink) {
+          const auto news = source->wait_for_news(*version, 2.0);
+          if (!news && (source->closed() || !server.is_running())) {
             sink.done();
             return true;
           }
@@ -271,10 +326,34 @@ struct WebServer::State {
           *version = news->first;
           const std::string event = "data: " + news->second + "\n\n";
           const bool sent = sink.write(event.data(), event.size());
-          std::this_thread::sleep_for(std::chrono::milliseconds(400));  // enough to look at
+          std::this_thread::sleep_for(pause);
           return sent;
         },
-        [this](bool) { listeners.fetch_sub(1); });
+        [this, end](bool) {
+          listeners.fetch_sub(1);
+          end();
+        });
+  }
+
+  void answer_page(const httplib::Request& request, httplib::Response& response) {
+    PageRequest asked{request.method, request.path, {}, {}, {}, request.body};
+    if (request.method != "GET" && request.get_header_value("X-Cnerf") != "1") {
+      return refuse(response, 403, "the header X-Cnerf is missing");
+    }
+    for (const auto& [name, value] : request.params) asked.parameters[name] = value;
+    asked.client = client_of(request);
+    if (const auto revision = count_of(request.get_header_value("X-Cnerf-Revision"))) {
+      asked.revision = int(std::min<std::size_t>(*revision, std::numeric_limits<int>::max()));
+    }
+    if (request.method == "GET" && request.path == api->prefix() + "/events") {
+      api->joined(asked.client);
+      return follow(api, std::chrono::milliseconds(60), response, [this, asked] { api->left(asked.client); });
+    }
+    PageAnswer answer = api->answer(asked);
+    response.status = answer.status;
+    for (const auto& [name, value] : answer.headers) response.set_header(name, value);
+    if (!answer.file.empty()) return send_file(answer.file, request, response);
+    response.set_content(answer.body, answer.type);
   }
 
   void control(const httplib::Request& request, httplib::Response& response) {
@@ -301,7 +380,7 @@ struct WebServer::State {
       const int yes = 1;
       ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
     });
-    server.set_payload_max_length(kLargestBody);
+    server.set_payload_max_length(api != nullptr ? kLargestUpload : kLargestBody);
     server.set_keep_alive_max_count(200);
     server.set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
       return check(request, response) ? httplib::Server::HandlerResponse::Handled
@@ -314,7 +393,9 @@ struct WebServer::State {
       server.Get("/live/state", [this](const httplib::Request&, httplib::Response& response) {
         response.set_content(feed->state(), "application/json");
       });
-      server.Get("/live/events", [this](const httplib::Request&, httplib::Response& response) { follow(response); });
+      server.Get("/live/events", [this](const httplib::Request&, httplib::Response& response) {
+        follow(feed, std::chrono::milliseconds(400), response, [] {});  // enough to look at
+      });
       server.Get(R"(/live/pictures/([\w.-]{1,80}))",
                  [this](const httplib::Request& request, httplib::Response& response) {
                    const auto bytes = feed->picture(request.matches[1]);
@@ -324,13 +405,20 @@ struct WebServer::State {
       server.Post("/live/control",
                   [this](const httplib::Request& request, httplib::Response& response) { control(request, response); });
     }
+    if (api != nullptr) {
+      const auto answer = [this](const httplib::Request& request, httplib::Response& response) {
+        answer_page(request, response);
+      };
+      const std::string below = api->prefix() + "/.*";
+      server.Get(below, answer).Put(below, answer).Post(below, answer);
+    }
     server.Get(".*",
                [this](const httplib::Request& request, httplib::Response& response) { serve_file(request, response); });
   }
 };
 
-WebServer::WebServer(std::vector<fs::path> folders, const WebServerOptions& options, LiveFeed* feed)
-    : state_(std::make_unique<State>()) {
+WebServer::WebServer(std::vector<fs::path> folders, const WebServerOptions& options, LiveFeed* feed, PageApi* api)
+    : state_(std::make_unique<State>(api)) {
   check_web_server_options(options);
   state_->folders = std::move(folders);
   state_->options = options;
@@ -362,6 +450,7 @@ void WebServer::start() {
 void WebServer::stop() {
   if (!state_->thread.joinable()) return;
   if (state_->feed != nullptr) state_->feed->close();
+  if (state_->api != nullptr) state_->api->close();
   state_->server.end();
   state_->thread.join();
 }

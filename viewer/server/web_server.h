@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "viewer/server/live_feed.h"
+#include "viewer/server/page_api.h"
 
 namespace cnerf::web {
 
@@ -31,10 +32,14 @@ void check_web_server_options(const WebServerOptions& options);
 /// With a feed also: GET /live/state, GET /live/events (server-sent events, at most 8 at a time),
 /// GET /live/pictures/NAME, and POST /live/control with the header `X-Cnerf: 1`, which no other site can send, and no
 /// `Origin` but the server's own.
+///
+/// With a page API also what that answers below its prefix: GET as files, PUT and POST as /live/control, with bodies as
+/// large as it says.
 class WebServer {
  public:
-  /// @param feed  may be null; must outlive the server.
-  WebServer(std::vector<std::filesystem::path> folders, const WebServerOptions& options, LiveFeed* feed = nullptr);
+  /// @param feed, api  may be null; must outlive the server.
+  WebServer(std::vector<std::filesystem::path> folders, const WebServerOptions& options, LiveFeed* feed = nullptr,
+            PageApi* api = nullptr);
   /// Stops.
   ~WebServer();
   WebServer(const WebServer&) = delete;

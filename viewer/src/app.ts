@@ -1,35 +1,27 @@
 /** The viewer: what is looked at, how, and who is told. */
 
 import type { Bundle } from "./bundle";
-import { axes, framed, interpolated, lensOfFov, pivotOf, upAxis, type Lens, type View } from "./camera";
+import { axes, framed, lensOfFov, upAxis, type Lens, type View } from "./camera";
 import { fromHash, toHash } from "./hash";
-import { add, mix, scale, type Vec3 } from "./math";
+import { add, mix, norm, scale, sub, type Vec3 } from "./math";
+import { Navigator } from "./navigator";
 import type { Renderer } from "./renderer";
 import { defaultSettings, displayOnly, type Settings } from "./settings";
 
-const ease = (t: number) => (t < 0.5 ? 4 * t * t * t : 1 - (2 - 2 * t) ** 3 / 2);
-
-export class App {
+export class App extends Navigator {
   readonly defaults: Settings;
   readonly low: Vec3;
   readonly high: Vec3;
   settings: Settings;
-  view: View;
-  /** What the camera turns about. */
-  target: Vec3;
-  /** Number of the capture's camera that is looked through, else -1. */
-  captureCamera = -1;
-  private animation: { from: View; to: View; targetTo: Vec3; targetFrom: Vec3; begin: number; length: number; camera: number } | null = null;
   private changed = new Set<() => void>();
   private hashTimer = 0;
   readonly home: View;
-  private readonly still: boolean;
 
   constructor(readonly bundle: Bundle, readonly renderer: Renderer) {
+    super();
     const { volume } = bundle;
     this.low = volume.origin;
     this.high = add(volume.origin, scale(volume.bricks, 8 * volume.voxelSize));
-    this.still = new URLSearchParams(location.search).has("still") || matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.defaults = defaultSettings(upAxis(bundle.upAxis, bundle.cameras));
     this.home = this.firstView();
     this.view = this.home;
@@ -56,8 +48,14 @@ export class App {
   get up(): Vec3 {
     return axes[this.settings.up];
   }
-  pivot(view: View): Vec3 {
-    return pivotOf(view, this.centre);
+  get cameras(): View[] {
+    return this.bundle.cameras;
+  }
+  get fly(): boolean {
+    return this.settings.fly;
+  }
+  get reach(): number {
+    return norm(sub(this.high, this.low)) / 2;
   }
 
   /** Calls `callback` after every change of the view or the settings. */
@@ -77,48 +75,11 @@ export class App {
     this.tell();
   }
 
-  setView(view: View, target?: Vec3): void {
-    this.animation = null;
-    this.captureCamera = -1;
-    this.put(view, target);
-  }
-  private put(view: View, target?: Vec3): void {
-    this.view = view;
-    if (target) this.target = target;
-    this.renderer.setView(view);
+  protected moved(): void {
+    this.renderer.setView(this.view);
     this.tell();
   }
 
-  moveTo(view: View, target: Vec3, camera = -1, milliseconds = 550): void {
-    if (this.still) {
-      this.captureCamera = camera;
-      this.animation = null;
-      return this.put(view, target);
-    }
-    this.captureCamera = -1;
-    this.animation = { from: this.view, to: view, targetFrom: this.target, targetTo: target, begin: performance.now(), length: milliseconds, camera };
-  }
-  /** To be called once an animation frame. */
-  animate(now: number): void {
-    const a = this.animation;
-    if (!a) return;
-    const t = Math.min(1, Math.max(0, (now - a.begin) / a.length));
-    if (t >= 1) {
-      this.animation = null;
-      this.captureCamera = a.camera;
-      return this.put(a.to, a.targetTo);
-    }
-    this.put(interpolated(a.from, a.to, ease(t)), mix(a.targetFrom, a.targetTo, ease(t)));
-  }
-
-  goToCamera(index: number): void {
-    const count = this.bundle.cameras.length;
-    if (count === 0) return;
-    const wrapped = ((index % count) + count) % count;
-    const camera = this.bundle.cameras[wrapped];
-    const view: View = { position: camera.position, rotation: camera.rotation, lens: camera.lens };
-    this.moveTo(view, this.pivot(view), wrapped);
-  }
   reset(): void {
     this.set({ ...this.defaults });
     this.moveTo(this.home, this.pivot(this.home), this.bundle.cameras.length > 0 ? 0 : -1);

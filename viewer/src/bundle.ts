@@ -2,6 +2,7 @@
 
 import type { Lens } from "./camera";
 import type { Mat3, Vec3 } from "./math";
+import { mostLevels } from "./shaders";
 
 /** Something is wrong with the bundle; the message says which file or field and what to do. */
 export class BundleError extends Error {}
@@ -21,6 +22,20 @@ export interface BundleFile {
   rawBytes: number;
 }
 
+/** A grid of bricks. */
+export interface BundleLevel {
+  origin: Vec3;
+  voxelSize: number;
+  bricks: Vec3;
+  storedBricks: number;
+  voxels: number;
+  density: { scale: number; max: number };
+  /** World units; within the bricks. */
+  cover: { low: Vec3; high: Vec3 };
+  /** Names of files. */
+  parts: { occupancy: string; density: string; color: string };
+}
+
 export interface Bundle {
   title: string;
   program: string;
@@ -29,23 +44,20 @@ export interface Bundle {
   inferred: boolean;
   colorizer: string;
   take: string;
-  volume: {
-    origin: Vec3;
-    voxelSize: number;
-    bricks: Vec3;
-    storedBricks: number;
-    voxels: number;
-    density: { scale: number; max: number };
-  };
+  /** Coarsest first; each stands by itself, and a finer one answers for all of its `cover`. */
+  levels: BundleLevel[];
+  /** The coarsest, which covers everything. */
+  volume: BundleLevel;
   poster: string | null;
   files: Map<string, BundleFile>;
   cameras: CaptureCamera[];
 }
 
-export const bundleSchema = 1;
+/** Schema 1 had one level, in `volume`. */
+export const bundleSchema = 2;
 
 /** What a bundle may state, so that one that somebody else made takes no more of the browser than a large one of ours. */
-const limits = { cells: 2 ** 26, storedBricks: 2 ** 18, cameras: 10_000, side: 100_000 };
+const limits = { cells: 2 ** 26, storedBricks: 2 ** 18, cameras: 10_000, side: 100_000, levels: mostLevels };
 const voxelsOfBrick = 512;
 
 type Json = { [key: string]: unknown };
@@ -97,15 +109,71 @@ function inside(name: string, field: string): string {
   return name;
 }
 
-/** The parts of the volume, whose sizes follow from its bricks. */
-function checkParts(files: Map<string, BundleFile>, cells: number, storedBricks: number): void {
-  const sizes = { "occupancy.bin": cells, "density.bin": storedBricks * voxelsOfBrick, "color.bin": 3 * storedBricks * voxelsOfBrick };
-  for (const [name, size] of Object.entries(sizes)) {
+/** The parts of a level, whose sizes follow from its bricks. */
+function checkParts(files: Map<string, BundleFile>, { parts, bricks, storedBricks }: BundleLevel): void {
+  const sizes = { occupancy: bricks[0] * bricks[1] * bricks[2], density: storedBricks * voxelsOfBrick, color: 3 * storedBricks * voxelsOfBrick };
+  for (const part of ["occupancy", "density", "color"] as const) {
+    const [name, size] = [parts[part], sizes[part]];
     const file = files.get(name);
     if (!file) fail("files", `${name} is not listed`);
     if (file.rawBytes !== size) fail("files", `${name}: expected ${size} bytes unpacked, found ${file.rawBytes}`);
     if (file.bytes > 1.1 * size + 1024) fail("files", `${name}: ${file.bytes} bytes are more than gzip makes of ${size}`);
   }
+}
+
+function coverOf(json: Json, field: string, { origin, bricks, voxelSize }: BundleLevel): BundleLevel["cover"] {
+  const cover = object(json, "cover");
+  const low = vector(cover.min, `${field}.cover.min`);
+  const high = vector(cover.max, `${field}.cover.max`);
+  for (let axis = 0; axis < 3; ++axis) {
+    const [begin, end] = [origin[axis], origin[axis] + 8 * bricks[axis] * voxelSize];
+    const rounding = 1e-6 * (end - begin);
+    if (low[axis] < begin - rounding || high[axis] > end + rounding || low[axis] >= high[axis]) fail(`${field}.cover`, "expected a box within the bricks");
+  }
+  return { low, high };
+}
+
+/** @param field  where it stands, for messages. */
+function levelOf(json: Json, field: string, files: Map<string, BundleFile>): BundleLevel {
+  const density = object(json, "density");
+  const encoding = text(density, "encoding");
+  if (encoding !== "r8") fail(`${field}.density.encoding`, `expected r8, found ${encoding}`);
+  if (number(json, "brick_side") !== 8) fail(`${field}.brick_side`, "this page reads bricks of 8");
+  const bricks = vector(json.bricks, `${field}.bricks`);
+  const cells = bricks[0] * bricks[1] * bricks[2];
+  if (!bricks.every((n) => Number.isInteger(n) && n > 0) || cells > limits.cells) fail(`${field}.bricks`, "expected counts of at most 2^26 bricks in all");
+  const level: BundleLevel = {
+    origin: vector(json.origin, `${field}.origin`),
+    voxelSize: number(json, "voxel_size", true),
+    bricks,
+    storedBricks: count(json, "stored_bricks", limits.storedBricks),
+    voxels: number(json, "voxels"),
+    density: { scale: number(density, "scale", true), max: number(density, "max") },
+    cover: { low: [0, 0, 0], high: [0, 0, 0] },
+    parts: { occupancy: "occupancy.bin", density: "density.bin", color: "color.bin" },
+  };
+  if (field === "volume") {
+    level.cover = { low: level.origin, high: level.origin.map((v, i) => v + 8 * bricks[i] * level.voxelSize) as Vec3 };
+  } else {
+    level.cover = coverOf(json, field, level);
+    for (const part of ["occupancy", "density", "color"] as const) level.parts[part] = inside(text(object(json, part), "file"), `${field}.${part}.file`);
+  }
+  checkParts(files, level);
+  return level;
+}
+
+function levelsOf(json: Json, schema: number, files: Map<string, BundleFile>): BundleLevel[] {
+  if (schema === 1) return [levelOf(object(json, "volume"), "volume", files)];
+  const entries = list(json, "levels");
+  if (entries.length === 0 || entries.length > limits.levels) fail("levels", `expected 1 to ${limits.levels} of them, found ${entries.length}`);
+  const levels = entries.map((entry, i) => levelOf(entry, `levels[${i}]`, files));
+  levels.forEach((level, i) => {
+    if (i > 0 && level.voxelSize >= levels[i - 1].voxelSize) fail(`levels[${i}].voxel_size`, "expected a finer level than the one before");
+  });
+  const sum = (of: (level: BundleLevel) => number) => levels.reduce((total, level) => total + of(level), 0);
+  if (sum(({ bricks }) => bricks[0] * bricks[1] * bricks[2]) > limits.cells) fail("levels", "expected at most 2^26 bricks in all");
+  if (sum(({ storedBricks }) => storedBricks) > limits.storedBricks) fail("levels", `expected at most ${limits.storedBricks} stored bricks in all`);
+  return levels;
 }
 
 function cameraOf(json: Json, index: number): CaptureCamera {
@@ -140,22 +208,13 @@ export function parseBundle(source: string): Bundle {
   }
   const schema = number(json, "schema");
   if (schema > bundleSchema) fail("schema", `${schema} is newer than this page, which reads ${bundleSchema}; use the page of that cnerf`);
-  const volume = object(json, "volume");
-  const density = object(volume, "density");
-  const encoding = text(density, "encoding");
-  if (encoding !== "r8") fail("volume.density.encoding", `expected r8, found ${encoding}`);
-  if (number(volume, "brick_side") !== 8) fail("volume.brick_side", "this page reads bricks of 8");
   const color = object(json, "color");
   const files = new Map<string, BundleFile>();
   for (const entry of list(json, "files")) {
     const file = { name: inside(text(entry, "name"), "files"), bytes: number(entry, "bytes"), sha256: text(entry, "sha256"), rawBytes: Number(entry.raw_bytes ?? 0) };
     files.set(file.name, file);
   }
-  const bricks = vector(volume.bricks, "volume.bricks");
-  const cells = bricks[0] * bricks[1] * bricks[2];
-  if (!bricks.every((n) => Number.isInteger(n) && n > 0) || cells > limits.cells) fail("volume.bricks", "expected counts of at most 2^26 bricks in all");
-  const storedBricks = count(volume, "stored_bricks", limits.storedBricks);
-  checkParts(files, cells, storedBricks);
+  const levels = levelsOf(json, schema, files);
   const cameras = list(json, "cameras");
   if (cameras.length > limits.cameras) fail("cameras", `expected at most ${limits.cameras}, found ${cameras.length}`);
   const poster = json.poster == null ? null : object(json, "poster");
@@ -167,14 +226,8 @@ export function parseBundle(source: string): Bundle {
     inferred: color.inferred === true,
     colorizer: text(color, "colorizer"),
     take: text(color, "take"),
-    volume: {
-      origin: vector(volume.origin, "volume.origin"),
-      voxelSize: number(volume, "voxel_size", true),
-      bricks,
-      storedBricks,
-      voxels: number(volume, "voxels"),
-      density: { scale: number(density, "scale", true), max: number(density, "max") },
-    },
+    levels,
+    volume: levels[0],
     poster: poster ? inside(text(poster, "file"), "poster.file") : null,
     files,
     cameras: cameras.map(cameraOf),
@@ -250,9 +303,9 @@ async function loadFile(base: string, file: BundleFile, onBytes: (count: number)
 }
 
 /** @param onProgress share of the bytes that came, in [0, 1]. @throws BundleError naming the file. */
-export async function loadVolume(base: string, bundle: Bundle, onProgress: (share: number) => void): Promise<Packed> {
-  const names = ["occupancy.bin", "density.bin", "color.bin"];
-  const files = names.map((name) => bundle.files.get(name)!);
+export async function loadLevel(base: string, bundle: Bundle, level: BundleLevel, onProgress: (share: number) => void): Promise<Packed> {
+  const { parts } = level;
+  const files = [parts.occupancy, parts.density, parts.color].map((name) => bundle.files.get(name)!);
   const total = files.reduce((sum, file) => sum + file.bytes, 0);
   let come = 0;
   const [occupancy, density, color] = await Promise.all(

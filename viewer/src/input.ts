@@ -1,8 +1,8 @@
 /** Mouse, touch and keyboard -> camera. */
 
-import type { App } from "./app";
 import { dollied, looked, moved, orbited, zoomed } from "./camera";
 import { add, apply, norm, sub, type Vec3 } from "./math";
+import type { Navigator } from "./navigator";
 
 const radiansAPixel = 0.006;
 
@@ -11,7 +11,11 @@ export class Input {
   private keys = new Set<string>();
   private last = 0;
 
-  constructor(private readonly app: App, private readonly surface: HTMLElement, private readonly actions: Record<string, () => void>) {
+  /** @param active  whether keys are this camera's at the moment */
+  constructor(
+    private readonly app: Navigator, private readonly surface: HTMLElement, private readonly actions: Record<string, () => void>,
+    private readonly active = () => true,
+  ) {
     surface.addEventListener("pointerdown", (e) => this.down(e));
     surface.addEventListener("pointermove", (e) => this.move(e));
     for (const type of ["pointerup", "pointercancel", "lostpointercapture"] as const) surface.addEventListener(type, (e) => this.pointers.delete(e.pointerId));
@@ -37,7 +41,7 @@ export class Input {
     this.pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
     if (e.buttons & 6 || e.shiftKey) return this.pan(dx, dy);
     const { app } = this;
-    if (app.settings.fly) return app.setView(looked(app.view, app.up, dx * radiansAPixel * 0.6, -dy * radiansAPixel * 0.6));
+    if (app.fly) return app.setView(looked(app.view, app.up, dx * radiansAPixel * 0.6, -dy * radiansAPixel * 0.6));
     app.setView(orbited(app.view, app.target, app.up, -dx * radiansAPixel, -dy * radiansAPixel));
   }
 
@@ -69,13 +73,10 @@ export class Input {
     e.preventDefault();
     const factor = Math.exp(Math.max(-120, Math.min(120, e.deltaY * (e.deltaMode === 1 ? 30 : 1))) * 0.0015);
     if (e.altKey) return this.app.setView(zoomed(this.app.view, 1 / factor));
-    if (this.app.settings.fly) return this.walk(0, 0, (1 - factor) * this.reach());
+    if (this.app.fly) return this.walk(0, 0, (1 - factor) * this.app.reach);
     this.dolly(factor);
   }
 
-  private reach(): number {
-    return norm(sub(this.app.high, this.app.low)) / 2;
-  }
   private walk(right: number, down: number, forward: number): void {
     const { app } = this;
     const view = moved(app.view, right, down, forward);
@@ -84,7 +85,8 @@ export class Input {
 
   private key(e: KeyboardEvent): void {
     const target = e.target as HTMLElement;
-    if (e.ctrlKey || e.metaKey) return;
+    if (e.ctrlKey || e.metaKey || !this.active()) return;
+    if (target instanceof HTMLSelectElement || target.closest("dialog")) return;
     if (target instanceof HTMLInputElement && target.type !== "range" && target.type !== "checkbox") return;
     if (/^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/.test(e.code)) {
       if (target instanceof HTMLInputElement && e.code.startsWith("Arrow")) return;
@@ -102,9 +104,10 @@ export class Input {
   step(now: number): void {
     const seconds = Math.min(0.1, (now - this.last) / 1000);
     this.last = now;
+    if (!this.active()) this.keys.clear();
     if (this.keys.size === 0) return;
     const held = (...codes: string[]) => (codes.some((code) => this.keys.has(code)) ? 1 : 0);
-    const speed = this.reach() * 0.6 * seconds;
+    const speed = this.app.reach * 0.6 * seconds;
     const right = held("KeyD", "ArrowRight") - held("KeyA", "ArrowLeft");
     const forward = held("KeyW", "ArrowUp") - held("KeyS", "ArrowDown");
     const up = held("KeyE") - held("KeyQ");

@@ -1,12 +1,13 @@
-/** Starts the page: a volume where there is a bundle, the running command where there is a live feed. */
+/** Starts the page: a volume where there is a bundle, the studio or the running command where there is one. */
 
 import { App } from "./app";
-import { makeAtlas } from "./bricks";
-import { BundleError, loadVolume, parseBundle, type Bundle } from "./bundle";
+import { BundleError, parseBundle, type Bundle } from "./bundle";
 import { pictureRectangle } from "./camera";
 import { Input } from "./input";
+import { Levels, textureBudget, thisDevice } from "./levels";
 import { showLive } from "./live";
 import { GraphicsError, Renderer } from "./renderer";
+import { showStudio } from "./studio/studio";
 import { copyText, download, el, iconButton, slider, toast } from "./ui/dom";
 import { Overlay } from "./ui/overlay";
 import { Panel } from "./ui/panel";
@@ -31,6 +32,8 @@ async function start(): Promise<void> {
     return showMessage("The server does not answer", "It may have been ended. Start it again with cnerf view and reload this page.", retry());
   }
   if (answer.status === 404) {
+    const studio = await fetch("./studio/scene").catch(() => null);
+    if (studio?.ok) return showStudio(root, await studio.json());
     const live = await fetch("./live/state").catch(() => null);
     if (live?.ok) return showLive(root, await live.json());
     return showMessage("Nothing to show", "There is no bundle.json beside this page. Write a bundle with cnerf bake --format web.");
@@ -78,14 +81,16 @@ async function showVolume(bundle: Bundle): Promise<void> {
   if (bundle.poster) poster.src = bundle.poster;
 
   const renderer = new Renderer(canvas);
-  const packed = await loadVolume(base, bundle, (share) => (bar.style.width = `${100 * share}%`));
-  renderer.upload(bundle, makeAtlas(bundle, packed, renderer.maxTexture));
+  const levels = new Levels(base, bundle, renderer, textureBudget(thisDevice()));
+  await levels.first((share) => (bar.style.width = `${100 * share}%`));
   const app = new App(bundle, renderer);
-  buildInterface(app, stage, canvas, photo, poster);
+  const panel = buildInterface(app, levels, stage, canvas, photo, poster);
   loading.remove();
+  await levels.rest(() => panel.showNote(levels.note));
+  document.body.dataset.complete = "yes";
 }
 
-function buildInterface(app: App, stage: HTMLElement, canvas: HTMLCanvasElement, photo: HTMLImageElement, poster: HTMLImageElement): void {
+function buildInterface(app: App, levels: Levels, stage: HTMLElement, canvas: HTMLCanvasElement, photo: HTMLImageElement, poster: HTMLImageElement): Panel {
   const { bundle, renderer } = app;
   const panel = new Panel(app);
   const overlay = new Overlay(app);
@@ -240,8 +245,7 @@ function buildInterface(app: App, stage: HTMLElement, canvas: HTMLCanvasElement,
         ["frame", `${s.milliseconds.toFixed(0)} ms, ${s.framesASecond.toFixed(0)} a second while moving`],
         ["resolution", `${Math.round(100 * s.resolution)} % while moving, refined ${s.refined} of ${s.passes}`],
         ["picture", `${canvas.width} × ${canvas.height}`],
-        ["voxels", `${bundle.volume.voxels.toLocaleString("en")} of ${bundle.volume.voxelSize.toPrecision(3)} ${bundle.units}`],
-        ["bricks", `${bundle.volume.storedBricks.toLocaleString("en")} of ${bundle.volume.bricks.reduce((a, b) => a * b, 1).toLocaleString("en")}`],
+        ...levels.rows,
         ["textures", `${(s.textureBytes / 2 ** 20).toFixed(0)} MiB`],
         ["graphics", s.renderer],
       ]);
@@ -255,10 +259,11 @@ function buildInterface(app: App, stage: HTMLElement, canvas: HTMLCanvasElement,
     showMessage("The graphics card was taken away", "The browser or the driver ended the page's use of it, often for want of memory. Reloading usually brings it back.", retry());
   });
   // For scripts and tests.
-  Object.assign(window, { cnerf: { app, renderer, panel, stopReveal, settled: () => new Promise<void>((done) => {
+  Object.assign(window, { cnerf: { app, renderer, panel, levels, stopReveal, settled: () => new Promise<void>((done) => {
     const poll = () => (renderer.settled ? done() : setTimeout(poll, 30));
     setTimeout(poll, 60);
   }) } });
+  return panel;
 }
 
 if (location.protocol !== "file:") {

@@ -4,8 +4,8 @@
  * averaged over rays spread within each pixel.
  */
 
-import type { Atlas } from "./bricks";
-import { brickTexels, textureBytes } from "./bricks";
+import type { AtlasPlan, SlabTexels } from "./bricks";
+import { brickTexels } from "./bricks";
 import type { Bundle } from "./bundle";
 import { fitted, type View } from "./camera";
 import { clamp, column, scale, sub, type Vec3 } from "./math";
@@ -91,8 +91,10 @@ export class Renderer {
   private index!: WebGLTexture;
   private density!: WebGLTexture;
   private lab!: WebGLTexture;
-  private atlas: Atlas | null = null;
+  private atlas: AtlasPlan | null = null;
   private bundle: Bundle | null = null;
+  /** Levels that are there, coarsest first. */
+  private levels = 0;
   private moving: Target | null = null;
   private fine: Target | null = null;
   private floatTargets: boolean;
@@ -135,31 +137,53 @@ export class Renderer {
     return this.gl.getParameter(this.gl.MAX_3D_TEXTURE_SIZE) as number;
   }
 
-  /** @throws GraphicsError when the graphics card's memory does not hold it. */
-  upload(bundle: Bundle, atlas: Atlas): void {
+  /** Makes room for the levels of a bundle. @throws GraphicsError when the graphics card's memory does not hold them. */
+  allocate(bundle: Bundle, atlas: AtlasPlan): void {
     const { gl } = this;
+    for (const texture of [this.index, this.density, this.lab]) if (texture) gl.deleteTexture(texture);
     this.bundle = bundle;
+    this.levels = 0;
     const [ax, ay, az] = atlas.counts.map((n) => n * brickTexels);
-    const [bx, by, bz] = bundle.volume.bricks;
     while (gl.getError() !== gl.NO_ERROR);
-    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     this.index = this.texture3d(gl.NEAREST);
-    gl.texImage3D(gl.TEXTURE_3D, 0, gl.RGBA8UI, bx, by, bz, 0, gl.RGBA_INTEGER, gl.UNSIGNED_BYTE, atlas.index);
+    gl.texStorage3D(gl.TEXTURE_3D, 1, gl.RGBA8UI, ...atlas.index);
     this.density = this.texture3d(gl.LINEAR);
-    gl.texImage3D(gl.TEXTURE_3D, 0, gl.R16F, ax, ay, az, 0, gl.RED, gl.HALF_FLOAT, atlas.density);
+    gl.texStorage3D(gl.TEXTURE_3D, 1, gl.R16F, ax, ay, az);
     this.lab = this.texture3d(gl.LINEAR);
-    gl.texImage3D(gl.TEXTURE_3D, 0, gl.RGBA8, ax, ay, az, 0, gl.RGBA, gl.UNSIGNED_BYTE, atlas.lab);
-    if (gl.getError() !== gl.NO_ERROR) {
-      throw new GraphicsError(
-        `The graphics card cannot hold this volume (${Math.round(textureBytes(atlas) / 2 ** 20)} MiB of textures). ` +
-          "Close other tabs, or write a smaller bundle: cnerf bake --format web --web-resolution 192",
-      );
-    }
-    this.atlas = { ...atlas, density: new Uint16Array(), lab: new Uint8Array(), index: new Uint8Array() };
-    this.bytes = textureBytes(atlas);
+    gl.texStorage3D(gl.TEXTURE_3D, 1, gl.RGBA8, ax, ay, az);
+    this.atlas = atlas;
+    this.checkMemory();
+  }
+  /** @param slab  of the atlas, counted from its beginning. @throws GraphicsError as allocate. */
+  putSlab(slab: number, texels: SlabTexels): void {
+    const { gl } = this;
+    const [ax, ay] = this.atlas!.counts.map((n) => n * brickTexels);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    gl.bindTexture(gl.TEXTURE_3D, this.density);
+    gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, slab * brickTexels, ax, ay, brickTexels, gl.RED, gl.HALF_FLOAT, texels.density);
+    gl.bindTexture(gl.TEXTURE_3D, this.lab);
+    gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, slab * brickTexels, ax, ay, brickTexels, gl.RGBA, gl.UNSIGNED_BYTE, texels.lab);
+  }
+  /** Shows the next finer level, whose slabs are there. @throws GraphicsError as allocate. */
+  addLevel(index: Uint8Array): void {
+    const { gl } = this;
+    const [bx, by, bz] = this.bundle!.levels[this.levels].bricks;
+    gl.activeTexture(gl.TEXTURE0);
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    gl.bindTexture(gl.TEXTURE_3D, this.index);
+    gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, this.atlas!.levels[this.levels].base, bx, by, bz, gl.RGBA_INTEGER, gl.UNSIGNED_BYTE, index);
+    this.checkMemory();
+    this.levels += 1;
     this.invalidate();
   }
-  private bytes = 0;
+  private checkMemory(): void {
+    if (this.gl.getError() === this.gl.NO_ERROR) return;
+    throw new GraphicsError(
+      `The graphics card cannot hold this volume (${Math.round(this.atlas!.bytes / 2 ** 20)} MiB of textures). ` +
+        "Close other tabs, or write a smaller bundle: cnerf bake --format web --web-resolution 192",
+    );
+  }
 
   setSize(width: number, height: number): void {
     width = Math.max(1, Math.round(width));
@@ -202,14 +226,14 @@ export class Renderer {
       framesASecond: span > 0 ? (1000 * (times.length - 1)) / span : 0,
       refined: Math.min(this.pass, passes),
       passes,
-      textureBytes: this.bytes,
+      textureBytes: this.atlas?.bytes ?? 0,
       renderer: String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER)),
     };
   }
 
   /** To be called once an animation frame. @return whether anything was drawn. */
   frame(now: number): boolean {
-    if (!this.atlas || !this.view || !this.settings || this.gl.isContextLost()) return false;
+    if (this.levels === 0 || !this.view || !this.settings || this.gl.isContextLost()) return false;
     if (this.fence && !this.finishFence()) return false;
     if (this.needsMarch) {
       this.marchMoving(now);
@@ -310,7 +334,7 @@ export class Renderer {
       gl.bindTexture(gl.TEXTURE_3D, texture);
       gl.uniform1i(march.at(name), unit);
     }
-    gl.uniform3fv(march.at("u_bricks"), volume.bricks);
+    this.bindLevels();
     gl.uniform3fv(march.at("u_texel"), this.atlas!.counts.map((n) => 1 / (n * brickTexels)));
     gl.uniform3fv(march.at("u_eye"), toVoxels(view.position));
     gl.uniformMatrix3fv(march.at("u_right_down_forward"), false, [...x, ...y, ...z]);
@@ -328,7 +352,21 @@ export class Renderer {
     gl.uniform1i(march.at("u_slice"), slice ? slice.axis : -1);
     gl.uniform1f(march.at("u_slice_at"), slice ? toVoxels([slice.at, slice.at, slice.at])[slice.axis] : 0);
     gl.uniform1i(march.at("u_quantity"), slice ? quantities.indexOf(slice.quantity) : 0);
-    gl.uniform1f(march.at("u_density_max"), Math.max(1e-6, Math.min(volume.density.max * volume.voxelSize, 24)));
+    const densest = Math.max(...this.bundle!.levels.slice(0, this.levels).map(({ density }) => Math.min(density.max, density.scale)));
+    gl.uniform1f(march.at("u_density_max"), Math.max(1e-6, densest * volume.voxelSize));
+  }
+
+  /** Where the levels lie, in voxels of the coarsest. */
+  private bindLevels(): void {
+    const { gl, march } = this;
+    const { levels, volume } = this.bundle!;
+    const there = levels.slice(0, this.levels);
+    const toVoxels = (p: Vec3) => scale(sub(p, volume.origin), 1 / volume.voxelSize);
+    gl.uniform1i(march.at("u_levels"), there.length);
+    gl.uniform3fv(march.at("u_cover_low"), there.flatMap(({ cover }) => toVoxels(cover.low)));
+    gl.uniform3fv(march.at("u_cover_high"), there.flatMap(({ cover }) => toVoxels(cover.high)));
+    gl.uniform4fv(march.at("u_place"), there.flatMap(({ origin, voxelSize }) => [...scale(sub(volume.origin, origin), 1 / voxelSize), volume.voxelSize / voxelSize]));
+    gl.uniform4iv(march.at("u_grid"), there.flatMap(({ bricks }, i) => [...bricks, this.atlas!.levels[i].base]));
   }
 
   private show(): void {
@@ -360,12 +398,13 @@ export class Renderer {
   /**
    * A picture of the current view and settings, as the screen shows it, at any size.
    * @param background  "#rrggbb", or "none" for an alpha channel.
+   * @param rays  a pixel.
    */
-  async picture(width: number, height: number, background: string): Promise<ImageData> {
+  async picture(width: number, height: number, background: string, rays = passes): Promise<ImageData> {
     const { gl } = this;
     const light = this.target(null, width, height);
     const rows = clamp(Math.floor((4 * stripMilliseconds * 1e6) / (this.nanosecondsAPixel * width)), 4, height);
-    for (let pass = 0; pass < (this.floatTargets ? passes : 1); ++pass) {
+    for (let pass = 0; pass < (this.floatTargets ? rays : 1); ++pass) {
       for (let row = 0; row < height; row += rows) {
         this.marchRows(light, pass, row, Math.min(rows, height - row));
         await this.drained();

@@ -1,5 +1,8 @@
 /** GLSL. The colour maths is that of src/color/colorspace_math.h, the integral that of bake/volume/integrate.h. */
 
+/** Levels that a bundle may have; a bake makes four at most. */
+export const mostLevels = 8;
+
 export const fullScreen = `#version 300 es
 void main() {
   vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
@@ -34,34 +37,46 @@ vec3 srgbFromLinear(vec3 c) {
 vec3 linearFromSrgb(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045))); }
 `;
 
-/** Emission and absorption along one ray a pixel, in voxel units. Writes linear Rec.709, premultiplied, and opacity. */
+/**
+ * Emission and absorption along one ray a pixel, in voxels of the coarsest level. At every point the finest level
+ * counts that covers it and has the brick; steps are as long as its voxels. Levels are whole in themselves: where a
+ * coarser one is empty, finer ones are too. Writes linear Rec.709, premultiplied, and opacity.
+ */
 export const march = `#version 300 es
 precision highp float;
 precision highp int;
 precision highp sampler3D;
 precision highp usampler3D;
-uniform usampler3D u_index;   // [bricks] place in the atlas, and bricks to the nearest stored one
-uniform sampler3D u_density;  // atlas: optical depth of a voxel
+uniform usampler3D u_index;   // [bricks] place in the atlas, and bricks to the nearest stored one; 255 = left out
+uniform sampler3D u_density;  // atlas: optical depth of a voxel of its level
 uniform sampler3D u_lab;      // atlas: L*, a, b
-uniform vec3 u_bricks;
+uniform int u_levels;         // coarsest first
+uniform vec3 u_cover_low[${mostLevels}], u_cover_high[${mostLevels}];
+uniform vec4 u_place[${mostLevels}];  // a level's voxels = coarsest * w + xyz
+uniform ivec4 u_grid[${mostLevels}];  // bricks along each axis, and where they begin in the index along z
 uniform vec3 u_texel;         // 1 / texels of the atlas
-uniform vec3 u_eye;           // voxels
+uniform vec3 u_eye;
 uniform mat3 u_right_down_forward;
 uniform vec4 u_lens;          // fx, fy, cx, cy in pixels of this target
 uniform vec2 u_offset;        // of the ray within its pixel
 uniform float u_height;
-uniform vec3 u_low, u_high;   // clip box, voxels
-uniform float u_step;         // voxels
+uniform vec3 u_low, u_high;   // clip box
+uniform float u_step;         // voxels of the level that is marched
 uniform float u_gain;
 uniform float u_threshold;    // optical depth of a voxel below which there is nothing
 uniform float u_end;          // transmittance at which a ray is opaque
 uniform float u_noise;
 uniform int u_slice;          // -1, or the axis the plane is across
-uniform float u_slice_at;     // voxels
+uniform float u_slice_at;
 uniform int u_quantity;       // of slices: 0 density, 1 L*, 2 a, 3 b
 uniform float u_density_max;  // optical depth of a voxel that slices show brightest
 out vec4 o_light;
 ${color}
+// The brick of a level around a point, p in its voxels.
+uvec4 brickOf(vec3 p, ivec4 grid, out ivec3 cell) {
+  cell = clamp(ivec3(floor(p * 0.125)), ivec3(0), grid.xyz - 1);
+  return texelFetch(u_index, cell + ivec3(0, 0, grid.w), 0);
+}
 vec3 texelOf(uvec4 brick, vec3 p, ivec3 cell) {
   return (vec3(brick.xyz) * 10.0 + 1.0 + (p - vec3(cell) * 8.0)) * u_texel;
 }
@@ -74,12 +89,20 @@ vec3 diverging(float v, vec3 low, vec3 high) {
   return linearFromSrgb(mix(vec3(0.93), t < 0.0 ? low : high, abs(t)));
 }
 vec4 sliceColor(vec3 p) {
-  ivec3 cell = clamp(ivec3(floor(p / 8.0)), ivec3(0), ivec3(u_bricks) - 1);
-  uvec4 brick = texelFetch(u_index, cell, 0);
+  int level = u_levels - 1;
+  while (level > 0 && (any(lessThan(p, u_cover_low[level])) || any(greaterThan(p, u_cover_high[level])))) --level;
+  vec3 q;
+  ivec3 cell;
+  uvec4 brick;
+  for (;; --level) {
+    q = p * u_place[level].w + u_place[level].xyz;
+    brick = brickOf(q, u_grid[level], cell);
+    if (brick.w < 255u || level == 0) break;
+  }
   vec4 nothing = vec4(vec3(0.012), 0.55);
   if (brick.w > 0u) return nothing;
-  vec3 at = texelOf(brick, p, cell);
-  float depth = textureLod(u_density, at, 0.0).r;
+  vec3 at = texelOf(brick, q, cell);
+  float depth = textureLod(u_density, at, 0.0).r * u_place[level].w;
   vec3 lab = textureLod(u_lab, at, 0.0).rgb * 255.0;
   if (u_quantity == 0) return depth > 0.0 ? vec4(ramp(pow(clamp(depth / u_density_max, 0.0, 1.0), 0.4)), 1.0) : nothing;
   if (depth <= 0.0) return nothing;
@@ -107,34 +130,67 @@ void main() {
     return;
   }
   float noise = fract(52.9829189 * fract(dot(floor(gl_FragCoord.xy), vec2(0.06711056, 0.00583715))) + u_noise);
-  float t = begin + noise * u_step;
+  float t = begin;
+  float bound = begin;  // how far the level goes on
+  float stride = u_step;
+  int level = 0;
+  vec4 place = u_place[0];
+  ivec4 grid = u_grid[0];
   vec3 light = vec3(0.0);
   float transmittance = 1.0;
   vec3 forward = step(0.0, d);
-  for (int i = 0; i < 4096; ++i) {
+  for (int i = 0; i < 8192; ++i) {
     if (t >= end) break;
-    vec3 p = u_eye + d * t;
-    ivec3 cell = clamp(ivec3(floor(p * 0.125)), ivec3(0), ivec3(u_bricks) - 1);
-    uvec4 brick = texelFetch(u_index, cell, 0);
+    if (t >= bound) {
+      level = 0;
+      bound = end;
+      for (int finer = 1; finer < u_levels; ++finer) {
+        vec3 a = (u_cover_low[finer] - u_eye) * inv, b = (u_cover_high[finer] - u_eye) * inv;
+        vec3 near = min(a, b), far = max(a, b);
+        float enter = max(near.x, max(near.y, near.z)), leave = min(far.x, min(far.y, far.z));
+        if (enter >= leave || leave <= t) continue;
+        if (enter <= t) {
+          level = finer;
+          bound = min(end, leave);
+        } else {
+          bound = min(bound, enter);
+        }
+      }
+      place = u_place[level];
+      grid = u_grid[level];
+      stride = u_step / place.w;
+    }
+    float len = min(stride, bound - t);
+    vec3 p = u_eye + d * (t + noise * len);
+    float scale = place.w;
+    vec3 q = p * scale + place.xyz;
+    ivec3 cell;
+    uvec4 brick = brickOf(q, grid, cell);
+    for (int coarser = level - 1; brick.w == 255u && coarser >= 0; --coarser) {  // left out
+      scale = u_place[coarser].w;
+      q = p * scale + u_place[coarser].xyz;
+      brick = brickOf(q, u_grid[coarser], cell);
+    }
     if (brick.w > 0u) {
       // All bricks less than w away are empty too: leave their box, in whole steps.
       float reach = float(brick.w) - 1.0;
       vec3 wall = (vec3(cell) + mix(vec3(-reach), vec3(1.0 + reach), forward)) * 8.0;
-      vec3 exits = (wall - p) * inv;
-      t += max(ceil(min(exits.x, min(exits.y, exits.z)) / u_step), 1.0) * u_step;
+      vec3 exits = (wall - q) * inv;
+      float exit = min(exits.x, min(exits.y, exits.z)) / scale;
+      t = min(bound, t + max(ceil(exit / stride), 1.0) * stride);
       continue;
     }
-    vec3 at = texelOf(brick, p, cell);
-    float depth = textureLod(u_density, at, 0.0).r;
+    vec3 at = texelOf(brick, q, cell);
+    float depth = textureLod(u_density, at, 0.0).r * scale;
     if (depth > u_threshold) {
-      float alpha = 1.0 - exp(-depth * u_gain * u_step);
+      float alpha = 1.0 - exp(-depth * u_gain * len);
       vec3 lab = textureLod(u_lab, at, 0.0).rgb * vec3(100.0, 255.0, 255.0) - vec3(0.0, 128.0, 128.0);
       float fy = (lab.x + 16.0) / 116.0;
       light += fromLabF(vec3(fy + lab.y / 500.0, fy, fy - lab.z / 200.0)) * (transmittance * alpha);
       transmittance *= 1.0 - alpha;
       if (transmittance < u_end) break;
     }
-    t += u_step;
+    t = len < stride ? bound : t + stride;
   }
   float opacity = transmittance < u_end ? 1.0 : 1.0 - transmittance;
   o_light = vec4(max(rgbFromXyz(light), 0.0), opacity);

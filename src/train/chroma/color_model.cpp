@@ -1,7 +1,9 @@
 #include "src/train/chroma/color_model.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "src/base/check.h"
 #include "src/base/parallel.h"
 #include "src/picture/picture.h"
 #include "src/train/luminance/options_json.h"
@@ -95,6 +97,23 @@ void ColorModel::save(const std::filesystem::path& file) {
   save_times(file, {{"seconds", report.seconds},
                     {"colorizer_seconds", report.colorizer_seconds},
                     {"waited_seconds", report.waited_seconds}});
+}
+
+ColorModel ColorModel::copy(const Engines& engines) {
+  ColorModel same = create(options, engines);
+  same.pixel_colors = pixel_colors;
+  same.colorizer = colorizer;
+  same.stage1_sha256 = stage1_sha256;
+  same.report = report;
+  const std::vector<StatePiece> from = state(), to = same.state();
+  CNERF_CHECK(from.size() == to.size(), "models of the same options have the same pieces");
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    CNERF_CHECK(from[i].bytes.size() == to[i].bytes.size(), "pieces of the same size");
+    std::ranges::copy(from[i].bytes, to[i].bytes.begin());
+  }
+  same.chroma->state_loaded();
+  same.chromaticity->state_loaded();
+  return same;
 }
 
 std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {

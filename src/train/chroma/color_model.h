@@ -32,6 +32,8 @@ struct ColorModel {
   /// @throws MissingInputError, SnapshotError
   static ColorModel load(const std::filesystem::path& snapshot, const Engines& engines);
   void save(const std::filesystem::path& snapshot);
+  /// One with engines of its own, in the same state.
+  [[nodiscard]] ColorModel copy(const Engines& engines);
 
   /// Colours of pixels as `pixel_colors` says, brought into the gamut at the pixel's own luminance. Pixels of hardly
   /// any opacity are grey.

@@ -12,22 +12,8 @@ namespace {
 constexpr float kSameDistance = 0.03f;   // of the distance: two views see the same surface
 constexpr float kSameLightness = 15.0f;  // L*: and it looks the same
 
-std::size_t view_named(const std::string& name, std::span<const std::string> names) {
-  const auto found = std::ranges::find(names, name);
-  if (found == names.end()) throw UsageError("known colours: no training view is called " + name);
-  return std::size_t(found - names.begin());
-}
-
-}  // namespace
-
-/// Colours that a user gave, at the size of their view.
-struct KnownColorMap::Source {
-  std::size_t view;
-  KnownColors colors;
-};
-
 /// What the view of a source sees of points that another view sees.
-struct KnownColorMap::Sight {
+struct Sight {
   const CachedView& source;
   std::span<const float> surface;  // of the source
   Mat3d camera_from_unit;
@@ -46,67 +32,94 @@ struct KnownColorMap::Sight {
   }
 };
 
-KnownColorMap::KnownColorMap(std::span<const CachedView> views, std::span<const std::string> names,
-                             std::span<const KnownColors> known) {
-  if (known.empty()) return;
-  std::vector<std::vector<float>> surfaces;
-  for (const CachedView& view : views) surfaces.push_back(surface_distance(view));
-  std::vector<Source> sources;
+}  // namespace
+
+SeenSurfaces::SeenSurfaces(std::span<const CachedView> views, std::span<const std::string> names)
+    : views_(views), names_(names), surfaces_(views.size()) {
+  parallel_tasks(views.size(), [&](std::size_t v) { surfaces_[v] = surface_distance(views[v]); });
+}
+
+std::size_t SeenSurfaces::view_named(const std::string& name) const {
+  const auto found = std::ranges::find(names_, name);
+  if (found == names_.end()) throw UsageError("known colours: no training view is called " + name);
+  return std::size_t(found - names_.begin());
+}
+
+KnownColorSources::KnownColorSources(const SeenSurfaces& seen, std::span<const KnownColors> known) : seen_(seen) {
   for (const KnownColors& one : known) {
-    const std::size_t view = view_named(one.view, names);
-    KnownColors at_size = resized_to(one, views[view]);
-    if (one.kind == KnownColorKind::kStrokes) at_size = spread(at_size, views[view], surfaces[view]);
-    sources.push_back({view, std::move(at_size)});
-    if (one.kind == KnownColorKind::kKeyFrame) add_key_frame(sources.back());
+    const std::size_t view = seen.view_named(one.view);
+    RunningColors colors = running_colors(resized_to(one, seen.views()[view]));
+    if (one.kind == KnownColorKind::kStrokes) {
+      run(colors, seen.views()[view], seen.surface(view));
+    } else {
+      std::ranges::fill(colors.reach, 0.0f);
+    }
+    sources_.push_back({view, one.kind, std::move(colors)});
   }
-  colors_.resize(views.size());
-  parallel_tasks(views.size(), [&](std::size_t v) { colors_[v] = colors_seen_in(v, views, sources, surfaces); });
+}
+
+/// The last source comes first.
+RunningColors KnownColorSources::seen_in(std::size_t v) const {
+  const CachedView& view = seen_.views()[v];
+  const std::span<const float> surface = seen_.surface(v);
+  const std::size_t pixels = view.opacity.size();
+  RunningColors colors{std::vector<Ab>(pixels), std::vector<float>(pixels), std::vector<float>(pixels, kUnreached)};
+  std::vector<Sight> sights;
+  for (const Source& source : sources_) sights.emplace_back(seen_.views()[source.view], seen_.surface(source.view));
+  for (std::size_t p = 0; p < pixels; ++p) {
+    for (std::size_t s = sources_.size(); s-- > 0 && !colors.is_known(p);) {
+      const RunningColors& given = sources_[s].colors;
+      auto from = long(p);
+      if (sources_[s].view != v) {
+        if (surface[p] <= 0) break;
+        const Vec3f point = view.camera.ray_of_pixel(p).at(surface[p]);
+        from = sights[s].pixel_of(point.cast<double>(), lightness_at(view, p));
+      }
+      if (from < 0 || !given.is_known(std::size_t(from))) continue;
+      colors.cost[p] = given.cost[std::size_t(from)];
+      colors.reach[p] = given.reach[std::size_t(from)];
+      colors.ab[p] = given.ab[std::size_t(from)];
+    }
+  }
+  run(colors, view, surface);
+  return colors;
+}
+
+KnownColorMap::KnownColorMap(const SeenSurfaces& seen, const KnownColorSources& sources) {
+  if (sources.sources().empty()) return;
+  for (const KnownColorSources::Source& source : sources.sources()) {
+    if (source.kind == KnownColorKind::kKeyFrame) add_key_frame(source);
+  }
+  colors_.resize(seen.views().size());
+  parallel_tasks(colors_.size(), [&](std::size_t v) { colors_[v] = sources.seen_in(v); });
   list_places();
 }
 
-void KnownColorMap::add_key_frame(const Source& source) {
+void KnownColorMap::add_key_frame(const KnownColorSources::Source& source) {
   KeyFrame frame{source.view, {}};
   for (const Ab& color : source.colors.ab) frame.ab.push_back(color.a);
   for (const Ab& color : source.colors.ab) frame.ab.push_back(color.b);
   key_frames_.push_back(std::move(frame));
 }
 
-/// Strokes correct what a key frame says, and of two the later: so the last source comes first.
-KnownColorMap::ViewColors KnownColorMap::colors_seen_in(std::size_t v, std::span<const CachedView> views,
-                                                        std::span<const Source> sources,
-                                                        std::span<const std::vector<float>> surfaces) {
-  const CachedView& view = views[v];
-  const std::size_t pixels = view.opacity.size();
-  ViewColors seen{std::vector<Ab>(pixels), std::vector<std::uint8_t>(pixels, 0)};
-  std::vector<Sight> sights;
-  for (const Source& source : sources) sights.emplace_back(views[source.view], surfaces[source.view]);
-  for (std::size_t p = 0; p < pixels; ++p) {
-    for (std::size_t s = sources.size(); s-- > 0 && seen.is_known[p] == 0;) {
-      auto from = long(p);
-      if (sources[s].view != v) {
-        if (surfaces[v][p] <= 0) break;
-        const Vec3f point = view.camera.ray_of_pixel(p).at(surfaces[v][p]);
-        from = sights[s].pixel_of(point.cast<double>(), lightness_at(view, p));
-      }
-      if (from < 0 || sources[s].colors.is_known[std::size_t(from)] == 0) continue;
-      seen.is_known[p] = 1;
-      seen.ab[p] = sources[s].colors.ab[std::size_t(from)];
-    }
-  }
-  return seen;
-}
-
 void KnownColorMap::list_places() {
   for (std::uint32_t v = 0; v < colors_.size(); ++v) {
-    for (std::uint32_t p = 0; p < colors_[v].is_known.size(); ++p) {
-      if (colors_[v].is_known[p] != 0) places_.push_back({v, p});
+    for (std::uint32_t p = 0; p < colors_[v].cost.size(); ++p) {
+      if (colors_[v].is_known(p)) places_.push_back({v, p});
     }
   }
 }
 
 const Ab* KnownColorMap::find(std::size_t view, std::uint32_t pixel) const {
-  if (colors_.empty() || colors_[view].is_known[pixel] == 0) return nullptr;
+  if (colors_.empty() || !colors_[view].is_known(pixel)) return nullptr;
   return &colors_[view].ab[pixel];
+}
+
+KnownColorMap known_color_map(std::span<const CachedView> views, std::span<const std::string> names,
+                              std::span<const KnownColors> known) {
+  if (known.empty()) return KnownColorMap();
+  const SeenSurfaces seen(views, names);
+  return {seen, KnownColorSources(seen, known)};
 }
 
 }  // namespace cnerf

@@ -10,12 +10,51 @@
 
 namespace cnerf {
 
-class KnownColorMap {
+/// What views see, for carrying colours from one to another. Refers to the views and their names.
+class SeenSurfaces {
  public:
   /// @param names  [views] of the cached views
-  /// @throws UsageError  when a view that is known is none of them.
-  KnownColorMap(std::span<const CachedView> views, std::span<const std::string> names,
-                std::span<const KnownColors> known);
+  SeenSurfaces(std::span<const CachedView> views, std::span<const std::string> names);
+
+  [[nodiscard]] std::span<const CachedView> views() const { return views_; }
+  /// Number of the view of that name.  @throws UsageError  when it is none of them.
+  [[nodiscard]] std::size_t view_named(const std::string& name) const;
+  /// `surface_distance` of a view.
+  [[nodiscard]] std::span<const float> surface(std::size_t view) const { return surfaces_[view]; }
+
+ private:
+  std::span<const CachedView> views_;
+  std::span<const std::string> names_;
+  std::vector<std::vector<float>> surfaces_;
+};
+
+/// Colours that a user gave, spread over the views that they were given on, ready to be looked at from any view.
+class KnownColorSources {
+ public:
+  /// Refers to `seen`.  @throws UsageError  when a view that is known is none of them.
+  KnownColorSources(const SeenSurfaces& seen, std::span<const KnownColors> known);
+
+  /// What is known of a view's pixels: its own colours, those of others that show the same surface, and of strokes what
+  /// these run to from there. Strokes correct what a key frame says, and of two the later.
+  [[nodiscard]] RunningColors seen_in(std::size_t view) const;
+
+  struct Source {
+    std::size_t view;
+    KnownColorKind kind;
+    RunningColors colors;  ///< at the size of the cached view, where they have run to
+  };
+  [[nodiscard]] std::span<const Source> sources() const { return sources_; }
+
+ private:
+  const SeenSurfaces& seen_;
+  std::vector<Source> sources_;
+};
+
+class KnownColorMap {
+ public:
+  /// Nothing is known.
+  KnownColorMap() = default;
+  KnownColorMap(const SeenSurfaces& seen, const KnownColorSources& sources);
 
   /// Null where nothing is known.
   [[nodiscard]] const Ab* find(std::size_t view, std::uint32_t pixel) const;
@@ -30,22 +69,16 @@ class KnownColorMap {
   [[nodiscard]] std::span<const KeyFrame> key_frames() const { return key_frames_; }
 
  private:
-  /// Colours of a view, wherever they were given.
-  struct ViewColors {
-    std::vector<Ab> ab;                  // [H, W]
-    std::vector<std::uint8_t> is_known;  // [H, W]
-  };
-  struct Source;
-  struct Sight;
-  void add_key_frame(const Source& source);
-  [[nodiscard]] static ViewColors colors_seen_in(std::size_t view, std::span<const CachedView> views,
-                                                 std::span<const Source> sources,
-                                                 std::span<const std::vector<float>> surfaces);
+  void add_key_frame(const KnownColorSources::Source& source);
   void list_places();
 
-  std::vector<ViewColors> colors_;  // [views]; empty where nothing is known at all
+  std::vector<RunningColors> colors_;  // [views]; empty where nothing is known at all
   std::vector<ViewPixel> places_;
   std::vector<KeyFrame> key_frames_;
 };
+
+/// Of colours as they were given.  @throws as KnownColorSources
+[[nodiscard]] KnownColorMap known_color_map(std::span<const CachedView> views, std::span<const std::string> names,
+                                            std::span<const KnownColors> known);
 
 }  // namespace cnerf

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <queue>
 
 #include "src/base/check.h"
@@ -22,9 +21,11 @@ float lightness_at(const CachedView& view, std::size_t pixel) {
 }
 
 KnownColors resized_to(const KnownColors& known, const CachedView& view) {
+  if (known.width == view.width && known.height == view.height) return known;
   KnownColors out{known.kind, known.view, view.width, view.height, {}, {}};
   const std::size_t pixels = std::size_t(view.width) * std::size_t(view.height);
   std::vector<double> sum(2 * pixels), count(pixels), all(pixels);
+  if (!known.reach.empty()) out.reach.resize(pixels);
   const auto add = [&](int from_x, int from_y, int x, int y) {
     const std::size_t to = std::size_t(y) * std::size_t(view.width) + std::size_t(x);
     const std::size_t from = std::size_t(from_y) * std::size_t(known.width) + std::size_t(from_x);
@@ -33,6 +34,7 @@ KnownColors resized_to(const KnownColors& known, const CachedView& view) {
     count[to] += 1;
     sum[2 * to] += known.ab[from].a;
     sum[2 * to + 1] += known.ab[from].b;
+    if (!known.reach.empty()) out.reach[to] = std::max(out.reach[to], known.reach[from]);
   };
   // Every pixel of the larger of the two images belongs to one of the smaller.
   const auto of = [](int i, int from, int to) { return std::min(int((i + 0.5) * to / from), to - 1); };
@@ -55,6 +57,7 @@ std::string describe(std::span<const KnownColors> known) {
   for (const KnownColors& one : known) {
     std::string content(reinterpret_cast<const char*>(one.is_known.data()), one.is_known.size());
     content.append(reinterpret_cast<const char*>(one.ab.data()), one.ab.size() * sizeof(Ab));
+    content.append(reinterpret_cast<const char*>(one.reach.data()), one.reach.size() * sizeof(float));
     text += one.kind == KnownColorKind::kKeyFrame ? " + key frame " : " + hints on ";
     text += one.view + " (" + sha256(std::as_bytes(std::span(content))).substr(0, 8) + ")";
   }
@@ -75,24 +78,29 @@ std::vector<float> surface_distance(const CachedView& view) {
   return surface;
 }
 
-KnownColors spread(const KnownColors& strokes, const CachedView& view, std::span<const float> surface,
-                   const StrokeReach& reach) {
-  CNERF_CHECK(strokes.width == view.width && strokes.height == view.height, "strokes of the view's size");
-  KnownColors out = strokes;
-  std::vector<float> cost(out.ab.size(), std::numeric_limits<float>::infinity());
+RunningColors running_colors(const KnownColors& strokes) {
+  RunningColors colors{strokes.ab, strokes.reach, {}};
+  if (colors.reach.empty()) colors.reach.assign(colors.ab.size(), 1.0f);
+  for (const std::uint8_t is_known : strokes.is_known) colors.cost.push_back(is_known != 0 ? 0.0f : kUnreached);
+  return colors;
+}
+
+void run(RunningColors& colors, const CachedView& view, std::span<const float> surface, const StrokeReach& reach) {
+  CNERF_CHECK(colors.cost.size() == view.opacity.size(), "colours of the view's size");
+  const float one_pixel = 1.0f / (reach.share_of_short_side * float(view.short_side()));
+  std::vector<float> lightness(colors.cost.size()), log_distance(colors.cost.size());
   using Entry = std::pair<float, std::uint32_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
-  for (std::uint32_t p = 0; p < cost.size(); ++p) {
-    if (strokes.is_known[p] == 0) continue;
-    cost[p] = 0;
-    open.emplace(0.0f, p);
+  for (std::uint32_t p = 0; p < colors.cost.size(); ++p) {
+    lightness[p] = lightness_at(view, p);
+    log_distance[p] = surface[p] > 0 ? std::log(surface[p]) : 0;
+    if (colors.is_known(p)) open.emplace(colors.cost[p], p);
   }
-  const float one_pixel = 1.0f / (reach.share_of_short_side * float(view.short_side()));
   while (!open.empty()) {
     const auto [so_far, p] = open.top();
     open.pop();
-    if (so_far > cost[p]) continue;
-    out.is_known[p] = 1;
+    const float further = colors.reach[p];
+    if (so_far > colors.cost[p] || further <= 0) continue;
     const int x = int(p) % view.width, y = int(p) / view.width;
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
@@ -101,16 +109,17 @@ KnownColors spread(const KnownColors& strokes, const CachedView& view, std::span
         const auto q = std::uint32_t(ny * view.width + nx);
         if (surface[p] <= 0 || surface[q] <= 0) continue;
         const float step = one_pixel * std::hypot(float(dx), float(dy)) +
-                           std::abs(lightness_at(view, p) - lightness_at(view, q)) / reach.lightness +
-                           std::abs(std::log(surface[q] / surface[p])) / reach.depth;
-        if (so_far + step >= std::min(cost[q], 1.0f)) continue;
-        cost[q] = so_far + step;
-        out.ab[q] = out.ab[p];
-        open.emplace(cost[q], q);
+                           std::abs(lightness[p] - lightness[q]) / reach.lightness +
+                           std::abs(log_distance[q] - log_distance[p]) / reach.depth;
+        const float cost = so_far + step / further;
+        if (cost >= std::min(colors.cost[q], 1.0f)) continue;
+        colors.cost[q] = cost;
+        colors.ab[q] = colors.ab[p];
+        colors.reach[q] = further;
+        open.emplace(cost, q);
       }
     }
   }
-  return out;
 }
 
 }  // namespace cnerf

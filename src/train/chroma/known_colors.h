@@ -4,6 +4,7 @@
 /// painted photograph colours the scene, and one stroke an object.
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,6 +26,7 @@ struct KnownColors {
   int width = 0, height = 0;
   std::vector<Ab> ab;                  ///< [H, W]
   std::vector<std::uint8_t> is_known;  ///< [H, W] 0 or 1
+  std::vector<float> reach = {};       ///< [H, W] of strokes, times StrokeReach; 0: stays there; empty = 1 everywhere
 };
 
 /// For logs, metadata and comparing runs: " + key frame images/0007.png (1a2b3c4d)"; empty without any.
@@ -37,11 +39,23 @@ struct StrokeReach {
   float depth = 0.1f;                ///< of the distance, nearer and farther
 };
 
-/// Gives pixels around the strokes the colour of the stroke that is nearest by that cost.
-/// @param strokes  at the view's size
+inline constexpr float kUnreached = std::numeric_limits<float>::infinity();
+
+/// Colours that run over the pixels of a view.  [H, W] each
+struct RunningColors {
+  std::vector<Ab> ab;
+  std::vector<float> reach;  ///< how far they run, times StrokeReach
+  std::vector<float> cost;   ///< of the way from the stroke; kUnreached where nothing is known
+
+  [[nodiscard]] bool is_known(std::size_t pixel) const { return cost[pixel] < kUnreached; }
+};
+
+/// Strokes before they run.
+[[nodiscard]] RunningColors running_colors(const KnownColors& strokes);
+
+/// Gives pixels the colour that comes to them at the least cost, as far as it reaches.
 /// @param surface  `surface_distance(view)`
-[[nodiscard]] KnownColors spread(const KnownColors& strokes, const CachedView& view, std::span<const float> surface,
-                                 const StrokeReach& reach = {});
+void run(RunningColors& colors, const CachedView& view, std::span<const float> surface, const StrokeReach& reach = {});
 
 /// L* of a pixel, 0..100.
 [[nodiscard]] float lightness_at(const CachedView& view, std::size_t pixel);

@@ -34,7 +34,7 @@ Stage2Report train_stage2(const Stage2Job& job, const Engines& engines, Observer
   Session session(job, observer);
   session.start_or_resume(engines, injection.pixel_colors());
   session.cache_views(engines);
-  const KnownColorMap known(session.views(), session.names(), job.known);
+  const KnownColorMap known = known_color_map(session.views(), session.names(), job.known);
   return colorize(session, known, job.questions != nullptr ? *job.questions : patches, injection);
 }
 

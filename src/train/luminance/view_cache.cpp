@@ -10,8 +10,9 @@ namespace cnerf {
 namespace {
 
 constexpr float kFullScale = 65535.0f;
-constexpr float kCacheTransmittance = 2e-3f;  // what lies behind is not worth a sample
-constexpr std::size_t kGrain = 512;           // pixels of a parallel piece of work
+constexpr float kCacheTransmittance = 2e-3f;   // what lies behind is not worth a sample
+constexpr std::size_t kRaysAtATime = 1 << 15;  // a tenth of a second of two cores; a GPU wants many
+constexpr std::size_t kGrain = 512;            // pixels of a parallel piece of work
 
 void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
   view.brightest = 1e-6f;
@@ -37,7 +38,7 @@ PixelSamples with_room_for(std::vector<std::size_t> offsets) {
 }  // namespace
 
 CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march, const UnitCamera& full_size_camera,
-                      int short_side, double share) {
+                      int short_side, double share, const std::function<void(double fraction)>& report) {
   CachedView view;
   view.camera = full_size_camera;
   const Intrinsics& lens = full_size_camera.intrinsics;
@@ -46,15 +47,23 @@ CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
   view.height = std::max(1, int(std::lround(lens.height * factor)));
   view.camera.intrinsics = resized(lens, view.width, view.height);
 
-  std::vector<Ray> rays(std::size_t(view.width) * std::size_t(view.height));
-  parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) rays[p] = view.camera.ray_of_pixel(p);
-  });
-  std::vector<WeightedSample> samples;
-  engine.trace(rays, march, {kCacheTransmittance, float(share)}, samples, view.offsets);
-  view.luminance.resize(rays.size());
-  view.opacity.resize(rays.size());
-  parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+  const std::size_t pixels = std::size_t(view.width) * std::size_t(view.height);
+  std::vector<WeightedSample> samples, some;
+  std::vector<std::size_t> offsets;
+  view.offsets = {0};
+  for (std::size_t first = 0; first < pixels; first += kRaysAtATime) {
+    std::vector<Ray> rays(std::min(kRaysAtATime, pixels - first));
+    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) rays[r] = view.camera.ray_of_pixel(first + r);
+    });
+    engine.trace(rays, march, {kCacheTransmittance, float(share)}, some, offsets);
+    for (std::size_t r = 0; r < rays.size(); ++r) view.offsets.push_back(samples.size() + offsets[r + 1]);
+    samples.insert(samples.end(), some.begin(), some.end());
+    if (report) report(double(first + rays.size()) / double(pixels));
+  }
+  view.luminance.resize(pixels);
+  view.opacity.resize(pixels);
+  parallel_ranges(pixels, kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s) {
         view.luminance[p] += samples[s].weight * samples[s].luminance;
@@ -77,9 +86,9 @@ void ViewCache::fill(const LuminanceEngine& engine, const MarchSettings& march, 
     if (!view.held_out) names_.push_back(view.name);
   }
   for (std::size_t v = views_.size(); v < views.size(); ++v) {
-    views_.push_back(cache_view(engine, march, views[v].camera, short_side, kCachedWeight));
+    views_.push_back(cache_view(engine, march, views[v].camera, short_side, kCachedWeight,
+                                [&](double fraction) { report((double(v) + fraction) / double(views.size())); }));
     ignore_masked(views_.back(), *views[v].image);
-    report(double(v + 1) / double(views.size()));
   }
 }
 

@@ -36,8 +36,10 @@ struct CachedView {
 
 /// Renders a view with its short side at most `short_side` pixels. Of each pixel the heaviest samples are kept that
 /// carry `share` of its weight.
+/// @param report  is told the share that is done, some times a second; may throw
 [[nodiscard]] CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
-                                    const UnitCamera& full_size_camera, int short_side, double share);
+                                    const UnitCamera& full_size_camera, int short_side, double share,
+                                    const std::function<void(double fraction)>& report = {});
 
 inline constexpr double kCachedWeight = 0.99;  ///< share of a pixel's weight that the samples of a ViewCache carry
 
@@ -46,7 +48,7 @@ class ViewCache {
  public:
   /// Traces the views, unless it holds them already at this size.
   /// @param short_side     pixels of their shorter side, at most
-  /// @param report         is told the share that is done, after each view; may throw, and a later call goes on
+  /// @param report         is told the share that is done; may throw, and a later call goes on
   /// @throws UsageError    every view is held out.
   void fill(const LuminanceEngine& engine, const MarchSettings& march, const Capture& capture, const SceneFrame& frame,
             int short_side, const std::function<void(double fraction)>& report);

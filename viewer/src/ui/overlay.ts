@@ -121,7 +121,7 @@ export class Overlay {
       last = { x: m.clientX, y: m.clientY };
       const low: Vec3 = [...clip.low];
       const high: Vec3 = [...clip.high];
-      const least = app.bundle.volume.voxelSize;
+      const least = app.bundle.levels.at(-1)!.voxelSize;
       if (i < 3) low[axis] = Math.min(high[axis] - least, Math.max(app.low[axis], low[axis] + shift));
       else high[axis] = Math.max(low[axis] + least, Math.min(app.high[axis], high[axis] + shift));
       app.set({ clip: { low, high } });

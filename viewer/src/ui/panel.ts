@@ -17,6 +17,8 @@ export class Panel {
   readonly node: HTMLElement;
   private refreshers: (() => void)[] = [];
   readonly statistics = el("dl", { class: "statistics", id: "statistics" });
+  /** What is not shown, and why. */
+  private readonly missing = el("p", { class: "note warning", id: "missing", role: "status", hidden: true });
   keys: View[] = [];
   private keyList = el("ol", { class: "keys", id: "key-frames" });
   private playing = 0;
@@ -26,6 +28,7 @@ export class Panel {
     this.node = el(
       "aside",
       { class: "panel", id: "panel", "aria-label": "Settings" },
+      this.missing,
       this.colour(),
       this.density(),
       this.clip(),
@@ -104,7 +107,7 @@ export class Panel {
           change: (v) => {
             const clip = app.settings.clip!;
             const next = { low: [...clip.low] as Vec3, high: [...clip.high] as Vec3 };
-            const least = app.bundle.volume.voxelSize;
+            const least = app.bundle.levels.at(-1)!.voxelSize;
             next[side][i] = side === "low" ? Math.min(v, clip.high[i] - least) : Math.max(v, clip.low[i] + least);
             app.set({ clip: next });
           },
@@ -249,6 +252,11 @@ export class Panel {
     const { bundle } = this.app;
     const origin = bundle.inferred ? `Colour is inferred, by colorizer ${bundle.colorizer}, take ${bundle.take}.` : "Grey: not colorized.";
     return el("p", { class: "note about" }, `${origin} ${bundle.program}.`);
+  }
+
+  showNote(text: string): void {
+    this.missing.textContent = text;
+    this.missing.hidden = text === "";
   }
 
   showStatistics(entries: [string, string][]): void {

@@ -2,13 +2,19 @@
  * What a bundle costs to look at, in the browser of the tests:
  *
  *   node viewer/tests/browser/measure.mjs BUNDLE [WIDTH HEIGHT]
+ *   node viewer/tests/browser/measure.mjs BUNDLE --against RENDERS [--save FOLDER] [--rays 16]
  *
- * Prints the bytes until the poster and until the volume is seen, and the milliseconds of a frame while moving. PAGE is
- * CNERF_BUILT_PAGE, or viewer/dist.
+ * Prints the bytes until the poster and until the volume is seen, and the milliseconds of a frame while moving; or dB
+ * between the page's pictures and those of `cnerf render RUN --path held-out --format png`, named as they are, which
+ * --save keeps; with fewer rays a pixel than the page takes at rest it is quicker. The page is CNERF_BUILT_PAGE, or viewer/dist.
  */
 
-import { builtPage, launch, open, serve } from "./support.mjs";
+import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { builtPage, decoded, encoded, launch, open, picture, serve } from "./support.mjs";
 
+const argument = (name) => (process.argv.includes(name) ? process.argv.splice(process.argv.indexOf(name), 2)[1] : null);
+const [against, save, rays] = [argument("--against"), argument("--save"), Number(argument("--rays") ?? 16)];
 const [bundle, width = "1280", height = "720"] = process.argv.slice(2);
 const sizes = new Map();
 const server = await serve([builtPage, bundle], (path, content) => {
@@ -16,13 +22,26 @@ const server = await serve([builtPage, bundle], (path, content) => {
   return content;
 });
 const browser = await launch();
-const context = await browser.newContext({ viewport: { width: Number(width), height: Number(height) } });
+// What is compared are pictures of a size of their own; the canvas, which draws all the while, need not be large.
+const viewport = against ? { width: 64, height: 48 } : { width: Number(width), height: Number(height) };
+const context = await browser.newContext({ viewport });
 const page = await open(context, `${server.url}?still`);
+// Bundles of earlier versions have one level, and their pages do not say when all is there.
+const began = Date.now();
+await page.waitForFunction(() => document.body.dataset.complete || !window.cnerf?.levels);
+if (against) {
+  await compare();
+  await browser.close();
+  await server.close();
+  process.exit(0);
+}
 const sum = (match) => [...sizes].filter(([path]) => match(path)).reduce((total, [, size]) => total + size, 0);
 const bytes = sum(() => true);
 const volume = sum((path) => path.endsWith(".bin"));
 console.log(`bytes to the poster:  ${bytes - volume} (uncompressed by the server)`);
-console.log(`bytes to the volume:  ${bytes}, of these ${volume} of bricks`);
+const coarsest = sum((path) => path.endsWith(".bin") && !path.includes("_fine"));
+console.log(`bytes to the volume:  ${bytes - volume + coarsest}, of these ${coarsest} of bricks`);
+console.log(`finer levels:         ${volume - coarsest} bytes, ${Date.now() - began} ms after the first picture`);
 /** In the page: milliseconds of one frame at full resolution, as while moving; the median of several. */
 function measure([width, height]) {
   const { renderer } = window.cnerf;
@@ -52,3 +71,49 @@ const statistics = await page.evaluate(() => window.cnerf.renderer.statistics())
 console.log(`graphics:             ${statistics.renderer}`);
 await browser.close();
 await server.close();
+
+/** dB between two pictures where `weight` is not 0. */
+function decibel(a, b, weight = () => 1) {
+  let [total, pixels] = [0, 0];
+  for (let p = 0; p < a.width * a.height; ++p) {
+    if (!weight(p)) continue;
+    pixels += 1;
+    for (let c = 0; c < 3; ++c) total += ((a.data[4 * p + c] - b.data[4 * p + c]) / 255) ** 2;
+  }
+  return { value: -10 * Math.log10(total / (3 * pixels)), share: pixels / (a.width * a.height) };
+}
+
+/**
+ * Every camera that was rendered; also the pixels that the finest level alone decides: opaque with a clip box around
+ * it, and the same with everything else.
+ */
+async function compare() {
+  if (save) mkdirSync(save, { recursive: true });
+  const { cameras, levels = [] } = JSON.parse(readFileSync(join(bundle, "bundle.json"), "utf8"));
+  const means = { all: [], finest: [] };
+  for (const [i, camera] of cameras.entries()) {
+    const name = camera.name.replaceAll("/", "_").replace(/\.[^.]*$/, ".png");
+    if (!existsSync(join(against, name))) continue;
+    const reference = await decoded(page, readFileSync(join(against, name)));
+    await page.evaluate((c) => window.cnerf.app.goToCamera(c), i);
+    const shown = await picture(page, reference.width, reference.height, "#000000", rays);
+    const all = decibel(shown, reference);
+    means.all.push(all.value);
+    let line = `${camera.name}: ${all.value.toFixed(2)} dB`;
+    if (levels.length > 1) {
+      const { min: low, max: high } = levels.at(-1).cover;
+      await page.evaluate((clip) => window.cnerf.app.set({ clip }), { low, high });
+      const alone = await picture(page, reference.width, reference.height, "none", rays);
+      await page.evaluate(() => window.cnerf.app.set({ clip: null }));
+      const isFinest = (p) => alone.data[4 * p + 3] >= 250 && [0, 1, 2].every((c) => Math.abs(alone.data[4 * p + c] - shown.data[4 * p + c]) <= 8);
+      const finest = decibel(shown, reference, isFinest);
+      means.finest.push(finest.value);
+      line += `; in the finest grid ${finest.value.toFixed(2)} dB of ${(100 * finest.share).toFixed(0)} % of the pixels`;
+    }
+    console.log(line);
+    if (save) writeFileSync(join(save, name), await encoded(page, shown));
+  }
+  for (const [what, values] of Object.entries(means)) {
+    if (values.length > 0) console.log(`mean, ${what}: ${(values.reduce((a, b) => a + b) / values.length).toFixed(2)} dB of ${values.length} cameras`);
+  }
+}

@@ -276,6 +276,91 @@ describe("camera", () => {
   });
 });
 
+describe("nested grids", () => {
+  const nested = JSON.parse(readFileSync(join(fixture, "nested.json"), "utf8"));
+  const ofNested = [builtPage, join(fixture, "nested")];
+  const levelsThere = (shown) => shown.evaluate(() => window.cnerf.levels.there);
+  const complete = (shown) => shown.waitForSelector("body[data-complete]", { state: "attached" });
+  it("are shown as the program's integrator does: inside the finest, across its border, and all", async () => {
+    const own = await serve(ofNested);
+    const shown = await open(context, `${own.url}?still`);
+    await complete(shown);
+    assert.equal(await levelsThere(shown), 3);
+    for (const [camera, image] of nested.images.entries()) {
+      await shown.evaluate((i) => window.cnerf.app.goToCamera(i), camera);
+      const drawnPicture = await picture(shown, image.width, image.height);
+      const [ofGrids, ofOne] = [psnr(drawnPicture, image.rgb), psnr(drawnPicture, nested.one_fine_grid[camera].rgb)];
+      console.log(`# camera ${camera}: ${ofGrids.toFixed(2)} dB to the nested grids, ${ofOne.toFixed(2)} dB to one fine grid`);
+      assert.ok(ofGrids >= 32, `${ofGrids} dB`);
+    }
+    assert.equal(await shown.evaluate(() => document.getElementById("missing").hidden), true, "nothing is left out");
+    await shown.close();
+    await own.close();
+  });
+  it("are seen coarse at first, then finer, each level as it comes", async () => {
+    let release;
+    const held = new Promise((resolve) => (release = resolve));
+    const own = await serve(ofNested, (path, bytes) => (path === "/color_fine1.bin" ? held.then(() => bytes) : bytes));
+    const shown = await open(context, `${own.url}?still`);
+    assert.equal(await levelsThere(shown), 1, "the coarsest is enough to begin with");
+    const image = nested.images[0];
+    const coarse = psnr(await picture(shown, image.width, image.height), image.rgb);
+    release();
+    await complete(shown);
+    assert.equal(await levelsThere(shown), 3);
+    const fine = psnr(await picture(shown, image.width, image.height), image.rgb);
+    assert.ok(coarse < fine - 6, `${coarse} dB, then ${fine} dB`);
+    await shown.close();
+    await own.close();
+  });
+  it("leave the finest bricks out where memory is short, without holes, and say so", async () => {
+    const own = await serve(ofNested);
+    const image = nested.images[2];
+    const seen = {};
+    for (const budget of ["0.1", "1.2", "64"]) {
+      const shown = await open(context, `${own.url}?still&budget=${budget}`);
+      await complete(shown);
+      await shown.evaluate(() => window.cnerf.app.goToCamera(2));
+      const { textureBytes } = await shown.evaluate(() => window.cnerf.renderer.statistics());
+      const drawnPicture = await picture(shown, image.width, image.height, "none");
+      const note = await shown.locator("#missing").textContent();
+      seen[budget] = { levels: await levelsThere(shown), alpha: meanAlpha(drawnPicture), bytes: textureBytes, note };
+      await shown.close();
+    }
+    console.log(`# ${JSON.stringify(seen)}`);
+    assert.equal(seen["0.1"].levels, 1);
+    assert.match(seen["0.1"].note, /Left out: the 2 finest levels.*budget=/);
+    assert.match(seen["1.2"].note, /Left out: [0-9,]+ bricks? of level 2/);
+    assert.ok(seen["1.2"].bytes < 1.3 * 2 ** 20 && seen["1.2"].bytes > seen["0.1"].bytes);
+    assert.equal(seen["64"].note, "");
+    for (const budget of ["0.1", "1.2"]) assert.ok(Math.abs(seen[budget].alpha - seen["64"].alpha) < 0.04 * seen["64"].alpha, "what is left out is shown coarser");
+    await own.close();
+  });
+  it("stay as they are where a finer level is damaged, with the reason", async () => {
+    const own = await serve(ofNested, (path, bytes) => (path === "/density_fine1.bin" ? bytes.subarray(0, 500) : bytes));
+    const shown = await open(context, `${own.url}?still`);
+    await complete(shown);
+    assert.equal(await levelsThere(shown), 1);
+    assert.match(await shown.locator("#missing").textContent(), /coarser than it is: density_fine1\.bin.*damaged/);
+    assert.equal(await shown.locator("#message").isVisible(), false);
+    await shown.close();
+    await own.close();
+  });
+  it("show slices of the finest level that is there", async () => {
+    const own = await serve(ofNested);
+    const shown = await open(context, `${own.url}?still`);
+    await complete(shown);
+    await shown.evaluate(() => window.cnerf.app.goToCamera(2));
+    await set(shown, { slice: { axis: 2, at: 0, quantity: "L" } });
+    const fine = await picture(shown);
+    assert.ok(brightness(fine) > 2);
+    await shown.evaluate(() => (window.cnerf.renderer.levels = 1));
+    assert.ok(psnrOfPictures(fine, await picture(shown)) < 30, "the coarsest would look otherwise");
+    await shown.close();
+    await own.close();
+  });
+});
+
 describe("what leaves the page", () => {
   it("a camera path in the manner of transforms.json", async () => {
     await reset();

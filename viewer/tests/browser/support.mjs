@@ -22,13 +22,13 @@ export function launch(extra = []) {
   });
 }
 
-/** Any static server will do; `change(path, bytes)` may alter or withhold (null) what is served. */
+/** Any static server will do; `change(path, bytes)` may alter, delay (by a promise) or withhold (null) what is served. */
 export async function serve(folders, change = (_, bytes) => bytes, port = 0) {
-  const server = createServer((request, response) => {
+  const server = createServer(async (request, response) => {
     let path = decodeURIComponent(request.url.split("?")[0]);
     if (path === "/") path = "/index.html";
     const found = folders.map((folder) => join(folder, path)).find((file) => existsSync(file) && statSync(file).isFile());
-    const bytes = found ? change(path, readFileSync(found)) : null;
+    const bytes = found ? await change(path, readFileSync(found)) : null;
     if (bytes === null) {
       response.statusCode = 404;
       return response.end();
@@ -83,15 +83,15 @@ export async function open(context, url, script) {
 }
 
 /** The page's picture of what it shows: { width, height, data: RGBA bytes }. */
-export async function picture(page, width = 160, height = 120, background = "#000000") {
+export async function picture(page, width = 160, height = 120, background = "#000000", rays = 16) {
   const list = await page.evaluate(
-    async ([w, h, b]) => {
-      const image = await window.cnerf.renderer.picture(w, h, b);
+    async ([w, h, b, r]) => {
+      const image = await window.cnerf.renderer.picture(w, h, b, r);
       let text = "";
       for (const byte of image.data) text += String.fromCharCode(byte);
       return btoa(text);
     },
-    [width, height, background],
+    [width, height, background, rays],
   );
   return { width, height, data: Buffer.from(list, "base64") };
 }
@@ -159,4 +159,15 @@ export async function decoded(page, bytes) {
     return [bitmap.width, bitmap.height, btoa(text)];
   }, bytes.toString("base64"));
   return { width, height, data: Buffer.from(data, "base64") };
+}
+
+/** A picture as a PNG file. */
+export async function encoded(page, { width, height, data }) {
+  const base64 = await page.evaluate(async ([w, h, bytes]) => {
+    const canvas = new OffscreenCanvas(w, h);
+    canvas.getContext("2d").putImageData(new ImageData(Uint8ClampedArray.from(atob(bytes), (c) => c.charCodeAt(0)), w, h), 0, 0);
+    const file = new Uint8Array(await (await canvas.convertToBlob()).arrayBuffer());
+    return btoa(Array.from(file, (b) => String.fromCharCode(b)).join(""));
+  }, [width, height, Buffer.from(data).toString("base64")]);
+  return Buffer.from(base64, "base64");
 }

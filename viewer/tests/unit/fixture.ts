@@ -15,11 +15,13 @@ interface Expected {
   images: { width: number; height: number; rgb: number[]; opacity: number[] }[];
 }
 
-export const manifestText = () => readFileSync(join(folder, "r8", "bundle.json"), "utf8");
+export const manifestText = (name = "r8") => readFileSync(join(folder, name, "bundle.json"), "utf8");
 export const bundle = there ? parseBundle(manifestText()) : null;
 export const expected = there ? (JSON.parse(readFileSync(join(folder, "expected.json"), "utf8")) as Expected) : null;
 
-export function packed(): Packed {
-  const read = (name: string) => new Uint8Array(gunzipSync(readFileSync(join(folder, "r8", name))));
-  return { occupancy: read("occupancy.bin"), density: read("density.bin"), color: read("color.bin") };
+/** A level's parts. @param name  "r8", or "nested" of several levels. */
+export function packed(name = "r8", level = 0): Packed {
+  const { parts } = parseBundle(manifestText(name)).levels[level];
+  const read = (part: string) => new Uint8Array(gunzipSync(readFileSync(join(folder, name, part))));
+  return { occupancy: read(parts.occupancy), density: read(parts.density), color: read(parts.color) };
 }

@@ -1,0 +1,174 @@
+#pragma once
+/// What the studio's page and its server say to each other, as records. Shares of width and height for places in
+/// pictures; cameras as src/capture/camera.h has them.
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "src/base/record.h"
+#include "src/studio/field_view.h"
+#include "src/train/chroma/strokes.h"
+
+namespace cnerf::studio {
+
+using Triple = std::array<double, 3>;
+
+struct LensMessage {
+  int width = 0, height = 0;
+  double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("width", self.width);
+    v("height", self.height);
+    v("fx", self.fx);
+    v("fy", self.fy);
+    v("cx", self.cx);
+    v("cy", self.cy);
+  }
+};
+
+/// POST frame: a camera, and what is shown of it, one picture above the other.
+struct FrameMessage {
+  Triple position{};
+  std::array<Triple, 3> rotation{};  ///< rows of world_from_camera
+  LensMessage lens;
+  std::vector<std::string> sides;  ///< "grey", "now", or a take
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("position", self.position);
+    v("rotation", self.rotation);
+    v("lens", self.lens);
+    v("sides", self.sides);
+  }
+};
+
+/// A view of the capture.
+struct ViewMessage {
+  std::string name;
+  bool held_out = false;
+  int width = 0, height = 0;
+  Triple position{};
+  std::array<Triple, 3> rotation{};
+  LensMessage lens;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("name", self.name);
+    v("held_out", self.held_out);
+    v("width", self.width);
+    v("height", self.height);
+    v("position", self.position);
+    v("rotation", self.rotation);
+    v("lens", self.lens);
+  }
+};
+
+/// GET scene.
+struct SceneMessage {
+  std::string title, run, up;
+  Triple centre{};
+  double radius = 1;  ///< of what is worth looking at, world units
+  std::vector<ViewMessage> views;
+  int home = 0;  ///< the view to begin with
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("title", self.title);
+    v("run", self.run);
+    v("up", self.up);
+    v("centre", self.centre);
+    v("radius", self.radius);
+    v("views", self.views);
+    v("home", self.home);
+  }
+};
+
+struct TakeMessage {
+  std::string name, colorizer;
+  double seconds = 0;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("name", self.name);
+    v("colorizer", self.colorizer);
+    v("seconds", self.seconds);
+  }
+};
+
+struct DownloadMessage {
+  std::string name, address;
+  std::uint64_t bytes = 0;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("name", self.name);
+    v("address", self.address);
+    v("bytes", self.bytes);
+  }
+};
+
+/// GET state, and the news.
+struct StateMessage {
+  std::uint64_t version = 1, colors = 1;
+  std::string task;
+  double fraction = 0;
+  std::map<std::string, double> figures;
+  std::string message;
+  bool failed = false, ready = false;
+  std::string writer;
+  int strokes = 0;  ///< revision
+  std::string take;
+  bool unkept = false;
+  std::vector<TakeMessage> takes;
+  std::vector<std::string> commands;
+  std::vector<DownloadMessage> downloads;
+  std::string blender;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("version", self.version);
+    v("colors", self.colors);
+    v("task", self.task);
+    v("fraction", self.fraction);
+    v("figures", self.figures);
+    v("message", self.message);
+    v("failed", self.failed);
+    v("ready", self.ready);
+    v("writer", self.writer);
+    v("strokes", self.strokes);
+    v("take", self.take);
+    v("unkept", self.unkept);
+    v("takes", self.takes);
+    v("commands", self.commands);
+    v("downloads", self.downloads);
+    v("blender", self.blender);
+  }
+};
+
+/// POST orders.
+struct OrderMessage {
+  std::string order, take, name, format, picture;
+  std::vector<std::string> formats;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("order", self.order);
+    v("take", self.take, kOptional);
+    v("name", self.name, kOptional);
+    v("format", self.format, kOptional);
+    v("formats", self.formats, kOptional);
+    v("picture", self.picture, kOptional);
+  }
+};
+
+/// @throws InputError  naming the field: no rotation, a lens or size beyond what is drawn
+[[nodiscard]] FieldCamera camera_of(const FrameMessage& message);
+[[nodiscard]] SceneMessage scene_of(const Capture& capture, const std::string& run);
+
+}  // namespace cnerf::studio

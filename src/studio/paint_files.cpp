@@ -1,0 +1,106 @@
+#include "src/studio/paint_files.h"
+
+#include <algorithm>
+#include <cctype>
+#include <opencv2/core.hpp>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/pipeline/run_context.h"
+#include "src/picture/encode.h"
+
+namespace cnerf::studio {
+namespace fs = std::filesystem;
+namespace {
+
+/// "images/view 1.png" -> "images_view_1.png"
+std::string picture_name(const std::string& view) {
+  std::string name = view.substr(0, view.rfind('.'));
+  for (char& c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-') c = '_';
+  }
+  return name + ".png";
+}
+
+/// B G R A, 8 bits: the paint at the luminance that is there.
+cv::Mat picture_of(const KnownColors& paint, const MonoImage& image) {
+  cv::Mat picture(paint.height, paint.width, CV_8UC4, cv::Scalar::all(0));
+  for (std::size_t p = 0; p < paint.ab.size(); ++p) {
+    if (paint.is_known[p] == 0) continue;
+    const Vec3f rgb = linear_rgb_at(image.stored_luminance(p), paint.ab[p]);
+    auto& pixel = picture.at<cv::Vec4b>(int(p) / paint.width, int(p) % paint.width);
+    pixel = {srgb8_from_linear(rgb.z), srgb8_from_linear(rgb.y), srgb8_from_linear(rgb.x), 255};
+  }
+  return picture;
+}
+
+void require_take(const pipeline::RunDirectory& directory, const std::string& take) {
+  pipeline::check_take_name(take);
+  if (!directory.take_record(take)) throw UsageError("there is no finished take " + take);
+}
+
+}  // namespace
+
+void write_paint_pictures(const fs::path& folder, const Capture& capture, const std::vector<Stroke>& strokes) {
+  for (const View& view : capture.views) {
+    const fs::path file = folder / picture_name(view.name);
+    const bool is_touched = std::ranges::find(strokes, view.name, &Stroke::view) != strokes.end();
+    const KnownColors paint = is_touched ? painted_on(view.name, strokes, view.image.width, view.image.height)
+                                         : KnownColors{};
+    std::error_code failure;
+    if (std::ranges::find(paint.is_known, 1) != paint.is_known.end()) {
+      write_png(file, picture_of(paint, view.image));
+    } else {
+      fs::remove(file, failure);
+    }
+  }
+}
+
+void duplicate(const pipeline::RunDirectory& directory, const std::string& take, const std::string& name,
+               Observer& observer) {
+  require_take(directory, take);
+  pipeline::check_take_name(name);
+  const fs::path to = directory.take_folder(name);
+  const FolderLock lock = pipeline::lock_folder(to, FolderLock::Mode::kAlone, observer);
+  if (!is_vacant(to)) throw UsageError("a take of this name exists: " + name);
+  std::error_code failure;
+  for (const auto& entry : fs::directory_iterator(directory.take_folder(take), failure)) {
+    const fs::path file = entry.path();
+    // The record comes last: without it there is no take.
+    const bool is_record = file == directory.take_record_file(take);
+    if (is_record || !entry.is_regular_file() || file.filename() == FolderLock::kFile || is_temporary(file)) continue;
+    write_atomically(to / file.filename(), [&](const fs::path& temporary) {
+      std::error_code problem;
+      if (!fs::copy_file(file, temporary, fs::copy_options::overwrite_existing, problem)) {
+        throw OutputError(file.string() + ": cannot be copied: " + problem.message());
+      }
+    });
+  }
+  pipeline::TakeRecord record = *directory.take_record(take);
+  record.name = name;
+  directory.save(record);
+}
+
+void remove(const pipeline::RunDirectory& directory, const std::string& take, const std::string& successor,
+            Observer& observer) {
+  require_take(directory, take);
+  const fs::path folder = directory.take_folder(take);
+  {
+    const FolderLock lock = pipeline::lock_folder(folder, FolderLock::Mode::kAlone, observer);
+    std::error_code failure;
+    fs::remove(directory.take_record_file(take), failure);  // first: what is left is no take
+    clear_folder(folder);
+  }
+  std::error_code failure;
+  fs::remove_all(folder, failure);
+  std::string other = successor;
+  for (const auto& entry : fs::directory_iterator(directory.root() / "takes", failure)) {
+    const std::string name = entry.path().filename().string();
+    if (other.empty() && directory.take_record(name)) other = name;
+  }
+  directory.update([&](pipeline::RunRecord& record) {
+    if (record.current_take == take) record.current_take = other;
+  });
+}
+
+}  // namespace cnerf::studio

@@ -1,0 +1,31 @@
+#pragma once
+/// Files of a studio: what is painted as pictures, and the folders of takes.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "src/base/observer.h"
+#include "src/capture/capture.h"
+#include "src/pipeline/run_directory.h"
+#include "src/train/chroma/strokes.h"
+
+namespace cnerf::studio {
+
+inline constexpr const char* kStrokeFile = "strokes.json";
+
+/// Writes VIEW.png into the folder for each view that is painted on, transparent except for paint, as --hint-image
+/// takes them; those of views that are not any more go.  @throws OutputError
+void write_paint_pictures(const std::filesystem::path& folder, const Capture& capture,
+                          const std::vector<Stroke>& strokes);
+
+/// A finished take under another name.  @throws UsageError  no such take, or a take of the new name; BusyError
+void duplicate(const pipeline::RunDirectory& directory, const std::string& take, const std::string& name,
+               Observer& observer);
+/// Removes a take.
+/// @param successor  what the run's current take is where it was this; empty = another, or none
+/// @throws UsageError  no such take; BusyError
+void remove(const pipeline::RunDirectory& directory, const std::string& take, const std::string& successor,
+            Observer& observer);
+
+}  // namespace cnerf::studio

@@ -1,0 +1,177 @@
+#include "src/train/chroma/strokes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "src/base/check.h"
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/color/colorspace_math.h"
+
+namespace cnerf {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::array<const char*, 4> kKinds = {"paint", "exact", "grey", "erase"};
+constexpr std::size_t kLongestId = 32;
+constexpr float kCovered = 0.5f;  // of a pixel: it is painted
+
+/// Refuses a stroke of a file by the name of its field.
+class StrokeCheck {
+ public:
+  StrokeCheck(const fs::path& file, std::size_t index) : file_(file), index_(index) {}
+
+  void require(bool holds, const char* field, const std::string& problem) const {
+    if (!holds) throw InputError(file_, fmt::format("strokes[{}].{}", index_, field), problem);
+  }
+  void in_range(float value, float least, float most, const char* field) const {
+    require(value >= least && value <= most, field, fmt::format("expected {} to {}, got {}", least, most, value));
+  }
+
+ private:
+  const fs::path& file_;
+  std::size_t index_;
+};
+
+void check(const Stroke& stroke, const StrokeCheck& check, std::span<const std::string> views) {
+  const bool is_plain = std::ranges::all_of(stroke.id, [](unsigned char c) { return std::isalnum(c) != 0; });
+  check.require(is_plain && !stroke.id.empty() && stroke.id.size() <= kLongestId, "id",
+                fmt::format("expected 1 to {} letters and digits", kLongestId));
+  check.require(std::ranges::find(views, stroke.view) != views.end(), "view",
+                "no training view is called " + excerpt(nlohmann::ordered_json(stroke.view)));
+  check.require(std::ranges::find(kKinds, stroke.kind) != kKinds.end(), "kind",
+                "expected paint, exact, grey or erase, got " + excerpt(nlohmann::ordered_json(stroke.kind)));
+  check.require(ab_of_hex(stroke.color).has_value(), "color",
+                "expected a colour like #c08040, got " + excerpt(nlohmann::ordered_json(stroke.color)));
+  check.in_range(stroke.size, 0.0005f, 0.5f, "size");
+  check.in_range(stroke.softness, 0, 1, "softness");
+  check.in_range(stroke.reach, 0.1f, 4, "reach");
+  check.require(!stroke.points.empty() && stroke.points.size() <= kMostStrokePoints, "points",
+                fmt::format("expected 1 to {} points, got {}", kMostStrokePoints, stroke.points.size()));
+  for (const StrokePoint& point : stroke.points) {
+    // A brush may start beside the picture.
+    check.in_range(point[0], -1, 2, "points");
+    check.in_range(point[1], -1, 2, "points");
+    check.in_range(point[2], 0, 1, "points");
+  }
+}
+
+/// Distance of a place to a segment, and how far along it the nearest point lies.
+struct Nearest {
+  float distance, along;
+};
+Nearest nearest(float x, float y, const StrokePoint& a, const StrokePoint& b) {
+  const float dx = b[0] - a[0], dy = b[1] - a[1], squared = dx * dx + dy * dy;
+  const float along = squared > 0 ? std::clamp(((x - a[0]) * dx + (y - a[1]) * dy) / squared, 0.0f, 1.0f) : 0.0f;
+  return {std::hypot(x - a[0] - along * dx, y - a[1] - along * dy), along};
+}
+
+}  // namespace
+
+StrokeList strokes_of_json(std::string_view text, const fs::path& file, std::span<const std::string> views) {
+  if (text.size() > kLargestStrokeFile) {
+    throw InputError(file, "", fmt::format("expected at most {} bytes, got {}", kLargestStrokeFile, text.size()));
+  }
+  auto list = record_of<StrokeList>(parse_json(text, file), file);
+  if (list.strokes.size() > kMostStrokes) {
+    throw InputError(file, "strokes", fmt::format("expected at most {}, got {}", kMostStrokes, list.strokes.size()));
+  }
+  std::set<std::string> ids;
+  for (std::size_t i = 0; i < list.strokes.size(); ++i) {
+    const StrokeCheck of_stroke(file, i);
+    check(list.strokes[i], of_stroke, views);
+    of_stroke.require(ids.insert(list.strokes[i].id).second, "id", "another stroke has it: " + list.strokes[i].id);
+  }
+  return list;
+}
+
+StrokeList read_strokes(const fs::path& file, std::span<const std::string> views) {
+  return strokes_of_json(read_text_file(file), file, views);
+}
+
+void write_strokes(const fs::path& file, const StrokeList& list) {
+  write_file(file, json_of(list).dump() + "\n");
+}
+
+std::optional<Ab> ab_of_hex(const std::string& color) {
+  unsigned rgb = 0;
+  const char *begin = color.data() + 1, *end = color.data() + color.size();
+  const bool is_hex = color.size() == 7 && color[0] == '#' && std::from_chars(begin, end, rgb, 16).ptr == end;
+  if (!is_hex) return std::nullopt;
+  const auto channel = [&](int shift) { return linear_from_srgb(float((rgb >> shift) & 255u) / 255.0f); };
+  const Lab<float> lab = lab_from_linear_rgb(Vec3f{channel(16), channel(8), channel(0)});
+  return Ab{lab.a, lab.b};
+}
+
+void cover(const Stroke& stroke, int width, int height, std::span<float> coverage) {
+  CNERF_CHECK(coverage.size() == std::size_t(width) * std::size_t(height), "coverage of the picture's size");
+  const float full = stroke.size * float(std::min(width, height)) / 2;
+  std::vector<StrokePoint> at;  // in pixels
+  for (const StrokePoint& p : stroke.points) at.push_back({p[0] * float(width), p[1] * float(height), p[2]});
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const StrokePoint &a = at[i], &b = at[std::min(i + 1, at.size() - 1)];
+    if (i > 0 && i + 1 == at.size()) break;  // the last point ends the segment before it
+    const float reach = full + 1;
+    const auto low = [&](int axis, int limit) {
+      return std::clamp(int(std::floor(std::min(a[axis], b[axis]) - reach)), 0, limit);
+    };
+    const auto high = [&](int axis, int limit) {
+      return std::clamp(int(std::ceil(std::max(a[axis], b[axis]) + reach)), 0, limit);
+    };
+    for (int y = low(1, height); y < high(1, height); ++y) {
+      for (int x = low(0, width); x < high(0, width); ++x) {
+        const Nearest near = nearest(float(x) + 0.5f, float(y) + 0.5f, a, b);
+        const float radius = std::max(full * (a[2] + (b[2] - a[2]) * near.along), 0.5f);
+        const float fade = std::max(stroke.softness * radius, 1.0f);  // at least over a pixel
+        const float value = std::clamp((radius + 0.5f - near.distance) / fade, 0.0f, 1.0f);
+        float& there = coverage[std::size_t(y) * std::size_t(width) + std::size_t(x)];
+        there = std::max(there, value);
+      }
+    }
+  }
+}
+
+KnownColors painted_on(const std::string& view, std::span<const Stroke> strokes, int width, int height) {
+  const std::size_t pixels = std::size_t(width) * std::size_t(height);
+  KnownColors paint{KnownColorKind::kStrokes,
+                    view,
+                    width,
+                    height,
+                    std::vector<Ab>(pixels),
+                    std::vector<std::uint8_t>(pixels, 0),
+                    std::vector<float>(pixels, 0.0f)};
+  std::vector<float> coverage(pixels);
+  for (const Stroke& stroke : strokes) {
+    if (stroke.view != view || stroke.hidden) continue;
+    std::ranges::fill(coverage, 0.0f);
+    cover(stroke, width, height, coverage);
+    const Ab color = stroke.kind == "grey" ? Ab{} : ab_of_hex(stroke.color).value_or(Ab{});
+    for (std::size_t p = 0; p < pixels; ++p) {
+      if (coverage[p] < kCovered) continue;
+      paint.is_known[p] = stroke.kind == "erase" ? 0 : 1;
+      paint.ab[p] = paint.is_known[p] != 0 ? color : Ab{};
+      paint.reach[p] = stroke.kind == "exact" ? 0.0f : stroke.reach;
+    }
+  }
+  return paint;
+}
+
+std::vector<KnownColors> painted(std::span<const Stroke> strokes, std::span<const std::string> names,
+                                 std::span<const Intrinsics> lenses) {
+  CNERF_CHECK(names.size() == lenses.size(), "one lens per view");
+  std::vector<KnownColors> known;
+  for (std::size_t v = 0; v < names.size(); ++v) {
+    if (std::ranges::find(strokes, names[v], &Stroke::view) == strokes.end()) continue;
+    KnownColors paint = painted_on(names[v], strokes, lenses[v].width, lenses[v].height);
+    if (std::ranges::find(paint.is_known, 1) != paint.is_known.end()) known.push_back(std::move(paint));
+  }
+  return known;
+}
+
+}  // namespace cnerf

@@ -1,0 +1,89 @@
+#pragma once
+/// Strokes: what somebody painted on views, as a list that can be hidden, recoloured and made again. A stroke changes
+/// colour, never light.
+
+#include <array>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/base/json_record.h"
+#include "src/base/record.h"
+#include "src/train/chroma/known_colors.h"
+
+namespace cnerf {
+
+inline constexpr std::size_t kMostStrokes = 2000;
+inline constexpr std::size_t kMostStrokePoints = 20000;  ///< of one stroke
+inline constexpr std::size_t kLargestStrokeFile = std::size_t(4) << 20;
+
+/// A place of a stroke: x and y as shares of the picture's width and height, pressure 0..1.
+using StrokePoint = std::array<float, 3>;
+
+struct Stroke {
+  std::string id;    ///< letters and digits, its own
+  std::string view;  ///< a training view, as the capture names it
+  /// "paint": the colour runs over what is alike around it; "exact": it stays where it was painted; "grey": paint
+  /// without colour; "erase": takes away what was painted before it on the view.
+  std::string kind = "paint";
+  std::string color = "#808080";  ///< sRGB; only hue and chroma count
+  float size = 0.02f;             ///< diameter at full pressure, as a share of the picture's shorter side
+  float softness = 0;             ///< share of the radius over which it fades out
+  float reach = 1;                ///< how far the colour runs, times StrokeReach
+  bool hidden = false;
+  std::vector<StrokePoint> points = {};  ///< joined by straight lines; one is a dot
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("id", self.id);
+    v("view", self.view);
+    v("kind", self.kind);
+    v("color", self.color, kOptional);
+    v("size", self.size);
+    v("softness", self.softness, kOptional);
+    v("reach", self.reach, kOptional);
+    v("hidden", self.hidden, kOptional);
+    v("points", self.points);
+  }
+};
+
+/// Content of a stroke file.
+struct StrokeList {
+  int revision = 0;  ///< grows with every change
+  std::vector<Stroke> strokes;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("revision", self.revision, kOptional);
+    v("strokes", self.strokes);
+  }
+};
+
+/// Strokes out of JSON of any content.
+/// @param file   that errors name
+/// @param views  names that strokes may have
+/// @throws InputError  "file: strokes[3].size: …": no such list, a number out of range, an unknown view or kind
+[[nodiscard]] StrokeList strokes_of_json(std::string_view text, const std::filesystem::path& file,
+                                         std::span<const std::string> views);
+/// @throws MissingInputError, and as strokes_of_json
+[[nodiscard]] StrokeList read_strokes(const std::filesystem::path& file, std::span<const std::string> views);
+/// @throws OutputError
+void write_strokes(const std::filesystem::path& file, const StrokeList& list);
+
+/// sRGB "#c08040" -> its a and b; nothing where the text is no colour.
+[[nodiscard]] std::optional<Ab> ab_of_hex(const std::string& color);
+
+/// Where a stroke covers a picture: 0 none, 1 whole.  [H, W]
+/// @param floor  values that are there already; larger ones stay
+void cover(const Stroke& stroke, int width, int height, std::span<float> coverage);
+
+/// What is painted on each view that has anything visible, at the views' sizes.
+/// @param lenses  [names] of their pictures
+[[nodiscard]] std::vector<KnownColors> painted(std::span<const Stroke> strokes, std::span<const std::string> names,
+                                               std::span<const Intrinsics> lenses);
+
+/// The paint of one view.  @return  nothing is known where nothing is painted
+[[nodiscard]] KnownColors painted_on(const std::string& view, std::span<const Stroke> strokes, int width, int height);
+
+}  // namespace cnerf

@@ -1,0 +1,349 @@
+// The studio by its answers, as a page gets them: frames, strokes, what they reach, colouring, takes.
+
+#include "src/studio/studio.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+#include <thread>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/picture/encode.h"
+#include "src/pipeline/train_step.h"
+#include "src/sample/sample_scene.h"
+#include "src/studio/paint_files.h"
+#include "tests/support/data.h"
+
+namespace cnerf::studio {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using nlohmann::json;
+using web::PageAnswer;
+constexpr const char* kPainter = "painter123";
+const RetouchOptions kQuick = {.steps = 40, .known_pixels = 512, .kept_pixels = 512};
+
+Config tiny_config() {
+  Config config;
+  config.capture.downscale = 2;
+  config.capture.holdout = 4;
+  config.stage1.steps = 100;
+  config.stage1.samples_per_step = 4096;
+  config.stage1.steps_per_box = config.render.steps_per_box = 64;
+  config.stage1.grid = {.levels = 4, .log2_rows = 12, .coarsest_resolution = 4, .finest_resolution = 64};
+  config.stage2.grid = config.stage1.grid;
+  config.stage2.working_resolution = 32;
+  return config;
+}
+
+/// A trained run, made once.
+class TrainedRun {
+ public:
+  static const pipeline::RunContext& get() {
+    static const TrainedRun run;
+    return *run.context_;
+  }
+
+ private:
+  TrainedRun() {
+    write_sample_scene(folder_ / "capture", {.views = 8, .width = 96, .height = 72, .samples_per_pixel = 1});
+    Observer observer;
+    const Config config = tiny_config();
+    context_.emplace(pipeline::RunContext{pipeline::RunDirectory(folder_ / "run"), config,
+                                          pipeline::read_capture(folder_ / "capture", config, observer),
+                                          {"cnerf", "train"}});
+    pipeline::begin_run(*context_, folder_ / "capture", {});
+    pipeline::train_step(*context_, false, cpu_engines(), observer);
+  }
+  test::TempDir folder_;
+  std::optional<pipeline::RunContext> context_;
+};
+
+/// A studio whose worker runs beside the test.
+class StudioTest : public testing::Test {
+ protected:
+  void TearDown() override {
+    close();
+    fs::remove_all(context_.directory.root() / "strokes");
+    fs::remove_all(context_.directory.root() / "takes");
+  }
+  void open(const std::string& take = "") {
+    studio_ = std::make_unique<Studio>(context_, take, cpu_engines(), observer_, kQuick);
+    worker_ = std::thread([this] { studio_->run(); });
+    studio_->joined(kPainter);
+    (void)wait_until([](const json& state) { return state["ready"] == true && state["task"] == ""; });
+  }
+  void close() {
+    if (!studio_) return;
+    studio_->close();
+    worker_.join();
+    studio_.reset();
+  }
+
+  PageAnswer get(const std::string& path) { return studio_->answer({"GET", "/studio/" + path, {}, kPainter, {}, {}}); }
+  PageAnswer post(const std::string& path, const json& body, const std::string& client = kPainter) {
+    return studio_->answer({"POST", "/studio/" + path, {}, client, {}, body.dump()});
+  }
+  PageAnswer put(const std::vector<json>& strokes, int revision, const std::string& client = kPainter) {
+    return studio_->answer({"PUT", "/studio/strokes", {}, client, revision, json{{"strokes", strokes}}.dump()});
+  }
+  json wait_until(const std::function<bool(const json&)>& holds) {
+    std::uint64_t seen = 0;
+    for (;;) {
+      const auto news = studio_->wait_for_news(seen, 60);
+      if (!news) throw std::runtime_error("no news for a minute");
+      seen = news->first;
+      json state = json::parse(news->second);
+      if (holds(state)) return state;
+    }
+  }
+  /// Gives an order and waits for its end.
+  json ordered(const json& order) {
+    EXPECT_EQ(post("orders", order).status, 202);
+    return wait_until([](const json& state) { return state["task"] == ""; });
+  }
+  [[nodiscard]] json stroke(const std::string& id, double x, double y) const {
+    return {{"id", id}, {"view", context_.capture.views[1].name}, {"kind", "paint"}, {"color", "#c03020"},
+            {"size", 0.2}, {"points", std::vector<std::vector<double>>{{x, y, 1}}}};
+  }
+  [[nodiscard]] json frame(const std::vector<std::string>& sides) const {
+    json view = json::parse(json_of(scene_of(context_.capture, "run")).dump())["views"][1];
+    return {{"position", view["position"]}, {"rotation", view["rotation"]}, {"lens", view["lens"]}, {"sides", sides}};
+  }
+  static cv::Mat decoded(const PageAnswer& answer) {
+    return cv::imdecode(std::vector<char>(answer.body.begin(), answer.body.end()), cv::IMREAD_UNCHANGED);
+  }
+  /// Mean distance of the channels of a picture from their mean.
+  static double colorfulness(const cv::Mat& picture) {
+    double sum = 0;
+    for (int y = 0; y < picture.rows; ++y) {
+      for (int x = 0; x < picture.cols; ++x) {
+        const auto& p = picture.at<cv::Vec3b>(y, x);
+        sum += std::max({p[0], p[1], p[2]}) - std::min({p[0], p[1], p[2]});
+      }
+    }
+    return sum / double(picture.total());
+  }
+
+  const pipeline::RunContext& context_ = TrainedRun::get();
+  Observer observer_;
+  std::unique_ptr<Studio> studio_;
+  std::thread worker_;
+};
+
+TEST_F(StudioTest, FramesAreOfTheSizeThatIsAskedForOneAboveTheOther) {
+  open();
+  const PageAnswer one = post("frame", frame({"grey"}));
+  ASSERT_EQ(one.status, 200) << one.body;
+  const Intrinsics& lens = context_.capture.views[1].intrinsics;
+  EXPECT_EQ(decoded(one).size(), cv::Size(lens.width, lens.height));
+  const PageAnswer two = post("frame", frame({"grey", "now"}));
+  EXPECT_EQ(decoded(two).size(), cv::Size(lens.width, 2 * lens.height));
+  EXPECT_EQ(one.headers.at(0).first, "X-Cnerf-Colors");
+}
+
+TEST_F(StudioTest, FramesOfNoCameraAreRefusedByTheField) {
+  open();
+  const auto refused = [&](const std::function<void(json&)>& spoil) {
+    json body = frame({"grey"});
+    spoil(body);
+    const PageAnswer answer = post("frame", body);
+    EXPECT_GE(answer.status, 400);
+    return answer.body;
+  };
+  EXPECT_THAT(refused([](json& f) { f["rotation"][0][0] = 3; }), HasSubstr("rotation"));
+  EXPECT_THAT(refused([](json& f) { f["lens"]["width"] = 100000; }), HasSubstr("lens"));
+  EXPECT_THAT(refused([](json& f) { f["lens"]["fx"] = 0; }), HasSubstr("lens.fx"));
+  EXPECT_THAT(refused([](json& f) { f["position"][1] = 1e30; }), HasSubstr("position"));
+  EXPECT_THAT(refused([](json& f) { f["sides"] = json::array(); }), HasSubstr("sides"));
+  EXPECT_THAT(refused([](json& f) { f["sides"] = {"../../etc"}; }), HasSubstr("take"));
+  EXPECT_THAT(refused([](json& f) { f["sides"] = {"evening"}; }), HasSubstr("evening"));
+  EXPECT_THAT(refused([](json& f) { f.erase("lens"); }), HasSubstr("lens"));
+}
+
+TEST_F(StudioTest, StrokesAreSavedAsTheyAreMade) {
+  open();
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5), stroke("b", 0.2, 0.5)}, 1).status, 200);
+  EXPECT_EQ(put({}, 1).status, 409) << "made from an older list";
+  EXPECT_EQ(put({}, 2, "another123").status, 423);
+  EXPECT_EQ(put({{{"id", "x"}}}, 2).status, 400);
+  close();
+  open();
+  const json strokes = json::parse(get("strokes").body);
+  EXPECT_EQ(strokes["revision"], 2);
+  ASSERT_EQ(strokes["strokes"].size(), 2u);
+  EXPECT_EQ(strokes["strokes"][1]["id"], "b");
+}
+
+TEST_F(StudioTest, APenIsFreeWhenItsTabIsClosed) {
+  open();
+  studio_->joined("another123");
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  EXPECT_EQ(put({}, 1, "another123").status, 423);
+  studio_->left(kPainter);
+  EXPECT_EQ(put({}, 1, "another123").status, 200);
+}
+
+TEST_F(StudioTest, ADamagedStrokeFileIsRefusedAndKept) {
+  const fs::path file = context_.directory.root() / "strokes/strokes.json";
+  write_file(file, "{\"strokes\": [{\"id\": 3}]}");
+  EXPECT_THROW(open(), InputError);
+  EXPECT_EQ(read_text_file(file), "{\"strokes\": [{\"id\": 3}]}");
+}
+
+TEST_F(StudioTest, ReachShowsWhatStrokesWillColorInTheirViewAndOthers) {
+  open();
+  const PageAnswer nothing = get("reach/1");
+  ASSERT_EQ(nothing.status, 200) << nothing.body;
+  const auto colored = [](const PageAnswer& answer) {
+    const cv::Mat picture = decoded(answer);
+    EXPECT_EQ(picture.channels(), 4);
+    int count = 0;
+    for (int i = 0; i < int(picture.total()); ++i) count += picture.at<cv::Vec4b>(i / picture.cols, i % picture.cols)[3] > 0;
+    return count;
+  };
+  EXPECT_EQ(colored(nothing), 0);
+  const PageAnswer drawn = post("reach", json{{"view", 1}, {"strokes", {stroke("a", 0.5, 0.5)}}});
+  EXPECT_GT(colored(drawn), 20);
+  EXPECT_EQ(colored(get("reach/1")), 0) << "it is not saved";
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  EXPECT_EQ(get("reach/1").body, drawn.body);
+  EXPECT_GT(colored(get("reach/2")), 5) << "the next camera sees some of it";
+  EXPECT_EQ(get("reach/99").status, 404);
+  EXPECT_EQ(get("reach/0").status, 404) << "held out";
+}
+
+TEST_F(StudioTest, ColouringGoesToAllViewsAndIsKept) {
+  open();
+  const auto shown = [&] { return colorfulness(decoded(post("frame", frame({"now"})))); };
+  EXPECT_LT(shown(), 2) << "grey";
+  json large = stroke("a", 0.5, 0.5);
+  large["size"] = 0.5;
+  large["reach"] = 4;
+  EXPECT_EQ(put({large}, 0).status, 200);
+  const json settled = ordered({{"order", "colour"}});
+  EXPECT_EQ(settled["failed"], false) << settled;
+  EXPECT_EQ(settled["unkept"], true);
+  EXPECT_GT(settled["colors"], 1);
+  EXPECT_THAT(settled["commands"].dump(), HasSubstr("--strokes"));
+  EXPECT_GT(shown(), 10);
+  EXPECT_TRUE(fs::exists(context_.directory.root() / "strokes" ) );
+
+  const json kept = ordered({{"order", "keep"}, {"name", "red"}});
+  EXPECT_EQ(kept["unkept"], false);
+  ASSERT_EQ(kept["takes"].size(), 1u);
+  EXPECT_EQ(context_.directory.record().current_take, "red");
+  const double now = shown();
+  EXPECT_NEAR(colorfulness(decoded(post("frame", frame({"red"})))), now, 0.01) << "the take is what was seen";
+  (void)ordered({{"order", "begin"}, {"take", ""}});
+  EXPECT_LT(shown(), 2);
+  (void)ordered({{"order", "begin"}, {"take", "red"}});
+  EXPECT_NEAR(shown(), now, 0.01);
+}
+
+TEST_F(StudioTest, AJournalIsReplayedBitForBit) {
+  open();
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  (void)ordered({{"order", "colour"}});
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5), stroke("b", 0.3, 0.6)}, 1).status, 200);
+  (void)ordered({{"order", "colour"}});
+  (void)ordered({{"order", "keep"}, {"name", "red"}});
+  close();
+  const fs::path file = context_.directory.take_folder("red") / kJournalFile;
+  const std::vector<std::string> views = {context_.capture.views[1].name};
+  const Journal journal = read_journal(file, views);
+  ASSERT_EQ(journal.deeds.size(), 3u);
+  Coloring again(context_, cpu_engines());
+  again.replay(journal, kQuick, [](double) {});
+  again.keep("red-2", 0, observer_);
+  EXPECT_EQ(read_binary_file(context_.directory.take_snapshot("red")),
+            read_binary_file(context_.directory.take_snapshot("red-2")));
+}
+
+TEST_F(StudioTest, JournalsOfAnyContentAreRefusedByName) {
+  const fs::path file = context_.directory.root() / "strokes/journal.json";
+  const std::vector<std::string> views = {context_.capture.views[1].name};
+  json bad = stroke("a", 0.5, 0.5);
+  bad["size"] = 7;
+  const std::vector<json> strokes = {bad};
+  for (const json& journal : {json(3), json{{"deeds", json::array()}}, json{{"deeds", {{{"base", "../../x"}}}}},
+                              json{{"deeds", {json::object(), {{"strokes", strokes}, {"steps", 3}}}}},
+                              json{{"deeds", {json::object(), {{"steps", "many"}}}}}}) {
+    write_file(file, journal.dump());
+    EXPECT_THROW((void)read_journal(file, views), Error) << journal;
+  }
+}
+
+TEST_F(StudioTest, TakesAreDuplicatedRenamedAndDeleted) {
+  open();
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  (void)ordered({{"order", "colour"}});
+  (void)ordered({{"order", "keep"}, {"name", "red"}});
+  EXPECT_EQ(ordered({{"order", "duplicate"}, {"take", "red"}, {"name", "copy"}})["takes"].size(), 2u);
+  EXPECT_EQ(read_binary_file(context_.directory.take_snapshot("red")),
+            read_binary_file(context_.directory.take_snapshot("copy")));
+  const json renamed = ordered({{"order", "rename"}, {"take", "red"}, {"name", "evening"}});
+  EXPECT_EQ(renamed["takes"][1]["name"], "evening");
+  EXPECT_EQ(context_.directory.record().current_take, "evening");
+  EXPECT_EQ(ordered({{"order", "delete"}, {"take", "copy"}})["takes"].size(), 1u);
+  EXPECT_FALSE(fs::exists(context_.directory.take_folder("copy")));
+  for (const json& order : {json{{"order", "delete"}, {"take", "copy"}},
+                            json{{"order", "duplicate"}, {"take", "evening"}, {"name", "../x"}},
+                            json{{"order", "duplicate"}, {"take", "evening"}, {"name", "evening"}},
+                            json{{"order", "keep"}, {"name", "evening"}}, json{{"order", "begin"}, {"take", "no"}}}) {
+    EXPECT_EQ(ordered(order)["failed"], true) << order;
+  }
+  EXPECT_EQ(json::parse(get("state").body)["takes"].size(), 1u);
+}
+
+TEST_F(StudioTest, BakesAreOfferedForDownload) {
+  open();
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  (void)ordered({{"order", "colour"}});
+  const json baked = ordered({{"order", "bake"}, {"formats", {"vdb"}}});
+  EXPECT_EQ(baked["failed"], false) << baked;
+  EXPECT_EQ(baked["take"], "studio") << "what was in no take is kept";
+  ASSERT_EQ(baked["downloads"].size(), 1u) << baked;
+  EXPECT_THAT(baked["blender"].get<std::string>(), HasSubstr("blender --python"));
+  const std::string address = baked["downloads"][0]["address"];
+  const PageAnswer file = get(address.substr(std::string("./studio/").size()));
+  EXPECT_EQ(file.status, 200);
+  EXPECT_EQ(fs::file_size(file.file), baked["downloads"][0]["bytes"]);
+  EXPECT_EQ(get("files/7").status, 404);
+  const json written = ordered({{"order", "photographs"}, {"format", "png"}});
+  EXPECT_EQ(written["failed"], false) << written;
+  EXPECT_EQ(written["downloads"].size(), context_.capture.views.size());
+  EXPECT_EQ(ordered({{"order", "bake"}, {"formats", {"stl"}}})["failed"], true);
+  fs::remove_all(context_.directory.root() / "bakes");
+  fs::remove_all(context_.directory.root() / "renders");
+}
+
+TEST_F(StudioTest, PicturesOfAnyContentAreRefusedByName) {
+  open();
+  const auto sent = [&](const std::string& kind, const std::string& bytes) {
+    return studio_->answer({"POST", "/studio/pictures", {{"kind", kind}, {"name", "red.png"}}, kPainter, {}, bytes});
+  };
+  EXPECT_EQ(sent("reference", "").status, 400);
+  EXPECT_THAT(sent("reference", "GIF89a?").body, HasSubstr("red.png"));
+  EXPECT_EQ(sent("virus", "x").status, 400);
+  const std::vector<std::byte> grey = png_bytes(Picture{8, 8, std::vector<std::uint8_t>(192, 90)});
+  EXPECT_THAT(sent("reference", {reinterpret_cast<const char*>(grey.data()), grey.size()}).body, HasSubstr("grey"));
+  EXPECT_TRUE(fs::is_empty(context_.directory.root() / "strokes/references")) << "nothing was kept";
+}
+
+TEST_F(StudioTest, StoppingKeepsWhatWasLearned) {
+  open();
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  EXPECT_EQ(post("orders", {{"order", "colour"}}).status, 202);
+  (void)wait_until([](const json& state) { return state["task"] == "colour" && state["fraction"] > 0; });
+  EXPECT_EQ(post("orders", {{"order", "begin"}, {"take", ""}}).status, 409);
+  EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
+  const json stopped = wait_until([](const json& state) { return state["task"] == ""; });
+  EXPECT_EQ(stopped["unkept"], true);
+}
+
+}  // namespace
+}  // namespace cnerf::studio

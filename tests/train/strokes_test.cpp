@@ -1,0 +1,153 @@
+// Strokes: checks, rasters, and what they make known.
+
+#include "src/train/chroma/strokes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "src/base/error.h"
+#include "tests/support/data.h"
+
+namespace cnerf {
+namespace {
+
+using testing::HasSubstr;
+const std::vector<std::string> kViews = {"a.png", "b.png"};
+
+Stroke dot(const std::string& id, float x, float y, const std::string& color = "#ff0000") {
+  Stroke stroke{.id = id, .view = "a.png", .color = color, .size = 0.2f};
+  stroke.points = {{x, y, 1}};
+  return stroke;
+}
+
+std::string text_of(const Stroke& stroke) {
+  StrokeList list;
+  list.strokes = {stroke};
+  return json_of(list).dump();
+}
+
+TEST(Strokes, AreWrittenAndRead) {
+  const test::TempDir folder;
+  StrokeList list{7, {dot("k1", 0.5f, 0.25f), dot("k2", 0.1f, 0.2f)}};
+  list.strokes[1].kind = "exact";
+  list.strokes[1].hidden = true;
+  list.strokes[1].softness = 0.5f;
+  write_strokes(folder / "strokes.json", list);
+  const StrokeList read = read_strokes(folder / "strokes.json", kViews);
+  EXPECT_EQ(json_of(read).dump(), json_of(list).dump());
+  EXPECT_EQ(read.revision, 7);
+  EXPECT_TRUE(read.strokes[1].hidden);
+}
+
+TEST(Strokes, BadOnesAreRefusedByTheirField) {
+  const auto refused = [&](const std::function<void(Stroke&)>& spoil) -> std::string {
+    Stroke stroke = dot("k1", 0.5f, 0.5f);
+    spoil(stroke);
+    try {
+      (void)strokes_of_json(text_of(stroke), "strokes.json", kViews);
+    } catch (const InputError& problem) {
+      return problem.what();
+    }
+    return "taken";
+  };
+  EXPECT_EQ(refused([](Stroke&) {}), "taken");
+  EXPECT_THAT(refused([](Stroke& s) { s.view = "c.png"; }), HasSubstr("strokes[0].view"));
+  EXPECT_THAT(refused([](Stroke& s) { s.id = "../x"; }), HasSubstr("strokes[0].id"));
+  EXPECT_THAT(refused([](Stroke& s) { s.kind = "burn"; }), HasSubstr("strokes[0].kind"));
+  EXPECT_THAT(refused([](Stroke& s) { s.color = "red"; }), HasSubstr("strokes[0].color"));
+  EXPECT_THAT(refused([](Stroke& s) { s.color = "#12345g"; }), HasSubstr("strokes[0].color"));
+  EXPECT_THAT(refused([](Stroke& s) { s.size = 0.9f; }), HasSubstr("strokes[0].size"));
+  EXPECT_THAT(refused([](Stroke& s) { s.reach = 9; }), HasSubstr("strokes[0].reach"));
+  EXPECT_THAT(refused([](Stroke& s) { s.points.clear(); }), HasSubstr("strokes[0].points"));
+  EXPECT_THAT(refused([](Stroke& s) { s.points[0][0] = 5; }), HasSubstr("strokes[0].points"));
+  EXPECT_THAT(refused([](Stroke& s) { s.points.assign(kMostStrokePoints + 1, {0, 0, 1}); }), HasSubstr("points"));
+}
+
+TEST(Strokes, ListsOfAnyContentAreRefusedOrRead) {
+  for (const char* text : {"", "[]", "{}", "null", "{\"strokes\": 3}", "{\"strokes\": [{}]}", "{\"strokes\": [3]}",
+                           "{\"revision\": \"x\", \"strokes\": []}"}) {
+    EXPECT_THROW((void)strokes_of_json(text, "strokes.json", kViews), InputError) << text;
+  }
+  EXPECT_THROW((void)strokes_of_json(std::string(kLargestStrokeFile + 1, ' '), "strokes.json", kViews), InputError);
+  StrokeList twice{0, {dot("k1", 0, 0), dot("k1", 0, 0)}};
+  EXPECT_THROW((void)strokes_of_json(json_of(twice).dump(), "strokes.json", kViews), InputError);
+  EXPECT_TRUE(strokes_of_json("{\"strokes\": []}", "strokes.json", kViews).strokes.empty());
+}
+
+TEST(Strokes, ADotCoversADiscOfItsSizeAndPressure) {
+  constexpr int kSide = 100;
+  const auto area = [&](float pressure, float softness) {
+    Stroke stroke = dot("k1", 0.5f, 0.5f);
+    stroke.points[0][2] = pressure;
+    stroke.softness = softness;
+    std::vector<float> coverage(kSide * kSide);
+    cover(stroke, kSide, kSide, coverage);
+    double sum = 0;
+    for (const float value : coverage) sum += value;
+    return sum;
+  };
+  EXPECT_NEAR(area(1, 0), M_PI * 10 * 10, 4) << "a fifth of 100 pixels across";
+  EXPECT_NEAR(area(0.5f, 0), M_PI * 5 * 5, 3);
+  EXPECT_LT(area(1, 1), 0.5 * area(1, 0)) << "a cone holds a third of its cylinder";
+}
+
+TEST(Strokes, ALineCoversWhatLiesWithinItsRadius) {
+  constexpr int kWidth = 80, kHeight = 60;
+  Stroke stroke = dot("k1", 0.25f, 0.5f);
+  stroke.points.push_back({0.75f, 0.5f, 1});
+  std::vector<float> coverage(kWidth * kHeight);
+  cover(stroke, kWidth, kHeight, coverage);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double dx = std::max({20 - (x + 0.5), (x + 0.5) - 60, 0.0}), dy = y + 0.5 - 30;
+      const double distance = std::hypot(dx, dy), radius = 0.1 * kHeight;
+      const float value = coverage[std::size_t(y * kWidth + x)];
+      EXPECT_TRUE(distance > radius - 1 || value == 1) << x << ' ' << y;
+      EXPECT_TRUE(distance < radius + 1 || value == 0) << x << ' ' << y;
+    }
+  }
+}
+
+TEST(Strokes, LaterOnesLieAboveAndAnEraserTakesAwayWhatIsBelow) {
+  std::vector<Stroke> strokes = {dot("k1", 0.5f, 0.5f), dot("k2", 0.5f, 0.5f, "#0000ff")};
+  strokes[1].size = 0.1f;
+  strokes.push_back(dot("k3", 0.9f, 0.5f, "#00ff00"));
+  strokes.push_back(dot("k4", 0.9f, 0.5f));
+  strokes[3].kind = "erase";
+  const KnownColors paint = painted_on("a.png", strokes, 100, 100);
+  const auto at = [](int x, int y) { return std::size_t(y * 100 + x); };
+  EXPECT_GT(paint.ab[at(50, 50)].b, -200);
+  EXPECT_LT(paint.ab[at(50, 50)].b, -50) << "blue";
+  EXPECT_GT(paint.ab[at(58, 50)].a, 50) << "red around it";
+  EXPECT_EQ(paint.is_known[at(90, 50)], 0);
+  strokes[3].hidden = true;
+  EXPECT_EQ(painted_on("a.png", strokes, 100, 100).is_known[at(90, 50)], 1);
+}
+
+TEST(Strokes, GreyHasNoColorAndExactStaysWhereItIs) {
+  std::vector<Stroke> strokes = {dot("k1", 0.2f, 0.5f), dot("k2", 0.8f, 0.5f)};
+  strokes[0].kind = "grey";
+  strokes[1].kind = "exact";
+  const KnownColors paint = painted_on("a.png", strokes, 50, 50);
+  EXPECT_EQ(paint.ab[25 * 50 + 10].a, 0);
+  EXPECT_EQ(paint.is_known[25 * 50 + 10], 1);
+  EXPECT_EQ(paint.reach[25 * 50 + 10], 1);
+  EXPECT_EQ(paint.reach[25 * 50 + 40], 0);
+}
+
+TEST(Strokes, OnlyViewsThatArePaintedAreKnown) {
+  const Intrinsics lens{LensModel::kPinhole, 40, 30, 50, 50, 20, 15, {}};
+  std::vector<Stroke> strokes = {dot("k1", 0.5f, 0.5f)};
+  const std::vector<Intrinsics> lenses = {lens, lens};
+  ASSERT_EQ(painted(strokes, kViews, lenses).size(), 1u);
+  EXPECT_EQ(painted(strokes, kViews, lenses)[0].view, "a.png");
+  strokes[0].hidden = true;
+  EXPECT_TRUE(painted(strokes, kViews, lenses).empty());
+}
+
+}  // namespace
+}  // namespace cnerf

@@ -1,0 +1,91 @@
+/** The server, as seen from the page. */
+
+import { words } from "./words";
+import type { FrameRequest, Scene, State, Stroke } from "./protocol";
+
+/** The server says no, with its reason. */
+export class Refusal extends Error {
+  constructor(readonly status: number, reason: string) {
+    super(reason);
+  }
+}
+/** The server did not answer. */
+export class Lost extends Error {}
+
+/** Survives a reload of the page, so that it stays the writer; a second tab gets one of its own. */
+function clientId(): string {
+  const key = "cnerf-studio-client";
+  const [navigation] = performance.getEntriesByType("navigation") as PerformanceNavigationTiming[];
+  const kept = navigation?.type === "reload" ? sessionStorage.getItem(key) : null;
+  const id = kept ?? randomId(16);
+  sessionStorage.setItem(key, id);
+  return id;
+}
+
+export function randomId(length: number): string {
+  const letters = "abcdefghijklmnopqrstuvwxyz0123456789";
+  return [...crypto.getRandomValues(new Uint8Array(length))].map((byte) => letters[byte % letters.length]).join("");
+}
+
+export class Api {
+  readonly client = clientId();
+
+  async send(method: string, path: string, body?: BodyInit, headers: Record<string, string> = {}): Promise<Response> {
+    const own: Record<string, string> = method === "GET" ? {} : { "X-Cnerf": "1", "X-Cnerf-Client": this.client };
+    let answer: Response;
+    try {
+      answer = await fetch(`./studio/${path}`, { method, body, headers: { ...own, ...headers }, cache: method === "GET" ? "default" : "no-store" });
+    } catch {
+      throw new Lost(words.lostForGood);
+    }
+    if (answer.ok) return answer;
+    const reason = (await answer.text().catch(() => "")).trim();
+    throw new Refusal(answer.status, reason && reason.length < 500 ? reason : `${answer.status} ${answer.statusText}`);
+  }
+
+  private post(path: string, value: unknown): Promise<Response> {
+    return this.send("POST", path, JSON.stringify(value), { "Content-Type": "application/json" });
+  }
+
+  async scene(): Promise<Scene> {
+    return (await this.send("GET", "scene")).json();
+  }
+  async state(): Promise<State> {
+    return (await this.send("GET", "state")).json();
+  }
+  async order(order: Record<string, unknown>): Promise<State | undefined> {
+    const answer = (await (await this.post("orders", order)).json().catch(() => ({}))) as State & { state?: State };
+    return answer.state ?? (answer.version ? answer : undefined);
+  }
+  /** null: a newer frame was asked for meanwhile. */
+  async frame(request: FrameRequest): Promise<{ picture: ImageBitmap; colors: number } | null> {
+    const answer = await this.post("frame", request);
+    if (answer.status === 204) return null;
+    const picture = await createImageBitmap(await answer.blob());
+    return { picture, colors: Number(answer.headers.get("X-Cnerf-Colors") ?? -1) };
+  }
+
+  async strokes(): Promise<{ revision: number; strokes: Stroke[] }> {
+    return (await this.send("GET", "strokes", undefined, { "Cache-Control": "no-cache" })).json();
+  }
+  async putStrokes(strokes: readonly Stroke[], revision: number): Promise<number> {
+    const headers = { "Content-Type": "application/json", "X-Cnerf-Revision": String(revision) };
+    return (await (await this.send("PUT", "strokes", JSON.stringify({ strokes }), headers)).json()).revision;
+  }
+  async reach(view: number, strokes: readonly Stroke[], revision: number): Promise<Blob> {
+    return (await (strokes.length > 0 ? this.post("reach", { view, strokes }) : this.send("GET", `reach/${view}?revision=${revision}`))).blob();
+  }
+  async picture(query: Record<string, string>, file: Blob): Promise<void> {
+    await this.send("POST", `pictures?${new URLSearchParams(query)}`, file, { "Content-Type": file.type || "application/octet-stream" });
+  }
+  /** Opens the stream of states. `lost` is called where it breaks; it connects again by itself. */
+  listen(heard: (state: State) => void, lost: () => void): void {
+    // A stream cannot carry headers: the client's name goes into its address.
+    const events = new EventSource(`./studio/events?client=${this.client}`);
+    events.onmessage = (event) => heard(JSON.parse(event.data as string) as State);
+    events.onerror = () => {
+      lost();
+      if (events.readyState === EventSource.CLOSED) setTimeout(() => this.listen(heard, lost), 2000);
+    };
+  }
+}

@@ -1,0 +1,199 @@
+/** The strokes as a document: undo and redo over every change, saved as it is made, merged where another tab was faster. */
+
+import { Lost, Refusal } from "./api";
+import type { Stroke } from "./protocol";
+
+export type StrokeList = readonly Stroke[];
+
+/**
+ * What `mine` changed since `base`, done to `theirs`: strokes are told apart by id. Where `theirs` is `base` this is
+ * `mine`, order and all.
+ */
+export function merged(base: StrokeList, mine: StrokeList, theirs: StrokeList): StrokeList {
+  if (theirs === base) return mine;
+  const before = new Map(base.map((s) => [s.id, s]));
+  const wanted = new Map(mine.map((s) => [s.id, s]));
+  const there = new Set(theirs.map((s) => s.id));
+  const same = (a: Stroke, b: Stroke) => a === b || JSON.stringify(a) === JSON.stringify(b);
+  const kept = theirs
+    .filter((s) => wanted.has(s.id) || !before.has(s.id))
+    .map((s) => {
+      const ours = wanted.get(s.id);
+      const old = before.get(s.id);
+      return ours && !(old && same(ours, old)) ? ours : s;
+    });
+  return [...kept, ...mine.filter((s) => !before.has(s.id) && !there.has(s.id))];
+}
+
+/** What strokes are saved to. */
+export interface StrokeStore {
+  strokes(): Promise<{ revision: number; strokes: Stroke[] }>;
+  /** @return the new revision */
+  putStrokes(strokes: StrokeList, revision: number): Promise<number>;
+}
+/** What keeps strokes that the server does not have: the browser's own store. */
+export type Shelf = Pick<Storage, "getItem" | "setItem" | "removeItem">;
+
+interface Kept {
+  base: StrokeList;
+  list: StrokeList;
+}
+
+export class StrokeDocument {
+  list: StrokeList = [];
+  /** The list that the server has. */
+  saved: StrokeList = this.list;
+  revision = 0;
+  /** The page tells: strokes of another tab came in; something could not be saved; unsent strokes were put back. */
+  told: (what: "merged" | "unsent" | "lost" | Refusal) => void = () => {};
+  private undone: [StrokeList, StrokeList][] = [];
+  private done: [StrokeList, StrokeList][] = [];
+  private changed = new Set<() => void>();
+  private busy: Promise<void> | null = null;
+
+  constructor(private readonly store: StrokeStore, private readonly shelf: Shelf, private readonly shelfKey: string) {}
+
+  onChange(callback: () => void): void {
+    this.changed.add(callback);
+  }
+  private tell(): void {
+    for (const callback of this.changed) callback();
+  }
+  get canUndo(): boolean {
+    return this.done.length > 0;
+  }
+  get canRedo(): boolean {
+    return this.undone.length > 0;
+  }
+  get isSaved(): boolean {
+    return this.list === this.saved;
+  }
+  /** Strokes the server does not have in this form. */
+  get unsaved(): Stroke[] {
+    const there = new Set(this.saved);
+    return this.isSaved ? [] : this.list.filter((s) => !there.has(s));
+  }
+  of(view: string): Stroke[] {
+    return this.list.filter((s) => s.view === view);
+  }
+
+  /** A change by the user: can be undone, and is saved. */
+  change(next: StrokeList): void {
+    if (next === this.list) return;
+    this.done.push([this.list, next]);
+    if (this.done.length > 500) this.done.shift();
+    this.undone = [];
+    this.put(next);
+  }
+  add(stroke: Stroke): void {
+    this.change([...this.list, stroke]);
+  }
+  edit(id: string, changes: Partial<Stroke>): void {
+    this.change(this.list.map((s) => (s.id === id ? { ...s, ...changes } : s)));
+  }
+  remove(id: string): void {
+    this.change(this.list.filter((s) => s.id !== id));
+  }
+  undo(): void {
+    const step = this.done.pop();
+    if (!step) return;
+    this.undone.push(step);
+    this.put(merged(step[1], step[0], this.list));
+  }
+  redo(): void {
+    const step = this.undone.pop();
+    if (!step) return;
+    this.done.push(step);
+    this.put(merged(step[0], step[1], this.list));
+  }
+  private put(next: StrokeList): void {
+    this.list = next;
+    this.keep();
+    this.tell();
+    void this.save();
+  }
+
+  /** Gets the server's list, and puts back what it never got. Also after the server was away. */
+  async load(): Promise<void> {
+    await this.busy;
+    const answer = await this.store.strokes();
+    const kept = this.taken();
+    // A page that has unsaved strokes itself knows them better than the shelf does.
+    const { base, list } = this.isSaved && kept ? kept : { base: this.saved, list: this.list };
+    const unsent = list !== base;
+    this.revision = answer.revision;
+    this.saved = answer.strokes;
+    this.list = unsent ? merged(base, list, answer.strokes) : answer.strokes;
+    this.keep();
+    this.tell();
+    if (!unsent) return;
+    this.told("unsent");
+    await this.save();
+  }
+  /** Another tab wrote: its list is taken, with what is unsaved here on top. */
+  async follow(revision: number): Promise<void> {
+    await this.busy;
+    if (revision <= this.revision) return;
+    await this.fetched();
+    if (!this.isSaved) await this.save();
+  }
+  private async fetched(): Promise<void> {
+    const answer = await this.store.strokes();
+    const unsaved = !this.isSaved;
+    this.list = unsaved ? merged(this.saved, this.list, answer.strokes) : answer.strokes;
+    this.saved = answer.strokes;
+    this.revision = answer.revision;
+    this.tell();
+    if (unsaved) this.told("merged");
+  }
+
+  /** Saves until everything is; one request at a time. */
+  save(): Promise<void> {
+    return (this.busy ??= this.saveAll().finally(() => (this.busy = null)));
+  }
+  private async saveAll(): Promise<void> {
+    try {
+      while (!this.isSaved) await this.saveOnce(this.list);
+    } catch (problem) {
+      if (problem instanceof Refusal && problem.status < 500) await this.refused(problem);
+      else if (problem instanceof Lost || problem instanceof Refusal) this.told("lost");
+      else throw problem;
+    }
+    this.keep();
+  }
+  private async saveOnce(list: StrokeList): Promise<void> {
+    try {
+      this.revision = await this.store.putStrokes(list, this.revision);
+      this.saved = list;
+      this.tell();
+    } catch (problem) {
+      if (!(problem instanceof Refusal && problem.status === 409)) throw problem;
+      await this.fetched();
+    }
+  }
+  /** What the server will never take is not asked again and again: its own list stands. */
+  private async refused(problem: Refusal): Promise<void> {
+    this.told(problem);
+    this.done = [];
+    this.undone = [];
+    this.saved = this.list;
+    await this.fetched().catch(() => this.told("lost"));
+  }
+
+  private keep(): void {
+    try {
+      if (this.isSaved) this.shelf.removeItem(this.shelfKey);
+      else this.shelf.setItem(this.shelfKey, JSON.stringify({ base: this.saved, list: this.list } satisfies Kept));
+    } catch {
+      // A full or forbidden store: the strokes are still in the page.
+    }
+  }
+  private taken(): Kept | null {
+    try {
+      const kept = JSON.parse(this.shelf.getItem(this.shelfKey) ?? "null") as Kept | null;
+      return kept && Array.isArray(kept.base) && Array.isArray(kept.list) ? kept : null;
+    } catch {
+      return null;
+    }
+  }
+}

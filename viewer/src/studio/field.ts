@@ -1,0 +1,202 @@
+/** The scene, drawn by the server from the field: a camera that is driven, frames that follow it, a wipe of two sides. */
+
+import { axes, fitted, framed, type View } from "../camera";
+import { Input } from "../input";
+import { add, type Vec3 } from "../math";
+import { Navigator } from "../navigator";
+import { el } from "../ui/dom";
+import { FrameScheduler } from "./scheduler";
+import type { Session } from "./session";
+import { words } from "./words";
+
+type Frame = { picture: ImageBitmap; colors: number; sides: string[] };
+const largest = 4096;
+
+export class FieldView extends Navigator {
+  readonly canvas = el("canvas", { id: "field", tabindex: "0", "aria-label": words.stage, role: "img" });
+  readonly node: HTMLElement;
+  readonly home: View;
+  readonly up: Vec3;
+  fly = false;
+  /** Share of the picture, from the left, that shows the left side. */
+  wipe = 0;
+  left = "grey";
+  right = "now";
+  private readonly scheduler: FrameScheduler<{ view: View; sides: string[] }, Frame>;
+  private readonly handle: HTMLElement;
+  private readonly labels: [HTMLElement, HTMLElement];
+  private frameShown: Frame | null = null;
+  private colorsShown = -1;
+  private input: Input | null = null;
+  private listeners = new Set<() => void>();
+  hidden = false;
+
+  constructor(private readonly session: Session) {
+    super();
+    this.labels = [el("span", { class: "side left" }), el("span", { class: "side right" })];
+    this.handle = this.wipeHandle();
+    this.node = el("div", { class: "field" }, this.canvas, this.handle);
+    this.up = axes[session.scene.up] ?? axes["+y"];
+    this.scheduler = new FrameScheduler({
+      fetch: (wish) => this.ask(wish.camera, wish.share),
+      show: (frame) => this.show(frame),
+      failed: (problem) => session.explain(problem),
+      now: () => performance.now(),
+      later: (callback, milliseconds) => void setTimeout(callback, milliseconds),
+    });
+    const { position, rotation, lens } = this.cameras[session.scene.home] ?? this.cameras[0];
+    this.home = this.view = { position, rotation, lens };
+    this.target = this.pivot(this.view);
+    this.captureCamera = session.scene.home;
+    this.showWipe();
+  }
+  get cameras(): readonly View[] {
+    return this.session.scene.views;
+  }
+  get centre(): Vec3 {
+    return this.session.scene.centre;
+  }
+  get reach(): number {
+    return this.session.scene.radius;
+  }
+  get settled(): boolean {
+    return this.scheduler.settled;
+  }
+  /** Colours of the frame that is shown. */
+  get colors(): number {
+    return this.frameShown?.colors ?? -1;
+  }
+
+  /** Starts frames and keys. */
+  begin(actions: Record<string, () => void>, active: () => boolean): void {
+    this.input = new Input(this, this.canvas, actions, active);
+    const step = (now: number) => {
+      requestAnimationFrame(step);
+      this.input!.step(now);
+      this.animate(now);
+    };
+    requestAnimationFrame(step);
+    new ResizeObserver(() => this.layout()).observe(this.node);
+    this.session.onState((state) => {
+      const names = new Set(["grey", "now", ...state.takes.map((take) => take.name)]);
+      if (!names.has(this.left) || !names.has(this.right)) this.compare(names.has(this.left) ? this.left : "grey", names.has(this.right) ? this.right : "now");
+      if (state.colors === this.colorsShown) return;
+      this.colorsShown = state.colors;
+      this.refresh();
+    });
+  }
+  /** Calls back when the camera or the sides changed. */
+  onChange(callback: () => void): void {
+    this.listeners.add(callback);
+  }
+  protected moved(): void {
+    if (!this.hidden) this.scheduler.look({ view: this.view, sides: this.sides });
+    for (const callback of this.listeners) callback();
+  }
+  /** The same camera anew: sides, colours or the canvas changed. */
+  refresh(): void {
+    if (!this.hidden && this.canvas.width > 16) this.scheduler.refresh({ view: this.view, sides: this.sides });
+    for (const callback of this.listeners) callback();
+  }
+  reset(): void {
+    this.moveTo(this.home, this.pivot(this.home), this.session.scene.home);
+  }
+  frame(): void {
+    const { centre, reach } = this;
+    const size: Vec3 = [0.6 * reach, 0.6 * reach, 0.6 * reach];
+    const lens = { ...this.view.lens, cx: this.view.lens.width / 2, cy: this.view.lens.height / 2 };
+    this.moveTo(framed({ ...this.view, lens }, add(centre, size.map((v) => -v) as Vec3), add(centre, size), this.up), centre);
+  }
+
+  /** Only what is seen is asked for: a parked wipe needs one side. */
+  private get sides(): string[] {
+    if (this.wipe < 0.004 || this.left === this.right) return [this.right];
+    return this.wipe > 0.996 ? [this.left] : [this.left, this.right];
+  }
+  private async ask({ view, sides }: { view: View; sides: string[] }, share: number): Promise<Frame | null> {
+    const scale = share * Math.min(1, largest / Math.max(this.canvas.width, this.canvas.height));
+    const width = Math.max(16, Math.round(this.canvas.width * scale));
+    const height = Math.max(16, Math.round(this.canvas.height * scale));
+    const frame = await this.session.api.frame({ position: view.position, rotation: view.rotation, lens: fitted(view.lens, width, height), sides });
+    return frame && { ...frame, sides };
+  }
+  private show(frame: Frame): void {
+    this.frameShown?.picture.close();
+    this.frameShown = frame;
+    document.body.classList.remove("loading");
+    document.body.dataset.ready = "yes";
+    this.draw();
+  }
+  private draw(): void {
+    const frame = this.frameShown;
+    if (!frame) return;
+    const { width, height } = this.canvas;
+    const context = this.canvas.getContext("2d")!;
+    const { picture, sides } = frame;
+    const part = picture.height / sides.length;
+    const cut = sides.length === 2 ? Math.round(width * this.wipe) : 0;
+    context.imageSmoothingQuality = "high";
+    const put = (row: number, from: number, to: number) => {
+      if (to <= from) return;
+      const scale = picture.width / width;
+      context.drawImage(picture, from * scale, row * part, (to - from) * scale, part, from, 0, to - from, height);
+    };
+    if (sides.length === 2) put(0, 0, cut);
+    put(sides.length - 1, cut, width);
+  }
+  private layout(): void {
+    const ratio = Math.min(devicePixelRatio || 1, 2);
+    const width = Math.max(16, Math.round(this.node.clientWidth * ratio));
+    const height = Math.max(16, Math.round(this.node.clientHeight * ratio));
+    if (width === this.canvas.width && height === this.canvas.height) return;
+    this.canvas.width = width;
+    this.canvas.height = height;
+    this.draw();
+    this.refresh();
+  }
+
+  compare(left: string, right: string): void {
+    this.left = left;
+    this.right = right;
+    this.showWipe();
+    this.refresh();
+  }
+  setWipe(share: number): void {
+    const before = this.sides.join();
+    this.wipe = Math.min(1, Math.max(0, share));
+    this.showWipe();
+    if (this.sides.join() === before) return this.draw();
+    this.refresh();
+  }
+  private showWipe(): void {
+    const name = (side: string) => (side === "grey" ? words.grey : side === "now" ? words.now : side);
+    this.labels[0].textContent = name(this.left);
+    this.labels[1].textContent = name(this.right);
+    this.handle.style.left = `${100 * this.wipe}%`;
+    this.handle.setAttribute("aria-valuenow", String(Math.round(100 * this.wipe)));
+    this.handle.setAttribute("aria-label", words.wipe(name(this.left), name(this.right)));
+    this.handle.classList.toggle("parked", this.wipe < 0.004 || this.wipe > 0.996);
+    this.handle.hidden = this.left === this.right;
+  }
+  private wipeHandle(): HTMLElement {
+    const handle = el("div", { class: "wipe", id: "wipe-handle", role: "slider", "aria-valuemin": "0", "aria-valuemax": "100", tabindex: "0" },
+      this.labels[0], el("span", { class: "grip" }), this.labels[1]);
+    handle.addEventListener("pointerdown", (e) => {
+      handle.setPointerCapture(e.pointerId);
+      const move = (m: PointerEvent) => {
+        const box = this.node.getBoundingClientRect();
+        this.setWipe((m.clientX - box.left) / box.width);
+      };
+      handle.addEventListener("pointermove", move);
+      handle.addEventListener("pointerup", () => handle.removeEventListener("pointermove", move), { once: true });
+    });
+    handle.addEventListener("keydown", (e) => {
+      const step = e.key === "ArrowRight" ? 0.02 : e.key === "ArrowLeft" ? -0.02 : 0;
+      if (!step) return;
+      e.preventDefault();
+      e.stopPropagation();
+      this.setWipe(this.wipe + step);
+    });
+    return handle;
+  }
+}

@@ -1,0 +1,225 @@
+/** The panel's sections beside the palette: strokes, takes, ideas, finish, commands. */
+
+import { button, copyText, el, icon, section, segments, slider } from "../ui/dom";
+import type { FieldView } from "./field";
+import type { Finish, Stroke, Take } from "./protocol";
+import { Latest } from "./reach";
+import type { Session } from "./session";
+import { words } from "./words";
+
+/** Asks for a name, or (without a value) for a yes. */
+export function ask(question: string, value?: string): Promise<string | null> {
+  const input = el("input", { type: "text", class: "hex", value: value ?? "", maxlength: 60, "aria-label": question, hidden: value === undefined });
+  const dialog = el("dialog", { class: "card" }, el("form", { method: "dialog" }, el("h1", {}, question), input,
+    el("div", { class: "buttons" }, el("button", { class: "button primary", value: "yes" }, value === undefined ? words.leave : words.ok), el("button", { class: "button", value: "", type: "submit", formnovalidate: true }, words.cancel))));
+  document.body.append(dialog);
+  dialog.showModal();
+  input.select();
+  return new Promise((done) => dialog.addEventListener("close", () => {
+    dialog.remove();
+    const text = value === undefined ? "yes" : input.value.trim();
+    done(dialog.returnValue === "yes" && text ? text : null);
+  }));
+}
+
+function small(name: string, title: string, onclick: () => void): HTMLButtonElement {
+  return el("button", { type: "button", class: "small", title, "aria-label": title, onclick }, icon(name));
+}
+
+/** A list whose rows are made anew only where their text changed, so that the keyboard's focus stays. */
+function keyed<T>(list: HTMLElement, items: readonly T[], keyOf: (item: T) => string, make: (item: T) => HTMLElement): void {
+  const there = new Map([...list.children].map((node) => [(node as HTMLElement).dataset.key!, node]));
+  list.replaceChildren(...items.map((item) => {
+    const key = keyOf(item);
+    const node = there.get(key) ?? make(item);
+    (node as HTMLElement).dataset.key = key;
+    return node;
+  }));
+}
+
+export function strokesPanel(session: Session): HTMLElement {
+  const { strokes } = session;
+  let all = false;
+  const list = el("ul", { class: "rows", id: "strokes" });
+  const none = el("p", { class: "note" }, words.noStrokes);
+  const which = segments<"view" | "all">("strokes-of", [["view", words.ofThisView], ["all", words.ofAllViews]], "view", (value) => {
+    all = value === "all";
+    update();
+  });
+  const file = el("input", { type: "file", accept: "image/png", hidden: true });
+  file.addEventListener("change", () => (file.files?.[0] && void session.send({ kind: "stroke", view: String(session.photo) }, file.files[0]), (file.value = "")));
+  const paintedPicture = button(words.paintedPicture, () => file.click());
+  const row = (stroke: Stroke) => {
+    const kind = stroke.kind === "paint" && stroke.points.length === 1 ? words.dot : words.kinds[stroke.kind];
+    const name = el("button", { type: "button", class: "name-button", "aria-label": words.selected(kind), onclick: () => ((session.selected = stroke.id), update()) }, el("span", { class: `dot ${stroke.kind}` }), el("span", {}, kind), el("small", {}, all ? stroke.view.replace(/^.*\//, "") : ""));
+    (name.firstChild as HTMLElement).style.setProperty("--color", stroke.color);
+    const hide = small(stroke.hidden ? "hidden" : "shown", stroke.hidden ? words.show : words.hide, () => strokes.edit(stroke.id, { hidden: !stroke.hidden }));
+    const recolour = small("drop", words.recolour, () => strokes.edit(stroke.id, { color: session.brush.settings.color }));
+    recolour.hidden = stroke.kind !== "paint" && stroke.kind !== "exact";
+    return el("li", { class: stroke.hidden ? "off" : "" }, name, hide, recolour, small("close", words.remove, () => strokes.remove(stroke.id)));
+  };
+  const update = () => {
+    const shown = all || !session.view ? strokes.list : strokes.of(session.view.name);
+    keyed(list, [...shown].reverse(), (s) => `${s.id} ${s.color} ${s.hidden} ${all}`, row);
+    for (const node of list.children) (node as HTMLElement).setAttribute("aria-current", String((node as HTMLElement).dataset.key!.startsWith(`${session.selected} `)));
+    none.hidden = shown.length > 0;
+    paintedPicture.hidden = !session.view;
+    node.classList.toggle("read-only", session.isReadOnly);
+  };
+  const node = section(words.strokes, true, which.node, list, none, el("div", { class: "buttons" }, paintedPicture), file);
+  strokes.onChange(update);
+  session.onState(update);
+  update();
+  return Object.assign(node, { refresh: update });
+}
+
+export class TakesPanel {
+  private list = el("ul", { class: "rows", id: "takes" });
+  private sides = ["left", "right"].map((side) => el("select", { id: `side-${side}`, "aria-label": side === "left" ? words.left : words.right }));
+  private keepButton = button(words.keep, () => void this.keep(), { id: "keep" });
+  readonly node: HTMLElement;
+
+  constructor(private readonly session: Session, private readonly field: FieldView) {
+    this.sides.forEach((select, i) => select.addEventListener("change", () => {
+      field.compare(this.sides[0].value, this.sides[1].value);
+      if (i === 0 || field.wipe < 0.02) field.setWipe(0.5);
+    }));
+    this.node = section(words.takes, true, this.list, el("div", { class: "buttons" }, this.keepButton),
+      el("div", { class: "row" }, ...this.sides.flatMap((select, i) => (i ? [el("span", { class: "name" }, "|"), select] : [select]))));
+    session.onState(() => this.update());
+    field.onChange(() => this.showSides());
+    this.update();
+  }
+  private update(): void {
+    const { state, isReadOnly } = this.session;
+    const grey: Take = { name: "", colorizer: "", seconds: 0 };
+    keyed(this.list, [grey, ...state.takes], (take) => `${take.name} ${take.colorizer} ${take.name === state.take} ${state.unkept}`, (take) => this.row(take));
+    const choices = ["grey", "now", ...state.takes.map((take) => take.name)];
+    for (const select of this.sides) {
+      if (select.dataset.choices === choices.join("\n")) continue;
+      select.dataset.choices = choices.join("\n");
+      select.replaceChildren(...choices.map((name) => el("option", { value: name }, name === "grey" ? words.grey : name === "now" ? words.now : name)));
+    }
+    this.showSides();
+    this.keepButton.disabled = !state.unkept || isReadOnly || state.task !== "";
+    this.node.classList.toggle("read-only", isReadOnly);
+  }
+  private showSides(): void {
+    this.sides[0].value = this.field.left;
+    this.sides[1].value = this.field.right;
+  }
+  private row({ name, colorizer }: Take): HTMLElement {
+    const { state } = this.session;
+    const isNow = name === state.take;
+    const begin = el("button", { type: "button", class: "name-button", title: words.begin, onclick: () => void this.begin(name) },
+      el("span", {}, name || words.grey), el("small", {}, isNow && state.unkept ? words.unkept : name ? colorizer : ""));
+    const row = el("li", { "aria-current": String(isNow), "data-take": name }, begin);
+    if (name) {
+      row.append(
+        small("compare", words.compare, () => (this.field.compare(name, "now"), this.field.setWipe(0.5))),
+        small("pencil", words.rename, () => void this.named("rename", words.renameTo, name)),
+        small("copy", words.duplicate, () => void this.named("duplicate", words.duplicateTo, name)),
+        small("close", words.remove, () => void this.remove(name)));
+    }
+    return row;
+  }
+  async keep(): Promise<void> {
+    const name = await this.askName(words.keepName, this.freeName(this.session.state.take || "take"));
+    if (name) await this.session.order({ order: "keep", name });
+  }
+  private freeName(name: string): string {
+    const taken = new Set(this.session.state.takes.map((take) => take.name));
+    let number = 2;
+    if (!taken.has(name)) return name;
+    while (taken.has(`${name}-${number}`)) number += 1;
+    return `${name}-${number}`;
+  }
+  private async askName(question: string, value: string): Promise<string | null> {
+    const name = await ask(question, value);
+    if (name !== "grey" && name !== "now") return name;
+    return this.askName(words.reserved(name), value);
+  }
+  private async named(order: "rename" | "duplicate", question: string, take: string): Promise<void> {
+    const name = await this.askName(question, order === "rename" ? take : this.freeName(take));
+    if (name && name !== take) await this.session.order({ order, take, name });
+  }
+  private async begin(take: string): Promise<void> {
+    if (!this.session.state.unkept || (await ask(words.loseNow))) await this.session.order({ order: "begin", take });
+  }
+  private async remove(take: string): Promise<void> {
+    if (await ask(words.removeTake(take))) await this.session.order({ order: "delete", take });
+  }
+}
+
+export function ideasPanel(session: Session, reference: (file: File) => void): HTMLElement {
+  const cards = el("div", { class: "cards", id: "cards" });
+  const file = el("input", { type: "file", accept: "image/png,image/jpeg,image/tiff,image/webp", hidden: true });
+  file.addEventListener("change", () => (file.files?.[0] && reference(file.files[0]), (file.value = "")));
+  const choose = async (number: number, address: string) => {
+    const answer = await fetch(address).catch(() => null);
+    if (!answer?.ok) return;
+    reference(new File([await answer.blob()], `suggestion-${number}.jpg`, { type: "image/jpeg" }));
+  };
+  const node = section(words.ideas, false,
+    el("div", { class: "buttons" }, button(words.suggest, () => void session.order({ order: "suggest" }), { id: "suggest" }), button(words.reference, () => file.click())),
+    el("p", { class: "note" }, `${words.suggestNote} ${words.referenceNote}`), cards, file);
+  session.onState((state) => {
+    keyed(cards, state.cards ?? [], (card) => `${card.number} ${card.address}`, ({ number, address }) =>
+      el("button", { type: "button", class: "idea", "aria-label": words.card(number), onclick: () => void choose(number, address) }, el("img", { src: address, alt: "" })));
+    node.classList.toggle("read-only", session.isReadOnly);
+  });
+  return node;
+}
+
+export function finishPanel(session: Session): HTMLElement {
+  const latest = new Latest();
+  let values: Finish = { saturation: 1, hue: 0, exposure: 0, ...session.state.finish };
+  const put = (partial: Partial<Finish>) => {
+    values = { ...values, ...partial };
+    void latest.run(async () => void (await session.order({ order: "finish", ...values })));
+  };
+  const signed = (v: number) => `${v >= 0 ? "+" : ""}${v.toFixed(2)} EV`;
+  const sliders = [
+    slider({ id: "saturation", label: words.saturation, min: 0, max: 2, step: 0.01, value: values.saturation, reset: 1, change: (v) => put({ saturation: v }) }),
+    slider({ id: "hue", label: words.hue, min: -180, max: 180, step: 1, value: values.hue, reset: 0, show: (v) => `${v.toFixed(0)}°`, change: (v) => put({ hue: v }) }),
+    slider({ id: "exposure", label: words.exposure, min: -3, max: 3, step: 0.05, value: values.exposure, reset: 0, show: signed, change: (v) => put({ exposure: v }) }),
+  ];
+  const formats = Object.entries(words.formats).map(([value, label], i) => {
+    const input = el("input", { type: "checkbox", value, checked: i < 2 });
+    return { input, node: el("label", { class: "check" }, input, label) };
+  });
+  const photographs = el("select", { "aria-label": words.photographs }, ...Object.entries(words.photographFormats).map(([value, label]) => el("option", { value }, label)));
+  const bake = button(words.bake, () => void session.order({ order: "bake", formats: formats.filter((f) => f.input.checked).map((f) => f.input.value) }), { id: "bake" });
+  const write = button(words.photographs, () => void session.order({ order: "photographs", format: photographs.value }), { id: "photographs" });
+  const downloads = el("ul", { class: "rows", id: "downloads" });
+  const blender = el("div", { class: "commands" });
+  const node = section(words.finish, false, ...(session.state.finish ? sliders.map((s) => s.node) : []), el("div", { class: "buttons checks" }, ...formats.map((f) => f.node), bake), el("div", { class: "row" }, photographs, write), downloads, blender);
+  session.onState((state) => {
+    keyed(downloads, state.downloads, (d) => `${d.address} ${d.bytes}`, (d) => el("li", {}, el("a", { class: "name-button", href: d.address, download: d.name }, el("span", {}, d.name), el("small", {}, `${(d.bytes / 2 ** 20).toFixed(1)} MiB`))));
+    showLines(blender, state.blender ? [state.blender] : [], words.blender);
+    bake.disabled = write.disabled = session.isBusy;
+    node.classList.toggle("read-only", session.isReadOnly);
+    const { finish } = state;
+    // Another tab's sliders are followed.
+    if (!finish || !session.isReadOnly) return;
+    [finish.saturation, finish.hue, finish.exposure].forEach((value, i) => sliders[i].set(value));
+  });
+  return node;
+}
+
+function showLines(box: HTMLElement, lines: string[], title: string): void {
+  box.hidden = lines.length === 0;
+  keyed(box, lines.length ? [title, ...lines] : [], (line) => line, (line) =>
+    line === title ? el("span", { class: "name" }, title) : el("div", { class: "command" }, el("code", {}, line), small("copy", words.copy, () => void copyText(line, words.copyLine))));
+}
+
+export function commandsPanel(session: Session): HTMLElement {
+  const box = el("div", { class: "commands", id: "commands" });
+  const node = section(words.repeat, false, box);
+  session.onState((state) => {
+    // A line that comes twice is shown once.
+    showLines(box, [...new Set(state.commands)], words.repeatNote);
+    node.hidden = state.commands.length === 0;
+  });
+  return node;
+}

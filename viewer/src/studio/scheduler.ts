@@ -1,0 +1,118 @@
+/** Which frame to ask for next: coarse ones while the camera moves, finer ones at rest, one in flight and one waiting. */
+
+export interface FrameWish<Camera> {
+  camera: Camera;
+  /** Share of the canvas's pixels across. */
+  share: number;
+}
+
+export interface FrameHost<Camera, Frame> {
+  /** null: the server had a newer wish. */
+  fetch(wish: FrameWish<Camera>): Promise<Frame | null>;
+  show(frame: Frame, wish: FrameWish<Camera>): void;
+  failed(problem: unknown): void;
+  now(): number;
+  later(callback: () => void, milliseconds: number): void;
+}
+
+interface Sent {
+  version: number;
+  share: number;
+}
+
+/** A frame while moving should take about this long, milliseconds. */
+const wanted = 100;
+const restAfter = 140;
+const coarsest = 1 / 12;
+
+export class FrameScheduler<Camera, Frame> {
+  /** Share of the canvas's pixels across, while moving. */
+  coarse = 1 / 6;
+  private camera: Camera | null = null;
+  private version = 0;
+  private shown: Sent = { version: 0, share: 0 };
+  private movedAt = -Infinity;
+  private inFlight = new Set<Sent>();
+  /** Shares of the wanted version that were answered, or are on their way. */
+  private asked = 0;
+  private paused = false;
+
+  constructor(private readonly host: FrameHost<Camera, Frame>) {}
+
+  /** The camera moved. */
+  look(camera: Camera): void {
+    this.camera = camera;
+    this.movedAt = this.host.now();
+    this.renew();
+    this.host.later(() => this.next(), restAfter + 1);
+  }
+  /** Colours or sides changed, the camera did not. */
+  refresh(camera: Camera | null = this.camera): void {
+    if (camera === null) return;
+    this.camera = camera;
+    this.paused = false;
+    this.renew();
+  }
+  private renew(): void {
+    this.version += 1;
+    this.asked = 0;
+    this.next();
+  }
+  /** Whether the frame that is shown is the final one. */
+  get settled(): boolean {
+    return this.shown.version === this.version && this.shown.share === 1;
+  }
+
+  private get moving(): boolean {
+    return this.host.now() - this.movedAt < restAfter;
+  }
+  private share(): number {
+    if (this.moving) return this.asked === 0 ? this.coarse : 0;
+    // A full frame that comes at once needs no half one before it.
+    const half = Math.max(0.5, this.coarse);
+    const quick = this.coarse * Math.sqrt(2.5) >= 1;
+    const share = this.asked < half && !quick ? half : 1;
+    return this.asked < share ? share : 0;
+  }
+  private next(): void {
+    if (this.camera === null || this.paused) return;
+    const share = this.share();
+    if (share === 0) return;
+    // A fine frame of an old wish is overtaken; coarse ones are soon there.
+    const [busy] = this.inFlight;
+    const overtakes = this.inFlight.size === 1 && busy.version < this.version && busy.share > this.coarse && this.moving;
+    if (this.inFlight.size > 0 && !overtakes) return;
+    void this.ask(this.camera, { version: this.version, share });
+  }
+  private async ask(camera: Camera, sent: Sent): Promise<void> {
+    this.inFlight.add(sent);
+    this.asked = sent.share;
+    const begin = this.host.now();
+    const alone = this.inFlight.size === 1;
+    let frame: Frame | null = null;
+    try {
+      frame = await this.host.fetch({ camera, share: sent.share });
+    } catch (problem) {
+      // A server that is away is not asked again and again.
+      this.paused = true;
+      this.asked = 0;
+      this.host.later(() => ((this.paused = false), this.next()), 1500);
+      this.host.failed(problem);
+    }
+    this.inFlight.delete(sent);
+    if (frame !== null) this.arrived(frame, camera, sent, alone ? this.host.now() - begin : 0);
+    else if (sent.version === this.version && !this.paused) this.asked = 0;
+    this.next();
+  }
+  private arrived(frame: Frame, camera: Camera, sent: Sent, milliseconds: number): void {
+    if (milliseconds > 0) {
+      const fitting = sent.share * Math.sqrt(wanted / milliseconds);
+      const factor = Math.min(1.5, Math.max(0.6, fitting / this.coarse));
+      this.coarse = Math.min(1, Math.max(coarsest, this.coarse * factor));
+    }
+    const { shown } = this;
+    if (sent.version < shown.version || (sent.version === shown.version && sent.share < shown.share)) return;
+    this.shown = sent;
+    this.host.show(frame, { camera, share: sent.share });
+  }
+}

@@ -1,0 +1,152 @@
+/** docs/tutorial-colour.md in a real browser, on the sample capture. CNERF_PICTURES names a folder for its pictures. */
+
+import assert from "node:assert/strict";
+import { existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, describe, it } from "node:test";
+import { launch, open, patience, program, run, startServing } from "./support.mjs";
+
+const folder = mkdtempSync(join(tmpdir(), "cnerf-tutorial-"));
+const [capture, trained] = [join(folder, "capture"), join(folder, "run")];
+const long = process.env.CNERF_PICTURES ? [] : ["--set", "stage1.steps=250", "--set", "stage1.samples_per_step=16384"];
+const size = process.env.CNERF_PICTURES ? ["--views", "24"] : ["--views", "10", "--width", "120", "--height", "90", "--samples-per-pixel", "1"];
+let browser, page, serving;
+
+async function ok(args) {
+  const { code, out } = await run(args);
+  assert.equal(code, 0, `cnerf ${args.join(" ")}\n${out}`);
+}
+const until = (what, argument) => page.waitForFunction(what, argument, { timeout: patience });
+const idle = () => until(() => window.cnerf.session.state.task === "");
+const state = () => page.evaluate(() => window.cnerf.session.state);
+async function shot(name) {
+  if (process.env.CNERF_PICTURES) await page.screenshot({ path: join(process.env.CNERF_PICTURES, `${name}.png`) });
+}
+const settled = () => until(() => window.cnerf.studio.field.settled && [...document.querySelectorAll(".thumbnail img")].every((i) => i.complete));
+
+/** Mean difference of the channels of the frame that is shown. */
+const colorfulness = () =>
+  page.evaluate(async () => {
+    const { session } = window.cnerf;
+    const scene = await (await fetch("./studio/scene")).json();
+    const { position, rotation, lens } = scene.views[scene.home];
+    const answer = await fetch("./studio/frame", { method: "POST", headers: { "X-Cnerf": "1", "X-Cnerf-Client": `${session.api?.client ?? "tutorial"}x9` }, body: JSON.stringify({ position, rotation, lens, sides: ["now"] }) });
+    const picture = await createImageBitmap(await answer.blob());
+    const canvas = new OffscreenCanvas(picture.width, picture.height);
+    const context = canvas.getContext("2d");
+    context.drawImage(picture, 0, 0);
+    const { data } = context.getImageData(0, 0, picture.width, picture.height);
+    let sum = 0;
+    for (let i = 0; i < data.length; i += 4) sum += Math.max(data[i], data[i + 1], data[i + 2]) - Math.min(data[i], data[i + 1], data[i + 2]);
+    return sum / (data.length / 4);
+  });
+
+async function draw(points) {
+  const places = [];
+  for (const [u, v] of points) {
+    places.push(await page.evaluate(([x, y]) => {
+      const { easel } = window.cnerf.studio;
+      const box = easel.canvas.getBoundingClientRect();
+      return { x: box.left + easel.corner.x + x * easel.photo.width * easel.scale, y: box.top + easel.corner.y + y * easel.photo.height * easel.scale };
+    }, [u, v]));
+  }
+  await page.mouse.move(places[0].x, places[0].y);
+  await page.mouse.down();
+  for (const { x, y } of places) await page.mouse.move(x, y, { steps: 6 });
+  await page.mouse.up();
+}
+
+before(async () => {
+  assert.ok(existsSync(program), "CNERF_PROGRAM names the program");
+  await ok(["sample", "-o", capture, ...size]);
+  await ok(["train", capture, "-o", trained, "--preset", "quick", ...long]);
+  browser = await launch();
+  serving = await startServing(["studio", trained]);
+  const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, acceptDownloads: true });
+  page = await open(context, `${serving.url}?still`);
+  await until(() => window.cnerf?.session.state.ready);
+});
+after(async () => {
+  serving?.child.kill("SIGINT");
+  await serving?.ended;
+  await browser?.close();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+describe("the tutorial", () => {
+  let painted;
+  it("shows the field in grey, and nobody else may work on the run", async () => {
+    assert.ok((await colorfulness()) < 3);
+    const second = await run(["studio", trained, "--no-browser"]);
+    assert.equal(second.code, 75, second.out);
+    assert.match(second.out, /strokes/);
+    await settled();
+    await shot("studio-grey");
+  });
+  it("paints a photograph, and shows what the strokes will colour", async () => {
+    const view = await page.evaluate(async () => (await (await fetch("./studio/scene")).json()).home);
+    await page.evaluate((i) => window.cnerf.studio.paint(i), view);
+    await page.waitForSelector(`[data-photo="${view}"]`);
+    for (const [color, points] of [["#c03a2b", [[0.42, 0.5], [0.5, 0.45], [0.55, 0.55]]], ["#4f7f3a", [[0.3, 0.6], [0.35, 0.62]]], ["#c9a227", [[0.62, 0.6], [0.66, 0.62]]]]) {
+      await page.evaluate((c) => window.cnerf.session.brush.set({ color: c, size: 0.08, reach: 2, tool: "brush" }), color);
+      await draw(points);
+    }
+    await until(() => window.cnerf.session.strokes.isSaved);
+    painted = JSON.parse(readFileSync(join(trained, "strokes", "strokes.json"), "utf8"));
+    assert.equal(painted.strokes.length, 3);
+    const reached = await page.evaluate(async (i) => {
+      const picture = await createImageBitmap(await (await fetch(`./studio/reach/${i}`)).blob());
+      const context = new OffscreenCanvas(picture.width, picture.height).getContext("2d");
+      context.drawImage(picture, 0, 0);
+      const { data } = context.getImageData(0, 0, picture.width, picture.height);
+      return data.filter((_, i) => i % 4 === 3).reduce((n, alpha) => n + (alpha > 0), 0) / (data.length / 4);
+    }, view);
+    assert.ok(reached > 0.02, `${reached} of the view`);
+    await page.waitForLoadState("networkidle");
+    await shot("studio-paint");
+  });
+  it("colours all views, and keeps a take", async () => {
+    await page.keyboard.press("c");
+    await until(() => window.cnerf.session.state.unkept);
+    await idle();
+    assert.ok((await colorfulness()) > 3, "the scene has colours");
+    await page.keyboard.press("Escape");
+    await page.evaluate(() => window.cnerf.session.order({ order: "keep", name: "evening" }));
+    await until(() => window.cnerf.session.state.takes.some((take) => take.name === "evening"));
+    await idle();
+    await settled();
+    await shot("studio-colour");
+  });
+  it("makes the take again without a browser, bit for bit", async () => {
+    await ok(["colorize", trained, "--replay", "evening", "--take", "again"]);
+    const [a, b] = ["evening", "again"].map((take) => readFileSync(join(trained, "takes", take, "take.snapshot")));
+    assert.ok(a.equals(b));
+  });
+  it("writes the volume, and the photographs in colour", async () => {
+    await page.evaluate(() => window.cnerf.session.order({ order: "photographs", format: "png" }));
+    await until(() => window.cnerf.session.state.downloads.length > 0);
+    await idle();
+    const { downloads, failed, message } = await state();
+    assert.equal(failed, false, message);
+    assert.equal(downloads.length, size[1] === "24" ? 24 : 10);
+    await page.evaluate(() => window.cnerf.session.order({ order: "bake", formats: ["vdb"] }));
+    await until(() => window.cnerf.session.state.blender);
+    await idle();
+    assert.match((await state()).blender, /blender --python/);
+    const [file] = (await state()).downloads;
+    const bytes = await page.evaluate(async (address) => (await (await fetch(address)).arrayBuffer()).byteLength, file.address);
+    assert.equal(bytes, file.bytes);
+  });
+  it("loses nothing when the program is killed while it colours", async () => {
+    await page.evaluate(() => window.cnerf.session.order({ order: "colour" }));
+    await until(() => window.cnerf.session.state.task === "colour");
+    serving.child.kill("SIGKILL");
+    await serving.ended;
+    serving = await startServing(["studio", trained, "--take", "evening"]);
+    const answer = await fetch(`${serving.url}studio/strokes`);
+    assert.deepEqual((await answer.json()).strokes, painted.strokes);
+    const { takes } = await (await fetch(`${serving.url}studio/state`)).json();
+    assert.deepEqual(takes.map((take) => take.name).sort(), ["again", "evening"]);
+  });
+});

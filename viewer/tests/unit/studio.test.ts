@@ -1,0 +1,308 @@
+import { describe, expect, it } from "vitest";
+import { Lost, Refusal } from "../../src/studio/api";
+import { Brush } from "../../src/studio/brush";
+import { merged, StrokeDocument, type StrokeList } from "../../src/studio/document";
+import type { Stroke } from "../../src/studio/protocol";
+import { Latest } from "../../src/studio/reach";
+import { FrameScheduler, type FrameWish } from "../../src/studio/scheduler";
+
+const stroke = (id: string, more: Partial<Stroke> = {}): Stroke => ({ id, view: "v", kind: "paint", color: "#c08040", size: 0.02, softness: 0, reach: 1, hidden: false, points: [[0.5, 0.5, 1]], ...more });
+const ids = (list: StrokeList) => list.map((s) => s.id).join("");
+
+function shelf() {
+  const kept = new Map<string, string>();
+  return { kept, getItem: (k: string) => kept.get(k) ?? null, setItem: (k: string, v: string) => void kept.set(k, v), removeItem: (k: string) => void kept.delete(k) };
+}
+/** A server in memory. */
+class Store {
+  revision = 0;
+  list: Stroke[] = [];
+  puts = 0;
+  fail: Error | null = null;
+  async strokes() {
+    if (this.fail instanceof Lost) throw this.fail;
+    return { revision: this.revision, strokes: structuredClone(this.list) };
+  }
+  async putStrokes(strokes: StrokeList, revision: number) {
+    this.puts += 1;
+    if (this.fail) throw this.fail;
+    if (revision !== this.revision) throw new Refusal(409, "Another tab was faster.");
+    this.list = structuredClone([...strokes]);
+    return ++this.revision;
+  }
+}
+async function opened(store = new Store(), kept = shelf()) {
+  const document = new StrokeDocument(store, kept, "key");
+  const told: unknown[] = [];
+  document.told = (what) => void told.push(what);
+  await document.load();
+  return { document, store, kept, told };
+}
+
+describe("strokes", () => {
+  it("are saved as they are made, one request at a time, the last list last", async () => {
+    const { document, store } = await opened();
+    document.add(stroke("a"));
+    document.add(stroke("b"));
+    document.add(stroke("c"));
+    expect(store.puts).toBe(1);
+    await document.save();
+    expect(ids(store.list)).toBe("abc");
+    expect(store.puts).toBe(2);
+    expect(document.isSaved).toBe(true);
+    expect(document.revision).toBe(2);
+  });
+  it("are undone and redone, whatever was done to them", async () => {
+    const { document, store } = await opened();
+    const states: string[] = [];
+    const look = () => JSON.stringify(document.list);
+    const step = (change: () => void) => (states.push(look()), change());
+    step(() => document.add(stroke("a")));
+    step(() => document.add(stroke("b")));
+    step(() => document.edit("a", { hidden: true }));
+    step(() => document.edit("a", { color: "#112233" }));
+    step(() => document.remove("a"));
+    states.push(look());
+    for (let i = states.length - 2; i >= 0; --i) {
+      document.undo();
+      expect(look()).toBe(states[i]);
+    }
+    expect(document.canUndo).toBe(false);
+    document.undo();
+    for (let i = 1; i < states.length; ++i) {
+      document.redo();
+      expect(look()).toBe(states[i]);
+    }
+    expect(document.canRedo).toBe(false);
+    document.undo();
+    document.add(stroke("d"));
+    expect(document.canRedo, "a new stroke ends the way forward").toBe(false);
+    await document.save();
+    expect(store.list).toEqual(document.list);
+  });
+  it("of two tabs come together where the other one was faster, and undo takes back only one's own", async () => {
+    const { document, store, told } = await opened();
+    document.add(stroke("a"));
+    await document.save();
+    store.list = [stroke("a", { color: "#000000" }), stroke("x")];
+    store.revision = 7;
+    document.add(stroke("b"));
+    await document.save();
+    expect(ids(store.list)).toBe("axb");
+    expect(store.list[0].color).toBe("#000000");
+    expect(document.revision).toBe(8);
+    expect(told).toEqual(["merged"]);
+    document.undo();
+    await document.save();
+    expect(ids(store.list)).toBe("ax");
+  });
+  it("are followed without being sent back", async () => {
+    const { document, store } = await opened();
+    store.list = [stroke("x")];
+    store.revision = 3;
+    await document.follow(3);
+    expect(ids(document.list)).toBe("x");
+    expect(store.puts).toBe(0);
+    await document.follow(2);
+    expect(document.revision).toBe(3);
+  });
+  it("outlive a server that is away, and a page that is closed meanwhile", async () => {
+    const { document, store, kept, told } = await opened();
+    document.add(stroke("a"));
+    await document.save();
+    store.fail = new Lost("away");
+    document.add(stroke("b"));
+    document.remove("a");
+    await document.save();
+    expect(told).toContain("lost");
+    expect(document.isSaved).toBe(false);
+    store.fail = null;
+    store.list.push(stroke("x"));
+    store.revision += 1;
+    const later = await opened(store, kept);
+    expect(ids(later.document.list)).toBe("xb");
+    expect(ids(store.list)).toBe("xb");
+    expect(later.told).toEqual(["unsent"]);
+    expect(kept.kept.size).toBe(0);
+    // The first page comes back too: nothing is doubled.
+    await document.load();
+    expect(ids(store.list)).toBe("xb");
+  });
+  it("that the server refuses are taken back, with its reason", async () => {
+    const { document, store, told } = await opened();
+    document.add(stroke("a"));
+    await document.save();
+    store.fail = new Refusal(423, "Another tab paints here.");
+    document.add(stroke("b"));
+    await document.save();
+    expect(ids(document.list)).toBe("a");
+    expect((told[0] as Refusal).message).toBe("Another tab paints here.");
+    expect(document.isSaved).toBe(true);
+  });
+  it("survive a shelf with nonsense on it", async () => {
+    for (const text of ["", "{", "[]", '{"base":1}']) {
+      const kept = shelf();
+      kept.setItem("key", text);
+      expect((await opened(new Store(), kept)).document.list).toEqual([]);
+    }
+  });
+  it("merge by what was done to them", () => {
+    const base = [stroke("a"), stroke("b"), stroke("c")];
+    const mine = [stroke("a"), stroke("c", { hidden: true }), stroke("m")];
+    const theirs = [stroke("t"), stroke("b"), stroke("a", { color: "#111111" }), stroke("c")];
+    const both = merged(base, mine, theirs);
+    expect(ids(both)).toBe("tacm");
+    expect(both[1].color).toBe("#111111");
+    expect(both[2].hidden).toBe(true);
+    expect(merged(base, mine, base)).toBe(mine);
+  });
+});
+
+describe("brush", () => {
+  it("makes strokes of its tool's kind, and remembers colours", () => {
+    const kept = shelf();
+    const brush = new Brush(kept);
+    const kinds = (["brush", "line", "fill", "grey", "eraser"] as const).map((tool) => (brush.set({ tool }), brush.stroke("v", [[0, 0, 1]]).kind));
+    expect(kinds).toEqual(["paint", "paint", "paint", "grey", "erase"]);
+    brush.set({ tool: "brush", exact: true, size: 9, softness: -1, color: "#123456" });
+    expect(brush.stroke("v", [])).toMatchObject({ kind: "exact", size: 0.5, softness: 0, color: "#123456" });
+    brush.remember();
+    brush.remember();
+    const again = new Brush(kept);
+    expect(again.settings.color).toBe("#123456");
+    expect(again.recent.filter((c) => c === "#123456")).toEqual([again.recent[0]]);
+    expect(new Set(Array.from({ length: 500 }, () => brush.stroke("v", []).id)).size).toBe(500);
+  });
+});
+
+/** A clock and a server that do only what they are told. */
+class Bench {
+  time = 1000;
+  timers: { at: number; call: () => void }[] = [];
+  sent: { wish: FrameWish<string>; answer: (frame: string | null) => void; fail: (e: Error) => void }[] = [];
+  shown: string[] = [];
+  problems: unknown[] = [];
+  scheduler = new FrameScheduler<string, string>({
+    fetch: (wish) => new Promise((answer, fail) => this.sent.push({ wish, answer, fail })),
+    show: (frame, wish) => this.shown.push(`${frame} ${wish.share.toFixed(2)}`),
+    failed: (problem) => this.problems.push(problem),
+    now: () => this.time,
+    later: (call, milliseconds) => void this.timers.push({ at: this.time + milliseconds, call }),
+  });
+  async pass(milliseconds: number) {
+    this.time += milliseconds;
+    const due = this.timers.filter((t) => t.at <= this.time);
+    this.timers = this.timers.filter((t) => t.at > this.time);
+    for (const timer of due) timer.call();
+    await this.settle();
+  }
+  async settle() {
+    for (let i = 0; i < 8; ++i) await Promise.resolve();
+  }
+  /** The oldest request is answered after so long. */
+  async answer(milliseconds = 0, frame?: string | null) {
+    await this.pass(milliseconds);
+    const { wish, answer } = this.sent.shift()!;
+    answer(frame === undefined ? wish.camera : frame);
+    await this.settle();
+  }
+  shares = () => this.sent.map((s) => Number(s.wish.share.toFixed(2)));
+}
+
+describe("frames", () => {
+  it("are coarse while moving, then half, then full", async () => {
+    const bench = new Bench();
+    bench.scheduler.look("a");
+    expect(bench.shares()).toEqual([0.17]);
+    await bench.answer(100);
+    expect(bench.sent).toHaveLength(0);
+    await bench.pass(150);
+    expect(bench.shares()).toEqual([0.5]);
+    await bench.answer(900);
+    await bench.answer(3000);
+    expect(bench.shown.map((s) => s.split(" ")[1])).toEqual(["0.17", "0.50", "1.00"]);
+    expect(bench.scheduler.settled).toBe(true);
+    expect(bench.sent).toHaveLength(0);
+  });
+  it("follow the latest camera, one in flight and one waiting", async () => {
+    const bench = new Bench();
+    for (const camera of "abcde") bench.scheduler.look(camera);
+    expect(bench.sent).toHaveLength(1);
+    await bench.answer(80);
+    expect(bench.sent.map((s) => s.wish.camera)).toEqual(["e"]);
+    await bench.answer(80);
+    expect(bench.shown.map((s) => s[0])).toEqual(["a", "e"]);
+    await bench.pass(200);
+    expect(bench.shares()).toEqual([0.5]);
+    bench.scheduler.look("f");
+    expect(bench.sent.map((s) => s.wish.camera), "a fine frame is overtaken").toEqual(["e", "f"]);
+    bench.scheduler.look("g");
+    expect(bench.sent).toHaveLength(2);
+    await bench.answer(10, null);
+    await bench.answer(60);
+    expect(bench.sent.map((s) => s.wish.camera)).toEqual(["g"]);
+    expect(bench.shown.at(-1)![0]).toBe("f");
+  });
+  it("never go back to an older or coarser one", async () => {
+    const bench = new Bench();
+    bench.scheduler.look("a");
+    await bench.answer(100);
+    await bench.pass(200);
+    bench.scheduler.look("b");
+    const [old] = bench.sent.splice(0, 1);
+    await bench.answer(50);
+    expect(bench.shown.at(-1)![0]).toBe("b");
+    old.answer("a");
+    await bench.settle();
+    expect(bench.shown.at(-1)![0]).toBe("b");
+  });
+  it("get as fine as a tenth of a second allows", async () => {
+    for (const [cost, share] of [[1000, Math.sqrt(0.1)], [40, 1], [8000, Math.sqrt(100 / 8000)]]) {
+      const bench = new Bench();
+      for (let i = 0; i < 10; ++i) {
+        bench.scheduler.look(String(i));
+        while (bench.sent.length > 0) await bench.answer(cost * bench.sent[0].wish.share ** 2);
+      }
+      expect(bench.scheduler.coarse).toBeCloseTo(share, 6);
+    }
+  });
+  it("are asked for again when colours change, without a coarse one", async () => {
+    const bench = new Bench();
+    bench.scheduler.refresh();
+    expect(bench.sent, "nothing before there is a camera").toHaveLength(0);
+    bench.scheduler.look("a");
+    await bench.answer(100);
+    await bench.pass(200);
+    await bench.answer(500);
+    await bench.answer(2000);
+    bench.scheduler.refresh();
+    bench.scheduler.refresh();
+    expect(bench.shares()).toEqual([0.5]);
+    await bench.answer(500);
+    expect(bench.shares(), "the second change came while the first was drawn").toEqual([0.5]);
+  });
+  it("stop for a while where the server is away", async () => {
+    const bench = new Bench();
+    bench.scheduler.look("a");
+    bench.sent.shift()!.fail(new Lost("away"));
+    await bench.settle();
+    expect(bench.problems).toHaveLength(1);
+    bench.scheduler.look("b");
+    expect(bench.sent).toHaveLength(0);
+    await bench.pass(2000);
+    expect(bench.sent.map((s) => s.wish.camera)).toEqual(["b"]);
+  });
+});
+
+describe("latest", () => {
+  it("leaves out what was overtaken", async () => {
+    const latest = new Latest();
+    const ran: string[] = [];
+    let end = () => {};
+    const first = latest.run(() => (ran.push("a"), new Promise((done) => (end = done))));
+    for (const name of "bcd") void latest.run(async () => void ran.push(name));
+    end();
+    await first;
+    expect(ran.join("")).toBe("ad");
+  });
+});
