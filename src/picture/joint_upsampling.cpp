@@ -7,8 +7,9 @@
 namespace cnerf {
 namespace {
 
-/// Differences of L* within a surface, grain included, are about this. Of 2 to 12, with a reach of 2 to 6 samples, these
-/// two gave the least error of chroma at full size for held-out and trained views of a capture whose colours are known.
+/// Differences of L* within a surface, grain included, are about this. Of 2 to 12, with a reach of 2 to 6 samples,
+/// these two gave the least error of chroma at full size for held-out and trained views of a capture whose colours are
+/// known.
 constexpr float kSameLightness = 6.0f;
 
 /// How much a sample counts by its difference in lightness. It never comes to nothing, as a Gaussian would: where no

@@ -20,8 +20,8 @@ namespace cnerf::pipeline {
 namespace fs = std::filesystem;
 namespace {
 
-/// Of the picture in which a take's chroma is rendered, whatever the photograph's size: 566 x 424. Twice as many make it
-/// no better, as chroma changes slowly and its edges come from the photograph.
+/// Of the picture in which a take's chroma is rendered, whatever the photograph's size: 566 x 424. Twice as many make
+/// it no better, as chroma changes slowly and its edges come from the photograph.
 constexpr double kRenderedPixels = 240'000;
 
 struct Photograph {

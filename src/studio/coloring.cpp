@@ -49,8 +49,8 @@ void Coloring::begin(const std::string& take) {
   if (!take.empty()) {
     base = std::make_unique<ColorModel>(ColorModel::load(context_.directory.take_snapshot(take), engines_));
   }
-  auto now = std::make_unique<ColorModel>(base ? base->copy(engines_)
-                                               : ColorModel::create(context_.config.stage2, engines_));
+  auto now =
+      std::make_unique<ColorModel>(base ? base->copy(engines_) : ColorModel::create(context_.config.stage2, engines_));
   now->stage1_sha256 = stage1_sha256_;
   base_ = std::move(base);
   now_ = std::move(now);
@@ -101,7 +101,8 @@ void Coloring::replay(const Journal& journal, const RetouchOptions& options, con
   const auto count = double(journal.deeds.size() - 1);
   for (std::size_t i = 1; i < journal.deeds.size(); ++i) {
     const Deed& deed = journal.deeds[i];
-    colour(deed.strokes, options, [&](double fraction) { breathe((double(i - 1) + fraction) / count); }, deed.steps);
+    colour(
+        deed.strokes, options, [&](double fraction) { breathe((double(i - 1) + fraction) / count); }, deed.steps);
   }
 }
 

@@ -7,8 +7,8 @@
 namespace cnerf::studio {
 namespace {
 
-constexpr std::size_t kGrain = 256;         // rays of a parallel piece of work
-constexpr std::size_t kLeastRays = 8192;    // between two questions whether to go on
+constexpr std::size_t kGrain = 256;       // rays of a parallel piece of work
+constexpr std::size_t kLeastRays = 8192;  // between two questions whether to go on
 
 PixelSamples seen_by(std::span<const Ray> rays, const LuminanceEngine& engine, const MarchSettings& march,
                      const RenderEffort& effort) {
@@ -43,15 +43,15 @@ Picture blank(int width, int height) {
 
 }  // namespace
 
-std::vector<Picture> draw_field(const LuminanceModel& luminance, const FieldCamera& camera,
-                                std::span<const Side> sides, const DrawingEffort& effort,
-                                const std::function<bool()>& keep_going) {
+std::vector<Picture> draw_field(const LuminanceModel& luminance, const FieldCamera& camera, std::span<const Side> sides,
+                                const DrawingEffort& effort, const std::function<bool()>& keep_going) {
   const UnitCamera unit(camera.lens, camera.world_from_camera, luminance.frame);
   const std::size_t count = std::size_t(camera.lens.width) * std::size_t(camera.lens.height);
   std::vector<Picture> pictures(sides.size(), blank(camera.lens.width, camera.lens.height));
   const bool is_grey = std::ranges::all_of(sides, [](Side side) { return side == nullptr; });
   const MarchSettings march = luminance.march(effort.steps_per_box);
-  const std::size_t at_a_time = std::max(kLeastRays, luminance.engine->points_at_a_time() / 8);
+  // Without colour a GPU hands back a number per ray, and likes many; with it, samples.
+  const std::size_t at_a_time = is_grey ? std::max(kLeastRays, luminance.engine->points_at_a_time() / 8) : kLeastRays;
   for (std::size_t first = 0; first < count; first += at_a_time) {
     if (!keep_going()) return {};
     std::vector<Ray> rays(std::min(at_a_time, count - first));
@@ -59,8 +59,8 @@ std::vector<Picture> draw_field(const LuminanceModel& luminance, const FieldCame
       for (std::size_t r = begin; r < end; ++r) rays[r] = unit.ray_of_pixel(first + r);
     });
     const PixelSamples pixels = is_grey ? PixelSamples{} : seen_by(rays, *luminance.engine, march, effort.rays);
-    const std::vector<float> light = is_grey ? light_of(rays, *luminance.engine, march, effort.rays)
-                                             : pixel_luminance(pixels);
+    const std::vector<float> light =
+        is_grey ? light_of(rays, *luminance.engine, march, effort.rays) : pixel_luminance(pixels);
     for (std::size_t s = 0; s < sides.size(); ++s) {
       put(light, sides[s] != nullptr ? sides[s]->decode(pixels) : std::vector<Ab>(rays.size()), first, pictures[s]);
     }

@@ -6,8 +6,8 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/pipeline/run_context.h"
 #include "src/picture/encode.h"
+#include "src/pipeline/run_context.h"
 
 namespace cnerf::studio {
 namespace fs = std::filesystem;
@@ -45,8 +45,8 @@ void write_paint_pictures(const fs::path& folder, const Capture& capture, const 
   for (const View& view : capture.views) {
     const fs::path file = folder / picture_name(view.name);
     const bool is_touched = std::ranges::find(strokes, view.name, &Stroke::view) != strokes.end();
-    const KnownColors paint = is_touched ? painted_on(view.name, strokes, view.image.width, view.image.height)
-                                         : KnownColors{};
+    const KnownColors paint =
+        is_touched ? painted_on(view.name, strokes, view.image.width, view.image.height) : KnownColors{};
     std::error_code failure;
     if (std::ranges::find(paint.is_known, 1) != paint.is_known.end()) {
       write_png(file, picture_of(paint, view.image));

@@ -8,9 +8,9 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/text.h"
 #include "src/base/usage.h"
 #include "src/picture/encode.h"
-#include "src/base/text.h"
 #include "src/pipeline/bake_step.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/photographs_step.h"
@@ -192,8 +192,8 @@ void Studio::color_by_reference(const fs::path& picture) {
   colors_changed();
   change([&](StateMessage& state) {
     state.message = "coloured like " + picture.filename().string() + ", take " + take;
-    state.commands.push_back("cnerf colorize " + context_.directory.root().string() + " --colorizer reference:" +
-                             picture.string());
+    state.commands.push_back("cnerf colorize " + context_.directory.root().string() +
+                             " --colorizer reference:" + picture.string());
   });
 }
 
@@ -222,8 +222,8 @@ void Studio::bake(const std::vector<std::string>& formats) {
   change([&](StateMessage& state) {
     state.message = "baked to " + folder.string();
     if (wanted.has_manifest()) state.blender = "blender --python " + (folder / "blender_setup.py").string();
-    state.commands.push_back("cnerf bake " + context_.directory.root().string() + (take.empty() ? "" : " --take " + take) +
-                             " --format " + cnerf::joined(formats, ","));
+    state.commands.push_back("cnerf bake " + context_.directory.root().string() +
+                             (take.empty() ? "" : " --take " + take) + " --format " + cnerf::joined(formats, ","));
   });
 }
 
@@ -232,8 +232,8 @@ void Studio::write_photographs(const std::string& format) {
   pipeline::check_photographs_take(context_.directory, take);
   const fs::path folder = pipeline::photographs_folder(context_.directory, take);
   JobObserver job(*this, "photographs");
-  offer_downloads(pipeline::photographs_step(
-      context_, {take, {}, folder, pipeline::photograph_format_named(format)}, engines_, job));
+  offer_downloads(pipeline::photographs_step(context_, {take, {}, folder, pipeline::photograph_format_named(format)},
+                                             engines_, job));
   change([&](StateMessage& state) {
     state.message = "photographs in " + folder.string();
     state.commands.push_back("cnerf render " + context_.directory.root().string() + " --take " + take +

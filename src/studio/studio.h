@@ -1,6 +1,6 @@
 #pragma once
-/// The studio: a run that is looked at, painted and coloured through a page. One thread works (the one that calls `run`):
-/// it draws frames and carries out orders, a training step at a time; the server's threads ask.
+/// The studio: a run that is looked at, painted and coloured through a page. One thread works (the one that calls
+/// `run`): it draws frames and carries out orders, a training step at a time; the server's threads ask.
 
 #include <condition_variable>
 #include <map>
@@ -110,8 +110,8 @@ class Studio final : public web::PageApi {
   StateMessage state_;
   StrokeList strokes_;
   std::vector<std::filesystem::path> downloads_;  // as state_.downloads has them
-  std::map<std::string, int> followers_;  // streams of each client
-  std::optional<OrderMessage> order_;     // that waits
+  std::map<std::string, int> followers_;          // streams of each client
+  std::optional<OrderMessage> order_;             // that waits
   bool is_working_ = false, stop_requested_ = false, is_closed_ = false;
   FrameDesk frames_;
 };

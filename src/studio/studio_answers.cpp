@@ -31,8 +31,8 @@ constexpr std::size_t kMostSides = 2;
 constexpr int kThumbnailWidth = 160, kReferenceWidth = 1600;
 constexpr int kPhotoQuality = 92, kThumbnailQuality = 82;
 constexpr std::uint8_t kReachAlpha = 200;
-const std::vector<std::string> kOrders = {"colour", "stop", "keep", "begin", "rename", "duplicate", "delete",
-                                          "bake",   "photographs"};
+const std::vector<std::string> kOrders = {"colour",    "stop",   "keep", "begin",      "rename",
+                                          "duplicate", "delete", "bake", "photographs"};
 
 std::string text_of(const std::vector<std::byte>& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -131,8 +131,8 @@ std::optional<std::size_t> Studio::largest_body(const std::string& method, const
 }
 
 PageAnswer Studio::answer(const PageRequest& request) {
-  const auto route = std::ranges::find_if(
-      routes(), [&](const Route& one) { return one.is_for(request.method, request.path); });
+  const auto route =
+      std::ranges::find_if(routes(), [&](const Route& one) { return one.is_for(request.method, request.path); });
   if (route == routes().end()) return refusal(404, "not here");
   try {
     return (this->*route->handler)(request);

@@ -1,5 +1,6 @@
 // What waiting in the studio is like, on a run: first frames, the reach of a stroke, and colouring by strokes.
-//   cnerf-studio-bench RUN [TAKE]
+//   cnerf-studio-bench RUN [TAKE] [colour=1] [steps=N] [known=N] [kept=N] [rate=R] [final=R]
+//     colour=1  only what colouring does
 //   prints a row per figure; pictures differ from `cnerf render`'s by the dB of the sharp row.
 
 #include <fmt/format.h>
@@ -75,21 +76,25 @@ Changes changes_of(std::span<const CachedView> views, const KnownColorMap& map, 
 }
 
 int bench(int argc, char** argv) {
-  if (argc < 2) return std::puts("cnerf-studio-bench RUN [TAKE]"), 64;
+  if (argc < 2) return std::puts("cnerf-studio-bench RUN [TAKE] [name=value...]"), 64;
   const pipeline::RunDirectory directory = pipeline::RunDirectory::open(argv[1]);
   Observer observer;
   const Config config = directory.config("", observer);
   Capture capture = survey_capture(directory.record().capture, config.capture);  // no pixels are looked at
   (void)apply_learned_views(capture, directory.stage1_snapshot());
   const Engines& engines = engines_for("auto");
+  const std::string take = argc > 2 && std::string(argv[2]).find('=') == std::string::npos ? argv[2] : "";
+  const bool is_grey = take.empty();
+  const bool is_about_color = std::any_of(argv + 2, argv + argc, [](std::string word) { return word == "colour=1"; });
   const LuminanceModel luminance = LuminanceModel::load(directory.stage1_snapshot(), engines);
-  ColorModel model = argc > 2 ? ColorModel::load(directory.take_snapshot(argv[2]), engines)
-                              : ColorModel::create(config.stage2, engines);
+  ColorModel model =
+      is_grey ? ColorModel::create(config.stage2, engines) : ColorModel::load(directory.take_snapshot(take), engines);
   const View& view = capture.views[capture.views.size() / 2];
   const std::vector<studio::Side> grey = {nullptr}, both = {nullptr, &model};
   const auto yes = [] { return true; };
   const studio::DrawingEffort effort = studio::sharp_effort(config.render.steps_per_box);
   for (const double share : {1.0 / 8, 1.0 / 6, 0.5, 1.0, 1.0}) {
+    if (is_about_color) break;
     std::vector<Picture> pictures;
     const studio::FieldCamera camera = camera_of(view, share);
     const std::string size = fmt::format(" {} x {}", camera.lens.width, camera.lens.height);
@@ -103,18 +108,21 @@ int bench(int argc, char** argv) {
       fmt::print("encoding is not measured: this machine has no codecs\n");
     }
     if (share < 1) continue;
-    const auto scene = pipeline::load_scene(directory, argc > 2 ? argv[2] : "", engines);
+    const auto scene = pipeline::load_scene(directory, take, engines);
     const RenderedImage reference = scene->render(camera.lens, camera.world_from_camera, {});
     const auto& values = reference.rgb.empty() ? reference.luminance : reference.rgb;
-    row("sharp against cnerf render", decibel(pictures[reference.rgb.empty() ? 0 : 1],
-                                             picture_from_linear(reference.width, reference.height, values)), "dB");
+    row("sharp against cnerf render",
+        decibel(pictures[reference.rgb.empty() ? 0 : 1],
+                picture_from_linear(reference.width, reference.height, values)),
+        "dB");
   }
 
   ViewCache cache;
   row("caching views", seconds_of([&] {
         cache.fill(*luminance.engine, luminance.march(), capture, luminance.frame, config.stage2.working_resolution,
                    [](double) {});
-      }), "s");
+      }),
+      "s");
   const Stopwatch of_surfaces;
   const SeenSurfaces seen(cache.views(), cache.names());
   row("surfaces", of_surfaces.seconds(), "s");
@@ -123,23 +131,44 @@ int bench(int argc, char** argv) {
   stroke.points = {{0.45f, 0.45f, 1}, {0.55f, 0.5f, 1}};
   const CachedView& painted = cache.views()[own];
   const Stopwatch of_own;
-  const std::vector<KnownColors> known = {painted_on(stroke.view, std::span(&stroke, 1), painted.width, painted.height)};
+  const std::vector<KnownColors> known = {
+      painted_on(stroke.view, std::span(&stroke, 1), painted.width, painted.height)};
   const KnownColorSources sources(seen, known);
   row("a stroke's reach in its own view", of_own.seconds(), "s");
-  row("  share of the view", double(std::ranges::count_if(sources.sources()[0].colors.cost, [](float c) { return c < kUnreached; })) /
-                                 double(painted.opacity.size()), "");
-  row("and in eight others", seconds_of([&] { for (std::size_t v = 0; v < 8; ++v) (void)sources.seen_in(v); }), "s");
-  row("eight thumbnails in colour",
-      seconds_of([&] { for (std::size_t v = 0; v < 8; ++v) (void)studio::draw_cached(cache.views()[v], &model, 160); }), "s");
+  row("  share of the view",
+      double(std::ranges::count_if(sources.sources()[0].colors.cost, [](float c) { return c < kUnreached; })) /
+          double(painted.opacity.size()),
+      "");
+  row("and in eight others", seconds_of([&] {
+        for (std::size_t v = 0; v < 8; ++v) (void)sources.seen_in(v);
+      }),
+      "s");
+  row("eight thumbnails in colour", seconds_of([&] {
+        for (std::size_t v = 0; v < 8; ++v) (void)studio::draw_cached(cache.views()[v], &model, 160);
+      }),
+      "s");
   const Stopwatch of_map;
   const KnownColorMap map(seen, sources);
   row("known colours of all views", of_map.seconds(), "s");
   ColorModel base = model.copy(engines);
   row("copying the model", seconds_of([&] { (void)model.copy(engines); }), "s");
-  Retouch retouch(cache.views(), map, argc > 2 ? &base : nullptr, model, {});
+  const auto number = [&](const std::string& name, double usual) {
+    const auto given =
+        std::find_if(argv + 2, argv + argc, [&](std::string word) { return word.starts_with(name + "="); });
+    return given == argv + argc ? usual : std::stod(std::string(*given).substr(name.size() + 1));
+  };
+  RetouchOptions options;
+  options.steps = int(number("steps", options.steps));
+  options.known_pixels = int(number("known", options.known_pixels));
+  options.kept_pixels = int(number("kept", options.kept_pixels));
+  options.learning_rate = number("rate", options.learning_rate);
+  options.final_learning_rate = number("final", options.final_learning_rate);
+  Retouch retouch(cache.views(), map, is_grey ? nullptr : &base, model, options);
   row("first step of colouring", seconds_of([&] { retouch.step(); }), "s");
-  row("all further steps", seconds_of([&] { while (!retouch.is_settled()) retouch.step(); }), "s");
-  const bool is_grey = argc <= 2;
+  row("all further steps", seconds_of([&] {
+        while (!retouch.is_settled()) retouch.step();
+      }),
+      "s");
   const Changes changes = changes_of(cache.views(), map, is_grey ? nullptr : &base, model);
   row("ab distance to the stroke where it reaches, mean", changes.known, "");
   row("change elsewhere, mean", changes.kept, "");

@@ -124,7 +124,8 @@ Compared compared(const fs::path& grey_file, const fs::path& color_file) {
     most.alpha = std::max(most.alpha, std::abs(before[3] - after[3]));
     if (before[3] == 0) continue;
     const auto lab = [](const cv::Vec4d& bgr) {
-      return lab_from_linear_rgb<double>({linear_from_srgb(bgr[2]), linear_from_srgb(bgr[1]), linear_from_srgb(bgr[0])});
+      return lab_from_linear_rgb<double>(
+          {linear_from_srgb(bgr[2]), linear_from_srgb(bgr[1]), linear_from_srgb(bgr[0])});
     };
     most.lightness = std::max(most.lightness, std::abs(lab(before).lightness - lab(after).lightness));
     most.chroma += std::hypot(lab(after).a, lab(after).b);

@@ -19,8 +19,8 @@
 namespace cnerf::studio {
 namespace {
 namespace fs = std::filesystem;
-using testing::HasSubstr;
 using nlohmann::json;
+using testing::HasSubstr;
 using web::PageAnswer;
 constexpr const char* kPainter = "painter123";
 const RetouchOptions kQuick = {.steps = 40, .known_pixels = 512, .kept_pixels = 512};
@@ -51,7 +51,8 @@ class TrainedRun {
     write_sample_scene(folder_ / "capture", {.views = 8, .width = 96, .height = 72, .samples_per_pixel = 1});
     Observer observer;
     const Config config = tiny_config();
-    context_.emplace(pipeline::RunContext{pipeline::RunDirectory(folder_ / "run"), config,
+    context_.emplace(pipeline::RunContext{pipeline::RunDirectory(folder_ / "run"),
+                                          config,
                                           pipeline::read_capture(folder_ / "capture", config, observer),
                                           {"cnerf", "train"}});
     pipeline::begin_run(*context_, folder_ / "capture", {});
@@ -105,8 +106,9 @@ class StudioTest : public testing::Test {
     return wait_until([](const json& state) { return state["task"] == ""; });
   }
   [[nodiscard]] json stroke(const std::string& id, double x, double y) const {
-    return {{"id", id}, {"view", context_.capture.views[1].name}, {"kind", "paint"}, {"color", "#c03020"},
-            {"size", 0.2}, {"points", std::vector<std::vector<double>>{{x, y, 1}}}};
+    return {{"id", id},        {"view", context_.capture.views[1].name},
+            {"kind", "paint"}, {"color", "#c03020"},
+            {"size", 0.2},     {"points", std::vector<std::vector<double>>{{x, y, 1}}}};
   }
   [[nodiscard]] json frame(const std::vector<std::string>& sides) const {
     json view = json::parse(json_of(scene_of(context_.capture, "run")).dump())["views"][1];
@@ -202,7 +204,8 @@ TEST_F(StudioTest, ReachShowsWhatStrokesWillColorInTheirViewAndOthers) {
     const cv::Mat picture = decoded(answer);
     EXPECT_EQ(picture.channels(), 4);
     int count = 0;
-    for (int i = 0; i < int(picture.total()); ++i) count += picture.at<cv::Vec4b>(i / picture.cols, i % picture.cols)[3] > 0;
+    for (int i = 0; i < int(picture.total()); ++i)
+      count += picture.at<cv::Vec4b>(i / picture.cols, i % picture.cols)[3] > 0;
     return count;
   };
   EXPECT_EQ(colored(nothing), 0);
@@ -230,7 +233,7 @@ TEST_F(StudioTest, ColouringGoesToAllViewsAndIsKept) {
   EXPECT_GT(settled["colors"], 1);
   EXPECT_THAT(settled["commands"].dump(), HasSubstr("--strokes"));
   EXPECT_GT(shown(), 10);
-  EXPECT_TRUE(fs::exists(context_.directory.root() / "strokes" ) );
+  EXPECT_TRUE(fs::exists(context_.directory.root() / "strokes"));
 
   const json kept = ordered({{"order", "keep"}, {"name", "red"}});
   EXPECT_EQ(kept["unkept"], false);

@@ -66,6 +66,28 @@ class Retouching : public test::Stage2Fixture {
   std::optional<SeenSurfaces> seen_;
 };
 
+TEST(RetouchLabels, DecodeToTheirColor) {
+  double usual = 0, ours = 0;
+  int count = 0;
+  for (float a = -30; a <= 30; a += 3.7f) {
+    for (float b = -30; b <= 30; b += 3.3f) {
+      const auto miss = [&](const SoftLabel& label) {
+        std::vector<float> logits(kAbBinCount, -60.0f);
+        for (int i = 0; i < kSoftLabelBins; ++i) {
+          logits[std::size_t(label.bin[std::size_t(i)])] = std::log(label.weight[std::size_t(i)]);
+        }
+        const Ab seen = decode_annealed_mean(logits, 0.6f);
+        return std::hypot(seen.a - a, seen.b - b);
+      };
+      usual += miss(soft_label({a, b}));
+      ours += miss(label_decoded_to({a, b}, 0.6f));
+      ++count;
+    }
+  }
+  EXPECT_GT(usual / count, 0.8) << "or there is nothing to mend";
+  EXPECT_LT(ours / count, 0.35);
+}
+
 TEST_F(Retouching, PaintIsLearntAndAllElseStays) {
   const Ab paint = {-20, 25};
   const std::vector<KnownColors> known = {painted_third(paint)};

@@ -36,7 +36,8 @@ std::optional<double> sigma_at(const WebBricks& bricks, Vec3d world) {
   if (bricks.distance[cell] != 0) return std::nullopt;
   std::size_t number = 0;
   for (std::size_t c = 0; c < cell; ++c) number += bricks.distance[c] == 0;
-  const std::uint8_t code = bricks.density[number * kWebBrickVoxels + std::size_t((v.z % 8 * 8 + v.y % 8) * 8 + v.x % 8)];
+  const std::uint8_t code =
+      bricks.density[number * kWebBrickVoxels + std::size_t((v.z % 8 * 8 + v.y % 8) * 8 + v.x % 8)];
   return bricks.density_scale * std::pow(code / 255.0, 3);
 }
 /// Relative error of a density that is a code and a half off.

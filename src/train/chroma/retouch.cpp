@@ -2,13 +2,53 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <limits>
 
 #include "src/base/error.h"
+#include "src/base/parallel.h"
 #include "src/base/rng.h"
 #include "src/optim/adam.h"
 
 namespace cnerf {
+namespace {
+
+constexpr std::size_t kGrain = 128;  // labels of a parallel piece of work
+
+/// What the bins of a label decode to.
+Ab annealed_mean(const SoftLabel& label, float temperature) {
+  Ab mean;
+  float total = 0;
+  for (int i = 0; i < kSoftLabelBins; ++i) {
+    const float weight = std::pow(label.weight[std::size_t(i)], 1 / temperature);
+    const Ab centre = ab_bin_centres()[std::size_t(label.bin[std::size_t(i)])];
+    mean.a += weight * centre.a;
+    mean.b += weight * centre.b;
+    total += weight;
+  }
+  return {mean.a / total, mean.b / total};
+}
+
+}  // namespace
+
+SoftLabel label_decoded_to(Ab color, float temperature) {
+  constexpr int kTries = 8;
+  constexpr float kNearEnough = 0.1f;
+  Ab aim = color;
+  SoftLabel best = soft_label(color);
+  if (temperature <= 0) return best;
+  float least = std::numeric_limits<float>::infinity();
+  for (int i = 0; i < kTries && least > kNearEnough; ++i) {
+    const SoftLabel label = soft_label(aim);
+    const Ab seen = annealed_mean(label, temperature);
+    const float miss = std::hypot(color.a - seen.a, color.b - seen.b);
+    if (miss < least) {
+      least = miss;
+      best = label;
+    }
+    aim = {aim.a + color.a - seen.a, aim.b + color.b - seen.b};
+  }
+  return best;
+}
 
 Retouch::Retouch(std::span<const CachedView> views, const KnownColorMap& known, const ColorModel* base,
                  ColorModel& model, const RetouchOptions& options)
@@ -28,8 +68,12 @@ double Retouch::step() {
   const PixelSamples pixels = pixel_samples(views_, places);
   std::vector<float> weights;
   for (const ViewPixel& place : places) weights.push_back(views_[place.view].opacity[place.pixel]);
-  std::vector<SoftLabel> labels;
-  std::ranges::transform(colors, std::back_inserter(labels), soft_label);
+  std::vector<SoftLabel> labels(colors.size());
+  parallel_ranges(colors.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      labels[i] = label_decoded_to(colors[i], float(model_.options.decode_temperature));
+    }
+  });
 
   const double share = double(done_) / options_.steps;
   const float rate = decayed_rate(options_.learning_rate, options_.final_learning_rate, share);

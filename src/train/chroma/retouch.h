@@ -12,10 +12,14 @@ namespace cnerf {
 
 struct RetouchOptions {
   int steps = 200;
-  int known_pixels = 3072, kept_pixels = 2048;  ///< of a step
+  int known_pixels = 2048, kept_pixels = 3072;  ///< of a step
   double learning_rate = 2e-2, final_learning_rate = 2e-3;
   std::uint64_t seed = 1;
 };
+
+/// The soft label whose annealed mean is nearest to a colour. A usual one's is pulled to its bins' centres, by an ab
+/// unit or two, which would add up as a take is retouched again and again.
+[[nodiscard]] SoftLabel label_decoded_to(Ab color, float temperature);
 
 class Retouch {
  public:
