@@ -54,14 +54,17 @@ void Coloring::begin(const std::string& take) {
   now->stage1_sha256 = stage1_sha256_;
   base_ = std::move(base);
   now_ = std::move(now);
-  base_name_ = take;
+  base_name_ = kept_as_ = take;
   is_grey_ = take.empty();
   is_unkept_ = false;
   journal_.deeds = {{take, {}, 0}};
 }
 
-void Coloring::base_is_called(const std::string& name) {
-  base_name_ = journal_.deeds.front().base = name;
+void Coloring::take_is_called(const std::string& take, const std::string& name) {
+  if (base_name_ == take) base_name_ = journal_.deeds.front().base = name;
+  if (kept_as_ != take) return;
+  kept_as_ = name;
+  is_unkept_ = is_unkept_ || name.empty();
 }
 
 void Coloring::colour(const std::vector<Stroke>& strokes, const RetouchOptions& options, const Breathe& breathe,
@@ -72,6 +75,7 @@ void Coloring::colour(const std::vector<Stroke>& strokes, const RetouchOptions& 
   Retouch retouch(cache_.views(), map, base_.get(), *now_, options);
   is_grey_ = false;
   is_unkept_ = true;
+  kept_as_.clear();
   now_->colorizer = (base_ ? base_->colorizer : std::string(pipeline::kGreyTake)) + describe(known);
   journal_.deeds.push_back({"", strokes, 0});
   while (!retouch.is_settled() && retouch.steps_done() < most_steps) {
@@ -93,6 +97,7 @@ void Coloring::keep(const std::string& take, double seconds, Observer& observer)
   write_file(folder / kJournalFile, json_of(journal_).dump() + "\n");
   directory.save(pipeline::TakeRecord{take, now_->colorizer, now_->report});
   directory.update([&](pipeline::RunRecord& record) { record.current_take = take; });
+  kept_as_ = take;
   is_unkept_ = false;
 }
 

@@ -59,8 +59,10 @@ class Coloring {
   [[nodiscard]] const ColorModel* now() const { return is_grey_ ? nullptr : now_.get(); }
   /// The take that "now" began from; empty = grey.
   [[nodiscard]] const std::string& base_name() const { return base_name_; }
-  /// The base was given another name.
-  void base_is_called(const std::string& name);
+  /// The take that holds what "now" is; empty = grey, or in none.
+  [[nodiscard]] const std::string& kept_as() const { return kept_as_; }
+  /// A take was given another name; an empty one: it is gone.
+  void take_is_called(const std::string& take, const std::string& name);
   [[nodiscard]] bool is_unkept() const { return is_unkept_; }
 
   /// Traces the training views, once.
@@ -90,7 +92,7 @@ class Coloring {
   ViewCache cache_;
   std::optional<SeenSurfaces> seen_;
   std::unique_ptr<ColorModel> base_, now_;  // no base: grey
-  std::string base_name_;
+  std::string base_name_, kept_as_;
   bool is_grey_ = true, is_unkept_ = false;
   Journal journal_;
 };

@@ -199,10 +199,9 @@ void Studio::color_by_reference(const fs::path& picture) {
 
 std::string Studio::take_of_now() {
   if (coloring_.now() == nullptr) return "";
-  if (!coloring_.is_unkept()) return coloring_.base_name();
+  if (!coloring_.is_unkept()) return coloring_.kept_as();
   const std::string take = context_.directory.free_take_name("studio");
   coloring_.keep(take, 0, observer_);
-  coloring_.begin(take);
   return take;
 }
 
@@ -325,7 +324,7 @@ void Studio::rename_take(const std::string& take, const std::string& name) {
   duplicate(context_.directory, take, name, observer_);
   remove(context_.directory, take, name, observer_);
   shown_takes_.erase(take);
-  if (coloring_.base_name() == take) coloring_.base_is_called(name);
+  coloring_.take_is_called(take, name);
   say("take " + take + " is called " + name + " now");
 }
 
@@ -333,6 +332,7 @@ void Studio::delete_take(const std::string& take) {
   if (take == coloring_.base_name()) throw UsageError("what is shown now was begun from take " + take);
   remove(context_.directory, take, "", observer_);
   shown_takes_.erase(take);
+  coloring_.take_is_called(take, "");
   say("take " + take + " is gone");
 }
 

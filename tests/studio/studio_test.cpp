@@ -167,6 +167,7 @@ TEST_F(StudioTest, FramesOfNoCameraAreRefusedByTheField) {
 
 TEST_F(StudioTest, StrokesAreSavedAsTheyAreMade) {
   open();
+  EXPECT_EQ(json::parse(get("strokes").body)["revision"], 0) << "pages name it when they save";
   EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
   EXPECT_EQ(put({stroke("a", 0.5, 0.5), stroke("b", 0.2, 0.5)}, 1).status, 200);
   EXPECT_EQ(put({}, 1).status, 409) << "made from an older list";
@@ -308,7 +309,7 @@ TEST_F(StudioTest, BakesAreOfferedForDownload) {
   (void)ordered({{"order", "colour"}});
   const json baked = ordered({{"order", "bake"}, {"formats", {"vdb"}}});
   EXPECT_EQ(baked["failed"], false) << baked;
-  EXPECT_EQ(baked["take"], "studio") << "what was in no take is kept";
+  EXPECT_TRUE(context_.directory.take_record("studio")) << "what was in no take is kept";
   ASSERT_EQ(baked["downloads"].size(), 1u) << baked;
   EXPECT_THAT(baked["blender"].get<std::string>(), HasSubstr("blender --python"));
   const std::string address = baked["downloads"][0]["address"];
@@ -319,6 +320,7 @@ TEST_F(StudioTest, BakesAreOfferedForDownload) {
   const json written = ordered({{"order", "photographs"}, {"format", "png"}});
   EXPECT_EQ(written["failed"], false) << written;
   EXPECT_EQ(written["downloads"].size(), context_.capture.views.size());
+  EXPECT_FALSE(context_.directory.take_record("studio-2")) << "it was kept already";
   EXPECT_EQ(ordered({{"order", "bake"}, {"formats", {"stl"}}})["failed"], true);
   fs::remove_all(context_.directory.root() / "bakes");
   fs::remove_all(context_.directory.root() / "renders");

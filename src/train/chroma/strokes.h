@@ -55,7 +55,7 @@ struct StrokeList {
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
-    v("revision", self.revision, kOptional);
+    v("revision", self.revision, kLater);
     v("strokes", self.strokes);
   }
 };

@@ -103,7 +103,6 @@ describe("the tutorial", () => {
       return data.filter((_, i) => i % 4 === 3).reduce((n, alpha) => n + (alpha > 0), 0) / (data.length / 4);
     }, view);
     assert.ok(reached > 0.02, `${reached} of the view`);
-    await page.waitForLoadState("networkidle");
     await shot("studio-paint");
   });
   it("colours all views, and keeps a take", async () => {
