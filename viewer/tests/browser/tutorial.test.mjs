@@ -88,8 +88,8 @@ describe("the tutorial", () => {
     const view = await page.evaluate(async () => (await (await fetch("./studio/scene")).json()).home);
     await page.evaluate((i) => window.cnerf.studio.paint(i), view);
     await page.waitForSelector(`[data-photo="${view}"]`);
-    for (const [color, points] of [["#c03a2b", [[0.42, 0.5], [0.5, 0.45], [0.55, 0.55]]], ["#4f7f3a", [[0.3, 0.6], [0.35, 0.62]]], ["#c9a227", [[0.62, 0.6], [0.66, 0.62]]]]) {
-      await page.evaluate((c) => window.cnerf.session.brush.set({ color: c, size: 0.08, reach: 2, tool: "brush" }), color);
+    for (const [color, points] of [["#4f7f3a", [[0.37, 0.24], [0.38, 0.36], [0.36, 0.46], [0.4, 0.5]]], ["#c03a2b", [[0.49, 0.46], [0.505, 0.53]]], ["#a8753c", [[0.24, 0.62], [0.36, 0.72], [0.5, 0.75], [0.7, 0.72], [0.78, 0.62]]]]) {
+      await page.evaluate((c) => window.cnerf.session.brush.set({ color: c, size: 0.04, reach: 2, tool: "brush" }), color);
       await draw(points);
     }
     await until(() => window.cnerf.session.strokes.isSaved);
