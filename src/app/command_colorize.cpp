@@ -26,11 +26,8 @@ struct ColorizeArguments {
 void replay(const ColorizeArguments& arguments, const pipeline::RunContext& context, Reporter& reporter) {
   const pipeline::RunDirectory& directory = context.directory;
   const std::string of = directory.choose_take(arguments.replay);
-  std::vector<std::string> views;
-  for (const View& view : context.capture.views) {
-    if (!view.held_out) views.push_back(view.name);
-  }
-  const studio::Journal journal = studio::read_journal(directory.take_folder(of) / studio::kJournalFile, views);
+  const studio::Journal journal =
+      studio::read_journal(directory.take_folder(of) / studio::kJournalFile, paintable_views(context.capture));
   const std::string take = pipeline::take_to_write(
       context, arguments.run.take.empty() ? of + "-again" : arguments.run.take, arguments.existing);
   const FolderLock lock = pipeline::lock_folder(directory.root(), FolderLock::Mode::kShared, reporter);

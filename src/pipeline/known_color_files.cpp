@@ -147,12 +147,10 @@ KnownColors dot_of(const std::string& hint, const Capture& capture) {
 
 /// What a stroke file paints on the capture's training views.
 std::vector<KnownColors> painted_in(const fs::path& file, const Capture& capture) {
-  std::vector<std::string> names;
+  const std::vector<std::string> names = paintable_views(capture);
   std::vector<Intrinsics> lenses;
   for (const View& view : capture.views) {
-    if (view.held_out) continue;
-    names.push_back(view.name);
-    lenses.push_back(view.intrinsics);
+    if (!view.held_out) lenses.push_back(view.intrinsics);
   }
   return painted(read_strokes(file, names).strokes, names, lenses);
 }

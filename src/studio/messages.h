@@ -153,7 +153,7 @@ struct StateMessage {
 
 /// POST orders.
 struct OrderMessage {
-  std::string order, take, name, format, picture;
+  std::string order, take, name, format;
   std::vector<std::string> formats;
 
   template <typename Self, typename Visitor>
@@ -163,7 +163,6 @@ struct OrderMessage {
     v("name", self.name, kOptional);
     v("format", self.format, kOptional);
     v("formats", self.formats, kOptional);
-    v("picture", self.picture, kOptional);
   }
 };
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <opencv2/core.hpp>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -22,24 +21,24 @@ std::string picture_name(const std::string& view) {
   return name + ".png";
 }
 
-/// B G R A, 8 bits: the paint at the luminance that is there.
-cv::Mat picture_of(const KnownColors& paint, const MonoImage& image) {
-  cv::Mat picture(paint.height, paint.width, CV_8UC4, cv::Scalar::all(0));
-  for (std::size_t p = 0; p < paint.ab.size(); ++p) {
-    if (paint.is_known[p] == 0) continue;
-    const Vec3f rgb = linear_rgb_at(image.stored_luminance(p), paint.ab[p]);
-    auto& pixel = picture.at<cv::Vec4b>(int(p) / paint.width, int(p) % paint.width);
-    pixel = {srgb8_from_linear(rgb.z), srgb8_from_linear(rgb.y), srgb8_from_linear(rgb.x), 255};
-  }
-  return picture;
-}
-
 void require_take(const pipeline::RunDirectory& directory, const std::string& take) {
   pipeline::check_take_name(take);
   if (!directory.take_record(take)) throw UsageError("there is no finished take " + take);
 }
 
 }  // namespace
+
+cv::Mat colors_at_luminance(const RunningColors& colors, cv::Size size, std::uint8_t alpha,
+                            const std::function<float(std::size_t pixel)>& luminance) {
+  cv::Mat picture(size, CV_8UC4, cv::Scalar::all(0));
+  for (std::size_t p = 0; p < colors.ab.size(); ++p) {
+    if (!colors.is_known(p)) continue;
+    const Vec3f rgb = linear_rgb_at(luminance(p), colors.ab[p]);
+    auto& pixel = picture.at<cv::Vec4b>(int(p) / size.width, int(p) % size.width);
+    pixel = {srgb8_from_linear(rgb.z), srgb8_from_linear(rgb.y), srgb8_from_linear(rgb.x), alpha};
+  }
+  return picture;
+}
 
 void write_paint_pictures(const fs::path& folder, const Capture& capture, const std::vector<Stroke>& strokes) {
   for (const View& view : capture.views) {
@@ -49,7 +48,8 @@ void write_paint_pictures(const fs::path& folder, const Capture& capture, const 
         is_touched ? painted_on(view.name, strokes, view.image.width, view.image.height) : KnownColors{};
     std::error_code failure;
     if (std::ranges::find(paint.is_known, 1) != paint.is_known.end()) {
-      write_png(file, picture_of(paint, view.image));
+      write_png(file, colors_at_luminance(running_colors(paint), {paint.width, paint.height}, 255,
+                                          [&](std::size_t p) { return view.image.stored_luminance(p); }));
     } else {
       fs::remove(file, failure);
     }

@@ -1,7 +1,10 @@
 #pragma once
 /// Files of a studio: what is painted as pictures, and the folders of takes.
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
@@ -13,6 +16,11 @@
 namespace cnerf::studio {
 
 inline constexpr const char* kStrokeFile = "strokes.json";
+
+/// Colours at the luminance that is there: B G R A, 8 bits, transparent where nothing is known.
+/// @param luminance  linear Y of a pixel
+[[nodiscard]] cv::Mat colors_at_luminance(const RunningColors& colors, cv::Size size, std::uint8_t alpha,
+                                          const std::function<float(std::size_t pixel)>& luminance);
 
 /// Writes VIEW.png into the folder for each view that is painted on, transparent except for paint, as --hint-image
 /// takes them; those of views that are not any more go.  @throws OutputError

@@ -24,17 +24,10 @@ constexpr auto kPoll = std::chrono::milliseconds(50);  // Ctrl-C only sets a fla
 constexpr double kBetweenColors = 1.0;                 // seconds: pages draw what changed
 constexpr std::size_t kMostTakesInMemory = 3;
 constexpr int kJpegQuality = 88;
+constexpr const char* kNow = "now";
 
 fs::path stroke_folder(const pipeline::RunContext& context) {
   return context.directory.root() / "strokes";
-}
-
-std::vector<std::string> training_names(const Capture& capture) {
-  std::vector<std::string> names;
-  for (const View& view : capture.views) {
-    if (!view.held_out) names.push_back(view.name);
-  }
-  return names;
 }
 
 }  // namespace
@@ -51,7 +44,7 @@ Studio::Studio(const pipeline::RunContext& context, const std::string& take, con
       coloring_(context, engines),
       frames_([this] { work_.notify_all(); }) {
   const fs::path file = stroke_folder(context_) / kStrokeFile;
-  if (fs::exists(file)) strokes_ = read_strokes(file, training_names(context_.capture));
+  if (fs::exists(file)) strokes_ = read_strokes(file, paintable_views(context_.capture));
   state_.strokes = strokes_.revision;
   coloring_.begin(take);
   state_.take = take;
@@ -63,10 +56,12 @@ Studio::~Studio() {
 }
 
 void Studio::run() {
-  order_.emplace().order = "cache";
+  Order first;
+  first.message.order = "cache";
+  work_on(first);
   while (!interruption_requested() && !closed()) {
     frames_.draw_waiting();
-    std::optional<OrderMessage> order;
+    std::optional<Order> order;
     {
       std::unique_lock lock(mutex_);
       work_.wait_for(lock, kPoll, [&] { return order_.has_value() || frames_.has_waiting() || is_closed_; });
@@ -79,7 +74,7 @@ void Studio::run() {
 }
 
 /// An order that cannot be carried out is told; the studio stays.
-void Studio::work_on(const OrderMessage& order) {
+void Studio::work_on(const Order& order) {
   try {
     carry_out(order);
   } catch (const Interrupted&) {
@@ -100,16 +95,17 @@ void Studio::work_on(const OrderMessage& order) {
   });
 }
 
-void Studio::carry_out(const OrderMessage& order) {
+void Studio::carry_out(const Order& of_page) {
+  const OrderMessage& order = of_page.message;
   if (order.order == "cache") {
     coloring_.cache_views([this](double fraction) { breathe("cache", fraction); });
     change([](StateMessage& state) { state.ready = true; });
   } else if (order.order == "colour") {
     colour();
   } else if (order.order == "keep") {
-    pipeline::check_take_name(order.name);
+    check_new_name(order.name);
     coloring_.keep(order.name, 0, observer_);
-    write_strokes(context_.directory.take_folder(order.name) / kStrokeFile, strokes_);
+    write_strokes(context_.directory.take_folder(order.name) / kStrokeFile, saved_strokes());
     say("kept as take " + order.name);
   } else if (order.order == "begin") {
     coloring_.begin(context_.directory.choose_take(order.take.empty() ? pipeline::kGreyTake : order.take));
@@ -122,7 +118,7 @@ void Studio::carry_out(const OrderMessage& order) {
   } else if (order.order == "delete") {
     delete_take(order.take);
   } else if (order.order == "reference") {
-    color_by_reference(order.picture);
+    color_by_reference(of_page.picture);
   } else if (order.order == "bake") {
     bake(order.formats);
   } else if (order.order == "photographs") {
@@ -133,12 +129,8 @@ void Studio::carry_out(const OrderMessage& order) {
 }
 
 void Studio::colour() {
-  std::vector<Stroke> strokes;
-  {
-    const std::lock_guard lock(mutex_);
-    strokes = strokes_.strokes;
-  }
-  write_paint();
+  const std::vector<Stroke> strokes = saved_strokes().strokes;
+  write_paint_pictures(stroke_folder(context_), context_.capture, strokes);
   const Stopwatch watch;
   double shown_at = 0;
   coloring_.colour(strokes, retouch_, [&](double fraction) {
@@ -273,8 +265,8 @@ bool Studio::should_stop() const {
 // ---- pictures -----------------------------------------------------------------------------------------------------
 
 const ColorModel* Studio::side_named(const std::string& name) {
-  if (name == "grey") return nullptr;
-  if (name == "now") return coloring_.now();
+  if (name == pipeline::kGreyTake) return nullptr;
+  if (name == kNow) return coloring_.now();
   const auto found = shown_takes_.find(name);
   if (found != shown_takes_.end()) return found->second.get();
   pipeline::check_take_name(name);
@@ -314,13 +306,21 @@ std::vector<TakeMessage> Studio::list_takes() const {
   return takes;
 }
 
+/// Sides of pictures have names too.
+void Studio::check_new_name(const std::string& name) {
+  pipeline::check_take_name(name);
+  if (name == kNow || name == pipeline::kGreyTake) throw UsageError("no take can be called " + name);
+}
+
 void Studio::duplicate_take(const std::string& take, const std::string& name) {
+  check_new_name(name);
   const pipeline::RunDirectory& directory = context_.directory;
   duplicate(directory, take, name, observer_);
   say("take " + take + " is take " + name + " too");
 }
 
 void Studio::rename_take(const std::string& take, const std::string& name) {
+  check_new_name(name);
   duplicate(context_.directory, take, name, observer_);
   remove(context_.directory, take, name, observer_);
   shown_takes_.erase(take);
@@ -336,8 +336,9 @@ void Studio::delete_take(const std::string& take) {
   say("take " + take + " is gone");
 }
 
-void Studio::write_paint() const {
-  write_paint_pictures(stroke_folder(context_), context_.capture, strokes_.strokes);
+StrokeList Studio::saved_strokes() const {
+  const std::lock_guard lock(mutex_);
+  return strokes_;
 }
 
 // ---- state --------------------------------------------------------------------------------------------------------

@@ -48,6 +48,11 @@ class Studio final : public web::PageApi {
   [[nodiscard]] bool closed() const override;
 
  private:
+  /// What a page orders, and the picture that it sent for it.
+  struct Order {
+    OrderMessage message;
+    std::filesystem::path picture;
+  };
   using Handler = web::PageAnswer (Studio::*)(const web::PageRequest&);
   struct Route;
   static const std::vector<Route>& routes();
@@ -65,15 +70,15 @@ class Studio final : public web::PageApi {
   web::PageAnswer post_order(const web::PageRequest& request);
   web::PageAnswer reach_of(std::size_t view, const std::vector<Stroke>& strokes);
   [[nodiscard]] std::size_t view_in(const web::PageRequest& request) const;
-  web::PageAnswer take_order(const web::PageRequest& request, const OrderMessage& order);
+  web::PageAnswer take_order(const web::PageRequest& request, const Order& order);
   void become_writer(const std::string& client);
 
   web::PageAnswer post_picture(const web::PageRequest& request);
   web::PageAnswer get_file(const web::PageRequest& request);
 
   // Work, on the thread of `run`.
-  void work_on(const OrderMessage& order);
-  void carry_out(const OrderMessage& order);
+  void work_on(const Order& order);
+  void carry_out(const Order& of_page);
   void colour();
   void color_by_reference(const std::filesystem::path& picture);
   void bake(const std::vector<std::string>& formats);
@@ -84,7 +89,8 @@ class Studio final : public web::PageApi {
   void rename_take(const std::string& take, const std::string& name);
   void duplicate_take(const std::string& take, const std::string& name);
   void delete_take(const std::string& take);
-  void write_paint() const;
+  static void check_new_name(const std::string& name);
+  [[nodiscard]] StrokeList saved_strokes() const;
   std::string drawn(const FrameMessage& message, const std::function<bool()>& keep_going);
   [[nodiscard]] const ColorModel* side_named(const std::string& name);
 
@@ -111,8 +117,8 @@ class Studio final : public web::PageApi {
   StrokeList strokes_;
   std::vector<std::filesystem::path> downloads_;  // as state_.downloads has them
   std::map<std::string, int> followers_;          // streams of each client
-  std::optional<OrderMessage> order_;             // that waits
-  bool is_working_ = false, stop_requested_ = false, is_closed_ = false;
+  std::optional<Order> order_;                    // that waits
+  bool is_working_ = true /* `run` begins with tracing the views */, stop_requested_ = false, is_closed_ = false;
   FrameDesk frames_;
 };
 

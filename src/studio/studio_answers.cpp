@@ -57,18 +57,6 @@ struct ReachMessage {
   }
 };
 
-/// B G R A: the colours at the pixels' own luminance.
-cv::Mat overlay_of(const RunningColors& colors, const CachedView& view) {
-  cv::Mat picture(view.height, view.width, CV_8UC4, cv::Scalar::all(0));
-  for (std::size_t p = 0; p < colors.ab.size(); ++p) {
-    if (!colors.is_known(p)) continue;
-    const Vec3f rgb = linear_rgb_at(view.luminance[p], colors.ab[p]);
-    auto& pixel = picture.at<cv::Vec4b>(int(p) / view.width, int(p) % view.width);
-    pixel = {srgb8_from_linear(rgb.z), srgb8_from_linear(rgb.y), srgb8_from_linear(rgb.x), kReachAlpha};
-  }
-  return picture;
-}
-
 /// A picture of any content.
 /// @param folder  for the while
 /// @param name    that errors have
@@ -232,11 +220,7 @@ PageAnswer Studio::get_strokes(const PageRequest& /*request*/) {
 }
 
 PageAnswer Studio::put_strokes(const PageRequest& request) {
-  std::vector<std::string> names;
-  for (const View& view : context_.capture.views) {
-    if (!view.held_out) names.push_back(view.name);
-  }
-  StrokeList list = strokes_of_json(request.body, "strokes", names);
+  StrokeList list = strokes_of_json(request.body, "strokes", paintable_views(context_.capture));
   if (!request.revision) return refusal(428, "the header X-Cnerf-Revision is missing");
   const std::lock_guard lock(mutex_);
   if (!state_.writer.empty() && state_.writer != request.client) return refusal(423, "another tab paints");
@@ -257,10 +241,7 @@ void Studio::become_writer(const std::string& client) {
 }
 
 PageAnswer Studio::get_reach(const PageRequest& request) {
-  std::unique_lock lock(mutex_);
-  std::vector<Stroke> strokes = strokes_.strokes;
-  lock.unlock();
-  return reach_of(view_in(request), strokes);
+  return reach_of(view_in(request), saved_strokes().strokes);
 }
 
 PageAnswer Studio::post_reach(const PageRequest& request) {
@@ -272,9 +253,7 @@ PageAnswer Studio::post_reach(const PageRequest& request) {
   // As those of a file are.
   const StrokeList checked = strokes_of_json(json_of(added).dump(), "reach", names);
   if (message.view < 0 || std::size_t(message.view) >= names.size()) throw MissingInputError("no such view");
-  std::unique_lock lock(mutex_);
-  std::vector<Stroke> strokes = strokes_.strokes;
-  lock.unlock();
+  std::vector<Stroke> strokes = saved_strokes().strokes;
   for (const Stroke& stroke : checked.strokes) {
     std::erase_if(strokes, [&](const Stroke& saved) { return saved.id == stroke.id; });
     strokes.push_back(stroke);
@@ -292,19 +271,20 @@ PageAnswer Studio::reach_of(std::size_t view, const std::vector<Stroke>& strokes
   const SeenSurfaces& seen = *coloring_.seen();
   const std::size_t cached = seen.view_named(wanted.name);
   const KnownColorSources sources(seen, known_of(strokes, seen.views(), coloring_.names()));
-  const cv::Mat overlay = overlay_of(sources.seen_in(cached), seen.views()[cached]);
+  const CachedView& shown = seen.views()[cached];
+  const cv::Mat overlay = colors_at_luminance(sources.seen_in(cached), {shown.width, shown.height}, kReachAlpha,
+                                              [&](std::size_t p) { return shown.luminance[p]; });
   return {.type = "image/png", .body = text_of(png_bytes(overlay))};
 }
 
 // ---- orders -------------------------------------------------------------------------------------------------------
 
 PageAnswer Studio::post_order(const PageRequest& request) {
-  auto order = record_of<OrderMessage>(parse_json(request.body, "order"), "order");
+  const auto order = record_of<OrderMessage>(parse_json(request.body, "order"), "order");
   if (std::ranges::find(kOrders, order.order) == kOrders.end()) {
     throw InputError("order", "order", "this studio cannot do " + excerpt(nlohmann::ordered_json(order.order)));
   }
-  order.picture.clear();  // pages send pictures, not paths
-  return take_order(request, order);
+  return take_order(request, {order, {}});
 }
 
 /// A photograph to colour like. It is checked like any file, and stays in the run.
@@ -320,9 +300,8 @@ PageAnswer Studio::post_picture(const PageRequest& request) {
   if (is_monochrome(image)) throw InputError("picture", "colour", "a reference must be in colour; this one is grey");
   const Picture picture = scaled_down(picture_from_linear(image.width, image.height, image.values), kReferenceWidth);
   write_file(file, png_bytes(picture));
-  OrderMessage order;
-  order.order = "reference";
-  order.picture = file.string();
+  Order order{{}, file};
+  order.message.order = "reference";
   return take_order(request, order);
 }
 
@@ -333,17 +312,17 @@ PageAnswer Studio::get_file(const PageRequest& request) {
   return {.headers = {{"Content-Disposition", "attachment"}}, .file = downloads_[number]};
 }
 
-PageAnswer Studio::take_order(const PageRequest& request, const OrderMessage& order) {
+PageAnswer Studio::take_order(const PageRequest& request, const Order& order) {
   const std::lock_guard lock(mutex_);
   if (!state_.writer.empty() && state_.writer != request.client) return refusal(423, "another tab paints");
   become_writer(request.client);
-  if (order.order == "stop") {
+  if (order.message.order == "stop") {
     stop_requested_ = true;
   } else if (is_working_ || order_) {
     return refusal(409, "wait until it is done: " + state_.task);
   } else {
     order_ = order;
-    state_.task = order.order;
+    state_.task = order.message.order;
     state_.message.clear();
     state_.failed = false;
     ++state_.version;

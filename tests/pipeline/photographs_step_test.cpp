@@ -17,6 +17,7 @@
 #include "src/pipeline/train_step.h"
 #include "src/sample/sample_scene.h"
 #include "tests/support/data.h"
+#include "tests/support/tiny_config.h"
 
 namespace cnerf::pipeline {
 namespace {
@@ -39,18 +40,11 @@ class Vivid final : public Colorizer {
   [[nodiscard]] std::string name() const override { return "vivid"; }
 };
 
-Config tiny_config() {
-  Config config;
-  config.capture.downscale = 2;
-  config.stage1.steps = 100;
-  config.stage1.samples_per_step = 4096;
-  config.stage1.steps_per_box = config.render.steps_per_box = 64;
-  config.stage1.grid = {.levels = 4, .log2_rows = 12, .coarsest_resolution = 4, .finest_resolution = 64};
-  config.stage2.grid = config.stage1.grid;
+Config vivid_config() {
+  Config config = test::tiny_config();
   config.stage2.patches = 60;
   config.stage2.patch_size = 32;
   config.stage2.rays_per_patch = 256;
-  config.stage2.working_resolution = 32;
   config.stage2.distill_steps = 10;
   config.stage2.purify.enabled = false;
   return config;
@@ -91,7 +85,7 @@ class Photographs : public testing::Test {
     return observer;
   }
   static RunContext run(const fs::path& from = capture()) {
-    const Config config = tiny_config();
+    const Config config = vivid_config();
     return {RunDirectory(*shared_ / "run"), config, read_capture(from, config, silent()), {}};
   }
   static std::vector<fs::path> written(const PhotographsJob& job, Observer& observer = silent()) {

@@ -15,6 +15,7 @@
 #include "src/sample/sample_scene.h"
 #include "src/studio/paint_files.h"
 #include "tests/support/data.h"
+#include "tests/support/tiny_config.h"
 
 namespace cnerf::studio {
 namespace {
@@ -25,16 +26,9 @@ using web::PageAnswer;
 constexpr const char* kPainter = "painter123";
 const RetouchOptions kQuick = {.steps = 40, .known_pixels = 512, .kept_pixels = 512};
 
-Config tiny_config() {
-  Config config;
-  config.capture.downscale = 2;
+Config studio_config() {
+  Config config = test::tiny_config();
   config.capture.holdout = 4;
-  config.stage1.steps = 100;
-  config.stage1.samples_per_step = 4096;
-  config.stage1.steps_per_box = config.render.steps_per_box = 64;
-  config.stage1.grid = {.levels = 4, .log2_rows = 12, .coarsest_resolution = 4, .finest_resolution = 64};
-  config.stage2.grid = config.stage1.grid;
-  config.stage2.working_resolution = 32;
   return config;
 }
 
@@ -50,7 +44,7 @@ class TrainedRun {
   TrainedRun() {
     write_sample_scene(folder_ / "capture", {.views = 8, .width = 96, .height = 72, .samples_per_pixel = 1});
     Observer observer;
-    const Config config = tiny_config();
+    const Config config = studio_config();
     context_.emplace(pipeline::RunContext{pipeline::RunDirectory(folder_ / "run"),
                                           config,
                                           pipeline::read_capture(folder_ / "capture", config, observer),
@@ -294,10 +288,12 @@ TEST_F(StudioTest, TakesAreDuplicatedRenamedAndDeleted) {
   EXPECT_EQ(context_.directory.record().current_take, "evening");
   EXPECT_EQ(ordered({{"order", "delete"}, {"take", "copy"}})["takes"].size(), 1u);
   EXPECT_FALSE(fs::exists(context_.directory.take_folder("copy")));
-  for (const json& order : {json{{"order", "delete"}, {"take", "copy"}},
-                            json{{"order", "duplicate"}, {"take", "evening"}, {"name", "../x"}},
-                            json{{"order", "duplicate"}, {"take", "evening"}, {"name", "evening"}},
-                            json{{"order", "keep"}, {"name", "evening"}}, json{{"order", "begin"}, {"take", "no"}}}) {
+  for (const json& order :
+       {json{{"order", "delete"}, {"take", "copy"}},
+        json{{"order", "duplicate"}, {"take", "evening"}, {"name", "../x"}},
+        json{{"order", "duplicate"}, {"take", "evening"}, {"name", "evening"}},
+        json{{"order", "keep"}, {"name", "evening"}}, json{{"order", "keep"}, {"name", "now"}},
+        json{{"order", "rename"}, {"take", "evening"}, {"name", "grey"}}, json{{"order", "begin"}, {"take", "no"}}}) {
     EXPECT_EQ(ordered(order)["failed"], true) << order;
   }
   EXPECT_EQ(json::parse(get("state").body)["takes"].size(), 1u);

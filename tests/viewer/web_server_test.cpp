@@ -197,6 +197,64 @@ TEST(WebServer, OrdersComeFromItsOwnPage) {
   EXPECT_TRUE(feed.stop_requested());
 }
 
+/// Answers with what it was asked.
+class Echo final : public PageApi {
+ public:
+  explicit Echo(fs::path file) : file_(std::move(file)) {}
+  [[nodiscard]] std::string prefix() const override { return "/echo"; }
+  [[nodiscard]] std::optional<std::size_t> largest_body(const std::string& method,
+                                                        const std::string& path) const override {
+    if (path == "/echo/order" && (method == "POST" || method == "PUT")) return 20;
+    return method == "GET" ? std::optional<std::size_t>(0) : std::nullopt;
+  }
+  [[nodiscard]] PageAnswer answer(const PageRequest& request) override {
+    if (request.path == "/echo/file") return {.file = file_};
+    const auto side = request.parameters.find("side");
+    return {.body = request.method + " " + request.client + " " + std::to_string(request.revision.value_or(-1)) + " " +
+                    (side == request.parameters.end() ? "" : side->second) + " " + request.body};
+  }
+  [[nodiscard]] std::optional<std::pair<std::uint64_t, std::string>> wait_for_news(std::uint64_t after,
+                                                                                   double /*seconds*/) override {
+    return after == 0 ? std::optional(std::pair<std::uint64_t, std::string>{1, "news"}) : std::nullopt;
+  }
+  void joined(const std::string& client) override { followers = "joined " + client; }
+  void left(const std::string& client) override { followers = "left " + client; }
+  void close() override { is_closed_ = true; }
+  [[nodiscard]] bool closed() const override { return is_closed_ || followers.starts_with("joined"); }
+
+  std::string followers;
+
+ private:
+  fs::path file_;
+  bool is_closed_ = false;
+};
+
+TEST(WebServer, APageApiIsAskedByItsOwnPageOnlyAndWithinItsLimits) {
+  const Site site;
+  Echo echo(site.root / "bundle.json");
+  WebServer server({site.root}, {}, nullptr, &echo);
+  server.start();
+  const auto order = [&](const std::string& line, const std::string& more, const std::string& body) {
+    return raw_answer(server.port(),
+                      line + " HTTP/1.1\r\nHost: 127.0.0.1:80\r\n" + more + "Connection: close\r\n\r\n" + body);
+  };
+  const std::string own = "X-Cnerf: 1\r\nX-Cnerf-Client: painter123\r\nX-Cnerf-Revision: 7\r\nContent-Length: 4\r\n";
+  EXPECT_NE(order("PUT /echo/order?side=3", own, "body").find("PUT painter123 7 3 body"), std::string::npos);
+  EXPECT_EQ(status_of(order("POST /echo/order", "Content-Length: 4\r\n", "body")), 403) << "any site can send that";
+  EXPECT_EQ(status_of(order("POST /echo/order", own + "Origin: http://evil.example\r\n", "body")), 403);
+  EXPECT_EQ(status_of(order("POST /echo/order", own + "Origin: http://127.0.0.1:80\r\n", "body")), 200);
+  EXPECT_EQ(status_of(order("POST /echo/order", "X-Cnerf: 1\r\nContent-Length: 21\r\n", std::string(21, 'x'))), 413);
+  EXPECT_EQ(status_of(order("POST /echo/order", "X-Cnerf: 1\r\nContent-Length: 99999999999\r\n", "")), 413);
+  EXPECT_EQ(status_of(order("POST /echo/order", "X-Cnerf: 1\r\nTransfer-Encoding: chunked\r\n", "1\r\nx\r\n0\r\n\r\n")),
+            411);
+  EXPECT_EQ(status_of(order("POST /echo/other", own, "body")), 405);
+  EXPECT_EQ(status_of(order("DELETE /echo/order", own, "body")), 405);
+  EXPECT_NE(order("GET /echo/x", "X-Cnerf-Client: ../../etc\r\n", "").find("GET  -1"), std::string::npos);
+  EXPECT_NE(order("GET /echo/file", "", "").find("\r\n\r\n{}"), std::string::npos);
+  EXPECT_NE(order("GET /echo/events?client=follower1", "", "").find("data: news"), std::string::npos);
+  EXPECT_EQ(echo.followers, "left follower1");
+}
+
 std::string body_of(const std::string& answer) {
   return answer.substr(std::min(answer.size(), answer.find("\r\n\r\n") + 4));
 }

@@ -8,7 +8,7 @@ import { Levels, textureBudget, thisDevice } from "./levels";
 import { showLive } from "./live";
 import { GraphicsError, Renderer } from "./renderer";
 import { showStudio } from "./studio/studio";
-import { copyText, download, el, iconButton, slider, toast } from "./ui/dom";
+import { copyText, download, el, iconButton, slider, slidesAcross, toast } from "./ui/dom";
 import { Overlay } from "./ui/overlay";
 import { Panel } from "./ui/panel";
 
@@ -97,23 +97,7 @@ function buildInterface(app: App, levels: Levels, stage: HTMLElement, canvas: HT
 
   const wipe = el("div", { class: "wipe", id: "wipe-handle", role: "slider", "aria-label": "Luminance and colour", "aria-valuemin": "0", "aria-valuemax": "100", tabindex: "0" },
     el("span", { class: "side left" }, "luminance"), el("span", { class: "grip" }), el("span", { class: "side right" }, "colour"));
-  wipe.addEventListener("pointerdown", (e) => {
-    wipe.setPointerCapture(e.pointerId);
-    stopReveal();
-    const move = (m: PointerEvent) => {
-      const box = stage.getBoundingClientRect();
-      app.set({ wipe: Math.min(1, Math.max(0, (m.clientX - box.left) / box.width)) });
-    };
-    wipe.addEventListener("pointermove", move);
-    wipe.addEventListener("pointerup", () => wipe.removeEventListener("pointermove", move), { once: true });
-  });
-  wipe.addEventListener("keydown", (e) => {
-    const step = e.key === "ArrowRight" ? 0.02 : e.key === "ArrowLeft" ? -0.02 : 0;
-    if (!step) return;
-    e.preventDefault();
-    e.stopPropagation();
-    app.set({ wipe: Math.min(1, Math.max(0, app.settings.wipe + step)) });
-  });
+  slidesAcross(wipe, () => stage, () => app.settings.wipe, (share) => app.set({ wipe: Math.min(1, Math.max(0, share)) }), () => stopReveal());
 
   const fade = slider({ id: "photo", label: "Photograph", min: 0, max: 1, step: 0.01, value: 0, reset: 0, show: (v) => `${Math.round(100 * v)} %`, change: (v) => app.set({ photo: v }) });
   const cameraName = el("span", { class: "camera-name", id: "camera-name" });

@@ -109,6 +109,14 @@ std::optional<Ab> ab_of_hex(const std::string& color) {
   return Ab{lab.a, lab.b};
 }
 
+std::vector<std::string> paintable_views(const Capture& capture) {
+  std::vector<std::string> names;
+  for (const View& view : capture.views) {
+    if (!view.held_out) names.push_back(view.name);
+  }
+  return names;
+}
+
 void cover(const Stroke& stroke, int width, int height, std::span<float> coverage) {
   CNERF_CHECK(coverage.size() == std::size_t(width) * std::size_t(height), "coverage of the picture's size");
   const float full = stroke.size * float(std::min(width, height)) / 2;

@@ -10,6 +10,7 @@
 
 #include "src/base/json_record.h"
 #include "src/base/record.h"
+#include "src/capture/capture.h"
 #include "src/train/chroma/known_colors.h"
 
 namespace cnerf {
@@ -74,8 +75,11 @@ void write_strokes(const std::filesystem::path& file, const StrokeList& list);
 /// sRGB "#c08040" -> its a and b; nothing where the text is no colour.
 [[nodiscard]] std::optional<Ab> ab_of_hex(const std::string& color);
 
+/// Names of the views that can be painted: those that are not held out.
+[[nodiscard]] std::vector<std::string> paintable_views(const Capture& capture);
+
 /// Where a stroke covers a picture: 0 none, 1 whole.  [H, W]
-/// @param floor  values that are there already; larger ones stay
+/// @param coverage  larger values that are there already stay
 void cover(const Stroke& stroke, int width, int height, std::span<float> coverage);
 
 /// What is painted on each view that has anything visible, at the views' sizes.

@@ -4,7 +4,7 @@ import { axes, fitted, framed, type View } from "../camera";
 import { Input } from "../input";
 import { add, type Vec3 } from "../math";
 import { Navigator } from "../navigator";
-import { el } from "../ui/dom";
+import { el, slidesAcross } from "../ui/dom";
 import { FrameScheduler } from "./scheduler";
 import type { Session } from "./session";
 import { words } from "./words";
@@ -181,22 +181,7 @@ export class FieldView extends Navigator {
   private wipeHandle(): HTMLElement {
     const handle = el("div", { class: "wipe", id: "wipe-handle", role: "slider", "aria-valuemin": "0", "aria-valuemax": "100", tabindex: "0" },
       this.labels[0], el("span", { class: "grip" }), this.labels[1]);
-    handle.addEventListener("pointerdown", (e) => {
-      handle.setPointerCapture(e.pointerId);
-      const move = (m: PointerEvent) => {
-        const box = this.node.getBoundingClientRect();
-        this.setWipe((m.clientX - box.left) / box.width);
-      };
-      handle.addEventListener("pointermove", move);
-      handle.addEventListener("pointerup", () => handle.removeEventListener("pointermove", move), { once: true });
-    });
-    handle.addEventListener("keydown", (e) => {
-      const step = e.key === "ArrowRight" ? 0.02 : e.key === "ArrowLeft" ? -0.02 : 0;
-      if (!step) return;
-      e.preventDefault();
-      e.stopPropagation();
-      this.setWipe(this.wipe + step);
-    });
+    slidesAcross(handle, () => this.node, () => this.wipe, (share) => this.setWipe(share));
     return handle;
   }
 }

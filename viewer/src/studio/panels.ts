@@ -161,8 +161,8 @@ export function ideasPanel(session: Session, reference: (file: File) => void): H
     reference(new File([await answer.blob()], `suggestion-${number}.jpg`, { type: "image/jpeg" }));
   };
   const node = section(words.ideas, false,
-    el("div", { class: "buttons" }, button(words.suggest, () => void session.order({ order: "suggest" }), { id: "suggest" }), button(words.reference, () => file.click())),
-    el("p", { class: "note" }, `${words.suggestNote} ${words.referenceNote}`), cards, file);
+    el("div", { class: "buttons" }, ...(session.state.cards ? [button(words.suggest, () => void session.order({ order: "suggest" }), { id: "suggest" })] : []), button(words.reference, () => file.click())),
+    el("p", { class: "note" }, session.state.cards ? `${words.suggestNote} ${words.referenceNote}` : words.referenceNote), cards, file);
   session.onState((state) => {
     keyed(cards, state.cards ?? [], (card) => `${card.number} ${card.address}`, ({ number, address }) =>
       el("button", { type: "button", class: "idea", "aria-label": words.card(number), onclick: () => void choose(number, address) }, el("img", { src: address, alt: "" })));

@@ -135,6 +135,27 @@ export function section(title: string, open: boolean, ...children: (Node | strin
   return el("details", { class: "section", open }, el("summary", {}, title), el("div", { class: "body" }, ...children));
 }
 
+/** Lets a handle be drawn across an area, or moved by its keys. @param put takes the share of the area's width */
+export function slidesAcross(handle: HTMLElement, area: () => HTMLElement, at: () => number, put: (share: number) => void, begin: () => void = () => {}): void {
+  handle.addEventListener("pointerdown", (e) => {
+    handle.setPointerCapture(e.pointerId);
+    begin();
+    const move = (m: PointerEvent) => {
+      const box = area().getBoundingClientRect();
+      put((m.clientX - box.left) / box.width);
+    };
+    handle.addEventListener("pointermove", move);
+    handle.addEventListener("pointerup", () => handle.removeEventListener("pointermove", move), { once: true });
+  });
+  handle.addEventListener("keydown", (e) => {
+    const step = e.key === "ArrowRight" ? 0.02 : e.key === "ArrowLeft" ? -0.02 : 0;
+    if (!step) return;
+    e.preventDefault();
+    e.stopPropagation();
+    put(at() + step);
+  });
+}
+
 let toastTimer = 0;
 export function toast(text: string): void {
   let node = document.getElementById("toast");
