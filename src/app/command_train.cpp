@@ -31,7 +31,7 @@ void train(const TrainArguments& arguments, const std::vector<std::string>& comm
   }
   pipeline::begin_run(context, arguments.capture, arguments.existing);
   Observer& observer = live ? static_cast<Observer&>(*live) : reporter;
-  pipeline::train_step(context, arguments.existing.resume, engines, observer);
+  pipeline::train_step(context, {arguments.existing.resume}, engines, observer);
   reporter.next("cnerf colorize " + arguments.out + " --colorizer reference:PHOTO.jpg");
 }
 

@@ -14,12 +14,18 @@ void add_run_folder_options(CLI::App& app, RunFolderArguments& arguments) {
 
 pipeline::RunContext open_run(const RunFolderArguments& arguments, const std::string& take,
                               std::vector<std::string> command_line, Reporter& reporter) {
-  pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.run);
-  const pipeline::RunRecord record = directory.record();
+  const pipeline::RunRecord record = pipeline::RunDirectory::open(arguments.run).record();
   if (!record.stage1.finished) {
     throw MissingInputError(arguments.run + ": stage 1 is not finished; go on with: cnerf train " +
                             record.capture.string() + " -o " + arguments.run + " --resume");
   }
+  return open_begun_run(arguments, take, std::move(command_line), reporter);
+}
+
+pipeline::RunContext open_begun_run(const RunFolderArguments& arguments, const std::string& take,
+                                    std::vector<std::string> command_line, Reporter& reporter) {
+  pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.run);
+  const pipeline::RunRecord record = directory.record();
   Config config = resolve_config(arguments.config, directory.config(take, reporter));
   std::error_code failure;
   if (arguments.capture.empty() && !fs::exists(record.capture, failure)) {
@@ -29,7 +35,7 @@ pipeline::RunContext open_run(const RunFolderArguments& arguments, const std::st
   Capture capture = pipeline::read_capture(arguments.capture.empty() ? record.capture : fs::path(arguments.capture),
                                            config, reporter);
   pipeline::RunContext context{std::move(directory), std::move(config), std::move(capture), std::move(command_line)};
-  pipeline::use_learned_views(context, reporter);
+  if (record.stage1.finished) pipeline::use_learned_views(context, reporter);
   return context;
 }
 

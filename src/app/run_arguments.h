@@ -24,6 +24,10 @@ void add_run_folder_options(CLI::App& app, RunFolderArguments& arguments);
 [[nodiscard]] pipeline::RunContext open_run(const RunFolderArguments& arguments, const std::string& take,
                                             std::vector<std::string> command_line, Reporter& reporter);
 
+/// The same of a run whose stage 1 may not be finished: what it learned of views is not in the capture then.
+[[nodiscard]] pipeline::RunContext open_begun_run(const RunFolderArguments& arguments, const std::string& take,
+                                                  std::vector<std::string> command_line, Reporter& reporter);
+
 /// Refuses `output` that exists unless `overwrite`.  @throws UsageError.
 void refuse_existing(const std::filesystem::path& output, bool overwrite);
 

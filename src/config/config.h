@@ -11,6 +11,7 @@
 #include "src/capture/load_capture.h"
 #include "src/colorizer/colorizer_options.h"
 #include "src/config/toml_binding.h"
+#include "src/field/finish.h"
 #include "src/render/picture_options.h"
 #include "src/train/chroma/stage2_options.h"
 #include "src/train/luminance/stage1_options.h"
@@ -31,6 +32,7 @@ struct Config {
   cnerf::bake::MeshOptions mesh;
   exporting::WebOptions web;
   PictureOptions render;
+  Finish finish;
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -47,6 +49,7 @@ struct Config {
     v.section("mesh", mesh);
     v.section("web", web);
     v.section("render", render);
+    v.section("finish", finish);
   }
 };
 

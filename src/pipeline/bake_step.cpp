@@ -34,7 +34,7 @@ void bake_step(const RunContext& context, const BakeJob& job, const Engines& eng
   const auto& [take, folder, formats] = job;
   const StepLocks locks(context.directory, folder, observer);
   const Stopwatch watch;
-  const auto scene = load_scene(context.directory, take, engines);
+  const auto scene = load_scene(context.directory, take, context.config.finish, engines);
   const Config& config = context.config;
   bake::Job bake{*scene, engines, bake::cameras_of(context.capture), volume_options(config, formats)};
   bake.volumes = formats.volumes();

@@ -8,6 +8,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/text.h"
+#include "src/picture/encode.h"
 #include "src/pipeline/known_color_files.h"
 #include "src/train/chroma/stage2.h"
 
@@ -44,7 +45,7 @@ TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Eng
   write_file(directory.take_config_file(job.take), to_toml(context.config));
   const Stage2Report report =
       train_stage2({context.capture, directory.stage1_snapshot(), context.config.stage2, colorizer, known,
-                    directory.take_snapshot(job.take), job.existing.resume, job.views},
+                    directory.take_snapshot(job.take), job.existing.resume, job.views, nullptr, nullptr, job.watch},
                    engines, observer);
   observer.report_progress({"stage 2", 1.0, {}});
   return {job.take, colorizer.name() + describe(known), report};
@@ -81,12 +82,24 @@ std::string take_to_write(const RunContext& context, const std::string& named, c
   return directory.free_take_name(kind_of(context.config.colorizer.spec));
 }
 
+std::vector<Tile> base_candidates(const RunContext& context, ViewCache* views, const Engines& engines,
+                                  Observer& observer) {
+  const auto colorizer = colorizer_of(context, observer);
+  const fs::path nowhere = context.directory.root() / "bases";
+  return cnerf::base_candidates({context.capture,
+                                 context.directory.stage1_snapshot(),
+                                 context.config.stage2,
+                                 *colorizer,
+                                 {},
+                                 nowhere,
+                                 false,
+                                 views},
+                                engines, observer);
+}
+
 void show_bases(const RunContext& context, const Engines& engines, Observer& observer) {
   const fs::path gallery = context.directory.root() / "bases.png";
-  const auto colorizer = colorizer_of(context, observer);
-  write_base_candidates(
-      {context.capture, context.directory.stage1_snapshot(), context.config.stage2, *colorizer, {}, gallery}, engines,
-      observer);
+  write_png(gallery, tiled(base_candidates(context, nullptr, engines, observer)));
   observer.wrote("base candidates", gallery);
 }
 

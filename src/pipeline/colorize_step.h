@@ -1,11 +1,14 @@
 #pragma once
 /// Stage 2 as a step of a run.
 
+#include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "src/colorizer/colorizer.h"
 #include "src/engine/engines.h"
+#include "src/picture/contact_sheet.h"
 #include "src/pipeline/run_context.h"
 
 namespace cnerf::pipeline {
@@ -22,14 +25,19 @@ namespace cnerf::pipeline {
 [[nodiscard]] std::string take_to_write(const RunContext& context, const std::string& named,
                                         const ExistingOutput& existing);
 
+/// Base candidates as pictures.
+/// @param views  of the run's stage 1; null = traced anew
+[[nodiscard]] std::vector<Tile> base_candidates(const RunContext& context, ViewCache* views, const Engines& engines,
+                                                Observer& observer);
 /// Writes the gallery of base candidates beside the takes, bases.png; touches none of them.
 void show_bases(const RunContext& context, const Engines& engines, Observer& observer);
 
 struct ColorizeJob {
   std::string take;
   ExistingOutput existing;
-  Colorizer* colorizer = nullptr;  ///< null: `colorizer_of` the run is made when it is needed
-  ViewCache* views = nullptr;      ///< of the run's stage 1; null = one of its own
+  Colorizer* colorizer = nullptr;                     ///< null: `colorizer_of` the run is made when it is needed
+  ViewCache* views = nullptr;                         ///< of the run's stage 1; null = one of its own
+  std::function<void(const ColorModel&)> watch = {};  ///< as Stage2Job has it
 };
 
 /// Stage 2 into a take, unless it is finished. Makes it the current one.

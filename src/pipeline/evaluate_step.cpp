@@ -37,7 +37,7 @@ void evaluate_step(const RunContext& context, const EvaluateJob& job, const Engi
   const Stopwatch watch;
   std::optional<Lpips> lpips;
   if (!job.lpips_weights.empty()) lpips.emplace(job.lpips_weights);  // read first: what is missing costs no rendering
-  const auto scene = load_scene(directory, job.take, engines);
+  const auto scene = load_scene(directory, job.take, {}, engines);
   EvaluateOptions options;
   options.lpips = lpips ? &*lpips : nullptr;
   options.render = render_options(context.config);

@@ -166,7 +166,9 @@ std::vector<fs::path> photographs_step(const RunContext& context, const Photogra
   const std::vector<Photograph> photographs = chosen(all_photographs(context, capture), job.views);
   const StepLocks locks(directory, job.folder, observer);
   const Stopwatch watch;
-  const auto scene = load_scene(directory, job.take, engines);
+  Finish finish = context.config.finish;
+  finish.exposure = 0;  // their own light stays
+  const auto scene = load_scene(directory, job.take, finish, engines);
   const ProgressSink progress = observer.progress_sink();
   std::vector<fs::path> files;
   for (const Photograph& photograph : photographs) {

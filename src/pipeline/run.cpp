@@ -36,7 +36,7 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& observ
   if (!job.grey) (void)load_known_colors(context.capture, context.config.colorizer);
   const auto colorizer = needs_colorizer(job, directory) ? colorizer_of(context, observer) : nullptr;
   begin_run(context, job.capture, job.existing);
-  train_step(context, job.existing.resume, engines, observer);
+  train_step(context, {job.existing.resume}, engines, observer);
   use_learned_views(context, observer);
 
   std::string take;

@@ -157,8 +157,10 @@ void RunDirectory::clear() const {
   }
 }
 
-std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::string& take, const Engines& engines) {
-  return Scene::load(directory.stage1_snapshot(), take.empty() ? fs::path() : directory.take_snapshot(take), engines);
+std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::string& take, const Finish& finish,
+                                  const Engines& engines) {
+  return Scene::load(directory.stage1_snapshot(), take.empty() ? fs::path() : directory.take_snapshot(take), finish,
+                     engines);
 }
 
 std::string colorizer_name(const RunDirectory& directory, const std::string& take) {

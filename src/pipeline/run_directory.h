@@ -141,7 +141,7 @@ class RunDirectory {
 /// The trained scene of a run.
 /// @param take  empty = luminance only.  @throws MissingInputError, SnapshotError.
 [[nodiscard]] std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::string& take,
-                                                const Engines& engines);
+                                                const Finish& finish, const Engines& engines);
 
 /// Who coloured a take; empty when nobody did.
 [[nodiscard]] std::string colorizer_name(const RunDirectory& directory, const std::string& take);

@@ -8,14 +8,15 @@
 
 namespace cnerf::pipeline {
 
-void train_step(const RunContext& context, bool resume, const Engines& engines, Observer& observer) {
+void train_step(const RunContext& context, const TrainJob& job, const Engines& engines, Observer& observer) {
   const RunDirectory& directory = context.directory;
   const FolderLock lock = lock_folder(directory.root(), FolderLock::Mode::kAlone, observer);
   RunRecord record = directory.record();
-  if (!record.stage1.finished || !resume) {
-    Stage1Job job{context.capture, context.config.stage1, directory.stage1_snapshot(), resume};
-    job.points = prepare::points_for_training(job, observer);
-    record.stage1 = {train_stage1(job, engines, observer), true};
+  if (!record.stage1.finished || !job.resume) {
+    Stage1Job stage1{context.capture, context.config.stage1, directory.stage1_snapshot(), job.resume};
+    stage1.points = prepare::points_for_training(stage1, observer);
+    stage1.watch = job.watch;
+    record.stage1 = {train_stage1(stage1, engines, observer), true};
     directory.save(record);
   }
   observer.say(fmt::format("stage 1: {} steps in {}, {:.1f} dB on training pixels", record.stage1.steps,

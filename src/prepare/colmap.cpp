@@ -75,8 +75,9 @@ class Colmap {
       if (interruption_requested()) {
         throw Interrupted("stopped during " + task + "; what is finished is kept in " + log_.parent_path().string());
       }
-      const double share = share_in_log(log_tail(begin), images);
-      if (progress && share > shown) progress({task, shown = std::min(share, 0.999), {}});
+      // Also where nothing moved: the sink may want to stop.
+      shown = std::max(shown, std::min(share_in_log(log_tail(begin), images), 0.999));
+      if (progress) progress({task, shown, {}});
     };
     if (progress) progress({task, 0, {}});
     const int status = run_program(line, log_, watch);

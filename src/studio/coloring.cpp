@@ -18,13 +18,14 @@ std::vector<KnownColors> known_of(const std::vector<Stroke>& strokes, std::span<
 }
 
 Journal read_journal(const fs::path& file, std::span<const std::string> views) {
+  PaintedPictures pictures(file.parent_path());
   auto journal = read_record<Journal>(file);
   if (journal.deeds.empty()) throw InputError(file, "deeds", "expected at least one");
   if (const std::string& base = journal.deeds.front().base; !base.empty()) pipeline::check_take_name(base);
   for (std::size_t i = 0; i < journal.deeds.size(); ++i) {
     StrokeList list{0, std::move(journal.deeds[i].strokes)};
     const fs::path of_deed = file.string() + ": deeds[" + std::to_string(i) + "]";
-    journal.deeds[i].strokes = strokes_of_json(json_of(list).dump(), of_deed, views).strokes;
+    journal.deeds[i].strokes = strokes_of_json(json_of(list).dump(), of_deed, views, pictures).strokes;
   }
   return journal;
 }

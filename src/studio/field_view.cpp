@@ -28,10 +28,11 @@ std::vector<float> light_of(std::span<const Ray> rays, const LuminanceEngine& en
 }
 
 /// Colours at their luminance, from the pixel `first` on.
-void put(std::span<const float> luminance, const std::vector<Ab>& colors, std::size_t first, Picture& picture) {
+void put(std::span<const float> luminance, const std::vector<Ab>& colors, const Finish& finish, std::size_t first,
+         Picture& picture) {
   parallel_ranges(colors.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Vec3f rgb = linear_rgb_at(luminance[i], colors[i]);
+      const Vec3f rgb = linear_rgb_at(finish.gain() * luminance[i], finish.of(colors[i]));
       for (int c = 0; c < 3; ++c) picture.rgb[3 * (first + i) + std::size_t(c)] = srgb8_from_linear(rgb[c]);
     }
   });
@@ -62,13 +63,14 @@ std::vector<Picture> draw_field(const LuminanceModel& luminance, const FieldCame
     const std::vector<float> light =
         is_grey ? light_of(rays, *luminance.engine, march, effort.rays) : pixel_luminance(pixels);
     for (std::size_t s = 0; s < sides.size(); ++s) {
-      put(light, sides[s] != nullptr ? sides[s]->decode(pixels) : std::vector<Ab>(rays.size()), first, pictures[s]);
+      put(light, sides[s] != nullptr ? sides[s]->decode(pixels) : std::vector<Ab>(rays.size()), effort.finish, first,
+          pictures[s]);
     }
   }
   return pictures;
 }
 
-Picture draw_cached(const CachedView& view, Side side, int width) {
+Picture draw_cached(const CachedView& view, Side side, int width, const Finish& finish) {
   const int step = std::max(1, (view.width + width - 1) / width);
   Picture picture = blank(std::max(view.width / step, 1), std::max(view.height / step, 1));
   std::vector<ViewPixel> places;
@@ -82,7 +84,7 @@ Picture draw_cached(const CachedView& view, Side side, int width) {
   std::vector<float> light;
   for (const ViewPixel& place : places) light.push_back(view.luminance[place.pixel]);
   put(light, side != nullptr ? side->decode(pixel_samples(std::span(&view, 1), places)) : std::vector<Ab>(light.size()),
-      0, picture);
+      finish, 0, picture);
   return picture;
 }
 

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "src/field/finish.h"
 #include "src/picture/picture.h"
 #include "src/train/chroma/color_model.h"
 #include "src/train/luminance/luminance_model.h"
@@ -24,12 +25,13 @@ using Side = const ColorModel*;
 struct DrawingEffort {
   RenderEffort rays;
   int steps_per_box = 0;  ///< of the march; 0 as in training
+  Finish finish = {};
 };
 
 /// Of a picture that is looked at: what is left out cannot be seen.
 /// @param steps_per_box  as `RenderOptions` has them
-[[nodiscard]] inline DrawingEffort sharp_effort(int steps_per_box) {
-  return {{1e-2f, 0.98f}, steps_per_box};
+[[nodiscard]] inline DrawingEffort sharp_effort(int steps_per_box, const Finish& finish = {}) {
+  return {{1e-2f, 0.98f}, steps_per_box, finish};
 }
 
 /// Draws one picture for each side, of the lens's size, all from one march.
@@ -40,6 +42,6 @@ struct DrawingEffort {
                                               const std::function<bool()>& keep_going);
 
 /// The same of a cached view, its pixels thinned to a width of at most `width`: for thumbnails.
-[[nodiscard]] Picture draw_cached(const CachedView& view, Side side, int width);
+[[nodiscard]] Picture draw_cached(const CachedView& view, Side side, int width, const Finish& finish);
 
 }  // namespace cnerf::studio

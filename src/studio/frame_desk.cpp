@@ -5,8 +5,9 @@
 
 namespace cnerf::studio {
 
-std::optional<std::string> FrameDesk::ask(const std::string& client, Drawing drawing) {
+std::optional<std::string> FrameDesk::ask(const std::string& client, bool is_urgent, Drawing drawing) {
   auto frame = std::make_shared<Frame>();
+  frame->is_urgent = is_urgent;
   frame->client = client;
   frame->drawing = std::move(drawing);
   {
@@ -29,15 +30,21 @@ std::optional<std::string> FrameDesk::ask(const std::string& client, Drawing dra
   return std::move(frame->result);
 }
 
-bool FrameDesk::draw_waiting() {
+FrameDesk::Waiting::const_iterator FrameDesk::next(Which which) const {
+  return std::ranges::find_if(
+      waiting_, [&](const std::shared_ptr<Frame>& frame) { return which == Which::kAll || frame->is_urgent; });
+}
+
+bool FrameDesk::draw_waiting(Which which) {
   bool has_drawn = false;
   for (;;) {
     std::shared_ptr<Frame> frame;
     {
       const std::lock_guard lock(mutex_);
-      if (waiting_.empty() || is_closed_) return has_drawn;
-      frame = drawn_now_ = waiting_.front();
-      waiting_.pop_front();
+      const auto first = next(which);
+      if (first == waiting_.end() || is_closed_) return has_drawn;
+      frame = drawn_now_ = *first;
+      waiting_.erase(first);
     }
     std::optional<std::string> result;
     std::exception_ptr failure;
@@ -59,9 +66,9 @@ bool FrameDesk::draw_waiting() {
   }
 }
 
-bool FrameDesk::has_waiting() const {
+bool FrameDesk::has_waiting(Which which) const {
   const std::lock_guard lock(mutex_);
-  return !waiting_.empty();
+  return next(which) != waiting_.end();
 }
 
 void FrameDesk::close() {

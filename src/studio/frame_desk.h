@@ -21,13 +21,18 @@ class FrameDesk {
   /// @param changed  is called when there is something to draw
   explicit FrameDesk(std::function<void()> changed) : changed_(std::move(changed)) {}
 
+  enum class Which {
+    kUrgent,  ///< somebody moves the camera
+    kAll,
+  };
+
   /// Waits for the frame.  @return  nothing where the client wants another by now, or the desk is closed
   /// @throws  what the drawing throws
-  [[nodiscard]] std::optional<std::string> ask(const std::string& client, Drawing drawing);
+  [[nodiscard]] std::optional<std::string> ask(const std::string& client, bool is_urgent, Drawing drawing);
 
   /// Draws what waits, on the calling thread.  @return  whether there was anything
-  bool draw_waiting();
-  [[nodiscard]] bool has_waiting() const;
+  bool draw_waiting(Which which = Which::kAll);
+  [[nodiscard]] bool has_waiting(Which which = Which::kAll) const;
   /// Lets everybody go.
   void close();
 
@@ -35,15 +40,18 @@ class FrameDesk {
   struct Frame {
     std::string client;
     Drawing drawing;
-    bool is_stale = false, is_done = false;
+    bool is_urgent = false, is_stale = false, is_done = false;
     std::optional<std::string> result;
     std::exception_ptr failure;
   };
 
+  using Waiting = std::list<std::shared_ptr<Frame>>;
+  [[nodiscard]] Waiting::const_iterator next(Which which) const;
+
   std::function<void()> changed_;
   mutable std::mutex mutex_;
   std::condition_variable done_;
-  std::list<std::shared_ptr<Frame>> waiting_;
+  Waiting waiting_;
   std::shared_ptr<Frame> drawn_now_;
   bool is_closed_ = false;
 };

@@ -38,6 +38,7 @@ struct FrameMessage {
   std::array<Triple, 3> rotation{};  ///< rows of world_from_camera
   LensMessage lens;
   std::vector<std::string> sides;  ///< "grey", "now", or a take
+  bool moving = false;             ///< somebody moves the camera; else a better or newer picture of where it rests
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
@@ -45,6 +46,7 @@ struct FrameMessage {
     v("rotation", self.rotation);
     v("lens", self.lens);
     v("sides", self.sides);
+    v("moving", self.moving, kOptional);
   }
 };
 
@@ -113,11 +115,47 @@ struct DownloadMessage {
   }
 };
 
+/// A suggestion of colours.
+struct CardMessage {
+  int number = 0;  ///< as `cnerf colorize --bases` counts
+  std::string address;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("number", self.number);
+    v("address", self.address);
+  }
+};
+
+/// What a page has sent to begin with.
+struct ArrivedMessage {
+  int files = 0;
+  std::uint64_t bytes = 0;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("files", self.files);
+    v("bytes", self.bytes);
+  }
+};
+
+// Stages of a studio.
+inline constexpr const char* kPhotographs = "photographs";  ///< there is no capture yet
+inline constexpr const char* kTraining = "training";        ///< luminance and density are not trained to the end
+inline constexpr const char* kField = "field";
+
 /// GET state, and the news.
 struct StateMessage {
   std::uint64_t version = 1, colors = 1;
-  std::string task;
+  std::string stage = kField;
+  int scene = 1;     ///< grows when GET scene answers otherwise
+  std::string task;  ///< that is worked on; empty = none
+  std::string step;  ///< of the task, in words
   double fraction = 0;
+  std::vector<std::string> notes;  ///< what the work said lately
+  ArrivedMessage arrived;
+  Finish finish;
+  std::vector<CardMessage> cards;
   std::map<std::string, double> figures;
   std::string message;
   bool failed = false, ready = false;
@@ -134,8 +172,15 @@ struct StateMessage {
   static void visit(Self& self, Visitor&& v) {
     v("version", self.version);
     v("colors", self.colors);
+    v("stage", self.stage);
+    v("scene", self.scene);
     v("task", self.task);
+    v("step", self.step);
     v("fraction", self.fraction);
+    v("notes", self.notes);
+    v("arrived", self.arrived);
+    v("finish", self.finish);
+    v("cards", self.cards);
     v("figures", self.figures);
     v("message", self.message);
     v("failed", self.failed);
@@ -155,6 +200,8 @@ struct StateMessage {
 struct OrderMessage {
   std::string order, take, name, format;
   std::vector<std::string> formats;
+  std::vector<int> bases;  ///< numbers of the cards that are liked
+  Finish finish;
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
@@ -163,6 +210,10 @@ struct OrderMessage {
     v("name", self.name, kOptional);
     v("format", self.format, kOptional);
     v("formats", self.formats, kOptional);
+    v("bases", self.bases, kOptional);
+    v("saturation", self.finish.saturation, kOptional);
+    v("hue", self.finish.hue, kOptional);
+    v("exposure", self.finish.exposure, kOptional);
   }
 };
 

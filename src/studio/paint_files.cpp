@@ -40,6 +40,18 @@ cv::Mat colors_at_luminance(const RunningColors& colors, cv::Size size, std::uin
   return picture;
 }
 
+fs::path stroke_folder(const pipeline::RunContext& context) {
+  return context.directory.root() / "strokes";
+}
+
+void write_strokes_whole(const fs::path& folder, const StrokeList& list, const PaintedPictures& from) {
+  const PaintedPictures to(folder);
+  for (const Stroke& stroke : list.strokes) {
+    if (!stroke.picture.empty()) write_file(to.file(stroke.picture), read_text_file(from.file(stroke.picture)));
+  }
+  write_strokes(folder / kStrokeFile, list);
+}
+
 void write_paint_pictures(const fs::path& folder, const Capture& capture, const std::vector<Stroke>& strokes) {
   for (const View& view : capture.views) {
     const fs::path file = folder / picture_name(view.name);

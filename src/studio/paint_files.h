@@ -10,12 +10,19 @@
 
 #include "src/base/observer.h"
 #include "src/capture/capture.h"
-#include "src/pipeline/run_directory.h"
+#include "src/pipeline/run_context.h"
 #include "src/train/chroma/strokes.h"
 
 namespace cnerf::studio {
 
 inline constexpr const char* kStrokeFile = "strokes.json";
+inline constexpr const char* kNow = "now";  ///< what a picture shows: no take's name
+
+/// Where a run keeps what is painted.
+[[nodiscard]] std::filesystem::path stroke_folder(const pipeline::RunContext& context);
+/// Writes a list with the painted pictures that it names.
+/// @param from  where these lie
+void write_strokes_whole(const std::filesystem::path& folder, const StrokeList& list, const PaintedPictures& from);
 
 /// Colours at the luminance that is there: B G R A, 8 bits, transparent where nothing is known.
 /// @param luminance  linear Y of a pixel

@@ -1,19 +1,14 @@
-#include "src/studio/studio.h"
+/// The studio's life: training, frames, and one order after another.
 
-#include <fmt/format.h>
+#include "src/studio/studio.h"
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
+#include <utility>
 
 #include "src/base/error.h"
-#include "src/base/files.h"
-#include "src/base/text.h"
-#include "src/base/usage.h"
 #include "src/picture/encode.h"
-#include "src/pipeline/bake_step.h"
-#include "src/pipeline/colorize_step.h"
-#include "src/pipeline/photographs_step.h"
+#include "src/pipeline/train_step.h"
 #include "src/studio/paint_files.h"
 
 namespace cnerf::studio {
@@ -21,34 +16,44 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr auto kPoll = std::chrono::milliseconds(50);  // Ctrl-C only sets a flag
-constexpr double kBetweenColors = 1.0;                 // seconds: pages draw what changed
 constexpr std::size_t kMostTakesInMemory = 3;
 constexpr int kJpegQuality = 88;
-constexpr const char* kNow = "now";
-
-fs::path stroke_folder(const pipeline::RunContext& context) {
-  return context.directory.root() / "strokes";
-}
+// A page that moves may slow a training to half on a processor, by a tenth on a GPU; one that rests by 2 %.
+constexpr double kTrainingPerTurn = 1, kTrainingPerTurnOfGpu = 9;
+constexpr double kTrainingPerRefresh = 50, kLeastBetweenRefreshes = 1, kMostBetweenRefreshes = 60;  // seconds
 
 }  // namespace
 
-Studio::Studio(const pipeline::RunContext& context, const std::string& take, const Engines& engines, Observer& observer,
+Studio::Studio(pipeline::RunContext& context, std::string take, const Engines& engines, Observer& observer,
                const RetouchOptions& retouch)
     : context_(context),
+      painted_(stroke_folder(context)),
       engines_(engines),
       observer_(observer),
       retouch_(retouch),
-      run_lock_(pipeline::lock_folder(context.directory.root(), FolderLock::Mode::kShared, observer)),
+      run_lock_(pipeline::lock_folder(
+          context.directory.root(),
+          context.directory.record().stage1.finished ? FolderLock::Mode::kShared : FolderLock::Mode::kAlone, observer)),
       lock_(pipeline::lock_folder(stroke_folder(context), FolderLock::Mode::kAlone, observer)),
+      first_take_(std::move(take)),
       scene_(json_of(scene_of(context.capture, context.directory.root().string())).dump()),
-      coloring_(context, engines),
       frames_([this] { work_.notify_all(); }) {
   const fs::path file = stroke_folder(context_) / kStrokeFile;
   if (fs::exists(file)) strokes_ = read_strokes(file, paintable_views(context_.capture));
-  state_.strokes = strokes_.revision;
-  coloring_.begin(take);
-  state_.take = take;
-  state_.takes = list_takes();
+  const bool is_trained = context_.directory.record().stage1.finished;
+  if (is_trained) {
+    coloring_.emplace(context_, engines_);
+    coloring_->begin(first_take_);
+    field_ = &coloring_->luminance();
+  }
+  std::vector<TakeMessage> takes = list_takes();
+  board_.change([&](StateMessage& state) {
+    state.stage = is_trained ? kField : kTraining;
+    state.strokes = strokes_.revision;
+    state.take = first_take_;
+    state.takes = std::move(takes);
+    state.finish = context_.config.finish;
+  });
 }
 
 Studio::~Studio() {
@@ -57,14 +62,15 @@ Studio::~Studio() {
 
 void Studio::run() {
   Order first;
-  first.message.order = "cache";
+  first.message.order = coloring_ ? "cache" : "train";
   work_on(first);
   while (!interruption_requested() && !closed()) {
-    frames_.draw_waiting();
+    draw_frames();
     std::optional<Order> order;
     {
       std::unique_lock lock(mutex_);
-      work_.wait_for(lock, kPoll, [&] { return order_.has_value() || frames_.has_waiting() || is_closed_; });
+      work_.wait_for(lock, kPoll,
+                     [&] { return order_ || (field_ != nullptr && frames_.has_waiting()) || board_.closed(); });
       std::swap(order, order_);
       is_working_ = order.has_value();
       stop_requested_ = false;
@@ -78,195 +84,95 @@ void Studio::work_on(const Order& order) {
   try {
     carry_out(order);
   } catch (const Interrupted&) {
-    say("stopped; what was done by then stays");
+    board_.say("stopped; what was done by then stays");
   } catch (const Error& problem) {
-    say(problem.what(), true);
+    board_.say(problem.what(), true);
   } catch (const std::bad_alloc&) {
-    say("the memory does not suffice for this", true);
+    board_.say("the memory does not suffice for this", true);
   }
   std::vector<TakeMessage> takes = list_takes();
-  change([&](StateMessage& state) {
-    is_working_ = false;
+  const std::lock_guard lock(mutex_);
+  is_working_ = false;
+  board_.change([&](StateMessage& state) {
     state.task.clear();
+    state.step.clear();
     state.fraction = 0;
     state.takes = std::move(takes);
-    state.take = coloring_.base_name();
-    state.unkept = coloring_.is_unkept();
+    if (!coloring_) return;
+    state.take = coloring_->base_name();
+    state.unkept = coloring_->is_unkept();
   });
 }
 
-void Studio::carry_out(const Order& of_page) {
-  const OrderMessage& order = of_page.message;
-  if (order.order == "cache") {
-    coloring_.cache_views([this](double fraction) { breathe("cache", fraction); });
-    change([](StateMessage& state) { state.ready = true; });
-  } else if (order.order == "colour") {
-    colour();
-  } else if (order.order == "keep") {
-    check_new_name(order.name);
-    coloring_.keep(order.name, 0, observer_);
-    write_strokes(context_.directory.take_folder(order.name) / kStrokeFile, saved_strokes());
-    say("kept as take " + order.name);
-  } else if (order.order == "begin") {
-    coloring_.begin(context_.directory.choose_take(order.take.empty() ? pipeline::kGreyTake : order.take));
-    say(order.take.empty() ? "grey again" : "begun from take " + order.take);
-    colors_changed();
-  } else if (order.order == "rename") {
-    rename_take(order.take, order.name);
-  } else if (order.order == "duplicate") {
-    duplicate_take(order.take, order.name);
-  } else if (order.order == "delete") {
-    delete_take(order.take);
-  } else if (order.order == "reference") {
-    color_by_reference(of_page.picture);
-  } else if (order.order == "bake") {
-    bake(order.formats);
-  } else if (order.order == "photographs") {
-    write_photographs(order.format);
-  } else {
-    throw UsageError("the studio cannot do this yet: " + order.order);
-  }
-}
+// ---- training -----------------------------------------------------------------------------------------------------
 
-void Studio::colour() {
-  const std::vector<Stroke> strokes = saved_strokes().strokes;
-  write_paint_pictures(stroke_folder(context_), context_.capture, strokes);
-  const Stopwatch watch;
-  double shown_at = 0;
-  coloring_.colour(strokes, retouch_, [&](double fraction) {
-    if (watch.seconds() - shown_at > kBetweenColors) {
-      shown_at = watch.seconds();
+void Studio::train(const Order& order) {
+  if (coloring_) throw UsageError("the scene is trained");
+  halted_.reset();
+  field_ = nullptr;
+  BoardObserver observer(
+      board_, observer_, "train", [] {}, [this] { return should_stop(); });
+  const auto watch = [this](const LuminanceModel& model) { watch_training(model); };
+  try {
+    pipeline::train_step(context_, {.resume = true, .watch = watch}, engines_, observer);
+  } catch (const Error&) {
+    // What was learned by then can be looked at.
+    if (fs::exists(context_.directory.stage1_snapshot()) && !board_.closed()) {
+      halted_ = LuminanceModel::load(context_.directory.stage1_snapshot(), engines_);
+      field_ = &*halted_;
       colors_changed();
     }
-    breathe("colour", fraction);
-  });
+    throw;
+  }
+  open_field();
+  cache_views(order);
+}
+
+/// Between two steps of a training: frames are drawn, but not for longer than it may be slowed.
+void Studio::watch_training(const LuminanceModel& model) {
+  const double since = since_drawn_.seconds();
+  const double per_turn = engines_.device() == Device::kCuda ? kTrainingPerTurnOfGpu : kTrainingPerTurn;
+  const double pause = std::min(kTrainingPerRefresh * drawing_seconds_, kMostBetweenRefreshes);
+  const auto which = since >= pause ? FrameDesk::Which::kAll : FrameDesk::Which::kUrgent;
+  if (since >= per_turn * drawing_seconds_ && frames_.has_waiting(which)) {
+    const Stopwatch drawing;
+    field_ = &model;
+    frames_.draw_waiting(which);
+    field_ = nullptr;
+    drawing_seconds_ = drawing.seconds();
+    since_drawn_ = {};
+  }
+  if (since < pause || since_refresh_.seconds() < std::max(pause, kLeastBetweenRefreshes)) return;
+  since_refresh_ = {};
   colors_changed();
-  const std::string base = coloring_.base_name();
-  change([&](StateMessage& state) {
-    state.message = fmt::format("settled in {:.0f} s", watch.seconds());
-    state.commands.push_back(fmt::format("cnerf colorize {}{} --strokes {}", context_.directory.root().string(),
-                                         base.empty() ? " --colorizer grey" : "",
-                                         (stroke_folder(context_) / kStrokeFile).string()));
-  });
 }
 
-/// Steps of the pipeline, as the studio's page sees them.
-class Studio::JobObserver final : public Observer {
- public:
-  JobObserver(Studio& studio, std::string task) : studio_(studio), task_(std::move(task)) {}
-  void report_progress(const Progress& progress) override {
-    studio_.change([&](StateMessage& state) {
-      state.figures.clear();
-      for (const auto& [name, value] : progress.figures) {
-        if (std::isfinite(value)) state.figures[name] = value;
-      }
-    });
-    studio_.breathe(task_, progress.fraction);
-  }
-  void say(const std::string& text) override { studio_.observer_.say(text); }
-  [[nodiscard]] bool is_cancelled() const override { return studio_.should_stop(); }
-
- private:
-  Studio& studio_;
-  std::string task_;
-};
-
-/// A take as the colorizer `reference:` makes it, then begun from.
-void Studio::color_by_reference(const fs::path& picture) {
-  pipeline::RunContext context = context_;
-  context.config.colorizer = {};
-  context.config.colorizer.spec = "reference:" + picture.string();
-  const std::string take = context_.directory.free_take_name("reference");
-  JobObserver job(*this, "colour");
-  coloring_.cache_views([this](double fraction) { breathe("cache", fraction); });
-  pipeline::colorize_step(context, {take, {}, nullptr, &coloring_.cached_views()}, engines_, job);
-  coloring_.begin(take);
-  colors_changed();
-  change([&](StateMessage& state) {
-    state.message = "coloured like " + picture.filename().string() + ", take " + take;
-    state.commands.push_back("cnerf colorize " + context_.directory.root().string() +
-                             " --colorizer reference:" + picture.string());
-  });
-}
-
-std::string Studio::take_of_now() {
-  if (coloring_.now() == nullptr) return "";
-  if (!coloring_.is_unkept()) return coloring_.kept_as();
-  const std::string take = context_.directory.free_take_name("studio");
-  coloring_.keep(take, 0, observer_);
-  return take;
-}
-
-void Studio::bake(const std::vector<std::string>& formats) {
-  const exporting::Formats wanted = exporting::parse_formats(cnerf::joined(formats, ","));
-  const std::string take = take_of_now();
-  const fs::path folder = context_.directory.bakes(take);
-  JobObserver job(*this, "bake");
-  pipeline::bake_step(context_, {take, folder, wanted}, engines_, job);
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string kind = entry.path().extension();
-    if (kind == ".vdb" || kind == ".glb" || kind == ".exr") files.push_back(entry.path());
-  }
-  std::ranges::sort(files);
-  offer_downloads(files);
-  change([&](StateMessage& state) {
-    state.message = "baked to " + folder.string();
-    if (wanted.has_manifest()) state.blender = "blender --python " + (folder / "blender_setup.py").string();
-    state.commands.push_back("cnerf bake " + context_.directory.root().string() +
-                             (take.empty() ? "" : " --take " + take) + " --format " + cnerf::joined(formats, ","));
-  });
-}
-
-void Studio::write_photographs(const std::string& format) {
-  const std::string take = take_of_now();
-  pipeline::check_photographs_take(context_.directory, take);
-  const fs::path folder = pipeline::photographs_folder(context_.directory, take);
-  JobObserver job(*this, "photographs");
-  offer_downloads(pipeline::photographs_step(context_, {take, {}, folder, pipeline::photograph_format_named(format)},
-                                             engines_, job));
-  change([&](StateMessage& state) {
-    state.message = "photographs in " + folder.string();
-    state.commands.push_back("cnerf render " + context_.directory.root().string() + " --take " + take +
-                             " --photographs --format " + format);
-  });
-}
-
-/// Those of earlier work go: their files may have been replaced.
-void Studio::offer_downloads(const std::vector<fs::path>& files) {
-  std::vector<DownloadMessage> downloads;
-  for (const fs::path& file : files) {
-    std::error_code failure;
-    const auto bytes = fs::file_size(file, failure);
-    downloads.push_back({file.filename().string(), fmt::format("./studio/files/{}", downloads.size()),
-                         failure ? 0 : std::uint64_t(bytes)});
-  }
-  change([&](StateMessage& state) {
-    downloads_ = files;
-    state.downloads = std::move(downloads);
-  });
-}
-
-/// Between two pieces of work: pages want frames, and users may have had enough.
-void Studio::breathe(const std::string& task, double fraction) {
-  change([&](StateMessage& state) {
-    state.task = task;
-    state.fraction = fraction;
-  });
-  frames_.draw_waiting();
-  if (should_stop()) throw Interrupted("stopped");
-}
-
-bool Studio::should_stop() const {
+/// What was trained is there to be coloured, its views as training found them to be.
+void Studio::open_field() {
+  run_lock_.reset();
+  run_lock_.emplace(pipeline::lock_folder(context_.directory.root(), FolderLock::Mode::kShared, observer_));
+  pipeline::use_learned_views(context_, observer_);
+  coloring_.emplace(context_, engines_);
+  field_ = &coloring_->luminance();
+  std::string scene = json_of(scene_of(context_.capture, context_.directory.root().string())).dump();
   const std::lock_guard lock(mutex_);
-  return stop_requested_ || is_closed_ || interruption_requested();
+  scene_ = std::move(scene);
+  board_.change([&](StateMessage& state) {
+    state.stage = kField;
+    ++state.scene;
+    ++state.colors;
+  });
 }
 
 // ---- pictures -----------------------------------------------------------------------------------------------------
 
+void Studio::draw_frames() {
+  if (field_ != nullptr) frames_.draw_waiting();
+}
+
 const ColorModel* Studio::side_named(const std::string& name) {
-  if (name == pipeline::kGreyTake) return nullptr;
-  if (name == kNow) return coloring_.now();
+  if (name == pipeline::kGreyTake || !coloring_) return nullptr;
+  if (name == kNow) return learning_ != nullptr ? learning_ : coloring_->now();
   const auto found = shown_takes_.find(name);
   if (found != shown_takes_.end()) return found->second.get();
   pipeline::check_take_name(name);
@@ -279,8 +185,8 @@ const ColorModel* Studio::side_named(const std::string& name) {
 std::string Studio::drawn(const FrameMessage& message, const std::function<bool()>& keep_going) {
   std::vector<Side> sides;
   for (const std::string& name : message.sides) sides.push_back(side_named(name));
-  const std::vector<Picture> pictures = draw_field(coloring_.luminance(), camera_of(message), sides,
-                                                   sharp_effort(context_.config.render.steps_per_box), keep_going);
+  const std::vector<Picture> pictures = draw_field(
+      *field_, camera_of(message), sides, sharp_effort(context_.config.render.steps_per_box, finish()), keep_going);
   if (pictures.empty()) return {};
   Picture all = pictures.front();
   for (std::size_t s = 1; s < pictures.size(); ++s) {
@@ -291,49 +197,28 @@ std::string Studio::drawn(const FrameMessage& message, const std::function<bool(
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-// ---- takes --------------------------------------------------------------------------------------------------------
+// ---- state --------------------------------------------------------------------------------------------------------
 
-std::vector<TakeMessage> Studio::list_takes() const {
-  std::vector<TakeMessage> takes;
-  std::error_code failure;
-  for (const auto& entry : fs::directory_iterator(context_.directory.root() / "takes", failure)) {
-    const std::string name = entry.path().filename().string();
-    if (const auto record = context_.directory.take_record(name)) {
-      takes.push_back({name, record->colorizer, record->stage2.seconds});
-    }
-  }
-  std::ranges::sort(takes, {}, &TakeMessage::name);
-  return takes;
+void Studio::breathe(const std::string& task, double fraction) {
+  board_.change([&](StateMessage& state) {
+    state.task = task;
+    state.fraction = fraction;
+  });
+  draw_frames();
+  if (should_stop()) throw Interrupted("stopped");
 }
 
-/// Sides of pictures have names too.
-void Studio::check_new_name(const std::string& name) {
-  pipeline::check_take_name(name);
-  if (name == kNow || name == pipeline::kGreyTake) throw UsageError("no take can be called " + name);
+BoardObserver Studio::observer_of(const std::string& task) {
+  const auto between = [this] {
+    draw_frames();
+    if (should_stop()) throw Interrupted("stopped");
+  };
+  return {board_, observer_, task, between, [this] { return should_stop(); }};
 }
 
-void Studio::duplicate_take(const std::string& take, const std::string& name) {
-  check_new_name(name);
-  const pipeline::RunDirectory& directory = context_.directory;
-  duplicate(directory, take, name, observer_);
-  say("take " + take + " is take " + name + " too");
-}
-
-void Studio::rename_take(const std::string& take, const std::string& name) {
-  check_new_name(name);
-  duplicate(context_.directory, take, name, observer_);
-  remove(context_.directory, take, name, observer_);
-  shown_takes_.erase(take);
-  coloring_.take_is_called(take, name);
-  say("take " + take + " is called " + name + " now");
-}
-
-void Studio::delete_take(const std::string& take) {
-  if (take == coloring_.base_name()) throw UsageError("what is shown now was begun from take " + take);
-  remove(context_.directory, take, "", observer_);
-  shown_takes_.erase(take);
-  coloring_.take_is_called(take, "");
-  say("take " + take + " is gone");
+bool Studio::should_stop() const {
+  const std::lock_guard lock(mutex_);
+  return stop_requested_ || board_.closed() || interruption_requested();
 }
 
 StrokeList Studio::saved_strokes() const {
@@ -341,63 +226,29 @@ StrokeList Studio::saved_strokes() const {
   return strokes_;
 }
 
-// ---- state --------------------------------------------------------------------------------------------------------
-
-void Studio::change(const std::function<void(StateMessage&)>& change) {
-  const std::lock_guard lock(mutex_);
-  change(state_);
-  ++state_.version;
-  news_.notify_all();
-}
-
-void Studio::say(const std::string& text, bool failed) {
-  change([&](StateMessage& state) {
-    state.message = text;
-    state.failed = failed;
-  });
+Finish Studio::finish() const {
+  return board_.read([](const StateMessage& state) { return state.finish; });
 }
 
 void Studio::colors_changed() {
-  change([](StateMessage& state) { ++state.colors; });
+  board_.change([](StateMessage& state) { ++state.colors; });
 }
 
-std::optional<std::pair<std::uint64_t, std::string>> Studio::wait_for_news(std::uint64_t after, double seconds) {
-  std::unique_lock lock(mutex_);
-  const auto has_news = [&] { return state_.version != after || is_closed_; };
-  if (!news_.wait_for(lock, std::chrono::duration<double>(seconds), has_news) || state_.version == after) {
-    return std::nullopt;
-  }
-  return std::pair{state_.version, json_of(state_).dump()};
+bool Studio::is_ready() const {
+  return board_.read([](const StateMessage& state) { return state.ready; });
 }
 
-void Studio::joined(const std::string& client) {
-  const std::lock_guard lock(mutex_);
-  ++followers_[client];
-}
-
-void Studio::left(const std::string& client) {
-  const std::lock_guard lock(mutex_);
-  if (--followers_[client] > 0) return;
-  followers_.erase(client);
-  if (state_.writer != client) return;
-  state_.writer.clear();
-  ++state_.version;
-  news_.notify_all();
+void Studio::add_command(const std::string& command) {
+  board_.change([&](StateMessage& state) { state.commands.push_back(command); });
 }
 
 void Studio::close() {
   {
     const std::lock_guard lock(mutex_);
-    is_closed_ = true;
-    news_.notify_all();
+    board_.close();
     work_.notify_all();
   }
   frames_.close();
-}
-
-bool Studio::closed() const {
-  const std::lock_guard lock(mutex_);
-  return is_closed_;
 }
 
 }  // namespace cnerf::studio

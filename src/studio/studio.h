@@ -1,51 +1,63 @@
 #pragma once
-/// The studio: a run that is looked at, painted and coloured through a page. One thread works (the one that calls
-/// `run`): it draws frames and carries out orders, a training step at a time; the server's threads ask.
+/// The studio: a run that is trained, looked at, painted and coloured through a page. One thread works (the one that
+/// calls `run`): it draws frames and carries out orders, a training step at a time; the server's threads ask.
 
 #include <condition_variable>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "src/base/observer.h"
+#include "src/base/usage.h"
 #include "src/pipeline/run_context.h"
+#include "src/studio/board.h"
+#include "src/studio/board_observer.h"
 #include "src/studio/coloring.h"
 #include "src/studio/frame_desk.h"
-#include "src/studio/messages.h"
+#include "src/studio/routes.h"
 #include "viewer/server/page_api.h"
 
 namespace cnerf::studio {
 
-/// GET  scene, state, events, photos/I, thumbnails/I, strokes, reach/I, files/I
+/// GET  scene, state, events, photos/I, thumbnails/I, strokes, reach/I, cards/I, files/I
 /// PUT  strokes
 /// POST frame, reach, orders, pictures
 /// As src/studio/messages.h and src/train/chroma/strokes.h have the bodies. Whoever orders or paints first is the
 /// writer until its stream of events ends; others follow.
 class Studio final : public web::PageApi {
  public:
-  /// Loads the run and what was painted before. Holds its folder `strokes`. All are referred to.
-  /// @param take  to begin with; empty = grey
+  /// Loads what there is of the run, and what was painted before. Holds its folder `strokes`, and the whole of it until
+  /// stage 1 is trained. All are referred to.
+  /// @param context  of a run that was begun; its capture gets what training learns of views
+  /// @param take     to begin with; empty = grey
   /// @throws BusyError  another studio works on this run; SnapshotError, InputError of a stroke file
-  Studio(const pipeline::RunContext& context, const std::string& take, const Engines& engines, Observer& observer,
+  Studio(pipeline::RunContext& context, std::string take, const Engines& engines, Observer& observer,
          const RetouchOptions& retouch = {});
   ~Studio() override;
 
-  /// Draws and works until the user ends the program, or it is closed.
+  /// Trains what is not trained, draws and works until the user ends the program, or it is closed.
   void run();
 
   [[nodiscard]] std::string prefix() const override { return "/studio"; }
   [[nodiscard]] std::optional<std::size_t> largest_body(const std::string& method,
-                                                        const std::string& path) const override;
-  [[nodiscard]] web::PageAnswer answer(const web::PageRequest& request) override;
+                                                        const std::string& path) const override {
+    return largest_body_of(routes(), method, path);
+  }
+  [[nodiscard]] web::PageAnswer answer(const web::PageRequest& request) override {
+    return answer_of(routes(), *this, request);
+  }
   [[nodiscard]] std::optional<std::pair<std::uint64_t, std::string>> wait_for_news(std::uint64_t after,
-                                                                                   double seconds) override;
-  void joined(const std::string& client) override;
-  void left(const std::string& client) override;
+                                                                                   double seconds) override {
+    return board_.wait_for_news(after, seconds);
+  }
+  void joined(const std::string& client) override { board_.joined(client); }
+  void left(const std::string& client) override { board_.left(client); }
   void close() override;
-  [[nodiscard]] bool closed() const override;
+  [[nodiscard]] bool closed() const override { return board_.closed(); }
 
  private:
   /// What a page orders, and the picture that it sent for it.
@@ -53,9 +65,10 @@ class Studio final : public web::PageApi {
     OrderMessage message;
     std::filesystem::path picture;
   };
-  using Handler = web::PageAnswer (Studio::*)(const web::PageRequest&);
-  struct Route;
-  static const std::vector<Route>& routes();
+  struct OrderKind;
+  static std::span<const OrderKind> order_kinds();
+  static bool is_order_of_pages(const std::string& name);
+  static std::span<const Route<Studio>> routes();
 
   // Answers, on the server's threads.
   web::PageAnswer get_scene(const web::PageRequest& request);
@@ -68,57 +81,87 @@ class Studio final : public web::PageApi {
   web::PageAnswer post_reach(const web::PageRequest& request);
   web::PageAnswer post_frame(const web::PageRequest& request);
   web::PageAnswer post_order(const web::PageRequest& request);
+  web::PageAnswer post_picture(const web::PageRequest& request);
+  web::PageAnswer add_painted(const web::PageRequest& request, std::optional<int> view, const std::string& name,
+                              const std::string& shown);
+  web::PageAnswer get_painted(const web::PageRequest& request);
+  web::PageAnswer get_card(const web::PageRequest& request);
+  web::PageAnswer get_file(const web::PageRequest& request);
   web::PageAnswer reach_of(std::size_t view, const std::vector<Stroke>& strokes);
   [[nodiscard]] std::size_t view_in(const web::PageRequest& request) const;
+  web::PageAnswer change_at_once(const web::PageRequest& request, const OrderMessage& order);
   web::PageAnswer take_order(const web::PageRequest& request, const Order& order);
-  void become_writer(const std::string& client);
-
-  web::PageAnswer post_picture(const web::PageRequest& request);
-  web::PageAnswer get_file(const web::PageRequest& request);
+  void save(StrokeList list);
+  [[nodiscard]] bool is_ready() const;
 
   // Work, on the thread of `run`.
   void work_on(const Order& order);
-  void carry_out(const Order& of_page);
-  void colour();
-  void color_by_reference(const std::filesystem::path& picture);
-  void bake(const std::vector<std::string>& formats);
-  void write_photographs(const std::string& format);
+  void carry_out(const Order& order);
+  void train(const Order& order);
+  void watch_training(const LuminanceModel& model);
+  void open_field();
+  void cache_views(const Order& order);
+  void colour(const Order& order);
+  void keep(const Order& order);
+  void begin(const Order& order);
+  void rename_take(const Order& order);
+  void duplicate_take(const Order& order);
+  void delete_take(const Order& order);
+  void suggest(const Order& order);
+  void color_by_reference(const Order& order);
+  void color_by_network(const Order& order);
+  void bake(const Order& order);
+  void write_photographs(const Order& order);
+  /// A take as a colorizer makes it, shown while it learns, then begun from.
+  std::string colorize(const ColorizerOptions& colorizer, const std::vector<int>& bases);
+  void watch_colors(const ColorModel& model);
+  class ConfigInstead;
   /// The take that "now" is, kept where it was in none yet.
   std::string take_of_now();
+  /// Between two pieces of work: pages want frames, and users may have had enough.
   void breathe(const std::string& task, double fraction);
-  void rename_take(const std::string& take, const std::string& name);
-  void duplicate_take(const std::string& take, const std::string& name);
-  void delete_take(const std::string& take);
-  static void check_new_name(const std::string& name);
-  [[nodiscard]] StrokeList saved_strokes() const;
+  void draw_frames();
+  [[nodiscard]] BoardObserver observer_of(const std::string& task);
   std::string drawn(const FrameMessage& message, const std::function<bool()>& keep_going);
   [[nodiscard]] const ColorModel* side_named(const std::string& name);
-
-  class JobObserver;
   void offer_downloads(const std::vector<std::filesystem::path>& files);
-  void change(const std::function<void(StateMessage&)>& change);
-  void say(const std::string& text, bool failed = false);
   void colors_changed();
   [[nodiscard]] std::vector<TakeMessage> list_takes() const;
-  [[nodiscard]] bool should_stop() const;
 
-  const pipeline::RunContext& context_;
+  [[nodiscard]] StrokeList saved_strokes() const;
+  [[nodiscard]] Finish finish() const;
+  [[nodiscard]] bool should_stop() const;
+  /// What repeats a thing that was done, in a terminal.
+  void add_command(const std::string& command);
+
+  pipeline::RunContext& context_;
+  PaintedPictures painted_;
   const Engines& engines_;
   Observer& observer_;
   RetouchOptions retouch_;
-  FolderLock run_lock_, lock_;
-  std::string scene_;
-  Coloring coloring_;
-  std::map<std::string, std::unique_ptr<ColorModel>> shown_takes_;  // that sides name; of the working thread
+  std::optional<FolderLock> run_lock_;
+  FolderLock lock_;
+  std::string first_take_;
 
-  mutable std::mutex mutex_;
-  std::condition_variable work_, news_;
-  StateMessage state_;
+  // Of the working thread; what server threads see of them does not change once the state is `ready`.
+  std::optional<Coloring> coloring_;      // once stage 1 is trained
+  std::optional<LuminanceModel> halted_;  // of a training that was stopped
+  const LuminanceModel* field_ = nullptr;
+  const ColorModel* learning_ = nullptr;                            // of a take that a colorizer makes
+  std::map<std::string, std::unique_ptr<ColorModel>> shown_takes_;  // that sides name
+  Stopwatch since_drawn_, since_refresh_;
+  double drawing_seconds_ = 0;  // that the last frame of a training took
+
+  Board board_;
+  mutable std::mutex mutex_;  // of what follows; taken before the board's
+  std::condition_variable work_;
+  std::string scene_;
   StrokeList strokes_;
-  std::vector<std::filesystem::path> downloads_;  // as state_.downloads has them
-  std::map<std::string, int> followers_;          // streams of each client
+  std::vector<std::filesystem::path> downloads_;  // as the state has them
+  std::vector<std::string> cards_;                // JPEG
   std::optional<Order> order_;                    // that waits
-  bool is_working_ = true /* `run` begins with tracing the views */, stop_requested_ = false, is_closed_ = false;
+  bool is_working_ = true;                        // `run` begins with work of its own
+  bool stop_requested_ = false;
   FrameDesk frames_;
 };
 

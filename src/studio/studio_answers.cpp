@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <cmath>
 #include <fstream>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -31,18 +31,10 @@ constexpr std::size_t kMostSides = 2;
 constexpr int kThumbnailWidth = 160, kReferenceWidth = 1600;
 constexpr int kPhotoQuality = 92, kThumbnailQuality = 82;
 constexpr std::uint8_t kReachAlpha = 200;
-const std::vector<std::string> kOrders = {"colour",    "stop",   "keep", "begin",      "rename",
-                                          "duplicate", "delete", "bake", "photographs"};
+constexpr double kSameShape = 0.02;  // of a painted picture and its photograph
 
 std::string text_of(const std::vector<std::byte>& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-/// A whole number; nothing where the text is none.
-std::optional<int> number_in(std::string_view text) {
-  int value = 0;
-  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return failure == std::errc() && end == text.data() + text.size() && value >= 0 ? std::optional(value) : std::nullopt;
 }
 
 /// Strokes that are not saved yet, of one view.
@@ -56,6 +48,18 @@ struct ReachMessage {
     v("strokes", self.strokes);
   }
 };
+
+/// As the options' own check would.
+void check_finish(const Finish& finish) {
+  const auto in_range = [](double value, double least, double most, const char* field) {
+    if (!(value >= least && value <= most)) {
+      throw InputError("order", field, fmt::format("expected {} to {}, got {}", least, most, value));
+    }
+  };
+  in_range(finish.saturation, 0, 4, "saturation");
+  in_range(finish.hue, -180, 180, "hue");
+  in_range(finish.exposure, -10, 10, "exposure");
+}
 
 /// A picture of any content.
 /// @param folder  for the while
@@ -80,20 +84,8 @@ Picture grey_of(const MonoImage& image) {
 
 }  // namespace
 
-struct Studio::Route {
-  std::string method, path;  ///< one that ends with / goes on with a number
-  std::size_t largest_body;
-  Handler handler;
-
-  [[nodiscard]] bool is_for(const std::string& wanted, const std::string& address) const {
-    if (method != wanted) return false;
-    return path.ends_with('/') ? address.starts_with(path) && number_in(address.substr(path.size())).has_value()
-                               : address == path;
-  }
-};
-
-const std::vector<Studio::Route>& Studio::routes() {
-  static const std::vector<Route> routes = {
+std::span<const Route<Studio>> Studio::routes() {
+  static const Route<Studio> routes[] = {
       {"GET", "/studio/scene", 0, &Studio::get_scene},
       {"GET", "/studio/state", 0, &Studio::get_state},
       {"GET", "/studio/events", 0, &Studio::get_state},
@@ -101,45 +93,27 @@ const std::vector<Studio::Route>& Studio::routes() {
       {"GET", "/studio/thumbnails/", 0, &Studio::get_thumbnail},
       {"GET", "/studio/strokes", 0, &Studio::get_strokes},
       {"PUT", "/studio/strokes", kLargestStrokeFile, &Studio::put_strokes},
+      {"GET", "/studio/painted", 0, &Studio::get_painted},
       {"GET", "/studio/reach/", 0, &Studio::get_reach},
       {"POST", "/studio/reach", kLargestStrokeFile, &Studio::post_reach},
       {"POST", "/studio/frame", kSmallBody, &Studio::post_frame},
       {"POST", "/studio/orders", kSmallBody, &Studio::post_order},
       {"POST", "/studio/pictures", kLargestPicture, &Studio::post_picture},
+      {"GET", "/studio/cards/", 0, &Studio::get_card},
       {"GET", "/studio/files/", 0, &Studio::get_file},
   };
   return routes;
 }
 
-std::optional<std::size_t> Studio::largest_body(const std::string& method, const std::string& path) const {
-  for (const Route& route : routes()) {
-    if (route.is_for(method, path)) return route.largest_body;
-  }
-  return std::nullopt;
-}
-
-PageAnswer Studio::answer(const PageRequest& request) {
-  const auto route =
-      std::ranges::find_if(routes(), [&](const Route& one) { return one.is_for(request.method, request.path); });
-  if (route == routes().end()) return refusal(404, "not here");
-  try {
-    return (this->*route->handler)(request);
-  } catch (const MissingInputError& problem) {
-    return refusal(404, problem.what());
-  } catch (const Error& problem) {
-    return refusal(problem.exit_code() == ExitCode::kOutput ? 507 : 400, problem.what());
-  }
-}
-
 // ---- looking ------------------------------------------------------------------------------------------------------
 
 PageAnswer Studio::get_scene(const PageRequest& /*request*/) {
+  const std::lock_guard lock(mutex_);
   return {.body = scene_};
 }
 
 PageAnswer Studio::get_state(const PageRequest& /*request*/) {
-  const std::lock_guard lock(mutex_);
-  return {.body = json_of(state_).dump()};
+  return {.body = board_.text()};
 }
 
 /// Number of the view at the end of the path.  @throws MissingInputError
@@ -164,20 +138,16 @@ PageAnswer Studio::get_photo(const PageRequest& request) {
 
 PageAnswer Studio::get_thumbnail(const PageRequest& request) {
   const View& view = context_.capture.views[view_in(request)];
-  bool is_ready = false;
-  {
-    const std::lock_guard lock(mutex_);
-    is_ready = state_.ready;
-  }
-  if (view.held_out || !is_ready) {
+  if (view.held_out || !is_ready()) {
     const Picture grey = scaled_down(grey_of(view.image), kThumbnailWidth);
     return {.type = "image/jpeg", .body = text_of(jpeg_bytes(grey, kThumbnailQuality))};
   }
-  const auto names = coloring_.names();
+  const auto names = coloring_->names();
   const auto cached = std::size_t(std::ranges::find(names, view.name) - names.begin());
   // Each thumbnail is a client of its own, so that none makes another stale.
-  auto drawn = frames_.ask(request.client + " thumbnail " + view.name, [this, cached](const auto&) {
-    const Picture picture = draw_cached(coloring_.seen()->views()[cached], coloring_.now(), kThumbnailWidth);
+  auto drawn = frames_.ask(request.client + " thumbnail " + view.name, false, [this, cached](const auto&) {
+    const Picture picture =
+        draw_cached(coloring_->seen()->views()[cached], side_named(kNow), kThumbnailWidth, finish());
     return std::optional(text_of(jpeg_bytes(picture, kThumbnailQuality)));
   });
   if (!drawn) return {.status = 204};
@@ -195,16 +165,14 @@ PageAnswer Studio::post_frame(const PageRequest& request) {
     double seconds = 0;
   };
   const auto seen = std::make_shared<Seen>();
-  auto drawn = frames_.ask(request.client, [this, message, seen](const std::function<bool()>& keep_going) {
-    {
-      const std::lock_guard lock(mutex_);
-      seen->colors = state_.colors;
-    }
-    const Stopwatch watch;
-    std::string jpeg = this->drawn(message, keep_going);
-    seen->seconds = watch.seconds();
-    return jpeg.empty() ? std::nullopt : std::optional(std::move(jpeg));
-  });
+  auto drawn =
+      frames_.ask(request.client, message.moving, [this, message, seen](const std::function<bool()>& keep_going) {
+        seen->colors = board_.read([](const StateMessage& state) { return state.colors; });
+        const Stopwatch watch;
+        std::string jpeg = this->drawn(message, keep_going);
+        seen->seconds = watch.seconds();
+        return jpeg.empty() ? std::nullopt : std::optional(std::move(jpeg));
+      });
   if (!drawn) return {.status = 204};
   return {.type = "image/jpeg",
           .body = std::move(*drawn),
@@ -220,24 +188,21 @@ PageAnswer Studio::get_strokes(const PageRequest& /*request*/) {
 }
 
 PageAnswer Studio::put_strokes(const PageRequest& request) {
-  StrokeList list = strokes_of_json(request.body, "strokes", paintable_views(context_.capture));
+  StrokeList list = strokes_of_json(request.body, "strokes", paintable_views(context_.capture), painted_);
   if (!request.revision) return refusal(428, "the header X-Cnerf-Revision is missing");
   const std::lock_guard lock(mutex_);
-  if (!state_.writer.empty() && state_.writer != request.client) return refusal(423, "another tab paints");
+  if (auto why = board_.become_writer(request.client)) return *why;
   if (*request.revision != strokes_.revision) return refusal(409, "another tab was faster");
-  list.revision = strokes_.revision + 1;
-  write_strokes(context_.directory.root() / "strokes" / kStrokeFile, list);
-  become_writer(request.client);
-  strokes_ = std::move(list);
-  state_.strokes = strokes_.revision;
-  ++state_.version;
-  news_.notify_all();
+  save(std::move(list));
   return {.body = nlohmann::json{{"revision", strokes_.revision}}.dump()};
 }
 
-/// Under the lock. Only who listens can be noticed when it leaves.
-void Studio::become_writer(const std::string& client) {
-  if (followers_.contains(client)) state_.writer = client;
+/// Under the lock.
+void Studio::save(StrokeList list) {
+  list.revision = strokes_.revision + 1;
+  write_strokes(stroke_folder(context_) / kStrokeFile, list);
+  strokes_ = std::move(list);
+  board_.change([&](StateMessage& state) { state.strokes = strokes_.revision; });
 }
 
 PageAnswer Studio::get_reach(const PageRequest& request) {
@@ -251,7 +216,7 @@ PageAnswer Studio::post_reach(const PageRequest& request) {
   StrokeList added;
   added.strokes = message.strokes;
   // As those of a file are.
-  const StrokeList checked = strokes_of_json(json_of(added).dump(), "reach", names);
+  const StrokeList checked = strokes_of_json(json_of(added).dump(), "reach", names, painted_);
   if (message.view < 0 || std::size_t(message.view) >= names.size()) throw MissingInputError("no such view");
   std::vector<Stroke> strokes = saved_strokes().strokes;
   for (const Stroke& stroke : checked.strokes) {
@@ -262,15 +227,12 @@ PageAnswer Studio::post_reach(const PageRequest& request) {
 }
 
 PageAnswer Studio::reach_of(std::size_t view, const std::vector<Stroke>& strokes) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!state_.ready) return refusal(503, "the views are being looked at; in a moment");
-  }
+  if (!is_ready()) return refusal(503, "the views are being looked at; in a moment");
   const View& wanted = context_.capture.views[view];
   if (wanted.held_out) throw MissingInputError(wanted.name + " is held out for evaluation");
-  const SeenSurfaces& seen = *coloring_.seen();
+  const SeenSurfaces& seen = *coloring_->seen();
   const std::size_t cached = seen.view_named(wanted.name);
-  const KnownColorSources sources(seen, known_of(strokes, seen.views(), coloring_.names()));
+  const KnownColorSources sources(seen, known_of(strokes, seen.views(), coloring_->names()));
   const CachedView& shown = seen.views()[cached];
   const cv::Mat overlay = colors_at_luminance(sources.seen_in(cached), {shown.width, shown.height}, kReachAlpha,
                                               [&](std::size_t p) { return shown.luminance[p]; });
@@ -281,28 +243,108 @@ PageAnswer Studio::reach_of(std::size_t view, const std::vector<Stroke>& strokes
 
 PageAnswer Studio::post_order(const PageRequest& request) {
   const auto order = record_of<OrderMessage>(parse_json(request.body, "order"), "order");
-  if (std::ranges::find(kOrders, order.order) == kOrders.end()) {
+  if (order.order == "stop" || order.order == "finish") return change_at_once(request, order);
+  if (!is_order_of_pages(order.order)) {
     throw InputError("order", "order", "this studio cannot do " + excerpt(nlohmann::ordered_json(order.order)));
   }
   return take_order(request, {order, {}});
 }
 
-/// A photograph to colour like. It is checked like any file, and stays in the run.
+/// What needs no work, and is taken beside it.
+PageAnswer Studio::change_at_once(const PageRequest& request, const OrderMessage& order) {
+  if (order.order == "finish") check_finish(order.finish);
+  const std::lock_guard lock(mutex_);
+  if (auto why = board_.become_writer(request.client)) return *why;
+  if (order.order == "stop") {
+    stop_requested_ = true;
+  } else {
+    board_.change([&](StateMessage& state) {
+      state.finish = order.finish;
+      ++state.colors;
+    });
+  }
+  return {.status = 202, .body = board_.text()};
+}
+
+PageAnswer Studio::take_order(const PageRequest& request, const Order& order) {
+  const std::lock_guard lock(mutex_);
+  if (auto why = board_.become_writer(request.client)) return *why;
+  if (is_working_ || order_) {
+    return refusal(409, "wait until it is done: " + board_.read([](const StateMessage& state) { return state.task; }));
+  }
+  order_ = order;
+  board_.change([&](StateMessage& state) {
+    state.task = order.message.order;
+    state.message.clear();
+    state.failed = false;
+  });
+  work_.notify_all();
+  return {.status = 202, .body = board_.text()};
+}
+
+/// Pictures are checked like any file, and stay in the run: a photograph to colour like, or what a paint program
+/// painted on one of the capture's.
 PageAnswer Studio::post_picture(const PageRequest& request) {
   const auto parameter = [&](const char* name) {
     const auto found = request.parameters.find(name);
     return found == request.parameters.end() ? std::string() : found->second;
   };
-  if (parameter("kind") != "reference") return refusal(400, "kind: this studio takes reference pictures only");
-  const fs::path folder = context_.directory.root() / "strokes" / "references";
-  const fs::path file = folder / (sha256(std::as_bytes(std::span(request.body))).substr(0, 12) + ".png");
-  const LinearImage image = decoded_image(request.body, folder, parameter("name").substr(0, 80));
+  const std::string name = sha256(std::as_bytes(std::span(request.body))).substr(0, 12);
+  const std::string shown = parameter("name").substr(0, 80), kind = parameter("kind");
+  if (kind == "stroke") return add_painted(request, number_in(parameter("view")), name, shown);
+  if (kind != "reference") return refusal(400, "kind: this studio takes pictures as reference or stroke");
+  const fs::path folder = stroke_folder(context_) / "references";
+  const LinearImage image = decoded_image(request.body, folder, shown);
   if (is_monochrome(image)) throw InputError("picture", "colour", "a reference must be in colour; this one is grey");
   const Picture picture = scaled_down(picture_from_linear(image.width, image.height, image.values), kReferenceWidth);
+  const fs::path file = folder / (name + ".png");
   write_file(file, png_bytes(picture));
   Order order{{}, file};
   order.message.order = "reference";
   return take_order(request, order);
+}
+
+PageAnswer Studio::add_painted(const PageRequest& request, std::optional<int> view, const std::string& name,
+                               const std::string& shown) {
+  if (!view || std::size_t(*view) >= context_.capture.views.size()) throw MissingInputError("view: no such view");
+  const View& of = context_.capture.views[std::size_t(*view)];
+  if (of.held_out) throw InputError("picture", "view", of.name + " is held out for evaluation");
+  const PaintedPicture picture =
+      painted_picture(decoded_image(request.body, stroke_folder(context_), shown), shown.empty() ? "picture" : shown);
+  const double ratio = double(picture.width) * of.intrinsics.height / (double(picture.height) * of.intrinsics.width);
+  if (std::abs(ratio - 1) > kSameShape) {
+    throw InputError(shown.empty() ? "picture" : shown, "size",
+                     fmt::format("{} x {} is not the shape of {}, {} x {}", picture.width, picture.height, of.name,
+                                 of.intrinsics.width, of.intrinsics.height));
+  }
+  const std::lock_guard lock(mutex_);
+  if (auto why = board_.become_writer(request.client)) return *why;
+  write_file(painted_.file(name), request.body);
+  StrokeList list = strokes_;
+  Stroke stroke{.id = "p" + name + std::to_string(list.revision), .view = of.name, .kind = "picture"};
+  stroke.picture = name;
+  stroke.painted = painted_.find(name);
+  list.strokes.push_back(std::move(stroke));
+  if (list.strokes.size() > kMostStrokes) throw InputError("strokes", "", "there are too many strokes already");
+  save(std::move(list));
+  return {.status = 202, .body = board_.text()};
+}
+
+PageAnswer Studio::get_painted(const PageRequest& request) {
+  const auto wanted = request.parameters.find("picture");
+  const bool is_named = wanted != request.parameters.end() && !wanted->second.empty();
+  const auto has_it = [&](const Stroke& stroke) { return stroke.picture == wanted->second; };
+  if (!is_named || std::ranges::none_of(saved_strokes().strokes, has_it)) {
+    throw MissingInputError("no stroke has this picture");
+  }
+  return {.type = "image/png", .file = painted_.file(wanted->second)};
+}
+
+PageAnswer Studio::get_card(const PageRequest& request) {
+  const auto number = std::size_t(*number_in(std::string_view(request.path).substr(request.path.rfind('/') + 1)));
+  const std::lock_guard lock(mutex_);
+  if (number >= cards_.size()) throw MissingInputError("there is no such card");
+  return {.type = "image/jpeg", .body = cards_[number]};
 }
 
 PageAnswer Studio::get_file(const PageRequest& request) {
@@ -310,26 +352,6 @@ PageAnswer Studio::get_file(const PageRequest& request) {
   const std::lock_guard lock(mutex_);
   if (number >= downloads_.size()) throw MissingInputError("not here");
   return {.headers = {{"Content-Disposition", "attachment"}}, .file = downloads_[number]};
-}
-
-PageAnswer Studio::take_order(const PageRequest& request, const Order& order) {
-  const std::lock_guard lock(mutex_);
-  if (!state_.writer.empty() && state_.writer != request.client) return refusal(423, "another tab paints");
-  become_writer(request.client);
-  if (order.message.order == "stop") {
-    stop_requested_ = true;
-  } else if (is_working_ || order_) {
-    return refusal(409, "wait until it is done: " + state_.task);
-  } else {
-    order_ = order;
-    state_.task = order.message.order;
-    state_.message.clear();
-    state_.failed = false;
-    ++state_.version;
-    work_.notify_all();
-    news_.notify_all();
-  }
-  return {.status = 202, .body = json_of(state_).dump()};
 }
 
 }  // namespace cnerf::studio

@@ -37,8 +37,8 @@ struct Trace {
 class TrainedScene final : public Scene {
  public:
   TrainedScene(const std::filesystem::path& stage1_snapshot, const std::filesystem::path& take_snapshot,
-               const Engines& engines)
-      : luminance_(LuminanceModel::load(stage1_snapshot, engines)) {
+               const Finish& finish, const Engines& engines)
+      : luminance_(LuminanceModel::load(stage1_snapshot, engines)), finish_(finish) {
     if (!take_snapshot.empty()) color_ = ColorModel::load(take_snapshot, engines);
   }
 
@@ -58,10 +58,13 @@ class TrainedScene final : public Scene {
   void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
                        std::span<float> luminance) const override {
     luminance_.engine->query_luminance(positions, directions, luminance);
+    for (float& light : luminance) light *= finish_.gain();
   }
   void query_chromaticity(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const override {
     if (color_) {
       color_->chromaticity->query(positions, chromaticity);
+      if (finish_.is_plain()) return;
+      for (Chromaticity& color : chromaticity) color = finish_.of(color);
     } else {
       std::fill(chromaticity.begin(), chromaticity.end(), Chromaticity{});
     }
@@ -108,7 +111,11 @@ class TrainedScene final : public Scene {
     Trace traced;
     luminance_.engine->trace(rays, luminance_.march(options.steps_per_box),
                              {float(options.min_transmittance), kShadedShare}, traced.samples, traced.offsets);
-    if (options.luminance) replace_luminance(rays, options, traced);
+    if (options.luminance) {
+      replace_luminance(rays, options, traced);
+    } else if (!finish_.is_plain()) {
+      for (WeightedSample& sample : traced.samples) sample.luminance *= finish_.gain();
+    }
     const std::vector<WeightedSample>& samples = traced.samples;
     const std::vector<std::size_t>& offsets = traced.offsets;
     const Vec3f axis = camera.unit_from_camera.column(2).cast<float>();
@@ -129,23 +136,35 @@ class TrainedScene final : public Scene {
     if (image.rgb.empty() && image.baked_rgb.empty()) return;
 
     const PixelSamples pixels = pixel_samples(rays, samples, offsets);
-    if (!image.rgb.empty()) put_colors(color_->decode(pixels), image.luminance, first, image.rgb);
+    if (!image.rgb.empty()) put_colors(finished(color_->decode(pixels)), image.luminance, first, image.rgb);
     if (!image.baked_rgb.empty()) {
       std::vector<Ab> colors(rays.size());
       color_->chromaticity->composite(pixels, colors);
-      put_colors(colors, image.luminance, first, image.baked_rgb);
+      put_colors(finished(std::move(colors)), image.luminance, first, image.baked_rgb);
     }
+  }
+
+  [[nodiscard]] std::vector<Ab> finished(std::vector<Ab> colors) const {
+    for (Ab& color : colors) color = finish_.of(color);
+    return colors;
   }
 
   LuminanceModel luminance_;
   std::optional<ColorModel> color_;
+  Finish finish_;
 };
 
 }  // namespace
 
 std::unique_ptr<Scene> Scene::load(const std::filesystem::path& stage1_snapshot,
                                    const std::filesystem::path& take_snapshot, const Engines& engines) {
-  return std::make_unique<TrainedScene>(stage1_snapshot, take_snapshot, engines);
+  return load(stage1_snapshot, take_snapshot, {}, engines);
+}
+
+std::unique_ptr<Scene> Scene::load(const std::filesystem::path& stage1_snapshot,
+                                   const std::filesystem::path& take_snapshot, const Finish& finish,
+                                   const Engines& engines) {
+  return std::make_unique<TrainedScene>(stage1_snapshot, take_snapshot, finish, engines);
 }
 
 }  // namespace cnerf

@@ -12,6 +12,7 @@
 #include "src/capture/camera.h"
 #include "src/engine/engines.h"
 #include "src/field/color_field.h"
+#include "src/field/finish.h"
 
 namespace cnerf {
 
@@ -40,6 +41,10 @@ class Scene : public ColorField {
   /// @throws MissingInputError, SnapshotError, DeviceError.
   static std::unique_ptr<Scene> load(const std::filesystem::path& stage1_snapshot,
                                      const std::filesystem::path& take_snapshot, const Engines& engines);
+  /// The same in another light, and with its colours changed.
+  static std::unique_ptr<Scene> load(const std::filesystem::path& stage1_snapshot,
+                                     const std::filesystem::path& take_snapshot, const Finish& finish,
+                                     const Engines& engines);
 
   [[nodiscard]] virtual bool is_colorized() const = 0;
   [[nodiscard]] virtual std::string colorizer() const = 0;  ///< name of the colorizer; empty when not colorized

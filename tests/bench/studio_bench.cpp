@@ -108,7 +108,7 @@ int bench(int argc, char** argv) {
       fmt::print("encoding is not measured: this machine has no codecs\n");
     }
     if (share < 1) continue;
-    const auto scene = pipeline::load_scene(directory, take, engines);
+    const auto scene = pipeline::load_scene(directory, take, {}, engines);
     const RenderedImage reference = scene->render(camera.lens, camera.world_from_camera, {});
     const auto& values = reference.rgb.empty() ? reference.luminance : reference.rgb;
     row("sharp against cnerf render",
@@ -144,7 +144,7 @@ int bench(int argc, char** argv) {
       }),
       "s");
   row("eight thumbnails in colour", seconds_of([&] {
-        for (std::size_t v = 0; v < 8; ++v) (void)studio::draw_cached(cache.views()[v], &model, 160);
+        for (std::size_t v = 0; v < 8; ++v) (void)studio::draw_cached(cache.views()[v], &model, 160, {});
       }),
       "s");
   const Stopwatch of_map;

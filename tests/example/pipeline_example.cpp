@@ -30,7 +30,7 @@ int main(int argc, char** argv) {
     const pipeline::RunContext run = {
         pipeline::RunDirectory(argv[2]), config, pipeline::read_capture(argv[1], config, printer), {argv, argv + argc}};
     pipeline::begin_run(run, argv[1], {});
-    pipeline::train_step(run, false, engines, printer);
+    pipeline::train_step(run, {}, engines, printer);
     pipeline::colorize_step(run, {"example", {}, nullptr}, engines, printer);
     pipeline::bake_step(run, {"example", run.directory.bakes("example"), {.vdb = true}}, engines, printer);
   } catch (const std::exception& error) {

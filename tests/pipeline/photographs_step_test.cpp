@@ -73,7 +73,7 @@ class Photographs : public testing::Test {
     enlarge(capture() / "images" / (std::string(kLarge) + ".png"));
     const RunContext context = run();
     begin_run(context, capture(), {});
-    train_step(context, false, cpu_engines(), silent());
+    train_step(context, {}, cpu_engines(), silent());
     Vivid vivid;
     colorize_step(context, {"vivid", {}, &vivid}, cpu_engines(), silent());
   }

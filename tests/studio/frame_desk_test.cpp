@@ -18,8 +18,8 @@ FrameDesk::Drawing text(const std::string& text) {
 TEST(FrameDesk, DrawsWhatIsAskedFor) {
   std::latch asked(2);
   FrameDesk desk([&] { asked.count_down(); });
-  auto one = std::async(std::launch::async, [&] { return desk.ask("one", text("1")); });
-  auto two = std::async(std::launch::async, [&] { return desk.ask("two", text("2")); });
+  auto one = std::async(std::launch::async, [&] { return desk.ask("one", false, text("1")); });
+  auto two = std::async(std::launch::async, [&] { return desk.ask("two", false, text("2")); });
   asked.wait();
   EXPECT_TRUE(desk.has_waiting());
   EXPECT_TRUE(desk.draw_waiting());
@@ -28,15 +28,30 @@ TEST(FrameDesk, DrawsWhatIsAskedFor) {
   EXPECT_FALSE(desk.draw_waiting());
 }
 
+TEST(FrameDesk, UrgentFramesCanBeDrawnAlone) {
+  std::latch asked(2);
+  FrameDesk desk([&] { asked.count_down(); });
+  auto moving = std::async(std::launch::async, [&] { return desk.ask("one", true, text("1")); });
+  auto resting = std::async(std::launch::async, [&] { return desk.ask("two", false, text("2")); });
+  asked.wait();
+  EXPECT_TRUE(desk.draw_waiting(FrameDesk::Which::kUrgent));
+  EXPECT_EQ(moving.get(), "1");
+  EXPECT_FALSE(desk.has_waiting(FrameDesk::Which::kUrgent));
+  EXPECT_FALSE(desk.draw_waiting(FrameDesk::Which::kUrgent));
+  EXPECT_TRUE(desk.has_waiting());
+  EXPECT_TRUE(desk.draw_waiting());
+  EXPECT_EQ(resting.get(), "2");
+}
+
 TEST(FrameDesk, AnOlderFrameThatWaitsIsLetGo) {
   std::latch first_asked(1), second_asked(2);
   FrameDesk desk([&] {
     first_asked.try_wait() ? second_asked.count_down() : first_asked.count_down();
     if (!second_asked.try_wait()) second_asked.count_down();
   });
-  auto older = std::async(std::launch::async, [&] { return desk.ask("one", text("old")); });
+  auto older = std::async(std::launch::async, [&] { return desk.ask("one", false, text("old")); });
   first_asked.wait();
-  auto newer = std::async(std::launch::async, [&] { return desk.ask("one", text("new")); });
+  auto newer = std::async(std::launch::async, [&] { return desk.ask("one", false, text("new")); });
   EXPECT_EQ(older.get(), std::nullopt) << "without anybody drawing";
   second_asked.wait();
   desk.draw_waiting();
@@ -47,7 +62,7 @@ TEST(FrameDesk, AFrameThatIsBeingDrawnStopsWhenItsClientWantsAnother) {
   std::latch drawing(1);
   FrameDesk desk([] {});
   auto older = std::async(std::launch::async, [&] {
-    return desk.ask("one", [&](const std::function<bool()>& keep_going) -> std::optional<std::string> {
+    return desk.ask("one", false, [&](const std::function<bool()>& keep_going) -> std::optional<std::string> {
       drawing.count_down();
       while (keep_going()) std::this_thread::yield();
       return std::nullopt;
@@ -57,7 +72,7 @@ TEST(FrameDesk, AFrameThatIsBeingDrawnStopsWhenItsClientWantsAnother) {
     while (!desk.draw_waiting()) std::this_thread::yield();
   });
   drawing.wait();
-  auto newer = std::async(std::launch::async, [&] { return desk.ask("one", text("new")); });
+  auto newer = std::async(std::launch::async, [&] { return desk.ask("one", false, text("new")); });
   EXPECT_EQ(older.get(), std::nullopt);
   worker.get();
   desk.draw_waiting();
@@ -68,7 +83,8 @@ TEST(FrameDesk, WhatDrawingThrowsReachesWhoAsked) {
   std::latch asked(1);
   FrameDesk desk([&] { asked.count_down(); });
   auto bad = std::async(std::launch::async, [&] {
-    return desk.ask("one", [](const auto&) -> std::optional<std::string> { throw std::runtime_error("no such take"); });
+    return desk.ask("one", false,
+                    [](const auto&) -> std::optional<std::string> { throw std::runtime_error("no such take"); });
   });
   asked.wait();
   desk.draw_waiting();
@@ -78,11 +94,11 @@ TEST(FrameDesk, WhatDrawingThrowsReachesWhoAsked) {
 TEST(FrameDesk, ClosingLetsEverybodyGo) {
   std::latch asked(1);
   FrameDesk desk([&] { asked.count_down(); });
-  auto waiting = std::async(std::launch::async, [&] { return desk.ask("one", text("1")); });
+  auto waiting = std::async(std::launch::async, [&] { return desk.ask("one", false, text("1")); });
   asked.wait();
   desk.close();
   EXPECT_EQ(waiting.get(), std::nullopt);
-  EXPECT_EQ(desk.ask("two", text("2")), std::nullopt);
+  EXPECT_EQ(desk.ask("two", false, text("2")), std::nullopt);
 }
 
 }  // namespace

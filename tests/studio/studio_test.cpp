@@ -29,14 +29,16 @@ const RetouchOptions kQuick = {.steps = 40, .known_pixels = 512, .kept_pixels = 
 Config studio_config() {
   Config config = test::tiny_config();
   config.capture.holdout = 4;
+  config.stage2.patches = config.stage2.distill_steps = 12;
+  config.stage2.patch_size = 32;
   return config;
 }
 
 /// A trained run, made once.
 class TrainedRun {
  public:
-  static const pipeline::RunContext& get() {
-    static const TrainedRun run;
+  static pipeline::RunContext& get() {
+    static TrainedRun run;
     return *run.context_;
   }
 
@@ -50,7 +52,7 @@ class TrainedRun {
                                           pipeline::read_capture(folder_ / "capture", config, observer),
                                           {"cnerf", "train"}});
     pipeline::begin_run(*context_, folder_ / "capture", {});
-    pipeline::train_step(*context_, false, cpu_engines(), observer);
+    pipeline::train_step(*context_, {}, cpu_engines(), observer);
   }
   test::TempDir folder_;
   std::optional<pipeline::RunContext> context_;
@@ -123,7 +125,7 @@ class StudioTest : public testing::Test {
     return sum / double(picture.total());
   }
 
-  const pipeline::RunContext& context_ = TrainedRun::get();
+  pipeline::RunContext& context_ = TrainedRun::get();
   Observer observer_;
   std::unique_ptr<Studio> studio_;
   std::thread worker_;
@@ -333,6 +335,113 @@ TEST_F(StudioTest, PicturesOfAnyContentAreRefusedByName) {
   const std::vector<std::byte> grey = png_bytes(Picture{8, 8, std::vector<std::uint8_t>(192, 90)});
   EXPECT_THAT(sent("reference", {reinterpret_cast<const char*>(grey.data()), grey.size()}).body, HasSubstr("grey"));
   EXPECT_TRUE(fs::is_empty(context_.directory.root() / "strokes/references")) << "nothing was kept";
+}
+
+TEST_F(StudioTest, TheFinishIsShownAtOnceAndBakedButNotTrained) {
+  open();
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  (void)ordered({{"order", "colour"}});
+  const cv::Mat before = decoded(post("frame", frame({"now"})));
+  const json state =
+      json::parse(post("orders", {{"order", "finish"}, {"saturation", 0}, {"hue", 0}, {"exposure", 1}}).body);
+  EXPECT_EQ(state["finish"]["exposure"], 1.0);
+  const cv::Mat after = decoded(post("frame", frame({"now"})));
+  EXPECT_LT(colorfulness(after), 0.3 * colorfulness(before)) << "JPEG leaves a little";
+  EXPECT_GT(cv::mean(after)[1], 1.1 * cv::mean(before)[1]);
+  EXPECT_EQ(json::parse(get("state").body)["unkept"], true);
+  const json written = ordered({{"order", "photographs"}, {"format", "png"}});
+  EXPECT_EQ(written["failed"], false) << written;
+  EXPECT_THAT(written["commands"].back().get<std::string>(), HasSubstr("--set finish.saturation=0"));
+  const std::string first = written["downloads"][0]["address"].get<std::string>().substr(9);
+  EXPECT_LT(colorfulness(cv::imread(get(first).file.string())), 0.01) << "exposure and colour of the finish";
+  for (const json& bad : {json{{"order", "finish"}, {"saturation", 9}}, json{{"order", "finish"}, {"hue", 181}},
+                          json{{"order", "finish"}, {"exposure", "x"}}}) {
+    EXPECT_EQ(post("orders", bad).status, 400) << bad;
+  }
+  fs::remove_all(context_.directory.root() / "renders");
+}
+
+TEST_F(StudioTest, SuggestionsAreCardsThatCanBeBegunFrom) {
+  open();
+  const json suggested = ordered({{"order", "suggest"}});
+  EXPECT_EQ(suggested["failed"], false) << suggested;
+  ASSERT_EQ(suggested["cards"].size(), 12u);
+  EXPECT_EQ(decoded(get("cards/0")).rows, decoded(get("cards/11")).rows);
+  EXPECT_EQ(get("cards/12").status, 404);
+  const json colored = ordered({{"order", "builtin"}, {"bases", {0, 5}}});
+  EXPECT_EQ(colored["failed"], false) << colored;
+  EXPECT_EQ(colored["take"], "builtin");
+  EXPECT_THAT(colored["commands"].back().get<std::string>(), HasSubstr("--colorizer builtin --bases 0,5"));
+  EXPECT_EQ(ordered({{"order", "builtin"}, {"bases", {12}}})["failed"], true) << "no such card";
+}
+
+TEST_F(StudioTest, APaintedPictureBecomesAStroke) {
+  open();
+  const View& view = context_.capture.views[1];
+  const auto sent = [&](const std::string& number, const cv::Mat& picture) {
+    std::vector<std::uint8_t> png;
+    cv::imencode(".png", picture, png);
+    return studio_->answer({"POST",
+                            "/studio/pictures",
+                            {{"kind", "stroke"}, {"view", number}, {"name", "red.png"}},
+                            kPainter,
+                            {},
+                            {png.begin(), png.end()}});
+  };
+  cv::Mat painted(2 * view.image.height, 2 * view.image.width, CV_8UC4, cv::Scalar(0, 0, 0, 0));
+  painted(cv::Rect(0, 0, painted.cols / 2, painted.rows)).setTo(cv::Scalar(20, 30, 200, 255));
+  ASSERT_EQ(sent("1", painted).status, 202) << sent("1", painted).body;
+  const json strokes = json::parse(get("strokes").body);
+  ASSERT_EQ(strokes["strokes"].size(), 1u);
+  EXPECT_EQ(strokes["strokes"][0]["kind"], "picture");
+  EXPECT_EQ(strokes["strokes"][0]["view"], view.name);
+  EXPECT_EQ(put(strokes["strokes"].get<std::vector<json>>(), 1).status, 200) << "comes back as it went";
+  const auto shown =
+      studio_->answer({"GET", "/studio/painted", {{"picture", strokes["strokes"][0]["picture"]}}, kPainter, {}, {}});
+  EXPECT_TRUE(fs::exists(shown.file));
+  const cv::Mat reach = decoded(get("reach/1"));
+  EXPECT_GT(reach.at<cv::Vec4b>(reach.rows / 2, reach.cols / 4)[3], 0);
+
+  EXPECT_EQ(sent("99", painted).status, 404);
+  EXPECT_THAT(sent("0", painted).body, HasSubstr("held out"));
+  EXPECT_THAT(sent("1", painted(cv::Rect(painted.cols / 2 - 9, 0, 18, painted.rows))).body, HasSubstr("shape"));
+  EXPECT_THAT(sent("1", cv::Mat(painted.size(), CV_8UC4, cv::Scalar(9, 9, 9, 255))).body, HasSubstr("opaque"));
+  EXPECT_THAT(sent("1", cv::Mat(painted.size(), CV_8UC4, cv::Scalar(9, 9, 9, 0))).body, HasSubstr("nothing"));
+  for (const char* picture : {"../../../etc", "0123456789ab", ""}) {
+    json bad = strokes["strokes"][0];
+    bad["picture"] = picture;
+    EXPECT_GE(put({bad}, 2).status, 400) << picture;
+    EXPECT_EQ(studio_->answer({"GET", "/studio/painted", {{"picture", picture}}, kPainter, {}, {}}).status, 404);
+  }
+}
+
+TEST_F(StudioTest, ATrainingIsWatchedStoppedAndGoneOnWith) {
+  const test::TempDir folder;
+  pipeline::RunContext context{pipeline::RunDirectory(folder / "run"), context_.config, context_.capture, {}};
+  context.config.stage1.steps = 1000000;
+  pipeline::begin_run(context, folder / "capture", {});
+  studio_ = std::make_unique<Studio>(context, "", cpu_engines(), observer_, kQuick);
+  worker_ = std::thread([this] { studio_->run(); });
+  studio_->joined(kPainter);
+  (void)wait_until([](const json& state) { return state["task"] == "train" && state["figures"].contains("psnr"); });
+  const cv::Mat early = decoded(post("frame", frame({"grey"})));
+  EXPECT_EQ(early.cols, context.capture.views[1].intrinsics.width);
+  EXPECT_EQ(post("orders", {{"order", "colour"}}).status, 409);
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200) << "painting need not wait";
+  EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
+  const json stopped = wait_until([](const json& state) { return state["task"] == ""; });
+  EXPECT_EQ(stopped["stage"], "training");
+  EXPECT_EQ(post("frame", frame({"grey"})).status, 200) << "what was learned is shown";
+  EXPECT_EQ(ordered({{"order", "colour"}})["failed"], true);
+
+  context.config.stage1.max_seconds = 1e-3;  // it is long past that
+  const json trained = ordered({{"order", "train"}});
+  EXPECT_EQ(trained["stage"], "field") << trained;
+  EXPECT_EQ(trained["scene"], stopped["scene"].get<int>() + 1);
+  EXPECT_TRUE(trained["ready"]);
+  EXPECT_EQ(ordered({{"order", "colour"}})["unkept"], true);
+  EXPECT_EQ(ordered({{"order", "train"}})["failed"], true) << "it is";
+  close();
 }
 
 TEST_F(StudioTest, StoppingKeepsWhatWasLearned) {

@@ -18,6 +18,12 @@ namespace {
 using testing::HasSubstr;
 const std::vector<std::string> kViews = {"a.png", "b.png"};
 
+/// None.
+PaintedPictures& pictures() {
+  static PaintedPictures none("nowhere");
+  return none;
+}
+
 Stroke dot(const std::string& id, float x, float y, const std::string& color = "#ff0000") {
   Stroke stroke{.id = id, .view = "a.png", .color = color, .size = 0.2f};
   stroke.points = {{x, y, 1}};
@@ -48,7 +54,7 @@ TEST(Strokes, BadOnesAreRefusedByTheirField) {
     Stroke stroke = dot("k1", 0.5f, 0.5f);
     spoil(stroke);
     try {
-      (void)strokes_of_json(text_of(stroke), "strokes.json", kViews);
+      (void)strokes_of_json(text_of(stroke), "strokes.json", kViews, pictures());
     } catch (const InputError& problem) {
       return problem.what();
     }
@@ -70,12 +76,13 @@ TEST(Strokes, BadOnesAreRefusedByTheirField) {
 TEST(Strokes, ListsOfAnyContentAreRefusedOrRead) {
   for (const char* text : {"", "[]", "{}", "null", "{\"strokes\": 3}", "{\"strokes\": [{}]}", "{\"strokes\": [3]}",
                            "{\"revision\": \"x\", \"strokes\": []}"}) {
-    EXPECT_THROW((void)strokes_of_json(text, "strokes.json", kViews), InputError) << text;
+    EXPECT_THROW((void)strokes_of_json(text, "strokes.json", kViews, pictures()), InputError) << text;
   }
-  EXPECT_THROW((void)strokes_of_json(std::string(kLargestStrokeFile + 1, ' '), "strokes.json", kViews), InputError);
+  EXPECT_THROW((void)strokes_of_json(std::string(kLargestStrokeFile + 1, ' '), "strokes.json", kViews, pictures()),
+               InputError);
   StrokeList twice{0, {dot("k1", 0, 0), dot("k1", 0, 0)}};
-  EXPECT_THROW((void)strokes_of_json(json_of(twice).dump(), "strokes.json", kViews), InputError);
-  EXPECT_TRUE(strokes_of_json("{\"strokes\": []}", "strokes.json", kViews).strokes.empty());
+  EXPECT_THROW((void)strokes_of_json(json_of(twice).dump(), "strokes.json", kViews, pictures()), InputError);
+  EXPECT_TRUE(strokes_of_json("{\"strokes\": []}", "strokes.json", kViews, pictures()).strokes.empty());
 }
 
 TEST(Strokes, ADotCoversADiscOfItsSizeAndPressure) {

@@ -10,12 +10,14 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <thread>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "tests/support/data.h"
 #include "viewer/server/http_server.h"
+#include "viewer/server/page_relay.h"
 
 namespace cnerf::web {
 namespace {
@@ -253,6 +255,57 @@ TEST(WebServer, APageApiIsAskedByItsOwnPageOnlyAndWithinItsLimits) {
   EXPECT_NE(order("GET /echo/file", "", "").find("\r\n\r\n{}"), std::string::npos);
   EXPECT_NE(order("GET /echo/events?client=follower1", "", "").find("data: news"), std::string::npos);
   EXPECT_EQ(echo.followers, "left follower1");
+}
+
+/// One that ends its news at once, of a version of its own.
+class Stage final : public PageApi {
+ public:
+  Stage(std::string name, std::uint64_t version) : name_(std::move(name)), version_(version) {}
+  [[nodiscard]] std::string prefix() const override { return "/stage"; }
+  [[nodiscard]] std::optional<std::size_t> largest_body(const std::string&, const std::string&) const override {
+    return 9;
+  }
+  [[nodiscard]] PageAnswer answer(const PageRequest&) override { return {.body = name_}; }
+  [[nodiscard]] std::optional<std::pair<std::uint64_t, std::string>> wait_for_news(std::uint64_t after,
+                                                                                   double) override {
+    return after == version_ ? std::nullopt : std::optional(std::pair(version_, name_));
+  }
+  void joined(const std::string& client) override { followers.insert(client); }
+  void left(const std::string& client) override { followers.extract(client); }
+  void close() override { is_closed_ = true; }
+  [[nodiscard]] bool closed() const override { return is_closed_; }
+
+  std::multiset<std::string> followers;
+
+ private:
+  std::string name_;
+  std::uint64_t version_;
+  bool is_closed_ = false;
+};
+
+TEST(PageRelay, AnswersByOneStageAfterAnotherAndFollowersGoOn) {
+  PageRelay relay("/stage");
+  EXPECT_EQ(relay.answer({}).status, 503);
+  const auto first = std::make_shared<Stage>("first", 1), second = std::make_shared<Stage>("second", 2);
+  relay.enter(first);
+  relay.joined("a");
+  relay.joined("a");
+  relay.joined("b");
+  EXPECT_EQ(relay.answer({}).body, "first");
+  EXPECT_EQ(relay.wait_for_news(0, 0)->first, 1u);
+  relay.enter(second);
+  EXPECT_TRUE(first->closed());
+  EXPECT_FALSE(relay.closed());
+  EXPECT_EQ(relay.answer({}).body, "second");
+  EXPECT_EQ(relay.wait_for_news(1, 0)->second, "second");
+  EXPECT_EQ(second->followers, (std::multiset<std::string>{"a", "a", "b"}));
+  relay.left("a");
+  EXPECT_EQ(second->followers.count("a"), 1u);
+  relay.close();
+  EXPECT_TRUE(relay.closed() && second->closed());
+  const auto late = std::make_shared<Stage>("late", 3);
+  relay.enter(late);
+  EXPECT_TRUE(late->closed());
 }
 
 std::string body_of(const std::string& answer) {

@@ -14,10 +14,10 @@ Tile tile_of(const AnsweredPatch& patch, std::string caption) {
           std::move(caption)};
 }
 
-void write_candidates(const std::filesystem::path& file, std::span<const AnsweredPatch> patches) {
+std::vector<Tile> candidate_tiles(std::span<const AnsweredPatch> patches) {
   std::vector<Tile> tiles;
   for (std::size_t i = 0; i < patches.size(); ++i) tiles.push_back(tile_of(patches[i], "base " + std::to_string(i)));
-  write_png(file, tiled(tiles));
+  return tiles;
 }
 
 void Galleries::remember(const AnsweredPatch& patch, bool is_accepted) {

@@ -13,7 +13,7 @@ namespace cnerf {
 
 [[nodiscard]] Tile tile_of(const AnsweredPatch& patch, std::string caption);
 /// With captions "base 0", "base 1", …
-void write_candidates(const std::filesystem::path& file, std::span<const AnsweredPatch> patches);
+[[nodiscard]] std::vector<Tile> candidate_tiles(std::span<const AnsweredPatch> patches);
 
 /// The first answers that were accepted, and the first that were rejected.
 class Galleries {

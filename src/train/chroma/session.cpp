@@ -81,6 +81,7 @@ void Session::report(const std::string& task, double fraction, Figures figures) 
   clock_.pause_for([&] {
     observer_.report_progress({task, std::min(fraction, 1.0), std::move(figures)});
     if (!previews_.empty()) observer_.offer_preview([this](std::size_t index) { return preview(index); });
+    if (job_.watch && model.chroma) job_.watch(model);
   });
   if (!observer_.is_cancelled()) return;
   if (!model.chroma) throw Interrupted("stopped; nothing was written");

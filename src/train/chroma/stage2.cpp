@@ -38,12 +38,12 @@ Stage2Report train_stage2(const Stage2Job& job, const Engines& engines, Observer
   return colorize(session, known, job.questions != nullptr ? *job.questions : patches, injection);
 }
 
-void write_base_candidates(const Stage2Job& job, const Engines& engines, Observer& observer) {
+std::vector<Tile> base_candidates(const Stage2Job& job, const Engines& engines, Observer& observer) {
   PatchQuestions questions;
   Session session(job, observer);
   session.cache_views(engines);
   Questioner questioner(session, questions);
-  write_candidates(job.take, BaseChooser(session, questioner).ask_candidates());
+  return candidate_tiles(BaseChooser(session, questioner).ask_candidates());
 }
 
 }  // namespace cnerf

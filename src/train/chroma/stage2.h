@@ -2,18 +2,22 @@
 /// Stage 2: chroma by querying a 2-D colorizer (paper, Sec. "Color representation prediction").
 
 #include <filesystem>
+#include <functional>
 #include <span>
+#include <vector>
 
 #include "src/base/observer.h"
 #include "src/capture/capture.h"
 #include "src/colorizer/colorizer.h"
 #include "src/engine/engines.h"
+#include "src/picture/contact_sheet.h"
 #include "src/train/chroma/known_colors.h"
 #include "src/train/chroma/stage2_options.h"
 #include "src/train/luminance/view_cache.h"
 
 namespace cnerf {
 
+struct ColorModel;
 class Injection;
 class Questions;
 
@@ -36,18 +40,18 @@ struct Stage2Job {
   bool resume = false;                 ///< go on with the take, if there is one
   ViewCache* views = nullptr;          ///< of this stage 1, for several colorizations; null = one of its own
   // Other ways to learn, for comparison; null = the method's own.
-  Questions* questions = nullptr;        ///< src/train/chroma/questioner.h
-  const Injection* injection = nullptr;  ///< src/train/chroma/injection.h
+  Questions* questions = nullptr;                     ///< src/train/chroma/questioner.h
+  const Injection* injection = nullptr;               ///< src/train/chroma/injection.h
+  std::function<void(const ColorModel&)> watch = {};  ///< sees the model between steps, in no training time
 };
 
 /// Colorizes a trained scene. The observer is offered pictures of held-out views, where there are any.
 /// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
 Stage2Report train_stage2(const Stage2Job& job, const Engines& engines, Observer& observer);
 
-/// Only asks for the base candidates, twelve patches spread over the views, and writes their gallery to `job.take`:
-/// what the whole scene would be coloured like, in a minute. `stage2.purify.picked_bases` then picks those that are
-/// liked.
+/// Only asks for the base candidates, twelve patches spread over the views: what the whole scene would be coloured
+/// like, in a minute. `stage2.purify.picked_bases` then picks those that are liked, by their numbers.
 /// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
-void write_base_candidates(const Stage2Job& job, const Engines& engines, Observer& observer);
+[[nodiscard]] std::vector<Tile> base_candidates(const Stage2Job& job, const Engines& engines, Observer& observer);
 
 }  // namespace cnerf

@@ -18,7 +18,9 @@ namespace cnerf {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::array<const char*, 4> kKinds = {"paint", "exact", "grey", "erase"};
+constexpr std::array<const char*, 5> kKinds = {"paint", "exact", "grey", "erase", "picture"};
+constexpr std::size_t kPictureDigits = 12;
+constexpr float kPaintedAlpha = 0.5f;
 constexpr std::size_t kLongestId = 32;
 constexpr float kCovered = 0.5f;  // of a pixel: it is painted
 
@@ -46,14 +48,19 @@ void check(const Stroke& stroke, const StrokeCheck& check, std::span<const std::
   check.require(std::ranges::find(views, stroke.view) != views.end(), "view",
                 "no training view is called " + excerpt(nlohmann::ordered_json(stroke.view)));
   check.require(std::ranges::find(kKinds, stroke.kind) != kKinds.end(), "kind",
-                "expected paint, exact, grey or erase, got " + excerpt(nlohmann::ordered_json(stroke.kind)));
+                "expected paint, exact, grey, erase or picture, got " + excerpt(nlohmann::ordered_json(stroke.kind)));
   check.require(ab_of_hex(stroke.color).has_value(), "color",
                 "expected a colour like #c08040, got " + excerpt(nlohmann::ordered_json(stroke.color)));
   check.in_range(stroke.size, 0.0005f, 0.5f, "size");
   check.in_range(stroke.softness, 0, 1, "softness");
   check.in_range(stroke.reach, 0.1f, 4, "reach");
-  check.require(!stroke.points.empty() && stroke.points.size() <= kMostStrokePoints, "points",
-                fmt::format("expected 1 to {} points, got {}", kMostStrokePoints, stroke.points.size()));
+  const bool is_picture = stroke.kind == "picture";
+  const bool is_number = std::ranges::all_of(stroke.picture, [](char c) { return std::isxdigit(c) != 0; });
+  check.require(is_picture ? stroke.picture.size() == kPictureDigits && is_number : stroke.picture.empty(), "picture",
+                is_picture ? fmt::format("expected {} hexadecimal digits", kPictureDigits) : "only pictures have one");
+  check.require(stroke.points.empty() == is_picture && stroke.points.size() <= kMostStrokePoints, "points",
+                is_picture ? "pictures have none"
+                           : fmt::format("expected 1 to {} points, got {}", kMostStrokePoints, stroke.points.size()));
   for (const StrokePoint& point : stroke.points) {
     // A brush may start beside the picture.
     check.in_range(point[0], -1, 2, "points");
@@ -72,9 +79,56 @@ Nearest nearest(float x, float y, const StrokePoint& a, const StrokePoint& b) {
   return {std::hypot(x - a[0] - along * dx, y - a[1] - along * dy), along};
 }
 
+/// Over what was painted before it.
+void put_picture(const PaintedPicture& picture, float reach, KnownColors& paint) {
+  for (int y = 0; y < paint.height; ++y) {
+    for (int x = 0; x < paint.width; ++x) {
+      const int row = std::min(int((y + 0.5f) / float(paint.height) * float(picture.height)), picture.height - 1);
+      const int column = std::min(int((x + 0.5f) / float(paint.width) * float(picture.width)), picture.width - 1);
+      const auto from = std::size_t(row) * std::size_t(picture.width) + std::size_t(column);
+      const auto to = std::size_t(y) * std::size_t(paint.width) + std::size_t(x);
+      if (picture.is_known[from] == 0) continue;
+      paint.is_known[to] = 1;
+      paint.ab[to] = picture.ab[from];
+      paint.reach[to] = reach;
+    }
+  }
+}
+
 }  // namespace
 
-StrokeList strokes_of_json(std::string_view text, const fs::path& file, std::span<const std::string> views) {
+PaintedPicture painted_picture(const LinearImage& image, const fs::path& name) {
+  PaintedPicture picture{image.width, image.height, {}, {}};
+  std::size_t painted = 0;
+  for (std::size_t p = 0; p < image.pixel_count(); ++p) {
+    const float alpha = image.alpha.empty() ? 1.0f : image.alpha[p];
+    const bool counts = alpha > kPaintedAlpha;
+    const float* pixel = &image.values[std::size_t(image.channels) * p];
+    const Vec3f light = image.channels == 3 ? Vec3f{pixel[0], pixel[1], pixel[2]} : Vec3f{pixel[0], pixel[0], pixel[0]};
+    const Lab<float> lab = counts ? lab_from_linear_rgb(light / alpha) : Lab<float>{};
+    picture.ab.push_back({lab.a, lab.b});
+    picture.is_known.push_back(counts ? 1 : 0);
+    painted += counts ? 1 : 0;
+  }
+  if (painted == 0) throw InputError(name, "alpha", "nothing is painted on it");
+  if (painted == image.pixel_count()) {
+    throw InputError(name, "alpha", "a painted picture is transparent except for its paint; this one is opaque");
+  }
+  return picture;
+}
+
+std::shared_ptr<const PaintedPicture> PaintedPictures::find(const std::string& picture) {
+  const std::lock_guard lock(mutex_);
+  std::shared_ptr<const PaintedPicture>& found = read_[picture];
+  if (!found) {
+    const fs::path from = file(picture);
+    found = std::make_shared<PaintedPicture>(painted_picture(read_linear_image(from, Transfer::kSrgb), from));
+  }
+  return found;
+}
+
+StrokeList strokes_of_json(std::string_view text, const fs::path& file, std::span<const std::string> views,
+                           PaintedPictures& pictures) {
   if (text.size() > kLargestStrokeFile) {
     throw InputError(file, "", fmt::format("expected at most {} bytes, got {}", kLargestStrokeFile, text.size()));
   }
@@ -87,12 +141,14 @@ StrokeList strokes_of_json(std::string_view text, const fs::path& file, std::spa
     const StrokeCheck of_stroke(file, i);
     check(list.strokes[i], of_stroke, views);
     of_stroke.require(ids.insert(list.strokes[i].id).second, "id", "another stroke has it: " + list.strokes[i].id);
+    if (!list.strokes[i].picture.empty()) list.strokes[i].painted = pictures.find(list.strokes[i].picture);
   }
   return list;
 }
 
 StrokeList read_strokes(const fs::path& file, std::span<const std::string> views) {
-  return strokes_of_json(read_text_file(file), file, views);
+  PaintedPictures pictures(file.parent_path());
+  return strokes_of_json(read_text_file(file), file, views, pictures);
 }
 
 void write_strokes(const fs::path& file, const StrokeList& list) {
@@ -157,6 +213,10 @@ KnownColors painted_on(const std::string& view, std::span<const Stroke> strokes,
   std::vector<float> coverage(pixels);
   for (const Stroke& stroke : strokes) {
     if (stroke.view != view || stroke.hidden) continue;
+    if (stroke.painted) {
+      put_picture(*stroke.painted, stroke.reach, paint);
+      continue;
+    }
     std::ranges::fill(coverage, 0.0f);
     cover(stroke, width, height, coverage);
     const Ab color = stroke.kind == "grey" ? Ab{} : ab_of_hex(stroke.color).value_or(Ab{});

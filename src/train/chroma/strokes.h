@@ -3,7 +3,12 @@
 /// colour, never light.
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,6 +16,7 @@
 #include "src/base/json_record.h"
 #include "src/base/record.h"
 #include "src/capture/capture.h"
+#include "src/capture/image_io.h"
 #include "src/train/chroma/known_colors.h"
 
 namespace cnerf {
@@ -22,11 +28,18 @@ inline constexpr std::size_t kLargestStrokeFile = std::size_t(4) << 20;
 /// A place of a stroke: x and y as shares of the picture's width and height, pressure 0..1.
 using StrokePoint = std::array<float, 3>;
 
+/// What a picture of a paint program paints: colours where it is not transparent.  [H, W]
+struct PaintedPicture {
+  int width = 0, height = 0;
+  std::vector<Ab> ab;
+  std::vector<std::uint8_t> is_known;  ///< 0 or 1
+};
+
 struct Stroke {
   std::string id;    ///< letters and digits, its own
   std::string view;  ///< a training view, as the capture names it
   /// "paint": the colour runs over what is alike around it; "exact": it stays where it was painted; "grey": paint
-  /// without colour; "erase": takes away what was painted before it on the view.
+  /// without colour; "erase": takes away what was painted before it on the view; "picture": what `picture` paints.
   std::string kind = "paint";
   std::string color = "#808080";  ///< sRGB; only hue and chroma count
   float size = 0.02f;             ///< diameter at full pressure, as a share of the picture's shorter side
@@ -34,6 +47,8 @@ struct Stroke {
   float reach = 1;                ///< how far the colour runs, times StrokeReach
   bool hidden = false;
   std::vector<StrokePoint> points = {};  ///< joined by straight lines; one is a dot
+  std::string picture = {};              ///< 12 hexadecimal digits: a file of the folder `painted` beside the list
+  std::shared_ptr<const PaintedPicture> painted = {};  ///< what that file holds
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
@@ -45,9 +60,33 @@ struct Stroke {
     v("softness", self.softness, kOptional);
     v("reach", self.reach, kOptional);
     v("hidden", self.hidden, kOptional);
-    v("points", self.points);
+    v("points", self.points, kOptional);
+    v("picture", self.picture, kOptional);
   }
 };
+
+/// The painted pictures of a folder of strokes, each read once. Thread-safe.
+class PaintedPictures {
+ public:
+  /// @param folder  that a stroke file lies in
+  explicit PaintedPictures(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  [[nodiscard]] std::filesystem::path file(const std::string& picture) const {
+    return folder_ / "painted" / (picture + ".png");
+  }
+  /// @throws MissingInputError, InputError  of the file
+  [[nodiscard]] std::shared_ptr<const PaintedPicture> find(const std::string& picture);
+
+ private:
+  std::filesystem::path folder_;
+  std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<const PaintedPicture>> read_;
+};
+
+/// Of a picture as paint programs write them, transparent except for paint.
+/// @param name  that errors have
+/// @throws InputError  it is opaque, or nothing is painted on it
+[[nodiscard]] PaintedPicture painted_picture(const LinearImage& image, const std::filesystem::path& name);
 
 /// Content of a stroke file.
 struct StrokeList {
@@ -62,11 +101,12 @@ struct StrokeList {
 };
 
 /// Strokes out of JSON of any content.
-/// @param file   that errors name
-/// @param views  names that strokes may have
+/// @param file      that errors name
+/// @param views     names that strokes may have
+/// @param pictures  that strokes may name
 /// @throws InputError  "file: strokes[3].size: …": no such list, a number out of range, an unknown view or kind
 [[nodiscard]] StrokeList strokes_of_json(std::string_view text, const std::filesystem::path& file,
-                                         std::span<const std::string> views);
+                                         std::span<const std::string> views, PaintedPictures& pictures);
 /// @throws MissingInputError, and as strokes_of_json
 [[nodiscard]] StrokeList read_strokes(const std::filesystem::path& file, std::span<const std::string> views);
 /// @throws OutputError

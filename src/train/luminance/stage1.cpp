@@ -157,6 +157,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
                                  {"rays/s", rays / clock.seconds()},
                                  {"samples", model.trained_samples}}});
       observer.offer_preview(preview);
+      if (job.watch) job.watch(model);
     });
 
     const long done = model.engine->step_count();

@@ -2,6 +2,8 @@
 /// Stage 1: luminance and density from monochrome views (paper, Sec. "Luminance and density representation").
 
 #include <filesystem>
+#include <functional>
+#include <vector>
 
 #include "src/base/observer.h"
 #include "src/capture/capture.h"
@@ -9,6 +11,8 @@
 #include "src/train/luminance/stage1_options.h"
 
 namespace cnerf {
+
+struct LuminanceModel;
 
 struct Stage1Report {
   int steps = 0;
@@ -25,9 +29,10 @@ void check_continues(const std::filesystem::path& snapshot, const Stage1Options&
 struct Stage1Job {
   const Capture& capture;
   const Stage1Options& options;
-  std::filesystem::path snapshot;        ///< that the result goes to
-  bool resume = false;                   ///< go on with the snapshot, if there is one
-  std::vector<SparsePoint> points = {};  ///< in place of the capture's, which has none
+  std::filesystem::path snapshot;                         ///< that the result goes to
+  bool resume = false;                                    ///< go on with the snapshot, if there is one
+  std::vector<SparsePoint> points = {};                   ///< in place of the capture's, which has none
+  std::function<void(const LuminanceModel&)> watch = {};  ///< sees the model between steps, in no training time
 
   [[nodiscard]] bool goes_on() const { return resume && std::filesystem::exists(snapshot); }
 };

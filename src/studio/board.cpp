@@ -1,0 +1,97 @@
+#include "src/studio/board.h"
+
+#include <atomic>
+#include <chrono>
+
+namespace cnerf::studio {
+namespace {
+
+constexpr std::size_t kMostNotes = 12;
+
+std::uint64_t next_version() {
+  static std::atomic<std::uint64_t> version = 0;
+  return ++version;
+}
+
+}  // namespace
+
+Board::Board() {
+  state_.version = next_version();
+}
+
+/// Under the lock.
+void Board::changed() {
+  state_.version = next_version();
+  news_.notify_all();
+}
+
+void Board::change(const std::function<void(StateMessage&)>& change) {
+  const std::lock_guard lock(mutex_);
+  change(state_);
+  changed();
+}
+
+void Board::say(const std::string& text, bool failed) {
+  change([&](StateMessage& state) {
+    state.message = text;
+    state.failed = failed;
+  });
+}
+
+void Board::note(const std::string& line) {
+  change([&](StateMessage& state) {
+    if (state.notes.size() >= kMostNotes) state.notes.erase(state.notes.begin());
+    state.notes.push_back(line);
+  });
+}
+
+std::string Board::text() const {
+  return read([](const StateMessage& state) { return json_of(state).dump(); });
+}
+
+std::optional<std::pair<std::uint64_t, std::string>> Board::wait_for_news(std::uint64_t after, double seconds) {
+  std::unique_lock lock(mutex_);
+  const auto has_news = [&] { return state_.version != after || is_closed_; };
+  if (!news_.wait_for(lock, std::chrono::duration<double>(seconds), has_news) || state_.version == after) {
+    return std::nullopt;
+  }
+  return std::pair{state_.version, json_of(state_).dump()};
+}
+
+void Board::joined(const std::string& client) {
+  const std::lock_guard lock(mutex_);
+  ++followers_[client];
+}
+
+void Board::left(const std::string& client) {
+  const std::lock_guard lock(mutex_);
+  if (--followers_[client] > 0) return;
+  followers_.erase(client);
+  if (state_.writer != client) return;
+  state_.writer.clear();
+  changed();
+}
+
+/// Only who listens can be noticed when it leaves: others may change things, but never own the studio.
+std::optional<web::PageAnswer> Board::become_writer(const std::string& client) {
+  const std::lock_guard lock(mutex_);
+  if (!state_.writer.empty() && state_.writer != client) return web::refusal(423, "another tab paints");
+  if (followers_.contains(client) && state_.writer != client) {
+    state_.writer = client;
+    changed();
+  }
+  return std::nullopt;
+}
+
+void Board::close() {
+  const std::lock_guard lock(mutex_);
+  is_closed_ = true;
+  news_.notify_all();
+}
+
+bool Board::closed() const {
+  const std::lock_guard lock(mutex_);
+  return is_closed_;
+}
+
+}  // namespace cnerf::studio

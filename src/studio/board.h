@@ -1,0 +1,58 @@
+#pragma once
+/// What a page of the studio is told, and who may change things. The thread that works writes, the server's threads
+/// read.
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "src/studio/messages.h"
+#include "viewer/server/page_api.h"
+
+namespace cnerf::studio {
+
+/// Versions grow from one board to the next of a process, so that a page hears of the change.
+class Board {
+ public:
+  Board();
+
+  /// Changes the state under the lock, and tells everybody.
+  void change(const std::function<void(StateMessage&)>& change);
+  void say(const std::string& text, bool failed = false);
+  /// Adds a line to what the work said lately.
+  void note(const std::string& line);
+
+  /// What `look` makes of the state, under the lock.
+  template <typename Look>
+  auto read(Look&& look) const {
+    const std::lock_guard lock(mutex_);
+    return look(state_);
+  }
+  [[nodiscard]] std::string text() const;
+  [[nodiscard]] std::optional<std::pair<std::uint64_t, std::string>> wait_for_news(std::uint64_t after, double seconds);
+
+  void joined(const std::string& client);
+  void left(const std::string& client);
+  /// Whoever orders or paints first is the writer until its stream of news ends.
+  /// @return  why another client may not; nothing where it may
+  [[nodiscard]] std::optional<web::PageAnswer> become_writer(const std::string& client);
+
+  void close();
+  [[nodiscard]] bool closed() const;
+
+ private:
+  void changed();
+
+  mutable std::mutex mutex_;
+  std::condition_variable news_;
+  StateMessage state_;
+  std::map<std::string, int> followers_;  // streams of each client
+  bool is_closed_ = false;
+};
+
+}  // namespace cnerf::studio

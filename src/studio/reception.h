@@ -1,0 +1,79 @@
+#pragma once
+/// Where a studio begins without a scene: photographs, a clip or a whole capture arrive from the page, and are prepared.
+
+#include <condition_variable>
+#include <filesystem>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "src/base/observer.h"
+#include "src/pipeline/run_context.h"
+#include "src/studio/board.h"
+#include "src/studio/routes.h"
+#include "viewer/server/page_api.h"
+
+namespace cnerf::studio {
+
+/// Bytes of a piece of a file that a page sends.
+inline constexpr std::size_t kLargestPiece = std::size_t(8) << 20;
+
+/// GET  scene, state, events
+/// PUT  arrivals?name=PATH&offset=BYTES   a piece of a file; 0 begins it anew
+/// POST orders                            prepare, clear, stop
+class Reception final : public web::PageApi {
+ public:
+  /// Begins a run on what was prepared.  @throws Error  it cannot be begun with this capture
+  using Open = std::function<pipeline::RunContext(const std::filesystem::path& capture, Observer& observer)>;
+
+  /// @param source  photographs, a clip or a capture to begin with at once; empty = what the page sends
+  /// @param run     folder that the run will go to; what arrives is kept beside it
+  /// @param observer  hears what is done; referred to
+  Reception(std::filesystem::path source, std::filesystem::path run, Open open, Observer& observer);
+
+  /// Waits for a capture and begins the run.  @return  nothing when the user ended the program, or it was closed
+  [[nodiscard]] std::optional<pipeline::RunContext> run();
+
+  [[nodiscard]] std::string prefix() const override { return "/studio"; }
+  [[nodiscard]] std::optional<std::size_t> largest_body(const std::string& method,
+                                                        const std::string& path) const override {
+    return largest_body_of(routes(), method, path);
+  }
+  [[nodiscard]] web::PageAnswer answer(const web::PageRequest& request) override {
+    return answer_of(routes(), *this, request);
+  }
+  [[nodiscard]] std::optional<std::pair<std::uint64_t, std::string>> wait_for_news(std::uint64_t after,
+                                                                                   double seconds) override {
+    return board_.wait_for_news(after, seconds);
+  }
+  void joined(const std::string& client) override { board_.joined(client); }
+  void left(const std::string& client) override { board_.left(client); }
+  void close() override;
+  [[nodiscard]] bool closed() const override { return board_.closed(); }
+
+ private:
+  static std::span<const Route<Reception>> routes();
+  web::PageAnswer get_scene(const web::PageRequest& request);
+  web::PageAnswer get_state(const web::PageRequest& request);
+  web::PageAnswer put_arrival(const web::PageRequest& request);
+  web::PageAnswer post_order(const web::PageRequest& request);
+
+  [[nodiscard]] std::optional<pipeline::RunContext> prepared(bool is_new);
+  /// What has arrived, as `prepare` wants it: a folder, or the one clip.
+  [[nodiscard]] std::filesystem::path arrived_source() const;
+  void count_arrivals();
+  [[nodiscard]] bool should_stop() const;
+
+  std::filesystem::path source_, run_, arrivals_;
+  Open open_;
+  Observer& observer_;
+
+  Board board_;
+  mutable std::mutex mutex_;  // of what follows; taken before the board's
+  std::condition_variable work_;
+  bool is_ordered_ = false, is_working_ = false, stop_requested_ = false;
+};
+
+}  // namespace cnerf::studio

@@ -1,0 +1,137 @@
+// Where a studio begins without a scene, by its answers.
+
+#include "src/studio/reception.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/sample/sample_scene.h"
+#include "tests/support/data.h"
+#include "tests/support/tiny_config.h"
+
+namespace cnerf::studio {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+using web::PageAnswer;
+constexpr const char* kPainter = "painter123";
+
+class ReceptionTest : public testing::Test {
+ protected:
+  void open(const fs::path& source = {}) {
+    const auto begin = [this](const fs::path& capture, Observer& observer) {
+      const Config config = test::tiny_config();
+      pipeline::RunContext context{pipeline::RunDirectory(folder_ / "run"), config,
+                                   pipeline::read_capture(capture, config, observer), {}};
+      pipeline::begin_run(context, capture, {});
+      return context;
+    };
+    reception_ = std::make_unique<Reception>(source, folder_ / "run", begin, observer_);
+    reception_->joined(kPainter);
+    worker_ = std::thread([this] { context_ = reception_->run(); });
+  }
+  void TearDown() override {
+    if (!reception_) return;
+    reception_->close();
+    if (worker_.joinable()) worker_.join();
+  }
+  PageAnswer put(const std::string& name, const std::string& offset, const std::string& body,
+                 const std::string& client = kPainter) {
+    return reception_->answer({"PUT", "/studio/arrivals", {{"name", name}, {"offset", offset}}, client, {}, body});
+  }
+  PageAnswer order(const std::string& name) {
+    return reception_->answer({"POST", "/studio/orders", {}, kPainter, {}, json{{"order", name}}.dump()});
+  }
+  json state() { return json::parse(reception_->answer({"GET", "/studio/state", {}, kPainter, {}, {}}).body); }
+  json wait_until(const std::function<bool(const json&)>& holds) {
+    std::uint64_t seen = 0;
+    for (;;) {
+      const auto news = reception_->wait_for_news(seen, 60);
+      if (!news) throw std::runtime_error("no news for a minute");
+      seen = news->first;
+      if (json state = json::parse(news->second); holds(state)) return state;
+    }
+  }
+
+  test::TempDir folder_;
+  Observer observer_;
+  std::unique_ptr<Reception> reception_;
+  std::optional<pipeline::RunContext> context_;
+  std::thread worker_;
+};
+
+TEST_F(ReceptionTest, FilesArriveInPieces) {
+  open();
+  EXPECT_EQ(json::parse(put("trip/a b.JPG", "0", "1234").body)["bytes"], 4);
+  EXPECT_EQ(json::parse(put("trip/a b.JPG", "4", "56").body)["bytes"], 6);
+  EXPECT_EQ(put("trip/a b.JPG", "4", "56").status, 409) << "the file does not end there";
+  EXPECT_EQ(read_text_file(folder_ / "run-photographs/trip/a b.JPG"), "123456");
+  EXPECT_EQ(state()["arrived"], (json{{"files", 1}, {"bytes", 6}}));
+  EXPECT_EQ(put("trip/a b.JPG", "0", "9").status, 200) << "begins anew";
+  EXPECT_EQ(state()["arrived"], (json{{"files", 1}, {"bytes", 1}}));
+  EXPECT_EQ(put("b.png", "0", "x", "another1").status, 423);
+  EXPECT_EQ(order("clear").status, 202);
+  EXPECT_FALSE(fs::exists(folder_ / "run-photographs"));
+  EXPECT_EQ(state()["arrived"]["files"], 0);
+  EXPECT_EQ(json::parse(reception_->answer({"GET", "/studio/scene", {}, kPainter, {}, {}}).body)["views"].size(), 0u);
+}
+
+TEST_F(ReceptionTest, NamesThatLeadElsewhereAreRefusedByName) {
+  open();
+  const std::string nul("a\0.png", 6);
+  for (const std::string& name : std::vector<std::string>{
+           "", "../a.png", "a/../../b.png", "/etc/a.png", "a//b.png", "a/./b.png", ".a.png", "a/.hidden/b.png", "a.exe",
+           "png", "a\\b.png", "a\nb.png", nul, std::string(201, 'a') + ".png", "1/2/3/4/5/6/a.png", "a.png/"}) {
+    EXPECT_EQ(put(name, "0", "x").status, 400) << name;
+  }
+  EXPECT_THAT(put("virus.exe", "0", "x").body, HasSubstr("virus.exe"));
+  for (const char* offset : {"", "-1", "x", "99999999999999999999", "17179869185"}) {
+    EXPECT_EQ(put("a.png", offset, "x").status, 400) << offset;
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "run-photographs")) << "nothing was written";
+  EXPECT_EQ(reception_->largest_body("PUT", "/studio/arrivals"), kLargestPiece);
+  EXPECT_EQ(order("colour").status, 400);
+}
+
+TEST_F(ReceptionTest, WhatCannotBePreparedIsToldAndOthersCanBeSent) {
+  open();
+  EXPECT_EQ(order("prepare").status, 202);
+  EXPECT_THAT(wait_until([](const json& state) { return state["failed"] == true; })["message"].get<std::string>(),
+              HasSubstr("nothing has arrived"));
+  EXPECT_EQ(put("a.jpg", "0", "no photograph").status, 200);
+  EXPECT_EQ(order("prepare").status, 202);
+  const json state = wait_until([](const json& now) { return now["failed"] == true && now["task"] == ""; });
+  EXPECT_THAT(state["message"].get<std::string>(), HasSubstr("a.jpg"));
+  EXPECT_EQ(put("b.jpg", "0", "another").status, 200);
+}
+
+TEST_F(ReceptionTest, ACaptureThatArrivesWholeIsTakenAsItIs) {
+  write_sample_scene(folder_ / "sent", {.views = 4, .width = 48, .height = 36, .samples_per_pixel = 1});
+  open();
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "sent")) {
+    if (!entry.is_regular_file()) continue;
+    const std::string name = "sent/" + fs::relative(entry.path(), folder_ / "sent").string();
+    (void)put(name, "0", read_text_file(entry.path()));
+  }
+  EXPECT_EQ(order("prepare").status, 202);
+  worker_.join();
+  ASSERT_TRUE(context_);
+  EXPECT_EQ(context_->capture.views.size(), 4u);
+  EXPECT_EQ(context_->directory.record().capture, folder_ / "run-photographs/sent");
+}
+
+TEST_F(ReceptionTest, ASourceOfTheCommandLineIsBegunWithAtOnce) {
+  write_sample_scene(folder_ / "capture", {.views = 4, .width = 48, .height = 36, .samples_per_pixel = 1});
+  open(folder_ / "capture");
+  worker_.join();
+  ASSERT_TRUE(context_);
+  EXPECT_EQ(context_->capture.root, folder_ / "capture");
+}
+
+}  // namespace
+}  // namespace cnerf::studio
