@@ -1,5 +1,6 @@
 /** The page of a running command: progress, curves, pictures, and buttons to pause and to stop. */
 
+import { Curve, type CurvePoint } from "./ui/curve";
 import { button, el, toast } from "./ui/dom";
 
 interface State {
@@ -13,11 +14,9 @@ interface State {
   finished: boolean;
   message: string;
   figures: Record<string, number | null>;
-  curves: Record<string, [number, number][]>;
+  curves: Record<string, CurvePoint[]>;
   pictures: { name: string; version: number }[];
 }
-
-const svgNs = "http://www.w3.org/2000/svg";
 
 export function durationText(seconds: number): string {
   const s = Math.round(seconds);
@@ -33,35 +32,20 @@ export function figureText(value: number | null): string {
   return String(Number(value.toPrecision(4)));
 }
 
-/** An SVG line with its lowest, highest and last value. Loss is shown on a logarithmic scale. */
-export function curvePath(points: [number, number][], width: number, height: number, logarithmic: boolean): string {
-  if (points.length < 2) return "";
-  const y = (v: number) => (logarithmic ? Math.log(Math.max(v, 1e-12)) : v);
-  const values = points.map((p) => y(p[1]));
-  const low = Math.min(...values);
-  const span = Math.max(...values) - low || 1;
-  const begin = points[0][0];
-  const time = points[points.length - 1][0] - begin || 1;
-  return points.map((p, i) => `${i ? "L" : "M"}${((width * (p[0] - begin)) / time).toFixed(1)} ${(height - (height * (values[i] - low)) / span).toFixed(1)}`).join("");
-}
-
+/** A curve with its lowest, highest and last value. */
 class Chart {
   readonly node: HTMLElement;
-  private path = document.createElementNS(svgNs, "path");
+  private curve = new Curve(400, 120);
   private last = el("strong");
   private range = el("span", { class: "range" });
 
   constructor(readonly name: string) {
-    const svg = document.createElementNS(svgNs, "svg");
-    svg.setAttribute("viewBox", "0 0 400 120");
-    svg.setAttribute("preserveAspectRatio", "none");
-    svg.append(this.path);
     const [task, figure] = name.split(": ").length > 1 ? [name.slice(0, name.lastIndexOf(": ")), name.slice(name.lastIndexOf(": ") + 2)] : ["", name];
-    this.node = el("figure", { class: "chart", "data-curve": name }, el("figcaption", {}, el("span", {}, figure), el("small", {}, task), this.last), svg, this.range);
+    this.node = el("figure", { class: "chart", "data-curve": name }, el("figcaption", {}, el("span", {}, figure), el("small", {}, task), this.last), this.curve.node, this.range);
   }
-  update(points: [number, number][]): void {
+  update(points: CurvePoint[]): void {
     const values = points.map((p) => p[1]);
-    this.path.setAttribute("d", curvePath(points, 400, 120, /loss|distance/.test(this.name)));
+    this.curve.draw(points, /loss|distance/.test(this.name));
     this.last.textContent = figureText(values[values.length - 1] ?? null);
     this.range.textContent = values.length ? `${figureText(Math.min(...values))} to ${figureText(Math.max(...values))}` : "";
   }

@@ -32,7 +32,7 @@ async function start(): Promise<void> {
     return showMessage("The server does not answer", "It may have been ended. Start it again with cnerf view and reload this page.", retry());
   }
   if (answer.status === 404) {
-    const studio = await fetch("./studio/scene").catch(() => null);
+    const studio = await fetch("./studio/state").catch(() => null);
     if (studio?.ok) return showStudio(root, await studio.json());
     const live = await fetch("./live/state").catch(() => null);
     if (live?.ok) return showLive(root, await live.json());

@@ -51,7 +51,7 @@ export abstract class Navigator {
   }
 
   moveTo(view: View, target: Vec3, camera = -1, milliseconds = 550): void {
-    if (this.still) {
+    if (this.still || milliseconds <= 0) {
       this.captureCamera = camera;
       this.flight = null;
       return this.put(view, target);

@@ -1,7 +1,7 @@
 /** The server, as seen from the page. */
 
 import { words } from "./words";
-import type { FrameRequest, Scene, State, Stroke } from "./protocol";
+import type { FrameRequest, Scene, State, Stroke, Viewpoint } from "./protocol";
 
 /** The server says no, with its reason. */
 export class Refusal extends Error {
@@ -48,7 +48,7 @@ export class Api {
   }
 
   async scene(): Promise<Scene> {
-    return (await this.send("GET", "scene")).json();
+    return (await this.send("GET", "scene", undefined, { "Cache-Control": "no-cache" })).json();
   }
   async state(): Promise<State> {
     return (await this.send("GET", "state")).json();
@@ -58,19 +58,19 @@ export class Api {
     return answer.state ?? (answer.version ? answer : undefined);
   }
   /** null: a newer frame was asked for meanwhile. */
-  async frame(request: FrameRequest): Promise<{ picture: ImageBitmap; colors: number } | null> {
+  async frame(request: FrameRequest): Promise<{ picture: ImageBitmap; colors: number; milliseconds: number } | null> {
     const answer = await this.post("frame", request);
     if (answer.status === 204) return null;
     const picture = await createImageBitmap(await answer.blob());
-    return { picture, colors: Number(answer.headers.get("X-Cnerf-Colors") ?? -1) };
+    return { picture, colors: Number(answer.headers.get("X-Cnerf-Colors") ?? -1), milliseconds: Number(answer.headers.get("X-Cnerf-Milliseconds") ?? 0) };
   }
 
-  async strokes(): Promise<{ revision: number; strokes: Stroke[] }> {
+  async strokes(): Promise<{ revision: number; strokes: Stroke[]; viewpoints: Viewpoint[] }> {
     return (await this.send("GET", "strokes", undefined, { "Cache-Control": "no-cache" })).json();
   }
-  async putStrokes(strokes: readonly Stroke[], revision: number): Promise<number> {
+  async putStrokes(strokes: readonly Stroke[], revision: number, viewpoints: readonly Viewpoint[] = []): Promise<number> {
     const headers = { "Content-Type": "application/json", "X-Cnerf-Revision": String(revision) };
-    return (await (await this.send("PUT", "strokes", JSON.stringify({ strokes }), headers)).json()).revision;
+    return (await (await this.send("PUT", "strokes", JSON.stringify({ strokes, viewpoints }), headers)).json()).revision;
   }
   async reach(view: number, strokes: readonly Stroke[], revision: number): Promise<Blob> {
     return (await (strokes.length > 0 ? this.post("reach", { view, strokes }) : this.send("GET", `reach/${view}?revision=${revision}`))).blob();
@@ -78,14 +78,30 @@ export class Api {
   async picture(query: Record<string, string>, file: Blob): Promise<void> {
     await this.send("POST", `pictures?${new URLSearchParams(query)}`, file, { "Content-Type": file.type || "application/octet-stream" });
   }
-  /** Opens the stream of states. `lost` is called where it breaks; it connects again by itself. */
-  listen(heard: (state: State) => void, lost: () => void): void {
-    // A stream cannot carry headers: the client's name goes into its address.
-    const events = new EventSource(`./studio/events?client=${this.client}`);
-    events.onmessage = (event) => heard(JSON.parse(event.data as string) as State);
-    events.onerror = () => {
-      lost();
-      if (events.readyState === EventSource.CLOSED) setTimeout(() => this.listen(heard, lost), 2000);
+  /** The next piece of a file that is sent. @return how much of it the server has now, bytes */
+  async arrive(name: string, offset: number, piece: Blob): Promise<number> {
+    // Not URLSearchParams: its "+" for a space is not every server's.
+    const answer = await this.send("PUT", `arrivals?name=${encodeURIComponent(name)}&offset=${offset}`, piece, { "Content-Type": "application/octet-stream" });
+    return (await answer.json()).bytes;
+  }
+  /** Opens the stream of states. `lost` is called where it breaks; it connects again by itself. @return what ends it */
+  listen(heard: (state: State) => void, lost: () => void): () => void {
+    let events: EventSource;
+    let ended = false;
+    const open = () => {
+      if (ended) return;
+      // A stream cannot carry headers: the client's name goes into its address.
+      events = new EventSource(`./studio/events?client=${this.client}`);
+      events.onmessage = (event) => heard(JSON.parse(event.data as string) as State);
+      events.onerror = () => {
+        lost();
+        if (events.readyState === EventSource.CLOSED) setTimeout(open, 2000);
+      };
+    };
+    open();
+    return () => {
+      ended = true;
+      events.close();
     };
   }
 }

@@ -1,7 +1,10 @@
-/** The strokes as a document: undo and redo over every change, saved as it is made, merged where another tab was faster. */
+/**
+ * The strokes as a document, with the viewpoints they are painted at: undo and redo over every change, saved as it is
+ * made, merged where another tab was faster.
+ */
 
 import { Lost, Refusal } from "./api";
-import type { Stroke } from "./protocol";
+import type { Stroke, Viewpoint } from "./protocol";
 
 export type StrokeList = readonly Stroke[];
 
@@ -27,9 +30,9 @@ export function merged(base: StrokeList, mine: StrokeList, theirs: StrokeList): 
 
 /** What strokes are saved to. */
 export interface StrokeStore {
-  strokes(): Promise<{ revision: number; strokes: Stroke[] }>;
+  strokes(): Promise<{ revision: number; strokes: Stroke[]; viewpoints: Viewpoint[] }>;
   /** @return the new revision */
-  putStrokes(strokes: StrokeList, revision: number): Promise<number>;
+  putStrokes(strokes: StrokeList, revision: number, viewpoints: readonly Viewpoint[]): Promise<number>;
 }
 /** What keeps strokes that the server does not have: the browser's own store. */
 export type Shelf = Pick<Storage, "getItem" | "setItem" | "removeItem">;
@@ -37,13 +40,25 @@ export type Shelf = Pick<Storage, "getItem" | "setItem" | "removeItem">;
 interface Kept {
   base: StrokeList;
   list: StrokeList;
+  viewpoints?: Viewpoint[];
 }
+
+const numberOf = (viewpoint: Viewpoint) => Number(/\d+$/.exec(viewpoint.name)?.[0] ?? 0);
 
 export class StrokeDocument {
   list: StrokeList = [];
   /** The list that the server has. */
   saved: StrokeList = this.list;
+  /** The viewpoints that the server has, in its order: they are numbered after the views. */
+  savedViewpoints: readonly Viewpoint[] = [];
   revision = 0;
+  /** Every viewpoint this page has heard of: a redo brings back strokes of one that was dropped. */
+  private known: Viewpoint[] = [];
+  /** Name of the viewpoint that is open; it stays without strokes too. */
+  private held = "";
+  /** Counts the changes of the viewpoints that are to be saved though no stroke changed. */
+  private wish = 0;
+  private savedWish = 0;
   /** The page tells: strokes of another tab came in; something could not be saved; unsent strokes were put back. */
   told: (what: "merged" | "unsent" | "lost" | Refusal) => void = () => {};
   private undone: [StrokeList, StrokeList][] = [];
@@ -66,15 +81,41 @@ export class StrokeDocument {
     return this.undone.length > 0;
   }
   get isSaved(): boolean {
-    return this.list === this.saved;
+    return this.list === this.saved && this.wish === this.savedWish;
   }
   /** Strokes the server does not have in this form. */
   get unsaved(): Stroke[] {
     const there = new Set(this.saved);
-    return this.isSaved ? [] : this.list.filter((s) => !there.has(s));
+    return this.list === this.saved ? [] : this.list.filter((s) => !there.has(s));
   }
   of(view: string): Stroke[] {
     return this.list.filter((s) => s.view === view);
+  }
+
+  // Viewpoints.
+
+  /** The viewpoints that are to be saved: those that are painted at, and the one that is open. */
+  get viewpoints(): readonly Viewpoint[] {
+    const painted = new Set(this.list.map((s) => s.view));
+    return this.known.filter((v) => painted.has(v.name) || v.name === this.held).sort((a, b) => numberOf(a) - numberOf(b));
+  }
+  freeViewpoint(): string {
+    return `viewpoint-${1 + Math.max(0, ...this.known.map(numberOf))}`;
+  }
+  /** Opens a viewpoint, or (null) none: the one that was open goes where nothing was painted at it. */
+  async hold(viewpoint: Viewpoint | null): Promise<void> {
+    const before = this.held;
+    this.held = viewpoint?.name ?? "";
+    if (viewpoint) this.learn([viewpoint]);
+    const there = (name: string) => this.savedViewpoints.some((v) => v.name === name);
+    const isStale = before !== this.held && there(before) && !this.list.some((s) => s.view === before);
+    if (!isStale && !(viewpoint && !there(viewpoint.name))) return;
+    this.wish += 1;
+    await this.save();
+  }
+  private learn(viewpoints: readonly Viewpoint[]): void {
+    const names = new Set(viewpoints.map((v) => v.name));
+    this.known = [...viewpoints, ...this.known.filter((v) => !names.has(v.name))];
   }
 
   /** A change by the user: can be undone, and is saved. */
@@ -119,16 +160,15 @@ export class StrokeDocument {
     const answer = await this.store.strokes();
     const kept = this.taken();
     // A page that has unsaved strokes itself knows them better than the shelf does.
-    const { base, list } = this.isSaved && kept ? kept : { base: this.saved, list: this.list };
+    const { base, list, viewpoints } = this.isSaved && kept ? kept : { base: this.saved, list: this.list };
     const unsent = list !== base;
-    this.revision = answer.revision;
-    this.saved = answer.strokes;
+    if (viewpoints) this.learn(viewpoints);
+    this.take(answer);
     this.list = unsent ? merged(base, list, answer.strokes) : answer.strokes;
     this.keep();
     this.tell();
-    if (!unsent) return;
-    this.told("unsent");
-    await this.save();
+    if (unsent) this.told("unsent");
+    if (!this.isSaved) await this.save();
   }
   /** Another tab wrote: its list is taken, with what is unsaved here on top. */
   async follow(revision: number): Promise<void> {
@@ -139,12 +179,17 @@ export class StrokeDocument {
   }
   private async fetched(): Promise<void> {
     const answer = await this.store.strokes();
-    const unsaved = !this.isSaved;
+    const unsaved = this.list !== this.saved;
     this.list = unsaved ? merged(this.saved, this.list, answer.strokes) : answer.strokes;
-    this.saved = answer.strokes;
-    this.revision = answer.revision;
+    this.take(answer);
     this.tell();
     if (unsaved) this.told("merged");
+  }
+  private take({ revision, strokes, viewpoints }: Awaited<ReturnType<StrokeStore["strokes"]>>): void {
+    this.saved = strokes;
+    this.savedViewpoints = viewpoints;
+    this.learn(viewpoints);
+    this.revision = revision;
   }
 
   /** Saves until everything is; one request at a time. */
@@ -162,9 +207,12 @@ export class StrokeDocument {
     this.keep();
   }
   private async saveOnce(list: StrokeList): Promise<void> {
+    const { wish, viewpoints } = this;
     try {
-      this.revision = await this.store.putStrokes(list, this.revision);
+      this.revision = await this.store.putStrokes(list, this.revision, viewpoints);
       this.saved = list;
+      this.savedViewpoints = viewpoints;
+      this.savedWish = wish;
       this.tell();
     } catch (problem) {
       if (!(problem instanceof Refusal && problem.status === 409)) throw problem;
@@ -177,13 +225,15 @@ export class StrokeDocument {
     this.done = [];
     this.undone = [];
     this.saved = this.list;
+    this.savedWish = this.wish;
     await this.fetched().catch(() => this.told("lost"));
   }
 
   private keep(): void {
     try {
-      if (this.isSaved) this.shelf.removeItem(this.shelfKey);
-      else this.shelf.setItem(this.shelfKey, JSON.stringify({ base: this.saved, list: this.list } satisfies Kept));
+      // A viewpoint alone, without strokes, is not worth keeping.
+      if (this.list === this.saved) this.shelf.removeItem(this.shelfKey);
+      else this.shelf.setItem(this.shelfKey, JSON.stringify({ base: this.saved, list: this.list, viewpoints: this.known } satisfies Kept));
     } catch {
       // A full or forbidden store: the strokes are still in the page.
     }

@@ -3,7 +3,7 @@
 import { el, toast } from "../ui/dom";
 import type { Tool } from "./brush";
 import { hexOf, lightnessOfCode, type Rgb } from "./color";
-import { PaintLayer, strokeAt, type Box } from "./paint";
+import { PaintLayer, planesOf, strokeAt, type Box, type Planes } from "./paint";
 import { limits, type Stroke, type StrokePoint } from "./protocol";
 import { TintFeed, type TintKind } from "./reach";
 import type { Session } from "./session";
@@ -32,6 +32,9 @@ export class Easel {
   private lineFrom: Place | null = null;
   private lastEnd: StrokePoint | null = null;
   private painted: readonly Stroke[] = [];
+  /** Painted pictures of this photograph, in its size, and those that are on their way. */
+  private pictures = new Map<string, Planes>();
+  private fetching = new Set<string>();
   private dirty = false;
   private dragging = false;
   private held: Tool | null = null;
@@ -39,7 +42,7 @@ export class Easel {
   private listeners = new Set<() => void>();
 
   constructor(private readonly session: Session) {
-    this.feed = new TintFeed(session, (view, tint) => view === session.photo && this.layer && (this.layer.setTint(tint), this.flush(null)));
+    this.feed = new TintFeed(session, (view, tint) => view === session.open && this.layer && (this.layer.setTint(tint), this.flush(null)));
     session.strokes.onChange(() => this.follow());
     session.brush.onChange(() => this.redraw());
     let [colors, ready] = [session.state.colors, session.state.ready];
@@ -70,16 +73,20 @@ export class Easel {
 
   async open(index: number): Promise<void> {
     const { session } = this;
-    session.photo = index;
+    const view = session.views[index];
+    session.open = view.name;
     this.node.hidden = false;
     this.lastEnd = null;
     this.growing = null;
-    const view = session.scene.views[index];
-    const side = Math.max(view.width, view.height) > longest ? `?side=${longest}` : "";
+    // Until the photograph is there nothing can be painted: it would go to another view than the one that is seen.
+    this.layer = null;
+    delete this.node.dataset.photo;
+    const side = Math.max(view.width, view.height) > longest ? `side=${longest}` : "";
+    const query = `${side}${session.stamp(index)}`.replace(/^&/, "");
     this.tell();
     try {
-      const photo = await createImageBitmap(await (await session.api.send("GET", `photos/${index}${side}`)).blob());
-      if (session.photo !== index) return photo.close();
+      const photo = await createImageBitmap(await (await session.api.send("GET", `photos/${index}${query && `?${query}`}`)).blob());
+      if (session.open !== view.name) return photo.close();
       this.show(photo);
     } catch (problem) {
       session.explain(problem);
@@ -94,6 +101,8 @@ export class Easel {
     this.layer = new PaintLayer(photo.width, photo.height, context.getImageData(0, 0, photo.width, photo.height).data);
     context.clearRect(0, 0, photo.width, photo.height);
     this.painted = [];
+    this.pictures.clear();
+    this.fetching.clear();
     this.fits = true;
     this.layout();
     this.follow();
@@ -102,7 +111,7 @@ export class Easel {
     this.tell();
   }
   close(): void {
-    this.session.photo = -1;
+    this.session.open = "";
     this.node.hidden = true;
     delete this.node.dataset.photo;
     this.layer = null;
@@ -118,7 +127,7 @@ export class Easel {
     this.tell();
   }
   askTint(): void {
-    if (this.layer) this.feed.ask(this.tint, this.session.photo, this.growing);
+    if (this.layer) this.feed.ask(this.tint, this.session.open, this.growing);
   }
 
   /** The strokes changed: by the user, by undo, or in another tab. */
@@ -130,11 +139,37 @@ export class Easel {
     if (!same) {
       this.painted = strokes;
       if (!this.growing) {
-        layer.redraw(strokes);
+        layer.redraw(strokes, this.pictures);
         this.flush(null);
       }
     }
+    for (const { picture } of strokes) if (picture) void this.fetchPicture(picture);
     if (!this.growing) this.askTint();
+  }
+  private async fetchPicture(name: string): Promise<void> {
+    const { layer } = this;
+    if (!layer || this.pictures.has(name) || this.fetching.has(name)) return;
+    this.fetching.add(name);
+    try {
+      const blob = await (await this.session.api.send("GET", `painted?picture=${name}`)).blob();
+      const picture = await createImageBitmap(blob, { resizeWidth: layer.width, resizeHeight: layer.height });
+      const context = new OffscreenCanvas(layer.width, layer.height).getContext("2d", { willReadFrequently: true })!;
+      context.drawImage(picture, 0, 0);
+      picture.close();
+      if (this.layer !== layer) return;
+      this.pictures.set(name, planesOf(context.getImageData(0, 0, layer.width, layer.height).data));
+    } catch (problem) {
+      this.session.explain(problem);
+    }
+    if (this.layer !== layer) return;
+    this.fetching.delete(name);
+    // A stroke that grows is not disturbed: what is painted is drawn anew after it.
+    if (this.growing) this.painted = [];
+    else this.redrawPaint();
+  }
+  private redrawPaint(): void {
+    this.layer?.redraw(this.painted, this.pictures);
+    this.flush(null);
   }
   /** Brings what the layer changed to the canvas. */
   private flush(box: Box | null): void {
@@ -384,8 +419,8 @@ export class Easel {
   cancel(): void {
     if (!this.growing || !this.layer) return;
     this.growing = this.lineFrom = null;
-    this.layer.redraw(this.painted);
-    this.flush(null);
+    this.painted = this.session.strokes.of(this.session.open);
+    this.redrawPaint();
     this.askTint();
   }
   get isDrawing(): boolean {

@@ -9,14 +9,12 @@ import { FrameScheduler } from "./scheduler";
 import type { Session } from "./session";
 import { words } from "./words";
 
-type Frame = { picture: ImageBitmap; colors: number; sides: string[] };
+type Frame = { picture: ImageBitmap; colors: number; milliseconds: number; sides: string[] };
 const largest = 4096;
 
 export class FieldView extends Navigator {
   readonly canvas = el("canvas", { id: "field", tabindex: "0", "aria-label": words.stage, role: "img" });
   readonly node: HTMLElement;
-  readonly home: View;
-  readonly up: Vec3;
   fly = false;
   /** Share of the picture, from the left, that shows the left side. */
   wipe = 0;
@@ -36,22 +34,30 @@ export class FieldView extends Navigator {
     this.labels = [el("span", { class: "side left" }), el("span", { class: "side right" })];
     this.handle = this.wipeHandle();
     this.node = el("div", { class: "field" }, this.canvas, this.handle);
-    this.up = axes[session.scene.up] ?? axes["+y"];
     this.scheduler = new FrameScheduler({
-      fetch: (wish) => this.ask(wish.camera, wish.share),
+      fetch: (wish) => this.ask(wish.camera, wish.share, wish.moving),
+      cost: (frame) => frame.milliseconds,
       show: (frame) => this.show(frame),
       failed: (problem) => session.explain(problem),
       now: () => performance.now(),
       later: (callback, milliseconds) => void setTimeout(callback, milliseconds),
     });
-    const { position, rotation, lens } = this.cameras[session.scene.home] ?? this.cameras[0];
-    this.home = this.view = { position, rotation, lens };
+    this.view = this.home;
     this.target = this.pivot(this.view);
     this.captureCamera = session.scene.home;
     this.showWipe();
   }
+  /** The capture's, then the viewpoints. */
   get cameras(): readonly View[] {
-    return this.session.scene.views;
+    return this.session.views;
+  }
+  get home(): View {
+    const { views, home } = this.session.scene;
+    const { position, rotation, lens } = views[home] ?? views[0];
+    return { position, rotation, lens };
+  }
+  get up(): Vec3 {
+    return axes[this.session.scene.up] ?? axes["+y"];
   }
   get centre(): Vec3 {
     return this.session.scene.centre;
@@ -80,10 +86,37 @@ export class FieldView extends Navigator {
     this.session.onState((state) => {
       const names = new Set(["grey", "now", ...state.takes.map((take) => take.name)]);
       if (!names.has(this.left) || !names.has(this.right)) this.compare(names.has(this.left) ? this.left : "grey", names.has(this.right) ? this.right : "now");
+      // Frames in passing do not hold up a training.
+      const inPassing = this.session.isTraining && state.task !== "";
+      if (inPassing !== this.scheduler.inPassing) this.scheduler.inPassing = inPassing;
+      if (this.session.isTraining) this.setWipe(0);
+      this.showWipe();
       if (state.colors === this.colorsShown) return;
       this.colorsShown = state.colors;
       this.refresh();
     });
+    // A camera that is looked through is followed where training moves it.
+    this.session.onScene(() => (this.captureCamera >= 0 && !this.hidden ? this.goToCamera(this.captureCamera, 0) : this.refresh()));
+    this.session.strokes.onChange(() => this.findViewpoint());
+  }
+  /** Viewpoints come and go: the one that is looked through may have another number now, or none. */
+  private findViewpoint(): void {
+    if (this.captureCamera >= 0 && !this.session.isViewpoint(this.captureCamera)) return;
+    const here = (camera: View) => JSON.stringify([camera.position, camera.rotation]);
+    const wanted = here(this.view);
+    const found = this.cameras.findIndex((camera, i) => this.session.isViewpoint(i) && here(camera) === wanted);
+    if (found === this.captureCamera) return;
+    this.captureCamera = found;
+    for (const callback of this.listeners) callback();
+  }
+  /** The camera as it stands, for a picture of what is seen, of `longest` pixels at most. */
+  viewHere(longest: number): View {
+    // Not the canvas's own size: that follows the page a moment later.
+    const ratio = Math.min(devicePixelRatio || 1, 2);
+    const [width, height] = [this.node.clientWidth * ratio, this.node.clientHeight * ratio];
+    const scale = Math.min(1, longest / Math.max(width, height));
+    const { position, rotation, lens } = this.view;
+    return { position, rotation, lens: fitted(lens, Math.max(16, Math.round(width * scale)), Math.max(16, Math.round(height * scale))) };
   }
   /** Calls back when the camera or the sides changed. */
   onChange(callback: () => void): void {
@@ -113,11 +146,11 @@ export class FieldView extends Navigator {
     if (this.wipe < 0.004 || this.left === this.right) return [this.right];
     return this.wipe > 0.996 ? [this.left] : [this.left, this.right];
   }
-  private async ask({ view, sides }: { view: View; sides: string[] }, share: number): Promise<Frame | null> {
+  private async ask({ view, sides }: { view: View; sides: string[] }, share: number, moving: boolean): Promise<Frame | null> {
     const scale = share * Math.min(1, largest / Math.max(this.canvas.width, this.canvas.height));
     const width = Math.max(16, Math.round(this.canvas.width * scale));
     const height = Math.max(16, Math.round(this.canvas.height * scale));
-    const frame = await this.session.api.frame({ position: view.position, rotation: view.rotation, lens: fitted(view.lens, width, height), sides });
+    const frame = await this.session.api.frame({ position: view.position, rotation: view.rotation, lens: fitted(view.lens, width, height), sides, moving });
     return frame && { ...frame, sides };
   }
   private show(frame: Frame): void {
@@ -162,6 +195,8 @@ export class FieldView extends Navigator {
     this.refresh();
   }
   setWipe(share: number): void {
+    if (this.session.isTraining && share > 0) return;
+    if (share === this.wipe) return;
     const before = this.sides.join();
     this.wipe = Math.min(1, Math.max(0, share));
     this.showWipe();
@@ -176,7 +211,8 @@ export class FieldView extends Navigator {
     this.handle.setAttribute("aria-valuenow", String(Math.round(100 * this.wipe)));
     this.handle.setAttribute("aria-label", words.wipe(name(this.left), name(this.right)));
     this.handle.classList.toggle("parked", this.wipe < 0.004 || this.wipe > 0.996);
-    this.handle.hidden = this.left === this.right;
+    // While it is trained the field has one look only.
+    this.handle.hidden = this.left === this.right || this.session.isTraining;
   }
   private wipeHandle(): HTMLElement {
     const handle = el("div", { class: "wipe", id: "wipe-handle", role: "slider", "aria-valuemin": "0", "aria-valuemax": "100", tabindex: "0" },

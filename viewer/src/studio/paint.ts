@@ -83,10 +83,24 @@ export function tintOf(width: number, height: number, rgba: Uint8ClampedArray): 
 }
 
 /** Chroma of the paint, and how much of it there is. */
-interface Planes {
+export interface Planes {
   a: Int8Array;
   b: Int8Array;
   alpha: Uint8Array;
+}
+
+/** A painted picture's paint. @param rgba  bytes of sRGB with straight alpha */
+export function planesOf(rgba: Uint8ClampedArray): Planes {
+  const count = rgba.length / 4;
+  const planes: Planes = { a: new Int8Array(count), b: new Int8Array(count), alpha: new Uint8Array(count) };
+  for (let p = 0; p < count; ++p) {
+    planes.alpha[p] = rgba[4 * p + 3];
+    if (planes.alpha[p] === 0) continue;
+    const lab = labFromRgb([rgba[4 * p], rgba[4 * p + 1], rgba[4 * p + 2]]);
+    planes.a[p] = Math.round(lab.a);
+    planes.b[p] = Math.round(lab.b);
+  }
+  return planes;
 }
 
 /** The paint over one photograph, as pixels of the photograph's size: opaque where there is chroma or a stroke. */
@@ -159,6 +173,19 @@ export class PaintLayer {
       }
     }
   }
+  /** Lays a painted picture over the paint. */
+  private lay(picture: Planes): void {
+    const { a, b, alpha } = this.paint;
+    for (let p = 0; p < alpha.length; ++p) {
+      const share = picture.alpha[p] / 255;
+      if (share === 0) continue;
+      const there = (alpha[p] / 255) * (1 - share);
+      const whole = there + share;
+      alpha[p] = Math.round(255 * whole);
+      a[p] = Math.round((a[p] * there + picture.a[p] * share) / whole);
+      b[p] = Math.round((b[p] * there + picture.b[p] * share) / whole);
+    }
+  }
   private clearCoverage(box: Box): void {
     for (let y = box.top; y < box.bottom; ++y) this.coverage.fill(0, y * this.width + box.left, y * this.width + box.right);
   }
@@ -185,12 +212,17 @@ export class PaintLayer {
     if (this.live) this.clearCoverage(this.live.box);
     this.live = this.before = null;
   }
-  /** Paints all of the strokes anew. */
-  redraw(strokes: readonly Stroke[]): void {
+  /** Paints all of the strokes anew. @param pictures  painted pictures in the layer's size, as far as they are there */
+  redraw(strokes: readonly Stroke[], pictures: ReadonlyMap<string, Planes> = new Map()): void {
     this.end();
     this.paint.alpha.fill(0);
     for (const stroke of strokes) {
-      if (stroke.hidden || stroke.kind === "picture") continue;
+      if (stroke.hidden) continue;
+      if (stroke.kind === "picture") {
+        const picture = pictures.get(stroke.picture ?? "");
+        if (picture?.alpha.length === this.paint.alpha.length) this.lay(picture);
+        continue;
+      }
       const box = this.cover(stroke, 0);
       this.mix(stroke, box, this.paint);
       this.clearCoverage(box);

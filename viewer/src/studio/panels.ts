@@ -8,10 +8,10 @@ import type { Session } from "./session";
 import { words } from "./words";
 
 /** Asks for a name, or (without a value) for a yes. */
-export function ask(question: string, value?: string): Promise<string | null> {
+export function ask(question: string, value?: string, yes = value === undefined ? words.leave : words.ok): Promise<string | null> {
   const input = el("input", { type: "text", class: "hex", value: value ?? "", maxlength: 60, "aria-label": question, hidden: value === undefined });
   const dialog = el("dialog", { class: "card" }, el("form", { method: "dialog" }, el("h1", {}, question), input,
-    el("div", { class: "buttons" }, el("button", { class: "button primary", value: "yes" }, value === undefined ? words.leave : words.ok), el("button", { class: "button", value: "", type: "submit", formnovalidate: true }, words.cancel))));
+    el("div", { class: "buttons" }, el("button", { class: "button primary", value: "yes" }, yes), el("button", { class: "button", value: "", type: "submit", formnovalidate: true }, words.cancel))));
   document.body.append(dialog);
   dialog.showModal();
   input.select();
@@ -27,7 +27,7 @@ function small(name: string, title: string, onclick: () => void): HTMLButtonElem
 }
 
 /** A list whose rows are made anew only where their text changed, so that the keyboard's focus stays. */
-function keyed<T>(list: HTMLElement, items: readonly T[], keyOf: (item: T) => string, make: (item: T) => HTMLElement): void {
+export function keyed<T>(list: HTMLElement, items: readonly T[], keyOf: (item: T) => string, make: (item: T) => HTMLElement): void {
   const there = new Map([...list.children].map((node) => [(node as HTMLElement).dataset.key!, node]));
   list.replaceChildren(...items.map((item) => {
     const key = keyOf(item);
@@ -35,6 +35,22 @@ function keyed<T>(list: HTMLElement, items: readonly T[], keyOf: (item: T) => st
     (node as HTMLElement).dataset.key = key;
     return node;
   }));
+}
+
+/** What everybody must know: the server is away, or another tab paints. */
+export function notice(session: Session): HTMLElement {
+  const node = el("div", { class: "notice", id: "notice", role: "status", hidden: true });
+  session.onState(() => {
+    node.textContent = session.isLost ? words.lost : words.readOnly;
+    node.hidden = !session.isLost && !session.isReadOnly;
+    document.body.classList.toggle("is-read-only", session.isReadOnly);
+  });
+  return node;
+}
+
+/** A painted picture as a small one. */
+function paintedDot(picture: string): HTMLElement {
+  return el("img", { class: "dot picture", src: `./studio/painted?picture=${picture}`, alt: "", draggable: "false" });
 }
 
 export function strokesPanel(session: Session): HTMLElement {
@@ -47,11 +63,11 @@ export function strokesPanel(session: Session): HTMLElement {
     update();
   });
   const file = el("input", { type: "file", accept: "image/png", hidden: true });
-  file.addEventListener("change", () => (file.files?.[0] && void session.send({ kind: "stroke", view: String(session.photo) }, file.files[0]), (file.value = "")));
+  file.addEventListener("change", () => (file.files?.[0] && void session.sendPainted(file.files[0]), (file.value = "")));
   const paintedPicture = button(words.paintedPicture, () => file.click());
   const row = (stroke: Stroke) => {
     const kind = stroke.kind === "paint" && stroke.points.length === 1 ? words.dot : words.kinds[stroke.kind];
-    const name = el("button", { type: "button", class: "name-button", "aria-label": words.selected(kind), onclick: () => ((session.selected = stroke.id), update()) }, el("span", { class: `dot ${stroke.kind}` }), el("span", {}, kind), el("small", {}, all ? stroke.view.replace(/^.*\//, "") : ""));
+    const name = el("button", { type: "button", class: "name-button", "aria-label": words.selected(kind), onclick: () => ((session.selected = stroke.id), update()) }, stroke.picture ? paintedDot(stroke.picture) : el("span", { class: `dot ${stroke.kind}` }), el("span", {}, kind), el("small", {}, all ? words.view(stroke.view) : ""));
     (name.firstChild as HTMLElement).style.setProperty("--color", stroke.color);
     const hide = small(stroke.hidden ? "hidden" : "shown", stroke.hidden ? words.show : words.hide, () => strokes.edit(stroke.id, { hidden: !stroke.hidden }));
     const recolour = small("drop", words.recolour, () => strokes.edit(stroke.id, { color: session.brush.settings.color }));
@@ -59,7 +75,7 @@ export function strokesPanel(session: Session): HTMLElement {
     return el("li", { class: stroke.hidden ? "off" : "" }, name, hide, recolour, small("close", words.remove, () => strokes.remove(stroke.id)));
   };
   const update = () => {
-    const shown = all || !session.view ? strokes.list : strokes.of(session.view.name);
+    const shown = all || session.open === "" ? strokes.list : strokes.of(session.open);
     keyed(list, [...shown].reverse(), (s) => `${s.id} ${s.color} ${s.hidden} ${all}`, row);
     for (const node of list.children) (node as HTMLElement).setAttribute("aria-current", String((node as HTMLElement).dataset.key!.startsWith(`${session.selected} `)));
     none.hidden = shown.length > 0;
@@ -71,6 +87,11 @@ export function strokesPanel(session: Session): HTMLElement {
   session.onState(update);
   update();
   return Object.assign(node, { refresh: update });
+}
+
+/** While the field is trained: what is to come, and what can be done already. */
+export function trainingPanel(): HTMLElement {
+  return el("section", { class: "section only-training" }, el("p", { class: "note training-note" }, words.trainingNote));
 }
 
 export class TakesPanel {
@@ -147,7 +168,7 @@ export class TakesPanel {
     if (!this.session.state.unkept || (await ask(words.loseNow))) await this.session.order({ order: "begin", take });
   }
   private async remove(take: string): Promise<void> {
-    if (await ask(words.removeTake(take))) await this.session.order({ order: "delete", take });
+    if (await ask(words.removeTake(take), undefined, words.remove)) await this.session.order({ order: "delete", take });
   }
 }
 
@@ -155,28 +176,46 @@ export function ideasPanel(session: Session, reference: (file: File) => void): H
   const cards = el("div", { class: "cards", id: "cards" });
   const file = el("input", { type: "file", accept: "image/png,image/jpeg,image/tiff,image/webp", hidden: true });
   file.addEventListener("change", () => (file.files?.[0] && reference(file.files[0]), (file.value = "")));
-  const choose = async (number: number, address: string) => {
-    const answer = await fetch(address).catch(() => null);
-    if (!answer?.ok) return;
-    reference(new File([await answer.blob()], `suggestion-${number}.jpg`, { type: "image/jpeg" }));
+  const liked = new Set<number>();
+  const choose = (card: HTMLElement, number: number) => {
+    if (!liked.delete(number)) liked.add(number);
+    card.setAttribute("aria-pressed", String(liked.has(number)));
   };
-  const node = section(words.ideas, false,
-    el("div", { class: "buttons" }, ...(session.state.cards ? [button(words.suggest, () => void session.order({ order: "suggest" }), { id: "suggest" })] : []), button(words.reference, () => file.click())),
-    el("p", { class: "note" }, session.state.cards ? `${words.suggestNote} ${words.referenceNote}` : words.referenceNote), cards, file);
+  const ofItself = async () => {
+    const bases = session.state.cards.map((card) => card.number).filter((number) => liked.has(number));
+    if (!session.state.unkept || (await ask(words.loseNow))) await session.order({ order: "builtin", bases });
+  };
+  const suggest = button(words.suggest, () => (liked.clear(), void session.order({ order: "suggest" })), { id: "suggest" });
+  const builtin = button(words.builtin, () => void ofItself(), { id: "builtin", title: words.builtinTitle });
+  const node = section(words.ideas, true,
+    el("div", { class: "buttons" }, suggest, builtin, button(words.reference, () => file.click())),
+    el("p", { class: "note" }, `${words.suggestNote} ${words.referenceNote}`), cards, file);
   session.onState((state) => {
-    keyed(cards, state.cards ?? [], (card) => `${card.number} ${card.address}`, ({ number, address }) =>
-      el("button", { type: "button", class: "idea", "aria-label": words.card(number), onclick: () => void choose(number, address) }, el("img", { src: address, alt: "" })));
+    suggest.disabled = builtin.disabled = session.isBusy || session.isLost;
+    keyed(cards, state.cards, (card) => card.address, ({ number, address }) => {
+      const card = el("button", { type: "button", class: "idea", "aria-label": words.card(number), "aria-pressed": "false" }, el("img", { src: address, alt: "" }));
+      card.addEventListener("click", () => choose(card, number));
+      return card;
+    });
     node.classList.toggle("read-only", session.isReadOnly);
   });
   return node;
 }
 
+/** Between two orders of the finish, milliseconds. */
+const finishRest = 250;
+
 export function finishPanel(session: Session): HTMLElement {
   const latest = new Latest();
-  let values: Finish = { saturation: 1, hue: 0, exposure: 0, ...session.state.finish };
+  let values: Finish = session.state.finish;
+  let heard = JSON.stringify(values);
   const put = (partial: Partial<Finish>) => {
     values = { ...values, ...partial };
-    void latest.run(async () => void (await session.order({ order: "finish", ...values })));
+    // A few orders a second: what a slider passes meanwhile is left out, where it stops is not.
+    void latest.run(async () => {
+      await session.order({ order: "finish", ...values });
+      await new Promise((done) => setTimeout(done, finishRest));
+    });
   };
   const signed = (v: number) => `${v >= 0 ? "+" : ""}${v.toFixed(2)} EV`;
   const sliders = [
@@ -193,15 +232,17 @@ export function finishPanel(session: Session): HTMLElement {
   const write = button(words.photographs, () => void session.order({ order: "photographs", format: photographs.value }), { id: "photographs" });
   const downloads = el("ul", { class: "rows", id: "downloads" });
   const blender = el("div", { class: "commands" });
-  const node = section(words.finish, false, ...(session.state.finish ? sliders.map((s) => s.node) : []), el("div", { class: "buttons checks" }, ...formats.map((f) => f.node), bake), el("div", { class: "row" }, photographs, write), downloads, blender);
+  const node = section(words.finish, true, ...sliders.map((s) => s.node), el("div", { class: "buttons checks" }, ...formats.map((f) => f.node), bake), el("div", { class: "row" }, photographs, write), downloads, blender);
   session.onState((state) => {
     keyed(downloads, state.downloads, (d) => `${d.address} ${d.bytes}`, (d) => el("li", {}, el("a", { class: "name-button", href: d.address, download: d.name }, el("span", {}, d.name), el("small", {}, `${(d.bytes / 2 ** 20).toFixed(1)} MiB`))));
     showLines(blender, state.blender ? [state.blender] : [], words.blender);
-    bake.disabled = write.disabled = session.isBusy;
+    bake.disabled = write.disabled = session.isBusy || session.isLost;
     node.classList.toggle("read-only", session.isReadOnly);
     const { finish } = state;
-    // Another tab's sliders are followed.
-    if (!finish || !session.isReadOnly) return;
+    // The server's finish is followed, but not while the sliders are under way.
+    if (JSON.stringify(finish) === heard || latest.isBusy) return;
+    heard = JSON.stringify(finish);
+    values = finish;
     [finish.saturation, finish.hue, finish.exposure].forEach((value, i) => sliders[i].set(value));
   });
   return node;

@@ -10,7 +10,12 @@ export interface SceneView extends View {
   height: number;
 }
 
-/** Does not change while the server runs. */
+/** A camera of the user's own, that is painted at as if it had a photograph. */
+export interface Viewpoint extends View {
+  readonly name: string;
+}
+
+/** Its cameras become better while the field is trained: State.scene tells. Without a capture it has no views. */
 export interface Scene {
   title: string;
   run: string;
@@ -28,11 +33,19 @@ export interface Take {
   seconds: number;
 }
 
+/** What there is: nothing yet, a capture whose field is being trained, or a field that can be coloured. */
+export type Stage = "photographs" | "training" | "field";
+
 export interface State {
   version: number;
+  stage: Stage;
+  /** Grows where GET studio/scene says something else than before. */
+  scene: number;
   /** Grows whenever the colours shown as "now" change. */
   colors: number;
   task: string;
+  /** Of the task, in words. */
+  step?: string;
   fraction: number;
   figures: Record<string, number>;
   message: string;
@@ -49,8 +62,12 @@ export interface State {
   commands: string[];
   downloads: { name: string; address: string; bytes: number }[];
   blender: string;
-  cards?: { number: number; address: string }[];
-  finish?: Finish;
+  cards: { number: number; address: string }[];
+  finish: Finish;
+  /** What the work said lately, oldest first. */
+  notes: string[];
+  /** Photographs, or a clip, that the server has. */
+  arrived: { files: number; bytes: number };
 }
 
 export interface Finish {
@@ -76,11 +93,15 @@ export interface Stroke {
   readonly reach: number;
   readonly hidden: boolean;
   readonly points: readonly StrokePoint[];
+  /** Of a painted picture: what studio/painted?picture= calls it. */
+  readonly picture?: string;
 }
 
-export const limits = { strokes: 2000, points: 20000, bytes: 4e6, size: [0.0005, 0.5], reach: [0.1, 4] } as const;
+export const limits = { strokes: 2000, viewpoints: 50, points: 20000, bytes: 4e6, size: [0.0005, 0.5], reach: [0.1, 4] } as const;
 
 export interface FrameRequest extends View {
   /** "grey", "now" or the name of a take; two of them come one above the other. */
   sides: string[];
+  /** Somebody moves the camera; otherwise a training may let it wait. */
+  moving?: boolean;
 }

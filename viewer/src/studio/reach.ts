@@ -13,6 +13,9 @@ export class Latest {
   private waiting: (() => Promise<void>) | null = null;
   private busy = false;
 
+  get isBusy(): boolean {
+    return this.busy;
+  }
   async run(job: () => Promise<void>): Promise<void> {
     this.waiting = job;
     if (this.busy) return;
@@ -40,14 +43,16 @@ async function tintOfPicture(picture: ImageBitmap): Promise<Tint> {
 export class TintFeed {
   private latest = new Latest();
 
-  constructor(private readonly session: Session, private readonly put: (view: number, tint: Tint | null) => void) {}
+  constructor(private readonly session: Session, private readonly put: (view: string, tint: Tint | null) => void) {}
 
-  ask(kind: TintKind, view: number, growing: Stroke | null): void {
+  /** @param view  name of the view that is open */
+  ask(kind: TintKind, view: string, growing: Stroke | null): void {
     if (kind === "none") return this.put(view, null);
     void this.latest.run(async () => {
-      if (this.session.photo !== view) return;
+      const { photo } = this.session;
+      if (this.session.open !== view || photo < 0) return;
       try {
-        this.put(view, kind === "now" ? await this.now(view) : await this.reach(view, growing));
+        this.put(view, kind === "now" ? await this.now(photo) : await this.reach(photo, growing));
       } catch (problem) {
         // While views are traced there is no reach, and strokes show all the same.
         if (problem instanceof Lost) this.session.lose();
@@ -61,7 +66,7 @@ export class TintFeed {
     return tintOfPicture(await createImageBitmap(await api.reach(view, own, strokes.revision)));
   }
   private async now(view: number): Promise<Tint | null> {
-    const { position, rotation, lens } = this.session.scene.views[view];
+    const { position, rotation, lens } = this.session.views[view];
     const scale = Math.min(1, 384 / Math.min(lens.width, lens.height));
     const small = fitted(lens, Math.round(lens.width * scale), Math.round(lens.height * scale));
     const frame = await this.session.api.frame({ position, rotation, lens: small, sides: ["now"] });

@@ -4,12 +4,16 @@ export interface FrameWish<Camera> {
   camera: Camera;
   /** Share of the canvas's pixels across. */
   share: number;
+  /** Whether it is needed at once. */
+  moving: boolean;
 }
 
 export interface FrameHost<Camera, Frame> {
   /** null: the server had a newer wish. */
   fetch(wish: FrameWish<Camera>): Promise<Frame | null>;
   show(frame: Frame, wish: FrameWish<Camera>): void;
+  /** Milliseconds that the server drew at it; it may have waited for longer. */
+  cost(frame: Frame): number;
   failed(problem: unknown): void;
   now(): number;
   later(callback: () => void, milliseconds: number): void;
@@ -24,10 +28,14 @@ interface Sent {
 const wanted = 100;
 const restAfter = 140;
 const coarsest = 1 / 12;
+const largestInPassing = 0.5;
 
 export class FrameScheduler<Camera, Frame> {
   /** Share of the canvas's pixels across, while moving. */
   coarse = 1 / 6;
+  private passing = false;
+  /** Share of the canvas's pixels across that no frame of the wanted version exceeds. */
+  private top = 1;
   private camera: Camera | null = null;
   private version = 0;
   private shown: Sent = { version: 0, share: 0 };
@@ -53,25 +61,38 @@ export class FrameScheduler<Camera, Frame> {
     this.paused = false;
     this.renew();
   }
+  /** Whether the server has other work and draws in passing: then nothing large is asked for. */
+  get inPassing(): boolean {
+    return this.passing;
+  }
+  set inPassing(passing: boolean) {
+    this.passing = passing;
+    this.top = this.largest();
+    this.next();
+  }
+  private largest(): number {
+    return this.passing ? Math.min(largestInPassing, 2 * this.coarse) : 1;
+  }
   private renew(): void {
     this.version += 1;
     this.asked = 0;
+    this.top = this.largest();
     this.next();
   }
   /** Whether the frame that is shown is the final one. */
   get settled(): boolean {
-    return this.shown.version === this.version && this.shown.share === 1;
+    return this.shown.version === this.version && this.shown.share >= this.top;
   }
 
   private get moving(): boolean {
     return this.host.now() - this.movedAt < restAfter;
   }
   private share(): number {
-    if (this.moving) return this.asked === 0 ? this.coarse : 0;
+    if (this.moving) return this.asked === 0 ? Math.min(this.coarse, this.top) : 0;
     // A full frame that comes at once needs no half one before it.
-    const half = Math.max(0.5, this.coarse);
-    const quick = this.coarse * Math.sqrt(2.5) >= 1;
-    const share = this.asked < half && !quick ? half : 1;
+    const half = Math.min(this.top, Math.max(0.5, this.coarse));
+    const quick = this.coarse * Math.sqrt(2.5) >= this.top;
+    const share = this.asked < half && !quick ? half : this.top;
     return this.asked < share ? share : 0;
   }
   private next(): void {
@@ -91,7 +112,7 @@ export class FrameScheduler<Camera, Frame> {
     const alone = this.inFlight.size === 1;
     let frame: Frame | null = null;
     try {
-      frame = await this.host.fetch({ camera, share: sent.share });
+      frame = await this.host.fetch({ camera, share: sent.share, moving: this.moving });
     } catch (problem) {
       // A server that is away is not asked again and again.
       this.paused = true;
@@ -100,7 +121,7 @@ export class FrameScheduler<Camera, Frame> {
       this.host.failed(problem);
     }
     this.inFlight.delete(sent);
-    if (frame !== null) this.arrived(frame, camera, sent, alone ? this.host.now() - begin : 0);
+    if (frame !== null) this.arrived(frame, camera, sent, this.passing ? this.host.cost(frame) : alone ? this.host.now() - begin : 0);
     else if (sent.version === this.version && !this.paused) this.asked = 0;
     this.next();
   }
@@ -113,6 +134,6 @@ export class FrameScheduler<Camera, Frame> {
     const { shown } = this;
     if (sent.version < shown.version || (sent.version === shown.version && sent.share < shown.share)) return;
     this.shown = sent;
-    this.host.show(frame, { camera, share: sent.share });
+    this.host.show(frame, { camera, share: sent.share, moving: this.moving });
   }
 }

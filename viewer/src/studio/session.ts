@@ -4,7 +4,8 @@ import { toast } from "../ui/dom";
 import { Api, Lost, Refusal } from "./api";
 import { Brush } from "./brush";
 import { StrokeDocument } from "./document";
-import type { Scene, SceneView, State } from "./protocol";
+import type { Scene, SceneView, State, Viewpoint } from "./protocol";
+import { Latest } from "./reach";
 import { words } from "./words";
 
 export class Session {
@@ -12,13 +13,20 @@ export class Session {
   isLost = false;
   readonly strokes: StrokeDocument;
   readonly brush = new Brush();
-  /** Number of the photograph that is painted on, else -1. */
-  photo = -1;
+  /** Name of the photograph, or the viewpoint, that is painted on, else "". */
+  open = "";
   /** Id of the stroke that is selected. */
   selected = "";
   private changed = new Set<(state: State) => void>();
+  private refined = new Set<() => void>();
+  private sceneSeen: number;
+  private refining = new Latest();
+  private all: { viewpoints: readonly Viewpoint[]; views: readonly SceneView[] } | null = null;
+  private stopListening = () => {};
 
+  /** @param scene  what the server said after `state` */
   constructor(readonly api: Api, readonly scene: Scene, state: State) {
+    this.sceneSeen = state.scene;
     this.state = state;
     this.strokes = new StrokeDocument(api, localStorage, `cnerf-studio-strokes ${scene.run}`);
     this.strokes.told = (what) => {
@@ -29,8 +37,32 @@ export class Session {
     };
   }
 
+  /** All that can be painted on, by its number: the photographs, then the viewpoints that the server has. */
+  get views(): readonly SceneView[] {
+    const { savedViewpoints } = this.strokes;
+    if (this.all?.viewpoints !== savedViewpoints) {
+      const own = savedViewpoints.map((v): SceneView => ({ ...v, held_out: false, width: v.lens.width, height: v.lens.height }));
+      this.all = { viewpoints: savedViewpoints, views: [...this.scene.views, ...own] };
+    }
+    return this.all.views;
+  }
+  /** Number of the view that is painted on, else -1. */
+  get photo(): number {
+    return this.open === "" ? -1 : this.views.findIndex((v) => v.name === this.open);
+  }
   get view(): SceneView | null {
-    return this.scene.views[this.photo] ?? null;
+    return this.views[this.photo] ?? null;
+  }
+  isViewpoint(index: number): boolean {
+    return index >= this.scene.views.length;
+  }
+  /** Numbers of viewpoints are given anew, addresses are not: their pictures are told apart by this. */
+  stamp(index: number): string {
+    const { name, position, rotation } = this.views[index];
+    return this.isViewpoint(index) ? `&at=${name}.${[...position, ...rotation[2]].map((v) => v.toFixed(3)).join(".")}` : "";
+  }
+  get isTraining(): boolean {
+    return this.state.stage === "training";
   }
   get isReadOnly(): boolean {
     return this.state.writer !== "" && this.state.writer !== this.api.client;
@@ -49,22 +81,59 @@ export class Session {
   tell(): void {
     for (const callback of this.changed) callback(this.state);
   }
+  /** Calls back after the cameras became others. */
+  onScene(callback: () => void): void {
+    this.refined.add(callback);
+  }
 
   async begin(): Promise<void> {
-    this.api.listen((state) => this.hear(state), () => this.lose());
+    this.listen();
     await this.strokes.load();
+  }
+  /** Hears of the server's state, without strokes. */
+  listen(): void {
+    this.stopListening = this.api.listen((state) => this.hear(state), () => this.lose());
+  }
+  end(): void {
+    this.stopListening();
+    this.changed.clear();
   }
   private hear(state: State): void {
     const wasLost = this.isLost;
     this.isLost = false;
     this.state = state;
-    if (wasLost) {
+    if (state.stage === "photographs") {
+      // There is nothing yet that strokes could be on.
+      if (wasLost) toast(words.back);
+    } else if (wasLost) {
       toast(words.back);
       void this.strokes.load().catch((problem) => this.explain(problem));
     } else if (state.strokes > this.strokes.revision) {
       void this.strokes.follow(state.strokes).catch((problem) => this.explain(problem));
     }
+    if (state.scene !== this.sceneSeen && this.scene.views.length > 0) void this.refining.run(() => this.refine());
     this.tell();
+  }
+  /** Training made the cameras better: the same ones are given their new places. */
+  private async refine(): Promise<void> {
+    const { scene } = this.state;
+    if (scene === this.sceneSeen) return;
+    try {
+      const next = await this.api.scene();
+      const { views } = this.scene;
+      if (next.views.length !== views.length || next.views.some((v, i) => v.name !== views[i].name)) {
+        // Another capture: nothing of this page fits it.
+        await this.strokes.save();
+        return location.reload();
+      }
+      next.views.forEach((view, i) => Object.assign(views[i], view));
+      Object.assign(this.scene, next, { views });
+      this.sceneSeen = scene;
+      for (const callback of this.refined) callback();
+    } catch (problem) {
+      // The next state tries again.
+      this.explain(problem);
+    }
   }
   lose(): void {
     if (this.isLost) return;
@@ -98,7 +167,12 @@ export class Session {
       this.explain(problem);
     }
   }
+  /** A painted PNG becomes a stroke on the view that is open. */
+  async sendPainted(file: File): Promise<void> {
+    await this.strokes.save();
+    if (this.photo >= 0) await this.send({ kind: "stroke", view: String(this.photo), name: file.name }, file);
+  }
   colour(): void {
-    void this.order({ order: this.isBusy ? "stop" : "colour" });
+    void this.order({ order: this.isBusy ? "stop" : this.isTraining ? "train" : "colour" });
   }
 }

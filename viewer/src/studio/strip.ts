@@ -1,4 +1,4 @@
-/** The photographs of the capture as a strip of thumbnails, in the colours of now, with what strokes will reach. */
+/** The photographs of the capture, then the viewpoints, as thumbnails in the colours of now, with what strokes will reach. */
 
 import { el } from "../ui/dom";
 import type { Session } from "./session";
@@ -8,6 +8,7 @@ import { words } from "./words";
 const atOnce = 2;
 
 interface Item {
+  name: string;
   node: HTMLButtonElement;
   image: HTMLImageElement;
   reach: HTMLImageElement;
@@ -19,29 +20,57 @@ export class Strip {
   readonly node = el("nav", { class: "strip", id: "strip", "aria-label": words.strip });
   /** Whether thumbnails show the reach of the strokes. */
   showsReach = true;
-  private items: Item[];
+  private items: Item[] = [];
   private loading = 0;
   private turn = -1;
   private failed = new Set<string>();
 
-  constructor(private readonly session: Session, choose: (index: number, fly: boolean) => void) {
-    this.items = session.scene.views.map((view, i) => {
-      const image = el("img", { alt: "", draggable: "false" });
-      const reach = el("img", { alt: "", class: "reach", draggable: "false" });
-      const count = el("span", { class: "count", hidden: true });
-      const node = el("button", { type: "button", class: "thumbnail", title: view.name, "data-view": i, onclick: (e: MouseEvent) => choose(i, e.shiftKey || view.held_out) }, image, reach, count);
-      node.classList.toggle("held-out", view.held_out);
-      return { node, image, reach, count, isSeen: false };
-    });
-    this.node.append(...this.items.map((item) => item.node));
-    const observer = new IntersectionObserver((entries) => {
-      for (const { target, isIntersecting } of entries) this.items[Number((target as HTMLElement).dataset.view)].isSeen = isIntersecting;
+  private observer: IntersectionObserver;
+  private marked = -1;
+
+  constructor(private readonly session: Session, private readonly choose: (index: number, fly: boolean) => void) {
+    this.observer = new IntersectionObserver((entries) => {
+      const items = new Map(this.items.map((item) => [item.node as Element, item]));
+      for (const { target, isIntersecting } of entries) {
+        const item = items.get(target);
+        if (item) item.isSeen = isIntersecting;
+      }
       this.pump();
     }, { root: this.node, rootMargin: "0px 80px" });
-    for (const item of this.items) observer.observe(item.node);
     session.onState(() => (this.failed.clear(), this.update()));
     session.strokes.onChange(() => this.update());
     this.update();
+  }
+
+  private make(index: number): Item {
+    const { name, held_out } = this.session.views[index];
+    const image = el("img", { alt: "", draggable: "false" });
+    const reach = el("img", { alt: "", class: "reach", draggable: "false" });
+    const count = el("span", { class: "count", hidden: true });
+    const own = this.session.isViewpoint(index);
+    const node = el("button", { type: "button", class: "thumbnail", title: own ? words.view(name) : name }, image, reach, count, own ? el("span", { class: "caption" }, words.view(name)) : null);
+    node.addEventListener("click", (e) => this.choose(this.items.findIndex((item) => item.node === node), e.shiftKey || held_out));
+    node.classList.toggle("held-out", held_out);
+    node.classList.toggle("viewpoint", own);
+    this.observer.observe(node);
+    return { name, node, image, reach, count, isSeen: false };
+  }
+  /** One thumbnail a view; those that stay are left as they are. */
+  private follow(): void {
+    const { views } = this.session;
+    if (views.length === this.items.length && views.every((view, i) => view.name === this.items[i].name)) return;
+    const there = new Map(this.items.map((item) => [item.name, item]));
+    this.items = views.map((view, i) => there.get(view.name) ?? this.make(i));
+    for (const { name } of this.items) there.delete(name);
+    for (const { node } of there.values()) {
+      this.observer.unobserve(node);
+      node.remove();
+    }
+    this.items.forEach(({ node }, i) => {
+      node.dataset.view = String(i);
+      if (this.node.children[i] !== node) this.node.insertBefore(node, this.node.children[i] ?? null);
+    });
+    this.mark(this.marked);
   }
 
   setReach(shown: boolean): void {
@@ -52,6 +81,7 @@ export class Strip {
   }
   /** Shows which view is open. */
   mark(index: number): void {
+    this.marked = index;
     this.items.forEach(({ node }, i) => {
       const is = i === index;
       if (is && node.getAttribute("aria-current") !== "true") this.node.scrollTo({ left: node.offsetLeft - this.node.clientWidth / 2 + node.clientWidth / 2, behavior: "smooth" });
@@ -60,9 +90,10 @@ export class Strip {
   }
 
   private update(): void {
+    this.follow();
     const counts = new Map<string, number>();
     for (const { view } of this.session.strokes.list) counts.set(view, (counts.get(view) ?? 0) + 1);
-    this.session.scene.views.forEach((view, i) => {
+    this.session.views.forEach((view, i) => {
       const count = counts.get(view.name) ?? 0;
       const item = this.items[i];
       item.count.textContent = String(count);
@@ -73,14 +104,16 @@ export class Strip {
   }
 
   private addresses(i: number): { image: string; reach: string } {
-    const { scene, state, strokes } = this.session;
-    const image = state.ready ? `./studio/thumbnails/${i}?v=${state.colors}` : `./studio/photos/${i}?side=160`;
+    const { views, state, strokes } = this.session;
+    const stamp = this.session.stamp(i);
+    const image = state.ready ? `./studio/thumbnails/${i}?v=${state.colors}${stamp}` : `./studio/photos/${i}?side=160${stamp}`;
     // What is saved counts; unsaved strokes follow in a moment.
-    const reach = state.ready && this.showsReach && !scene.views[i].held_out && strokes.list.length > 0 && strokes.isSaved ? `./studio/reach/${i}?revision=${strokes.revision}` : "";
+    const reach = state.ready && this.showsReach && !views[i].held_out && strokes.list.length > 0 && strokes.isSaved ? `./studio/reach/${i}?revision=${strokes.revision}${stamp}` : "";
     return { image, reach };
   }
   /** Loads what is seen and out of date, a few at a time. */
   private pump(): void {
+    this.follow();
     // In turns: where colours change all the time, the last ones shall be seen to change too.
     for (let k = 0; k < this.items.length && this.loading < atOnce; ++k) {
       const i = (this.turn + 1) % this.items.length;

@@ -1,18 +1,23 @@
 /** The studio: the scene from the field, photographs to paint on, and everything around them. */
 
+import { Curve, withPoint, type CurvePoint } from "../ui/curve";
 import { button, el, icon, iconButton, segments, toast } from "../ui/dom";
 import { Api } from "./api";
 import { tools } from "./brush";
 import { Easel } from "./easel";
 import { FieldView } from "./field";
 import { Palette } from "./palette";
-import { commandsPanel, finishPanel, ideasPanel, strokesPanel, TakesPanel } from "./panels";
-import type { Scene, State } from "./protocol";
+import { commandsPanel, finishPanel, ideasPanel, notice, strokesPanel, TakesPanel, trainingPanel } from "./panels";
+import { limits, type State } from "./protocol";
+import { receive } from "./reception";
 import { Session } from "./session";
 import { Strip } from "./strip";
 import "./studio.css";
 import { Toolbar } from "./toolbar";
 import { words } from "./words";
+
+/** Pictures that are painted at free viewpoints: pixels of the longer side at most. */
+const longestViewpoint = 1024;
 
 class Studio {
   readonly field: FieldView;
@@ -23,6 +28,9 @@ class Studio {
   private toolbar: Toolbar;
   private strokes: HTMLElement & { refresh(): void };
   private stage = el("div", { class: "stage studio-stage", id: "stage" });
+  /** Name of the view that is to be opened. */
+  private wanted = "";
+  private isPlacing = false;
   private help = el("dialog", { class: "card help", "aria-label": words.keysTitle });
 
   constructor(readonly session: Session, private readonly root: HTMLElement) {
@@ -38,26 +46,60 @@ class Studio {
     this.field.begin(this.sceneKeys(), () => !this.isPainting && !document.querySelector("dialog[open]"));
   }
   get isPainting(): boolean {
-    return this.session.photo >= 0;
+    return this.session.open !== "";
   }
 
   async paint(index: number): Promise<void> {
-    const { views } = this.session.scene;
-    const next = (index + views.length) % views.length;
-    if (views[next].held_out) return toast(words.heldOut(views[next].name));
+    const { session } = this;
+    const { views } = session;
+    const next = views[(index + views.length) % views.length];
+    if (next.held_out) return toast(words.heldOut(next.name));
+    if (!(await this.hold(next.name))) return;
     this.field.hidden = true;
     document.body.classList.add("painting");
-    this.strip.mark(next);
-    await this.easel.open(next);
+    const number = session.views.findIndex((view) => view.name === next.name);
+    this.strip.mark(number);
+    await this.easel.open(number);
     this.strokes.refresh();
     this.easel.canvas.focus({ preventScroll: true });
   }
-  /** The next photograph that can be painted on. */
+  /**
+   * A viewpoint stays while it is open, and goes afterwards where nothing was painted at it.
+   * @param name  of the view that is wanted next, "" = none
+   * @return whether it is still the one that is wanted
+   */
+  private async hold(name: string): Promise<boolean> {
+    this.wanted = name;
+    const { strokes, isReadOnly } = this.session;
+    if (!isReadOnly) await strokes.hold(strokes.savedViewpoints.find((v) => v.name === name) ?? null);
+    return this.wanted === name && (name === "" || this.session.views.some((view) => view.name === name));
+  }
+  /** On the photograph of the camera that is looked through, else on a new viewpoint's picture. */
+  async paintHere(): Promise<void> {
+    const { session, field } = this;
+    const { strokes } = session;
+    if (this.isPainting || this.isPlacing) return;
+    if (field.captureCamera >= 0) return this.paint(field.captureCamera);
+    if (session.isReadOnly) return toast(words.readOnly);
+    if (strokes.viewpoints.length >= limits.viewpoints) return toast(words.tooManyViewpoints(limits.viewpoints));
+    this.isPlacing = true;
+    const name = strokes.freeViewpoint();
+    const view = field.viewHere(longestViewpoint);
+    // A camera on its way stops here.
+    field.setView(field.view);
+    await strokes.hold({ name, ...view });
+    this.isPlacing = false;
+    const index = session.views.findIndex((v) => v.name === name);
+    // Where it could not be saved there is no picture of it.
+    if (index < 0) return strokes.hold(null);
+    return this.paint(index);
+  }
+  /** The next one that can be painted on. */
   private step(direction: 1 | -1): void {
-    const { views } = this.session.scene;
-    let index = this.session.photo;
+    const { photo, views } = this.session;
+    let index = photo;
     do index = (index + direction + views.length) % views.length;
-    while (views[index].held_out && index !== this.session.photo);
+    while (views[index].held_out && index !== photo);
     void this.paint(index);
   }
   private lookThrough(index: number): void {
@@ -70,6 +112,8 @@ class Studio {
     document.body.classList.remove("painting");
     this.field.hidden = false;
     if (photo >= 0) this.field.goToCamera(photo, 0);
+    else this.field.setView(this.field.view);
+    void this.hold("");
     this.field.canvas.focus({ preventScroll: true });
     this.strokes.refresh();
   }
@@ -79,10 +123,12 @@ class Studio {
   private build(): void {
     const { session, field, easel } = this;
     this.stage.append(field.node, easel.node);
-    const panel = el("aside", { class: "panel", id: "panel", "aria-label": words.panel }, el("div", { class: "only-painting" }, this.palette.node), this.strokes, this.takes.node,
-      ideasPanel(session, (file) => this.reference(file)), finishPanel(session), commandsPanel(session));
+    const panel = el("aside", { class: "panel", id: "panel", "aria-label": words.panel }, el("div", { class: "only-painting" }, this.palette.node), trainingPanel(), this.strokes,
+      el("div", { class: "after-training" }, this.takes.node, ideasPanel(session, (file) => this.reference(file)), finishPanel(session)), commandsPanel(session));
     this.buildHelp();
-    this.root.append(this.stage, this.toolbar.node, this.head(), panel, this.foot(), this.notice(), this.help);
+    this.root.append(this.stage, this.toolbar.node, this.head(), panel, this.foot(), notice(session), this.help);
+    session.onState(() => document.body.classList.toggle("training", session.isTraining));
+    session.strokes.onChange(() => this.isPainting && session.photo < 0 && session.strokes.isSaved && this.leave());
     document.body.classList.add("studio");
     if (innerWidth > 900) document.body.classList.add("panel-open");
   }
@@ -94,15 +140,21 @@ class Studio {
     const redo = iconButton("redo", words.redo, () => session.strokes.redo(), "redo");
     const bar = el("div", { class: "bar" });
     const progress = el("div", { class: "task", role: "progressbar", "aria-valuemin": "0", "aria-valuemax": "100", hidden: true }, bar);
+    const title = el("h1");
+    const curve = this.curve();
     const update = () => {
-      const { state, strokes, isReadOnly } = session;
-      const figures = Object.entries(state.figures ?? {}).map(([name, value]) => words.figure(name, value));
-      status.textContent = state.task ? [words.tasks[state.task] ?? state.task, words.percent(state.fraction), ...figures].join(" · ") : [state.message || words.of(state.take), state.unkept ? words.unkept : ""].filter(Boolean).join(" · ");
+      const { state, strokes, isReadOnly, isTraining } = session;
+      const all = Object.entries(state.figures).map(([name, value]) => words.figure(name, value));
+      // A training has more figures than are worth reading while it runs.
+      const figures = isTraining && "psnr" in state.figures ? [words.dB(state.figures.psnr)] : all;
+      status.title = isTraining ? all.join(" · ") : "";
+      title.textContent = session.scene.title || words.program;
+      status.textContent = state.task ? [words.tasks[state.task] ?? state.task, words.percent(state.fraction), ...figures].join(" · ") : [state.message || (isTraining ? "" : words.of(state.take)), state.unkept ? words.unkept : ""].filter(Boolean).join(" · ");
       status.classList.toggle("failed", state.failed && !state.task);
-      colour.textContent = state.task ? words.stop : words.colour;
-      colour.title = state.task ? words.stopTitle : words.colourTitle;
+      colour.textContent = state.task ? words.stop : isTraining ? words.train : words.colour;
+      colour.title = state.task ? words.stopTitle : isTraining ? words.trainTitle : words.colourTitle;
       colour.classList.toggle("stop", state.task !== "");
-      colour.disabled = isReadOnly || session.isLost || (!state.task && !state.ready);
+      colour.disabled = isReadOnly || session.isLost || (!state.task && !isTraining && !state.ready);
       undo.disabled = isReadOnly || !strokes.canUndo;
       redo.disabled = isReadOnly || !strokes.canRedo;
       progress.hidden = state.task === "";
@@ -110,18 +162,37 @@ class Studio {
       bar.style.width = `${100 * state.fraction}%`;
     };
     session.onState(update);
+    session.onScene(update);
     session.strokes.onChange(update);
     update();
     return el("header", { class: "head" }, progress,
-      el("div", { class: "title" }, el("img", { src: "./icon.svg", alt: "", width: 28, height: 28 }), el("div", {}, el("h1", {}, session.scene.title || words.program), status)),
+      el("div", { class: "title" }, el("img", { src: "./icon.svg", alt: "", width: 28, height: 28 }), el("div", {}, title, status), curve),
       el("div", { class: "tools" }, undo, redo, iconButton("help", words.help, () => this.toggleHelp(), "help"), iconButton("panel", words.panel, () => this.togglePanel(), "settings"), colour));
+  }
+  /** How good the field has become, while it is trained. */
+  private curve(): HTMLElement {
+    const { session } = this;
+    const curve = new Curve(96, 30);
+    const node = el("figure", { class: "small-curve", id: "curve", role: "img", hidden: true });
+    let points: CurvePoint[] = [];
+    node.append(curve.node);
+    session.onState(({ figures, task }) => {
+      if (session.isTraining && task === "train" && figures.psnr !== undefined) {
+        points = withPoint(points, [performance.now(), figures.psnr]);
+        curve.draw(points);
+        node.setAttribute("aria-label", words.curve(figures.psnr));
+        node.title = words.curve(figures.psnr);
+      }
+      node.hidden = !session.isTraining || points.length < 2;
+    });
+    return node;
   }
   private foot(): HTMLElement {
     const { session, field, easel } = this;
     const name = el("span", { class: "camera-name", id: "camera-name" });
     const step = (label: string, sign: string, onclick: () => void, only: string) => el("button", { type: "button", class: `step ${only}`, title: label, "aria-label": label, onclick }, sign);
     const camera = (by: number) => () => field.goToCamera(Math.max(field.captureCamera, -1) + by);
-    const paintHere = button(words.paintHere, () => void this.paint(field.captureCamera), { title: words.paintHereTitle, id: "paint-here" });
+    const paintHere = button(words.paintHere, () => void this.paintHere(), { title: words.paintHereTitle, id: "paint-here" });
     const mode = segments<"orbit" | "fly">("mode", [["orbit", words.orbit], ["fly", words.fly]], "orbit", (value) => (field.fly = value === "fly"));
     mode.node.classList.add("only-scene");
     const bar = el("div", { class: "camera-bar" },
@@ -132,9 +203,10 @@ class Studio {
     this.toolbar.tints.classList.add("only-painting");
     const update = () => {
       const index = this.isPainting ? session.photo : field.captureCamera;
-      const view = session.scene.views[index];
-      name.textContent = view ? view.name.replace(/^.*\//, "") : words.freeView;
-      paintHere.hidden = this.isPainting || !view || view.held_out;
+      const view = this.session.views[index];
+      name.textContent = view ? words.view(view.name) : words.freeView;
+      paintHere.hidden = this.isPainting || (view ? view.held_out : session.isReadOnly);
+      paintHere.title = view ? words.paintHereTitle : words.paintFreeTitle;
       this.strip.mark(index);
       this.strip.setReach(easel.tint === "reach");
       this.toolbar.node.hidden = !this.isPainting;
@@ -142,6 +214,7 @@ class Studio {
     };
     field.onChange(update);
     easel.onChange(update);
+    session.onState(update);
     update();
     return el("footer", { class: "foot" }, bar, this.strip.node);
   }
@@ -149,16 +222,6 @@ class Studio {
     const { easel } = this;
     const make = (sign: string, title: string, onclick: () => void) => el("button", { type: "button", class: "step", title, "aria-label": title, onclick }, sign);
     return el("div", { class: "zoom only-painting" }, make("−", words.zoomOut, () => easel.zoomBy(1 / 1.5)), make("+", words.zoomIn, () => easel.zoomBy(1.5)), el("button", { type: "button", class: "step", title: words.fit, "aria-label": words.fit, onclick: () => easel.fit() }, icon("frame")));
-  }
-  private notice(): HTMLElement {
-    const { session } = this;
-    const node = el("div", { class: "notice", id: "notice", role: "status", hidden: true });
-    session.onState(() => {
-      node.textContent = session.isLost ? words.lost : words.readOnly;
-      node.hidden = !session.isLost && !session.isReadOnly;
-      document.body.classList.toggle("is-read-only", session.isReadOnly);
-    });
-    return node;
   }
   private buildHelp(): void {
     const rows = (list: [string, string][]) => el("dl", {}, ...list.flatMap(([key, what]) => [el("dt", {}, key), el("dd", {}, what)]));
@@ -224,7 +287,7 @@ class Studio {
       // Buttons keep their own keys.
       const isControl = target instanceof HTMLButtonElement || target instanceof HTMLInputElement || target.tagName === "SUMMARY";
       if (isControl && (key === " " || key === "Enter")) return;
-      if (key === "Enter" && !this.isPainting && target.tagName !== "A" && this.field.captureCamera >= 0) action = () => void this.paint(this.field.captureCamera);
+      if (key === "Enter" && !this.isPainting && target.tagName !== "A") action = () => void this.paintHere();
       else action = both[key] ?? (this.isPainting ? painting[key] : undefined);
       if (this.isPainting && this.session.isReadOnly && key === "Delete") return;
     }
@@ -246,7 +309,7 @@ class Studio {
       e.preventDefault();
       const place = placeOf(e);
       veil.hidden = false;
-      veil.textContent = place === "picker" ? words.dropPicker : place === "easel" ? words.dropEasel : words.dropScene;
+      veil.textContent = place === "picker" ? words.dropPicker : place === "easel" ? words.dropEasel : this.session.isTraining ? words.afterTraining : words.dropScene;
     });
     addEventListener("dragleave", (e) => (veil.hidden = e.relatedTarget === null || veil.hidden));
     addEventListener("drop", (e) => {
@@ -257,21 +320,31 @@ class Studio {
       if (!file) return;
       if (place === "picker") void this.palette.showPicture(file);
       else if (this.session.isReadOnly) toast(words.readOnly);
-      else if (place === "easel" && file.type === "image/png") void this.session.send({ kind: "stroke", view: String(this.session.photo) }, file);
+      else if (place === "easel" && file.type === "image/png") void this.session.sendPainted(file);
+      else if (this.session.isTraining) toast(words.afterTraining);
       else this.reference(file);
     });
   }
 }
 
 /** @param root  what the page is built into */
-export async function showStudio(root: HTMLElement, scene: Scene): Promise<void> {
-  document.title = `${scene.title} · ${words.program}`;
-  document.body.classList.add("loading");
+export async function showStudio(root: HTMLElement, first: State): Promise<void> {
   const api = new Api();
-  const state: State = await api.state();
+  let state = first;
+  let leaveReception = () => {};
+  if (state.stage === "photographs") {
+    leaveReception = await receive(root, api, state);
+    state = await api.state();
+  }
+  // After the state: it is not older than that says.
+  const scene = await api.scene();
+  document.title = scene.title ? `${scene.title} · ${words.program}` : words.program;
+  document.body.classList.add("loading");
   const session = new Session(api, scene, state);
   const studio = new Studio(session, root);
   await session.begin();
+  // Only now: a page that hears nothing in between would lose the right to paint.
+  leaveReception();
   session.tell();
   // For scripts and tests.
   Object.assign(window, { cnerf: { studio, session } });

@@ -42,6 +42,7 @@ const paths: Record<string, string> = {
   compare: "M12 3v18M9 7H4v10h5M15 7h5v10h-5",
   pencil: "M4 20l1-4.500L16 4.500l3.500 3.500-11 11zM14 6.500l3.500 3.500",
   copy: "M9 9h11v11H9zM15 9V4H4v11h5",
+  photographs: "M3 7h14v11H3zM6.500 4h14.500v11M3 15.500l4-4 3.500 3.500 2-2 4.500 4.500M13 10.500v.1",
   full: "M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5",
 };
 

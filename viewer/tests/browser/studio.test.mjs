@@ -1,11 +1,15 @@
 /** The studio in a real browser. CNERF_STUDIO_URL names a running server; without it a stand-in answers. */
 
 import assert from "node:assert/strict";
+import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { after, before, describe, it } from "node:test";
 import { builtPage, launch, open, patience } from "./support.mjs";
 import { png, StudioMock } from "./studio_mock.mjs";
 
 const real = process.env.CNERF_STUDIO_URL;
+const standIn = real ? "only against the stand-in" : false;
 const noReal = real ? "only where the server can be ended" : false;
 let browser, context, mock, url, page;
 
@@ -382,5 +386,380 @@ describe("other screens", () => {
     await until(shown, () => window.cnerf?.studio.field.settled);
     assert.deepEqual(shown.problems, []);
     await shown.close();
+  });
+});
+
+/** A stand-in of its own, whose work goes on when it is told to. */
+async function opened(options, size = { width: 1280, height: 720 }) {
+  const server = await new StudioMock(builtPage, { slow: true, ...options }).start();
+  const own = await browser.newContext({ viewport: size });
+  const shown = await open(own, `${server.url}?still`);
+  return { server, own, shown, close: async () => (await own.close(), server.close()) };
+}
+/** The page has heard everything. */
+const heard = (shown, server) => until(shown, (version) => window.cnerf.session.state.version >= version, server.state.version);
+const text = (shown, selector) => shown.locator(selector).textContent();
+const jpeg = (bytes) => Buffer.concat([png(4, 3, 3, Buffer.alloc(36, 99)), Buffer.alloc(bytes)]);
+
+describe("a studio without photographs", { skip: standIn }, () => {
+  let server, own, shown, close, folder, second;
+  before(async () => {
+    folder = mkdtempSync(join(tmpdir(), "cnerf-photographs-"));
+    mkdirSync(join(folder, "house/images/.cache"), { recursive: true });
+    for (const name of ["images/a.jpg", "images/b.jpg", "images/c.png", "images/bad.jpg", "Thumbs.db", "x.heic", "images/.cache/d.jpg", ".hidden.jpg"]) writeFileSync(join(folder, "house", name), jpeg(1000));
+    ({ server, own, shown, close } = await opened({ stage: "photographs", steps: 5 }));
+  });
+  after(async () => {
+    await close?.();
+    rmSync(folder, { recursive: true, force: true });
+  });
+
+  it("asks for them", async () => {
+    await shown.waitForSelector("#drop-zone:not([hidden])");
+    assert.equal(await shown.locator("#build").isDisabled(), true);
+    assert.equal(await shown.locator("#strip").count(), 0);
+    assert.equal(await shown.evaluate(() => document.getElementById("folder").webkitdirectory), true);
+  });
+  it("takes a folder, tells by name what is refused, and leaves out what it has no use for", async () => {
+    server.refusals.set("house/images/bad.jpg", { status: 400, sentence: "house/images/bad.jpg: it is no picture.", times: 9 });
+    await shown.setInputFiles("#folder", join(folder, "house"));
+    await until(shown, () => !document.getElementById("build").disabled);
+    assert.deepEqual([...server.arrived.keys()].sort(), ["house/images/a.jpg", "house/images/b.jpg", "house/images/c.png"]);
+    assert.match(await text(shown, "#refused"), /house\/images\/bad\.jpg.*it is no picture/);
+    assert.match(await text(shown, "#left-out"), /2 files of other kinds.*\.heic.*HEIC/);
+    assert.match(await text(shown, "#arrived"), /3 files are here/);
+  });
+  it("sends a clip in pieces, anew where the server lost it", async () => {
+    const clip = jpeg(20 * 2 ** 20);
+    const offsets = [];
+    const listen = (request) => /arrivals\?name=clip.mp4/.test(request.url()) && offsets.push(Number(new URL(request.url()).searchParams.get("offset")) / 2 ** 20);
+    shown.on("request", listen);
+    const answer = server.arrive;
+    let isLost = false;
+    server.arrive = function (response, name, offset, body) {
+      if (name === "clip.mp4" && offset > 0 && !isLost) isLost = this.arrived.delete(name);
+      return answer.call(this, response, name, offset, body);
+    };
+    const sending = shown.waitForSelector(".arrivals .progress:not([hidden])", { timeout: patience });
+    await shown.setInputFiles("#files", { name: "clip.mp4", mimeType: "video/mp4", buffer: clip });
+    await sending;
+    await until(shown, () => !window.cnerf.reception.isSending);
+    shown.off("request", listen);
+    assert.deepEqual(offsets, [0, 8, 0, 8, 16]);
+    assert.ok(server.arrived.get("clip.mp4").equals(clip));
+  });
+  it("takes what is dropped anywhere on the page", async () => {
+    await shown.evaluate(() => {
+      const transfer = new DataTransfer();
+      for (const name of ["dropped 1.jpg", "dropped 2.jpg"]) transfer.items.add(new File([new Uint8Array(500)], name, { type: "image/jpeg" }));
+      for (const type of ["dragover", "drop"]) document.querySelector("#reception header").dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
+    });
+    await until(shown, () => window.cnerf.session.state.arrived.files === 6);
+    assert.ok(server.arrived.has("dropped 2.jpg"));
+  });
+  it("is followed by a second tab, which cannot send", async () => {
+    second = await open(own, `${server.url}?still`);
+    await second.waitForSelector("#notice:not([hidden])", { timeout: patience });
+    assert.match(await text(second, "#arrived"), /6 files are here/);
+    assert.equal(await second.locator("#build").isDisabled(), true);
+    assert.equal(await second.evaluate(() => document.getElementById("drop-zone").inert), true);
+  });
+  it("builds, says how it goes, and can be stopped", async () => {
+    await shown.click("#build");
+    await shown.waitForSelector("#work:not([hidden])");
+    server.advance(2);
+    await until(shown, () => document.querySelectorAll("#notes li").length === 2);
+    assert.match(await text(shown, "#work"), /Finding the cameras.*40 %/);
+    assert.match(await text(shown, "#notes"), /6 photographs were read\./);
+    await until(second, () => document.querySelectorAll("#notes li").length === 2);
+    await shown.click("#stop");
+    await shown.waitForSelector("#work[hidden]", { state: "attached" });
+    assert.equal(await shown.locator("#build").isDisabled(), false);
+  });
+  it("says why it failed, and takes more", async () => {
+    server.prepareFails = "2 of 6 photographs could be placed.";
+    await shown.click("#build");
+    await shown.waitForSelector("#work:not([hidden])");
+    server.advance(5);
+    await shown.waitForSelector("#failure:not([hidden])", { timeout: patience });
+    assert.match(await text(shown, "#failure"), /2 of 6 photographs could be placed/);
+    await shown.setInputFiles("#files", { name: "more.jpg", mimeType: "image/jpeg", buffer: jpeg(10) });
+    await until(shown, () => window.cnerf.session.state.arrived.files === 7 && !document.getElementById("build").disabled);
+  });
+  it("becomes the studio without a reload, in both tabs", async () => {
+    server.prepareFails = "";
+    await Promise.all([shown, second].map((tab) => tab.evaluate(() => (window.isSame = true))));
+    await shown.click("#build");
+    await shown.waitForSelector("#work:not([hidden])");
+    server.advance(5);
+    for (const tab of [shown, second]) {
+      await until(tab, () => window.cnerf.studio?.field.settled);
+      assert.deepEqual(await tab.evaluate(() => [window.isSame, document.querySelectorAll("#reception").length, document.querySelectorAll(".thumbnail").length]), [true, 0, 8]);
+    }
+    assert.equal(await second.locator("#colour").isDisabled(), true, "it still follows only");
+    assert.equal(await shown.locator("#colour").isDisabled(), false, "it may still paint");
+    assert.deepEqual([shown.problems, second.problems], [[], []]);
+  });
+  it("is within reach on a phone", async () => {
+    const phone = await opened({ stage: "photographs" }, { width: 390, height: 844 });
+    const box = await phone.shown.evaluate(() => ({
+      wide: document.querySelector(".reception-box").scrollWidth,
+      low: [...document.querySelectorAll("button")].filter((b) => b.checkVisibility()).map((b) => b.getBoundingClientRect().height).filter((h) => h < 39.5),
+    }));
+    assert.deepEqual(box, { wide: 390, low: [] });
+    await phone.shown.focus("#choose-folder");
+    await phone.close();
+  });
+});
+
+describe("training", { skip: standIn }, () => {
+  let server, shown, close;
+  before(async () => {
+    ({ server, shown, close } = await opened({ stage: "training", steps: 12 }));
+    server.train();
+    await until(shown, () => window.cnerf?.studio?.field.settled);
+  });
+  after(() => close?.());
+
+  it("is seen while it goes on, in frames of half the size", async () => {
+    const widths = [];
+    const listen = (request) => request.url().endsWith("/studio/frame") && widths.push(JSON.parse(request.postData()).lens.width);
+    shown.on("request", listen);
+    for (let i = 0; i < 2; ++i) {
+      server.advance();
+      await until(shown, (colors) => window.cnerf.studio.field.colors >= colors && window.cnerf.studio.field.settled, server.state.colors);
+    }
+    shown.off("request", listen);
+    assert.ok(widths.length >= 2);
+    assert.ok(Math.max(...widths) <= (await shown.evaluate(() => document.getElementById("field").width)) / 2 + 1);
+    assert.match(await text(shown, "#status"), /^Training · 17 % · 24\.0 dB$/);
+    assert.match(await shown.locator("#curve path").getAttribute("d"), /^M.*L/);
+    assert.equal(await shown.locator("#curve").isVisible(), true);
+    assert.equal(await shown.locator("#takes").isVisible(), false);
+    assert.equal(await shown.locator("#suggest").isVisible(), false);
+    assert.equal(await shown.locator("#wipe-handle").isVisible(), false);
+  });
+  it("lets photographs be painted on already, and gives the cameras their new places", async () => {
+    await paintOn(shown, 2);
+    await draw(shown, [[0.4, 0.5], [0.6, 0.5]]);
+    await saved(shown);
+    const before = await shown.evaluate(() => [window.cnerf.session.scene.views[2].position, window.cnerf.session.state.scene]);
+    server.advance(2);
+    await until(shown, ([position]) => window.cnerf.session.scene.views[2].position[2] !== position[2], before);
+    assert.deepEqual(await shown.evaluate(() => [window.cnerf.session.photo, window.cnerf.session.strokes.list.length]), [2, 1]);
+    assert.equal(server.strokes.length, 1);
+    await shown.click("#leave");
+    assert.deepEqual(await shown.evaluate(() => window.cnerf.studio.field.view.position), server.scene.views[2].position);
+    // The camera that is looked through moves along.
+    server.advance(3);
+    await until(shown, (position) => window.cnerf.studio.field.view.position[2] === position[2], server.scene.views[2].position);
+  });
+  it("stops, goes on, and ends with a field that can be coloured", async () => {
+    await shown.click("#colour");
+    await until(shown, () => document.getElementById("colour").textContent === "Train");
+    await until(shown, () => window.cnerf.studio.field.settled);
+    const orders = server.requests.length;
+    await shown.focus("#field");
+    await shown.keyboard.press("c");
+    await until(shown, () => document.getElementById("colour").textContent === "Stop");
+    assert.ok(server.requests.slice(orders).includes("POST orders"));
+    assert.equal(server.state.task, "train");
+    server.advance(12);
+    await until(shown, () => document.getElementById("colour").textContent === "Colour");
+    assert.equal(await shown.locator("#takes").isVisible(), true);
+    const full = shown.waitForRequest((r) => r.url().endsWith("/studio/frame") && JSON.parse(r.postData()).lens.width > 800, { timeout: patience });
+    await shown.evaluate(() => window.cnerf.studio.field.goToCamera(3));
+    await full;
+    assert.equal((await shownStrokes(shown)).length, 1);
+    assert.deepEqual(shown.problems, []);
+  });
+});
+
+describe("ideas and finish", { skip: standIn }, () => {
+  let server, shown, close;
+  before(async () => {
+    ({ server, shown, close } = await opened({ steps: 3 }));
+    await until(shown, () => window.cnerf?.studio.field.settled);
+  });
+  after(() => close?.());
+
+  it("colours with the built-in colorizer, as a take", async () => {
+    await shown.click("#builtin");
+    await until(shown, () => document.getElementById("builtin").disabled && document.getElementById("suggest").disabled);
+    server.advance(3);
+    await shown.locator('#takes [data-take="builtin"]').waitFor({ timeout: patience });
+    assert.deepEqual([server.state.take, server.state.unkept], ["builtin", false]);
+  });
+  it("suggests, and colours by the cards that are liked", async () => {
+    await shown.click("#suggest");
+    await until(shown, () => window.cnerf.session.isBusy);
+    server.advance(3);
+    await shown.locator("#cards .idea").nth(1).click();
+    await shown.locator("#cards .idea").nth(0).click();
+    await shown.locator("#cards .idea").nth(0).click();
+    assert.deepEqual(await shown.locator("#cards .idea").evaluateAll((cards) => cards.map((card) => card.getAttribute("aria-pressed"))), ["false", "true"]);
+    const sent = shown.waitForRequest((r) => r.url().endsWith("/studio/orders"), { timeout: patience });
+    await shown.click("#builtin");
+    assert.deepEqual((await sent).postDataJSON(), { order: "builtin", bases: [1] });
+    await heard(shown, server);
+    server.advance(3);
+    await until(shown, () => !window.cnerf.session.isBusy);
+    await shown.evaluate(() => window.cnerf.session.order({ order: "begin", take: "builtin" }));
+  });
+  it("follows the sliders with a few orders a second, also beside work, and keeps the take kept", async () => {
+    await shown.evaluate(() => void window.cnerf.session.order({ order: "bake", formats: ["vdb"] }));
+    await until(shown, () => window.cnerf.session.state.task === "bake");
+    const { colors } = server.state;
+    const orders = [];
+    const listen = (request) => request.url().endsWith("/studio/orders") && orders.push(JSON.parse(request.postData()));
+    shown.on("request", listen);
+    await shown.evaluate(() => {
+      const input = document.getElementById("saturation");
+      for (let value = 100; value >= 20; value -= 1) {
+        input.value = String(value / 100);
+        input.dispatchEvent(new Event("input", { bubbles: true }));
+      }
+    });
+    await until(shown, () => window.cnerf.session.state.finish.saturation === 0.2);
+    shown.off("request", listen);
+    assert.equal(orders.length, 2, "the first one at once, then the last one");
+    assert.deepEqual(orders.at(-1), { order: "finish", saturation: 0.2, hue: 0, exposure: 0 });
+    assert.ok(server.state.colors > colors);
+    await until(shown, (wanted) => window.cnerf.studio.field.colors === wanted, server.state.colors);
+    assert.deepEqual([server.state.unkept, server.state.task], [false, "bake"]);
+    // Somebody else's finish is shown.
+    await until(shown, () => !document.querySelector("#exposure:active"));
+    server.change({ finish: { saturation: 1, hue: 0, exposure: 1 } });
+    await until(shown, () => (window.cnerf.session.tell(), document.getElementById("exposure").value === "1"));
+    server.advance(3);
+    assert.deepEqual(shown.problems, []);
+  });
+});
+
+describe("a painted PNG", { skip: standIn }, () => {
+  it("becomes a stroke of its photograph, that is drawn, hidden and deleted", async () => {
+    const { server, shown, close } = await opened({});
+    await until(shown, () => window.cnerf?.studio.field.settled);
+    await paintOn(shown, 1);
+    const { width, height } = server.pictures[1];
+    const paint = Buffer.alloc(4 * width * height);
+    for (let y = 20; y < 80; ++y) for (let x = 20; x < 100; ++x) paint.set([200, 40, 30, 255], 4 * (y * width + x));
+    const sent = shown.waitForRequest((r) => /pictures\?kind=stroke&view=1&name=roof\.png/.test(r.url()), { timeout: patience });
+    await shown.evaluate((list) => {
+      const transfer = new DataTransfer();
+      transfer.items.add(new File([new Uint8Array(list)], "roof.png", { type: "image/png" }));
+      for (const type of ["dragover", "drop"]) document.getElementById("easel").dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
+    }, [...png(width, height, 4, paint)]);
+    await sent;
+    const spot = [60 / width, 50 / height];
+    const isRed = ([u, v]) => {
+      const { layer } = window.cnerf.studio.easel;
+      const color = layer.colorAt(Math.floor(u * layer.width), Math.floor(v * layer.height));
+      return color !== null && color[0] > color[2] + 10;
+    };
+    await until(shown, isRed, spot);
+    assert.equal((await seen(shown, 0.9, 0.9)).color, null);
+    await until(shown, () => document.querySelector("#strokes img.picture")?.naturalWidth > 0);
+    const row = shown.locator("#strokes li");
+    assert.match(await row.textContent(), /Painted picture/);
+    await row.getByRole("button", { name: "Hide" }).click();
+    assert.equal((await seen(shown, ...spot)).color, null);
+    await saved(shown);
+    assert.deepEqual([server.strokes[0].hidden, server.strokes[0].kind, server.painted.has(server.strokes[0].picture), server.strokes[0].points], [true, "picture", true, []]);
+    await row.getByRole("button", { name: "Show" }).click();
+    await until(shown, isRed, spot);
+    await row.getByRole("button", { name: "Delete" }).click();
+    await saved(shown);
+    assert.equal(server.strokes.length, 0);
+    assert.deepEqual(shown.problems, []);
+    await close();
+  });
+});
+
+describe("free viewpoints", { skip: standIn }, () => {
+  let server, shown, close, place1;
+  before(async () => {
+    ({ server, shown, close } = await opened({}));
+    await until(shown, () => window.cnerf?.studio.field.settled);
+  });
+  after(() => close?.());
+  const nearer = (factor) => shown.evaluate((f) => {
+    const { field } = window.cnerf.studio;
+    field.setView({ ...field.view, position: field.view.position.map((v) => v * f) });
+    return field.view.position;
+  }, factor);
+  const thumbnails = () => shown.evaluate(() => [...document.querySelectorAll("#strip .caption")].map((n) => n.textContent));
+
+  it("are painted on wherever the camera stands, by keyboard too", async () => {
+    place1 = await nearer(0.8);
+    const canvas = await shown.evaluate(() => document.getElementById("field").width / document.getElementById("field").height);
+    assert.equal(await text(shown, "#camera-name"), "free view");
+    assert.equal(await shown.locator("#paint-here").isVisible(), true);
+    await shown.focus("#field");
+    await shown.keyboard.press("Enter");
+    await shown.waitForSelector('[data-photo="8"]', { timeout: patience });
+    assert.equal(await text(shown, "#camera-name"), "Viewpoint 1");
+    assert.deepEqual(await thumbnails(), ["Viewpoint 1"]);
+    const [viewpoint] = server.viewpoints;
+    assert.deepEqual(viewpoint.position, place1);
+    const { width, height } = viewpoint.lens;
+    assert.ok(Math.max(width, height) <= 1024 && width > 500, `${width} x ${height}`);
+    assert.ok(Math.abs(width / height - canvas) < 0.01, "it shows what was seen");
+    await draw(shown, [[0.4, 0.5], [0.5, 0.5]]);
+    await saved(shown);
+    assert.equal(server.strokes[0].view, "viewpoint-1");
+    assert.match(await text(shown, "#strip"), /1/);
+  });
+  it("stay with their strokes, and leaving returns to the camera", async () => {
+    await shown.keyboard.press("Escape");
+    await until(shown, () => window.cnerf.studio.field.settled);
+    assert.deepEqual(await shown.evaluate(() => window.cnerf.studio.field.view.position), place1);
+    assert.equal(await text(shown, "#camera-name"), "Viewpoint 1");
+    assert.equal(server.viewpoints.length, 1);
+  });
+  it("go again where nothing was painted", async () => {
+    const there = await nearer(0.9);
+    await shown.click("#paint-here");
+    await shown.waitForSelector('[data-photo="9"]', { timeout: patience });
+    assert.equal(server.viewpoints.length, 2);
+    await shown.click("#leave");
+    await until(shown, () => window.cnerf.session.strokes.savedViewpoints.length === 1);
+    assert.deepEqual(server.viewpoints.map((v) => v.name), ["viewpoint-1"]);
+    assert.deepEqual(await thumbnails(), ["Viewpoint 1"]);
+    assert.deepEqual(await shown.evaluate(() => window.cnerf.studio.field.view.position), there);
+    assert.equal(await text(shown, "#camera-name"), "free view");
+  });
+  it("keep their strokes where another one before them goes", async () => {
+    await shown.click("#paint-here");
+    await shown.waitForSelector('[data-photo="9"]', { timeout: patience });
+    await draw(shown, [[0.3, 0.4], [0.35, 0.4]]);
+    await saved(shown);
+    // The first one's stroke is deleted while the second one is open: it is number 8 now.
+    await shown.evaluate(() => window.cnerf.session.strokes.remove(window.cnerf.session.strokes.list[0].id));
+    await saved(shown);
+    assert.equal(await shown.evaluate(() => window.cnerf.session.photo), 8);
+    const asked = shown.waitForRequest((r) => r.method() === "POST" && r.url().endsWith("/studio/reach") && JSON.parse(r.postData()).view === 8, { timeout: patience });
+    await draw(shown, [[0.5, 0.6], [0.55, 0.6]]);
+    await asked;
+    await saved(shown);
+    assert.equal(new Set(server.strokes.map((s) => s.view)).size, 1);
+    assert.equal(server.strokes.length, 2);
+    const [{ name }] = server.viewpoints;
+    // Undo brings the first one back, camera and all.
+    for (let i = 0; i < 2; ++i) await shown.keyboard.press("Control+z");
+    await saved(shown);
+    assert.deepEqual(server.viewpoints.map((v) => v.name), ["viewpoint-1", name]);
+    assert.deepEqual(server.viewpoints[0].position, place1);
+    await until(shown, () => document.querySelectorAll("#strip .caption").length === 2);
+  });
+  it("are there after a reload, and open from the strip", async () => {
+    await saved(shown);
+    await shown.reload({ timeout: patience });
+    await until(shown, () => window.cnerf?.studio && document.querySelectorAll("#strip .caption").length === 2);
+    await shown.locator('#strip [data-view="8"]').click();
+    await shown.waitForSelector('[data-photo="8"]', { timeout: patience });
+    assert.equal(await text(shown, "#camera-name"), "Viewpoint 1");
+    assert.equal(await shown.locator("#strokes li").count(), 1);
+    assert.deepEqual(shown.problems, []);
   });
 });

@@ -3,6 +3,7 @@
  * there, the same tests run against that (CNERF_STUDIO_URL).
  */
 
+import { randomBytes } from "node:crypto";
 import { createServer } from "node:http";
 import { existsSync, readFileSync, statSync } from "node:fs";
 import { extname, join } from "node:path";
@@ -63,21 +64,35 @@ function camera(index, count, { width, height }) {
 }
 const luma = (rgb, p) => Math.round(0.2126 * rgb[p] + 0.7152 * rgb[p + 1] + 0.0722 * rgb[p + 2]);
 
-/** @param pictures  [{ width, height, rgb }]: what the views show, in colour; left out, a ball */
+const wantedKinds = /\.(jpe?g|png|tiff?|webp|mp4|mov|mkv|avi|webm|m4v|json|bin|txt|npy|npz|xml|csv|xmp|exr|ply)$/i;
+
+/**
+ * @param pictures  [{ width, height, rgb }]: what the views show, in colour; left out, a ball
+ * @param stage     what there is at first: "photographs", "training" or "field"
+ * @param slow      steps of work wait for advance() instead of a clock
+ */
 export class StudioMock {
-  constructor(page, { pictures, count = 8, title = "ball", steps = 6 } = {}) {
+  constructor(page, { pictures, count = 8, title = "ball", steps = 6, stage = "field", slow = false } = {}) {
     this.page = page;
     this.steps = steps;
+    this.slow = slow;
     this.pictures = pictures ?? Array.from({ length: count }, (_, i) => ballPicture(i));
     this.scene = {
       title, run: "/runs/ball", up: "+y", centre: [0, 0, 0], radius: 1.6, home: 1,
       views: this.pictures.map((picture, i) => ({ name: `images/${String(i).padStart(4, "0")}.png`, held_out: i === this.pictures.length - 1, width: picture.width, height: picture.height, ...camera(i, this.pictures.length, picture) })),
     };
     this.state = {
-      version: 1, colors: 1, task: "", fraction: 0, figures: {}, message: "", failed: false, ready: true, writer: "", strokes: 0, take: "",
+      version: 1, stage, scene: 1, notes: [], arrived: { files: 0, bytes: 0 }, finish: { saturation: 1, hue: 0, exposure: 0 }, colors: 1, task: "", fraction: 0, figures: {}, message: "", failed: false, ready: stage === "field", writer: "", strokes: 0, take: "",
       unkept: false, takes: [], commands: [], downloads: [], blender: "", cards: [],
     };
     this.strokes = [];
+    this.viewpoints = [];
+    this.painted = new Map();
+    /** Files that were sent: name -> bytes. */
+    this.arrived = new Map();
+    /** Names -> what a piece of such a file is answered with: { status, sentence, times }. */
+    this.refusals = new Map();
+    this.prepareFails = "";
     this.amount = 0;
     this.amounts = {};
     this.streams = new Map();
@@ -115,12 +130,18 @@ export class StudioMock {
     if (request.method !== "GET" && (request.headers["x-cnerf"] !== "1" || !/^[a-z0-9]{8,32}$/i.test(client))) return this.refuse(response, 403, "The header X-Cnerf is missing.");
     const [kind, index] = what.split("/");
     const number = Number(index ?? -1);
-    if (request.method === "GET" && index !== undefined && !this.pictures[number]) return this.refuse(response, 404, "There is no such view.");
+    const isOfView = ["photos", "thumbnails", "reach"].includes(kind);
+    if (request.method === "GET" && isOfView && index !== undefined && !this.pictures[number] && !this.viewpoints[number - this.pictures.length]) return this.refuse(response, 404, "There is no such view.");
     const handlers = {
-      "GET scene": () => this.json(response, 200, this.scene),
+      "GET scene": () => this.json(response, 200, this.state.stage === "photographs" ? { title: "", run: "/runs/ball", up: "+y", centre: [0, 0, 0], radius: 1, views: [], home: 0 } : this.scene),
       "GET state": () => this.json(response, 200, this.state),
       "GET events": () => this.events(url.searchParams.get("client") ?? "", response),
-      "GET strokes": () => this.json(response, 200, { revision: this.state.strokes, strokes: this.strokes }),
+      "GET strokes": () => this.json(response, 200, { revision: this.state.strokes, strokes: this.strokes, viewpoints: this.viewpoints }),
+      "GET painted": () => {
+        const bytes = this.painted.get(url.searchParams.get("picture"));
+        return bytes ? response.writeHead(200, { "Content-Type": "image/png" }).end(bytes) : this.refuse(response, 404, "There is no such picture.");
+      },
+      "PUT arrivals": () => this.isWriter(client, response) && this.arrive(response, url.searchParams.get("name"), Number(url.searchParams.get("offset")), body),
       "GET photos": () => this.picture(response, this.sampled(number, Number(url.searchParams.get("side") ?? 0), 0)),
       "GET thumbnails": () => (this.state.ready ? this.picture(response, this.sampled(number, 160, this.amount)) : this.refuse(response, 503, "Views are traced.")),
       "GET reach": () => this.reach(response, number, this.strokes),
@@ -166,12 +187,22 @@ export class StudioMock {
   // Pictures.
 
   pixel(index, x, y, amount, out, at) {
+    const { saturation, exposure } = this.state.finish;
+    amount *= saturation;
+    const light = 2 ** (exposure / 2.2);
     const { width, height, rgb } = this.pictures[index];
     const p = 3 * (Math.min(height - 1, Math.max(0, Math.floor(y))) * width + Math.min(width - 1, Math.max(0, Math.floor(x))));
     const grey = luma(rgb, p);
-    for (let k = 0; k < 3; ++k) out[at + k] = grey + (rgb[p + k] - grey) * amount;
+    for (let k = 0; k < 3; ++k) out[at + k] = Math.max(0, Math.min(255, (grey + (rgb[p + k] - grey) * amount) * light));
   }
+  /** What stands at a viewpoint is what the nearest view shows. */
   sampled(index, side, amount) {
+    const viewpoint = this.viewpoints[index - this.pictures.length];
+    if (viewpoint) {
+      const { width, height } = viewpoint.lens;
+      const scale = side > 0 ? Math.min(1, side / Math.max(width, height)) : 1;
+      return this.seen(viewpoint.position, this.scaled(viewpoint.lens, scale), [amount]);
+    }
     const own = this.pictures[index];
     const scale = side > 0 ? Math.min(1, side / Math.max(own.width, own.height)) : 1;
     const [width, height] = [Math.round(own.width * scale), Math.round(own.height * scale)];
@@ -182,25 +213,33 @@ export class StudioMock {
   picture(response, { width, height, channels, data }, headers = {}) {
     response.writeHead(200, { "Content-Type": "image/png", ...headers }).end(png(width, height, channels, data));
   }
+  scaled({ width, height, fx, fy, cx, cy }, scale) {
+    return { width: Math.round(width * scale), height: Math.round(height * scale), fx: fx * scale, fy: fy * scale, cx: cx * scale, cy: cy * scale };
+  }
   frame(response, { position, lens, sides }) {
     const { width, height } = lens;
     if (!(width > 0 && height > 0 && width <= 4096 && height <= 4096)) return this.refuse(response, 400, "lens: a picture has 1 to 4096 pixels a side.");
+    const amounts = sides.map((side) => (side === "grey" ? 0 : side === "now" ? this.amount : (this.amounts[side] ?? 0)));
+    this.picture(response, this.seen(position, lens, amounts), { "X-Cnerf-Colors": String(this.state.colors), "X-Cnerf-Milliseconds": "20" });
+  }
+  seen(position, lens, amounts) {
+    const { width, height } = lens;
     const distance = ({ position: p }) => Math.hypot(...p.map((v, k) => v - position[k]));
     const index = this.scene.views.reduce((best, view, i, all) => (distance(view) < distance(all[best]) ? i : best), 0);
     const own = this.scene.views[index].lens;
-    const data = Buffer.alloc(3 * width * height * sides.length);
-    sides.forEach((side, row) => {
-      const amount = side === "grey" ? 0 : side === "now" ? this.amount : (this.amounts[side] ?? 0);
+    const data = Buffer.alloc(3 * width * height * amounts.length);
+    amounts.forEach((amount, row) => {
       for (let y = 0; y < height; ++y) {
         for (let x = 0; x < width; ++x) this.pixel(index, own.cx + ((x + 0.5 - lens.cx) / lens.fx) * own.fx, own.cy + ((y + 0.5 - lens.cy) / lens.fy) * own.fy, amount, data, 3 * ((row * height + y) * width + x));
       }
     });
-    this.picture(response, { width, height: height * sides.length, channels: 3, data }, { "X-Cnerf-Colors": String(this.state.colors), "X-Cnerf-Milliseconds": "20" });
+    return { width, height: height * amounts.length, channels: 3, data };
   }
   /** Pixels of like light near a stroke, in every view at the same place. */
   reach(response, index, strokes) {
     if (!this.state.ready) return this.refuse(response, 503, "Views are traced.");
-    const { width, height, rgb } = this.pictures[index];
+    // At a viewpoint: that of the first view, roughly.
+    const { width, height, rgb } = this.pictures[index] ?? this.pictures[0];
     const data = Buffer.alloc(4 * width * height);
     for (const stroke of strokes) {
       if (stroke.hidden || stroke.kind !== "paint") continue;
@@ -227,52 +266,105 @@ export class StudioMock {
   put(response, revision, body) {
     const list = Array.isArray(body) ? body : body.strokes;
     if (revision !== this.state.strokes) return this.refuse(response, 409, "Another tab was faster.");
-    const training = new Set(this.scene.views.filter((v) => !v.held_out).map((v) => v.name));
+    const viewpoints = body.viewpoints ?? [];
+    if (viewpoints.length > 50) return this.refuse(response, 400, "viewpoints: there are more than 50.");
+    for (const [i, v] of viewpoints.entries()) {
+      const isGood = /^viewpoint-\d{1,6}$/.test(v.name) && v.position.length === 3 && v.rotation.length === 3 && Number.isInteger(v.lens.width) && Number.isInteger(v.lens.height) && Math.max(v.lens.width, v.lens.height) <= 1024;
+      if (!isGood) return this.refuse(response, 400, `viewpoints[${i}]: something is wrong with it.`);
+    }
+    const training = new Set([...this.scene.views.filter((v) => !v.held_out), ...viewpoints].map((v) => v.name));
     for (const [i, s] of list.entries()) {
-      const isGood = /^[a-z0-9]{1,32}$/i.test(s.id) && training.has(s.view) && ["paint", "exact", "grey", "erase", "picture"].includes(s.kind) && /^#[0-9a-f]{6}$/i.test(s.color) && s.size >= 0.0005 && s.size <= 0.5 && s.softness >= 0 && s.softness <= 1 && s.reach >= 0.1 && s.reach <= 4 && s.points.length > 0 && s.points.every(([x, y, p]) => x >= -1 && x <= 2 && y >= -1 && y <= 2 && p >= 0 && p <= 1);
+      const isGood = /^[a-z0-9]{1,32}$/i.test(s.id) && training.has(s.view) && ["paint", "exact", "grey", "erase", "picture"].includes(s.kind) && /^#[0-9a-f]{6}$/i.test(s.color) && s.size >= 0.0005 && s.size <= 0.5 && s.softness >= 0 && s.softness <= 1 && s.reach >= 0.1 && s.reach <= 4 && (s.kind === "picture" ? this.painted.has(s.picture) : s.points.length > 0) && s.points.every(([x, y, p]) => x >= -1 && x <= 2 && y >= -1 && y <= 2 && p >= 0 && p <= 1);
       if (!isGood) return this.refuse(response, 400, `strokes[${i}]: something is wrong with it.`);
     }
     this.strokes = list;
+    this.viewpoints = viewpoints;
     this.change({ strokes: revision + 1 });
     this.json(response, 200, { revision: revision + 1 });
   }
-  run(task, end) {
+  arrive(response, name, offset, body) {
+    const refusal = this.refusals.get(name);
+    if (refusal && refusal.times-- > 0) return this.refuse(response, refusal.status, refusal.sentence);
+    const parts = name.split("/");
+    if (parts.length > 6 || name.length > 200 || parts.some((part) => !/^[\p{L}\p{N} _()+-][\p{L}\p{N} ._()+-]*$/u.test(part))) return this.refuse(response, 400, `${name}: that is no name for a file here.`);
+    if (!wantedKinds.test(name)) return this.refuse(response, 400, `${name}: files of that kind are not taken.`);
+    if (body.length > 8 * 2 ** 20) return this.refuse(response, 413, `${name}: a piece has 8 MiB at most.`);
+    const before = offset === 0 ? Buffer.alloc(0) : (this.arrived.get(name) ?? Buffer.alloc(0));
+    if (before.length !== offset) return this.refuse(response, 409, `${name}: ${before.length} bytes are here.`);
+    this.arrived.set(name, Buffer.concat([before, body]));
+    this.change({ arrived: { files: this.arrived.size, bytes: [...this.arrived.values()].reduce((sum, file) => sum + file.length, 0) } });
+    this.json(response, 200, { bytes: offset + body.length });
+  }
+  train() {
+    let step = 0;
+    this.run("train", () => this.change({ stage: "field", ready: true, scene: this.state.scene + 1, message: "The field is trained." }), () => {
+      step += 1;
+      // The cameras are refined now and then.
+      if (step % 3 === 0) {
+        this.scene = { ...this.scene, views: this.scene.views.map((view) => ({ ...view, position: view.position.map((v) => v * 1.002) })) };
+        this.state.scene += 1;
+      }
+      this.state.colors += 1;
+      return { psnr: 30 - 12 / step, loss: 0.02 / step, "rays/s": 412_345, samples: 91_000 };
+    });
+  }
+  /** One step of slow work, or some. */
+  advance(steps = 1) {
+    for (let i = 0; i < steps; ++i) this.step?.();
+  }
+  /** @param figures  called at each step */
+  run(task, end, figures = () => ({})) {
     let step = 0;
     this.end = () => {
       clearInterval(this.timer);
+      this.step = null;
       this.change({ task: "", fraction: 0, figures: {} });
     };
-    this.change({ task, fraction: 0, message: "" });
-    this.timer = setInterval(() => {
+    this.change({ task, fraction: 0, message: "", failed: false });
+    this.step = () => {
       step += 1;
       if (task === "colour") {
         this.amount = Math.min(1, step / 6);
         this.state.colors += 1;
       }
-      this.change({ fraction: step / this.steps, figures: task === "colour" ? { loss: 1 / step } : {} });
+      this.change({ fraction: step / this.steps, figures: task === "colour" ? { loss: 1 / step } : figures() });
       if (step < this.steps) return;
       this.end();
       end();
-    }, 40);
+    };
+    if (!this.slow) this.timer = setInterval(() => this.step?.(), 40);
   }
   order(response, order) {
     const { state } = this;
     const take = state.takes.find((t) => t.name === order.take);
     const colored = (amount, change) => ((this.amount = amount), this.change({ colors: state.colors + 1, ...change }));
     const command = (line) => (state.commands = [...state.commands, line]);
-    if (["colour", "bake", "suggest", "photographs"].includes(order.order) && state.task) return this.refuse(response, 409, "Something runs already.");
+    if (["colour", "bake", "suggest", "photographs", "builtin", "prepare", "train"].includes(order.order) && state.task) return this.refuse(response, 409, "Something runs already.");
     if (["begin", "rename", "duplicate", "delete"].includes(order.order) && !take && order.take !== "") return this.refuse(response, 404, `There is no take ${order.take}.`);
     if (["keep", "rename", "duplicate"].includes(order.order) && state.takes.some((t) => t.name === order.name)) return this.refuse(response, 409, `There is a take ${order.name} already.`);
     const orders = {
       colour: () => this.run("colour", () => (command("cnerf colorize RUN --strokes RUN/strokes.json"), this.change({ unkept: true, message: "The scene is coloured." }))),
+      prepare: () => {
+        if (this.arrived.size === 0) return;
+        this.change({ notes: [] });
+        const lines = [`${this.arrived.size} photographs were read.`, "COLMAP finds what the photographs have in common.", "5 640 points in common were found.", "Cameras are placed.", `${this.arrived.size} of ${this.arrived.size} photographs were placed.`];
+        this.run("prepare", () => {
+          if (this.prepareFails) return this.change({ failed: true, message: this.prepareFails });
+          this.change({ stage: "training", scene: this.state.scene + 1 });
+          this.train();
+        }, () => ((this.state.notes = [...this.state.notes, ...lines.splice(0, 1)].slice(-12)), {}));
+      },
+      clear: () => (this.arrived.clear(), this.change({ arrived: { files: 0, bytes: 0 }, notes: [], failed: false, message: "" })),
+      train: () => this.train(),
+      builtin: () => this.run("colour", () => ((this.amounts.builtin = this.amount), this.change({ takes: [...state.takes, { name: "builtin", colorizer: "built-in", seconds: 2 }], take: "builtin", unkept: false }))),
       stop: () => this.end?.(),
       keep: () => ((this.amounts[order.name] = this.amount), this.change({ takes: [...state.takes, { name: order.name, colorizer: "strokes", seconds: 3 }], take: order.name, unkept: false })),
       begin: () => colored(this.amounts[order.take] ?? 0, { take: order.take, unkept: false }),
       rename: () => ((this.amounts[order.name] = this.amounts[order.take]), this.change({ take: state.take === order.take ? order.name : state.take, takes: state.takes.map((t) => (t === take ? { ...t, name: order.name } : t)) })),
       duplicate: () => ((this.amounts[order.name] = this.amounts[order.take]), this.change({ takes: [...state.takes, { ...take, name: order.name }] })),
       delete: () => this.change({ takes: state.takes.filter((t) => t !== take), take: state.take === order.take ? "" : state.take }),
-      suggest: () => this.run("suggest", () => this.change({ cards: [0, 1].map((number) => ({ number, address: `./studio/photos/${number}` })) })),
-      finish: () => colored(this.amount, { finish: { saturation: order.saturation, hue: order.hue, exposure: order.exposure } }),
+      suggest: () => this.run("suggest", () => this.change({ cards: [0, 1].map((number) => ({ number, address: `./studio/photos/${number}?side=96` })) })),
+      finish: () => colored(this.amount, { unkept: state.unkept, finish: { saturation: order.saturation, hue: order.hue, exposure: order.exposure } }),
       bake: () => this.run("bake", () => (command(`cnerf bake RUN --format ${order.formats.join(",")}`), this.change({ downloads: order.formats.map((f) => ({ name: `ball.${f}`, address: `./studio/files/ball.${f}`, bytes: 3e6 })), blender: "blender --python blender_setup.py" }))),
       photographs: () => this.run("photographs", () => this.change({ message: "Written." })),
     };
@@ -282,6 +374,15 @@ export class StudioMock {
   }
   taken(response, query, body) {
     if (body.length === 0) return this.refuse(response, 400, "The picture is empty.");
+    if (query.get("kind") === "stroke") {
+      const index = Number(query.get("view"));
+      const view = [...this.scene.views, ...this.viewpoints][index];
+      if (!view) return this.refuse(response, 404, "There is no such view.");
+      const picture = randomBytes(6).toString("hex");
+      this.painted.set(picture, body);
+      this.strokes = [...this.strokes, { id: picture, view: view.name, kind: "picture", picture, color: "#808080", size: 0.01, softness: 0, reach: 1, hidden: false, points: [] }];
+      this.change({ strokes: this.state.strokes + 1 });
+    }
     if (query.get("kind") === "reference") this.run("colour", () => this.change({ take: "", unkept: true, message: `Begun from ${query.get("name")}.` }));
     this.json(response, 202, { state: this.state });
   }

@@ -2,7 +2,8 @@ import { describe, expect, it } from "vitest";
 import { lookAt, orbited, type View } from "../../src/camera";
 import { aabbText, fromHash, toHash } from "../../src/hash";
 import { keysFromJson, pathJson, viewAt } from "../../src/keyframes";
-import { curvePath, durationText, figureText } from "../../src/live";
+import { durationText, figureText } from "../../src/live";
+import { curvePath, withPoint, type CurvePoint } from "../../src/ui/curve";
 import { defaultSettings, type Settings } from "../../src/settings";
 
 const view: View = {
@@ -64,6 +65,10 @@ describe("live page", () => {
     expect(curvePath([[1, 10], [2, 20], [3, 30]], 100, 50, false)).toBe("M0.0 50.0L50.0 25.0L100.0 0.0");
     expect(curvePath([[1, 1], [2, 10], [3, 100]], 100, 50, true)).toBe("M0.0 50.0L50.0 25.0L100.0 0.0");
     expect(curvePath([[1, 1]], 100, 50, false)).toBe("");
+    let points: CurvePoint[] = [];
+    for (let i = 0; i < 5000; ++i) points = withPoint(points, [i, i], 100);
+    expect(points.length).toBeLessThanOrEqual(100);
+    expect([points[0], points.at(-1)]).toEqual([[0, 0], [4999, 4999]]);
   });
   it("says durations and figures as the program does", () => {
     expect([durationText(12), durationText(200), durationText(3720)]).toEqual(["12 s", "3 min 20 s", "1 h 02 min"]);

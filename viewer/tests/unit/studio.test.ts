@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { Lost, Refusal } from "../../src/studio/api";
 import { Brush } from "../../src/studio/brush";
 import { merged, StrokeDocument, type StrokeList } from "../../src/studio/document";
-import type { Stroke } from "../../src/studio/protocol";
+import type { Stroke, Viewpoint } from "../../src/studio/protocol";
 import { Latest } from "../../src/studio/reach";
 import { FrameScheduler, type FrameWish } from "../../src/studio/scheduler";
 
@@ -17,17 +17,19 @@ function shelf() {
 class Store {
   revision = 0;
   list: Stroke[] = [];
+  viewpoints: Viewpoint[] = [];
   puts = 0;
   fail: Error | null = null;
   async strokes() {
     if (this.fail instanceof Lost) throw this.fail;
-    return { revision: this.revision, strokes: structuredClone(this.list) };
+    return { revision: this.revision, strokes: structuredClone(this.list), viewpoints: structuredClone(this.viewpoints) };
   }
-  async putStrokes(strokes: StrokeList, revision: number) {
+  async putStrokes(strokes: StrokeList, revision: number, viewpoints: readonly Viewpoint[]) {
     this.puts += 1;
     if (this.fail) throw this.fail;
     if (revision !== this.revision) throw new Refusal(409, "Another tab was faster.");
     this.list = structuredClone([...strokes]);
+    this.viewpoints = structuredClone([...viewpoints]);
     return ++this.revision;
   }
 }
@@ -158,6 +160,87 @@ describe("strokes", () => {
   });
 });
 
+const viewpoint = (name: string, x = 0): Viewpoint => ({ name, position: [x, 0, 1], rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], lens: { width: 8, height: 6, fx: 9, fy: 9, cx: 4, cy: 3 } });
+const names = (list: readonly Viewpoint[]) => list.map((v) => v.name).join(" ");
+
+describe("viewpoints", () => {
+  it("are saved while they are open, and go again where nothing was painted", async () => {
+    const { document, store } = await opened();
+    expect(document.freeViewpoint()).toBe("viewpoint-1");
+    await document.hold(viewpoint("viewpoint-1"));
+    expect(names(store.viewpoints)).toBe("viewpoint-1");
+    expect(names(document.savedViewpoints)).toBe("viewpoint-1");
+    expect(document.isSaved).toBe(true);
+    await document.hold(null);
+    expect(store.viewpoints).toEqual([]);
+    expect(document.freeViewpoint(), "a name is not given twice").toBe("viewpoint-2");
+    await document.hold(viewpoint("viewpoint-2"));
+    document.add(stroke("a", { view: "viewpoint-2" }));
+    await document.save();
+    const { puts } = store;
+    await document.hold(null);
+    expect(names(store.viewpoints)).toBe("viewpoint-2");
+    expect(store.puts, "nothing was to be saved").toBe(puts);
+  });
+  it("go with their last stroke and come back with undo", async () => {
+    const { document, store } = await opened();
+    await document.hold(viewpoint("viewpoint-1"));
+    document.add(stroke("a", { view: "viewpoint-1" }));
+    await document.hold(viewpoint("viewpoint-2", 5));
+    document.add(stroke("b", { view: "viewpoint-2" }));
+    await document.hold(null);
+    document.remove("a");
+    await document.save();
+    expect(names(store.viewpoints)).toBe("viewpoint-2");
+    document.undo();
+    await document.save();
+    expect(names(store.viewpoints)).toBe("viewpoint-1 viewpoint-2");
+    expect(store.viewpoints[1].position).toEqual([5, 0, 1]);
+  });
+  it("of another tab are followed, and not sent back", async () => {
+    const { document, store } = await opened();
+    store.viewpoints = [viewpoint("viewpoint-4", 2)];
+    store.revision = 5;
+    await document.follow(5);
+    expect(names(document.savedViewpoints)).toBe("viewpoint-4");
+    expect(document.isSaved, "an empty one is the other tab's that paints there").toBe(true);
+    expect(store.puts).toBe(0);
+    expect(document.freeViewpoint()).toBe("viewpoint-5");
+  });
+  it("outlive a server that is away together with their strokes", async () => {
+    const { document, store, kept } = await opened();
+    await document.hold(viewpoint("viewpoint-1", 7));
+    store.fail = new Lost("away");
+    document.add(stroke("a", { view: "viewpoint-1" }));
+    await document.save();
+    await document.hold(null);
+    store.fail = null;
+    store.viewpoints = [];
+    store.revision += 1;
+    const later = await opened(store, kept);
+    expect(later.document.isSaved).toBe(true);
+    expect(names(store.viewpoints)).toBe("viewpoint-1");
+    expect(store.viewpoints[0].position).toEqual([7, 0, 1]);
+  });
+  it("survive that another tab was faster", async () => {
+    const { document, store, told } = await opened();
+    store.list = [stroke("x")];
+    store.revision = 3;
+    await document.hold(viewpoint("viewpoint-1"));
+    expect(names(store.viewpoints)).toBe("viewpoint-1");
+    expect(ids(store.list)).toBe("x");
+    expect(told).toEqual([]);
+  });
+  it("that are refused leave nothing unsaved behind", async () => {
+    const { document, store, told } = await opened();
+    store.fail = new Refusal(423, "Another tab paints here.");
+    await document.hold(viewpoint("viewpoint-1"));
+    expect(document.savedViewpoints).toEqual([]);
+    expect(document.isSaved).toBe(true);
+    expect((told[0] as Refusal).status).toBe(423);
+  });
+});
+
 describe("brush", () => {
   it("makes strokes of its tool's kind, and remembers colours", () => {
     const kept = shelf();
@@ -181,9 +264,11 @@ class Bench {
   timers: { at: number; call: () => void }[] = [];
   sent: { wish: FrameWish<string>; answer: (frame: string | null) => void; fail: (e: Error) => void }[] = [];
   shown: string[] = [];
+  drawing = 0;
   problems: unknown[] = [];
   scheduler = new FrameScheduler<string, string>({
     fetch: (wish) => new Promise((answer, fail) => this.sent.push({ wish, answer, fail })),
+    cost: () => this.drawing,
     show: (frame, wish) => this.shown.push(`${frame} ${wish.share.toFixed(2)}`),
     failed: (problem) => this.problems.push(problem),
     now: () => this.time,
@@ -280,6 +365,32 @@ describe("frames", () => {
     expect(bench.shares()).toEqual([0.5]);
     await bench.answer(500);
     expect(bench.shares(), "the second change came while the first was drawn").toEqual([0.5]);
+  });
+  it("stay small while the server draws in passing, by what it drew and not by how long it waited", async () => {
+    const bench = new Bench();
+    bench.scheduler.inPassing = true;
+    bench.drawing = 100;
+    bench.scheduler.look("a");
+    expect(bench.sent[0].wish.moving).toBe(true);
+    await bench.answer(20000);
+    expect(bench.scheduler.coarse, "a long wait says nothing").toBeCloseTo(1 / 6, 6);
+    await bench.pass(200);
+    expect(bench.shares()).toEqual([0.33]);
+    expect(bench.sent[0].wish.moving).toBe(false);
+    bench.drawing = 400;
+    await bench.answer(20000);
+    expect(bench.sent).toHaveLength(0);
+    expect(bench.scheduler.settled, "that is as fine as it gets").toBe(true);
+    bench.scheduler.inPassing = false;
+    expect(bench.scheduler.settled).toBe(false);
+    expect(bench.shares()).toEqual([0.5]);
+    await bench.answer(500);
+    await bench.answer(2000);
+    expect(bench.scheduler.settled).toBe(true);
+    bench.scheduler.coarse = 1;
+    bench.scheduler.inPassing = true;
+    bench.scheduler.look("b");
+    expect(bench.shares(), "while moving too").toEqual([0.5]);
   });
   it("stop for a while where the server is away", async () => {
     const bench = new Bench();

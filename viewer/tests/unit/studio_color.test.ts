@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { coloredPixel, hexAt, hexOf, inGamut, labFromRgb, labOfHex, lightnessOfCode, linearFromSrgb, mappedIntoGamut, rgbFromLab, rgbOfHex, type Rgb } from "../../src/studio/color";
-import { coverSegment, PaintLayer, strokeAt, tintOf } from "../../src/studio/paint";
+import { coverSegment, PaintLayer, planesOf, strokeAt, tintOf } from "../../src/studio/paint";
 import type { Stroke, StrokePoint } from "../../src/studio/protocol";
 
 /** The textbook's way: the matrix of IEC 61966-2-1, its white, CIE 15. */
@@ -186,5 +186,35 @@ describe("paint", () => {
     expect(strokeAt(list, 0.4, 0.4, width, height)?.id).toBe("b");
     expect(strokeAt(list, 0.9, 0.5, width, height)?.id).toBe("a");
     expect(strokeAt(list, 0.5, 0.95, width, height)).toBeNull();
+  });
+});
+
+describe("painted pictures", () => {
+  const grey = new Uint8ClampedArray(4 * 4 * 2).fill(128);
+  const picture = new Uint8ClampedArray(4 * 4 * 2);
+  // The left half is red, with one pixel of half the strength.
+  for (const p of [0, 1, 4, 5]) picture.set([200, 40, 30, p === 5 ? 128 : 255], 4 * p);
+  const stroke: Stroke = { id: "p", view: "v", kind: "picture", picture: "abc", color: "#808080", size: 0.01, softness: 0, reach: 1, hidden: false, points: [] };
+  const pictures = new Map([["abc", planesOf(picture)]]);
+
+  it("colour where they are painted, at the photograph's light", () => {
+    const layer = new PaintLayer(4, 2, grey);
+    layer.redraw([stroke], pictures);
+    const [full, half] = [layer.colorAt(0, 0)!, layer.colorAt(1, 1)!];
+    expect(full[0]).toBeGreaterThan(full[2] + 40);
+    expect(half[0] - half[2]).toBeGreaterThan(20);
+    expect(half[0] - half[2]).toBeLessThan(full[0] - full[2]);
+    expect(layer.colorAt(2, 0)).toBeNull();
+    expect(labFromRgb(full).lightness).toBeCloseTo(labFromRgb([128, 128, 128]).lightness, 0);
+  });
+  it("are hidden with their stroke, lie below later strokes, and are left out while they are not there", () => {
+    const layer = new PaintLayer(4, 2, grey);
+    layer.redraw([{ ...stroke, hidden: true }], pictures);
+    expect(layer.colorAt(0, 0)).toBeNull();
+    layer.redraw([stroke], new Map());
+    expect(layer.colorAt(0, 0)).toBeNull();
+    layer.redraw([stroke, { ...stroke, id: "e", kind: "erase", picture: undefined, size: 0.5, points: [[0.125, 0.25, 1]] }], pictures);
+    expect(layer.colorAt(0, 0)).toBeNull();
+    expect(layer.colorAt(1, 1)).not.toBeNull();
   });
 });
