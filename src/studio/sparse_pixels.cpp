@@ -14,13 +14,13 @@ namespace {
 constexpr std::size_t kGrain = 1024;  // pixels of a parallel piece of work
 constexpr int kColorStep = 2;         // between pixels that have colours
 
-// Measured on nine views of three captures, 1280 x 720: with these 16 to 34 % of the rays are traced, and pictures
-// are at least 45.7 dB from the whole ones, which are 50 from those of `cnerf render`.
-constexpr float kSameLightness = 8;   // most that L* of the pixels around may differ
-constexpr float kSameColor = 8;       // likewise a and b
-constexpr float kDoubt = 1.4f;        // most that foretelling by other rules may change L* ...
-constexpr float kCoarseDoubt = 1;     // ... and of pixels that others are foretold from
-constexpr float kLikeLightness = 6;   // a colour spreads to pixels whose L* differs by about this
+// Measured on nine views of three captures, 1280 x 720: with these 16 to 34 % of the rays are traced, and pictures are
+// at least 45.7 dB from those of `cnerf render`; whole ones are 50 from them.
+constexpr float kSameLightness = 8;  // most that L* of the pixels around may differ
+constexpr float kSameColor = 8;      // likewise a and b
+constexpr float kDoubt = 1.4f;       // most that foretelling by other rules may change L* ...
+constexpr float kCoarseDoubt = 1;    // ... and of pixels that others are foretold from
+constexpr float kLikeLightness = 6;  // a colour spreads to pixels whose L* differs by about this
 
 /// How much a pixel's colour counts where L* differs by this. It never comes to nothing: where no pixel around is
 /// alike, those that are least unlike decide.
@@ -107,9 +107,9 @@ bool SparsePixels::foretell_pixel(const Pass& pass, int column, int row) {
   };
   if (pass.reach == 0 || !has(1)) return false;
   const std::ptrdiff_t along_row = pass.reach, along_column = std::ptrdiff_t(pass.reach) * width_;
-  const std::array<std::ptrdiff_t, 2> axes =
-      pass.is_diagonal ? std::array{along_column + along_row, along_column - along_row}
-                       : std::array{along_row, along_column};
+  const std::array<std::ptrdiff_t, 2> axes = pass.is_diagonal
+                                                 ? std::array{along_column + along_row, along_column - along_row}
+                                                 : std::array{along_row, along_column};
   const std::size_t pixel = std::size_t(row) * std::size_t(width_) + std::size_t(column);
   const float* light = &lightness_[pixel];
   const std::ptrdiff_t far_steps = has(3) ? 3 : 1;
