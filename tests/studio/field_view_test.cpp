@@ -44,7 +44,8 @@ class FieldView : public test::Stage2Fixture {
     colors_ = ColorModel::load(take("two"), cpu_engines());
   }
   [[nodiscard]] FieldCamera camera(int view, int enlarged = 2) const {
-    FieldCamera camera{capture_.views[std::size_t(view)].intrinsics, capture_.views[std::size_t(view)].world_from_camera};
+    FieldCamera camera{capture_.views[std::size_t(view)].intrinsics,
+                       capture_.views[std::size_t(view)].world_from_camera};
     Intrinsics& lens = camera.lens;
     for (double* number : {&lens.fx, &lens.fy, &lens.cx, &lens.cy}) *number *= enlarged;
     lens.width *= enlarged;
@@ -56,7 +57,8 @@ class FieldView : public test::Stage2Fixture {
     DrawingEffort effort = sharp_effort(64);
     effort.least_sparse_pixels = least_sparse_pixels;
     const std::vector<Side> sides = {&colors_, nullptr, &colors_};
-    return draw_field(luminance_, camera, sides, effort, [] { return true; }, &costs);
+    return draw_field(
+        luminance_, camera, sides, effort, [] { return true; }, &costs);
   }
 
   LuminanceModel luminance_;

@@ -76,7 +76,9 @@ TEST(SparsePixels, AConstantSceneIsExactAndCheap) {
 }
 
 TEST(SparsePixels, ALatticeOfOneIsEveryPixel) {
-  const Scene scene = [](int x, int y) { return Lab<float>{float((x * 7 + y * 13) % 100), float(x % 9), float(y % 5)}; };
+  const Scene scene = [](int x, int y) {
+    return Lab<float>{float((x * 7 + y * 13) % 100), float(x % 9), float(y % 5)};
+  };
   const Drawn result = drawn(scene, 1);
   EXPECT_EQ(result.traced, std::size_t(kWidth * kHeight));
   EXPECT_EQ(result.colored, result.traced);
