@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kGrain = 1024;  // pixels of a parallel piece of work
 constexpr int kColorStep = 2;         // between pixels that have colours
 
-// Measured on nine views of three captures, 1280 x 720: with these 16 to 34 % of the rays are traced, and pictures are
+// Measured on nine views of three captures, 1280 x 720: with these 15 to 34 % of the rays are traced, and pictures are
 // at least 45.7 dB from those of `cnerf render`; whole ones are 50 from them.
 constexpr float kSameLightness = 8;  // most that L* of the pixels around may differ
 constexpr float kSameColor = 8;      // likewise a and b
