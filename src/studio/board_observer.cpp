@@ -12,11 +12,7 @@ constexpr double kBetweenReports = 0.1;  // seconds: steps may be thousands a se
 
 BoardObserver::BoardObserver(Board& board, Observer& inner, std::string task, std::function<void()> between,
                              std::function<bool()> stops)
-    : board_(board),
-      inner_(inner),
-      task_(std::move(task)),
-      between_(std::move(between)),
-      stops_(std::move(stops)) {}
+    : board_(board), inner_(inner), task_(std::move(task)), between_(std::move(between)), stops_(std::move(stops)) {}
 
 void BoardObserver::report_progress(const Progress& progress) {
   const bool is_new = !has_told_ || progress.task != step_;

@@ -1,71 +1,120 @@
 #include "src/studio/field_view.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "src/base/parallel.h"
+#include "src/studio/sparse_pixels.h"
 
 namespace cnerf::studio {
 namespace {
 
-constexpr std::size_t kGrain = 256;       // rays of a parallel piece of work
+constexpr std::size_t kGrain = 256;       // rays or pixels of a parallel piece of work
 constexpr std::size_t kLeastRays = 8192;  // between two questions whether to go on
+constexpr int kSparseLattice = 4;         // coarser ones save no rays, and lose what is thin
 
-PixelSamples seen_by(std::span<const Ray> rays, const LuminanceEngine& engine, const MarchSettings& march,
-                     const RenderEffort& effort) {
-  std::vector<WeightedSample> samples;
-  std::vector<std::size_t> offsets;
-  engine.trace(rays, march, effort, samples, offsets);
-  return pixel_samples(rays, samples, offsets);
+Lab<float> finished(const Lab<float>& color, const Finish& finish) {
+  if (finish.is_plain()) return color;
+  const Ab ab = finish.of(Ab{color.a, color.b});
+  return {lightness_from_luminance(finish.gain() * luminance_from_lightness(color.lightness)), ab.a, ab.b};
 }
 
-std::vector<float> light_of(std::span<const Ray> rays, const LuminanceEngine& engine, const MarchSettings& march,
-                            const RenderEffort& effort) {
-  std::vector<RayResult> results(rays.size());
-  engine.render(rays, march, effort, results);
-  std::vector<float> light;
-  for (const RayResult& result : results) light.push_back(result.luminance);
-  return light;
-}
-
-/// Colours at their luminance, from the pixel `first` on.
-void put(std::span<const float> luminance, const std::vector<Ab>& colors, const Finish& finish, std::size_t first,
-         Picture& picture) {
-  parallel_ranges(colors.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Vec3f rgb = linear_rgb_at(finish.gain() * luminance[i], finish.of(colors[i]));
-      for (int c = 0; c < 3; ++c) picture.rgb[3 * (first + i) + std::size_t(c)] = srgb8_from_linear(rgb[c]);
-    }
-  });
+void put(const Lab<float>& color, const Finish& finish, std::size_t pixel, Picture& picture) {
+  const Vec3f rgb = gamut_mapped_linear_rgb_from_lab(finished(color, finish));
+  for (int c = 0; c < 3; ++c) picture.rgb[3 * pixel + std::size_t(c)] = srgb8_from_linear(rgb[c]);
 }
 
 Picture blank(int width, int height) {
   return {width, height, std::vector<std::uint8_t>(3 * std::size_t(width) * std::size_t(height))};
 }
 
+/// One drawing: which pixels are traced, and what is seen there.
+class Drawing {
+ public:
+  Drawing(const LuminanceModel& luminance, const FieldCamera& camera, std::span<const Side> colored,
+          const DrawingEffort& effort)
+      : engine_(*luminance.engine),
+        unit_(camera.lens, camera.world_from_camera, luminance.frame),
+        march_(luminance.march(effort.steps_per_box)),
+        effort_(effort.rays),
+        colored_(colored),
+        pixels_(camera.lens.width, camera.lens.height, lattice_of(camera.lens, effort), colored.size()) {}
+
+  /// @return  false where it was told to stop
+  bool trace(const std::function<bool()>& keep_going, DrawingCosts& costs) {
+    for (std::size_t pass = 0; pass < pixels_.passes(); ++pass) {
+      const std::vector<std::size_t> wanted = pixels_.foretell(pass);
+      const bool needs_colors = pixels_.needs_colors(pass);
+      costs.rays += wanted.size();
+      costs.colored_rays += needs_colors ? wanted.size() : 0;
+      // Without colour a GPU hands back a number per ray, and likes many; with it, samples.
+      const std::size_t at_a_time = needs_colors ? kLeastRays : std::max(kLeastRays, engine_.points_at_a_time() / 8);
+      for (std::size_t first = 0; first < wanted.size(); first += at_a_time) {
+        if (!keep_going()) return false;
+        const auto part = std::span(wanted).subspan(first, std::min(at_a_time, wanted.size() - first));
+        needs_colors ? trace_colors(part) : trace_light(part);
+      }
+    }
+    pixels_.spread_colors();
+    return true;
+  }
+  [[nodiscard]] const SparsePixels& pixels() const { return pixels_; }
+
+ private:
+  static int lattice_of(const Intrinsics& lens, const DrawingEffort& effort) {
+    const std::size_t count = std::size_t(lens.width) * std::size_t(lens.height);
+    return effort.least_sparse_pixels > 0 && count >= effort.least_sparse_pixels ? kSparseLattice : 1;
+  }
+  [[nodiscard]] std::vector<Ray> rays_of(std::span<const std::size_t> wanted) const {
+    std::vector<Ray> rays(wanted.size());
+    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) rays[r] = unit_.ray_of_pixel(wanted[r]);
+    });
+    return rays;
+  }
+  void trace_light(std::span<const std::size_t> wanted) {
+    std::vector<RayResult> results(wanted.size());
+    engine_.render(rays_of(wanted), march_, effort_, results);
+    std::vector<float> light;
+    for (const RayResult& result : results) light.push_back(result.luminance);
+    pixels_.set_light(wanted, light);
+  }
+  void trace_colors(std::span<const std::size_t> wanted) {
+    const std::vector<Ray> rays = rays_of(wanted);
+    std::vector<WeightedSample> samples;
+    std::vector<std::size_t> offsets;
+    engine_.trace(rays, march_, effort_, samples, offsets);
+    const PixelSamples seen = pixel_samples(rays, samples, offsets);
+    pixels_.set_light(wanted, pixel_luminance(seen));
+    for (std::size_t s = 0; s < colored_.size(); ++s) pixels_.set_colors(s, wanted, colored_[s]->decode(seen));
+  }
+
+  const LuminanceEngine& engine_;
+  UnitCamera unit_;
+  MarchSettings march_;
+  RenderEffort effort_;
+  std::span<const Side> colored_;
+  SparsePixels pixels_;
+};
+
 }  // namespace
 
 std::vector<Picture> draw_field(const LuminanceModel& luminance, const FieldCamera& camera, std::span<const Side> sides,
-                                const DrawingEffort& effort, const std::function<bool()>& keep_going) {
-  const UnitCamera unit(camera.lens, camera.world_from_camera, luminance.frame);
-  const std::size_t count = std::size_t(camera.lens.width) * std::size_t(camera.lens.height);
-  std::vector<Picture> pictures(sides.size(), blank(camera.lens.width, camera.lens.height));
-  const bool is_grey = std::ranges::all_of(sides, [](Side side) { return side == nullptr; });
-  const MarchSettings march = luminance.march(effort.steps_per_box);
-  // Without colour a GPU hands back a number per ray, and likes many; with it, samples.
-  const std::size_t at_a_time = is_grey ? std::max(kLeastRays, luminance.engine->points_at_a_time() / 8) : kLeastRays;
-  for (std::size_t first = 0; first < count; first += at_a_time) {
-    if (!keep_going()) return {};
-    std::vector<Ray> rays(std::min(at_a_time, count - first));
-    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) rays[r] = unit.ray_of_pixel(first + r);
+                                const DrawingEffort& effort, const std::function<bool()>& keep_going,
+                                DrawingCosts* costs) {
+  std::vector<Side> colored;
+  std::ranges::copy_if(sides, std::back_inserter(colored), [](Side side) { return side != nullptr; });
+  Drawing drawing(luminance, camera, colored, effort);
+  DrawingCosts unwanted;
+  if (!drawing.trace(keep_going, costs != nullptr ? *costs : unwanted)) return {};
+  std::vector<Picture> pictures;
+  std::size_t next_colored = 0;
+  for (const Side side : sides) {
+    Picture& picture = pictures.emplace_back(blank(camera.lens.width, camera.lens.height));
+    const std::size_t color = side != nullptr ? next_colored++ : SparsePixels::kGrey;
+    parallel_ranges(picture.rgb.size() / 3, kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t p = begin; p < end; ++p) put(drawing.pixels().lab(color, p), effort.finish, p, picture);
     });
-    const PixelSamples pixels = is_grey ? PixelSamples{} : seen_by(rays, *luminance.engine, march, effort.rays);
-    const std::vector<float> light =
-        is_grey ? light_of(rays, *luminance.engine, march, effort.rays) : pixel_luminance(pixels);
-    for (std::size_t s = 0; s < sides.size(); ++s) {
-      put(light, sides[s] != nullptr ? sides[s]->decode(pixels) : std::vector<Ab>(rays.size()), effort.finish, first,
-          pictures[s]);
-    }
   }
   return pictures;
 }
@@ -81,10 +130,14 @@ Picture draw_cached(const CachedView& view, Side side, int width, const Finish& 
       places.push_back({0, std::uint32_t(row * view.width + column)});
     }
   }
-  std::vector<float> light;
-  for (const ViewPixel& place : places) light.push_back(view.luminance[place.pixel]);
-  put(light, side != nullptr ? side->decode(pixel_samples(std::span(&view, 1), places)) : std::vector<Ab>(light.size()),
-      finish, 0, picture);
+  const std::vector<Ab> colors =
+      side != nullptr ? side->decode(pixel_samples(std::span(&view, 1), places)) : std::vector<Ab>(places.size());
+  parallel_ranges(places.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      const float lightness = lightness_from_luminance(view.luminance[places[p].pixel]);
+      put({lightness, colors[p].a, colors[p].b}, finish, p, picture);
+    }
+  });
   return picture;
 }
 

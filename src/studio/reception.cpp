@@ -170,7 +170,8 @@ fs::path Reception::arrived_source() const {
     for (const auto& entry : fs::directory_iterator(folder)) entries.push_back(entry.path());
     if (entries.size() != 1) return folder;
     // A folder that was dropped comes as itself; a clip alone is no folder of photographs.
-    if (!fs::is_directory(entries.front())) return is_one_of(kind_of(entries.front()), kClipKinds) ? entries.front() : folder;
+    if (!fs::is_directory(entries.front()))
+      return is_one_of(kind_of(entries.front()), kClipKinds) ? entries.front() : folder;
     folder = entries.front();
   }
 }
@@ -270,8 +271,8 @@ PageAnswer Reception::post_order(const PageRequest& request) {
     });
     work_.notify_all();
   } else {
-    throw InputError("order", "order", "there is no scene yet to do this with: " +
-                                           excerpt(nlohmann::ordered_json(order.order)));
+    throw InputError("order", "order",
+                     "there is no scene yet to do this with: " + excerpt(nlohmann::ordered_json(order.order)));
   }
   return {.status = 202, .body = board_.text()};
 }

@@ -1,5 +1,6 @@
 #pragma once
-/// Where a studio begins without a scene: photographs, a clip or a whole capture arrive from the page, and are prepared.
+/// Where a studio begins without a scene: photographs, a clip or a whole capture arrive from the page, and are
+/// prepared.
 
 #include <condition_variable>
 #include <filesystem>

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "src/base/error.h"
@@ -20,6 +21,8 @@ constexpr std::size_t kMostTakesInMemory = 3;
 constexpr int kJpegQuality = 88;
 // A page that moves may slow a training to half on a processor, by a tenth on a GPU; one that rests by 2 %.
 constexpr double kTrainingPerTurn = 1, kTrainingPerTurnOfGpu = 9;
+constexpr double kFrameOfTraining = 0.25;  // seconds, at most: what is half learned is fog, and dear
+constexpr double kFirstRays = 600, kMostGrowth = 4;
 constexpr double kTrainingPerRefresh = 50, kLeastBetweenRefreshes = 1, kMostBetweenRefreshes = 60;  // seconds
 
 }  // namespace
@@ -110,6 +113,7 @@ void Studio::train(const Order& order) {
   if (coloring_) throw UsageError("the scene is trained");
   halted_.reset();
   field_ = nullptr;
+  affordable_rays_ = kFirstRays;
   BoardObserver observer(
       board_, observer_, "train", [] {}, [this] { return should_stop(); });
   const auto watch = [this](const LuminanceModel& model) { watch_training(model); };
@@ -182,12 +186,28 @@ const ColorModel* Studio::side_named(const std::string& name) {
   return (shown_takes_[name] = std::move(model)).get();
 }
 
+/// The same picture with no more pixels than a training can wait for. The page scales it.
+FieldCamera Studio::affordable(FieldCamera camera) const {
+  const double share = std::sqrt(affordable_rays_ / (double(camera.lens.width) * camera.lens.height));
+  if (share >= 1) return camera;
+  const auto side = [&](int full) { return std::max(1, int(full * share)); };
+  camera.lens = resized(camera.lens, side(camera.lens.width), side(camera.lens.height));
+  return camera;
+}
+
 std::string Studio::drawn(const FrameMessage& message, const std::function<bool()>& keep_going) {
   std::vector<Side> sides;
   for (const std::string& name : message.sides) sides.push_back(side_named(name));
-  const std::vector<Picture> pictures = draw_field(
-      *field_, camera_of(message), sides, sharp_effort(context_.config.render.steps_per_box, finish()), keep_going);
+  const bool is_training = !coloring_ && !halted_;
+  const FieldCamera camera = is_training ? affordable(camera_of(message)) : camera_of(message);
+  const Stopwatch watch;
+  const std::vector<Picture> pictures =
+      draw_field(*field_, camera, sides, sharp_effort(context_.config.render.steps_per_box, finish()), keep_going);
   if (pictures.empty()) return {};
+  if (is_training) {
+    const double rays = double(camera.lens.width) * camera.lens.height;
+    affordable_rays_ = std::min(rays * kFrameOfTraining / watch.seconds(), kMostGrowth * rays);
+  }
   Picture all = pictures.front();
   for (std::size_t s = 1; s < pictures.size(); ++s) {
     all.rgb.insert(all.rgb.end(), pictures[s].rgb.begin(), pictures[s].rgb.end());

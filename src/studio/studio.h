@@ -122,6 +122,7 @@ class Studio final : public web::PageApi {
   void breathe(const std::string& task, double fraction);
   void draw_frames();
   [[nodiscard]] BoardObserver observer_of(const std::string& task);
+  [[nodiscard]] FieldCamera affordable(FieldCamera camera) const;
   std::string drawn(const FrameMessage& message, const std::function<bool()>& keep_going);
   [[nodiscard]] const ColorModel* side_named(const std::string& name);
   void offer_downloads(const std::vector<std::filesystem::path>& files);
@@ -150,6 +151,7 @@ class Studio final : public web::PageApi {
   const ColorModel* learning_ = nullptr;                            // of a take that a colorizer makes
   std::map<std::string, std::unique_ptr<ColorModel>> shown_takes_;  // that sides name
   Stopwatch since_drawn_, since_refresh_;
+  double affordable_rays_ = 0;  // of a frame while it trains
   double drawing_seconds_ = 0;  // that the last frame of a training took
 
   Board board_;

@@ -36,9 +36,10 @@ std::string numbers_text(const std::vector<int>& numbers) {
 
 /// As settings of a command.
 std::string finish_text(const Finish& finish) {
-  return finish.is_plain() ? ""
-                           : fmt::format(" --set finish.saturation={:g} --set finish.hue={:g} --set finish.exposure={:g}",
-                                         finish.saturation, finish.hue, finish.exposure);
+  return finish.is_plain()
+             ? ""
+             : fmt::format(" --set finish.saturation={:g} --set finish.hue={:g} --set finish.exposure={:g}",
+                           finish.saturation, finish.hue, finish.exposure);
 }
 
 }  // namespace

@@ -1,13 +1,15 @@
 // What waiting in the studio is like, on a run: first frames, the reach of a stroke, and colouring by strokes.
-//   cnerf-studio-bench RUN [TAKE] [colour=1] [steps=N] [known=N] [kept=N] [rate=R] [final=R]
+//   cnerf-studio-bench RUN [TAKE] [frames=1] [colour=1] [steps=N] [known=N] [kept=N] [rate=R] [final=R]
+//     frames=1  only frames
 //     colour=1  only what colouring does
-//   prints a row per figure; pictures differ from `cnerf render`'s by the dB of the sharp row.
+//   prints a row per figure; pictures differ from `cnerf render`'s by the dB of the sharp rows.
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numeric>
 
 #include "src/base/error.h"
@@ -48,6 +50,69 @@ studio::FieldCamera camera_of(const View& view, double share) {
   return {{LensModel::kPinhole, width, height, f, f, width / 2.0, height / 2.0, {}}, view.world_from_camera};
 }
 
+/// How far pictures are from those of `cnerf render`, dB.
+struct Sharpness {
+  double grey = std::numeric_limits<double>::infinity(), color = grey;
+  [[nodiscard]] Sharpness worse(const Sharpness& other) const {
+    return {std::min(grey, other.grey), std::min(color, other.color)};
+  }
+};
+
+/// Frames of a field, grey ones and of both sides.
+struct Frames {
+  const LuminanceModel& luminance;
+  const Scene& scene;
+  const ColorModel* model = nullptr;  ///< null: grey alone
+  studio::DrawingEffort effort;
+
+  /// @param view  of the camera, where the frame is to be compared with what `cnerf render` draws
+  Sharpness measure(const studio::FieldCamera& camera, const std::string* view = nullptr) const {
+    const std::string size = fmt::format(" {} x {}", camera.lens.width, camera.lens.height);
+    const std::string of = view != nullptr ? size + " as " + *view : size;
+    std::vector<studio::Side> sides = {nullptr};
+    std::vector<Picture> pictures = draw(camera, sides, "frame, grey" + of);
+    if (model != nullptr) {
+      sides.push_back(model);
+      pictures = draw(camera, sides, "frame, grey and colour" + of);
+    }
+    try {
+      row(("encoding it" + size).c_str(), seconds_of([&] { (void)jpeg_bytes(pictures.back(), 85); }), "s");
+    } catch (const DeviceError&) {
+      fmt::print("encoding is not measured: this machine has no codecs\n");
+    }
+    if (view == nullptr) return {};
+    const RenderedImage whole = scene.render(camera.lens, camera.world_from_camera, {});
+    Sharpness sharpness;
+    sharpness.grey = decibel(pictures[0], picture_from_linear(whole.width, whole.height, whole.luminance));
+    row("  grey against cnerf render", sharpness.grey, "dB");
+    if (model == nullptr) return sharpness;
+    sharpness.color = decibel(pictures[1], picture_from_linear(whole.width, whole.height, whole.rgb));
+    row("  colour against cnerf render", sharpness.color, "dB");
+    return sharpness;
+  }
+
+ private:
+  /// The quicker of two times.
+  std::vector<Picture> draw(const studio::FieldCamera& camera, const std::vector<studio::Side>& sides,
+                            const std::string& what) const {
+    std::vector<Picture> pictures;
+    studio::DrawingCosts costs;
+    double seconds = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < 2; ++i) {
+      costs = {};
+      seconds = std::min(seconds, seconds_of([&] {
+                           pictures = studio::draw_field(
+                               luminance, camera, sides, effort, [] { return true; }, &costs);
+                         }));
+    }
+    row(what.c_str(), seconds, "s");
+    const double pixels = double(camera.lens.width) * camera.lens.height;
+    row("  pixels that are traced", 100 * double(costs.rays) / pixels, "%");
+    if (sides.size() > 1) row("  and coloured", 100 * double(costs.colored_rays) / pixels, "%");
+    return pictures;
+  }
+};
+
 /// What colouring did to pixels of all views, ab distances.
 struct Changes {
   double known = 0, kept = 0, kept_most = 0;
@@ -85,37 +150,27 @@ int bench(int argc, char** argv) {
   const Engines& engines = engines_for("auto");
   const std::string take = argc > 2 && std::string(argv[2]).find('=') == std::string::npos ? argv[2] : "";
   const bool is_grey = take.empty();
-  const bool is_about_color = std::any_of(argv + 2, argv + argc, [](std::string word) { return word == "colour=1"; });
+  const auto is_given = [&](const std::string& word) { return std::find(argv + 2, argv + argc, word) < argv + argc; };
+  const bool is_about_color = is_given("colour=1"), is_about_frames = is_given("frames=1");
   const LuminanceModel luminance = LuminanceModel::load(directory.stage1_snapshot(), engines);
   ColorModel model =
       is_grey ? ColorModel::create(config.stage2, engines) : ColorModel::load(directory.take_snapshot(take), engines);
   const View& view = capture.views[capture.views.size() / 2];
-  const std::vector<studio::Side> grey = {nullptr}, both = {nullptr, &model};
-  const auto yes = [] { return true; };
-  const studio::DrawingEffort effort = studio::sharp_effort(config.render.steps_per_box);
-  for (const double share : {1.0 / 8, 1.0 / 6, 0.5, 1.0, 1.0}) {
-    if (is_about_color) break;
-    std::vector<Picture> pictures;
-    const studio::FieldCamera camera = camera_of(view, share);
-    const std::string size = fmt::format(" {} x {}", camera.lens.width, camera.lens.height);
-    row(("frame, grey" + size).c_str(),
-        seconds_of([&] { pictures = studio::draw_field(luminance, camera, grey, effort, yes); }), "s");
-    row(("frame, grey and colour" + size).c_str(),
-        seconds_of([&] { pictures = studio::draw_field(luminance, camera, both, effort, yes); }), "s");
-    try {
-      row(("encoding it" + size).c_str(), seconds_of([&] { (void)jpeg_bytes(pictures[1], 85); }), "s");
-    } catch (const DeviceError&) {
-      fmt::print("encoding is not measured: this machine has no codecs\n");
-    }
-    if (share < 1) continue;
+  if (!is_about_color) {
     const auto scene = pipeline::load_scene(directory, take, {}, engines);
-    const RenderedImage reference = scene->render(camera.lens, camera.world_from_camera, {});
-    const auto& values = reference.rgb.empty() ? reference.luminance : reference.rgb;
-    row("sharp against cnerf render",
-        decibel(pictures[reference.rgb.empty() ? 0 : 1],
-                picture_from_linear(reference.width, reference.height, values)),
-        "dB");
+    const Frames frames{luminance, *scene, is_grey ? nullptr : &model,
+                        studio::sharp_effort(config.render.steps_per_box)};
+    for (const double share : {1.0 / 8, 1.0 / 6}) frames.measure(camera_of(view, share));
+    frames.measure(camera_of(view, 0.5), &view.name);
+    Sharpness worst;
+    for (const double place : {0.5, 0.1, 0.8}) {
+      const View& own = capture.views[std::size_t(place * double(capture.views.size()))];
+      worst = worst.worse(frames.measure(camera_of(own, 1), &own.name));
+    }
+    row("grey against cnerf render, worst of three cameras", worst.grey, "dB");
+    if (!is_grey) row("colour against cnerf render, worst of three cameras", worst.color, "dB");
   }
+  if (is_about_frames) return 0;
 
   ViewCache cache;
   row("caching views", seconds_of([&] {

@@ -26,8 +26,8 @@ class ReceptionTest : public testing::Test {
   void open(const fs::path& source = {}) {
     const auto begin = [this](const fs::path& capture, Observer& observer) {
       const Config config = test::tiny_config();
-      pipeline::RunContext context{pipeline::RunDirectory(folder_ / "run"), config,
-                                   pipeline::read_capture(capture, config, observer), {}};
+      pipeline::RunContext context{
+          pipeline::RunDirectory(folder_ / "run"), config, pipeline::read_capture(capture, config, observer), {}};
       pipeline::begin_run(context, capture, {});
       return context;
     };

@@ -425,7 +425,7 @@ TEST_F(StudioTest, ATrainingIsWatchedStoppedAndGoneOnWith) {
   studio_->joined(kPainter);
   (void)wait_until([](const json& state) { return state["task"] == "train" && state["figures"].contains("psnr"); });
   const cv::Mat early = decoded(post("frame", frame({"grey"})));
-  EXPECT_EQ(early.cols, context.capture.views[1].intrinsics.width);
+  EXPECT_GT(early.cols, early.rows) << "as large as there is time for";
   EXPECT_EQ(post("orders", {{"order", "colour"}}).status, 409);
   EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200) << "painting need not wait";
   EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);

@@ -66,7 +66,8 @@ export class Api {
   }
 
   async strokes(): Promise<{ revision: number; strokes: Stroke[]; viewpoints: Viewpoint[] }> {
-    return (await this.send("GET", "strokes", undefined, { "Cache-Control": "no-cache" })).json();
+    const { viewpoints = [], ...rest } = await (await this.send("GET", "strokes", undefined, { "Cache-Control": "no-cache" })).json();
+    return { ...rest, viewpoints };
   }
   async putStrokes(strokes: readonly Stroke[], revision: number, viewpoints: readonly Viewpoint[] = []): Promise<number> {
     const headers = { "Content-Type": "application/json", "X-Cnerf-Revision": String(revision) };

@@ -60,12 +60,10 @@ async function draw(points) {
 before(async () => {
   assert.ok(existsSync(program), "CNERF_PROGRAM names the program");
   await ok(["sample", "-o", capture, ...size]);
-  await ok(["train", capture, "-o", trained, "--preset", "quick", ...long]);
   browser = await launch();
-  serving = await startServing(["studio", trained]);
+  serving = await startServing(["studio", "-o", trained, "--preset", "quick", "--set", "capture.holdout=8", ...long]);
   const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, acceptDownloads: true });
   page = await open(context, `${serving.url}?still`);
-  await until(() => window.cnerf?.session.state.ready);
 });
 after(async () => {
   serving?.child.kill("SIGINT");
@@ -76,6 +74,26 @@ after(async () => {
 
 describe("the tutorial", () => {
   let painted;
+  it("begins with nothing: a folder is dropped, and refused by name what is not understood", async () => {
+    await page.waitForSelector("#reception");
+    await page.setInputFiles("#folder", capture);
+    await until(() => !document.getElementById("build").disabled);
+    await shot("studio-drop");
+    const bad = await page.evaluate(async () => (await fetch("./studio/arrivals?name=..%2Fescape.png&offset=0", { method: "PUT", headers: { "X-Cnerf": "1" }, body: "x" })).status);
+    assert.equal(bad, 400);
+    assert.ok(!existsSync(join(folder, "escape.png")));
+  });
+  it("trains in front of it", async () => {
+    await page.click("#build");
+    await until(() => window.cnerf?.session?.state.stage === "training" && window.cnerf.session.state.figures.psnr > 0);
+    await page.waitForFunction(() => document.body.dataset.ready === "yes", undefined, { timeout: patience });
+    await shot("studio-training");
+    await page.evaluate(() => window.cnerf.session.order({ order: "stop" }));
+    await until(() => window.cnerf.session.state.stage === "field" || window.cnerf.session.state.task === "");
+    if ((await state()).stage === "training") await page.evaluate(() => window.cnerf.session.order({ order: "train" }));
+    await until(() => window.cnerf.session.state.ready);
+    await idle();
+  });
   it("shows the field in grey, and nobody else may work on the run", async () => {
     assert.ok((await colorfulness()) < 3);
     const second = await run(["studio", trained, "--no-browser"]);
