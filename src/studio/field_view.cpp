@@ -47,8 +47,8 @@ class Drawing {
       const bool needs_colors = pixels_.needs_colors(pass);
       costs.rays += wanted.size();
       costs.colored_rays += needs_colors ? wanted.size() : 0;
-      // Without colour a GPU hands back a number per ray, and likes many; with it, samples.
-      const std::size_t at_a_time = needs_colors ? kLeastRays : std::max(kLeastRays, engine_.points_at_a_time() / 8);
+      // A GPU likes many. Without colour it hands back a number per ray; with it, samples.
+      const std::size_t at_a_time = std::max(kLeastRays, engine_.points_at_a_time() / (needs_colors ? 16 : 8));
       for (std::size_t first = 0; first < wanted.size(); first += at_a_time) {
         if (!keep_going()) return false;
         const auto part = std::span(wanted).subspan(first, std::min(at_a_time, wanted.size() - first));

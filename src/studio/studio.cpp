@@ -19,11 +19,15 @@ namespace {
 constexpr auto kPoll = std::chrono::milliseconds(50);  // Ctrl-C only sets a flag
 constexpr std::size_t kMostTakesInMemory = 3;
 constexpr int kJpegQuality = 88;
-// A page that moves may slow a training to half on a processor, by a tenth on a GPU; one that rests by 2 %.
-constexpr double kTrainingPerTurn = 1, kTrainingPerTurnOfGpu = 9;
+/// Seconds of training per second of drawing, so that a page that moves slows it by half on a processor and a tenth on
+/// a GPU, and one that rests by 2 %. A GPU also loses the steps that it had begun.
+struct Pace {
+  double while_turning, while_resting;
+};
+constexpr Pace kPace = {1, 50}, kPaceOfGpu = {14, 120};
 constexpr double kFrameOfTraining = 0.25;  // seconds, at most: what is half learned is fog, and dear
 constexpr double kFirstRays = 600, kMostGrowth = 4;
-constexpr double kTrainingPerRefresh = 50, kLeastBetweenRefreshes = 1, kMostBetweenRefreshes = 60;  // seconds
+constexpr double kLeastBetweenRefreshes = 1, kMostBetweenRefreshes = 60;  // seconds
 
 }  // namespace
 
@@ -135,10 +139,10 @@ void Studio::train(const Order& order) {
 /// Between two steps of a training: frames are drawn, but not for longer than it may be slowed.
 void Studio::watch_training(const LuminanceModel& model) {
   const double since = since_drawn_.seconds();
-  const double per_turn = engines_.device() == Device::kCuda ? kTrainingPerTurnOfGpu : kTrainingPerTurn;
-  const double pause = std::min(kTrainingPerRefresh * drawing_seconds_, kMostBetweenRefreshes);
+  const Pace& pace = engines_.device() == Device::kCuda ? kPaceOfGpu : kPace;
+  const double pause = std::min(pace.while_resting * drawing_seconds_, kMostBetweenRefreshes);
   const auto which = since >= pause ? FrameDesk::Which::kAll : FrameDesk::Which::kUrgent;
-  if (since >= per_turn * drawing_seconds_ && frames_.has_waiting(which)) {
+  if (since >= pace.while_turning * drawing_seconds_ && frames_.has_waiting(which)) {
     const Stopwatch drawing;
     field_ = &model;
     frames_.draw_waiting(which);

@@ -1,6 +1,7 @@
 // What waiting in the studio is like, on a run: first frames, the reach of a stroke, and colouring by strokes.
-//   cnerf-studio-bench RUN [TAKE] [frames=1] [colour=1] [steps=N] [known=N] [kept=N] [rate=R] [final=R]
+//   cnerf-studio-bench RUN [TAKE] [frames=1] [whole=1] [colour=1] [steps=N] [known=N] [kept=N] [rate=R] [final=R]
 //     frames=1  only frames
+//     whole=1   of which every pixel is traced
 //     colour=1  only what colouring does
 //   prints a row per figure; pictures differ from `cnerf render`'s by the dB of the sharp rows.
 
@@ -158,8 +159,8 @@ int bench(int argc, char** argv) {
   const View& view = capture.views[capture.views.size() / 2];
   if (!is_about_color) {
     const auto scene = pipeline::load_scene(directory, take, {}, engines);
-    const Frames frames{luminance, *scene, is_grey ? nullptr : &model,
-                        studio::sharp_effort(config.render.steps_per_box)};
+    Frames frames{luminance, *scene, is_grey ? nullptr : &model, studio::sharp_effort(config.render.steps_per_box)};
+    if (is_given("whole=1")) frames.effort.least_sparse_pixels = 0;
     for (const double share : {1.0 / 8, 1.0 / 6}) frames.measure(camera_of(view, share));
     frames.measure(camera_of(view, 0.5), &view.name);
     Sharpness worst;
