@@ -1,7 +1,7 @@
 // What a training in the studio loses to a page that looks at it.
-//   cnerf-studio-training CAPTURE FOLDER [seconds=10] [device=auto] [downscale=N]
+//   cnerf-studio-training CAPTURE FOLDER [from=4e6] [to=24e6] [device=auto] [downscale=N]
 //     FOLDER    for runs; made anew each time
-//     prints samples per second with nobody there, with a page that rests, and with one that turns the camera
+//     prints how long these samples take, medians of three, with nobody there, with a page that rests, and with one that turns the camera
 
 #include <fmt/format.h>
 
@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "src/base/error.h"
+#include "src/base/statistics.h"
 #include "src/base/usage.h"
 #include "src/pipeline/run_context.h"
 #include "src/studio/studio.h"
@@ -17,6 +18,8 @@
 namespace cnerf::studio {
 namespace {
 namespace fs = std::filesystem;
+
+constexpr int kRounds = 3;
 
 enum class Page { kNobody, kRests, kTurns };
 
@@ -58,9 +61,14 @@ void look(Studio& studio, const Capture& capture, Page page, const std::atomic<b
   }
 }
 
-/// Samples per second of a training.
-double speed(pipeline::RunContext& context, const fs::path& capture, const Engines& engines, Page page,
-             double seconds) {
+/// The part of a training that is timed, in samples: what is half learned is slower.
+struct Part {
+  double begin = 0, end = 0;
+};
+
+/// Seconds that a part of a training takes.
+double timed(pipeline::RunContext& context, const fs::path& capture, const Engines& engines, Page page,
+             const Part& part) {
   Observer observer;
   pipeline::begin_run(context, capture, {.overwrite = true});
   Studio studio(context, "", engines, observer);
@@ -69,38 +77,45 @@ double speed(pipeline::RunContext& context, const fs::path& capture, const Engin
     const auto state = parse_json(studio.answer({"GET", "/studio/state", {}, "bench", {}, {}}).body, "state");
     return state.at("figures").value("samples", 0.0);
   };
-  while (samples() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  const auto wait_for = [&](double count) {
+    while (samples() < count) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  };
+  wait_for(1);
   std::atomic<bool> is_over = false;
   std::thread client([&] {
     if (page != Page::kNobody) look(studio, context.capture, page, is_over);
   });
-  std::this_thread::sleep_for(std::chrono::duration<double>(seconds / 4));  // until frames have found their size
-  const double before = samples();
+  wait_for(part.begin);
   const Stopwatch watch;
-  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
-  const double rate = (samples() - before) / watch.seconds();
+  wait_for(part.end);
+  const double seconds = watch.seconds();
   is_over = true;
   studio.close();
   client.join();
   worker.join();
-  return rate;
+  return seconds;
 }
 
-void measure(const fs::path& capture, const fs::path& folder, const Config& config, double seconds) {
+void measure(const fs::path& capture, const fs::path& folder, const Config& config, const Part& part) {
   const Engines& engines = engines_for(config.device);
   Observer observer;
   pipeline::RunContext context{pipeline::RunDirectory(folder),
                                config,
                                pipeline::read_capture(capture, config, observer),
                                {"cnerf-studio-training"}};
-  const double alone = speed(context, capture, engines, Page::kNobody, seconds);
-  const double resting = speed(context, capture, engines, Page::kRests, seconds);
-  const double turning = speed(context, capture, engines, Page::kTurns, seconds);
-  const double again = speed(context, capture, engines, Page::kNobody, seconds);
-  const double mean = (alone + again) / 2;
-  fmt::print("{:<40} {:>10.3g} and {:.3g} samples/s\n", "nobody looks, before and after", alone, again);
-  fmt::print("{:<40} {:>9.1f} % slower\n", "a page that rests", 100 * (1 - resting / mean));
-  fmt::print("{:<40} {:>9.1f} % slower\n", "a page that turns", 100 * (1 - turning / mean));
+  // In turns: the machine is not equally quick all the time.
+  std::vector<double> alone, resting, turning;
+  for (int round = 0; round < kRounds; ++round) {
+    alone.push_back(timed(context, capture, engines, Page::kNobody, part));
+    resting.push_back(timed(context, capture, engines, Page::kRests, part));
+    turning.push_back(timed(context, capture, engines, Page::kTurns, part));
+  }
+  const auto [least, most] = std::ranges::minmax(alone);
+  // Of its speed, as a share.
+  const auto slower = [&](const std::vector<double>& seconds) { return 100 * (1 - median(alone) / median(seconds)); };
+  fmt::print("{:<40} {:>9.1f} s ({:.1f} to {:.1f})\n", "nobody looks", median(alone), least, most);
+  fmt::print("{:<40} {:>9.1f} % slower\n", "a page that rests", slower(resting));
+  fmt::print("{:<40} {:>9.1f} % slower\n", "a page that turns", slower(turning));
 }
 
 }  // namespace
@@ -110,13 +125,15 @@ int main(int argc, char** argv) {
   try {
     std::filesystem::path capture, folder;
     cnerf::Config config;
-    double seconds = 10;
+    cnerf::studio::Part part{4e6, 24e6};
     for (int i = 1; i < argc; ++i) {
       const std::string word = argv[i];
       const auto equals = word.find('=');
       const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
-      if (word.starts_with("seconds="))
-        seconds = std::stod(value);
+      if (word.starts_with("from="))
+        part.begin = std::stod(value);
+      else if (word.starts_with("to="))
+        part.end = std::stod(value);
       else if (word.starts_with("device="))
         config.device = value;
       else if (word.starts_with("downscale="))
@@ -124,9 +141,9 @@ int main(int argc, char** argv) {
       else
         (capture.empty() ? capture : folder) = word;
     }
-    if (folder.empty()) throw cnerf::UsageError("CAPTURE FOLDER [seconds=10] [device=auto] [downscale=N]");
+    if (folder.empty()) throw cnerf::UsageError("CAPTURE FOLDER [from=4e6] [to=24e6] [device=auto] [downscale=N]");
     config.stage1.steps = 10000000;
-    cnerf::studio::measure(capture, folder, config, seconds);
+    cnerf::studio::measure(capture, folder, config, part);
     return 0;
   } catch (const std::exception& problem) {
     fmt::print(stderr, "cnerf-studio-training: {}\n", problem.what());

@@ -1,9 +1,7 @@
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
-#include <sys/resource.h>
 
 #include <cmath>
-#include <csignal>
 #include <fstream>
 #include <map>
 #include <tuple>
@@ -15,6 +13,7 @@
 #include "src/base/parallel.h"
 #include "tests/export/test_volumes.h"
 #include "tests/support/data.h"
+#include "tests/support/full_disk.h"
 
 namespace cnerf::exporting::test {
 using namespace cnerf::test;
@@ -294,32 +293,10 @@ TEST(Vdb, AFolderThatCannotBeWrittenIsAnOutputError) {
   EXPECT_THROW(write_dilated(block(), fs::path("/proc/cnerf/a.vdb")), OutputError);
 }
 
-/// Files of this process cannot grow beyond `bytes` while this lives: what a full disk does.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    rlimit limit = before_;
-    limit.rlim_cur = bytes;
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-    handler_ = std::signal(SIGXFSZ, SIG_IGN);
-  }
-  ~FullDisk() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int) = nullptr;
-};
-
 TEST(Vdb, AFullDiskIsAnOutputErrorAndLeavesNothing) {
   const TempDir folder;
   for (const rlim_t room : {rlim_t{0}, rlim_t{1000}, rlim_t{9000}}) {
-    const FullDisk full(room);
+    const test::FullDisk full(room);
     EXPECT_THROW(write_dilated(block(), folder / "a.vdb", {.compression = "none"}), OutputError) << room;
     EXPECT_TRUE(fs::is_empty(folder.path())) << room;
   }

@@ -11,6 +11,7 @@
 #include "src/base/files.h"
 #include "src/sample/sample_scene.h"
 #include "tests/support/data.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/tiny_config.h"
 
 namespace cnerf::studio {
@@ -79,6 +80,18 @@ TEST_F(ReceptionTest, FilesArriveInPieces) {
   EXPECT_FALSE(fs::exists(folder_ / "run-photographs"));
   EXPECT_EQ(state()["arrived"]["files"], 0);
   EXPECT_EQ(json::parse(reception_->answer({"GET", "/studio/scene", {}, kPainter, {}, {}}).body)["views"].size(), 0u);
+}
+
+TEST_F(ReceptionTest, AFullDiskIsToldAndThePieceCanBeSentAgain) {
+  open();
+  ASSERT_EQ(put("a.jpg", "0", "1234").status, 200);
+  {
+    const test::FullDisk full(6);
+    EXPECT_EQ(put("a.jpg", "4", "5678").status, 507);
+    EXPECT_EQ(state()["arrived"]["bytes"], 4);
+  }
+  EXPECT_EQ(read_text_file(folder_ / "run-photographs/a.jpg"), "1234");
+  EXPECT_EQ(put("a.jpg", "4", "5678").status, 200);
 }
 
 TEST_F(ReceptionTest, NamesThatLeadElsewhereAreRefusedByName) {

@@ -15,6 +15,7 @@
 #include "src/sample/sample_scene.h"
 #include "src/studio/paint_files.h"
 #include "tests/support/data.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/tiny_config.h"
 
 namespace cnerf::studio {
@@ -175,6 +176,22 @@ TEST_F(StudioTest, StrokesAreSavedAsTheyAreMade) {
   EXPECT_EQ(strokes["revision"], 2);
   ASSERT_EQ(strokes["strokes"].size(), 2u);
   EXPECT_EQ(strokes["strokes"][1]["id"], "b");
+}
+
+TEST_F(StudioTest, AFullDiskIsToldAndNothingIsLost) {
+  open();
+  ASSERT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  const fs::path file = context_.directory.root() / "strokes" / kStrokeFile;
+  const std::string before = read_text_file(file);
+  {
+    const test::FullDisk full;
+    EXPECT_EQ(put({stroke("a", 0.5, 0.5), stroke("b", 0.2, 0.2)}, 1).status, 507);
+    EXPECT_EQ(ordered({{"order", "colour"}})["failed"], true) << "the painted pictures cannot be written";
+  }
+  EXPECT_EQ(read_text_file(file), before);
+  EXPECT_EQ(json::parse(get("strokes").body)["strokes"].size(), 1u);
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5), stroke("b", 0.2, 0.2)}, 1).status, 200) << "and goes on";
+  EXPECT_EQ(ordered({{"order", "colour"}})["failed"], false);
 }
 
 TEST_F(StudioTest, APenIsFreeWhenItsTabIsClosed) {
