@@ -75,8 +75,20 @@ void Studio::run() {
       is_working_ = order.has_value();
       stop_requested_ = false;
     }
+    forget_viewpoints();
     if (order) work_on(*order);
   }
+}
+
+void Studio::forget_viewpoints() {
+  std::vector<Viewpoint> kept;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!coloring_ || strokes_.revision == forgotten_at_) return;
+    forgotten_at_ = strokes_.revision;
+    kept = strokes_.viewpoints;
+  }
+  coloring_->forget_others(kept);
 }
 
 /// An order that cannot be carried out is told; the studio stays.

@@ -23,15 +23,15 @@ enum class Page { kNobody, kRests, kTurns };
 std::string asked_frame(const Capture& capture, double share, bool is_moving) {
   const SceneMessage scene = scene_of(capture, "");
   const ViewMessage& view = scene.views[std::size_t(scene.home)];
-  FrameMessage frame{view.position, view.rotation, {}, {"grey"}, is_moving};
+  FrameMessage frame{view.camera, {"grey"}, is_moving};
   const int width = int(1280 * share), height = int(720 * share);
-  const double f = view.lens.fy * height / view.lens.height;
-  frame.lens = {width, height, f, f, width / 2.0, height / 2.0};
+  const double f = view.camera.lens.fy * height / view.camera.lens.height;
+  frame.camera.lens = {width, height, f, f, width / 2.0, height / 2.0};
   return json_of(frame).dump();
 }
 
-/// A page as viewer/src/studio/scheduler.ts has it: coarse frames one after another while it turns; at rest a coarse one
-/// and one of twice its size whenever the colours changed.
+/// A page as viewer/src/studio/scheduler.ts has it: coarse frames one after another while it turns; at rest a coarse
+/// one and one of twice its size whenever the colours changed.
 void look(Studio& studio, const Capture& capture, Page page, const std::atomic<bool>& is_over) {
   double coarse = 1.0 / 6;
   const auto ask = [&](double share, bool is_moving) {
@@ -89,8 +89,10 @@ double speed(pipeline::RunContext& context, const fs::path& capture, const Engin
 void measure(const fs::path& capture, const fs::path& folder, const Config& config, double seconds) {
   const Engines& engines = engines_for(config.device);
   Observer observer;
-  pipeline::RunContext context{pipeline::RunDirectory(folder), config,
-                               pipeline::read_capture(capture, config, observer), {"cnerf-studio-training"}};
+  pipeline::RunContext context{pipeline::RunDirectory(folder),
+                               config,
+                               pipeline::read_capture(capture, config, observer),
+                               {"cnerf-studio-training"}};
   const double alone = speed(context, capture, engines, Page::kNobody, seconds);
   const double resting = speed(context, capture, engines, Page::kRests, seconds);
   const double turning = speed(context, capture, engines, Page::kTurns, seconds);
@@ -113,10 +115,14 @@ int main(int argc, char** argv) {
       const std::string word = argv[i];
       const auto equals = word.find('=');
       const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
-      if (word.starts_with("seconds=")) seconds = std::stod(value);
-      else if (word.starts_with("device=")) config.device = value;
-      else if (word.starts_with("downscale=")) config.capture.downscale = std::stoi(value);
-      else (capture.empty() ? capture : folder) = word;
+      if (word.starts_with("seconds="))
+        seconds = std::stod(value);
+      else if (word.starts_with("device="))
+        config.device = value;
+      else if (word.starts_with("downscale="))
+        config.capture.downscale = std::stoi(value);
+      else
+        (capture.empty() ? capture : folder) = word;
     }
     if (folder.empty()) throw cnerf::UsageError("CAPTURE FOLDER [seconds=10] [device=auto] [downscale=N]");
     config.stage1.steps = 10000000;
