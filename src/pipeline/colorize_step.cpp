@@ -37,18 +37,18 @@ std::string last_take(const RunDirectory& directory, bool is_finished) {
 TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Engines& engines, Observer& observer) {
   const RunDirectory& directory = context.directory;
   // Before anything is written: they may refuse.
-  const std::vector<KnownColors> known = load_known_colors(context.capture, context.config.colorizer);
+  const auto [known, viewpoints] = load_known_colors(context.capture, context.config.colorizer);
   std::unique_ptr<Colorizer> made;
   if (job.colorizer == nullptr) made = colorizer_of(context, observer);
   Colorizer& colorizer = job.colorizer != nullptr ? *job.colorizer : *made;
   if (job.existing.overwrite) clear_folder(directory.take_folder(job.take));
   write_file(directory.take_config_file(job.take), to_toml(context.config));
-  const Stage2Report report =
-      train_stage2({context.capture, directory.stage1_snapshot(), context.config.stage2, colorizer, known,
-                    directory.take_snapshot(job.take), job.existing.resume, job.views, nullptr, nullptr, job.watch},
-                   engines, observer);
+  const Stage2Report report = train_stage2(
+      {context.capture, directory.stage1_snapshot(), context.config.stage2, colorizer, known,
+       directory.take_snapshot(job.take), job.existing.resume, job.views, nullptr, nullptr, job.watch, viewpoints},
+      engines, observer);
   observer.report_progress({"stage 2", 1.0, {}});
-  return {job.take, colorizer.name() + describe(known), report};
+  return {job.take, colorizer.name() + describe(known) + describe_viewpoints(viewpoints), report};
 }
 
 }  // namespace

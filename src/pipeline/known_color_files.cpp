@@ -145,20 +145,28 @@ KnownColors dot_of(const std::string& hint, const Capture& capture) {
   return known;
 }
 
-/// What a stroke file paints on the capture's training views.
-std::vector<KnownColors> painted_in(const fs::path& file, const Capture& capture) {
-  const std::vector<std::string> names = paintable_views(capture);
+/// What a stroke file paints on the capture's training views, and at viewpoints.
+void add_painted(const fs::path& file, const Capture& capture, GivenColors& given) {
+  const PaintableViews views = paintable_views(capture);
+  const StrokeList list = read_strokes(file, views);
+  std::vector<std::string> names = views.names;
   std::vector<Intrinsics> lenses;
   for (const View& view : capture.views) {
     if (!view.held_out) lenses.push_back(view.intrinsics);
   }
-  return painted(read_strokes(file, names).strokes, names, lenses);
+  given.viewpoints = painted_viewpoints(list);
+  for (const Viewpoint& viewpoint : given.viewpoints) {
+    names.push_back(viewpoint.name);
+    lenses.push_back(viewpoint.camera.intrinsics());
+  }
+  for (KnownColors& paint : painted(list.strokes, names, lenses)) given.known.push_back(std::move(paint));
 }
 
 }  // namespace
 
-std::vector<KnownColors> load_known_colors(const Capture& capture, const ColorizerOptions& config) {
-  std::vector<KnownColors> known;
+GivenColors load_known_colors(const Capture& capture, const ColorizerOptions& config) {
+  GivenColors given;
+  std::vector<KnownColors>& known = given.known;
   const auto load = [&](const std::string& list, const char* option, KnownColorKind kind) {
     for (const NamedFile& named : named_files(list, option)) {
       known.push_back(load_colors(named, kind, training_view(capture, named.view, named.entry)));
@@ -167,9 +175,8 @@ std::vector<KnownColors> load_known_colors(const Capture& capture, const Coloriz
   load(config.keyframes, "--keyframe", KnownColorKind::kKeyFrame);
   load(config.hint_images, "--hint-image", KnownColorKind::kStrokes);
   for (const std::string& hint : split(config.hints, ';')) known.push_back(dot_of(hint, capture));
-  if (config.strokes.empty()) return known;
-  for (KnownColors& paint : painted_in(config.strokes, capture)) known.push_back(std::move(paint));
-  return known;
+  if (!config.strokes.empty()) add_painted(config.strokes, capture, given);
+  return given;
 }
 
 std::vector<fs::path> key_frame_files(const ColorizerOptions& config) {

@@ -10,22 +10,22 @@
 namespace cnerf::studio {
 namespace fs = std::filesystem;
 
-std::vector<KnownColors> known_of(const std::vector<Stroke>& strokes, std::span<const CachedView> views,
-                                  std::span<const std::string> names) {
+std::vector<KnownColors> known_of(const std::vector<Stroke>& strokes, const SeenSurfaces& seen) {
   std::vector<Intrinsics> lenses;
-  for (const CachedView& view : views) lenses.push_back(view.camera.intrinsics);
-  return painted(strokes, names, lenses);
+  for (const CachedView& view : seen.views()) lenses.push_back(view.camera.intrinsics);
+  return painted(strokes, seen.names(), lenses);
 }
 
-Journal read_journal(const fs::path& file, std::span<const std::string> views) {
+Journal read_journal(const fs::path& file, const PaintableViews& views) {
   PaintedPictures pictures(file.parent_path());
   auto journal = read_record<Journal>(file);
   if (journal.deeds.empty()) throw InputError(file, "deeds", "expected at least one");
   if (const std::string& base = journal.deeds.front().base; !base.empty()) pipeline::check_take_name(base);
   for (std::size_t i = 0; i < journal.deeds.size(); ++i) {
-    StrokeList list{0, std::move(journal.deeds[i].strokes)};
+    Deed& deed = journal.deeds[i];
+    const StrokeList list{0, std::move(deed.strokes), deed.viewpoints};
     const fs::path of_deed = file.string() + ": deeds[" + std::to_string(i) + "]";
-    journal.deeds[i].strokes = strokes_of_json(json_of(list).dump(), of_deed, views, pictures).strokes;
+    deed.strokes = strokes_of_json(json_of(list).dump(), of_deed, views, pictures).strokes;
   }
   return journal;
 }
@@ -43,6 +43,28 @@ void Coloring::cache_views(const Breathe& breathe) {
   cache_.fill(*luminance_.engine, luminance_.march(), context_.capture, luminance_.frame,
               context_.config.stage2.working_resolution, breathe);
   seen_.emplace(cache_.views(), cache_.names());
+}
+
+/// What the capture's views see stays as it is.
+void Coloring::change_seen(const std::function<void()>& change) {
+  const std::unique_lock lock(seen_mutex_);
+  change();
+  seen_ = SeenSurfaces(cache_.views(), cache_.names(), seen_->surfaces().first(cache_.of_capture()));
+}
+
+void Coloring::see(std::span<const Viewpoint> viewpoints, const Breathe& breathe) {
+  // `breathe` may come back here, so that another call is through first; what is there twice then is left out.
+  auto traced = cache_.traced(*luminance_.engine, luminance_.march(), luminance_.frame, viewpoints, breathe);
+  if (!traced.empty()) change_seen([&] { cache_.add(std::move(traced)); });
+}
+
+void Coloring::forget_others(std::span<const Viewpoint> viewpoints) {
+  const auto is_other = [&](const Viewpoint& one) { return std::ranges::find(viewpoints, one) == viewpoints.end(); };
+  if (std::ranges::any_of(cache_.viewpoints(), is_other)) change_seen([&] { cache_.keep_only(viewpoints); });
+}
+
+bool Coloring::has_seen(std::span<const Viewpoint> viewpoints) const {
+  return std::ranges::all_of(viewpoints, [this](const Viewpoint& viewpoint) { return cache_.holds(viewpoint); });
 }
 
 void Coloring::begin(const std::string& take) {
@@ -68,17 +90,25 @@ void Coloring::take_is_called(const std::string& take, const std::string& name) 
   is_unkept_ = is_unkept_ || name.empty();
 }
 
-void Coloring::colour(const std::vector<Stroke>& strokes, const RetouchOptions& options, const Breathe& breathe,
-                      int most_steps) {
-  cache_views([&](double fraction) { breathe(fraction * 0.2); });
-  const std::vector<KnownColors> known = known_of(strokes, cache_.views(), cache_.names());
-  const KnownColorMap map(*seen_, KnownColorSources(*seen_, known));
-  Retouch retouch(cache_.views(), map, base_.get(), *now_, options);
+void Coloring::colour(const StrokeList& list, const RetouchOptions& options, const Breathe& breathe, int most_steps) {
+  const auto told = [&](double fraction) { breathe(fraction * 0.2); };
+  const std::vector<Viewpoint> viewpoints = painted_viewpoints(list);
+  cache_views(told);
+  forget_others(list.viewpoints);
+  see(viewpoints, told);
+  if (!has_seen(viewpoints)) throw UsageError("viewpoints came and went too fast; once more, please");
+  if (!viewpoints.empty()) change_seen([&] { cache_.put_first(viewpoints); });
+  // What comes later, for others to look at, has no part in this: it repeats bit for bit.
+  const SeenSurfaces seen = seen_->first(cache_.of_capture() + viewpoints.size());
+  const std::vector<KnownColors> known = known_of(list.strokes, seen);
+  const KnownColorMap map(seen, KnownColorSources(seen, known));
+  Retouch retouch(seen.views(), map, base_.get(), *now_, options);
   is_grey_ = false;
   is_unkept_ = true;
   kept_as_.clear();
-  now_->colorizer = (base_ ? base_->colorizer : std::string(pipeline::kGreyTake)) + describe(known);
-  journal_.deeds.push_back({"", strokes, 0});
+  now_->colorizer =
+      (base_ ? base_->colorizer : std::string(pipeline::kGreyTake)) + describe(known) + describe_viewpoints(viewpoints);
+  journal_.deeds.push_back({"", list.strokes, 0, viewpoints});
   while (!retouch.is_settled() && retouch.steps_done() < most_steps) {
     retouch.step();
     journal_.deeds.back().steps = retouch.steps_done();
@@ -108,7 +138,8 @@ void Coloring::replay(const Journal& journal, const RetouchOptions& options, con
   for (std::size_t i = 1; i < journal.deeds.size(); ++i) {
     const Deed& deed = journal.deeds[i];
     colour(
-        deed.strokes, options, [&](double fraction) { breathe((double(i - 1) + fraction) / count); }, deed.steps);
+        {0, deed.strokes, deed.viewpoints}, options,
+        [&](double fraction) { breathe((double(i - 1) + fraction) / count); }, deed.steps);
   }
 }
 

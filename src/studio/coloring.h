@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <shared_mutex>
 #include <string>
 #include <vector>
 
@@ -18,15 +19,17 @@ namespace cnerf::studio {
 
 /// One thing that was done to the colours, so that it can be done again.
 struct Deed {
-  std::string base;             ///< the first: the take it began from; empty = grey
-  std::vector<Stroke> strokes;  ///< the others: what was painted by then
-  int steps = 0;                ///< and the steps that were run with it
+  std::string base;                        ///< the first: the take it began from; empty = grey
+  std::vector<Stroke> strokes;             ///< the others: what was painted by then
+  int steps = 0;                           ///< and the steps that were run with it
+  std::vector<Viewpoint> viewpoints = {};  ///< that the strokes name
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
     v("base", self.base, kOptional);
     v("strokes", self.strokes, kOptional);
     v("steps", self.steps, kOptional);
+    v("viewpoints", self.viewpoints, kOptional);
   }
 };
 
@@ -42,9 +45,9 @@ struct Journal {
 
 inline constexpr const char* kJournalFile = "journal.json";
 /// A take's journal of any content.
-/// @param views  names that strokes may have
+/// @param views  that strokes may name
 /// @throws MissingInputError, InputError  "file: deeds[2].strokes…"
-[[nodiscard]] Journal read_journal(const std::filesystem::path& file, std::span<const std::string> views);
+[[nodiscard]] Journal read_journal(const std::filesystem::path& file, const PaintableViews& views);
 
 /// Called between pieces of work, with the share that is done; may throw Interrupted.
 using Breathe = std::function<void(double fraction)>;
@@ -67,17 +70,30 @@ class Coloring {
 
   /// Traces the training views, once.
   void cache_views(const Breathe& breathe);
-  /// What is traced of them, for others who colour this run.
+  /// What is traced of them, for others who colour this run. Without viewpoints in their job, they colour by the
+  /// capture's views alone.
   [[nodiscard]] ViewCache& cached_views() { return cache_; }
-  /// Null until then. Does not change any more.
+
+  // What is traced changes on one thread, which works and looks at it without a lock. Others hold `reading()` while
+  // they look. Viewpoints come beside work that goes on: they take places that nobody works with, and nothing moves for
+  // them. They go, or move, only between two pieces of work.
+
+  /// Traces viewpoints, each once. After `cache_views`, on the thread that works.
+  /// @param breathe  may be none
+  void see(std::span<const Viewpoint> viewpoints, const Breathe& breathe);
+  /// Lets what was traced of other viewpoints go. Between two pieces of work.
+  void forget_others(std::span<const Viewpoint> viewpoints);
+
+  [[nodiscard]] std::shared_lock<std::shared_mutex> reading() const { return std::shared_lock(seen_mutex_); }
+  /// Of the views, then of viewpoints. Null until they are traced.
   [[nodiscard]] const SeenSurfaces* seen() const { return seen_ ? &*seen_ : nullptr; }
-  [[nodiscard]] std::span<const std::string> names() const { return cache_.names(); }
+  [[nodiscard]] bool has_seen(std::span<const Viewpoint> viewpoints) const;
 
   /// "Now" becomes what a take has; empty = grey.  @throws as ColorModel::load
   void begin(const std::string& take);
   /// Goes on with "now" until it has settled on the strokes. What was learned when `breathe` throws stays.
   /// @param most_steps  to stop after
-  void colour(const std::vector<Stroke>& strokes, const RetouchOptions& options, const Breathe& breathe,
+  void colour(const StrokeList& list, const RetouchOptions& options, const Breathe& breathe,
               int most_steps = std::numeric_limits<int>::max());
   /// Writes "now" as a take.  @throws OutputError, BusyError
   void keep(const std::string& take, double seconds, Observer& observer);
@@ -85,10 +101,13 @@ class Coloring {
   void replay(const Journal& journal, const RetouchOptions& options, const Breathe& breathe);
 
  private:
+  void change_seen(const std::function<void()>& change);
+
   const pipeline::RunContext& context_;
   const Engines& engines_;
   LuminanceModel luminance_;
   std::string stage1_sha256_;
+  mutable std::shared_mutex seen_mutex_;  // of the two that follow
   ViewCache cache_;
   std::optional<SeenSurfaces> seen_;
   std::unique_ptr<ColorModel> base_, now_;  // no base: grey
@@ -97,8 +116,7 @@ class Coloring {
   Journal journal_;
 };
 
-/// What the strokes of a list make known, at the sizes of cached views.
-[[nodiscard]] std::vector<KnownColors> known_of(const std::vector<Stroke>& strokes, std::span<const CachedView> views,
-                                                std::span<const std::string> names);
+/// What strokes make known, at the sizes of cached views.
+[[nodiscard]] std::vector<KnownColors> known_of(const std::vector<Stroke>& strokes, const SeenSurfaces& seen);
 
 }  // namespace cnerf::studio

@@ -1,27 +1,14 @@
 #include "src/studio/messages.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
-#include "src/base/error.h"
 #include "src/capture/arrangement.h"
 
 namespace cnerf::studio {
 namespace {
 
-constexpr int kLargestSide = 4096;
-constexpr double kFarthest = 1e9;  // world units
-constexpr double kRotationError = 1e-3;
-
-void require(bool holds, const char* field, const std::string& problem) {
-  if (!holds) throw InputError("frame", field, problem);
-}
-
-Triple triple(Vec3d v) {
-  return {v.x, v.y, v.z};
-}
+constexpr int kLargestSide = 4096;  // of a frame
 
 /// The signed axis nearest to a direction: "+y".
 std::string axis_name(Vec3d direction) {
@@ -34,40 +21,19 @@ std::string axis_name(Vec3d direction) {
 }
 
 ViewMessage message_of(const View& view) {
-  ViewMessage message{view.name, view.held_out, view.intrinsics.width, view.intrinsics.height, {}, {}, {}};
-  const Intrinsics& lens = view.intrinsics;
-  message.lens = {lens.width, lens.height, lens.fx, lens.fy, lens.cx, lens.cy};
-  message.position = triple(view.world_from_camera.translation);
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      message.rotation[std::size_t(row)][std::size_t(column)] = view.world_from_camera.linear.column(column)[row];
-    }
-  }
-  return message;
+  return {view.name, view.held_out, view.intrinsics.width, view.intrinsics.height,
+          camera_record(view.intrinsics, view.world_from_camera)};
 }
 
 }  // namespace
 
+FieldCamera camera_of(const CameraRecord& camera) {
+  return {camera.intrinsics(), camera.world_from_camera()};
+}
+
 FieldCamera camera_of(const FrameMessage& message) {
-  const LensMessage& lens = message.lens;
-  require(lens.width >= 1 && lens.width <= kLargestSide && lens.height >= 1 && lens.height <= kLargestSide, "lens",
-          fmt::format("expected 1 to {} pixels, got {} x {}", kLargestSide, lens.width, lens.height));
-  const double side = std::max(lens.width, lens.height);
-  require(lens.fx > 0.01 * side && lens.fx < 1000 * side && lens.fy > 0.01 * side && lens.fy < 1000 * side, "lens.fx",
-          "no focal length of such a picture");
-  require(std::abs(lens.cx) < 10 * side && std::abs(lens.cy) < 10 * side, "lens.cx", "lies far off the picture");
-  FieldCamera camera{{LensModel::kPinhole, lens.width, lens.height, lens.fx, lens.fy, lens.cx, lens.cy, {}}, {}};
-  Vec3d columns[3];
-  for (int c = 0; c < 3; ++c) {
-    const auto i = std::size_t(c);
-    columns[c] = {message.rotation[0][i], message.rotation[1][i], message.rotation[2][i]};
-    require(std::abs(length(columns[c]) - 1) < kRotationError, "rotation", "is no rotation");
-    require(std::abs(message.position[i]) < kFarthest, "position", "is too far away");
-  }
-  require(length(cross(columns[0], columns[1]) - columns[2]) < 2 * kRotationError, "rotation", "is no rotation");
-  camera.world_from_camera.linear = Mat3d::from_columns(columns[0], columns[1], columns[2]);
-  camera.world_from_camera.translation = {message.position[0], message.position[1], message.position[2]};
-  return camera;
+  check_camera(message.camera, kLargestSide, "frame", "");
+  return camera_of(message.camera);
 }
 
 SceneMessage scene_of(const Capture& capture, const std::string& run) {

@@ -1,8 +1,7 @@
 #pragma once
 /// What the studio's page and its server say to each other, as records. Shares of width and height for places in
-/// pictures; cameras as src/capture/camera.h has them.
+/// pictures; cameras as src/capture/camera_record.h has them.
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -10,41 +9,21 @@
 #include <vector>
 
 #include "src/base/record.h"
+#include "src/capture/camera_record.h"
 #include "src/studio/field_view.h"
 #include "src/train/chroma/strokes.h"
 
 namespace cnerf::studio {
 
-using Triple = std::array<double, 3>;
-
-struct LensMessage {
-  int width = 0, height = 0;
-  double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
-
-  template <typename Self, typename Visitor>
-  static void visit(Self& self, Visitor&& v) {
-    v("width", self.width);
-    v("height", self.height);
-    v("fx", self.fx);
-    v("fy", self.fy);
-    v("cx", self.cx);
-    v("cy", self.cy);
-  }
-};
-
 /// POST frame: a camera, and what is shown of it, one picture above the other.
 struct FrameMessage {
-  Triple position{};
-  std::array<Triple, 3> rotation{};  ///< rows of world_from_camera
-  LensMessage lens;
+  CameraRecord camera;
   std::vector<std::string> sides;  ///< "grey", "now", or a take
   bool moving = false;             ///< somebody moves the camera; else a better or newer picture of where it rests
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
-    v("position", self.position);
-    v("rotation", self.rotation);
-    v("lens", self.lens);
+    CameraRecord::visit(self.camera, v);
     v("sides", self.sides);
     v("moving", self.moving, kOptional);
   }
@@ -55,9 +34,7 @@ struct ViewMessage {
   std::string name;
   bool held_out = false;
   int width = 0, height = 0;
-  Triple position{};
-  std::array<Triple, 3> rotation{};
-  LensMessage lens;
+  CameraRecord camera;
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
@@ -65,9 +42,7 @@ struct ViewMessage {
     v("held_out", self.held_out);
     v("width", self.width);
     v("height", self.height);
-    v("position", self.position);
-    v("rotation", self.rotation);
-    v("lens", self.lens);
+    CameraRecord::visit(self.camera, v);
   }
 };
 
@@ -217,7 +192,8 @@ struct OrderMessage {
   }
 };
 
-/// @throws InputError  naming the field: no rotation, a lens or size beyond what is drawn
+[[nodiscard]] FieldCamera camera_of(const CameraRecord& camera);
+/// The camera of a frame that somebody asks for.  @throws InputError  as check_camera
 [[nodiscard]] FieldCamera camera_of(const FrameMessage& message);
 [[nodiscard]] SceneMessage scene_of(const Capture& capture, const std::string& run);
 

@@ -30,7 +30,7 @@ void write_strokes_whole(const std::filesystem::path& folder, const StrokeList& 
                                           const std::function<float(std::size_t pixel)>& luminance);
 
 /// Writes VIEW.png into the folder for each view that is painted on, transparent except for paint, as --hint-image
-/// takes them; those of views that are not any more go.  @throws OutputError
+/// takes them; those of views that are not any more go. Viewpoints have none.  @throws OutputError
 void write_paint_pictures(const std::filesystem::path& folder, const Capture& capture,
                           const std::vector<Stroke>& strokes);
 

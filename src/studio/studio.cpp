@@ -19,8 +19,8 @@ namespace {
 constexpr auto kPoll = std::chrono::milliseconds(50);  // Ctrl-C only sets a flag
 constexpr std::size_t kMostTakesInMemory = 3;
 constexpr int kJpegQuality = 88;
-/// Seconds of training per second of drawing, so that a page that moves slows it by less than half on a processor and a tenth on
-/// a GPU, and one that rests by 2 %. A GPU also loses the steps that it had begun.
+/// Seconds of training per second of drawing, so that a page that moves slows it by less than half on a processor and a
+/// tenth on a GPU, and one that rests by 2 %. A GPU also loses the steps that it had begun.
 struct Pace {
   double while_turning, while_resting;
 };
@@ -82,8 +82,20 @@ void Studio::run() {
       is_working_ = order.has_value();
       stop_requested_ = false;
     }
+    forget_viewpoints();
     if (order) work_on(*order);
   }
+}
+
+void Studio::forget_viewpoints() {
+  std::vector<Viewpoint> kept;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!coloring_ || strokes_.revision == forgotten_at_) return;
+    forgotten_at_ = strokes_.revision;
+    kept = strokes_.viewpoints;
+  }
+  coloring_->forget_others(kept);
 }
 
 /// An order that cannot be carried out is told; the studio stays.

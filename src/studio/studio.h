@@ -2,6 +2,7 @@
 /// The studio: a run that is trained, looked at, painted and coloured through a page. One thread works (the one that
 /// calls `run`): it draws frames and carries out orders, a training step at a time; the server's threads ask.
 
+#include <atomic>
 #include <condition_variable>
 #include <map>
 #include <memory>
@@ -26,8 +27,9 @@ namespace cnerf::studio {
 /// GET  scene, state, events, photos/I, thumbnails/I, strokes, reach/I, cards/I, files/I
 /// PUT  strokes
 /// POST frame, reach, orders, pictures
-/// As src/studio/messages.h and src/train/chroma/strokes.h have the bodies. Whoever orders or paints first is the
-/// writer until its stream of events ends; others follow.
+/// As src/studio/messages.h and src/train/chroma/strokes.h have the bodies. I numbers the capture's views, and after
+/// them the viewpoints of the strokes that are saved. Whoever orders or paints first is the writer until its stream of
+/// events ends; others follow.
 class Studio final : public web::PageApi {
  public:
   /// Loads what there is of the run, and what was painted before. Holds its folder `strokes`, and the whole of it until
@@ -87,8 +89,25 @@ class Studio final : public web::PageApi {
   web::PageAnswer get_painted(const web::PageRequest& request);
   web::PageAnswer get_card(const web::PageRequest& request);
   web::PageAnswer get_file(const web::PageRequest& request);
-  web::PageAnswer reach_of(std::size_t view, const std::vector<Stroke>& strokes);
-  [[nodiscard]] std::size_t view_in(const web::PageRequest& request) const;
+  web::PageAnswer reach_of(int view, const StrokeList& list);
+  /// What can be painted on, by its number: a view of the capture, else a viewpoint.
+  struct Paintable {
+    const View* view = nullptr;
+    Viewpoint viewpoint;
+
+    [[nodiscard]] const std::string& name() const { return view != nullptr ? view->name : viewpoint.name; }
+    [[nodiscard]] Intrinsics lens() const { return view != nullptr ? view->intrinsics : viewpoint.camera.intrinsics(); }
+    [[nodiscard]] bool is_held_out() const { return view != nullptr && view->held_out; }
+  };
+  /// @throws MissingInputError
+  [[nodiscard]] Paintable numbered(int number, const StrokeList& list) const;
+  [[nodiscard]] Paintable numbered_in(const web::PageRequest& request) const;
+  web::PageAnswer viewpoint_photo(const Viewpoint& viewpoint, int side);
+  web::PageAnswer viewpoint_thumbnail(const Viewpoint& viewpoint);
+  /// Waits until the working thread has traced them.
+  void see(const std::vector<Viewpoint>& viewpoints);
+  /// What the working thread makes of it, whoever else asks for what; nothing where the studio is closed.
+  std::optional<std::string> asked_alone(bool is_urgent, FrameDesk::Drawing drawing);
   web::PageAnswer change_at_once(const web::PageRequest& request, const OrderMessage& order);
   web::PageAnswer take_order(const web::PageRequest& request, const Order& order);
   void save(StrokeList list);
@@ -124,6 +143,8 @@ class Studio final : public web::PageApi {
   [[nodiscard]] BoardObserver observer_of(const std::string& task);
   [[nodiscard]] FieldCamera affordable(FieldCamera camera) const;
   std::string drawn(const FrameMessage& message, const std::function<bool()>& keep_going);
+  /// Viewpoints that are not in the list any more are no longer kept as they were traced.
+  void forget_viewpoints();
   [[nodiscard]] const ColorModel* side_named(const std::string& name);
   void offer_downloads(const std::vector<std::filesystem::path>& files);
   void colors_changed();
@@ -150,6 +171,7 @@ class Studio final : public web::PageApi {
   const LuminanceModel* field_ = nullptr;
   const ColorModel* learning_ = nullptr;                            // of a take that a colorizer makes
   std::map<std::string, std::unique_ptr<ColorModel>> shown_takes_;  // that sides name
+  int forgotten_at_ = 0;                                            // revision of the strokes
   Stopwatch since_drawn_, since_refresh_;
   double affordable_rays_ = 0;  // of a frame while it trains
   double drawing_seconds_ = 0;  // that the last frame of a training took
@@ -159,12 +181,18 @@ class Studio final : public web::PageApi {
   std::condition_variable work_;
   std::string scene_;
   StrokeList strokes_;
+  struct Photo {
+    Viewpoint of;
+    std::string jpeg;
+  };
+  std::vector<Photo> photos_;                     // of viewpoints that are saved
   std::vector<std::filesystem::path> downloads_;  // as the state has them
   std::vector<std::string> cards_;                // JPEG
   std::optional<Order> order_;                    // that waits
   bool is_working_ = true;                        // `run` begins with work of its own
   bool stop_requested_ = false;
   FrameDesk frames_;
+  std::atomic<std::uint64_t> asked_alone_ = 0;
 };
 
 }  // namespace cnerf::studio

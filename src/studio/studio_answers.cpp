@@ -37,7 +37,7 @@ std::string text_of(const std::vector<std::byte>& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// Strokes that are not saved yet, of one view.
+/// Strokes that are not saved yet, and the number of what they are seen on.
 struct ReachMessage {
   int view = 0;
   std::vector<Stroke> strokes;
@@ -74,6 +74,17 @@ LinearImage decoded_image(const std::string& bytes, const fs::path& folder, cons
   } catch (const InputError&) {
     throw InputError(name.empty() ? "picture" : name, "", "expected a PNG, JPEG, TIFF or WebP picture");
   }
+}
+
+/// Of the path; -1 where it is too large.
+int number_at_end(const PageRequest& request) {
+  return number_in(std::string_view(request.path).substr(request.path.rfind('/') + 1)).value_or(-1);
+}
+
+/// A lens of a picture that is no larger than this.
+Intrinsics fitted(const Intrinsics& lens, int side) {
+  const double factor = std::min(1.0, double(side) / std::max(lens.width, lens.height));
+  return resized(lens, std::max(1, int(lens.width * factor)), std::max(1, int(lens.height * factor)));
 }
 
 Picture grey_of(const MonoImage& image) {
@@ -116,38 +127,89 @@ PageAnswer Studio::get_state(const PageRequest& /*request*/) {
   return {.body = board_.text()};
 }
 
-/// Number of the view at the end of the path.  @throws MissingInputError
-std::size_t Studio::view_in(const PageRequest& request) const {
-  const auto number = number_in(std::string_view(request.path).substr(request.path.rfind('/') + 1));
-  if (!number || std::size_t(*number) >= context_.capture.views.size()) {
-    throw MissingInputError("the capture has " + std::to_string(context_.capture.views.size()) + " views");
-  }
-  return std::size_t(*number);
+Studio::Paintable Studio::numbered(int number, const StrokeList& list) const {
+  const std::vector<View>& views = context_.capture.views;
+  const auto place = std::size_t(number);  // of a number below 0 it is too large
+  if (place < views.size()) return {&views[place], {}};
+  if (place - views.size() < list.viewpoints.size()) return {nullptr, list.viewpoints[place - views.size()]};
+  throw MissingInputError(fmt::format("view: there are {} and {} viewpoints", views.size(), list.viewpoints.size()));
+}
+
+Studio::Paintable Studio::numbered_in(const PageRequest& request) const {
+  const std::lock_guard lock(mutex_);
+  return numbered(number_at_end(request), strokes_);
 }
 
 PageAnswer Studio::get_photo(const PageRequest& request) {
-  Picture picture = grey_of(context_.capture.views[view_in(request)].image);
-  const auto wanted = request.parameters.find("side");
-  if (wanted != request.parameters.end()) {
-    const int side = std::max(number_in(wanted->second).value_or(0), 16);
-    const double factor = std::min(1.0, double(side) / std::max(picture.width, picture.height));
-    picture = scaled_down(picture, std::max(1, int(picture.width * factor)));
-  }
+  const Paintable wanted = numbered_in(request);
+  const auto parameter = request.parameters.find("side");
+  const bool is_whole = parameter == request.parameters.end();
+  const int side = is_whole ? kLargestViewpoint : std::max(number_in(parameter->second).value_or(0), 16);
+  if (wanted.view == nullptr) return viewpoint_photo(wanted.viewpoint, side);
+  Picture picture = grey_of(wanted.view->image);
+  if (!is_whole) picture = scaled_down(picture, fitted(wanted.lens(), side).width);
   return {.type = "image/jpeg", .body = text_of(jpeg_bytes(picture, kPhotoQuality))};
 }
 
+/// What the field shows there. A whole one is kept, once the field is trained.
+PageAnswer Studio::viewpoint_photo(const Viewpoint& viewpoint, int side) {
+  FieldCamera camera = camera_of(viewpoint.camera);
+  camera.lens = fitted(camera.lens, side);
+  const bool is_whole = camera.lens == viewpoint.camera.intrinsics();
+  {
+    const std::lock_guard lock(mutex_);
+    const auto kept = std::ranges::find(photos_, viewpoint, &Photo::of);
+    if (is_whole && kept != photos_.end()) return {.type = "image/jpeg", .body = kept->jpeg};
+  }
+  // Who opens one waits for it.
+  auto jpeg = asked_alone(is_whole, [this, viewpoint, camera, is_whole](const std::function<bool()>& keep_going) {
+    const std::vector<Side> grey = {nullptr};
+    const DrawingEffort effort = sharp_effort(context_.config.render.steps_per_box);
+    const std::vector<Picture> pictures = draw_field(*field_, camera, grey, effort, keep_going);
+    if (pictures.empty()) return std::optional<std::string>();
+    std::string bytes = text_of(jpeg_bytes(pictures.front(), kPhotoQuality));
+    const std::lock_guard lock(mutex_);
+    const bool is_saved = std::ranges::find(strokes_.viewpoints, viewpoint) != strokes_.viewpoints.end();
+    const bool is_kept = std::ranges::find(photos_, viewpoint, &Photo::of) != photos_.end();
+    if (is_whole && is_saved && !is_kept && coloring_) photos_.push_back({viewpoint, bytes});
+    return std::optional(std::move(bytes));
+  });
+  if (!jpeg) return {.status = 204};
+  return {.type = "image/jpeg", .body = std::move(*jpeg)};
+}
+
+PageAnswer Studio::viewpoint_thumbnail(const Viewpoint& viewpoint) {
+  FieldCamera camera = camera_of(viewpoint.camera);
+  const int width = std::min(camera.lens.width, kThumbnailWidth);
+  camera.lens = resized(camera.lens, width, std::max(1, camera.lens.height * width / camera.lens.width));
+  auto jpeg = asked_alone(false, [this, camera](const std::function<bool()>& keep_going) {
+    const std::vector<Side> now = {side_named(kNow)};
+    const DrawingEffort effort = sharp_effort(context_.config.render.steps_per_box, finish());
+    const std::vector<Picture> pictures = draw_field(*field_, camera, now, effort, keep_going);
+    return pictures.empty() ? std::nullopt : std::optional(text_of(jpeg_bytes(pictures.front(), kThumbnailQuality)));
+  });
+  if (!jpeg) return {.status = 204};
+  return {.type = "image/jpeg", .body = std::move(*jpeg)};
+}
+
+/// A client of its own each, so that none makes another stale.
+std::optional<std::string> Studio::asked_alone(bool is_urgent, FrameDesk::Drawing drawing) {
+  return frames_.ask(fmt::format("alone {}", ++asked_alone_), is_urgent, std::move(drawing));
+}
+
 PageAnswer Studio::get_thumbnail(const PageRequest& request) {
-  const View& view = context_.capture.views[view_in(request)];
-  if (view.held_out || !is_ready()) {
-    const Picture grey = scaled_down(grey_of(view.image), kThumbnailWidth);
+  const Paintable wanted = numbered_in(request);
+  if (wanted.view == nullptr) return viewpoint_thumbnail(wanted.viewpoint);
+  if (wanted.is_held_out() || !is_ready()) {
+    const Picture grey = scaled_down(grey_of(wanted.view->image), kThumbnailWidth);
     return {.type = "image/jpeg", .body = text_of(jpeg_bytes(grey, kThumbnailQuality))};
   }
-  const auto names = coloring_->names();
-  const auto cached = std::size_t(std::ranges::find(names, view.name) - names.begin());
   // Each thumbnail is a client of its own, so that none makes another stale.
-  auto drawn = frames_.ask(request.client + " thumbnail " + view.name, false, [this, cached](const auto&) {
+  const std::string& name = wanted.name();
+  auto drawn = frames_.ask(request.client + " thumbnail " + name, false, [this, name](const auto&) {
+    const SeenSurfaces& seen = *coloring_->seen();
     const Picture picture =
-        draw_cached(coloring_->seen()->views()[cached], side_named(kNow), kThumbnailWidth, finish());
+        draw_cached(seen.views()[seen.view_named(name)], side_named(kNow), kThumbnailWidth, finish());
     return std::optional(text_of(jpeg_bytes(picture, kThumbnailQuality)));
   });
   if (!drawn) return {.status = 204};
@@ -202,37 +264,54 @@ void Studio::save(StrokeList list) {
   list.revision = strokes_.revision + 1;
   write_strokes(stroke_folder(context_) / kStrokeFile, list);
   strokes_ = std::move(list);
+  std::erase_if(photos_, [this](const Photo& photo) {
+    return std::ranges::find(strokes_.viewpoints, photo.of) == strokes_.viewpoints.end();
+  });
   board_.change([&](StateMessage& state) { state.strokes = strokes_.revision; });
 }
 
 PageAnswer Studio::get_reach(const PageRequest& request) {
-  return reach_of(view_in(request), saved_strokes().strokes);
+  return reach_of(number_at_end(request), saved_strokes());
 }
 
 PageAnswer Studio::post_reach(const PageRequest& request) {
   const auto message = record_of<ReachMessage>(parse_json(request.body, "reach"), "reach");
-  std::vector<std::string> names;
-  for (const View& view : context_.capture.views) names.push_back(view.name);
-  StrokeList added;
-  added.strokes = message.strokes;
+  StrokeList list = saved_strokes();
   // As those of a file are.
-  const StrokeList checked = strokes_of_json(json_of(added).dump(), "reach", names, painted_);
-  if (message.view < 0 || std::size_t(message.view) >= names.size()) throw MissingInputError("no such view");
-  std::vector<Stroke> strokes = saved_strokes().strokes;
+  const StrokeList added{0, message.strokes, list.viewpoints};
+  const StrokeList checked =
+      strokes_of_json(json_of(added).dump(), "reach", paintable_views(context_.capture), painted_);
   for (const Stroke& stroke : checked.strokes) {
-    std::erase_if(strokes, [&](const Stroke& saved) { return saved.id == stroke.id; });
-    strokes.push_back(stroke);
+    std::erase_if(list.strokes, [&](const Stroke& saved) { return saved.id == stroke.id; });
+    list.strokes.push_back(stroke);
   }
-  return reach_of(std::size_t(message.view), strokes);
+  return reach_of(message.view, list);
 }
 
-PageAnswer Studio::reach_of(std::size_t view, const std::vector<Stroke>& strokes) {
+/// Each in a turn of its own, so that frames need not wait for all.
+void Studio::see(const std::vector<Viewpoint>& viewpoints) {
+  for (const Viewpoint& viewpoint : viewpoints) {
+    if (const auto reading = coloring_->reading(); coloring_->has_seen(std::span(&viewpoint, 1))) continue;
+    (void)asked_alone(false, [this, viewpoint](const auto&) {
+      coloring_->see(std::span(&viewpoint, 1), {});
+      return std::optional<std::string>("");
+    });
+  }
+}
+
+PageAnswer Studio::reach_of(int view, const StrokeList& list) {
+  const Paintable wanted = numbered(view, list);
   if (!is_ready()) return refusal(503, "the views are being looked at; in a moment");
-  const View& wanted = context_.capture.views[view];
-  if (wanted.held_out) throw MissingInputError(wanted.name + " is held out for evaluation");
+  if (wanted.is_held_out()) throw MissingInputError(wanted.name() + " is held out for evaluation");
+  std::vector<Viewpoint> viewpoints = painted_viewpoints(list);
+  const bool is_unpainted = std::ranges::find(viewpoints, wanted.viewpoint) == viewpoints.end();
+  if (wanted.view == nullptr && is_unpainted) viewpoints.push_back(wanted.viewpoint);
+  see(viewpoints);
+  const auto reading = coloring_->reading();
+  if (!coloring_->has_seen(viewpoints)) return refusal(503, "the viewpoints are being looked at; in a moment");
   const SeenSurfaces& seen = *coloring_->seen();
-  const std::size_t cached = seen.view_named(wanted.name);
-  const KnownColorSources sources(seen, known_of(strokes, seen.views(), coloring_->names()));
+  const std::size_t cached = seen.view_named(wanted.name());
+  const KnownColorSources sources(seen, known_of(list.strokes, seen));
   const CachedView& shown = seen.views()[cached];
   const cv::Mat overlay = colors_at_luminance(sources.seen_in(cached), {shown.width, shown.height}, kReachAlpha,
                                               [&](std::size_t p) { return shown.luminance[p]; });
@@ -306,22 +385,25 @@ PageAnswer Studio::post_picture(const PageRequest& request) {
 
 PageAnswer Studio::add_painted(const PageRequest& request, std::optional<int> view, const std::string& name,
                                const std::string& shown) {
-  if (!view || std::size_t(*view) >= context_.capture.views.size()) throw MissingInputError("view: no such view");
-  const View& of = context_.capture.views[std::size_t(*view)];
-  if (of.held_out) throw InputError("picture", "view", of.name + " is held out for evaluation");
+  const Paintable of = numbered(view.value_or(-1), saved_strokes());
+  if (of.is_held_out()) throw InputError("picture", "view", of.name() + " is held out for evaluation");
+  const Intrinsics lens = of.lens();
   const PaintedPicture picture =
       painted_picture(decoded_image(request.body, stroke_folder(context_), shown), shown.empty() ? "picture" : shown);
-  const double ratio = double(picture.width) * of.intrinsics.height / (double(picture.height) * of.intrinsics.width);
+  const double ratio = double(picture.width) * lens.height / (double(picture.height) * lens.width);
   if (std::abs(ratio - 1) > kSameShape) {
     throw InputError(shown.empty() ? "picture" : shown, "size",
-                     fmt::format("{} x {} is not the shape of {}, {} x {}", picture.width, picture.height, of.name,
-                                 of.intrinsics.width, of.intrinsics.height));
+                     fmt::format("{} x {} is not the shape of {}, {} x {}", picture.width, picture.height, of.name(),
+                                 lens.width, lens.height));
   }
   const std::lock_guard lock(mutex_);
   if (auto why = board_.become_writer(request.client)) return *why;
   write_file(painted_.file(name), request.body);
   StrokeList list = strokes_;
-  Stroke stroke{.id = "p" + name + std::to_string(list.revision), .view = of.name, .kind = "picture"};
+  if (of.view == nullptr && std::ranges::find(list.viewpoints, of.viewpoint) == list.viewpoints.end()) {
+    throw MissingInputError("view: it is gone");
+  }
+  Stroke stroke{.id = "p" + name + std::to_string(list.revision), .view = of.name(), .kind = "picture"};
   stroke.picture = name;
   stroke.painted = painted_.find(name);
   list.strokes.push_back(std::move(stroke));
@@ -341,14 +423,14 @@ PageAnswer Studio::get_painted(const PageRequest& request) {
 }
 
 PageAnswer Studio::get_card(const PageRequest& request) {
-  const auto number = std::size_t(*number_in(std::string_view(request.path).substr(request.path.rfind('/') + 1)));
+  const auto number = std::size_t(number_at_end(request));
   const std::lock_guard lock(mutex_);
   if (number >= cards_.size()) throw MissingInputError("there is no such card");
   return {.type = "image/jpeg", .body = cards_[number]};
 }
 
 PageAnswer Studio::get_file(const PageRequest& request) {
-  const auto number = std::size_t(*number_in(std::string_view(request.path).substr(request.path.rfind('/') + 1)));
+  const auto number = std::size_t(number_at_end(request));
   const std::lock_guard lock(mutex_);
   if (number >= downloads_.size()) throw MissingInputError("not here");
   return {.headers = {{"Content-Disposition", "attachment"}}, .file = downloads_[number]};

@@ -105,11 +105,11 @@ void Studio::cache_views(const Order& /*order*/) {
 }
 
 void Studio::colour(const Order& /*order*/) {
-  const std::vector<Stroke> strokes = saved_strokes().strokes;
-  write_paint_pictures(stroke_folder(context_), context_.capture, strokes);
+  const StrokeList list = saved_strokes();
+  write_paint_pictures(stroke_folder(context_), context_.capture, list.strokes);
   const Stopwatch watch;
   double shown_at = 0;
-  coloring_->colour(strokes, retouch_, [&](double fraction) {
+  coloring_->colour(list, retouch_, [&](double fraction) {
     if (watch.seconds() - shown_at > kBetweenColors) {
       shown_at = watch.seconds();
       colors_changed();

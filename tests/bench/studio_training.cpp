@@ -1,7 +1,8 @@
 // What a training in the studio loses to a page that looks at it.
 //   cnerf-studio-training CAPTURE FOLDER [from=4e6] [to=24e6] [device=auto] [downscale=N]
 //     FOLDER    for runs; made anew each time
-//     prints how long these samples take, medians of three, with nobody there, with a page that rests, and with one that turns the camera
+//     prints how long these samples take, medians of three, with nobody there, with a page that rests, and with one
+//     that turns the camera
 
 #include <fmt/format.h>
 
@@ -26,10 +27,10 @@ enum class Page { kNobody, kRests, kTurns };
 std::string asked_frame(const Capture& capture, double share, bool is_moving) {
   const SceneMessage scene = scene_of(capture, "");
   const ViewMessage& view = scene.views[std::size_t(scene.home)];
-  FrameMessage frame{view.position, view.rotation, {}, {"grey"}, is_moving};
+  FrameMessage frame{view.camera, {"grey"}, is_moving};
   const int width = int(1280 * share), height = int(720 * share);
-  const double f = view.lens.fy * height / view.lens.height;
-  frame.lens = {width, height, f, f, width / 2.0, height / 2.0};
+  const double f = view.camera.lens.fy * height / view.camera.lens.height;
+  frame.camera.lens = {width, height, f, f, width / 2.0, height / 2.0};
   return json_of(frame).dump();
 }
 

@@ -10,6 +10,7 @@
 
 #include "src/base/error.h"
 #include "src/picture/encode.h"
+#include "src/train/chroma/strokes.h"
 #include "tests/support/data.h"
 
 namespace cnerf::pipeline {
@@ -59,7 +60,7 @@ TEST_F(KnownColorFiles, KeyFramesComeFirstThenHints) {
   ColorizerOptions config;
   config.keyframes = "b=" + at("red.png") + "; images/a.png=" + at("red.png");
   config.hints = "10,10,a,#00ff00;39.5,0,b.png,#0000ff";
-  const std::vector<KnownColors> known = load_known_colors(capture_, config);
+  const std::vector<KnownColors> known = load_known_colors(capture_, config).known;
   ASSERT_EQ(known.size(), 4u);
   EXPECT_EQ(known[0].view, "images/b.png");
   EXPECT_EQ(known[1].view, "images/a.png");
@@ -80,7 +81,7 @@ TEST_F(KnownColorFiles, OfAHintPictureOnlyTheStrokesCount) {
   cv::imwrite(at("strokes.png"), strokes);
   ColorizerOptions config;
   config.hint_images = "a=" + at("strokes.png");
-  const std::vector<KnownColors> known = load_known_colors(capture_, config);
+  const std::vector<KnownColors> known = load_known_colors(capture_, config).known;
   ASSERT_EQ(known.size(), 1u);
   EXPECT_EQ(known[0].kind, KnownColorKind::kStrokes);
   EXPECT_EQ(std::accumulate(known[0].is_known.begin(), known[0].is_known.end(), 0), 1);
@@ -90,6 +91,28 @@ TEST_F(KnownColorFiles, OfAHintPictureOnlyTheStrokesCount) {
   cv::imwrite(at("empty.png"), cv::Mat4b(20, 40, cv::Vec4b(0, 0, 0, 0)));
   config.hint_images = "a=" + at("empty.png");
   EXPECT_THAT(refusal<InputError>(config), HasSubstr("nothing is painted"));
+}
+
+TEST_F(KnownColorFiles, StrokeFilesPaintViewsAndViewpoints) {
+  const LensRecord lens = {16, 12, 14, 14, 8, 6};
+  const CameraRecord camera = {{0, 0, 0}, {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, lens};
+  StrokeList list{1, {}, {{"unpainted", camera}, {"viewpoint-1", camera}}};
+  for (const char* view : {"viewpoint-1", "images/b.png"}) {
+    Stroke stroke{.id = "s" + std::to_string(list.strokes.size()), .view = view, .color = "#ff0000", .size = 0.3f};
+    stroke.points = {{0.5f, 0.5f, 1}};
+    list.strokes.push_back(stroke);
+  }
+  write_strokes(at("strokes.json"), list);
+  ColorizerOptions config;
+  config.strokes = at("strokes.json");
+  const GivenColors given = load_known_colors(capture_, config);
+  ASSERT_EQ(given.viewpoints.size(), 1u) << "those that are painted";
+  EXPECT_EQ(given.viewpoints[0].name, "viewpoint-1");
+  ASSERT_EQ(given.known.size(), 2u);
+  EXPECT_EQ(given.known[0].view, "images/b.png") << "the capture's views come first";
+  EXPECT_EQ(given.known[1].view, "viewpoint-1");
+  EXPECT_EQ(given.known[1].width, lens.width);
+  EXPECT_EQ(given.known[1].is_known[6 * 16 + 8], 1);
 }
 
 TEST_F(KnownColorFiles, BadEntriesAreRefusedByName) {

@@ -10,6 +10,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/capture/arrangement.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/train_step.h"
 #include "src/sample/sample_scene.h"
@@ -87,6 +88,10 @@ class StudioTest : public testing::Test {
   PageAnswer put(const std::vector<json>& strokes, int revision, const std::string& client = kPainter) {
     return studio_->answer({"PUT", "/studio/strokes", {}, client, revision, json{{"strokes", strokes}}.dump()});
   }
+  PageAnswer put_with(const std::vector<json>& strokes, const std::vector<json>& viewpoints, int revision) {
+    const json body = {{"strokes", strokes}, {"viewpoints", viewpoints}};
+    return studio_->answer({"PUT", "/studio/strokes", {}, kPainter, revision, body.dump()});
+  }
   json wait_until(const std::function<bool(const json&)>& holds) {
     std::uint64_t seen = 0;
     for (;;) {
@@ -106,6 +111,34 @@ class StudioTest : public testing::Test {
     return {{"id", id},        {"view", context_.capture.views[1].name},
             {"kind", "paint"}, {"color", "#c03020"},
             {"size", 0.2},     {"points", std::vector<std::vector<double>>{{x, y, 1}}}};
+  }
+  /// Between two cameras of the capture, a little nearer to its middle.
+  [[nodiscard]] json viewpoint(const std::string& name, double nearer = 0.95) const {
+    const View& view = context_.capture.views[1];
+    const CameraArrangement cameras = arrangement_of(context_.capture);
+    Affined pose = view.world_from_camera;
+    pose.translation = cameras.focus + (pose.translation - cameras.focus) * nearer;
+    const Intrinsics lens = resized(view.intrinsics, 120, 80);
+    return json::parse(json_of(Viewpoint{name, camera_record(lens, pose)}).dump());
+  }
+  /// A large stroke on it.
+  [[nodiscard]] json stroke_on(const std::string& view, const std::string& id = "v") const {
+    json large = stroke(id, 0.5, 0.5);
+    large["view"] = view;
+    large["size"] = 0.5;
+    large["reach"] = 4;
+    return large;
+  }
+  [[nodiscard]] std::string address(const char* of, std::size_t viewpoint) const {
+    return of + std::to_string(context_.capture.views.size() + viewpoint);
+  }
+  static int colored_pixels(const PageAnswer& answer) {
+    const cv::Mat picture = decoded(answer);
+    EXPECT_EQ(picture.channels(), 4) << answer.body;
+    int count = 0;
+    for (int i = 0; i < int(picture.total()); ++i)
+      count += picture.at<cv::Vec4b>(i / picture.cols, i % picture.cols)[3] > 0;
+    return count;
   }
   [[nodiscard]] json frame(const std::vector<std::string>& sides) const {
     json view = json::parse(json_of(scene_of(context_.capture, "run")).dump())["views"][1];
@@ -214,21 +247,13 @@ TEST_F(StudioTest, ReachShowsWhatStrokesWillColorInTheirViewAndOthers) {
   open();
   const PageAnswer nothing = get("reach/1");
   ASSERT_EQ(nothing.status, 200) << nothing.body;
-  const auto colored = [](const PageAnswer& answer) {
-    const cv::Mat picture = decoded(answer);
-    EXPECT_EQ(picture.channels(), 4);
-    int count = 0;
-    for (int i = 0; i < int(picture.total()); ++i)
-      count += picture.at<cv::Vec4b>(i / picture.cols, i % picture.cols)[3] > 0;
-    return count;
-  };
-  EXPECT_EQ(colored(nothing), 0);
+  EXPECT_EQ(colored_pixels(nothing), 0);
   const PageAnswer drawn = post("reach", json{{"view", 1}, {"strokes", {stroke("a", 0.5, 0.5)}}});
-  EXPECT_GT(colored(drawn), 20);
-  EXPECT_EQ(colored(get("reach/1")), 0) << "it is not saved";
+  EXPECT_GT(colored_pixels(drawn), 20);
+  EXPECT_EQ(colored_pixels(get("reach/1")), 0) << "it is not saved";
   EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
   EXPECT_EQ(get("reach/1").body, drawn.body);
-  EXPECT_GT(colored(get("reach/2")), 5) << "the next camera sees some of it";
+  EXPECT_GT(colored_pixels(get("reach/2")), 5) << "the next camera sees some of it";
   EXPECT_EQ(get("reach/99").status, 404);
   EXPECT_EQ(get("reach/0").status, 404) << "held out";
 }
@@ -270,8 +295,7 @@ TEST_F(StudioTest, AJournalIsReplayedBitForBit) {
   (void)ordered({{"order", "keep"}, {"name", "red"}});
   close();
   const fs::path file = context_.directory.take_folder("red") / kJournalFile;
-  const std::vector<std::string> views = {context_.capture.views[1].name};
-  const Journal journal = read_journal(file, views);
+  const Journal journal = read_journal(file, paintable_views(context_.capture));
   ASSERT_EQ(journal.deeds.size(), 3u);
   Coloring again(context_, cpu_engines());
   again.replay(journal, kQuick, [](double) {});
@@ -282,7 +306,7 @@ TEST_F(StudioTest, AJournalIsReplayedBitForBit) {
 
 TEST_F(StudioTest, JournalsOfAnyContentAreRefusedByName) {
   const fs::path file = context_.directory.root() / "strokes/journal.json";
-  const std::vector<std::string> views = {context_.capture.views[1].name};
+  const PaintableViews views = paintable_views(context_.capture);
   json bad = stroke("a", 0.5, 0.5);
   bad["size"] = 7;
   const std::vector<json> strokes = {bad};
@@ -419,6 +443,14 @@ TEST_F(StudioTest, APaintedPictureBecomesAStroke) {
   const cv::Mat reach = decoded(get("reach/1"));
   EXPECT_GT(reach.at<cv::Vec4b>(reach.rows / 2, reach.cols / 4)[3], 0);
 
+  ASSERT_EQ(put_with({}, {viewpoint("viewpoint-1")}, 2).status, 200);
+  cv::Mat there(160, 240, CV_8UC4, cv::Scalar(0, 0, 0, 0));
+  there(cv::Rect(0, 0, 120, 160)).setTo(cv::Scalar(20, 30, 200, 255));
+  ASSERT_EQ(sent(std::to_string(context_.capture.views.size()), there).status, 202);
+  const json on_viewpoint = json::parse(get("strokes").body);
+  EXPECT_EQ(on_viewpoint["strokes"][0]["view"], "viewpoint-1");
+  EXPECT_EQ(on_viewpoint["viewpoints"].size(), 1u) << "it stays";
+
   EXPECT_EQ(sent("99", painted).status, 404);
   EXPECT_THAT(sent("0", painted).body, HasSubstr("held out"));
   EXPECT_THAT(sent("1", painted(cv::Rect(painted.cols / 2 - 9, 0, 18, painted.rows))).body, HasSubstr("shape"));
@@ -427,9 +459,124 @@ TEST_F(StudioTest, APaintedPictureBecomesAStroke) {
   for (const char* picture : {"../../../etc", "0123456789ab", ""}) {
     json bad = strokes["strokes"][0];
     bad["picture"] = picture;
-    EXPECT_GE(put({bad}, 2).status, 400) << picture;
+    EXPECT_GE(put({bad}, 4).status, 400) << picture;
     EXPECT_EQ(studio_->answer({"GET", "/studio/painted", {{"picture", picture}}, kPainter, {}, {}}).status, 404);
   }
+}
+
+TEST_F(StudioTest, ViewpointsHavePicturesOfTheFieldAndNumbersAfterTheViews) {
+  open();
+  EXPECT_EQ(json::parse(get("strokes").body)["viewpoints"], json::array());
+  EXPECT_EQ(get(address("photos/", 0)).status, 404);
+  ASSERT_EQ(put_with({}, {viewpoint("viewpoint-1"), viewpoint("other", 0.8)}, 0).status, 200);
+  EXPECT_EQ(json::parse(get("strokes").body)["viewpoints"], json({viewpoint("viewpoint-1"), viewpoint("other", 0.8)}));
+  const PageAnswer photo = get(address("photos/", 0));
+  EXPECT_EQ(decoded(photo).size(), cv::Size(120, 80));
+  EXPECT_LT(colorfulness(decoded(photo)), 1) << "grey";
+  EXPECT_EQ(get(address("photos/", 0)).body, photo.body);
+  EXPECT_NE(get(address("photos/", 1)).body, photo.body);
+  const auto small =
+      studio_->answer({"GET", "/studio/" + address("photos/", 0), {{"side", "60"}, {"at", "7"}}, {}, {}, {}});
+  EXPECT_EQ(decoded(small).size(), cv::Size(60, 40));
+  EXPECT_EQ(decoded(get(address("thumbnails/", 1))).size(), cv::Size(120, 80));
+  EXPECT_EQ(get(address("photos/", 2)).status, 404);
+
+  ASSERT_EQ(put_with({}, {viewpoint("viewpoint-1", 0.8)}, 1).status, 200);
+  EXPECT_NE(get(address("photos/", 0)).body, photo.body) << "it looks from elsewhere now";
+  for (const char* of : {"photos/", "thumbnails/", "reach/"}) EXPECT_EQ(get(address(of, 1)).status, 404) << of;
+}
+
+TEST_F(StudioTest, ViewpointsAreRefusedByTheField) {
+  open();
+  json bad = viewpoint("viewpoint-2");
+  bad["lens"]["fx"] = 0;
+  const PageAnswer answer = put_with({}, {viewpoint("viewpoint-1"), bad}, 0);
+  EXPECT_EQ(answer.status, 400);
+  EXPECT_THAT(answer.body, HasSubstr("viewpoints[1].lens.fx"));
+  EXPECT_THAT(put_with({}, {viewpoint("a"), viewpoint("a")}, 0).body, HasSubstr("viewpoints[1].name"));
+  EXPECT_EQ(put_with({stroke_on("viewpoint-1")}, {}, 0).status, 400) << "no such view";
+  EXPECT_EQ(put_with({stroke_on("viewpoint-1")}, {viewpoint("viewpoint-1")}, 0).status, 200);
+  EXPECT_EQ(put_with({stroke_on("viewpoint-1")}, {}, 1).status, 400) << "it is painted on";
+}
+
+TEST_F(StudioTest, StrokesOnViewpointsReachViewsAndColorThem) {
+  open();
+  ASSERT_EQ(put_with({}, {viewpoint("viewpoint-1")}, 0).status, 200);
+  EXPECT_EQ(colored_pixels(get(address("reach/", 0))), 0);
+  const json drawn = {{"view", context_.capture.views.size()}, {"strokes", {stroke_on("viewpoint-1")}}};
+  EXPECT_GT(colored_pixels(post("reach", drawn)), 100) << "before it is saved";
+  EXPECT_EQ(colored_pixels(get("reach/1")), 0);
+  ASSERT_EQ(put_with({stroke_on("viewpoint-1")}, {viewpoint("viewpoint-1")}, 1).status, 200);
+  EXPECT_GT(colored_pixels(get(address("reach/", 0))), 100);
+  EXPECT_GT(colored_pixels(get("reach/1")), 50);
+
+  const json settled = ordered({{"order", "colour"}});
+  EXPECT_EQ(settled["failed"], false) << settled;
+  EXPECT_GT(colorfulness(decoded(post("frame", frame({"now"})))), 10) << "as a camera of the capture sees it";
+  EXPECT_GT(colorfulness(decoded(get(address("thumbnails/", 0)))), 10);
+  EXPECT_LT(colorfulness(decoded(get(address("photos/", 0)))), 1);
+  for (const auto& entry : fs::directory_iterator(context_.directory.root() / "strokes")) {
+    EXPECT_NE(entry.path().extension(), ".png") << "photographs have pictures of their paint, viewpoints none";
+  }
+  ASSERT_EQ(put_with({}, {}, 2).status, 200);
+  EXPECT_EQ(colored_pixels(get("reach/1")), 0);
+  EXPECT_EQ(get(address("reach/", 0)).status, 404);
+  EXPECT_EQ(ordered({{"order", "colour"}})["failed"], false);
+}
+
+TEST_F(StudioTest, TakesOfViewpointsAreKeptAndReplayedBitForBit) {
+  open();
+  const json first = viewpoint("viewpoint-1"), moved = viewpoint("viewpoint-1", 0.8), other = viewpoint("other", 0.9);
+  EXPECT_EQ(put_with({stroke_on("viewpoint-1")}, {first}, 0).status, 200);
+  (void)ordered({{"order", "colour"}});
+  // Looked at in another order than they are painted in, one of them without paint, one where another was.
+  EXPECT_EQ(put_with({stroke_on("other"), stroke_on("viewpoint-1", "w"), stroke("a", 0.2, 0.5)},
+                     {viewpoint("empty", 0.7), other, moved}, 1)
+                .status,
+            200);
+  for (const std::size_t i : {0, 2, 1}) EXPECT_EQ(get(address("reach/", i)).status, 200) << i;
+  (void)ordered({{"order", "colour"}});
+  (void)ordered({{"order", "keep"}, {"name", "red"}});
+  const fs::path folder = context_.directory.take_folder("red");
+  EXPECT_EQ(read_strokes(folder / kStrokeFile, paintable_views(context_.capture)).viewpoints.size(), 3u);
+  EXPECT_THAT(context_.directory.take_record("red")->colorizer, HasSubstr("viewpoint-1"));
+  close();
+  const Journal journal = read_journal(folder / kJournalFile, paintable_views(context_.capture));
+  ASSERT_EQ(journal.deeds.size(), 3u);
+  EXPECT_EQ(journal.deeds[1].viewpoints.size(), 1u);
+  EXPECT_EQ(journal.deeds[2].viewpoints.size(), 2u) << "those that are painted";
+  Coloring again(context_, cpu_engines());
+  again.replay(journal, kQuick, [](double) {});
+  again.keep("red-2", 0, observer_);
+  EXPECT_EQ(read_binary_file(context_.directory.take_snapshot("red")),
+            read_binary_file(context_.directory.take_snapshot("red-2")));
+}
+
+TEST_F(StudioTest, ViewpointsComeBesideWorkAndGoBetweenIt) {
+  Coloring coloring(context_, cpu_engines());
+  coloring.cache_views([](double) {});
+  const auto at = [&](const std::string& name, double nearer) {
+    return record_of<Viewpoint>(parse_json(viewpoint(name, nearer).dump(), "test"), "test");
+  };
+  const std::vector<Viewpoint> one = {at("a", 0.9)}, moved = {at("a", 0.8)}, two = {at("a", 0.8), at("b", 0.7)};
+  const std::size_t views = coloring.seen()->views().size();
+  coloring.see(one, {});
+  const SeenSurfaces before = coloring.seen()->first(views + 1);
+  const CachedView* first = before.views().data();
+  coloring.see(moved, {});
+  coloring.see(two, {});
+  EXPECT_EQ(coloring.seen()->views().data(), first) << "nothing moves";
+  ASSERT_EQ(coloring.seen()->views().size(), views + 3);
+  EXPECT_EQ(coloring.seen()->view_named("a"), views + 1) << "the later one";
+  EXPECT_TRUE(coloring.has_seen(two));
+  // A call that comes while another one traces.
+  const std::vector<Viewpoint> third = {at("c", 0.6)};
+  coloring.see(third, [&](double) { coloring.see(third, {}); });
+  EXPECT_EQ(coloring.seen()->views().size(), views + 4);
+  coloring.forget_others(moved);
+  EXPECT_EQ(coloring.seen()->views().size(), views + 1);
+  EXPECT_TRUE(coloring.has_seen(moved));
+  EXPECT_FALSE(coloring.has_seen(two));
 }
 
 TEST_F(StudioTest, ATrainingIsWatchedStoppedAndGoneOnWith) {
@@ -445,6 +592,9 @@ TEST_F(StudioTest, ATrainingIsWatchedStoppedAndGoneOnWith) {
   EXPECT_GT(early.cols, early.rows) << "as large as there is time for";
   EXPECT_EQ(post("orders", {{"order", "colour"}}).status, 409);
   EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200) << "painting need not wait";
+  EXPECT_EQ(put_with({stroke_on("viewpoint-1")}, {viewpoint("viewpoint-1")}, 1).status, 200);
+  EXPECT_EQ(decoded(get(address("photos/", 0))).size(), cv::Size(120, 80)) << "of the field as it is by now";
+  EXPECT_EQ(get(address("reach/", 0)).status, 503);
   EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
   const json stopped = wait_until([](const json& state) { return state["task"] == ""; });
   EXPECT_EQ(stopped["stage"], "training");

@@ -74,6 +74,31 @@ TEST_F(Stage2, SpreadWeightReachesTheField) {
   EXPECT_LT(distance_to_answer("close"), 5);
 }
 
+TEST_F(Stage2, ViewpointsAreViewsOfTheirJobAlone) {
+  const View& near = capture_.views[0];
+  Affined pose = near.world_from_camera;
+  pose.translation = pose.translation * 0.9;
+  const std::vector<Viewpoint> viewpoints = {{"viewpoint-1", camera_record(near.intrinsics, pose)}};
+  const auto pixels = std::size_t(near.intrinsics.width) * std::size_t(near.intrinsics.height);
+  const std::vector<KnownColors> known = {{KnownColorKind::kStrokes, "viewpoint-1", near.intrinsics.width,
+                                           near.intrinsics.height, std::vector<Ab>(pixels, Ab{-40, 40}),
+                                           std::vector<std::uint8_t>(pixels, 1)}};
+  ViewCache views;
+  Listening painted, plain;
+  Stage2Job job{capture_, stage1(), small_options(), painted, known, take("painted"), false, &views};
+  EXPECT_THROW((void)train_stage2(job, cpu_engines(), observer_), UsageError) << "no such view";
+  job.viewpoints = viewpoints;
+  (void)train_stage2(job, cpu_engines(), observer_);
+  EXPECT_EQ(views.views().size(), 6u);
+  const auto asks_there = [](const PatchOrigin& origin) { return origin.view == "viewpoint-1"; };
+  EXPECT_TRUE(std::ranges::any_of(painted.origins, asks_there));
+  EXPECT_GT(distance_to_answer("painted"), 20) << "what is painted there is learned for all views";
+
+  (void)colorize(small_options(), plain, take("plain"), &views);
+  EXPECT_FALSE(std::ranges::any_of(plain.origins, asks_there));
+  EXPECT_LT(distance_to_answer("plain"), 5);
+}
+
 TEST_F(Stage2, KeptViewsChangeNothing) {
   ViewCache views;
   for (const char* name : {"alone", "first", "second"}) {

@@ -16,7 +16,7 @@ namespace cnerf {
 namespace {
 
 using testing::HasSubstr;
-const std::vector<std::string> kViews = {"a.png", "b.png"};
+const PaintableViews kViews = {{"a.png", "b.png"}, {"held"}};
 
 /// None.
 PaintedPictures& pictures() {
@@ -73,16 +73,67 @@ TEST(Strokes, BadOnesAreRefusedByTheirField) {
   EXPECT_THAT(refused([](Stroke& s) { s.points.assign(kMostStrokePoints + 1, {0, 0, 1}); }), HasSubstr("points"));
 }
 
+Viewpoint viewpoint(const std::string& name) {
+  return {name, {{1, 2, 1.0 / 3}, {{{1, 0, 0}, {0, 0, -1}, {0, 1, 0}}}, {64, 48, 50, 51, 32, 24}}};
+}
+
+TEST(Strokes, ViewpointsAreWrittenAndRead) {
+  const test::TempDir folder;
+  StrokeList list{7, {dot("k1", 0.5f, 0.25f), dot("k2", 0.1f, 0.2f)}, {viewpoint("viewpoint-1"), viewpoint("other")}};
+  list.strokes[1].view = "viewpoint-1";
+  write_strokes(folder / "strokes.json", list);
+  const StrokeList read = read_strokes(folder / "strokes.json", kViews);
+  EXPECT_EQ(json_of(read).dump(), json_of(list).dump());
+  ASSERT_EQ(read.viewpoints, list.viewpoints) << "to the last bit";
+  ASSERT_EQ(painted_viewpoints(read).size(), 1u);
+  EXPECT_EQ(painted_viewpoints(read)[0].name, "viewpoint-1");
+  EXPECT_EQ(read.viewpoints[0].camera.world_from_camera().linear * Vec3d(0, 0, 1), Vec3d(0, -1, 0)) << "rows";
+}
+
+TEST(Strokes, BadViewpointsAreRefusedByTheirField) {
+  const auto refused = [&](const std::function<void(std::vector<Viewpoint>&)>& spoil) -> std::string {
+    StrokeList list{0, {}, {viewpoint("viewpoint-1"), viewpoint("viewpoint-2"), viewpoint("viewpoint-3")}};
+    spoil(list.viewpoints);
+    try {
+      (void)strokes_of_json(json_of(list).dump(), "strokes.json", kViews, pictures());
+    } catch (const InputError& problem) {
+      return problem.what();
+    }
+    return "taken";
+  };
+  using List = std::vector<Viewpoint>&;
+  EXPECT_EQ(refused([](List) {}), "taken");
+  for (const char* name : {"", "a.png", "../x", "a b", "viewpoint_1", "viewpoint-2", "held"}) {
+    EXPECT_THAT(refused([&](List v) { v[0].name = name; }), HasSubstr("].name")) << name;
+  }
+  EXPECT_THAT(refused([](List v) { v[2].name.assign(41, 'x'); }), HasSubstr("viewpoints[2].name"));
+  EXPECT_THAT(refused([](List v) { v[2].camera.lens.fx = 0; }), HasSubstr("viewpoints[2].lens.fx"));
+  EXPECT_THAT(refused([](List v) { v[0].camera.lens.fy = 1e9; }), HasSubstr("viewpoints[0].lens.fy"));
+  EXPECT_THAT(refused([](List v) { v[0].camera.lens.cy = -1e9; }), HasSubstr("viewpoints[0].lens.cy"));
+  EXPECT_THAT(refused([](List v) { v[0].camera.lens.width = 2049; }), HasSubstr("viewpoints[0].lens.width"));
+  EXPECT_THAT(refused([](List v) { v[0].camera.lens.height = 0; }), HasSubstr("viewpoints[0].lens.height"));
+  EXPECT_THAT(refused([](List v) { v[1].camera.position[2] = 1e30; }), HasSubstr("viewpoints[1].position"));
+  EXPECT_THAT(refused([](List v) { v[1].camera.rotation[0][0] = -1; }), HasSubstr("viewpoints[1].rotation"));
+  EXPECT_THAT(refused([](List v) { v[1].camera.rotation = {}; }), HasSubstr("viewpoints[1].rotation"));
+  EXPECT_THAT(refused([](List v) {
+                for (int i = 0; i < 50; ++i) v.push_back(viewpoint("v" + std::to_string(i)));
+              }),
+              HasSubstr("viewpoints: "));
+}
+
 TEST(Strokes, ListsOfAnyContentAreRefusedOrRead) {
   for (const char* text : {"", "[]", "{}", "null", "{\"strokes\": 3}", "{\"strokes\": [{}]}", "{\"strokes\": [3]}",
-                           "{\"revision\": \"x\", \"strokes\": []}"}) {
+                           "{\"revision\": \"x\", \"strokes\": []}", "{\"strokes\": [], \"viewpoints\": 3}",
+                           "{\"strokes\": [], \"viewpoints\": [{\"name\": \"a\"}]}"}) {
     EXPECT_THROW((void)strokes_of_json(text, "strokes.json", kViews, pictures()), InputError) << text;
   }
   EXPECT_THROW((void)strokes_of_json(std::string(kLargestStrokeFile + 1, ' '), "strokes.json", kViews, pictures()),
                InputError);
   StrokeList twice{0, {dot("k1", 0, 0), dot("k1", 0, 0)}};
   EXPECT_THROW((void)strokes_of_json(json_of(twice).dump(), "strokes.json", kViews, pictures()), InputError);
-  EXPECT_TRUE(strokes_of_json("{\"strokes\": []}", "strokes.json", kViews, pictures()).strokes.empty());
+  const StrokeList old = strokes_of_json("{\"strokes\": []}", "strokes.json", kViews, pictures());
+  EXPECT_TRUE(old.strokes.empty());
+  EXPECT_TRUE(old.viewpoints.empty()) << "files of earlier versions have none";
 }
 
 TEST(Strokes, ADotCoversADiscOfItsSizeAndPressure) {
@@ -150,10 +201,10 @@ TEST(Strokes, OnlyViewsThatArePaintedAreKnown) {
   const Intrinsics lens{LensModel::kPinhole, 40, 30, 50, 50, 20, 15, {}};
   std::vector<Stroke> strokes = {dot("k1", 0.5f, 0.5f)};
   const std::vector<Intrinsics> lenses = {lens, lens};
-  ASSERT_EQ(painted(strokes, kViews, lenses).size(), 1u);
-  EXPECT_EQ(painted(strokes, kViews, lenses)[0].view, "a.png");
+  ASSERT_EQ(painted(strokes, kViews.names, lenses).size(), 1u);
+  EXPECT_EQ(painted(strokes, kViews.names, lenses)[0].view, "a.png");
   strokes[0].hidden = true;
-  EXPECT_TRUE(painted(strokes, kViews, lenses).empty());
+  EXPECT_TRUE(painted(strokes, kViews.names, lenses).empty());
 }
 
 }  // namespace

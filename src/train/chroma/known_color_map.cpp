@@ -34,14 +34,19 @@ struct Sight {
 
 }  // namespace
 
-SeenSurfaces::SeenSurfaces(std::span<const CachedView> views, std::span<const std::string> names)
-    : views_(views), names_(names), surfaces_(views.size()) {
-  parallel_tasks(views.size(), [&](std::size_t v) { surfaces_[v] = surface_distance(views[v]); });
+SeenSurfaces::SeenSurfaces(std::span<const CachedView> views, std::span<const std::string> names,
+                           std::span<const Surface> surfaces)
+    : views_(views), names_(names), surfaces_(surfaces.begin(), surfaces.end()) {
+  const std::size_t known = surfaces.size();
+  surfaces_.resize(views.size());
+  parallel_tasks(views.size() - known, [&](std::size_t i) {
+    surfaces_[known + i] = std::make_shared<const std::vector<float>>(surface_distance(views[known + i]));
+  });
 }
 
 std::size_t SeenSurfaces::view_named(const std::string& name) const {
   const auto found = std::ranges::find(names_, name);
-  if (found == names_.end()) throw UsageError("known colours: no training view is called " + name);
+  if (found == names_.end()) throw UsageError("known colours: no training view or viewpoint is called " + name);
   return std::size_t(found - names_.begin());
 }
 

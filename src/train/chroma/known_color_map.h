@@ -2,6 +2,7 @@
 /// Known color map: what is known of the pixels of all cached views, their own colours and those of others that show
 /// the same surface.
 
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,19 +14,31 @@ namespace cnerf {
 /// What views see, for carrying colours from one to another. Refers to the views and their names.
 class SeenSurfaces {
  public:
+  using Surface = std::shared_ptr<const std::vector<float>>;
+
   /// @param names  [views] of the cached views
-  SeenSurfaces(std::span<const CachedView> views, std::span<const std::string> names);
+  SeenSurfaces(std::span<const CachedView> views, std::span<const std::string> names)
+      : SeenSurfaces(views, names, {}) {}
+  /// @param surfaces  of the first of the views, where they are known already
+  SeenSurfaces(std::span<const CachedView> views, std::span<const std::string> names,
+               std::span<const Surface> surfaces);
 
   [[nodiscard]] std::span<const CachedView> views() const { return views_; }
+  [[nodiscard]] std::span<const std::string> names() const { return names_; }
+  [[nodiscard]] std::span<const Surface> surfaces() const { return surfaces_; }
+  /// The first of the views alone.
+  [[nodiscard]] SeenSurfaces first(std::size_t count) const {
+    return {views_.first(count), names_.first(count), std::span(surfaces_).first(count)};
+  }
   /// Number of the view of that name.  @throws UsageError  when it is none of them.
   [[nodiscard]] std::size_t view_named(const std::string& name) const;
   /// `surface_distance` of a view.
-  [[nodiscard]] std::span<const float> surface(std::size_t view) const { return surfaces_[view]; }
+  [[nodiscard]] std::span<const float> surface(std::size_t view) const { return *surfaces_[view]; }
 
  private:
   std::span<const CachedView> views_;
   std::span<const std::string> names_;
-  std::vector<std::vector<float>> surfaces_;
+  std::vector<Surface> surfaces_;
 };
 
 /// Colours that a user gave, spread over the views that they were given on, ready to be looked at from any view.

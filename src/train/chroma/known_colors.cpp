@@ -7,6 +7,7 @@
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/json_record.h"
 #include "src/color/colorspace_math.h"
 
 namespace cnerf {
@@ -60,6 +61,15 @@ std::string describe(std::span<const KnownColors> known) {
     content.append(reinterpret_cast<const char*>(one.reach.data()), one.reach.size() * sizeof(float));
     text += one.kind == KnownColorKind::kKeyFrame ? " + key frame " : " + hints on ";
     text += one.view + " (" + sha256(std::as_bytes(std::span(content))).substr(0, 8) + ")";
+  }
+  return text;
+}
+
+std::string describe_viewpoints(std::span<const Viewpoint> viewpoints) {
+  std::string text;
+  for (const Viewpoint& viewpoint : viewpoints) {
+    const std::string camera = json_of(viewpoint.camera).dump();
+    text += " + " + viewpoint.name + " (" + sha256(std::as_bytes(std::span(camera))).substr(0, 8) + ")";
   }
   return text;
 }

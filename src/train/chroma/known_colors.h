@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "src/capture/camera_record.h"
 #include "src/color/ab_bins.h"
 #include "src/train/luminance/view_cache.h"
 
@@ -19,10 +20,10 @@ enum class KnownColorKind {
   kStrokes,   ///< some pixels; their colours run over the surface around them
 };
 
-/// Colours of one training view, at any size of the view's shape.
+/// Colours of one training view or viewpoint, at any size of the view's shape.
 struct KnownColors {
   KnownColorKind kind = KnownColorKind::kKeyFrame;
-  std::string view;  ///< name of the view, as the capture has it
+  std::string view;  ///< its name, as the capture has it
   int width = 0, height = 0;
   std::vector<Ab> ab;                  ///< [H, W]
   std::vector<std::uint8_t> is_known;  ///< [H, W] 0 or 1
@@ -31,6 +32,8 @@ struct KnownColors {
 
 /// For logs, metadata and comparing runs: " + key frame images/0007.png (1a2b3c4d)"; empty without any.
 [[nodiscard]] std::string describe(std::span<const KnownColors> known);
+/// And of where it was painted: " + viewpoint-1 (1a2b3c4d)".
+[[nodiscard]] std::string describe_viewpoints(std::span<const Viewpoint> viewpoints);
 
 /// How far a stroke's colour runs: until the way to a pixel has cost 1, where each of these costs as much.
 struct StrokeReach {

@@ -22,10 +22,11 @@ Session::Session(const Stage2Job& job, Observer& observer)
       colorizer(job.colorizer),
       job_(job),
       observer_(observer),
-      views_(job.views != nullptr ? *job.views : own_views_) {}
+      cache_(job.views != nullptr ? *job.views : own_cache_) {}
 
 void Session::start_or_resume(const Engines& engines, PixelColors pixel_colors) {
-  const std::string digest = sha256_of_file(job_.stage1), source = colorizer.name() + describe(job_.known);
+  const std::string digest = sha256_of_file(job_.stage1),
+                    source = colorizer.name() + describe(job_.known) + describe_viewpoints(job_.viewpoints);
   const std::filesystem::path& file = job_.take;
   if (!job_.resume || !std::filesystem::exists(file)) {
     model = ColorModel::create(options, engines);
@@ -50,8 +51,14 @@ void Session::start_or_resume(const Engines& engines, PixelColors pixel_colors) 
 void Session::cache_views(const Engines& engines) {
   const LuminanceModel luminance = LuminanceModel::load(job_.stage1, engines);
   if (observer_.wants_previews() && model.chroma) cache_previews(luminance);
-  views_.fill(*luminance.engine, luminance.march(), job_.capture, luminance.frame, options.working_resolution,
-              [this](double fraction) { report("stage 2: caching views", fraction); });
+  const auto told = [this](double fraction) { report("stage 2: caching views", fraction); };
+  const MarchSettings march = luminance.march();
+  cache_.fill(*luminance.engine, march, job_.capture, luminance.frame, options.working_resolution, told);
+  cache_.add(cache_.traced(*luminance.engine, march, luminance.frame, job_.viewpoints, told));
+  cache_.put_first(job_.viewpoints);
+  const std::size_t count = cache_.of_capture() + job_.viewpoints.size();
+  views_ = cache_.views().first(count);
+  names_ = cache_.names().first(count);
 }
 
 void Session::cache_previews(const LuminanceModel& luminance) {

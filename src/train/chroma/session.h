@@ -25,8 +25,10 @@ class Session {
   /// Traces what the views see, unless the job brings it.
   void cache_views(const Engines& engines);
 
-  [[nodiscard]] std::span<const CachedView> views() const { return views_.views(); }
-  [[nodiscard]] std::span<const std::string> names() const { return views_.names(); }
+  /// The capture's, and the job's viewpoints; other viewpoints of a cache that the job brings are none of its business,
+  /// and may come to it meanwhile.
+  [[nodiscard]] std::span<const CachedView> views() const { return views_; }
+  [[nodiscard]] std::span<const std::string> names() const { return names_; }
   [[nodiscard]] std::filesystem::path folder() const { return job_.take.parent_path(); }
 
   using Figures = std::vector<std::pair<std::string, double>>;
@@ -48,8 +50,10 @@ class Session {
 
   const Stage2Job& job_;
   Observer& observer_;
-  ViewCache own_views_;
-  ViewCache& views_;
+  ViewCache own_cache_;
+  ViewCache& cache_;
+  std::span<const CachedView> views_;
+  std::span<const std::string> names_;
   std::vector<std::pair<std::string, CachedView>> previews_;  // of held-out views, small
   TrainingClock clock_;
   double seconds_before_ = 0;

@@ -43,6 +43,7 @@ struct Stage2Job {
   Questions* questions = nullptr;                     ///< src/train/chroma/questioner.h
   const Injection* injection = nullptr;               ///< src/train/chroma/injection.h
   std::function<void(const ColorModel&)> watch = {};  ///< sees the model between steps, in no training time
+  std::span<const Viewpoint> viewpoints = {};         ///< views beside the capture's, that `known` may name
 };
 
 /// Colorizes a trained scene. The observer is offered pictures of held-out views, where there are any.

@@ -21,7 +21,7 @@ namespace {
 constexpr std::array<const char*, 5> kKinds = {"paint", "exact", "grey", "erase", "picture"};
 constexpr std::size_t kPictureDigits = 12;
 constexpr float kPaintedAlpha = 0.5f;
-constexpr std::size_t kLongestId = 32;
+constexpr std::size_t kLongestId = 32, kLongestViewpointName = 40;
 constexpr float kCovered = 0.5f;  // of a pixel: it is painted
 
 /// Refuses a stroke of a file by the name of its field.
@@ -46,7 +46,7 @@ void check(const Stroke& stroke, const StrokeCheck& check, std::span<const std::
   check.require(is_plain && !stroke.id.empty() && stroke.id.size() <= kLongestId, "id",
                 fmt::format("expected 1 to {} letters and digits", kLongestId));
   check.require(std::ranges::find(views, stroke.view) != views.end(), "view",
-                "no training view is called " + excerpt(nlohmann::ordered_json(stroke.view)));
+                "no training view or viewpoint is called " + excerpt(nlohmann::ordered_json(stroke.view)));
   check.require(std::ranges::find(kKinds, stroke.kind) != kKinds.end(), "kind",
                 "expected paint, exact, grey, erase or picture, got " + excerpt(nlohmann::ordered_json(stroke.kind)));
   check.require(ab_of_hex(stroke.color).has_value(), "color",
@@ -66,6 +66,26 @@ void check(const Stroke& stroke, const StrokeCheck& check, std::span<const std::
     check.in_range(point[0], -1, 2, "points");
     check.in_range(point[1], -1, 2, "points");
     check.in_range(point[2], 0, 1, "points");
+  }
+}
+
+void check(const std::vector<Viewpoint>& viewpoints, const fs::path& file, const PaintableViews& views) {
+  if (viewpoints.size() > kMostViewpoints) {
+    throw InputError(file, "viewpoints",
+                     fmt::format("expected at most {}, got {}", kMostViewpoints, viewpoints.size()));
+  }
+  std::set<std::string> taken(views.names.begin(), views.names.end());
+  taken.insert(views.held_out.begin(), views.held_out.end());
+  for (std::size_t i = 0; i < viewpoints.size(); ++i) {
+    const auto& [name, camera] = viewpoints[i];
+    const std::string where = fmt::format("viewpoints[{}].", i);
+    const bool is_plain = std::ranges::all_of(name, [](unsigned char c) { return std::isalnum(c) != 0 || c == '-'; });
+    if (!is_plain || name.empty() || name.size() > kLongestViewpointName) {
+      throw InputError(file, where + "name",
+                       fmt::format("expected 1 to {} letters, digits and -", kLongestViewpointName));
+    }
+    if (!taken.insert(name).second) throw InputError(file, where + "name", "another view or viewpoint has it: " + name);
+    check_camera(camera, kLargestViewpoint, file, where);
   }
 }
 
@@ -127,7 +147,7 @@ std::shared_ptr<const PaintedPicture> PaintedPictures::find(const std::string& p
   return found;
 }
 
-StrokeList strokes_of_json(std::string_view text, const fs::path& file, std::span<const std::string> views,
+StrokeList strokes_of_json(std::string_view text, const fs::path& file, const PaintableViews& views,
                            PaintedPictures& pictures) {
   if (text.size() > kLargestStrokeFile) {
     throw InputError(file, "", fmt::format("expected at most {} bytes, got {}", kLargestStrokeFile, text.size()));
@@ -136,17 +156,20 @@ StrokeList strokes_of_json(std::string_view text, const fs::path& file, std::spa
   if (list.strokes.size() > kMostStrokes) {
     throw InputError(file, "strokes", fmt::format("expected at most {}, got {}", kMostStrokes, list.strokes.size()));
   }
+  check(list.viewpoints, file, views);
+  std::vector<std::string> names = views.names;
+  for (const Viewpoint& viewpoint : list.viewpoints) names.push_back(viewpoint.name);
   std::set<std::string> ids;
   for (std::size_t i = 0; i < list.strokes.size(); ++i) {
     const StrokeCheck of_stroke(file, i);
-    check(list.strokes[i], of_stroke, views);
+    check(list.strokes[i], of_stroke, names);
     of_stroke.require(ids.insert(list.strokes[i].id).second, "id", "another stroke has it: " + list.strokes[i].id);
     if (!list.strokes[i].picture.empty()) list.strokes[i].painted = pictures.find(list.strokes[i].picture);
   }
   return list;
 }
 
-StrokeList read_strokes(const fs::path& file, std::span<const std::string> views) {
+StrokeList read_strokes(const fs::path& file, const PaintableViews& views) {
   PaintedPictures pictures(file.parent_path());
   return strokes_of_json(read_text_file(file), file, views, pictures);
 }
@@ -165,12 +188,19 @@ std::optional<Ab> ab_of_hex(const std::string& color) {
   return Ab{lab.a, lab.b};
 }
 
-std::vector<std::string> paintable_views(const Capture& capture) {
-  std::vector<std::string> names;
-  for (const View& view : capture.views) {
-    if (!view.held_out) names.push_back(view.name);
+PaintableViews paintable_views(const Capture& capture) {
+  PaintableViews views;
+  for (const View& view : capture.views) (view.held_out ? views.held_out : views.names).push_back(view.name);
+  return views;
+}
+
+std::vector<Viewpoint> painted_viewpoints(const StrokeList& list) {
+  std::vector<Viewpoint> painted;
+  for (const Viewpoint& viewpoint : list.viewpoints) {
+    const bool is_named = std::ranges::find(list.strokes, viewpoint.name, &Stroke::view) != list.strokes.end();
+    if (is_named) painted.push_back(viewpoint);
   }
-  return names;
+  return painted;
 }
 
 void cover(const Stroke& stroke, int width, int height, std::span<float> coverage) {

@@ -15,6 +15,7 @@
 
 #include "src/base/json_record.h"
 #include "src/base/record.h"
+#include "src/capture/camera_record.h"
 #include "src/capture/capture.h"
 #include "src/capture/image_io.h"
 #include "src/train/chroma/known_colors.h"
@@ -24,6 +25,7 @@ namespace cnerf {
 inline constexpr std::size_t kMostStrokes = 2000;
 inline constexpr std::size_t kMostStrokePoints = 20000;  ///< of one stroke
 inline constexpr std::size_t kLargestStrokeFile = std::size_t(4) << 20;
+inline constexpr int kLargestViewpoint = 2048;  ///< pixels a side
 
 /// A place of a stroke: x and y as shares of the picture's width and height, pressure 0..1.
 using StrokePoint = std::array<float, 3>;
@@ -37,7 +39,7 @@ struct PaintedPicture {
 
 struct Stroke {
   std::string id;    ///< letters and digits, its own
-  std::string view;  ///< a training view, as the capture names it
+  std::string view;  ///< a training view, as the capture names it, or a viewpoint
   /// "paint": the colour runs over what is alike around it; "exact": it stays where it was painted; "grey": paint
   /// without colour; "erase": takes away what was painted before it on the view; "picture": what `picture` paints.
   std::string kind = "paint";
@@ -92,31 +94,43 @@ class PaintedPictures {
 struct StrokeList {
   int revision = 0;  ///< grows with every change
   std::vector<Stroke> strokes;
+  /// Cameras that were painted through beside the capture's. Their names are letters, digits and "-", and no view's.
+  std::vector<Viewpoint> viewpoints = {};
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
     v("revision", self.revision, kLater);
     v("strokes", self.strokes);
+    v("viewpoints", self.viewpoints, kLater);
   }
+};
+
+/// Names of a capture's views.
+struct PaintableViews {
+  std::vector<std::string> names;
+  std::vector<std::string> held_out = {};  ///< no stroke may name them, and no viewpoint be called like them
 };
 
 /// Strokes out of JSON of any content.
 /// @param file      that errors name
-/// @param views     names that strokes may have
+/// @param views     that strokes may name
 /// @param pictures  that strokes may name
-/// @throws InputError  "file: strokes[3].size: …": no such list, a number out of range, an unknown view or kind
+/// @throws InputError  "file: strokes[3].size: …": no such list, a number out of range, an unknown view or kind; of a
+///                     viewpoint "file: viewpoints[2].lens.fx: …"
 [[nodiscard]] StrokeList strokes_of_json(std::string_view text, const std::filesystem::path& file,
-                                         std::span<const std::string> views, PaintedPictures& pictures);
+                                         const PaintableViews& views, PaintedPictures& pictures);
 /// @throws MissingInputError, and as strokes_of_json
-[[nodiscard]] StrokeList read_strokes(const std::filesystem::path& file, std::span<const std::string> views);
+[[nodiscard]] StrokeList read_strokes(const std::filesystem::path& file, const PaintableViews& views);
 /// @throws OutputError
 void write_strokes(const std::filesystem::path& file, const StrokeList& list);
 
 /// sRGB "#c08040" -> its a and b; nothing where the text is no colour.
 [[nodiscard]] std::optional<Ab> ab_of_hex(const std::string& color);
 
-/// Names of the views that can be painted: those that are not held out.
-[[nodiscard]] std::vector<std::string> paintable_views(const Capture& capture);
+/// The views that can be painted are those that are not held out.
+[[nodiscard]] PaintableViews paintable_views(const Capture& capture);
+/// The viewpoints that strokes name, in the list's order.
+[[nodiscard]] std::vector<Viewpoint> painted_viewpoints(const StrokeList& list);
 
 /// Where a stroke covers a picture: 0 none, 1 whole.  [H, W]
 /// @param coverage  larger values that are there already stay

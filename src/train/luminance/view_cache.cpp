@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
 
@@ -10,9 +12,10 @@ namespace cnerf {
 namespace {
 
 constexpr float kFullScale = 65535.0f;
-constexpr float kCacheTransmittance = 2e-3f;   // what lies behind is not worth a sample
-constexpr std::size_t kRaysAtATime = 1 << 15;  // a tenth of a second of two cores; a GPU wants many
-constexpr std::size_t kGrain = 512;            // pixels of a parallel piece of work
+constexpr float kCacheTransmittance = 2e-3f;        // what lies behind is not worth a sample
+constexpr std::size_t kRaysAtATime = 1 << 15;       // a tenth of a second of two cores; a GPU wants many
+constexpr std::size_t kGrain = 512;                 // pixels of a parallel piece of work
+constexpr std::size_t kRoom = 2 * kMostViewpoints;  // for a list of viewpoints, and for the next one beside it
 
 void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
   view.brightest = 1e-6f;
@@ -79,17 +82,75 @@ void ViewCache::fill(const LuminanceEngine& engine, const MarchSettings& march, 
                      const SceneFrame& frame, int short_side, const std::function<void(double fraction)>& report) {
   const std::vector<TrainingView> views = training_views(capture, frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
-  if (short_side != short_side_) views_.clear();
+  if (short_side != short_side_) *this = ViewCache();
   short_side_ = short_side;
-  names_.clear();
-  for (const View& view : capture.views) {
-    if (!view.held_out) names_.push_back(view.name);
+  if (names_.empty()) {
+    views_.reserve(views.size() + kRoom);
+    names_.reserve(views.size() + kRoom);
+    for (const View& view : capture.views) {
+      if (!view.held_out) names_.push_back(view.name);
+    }
   }
   for (std::size_t v = views_.size(); v < views.size(); ++v) {
     views_.push_back(cache_view(engine, march, views[v].camera, short_side, kCachedWeight,
                                 [&](double fraction) { report((double(v) + fraction) / double(views.size())); }));
     ignore_masked(views_.back(), *views[v].image);
   }
+}
+
+std::vector<ViewCache::TracedViewpoint> ViewCache::traced(const LuminanceEngine& engine, const MarchSettings& march,
+                                                          const SceneFrame& frame,
+                                                          std::span<const Viewpoint> viewpoints,
+                                                          const std::function<void(double fraction)>& report) const {
+  std::vector<Viewpoint> missing;
+  std::ranges::copy_if(viewpoints, std::back_inserter(missing), [this](const Viewpoint& one) { return !holds(one); });
+  std::vector<TracedViewpoint> traced;
+  for (const Viewpoint& viewpoint : missing) {
+    const UnitCamera camera(viewpoint.camera.intrinsics(), viewpoint.camera.world_from_camera(), frame);
+    traced.push_back({viewpoint, cache_view(engine, march, camera, short_side_, kCachedWeight, [&](double fraction) {
+                        if (report) report((double(traced.size()) + fraction) / double(missing.size()));
+                      })});
+  }
+  return traced;
+}
+
+std::size_t ViewCache::place_of(const Viewpoint& viewpoint) const {
+  return of_capture() + std::size_t(std::ranges::find(viewpoints_, viewpoint) - viewpoints_.begin());
+}
+
+void ViewCache::add(std::vector<TracedViewpoint> traced) {
+  for (auto& [viewpoint, view] : traced) {
+    if (holds(viewpoint) || viewpoints_.size() == kRoom) continue;
+    const auto older = std::ranges::find(viewpoints_, viewpoint.name, &Viewpoint::name);
+    if (older != viewpoints_.end()) {
+      names_[place_of(*older)].clear();
+      older->name.clear();
+    }
+    views_.push_back(std::move(view));
+    names_.push_back(viewpoint.name);
+    viewpoints_.push_back(std::move(viewpoint));
+  }
+}
+
+void ViewCache::put_first(std::span<const Viewpoint> viewpoints) {
+  const std::size_t first = of_capture();
+  for (std::size_t i = 0; i < viewpoints.size(); ++i) {
+    const std::size_t from = place_of(viewpoints[i]), to = first + i;
+    CNERF_CHECK(from < names_.size() && to <= from, "viewpoints that are held, each once");
+    std::swap(views_[to], views_[from]);
+    std::swap(names_[to], names_[from]);
+    std::swap(viewpoints_[i], viewpoints_[from - first]);
+  }
+}
+
+void ViewCache::keep_only(std::span<const Viewpoint> viewpoints) {
+  std::vector<Viewpoint> kept;
+  std::ranges::copy_if(viewpoints, std::back_inserter(kept), [this](const Viewpoint& one) { return holds(one); });
+  put_first(kept);
+  const std::size_t count = of_capture() + kept.size();
+  views_.resize(count);
+  names_.resize(count);
+  viewpoints_.resize(kept.size());
 }
 
 void ignore_masked(CachedView& view, const MonoImage& image) {

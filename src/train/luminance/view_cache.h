@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "src/capture/camera_record.h"
 #include "src/engine/color_engines.h"
 #include "src/engine/luminance_engine.h"
 #include "src/render/training_views.h"
@@ -43,7 +44,8 @@ struct CachedView {
 
 inline constexpr double kCachedWeight = 0.99;  ///< share of a pixel's weight that the samples of a ViewCache carry
 
-/// The training views of a capture. Who colours one stage 1 several times keeps it, so that they are traced once.
+/// The training views of a capture, and viewpoints after them. Who colours one stage 1 several times keeps it, so that
+/// they are traced once.
 class ViewCache {
  public:
   /// Traces the views, unless it holds them already at this size.
@@ -54,11 +56,33 @@ class ViewCache {
             int short_side, const std::function<void(double fraction)>& report);
   [[nodiscard]] std::span<const CachedView> views() const { return views_; }
   [[nodiscard]] std::span<const std::string> names() const { return names_; }  ///< as the capture has them
+  [[nodiscard]] std::size_t of_capture() const { return names_.size() - viewpoints_.size(); }
+  [[nodiscard]] std::span<const Viewpoint> viewpoints() const { return viewpoints_; }
+
+  struct TracedViewpoint {
+    Viewpoint viewpoint;
+    CachedView view;
+  };
+  /// What is not held yet of these viewpoints, traced as the capture's views are: after `fill`.
+  [[nodiscard]] std::vector<TracedViewpoint> traced(const LuminanceEngine& engine, const MarchSettings& march,
+                                                    const SceneFrame& frame, std::span<const Viewpoint> viewpoints,
+                                                    const std::function<void(double fraction)>& report) const;
+  [[nodiscard]] bool holds(const Viewpoint& viewpoint) const { return place_of(viewpoint) < names_.size(); }
+  /// Holds them behind all others, which stay where they are: who goes through `views()` meanwhile is not disturbed.
+  /// One of the same name and another camera loses its name. When there is no room for more, these are left out.
+  void add(std::vector<TracedViewpoint> traced);
+  /// Puts viewpoints that are held before the other ones, in their order. Views move.
+  void put_first(std::span<const Viewpoint> viewpoints);
+  /// Lets the viewpoints go that are none of these. Views move.
+  void keep_only(std::span<const Viewpoint> viewpoints);
 
  private:
+  [[nodiscard]] std::size_t place_of(const Viewpoint& viewpoint) const;
+
   int short_side_ = 0;
-  std::vector<CachedView> views_;
-  std::vector<std::string> names_;
+  std::vector<CachedView> views_;   // with room for viewpoints, so that none moves as they come
+  std::vector<std::string> names_;  // likewise
+  std::vector<Viewpoint> viewpoints_;
 };
 
 /// Makes pixels transparent that the view's mask says to ignore, wholly or in part: nothing there is learnt from, and
