@@ -165,7 +165,9 @@ PageAnswer Studio::viewpoint_photo(const Viewpoint& viewpoint, int side) {
   auto jpeg = asked_alone(is_whole, [this, viewpoint, camera, is_whole](const std::function<bool()>& keep_going) {
     const std::vector<Side> grey = {nullptr};
     const DrawingEffort effort = sharp_effort(context_.config.render.steps_per_box);
-    const std::vector<Picture> pictures = draw_field(*field_, camera, grey, effort, keep_going);
+    const bool is_training = !coloring_ && !halted_;
+    const std::vector<Picture> pictures =
+        draw_field(*field_, is_training ? affordable(camera) : camera, grey, effort, keep_going);
     if (pictures.empty()) return std::optional<std::string>();
     std::string bytes = text_of(jpeg_bytes(pictures.front(), kPhotoQuality));
     const std::lock_guard lock(mutex_);

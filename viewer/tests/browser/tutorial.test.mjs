@@ -123,6 +123,39 @@ describe("the tutorial", () => {
     assert.ok(reached > 0.02, `${reached} of the view`);
     await shot("studio-paint");
   });
+  it("paints where the camera stands, and takes a picture that was painted elsewhere", async () => {
+    await page.keyboard.press("Escape");
+    await page.evaluate(() => {
+      const { field } = window.cnerf.studio;
+      field.setView({ ...field.view, position: field.view.position.map((v) => v * 0.9) });
+    });
+    await page.focus("#field");
+    await page.keyboard.press("Enter");
+    const views = await page.evaluate(() => window.cnerf.session.scene.views.length);
+    await page.waitForSelector(`[data-photo="${views}"]`, { timeout: patience });
+    await page.evaluate(() => window.cnerf.session.brush.set({ color: "#3b5fa0", size: 0.05, reach: 1, tool: "brush" }));
+    await draw([[0.62, 0.35], [0.66, 0.4]]);
+    await until(() => window.cnerf.session.strokes.isSaved);
+    const list = JSON.parse(readFileSync(join(trained, "strokes", "strokes.json"), "utf8"));
+    assert.deepEqual([list.viewpoints.length, list.strokes.at(-1).view], [1, list.viewpoints[0].name]);
+    await page.keyboard.press("Escape");
+
+    const photo = await page.evaluate(() => window.cnerf.session.scene.home);
+    await page.evaluate((i) => window.cnerf.studio.paint(i), photo);
+    await page.waitForSelector(`[data-photo="${photo}"]`);
+    await page.evaluate(async (i) => {
+      const { width, height } = window.cnerf.session.scene.views[i];
+      const canvas = new OffscreenCanvas(width, height);
+      const context = canvas.getContext("2d");
+      context.fillStyle = "#a04080";
+      context.fillRect(0.1 * width, 0.75 * height, 0.05 * width, 0.05 * height);
+      await window.cnerf.session.sendPainted(new File([await canvas.convertToBlob({ type: "image/png" })], "gimp.png", { type: "image/png" }));
+    }, photo);
+    await until(() => window.cnerf.session.strokes.list.some((stroke) => stroke.kind === "picture"));
+    painted = JSON.parse(readFileSync(join(trained, "strokes", "strokes.json"), "utf8"));
+    assert.equal(painted.strokes.length, 5);
+    assert.ok(existsSync(join(trained, "strokes", "painted", `${painted.strokes.at(-1).picture}.png`)));
+  });
   it("colours all views, and keeps a take", async () => {
     await page.keyboard.press("c");
     await until(() => window.cnerf.session.state.unkept);
@@ -139,6 +172,13 @@ describe("the tutorial", () => {
     await ok(["colorize", trained, "--replay", "evening", "--take", "again"]);
     const [a, b] = ["evening", "again"].map((take) => readFileSync(join(trained, "takes", take, "take.snapshot")));
     assert.ok(a.equals(b));
+  });
+  it("finishes what is shown, without touching the take", async () => {
+    const before = await colorfulness();
+    await page.evaluate(() => window.cnerf.session.order({ order: "finish", saturation: 0.2, hue: 0, exposure: 0 }));
+    assert.ok((await colorfulness()) < 0.6 * before);
+    await page.evaluate(() => window.cnerf.session.order({ order: "finish", saturation: 1, hue: 0, exposure: 0 }));
+    assert.equal((await state()).unkept, false);
   });
   it("writes the volume, and the photographs in colour", async () => {
     await page.evaluate(() => window.cnerf.session.order({ order: "photographs", format: "png" }));
