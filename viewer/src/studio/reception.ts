@@ -172,7 +172,7 @@ export async function receive(root: HTMLElement, api: Api, state: State): Promis
   // For scripts and tests.
   Object.assign(window, { cnerf: { reception, session } });
   const capture = new Promise<void>((done) => session.onState(({ stage }) => stage !== "photographs" && done()));
-  session.listen();
+  void session.listen();
   session.tell();
   await capture;
   return () => {

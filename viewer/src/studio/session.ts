@@ -87,12 +87,13 @@ export class Session {
   }
 
   async begin(): Promise<void> {
-    this.listen();
-    await this.strokes.load();
+    await Promise.all([this.listen(), this.strokes.load()]);
   }
-  /** Hears of the server's state, without strokes. */
-  listen(): void {
-    this.stopListening = this.api.listen((state) => this.hear(state), () => this.lose());
+  /** Hears of the server's state, without strokes. @return when it heard first: the server knows of this page then */
+  listen(): Promise<void> {
+    return new Promise((first) => {
+      this.stopListening = this.api.listen((state) => (this.hear(state), first()), () => this.lose());
+    });
   }
   end(): void {
     this.stopListening();

@@ -87,6 +87,7 @@ describe("the tutorial", () => {
     await page.click("#build");
     await until(() => window.cnerf?.session?.state.stage === "training" && window.cnerf.session.state.figures.psnr > 0);
     await page.waitForFunction(() => document.body.dataset.ready === "yes", undefined, { timeout: patience });
+    if (process.env.CNERF_PICTURES) await until(() => window.cnerf.session.state.fraction > 0.4 && window.cnerf.studio.field.settled);
     await shot("studio-training");
     await page.evaluate(() => window.cnerf.session.order({ order: "stop" }));
     await until(() => window.cnerf.session.state.stage === "field" || window.cnerf.session.state.task === "");
