@@ -593,7 +593,8 @@ TEST_F(StudioTest, ATrainingIsWatchedStoppedAndGoneOnWith) {
   EXPECT_EQ(post("orders", {{"order", "colour"}}).status, 409);
   EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200) << "painting need not wait";
   EXPECT_EQ(put_with({stroke_on("viewpoint-1")}, {viewpoint("viewpoint-1")}, 1).status, 200);
-  EXPECT_EQ(decoded(get(address("photos/", 0))).size(), cv::Size(120, 80)) << "of the field as it is by now";
+  const cv::Mat photo = decoded(get(address("photos/", 0)));
+  EXPECT_GT(photo.cols, photo.rows) << "of the field as it is by now, as large as there is time for";
   EXPECT_EQ(get(address("reach/", 0)).status, 503);
   EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
   const json stopped = wait_until([](const json& state) { return state["task"] == ""; });
