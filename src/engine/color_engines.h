@@ -4,32 +4,17 @@
 
 #include <cstdint>
 #include <memory>
-#include <numeric>
 #include <span>
 #include <vector>
 
 #include "encoding/hash_grid_levels.h"
 #include "src/color/ab_bins.h"
 #include "src/engine/chroma_math.h"
+#include "src/engine/pixel_samples.h"
 #include "src/field/color_field.h"
 #include "src/field/state.h"
 
 namespace cnerf {
-
-/// What stage 2 knows of R pixels: the few samples that carry their opacity, with frozen weights; pixel by pixel, front
-/// to back.
-struct PixelSamples {
-  std::vector<Vec3f> positions;            ///< [S], unit space
-  std::vector<float> weights;              ///< [S], w_i >= 0; a pixel's sum is its opacity
-  std::vector<float> luminance;            ///< [S], linear Y
-  std::vector<std::size_t> offsets = {0};  ///< [R + 1]
-
-  [[nodiscard]] std::size_t pixels() const { return offsets.size() - 1; }
-  [[nodiscard]] float opacity(std::size_t pixel) const {
-    return std::accumulate(weights.begin() + std::ptrdiff_t(offsets[pixel]),
-                           weights.begin() + std::ptrdiff_t(offsets[pixel + 1]), 0.0f);
-  }
-};
 
 /// What a step adds to the cross entropy.
 struct ChromaLossWeights {
@@ -52,6 +37,10 @@ class ColorBinEngine {
   virtual void logits(const PixelSamples& pixels, std::span<float> logits) const = 0;
   /// One colour per pixel, of the same pixels: see `decode_annealed_mean`; temperature 0 is `decode_arg_max`.
   virtual void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const = 0;
+  /// The same, without a way through the host's memory where the pixels were traced on this engine's device.
+  virtual void decode_traced(const TracedPixels& pixels, float temperature, std::span<Ab> colors) const {
+    decode(pixels.samples(), temperature, colors);
+  }
   [[nodiscard]] virtual long step_count() const = 0;
   [[nodiscard]] virtual std::vector<StatePiece> state() = 0;
   virtual void state_loaded() = 0;

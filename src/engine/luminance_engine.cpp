@@ -3,6 +3,43 @@
 #include "src/base/parallel.h"
 
 namespace cnerf {
+namespace {
+
+/// Whose samples lie in the host's memory anyway.
+class HostTracedPixels final : public TracedPixels {
+ public:
+  HostTracedPixels(std::span<const Ray> rays, std::span<const WeightedSample> samples,
+                   std::span<const std::size_t> offsets)
+      : samples_(pixel_samples(rays, samples, offsets)), results_(rays.size()) {
+    parallel_ranges(rays.size(), 256, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) {
+        RayResult& seen = results_[r];
+        for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
+          seen.luminance += samples[s].weight * samples[s].luminance;
+          seen.opacity += samples[s].weight;
+          seen.depth += samples[s].weight * samples[s].t;
+        }
+        if (seen.opacity > 0) seen.depth /= seen.opacity;
+      }
+    });
+  }
+  [[nodiscard]] std::span<const RayResult> results() const override { return results_; }
+  [[nodiscard]] const PixelSamples& samples() const override { return samples_; }
+
+ private:
+  PixelSamples samples_;
+  std::vector<RayResult> results_;
+};
+
+}  // namespace
+
+std::unique_ptr<TracedPixels> LuminanceEngine::trace_pixels(std::span<const Ray> rays, const MarchSettings& march,
+                                                            const RenderEffort& effort) const {
+  std::vector<WeightedSample> samples;
+  std::vector<std::size_t> offsets;
+  trace(rays, march, effort, samples, offsets);
+  return std::make_unique<HostTracedPixels>(rays, samples, offsets);
+}
 
 void LuminanceEngine::render_view(const UnitCamera& camera, const MarchSettings& march, const RenderEffort& effort,
                                   std::span<RayResult> results) const {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "encoding/hash_grid_levels.h"
+#include "src/engine/pixel_samples.h"
 #include "src/engine/view_learning.h"
 #include "src/field/state.h"
 #include "src/render/march.h"
@@ -36,20 +37,6 @@ struct StepReport {
   double squared_error = 0;  ///< mean over rays, on sRGB-encoded luminance clamped to [0, 1]
   std::size_t rays = 0;
   std::size_t trained_samples = 0;
-};
-
-/// What a ray sees. Linear light, over black.
-struct RayResult {
-  float luminance = 0;
-  float opacity = 0;
-  float depth = 0;  ///< expected t of what is seen, unit space; 0 when nothing is
-};
-
-/// A sample that carries part of a ray's opacity.
-struct WeightedSample {
-  float t = 0;
-  float weight = 0;
-  float luminance = 0;
 };
 
 /// What may be left out of a picture for speed.
@@ -87,6 +74,12 @@ class LuminanceEngine {
   /// The samples behind `render`'s results, ray by ray in order; `offsets` has rays + 1 entries.
   virtual void trace(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                      std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) const = 0;
+  /// `trace` for somebody who colours the pixels with a colour engine of the same device: nothing but results leaves
+  /// it. Its samples take memory, so not many more than `rays_at_a_time` should be asked for.
+  [[nodiscard]] virtual std::unique_ptr<TracedPixels> trace_pixels(std::span<const Ray> rays,
+                                                                   const MarchSettings& march,
+                                                                   const RenderEffort& effort) const;
+  [[nodiscard]] virtual std::size_t rays_at_a_time() const { return std::size_t(1) << 13; }
 
   /// Points worth asking for at once, by one of many threads.
   [[nodiscard]] virtual std::size_t points_at_a_time() const { return std::size_t(1) << 12; }

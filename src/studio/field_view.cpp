@@ -9,9 +9,8 @@
 namespace cnerf::studio {
 namespace {
 
-constexpr std::size_t kGrain = 256;       // rays or pixels of a parallel piece of work
-constexpr std::size_t kLeastRays = 8192;  // between two questions whether to go on
-constexpr int kSparseLattice = 4;         // coarser ones save no rays, and lose what is thin
+constexpr std::size_t kGrain = 256;  // rays or pixels of a parallel piece of work
+constexpr int kSparseLattice = 4;    // coarser ones save no rays, and lose what is thin
 
 Lab<float> finished(const Lab<float>& color, const Finish& finish) {
   if (finish.is_plain()) return color;
@@ -47,8 +46,7 @@ class Drawing {
       const bool needs_colors = pixels_.needs_colors(pass);
       costs.rays += wanted.size();
       costs.colored_rays += needs_colors ? wanted.size() : 0;
-      // A GPU likes many. Without colour it hands back a number per ray; with it, samples.
-      const std::size_t at_a_time = std::max(kLeastRays, engine_.points_at_a_time() / (needs_colors ? 16 : 8));
+      const std::size_t at_a_time = engine_.rays_at_a_time();
       for (std::size_t first = 0; first < wanted.size(); first += at_a_time) {
         if (!keep_going()) return false;
         const auto part = std::span(wanted).subspan(first, std::min(at_a_time, wanted.size() - first));
@@ -75,18 +73,17 @@ class Drawing {
   void trace_light(std::span<const std::size_t> wanted) {
     std::vector<RayResult> results(wanted.size());
     engine_.render(rays_of(wanted), march_, effort_, results);
+    set_light(wanted, results);
+  }
+  void trace_colors(std::span<const std::size_t> wanted) {
+    const auto seen = engine_.trace_pixels(rays_of(wanted), march_, effort_);
+    set_light(wanted, seen->results());
+    for (std::size_t s = 0; s < colored_.size(); ++s) pixels_.set_colors(s, wanted, colored_[s]->decode(*seen));
+  }
+  void set_light(std::span<const std::size_t> wanted, std::span<const RayResult> results) {
     std::vector<float> light;
     for (const RayResult& result : results) light.push_back(result.luminance);
     pixels_.set_light(wanted, light);
-  }
-  void trace_colors(std::span<const std::size_t> wanted) {
-    const std::vector<Ray> rays = rays_of(wanted);
-    std::vector<WeightedSample> samples;
-    std::vector<std::size_t> offsets;
-    engine_.trace(rays, march_, effort_, samples, offsets);
-    const PixelSamples seen = pixel_samples(rays, samples, offsets);
-    pixels_.set_light(wanted, pixel_luminance(seen));
-    for (std::size_t s = 0; s < colored_.size(); ++s) pixels_.set_colors(s, wanted, colored_[s]->decode(seen));
   }
 
   const LuminanceEngine& engine_;

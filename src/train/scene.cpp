@@ -7,15 +7,13 @@
 #include "src/picture/picture.h"
 #include "src/train/chroma/color_model.h"
 #include "src/train/luminance/luminance_model.h"
-#include "src/train/luminance/view_cache.h"
 
 namespace cnerf {
 
 namespace {
 
-constexpr std::size_t kGrain = 256;          // rays of a parallel piece of work
-constexpr std::size_t kRaysAtATime = 16384;  // bounds the memory of traced samples
-constexpr float kShadedShare = 0.995f;       // what the rest could change is below a grey level of an 8-bit picture
+constexpr std::size_t kGrain = 256;     // rays of a parallel piece of work
+constexpr float kShadedShare = 0.995f;  // what the rest could change is below a grey level of an 8-bit picture
 
 /// Colours of the pixels from `first` on, at their luminance, to an image of three interleaved channels.
 void put_colors(const std::vector<Ab>& colors, const std::vector<float>& luminance, std::size_t first,
@@ -27,12 +25,6 @@ void put_colors(const std::vector<Ab>& colors, const std::vector<float>& luminan
     }
   });
 }
-
-/// What rays met.
-struct Trace {
-  std::vector<WeightedSample> samples;
-  std::vector<std::size_t> offsets;
-};
 
 class TrainedScene final : public Scene {
  public:
@@ -83,23 +75,24 @@ class TrainedScene final : public Scene {
     for (auto* channel : {&image.luminance, &image.opacity, &image.depth}) channel->resize(n);
     if (color_ && options.color) image.rgb.resize(3 * n);
     if (color_ && options.baked_color) image.baked_rgb.resize(3 * n);
-    for (std::size_t first = 0; first < n; first += kRaysAtATime) {
-      render_part(camera, options, first, std::min(n, first + kRaysAtATime), image);
+    const std::size_t at_a_time = luminance_.engine->rays_at_a_time();
+    for (std::size_t first = 0; first < n; first += at_a_time) {
+      render_part(camera, options, first, std::min(n, first + at_a_time), image);
     }
     return image;
   }
 
  private:
-  static void replace_luminance(std::span<const Ray> rays, const RenderOptions& options, Trace& traced) {
-    std::vector<Vec3f> positions;
-    for (std::size_t r = 0; r < rays.size(); ++r) {
-      for (std::size_t s = traced.offsets[r]; s < traced.offsets[r + 1]; ++s) {
-        positions.push_back(rays[r].origin + rays[r].direction * traced.samples[s].t);
-      }
+  /// The light of pixels where it is not just what was traced. Empty: it is.
+  [[nodiscard]] std::optional<PixelSamples> relit(const TracedPixels& traced, const RenderOptions& options) const {
+    if (!options.luminance && finish_.gain() == 1) return std::nullopt;
+    PixelSamples pixels = traced.samples();
+    if (options.luminance) {
+      options.luminance(pixels.positions, pixels.luminance);
+    } else {
+      for (float& light : pixels.luminance) light *= finish_.gain();
     }
-    std::vector<float> luminance(positions.size());
-    options.luminance(positions, luminance);
-    for (std::size_t s = 0; s < luminance.size(); ++s) traced.samples[s].luminance = luminance[s];
+    return pixels;
   }
 
   void render_part(const UnitCamera& camera, const RenderOptions& options, std::size_t first, std::size_t last,
@@ -108,38 +101,28 @@ class TrainedScene final : public Scene {
     parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t r = begin; r < end; ++r) rays[r] = camera.ray_of_pixel(first + r);
     });
-    Trace traced;
-    luminance_.engine->trace(rays, luminance_.march(options.steps_per_box),
-                             {float(options.min_transmittance), kShadedShare}, traced.samples, traced.offsets);
-    if (options.luminance) {
-      replace_luminance(rays, options, traced);
-    } else if (!finish_.is_plain()) {
-      for (WeightedSample& sample : traced.samples) sample.luminance *= finish_.gain();
-    }
-    const std::vector<WeightedSample>& samples = traced.samples;
-    const std::vector<std::size_t>& offsets = traced.offsets;
+    const auto traced = luminance_.engine->trace_pixels(rays, luminance_.march(options.steps_per_box),
+                                                        {float(options.min_transmittance), kShadedShare});
+    const std::optional<PixelSamples> pixels = relit(*traced, options);
+    const std::vector<float> light = pixels ? pixel_luminance(*pixels) : std::vector<float>();
     const Vec3f axis = camera.unit_from_camera.column(2).cast<float>();
     parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t r = begin; r < end; ++r) {
-        float weighted_t = 0;
-        for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
-          image.luminance[first + r] += samples[s].weight * samples[s].luminance;
-          image.opacity[first + r] += samples[s].weight;
-          weighted_t += samples[s].weight * samples[s].t;
-        }
-        if (image.opacity[first + r] >= 0.5f) {
-          const float t = weighted_t / image.opacity[first + r];
-          image.depth[first + r] = t * dot(rays[r].direction, axis) / float(frame().unit_per_world);
+        const RayResult& seen = traced->results()[r];
+        image.luminance[first + r] = pixels ? light[r] : seen.luminance;
+        image.opacity[first + r] = seen.opacity;
+        if (seen.opacity >= 0.5f) {
+          image.depth[first + r] = seen.depth * dot(rays[r].direction, axis) / float(frame().unit_per_world);
         }
       }
     });
-    if (image.rgb.empty() && image.baked_rgb.empty()) return;
-
-    const PixelSamples pixels = pixel_samples(rays, samples, offsets);
-    if (!image.rgb.empty()) put_colors(finished(color_->decode(pixels)), image.luminance, first, image.rgb);
+    if (!image.rgb.empty()) {
+      std::vector<Ab> colors = pixels ? color_->decode(*pixels) : color_->decode(*traced);
+      put_colors(finished(std::move(colors)), image.luminance, first, image.rgb);
+    }
     if (!image.baked_rgb.empty()) {
       std::vector<Ab> colors(rays.size());
-      color_->chromaticity->composite(pixels, colors);
+      color_->chromaticity->composite(pixels ? *pixels : traced->samples(), colors);
       put_colors(finished(std::move(colors)), image.luminance, first, image.baked_rgb);
     }
   }

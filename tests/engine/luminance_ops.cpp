@@ -115,6 +115,41 @@ void append_queries(const LuminanceEngine& engine, std::vector<Result>& results)
   results.push_back({"luminance of points", doubles(answers)});
 }
 
+/// The heaviest samples of rays, in the engine's own memory and as `trace` hands them out.
+void append_traced_pixels(const LuminanceEngine& engine, std::span<const Ray> rays, const MarchSettings& march,
+                          std::vector<Result>& results) {
+  const RenderEffort effort{1e-3f, 0.98f};
+  std::vector<WeightedSample> samples;
+  std::vector<std::size_t> offsets;
+  engine.trace(rays, march, effort, samples, offsets);
+  const PixelSamples expected = pixel_samples(rays, samples, offsets);
+  const std::unique_ptr<TracedPixels> traced = engine.trace_pixels(rays, march, effort);
+  // Memory that is handed out again must not be that of pixels somebody still holds.
+  const std::unique_ptr<TracedPixels> others = engine.trace_pixels(rays.first(rays.size() / 2), march, effort);
+  EXPECT_EQ(traced->samples().offsets, expected.offsets);
+  EXPECT_EQ(traced->samples().weights, expected.weights);
+  EXPECT_EQ(traced->samples().luminance, expected.luminance);
+  ASSERT_EQ(traced->samples().positions.size(), expected.positions.size());
+  float farthest = 0;
+  for (std::size_t s = 0; s < expected.positions.size(); ++s) {
+    farthest = std::max(farthest, length(traced->samples().positions[s] - expected.positions[s]));
+  }
+  EXPECT_LT(farthest, 1e-6f);
+  std::vector<double> luminance, opacity, depth;
+  ASSERT_EQ(traced->results().size(), rays.size());
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    const RayResult& seen = traced->results()[r];
+    luminance.push_back(seen.luminance);
+    opacity.push_back(seen.opacity);
+    depth.push_back(seen.depth * seen.opacity);
+    EXPECT_NEAR(seen.opacity, expected.opacity(r), 1e-5f);
+  }
+  results.push_back({"luminance of the heaviest samples", luminance});
+  results.push_back({"opacity of the heaviest samples", opacity});
+  results.push_back({"depth of the heaviest samples", depth});
+  results.push_back({"number of the heaviest samples", {double(expected.offsets.back())}});
+}
+
 void append_pictures(const Scene& scene, const LuminanceEngine& engine, std::vector<Result>& results) {
   const UnitCamera& camera = scene.views()[1].camera;
   std::vector<Ray> rays;
@@ -147,6 +182,7 @@ void append_pictures(const Scene& scene, const LuminanceEngine& engine, std::vec
   }
   EXPECT_TRUE(in_order) << "traced samples";
   EXPECT_LT(relative_distance(traced, luminance), 1e-4) << "traced samples add up to the picture";
+  append_traced_pixels(engine, rays, scene.options().march, results);
   results.push_back({"rendered luminance", luminance});
   results.push_back({"rendered opacity", opacity});
   results.push_back({"rendered depth", depth});

@@ -28,7 +28,7 @@ unsigned pixel_blocks(std::uint32_t pixels) {
 
 __global__ void prepare(const PixelArrays pixels) {
   for_each_pixel(pixels.pixels, [&](std::uint32_t p) {
-    const std::uint32_t begin = pixels.offsets[p] + threadIdx.x % 32, end = pixels.offsets[p + 1];
+    const std::uint32_t begin = pixels.begins[p] + threadIdx.x % 32, end = pixels.ends[p];
     float opacity = 0;
     for (std::uint32_t s = begin; s < end; s += 32) opacity += pixels.weights[s];
     const float inverse = inverse_opacity(warp_sum(opacity));
@@ -42,7 +42,7 @@ __global__ void prepare(const PixelArrays pixels) {
 
 __device__ PixelXyz seen_xyz(const PixelArrays& pixels, std::uint32_t p, const float2* logs) {
   PixelXyz sum;
-  for (std::uint32_t s = pixels.offsets[p] + threadIdx.x % 32; s < pixels.offsets[p + 1]; s += 32) {
+  for (std::uint32_t s = pixels.begins[p] + threadIdx.x % 32; s < pixels.ends[p]; s += 32) {
     const float light = pixels.weights[s] * pixels.luminance[s];
     sum.x += light * ratio_of(logs[s].x);
     sum.y += light;
@@ -64,7 +64,7 @@ __global__ void compare(const PixelArrays pixels, const float2* logs, const Chro
     const AbError error =
         ab_error(seen_xyz(pixels, p, logs), targets.colors[p], targets.kind, targets.pixel_weights[p] * targets.scale);
     total += error.distance;
-    for (std::uint32_t s = pixels.offsets[p] + threadIdx.x % 32; s < pixels.offsets[p + 1]; s += 32) {
+    for (std::uint32_t s = pixels.begins[p] + threadIdx.x % 32; s < pixels.ends[p]; s += 32) {
       const float light = pixels.weights[s] * pixels.luminance[s];
       targets.d_logs[s] =
           make_float2(error.d_x * light * ratio_derivative(logs[s].x), error.d_z * light * ratio_derivative(logs[s].y));
@@ -134,9 +134,9 @@ __device__ float composite_features(const ChromaHeadJob& job, std::uint32_t firs
     float2 sum = make_float2(0, 0);
     float squares = 0;
     if (first + p < job.pixels.pixels) {
-      const std::uint32_t end = job.pixels.offsets[first + p + 1];
+      const std::uint32_t end = job.pixels.ends[first + p];
 #pragma unroll 4
-      for (std::uint32_t s = job.pixels.offsets[first + p]; s < end; ++s) {
+      for (std::uint32_t s = job.pixels.begins[first + p]; s < end; ++s) {
         const float share = job.pixels.shares[s];
         const float2 features = floats_of_halves(job.features[std::size_t(s) * (kFeatures / 2) + lane]);
         sum.x += share * features.x;

@@ -19,7 +19,7 @@ struct PixelArrays {
   const Vec3f* positions = nullptr;
   const float* weights = nullptr;
   const float* luminance = nullptr;
-  const std::uint32_t* offsets = nullptr;  ///< [pixels + 1]
+  const std::uint32_t *begins = nullptr, *ends = nullptr;  ///< [pixels] of their samples
   // Made of these by `prepare_samples`:
   float4* places = nullptr;  ///< positions clamped to [0, 1], and the bits of the pixel's number
   float* shares = nullptr;   ///< w / A: of its pixel's features; 0 in pixels without colour

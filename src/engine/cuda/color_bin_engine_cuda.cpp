@@ -4,6 +4,7 @@
 #include "src/engine/color_engines.h"
 #include "src/engine/cuda/chroma_stream.h"
 #include "src/engine/cuda/pixel_batch.h"
+#include "src/engine/cuda/traced_pixels.h"
 #include "src/field/cuda/point_net.h"
 #include "src/field/nets.h"
 
@@ -63,6 +64,18 @@ class ColorBinEngineCuda final : public ColorBinEngine {
       chroma_colors(head_job(), {temperature, centres_.data(), colors_.data()}, stream_);
       colors_.download(colors.data() + begin, count, stream_);
     });
+  }
+  void decode_traced(const TracedPixels& pixels, float temperature, std::span<Ab> colors) const override {
+    const auto* here = dynamic_cast<const TracedPixelsCuda*>(&pixels);
+    if (here == nullptr) return decode(pixels.samples(), temperature, colors);
+    CNERF_CHECK_EQ(colors.size(), pixels.results().size());
+    const std::lock_guard lock(mutex_);
+    batch_.refer_to(here->buffers(), stream_);
+    features_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/false, stream_);
+    colors_.reserve(colors.size(), "pixels");
+    chroma_colors(head_job(), {temperature, centres_.data(), colors_.data()}, stream_);
+    colors_.download(colors.data(), colors.size(), stream_);
+    stream_.wait();
   }
 
   [[nodiscard]] long step_count() const override { return steps_.front(); }

@@ -86,6 +86,12 @@ class LuminanceEngineCuda final : public LuminanceEngine {
     const std::lock_guard lock(mutex_);
     tracer_.trace(field_.view(), rays, march, effort, samples, offsets);
   }
+  [[nodiscard]] std::unique_ptr<TracedPixels> trace_pixels(std::span<const Ray> rays, const MarchSettings& march,
+                                                           const RenderEffort& effort) const override {
+    const std::lock_guard lock(mutex_);
+    return tracer_.trace_pixels(field_.view(), rays, march, effort);
+  }
+  [[nodiscard]] std::size_t rays_at_a_time() const override { return LuminanceTracerCuda::kTracedAtATime; }
   [[nodiscard]] std::size_t points_at_a_time() const override { return LuminanceTracerCuda::kPointsAtATime; }
   void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override {
     const std::lock_guard lock(mutex_);

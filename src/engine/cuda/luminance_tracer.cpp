@@ -4,46 +4,16 @@
 
 #include "src/base/check.h"
 #include "src/base/parallel.h"
-#include "src/engine/heaviest_samples.h"
 
 namespace cnerf {
 namespace {
 
-constexpr std::uint32_t kRaysAtATime = 1 << 18;    // of a rendering
-constexpr std::uint32_t kTracedAtATime = 1 << 14;  // rays whose samples are kept
+constexpr std::uint32_t kRaysAtATime = 1 << 18;  // of a rendering
+constexpr std::size_t kTracedAtATime = LuminanceTracerCuda::kTracedAtATime;
+constexpr std::size_t kUsualSamples = 16;  // that are kept of a ray
+constexpr std::size_t kGrain = 1 << 14;    // samples of a parallel piece of work
 
 const char* const kRayAdvice = "rays";
-
-/// Puts traced samples in the order of their rays and leaves out the light ones.
-void append_heaviest(std::span<const TracedRay> rays, const WeightedSample* found, const RenderEffort& effort,
-                     std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets) {
-  constexpr std::size_t kRays = 256;  // of a part
-  struct Part {
-    std::vector<WeightedSample> samples;
-    std::vector<std::size_t> offsets = {0};
-  };
-  std::vector<Part> parts((rays.size() + kRays - 1) / kRays);
-  parallel_tasks(parts.size(), [&](std::size_t i) {
-    Part& part = parts[i];
-    for (const TracedRay& ray : rays.subspan(i * kRays, std::min(kRays, rays.size() - i * kRays))) {
-      for (std::uint32_t s = 0; s < ray.samples; s += 32) {
-        const WeightedSample* run = found + ray.run[s / 32];
-        part.samples.insert(part.samples.end(), run, run + std::min(32u, ray.samples - s));
-      }
-      part.offsets.push_back(part.samples.size());
-    }
-    keep_heaviest(effort, part.samples, part.offsets);
-  });
-  std::vector<std::size_t> begins = {samples.size()};
-  for (const Part& part : parts) {
-    for (std::size_t r = 1; r < part.offsets.size(); ++r) offsets.push_back(begins.back() + part.offsets[r]);
-    begins.push_back(begins.back() + part.samples.size());
-  }
-  samples.resize(begins.back());
-  parallel_tasks(parts.size(), [&](std::size_t i) {
-    std::copy(parts[i].samples.begin(), parts[i].samples.end(), samples.begin() + std::ptrdiff_t(begins[i]));
-  });
-}
 
 }  // namespace
 
@@ -102,39 +72,57 @@ void LuminanceTracerCuda::render_view(const FieldView& field, const UnitCamera& 
   wait();
 }
 
+void LuminanceTracerCuda::trace_to(const FieldView& field, std::span<const Ray> rays, const MarchSettings& march,
+                                   const RenderEffort& effort, TracedBuffers& to) {
+  scratch_.reserve(tracing_warps(field.n_levels) * kMostSamplesOfRay, kRayAdvice);
+  to.begins.reserve(rays.size(), kRayAdvice);
+  to.ends.reserve(rays.size(), kRayAdvice);
+  to.results.reserve(rays.size(), kRayAdvice);
+  to.rays = std::uint32_t(rays.size());
+  std::size_t room = kUsualSamples * rays.size();
+  while (true) {
+    to.positions.reserve(room, kRayAdvice);
+    for (auto* buffer : {&to.t, &to.weights, &to.luminance}) buffer->reserve(room, kRayAdvice);
+    TraceJob trace = job_of_rays(field, rays, march, effort);
+    trace.kept = {
+        scratch_.data(),     effort.shaded_share, std::uint32_t(std::min<std::size_t>(to.t.size(), ~std::uint32_t(0))),
+        to.positions.data(), to.t.data(),         to.weights.data(),
+        to.luminance.data(), to.begins.data(),    to.ends.data(),
+        to.results.data()};
+    trace_to_samples(trace, stream_);
+    wait();
+    to.samples = state_.downloaded().front().samples;
+    if (to.samples <= trace.kept.capacity) return;
+    room = to.samples;
+  }
+}
+
 void LuminanceTracerCuda::trace(const FieldView& field, std::span<const Ray> rays, const MarchSettings& march,
                                 const RenderEffort& effort, std::vector<WeightedSample>& samples,
                                 std::vector<std::size_t>& offsets) {
   samples.clear();
   offsets.assign(1, 0);
-  std::uint32_t most = kTracedAtATime;
-  const std::size_t room = std::size_t(1) << 22;
-  if (weighted_.size() < room) weighted_ = {room, kRayAdvice};
-  traced_.reserve(most, kRayAdvice);
-  if (!found_) found_ = std::make_unique<MappedBuffer<WeightedSample>>(room);
-  WeightedSample* found = &(*found_)[0];
-  for (std::size_t first = 0; first < rays.size();) {
-    const auto count = std::uint32_t(std::min<std::size_t>(most, rays.size() - first));
-    TraceJob trace = job_of_rays(field, rays.subspan(first, count), march, effort);
-    trace.weighted = weighted_.data();
-    trace.weighted_capacity = std::uint32_t(room);
-    trace.traced = traced_.data();
-    trace_to_samples(trace, stream_);
-    wait();
-    const StepState state = state_.downloaded().front();
-    if (state.samples > trace.weighted_capacity) {
-      most = count / 2;  // too many samples: fewer rays at a time
-      continue;
-    }
-    std::vector<TracedRay> of_rays(count);
-    weighted_.download(found, state.samples, stream_);
-    traced_.download(of_rays.data(), count, stream_);
-    wait();
-    append_heaviest(of_rays, found, effort, samples, offsets);
-    // As many samples per ray as so far: memory hardly ever moves.
-    if (first == 0) samples.reserve(samples.size() * (rays.size() / count + 1));
-    first += count;
+  for (std::size_t first = 0; first < rays.size(); first += kTracedAtATime) {
+    const std::size_t count = std::min<std::size_t>(kTracedAtATime, rays.size() - first), before = samples.size();
+    trace_to(field, rays.subspan(first, count), march, effort, to_host_);
+    const RayOrder order(to_host_);
+    const std::vector<float> t = order.downloaded(to_host_.t), weights = order.downloaded(to_host_.weights),
+                             luminance = order.downloaded(to_host_.luminance);
+    for (std::size_t r = 0; r < count; ++r) offsets.push_back(before + order.offsets()[r + 1]);
+    samples.resize(offsets.back());
+    parallel_ranges(t.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t s = begin; s < end; ++s) samples[before + s] = {t[s], weights[s], luminance[s]};
+    });
   }
+}
+
+std::unique_ptr<TracedPixels> LuminanceTracerCuda::trace_pixels(const FieldView& field, std::span<const Ray> rays,
+                                                                const MarchSettings& march,
+                                                                const RenderEffort& effort) {
+  // Memory of pixels that nobody looks at any more serves again: a picture is traced in many parts.
+  if (!kept_ || kept_.use_count() > 1) kept_ = std::make_shared<TracedBuffers>();
+  trace_to(field, rays, march, effort, *kept_);
+  return std::make_unique<TracedPixelsCuda>(kept_);
 }
 
 void LuminanceTracerCuda::query(const FieldView& field, std::span<const Vec3f> positions,

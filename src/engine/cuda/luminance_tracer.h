@@ -8,6 +8,7 @@
 
 #include "src/base/cuda/stream.h"
 #include "src/engine/cuda/trace_kernel.h"
+#include "src/engine/cuda/traced_pixels.h"
 #include "src/engine/luminance_engine.h"
 
 namespace cnerf {
@@ -16,6 +17,7 @@ namespace cnerf {
 class LuminanceTracerCuda {
  public:
   static constexpr std::uint32_t kPointsAtATime = 1 << 20;
+  static constexpr std::size_t kTracedAtATime = 1 << 16;  ///< rays whose samples are kept
 
   /// @param layout, occupied  the occupancy grid and its bits
   LuminanceTracerCuda(const OccupancyLayout& layout, const std::uint32_t* occupied, cudaStream_t stream)
@@ -28,6 +30,8 @@ class LuminanceTracerCuda {
                    const RenderEffort& effort, std::span<RayResult> results);
   void trace(const FieldView& field, std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
              std::vector<WeightedSample>& samples, std::vector<std::size_t>& offsets);
+  [[nodiscard]] std::unique_ptr<TracedPixels> trace_pixels(const FieldView& field, std::span<const Ray> rays,
+                                                           const MarchSettings& march, const RenderEffort& effort);
   /// Density at points, or the luminance seen along directions.
   /// @param directions  empty: density
   void query(const FieldView& field, std::span<const Vec3f> positions, std::span<const Vec3f> directions,
@@ -41,6 +45,9 @@ class LuminanceTracerCuda {
   [[nodiscard]] TraceJob job_of_rays(const FieldView& field, std::span<const Ray> rays, const MarchSettings& march,
                                      const RenderEffort& effort);
 
+  void trace_to(const FieldView& field, std::span<const Ray> rays, const MarchSettings& march,
+                const RenderEffort& effort, TracedBuffers& to);
+
   OccupancyLayout layout_;
   const std::uint32_t* occupied_;
   cudaStream_t stream_;
@@ -50,9 +57,9 @@ class LuminanceTracerCuda {
   DeviceBuffer<RayRecord> rays_;
   DeviceBuffer<DirectionCode> directions_;
   DeviceBuffer<RayResult> results_;
-  DeviceBuffer<WeightedSample> weighted_;
-  DeviceBuffer<TracedRay> traced_;
-  std::unique_ptr<MappedBuffer<WeightedSample>> found_;  // a copy of `weighted_`, pinned
+  DeviceBuffer<WeightedSample> scratch_;
+  TracedBuffers to_host_;
+  std::shared_ptr<TracedBuffers> kept_;  // of the pixels that were traced last
   DeviceBuffer<Vec3f> points_, point_directions_;
   DeviceBuffer<float> answers_;
 };

@@ -43,8 +43,8 @@ struct RunDistortion {
   }
 };
 
-/// What a ray has gathered so far. Runs lie in memory one after another, or wherever there was room; lane r knows where
-/// run r begins.
+/// What a ray has gathered so far. Runs of training rays lie in memory wherever there was room; lane r knows where run
+/// r begins.
 struct RayProgress {
   float depth = 0;           ///< optical
   float luminance = 0;       ///< this lane's share
@@ -85,6 +85,80 @@ __device__ void keep_for_training(const TraceJob& job, const WarpField<KT>& warp
   }
   const std::uint32_t room = samples.capacity - min(begin, samples.capacity);
   warp.store(samples.encoded + std::size_t(begin) * (2 * KT), unsigned(count), room, lane);
+}
+
+__device__ WeightedSample* scratch_of_warp(const KeptSamples& kept) {
+  return kept.scratch + (std::size_t(blockIdx.x) * kWarps + threadIdx.x / 32) * kMostSamplesOfRay;
+}
+
+/// Calls `visit(sample)` for this lane's share of a ray's samples.
+template <typename Visit>
+__device__ void for_samples_of_lane(const WeightedSample* samples, int count, Visit&& visit) {
+  for (int s = int(threadIdx.x) % 32; s < count; s += 32) visit(samples[s]);
+}
+
+/// The weight of the lightest sample among the fewest that carry `wanted`.
+__device__ float lightest_carrying(float wanted, const WeightedSample* samples, int count) {
+  std::uint32_t lightest = 0;  // weights are not negative: they have the order of their bits
+  for (int bit = 30; bit >= 0; --bit) {
+    const std::uint32_t tried = lightest | (1u << bit);
+    float carried = 0;
+    for_samples_of_lane(samples, count, [&](const WeightedSample& sample) {
+      carried += __float_as_uint(sample.weight) >= tried ? sample.weight : 0.0f;
+    });
+    if (warp_sum(carried) >= wanted) lightest = tried;
+  }
+  return __uint_as_float(lightest);
+}
+
+/// As keep_heaviest (heaviest_samples.h), of a ray whose samples lie in the warp's scratch.
+__device__ void keep_heaviest_of_ray(const TraceJob& job, const Ray& ray, std::uint32_t index, int count) {
+  const unsigned lane = threadIdx.x % 32;
+  const KeptSamples& kept = job.kept;
+  const WeightedSample* samples = scratch_of_warp(kept);
+  float total = 0;
+  for_samples_of_lane(samples, count, [&](const WeightedSample& sample) { total += sample.weight; });
+  total = warp_sum(total);
+  const bool keeps_all = kept.share >= 1;
+  const float lightest = keeps_all || total <= 0 ? 0.0f : lightest_carrying(kept.share * total, samples, count);
+  const auto is_kept = [&](float weight) { return keeps_all || (weight >= lightest && weight > 0); };
+
+  int n = 0;
+  RayResult sums;  // this lane's share, not yet scaled
+  for_samples_of_lane(samples, count, [&](const WeightedSample& sample) {
+    if (!is_kept(sample.weight)) return;
+    ++n;
+    sums.luminance += sample.weight * sample.luminance;
+    sums.opacity += sample.weight;
+    sums.depth += sample.weight * sample.t;
+  });
+  sums = {warp_sum(sums.luminance), warp_sum(sums.opacity), warp_sum(sums.depth)};
+  n = int(warp_sum(float(n)));
+  const float opacity = total > 1 - job.min_transmittance ? 1.0f : total;  // RenderEffort::opacity_of
+  const float scale = sums.opacity > 0 ? opacity / sums.opacity : 1.0f;
+  std::uint32_t to = 0;
+  if (lane == 0) {
+    to = atomicAdd(&job.state->samples, std::uint32_t(n));
+    kept.begins[index] = to;
+    kept.ends[index] = to + std::uint32_t(n);
+    const float depth = sums.opacity > 0 ? sums.depth / sums.opacity : 0.0f;
+    kept.results[index] = {scale * sums.luminance, scale * sums.opacity, depth};
+  }
+  to = __shfl_sync(~0u, to, 0);
+  if (to + std::uint32_t(n) > kept.capacity) return;
+  for (int first = 0; first < count; first += 32) {
+    const bool has_sample = first + int(lane) < count;
+    const WeightedSample sample = has_sample ? samples[first + lane] : WeightedSample{};
+    const unsigned all = __ballot_sync(~0u, has_sample && is_kept(sample.weight));
+    if ((all >> lane & 1u) != 0) {
+      const std::uint32_t at = to + std::uint32_t(__popc(all & ((1u << lane) - 1u)));
+      kept.positions[at] = ray.at(sample.t);
+      kept.t[at] = sample.t;
+      kept.weights[at] = scale * sample.weight;
+      kept.luminance[at] = sample.luminance;
+    }
+    to += std::uint32_t(__popc(all));
+  }
 }
 
 /// Loss of a finished training ray and its gradient by what its samples emit and absorb.
@@ -171,10 +245,7 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
       is_open = is_open && ray.has_room;
     }
     if constexpr (kKeep == Keep::kSamples) {
-      ray.has_room = allocate_run(ray, count, job.weighted_capacity, &job.state->samples);
-      const std::uint32_t begin = __shfl_sync(~0u, ray.run_begin, ray.samples / 32);
-      if (ray.has_room && int(lane) < count) job.weighted[begin + lane] = {sample.t, weight, luminance};
-      is_open = is_open && ray.has_room;
+      if (int(lane) < count) scratch_of_warp(job.kept)[ray.samples + int(lane)] = {sample.t, weight, luminance};
     }
     ray.samples += count;
     __syncwarp();
@@ -201,8 +272,8 @@ __global__ void __launch_bounds__(kThreads, 2)
     const RayProgress ray = follow_ray<KT, kKeep>(levels, job, shared, record, index);
     if constexpr (kKeep == Keep::kTraining) train_ray(job, record, ray, n_rays, sums);
     if constexpr (kKeep == Keep::kSamples) {
-      if (lane < kMostRuns) job.traced[index].run[lane] = ray.run_begin;
-      if (lane == 0) job.traced[index].samples = std::uint32_t(ray.samples);
+      keep_heaviest_of_ray(job, record.ray, index, ray.samples);
+      __syncwarp();  // before the next ray's samples take their place
     }
   }
   if constexpr (kKeep == Keep::kTraining) {
@@ -315,6 +386,14 @@ void trace_training_rays(const TraceJob& job, cudaStream_t stream) {
 }
 void trace_to_samples(const TraceJob& job, cudaStream_t stream) {
   launch_trace<Keep::kSamples>(job, stream);
+}
+std::size_t tracing_warps(int n_levels) {
+  std::size_t warps = 0;
+  with_channel_tiles(n_levels, [&](auto tiles) {
+    constexpr int KT = decltype(tiles)::value;
+    warps = kWarps * resident_blocks<trace<KT, Keep::kSamples>>(kThreads, sizeof(TraceShared<KT>));
+  });
+  return warps;
 }
 
 void query_field(const FieldView& field, const QueryJob& job, cudaStream_t stream) {

@@ -24,11 +24,21 @@ struct SampleArrays {
   float2* gradients = nullptr;  ///< of the loss by the luminance net's raw output and by log density
 };
 
-/// A traced ray's samples: runs of 32, the last one shorter.
+/// Of one ray's samples, in runs of 32.
 inline constexpr int kMostRuns = 32;
-struct TracedRay {
-  std::uint32_t run[kMostRuns];
-  std::uint32_t samples;
+inline constexpr int kMostSamplesOfRay = 32 * kMostRuns;
+
+/// What tracing keeps of rays: the heaviest of their samples (heaviest_samples.h).
+struct KeptSamples {
+  WeightedSample* scratch = nullptr;  ///< [tracing_warps(), kMostSamplesOfRay]
+  float share = 1;                    ///< of a ray's weight that is kept
+  std::uint32_t capacity = 0;         ///< where it does not suffice, what is kept is of no use
+  // [capacity], a ray's samples in a row, front to back; rays in any order:
+  Vec3f* positions = nullptr;
+  float *t = nullptr, *weights = nullptr, *luminance = nullptr;
+  // [rays]
+  std::uint32_t *begins = nullptr, *ends = nullptr;
+  RayResult* results = nullptr;
 };
 
 struct TraceJob {
@@ -47,13 +57,13 @@ struct TraceJob {
   // Rendering:
   RayResult* results = nullptr;
   // Tracing:
-  WeightedSample* weighted = nullptr;
-  std::uint32_t weighted_capacity = 0;
-  TracedRay* traced = nullptr;
+  KeptSamples kept;
 };
 
 void trace_training_rays(const TraceJob& job, cudaStream_t stream);
 void trace_to_samples(const TraceJob& job, cudaStream_t stream);
+/// Warps that `trace_to_samples` runs, at most.
+[[nodiscard]] std::size_t tracing_warps(int n_levels);
 
 /// Follows rays to `results`. Answers differ from those of traced samples in what is left dark, 16 samples at a time
 /// that together add less than a tenth of an 8-bit step to a pixel, and in that samples are not counted: a ray goes on

@@ -23,6 +23,18 @@ PixelColors pixel_colors_of(const nlohmann::json& header) {
   return is_field ? PixelColors::kField : PixelColors::kDistribution;
 }
 
+/// Colours as they can be shown at the pixels' light.
+/// @param seen  RayResult of a pixel
+template <typename Seen>
+void show(std::vector<Ab>& colors, const Seen& seen) {
+  parallel_ranges(colors.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      const RayResult pixel = seen(p);
+      colors[p] = pixel.opacity >= kLeastColoredOpacity ? in_gamut(colors[p], pixel.luminance) : Ab{};
+    }
+  });
+}
+
 }  // namespace
 
 Ab in_gamut(Ab color, float luminance) {
@@ -124,12 +136,18 @@ std::vector<Ab> ColorModel::decode(const PixelSamples& pixels) const {
     chroma->decode(pixels, float(options.decode_temperature), colors);
   }
   const std::vector<float> luminance = pixel_luminance(pixels);
-  parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      const bool is_colored = pixels.opacity(p) >= kLeastColoredOpacity;
-      colors[p] = is_colored ? in_gamut(colors[p], luminance[p]) : Ab{};
-    }
-  });
+  show(colors, [&](std::size_t p) { return RayResult{luminance[p], pixels.opacity(p), 0}; });
+  return colors;
+}
+
+std::vector<Ab> ColorModel::decode(const TracedPixels& pixels) const {
+  std::vector<Ab> colors(pixels.results().size());
+  if (pixel_colors == PixelColors::kField) {
+    chromaticity->composite(pixels.samples(), colors);
+  } else {
+    chroma->decode_traced(pixels, float(options.decode_temperature), colors);
+  }
+  show(colors, [&](std::size_t p) { return pixels.results()[p]; });
   return colors;
 }
 

@@ -38,6 +38,7 @@ struct ColorModel {
   /// Colours of pixels as `pixel_colors` says, brought into the gamut at the pixel's own luminance. Pixels of hardly
   /// any opacity are grey.
   [[nodiscard]] std::vector<Ab> decode(const PixelSamples& pixels) const;
+  [[nodiscard]] std::vector<Ab> decode(const TracedPixels& pixels) const;
 
  private:
   [[nodiscard]] std::vector<StatePiece> state();

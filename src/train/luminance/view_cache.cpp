@@ -29,15 +29,6 @@ void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
   });
 }
 
-PixelSamples with_room_for(std::vector<std::size_t> offsets) {
-  PixelSamples pixels;
-  pixels.positions.resize(offsets.back());
-  pixels.weights.resize(offsets.back());
-  pixels.luminance.resize(offsets.back());
-  pixels.offsets = std::move(offsets);
-  return pixels;
-}
-
 }  // namespace
 
 CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march, const UnitCamera& full_size_camera,
@@ -161,21 +152,6 @@ void ignore_masked(CachedView& view, const MonoImage& image) {
     const auto column = std::size_t(x * view.width / image.width), row = std::size_t(y * view.height / image.height);
     view.opacity[row * std::size_t(view.width) + column] = 0;
   }
-}
-
-PixelSamples pixel_samples(std::span<const Ray> rays, std::span<const WeightedSample> samples,
-                           std::span<const std::size_t> offsets) {
-  PixelSamples pixels = with_room_for({offsets.begin(), offsets.end()});
-  parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t r = begin; r < end; ++r) {
-      for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
-        pixels.positions[s] = rays[r].at(samples[s].t);
-        pixels.weights[s] = samples[s].weight;
-        pixels.luminance[s] = samples[s].luminance;
-      }
-    }
-  });
-  return pixels;
 }
 
 PixelSamples pixel_samples(std::span<const CachedView> views, std::span<const ViewPixel> wanted) {

@@ -89,10 +89,6 @@ class ViewCache {
 /// no histogram counts it. What a colorizer is shown stays.
 void ignore_masked(CachedView& view, const MonoImage& image);
 
-/// Traced samples as the chroma engines want them.
-[[nodiscard]] PixelSamples pixel_samples(std::span<const Ray> rays, std::span<const WeightedSample> samples,
-                                         std::span<const std::size_t> offsets);
-
 /// A pixel of one of several views.
 struct ViewPixel {
   std::uint32_t view = 0;

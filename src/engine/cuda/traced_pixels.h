@@ -1,0 +1,64 @@
+#pragma once
+/// Pixels that were traced on the GPU, their samples in its memory.
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "src/base/cuda/device_memory.h"
+#include "src/base/parallel.h"
+#include "src/engine/pixel_samples.h"
+
+namespace cnerf {
+
+/// See KeptSamples (trace_kernel.h).
+struct TracedBuffers {
+  std::uint32_t rays = 0, samples = 0;
+  DeviceBuffer<Vec3f> positions;
+  DeviceBuffer<float> t, weights, luminance;
+  DeviceBuffer<std::uint32_t> begins, ends;
+  DeviceBuffer<RayResult> results;
+};
+
+/// Brings samples to the host in the order of their rays.
+class RayOrder {
+ public:
+  explicit RayOrder(const TracedBuffers& traced);
+
+  [[nodiscard]] const std::vector<std::size_t>& offsets() const { return offsets_; }  ///< [rays + 1]
+  template <typename T>
+  [[nodiscard]] std::vector<T> downloaded(const DeviceBuffer<T>& of_samples) const {
+    constexpr std::size_t kGrain = 512;  // rays of a parallel piece of work
+    std::vector<T> found(offsets_.back()), ordered(offsets_.back());
+    of_samples.download(found.data(), found.size());
+    parallel_ranges(begins_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) {
+        std::copy_n(&found[0] + begins_[r], offsets_[r + 1] - offsets_[r], &ordered[0] + offsets_[r]);
+      }
+    });
+    return ordered;
+  }
+
+ private:
+  std::vector<std::uint32_t> begins_;
+  std::vector<std::size_t> offsets_ = {0};
+};
+
+class TracedPixelsCuda final : public TracedPixels {
+ public:
+  explicit TracedPixelsCuda(std::shared_ptr<const TracedBuffers> buffers);
+
+  [[nodiscard]] std::span<const RayResult> results() const override { return results_; }
+  [[nodiscard]] const PixelSamples& samples() const override;
+  [[nodiscard]] const TracedBuffers& buffers() const { return *buffers_; }
+
+ private:
+  std::shared_ptr<const TracedBuffers> buffers_;
+  std::vector<RayResult> results_;
+  mutable std::optional<PixelSamples> samples_;
+};
+
+}  // namespace cnerf
