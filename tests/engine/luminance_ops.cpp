@@ -117,7 +117,7 @@ void append_queries(const LuminanceEngine& engine, std::vector<Result>& results)
 
 /// The heaviest samples of rays, in the engine's own memory and as `trace` hands them out.
 void append_traced_pixels(const LuminanceEngine& engine, std::span<const Ray> rays, const MarchSettings& march,
-                          std::vector<Result>& results) {
+                          const Backend& backend, std::vector<Result>& results) {
   const RenderEffort effort{1e-3f, 0.98f};
   std::vector<WeightedSample> samples;
   std::vector<std::size_t> offsets;
@@ -144,13 +144,27 @@ void append_traced_pixels(const LuminanceEngine& engine, std::span<const Ray> ra
     depth.push_back(seen.depth * seen.opacity);
     EXPECT_NEAR(seen.opacity, expected.opacity(r), 1e-5f);
   }
+  const auto colorist = backend.make([](const Engines& engines) {
+    return engines.make_color_bins({.levels = 8, .log2_rows = 12, .coarsest_resolution = 4, .finest_resolution = 64},
+                                   5);
+  });
+  std::vector<Ab> colors(rays.size()), expected_colors(rays.size());
+  colorist->decode_traced(*traced, 0.38f, colors);
+  colorist->decode(expected, 0.38f, expected_colors);
+  float most = 0;
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    if (traced->results()[r].opacity < kLeastColoredOpacity) continue;
+    most = std::max({most, std::abs(colors[r].a - expected_colors[r].a), std::abs(colors[r].b - expected_colors[r].b)});
+  }
+  EXPECT_LT(most, 1e-3f) << "colours of traced pixels";
   results.push_back({"luminance of the heaviest samples", luminance});
   results.push_back({"opacity of the heaviest samples", opacity});
   results.push_back({"depth of the heaviest samples", depth});
   results.push_back({"number of the heaviest samples", {double(expected.offsets.back())}});
 }
 
-void append_pictures(const Scene& scene, const LuminanceEngine& engine, std::vector<Result>& results) {
+void append_pictures(const Scene& scene, const LuminanceEngine& engine, const Backend& backend,
+                     std::vector<Result>& results) {
   const UnitCamera& camera = scene.views()[1].camera;
   std::vector<Ray> rays;
   for (int y = 0; y < 40; ++y) {
@@ -182,7 +196,7 @@ void append_pictures(const Scene& scene, const LuminanceEngine& engine, std::vec
   }
   EXPECT_TRUE(in_order) << "traced samples";
   EXPECT_LT(relative_distance(traced, luminance), 1e-4) << "traced samples add up to the picture";
-  append_traced_pixels(engine, rays, scene.options().march, results);
+  append_traced_pixels(engine, rays, scene.options().march, backend, results);
   results.push_back({"rendered luminance", luminance});
   results.push_back({"rendered opacity", opacity});
   results.push_back({"rendered depth", depth});
@@ -205,7 +219,7 @@ Op stage1(const Problem& problem) {
     const auto engine = scene->trained(backend, 40);
     append_gradients(*engine, results);
     append_queries(*engine, results);
-    append_pictures(*scene, *engine, results);
+    append_pictures(*scene, *engine, backend, results);
     append_step(*scene->trained(backend, 48), results);
     return results;
   };
@@ -233,8 +247,10 @@ Op stage1(const Problem& problem) {
   }
   op.bounds.push_back({"density of points", 1e-4, 1e-2});
   op.bounds.push_back({"luminance of points", 1e-4, 5e-3});
-  for (const char* rendered : {"rendered luminance", "rendered opacity", "rendered depth"}) {
-    op.bounds.push_back({rendered, 1e-3, 1e-2});
+  for (const char* seen :
+       {"rendered luminance", "rendered opacity", "rendered depth", "luminance of the heaviest samples",
+        "opacity of the heaviest samples", "depth of the heaviest samples", "number of the heaviest samples"}) {
+    op.bounds.push_back({seen, 1e-3, 1e-2});
   }
   // Where gradients are mostly noise, Adam's step has either sign.
   for (const std::string& piece : pieces) {
