@@ -248,8 +248,8 @@ Op stage1(const Problem& problem) {
   op.bounds.push_back({"density of points", 1e-4, 1e-2});
   op.bounds.push_back({"luminance of points", 1e-4, 5e-3});
   for (const char* seen :
-       {"rendered luminance", "rendered opacity", "rendered depth", "luminance of the heaviest samples",
-        "opacity of the heaviest samples", "depth of the heaviest samples", "number of the heaviest samples"}) {
+       {"luminance of the heaviest samples", "opacity of the heaviest samples", "depth of the heaviest samples",
+        "number of the heaviest samples", "rendered luminance", "rendered opacity", "rendered depth"}) {
     op.bounds.push_back({seen, 1e-3, 1e-2});
   }
   // Where gradients are mostly noise, Adam's step has either sign.
