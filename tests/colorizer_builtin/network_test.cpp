@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 #include <torch/torch.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -240,6 +242,45 @@ TEST(BuiltinColorizer, AnswerDoesNotDependOnThePicturesResolution) {
   }
   EXPECT_GT(chroma, 96 * 96) << "the comparison must be able to fail";
   EXPECT_LT(difference, 0.1 * chroma);
+}
+
+/// A question of stage 2.
+std::vector<float> asked_as(Colorizer& colorizer, std::uint64_t query) {
+  LightnessBatch patch = blobs(96);
+  patch.origins = {{"view", 0, 0, 1, 1, query}};
+  return colorizer.colorize(patch).ab;
+}
+
+TEST(BuiltinColorizer, AQuestionsNumberSaysHowItIsAsked) {
+  const auto colorizer = builtin_colorizer();
+  EXPECT_EQ(asked_as(*colorizer, 7), asked_as(*colorizer, 7));
+  std::set<std::vector<float>> answers;
+  for (std::uint64_t query = 0; query < 64; ++query) answers.insert(asked_as(*colorizer, query));
+  EXPECT_EQ(answers.size(), 8u) << "four sizes, each as it is and mirrored";
+}
+
+TEST(BuiltinColorizer, APictureGetsTheMeanOfAllWays) {
+  const auto colorizer = builtin_colorizer();
+  const double gain = load_colorizer_weights(builtin_weights_file()).decoding.gain;
+  std::set<std::vector<float>> answers;
+  for (std::uint64_t query = 0; query < 64; ++query) answers.insert(asked_as(*colorizer, query));
+  const std::vector<float> whole = colorizer->colorize(blobs(96)).ab;
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    double mean = 0;
+    for (const std::vector<float>& answer : answers) mean += answer[i] / double(answers.size());
+    ASSERT_NEAR(whole[i], gain * mean, 1e-3);
+  }
+}
+
+TEST(BuiltinColorizer, AMirroredPictureGetsMirroredColors) {
+  const auto colorizer = builtin_colorizer();
+  LightnessBatch picture = blobs(64);
+  const std::vector<float> ab = colorizer->colorize(picture).ab;
+  for (int y = 0; y < 64; ++y) std::reverse(&picture.lightness[64 * y], &picture.lightness[64 * y] + 64);
+  const std::vector<float> mirrored = colorizer->colorize(picture).ab;
+  for (int row = 0; row < 128; ++row) {
+    for (int x = 0; x < 64; ++x) ASSERT_NEAR(ab[64 * row + x], mirrored[64 * row + 63 - x], 1e-2);
+  }
 }
 
 TEST(BuiltinColorizer, FlatGreyGetsNearlyNoColor) {

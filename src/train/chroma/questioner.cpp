@@ -9,8 +9,9 @@
 namespace cnerf {
 namespace {
 
-// s of the training's patches (paper, Eq. patch sampling).
-constexpr double kSmallestPatch = 0.3, kLargestPatch = 0.7;
+// s of the training's patches (paper, Eq. patch sampling). The largest show whole things and their surroundings, from
+// which a colorizer knows what they are.
+constexpr double kSmallestPatch = 0.3, kLargestPatch = 1;
 
 }  // namespace
 
