@@ -104,8 +104,8 @@ Made small_resnet() {
 /// Convolution, then normalisation, as they stand in the model: nothing is folded.
 Tensor unfolded(const Made& made, const Tensor& x, const std::string& conv, const std::string& norm, int stride) {
   const Tensor kernel = made.get(conv + "/kernel");
-  const Tensor y = torch::conv2d(x, kernel.permute({3, 2, 0, 1}).contiguous(), made.get(conv + "/bias"), stride,
-                                 kernel.size(0) / 2);
+  const Tensor y =
+      torch::conv2d(x, kernel.permute({3, 2, 0, 1}).contiguous(), made.get(conv + "/bias"), stride, kernel.size(0) / 2);
   return torch::batch_norm(y, made.get(norm + "/gamma"), made.get(norm + "/beta"), made.get(norm + "/moving_mean"),
                            made.get(norm + "/moving_variance"), false, 0, 1e-3, false);
 }
@@ -227,7 +227,8 @@ TEST(Encoder, AFitStartsAsItWouldWithoutItAndDoesNotDependOnThreads) {
   const ReferenceRecipe alone = short_recipe(nullptr), guided = short_recipe(load_encoder(folder.path()));
   EXPECT_NE(alone.text(), guided.text()) << "a cached fit would be taken for another";
   const LightnessBatch question = test::some_question(2, 64, 96);
-  EXPECT_EQ(ReferenceNetwork(guided, images, 3).colorize(question), ReferenceNetwork(alone, images, 3).colorize(question));
+  EXPECT_EQ(ReferenceNetwork(guided, images, 3).colorize(question),
+            ReferenceNetwork(alone, images, 3).colorize(question));
 
   const auto fitted = [&](int threads, std::uint64_t seed) {
     set_thread_count(threads);

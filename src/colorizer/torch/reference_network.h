@@ -35,7 +35,7 @@ struct ReferenceRecipe {
   /// read where the network fitted here has the same resolution, through 1x1 convolutions that start at zero.
   std::shared_ptr<const Encoder> encoder;
   /// How often a patch is learned from, and how many a shard holds of which it takes one a step: what the frozen
-  /// networks make of a patch costs more than a step of the fit.
+  /// networks make of a patch is kept with it.
   int patch_uses = 1, patches_held = 1;
   PatchDistortion distortion;
 
