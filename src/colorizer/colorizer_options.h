@@ -13,6 +13,7 @@ struct ColorizerOptions {
   double timeout_seconds = 60;
   int reference_steps = 480;
   bool reference_on_builtin = true;
+  std::string reference_encoder = "auto";
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -27,6 +28,8 @@ struct ColorizerOptions {
       "an exec: or torchscript: colorizer that takes longer for a batch failed");
     v("reference_steps", reference_steps, Range{1, 1e6}, "optimiser steps of the fit to a reference: photograph");
     v("reference_on_builtin", reference_on_builtin, "that fit builds on what the built-in network makes of a picture");
+    v("reference_encoder", reference_encoder, Choice{"auto", "on", "off"},
+      "and on what an encoder makes of it that is installed by itself; auto: where it is installed");
   }
 };
 

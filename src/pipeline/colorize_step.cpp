@@ -55,7 +55,8 @@ TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Eng
 
 ColorizerContext colorizer_context(const Config& config, const fs::path& working_folder, const fs::path& cache_folder,
                                    Observer& observer) {
-  return {working_folder, cache_folder, std::uint64_t(config.stage2.seed), observer.progress_sink()};
+  return {working_folder, cache_folder, std::uint64_t(config.stage2.seed), observer.progress_sink(),
+          [&observer](const std::string& text) { observer.say(text); }};
 }
 
 std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& observer) {

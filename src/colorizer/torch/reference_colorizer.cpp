@@ -8,6 +8,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/colorizer/torch/encoder.h"
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer/torch/reference_images.h"
 #include "src/colorizer/torch/reference_network.h"
@@ -100,12 +101,27 @@ class ReferenceColorizer final : public Colorizer {
   ReferenceNetwork network_;
 };
 
+/// @throws MissingInputError  it was asked for and is not installed.
+bool wants_encoder(const ColorizerRequest& request) {
+  const std::string& choice = request.options.reference_encoder;
+  if (choice == "off") return false;
+  if (is_encoder_installed()) return true;
+  const std::string missing = "no encoder in " + encoder_folder().string();
+  if (choice == "on") {
+    throw MissingInputError("colorizer.reference_encoder: " + missing +
+                            "; scripts/install_dependencies.sh --encoder installs it");
+  }
+  if (request.context.say) request.context.say("reference: fits without the optional encoder: " + missing);
+  return false;
+}
+
 }  // namespace
 
 std::unique_ptr<Colorizer> make_reference_colorizer(const ColorizerRequest& request) {
   ReferenceRecipe recipe;
   recipe.steps = request.options.reference_steps;
   if (request.options.reference_on_builtin) recipe.builtin = builtin_weights_file();
+  if (wants_encoder(request)) use_encoder(recipe, load_encoder(encoder_folder()));
   return fit_reference_colorizer(request, recipe);
 }
 
@@ -115,7 +131,8 @@ std::unique_ptr<Colorizer> fit_reference_colorizer(const ColorizerRequest& reque
   for (const fs::path& file : files) images.push_back(load_reference_image(file));
 
   const ColorizerContext& context = request.context;
-  const std::string name = "reference:" + request.argument;
+  const std::string with = recipe.encoder ? " with encoder " + recipe.encoder->sha256().substr(0, 8) : "";
+  const std::string name = "reference:" + request.argument + with;
   ReferenceNetwork network(recipe, images, context.seed);
   const fs::path cache =
       context.cache_folder.empty()

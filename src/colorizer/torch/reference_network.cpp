@@ -14,6 +14,7 @@
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/color/ab_bins.h"
+#include "src/colorizer/torch/encoder.h"
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer/torch/single_threaded_ops.h"
 
@@ -24,6 +25,7 @@ namespace nn = torch::nn;
 using torch::Tensor;
 
 constexpr float kAbScale = 40.0f;  // network units of ab: keeps outputs near 1
+constexpr double kStageScale = 4;  // of the encoder's features
 
 /// Convolution, SiLU. No normalisation: with it, the same time of fitting ends at colours a tenth further from the
 /// truth.
@@ -37,12 +39,22 @@ struct BlockImpl : nn::Module {
 };
 TORCH_MODULE(Block);
 
-/// What the frozen built-in network makes of a picture; empty without one.
+/// What the frozen networks make of a picture; empty without them.
 struct Guidance {
-  static constexpr std::size_t kSemanticLevel = 3, kAbLevel = 1;  // of the U-Net, at the same resolution
-  Tensor semantic;  ///< [B, ColorizerNetImpl::kSemanticChannels, H/16, W/16]
-  Tensor ab;        ///< [B, 2, H/4, W/4], network units
+  // Levels of the U-Net at the same resolution.
+  static constexpr std::size_t kSemanticLevel = 3, kAbLevel = 1, kFirstStageLevel = 1;
+  Tensor semantic;             ///< [B, ColorizerNetImpl::kSemanticChannels, H/16, W/16]
+  Tensor ab;                   ///< [B, 2, H/4, W/4], network units
+  std::vector<Tensor> stages;  ///< of the encoder, as `scaled_stage` makes them
 };
+
+/// A stage of the encoder as a 1x1 convolution learns well from it: of like size in every place, and the smaller the
+/// more channels there are, since each of them moves as far in a step.
+Tensor scaled_stage(const Tensor& stage) {
+  const int64_t channels = stage.size(1);
+  const Tensor pixels = torch::layer_norm(stage.permute({0, 2, 3, 1}), {channels});
+  return pixels.permute({0, 3, 1, 2}) * (kStageScale / std::sqrt(double(channels)));
+}
 
 /// U-Net from lightness at full size to `outputs` channels at half size.
 struct UNetImpl : nn::Module {
@@ -63,12 +75,24 @@ struct UNetImpl : nn::Module {
       decode.push_back(register_module("decode" + name, Block(c[level], c[level], 1)));
     }
     head = register_module("head", nn::Conv2d(nn::Conv2dOptions(c[0], outputs, 1)));
+    if (recipe.encoder) read_encoder(recipe);
     if (recipe.builtin.empty()) return;
     CNERF_CHECK(c.size() > Guidance::kSemanticLevel, "as many levels as the built-in network's features need");
     CNERF_CHECK_EQ(recipe.patch_size % ColorizerNetImpl::kInputMultiple, 0);
     guide_semantic = register_module("guide_semantic", nn::Conv2d(nn::Conv2dOptions(ColorizerNetImpl::kSemanticChannels,
                                                                                     c[Guidance::kSemanticLevel], 1)));
     guide_ab = register_module("guide_ab", nn::Conv2d(nn::Conv2dOptions(2, c[Guidance::kAbLevel], 3).padding(1)));
+  }
+
+  /// An adapter for each stage that has a level of its resolution.
+  void read_encoder(const ReferenceRecipe& recipe) {
+    CNERF_CHECK_EQ(recipe.patch_size % Encoder::kInputMultiple, 0);
+    for (std::size_t stage = 0; stage < Encoder::kStages; ++stage) {
+      const std::size_t level = stage + Guidance::kFirstStageLevel;
+      if (level >= recipe.channels.size()) break;
+      const nn::Conv2dOptions options(recipe.encoder->channels()[stage], recipe.channels[level], 1);
+      guide_stages.push_back(register_module("guide_stage" + std::to_string(stage), nn::Conv2d(options)));
+    }
   }
 
   /// @param lightness  [B, 1, H, W] L*, H and W multiples of 2^levels.   @return [B, outputs, H/2, W/2]
@@ -80,6 +104,8 @@ struct UNetImpl : nn::Module {
       x = down[level](x);
       if (guide_semantic && level == Guidance::kSemanticLevel) x = x + guide_semantic(guidance.semantic);
       if (guide_ab && level == Guidance::kAbLevel) x = x + guide_ab(guidance.ab);
+      const std::size_t stage = level - Guidance::kFirstStageLevel;  // huge before the first
+      if (stage < guide_stages.size()) x = x + guide_stages[stage](guidance.stages[stage]);
       x = x + encode[level](x);
       skips.push_back(x);
     }
@@ -117,6 +143,7 @@ struct UNetImpl : nn::Module {
   nn::Conv2d global{nullptr};
   nn::Conv2d head{nullptr};
   nn::Conv2d guide_semantic{nullptr}, guide_ab{nullptr};  // empty without guidance
+  std::vector<nn::Conv2d> guide_stages;
 };
 TORCH_MODULE(UNet);
 
@@ -204,8 +231,16 @@ std::string ReferenceRecipe::text() const {
        << "; flip " << distortion.flip << "; tone " << distortion.log_gamma << ' ' << distortion.contrast << "; blur "
        << distortion.blur << "; noise " << distortion.noise;
   if (!builtin.empty()) text << "; on " << sha256(read_binary_file(builtin));
+  if (encoder) text << "; encoder " << encoder->sha256() << ", scale " << kStageScale;
+  if (patch_uses > 1) text << "; each patch " << patch_uses << " times of " << patches_held;
   return text.str();
 }
+
+/// Part of a batch that is learned from.
+struct Patches {
+  Tensor lightness, ab;  ///< [n, 1, H, W], [n, 2, H, W]
+  Guidance guidance;
+};
 
 struct ReferenceNetwork::Parts {
   ReferenceRecipe recipe;
@@ -216,15 +251,26 @@ struct ReferenceNetwork::Parts {
   std::optional<ColorizerWeights> builtin;
 
   [[nodiscard]] Guidance guidance(const Tensor& lightness) const {
-    if (!builtin) return {};
     const torch::NoGradGuard no_grad;
-    const ColorizerFeatures features = ColorizerNet(builtin->network)->features(lightness);
-    return {features.semantic, decode_ab(features.logits, builtin->decoding) / kAbScale};
+    Guidance guidance;
+    if (builtin) {
+      const ColorizerFeatures features = ColorizerNet(builtin->network)->features(lightness);
+      guidance.semantic = features.semantic;
+      guidance.ab = decode_ab(features.logits, builtin->decoding) / kAbScale;
+    }
+    if (recipe.encoder) {
+      for (const Tensor& stage : recipe.encoder->features(lightness)) guidance.stages.push_back(scaled_stage(stage));
+    }
+    return guidance;
   }
   [[nodiscard]] Tensor decode(const Tensor& out) const { return torch::conv2d(torch::softmax(out, 1), centres); }
   [[nodiscard]] Tensor loss(const Tensor& out, const Tensor& ab) const;
-  [[nodiscard]] std::vector<Tensor> shard_gradients(std::span<const ReferenceImage> images, int step, int shard,
-                                                    double* loss) const;
+  /// New patches of the photographs.
+  [[nodiscard]] Patches drawn(std::span<const ReferenceImage> images, int step, int shard) const;
+  /// Those of a step, of which `held` are kept from step to step.
+  [[nodiscard]] const Patches& patches_of(std::span<const ReferenceImage> images, int step, int shard,
+                                          std::vector<Patches>& held) const;
+  [[nodiscard]] std::vector<Tensor> gradients(const Patches& patches, double* loss) const;
 };
 
 Tensor ReferenceNetwork::Parts::loss(const Tensor& out, const Tensor& ab) const {
@@ -248,20 +294,45 @@ Tensor ReferenceNetwork::Parts::loss(const Tensor& out, const Tensor& ab) const 
   return -(log_p.gather(1, index) * weight).sum(1).mean();
 }
 
-std::vector<Tensor> ReferenceNetwork::Parts::shard_gradients(std::span<const ReferenceImage> images, int step,
-                                                             int shard, double* loss_value) const {
+Patches ReferenceNetwork::Parts::drawn(std::span<const ReferenceImage> images, int step, int shard) const {
   const int count = recipe.batch / recipe.shards, size = recipe.patch_size;
   const std::size_t pixels = std::size_t(size) * std::size_t(size);
-  Tensor lightness = torch::empty({count, 1, size, size}), ab = torch::empty({count, 2, size, size});
+  Patches patches{torch::empty({count, 1, size, size}), torch::empty({count, 2, size, size}), {}};
   for (int i = 0; i < count; ++i) {
     SequentialRng rng(seed, (std::uint64_t(step) << 16) + std::uint64_t(shard * count + i) + 1);
     sample_reference_patch(images, recipe.distortion, size, rng,
-                           {lightness.data_ptr<float>() + std::size_t(i) * pixels, pixels},
-                           {ab.data_ptr<float>() + std::size_t(i) * 2 * pixels, 2 * pixels});
+                           {patches.lightness.data_ptr<float>() + std::size_t(i) * pixels, pixels},
+                           {patches.ab.data_ptr<float>() + std::size_t(i) * 2 * pixels, 2 * pixels});
   }
-  const Tensor value = loss(UNet(net)->forward(lightness, guidance(lightness)), torch::avg_pool2d(ab, {2, 2}));
+  patches.guidance = guidance(patches.lightness);
+  return patches;
+}
+
+const Patches& ReferenceNetwork::Parts::patches_of(std::span<const ReferenceImage> images, int step, int shard,
+                                                   std::vector<Patches>& held) const {
+  if (step % recipe.patch_uses == 0) {
+    Patches fresh = drawn(images, step, shard);
+    if (int(held.size()) < recipe.patches_held) {
+      held.push_back(std::move(fresh));
+    } else {
+      held[std::size_t(step / recipe.patch_uses) % held.size()] = std::move(fresh);
+    }
+  }
+  SequentialRng rng(seed, named_stream("held") + (std::uint64_t(step) << 16) + std::uint64_t(shard));
+  return held[std::min(held.size() - 1, std::size_t(rng.uniform(0, float(held.size()))))];
+}
+
+std::vector<Tensor> ReferenceNetwork::Parts::gradients(const Patches& patches, double* loss_value) const {
+  const Tensor out = UNet(net)->forward(patches.lightness, patches.guidance);
+  const Tensor value = loss(out, torch::avg_pool2d(patches.ab, {2, 2}));
   *loss_value = value.item<double>();
   return torch::autograd::grad({value}, net->parameters());
+}
+
+void use_encoder(ReferenceRecipe& recipe, std::shared_ptr<const Encoder> encoder) {
+  recipe.encoder = std::move(encoder);
+  recipe.patch_uses = 4;
+  recipe.patches_held = 16;
 }
 
 ReferenceNetwork::ReferenceNetwork(const ReferenceRecipe& recipe, std::span<const ReferenceImage> images,
@@ -302,6 +373,7 @@ void ReferenceNetwork::fit(std::span<const ReferenceImage> images, const Progres
   torch::optim::AdamW optimizer(
       parameters,
       torch::optim::AdamWOptions(recipe.learning_rate).weight_decay(recipe.weight_decay).betas({0.9, 0.99}));
+  std::vector<std::vector<Patches>> held(std::size_t(recipe.shards));
   double smoothed = 0;
   for (int step = 0; step < recipe.steps; ++step) {
     if (interruption_requested()) throw Interrupted("stopped while fitting the reference network; nothing was kept");
@@ -309,7 +381,8 @@ void ReferenceNetwork::fit(std::span<const ReferenceImage> images, const Progres
     std::vector<double> losses(std::size_t(recipe.shards));
     parallel_tasks(std::size_t(recipe.shards), [&](std::size_t shard) {
       at::init_num_threads();
-      gradients[shard] = parts_->shard_gradients(images, step, int(shard), &losses[shard]);
+      const Patches& patches = parts_->patches_of(images, step, int(shard), held[shard]);
+      gradients[shard] = parts_->gradients(patches, &losses[shard]);
     });
     torch::NoGradGuard no_grad;
     for (std::size_t i = 0; i < parameters.size(); ++i) {
@@ -332,10 +405,11 @@ void ReferenceNetwork::fit(std::span<const ReferenceImage> images, const Progres
 }
 
 std::vector<float> ReferenceNetwork::colorize(const LightnessBatch& patches) const {
+  static_assert(ColorizerNetImpl::kInputMultiple == Encoder::kInputMultiple);
   const SingleThreadedOps single;
   const int64_t height = patches.height, width = patches.width, pixels = height * width;
-  const int64_t multiple =
-      std::max(int64_t(1) << parts_->recipe.channels.size(), parts_->builtin ? ColorizerNetImpl::kInputMultiple : 1);
+  const int64_t multiple = std::max(int64_t(1) << parts_->recipe.channels.size(),
+                                    parts_->builtin || parts_->recipe.encoder ? ColorizerNetImpl::kInputMultiple : 1);
   const auto rounded = [&](int64_t n) { return (n + multiple - 1) / multiple * multiple; };
   std::vector<float> answer(std::size_t(patches.batch) * 2 * std::size_t(pixels));
   parallel_tasks(std::size_t(patches.batch), [&](std::size_t i) {

@@ -16,6 +16,8 @@
 
 namespace cnerf {
 
+class Encoder;  // encoder.h, which includes Torch
+
 /// Everything that decides what a fit gives, besides photographs and seed.
 struct ReferenceRecipe {
   std::vector<int> channels = {24, 48, 64, 96, 96};  ///< per level; the first is at half the patch's size
@@ -29,6 +31,12 @@ struct ReferenceRecipe {
   /// the picture: its inner features and its colours (ladder side-tuning, Sung et al. 2022). These paths start at zero,
   /// so that the photographs decide how much of it is used.
   std::filesystem::path builtin;
+  /// A network that was trained on many more photographs; empty = none. It is frozen too, and each of its stages is
+  /// read where the network fitted here has the same resolution, through 1x1 convolutions that start at zero.
+  std::shared_ptr<const Encoder> encoder;
+  /// How often a patch is learned from, and how many a shard holds of which it takes one a step: what the frozen
+  /// networks make of a patch is kept with it.
+  int patch_uses = 1, patches_held = 1;
   PatchDistortion distortion;
 
   /// All settings as text: part of a cache's key.
@@ -57,6 +65,15 @@ class ReferenceNetwork {
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };
+
+/// The encoder in `folder`.  @throws MissingInputError, InputError  see read_layers_model and Encoder.
+[[nodiscard]] std::shared_ptr<const Encoder> load_encoder(const std::filesystem::path& folder);
+/// Where it is looked for: $CNERF_ENCODER, else the user's data folder.
+[[nodiscard]] std::filesystem::path encoder_folder();
+[[nodiscard]] bool is_encoder_installed();
+
+/// The recipe with the encoder, at about the same cost.
+void use_encoder(ReferenceRecipe& recipe, std::shared_ptr<const Encoder> encoder);
 
 /// The colorizer of a network fitted to the images of the request's argument, or of the weights that an earlier fit to
 /// the same images with the same recipe and seed left in the request's cache folder.
