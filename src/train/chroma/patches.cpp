@@ -69,7 +69,7 @@ PatchPlace near_patch(std::span<const CachedView> views, const PatchPlace& place
 
 RenderedPatch render_patch(const CachedView& view, const PatchPlace& place, int k) {
   RenderedPatch patch;
-  patch.lightness = resized_square(view.sharpest(), view, place, k);
+  patch.lightness = resized_square(view.luminance, view, place, k);
   for (float& value : patch.lightness) value = std::clamp(lightness_from_luminance(value), 0.0f, 100.0f);
   patch.opacity = resized_square(view.opacity, view, place, k);
   return patch;

@@ -7,7 +7,6 @@
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
-#include "src/capture/image_io.h"
 
 namespace cnerf {
 namespace {
@@ -28,13 +27,6 @@ void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
                          std::uint16_t(std::lround(samples[s].luminance / view.brightest * kFullScale))};
     }
   });
-}
-
-/// Empty where the capture was loaded without pixels.
-std::vector<float> photograph_at(const MonoImage& image, const CachedView& view) {
-  if (image.u8.empty() && image.u16.empty() && image.f32.empty()) return {};
-  const LinearImage whole{image.width, image.height, 1, image.depth, luminance_plane(image), {}};
-  return area_resized(whole, view.width, view.height).values;
 }
 
 }  // namespace
@@ -93,7 +85,6 @@ void ViewCache::fill(const LuminanceEngine& engine, const MarchSettings& march, 
   for (std::size_t v = views_.size(); v < views.size(); ++v) {
     views_.push_back(cache_view(engine, march, views[v].camera, short_side, kCachedWeight,
                                 [&](double fraction) { report((double(v) + fraction) / double(views.size())); }));
-    views_.back().photograph = photograph_at(*views[v].image, views_.back());
     ignore_masked(views_.back(), *views[v].image);
   }
 }

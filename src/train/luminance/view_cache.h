@@ -31,11 +31,7 @@ struct CachedView {
   float brightest = 1;                ///< luminance of the brightest sample
   std::vector<CachedSample> samples;  ///< pixel by pixel, front to back
   std::vector<std::size_t> offsets;   ///< [H W + 1]
-  /// Linear Y of the photograph from here; empty where there is none.
-  std::vector<float> photograph = {};
 
-  /// What a colorizer is shown: a photograph is sharper than the field, so it tells more of what things are.
-  [[nodiscard]] const std::vector<float>& sharpest() const { return photograph.empty() ? luminance : photograph; }
   [[nodiscard]] int short_side() const { return std::min(width, height); }
 };
 
