@@ -159,7 +159,7 @@ void add_painted(const fs::path& file, const Capture& capture, GivenColors& give
     names.push_back(viewpoint.name);
     lenses.push_back(viewpoint.camera.intrinsics());
   }
-  for (KnownColors& paint : painted(list.strokes, names, lenses)) given.known.push_back(std::move(paint));
+  for (KnownColors& paint : painted(list, names, lenses)) given.known.push_back(std::move(paint));
 }
 
 }  // namespace

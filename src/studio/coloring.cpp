@@ -10,10 +10,10 @@
 namespace cnerf::studio {
 namespace fs = std::filesystem;
 
-std::vector<KnownColors> known_of(const std::vector<Stroke>& strokes, const SeenSurfaces& seen) {
+std::vector<KnownColors> known_of(const StrokeList& list, const SeenSurfaces& seen) {
   std::vector<Intrinsics> lenses;
   for (const CachedView& view : seen.views()) lenses.push_back(view.camera.intrinsics);
-  return painted(strokes, seen.names(), lenses);
+  return painted(list, seen.names(), lenses);
 }
 
 Journal read_journal(const fs::path& file, const PaintableViews& views) {
@@ -23,7 +23,7 @@ Journal read_journal(const fs::path& file, const PaintableViews& views) {
   if (const std::string& base = journal.deeds.front().base; !base.empty()) pipeline::check_take_name(base);
   for (std::size_t i = 0; i < journal.deeds.size(); ++i) {
     Deed& deed = journal.deeds[i];
-    const StrokeList list{0, std::move(deed.strokes), deed.viewpoints};
+    const StrokeList list{0, std::move(deed.strokes), deed.viewpoints, deed.everywhere};
     const fs::path of_deed = file.string() + ": deeds[" + std::to_string(i) + "]";
     deed.strokes = strokes_of_json(json_of(list).dump(), of_deed, views, pictures).strokes;
   }
@@ -100,7 +100,7 @@ void Coloring::colour(const StrokeList& list, const RetouchOptions& options, con
   if (!viewpoints.empty()) change_seen([&] { cache_.put_first(viewpoints); });
   // What comes later, for others to look at, has no part in this: it repeats bit for bit.
   const SeenSurfaces seen = seen_->first(cache_.of_capture() + viewpoints.size());
-  const std::vector<KnownColors> known = known_of(list.strokes, seen);
+  const std::vector<KnownColors> known = known_of(list, seen);
   const KnownColorMap map(seen, KnownColorSources(seen, known));
   Retouch retouch(seen.views(), map, base_.get(), *now_, options);
   is_grey_ = false;
@@ -108,7 +108,7 @@ void Coloring::colour(const StrokeList& list, const RetouchOptions& options, con
   kept_as_.clear();
   now_->colorizer =
       (base_ ? base_->colorizer : std::string(pipeline::kGreyTake)) + describe(known) + describe_viewpoints(viewpoints);
-  journal_.deeds.push_back({"", list.strokes, 0, viewpoints});
+  journal_.deeds.push_back({"", list.strokes, 0, viewpoints, list.everywhere});
   while (!retouch.is_settled() && retouch.steps_done() < most_steps) {
     retouch.step();
     journal_.deeds.back().steps = retouch.steps_done();
@@ -138,7 +138,7 @@ void Coloring::replay(const Journal& journal, const RetouchOptions& options, con
   for (std::size_t i = 1; i < journal.deeds.size(); ++i) {
     const Deed& deed = journal.deeds[i];
     colour(
-        {0, deed.strokes, deed.viewpoints}, options,
+        {0, deed.strokes, deed.viewpoints, deed.everywhere}, options,
         [&](double fraction) { breathe((double(i - 1) + fraction) / count); }, deed.steps);
   }
 }

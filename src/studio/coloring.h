@@ -23,6 +23,7 @@ struct Deed {
   std::vector<Stroke> strokes;             ///< the others: what was painted by then
   int steps = 0;                           ///< and the steps that were run with it
   std::vector<Viewpoint> viewpoints = {};  ///< that the strokes name
+  bool everywhere = false;                 ///< as StrokeList has it
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
@@ -30,6 +31,7 @@ struct Deed {
     v("strokes", self.strokes, kOptional);
     v("steps", self.steps, kOptional);
     v("viewpoints", self.viewpoints, kOptional);
+    v("everywhere", self.everywhere, kOptional);
   }
 };
 
@@ -117,6 +119,6 @@ class Coloring {
 };
 
 /// What strokes make known, at the sizes of cached views.
-[[nodiscard]] std::vector<KnownColors> known_of(const std::vector<Stroke>& strokes, const SeenSurfaces& seen);
+[[nodiscard]] std::vector<KnownColors> known_of(const StrokeList& list, const SeenSurfaces& seen);
 
 }  // namespace cnerf::studio

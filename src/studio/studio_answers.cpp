@@ -41,11 +41,13 @@ std::string text_of(const std::vector<std::byte>& bytes) {
 struct ReachMessage {
   int view = 0;
   std::vector<Stroke> strokes;
+  bool everywhere = false;  ///< as StrokeList has it
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
     v("view", self.view);
     v("strokes", self.strokes);
+    v("everywhere", self.everywhere, kOptional);
   }
 };
 
@@ -287,6 +289,7 @@ PageAnswer Studio::post_reach(const PageRequest& request) {
     std::erase_if(list.strokes, [&](const Stroke& saved) { return saved.id == stroke.id; });
     list.strokes.push_back(stroke);
   }
+  list.everywhere = message.everywhere;
   return reach_of(message.view, list);
 }
 
@@ -313,7 +316,7 @@ PageAnswer Studio::reach_of(int view, const StrokeList& list) {
   if (!coloring_->has_seen(viewpoints)) return refusal(503, "the viewpoints are being looked at; in a moment");
   const SeenSurfaces& seen = *coloring_->seen();
   const std::size_t cached = seen.view_named(wanted.name());
-  const KnownColorSources sources(seen, known_of(list.strokes, seen));
+  const KnownColorSources sources(seen, known_of(list, seen));
   const CachedView& shown = seen.views()[cached];
   const cv::Mat overlay = colors_at_luminance(sources.seen_in(cached), {shown.width, shown.height}, kReachAlpha,
                                               [&](std::size_t p) { return shown.luminance[p]; });

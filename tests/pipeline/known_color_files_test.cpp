@@ -113,6 +113,10 @@ TEST_F(KnownColorFiles, StrokeFilesPaintViewsAndViewpoints) {
   EXPECT_EQ(given.known[1].view, "viewpoint-1");
   EXPECT_EQ(given.known[1].width, lens.width);
   EXPECT_EQ(given.known[1].is_known[6 * 16 + 8], 1);
+  EXPECT_FALSE(given.known[0].everywhere);
+  list.everywhere = true;
+  write_strokes(at("strokes.json"), list);
+  for (const KnownColors& known : load_known_colors(capture_, config).known) EXPECT_TRUE(known.everywhere);
 }
 
 TEST_F(KnownColorFiles, BadEntriesAreRefusedByName) {

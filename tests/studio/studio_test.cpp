@@ -304,6 +304,29 @@ TEST_F(StudioTest, AJournalIsReplayedBitForBit) {
             read_binary_file(context_.directory.take_snapshot("red-2")));
 }
 
+TEST_F(StudioTest, StrokesThatColorEverythingReachAllAndAreReplayedBitForBit) {
+  open();
+  const json list = {stroke("a", 0.5, 0.5), stroke("b", 0.3, 0.6)};
+  const auto reached = [&](bool everywhere) {
+    return colored_pixels(post("reach", {{"view", 1}, {"strokes", list}, {"everywhere", everywhere}}));
+  };
+  EXPECT_GT(reached(true), 2 * reached(false)) << "as the page asks before they are saved";
+  const json body = {{"strokes", list}, {"everywhere", true}};
+  EXPECT_EQ(studio_->answer({"PUT", "/studio/strokes", {}, kPainter, 0, body.dump()}).status, 200);
+  EXPECT_TRUE(read_strokes(stroke_folder(context_) / kStrokeFile, paintable_views(context_.capture)).everywhere);
+  (void)ordered({{"order", "colour"}});
+  (void)ordered({{"order", "keep"}, {"name", "all"}});
+  close();
+  const fs::path folder = context_.directory.take_folder("all");
+  const Journal journal = read_journal(folder / kJournalFile, paintable_views(context_.capture));
+  EXPECT_TRUE(journal.deeds.back().everywhere);
+  Coloring again(context_, cpu_engines());
+  again.replay(journal, kQuick, [](double) {});
+  again.keep("all-2", 0, observer_);
+  EXPECT_EQ(read_binary_file(context_.directory.take_snapshot("all")),
+            read_binary_file(context_.directory.take_snapshot("all-2")));
+}
+
 TEST_F(StudioTest, JournalsOfAnyContentAreRefusedByName) {
   const fs::path file = context_.directory.root() / "strokes/journal.json";
   const PaintableViews views = paintable_views(context_.capture);

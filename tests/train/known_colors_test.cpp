@@ -190,6 +190,104 @@ TEST(KnownColors, AStrokeRunsOnInOtherViewsBeyondTheBorderOfItsOwn) {
   EXPECT_LE(known_color_map(views, kNames, exact).places().size(), 4u) << "in each view where it was painted alone";
 }
 
+void put(KnownColors& strokes, int x, int y, Ab color, float reach = 1) {
+  const auto p = std::size_t(y * kWidth + x);
+  if (strokes.reach.empty()) strokes.reach.assign(strokes.ab.size(), 1.0f);
+  strokes.ab[p] = color;
+  strokes.is_known[p] = 1;
+  strokes.reach[p] = reach;
+}
+
+TEST(ColorsEverywhere, ColorAllThatThereIsEachWhatIsMostLikeThem) {
+  std::vector<CachedView> views = {look(0.45f, true), look(0.75f, true)};
+  for (CachedView& view : views) {
+    for (std::uint32_t p = 0; p < view.opacity.size(); ++p) {
+      if (point_at(view, p).z < kWall - 0.1f) view.luminance[p] = 0.6f;
+    }
+  }
+  const auto is_board = [](const CachedView& view, std::uint32_t p) { return point_at(view, p).z < kWall - 0.1f; };
+  KnownColors strokes = stroke_at(3, 20, {50, 0});
+  std::uint32_t on_board = 20 * kWidth;
+  while (!is_board(views[0], on_board)) ++on_board;
+  put(strokes, int(on_board % kWidth) + 2, 20, {-50, 0});
+  strokes.everywhere = true;
+  const std::vector<KnownColors> known = {strokes};
+  const KnownColorMap map = known_color_map(views, kNames, known);
+  EXPECT_EQ(map.places().size(), views[0].opacity.size() + views[1].opacity.size());
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    for (std::uint32_t p = 0; p < views[v].opacity.size(); ++p) {
+      ASSERT_NE(map.find(v, p), nullptr);
+      EXPECT_EQ(map.find(v, p)->a < 0, is_board(views[v], p)) << "view " << v << " pixel " << p;
+    }
+  }
+}
+
+TEST(ColorsEverywhere, WhatIsPaintedExactlyStaysAndDoesNotRun) {
+  const std::vector<CachedView> views = {look(0.45f, false), look(0.55f, false)};
+  KnownColors strokes = stroke_at(20, 20, {50, 0});
+  put(strokes, 40, 20, {-50, 0}, 0);
+  put(strokes, 41, 20, {0, 0}, 0);
+  strokes.everywhere = true;
+  const std::vector<KnownColors> known = {strokes};
+  const KnownColorMap map = known_color_map(views, kNames, known);
+  EXPECT_EQ(map.find(0, 20 * kWidth + 40)->a, -50);
+  EXPECT_EQ(map.find(0, 20 * kWidth + 41)->a, 0);
+  EXPECT_NEAR(map.find(0, 20 * kWidth + 42)->a, 50, 1e-3);
+  EXPECT_NEAR(map.find(0, 21 * kWidth + 40)->a, 50, 1e-3);
+}
+
+TEST(ColorsEverywhere, OnlyExactPaintColorsNothingElse) {
+  const std::vector<CachedView> views = {look(0.45f, false), look(0.55f, false)};
+  KnownColors strokes = stroke_at(20, 20, {50, 0});
+  strokes.reach.assign(strokes.ab.size(), 0.0f);
+  strokes.everywhere = true;
+  const std::vector<KnownColors> known = {strokes};
+  EXPECT_LE(known_color_map(views, kNames, known).places().size(), 4u);
+}
+
+TEST(ColorsEverywhere, AreTheSameEachTimeAndMixWhereTwoAreEquallyNear) {
+  const std::vector<CachedView> views = {look(0.45f, false), look(0.55f, false)};
+  KnownColors strokes = stroke_at(20, 20, {50, 0});
+  put(strokes, 40, 20, {-50, 0});
+  strokes.everywhere = true;
+  const std::vector<KnownColors> known = {strokes};
+  const KnownColorMap one = known_color_map(views, kNames, known), other = known_color_map(views, kNames, known);
+  ASSERT_EQ(one.places().size(), other.places().size());
+  for (const ViewPixel& place : one.places()) {
+    EXPECT_EQ(one.find(place.view, place.pixel)->a, other.find(place.view, place.pixel)->a);
+  }
+  EXPECT_NEAR(one.find(0, 20 * kWidth + 30)->a, 0, 10) << "half way, but for half a pixel";
+  EXPECT_LT(std::abs(one.find(0, 20 * kWidth + 29)->a), 20) << "and no edge beside it";
+}
+
+TEST(ColorsEverywhere, InTheShadeHaveLessChroma) {
+  std::vector<CachedView> views = {look(0.45f, false), look(0.55f, false)};
+  for (std::size_t p = 0; p < views[0].luminance.size(); ++p) {
+    if (p % kWidth >= kWidth / 2) views[0].luminance[p] = 0.02f;
+  }
+  KnownColors strokes = stroke_at(10, 20, {50, 20});
+  strokes.everywhere = true;
+  const std::vector<KnownColors> known = {strokes};
+  const KnownColorMap map = known_color_map(views, kNames, known);
+  const Ab light = *map.find(0, 20 * kWidth + 15), dark = *map.find(0, 20 * kWidth + 50);
+  EXPECT_NEAR(light.a, 50, 1e-3);
+  EXPECT_LT(dark.a, 30);
+  EXPECT_NEAR(dark.b / dark.a, 0.4, 1e-4) << "of the same hue";
+}
+
+TEST(ColorsEverywhere, OfStrokesInTwoViewsEachHasWhatIsMostLikeIt) {
+  const std::vector<CachedView> views = {look(0.45f, false), look(0.55f, false)};
+  KnownColors left = stroke_at(5, 20, {50, 0}), right = stroke_at(kWidth - 5, 20, {-50, 0});
+  right.view = kNames[1];
+  left.everywhere = right.everywhere = true;
+  const std::vector<KnownColors> known = {left, right};
+  const KnownColorMap map = known_color_map(views, kNames, known);
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    EXPECT_GT(map.find(v, 20 * kWidth + 3)->a, 40) << "view " << v;
+    EXPECT_LT(map.find(v, 20 * kWidth + kWidth - 4)->a, -40) << "view " << v;
+  }
+}
+
 TEST(KnownColors, HintsCorrectKeyFrames) {
   const std::vector<CachedView> views = {look(0.45f, false), look(0.55f, false)};
   const std::vector<KnownColors> known = {key_frame_of(views[0], kNames[0]), stroke_at(30, 20, {-60, -60})};

@@ -90,6 +90,23 @@ TEST(Strokes, ViewpointsAreWrittenAndRead) {
   EXPECT_EQ(read.viewpoints[0].camera.world_from_camera().linear * Vec3d(0, 0, 1), Vec3d(0, -1, 0)) << "rows";
 }
 
+TEST(Strokes, ThatColorEverythingAreWrittenReadAndRefusedByName) {
+  const test::TempDir folder;
+  StrokeList list{7, {dot("k1", 0.5f, 0.25f)}};
+  EXPECT_EQ(json_of(list).dump().find("everywhere"), std::string::npos) << "as files were before";
+  list.everywhere = true;
+  write_strokes(folder / "strokes.json", list);
+  EXPECT_TRUE(read_strokes(folder / "strokes.json", kViews).everywhere);
+  const std::vector<Intrinsics> lenses(kViews.names.size(), {LensModel::kPinhole, 20, 20, 20, 20, 10, 10, {}});
+  EXPECT_TRUE(painted(list, kViews.names, lenses).at(0).everywhere);
+  try {
+    (void)strokes_of_json("{\"strokes\": [], \"everywhere\": 3}", "strokes.json", kViews, pictures());
+    FAIL() << "taken";
+  } catch (const InputError& problem) {
+    EXPECT_THAT(problem.what(), HasSubstr("strokes.json: everywhere: "));
+  }
+}
+
 TEST(Strokes, BadViewpointsAreRefusedByTheirField) {
   const auto refused = [&](const std::function<void(std::vector<Viewpoint>&)>& spoil) -> std::string {
     StrokeList list{0, {}, {viewpoint("viewpoint-1"), viewpoint("viewpoint-2"), viewpoint("viewpoint-3")}};
@@ -134,6 +151,7 @@ TEST(Strokes, ListsOfAnyContentAreRefusedOrRead) {
   const StrokeList old = strokes_of_json("{\"strokes\": []}", "strokes.json", kViews, pictures());
   EXPECT_TRUE(old.strokes.empty());
   EXPECT_TRUE(old.viewpoints.empty()) << "files of earlier versions have none";
+  EXPECT_FALSE(old.everywhere);
 }
 
 TEST(Strokes, ADotCoversADiscOfItsSizeAndPressure) {
@@ -201,10 +219,10 @@ TEST(Strokes, OnlyViewsThatArePaintedAreKnown) {
   const Intrinsics lens{LensModel::kPinhole, 40, 30, 50, 50, 20, 15, {}};
   std::vector<Stroke> strokes = {dot("k1", 0.5f, 0.5f)};
   const std::vector<Intrinsics> lenses = {lens, lens};
-  ASSERT_EQ(painted(strokes, kViews.names, lenses).size(), 1u);
-  EXPECT_EQ(painted(strokes, kViews.names, lenses)[0].view, "a.png");
+  ASSERT_EQ(painted({0, strokes}, kViews.names, lenses).size(), 1u);
+  EXPECT_EQ(painted({0, strokes}, kViews.names, lenses)[0].view, "a.png");
   strokes[0].hidden = true;
-  EXPECT_TRUE(painted(strokes, kViews.names, lenses).empty());
+  EXPECT_TRUE(painted({0, strokes}, kViews.names, lenses).empty());
 }
 
 }  // namespace

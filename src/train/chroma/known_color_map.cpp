@@ -10,6 +10,7 @@ namespace cnerf {
 namespace {
 
 constexpr float kSameDistance = 0.03f;   // of the distance: two views see the same surface
+constexpr float kKeyFrameCost = 1;       // a stroke corrects one as far as it reaches
 constexpr float kSameLightness = 15.0f;  // L*: and it looks the same
 
 /// What the view of a source sees of points that another view sees.
@@ -51,20 +52,67 @@ std::size_t SeenSurfaces::view_named(const std::string& name) const {
 }
 
 KnownColorSources::KnownColorSources(const SeenSurfaces& seen, std::span<const KnownColors> known) : seen_(seen) {
+  const bool everywhere = std::ranges::any_of(known, &KnownColors::everywhere);
   for (const KnownColors& one : known) {
     const std::size_t view = seen.view_named(one.view);
     RunningColors colors = running_colors(resized_to(one, seen.views()[view]));
-    if (one.kind == KnownColorKind::kStrokes) {
+    std::shared_ptr<const StrokesEverywhere> strokes;
+    if (one.kind == KnownColorKind::kStrokes && everywhere) {
+      strokes = std::make_shared<StrokesEverywhere>(colors, seen.views()[view], seen.surface(view));
+    } else if (one.kind == KnownColorKind::kStrokes) {
       run(colors, seen.views()[view], seen.surface(view));
     } else {
       std::ranges::fill(colors.reach, 0.0f);
     }
-    sources_.push_back({view, one.kind, std::move(colors)});
+    sources_.push_back({view, one.kind, std::move(colors), std::move(strokes)});
   }
+}
+
+bool KnownColorSources::is_everywhere() const {
+  return std::ranges::any_of(sources_, [](const Source& source) { return source.everywhere != nullptr; });
+}
+
+/// What a painted view shows of a pixel, it claims; of what none shows, those claim by likeness that have samples.
+RunningColors KnownColorSources::everywhere_in(std::size_t v) const {
+  const CachedView& view = seen_.views()[v];
+  const PixelLooks looks(view, seen_.surface(v));
+  const std::size_t pixels = view.opacity.size();
+  RunningColors colors{std::vector<Ab>(pixels), std::vector<float>(pixels), std::vector<float>(pixels, kUnreached)};
+  std::vector<Sight> sights;
+  for (const Source& source : sources_) sights.emplace_back(seen_.views()[source.view], seen_.surface(source.view));
+  for (std::size_t p = 0; p < pixels; ++p) {
+    if (view.opacity[p] < kLeastColoredOpacity) continue;
+    Claims claims;
+    for (std::size_t s = sources_.size(); s-- > 0;) {
+      const Source& source = sources_[s];
+      auto from = long(p);
+      if (source.view != v) {
+        if (looks.surface[p] <= 0) break;
+        const Vec3f point = view.camera.ray_of_pixel(p).at(looks.surface[p]);
+        from = sights[s].pixel_of(point.cast<double>(), lightness_at(view, p));
+      }
+      if (from < 0) continue;
+      if (source.everywhere) {
+        for (const Claims::Claim& claim : source.everywhere->claims()[std::size_t(from)].list) {
+          claims.add(claim);
+        }
+      } else if (source.colors.is_known(std::size_t(from))) {
+        claims.add({kKeyFrameCost, source.colors.ab[std::size_t(from)]});
+      }
+    }
+    const bool is_shown = claims.cost() < kUnreached;
+    for (std::size_t s = sources_.size(); s-- > 0 && !is_shown;) {
+      if (sources_[s].everywhere) sources_[s].everywhere->claim_alike(view, looks, p, claims);
+    }
+    colors.cost[p] = claims.cost();
+    colors.ab[p] = claims.mixed(lightness_at(view, p));
+  }
+  return colors;
 }
 
 /// The last source comes first.
 RunningColors KnownColorSources::seen_in(std::size_t v) const {
+  if (is_everywhere()) return everywhere_in(v);
   const CachedView& view = seen_.views()[v];
   const std::span<const float> surface = seen_.surface(v);
   const std::size_t pixels = view.opacity.size();

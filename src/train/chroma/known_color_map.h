@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "src/train/chroma/known_colors.h"
+#include "src/train/chroma/likeness.h"
 
 namespace cnerf {
 
@@ -55,10 +56,14 @@ class KnownColorSources {
     std::size_t view;
     KnownColorKind kind;
     RunningColors colors;  ///< at the size of the cached view, where they have run to
+    std::shared_ptr<const StrokesEverywhere> everywhere = {};  ///< null: they have a reach
   };
   [[nodiscard]] std::span<const Source> sources() const { return sources_; }
 
  private:
+  [[nodiscard]] bool is_everywhere() const;
+  [[nodiscard]] RunningColors everywhere_in(std::size_t view) const;
+
   const SeenSurfaces& seen_;
   std::vector<Source> sources_;
 };

@@ -23,7 +23,7 @@ float lightness_at(const CachedView& view, std::size_t pixel) {
 
 KnownColors resized_to(const KnownColors& known, const CachedView& view) {
   if (known.width == view.width && known.height == view.height) return known;
-  KnownColors out{known.kind, known.view, view.width, view.height, {}, {}};
+  KnownColors out{known.kind, known.view, view.width, view.height, {}, {}, {}, known.everywhere};
   const std::size_t pixels = std::size_t(view.width) * std::size_t(view.height);
   std::vector<double> sum(2 * pixels), count(pixels), all(pixels);
   if (!known.reach.empty()) out.reach.resize(pixels);
@@ -59,6 +59,7 @@ std::string describe(std::span<const KnownColors> known) {
     std::string content(reinterpret_cast<const char*>(one.is_known.data()), one.is_known.size());
     content.append(reinterpret_cast<const char*>(one.ab.data()), one.ab.size() * sizeof(Ab));
     content.append(reinterpret_cast<const char*>(one.reach.data()), one.reach.size() * sizeof(float));
+    if (one.everywhere) content += "everywhere";
     text += one.kind == KnownColorKind::kKeyFrame ? " + key frame " : " + hints on ";
     text += one.view + " (" + sha256(std::as_bytes(std::span(content))).substr(0, 8) + ")";
   }

@@ -28,6 +28,7 @@ struct KnownColors {
   std::vector<Ab> ab;                  ///< [H, W]
   std::vector<std::uint8_t> is_known;  ///< [H, W] 0 or 1
   std::vector<float> reach = {};       ///< [H, W] of strokes, times StrokeReach; 0: stays there; empty = 1 everywhere
+  bool everywhere = false;             ///< of strokes: they colour all that there is, see likeness.h
 };
 
 /// For logs, metadata and comparing runs: " + key frame images/0007.png (1a2b3c4d)"; empty without any.

@@ -260,13 +260,14 @@ KnownColors painted_on(const std::string& view, std::span<const Stroke> strokes,
   return paint;
 }
 
-std::vector<KnownColors> painted(std::span<const Stroke> strokes, std::span<const std::string> names,
+std::vector<KnownColors> painted(const StrokeList& list, std::span<const std::string> names,
                                  std::span<const Intrinsics> lenses) {
   CNERF_CHECK(names.size() == lenses.size(), "one lens per view");
   std::vector<KnownColors> known;
   for (std::size_t v = 0; v < names.size(); ++v) {
-    if (std::ranges::find(strokes, names[v], &Stroke::view) == strokes.end()) continue;
-    KnownColors paint = painted_on(names[v], strokes, lenses[v].width, lenses[v].height);
+    if (std::ranges::find(list.strokes, names[v], &Stroke::view) == list.strokes.end()) continue;
+    KnownColors paint = painted_on(names[v], list.strokes, lenses[v].width, lenses[v].height);
+    paint.everywhere = list.everywhere;
     if (std::ranges::find(paint.is_known, 1) != paint.is_known.end()) known.push_back(std::move(paint));
   }
   return known;

@@ -96,12 +96,15 @@ struct StrokeList {
   std::vector<Stroke> strokes;
   /// Cameras that were painted through beside the capture's. Their names are letters, digits and "-", and no view's.
   std::vector<Viewpoint> viewpoints = {};
+  /// Strokes colour all that there is, each what is most like it; otherwise what lies within their reach.
+  bool everywhere = false;
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
     v("revision", self.revision, kLater);
     v("strokes", self.strokes);
     v("viewpoints", self.viewpoints, kLater);
+    v("everywhere", self.everywhere, kOptional);
   }
 };
 
@@ -138,7 +141,7 @@ void cover(const Stroke& stroke, int width, int height, std::span<float> coverag
 
 /// What is painted on each view that has anything visible, at the views' sizes.
 /// @param lenses  [names] of their pictures
-[[nodiscard]] std::vector<KnownColors> painted(std::span<const Stroke> strokes, std::span<const std::string> names,
+[[nodiscard]] std::vector<KnownColors> painted(const StrokeList& list, std::span<const std::string> names,
                                                std::span<const Intrinsics> lenses);
 
 /// The paint of one view.  @return  nothing is known where nothing is painted

@@ -65,16 +65,16 @@ export class Api {
     return { picture, colors: Number(answer.headers.get("X-Cnerf-Colors") ?? -1), milliseconds: Number(answer.headers.get("X-Cnerf-Milliseconds") ?? 0) };
   }
 
-  async strokes(): Promise<{ revision: number; strokes: Stroke[]; viewpoints: Viewpoint[] }> {
-    const { viewpoints = [], ...rest } = await (await this.send("GET", "strokes", undefined, { "Cache-Control": "no-cache" })).json();
-    return { ...rest, viewpoints };
+  async strokes(): Promise<{ revision: number; strokes: Stroke[]; viewpoints: Viewpoint[]; everywhere: boolean }> {
+    const { viewpoints = [], everywhere = false, ...rest } = await (await this.send("GET", "strokes", undefined, { "Cache-Control": "no-cache" })).json();
+    return { ...rest, viewpoints, everywhere };
   }
-  async putStrokes(strokes: readonly Stroke[], revision: number, viewpoints: readonly Viewpoint[] = []): Promise<number> {
+  async putStrokes(strokes: readonly Stroke[], revision: number, viewpoints: readonly Viewpoint[] = [], everywhere = false): Promise<number> {
     const headers = { "Content-Type": "application/json", "X-Cnerf-Revision": String(revision) };
-    return (await (await this.send("PUT", "strokes", JSON.stringify({ strokes, viewpoints }), headers)).json()).revision;
+    return (await (await this.send("PUT", "strokes", JSON.stringify({ strokes, viewpoints, everywhere }), headers)).json()).revision;
   }
-  async reach(view: number, strokes: readonly Stroke[], revision: number): Promise<Blob> {
-    return (await (strokes.length > 0 ? this.post("reach", { view, strokes }) : this.send("GET", `reach/${view}?revision=${revision}`))).blob();
+  async reach(view: number, strokes: readonly Stroke[], revision: number, everywhere = false): Promise<Blob> {
+    return (await (strokes.length > 0 ? this.post("reach", { view, strokes, everywhere }) : this.send("GET", `reach/${view}?revision=${revision}`))).blob();
   }
   async picture(query: Record<string, string>, file: Blob): Promise<void> {
     await this.send("POST", `pictures?${new URLSearchParams(query)}`, file, { "Content-Type": file.type || "application/octet-stream" });

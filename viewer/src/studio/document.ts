@@ -30,9 +30,9 @@ export function merged(base: StrokeList, mine: StrokeList, theirs: StrokeList): 
 
 /** What strokes are saved to. */
 export interface StrokeStore {
-  strokes(): Promise<{ revision: number; strokes: Stroke[]; viewpoints: Viewpoint[] }>;
+  strokes(): Promise<{ revision: number; strokes: Stroke[]; viewpoints: Viewpoint[]; everywhere: boolean }>;
   /** @return the new revision */
-  putStrokes(strokes: StrokeList, revision: number, viewpoints: readonly Viewpoint[]): Promise<number>;
+  putStrokes(strokes: StrokeList, revision: number, viewpoints: readonly Viewpoint[], everywhere: boolean): Promise<number>;
 }
 /** What keeps strokes that the server does not have: the browser's own store. */
 export type Shelf = Pick<Storage, "getItem" | "setItem" | "removeItem">;
@@ -52,11 +52,14 @@ export class StrokeDocument {
   /** The viewpoints that the server has, in its order: they are numbered after the views. */
   savedViewpoints: readonly Viewpoint[] = [];
   revision = 0;
+  /** Strokes colour all that there is, not what lies within their reach. */
+  everywhere = false;
+  private isChosen = false;
   /** Every viewpoint this page has heard of: a redo brings back strokes of one that was dropped. */
   private known: Viewpoint[] = [];
   /** Name of the viewpoint that is open; it stays without strokes too. */
   private held = "";
-  /** Counts the changes of the viewpoints that are to be saved though no stroke changed. */
+  /** Counts the changes of the viewpoints, and of what is coloured, that are to be saved though no stroke changed. */
   private wish = 0;
   private savedWish = 0;
   /** The page tells: strokes of another tab came in; something could not be saved; unsent strokes were put back. */
@@ -116,6 +119,22 @@ export class StrokeDocument {
   private learn(viewpoints: readonly Viewpoint[]): void {
     const names = new Set(viewpoints.map((v) => v.name));
     this.known = [...viewpoints, ...this.known.filter((v) => !names.has(v.name))];
+  }
+
+  /** By the user. */
+  setEverywhere(everywhere: boolean): void {
+    this.isChosen = true;
+    if (everywhere === this.everywhere) return;
+    this.everywhere = everywhere;
+    this.wish += 1;
+    this.tell();
+    void this.save();
+  }
+  /** What suits the colours that strokes go on, as long as there are none and the user did not choose. */
+  suggestEverywhere(everywhere: boolean): void {
+    if (this.isChosen || this.list.length > 0 || this.saved.length > 0 || everywhere === this.everywhere) return;
+    this.everywhere = everywhere;
+    this.tell();
   }
 
   /** A change by the user: can be undone, and is saved. */
@@ -185,7 +204,8 @@ export class StrokeDocument {
     this.tell();
     if (unsaved) this.told("merged");
   }
-  private take({ revision, strokes, viewpoints }: Awaited<ReturnType<StrokeStore["strokes"]>>): void {
+  private take({ revision, strokes, viewpoints, everywhere }: Awaited<ReturnType<StrokeStore["strokes"]>>): void {
+    if (strokes.length > 0 && this.wish === this.savedWish) this.everywhere = everywhere;
     this.saved = strokes;
     this.savedViewpoints = viewpoints;
     this.learn(viewpoints);
@@ -207,9 +227,9 @@ export class StrokeDocument {
     this.keep();
   }
   private async saveOnce(list: StrokeList): Promise<void> {
-    const { wish, viewpoints } = this;
+    const { wish, viewpoints, everywhere } = this;
     try {
-      this.revision = await this.store.putStrokes(list, this.revision, viewpoints);
+      this.revision = await this.store.putStrokes(list, this.revision, viewpoints, everywhere);
       this.saved = list;
       this.savedViewpoints = viewpoints;
       this.savedWish = wish;

@@ -1,6 +1,6 @@
 /** The panel's sections beside the palette: strokes, takes, ideas, finish, commands. */
 
-import { button, copyText, el, icon, section, segments, slider } from "../ui/dom";
+import { button, copyText, el, icon, section, segments, slider, toggle } from "../ui/dom";
 import type { FieldView } from "./field";
 import type { Finish, Stroke, Take } from "./protocol";
 import { Latest } from "./reach";
@@ -74,7 +74,10 @@ export function strokesPanel(session: Session): HTMLElement {
     recolour.hidden = stroke.kind !== "paint" && stroke.kind !== "exact";
     return el("li", { class: stroke.hidden ? "off" : "" }, name, hide, recolour, small("close", words.remove, () => strokes.remove(stroke.id)));
   };
+  const everywhere = toggle("everywhere", words.everywhere, strokes.everywhere, (value) => strokes.setEverywhere(value));
+  everywhere.node.title = words.everywhereTitle;
   const update = () => {
+    everywhere.set(strokes.everywhere);
     const shown = all || session.open === "" ? strokes.list : strokes.of(session.open);
     keyed(list, [...shown].reverse(), (s) => `${s.id} ${s.color} ${s.hidden} ${all}`, row);
     for (const node of list.children) (node as HTMLElement).setAttribute("aria-current", String((node as HTMLElement).dataset.key!.startsWith(`${session.selected} `)));
@@ -82,7 +85,7 @@ export function strokesPanel(session: Session): HTMLElement {
     paintedPicture.hidden = !session.view;
     node.classList.toggle("read-only", session.isReadOnly);
   };
-  const node = section(words.strokes, true, which.node, list, none, el("div", { class: "buttons" }, paintedPicture), file);
+  const node = section(words.strokes, true, everywhere.node, which.node, list, none, el("div", { class: "buttons" }, paintedPicture), file);
   strokes.onChange(update);
   session.onState(update);
   update();

@@ -63,7 +63,7 @@ export class TintFeed {
   private async reach(view: number, growing: Stroke | null): Promise<Tint> {
     const { strokes, api } = this.session;
     const own = growing ? [...strokes.unsaved, growing] : strokes.unsaved;
-    return tintOfPicture(await createImageBitmap(await api.reach(view, own, strokes.revision)));
+    return tintOfPicture(await createImageBitmap(await api.reach(view, own, strokes.revision, strokes.everywhere)));
   }
   private async now(view: number): Promise<Tint | null> {
     const { position, rotation, lens } = this.session.views[view];

@@ -88,6 +88,7 @@ export class Session {
 
   async begin(): Promise<void> {
     await Promise.all([this.listen(), this.strokes.load()]);
+    this.strokes.suggestEverywhere(this.state.take === "");
   }
   /** Hears of the server's state, without strokes. @return when it heard first: the server knows of this page then */
   listen(): Promise<void> {
@@ -103,6 +104,7 @@ export class Session {
     const wasLost = this.isLost;
     this.isLost = false;
     this.state = state;
+    this.strokes.suggestEverywhere(state.take === "");
     if (state.stage === "photographs") {
       // There is nothing yet that strokes could be on.
       if (wasLost) toast(words.back);

@@ -122,6 +122,8 @@ export const words = {
   ofAllViews: "All",
   kinds: { paint: "Paint", exact: "Exact paint", grey: "Keep grey", erase: "Eraser", picture: "Painted picture" } as Record<StrokeKind, string>,
   dot: "Fill",
+  everywhere: "Colour everything",
+  everywhereTitle: "Each place takes the colours of the strokes that it is most like; otherwise colours stay within their reach",
   noStrokes: "No strokes yet. Choose a photograph below and paint.",
   hide: "Hide",
   show: "Show",

@@ -129,6 +129,19 @@ describe("painting", () => {
     assert.ok(stroke.points.length >= 3);
     assert.ok(Math.abs(stroke.points[0][0] - 0.4) < 0.01 && Math.abs(stroke.points.at(-1)[1] - 0.5) < 0.01);
   });
+  it("colours everything from grey, unless the user says otherwise", async () => {
+    const everywhere = async () => (await page.evaluate(async () => (await fetch("./studio/strokes", { cache: "no-store" })).json())).everywhere ?? false;
+    const box = page.locator("#everywhere");
+    assert.deepEqual([await box.isChecked(), await everywhere()], [true, true]);
+    const asked = page.waitForRequest((r) => r.method() === "PUT" && r.url().endsWith("/studio/strokes"), { timeout: patience });
+    await box.click();
+    assert.equal(JSON.parse((await asked).postData()).everywhere, false);
+    await saved(page);
+    assert.deepEqual([await box.isChecked(), await everywhere()], [false, false]);
+    await box.click();
+    await saved(page);
+    assert.equal(await everywhere(), true);
+  });
   it("shows what strokes will reach in the thumbnails", () =>
     until(page, () => [...document.querySelectorAll("#strip .reach")].some((image) => image.naturalWidth > 0)));
   it("is undone and redone by keys and buttons", async () => {

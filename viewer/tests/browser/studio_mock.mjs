@@ -136,7 +136,7 @@ export class StudioMock {
       "GET scene": () => this.json(response, 200, this.state.stage === "photographs" ? { title: "", run: "/runs/ball", up: "+y", centre: [0, 0, 0], radius: 1, views: [], home: 0 } : this.scene),
       "GET state": () => this.json(response, 200, this.state),
       "GET events": () => this.events(url.searchParams.get("client") ?? "", response),
-      "GET strokes": () => this.json(response, 200, { revision: this.state.strokes, strokes: this.strokes, viewpoints: this.viewpoints }),
+      "GET strokes": () => this.json(response, 200, { revision: this.state.strokes, strokes: this.strokes, viewpoints: this.viewpoints, ...(this.everywhere ? { everywhere: true } : {}) }),
       "GET painted": () => {
         const bytes = this.painted.get(url.searchParams.get("picture"));
         return bytes ? response.writeHead(200, { "Content-Type": "image/png" }).end(bytes) : this.refuse(response, 404, "There is no such picture.");
@@ -278,6 +278,8 @@ export class StudioMock {
       if (!isGood) return this.refuse(response, 400, `strokes[${i}]: something is wrong with it.`);
     }
     this.strokes = list;
+    if (typeof (body.everywhere ?? false) !== "boolean") return this.refuse(response, 400, "everywhere: expected true or false.");
+    this.everywhere = body.everywhere ?? false;
     this.viewpoints = viewpoints;
     this.change({ strokes: revision + 1 });
     this.json(response, 200, { revision: revision + 1 });

@@ -18,18 +18,20 @@ class Store {
   revision = 0;
   list: Stroke[] = [];
   viewpoints: Viewpoint[] = [];
+  everywhere = false;
   puts = 0;
   fail: Error | null = null;
   async strokes() {
     if (this.fail instanceof Lost) throw this.fail;
-    return { revision: this.revision, strokes: structuredClone(this.list), viewpoints: structuredClone(this.viewpoints) };
+    return { revision: this.revision, strokes: structuredClone(this.list), viewpoints: structuredClone(this.viewpoints), everywhere: this.everywhere };
   }
-  async putStrokes(strokes: StrokeList, revision: number, viewpoints: readonly Viewpoint[]) {
+  async putStrokes(strokes: StrokeList, revision: number, viewpoints: readonly Viewpoint[], everywhere: boolean) {
     this.puts += 1;
     if (this.fail) throw this.fail;
     if (revision !== this.revision) throw new Refusal(409, "Another tab was faster.");
     this.list = structuredClone([...strokes]);
     this.viewpoints = structuredClone([...viewpoints]);
+    this.everywhere = everywhere;
     return ++this.revision;
   }
 }
@@ -53,6 +55,22 @@ describe("strokes", () => {
     expect(store.puts).toBe(2);
     expect(document.isSaved).toBe(true);
     expect(document.revision).toBe(2);
+  });
+  it("colour everything where that is suggested before the first, or chosen at any time", async () => {
+    const { document, store, kept } = await opened();
+    document.suggestEverywhere(true);
+    expect([document.everywhere, store.puts]).toEqual([true, 0]);
+    document.add(stroke("a"));
+    await document.save();
+    expect(store.everywhere).toBe(true);
+    document.suggestEverywhere(false);
+    expect(document.everywhere).toBe(true);
+    document.setEverywhere(false);
+    expect(document.isSaved).toBe(false);
+    await document.save();
+    expect([store.everywhere, document.isSaved]).toEqual([false, true]);
+    store.everywhere = true;
+    expect((await opened(store, kept)).document.everywhere).toBe(true);
   });
   it("are undone and redone, whatever was done to them", async () => {
     const { document, store } = await opened();

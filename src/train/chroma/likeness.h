@@ -1,0 +1,75 @@
+#pragma once
+/// Colours everywhere: strokes whose colours run on without limit, so that each pixel has those of the strokes that it
+/// is most like.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "src/train/chroma/known_colors.h"
+
+namespace cnerf {
+
+/// What pixels of a view look like, for telling how alike two of them are.  [H, W] each
+struct PixelLooks {
+  PixelLooks(const CachedView& view, std::span<const float> surface);
+
+  std::vector<float> lightness;    ///< L*, mean of the pixels around
+  std::vector<float> texture;      ///< L*, its standard deviation there
+  std::span<const float> surface;  ///< `surface_distance`
+};
+
+/// Colours that may be a pixel's, the cheapest first.
+struct Claims {
+  static constexpr std::size_t kMost = 3;
+  struct Claim {
+    float cost = kUnreached;
+    Ab color;
+    float lightness = 100;  ///< L* where it was painted
+  };
+  std::array<Claim, kMost> list;
+
+  /// Of a colour the least cost counts. Of equal costs what came first is first.
+  void add(const Claim& claim);
+  [[nodiscard]] bool has(Ab color) const;
+  [[nodiscard]] bool is_full() const { return list.back().cost < kUnreached; }
+  [[nodiscard]] float cost() const { return list[0].cost; }
+  /// The first, and of others those that cost hardly more: a border between strokes is no edge where the scene has
+  /// none. Darker than where it was painted a colour has less chroma. What was painted (cost 0) stays as it is.
+  /// @param lightness  L* of the pixel
+  [[nodiscard]] Ab mixed(float lightness) const;
+};
+
+/// Strokes of one view that everything is coloured by. They have at least one colour that runs, or nothing is claimed
+/// but what they paint.
+class StrokesEverywhere {
+ public:
+  /// Refers to the view and its surface.
+  /// @param strokes  at the view's size
+  StrokesEverywhere(const RunningColors& strokes, const CachedView& view, std::span<const float> surface);
+
+  /// Of the pixels of the painted view; of those without a surface too.  [H, W]
+  [[nodiscard]] std::span<const Claims> claims() const { return claims_; }
+  /// What a pixel of any view may have by its looks and its place in space.
+  void claim_alike(const CachedView& view, const PixelLooks& looks, std::size_t pixel, Claims& to) const;
+
+ private:
+  struct Sample {
+    Vec3f direction;         ///< from the camera
+    float log_distance = 0;  ///< 0: none
+    float lightness = 0, texture = 0;
+    std::uint32_t color = 0;
+  };
+  void take_samples(const RunningColors& strokes, const PixelLooks& looks);
+  void run(const RunningColors& strokes, const PixelLooks& looks);
+  [[nodiscard]] std::uint32_t number_of(Ab color) const;
+
+  const CachedView& view_;
+  std::vector<Ab> colors_;
+  std::vector<float> lightness_, reach_;  // [colours] L* where they were painted, mean; and how far they run, times
+  std::vector<Sample> samples_;
+  std::vector<Claims> claims_;
+};
+
+}  // namespace cnerf
