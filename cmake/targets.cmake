@@ -1,11 +1,34 @@
 include(GNUInstallDirs)
 
+# Where programs look for their parts when these are not beside them: in the build tree, or where a package puts them.
+# A package's program names no folder of the machine that built it. Plug-ins, data: src/base/plugin.h.
+set(CNERF_BUILT_DATA ${PROJECT_BINARY_DIR}/share/cnerf)
+if(CNERF_PACKAGE)
+  set(CNERF_PLUGIN_HOME ${CMAKE_INSTALL_PREFIX}/lib/cnerf)
+  set(CNERF_DATA_HOME ${CMAKE_INSTALL_PREFIX}/share/cnerf)
+else()
+  set(CNERF_PLUGIN_HOME ${PROJECT_BINARY_DIR})
+  set(CNERF_DATA_HOME ${CNERF_BUILT_DATA})
+endif()
+
+# cnerf_keep_data(NAME PATH): a file or folder of the sources that programs read, installed as share/cnerf/NAME.
+function(cnerf_keep_data name path)
+  file(MAKE_DIRECTORY ${CNERF_BUILT_DATA})
+  file(CREATE_LINK ${path} ${CNERF_BUILT_DATA}/${name} SYMBOLIC)
+  if(IS_DIRECTORY ${path})
+    install(DIRECTORY ${path}/ DESTINATION share/cnerf/${name})
+  else()
+    install(FILES ${path} DESTINATION share/cnerf)
+  endif()
+endfunction()
+
 # cnerf_add_library(NAME SOURCES … [PUBLIC …] [PRIVATE …])
 # One static library a folder; headers are included by their path from the root.
 function(cnerf_add_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(${name} STATIC ${arg_SOURCES})
-  target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
+  target_include_directories(${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/cnerf>)
   target_link_libraries(${name} PUBLIC ${arg_PUBLIC} PRIVATE cnerf_options ${arg_PRIVATE})
   if("torch" IN_LIST arg_PUBLIC OR "torch" IN_LIST arg_PRIVATE)
     # Once all its sources are known. A deferred call sees variables of then, so the name has to be written out.
@@ -40,7 +63,7 @@ function(cnerf_add_plugin name)
     target_link_options(${name} PRIVATE LINKER:-z,defs)  # what the program lacks must not be missed at run time
   endif()
   set_target_properties(${name} PROPERTIES
-    LIBRARY_OUTPUT_DIRECTORY ${CNERF_PLUGIN_FOLDER} INSTALL_RPATH_USE_LINK_PATH ON)
+    LIBRARY_OUTPUT_DIRECTORY ${CNERF_PLUGIN_FOLDER} INSTALL_RPATH $ORIGIN INSTALL_RPATH_USE_LINK_PATH ON)
   install(TARGETS ${name} LIBRARY DESTINATION lib/cnerf)
 endfunction()
 
@@ -170,5 +193,8 @@ endfunction()
 # cnerf_enable_cuda(NAME): for a library of ours that has kernels beside other sources.
 function(cnerf_enable_cuda name)
   target_compile_options(${name} PRIVATE $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr>)
+  if(CNERF_PACKAGE)  # nvcc gives whole paths to __FILE__, which would stand in the package
+    target_compile_options(${name} PRIVATE $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=>)
+  endif()
   target_link_libraries(${name} PUBLIC CUDA::cudart_static)
 endfunction()

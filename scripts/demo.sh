@@ -20,7 +20,7 @@ echo "volume (OpenVDB):    $(ls "$out"/run/bakes/*/*.vdb)"
 echo "before and after:    $out/run/contact_sheet.png"
 echo "turntable video:     $(ls "$out"/run/renders/*/turntable.mp4)"
 echo "metrics:             $out/run/metrics.json"
-if [ -f build/release/viewer/page/index.html ]; then
+if [ -f build/release/share/cnerf/viewer/index.html ]; then
   echo "in a browser:        $cnerf view $out/run"
 else
   echo "in a browser:        not yet: the viewer's page could not be built; it wants npm and what 'npm ci --prefix viewer' gets"

@@ -2,6 +2,7 @@
 /// What a command of the program is. Each has a file of its own that declares its options and does its work.
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
@@ -19,6 +20,7 @@ struct Command {
   const char* summary;
   DeclareCommand declare;
   bool resumable;  ///< after Ctrl-C, the same line with --resume goes on
+  std::array<const char*, 2> examples;
 };
 
 /// A command that `app` stands for.

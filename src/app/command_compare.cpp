@@ -1,7 +1,7 @@
 /// cnerf compare: the paper's table, its baselines and ablations.
 
 #include "src/app/command.h"
-#include "src/app/common_options.h"
+#include "src/app/run_arguments.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/text.h"
@@ -23,8 +23,10 @@ struct CompareArguments {
   bool rating_sheet = false, resume = false, overwrite = false, only_report = false;
 };
 
-void run_comparison(const CompareArguments& arguments, const std::vector<std::string>& command_line) {
+void run_comparison(CompareArguments arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
+  const fs::path first = arguments.captures.empty() ? "cnerf" : parse_compared_capture(arguments.captures.front()).path;
+  arguments.out = chosen_output(arguments.out, output_beside(first, "comparison"), reporter).string();
   if (!arguments.ratings.empty()) {
     return write_ratings(arguments.out, {arguments.ratings.begin(), arguments.ratings.end()}, reporter);
   }
@@ -61,7 +63,8 @@ Work declare_compare(CLI::App& app) {
   auto arguments = std::make_shared<CompareArguments>();
   app.add_option("CAPTURE", arguments->captures,
                  "Folders of colour photographs and camera poses; FOLDER@4: image sizes divided by 4");
-  app.add_option("-o,--out", arguments->out, "Folder of the report, made if needed")->required();
+  app.add_option("-o,--out", arguments->out,
+                 "Folder of the report, made if needed; beside the first CAPTURE if not given");
   app.add_option("--methods", arguments->methods, "Names of methods, comma-separated, or all [all]");
   app.add_option("--seeds", arguments->seeds, "How often everything is repeated, with seeds 1, 2, ... [1]")
       ->check(CLI::Range(1, 100));

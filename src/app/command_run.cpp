@@ -1,7 +1,7 @@
 /// cnerf run: a capture in, a colour volume out.
 
 #include "src/app/command.h"
-#include "src/app/common_options.h"
+#include "src/app/run_arguments.h"
 #include "src/pipeline/run.h"
 
 namespace cnerf::app {
@@ -18,6 +18,7 @@ void run(RunArguments arguments, const std::vector<std::string>& command_line) {
   job.formats = exporting::parse_formats(arguments.format);
   job.command_line = command_line;
   Reporter reporter = make_reporter(arguments.config);
+  job.out = chosen_output(job.out, output_beside(job.capture, "run"), reporter);
   const pipeline::RunDirectory directory(job.out);
   const bool goes_on = job.existing.resume && directory.exists();
   const Config config = resolve_config(arguments.config, goes_on ? directory.config("", reporter) : Config{});
@@ -37,7 +38,7 @@ Work declare_run(CLI::App& app) {
   app.add_option("CAPTURE", job.capture,
                  "Folder of photographs and camera poses; without poses, or a film clip, it is prepared first")
       ->required();
-  app.add_option("-o,--out", job.out, "Folder of the run, made if needed")->required();
+  app.add_option("-o,--out", job.out, "Folder of the run, made if needed; CAPTURE-run if not given");
   add_colorizer_options(app, arguments->config);
   app.add_flag("--grey", job.grey, "Stay grey: no colorizer");
   app.add_option("--format", arguments->format, "What to bake: vdb, gltf, exr, web or several, comma-separated");

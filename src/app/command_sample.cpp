@@ -18,8 +18,9 @@ struct SampleArguments {
   int threads = 0;
 };
 
-void sample(const SampleArguments& arguments) {
+void sample(SampleArguments arguments) {
   Reporter reporter(progress_style(arguments.progress, stdout));
+  arguments.out = chosen_output(arguments.out, "sample", reporter).string();
   set_thread_count(arguments.threads);
   const FolderLock lock = pipeline::lock_folder(arguments.out, FolderLock::Mode::kAlone, reporter);
   refuse_existing(fs::path(arguments.out) / "transforms.json", arguments.overwrite);
@@ -32,11 +33,11 @@ void sample(const SampleArguments& arguments) {
 
 Work declare_sample(CLI::App& app) {
   auto arguments = std::make_shared<SampleArguments>();
-  app.add_option("-o,--out", arguments->out, "Folder of the capture, made if needed")->required();
+  app.add_option("-o,--out", arguments->out, "Folder of the capture, made if needed; sample if not given");
   add_field_options(app, fields_of(arguments->options));
   app.add_option("--threads", arguments->threads, "Threads to use; 0 = all cores");
   app.add_flag("--overwrite", arguments->overwrite, "Replace a capture that is there");
-  app.add_option("--progress", arguments->progress, "auto, line, plain, json or quiet");
+  add_progress_options(app, arguments->progress);
   return [arguments](const auto&) { sample(*arguments); };
 }
 

@@ -27,9 +27,7 @@ struct StudioArguments {
     if (run.run.empty()) return out.empty() ? kDefaultRun : out;
     if (pipeline::RunDirectory(run.run).exists()) return run.run;
     if (!out.empty()) return out;
-    fs::path source = fs::absolute(run.run).lexically_normal();
-    if (source.filename().empty()) source = source.parent_path();
-    return source.parent_path() / (source.stem().string() + "-run");
+    return output_beside(run.run, "run");
   }
 };
 

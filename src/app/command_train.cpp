@@ -1,7 +1,7 @@
 /// cnerf train: stage 1, luminance and density.
 
 #include "src/app/command.h"
-#include "src/app/common_options.h"
+#include "src/app/run_arguments.h"
 #include "src/pipeline/train_step.h"
 #include "viewer/server/live_session.h"
 
@@ -16,8 +16,9 @@ struct TrainArguments {
   web::BrowserOptions browser;
 };
 
-void train(const TrainArguments& arguments, const std::vector<std::string>& command_line) {
+void train(TrainArguments arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
+  arguments.out = chosen_output(arguments.out, output_beside(arguments.capture, "run"), reporter).string();
   pipeline::RunDirectory directory(arguments.out);
   const bool goes_on = arguments.existing.resume && directory.exists();
   const Config config = resolve_config(arguments.config, goes_on ? directory.config("", reporter) : Config{});
@@ -40,7 +41,7 @@ void train(const TrainArguments& arguments, const std::vector<std::string>& comm
 Work declare_train(CLI::App& app) {
   auto arguments = std::make_shared<TrainArguments>();
   app.add_option("CAPTURE", arguments->capture, "Folder of photographs and camera poses")->required();
-  app.add_option("-o,--out", arguments->out, "Folder of the run, made if needed")->required();
+  app.add_option("-o,--out", arguments->out, "Folder of the run, made if needed; CAPTURE-run if not given");
   add_short_form(app, arguments->config, "--downscale", "capture.downscale");
   add_short_form(app, arguments->config, "--holdout", "capture.holdout");
   add_short_form(app, arguments->config, "--transfer", "capture.transfer");

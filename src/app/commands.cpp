@@ -1,4 +1,5 @@
 #include "src/app/command.h"
+#include "src/app/exit_codes.h"
 #include "src/base/error.h"
 #include "src/config/toml_binding.h"
 
@@ -6,22 +7,77 @@ namespace cnerf::app {
 namespace {
 
 constexpr Command kCommands[] = {
-    {"run", "All of the below: train, colorize, evaluate, bake, render", declare_run, true},
-    {"sample", "Write the embedded sample capture, with colour ground truth", declare_sample, false},
-    {"prepare", "Photographs or a film clip to a capture: camera poses by COLMAP", declare_prepare, true},
-    {"train", "Stage 1: luminance and density from a capture", declare_train, true},
-    {"colorize", "Stage 2: colours for a trained run; takes stand side by side", declare_colorize, true},
-    {"colorize-image", "One picture, to judge a colorizer", declare_colorize_image, false},
-    {"render", "Pictures and videos of a run", declare_render, false},
-    {"eval", "Numbers against held-out views, and a contact sheet", declare_eval, false},
+    {"run",
+     "All of the below: train, colorize, evaluate, bake, render",
+     declare_run,
+     true,
+     {"cnerf run photos -o out/photos --preset quick", "cnerf run clip.mp4 --colorizer reference:painted_view.jpg"}},
+    {"sample",
+     "Write the embedded sample capture, with colour ground truth",
+     declare_sample,
+     false,
+     {"cnerf sample", "cnerf sample -o capture --overwrite"}},
+    {"prepare",
+     "Photographs or a film clip to a capture: camera poses by COLMAP",
+     declare_prepare,
+     true,
+     {"cnerf prepare clip.mp4 -o captures/street", "cnerf prepare photos --motion-masks"}},
+    {"train",
+     "Stage 1: luminance and density from a capture",
+     declare_train,
+     true,
+     {"cnerf train photos -o out/photos --preset quality --holdout 8", "cnerf train photos -o out/photos --resume"}},
+    {"colorize",
+     "Stage 2: colours for a trained run; takes stand side by side",
+     declare_colorize,
+     true,
+     {"cnerf colorize out/photos --take warm --colorizer reference:warm.jpg",
+      "cnerf colorize out/photos --keyframe IMG_0012=painted.png --hint 412,230,IMG_0020,#8a2be2"}},
+    {"colorize-image",
+     "One picture, to judge a colorizer",
+     declare_colorize_image,
+     false,
+     {"cnerf colorize-image grey.png coloured.png",
+      "cnerf colorize-image grey.png coloured.png --colorizer reference:warm.jpg"}},
+    {"render",
+     "Pictures and videos of a run",
+     declare_render,
+     false,
+     {"cnerf render out/photos --take warm --path orbit --format mp4,png",
+      "cnerf render out/photos --photographs --views IMG_0012,IMG_0020"}},
+    {"eval",
+     "Numbers against held-out views, and a contact sheet",
+     declare_eval,
+     false,
+     {"cnerf eval out/photos", "cnerf eval out/photos --take warm"}},
 #if CNERF_COMPARE
-    {"compare", "The paper's method, its ablations and baselines, in one table", declare_compare, true},
+    {"compare",
+     "The paper's method, its ablations and baselines, in one table",
+     declare_compare,
+     true,
+     {"cnerf compare photos -o out/table --seeds 3", "cnerf compare fox@4 trex@8 --methods all --rating-sheet"}},
 #endif
-    {"bake", "A run as an OpenVDB volume for Blender and others", declare_bake, false},
-    {"view", "A bake or a run in the browser", declare_view, false},
-    {"studio", "A run painted and coloured in the browser", declare_studio, false},
-    {"info", "What a capture, run, snapshot or VDB holds", declare_info, false},
-    {"doctor", "What this machine and build can do", declare_doctor, false},
+    {"bake",
+     "A run as an OpenVDB volume for Blender and others",
+     declare_bake,
+     false,
+     {"cnerf bake out/photos --take warm --resolution 384", "cnerf bake out/photos --format vdb,gltf,exr -o out/warm"}},
+    {"view",
+     "A bake or a run in the browser",
+     declare_view,
+     false,
+     {"cnerf view out/photos", "cnerf view out/photos --take warm --port 0 --no-browser"}},
+    {"studio",
+     "A run painted and coloured in the browser",
+     declare_studio,
+     false,
+     {"cnerf studio photos -o out/photos", "cnerf studio out/photos --take warm"}},
+    {"info",
+     "What a capture, run, snapshot or VDB holds",
+     declare_info,
+     false,
+     {"cnerf info photos", "cnerf info out/photos/bakes/warm/volume.vdb"}},
+    {"doctor", "What this machine and build can do", declare_doctor, false, {"cnerf doctor", "cnerf doctor --quiet"}},
 };
 
 void refuse_unknown_command(const std::string& word) {
@@ -55,10 +111,13 @@ void refuse_empty_values(const CLI::App& app) {
 }  // namespace
 
 std::vector<ParsedCommand> declare_commands(CLI::App& program) {
+  program.set_help_flag("-h,--help", "Show what there is");
+  program.footer(exit_codes_text());
   std::vector<ParsedCommand> commands;
   for (const Command& command : kCommands) {
     CLI::App* app = program.add_subcommand(command.name, command.summary);
     app->allow_extras();  // unknown words are refused below, with a suggestion
+    app->footer(std::string("Examples:\n  ") + command.examples[0] + "\n  " + command.examples[1] + "\n");
     commands.push_back({&command, app, command.declare(*app)});
   }
   return commands;

@@ -59,7 +59,13 @@ void add_config_options(CLI::App& app, ConfigArguments& arguments) {
   add_short_form(app, arguments, "--device", "device");
   add_short_form(app, arguments, "--threads", "threads");
   add_short_form(app, arguments, "--max-memory", "max_memory");
-  app.add_option("--progress", arguments.progress, "auto, line, plain, json or quiet");
+  add_progress_options(app, arguments.progress);
+}
+
+void add_progress_options(CLI::App& app, std::string& progress) {
+  app.add_option("--progress", progress, "auto, line, plain, json or quiet");
+  app.add_flag_callback(
+      "--quiet", [&progress] { progress = "quiet"; }, "Print results only: short for --progress quiet");
 }
 
 void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key) {

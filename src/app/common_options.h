@@ -23,8 +23,10 @@ struct ConfigArguments {
   bool is_trusting = false;  ///< whoever made the run folder, whose colorizer is code
 };
 
-/// Declares --preset, --config, --set, --device, --threads, --max-memory and --progress.
+/// Declares --preset, --config, --set, --device, --threads, --max-memory, --progress and --quiet.
 void add_config_options(CLI::App& app, ConfigArguments& arguments);
+/// Declares --progress and its short form --quiet.
+void add_progress_options(CLI::App& app, std::string& progress);
 /// Declares `option` as a short form of the config key `key`, which brings its help and what is legal along.
 void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
 /// The same for a key that is true or false: the option sets it.

@@ -1,6 +1,7 @@
 /// The cnerf program: the one place where errors become messages and exit codes.
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -43,7 +44,6 @@ void run_program(CLI::App& program, int argc, char** argv) {
   check_words(argc, argv);
   program.allow_extras();
   program.set_version_flag("--version", "cnerf " + pipeline::version_text());
-  program.set_help_flag("-h,--help", "Show what there is");
   const std::vector<ParsedCommand> commands = declare_commands(program);
   program.parse(argc, argv);
 
@@ -56,8 +56,17 @@ void run_program(CLI::App& program, int argc, char** argv) {
   }
 }
 
+/// On a terminal only, and not where NO_COLOR asks for none (no-color.org).
+bool wants_color(std::FILE* out) {
+  const char* none = std::getenv("NO_COLOR");
+  return ::isatty(::fileno(out)) != 0 && (none == nullptr || *none == '\0');
+}
+
 int failed(ExitCode code, const std::string& message) {
-  fmt::print(stderr, "\ncnerf: {}\n", message);
+  constexpr const char* kRed = "\x1b[31m";
+  constexpr const char* kNormal = "\x1b[0m";
+  const bool is_red = wants_color(stderr);
+  fmt::print(stderr, "\n{}cnerf: {}{}\n", is_red ? kRed : "", message, is_red ? kNormal : "");
   return int(code);
 }
 

@@ -39,6 +39,21 @@ pipeline::RunContext open_begun_run(const RunFolderArguments& arguments, const s
   return context;
 }
 
+fs::path output_beside(const fs::path& source, const std::string& kind) {
+  fs::path plain = fs::absolute(source).lexically_normal();
+  if (plain.filename().empty()) plain = plain.parent_path();
+  std::error_code failure;  // what is missing is refused where it is read
+  // A folder's name may have dots of its own.
+  const fs::path name = fs::is_directory(plain, failure) ? plain.filename() : plain.stem();
+  return plain.parent_path() / (name.string() + "-" + kind);
+}
+
+fs::path chosen_output(const fs::path& given, const fs::path& fallback, Reporter& reporter) {
+  if (!given.empty()) return given;
+  reporter.say("no -o given: writing to " + fallback.string());
+  return fallback;
+}
+
 void refuse_existing(const fs::path& output, bool overwrite) {
   if (overwrite || !fs::exists(output)) return;
   throw UsageError(output.string() + ": exists already; pass --overwrite to replace it, or another folder with -o");

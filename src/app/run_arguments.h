@@ -28,6 +28,12 @@ void add_run_folder_options(CLI::App& app, RunFolderArguments& arguments);
 [[nodiscard]] pipeline::RunContext open_begun_run(const RunFolderArguments& arguments, const std::string& take,
                                                   std::vector<std::string> command_line, Reporter& reporter);
 
+/// Where a command writes to that was given no -o: beside `source`, named like it with "-`kind`".
+[[nodiscard]] std::filesystem::path output_beside(const std::filesystem::path& source, const std::string& kind);
+/// `given`, or else `fallback`, which the user is told of.
+[[nodiscard]] std::filesystem::path chosen_output(const std::filesystem::path& given,
+                                                  const std::filesystem::path& fallback, Reporter& reporter);
+
 /// Refuses `output` that exists unless `overwrite`.  @throws UsageError.
 void refuse_existing(const std::filesystem::path& output, bool overwrite);
 

@@ -2,23 +2,23 @@
 
 #include <dlfcn.h>
 
-#include <filesystem>
-#include <vector>
-
 #include "src/base/error.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
 namespace {
 
-std::vector<fs::path> plugin_folders() {
-  std::vector<fs::path> folders;
+/// The folder that the running program lies in; empty where the system does not say.
+fs::path program_folder() {
   std::error_code failure;
-  if (const fs::path program = fs::read_symlink("/proc/self/exe", failure); !failure) {
-    folders.push_back(program.parent_path());
-    folders.push_back(program.parent_path().parent_path() / "lib" / "cnerf");
+  return fs::read_symlink("/proc/self/exe", failure).parent_path();
+}
+
+std::vector<fs::path> plugin_folders() {
+  std::vector<fs::path> folders = {CNERF_PLUGIN_HOME};
+  if (const fs::path program = program_folder(); !program.empty()) {
+    folders.insert(folders.begin(), {program, program.parent_path() / "lib" / "cnerf"});
   }
-  folders.emplace_back(CNERF_PLUGIN_FOLDER);
   return folders;
 }
 
@@ -31,6 +31,14 @@ fs::path program_part(const std::string& name) {
     looked += " " + folder.string();
   }
   throw DeviceError(name + ", a part of this program, is missing; looked in" + looked);
+}
+
+std::vector<fs::path> data_places(const std::string& name) {
+  std::vector<fs::path> places = {fs::path(CNERF_DATA_HOME) / name};
+  if (const fs::path program = program_folder(); !program.empty()) {
+    places.insert(places.begin(), program.parent_path() / "share" / "cnerf" / name);
+  }
+  return places;
 }
 
 void* plugin_symbol(const std::string& plugin, const std::string& symbol) {

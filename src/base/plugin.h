@@ -8,12 +8,17 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace cnerf {
 
-/// A file of the program's: looked for beside it, in ../lib/cnerf and in the build tree.
+/// A file of the program's: looked for beside it, in ../lib/cnerf, and where this build keeps or installs it.
 /// @throws DeviceError  saying where it was looked for.
 [[nodiscard]] std::filesystem::path program_part(const std::string& name);
+
+/// Where a file or folder of the program's data may lie, the first place first: ../share/cnerf beside the program, and
+/// where this build keeps or installs it.
+[[nodiscard]] std::vector<std::filesystem::path> data_places(const std::string& name);
 
 /// The address of a symbol of libcnerf_`plugin`.so, which stays loaded.
 /// @throws DeviceError  no such file, it cannot be loaded, or it lacks the symbol.

@@ -5,6 +5,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/plugin.h"
 #include "src/config/toml_binding.h"
 
 namespace cnerf {
@@ -83,12 +84,7 @@ void check_consistency(const Config& config) {
 }
 
 std::vector<fs::path> preset_folders() {
-  std::vector<fs::path> folders;
-  std::error_code failure;
-  const fs::path executable = fs::read_symlink("/proc/self/exe", failure);
-  if (!failure) folders.push_back(executable.parent_path().parent_path() / "share" / "cnerf" / "configs");
-  folders.emplace_back(fs::path(CNERF_SOURCE_DIR) / "configs");
-  return folders;
+  return data_places("configs");
 }
 
 std::vector<std::string> preset_names() {

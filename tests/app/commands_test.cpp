@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include "src/app/command.h"
+#include "src/app/run_arguments.h"
 #include "src/base/error.h"
+#include "src/base/files.h"
+#include "tests/support/data.h"
 
 namespace cnerf::app {
 namespace {
@@ -36,6 +39,27 @@ TEST(Commands, AreChosenByName) {
   EXPECT_THAT([] { (void)chosen("docter"); }, ThrowsMessage<UsageError>(HasSubstr("did you mean 'doctor'")));
   EXPECT_THAT([] { (void)chosen("info a --downscal 2"); }, ThrowsMessage<UsageError>(HasSubstr("--downscale")));
   EXPECT_THAT([] { (void)chosen(""); }, ThrowsMessage<UsageError>(HasSubstr("a command is needed")));
+}
+
+TEST(Output, LiesBesideItsSource) {
+  const cnerf::test::TempDir folder;
+  std::filesystem::create_directory(folder / "roll.7");
+  EXPECT_EQ(output_beside(folder / "roll.7", "run"), folder / "roll.7-run");
+  EXPECT_EQ(output_beside(folder.path() / "roll.7" / "", "run"), folder / "roll.7-run");
+  EXPECT_EQ(output_beside(folder / "clip.mp4", "capture"), folder / "clip-capture");
+}
+
+TEST(Output, IsAnnouncedOnlyWhereItWasChosen) {
+  const cnerf::test::TempDir folder;
+  const auto printed = [&](const std::string& given) {
+    std::FILE* out = std::fopen((folder / "out").c_str(), "w");
+    Reporter reporter(ProgressStyle::kPlain, out);
+    EXPECT_EQ(chosen_output(given, "photos-run", reporter), given.empty() ? "photos-run" : given);
+    std::fclose(out);
+    return read_text_file(folder / "out");
+  };
+  EXPECT_EQ(printed(""), "no -o given: writing to photos-run\n");
+  EXPECT_EQ(printed("mine"), "");
 }
 
 }  // namespace

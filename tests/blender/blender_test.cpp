@@ -427,6 +427,26 @@ TEST(Blender, TheAddOnImportsABakeIntoASceneOfItsOwn) {
   EXPECT_EQ(run_blender(folder / "import.py", ""), 0) << read_text_file(folder / "blender.log");
 }
 
+TEST(Blender, TheAddOnIsInstalledByBlendersOwnInstaller) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
+  std::filesystem::create_directories(folder / "scripts/addons");
+  ::setenv("BLENDER_USER_SCRIPTS", (folder / "scripts").c_str(), 1);  // not the tester's own
+  std::ofstream(folder / "install.py") << "import bpy\n"
+                                          "bpy.ops.preferences.addon_install(filepath=r'" CNERF_ADDON_ZIP
+                                          "')\n"
+                                          "bpy.ops.preferences.addon_enable(module='cnerf_bake')\n"
+                                          "assert 'cnerf_bake' in bpy.context.preferences.addons\n"
+                                          "assert bpy.ops.import_scene.cnerf_bake(filepath=r'" +
+                                              bake.manifest.string() +
+                                              "') == {'FINISHED'}\n"
+                                              "assert 'VOLUME' in [o.type for o in bpy.data.scenes['cnerf'].objects]\n";
+  EXPECT_EQ(run_blender(folder / "install.py", ""), 0) << read_text_file(folder / "blender.log");
+  EXPECT_TRUE(std::filesystem::exists(folder / "scripts/addons/cnerf_bake/__init__.py"));
+  ::unsetenv("BLENDER_USER_SCRIPTS");
+}
+
 TEST(Blender, PastedIntoTheTextEditorItMakesASceneOfItsOwn) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;

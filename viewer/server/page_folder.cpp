@@ -2,16 +2,14 @@
 
 #include <cstdlib>
 
+#include "src/base/plugin.h"
+
 namespace cnerf::web {
 namespace fs = std::filesystem;
 
 std::vector<fs::path> page_folders() {
-  std::vector<fs::path> folders;
-  if (const char* given = std::getenv("CNERF_PAGE")) folders.emplace_back(given);
-  std::error_code failure;
-  const fs::path executable = fs::read_symlink("/proc/self/exe", failure);
-  if (!failure) folders.push_back(executable.parent_path().parent_path() / "share" / "cnerf" / "viewer");
-  folders.emplace_back(CNERF_PAGE_FOLDER);
+  std::vector<fs::path> folders = data_places("viewer");
+  if (const char* given = std::getenv("CNERF_PAGE")) folders.insert(folders.begin(), given);
   return folders;
 }
 

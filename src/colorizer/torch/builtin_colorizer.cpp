@@ -11,6 +11,7 @@
 
 #include "src/base/error.h"
 #include "src/base/parallel.h"
+#include "src/base/plugin.h"
 #include "src/base/rng.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/torch/network_weights.h"
@@ -121,12 +122,8 @@ class BuiltinColorizer final : public Colorizer {
 };
 
 std::vector<fs::path> candidate_weights() {
-  std::vector<fs::path> places;
-  if (const char* named = std::getenv("CNERF_COLORIZER_WEIGHTS")) places.emplace_back(named);
-  std::error_code failure;
-  const fs::path program = fs::read_symlink("/proc/self/exe", failure);
-  if (!failure) places.push_back(program.parent_path().parent_path() / "share" / "cnerf" / kWeightsName);
-  places.push_back(fs::path(CNERF_WEIGHTS_FOLDER) / kWeightsName);
+  std::vector<fs::path> places = data_places(kWeightsName);
+  if (const char* named = std::getenv("CNERF_COLORIZER_WEIGHTS")) places.insert(places.begin(), named);
   return places;
 }
 

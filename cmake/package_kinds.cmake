@@ -1,0 +1,8 @@
+# Read by CPack for each kind of package: a Debian package leaves the libraries to Debian.
+if(CPACK_GENERATOR STREQUAL DEB)
+  set(CPACK_COMPONENTS_ALL program dev)
+else()
+  set(CPACK_COMPONENTS_ALL program libraries)
+  set(CPACK_ARCHIVE_COMPONENT_INSTALL ON)
+  set(CPACK_COMPONENTS_GROUPING ALL_COMPONENTS_IN_ONE)
+endif()

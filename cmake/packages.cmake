@@ -1,0 +1,59 @@
+# Packages by CPack, which scripts/package.sh calls: cnerf and libcnerf-dev for Debian, and an archive for other machines.
+set(CPACK_PACKAGE_NAME cnerf)
+set(CPACK_PACKAGE_CONTACT "The cnerf developers")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY ${PROJECT_DESCRIPTION})
+set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_VERBATIM_VARIABLES ON)
+set(CPACK_PROJECT_CONFIG_FILE ${PROJECT_SOURCE_DIR}/cmake/package_kinds.cmake)
+
+# Debian's policy wants these names, and the changelog compressed without a date.
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+set(changelog ${PROJECT_BINARY_DIR}/changelog.gz)
+add_custom_command(OUTPUT ${changelog} COMMAND ${CNERF_GZIP} -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md > ${changelog}
+  DEPENDS CHANGELOG.md)
+add_custom_target(cnerf_changelog ALL DEPENDS ${changelog})
+install(FILES ${changelog} DESTINATION ${CMAKE_INSTALL_DOCDIR})
+foreach(file LICENSE:copyright ${changelog}:changelog.gz)
+  string(REGEX MATCH "^(.*):(.*)$" parts ${file})
+  install(FILES ${CMAKE_MATCH_1} DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/libcnerf-dev RENAME ${CMAKE_MATCH_2}
+          COMPONENT dev)
+endforeach()
+
+# Debian 12 and 13 link other versions of the same libraries, so that the packages' versions tell them apart.
+cmake_host_system_information(RESULT debian QUERY DISTRIB_VERSION_ID)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_RELEASE 1~deb${debian})
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME cnerf)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION graphics)
+# LibTorch runs on any BLAS; on the reference one colorizers are fitted many times slower.
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "libopenblas0-pthread")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "colmap, blender")
+set(CPACK_COMPONENT_PROGRAM_DESCRIPTION
+    "Colour volumes from black-and-white photographs with known camera poses\nThe program, its page for browsers, its presets and the weights of its colorizer.")
+set(CPACK_DEBIAN_DEV_PACKAGE_NAME libcnerf-dev)
+set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
+    "cnerf (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}), libtbb-dev, libssl-dev, zlib1g-dev, libfmt-dev, libspdlog-dev, nlohmann-json3-dev, libtomlplusplus-dev, libcli11-dev, libpugixml-dev, libopencv-dev, libopenexr-dev, libmeshoptimizer-dev, libtinygltf-dev, libcpp-httplib-dev, libexif-dev, libboost-iostreams-dev, libopenvdb-dev, pkg-config")
+set(CPACK_COMPONENT_DEV_DESCRIPTION "The cnerf library\nStatic libraries, headers and the CMake package cnerf.")
+
+# What the archive holds beside the program: the shared libraries it links, without the C library and a GPU's driver.
+# Programs have an RPATH rather than a RUNPATH, so that these libraries find each other too.
+set(plugins cnerf_images cnerf_videos cnerf_torch)
+if(CNERF_COMPARE)
+  list(APPEND plugins cnerf_compare_torch)
+endif()
+list(TRANSFORM plugins REPLACE "(.+)" "$<TARGET_FILE:\\1>")
+list(JOIN plugins " " plugins)
+install(CODE "
+  file(GET_RUNTIME_DEPENDENCIES RESOLVED_DEPENDENCIES_VAR found
+    EXECUTABLES $<TARGET_FILE:cnerf> $<TARGET_FILE:cnerf-vdb-reader>
+    MODULES ${plugins}
+    POST_EXCLUDE_REGEXES [[/(ld-linux|libc|libm|libmvec|libdl|librt|libpthread|libresolv|libutil|libcuda|libnvidia)[-.a-z0-9_]*\\.so]])
+  file(INSTALL \${found} DESTINATION \${CMAKE_INSTALL_PREFIX}/lib/cnerf FOLLOW_SYMLINK_CHAIN)
+" COMPONENT libraries EXCLUDE_FROM_ALL)
+include(CPack)

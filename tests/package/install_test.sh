@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# install_test.sh BUILD FOLDER: installs BUILD below FOLDER, moves it, and uses it there.
+set -euo pipefail
+here="$(cd "$(dirname "$0")" && pwd)"
+build=$1
+folder=$2/installed
+fail() { echo "$1" >&2; exit 1; }
+
+rm -rf "$folder" "$folder-moved"
+cmake --install "$build" --prefix "$folder" > /dev/null
+mv "$folder" "$folder-moved"  # whatever names its first place is found out
+folder=$folder-moved
+
+"$folder/bin/cnerf" doctor > "$folder/doctor.txt"
+grep -q "presets:.* in $folder/share/cnerf/configs" "$folder/doctor.txt" || fail "presets are not the installed ones"
+grep -q 'LibTorch: *[0-9]' "$folder/doctor.txt" || fail "the plug-in with LibTorch is not loaded"
+for file in share/man/man1/cnerf.1.gz share/man/man1/cnerf-bake.1.gz share/bash-completion/completions/cnerf \
+  share/cnerf/colorizer.weights share/doc/cnerf/copyright lib/cnerf/cnerf-vdb-reader; do
+  [ -s "$folder/$file" ] || fail "$file is not installed"
+done
+if command -v man > /dev/null; then
+  # The commands as text; a page that man complains of is none.
+  complaints=$(man --warnings -l "$folder/share/man/man1/cnerf-bake.1.gz" 2>&1 > "$folder/page.txt")
+  [ -z "$complaints" ] || fail "man: $complaints"
+  grep -qe '--resolution' "$folder/page.txt" || fail "cnerf-bake(1) lacks --resolution"
+fi
+
+cmake -S "$here/consumer" -B "$folder/consumer" -DCMAKE_PREFIX_PATH="$folder" > "$folder/configure.txt" ||
+  { cat "$folder/configure.txt"; fail "find_package(cnerf) fails"; }
+cmake --build "$folder/consumer" > "$folder/build.txt" 2>&1 || { tail -n 30 "$folder/build.txt"; fail "it does not build"; }
+status=0
+"$folder/consumer/pipeline_example" || status=$?
+[ "$status" -eq 64 ] || fail "the built program ends with $status, where 64 says how to call it"
+rm -rf "$folder"
