@@ -1,5 +1,7 @@
 # Packages by CPack, which scripts/package.sh calls: cnerf and libcnerf-dev for Debian, and an archive for other machines.
 set(CPACK_PACKAGE_NAME cnerf)
+string(TOLOWER ${CMAKE_SYSTEM_NAME}-${CMAKE_SYSTEM_PROCESSOR} machine)
+set(CPACK_PACKAGE_FILE_NAME cnerf-${PROJECT_VERSION}-${machine})
 set(CPACK_PACKAGE_CONTACT "The cnerf developers")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY ${PROJECT_DESCRIPTION})
 set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
@@ -53,7 +55,7 @@ install(CODE "
   file(GET_RUNTIME_DEPENDENCIES RESOLVED_DEPENDENCIES_VAR found
     EXECUTABLES $<TARGET_FILE:cnerf> $<TARGET_FILE:cnerf-vdb-reader>
     MODULES ${plugins}
-    POST_EXCLUDE_REGEXES [[/(ld-linux|libc|libm|libmvec|libdl|librt|libpthread|libresolv|libutil|libcuda|libnvidia)[-.a-z0-9_]*\\.so]])
+    POST_EXCLUDE_REGEXES [[/(ld-linux-x86-64|libc|libm|libmvec|libdl|librt|libpthread|libresolv|libutil|libcuda|libnvidia-[-a-z]+)\\.so]])
   file(INSTALL \${found} DESTINATION \${CMAKE_INSTALL_PREFIX}/lib/cnerf FOLLOW_SYMLINK_CHAIN)
 " COMPONENT libraries EXCLUDE_FROM_ALL)
 include(CPack)

@@ -4,8 +4,8 @@
 #   scripts/try_debian.sh 12|13 [packages|demo|tests]...      stages to run; demo and tests if not given
 # Each stage begins with scripts/install_dependencies.sh, apt included. $CNERF_DATA, if set, is mounted read-only for the
 # tests. The root stays, so that a later call goes on in it; FRESH=1 makes it anew.
-#   scripts/try_debian.sh 12|13 package     installs the package that scripts/package.sh built for that Debian, in a root
-#                                           that has nothing else, runs the sample to a volume and purges it
+#   scripts/try_debian.sh 12|13 package|archive      takes what scripts/package.sh built for that Debian to a root that has
+#                                                    nothing else, runs the sample to a volume and removes it
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -21,7 +21,7 @@ if [ ${#stages[@]} -eq 0 ]; then stages=(demo tests); fi
 [ "$EUID" -eq 0 ] || { echo "$0: needs root for chroot and mount" >&2; exit 77; }
 
 root=${ROOTS:-/var/tmp}/cnerf-debian-$release
-if [ "${stages[*]}" = package ]; then root+=-package; fi  # where nothing is installed that building needs
+case ${stages[*]} in package | archive) root+=-package ;; esac  # where nothing is installed that building needs
 tree=/home/cnerf
 mounts=()
 release_mounts() {
@@ -70,10 +70,14 @@ rm -rf "${root:?}$tree"
 mkdir -p "$root$tree"
 git archive HEAD | tar -x -C "$root$tree"
 
-if [ "${stages[*]}" = package ]; then
-  built=$(ls build/package/packages/cnerf_*~deb"${release}"_*.deb 2> /dev/null || true)
-  [ -e "$built" ] || { echo "$0: no package of Debian $release; run scripts/package.sh on it" >&2; exit 66; }
-  cp "$built" "$root$tree/cnerf.deb"
+case ${stages[*]} in
+  package) built=$(ls build/package/packages/cnerf_*~deb"$release"_*.deb 2> /dev/null || true) ;;
+  archive) built=$(ls build/package/packages/cnerf-*.tar.gz 2> /dev/null || true) ;;
+  *) built= ;;
+esac
+if [[ $root == *-package ]]; then
+  [ -e "$built" ] || { echo "$0: nothing built for Debian $release; run scripts/package.sh on it" >&2; exit 66; }
+  cp "$built" "$root$tree/"
 fi
 
 declare -A outcome=([packages]=- [demo]=- [tests]=-)
@@ -83,7 +87,7 @@ for stage in "${stages[@]}"; do
     packages) command=(bash scripts/install_dependencies.sh) ;;
     demo) command=(bash scripts/demo.sh) ;;
     tests) command=(bash scripts/test.sh) ;;
-    package) command=(bash scripts/try_package.sh cnerf.deb) ;;
+    package | archive) command=(bash scripts/try_package.sh "$(basename "$built")") ;;
     *) echo "$0: no stage '$stage'" >&2; exit 64 ;;
   esac
   begin=$SECONDS
@@ -93,7 +97,7 @@ for stage in "${stages[@]}"; do
   echo "Debian $release: $stage ${outcome[$stage]}; $root-$stage.log" >&2
   tail -n 4 "$root-$stage.log" >&2
 done
-if [ "${stages[*]}" = package ]; then exit $failures; fi
+if [[ $root == *-package ]]; then exit $failures; fi
 
 version_of() { chroot "$root" dpkg-query -W -f '${Version}' "$1" 2> /dev/null | sed 's/^[0-9]*://; s/[-+~].*//' || true; }
 echo "| Debian | g++ | CMake | LibTorch | OpenCV | COLMAP | Blender | node | packages | demo | tests |"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Installs cnerf's package on a Debian that has nothing of it, uses it, purges it and looks for what is left.
+# Takes cnerf's package or archive to a Debian that has nothing of it, uses it, removes it and looks for what is left.
 # scripts/try_debian.sh runs it in a bare root; it needs root, and changes the system it runs on.
-#   bash scripts/try_package.sh CNERF.deb
+#   bash scripts/try_package.sh CNERF.deb|CNERF.tar.gz
 set -euo pipefail
 package=$(realpath "$1")
 work=$(mktemp -d)
@@ -15,31 +15,39 @@ list_files() {
 }
 packages() { dpkg-query -W -f '${Package} ${db:Status-Abbrev}\n' | sort; }
 
-apt-get update -qq
-list_files > "$work/files_before"
-packages > "$work/packages_before"
+# From the sample to its volume.  use PROGRAM
+use() {
+  "$1" doctor
+  "$1" sample -o "$work/capture" --progress plain
+  "$1" run "$work/capture" -o "$work/run" --preset quick --progress plain
+  ls -l "$work"/run/bakes/*/volume.vdb
+}
 
-begin=$SECONDS
-apt-get install -y -qq "$package" > "$work/install.log" 2>&1 || { tail -n 20 "$work/install.log" >&2; exit 1; }
-installed=$SECONDS
-echo "installed: $(($(packages | wc -l) - $(wc -l < "$work/packages_before"))) packages in $((installed - begin)) s"
-cnerf doctor
-cd "$work"
-cnerf sample -o capture --progress plain
-cnerf run capture -o run --preset quick --progress plain
-ls -l run/bakes/*/volume.vdb
-echo "from apt to the volume: $((SECONDS - begin)) s, of which apt took $((installed - begin)) s"
-cd /
+try_archive() {
+  tar -xzf "$1" -C "$work"
+  use "$work"/cnerf-*/bin/cnerf
+}
 
-apt-get purge -y -qq --autoremove cnerf > "$work/purge.log" 2>&1 || { tail -n 20 "$work/purge.log" >&2; exit 1; }
-list_files > "$work/files_after"
-packages > "$work/packages_after"
-diff "$work/packages_before" "$work/packages_after" && echo "purged: the same packages as before"
-# What packages of others make at their installation and leave is listed; a file of cnerf's fails.
-comm -13 "$work/files_before" "$work/files_after" > "$work/left"
-echo "files that were not there before: $(wc -l < "$work/left")"
-head -n 20 "$work/left"
-if grep -i cnerf "$work/left"; then
-  echo "try_package: the above is left of cnerf" >&2
-  exit 1
-fi
+try_package() {
+  apt-get update -qq
+  list_files > "$work/files_before"
+  packages > "$work/packages_before"
+  local begin=$SECONDS
+  apt-get install -y -qq "$1" > "$work/install.log" 2>&1 || { tail -n 20 "$work/install.log" >&2; exit 1; }
+  local took=$((SECONDS - begin))
+  use cnerf
+  echo "$(($(packages | wc -l) - $(wc -l < "$work/packages_before"))) packages in $took s; to the end of the run $((SECONDS - begin)) s"
+
+  apt-get purge -y -qq --autoremove cnerf > "$work/purge.log" 2>&1 || { tail -n 20 "$work/purge.log" >&2; exit 1; }
+  list_files > "$work/files_after"
+  packages > "$work/packages_after"
+  diff "$work/packages_before" "$work/packages_after" && echo "purged: the same packages as before"
+  comm -13 "$work/files_before" "$work/files_after" > "$work/left"
+  echo "files that were not there before: $(wc -l < "$work/left")"
+  [ ! -s "$work/left" ] || { head -n 20 "$work/left" >&2; exit 1; }
+}
+
+case $package in
+  *.deb) try_package "$package" ;;
+  *) try_archive "$package" ;;
+esac

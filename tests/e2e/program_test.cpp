@@ -71,6 +71,31 @@ TEST(Program, SampleRefusesToOverwrite) {
   EXPECT_EQ(files_below(tiny_capture()), before);
 }
 
+TEST(Program, WithoutOutItWritesBesideTheCaptureAndNeverOver) {
+  const TempDir folder;
+  const fs::path photos = copied(tiny_capture(), folder / "photos");
+  const std::vector<std::string> words =
+      concatenated({"train", photos.string(), "--progress", "plain"}, tiny_options());
+  const ProgramResult first = cnerf(words);
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  const fs::path run = folder / "photos-run";
+  EXPECT_THAT(first.out, testing::StartsWith("no -o given: writing to " + run.string() + "\n"));
+  EXPECT_TRUE(fs::exists(run / "stage1.snapshot"));
+  const auto before = files_below(run);
+  const ProgramResult second = cnerf(words);
+  EXPECT_EQ(second.exit_code, 64) << second.out;
+  EXPECT_THAT(second.err, AllOf(HasSubstr(run.string()), testing::Not(HasSubstr("\x1b"))));
+  EXPECT_EQ(files_below(run), before);
+}
+
+TEST(Program, QuietPrintsResultsOnly) {
+  const TempDir folder;
+  const ProgramResult result = cnerf({"sample", "-o", (folder / "c").string(), "--views", "2", "--width", "16",
+                                      "--height", "16", "--samples-per-pixel", "1", "--quiet"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, testing::MatchesRegex("capture: +[^\n]+/c\n"));
+}
+
 TEST(Program, JsonProgressIsOneObjectALine) {
   const TempDir folder;
   const ProgramResult result = cnerf({"sample", "-o", (folder / "c").string(), "--views", "2", "--width", "16",

@@ -25,6 +25,12 @@ if command -v man > /dev/null; then
   grep -qe '--resolution' "$folder/page.txt" || fail "cnerf-bake(1) lacks --resolution"
 fi
 
+# Errors are red on a terminal, unless NO_COLOR asks for none.
+red=$'\x1b[31mcnerf: '
+on_terminal() { script -qec "$1" /dev/null || true; }
+grep -qF "$red" <<< "$(NO_COLOR= on_terminal "$folder/bin/cnerf docter")" || fail "an error on a terminal is not red"
+if grep -qF $'\x1b' <<< "$(NO_COLOR=1 on_terminal "$folder/bin/cnerf docter")"; then fail "NO_COLOR is not honoured"; fi
+
 cmake -S "$here/consumer" -B "$folder/consumer" -DCMAKE_PREFIX_PATH="$folder" > "$folder/configure.txt" ||
   { cat "$folder/configure.txt"; fail "find_package(cnerf) fails"; }
 cmake --build "$folder/consumer" > "$folder/build.txt" 2>&1 || { tail -n 30 "$folder/build.txt"; fail "it does not build"; }
