@@ -10,13 +10,14 @@ set(CPACK_VERBATIM_VARIABLES ON)
 set(CPACK_PROJECT_CONFIG_FILE ${PROJECT_SOURCE_DIR}/cmake/package_kinds.cmake)
 
 # Debian's policy wants these names, and the changelog compressed without a date.
-install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+install(FILES cmake/debian_copyright DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT libraries EXCLUDE_FROM_ALL)  # not every system has it
 set(changelog ${PROJECT_BINARY_DIR}/changelog.gz)
 add_custom_command(OUTPUT ${changelog} COMMAND ${CNERF_GZIP} -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md > ${changelog}
   DEPENDS CHANGELOG.md)
 add_custom_target(cnerf_changelog ALL DEPENDS ${changelog})
 install(FILES ${changelog} DESTINATION ${CMAKE_INSTALL_DOCDIR})
-foreach(file LICENSE:copyright ${changelog}:changelog.gz)
+foreach(file cmake/debian_copyright:copyright ${changelog}:changelog.gz)
   string(REGEX MATCH "^(.*):(.*)$" parts ${file})
   install(FILES ${CMAKE_MATCH_1} DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/libcnerf-dev RENAME ${CMAKE_MATCH_2}
           COMPONENT dev)
@@ -35,7 +36,7 @@ set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "libopenblas0-pthread")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "colmap, blender")
 set(CPACK_COMPONENT_PROGRAM_DESCRIPTION
-    "Colour volumes from black-and-white photographs with known camera poses\nThe program, its page for browsers, its presets and the weights of its colorizer.")
+    "Colour volumes from black-and-white photographs with known camera poses\nThe program, its page for browsers, its presets\nand the weights of its colorizer.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libcnerf-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
@@ -57,5 +58,15 @@ install(CODE "
     MODULES ${plugins}
     POST_EXCLUDE_REGEXES [[/(ld-linux-x86-64|libc|libm|libmvec|libdl|librt|libpthread|libresolv|libutil|libcuda|libnvidia-[-a-z]+)\\.so]])
   file(INSTALL \${found} DESTINATION \${CMAKE_INSTALL_PREFIX}/lib/cnerf FOLLOW_SYMLINK_CHAIN)
+  # Whose they are, and under which licence.
+  execute_process(COMMAND perl ${PROJECT_SOURCE_DIR}/scripts/bill_of_materials.pl $<TARGET_FILE:cnerf> $<TARGET_FILE:cnerf-vdb-reader> ${plugins}
+    OUTPUT_VARIABLE bill COMMAND_ERROR_IS_FATAL ANY)
+  string(JSON last LENGTH \"\${bill}\" packages)
+  math(EXPR last \"\${last} - 1\")
+  foreach(i RANGE 1 \${last})  # 0 is cnerf
+    string(JSON name GET \"\${bill}\" packages \${i} name)
+    file(INSTALL /usr/share/doc/\${name}/copyright
+         DESTINATION \${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATAROOTDIR}/doc/\${name})
+  endforeach()
 " COMPONENT libraries EXCLUDE_FROM_ALL)
 include(CPack)

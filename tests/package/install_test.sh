@@ -14,6 +14,8 @@ folder=$folder-moved
 "$folder/bin/cnerf" doctor > "$folder/doctor.txt"
 grep -q "presets:.* in $folder/share/cnerf/configs" "$folder/doctor.txt" || fail "presets are not the installed ones"
 grep -q 'LibTorch: *[0-9]' "$folder/doctor.txt" || fail "the plug-in with LibTorch is not loaded"
+"$folder/bin/cnerf" colorize-image "$here/../../docs/images/viewer.png" "$folder/coloured.png" --short-side 32 > "$folder/colorizer.txt"
+grep -q '^coloured by builtin:' "$folder/colorizer.txt" || fail "the built-in colorizer has no weights"
 for file in share/man/man1/cnerf.1.gz share/man/man1/cnerf-bake.1.gz share/bash-completion/completions/cnerf \
   share/cnerf/colorizer.weights share/doc/cnerf/copyright lib/cnerf/cnerf-vdb-reader; do
   [ -s "$folder/$file" ] || fail "$file is not installed"
