@@ -25,7 +25,7 @@ case \${1:-} in
   run | train) add stage1.steps=60 stage1.samples_per_step=4096 stage1.grid.log2_rows=12 ;;&
   run | colorize) add stage2.patches=4 stage2.distill_steps=20 stage2.working_resolution=32 stage2.purify.opinions=1 \
                       colorizer.reference_steps=20 ;;&
-  run | bake) add bake.resolution=32 ;;&
+  run | bake) add bake.resolution=32 mesh.texture_size=64 mesh.faces=500 ;;&
   run | render) add render.frames=3 render.short_side=32 ;;
 esac
 exec "$program" "\$@" "\${small[@]}"
