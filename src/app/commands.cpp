@@ -55,6 +55,7 @@ void refuse_empty_values(const CLI::App& app) {
 }  // namespace
 
 std::vector<ParsedCommand> declare_commands(CLI::App& program) {
+  program.require_subcommand(0, 1);  // behind a command, `run` or `sample` is the name of a folder
   std::vector<ParsedCommand> commands;
   for (const Command& command : kCommands) {
     CLI::App* app = program.add_subcommand(command.name, command.summary);

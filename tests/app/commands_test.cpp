@@ -38,5 +38,11 @@ TEST(Commands, AreChosenByName) {
   EXPECT_THAT([] { (void)chosen(""); }, ThrowsMessage<UsageError>(HasSubstr("a command is needed")));
 }
 
+TEST(Commands, FoldersMayBeNamedLikeCommands) {
+  EXPECT_EQ(chosen("studio run"), "studio");
+  EXPECT_EQ(chosen("bake run --grids one"), "bake");
+  EXPECT_EQ(chosen("info sample --downscale 2"), "info");
+}
+
 }  // namespace
 }  // namespace cnerf::app
