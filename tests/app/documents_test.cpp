@@ -157,6 +157,30 @@ TEST(Documents, CallTheProgramAsItIs) {
   EXPECT_EQ(objections(calls), "");
 }
 
+/// Code spans that look like options and are none; files of a run look like them too.
+std::vector<std::string> unknown_options(const std::string& markdown) {
+  static const std::regex span(
+      R"re(`((?:capture|stage1|stage2|colorizer|bake|vdb|mesh|web|render|finish)\.[a-z0-9_.]+)[`= ])re");
+  Config config;
+  const std::vector<Field> fields = fields_of(config);
+  std::vector<std::string> unknown;
+  for (std::sregex_iterator at(markdown.begin(), markdown.end(), span), end; at != end; ++at) {
+    const std::string key = (*at)[1];
+    const bool is_file = key == "stage1.snapshot" || key == "mesh.gltf" || key == "mesh.glb" || key == "mesh.bin";
+    const bool is_option = std::ranges::any_of(
+        fields, [&](const Field& field) { return field.key == key || field.key.starts_with(key + "."); });
+    if (!is_file && !is_option) unknown.push_back(key);
+  }
+  return unknown;
+}
+
+TEST(Documents, NameOptionsThatThereAre) {
+  for (const fs::path& file : documents()) {
+    EXPECT_THAT(unknown_options(read_text_file(file)), testing::IsEmpty()) << file;
+  }
+  EXPECT_THAT(unknown_options("`stage1.steps`, `stage2.purify`, `bake.grid=one`"), testing::ElementsAre("bake.grid"));
+}
+
 TEST(Documents, CallsAreFoundInBlocksAndSpans) {
   const std::vector<Call> calls = calls_in("a.md",
                                            "Prose about cnerf and `cnerf doctor`, `cnerf-vdb-reader x`.\n"
