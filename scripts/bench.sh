@@ -23,7 +23,7 @@ trap 'rm -rf "$results"' EXIT
 
 # A row a benchmark; the counters that a file does not have stay empty.
 table=$(
-  echo "| path | ns a sample | M samples/s | ceiling, ns | share of the ceiling | share of FMA peak | threads | against one thread | LibTorch, ns | against LibTorch |"
+  echo "| path | ns per sample | M samples/s | ceiling, ns | share of the ceiling | share of FMA peak | threads | against one thread | LibTorch, ns | against LibTorch |"
   echo "|---|---|---|---|---|---|---|---|---|---|"
   awk '
     function value(name, digits) {

@@ -19,7 +19,7 @@ packages=(
 )
 command -v npm > /dev/null || packages+=(nodejs npm)  # for the viewer's page; a node from elsewhere will do
 if [[ "${1:-}" == "--tests" ]]; then
-  packages+=(blender python3-numpy chromium man-db mandoc fish zsh)
+  packages+=(blender python3-numpy chromium man-db mandoc fish zsh doxygen codespell)
 fi
 
 # Installs those of "${packages[@]}" that are missing.

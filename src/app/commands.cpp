@@ -113,6 +113,7 @@ void refuse_empty_values(const CLI::App& app) {
 std::vector<ParsedCommand> declare_commands(CLI::App& program) {
   program.set_help_flag("-h,--help", "Show what there is");
   program.footer(exit_codes_text());
+  program.require_subcommand(0, 1);  // behind a command, `run` or `sample` is the name of a folder
   std::vector<ParsedCommand> commands;
   for (const Command& command : kCommands) {
     CLI::App* app = program.add_subcommand(command.name, command.summary);

@@ -62,5 +62,11 @@ TEST(Output, IsAnnouncedOnlyWhereItWasChosen) {
   EXPECT_EQ(printed("mine"), "");
 }
 
+TEST(Commands, FoldersMayBeNamedLikeCommands) {
+  EXPECT_EQ(chosen("studio run"), "studio");
+  EXPECT_EQ(chosen("bake run --grids one"), "bake");
+  EXPECT_EQ(chosen("info sample --downscale 2"), "info");
+}
+
 }  // namespace
 }  // namespace cnerf::app

@@ -150,6 +150,21 @@ TEST(Architecture, EverySourceLiesInALayer) {
   EXPECT_GT(all_includes().size(), 100u) << "the sources were not found";
 }
 
+/// The rooms that the first column of the table in a document names, from the top.
+std::vector<std::string> rooms_of(const std::string& markdown) {
+  static const std::regex row(R"re((?:^|\n)\| `([\w/]+)`)re");
+  const std::string table = markdown.substr(0, markdown.find("\n## Devices"));
+  std::vector<std::string> rooms;
+  for (std::sregex_iterator at(table.begin(), table.end(), row), end; at != end; ++at) rooms.push_back((*at)[1]);
+  return rooms;
+}
+
+TEST(Architecture, TheDocumentNamesEveryRoomInOrder) {
+  std::vector<std::string> expected = kLayers;
+  std::erase_if(expected, [](const std::string& layer) { return layer.starts_with("bake/"); });  // one row for all
+  EXPECT_EQ(rooms_of(read_text_file(fs::path(CNERF_SOURCE_DIR) / "docs/architecture.md")), expected);
+}
+
 /// The rules themselves can fail.
 TEST(Architecture, RulesRecogniseWhatTheyForbid) {
   const auto upward = includes_of("src/base/error.h", "  #  include \"src/train/scene.h\"\n");

@@ -1,5 +1,5 @@
 // Quality over time of stage 1 on a real capture: trains with the given options and prints the held-out luminance PSNR
-// (decision 1 of docs/decisions.md) at growing training times. Evaluation does not count as training time. With
+// (docs/decisions/linear-luminance.md) at growing training times. Evaluation does not count as training time. With
 // `samples` the marks are millions of trained samples instead, which do not depend on what else the machine does.
 //
 //   reconstruction CAPTURE [downscale=1] [holdout=8] [seconds=60] [option=value ...]

@@ -7,7 +7,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "src/base/error.h"
 #include "src/base/statistics.h"
@@ -101,28 +103,9 @@ int bench(int argc, char** argv) {
   const Engines& engines = engines_for("auto");
   const StrokeList list = read_strokes(argv[2], paintable_views(context.capture));
   studio::Coloring coloring(context, engines);
-  if (std::getenv("K_FAST")) {
-    const LuminanceModel& l = coloring.luminance();
-    std::vector<CachedView> views;
-    std::vector<std::string> names;
-    for (const View& v : context.capture.views)
-      if (v.name == list.strokes[0].view) {
-        views.push_back(cache_view(*l.engine, l.march(), UnitCamera(v.intrinsics, v.world_from_camera, l.frame),
-                                   config.stage2.working_resolution, kCachedWeight));
-        names.push_back(v.name);
-      }
-    const SeenSurfaces seen(views, names);
-    say_known(context, seen, list, maps);
-    return 0;
-  }
-  row(
-      "caching views",
-      [&] {
-        const Stopwatch watch;
-        coloring.cache_views([](double) {});
-        return watch.seconds();
-      }(),
-      "s");
+  const Stopwatch of_caching;
+  coloring.cache_views([](double) {});
+  row("caching views", of_caching.seconds(), "s");
   coloring.see(painted_viewpoints(list), {});
   say_known(context, *coloring.seen(), list, maps);
   if (is_map) return 0;

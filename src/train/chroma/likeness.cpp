@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kAround = 2;  // pixels on each side that looks are a mean of
 // What costs 1 from a stroke to a pixel that is like it, whatever lies between them. The error hardly depends on these:
-// docs/decisions.md.
+// docs/history/decisions.md, 59.
 constexpr float kLightness = 12;    // L* up and down
 constexpr float kTexture = 6;       // L*
 constexpr float kDepth = 0.2f;      // of the distance
