@@ -38,7 +38,7 @@ struct Formats {
 struct OutputOptions {
   VdbOptions vdb;
   WebOptions web;
-  std::filesystem::path page;           ///< folder of the built page of web bundles; empty = none
+  std::filesystem::path page;          ///< folder of the built page of web bundles; empty = none
   std::optional<SkyPicture> sky = {};  ///< behind what is baked
 };
 

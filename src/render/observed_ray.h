@@ -80,13 +80,15 @@ template <typename Views>
   observed.jitter = rng.uniform(2 * ray);
   // Another background each time: what is transparent has to become empty and what is opaque solid. Over black, a dark
   // thing could as well be a hole, and thin fog everywhere explains a dim picture.
-  observed.target.background = luminance_from_lightness(100.0f * rng.uniform(2 * ray + 1));
-  // The way to the sky is as empty as what is transparent; where it may be seen, what is behind the ray is known, and
-  // nothing is asked to be solid.
+  const float random = rng.uniform(2 * ray + 1);
+  observed.target.background = luminance_from_lightness(100.0f * random);
+  // The way to the sky is as empty as what is transparent; every other time its light is compared, which tells the
+  // view's exposure. Where the sky only may be seen, nothing is asked to be solid.
   const SkyLabel label = views.sky_label(picked.view, pixel);
-  if (label == SkyLabel::kSky) {
+  if (label == SkyLabel::kSky && random < 0.5f) {
+    observed.target.background = luminance_from_lightness(200.0f * random);
     observed.target.luminance = observed.target.coverage = 0;
-  } else if (label == SkyLabel::kEither) {
+  } else if (label != SkyLabel::kScene) {
     observed.target.background = 0;
     observed.target.sky = observed.target.gain * views.sky(picked.view).along(observed.ray.direction);
   }

@@ -41,6 +41,7 @@ struct UnitCamera {
 enum class SkyLabel : std::uint8_t {
   kScene,   ///< shows something in the box
   kEither,  ///< perhaps, or the sky between: an edge, a gap
+  kFar,     ///< shows what is so far that it may lie beyond the box
   kSky,     ///< shows the sky: the way to it is empty
 };
 

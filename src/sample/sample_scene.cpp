@@ -32,7 +32,7 @@ constexpr double kClothHeight = -0.1;
 constexpr double kLeastDown = 1e-3;  // of a ray, per depth: above the horizon lies what is there
 constexpr double kShadowDistance = 1.1, kShadowRadius = 0.7, kShadowDepth = 0.6;
 constexpr double kExposureSpread = 0.3;
-constexpr double kHaze = 5;  // depth at which it hides 63 % of the cloth
+constexpr double kHaze = 8;  // depth at which it hides 63 % of the cloth
 constexpr Vec3d kHorizonColor = {0.78, 0.82, 0.86}, kZenithColor = {0.24, 0.40, 0.72}, kCloudColor = {0.92, 0.92, 0.93};
 constexpr std::uint64_t kExposureDraw = std::uint64_t(1) << 40;  // beyond those of pixels
 constexpr int kFirstReference = 1, kReferences = 3;  // training views; the golden angle puts them around the scene

@@ -16,12 +16,12 @@ inline Affined look_at(Vec3d eye, Vec3d target) {
   return {Mat3d::from_columns(right, cross(forward, right), forward), eye};
 }
 
-/// A sky that a third of the pixels show, and another third perhaps; brighter towards +x.
+/// A sky that a quarter of the pixels show, and half of them perhaps; brighter towards +x.
 class ToySky {
  public:
   ToySky(std::size_t views, std::size_t pixels) : labels_(views, std::vector<SkyLabel>(pixels)) {
     for (std::size_t v = 0; v < views; ++v) {
-      for (std::size_t p = 0; p < pixels; ++p) labels_[v][p] = SkyLabel((p / 3 + v) % 3);
+      for (std::size_t p = 0; p < pixels; ++p) labels_[v][p] = SkyLabel((p / 3 + v) % 4);
     }
     for (int i = 0; i < 16 * 8; ++i)
       light_.planes[0].push_back(0.3f + 0.5f * float(i % 16 < 8 ? i % 16 : 15 - i % 16) / 8);

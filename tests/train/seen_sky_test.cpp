@@ -96,7 +96,9 @@ TEST(SeenSky, IsNotABrightWallWithStructure) {
 }
 
 TEST(SeenSky, IsNotADarkCeiling) {
-  const auto ceiling = [](Vec3d direction, int, double noise) { return direction.z < 0 ? 150 + 60 * noise : 60 + noise; };
+  const auto ceiling = [](Vec3d direction, int, double noise) {
+    return direction.z < 0 ? 150 + 60 * noise : 60 + noise;
+  };
   EXPECT_FALSE(found_in(outdoors(ceiling)).light.exists());
 }
 

@@ -9,8 +9,8 @@
 namespace cnerf {
 namespace {
 
-constexpr float kMostOpacity = 0.5f;    // of the field before the sky, where a colour still is the sky's
-constexpr float kKnownWeight = 1000;    // over that of an answer
+constexpr float kMostOpacity = 0.5f;  // of the field before the sky, where a colour still is the sky's
+constexpr float kKnownWeight = 1000;  // over that of an answer
 
 }  // namespace
 
@@ -34,8 +34,8 @@ void SkyColors::add(std::span<const CachedView> views, const KnownColorMap& know
 
 void SkyColors::refresh() {
   const std::size_t pixels = std::size_t(sums_.width()) * std::size_t(sums_.height());
-  colors_ = is_grey() ? DirectionMap{sums_.width(), sums_.height(), {2, std::vector<float>(pixels, 0.0f)}}
-                      : sums_.filled();
+  colors_ =
+      is_grey() ? DirectionMap{sums_.width(), sums_.height(), {2, std::vector<float>(pixels, 0.0f)}} : sums_.filled();
 }
 
 Ab SkyColors::along(Vec3f direction) const {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <limits>
 
 #include "src/base/parallel.h"
 #include "src/base/statistics.h"
@@ -12,28 +12,33 @@
 namespace cnerf {
 namespace {
 
-constexpr int kMapWidth = 512;            // 0.7 degrees a pixel
-constexpr int kLongSide = 256;            // of the pictures that are searched, pixels
-constexpr float kHorizon = -0.02f;        // least elevation of the sky, as a sine: horizons are not level
-constexpr float kSeedElevation = 0.05f;   // of where the search begins
-constexpr float kLeastLightness = 40;     // L* of a sky
-constexpr float kBrighter = 8;            // L* that it has over what is below
-constexpr float kSmooth = 2.5f;           // L* between neighbours
-constexpr double kLeastShare = 0.01;      // of a picture, that counts as a sky
-constexpr float kThinThing = 8;           // L* from what is around: a wire, a twig
-constexpr int kInside = 2, kEdge = 3;     // searched pixels within the sky's border, and beyond it
-constexpr float kDarkest = 2;             // L* below the darkest twentieth of a view's sky, of a gap that may show it
-constexpr double kPointShare = 0.15;      // of the picture's density of points, that a sky has at most
+constexpr int kMapWidth = 512;              // 0.7 degrees a pixel
+constexpr int kLongSide = 256;              // of the pictures that are searched, pixels
+constexpr float kHorizon = -0.02f;          // least elevation of the sky, as a sine: horizons are not level
+constexpr float kNearHorizon = 0.03f;       // where the sky comes down to it
+constexpr float kFarElevation = 0.12f;      // above and below the horizon, of what is far where nothing hides it
+constexpr float kSeedElevation = 0.05f;     // of where the search begins
+constexpr float kLeastLightness = 40;       // L* of a sky
+constexpr double kDarkPart = 0.25;          // of what is below the horizon: snow and haze are as bright as a sky
+constexpr float kBrighter = 8;              // L* that it has over what is below
+constexpr float kSmooth = 2;                // L* between neighbours
+constexpr double kLeastShare = 0.05;        // of a picture, and of its border, that a sky takes
+constexpr float kThinThing = 8;             // L* from what is around: a wire, a twig
+constexpr int kInside = 2, kEdge = 3;       // searched pixels within the sky's border, and beyond it
+constexpr float kDarkest = 2;               // L* below the darkest twentieth of a view's sky, of a gap that may show it
+constexpr double kPointShare = 0.15;        // of the picture's density of points, that a sky has at most
 constexpr std::size_t kTellingPoints = 30;  // of a view: fewer say nothing
-constexpr float kUnlike = 3.5f;              // L* from what other views see there: no sky
-constexpr double kLeastViews = 0.2;       // of all views, that have to show it
+constexpr float kFarShare = 0.02f;          // of the weight of a pixel of the sky, in the map
+constexpr float kSame = 1.5f;               // L* from the map, of a pixel that shows the sky after all
+constexpr float kUnlike = 3.5f;             // L* from what other views see there: no sky
+constexpr double kLeastViews = 0.5;         // of all views, that have to show it
 constexpr std::size_t kReadPixels = 30000;  // of a view, for the map
 
 /// A picture that is searched.
 struct SearchedView {
   int width = 0, height = 0;
-  std::vector<float> lightness;     // [H, W] L*
-  std::vector<float> elevation;     // [H, W] sine of the angle over the horizon
+  std::vector<float> lightness;      // [H, W] L*
+  std::vector<float> elevation;      // [H, W] sine of the angle over the horizon
   std::vector<std::uint8_t> is_sky;  // [H, W]
 
   [[nodiscard]] std::size_t at(int x, int y) const { return std::size_t(y) * std::size_t(width) + std::size_t(x); }
@@ -78,7 +83,7 @@ float least_lightness(const SearchedView& view) {
     if (view.elevation[p] < 0) below.push_back(view.lightness[p]);
   }
   if (below.size() < view.lightness.size() / 20) below = view.lightness;
-  return std::max(kLeastLightness, median(std::move(below)) + kBrighter);
+  return std::max(kLeastLightness, quantile(std::move(below), kDarkPart) + kBrighter);
 }
 
 /// Marks what is reached from the picture's border over smooth, bright pixels.
@@ -97,17 +102,21 @@ void grow(SearchedView& view) {
   for (int y = 0; y < view.height; ++y) {
     for (const int x : {0, view.width - 1}) take(x, y, kSeedElevation);
   }
-  std::size_t marked = 0;
+  std::size_t marked = 0, on_border = 0;
   while (!front.empty()) {
     const auto [x, y] = front.back();
     front.pop_back();
     ++marked;
+    if (x == 0 || y == 0 || x == view.width - 1 || y == view.height - 1) ++on_border;
     for (const auto& [u, v] : {std::pair{x - 1, y}, {x + 1, y}, {x, y - 1}, {x, y + 1}}) {
       if (!view.holds(u, v)) continue;
       if (std::abs(view.lightness[view.at(u, v)] - view.lightness[view.at(x, y)]) < kSmooth) take(u, v, kHorizon);
     }
   }
-  if (double(marked) < kLeastShare * double(view.is_sky.size())) std::ranges::fill(view.is_sky, 0);
+  const double border = 2.0 * (view.width + view.height);
+  if (double(marked) < kLeastShare * double(view.is_sky.size()) || double(on_border) < kLeastShare * border) {
+    std::ranges::fill(view.is_sky, 0);
+  }
 }
 
 /// Whether all pixels, or any, in a square around one are marked. What is beyond the picture goes on as its border.
@@ -139,18 +148,33 @@ void unmark_structured(const View& view, const std::vector<Vec3d>& points, Searc
   if (double(in_sky) > kPointShare * area * double(in_picture)) std::ranges::fill(small.is_sky, 0);
 }
 
+/// Marks columns in which the sky comes down to the horizon: what is below it there is far.
+std::vector<bool> open_columns(const SearchedView& small) {
+  std::vector<bool> open(std::size_t(small.width), false);
+  for (int x = 0; x < small.width; ++x) {
+    for (int y = 0; y < small.height; ++y) {
+      const std::size_t p = small.at(x, y);
+      if (small.is_sky[p] != 0 && small.elevation[p] < kNearHorizon) open[std::size_t(x)] = true;
+    }
+  }
+  return open;
+}
+
 std::vector<SkyLabel> labels_of(const SearchedView& small, const MonoImage& image) {
   std::vector<float> of_sky;
   for (std::size_t p = 0; p < small.is_sky.size(); ++p) {
     if (small.is_sky[p] != 0) of_sky.push_back(small.lightness[p]);
   }
   const float darkest = quantile(std::move(of_sky), 0.05) - kDarkest;
+  const std::vector<bool> is_open = open_columns(small);
   std::vector<SkyLabel> of_small;
   for (int y = 0; y < small.height; ++y) {
     for (int x = 0; x < small.width; ++x) {
       const std::size_t p = small.at(x, y);
       const bool is_gap = small.elevation[p] > kHorizon && small.lightness[p] > darkest;
-      of_small.push_back(marked_around<true>(small, x, y, kInside)             ? SkyLabel::kSky
+      const bool is_far = is_open[std::size_t(x)] && std::abs(small.elevation[p]) < kFarElevation;
+      of_small.push_back(marked_around<true>(small, x, y, kInside)            ? SkyLabel::kSky
+                         : is_far                                             ? SkyLabel::kFar
                          : is_gap || marked_around<false>(small, x, y, kEdge) ? SkyLabel::kEither
                                                                               : SkyLabel::kScene);
     }
@@ -174,31 +198,48 @@ void for_sky_pixels(const TrainingView& view, const std::vector<SkyLabel>& label
   const MonoImage& image = *view.image;
   const std::size_t step = std::max<std::size_t>(1, image.pixel_count() / kReadPixels) | 1;  // odd: no columns
   for (std::size_t p = 0; p < labels.size(); p += step) {
-    if (labels[p] != SkyLabel::kSky || !image.valid(p)) continue;
+    const float certain = labels[p] == SkyLabel::kSky ? 1 : labels[p] == SkyLabel::kFar ? kFarShare : 0;
+    if (certain == 0 || !image.valid(p)) continue;
     const double x = double(p % std::size_t(image.width)) + 0.5, y = double(p / std::size_t(image.width)) + 0.5;
-    const double across = std::min(x, image.width - x) / image.width, down = std::min(y, image.height - y) / image.height;
+    const double across = std::min(x, image.width - x) / image.width,
+                 down = std::min(y, image.height - y) / image.height;
     const Ray ray = correction.applied_to(view.camera.ray_of_pixel(p));
-    visit(ray.direction, image.luminance(p) / correction.gain(), float(std::min(1.0, 8 * std::min(across, down))));
+    visit(ray.direction, image.luminance(p) / correction.gain(),
+          certain * float(std::min(1.0, 8 * std::min(across, down))));
   }
 }
 
-/// Whether a view's sky is what the map has there, but for the view's exposure.
-bool is_alike(const TrainingView& view, const std::vector<SkyLabel>& labels, const DirectionMap& light) {
+/// How a view's sky fits the map.
+struct SkyFit {
+  float gain = 1;  ///< of the view's exposure
+  float miss = 0;  ///< L*, the median over its pixels; infinite where it shows none
+};
+
+SkyFit fit_of(const TrainingView& view, const std::vector<SkyLabel>& labels, const DirectionMap& light) {
   std::vector<std::pair<float, float>> pairs;
-  std::vector<float> ratios;
+  std::vector<float> ratios, misses;
   const DirectionView seen = light.plane(0);
   for_sky_pixels(view, labels, {}, [&](Vec3f direction, float luminance, float) {
     const float expected = std::max(seen.along(direction), 1e-4f);
     pairs.emplace_back(luminance, expected);
     ratios.push_back(luminance / expected);
   });
-  if (pairs.empty()) return false;
+  if (pairs.empty()) return {1, std::numeric_limits<float>::infinity()};
   const float gain = std::max(median(std::move(ratios)), 1e-4f);
-  std::vector<float> misses;
   for (const auto& [luminance, expected] : pairs) {
     misses.push_back(std::abs(lightness_from_luminance(luminance / gain) - lightness_from_luminance(expected)));
   }
-  return median(std::move(misses)) < kUnlike;
+  return {gain, median(std::move(misses))};
+}
+
+/// Pixels that may show the sky, or what is far, and look like it do.
+void settle_either(const TrainingView& view, const DirectionMap& light, float gain, std::vector<SkyLabel>& labels) {
+  for (std::size_t p = 0; p < labels.size(); ++p) {
+    if (labels[p] != SkyLabel::kEither && labels[p] != SkyLabel::kFar) continue;
+    const float expected = light.plane(0).along(view.camera.ray_of_pixel(p).direction);
+    const float miss = lightness_from_luminance(view.image->luminance(p) / gain) - lightness_from_luminance(expected);
+    if (std::abs(miss) < kSame) labels[p] = SkyLabel::kSky;
+  }
 }
 
 std::vector<const View*> training_views_of(const Capture& capture) {
@@ -255,9 +296,10 @@ SeenSky find_sky(const Capture& capture, std::span<const TrainingView> views, co
   });
   if (!enough_views(sky)) return {};
   DirectionMap light = sky_light(views, sky.labels, {});
-  for (std::size_t v = 0; v < views.size(); ++v) {
-    if (!sky.labels[v].empty() && !is_alike(views[v], sky.labels[v], light)) sky.labels[v].clear();
-  }
+  parallel_tasks(views.size(), [&](std::size_t v) {
+    const SkyFit fit = fit_of(views[v], sky.labels[v], light);
+    fit.miss < kUnlike ? settle_either(views[v], light, fit.gain, sky.labels[v]) : sky.labels[v].clear();
+  });
   if (!enough_views(sky)) return {};
   sky.light = sky_light(views, sky.labels, {});
   return sky;

@@ -19,9 +19,9 @@ struct SeenSky {
   void show_to(std::vector<TrainingView>& views) const;
 };
 
-/// Looks for it: above the horizon, from the border of the picture inwards, brighter than what is below and without
-/// structure or sparse points; and from all views it has to look alike. Where cameras stood upright, on the whole, it
-/// is found; a sky that a filter made dark is not, nor one behind leaves alone.
+/// Looks for it: above the horizon, from the border of the picture inwards, brighter than what is dark below, and
+/// without structure or sparse points. Half of the views have to show it, and alike. Where cameras stood upright, on
+/// the whole, it is found; a sky that a filter made dark is not, nor one behind leaves alone.
 /// @param views   the training views
 /// @param points  of structure from motion; their `views` are places in `capture.views`
 [[nodiscard]] SeenSky find_sky(const Capture& capture, std::span<const TrainingView> views,
