@@ -63,8 +63,7 @@ int run(const fs::path& folder, const fs::path& capture_path, const fs::path& pi
   for (const View& view : capture.views) {
     if (!view.held_out) continue;
     const fs::path name = fs::path(view.name).filename();
-    const Row row =
-        measure(model, view, capture_path / "sky" / name, pictures.empty() ? fs::path() : pictures / name);
+    const Row row = measure(model, view, capture_path / "sky" / name, pictures.empty() ? fs::path() : pictures / name);
     std::printf("%-28s %8.2f %14.4f %8.2f\n", view.name.c_str(), row.psnr, row.opacity, row.share);
     sum = {sum.psnr + row.psnr, sum.opacity + row.opacity, sum.share + row.share};
     ++count;

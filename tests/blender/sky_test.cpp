@@ -54,9 +54,9 @@ TEST_P(BlenderSky, StandsWhereTheFieldHasIt) {
 
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const std::filesystem::path file = folder / ("out" + std::to_string(c) + ".exr");
-    ASSERT_EQ(run_blender(bake.blender_setup(),
-                          "--samples 16 --camera " + std::to_string(c) + " --render " + file.string()),
-              0)
+    ASSERT_EQ(
+        run_blender(bake.blender_setup(), "--samples 16 --camera " + std::to_string(c) + " --render " + file.string()),
+        0)
         << read_text_file(folder / "blender.log");
     const RenderedExr image = read_exr(file);
     for (const auto& [x, y] : {std::pair{16, 12}, {2, 2}, {30, 3}, {3, 22}}) {

@@ -40,8 +40,8 @@ TEST(Sky, IsTrainedColouredAndBaked) {
   const fs::path run = folder / "run";
   ASSERT_EQ(cnerf(training(run)).exit_code, 0);
   EXPECT_THAT(cnerf({"info", run.string()}).out, HasSubstr("sky:"));
-  const ProgramResult colored =
-      cnerf({"colorize", run.string(), "--take", "warm", "--colorizer", "reference:" + (outdoors() / "references").string()});
+  const ProgramResult colored = cnerf(
+      {"colorize", run.string(), "--take", "warm", "--colorizer", "reference:" + (outdoors() / "references").string()});
   ASSERT_EQ(colored.exit_code, 0) << colored.err;
   const fs::path bake = folder / "bake";
   const ProgramResult baked = cnerf({"bake", run.string(), "--take", "warm", "--format", "vdb,gltf,web", "-o",
@@ -51,7 +51,9 @@ TEST(Sky, IsTrainedColouredAndBaked) {
   const LinearImage sky = read_exr(bake / "sky.exr");
   ASSERT_EQ(sky.channels, 3);
   ASSERT_EQ(sky.width, 2 * sky.height);
-  const auto pixel = [&](int x, int y) { return &sky.values[3 * (std::size_t(y) * std::size_t(sky.width) + std::size_t(x))]; };
+  const auto pixel = [&](int x, int y) {
+    return &sky.values[3 * (std::size_t(y) * std::size_t(sky.width) + std::size_t(x))];
+  };
   for (int x = 0; x < sky.width; x += 16) {
     const float* rgb = pixel(x, sky.height * 2 / 5);  // 18 degrees up, where the cameras look
     EXPECT_GT(0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2], 0.35f) << x;

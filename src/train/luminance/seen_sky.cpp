@@ -232,13 +232,28 @@ SkyFit fit_of(const TrainingView& view, const std::vector<SkyLabel>& labels, con
   return {gain, median(std::move(misses))};
 }
 
-/// Pixels that may show the sky, or what is far, and look like it do.
+/// Pixels that may show the sky, or what is far, do where they and those around them look like it.
 void settle_either(const TrainingView& view, const DirectionMap& light, float gain, std::vector<SkyLabel>& labels) {
+  const int width = view.image->width, height = view.image->height;
+  std::vector<bool> looks_like_it(labels.size());
   for (std::size_t p = 0; p < labels.size(); ++p) {
-    if (labels[p] != SkyLabel::kEither && labels[p] != SkyLabel::kFar) continue;
     const float expected = light.plane(0).along(view.camera.ray_of_pixel(p).direction);
     const float miss = lightness_from_luminance(view.image->luminance(p) / gain) - lightness_from_luminance(expected);
-    if (std::abs(miss) < kSame) labels[p] = SkyLabel::kSky;
+    looks_like_it[p] = std::abs(miss) < kSame;
+  }
+  const auto all_around = [&](int x, int y) {
+    for (int v = std::max(0, y - 1); v <= std::min(height - 1, y + 1); ++v) {
+      for (int u = std::max(0, x - 1); u <= std::min(width - 1, x + 1); ++u) {
+        if (!looks_like_it[std::size_t(v) * std::size_t(width) + std::size_t(u)]) return false;
+      }
+    }
+    return true;
+  };
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      SkyLabel& label = labels[std::size_t(y) * std::size_t(width) + std::size_t(x)];
+      if ((label == SkyLabel::kEither || label == SkyLabel::kFar) && all_around(x, y)) label = SkyLabel::kSky;
+    }
   }
 }
 
