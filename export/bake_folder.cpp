@@ -130,6 +130,19 @@ std::vector<fs::path> BakeFolder::add_volumes(const std::vector<bake::VolumePlan
   return files;
 }
 
+void BakeFolder::add_sky(const SkyPicture& sky) {
+  const fs::path file = folder_ / "sky.exr";
+  const std::span<const float> rgb(sky.rgb);
+  write_exr(file, {sky.width,
+                   sky.height,
+                   {{"R", rgb, 3, true}, {"G", rgb.subspan(1), 3, true}, {"B", rgb.subspan(2), 3, true}},
+                   {{"software", "cnerf " CNERF_VERSION},
+                    {"colorOrigin", color_origin_text(manifest_.label.provenance)},
+                    {"colorSpace", "lin_rec709"}}});
+  list(file);
+  manifest_.sky = ManifestSky{file.filename().string()};
+}
+
 void BakeFolder::add_plate(const std::string& camera, const std::vector<std::byte>& jpeg) {
   std::string stem = fs::path(camera).replace_extension().string();
   std::ranges::replace_if(
@@ -146,6 +159,7 @@ GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, 
   scene.basecolor_png = basecolor_png(mesh.texture);
   scene.label = manifest_.label;
   if (manifest_.volume) scene.vdb = manifest_.volume->file;
+  if (manifest_.sky) scene.sky = manifest_.sky->file;
   if (exr) {
     const TextureFiles textures =
         write_exr_textures(mesh.texture, color_origin_text(manifest_.label.provenance), folder_, name);

@@ -10,6 +10,7 @@
 #include "export/gltf_writer.h"
 #include "export/manifest.h"
 #include "export/options.h"
+#include "src/picture/sky_picture.h"
 
 namespace cnerf::exporting {
 
@@ -34,6 +35,9 @@ class BakeFolder {
   /// _lab.exr. To be called after add_volumes, where there is a volume: the mesh then names it.
   /// @throws ContractError, OutputError.
   GltfFiles add_mesh(const bake::Mesh& mesh, const std::string& name, bool exr);
+  /// Writes sky.exr: Blender's world, behind volume and mesh. To be called before add_mesh, which names it.
+  /// @throws OutputError.
+  void add_sky(const SkyPicture& sky);
   /// A camera's photograph without lens distortion, as plates/`stem`.jpg: what Blender shows behind its view.
   /// @throws OutputError.
   void add_plate(const std::string& camera, const std::vector<std::byte>& jpeg);

@@ -54,6 +54,14 @@ struct ManifestMesh {
 /// All but the names of files and the rotation.
 [[nodiscard]] ManifestMesh describe_mesh(const bake::Mesh& mesh);
 
+/// The light from beyond the volume.
+struct ManifestSky {
+  std::string file;  ///< relative to the manifest: linear Rec.709, half float
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v);
+};
+
 struct BakeManifest {
   Label label;
   /// What a file was when the manifest was written.
@@ -69,6 +77,7 @@ struct BakeManifest {
   std::optional<ManifestVolume> volume;       ///< the only grid, or the coarsest of nested ones
   std::vector<ManifestVolume> finer_volumes;  ///< inside of it, finest first; each coarser one is empty there
   std::optional<ManifestMesh> mesh;
+  std::optional<ManifestSky> sky;  ///< where the capture has one
 };
 
 /// Writes `manifest.json` into `folder`, where the listed files already are, and returns its path.

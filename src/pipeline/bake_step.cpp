@@ -42,8 +42,8 @@ void bake_step(const RunContext& context, const BakeJob& job, const Engines& eng
   bake.journal = folder / kJournal;
   bake.identity = field_identity(context.directory, take);
   const exporting::Label label{{colorizer_name(context.directory, take), take, context.command_line}, config.world};
-  exporting::BakeOutput output(folder, formats, {config.vdb, config.web, web::find_page()}, context.capture, label,
-                               observer);
+  exporting::BakeOutput output(folder, formats, {config.vdb, config.web, web::find_page(), scene->sky()},
+                               context.capture, label, observer);
   bake::run(bake, output, observer);
   note_time(context.directory, "bake", watch);
 }
