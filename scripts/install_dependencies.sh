@@ -14,12 +14,13 @@ packages=(
   libexif-dev colmap
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libpugixml-dev libfmt-dev libspdlog-dev
   libtbb-dev libssl-dev zlib1g-dev libcpp-httplib-dev
+  pybind11-dev python3-dev python3-numpy  # the Python module
   libgtest-dev libgmock-dev libbenchmark-dev
   dpkg-dev binutils perl  # packages: which libraries a program needs
 )
 command -v npm > /dev/null || packages+=(nodejs npm)  # for the viewer's page; a node from elsewhere will do
 if [[ "${1:-}" == "--tests" ]]; then
-  packages+=(blender python3-numpy chromium man-db mandoc fish zsh doxygen codespell)
+  packages+=(blender chromium man-db mandoc fish zsh doxygen codespell)
 fi
 
 # Installs those of "${packages[@]}" that are missing.
