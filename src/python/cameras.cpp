@@ -87,8 +87,8 @@ void bind_cameras(py::module_& module) {
                        std::optional<double> cx, std::optional<double> cy, const std::string& name) {
              return make_camera(world_from_camera, {width, height, fx, fy, cx, cy}, name);
            }),
-           py::arg("world_from_camera"), py::arg("width"), py::arg("height"), py::arg("fx"),
-           py::arg("fy") = py::none(), py::arg("cx") = py::none(), py::arg("cy") = py::none(), py::arg("name") = "")
+           py::arg("world_from_camera"), py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy") = py::none(),
+           py::arg("cx") = py::none(), py::arg("cy") = py::none(), py::arg("name") = "")
       .def_readonly("name", &bake::Camera::name)
       .def_property_readonly("width", lens_value(&Intrinsics::width))
       .def_property_readonly("height", lens_value(&Intrinsics::height))
