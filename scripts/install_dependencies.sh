@@ -18,6 +18,9 @@ packages=(
   libgtest-dev libgmock-dev libbenchmark-dev
   dpkg-dev binutils perl  # packages: which libraries a program needs
 )
+if [[ "$(. /etc/os-release && echo "${VERSION_ID%%.*}")" -ge 13 ]]; then
+  packages+=(libonnxruntime-dev)  # runs onnx: networks; Debian 12 has none, and OpenCV does
+fi
 command -v npm > /dev/null || packages+=(nodejs npm)  # for the viewer's page; a node from elsewhere will do
 if [[ "${1:-}" == "--tests" ]]; then
   packages+=(blender chromium man-db mandoc fish zsh doxygen codespell)
