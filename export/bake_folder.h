@@ -41,6 +41,9 @@ class BakeFolder {
   /// A camera's photograph without lens distortion, as plates/`stem`.jpg: what Blender shows behind its view.
   /// @throws OutputError.
   void add_plate(const std::string& camera, const std::vector<std::byte>& jpeg);
+  /// The cameras as cameras.usda, where the .usda of the volumes lies, and cameras.chan: see camera_tracks.h.
+  /// @throws OutputError.
+  void add_camera_tracks(const VdbOptions& options);
   /// Writes blender_setup.py and manifest.json. Files that a former manifest here lists and this one does not are
   /// removed.  @throws OutputError.
   void finish();

@@ -95,6 +95,7 @@ void BakeOutput::add_plates() {
 void BakeOutput::finish() {
   if (!formats_.has_manifest()) return;
   if (options_.vdb.plates) add_plates();
+  bake_.add_camera_tracks(options_.vdb);
   bake_.finish();
   observer_.wrote("Blender set-up", bake_.blender_setup());
 }
