@@ -7,6 +7,7 @@
 
 #include "export/texture_writer.h"
 #include "export/up_axis.h"
+#include "export/usd_text.h"
 #include "export/vdb_writer.h"
 #include "src/base/check.h"
 #include "src/base/files.h"
@@ -23,16 +24,6 @@ constexpr Field kFields[] = {{"density", "float", ""},
                              {"luminance", "float", ""},
                              {"lab_a", "float", ""},
                              {"lab_b", "float", ""}};
-
-/// A USD string; what is quoted here are file names and names of colorizers.
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += c == '\n' ? ' ' : c;
-  }
-  return result + "\"";
-}
 
 std::string volume_prim(const ManifestVolume& volume, std::size_t number) {
   std::string text = fmt::format("    def Volume \"grid_{}\"\n    {{\n", number);
@@ -57,20 +48,12 @@ std::string volume_prim(const ManifestVolume& volume, std::size_t number) {
 }
 
 /// Writes a .usda with one Volume prim for each file and an OpenVDBAsset field for each of its grids `density`,
-/// `color`, `luminance`, `lab_a`, `lab_b`. Files are named relative to the scene. USD knows Y and Z as up axes: an X-up
-/// frame is turned by a transform of the root.
+/// `color`, `luminance`, `lab_a`, `lab_b`. Files are named relative to the scene.
 /// @param up_axis  of the files' world, "x", "y" or "z".
 /// @throws OutputError.
 void write_usd(const std::vector<ManifestVolume>& volumes, const std::string& up_axis, const Label& label,
                const std::filesystem::path& file) {
-  const bool x_up = up_axis == "x";
-  std::string text = fmt::format(
-      "#usda 1.0\n(\n    defaultPrim = \"cnerf\"\n    doc = {}\n    metersPerUnit = {}\n    upAxis = \"{}\"\n)\n\n"
-      "def Xform \"cnerf\"\n{{\n",
-      quoted(color_origin_text(label.provenance)), label.world.metres_per_unit, up_axis == "y" ? "Y" : "Z");
-  if (x_up) {
-    text += "    double3 xformOp:rotateXYZ = (0, -90, 0)\n    uniform token[] xformOpOrder = [\"xformOp:rotateXYZ\"]\n";
-  }
+  std::string text = usd_beginning(up_axis, label);
   for (std::size_t v = 0; v < volumes.size(); ++v) text += volume_prim(volumes[v], v);
   write_file(file, text + "}\n");
 }
@@ -170,8 +153,19 @@ GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, 
   return files;
 }
 
+SplatFiles BakeFolder::add_splats(const bake::SplatCloud& cloud, const std::string& name) {
+  SplatFiles files = write_splats(cloud, folder_, name, manifest_.label);
+  for (const fs::path& file : {files.ply, files.spz, files.usd}) list(file);
+  manifest_.frame = cloud.frame;
+  manifest_.splats = describe_splats(cloud);
+  manifest_.splats->ply = files.ply.filename().string();
+  manifest_.splats->spz = files.spz.filename().string();
+  manifest_.splats->usd = files.usd.filename().string();
+  return files;
+}
+
 void BakeFolder::finish() {
-  list(write_blender_setup(folder_));
+  if (manifest_.volume || manifest_.mesh) list(write_blender_setup(folder_));
   std::vector<std::string> former;
   if (fs::exists(manifest())) {
     try {

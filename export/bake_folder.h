@@ -10,6 +10,7 @@
 #include "export/gltf_writer.h"
 #include "export/manifest.h"
 #include "export/options.h"
+#include "export/splat_writer.h"
 
 namespace cnerf::exporting {
 
@@ -34,11 +35,13 @@ class BakeFolder {
   /// _lab.exr. To be called after add_volumes, where there is a volume: the mesh then names it.
   /// @throws ContractError, OutputError.
   GltfFiles add_mesh(const bake::Mesh& mesh, const std::string& name, bool exr);
+  /// Writes `name`.ply, .spz and .usda.  @throws OutputError.
+  SplatFiles add_splats(const bake::SplatCloud& cloud, const std::string& name);
   /// A camera's photograph without lens distortion, as plates/`stem`.jpg: what Blender shows behind its view.
   /// @throws OutputError.
   void add_plate(const std::string& camera, const std::vector<std::byte>& jpeg);
-  /// Writes blender_setup.py and manifest.json. Files that a former manifest here lists and this one does not are
-  /// removed.  @throws OutputError.
+  /// Writes manifest.json, and blender_setup.py where there is a volume or a mesh to set up. Files that a former
+  /// manifest here lists and this one does not are removed.  @throws OutputError.
   void finish();
 
   [[nodiscard]] std::filesystem::path manifest() const { return folder_ / "manifest.json"; }

@@ -25,7 +25,7 @@ void run(RunArguments arguments, const std::vector<std::string>& command_line) {
   refuse_colorizer_of_others(arguments.config, config);
   const auto bake = pipeline::run(job, config, engines_for(config.device), reporter);
   reporter.next("cnerf view " + job.out.string());
-  if (job.formats.has_manifest()) {
+  if (job.formats.is_for_blender()) {
     reporter.next("blender --python " + (bake / "blender_setup.py").string());
   }
 }
