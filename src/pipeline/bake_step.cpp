@@ -30,13 +30,16 @@ bake::Options volume_options(const Config& config, const exporting::Formats& for
   return options;
 }
 
-/// What the scene shows a camera; grey where it is not colorized.
+/// What the scene shows a camera, with colours of samples as all bakes have them; grey where it is not colorized.
 bake::FieldPicture field_picture(const Scene& scene, const Intrinsics& intrinsics, const Affined& world_from_camera) {
-  RenderedImage image = scene.render(intrinsics, world_from_camera);
-  if (image.rgb.empty()) {
-    for (const float light : image.luminance) image.rgb.insert(image.rgb.end(), 3, light);
+  RenderOptions options;
+  options.color = false;
+  options.baked_color = true;
+  RenderedImage image = scene.render(intrinsics, world_from_camera, options);
+  if (image.baked_rgb.empty()) {
+    for (const float light : image.luminance) image.baked_rgb.insert(image.baked_rgb.end(), 3, light);
   }
-  return {std::move(image.rgb), std::move(image.opacity), std::move(image.depth)};
+  return {std::move(image.baked_rgb), std::move(image.opacity), std::move(image.depth)};
 }
 
 bake::SplatCloud make_splats(const Scene& scene, const Capture& capture, const bake::SplatOptions& options,

@@ -1,4 +1,4 @@
-/// The rasterizer of splats against the slow one, and its gradient against finite differences.
+/// The rasterizer of splats against the plain one, and its gradient against finite differences.
 
 #include "bake/splat/rasterize.h"
 
@@ -83,7 +83,7 @@ std::vector<double> analytic_gradient(const std::vector<Splat>& splats, const Ca
   return all;
 }
 
-/// Of the slow rasterizer.
+/// Of the plain rasterizer.
 std::vector<double> numeric_gradient(const std::vector<Splat>& splats, const Camera& camera) {
   std::vector<double> parameters;
   for (const Splat& splat : splats) {
@@ -92,11 +92,11 @@ std::vector<double> numeric_gradient(const std::vector<Splat>& splats, const Cam
   const std::vector<double> weights =
       weights_of(std::size_t(camera.intrinsics.width) * std::size_t(camera.intrinsics.height) * 4);
   const auto loss = [&](const std::vector<double>& values) {
-    std::vector<BasicSplat<double>> moved;
+    std::vector<FileSplat> moved;
     for (std::size_t i = 0; i < splats.size(); ++i) {
       SplatRow<double> row;
       std::copy_n(values.begin() + std::ptrdiff_t(i * kSplatParameters), kSplatParameters, row.begin());
-      moved.push_back(splat_of(row));
+      moved.push_back(file_splat(splat_of(row)));
     }
     return weighted(reference_picture(moved, camera.intrinsics, camera.world_from_camera, {kNear, kViewerBlur}), weights);
   };
@@ -109,27 +109,27 @@ class SplatIsa : public testing::TestWithParam<IsaLevel> {};
 INSTANTIATE_TEST_SUITE_P(, SplatIsa, testing::ValuesIn(available_isas()),
                          [](const auto& isa) { return to_string(isa.param); });
 
-TEST_P(SplatIsa, PicturesEqualTheSlowRasterizers) {
+TEST_P(SplatIsa, PicturesEqualThePlainRasterizers) {
   const ScopedIsa isa(GetParam());
   const std::vector<Splat> splats = cloud_of(400);
   const Camera camera = camera_of();
   SplatRasterizer rasterizer;
   const std::vector<double> ours = values_of(rasterizer.draw(splats, splat_camera_of(camera)));
-  const std::vector<double> slow =
-      reference_picture(in_double(splats), camera.intrinsics, camera.world_from_camera, {kNear, kViewerBlur});
-  ASSERT_EQ(ours.size(), slow.size());
+  const std::vector<double> plain =
+      reference_picture(file_splats(splats), camera.intrinsics, camera.world_from_camera, {kNear, kViewerBlur});
+  ASSERT_EQ(ours.size(), plain.size());
   // A pixel on the rim of a splat, where that is cut off at 1/255, may fall on either side in float.
   double worst = 0, sum = 0;
   for (std::size_t i = 0; i < ours.size(); ++i) {
-    worst = std::max(worst, std::abs(ours[i] - slow[i]));
-    sum += std::abs(ours[i] - slow[i]);
+    worst = std::max(worst, std::abs(ours[i] - plain[i]));
+    sum += std::abs(ours[i] - plain[i]);
   }
   EXPECT_LT(sum / double(ours.size()), 2e-6);
   EXPECT_LT(worst, 1.5 / 255);
-  EXPECT_GT(*std::ranges::max_element(slow), 0.5);
+  EXPECT_GT(*std::ranges::max_element(plain), 0.5);
 }
 
-TEST_P(SplatIsa, GradientsEqualFiniteDifferencesOfTheSlowRasterizer) {
+TEST_P(SplatIsa, GradientsEqualFiniteDifferencesOfThePlainRasterizer) {
   const ScopedIsa isa(GetParam());
   const std::vector<Splat> splats = cloud_of(24);
   const Camera camera = camera_of(24, 20);
@@ -165,13 +165,16 @@ TEST(SplatMath, GradientOfTheProjectionEqualsFiniteDifferences) {
   };
   int seen = 0;
   for (const Splat& splat : cloud_of(40)) {
-    const BasicSplat<double> exact = in_double(splat);
+    SplatRow<double> values{};
+    const SplatRow<float> rounded = row_of(splat);
+    std::copy(rounded.begin(), rounded.end(), values.begin());
+    const BasicSplat<double> exact = splat_of(values);
     const auto projection = SplatProjection<double>::of(exact, in_view);
     if (!projection || projection->depth() < 0.5) continue;
     ++seen;
     FlatSplat<double> d{weights[0], weights[1], weights[2], weights[3], weights[4], weights[5],
                         {weights[6], weights[7], weights[8]}};
-    const SplatRow<double> row = row_of(projection->gradient(d)), values = row_of(exact);
+    const SplatRow<double> row = row_of(projection->gradient(d));
     std::vector<std::size_t> indices(kSplatParameters);
     for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = i;
     const auto numeric = central_difference({values.begin(), values.end()}, indices, 1e-6, loss);
