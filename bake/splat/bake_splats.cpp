@@ -60,9 +60,8 @@ double nearest_splat(const SceneFrame& frame) {
 
 SplatCloud bake_splats(const SplatJob& job, Observer& observer) {
   const std::vector<Camera> cameras = target_cameras(job.cameras);
-  const std::vector<SplatTarget> targets = draw_targets(cameras, job.draw, job.options.picture_side, [&](double share) {
-    report(observer, kTargetShare * share);
-  });
+  const std::vector<SplatTarget> targets = draw_targets(cameras, job.draw, job.options.picture_side,
+                                                        [&](double share) { report(observer, kTargetShare * share); });
   std::vector<PlacedSplat> placed = place_splats(targets, splats_at_first(job.options));
   observer.say(fmt::format("splats: {} placed on what {} pictures of {} x {} show", placed.size(), targets.size(),
                            targets.front().intrinsics.width, targets.front().intrinsics.height));

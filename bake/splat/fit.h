@@ -10,7 +10,8 @@
 
 namespace cnerf::bake {
 
-/// Of `options.count` splats, how many are to be placed before anything is drawn; the others come where pictures differ.
+/// Of `options.count` splats, how many are to be placed before anything is drawn; the others come where pictures
+/// differ.
 [[nodiscard]] std::size_t splats_at_first(const SplatOptions& options);
 
 /// Adam on every parameter of the splats that a picture shows, one picture after another. The same result for any

@@ -12,11 +12,11 @@ namespace cnerf::bake {
 namespace {
 
 constexpr double kCandidatesPerSplat = 6;
-constexpr double kFlatness = 0.15;    ///< thickness of a disc, of its radius
-constexpr double kRadius = 0.6;       ///< standard deviation of a disc, of its spacing
-constexpr double kMostSlope = 8;      ///< pixels' sides between the depths of neighbours on one surface
+constexpr double kFlatness = 0.15;  ///< thickness of a disc, of its radius
+constexpr double kRadius = 0.6;     ///< standard deviation of a disc, of its spacing
+constexpr double kMostSlope = 8;    ///< pixels' sides between the depths of neighbours on one surface
 constexpr float kOpacity = 0.9f;
-constexpr int kCoarserOctaves = 4;    ///< that a splat keeps its cell of for itself
+constexpr int kCoarserOctaves = 4;  ///< that a splat keeps its cell of for itself
 
 /// The step from a pixel to its neighbour on the same surface along one axis, world units; the one that is less deep
 /// or high than the other.

@@ -17,13 +17,13 @@ inline constexpr int kShadings = 8;
 
 template <typename Real>
 struct BasicSplat {
-  Vec3<Real> position;                     ///< world
-  Vec3<Real> log_scale;                    ///< ln of the standard deviations along its own axes, world units
+  Vec3<Real> position;                       ///< world
+  Vec3<Real> log_scale;                      ///< ln of the standard deviations along its own axes, world units
   std::array<Real, 4> rotation{1, 0, 0, 0};  ///< world_from_own, w x y z; of any length but 0
-  Real opacity_logit{};                    ///< opacity at the centre is its sigmoid
-  Vec3<Real> color;                        ///< sRGB-encoded, 0..1, before shading
-  /// How the colour depends on the direction d in which it is looked at: it is multiplied by 1 + sum_i shading_i Y_i(d).
-  /// One factor for the three encoded channels changes luminance and leaves chromaticity, but for sRGB's foot.
+  Real opacity_logit{};                      ///< opacity at the centre is its sigmoid
+  Vec3<Real> color;                          ///< sRGB-encoded, 0..1, before shading
+  /// How the colour depends on the direction d in which it is looked at: it is multiplied by 1 + sum_i shading_i
+  /// Y_i(d). One factor for the three encoded channels changes luminance and leaves chromaticity, but for sRGB's foot.
   std::array<Real, kShadings> shading{};
 };
 using Splat = BasicSplat<float>;

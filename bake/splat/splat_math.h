@@ -20,12 +20,12 @@ inline constexpr double kViewerBlur = 0.3;
 /// A camera without lens distortion, which no viewer of splats has.
 template <typename Real>
 struct SplatCamera {
-  int width = 0, height = 0;          ///< pixels
+  int width = 0, height = 0;            ///< pixels
   Real fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
-  Affine<Real> camera_from_world;     ///< rigid; axes as camera.h says
-  Vec3<Real> centre;                  ///< world
-  Real near = 0;                      ///< what is nearer is not drawn; world units along the optical axis
-  Real blur = Real(kViewerBlur);      ///< square pixels
+  Affine<Real> camera_from_world;       ///< rigid; axes as camera.h says
+  Vec3<Real> centre;                    ///< world
+  Real near = 0;                        ///< what is nearer is not drawn; world units along the optical axis
+  Real blur = Real(kViewerBlur);        ///< square pixels
 };
 
 template <typename Real>
@@ -34,11 +34,19 @@ template <typename Real>
 }
 /// @param blur  square pixels; of a reduced picture, what kViewerBlur of the whole one is there
 template <typename Real>
-[[nodiscard]] SplatCamera<Real> splat_camera(const Intrinsics& intrinsics, const Affined& world_from_camera, double near,
-                                             double blur = kViewerBlur) {
+[[nodiscard]] SplatCamera<Real> splat_camera(const Intrinsics& intrinsics, const Affined& world_from_camera,
+                                             double near, double blur = kViewerBlur) {
   const Affined camera_from_world = world_from_camera.inverse();
-  SplatCamera<Real> camera{intrinsics.width, intrinsics.height, Real(intrinsics.fx), Real(intrinsics.fy),
-                           Real(intrinsics.cx), Real(intrinsics.cy), {}, {}, Real(near), Real(blur)};
+  SplatCamera<Real> camera{intrinsics.width,
+                           intrinsics.height,
+                           Real(intrinsics.fx),
+                           Real(intrinsics.fy),
+                           Real(intrinsics.cx),
+                           Real(intrinsics.cy),
+                           {},
+                           {},
+                           Real(near),
+                           Real(blur)};
   for (int i = 0; i < 3; ++i) {
     camera.camera_from_world.linear.rows[i] = to_real<Real>(camera_from_world.linear.rows[i]);
   }
@@ -50,10 +58,10 @@ template <typename Real>
 /// What a splat is in a picture: opacity exp(-(a dx^2 + c dy^2) / 2 - b dx dy) of one colour.
 template <typename Real>
 struct FlatSplat {
-  Real x = 0, y = 0;           ///< pixels
-  Real a = 0, b = 0, c = 0;    ///< the inverse covariance, 1 / square pixels
+  Real x = 0, y = 0;         ///< pixels
+  Real a = 0, b = 0, c = 0;  ///< the inverse covariance, 1 / square pixels
   Real opacity = 0;
-  Vec3<Real> color;            ///< sRGB-encoded, >= 0
+  Vec3<Real> color;  ///< sRGB-encoded, >= 0
 };
 
 /// The exponent below which a splat of this opacity is left out.

@@ -27,8 +27,7 @@ std::size_t neighbour_of(const std::vector<Camera>& cameras, std::size_t i) {
   double least = 0;
   for (std::size_t j = 0; j < cameras.size(); ++j) {
     if (j == i || dot(axis_of(cameras[i]), axis_of(cameras[j])) < 0.5) continue;
-    const double distance =
-        length(cameras[j].world_from_camera.translation - cameras[i].world_from_camera.translation);
+    const double distance = length(cameras[j].world_from_camera.translation - cameras[i].world_from_camera.translation);
     if (distance > 0 && (nearest == i || distance < least)) {
       nearest = j;
       least = distance;

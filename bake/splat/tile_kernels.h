@@ -22,10 +22,10 @@ inline constexpr int kTilePixels = kTileSide * kTileSide;
 
 /// A splat of a picture with how far it reaches.
 struct TileSplat {
-  float x, y;        ///< pixels
-  float a, b, c;     ///< inverse covariance
+  float x, y;     ///< pixels
+  float a, b, c;  ///< inverse covariance
   float opacity;
-  float least_power;  ///< exponents below it are left out
+  float least_power;       ///< exponents below it are left out
   float reach_x, reach_y;  ///< pixels
   float color[3];
 };

@@ -16,11 +16,21 @@ using Ints = cnerf::CNERF_ISA::Lanes::RawI32;
 /// Pixels are tested so often whether any of them still shows what comes.
 constexpr std::size_t kEntriesPerTest = 16;
 
-Floats load(const float* from) { return cnerf::CNERF_ISA::Lanes::load(from).raw; }
-void store(Floats value, float* to) { cnerf::CNERF_ISA::Lanes(value).store(to); }
-float sum(Floats value) { return cnerf::CNERF_ISA::sum(cnerf::CNERF_ISA::Lanes(value)); }
-Floats all(float value) { return Floats{} + value; }
-Floats masked(Ints mask, Floats value) { return Floats(Ints(value) & mask); }
+Floats load(const float* from) {
+  return cnerf::CNERF_ISA::Lanes::load(from).raw;
+}
+void store(Floats value, float* to) {
+  cnerf::CNERF_ISA::Lanes(value).store(to);
+}
+float sum(Floats value) {
+  return cnerf::CNERF_ISA::sum(cnerf::CNERF_ISA::Lanes(value));
+}
+Floats all(float value) {
+  return Floats{} + value;
+}
+Floats masked(Ints mask, Floats value) {
+  return Floats(Ints(value) & mask);
+}
 
 /// 0, 1, 2, ...
 Floats ramp() {
@@ -119,7 +129,8 @@ struct Sums {
     pyy += by_power * (dy * dy);
   }
   void store_to(TileSums& out) const {
-    out = {sum(p), sum(px), sum(py), sum(pxx), sum(pxy), sum(pyy), {sum(color[0]), sum(color[1]), sum(color[2])}, sum(weight)};
+    out = {sum(p),     sum(px), sum(py), sum(pxx), sum(pxy), sum(pyy), {sum(color[0]), sum(color[1]), sum(color[2])},
+           sum(weight)};
   }
 };
 

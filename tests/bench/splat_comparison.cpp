@@ -1,5 +1,5 @@
-// How like its field the splats of a bake are: views of a capture drawn from the file by the tests' plain rasterizer, as
-// viewers draw it, against the field's render of the view: PSNR of sRGB-encoded colour, see Likeness. Cameras are
+// How like its field the splats of a bake are: views of a capture drawn from the file by the tests' plain rasterizer,
+// as viewers draw it, against the field's render of the view: PSNR of sRGB-encoded colour, see Likeness. Cameras are
 // without lens distortion. All over black.
 //
 //   splat_comparison BAKE CAPTURE STAGE1.snapshot [TAKE.snapshot] [spz=0] [...]

@@ -98,7 +98,8 @@ std::vector<double> numeric_gradient(const std::vector<Splat>& splats, const Cam
       std::copy_n(values.begin() + std::ptrdiff_t(i * kSplatParameters), kSplatParameters, row.begin());
       moved.push_back(file_splat(splat_of(row)));
     }
-    return weighted(reference_picture(moved, camera.intrinsics, camera.world_from_camera, {kNear, kViewerBlur}), weights);
+    return weighted(reference_picture(moved, camera.intrinsics, camera.world_from_camera, {kNear, kViewerBlur}),
+                    weights);
   };
   std::vector<std::size_t> indices(parameters.size());
   for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = i;
@@ -172,8 +173,8 @@ TEST(SplatMath, GradientOfTheProjectionEqualsFiniteDifferences) {
     const auto projection = SplatProjection<double>::of(exact, in_view);
     if (!projection || projection->depth() < 0.5) continue;
     ++seen;
-    FlatSplat<double> d{weights[0], weights[1], weights[2], weights[3], weights[4], weights[5],
-                        {weights[6], weights[7], weights[8]}};
+    FlatSplat<double> d{
+        weights[0], weights[1], weights[2], weights[3], weights[4], weights[5], {weights[6], weights[7], weights[8]}};
     const SplatRow<double> row = row_of(projection->gradient(d));
     std::vector<std::size_t> indices(kSplatParameters);
     for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = i;

@@ -34,10 +34,9 @@ inline Matrix3 matrix_of_quaternion(std::array<double, 4> q) {
   const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   for (double& part : q) part /= norm;
   const auto times = [](const std::array<double, 4>& a, const std::array<double, 4>& b) {
-    return std::array<double, 4>{a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-                                 a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-                                 a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-                                 a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
+    return std::array<double, 4>{
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
   };
   Matrix3 m{};
   for (int axis = 0; axis < 3; ++axis) {
@@ -110,7 +109,8 @@ inline std::vector<Ellipse> ellipses_of(const std::vector<FileSplat>& splats, co
     const Matrix3 sigma = product(product(turn, shape), transposed(turn));
     const double limit_x = 1.3 * lens.width / (2 * lens.fx), limit_y = 1.3 * lens.height / (2 * lens.fy);
     const double sx = std::clamp(p.x / p.z, -limit_x, limit_x), sy = std::clamp(p.y / p.z, -limit_y, limit_y);
-    const Matrix3 slope = {{{lens.fx / p.z, 0, -lens.fx * sx / p.z}, {0, lens.fy / p.z, -lens.fy * sy / p.z}, {0, 0, 0}}};
+    const Matrix3 slope = {
+        {{lens.fx / p.z, 0, -lens.fx * sx / p.z}, {0, lens.fy / p.z, -lens.fy * sy / p.z}, {0, 0, 0}}};
     const Matrix3 flat = product(product(slope, sigma), transposed(slope));
     ellipses.push_back({p.z, lens.fx * p.x / p.z + lens.cx, lens.fy * p.y / p.z + lens.cy, flat[0][0] + options.blur,
                         flat[0][1], flat[1][1] + options.blur, 1 / (1 + std::exp(-splat.opacity_logit)),
