@@ -21,7 +21,9 @@ void report(Observer& observer, double fraction, std::vector<std::pair<std::stri
 
 std::vector<Splat> fitted(const std::vector<SplatTarget>& targets, std::vector<PlacedSplat> placed, const SplatJob& job,
                           Observer& observer) {
-  SplatFit fit(targets, std::move(placed), job.options, nearest_splat(job.frame));
+  SplatOptions options = job.options;
+  options.count = splats_in_all(options, placed.size());
+  SplatFit fit(targets, std::move(placed), options, nearest_splat(job.frame));
   double psnr = 0;
   while (fit.steps_done() < job.options.steps) {
     const double of_picture = fit.step();

@@ -22,6 +22,7 @@ constexpr float kShadingRate = 0.004f;
 constexpr double kLastRate = 0.05;  ///< share of them in the end
 
 constexpr float kOpacityWeight = 0.2f;  ///< of the loss by opacity beside that by a colour
+constexpr double kFirstShare = 0.6;     ///< of all splats, placed before anything is drawn
 /// When splats that show nothing go and others come where pictures differ most; share of all steps.
 constexpr double kRenewals[] = {0.15, 0.3, 0.45};
 constexpr float kLeastOpacity = 0.02f;  ///< that a splat is kept for
@@ -46,8 +47,10 @@ void keep_in_range(Splat& splat, float spacing) {
 }  // namespace
 
 std::size_t splats_at_first(const SplatOptions& options) {
-  constexpr double kShare = 0.6;
-  return std::size_t(options.steps == 0 ? options.count : std::max(1.0, kShare * options.count));
+  return std::size_t(options.steps == 0 ? options.count : std::max(1.0, kFirstShare * options.count));
+}
+int splats_in_all(const SplatOptions& options, std::size_t placed) {
+  return int(std::min(double(options.count), std::ceil(double(placed) / kFirstShare)));
 }
 
 SplatFit::SplatFit(std::span<const SplatTarget> targets, std::vector<PlacedSplat> placed, const SplatOptions& options,

@@ -13,6 +13,8 @@ namespace cnerf::bake {
 /// Of `options.count` splats, how many are to be placed before anything is drawn; the others come where pictures
 /// differ.
 [[nodiscard]] std::size_t splats_at_first(const SplatOptions& options);
+/// Splats at most where so many could be placed: no more than the pictures ask for.
+[[nodiscard]] int splats_in_all(const SplatOptions& options, std::size_t placed);
 
 /// Adam on every parameter of the splats that a picture shows, one picture after another. The same result for any
 /// number of threads.

@@ -152,7 +152,7 @@ std::optional<PlacedSplat> splat_at_pixel(const SplatTarget& target, int x, int 
 
 std::vector<PlacedSplat> place_splats(std::span<const SplatTarget> targets, std::size_t count) {
   const std::vector<Candidate> candidates = find_candidates(targets, count);
-  double low = 0.25, high = 64;  // pixels' sides between splats
+  double low = 3, high = 64;  // pixels' sides between splats; those that lie closer show nothing new
   std::vector<std::uint32_t> kept = thinned(candidates, high, count);
   for (int round = 0; round < 9; ++round) {
     const double middle = std::sqrt(low * high);

@@ -163,8 +163,8 @@ TEST(SplatPlacement, DiscsLieFlatOnTheSurface) {
   for (const PlacedSplat& placed : place_splats(targets, 400)) {
     const Vec3d out = placed.splat.position.cast<double>() - kCentre;
     EXPECT_NEAR(length(out), kRadius, 1e-4);
-    const auto turn = matrix_of_quaternion({placed.splat.rotation[0], placed.splat.rotation[1],
-                                            placed.splat.rotation[2], placed.splat.rotation[3]});
+    const auto turn = matrix_of_quaternion(
+        {placed.splat.rotation[0], placed.splat.rotation[1], placed.splat.rotation[2], placed.splat.rotation[3]});
     const Vec3d normal{turn[0][2], turn[1][2], turn[2][2]};
     EXPECT_LT(placed.splat.log_scale.z, placed.splat.log_scale.x - 1);
     found += std::abs(dot(normal, normalized(out))) > 0.95 ? 1 : 0;
