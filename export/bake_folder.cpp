@@ -176,8 +176,19 @@ GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, 
   return files;
 }
 
+SplatFiles BakeFolder::add_splats(const bake::SplatCloud& cloud, const std::string& name) {
+  SplatFiles files = write_splats(cloud, folder_, name, manifest_.label);
+  for (const fs::path& file : {files.ply, files.spz, files.usd}) list(file);
+  manifest_.frame = cloud.frame;
+  manifest_.splats = describe_splats(cloud);
+  manifest_.splats->ply = files.ply.filename().string();
+  manifest_.splats->spz = files.spz.filename().string();
+  manifest_.splats->usd = files.usd.filename().string();
+  return files;
+}
+
 void BakeFolder::finish() {
-  list(write_blender_setup(folder_));
+  if (manifest_.volume || manifest_.mesh) list(write_blender_setup(folder_));
   std::vector<std::string> former;
   if (fs::exists(manifest())) {
     try {

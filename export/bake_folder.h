@@ -10,6 +10,7 @@
 #include "export/gltf_writer.h"
 #include "export/manifest.h"
 #include "export/options.h"
+#include "export/splat_writer.h"
 #include "src/picture/sky_picture.h"
 
 namespace cnerf::exporting {
@@ -35,6 +36,8 @@ class BakeFolder {
   /// _lab.exr. To be called after add_volumes, where there is a volume: the mesh then names it.
   /// @throws ContractError, OutputError.
   GltfFiles add_mesh(const bake::Mesh& mesh, const std::string& name, bool exr);
+  /// Writes `name`.ply, .spz and .usda.  @throws OutputError.
+  SplatFiles add_splats(const bake::SplatCloud& cloud, const std::string& name);
   /// Writes sky.exr: Blender's world, behind volume and mesh. To be called before add_mesh, which names it.
   /// @throws OutputError.
   void add_sky(const SkyPicture& sky);
@@ -44,8 +47,8 @@ class BakeFolder {
   /// The cameras as cameras.usda, where the .usda of the volumes lies, and cameras.chan: see camera_tracks.h.
   /// @throws OutputError.
   void add_camera_tracks(const VdbOptions& options);
-  /// Writes blender_setup.py and manifest.json. Files that a former manifest here lists and this one does not are
-  /// removed.  @throws OutputError.
+  /// Writes manifest.json, and blender_setup.py where there is a volume or a mesh to set up. Files that a former
+  /// manifest here lists and this one does not are removed.  @throws OutputError.
   void finish();
 
   [[nodiscard]] std::filesystem::path manifest() const { return folder_ / "manifest.json"; }

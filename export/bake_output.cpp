@@ -17,16 +17,17 @@ Formats parse_formats(const std::string& list) {
   Formats formats;
   std::istringstream words(list);
   for (std::string format; std::getline(words, format, ',');) {
-    bool* flag = format == "vdb"    ? &formats.vdb
-                 : format == "gltf" ? &formats.gltf
-                 : format == "exr"  ? &formats.exr
-                 : format == "web"  ? &formats.web
-                                    : nullptr;
-    if (flag == nullptr) throw UsageError("--format: expected vdb, gltf, exr or web, got '" + format + "'");
+    bool* flag = format == "vdb"     ? &formats.vdb
+                 : format == "gltf"  ? &formats.gltf
+                 : format == "exr"   ? &formats.exr
+                 : format == "web"   ? &formats.web
+                 : format == "splat" ? &formats.splat
+                                     : nullptr;
+    if (flag == nullptr) throw UsageError("--format: expected vdb, gltf, exr, web or splat, got '" + format + "'");
     *flag = true;
   }
-  if (!formats.vdb && !formats.gltf && !formats.exr && !formats.web) {
-    throw UsageError("--format: expected vdb, gltf, exr or web, got none");
+  if (!formats.vdb && !formats.gltf && !formats.exr && !formats.web && !formats.splat) {
+    throw UsageError("--format: expected vdb, gltf, exr, web or splat, got none");
   }
   formats.gltf = formats.gltf || formats.exr;
   return formats;
@@ -81,6 +82,11 @@ void BakeOutput::take_mesh(const bake::Mesh& mesh) {
   observer_.wrote("mesh", files.gltf);
 }
 
+void BakeOutput::take_splats(const bake::SplatCloud& cloud) {
+  const SplatFiles files = bake_.add_splats(cloud, "splats");
+  for (const fs::path& file : {files.ply, files.spz, files.usd}) observer_.wrote("splats", file);
+}
+
 void BakeOutput::add_plates() {
   constexpr int kPlateSide = 4096, kPlateQuality = 92;
   const std::span<const View> views = capture_.views;
@@ -94,10 +100,10 @@ void BakeOutput::add_plates() {
 
 void BakeOutput::finish() {
   if (!formats_.has_manifest()) return;
-  if (options_.vdb.plates) add_plates();
+  if (options_.vdb.plates && formats_.is_for_blender()) add_plates();
   bake_.add_camera_tracks(options_.vdb);
   bake_.finish();
-  observer_.wrote("Blender set-up", bake_.blender_setup());
+  if (formats_.is_for_blender()) observer_.wrote("Blender set-up", bake_.blender_setup());
 }
 
 }  // namespace cnerf::exporting

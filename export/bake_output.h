@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bake/job/job.h"
+#include "bake/splat/splat.h"
 #include "export/bake_folder.h"
 #include "export/options.h"
 #include "src/base/observer.h"
@@ -16,17 +17,21 @@ namespace cnerf::exporting {
 
 /// What a bake writes.
 struct Formats {
-  bool vdb = false;   ///< the volume
-  bool gltf = false;  ///< a textured mesh, as .gltf and .glb
-  bool exr = false;   ///< the mesh's textures in floating point, beside the mesh
-  bool web = false;   ///< a folder with a page, for browsers
+  bool vdb = false;    ///< the volume
+  bool gltf = false;   ///< a textured mesh, as .gltf and .glb
+  bool exr = false;    ///< the mesh's textures in floating point, beside the mesh
+  bool web = false;    ///< a folder with a page, for browsers
+  bool splat = false;  ///< 3-D Gaussians as PLY, SPZ and USD
 
-  [[nodiscard]] bool has_manifest() const { return vdb || gltf; }
+  [[nodiscard]] bool has_manifest() const { return is_for_blender() || splat; }
+  /// Whether there is what the set-up script shows.
+  [[nodiscard]] bool is_for_blender() const { return vdb || gltf; }
+  [[nodiscard]] bool has_only_splats() const { return splat && !vdb && !gltf && !web; }
   [[nodiscard]] bake::VolumeUse volumes() const {
     return vdb ? bake::VolumeUse::kGrids : web ? bake::VolumeUse::kRead : bake::VolumeUse::kNone;
   }
 };
-/// "vdb,gltf,exr,web" or some of them; exr brings the mesh along.  @throws UsageError.
+/// "vdb,gltf,exr,web,splat" or some of them; exr brings the mesh along.  @throws UsageError.
 [[nodiscard]] Formats parse_formats(const std::string& list);
 
 /// The file that a bake of these formats writes last: once it is there, all of it is.
@@ -50,6 +55,7 @@ class BakeOutput final : public bake::Output {
 
   void take_volumes(const std::vector<bake::VolumePlanes>& volumes) override;
   void take_mesh(const bake::Mesh& mesh) override;
+  void take_splats(const bake::SplatCloud& cloud);
   void finish() override;
 
  private:

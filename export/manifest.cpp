@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "export/splat_writer.h"
 #include "export/vec3_json.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -171,6 +172,7 @@ struct ManifestRecord {
     v("finer_volumes", self.manifest.finer_volumes, kLater);
     v("mesh", self.manifest.mesh, kNullable);
     v("sky", self.manifest.sky, kLater);
+    v("splats", self.manifest.splats);
     v("camera_axes", axes, kWritten);
     v("cameras", self.cameras);
   }
@@ -259,6 +261,19 @@ void ManifestMesh::visit(Self& self, Visitor&& v) {
   }
 }
 
+template <typename Self, typename Visitor>
+void ManifestSplats::visit(Self& self, Visitor&& v) {
+  static Text space = "sRGB-encoded", frame = "world";
+  v("ply", self.ply);
+  v("spz", self.spz);
+  v("usd", self.usd);
+  v("bounds", self.bounds);
+  v("count", self.count);
+  v("degree", self.degree);
+  v("color_space", space, kWritten);
+  v("frame", frame, kWritten);
+}
+
 Json camera_json(const bake::Camera& camera) {
   return json_of(CameraRecord{camera, {}});
 }
@@ -297,6 +312,15 @@ ManifestMesh describe_mesh(const bake::Mesh& mesh) {
   described.gutter = mesh.gutter;
   described.charts = mesh.charts;
   described.voxel_size = mesh.voxel_size;
+  return described;
+}
+
+ManifestSplats describe_splats(const bake::SplatCloud& cloud) {
+  ManifestSplats described;
+  described.bounds = Aabbd::empty();
+  for (const bake::Splat& splat : cloud.splats) described.bounds.grow(splat.position.cast<double>());
+  described.count = cloud.splats.size();
+  described.degree = kSplatDegree;
   return described;
 }
 

@@ -11,6 +11,7 @@
 
 #include "bake/camera.h"
 #include "bake/mesh.h"
+#include "bake/splat/splat.h"
 #include "bake/volume.h"
 #include "export/vdb_writer.h"
 #include "src/base/aabb.h"
@@ -62,6 +63,19 @@ struct ManifestSky {
   static void visit(Self& self, Visitor&& v);
 };
 
+/// The splats of a bake, three times the same. File names are relative to the manifest.
+struct ManifestSplats {
+  std::string ply, spz, usd;
+  Aabbd bounds;  ///< world units; of the centres
+  std::size_t count = 0;
+  int degree = 0;  ///< of the harmonics
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v);
+};
+/// All but the names of files.
+[[nodiscard]] ManifestSplats describe_splats(const bake::SplatCloud& cloud);
+
 struct BakeManifest {
   Label label;
   /// What a file was when the manifest was written.
@@ -78,6 +92,7 @@ struct BakeManifest {
   std::vector<ManifestVolume> finer_volumes;  ///< inside of it, finest first; each coarser one is empty there
   std::optional<ManifestMesh> mesh;
   std::optional<ManifestSky> sky;  ///< where the capture has one
+  std::optional<ManifestSplats> splats;
 };
 
 /// Writes `manifest.json` into `folder`, where the listed files already are, and returns its path.

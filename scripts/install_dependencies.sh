@@ -61,6 +61,22 @@ install_gltf_validator() {
     echo "dependencies: npm cannot get the glTF validator; its tests will skip"
 }
 
+# Spark, an independent reader of splats, with what it draws by and what opens a browser. Tests that need it skip where
+# it cannot be had.
+install_splat_reader() {
+  local folder
+  folder="$(dirname "$0")/../build/node"
+  [[ -d "$folder/node_modules/@sparkjsdev/spark" ]] && return
+  if ! command -v npm > /dev/null; then
+    echo "dependencies: no npm, so no reader of splats; its tests will skip"
+    return
+  fi
+  mkdir -p "$folder"
+  npm install --prefix "$folder" --no-save --no-fund --no-audit --loglevel=error \
+    @sparkjsdev/spark@2.2.0 three@0.180.0 playwright-core@1.55.1 gltf-validator@2.0.0-dev.3.10 ||
+    echo "dependencies: npm cannot get the reader of splats; its tests will skip"
+}
+
 # What the viewer's page is built with: Vite, TypeScript; nothing of it is part of the page.
 install_page_packages() {
   local folder
@@ -106,4 +122,7 @@ if [[ "${1:-}" == "--encoder" ]]; then
 fi
 install_packages
 install_page_packages
-if [[ "${1:-}" == "--tests" ]]; then install_gltf_validator; fi
+if [[ "${1:-}" == "--tests" ]]; then
+  install_gltf_validator
+  install_splat_reader
+fi

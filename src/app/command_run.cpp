@@ -25,7 +25,7 @@ void run(RunArguments arguments, const std::vector<std::string>& command_line) {
   refuse_colorizer_of_others(arguments.config, config);
   const auto bake = pipeline::run(job, config, engines_for(config.device), reporter);
   reporter.next("cnerf view " + job.out.string());
-  if (job.formats.has_manifest()) {
+  if (job.formats.is_for_blender()) {
     reporter.next("blender --python " + (bake / "blender_setup.py").string());
   }
 }
@@ -41,7 +41,7 @@ Work declare_run(CLI::App& app) {
   app.add_option("-o,--out", job.out, "Folder of the run, made if needed; CAPTURE-run if not given");
   add_colorizer_options(app, arguments->config);
   app.add_flag("--grey", job.grey, "Stay grey: no colorizer");
-  app.add_option("--format", arguments->format, "What to bake: vdb, gltf, exr, web or several, comma-separated");
+  app.add_option("--format", arguments->format, "What to bake: vdb, gltf, exr, web, splat or several, comma-separated");
   add_short_form(app, arguments->config, "--downscale", "capture.downscale");
   add_short_form(app, arguments->config, "--holdout", "capture.holdout");
   add_short_form(app, arguments->config, "--transfer", "capture.transfer");

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bake/options.h"
+#include "bake/splat/options.h"
 #include "export/options.h"
 #include "src/capture/load_capture.h"
 #include "src/colorizer/colorizer_options.h"
@@ -30,6 +31,7 @@ struct Config {
   exporting::VdbOptions vdb;
   exporting::WorldConvention world;
   cnerf::bake::MeshOptions mesh;
+  cnerf::bake::SplatOptions splat;
   exporting::WebOptions web;
   PictureOptions render;
   Finish finish;
@@ -47,6 +49,7 @@ struct Config {
     v.section("vdb", vdb);
     v.section("vdb", world);  // the keys that users know
     v.section("mesh", mesh);
+    v.section("splat", splat);
     v.section("web", web);
     v.section("render", render);
     v.section("finish", finish);

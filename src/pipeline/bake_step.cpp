@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "bake/job/job.h"
+#include "bake/splat/bake_splats.h"
 #include "src/base/files.h"
 #include "src/base/usage.h"
 #include "src/pipeline/version.h"
@@ -24,8 +25,36 @@ std::string field_identity(const RunDirectory& directory, const std::string& tak
 bake::Options volume_options(const Config& config, const exporting::Formats& formats) {
   bake::Options options = config.bake;
   if (options.max_memory.empty()) options.max_memory = config.max_memory;
-  if (formats.web && !formats.has_manifest()) options.resolution = std::min(options.resolution, config.web.resolution);
+  if (formats.web && !formats.is_for_blender())
+    options.resolution = std::min(options.resolution, config.web.resolution);
   return options;
+}
+
+/// What the scene shows a camera, with colours of samples as all bakes have them; grey where it is not colorized.
+bake::FieldPicture field_picture(const Scene& scene, const Intrinsics& intrinsics, const Affined& world_from_camera) {
+  RenderOptions options;
+  options.color = false;
+  options.baked_color = true;
+  options.sky = false;
+  RenderedImage image = scene.render(intrinsics, world_from_camera, options);
+  if (image.baked_rgb.empty()) {
+    for (const float light : image.luminance) image.baked_rgb.insert(image.baked_rgb.end(), 3, light);
+  }
+  return {std::move(image.baked_rgb), std::move(image.opacity), std::move(image.depth)};
+}
+
+bake::SplatCloud make_splats(const Scene& scene, const Capture& capture, const bake::SplatOptions& options,
+                             Observer& observer) {
+  bake::SplatJob job;
+  job.draw = [&](const Intrinsics& intrinsics, const Affined& world_from_camera) {
+    return field_picture(scene, intrinsics, world_from_camera);
+  };
+  job.frame = scene.frame();
+  for (const View& view : capture.views) {
+    if (!view.held_out) job.cameras.push_back({view.name, view.intrinsics, view.world_from_camera});
+  }
+  job.options = options;
+  return bake::bake_splats(job, observer);
 }
 
 }  // namespace
@@ -44,7 +73,12 @@ void bake_step(const RunContext& context, const BakeJob& job, const Engines& eng
   const exporting::Label label{{colorizer_name(context.directory, take), take, context.command_line}, config.world};
   exporting::BakeOutput output(folder, formats, {config.vdb, config.web, web::find_page(), scene->sky()},
                                context.capture, label, observer);
-  bake::run(bake, output, observer);
+  if (formats.splat) output.take_splats(make_splats(*scene, context.capture, config.splat, observer));
+  if (formats.has_only_splats()) {
+    output.finish();
+  } else {
+    bake::run(bake, output, observer);
+  }
   note_time(context.directory, "bake", watch);
 }
 

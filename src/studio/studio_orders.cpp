@@ -232,7 +232,7 @@ void Studio::bake(const Order& order) {
   offer_downloads(files);
   board_.change([&](StateMessage& state) {
     state.message = "baked to " + folder.string();
-    if (wanted.has_manifest()) state.blender = "blender --python " + (folder / "blender_setup.py").string();
+    if (wanted.is_for_blender()) state.blender = "blender --python " + (folder / "blender_setup.py").string();
   });
   add_command("cnerf bake " + context_.directory.root().string() + (take.empty() ? "" : " --take " + take) +
               " --format " + cnerf::joined(formats, ",") + finish_text(context_.config.finish));

@@ -140,7 +140,7 @@ class TrainedScene final : public Scene {
       color_->chromaticity->composite(pixels ? *pixels : traced->samples(), colors);
       put_colors(finished(std::move(colors)), image.luminance, first, image.baked_rgb);
     }
-    if (sky_.exists()) put_sky_behind(rays, first, image);
+    if (sky_.exists() && options.sky) put_sky_behind(rays, first, image);
   }
 
   /// Of pixels that show the field alone so far.

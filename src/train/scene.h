@@ -22,7 +22,7 @@ namespace cnerf {
 struct RenderedImage {
   int width = 0, height = 0;
   std::vector<float> luminance;  ///< linear Y
-  std::vector<float> opacity;    ///< 0..1; 1 everywhere in a scene with a sky
+  std::vector<float> opacity;    ///< 0..1; 1 everywhere where a sky is behind
   std::vector<float> depth;      ///< expected distance along the optical axis, world units; 0 where opacity < 0.5
   std::vector<float> rgb;        ///< [H, W, 3] linear Rec.709 by the paper's per-pixel decode; empty when not colorized
   std::vector<float> baked_rgb;  ///< [H, W, 3] linear Rec.709 composited from per-sample colour, as a bake shows it
@@ -33,6 +33,7 @@ struct RenderOptions {
   double min_transmittance = 1e-3;  ///< a ray ends below this, and counts as opaque
   bool color = true;                ///< also rgb, when the scene is colorized
   bool baked_color = false;         ///< also baked_rgb
+  bool sky = true;                  ///< is behind what is seen, where there is one; else black
   /// Linear Y of samples at positions in unit space, in place of the field's own, which depends on the view.
   std::function<void(std::span<const Vec3f> positions, std::span<float> luminance)> luminance = {};
 };

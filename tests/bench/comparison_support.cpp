@@ -143,8 +143,13 @@ RenderedImage Comparison::field_of(const View& view) const {
 
 int compare_views(int argc, char** argv, const std::string& name, std::map<std::string, int> options,
                   const std::function<std::vector<float>(Comparison&, const View&, const RenderedImage*)>& each) {
-  options.merge(std::map<std::string, int>{
-      {"views", 3}, {"downscale", 1}, {"holdout", 0}, {"trained", 0}, {"averaged", 0}, {"pictures", 0}});
+  options.merge(std::map<std::string, int>{{"views", 3},
+                                           {"downscale", 1},
+                                           {"holdout", 0},
+                                           {"trained", 0},
+                                           {"averaged", 0},
+                                           {"pinhole", 0},
+                                           {"pictures", 0}});
   const auto [files, chosen] = parse_arguments(argc, argv, options);
   if (files.size() < 2) {
     std::printf("%s_comparison BAKE CAPTURE [STAGE1.snapshot [TAKE.snapshot] | RENDERS]", name.c_str());
@@ -169,6 +174,9 @@ int compare_views(int argc, char** argv, const std::string& name, std::map<std::
     if (chosen.at("averaged") != 0) {
       comparison.average = average_behind(comparison.manifest, *comparison.scene, comparison.capture);
     }
+  }
+  for (View& view : comparison.capture.views) {
+    if (chosen.at("pinhole") != 0) view.intrinsics = exporting::without_distortion(view.intrinsics);
   }
   const auto views = views_to_compare(comparison.capture, chosen.at("trained") != 0, chosen.at("views"));
   ContactSheet sheet({name, "field", "difference x 2"}, 1000);

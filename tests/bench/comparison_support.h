@@ -13,6 +13,7 @@
 
 #include "bake/color/view_average.h"
 #include "export/manifest.h"
+#include "export/web_pictures.h"
 #include "src/capture/capture.h"
 #include "src/color/colorspace_math.h"
 #include "src/picture/encode.h"
@@ -80,7 +81,9 @@ struct Comparison {
 /// --view-averaged --path held-out --format exr` leaves them: made on a GPU, say. Of the pictures that `each` returns,
 /// [H, W, 4] or nothing, pictures=1 writes BAKE/`name`_comparison.png: picture, field, and what the picture adds to the
 /// field's sRGB-encoded colour, at twice the contrast; grey where it adds nothing.
-/// @param options  of this comparison; all have views=3, downscale=1, holdout=0, trained=0, averaged=0 and pictures=0.
+/// @param options  of this comparison; all have views=3, downscale=1, holdout=0, trained=0, averaged=0, pinhole=0 and
+/// pictures=0;
+///                 pinhole=1 takes the distortion of lenses away.
 /// @return  the program's exit status.
 int compare_views(int argc, char** argv, const std::string& name, std::map<std::string, int> options,
                   const std::function<std::vector<float>(Comparison&, const View&, const RenderedImage*)>& each);

@@ -1,0 +1,2 @@
+#define CNERF_ISA generic
+#include "bake/splat/tile_kernels.inl"
