@@ -43,8 +43,8 @@ std::optional<Launch> by_torchrun(const GetVariable& variable) {
   launch.host = variable("MASTER_ADDR").value_or("");
   launch.port = number(variable, "MASTER_PORT", 0);
   launch.has_store = variable("TORCHELASTIC_USE_AGENT_STORE").value_or("") == "True";
-  launch.attempt = variable("TORCHELASTIC_RUN_ID").value_or("") + "-" +
-                   variable("TORCHELASTIC_RESTART_COUNT").value_or("0");
+  launch.attempt =
+      variable("TORCHELASTIC_RUN_ID").value_or("") + "-" + variable("TORCHELASTIC_RESTART_COUNT").value_or("0");
   if (launch.port == 0) throw UsageError("$MASTER_PORT: expected a port, as $RANK and $WORLD_SIZE are set");
   return launch;
 }
@@ -78,8 +78,9 @@ std::optional<Launch> by_slurm(const GetVariable& variable) {
   launch.size = number(variable, "SLURM_STEP_NUM_TASKS", 1);
   launch.local_rank = number(variable, "SLURM_LOCALID", 0);
   launch.local_size = std::max(tasks_per_node(variable), launch.local_rank + 1);
-  launch.host = variable("MASTER_ADDR").value_or(first_host(
-      variable("SLURM_STEP_NODELIST").value_or(variable("SLURM_NODELIST").value_or(""))));
+  launch.host =
+      variable("MASTER_ADDR")
+          .value_or(first_host(variable("SLURM_STEP_NODELIST").value_or(variable("SLURM_NODELIST").value_or(""))));
   const std::string job = variable("SLURM_JOB_ID").value_or("0") + "." + variable("SLURM_STEP_ID").value_or("0");
   launch.port = port_of(variable, job);
   launch.attempt = job + "-" + variable("SLURM_RESTART_COUNT").value_or("0");

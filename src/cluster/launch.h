@@ -9,10 +9,10 @@ namespace cnerf::cluster {
 
 /// The place of a process among those that were started together.
 struct Launch {
-  std::string launcher;              ///< "torchrun", "Open MPI", "Slurm"
-  int rank = 0, size = 1;            ///< of all processes
+  std::string launcher;                ///< "torchrun", "Open MPI", "Slurm"
+  int rank = 0, size = 1;              ///< of all processes
   int local_rank = 0, local_size = 1;  ///< of those on this machine
-  std::string host;                  ///< where the processes meet: a name or an address of the first one's machine
+  std::string host;                    ///< where the processes meet: a name or an address of the first one's machine
   int port = 0;
   bool has_store = false;  ///< the launcher keeps the store itself, and every process is a client of it
   std::string attempt;     ///< tells a restarted job from the one before, whose words the store may still hold

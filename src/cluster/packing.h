@@ -24,9 +24,7 @@ class Packer {
     static_assert(std::is_trivially_copyable_v<Value>);
     return add(values.size()).add_bytes(std::as_bytes(std::span(values)));
   }
-  Packer& add(const std::string& text) {
-    return add(text.size()).add_bytes(std::as_bytes(std::span(text)));
-  }
+  Packer& add(const std::string& text) { return add(text.size()).add_bytes(std::as_bytes(std::span(text))); }
   [[nodiscard]] Bytes packed() { return std::move(bytes_); }
 
  private:
@@ -42,9 +40,7 @@ class Unpacker {
  public:
   explicit Unpacker(std::span<const std::byte> bytes) : rest_(bytes) {}
   template <typename Value>
-  requires std::is_trivially_copyable_v<Value> Unpacker& get(Value& value) {
-    return get_bytes(&value, sizeof value);
-  }
+  requires std::is_trivially_copyable_v<Value> Unpacker& get(Value& value) { return get_bytes(&value, sizeof value); }
   template <typename Value>
   Unpacker& get(std::vector<Value>& values) {
     static_assert(std::is_trivially_copyable_v<Value>);

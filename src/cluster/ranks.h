@@ -85,9 +85,9 @@ struct Meeting {
   Launch launch;
   const Channel& channel;
   Patience patience = {};
-  Seconds limit;  ///< for all to come
-  std::string name = {};   ///< of this process, for messages: "pid 17 on fermi"
-  Watch::End end = {};     ///< see Watch
+  Seconds limit;          ///< for all to come
+  std::string name = {};  ///< of this process, for messages: "pid 17 on fermi"
+  Watch::End end = {};    ///< see Watch
 };
 
 /// The ranks of a launch. Once the work is done, `leave` is to be called.

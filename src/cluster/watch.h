@@ -18,9 +18,9 @@ namespace cnerf::cluster {
 
 /// How long what may take.
 struct Patience {
-  Seconds beat{1};     ///< between two signs of life
+  Seconds beat{1};      ///< between two signs of life
   Seconds silence{15};  ///< without one, after which a process is lost
-  Seconds grace{5};    ///< for the work to end by itself once somebody is lost
+  Seconds grace{5};     ///< for the work to end by itself once somebody is lost
 };
 
 class Watch {

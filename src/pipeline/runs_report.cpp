@@ -57,7 +57,8 @@ std::string cell(const std::string& text) {
 std::string row(const ReportedRun& run) {
   const Stage1Record& stage1 = run.record.stage1;
   const std::string trained = stage1.finished ? duration_text(stage1.seconds) : "not finished";
-  if (!run.metrics) return fmt::format("| {} | {} | not evaluated | - | - | - | - | - | - |\n", cell(run.name()), trained);
+  if (!run.metrics)
+    return fmt::format("| {} | {} | not evaluated | - | - | - | - | - | - |\n", cell(run.name()), trained);
   const ViewMetrics& mean = run.metrics->mean;
   const std::string take = run.metrics->take.empty() ? "grey" : run.metrics->take;
   return fmt::format("| {} | {} | {} | {} | {} {} | {} | {} | {} | {} |\n", cell(run.name()), trained, cell(take),

@@ -129,7 +129,8 @@ inline cluster::Meeting fake_meeting(int rank, int size) {
   launch.launcher = "a test";
   launch.rank = rank;
   launch.size = size;
-  return {launch, fake_channel(), {}, cluster::Seconds(20), "thread " + std::to_string(rank), [](const std::string&) {}};
+  return {
+      launch, fake_channel(), {}, cluster::Seconds(20), "thread " + std::to_string(rank), [](const std::string&) {}};
 }
 
 /// Runs `work(ranks)` on so many threads, each a rank, and lets them leave. Rethrows the error of the lowest rank.

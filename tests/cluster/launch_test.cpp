@@ -18,8 +18,8 @@ std::optional<Launch> launch_of(std::map<std::string, std::string> variables) {
   });
 }
 
-const std::map<std::string, std::string> kTorchrun = {{"RANK", "1"},       {"WORLD_SIZE", "4"},
-                                                      {"LOCAL_RANK", "1"}, {"LOCAL_WORLD_SIZE", "2"},
+const std::map<std::string, std::string> kTorchrun = {{"RANK", "1"},        {"WORLD_SIZE", "4"},
+                                                      {"LOCAL_RANK", "1"},  {"LOCAL_WORLD_SIZE", "2"},
                                                       {"MASTER_ADDR", "a"}, {"MASTER_PORT", "29500"}};
 
 std::map<std::string, std::string> with(std::map<std::string, std::string> variables, const std::string& name,
@@ -59,9 +59,12 @@ TEST(Launch, ARestartIsAnotherAttempt) {
   EXPECT_NE(first->attempt, second->attempt);
 }
 
-const std::map<std::string, std::string> kSlurm = {{"SLURM_PROCID", "3"},           {"SLURM_STEP_NUM_TASKS", "8"},
-                                                   {"SLURM_LOCALID", "1"},          {"SLURM_STEP_TASKS_PER_NODE", "2(x4)"},
-                                                   {"SLURM_STEP_NODELIST", "n[07-10]"}, {"SLURM_JOB_ID", "17"},
+const std::map<std::string, std::string> kSlurm = {{"SLURM_PROCID", "3"},
+                                                   {"SLURM_STEP_NUM_TASKS", "8"},
+                                                   {"SLURM_LOCALID", "1"},
+                                                   {"SLURM_STEP_TASKS_PER_NODE", "2(x4)"},
+                                                   {"SLURM_STEP_NODELIST", "n[07-10]"},
+                                                   {"SLURM_JOB_ID", "17"},
                                                    {"SLURM_STEP_ID", "0"}};
 
 TEST(Launch, SlurmSaysWhoIsWho) {

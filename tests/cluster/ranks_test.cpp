@@ -8,8 +8,8 @@
 #include <mutex>
 #include <set>
 
-#include "src/cluster/rank_error.h"
 #include "src/cluster/packing.h"
+#include "src/cluster/rank_error.h"
 #include "src/cluster/share_out.h"
 #include "tests/cluster/fake_channel.h"
 

@@ -111,8 +111,8 @@ TEST(SharedStage1, AStepIsThatOfOneProcessButForRounding) {
       EXPECT_EQ(shared.report.trained_samples, alone.report.trained_samples);
       EXPECT_NEAR(shared.report.loss, alone.report.loss, 1e-6 * alone.report.loss);
       using Part = std::vector<float> test::Stage1Gradients::*;
-      for (const Part part : {&test::Stage1Gradients::table, &test::Stage1Gradients::weights,
-                              &test::Stage1Gradients::views}) {
+      for (const Part part :
+           {&test::Stage1Gradients::table, &test::Stage1Gradients::weights, &test::Stage1Gradients::views}) {
         const std::vector<float>& expected = alone.*part;
         ASSERT_FALSE(expected.empty());
         ASSERT_GT(largest(expected), 0);

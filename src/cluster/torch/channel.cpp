@@ -73,8 +73,8 @@ std::string address_towards(const std::string& host) {
                           ::getsockname(socket.number(), reinterpret_cast<sockaddr*>(&own), &size) == 0;
   ::freeaddrinfo(found);
   char text[NI_MAXHOST] = "";
-  if (!is_reached || ::getnameinfo(reinterpret_cast<sockaddr*>(&own), size, text, sizeof text, nullptr, 0,
-                                   NI_NUMERICHOST) != 0) {
+  if (!is_reached ||
+      ::getnameinfo(reinterpret_cast<sockaddr*>(&own), size, text, sizeof text, nullptr, 0, NI_NUMERICHOST) != 0) {
     throw std::runtime_error("no way to " + host + ": " + std::strerror(errno));
   }
   return text;
@@ -86,8 +86,8 @@ class GlooGroup final : public Group {
     const auto options = c10d::ProcessGroupGloo::Options::create(kLongestOperation);
     options->devices.push_back(c10d::ProcessGroupGloo::createDeviceForHostname(address_towards(launch.host)));
     options->threads = 2;
-    group_ = c10::make_intrusive<c10d::ProcessGroupGloo>(connected(launch, false, limit), launch.rank, launch.size,
-                                                         options);
+    group_ =
+        c10::make_intrusive<c10d::ProcessGroupGloo>(connected(launch, false, limit), launch.rank, launch.size, options);
   }
   void sum(std::span<float> values) override { sum_of(values.data(), values.size(), at::kFloat); }
   void sum(std::span<double> values) override { sum_of(values.data(), values.size(), at::kDouble); }
@@ -113,13 +113,12 @@ class GlooGroup final : public Group {
 
 extern "C" __attribute__((visibility("default"))) const cnerf::cluster::Channel* cnerf_cluster_channel() {
   using namespace cnerf::cluster;
-  static const Channel channel{
-      [](const Launch& launch, bool opens, Seconds limit) -> std::unique_ptr<Store> {
-        return std::make_unique<C10dStore>(connected(launch, opens, limit));
-      },
-      [](const Launch& launch, Seconds limit) -> std::unique_ptr<Group> {
-        return std::make_unique<GlooGroup>(launch, limit);
-      },
-      "LibTorch " TORCH_VERSION ": Gloo"};
+  static const Channel channel{[](const Launch& launch, bool opens, Seconds limit) -> std::unique_ptr<Store> {
+                                 return std::make_unique<C10dStore>(connected(launch, opens, limit));
+                               },
+                               [](const Launch& launch, Seconds limit) -> std::unique_ptr<Group> {
+                                 return std::make_unique<GlooGroup>(launch, limit);
+                               },
+                               "LibTorch " TORCH_VERSION ": Gloo"};
   return &channel;
 }
