@@ -187,7 +187,7 @@ void lose(int victim, int signal, const std::string& complaint) {
     EXPECT_THAT(ranks.said(survivor), HasSubstr(complaint));
   }
   for (const std::string& file : files_below(out)) {
-    if (victim == 1) EXPECT_FALSE(is_temporary(file)) << file;
+    EXPECT_FALSE(victim == 1 && is_temporary(file)) << file << " is half written";
   }
   Launched ranks(2, concatenated(endless(out), {"--resume", "--set", "stage1.max_seconds=0.5"}));
   expect_success(ranks, 2);
