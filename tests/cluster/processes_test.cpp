@@ -12,6 +12,7 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <map>
 #include <thread>
 
 #include "src/base/files.h"
@@ -40,14 +41,24 @@ int free_port() {
   return ntohs(address.sin_port);
 }
 
+using Variables = std::map<std::string, std::string>;
+
 /// Ranks of the program on this machine; those that are left are killed at the end.
 class Launched {
  public:
-  Launched(int size, const std::vector<std::string>& arguments) {
-    const std::string port = std::to_string(free_port());
+  /// @param more  variables beside those of every launch
+  Launched(int size, const std::vector<std::string>& arguments, const Variables& more = {}) {
+    Variables variables = {{"WORLD_SIZE", std::to_string(size)},
+                           {"LOCAL_WORLD_SIZE", std::to_string(size)},
+                           {"MASTER_ADDR", "127.0.0.1"},
+                           {"MASTER_PORT", std::to_string(free_port())},
+                           {"OMP_NUM_THREADS", "1"},  // a colorizer's answers depend on it
+                           {"CUDA_VISIBLE_DEVICES", ""}};
+    for (const auto& [name, value] : more) variables[name] = value;
     for (int rank = 0; rank < size; ++rank) {
       write_file(output(rank), std::string_view());
-      children_.push_back(start(rank, size, port, arguments));
+      variables["RANK"] = variables["LOCAL_RANK"] = std::to_string(rank);
+      children_.push_back(start(rank, arguments, variables));
     }
   }
   ~Launched() {
@@ -78,7 +89,7 @@ class Launched {
  private:
   [[nodiscard]] fs::path output(int rank) const { return folder_ / ("rank" + std::to_string(rank)); }
 
-  [[nodiscard]] pid_t start(int rank, int size, const std::string& port, const std::vector<std::string>& arguments) {
+  [[nodiscard]] pid_t start(int rank, const std::vector<std::string>& arguments, const Variables& variables) const {
     std::vector<std::string> words = {program()};
     words.insert(words.end(), arguments.begin(), arguments.end());
     std::vector<char*> argv = pointers_to(words);
@@ -87,14 +98,7 @@ class Launched {
     const int out = ::open(output(rank).c_str(), O_WRONLY | O_APPEND, 0600);
     ::dup2(out, STDOUT_FILENO);
     ::dup2(out, STDERR_FILENO);
-    const auto set = [](const char* name, const std::string& value) { ::setenv(name, value.c_str(), 1); };
-    set("RANK", std::to_string(rank));
-    set("WORLD_SIZE", std::to_string(size));
-    set("LOCAL_RANK", std::to_string(rank));
-    set("LOCAL_WORLD_SIZE", std::to_string(size));
-    set("MASTER_ADDR", "127.0.0.1");
-    set("MASTER_PORT", port);
-    set("CUDA_VISIBLE_DEVICES", "");
+    for (const auto& [name, value] : variables) ::setenv(name.c_str(), value.c_str(), 1);
     ::execv(argv[0], argv.data());
     ::_exit(127);
   }
@@ -204,6 +208,34 @@ TEST(Processes, RankZeroThatDiesIsNamed) {
 TEST(Processes, OneThatStopsIsNamed) {
   lose(1, SIGSTOP, "has shown no sign of life");
 }
+
+/// torchrun's agent keeps a store itself; another job's rank 0 stands in for it, and its words are told apart.
+TEST(Processes, TheStoreMayBeSomebodyElses) {
+  const TempDir folder;
+  const std::string port = std::to_string(free_port());
+  Launched agent(2, endless(folder / "agent"), {{"MASTER_PORT", port}, {"TORCHELASTIC_RUN_ID", "agent"}});
+  agent.wait_for(folder / "agent/stage1.snapshot");
+  const auto words = concatenated({"train", tiny_capture().string(), "-o", (folder / "job").string()}, tiny_options());
+  Launched job(2, words,
+               {{"MASTER_PORT", port}, {"TORCHELASTIC_RUN_ID", "job"}, {"TORCHELASTIC_USE_AGENT_STORE", "True"}});
+  expect_success(job, 2);
+  EXPECT_TRUE(fs::exists(folder / "job/stage1.snapshot"));
+}
+
+#if CNERF_COMPARE
+TEST(Processes, CellsOfAComparisonAreDealtOut) {
+  const TempDir folder;
+  const auto compare = [&](const std::string& out) {
+    return concatenated(
+        {"compare", tiny_capture().string(), "-o", (folder / out).string(), "--methods", "grey,oracle", "--seeds", "2"},
+        tiny_options());
+  };
+  ASSERT_EQ(cnerf(compare("alone")).exit_code, 0);
+  Launched ranks(2, compare("shared"));
+  expect_success(ranks, 2);
+  EXPECT_EQ(files_below(folder / "shared"), files_below(folder / "alone"));
+}
+#endif
 
 TEST(Processes, CtrlCSavesAndGoesOn) {
   const TempDir folder;
