@@ -7,7 +7,7 @@ set -euo pipefail
 
 packages=(
   cmake ninja-build g++ pkg-config ccache
-  libtorch-dev
+  libtorch-dev libgloo-dev
   libopenblas0-pthread  # without it LibTorch falls back to the reference BLAS, which is many times slower
   libopenvdb-dev libboost-iostreams-dev libopenvdb-tools libnanovdb-dev
   libopencv-dev libopenexr-dev libtinygltf-dev libmeshoptimizer-dev
@@ -23,7 +23,8 @@ if [[ "$(. /etc/os-release && echo "${VERSION_ID%%.*}")" -ge 13 ]]; then
 fi
 command -v npm > /dev/null || packages+=(nodejs npm)  # for the viewer's page; a node from elsewhere will do
 if [[ "${1:-}" == "--tests" ]]; then
-  packages+=(blender chromium man-db mandoc fish zsh doxygen codespell)
+  packages+=(blender chromium man-db mandoc fish zsh doxygen codespell
+    slurm-wlm munge openmpi-bin iproute2)
 fi
 
 # Installs those of "${packages[@]}" that are missing.

@@ -20,6 +20,7 @@ struct Command {
   const char* summary;
   DeclareCommand declare;
   bool resumable;  ///< after Ctrl-C, the same line with --resume goes on
+  bool shared;     ///< processes of one launch work on it together; others do the same thing each
   std::array<const char*, 2> examples;
 };
 
@@ -45,6 +46,7 @@ Work declare_colorize_image(CLI::App& app);
 Work declare_render(CLI::App& app);
 Work declare_eval(CLI::App& app);
 Work declare_compare(CLI::App& app);
+Work declare_report(CLI::App& app);
 Work declare_bake(CLI::App& app);
 Work declare_view(CLI::App& app);
 Work declare_studio(CLI::App& app);

@@ -4,6 +4,7 @@
 #include "src/app/run_arguments.h"
 #include "src/base/error.h"
 #include "src/base/usage.h"
+#include "src/cluster/ranks.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/default_colorizer.h"
 #include "src/studio/coloring.h"
@@ -47,6 +48,9 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
   // A take that is gone on with has its own configuration; a new one starts from the run's.
   const std::string base = arguments.existing.resume ? arguments.run.take : "";
   pipeline::RunContext context = open_run(arguments.run, base, command_line, reporter);
+  if (!cluster::world().is_alone() && (arguments.bases_only || !arguments.replay.empty())) {
+    throw UsageError("--bases-only and --replay: are for one process, without torchrun, srun or mpirun");
+  }
   if (!arguments.replay.empty()) return replay(arguments, context, reporter);
   refuse_colorizer_of_others(arguments.run.config, context.config);
   const Engines& engines = engines_for(context.config.device);
@@ -59,7 +63,7 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
   }
   const std::string take = pipeline::take_to_write(context, arguments.run.take, arguments.existing);
   std::optional<web::LiveSession> live;
-  if (arguments.view) {
+  if (arguments.view && cluster::world().is_first()) {
     live.emplace("Colorizing " + context.capture.root.filename().string() + ", take " + take, arguments.browser,
                  reporter);
   }

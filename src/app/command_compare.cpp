@@ -5,6 +5,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/text.h"
+#include "src/cluster/ranks.h"
 #include "src/compare/baselines/simulated.h"
 #include "src/compare/rating.h"
 #include "src/compare/run.h"
@@ -48,10 +49,13 @@ void run_comparison(CompareArguments arguments, const std::vector<std::string>& 
   // Parts with other seeds may run side by side.
   const auto mode = arguments.overwrite ? FolderLock::Mode::kAlone : FolderLock::Mode::kShared;
   const FolderLock lock = pipeline::lock_folder(plan.report, mode, reporter);
-  begin_report(plan.report, {arguments.resume || arguments.only_report, arguments.overwrite});
+  cluster::Ranks& world = cluster::world();
+  if (world.is_first()) begin_report(plan.report, {arguments.resume || arguments.only_report, arguments.overwrite});
+  world.barrier("begin of the comparison");
   Run comparison(std::move(plan), config, reporter);
-  write_file(fs::path(arguments.out) / "config.toml", to_toml(config));
+  if (world.is_first()) write_file(fs::path(arguments.out) / "config.toml", to_toml(config));
   comparison.run();
+  if (!world.is_first()) return;
   comparison.write_report();
   if (arguments.rating_sheet) comparison.write_rating_sheet();
   reporter.next("open " + (fs::path(arguments.out) / "report.html").string() + " in a browser");

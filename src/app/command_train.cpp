@@ -2,6 +2,7 @@
 
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
+#include "src/cluster/ranks.h"
 #include "src/pipeline/train_step.h"
 #include "viewer/server/live_session.h"
 
@@ -27,7 +28,7 @@ void train(TrainArguments arguments, const std::vector<std::string>& command_lin
                                      command_line};
   const FolderLock lock = pipeline::claim_run_folder(directory, arguments.existing, reporter);
   std::optional<web::LiveSession> live;
-  if (arguments.view) {
+  if (arguments.view && cluster::world().is_first()) {
     live.emplace("Training " + context.capture.root.filename().string(), arguments.browser, reporter);
   }
   pipeline::begin_run(context, arguments.capture, arguments.existing);

@@ -9,6 +9,7 @@
 #include "src/base/parallel.h"
 #include "src/base/text.h"
 #include "src/base/usage.h"
+#include "src/cluster/ranks.h"
 #include "src/config/toml_binding.h"
 #include "src/engine/engines.h"
 
@@ -143,7 +144,7 @@ Config resolve_config(const ConfigArguments& arguments, Config base) {
   read_settings(arguments, fields_of(base), retired_keys());
   check_consistency(base);
   (void)engines_for(base.device);  // refuses a device that is not there
-  set_thread_count(base.threads);
+  set_thread_count(base.threads > 0 ? base.threads : cluster::world().threads());
   if (!base.max_memory.empty()) limit_memory(base.max_memory);
   return base;
 }
@@ -160,6 +161,7 @@ void refuse_colorizer_of_others(const ConfigArguments& arguments, const Config& 
 }
 
 Reporter make_reporter(const ConfigArguments& arguments) {
+  if (!cluster::world().is_first()) return Reporter(ProgressStyle::kSilent);  // rank 0 speaks for all
   return Reporter(progress_style(arguments.progress, stdout));
 }
 

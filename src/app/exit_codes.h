@@ -13,7 +13,7 @@ struct ExitCodeMeaning {
   const char* meaning;
 };
 
-inline constexpr std::array<ExitCodeMeaning, 14> kExitCodes = {{
+inline constexpr std::array<ExitCodeMeaning, 15> kExitCodes = {{
     {ExitCode::kSuccess, "success"},
     {ExitCode::kUsage, "unknown option or config key, value out of range"},
     {ExitCode::kInput, "a file's content is wrong"},
@@ -22,6 +22,7 @@ inline constexpr std::array<ExitCodeMeaning, 14> kExitCodes = {{
     {ExitCode::kInternal, "a bug in cnerf"},
     {ExitCode::kMemory, "memory did not suffice"},
     {ExitCode::kOutput, "the output cannot be written"},
+    {ExitCode(74), "another process of the same launch ended early or cannot be reached"},
     {ExitCode::kBusy, "another cnerf works in the same folder"},
     {ExitCode::kColorizer, "a colorizer failed, timed out or answered nonsense"},
     {ExitCode::kPoses, "no camera poses can be found"},

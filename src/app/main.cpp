@@ -11,6 +11,7 @@
 #include "src/base/error.h"
 #include "src/base/progress.h"
 #include "src/base/text.h"
+#include "src/cluster/ranks.h"
 #include "src/pipeline/version.h"
 
 namespace cnerf::app {
@@ -48,6 +49,7 @@ void run_program(CLI::App& program, int argc, char** argv) {
   program.parse(argc, argv);
 
   const ParsedCommand& chosen = chosen_command(program, commands);
+  if (chosen.command->shared) cluster::join_world();
   try {
     chosen.work(without_token({argv, argv + argc}));
   } catch (const Interrupted& interruption) {
@@ -62,11 +64,18 @@ bool wants_color(std::FILE* out) {
   return ::isatty(::fileno(out)) != 0 && (none == nullptr || *none == '\0');
 }
 
+/// Of several processes each says which it is.
+std::string with_rank(const std::string& message) {
+  const cluster::Ranks& world = cluster::world();
+  return world.is_alone() ? message : "rank " + std::to_string(world.rank()) + ": " + message;
+}
+
 int failed(ExitCode code, const std::string& message) {
   constexpr const char* kRed = "\x1b[31m";
   constexpr const char* kNormal = "\x1b[0m";
   const bool is_red = wants_color(stderr);
-  fmt::print(stderr, "\n{}cnerf: {}{}\n", is_red ? kRed : "", message, is_red ? kNormal : "");
+  fmt::print(stderr, "\n{}cnerf: {}{}\n", is_red ? kRed : "", with_rank(message), is_red ? kNormal : "");
+  cluster::leave_world(message);
   return int(code);
 }
 
@@ -74,6 +83,7 @@ int guarded_main(int argc, char** argv) {
   CLI::App program{"Colour volumes from monochrome photographs with known camera poses", "cnerf"};
   try {
     run_program(program, argc, argv);
+    cluster::leave_world({});
     return int(ExitCode::kSuccess);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
@@ -101,7 +111,8 @@ int main(int argc, char** argv) {
   cnerf::install_interruption_handler();
   const int code = cnerf::app::guarded_main(argc, argv);
   std::fflush(nullptr);
-  // A network that gave no answer in time may still be computing, in a thread that cannot be stopped.
-  if (code == int(cnerf::ExitCode::kColorizer)) std::_Exit(code);
+  // A network that gave no answer in time may still be computing, in a thread that cannot be stopped; and those that
+  // talk with other processes may wait for ever.
+  if (code == int(cnerf::ExitCode::kColorizer) || !cnerf::cluster::world().is_alone()) std::_Exit(code);
   return code;
 }

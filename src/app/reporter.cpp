@@ -46,7 +46,7 @@ ProgressStyle progress_style(const std::string& name, std::FILE* out) {
 }
 
 void Reporter::report_progress(const Progress& progress) {
-  if (style_ == ProgressStyle::kQuiet) return;
+  if (style_ == ProgressStyle::kQuiet || style_ == ProgressStyle::kSilent) return;
   const auto now = Clock::now();
   const bool is_new = progress.task != task_ || progress.fraction < start_fraction_;
   if (is_new) {
@@ -101,13 +101,14 @@ void Reporter::print_json(const std::string& json) {
 
 void Reporter::say(const std::string& text) {
   if (style_ == ProgressStyle::kJson) return print_json(Json{{"event", "message"}, {"text", text}}.dump());
-  if (style_ == ProgressStyle::kQuiet) return;
+  if (style_ == ProgressStyle::kQuiet || style_ == ProgressStyle::kSilent) return;
   end_line();
   fmt::print(out_, "{}\n", text);
   std::fflush(out_);
 }
 
 void Reporter::wrote(const std::string& what, const std::filesystem::path& path) {
+  if (style_ == ProgressStyle::kSilent) return;
   if (style_ == ProgressStyle::kJson) {
     return print_json(Json{{"event", "wrote"}, {"what", what}, {"path", path.string()}}.dump());
   }
@@ -118,7 +119,7 @@ void Reporter::wrote(const std::string& what, const std::filesystem::path& path)
 
 void Reporter::next(const std::string& text) {
   if (style_ == ProgressStyle::kJson) return print_json(Json{{"event", "next"}, {"text", text}}.dump());
-  if (style_ == ProgressStyle::kQuiet) return;
+  if (style_ == ProgressStyle::kQuiet || style_ == ProgressStyle::kSilent) return;
   end_line();
   fmt::print(out_, "{:<18} {}\n", "next:", text);
   std::fflush(out_);

@@ -12,10 +12,11 @@
 namespace cnerf::app {
 
 enum class ProgressStyle {
-  kLine,   ///< one line that rewrites itself, for a terminal
-  kPlain,  ///< a line now and then, for a log
-  kJson,   ///< one JSON object a line, for programs: {"event": "progress" | "message" | "wrote" | "next", ...}
-  kQuiet,  ///< results only
+  kLine,    ///< one line that rewrites itself, for a terminal
+  kPlain,   ///< a line now and then, for a log
+  kJson,    ///< one JSON object a line, for programs: {"event": "progress" | "message" | "wrote" | "next", ...}
+  kQuiet,   ///< results only
+  kSilent,  ///< nothing at all
 };
 
 /// Of "auto", "line", "plain", "json", "quiet"; "auto" looks at whether `out` is a terminal.  @throws UsageError.

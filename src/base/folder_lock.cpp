@@ -108,7 +108,7 @@ FolderLock::FolderLock(const fs::path& folder, Mode mode) {
 }
 
 bool FolderLock::is_held() const {
-  return held_->is_locked;
+  return held_ == nullptr || held_->is_locked;
 }
 
 void clear_folder(const fs::path& folder) {

@@ -23,6 +23,9 @@ class FolderLock {
   /// @throws OutputError  when nothing can be written there.
   explicit FolderLock(const std::filesystem::path& folder, Mode mode = Mode::kAlone);
 
+  /// For a process whose launch has another one that holds the folder for all.
+  [[nodiscard]] static FolderLock of_another_process() { return {}; }
+
   /// False on a file system that knows no locks (some network shares): the user has to take care.
   [[nodiscard]] bool is_held() const;
 
@@ -30,8 +33,9 @@ class FolderLock {
   static constexpr const char* kFile = ".cnerf.lock";
 
  private:
+  FolderLock() = default;
   struct Held;
-  std::shared_ptr<Held> held_;
+  std::shared_ptr<Held> held_;  ///< null = by another process
 };
 
 /// Removes what a folder holds, but not the lock of who clears it.  @throws OutputError.

@@ -2,10 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
+
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/folder_lock.h"
 #include "src/base/json_record.h"
+#include "src/cluster/share_out.h"
 #include "src/compare/baselines/simulated.h"
 #include "src/compare/rating.h"
 #include "src/compare/report.h"
@@ -43,23 +47,40 @@ Run::Run(Plan plan, Config config, Observer& observer)
 }
 
 void Run::run() {
+  const bool is_shared = !cluster::world().is_alone() && !plan_.only_report;
+  if (is_shared) make_cells_together();
   for (const auto& subject : subjects_) {
-    for (const int seed : plan_.seeds) plan_.only_report ? read_cells(*subject, seed) : make_cells(*subject, seed);
+    for (const int seed : plan_.seeds) {
+      if (plan_.only_report || is_shared) {
+        read_cells(*subject, seed);
+      } else {
+        std::ranges::move(make_cells(*subject, seed), std::back_inserter(cells_));
+      }
+    }
   }
   if (cells_.empty()) throw UsageError(plan_.report.string() + ": no finished method of these captures and seeds");
+}
+
+void Run::make_cells_together() {
+  const std::size_t seeds = plan_.seeds.size();
+  const auto make = [&](std::size_t i) { (void)make_cells(*subjects_[i / seeds], plan_.seeds[i % seeds]); };
+  cluster::share_out(cluster::world(), subjects_.size() * seeds, make, [](std::size_t) {});
+  cluster::world().barrier("cells of the comparison");
 }
 
 fs::path Run::folder_of(const Subject& subject, int seed) const {
   return plan_.report / "runs" / subject.name / fmt::format("seed-{}", seed);
 }
 
-void Run::make_cells(const Subject& subject, int seed) {
+std::vector<Cell> Run::make_cells(const Subject& subject, int seed) const {
   const FolderLock lock(folder_of(subject, seed));
   remove_leftovers(folder_of(subject, seed), kDeepestCell);
   const Bench bench{plan_, config_, engines_, lpips_.get(), observer_};
   SeedRun seed_run(bench, subject, seed, folder_of(subject, seed));
   seed_run.train();
-  for (const Method* method : plan_.methods) cells_.push_back(seed_run.make(*method));
+  std::vector<Cell> cells;
+  for (const Method* method : plan_.methods) cells.push_back(seed_run.make(*method));
+  return cells;
 }
 
 void Run::read_cells(const Subject& subject, int seed) {

@@ -36,7 +36,8 @@ class Run {
   /// @throws UsageError, MissingInputError, InputError  also for a capture without any colour.
   Run(Plan plan, Config config, Observer& observer);
 
-  /// All cells; a method that fails leaves one that says why.  @throws Interrupted  what is finished stays.
+  /// All cells, each capture and seed by one of the ranks; a method that fails leaves one that says why.  @throws
+  /// Interrupted  what is finished stays.
   void run();
   /// Writes the tables and the report.
   void write_report() const;
@@ -44,7 +45,9 @@ class Run {
   void write_rating_sheet() const;
 
  private:
-  void make_cells(const Subject& subject, int seed);
+  /// Stage 1 and all methods of a capture and a seed; what is there stays.
+  [[nodiscard]] std::vector<Cell> make_cells(const Subject& subject, int seed) const;
+  void make_cells_together();
   void read_cells(const Subject& subject, int seed);
   [[nodiscard]] std::filesystem::path folder_of(const Subject& subject, int seed) const;
 

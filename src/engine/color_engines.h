@@ -11,6 +11,7 @@
 #include "src/color/ab_bins.h"
 #include "src/engine/chroma_math.h"
 #include "src/engine/pixel_samples.h"
+#include "src/engine/step_share.h"
 #include "src/field/color_field.h"
 #include "src/field/state.h"
 
@@ -28,6 +29,8 @@ struct ChromaLossWeights {
 class ColorBinEngine {
  public:
   virtual ~ColorBinEngine() = default;
+  /// As LuminanceEngine::share_steps. All processes are to call `step` with the same pixels.
+  virtual void share_steps(const StepShare& share);
   /// One optimiser step; returns the mean loss.
   /// @param labels         [R] soft labels of the pixels
   /// @param pixel_weights  [R] factors of the pixels' losses (class rebalancing, opacity); may be empty = all 1
@@ -51,6 +54,8 @@ class ColorBinEngine {
 class ColorFieldEngine {
  public:
   virtual ~ColorFieldEngine() = default;
+  /// As ColorBinEngine::share_steps.
+  virtual void share_steps(const StepShare& share);
   /// One optimiser step towards target ab values at the pixels' own luminance; returns the mean ab distance.
   /// @param pixel_weights  [R] factors of the pixels' losses; may be empty = all 1
   virtual double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,

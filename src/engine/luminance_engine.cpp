@@ -1,5 +1,6 @@
 #include "src/engine/luminance_engine.h"
 
+#include "src/base/error.h"
 #include "src/base/parallel.h"
 
 namespace cnerf {
@@ -32,6 +33,10 @@ class HostTracedPixels final : public TracedPixels {
 };
 
 }  // namespace
+
+void LuminanceEngine::share_steps(const StepShare& share) {
+  if (!share.is_whole()) throw DeviceError("this device's engines do not share a step with other processes");
+}
 
 std::unique_ptr<TracedPixels> LuminanceEngine::trace_pixels(std::span<const Ray> rays, const MarchSettings& march,
                                                             const RenderEffort& effort) const {

@@ -10,6 +10,7 @@
 
 #include "encoding/hash_grid_levels.h"
 #include "src/engine/pixel_samples.h"
+#include "src/engine/step_share.h"
 #include "src/engine/view_learning.h"
 #include "src/field/state.h"
 #include "src/render/march.h"
@@ -57,6 +58,9 @@ class LuminanceEngine {
 
   /// What steps draw their pixels from. To be called before the first step; the images must outlive the steps.
   virtual void set_views(const std::vector<TrainingView>& views) = 0;
+  /// Steps work on a share of their pixels from now on; their reports are of the whole.
+  /// @throws DeviceError  an engine that cannot
+  virtual void share_steps(const StepShare& share);
   /// One optimiser step. The same step number draws the same pixels.
   virtual StepReport step(float learning_rate) = 0;
   [[nodiscard]] virtual long step_count() const = 0;

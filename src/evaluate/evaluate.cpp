@@ -136,6 +136,16 @@ ViewMetrics mean_of(const std::vector<ViewMetrics>& views) {
   return mean;
 }
 
+std::string split_of(const std::vector<const View*>& views) {
+  return views.front()->held_out ? "held-out" : "train";
+}
+
+Progress progress_of(const Metrics& metrics, std::size_t views) {
+  return {"evaluate",
+          double(metrics.views.size()) / double(views),
+          {{"psnr", metrics.views.back().psnr_luminance.value_or(0)}}};
+}
+
 std::vector<const View*> views_to_evaluate(const Capture& capture, const EvaluateOptions& options) {
   std::vector<const View*> held_out, all;
   for (const View& view : capture.views) {
@@ -164,40 +174,43 @@ ViewMetrics measure(const EvaluatedView& pictures) {
   return metrics;
 }
 
+std::vector<ViewMetrics> evaluate_views(const Scene& scene, std::span<const View* const> views,
+                                        const EvaluateOptions& options,
+                                        const std::function<void(const EvaluatedView&)>& watch) {
+  RenderOptions render = options.render;
+  render.color = scene.is_colorized();
+  render.baked_color = scene.is_colorized() && options.with_baked;
+  std::vector<RenderedImage> ours;
+  for (const View* view : views) {
+    if (interruption_requested()) throw Interrupted("evaluation stopped; nothing was written");
+    ours.push_back(scene.render(view->intrinsics, view->world_from_camera, render));
+    if (ours.back().rgb.empty() && options.grey_as_color) paint_grey(ours.back());
+  }
+  std::vector<std::optional<ColorImage>> truth(views.size());
+  std::vector<ViewMetrics> measured(views.size());
+  parallel_tasks(views.size(), [&](std::size_t i) {
+    truth[i] = load_color_truth(*views[i]);
+    measured[i] = measure({*views[i], ours[i], truth[i]});
+  });
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const EvaluatedView pictures{*views[i], ours[i], truth[i]};
+    if (options.lpips != nullptr) measure_by_network(pictures, *options.lpips, measured[i]);
+    if (watch) watch(pictures);
+  }
+  return measured;
+}
+
 Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptions& options,
                  const std::function<void(const EvaluatedView&)>& watch, const ProgressSink& progress) {
   const std::vector<const View*> views = views_to_evaluate(capture, options);
   Metrics metrics;
-  metrics.split = views.front()->held_out ? "held-out" : "train";
-  RenderOptions render = options.render;
-  render.color = scene.is_colorized();
-  render.baked_color = scene.is_colorized() && options.with_baked;
+  metrics.split = split_of(views);
   const std::size_t at_a_time = views_at_a_time(views);
   for (std::size_t begin = 0; begin < views.size(); begin += at_a_time) {
     const std::size_t count = std::min(at_a_time, views.size() - begin);
-    std::vector<RenderedImage> ours;
-    for (std::size_t i = 0; i < count; ++i) {
-      if (interruption_requested()) throw Interrupted("evaluation stopped; nothing was written");
-      const View& view = *views[begin + i];
-      ours.push_back(scene.render(view.intrinsics, view.world_from_camera, render));
-      if (ours.back().rgb.empty() && options.grey_as_color) paint_grey(ours.back());
-    }
-    std::vector<std::optional<ColorImage>> truth(count);
-    std::vector<ViewMetrics> measured(count);
-    parallel_tasks(count, [&](std::size_t i) {
-      truth[i] = load_color_truth(*views[begin + i]);
-      measured[i] = measure({*views[begin + i], ours[i], truth[i]});
-    });
-    for (std::size_t i = 0; i < count; ++i) {
-      const EvaluatedView pictures{*views[begin + i], ours[i], truth[i]};
-      if (options.lpips != nullptr) measure_by_network(pictures, *options.lpips, measured[i]);
-      metrics.views.push_back(measured[i]);
-      if (watch) watch(pictures);
-      if (progress) {
-        progress({"evaluate",
-                  double(metrics.views.size()) / double(views.size()),
-                  {{"psnr", measured[i].psnr_luminance.value_or(0)}}});
-      }
+    for (ViewMetrics& measured : evaluate_views(scene, std::span(views).subspan(begin, count), options, watch)) {
+      metrics.views.push_back(std::move(measured));
+      if (progress) progress(progress_of(metrics, views.size()));
     }
   }
   metrics.mean = mean_of(metrics.views);

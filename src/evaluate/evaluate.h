@@ -4,6 +4,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -98,11 +99,21 @@ struct EvaluateOptions {
 /// The views `evaluate` looks at: the held-out ones, or some training views when there are none.
 [[nodiscard]] std::vector<const View*> views_to_evaluate(const Capture& capture, const EvaluateOptions& options);
 
+/// Metrics::split of such views.
+[[nodiscard]] std::string split_of(const std::vector<const View*>& views);
+/// With as many of them as there are metrics.
+[[nodiscard]] Progress progress_of(const Metrics& metrics, std::size_t views);
+
 /// Renders and measures each view; hands its pictures to `watch` before they are dropped.
 /// @throws Interrupted  when the user asked to stop; nothing is saved.
 [[nodiscard]] Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptions& options,
                                const std::function<void(const EvaluatedView&)>& watch = {},
                                const ProgressSink& progress = {});
+
+/// The same for some views at once, which takes memory for each; `evaluate` is this over all.
+[[nodiscard]] std::vector<ViewMetrics> evaluate_views(const Scene& scene, std::span<const View* const> views,
+                                                      const EvaluateOptions& options,
+                                                      const std::function<void(const EvaluatedView&)>& watch = {});
 
 /// Measures one pair of pictures; `evaluate` is this over all views, and LPIPS. Thread-safe.
 [[nodiscard]] ViewMetrics measure(const EvaluatedView& pictures);

@@ -6,6 +6,7 @@
 #include "bake/splat/bake_splats.h"
 #include "src/base/files.h"
 #include "src/base/usage.h"
+#include "src/cluster/ranks.h"
 #include "src/pipeline/version.h"
 #include "viewer/server/page_folder.h"
 
@@ -62,6 +63,8 @@ bake::SplatCloud make_splats(const Scene& scene, const Capture& capture, const b
 void bake_step(const RunContext& context, const BakeJob& job, const Engines& engines, Observer& observer) {
   const auto& [take, folder, formats] = job;
   const StepLocks locks(context.directory, folder, observer);
+  const cluster::RanksWait others_wait(cluster::world(), "bake");
+  if (!cluster::world().is_first()) return;
   const Stopwatch watch;
   const auto scene = load_scene(context.directory, take, context.config.finish, engines);
   const Config& config = context.config;
@@ -84,7 +87,7 @@ void bake_step(const RunContext& context, const BakeJob& job, const Engines& eng
 
 void end_bake(const RunDirectory& directory, const fs::path& folder, Observer& observer) {
   const StepLocks locks(directory, folder, observer);
-  fs::remove(folder / kJournal);
+  if (cluster::world().is_first()) fs::remove(folder / kJournal);
 }
 
 }  // namespace cnerf::pipeline

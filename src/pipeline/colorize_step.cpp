@@ -10,6 +10,7 @@
 #include "src/base/text.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/known_color_files.h"
+#include "src/pipeline/shared_training.h"
 #include "src/train/chroma/stage2.h"
 
 namespace cnerf::pipeline {
@@ -33,38 +34,8 @@ std::string last_take(const RunDirectory& directory, bool is_finished) {
   return names.empty() ? "" : names.back();
 }
 
-/// @return  what the take's record says
-TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Engines& engines, Observer& observer) {
-  const RunDirectory& directory = context.directory;
-  // Before anything is written: they may refuse.
-  const auto [known, viewpoints] = load_known_colors(context.capture, context.config.colorizer);
-  std::unique_ptr<Colorizer> made;
-  if (job.colorizer == nullptr) made = colorizer_of(context, observer);
-  Colorizer& colorizer = job.colorizer != nullptr ? *job.colorizer : *made;
-  if (job.existing.overwrite) clear_folder(directory.take_folder(job.take));
-  write_file(directory.take_config_file(job.take), to_toml(context.config));
-  const Stage2Report report = train_stage2(
-      {context.capture, directory.stage1_snapshot(), context.config.stage2, colorizer, known,
-       directory.take_snapshot(job.take), job.existing.resume, job.views, nullptr, nullptr, job.watch, viewpoints},
-      engines, observer);
-  observer.report_progress({"stage 2", 1.0, {}});
-  return {job.take, colorizer.name() + describe(known) + describe_viewpoints(viewpoints), report};
-}
-
-}  // namespace
-
-ColorizerContext colorizer_context(const Config& config, const fs::path& working_folder, const fs::path& cache_folder,
-                                   Observer& observer) {
-  return {working_folder, cache_folder, std::uint64_t(config.stage2.seed), observer.progress_sink(),
-          [&observer](const std::string& text) { observer.say(text); }};
-}
-
-std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& observer) {
-  return make_colorizer(context.config.colorizer, colorizer_context(context.config, context.capture.root,
-                                                                    context.directory.colorizer_cache(), observer));
-}
-
-std::string take_to_write(const RunContext& context, const std::string& named, const ExistingOutput& existing) {
+/// See take_to_write.
+std::string chosen_take(const RunContext& context, const std::string& named, const ExistingOutput& existing) {
   const RunDirectory& directory = context.directory;
   if (!named.empty()) {
     check_take_name(named);
@@ -81,6 +52,62 @@ std::string take_to_write(const RunContext& context, const std::string& named, c
     if (const std::string finished = last_take(directory, true); !finished.empty()) return finished;
   }
   return directory.free_take_name(kind_of(context.config.colorizer.spec));
+}
+
+/// @return  what the take's record says
+TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Engines& engines, Observer& observer) {
+  const RunDirectory& directory = context.directory;
+  // Before anything is written: they may refuse.
+  const auto [known, viewpoints] = load_known_colors(context.capture, context.config.colorizer);
+  std::unique_ptr<Colorizer> made;
+  if (job.colorizer == nullptr) made = colorizer_of(context, observer);
+  Colorizer& colorizer = job.colorizer != nullptr ? *job.colorizer : *made;
+  cluster::Ranks& world = cluster::world();
+  if (world.is_first()) {
+    if (job.existing.overwrite) clear_folder(directory.take_folder(job.take));
+    write_file(directory.take_config_file(job.take), to_toml(context.config));
+  }
+  const bool resume = world.agreed(job.existing.resume && fs::exists(directory.take_snapshot(job.take)));
+  const Stage2Job stage2{context.capture,
+                         directory.stage1_snapshot(),
+                         context.config.stage2,
+                         colorizer,
+                         known,
+                         directory.take_snapshot(job.take),
+                         resume,
+                         job.views,
+                         nullptr,
+                         nullptr,
+                         job.watch,
+                         viewpoints,
+                         ranks_that_train(engines)};
+  const Stage2Report report = is_needed(stage2.ranks) ? train_stage2(stage2, engines, observer) : Stage2Report();
+  observer.report_progress({"stage 2", 1.0, {}});
+  return {job.take, colorizer.name() + describe(known) + describe_viewpoints(viewpoints), report};
+}
+
+}  // namespace
+
+ColorizerContext colorizer_context(const Config& config, const fs::path& working_folder, const fs::path& cache_folder,
+                                   Observer& observer) {
+  return {working_folder, cache_folder, std::uint64_t(config.stage2.seed), observer.progress_sink(),
+          [&observer](const std::string& text) { observer.say(text); }};
+}
+
+std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& observer) {
+  // What rank 0's one learns lies in the run's cache, where the others find it.
+  cluster::Ranks& world = cluster::world();
+  if (!world.is_first()) world.barrier("colorizer");
+  auto colorizer = make_colorizer(
+      context.config.colorizer,
+      colorizer_context(context.config, context.capture.root, context.directory.colorizer_cache(), observer));
+  if (world.is_first()) world.barrier("colorizer");
+  return colorizer;
+}
+
+std::string take_to_write(const RunContext& context, const std::string& named, const ExistingOutput& existing) {
+  cluster::Ranks& world = cluster::world();
+  return world.agreed(world.is_first() ? chosen_take(context, named, existing) : "");
 }
 
 std::vector<Tile> base_candidates(const RunContext& context, ViewCache* views, const Engines& engines,
@@ -107,15 +134,19 @@ void show_bases(const RunContext& context, const Engines& engines, Observer& obs
 void colorize_step(const RunContext& context, const ColorizeJob& job, const Engines& engines, Observer& observer) {
   const RunDirectory& directory = context.directory;
   const StepLocks locks(directory, directory.take_folder(job.take), observer);
-  (void)take_to_write(context, job.take, job.existing);  // again, now that nobody can finish it meanwhile
+  cluster::Ranks& world = cluster::world();
+  // Again, now that nobody can finish it meanwhile.
+  if (world.is_first()) (void)chosen_take(context, job.take, job.existing);
   std::optional<TakeRecord> take = directory.take_record(job.take);
-  if (!take || !job.existing.resume) {
+  if (world.agreed(!take || !job.existing.resume)) {
     take = colorize(context, job, engines, observer);
-    directory.save(*take);
+    if (world.is_first()) directory.save(*take);
   }
-  if (directory.record().current_take != job.take) {
+  if (world.is_first() && directory.record().current_take != job.take) {
     directory.update([&](RunRecord& record) { record.current_take = job.take; });
   }
+  world.barrier("end of stage 2");
+  if (!world.is_first()) return;
   const Stage2Report& report = take->stage2;
   observer.say(
       fmt::format("take {}: {}, {:.0f} s of them waiting for {}, {} patches accepted, {} rejected; baked colour is "

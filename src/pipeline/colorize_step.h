@@ -21,7 +21,7 @@ namespace cnerf::pipeline {
 [[nodiscard]] std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& observer);
 
 /// The take a colorization goes to: the named one, else a free name after the colorizer's kind; with `resume` the take
-/// that was not finished.  @throws UsageError  when the named take is finished and neither is set.
+/// that was not finished. Rank 0 says which.  @throws UsageError  when the named take is finished and neither is set.
 [[nodiscard]] std::string take_to_write(const RunContext& context, const std::string& named,
                                         const ExistingOutput& existing);
 

@@ -7,6 +7,8 @@
 #include "src/base/files.h"
 #include "src/base/json_record.h"
 #include "src/base/usage.h"
+#include "src/cluster/packing.h"
+#include "src/cluster/share_out.h"
 #include "src/evaluate/evaluate.h"
 #include "src/picture/contact_sheet.h"
 #include "src/picture/encode.h"
@@ -29,6 +31,66 @@ void say_metrics(const Metrics& metrics, Observer& observer) {
   observer.say(text);
 }
 
+/// A view's row of the contact sheet.
+using SheetRow = std::vector<Picture>;
+
+SheetRow row_of(const EvaluatedView& view) {
+  const Picture truth =
+      view.truth ? picture_from_linear(view.truth->width, view.truth->height, view.truth->rgb) : Picture{};
+  return {grey_picture(view.view.image), picture_of(view.ours, ShownColor::kDecoded), truth};
+}
+
+/// What a rank finds out about a view.
+struct SeenView {
+  ViewMetrics metrics;
+  SheetRow row;  ///< of the first views
+};
+
+cluster::Bytes packed(const SeenView& seen) {
+  cluster::Packer packer;
+  packer.add(seen.metrics.view);
+  ViewMetrics::visit_numbers(seen.metrics, [&](const char*, const auto& value) { packer.add(value); });
+  packer.add(seen.row.size());
+  for (const Picture& picture : seen.row) packer.add(picture.width).add(picture.height).add(picture.rgb);
+  return packer.packed();
+}
+
+SeenView unpacked(const cluster::Bytes& bytes) {
+  SeenView seen;
+  cluster::Unpacker unpacker(bytes);
+  std::size_t pictures = 0;
+  unpacker.get(seen.metrics.view);
+  ViewMetrics::visit_numbers(seen.metrics, [&](const char*, auto& value) { unpacker.get(value); });
+  unpacker.get(pictures);
+  seen.row.resize(pictures);
+  for (Picture& picture : seen.row) unpacker.get(picture.width).get(picture.height).get(picture.rgb);
+  return seen;
+}
+
+/// `evaluate` by all ranks, a view at a time; the result is rank 0's.
+Metrics evaluate_together(const Scene& scene, const Capture& capture, const EvaluateOptions& options,
+                          ContactSheet& sheet, const ProgressSink& progress) {
+  const std::vector<const View*> views = views_to_evaluate(capture, options);
+  Metrics metrics;
+  metrics.split = split_of(views);
+  const auto see = [&](std::size_t i) {
+    SeenView seen;
+    const auto keep_row = [&](const EvaluatedView& view) {
+      if (i < std::size_t(kSheetRows)) seen.row = row_of(view);
+    };
+    seen.metrics = evaluate_views(scene, std::span(views).subspan(i, 1), options, keep_row).front();
+    return seen;
+  };
+  const auto take = [&](std::size_t, const SeenView& seen) {
+    metrics.views.push_back(seen.metrics);
+    if (!seen.row.empty()) sheet.add_row(seen.row);
+    progress(progress_of(metrics, views.size()));
+  };
+  cluster::share_out(cluster::world(), views.size(), see, take, packed, unpacked);
+  metrics.mean = mean_of(metrics.views);
+  return metrics;
+}
+
 }  // namespace
 
 void evaluate_step(const RunContext& context, const EvaluateJob& job, const Engines& engines, Observer& observer) {
@@ -43,12 +105,12 @@ void evaluate_step(const RunContext& context, const EvaluateJob& job, const Engi
   options.render = render_options(context.config);
   ContactSheet sheet({"input", "ours", "truth"});
   const auto add_to_sheet = [&](const EvaluatedView& view) {
-    if (sheet.rows() >= kSheetRows) return;
-    const Picture truth =
-        view.truth ? picture_from_linear(view.truth->width, view.truth->height, view.truth->rgb) : Picture{};
-    sheet.add_row({grey_picture(view.view.image), picture_of(view.ours, ShownColor::kDecoded), truth});
+    if (sheet.rows() < kSheetRows) sheet.add_row(row_of(view));
   };
-  Metrics metrics = evaluate(*scene, context.capture, options, add_to_sheet, observer.progress_sink());
+  const ProgressSink progress = observer.progress_sink();
+  Metrics metrics = cluster::world().is_alone() ? evaluate(*scene, context.capture, options, add_to_sheet, progress)
+                                                : evaluate_together(*scene, context.capture, options, sheet, progress);
+  if (!cluster::world().is_first()) return;
   metrics.take = job.take;
   metrics.colorizer = colorizer_name(directory, job.take);
 

@@ -11,6 +11,7 @@
 #include "src/base/usage.h"
 #include "src/capture/image_io.h"
 #include "src/capture/load_capture.h"
+#include "src/cluster/share_out.h"
 #include "src/color/colorspace_math.h"
 #include "src/picture/colored_photograph.h"
 #include "src/picture/encode.h"
@@ -170,17 +171,23 @@ std::vector<fs::path> photographs_step(const RunContext& context, const Photogra
   finish.exposure = 0;  // their own light stays
   const auto scene = load_scene(directory, job.take, finish, engines);
   const ProgressSink progress = observer.progress_sink();
+  const bool is_tiff = job.format == PhotographFormat::kTiff;
   std::vector<fs::path> files;
-  for (const Photograph& photograph : photographs) {
+  for (const Photograph& one : photographs) files.push_back(job.folder / (one.name + (is_tiff ? ".tiff" : ".png")));
+  std::size_t written = 0;
+  const auto write = [&](std::size_t i) {
     if (observer.is_cancelled()) {
-      throw Interrupted(fmt::format("stopped; {} of {} photographs were written", files.size(), photographs.size()));
+      throw Interrupted(fmt::format("stopped; {} of {} photographs were written", written, photographs.size()));
     }
-    const cv::Mat picture = colored(photograph, *scene, context.config);
-    const bool is_tiff = job.format == PhotographFormat::kTiff;
-    files.push_back(job.folder / (photograph.name + (is_tiff ? ".tiff" : ".png")));
-    (is_tiff ? write_tiff : write_srgb_png)(files.back(), picture);
-    progress({"photographs", double(files.size()) / double(photographs.size()), {}});
-  }
+    const cv::Mat picture = colored(photographs[i], *scene, context.config);
+    (is_tiff ? write_tiff : write_srgb_png)(files[i], picture);
+  };
+  const auto done = [&](std::size_t i) {
+    written = i + 1;
+    progress({"photographs", double(written) / double(photographs.size()), {}});
+  };
+  cluster::share_out(cluster::world(), photographs.size(), write, done);
+  if (!cluster::world().is_first()) return files;
   observer.wrote("photographs", job.folder);
   note_time(directory, "photographs", watch);
   return files;

@@ -1,4 +1,5 @@
 #include "src/pipeline/render_bake.h"
+#include "src/cluster/share_out.h"
 
 #include <algorithm>
 #include <vector>
@@ -30,14 +31,18 @@ CameraPath cameras_of_bake(const fs::path& bake) {
 
 void render_bake(const fs::path& bake, const CameraPath& path, const fs::path& folder, Observer& observer) {
   const FolderLock lock = lock_folder(folder.parent_path(), FolderLock::Mode::kAlone, observer);
+  cluster::world().barrier("begin of a step");
   const std::vector<bake::Volume> volumes = exporting::read_volumes(bake);
-  for (std::size_t i = 0; i < path.cameras.size(); ++i) {
+  const auto write = [&](std::size_t i) {
     const PathCamera& camera = path.cameras[i];
     const bake::VolumeImage image = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);
     write_png(folder / (camera.name + ".png"), picture_from_linear(image.width, image.height, image.rgb));
+  };
+  const auto done = [&](std::size_t i) {
     observer.report_progress({"render", double(i + 1) / double(path.cameras.size()), {}});
     if (observer.is_cancelled()) throw Interrupted("stopped");
-  }
+  };
+  cluster::share_out(cluster::world(), path.cameras.size(), write, done);
   observer.wrote("pictures", folder);
 }
 

@@ -4,11 +4,23 @@
 #include "bake/provenance.h"
 #include "src/base/error.h"
 #include "src/base/usage.h"
+#include "src/cluster/packing.h"
+#include "src/cluster/share_out.h"
 #include "src/picture/encode.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
 namespace {
+
+cluster::Bytes packed(const Picture& picture) {
+  return cluster::Packer().add(picture.width).add(picture.height).add(picture.rgb).packed();
+}
+
+Picture unpacked(const cluster::Bytes& bytes) {
+  Picture picture;
+  cluster::Unpacker(bytes).get(picture.width).get(picture.height).get(picture.rgb);
+  return picture;
+}
 
 /// The files of one render, opened as pictures come.
 class RenderFiles {
@@ -21,14 +33,20 @@ class RenderFiles {
         video_path_(output.folder / (path_name + ".mp4")),
         video_(video_path_, fps),
         with_video_(output.mp4),
-        with_png_(output.png),
         observer_(observer) {}
 
-  void add(const std::string& name, const RenderedImage& image) {
+  /// The files of one picture, by whichever rank renders it.  @return  its frame of the video
+  [[nodiscard]] Picture write(const std::string& name, const RenderedImage& image) const {
     const Picture picture = picture_of(image, output_.color);
-    if (with_video_ && !video_.add(picture)) give_video_up();
-    if (with_png_) write_png(frames_ / (name + ".png"), picture);
+    if (output_.png) write_png(frames_ / (name + ".png"), picture);
     if (output_.exr) write_exr(frames_ / (name + ".exr"), image, output_.color, color_origin_);
+    return output_.mp4 ? picture : Picture();
+  }
+  /// All frames in order, on rank 0.
+  void add_to_video(const std::string& name, const Picture& picture) {
+    if (!output_.mp4) return;
+    if (with_video_ && !video_.add(picture)) give_video_up();
+    if (!with_video_ && !output_.png) write_png(frames_ / (name + ".png"), picture);
   }
 
   void finish() {
@@ -36,21 +54,20 @@ class RenderFiles {
       video_.finish();
       observer_.wrote("video", video_path_);
     }
-    if (with_png_ || output_.exr) observer_.wrote("pictures", frames_);
+    if (output_.png || output_.exr || with_video_ != output_.mp4) observer_.wrote("pictures", frames_);
   }
 
  private:
   void give_video_up() {
     observer_.say("note: this OpenCV has no MPEG-4 encoder; writing PNG pictures instead of a video");
     with_video_ = false;
-    with_png_ = true;
   }
 
   const RenderOutput& output_;
   std::string color_origin_;
   fs::path frames_, video_path_;
   VideoFile video_;
-  bool with_video_, with_png_;
+  bool with_video_;
   Observer& observer_;
 };
 
@@ -72,12 +89,18 @@ void render_step(const RunContext& context, const RenderJob& job, const Engines&
   const std::string color_origin = bake::color_origin_text(colorizer_name(context.directory, job.take), job.take);
   RenderFiles files(output, job.path.name, color_origin, context.config.render.fps, observer);
   const ProgressSink progress = observer.progress_sink();
-  for (std::size_t i = 0; i < job.path.cameras.size(); ++i) {
+  const std::vector<PathCamera>& cameras = job.path.cameras;
+  const auto make = [&](std::size_t i) {
     if (observer.is_cancelled()) throw Interrupted("rendering stopped; the video was not written");
-    const PathCamera& camera = job.path.cameras[i];
-    files.add(camera.name, scene->render(camera.intrinsics, camera.world_from_camera, options));
-    progress({"render " + job.path.name, double(i + 1) / double(job.path.cameras.size()), {}});
-  }
+    const PathCamera& camera = cameras[i];
+    return files.write(camera.name, scene->render(camera.intrinsics, camera.world_from_camera, options));
+  };
+  const auto take = [&](std::size_t i, const Picture& picture) {
+    files.add_to_video(cameras[i].name, picture);
+    progress({"render " + job.path.name, double(i + 1) / double(cameras.size()), {}});
+  };
+  cluster::share_out(cluster::world(), cameras.size(), make, take, packed, unpacked);
+  if (!cluster::world().is_first()) return;
   files.finish();
   note_time(context.directory, "render", watch);
 }

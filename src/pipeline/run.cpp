@@ -1,5 +1,6 @@
 #include "src/pipeline/run.h"
 
+#include "src/cluster/ranks.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/default_colorizer.h"
 #include "src/pipeline/evaluate_step.h"
@@ -14,13 +15,19 @@ namespace {
 
 /// Outputs of an earlier, interrupted call that need not be made again.
 bool is_done(const RunJob& job, const fs::path& output) {
-  return job.existing.resume && fs::exists(output);
+  return cluster::world().agreed(job.existing.resume && fs::exists(output));
+}
+
+/// Rank 0 makes the capture, if that is to be made; the others wait.
+fs::path common_capture(const RunJob& job, Observer& observer) {
+  cluster::Ranks& world = cluster::world();
+  return world.agreed(world.is_first() ? capture_of(job.capture, job.out, observer).string() : "");
 }
 
 bool needs_colorizer(const RunJob& job, const RunDirectory& directory) {
   if (job.grey) return false;
   const bool is_colorized = directory.exists() && !directory.record().current_take.empty();
-  return !(job.existing.resume && is_colorized);
+  return cluster::world().agreed(!(job.existing.resume && is_colorized));
 }
 
 }  // namespace
@@ -29,7 +36,7 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& observ
   const RunDirectory directory(job.out);
   const FolderLock lock = claim_run_folder(directory, job.existing, observer);
   if (!job.grey) choose_colorizer(job.capture, config, observer);
-  job.capture = capture_of(job.capture, job.out, observer);
+  job.capture = common_capture(job, observer);
 
   RunContext context{directory, config, read_capture(job.capture, config, observer), job.command_line};
   // Made before the training: what cannot be made or read should not cost an hour.

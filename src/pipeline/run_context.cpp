@@ -8,6 +8,7 @@
 #include "src/base/files.h"
 #include "src/base/text.h"
 #include "src/capture/load_capture.h"
+#include "src/cluster/ranks.h"
 #include "src/pipeline/version.h"
 #include "src/train/luminance/learned_views.h"
 #include "src/train/luminance/stage1.h"
@@ -19,6 +20,7 @@ namespace fs = std::filesystem;
 constexpr int kDeepestOutput = 3;
 
 FolderLock lock_folder(const fs::path& folder, FolderLock::Mode mode, Observer& observer) {
+  if (!cluster::world().is_first()) return FolderLock::of_another_process();
   FolderLock lock(folder, mode);
   if (!lock.is_held()) {
     observer.say("note: " + folder.string() +
@@ -31,6 +33,7 @@ FolderLock lock_folder(const fs::path& folder, FolderLock::Mode mode, Observer& 
 StepLocks::StepLocks(const RunDirectory& directory, const fs::path& folder, Observer& observer)
     : run(lock_folder(directory.root(), FolderLock::Mode::kShared, observer)) {
   if (folder != directory.root()) own = lock_folder(folder, FolderLock::Mode::kAlone, observer);
+  cluster::world().barrier("begin of a step");
 }
 
 Capture read_capture(const fs::path& path, const Config& config, Observer& observer) {
@@ -63,12 +66,15 @@ void check_run_folder(const RunDirectory& directory, const ExistingOutput& exist
 
 FolderLock claim_run_folder(const RunDirectory& directory, const ExistingOutput& existing, Observer& observer) {
   check_run_folder(directory, existing);
+  cluster::world().barrier("look at the run's folder");  // before rank 0 changes it
   FolderLock lock = lock_folder(directory.root(), FolderLock::Mode::kAlone, observer);
-  check_run_folder(directory, existing);  // again, now that nobody can change the answer
+  if (cluster::world().is_first()) check_run_folder(directory, existing);  // again, now that nobody can change it
   return lock;
 }
 
-void begin_run(const RunContext& context, const fs::path& capture_path, const ExistingOutput& existing) {
+namespace {
+
+void begin_records(const RunContext& context, const fs::path& capture_path, const ExistingOutput& existing) {
   const RunDirectory& directory = context.directory;
   const FolderLock lock(directory.root());
   const bool goes_on = directory.exists() && existing.resume;
@@ -84,6 +90,13 @@ void begin_run(const RunContext& context, const fs::path& capture_path, const Ex
   record.program_version = version_text();
   record.command_line = joined(context.command_line);
   directory.save(record);
+}
+
+}  // namespace
+
+void begin_run(const RunContext& context, const fs::path& capture_path, const ExistingOutput& existing) {
+  if (cluster::world().is_first()) begin_records(context, capture_path, existing);
+  cluster::world().barrier("begin of the run");
 }
 
 }  // namespace cnerf::pipeline

@@ -35,10 +35,11 @@ void use_learned_views(RunContext& context, Observer& observer);
 /// Reads a capture and says what was found, with the reader's notes.
 [[nodiscard]] Capture read_capture(const std::filesystem::path& path, const Config& config, Observer& observer);
 
-/// FolderLock; says so where the file system has no locks. Clears away what killed writers left there.
+/// FolderLock, which rank 0 holds for all; says so where the file system has no locks. Clears away what killed writers
+/// left there.
 [[nodiscard]] FolderLock lock_folder(const std::filesystem::path& folder, FolderLock::Mode mode, Observer& observer);
 /// For a step that works on a run and writes a folder of its own, which may lie in the run: holds that one alone, and
-/// keeps the run from being cleared.
+/// keeps the run from being cleared. Ranks wait for each other here.
 struct StepLocks {
   StepLocks(const RunDirectory& directory, const std::filesystem::path& folder, Observer& observer);
   FolderLock run;

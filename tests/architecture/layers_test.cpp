@@ -20,6 +20,7 @@ namespace fs = std::filesystem;
 /// From the bottom to the top, as add_subdirectory has them in the root CMakeLists.txt; a file may include its own
 /// folder and those before it.
 const std::vector<std::string> kLayers = {"src/base",
+                                          "src/cluster",
                                           "src/color",
                                           "src/picture",
                                           "src/capture",

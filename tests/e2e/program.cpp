@@ -84,6 +84,10 @@ fs::path fixture(const std::string& name, const std::function<ProgramResult(cons
 
 }  // namespace
 
+std::string program() {
+  return CNERF_PROGRAM;
+}
+
 ProgramResult cnerf(const std::vector<std::string>& arguments) {
   return run(arguments, "");
 }

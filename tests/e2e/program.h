@@ -16,6 +16,9 @@ struct ProgramResult {
   std::string err;  ///< standard error
 };
 
+/// Its path.
+[[nodiscard]] std::string program();
+
 /// Runs cnerf with these arguments and waits for it. It sees no GPU, whatever the machine has.
 [[nodiscard]] ProgramResult cnerf(const std::vector<std::string>& arguments);
 

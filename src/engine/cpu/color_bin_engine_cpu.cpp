@@ -25,12 +25,15 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     head_.set_weights(initial_chroma_head(seed));
   }
 
+  void share_steps(const StepShare& share) override { share_ = share; }
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
     const float scale = 1.0f / float(pixels.pixels());
-    chunks_.run(pixels.pixels(), kBlockPixels, features_.weight_count() + head_.layout().weight_count(),
-                [&](StepChunk& chunk, std::size_t begin, std::size_t end) {
+    const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
+    chunks_.run(last - own, kBlockPixels, features_.weight_count() + head_.layout().weight_count(),
+                [&, shift = own](StepChunk& chunk, std::size_t from, std::size_t to) {
+                  const std::size_t begin = shift + from, end = shift + to;
                   Work& work = works_.local();
                   forward(pixels, begin, end, work);
                   for (std::size_t p = begin; p < end; ++p) {
@@ -42,11 +45,12 @@ class ColorBinEngineCpu final : public ColorBinEngine {
                   chunk.loss += more.spread * spread;
                 });
     steps_.front() += 1;
-    const std::vector<float> d_weights = chunks_.d_weights();
+    const auto [d_weights, total] = chunks_.sums(share_);
     const auto split = std::ptrdiff_t(features_.weight_count());
-    features_.update(chunks_.runs(), {d_weights.begin(), d_weights.begin() + split}, learning_rate, steps_.front());
+    features_.update(chunks_.runs(), {d_weights.begin(), d_weights.begin() + split}, learning_rate, steps_.front(),
+                     share_.sum);
     head_.update({d_weights.begin() + split, d_weights.end()}, AdamStep(learning_rate, steps_.front()));
-    return chunks_.loss() * scale;
+    return total * scale;
   }
 
   void logits(const PixelSamples& pixels, std::span<float> logits) const override {
@@ -205,6 +209,7 @@ class ColorBinEngineCpu final : public ColorBinEngine {
 
   PointNetCpu features_;
   MlpCpu head_;
+  StepShare share_;
   StepChunks chunks_;
   std::vector<std::int64_t> steps_ = {0};
   mutable tbb::enumerable_thread_specific<Work> works_;

@@ -18,13 +18,16 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
   ColorFieldEngineCpu(const HashGridOptions& grid, std::uint64_t seed)
       : field_(grid, kChromaticityOutputs, /*relu_output=*/false, seed) {}
 
+  void share_steps(const StepShare& share) override { share_ = share; }
   using ColorFieldEngine::step;
   double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
               AbLoss loss, float learning_rate) override {
     CNERF_CHECK_EQ(targets.size(), pixels.pixels());
     const float scale = 1.0f / float(pixels.pixels());
-    chunks_.run(pixels.pixels(), kBlockPixels, field_.weight_count(),
-                [&](StepChunk& chunk, std::size_t begin, std::size_t end) {
+    const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
+    chunks_.run(last - own, kBlockPixels, field_.weight_count(),
+                [&, shift = own](StepChunk& chunk, std::size_t from, std::size_t to) {
+                  const std::size_t begin = shift + from, end = shift + to;
                   PointWorkspace& work = works_.local();
                   const std::size_t first = forward(pixels, begin, end, work);
                   std::fill(work.d_output.begin(), work.d_output.end(), 0.0f);
@@ -38,8 +41,9 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
                   field_.backward(work, d_encoded, chunk.d_weights.data());
                 });
     steps_.front() += 1;
-    field_.update(chunks_.runs(), chunks_.d_weights(), learning_rate, steps_.front());
-    return chunks_.loss() * scale;
+    const auto [d_weights, total] = chunks_.sums(share_);
+    field_.update(chunks_.runs(), d_weights, learning_rate, steps_.front(), share_.sum);
+    return total * scale;
   }
 
   void composite(const PixelSamples& pixels, std::span<Ab> colors) const override {
@@ -109,6 +113,7 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
   }
 
   PointNetCpu field_;
+  StepShare share_;
   StepChunks chunks_;
   std::vector<std::int64_t> steps_ = {0};
   mutable tbb::enumerable_thread_specific<PointWorkspace> works_;

@@ -28,6 +28,12 @@ void set_position(float* positions, std::size_t sample, Vec3f p) {
   for (int axis = 0; axis < 3; ++axis) grouped.at(sample, axis) = std::clamp(p[axis], 0.0f, 1.0f);
 }
 
+template <typename Gradients>
+std::span<float> floats_of(std::vector<Gradients>& structs) {
+  static_assert(sizeof(Gradients) % sizeof(float) == 0);
+  return {reinterpret_cast<float*>(structs.data()), structs.size() * sizeof(Gradients) / sizeof(float)};
+}
+
 /// Fills the unused lanes of the last group with a legal position.
 void pad_positions(AlignedVector<float>& positions, std::size_t samples) {
   for (std::size_t s = samples; s < groups_of(samples) * kGroup; ++s)
@@ -39,6 +45,7 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   explicit LuminanceEngineCpu(const LuminanceEngineOptions& options);
 
   void set_views(const std::vector<TrainingView>& views) override;
+  void share_steps(const StepShare& share) override { share_ = share; }
   StepReport step(float learning_rate) override;
   [[nodiscard]] long step_count() const override { return counters_.front(); }
   [[nodiscard]] std::vector<ViewCorrection> view_corrections() const override { return corrections_; }
@@ -113,8 +120,17 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   /// What the block's samples say of the poses of their views, and of their lenses.
   void add_camera_gradients(std::span<const ObservedRay> rays, const float* d_encoded, Teaching teaching, Block& block,
                             StepChunk& chunk) const;
-  void update_corrections(float learning_rate);
-  void update_lenses(const AdamStep& adam);
+  /// What a step adds up beside the table's gradient.
+  struct StepSums {
+    std::vector<float> d_weights;
+    std::vector<ViewGradient> d_views;
+    std::vector<LensGradient> d_lenses;
+    StepReport report;
+  };
+  /// Of the chunks, and of all processes that share the step.
+  [[nodiscard]] StepSums sums() const;
+  void update_corrections(const StepSums& sums, float learning_rate);
+  void update_lenses(const StepSums& sums, const AdamStep& adam);
   /// Gives the views' cameras the lenses that were learned.
   void use_lenses();
   [[nodiscard]] StepReport report() const;
@@ -129,6 +145,7 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   std::vector<LensMoments> lens_moments_;
   std::vector<Intrinsics> given_lenses_;  // of each view
   std::vector<std::int64_t> counters_;    // steps done, rays of the next step
+  StepShare share_;
   StepChunks chunks_;
   mutable tbb::enumerable_thread_specific<Block> blocks_;
 };
@@ -331,15 +348,35 @@ void LuminanceEngineCpu::add_camera_gradients(std::span<const ObservedRay> rays,
   }
 }
 
-void LuminanceEngineCpu::update_corrections(float learning_rate) {
+LuminanceEngineCpu::StepSums LuminanceEngineCpu::sums() const {
+  StepSums sums{chunks_.d_weights(), std::vector<ViewGradient>(corrections_.size()),
+                std::vector<LensGradient>(lenses_.size()), report()};
+  for (const StepChunk& chunk : chunks_.all()) {
+    for (std::size_t v = 0; v < sums.d_views.size(); ++v) sums.d_views[v] += chunk.d_views[v];
+    for (std::size_t l = 0; l < sums.d_lenses.size(); ++l) sums.d_lenses[l] += chunk.d_lenses[l];
+  }
+  if (share_.is_whole()) return sums;
+  const std::array<std::span<float>, 3> gradients = {sums.d_weights, floats_of(sums.d_views), floats_of(sums.d_lenses)};
+  SharedNumbers shared;
+  for (const std::span<float> part : gradients) shared.add(part);
+  shared.add(float(sums.report.loss));
+  shared.add(float(sums.report.squared_error));
+  shared.add_count(sums.report.trained_samples);
+  shared.sum(share_.sum);
+  for (const std::span<float> part : gradients) shared.next(part);
+  sums.report.loss = shared.next();
+  sums.report.squared_error = shared.next();
+  sums.report.trained_samples = shared.next_count();
+  return sums;
+}
+
+void LuminanceEngineCpu::update_corrections(const StepSums& sums, float learning_rate) {
   const AdamStep adam(learning_rate, step_count());
   const auto n = int(corrections_.size());
   for (std::size_t v = 0; v < corrections_.size(); ++v) {
-    ViewGradient sum;
-    for (const StepChunk& chunk : chunks_.all()) sum += chunk.d_views[v];
-    update_view(options_.learning, adam, step_count(), sum, correction_moments_[v], corrections_[v]);
+    update_view(options_.learning, adam, step_count(), sums.d_views[v], correction_moments_[v], corrections_[v]);
   }
-  update_lenses(adam);
+  update_lenses(sums, adam);
   if (step_count() % kGaugeEvery != 0) return;
   const auto origin = [&](int v) { return views_[std::size_t(v)].camera.origin.cast<float>(); };
   ViewGauge gauge = pose_gauge(corrections_.data(), n, origin);
@@ -349,13 +386,11 @@ void LuminanceEngineCpu::update_corrections(float learning_rate) {
   for (int v = 0; v < n; ++v) gauge.take_off(origin(v), corrections_[std::size_t(v)]);
 }
 
-void LuminanceEngineCpu::update_lenses(const AdamStep& adam) {
+void LuminanceEngineCpu::update_lenses(const StepSums& sums, const AdamStep& adam) {
   for (std::size_t l = 0; l < lenses_.size(); ++l) {
-    LensGradient sum;
-    for (const StepChunk& chunk : chunks_.all()) sum += chunk.d_lenses[l];
     const auto first = std::ranges::find(views_, int(l), &TrainingView::lens);
     const Intrinsics& given = given_lenses_[std::size_t(first - views_.begin())];
-    update_lens(options_.learning.of_cameras(adam, options_.learning.lens_rate, step_count()), given, sum,
+    update_lens(options_.learning.of_cameras(adam, options_.learning.lens_rate, step_count()), given, sums.d_lenses[l],
                 lens_moments_[l], lenses_[l]);
   }
   use_lenses();
@@ -381,20 +416,23 @@ StepReport LuminanceEngineCpu::step(float learning_rate) {
   }
   const auto rays = std::size_t(counters_[1]);
   static_assert(kBlockRays == kPoseRayBlock);
-  chunks_.run(rays, kBlockRays, field_.weight_count(), [&](StepChunk& chunk, std::size_t begin, std::size_t end) {
+  const auto [first, last] = share_.range(rays, kBlockRays);
+  const auto work = [&, own = first](StepChunk& chunk, std::size_t from, std::size_t to) {
+    const std::size_t begin = own + from, end = own + to;
     std::array<ObservedRay, kBlockRays> observed;
     for (std::size_t r = begin; r < end; ++r) {
       observed[r - begin] = observe_ray(views_, options_.seed, step, r, corrections_);
     }
     train_block({observed.data(), end - begin}, 1.0f / float(rays), teaching(std::uint32_t(begin)), blocks_.local(),
                 chunk);
-  });
-  const StepReport done = report();
+  };
+  chunks_.run(last - first, kBlockRays, field_.weight_count(), work);
+  const StepSums done = sums();
   counters_[0] += 1;
-  field_.update(chunks_.runs(), chunks_.d_weights(), learning_rate, counters_[0]);
-  if (options_.learning.is_on()) update_corrections(learning_rate);
-  counters_[1] = next_rays(counters_[1], std::int64_t(done.trained_samples), options_.samples_per_step);
-  return done;
+  field_.update(chunks_.runs(), done.d_weights, learning_rate, counters_[0], share_.sum);
+  if (options_.learning.is_on()) update_corrections(done, learning_rate);
+  counters_[1] = next_rays(counters_[1], std::int64_t(done.report.trained_samples), options_.samples_per_step);
+  return done.report;
 }
 
 void LuminanceEngineCpu::render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "src/base/aligned.h"
 #include "src/base/parallel.h"
+#include "src/engine/step_share.h"
 #include "src/field/cpu/hash_grid.h"
 #include "src/render/lens_correction.h"
 #include "src/render/view_correction.h"
@@ -82,6 +84,18 @@ class StepChunks {
     double total = 0;
     for (const StepChunk& chunk : chunks_) total += chunk.loss;
     return total;
+  }
+  /// Both, over all processes that share the step.
+  [[nodiscard]] std::pair<std::vector<float>, double> sums(const StepShare& share) const {
+    std::pair<std::vector<float>, double> sums = {d_weights(), loss()};
+    if (share.is_whole()) return sums;
+    SharedNumbers shared;
+    shared.add(sums.first);
+    shared.add(float(sums.second));
+    shared.sum(share.sum);
+    shared.next(sums.first);
+    sums.second = shared.next();
+    return sums;
   }
 
  private:

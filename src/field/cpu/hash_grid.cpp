@@ -14,19 +14,36 @@ HashGridCpu::HashGridCpu(const HashGridOptions& options, std::uint64_t seed)
   moments_.assign(rows * 8, 0.0f);
 }
 
-void HashGridCpu::backward_and_update(const std::vector<EncodedSamples>& runs, const AdamStep& step) {
+void HashGridCpu::scatter(std::size_t l, const std::vector<EncodedSamples>& runs) {
+  const GridLevel& level = levels_[l];
+  for (const EncodedSamples& run : runs) {
+    kernels_->scatter_level(level, run.positions, run.d_encoded, run.groups, channels(), 4 * int(l),
+                            d_table_.data() + 4 * std::size_t(level.first_row));
+  }
+}
+
+void HashGridCpu::update(std::size_t l, const AdamStep& step) {
+  const GridLevel& level = levels_[l];
+  const std::size_t first = level.first_row;
+  update_rows({table_.data() + 4 * first, d_table_.data() + 4 * first, moments_.data() + 8 * first, level.rows}, step,
+              decay_);
+}
+
+void HashGridCpu::backward_and_update(const std::vector<EncodedSamples>& runs, const AdamStep& step,
+                                      const GradientSum& sum) {
   // Finest levels first: they take longest.
-  parallel_tasks(levels_.size(), [&](std::size_t task) {
-    const std::size_t l = levels_.size() - 1 - task;
-    const GridLevel& level = levels_[l];
-    float* d_rows = d_table_.data() + 4 * std::size_t(level.first_row);
-    for (const EncodedSamples& run : runs) {
-      kernels_->scatter_level(level, run.positions, run.d_encoded, run.groups, channels(), 4 * int(l), d_rows);
-    }
-    update_rows({table_.data() + 4 * std::size_t(level.first_row), d_rows,
-                 moments_.data() + 8 * std::size_t(level.first_row), level.rows},
-                step, decay_);
-  });
+  const auto each_level = [&](const auto& work) {
+    parallel_tasks(levels_.size(), [&](std::size_t task) { work(levels_.size() - 1 - task); });
+  };
+  if (!sum) {
+    return each_level([&](std::size_t l) {
+      scatter(l, runs);
+      update(l, step);
+    });
+  }
+  each_level([&](std::size_t l) { scatter(l, runs); });
+  sum(d_table_);
+  each_level([&](std::size_t l) { update(l, step); });
 }
 
 void HashGridCpu::append_state(const std::string& prefix, std::vector<StatePiece>& state) {

@@ -9,6 +9,7 @@
 #include "encoding/hash_grid_levels.h"
 #include "src/base/aligned.h"
 #include "src/field/state.h"
+#include "src/optim/gradient_sum.h"
 #include "src/optim/row_adam.h"
 
 namespace cnerf {
@@ -33,7 +34,8 @@ class HashGridCpu {
   }
   /// Scatters all runs and applies Adam, one task per level: a level's rows stay in one core's cache, and sums are made
   /// in the order of the runs for any number of threads.
-  void backward_and_update(const std::vector<EncodedSamples>& runs, const AdamStep& step);
+  /// @param sum  between the two, of the whole table's gradient
+  void backward_and_update(const std::vector<EncodedSamples>& runs, const AdamStep& step, const GradientSum& sum = {});
   /// @param levels  that count, coarsest first
   void position_gradient(int levels, const float* positions, const float* d_encoded, std::size_t groups,
                          float* d_positions) const {
@@ -43,6 +45,9 @@ class HashGridCpu {
   void append_state(const std::string& prefix, std::vector<StatePiece>& state);
 
  private:
+  void scatter(std::size_t level, const std::vector<EncodedSamples>& runs);
+  void update(std::size_t level, const AdamStep& step);
+
   std::vector<GridLevel> levels_;
   float decay_;
   const HashGridKernels* kernels_;

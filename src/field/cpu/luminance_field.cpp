@@ -94,9 +94,9 @@ void LuminanceFieldCpu::backward(LuminanceWorkspace& work, float* d_encoded, flo
 }
 
 void LuminanceFieldCpu::update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights,
-                               float learning_rate, long step) {
+                               float learning_rate, long step, const GradientSum& sum) {
   const AdamStep adam(learning_rate, step);
-  grid_.backward_and_update(runs, adam);
+  grid_.backward_and_update(runs, adam, sum);
   const std::size_t split = density_net_.layout().weight_count();
   density_net_.update({d_weights.begin(), d_weights.begin() + std::ptrdiff_t(split)}, adam);
   luminance_net_.update({d_weights.begin() + std::ptrdiff_t(split), d_weights.end()}, adam);

@@ -51,8 +51,10 @@ class LuminanceFieldCpu {
   }
   [[nodiscard]] const std::vector<GridLevel>& levels() const { return grid_.levels(); }
 
+  /// @param sum        over processes, of the table's gradient
+  /// @param d_weights  summed already
   void update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights, float learning_rate,
-              long step);
+              long step, const GradientSum& sum = {});
 
   [[nodiscard]] std::size_t weight_count() const {
     return density_net_.layout().weight_count() + luminance_net_.layout().weight_count();

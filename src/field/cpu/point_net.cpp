@@ -48,9 +48,9 @@ void PointNetCpu::backward(PointWorkspace& work, float* d_encoded, float* d_weig
 }
 
 void PointNetCpu::update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights,
-                         float learning_rate, long step) {
+                         float learning_rate, long step, const GradientSum& sum) {
   const AdamStep adam(learning_rate, step);
-  grid_.backward_and_update(runs, adam);
+  grid_.backward_and_update(runs, adam, sum);
   net_.update(d_weights, adam);
 }
 

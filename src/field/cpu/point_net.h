@@ -31,8 +31,9 @@ class PointNetCpu {
   /// From `work.d_output`, given behind the output's ReLU if there is one.
   /// @param d_encoded  [G, 4 L, 16], written   @param d_weights  [weight_count], added to
   void backward(PointWorkspace& work, float* d_encoded, float* d_weights) const;
+  /// See LuminanceFieldCpu::update.
   void update(const std::vector<EncodedSamples>& runs, const std::vector<float>& d_weights, float learning_rate,
-              long step);
+              long step, const GradientSum& sum = {});
 
   [[nodiscard]] int encoded_channels() const { return grid_.channels(); }
   [[nodiscard]] std::size_t weight_count() const { return net_.layout().weight_count(); }

@@ -24,7 +24,7 @@ std::vector<AnsweredPatch> BaseChooser::choose(const KnownColorMap& known) {
   if (known.key_frames().empty() && purify.enabled && !is_picked && purify.opinions > 1) return typical_bases();
   const bool has_key_frames = !known.key_frames().empty();
   const std::vector<AnsweredPatch> candidates = has_key_frames ? bases_of_key_frames(known) : ask_candidates();
-  write_png(session_.folder() / "bases.png", tiled(candidate_tiles(candidates)));
+  if (session_.ranks().is_first()) write_png(session_.folder() / "bases.png", tiled(candidate_tiles(candidates)));
   if (has_key_frames) return candidates;
   std::vector<AnsweredPatch> bases;
   for (const int index : picked()) bases.push_back(candidates[std::size_t(index)]);
@@ -65,7 +65,7 @@ std::vector<AnsweredPatch> BaseChooser::typical_bases() {
     bases.push_back(*std::ranges::max_element(of_place, of_place + purify.opinions, {}, likeness));
     tiles.push_back(tile_of(bases.back(), "of " + std::to_string(purify.opinions)));
   }
-  write_png(session_.folder() / "bases.png", tiled(tiles));
+  if (session_.ranks().is_first()) write_png(session_.folder() / "bases.png", tiled(tiles));
   return bases;
 }
 

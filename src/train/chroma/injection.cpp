@@ -49,7 +49,7 @@ void PatchTraining::run() {
     session_.after_step("stage 2", "loss", steps(), options.patches);
   }
   if (model.sky.exists()) model.sky.refresh();
-  galleries_.write(session_.folder());
+  if (session_.ranks().is_first()) galleries_.write(session_.folder());
 }
 
 long PatchTraining::steps() const {

@@ -5,6 +5,7 @@
 
 #include "src/base/rng.h"
 #include "src/base/usage.h"
+#include "src/cluster/packing.h"
 
 namespace cnerf {
 namespace {
@@ -43,8 +44,34 @@ Answers Questioner::ask(std::span<const PatchPlace> places) const {
   for (const PatchPlace& place : places) {
     answers.patches.push_back({place, k, render_patch(session_.views()[place.view], place, k), {}});
   }
-  questions_.answer(session_, answers.patches);
+  const auto [first, last] = part_of(places.size(), session_.ranks().rank());
+  if (first < last) questions_.answer(session_, std::span(answers.patches).subspan(first, last - first));
   answers.seconds = watch.seconds();
+  return answers;
+}
+
+std::pair<std::size_t, std::size_t> Questioner::part_of(std::size_t patches, int rank) const {
+  const auto ranks = std::size_t(session_.ranks().size()), part = std::size_t(rank);
+  return {patches * part / ranks, patches * (part + 1) / ranks};
+}
+
+void Questioner::exchange(std::vector<AnsweredPatch>& patches) const {
+  cluster::Ranks& ranks = session_.ranks();
+  if (ranks.is_alone()) return;
+  cluster::Packer own;
+  const auto [first, last] = part_of(patches.size(), ranks.rank());
+  for (std::size_t i = first; i < last; ++i) own.add(patches[i].ab);
+  const std::vector<cluster::Bytes> all = ranks.gather(own.packed());
+  for (int rank = 0; rank < ranks.size(); ++rank) {
+    cluster::Unpacker answers(all[std::size_t(rank)]);
+    const auto [begin, end] = part_of(patches.size(), rank);
+    for (std::size_t i = begin; i < end; ++i) answers.get(patches[i].ab);
+  }
+}
+
+Answers Questioner::next() {
+  Answers answers = coming_.get();
+  exchange(answers.patches);
   return answers;
 }
 
@@ -53,6 +80,7 @@ std::vector<AnsweredPatch> Questioner::ask_all(const std::vector<PatchPlace>& pl
   std::vector<AnsweredPatch> answered;
   for (std::size_t first = 0; first < places.size(); first += batch) {
     Answers answers = ask(std::span(places).subspan(first, std::min(batch, places.size() - first)));
+    exchange(answers.patches);
     session_.model.report.colorizer_seconds += answers.seconds;
     std::ranges::move(answers.patches, std::back_inserter(answered));
   }

@@ -3,6 +3,7 @@
 
 #include <future>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "src/train/chroma/patches.h"
@@ -45,10 +46,15 @@ class Questioner {
   /// is under way at a time; which patches it shows depends on their numbers alone.
   void ask_ahead(std::int64_t first);
   /// Waits for what was asked ahead.
-  [[nodiscard]] Answers next() { return coming_.get(); }
+  [[nodiscard]] Answers next();
 
  private:
+  /// Of the places, this rank's part has answers then.
   [[nodiscard]] Answers ask(std::span<const PatchPlace> places) const;
+  /// Which of so many patches this rank asks about: the first one and the one behind the last.
+  [[nodiscard]] std::pair<std::size_t, std::size_t> part_of(std::size_t patches, int rank) const;
+  /// Gives all ranks the answers that each of them has.
+  void exchange(std::vector<AnsweredPatch>& patches) const;
 
   Session& session_;
   Questions& questions_;

@@ -7,6 +7,7 @@
 #include "src/base/files.h"
 #include "src/picture/picture.h"
 #include "src/train/luminance/options_json.h"
+#include "src/train/luminance/shared_steps.h"
 
 namespace cnerf {
 namespace {
@@ -25,6 +26,12 @@ Session::Session(const Stage2Job& job, Observer& observer)
       cache_(job.views != nullptr ? *job.views : own_cache_) {}
 
 void Session::start_or_resume(const Engines& engines, PixelColors pixel_colors) {
+  begin_model(engines, pixel_colors);
+  model.chroma->share_steps(share_of(ranks()));
+  model.chromaticity->share_steps(share_of(ranks()));
+}
+
+void Session::begin_model(const Engines& engines, PixelColors pixel_colors) {
   const std::string digest = sha256_of_file(job_.stage1),
                     source = colorizer.name() + describe(job_.known) + describe_viewpoints(job_.viewpoints);
   const std::filesystem::path& file = job_.take;
@@ -53,6 +60,7 @@ void Session::cache_views(const Engines& engines) {
   if (luminance.sky.exists() && !model.sky.exists()) model.sky = SkyColors::grey();
   if (observer_.wants_previews() && model.chroma) cache_previews(luminance);
   const auto told = [this](double fraction) { report("stage 2: caching views", fraction); };
+  cache_.trace_with(ranks());
   cache_.fill(luminance.seen(), job_.capture, luminance.frame, options.working_resolution, told);
   cache_.add(cache_.traced(luminance.seen(), luminance.frame, job_.viewpoints, told));
   cache_.put_first(job_.viewpoints);
@@ -86,14 +94,18 @@ PreviewPicture Session::preview(std::size_t index) const {
   return picture;
 }
 
-void Session::report(const std::string& task, double fraction, Figures figures) {
+void Session::tell(const std::string& task, double fraction, Figures figures) {
   clock_.pause_for([&] {
     observer_.report_progress({task, std::min(fraction, 1.0), std::move(figures)});
     if (!previews_.empty()) observer_.offer_preview([this](std::size_t index) { return preview(index); });
     if (job_.watch && model.chroma) job_.watch(model);
   });
+}
+
+void Session::report(const std::string& task, double fraction, Figures figures) {
+  tell(task, fraction, std::move(figures));
   if (!observer_.is_cancelled()) return;
-  if (!model.chroma) throw Interrupted("stopped; nothing was written");
+  if (!model.chroma || !ranks().is_alone()) throw Interrupted("stopped; nothing was written");
   save();
   throw Interrupted("stopped; saved " + job_.take.string() + ", continue with --resume");
 }
@@ -105,15 +117,19 @@ void Session::after_step(const std::string& task, const std::string& loss_name, 
   }
   const Stage2Report& so_far = model.report;
   const int asked = so_far.accepted + so_far.rejected;
-  report(task, double(done) / all,
-         {{loss_name, loss},
-          {"accepted", double(so_far.accepted) / std::max(asked, 1)},
-          {"waited s", so_far.waited_seconds}});
+  tell(task, double(done) / all,
+       {{loss_name, loss},
+        {"accepted", double(so_far.accepted) / std::max(asked, 1)},
+        {"waited s", so_far.waited_seconds}});
+  if (!ranks().any(observer_.is_cancelled())) return;
+  save();
+  throw Interrupted("stopped; saved " + job_.take.string() + ", continue with --resume");
 }
 
 void Session::save() {
   model.report.seconds = seconds_before_ + clock_.seconds();
-  model.save(job_.take);
+  if (ranks().is_first()) model.save(job_.take);
+  ranks().barrier("snapshot of stage 2");
 }
 
 }  // namespace cnerf

@@ -29,14 +29,16 @@ class Session {
   /// and may come to it meanwhile.
   [[nodiscard]] std::span<const CachedView> views() const { return views_; }
   [[nodiscard]] std::span<const std::string> names() const { return names_; }
+  [[nodiscard]] cluster::Ranks& ranks() const { return job_.ranks; }
   [[nodiscard]] std::filesystem::path folder() const { return job_.take.parent_path(); }
 
   using Figures = std::vector<std::pair<std::string, double>>;
   /// Tells the observer, and saves and stops when it cancelled. Without a model there is nothing to save.  @throws
   /// Interrupted.
   void report(const std::string& task, double fraction, Figures figures = {});
-  /// The same with the figures of a step.
+  /// The same with the figures of a step. All ranks stop where one cancelled.
   void after_step(const std::string& task, const std::string& loss_name, long done, int all);
+  /// On rank 0; the others wait.
   void save();
 
   const Stage2Options& options;
@@ -45,6 +47,8 @@ class Session {
   double loss = 0;  ///< of the last step
 
  private:
+  void begin_model(const Engines& engines, PixelColors pixel_colors);
+  void tell(const std::string& task, double fraction, Figures figures);
   void cache_previews(const LuminanceModel& luminance);
   [[nodiscard]] PreviewPicture preview(std::size_t index) const;
 

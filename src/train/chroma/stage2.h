@@ -8,6 +8,7 @@
 
 #include "src/base/observer.h"
 #include "src/capture/capture.h"
+#include "src/cluster/ranks.h"
 #include "src/colorizer/colorizer.h"
 #include "src/engine/engines.h"
 #include "src/picture/contact_sheet.h"
@@ -44,9 +45,11 @@ struct Stage2Job {
   const Injection* injection = nullptr;               ///< src/train/chroma/injection.h
   std::function<void(const ColorModel&)> watch = {};  ///< sees the model between steps, in no training time
   std::span<const Viewpoint> viewpoints = {};         ///< views beside the capture's, that `known` may name
+  cluster::Ranks& ranks = cluster::alone();           ///< that share questions and steps; rank 0 writes
 };
 
-/// Colorizes a trained scene. The observer is offered pictures of held-out views, where there are any.
+/// Colorizes a trained scene. Several ranks share it as they share stage 1, each with a colorizer of its own. The
+/// observer is offered pictures of held-out views, where there are any.
 /// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
 Stage2Report train_stage2(const Stage2Job& job, const Engines& engines, Observer& observer);
 

@@ -12,6 +12,7 @@
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/options_json.h"
 #include "src/train/luminance/seen_sky.h"
+#include "src/train/luminance/shared_steps.h"
 
 namespace cnerf {
 namespace {
@@ -119,6 +120,30 @@ float brightest_pixel(const View& view) {
       loss, step, suspect->name, brightest_pixel(*suspect)));
 }
 
+constexpr long kStepsOfOneMind = 16;  // between two questions whether a rank wants to stop
+
+/// What rank 0 saves, and all wait for.
+void save_snapshot_of(const LuminanceModel& model, const Stage1Job& job) {
+  if (job.ranks.is_first()) model.save(job.snapshot);
+  job.ranks.barrier("snapshot of stage 1");
+}
+
+/// @param is_cancelled  by this rank's user
+/// @throws Interrupted  after saving, where any rank's user cancelled
+void stop_where_cancelled(LuminanceModel& model, const Stage1Job& job, bool is_cancelled) {
+  const long done = model.engine->step_count();
+  if (!job.ranks.is_alone()) {
+    if (job.options.max_seconds <= 0 && done % kStepsOfOneMind != 0) return;
+    const CommonMind mind = CommonMind{model.seconds, is_cancelled}.among(job.ranks);
+    model.seconds = mind.seconds;
+    is_cancelled = mind.is_cancelled;
+  }
+  if (!is_cancelled) return;
+  save_snapshot_of(model, job);
+  throw Interrupted("stopped at step " + std::to_string(done) + "; saved " + job.snapshot.string() +
+                    ", continue with --resume");
+}
+
 /// Done so far, of the steps or of the time, whichever is nearer to its end.
 double fraction_done(const LuminanceModel& model, const Stage1Options& options) {
   const double of_steps = double(model.engine->step_count()) / options.steps;
@@ -141,6 +166,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   sky.show_to(views);
   model.sky = sky.light;
   model.engine->set_views(views);
+  model.engine->share_steps(share_of(job.ranks));
 
   TrainingClock clock;
   const double seconds_before = model.seconds;
@@ -171,16 +197,13 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
       if (job.watch) job.watch(model);
     });
 
-    const long done = model.engine->step_count();
-    if (observer.is_cancelled()) {
-      model.save(job.snapshot);
-      throw Interrupted("stopped at step " + std::to_string(done) + "; saved " + job.snapshot.string() +
-                        ", continue with --resume");
+    stop_where_cancelled(model, job, observer.is_cancelled());
+    if (options.checkpoint_every > 0 && model.engine->step_count() % options.checkpoint_every == 0) {
+      save_snapshot_of(model, job);
     }
-    if (options.checkpoint_every > 0 && done % options.checkpoint_every == 0) model.save(job.snapshot);
   }
   if (model.sky.exists()) model.sky = sky_light(views, sky.labels, model.engine->view_corrections());
-  model.save(job.snapshot);
+  save_snapshot_of(model, job);
   observer.report_progress({"stage 1", 1.0, {{"psnr", psnr.value()}}});
   return {int(model.engine->step_count()), model.seconds, model.trained_samples, psnr.value()};
 }

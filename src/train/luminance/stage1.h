@@ -7,6 +7,7 @@
 
 #include "src/base/observer.h"
 #include "src/capture/capture.h"
+#include "src/cluster/ranks.h"
 #include "src/engine/engines.h"
 #include "src/train/luminance/stage1_options.h"
 
@@ -33,13 +34,16 @@ struct Stage1Job {
   bool resume = false;                                    ///< go on with the snapshot, if there is one
   std::vector<SparsePoint> points = {};                   ///< in place of the capture's, which has none
   std::function<void(const LuminanceModel&)> watch = {};  ///< sees the model between steps, in no training time
+  cluster::Ranks& ranks = cluster::alone();               ///< that share the steps; rank 0 saves
 
   [[nodiscard]] bool goes_on() const { return resume && std::filesystem::exists(snapshot); }
 };
 
 /// Trains and leaves the result in the job's snapshot. What the observer takes is no training time; previews show
 /// held-out views, or some of all. Resuming continues bit for bit on the CPU, whatever the number of threads.
-/// @throws Interrupted    after saving, when the observer cancelled.
+/// Several ranks of a job share its steps: each works on its own pixels of the same random numbers. The result is the
+/// same bit by bit for equal numbers of ranks, and within rounding of sums for others.
+/// @throws Interrupted    after saving, when the observer of any rank cancelled.
 /// @throws SnapshotError  the snapshot is of another version, cut short, or of another configuration.
 Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer& observer);
 

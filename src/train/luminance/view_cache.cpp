@@ -7,6 +7,7 @@
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
+#include "src/cluster/packing.h"
 
 namespace cnerf {
 namespace {
@@ -27,6 +28,20 @@ void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
                          std::uint16_t(std::lround(samples[s].luminance / view.brightest * kFullScale))};
     }
   });
+}
+
+cluster::Bytes packed(const CachedView& view) {
+  cluster::Packer packer;
+  packer.add(view.camera).add(view.width).add(view.height).add(view.brightest);
+  return packer.add(view.luminance).add(view.opacity).add(view.samples).add(view.offsets).packed();
+}
+
+CachedView unpacked(const cluster::Bytes& bytes) {
+  CachedView view;
+  cluster::Unpacker unpacker(bytes);
+  unpacker.get(view.camera).get(view.width).get(view.height).get(view.brightest);
+  unpacker.get(view.luminance).get(view.opacity).get(view.samples).get(view.offsets);
+  return view;
 }
 
 }  // namespace
@@ -76,7 +91,9 @@ void ViewCache::fill(const SeenScene& scene, const Capture& capture, const Scene
                      const std::function<void(double fraction)>& report) {
   const std::vector<TrainingView> views = training_views(capture, frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
+  cluster::Ranks& ranks = *ranks_;
   if (short_side != short_side_) *this = ViewCache();
+  trace_with(ranks);
   short_side_ = short_side;
   if (names_.empty()) {
     views_.reserve(views.size() + kRoom);
@@ -85,10 +102,20 @@ void ViewCache::fill(const SeenScene& scene, const Capture& capture, const Scene
       if (!view.held_out) names_.push_back(view.name);
     }
   }
-  for (std::size_t v = views_.size(); v < views.size(); ++v) {
-    views_.push_back(cache_view(scene, views[v].camera, short_side, kCachedWeight,
-                                [&](double fraction) { report((double(v) + fraction) / double(views.size())); }));
-    ignore_masked(views_.back(), *views[v].image);
+  const auto traced = [&](std::size_t v) {
+    return cache_view(scene, views[v].camera, short_side, kCachedWeight,
+                      [&](double fraction) { report((double(v) + fraction) / double(views.size())); });
+  };
+  while (views_.size() < views.size()) {  // one by each rank, until all have all
+    const std::size_t first = views_.size(), own = first + std::size_t(ranks.rank());
+    const std::size_t count = std::min(views.size() - first, std::size_t(ranks.size()));
+    if (ranks.is_alone()) {
+      views_.push_back(traced(own));
+    } else {
+      const std::vector<cluster::Bytes> all = ranks.gather(own < views.size() ? packed(traced(own)) : cluster::Bytes());
+      for (std::size_t i = 0; i < count; ++i) views_.push_back(unpacked(all[i]));
+    }
+    for (std::size_t v = first; v < first + count; ++v) ignore_masked(views_[v], *views[v].image);
   }
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "src/capture/camera_record.h"
+#include "src/cluster/ranks.h"
 #include "src/engine/color_engines.h"
 #include "src/engine/luminance_engine.h"
 #include "src/render/training_views.h"
@@ -48,6 +49,8 @@ inline constexpr double kCachedWeight = 0.99;  ///< share of a pixel's weight th
 /// they are traced once.
 class ViewCache {
  public:
+  /// Ranks that trace the capture's views for each other: all of them call `fill` then.
+  void trace_with(cluster::Ranks& ranks) { ranks_ = &ranks; }
   /// Traces the views, unless it holds them already at this size.
   /// @param short_side     pixels of their shorter side, at most
   /// @param report         is told the share that is done; may throw, and a later call goes on
@@ -79,6 +82,7 @@ class ViewCache {
  private:
   [[nodiscard]] std::size_t place_of(const Viewpoint& viewpoint) const;
 
+  cluster::Ranks* ranks_ = &cluster::alone();
   int short_side_ = 0;
   std::vector<CachedView> views_;   // with room for viewpoints, so that none moves as they come
   std::vector<std::string> names_;  // likewise

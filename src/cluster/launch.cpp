@@ -1,0 +1,123 @@
+#include "src/cluster/launch.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdlib>
+
+#include "src/base/error.h"
+
+namespace cnerf::cluster {
+namespace {
+
+constexpr int kFirstPort = 20000, kPorts = 10000;  // below those that systems give away themselves
+
+int parsed(const std::string& name, const std::string& text) {
+  int value = 0;
+  const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (problem != std::errc() || end != text.data() + text.size() || value < 0) {
+    throw UsageError("$" + name + ": expected a whole number, found '" + text + "'");
+  }
+  return value;
+}
+
+int number(const GetVariable& variable, const std::string& name, int fallback) {
+  const auto text = variable(name);
+  return text ? parsed(name, *text) : fallback;
+}
+
+/// Of the processes of one job; two jobs on one machine are unlikely to have the same.
+int port_of(const GetVariable& variable, const std::string& job) {
+  unsigned hash = 2166136261u;  // FNV-1a
+  for (const char c : job) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619u;
+  return number(variable, "MASTER_PORT", kFirstPort + int(hash % unsigned(kPorts)));
+}
+
+std::optional<Launch> by_torchrun(const GetVariable& variable) {
+  if (!variable("RANK") || !variable("WORLD_SIZE")) return std::nullopt;
+  Launch launch;
+  launch.launcher = "torchrun";
+  launch.rank = number(variable, "RANK", 0);
+  launch.size = number(variable, "WORLD_SIZE", 1);
+  launch.local_rank = number(variable, "LOCAL_RANK", 0);
+  launch.local_size = number(variable, "LOCAL_WORLD_SIZE", 1);
+  launch.host = variable("MASTER_ADDR").value_or("");
+  launch.port = number(variable, "MASTER_PORT", 0);
+  launch.has_store = variable("TORCHELASTIC_USE_AGENT_STORE").value_or("") == "True";
+  launch.attempt =
+      variable("TORCHELASTIC_RUN_ID").value_or("") + "-" + variable("TORCHELASTIC_RESTART_COUNT").value_or("0");
+  if (launch.port == 0) throw UsageError("$MASTER_PORT: expected a port, as $RANK and $WORLD_SIZE are set");
+  return launch;
+}
+
+std::optional<Launch> by_open_mpi(const GetVariable& variable) {
+  if (!variable("OMPI_COMM_WORLD_RANK")) return std::nullopt;
+  Launch launch;
+  launch.launcher = "Open MPI";
+  launch.rank = number(variable, "OMPI_COMM_WORLD_RANK", 0);
+  launch.size = number(variable, "OMPI_COMM_WORLD_SIZE", 1);
+  launch.local_rank = number(variable, "OMPI_COMM_WORLD_LOCAL_RANK", 0);
+  launch.local_size = number(variable, "OMPI_COMM_WORLD_LOCAL_SIZE", 1);
+  const bool is_one_machine = launch.local_size == launch.size;
+  launch.host = variable("MASTER_ADDR").value_or(is_one_machine ? "127.0.0.1" : "");
+  launch.port = port_of(variable, variable("PMIX_NAMESPACE").value_or("mpi"));
+  return launch;
+}
+
+/// Of "2(x3),1": the tasks of this node, or of the first one where that is unknown.
+int tasks_per_node(const GetVariable& variable) {
+  const std::string text = variable("SLURM_STEP_TASKS_PER_NODE").value_or("1");
+  return parsed("SLURM_STEP_TASKS_PER_NODE", text.substr(0, text.find_first_of("(,")));
+}
+
+/// A script of sbatch has the variables of its job; only what srun started has those of a step.
+std::optional<Launch> by_slurm(const GetVariable& variable) {
+  if (!variable("SLURM_PROCID") || !variable("SLURM_STEP_NUM_TASKS")) return std::nullopt;
+  Launch launch;
+  launch.launcher = "Slurm";
+  launch.rank = number(variable, "SLURM_PROCID", 0);
+  launch.size = number(variable, "SLURM_STEP_NUM_TASKS", 1);
+  launch.local_rank = number(variable, "SLURM_LOCALID", 0);
+  launch.local_size = std::max(tasks_per_node(variable), launch.local_rank + 1);
+  launch.host =
+      variable("MASTER_ADDR")
+          .value_or(first_host(variable("SLURM_STEP_NODELIST").value_or(variable("SLURM_NODELIST").value_or(""))));
+  const std::string job = variable("SLURM_JOB_ID").value_or("0") + "." + variable("SLURM_STEP_ID").value_or("0");
+  launch.port = port_of(variable, job);
+  launch.attempt = job + "-" + variable("SLURM_RESTART_COUNT").value_or("0");
+  return launch;
+}
+
+}  // namespace
+
+GetVariable environment() {
+  return [](const std::string& name) -> std::optional<std::string> {
+    const char* value = std::getenv(name.c_str());
+    if (value == nullptr || *value == '\0') return std::nullopt;
+    return value;
+  };
+}
+
+std::string first_host(const std::string& nodes) {
+  const std::size_t bracket = nodes.find('['), comma = nodes.find(',');
+  if (bracket == std::string::npos || comma < bracket) return nodes.substr(0, comma);
+  const std::size_t end = nodes.find_first_of("-,]", bracket);
+  return nodes.substr(0, bracket) + nodes.substr(bracket + 1, end == std::string::npos ? end : end - bracket - 1);
+}
+
+std::optional<Launch> find_launch(const GetVariable& variable) {
+  std::optional<Launch> launch = by_torchrun(variable);
+  if (!launch) launch = by_open_mpi(variable);
+  if (!launch) launch = by_slurm(variable);
+  if (!launch || launch->size == 1) return std::nullopt;
+  if (launch->size < 1 || launch->rank >= launch->size) {
+    throw UsageError(launch->launcher + ": rank " + std::to_string(launch->rank) + " of " +
+                     std::to_string(launch->size) + " processes is none");
+  }
+  if (launch->host.empty()) {
+    throw UsageError(launch->launcher +
+                     ": $MASTER_ADDR has to name the machine of the first process, where the others find it");
+  }
+  return launch;
+}
+
+}  // namespace cnerf::cluster

@@ -1,0 +1,225 @@
+#include "src/cluster/ranks.h"
+
+#include <fmt/format.h>
+
+#include <sched.h>
+
+#include <algorithm>
+#include <exception>
+#include <thread>
+
+#include "src/cluster/rank_error.h"
+
+namespace cnerf::cluster {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kGlance{2};  // between two looks into the store
+constexpr Seconds kFarewell{5};                  // for the others to hear of an error
+
+/// Those that the system lets this process use.
+int allowed_processors() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  return ::sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
+}
+
+std::string name_key(int rank) {
+  return "name/" + std::to_string(rank);
+}
+std::string work_key(std::int64_t work, const std::string& what) {
+  return fmt::format("work/{}/{}", work, what);
+}
+std::string result_key(std::int64_t work, std::int64_t piece) {
+  return work_key(work, "result/" + std::to_string(piece));
+}
+
+}  // namespace
+
+std::vector<Bytes> Ranks::gather(Bytes bytes) {
+  std::vector<Bytes> all;
+  all.push_back(std::move(bytes));
+  return all;
+}
+
+bool Ranks::agreed(bool of_rank_0) {
+  return broadcast({std::byte(of_rank_0)}).front() != std::byte{0};
+}
+
+std::string Ranks::agreed(const std::string& of_rank_0) {
+  return text_of(broadcast(bytes_of(of_rank_0)));
+}
+
+bool Ranks::any(bool of_this) {
+  double count = of_this ? 1 : 0;
+  sum(std::span(&count, 1));
+  return count > 0;
+}
+
+Ranks& alone() {
+  static Ranks one;
+  return one;
+}
+
+RanksWait::RanksWait(Ranks& ranks, std::string what)
+    : ranks_(ranks), what_(std::move(what)), errors_(std::uncaught_exceptions()) {}
+
+RanksWait::~RanksWait() noexcept(false) {
+  if (std::uncaught_exceptions() == errors_) ranks_.barrier(what_);
+}
+
+JoinedRanks::JoinedRanks(Meeting meeting) : meeting_(std::move(meeting)) {
+  const Launch& launch = meeting_.launch;
+  try {
+    store_ = meeting_.channel.connect(launch, /*opens=*/true, meeting_.limit);
+    meet(*store_);
+    watch_ = std::make_unique<Watch>(meeting_.channel.connect(launch, false, meeting_.limit), rank(), names_,
+                                     meeting_.patience, meeting_.end);
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& problem) {
+    throw RankError(fmt::format("rank {} of {} ({}): rank 0 cannot be reached at {}:{}: {}", rank(), size(),
+                                launch.launcher, launch.host, launch.port, problem.what()));
+  }
+}
+
+JoinedRanks::~JoinedRanks() = default;
+
+/// Everybody says who it is, and waits for the others.
+void JoinedRanks::meet(Store& store) {
+  const Clock::time_point start = Clock::now();
+  store.set(name_key(rank()), bytes_of(fmt::format("rank {} ({})", rank(), meeting_.name)));
+  std::string missing;
+  for (int other = 0; other < size(); ++other) {
+    std::optional<Bytes> name = store.get(name_key(other));
+    while (!name && Clock::now() - start < meeting_.limit) {
+      std::this_thread::sleep_for(10 * kGlance);
+      name = store.get(name_key(other));
+    }
+    if (!name) missing += (missing.empty() ? "" : ", ") + std::to_string(other);
+    names_.push_back(name ? text_of(*name) : "");
+  }
+  if (missing.empty()) return;
+  throw RankError(fmt::format("of {} processes by {}, these ranks did not come within {:.0f} s: {}", size(),
+                              meeting_.launch.launcher, meeting_.limit.count(), missing));
+}
+
+template <typename Operation>
+auto JoinedRanks::guarded(const Operation& operation) {
+  watch_->check();
+  try {
+    return operation();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& problem) {
+    throw RankError(watch_->explained(problem.what()));
+  }
+}
+
+void JoinedRanks::wait_for(const std::function<bool()>& is_there, const std::string& what, Seconds limit) {
+  const Clock::time_point start = Clock::now();
+  while (!guarded(is_there)) {
+    if (Clock::now() - start > limit) {
+      throw RankError(fmt::format("{}: not all ranks came within {:.0f} s", what, limit.count()));
+    }
+    std::this_thread::sleep_for(kGlance);
+  }
+}
+
+int JoinedRanks::threads() const {
+  // A launcher that binds processes to processors has shared these out itself.
+  const int given = int(std::thread::hardware_concurrency()), allowed = allowed_processors();
+  return allowed < given ? 0 : std::max(1, given / meeting_.launch.local_size);
+}
+
+Group& JoinedRanks::group() {
+  if (!group_) group_ = meeting_.channel.group(meeting_.launch, meeting_.limit);
+  return *group_;
+}
+
+void JoinedRanks::sum(std::span<float> values) {
+  guarded([&] { group().sum(values); });
+}
+
+void JoinedRanks::sum(std::span<double> values) {
+  guarded([&] { group().sum(values); });
+}
+
+/// By the store: rank 0 may come hours later.
+Bytes JoinedRanks::broadcast(Bytes bytes) {
+  const std::string key = work_key(begin_work(), "said");
+  if (is_first()) {
+    guarded([&] { store_->set(key, bytes); });
+    return bytes;
+  }
+  std::optional<Bytes> said;
+  wait_for([&] { return (said = store_->get(key)).has_value(); }, "broadcast", kNoLimit);
+  return std::move(*said);
+}
+
+std::vector<Bytes> JoinedRanks::gather(Bytes bytes) {
+  barrier("gather");  // the group's operations have a limit
+  std::vector<double> sizes(std::size_t(size()), 0.0);
+  sizes[std::size_t(rank())] = double(bytes.size());
+  sum(std::span(sizes));
+  std::vector<Bytes> all(sizes.size());
+  all[std::size_t(rank())] = std::move(bytes);
+  for (int from = 0; from < size(); ++from) {
+    Bytes& of_rank = all[std::size_t(from)];
+    of_rank.resize(std::size_t(sizes[std::size_t(from)]));
+    if (!of_rank.empty()) guarded([&] { group().broadcast(of_rank, from); });
+  }
+  return all;
+}
+
+void JoinedRanks::barrier(const std::string& what, Seconds limit) {
+  const std::string key = "barrier/" + std::to_string(barriers_++);
+  guarded([&] { store_->add(key, 1); });
+  wait_for([&] { return store_->add(key, 0) >= size(); }, what, limit);
+}
+
+std::int64_t JoinedRanks::next(std::int64_t work) {
+  return guarded([&] { return store_->add(work_key(work, "next"), 1); }) - 1;
+}
+
+void JoinedRanks::put(std::int64_t work, std::int64_t piece, Bytes result) {
+  wait_for([&] { return piece - store_->add(work_key(work, "taken"), 0) < kMostAhead; }, "result", kNoLimit);
+  guarded([&] { store_->set(result_key(work, piece), result); });
+}
+
+std::optional<Bytes> JoinedRanks::take(std::int64_t work, std::int64_t piece, bool waits) {
+  const std::string key = result_key(work, piece);
+  std::optional<Bytes> result = guarded([&] { return store_->get(key); });
+  if (!result && waits) {
+    wait_for([&] { return (result = store_->get(key)).has_value(); }, "result", kNoLimit);
+  }
+  if (result) guarded([&] { store_->remove(key); });
+  return result;
+}
+
+void JoinedRanks::took(std::int64_t work) {
+  guarded([&] { store_->add(work_key(work, "taken"), 1); });
+}
+
+void JoinedRanks::leave(const std::optional<std::string>& error) {
+  if (!error) barrier("end");
+  // Where somebody is lost the store may be silent; only rank 0's own is sure to answer.
+  if (!is_first() && watch_->verdict()) return watch_->rest();
+  try {
+    if (error && !watch_->verdict()) {
+      store_->set(kLostKey, bytes_of(names_[std::size_t(rank())] + " has ended: " + *error));
+    }
+    store_->add("gone", 1);
+    watch_->rest();
+    // The store goes with rank 0.
+    const Clock::time_point start = Clock::now();
+    while (is_first() && store_->add("gone", 0) < size() && Clock::now() - start < kFarewell) {
+      std::this_thread::sleep_for(10 * kGlance);
+    }
+  } catch (const std::exception&) {
+    watch_->rest();  // nobody is there to be told
+  }
+}
+
+}  // namespace cnerf::cluster

@@ -1,0 +1,124 @@
+// The channel of LibTorch's c10d: a TCPStore, and sums by Gloo. On its own: few programs are started by a launcher, and
+// LibTorch takes long to load.
+
+#ifndef USE_C10D_GLOO
+#define USE_C10D_GLOO  // LibTorch has it; only its headers ask
+#endif
+
+#include <arpa/inet.h>
+#include <netdb.h>
+#include <sys/socket.h>
+#include <torch/version.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <stdexcept>
+#include <torch/csrc/distributed/c10d/PrefixStore.hpp>
+#include <torch/csrc/distributed/c10d/ProcessGroupGloo.hpp>
+#include <torch/csrc/distributed/c10d/TCPStore.hpp>
+
+#include "src/base/file_descriptor.h"
+#include "src/cluster/channel.h"
+
+namespace cnerf::cluster {
+namespace {
+
+using Milliseconds = std::chrono::milliseconds;
+
+/// For ranks that are late at an operation: rank 0 may save, or draw for a page. Who is lost is found by the Watch.
+constexpr std::chrono::minutes kLongestOperation{30};
+
+c10::intrusive_ptr<c10d::Store> connected(const Launch& launch, bool opens, Seconds limit) {
+  c10d::TCPStoreOptions options;
+  options.port = std::uint16_t(launch.port);
+  options.isServer = opens && launch.rank == 0 && !launch.has_store;
+  options.waitWorkers = false;
+  options.timeout = std::chrono::duration_cast<Milliseconds>(limit);
+  auto store = c10::make_intrusive<c10d::TCPStore>(launch.host, options);
+  return c10::make_intrusive<c10d::PrefixStore>("cnerf/" + launch.attempt, store);
+}
+
+class C10dStore final : public Store {
+ public:
+  explicit C10dStore(c10::intrusive_ptr<c10d::Store> store) : store_(std::move(store)) {}
+  void set(const std::string& key, const Bytes& value) override {
+    const auto* begin = reinterpret_cast<const std::uint8_t*>(value.data());
+    store_->set(key, {begin, begin + value.size()});
+  }
+  std::optional<Bytes> get(const std::string& key) override {
+    if (!store_->check({key})) return std::nullopt;
+    const std::vector<std::uint8_t> value = store_->get(key);
+    const auto* begin = reinterpret_cast<const std::byte*>(value.data());
+    return Bytes(begin, begin + value.size());
+  }
+  std::int64_t add(const std::string& key, std::int64_t amount) override { return store_->add(key, amount); }
+  void remove(const std::string& key) override { store_->deleteKey(key); }
+
+ private:
+  c10::intrusive_ptr<c10d::Store> store_;
+};
+
+/// The address of this machine that packets to `host` come from: a machine may have several, and its name may stand for
+/// one that others cannot reach.
+std::string address_towards(const std::string& host) {
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_DGRAM;
+  addrinfo* found = nullptr;
+  if (::getaddrinfo(host.c_str(), "9", &hints, &found) != 0) throw std::runtime_error("unknown host " + host);
+  const FileDescriptor socket(::socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  sockaddr_storage own{};
+  ::socklen_t size = sizeof own;
+  // Nothing is sent: a datagram socket only looks the way up.
+  const bool is_reached = ::connect(socket.number(), found->ai_addr, found->ai_addrlen) == 0 &&
+                          ::getsockname(socket.number(), reinterpret_cast<sockaddr*>(&own), &size) == 0;
+  ::freeaddrinfo(found);
+  char text[NI_MAXHOST] = "";
+  if (!is_reached ||
+      ::getnameinfo(reinterpret_cast<sockaddr*>(&own), size, text, sizeof text, nullptr, 0, NI_NUMERICHOST) != 0) {
+    throw std::runtime_error("no way to " + host + ": " + std::strerror(errno));
+  }
+  return text;
+}
+
+class GlooGroup final : public Group {
+ public:
+  GlooGroup(const Launch& launch, Seconds limit) {
+    const auto options = c10d::ProcessGroupGloo::Options::create(kLongestOperation);
+    options->devices.push_back(c10d::ProcessGroupGloo::createDeviceForHostname(address_towards(launch.host)));
+    options->threads = 2;
+    group_ =
+        c10::make_intrusive<c10d::ProcessGroupGloo>(connected(launch, false, limit), launch.rank, launch.size, options);
+  }
+  void sum(std::span<float> values) override { sum_of(values.data(), values.size(), at::kFloat); }
+  void sum(std::span<double> values) override { sum_of(values.data(), values.size(), at::kDouble); }
+  void broadcast(std::span<std::byte> bytes, int from) override {
+    std::vector<at::Tensor> tensors = {at::from_blob(bytes.data(), {std::int64_t(bytes.size())}, at::kByte)};
+    c10d::BroadcastOptions options;
+    options.rootRank = from;
+    group_->broadcast(tensors, options)->wait();
+  }
+
+ private:
+  void sum_of(void* values, std::size_t count, at::ScalarType type) {
+    if (count == 0) return;
+    std::vector<at::Tensor> tensors = {at::from_blob(values, {std::int64_t(count)}, type)};
+    group_->allreduce(tensors)->wait();
+  }
+
+  c10::intrusive_ptr<c10d::ProcessGroupGloo> group_;
+};
+
+}  // namespace
+}  // namespace cnerf::cluster
+
+extern "C" __attribute__((visibility("default"))) const cnerf::cluster::Channel* cnerf_cluster_channel() {
+  using namespace cnerf::cluster;
+  static const Channel channel{[](const Launch& launch, bool opens, Seconds limit) -> std::unique_ptr<Store> {
+                                 return std::make_unique<C10dStore>(connected(launch, opens, limit));
+                               },
+                               [](const Launch& launch, Seconds limit) -> std::unique_ptr<Group> {
+                                 return std::make_unique<GlooGroup>(launch, limit);
+                               },
+                               "LibTorch " TORCH_VERSION ": Gloo"};
+  return &channel;
+}

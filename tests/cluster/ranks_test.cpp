@@ -1,0 +1,187 @@
+/// Ranks, with threads for processes: what they share, and what happens when one is lost.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <mutex>
+#include <set>
+
+#include "src/cluster/packing.h"
+#include "src/cluster/rank_error.h"
+#include "src/cluster/share_out.h"
+#include "tests/cluster/fake_channel.h"
+
+namespace cnerf::cluster {
+namespace {
+
+using test::exchange;
+using test::on_ranks;
+using testing::HasSubstr;
+
+Bytes packed(std::size_t value) {
+  return Packer().add(value).packed();
+}
+std::size_t unpacked(const Bytes& bytes) {
+  std::size_t value = 0;
+  Unpacker(bytes).get(value);
+  return value;
+}
+
+TEST(Ranks, SumsBroadcastsAndGathers) {
+  on_ranks(3, [](Ranks& ranks) {
+    std::vector<float> values = {float(ranks.rank()), 1.0f};
+    ranks.sum(std::span(values));
+    EXPECT_EQ(values, (std::vector<float>{3, 3}));
+    EXPECT_EQ(ranks.agreed(std::string("by ") + std::to_string(ranks.rank())), "by 0");
+    EXPECT_TRUE(ranks.agreed(ranks.is_first()));
+    EXPECT_TRUE(ranks.any(ranks.rank() == 2));
+    EXPECT_FALSE(ranks.any(false));
+    // Of different sizes, one of them empty.
+    const std::vector<Bytes> all = ranks.gather(Bytes(std::size_t(ranks.rank()), std::byte(7)));
+    ASSERT_EQ(all.size(), 3u);
+    for (std::size_t rank = 0; rank < 3; ++rank) EXPECT_EQ(all[rank], Bytes(rank, std::byte(7)));
+    ranks.barrier("test");
+  });
+}
+
+TEST(Ranks, AloneNothingIsShared) {
+  std::vector<std::size_t> taken;
+  share_out(
+      alone(), 3, [](std::size_t i) { return 10 * i; }, [&](std::size_t, std::size_t value) { taken.push_back(value); },
+      [](std::size_t) -> Bytes { throw std::logic_error("alone nothing is packed"); },
+      [](const Bytes&) -> std::size_t { throw std::logic_error("alone nothing is packed"); });
+  EXPECT_EQ(taken, (std::vector<std::size_t>{0, 10, 20}));
+  EXPECT_TRUE(alone().agreed(true));
+  EXPECT_EQ(alone().gather(Bytes(2)).size(), 1u);
+}
+
+TEST(Ranks, EveryPieceIsMadeOnceAndTakenInOrder) {
+  constexpr std::size_t kPieces = 500;  // more than may wait for rank 0
+  std::mutex mutex;
+  std::multiset<std::size_t> made;
+  std::vector<std::size_t> taken;
+  std::set<int> makers;
+  on_ranks(3, [&](Ranks& ranks) {
+    for (int repetition = 0; repetition < 2; ++repetition) {  // two works do not mix
+      share_out(
+          ranks, kPieces,
+          [&](std::size_t piece) {
+            const std::lock_guard lock(mutex);
+            made.insert(piece);
+            makers.insert(ranks.rank());
+            return piece * piece;
+          },
+          [&](std::size_t piece, std::size_t result) {
+            EXPECT_TRUE(ranks.is_first());
+            EXPECT_EQ(result, piece * piece);
+            taken.push_back(piece);
+          },
+          packed, unpacked);
+    }
+  });
+  EXPECT_EQ(made.size(), 2 * kPieces);
+  EXPECT_EQ(made.count(17), 2u);
+  ASSERT_EQ(taken.size(), 2 * kPieces);
+  EXPECT_TRUE(std::is_sorted(taken.begin(), taken.begin() + kPieces));
+  EXPECT_EQ(makers.size(), 3u);
+  // Results do not stay in the store.
+  for (const auto& [key, value] : exchange->values) EXPECT_THAT(key, testing::Not(HasSubstr("result")));
+}
+
+TEST(Ranks, WhoDoesNotComeIsNamed) {
+  exchange = std::make_shared<test::Exchange>();
+  Meeting meeting = test::fake_meeting(0, 3);
+  meeting.limit = Seconds(0.1);
+  try {
+    const JoinedRanks ranks(std::move(meeting));
+    FAIL() << "two are missing";
+  } catch (const RankError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("did not come within 0 s: 1, 2"));
+    EXPECT_EQ(error.exit_code(), ExitCode(74));
+  }
+}
+
+/// An error of one rank ends the others, which say whose it was.
+TEST(Ranks, AnErrorOfOneIsHeardByAll) {
+  std::string heard;
+  const auto work = [&](Ranks& ranks) {
+    if (ranks.rank() == 1) throw OutputError("the disk is full");
+    try {
+      ranks.barrier("never");
+    } catch (const RankError& error) {
+      heard = error.what();
+      throw;
+    }
+  };
+  EXPECT_THROW(on_ranks(2, work), RankError);
+  EXPECT_EQ(heard, "rank 1 (thread 1) has ended: the disk is full");
+}
+
+constexpr Patience kShort{Seconds(0.02), Seconds(0.3), Seconds(0.1)};
+
+/// A process that stops, as a thread that shows no sign of life.
+TEST(Watch, WhoStopsIsNamedAndTheProgramEnds) {
+  exchange = std::make_shared<test::Exchange>();
+  std::atomic<bool> has_ended = false;
+  const Watch watch(std::make_unique<test::FakeStore>(), 0, {"rank 0", "rank 1 (pid 17 on fermi)"}, kShort,
+                    [&](const std::string& why) {
+                      EXPECT_THAT(why, HasSubstr("rank 1 (pid 17 on fermi)"));
+                      has_ended = true;
+                    });
+  EXPECT_NO_THROW(watch.check());
+  const std::string why = watch.explained("connection reset");
+  EXPECT_THAT(why, HasSubstr("rank 1 (pid 17 on fermi) has shown no sign of life"));
+  EXPECT_THROW(watch.check(), RankError);
+  while (!has_ended) std::this_thread::yield();
+  // The others read it.
+  test::FakeStore store;
+  EXPECT_EQ(text_of(store.get(kLostKey).value()), why);
+}
+
+TEST(Watch, WhoLivesIsLeftInPeace) {
+  exchange = std::make_shared<test::Exchange>();
+  const auto none = [](const std::string& why) { FAIL() << why; };
+  const Watch first(std::make_unique<test::FakeStore>(), 0, {"rank 0", "rank 1"}, kShort, none);
+  const Watch second(std::make_unique<test::FakeStore>(), 1, {"rank 0", "rank 1"}, kShort, none);
+  // Three times as long as silence may last, by the beats themselves.
+  test::FakeStore store;
+  while (store.add("beat/0", 0) < 45 || store.add("beat/1", 0) < 45) std::this_thread::yield();
+  EXPECT_FALSE(first.verdict());
+  EXPECT_FALSE(second.verdict());
+}
+
+/// A cut cable: calls do not fail, they never return.
+TEST(Watch, ASilentNetworkIsRankZeroOutOfReach) {
+  exchange = std::make_shared<test::Exchange>();
+  std::atomic<bool> has_ended = false;
+  {
+    const Watch watch(std::make_unique<test::FakeStore>(), 1, {"rank 0 (pid 4 on n1)", "rank 1"}, kShort,
+                      [&](const std::string&) { has_ended = true; });
+    exchange->change(exchange->is_silent, true);
+    EXPECT_THAT(watch.explained(""), HasSubstr("rank 0 (pid 4 on n1) cannot be reached"));
+    while (!has_ended) std::this_thread::yield();
+  }  // does not wait for the network
+  exchange->change(exchange->is_silent, false);
+}
+
+TEST(Watch, ABrokenConnectionIsRankZeroGone) {
+  exchange = std::make_shared<test::Exchange>();
+  const Watch watch(std::make_unique<test::FakeStore>(), 1, {"rank 0 (pid 4 on n1)", "rank 1"}, kShort,
+                    [](const std::string&) {});
+  exchange->change(exchange->is_broken, true);
+  EXPECT_THAT(watch.explained(""), HasSubstr("rank 0 (pid 4 on n1) is gone"));
+}
+
+/// What is at rest neither accuses nor ends anybody.
+TEST(Watch, AtRestNobodyIsMissed) {
+  exchange = std::make_shared<test::Exchange>();
+  Watch watch(std::make_unique<test::FakeStore>(), 0, {"rank 0", "rank 1"}, kShort,
+              [](const std::string& why) { FAIL() << why; });
+  watch.rest();
+  EXPECT_EQ(watch.explained("the sum failed"), "the processes lost each other: the sum failed");
+}
+
+}  // namespace
+}  // namespace cnerf::cluster
