@@ -2,21 +2,36 @@
 set(CPACK_PACKAGE_NAME cnerf)
 string(TOLOWER ${CMAKE_SYSTEM_NAME}-${CMAKE_SYSTEM_PROCESSOR} machine)
 set(CPACK_PACKAGE_FILE_NAME cnerf-${PROJECT_VERSION}-${machine})
-set(CPACK_PACKAGE_CONTACT "The cnerf developers")
+set(CPACK_PACKAGE_CONTACT "The cnerf developers <developers@cnerf.invalid>")  # no address yet; Debian wants the form
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY ${PROJECT_DESCRIPTION})
 set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_VERBATIM_VARIABLES ON)
 set(CPACK_PROJECT_CONFIG_FILE ${PROJECT_SOURCE_DIR}/cmake/package_kinds.cmake)
 
-# Debian's policy wants these names, and the changelog compressed without a date.
+# Debian 12 and 13 link other versions of the same libraries, so that the packages' versions tell them apart.
+cmake_host_system_information(RESULT debian QUERY DISTRIB_VERSION_ID)
+set(CPACK_DEBIAN_PACKAGE_RELEASE 1~deb${debian})
+
+# Debian's policy wants these names, and changelogs compressed without a date: ours, and one of the packaging.
 install(FILES cmake/debian_copyright DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT libraries EXCLUDE_FROM_ALL)  # not every system has it
 set(changelog ${PROJECT_BINARY_DIR}/changelog.gz)
+set(changelog_of_packaging ${PROJECT_BINARY_DIR}/changelog.Debian.gz)
 add_custom_command(OUTPUT ${changelog} COMMAND ${CNERF_GZIP} -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md > ${changelog}
   DEPENDS CHANGELOG.md)
-add_custom_target(cnerf_changelog ALL DEPENDS ${changelog})
-install(FILES ${changelog} DESTINATION ${CMAKE_INSTALL_DOCDIR})
+string(TIMESTAMP now "%a, %d %b %Y %H:%M:%S +0000" UTC)  # of SOURCE_DATE_EPOCH where that is set
+file(WRITE ${PROJECT_BINARY_DIR}/changelog.Debian "cnerf (${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}) unstable; urgency=medium
+
+  * What changed stands in changelog.gz.
+
+ -- ${CPACK_PACKAGE_CONTACT}  ${now}
+")
+add_custom_command(OUTPUT ${changelog_of_packaging}
+  COMMAND ${CNERF_GZIP} -9nc ${PROJECT_BINARY_DIR}/changelog.Debian > ${changelog_of_packaging}
+  DEPENDS ${PROJECT_BINARY_DIR}/changelog.Debian)
+add_custom_target(cnerf_changelog ALL DEPENDS ${changelog} ${changelog_of_packaging})
+install(FILES ${changelog} ${changelog_of_packaging} DESTINATION ${CMAKE_INSTALL_DOCDIR})
 set(others dev:libcnerf-dev)
 if(CNERF_PYTHON)
   list(APPEND others python:python3-cnerf)
@@ -26,14 +41,11 @@ foreach(other ${others})
   set(component ${CMAKE_MATCH_1})
   set(folder ${CMAKE_INSTALL_DATAROOTDIR}/doc/${CMAKE_MATCH_2})
   install(FILES cmake/debian_copyright DESTINATION ${folder} RENAME copyright COMPONENT ${component})
-  install(FILES ${changelog} DESTINATION ${folder} RENAME changelog.gz COMPONENT ${component})
+  install(FILES ${changelog} ${changelog_of_packaging} DESTINATION ${folder} COMPONENT ${component})
 endforeach()
 
-# Debian 12 and 13 link other versions of the same libraries, so that the packages' versions tell them apart.
-cmake_host_system_information(RESULT debian QUERY DISTRIB_VERSION_ID)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_RELEASE 1~deb${debian})
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME cnerf)
@@ -48,7 +60,7 @@ set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
     "cnerf (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}), libtbb-dev, libssl-dev, zlib1g-dev, libfmt-dev, libspdlog-dev, nlohmann-json3-dev, libtomlplusplus-dev, libcli11-dev, libpugixml-dev, libopencv-dev, libopenexr-dev, libmeshoptimizer-dev, libtinygltf-dev, libcpp-httplib-dev, libexif-dev, libboost-iostreams-dev, libopenvdb-dev, pkg-config")
-set(CPACK_COMPONENT_DEV_DESCRIPTION "The cnerf library\nStatic libraries, headers and the CMake package cnerf.")
+set(CPACK_COMPONENT_DEV_DESCRIPTION "Library of cnerf\nStatic libraries, headers and the CMake package cnerf.")
 
 if(CNERF_PYTHON)
   # A module fits one minor version of Python.
@@ -57,7 +69,7 @@ if(CNERF_PYTHON)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
       "cnerf (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}), python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next}), python3-numpy")
-  set(CPACK_COMPONENT_PYTHON_DESCRIPTION "The Python module cnerf\nRuns and bakes with NumPy arrays, and the steps that make them.")
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION "Python module for cnerf\nRuns and bakes with NumPy arrays, and the steps that make them.")
 endif()
 
 # What the archive holds beside the program: the shared libraries it links, without the C library and a GPU's driver.
