@@ -8,8 +8,8 @@
 #include <mutex>
 #include <set>
 
+#include "src/base/error.h"
 #include "src/cluster/packing.h"
-#include "src/cluster/rank_error.h"
 #include "src/cluster/share_out.h"
 #include "tests/cluster/fake_channel.h"
 
@@ -99,7 +99,7 @@ TEST(Ranks, WhoDoesNotComeIsNamed) {
     FAIL() << "two are missing";
   } catch (const RankError& error) {
     EXPECT_THAT(error.what(), HasSubstr("did not come within 0 s: 1, 2"));
-    EXPECT_EQ(error.exit_code(), ExitCode(74));
+    EXPECT_EQ(error.exit_code(), ExitCode::kRanks);
   }
 }
 
