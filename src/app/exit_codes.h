@@ -22,7 +22,7 @@ inline constexpr std::array<ExitCodeMeaning, 15> kExitCodes = {{
     {ExitCode::kInternal, "a bug in cnerf"},
     {ExitCode::kMemory, "memory did not suffice"},
     {ExitCode::kOutput, "the output cannot be written"},
-    {ExitCode(74), "another process of the same launch ended early or cannot be reached"},
+    {ExitCode::kRanks, "another process of the same launch ended early or cannot be reached"},
     {ExitCode::kBusy, "another cnerf works in the same folder"},
     {ExitCode::kColorizer, "a colorizer failed, timed out or answered nonsense"},
     {ExitCode::kPoses, "no camera poses can be found"},

@@ -18,6 +18,7 @@ enum class ExitCode : int {
   kInternal = 70,      ///< our own contract was broken: a bug
   kMemory = 71,        ///< memory did not suffice
   kOutput = 73,        ///< the output cannot be written: permissions, full disk
+  kRanks = 74,         ///< another process of the same launch died, stopped, failed or cannot be reached
   kBusy = 75,          ///< another cnerf works in the same folder; later it may go
   kColorizer = 76,     ///< a colorizer failed, timed out or answered nonsense
   kPoses = 77,         ///< no camera poses can be found: no overlap, no parallax, too few views placed
@@ -60,6 +61,11 @@ struct DeviceError : Error {
 /// An output that cannot be written. Nothing half-written is left under the final name.
 struct OutputError : Error {
   explicit OutputError(const std::string& message) : Error(ExitCode::kOutput, message) {}
+};
+
+/// Another process that a launcher started together with this one died, stopped, failed or cannot be reached.
+struct RankError : Error {
+  explicit RankError(const std::string& message) : Error(ExitCode::kRanks, message) {}
 };
 
 /// A folder that another process of this program works in.

@@ -8,7 +8,7 @@
 #include <exception>
 #include <thread>
 
-#include "src/cluster/rank_error.h"
+#include "src/base/error.h"
 
 namespace cnerf::cluster {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "src/cluster/rank_error.h"
+#include "src/base/error.h"
 
 namespace cnerf::cluster {
 namespace {

@@ -37,7 +37,7 @@ void choose_gpu(int local_rank) {
 void end_program(const std::string& why) {
   const std::string line = "\ncnerf: error: " + why + "\n";
   (void)!::write(STDERR_FILENO, line.data(), line.size());
-  std::_Exit(int(ExitCode(74)));
+  std::_Exit(int(ExitCode::kRanks));
 }
 
 }  // namespace

@@ -15,9 +15,9 @@
 #include <map>
 #include <thread>
 
+#include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/pointers_to.h"
-#include "src/cluster/rank_error.h"
 #include "tests/e2e/program.h"
 #include "tests/support/data.h"
 
@@ -184,7 +184,7 @@ void lose(int victim, int signal, const std::string& complaint) {
     const std::string pid = std::to_string(ranks.process(victim));
     const auto start = std::chrono::steady_clock::now();
     ASSERT_EQ(::kill(ranks.process(victim), signal), 0);
-    EXPECT_EQ(ranks.exit_code(survivor), int(ExitCode(74))) << ranks.said(survivor);
+    EXPECT_EQ(ranks.exit_code(survivor), int(ExitCode::kRanks)) << ranks.said(survivor);
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     EXPECT_LT(took.count(), kLongestEnd);
     EXPECT_THAT(ranks.said(survivor), HasSubstr("rank " + std::to_string(victim) + " (pid " + pid + " on "));
@@ -254,7 +254,7 @@ TEST(Processes, AnErrorOfRankZeroIsHeardByAll) {
   Launched ranks(2, endless(folder / "run"));
   EXPECT_EQ(ranks.exit_code(0), int(ExitCode::kUsage)) << ranks.said(0);
   const int code = ranks.exit_code(1);
-  EXPECT_TRUE(code == int(ExitCode::kUsage) || code == int(ExitCode(74))) << ranks.said(1);
+  EXPECT_TRUE(code == int(ExitCode::kUsage) || code == int(ExitCode::kRanks)) << ranks.said(1);
 }
 
 }  // namespace
