@@ -1,4 +1,4 @@
-# Packages by CPack, which scripts/package.sh calls: cnerf and libcnerf-dev for Debian, and an archive for other machines.
+# Packages by CPack, which scripts/package.sh calls: cnerf, libcnerf-dev and python3-cnerf for Debian, and an archive for other machines.
 set(CPACK_PACKAGE_NAME cnerf)
 string(TOLOWER ${CMAKE_SYSTEM_NAME}-${CMAKE_SYSTEM_PROCESSOR} machine)
 set(CPACK_PACKAGE_FILE_NAME cnerf-${PROJECT_VERSION}-${machine})
@@ -17,10 +17,16 @@ add_custom_command(OUTPUT ${changelog} COMMAND ${CNERF_GZIP} -9nc ${PROJECT_SOUR
   DEPENDS CHANGELOG.md)
 add_custom_target(cnerf_changelog ALL DEPENDS ${changelog})
 install(FILES ${changelog} DESTINATION ${CMAKE_INSTALL_DOCDIR})
-foreach(file cmake/debian_copyright:copyright ${changelog}:changelog.gz)
-  string(REGEX MATCH "^(.*):(.*)$" parts ${file})
-  install(FILES ${CMAKE_MATCH_1} DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/libcnerf-dev RENAME ${CMAKE_MATCH_2}
-          COMPONENT dev)
+set(others dev:libcnerf-dev)
+if(CNERF_PYTHON)
+  list(APPEND others python:python3-cnerf)
+endif()
+foreach(other ${others})
+  string(REGEX MATCH "^(.*):(.*)$" parts ${other})
+  set(component ${CMAKE_MATCH_1})
+  set(folder ${CMAKE_INSTALL_DATAROOTDIR}/doc/${CMAKE_MATCH_2})
+  install(FILES cmake/debian_copyright DESTINATION ${folder} RENAME copyright COMPONENT ${component})
+  install(FILES ${changelog} DESTINATION ${folder} RENAME changelog.gz COMPONENT ${component})
 endforeach()
 
 # Debian 12 and 13 link other versions of the same libraries, so that the packages' versions tell them apart.
@@ -44,11 +50,24 @@ set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
     "cnerf (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}), libtbb-dev, libssl-dev, zlib1g-dev, libfmt-dev, libspdlog-dev, nlohmann-json3-dev, libtomlplusplus-dev, libcli11-dev, libpugixml-dev, libopencv-dev, libopenexr-dev, libmeshoptimizer-dev, libtinygltf-dev, libcpp-httplib-dev, libexif-dev, libboost-iostreams-dev, libopenvdb-dev, pkg-config")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "The cnerf library\nStatic libraries, headers and the CMake package cnerf.")
 
+if(CNERF_PYTHON)
+  # A module fits one minor version of Python.
+  math(EXPR next "${Python_VERSION_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-cnerf)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+      "cnerf (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}), python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next}), python3-numpy")
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION "The Python module cnerf\nRuns and bakes with NumPy arrays, and the steps that make them.")
+endif()
+
 # What the archive holds beside the program: the shared libraries it links, without the C library and a GPU's driver.
 # Programs have an RPATH rather than a RUNPATH, so that these libraries find each other too.
 set(plugins cnerf_images cnerf_videos cnerf_torch)
 if(CNERF_COMPARE)
   list(APPEND plugins cnerf_compare_torch)
+endif()
+if(TARGET cnerf_onnxruntime)
+  list(APPEND plugins cnerf_onnxruntime)
 endif()
 list(TRANSFORM plugins REPLACE "(.+)" "$<TARGET_FILE:\\1>")
 list(JOIN plugins " " plugins)

@@ -11,6 +11,8 @@ else()
   set(CNERF_DATA_HOME ${CNERF_BUILT_DATA})
 endif()
 
+set(CNERF_PYTHON_FOLDER lib/python3/dist-packages/cnerf)  # of the Python module; Debian's interpreter looks there
+
 # cnerf_keep_data(NAME PATH): a file or folder of the sources that programs read, installed as share/cnerf/NAME.
 function(cnerf_keep_data name path)
   file(MAKE_DIRECTORY ${CNERF_BUILT_DATA})

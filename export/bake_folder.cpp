@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "export/camera_tracks.h"
 #include "export/texture_writer.h"
 #include "export/up_axis.h"
 #include "export/usd_text.h"
@@ -53,7 +54,7 @@ std::string volume_prim(const ManifestVolume& volume, std::size_t number) {
 /// @throws OutputError.
 void write_usd(const std::vector<ManifestVolume>& volumes, const std::string& up_axis, const Label& label,
                const std::filesystem::path& file) {
-  std::string text = usd_beginning(up_axis, label);
+  std::string text = usd_begin(up_axis, label);
   for (std::size_t v = 0; v < volumes.size(); ++v) text += volume_prim(volumes[v], v);
   write_file(file, text + "}\n");
 }
@@ -113,6 +114,27 @@ std::vector<fs::path> BakeFolder::add_volumes(const std::vector<bake::VolumePlan
   return files;
 }
 
+void BakeFolder::add_sky(const SkyPicture& sky) {
+  const fs::path file = folder_ / "sky.exr";
+  const std::span<const float> rgb(sky.rgb);
+  write_exr(file, {sky.width,
+                   sky.height,
+                   {{"R", rgb, 3, true}, {"G", rgb.subspan(1), 3, true}, {"B", rgb.subspan(2), 3, true}},
+                   {{"software", "cnerf " CNERF_VERSION},
+                    {"colorOrigin", color_origin_text(manifest_.label.provenance)},
+                    {"colorSpace", "lin_rec709"}}});
+  list(file);
+  manifest_.sky = ManifestSky{file.filename().string()};
+}
+
+void BakeFolder::add_camera_tracks(const VdbOptions& options) {
+  const fs::path usd = folder_ / "cameras.usda", chan = folder_ / "cameras.chan";
+  write_cameras_usd(manifest_.cameras, options, manifest_.label, usd);
+  write_chan(manifest_.cameras, manifest_.label.world, chan);
+  list(usd);
+  list(chan);
+}
+
 void BakeFolder::add_plate(const std::string& camera, const std::vector<std::byte>& jpeg) {
   std::string stem = fs::path(camera).replace_extension().string();
   std::ranges::replace_if(
@@ -129,6 +151,7 @@ GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, 
   scene.basecolor_png = basecolor_png(mesh.texture);
   scene.label = manifest_.label;
   if (manifest_.volume) scene.vdb = manifest_.volume->file;
+  if (manifest_.sky) scene.sky = manifest_.sky->file;
   if (exr) {
     const TextureFiles textures =
         write_exr_textures(mesh.texture, color_origin_text(manifest_.label.provenance), folder_, name);

@@ -11,6 +11,7 @@
 #include "export/manifest.h"
 #include "export/options.h"
 #include "export/splat_writer.h"
+#include "src/picture/sky_picture.h"
 
 namespace cnerf::exporting {
 
@@ -37,9 +38,15 @@ class BakeFolder {
   GltfFiles add_mesh(const bake::Mesh& mesh, const std::string& name, bool exr);
   /// Writes `name`.ply, .spz and .usda.  @throws OutputError.
   SplatFiles add_splats(const bake::SplatCloud& cloud, const std::string& name);
+  /// Writes sky.exr: Blender's world, behind volume and mesh. To be called before add_mesh, which names it.
+  /// @throws OutputError.
+  void add_sky(const SkyPicture& sky);
   /// A camera's photograph without lens distortion, as plates/`stem`.jpg: what Blender shows behind its view.
   /// @throws OutputError.
   void add_plate(const std::string& camera, const std::vector<std::byte>& jpeg);
+  /// The cameras as cameras.usda, where the .usda of the volumes lies, and cameras.chan: see camera_tracks.h.
+  /// @throws OutputError.
+  void add_camera_tracks(const VdbOptions& options);
   /// Writes manifest.json, and blender_setup.py where there is a volume or a mesh to set up. Files that a former
   /// manifest here lists and this one does not are removed.  @throws OutputError.
   void finish();

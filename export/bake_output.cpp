@@ -49,7 +49,11 @@ BakeOutput::BakeOutput(fs::path folder, const Formats& formats, OutputOptions op
       capture_(capture),
       label_(label),
       bake_(folder_, bake::cameras_of(capture), label),
-      observer_(observer) {}
+      observer_(observer) {
+  if (!options_.sky || !formats_.has_manifest()) return;
+  bake_.add_sky(*options_.sky);
+  observer_.wrote("sky", folder_ / "sky.exr");
+}
 
 void BakeOutput::take_volumes(const std::vector<bake::VolumePlanes>& volumes) {
   if (formats_.vdb) {
@@ -61,11 +65,12 @@ void BakeOutput::take_volumes(const std::vector<bake::VolumePlanes>& volumes) {
 void BakeOutput::write_bundle(const std::vector<bake::VolumePlanes>& volumes) {
   std::vector<bake::Volume> whole;
   for (const bake::VolumePlanes& volume : volumes) whole.push_back(whole_volume(volume));
-  WebScene scene{capture_.root.filename().string(), bake::cameras_of(capture_), {}, label_};
+  WebScene scene{capture_.root.filename().string(), bake::cameras_of(capture_), {}, label_, {}};
   if (options_.web.photo_side > 0) {
     constexpr int kQuality = 82;  // of JPEG: photographs are laid over the volume, and loaded with it
     scene.photos = make_web_photos(capture_.views, options_.web.photo_side, kQuality);
   }
+  scene.sky = options_.sky;
   write_web(std::move(whole), scene, web_folder(folder_), options_.page, options_.web, observer_);
 }
 
@@ -96,6 +101,7 @@ void BakeOutput::add_plates() {
 void BakeOutput::finish() {
   if (!formats_.has_manifest()) return;
   if (options_.vdb.plates && formats_.is_for_blender()) add_plates();
+  bake_.add_camera_tracks(options_.vdb);
   bake_.finish();
   if (formats_.is_for_blender()) observer_.wrote("Blender set-up", bake_.blender_setup());
 }

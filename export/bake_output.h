@@ -2,6 +2,7 @@
 /// A bake job's results as the files of a folder: volumes, mesh and textures, web bundle, and what names them.
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,7 +43,8 @@ struct Formats {
 struct OutputOptions {
   VdbOptions vdb;
   WebOptions web;
-  std::filesystem::path page;  ///< folder of the built page of web bundles; empty = none
+  std::filesystem::path page;          ///< folder of the built page of web bundles; empty = none
+  std::optional<SkyPicture> sky = {};  ///< behind what is baked
 };
 
 class BakeOutput final : public bake::Output {

@@ -488,14 +488,28 @@ def pick_camera(cameras, wanted):
     raise ValueError("no camera %s; there are %d, the first is %s" % (wanted, len(cameras), names[0]))
 
 
-def blacken_world(scene):
-    world = bpy.data.worlds.new("cnerf black")
+def set_world(scene, manifest, folder):
+    """The sky of the capture where it has one, else black. The volume shines by itself: nothing is lit by it."""
+    sky = manifest.get("sky")
+    world = bpy.data.worlds.new("cnerf sky" if sky else "cnerf black")
     world.color = (0.0, 0.0, 0.0)
     world.use_nodes = True
-    for node in world.node_tree.nodes:
-        if node.type == "BACKGROUND":
-            node.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    background = next(node for node in nodes if node.type == "BACKGROUND")
+    background.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
     scene.world = world
+    if not sky:
+        return
+    place, turn, picture = (nodes.new(kind) for kind in
+                            ("ShaderNodeTexCoord", "ShaderNodeMapping", "ShaderNodeTexEnvironment"))
+    turn.vector_type = "VECTOR"
+    turn.inputs["Rotation"].default_value = upright(manifest).to_3x3().inverted().to_euler("XYZ")
+    picture.image = bpy.data.images.load(os.path.join(folder, sky["file"]))  # float: linear as it is
+    links.new(place.outputs["Generated"], turn.inputs["Vector"])
+    links.new(turn.outputs["Vector"], picture.inputs["Vector"])
+    links.new(picture.outputs["Color"], background.inputs["Color"])
+    for left, node in enumerate((place, turn, picture)):
+        node.location = (background.location.x - 300 * (3 - left), background.location.y)
 
 
 def steps_needed(volume, voxel_size, step_rate):
@@ -573,7 +587,7 @@ def set_up(options):
         print("cnerf: Cycles will take about %.2f GiB for the grids" % (cycles_memory(volumes) / 2**30))
     if mesh and mesh_use != "none":
         add_mesh(scene, root, mesh, folder, mesh_use)
-    blacken_world(scene)
+    set_world(scene, manifest, folder)
     finest = manifest["finer_volumes"][0] if manifest.get("finer_volumes") else bounded
     set_up_rendering(scene, bounded, finest["voxel_size"], options)
 

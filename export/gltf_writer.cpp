@@ -223,6 +223,7 @@ tinygltf::Model model_of(const bake::Mesh& mesh, const GltfScene& scene) {
   model.nodes.push_back(shown);
   model.scenes.assign(1, {});
   model.scenes[0].nodes = {0};
+  if (!scene.sky.empty()) model.scenes[0].extras = extras({{"sky", scene.sky}});
   model.defaultScene = 0;
   add_cameras(scene.cameras, from_world, diagonal(mesh), model);
   return model;

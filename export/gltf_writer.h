@@ -17,7 +17,7 @@ struct GltfScene {
   std::vector<bake::Camera> cameras;     ///< of the capture
   std::vector<std::byte> basecolor_png;  ///< 8-bit sRGB
   Label label;
-  std::string rgb_exr, luminance_exr, lab_exr, vdb;  ///< names of files beside these, for `extras`; empty = none
+  std::string rgb_exr, luminance_exr, lab_exr, vdb, sky;  ///< names of files beside these, for `extras`; empty = none
 };
 
 struct GltfFiles {

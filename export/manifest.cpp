@@ -172,6 +172,7 @@ struct ManifestRecord {
     v("finer_volumes", self.manifest.finer_volumes, kLater);
     v("mesh", self.manifest.mesh, kNullable);
     v("splats", self.manifest.splats);
+    v("sky", self.manifest.sky, kLater);
     v("camera_axes", axes, kWritten);
     v("cameras", self.cameras);
   }
@@ -222,6 +223,15 @@ void ManifestVolume::visit(Self& self, Visitor&& v) {
   v("density_scale", self.density_scale, kLater);
   v("file_from_world", self.file_from_world, kLater);
   v("world_from_file", world_from_file, kWritten);
+}
+
+template <typename Self, typename Visitor>
+void ManifestSky::visit(Self& self, Visitor&& v) {
+  static Text layout = "equirectangular, axes of the poses' frame: +x in the middle, +z up, +y a quarter to the left";
+  static Text space = "lin_rec709";
+  v("file", self.file);
+  v("layout", layout, kWritten);
+  v("space", space, kWritten);
 }
 
 template <typename Self, typename Visitor>

@@ -68,6 +68,14 @@ struct ManifestSplats {
 /// All but the names of files.
 [[nodiscard]] ManifestSplats describe_splats(const bake::SplatCloud& cloud);
 
+/// The light from beyond the volume.
+struct ManifestSky {
+  std::string file;  ///< relative to the manifest: linear Rec.709, half float
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v);
+};
+
 struct BakeManifest {
   Label label;
   /// What a file was when the manifest was written.
@@ -84,6 +92,7 @@ struct BakeManifest {
   std::vector<ManifestVolume> finer_volumes;  ///< inside of it, finest first; each coarser one is empty there
   std::optional<ManifestMesh> mesh;
   std::optional<ManifestSplats> splats;
+  std::optional<ManifestSky> sky;  ///< where the capture has one
 };
 
 /// Writes `manifest.json` into `folder`, where the listed files already are, and returns its path.

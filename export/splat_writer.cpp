@@ -184,7 +184,7 @@ std::vector<std::byte> splat_spz(const bake::SplatCloud& cloud) {
 
 std::string splat_usd(const bake::SplatCloud& cloud, const Label& label) {
   const auto& splats = cloud.splats;
-  std::string text = usd_beginning(label.world.up_axis, label);
+  std::string text = usd_begin(label.world.up_axis, label);
   text += "    def ParticleField3DGaussianSplat \"splats\"\n    {\n" + extent_of(cloud);
   add_array(text, "point3f[] positions", splats,
             [](const auto& splat, std::string& to) { add_vector(to, splat.position, kPlaceDigits); });

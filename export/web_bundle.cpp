@@ -13,6 +13,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/gzip.h"
+#include "src/picture/encode.h"
 
 namespace cnerf::exporting {
 namespace {
@@ -21,6 +22,7 @@ using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 constexpr int kPosterSide = 640;
+constexpr int kSkyQuality = 92;  // of JPEG
 
 Json to_json(Vec3d v) {
   return {v.x, v.y, v.z};
@@ -158,6 +160,12 @@ WebReport write_web_bundle(const WebVolume& volume, const WebScene& scene, const
     files.add("poster.webp", volume.poster);
     poster = {{"file", "poster.webp"}, {"camera", 0}};
   }
+  Json sky(nullptr);
+  if (scene.sky) {
+    const Picture picture = picture_from_linear(scene.sky->width, scene.sky->height, scene.sky->rgb);
+    files.add("sky.jpg", jpeg_bytes(picture, kSkyQuality));
+    sky = {{"file", "sky.jpg"}, {"layout", "equirectangular: +x in the middle, +z up, +y a quarter to the left; sRGB"}};
+  }
   for (std::size_t i = 0; i < scene.photos.size(); ++i) {
     if (scene.photos[i].jpeg.empty()) continue;
     report.photo_bytes += files.add(fmt::format("photos/{:03}.jpg", i), scene.photos[i].jpeg);
@@ -175,6 +183,7 @@ WebReport write_web_bundle(const WebVolume& volume, const WebScene& scene, const
                   {"frame", frame_json(volume.frame)},
                   {"levels", levels_json(volume.levels)},
                   {"poster", poster},
+                  {"sky", sky},
                   {"files", files.list()},
                   {"camera_axes", "+X right, +Y down, +Z forward; centre of the first pixel at (0.5, 0.5)"},
                   {"cameras", cameras_json(scene)}};

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "export/web_bricks.h"
 #include "export/web_pictures.h"
 #include "src/base/observer.h"
+#include "src/picture/sky_picture.h"
 
 namespace cnerf::exporting {
 
@@ -31,6 +33,7 @@ struct WebScene {
   std::vector<bake::Camera> cameras;  ///< of the capture
   std::vector<WebPhoto> photos;       ///< one a camera, or none at all
   Label label;
+  std::optional<SkyPicture> sky = {};  ///< behind the volume
 };
 
 struct WebReport {
@@ -41,9 +44,9 @@ struct WebReport {
 };
 
 /// Writes for each level `occupancy.bin`, `density.bin` and `color.bin`, of finer ones `occupancy_fine1.bin` and so on
-/// (each one gzip member; layouts in docs/viewer.md), `poster.webp`, `photos/NNN.jpg`, a copy of the page, and at the
-/// end bundle.json, which holds the SHA-256 of all of them, the frame, the cameras and the colour spaces. Every file is
-/// whole or not there; levels of a former bundle that this one does not have are removed.
+/// (each one gzip member; layouts in docs/viewer.md), `poster.webp`, `sky.jpg`, `photos/NNN.jpg`, a copy of the page,
+/// and at the end bundle.json, which holds the SHA-256 of all of them, the frame, the cameras and the colour spaces.
+/// Every file is whole or not there; levels of a former bundle that this one does not have are removed.
 /// @param page    folder of the built page; empty = none, the bundle then needs `cnerf view` to be looked at.
 /// @throws ContractError  when photos and cameras disagree in number, or there is no level.
 /// @throws OutputError, MissingInputError.

@@ -14,12 +14,16 @@ packages=(
   libexif-dev colmap
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libpugixml-dev libfmt-dev libspdlog-dev
   libtbb-dev libssl-dev zlib1g-dev libcpp-httplib-dev
+  pybind11-dev python3-dev python3-numpy  # the Python module
   libgtest-dev libgmock-dev libbenchmark-dev
   dpkg-dev binutils perl  # packages: which libraries a program needs
 )
+if [[ "$(. /etc/os-release && echo "${VERSION_ID%%.*}")" -ge 13 ]]; then
+  packages+=(libonnxruntime-dev)  # runs onnx: networks; Debian 12 has none, and OpenCV does
+fi
 command -v npm > /dev/null || packages+=(nodejs npm)  # for the viewer's page; a node from elsewhere will do
 if [[ "${1:-}" == "--tests" ]]; then
-  packages+=(blender python3-numpy chromium man-db mandoc fish zsh doxygen codespell)
+  packages+=(blender chromium man-db mandoc fish zsh doxygen codespell)
 fi
 
 # Installs those of "${packages[@]}" that are missing.

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds the packages of this machine's Debian into build/package/packages:
-#   cnerf and libcnerf-dev (.deb), an archive with the shared libraries (.tar.gz), a bill of materials (SPDX), SHA256SUMS.
+#   cnerf, libcnerf-dev and python3-cnerf (.deb), an archive with the shared libraries (.tar.gz), a bill of materials (SPDX), SHA256SUMS.
 #   bash scripts/package.sh [deb] [archive]     both if none is named
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -32,7 +32,7 @@ for kind in "${kinds[@]}"; do
   esac
 done
 rm -rf "$packages/_CPack_Packages"
-for file in "$build"/cnerf "$build"/cnerf-vdb-reader "$build"/libcnerf_*.so; do
+for file in "$build"/cnerf "$build"/cnerf-vdb-reader "$build"/libcnerf_*.so "$build"/python/cnerf/*.so; do
   if strings "$file" | grep -F "$PWD/" > "$build/own_folder.txt"; then
     echo "package: $file names this folder: $(head -n 1 "$build/own_folder.txt")" >&2
     exit 70

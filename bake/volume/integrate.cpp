@@ -163,18 +163,24 @@ Radiance integrate_ray(const std::vector<VoxelMedium>& media, Vec3d origin, Vec3
   return result;
 }
 
-}  // namespace
-
-VolumeImage integrate_volumes(std::span<const Volume> volumes, const Intrinsics& intrinsics,
-                              const Affined& world_from_camera, const IntegratorOptions& options) {
+/// Finest first.
+std::vector<VoxelMedium> media_of(std::span<const Volume> volumes) {
   CNERF_CHECK(!volumes.empty(), "there is no volume to render");
-  CNERF_CHECK(options.step > 0 && options.samples_per_axis > 0, "integrator options must be positive");
   std::vector<VoxelMedium> media;
   for (const Volume& volume : volumes) {
     CNERF_CHECK(!volume.voxels.empty() && volume.voxel_size > 0, "an empty volume cannot be rendered");
     media.emplace_back(volume);
   }
   std::ranges::sort(media, {}, &VoxelMedium::voxel_size);
+  return media;
+}
+
+}  // namespace
+
+VolumeImage integrate_volumes(std::span<const Volume> volumes, const Intrinsics& intrinsics,
+                              const Affined& world_from_camera, const IntegratorOptions& options) {
+  CNERF_CHECK(options.step > 0 && options.samples_per_axis > 0, "integrator options must be positive");
+  const std::vector<VoxelMedium> media = media_of(volumes);
   const int n = options.samples_per_axis;
   VolumeImage image;
   image.width = intrinsics.width;
@@ -205,6 +211,30 @@ VolumeImage integrate_volumes(std::span<const Volume> volumes, const Intrinsics&
 VolumeImage integrate_volume(const Volume& volume, const Intrinsics& intrinsics, const Affined& world_from_camera,
                              const IntegratorOptions& options) {
   return integrate_volumes({&volume, 1}, intrinsics, world_from_camera, options);
+}
+
+struct VolumeLookup::Media {
+  std::vector<VoxelMedium> all;
+};
+
+VolumeLookup::VolumeLookup(std::span<const Volume> volumes)
+    : media_(std::make_unique<const Media>(Media{media_of(volumes)})) {}
+
+VolumeLookup::~VolumeLookup() = default;
+
+void VolumeLookup::query(std::span<const Vec3d> positions, std::span<float> sigma, std::span<Vec3f> rgb) const {
+  constexpr std::size_t kGrain = 4096;
+  constexpr double kFar = 1e9;  // voxels; numbers of voxels are of 32 bits
+  const std::vector<VoxelMedium>& media = media_->all;
+  parallel_ranges(positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3d p = media.front().voxel_from_world(positions[i]);
+      const bool is_near = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < kFar;
+      const Mixture mixture = is_near ? mixture_at(media, positions[i], {1, 0, 0}) : Mixture{};
+      sigma[i] = float(mixture.sigma);
+      rgb[i] = mixture.sigma > 0 ? (mixture.emission / mixture.sigma).cast<float>() : Vec3f{};
+    }
+  });
 }
 
 }  // namespace cnerf::bake

@@ -2,6 +2,7 @@
 /// Emission and absorption through a baked volume, straight from its voxels: what any renderer with trilinear
 /// interpolation should show. Slow and simple; exports are checked against it.
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -28,5 +29,22 @@ struct VolumeImage {
                                             const Affined& world_from_camera, const IntegratorOptions& options = {});
 [[nodiscard]] VolumeImage integrate_volume(const Volume& volume, const Intrinsics& intrinsics,
                                            const Affined& world_from_camera, const IntegratorOptions& options = {});
+
+/// What volumes hold at points, by the same rules. Thread-safe.
+class VolumeLookup {
+ public:
+  /// @throws ContractError  on no volume, or one without voxels
+  explicit VolumeLookup(std::span<const Volume> volumes);
+  ~VolumeLookup();
+
+  /// @param positions  world units; the others are written and have their size
+  /// @param sigma      1/world unit; 0 outside
+  /// @param rgb        linear Rec.709 of what is there, by density; 0 where density is
+  void query(std::span<const Vec3d> positions, std::span<float> sigma, std::span<Vec3f> rgb) const;
+
+ private:
+  struct Media;
+  std::unique_ptr<const Media> media_;
+};
 
 }  // namespace cnerf::bake

@@ -1,23 +1,40 @@
 #include "src/base/plugin.h"
 
 #include <dlfcn.h>
+#include <link.h>
 
 #include "src/base/error.h"
+#include "src/base/progress.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
 namespace {
 
-/// The folder that the running program lies in; empty where the system does not say.
-fs::path program_folder() {
+/// The folder of the file that holds this code: a program or a shared library; empty where the system does not say.
+fs::path own_folder() {
+  Dl_info info;
+  link_map* object = nullptr;
+  const bool is_known = ::dladdr1(reinterpret_cast<const void*>(&own_folder), &info, reinterpret_cast<void**>(&object),
+                                  RTLD_DL_LINKMAP) != 0;
+  // The loader's name of the program itself is empty.
+  const bool is_program = !is_known || object == nullptr || *object->l_name == '\0';
   std::error_code failure;
-  return fs::read_symlink("/proc/self/exe", failure).parent_path();
+  return fs::canonical(is_program ? "/proc/self/exe" : object->l_name, failure).parent_path();
+}
+
+/// The root of the installation that a file in `folder` is part of.
+fs::path installation_of(const fs::path& folder) {
+  const std::string path = folder.string();
+  for (const std::string place : {"/" CNERF_LIBRARY_FOLDER, "/" CNERF_PYTHON_FOLDER}) {
+    if (path.ends_with(place)) return path.substr(0, path.size() - place.size());
+  }
+  return folder.parent_path();  // bin
 }
 
 std::vector<fs::path> plugin_folders() {
   std::vector<fs::path> folders = {CNERF_PLUGIN_HOME};
-  if (const fs::path program = program_folder(); !program.empty()) {
-    folders.insert(folders.begin(), {program, program.parent_path() / "lib" / "cnerf"});
+  if (const fs::path own = own_folder(); !own.empty()) {
+    folders.insert(folders.begin(), {own, installation_of(own) / CNERF_LIBRARY_FOLDER});
   }
   return folders;
 }
@@ -35,8 +52,8 @@ fs::path program_part(const std::string& name) {
 
 std::vector<fs::path> data_places(const std::string& name) {
   std::vector<fs::path> places = {fs::path(CNERF_DATA_HOME) / name};
-  if (const fs::path program = program_folder(); !program.empty()) {
-    places.insert(places.begin(), program.parent_path() / "share" / "cnerf" / name);
+  if (const fs::path own = own_folder(); !own.empty()) {
+    places.insert(places.begin(), installation_of(own) / "share" / "cnerf" / name);
   }
   return places;
 }
@@ -45,6 +62,9 @@ void* plugin_symbol(const std::string& plugin, const std::string& symbol) {
   const fs::path file = program_part("libcnerf_" + plugin + ".so");
   void* library = ::dlopen(file.c_str(), RTLD_LAZY | RTLD_LOCAL);  // a second time gives the first one's handle
   if (library == nullptr) throw DeviceError(file.string() + " cannot be loaded: " + ::dlerror());
+  if (void* follow = ::dlsym(library, "cnerf_follow_interruption"); follow != nullptr) {
+    reinterpret_cast<void (*)(volatile std::sig_atomic_t*)>(follow)(interruption_flag());
+  }
   void* address = ::dlsym(library, symbol.c_str());
   if (address == nullptr) throw DeviceError(file.string() + " is of another version: it has no " + symbol);
   return address;

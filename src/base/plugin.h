@@ -3,8 +3,10 @@
 /// are loaded on first use.
 ///
 /// A plug-in links copies of the lower rooms that it needs. The program exports the symbols of its own copies
-/// (cmake/exported_symbols.txt), and the loader prefers those, so that the number of threads, the state of Ctrl-C and
-/// the types of errors are the same on both sides.
+/// (cmake/exported_symbols.txt), and the loader prefers those. A library that is itself loaded by somebody else, as the
+/// Python module is, keeps its symbols to itself; a plug-in then uses its own copies. Little is shared between the two:
+/// the number of threads lies in TBB, types of errors are compared by name, and the state of Ctrl-C is handed over
+/// when a plug-in is loaded.
 
 #include <filesystem>
 #include <string>
@@ -12,11 +14,12 @@
 
 namespace cnerf {
 
-/// A file of the program's: looked for beside it, in ../lib/cnerf, and where this build keeps or installs it.
+/// A file of the program's: looked for beside the file that holds this code (the program, or the Python module), in
+/// lib/cnerf of the installation that it is part of, and where this build keeps or installs it.
 /// @throws DeviceError  saying where it was looked for.
 [[nodiscard]] std::filesystem::path program_part(const std::string& name);
 
-/// Where a file or folder of the program's data may lie, the first place first: ../share/cnerf beside the program, and
+/// Where a file or folder of the program's data may lie, the first place first: share/cnerf of the installation, and
 /// where this build keeps or installs it.
 [[nodiscard]] std::vector<std::filesystem::path> data_places(const std::string& name);
 

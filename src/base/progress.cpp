@@ -6,17 +6,18 @@
 namespace cnerf {
 namespace {
 
-volatile std::sig_atomic_t interruption = 0;
+volatile std::sig_atomic_t own_interruption = 0;
+volatile std::sig_atomic_t* interruption = &own_interruption;  // in a plug-in's copy: that of who loaded it
 
 void handle_signal(int) {
-  if (interruption != 0) std::_Exit(130);
-  interruption = 1;
+  if (*interruption != 0) std::_Exit(130);
+  *interruption = 1;
 }
 
 }  // namespace
 
 bool interruption_requested() {
-  return interruption != 0;
+  return *interruption != 0;
 }
 
 void install_interruption_handler() {
@@ -24,4 +25,19 @@ void install_interruption_handler() {
   std::signal(SIGTERM, handle_signal);
 }
 
+void request_interruption() {
+  *interruption = 1;
+}
+void forget_interruption() {
+  *interruption = 0;
+}
+volatile std::sig_atomic_t* interruption_flag() {
+  return interruption;
+}
+
 }  // namespace cnerf
+
+/// Called by name in a plug-in that was loaded, so that its copy of this file sees the same Ctrl-C.
+extern "C" void cnerf_follow_interruption(volatile std::sig_atomic_t* flag) {
+  cnerf::interruption = flag;
+}

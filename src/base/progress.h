@@ -1,6 +1,7 @@
 #pragma once
 /// Progress of long work, and requests to stop it.
 
+#include <csignal>
 #include <functional>
 #include <string>
 #include <utility>
@@ -21,5 +22,12 @@ using ProgressSink = std::function<void(const Progress&)>;
 [[nodiscard]] bool interruption_requested();
 /// Installs the SIGINT and SIGTERM handlers behind `interruption_requested`; a second signal ends the program at once.
 void install_interruption_handler();
+/// For programs with signal handlers of their own: as if the user had pressed Ctrl-C. May be called in a handler.
+void request_interruption();
+/// For programs that go on after work was stopped.
+void forget_interruption();
+
+/// What `interruption_requested` reads. Whoever loads a plug-in hands it over (src/base/plugin.h).
+[[nodiscard]] volatile std::sig_atomic_t* interruption_flag();
 
 }  // namespace cnerf

@@ -16,6 +16,20 @@ std::unique_ptr<Colorizer> make_by_torch(const ColorizerRequest& request) {
   return (torch_colorizers().*Make)(request);
 }
 
+/// The engine of onnx: networks; null: OpenCV.
+const OnnxRuntimeColorizers* onnx_runtime() {
+#if CNERF_ONNXRUNTIME
+  return &plugin_table<OnnxRuntimeColorizers>("onnxruntime", "cnerf_onnxruntime_colorizers");
+#else
+  return nullptr;
+#endif
+}
+
+std::unique_ptr<Colorizer> make_onnx(const ColorizerRequest& request) {
+  const OnnxRuntimeColorizers* runtime = onnx_runtime();
+  return runtime != nullptr ? runtime->onnx(request) : make_onnx_colorizer(request);
+}
+
 struct Kind {
   const char* name;
   const char* argument;  ///< as shown in messages; empty = takes none
@@ -27,7 +41,7 @@ constexpr Kind kKinds[] = {
     {"builtin", "", make_by_torch<&TorchColorizers::builtin>, false},
     {"reference", "IMAGE[,IMAGE...]", make_by_torch<&TorchColorizers::reference>, true},
     {"torchscript", "FILE", make_by_torch<&TorchColorizers::torchscript>, true},
-    {"onnx", "FILE", make_onnx_colorizer, true},
+    {"onnx", "FILE", make_onnx, true},
     {"caffe", "PROTO,MODEL", make_caffe_colorizer, true},
     {"exec", "COMMAND", make_exec_colorizer, true},
     {"grey", "", make_grey_colorizer, false},
@@ -85,6 +99,11 @@ std::unique_ptr<Colorizer> make_colorizer(const ColorizerOptions& options, const
 
 std::string torch_version() {
   return torch_colorizers().version;
+}
+
+std::string onnx_engine() {
+  const OnnxRuntimeColorizers* runtime = onnx_runtime();
+  return runtime != nullptr ? runtime->version : "OpenCV";
 }
 
 std::unique_ptr<Colorizer> make_grey_colorizer(const ColorizerRequest& request) {

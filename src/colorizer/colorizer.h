@@ -71,6 +71,8 @@ struct ColorizerContext {
 
 /// Version of the LibTorch that colorizers use. Loads it.  @throws DeviceError  as make_colorizer.
 [[nodiscard]] std::string torch_version();
+/// What runs onnx: networks: "ONNX Runtime 1.21.0" or "OpenCV".  @throws DeviceError  when its plug-in cannot be loaded
+[[nodiscard]] std::string onnx_engine();
 
 /// Checks shape, size and finiteness of an answer.  @throws ColorizerError  naming the colorizer.
 void check_answer(const std::string& colorizer, const LightnessBatch& question, const ChromaBatch& answer);

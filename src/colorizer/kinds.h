@@ -20,7 +20,7 @@ MakeColorizer make_grey_colorizer;         ///< a = b = 0: for tests, and as the
 MakeColorizer make_builtin_colorizer;      ///< `[FILE]`: the network whose weights come with the program
 MakeColorizer make_reference_colorizer;    ///< `IMAGE[,IMAGE…]`: a small network fitted to photographs of the scene
 MakeColorizer make_torchscript_colorizer;  ///< `FILE`: a scripted LibTorch module, see docs/colorizers.md
-MakeColorizer make_onnx_colorizer;         ///< `FILE`: a network in the ONNX format, run by OpenCV
+MakeColorizer make_onnx_colorizer;         ///< `FILE`: a network in the ONNX format, run by OpenCV: the fallback
 MakeColorizer make_caffe_colorizer;        ///< `PROTO,MODEL`: a Caffe network, run by OpenCV
 /// `COMMAND`: any program that speaks the pipe protocol of docs/colorizers.md. `{prompt}` in it becomes the prompt.
 MakeColorizer make_exec_colorizer;
@@ -31,6 +31,12 @@ struct TorchColorizers {
   MakeColorizer* reference;
   MakeColorizer* torchscript;
   const char* version;  ///< of LibTorch
+};
+
+/// What libcnerf_onnxruntime.so offers; builds without ONNX Runtime have no such plug-in.
+struct OnnxRuntimeColorizers {
+  MakeColorizer* onnx;
+  const char* version;  ///< "ONNX Runtime 1.21.0"
 };
 
 /// Whether a command says that it takes a prompt.

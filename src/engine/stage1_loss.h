@@ -4,8 +4,9 @@
 ///
 ///   L = ((L*(seen) - L*(wanted)) / 100)^2 + distortion_weight D,   its mean over the rays of a step
 ///
-/// `seen` composites the field's luminance, times the view's gain, over a random background; `wanted` is the pixel over
-/// the same background, both as CIE lightness L*. D says how far apart the ray's samples lie (distortion_math.h).
+/// `seen` composites the field's luminance, times the view's gain, over a random background, or over the sky where that
+/// may be seen; `wanted` is the pixel over the same background, both as CIE lightness L*. D says how far apart the
+/// ray's samples lie (distortion_math.h).
 
 #include "src/base/host_device.h"
 #include "src/color/colorspace_math.h"
@@ -21,7 +22,9 @@ struct SeenRay {
   float transmittance = 1;  ///< behind the last sample
 
   /// As the target's view shows it.
-  [[nodiscard]] CNERF_HD float luminance_in(const RayTarget& target) const { return target.gain * luminance; }
+  [[nodiscard]] CNERF_HD float luminance_in(const RayTarget& target) const {
+    return target.gain * luminance + transmittance * target.sky;
+  }
   [[nodiscard]] CNERF_HD float over_background(const RayTarget& target) const {
     return luminance_in(target) + transmittance * target.background;
   }
@@ -75,7 +78,9 @@ class RayGradient {
   /// By the luminance that a sample emits.
   [[nodiscard]] CNERF_HD float by_luminance(const LitSample& sample) const { return d_seen_ * gain_ * sample.weight; }
   /// By the logarithm of the view's gain.
-  [[nodiscard]] CNERF_HD float by_log_gain(const SeenRay& ray) const { return d_seen_ * gain_ * ray.luminance; }
+  [[nodiscard]] CNERF_HD float by_log_gain(const SeenRay& ray, const RayTarget& target) const {
+    return d_seen_ * ray.luminance_in(target);
+  }
   /// By a sample's density, as far as it changes what is seen. What lies behind it counts, the background included.
   [[nodiscard]] CNERF_HD float by_density(const LitSample& sample) const {
     return d_seen_ * density_derivative(sample.dt, sample.transmittance_after, gain_ * sample.luminance,

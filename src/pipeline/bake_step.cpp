@@ -35,6 +35,7 @@ bake::FieldPicture field_picture(const Scene& scene, const Intrinsics& intrinsic
   RenderOptions options;
   options.color = false;
   options.baked_color = true;
+  options.sky = false;  // it has no place to put splats at
   RenderedImage image = scene.render(intrinsics, world_from_camera, options);
   if (image.baked_rgb.empty()) {
     for (const float light : image.luminance) image.baked_rgb.insert(image.baked_rgb.end(), 3, light);
@@ -70,8 +71,8 @@ void bake_step(const RunContext& context, const BakeJob& job, const Engines& eng
   bake.journal = folder / kJournal;
   bake.identity = field_identity(context.directory, take);
   const exporting::Label label{{colorizer_name(context.directory, take), take, context.command_line}, config.world};
-  exporting::BakeOutput output(folder, formats, {config.vdb, config.web, web::find_page()}, context.capture, label,
-                               observer);
+  exporting::BakeOutput output(folder, formats, {config.vdb, config.web, web::find_page(), scene->sky()},
+                               context.capture, label, observer);
   if (formats.splat) output.take_splats(make_splats(*scene, context.capture, config.splat, observer));
   if (formats.has_only_splats()) {
     output.finish();

@@ -6,9 +6,11 @@
 
 #include "export/vdb_reader.h"
 #include "src/base/error.h"
+#include "src/base/statistics.h"
 #include "src/base/text.h"
 #include "src/capture/arrangement.h"
 #include "src/capture/image_header.h"
+#include "src/color/colorspace_math.h"
 #include "src/pipeline/run_directory.h"
 #include "src/train/luminance/learned_views.h"
 
@@ -41,6 +43,17 @@ void add_frame(Report& report, const SceneFrame& frame) {
   report.line("box, world", "{}", text_of(frame.world_box()));
   report.line("scale", "{:.6g} box sides a world unit", frame.unit_per_world);
   report.line("cascades", "{}", frame.cascades);
+}
+
+void add_sky(Report& report, const Scene& scene) {
+  const auto sky = scene.sky();
+  if (!sky) return;
+  std::vector<float> light;
+  for (std::size_t p = 0; p < sky->rgb.size(); p += 3) {
+    light.push_back(luminance_of(Vec3f{sky->rgb[p], sky->rgb[p + 1], sky->rgb[p + 2]}));
+  }
+  report.line("sky", "luminance {:.2f}, {:.2f} to {:.2f} for nine tenths of it", median(light), quantile(light, 0.05),
+              quantile(light, 0.95));
 }
 
 std::string lens_text(LensModel model) {
@@ -87,6 +100,7 @@ void add_capture(Report& report, const Capture& capture) {
 void add_scene(Report& report, const fs::path& stage1, const fs::path& take) {
   const auto scene = Scene::load(stage1, take, cpu_engines());
   add_frame(report, scene->frame());
+  add_sky(report, *scene);
   if (scene->is_colorized()) report.line("colorizer", "{}", scene->colorizer());
 }
 

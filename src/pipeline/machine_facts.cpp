@@ -85,6 +85,14 @@ std::vector<Fact> torch_facts() {
   }
 }
 
+std::string onnx_text() {
+  try {
+    return onnx_engine();
+  } catch (const DeviceError& problem) {
+    return std::string("cannot be used: ") + problem.what();
+  }
+}
+
 }  // namespace
 
 std::vector<Fact> facts_of_machine() {
@@ -95,8 +103,9 @@ std::vector<Fact> facts_of_machine() {
                              {"CUDA", cuda_text()}};
   for (Fact& fact : torch_facts()) facts.push_back(std::move(fact));
   const fs::path page = web::find_page();
-  for (const Fact& fact : {Fact{"OpenCV", CV_VERSION}, Fact{"OpenVDB", CNERF_OPENVDB_VERSION},
-                           Fact{"OpenEXR", OPENEXR_VERSION_STRING}, Fact{"presets", presets_text()},
+  for (const Fact& fact : {Fact{"OpenCV", CV_VERSION}, Fact{"onnx: networks", "run by " + onnx_text()},
+                           Fact{"OpenVDB", CNERF_OPENVDB_VERSION}, Fact{"OpenEXR", OPENEXR_VERSION_STRING},
+                           Fact{"presets", presets_text()},
                            Fact{"viewer page", page.empty() ? "not built (CNERF_VIEWER, npm)" : page.string()},
                            program_fact("blender", "shows bakes"), program_fact("colmap", "finds camera poses"),
                            program_fact("ffmpeg", "cuts videos into pictures")}) {

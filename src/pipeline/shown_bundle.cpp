@@ -5,6 +5,7 @@
 #include "export/vdb_reader.h"
 #include "export/web_bundle.h"
 #include "src/base/error.h"
+#include "src/capture/exr_io.h"
 #include "src/pipeline/run_context.h"
 #include "viewer/server/page_folder.h"
 
@@ -17,6 +18,14 @@ bool is_bundle(const fs::path& folder) {
 }
 bool is_bake(const fs::path& folder) {
   return fs::exists(folder / "manifest.json");
+}
+
+std::optional<SkyPicture> sky_of(const exporting::BakeManifest& manifest, const fs::path& bake) {
+  if (!manifest.sky) return std::nullopt;
+  exporting::check_listed_file(manifest, bake, manifest.sky->file);
+  const LinearImage image = read_exr(bake / manifest.sky->file);
+  if (image.channels != 3) throw InputError(bake / manifest.sky->file, "channels", "expected R, G and B");
+  return SkyPicture{image.width, image.height, image.values};
 }
 
 /// The bundle of a bake: the one beside it, made anew where there is none or it is older than the bake.
@@ -33,7 +42,7 @@ fs::path bundle_of_bake(const fs::path& bake, const ShowJob& job, const exportin
   if (!manifest.volume) {
     throw InputError(manifest_file, "volume", "this bake has none; bake with --format vdb or --format web");
   }
-  exporting::WebScene scene{bake.filename().string(), manifest.cameras, {}, manifest.label};
+  exporting::WebScene scene{bake.filename().string(), manifest.cameras, {}, manifest.label, sky_of(manifest, bake)};
   scene.label.provenance.command_line = job.command_line;
   write_web(exporting::read_volumes(bake), scene, folder, web::find_page(), options, observer);
   observer.say("note: the photographs are with the capture; cnerf bake RUN --format web adds them");

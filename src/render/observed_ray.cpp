@@ -17,6 +17,10 @@ struct HostViews {
   [[nodiscard]] bool is_valid(std::uint32_t v, std::size_t pixel) const { return views[v].image->valid(pixel); }
   [[nodiscard]] float luminance(std::uint32_t v, std::size_t pixel) const { return views[v].image->luminance(pixel); }
   [[nodiscard]] float coverage(std::uint32_t v, std::size_t pixel) const { return views[v].image->coverage(pixel); }
+  [[nodiscard]] SkyLabel sky_label(std::uint32_t v, std::size_t pixel) const {
+    return views[v].sky_labels == nullptr ? SkyLabel::kScene : (*views[v].sky_labels)[pixel];
+  }
+  [[nodiscard]] DirectionView sky(std::uint32_t v) const { return views[v].sky->plane(0); }
 };
 
 }  // namespace

@@ -20,6 +20,7 @@ struct RayTarget {
   float luminance = 0;   ///< linear Y over black
   float coverage = 1;    ///< alpha of the pixel
   float background = 0;  ///< linear Y put behind ray and pixel alike
+  float sky = 0;         ///< linear Y behind the ray that the pixel shows, as its view has it
   float gain = 1;        ///< of the view: its light over that of the scene
 
   /// What is to be seen with the background behind it; linear Y.
@@ -52,8 +53,8 @@ CNERF_HD PickedPixel pick_pixel(const Views& views, const CounterRng& rng, std::
   return {v, int(rng.below(at + 1, std::uint32_t(image.width))), int(rng.below(at + 2, std::uint32_t(image.height)))};
 }
 
-/// @tparam Views  count(), and of view v: size_of(v), camera(v), correction(v); of its pixel i = y * width + x:
-///                is_valid(v, i), luminance(v, i), coverage(v, i)
+/// @tparam Views  count(), and of view v: size_of(v), camera(v), correction(v), sky(v); of its pixel i = y * width + x:
+///                is_valid(v, i), luminance(v, i), coverage(v, i), sky_label(v, i)
 template <typename Views>
 [[nodiscard]] CNERF_HD ObservedRay observe_ray(const Views& views, std::uint64_t seed, std::uint64_t step,
                                                std::uint64_t ray) {
@@ -79,7 +80,18 @@ template <typename Views>
   observed.jitter = rng.uniform(2 * ray);
   // Another background each time: what is transparent has to become empty and what is opaque solid. Over black, a dark
   // thing could as well be a hole, and thin fog everywhere explains a dim picture.
-  observed.target.background = luminance_from_lightness(100.0f * rng.uniform(2 * ray + 1));
+  const float random = rng.uniform(2 * ray + 1);
+  observed.target.background = luminance_from_lightness(100.0f * random);
+  // The way to the sky is as empty as what is transparent; every other time its light is compared, which tells the
+  // view's exposure. Where the sky only may be seen, nothing is asked to be solid.
+  const SkyLabel label = views.sky_label(picked.view, pixel);
+  if (label == SkyLabel::kSky && random < 0.5f) {
+    observed.target.background = luminance_from_lightness(200.0f * random);
+    observed.target.luminance = observed.target.coverage = 0;
+  } else if (label != SkyLabel::kScene) {
+    observed.target.background = 0;
+    observed.target.sky = observed.target.gain * views.sky(picked.view).along(observed.ray.direction);
+  }
   return observed;
 }
 

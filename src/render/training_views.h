@@ -2,12 +2,14 @@
 /// What a training step draws its pixels from: images and poses in unit space. No colour: MonoImage has none.
 
 #include <algorithm>
+#include <cstdint>
 #include <vector>
 
 #include "src/capture/camera_math.h"
 #include "src/capture/capture.h"
 #include "src/capture/mono_image.h"
 #include "src/field/scene_frame.h"
+#include "src/render/direction_map.h"
 #include "src/render/ray.h"
 
 namespace cnerf {
@@ -35,10 +37,21 @@ struct UnitCamera {
   }
 };
 
+/// What is known of a pixel in a capture that sees a sky.
+enum class SkyLabel : std::uint8_t {
+  kScene,   ///< shows something in the box
+  kEither,  ///< perhaps, or the sky between: an edge, a gap
+  kFar,     ///< shows what is so far that it may lie beyond the box
+  kSky,     ///< shows the sky: the way to it is empty
+};
+
 struct TrainingView {
   UnitCamera camera;
   const MonoImage* image = nullptr;
   int lens = 0;  ///< its place among the lenses that views share
+  // Where a sky is seen; both null elsewhere.
+  const std::vector<SkyLabel>* sky_labels = nullptr;  ///< [H, W]
+  const DirectionMap* sky = nullptr;                  ///< its linear Y, at the median view's exposure
 };
 
 /// The lenses of the views that are not held out, each once.

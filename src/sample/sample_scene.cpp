@@ -23,20 +23,24 @@ using sample::PixelColor;
 
 constexpr double kAngleOfView = 42;  ///< degrees, horizontal
 constexpr double kDistance = 3.6;    ///< from the point all cameras look at
-constexpr Vec3d kLookAt = {0, 0, 0.12};
+constexpr Vec3d kLookAt = {0, 0, 0.12}, kLookAtOutdoors = {0, 0, 0.75};
 constexpr std::array<double, 3> kElevations = {20, 36, 53};  ///< degrees above the plate
-constexpr double kOrbitElevation = 32;
+constexpr std::array<double, 3> kElevationsOutdoors = {4, 10, 16};
+constexpr double kOrbitElevation = 32, kOrbitElevationOutdoors = 10;
 constexpr int kTestEvery = 8;
 constexpr double kClothHeight = -0.1;
 constexpr double kLeastDown = 1e-3;  // of a ray, per depth: above the horizon lies what is there
 constexpr double kShadowDistance = 1.1, kShadowRadius = 0.7, kShadowDepth = 0.6;
 constexpr double kExposureSpread = 0.3;
+constexpr double kHaze = 8;  // depth at which it hides 63 % of the cloth
+constexpr Vec3d kHorizonColor = {0.78, 0.82, 0.86}, kZenithColor = {0.24, 0.40, 0.72}, kCloudColor = {0.92, 0.92, 0.93};
 constexpr std::uint64_t kExposureDraw = std::uint64_t(1) << 40;  // beyond those of pixels
 constexpr int kFirstReference = 1, kReferences = 3;  // training views; the golden angle puts them around the scene
 
 struct RenderedView {
   std::vector<PixelColor> color;  ///< [H, W]
   std::vector<float> depth;       ///< [H, W]
+  std::vector<std::uint8_t> sky;  ///< [H, W] 1 where nothing is before it
 };
 
 Intrinsics camera_of(const SampleSceneOptions& options) {
@@ -55,13 +59,19 @@ Affined pose_of(const SampleSceneOptions& options, int view) {
   const bool orbit = options.path == "orbit";
   const double step = orbit ? 2 * std::numbers::pi / options.views : std::numbers::pi * (3 - std::sqrt(5.0));
   const double azimuth = view * step - 0.5 * std::numbers::pi;
-  const double degrees = orbit ? kOrbitElevation : kElevations[std::size_t(view) % kElevations.size()];
+  const std::array<double, 3>& elevations = options.sky ? kElevationsOutdoors : kElevations;
+  const double degrees = orbit && options.sky ? kOrbitElevationOutdoors
+                         : orbit              ? kOrbitElevation
+                                              : elevations[std::size_t(view) % elevations.size()];
   const double elevation = degrees * std::numbers::pi / 180;
   const Vec3d outward = {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
                          std::sin(elevation)};
   const Vec3d forward = -outward;
   const Vec3d right = normalized(cross(forward, Vec3d{0, 0, 1}));
-  return {Mat3d::from_columns(right, cross(forward, right), forward), kLookAt + outward * kDistance};
+  const Vec3d eye = kLookAt + outward * kDistance;
+  if (!options.sky) return {Mat3d::from_columns(right, cross(forward, right), forward), eye};
+  const Vec3d ahead = normalized(kLookAtOutdoors - eye);
+  return {Mat3d::from_columns(right, cross(ahead, right), ahead), eye};
 }
 
 std::string file_name(int view, const char* extension) {
@@ -95,6 +105,15 @@ Vec3d cloth_at(Vec3d place) {
   return Vec3d{0.34, 0.30, 0.26} * (0.4 + 0.6 * stripes) * (0.5 + blotch);
 }
 
+/// Pale at the horizon, blue above, with clouds.
+Vec3d sky_at(Vec3d direction) {
+  const double height = std::max(direction.z, 0.0);
+  const Vec3d clear = kHorizonColor + (kZenithColor - kHorizonColor) * std::sqrt(height);
+  const Vec3d dome = direction * (2 / (height + 0.35));
+  const double cover = std::clamp((sample::noise({dome.x, dome.y, 0.5}, 3) - 0.45) / 0.3, 0.0, 1.0);
+  return clear + (kCloudColor - clear) * (cover * cover * (3 - 2 * cover));
+}
+
 /// How much light reaches a place beside the photographer, who stands at `pose`.
 double shadow_at(Vec3d place, const Affined& pose) {
   const Vec3d outward = normalized(Vec3d{pose.translation.x, pose.translation.y, 0});
@@ -102,13 +121,20 @@ double shadow_at(Vec3d place, const Affined& pose) {
   return 1 - kShadowDepth * std::exp(-std::pow(distance / kShadowRadius, 2));
 }
 
-void lay_on_cloth(const Intrinsics& intrinsics, const Affined& pose, bool in_shadow, RenderedView& view) {
+void lay_on_cloth(const SampleSceneOptions& options, const Affined& pose, RenderedView& view) {
+  const Intrinsics intrinsics = camera_of(options);
   for (std::size_t p = 0; p < view.color.size(); ++p) {
     PixelColor& color = view.color[p];
     const double depth = cloth_depth(intrinsics, pose, p);
-    const Vec3d cloth = cloth_at(place_at(intrinsics, pose, p, depth));
+    Vec3d cloth = cloth_at(place_at(intrinsics, pose, p, depth));
+    if (options.sky) {
+      const Vec3d direction = normalized(place_at(intrinsics, pose, p, 1) - pose.translation);
+      const double clear = direction.z < 0 ? std::exp(-depth / kHaze) : 0;
+      cloth = cloth * clear + sky_at(direction) * (1 - clear);
+      if (direction.z >= 0 && color.alpha == 0) view.sky[p] = 1;
+    }
     const Vec3d place = place_at(intrinsics, pose, p, view.depth[p] > 0 ? view.depth[p] : depth);
-    const double light = in_shadow ? shadow_at(place, pose) : 1;
+    const double light = options.moving_shadow ? shadow_at(place, pose) : 1;
     color = {(color.rgb + cloth * (1 - color.alpha)) * light, 1};
   }
 }
@@ -132,7 +158,8 @@ RenderedView render_view(const SampleSceneOptions& options, int view) {
       out.depth[pixel] = sample::depth_of_pixel(intrinsics, pose, int(x), int(y));
     }
   });
-  if (options.cloth || options.moving_shadow) lay_on_cloth(intrinsics, pose, options.moving_shadow, out);
+  out.sky.resize(out.color.size(), 0);
+  if (options.cloth || options.moving_shadow || options.sky) lay_on_cloth(options, pose, out);
   if (options.exposures) expose(1 + kExposureSpread * (2 * double(seeds.uniform(kExposureDraw)) - 1), out);
   return out;
 }
@@ -156,6 +183,11 @@ void write_picture(const fs::path& file, const SampleSceneOptions& options, cons
 void write_view(const fs::path& folder, const SampleSceneOptions& options, int index, const RenderedView& view) {
   write_picture(folder / "images" / file_name(index, "png"), options, view, /*grey=*/true);
   write_picture(folder / "color" / file_name(index, "png"), options, view, /*grey=*/false);
+  if (options.sky) {
+    cv::Mat1b sky(options.height, options.width);
+    for (int i = 0; i < options.width * options.height; ++i) sky(i) = view.sky[std::size_t(i)] != 0 ? 255 : 0;
+    write_png(folder / "sky" / file_name(index, "png"), sky);
+  }
   write_exr_channel(folder / "depth" / file_name(index, "exr"), "Z", options.width, options.height, view.depth);
 }
 
@@ -176,7 +208,7 @@ nlohmann::ordered_json transforms_of(const SampleSceneOptions& options) {
   nlohmann::ordered_json out = {{"camera_model", "PINHOLE"}, {"w", camera.width}, {"h", camera.height},
                                 {"fl_x", camera.fx},         {"fl_y", camera.fy}, {"cx", camera.cx},
                                 {"cy", camera.cy},           {"aabb_scale", 1}};
-  out["aabb"] = {{box.min.x, box.min.y, box.min.z}, {box.max.x, box.max.y, box.max.z}};
+  if (!options.sky) out["aabb"] = {{box.min.x, box.min.y, box.min.z}, {box.max.x, box.max.y, box.max.z}};
   out["train_filenames"] = nlohmann::json::array();
   out["test_filenames"] = nlohmann::json::array();
   for (int view = 0; view < options.views; ++view) {

@@ -40,8 +40,8 @@ Coloring::Coloring(const pipeline::RunContext& context, const Engines& engines)
 
 void Coloring::cache_views(const Breathe& breathe) {
   if (seen_) return;
-  cache_.fill(*luminance_.engine, luminance_.march(), context_.capture, luminance_.frame,
-              context_.config.stage2.working_resolution, breathe);
+  cache_.fill(luminance_.seen(), context_.capture, luminance_.frame, context_.config.stage2.working_resolution,
+              breathe);
   seen_.emplace(cache_.views(), cache_.names());
 }
 
@@ -54,7 +54,7 @@ void Coloring::change_seen(const std::function<void()>& change) {
 
 void Coloring::see(std::span<const Viewpoint> viewpoints, const Breathe& breathe) {
   // `breathe` may come back here, so that another call is through first; what is there twice then is left out.
-  auto traced = cache_.traced(*luminance_.engine, luminance_.march(), luminance_.frame, viewpoints, breathe);
+  auto traced = cache_.traced(luminance_.seen(), luminance_.frame, viewpoints, breathe);
   if (!traced.empty()) change_seen([&] { cache_.add(std::move(traced)); });
 }
 
@@ -75,6 +75,7 @@ void Coloring::begin(const std::string& take) {
   auto now =
       std::make_unique<ColorModel>(base ? base->copy(engines_) : ColorModel::create(context_.config.stage2, engines_));
   now->stage1_sha256 = stage1_sha256_;
+  if (luminance_.sky.exists() && !now->sky.exists()) now->sky = SkyColors::grey();
   base_ = std::move(base);
   now_ = std::move(now);
   base_name_ = kept_as_ = take;

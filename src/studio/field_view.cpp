@@ -37,6 +37,7 @@ class Drawing {
         march_(luminance.march(effort.steps_per_box)),
         effort_(effort.rays),
         colored_(colored),
+        sky_(luminance.sky_light()),
         pixels_(camera.lens.width, camera.lens.height, lattice_of(camera.lens, effort), colored.size()) {}
 
   /// @return  false where it was told to stop
@@ -71,19 +72,38 @@ class Drawing {
     return rays;
   }
   void trace_light(std::span<const std::size_t> wanted) {
+    const std::vector<Ray> rays = rays_of(wanted);
     std::vector<RayResult> results(wanted.size());
-    engine_.render(rays_of(wanted), march_, effort_, results);
-    set_light(wanted, results);
+    engine_.render(rays, march_, effort_, results);
+    set_light(wanted, rays, results);
   }
   void trace_colors(std::span<const std::size_t> wanted) {
-    const auto seen = engine_.trace_pixels(rays_of(wanted), march_, effort_);
-    set_light(wanted, seen->results());
-    for (std::size_t s = 0; s < colored_.size(); ++s) pixels_.set_colors(s, wanted, colored_[s]->decode(*seen));
+    const std::vector<Ray> rays = rays_of(wanted);
+    const auto seen = engine_.trace_pixels(rays, march_, effort_);
+    set_light(wanted, rays, seen->results());
+    for (std::size_t s = 0; s < colored_.size(); ++s) {
+      std::vector<Ab> colors = colored_[s]->decode(*seen);
+      if (sky_.values != nullptr && colored_[s]->sky.exists()) {
+        put_sky_behind(colored_[s]->sky, rays, seen->results(), colors);
+      }
+      pixels_.set_colors(s, wanted, colors);
+    }
   }
-  void set_light(std::span<const std::size_t> wanted, std::span<const RayResult> results) {
+  void set_light(std::span<const std::size_t> wanted, std::span<const Ray> rays, std::span<const RayResult> results) {
     std::vector<float> light;
-    for (const RayResult& result : results) light.push_back(result.luminance);
+    for (std::size_t r = 0; r < results.size(); ++r) {
+      light.push_back(results[r].luminance + light_behind(sky_, rays[r], results[r].opacity));
+    }
     pixels_.set_light(wanted, light);
+  }
+  void put_sky_behind(const SkyColors& sky, std::span<const Ray> rays, std::span<const RayResult> seen,
+                      std::vector<Ab>& colors) const {
+    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) {
+        const float behind = light_behind(sky_, rays[r], seen[r].opacity);
+        if (behind > 0) colors[r] = mixed(colors[r], seen[r].luminance, sky.along(rays[r].direction), behind);
+      }
+    });
   }
 
   const LuminanceEngine& engine_;
@@ -91,6 +111,7 @@ class Drawing {
   MarchSettings march_;
   RenderEffort effort_;
   std::span<const Side> colored_;
+  DirectionView sky_;
   SparsePixels pixels_;
 };
 
@@ -127,8 +148,15 @@ Picture draw_cached(const CachedView& view, Side side, int width, const Finish& 
       places.push_back({0, std::uint32_t(row * view.width + column)});
     }
   }
-  const std::vector<Ab> colors =
-      side != nullptr ? side->decode(pixel_samples(std::span(&view, 1), places)) : std::vector<Ab>(places.size());
+  std::vector<Ab> colors(places.size());
+  if (side != nullptr) {
+    const PixelSamples samples = pixel_samples(std::span(&view, 1), places);
+    colors = side->decode(samples);
+    const std::vector<float> field = pixel_luminance(samples);
+    for (std::size_t p = 0; p < places.size() && side->sky.exists(); ++p) {
+      colors[p] = side->sky.behind(view, places[p].pixel, field[p], colors[p]);
+    }
+  }
   parallel_ranges(places.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       const float lightness = lightness_from_luminance(view.luminance[places[p].pixel]);

@@ -32,6 +32,7 @@ class TrainedScene final : public Scene {
                const Finish& finish, const Engines& engines)
       : luminance_(LuminanceModel::load(stage1_snapshot, engines)), finish_(finish) {
     if (!take_snapshot.empty()) color_ = ColorModel::load(take_snapshot, engines);
+    sky_ = {luminance_.sky_light(), color_ ? &color_->sky : nullptr, finish_};
   }
 
   [[nodiscard]] const SceneFrame& frame() const override { return luminance_.frame; }
@@ -63,6 +64,20 @@ class TrainedScene final : public Scene {
   }
 
   [[nodiscard]] bool is_colorized() const override { return color_.has_value(); }
+  [[nodiscard]] std::optional<SkyPicture> sky() const override {
+    if (!sky_.exists()) return std::nullopt;
+    const int width = luminance_.sky.width, height = luminance_.sky.height;
+    SkyPicture picture{width, height, std::vector<float>(3 * std::size_t(width) * std::size_t(height))};
+    parallel_tasks(std::size_t(height), [&](std::size_t y) {
+      for (int x = 0; x < width; ++x) {
+        const SkyPlace place{(float(x) + 0.5f) / float(width), 1 - (float(y) + 0.5f) / float(height)};
+        const Vec3f rgb = sky_.along(sky_direction(place));
+        for (int c = 0; c < 3; ++c)
+          picture.rgb[3 * (y * std::size_t(width) + std::size_t(x)) + std::size_t(c)] = rgb[c];
+      }
+    });
+    return picture;
+  }
   [[nodiscard]] std::string colorizer() const override { return color_ ? color_->colorizer : ""; }
 
   [[nodiscard]] RenderedImage render(const Intrinsics& intrinsics, const Affined& world_from_camera,
@@ -125,6 +140,22 @@ class TrainedScene final : public Scene {
       color_->chromaticity->composite(pixels ? *pixels : traced->samples(), colors);
       put_colors(finished(std::move(colors)), image.luminance, first, image.baked_rgb);
     }
+    if (options.sky && sky_.exists()) put_sky_behind(rays, first, image);
+  }
+
+  /// Of pixels that show the field alone so far.
+  void put_sky_behind(const std::vector<Ray>& rays, std::size_t first, RenderedImage& image) const {
+    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) {
+        const std::size_t pixel = first + r;
+        const Vec3f behind = (1 - image.opacity[pixel]) * sky_.along(rays[r].direction);
+        image.opacity[pixel] = 1;
+        image.luminance[pixel] += luminance_of(behind);
+        for (auto* rgb : {&image.rgb, &image.baked_rgb}) {
+          for (int c = 0; c < 3 && !rgb->empty(); ++c) (*rgb)[3 * pixel + std::size_t(c)] += behind[c];
+        }
+      }
+    });
   }
 
   [[nodiscard]] std::vector<Ab> finished(std::vector<Ab> colors) const {
@@ -135,6 +166,7 @@ class TrainedScene final : public Scene {
   LuminanceModel luminance_;
   std::optional<ColorModel> color_;
   Finish finish_;
+  ColoredSky sky_;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,14 +14,15 @@
 #include "src/engine/engines.h"
 #include "src/field/color_field.h"
 #include "src/field/finish.h"
+#include "src/picture/sky_picture.h"
 
 namespace cnerf {
 
-/// One rendered view. Linear light, composited over black; [H, W] each.
+/// One rendered view. Linear light, composited over the sky, or over black where there is none; [H, W] each.
 struct RenderedImage {
   int width = 0, height = 0;
   std::vector<float> luminance;  ///< linear Y
-  std::vector<float> opacity;    ///< 0..1
+  std::vector<float> opacity;    ///< 0..1; 1 everywhere in a scene with a sky
   std::vector<float> depth;      ///< expected distance along the optical axis, world units; 0 where opacity < 0.5
   std::vector<float> rgb;        ///< [H, W, 3] linear Rec.709 by the paper's per-pixel decode; empty when not colorized
   std::vector<float> baked_rgb;  ///< [H, W, 3] linear Rec.709 composited from per-sample colour, as a bake shows it
@@ -31,6 +33,7 @@ struct RenderOptions {
   double min_transmittance = 1e-3;  ///< a ray ends below this, and counts as opaque
   bool color = true;                ///< also rgb, when the scene is colorized
   bool baked_color = false;         ///< also baked_rgb
+  bool sky = true;                  ///< also what shows behind the box, where views see a sky
   /// Linear Y of samples at positions in unit space, in place of the field's own, which depends on the view.
   std::function<void(std::span<const Vec3f> positions, std::span<float> luminance)> luminance = {};
 };
@@ -47,6 +50,7 @@ class Scene : public ColorField {
                                      const Engines& engines);
 
   [[nodiscard]] virtual bool is_colorized() const = 0;
+  [[nodiscard]] virtual std::optional<SkyPicture> sky() const { return {}; }  ///< where views see one
   [[nodiscard]] virtual std::string colorizer() const = 0;  ///< name of the colorizer; empty when not colorized
   [[nodiscard]] virtual RenderedImage render(const Intrinsics& intrinsics, const Affined& world_from_camera,
                                              const RenderOptions& options = {}) const = 0;

@@ -52,6 +52,7 @@ const std::vector<std::string> kLayers = {"src/base",
                                           "src/pipeline",
                                           "src/studio",
                                           "src/compare",
+                                          "src/python",
                                           "src/app"};
 
 constexpr const char* kColorTruth = "color_truth.h";

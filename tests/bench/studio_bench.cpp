@@ -175,8 +175,7 @@ int bench(int argc, char** argv) {
 
   ViewCache cache;
   row("caching views", seconds_of([&] {
-        cache.fill(*luminance.engine, luminance.march(), capture, luminance.frame, config.stage2.working_resolution,
-                   [](double) {});
+        cache.fill(luminance.seen(), capture, luminance.frame, config.stage2.working_resolution, [](double) {});
       }),
       "s");
   const Stopwatch of_surfaces;

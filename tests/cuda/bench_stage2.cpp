@@ -107,7 +107,7 @@ int bench_stage2(const Arguments& arguments) {
   const int side = int(arguments.number("working_resolution", 384));
   const double caching = milliseconds([&] {
     for (const TrainingView& view : views) {
-      cached.push_back(cache_view(*luminance, options.march, view.camera, side, arguments.number("share", 0.99)));
+      cached.push_back(cache_view({*luminance, options.march}, view.camera, side, arguments.number("share", 0.99)));
     }
   });
   std::size_t pixels = 0, samples = 0;

@@ -89,9 +89,11 @@ class LossInDouble {
       }
       const double background = rays_[r].target.background;
       const double wanted = rays_[r].target.luminance + (1.0 - rays_[r].target.coverage) * background;
-      const double error = (lightness_from_luminance(correction.gain * seen.value + seen.transmittance * background) -
-                            lightness_from_luminance(wanted)) /
-                           100.0;
+      // The sky's light is stated as the view has it, at the gain that the ray was drawn with.
+      const double sky = rays_[r].target.sky / double(rays_[r].target.gain) * correction.gain;
+      const double behind = seen.transmittance * (background + sky);
+      const double error =
+          (lightness_from_luminance(correction.gain * seen.value + behind) - lightness_from_luminance(wanted)) / 100.0;
       loss += (error * error + distortion_weight_ * distortion.value) / double(rays_.size());
     }
     return loss;
@@ -170,6 +172,7 @@ struct Loss {
   const char* name;
   bool with_alpha;
   float distortion_weight;
+  bool with_sky = false;
 };
 
 class LuminanceGradient : public testing::TestWithParam<Loss> {};
@@ -180,7 +183,9 @@ TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
   options.distortion_weight = GetParam().distortion_weight;
   SceneFrame frame;
   frame.unit_per_world = 0.4;
-  const std::vector<TrainingView> views = training_views(capture, frame);
+  std::vector<TrainingView> views = training_views(capture, frame);
+  const test::ToySky sky(views.size(), 24 * 20);
+  if (GetParam().with_sky) sky.show_to(views);
   for (const IsaLevel isa : test::available_isas()) {
     const test::ScopedIsa scope(isa);
     const auto engine = make_cpu_luminance_engine(options);
@@ -212,7 +217,8 @@ TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
 
 INSTANTIATE_TEST_SUITE_P(Of, LuminanceGradient,
                          testing::Values(Loss{"Opaque", false, 0}, Loss{"WithAlpha", true, 0},
-                                         Loss{"Distortion", false, 0.3f}, Loss{"DistortionAndAlpha", true, 0.3f}),
+                                         Loss{"Distortion", false, 0.3f}, Loss{"DistortionAndAlpha", true, 0.3f},
+                                         Loss{"Sky", false, 0.1f, true}),
                          [](const auto& param_info) { return param_info.param.name; });
 
 /// With a pinhole, whose distortion is learned from nothing, and with a lens that has some.
@@ -229,7 +235,9 @@ TEST_P(ViewLearningWithLens, GradientsMatchFiniteDifferencesOfTheLoss) {
   options.learning = {4, 1, true, true};
   SceneFrame frame;
   frame.unit_per_world = 0.4;
-  const std::vector<TrainingView> views = training_views(capture, frame);
+  std::vector<TrainingView> views = training_views(capture, frame);
+  const test::ToySky sky(views.size(), 24 * 20);
+  sky.show_to(views);
   for (const IsaLevel isa : test::available_isas()) {
     const test::ScopedIsa scope(isa);
     const auto engine = make_cpu_luminance_engine(options);

@@ -24,6 +24,7 @@ struct Problem {
   bool with_alpha = false, with_lens = false, with_exposures = false;
   float distortion_weight = 0;
   bool learns_views = false;
+  bool with_sky = false;
 };
 
 /// Views, options, and engines that share a state that the generic processor trained.
@@ -52,6 +53,7 @@ class Scene {
     options_.march = march_settings(problem.cascades, 64, 1.0 / 64);
     options_.samples_per_step = 8192;
     options_.distortion_weight = problem.distortion_weight;
+    if (problem.with_sky) sky_.show_to(views_);
     if (problem.learns_views) options_.learning = {int(views_.size()), 1, true, true};
   }
 
@@ -78,6 +80,7 @@ class Scene {
 
  private:
   Capture capture_;
+  ToySky sky_{6, 48 * 40};
   std::vector<TrainingView> views_;
   LuminanceEngineOptions options_;
   std::map<long, std::unique_ptr<LuminanceEngine>> trained_;  // by steps
@@ -309,6 +312,7 @@ std::vector<Op> luminance_ops() {
           stage1({"Stage1WithCascadesLensAndMask", 12, 14, 128, 3, false, true}),
           stage1({"Stage1WithManyLevels", 16, 13, 128, 2}),
           stage1({"Stage1WithLearnedViews", 8, 14, 64, 2, false, true, true, 0, true}),
+          stage1({"Stage1WithSky", 8, 14, 64, 2, false, false, true, 0.1f, true, true}),
           stage1_learning({"Stage1Learns", 8, 14, 64, 1, false, false, true}),
           stage1_learning({"Stage1LearnsWithCascades", 12, 14, 128, 3, false, true}),
           out_of_memory()};

@@ -20,6 +20,19 @@ for file in share/man/man1/cnerf.1.gz share/man/man1/cnerf-bake.1.gz share/bash-
   share/cnerf/colorizer.weights share/doc/cnerf/copyright lib/cnerf/cnerf-vdb-reader; do
   [ -s "$folder/$file" ] || fail "$file is not installed"
 done
+# The module finds the installation that it is part of.
+python=$folder/lib/python3/dist-packages
+if [ -d "$python/cnerf" ]; then
+  PYTHONPATH=$python python3 - "$folder" << 'END' || fail "the Python module does not work where it is installed"
+import pathlib, sys
+import cnerf
+assert pathlib.Path(cnerf.__file__).is_relative_to(sys.argv[1]), cnerf.__file__
+try:
+    cnerf.train("none", "nowhere", preset="no-such-preset")
+except cnerf.UsageError as error:
+    assert "quick" in str(error), error
+END
+fi
 if command -v man > /dev/null; then
   # The commands as text; a page that man complains of is none.
   complaints=$(man --warnings -l "$folder/share/man/man1/cnerf-bake.1.gz" 2>&1 > "$folder/page.txt")

@@ -9,6 +9,7 @@
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/capture/color_truth.h"
+#include "src/capture/image_io.h"
 #include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
 #include "src/sample/scene.h"
@@ -278,6 +279,30 @@ TEST(SampleScene, ExposuresScaleAViewAndTheShadowDimsAPartOfIt) {
   EXPECT_GT(most, 1.1);
   EXPECT_GT(least, 0.65);
   EXPECT_LT(most, 1.35);
+}
+
+/// Half of the pixels, brighter than the rest, and told by a picture of their own.
+TEST(SampleScene, OutdoorsHalfOfThePixelsAreSky) {
+  SampleSceneOptions options = kSmall;
+  options.sky = true;
+  const test::TempDir folder;
+  write_sample_scene(folder.path(), options);
+  const Capture capture = load_capture(folder.path(), {});
+  double sky = 0, all = 0, darkest_sky = 1;
+  for (const View& view : capture.views) {
+    EXPECT_TRUE(view.image.alpha.empty());
+    const std::vector<std::uint8_t> mask =
+        read_mask(folder / "sky" / fs::path(view.name).filename().string(), options.width, options.height);
+    for (std::size_t p = 0; p < mask.size(); ++p) {
+      all += 1;
+      if (mask[p] == 0) continue;
+      sky += 1;
+      darkest_sky = std::min(darkest_sky, double(view.image.luminance(p)));
+    }
+  }
+  EXPECT_NEAR(sky / all, 0.5, 0.08);
+  EXPECT_GT(darkest_sky, 0.3);
+  EXPECT_FALSE(capture.bounds.has_value());
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "src/capture/capture.h"
+#include "src/render/training_views.h"
 
 namespace cnerf::test {
 
@@ -14,6 +15,28 @@ inline Affined look_at(Vec3d eye, Vec3d target) {
   const Vec3d right = normalized(cross(forward, Vec3d{0, 0, 1}));
   return {Mat3d::from_columns(right, cross(forward, right), forward), eye};
 }
+
+/// A sky that a quarter of the pixels show, and half of them perhaps; brighter towards +x.
+class ToySky {
+ public:
+  ToySky(std::size_t views, std::size_t pixels) : labels_(views, std::vector<SkyLabel>(pixels)) {
+    for (std::size_t v = 0; v < views; ++v) {
+      for (std::size_t p = 0; p < pixels; ++p) labels_[v][p] = SkyLabel((p / 3 + v) % 4);
+    }
+    for (int i = 0; i < 16 * 8; ++i)
+      light_.planes[0].push_back(0.3f + 0.5f * float(i % 16 < 8 ? i % 16 : 15 - i % 16) / 8);
+  }
+  void show_to(std::vector<TrainingView>& views) const {
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      views[v].sky_labels = &labels_[v];
+      views[v].sky = &light_;
+    }
+  }
+
+ private:
+  std::vector<std::vector<SkyLabel>> labels_;
+  DirectionMap light_{16, 8, {{}}};
+};
 
 inline Capture toy_capture(int views = 4, int width = 24, int height = 20, bool with_alpha = false) {
   Capture capture;

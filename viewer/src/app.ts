@@ -22,7 +22,7 @@ export class App extends Navigator {
     const { volume } = bundle;
     this.low = volume.origin;
     this.high = add(volume.origin, scale(volume.bricks, 8 * volume.voxelSize));
-    this.defaults = defaultSettings(upAxis(bundle.upAxis, bundle.cameras));
+    this.defaults = defaultSettings(upAxis(bundle.upAxis, bundle.cameras), bundle.sky ? "sky" : undefined);
     this.home = this.firstView();
     this.view = this.home;
     this.target = this.pivot(this.home);

@@ -49,6 +49,8 @@ export interface Bundle {
   /** The coarsest, which covers everything. */
   volume: BundleLevel;
   poster: string | null;
+  /** What is seen beyond the volume. */
+  sky: string | null;
   files: Map<string, BundleFile>;
   cameras: CaptureCamera[];
 }
@@ -218,6 +220,7 @@ export function parseBundle(source: string): Bundle {
   const cameras = list(json, "cameras");
   if (cameras.length > limits.cameras) fail("cameras", `expected at most ${limits.cameras}, found ${cameras.length}`);
   const poster = json.poster == null ? null : object(json, "poster");
+  const sky = json.sky == null ? null : object(json, "sky");
   return {
     title: text(json, "title"),
     program: `cnerf ${text(json, "program_version")}`,
@@ -229,6 +232,7 @@ export function parseBundle(source: string): Bundle {
     levels,
     volume: levels[0],
     poster: poster ? inside(text(poster, "file"), "poster.file") : null,
+    sky: sky ? inside(text(sky, "file"), "sky.file") : null,
     files,
     cameras: cameras.map(cameraOf),
   };

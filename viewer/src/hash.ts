@@ -50,7 +50,7 @@ export function fromHash(hash: string, defaults: Settings): { view?: View; targe
   settings.threshold = read("d", 0, 24) ?? settings.threshold;
   settings.photo = read("o", 0, 1) ?? settings.photo;
   const background = values.get("b");
-  if (background && /^([0-9a-f]{6}|none)$/i.test(background)) settings.background = background === "none" ? "none" : `#${background}`;
+  if (background && /^([0-9a-f]{6}|none|sky)$/i.test(background)) settings.background = background.length === 6 ? `#${background}` : background;
   const clip = numbersOf(values.get("c"), 6);
   if (clip) settings.clip = { low: clip.slice(0, 3) as Vec3, high: clip.slice(3) as Vec3 };
   const slice = values.get("x")?.split(",");

@@ -86,8 +86,21 @@ async function showVolume(bundle: Bundle): Promise<void> {
   const app = new App(bundle, renderer);
   const panel = buildInterface(app, levels, stage, canvas, photo, poster);
   loading.remove();
+  if (bundle.sky) void showSky(bundle.sky, renderer);
   await levels.rest(() => panel.showNote(levels.note));
   document.body.dataset.complete = "yes";
+}
+
+/** Without it, the background is as dark as ever. */
+async function showSky(file: string, renderer: Renderer): Promise<void> {
+  const image = new Image();
+  image.src = file;
+  try {
+    await image.decode();
+    renderer.setSky(image);
+  } catch {
+    toast(`${file} cannot be loaded`);
+  }
 }
 
 function buildInterface(app: App, levels: Levels, stage: HTMLElement, canvas: HTMLCanvasElement, photo: HTMLImageElement, poster: HTMLImageElement): Panel {
@@ -174,7 +187,7 @@ function buildInterface(app: App, levels: Levels, stage: HTMLElement, canvas: HT
     wipe.classList.toggle("parked", settings.wipe < 0.004 || settings.wipe > 0.996);
     wipe.hidden = !bundle.inferred || !!settings.slice;
     stage.classList.toggle("checker", settings.background === "none");
-    stage.style.background = settings.background === "none" ? "" : settings.background;
+    stage.style.background = settings.background.startsWith("#") ? settings.background : "";
     const camera = bundle.cameras[app.captureCamera];
     cameraName.textContent = camera ? camera.name.replace(/^.*\//, "") : "free view";
     fade.set(settings.photo);

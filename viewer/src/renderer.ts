@@ -9,7 +9,7 @@ import { brickTexels } from "./bricks";
 import type { Bundle } from "./bundle";
 import { fitted, type View } from "./camera";
 import { clamp, column, scale, sub, type Vec3 } from "./math";
-import { quantities, type Settings } from "./settings";
+import { defaultBackground, quantities, type Settings } from "./settings";
 import * as shaders from "./shaders";
 
 /** This browser cannot show the volume; the message says why and what to do. */
@@ -91,6 +91,7 @@ export class Renderer {
   private index!: WebGLTexture;
   private density!: WebGLTexture;
   private lab!: WebGLTexture;
+  private sky: WebGLTexture | null = null;
   private atlas: AtlasPlan | null = null;
   private bundle: Bundle | null = null;
   /** Levels that are there, coarsest first. */
@@ -164,6 +165,19 @@ export class Renderer {
     gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, slab * brickTexels, ax, ay, brickTexels, gl.RED, gl.HALF_FLOAT, texels.density);
     gl.bindTexture(gl.TEXTURE_3D, this.lab);
     gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, slab * brickTexels, ax, ay, brickTexels, gl.RGBA, gl.UNSIGNED_BYTE, texels.lab);
+  }
+  /** What is behind the volume where the background is "sky". */
+  setSky(image: TexImageSource): void {
+    const { gl } = this;
+    if (this.sky) gl.deleteTexture(this.sky);
+    this.sky = gl.createTexture();
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, this.sky);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, image);
+    for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_WRAP_S, gl.REPEAT], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]]) {
+      gl.texParameteri(gl.TEXTURE_2D, name, value);
+    }
+    this.needsDisplay = true;
   }
   /** Shows the next finer level, whose slabs are there. @throws GraphicsError as allocate. */
   addLevel(index: Uint8Array): void {
@@ -389,15 +403,31 @@ export class Renderer {
     const hue = (settings.hue * Math.PI) / 180;
     gl.uniform2f(display.at("u_hue"), Math.cos(hue), Math.sin(hue));
     gl.uniform1f(display.at("u_exposure"), 2 ** settings.exposure);
+    this.bindSky(width, height, background === "sky" && !settings.slice);
+    if (background === "sky") background = defaultBackground;
     if (background === "none") gl.uniform4f(display.at("u_background"), 0, 0, 0, 0);
     else gl.uniform4f(display.at("u_background"), ...linearOf(background), 1);
     gl.uniform1i(display.at("u_plain"), settings.slice ? 1 : 0);
     this.draw();
   }
 
+  /** @param wanted  as the background; what the bundle does not have is not shown. */
+  private bindSky(width: number, height: number, wanted: boolean): void {
+    const { gl, display } = this;
+    gl.uniform1i(display.at("u_has_sky"), wanted && this.sky ? 1 : 0);
+    gl.uniform1i(display.at("u_sky"), 1);
+    if (!wanted || !this.sky) return;
+    const view = this.view!;
+    const lens = fitted(view.lens, width, height);
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D, this.sky);
+    gl.uniformMatrix3fv(display.at("u_right_down_forward"), false, ([0, 1, 2] as const).flatMap((axis) => column(view.rotation, axis)));
+    gl.uniform4f(display.at("u_lens"), lens.fx, lens.fy, lens.cx, lens.cy);
+  }
+
   /**
    * A picture of the current view and settings, as the screen shows it, at any size.
-   * @param background  "#rrggbb", or "none" for an alpha channel.
+   * @param background  "#rrggbb", "sky", or "none" for an alpha channel.
    * @param rays  a pixel.
    */
   async picture(width: number, height: number, background: string, rays = passes): Promise<ImageData> {

@@ -13,7 +13,7 @@ export interface Settings {
   hue: number;
   /** Stops. */
   exposure: number;
-  /** sRGB, "#rrggbb"; or "none", which is transparent. */
+  /** sRGB, "#rrggbb"; "none", which is transparent; "sky", where the bundle has one. */
   background: string;
   gain: number;
   /** Optical depth of a voxel below which there is nothing. */
@@ -31,13 +31,13 @@ export interface Settings {
 
 export const defaultBackground = "#101216";
 
-export function defaultSettings(up: string): Settings {
+export function defaultSettings(up: string, background = defaultBackground): Settings {
   return {
     wipe: 0,
     saturation: 1,
     hue: 0,
     exposure: 0,
-    background: defaultBackground,
+    background,
     gain: 1,
     threshold: 0,
     clip: null,

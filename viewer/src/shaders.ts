@@ -214,6 +214,10 @@ uniform vec2 u_hue;          // cosine and sine
 uniform float u_exposure;    // factor
 uniform vec4 u_background;   // linear; alpha 0 = transparent
 uniform bool u_plain;        // slices: colours are a scale, not light
+uniform bool u_has_sky;      // is the background, by the direction of view
+uniform sampler2D u_sky;     // equirectangular: +x in the middle, +z up, +y a quarter to the left; sRGB
+uniform mat3 u_right_down_forward;
+uniform vec4 u_lens;         // fx, fy, cx, cy in pixels of this target
 out vec4 o_color;
 ${color}
 vec3 graded(vec3 c) {
@@ -230,9 +234,15 @@ vec3 graded(vec3 c) {
   }
   return mix(vec3(y), c, clamp(keep, 0.0, 1.0));
 }
+vec3 skyAt(vec2 pixel) {
+  vec3 d = normalize(u_right_down_forward * vec3((pixel - u_lens.zw) / u_lens.xy, 1.0));
+  vec2 place = vec2(0.5 - atan(d.y, d.x) / 6.283185307, 0.5 - atan(d.z, length(d.xy)) / 3.141592654);
+  return linearFromSrgb(textureLod(u_sky, place, 0.0).rgb);
+}
 void main() {
   vec2 at = gl_FragCoord.xy / u_size;
   vec4 light = texture(u_image, at);
+  if (u_has_sky) light = vec4(light.rgb + (1.0 - light.a) * skyAt(vec2(gl_FragCoord.x, u_size.y - gl_FragCoord.y)), 1.0);
   vec3 c = light.a > 1e-4 ? light.rgb / light.a : vec3(0.0);
   if (!u_plain) {
     if (at.x < u_wipe) c = vec3(luminanceOf(c));

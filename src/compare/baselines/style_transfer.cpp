@@ -35,7 +35,7 @@ std::vector<StyledView> styled_views(const Capture& capture, const LuminanceMode
   for (const TrainingView& view : views) {
     if (observer.is_cancelled()) throw Interrupted("style transfer stopped; nothing was written");
     StyledView one;
-    one.view = cache_view(*luminance.engine, luminance.march(), view.camera, kStyleSide, kCachedWeight);
+    one.view = cache_view(luminance.seen(), view.camera, kStyleSide, kCachedWeight);
     ignore_masked(one.view, *view.image);
     std::vector<ViewPixel> all(one.view.luminance.size());
     for (std::size_t p = 0; p < all.size(); ++p) all[p].pixel = std::uint32_t(p);
@@ -170,7 +170,7 @@ LabPicture colorized_view(const Capture& capture, const std::filesystem::path& s
   if (training.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
   const std::size_t middle = training.size() / 2;
   const UnitCamera camera(training[middle]->intrinsics, training[middle]->world_from_camera, luminance.frame);
-  const CachedView view = cache_view(*luminance.engine, luminance.march(), camera, kStyleSide, kCachedWeight);
+  const CachedView view = cache_view(luminance.seen(), camera, kStyleSide, kCachedWeight);
   LightnessBatch question = whole_view(view, training[middle]->name, middle, kStyleSide);
   const ChromaBatch answer = colorizer.colorize(question);
   check_answer(colorizer.name(), question, answer);

@@ -287,7 +287,7 @@ void LuminanceEngineCpu::train_ray(const ObservedRay& ray, std::size_t index, fl
   chunk.squared_error += squared_error(seen, ray.target);
 
   const RayGradient gradient(error, ray.target.gain, distortion, distortion_weight, gradient_scale);
-  if (options_.learning.exposures) chunk.d_views[ray.view].by_log_gain += gradient.by_log_gain(seen);
+  if (options_.learning.exposures) chunk.d_views[ray.view].by_log_gain += gradient.by_log_gain(seen, ray.target);
   float distortion_behind = gradient.distortion_of_all();
   light = {};
   Distortion<float> before;

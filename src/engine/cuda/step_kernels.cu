@@ -34,6 +34,10 @@ struct DeviceViews {
   [[nodiscard]] __device__ float coverage(std::uint32_t v, std::size_t pixel) const {
     return views[v].alpha == nullptr ? 1.0f : float(views[v].alpha[pixel]) / 255.0f;
   }
+  [[nodiscard]] __device__ SkyLabel sky_label(std::uint32_t v, std::size_t pixel) const {
+    return views[v].sky_labels == nullptr ? SkyLabel::kScene : views[v].sky_labels[pixel];
+  }
+  [[nodiscard]] __device__ DirectionView sky(std::uint32_t v) const { return views[v].sky; }
   [[nodiscard]] __device__ float luminance(std::uint32_t v, std::size_t pixel) const {
     const ViewRecord& view = views[v];
     switch (view.depth) {

@@ -30,11 +30,13 @@ struct ViewRecord {
   int width = 0, height = 0;
   PixelDepth depth = PixelDepth::kU8;
   const void* pixels = nullptr;
-  const float* decoded = nullptr;       ///< linear luminance of every integer value; null for floats
-  const std::uint8_t* alpha = nullptr;  ///< null: opaque
-  const std::uint8_t* mask = nullptr;   ///< null: every pixel counts
-  int lens = 0;                         ///< see TrainingView
-  Intrinsics given;                     ///< the camera's, which are corrected as they are learned
+  const float* decoded = nullptr;        ///< linear luminance of every integer value; null for floats
+  const std::uint8_t* alpha = nullptr;   ///< null: opaque
+  const std::uint8_t* mask = nullptr;    ///< null: every pixel counts
+  const SkyLabel* sky_labels = nullptr;  ///< null: no pixel shows the sky
+  DirectionView sky;
+  int lens = 0;      ///< see TrainingView
+  Intrinsics given;  ///< the camera's, which are corrected as they are learned
 };
 
 /// What a step reports, in host memory that kernels write to.

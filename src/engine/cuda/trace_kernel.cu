@@ -175,7 +175,7 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
   const float scale = ray.has_room ? 1.0f / float(n_rays) : 0.0f;
   const RayGradient gradient(error, record.target.gain, distortion, job.distortion_weight, scale);
   if (job.view_gradients != nullptr && lane == 0) {
-    atomicAdd(&job.view_gradients[record.view].by_log_gain, gradient.by_log_gain(seen));
+    atomicAdd(&job.view_gradients[record.view].by_log_gain, gradient.by_log_gain(seen, record.target));
   }
   float distortion_behind = gradient.distortion_of_all();
   RunDistortion passed;

@@ -41,6 +41,10 @@ ViewRecord ViewImages::record_of(const TrainingView& view) {
   }
   record.alpha = plane(image.alpha.data(), image.alpha.size());
   record.mask = plane(image.mask.data(), image.mask.size());
+  if (view.sky_labels != nullptr) {
+    record.sky_labels = reinterpret_cast<const SkyLabel*>(plane(view.sky_labels->data(), view.sky_labels->size()));
+    record.sky = sky(*view.sky);
+  }
   return record;
 }
 
@@ -49,6 +53,15 @@ const std::uint8_t* ViewImages::plane(const void* data, std::size_t bytes) {
   planes_.emplace_back(bytes, kImageAdvice);
   planes_.back().upload(static_cast<const std::uint8_t*>(data), bytes);
   return planes_.back().data();
+}
+
+DirectionView ViewImages::sky(const DirectionMap& map) {
+  if (uploaded_sky_ != &map) {
+    uploaded_sky_ = &map;
+    tables_.push_back(uploaded(map.planes[0], kImageAdvice));
+    sky_ = {tables_.back().data(), map.width, map.height};
+  }
+  return sky_;
 }
 
 const float* ViewImages::decoded(const MonoImage& image) {

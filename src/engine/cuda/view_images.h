@@ -24,8 +24,12 @@ class ViewImages {
   /// Linear luminance of every integer value of an image.
   [[nodiscard]] const float* decoded(const MonoImage& image);
 
+  [[nodiscard]] DirectionView sky(const DirectionMap& map);
+
   std::vector<DeviceBuffer<std::uint8_t>> planes_;
   std::vector<DeviceBuffer<float>> tables_;
+  const DirectionMap* uploaded_sky_ = nullptr;  // all views see the same
+  DirectionView sky_;
   const float* shared_tables_[2][3] = {};  // per kind of integer and transfer, of images without exposure of their own
   DeviceBuffer<ViewRecord> records_;
 };

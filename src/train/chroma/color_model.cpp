@@ -35,6 +35,17 @@ void show(std::vector<Ab>& colors, const Seen& seen) {
   });
 }
 
+/// Of the size that the snapshot says, still to be restored.
+SkyColors stored_sky(const Snapshot& snapshot) {
+  constexpr int kWidest = 4096;
+  const int width = snapshot.header().contains("sky_width") ? header_field<int>(snapshot, "sky_width") : 0;
+  if (width == 0) return {};
+  if (width < 2 || width > kWidest || (width & (width - 1)) != 0) {
+    throw SnapshotError(snapshot.file().string() + ": header: sky_width: expected a power of two up to 4096");
+  }
+  return SkyColors(width);
+}
+
 }  // namespace
 
 Ab in_gamut(Ab color, float luminance) {
@@ -68,6 +79,7 @@ std::vector<StatePiece> ColorModel::state() {
   std::vector<StatePiece> pieces = chroma->state();
   for (StatePiece& piece : chromaticity->state()) pieces.push_back(std::move(piece));
   pieces.push_back(state_piece("queries", queries));
+  if (sky.exists()) pieces.push_back(state_piece("sky", sky.sums()));
   return pieces;
 }
 
@@ -90,7 +102,9 @@ ColorModel ColorModel::load(const std::filesystem::path& file, const Engines& en
   }
   model.colorizer = header_field<std::string>(snapshot, "colorizer");
   model.stage1_sha256 = header_field<std::string>(snapshot, "stage1_sha256");
+  model.sky = stored_sky(snapshot);
   snapshot.restore(model.state());
+  model.sky.refresh();
   model.chroma->state_loaded();
   model.chromaticity->state_loaded();
   return model;
@@ -103,6 +117,7 @@ void ColorModel::save(const std::filesystem::path& file) {
        {"pixel_colors", pixel_colors == PixelColors::kField ? kFieldColors : "distribution"},
        {"colorizer", colorizer},
        {"stage1_sha256", stage1_sha256},
+       {"sky_width", sky.width()},
        {"report",
         {{"accepted", report.accepted}, {"rejected", report.rejected}, {"bake_ab_distance", report.bake_ab_distance}}}},
       state());
@@ -117,6 +132,7 @@ ColorModel ColorModel::copy(const Engines& engines) {
   same.colorizer = colorizer;
   same.stage1_sha256 = stage1_sha256;
   same.report = report;
+  same.sky = sky;
   const std::vector<StatePiece> from = state(), to = same.state();
   CNERF_CHECK(from.size() == to.size(), "models of the same options have the same pieces");
   for (std::size_t i = 0; i < from.size(); ++i) {

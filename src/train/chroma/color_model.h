@@ -7,6 +7,7 @@
 
 #include "src/engine/color_engines.h"
 #include "src/engine/engines.h"
+#include "src/train/chroma/sky_colors.h"
 #include "src/train/chroma/stage2.h"
 #include "src/train/luminance/snapshot.h"
 
@@ -27,6 +28,7 @@ struct ColorModel {
   std::vector<std::int64_t> queries = {0};  ///< patches the colorizer was asked for, and the next patch's index
   std::unique_ptr<ColorBinEngine> chroma;
   std::unique_ptr<ColorFieldEngine> chromaticity;
+  SkyColors sky;  ///< there is one where stage 1 has a sky
 
   static ColorModel create(const Stage2Options& options, const Engines& engines);
   /// @throws MissingInputError, SnapshotError

@@ -12,6 +12,7 @@ namespace cnerf {
 namespace {
 
 constexpr int kMostRejectedInARow = 400;
+constexpr int kSkyStep = 4;  // of the pixels of an answer, one of so many along both axes tells of the sky
 
 }  // namespace
 
@@ -28,6 +29,7 @@ PatchTraining::PatchTraining(Session& session, const Injection& injection, Quest
 void PatchTraining::run() {
   const Stage2Options& options = session_.options;
   ColorModel& model = session_.model;
+  if (model.sky.exists() && model.sky.is_grey()) model.sky.add(session_.views(), known_);
   questioner_.ask_ahead(model.queries.front());
   while (steps() < options.patches) {
     const Stopwatch waiting;
@@ -42,9 +44,11 @@ void PatchTraining::run() {
       const float rate =
           decayed_rate(options.learning_rate, options.final_learning_rate, double(steps()) / options.patches);
       session_.loss = injection_.step(model, pixels_of(patch, is_accepted), rate);
+      if (model.sky.exists() && is_accepted) learn_sky(patch);
     }
     session_.after_step("stage 2", "loss", steps(), options.patches);
   }
+  if (model.sky.exists()) model.sky.refresh();
   galleries_.write(session_.folder());
 }
 
@@ -64,6 +68,19 @@ bool PatchTraining::judge(const AnsweredPatch& patch, bool is_accepted) {
                          "stage2.purify.threshold, or pick other bases");
   }
   return is_of_use;
+}
+
+void PatchTraining::learn_sky(const AnsweredPatch& patch) {
+  const PatchPlace& place = patch.place;
+  const CachedView& view = session_.views()[place.view];
+  const std::size_t side = std::size_t(patch.side), b = side * side;
+  for (int y = 0; y < patch.side; y += kSkyStep) {
+    for (int x = 0; x < patch.side; x += kSkyStep) {
+      const int column = place.left + x * place.side / patch.side, row = place.top + y * place.side / patch.side;
+      const std::size_t at = std::size_t(y) * side + std::size_t(x);
+      session_.model.sky.add(view, std::size_t(row * view.width + column), {patch.ab[at], patch.ab[b + at]});
+    }
+  }
 }
 
 /// Pixels of the patch with the answer's colours, or known ones; of a rejected patch only those; and known pixels of

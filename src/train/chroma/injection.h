@@ -57,6 +57,8 @@ class PatchTraining {
   [[nodiscard]] long steps() const;
   /// @return  whether anything is to be learnt with it
   bool judge(const AnsweredPatch& patch, bool is_accepted);
+  /// What an answer says of the sky.
+  void learn_sky(const AnsweredPatch& patch);
   [[nodiscard]] ColoredPixels pixels_of(const AnsweredPatch& patch, bool is_accepted) const;
   void add_known(std::vector<ViewPixel>& places, std::vector<Ab>& colors) const;
 

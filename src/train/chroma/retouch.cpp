@@ -55,6 +55,7 @@ Retouch::Retouch(std::span<const CachedView> views, const KnownColorMap& known, 
     : views_(views), known_(known), base_(base), model_(model), options_(options) {}
 
 double Retouch::step() {
+  if (done_ == 0 && model_.sky.exists()) paint_sky();
   const CounterRng rng(options_.seed ^ named_stream("known"), std::uint64_t(done_));
   std::vector<ViewPixel> places = draw_kept();
   std::vector<Ab> colors(places.size());
@@ -83,6 +84,12 @@ double Retouch::step() {
   if (!std::isfinite(loss)) throw DivergedError("colours: the loss is not finite; the take is as it was");
   ++done_;
   return loss;
+}
+
+void Retouch::paint_sky() {
+  model_.sky = base_ != nullptr && base_->sky.exists() ? base_->sky : SkyColors::grey();
+  model_.sky.add(views_, known_);
+  model_.sky.refresh();
 }
 
 /// Random pixels of all views of which nothing is known.

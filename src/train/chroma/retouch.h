@@ -36,6 +36,7 @@ class Retouch {
   [[nodiscard]] bool is_settled() const { return done_ >= options_.steps; }
 
  private:
+  void paint_sky();
   [[nodiscard]] std::vector<ViewPixel> draw_kept() const;
 
   std::span<const CachedView> views_;

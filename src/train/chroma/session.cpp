@@ -50,11 +50,11 @@ void Session::start_or_resume(const Engines& engines, PixelColors pixel_colors) 
 
 void Session::cache_views(const Engines& engines) {
   const LuminanceModel luminance = LuminanceModel::load(job_.stage1, engines);
+  if (luminance.sky.exists() && !model.sky.exists()) model.sky = SkyColors::grey();
   if (observer_.wants_previews() && model.chroma) cache_previews(luminance);
   const auto told = [this](double fraction) { report("stage 2: caching views", fraction); };
-  const MarchSettings march = luminance.march();
-  cache_.fill(*luminance.engine, march, job_.capture, luminance.frame, options.working_resolution, told);
-  cache_.add(cache_.traced(*luminance.engine, march, luminance.frame, job_.viewpoints, told));
+  cache_.fill(luminance.seen(), job_.capture, luminance.frame, options.working_resolution, told);
+  cache_.add(cache_.traced(luminance.seen(), luminance.frame, job_.viewpoints, told));
   cache_.put_first(job_.viewpoints);
   const std::size_t count = cache_.of_capture() + job_.viewpoints.size();
   views_ = cache_.views().first(count);
@@ -65,8 +65,7 @@ void Session::cache_previews(const LuminanceModel& luminance) {
   for (const View& view : job_.capture.views) {
     if (!view.held_out || previews_.size() >= kPreviews) continue;
     const UnitCamera camera(view.intrinsics, view.world_from_camera, luminance.frame);
-    previews_.push_back(
-        {view.name, cache_view(*luminance.engine, luminance.march(), camera, kPreviewSide, kPreviewShare)});
+    previews_.push_back({view.name, cache_view(luminance.seen(), camera, kPreviewSide, kPreviewShare)});
   }
 }
 
@@ -75,9 +74,12 @@ PreviewPicture Session::preview(std::size_t index) const {
   PreviewPicture picture{name, view.width, view.height, {}, view.luminance};
   std::vector<ViewPixel> all(view.luminance.size());
   for (std::size_t p = 0; p < all.size(); ++p) all[p].pixel = std::uint32_t(p);
-  const std::vector<Ab> colors = model.decode(pixel_samples(std::span(&view, 1), all));
+  const PixelSamples samples = pixel_samples(std::span(&view, 1), all);
+  const std::vector<Ab> colors = model.decode(samples);
+  const std::vector<float> field = pixel_luminance(samples);
   for (std::size_t p = 0; p < all.size(); ++p) {
-    const Ab ab = view.opacity[p] < kLeastColoredOpacity ? Ab{} : colors[p];
+    Ab ab = view.opacity[p] < kLeastColoredOpacity ? Ab{} : colors[p];
+    if (model.sky.exists()) ab = model.sky.behind(view, p, field[p], ab);
     const Vec3f rgb = linear_rgb_at(view.luminance[p], ab);
     picture.ours.insert(picture.ours.end(), {rgb.x, rgb.y, rgb.z});
   }

@@ -82,6 +82,18 @@ std::vector<Numbers> stored_piece(const Snapshot& snapshot, const char* name, in
   return values;
 }
 
+constexpr const char* kSky = "sky";
+constexpr int kWidestSky = 4096;
+
+DirectionMap stored_sky(const Snapshot& snapshot) {
+  const int width = learned_count(snapshot, "sky_width");
+  if (width == 0) return {};
+  if (width < 0 || width > kWidestSky || width % 2 != 0) {
+    throw SnapshotError(snapshot.file().string() + ": header: sky_width: expected an even number up to 4096");
+  }
+  return {width, width / 2, {stored_piece<float>(snapshot, kSky, width * (width / 2))}};
+}
+
 /// Of what decides how much memory an engine takes, and of what it divides by.
 void check_stored(const Snapshot& snapshot, const LuminanceModel& model) {
   constexpr int kMostCascades = 8, kBlock = 16, kMostResolution = 1 << 10, kMostSamples = 1 << 24, kMostSteps = 1 << 16;
@@ -191,12 +203,19 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   model.learned_lenses = learned_count(snapshot, "learned_lenses");
   check_stored(snapshot, model);
   model.engine = make_engine(model, engines);
-  snapshot.restore(model.engine->state());
+  model.sky = stored_sky(snapshot);
+  std::vector<StatePiece> pieces = model.engine->state();
+  if (model.sky.exists()) pieces.push_back(state_piece(kSky, model.sky.planes.front()));
+  snapshot.restore(pieces);
   model.engine->state_loaded();
   return model;
 }
 
 void LuminanceModel::save(const std::filesystem::path& file) const {
+  std::vector<StatePiece> pieces = engine->state();
+  std::vector<float> light;
+  if (sky.exists()) light = sky.planes.front();
+  if (sky.exists()) pieces.push_back(state_piece(kSky, light));
   save_snapshot(file, kKind,
                 {{"frame", frame_to_json(frame)},
                  {"options", options_to_json(options)},
@@ -205,8 +224,9 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
                  {"learned_views", learned_views},
                  {"learned_lenses", learned_lenses},
                  {"trained_samples", trained_samples},
+                 {"sky_width", sky.width},
                  {"step", engine->step_count()}},
-                engine->state());
+                pieces);
   save_times(file, {{"seconds", seconds}});
 }
 

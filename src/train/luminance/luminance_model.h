@@ -8,6 +8,7 @@
 #include "src/engine/engines.h"
 #include "src/engine/luminance_engine.h"
 #include "src/field/scene_frame.h"
+#include "src/train/luminance/seen_scene.h"
 #include "src/train/luminance/snapshot.h"
 #include "src/train/luminance/stage1_options.h"
 
@@ -29,6 +30,7 @@ struct LuminanceModel {
   double seconds = 0;          ///< training time so far
   double trained_samples = 0;  ///< so far
   std::unique_ptr<LuminanceEngine> engine;
+  DirectionMap sky;  ///< linear Y beyond the box, at the median view's exposure; none where no view sees one
 
   /// A fresh model for a capture. The second form knows more points than the capture brings.
   static LuminanceModel create(const Capture& capture, const Stage1Options& options, const Engines& engines);
@@ -47,6 +49,9 @@ struct LuminanceModel {
     return march_settings(frame.cascades, steps_per_box > 0 ? steps_per_box : options.steps_per_box,
                           options.cone_angle);
   }
+  [[nodiscard]] DirectionView sky_light() const { return sky.exists() ? sky.plane(0) : DirectionView(); }
+  /// As training marched.
+  [[nodiscard]] SeenScene seen() const { return {*engine, march(), sky_light()}; }
 };
 
 /// SceneFrame in snapshot headers.

@@ -11,6 +11,7 @@
 #include "src/optim/adam.h"
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/options_json.h"
+#include "src/train/luminance/seen_sky.h"
 
 namespace cnerf {
 namespace {
@@ -69,7 +70,10 @@ PreviewPicture preview_of(const LuminanceModel& model, const View& view) {
   }
   std::vector<RayResult> results(picture.input.size());
   model.engine->render_view(camera, model.march(), {1e-2f, 0.9f}, results);
-  for (const RayResult& result : results) picture.ours.push_back(result.luminance);
+  for (std::size_t p = 0; p < results.size(); ++p) {
+    const float behind = light_behind(model.sky_light(), camera.ray_of_pixel(p), results[p].opacity);
+    picture.ours.push_back(results[p].luminance + behind);
+  }
   return picture;
 }
 
@@ -79,10 +83,13 @@ void refuse_others(const std::filesystem::path& snapshot, const Stage1Options& s
                       ": was trained with other stage1 options; run with the same ones, or without --resume");
 }
 
+const std::vector<SparsePoint>& points_of(const Stage1Job& job) {
+  return job.points.empty() ? job.capture.points : job.points;
+}
+
 LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines) {
   if (!job.goes_on()) {
-    const auto& points = job.points.empty() ? job.capture.points : job.points;
-    return LuminanceModel::create(job.capture, job.options, engines, points);
+    return LuminanceModel::create(job.capture, job.options, engines, points_of(job));
   }
   LuminanceModel model = LuminanceModel::load(job.snapshot, engines);
   refuse_others(job.snapshot, model.options, job.options);
@@ -127,8 +134,12 @@ void check_continues(const std::filesystem::path& snapshot, const Stage1Options&
 Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer& observer) {
   const Stage1Options& options = job.options;
   LuminanceModel model = start_or_resume(job, engines);
-  const std::vector<TrainingView> views = training_views(job.capture, model.frame);
+  std::vector<TrainingView> views = training_views(job.capture, model.frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
+  SeenSky sky;
+  if (options.sky) sky = find_sky(job.capture, views, points_of(job));
+  sky.show_to(views);
+  model.sky = sky.light;
   model.engine->set_views(views);
 
   TrainingClock clock;
@@ -168,6 +179,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
     }
     if (options.checkpoint_every > 0 && done % options.checkpoint_every == 0) model.save(job.snapshot);
   }
+  if (model.sky.exists()) model.sky = sky_light(views, sky.labels, model.engine->view_corrections());
   model.save(job.snapshot);
   observer.report_progress({"stage 1", 1.0, {{"psnr", psnr.value()}}});
   return {int(model.engine->step_count()), model.seconds, model.trained_samples, psnr.value()};

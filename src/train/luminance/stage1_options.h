@@ -31,6 +31,7 @@ struct Stage1Options {
   double cone_angle = 1.0 / 64;
   bool free_space = true;
   bool exposures = true, poses = false, lenses = false;
+  bool sky = true;
   int checkpoint_every = 1000;
   int seed = 1;
   HashGridOptions grid = {.decay = 0.1};
@@ -55,6 +56,7 @@ struct Stage1Options {
     v("exposures", exposures, "the light of each training view is learned, over that of the median view");
     v("poses", poses, "where cameras stood and looked is learned");
     v("lenses", lenses, "focal lengths, principal points and distortion of the views' lenses are learned");
+    v("sky", sky, "where views see a sky, its light comes from beyond the scene and the way there is empty");
     v("checkpoint_every", checkpoint_every, Range{0, 1e8}, "steps between snapshots; 0 = only at the end");
     v("seed", seed, Range{0, 1e9}, "of weights, rays and jitter");
     v.section("grid", grid);

@@ -31,8 +31,8 @@ void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
 
 }  // namespace
 
-CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march, const UnitCamera& full_size_camera,
-                      int short_side, double share, const std::function<void(double fraction)>& report) {
+CachedView cache_view(const SeenScene& scene, const UnitCamera& full_size_camera, int short_side, double share,
+                      const std::function<void(double fraction)>& report) {
   CachedView view;
   view.camera = full_size_camera;
   const Intrinsics& lens = full_size_camera.intrinsics;
@@ -50,7 +50,7 @@ CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
     parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t r = begin; r < end; ++r) rays[r] = view.camera.ray_of_pixel(first + r);
     });
-    engine.trace(rays, march, {kCacheTransmittance, float(share)}, some, offsets);
+    scene.engine.trace(rays, scene.march, {kCacheTransmittance, float(share)}, some, offsets);
     for (std::size_t r = 0; r < rays.size(); ++r) view.offsets.push_back(samples.size() + offsets[r + 1]);
     samples.insert(samples.end(), some.begin(), some.end());
     if (report) report(double(first + rays.size()) / double(pixels));
@@ -63,14 +63,17 @@ CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
         view.luminance[p] += samples[s].weight * samples[s].luminance;
         view.opacity[p] += samples[s].weight;
       }
+      if (scene.sky.values != nullptr) {
+        view.luminance[p] += light_behind(scene.sky, view.camera.ray_of_pixel(p), view.opacity[p]);
+      }
     }
   });
   pack(samples, view);
   return view;
 }
 
-void ViewCache::fill(const LuminanceEngine& engine, const MarchSettings& march, const Capture& capture,
-                     const SceneFrame& frame, int short_side, const std::function<void(double fraction)>& report) {
+void ViewCache::fill(const SeenScene& scene, const Capture& capture, const SceneFrame& frame, int short_side,
+                     const std::function<void(double fraction)>& report) {
   const std::vector<TrainingView> views = training_views(capture, frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to colorize");
   if (short_side != short_side_) *this = ViewCache();
@@ -83,14 +86,13 @@ void ViewCache::fill(const LuminanceEngine& engine, const MarchSettings& march, 
     }
   }
   for (std::size_t v = views_.size(); v < views.size(); ++v) {
-    views_.push_back(cache_view(engine, march, views[v].camera, short_side, kCachedWeight,
+    views_.push_back(cache_view(scene, views[v].camera, short_side, kCachedWeight,
                                 [&](double fraction) { report((double(v) + fraction) / double(views.size())); }));
     ignore_masked(views_.back(), *views[v].image);
   }
 }
 
-std::vector<ViewCache::TracedViewpoint> ViewCache::traced(const LuminanceEngine& engine, const MarchSettings& march,
-                                                          const SceneFrame& frame,
+std::vector<ViewCache::TracedViewpoint> ViewCache::traced(const SeenScene& scene, const SceneFrame& frame,
                                                           std::span<const Viewpoint> viewpoints,
                                                           const std::function<void(double fraction)>& report) const {
   std::vector<Viewpoint> missing;
@@ -98,7 +100,7 @@ std::vector<ViewCache::TracedViewpoint> ViewCache::traced(const LuminanceEngine&
   std::vector<TracedViewpoint> traced;
   for (const Viewpoint& viewpoint : missing) {
     const UnitCamera camera(viewpoint.camera.intrinsics(), viewpoint.camera.world_from_camera(), frame);
-    traced.push_back({viewpoint, cache_view(engine, march, camera, short_side_, kCachedWeight, [&](double fraction) {
+    traced.push_back({viewpoint, cache_view(scene, camera, short_side_, kCachedWeight, [&](double fraction) {
                         if (report) report((double(traced.size()) + fraction) / double(missing.size()));
                       })});
   }

@@ -12,6 +12,7 @@
 #include "src/engine/color_engines.h"
 #include "src/engine/luminance_engine.h"
 #include "src/render/training_views.h"
+#include "src/train/luminance/seen_scene.h"
 
 namespace cnerf {
 
@@ -26,8 +27,8 @@ struct CachedSample {
 struct CachedView {
   UnitCamera camera;
   int width = 0, height = 0;
-  std::vector<float> luminance;  ///< linear Y over black
-  std::vector<float> opacity;
+  std::vector<float> luminance;       ///< linear Y over the sky, or over black
+  std::vector<float> opacity;         ///< of the field
   float brightest = 1;                ///< luminance of the brightest sample
   std::vector<CachedSample> samples;  ///< pixel by pixel, front to back
   std::vector<std::size_t> offsets;   ///< [H W + 1]
@@ -38,9 +39,8 @@ struct CachedView {
 /// Renders a view with its short side at most `short_side` pixels. Of each pixel the heaviest samples are kept that
 /// carry `share` of its weight.
 /// @param report  is told the share that is done, some times a second; may throw
-[[nodiscard]] CachedView cache_view(const LuminanceEngine& engine, const MarchSettings& march,
-                                    const UnitCamera& full_size_camera, int short_side, double share,
-                                    const std::function<void(double fraction)>& report = {});
+[[nodiscard]] CachedView cache_view(const SeenScene& scene, const UnitCamera& full_size_camera, int short_side,
+                                    double share, const std::function<void(double fraction)>& report = {});
 
 inline constexpr double kCachedWeight = 0.99;  ///< share of a pixel's weight that the samples of a ViewCache carry
 
@@ -52,8 +52,8 @@ class ViewCache {
   /// @param short_side     pixels of their shorter side, at most
   /// @param report         is told the share that is done; may throw, and a later call goes on
   /// @throws UsageError    every view is held out.
-  void fill(const LuminanceEngine& engine, const MarchSettings& march, const Capture& capture, const SceneFrame& frame,
-            int short_side, const std::function<void(double fraction)>& report);
+  void fill(const SeenScene& scene, const Capture& capture, const SceneFrame& frame, int short_side,
+            const std::function<void(double fraction)>& report);
   [[nodiscard]] std::span<const CachedView> views() const { return views_; }
   [[nodiscard]] std::span<const std::string> names() const { return names_; }  ///< as the capture has them
   [[nodiscard]] std::size_t of_capture() const { return names_.size() - viewpoints_.size(); }
@@ -64,8 +64,8 @@ class ViewCache {
     CachedView view;
   };
   /// What is not held yet of these viewpoints, traced as the capture's views are: after `fill`.
-  [[nodiscard]] std::vector<TracedViewpoint> traced(const LuminanceEngine& engine, const MarchSettings& march,
-                                                    const SceneFrame& frame, std::span<const Viewpoint> viewpoints,
+  [[nodiscard]] std::vector<TracedViewpoint> traced(const SeenScene& scene, const SceneFrame& frame,
+                                                    std::span<const Viewpoint> viewpoints,
                                                     const std::function<void(double fraction)>& report) const;
   [[nodiscard]] bool holds(const Viewpoint& viewpoint) const { return place_of(viewpoint) < names_.size(); }
   /// Holds them behind all others, which stay where they are: who goes through `views()` meanwhile is not disturbed.

@@ -57,14 +57,16 @@ export class Panel {
     const { app } = this;
     const custom = el("input", { type: "color", id: "background-color", title: "Any colour", "aria-label": "Background colour" });
     custom.addEventListener("input", () => app.set({ background: custom.value }));
-    const swatches = backgrounds.map(([value, label]) => {
+    const offered: [string, string][] = app.bundle.sky ? [["sky", "Sky"], ...backgrounds] : backgrounds;
+    const swatches = offered.map(([value, label]) => {
       const b = el("button", { class: "swatch", type: "button", title: label, "aria-label": `Background ${label}`, "data-background": value, onclick: () => app.set({ background: value }) });
-      if (value !== "none") b.style.background = value;
+      if (value.startsWith("#")) b.style.background = value;
+      if (value === "sky") b.style.background = "linear-gradient(#5b87c4, #dfe6ea)";
       return b;
     });
     this.refreshers.push(() => {
       for (const s of swatches) s.setAttribute("aria-pressed", String(s.dataset.background === app.settings.background));
-      if (app.settings.background !== "none") custom.value = app.settings.background;
+      if (app.settings.background.startsWith("#")) custom.value = app.settings.background;
     });
     return section(
       "Colour", true,
