@@ -7,7 +7,6 @@
 
 #include "bake/camera.h"
 #include "bake/splat/splat_math.h"
-#include "src/base/observer.h"
 
 namespace cnerf::bake {
 
