@@ -222,13 +222,13 @@ TEST_F(SharedStage2, ViewsAreTracedForEachOther) {
   const LuminanceModel model = LuminanceModel::load(stage1(), cpu_engines());
   ViewCache alone;
   const auto silent = [](double) {};
-  alone.fill(*model.engine, model.march(), capture_, model.frame, 20, silent);
+  alone.fill(model.seen(), capture_, model.frame, 20, silent);
   on_ranks(2, [&](cluster::Ranks& ranks) {
     const LuminanceModel own = LuminanceModel::load(stage1(), cpu_engines());
     ViewCache shared;
     shared.trace_with(ranks);
     int reports = 0;
-    shared.fill(*own.engine, own.march(), capture_, own.frame, 20, [&](double) { ++reports; });
+    shared.fill(own.seen(), capture_, own.frame, 20, [&](double) { ++reports; });
     ASSERT_EQ(shared.views().size(), alone.views().size());
     EXPECT_EQ(reports, ranks.is_first() ? 3 : 2) << "of five views";
     for (std::size_t v = 0; v < alone.views().size(); ++v) {
