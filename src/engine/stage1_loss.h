@@ -79,7 +79,7 @@ class RayGradient {
   [[nodiscard]] CNERF_HD float by_luminance(const LitSample& sample) const { return d_seen_ * gain_ * sample.weight; }
   /// By the logarithm of the view's gain.
   [[nodiscard]] CNERF_HD float by_log_gain(const SeenRay& ray, const RayTarget& target) const {
-    return d_seen_ * ray.luminance_in(target);
+    return d_seen_ * gain_ * ray.luminance + d_seen_ * ray.transmittance * target.sky;
   }
   /// By a sample's density, as far as it changes what is seen. What lies behind it counts, the background included.
   [[nodiscard]] CNERF_HD float by_density(const LitSample& sample) const {
