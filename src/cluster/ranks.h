@@ -39,7 +39,7 @@ class Ranks {
   [[nodiscard]] virtual Bytes broadcast(Bytes bytes) { return bytes; }
   /// What all have, by rank, for all.
   [[nodiscard]] virtual std::vector<Bytes> gather(Bytes bytes);
-  /// Waits until all are here.  @param what  for the message  @param limit  then it is an error
+  /// Waits until all are here; an error that says for what, when the limit has passed.
   virtual void barrier(const std::string& /*what*/, Seconds /*limit*/ = kNoLimit) {}
 
   /// A number for a shared work, the same on all ranks.
@@ -48,7 +48,7 @@ class Ranks {
   [[nodiscard]] virtual std::int64_t next(std::int64_t /*work*/) { return 0; }
   /// A result for rank 0. Waits while that is many pieces behind.
   virtual void put(std::int64_t /*work*/, std::int64_t /*piece*/, Bytes /*result*/) {}
-  /// For rank 0, once: a result, if it is there.  @param waits  until it is
+  /// For rank 0, once: a result, if it is there. If asked, waits until it is.
   [[nodiscard]] virtual std::optional<Bytes> take(std::int64_t /*work*/, std::int64_t /*piece*/, bool /*waits*/) {
     return std::nullopt;
   }

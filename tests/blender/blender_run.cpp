@@ -53,8 +53,13 @@ RenderedExr read_exr(const fs::path& file) {
   Imf::FrameBuffer frame;
   const std::array<const char*, 4> names{"R", "G", "B", "A"};
   for (std::size_t c = 0; c < names.size(); ++c) {
-    if (input.header().channels().findChannel(names[c]) == nullptr) {
+    const bool is_missing = input.header().channels().findChannel(names[c]) == nullptr;
+    if (is_missing && names[c] != std::string("A")) {
       throw std::runtime_error(file.string() + ": no channel " + names[c]);
+    }
+    if (is_missing) {
+      for (std::size_t p = c; p < image.rgba.size(); p += names.size()) image.rgba[p] = 1;
+      continue;
     }
     frame.insert(names[c], Imf::Slice::Make(Imf::FLOAT, image.rgba.data() + c, window, 4 * sizeof(float),
                                             4 * sizeof(float) * std::size_t(image.width)));

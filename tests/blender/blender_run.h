@@ -27,7 +27,7 @@ int run_blender(const std::filesystem::path& setup, const std::string& arguments
 /// A picture rendered with `--exact` and these further arguments.  @throws std::runtime_error with Blender's log.
 [[nodiscard]] RenderedExr render_exact(const std::filesystem::path& setup, const std::string& arguments);
 
-/// Reads an EXR with channels R, G, B, A of 32 bits.
+/// Reads an EXR with channels R, G, B, A of 32 bits; opaque where A is missing.
 [[nodiscard]] RenderedExr read_exr(const std::filesystem::path& file);
 
 }  // namespace cnerf::test
