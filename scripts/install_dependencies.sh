@@ -48,34 +48,20 @@ install_packages() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}"
 }
 
-# Khronos' glTF validator, which Debian does not package. Tests that need it skip where it cannot be had.
-install_gltf_validator() {
+# What tests look at results with and Debian does not package: Khronos' glTF validator, and Spark, an independent reader
+# of splats, with what it draws by and what opens a browser. Tests skip where these cannot be had.
+install_readers() {
   local folder
   folder="$(dirname "$0")/../build/node"
-  [[ -d "$folder/node_modules/gltf-validator" ]] && return
+  [[ -d "$folder/node_modules/gltf-validator" && -d "$folder/node_modules/@sparkjsdev/spark" ]] && return
   if ! command -v npm > /dev/null; then
-    echo "dependencies: no npm, so no glTF validator; its tests will skip"
-    return
-  fi
-  mkdir -p "$folder"
-  npm install --prefix "$folder" --no-save --no-fund --no-audit --loglevel=error gltf-validator@2.0.0-dev.3.10 ||
-    echo "dependencies: npm cannot get the glTF validator; its tests will skip"
-}
-
-# Spark, an independent reader of splats, with what it draws by and what opens a browser. Tests that need it skip where
-# it cannot be had.
-install_splat_reader() {
-  local folder
-  folder="$(dirname "$0")/../build/node"
-  [[ -d "$folder/node_modules/@sparkjsdev/spark" ]] && return
-  if ! command -v npm > /dev/null; then
-    echo "dependencies: no npm, so no reader of splats; its tests will skip"
+    echo "dependencies: no npm, so neither glTF validator nor reader of splats; their tests will skip"
     return
   fi
   mkdir -p "$folder"
   npm install --prefix "$folder" --no-save --no-fund --no-audit --loglevel=error \
-    @sparkjsdev/spark@2.2.0 three@0.180.0 playwright-core@1.55.1 gltf-validator@2.0.0-dev.3.10 ||
-    echo "dependencies: npm cannot get the reader of splats; its tests will skip"
+    gltf-validator@2.0.0-dev.3.10 @sparkjsdev/spark@2.2.0 three@0.180.0 playwright-core@1.55.1 ||
+    echo "dependencies: npm cannot get glTF validator and reader of splats; their tests will skip"
 }
 
 # What the viewer's page is built with: Vite, TypeScript; nothing of it is part of the page.
@@ -123,7 +109,4 @@ if [[ "${1:-}" == "--encoder" ]]; then
 fi
 install_packages
 install_page_packages
-if [[ "${1:-}" == "--tests" ]]; then
-  install_gltf_validator
-  install_splat_reader
-fi
+if [[ "${1:-}" == "--tests" ]]; then install_readers; fi

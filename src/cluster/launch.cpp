@@ -32,13 +32,23 @@ int port_of(const GetVariable& variable, const std::string& job) {
   return number(variable, "MASTER_PORT", kFirstPort + int(hash % unsigned(kPorts)));
 }
 
+/// Where the variables of a launcher say who a process is.
+struct RankVariables {
+  const char *rank, *size, *local_rank;
+};
+
+Launch numbered(const GetVariable& variable, const char* launcher, const RankVariables& names) {
+  Launch launch;
+  launch.launcher = launcher;
+  launch.rank = number(variable, names.rank, 0);
+  launch.size = number(variable, names.size, 1);
+  launch.local_rank = number(variable, names.local_rank, 0);
+  return launch;
+}
+
 std::optional<Launch> by_torchrun(const GetVariable& variable) {
   if (!variable("RANK") || !variable("WORLD_SIZE")) return std::nullopt;
-  Launch launch;
-  launch.launcher = "torchrun";
-  launch.rank = number(variable, "RANK", 0);
-  launch.size = number(variable, "WORLD_SIZE", 1);
-  launch.local_rank = number(variable, "LOCAL_RANK", 0);
+  Launch launch = numbered(variable, "torchrun", {"RANK", "WORLD_SIZE", "LOCAL_RANK"});
   launch.local_size = number(variable, "LOCAL_WORLD_SIZE", 1);
   launch.host = variable("MASTER_ADDR").value_or("");
   launch.port = number(variable, "MASTER_PORT", 0);
@@ -51,11 +61,8 @@ std::optional<Launch> by_torchrun(const GetVariable& variable) {
 
 std::optional<Launch> by_open_mpi(const GetVariable& variable) {
   if (!variable("OMPI_COMM_WORLD_RANK")) return std::nullopt;
-  Launch launch;
-  launch.launcher = "Open MPI";
-  launch.rank = number(variable, "OMPI_COMM_WORLD_RANK", 0);
-  launch.size = number(variable, "OMPI_COMM_WORLD_SIZE", 1);
-  launch.local_rank = number(variable, "OMPI_COMM_WORLD_LOCAL_RANK", 0);
+  Launch launch =
+      numbered(variable, "Open MPI", {"OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_LOCAL_RANK"});
   launch.local_size = number(variable, "OMPI_COMM_WORLD_LOCAL_SIZE", 1);
   const bool is_one_machine = launch.local_size == launch.size;
   launch.host = variable("MASTER_ADDR").value_or(is_one_machine ? "127.0.0.1" : "");
@@ -72,11 +79,7 @@ int tasks_per_node(const GetVariable& variable) {
 /// A script of sbatch has the variables of its job; only what srun started has those of a step.
 std::optional<Launch> by_slurm(const GetVariable& variable) {
   if (!variable("SLURM_PROCID") || !variable("SLURM_STEP_NUM_TASKS")) return std::nullopt;
-  Launch launch;
-  launch.launcher = "Slurm";
-  launch.rank = number(variable, "SLURM_PROCID", 0);
-  launch.size = number(variable, "SLURM_STEP_NUM_TASKS", 1);
-  launch.local_rank = number(variable, "SLURM_LOCALID", 0);
+  Launch launch = numbered(variable, "Slurm", {"SLURM_PROCID", "SLURM_STEP_NUM_TASKS", "SLURM_LOCALID"});
   launch.local_size = std::max(tasks_per_node(variable), launch.local_rank + 1);
   launch.host =
       variable("MASTER_ADDR")

@@ -12,7 +12,7 @@
 namespace cnerf {
 namespace {
 
-constexpr int kMapWidth = 512;              // 0.7 degrees a pixel
+constexpr int kMapWidth = 512;              // 0.7 degrees per pixel
 constexpr int kLongSide = 256;              // of the pictures that are searched, pixels
 constexpr float kHorizon = -0.02f;          // least elevation of the sky, as a sine: horizons are not level
 constexpr float kNearHorizon = 0.03f;       // where the sky comes down to it
