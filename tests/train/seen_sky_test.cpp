@@ -2,9 +2,14 @@
 
 #include "src/train/luminance/seen_sky.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "src/base/error.h"
 #include "src/base/rng.h"
+#include "src/engine/engines.h"
+#include "src/train/luminance/luminance_model.h"
+#include "tests/support/data.h"
 #include "tests/support/toy_capture.h"
 
 namespace cnerf {
@@ -154,6 +159,40 @@ TEST(SeenSky, LightIsThatOfTheMedianView) {
     const float truth = decode_transfer(Transfer::kSrgb, float(bright_sky(direction.cast<double>(), 0, 0) / 255));
     EXPECT_NEAR(light.plane(0).along(direction), truth, 0.01f);
   }
+}
+
+/// A model whose sky is as wide as that, saved.
+std::filesystem::path saved_with_sky(const test::TempDir& folder, int width, std::size_t pixels) {
+  Stage1Options options;
+  options.grid.levels = 4;
+  options.grid.log2_rows = 12;
+  LuminanceModel model = LuminanceModel::create(test::toy_capture(), options, cpu_engines());
+  model.sky = {width, width / 2, {std::vector<float>(pixels, 0.25f)}};
+  std::filesystem::path file = folder / "stage1.snapshot";
+  model.save(file);
+  return file;
+}
+
+TEST(SeenSky, IsInTheSnapshot) {
+  const test::TempDir folder;
+  const LuminanceModel model = LuminanceModel::load(saved_with_sky(folder, 6, 18), cpu_engines());
+  EXPECT_EQ(model.sky.width, 6);
+  EXPECT_NEAR(model.sky_light().along({0, 1, 0}), 0.25f, 1e-6f);
+}
+
+TEST(SeenSky, ForgedSizesAreRefusedByName) {
+  const test::TempDir folder;
+  const auto message_of = [&](int width, std::size_t pixels) -> std::string {
+    try {
+      (void)LuminanceModel::load(saved_with_sky(folder, width, pixels), cpu_engines());
+    } catch (const SnapshotError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(message_of(5, 10), testing::HasSubstr("sky_width"));
+  EXPECT_THAT(message_of(8192, 10), testing::HasSubstr("sky_width"));
+  EXPECT_THAT(message_of(6, 17), testing::HasSubstr("'sky' is damaged"));
 }
 
 }  // namespace
