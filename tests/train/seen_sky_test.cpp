@@ -142,6 +142,15 @@ TEST(SeenSky, IsNotLookedForWhereAlphaCutsTheObjectOut) {
   EXPECT_FALSE(found_in(capture).light.exists());
 }
 
+TEST(SeenSky, IsNotLookedForBehindAMask) {
+  Capture capture = outdoors(bright_sky);
+  for (View& view : capture.views) {
+    view.image.mask.assign(view.image.pixel_count(), 255);
+    std::fill_n(view.image.mask.begin(), kWidth * kHeight * 3 / 4, std::uint8_t(0));
+  }
+  EXPECT_FALSE(found_in(capture).light.exists());
+}
+
 /// The exposures that a training found take the seams out.
 TEST(SeenSky, LightIsThatOfTheMedianView) {
   Capture capture = outdoors(bright_sky);

@@ -181,6 +181,7 @@ std::vector<SkyLabel> labels_of(const SearchedView& small, const MonoImage& imag
   }
   std::vector<SkyLabel> labels(image.pixel_count());
   for (std::size_t p = 0; p < labels.size(); ++p) {
+    if (!image.valid(p)) continue;  // who masks a sky wants none
     const auto x = std::int64_t(p) % image.width, y = std::int64_t(p) / image.width;
     const std::size_t from = small.at(int(x * small.width / image.width), int(y * small.height / image.height));
     const bool is_thin = std::abs(lightness_from_luminance(image.luminance(p)) - small.lightness[from]) > kThinThing;
