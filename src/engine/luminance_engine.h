@@ -10,6 +10,7 @@
 
 #include "encoding/hash_grid_levels.h"
 #include "src/engine/pixel_samples.h"
+#include "src/engine/stage1_schedule.h"
 #include "src/engine/step_share.h"
 #include "src/engine/view_learning.h"
 #include "src/field/state.h"
@@ -28,6 +29,7 @@ struct LuminanceEngineOptions {
   int samples_per_step = 1 << 16;  ///< trained samples that a step aims at
   float max_luminance = 1.0f;      ///< of the images; the field emits at most a little more
   float distortion_weight = 0;     ///< of each ray's distortion (distortion_math.h) in the loss
+  DepthLearning depth;             ///< of views that know of depths
   ViewLearning learning;
   std::uint64_t seed = 1;
 };

@@ -291,8 +291,8 @@ std::vector<SparsePoint> find_sparse_points(const Capture& capture, const Progre
 
 std::vector<SparsePoint> points_for_training(const Stage1Job& job, Observer& observer) {
   const Capture& capture = job.capture;
-  const bool is_bounded = capture.is_bounded_object || capture.depth_range;
-  if (!job.options.free_space || job.goes_on() || is_bounded || !capture.points.empty()) return {};
+  const bool asks_for_points = job.options.free_space || job.options.depth_weight > 0;
+  if (!asks_for_points || capture.is_bounded_object || !capture.points.empty()) return {};
   const Stopwatch watch;
   std::vector<SparsePoint> points = find_sparse_points(capture, observer.progress_sink());
   observer.say(fmt::format("{} sparse points found in {}", points.size(), duration_text(watch.seconds())));

@@ -20,6 +20,13 @@ struct HostViews {
   [[nodiscard]] SkyLabel sky_label(std::uint32_t v, std::size_t pixel) const {
     return views[v].sky_labels == nullptr ? SkyLabel::kScene : (*views[v].sky_labels)[pixel];
   }
+  [[nodiscard]] DepthHint depth(std::uint32_t v, int x, int y) const {
+    const DepthHints* hints = views[v].depths;
+    if (hints == nullptr) return {};
+    const int column = hint_cell(x, views[v].image->width, hints->columns);
+    const int row = hint_cell(y, views[v].image->height, hints->rows);
+    return hints->cells[std::size_t(row) * std::size_t(hints->columns) + std::size_t(column)];
+  }
   [[nodiscard]] DirectionView sky(std::uint32_t v) const { return views[v].sky->plane(0); }
 };
 

@@ -22,6 +22,7 @@ struct RayTarget {
   float background = 0;  ///< linear Y put behind ray and pixel alike
   float sky = 0;         ///< linear Y behind the ray that the pixel shows, as its view has it
   float gain = 1;        ///< of the view: its light over that of the scene
+  DepthHint depth;
 
   /// What is to be seen with the background behind it; linear Y.
   [[nodiscard]] CNERF_HD float wanted() const { return luminance + (1.0f - coverage) * background; }
@@ -53,8 +54,8 @@ CNERF_HD PickedPixel pick_pixel(const Views& views, const CounterRng& rng, std::
   return {v, int(rng.below(at + 1, std::uint32_t(image.width))), int(rng.below(at + 2, std::uint32_t(image.height)))};
 }
 
-/// @tparam Views  count(), and of view v: size_of(v), camera(v), correction(v), sky(v); of its pixel i = y * width + x:
-///                is_valid(v, i), luminance(v, i), coverage(v, i), sky_label(v, i)
+/// @tparam Views  count(), and of view v: size_of(v), camera(v), correction(v), sky(v), depth(v, x, y); of its pixel
+///                i = y * width + x: is_valid(v, i), luminance(v, i), coverage(v, i), sky_label(v, i)
 template <typename Views>
 [[nodiscard]] CNERF_HD ObservedRay observe_ray(const Views& views, std::uint64_t seed, std::uint64_t step,
                                                std::uint64_t ray) {
@@ -77,6 +78,7 @@ template <typename Views>
   observed.target.gain = correction.gain();
   observed.target.luminance = views.luminance(picked.view, pixel);
   observed.target.coverage = views.coverage(picked.view, pixel);
+  observed.target.depth = views.depth(picked.view, picked.x, picked.y);
   observed.jitter = rng.uniform(2 * ray);
   // Another background each time: what is transparent has to become empty and what is opaque solid. Over black, a dark
   // thing could as well be a hole, and thin fog everywhere explains a dim picture.
@@ -88,6 +90,7 @@ template <typename Views>
   if (label == SkyLabel::kSky && random < 0.5f) {
     observed.target.background = luminance_from_lightness(200.0f * random);
     observed.target.luminance = observed.target.coverage = 0;
+    observed.target.depth = {};
   } else if (label != SkyLabel::kScene) {
     observed.target.background = 0;
     observed.target.sky = observed.target.gain * views.sky(picked.view).along(observed.ray.direction);

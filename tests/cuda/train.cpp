@@ -5,6 +5,7 @@
 
 #include "src/base/cuda/device_memory.h"
 
+#include "src/train/luminance/depth_hints.h"
 #include "tests/cuda/check.h"
 #include "tests/cuda/packed_capture.h"
 #include "tests/support/disturbed_capture.h"
@@ -78,7 +79,9 @@ int train(const Arguments& arguments) {
   const std::vector<Affined> truth = training_poses(packed.capture);
   disturb(packed.capture, {arguments.number("gain", 0), arguments.number("degrees", 0), arguments.number("shift", 0),
                            arguments.number("focal", 0)});
-  const std::vector<TrainingView> views = training_views(packed.capture, packed.frame);
+  std::vector<TrainingView> views = training_views(packed.capture, packed.frame);
+  const std::vector<DepthHints> depths = depth_hints(packed.capture, packed.frame, packed.capture.points);
+  for (std::size_t v = 0; v < depths.size(); ++v) views[v].depths = &depths[v];
   const double seconds = arguments.number("seconds", 10), rate = arguments.number("rate", 1e-2);
   const double final_rate = arguments.number("final_rate", 5e-4), hold = arguments.number("hold", 0.5);
   std::vector<double> report_at;

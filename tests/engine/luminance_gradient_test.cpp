@@ -46,6 +46,7 @@ class LossInDouble {
         luminance_(luminance_net_layout()),
         max_luminance_(options.max_luminance),
         distortion_weight_(options.distortion_weight),
+        depth_weight_(options.depth.weight_at(engine.step_count())),
         learning_(options.learning),
         views_(views) {
     for (std::size_t r = 0; r < n_rays; ++r) {
@@ -74,6 +75,8 @@ class LossInDouble {
     for (std::size_t r = 0; r < rays_.size(); ++r) {
       Compositor<double> seen;
       Distortion<double> distortion;
+      double depth = 0;
+      const DepthHint& hint = rays_[r].target.depth;
       const Correction correction = correction_of(parameters, first_view, r);
       for (const RaySample& sample : samples_[r]) {
         const Vec3d p = correction.applied_to(rays_[r].ray, double(sample.t));
@@ -86,7 +89,9 @@ class LossInDouble {
         const double weight =
             seen.add(alpha_of(sigma, double(sample.dt)), activation.value(luminance_net.forward(features).back()[0]));
         distortion.add(weight, {double(sample.t), double(sample.dt)});
+        if (hint.is_known()) depth += weight * depth_miss(double(sample.t), hint);
       }
+      if (hint.is_known()) depth += seen.transmittance;
       const double background = rays_[r].target.background;
       const double wanted = rays_[r].target.luminance + (1.0 - rays_[r].target.coverage) * background;
       // The sky's light is stated as the view has it, at the gain that the ray was drawn with.
@@ -94,7 +99,7 @@ class LossInDouble {
       const double behind = seen.transmittance * (background + sky);
       const double error =
           (lightness_from_luminance(correction.gain * seen.value + behind) - lightness_from_luminance(wanted)) / 100.0;
-      loss += (error * error + distortion_weight_ * distortion.value) / double(rays_.size());
+      loss += (error * error + distortion_weight_ * distortion.value + depth_weight_ * depth) / double(rays_.size());
     }
     return loss;
   }
@@ -137,7 +142,7 @@ class LossInDouble {
 
   std::vector<GridLevel> levels_;
   MlpLayout density_, luminance_;
-  double max_luminance_, distortion_weight_;
+  double max_luminance_, distortion_weight_, depth_weight_;
   ViewLearning learning_;
   std::vector<TrainingView> views_;
   std::vector<ObservedRay> rays_;
@@ -173,6 +178,7 @@ struct Loss {
   bool with_alpha;
   float distortion_weight;
   bool with_sky = false;
+  float depth_weight = 0;
 };
 
 class LuminanceGradient : public testing::TestWithParam<Loss> {};
@@ -186,6 +192,9 @@ TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
   std::vector<TrainingView> views = training_views(capture, frame);
   const test::ToySky sky(views.size(), 24 * 20);
   if (GetParam().with_sky) sky.show_to(views);
+  options.depth.weight = GetParam().depth_weight;
+  const test::ToyDepths depths(views.size());
+  if (options.depth.weight > 0) depths.show_to(views);
   for (const IsaLevel isa : test::available_isas()) {
     const test::ScopedIsa scope(isa);
     const auto engine = make_cpu_luminance_engine(options);
@@ -218,7 +227,8 @@ TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
 INSTANTIATE_TEST_SUITE_P(Of, LuminanceGradient,
                          testing::Values(Loss{"Opaque", false, 0}, Loss{"WithAlpha", true, 0},
                                          Loss{"Distortion", false, 0.3f}, Loss{"DistortionAndAlpha", true, 0.3f},
-                                         Loss{"Sky", false, 0.1f, true}),
+                                         Loss{"Sky", false, 0.1f, true}, Loss{"Depth", false, 0, false, 0.3f},
+                                         Loss{"DepthDistortionAndSky", false, 0.1f, true, 0.3f}),
                          [](const auto& param_info) { return param_info.param.name; });
 
 /// With a pinhole, whose distortion is learned from nothing, and with a lens that has some.

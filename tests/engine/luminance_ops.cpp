@@ -25,6 +25,7 @@ struct Problem {
   float distortion_weight = 0;
   bool learns_views = false;
   bool with_sky = false;
+  float depth_weight = 0;
 };
 
 /// Views, options, and engines that share a state that the generic processor trained.
@@ -54,6 +55,8 @@ class Scene {
     options_.samples_per_step = 8192;
     options_.distortion_weight = problem.distortion_weight;
     if (problem.with_sky) sky_.show_to(views_);
+    options_.depth.weight = problem.depth_weight;
+    if (problem.depth_weight > 0) depths_.show_to(views_);
     if (problem.learns_views) options_.learning = {int(views_.size()), 1, true, true};
   }
 
@@ -81,6 +84,7 @@ class Scene {
  private:
   Capture capture_;
   ToySky sky_{6, 48 * 40};
+  ToyDepths depths_{6};
   std::vector<TrainingView> views_;
   LuminanceEngineOptions options_;
   std::map<long, std::unique_ptr<LuminanceEngine>> trained_;  // by steps
@@ -313,6 +317,7 @@ std::vector<Op> luminance_ops() {
           stage1({"Stage1WithManyLevels", 16, 13, 128, 2}),
           stage1({"Stage1WithLearnedViews", 8, 14, 64, 2, false, true, true, 0, true}),
           stage1({"Stage1WithSky", 8, 14, 64, 2, false, false, true, 0.1f, true, true}),
+          stage1({"Stage1WithDepth", 8, 14, 64, 2, false, false, false, 0.1f, false, false, 0.1f}),
           stage1_learning({"Stage1Learns", 8, 14, 64, 1, false, false, true}),
           stage1_learning({"Stage1LearnsWithCascades", 12, 14, 128, 3, false, true}),
           out_of_memory()};

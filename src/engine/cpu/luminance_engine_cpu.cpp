@@ -289,23 +289,26 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
 void LuminanceEngineCpu::train_ray(const ObservedRay& ray, std::size_t index, float gradient_scale, Block& block,
                                    StepChunk& chunk) const {
   const std::size_t begin = block.offsets[index], end = block.offsets[index + 1];
-  const float distortion_weight = options_.distortion_weight;
+  const ShapeWeights weights = {options_.distortion_weight, options_.depth.weight_at(step_count())};
+  const bool has_depth = weights.depth > 0 && ray.target.depth.is_known();
   Compositor<float> light;
-  Distortion<float> distortion;
+  RayShape shape;
   for (std::size_t s = begin; s < end; ++s) {
     const MarchedSample& sample = block.samples[s];
     const float alpha = alpha_of(field_.sigma(block.work, s), sample.dt);
     const float weight = light.add(alpha, field_.luminance(block.work, s));
-    if (distortion_weight > 0) distortion.add(weight, {sample.t, sample.dt});
+    if (weights.distortion > 0) shape.distortion.add(weight, {sample.t, sample.dt});
+    if (has_depth) shape.depth_miss += weight * depth_miss(sample.t, ray.target.depth);
   }
+  if (has_depth) shape.depth_miss += light.transmittance;
   const SeenRay seen{light.value, light.transmittance};
   const RayError error(seen, ray.target);
-  chunk.loss += ray_loss(error, distortion.value, distortion_weight);
+  chunk.loss += ray_loss(error, shape, weights);
   chunk.squared_error += squared_error(seen, ray.target);
 
-  const RayGradient gradient(error, ray.target.gain, distortion, distortion_weight, gradient_scale);
+  const RayGradient gradient(error, ray.target.gain, shape, weights, gradient_scale);
   if (options_.learning.exposures) chunk.d_views[ray.view].by_log_gain += gradient.by_log_gain(seen, ray.target);
-  float distortion_behind = gradient.distortion_of_all();
+  float distortion_behind = gradient.distortion_of_all(), depth_behind = shape.depth_miss;
   light = {};
   Distortion<float> before;
   for (std::size_t s = begin; s < end; ++s) {
@@ -313,12 +316,17 @@ void LuminanceEngineCpu::train_ray(const ObservedRay& ray, std::size_t index, fl
     const float weight = light.add(alpha_of(field_.sigma(block.work, s), dt), luminance);
     const LitSample sample{dt, luminance, weight, light.transmittance, light.value};
     float d_sigma = gradient.by_density(sample);
-    if (distortion_weight > 0) {
+    if (weights.distortion > 0) {
       const LogInterval<float> at(block.samples[s].t, dt);
       const float slope = gradient.distortion_by_weight(weight, at, before);
       before.add(weight, at);
       distortion_behind -= weight * slope;
       d_sigma += gradient.by_density_of_distortion(sample, slope, distortion_behind);
+    }
+    if (has_depth) {
+      const float miss = depth_miss(block.samples[s].t, ray.target.depth);
+      depth_behind -= weight * miss;
+      d_sigma += gradient.by_density_of_depth(sample, miss, depth_behind);
     }
     field_.set_gradient(block.work, s, d_sigma, gradient.by_luminance(sample));
   }

@@ -85,6 +85,7 @@ TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
   job.state = state_.data();
   job.samples = {capacity_, places_.data(), encoded_.data(), gradients_.data()};
   job.distortion_weight = options_.distortion_weight;
+  job.depth = options_.depth;
   if (options_.learning.exposures) job.view_gradients = view_gradients_.data();
   return job;
 }

@@ -37,6 +37,12 @@ struct DeviceViews {
   [[nodiscard]] __device__ SkyLabel sky_label(std::uint32_t v, std::size_t pixel) const {
     return views[v].sky_labels == nullptr ? SkyLabel::kScene : views[v].sky_labels[pixel];
   }
+  [[nodiscard]] __device__ DepthHint depth(std::uint32_t v, int x, int y) const {
+    const ViewRecord& view = views[v];
+    if (view.depths == nullptr) return {};
+    const int column = hint_cell(x, view.width, view.depth_columns), row = hint_cell(y, view.height, view.depth_rows);
+    return view.depths[row * view.depth_columns + column];
+  }
   [[nodiscard]] __device__ DirectionView sky(std::uint32_t v) const { return views[v].sky; }
   [[nodiscard]] __device__ float luminance(std::uint32_t v, std::size_t pixel) const {
     const ViewRecord& view = views[v];

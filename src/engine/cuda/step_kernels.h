@@ -35,6 +35,8 @@ struct ViewRecord {
   const std::uint8_t* mask = nullptr;    ///< null: every pixel counts
   const SkyLabel* sky_labels = nullptr;  ///< null: no pixel shows the sky
   DirectionView sky;
+  const DepthHint* depths = nullptr;  ///< [rows, columns]; null: nothing is known
+  int depth_columns = 0, depth_rows = 0;
   int lens = 0;      ///< see TrainingView
   Intrinsics given;  ///< the camera's, which are corrected as they are learned
 };

@@ -52,6 +52,7 @@ struct TraceJob {
   StepState* state;  ///< rays, next_ray, samples; training also sums up here
   // Training:
   SampleArrays samples;
+  DepthLearning depth;
   float distortion_weight = 0;
   ViewGradient* view_gradients = nullptr;  ///< by the views' gains; null: not asked for
   // Rendering:

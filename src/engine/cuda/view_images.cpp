@@ -45,6 +45,12 @@ ViewRecord ViewImages::record_of(const TrainingView& view) {
     record.sky_labels = reinterpret_cast<const SkyLabel*>(plane(view.sky_labels->data(), view.sky_labels->size()));
     record.sky = sky(*view.sky);
   }
+  if (view.depths != nullptr) {
+    const std::vector<DepthHint>& cells = view.depths->cells;
+    record.depths = reinterpret_cast<const DepthHint*>(plane(cells.data(), cells.size() * sizeof(DepthHint)));
+    record.depth_columns = view.depths->columns;
+    record.depth_rows = view.depths->rows;
+  }
   return record;
 }
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/train/luminance/believed_points.h"
+
 namespace cnerf {
 namespace {
 
-constexpr double kLargestError = 2;        // pixels, of a point that is believed
-constexpr std::size_t kShortestTrack = 3;  // views
 constexpr int kVotes = 2;               // that make a place free: a way to a point is one, all points of a view are two
 constexpr int kAcross = 64;             // cells of a sight along the longer side of its picture
 constexpr double kWayRadius = 2.5;      // cells around a point that its view sees through as well
@@ -95,12 +95,10 @@ bool FreeSpace::Sight::is_near_lens(Vec3d at, double radius) const {
 }
 
 FreeSpace::FreeSpace(const std::vector<View>& views, const std::vector<SparsePoint>& points) {
-  std::vector<std::vector<Vec3d>> shown(views.size());
   for (const SparsePoint& point : points) {
-    if (point.error > kLargestError || point.views.size() < kShortestTrack) continue;
-    points_.push_back(point.position);
-    for (const std::uint32_t view : point.views) shown[view].push_back(point.position);
+    if (is_believed(point)) points_.push_back(point.position);
   }
+  const std::vector<std::vector<Vec3d>> shown = believed_points(views.size(), points);
   for (std::size_t i = 0; i < shown.size(); ++i) {
     if (!views[i].held_out && !shown[i].empty()) sights_.emplace_back(views[i], shown[i]);
   }

@@ -23,6 +23,7 @@ std::unique_ptr<LuminanceEngine> make_engine(const LuminanceModel& model, const 
   engine.march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
   engine.samples_per_step = options.samples_per_step;
   engine.distortion_weight = float(options.distortion_weight);
+  engine.depth.weight = float(options.depth_weight);
   engine.max_luminance = model.max_luminance;
   if (model.learned_views > 0) {
     engine.learning = {model.learned_views, model.learned_lenses, options.exposures, options.poses};

@@ -9,6 +9,7 @@
 #include "src/base/error.h"
 #include "src/base/usage.h"
 #include "src/optim/adam.h"
+#include "src/train/luminance/depth_hints.h"
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/options_json.h"
 #include "src/train/luminance/seen_sky.h"
@@ -165,6 +166,8 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   if (options.sky) sky = find_sky(job.capture, views, points_of(job));
   sky.show_to(views);
   model.sky = sky.light;
+  const std::vector<DepthHints> depths = depth_hints(job.capture, model.frame, points_of(job));
+  for (std::size_t v = 0; v < depths.size(); ++v) views[v].depths = &depths[v];
   model.engine->set_views(views);
   model.engine->share_steps(share_of(job.ranks));
 
