@@ -16,8 +16,8 @@ namespace cnerf::prepare {
 /// @throws Interrupted
 [[nodiscard]] std::vector<SparsePoint> find_sparse_points(const Capture& capture, const ProgressSink& progress = {});
 
-/// What a stage 1 that begins is to know besides the capture: points, if the job wants free space known and the capture
-/// has no points of its own, and neither outlines nor a depth range bound its space. Says how many were found.
+/// What a stage 1 is to know besides the capture: points, if the job asks for free space or depths, the capture has
+/// none of its own, and outlines do not bound its space. Says how many were found.
 [[nodiscard]] std::vector<SparsePoint> points_for_training(const Stage1Job& job, Observer& observer);
 
 }  // namespace cnerf::prepare

@@ -83,7 +83,7 @@ TEST(SparsePoints, WrongPosesMakeFew) {
   EXPECT_LT(find_sparse_points(capture).size(), right / 2);
 }
 
-TEST(SparsePoints, AreNotLookedForWhereOutlinesOrDepthBoundSpace) {
+TEST(SparsePoints, AreNotLookedForWhereOutlinesBoundSpaceOrThereAreSome) {
   Observer observer;
   Capture capture = plane_capture(4);
   const Stage1Options options;
@@ -92,23 +92,23 @@ TEST(SparsePoints, AreNotLookedForWhereOutlinesOrDepthBoundSpace) {
   capture.is_bounded_object = true;
   EXPECT_TRUE(points_for_training(job, observer).empty());
   capture.is_bounded_object = false;
-  capture.depth_range = {1, 3};
-  EXPECT_TRUE(points_for_training(job, observer).empty());
-  capture.depth_range.reset();
   capture.points = {{{0, 0, 0}, 0.5, {0, 1, 2}}};
   EXPECT_TRUE(points_for_training(job, observer).empty()) << "it has its own";
 }
 
-TEST(SparsePoints, AreNotLookedForByATrainingThatGoesOnOrDoesNotWantThem) {
+TEST(SparsePoints, AreLookedForAgainByATrainingThatGoesOnAndNotByOneThatDoesNotWantThem) {
   Observer observer;
   const Capture capture = plane_capture(4);
   const test::TempDir folder;
   const std::filesystem::path snapshot = folder / "stage1.snapshot";
   write_file(snapshot, std::string_view());
   Stage1Options options;
-  EXPECT_TRUE(points_for_training({capture, options, snapshot, true}, observer).empty());
-  EXPECT_FALSE(points_for_training({capture, options, snapshot, false}, observer).empty()) << "anew";
+  const std::vector<SparsePoint> points = points_for_training({capture, options, snapshot, false}, observer);
+  EXPECT_FALSE(points.empty());
+  EXPECT_EQ(points_for_training({capture, options, snapshot, true}, observer), points);
   options.free_space = false;
+  EXPECT_EQ(points_for_training({capture, options, snapshot, false}, observer), points) << "for depths";
+  options.depth_weight = 0;
   EXPECT_TRUE(points_for_training({capture, options, snapshot, false}, observer).empty());
 }
 

@@ -54,7 +54,7 @@ TEST_F(DepthHintsTest, IsTheDistanceInUnitSpaceAtAPointAndLessSureAroundIt) {
 TEST_F(DepthHintsTest, PointsThatDisagreeSayLittleOrNothing) {
   for (const double x : {0.5, 0.55}) add_point({x, 0.5, 4});
   const DepthHint agreed = hint_at({0.5, 0.5, 4});
-  add_point({0.4, 0.44, 3.5});
+  add_point({0.3, 0.34, 2.7});
   const DepthHint doubtful = hint_at({0.5, 0.5, 4});
   ASSERT_TRUE(agreed.is_known());
   ASSERT_TRUE(doubtful.is_known());

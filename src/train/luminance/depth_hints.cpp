@@ -12,8 +12,8 @@ namespace {
 constexpr int kAcross = 64;             // cells along the longer side of a picture
 constexpr double kReach = 6;            // cells, from a point to where it tells anything
 constexpr std::size_t kNeighbours = 4;  // points that tell of a cell
-constexpr double kExactness = 0.02;     // of the logarithm of distances, at a point: a cell is not one pixel
-constexpr double kSlope = 0.03;         // per cell from the nearest point, likewise
+constexpr double kExactness = 0.05;     // of the logarithm of distances, at a point: a cell is not one pixel
+constexpr double kSlope = 0.1;         // per cell from the nearest point, likewise
 constexpr double kWidest = 0.5;         // likewise: more is not worth saying
 
 /// A point in a picture.

@@ -296,7 +296,7 @@ void SeenSky::show_to(std::vector<TrainingView>& views) const {
 
 SeenSky find_sky(const Capture& capture, std::span<const TrainingView> views, const std::vector<SparsePoint>& points) {
   SeenSky sky;
-  if (capture.is_bounded_object) return sky;
+  if (capture.is_bounded_object || views.empty()) return sky;
   const Vec3d up = arrangement_of(capture).up;
   const std::vector<const View*> of_capture = training_views_of(capture);
   const std::vector<std::vector<Vec3d>> shown = points_by_view(capture, points);

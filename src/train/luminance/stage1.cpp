@@ -89,9 +89,19 @@ const std::vector<SparsePoint>& points_of(const Stage1Job& job) {
   return job.points.empty() ? job.capture.points : job.points;
 }
 
-LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines) {
+SeenSky sky_of(const Stage1Job& job) {
+  if (!job.options.sky) return {};
+  return find_sky(job.capture, training_views(job.capture, {}), points_of(job));  // directions know no frame
+}
+
+FreeSpace free_space_of(const Stage1Job& job, const SeenSky& sky) {
+  if (!job.options.free_space) return FreeSpace(job.capture.views, {});
+  return FreeSpace(job.capture.views, points_of(job), sky.labels);
+}
+
+LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines, const SeenSky& sky) {
   if (!job.goes_on()) {
-    return LuminanceModel::create(job.capture, job.options, engines, points_of(job));
+    return LuminanceModel::create(job.capture, job.options, engines, free_space_of(job, sky));
   }
   LuminanceModel model = LuminanceModel::load(job.snapshot, engines);
   refuse_others(job.snapshot, model.options, job.options);
@@ -159,11 +169,10 @@ void check_continues(const std::filesystem::path& snapshot, const Stage1Options&
 
 Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer& observer) {
   const Stage1Options& options = job.options;
-  LuminanceModel model = start_or_resume(job, engines);
+  const SeenSky sky = sky_of(job);
+  LuminanceModel model = start_or_resume(job, engines, sky);
   std::vector<TrainingView> views = training_views(job.capture, model.frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
-  SeenSky sky;
-  if (options.sky) sky = find_sky(job.capture, views, points_of(job));
   sky.show_to(views);
   model.sky = sky.light;
   const std::vector<DepthHints> depths = depth_hints(job.capture, model.frame, points_of(job));
