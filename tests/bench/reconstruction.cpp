@@ -82,7 +82,8 @@ double held_out_psnr(const cnerf::Capture& capture, const cnerf::LuminanceModel&
 /// Triangulates sparse points, in place of those of the file.
 void print_points(cnerf::Capture& capture) {
   const Clock::time_point start = Clock::now();
-  capture.points = cnerf::prepare::find_sparse_points(capture);
+  cnerf::Observer silent;
+  capture.points = cnerf::prepare::find_sparse_points(capture, silent);
   std::size_t of_three = 0, sightings = 0;
   double error = 0;
   for (const cnerf::SparsePoint& point : capture.points) {
