@@ -104,8 +104,8 @@ CNERF_HD inline void update_view(const ViewLearning& learning, const AdamStep& a
 CNERF_HD inline void update_light(const ViewLearning& learning, const AdamStep& adam, int node,
                                   const GainField& gradient, LightMoments& moments, GainField& light) {
   adam.at_rate(learning.light_rate)
-      .apply(gradient.log_gain[node], moments.first.log_gain[node], moments.second.log_gain[node],
-             light.log_gain[node], adam.kept(learning.light_decay));
+      .apply(gradient.log_gain[node], moments.first.log_gain[node], moments.second.log_gain[node], light.log_gain[node],
+             adam.kept(learning.light_decay));
 }
 
 /// The same for one lens.

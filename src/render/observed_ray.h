@@ -32,8 +32,8 @@ struct RayTarget {
 struct ObservedRay {
   Ray ray;
   RayTarget target;
-  float jitter = 0;        ///< in [0, 1): of the samples along the ray
-  std::uint32_t view = 0;  ///< that shows it
+  float jitter = 0;         ///< in [0, 1): of the samples along the ray
+  std::uint32_t view = 0;   ///< that shows it
   PicturePlace place = {};  ///< of its pixel
 };
 

@@ -7,8 +7,8 @@
 //
 // `gain`, `degrees`, `shift` and `focal` make the capture worse first (Disturbance); `aligned=1` fits the poses of
 // held-out views. With `points=1` sparse points are triangulated first. With `validation=N` every N-th of the views to
-// be trained on is judged instead of the held-out ones; `few=N` trains on every N-th view alone. Options are stage 1's by their short names, e.g.
-// grid.log2_rows=16 steps_per_box=512 samples_per_step=65536.
+// be trained on is judged instead of the held-out ones; `few=N` trains on every N-th view alone. Options are stage 1's
+// by their short names, e.g. grid.log2_rows=16 steps_per_box=512 samples_per_step=65536.
 
 #include <algorithm>
 #include <chrono>
@@ -83,7 +83,8 @@ double held_out_psnr(const cnerf::Capture& capture, const cnerf::LuminanceModel&
 /// Triangulates sparse points, in place of those of the file.
 void print_points(cnerf::Capture& capture) {
   const Clock::time_point start = Clock::now();
-  capture.points = cnerf::prepare::find_sparse_points(capture);
+  cnerf::Observer silent;
+  capture.points = cnerf::prepare::find_sparse_points(capture, silent);
   std::size_t of_three = 0, sightings = 0;
   double error = 0;
   for (const cnerf::SparsePoint& point : capture.points) {

@@ -174,7 +174,8 @@ std::vector<double> parameters_of(LuminanceEngine& engine) {
     const auto is_one_of = [&](const std::vector<std::string>& names) {
       return std::ranges::find(names, piece.name) != names.end();
     };
-    if (!is_one_of({"grid.table", "density_net.weights", "luminance_net.weights", "views", "light", "lenses"})) continue;
+    if (!is_one_of({"grid.table", "density_net.weights", "luminance_net.weights", "views", "light", "lenses"}))
+      continue;
     const std::span<const float> values = test::floats_of(piece);
     parameters.insert(parameters.end(), values.begin(), values.end());
   }
@@ -263,7 +264,8 @@ TEST_P(ViewLearningWithLens, GradientsMatchFiniteDifferencesOfTheLoss) {
     for (int i = 0; i < 12; ++i) engine->step(1e-2f);
     // The double reference bends rays as they are given: corrections start from nothing.
     for (const StatePiece& piece : engine->state()) {
-      if (piece.name == "views" || piece.name == "light" || piece.name == "lenses") std::ranges::fill(piece.bytes, std::byte{0});
+      if (piece.name == "views" || piece.name == "light" || piece.name == "lenses")
+        std::ranges::fill(piece.bytes, std::byte{0});
     }
     engine->state_loaded();
     const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);

@@ -377,8 +377,8 @@ LuminanceEngineCpu::StepSums LuminanceEngineCpu::sums() const {
     for (std::size_t v = 0; v < sums.d_light.size(); ++v) sums.d_light[v] += chunk.d_light[v];
   }
   if (share_.is_whole()) return sums;
-  const std::array<std::span<float>, 4> gradients = {sums.d_weights, floats_of(sums.d_views),
-                                                     floats_of(sums.d_lenses), floats_of(sums.d_light)};
+  const std::array<std::span<float>, 4> gradients = {sums.d_weights, floats_of(sums.d_views), floats_of(sums.d_lenses),
+                                                     floats_of(sums.d_light)};
   SharedNumbers shared;
   for (const std::span<float> part : gradients) shared.add(part);
   shared.add(float(sums.report.loss));

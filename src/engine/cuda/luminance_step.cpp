@@ -77,8 +77,8 @@ void LuminanceStepCuda::set_lenses(const std::vector<LensCorrection>& lenses, co
 }
 
 LearnedViews LuminanceStepCuda::learned() const {
-  return {options_.learning,     corrections_.data(), correction_moments_.data(), view_gradients_.data(),
-          light_.data(),         light_moments_.data(), light_gradients_.data(), lenses_.data(),
+  return {options_.learning,    corrections_.data(),   correction_moments_.data(), view_gradients_.data(),
+          light_.data(),        light_moments_.data(), light_gradients_.data(),    lenses_.data(),
           lens_moments_.data(), lens_gradients_.data()};
 }
 
@@ -110,9 +110,9 @@ void LuminanceStepCuda::launch(const std::uint32_t* occupied) {
   begin_step(state_.data(), learning_rates_.on_device(), stream_);
   const ViewLearning& learning = options_.learning;
   const ViewCorrection* corrections = learning.is_on() ? corrections_.data() : nullptr;
-  draw_training_rays(
-      {state_.data(), views_.records(), corrections, learning.light ? light_.data() : nullptr, views_.count(), options_.seed, rays_.data(), directions_.data()},
-      stream_);
+  draw_training_rays({state_.data(), views_.records(), corrections, learning.light ? light_.data() : nullptr,
+                      views_.count(), options_.seed, rays_.data(), directions_.data()},
+                     stream_);
   trace_training_rays(trace_job(occupied), stream_);
   field_.nets_backward(samples(), stream_);
   fork_.record(stream_);

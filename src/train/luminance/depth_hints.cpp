@@ -13,7 +13,7 @@ constexpr int kAcross = 64;             // cells along the longer side of a pict
 constexpr double kReach = 6;            // cells, from a point to where it tells anything
 constexpr std::size_t kNeighbours = 4;  // points that tell of a cell
 constexpr double kExactness = 0.05;     // of the logarithm of distances, at a point: a cell is not one pixel
-constexpr double kSlope = 0.1;         // per cell from the nearest point, likewise
+constexpr double kSlope = 0.1;          // per cell from the nearest point, likewise
 constexpr double kWidest = 0.5;         // likewise: more is not worth saying
 
 /// A point in a picture.
@@ -71,8 +71,7 @@ class HintedView {
       const double off = near[i].log_distance - mean;
       spread += std::exp(-2 * near[i].squared / scale) * off * off;
     }
-    const double width =
-        std::sqrt(kExactness * kExactness + kSlope * kSlope * near.front().squared + spread / weights);
+    const double width = std::sqrt(kExactness * kExactness + kSlope * kSlope * near.front().squared + spread / weights);
     return width > kWidest ? DepthHint{} : DepthHint{float(mean), float(1 / width)};
   }
 

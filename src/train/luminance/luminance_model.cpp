@@ -26,8 +26,7 @@ std::unique_ptr<LuminanceEngine> make_engine(const LuminanceModel& model, const 
   engine.depth.weight = float(options.depth_weight);
   engine.max_luminance = model.max_luminance;
   if (model.learned_views > 0) {
-    engine.learning = {model.learned_views, model.learned_lenses, options.exposures, options.poses,
-                       model.learns_light};
+    engine.learning = {model.learned_views, model.learned_lenses, options.exposures, options.poses, model.learns_light};
   }
   engine.seed = std::uint64_t(options.seed);
   return engines.make_luminance(engine);

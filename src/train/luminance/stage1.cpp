@@ -217,7 +217,12 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   if (model.sky.exists()) model.sky = sky_light(views, sky.labels, model.engine->view_corrections());
   save_snapshot_of(model, job);
   observer.report_progress({"stage 1", 1.0, {{"psnr", psnr.value()}}});
-  return {int(model.engine->step_count()), model.seconds, model.trained_samples, psnr.value()};
+  return {int(model.engine->step_count()),
+          model.seconds,
+          model.trained_samples,
+          psnr.value(),
+          sky.views(),
+          sky.share(views)};
 }
 
 }  // namespace cnerf
