@@ -68,8 +68,6 @@ class LuminanceEngine {
   [[nodiscard]] virtual long step_count() const = 0;
   /// What was learned of the views, in their order. Empty where nothing is.
   [[nodiscard]] virtual std::vector<ViewCorrection> view_corrections() const { return {}; }
-  /// Their light over the picture, likewise.
-  [[nodiscard]] virtual std::vector<GainField> view_light() const { return {}; }
   /// And of the lenses that they share (TrainingView::lens).
   [[nodiscard]] virtual std::vector<LensCorrection> lens_corrections() const { return {}; }
 

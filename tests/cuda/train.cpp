@@ -60,14 +60,12 @@ int lenses_among(const std::vector<TrainingView>& views) {
 
 void set_learning(LuminanceEngineOptions& options, const Arguments& arguments, const std::vector<TrainingView>& views) {
   const bool exposures = arguments.number("exposures", 0) > 0, poses = arguments.number("poses", 0) > 0;
-  const bool lenses = arguments.number("lenses", 0) > 0, light = arguments.number("light", 0) > 0;
-  if (!exposures && !poses && !lenses && !light) return;
-  options.learning = {int(views.size()), lenses ? lenses_among(views) : 0, exposures, poses, light};
+  const bool lenses = arguments.number("lenses", 0) > 0;
+  if (!exposures && !poses && !lenses) return;
+  options.learning = {int(views.size()), lenses ? lenses_among(views) : 0, exposures, poses};
   ViewLearning& learning = options.learning;
   learning.gain_rate = float(arguments.number("gain_rate", learning.gain_rate));
   learning.lens_rate = float(arguments.number("lens_rate", learning.lens_rate));
-  learning.light_rate = float(arguments.number("light_rate", learning.light_rate));
-  learning.light_decay = float(arguments.number("light_decay", learning.light_decay));
   learning.pose_rate = float(arguments.number("pose_rate", learning.pose_rate));
   learning.pose_warm_up = int(arguments.number("pose_warm_up", learning.pose_warm_up));
   learning.finest_pose_cells = int(arguments.number("pose_cells", learning.finest_pose_cells));

@@ -57,7 +57,7 @@ class Scene {
     if (problem.with_sky) sky_.show_to(views_);
     options_.depth.weight = problem.depth_weight;
     if (problem.depth_weight > 0) depths_.show_to(views_);
-    if (problem.learns_views) options_.learning = {int(views_.size()), 1, true, true, true};
+    if (problem.learns_views) options_.learning = {int(views_.size()), 1, true, true};
   }
 
   [[nodiscard]] const std::vector<TrainingView>& views() const { return views_; }
@@ -106,7 +106,6 @@ void append_gradients(LuminanceEngine& engine, std::vector<Result>& results) {
   results.push_back({"gradient of the gains", by_gain});
   results.push_back({"gradient of the poses", by_pose});
   results.push_back({"gradient of the lens", doubles(found.lenses)});
-  results.push_back({"gradient of the light", doubles(found.light)});
 }
 
 void append_queries(const LuminanceEngine& engine, std::vector<Result>& results) {
@@ -251,8 +250,7 @@ Op stage1(const Problem& problem) {
     op.bounds.push_back({"gradient of the gains", 1e-3, 1e-2, Measure::kGradient});
     op.bounds.push_back({"gradient of the poses", 1e-3, 3e-2, Measure::kGradient});
     op.bounds.push_back({"gradient of the lens", 1e-3, 3e-2, Measure::kGradient});
-    op.bounds.push_back({"gradient of the light", 1e-3, 1e-2, Measure::kGradient});
-    pieces.insert(pieces.end(), {"views", "views.moments", "lenses", "lenses.moments", "light", "light.moments"});
+    pieces.insert(pieces.end(), {"views", "views.moments", "lenses", "lenses.moments"});
   }
   op.bounds.push_back({"density of points", 1e-4, 1e-2});
   op.bounds.push_back({"luminance of points", 1e-4, 5e-3});

@@ -49,7 +49,6 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   StepReport step(float learning_rate) override;
   [[nodiscard]] long step_count() const override { return counters_.front(); }
   [[nodiscard]] std::vector<ViewCorrection> view_corrections() const override { return corrections_; }
-  [[nodiscard]] std::vector<GainField> view_light() const override { return light_; }
   [[nodiscard]] std::vector<LensCorrection> lens_corrections() const override { return lenses_; }
 
   void render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
@@ -126,7 +125,6 @@ class LuminanceEngineCpu final : public LuminanceEngine {
     std::vector<float> d_weights;
     std::vector<ViewGradient> d_views;
     std::vector<LensGradient> d_lenses;
-    std::vector<GainField> d_light;
     StepReport report;
   };
   /// Of the chunks, and of all processes that share the step.
@@ -143,8 +141,6 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   std::vector<TrainingView> views_;
   std::vector<ViewCorrection> corrections_;  // of the views, where they are learned
   std::vector<ViewMoments> correction_moments_;
-  std::vector<GainField> light_;  // likewise
-  std::vector<LightMoments> light_moments_;
   std::vector<LensCorrection> lenses_;  // likewise; the views' cameras have them
   std::vector<LensMoments> lens_moments_;
   std::vector<Intrinsics> given_lenses_;  // of each view
@@ -160,12 +156,10 @@ LuminanceEngineCpu::LuminanceEngineCpu(const LuminanceEngineOptions& options)
       occupancy_(options.occupancy, options.cascades),
       corrections_(std::size_t(options.learning.views)),
       correction_moments_(std::size_t(options.learning.views)),
-      light_(std::size_t(options.learning.lit_views())),
-      light_moments_(light_.size()),
       lenses_(std::size_t(options.learning.lenses)),
       lens_moments_(std::size_t(options.learning.lenses)),
       counters_{0, first_rays(options.samples_per_step)},
-      chunks_({corrections_.size(), lenses_.size(), light_.size()}) {}
+      chunks_(std::size_t(options.learning.views), std::size_t(options.learning.lenses)) {}
 
 void LuminanceEngineCpu::set_views(const std::vector<TrainingView>& views) {
   if (options_.learning.is_on()) CNERF_CHECK_EQ(views.size(), corrections_.size());
@@ -314,12 +308,6 @@ void LuminanceEngineCpu::train_ray(const ObservedRay& ray, std::size_t index, fl
 
   const RayGradient gradient(error, ray.target.gain, shape, weights, gradient_scale);
   if (options_.learning.exposures) chunk.d_views[ray.view].by_log_gain += gradient.by_log_gain(seen, ray.target);
-  if (options_.learning.light) {
-    const GainCorners corners(ray.place);
-    for (int i = 0; i < 4; ++i) {
-      chunk.d_light[ray.view].log_gain[corners.node(i)] += corners.share(i) * gradient.by_log_gain(seen, ray.target);
-    }
-  }
   float distortion_behind = gradient.distortion_of_all(), depth_behind = shape.depth_miss;
   light = {};
   Distortion<float> before;
@@ -370,15 +358,13 @@ void LuminanceEngineCpu::add_camera_gradients(std::span<const ObservedRay> rays,
 
 LuminanceEngineCpu::StepSums LuminanceEngineCpu::sums() const {
   StepSums sums{chunks_.d_weights(), std::vector<ViewGradient>(corrections_.size()),
-                std::vector<LensGradient>(lenses_.size()), std::vector<GainField>(light_.size()), report()};
+                std::vector<LensGradient>(lenses_.size()), report()};
   for (const StepChunk& chunk : chunks_.all()) {
     for (std::size_t v = 0; v < sums.d_views.size(); ++v) sums.d_views[v] += chunk.d_views[v];
     for (std::size_t l = 0; l < sums.d_lenses.size(); ++l) sums.d_lenses[l] += chunk.d_lenses[l];
-    for (std::size_t v = 0; v < sums.d_light.size(); ++v) sums.d_light[v] += chunk.d_light[v];
   }
   if (share_.is_whole()) return sums;
-  const std::array<std::span<float>, 4> gradients = {sums.d_weights, floats_of(sums.d_views), floats_of(sums.d_lenses),
-                                                     floats_of(sums.d_light)};
+  const std::array<std::span<float>, 3> gradients = {sums.d_weights, floats_of(sums.d_views), floats_of(sums.d_lenses)};
   SharedNumbers shared;
   for (const std::span<float> part : gradients) shared.add(part);
   shared.add(float(sums.report.loss));
@@ -397,11 +383,6 @@ void LuminanceEngineCpu::update_corrections(const StepSums& sums, float learning
   const auto n = int(corrections_.size());
   for (std::size_t v = 0; v < corrections_.size(); ++v) {
     update_view(options_.learning, adam, step_count(), sums.d_views[v], correction_moments_[v], corrections_[v]);
-  }
-  for (std::size_t v = 0; v < light_.size(); ++v) {
-    for (int node = 0; node < kGainNodes; ++node) {
-      update_light(options_.learning, adam, node, sums.d_light[v], light_moments_[v], light_[v]);
-    }
   }
   update_lenses(sums, adam);
   if (step_count() % kGaugeEvery != 0) return;
@@ -448,7 +429,7 @@ StepReport LuminanceEngineCpu::step(float learning_rate) {
     const std::size_t begin = own + from, end = own + to;
     std::array<ObservedRay, kBlockRays> observed;
     for (std::size_t r = begin; r < end; ++r) {
-      observed[r - begin] = observe_ray(views_, options_.seed, step, r, corrections_, light_);
+      observed[r - begin] = observe_ray(views_, options_.seed, step, r, corrections_);
     }
     train_block({observed.data(), end - begin}, 1.0f / float(rays), teaching(std::uint32_t(begin)), blocks_.local(),
                 chunk);
@@ -554,10 +535,6 @@ std::vector<StatePiece> LuminanceEngineCpu::state() {
   if (options_.learning.is_on()) {
     state.push_back(state_piece("views", corrections_));
     state.push_back(state_piece("views.moments", correction_moments_));
-  }
-  if (!light_.empty()) {
-    state.push_back(state_piece("light", light_));
-    state.push_back(state_piece("light.moments", light_moments_));
   }
   if (!lenses_.empty()) {
     state.push_back(state_piece("lenses", lenses_));

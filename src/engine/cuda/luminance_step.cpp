@@ -31,9 +31,6 @@ LuminanceStepCuda::LuminanceStepCuda(const LuminanceEngineOptions& options, cons
       corrections_(std::size_t(options.learning.views), kViewAdvice),
       correction_moments_(std::size_t(options.learning.views), kViewAdvice),
       view_gradients_(std::size_t(options.learning.views), kViewAdvice),
-      light_(std::size_t(options.learning.lit_views()), kViewAdvice),
-      light_moments_(std::size_t(options.learning.lit_views()), kViewAdvice),
-      light_gradients_(std::size_t(options.learning.lit_views()), kViewAdvice),
       lenses_(std::size_t(options.learning.lenses), kViewAdvice),
       lens_moments_(std::size_t(options.learning.lenses), kViewAdvice),
       lens_gradients_(std::size_t(options.learning.lenses), kViewAdvice) {}
@@ -65,11 +62,6 @@ void LuminanceStepCuda::set_learned(const std::vector<ViewCorrection>& correctio
   correction_moments_.upload(moments.data(), moments.size());
 }
 
-void LuminanceStepCuda::set_light(const std::vector<GainField>& light, const std::vector<LightMoments>& moments) {
-  light_.upload(light.data(), light.size());
-  light_moments_.upload(moments.data(), moments.size());
-}
-
 void LuminanceStepCuda::set_lenses(const std::vector<LensCorrection>& lenses, const std::vector<LensMoments>& moments) {
   lenses_.upload(lenses.data(), lenses.size());
   lens_moments_.upload(moments.data(), moments.size());
@@ -77,9 +69,8 @@ void LuminanceStepCuda::set_lenses(const std::vector<LensCorrection>& lenses, co
 }
 
 LearnedViews LuminanceStepCuda::learned() const {
-  return {options_.learning,    corrections_.data(),   correction_moments_.data(), view_gradients_.data(),
-          light_.data(),        light_moments_.data(), light_gradients_.data(),    lenses_.data(),
-          lens_moments_.data(), lens_gradients_.data()};
+  return {options_.learning, corrections_.data(),  correction_moments_.data(), view_gradients_.data(),
+          lenses_.data(),    lens_moments_.data(), lens_gradients_.data()};
 }
 
 TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
@@ -96,7 +87,6 @@ TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
   job.distortion_weight = options_.distortion_weight;
   job.depth = options_.depth;
   if (options_.learning.exposures) job.view_gradients = view_gradients_.data();
-  if (options_.learning.light) job.light_gradients = light_gradients_.data();
   return job;
 }
 
@@ -110,9 +100,9 @@ void LuminanceStepCuda::launch(const std::uint32_t* occupied) {
   begin_step(state_.data(), learning_rates_.on_device(), stream_);
   const ViewLearning& learning = options_.learning;
   const ViewCorrection* corrections = learning.is_on() ? corrections_.data() : nullptr;
-  draw_training_rays({state_.data(), views_.records(), corrections, learning.light ? light_.data() : nullptr,
-                      views_.count(), options_.seed, rays_.data(), directions_.data()},
-                     stream_);
+  draw_training_rays(
+      {state_.data(), views_.records(), corrections, views_.count(), options_.seed, rays_.data(), directions_.data()},
+      stream_);
   trace_training_rays(trace_job(occupied), stream_);
   field_.nets_backward(samples(), stream_);
   fork_.record(stream_);

@@ -38,10 +38,6 @@ class LuminanceStepCuda {
   [[nodiscard]] std::vector<ViewCorrection> corrections() const { return corrections_.downloaded(); }
   [[nodiscard]] std::vector<ViewMoments> correction_moments() const { return correction_moments_.downloaded(); }
   void set_learned(const std::vector<ViewCorrection>& corrections, const std::vector<ViewMoments>& moments);
-  /// The same of their light.
-  [[nodiscard]] std::vector<GainField> light() const { return light_.downloaded(); }
-  [[nodiscard]] std::vector<LightMoments> light_moments() const { return light_moments_.downloaded(); }
-  void set_light(const std::vector<GainField>& light, const std::vector<LightMoments>& moments);
   /// The same of the lenses.
   [[nodiscard]] std::vector<LensCorrection> lenses() const { return lenses_.downloaded(); }
   [[nodiscard]] std::vector<LensMoments> lens_moments() const { return lens_moments_.downloaded(); }
@@ -74,9 +70,6 @@ class LuminanceStepCuda {
   DeviceBuffer<ViewCorrection> corrections_;  // of the views, where they are learned
   DeviceBuffer<ViewMoments> correction_moments_;
   DeviceBuffer<ViewGradient> view_gradients_;
-  DeviceBuffer<GainField> light_;  // likewise
-  DeviceBuffer<LightMoments> light_moments_;
-  DeviceBuffer<GainField> light_gradients_;
   DeviceBuffer<LensCorrection> lenses_;  // likewise
   DeviceBuffer<LensMoments> lens_moments_;
   DeviceBuffer<LensGradient> lens_gradients_;

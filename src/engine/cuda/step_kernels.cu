@@ -20,7 +20,6 @@ __global__ void begin(StepState* state, const float* learning_rates) {
 struct DeviceViews {
   const ViewRecord* views;
   const ViewCorrection* corrections;
-  const GainField* light_fields;
   std::uint32_t n_views;
 
   [[nodiscard]] __device__ std::uint32_t count() const { return n_views; }
@@ -37,9 +36,6 @@ struct DeviceViews {
   }
   [[nodiscard]] __device__ SkyLabel sky_label(std::uint32_t v, std::size_t pixel) const {
     return views[v].sky_labels == nullptr ? SkyLabel::kScene : views[v].sky_labels[pixel];
-  }
-  [[nodiscard]] __device__ const GainField* light(std::uint32_t v) const {
-    return light_fields == nullptr ? nullptr : light_fields + v;
   }
   [[nodiscard]] __device__ DepthHint depth(std::uint32_t v, int x, int y) const {
     const ViewRecord& view = views[v];
@@ -72,14 +68,13 @@ __device__ void clip(RayRecord& record) {
 __global__ void draw(const DrawJob job) {
   const std::uint32_t ray = blockIdx.x * kThreads + threadIdx.x;
   if (ray >= job.state->rays) return;
-  const ObservedRay observed = observe_ray(DeviceViews{job.views, job.corrections, job.light, job.n_views}, job.seed,
+  const ObservedRay observed = observe_ray(DeviceViews{job.views, job.corrections, job.n_views}, job.seed,
                                            std::uint64_t(job.state->step), std::uint64_t(ray));
   RayRecord record;
   record.ray = observed.ray;
   record.jitter = observed.jitter;
   record.target = observed.target;
   record.view = observed.view;
-  record.place = observed.place;
   clip(record);
   job.rays[ray] = record;
   job.directions[ray] = encode_direction(record.ray.direction);
@@ -141,12 +136,6 @@ __global__ void __launch_bounds__(kGaugeThreads)
   for (int v = int(threadIdx.x); v < n; v += kGaugeThreads) {
     update_view(learned.learning, state->adam, step, learned.gradients[v], learned.moments[v], learned.corrections[v]);
     learned.gradients[v] = {};
-  }
-  for (int i = int(threadIdx.x); i < learned.learning.lit_views() * kGainNodes; i += kGaugeThreads) {
-    const int v = i / kGainNodes, node = i % kGainNodes;
-    update_light(learned.learning, state->adam, node, learned.light_gradients[v], learned.light_moments[v],
-                 learned.light[v]);
-    learned.light_gradients[v].log_gain[node] = 0;
   }
   update_lenses(learned, views, state->adam, step);
   if (step % kGaugeEvery != 0) return;

@@ -57,7 +57,6 @@ struct DrawJob {
   const StepState* state;
   const ViewRecord* views;
   const ViewCorrection* corrections;  ///< of the views; null: none
-  const GainField* light;             ///< likewise
   std::uint32_t n_views;
   std::uint64_t seed;
   RayRecord* rays;
@@ -78,9 +77,6 @@ struct LearnedViews {
   ViewCorrection* corrections = nullptr;
   ViewMoments* moments = nullptr;
   ViewGradient* gradients = nullptr;  ///< of the step; zero between steps
-  GainField* light = nullptr;
-  LightMoments* light_moments = nullptr;
-  GainField* light_gradients = nullptr;  ///< likewise
   LensCorrection* lenses = nullptr;
   LensMoments* lens_moments = nullptr;
   LensGradient* lens_gradients = nullptr;  ///< likewise

@@ -180,11 +180,6 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
   if (job.view_gradients != nullptr && lane == 0) {
     atomicAdd(&job.view_gradients[record.view].by_log_gain, gradient.by_log_gain(seen, record.target));
   }
-  if (job.light_gradients != nullptr && lane < 4) {
-    const GainCorners corners(record.place);
-    atomicAdd(&job.light_gradients[record.view].log_gain[corners.node(int(lane))],
-              corners.share(int(lane)) * gradient.by_log_gain(seen, record.target));
-  }
   float distortion_behind = gradient.distortion_of_all(), depth_behind = shape.depth_miss;
   RunDistortion passed;
   float depth = 0, composited = 0;

@@ -55,7 +55,6 @@ struct TraceJob {
   DepthLearning depth;
   float distortion_weight = 0;
   ViewGradient* view_gradients = nullptr;  ///< by the views' gains; null: not asked for
-  GainField* light_gradients = nullptr;    ///< likewise, by their light
   // Rendering:
   RayResult* results = nullptr;
   // Tracing:

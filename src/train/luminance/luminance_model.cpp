@@ -26,7 +26,7 @@ std::unique_ptr<LuminanceEngine> make_engine(const LuminanceModel& model, const 
   engine.depth.weight = float(options.depth_weight);
   engine.max_luminance = model.max_luminance;
   if (model.learned_views > 0) {
-    engine.learning = {model.learned_views, model.learned_lenses, options.exposures, options.poses, model.learns_light};
+    engine.learning = {model.learned_views, model.learned_lenses, options.exposures, options.poses};
   }
   engine.seed = std::uint64_t(options.seed);
   return engines.make_luminance(engine);
@@ -155,8 +155,7 @@ LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Option
   model.options = options;
   model.max_luminance = brightest(capture);
   if (options.lenses) model.learned_lenses = int(lenses_of(capture).size());
-  model.learns_light = options.moving_light;
-  if (options.exposures || options.poses || options.lenses || options.moving_light) {
+  if (options.exposures || options.poses || options.lenses) {
     model.learned_views = int(std::ranges::count_if(capture.views, [](const View& view) { return !view.held_out; }));
   }
   model.engine = make_engine(model, engines);
@@ -203,7 +202,6 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   model.trained_samples = header_field<double>(snapshot, "trained_samples");
   model.learned_views = learned_count(snapshot, "learned_views");
   model.learned_lenses = learned_count(snapshot, "learned_lenses");
-  model.learns_light = snapshot.header().contains("learns_light") && header_field<bool>(snapshot, "learns_light");
   check_stored(snapshot, model);
   model.engine = make_engine(model, engines);
   model.sky = stored_sky(snapshot);
@@ -226,7 +224,6 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
                  {"max_luminance", max_luminance},
                  {"learned_views", learned_views},
                  {"learned_lenses", learned_lenses},
-                 {"learns_light", learns_light},
                  {"trained_samples", trained_samples},
                  {"sky_width", sky.width},
                  {"step", engine->step_count()}},

@@ -28,7 +28,6 @@ struct LuminanceModel {
   float max_luminance = 1;
   int learned_views = 0;       ///< training views of which something is learned; 0: nothing is
   int learned_lenses = 0;      ///< lenses that are learned
-  bool learns_light = false;   ///< of the learned views, over their pictures
   double seconds = 0;          ///< training time so far
   double trained_samples = 0;  ///< so far
   std::unique_ptr<LuminanceEngine> engine;

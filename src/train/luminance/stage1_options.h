@@ -31,7 +31,7 @@ struct Stage1Options {
   int steps_per_box = 256;
   double cone_angle = 1.0 / 64;
   bool free_space = true;
-  bool exposures = true, moving_light = false, poses = false, lenses = false;
+  bool exposures = true, poses = false, lenses = false;
   bool sky = true;
   int checkpoint_every = 1000;
   int seed = 1;
@@ -57,7 +57,6 @@ struct Stage1Options {
     v("free_space", free_space,
       "space before sparse points is empty; they are found first where a capture has none and nothing else bounds it");
     v("exposures", exposures, "the light of each training view is learned, over that of the median view");
-    v("moving_light", moving_light, "so is how light differs over each picture: shadows that move, clouds");
     v("poses", poses, "where cameras stood and looked is learned");
     v("lenses", lenses, "focal lengths, principal points and distortion of the views' lenses are learned");
     v("sky", sky, "where views see a sky, its light comes from beyond the scene and the way there is empty");
