@@ -144,7 +144,7 @@ int main(int argc, char** argv) {
   cnerf::LuminanceModel model = cnerf::LuminanceModel::create(capture, options, cnerf::cpu_engines());
   auto views = cnerf::training_views(capture, model.frame);
   const std::vector<cnerf::DepthHints> depths = cnerf::depth_hints(capture, model.frame, capture.points);
-  for (std::size_t v = 0; v < depths.size(); ++v) views[v].depths = &depths[v];
+  cnerf::show_to(views, depths);
   model.engine->set_views(views);
   std::printf("%zu training views of %dx%d, %d cascades, side %.3f world units\n", views.size(), views[0].image->width,
               views[0].image->height, model.frame.cascades, 1 / model.frame.unit_per_world);

@@ -81,7 +81,7 @@ int train(const Arguments& arguments) {
                            arguments.number("focal", 0)});
   std::vector<TrainingView> views = training_views(packed.capture, packed.frame);
   const std::vector<DepthHints> depths = depth_hints(packed.capture, packed.frame, packed.capture.points);
-  for (std::size_t v = 0; v < depths.size(); ++v) views[v].depths = &depths[v];
+  show_to(views, depths);
   const double seconds = arguments.number("seconds", 10), rate = arguments.number("rate", 1e-2);
   const double final_rate = arguments.number("final_rate", 5e-4), hold = arguments.number("hold", 0.5);
   std::vector<double> report_at;

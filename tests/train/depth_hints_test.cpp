@@ -74,6 +74,17 @@ TEST_F(DepthHintsTest, WhatIsNotBelievedOrNotSeenSaysNothing) {
   for (const DepthHint& hint : hints.front().cells) EXPECT_FALSE(hint.is_known());
 }
 
+TEST_F(DepthHintsTest, AViewThatShowsNoPointIsGivenNone) {
+  capture_.views.push_back(capture_.views.front());
+  add_point({0.5, 0.5, 4});
+  const std::vector<DepthHints> hints = depth_hints(capture_, frame_, capture_.points);
+  std::vector<TrainingView> views = training_views(capture_, frame_);
+  ASSERT_EQ(views.size(), 4u);
+  show_to(views, hints);
+  EXPECT_NE(views[0].depths, nullptr);
+  EXPECT_EQ(views[3].depths, nullptr);
+}
+
 TEST(DepthMiss, IsNothingAtTheKnownDistanceAndBoundedElsewhere) {
   const DepthHint hint = {std::log(0.5f), 20};
   EXPECT_NEAR(depth_miss(0.5, hint), 0, 1e-12);

@@ -97,4 +97,10 @@ std::vector<DepthHints> depth_hints(const Capture& capture, const SceneFrame& fr
   return hints;
 }
 
+void show_to(std::vector<TrainingView>& views, const std::vector<DepthHints>& hints) {
+  for (std::size_t v = 0; v < hints.size(); ++v) {
+    if (!hints[v].cells.empty()) views[v].depths = &hints[v];
+  }
+}
+
 }  // namespace cnerf

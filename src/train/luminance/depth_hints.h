@@ -6,6 +6,7 @@
 #include "src/capture/capture.h"
 #include "src/field/scene_frame.h"
 #include "src/render/depth_math.h"
+#include "src/render/training_views.h"
 
 namespace cnerf {
 
@@ -13,5 +14,8 @@ namespace cnerf {
 /// points are and the more they agree. Where none is near nothing is known. Empty without points.
 [[nodiscard]] std::vector<DepthHints> depth_hints(const Capture& capture, const SceneFrame& frame,
                                                   const std::vector<SparsePoint>& points);
+
+/// Views know of them, but for those that show no point. The hints have to outlive them.
+void show_to(std::vector<TrainingView>& views, const std::vector<DepthHints>& hints);
 
 }  // namespace cnerf

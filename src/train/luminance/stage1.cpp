@@ -176,7 +176,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   sky.show_to(views);
   model.sky = sky.light;
   const std::vector<DepthHints> depths = depth_hints(job.capture, model.frame, points_of(job));
-  for (std::size_t v = 0; v < depths.size(); ++v) views[v].depths = &depths[v];
+  show_to(views, depths);
   model.engine->set_views(views);
   model.engine->share_steps(share_of(job.ranks));
 
