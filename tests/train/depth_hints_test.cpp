@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "src/render/training_views.h"
+#include "tests/support/facing_views.h"
 
 namespace cnerf {
 namespace {
@@ -13,15 +14,8 @@ namespace {
 class DepthHintsTest : public testing::Test {
  protected:
   DepthHintsTest() {
-    for (int i = 0; i < 4; ++i) {
-      View view;
-      view.intrinsics.width = view.intrinsics.height = 128;
-      view.intrinsics.fx = view.intrinsics.fy = 128;
-      view.intrinsics.cx = view.intrinsics.cy = 64;
-      view.world_from_camera = {Mat3d::identity(), {0.1 * i, 0, 0}};
-      view.held_out = i == 3;
-      capture_.views.push_back(view);
-    }
+    capture_.views = test::facing_views(4, 128, 0.1);
+    capture_.views.back().held_out = true;
     frame_.unit_per_world = 0.25;
   }
   void add_point(Vec3d at, double error = 0.5, std::vector<std::uint32_t> views = {0, 1, 2}) {

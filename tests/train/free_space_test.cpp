@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "tests/support/facing_views.h"
+
 namespace cnerf {
 namespace {
 
@@ -15,14 +17,6 @@ constexpr double kRadius = 0.05;
 class FreeSpaceTest : public testing::Test {
  protected:
   FreeSpaceTest() {
-    for (int i = 0; i < 4; ++i) {
-      View view;
-      view.intrinsics.width = view.intrinsics.height = 100;
-      view.intrinsics.fx = view.intrinsics.fy = 100;
-      view.intrinsics.cx = view.intrinsics.cy = 50;
-      view.world_from_camera = {Mat3d::identity(), {0.2 * i, 0, 0}};
-      views_.push_back(view);
-    }
     for (int i = -4; i <= 4; ++i) {
       for (int j = -4; j <= 4; ++j) points_.push_back({{0.3 + 0.3 * i, 0.3 * j, 4}, 0.5, {0, 1, 2, 3}});
     }
@@ -31,7 +25,7 @@ class FreeSpaceTest : public testing::Test {
     return FreeSpace(views_, points_).holds(at, radius);
   }
 
-  std::vector<View> views_;
+  std::vector<View> views_ = test::facing_views(4, 100, 0.2);
   std::vector<SparsePoint> points_;
 };
 
