@@ -165,6 +165,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   if (options.sky) sky = find_sky(job.capture, views, points_of(job));
   sky.show_to(views);
   model.sky = sky.light;
+  model.engine->limit_image_memory(job.image_memory);
   model.engine->set_views(views);
   model.engine->share_steps(share_of(job.ranks));
 
