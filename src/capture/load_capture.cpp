@@ -318,6 +318,24 @@ void mask_what_is_transparent(MonoImage& image) {
   image.alpha.clear();
 }
 
+/// What the pixels of all views will take, by the headers that say it.
+std::size_t stated_bytes(const std::vector<ListedView>& listed) {
+  double bytes = 0;
+  for (const ListedView& view : listed) {
+    std::optional<ImageHeader> header;
+    try {
+      header = stated_header(view.image_file);
+    } catch (const Error&) {
+      continue;  // who reads it says what is wrong
+    }
+    if (!header) continue;
+    const int depth = header->depth == PixelDepth::kU8 ? 1 : header->depth == PixelDepth::kU16 ? 2 : 4;
+    const int of_pixel = depth + (header->has_alpha ? 1 : 0);
+    bytes += of_pixel * double(header->width) * double(header->height) / (view.downscale * view.downscale);
+  }
+  return std::size_t(bytes);
+}
+
 void load_views(const std::vector<ListedView>& listed, Transfer transfer, PhotographStore& store, Capture& capture) {
   std::vector<LoadedView> loaded(listed.size());
   parallel_tasks(listed.size(), [&](std::size_t i) {
@@ -393,7 +411,7 @@ Capture load_capture(const fs::path& path, const CaptureOptions& options, const 
   Found found = find_views(path, options);
   Capture capture = capture_without_views(found);
   const std::vector<ListedView>& listed = found.listing.views;
-  PhotographStore store(memory);
+  PhotographStore store(memory, stated_bytes(listed));
   load_views(listed, transfer, store, capture);
   const auto put = [&](MonoImage& image) {
     if (store.has_file()) store.put(image);

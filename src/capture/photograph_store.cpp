@@ -109,7 +109,8 @@ class PhotographStore::File {
   std::thread guard_;
 };
 
-PhotographStore::PhotographStore(ImageMemory memory) : memory_(std::move(memory)) {}
+PhotographStore::PhotographStore(ImageMemory memory, std::size_t expected)
+    : memory_(std::move(memory)), taken_(expected > memory_.most ? memory_.most : 0) {}
 
 PhotographStore::~PhotographStore() = default;
 

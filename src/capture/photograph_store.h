@@ -20,7 +20,8 @@ struct ImageMemory {
 
 class PhotographStore {
  public:
-  explicit PhotographStore(ImageMemory memory);
+  /// @param expected  bytes of all images, as far as it is known: where they are too much, all move to the file at once
+  explicit PhotographStore(ImageMemory memory, std::size_t expected = 0);
   ~PhotographStore();
   PhotographStore(const PhotographStore&) = delete;
   PhotographStore& operator=(const PhotographStore&) = delete;

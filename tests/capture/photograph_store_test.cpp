@@ -58,6 +58,16 @@ TEST(PhotographStore, WhatDoesNotFitIsReadFromAFileWithoutAName) {
   }
 }
 
+TEST(PhotographStore, WhereTooMuchIsExpectedNothingStaysInMemory) {
+  const test::TempDir folder;
+  const MonoImage given = image_of(64, 64);
+  PhotographStore store({2 * bytes_of(given), folder.path()}, 3 * bytes_of(given));
+  MonoImage first = given;
+  store.take(first);
+  EXPECT_TRUE(first.u8.is_in_file());
+  EXPECT_EQ(first.u8, given.u8);
+}
+
 TEST(PhotographStore, PixelsOfAFileAreWrittenToInMemoryOnly) {
   const test::TempDir folder;
   MonoImage image = image_of(16, 16);
