@@ -22,7 +22,7 @@ namespace cnerf {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::chrono::milliseconds kBetweenLooks{200};
+constexpr std::chrono::milliseconds kBetweenLooks{20};
 constexpr const char* kAdvice = "; --image-memory says how much of the photographs lies in memory";
 
 /// Pages of files that this process holds in memory, its own libraries' among them; bytes.
