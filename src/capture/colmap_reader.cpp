@@ -253,17 +253,6 @@ std::vector<Registered> read_images(const fs::path& file) {
   return file.extension() == ".bin" ? read_images_binary(file) : read_images_text(file);
 }
 
-std::vector<SparsePoint> read_points(const fs::path& folder) {
-  const auto file = model_file(folder, "points3D");
-  if (!file) return {};
-  std::vector<SparsePoint> points = file->extension() == ".bin" ? read_points_binary(*file) : read_points_text(*file);
-  std::erase_if(points, [](const SparsePoint& point) {
-    const auto [x, y, z] = point.position;
-    return !std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z) || !std::isfinite(point.error);
-  });
-  return points;
-}
-
 /// The folder that image names are relative to: `images` or `input` beside the model or above it.
 fs::path find_image_folder(const fs::path& root, const fs::path& model_folder, const std::string& first_image) {
   std::vector<fs::path> places = {root, model_folder};
@@ -310,6 +299,15 @@ ListedView list_view(const Registered& image, const Cameras& cameras, const Mode
 
 }  // namespace
 
+std::vector<SparsePoint> read_colmap_points(const fs::path& file) {
+  std::vector<SparsePoint> points = file.extension() == ".bin" ? read_points_binary(file) : read_points_text(file);
+  std::erase_if(points, [](const SparsePoint& point) {
+    const auto [x, y, z] = point.position;
+    return !std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z) || !std::isfinite(point.error);
+  });
+  return points;
+}
+
 std::size_t colmap_image_count(const fs::path& model_folder) {
   const fs::path file = required_model_file(model_folder, "images");
   if (file.extension() == ".bin") return ByteReader(file).next<std::uint64_t>("number of images");
@@ -326,7 +324,7 @@ CaptureListing read_colmap(const fs::path& root, const fs::path& model_folder) {
   CaptureListing listing;
   listing.source = images_file;
   listing.format = "colmap";
-  listing.points = read_points(model_folder);
+  if (const auto points = model_file(model_folder, "points3D")) listing.points = read_colmap_points(*points);
   const fs::path folder = find_image_folder(root, model_folder, images.empty() ? "" : images.front().name);
   for (const Registered& image : images)
     listing.views.push_back(list_view(image, cameras, {cameras_file, images_file}, folder));

@@ -63,6 +63,9 @@ void bring_near_origin(CaptureListing& listing);
 /// A COLMAP model, binary or text.  @param root  the capture folder, where images are looked for first.
 /// @throws InputError, MissingInputError.
 [[nodiscard]] CaptureListing read_colmap(const std::filesystem::path& root, const std::filesystem::path& model_folder);
+/// COLMAP's points3D.txt or points3D.bin alone; those that are no finite numbers are left out.
+/// @throws MissingInputError, InputError.
+[[nodiscard]] std::vector<SparsePoint> read_colmap_points(const std::filesystem::path& file);
 /// Registered images of a model, to choose between several.
 [[nodiscard]] std::size_t colmap_image_count(const std::filesystem::path& model_folder);
 

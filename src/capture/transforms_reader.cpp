@@ -260,12 +260,20 @@ void read_hints(const fs::path& file, const Json& top, CaptureListing& listing) 
   }
 }
 
+/// Our own key, which `cnerf prepare` writes: a file of COLMAP's points, whose images are numbers of frames.
+std::vector<SparsePoint> read_sparse_points(const fs::path& file, const Json& top) {
+  const Json no_frame = Json::object();
+  const std::string name = Fields(file, top, no_frame, "").text("sparse_points");
+  return name.empty() ? std::vector<SparsePoint>() : read_colmap_points(file.parent_path() / name);
+}
+
 /// Appends the frames of one file.
 Json append_file(const fs::path& file, bool held_out, CaptureListing& listing) {
   Json top = read_json(file);
   if (!top.is_object()) throw InputError(file, "", std::string("expected an object, found ") + top.type_name());
   for (ListedView& view : read_frames(file, top)) {
     view.held_out = held_out;
+    view.number = std::uint32_t(listing.views.size());
     listing.views.push_back(std::move(view));
   }
   return top;
@@ -279,6 +287,7 @@ CaptureListing read_transforms(const fs::path& json_file) {
   listing.format = "transforms";
   const Json top = append_file(json_file, false, listing);
   read_hints(json_file, top, listing);
+  listing.points = read_sparse_points(json_file, top);
   if (json_file.filename() == "transforms_train.json") {
     const fs::path test = json_file.parent_path() / "transforms_test.json";
     const fs::path validation = json_file.parent_path() / "transforms_val.json";

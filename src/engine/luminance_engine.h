@@ -10,6 +10,7 @@
 
 #include "encoding/hash_grid_levels.h"
 #include "src/engine/pixel_samples.h"
+#include "src/engine/stage1_schedule.h"
 #include "src/engine/step_share.h"
 #include "src/engine/view_learning.h"
 #include "src/field/state.h"
@@ -28,6 +29,7 @@ struct LuminanceEngineOptions {
   int samples_per_step = 1 << 16;  ///< trained samples that a step aims at
   float max_luminance = 1.0f;      ///< of the images; the field emits at most a little more
   float distortion_weight = 0;     ///< of each ray's distortion (distortion_math.h) in the loss
+  DepthLearning depth;             ///< of views that know of depths
   ViewLearning learning;
   std::uint64_t seed = 1;
 };
@@ -69,6 +71,8 @@ class LuminanceEngine {
   [[nodiscard]] virtual long step_count() const = 0;
   /// What was learned of the views, in their order. Empty where nothing is.
   [[nodiscard]] virtual std::vector<ViewCorrection> view_corrections() const { return {}; }
+  /// Their light over the picture, likewise.
+  [[nodiscard]] virtual std::vector<GainField> view_light() const { return {}; }
   /// And of the lenses that they share (TrainingView::lens).
   [[nodiscard]] virtual std::vector<LensCorrection> lens_corrections() const { return {}; }
 

@@ -2,15 +2,16 @@
 /// The loss of stage 1 and its gradient along a ray, once for every device. Engines differ only in how they walk a
 /// ray's samples: one after another on the processor, 32 at a time on the GPU.
 ///
-///   L = ((L*(seen) - L*(wanted)) / 100)^2 + distortion_weight D,   its mean over the rays of a step
+///   L = ((L*(seen) - L*(wanted)) / 100)^2 + distortion_weight D + depth_weight M,   its mean over the rays of a step
 ///
 /// `seen` composites the field's luminance, times the view's gain, over a random background, or over the sky where that
 /// may be seen; `wanted` is the pixel over the same background, both as CIE lightness L*. D says how far apart the
-/// ray's samples lie (distortion_math.h).
+/// ray's samples lie (distortion_math.h), M how far from where points are seen, where that is known (depth_math.h).
 
 #include "src/base/host_device.h"
 #include "src/color/colorspace_math.h"
 #include "src/render/composite_math.h"
+#include "src/render/depth_math.h"
 #include "src/render/distortion_math.h"
 #include "src/render/observed_ray.h"
 
@@ -40,9 +41,20 @@ struct RayError {
         lightness((lightness_from_luminance(seen) - lightness_from_luminance(target.wanted())) / 100.0f) {}
 };
 
+/// What is asked of a ray's samples beside their light.
+struct RayShape {
+  Distortion<float> distortion;  ///< of the whole ray
+  float depth_miss = 0;          ///< M: sum of w rho, plus the transmittance behind; 0 where no depth is known
+};
+struct ShapeWeights {
+  float distortion = 0, depth = 0;
+};
+
 /// The loss of one ray.
-[[nodiscard]] CNERF_HD inline float ray_loss(const RayError& error, float distortion, float distortion_weight) {
-  return error.lightness * error.lightness + distortion_weight * distortion;
+[[nodiscard]] CNERF_HD inline float ray_loss(const RayError& error, const RayShape& shape,
+                                             const ShapeWeights& weights) {
+  return error.lightness * error.lightness + weights.distortion * shape.distortion.value +
+         weights.depth * shape.depth_miss;
 }
 
 /// What PSNR is made of: on sRGB-encoded luminance over black, clamped to [0, 1].
@@ -64,16 +76,16 @@ struct LitSample {
 /// Derivatives of `scale` times a ray's loss by what its samples emit and absorb.
 class RayGradient {
  public:
-  /// @param gain        of the ray's view
-  /// @param scale       of the loss: 1 / rays of the step
-  /// @param distortion  of the whole ray
-  CNERF_HD RayGradient(const RayError& error, float gain, const Distortion<float>& distortion, float distortion_weight,
+  /// @param gain   of the ray's view
+  /// @param scale  of the loss: 1 / rays of the step
+  CNERF_HD RayGradient(const RayError& error, float gain, const RayShape& shape, const ShapeWeights& weights,
                        float scale)
       : seen_(error.seen),
         gain_(gain),
         d_seen_(scale * 2.0f * error.lightness * lightness_derivative(seen_) / 100.0f),
-        d_distortion_(scale * distortion_weight),
-        distortion_(distortion) {}
+        d_distortion_(scale * weights.distortion),
+        d_depth_(scale * weights.depth),
+        distortion_(shape.distortion) {}
 
   /// By the luminance that a sample emits.
   [[nodiscard]] CNERF_HD float by_luminance(const LitSample& sample) const { return d_seen_ * gain_ * sample.weight; }
@@ -100,9 +112,14 @@ class RayGradient {
   [[nodiscard]] CNERF_HD float by_density_of_distortion(const LitSample& sample, float slope, float behind) const {
     return d_distortion_ * density_derivative(sample.dt, sample.transmittance_after, slope, behind);
   }
+  /// And of the miss of a known depth, whose slope is rho.
+  /// @param behind  sum_{j>i} w_j rho_j, plus the transmittance behind the last sample
+  [[nodiscard]] CNERF_HD float by_density_of_depth(const LitSample& sample, float miss, float behind) const {
+    return d_depth_ * density_derivative(sample.dt, sample.transmittance_after, miss, behind);
+  }
 
  private:
-  float seen_, gain_, d_seen_, d_distortion_;
+  float seen_, gain_, d_seen_, d_distortion_, d_depth_;
   Distortion<float> distortion_;
 };
 

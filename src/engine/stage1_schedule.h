@@ -2,6 +2,7 @@
 /// What a step of stage 1 does when, once for every device: how many rays it takes, when it visits the occupancy grid.
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include "src/base/host_device.h"
@@ -11,6 +12,16 @@
 namespace cnerf {
 
 inline constexpr float kTrainingTransmittance = 1e-4f;  ///< a training ray ends below this
+
+/// How much known depths weigh in a step: less and less, since they are rougher than what pictures tell.
+struct DepthLearning {
+  float weight = 0;       ///< in the loss, of the first step; 0: depths are not looked at
+  float half_life = 500;  ///< steps
+
+  [[nodiscard]] CNERF_HD float weight_at(std::int64_t step) const {
+    return weight <= 0 ? 0.0f : weight * std::exp2(-float(step) / half_life);
+  }
+};
 
 inline constexpr std::int64_t kFewestRays = 64, kMostRays = 1 << 16;  ///< of a step
 

@@ -5,6 +5,7 @@
 
 #include "src/base/host_device.h"
 #include "src/optim/adam.h"
+#include "src/render/gain_field.h"
 #include "src/render/lens_correction.h"
 #include "src/render/training_views.h"
 #include "src/render/view_correction.h"
@@ -18,8 +19,11 @@ struct ViewLearning {
   int views = 0;   ///< training views; 0: nothing is learned
   int lenses = 0;  ///< that they share; 0: not learned
   bool exposures = false, poses = false;
+  bool light = false;  ///< how it differs over each picture (gain_field.h)
   /// Learning rates over that of the field; the lens's in focal lengths at the picture's corner.
-  float gain_rate = 0.1f, pose_rate = 0.02f, lens_rate = 0.005f;
+  float gain_rate = 0.1f, pose_rate = 0.02f, lens_rate = 0.005f, light_rate = 0.02f;
+  /// Weight decay of the light's nodes, in units of the field's learning rate: most of what pictures show is the scene.
+  float light_decay = 0.05f;
   /// Poses learn little in so many first steps, while the scene takes shape and its gradients say nothing.
   int pose_warm_up = 512;
   /// Poses learn from the coarser levels of the hash grid, up to so many cells, whose slopes hold for more than the
@@ -30,6 +34,7 @@ struct ViewLearning {
   int pose_blocks = 4, lens_blocks = 16;
 
   [[nodiscard]] CNERF_HD bool is_on() const { return views > 0; }
+  [[nodiscard]] CNERF_HD int lit_views() const { return light ? views : 0; }
   [[nodiscard]] CNERF_HD bool teaches_lens(std::uint32_t ray) const {
     return lenses > 0 && ray / kPoseRayBlock % std::uint32_t(lens_blocks) == 0;
   }
@@ -70,6 +75,9 @@ CNERF_HD inline void add_lens_gradient(const UnitCamera& camera, const Intrinsic
 struct ViewMoments {
   ViewCorrection first, second;
 };
+struct LightMoments {
+  GainField first, second;
+};
 struct LensMoments {
   float first[kLensNumbers] = {}, second[kLensNumbers] = {};
 };
@@ -89,6 +97,15 @@ CNERF_HD inline void update_view(const ViewLearning& learning, const AdamStep& a
     of_pose.apply(by_turn[axis], moments.first.turn[axis], moments.second.turn[axis], view.turn[axis]);
     of_pose.apply(gradient.by_shift[axis], moments.first.shift[axis], moments.second.shift[axis], view.shift[axis]);
   }
+}
+
+/// The same for a node of a view's light.
+/// @param adam  of the field
+CNERF_HD inline void update_light(const ViewLearning& learning, const AdamStep& adam, int node,
+                                  const GainField& gradient, LightMoments& moments, GainField& light) {
+  adam.at_rate(learning.light_rate)
+      .apply(gradient.log_gain[node], moments.first.log_gain[node], moments.second.log_gain[node], light.log_gain[node],
+             adam.kept(learning.light_decay));
 }
 
 /// The same for one lens.

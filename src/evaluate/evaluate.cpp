@@ -7,6 +7,7 @@
 #include "src/base/error.h"
 #include "src/base/parallel.h"
 #include "src/base/statistics.h"
+#include "src/evaluate/held_out_camera.h"
 #include "src/picture/picture.h"
 
 namespace cnerf {
@@ -42,24 +43,15 @@ std::vector<std::uint8_t> coloured_pixels(const RenderedImage& image, std::span<
   return pixels;
 }
 
-/// Luminance times the gain that brings it closest to the truth, by least squares over the pixels that count.
-std::vector<float> at_exposure_of(std::vector<float> luminance, const MonoImage& image,
-                                  const std::vector<float>& truth) {
-  GainFit fit;
-  for (std::size_t p = 0; p < truth.size(); ++p) {
-    if (image.valid(p)) fit.add(luminance[p], truth[p]);
-  }
-  for (float& value : luminance) value *= float(fit.gain());
-  return luminance;
-}
-
 void measure_luminance(const EvaluatedView& pictures, ViewMetrics& metrics) {
   const MonoImage& image = pictures.view.image;
   const std::vector<float> truth = luminance_plane(image);
   const std::vector<float>& ours = pictures.ours.luminance;
   metrics.psnr_luminance = psnr_from_mse(encoded_mse(ours, truth, 1, image.mask));
-  metrics.psnr_luminance_exposure_fitted =
-      psnr_from_mse(encoded_mse(at_exposure_of(ours, image, truth), truth, 1, image.mask));
+  std::vector<float> at_its_exposure = ours;
+  const auto gain = float(fitted_gain(ours, truth, image.mask));
+  for (float& value : at_its_exposure) value *= gain;
+  metrics.psnr_luminance_exposure_fitted = psnr_from_mse(encoded_mse(at_its_exposure, truth, 1, image.mask));
   metrics.ssim = ssim(encoded(pictures.ours.luminance), encoded(truth), image.width, image.height, image.mask);
 }
 
@@ -88,6 +80,18 @@ void measure_by_network(const EvaluatedView& pictures, const Lpips& lpips, ViewM
   if (pictures.ours.rgb.empty() || !pictures.truth) return;
   metrics.lpips = lpips.distance(srgb8_from_linear(pictures.ours.rgb), srgb8_from_linear(pictures.truth->rgb),
                                  pictures.ours.width, pictures.ours.height);
+}
+
+/// Engines share their threads among rays: not for several views at once.
+void measure_camera(const Scene& scene, const View& view, const EvaluateOptions& options, ViewMetrics& metrics) {
+  const auto seen = scene.seen(options.render);
+  if (!seen) return;
+  const RenderEffort effort = options.render.effort();
+  const UnitCamera given(view.intrinsics, view.world_from_camera, scene.frame());
+  metrics.near_opacity = near_opacity(*seen, effort, given);
+  if (!options.alignment || !view.held_out) return;
+  const UnitCamera start(view.intrinsics, options.alignment->applied_to(view.world_from_camera), scene.frame());
+  if (const auto fitted = fit_camera(*seen, effort, start, view.image)) metrics.psnr_luminance_aligned = fitted->psnr;
 }
 
 /// A number without a pixel behind it is no number.
@@ -134,6 +138,32 @@ ViewMetrics mean_of(const std::vector<ViewMetrics>& views) {
     ++index;
   });
   return mean;
+}
+
+std::map<std::string, Spread> spread_of(const std::vector<ViewMetrics>& views) {
+  // The lower the worse, but for opacity.
+  static const std::map<std::string, double> kWorse = {{"psnr_luminance", -1},
+                                                       {"psnr_luminance_exposure_fitted", -1},
+                                                       {"psnr_luminance_aligned", -1},
+                                                       {"ssim", -1},
+                                                       {"near_opacity", 1}};
+  std::map<std::string, std::vector<std::pair<double, std::string>>> values;
+  for (const ViewMetrics& view : views) {
+    ViewMetrics::visit_numbers(view, [&](const char* name, const std::optional<double>& value) {
+      if (value && kWorse.contains(name)) values[name].emplace_back(*value, view.view);
+    });
+  }
+  std::map<std::string, Spread> spread;
+  for (const auto& [name, of_views] : values) {
+    const double sign = kWorse.at(name);
+    std::vector<double> badness;
+    for (const auto& [value, view] : of_views) badness.push_back(sign * value);
+    const auto worst = std::ranges::max_element(badness) - badness.begin();
+    const auto from_worst = [&](double share) { return sign * quantile(badness, 1 - share); };
+    spread[name] = {of_views[std::size_t(worst)].first, of_views[std::size_t(worst)].second, from_worst(0.1),
+                    from_worst(0.25), from_worst(0.5)};
+  }
+  return spread;
 }
 
 std::string split_of(const std::vector<const View*>& views) {
@@ -194,6 +224,7 @@ std::vector<ViewMetrics> evaluate_views(const Scene& scene, std::span<const View
   });
   for (std::size_t i = 0; i < views.size(); ++i) {
     const EvaluatedView pictures{*views[i], ours[i], truth[i]};
+    measure_camera(scene, *views[i], options, measured[i]);
     if (options.lpips != nullptr) measure_by_network(pictures, *options.lpips, measured[i]);
     if (watch) watch(pictures);
   }
@@ -214,6 +245,7 @@ Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptio
     }
   }
   metrics.mean = mean_of(metrics.views);
+  metrics.spread = spread_of(metrics.views);
   return metrics;
 }
 

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,6 +15,7 @@
 #include "src/capture/color_truth.h"
 #include "src/evaluate/lpips.h"
 #include "src/evaluate/metrics.h"
+#include "src/evaluate/pose_alignment.h"
 #include "src/train/scene.h"
 
 namespace cnerf {
@@ -26,10 +28,14 @@ struct ViewMetrics {
   std::optional<double> psnr_luminance;  ///< dB; sRGB-encoded Rec.709 Y, clamped to [0, 1]
   /// The same with the one gain of linear light that fits the view best: of a picture whose exposure nobody knows.
   std::optional<double> psnr_luminance_exposure_fitted;
-  std::optional<double> psnr_rgb;  ///< dB; sRGB-encoded values of all three channels
-  std::optional<double> ssim;      ///< of encoded luminance
-  std::optional<double> ssim_rgb;  ///< mean of the three encoded channels
-  std::optional<double> lpips;     ///< of 8-bit sRGB, where weights were given
+  /// Of the right half of the picture, pose and gain fitted on the left half: of a held-out view whose pose nobody
+  /// knows exactly. To be compared with its like alone.
+  std::optional<double> psnr_luminance_aligned;
+  std::optional<double> near_opacity;  ///< mean opacity of the first tenth of rays: 0 where the camera stands free
+  std::optional<double> psnr_rgb;      ///< dB; sRGB-encoded values of all three channels
+  std::optional<double> ssim;          ///< of encoded luminance
+  std::optional<double> ssim_rgb;      ///< mean of the three encoded channels
+  std::optional<double> lpips;         ///< of 8-bit sRGB, where weights were given
   std::optional<double> colorfulness, colorfulness_truth, colorfulness_difference;  ///< difference: ours - truth
   std::optional<double> colorfulness_magnitude, colorfulness_magnitude_truth, colorfulness_magnitude_difference;
   std::optional<double> ab_error;          ///< mean Lab ab distance to the truth
@@ -46,6 +52,8 @@ struct ViewMetrics {
   static void visit_numbers(Self& self, Visitor&& visitor) {
     visitor("psnr_luminance", self.psnr_luminance);
     visitor("psnr_luminance_exposure_fitted", self.psnr_luminance_exposure_fitted);
+    visitor("psnr_luminance_aligned", self.psnr_luminance_aligned);
+    visitor("near_opacity", self.near_opacity);
     visitor("psnr_rgb", self.psnr_rgb);
     visitor("ssim", self.ssim);
     visitor("ssim_rgb", self.ssim_rgb);
@@ -62,11 +70,28 @@ struct ViewMetrics {
   }
 };
 
+/// How a number is spread over the views: a mean hides a view that is lost. Quantiles count from the worst.
+struct Spread {
+  double worst = 0;
+  std::string worst_view;
+  double tenth = 0, quarter = 0, median = 0;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor("worst", self.worst);
+    visitor("worst_view", self.worst_view);
+    visitor("tenth", self.tenth);
+    visitor("quarter", self.quarter);
+    visitor("median", self.median);
+  }
+};
+
 struct Metrics {
   int schema_version = kMetricsSchemaVersion;
-  std::string split;            ///< "held-out", or "train" when nothing was held out
-  std::string take, colorizer;  ///< filled in by the caller; empty = not colorized
-  ViewMetrics mean;             ///< mean over the views that have the number; of dB for PSNR
+  std::string split;                     ///< "held-out", or "train" when nothing was held out
+  std::string take, colorizer;           ///< filled in by the caller; empty = not colorized
+  ViewMetrics mean;                      ///< mean over the views that have the number; of dB for PSNR
+  std::map<std::string, Spread> spread;  ///< of the numbers of luminance that were measured, by name
   std::vector<ViewMetrics> views;
 
   /// metrics.json
@@ -77,6 +102,7 @@ struct Metrics {
     visitor("take", self.take);
     visitor("colorizer", self.colorizer);
     visitor("mean", self.mean);
+    visitor("spread", self.spread, kOptional);
     visitor("views", self.views);
   }
 };
@@ -94,6 +120,9 @@ struct EvaluateOptions {
   const Lpips* lpips = nullptr;  ///< measures LPIPS too; the networks run one view at a time
   bool with_baked = true;        ///< also compares the bake's colours with the per-pixel decode
   bool grey_as_color = false;    ///< an uncoloured scene counts as one that was coloured grey
+  /// From the file's frame to that of the learned cameras: held-out views are judged aligned as well, which takes as
+  /// long as rendering them a few times. None: they are not.
+  std::optional<PoseAlignment> alignment = {};
 };
 
 /// The views `evaluate` looks at: the held-out ones, or some training views when there are none.
@@ -120,5 +149,6 @@ struct EvaluateOptions {
 
 /// The mean over the views that have a number, for each number.
 [[nodiscard]] ViewMetrics mean_of(const std::vector<ViewMetrics>& views);
+[[nodiscard]] std::map<std::string, Spread> spread_of(const std::vector<ViewMetrics>& views);
 
 }  // namespace cnerf

@@ -10,12 +10,6 @@
 namespace cnerf {
 namespace {
 
-constexpr double kHighestPsnr = 100;
-
-float encoded_value(float linear) {
-  return std::clamp(srgb_from_linear(linear), 0.0f, 1.0f);
-}
-
 bool counts(std::span<const std::uint8_t> valid, std::size_t pixel) {
   return valid.empty() || valid[pixel] != 0;
 }
@@ -60,25 +54,6 @@ Lab<double> lab_at(std::span<const float> rgb, std::size_t pixel) {
 }
 
 }  // namespace
-
-double psnr_from_mse(double mean_squared_error) {
-  if (mean_squared_error <= 0) return kHighestPsnr;
-  return std::min(kHighestPsnr, -10 * std::log10(mean_squared_error));
-}
-
-double encoded_mse(std::span<const float> ours, std::span<const float> truth, int channels,
-                   std::span<const std::uint8_t> valid) {
-  CNERF_CHECK_EQ(ours.size(), truth.size());
-  double sum = 0;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < ours.size(); ++i) {
-    if (!counts(valid, i / channels)) continue;
-    const double difference = double(encoded_value(ours[i])) - double(encoded_value(truth[i]));
-    sum += difference * difference;
-    ++count;
-  }
-  return sum / double(count);
-}
 
 std::optional<double> ssim(std::span<const float> ours, std::span<const float> truth, int width, int height,
                            std::span<const std::uint8_t> valid) {

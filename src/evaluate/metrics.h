@@ -6,17 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "src/evaluate/psnr.h"
+
 namespace cnerf {
-
-/// Peak signal-to-noise ratio in dB of values whose peak is 1, from their mean squared error; capped at 100 dB, so that
-/// equal pictures give a number that JSON can hold.
-[[nodiscard]] double psnr_from_mse(double mean_squared_error);
-
-/// Mean squared difference of sRGB-encoded values, each clamped to [0, 1] first.
-/// @param ours, truth  linear light, equal sizes: [N] luminance or [N, 3] RGB, as `channels` says.
-/// @param valid        [N]; pixels that count; empty = all.  NaN when none counts.
-[[nodiscard]] double encoded_mse(std::span<const float> ours, std::span<const float> truth, int channels,
-                                 std::span<const std::uint8_t> valid = {});
 
 /// Structural similarity (Wang et al. 2004): 11x11 Gaussian window of sigma 1.5, K1 = 0.01, K2 = 0.03, mean over the
 /// windows that lie inside the picture (and, where `valid` is given, whose centre is valid).

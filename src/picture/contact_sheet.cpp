@@ -25,6 +25,12 @@ void paste(const Picture& picture, Picture& sheet, int left, int top) {
   mat_of(picture).copyTo(mat_of(sheet)(cv::Rect(left, top, picture.width, picture.height)));
 }
 
+/// In the line that begins at `top`.
+void write_title(const std::string& title, int left, int top, Picture& sheet) {
+  cv::putText(mat_of(sheet), title, {left + 2, top + kTitleHeight - 8}, cv::FONT_HERSHEY_SIMPLEX, 0.55,
+              cv::Scalar(40, 40, 40), 1, cv::LINE_AA);
+}
+
 }  // namespace
 
 Picture tiled(std::span<const Tile> tiles, int columns) {
@@ -80,11 +86,24 @@ Picture ContactSheet::compose() const {
     height += tallest + kGap;
   }
 
+  const int table_height = height;
+  int right = kGap;
+  for (const auto& [picture, caption] : below_) {
+    right += picture.width + kGap;
+    height = std::max(height, table_height + kTitleHeight + picture.height + kGap);
+  }
+  width = std::max(width, right);
+
   Picture sheet = blank(width, height, 255);
   for (std::size_t c = 0; c < columns.size(); ++c) {
-    cv::putText(mat_of(sheet), titles_[columns[c]], {left[c] + 2, kTitleHeight - 8}, cv::FONT_HERSHEY_SIMPLEX, 0.55,
-                cv::Scalar(40, 40, 40), 1, cv::LINE_AA);
+    write_title(titles_[columns[c]], left[c], 0, sheet);
     for (std::size_t r = 0; r < rows_.size(); ++r) paste(rows_[r][columns[c]], sheet, left[c], top[r]);
+  }
+  int next = kGap;
+  for (const auto& [picture, caption] : below_) {
+    write_title(caption, next, table_height, sheet);
+    paste(picture, sheet, next, table_height + kTitleHeight);
+    next += picture.width + kGap;
   }
   return sheet;
 }

@@ -20,7 +20,8 @@ struct Tile {
 /// large as the largest picture. No tiles give a sheet with one empty cell.
 [[nodiscard]] Picture tiled(std::span<const Tile> tiles, int columns = 5);
 
-/// A table of pictures: one row per view, one column per kind, with a title above each column.
+/// A table of pictures: one row per view, one column per kind, with a title above each column. Below it, side by side,
+/// may stand what concerns all views.
 class ContactSheet {
  public:
   /// @param cell_width  widest a cell gets, pixels; smaller pictures keep their size.
@@ -30,6 +31,8 @@ class ContactSheet {
   void add_row(const std::vector<Picture>& pictures);
   [[nodiscard]] int rows() const { return int(rows_.size()); }
 
+  void add_below(Tile tile) { below_.push_back(std::move(tile)); }
+
   /// The sheet; columns that are empty in every row are left out.
   [[nodiscard]] Picture compose() const;
 
@@ -37,6 +40,7 @@ class ContactSheet {
   std::vector<std::string> titles_;
   int cell_width_;
   std::vector<std::vector<Picture>> rows_;
+  std::vector<Tile> below_;
 };
 
 }  // namespace cnerf

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <numbers>
 #include <optional>
 
 #include "src/base/files.h"
@@ -10,7 +12,9 @@
 #include "src/cluster/packing.h"
 #include "src/cluster/share_out.h"
 #include "src/evaluate/evaluate.h"
+#include "src/evaluate/held_out_camera.h"
 #include "src/picture/contact_sheet.h"
+#include "src/picture/curve_picture.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/render_step.h"
 
@@ -23,6 +27,16 @@ void say_metrics(const Metrics& metrics, Observer& observer) {
   const ViewMetrics& mean = metrics.mean;
   std::string text = fmt::format("{} views ({}): luminance {:.2f} dB", metrics.views.size(), metrics.split,
                                  mean.psnr_luminance.value_or(0));
+  if (const auto found = metrics.spread.find("psnr_luminance"); found != metrics.spread.end()) {
+    text += fmt::format(" (worst {:.2f})", found->second.worst);
+  }
+  if (mean.psnr_luminance_exposure_fitted) {
+    text += fmt::format(", exposure fitted {:.2f} dB", *mean.psnr_luminance_exposure_fitted);
+  }
+  if (mean.psnr_luminance_aligned) {
+    text += fmt::format(", right halves aligned {:.2f} dB", *mean.psnr_luminance_aligned);
+  }
+  if (mean.near_opacity) text += fmt::format(", fog before cameras {:.2f} %", 100 * *mean.near_opacity);
   if (mean.ssim) text += fmt::format(", SSIM {:.3f}", *mean.ssim);
   if (mean.psnr_rgb) text += fmt::format(", RGB {:.2f} dB", *mean.psnr_rgb);
   if (mean.lpips) text += fmt::format(", LPIPS {:.3f}", *mean.lpips);
@@ -38,6 +52,28 @@ SheetRow row_of(const EvaluatedView& view) {
   const Picture truth =
       view.truth ? picture_from_linear(view.truth->width, view.truth->height, view.truth->rgb) : Picture{};
   return {grey_picture(view.view.image), picture_of(view.ours, ShownColor::kDecoded), truth};
+}
+
+/// What training found out about its views, below the table: exposures, how far cameras moved, the sky.
+void add_estimates(const LearnedViews& learned, const Scene& scene, ContactSheet& sheet) {
+  constexpr int kWidth = 400, kHeight = 130;
+  std::vector<double> gains, degrees;
+  for (const ViewCorrection& correction : learned.corrections) {
+    gains.push_back(correction.gain());
+    degrees.push_back(double(length(correction.turn)) * 180 / std::numbers::pi);
+  }
+  const auto add_curve = [&](const std::string& title, const std::vector<double>& values, std::optional<double> level) {
+    if (values.empty()) return;
+    const auto [least, most] = std::ranges::minmax(values);
+    if (!(least < most)) return;
+    sheet.add_below(
+        {curve_picture(values, level, kWidth, kHeight), fmt::format("{} {:.2f} to {:.2f}", title, least, most)});
+  };
+  add_curve("exposures:", gains, 1);
+  add_curve("cameras turned, degrees:", degrees, {});
+  if (const auto sky = scene.sky()) {
+    sheet.add_below({scaled_down(picture_from_linear(sky->width, sky->height, sky->rgb), kWidth), "sky, all around"});
+  }
 }
 
 /// What a rank finds out about a view.
@@ -88,6 +124,7 @@ Metrics evaluate_together(const Scene& scene, const Capture& capture, const Eval
   };
   cluster::share_out(cluster::world(), views.size(), see, take, packed, unpacked);
   metrics.mean = mean_of(metrics.views);
+  metrics.spread = spread_of(metrics.views);
   return metrics;
 }
 
@@ -103,6 +140,9 @@ void evaluate_step(const RunContext& context, const EvaluateJob& job, const Engi
   EvaluateOptions options;
   options.lpips = lpips ? &*lpips : nullptr;
   options.render = render_options(context.config);
+  const LearnedViews learned = LuminanceModel::learned_views_in(directory.stage1_snapshot());
+  options.alignment = alignment_of(context.capture, learned);
+  if (job.aligned && !options.alignment) options.alignment = PoseAlignment();
   ContactSheet sheet({"input", "ours", "truth"});
   const auto add_to_sheet = [&](const EvaluatedView& view) {
     if (sheet.rows() < kSheetRows) sheet.add_row(row_of(view));
@@ -113,6 +153,8 @@ void evaluate_step(const RunContext& context, const EvaluateJob& job, const Engi
   if (!cluster::world().is_first()) return;
   metrics.take = job.take;
   metrics.colorizer = colorizer_name(directory, job.take);
+
+  add_estimates(learned, *scene, sheet);
 
   const std::string json = json_of(metrics).dump(2) + "\n";
   if (!job.take.empty()) write_file(directory.take_folder(job.take) / "metrics.json", json);

@@ -12,6 +12,7 @@ namespace cnerf::pipeline {
 struct EvaluateJob {
   std::string take;                     ///< empty = luminance only
   std::filesystem::path lpips_weights;  ///< see `Lpips`; empty = LPIPS is not measured
+  bool aligned = false;                 ///< fit the poses of held-out views also where cameras stayed as given
 };
 
 /// Measures a take and writes metrics.json and the contact sheet.

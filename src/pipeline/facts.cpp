@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
 #include "export/vdb_reader.h"
 #include "src/base/error.h"
@@ -10,6 +11,7 @@
 #include "src/base/text.h"
 #include "src/capture/arrangement.h"
 #include "src/capture/image_header.h"
+#include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
 #include "src/pipeline/run_directory.h"
 #include "src/train/luminance/learned_views.h"
@@ -104,6 +106,47 @@ void add_scene(Report& report, const fs::path& stage1, const fs::path& take) {
   if (scene->is_colorized()) report.line("colorizer", "{}", scene->colorizer());
 }
 
+/// A line that rises and falls with the values, over the views in their order; views are thinned out to its width.
+std::string curve_text(const std::vector<double>& values) {
+  constexpr std::size_t kWidest = 60;
+  constexpr std::array<const char*, 8> kBars = {"\u2581", "\u2582", "\u2583", "\u2584",
+                                                "\u2585", "\u2586", "\u2587", "\u2588"};
+  const auto [least, most] = std::ranges::minmax(values);
+  if (!(least < most)) return "";
+  const std::size_t width = std::min(kWidest, values.size());
+  std::string text;
+  for (std::size_t x = 0; x < width; ++x) {
+    const double share = (values[x * values.size() / width] - least) / (most - least);
+    text += kBars[std::min<std::size_t>(kBars.size() - 1, std::size_t(share * double(kBars.size())))];
+  }
+  return text;
+}
+
+/// As the run's capture gives them; none where it does not lie there any more.
+std::vector<Intrinsics> given_lenses(const RunDirectory& directory, const RunRecord& record) {
+  try {
+    Observer silent;
+    return lenses_of(survey_capture(record.capture, directory.config("", silent).capture));
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+void add_learned(Report& report, const RunDirectory& directory, const RunRecord& record) {
+  if (record.stage1.sky_views > 0) {
+    report.line("sky seen", "{:.0f} % of the pixels, in {} views", 100 * record.stage1.sky_share,
+                record.stage1.sky_views);
+  }
+  const LearnedViews learned = LuminanceModel::learned_views_in(directory.stage1_snapshot());
+  std::vector<double> gains;
+  for (const ViewCorrection& correction : learned.corrections) gains.push_back(double(correction.gain()));
+  if (const std::string curve = gains.empty() ? "" : curve_text(gains); !curve.empty()) {
+    report.line("exposure curve", "{}", curve);
+  }
+  const auto given = learned.lenses.empty() ? std::vector<Intrinsics>() : given_lenses(directory, record);
+  for (const auto& [name, text] : facts_of(learned, given)) report.line(name, "{}", text);
+}
+
 void add_run(Report& report, const RunDirectory& directory) {
   const RunRecord record = directory.record();
   report.line("run", "{} (cnerf {})", directory.root().string(), record.program_version);
@@ -113,9 +156,7 @@ void add_run(Report& report, const RunDirectory& directory) {
   report.line("stage 1", "{} steps, {}, {:.2f} dB on training pixels", record.stage1.steps,
               duration_text(record.stage1.seconds), record.stage1.train_psnr);
   add_scene(report, directory.stage1_snapshot(), {});
-  for (const auto& [name, text] : facts_of(LuminanceModel::learned_views_in(directory.stage1_snapshot()))) {
-    report.line(name, "{}", text);
-  }
+  add_learned(report, directory, record);
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(directory.root() / "takes", none)) {
     const std::string name = entry.path().filename().string();

@@ -11,6 +11,7 @@
 #include "src/capture/load_capture.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/run_context.h"
+#include "src/prepare/capture_writer.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
@@ -87,7 +88,8 @@ bool begin_folder(const PrepareJob& job) {
                                  : ": was begun already; pass --resume to go on or --overwrite to start again"));
     }
     if (existing.overwrite) {
-      for (const char* made : {"images", "masks", "work", "transforms.json", "prepare.json", "contact_sheet.png"}) {
+      for (const char* made :
+           {"images", "masks", "work", "transforms.json", prepare::kPointsFile, "prepare.json", "contact_sheet.png"}) {
         fs::remove_all(out / made);
       }
     }

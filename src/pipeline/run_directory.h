@@ -42,6 +42,8 @@ struct Stage1Record : Stage1Report {
     v("seconds", self.seconds);
     v("trained_samples", self.trained_samples);
     v("train_psnr", self.train_psnr);
+    v("sky_views", self.sky_views, kLater);
+    v("sky_share", self.sky_share, kLater);
   }
 };
 

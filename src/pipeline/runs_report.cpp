@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -54,24 +56,74 @@ std::string cell(const std::string& text) {
   return safe;
 }
 
-std::string row(const ReportedRun& run) {
+/// A column of luminance that some runs have: empty where a run lacks it.
+struct Column {
+  std::string title;
+  std::function<std::string(const Metrics&)> text;  ///< of a run; empty: it has none
+};
+
+/// Beside the luminance as given. None is ever shown in place of another.
+const std::vector<Column>& further_columns() {
+  const auto mean = [](const std::string& title, std::optional<double> ViewMetrics::*field, double scale, int digits) {
+    return Column{title, [=](const Metrics& metrics) {
+                    const std::optional<double>& value = metrics.mean.*field;
+                    return value ? fmt::format("{:.{}f}", scale * *value, digits) : "";
+                  }};
+  };
+  const auto worst = [](const std::string& title, const std::string& name) {
+    return Column{title, [=](const Metrics& metrics) {
+                    const auto found = metrics.spread.find(name);
+                    return found == metrics.spread.end() ? "" : fmt::format("{:.2f}", found->second.worst);
+                  }};
+  };
+  static const std::vector<Column> columns = {
+      worst("worst", "psnr_luminance"),
+      mean("exposure fitted dB", &ViewMetrics::psnr_luminance_exposure_fitted, 1, 2),
+      worst("worst", "psnr_luminance_exposure_fitted"),
+      mean("right halves aligned dB", &ViewMetrics::psnr_luminance_aligned, 1, 2),
+      worst("worst", "psnr_luminance_aligned"),
+      mean("fog before cameras %", &ViewMetrics::near_opacity, 100, 2),
+  };
+  return columns;
+}
+
+std::vector<Column> columns_of(const std::vector<ReportedRun>& runs) {
+  std::vector<Column> shown;
+  for (const Column& column : further_columns()) {
+    const auto has_it = [&](const ReportedRun& run) { return run.metrics && !column.text(*run.metrics).empty(); };
+    if (std::ranges::any_of(runs, has_it)) shown.push_back(column);
+  }
+  return shown;
+}
+
+std::string row(const ReportedRun& run, const std::vector<Column>& columns) {
   const Stage1Record& stage1 = run.record.stage1;
   const std::string trained = stage1.finished ? duration_text(stage1.seconds) : "not finished";
-  if (!run.metrics)
-    return fmt::format("| {} | {} | not evaluated | - | - | - | - | - | - |\n", cell(run.name()), trained);
+  std::string further;
+  for (const Column& column : columns) {
+    const std::string text = run.metrics ? column.text(*run.metrics) : "";
+    further += (text.empty() ? "-" : text) + " | ";
+  }
+  if (!run.metrics) {
+    return fmt::format("| {} | {} | not evaluated | - | - | - | {}- | - | - |\n", cell(run.name()), trained, further);
+  }
   const ViewMetrics& mean = run.metrics->mean;
   const std::string take = run.metrics->take.empty() ? "grey" : run.metrics->take;
-  return fmt::format("| {} | {} | {} | {} | {} {} | {} | {} | {} | {} |\n", cell(run.name()), trained, cell(take),
+  return fmt::format("| {} | {} | {} | {} | {} {} | {} | {}{} | {} | {} |\n", cell(run.name()), trained, cell(take),
                      run.colorize_seconds > 0 ? duration_text(run.colorize_seconds) : "-", run.metrics->views.size(),
-                     cell(run.metrics->split), number(mean.psnr_luminance, 2), number(mean.ssim, 3),
+                     cell(run.metrics->split), number(mean.psnr_luminance, 2), further, number(mean.ssim, 3),
                      number(mean.psnr_rgb, 2), number(mean.ab_error, 2));
 }
 
 std::string table_of(const std::vector<ReportedRun>& runs) {
-  std::string table =
-      "| run | stage 1 | take | stage 2 | views | luminance dB | SSIM | RGB dB | ab error |\n"
-      "|---|---|---|---|---|---|---|---|---|\n";
-  for (const ReportedRun& run : runs) table += row(run);
+  const std::vector<Column> columns = columns_of(runs);
+  std::string titles = "| run | stage 1 | take | stage 2 | views | luminance dB | ", rule = "|---|---|---|---|---|---|";
+  for (const Column& column : columns) {
+    titles += column.title + " | ";
+    rule += "---|";
+  }
+  std::string table = titles + "SSIM | RGB dB | ab error |\n" + rule + "---|---|---|\n";
+  for (const ReportedRun& run : runs) table += row(run, columns);
   return table;
 }
 

@@ -1,5 +1,7 @@
 #include "src/prepare/capture_writer.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -148,7 +150,7 @@ cv::Mat drawn(Plan plan, const std::string& title, const std::vector<View>& view
 }  // namespace
 
 Json transforms_json(const std::vector<View>& views, const std::vector<PreparedImage>& images,
-                     const std::optional<SubjectBox>& subject) {
+                     const std::optional<SubjectBox>& subject, bool with_points) {
   std::map<std::string, const PreparedImage*> by_name;
   for (const PreparedImage& image : images) by_name[image.name] = &image;
   const bool one_lens =
@@ -161,6 +163,7 @@ Json transforms_json(const std::vector<View>& views, const std::vector<PreparedI
     out["aabb"] = {{box.min.x, box.min.y, box.min.z}, {box.max.x, box.max.y, box.max.z}};
     if (subject->forward_facing) out["depth_range"] = {subject->near, subject->far};
   }
+  if (with_points) out["sparse_points"] = kPointsFile;
   out["frames"] = Json::array();
   for (const View& view : views) {
     Json frame = {{"file_path", "images/" + view.name}};
@@ -175,6 +178,18 @@ Json transforms_json(const std::vector<View>& views, const std::vector<PreparedI
     out["frames"].push_back(std::move(frame));
   }
   return out;
+}
+
+std::string points_text(const std::vector<SparsePoint>& points) {
+  std::string text = "# number, x y z, colour, error in pixels, then for each view that shows it its frame and a 0\n";
+  std::size_t number = 0;
+  for (const SparsePoint& point : points) {
+    const Vec3d& at = point.position;
+    text += fmt::format("{} {:.9g} {:.9g} {:.9g} 128 128 128 {:.4g}", ++number, at.x, at.y, at.z, point.error);
+    for (const std::uint32_t view : point.views) text += fmt::format(" {} 0", view);
+    text += '\n';
+  }
+  return text;
 }
 
 void write_contact_sheet(const fs::path& file, const fs::path& capture, const std::vector<View>& views,

@@ -35,8 +35,8 @@ struct Material {
 
 /// The poses, in whatever frame they came.
 struct Poses {
-  std::vector<View> views;  ///< named as the images; no pixels
-  std::vector<Vec3d> points;
+  std::vector<View> views;          ///< named as the images; no pixels
+  std::vector<SparsePoint> points;  ///< `views` are places in these
   std::optional<PoseRecovery> recovery;
   fs::path model;
 };
@@ -87,7 +87,7 @@ Poses poses_of_model(const fs::path& model, const fs::path& capture, const std::
   Poses out;
   out.model = model;
   CaptureListing listing = read_colmap(capture, model);
-  out.points = positions_of(listing.points);
+  std::vector<ListedView> taken;
   for (const ListedView& listed : listing.views) {
     const auto found = by_name.find(fs::path(listed.name).stem().string());
     if (found == by_name.end()) continue;
@@ -102,8 +102,13 @@ Poses poses_of_model(const fs::path& model, const fs::path& capture, const std::
                                    found->second->height, view.intrinsics.width, view.intrinsics.height));
     }
     out.views.push_back(std::move(view));
+    taken.push_back(listed);
+    taken.back().name = out.views.back().name;
   }
   std::ranges::sort(out.views, {}, &View::name);
+  std::ranges::sort(taken, {}, &ListedView::name);
+  listing.views = std::move(taken);
+  out.points = points_by_place(listing);
   return out;
 }
 
@@ -187,7 +192,7 @@ Poses find_poses(const Material& material, const fs::path& capture, const fs::pa
 
 /// The subject's box as it is found, or as it is given.
 std::optional<SubjectBox> subject_of(const Poses& poses, const FrameOptions& options) {
-  auto subject = find_subject(poses.views, poses.points);
+  auto subject = find_subject(poses.views, positions_of(poses.points));
   if (options.box.empty()) return subject;
   if (!subject) subject.emplace();
   subject->box = parse_box(options.box);
@@ -301,9 +306,9 @@ PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, c
                               const ProgressSink& progress, const Say& say) {
   Material material = read_material(source, capture, options, progress, say);
   Poses poses = find_poses(material, capture, capture / "work", options, progress, say);
-  const FrameChoice frame = choose_frame(poses.views, poses.points, options.frame);
+  const FrameChoice frame = choose_frame(poses.views, positions_of(poses.points), options.frame);
   for (View& view : poses.views) view.world_from_camera = frame.capture_from_poses.pose(view.world_from_camera);
-  for (Vec3d& point : poses.points) point = frame.capture_from_poses.point(point);
+  for (SparsePoint& point : poses.points) point.position = frame.capture_from_poses.point(point.position);
   const auto subject = subject_of(poses, options.frame);
   say(fmt::format("frame: Z is up by {}, {}", frame.up_by,
                   frame.metres ? "in metres" : "no known unit (--measure gives metres)"));
@@ -313,9 +318,12 @@ PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, c
                       *spread >= kNotedExposure ? ", evened out when the capture is read" : ""));
     }
   }
-  write_contact_sheet(capture / "contact_sheet.png", capture, poses.views, poses.points, subject);
+  write_contact_sheet(capture / "contact_sheet.png", capture, poses.views, positions_of(poses.points), subject);
   write_file(capture / "prepare.json", record_of(source, options, material, poses, frame, subject).dump(1) + "\n");
-  write_file(capture / "transforms.json", transforms_json(poses.views, material.set.images, subject).dump(1) + "\n");
+  const bool with_points = !poses.points.empty();
+  if (with_points) write_file(capture / kPointsFile, points_text(poses.points));
+  write_file(capture / "transforms.json",
+             transforms_json(poses.views, material.set.images, subject, with_points).dump(1) + "\n");
   return {material.set.images.size(), poses.views.size()};
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// From photographs or a film clip to a capture: images, transforms.json, prepare.json, a contact sheet.
+/// From photographs or a film clip to a capture: images, transforms.json, points, prepare.json, a contact sheet.
 
 #include <filesystem>
 #include <functional>

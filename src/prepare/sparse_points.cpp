@@ -258,27 +258,33 @@ class Triangulator {
   std::vector<Start> starts_;
 };
 
+/// Tasks of about a second, between which the observer is asked: it hears from one thread alone.
+template <typename Task>
+void in_parts(std::size_t tasks, const std::string& name, std::pair<double, double> share, Observer& observer,
+              const Task& task) {
+  const std::size_t part = 8 * std::size_t(thread_count());
+  for (std::size_t begin = 0; begin < tasks; begin += part) {
+    if (observer.is_cancelled()) throw Interrupted("stopped while looking for sparse points");
+    const double done = double(begin) / double(tasks);
+    observer.report_progress({name, share.first + done * (share.second - share.first), {}});
+    parallel_tasks(std::min(part, tasks - begin), [&](std::size_t i) { task(begin + i); });
+  }
+  if (observer.is_cancelled()) throw Interrupted("stopped while looking for sparse points");
+}
+
 }  // namespace
 
-std::vector<SparsePoint> find_sparse_points(const Capture& capture, const ProgressSink& progress) {
-  const auto end_if_interrupted = [] {
-    if (interruption_requested()) throw Interrupted("stopped while looking for sparse points");
-  };
-  if (progress) progress({"features", 0, {}});
+std::vector<SparsePoint> find_sparse_points(const Capture& capture, Observer& observer) {
   std::vector<ViewFeatures> features(capture.views.size());
-  parallel_tasks(features.size(), [&](std::size_t i) {
-    if (!capture.views[i].held_out && !interruption_requested()) features[i] = features_of(capture.views[i]);
+  in_parts(features.size(), "features", {0, 0.5}, observer, [&](std::size_t i) {
+    if (!capture.views[i].held_out) features[i] = features_of(capture.views[i]);
   });
-  end_if_interrupted();
-  if (progress) progress({"matches", 0.5, {}});
   const auto pairs = pairs_of(capture);
   std::vector<std::vector<Match>> matches(pairs.size());
-  parallel_tasks(pairs.size(), [&](std::size_t k) {
+  in_parts(pairs.size(), "matches", {0.5, 1}, observer, [&](std::size_t k) {
     const auto [a, b] = pairs[k];
-    if (interruption_requested()) return;
     matches[k] = match(features[a], features[b], centre_of(capture.views[b]) - centre_of(capture.views[a]));
   });
-  end_if_interrupted();
   Triangulator triangulator(capture, features);
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const auto [a, b] = pairs[k];
@@ -291,10 +297,12 @@ std::vector<SparsePoint> find_sparse_points(const Capture& capture, const Progre
 
 std::vector<SparsePoint> points_for_training(const Stage1Job& job, Observer& observer) {
   const Capture& capture = job.capture;
-  const bool is_bounded = capture.is_bounded_object || capture.depth_range;
-  if (!job.options.free_space || job.goes_on() || is_bounded || !capture.points.empty()) return {};
+  const bool asks_for_points = job.options.free_space || job.options.depth_weight > 0;
+  const bool has_points =
+      std::ranges::any_of(capture.points, [](const SparsePoint& point) { return point.views.size() >= kFewestViews; });
+  if (!asks_for_points || capture.is_bounded_object || has_points) return {};
   const Stopwatch watch;
-  std::vector<SparsePoint> points = find_sparse_points(capture, observer.progress_sink());
+  std::vector<SparsePoint> points = find_sparse_points(capture, observer);
   observer.say(fmt::format("{} sparse points found in {}", points.size(), duration_text(watch.seconds())));
   return points;
 }

@@ -5,19 +5,18 @@
 #include <vector>
 
 #include "src/base/observer.h"
-#include "src/base/progress.h"
 #include "src/capture/capture.h"
 #include "src/train/luminance/stage1.h"
 
 namespace cnerf::prepare {
 
-/// Held-out views are not looked at. The same capture gives the same points.
+/// Held-out views are not looked at. The same capture gives the same points. The observer is told how far it is.
 /// @return  points that at least three views show, from directions that differ
-/// @throws Interrupted
-[[nodiscard]] std::vector<SparsePoint> find_sparse_points(const Capture& capture, const ProgressSink& progress = {});
+/// @throws Interrupted  when the observer cancels; after a few views or pairs at most
+[[nodiscard]] std::vector<SparsePoint> find_sparse_points(const Capture& capture, Observer& observer);
 
-/// What a stage 1 that begins is to know besides the capture: points, if the job wants free space known and the capture
-/// has no points of its own, and neither outlines nor a depth range bound its space. Says how many were found.
+/// What a stage 1 is to know besides the capture: points, if the job asks for free space or depths, the capture has
+/// none of its own whose views it knows, and outlines do not bound its space. Says how many were found.
 [[nodiscard]] std::vector<SparsePoint> points_for_training(const Stage1Job& job, Observer& observer);
 
 }  // namespace cnerf::prepare

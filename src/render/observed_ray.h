@@ -10,6 +10,7 @@
 #include "src/base/host_device.h"
 #include "src/base/rng.h"
 #include "src/color/colorspace_math.h"
+#include "src/render/gain_field.h"
 #include "src/render/training_views.h"
 #include "src/render/view_correction.h"
 
@@ -22,6 +23,7 @@ struct RayTarget {
   float background = 0;  ///< linear Y put behind ray and pixel alike
   float sky = 0;         ///< linear Y behind the ray that the pixel shows, as its view has it
   float gain = 1;        ///< of the view: its light over that of the scene
+  DepthHint depth;
 
   /// What is to be seen with the background behind it; linear Y.
   [[nodiscard]] CNERF_HD float wanted() const { return luminance + (1.0f - coverage) * background; }
@@ -30,8 +32,9 @@ struct RayTarget {
 struct ObservedRay {
   Ray ray;
   RayTarget target;
-  float jitter = 0;        ///< in [0, 1): of the samples along the ray
-  std::uint32_t view = 0;  ///< that shows it
+  float jitter = 0;         ///< in [0, 1): of the samples along the ray
+  std::uint32_t view = 0;   ///< that shows it
+  PicturePlace place = {};  ///< of its pixel
 };
 
 struct ImageSize {
@@ -53,8 +56,8 @@ CNERF_HD PickedPixel pick_pixel(const Views& views, const CounterRng& rng, std::
   return {v, int(rng.below(at + 1, std::uint32_t(image.width))), int(rng.below(at + 2, std::uint32_t(image.height)))};
 }
 
-/// @tparam Views  count(), and of view v: size_of(v), camera(v), correction(v), sky(v); of its pixel i = y * width + x:
-///                is_valid(v, i), luminance(v, i), coverage(v, i), sky_label(v, i)
+/// @tparam Views  count(), and of view v: size_of(v), camera(v), correction(v), sky(v), light(v), depth(v, x, y);
+///                of its pixel i = y * width + x: is_valid(v, i), luminance(v, i), coverage(v, i), sky_label(v, i)
 template <typename Views>
 [[nodiscard]] CNERF_HD ObservedRay observe_ray(const Views& views, std::uint64_t seed, std::uint64_t step,
                                                std::uint64_t ray) {
@@ -74,9 +77,15 @@ template <typename Views>
   const ViewCorrection correction = views.correction(picked.view);
   observed.view = picked.view;
   observed.ray = correction.applied_to(views.camera(picked.view).ray({picked.x + 0.5, picked.y + 0.5}));
+  const ImageSize size = views.size_of(picked.view);
+  observed.place = {(float(picked.x) + 0.5f) / float(size.width), (float(picked.y) + 0.5f) / float(size.height)};
   observed.target.gain = correction.gain();
+  if (const GainField* light = views.light(picked.view); light != nullptr) {
+    observed.target.gain *= std::exp(GainCorners(observed.place).log_gain_of(*light));
+  }
   observed.target.luminance = views.luminance(picked.view, pixel);
   observed.target.coverage = views.coverage(picked.view, pixel);
+  observed.target.depth = views.depth(picked.view, picked.x, picked.y);
   observed.jitter = rng.uniform(2 * ray);
   // Another background each time: what is transparent has to become empty and what is opaque solid. Over black, a dark
   // thing could as well be a hole, and thin fog everywhere explains a dim picture.
@@ -88,6 +97,7 @@ template <typename Views>
   if (label == SkyLabel::kSky && random < 0.5f) {
     observed.target.background = luminance_from_lightness(200.0f * random);
     observed.target.luminance = observed.target.coverage = 0;
+    observed.target.depth = {};
   } else if (label != SkyLabel::kScene) {
     observed.target.background = 0;
     observed.target.sky = observed.target.gain * views.sky(picked.view).along(observed.ray.direction);
@@ -95,8 +105,9 @@ template <typename Views>
   return observed;
 }
 
-/// @param corrections  of the views; empty: none
+/// @param corrections, light  of the views; empty: none
 [[nodiscard]] ObservedRay observe_ray(const std::vector<TrainingView>& views, std::uint64_t seed, std::uint64_t step,
-                                      std::uint64_t ray, std::span<const ViewCorrection> corrections = {});
+                                      std::uint64_t ray, std::span<const ViewCorrection> corrections = {},
+                                      std::span<const GainField> light = {});
 
 }  // namespace cnerf

@@ -9,6 +9,7 @@
 #include "src/capture/capture.h"
 #include "src/capture/mono_image.h"
 #include "src/field/scene_frame.h"
+#include "src/render/depth_math.h"
 #include "src/render/direction_map.h"
 #include "src/render/ray.h"
 
@@ -52,6 +53,7 @@ struct TrainingView {
   // Where a sky is seen; both null elsewhere.
   const std::vector<SkyLabel>* sky_labels = nullptr;  ///< [H, W]
   const DirectionMap* sky = nullptr;                  ///< its linear Y, at the median view's exposure
+  const DepthHints* depths = nullptr;                 ///< null: nothing is known
 };
 
 /// The lenses of the views that are not held out, each once.

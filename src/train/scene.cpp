@@ -12,8 +12,7 @@ namespace cnerf {
 
 namespace {
 
-constexpr std::size_t kGrain = 256;     // rays of a parallel piece of work
-constexpr float kShadedShare = 0.995f;  // what the rest could change is below a grey level of an 8-bit picture
+constexpr std::size_t kGrain = 256;  // rays of a parallel piece of work
 
 /// Colours of the pixels from `first` on, at their luminance, to an image of three interleaved channels.
 void put_colors(const std::vector<Ab>& colors, const std::vector<float>& luminance, std::size_t first,
@@ -78,6 +77,10 @@ class TrainedScene final : public Scene {
     });
     return picture;
   }
+  [[nodiscard]] std::optional<SeenScene> seen(const RenderOptions& options) const override {
+    return SeenScene{*luminance_.engine, luminance_.march(options.steps_per_box),
+                     options.sky ? luminance_.sky_light() : DirectionView{}};
+  }
   [[nodiscard]] std::string colorizer() const override { return color_ ? color_->colorizer : ""; }
 
   [[nodiscard]] RenderedImage render(const Intrinsics& intrinsics, const Affined& world_from_camera,
@@ -116,8 +119,8 @@ class TrainedScene final : public Scene {
     parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t r = begin; r < end; ++r) rays[r] = camera.ray_of_pixel(first + r);
     });
-    const auto traced = luminance_.engine->trace_pixels(rays, luminance_.march(options.steps_per_box),
-                                                        {float(options.min_transmittance), kShadedShare});
+    const auto traced =
+        luminance_.engine->trace_pixels(rays, luminance_.march(options.steps_per_box), options.effort());
     const std::optional<PixelSamples> pixels = relit(*traced, options);
     const std::vector<float> light = pixels ? pixel_luminance(*pixels) : std::vector<float>();
     const Vec3f axis = camera.unit_from_camera.column(2).cast<float>();

@@ -15,6 +15,7 @@
 #include "src/field/color_field.h"
 #include "src/field/finish.h"
 #include "src/picture/sky_picture.h"
+#include "src/train/luminance/seen_scene.h"
 
 namespace cnerf {
 
@@ -36,6 +37,9 @@ struct RenderOptions {
   bool sky = true;                  ///< is behind what is seen, where there is one; else black
   /// Linear Y of samples at positions in unit space, in place of the field's own, which depends on the view.
   std::function<void(std::span<const Vec3f> positions, std::span<float> luminance)> luminance = {};
+
+  /// What samples are left out could change less than a grey level of an 8-bit picture.
+  [[nodiscard]] RenderEffort effort() const { return {float(min_transmittance), 0.995f}; }
 };
 
 class Scene : public ColorField {
@@ -51,6 +55,9 @@ class Scene : public ColorField {
 
   [[nodiscard]] virtual bool is_colorized() const = 0;
   [[nodiscard]] virtual std::optional<SkyPicture> sky() const { return {}; }  ///< where views see one
+  /// What its rays see before colours and finish, for whoever fits cameras to it. None where no trained field is
+  /// behind.
+  [[nodiscard]] virtual std::optional<SeenScene> seen(const RenderOptions& /*options*/) const { return {}; }
   [[nodiscard]] virtual std::string colorizer() const = 0;  ///< name of the colorizer; empty when not colorized
   [[nodiscard]] virtual RenderedImage render(const Intrinsics& intrinsics, const Affined& world_from_camera,
                                              const RenderOptions& options = {}) const = 0;

@@ -7,8 +7,8 @@
 //
 // `gain`, `degrees`, `shift` and `focal` make the capture worse first (Disturbance); `aligned=1` fits the poses of
 // held-out views. With `points=1` sparse points are triangulated first. With `validation=N` every N-th of the views to
-// be trained on is judged instead of the held-out ones. Options are stage 1's by their short names, e.g.
-// grid.log2_rows=16 steps_per_box=512 samples_per_step=65536.
+// be trained on is judged instead of the held-out ones; `few=N` trains on every N-th view alone. Options are stage 1's
+// by their short names, e.g. grid.log2_rows=16 steps_per_box=512 samples_per_step=65536.
 
 #include <algorithm>
 #include <chrono>
@@ -22,6 +22,7 @@
 
 #include "src/capture/load_capture.h"
 #include "src/prepare/sparse_points.h"
+#include "src/train/luminance/depth_hints.h"
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/options_json.h"
 #include "tests/support/disturbed_capture.h"
@@ -82,7 +83,8 @@ double held_out_psnr(const cnerf::Capture& capture, const cnerf::LuminanceModel&
 /// Triangulates sparse points, in place of those of the file.
 void print_points(cnerf::Capture& capture) {
   const Clock::time_point start = Clock::now();
-  capture.points = cnerf::prepare::find_sparse_points(capture);
+  cnerf::Observer silent;
+  capture.points = cnerf::prepare::find_sparse_points(capture, silent);
   std::size_t of_three = 0, sightings = 0;
   double error = 0;
   for (const cnerf::SparsePoint& point : capture.points) {
@@ -105,7 +107,7 @@ int main(int argc, char** argv) {
   std::map<std::string, double> own = {{"downscale", 1}, {"holdout", 8}, {"seconds", 60}, {"eval_every", 1},
                                        {"verbose", 0},   {"points", 0},  {"first", 0.25}, {"validation", 0},
                                        {"gain", 0},      {"degrees", 0}, {"shift", 0},    {"aligned", 0},
-                                       {"focal", 0}};
+                                       {"focal", 0},     {"few", 0}};
   std::string pictures;       // a folder for what is seen of the held-out views
   std::vector<double> marks;  // of the training's length: million samples if given, else seconds
   nlohmann::json json = cnerf::options_to_json(cnerf::Stage1Options{});
@@ -135,11 +137,14 @@ int main(int argc, char** argv) {
   capture_options.holdout = int(own["holdout"]);
   cnerf::Capture capture = cnerf::load_capture(argv[1], capture_options);
   if (own["validation"] > 0) cnerf::test::hold_out_of_training(capture, int(own["validation"]));
+  if (own["few"] > 0) cnerf::test::train_on_few(capture, int(own["few"]));
   if (own["points"] > 0) print_points(capture);
   const std::vector<cnerf::Affined> truth = cnerf::test::training_poses(capture);
   cnerf::test::disturb(capture, {own["gain"], own["degrees"], own["shift"], own["focal"]});
   cnerf::LuminanceModel model = cnerf::LuminanceModel::create(capture, options, cnerf::cpu_engines());
-  const auto views = cnerf::training_views(capture, model.frame);
+  auto views = cnerf::training_views(capture, model.frame);
+  const std::vector<cnerf::DepthHints> depths = cnerf::depth_hints(capture, model.frame, capture.points);
+  for (std::size_t v = 0; v < depths.size(); ++v) views[v].depths = &depths[v];
   model.engine->set_views(views);
   std::printf("%zu training views of %dx%d, %d cascades, side %.3f world units\n", views.size(), views[0].image->width,
               views[0].image->height, model.frame.cascades, 1 / model.frame.unit_per_world);

@@ -50,6 +50,22 @@ TEST_F(Colmap, TextSaysTheSame) {
   EXPECT_EQ(text.views[3].intrinsics, binary.views[3].intrinsics);
 }
 
+TEST_F(Colmap, RigsAndFramesOfNewerVersionsChangeNothing) {
+  test::write_colmap_binary(folder_ / "sparse/0");
+  const Capture before = load_capture(folder_.path());
+  test::write_colmap_rigs_binary(folder_ / "sparse/0");
+  const Capture binary = load_capture(folder_.path());
+  expect_ring(binary, 4);
+  EXPECT_EQ(binary.points, before.points);
+  std::filesystem::remove_all(folder_ / "sparse");
+  test::write_colmap_text(folder_ / "sparse/0");
+  test::write_colmap_rigs_text(folder_ / "sparse/0");
+  const Capture text = load_capture(folder_.path());
+  expect_ring(text, 4);
+  EXPECT_EQ(text.points, before.points);
+  EXPECT_EQ(load_capture(folder_ / "sparse/0/rigs.txt").views.size(), 4u) << "each of its files names the model";
+}
+
 TEST_F(Colmap, PointsForgetAViewWhoseImageIsMissing) {
   test::write_colmap_binary(folder_ / "sparse/0");
   std::filesystem::remove(folder_ / "images/0.png");  // the only view of the points

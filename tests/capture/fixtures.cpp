@@ -187,6 +187,35 @@ void write_colmap_text(const fs::path& model_folder, const ColmapModel& model) {
   write_file(model_folder / "points3D.txt", "# Points\n1 0.5 -1 2 9 9 9 0.7 1 0\n2 1.5 -1 2 9 9 9 0.7 1 0\n");
 }
 
+void write_colmap_rigs_binary(const fs::path& model_folder, const ColmapModel& model) {
+  constexpr std::int32_t kCamera = 0;  // a kind of sensor
+  Bytes rigs;
+  rigs.add(std::uint64_t(1)).add(std::uint32_t(1)).add(std::uint32_t(1)).add(kCamera).add(std::uint32_t(3));
+  write_file(model_folder / "rigs.bin", rigs.text());
+  Bytes frames;
+  frames.add(std::uint64_t(model.images));
+  for (int i = 0; i < model.images; ++i) {
+    const auto [q, t] = colmap_pose(i, model.images);
+    frames.add(std::uint32_t(i + 1)).add(std::uint32_t(1));
+    frames.add(q.w).add(q.x).add(q.y).add(q.z).add(t.x).add(t.y).add(t.z);
+    frames.add(std::uint32_t(1)).add(kCamera).add(std::uint32_t(3)).add(std::uint64_t(i + 1));
+  }
+  write_file(model_folder / "frames.bin", frames.text());
+}
+
+void write_colmap_rigs_text(const fs::path& model_folder, const ColmapModel& model) {
+  write_file(model_folder / "rigs.txt", "# Rig calib list\n1 1 CAMERA 3\n");
+  std::ostringstream frames;
+  frames.precision(17);
+  frames << "# Frame list\n";
+  for (int i = 0; i < model.images; ++i) {
+    const auto [q, t] = colmap_pose(i, model.images);
+    frames << i + 1 << " 1 " << q.w << ' ' << q.x << ' ' << q.y << ' ' << q.z << ' ' << t.x << ' ' << t.y << ' ' << t.z
+           << " 1 CAMERA 3 " << i + 1 << '\n';
+  }
+  write_file(model_folder / "frames.txt", frames.str());
+}
+
 std::string text_of(const std::vector<double>& numbers) {
   std::ostringstream text;
   text.precision(17);

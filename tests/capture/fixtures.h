@@ -51,6 +51,9 @@ struct ColmapModel {
 };
 void write_colmap_binary(const std::filesystem::path& model_folder, const ColmapModel& model = {});
 void write_colmap_text(const std::filesystem::path& model_folder, const ColmapModel& model = {});
+/// What COLMAP 3.12 and later put beside a model: a rig of its one camera, and a frame per image.
+void write_colmap_rigs_binary(const std::filesystem::path& model_folder, const ColmapModel& model = {});
+void write_colmap_rigs_text(const std::filesystem::path& model_folder, const ColmapModel& model = {});
 /// The images 0.png, 1.png, … that both models name.
 void write_colmap_images(const std::filesystem::path& image_folder, int images = 4);
 

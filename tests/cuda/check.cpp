@@ -16,6 +16,8 @@ LuminanceEngineOptions engine_options(const Arguments& arguments, int cascades) 
   options.occupancy.decay = float(arguments.number("decay", options.occupancy.decay));
   options.occupancy.optical_thickness = float(arguments.number("thickness", options.occupancy.optical_thickness));
   options.distortion_weight = float(arguments.number("distortion", options.distortion_weight));
+  options.depth.weight = float(arguments.number("depth", 0));
+  options.depth.half_life = float(arguments.number("depth_half", options.depth.half_life));
   options.seed = std::uint64_t(arguments.number("seed", 1));
   return options;
 }

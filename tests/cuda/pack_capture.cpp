@@ -40,7 +40,8 @@ int main(int argc, char** argv) {
   cnerf::Stage1Options stage1;
   stage1.free_space = points > 0;
   if (points > 0 && packed.capture.points.empty()) {
-    packed.capture.points = cnerf::prepare::find_sparse_points(packed.capture);
+    cnerf::Observer silent;
+    packed.capture.points = cnerf::prepare::find_sparse_points(packed.capture, silent);
   }
   const auto model = cnerf::LuminanceModel::create(packed.capture, stage1, cnerf::cpu_engines());
   packed.frame = model.frame;

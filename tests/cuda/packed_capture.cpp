@@ -9,7 +9,7 @@ namespace cnerf::test {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::uint32_t kMagic = 0x31504e43;  // CNP1
+constexpr std::uint32_t kMagic = 0x32504e43;  // CNP2
 
 template <typename T>
 void put(std::ofstream& file, const T& value) {
@@ -46,6 +46,13 @@ void write_packed(const PackedCapture& packed, const fs::path& folder) {
   put(file, packed.occupancy_resolution);
   put(file, std::uint64_t(packed.excluded.size()));
   file.write(reinterpret_cast<const char*>(packed.excluded.data()), long(packed.excluded.size()));
+  put(file, std::uint64_t(packed.capture.points.size()));
+  for (const SparsePoint& point : packed.capture.points) {
+    put(file, point.position);
+    put(file, point.error);
+    put(file, std::uint32_t(point.views.size()));
+    for (const std::uint32_t view : point.views) put(file, view);
+  }
   put(file, std::uint32_t(packed.capture.views.size()));
   for (std::size_t v = 0; v < packed.capture.views.size(); ++v) {
     const View& view = packed.capture.views[v];
@@ -74,6 +81,18 @@ PackedCapture read_packed(const fs::path& folder) {
   get(file, cells);
   packed.excluded.resize(cells);
   file.read(reinterpret_cast<char*>(packed.excluded.data()), long(cells));
+  std::uint64_t points = 0;
+  get(file, points);
+  for (std::uint64_t p = 0; p < points && file; ++p) {
+    SparsePoint point;
+    std::uint32_t shown = 0;
+    get(file, point.position);
+    get(file, point.error);
+    get(file, shown);
+    point.views.resize(shown);
+    for (std::uint32_t& view : point.views) get(file, view);
+    packed.capture.points.push_back(std::move(point));
+  }
   get(file, views);
   for (std::size_t v = 0; v < views; ++v) {
     View view;

@@ -1,6 +1,7 @@
 #pragma once
 /// A capture ready to be trained on, as plain files: what a machine with a GPU but without image codecs can read.
-/// `scene.bin` holds cameras, placement and excluded space; pixels lie beside it, one raw 8-bit file a view
+/// `scene.bin` holds cameras, placement, excluded space and sparse points; pixels lie beside it, one raw 8-bit file a
+/// view
 /// (`0001.grey`, and `0001.alpha` where there is alpha).
 
 #include <filesystem>

@@ -5,6 +5,7 @@
 
 #include "src/base/cuda/device_memory.h"
 
+#include "src/train/luminance/depth_hints.h"
 #include "tests/cuda/check.h"
 #include "tests/cuda/packed_capture.h"
 #include "tests/support/disturbed_capture.h"
@@ -59,12 +60,14 @@ int lenses_among(const std::vector<TrainingView>& views) {
 
 void set_learning(LuminanceEngineOptions& options, const Arguments& arguments, const std::vector<TrainingView>& views) {
   const bool exposures = arguments.number("exposures", 0) > 0, poses = arguments.number("poses", 0) > 0;
-  const bool lenses = arguments.number("lenses", 0) > 0;
-  if (!exposures && !poses && !lenses) return;
-  options.learning = {int(views.size()), lenses ? lenses_among(views) : 0, exposures, poses};
+  const bool lenses = arguments.number("lenses", 0) > 0, light = arguments.number("light", 0) > 0;
+  if (!exposures && !poses && !lenses && !light) return;
+  options.learning = {int(views.size()), lenses ? lenses_among(views) : 0, exposures, poses, light};
   ViewLearning& learning = options.learning;
   learning.gain_rate = float(arguments.number("gain_rate", learning.gain_rate));
   learning.lens_rate = float(arguments.number("lens_rate", learning.lens_rate));
+  learning.light_rate = float(arguments.number("light_rate", learning.light_rate));
+  learning.light_decay = float(arguments.number("light_decay", learning.light_decay));
   learning.pose_rate = float(arguments.number("pose_rate", learning.pose_rate));
   learning.pose_warm_up = int(arguments.number("pose_warm_up", learning.pose_warm_up));
   learning.finest_pose_cells = int(arguments.number("pose_cells", learning.finest_pose_cells));
@@ -78,13 +81,16 @@ int train(const Arguments& arguments) {
   const std::vector<Affined> truth = training_poses(packed.capture);
   disturb(packed.capture, {arguments.number("gain", 0), arguments.number("degrees", 0), arguments.number("shift", 0),
                            arguments.number("focal", 0)});
-  const std::vector<TrainingView> views = training_views(packed.capture, packed.frame);
+  std::vector<TrainingView> views = training_views(packed.capture, packed.frame);
+  const std::vector<DepthHints> depths = depth_hints(packed.capture, packed.frame, packed.capture.points);
+  for (std::size_t v = 0; v < depths.size(); ++v) views[v].depths = &depths[v];
   const double seconds = arguments.number("seconds", 10), rate = arguments.number("rate", 1e-2);
   const double final_rate = arguments.number("final_rate", 5e-4), hold = arguments.number("hold", 0.5);
   std::vector<double> report_at;
   for (const double t : {1.0, 2.0, 5.0, 10.0, 30.0}) {
     if (t <= seconds) report_at.push_back(t);
   }
+  if (arguments.number("marks", 1) == 0) report_at = {seconds};
   for (int seed = 1; seed <= int(arguments.number("seeds", 1)); ++seed) {
     LuminanceEngineOptions options = engine_options(arguments, packed.frame.cascades);
     options.seed = std::uint64_t(seed);

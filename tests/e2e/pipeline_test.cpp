@@ -70,7 +70,15 @@ TEST(Pipeline, StepsOneByOneWithoutColour) {
   const TempDir folder;
   const std::string out = copied(tiny_run(), folder / "run").string();
   EXPECT_EQ(cnerf({"eval", out}).exit_code, 0);
-  EXPECT_FALSE(json_of(folder / "run/metrics.json").at("mean").contains("psnr_rgb"));
+  const nlohmann::json plain = json_of(folder / "run/metrics.json");
+  EXPECT_FALSE(plain.at("mean").contains("psnr_rgb"));
+  EXPECT_FALSE(plain.at("mean").contains("psnr_luminance_aligned"));
+  EXPECT_TRUE(plain.at("mean").contains("near_opacity"));
+  EXPECT_LE(plain.at("spread").at("psnr_luminance").at("worst"), plain.at("mean").at("psnr_luminance"));
+  EXPECT_EQ(cnerf({"eval", out, "--aligned"}).exit_code, 0);
+  const nlohmann::json aligned = json_of(folder / "run/metrics.json");
+  for (const nlohmann::json& view : aligned.at("views")) EXPECT_TRUE(view.contains("psnr_luminance_aligned"));
+  EXPECT_EQ(aligned.at("mean").at("psnr_luminance"), plain.at("mean").at("psnr_luminance"));
   EXPECT_EQ(cnerf({"bake", out}).exit_code, 0);
   EXPECT_EQ(cnerf({"bake", out}).exit_code, 64) << "a bake is not overwritten";
   EXPECT_EQ(cnerf({"bake", out, "--overwrite", "--houdini"}).exit_code, 0);

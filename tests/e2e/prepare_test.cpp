@@ -63,7 +63,7 @@ UserFolder without_poses(const fs::path& folder) {
           << ' ' << lens.cy << '\n';
   write_file(out.model / "cameras.txt", cameras.str());
   write_file(out.model / "images.txt", images.str());
-  write_file(out.model / "points3D.txt", std::string_view("1 0 0 0 9 9 9 0.1\n2 0.1 0 0.2 9 9 9 0.1\n"));
+  write_file(out.model / "points3D.txt", std::string_view("1 0 0 0 9 9 9 0.1 1 0 3 7\n2 0.1 0 0.2 9 9 9 0.1\n"));
   return out;
 }
 
@@ -88,6 +88,17 @@ TEST(Prepare, TakesAReadyModelAndSetsItUpright) {
   for (const double error : comparison.centre_errors) EXPECT_LT(error, 1e-9);
   // The sample's cameras are level about Z, so Z stays up.
   EXPECT_LT(length(comparison.truth_from_poses.rotation * Vec3d{0, 0, 1} - Vec3d{0, 0, 1}), 1e-6);
+
+  ASSERT_EQ(prepared.points.size(), 2u) << "the model's points are kept";
+  EXPECT_EQ(prepared.points[0].views, (std::vector<std::uint32_t>{0, 2}));
+  EXPECT_DOUBLE_EQ(prepared.points[0].error, 0.1);
+  const auto pixel_in = [](const View& view, Vec3d point) {
+    return project(view.intrinsics, view.world_from_camera.inverse().point(point)).value();
+  };
+  const PixelPosition there = pixel_in(prepared.views[2], prepared.points[1].position);
+  const PixelPosition here = pixel_in(given.views[2], {0.1, 0, 0.2});
+  EXPECT_NEAR(there.x, here.x, 1e-4) << "in the frame of the prepared poses";
+  EXPECT_NEAR(there.y, here.y, 1e-4);
 
   const auto record = nlohmann::json::parse(read_text_file(out / "prepare.json"));
   EXPECT_EQ(record.at("poses").at("placed"), given.views.size());

@@ -39,7 +39,10 @@ TEST(Sky, IsTrainedColouredAndBaked) {
   const TempDir folder;
   const fs::path run = folder / "run";
   ASSERT_EQ(cnerf(training(run)).exit_code, 0);
-  EXPECT_THAT(cnerf({"info", run.string()}).out, HasSubstr("sky:"));
+  EXPECT_THAT(
+      cnerf({"info", run.string()}).out,
+      testing::AllOf(HasSubstr("sky:"), testing::ContainsRegex("sky seen: +[0-9]+ % of the pixels, in [0-9]+ views"),
+                     HasSubstr("exposure curve:")));
   const ProgramResult colored = cnerf(
       {"colorize", run.string(), "--take", "warm", "--colorizer", "reference:" + (outdoors() / "references").string()});
   ASSERT_EQ(colored.exit_code, 0) << colored.err;

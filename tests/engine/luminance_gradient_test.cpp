@@ -46,6 +46,7 @@ class LossInDouble {
         luminance_(luminance_net_layout()),
         max_luminance_(options.max_luminance),
         distortion_weight_(options.distortion_weight),
+        depth_weight_(options.depth.weight_at(engine.step_count())),
         learning_(options.learning),
         views_(views) {
     for (std::size_t r = 0; r < n_rays; ++r) {
@@ -56,8 +57,8 @@ class LossInDouble {
     }
   }
 
-  /// @param parameters  table, both nets' weights, then where they are learned: each view's gain, turn and shift, and
-  ///                    the lens's numbers
+  /// @param parameters  table, both nets' weights, then where they are learned: each view's gain, turn and shift, the
+  ///                    nodes of each view's light, and the lens's numbers
   double operator()(const std::vector<double>& parameters) const {
     const std::size_t table_size = std::size_t(total_rows(levels_)) * 4;
     const std::vector<double> table(parameters.begin(), parameters.begin() + long(table_size));
@@ -74,6 +75,8 @@ class LossInDouble {
     for (std::size_t r = 0; r < rays_.size(); ++r) {
       Compositor<double> seen;
       Distortion<double> distortion;
+      double depth = 0;
+      const DepthHint& hint = rays_[r].target.depth;
       const Correction correction = correction_of(parameters, first_view, r);
       for (const RaySample& sample : samples_[r]) {
         const Vec3d p = correction.applied_to(rays_[r].ray, double(sample.t));
@@ -86,7 +89,9 @@ class LossInDouble {
         const double weight =
             seen.add(alpha_of(sigma, double(sample.dt)), activation.value(luminance_net.forward(features).back()[0]));
         distortion.add(weight, {double(sample.t), double(sample.dt)});
+        if (hint.is_known()) depth += weight * depth_miss(double(sample.t), hint);
       }
+      if (hint.is_known()) depth += seen.transmittance;
       const double background = rays_[r].target.background;
       const double wanted = rays_[r].target.luminance + (1.0 - rays_[r].target.coverage) * background;
       // The sky's light is stated as the view has it, at the gain that the ray was drawn with.
@@ -94,7 +99,7 @@ class LossInDouble {
       const double behind = seen.transmittance * (background + sky);
       const double error =
           (lightness_from_luminance(correction.gain * seen.value + behind) - lightness_from_luminance(wanted)) / 100.0;
-      loss += (error * error + distortion_weight_ * distortion.value) / double(rays_.size());
+      loss += (error * error + distortion_weight_ * distortion.value + depth_weight_ * depth) / double(rays_.size());
     }
     return loss;
   }
@@ -115,12 +120,20 @@ class LossInDouble {
                                          std::size_t ray) const {
     if (parameters.size() == first) return {};
     const double* numbers = &parameters[first + kViewNumbers * rays_[ray].view];
-    if (!learning_.teaches_camera(std::uint32_t(ray))) return {std::exp(numbers[0]), {}, {}};
+    const double* light = &parameters[first + std::size_t(kViewNumbers * learning_.views)];
+    double log_gain = numbers[0];
+    if (learning_.light) {
+      const GainCorners corners(rays_[ray].place);
+      for (int i = 0; i < 4; ++i) {
+        log_gain += double(corners.share(i)) * light[kGainNodes * int(rays_[ray].view) + corners.node(i)];
+      }
+    }
+    if (!learning_.teaches_camera(std::uint32_t(ray))) return {std::exp(log_gain), {}, {}};
     Correction correction{
-        std::exp(numbers[0]), {numbers[1], numbers[2], numbers[3]}, {numbers[4], numbers[5], numbers[6]}};
+        std::exp(log_gain), {numbers[1], numbers[2], numbers[3]}, {numbers[4], numbers[5], numbers[6]}};
     if (!learning_.teaches_lens(std::uint32_t(ray))) return correction;
     // The lens's numbers are too small for the engine's floats to be disturbed: its maths is done again in double.
-    const double* lens = &parameters[first + std::size_t(kViewNumbers * learning_.views)];
+    const double* lens = light + kGainNodes * learning_.lit_views();
     const UnitCamera& camera = views_[rays_[ray].view].camera;
     const auto pixel =
         project(camera.intrinsics, camera.unit_from_camera.transposed() * rays_[ray].ray.direction.cast<double>());
@@ -137,7 +150,7 @@ class LossInDouble {
 
   std::vector<GridLevel> levels_;
   MlpLayout density_, luminance_;
-  double max_luminance_, distortion_weight_;
+  double max_luminance_, distortion_weight_, depth_weight_;
   ViewLearning learning_;
   std::vector<TrainingView> views_;
   std::vector<ObservedRay> rays_;
@@ -161,7 +174,8 @@ std::vector<double> parameters_of(LuminanceEngine& engine) {
     const auto is_one_of = [&](const std::vector<std::string>& names) {
       return std::ranges::find(names, piece.name) != names.end();
     };
-    if (!is_one_of({"grid.table", "density_net.weights", "luminance_net.weights", "views", "lenses"})) continue;
+    if (!is_one_of({"grid.table", "density_net.weights", "luminance_net.weights", "views", "light", "lenses"}))
+      continue;
     const std::span<const float> values = test::floats_of(piece);
     parameters.insert(parameters.end(), values.begin(), values.end());
   }
@@ -173,6 +187,7 @@ struct Loss {
   bool with_alpha;
   float distortion_weight;
   bool with_sky = false;
+  float depth_weight = 0;
 };
 
 class LuminanceGradient : public testing::TestWithParam<Loss> {};
@@ -186,6 +201,9 @@ TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
   std::vector<TrainingView> views = training_views(capture, frame);
   const test::ToySky sky(views.size(), 24 * 20);
   if (GetParam().with_sky) sky.show_to(views);
+  options.depth.weight = GetParam().depth_weight;
+  const test::ToyDepths depths(views.size());
+  if (options.depth.weight > 0) depths.show_to(views);
   for (const IsaLevel isa : test::available_isas()) {
     const test::ScopedIsa scope(isa);
     const auto engine = make_cpu_luminance_engine(options);
@@ -218,7 +236,8 @@ TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
 INSTANTIATE_TEST_SUITE_P(Of, LuminanceGradient,
                          testing::Values(Loss{"Opaque", false, 0}, Loss{"WithAlpha", true, 0},
                                          Loss{"Distortion", false, 0.3f}, Loss{"DistortionAndAlpha", true, 0.3f},
-                                         Loss{"Sky", false, 0.1f, true}),
+                                         Loss{"Sky", false, 0.1f, true}, Loss{"Depth", false, 0, false, 0.3f},
+                                         Loss{"DepthDistortionAndSky", false, 0.1f, true, 0.3f}),
                          [](const auto& param_info) { return param_info.param.name; });
 
 /// With a pinhole, whose distortion is learned from nothing, and with a lens that has some.
@@ -232,7 +251,7 @@ TEST_P(ViewLearningWithLens, GradientsMatchFiniteDifferencesOfTheLoss) {
     view.intrinsics.distortion = {-0.1, 0.05, 2e-3, -3e-3, 0.01, 0.02, 0, 0};
   }
   LuminanceEngineOptions options = small_engine();
-  options.learning = {4, 1, true, true};
+  options.learning = {4, 1, true, true, true};
   SceneFrame frame;
   frame.unit_per_world = 0.4;
   std::vector<TrainingView> views = training_views(capture, frame);
@@ -245,7 +264,8 @@ TEST_P(ViewLearningWithLens, GradientsMatchFiniteDifferencesOfTheLoss) {
     for (int i = 0; i < 12; ++i) engine->step(1e-2f);
     // The double reference bends rays as they are given: corrections start from nothing.
     for (const StatePiece& piece : engine->state()) {
-      if (piece.name == "views" || piece.name == "lenses") std::ranges::fill(piece.bytes, std::byte{0});
+      if (piece.name == "views" || piece.name == "light" || piece.name == "lenses")
+        std::ranges::fill(piece.bytes, std::byte{0});
     }
     engine->state_loaded();
     const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);
@@ -256,7 +276,8 @@ TEST_P(ViewLearningWithLens, GradientsMatchFiniteDifferencesOfTheLoss) {
     const LossInDouble loss(*engine, options, views, analytic.report.rays);
     EXPECT_NEAR(loss(parameters), analytic.report.loss, 1e-4 * analytic.report.loss + 1e-6);
     std::vector<std::size_t> indices(analytic.views.size());
-    std::iota(indices.begin(), indices.end(), parameters.size() - kLensNumbers - indices.size());
+    const std::size_t first_of_light = parameters.size() - kLensNumbers - analytic.light.size();
+    std::iota(indices.begin(), indices.end(), first_of_light - indices.size());
     const std::vector<double> numeric = test::central_difference(parameters, indices, 1e-7, loss);
     for (const int first : {0, 1, 4}) {  // gains, turns, shifts: each on its own scale
       std::vector<double> found, expected;
@@ -268,6 +289,11 @@ TEST_P(ViewLearningWithLens, GradientsMatchFiniteDifferencesOfTheLoss) {
       }
       EXPECT_LT(test::relative_distance(found, expected), 1e-2) << to_string(isa) << ", numbers from " << first;
     }
+    ASSERT_EQ(analytic.light.size(), 4u * kGainNodes);
+    std::vector<std::size_t> of_light(analytic.light.size());
+    std::iota(of_light.begin(), of_light.end(), first_of_light);
+    const std::vector<double> light(analytic.light.begin(), analytic.light.end());
+    EXPECT_LT(test::relative_distance(light, test::central_difference(parameters, of_light, 1e-5, loss)), 1e-2);
     std::vector<std::size_t> of_lens(kLensNumbers);
     std::iota(of_lens.begin(), of_lens.end(), parameters.size() - kLensNumbers);
     const std::vector<double> lens = test::central_difference(parameters, of_lens, 1e-7, loss);

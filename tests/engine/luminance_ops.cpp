@@ -29,6 +29,7 @@ struct Problem {
   float distortion_weight = 0;
   bool learns_views = false;
   bool with_sky = false;
+  float depth_weight = 0;
 };
 
 /// Views, options, and engines that share a state that the generic processor trained.
@@ -58,7 +59,9 @@ class Scene {
     options_.samples_per_step = 8192;
     options_.distortion_weight = problem.distortion_weight;
     if (problem.with_sky) sky_.show_to(views_);
-    if (problem.learns_views) options_.learning = {int(views_.size()), 1, true, true};
+    options_.depth.weight = problem.depth_weight;
+    if (problem.depth_weight > 0) depths_.show_to(views_);
+    if (problem.learns_views) options_.learning = {int(views_.size()), 1, true, true, true};
   }
 
   [[nodiscard]] const std::vector<TrainingView>& views() const { return views_; }
@@ -85,6 +88,7 @@ class Scene {
  private:
   Capture capture_;
   ToySky sky_{6, 48 * 40};
+  ToyDepths depths_{6};
   std::vector<TrainingView> views_;
   LuminanceEngineOptions options_;
   std::map<long, std::unique_ptr<LuminanceEngine>> trained_;  // by steps
@@ -106,6 +110,7 @@ void append_gradients(LuminanceEngine& engine, std::vector<Result>& results) {
   results.push_back({"gradient of the gains", by_gain});
   results.push_back({"gradient of the poses", by_pose});
   results.push_back({"gradient of the lens", doubles(found.lenses)});
+  results.push_back({"gradient of the light", doubles(found.light)});
 }
 
 void append_queries(const LuminanceEngine& engine, std::vector<Result>& results) {
@@ -250,7 +255,8 @@ Op stage1(const Problem& problem) {
     op.bounds.push_back({"gradient of the gains", 1e-3, 1e-2, Measure::kGradient});
     op.bounds.push_back({"gradient of the poses", 1e-3, 3e-2, Measure::kGradient});
     op.bounds.push_back({"gradient of the lens", 1e-3, 3e-2, Measure::kGradient});
-    pieces.insert(pieces.end(), {"views", "views.moments", "lenses", "lenses.moments"});
+    op.bounds.push_back({"gradient of the light", 1e-3, 1e-2, Measure::kGradient});
+    pieces.insert(pieces.end(), {"views", "views.moments", "lenses", "lenses.moments", "light", "light.moments"});
   }
   op.bounds.push_back({"density of points", 1e-4, 1e-2});
   op.bounds.push_back({"luminance of points", 1e-4, 5e-3});
@@ -417,6 +423,7 @@ std::vector<Op> luminance_ops() {
         stage1({"Stage1WithManyLevels", 16, 13, 128, 2}),
         stage1({"Stage1WithLearnedViews", 8, 14, 64, 2, false, true, true, 0, true}),
         stage1({"Stage1WithSky", 8, 14, 64, 2, false, false, true, 0.1f, true, true}),
+        stage1({"Stage1WithDepth", 8, 14, 64, 2, false, false, false, 0.1f, false, false, 0.1f}),
         stage1_shared({"Stage1Shared", 8, 14, 64, 2, false, true, true, 0.1f, true}),
         stage1_learning({"Stage1Learns", 8, 14, 64, 1, false, false, true}),
         stage1_learning({"Stage1LearnsWithCascades", 12, 14, 128, 3, false, true}),

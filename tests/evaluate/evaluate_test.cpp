@@ -96,6 +96,26 @@ TEST(Evaluate, PicturesOfAnotherSizeAreRefused) {
   EXPECT_THROW((void)measure({capture.views[0], ours, std::nullopt}), ContractError);
 }
 
+TEST(Evaluate, AMeanDoesNotHideTheWorstView) {
+  std::vector<ViewMetrics> views(11);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    views[i].view = "view" + std::to_string(i);
+    views[i].psnr_luminance = 20 + double(i);
+    views[i].near_opacity = 0.01 * double(i);
+    views[i].colorfulness = 5;
+  }
+  views[4].psnr_luminance = 12;
+  const auto spread = spread_of(views);
+  EXPECT_EQ(spread.at("psnr_luminance").worst_view, "view4");
+  EXPECT_EQ(spread.at("psnr_luminance").worst, 12);
+  EXPECT_EQ(spread.at("psnr_luminance").tenth, 20) << "the second of eleven";
+  EXPECT_EQ(spread.at("psnr_luminance").median, 25);
+  EXPECT_EQ(spread.at("near_opacity").worst_view, "view10") << "the more, the worse";
+  EXPECT_NEAR(spread.at("near_opacity").tenth, 0.09, 1e-12);
+  EXPECT_FALSE(spread.contains("psnr_luminance_aligned")) << "was not measured";
+  EXPECT_FALSE(spread.contains("colourfulness")) << "neither end is the worst";
+}
+
 TEST(Evaluate, JsonHoldsWhatWasMeasuredAndNothingElse) {
   Metrics metrics;
   metrics.split = "held-out";
@@ -109,6 +129,7 @@ TEST(Evaluate, JsonHoldsWhatWasMeasuredAndNothingElse) {
   EXPECT_EQ(json.at("schema_version"), kMetricsSchemaVersion);
   EXPECT_EQ(json.at("mean").at("psnr_luminance"), 26.5);
   EXPECT_FALSE(json.at("mean").contains("psnr_rgb"));
+  EXPECT_FALSE(json.contains("spread"));
   EXPECT_EQ(json.at("views").at(0).at("view"), "a.png");
   EXPECT_EQ(json.at("views").at(0).at("ssim"), 0.75);
 }

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "src/picture/curve_picture.h"
+
 namespace cnerf {
 namespace {
 
@@ -30,6 +32,40 @@ TEST(ContactSheet, ShowsEveryPictureWholeAndLeavesEmptyColumnsOut) {
   EXPECT_EQ(pixels_of(picture, 200, 10, 10), 600u);
   EXPECT_EQ(pixels_of(picture, 10, 200, 10), 1200u) << "80x60 becomes 40x30";
   EXPECT_LT(picture.width, 3 * 40) << "the column without pictures takes no room";
+}
+
+TEST(ContactSheet, WhatConcernsAllViewsStandsBelow) {
+  ContactSheet sheet({"grey"}, 40);
+  sheet.add_row({uniform_picture(30, 20, 9, 9, 9)});
+  const Picture before = sheet.compose();
+  sheet.add_below({uniform_picture(50, 10, 200, 10, 10), "curve"});
+  sheet.add_below({uniform_picture(20, 30, 10, 200, 10), "sky"});
+  const Picture after = sheet.compose();
+  EXPECT_EQ(pixels_of(after, 9, 9, 9), 600u);
+  EXPECT_EQ(pixels_of(after, 200, 10, 10), 500u);
+  EXPECT_EQ(pixels_of(after, 10, 200, 10), 600u);
+  EXPECT_GE(after.height, before.height + 30);
+  EXPECT_GE(after.width, 70);
+}
+
+/// The row of the first of the darkest pixels of a column: above the middle of a dot by its radius.
+int ink_row(const Picture& picture, int x) {
+  int darkest = 0;
+  for (int y = 0; y < picture.height; ++y) {
+    const auto red = [&](int row) { return picture.rgb[3 * std::size_t(row * picture.width + x)]; };
+    if (red(y) < red(darkest)) darkest = y;
+  }
+  return darkest;
+}
+
+TEST(CurvePicture, GoesThroughItsValues) {
+  const std::vector<double> values = {1, 2, 0.5};
+  const Picture picture = curve_picture(values, 1, 101, 61);
+  ASSERT_EQ(picture.rgb.size(), 3u * 101 * 61);
+  EXPECT_NEAR(ink_row(picture, 50) + 2, 6, 1) << "the largest value";
+  EXPECT_NEAR(ink_row(picture, 94) + 2, 54, 1) << "the smallest";
+  EXPECT_NEAR(ink_row(picture, 6) + 2, 38, 1) << "a third of the way up";
+  EXPECT_EQ(pixels_of(curve_picture({}, {}, 20, 10), 250, 250, 250), 200u) << "nothing to draw";
 }
 
 TEST(Tiles, LieRowByRow) {

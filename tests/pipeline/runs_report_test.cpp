@@ -57,6 +57,23 @@ TEST(RunsReport, HasARowAndATileOfEachRun) {
   EXPECT_GE(sheet.width, 2 * 40) << "two tiles side by side";
 }
 
+TEST(RunsReport, ShowsTheColumnsThatSomeRunHas) {
+  const test::TempDir folder;
+  const std::vector<fs::path> runs = {make_run(folder / "fox"), make_run(folder / "fruit")};
+  const RunDirectory fruit(runs[1]);
+  auto metrics = read_record<Metrics>(fruit.metrics_file());
+  metrics.mean.psnr_luminance_aligned = 28.25;
+  metrics.mean.near_opacity = 0.0125;
+  metrics.spread["psnr_luminance"] = {12.1, "a.png", 17, 22, 26};
+  write_file(fruit.metrics_file(), json_of(metrics).dump());
+  Observer silent;
+  report_runs(runs, folder / "report", silent);
+  const std::string table = read_text_file(folder / "report/table.md");
+  EXPECT_THAT(table, HasSubstr("| luminance dB | worst | right halves aligned dB | fog before cameras % | SSIM |"));
+  EXPECT_THAT(table, HasSubstr("2 held-out | 27.50 | 12.10 | 28.25 | 1.25 | 0.912 |"));
+  EXPECT_THAT(table, HasSubstr("2 held-out | 27.50 | - | - | - | 0.912 |")) << "the other run has none of them";
+}
+
 /// A job array leaves runs in every state.
 TEST(RunsReport, SaysWhatIsNotFinished) {
   const test::TempDir folder;

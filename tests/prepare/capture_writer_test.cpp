@@ -80,6 +80,26 @@ TEST(CaptureWriter, WhatIsWrittenReadsBack) {
   }
 }
 
+TEST(CaptureWriter, PointsKeepTheirErrorsAndTheViewsThatShowThem) {
+  const test::TempDir folder;
+  std::vector<View> views = views_of(LensModel::kPinhole, false);
+  const auto images = write_images(folder.path(), views, false);
+  std::swap(views[0], views[3]);  // frames need not be in the order of their names
+  const std::vector<SparsePoint> points = {{{0.123456789, -2, 3e-5}, 0.75, {0, 2, 3}}, {{1, 2, 3}, 1.5, {1}}};
+  write_file(folder / "transforms.json", transforms_json(views, images, std::nullopt, true).dump());
+  EXPECT_THROW((void)load_capture(folder.path()), MissingInputError) << "the file is named, and not there";
+  write_file(folder / kPointsFile, points_text(points));
+  Capture capture = load_capture(folder.path());
+  ASSERT_EQ(capture.points.size(), 2u);
+  EXPECT_EQ(capture.points[0], (SparsePoint{points[0].position, 0.75, {0, 2, 3}})) << "views 3 and 0 changed places";
+  EXPECT_EQ(capture.points[1], points[1]);
+  std::filesystem::remove(folder / "images/v2.png");
+  capture = load_capture(folder.path());
+  EXPECT_EQ(capture.points[0].views, (std::vector<std::uint32_t>{0, 2})) << "the third view is gone";
+  write_file(folder / kPointsFile, std::string_view("1 0 x 0\n"));
+  EXPECT_THROW((void)load_capture(folder.path()), InputError);
+}
+
 TEST(CaptureWriter, RationalLensesAreRefusedNotRounded) {
   std::vector<View> views = views_of(LensModel::kOpenCv, false);
   views[2].intrinsics.distortion[5] = 0.1;

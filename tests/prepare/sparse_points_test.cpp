@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/rng.h"
 #include "src/capture/load_capture.h"
@@ -57,10 +58,15 @@ Capture plane_capture(int views) {
   return capture;
 }
 
+std::vector<SparsePoint> points_of(const Capture& capture) {
+  Observer silent;
+  return find_sparse_points(capture, silent);
+}
+
 TEST(SparsePoints, LieOnThePlaneThatThePicturesShow) {
   Capture capture = plane_capture(8);
   capture.views[3].held_out = true;
-  const std::vector<SparsePoint> points = find_sparse_points(capture);
+  const std::vector<SparsePoint> points = points_of(capture);
   ASSERT_GT(points.size(), 50u);
   std::vector<double> heights;
   for (const SparsePoint& point : points) {
@@ -73,17 +79,45 @@ TEST(SparsePoints, LieOnThePlaneThatThePicturesShow) {
   std::ranges::sort(heights);
   EXPECT_LT(heights[heights.size() / 2], 0.01);
   EXPECT_LT(heights[heights.size() * 9 / 10], 0.05);
-  EXPECT_EQ(find_sparse_points(capture), points) << "the same each time";
+  EXPECT_EQ(points_of(capture), points) << "the same each time";
 }
 
 TEST(SparsePoints, WrongPosesMakeFew) {
   Capture capture = plane_capture(8);
-  const std::size_t right = find_sparse_points(capture).size();
+  const std::size_t right = points_of(capture).size();
   for (std::size_t i = 0; i < 8; ++i) capture.views[i].world_from_camera.translation.y += 0.3 * double(i * i % 5);
-  EXPECT_LT(find_sparse_points(capture).size(), right / 2);
+  EXPECT_LT(points_of(capture).size(), right / 2);
 }
 
-TEST(SparsePoints, AreNotLookedForWhereOutlinesOrDepthBoundSpace) {
+/// Cancels once it has heard of progress so often.
+class Impatient : public Observer {
+ public:
+  explicit Impatient(int patience) : left_(patience) {}
+  void report_progress(const Progress& progress) override {
+    --left_;
+    last_ = progress.task;
+  }
+  [[nodiscard]] bool is_cancelled() const override { return left_ <= 0; }
+  [[nodiscard]] const std::string& last() const { return last_; }
+
+ private:
+  int left_;
+  std::string last_;
+};
+
+TEST(SparsePoints, EndWhereTheObserverCancels) {
+  const Capture capture = plane_capture(8);
+  for (const auto& [patience, where] : {std::pair(0, ""), std::pair(1, "features"), std::pair(2, "matches")}) {
+    Impatient observer(patience);
+    EXPECT_THROW((void)find_sparse_points(capture, observer), Interrupted);
+    EXPECT_EQ(observer.last(), where);
+  }
+  const Stage1Options options;
+  Impatient observer(1);
+  EXPECT_THROW((void)points_for_training({capture, options, "no.snapshot"}, observer), Interrupted);
+}
+
+TEST(SparsePoints, AreNotLookedForWhereOutlinesBoundSpaceOrThereAreSome) {
   Observer observer;
   Capture capture = plane_capture(4);
   const Stage1Options options;
@@ -92,23 +126,25 @@ TEST(SparsePoints, AreNotLookedForWhereOutlinesOrDepthBoundSpace) {
   capture.is_bounded_object = true;
   EXPECT_TRUE(points_for_training(job, observer).empty());
   capture.is_bounded_object = false;
-  capture.depth_range = {1, 3};
-  EXPECT_TRUE(points_for_training(job, observer).empty());
-  capture.depth_range.reset();
   capture.points = {{{0, 0, 0}, 0.5, {0, 1, 2}}};
   EXPECT_TRUE(points_for_training(job, observer).empty()) << "it has its own";
+  capture.points = {{{0, 0, 0}, 0.5, {}}};
+  EXPECT_FALSE(points_for_training(job, observer).empty()) << "of which nobody says who sees them";
 }
 
-TEST(SparsePoints, AreNotLookedForByATrainingThatGoesOnOrDoesNotWantThem) {
+TEST(SparsePoints, AreLookedForAgainByATrainingThatGoesOnAndNotByOneThatDoesNotWantThem) {
   Observer observer;
   const Capture capture = plane_capture(4);
   const test::TempDir folder;
   const std::filesystem::path snapshot = folder / "stage1.snapshot";
   write_file(snapshot, std::string_view());
   Stage1Options options;
-  EXPECT_TRUE(points_for_training({capture, options, snapshot, true}, observer).empty());
-  EXPECT_FALSE(points_for_training({capture, options, snapshot, false}, observer).empty()) << "anew";
+  const std::vector<SparsePoint> points = points_for_training({capture, options, snapshot, false}, observer);
+  EXPECT_FALSE(points.empty());
+  EXPECT_EQ(points_for_training({capture, options, snapshot, true}, observer), points);
   options.free_space = false;
+  EXPECT_EQ(points_for_training({capture, options, snapshot, false}, observer), points) << "for depths";
+  options.depth_weight = 0;
   EXPECT_TRUE(points_for_training({capture, options, snapshot, false}, observer).empty());
 }
 
@@ -118,7 +154,7 @@ TEST(SparsePoints, OfARealCapture) {
   options.downscale = 4;
   options.holdout = 8;
   const Capture capture = load_capture(fox, options);
-  const std::vector<SparsePoint> points = find_sparse_points(capture);
+  const std::vector<SparsePoint> points = points_of(capture);
   EXPECT_GT(points.size(), 1000u);
   for (const SparsePoint& point : points) {
     for (const std::uint32_t view : point.views) ASSERT_FALSE(capture.views[view].held_out);

@@ -74,6 +74,7 @@ struct Stage1Gradients {
   std::vector<float> weights;  ///< density net, then luminance net
   std::vector<float> views;    ///< of each view: log gain, turn, shift; empty where they are not learned
   std::vector<float> lenses;   ///< of each lens, in LensCorrection's order; likewise
+  std::vector<float> light;    ///< of each view's nodes; likewise
   StepReport report;
 };
 /// Leaves the engine as it was. Not for a step that updates the occupancy grid first.
@@ -91,6 +92,7 @@ struct Stage1Gradients {
   }
   found.views = gradient_of_structs(state, "views.moments", kViewNumbers);
   found.lenses = gradient_of_structs(state, "lenses.moments", kLensNumbers);
+  found.light = gradient_of_structs(state, "light.moments", kGainNodes);
   for (std::size_t i = 0; i < kept.size(); ++i) std::ranges::copy(kept[i], state[i].bytes.begin());
   engine.state_loaded();
   return found;

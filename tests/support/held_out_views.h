@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "src/engine/luminance_engine.h"
+#include "src/evaluate/pose_alignment.h"
 #include "src/field/scene_frame.h"
-#include "tests/support/pose_alignment.h"
 
 namespace cnerf::test {
 
@@ -38,7 +38,6 @@ struct Judge {
 
  private:
   [[nodiscard]] HeldOutView judge(const View& view, float log_gain) const;
-  [[nodiscard]] double aligned(const View& view) const;
 };
 
 /// From true poses of the training views to those that the judge's engine learned; prints how far they are apart,

@@ -38,6 +38,24 @@ class ToySky {
   DirectionMap light_{16, 8, {{}}};
 };
 
+/// Depths of half of the cells, between the nearest and the farthest surface that a toy's cameras see.
+class ToyDepths {
+ public:
+  explicit ToyDepths(std::size_t views) : hints_(views, {5, 4, std::vector<DepthHint>(5 * 4)}) {
+    for (std::size_t v = 0; v < views; ++v) {
+      for (std::size_t c = v % 2; c < hints_[v].cells.size(); c += 2) {
+        hints_[v].cells[c] = {std::log(0.5f + 0.05f * float((c + v) % 7)), float(c % 3 + 2)};
+      }
+    }
+  }
+  void show_to(std::vector<TrainingView>& views) const {
+    for (std::size_t v = 0; v < views.size(); ++v) views[v].depths = &hints_[v];
+  }
+
+ private:
+  std::vector<DepthHints> hints_;
+};
+
 inline Capture toy_capture(int views = 4, int width = 24, int height = 20, bool with_alpha = false) {
   Capture capture;
   capture.format = "toy";

@@ -69,7 +69,8 @@ TEST_F(Exclusion, TheWayToSparsePointsIsLeftOutUnlessTheOptionSaysNo) {
   const double distance = length(capture_.views.front().world_from_camera.translation);
   for (const bool free_space : {false, true}) {
     options.free_space = free_space;
-    model_ = LuminanceModel::create(capture_, options, cpu_engines(), points);
+    capture_.points = points;
+    model_ = LuminanceModel::create(capture_, options, cpu_engines());
     EXPECT_EQ(is_left_out(before_the_lens(0.5 * distance)), free_space);
     EXPECT_FALSE(is_left_out({0, 0, 0})) << "where points are";
   }

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace cnerf {
 namespace {
 
@@ -97,6 +99,26 @@ TEST_F(FreeSpaceTest, AWallBesideTheLensesStays) {
   }
   EXPECT_FALSE(is_free({1.5, 0, 0.1}));
   EXPECT_TRUE(is_free({0.3, 0, 1.2}));
+}
+
+TEST_F(FreeSpaceTest, ReachesAllTheWayWhereTwoViewsSeeTheSkyAndNoPoint) {
+  const auto sky_above = [&](std::size_t views) {
+    std::vector<std::vector<SkyLabel>> sky(views_.size());
+    for (std::size_t v = 0; v < views; ++v) {
+      sky[v].assign(100 * 100, SkyLabel::kScene);
+      std::fill_n(sky[v].begin(), 100 * 50, SkyLabel::kSky);  // the upper half, where y is negative
+    }
+    return sky;
+  };
+  const std::vector<SparsePoint> no_points;
+  const FreeSpace two(views_, no_points, sky_above(2)), one(views_, no_points, sky_above(1));
+  for (const double z : {1.0, 5.0, 50.0}) {
+    EXPECT_TRUE(two.holds({0.1, -0.2 * z, z}, kRadius)) << z;
+    EXPECT_FALSE(one.holds({0.1, -0.2 * z, z}, kRadius)) << z;
+    EXPECT_FALSE(two.holds({0.1, 0.2 * z, z}, kRadius)) << z;
+    EXPECT_FALSE(two.holds({0.1, -kRadius / 2, z}, kRadius)) << "reaches over the horizon";
+  }
+  EXPECT_FALSE(FreeSpace(views_, points_, sky_above(2)).holds({0.3, -0.6, 4}, kRadius)) << "a point is there";
 }
 
 }  // namespace

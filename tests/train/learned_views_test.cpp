@@ -214,5 +214,21 @@ TEST(LearnedViews, SayHowFarTheyAreFromWhatWasGiven) {
   EXPECT_EQ(facts[0].text, "0.82 to 1.11 of the median view's");
 }
 
+TEST(LearnedViews, SayWhatALensWasAndIs) {
+  LearnedViews learned;
+  learned.corrections = gains({0, 0});
+  learned.lenses.resize(1);
+  learned.lenses[0].log_focal = std::log(1.02f);
+  learned.lenses[0].x = 0.01f;
+  learned.lenses[0].k1 = 0.05f;
+  const Intrinsics given = {LensModel::kOpenCv, 640, 480, 500, 500, 320, 240, {0.1, 0, 0, -0.002}};
+  const std::vector<LearnedFact> facts = facts_of(learned, std::vector{given});
+  ASSERT_EQ(facts.size(), 1u);
+  EXPECT_EQ(facts[0].text,
+            "focal length times 1.0200 (500.0 -> 510.0 pixels), principal point 320.0, 240.0 -> 325.0, 240.0, "
+            "k1 +0.1000 -> +0.1500, k2 +0.0000 -> +0.0000, p1 +0.0000 -> +0.0000, p2 -0.0020 -> -0.0020");
+  EXPECT_THAT(facts_of(learned)[0].text, HasSubstr("focal length times 1.0200, k1 +0.0500"));
+}
+
 }  // namespace
 }  // namespace cnerf

@@ -49,6 +49,7 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   StepReport step(float learning_rate) override;
   [[nodiscard]] long step_count() const override { return counters_.front(); }
   [[nodiscard]] std::vector<ViewCorrection> view_corrections() const override { return corrections_; }
+  [[nodiscard]] std::vector<GainField> view_light() const override { return light_; }
   [[nodiscard]] std::vector<LensCorrection> lens_corrections() const override { return lenses_; }
 
   void render(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
@@ -125,6 +126,7 @@ class LuminanceEngineCpu final : public LuminanceEngine {
     std::vector<float> d_weights;
     std::vector<ViewGradient> d_views;
     std::vector<LensGradient> d_lenses;
+    std::vector<GainField> d_light;
     StepReport report;
   };
   /// Of the chunks, and of all processes that share the step.
@@ -141,6 +143,8 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   std::vector<TrainingView> views_;
   std::vector<ViewCorrection> corrections_;  // of the views, where they are learned
   std::vector<ViewMoments> correction_moments_;
+  std::vector<GainField> light_;  // likewise
+  std::vector<LightMoments> light_moments_;
   std::vector<LensCorrection> lenses_;  // likewise; the views' cameras have them
   std::vector<LensMoments> lens_moments_;
   std::vector<Intrinsics> given_lenses_;  // of each view
@@ -156,10 +160,12 @@ LuminanceEngineCpu::LuminanceEngineCpu(const LuminanceEngineOptions& options)
       occupancy_(options.occupancy, options.cascades),
       corrections_(std::size_t(options.learning.views)),
       correction_moments_(std::size_t(options.learning.views)),
+      light_(std::size_t(options.learning.lit_views())),
+      light_moments_(light_.size()),
       lenses_(std::size_t(options.learning.lenses)),
       lens_moments_(std::size_t(options.learning.lenses)),
       counters_{0, first_rays(options.samples_per_step)},
-      chunks_(std::size_t(options.learning.views), std::size_t(options.learning.lenses)) {}
+      chunks_({corrections_.size(), lenses_.size(), light_.size()}) {}
 
 void LuminanceEngineCpu::set_views(const std::vector<TrainingView>& views) {
   if (options_.learning.is_on()) CNERF_CHECK_EQ(views.size(), corrections_.size());
@@ -289,23 +295,32 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
 void LuminanceEngineCpu::train_ray(const ObservedRay& ray, std::size_t index, float gradient_scale, Block& block,
                                    StepChunk& chunk) const {
   const std::size_t begin = block.offsets[index], end = block.offsets[index + 1];
-  const float distortion_weight = options_.distortion_weight;
+  const ShapeWeights weights = {options_.distortion_weight, options_.depth.weight_at(step_count())};
+  const bool has_depth = weights.depth > 0 && ray.target.depth.is_known();
   Compositor<float> light;
-  Distortion<float> distortion;
+  RayShape shape;
   for (std::size_t s = begin; s < end; ++s) {
     const MarchedSample& sample = block.samples[s];
     const float alpha = alpha_of(field_.sigma(block.work, s), sample.dt);
     const float weight = light.add(alpha, field_.luminance(block.work, s));
-    if (distortion_weight > 0) distortion.add(weight, {sample.t, sample.dt});
+    if (weights.distortion > 0) shape.distortion.add(weight, {sample.t, sample.dt});
+    if (has_depth) shape.depth_miss += weight * depth_miss(sample.t, ray.target.depth);
   }
+  if (has_depth) shape.depth_miss += light.transmittance;
   const SeenRay seen{light.value, light.transmittance};
   const RayError error(seen, ray.target);
-  chunk.loss += ray_loss(error, distortion.value, distortion_weight);
+  chunk.loss += ray_loss(error, shape, weights);
   chunk.squared_error += squared_error(seen, ray.target);
 
-  const RayGradient gradient(error, ray.target.gain, distortion, distortion_weight, gradient_scale);
+  const RayGradient gradient(error, ray.target.gain, shape, weights, gradient_scale);
   if (options_.learning.exposures) chunk.d_views[ray.view].by_log_gain += gradient.by_log_gain(seen, ray.target);
-  float distortion_behind = gradient.distortion_of_all();
+  if (options_.learning.light) {
+    const GainCorners corners(ray.place);
+    for (int i = 0; i < 4; ++i) {
+      chunk.d_light[ray.view].log_gain[corners.node(i)] += corners.share(i) * gradient.by_log_gain(seen, ray.target);
+    }
+  }
+  float distortion_behind = gradient.distortion_of_all(), depth_behind = shape.depth_miss;
   light = {};
   Distortion<float> before;
   for (std::size_t s = begin; s < end; ++s) {
@@ -313,12 +328,17 @@ void LuminanceEngineCpu::train_ray(const ObservedRay& ray, std::size_t index, fl
     const float weight = light.add(alpha_of(field_.sigma(block.work, s), dt), luminance);
     const LitSample sample{dt, luminance, weight, light.transmittance, light.value};
     float d_sigma = gradient.by_density(sample);
-    if (distortion_weight > 0) {
+    if (weights.distortion > 0) {
       const LogInterval<float> at(block.samples[s].t, dt);
       const float slope = gradient.distortion_by_weight(weight, at, before);
       before.add(weight, at);
       distortion_behind -= weight * slope;
       d_sigma += gradient.by_density_of_distortion(sample, slope, distortion_behind);
+    }
+    if (has_depth) {
+      const float miss = depth_miss(block.samples[s].t, ray.target.depth);
+      depth_behind -= weight * miss;
+      d_sigma += gradient.by_density_of_depth(sample, miss, depth_behind);
     }
     field_.set_gradient(block.work, s, d_sigma, gradient.by_luminance(sample));
   }
@@ -350,13 +370,15 @@ void LuminanceEngineCpu::add_camera_gradients(std::span<const ObservedRay> rays,
 
 LuminanceEngineCpu::StepSums LuminanceEngineCpu::sums() const {
   StepSums sums{chunks_.d_weights(), std::vector<ViewGradient>(corrections_.size()),
-                std::vector<LensGradient>(lenses_.size()), report()};
+                std::vector<LensGradient>(lenses_.size()), std::vector<GainField>(light_.size()), report()};
   for (const StepChunk& chunk : chunks_.all()) {
     for (std::size_t v = 0; v < sums.d_views.size(); ++v) sums.d_views[v] += chunk.d_views[v];
     for (std::size_t l = 0; l < sums.d_lenses.size(); ++l) sums.d_lenses[l] += chunk.d_lenses[l];
+    for (std::size_t v = 0; v < sums.d_light.size(); ++v) sums.d_light[v] += chunk.d_light[v];
   }
   if (share_.is_whole()) return sums;
-  const std::array<std::span<float>, 3> gradients = {sums.d_weights, floats_of(sums.d_views), floats_of(sums.d_lenses)};
+  const std::array<std::span<float>, 4> gradients = {sums.d_weights, floats_of(sums.d_views), floats_of(sums.d_lenses),
+                                                     floats_of(sums.d_light)};
   SharedNumbers shared;
   for (const std::span<float> part : gradients) shared.add(part);
   shared.add(float(sums.report.loss));
@@ -375,6 +397,11 @@ void LuminanceEngineCpu::update_corrections(const StepSums& sums, float learning
   const auto n = int(corrections_.size());
   for (std::size_t v = 0; v < corrections_.size(); ++v) {
     update_view(options_.learning, adam, step_count(), sums.d_views[v], correction_moments_[v], corrections_[v]);
+  }
+  for (std::size_t v = 0; v < light_.size(); ++v) {
+    for (int node = 0; node < kGainNodes; ++node) {
+      update_light(options_.learning, adam, node, sums.d_light[v], light_moments_[v], light_[v]);
+    }
   }
   update_lenses(sums, adam);
   if (step_count() % kGaugeEvery != 0) return;
@@ -421,7 +448,7 @@ StepReport LuminanceEngineCpu::step(float learning_rate) {
     const std::size_t begin = own + from, end = own + to;
     std::array<ObservedRay, kBlockRays> observed;
     for (std::size_t r = begin; r < end; ++r) {
-      observed[r - begin] = observe_ray(views_, options_.seed, step, r, corrections_);
+      observed[r - begin] = observe_ray(views_, options_.seed, step, r, corrections_, light_);
     }
     train_block({observed.data(), end - begin}, 1.0f / float(rays), teaching(std::uint32_t(begin)), blocks_.local(),
                 chunk);
@@ -527,6 +554,10 @@ std::vector<StatePiece> LuminanceEngineCpu::state() {
   if (options_.learning.is_on()) {
     state.push_back(state_piece("views", corrections_));
     state.push_back(state_piece("views.moments", correction_moments_));
+  }
+  if (!light_.empty()) {
+    state.push_back(state_piece("light", light_));
+    state.push_back(state_piece("light.moments", light_moments_));
   }
   if (!lenses_.empty()) {
     state.push_back(state_piece("lenses", lenses_));

@@ -12,10 +12,16 @@
 #include "src/base/parallel.h"
 #include "src/engine/step_share.h"
 #include "src/field/cpu/hash_grid.h"
+#include "src/render/gain_field.h"
 #include "src/render/lens_correction.h"
 #include "src/render/view_correction.h"
 
 namespace cnerf {
+
+/// Of how many views and lenses something is learned.
+struct LearnedCounts {
+  std::size_t views = 0, lenses = 0, light = 0;
+};
 
 /// What one chunk adds up: gradients to be scattered as runs, weight gradients, losses and counts.
 struct StepChunk {
@@ -24,15 +30,17 @@ struct StepChunk {
   std::vector<float> d_weights;
   std::vector<ViewGradient> d_views;   ///< where they are learned
   std::vector<LensGradient> d_lenses;  ///< likewise
+  std::vector<GainField> d_light;      ///< likewise
   double loss = 0, squared_error = 0;
   std::size_t trained = 0;  ///< samples
 
-  void clear(std::size_t weight_count, std::size_t views, std::size_t lenses) {
+  void clear(std::size_t weight_count, const LearnedCounts& learned) {
     groups = trained = 0;
     loss = squared_error = 0;
     d_weights.assign(weight_count, 0.0f);
-    d_views.assign(views, {});
-    d_lenses.assign(lenses, {});
+    d_views.assign(learned.views, {});
+    d_lenses.assign(learned.lenses, {});
+    d_light.assign(learned.light, {});
   }
   /// Appends a block's positions; returns where its gradient belongs.
   float* append(const AlignedVector<float>& block_positions, std::size_t block_groups, int encoded_channels) {
@@ -51,15 +59,14 @@ class StepChunks {
  public:
   static constexpr std::size_t kCount = 32;
 
-  /// @param views, lenses  that are learned
-  explicit StepChunks(std::size_t views = 0, std::size_t lenses = 0) : views_(views), lenses_(lenses) {}
+  explicit StepChunks(const LearnedCounts& learned = {}) : learned_(learned) {}
 
   /// Calls `work(chunk, begin, end)` over blocks of at most `block` of `items` items, chunk by chunk.
   template <typename Work>
   void run(std::size_t items, std::size_t block, std::size_t weight_count, Work&& work) {
     const std::size_t blocks = (items + block - 1) / block;
     parallel_tasks(kCount, [&](std::size_t c) {
-      chunks_[c].clear(weight_count, views_, lenses_);
+      chunks_[c].clear(weight_count, learned_);
       for (std::size_t b = c * blocks / kCount; b < (c + 1) * blocks / kCount; ++b) {
         work(chunks_[c], b * block, std::min(items, (b + 1) * block));
       }
@@ -100,7 +107,7 @@ class StepChunks {
 
  private:
   std::array<StepChunk, kCount> chunks_;
-  std::size_t views_, lenses_;
+  LearnedCounts learned_;
 };
 
 }  // namespace cnerf

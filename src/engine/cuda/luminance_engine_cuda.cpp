@@ -37,6 +37,8 @@ class LuminanceEngineCuda final : public LuminanceEngine {
         counters_{0, first_rays(options.samples_per_step)},
         corrections_(std::size_t(options.learning.views)),
         correction_moments_(std::size_t(options.learning.views)),
+        light_(std::size_t(options.learning.lit_views())),
+        light_moments_(light_.size()),
         lenses_(std::size_t(options.learning.lenses)),
         lens_moments_(std::size_t(options.learning.lenses)) {
     state_loaded();
@@ -68,6 +70,11 @@ class LuminanceEngineCuda final : public LuminanceEngine {
     const std::lock_guard lock(mutex_);
     stream_.wait();
     return step_.corrections();
+  }
+  [[nodiscard]] std::vector<GainField> view_light() const override {
+    const std::lock_guard lock(mutex_);
+    stream_.wait();
+    return step_.light();
   }
   [[nodiscard]] std::vector<LensCorrection> lens_corrections() const override {
     const std::lock_guard lock(mutex_);
@@ -140,6 +147,12 @@ class LuminanceEngineCuda final : public LuminanceEngine {
       state.push_back(state_piece("views", corrections_));
       state.push_back(state_piece("views.moments", correction_moments_));
     }
+    if (options_.learning.light) {
+      light_ = step_.light();
+      light_moments_ = step_.light_moments();
+      state.push_back(state_piece("light", light_));
+      state.push_back(state_piece("light.moments", light_moments_));
+    }
     if (options_.learning.lenses > 0) {
       lenses_ = step_.lenses();
       lens_moments_ = step_.lens_moments();
@@ -154,6 +167,7 @@ class LuminanceEngineCuda final : public LuminanceEngine {
     field_.upload(stream_);
     step_.restart(long(counters_[0]), counters_[1]);
     step_.set_learned(corrections_, correction_moments_);
+    step_.set_light(light_, light_moments_);
     step_.set_lenses(lenses_, lens_moments_);
     occupancy_.refresh_bits();
     occupancy_is_old_ = false;
@@ -195,6 +209,8 @@ class LuminanceEngineCuda final : public LuminanceEngine {
   std::vector<std::int64_t> counters_;       // steps done, rays of the next step
   std::vector<ViewCorrection> corrections_;  // as the last call of `state` or `state_loaded` left them
   std::vector<ViewMoments> correction_moments_;
+  std::vector<GainField> light_;  // likewise
+  std::vector<LightMoments> light_moments_;
   std::vector<LensCorrection> lenses_;  // likewise
   std::vector<LensMoments> lens_moments_;
   mutable std::mutex mutex_;  // queries come from many threads

@@ -20,7 +20,8 @@ const char* const kViewAdvice = "views";
 std::size_t small_gradients(const ViewLearning& learning) {
   static_assert(sizeof(ViewGradient) == kViewNumbers * sizeof(float));
   static_assert(sizeof(LensGradient) == kLensNumbers * sizeof(float));
-  return std::size_t(kViewNumbers * learning.views + kLensNumbers * learning.lenses + kStepSums);
+  return std::size_t(kViewNumbers * learning.views + kGainNodes * learning.lit_views() +
+                     kLensNumbers * learning.lenses + kStepSums);
 }
 
 /// A hash grid's levels from the finest to the coarsest, in parts of some million rows: sums of less are slow for what
@@ -56,6 +57,8 @@ LuminanceStepCuda::LuminanceStepCuda(const LuminanceEngineOptions& options, cons
       directions_(std::size_t(kMostRays), kRayAdvice),
       corrections_(std::size_t(options.learning.views), kViewAdvice),
       correction_moments_(std::size_t(options.learning.views), kViewAdvice),
+      light_(std::size_t(options.learning.lit_views()), kViewAdvice),
+      light_moments_(std::size_t(options.learning.lit_views()), kViewAdvice),
       lenses_(std::size_t(options.learning.lenses), kViewAdvice),
       lens_moments_(std::size_t(options.learning.lenses), kViewAdvice),
       small_gradients_(small_gradients(options.learning), kViewAdvice) {}
@@ -87,6 +90,11 @@ void LuminanceStepCuda::set_learned(const std::vector<ViewCorrection>& correctio
   correction_moments_.upload(moments.data(), moments.size());
 }
 
+void LuminanceStepCuda::set_light(const std::vector<GainField>& light, const std::vector<LightMoments>& moments) {
+  light_.upload(light.data(), light.size());
+  light_moments_.upload(moments.data(), moments.size());
+}
+
 void LuminanceStepCuda::set_lenses(const std::vector<LensCorrection>& lenses, const std::vector<LensMoments>& moments) {
   lenses_.upload(lenses.data(), lenses.size());
   lens_moments_.upload(moments.data(), moments.size());
@@ -94,11 +102,16 @@ void LuminanceStepCuda::set_lenses(const std::vector<LensCorrection>& lenses, co
 }
 
 LearnedViews LuminanceStepCuda::learned() const {
-  float* of_lenses = small_gradients_.data() + kViewNumbers * options_.learning.views;
+  float* of_views = small_gradients_.data();
+  float* of_light = of_views + kViewNumbers * options_.learning.views;
+  float* of_lenses = of_light + kGainNodes * options_.learning.lit_views();
   return {options_.learning,
           corrections_.data(),
           correction_moments_.data(),
-          reinterpret_cast<ViewGradient*>(small_gradients_.data()),
+          reinterpret_cast<ViewGradient*>(of_views),
+          light_.data(),
+          light_moments_.data(),
+          reinterpret_cast<GainField*>(of_light),
           lenses_.data(),
           lens_moments_.data(),
           reinterpret_cast<LensGradient*>(of_lenses)};
@@ -116,7 +129,9 @@ TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
   job.state = state_.data();
   job.samples = {capacity_, places_.data(), encoded_.data(), gradients_.data()};
   job.distortion_weight = options_.distortion_weight;
+  job.depth = options_.depth;
   if (options_.learning.exposures) job.view_gradients = learned().gradients;
+  if (options_.learning.light) job.light_gradients = learned().light_gradients;
   return job;
 }
 
@@ -153,8 +168,9 @@ void LuminanceStepCuda::launch(const std::uint32_t* occupied) {
 void LuminanceStepCuda::draw_and_trace(const std::uint32_t* occupied) {
   begin_step(state_.data(), learning_rates_.on_device(), {share_.part, share_.parts}, stream_);
   const ViewCorrection* corrections = options_.learning.is_on() ? corrections_.data() : nullptr;
-  draw_training_rays({state_.data(), views_.records(), corrections, views_.count(), views_.resident(), options_.seed,
-                      rays_.data(), directions_.data()},
+  const GainField* light = options_.learning.light ? light_.data() : nullptr;
+  draw_training_rays({state_.data(), views_.records(), corrections, light, views_.count(), views_.resident(),
+                      options_.seed, rays_.data(), directions_.data()},
                      stream_);
   trace_training_rays(trace_job(occupied), stream_);
   field_.nets_backward(samples(), stream_);

@@ -47,6 +47,10 @@ class LuminanceStepCuda {
   [[nodiscard]] std::vector<ViewCorrection> corrections() const { return corrections_.downloaded(); }
   [[nodiscard]] std::vector<ViewMoments> correction_moments() const { return correction_moments_.downloaded(); }
   void set_learned(const std::vector<ViewCorrection>& corrections, const std::vector<ViewMoments>& moments);
+  /// The same of their light.
+  [[nodiscard]] std::vector<GainField> light() const { return light_.downloaded(); }
+  [[nodiscard]] std::vector<LightMoments> light_moments() const { return light_moments_.downloaded(); }
+  void set_light(const std::vector<GainField>& light, const std::vector<LightMoments>& moments);
   /// The same of the lenses.
   [[nodiscard]] std::vector<LensCorrection> lenses() const { return lenses_.downloaded(); }
   [[nodiscard]] std::vector<LensMoments> lens_moments() const { return lens_moments_.downloaded(); }
@@ -83,10 +87,12 @@ class LuminanceStepCuda {
   DeviceBuffer<DirectionCode> directions_;
   DeviceBuffer<ViewCorrection> corrections_;  // of the views, where they are learned
   DeviceBuffer<ViewMoments> correction_moments_;
+  DeviceBuffer<GainField> light_;  // likewise
+  DeviceBuffer<LightMoments> light_moments_;
   DeviceBuffer<LensCorrection> lenses_;  // likewise
   DeviceBuffer<LensMoments> lens_moments_;
-  /// Of the views, of the lenses, then kStepSums numbers of the step; which the nets' gradient follows where processes
-  /// share steps, so that all of it is one sum.
+  /// Of the views, of their light, of the lenses, then kStepSums numbers of the step; which the nets' gradient follows
+  /// where processes share steps, so that all of it is one sum.
   DeviceBuffer<float> small_gradients_;
 
   MappedBuffer<float> learning_rates_{kStepRing};

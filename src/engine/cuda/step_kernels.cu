@@ -23,6 +23,7 @@ __global__ void begin(StepState* state, const float* learning_rates, const StepP
 struct DeviceViews {
   const ViewRecord* views;
   const ViewCorrection* corrections;
+  const GainField* light_fields;
   std::uint32_t n_views;
   const std::uint32_t* resident;
 
@@ -44,6 +45,16 @@ struct DeviceViews {
   }
   [[nodiscard]] __device__ SkyLabel sky_label(std::uint32_t v, std::size_t pixel) const {
     return view(v).sky_labels == nullptr ? SkyLabel::kScene : view(v).sky_labels[pixel];
+  }
+  [[nodiscard]] __device__ const GainField* light(std::uint32_t v) const {
+    return light_fields == nullptr ? nullptr : light_fields + number_of(v);
+  }
+  [[nodiscard]] __device__ DepthHint depth(std::uint32_t v, int x, int y) const {
+    const ViewRecord& record = view(v);
+    if (record.depths == nullptr) return {};
+    const int column = hint_cell(x, record.width, record.depth_columns),
+              row = hint_cell(y, record.height, record.depth_rows);
+    return record.depths[row * record.depth_columns + column];
   }
   [[nodiscard]] __device__ DirectionView sky(std::uint32_t v) const { return view(v).sky; }
   [[nodiscard]] __device__ float luminance(std::uint32_t v, std::size_t pixel) const {
@@ -70,13 +81,14 @@ __device__ void clip(RayRecord& record) {
 __global__ void draw(const DrawJob job) {
   const std::uint32_t ray = job.state->next_ray + blockIdx.x * kThreads + threadIdx.x;
   if (ray >= job.state->end_ray) return;
-  const DeviceViews views = {job.views, job.corrections, job.n_views, job.resident};
+  const DeviceViews views = {job.views, job.corrections, job.light, job.n_views, job.resident};
   const ObservedRay observed = observe_ray(views, job.seed, std::uint64_t(job.state->step), std::uint64_t(ray));
   RayRecord record;
   record.ray = observed.ray;
   record.jitter = observed.jitter;
   record.target = observed.target;
   record.view = views.number_of(observed.view);
+  record.place = observed.place;
   clip(record);
   job.rays[ray] = record;
   job.directions[ray] = encode_direction(record.ray.direction);
@@ -147,6 +159,12 @@ __global__ void __launch_bounds__(kGaugeThreads)
   for (int v = int(threadIdx.x); v < n; v += kGaugeThreads) {
     update_view(learned.learning, state->adam, step, learned.gradients[v], learned.moments[v], learned.corrections[v]);
     learned.gradients[v] = {};
+  }
+  for (int i = int(threadIdx.x); i < learned.learning.lit_views() * kGainNodes; i += kGaugeThreads) {
+    const int v = i / kGainNodes, node = i % kGainNodes;
+    update_light(learned.learning, state->adam, node, learned.light_gradients[v], learned.light_moments[v],
+                 learned.light[v]);
+    learned.light_gradients[v].log_gain[node] = 0;
   }
   update_lenses(learned, views, state->adam, step);
   if (step % kGaugeEvery != 0) return;

@@ -36,6 +36,8 @@ struct ViewRecord {
   const std::uint8_t* mask = nullptr;    ///< null: every pixel counts
   const SkyLabel* sky_labels = nullptr;  ///< null: no pixel shows the sky
   DirectionView sky;
+  const DepthHint* depths = nullptr;  ///< [rows, columns]; null: nothing is known
+  int depth_columns = 0, depth_rows = 0;
   int lens = 0;      ///< see TrainingView
   Intrinsics given;  ///< the camera's, which are corrected as they are learned
 };
@@ -60,6 +62,7 @@ struct DrawJob {
   const StepState* state;
   const ViewRecord* views;
   const ViewCorrection* corrections;  ///< of the views; null: none
+  const GainField* light;             ///< likewise
   std::uint32_t n_views;              ///< that pixels are drawn from
   const std::uint32_t* resident;      ///< [n_views], their numbers; null: the first ones
   std::uint64_t seed;
@@ -90,6 +93,9 @@ struct LearnedViews {
   ViewCorrection* corrections = nullptr;
   ViewMoments* moments = nullptr;
   ViewGradient* gradients = nullptr;  ///< of the step; zero between steps
+  GainField* light = nullptr;
+  LightMoments* light_moments = nullptr;
+  GainField* light_gradients = nullptr;  ///< likewise
   LensCorrection* lenses = nullptr;
   LensMoments* lens_moments = nullptr;
   LensGradient* lens_gradients = nullptr;  ///< likewise

@@ -49,6 +49,7 @@ struct RayProgress {
   float depth = 0;           ///< optical
   float luminance = 0;       ///< this lane's share
   RunDistortion distortion;  ///< of training rays
+  float depth_miss = 0;      ///< likewise, this lane's share
   int samples = 0;
   std::uint32_t run_begin = 0;
   bool has_room = true;
@@ -167,17 +168,24 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
   const unsigned lane = threadIdx.x % 32;
   const SeenRay seen{warp_sum(ray.luminance), expf(-ray.depth)};
   const RayError error(seen, record.target);
-  const Distortion<float> distortion = ray.distortion.total();
+  const ShapeWeights weights = {job.distortion_weight, job.depth.weight_at(job.state->step)};
+  const bool has_depth = weights.depth > 0 && record.target.depth.is_known();
+  const RayShape shape = {ray.distortion.total(), has_depth ? warp_sum(ray.depth_miss) + seen.transmittance : 0.0f};
   if (lane == 0) {
-    sums.loss += ray_loss(error, distortion.value, job.distortion_weight);
+    sums.loss += ray_loss(error, shape, weights);
     sums.squared_error += squared_error(seen, record.target);
   }
   const float scale = ray.has_room ? 1.0f / float(n_rays) : 0.0f;
-  const RayGradient gradient(error, record.target.gain, distortion, job.distortion_weight, scale);
+  const RayGradient gradient(error, record.target.gain, shape, weights, scale);
   if (job.view_gradients != nullptr && lane == 0) {
     atomicAdd(&job.view_gradients[record.view].by_log_gain, gradient.by_log_gain(seen, record.target));
   }
-  float distortion_behind = gradient.distortion_of_all();
+  if (job.light_gradients != nullptr && lane < 4) {
+    const GainCorners corners(record.place);
+    atomicAdd(&job.light_gradients[record.view].log_gain[corners.node(int(lane))],
+              corners.share(int(lane)) * gradient.by_log_gain(seen, record.target));
+  }
+  float distortion_behind = gradient.distortion_of_all(), depth_behind = shape.depth_miss;
   RunDistortion passed;
   float depth = 0, composited = 0;
   for (int first = 0; first < ray.samples; first += 32) {
@@ -188,15 +196,20 @@ __device__ void train_ray(const TraceJob& job, const RayRecord& record, const Ra
     LitSample sample{1.0f, job.field.activation.value(stored.y), optics.weight(), optics.transmittance_after()};
     sample.composited = composited + warp_prefix_sum(sample.weight * sample.luminance);
     float d_depth = gradient.by_density(sample);
-    if (job.distortion_weight > 0) {
-      const float4 place = has_sample ? job.samples.places[at] : make_float4(0, 0, 0, 0);
-      const float t = dot(Vec3f{place.x, place.y, place.z} - record.ray.origin, record.ray.direction);
+    const float4 place = has_sample ? job.samples.places[at] : make_float4(0, 0, 0, 0);
+    const float t = dot(Vec3f{place.x, place.y, place.z} - record.ray.origin, record.ray.direction);
+    if (weights.distortion > 0) {
       const LogInterval<float> interval(t, march_step(job.march, t));
       const Distortion<float> before = passed.add(sample.weight, interval);
       const float slope = gradient.distortion_by_weight(sample.weight, interval, before);
       const float taken = warp_prefix_sum(sample.weight * slope);
       d_depth += gradient.by_density_of_distortion(sample, slope, distortion_behind - taken);
       distortion_behind -= __shfl_sync(~0u, taken, 31);
+    }
+    if (has_depth) {
+      const float miss = depth_miss(t, record.target.depth), taken = warp_prefix_sum(sample.weight * miss);
+      d_depth += gradient.by_density_of_depth(sample, miss, depth_behind - taken);
+      depth_behind -= __shfl_sync(~0u, taken, 31);
     }
     const float d_raw = gradient.by_luminance(sample) * job.field.activation.derivative(stored.y);
     if (has_sample) job.samples.gradients[at] = make_float2(d_raw, stored.x * d_depth);
@@ -241,6 +254,7 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
 
     if constexpr (kKeep == Keep::kTraining) {
       if (job.distortion_weight > 0) ray.distortion.add(weight, {sample.t, sample.dt});
+      if (record.target.depth.is_known()) ray.depth_miss += weight * depth_miss(sample.t, record.target.depth);
       keep_for_training(job, warp, ray_index, {place, depth, raw_luminance}, count, ray);
       is_open = is_open && ray.has_room;
     }

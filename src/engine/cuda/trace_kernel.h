@@ -52,8 +52,10 @@ struct TraceJob {
   StepState* state;  ///< rays, next_ray, end_ray, samples; training also sums up here
   // Training:
   SampleArrays samples;
+  DepthLearning depth;
   float distortion_weight = 0;
   ViewGradient* view_gradients = nullptr;  ///< by the views' gains; null: not asked for
+  GainField* light_gradients = nullptr;    ///< likewise, by their light
   // Rendering:
   RayResult* results = nullptr;
   // Tracing:

@@ -61,6 +61,12 @@ ViewRecord ViewImages::record_of(const TrainingView& view, bool with_pixels) {
   record.lens = view.lens;
   if (image.depth != PixelDepth::kF32) record.decoded = decoded(image);
   if (view.sky_labels != nullptr) record.sky = sky(*view.sky);
+  if (view.depths != nullptr) {
+    const std::vector<DepthHint>& cells = view.depths->cells;
+    record.depths = reinterpret_cast<const DepthHint*>(plane(cells.data(), cells.size() * sizeof(DepthHint)));
+    record.depth_columns = view.depths->columns;
+    record.depth_rows = view.depths->rows;
+  }
   if (!with_pixels) return record;
   PlacedView placed;
   place_pixels(

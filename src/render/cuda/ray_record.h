@@ -11,6 +11,7 @@ struct alignas(16) RayRecord {
   float jitter = 0.5f;
   RayTarget target;        ///< of training rays
   std::uint32_t view = 0;  ///< of training rays
+  PicturePlace place;      ///< likewise
 };
 
 }  // namespace cnerf

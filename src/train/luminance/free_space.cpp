@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "src/train/luminance/believed_points.h"
 
 namespace cnerf {
 namespace {
 
-constexpr double kLargestError = 2;        // pixels, of a point that is believed
-constexpr std::size_t kShortestTrack = 3;  // views
 constexpr int kVotes = 2;               // that make a place free: a way to a point is one, all points of a view are two
 constexpr int kAcross = 64;             // cells of a sight along the longer side of its picture
 constexpr double kWayRadius = 2.5;      // cells around a point that its view sees through as well
@@ -31,7 +32,7 @@ bool is_in_picture(const Intrinsics& lens, PixelPosition at) {
 
 }  // namespace
 
-FreeSpace::Sight::Sight(const View& view, const std::vector<Vec3d>& shown)
+FreeSpace::Sight::Sight(const View& view, const std::vector<Vec3d>& shown, const std::vector<SkyLabel>& sky)
     : camera_from_world_(view.world_from_camera.inverse()),
       lens_(&view.intrinsics),
       cells_per_pixel_(double(kAcross) / std::max(lens_->width, lens_->height)),
@@ -47,6 +48,7 @@ FreeSpace::Sight::Sight(const View& view, const std::vector<Vec3d>& shown)
     depths.push_back(at.z);
     clear_way_to(*pixel, at.z);
   }
+  clear_way_to_sky(sky);
   if (depths.size() >= kFewestPoints) clear_the_near(std::move(depths));
 }
 
@@ -60,6 +62,22 @@ void FreeSpace::Sight::clear_way_to(PixelPosition pixel, double depth) {
       float& known = clear_depth_[std::size_t(v) * std::size_t(width_) + std::size_t(u)];
       known = known == 0 ? clear : std::min(known, clear);
     }
+  }
+}
+
+/// Where all pixels of a cell show it. A point there knows better.
+void FreeSpace::Sight::clear_way_to_sky(const std::vector<SkyLabel>& sky) {
+  if (sky.empty()) return;
+  std::vector<bool> is_sky(clear_depth_.size(), true);
+  for (std::size_t p = 0; p < sky.size(); ++p) {
+    if (sky[p] == SkyLabel::kSky) continue;
+    const std::size_t x = p % std::size_t(lens_->width), y = p / std::size_t(lens_->width);
+    const auto u = std::min<std::size_t>(std::size_t(double(x) * cells_per_pixel_), std::size_t(width_) - 1);
+    const auto v = std::min<std::size_t>(std::size_t(double(y) * cells_per_pixel_), std::size_t(height_) - 1);
+    is_sky[v * std::size_t(width_) + u] = false;
+  }
+  for (std::size_t c = 0; c < is_sky.size(); ++c) {
+    if (is_sky[c] && clear_depth_[c] == 0) clear_depth_[c] = std::numeric_limits<float>::infinity();
   }
 }
 
@@ -94,15 +112,19 @@ bool FreeSpace::Sight::is_near_lens(Vec3d at, double radius) const {
   return at.z + radius > 0 && distance + radius < near;
 }
 
-FreeSpace::FreeSpace(const std::vector<View>& views, const std::vector<SparsePoint>& points) {
-  std::vector<std::vector<Vec3d>> shown(views.size());
+FreeSpace::FreeSpace(const std::vector<View>& views, const std::vector<SparsePoint>& points,
+                     const std::vector<std::vector<SkyLabel>>& sky) {
   for (const SparsePoint& point : points) {
-    if (point.error > kLargestError || point.views.size() < kShortestTrack) continue;
-    points_.push_back(point.position);
-    for (const std::uint32_t view : point.views) shown[view].push_back(point.position);
+    if (is_believed(point)) points_.push_back(point.position);
   }
+  const std::vector<std::vector<Vec3d>> shown = believed_points(views.size(), points);
+  const std::vector<SkyLabel> no_sky;
+  std::size_t training = 0;
   for (std::size_t i = 0; i < shown.size(); ++i) {
-    if (!views[i].held_out && !shown[i].empty()) sights_.emplace_back(views[i], shown[i]);
+    if (views[i].held_out) continue;
+    const std::vector<SkyLabel>& of_view = sky.empty() ? no_sky : sky[training];
+    ++training;
+    if (!shown[i].empty() || !of_view.empty()) sights_.emplace_back(views[i], shown[i], of_view);
   }
 }
 

@@ -1,20 +1,24 @@
 #pragma once
-/// Space that sparse points prove empty.
+/// Space that sparse points and the sky prove empty.
 
 #include <vector>
 
 #include "src/capture/capture.h"
+#include "src/render/training_views.h"
 
 namespace cnerf {
 
 /// A view that shows a sparse point sees through all that lies between: space around the way to it is empty, and what
-/// is nearer to the lens than all that the view shows. Two ways have to agree, or one view's points together. Held-out
-/// views do not, and without points nothing is known. What has no features at all, such as a white thing before a
-/// picture's nearest point, is not protected.
+/// is nearer to the lens than all that the view shows. Where it shows the sky it sees through everything. Two ways have
+/// to agree, or one view's points together. Held-out views say nothing. What has no features at all, such as a white
+/// thing before a picture's nearest point, is not protected.
 class FreeSpace {
  public:
-  /// Refers to the views.  @param points  their `views` are places in `views`
-  FreeSpace(const std::vector<View>& views, const std::vector<SparsePoint>& points);
+  /// Refers to the views.
+  /// @param points  their `views` are places in `views`
+  /// @param sky     [training views] as SeenSky has it; empty: none is seen
+  FreeSpace(const std::vector<View>& views, const std::vector<SparsePoint>& points,
+            const std::vector<std::vector<SkyLabel>>& sky = {});
 
   /// Whether enough views see through the whole ball, and no point lies in it. World space.
   [[nodiscard]] bool holds(Vec3d centre, double radius) const;
@@ -23,7 +27,8 @@ class FreeSpace {
   /// What a view sees through: a small picture of depths along its axis, up to which all is empty.
   class Sight {
    public:
-    Sight(const View& view, const std::vector<Vec3d>& shown);
+    /// @param sky  [H, W]; empty: the view shows none
+    Sight(const View& view, const std::vector<Vec3d>& shown, const std::vector<SkyLabel>& sky);
     /// How much it says for a ball's being empty.
     [[nodiscard]] int votes_for(Vec3d centre, double radius) const;
 
@@ -31,6 +36,7 @@ class FreeSpace {
     /// @param at  in the camera's axes, not in its picture or partly behind its lens
     [[nodiscard]] bool is_near_lens(Vec3d at, double radius) const;
     void clear_way_to(PixelPosition pixel, double depth);
+    void clear_way_to_sky(const std::vector<SkyLabel>& sky);
     void clear_the_near(std::vector<double> depths);
 
     Affined camera_from_world_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -60,17 +61,40 @@ bool neighbours_tell(const std::vector<float>& gains) {
   return by_neighbours < by_median;
 }
 
+Mat3d turned_axes(const Mat3d& axes, Vec3d turn) {
+  return Mat3d::from_columns(turned(turn, axes.column(0)), turned(turn, axes.column(1)), turned(turn, axes.column(2)));
+}
+
+std::string lens_text(const LensCorrection& lens) {
+  return fmt::format("focal length times {:.4f}, k1 {:+.4f}, k2 {:+.4f}", std::exp(lens.log_focal), lens.k1, lens.k2);
+}
+/// Before and after.
+std::string lens_text(const LensCorrection& lens, const Intrinsics& given) {
+  const Intrinsics found = lens.applied_to(given);
+  std::string text = fmt::format(
+      "focal length times {:.4f} ({:.1f} -> {:.1f} pixels), principal point {:.1f}, {:.1f} -> {:.1f}, {:.1f}",
+      std::exp(lens.log_focal), given.fx, found.fx, given.cx, given.cy, found.cx, found.cy);
+  if (given.model == LensModel::kOpenCvFisheye) return text;  // whose distortion is not learned
+  constexpr std::array<const char*, 4> kNames = {"k1", "k2", "p1", "p2"};
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    text += fmt::format(", {} {:+.4f} -> {:+.4f}", kNames[i], given.distortion[i], found.distortion[i]);
+  }
+  return text;
+}
+
 }  // namespace
 
 Affined corrected_pose(const Affined& world_from_camera, const ViewCorrection& correction, const SceneFrame& frame) {
-  const Vec3d turn = correction.turn.cast<double>();
-  const Mat3d& given = world_from_camera.linear;
-  return {
-      Mat3d::from_columns(turned(turn, given.column(0)), turned(turn, given.column(1)), turned(turn, given.column(2))),
-      world_from_camera.translation + correction.shift.cast<double>() / frame.unit_per_world};
+  return {turned_axes(world_from_camera.linear, correction.turn.cast<double>()),
+          world_from_camera.translation + correction.shift.cast<double>() / frame.unit_per_world};
 }
 
-std::vector<LearnedFact> facts_of(const LearnedViews& learned) {
+Affined given_pose(const Affined& world_from_camera, const ViewCorrection& correction, const SceneFrame& frame) {
+  return {turned_axes(world_from_camera.linear, -correction.turn.cast<double>()),
+          world_from_camera.translation - correction.shift.cast<double>() / frame.unit_per_world};
+}
+
+std::vector<LearnedFact> facts_of(const LearnedViews& learned, std::span<const Intrinsics> given) {
   std::vector<double> gains, turns, shifts;
   for (const ViewCorrection& correction : learned.corrections) {
     gains.push_back(correction.gain());
@@ -88,10 +112,9 @@ std::vector<LearnedFact> facts_of(const LearnedViews& learned) {
                                 "{:.2f}, {:.2f})",
                                 median(turns), median(shifts), std::ranges::max(turns), std::ranges::max(shifts))});
   }
-  for (const LensCorrection& lens : learned.lenses) {
-    if (facts.size() >= kMostFacts) break;
-    facts.push_back({"lens", fmt::format("focal length times {:.4f}, k1 {:+.4f}, k2 {:+.4f}", std::exp(lens.log_focal),
-                                         lens.k1, lens.k2)});
+  const bool knows_given = given.size() == learned.lenses.size();
+  for (std::size_t l = 0; l < learned.lenses.size() && facts.size() < kMostFacts; ++l) {
+    facts.push_back({"lens", knows_given ? lens_text(learned.lenses[l], given[l]) : lens_text(learned.lenses[l])});
   }
   return facts;
 }
@@ -144,9 +167,10 @@ std::vector<std::string> apply_learned_views(Capture& capture, const std::filesy
     throw SnapshotError(fmt::format("{}: learned of {} lenses, but the capture has {}", stage1_snapshot.string(),
                                     learned.lenses.size(), lenses_of(capture).size()));
   }
+  const std::vector<LearnedFact> facts = facts_of(learned, lenses_of(capture));
   apply_learned_views(capture, learned);
   std::vector<std::string> lines;
-  for (const auto& [name, text] : facts_of(learned)) lines.push_back(name + ": " + text);
+  for (const auto& [name, text] : facts) lines.push_back(name + ": " + text);
   const std::string strays = stray_cameras(learned, names);
   if (!strays.empty()) lines.push_back("note: these poses are not inexact but wrong, by the look of it: " + strays);
   return lines;

@@ -23,9 +23,10 @@ std::unique_ptr<LuminanceEngine> make_engine(const LuminanceModel& model, const 
   engine.march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
   engine.samples_per_step = options.samples_per_step;
   engine.distortion_weight = float(options.distortion_weight);
+  engine.depth.weight = float(options.depth_weight);
   engine.max_luminance = model.max_luminance;
   if (model.learned_views > 0) {
-    engine.learning = {model.learned_views, model.learned_lenses, options.exposures, options.poses};
+    engine.learning = {model.learned_views, model.learned_lenses, options.exposures, options.poses, model.learns_light};
   }
   engine.seed = std::uint64_t(options.seed);
   return engines.make_luminance(engine);
@@ -143,22 +144,23 @@ SceneFrame frame_from_json(const nlohmann::json& json) {
 }
 
 LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options, const Engines& engines) {
-  return create(capture, options, engines, capture.points);
+  const std::vector<SparsePoint> unknown;
+  return create(capture, options, engines, FreeSpace(capture.views, options.free_space ? capture.points : unknown));
 }
 
 LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options, const Engines& engines,
-                                      const std::vector<SparsePoint>& points) {
+                                      const FreeSpace& free_space) {
   LuminanceModel model;
   model.frame = place_scene(capture, options.placement);
   model.options = options;
   model.max_luminance = brightest(capture);
   if (options.lenses) model.learned_lenses = int(lenses_of(capture).size());
-  if (options.exposures || options.poses || options.lenses) {
+  model.learns_light = options.moving_light;
+  if (options.exposures || options.poses || options.lenses || options.moving_light) {
     model.learned_views = int(std::ranges::count_if(capture.views, [](const View& view) { return !view.held_out; }));
   }
   model.engine = make_engine(model, engines);
-  const auto known = options.free_space ? points : std::vector<SparsePoint>();
-  exclude_empty(capture, model.frame, FreeSpace(capture.views, known), *model.engine);
+  exclude_empty(capture, model.frame, free_space, *model.engine);
   return model;
 }
 
@@ -201,6 +203,7 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   model.trained_samples = header_field<double>(snapshot, "trained_samples");
   model.learned_views = learned_count(snapshot, "learned_views");
   model.learned_lenses = learned_count(snapshot, "learned_lenses");
+  model.learns_light = snapshot.header().contains("learns_light") && header_field<bool>(snapshot, "learns_light");
   check_stored(snapshot, model);
   model.engine = make_engine(model, engines);
   model.sky = stored_sky(snapshot);
@@ -223,6 +226,7 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
                  {"max_luminance", max_luminance},
                  {"learned_views", learned_views},
                  {"learned_lenses", learned_lenses},
+                 {"learns_light", learns_light},
                  {"trained_samples", trained_samples},
                  {"sky_width", sky.width},
                  {"step", engine->step_count()}},

@@ -8,6 +8,7 @@
 #include "src/engine/engines.h"
 #include "src/engine/luminance_engine.h"
 #include "src/field/scene_frame.h"
+#include "src/train/luminance/free_space.h"
 #include "src/train/luminance/seen_scene.h"
 #include "src/train/luminance/snapshot.h"
 #include "src/train/luminance/stage1_options.h"
@@ -27,15 +28,16 @@ struct LuminanceModel {
   float max_luminance = 1;
   int learned_views = 0;       ///< training views of which something is learned; 0: nothing is
   int learned_lenses = 0;      ///< lenses that are learned
+  bool learns_light = false;   ///< of the learned views, over their pictures
   double seconds = 0;          ///< training time so far
   double trained_samples = 0;  ///< so far
   std::unique_ptr<LuminanceEngine> engine;
   DirectionMap sky;  ///< linear Y beyond the box, at the median view's exposure; none where no view sees one
 
-  /// A fresh model for a capture. The second form knows more points than the capture brings.
+  /// A fresh model for a capture. The first form knows of free space what the capture's own points say.
   static LuminanceModel create(const Capture& capture, const Stage1Options& options, const Engines& engines);
   static LuminanceModel create(const Capture& capture, const Stage1Options& options, const Engines& engines,
-                               const std::vector<SparsePoint>& points);
+                               const FreeSpace& free_space);
   /// @throws MissingInputError, SnapshotError
   static LuminanceModel load(const std::filesystem::path& snapshot, const Engines& engines);
   /// Only what it was trained with.  @throws MissingInputError, SnapshotError

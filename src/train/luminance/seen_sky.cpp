@@ -280,11 +280,21 @@ std::vector<std::vector<Vec3d>> points_by_view(const Capture& capture, const std
 }
 
 bool enough_views(const SeenSky& sky) {
-  const auto count = std::ranges::count_if(sky.labels, [](const auto& labels) { return !labels.empty(); });
-  return count >= 2 && double(count) >= kLeastViews * double(sky.labels.size());
+  return sky.views() >= 2 && double(sky.views()) >= kLeastViews * double(sky.labels.size());
 }
 
 }  // namespace
+
+int SeenSky::views() const {
+  return int(std::ranges::count_if(labels, [](const auto& of_view) { return !of_view.empty(); }));
+}
+
+double SeenSky::share(std::span<const TrainingView> of) const {
+  double sky = 0, all = 0;
+  for (const auto& of_view : labels) sky += double(std::ranges::count(of_view, SkyLabel::kSky));
+  for (const TrainingView& view : of) all += double(view.image->pixel_count());
+  return all > 0 ? sky / all : 0;
+}
 
 void SeenSky::show_to(std::vector<TrainingView>& views) const {
   for (std::size_t v = 0; v < labels.size() && light.exists(); ++v) {
@@ -296,7 +306,7 @@ void SeenSky::show_to(std::vector<TrainingView>& views) const {
 
 SeenSky find_sky(const Capture& capture, std::span<const TrainingView> views, const std::vector<SparsePoint>& points) {
   SeenSky sky;
-  if (capture.is_bounded_object) return sky;
+  if (capture.is_bounded_object || views.empty()) return sky;
   const Vec3d up = arrangement_of(capture).up;
   const std::vector<const View*> of_capture = training_views_of(capture);
   const std::vector<std::vector<Vec3d>> shown = points_by_view(capture, points);

@@ -15,6 +15,10 @@ struct SeenSky {
   std::vector<std::vector<SkyLabel>> labels;  ///< [training views][H, W]; empty: that view shows no sky
   DirectionMap light;                         ///< linear Y at the median view's exposure; there is none: no view does
 
+  /// How many views show it, and how much of all pixels it is.
+  [[nodiscard]] int views() const;
+  [[nodiscard]] double share(std::span<const TrainingView> of) const;
+
   /// Views and steps know of it. It has to outlive them.
   void show_to(std::vector<TrainingView>& views) const;
 };

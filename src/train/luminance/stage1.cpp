@@ -9,6 +9,7 @@
 #include "src/base/error.h"
 #include "src/base/usage.h"
 #include "src/optim/adam.h"
+#include "src/train/luminance/depth_hints.h"
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/options_json.h"
 #include "src/train/luminance/seen_sky.h"
@@ -88,9 +89,19 @@ const std::vector<SparsePoint>& points_of(const Stage1Job& job) {
   return job.points.empty() ? job.capture.points : job.points;
 }
 
-LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines) {
+SeenSky sky_of(const Stage1Job& job) {
+  if (!job.options.sky) return {};
+  return find_sky(job.capture, training_views(job.capture, {}), points_of(job));  // directions know no frame
+}
+
+FreeSpace free_space_of(const Stage1Job& job, const SeenSky& sky) {
+  if (!job.options.free_space) return FreeSpace(job.capture.views, {});
+  return FreeSpace(job.capture.views, points_of(job), sky.labels);
+}
+
+LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines, const SeenSky& sky) {
   if (!job.goes_on()) {
-    return LuminanceModel::create(job.capture, job.options, engines, points_of(job));
+    return LuminanceModel::create(job.capture, job.options, engines, free_space_of(job, sky));
   }
   LuminanceModel model = LuminanceModel::load(job.snapshot, engines);
   refuse_others(job.snapshot, model.options, job.options);
@@ -158,13 +169,14 @@ void check_continues(const std::filesystem::path& snapshot, const Stage1Options&
 
 Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer& observer) {
   const Stage1Options& options = job.options;
-  LuminanceModel model = start_or_resume(job, engines);
+  const SeenSky sky = sky_of(job);
+  LuminanceModel model = start_or_resume(job, engines, sky);
   std::vector<TrainingView> views = training_views(job.capture, model.frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
-  SeenSky sky;
-  if (options.sky) sky = find_sky(job.capture, views, points_of(job));
   sky.show_to(views);
   model.sky = sky.light;
+  const std::vector<DepthHints> depths = depth_hints(job.capture, model.frame, points_of(job));
+  for (std::size_t v = 0; v < depths.size(); ++v) views[v].depths = &depths[v];
   model.engine->limit_image_memory(job.image_memory);
   model.engine->set_views(views);
   model.engine->share_steps(share_of(job.ranks));
@@ -206,7 +218,12 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   if (model.sky.exists()) model.sky = sky_light(views, sky.labels, model.engine->view_corrections());
   save_snapshot_of(model, job);
   observer.report_progress({"stage 1", 1.0, {{"psnr", psnr.value()}}});
-  return {int(model.engine->step_count()), model.seconds, model.trained_samples, psnr.value()};
+  return {int(model.engine->step_count()),
+          model.seconds,
+          model.trained_samples,
+          psnr.value(),
+          sky.views(),
+          sky.share(views)};
 }
 
 }  // namespace cnerf

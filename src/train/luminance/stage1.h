@@ -21,6 +21,8 @@ struct Stage1Report {
   double seconds = 0;  ///< training time only, over all resumed parts
   double trained_samples = 0;
   double train_psnr = 0;  ///< luminance dB over the rays of the last 100 steps since it began or went on
+  int sky_views = 0;      ///< training views that show a sky
+  double sky_share = 0;   ///< of all their pixels
 };
 
 /// Whether a training with these options may go on from `snapshot`, if there is one.

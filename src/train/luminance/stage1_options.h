@@ -27,10 +27,11 @@ struct Stage1Options {
   int samples_per_step = 65536;
   double learning_rate = 1e-2, final_learning_rate = 5e-4;
   double distortion_weight = 3e-4;
+  double depth_weight = 0.01;
   int steps_per_box = 256;
   double cone_angle = 1.0 / 64;
   bool free_space = true;
-  bool exposures = true, poses = false, lenses = false;
+  bool exposures = true, moving_light = false, poses = false, lenses = false;
   bool sky = true;
   int checkpoint_every = 1000;
   int seed = 1;
@@ -49,11 +50,14 @@ struct Stage1Options {
       "Adam's step size at the end, reached by exponential decay over the last half");
     v("distortion_weight", distortion_weight, Range{0, 10},
       "of a loss on how far apart the samples of a ray lie: against fog and floaters");
+    v("depth_weight", depth_weight, Range{0, 10},
+      "of a loss on distances that sparse points tell, at the start; it fades");
     v("steps_per_box", steps_per_box, Range{16, 8192}, "march steps across the side of the innermost cascade");
     v("cone_angle", cone_angle, Range{1e-4, 1}, "march step over distance, in scenes of several cascades");
     v("free_space", free_space,
       "space before sparse points is empty; they are found first where a capture has none and nothing else bounds it");
     v("exposures", exposures, "the light of each training view is learned, over that of the median view");
+    v("moving_light", moving_light, "so is how light differs over each picture: shadows that move, clouds");
     v("poses", poses, "where cameras stood and looked is learned");
     v("lenses", lenses, "focal lengths, principal points and distortion of the views' lenses are learned");
     v("sky", sky, "where views see a sky, its light comes from beyond the scene and the way there is empty");

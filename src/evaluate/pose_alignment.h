@@ -10,7 +10,7 @@
 #include "src/base/vec3.h"
 #include "src/render/view_correction.h"
 
-namespace cnerf::test {
+namespace cnerf {
 
 /// The rotation vector of a rotation by less than half a turn.
 inline Vec3d rotation_vector(const Mat3d& r) {
@@ -65,4 +65,4 @@ struct PoseAlignment {
   return found;
 }
 
-}  // namespace cnerf::test
+}  // namespace cnerf
