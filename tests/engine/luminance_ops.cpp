@@ -256,7 +256,7 @@ Op stage1(const Problem& problem) {
     op.bounds.push_back({"gradient of the poses", 1e-3, 3e-2, Measure::kGradient});
     op.bounds.push_back({"gradient of the lens", 1e-3, 3e-2, Measure::kGradient});
     op.bounds.push_back({"gradient of the light", 1e-3, 1e-2, Measure::kGradient});
-    pieces.insert(pieces.end(), {"views", "views.moments", "lenses", "lenses.moments", "light", "light.moments"});
+    pieces.insert(pieces.end(), {"views", "views.moments", "light", "light.moments", "lenses", "lenses.moments"});
   }
   op.bounds.push_back({"density of points", 1e-4, 1e-2});
   op.bounds.push_back({"luminance of points", 1e-4, 5e-3});
