@@ -93,7 +93,7 @@ Passes make_passes(const Job& job, const std::vector<Plan>& plans, Journal& jour
 
 /// A journal that this bake cannot have written is not believed: all is made anew.
 Passes go_on(const Job& job, const std::vector<Plan>& plans, Journal& journal, Observer& observer) {
-  if (journal.found() == 0) return make_passes(job, plans, journal, observer);
+  if (!journal.has_found_any()) return make_passes(job, plans, journal, observer);
   observer.say("bake: going on where it was stopped");
   try {
     return make_passes(job, plans, journal, observer);
@@ -114,8 +114,10 @@ void run(const Job& job, Output& output, Observer& observer) {
   say_estimate(plans, estimate, observer);
   check_memory(estimate, held, options);
 
-  Journal journal(job.journal, identity_of(job, plans));
+  Journal journal = job.ranks.is_first() ? Journal(job.journal, identity_of(job, plans)) : Journal();
+  journal.share_with(job.ranks);
   auto [levels, volumes] = drop_on_bad_input(job.journal, [&] { return go_on(job, plans, journal, observer); });
+  if (!job.ranks.is_first()) return;
   if (job.volumes != VolumeUse::kNone) {
     if (!job.mesh) levels.clear();  // grids of files need the memory
     // Density that was given back is still the process's, and is what the grids will take.

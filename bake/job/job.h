@@ -12,6 +12,7 @@
 #include "bake/options.h"
 #include "bake/out_of_core/planes.h"
 #include "src/base/observer.h"
+#include "src/cluster/ranks.h"
 #include "src/engine/engines.h"
 #include "src/field/color_field.h"
 
@@ -29,6 +30,7 @@ struct Job {
   const Engines& engines;
   std::vector<Camera> cameras;  ///< of the capture
   Options options;
+  cluster::Ranks& ranks = cluster::alone();  ///< that find voxels for each other; rank 0 alone goes on with them
   VolumeUse volumes = VolumeUse::kGrids;
   std::optional<MeshOptions> mesh = {};  ///< none: no mesh is made
   std::filesystem::path journal = {};    ///< the file of finished parts; there while the bake is not finished

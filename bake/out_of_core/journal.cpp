@@ -146,6 +146,28 @@ std::size_t Journal::found() const {
   return file_->found;
 }
 
+std::size_t Journal::finished_of_rank_0() const {
+  if (ranks_->is_alone()) return size();
+  std::size_t finished = 0;
+  const cluster::Bytes said = ranks_->broadcast(cluster::Packer().add(size()).packed());
+  cluster::Unpacker(said).get(finished);
+  return finished;
+}
+
+void Journal::hear_of_refusals(std::exception_ptr& failure) const {
+  bool refuses = false;
+  try {
+    if (failure) std::rethrow_exception(failure);
+  } catch (const JournalError&) {
+    refuses = true;
+  } catch (...) {
+    refuses = false;  // this rank ends, and the others hear why
+  }
+  if (ranks_->any(refuses) && !failure) {
+    failure = std::make_exception_ptr(JournalError("unfinished.bake holds what this bake cannot have made"));
+  }
+}
+
 void Journal::restart() {
   file_->begin();
 }

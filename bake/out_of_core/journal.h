@@ -17,6 +17,8 @@
 
 #include "src/base/error.h"
 #include "src/base/parallel.h"
+#include "src/cluster/packing.h"
+#include "src/cluster/ranks.h"
 
 namespace cnerf::bake {
 
@@ -40,11 +42,16 @@ class Journal {
   Journal(Journal&&) noexcept;
   Journal& operator=(Journal&&) noexcept;
 
+  /// From now on these ranks make parts for each other. All have a journal of their own, which come to hold the same;
+  /// what was found is rank 0's. All call `parts` in the same order, and `restart`.
+  void share_with(cluster::Ranks& ranks) { ranks_ = &ranks; }
+
   [[nodiscard]] std::size_t size() const;
   /// Forgets all parts, those of the file too.  @throws OutputError.
   void restart();
   /// How many parts there were when the file was opened.
   [[nodiscard]] std::size_t found() const;
+  [[nodiscard]] bool has_found_any() const { return ranks_->agreed(found() > 0); }
 
   /// Calls `use(i, part first + i)` for each i below `count`, in order. A part is read if it is finished, else made and
   /// written, which has to happen in order and without gaps. `at_a_time` parts are made at the same time: `make(i)` is
@@ -58,17 +65,20 @@ class Journal {
              const std::function<std::vector<T>(std::size_t)>& make,
              const std::function<void(std::size_t, const std::vector<T>&)>& use,
              const std::function<bool(std::size_t, const std::vector<T>&)>& is_sound = {}) {
+    const auto ranks = std::size_t(ranks_->size()), rank = std::size_t(ranks_->rank());
+    at_a_time *= ranks;
     for (std::size_t begin = 0; begin < count; begin += at_a_time) {
       std::vector<std::optional<std::vector<T>>> some(std::min(at_a_time, count - begin));
-      const std::size_t finished = size();
+      const std::size_t own = size(), finished = finished_of_rank_0();
       std::exception_ptr failure;
       try {
         parallel_tasks(some.size(), [&](std::size_t i) {
           const std::size_t number = first + begin + i;
           if (number >= finished) {
-            some[i] = make(begin + i);
+            if (i % ranks == rank) some[i] = make(begin + i);
             return;
           }
+          if (rank > 0) return;
           std::vector<T> part = read<T>(number);
           if (is_sound && !is_sound(begin + i, part)) refuse(number);
           some[i] = std::move(part);
@@ -76,10 +86,12 @@ class Journal {
       } catch (...) {
         failure = std::current_exception();
       }
+      if (ranks > 1) hear_of_refusals(failure);
+      if (ranks > 1 && !failure) exchange(finished - std::min(finished, first + begin), some);
       // What is made is kept, whoever stops the bake.
       for (std::size_t i = 0; i < some.size() && some[i]; ++i) {
         const std::size_t number = first + begin + i;
-        if (number >= finished) append(number, std::as_bytes(std::span<const T>(*some[i])));
+        if (number >= own) append(number, std::as_bytes(std::span<const T>(*some[i])));
       }
       if (failure) std::rethrow_exception(failure);
       for (std::size_t i = 0; i < some.size(); ++i) {
@@ -101,11 +113,27 @@ class Journal {
 
  private:
   struct File;
+  [[nodiscard]] std::size_t finished_of_rank_0() const;
+  /// Parts that are not sound are found by rank 0, which reads them; all refuse them.
+  void hear_of_refusals(std::exception_ptr& failure) const;
+  /// Parts go to all: the first ones from rank 0, which had them, of the others each from who made it.
+  template <typename T>
+  void exchange(std::size_t had, std::vector<std::optional<std::vector<T>>>& some) const {
+    const auto ranks = std::size_t(ranks_->size());
+    cluster::Packer packer;
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      if (some[i]) packer.add(*some[i]);
+    }
+    const std::vector<cluster::Bytes> all = ranks_->gather(packer.packed());
+    std::vector<cluster::Unpacker> of_rank(all.begin(), all.end());
+    for (std::size_t i = 0; i < some.size(); ++i) of_rank[i < had ? 0 : i % ranks].get(some[i].emplace());
+  }
   void append(std::size_t number, std::span<const std::byte> bytes);
   [[nodiscard]] std::vector<std::byte> read_bytes(std::size_t number) const;
   [[noreturn]] void refuse(std::size_t number) const;
 
   std::unique_ptr<File> file_;
+  cluster::Ranks* ranks_ = &cluster::alone();
 };
 
 }  // namespace cnerf::bake

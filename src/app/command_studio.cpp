@@ -47,7 +47,7 @@ pipeline::RunContext begin_run(const StudioArguments& arguments, const std::vect
                                const fs::path& capture, Observer& observer) {
   const Config config = resolve_config(arguments.run.config);
   pipeline::RunContext context{pipeline::RunDirectory(arguments.folder()), config,
-                               pipeline::read_capture(capture, config, observer), command_line};
+                               pipeline::read_capture(capture, config, observer, arguments.folder()), command_line};
   const FolderLock lock = pipeline::claim_run_folder(context.directory, {}, observer);
   pipeline::begin_run(context, capture, {});
   return context;

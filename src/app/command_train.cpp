@@ -24,8 +24,8 @@ void train(TrainArguments arguments, const std::vector<std::string>& command_lin
   const bool goes_on = arguments.existing.resume && directory.exists();
   const Config config = resolve_config(arguments.config, goes_on ? directory.config("", reporter) : Config{});
   const Engines& engines = engines_for(config.device);
-  const pipeline::RunContext context{directory, config, pipeline::read_capture(arguments.capture, config, reporter),
-                                     command_line};
+  const pipeline::RunContext context{
+      directory, config, pipeline::read_capture(arguments.capture, config, reporter, directory.root()), command_line};
   const FolderLock lock = pipeline::claim_run_folder(directory, arguments.existing, reporter);
   std::optional<web::LiveSession> live;
   if (arguments.view && cluster::world().is_first()) {

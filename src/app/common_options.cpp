@@ -60,6 +60,7 @@ void add_config_options(CLI::App& app, ConfigArguments& arguments) {
   add_short_form(app, arguments, "--device", "device");
   add_short_form(app, arguments, "--threads", "threads");
   add_short_form(app, arguments, "--max-memory", "max_memory");
+  add_short_form(app, arguments, "--image-memory", "image_memory");
   add_progress_options(app, arguments.progress);
 }
 

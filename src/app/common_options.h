@@ -23,7 +23,7 @@ struct ConfigArguments {
   bool is_trusting = false;  ///< whoever made the run folder, whose colorizer is code
 };
 
-/// Declares --preset, --config, --set, --device, --threads, --max-memory, --progress and --quiet.
+/// Declares --preset, --config, --set, --device, --threads, --max-memory, --image-memory, --progress and --quiet.
 void add_config_options(CLI::App& app, ConfigArguments& arguments);
 /// Declares --progress and its short form --quiet.
 void add_progress_options(CLI::App& app, std::string& progress);

@@ -33,7 +33,7 @@ pipeline::RunContext open_begun_run(const RunFolderArguments& arguments, const s
                             ": no such file or folder; --capture says where it lies now");
   }
   Capture capture = pipeline::read_capture(arguments.capture.empty() ? record.capture : fs::path(arguments.capture),
-                                           config, reporter);
+                                           config, reporter, directory.root());
   pipeline::RunContext context{std::move(directory), std::move(config), std::move(capture), std::move(command_line)};
   if (record.stage1.finished) pipeline::use_learned_views(context, reporter);
   return context;

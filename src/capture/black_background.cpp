@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -87,10 +88,21 @@ std::optional<cv::Mat1b> empty_part(const MonoImage& image) {
   return empty;
 }
 
-void cut_out(MonoImage& image, const cv::Mat1b& empty) {
+/// A bit for each pixel: many views are looked at before it is known whether any is cut out.
+std::vector<bool> bits_of(const cv::Mat1b& part) {
+  std::vector<bool> bits;
+  bits.reserve(part.total());
+  for (const std::uint8_t value : part) bits.push_back(value != 0);
+  return bits;
+}
+
+void cut_out(MonoImage& image, const std::vector<bool>& empty) {
+  image.u8.bring_to_memory();
+  image.u16.bring_to_memory();
+  image.f32.bring_to_memory();
   image.alpha.assign(image.pixel_count(), 255);
   for (std::size_t p = 0; p < image.pixel_count(); ++p) {
-    if (empty(int(p) / image.width, int(p) % image.width) == 0) continue;
+    if (!empty[p]) continue;
     image.alpha[p] = 0;
     if (!image.u8.empty()) image.u8[p] = 0;
     if (!image.u16.empty()) image.u16[p] = 0;
@@ -100,11 +112,22 @@ void cut_out(MonoImage& image, const cv::Mat1b& empty) {
 
 }  // namespace
 
-bool cut_out_of_black(std::vector<View>& views) {
-  std::vector<std::optional<cv::Mat1b>> empty(views.size());
-  parallel_tasks(views.size(), [&](std::size_t v) { empty[v] = empty_part(views[v].image); });
-  if (!std::ranges::all_of(empty, [](const auto& part) { return part.has_value(); })) return false;
-  for (std::size_t v = 0; v < views.size(); ++v) cut_out(views[v].image, *empty[v]);
+bool cut_out_of_black(std::vector<View>& views, const std::function<void(MonoImage&)>& changed) {
+  std::vector<std::vector<bool>> empty(views.size());
+  std::atomic<bool> all_are_before_black = true;
+  parallel_tasks(views.size(), [&](std::size_t v) {
+    if (!all_are_before_black) return;
+    if (const std::optional<cv::Mat1b> part = empty_part(views[v].image)) {
+      empty[v] = bits_of(*part);
+    } else {
+      all_are_before_black = false;
+    }
+  });
+  if (!all_are_before_black) return false;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    cut_out(views[v].image, empty[v]);
+    changed(views[v].image);
+  }
   return true;
 }
 

@@ -300,7 +300,7 @@ LoadedView load_view(const ListedView& listed, Transfer transfer) {
 constexpr double kTransparentShare = 0.05;
 
 bool is_cut_out(const View& view) {
-  const std::vector<std::uint8_t>& alpha = view.image.alpha;
+  const PixelPlane<std::uint8_t>& alpha = view.image.alpha;
   const auto transparent = std::count(alpha.begin(), alpha.end(), std::uint8_t(0));
   return double(transparent) > kTransparentShare * double(view.image.pixel_count());
 }
@@ -309,16 +309,39 @@ bool is_cut_out(const View& view) {
 /// not learnt as empty space.
 void mask_what_is_transparent(MonoImage& image) {
   if (image.alpha.empty()) return;
+  const PixelPlane<std::uint8_t>& alpha = image.alpha;
+  image.mask.bring_to_memory();
   if (image.mask.empty()) image.mask.assign(image.pixel_count(), 255);
   for (std::size_t i = 0; i < image.pixel_count(); ++i) {
-    if (image.alpha[i] < 255) image.mask[i] = 0;
+    if (alpha[i] < 255) image.mask[i] = 0;
   }
   image.alpha.clear();
 }
 
-void load_views(const std::vector<ListedView>& listed, Transfer transfer, Capture& capture) {
+/// What the pixels of all views will take, by the headers that say it.
+std::size_t stated_bytes(const std::vector<ListedView>& listed) {
+  double bytes = 0;
+  for (const ListedView& view : listed) {
+    std::optional<ImageHeader> header;
+    try {
+      header = stated_header(view.image_file);
+    } catch (const Error&) {
+      continue;  // who reads it says what is wrong
+    }
+    if (!header) continue;
+    const int depth = header->depth == PixelDepth::kU8 ? 1 : header->depth == PixelDepth::kU16 ? 2 : 4;
+    const int of_pixel = depth + (header->has_alpha ? 1 : 0);
+    bytes += of_pixel * double(header->width) * double(header->height) / (view.downscale * view.downscale);
+  }
+  return std::size_t(bytes);
+}
+
+void load_views(const std::vector<ListedView>& listed, Transfer transfer, PhotographStore& store, Capture& capture) {
   std::vector<LoadedView> loaded(listed.size());
-  parallel_tasks(listed.size(), [&](std::size_t i) { loaded[i] = load_view(listed[i], transfer); });
+  parallel_tasks(listed.size(), [&](std::size_t i) {
+    loaded[i] = load_view(listed[i], transfer);
+    store.take(loaded[i].view.image);
+  });
   const auto colored = std::count_if(loaded.begin(), loaded.end(), [](const LoadedView& v) { return v.had_color; });
   if (colored > 0) {
     capture.notes.push_back(std::to_string(colored) + " of " + std::to_string(loaded.size()) +
@@ -383,19 +406,27 @@ std::vector<FullSizeImage> full_size_images(const fs::path& path, const CaptureO
   return images;
 }
 
-Capture load_capture(const fs::path& path, const CaptureOptions& options) {
+Capture load_capture(const fs::path& path, const CaptureOptions& options, const ImageMemory& memory) {
   const Transfer transfer = transfer_named(options.transfer);
   Found found = find_views(path, options);
   Capture capture = capture_without_views(found);
   const std::vector<ListedView>& listed = found.listing.views;
-  load_views(listed, transfer, capture);
-  if (options.cut_out_of_black && !capture.depth_range && cut_out_of_black(capture.views)) {
+  PhotographStore store(memory, stated_bytes(listed));
+  load_views(listed, transfer, store, capture);
+  const auto put = [&](MonoImage& image) {
+    if (store.has_file()) store.put(image);
+  };
+  for (View& view : capture.views) put(view.image);  // those that came before there was a file
+  if (options.cut_out_of_black && !capture.depth_range && cut_out_of_black(capture.views, put)) {
     capture.notes.push_back(
         "all views show an object before black, which is taken as empty (capture.cut_out_of_black)");
   }
   capture.is_bounded_object = std::all_of(capture.views.begin(), capture.views.end(), is_cut_out);
   if (!capture.is_bounded_object) {
-    for (View& view : capture.views) mask_what_is_transparent(view.image);
+    for (View& view : capture.views) {
+      mask_what_is_transparent(view.image);
+      put(view.image);
+    }
   }
   return capture;
 }

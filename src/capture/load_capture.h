@@ -6,6 +6,7 @@
 
 #include "src/base/options.h"
 #include "src/capture/capture.h"
+#include "src/capture/photograph_store.h"
 
 namespace cnerf {
 
@@ -32,8 +33,11 @@ struct CaptureOptions {
 /// `metadata.json` beside `rgb/` (Record3D). A path to the marker file itself works as well; an `.xml` may have any
 /// name.
 /// @throws MissingInputError  no such folder, or no marker: the message lists what was looked for.
+/// @param memory  for its pixels; images are read one by one on each thread, whatever their number
 /// @throws InputError         fewer than 2 usable views, bad poses, truncated files; names file, field and value.
-[[nodiscard]] Capture load_capture(const std::filesystem::path& path, const CaptureOptions& options = {});
+/// @throws OutputError        pixels are more than their memory and cannot be written to a file.
+[[nodiscard]] Capture load_capture(const std::filesystem::path& path, const CaptureOptions& options = {},
+                                   const ImageMemory& memory = {});
 
 /// Whether a folder carries poses in one of these conventions, be they whole or not.
 [[nodiscard]] bool holds_poses(const std::filesystem::path& folder);

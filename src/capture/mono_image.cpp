@@ -76,6 +76,11 @@ float MonoImage::stored_luminance(std::size_t index) const {
   return f32[index];
 }
 
+std::size_t bytes_of(const MonoImage& image) {
+  return image.u8.size() + image.u16.size() * sizeof(std::uint16_t) + image.f32.size() * sizeof(float) +
+         image.alpha.size() + image.mask.size();
+}
+
 std::vector<float> luminance_plane(const MonoImage& image) {
   std::vector<float> luminance(image.pixel_count());
   for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = image.luminance(i);

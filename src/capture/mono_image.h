@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "src/capture/pixel_plane.h"
+
 namespace cnerf {
 
 /// How stored values encode linear luminance.
@@ -25,13 +27,13 @@ struct MonoImage {
   int width = 0, height = 0;
   PixelDepth depth = PixelDepth::kU8;
   Transfer transfer = Transfer::kSrgb;
-  float exposure = 1;               ///< light of this picture over that of the others; `luminance` divides by it
-  float haze = 0;                   ///< light that lies over this picture alone; `luminance` takes it off before
-  std::vector<std::uint8_t> u8;     ///< [H, W] when depth is kU8, else empty
-  std::vector<std::uint16_t> u16;   ///< [H, W] when depth is kU16, else empty
-  std::vector<float> f32;           ///< [H, W] when depth is kF32, else empty; always linear
-  std::vector<std::uint8_t> alpha;  ///< [H, W] coverage 0..255; empty = opaque. Values are premultiplied: over black.
-  std::vector<std::uint8_t> mask;   ///< [H, W] 0 = ignore this pixel; empty = every pixel counts
+  float exposure = 1;              ///< light of this picture over that of the others; `luminance` divides by it
+  float haze = 0;                  ///< light that lies over this picture alone; `luminance` takes it off before
+  PixelPlane<std::uint8_t> u8;     ///< [H, W] when depth is kU8, else empty
+  PixelPlane<std::uint16_t> u16;   ///< [H, W] when depth is kU16, else empty
+  PixelPlane<float> f32;           ///< [H, W] when depth is kF32, else empty; always linear
+  PixelPlane<std::uint8_t> alpha;  ///< [H, W] coverage 0..255; empty = opaque. Values are premultiplied: over black.
+  PixelPlane<std::uint8_t> mask;   ///< [H, W] 0 = ignore this pixel; empty = every pixel counts
 
   [[nodiscard]] std::size_t pixel_count() const { return std::size_t(width) * std::size_t(height); }
   /// Linear luminance Y at the exposure of the whole capture, 1 = white, composited over black.
@@ -44,6 +46,9 @@ struct MonoImage {
   [[nodiscard]] float coverage(std::size_t index) const { return alpha.empty() ? 1.0f : float(alpha[index]) / 255.0f; }
   [[nodiscard]] bool valid(std::size_t index) const { return mask.empty() || mask[index] != 0; }
 };
+
+/// What its pixels take, in memory or in a file.
+[[nodiscard]] std::size_t bytes_of(const MonoImage& image);
 
 /// Linear luminance of every pixel.  [H, W]
 [[nodiscard]] std::vector<float> luminance_plane(const MonoImage& image);

@@ -146,6 +146,13 @@ void JoinedRanks::sum(std::span<double> values) {
   guarded([&] { group().sum(values); });
 }
 
+void JoinedRanks::sum_on_device(float* values, std::size_t count, void* stream) {
+  guarded([&] {
+    if (!device_group_) device_group_ = meeting_.channel.device_group(meeting_.launch, meeting_.limit);
+    device_group_->sum(values, count, stream);
+  });
+}
+
 /// By the store: rank 0 may come hours later.
 Bytes JoinedRanks::broadcast(Bytes bytes) {
   const std::string key = work_key(begin_work(), "said");

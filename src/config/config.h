@@ -22,7 +22,7 @@ namespace cnerf {
 struct Config {
   std::string device = "auto";
   int threads = 0;
-  std::string max_memory;
+  std::string max_memory, image_memory;
   CaptureOptions capture;
   Stage1Options stage1;
   ColorizerOptions colorizer;
@@ -41,6 +41,10 @@ struct Config {
     v("device", device, Choice{"auto", "cpu", "cuda"}, "where fields are trained, rendered and baked");
     v("threads", threads, Range{0, 4096}, "threads to use; 0 = all cores");
     v("max_memory", max_memory, "memory the program may take, as 8G; needing more ends it with exit code 71");
+    v("image_memory", image_memory,
+      "memory for photographs, as 4G, and as much on a GPU; the rest lies in a file of the run's folder, which is read "
+      "as "
+      "it is needed; empty: a quarter of the machine's");
     v.section("capture", capture);
     v.section("stage1", stage1);
     v.section("colorizer", colorizer);

@@ -58,6 +58,9 @@ class LuminanceEngine {
  public:
   virtual ~LuminanceEngine() = default;
 
+  /// Bytes of the device's memory that the views' pixels may take, where it is not the host's. What does not fit comes
+  /// and goes between steps, which draw from what is there. To be called before `set_views`.
+  virtual void limit_image_memory(std::size_t /*bytes*/) {}
   /// What steps draw their pixels from. To be called before the first step; the images must outlive the steps.
   virtual void set_views(const std::vector<TrainingView>& views) = 0;
   /// Steps work on a share of their pixels from now on; their reports are of the whole.

@@ -40,6 +40,19 @@ inline constexpr std::int64_t kFewestRays = 64, kMostRays = 1 << 16;  ///< of a 
   return next < kFewestRays ? kFewestRays : next > kMostRays ? kMostRays : next;
 }
 
+/// A process's range of a step's rays, in whole blocks of those that teach poses together: the first one and the one
+/// behind the last.
+struct RayRange {
+  std::uint32_t first = 0, last = 0;
+};
+[[nodiscard]] CNERF_HD inline RayRange part_of_rays(std::uint32_t rays, int part, int parts) {
+  constexpr std::uint32_t kBlock = 16;
+  const std::uint32_t blocks = (rays + kBlock - 1) / kBlock;
+  const std::uint32_t first = blocks * std::uint32_t(part) / std::uint32_t(parts) * kBlock;
+  const std::uint32_t last = blocks * std::uint32_t(part + 1) / std::uint32_t(parts) * kBlock;
+  return {first < rays ? first : rays, last < rays ? last : rays};
+}
+
 inline constexpr long kOccupancyEvery = 16;    ///< steps between updates of the occupancy grid
 inline constexpr long kOccupancyWarmUp = 256;  ///< steps during which an update visits a quarter of the cells
 

@@ -15,6 +15,7 @@ namespace cnerf {
 struct StepShare {
   int part = 0, parts = 1;  ///< of the processes
   GradientSum sum = {};
+  DeviceGradientSum sum_on_device = {};  ///< empty: a GPU's engine takes what it sums through the host's memory
 
   [[nodiscard]] bool is_whole() const { return parts == 1; }
   /// This process's of so many items, in whole blocks: the first one and the one behind the last.

@@ -56,7 +56,7 @@ void measure_luminance(const EvaluatedView& pictures, ViewMetrics& metrics) {
 }
 
 void measure_colour(const EvaluatedView& pictures, ViewMetrics& metrics) {
-  const std::vector<std::uint8_t>& valid = pictures.view.image.mask;
+  const std::span<const std::uint8_t> valid = pictures.view.image.mask;
   const std::vector<float>& ours = pictures.ours.rgb;
   const Colorfulness colorful = colorfulness(srgb8_from_linear(ours), valid);
   metrics.colorfulness = colorful.standard;

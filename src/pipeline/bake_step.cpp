@@ -58,21 +58,34 @@ bake::SplatCloud make_splats(const Scene& scene, const Capture& capture, const b
   return bake::bake_splats(job, observer);
 }
 
+/// Of ranks that find voxels for rank 0.
+class NoOutput final : public bake::Output {
+ public:
+  void take_volumes(const std::vector<bake::VolumePlanes>& /*volumes*/) override {}
+  void take_mesh(const bake::Mesh& /*mesh*/) override {}
+  void finish() override {}
+};
+
 }  // namespace
 
 void bake_step(const RunContext& context, const BakeJob& job, const Engines& engines, Observer& observer) {
   const auto& [take, folder, formats] = job;
   const StepLocks locks(context.directory, folder, observer);
-  const cluster::RanksWait others_wait(cluster::world(), "bake");
-  if (!cluster::world().is_first()) return;
+  cluster::Ranks& world = cluster::world();
+  const cluster::RanksWait others_wait(world, "bake");
+  if (formats.has_only_splats() && !world.is_first()) return;
   const Stopwatch watch;
   const auto scene = load_scene(context.directory, take, context.config.finish, engines);
   const Config& config = context.config;
-  bake::Job bake{*scene, engines, bake::cameras_of(context.capture), volume_options(config, formats)};
+  bake::Job bake{*scene, engines, bake::cameras_of(context.capture), volume_options(config, formats), world};
   bake.volumes = formats.volumes();
   if (formats.gltf) bake.mesh = config.mesh;
   bake.journal = folder / kJournal;
   bake.identity = field_identity(context.directory, take);
+  if (!world.is_first()) {
+    NoOutput none;
+    return bake::run(bake, none, observer);
+  }
   const exporting::Label label{{colorizer_name(context.directory, take), take, context.command_line}, config.world};
   exporting::BakeOutput output(folder, formats, {config.vdb, config.web, web::find_page(), scene->sky()},
                                context.capture, label, observer);

@@ -38,7 +38,8 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& observ
   if (!job.grey) choose_colorizer(job.capture, config, observer);
   job.capture = common_capture(job, observer);
 
-  RunContext context{directory, config, read_capture(job.capture, config, observer), job.command_line};
+  RunContext context{directory, config, read_capture(job.capture, config, observer, directory.root()),
+                     job.command_line};
   // Made before the training: what cannot be made or read should not cost an hour.
   if (!job.grey) (void)load_known_colors(context.capture, context.config.colorizer);
   const auto colorizer = needs_colorizer(job, directory) ? colorizer_of(context, observer) : nullptr;

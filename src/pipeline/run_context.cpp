@@ -1,12 +1,15 @@
 #include "src/pipeline/run_context.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 
+#include "src/base/byte_count.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/text.h"
+#include "src/base/usage.h"
 #include "src/capture/load_capture.h"
 #include "src/cluster/ranks.h"
 #include "src/pipeline/version.h"
@@ -36,13 +39,44 @@ StepLocks::StepLocks(const RunDirectory& directory, const fs::path& folder, Obse
   cluster::world().barrier("begin of a step");
 }
 
-Capture read_capture(const fs::path& path, const Config& config, Observer& observer) {
-  Capture capture = load_capture(path, config.capture);
+std::size_t image_memory(const Config& config) {
+  if (!config.image_memory.empty()) return bytes_from("image_memory", config.image_memory);
+  const auto all = std::size_t(::sysconf(_SC_PHYS_PAGES)) * std::size_t(::sysconf(_SC_PAGESIZE));
+  return all / 4 / std::size_t(cluster::world().size());
+}
+
+namespace {
+
+/// The folder itself, or the one that it will be made in; empty where there is none of them.
+fs::path nearest_folder(fs::path folder) {
+  if (!folder.empty()) folder = fs::absolute(folder);
+  while (!folder.empty() && !fs::is_directory(folder)) folder = folder.parent_path();
+  return folder;
+}
+
+void say_size(const Capture& capture, std::size_t memory, double seconds, Observer& observer) {
+  std::size_t bytes = 0;
+  for (const View& view : capture.views) bytes += bytes_of(view.image);
+  constexpr std::size_t kWorthSaying = std::size_t(1) << 30;
+  if (bytes <= std::min(memory, kWorthSaying)) return;
+  const std::string place =
+      bytes > memory ? "in a file, at most " + in_words(memory) + " of them in memory" : "in memory";
+  observer.say(fmt::format("photographs: {} of pixels, {}; read in {}, {} resident", in_words(bytes), place,
+                           duration_text(seconds), in_words(held_memory_bytes())));
+}
+
+}  // namespace
+
+Capture read_capture(const fs::path& path, const Config& config, Observer& observer, const fs::path& output) {
+  const std::size_t memory = image_memory(config);
+  const Stopwatch watch;
+  Capture capture = load_capture(path, config.capture, {memory, nearest_folder(output)});
   const auto held_out = std::ranges::count_if(capture.views, [](const View& view) { return view.held_out; });
   const Intrinsics& first = capture.views.front().intrinsics;
   observer.say(fmt::format("capture: {} ({}, {} views of {} x {}, {} held out)", path.string(), capture.format,
                            capture.views.size(), first.width, first.height, held_out));
   for (const std::string& note : capture.notes) observer.say("note: " + note);
+  say_size(capture, memory, watch.seconds(), observer);
   return capture;
 }
 

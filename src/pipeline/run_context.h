@@ -32,8 +32,12 @@ struct ExistingOutput {
 /// stage 1, which learns from the capture as it is.  @throws SnapshotError
 void use_learned_views(RunContext& context, Observer& observer);
 
-/// Reads a capture and says what was found, with the reader's notes.
-[[nodiscard]] Capture read_capture(const std::filesystem::path& path, const Config& config, Observer& observer);
+/// Bytes that photographs may take of the processor's memory, and again of a GPU's; of several ranks, each.
+[[nodiscard]] std::size_t image_memory(const Config& config);
+/// Reads a capture and says what was found, with the reader's notes, and where large photographs lie.
+/// @param output  the folder that is worked in; what of the photographs does not fit into memory lies on its disk
+[[nodiscard]] Capture read_capture(const std::filesystem::path& path, const Config& config, Observer& observer,
+                                   const std::filesystem::path& output = {});
 
 /// FolderLock, which rank 0 holds for all; says so where the file system has no locks. Clears away what killed writers
 /// left there.

@@ -96,7 +96,7 @@ class OpenRun {
     if (!fs::exists(where, failure)) {
       throw MissingInputError(where.string() + ": no such capture; cnerf.open_run(..., capture=...) says where it is");
     }
-    Capture capture = pipeline::read_capture(where, config, observer);
+    Capture capture = pipeline::read_capture(where, config, observer, directory_.root());
     pipeline::RunContext made{directory_, std::move(config), std::move(capture), std::move(command_line)};
     pipeline::use_learned_views(made, observer);
     return made;
@@ -143,7 +143,7 @@ void train(const TrainCall& call, Observer& observer) {
   call.settings.apply(config);
   const Words words = call.settings.command_line({"cnerf", "train", call.capture.string(), "-o", call.out.string()});
   const Engines& engines = engines_for(config.device);
-  Capture capture = pipeline::read_capture(call.capture, config, observer);
+  Capture capture = pipeline::read_capture(call.capture, config, observer, call.out);
   const pipeline::RunContext context{directory, config, std::move(capture), words};
   const FolderLock lock = pipeline::claim_run_folder(directory, call.existing, observer);
   pipeline::begin_run(context, call.capture, call.existing);

@@ -15,6 +15,7 @@
 #include "src/base/files.h"
 #include "tests/bake/analytic_field.h"
 #include "tests/bake/processor_alone.h"
+#include "tests/cluster/fake_channel.h"
 #include "tests/support/data.h"
 
 namespace cnerf::bake::test {
@@ -44,10 +45,10 @@ class Kept final : public Output {
 
 class BakeJob : public testing::Test {
  protected:
-  [[nodiscard]] Job job(VolumeUse volumes = VolumeUse::kGrids) const {
+  [[nodiscard]] Job job(VolumeUse volumes = VolumeUse::kGrids, cluster::Ranks& ranks = cluster::alone()) const {
     Options options;
     options.resolution = resolution_;
-    Job made{field_, engines_, {}, options};
+    Job made{field_, engines_, {}, options, ranks};
     made.volumes = volumes;
     made.journal = folder_ / "unfinished.bake";
     made.identity = "a ball";
@@ -98,6 +99,36 @@ TEST_F(BakeJob, AnotherIdentityBeginsAnew) {
   other.options.dilation = 3;
   run(other, second, listener);
   EXPECT_EQ(listener.said.find("going on"), std::string::npos);
+}
+
+/// Bakes by three ranks; nothing but what rank 0 makes is kept.
+Kept baked_by_ranks(const std::function<Job(cluster::Ranks&)>& job, std::string& said) {
+  Kept first;
+  cnerf::test::on_ranks(3, [&](cluster::Ranks& ranks) {
+    Kept others;
+    Listener listener;
+    run(job(ranks), ranks.is_first() ? first : others, listener);
+    EXPECT_EQ(others.is_finished, false);
+    EXPECT_TRUE(others.voxels.empty());
+    if (ranks.is_first()) said = listener.said;
+  });
+  return first;
+}
+
+TEST_F(BakeJob, RanksFindTheSameVoxelsAsOne) {
+  Kept alone, stopped;
+  Listener listener;
+  run(job(), alone, listener);
+  std::string said;
+  const auto shared = [&](cluster::Ranks& ranks) { return job(VolumeUse::kGrids, ranks); };
+  EXPECT_EQ(baked_by_ranks(shared, said).voxels, alone.voxels);
+  EXPECT_FALSE(fs::exists(job().journal));
+
+  // What one process left they go on with.
+  stopped.is_disk_full = true;
+  EXPECT_THROW(run(job(), stopped, listener), OutputError);
+  EXPECT_EQ(baked_by_ranks(shared, said).voxels, alone.voxels);
+  EXPECT_NE(said.find("going on where it was stopped"), std::string::npos) << said;
 }
 
 /// A journal of this bake with wrong values under right checksums, which is what a forger would hand over.
@@ -160,6 +191,15 @@ class ForgedJournal : public BakeJob {
   Kept whole_;
   std::vector<std::byte> journal_;
 };
+
+TEST_F(ForgedJournal, RanksRefuseItTogether) {
+  write_file(job().journal, journal_);
+  forge<DenseVoxel>(job().journal, 1, [](std::vector<DenseVoxel>& v) { v.back().brick = 4; });
+  std::string said;
+  const Kept made = baked_by_ranks([&](cluster::Ranks& ranks) { return job(VolumeUse::kGrids, ranks); }, said);
+  EXPECT_EQ(made.voxels, whole_.voxels);
+  EXPECT_NE(said.find("starting anew"), std::string::npos) << said;
+}
 
 TEST_F(ForgedJournal, ValuesThatNoBakeMakesBeginAnew) {
   const auto refused = testing::HasSubstr("starting anew");

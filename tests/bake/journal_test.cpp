@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <array>
 #include <atomic>
 #include <fstream>
 #include <numeric>
@@ -10,6 +11,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/parallel.h"
+#include "tests/cluster/fake_channel.h"
 #include "tests/support/data.h"
 
 namespace cnerf::bake::test {
@@ -190,6 +192,37 @@ TEST(Journal, LinksAndFoldersAreNotWrittenTo) {
   EXPECT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
   EXPECT_THROW(Journal(folder / "pipe", "one bake"), OutputError);
   EXPECT_THROW(Journal(folder.path(), "one bake"), OutputError);
+}
+
+TEST(Journal, RanksMakeEachPartOnceAndAllHoldIt) {
+  const cnerf::test::TempDir folder;
+  fill(folder / "j", 4);
+  constexpr std::size_t kParts = 23;
+  std::array<std::atomic<int>, kParts> made{};
+  std::array<std::atomic<int>, 3> made_by{};
+  cnerf::test::on_ranks(3, [&](cluster::Ranks& ranks) {
+    Journal journal = ranks.is_first() ? Journal(folder / "j", "one bake") : Journal();
+    journal.share_with(ranks);
+    EXPECT_TRUE(journal.has_found_any());
+    std::size_t used = 0;
+    journal.parts<int>(
+        0, kParts, 2,
+        [&](std::size_t p) {
+          ++made[p];
+          ++made_by[std::size_t(ranks.rank())];
+          return numbers(10 * int(p));
+        },
+        [&](std::size_t p, const std::vector<int>& it) {
+          EXPECT_EQ(p, used++);
+          EXPECT_EQ(it, numbers(10 * int(p)));
+        });
+    EXPECT_EQ(used, kParts);
+    for (std::size_t p = 0; p < kParts; ++p) EXPECT_EQ(journal.read<int>(p), numbers(10 * int(p)));
+  });
+  for (std::size_t p = 0; p < kParts; ++p) EXPECT_EQ(made[p], p < 4 ? 0 : 1) << p;
+  for (const std::atomic<int>& by_rank : made_by) EXPECT_GE(by_rank, 5);
+  const Journal alone(folder / "j", "one bake");
+  EXPECT_EQ(alone.found(), kParts);
 }
 
 TEST(Journal, PlacesThatCannotBeWrittenAreOutputErrors) {

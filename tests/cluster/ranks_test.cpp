@@ -7,6 +7,7 @@
 #include <atomic>
 #include <mutex>
 #include <set>
+#include <thread>
 
 #include "src/base/error.h"
 #include "src/cluster/packing.h"
@@ -44,6 +45,44 @@ TEST(Ranks, SumsBroadcastsAndGathers) {
     for (std::size_t rank = 0; rank < 3; ++rank) EXPECT_EQ(all[rank], Bytes(rank, std::byte(7)));
     ranks.barrier("test");
   });
+}
+
+/// Sums in memory that plays a GPU's.
+class FakeDeviceGroup final : public DeviceGroup {
+ public:
+  FakeDeviceGroup(int rank, int size) : group_(rank, size) {}
+  void sum(float* values, std::size_t count, void* stream) override {
+    EXPECT_EQ(stream, nullptr);
+    group_.sum(std::span(values, count));
+  }
+
+ private:
+  test::FakeGroup group_;
+};
+
+TEST(Ranks, SumOnDevicesWhereTheChannelCan) {
+  static const Channel channel = [] {
+    Channel with_devices = test::fake_channel();
+    with_devices.device_group = [](const Launch& launch, Seconds) -> std::unique_ptr<DeviceGroup> {
+      return std::make_unique<FakeDeviceGroup>(launch.rank, launch.size);
+    };
+    return with_devices;
+  }();
+  on_ranks(2, [](Ranks& ranks) { EXPECT_FALSE(ranks.sums_on_devices()); });
+  EXPECT_FALSE(alone().sums_on_devices());
+  exchange = std::make_shared<test::Exchange>();
+  std::vector<std::jthread> threads;
+  for (int rank = 0; rank < 2; ++rank) {
+    threads.emplace_back([rank] {
+      const Meeting plain = test::fake_meeting(rank, 2);
+      JoinedRanks ranks({plain.launch, channel, plain.patience, plain.limit, plain.name, plain.end});
+      EXPECT_TRUE(ranks.sums_on_devices());
+      std::vector<float> values = {float(rank), 2};
+      ranks.sum_on_device(values.data(), values.size(), nullptr);
+      EXPECT_EQ(values, (std::vector<float>{1, 4}));
+      ranks.leave({});
+    });
+  }
 }
 
 TEST(Ranks, AloneNothingIsShared) {

@@ -25,7 +25,7 @@ fs::path plane_file(const fs::path& folder, std::size_t view, const char* extens
   std::snprintf(name, sizeof(name), "%04zu.", view);
   return folder / (std::string(name) + extension);
 }
-void write_plane(const fs::path& file, const std::vector<std::uint8_t>& plane) {
+void write_plane(const fs::path& file, const PixelPlane<std::uint8_t>& plane) {
   std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(plane.data()), long(plane.size()));
 }
 std::vector<std::uint8_t> read_plane(const fs::path& file, std::size_t size) {

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <barrier>
 #include <map>
 #include <memory>
+#include <thread>
 
 #include "src/base/error.h"
 #include "src/base/rng.h"
@@ -13,6 +16,7 @@
 
 #if CNERF_CUDA_ENGINE
 #include "src/base/cuda/device_memory.h"
+#include "src/engine/cuda/view_rotation.h"
 #endif
 
 namespace cnerf::test {
@@ -266,6 +270,105 @@ Op stage1(const Problem& problem) {
   return op;
 }
 
+/// Sums of threads that play processes, through the host's memory.
+class ThreadsSum {
+ public:
+  explicit ThreadsSum(int parts) : values_(std::size_t(parts)), all_are_here_(parts) {}
+
+  [[nodiscard]] StepShare share(int part) {
+    return {part, int(values_.size()), [this, part](std::span<float> values) { sum(part, values); }};
+  }
+
+ private:
+  void sum(int part, std::span<float> values) {
+    values_[std::size_t(part)] = values;
+    all_are_here_.arrive_and_wait();
+    std::vector<float> total(values.size(), 0.0f);
+    for (const std::span<float> of_part : values_) {
+      for (std::size_t i = 0; i < total.size(); ++i) total[i] += of_part[i];
+    }
+    all_are_here_.arrive_and_wait();
+    std::ranges::copy(total, values.begin());
+  }
+
+  std::vector<std::span<float>> values_;
+  std::barrier<> all_are_here_;
+};
+
+/// Three engines that share a step find the gradients of one that has it alone, and stay equal.
+Op stage1_shared(const Problem& problem) {
+  constexpr int kParts = 3;
+  const auto scene = std::make_shared<Scene>(problem);
+  Op op = stage1(problem);
+  std::erase_if(op.bounds, [](const Bound& bound) {
+    const bool is_of_step = bound.result.starts_with("gradient") || bound.result == "rays" || bound.result == "loss" ||
+                            bound.result == "trained samples" || bound.result == "squared error";
+    return !is_of_step;
+  });
+  op.expected = [scene] {
+    std::vector<Result> results;
+    append_gradients(*scene->trained(reference_backend(), 40), results);
+    return results;
+  };
+  op.run = [scene](const Backend& backend) {
+    std::vector<std::unique_ptr<LuminanceEngine>> engines;
+    for (int part = 0; part < kParts; ++part) engines.push_back(scene->trained(backend, 40));
+    ThreadsSum threads_sum(kParts);
+    std::vector<Result> results[kParts];
+    std::vector<std::jthread> threads;
+    for (int part = 0; part < kParts; ++part) {
+      threads.emplace_back([&, part] {
+        LuminanceEngine& engine = *engines[std::size_t(part)];
+        engine.share_steps(threads_sum.share(part));
+        append_gradients(engine, results[part]);
+        for (int step = 0; step < 3; ++step) engine.step(1e-3f);
+      });
+    }
+    threads.clear();
+    const std::vector<StatePiece> state = engines.front()->state();
+    for (int part = 1; part < kParts; ++part) {
+      const std::vector<StatePiece> others = engines[std::size_t(part)]->state();
+      for (std::size_t i = 0; i < state.size(); ++i) {
+        EXPECT_TRUE(std::ranges::equal(state[i].bytes, others[i].bytes)) << state[i].name << " of part " << part;
+      }
+    }
+    return results[0];
+  };
+  return op;
+}
+
+#if CNERF_CUDA_ENGINE
+/// Of views that take turns on the GPU, a step draws from those that are there: what it finds is what the processor
+/// finds of these alone.
+Op stage1_in_turns(const Problem& problem) {
+  constexpr long kResident = 3, kSteps = 40;
+  const auto scene = std::make_shared<Scene>(problem);
+  Op op = stage1_shared(problem);  // for its bounds
+  op.is_gpu_only = true;
+  op.expected = [scene] {
+    const auto engine = scene->trained(reference_backend(), kSteps);
+    std::vector<TrainingView> resident;
+    for (const std::size_t v : ViewRotation::views_of_step(kSteps, scene->views().size(), kResident)) {
+      resident.push_back(scene->views()[v]);
+    }
+    engine->set_views(resident);
+    std::vector<Result> results;
+    append_gradients(*engine, results);
+    return results;
+  };
+  op.run = [scene](const Backend& backend) {
+    const auto engine = scene->trained(backend, kSteps);
+    constexpr std::size_t kSlot = (48 * 40 + 255) / 256 * 256 + 4 * 256;
+    engine->limit_image_memory((kResident + 1) * kSlot);
+    engine->set_views(scene->views());
+    std::vector<Result> results;
+    append_gradients(*engine, results);
+    return results;
+  };
+  return op;
+}
+#endif
+
 /// Rounding sends back ends apart. Losses are averaged, since a step's depends mostly on the pixels it drew.
 Op stage1_learning(const Problem& problem) {
   const auto scene = std::make_shared<Scene>(problem);
@@ -310,17 +413,23 @@ Op out_of_memory() {
 }  // namespace
 
 std::vector<Op> luminance_ops() {
-  return {stage1({"Stage1WithExposures", 8, 14, 64, 1, false, false, true}),
-          stage1({"Stage1WithDistortionLoss", 8, 14, 64, 2, false, false, false, 0.3f}),
-          stage1({"Stage1WithAlpha", 3, 12, 20, 1, true}),
-          stage1({"Stage1WithCascadesLensAndMask", 12, 14, 128, 3, false, true}),
-          stage1({"Stage1WithManyLevels", 16, 13, 128, 2}),
-          stage1({"Stage1WithLearnedViews", 8, 14, 64, 2, false, true, true, 0, true}),
-          stage1({"Stage1WithSky", 8, 14, 64, 2, false, false, true, 0.1f, true, true}),
-          stage1({"Stage1WithDepth", 8, 14, 64, 2, false, false, false, 0.1f, false, false, 0.1f}),
-          stage1_learning({"Stage1Learns", 8, 14, 64, 1, false, false, true}),
-          stage1_learning({"Stage1LearnsWithCascades", 12, 14, 128, 3, false, true}),
-          out_of_memory()};
+  return {
+    stage1({"Stage1WithExposures", 8, 14, 64, 1, false, false, true}),
+        stage1({"Stage1WithDistortionLoss", 8, 14, 64, 2, false, false, false, 0.3f}),
+        stage1({"Stage1WithAlpha", 3, 12, 20, 1, true}),
+        stage1({"Stage1WithCascadesLensAndMask", 12, 14, 128, 3, false, true}),
+        stage1({"Stage1WithManyLevels", 16, 13, 128, 2}),
+        stage1({"Stage1WithLearnedViews", 8, 14, 64, 2, false, true, true, 0, true}),
+        stage1({"Stage1WithSky", 8, 14, 64, 2, false, false, true, 0.1f, true, true}),
+        stage1({"Stage1WithDepth", 8, 14, 64, 2, false, false, false, 0.1f, false, false, 0.1f}),
+        stage1_shared({"Stage1Shared", 8, 14, 64, 2, false, true, true, 0.1f, true}),
+        stage1_learning({"Stage1Learns", 8, 14, 64, 1, false, false, true}),
+        stage1_learning({"Stage1LearnsWithCascades", 12, 14, 128, 3, false, true}),
+#if CNERF_CUDA_ENGINE
+        stage1_in_turns({.name = "Stage1WithViewsInTurns", .levels = 8, .log2_rows = 14, .finest = 64, .cascades = 1}),
+#endif
+        out_of_memory()
+  };
 }
 
 }  // namespace cnerf::test

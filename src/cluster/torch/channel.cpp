@@ -1,5 +1,5 @@
-// The channel of LibTorch's c10d: a TCPStore, and sums by Gloo. On its own: few programs are started by a launcher, and
-// LibTorch takes long to load.
+// The channel of LibTorch's c10d: a TCPStore, sums by Gloo, and sums on GPUs by NCCL where LibTorch has it. On its own:
+// few programs are started by a launcher, and LibTorch takes long to load.
 
 #ifndef USE_C10D_GLOO
 #define USE_C10D_GLOO  // LibTorch has it; only its headers ask
@@ -17,6 +17,13 @@
 #include <torch/csrc/distributed/c10d/ProcessGroupGloo.hpp>
 #include <torch/csrc/distributed/c10d/TCPStore.hpp>
 
+#if CNERF_NCCL
+#include <c10/cuda/CUDAGuard.h>
+#include <c10/cuda/CUDAStream.h>
+
+#include <torch/csrc/distributed/c10d/ProcessGroupNCCL.hpp>
+#endif
+
 #include "src/base/file_descriptor.h"
 #include "src/cluster/channel.h"
 
@@ -28,14 +35,16 @@ using Milliseconds = std::chrono::milliseconds;
 /// For ranks that are late at an operation: rank 0 may save, or draw for a page. Who is lost is found by the Watch.
 constexpr std::chrono::minutes kLongestOperation{30};
 
-c10::intrusive_ptr<c10d::Store> connected(const Launch& launch, bool opens, Seconds limit) {
+/// @param topic  of what is told through it; others have names of their own
+c10::intrusive_ptr<c10d::Store> connected(const Launch& launch, bool opens, Seconds limit,
+                                          const std::string& topic = "") {
   c10d::TCPStoreOptions options;
   options.port = std::uint16_t(launch.port);
   options.isServer = opens && launch.rank == 0 && !launch.has_store;
   options.waitWorkers = false;
   options.timeout = std::chrono::duration_cast<Milliseconds>(limit);
   auto store = c10::make_intrusive<c10d::TCPStore>(launch.host, options);
-  return c10::make_intrusive<c10d::PrefixStore>("cnerf/" + launch.attempt, store);
+  return c10::make_intrusive<c10d::PrefixStore>("cnerf/" + topic + launch.attempt, store);
 }
 
 class C10dStore final : public Store {
@@ -43,7 +52,7 @@ class C10dStore final : public Store {
   explicit C10dStore(c10::intrusive_ptr<c10d::Store> store) : store_(std::move(store)) {}
   void set(const std::string& key, const Bytes& value) override {
     const auto* begin = reinterpret_cast<const std::uint8_t*>(value.data());
-    store_->set(key, {begin, begin + value.size()});
+    store_->set(key, std::vector<std::uint8_t>(begin, begin + value.size()));
   }
   std::optional<Bytes> get(const std::string& key) override {
     if (!store_->check({key})) return std::nullopt;
@@ -108,17 +117,53 @@ class GlooGroup final : public Group {
   c10::intrusive_ptr<c10d::ProcessGroupGloo> group_;
 };
 
+#if CNERF_NCCL
+/// NCCL has streams of its own, which wait for the caller's and which the caller's waits for.
+class NcclGroup final : public DeviceGroup {
+ public:
+  NcclGroup(const Launch& launch, Seconds limit) {
+    // Kernels of a sum find room beside those that fill the GPU.
+    const auto options = c10d::ProcessGroupNCCL::Options::create(/*is_high_priority_stream=*/true);
+    options->timeout = kLongestOperation;
+    const c10::intrusive_ptr<c10d::Store> store = connected(launch, false, limit, "nccl/");
+    store->setTimeout(std::chrono::duration_cast<Milliseconds>(kLongestOperation));  // the first sum waits in it
+    group_ = c10::make_intrusive<c10d::ProcessGroupNCCL>(store, launch.rank, launch.size, options);
+  }
+  void sum(float* values, std::size_t count, void* stream) override {
+    const c10::Device own(c10::kCUDA, 0);  // the process sees one GPU, or takes the first one
+    const c10::cuda::CUDAStreamGuard guard(
+        c10::cuda::getStreamFromExternal(static_cast<cudaStream_t>(stream), own.index()));
+    std::vector<at::Tensor> tensors = {
+        at::from_blob(values, {std::int64_t(count)}, at::TensorOptions().dtype(at::kFloat).device(own))};
+    group_->allreduce(tensors)->wait();  // the stream waits, not the caller
+  }
+
+ private:
+  c10::intrusive_ptr<c10d::ProcessGroupNCCL> group_;
+};
+#endif
+
 }  // namespace
 }  // namespace cnerf::cluster
 
 extern "C" __attribute__((visibility("default"))) const cnerf::cluster::Channel* cnerf_cluster_channel() {
   using namespace cnerf::cluster;
-  static const Channel channel{[](const Launch& launch, bool opens, Seconds limit) -> std::unique_ptr<Store> {
-                                 return std::make_unique<C10dStore>(connected(launch, opens, limit));
-                               },
-                               [](const Launch& launch, Seconds limit) -> std::unique_ptr<Group> {
-                                 return std::make_unique<GlooGroup>(launch, limit);
-                               },
-                               "LibTorch " TORCH_VERSION ": Gloo"};
+  static const Channel channel {
+    [](const Launch& launch, bool opens, Seconds limit) -> std::unique_ptr<Store> {
+      return std::make_unique<C10dStore>(connected(launch, opens, limit));
+    },
+        [](const Launch& launch, Seconds limit) -> std::unique_ptr<Group> {
+          return std::make_unique<GlooGroup>(launch, limit);
+        },
+#if CNERF_NCCL
+        "LibTorch " TORCH_VERSION ": Gloo, NCCL",
+        [](const Launch& launch, Seconds limit) -> std::unique_ptr<DeviceGroup> {
+          return std::make_unique<NcclGroup>(launch, limit);
+        }
+  };
+#else
+        "LibTorch " TORCH_VERSION ": Gloo"
+  };
+#endif
   return &channel;
 }

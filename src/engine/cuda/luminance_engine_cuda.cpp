@@ -42,10 +42,18 @@ class LuminanceEngineCuda final : public LuminanceEngine {
     state_loaded();
   }
 
+  void limit_image_memory(std::size_t bytes) override {
+    const std::lock_guard lock(mutex_);
+    step_.limit_image_memory(bytes);
+  }
   void set_views(const std::vector<TrainingView>& views) override {
     CNERF_CHECK(!views.empty(), "no training views");
     const std::lock_guard lock(mutex_);
     step_.set_views(views);
+  }
+  void share_steps(const StepShare& share) override {
+    const std::lock_guard lock(mutex_);
+    step_.share(share);
   }
   StepReport step(float learning_rate) override {
     const std::lock_guard lock(mutex_);

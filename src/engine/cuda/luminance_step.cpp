@@ -1,5 +1,7 @@
 #include "src/engine/cuda/luminance_step.h"
 
+#include <algorithm>
+
 #include "src/base/check.h"
 #include "src/engine/cuda/pose_kernel.h"
 #include "src/engine/stage1_schedule.h"
@@ -13,6 +15,30 @@ constexpr long kMostAhead = kStepRing / 2;
 const char* const kSampleAdvice = "the samples of a step; lower stage1.samples_per_step";
 const char* const kRayAdvice = "rays";
 const char* const kViewAdvice = "views";
+
+/// Floats.
+std::size_t small_gradients(const ViewLearning& learning) {
+  static_assert(sizeof(ViewGradient) == kViewNumbers * sizeof(float));
+  static_assert(sizeof(LensGradient) == kLensNumbers * sizeof(float));
+  return std::size_t(kViewNumbers * learning.views + kLensNumbers * learning.lenses + kStepSums);
+}
+
+/// A hash grid's levels from the finest to the coarsest, in parts of some million rows: sums of less are slow for what
+/// they are, and of more nothing goes on beside them.
+std::vector<LevelRange> parts_of_grid(const std::vector<GridLevel>& levels) {
+  constexpr std::uint32_t kRowsOfPart = 1 << 21;
+  std::vector<LevelRange> parts;
+  std::uint32_t rows = kRowsOfPart;
+  for (std::size_t l = levels.size(); l-- > 0;) {
+    if (rows >= kRowsOfPart) {
+      parts.push_back({l, l + 1});
+      rows = 0;
+    }
+    parts.back().first = l;
+    rows += levels[l].rows;
+  }
+  return parts;
+}
 
 }  // namespace
 
@@ -30,10 +56,9 @@ LuminanceStepCuda::LuminanceStepCuda(const LuminanceEngineOptions& options, cons
       directions_(std::size_t(kMostRays), kRayAdvice),
       corrections_(std::size_t(options.learning.views), kViewAdvice),
       correction_moments_(std::size_t(options.learning.views), kViewAdvice),
-      view_gradients_(std::size_t(options.learning.views), kViewAdvice),
       lenses_(std::size_t(options.learning.lenses), kViewAdvice),
       lens_moments_(std::size_t(options.learning.lenses), kViewAdvice),
-      lens_gradients_(std::size_t(options.learning.lenses), kViewAdvice) {}
+      small_gradients_(small_gradients(options.learning), kViewAdvice) {}
 
 LuminanceStepCuda::~LuminanceStepCuda() {
   cudaStreamSynchronize(stream_);
@@ -43,7 +68,7 @@ LuminanceStepCuda::~LuminanceStepCuda() {
 void LuminanceStepCuda::set_views(const std::vector<TrainingView>& views) {
   if (options_.learning.is_on()) CNERF_CHECK_EQ(views.size(), std::size_t(options_.learning.views));
   forget_graph();
-  views_ = ViewImages(views);
+  views_ = ViewImages(views, image_memory_);
   use_lenses(learned(), views_.records(), stream_);
 }
 
@@ -69,8 +94,15 @@ void LuminanceStepCuda::set_lenses(const std::vector<LensCorrection>& lenses, co
 }
 
 LearnedViews LuminanceStepCuda::learned() const {
-  return {options_.learning, corrections_.data(),  correction_moments_.data(), view_gradients_.data(),
-          lenses_.data(),    lens_moments_.data(), lens_gradients_.data()};
+  float* of_views = small_gradients_.data();
+  float* of_lenses = of_views + kViewNumbers * options_.learning.views;
+  return {options_.learning,
+          corrections_.data(),
+          correction_moments_.data(),
+          reinterpret_cast<ViewGradient*>(of_views),
+          lenses_.data(),
+          lens_moments_.data(),
+          reinterpret_cast<LensGradient*>(of_lenses)};
 }
 
 TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
@@ -86,7 +118,7 @@ TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
   job.samples = {capacity_, places_.data(), encoded_.data(), gradients_.data()};
   job.distortion_weight = options_.distortion_weight;
   job.depth = options_.depth;
-  if (options_.learning.exposures) job.view_gradients = view_gradients_.data();
+  if (options_.learning.exposures) job.view_gradients = learned().gradients;
   return job;
 }
 
@@ -94,31 +126,94 @@ FieldSamples LuminanceStepCuda::samples() const {
   return {{&state_.data()->samples, capacity_}, places_.data(), directions_.data(), encoded_.data(), gradients_.data()};
 }
 
+void LuminanceStepCuda::share(const StepShare& share) {
+  forget_graph();  // it knows where the gradients lie
+  share_ = share;
+  if (share.is_whole()) return;
+  const std::size_t nets = std::size_t(field_weight_count(field_.levels()));
+  small_gradients_ = DeviceBuffer<float>(small_gradients(options_.learning) + nets, "nets");
+  grid_parts_ = parts_of_grid(field_.grid_levels());
+  if (!sums_) sums_.emplace();
+}
+
 /// The nets' optimiser, the hash grid's backward pass and the views need the same gradients and nothing of each other.
 void LuminanceStepCuda::launch(const std::uint32_t* occupied) {
   const AdamStep* adam = &state_.data()->adam;
-  begin_step(state_.data(), learning_rates_.on_device(), stream_);
-  const ViewLearning& learning = options_.learning;
-  const ViewCorrection* corrections = learning.is_on() ? corrections_.data() : nullptr;
-  draw_training_rays(
-      {state_.data(), views_.records(), corrections, views_.count(), options_.seed, rays_.data(), directions_.data()},
-      stream_);
-  trace_training_rays(trace_job(occupied), stream_);
-  field_.nets_backward(samples(), stream_);
+  draw_and_trace(occupied);
   fork_.record(stream_);
   fork_.hold(side_);
   field_.update_nets(adam, side_);
-  if (learning.poses || learning.lenses > 0) {
-    add_camera_gradients(
-        field_.position_slopes(learning.pose_levels(field_.grid_levels())),
-        {learned(), views_.records(), {&state_.data()->samples, capacity_}, places_.data(), rays_.data()}, side_);
-  }
-  if (learning.is_on()) update_corrections(learned(), views_.records(), state_.data(), side_);
+  teach_cameras(side_);
+  if (options_.learning.is_on()) update_corrections(learned(), views_.records(), state_.data(), side_);
   join_.record(side_);
   field_.grid_backward(samples(), stream_);
   join_.hold(stream_);  // what still reads the table
   field_.update_grid(adam, stream_);
   end_step(state_.data(), std::uint32_t(options_.samples_per_step), capacity_, reports_.on_device(), stream_);
+}
+
+void LuminanceStepCuda::draw_and_trace(const std::uint32_t* occupied) {
+  begin_step(state_.data(), learning_rates_.on_device(), {share_.part, share_.parts}, stream_);
+  const ViewCorrection* corrections = options_.learning.is_on() ? corrections_.data() : nullptr;
+  draw_training_rays({state_.data(), views_.records(), corrections, views_.count(), views_.resident(), options_.seed,
+                      rays_.data(), directions_.data()},
+                     stream_);
+  trace_training_rays(trace_job(occupied), stream_);
+  field_.nets_backward(samples(), stream_);
+}
+
+void LuminanceStepCuda::teach_cameras(cudaStream_t stream) {
+  const ViewLearning& learning = options_.learning;
+  if (!learning.poses && learning.lenses == 0) return;
+  add_camera_gradients(
+      field_.position_slopes(learning.pose_levels(field_.grid_levels())),
+      {learned(), views_.records(), {&state_.data()->samples, capacity_}, places_.data(), rays_.data()}, stream);
+}
+
+/// Three queues: the hash grid's backward pass part by part, the sums of its parts, and what follows these.
+void LuminanceStepCuda::launch_shared(const std::uint32_t* occupied) {
+  const AdamStep* adam = &state_.data()->adam;
+  draw_and_trace(occupied);
+  fork_.record(stream_);
+  fork_.hold(side_);
+  float* of_step = small_gradients_.data() + small_gradients(options_.learning) - kStepSums;
+  float* of_nets = of_step + kStepSums;
+  teach_cameras(side_);  // before any row changes: it reads the table
+  field_.write_nets_gradient(of_nets, side_);
+  pack_step_sums(state_.data(), of_step, side_);
+  for (const LevelRange& part : grid_parts_) {
+    field_.grid_backward(part, samples(), stream_);
+    sum_after(stream_, field_.grid().gradient(part));
+    summed_.hold(side_);
+    if (&part == &grid_parts_.front()) {
+      sum_after(side_, {small_gradients_.data(), small_gradients_.size()});
+      summed_.hold(side_);
+      field_.update_nets(of_nets, adam, side_);
+      if (options_.learning.is_on()) update_corrections(learned(), views_.records(), state_.data(), side_);
+    }
+    field_.grid().update(part, adam, side_);
+  }
+  join_.record(side_);
+  join_.hold(stream_);
+  unpack_step_sums(of_step, state_.data(), stream_);  // not earlier: the backward passes count samples by the state
+  end_step(state_.data(), std::uint32_t(options_.samples_per_step), capacity_ * std::uint32_t(share_.parts),
+           reports_.on_device(), stream_);
+}
+
+/// Sums values in the queue of sums, once what is queued elsewhere by now is done.
+void LuminanceStepCuda::sum_after(cudaStream_t queue, std::span<float> values) {
+  ready_.record(queue);
+  ready_.hold(*sums_);
+  if (share_.sum_on_device) {
+    share_.sum_on_device(values.data(), values.size(), *sums_);
+  } else {
+    on_host_.resize(std::max(on_host_.size(), values.size()));
+    CNERF_CUDA(cudaMemcpyAsync(on_host_.data(), values.data(), values.size_bytes(), cudaMemcpyDeviceToHost, *sums_));
+    sums_->wait();
+    share_.sum({on_host_.data(), values.size()});
+    CNERF_CUDA(cudaMemcpyAsync(values.data(), on_host_.data(), values.size_bytes(), cudaMemcpyHostToDevice, *sums_));
+  }
+  summed_.record(*sums_);
 }
 
 void LuminanceStepCuda::capture(const std::uint32_t* occupied) {
@@ -140,7 +235,10 @@ StepReport LuminanceStepCuda::run(float learning_rate, const std::uint32_t* occu
   const bool is_early = steps_ - restarted_at_ < kMostAhead;  // nothing to report yet but this step itself
   if (!is_early) done_[(steps_ - kMostAhead) % kStepRing].wait();
   learning_rates_[std::size_t(steps_ % kStepRing)] = learning_rate;
-  if (!is_warm_) {
+  views_.follow(steps_, stream_);
+  if (!share_.is_whole()) {
+    launch_shared(occupied);
+  } else if (!is_warm_) {
     launch(occupied);  // loads the kernels, which a capture must not do
     is_warm_ = true;
   } else {

@@ -2,9 +2,14 @@
 /// A training step of stage 1 on the GPU: one graph of kernels. Rays are drawn and followed (march, hash grid, nets,
 /// loss and its gradient), then come the nets backward, the hash grid backward, Adam. The host only says the learning
 /// rate and never waits for a step, except that it keeps no more than a few ahead.
+///
+/// A step that processes share is no graph: a library's sums lie between its kernels. Those of the hash grid's levels
+/// are under way while the next levels' gradients are found and the last ones' rows take their step.
 
 #include <cstdint>
+#include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "src/base/cuda/stream.h"
@@ -28,7 +33,11 @@ class LuminanceStepCuda {
   LuminanceStepCuda(const LuminanceStepCuda&) = delete;
   LuminanceStepCuda& operator=(const LuminanceStepCuda&) = delete;
 
+  /// Of the views that are set next.
+  void limit_image_memory(std::size_t bytes) { image_memory_ = bytes; }
   void set_views(const std::vector<TrainingView>& views);
+  /// See LuminanceEngine::share_steps.
+  void share(const StepShare& share);
   /// Goes on from here.  @param rays  of the next step
   void restart(long step, std::int64_t rays);
   [[nodiscard]] long steps() const { return steps_; }
@@ -49,6 +58,10 @@ class LuminanceStepCuda {
 
  private:
   void launch(const std::uint32_t* occupied);
+  void launch_shared(const std::uint32_t* occupied);
+  void draw_and_trace(const std::uint32_t* occupied);
+  void teach_cameras(cudaStream_t stream);
+  void sum_after(cudaStream_t queue, std::span<float> values);
   void capture(const std::uint32_t* occupied);
   void forget_graph();
   [[nodiscard]] TraceJob trace_job(const std::uint32_t* occupied) const;
@@ -59,6 +72,7 @@ class LuminanceStepCuda {
   std::uint32_t capacity_;
   const LuminanceFieldCuda& field_;
   cudaStream_t stream_;
+  std::size_t image_memory_ = std::numeric_limits<std::size_t>::max();
   ViewImages views_;
 
   DeviceBuffer<StepState> state_;
@@ -69,13 +83,19 @@ class LuminanceStepCuda {
   DeviceBuffer<DirectionCode> directions_;
   DeviceBuffer<ViewCorrection> corrections_;  // of the views, where they are learned
   DeviceBuffer<ViewMoments> correction_moments_;
-  DeviceBuffer<ViewGradient> view_gradients_;
   DeviceBuffer<LensCorrection> lenses_;  // likewise
   DeviceBuffer<LensMoments> lens_moments_;
-  DeviceBuffer<LensGradient> lens_gradients_;
+  /// Of the views, of the lenses, then kStepSums numbers of the step; which the nets' gradient follows
+  /// where processes share steps, so that all of it is one sum.
+  DeviceBuffer<float> small_gradients_;
 
   MappedBuffer<float> learning_rates_{kStepRing};
   MappedBuffer<StepRecord> reports_{kStepRing};
+  StepShare share_;
+  std::vector<LevelRange> grid_parts_;  // in the order of their sums
+  std::vector<float> on_host_;          // what is summed through the host's memory
+  std::optional<CudaStream> sums_;      // that processes share
+  CudaEvent ready_, summed_;
   CudaStream side_;
   CudaEvent done_[kStepRing], fork_, join_;
   cudaGraphExec_t graph_ = nullptr;

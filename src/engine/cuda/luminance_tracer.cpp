@@ -23,7 +23,7 @@ TraceJob LuminanceTracerCuda::job(const FieldView& field, std::uint32_t rays, co
   rays_.reserve(rays, kRayAdvice);
   directions_.reserve(rays, kRayAdvice);
   StepState state;
-  state.rays = rays;
+  state.rays = state.end_ray = rays;
   state_.upload(&state, 1, stream_);
   TraceJob job{};
   job.field = field;

@@ -9,50 +9,59 @@ namespace {
 
 constexpr unsigned kThreads = 128;
 
-__global__ void begin(StepState* state, const float* learning_rates) {
+__global__ void begin(StepState* state, const float* learning_rates, const StepPart part) {
   const float rate = learning_rates[state->step % kStepRing];
-  state->next_ray = state->samples = 0;
+  const auto [first, last] = part_of_rays(state->rays, part.part, part.parts);
+  state->next_ray = first;
+  state->end_ray = last;
+  state->samples = 0;
   state->loss = state->squared_error = 0;
   state->adam = AdamStep(rate, state->step + 1);
 }
 
-/// The views in device memory.
+/// The views in device memory; of those that pixels are drawn from, what `observe_ray` numbers.
 struct DeviceViews {
   const ViewRecord* views;
   const ViewCorrection* corrections;
   std::uint32_t n_views;
+  const std::uint32_t* resident;
 
+  [[nodiscard]] __device__ std::uint32_t number_of(std::uint32_t v) const {
+    return resident == nullptr ? v : resident[v];
+  }
+  [[nodiscard]] __device__ const ViewRecord& view(std::uint32_t v) const { return views[number_of(v)]; }
   [[nodiscard]] __device__ std::uint32_t count() const { return n_views; }
   [[nodiscard]] __device__ ViewCorrection correction(std::uint32_t v) const {
-    return corrections == nullptr ? ViewCorrection() : corrections[v];
+    return corrections == nullptr ? ViewCorrection() : corrections[number_of(v)];
   }
-  [[nodiscard]] __device__ ImageSize size_of(std::uint32_t v) const { return {views[v].width, views[v].height}; }
-  [[nodiscard]] __device__ const UnitCamera& camera(std::uint32_t v) const { return views[v].camera; }
+  [[nodiscard]] __device__ ImageSize size_of(std::uint32_t v) const { return {view(v).width, view(v).height}; }
+  [[nodiscard]] __device__ const UnitCamera& camera(std::uint32_t v) const { return view(v).camera; }
   [[nodiscard]] __device__ bool is_valid(std::uint32_t v, std::size_t pixel) const {
-    return views[v].mask == nullptr || views[v].mask[pixel] != 0;
+    return view(v).mask == nullptr || view(v).mask[pixel] != 0;
   }
   [[nodiscard]] __device__ float coverage(std::uint32_t v, std::size_t pixel) const {
-    return views[v].alpha == nullptr ? 1.0f : float(views[v].alpha[pixel]) / 255.0f;
+    return view(v).alpha == nullptr ? 1.0f : float(view(v).alpha[pixel]) / 255.0f;
   }
   [[nodiscard]] __device__ SkyLabel sky_label(std::uint32_t v, std::size_t pixel) const {
-    return views[v].sky_labels == nullptr ? SkyLabel::kScene : views[v].sky_labels[pixel];
+    return view(v).sky_labels == nullptr ? SkyLabel::kScene : view(v).sky_labels[pixel];
   }
   [[nodiscard]] __device__ DepthHint depth(std::uint32_t v, int x, int y) const {
-    const ViewRecord& view = views[v];
-    if (view.depths == nullptr) return {};
-    const int column = hint_cell(x, view.width, view.depth_columns), row = hint_cell(y, view.height, view.depth_rows);
-    return view.depths[row * view.depth_columns + column];
+    const ViewRecord& record = view(v);
+    if (record.depths == nullptr) return {};
+    const int column = hint_cell(x, record.width, record.depth_columns),
+              row = hint_cell(y, record.height, record.depth_rows);
+    return record.depths[row * record.depth_columns + column];
   }
-  [[nodiscard]] __device__ DirectionView sky(std::uint32_t v) const { return views[v].sky; }
+  [[nodiscard]] __device__ DirectionView sky(std::uint32_t v) const { return view(v).sky; }
   [[nodiscard]] __device__ float luminance(std::uint32_t v, std::size_t pixel) const {
-    const ViewRecord& view = views[v];
-    switch (view.depth) {
+    const ViewRecord& record = view(v);
+    switch (record.depth) {
       case PixelDepth::kU8:
-        return view.decoded[static_cast<const std::uint8_t*>(view.pixels)[pixel]];
+        return record.decoded[static_cast<const std::uint8_t*>(record.pixels)[pixel]];
       case PixelDepth::kU16:
-        return view.decoded[static_cast<const std::uint16_t*>(view.pixels)[pixel]];
+        return record.decoded[static_cast<const std::uint16_t*>(record.pixels)[pixel]];
       default:
-        return static_cast<const float*>(view.pixels)[pixel];
+        return static_cast<const float*>(record.pixels)[pixel];
     }
   }
 };
@@ -66,18 +75,27 @@ __device__ void clip(RayRecord& record) {
 }
 
 __global__ void draw(const DrawJob job) {
-  const std::uint32_t ray = blockIdx.x * kThreads + threadIdx.x;
-  if (ray >= job.state->rays) return;
-  const ObservedRay observed = observe_ray(DeviceViews{job.views, job.corrections, job.n_views}, job.seed,
-                                           std::uint64_t(job.state->step), std::uint64_t(ray));
+  const std::uint32_t ray = job.state->next_ray + blockIdx.x * kThreads + threadIdx.x;
+  if (ray >= job.state->end_ray) return;
+  const DeviceViews views = {job.views, job.corrections, job.n_views, job.resident};
+  const ObservedRay observed = observe_ray(views, job.seed, std::uint64_t(job.state->step), std::uint64_t(ray));
   RayRecord record;
   record.ray = observed.ray;
   record.jitter = observed.jitter;
   record.target = observed.target;
-  record.view = observed.view;
+  record.view = views.number_of(observed.view);
   clip(record);
   job.rays[ray] = record;
   job.directions[ray] = encode_direction(record.ray.direction);
+}
+
+__global__ void place(const PlacedView placed, ViewRecord* views, std::uint32_t* resident) {
+  ViewRecord& record = views[placed.view];
+  record.pixels = placed.pixels;
+  record.alpha = placed.alpha;
+  record.mask = placed.mask;
+  record.sky_labels = placed.sky_labels;
+  *resident = placed.view;
 }
 
 __global__ void prepare(const Ray* rays, std::uint32_t count, RayRecord* records, DirectionCode* directions) {
@@ -152,6 +170,21 @@ __global__ void __launch_bounds__(kGaugeThreads)
   for (int v = int(threadIdx.x); v < n; v += kGaugeThreads) gauge.take_off(origin(v), learned.corrections[v]);
 }
 
+constexpr std::uint32_t kHalf = 1u << 12;  // counts travel in two floats, so that sums below 2^36 are exact
+
+__global__ void pack_sums(const StepState* state, float* sums) {
+  sums[0] = float(state->loss);
+  sums[1] = float(state->squared_error);
+  sums[2] = float(state->samples / kHalf);
+  sums[3] = float(state->samples % kHalf);
+}
+
+__global__ void unpack_sums(const float* sums, StepState* state) {
+  state->loss = sums[0];
+  state->squared_error = sums[1];
+  state->samples = std::uint32_t(sums[2]) * kHalf + std::uint32_t(sums[3]);
+}
+
 __global__ void end(StepState* state, std::uint32_t wanted_samples, std::uint32_t capacity, StepRecord* reports) {
   const double rays = state->rays;
   reports[state->step % kStepRing] = {state->loss / rays, state->squared_error / rays, state->rays,
@@ -162,13 +195,18 @@ __global__ void end(StepState* state, std::uint32_t wanted_samples, std::uint32_
 
 }  // namespace
 
-void begin_step(StepState* state, const float* learning_rates, cudaStream_t stream) {
-  begin<<<1, 1, 0, stream>>>(state, learning_rates);
+void begin_step(StepState* state, const float* learning_rates, const StepPart& part, cudaStream_t stream) {
+  begin<<<1, 1, 0, stream>>>(state, learning_rates, part);
   CNERF_CUDA(cudaGetLastError());
 }
 
 void draw_training_rays(const DrawJob& job, cudaStream_t stream) {
   draw<<<blocks_for(kMostRays, kThreads), kThreads, 0, stream>>>(job);
+  CNERF_CUDA(cudaGetLastError());
+}
+
+void put_view(const PlacedView& placed, ViewRecord* views, std::uint32_t* resident, cudaStream_t stream) {
+  place<<<1, 1, 0, stream>>>(placed, views, resident);
   CNERF_CUDA(cudaGetLastError());
 }
 
@@ -192,6 +230,16 @@ void use_lenses(const LearnedViews& learned, ViewRecord* views, cudaStream_t str
 
 void update_corrections(const LearnedViews& learned, ViewRecord* views, const StepState* state, cudaStream_t stream) {
   update_views<<<1, kGaugeThreads, 0, stream>>>(learned, views, state);
+  CNERF_CUDA(cudaGetLastError());
+}
+
+void pack_step_sums(const StepState* state, float* sums, cudaStream_t stream) {
+  pack_sums<<<1, 1, 0, stream>>>(state, sums);
+  CNERF_CUDA(cudaGetLastError());
+}
+
+void unpack_step_sums(const float* sums, StepState* state, cudaStream_t stream) {
+  unpack_sums<<<1, 1, 0, stream>>>(sums, state);
   CNERF_CUDA(cudaGetLastError());
 }
 

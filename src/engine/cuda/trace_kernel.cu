@@ -269,14 +269,14 @@ __global__ void __launch_bounds__(kThreads, 2)
   auto& shared = *reinterpret_cast<TraceShared<KT>*>(memory);
   shared.field.load(job.field.nets);
   const unsigned lane = threadIdx.x % 32;
-  const std::uint32_t n_rays = job.state->rays;
+  const std::uint32_t n_rays = job.state->rays, end_ray = job.state->end_ray;
 
   StepState sums;
   while (true) {
     std::uint32_t index = 0;
     if (lane == 0) index = atomicAdd(&job.state->next_ray, 1u);
     index = __shfl_sync(~0u, index, 0);
-    if (index >= n_rays) break;
+    if (index >= end_ray) break;
     const RayRecord record = job.rays[index];
     const RayProgress ray = follow_ray<KT, kKeep>(levels, job, shared, record, index);
     if constexpr (kKeep == Keep::kTraining) train_ray(job, record, ray, n_rays, sums);

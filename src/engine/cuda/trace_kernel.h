@@ -49,7 +49,7 @@ struct TraceJob {
   float min_transmittance;
   const RayRecord* rays;
   const DirectionCode* directions;
-  StepState* state;  ///< rays, next_ray, samples; training also sums up here
+  StepState* state;  ///< rays, next_ray, end_ray, samples; training also sums up here
   // Training:
   SampleArrays samples;
   DepthLearning depth;

@@ -32,17 +32,33 @@ __device__ void pack(const DenseLayer& layer, int out, int in, float value) {
   }
 }
 
+using SliceSums = float[kSlices][kColumns];
+
+/// Of the parts of a weight's gradient, what the threads of its column find.
+__device__ void sum_slices(const float* d_weights, int parts, int weights, int index, SliceSums& sums) {
+  float sum = 0;
+  for (int part = int(threadIdx.y); part < parts; part += kSlices)
+    sum += d_weights[std::size_t(part) * weights + index];
+  sums[threadIdx.y][threadIdx.x] = sum;
+  __syncthreads();
+}
+__device__ float sum_of(const SliceSums& sums) {
+  float sum = 0;
+  for (int slice = 0; slice < kSlices; ++slice) sum += sums[slice][threadIdx.x];
+  return sum;
+}
+
+__global__ void sum_parts(const float* d_weights, int parts, int weights, float* to) {
+  __shared__ SliceSums sums;
+  const int index = int(blockIdx.x) * kColumns + int(threadIdx.x);
+  sum_slices(d_weights, parts, weights, index, sums);
+  if (threadIdx.y == 0) to[index] = sum_of(sums);
+}
+
 __global__ void update(const __grid_constant__ UpdateJob job) {
-  __shared__ float sums[kSlices][kColumns];
+  __shared__ SliceSums sums;
   int index = int(blockIdx.x) * kColumns + int(threadIdx.x);
-  if (job.d_weights != nullptr) {
-    float sum = 0;
-    for (int part = int(threadIdx.y); part < job.parts; part += kSlices) {
-      sum += job.d_weights[std::size_t(part) * job.weights + index];
-    }
-    sums[threadIdx.y][threadIdx.x] = sum;
-    __syncthreads();
-  }
+  if (job.d_weights != nullptr) sum_slices(job.d_weights, job.parts, job.weights, index, sums);
   if (threadIdx.y > 0) return;
   const DenseLayer* layer = job.layer;
   for (; index >= layer->padded_outputs * layer->padded_inputs; ++layer) {
@@ -54,9 +70,7 @@ __global__ void update(const __grid_constant__ UpdateJob job) {
   const TrainedWeights& trained = layer->trained;
   float value = trained.values[at];
   if (job.d_weights != nullptr) {
-    float d = 0;
-    for (int slice = 0; slice < kSlices; ++slice) d += sums[slice][threadIdx.x];
-    job.adam->apply(d, trained.first_moments[at], trained.second_moments[at], value);
+    job.adam->apply(sum_of(sums), trained.first_moments[at], trained.second_moments[at], value);
     trained.values[at] = value;
   }
   pack(*layer, out, in, value);
@@ -74,6 +88,12 @@ void update_layers(const std::vector<DenseLayer>& layers, const float* d_weights
   }
   CNERF_CHECK(job.weights % kColumns == 0, "padded layers are multiples of 16 by 16, or rows of 64");
   update<<<unsigned(job.weights / kColumns), dim3(kColumns, kSlices), 0, stream>>>(job);
+  CNERF_CUDA(cudaGetLastError());
+}
+
+void sum_gradient_parts(const float* d_weights, int parts, int weights, float* sum, cudaStream_t stream) {
+  CNERF_CHECK(weights % kColumns == 0, "padded layers are multiples of 16 by 16, or rows of 64");
+  sum_parts<<<unsigned(weights / kColumns), dim3(kColumns, kSlices), 0, stream>>>(d_weights, parts, weights, sum);
   CNERF_CUDA(cudaGetLastError());
 }
 

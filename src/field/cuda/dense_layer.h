@@ -50,4 +50,9 @@ struct DenseLayer {
 void update_layers(const std::vector<DenseLayer>& layers, const float* d_weights, int parts, const AdamStep* adam,
                    cudaStream_t stream);
 
+/// The gradient that `update_layers` would sum, as its only part.
+/// @param weights  of all layers, padded
+/// @param sum      [weights], written
+void sum_gradient_parts(const float* d_weights, int parts, int weights, float* sum, cudaStream_t stream);
+
 }  // namespace cnerf

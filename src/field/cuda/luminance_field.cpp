@@ -47,14 +47,22 @@ PositionSlopes LuminanceFieldCuda::position_slopes(int levels) const {
           reinterpret_cast<const uint2*>(d_encoded_.data())};
 }
 
-void LuminanceFieldCuda::update_layers_of_nets(const float* d_weights, const AdamStep* adam,
+void LuminanceFieldCuda::update_layers_of_nets(const float* d_weights, int parts, const AdamStep* adam,
                                                cudaStream_t stream) const {
   const FieldParameters parameters = {density_.weights(), luminance_.weights(), packed_.weights(), last_layer_.data()};
-  update_layers(field_layers(levels(), parameters), d_weights, field_backward_blocks(), adam, stream);
+  update_layers(field_layers(levels(), parameters), d_weights, parts, adam, stream);
 }
 
 void LuminanceFieldCuda::update_nets(const AdamStep* adam, cudaStream_t stream) const {
-  update_layers_of_nets(d_weights_.data(), adam, stream);
+  update_layers_of_nets(d_weights_.data(), field_backward_blocks(), adam, stream);
+}
+
+void LuminanceFieldCuda::write_nets_gradient(float* to, cudaStream_t stream) const {
+  sum_gradient_parts(d_weights_.data(), field_backward_blocks(), field_weight_count(levels()), to, stream);
+}
+
+void LuminanceFieldCuda::update_nets(const float* gradient, const AdamStep* adam, cudaStream_t stream) const {
+  update_layers_of_nets(gradient, /*parts=*/1, adam, stream);
 }
 
 void LuminanceFieldCuda::append_state(std::vector<StatePiece>& state) {
@@ -67,7 +75,7 @@ void LuminanceFieldCuda::upload(cudaStream_t stream) const {
   grid_.upload(stream);
   density_.upload();
   luminance_.upload();
-  update_layers_of_nets(nullptr, nullptr, stream);
+  update_layers_of_nets(nullptr, 0, nullptr, stream);
 }
 
 }  // namespace cnerf

@@ -29,6 +29,14 @@ class LuminanceFieldCuda {
   [[nodiscard]] const std::vector<GridLevel>& grid_levels() const { return grid_.levels(); }
   /// @param adam  device memory
   void update_nets(const AdamStep* adam, cudaStream_t stream) const;
+  /// The grid, whose parts may take their steps one after another.
+  [[nodiscard]] const TrainedGrid& grid() const { return grid_; }
+  void grid_backward(const LevelRange& range, const FieldSamples& samples, cudaStream_t stream) const {
+    grid_.backward(range, samples.places, samples.count, d_encoded_.data(), stream);
+  }
+  /// The nets' gradient, [field_weight_count(levels())], and a step by such a one.
+  void write_nets_gradient(float* to, cudaStream_t stream) const;
+  void update_nets(const float* gradient, const AdamStep* adam, cudaStream_t stream) const;
   void update_grid(const AdamStep* adam, cudaStream_t stream) const { grid_.update(adam, stream); }
 
   void append_state(std::vector<StatePiece>& state);
@@ -37,7 +45,7 @@ class LuminanceFieldCuda {
 
  private:
   /// @param d_weights  null: only packs the weights
-  void update_layers_of_nets(const float* d_weights, const AdamStep* adam, cudaStream_t stream) const;
+  void update_layers_of_nets(const float* d_weights, int parts, const AdamStep* adam, cudaStream_t stream) const;
 
   float density_scale_;
   LuminanceActivation<float> activation_;

@@ -29,18 +29,27 @@ TrainedGrid::TrainedGrid(const HashGridOptions& options, std::uint64_t seed, con
       d_table_(rows(), use),
       halves_(rows(), use) {}
 
-void TrainedGrid::backward(const float4* places, SampleCount samples, const void* d_encoded,
+void TrainedGrid::backward(const LevelRange& range, const float4* places, SampleCount samples, const void* d_encoded,
                            cudaStream_t stream) const {
-  encode_backward_cuda(levels_, places, samples, d_encoded, d_table_.data(), stream);
+  const std::vector<GridLevel> some(levels_.begin() + long(range.first), levels_.begin() + long(range.last));
+  const uint2* d_some = static_cast<const uint2*>(d_encoded) + range.first * samples.most;
+  encode_backward_cuda(some, places, samples, d_some, d_table_.data(), stream);
 }
 
-void TrainedGrid::update(const AdamStep* adam, cudaStream_t stream) const {
-  update_rows(table_rows(), adam, decay_, stream);
+std::span<float> TrainedGrid::gradient(const LevelRange& range) const {
+  const TableRowsCuda rows = table_rows(range);
+  return {reinterpret_cast<float*>(rows.gradient), 4 * std::size_t(rows.count)};
 }
 
-TableRowsCuda TrainedGrid::table_rows() const {
-  return {reinterpret_cast<float4*>(table_.data()), d_table_.data(), reinterpret_cast<float4*>(moments_.data()),
-          halves_.data(), rows()};
+void TrainedGrid::update(const LevelRange& range, const AdamStep* adam, cudaStream_t stream) const {
+  update_rows(table_rows(range), adam, decay_, stream);
+}
+
+TableRowsCuda TrainedGrid::table_rows(const LevelRange& range) const {
+  const std::uint32_t first = levels_[range.first].first_row;
+  const std::uint32_t last = range.last < levels_.size() ? levels_[range.last].first_row : rows();
+  return {reinterpret_cast<float4*>(table_.data()) + first, d_table_.data() + first,
+          reinterpret_cast<float4*>(moments_.data()) + 2 * std::size_t(first), halves_.data() + first, last - first};
 }
 
 void TrainedGrid::append_state(const std::string& prefix, std::vector<StatePiece>& state) {
@@ -51,7 +60,7 @@ void TrainedGrid::append_state(const std::string& prefix, std::vector<StatePiece
 void TrainedGrid::upload(cudaStream_t stream) const {
   table_.upload();
   moments_.upload();
-  round_rows(table_rows(), stream);
+  round_rows(table_rows(all()), stream);
 }
 
 }  // namespace cnerf

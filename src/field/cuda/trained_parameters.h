@@ -3,6 +3,7 @@
 /// equal those of HashGridCpu and MlpCpu, so that a snapshot of one device loads on the other.
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -62,6 +63,11 @@ class TrainedNet {
   StateBuffer weights_, first_, second_;
 };
 
+/// Levels of a hash grid that follow one another, and so do their rows.
+struct LevelRange {
+  std::size_t first = 0, last = 0;  ///< the one behind the last
+};
+
 /// A hash grid: its table, rounded for kernels, its gradient and its moments.
 class TrainedGrid {
  public:
@@ -74,15 +80,24 @@ class TrainedGrid {
   [[nodiscard]] const uint2* table() const { return halves_.data(); }
 
   /// Adds to the gradient, as encode_backward_cuda does.
-  void backward(const float4* places, SampleCount samples, const void* d_encoded, cudaStream_t stream) const;
+  void backward(const float4* places, SampleCount samples, const void* d_encoded, cudaStream_t stream) const {
+    backward(all(), places, samples, d_encoded, stream);
+  }
   /// Adam on what has a gradient.  @param adam  device memory
-  void update(const AdamStep* adam, cudaStream_t stream) const;
+  void update(const AdamStep* adam, cudaStream_t stream) const { update(all(), adam, stream); }
+
+  // The same of some levels, whose gradient is then summed with that of other processes.
+  [[nodiscard]] LevelRange all() const { return {0, levels_.size()}; }
+  void backward(const LevelRange& range, const float4* places, SampleCount samples, const void* d_encoded,
+                cudaStream_t stream) const;
+  [[nodiscard]] std::span<float> gradient(const LevelRange& range) const;  ///< device memory
+  void update(const LevelRange& range, const AdamStep* adam, cudaStream_t stream) const;
   void append_state(const std::string& prefix, std::vector<StatePiece>& state);
   void upload(cudaStream_t stream) const;
 
  private:
   [[nodiscard]] std::uint32_t rows() const { return total_rows(levels_); }
-  [[nodiscard]] TableRowsCuda table_rows() const;
+  [[nodiscard]] TableRowsCuda table_rows(const LevelRange& range) const;
 
   std::vector<GridLevel> levels_;
   float decay_ = 0;

@@ -11,7 +11,13 @@ namespace cnerf {
 /// A rank's share of each step.
 [[nodiscard]] inline StepShare share_of(cluster::Ranks& ranks) {
   if (ranks.is_alone()) return {};
-  return {ranks.rank(), ranks.size(), [&ranks](std::span<float> values) { ranks.sum(values); }};
+  StepShare share{ranks.rank(), ranks.size(), [&ranks](std::span<float> values) { ranks.sum(values); }};
+  if (ranks.sums_on_devices()) {
+    share.sum_on_device = [&ranks](float* values, std::size_t count, void* stream) {
+      ranks.sum_on_device(values, count, stream);
+    };
+  }
+  return share;
 }
 
 /// What ranks have to be of one mind about between two steps.

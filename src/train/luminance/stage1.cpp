@@ -177,6 +177,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   model.sky = sky.light;
   const std::vector<DepthHints> depths = depth_hints(job.capture, model.frame, points_of(job));
   show_to(views, depths);
+  model.engine->limit_image_memory(job.image_memory);
   model.engine->set_views(views);
   model.engine->share_steps(share_of(job.ranks));
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include "src/base/observer.h"
@@ -37,6 +38,8 @@ struct Stage1Job {
   std::vector<SparsePoint> points = {};                   ///< in place of the capture's, which has none
   std::function<void(const LuminanceModel&)> watch = {};  ///< sees the model between steps, in no training time
   cluster::Ranks& ranks = cluster::alone();               ///< that share the steps; rank 0 saves
+  /// See LuminanceEngine::limit_image_memory.
+  std::size_t image_memory = std::numeric_limits<std::size_t>::max();
 
   [[nodiscard]] bool goes_on() const { return resume && std::filesystem::exists(snapshot); }
 };
