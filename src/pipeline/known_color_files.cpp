@@ -185,4 +185,12 @@ std::vector<fs::path> key_frame_files(const ColorizerOptions& config) {
   return files;
 }
 
+std::vector<std::string> key_frame_views(const Capture& capture, const ColorizerOptions& config) {
+  std::vector<std::string> views;
+  for (const NamedFile& named : named_files(config.keyframes, "--keyframe")) {
+    views.push_back(training_view(capture, named.view, named.entry).name);
+  }
+  return views;
+}
+
 }  // namespace cnerf::pipeline

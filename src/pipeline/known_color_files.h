@@ -23,4 +23,7 @@ struct GivenColors {
 /// The files `config.keyframes` names.  @throws UsageError.
 [[nodiscard]] std::vector<std::filesystem::path> key_frame_files(const ColorizerOptions& config);
 
+/// The views that `config.keyframes` names, as the capture names them.  @throws UsageError.
+[[nodiscard]] std::vector<std::string> key_frame_views(const Capture& capture, const ColorizerOptions& config);
+
 }  // namespace cnerf::pipeline
