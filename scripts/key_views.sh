@@ -56,15 +56,18 @@ python3 - "$out" "$@" << 'PYTHON'
 import json, sys
 from pathlib import Path
 print("| capture | middle view | ab error | suggested view | ab error | change |\n|---|---|---|---|---|---|")
-changes = []
+changes, errors = [], []
 for name in sys.argv[2:]:
     run = Path(sys.argv[1]) / name
     views = json.loads((run / "key_views.json").read_text())
     names = [views["alone"][len(views["alone"]) // 2]["view"], views["suggested"][0]["view"]]
     means = [json.loads((run / "takes" / take / "metrics.json").read_text())["mean"] for take in ("middle", "suggested")]
-    changes.append(means[1]["ab_error"] / means[0]["ab_error"] - 1)
+    errors.append([mean["ab_error"] for mean in means])
+    changes.append(errors[-1][1] / errors[-1][0] - 1)
     cells = [f"`{Path(view).stem}` | {mean['ab_error']:.2f}, {mean['ab_error'] / mean['ab_error_grey']:.0%} of grey's"
              for view, mean in zip(names, means)]
     print(f"| {name} | {cells[0]} | {cells[1]} | {changes[-1]:+.0%} |")
-print(f"| mean | | | | | {sum(changes) / len(changes):+.0%} |")
+middle, suggested = (sum(column) / len(errors) for column in zip(*errors))
+print(f"| mean error | | {middle:.2f} | | {suggested:.2f} | {suggested / middle - 1:+.0%} |")
+print(f"| mean change | | | | | {sum(changes) / len(changes):+.0%} |")
 PYTHON
