@@ -7,6 +7,7 @@
 #include "src/cluster/ranks.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/default_colorizer.h"
+#include "src/pipeline/key_views_step.h"
 #include "src/studio/coloring.h"
 #include "viewer/server/live_session.h"
 
@@ -19,6 +20,7 @@ struct ColorizeArguments {
   std::string bases;
   std::string replay;
   bool bases_only = false;
+  int suggested_keyframes = 0;
   bool view = false;
   web::BrowserOptions browser;
 };
@@ -43,15 +45,25 @@ void replay(const ColorizeArguments& arguments, const pipeline::RunContext& cont
   reporter.wrote("take", directory.take_folder(take));
 }
 
+void suggest(const ColorizeArguments& arguments, const pipeline::RunContext& context, Reporter& reporter) {
+  const std::string take = context.directory.choose_take(arguments.run.take);
+  pipeline::key_views_step(context, {arguments.suggested_keyframes, take}, engines_for(context.config.device),
+                           reporter);
+  reporter.next("cnerf colorize " + arguments.run.run + " --keyframe VIEW=PAINTED.png");
+}
+
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
   // A take that is gone on with has its own configuration; a new one starts from the run's.
   const std::string base = arguments.existing.resume ? arguments.run.take : "";
   pipeline::RunContext context = open_run(arguments.run, base, command_line, reporter);
-  if (!cluster::world().is_alone() && (arguments.bases_only || !arguments.replay.empty())) {
-    throw UsageError("--bases-only and --replay: are for one process, without torchrun, srun or mpirun");
+  const bool is_suggestion = arguments.suggested_keyframes > 0;
+  if (!cluster::world().is_alone() && (arguments.bases_only || is_suggestion || !arguments.replay.empty())) {
+    throw UsageError(
+        "--bases-only, --suggest-keyframes and --replay: are for one process, without torchrun, srun or mpirun");
   }
   if (!arguments.replay.empty()) return replay(arguments, context, reporter);
+  if (is_suggestion) return suggest(arguments, context, reporter);
   refuse_colorizer_of_others(arguments.run.config, context.config);
   const Engines& engines = engines_for(context.config.device);
   pipeline::choose_colorizer(context.capture.root, context.config, reporter);
@@ -81,6 +93,9 @@ Work declare_colorize(CLI::App& app) {
   app.add_option("--bases", arguments->bases,
                  "2,5,7: base images whose colours you like, by their numbers in bases.png");
   app.add_flag("--bases-only", arguments->bases_only, "Only show the candidates of base images, in a minute");
+  app.add_option("--suggest-keyframes", arguments->suggested_keyframes,
+                 "Only name so many views that, painted, tell most about the colours of all others")
+      ->check(CLI::Range(1, 100));
   app.add_option("--replay", arguments->replay, "Make a take of the studio again from its journal, as --take NAME");
   app.add_flag("--resume", arguments->existing.resume, "Go on with a take that was stopped");
   app.add_flag("--overwrite", arguments->existing.overwrite, "Start again where a take of this name is finished");

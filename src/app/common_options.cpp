@@ -112,6 +112,7 @@ void add_colorizer_options(CLI::App& app, ConfigArguments& arguments) {
   add_short_form(app, arguments, "--prompt", "colorizer.prompt");
   add_list_form(app, arguments, "--keyframe", "colorizer.keyframes");
   add_list_form(app, arguments, "--hint", "colorizer.hints");
+  add_list_form(app, arguments, "--palette", "colorizer.palette");
   add_list_form(app, arguments, "--hint-image", "colorizer.hint_images");
   add_short_form(app, arguments, "--strokes", "colorizer.strokes");
 }

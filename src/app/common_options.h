@@ -33,7 +33,7 @@ void add_short_form(CLI::App& app, ConfigArguments& arguments, const std::string
 void add_flag_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
 /// The same for a key that holds a list separated by `;`: the option may be repeated.
 void add_list_form(CLI::App& app, ConfigArguments& arguments, const std::string& option, const std::string& key);
-/// Declares --colorizer, --trust, --prompt, --keyframe, --hint, --hint-image and --strokes.
+/// Declares --colorizer, --trust, --prompt, --keyframe, --hint, --palette, --hint-image and --strokes.
 void add_colorizer_options(CLI::App& app, ConfigArguments& arguments);
 /// Declares --port, --host, --token, --token-file and --no-browser.
 void add_browser_options(CLI::App& app, web::BrowserOptions& options);

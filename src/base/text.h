@@ -14,6 +14,9 @@ namespace cnerf {
   return text;
 }
 
+/// The parts of a list, without the spaces around them; empty ones are left out.
+[[nodiscard]] std::vector<std::string> split(const std::string& text, char separator);
+
 /// Whether a text is UTF-8, as the names in JSON, TOML, VDB and glTF files have to be.
 [[nodiscard]] bool is_utf8(std::string_view text);
 

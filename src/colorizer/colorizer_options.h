@@ -9,7 +9,7 @@ namespace cnerf {
 
 struct ColorizerOptions {
   std::string spec;  // empty = none given
-  std::string keyframes, hint_images, hints, strokes, prompt;
+  std::string keyframes, hint_images, hints, strokes, palette, prompt;
   double timeout_seconds = 60;
   int reference_steps = 480;
   bool reference_on_builtin = true;
@@ -22,6 +22,7 @@ struct ColorizerOptions {
     v("keyframes", keyframes, "painted frames of the capture, VIEW=FILE;...");
     v("hint_images", hint_images, "pictures that are transparent except for strokes, VIEW=FILE;...");
     v("hints", hints, "dots of colour, x,y,VIEW,#rrggbb;... in pixels of the view's image file");
+    v("palette", palette, "words that hints and strokes may name instead of a colour, WORD=#rrggbb,...");
     v("strokes", strokes, "what was painted in the studio: the file RUN/strokes/strokes.json");
     v("prompt", prompt, "a text for colorizers that take one: exec: commands with {prompt} in them");
     v("timeout_seconds", timeout_seconds, Range{0.1, 1e6},

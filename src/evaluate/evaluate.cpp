@@ -61,6 +61,7 @@ void measure_colour(const EvaluatedView& pictures, ViewMetrics& metrics) {
   const Colorfulness colorful = colorfulness(srgb8_from_linear(ours), valid);
   metrics.colorfulness = colorful.standard;
   metrics.colorfulness_magnitude = colorful.magnitude;
+  metrics.color_diversity = color_diversity(ours, valid);
   if (!pictures.truth) return;
 
   const std::vector<float>& truth = pictures.truth->rgb;
@@ -69,6 +70,8 @@ void measure_colour(const EvaluatedView& pictures, ViewMetrics& metrics) {
   metrics.colorfulness_magnitude_truth = wanted.magnitude;
   metrics.colorfulness_difference = colorful.standard - wanted.standard;
   metrics.colorfulness_magnitude_difference = colorful.magnitude - wanted.magnitude;
+  metrics.color_diversity_truth = color_diversity(truth, valid);
+  metrics.color_diversity_difference = *metrics.color_diversity - *metrics.color_diversity_truth;
   metrics.psnr_rgb = psnr_from_mse(encoded_mse(ours, truth, 3, valid));
   metrics.ssim_rgb = ssim_of_channels(encoded(ours), encoded(truth), pictures.ours.width, pictures.ours.height, valid);
   metrics.ab_error = mean_ab_distance(ours, truth, valid);

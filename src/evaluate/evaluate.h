@@ -38,6 +38,7 @@ struct ViewMetrics {
   std::optional<double> lpips;         ///< of 8-bit sRGB, where weights were given
   std::optional<double> colorfulness, colorfulness_truth, colorfulness_difference;  ///< difference: ours - truth
   std::optional<double> colorfulness_magnitude, colorfulness_magnitude_truth, colorfulness_magnitude_difference;
+  std::optional<double> color_diversity, color_diversity_truth, color_diversity_difference;  ///< likewise
   std::optional<double> ab_error;          ///< mean Lab ab distance to the truth
   std::optional<double> ab_error_grey;     ///< what an all-grey picture would get
   std::optional<double> bake_ab_distance;  ///< per-pixel decode against composited per-sample colour, opacity >= 0.01
@@ -64,6 +65,9 @@ struct ViewMetrics {
     visitor("colourfulness_magnitude", self.colorfulness_magnitude);
     visitor("colourfulness_magnitude_truth", self.colorfulness_magnitude_truth);
     visitor("colourfulness_magnitude_difference", self.colorfulness_magnitude_difference);
+    visitor("colour_diversity", self.color_diversity);
+    visitor("colour_diversity_truth", self.color_diversity_truth);
+    visitor("colour_diversity_difference", self.color_diversity_difference);
     visitor("ab_error", self.ab_error);
     visitor("ab_error_grey", self.ab_error_grey);
     visitor("bake_ab_distance", self.bake_ab_distance);

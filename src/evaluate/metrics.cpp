@@ -1,10 +1,13 @@
 #include "src/evaluate/metrics.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/check.h"
+#include "src/color/ab_bins.h"
 #include "src/color/colorspace_math.h"
 
 namespace cnerf {
@@ -91,6 +94,21 @@ Colorfulness colorfulness(std::span<const std::uint8_t> rgb, std::span<const std
     yb_magnitude.add(std::abs(yellow_blue));
   }
   return {colorfulness_of(rg, yb), colorfulness_of(rg_magnitude, yb_magnitude)};
+}
+
+double color_diversity(std::span<const float> rgb, std::span<const std::uint8_t> valid) {
+  std::array<double, kAbBinCount> pixels{};
+  double all = 0;
+  for (std::size_t pixel = 0; pixel < rgb.size() / 3; ++pixel) {
+    if (!counts(valid, pixel)) continue;
+    const Lab<double> lab = lab_at(rgb, pixel);
+    ++pixels[std::size_t(nearest_bin({float(lab.a), float(lab.b)}))];
+    ++all;
+  }
+  if (all == 0) return std::numeric_limits<double>::quiet_NaN();
+  double entropy = 0;
+  for (const double count : pixels) entropy -= count > 0 ? count / all * std::log(count / all) : 0;
+  return std::exp(entropy);
 }
 
 double mean_ab_distance(std::span<const float> ours, std::span<const float> truth,

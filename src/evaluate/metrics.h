@@ -25,6 +25,13 @@ struct Colorfulness {
 /// @param rgb  [N, 3] 8-bit sRGB.
 [[nodiscard]] Colorfulness colorfulness(std::span<const std::uint8_t> rgb, std::span<const std::uint8_t> valid = {});
 
+/// Diversity of colours: how many equally frequent ones would be as diverse, exp(-Σ p_q ln p_q) with p_q the share of
+/// pixels whose nearest of the 313 ab bins is q. 1 where all are of one bin, as in grey. It is Hill's number of order 1
+/// (Hill, Ecology 54, 1973), the exponential of Shannon's entropy. Colourfulness grows with chroma; this with the
+/// number of different colours, which averaging over unlike answers takes away.
+/// @param rgb  [N, 3] linear Rec.709  @return  NaN where no pixel counts
+[[nodiscard]] double color_diversity(std::span<const float> rgb, std::span<const std::uint8_t> valid = {});
+
 /// Mean Euclidean distance of Lab a and b.
 /// @param ours, truth  [N, 3] linear Rec.709; `truth` empty compares with grey, i.e. gives the mean chroma of `ours`.
 [[nodiscard]] double mean_ab_distance(std::span<const float> ours, std::span<const float> truth,

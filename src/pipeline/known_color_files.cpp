@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <sstream>
 
 #include "src/base/error.h"
+#include "src/base/text.h"
 #include "src/capture/image_io.h"
 #include "src/color/colorspace_math.h"
+#include "src/pipeline/palette.h"
 #include "src/train/chroma/strokes.h"
 
 namespace cnerf::pipeline {
@@ -19,16 +20,6 @@ namespace {
 constexpr float kStrokeAlpha = 0.5f;      // of a hint image: what is painted on
 constexpr double kHintRadius = 0.01;      // of a hint's dot, as a share of the short side
 constexpr float kLeastMeanChroma = 1.0f;  // a key frame of less is grey
-
-std::vector<std::string> split(const std::string& text, char separator) {
-  std::vector<std::string> parts;
-  std::istringstream stream(text);
-  for (std::string part; std::getline(stream, part, separator);) {
-    const auto first = part.find_first_not_of(' '), last = part.find_last_not_of(' ');
-    if (first != std::string::npos) parts.push_back(part.substr(first, last - first + 1));
-  }
-  return parts;
-}
 
 const View& training_view(const Capture& capture, const std::string& name, const std::string& entry) {
   const auto is_named = [&](const View& view) {
@@ -112,17 +103,18 @@ double number_of(const std::string& text, const std::string& entry) {
   return value;
 }
 
-Ab color_of(const std::string& text, const std::string& entry) {
-  const std::optional<Ab> color = ab_of_hex(text);
-  if (!color) throw UsageError(entry + ": expected a colour like #c08040, found " + text);
-  return *color;
+Ab color_of(const std::string& text, const std::string& entry, Palette& palette) {
+  const std::optional<Ab> color = ab_of_hex(palette.find(text).value_or(text));
+  if (color) return *color;
+  throw UsageError(entry + ": expected a colour like #c08040 or a word of --palette (" + palette.words() + "), found " +
+                   text);
 }
 
-/// "x,y,VIEW,#rrggbb": a dot, in pixels of the view's image file.
-KnownColors dot_of(const std::string& hint, const Capture& capture) {
+/// "x,y,VIEW,#rrggbb", or with a word of the palette: a dot, in pixels of the view's image file.
+KnownColors dot_of(const std::string& hint, const Capture& capture, Palette& palette) {
   const std::string entry = "--hint " + hint;
   const std::vector<std::string> parts = split(hint, ',');
-  if (parts.size() != 4) throw UsageError(entry + ": expected x,y,VIEW,#rrggbb");
+  if (parts.size() != 4) throw UsageError(entry + ": expected x,y,VIEW,#rrggbb or x,y,VIEW,WORD");
   const View& view = training_view(capture, parts[2], entry);
   const ImageHeader file = image_header(view.image_file);
   const double x = number_of(parts[0], entry), y = number_of(parts[1], entry);
@@ -132,7 +124,7 @@ KnownColors dot_of(const std::string& hint, const Capture& capture) {
   const Intrinsics& lens = view.intrinsics;
   KnownColors known{KnownColorKind::kStrokes, view.name, lens.width, lens.height, {}, {}};
   const auto pixels = std::size_t(lens.width) * std::size_t(lens.height);
-  known.ab.assign(pixels, color_of(parts[3], entry));
+  known.ab.assign(pixels, color_of(parts[3], entry, palette));
   known.is_known.assign(pixels, 0);
   const double cx = x * lens.width / file.width, cy = y * lens.height / file.height;
   const double radius = std::max(1.5, kHintRadius * std::min(lens.width, lens.height));
@@ -146,9 +138,10 @@ KnownColors dot_of(const std::string& hint, const Capture& capture) {
 }
 
 /// What a stroke file paints on the capture's training views, and at viewpoints.
-void add_painted(const fs::path& file, const Capture& capture, GivenColors& given) {
+void add_painted(const fs::path& file, const Capture& capture, Palette& palette, GivenColors& given) {
   const PaintableViews views = paintable_views(capture);
-  const StrokeList list = read_strokes(file, views);
+  StrokeList list = read_strokes(file, views);
+  for (Stroke& stroke : list.strokes) stroke.color = palette.find(stroke.word).value_or(stroke.color);
   std::vector<std::string> names = views.names;
   std::vector<Intrinsics> lenses;
   for (const View& view : capture.views) {
@@ -166,6 +159,7 @@ void add_painted(const fs::path& file, const Capture& capture, GivenColors& give
 
 GivenColors load_known_colors(const Capture& capture, const ColorizerOptions& config) {
   GivenColors given;
+  Palette palette(config.palette);
   std::vector<KnownColors>& known = given.known;
   const auto load = [&](const std::string& list, const char* option, KnownColorKind kind) {
     for (const NamedFile& named : named_files(list, option)) {
@@ -174,8 +168,9 @@ GivenColors load_known_colors(const Capture& capture, const ColorizerOptions& co
   };
   load(config.keyframes, "--keyframe", KnownColorKind::kKeyFrame);
   load(config.hint_images, "--hint-image", KnownColorKind::kStrokes);
-  for (const std::string& hint : split(config.hints, ';')) known.push_back(dot_of(hint, capture));
-  if (!config.strokes.empty()) add_painted(config.strokes, capture, given);
+  for (const std::string& hint : split(config.hints, ';')) known.push_back(dot_of(hint, capture, palette));
+  if (!config.strokes.empty()) add_painted(config.strokes, capture, palette, given);
+  palette.refuse_unnamed();
   return given;
 }
 
@@ -183,6 +178,14 @@ std::vector<fs::path> key_frame_files(const ColorizerOptions& config) {
   std::vector<fs::path> files;
   for (const NamedFile& named : named_files(config.keyframes, "--keyframe")) files.push_back(named.file);
   return files;
+}
+
+std::vector<std::string> key_frame_views(const Capture& capture, const ColorizerOptions& config) {
+  std::vector<std::string> views;
+  for (const NamedFile& named : named_files(config.keyframes, "--keyframe")) {
+    views.push_back(training_view(capture, named.view, named.entry).name);
+  }
+  return views;
 }
 
 }  // namespace cnerf::pipeline

@@ -14,13 +14,17 @@ struct GivenColors {
   std::vector<Viewpoint> viewpoints;  ///< that some are painted at, beside the capture's views
 };
 
-/// What `config.colorizer.keyframes`, `hint_images`, `hints` and `strokes` name; key frames come first, since hints
-/// correct them. Views are named as the capture names them, or by their file's name with or without extension.
+/// What `config.colorizer.keyframes`, `hint_images`, `hints` and `strokes` name, in the colours of `palette`; key
+/// frames come first, since hints correct them. Views are named as the capture names them, or by their file's name with
+/// or without extension.
 /// @throws UsageError         an entry that cannot be read, a view that is not there, or is held out.
 /// @throws MissingInputError, InputError  a file that is not there, not a picture, of another shape, or without colour.
 [[nodiscard]] GivenColors load_known_colors(const Capture& capture, const ColorizerOptions& config);
 
 /// The files `config.keyframes` names.  @throws UsageError.
 [[nodiscard]] std::vector<std::filesystem::path> key_frame_files(const ColorizerOptions& config);
+
+/// The views that `config.keyframes` names, as the capture names them.  @throws UsageError.
+[[nodiscard]] std::vector<std::string> key_frame_views(const Capture& capture, const ColorizerOptions& config);
 
 }  // namespace cnerf::pipeline

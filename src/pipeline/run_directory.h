@@ -10,6 +10,7 @@
 ///   bakes/NAME/          volumes of a take
 ///   metrics.json, contact_sheet.png   of the take evaluated last
 ///   bases.png            base candidates, when only those were asked for
+///   key_views.png, key_views.json     suggested key frames, when those were asked for
 
 #include <filesystem>
 #include <functional>

@@ -56,13 +56,13 @@ std::string cell(const std::string& text) {
   return safe;
 }
 
-/// A column of luminance that some runs have: empty where a run lacks it.
+/// A column that some runs have: empty where a run lacks it.
 struct Column {
   std::string title;
   std::function<std::string(const Metrics&)> text;  ///< of a run; empty: it has none
 };
 
-/// Beside the luminance as given. None is ever shown in place of another.
+/// Beside the luminance as given, and of colours. None is ever shown in place of another.
 const std::vector<Column>& further_columns() {
   const auto mean = [](const std::string& title, std::optional<double> ViewMetrics::*field, double scale, int digits) {
     return Column{title, [=](const Metrics& metrics) {
@@ -83,6 +83,7 @@ const std::vector<Column>& further_columns() {
       mean("right halves aligned dB", &ViewMetrics::psnr_luminance_aligned, 1, 2),
       worst("worst", "psnr_luminance_aligned"),
       mean("fog before cameras %", &ViewMetrics::near_opacity, 100, 2),
+      mean("diversity of colours", &ViewMetrics::color_diversity, 1, 1),
   };
   return columns;
 }

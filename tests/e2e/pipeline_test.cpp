@@ -48,8 +48,9 @@ TEST(Pipeline, RunLeavesEverythingItSays) {
   EXPECT_EQ(metrics.at("schema_version"), 1);
   EXPECT_EQ(metrics.at("split"), "held-out");
   EXPECT_EQ(metrics.at("take"), "reference");
-  for (const char* name : {"psnr_luminance", "psnr_rgb", "ssim", "colourfulness", "colourfulness_difference",
-                           "ab_error", "ab_error_grey", "bake_ab_distance"}) {
+  for (const char* name :
+       {"psnr_luminance", "psnr_rgb", "ssim", "colourfulness", "colourfulness_difference", "colour_diversity",
+        "colour_diversity_truth", "ab_error", "ab_error_grey", "bake_ab_distance"}) {
     EXPECT_TRUE(metrics.at("mean").contains(name)) << name;
   }
   EXPECT_EQ(metrics.at("views").size(), 2u) << "every 8th of 9 views";
@@ -109,6 +110,23 @@ TEST(Pipeline, TakesStandSideBySide) {
   for (const char* take : {"grey", "grey-2", "mine"}) {
     EXPECT_TRUE(fs::exists(folder / "run/takes" / take / "take.json")) << take;
   }
+}
+
+TEST(Pipeline, KeyViewsAreSuggestedWithoutColours) {
+  const TempDir folder;
+  const std::string out = copied(tiny_run(), folder / "run").string();
+  const ProgramResult result = cnerf({"colorize", out, "--suggest-keyframes", "2"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json views = json_of(folder / "run/key_views.json");
+  ASSERT_EQ(views.at("suggested").size(), 2u);
+  EXPECT_EQ(views.at("alone").size(), 7u) << "views that are trained on";
+  const std::string first = views.at("suggested")[0].at("view"), second = views.at("suggested")[1].at("view");
+  EXPECT_NE(first, second);
+  EXPECT_GE(views.at("suggested")[0].at("adds"), views.at("suggested")[1].at("adds"));
+  EXPECT_THAT(result.out, HasSubstr(first));
+  EXPECT_GT(cv::imread((folder / "run/key_views.png").string()).cols, 0);
+  EXPECT_FALSE(fs::exists(folder / "run/takes")) << "nothing is coloured";
+  EXPECT_EQ(cnerf({"colorize", out, "--suggest-keyframes", "0"}).exit_code, 64);
 }
 
 TEST(Pipeline, EvaluationMeasuresLpipsWithWeights) {

@@ -94,6 +94,25 @@ TEST(ColorfulnessMetric, EqualsAnIndependentEvaluation) {
   EXPECT_NEAR(colorfulness(rgb).magnitude, 100.5214370614793, 1e-6);
 }
 
+TEST(ColorDiversity, ClosedForms) {
+  const std::vector<float> grey = {0.1f, 0.1f, 0.1f, 0.7f, 0.7f, 0.7f}, red = {1, 0, 0}, green = {0, 1, 0},
+                           blue = {0, 0, 1};
+  const auto pixels = [](std::initializer_list<std::span<const float>> colors) {
+    std::vector<float> rgb;
+    for (const auto& color : colors) rgb.insert(rgb.end(), color.begin(), color.end());
+    return rgb;
+  };
+  EXPECT_DOUBLE_EQ(color_diversity(grey), 1);
+  EXPECT_DOUBLE_EQ(color_diversity(pixels({red, red, red})), 1) << "vivid, but one colour";
+  EXPECT_NEAR(color_diversity(pixels({red, green, blue, std::span(grey).first(3)})), 4, 1e-12)
+      << "as many as there are, where all are as frequent";
+  // Shares 3/4 and 1/4: exp(3/4 ln 4/3 + 1/4 ln 4).
+  EXPECT_NEAR(color_diversity(pixels({red, red, red, green})), std::pow(4.0 / 3, 0.75) * std::pow(4.0, 0.25), 1e-12);
+  const std::vector<std::uint8_t> valid = {1, 0, 1, 0};
+  EXPECT_NEAR(color_diversity(pixels({red, blue, green, blue}), valid), 2, 1e-12) << "what does not count";
+  EXPECT_TRUE(std::isnan(color_diversity({})));
+}
+
 TEST(AbDistance, MatchesKnownLabValues) {
   const std::vector<float> red = {1, 0, 0}, green = {0, 1, 0}, grey = {0.3f, 0.3f, 0.3f};
   // Lab of sRGB red is (53.241, 80.094, 67.203), of green (87.738, -86.188, 83.172), given to 3 decimals.

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
 
@@ -117,6 +118,63 @@ TEST_F(KnownColorFiles, StrokeFilesPaintViewsAndViewpoints) {
   list.everywhere = true;
   write_strokes(at("strokes.json"), list);
   for (const KnownColors& known : load_known_colors(capture_, config).known) EXPECT_TRUE(known.everywhere);
+}
+
+TEST_F(KnownColorFiles, APaletteColorsTheHintsThatNameItsWords) {
+  ColorizerOptions config;
+  config.hints = "10,10,a,jacket;30,10,a,jacket;10,10,b,#0000ff;30,10,b,the wall";
+  config.palette = "jacket=#00ff00, the wall=#ff0000";
+  const auto dot = [&](std::size_t index, int x) {
+    return load_known_colors(capture_, config).known.at(index).ab[5 * 20 + std::size_t(x)];
+  };
+  const Ab green = *ab_of_hex("#00ff00"), red = *ab_of_hex("#ff0000"), blue = *ab_of_hex("#0000ff");
+  EXPECT_EQ(dot(0, 5).a, green.a);
+  EXPECT_EQ(dot(1, 15).a, green.a);
+  EXPECT_EQ(dot(2, 5).a, blue.a);
+  EXPECT_EQ(dot(3, 15).a, red.a);
+  config.palette = "jacket=#ff0000;the wall=#ff0000";
+  EXPECT_EQ(dot(0, 5).a, red.a) << "one word, all its hints";
+  EXPECT_EQ(dot(1, 15).a, red.a);
+  EXPECT_EQ(dot(2, 5).a, blue.a);
+}
+
+TEST_F(KnownColorFiles, APaletteColorsTheStrokesThatHaveItsWords) {
+  StrokeList list;
+  list.strokes = {{"a1", "images/a.png", "paint", "#0000ff"}, {"b1", "images/b.png", "paint", "#0000ff"}};
+  for (Stroke& stroke : list.strokes) {
+    stroke.points = {{0.5f, 0.5f, 1}};
+    stroke.size = 0.3f;
+  }
+  list.strokes[0].word = "jacket";
+  write_strokes(folder_ / "strokes.json", list);
+  ColorizerOptions config;
+  config.strokes = at("strokes.json");
+  const auto painted_a = [&](std::size_t index) {
+    const KnownColors known = load_known_colors(capture_, config).known.at(index);
+    return known.ab[std::size_t(std::ranges::find(known.is_known, 1) - known.is_known.begin())].a;
+  };
+  EXPECT_EQ(painted_a(0), ab_of_hex("#0000ff")->a) << "without a palette as it was painted";
+  config.palette = "jacket=#00ff00";
+  EXPECT_EQ(painted_a(0), ab_of_hex("#00ff00")->a);
+  EXPECT_EQ(painted_a(1), ab_of_hex("#0000ff")->a);
+}
+
+TEST_F(KnownColorFiles, BadPalettesAreRefusedByTheirEntry) {
+  const auto refused = [&](const std::string& palette, const std::string& hint = "1,2,a,jacket") {
+    ColorizerOptions config;
+    config.palette = palette;
+    config.hints = hint;
+    return refusal<UsageError>(config);
+  };
+  EXPECT_THAT(refused("jacket"), HasSubstr("--palette jacket: expected WORD=#rrggbb"));
+  EXPECT_THAT(refused("#abc=#00ff00"), HasSubstr("expected WORD=#rrggbb"));
+  EXPECT_THAT(refused("jacket=green"),
+              HasSubstr("--palette jacket=green: expected a colour like #c08040, found green"));
+  EXPECT_THAT(refused("jacket=#00ff00,jacket=#ff0000"), HasSubstr("jacket=#ff0000: jacket has a colour already"));
+  EXPECT_THAT(refused("jacket=#00ff00,wall=#ff0000"), HasSubstr("no hint and no stroke is called wall"));
+  EXPECT_THAT(refused("jacket=#00ff00,wall=#ff0000", "1,2,a,jaket"),
+              HasSubstr("--palette (jacket, wall), found jaket"));
+  EXPECT_THAT(refused(""), HasSubstr("--palette (none), found jacket"));
 }
 
 TEST_F(KnownColorFiles, BadEntriesAreRefusedByName) {

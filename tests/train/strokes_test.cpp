@@ -66,6 +66,9 @@ TEST(Strokes, BadOnesAreRefusedByTheirField) {
   EXPECT_THAT(refused([](Stroke& s) { s.kind = "burn"; }), HasSubstr("strokes[0].kind"));
   EXPECT_THAT(refused([](Stroke& s) { s.color = "red"; }), HasSubstr("strokes[0].color"));
   EXPECT_THAT(refused([](Stroke& s) { s.color = "#12345g"; }), HasSubstr("strokes[0].color"));
+  EXPECT_EQ(refused([](Stroke& s) { s.word = "the jacket"; }), "taken");
+  EXPECT_THAT(refused([](Stroke& s) { s.word = "a=b"; }), HasSubstr("strokes[0].word"));
+  EXPECT_THAT(refused([](Stroke& s) { s.word = std::string(65, 'a'); }), HasSubstr("strokes[0].word"));
   EXPECT_THAT(refused([](Stroke& s) { s.size = 0.9f; }), HasSubstr("strokes[0].size"));
   EXPECT_THAT(refused([](Stroke& s) { s.reach = 9; }), HasSubstr("strokes[0].reach"));
   EXPECT_THAT(refused([](Stroke& s) { s.points.clear(); }), HasSubstr("strokes[0].points"));

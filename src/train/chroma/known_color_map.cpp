@@ -13,26 +13,6 @@ constexpr float kSameDistance = 0.03f;   // of the distance: two views see the s
 constexpr float kKeyFrameCost = 1;       // a stroke corrects one as far as it reaches
 constexpr float kSameLightness = 15.0f;  // L*: and it looks the same
 
-/// What the view of a source sees of points that another view sees.
-struct Sight {
-  const CachedView& source;
-  std::span<const float> surface;  // of the source
-  Mat3d camera_from_unit;
-
-  Sight(const CachedView& view, std::span<const float> of_source)
-      : source(view), surface(of_source), camera_from_unit(view.camera.unit_from_camera.transposed()) {}
-
-  [[nodiscard]] long pixel_of(Vec3d point, float lightness) const {
-    const Vec3d from_camera = point - source.camera.origin;
-    const auto at = project(source.camera.intrinsics, camera_from_unit * from_camera);
-    if (!at || at->x < 0 || at->y < 0 || at->x >= source.width || at->y >= source.height) return -1;
-    const std::size_t pixel = std::size_t(at->y) * std::size_t(source.width) + std::size_t(at->x);
-    const double distance = length(from_camera);
-    if (surface[pixel] <= 0 || std::abs(distance - surface[pixel]) > kSameDistance * distance) return -1;
-    return std::abs(lightness_at(source, pixel) - lightness) <= kSameLightness ? long(pixel) : -1;
-  }
-};
-
 }  // namespace
 
 SeenSurfaces::SeenSurfaces(std::span<const CachedView> views, std::span<const std::string> names,
@@ -49,6 +29,20 @@ std::size_t SeenSurfaces::view_named(const std::string& name) const {
   const auto found = std::ranges::find(names_, name);
   if (found == names_.end()) throw UsageError("known colours: no training view or viewpoint is called " + name);
   return std::size_t(found - names_.begin());
+}
+
+Sight::Sight(const CachedView& view, std::span<const float> surface)
+    : view_(view), surface_(surface), camera_from_unit_(view.camera.unit_from_camera.transposed()) {}
+
+std::optional<std::size_t> Sight::pixel_of(Vec3d point, float lightness) const {
+  const Vec3d from_camera = point - view_.camera.origin;
+  const auto at = project(view_.camera.intrinsics, camera_from_unit_ * from_camera);
+  if (!at || at->x < 0 || at->y < 0 || at->x >= view_.width || at->y >= view_.height) return {};
+  const std::size_t pixel = std::size_t(at->y) * std::size_t(view_.width) + std::size_t(at->x);
+  const double distance = length(from_camera);
+  if (surface_[pixel] <= 0 || std::abs(distance - surface_[pixel]) > kSameDistance * distance) return {};
+  if (std::abs(lightness_at(view_, pixel) - lightness) > kSameLightness) return {};
+  return pixel;
 }
 
 KnownColorSources::KnownColorSources(const SeenSurfaces& seen, std::span<const KnownColors> known) : seen_(seen) {
@@ -85,19 +79,19 @@ RunningColors KnownColorSources::everywhere_in(std::size_t v) const {
     Claims claims;
     for (std::size_t s = sources_.size(); s-- > 0;) {
       const Source& source = sources_[s];
-      auto from = long(p);
+      std::optional<std::size_t> from = p;
       if (source.view != v) {
         if (looks.surface[p] <= 0) break;
         const Vec3f point = view.camera.ray_of_pixel(p).at(looks.surface[p]);
         from = sights[s].pixel_of(point.cast<double>(), lightness_at(view, p));
       }
-      if (from < 0) continue;
+      if (!from) continue;
       if (source.everywhere) {
-        for (const Claims::Claim& claim : source.everywhere->claims()[std::size_t(from)].list) {
+        for (const Claims::Claim& claim : source.everywhere->claims()[*from].list) {
           claims.add(claim);
         }
-      } else if (source.colors.is_known(std::size_t(from))) {
-        claims.add({kKeyFrameCost, source.colors.ab[std::size_t(from)]});
+      } else if (source.colors.is_known(*from)) {
+        claims.add({kKeyFrameCost, source.colors.ab[*from]});
       }
     }
     const bool is_shown = claims.cost() < kUnreached;
@@ -122,16 +116,16 @@ RunningColors KnownColorSources::seen_in(std::size_t v) const {
   for (std::size_t p = 0; p < pixels; ++p) {
     for (std::size_t s = sources_.size(); s-- > 0 && !colors.is_known(p);) {
       const RunningColors& given = sources_[s].colors;
-      auto from = long(p);
+      std::optional<std::size_t> from = p;
       if (sources_[s].view != v) {
         if (surface[p] <= 0) break;
         const Vec3f point = view.camera.ray_of_pixel(p).at(surface[p]);
         from = sights[s].pixel_of(point.cast<double>(), lightness_at(view, p));
       }
-      if (from < 0 || !given.is_known(std::size_t(from))) continue;
-      colors.cost[p] = given.cost[std::size_t(from)];
-      colors.reach[p] = given.reach[std::size_t(from)];
-      colors.ab[p] = given.ab[std::size_t(from)];
+      if (!from || !given.is_known(*from)) continue;
+      colors.cost[p] = given.cost[*from];
+      colors.reach[p] = given.reach[*from];
+      colors.ab[p] = given.ab[*from];
     }
   }
   run(colors, view, surface);

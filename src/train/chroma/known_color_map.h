@@ -3,6 +3,7 @@
 /// the same surface.
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -40,6 +41,23 @@ class SeenSurfaces {
   std::span<const CachedView> views_;
   std::span<const std::string> names_;
   std::vector<Surface> surfaces_;
+};
+
+/// What a view sees of points of the scene: the same surface, and it looks the same. Refers to both.
+class Sight {
+ public:
+  /// @param surface  `surface_distance(view)`
+  Sight(const CachedView& view, std::span<const float> surface);
+
+  /// The pixel that shows the point; nothing where another surface is before it, or none.
+  /// @param point      unit space
+  /// @param lightness  L* where it was seen from elsewhere
+  [[nodiscard]] std::optional<std::size_t> pixel_of(Vec3d point, float lightness) const;
+
+ private:
+  const CachedView& view_;
+  std::span<const float> surface_;
+  Mat3d camera_from_unit_;
 };
 
 /// Colours that a user gave, spread over the views that they were given on, ready to be looked at from any view.

@@ -21,7 +21,7 @@ namespace {
 constexpr std::array<const char*, 5> kKinds = {"paint", "exact", "grey", "erase", "picture"};
 constexpr std::size_t kPictureDigits = 12;
 constexpr float kPaintedAlpha = 0.5f;
-constexpr std::size_t kLongestId = 32, kLongestViewpointName = 40;
+constexpr std::size_t kLongestId = 32, kLongestViewpointName = 40, kLongestWord = 64;
 constexpr float kCovered = 0.5f;  // of a pixel: it is painted
 
 /// Refuses a stroke of a file by the name of its field.
@@ -51,6 +51,8 @@ void check(const Stroke& stroke, const StrokeCheck& check, std::span<const std::
                 "expected paint, exact, grey, erase or picture, got " + excerpt(nlohmann::ordered_json(stroke.kind)));
   check.require(ab_of_hex(stroke.color).has_value(), "color",
                 "expected a colour like #c08040, got " + excerpt(nlohmann::ordered_json(stroke.color)));
+  check.require(stroke.word.size() <= kLongestWord && stroke.word.find_first_of(",;=#") == std::string::npos, "word",
+                fmt::format("expected at most {} letters and none of , ; = #", kLongestWord));
   check.in_range(stroke.size, 0.0005f, 0.5f, "size");
   check.in_range(stroke.softness, 0, 1, "softness");
   check.in_range(stroke.reach, 0.1f, 4, "reach");

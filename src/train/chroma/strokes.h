@@ -51,6 +51,7 @@ struct Stroke {
   std::vector<StrokePoint> points = {};  ///< joined by straight lines; one is a dot
   std::string picture = {};              ///< 12 hexadecimal digits: a file of the folder `painted` beside the list
   std::shared_ptr<const PaintedPicture> painted = {};  ///< what that file holds
+  std::string word = {};  ///< what is painted, such as "jacket": a palette's colour of that word replaces `color`
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
@@ -58,6 +59,7 @@ struct Stroke {
     v("view", self.view);
     v("kind", self.kind);
     v("color", self.color, kOptional);
+    v("word", self.word, kOptional);
     v("size", self.size);
     v("softness", self.softness, kOptional);
     v("reach", self.reach, kOptional);
