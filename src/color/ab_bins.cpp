@@ -125,7 +125,8 @@ float exp_of_negative(float x) {
   const int n = int(x * kLog2E - 0.5f);
   const float r = (x - float(n) * kLn2High) - float(n) * kLn2Low;  // |r| <= ln(2) / 2
   const float series =
-      1 + r * (1 + r * (0.5f + r * (1.66666667e-1f + r * (4.16666667e-2f + r * (8.33333333e-3f + r * 1.38888889e-3f)))));
+      1 +
+      r * (1 + r * (0.5f + r * (1.66666667e-1f + r * (4.16666667e-2f + r * (8.33333333e-3f + r * 1.38888889e-3f)))));
   return series * std::bit_cast<float>((n + 127) << 23);
 }
 
