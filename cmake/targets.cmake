@@ -183,7 +183,7 @@ function(cnerf_compile_per_isa generic avx2 avx512)
   set_source_files_properties(${generic} PROPERTIES COMPILE_OPTIONS "${common}")
   set_source_files_properties(${avx2} PROPERTIES COMPILE_OPTIONS "${common};-mavx2;-mfma;-mtune=haswell")
   set_source_files_properties(${avx512} PROPERTIES
-    COMPILE_OPTIONS "${common};-mavx512f;-mavx512dq;-mavx512vl;-mavx512bw;-mfma;-mtune=znver3;-Wno-uninitialized")  # GCC 105593
+    COMPILE_OPTIONS "${common};-mavx512f;-mavx512dq;-mavx512vl;-mavx512bw;-mfma;-mtune=haswell;-Wno-uninitialized")  # GCC 105593
 endfunction()
 
 # cnerf_add_cuda_library(NAME SOURCES … [PUBLIC …]): like cnerf_add_library, of kernels and their launchers.

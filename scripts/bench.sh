@@ -3,12 +3,14 @@
 # docs/performance.md. Ceilings and yardsticks are measured in the same run. Wants a quiet machine.
 #
 #   scripts/bench.sh CAPTURE [threads]        CAPTURE: a real one, as fox with 1080x1920 images; threads: all
+#   scripts/bench.sh run CAPTURE [...]        cnerf run as a whole: scripts/bench_run.py says the rest
 set -euo pipefail
 cd "$(dirname "$0")/.."
 if [ $# -lt 1 ]; then
-  sed -n '2,5p' "$0" >&2
+  sed -n '2,6p' "$0" >&2
   exit 64
 fi
+if [ "$1" = run ]; then exec python3 scripts/bench_run.py "${@:2}"; fi
 capture=$1
 threads=${2:-$(nproc)}
 build=build/release/tests/bench

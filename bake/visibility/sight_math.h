@@ -110,13 +110,18 @@ template <typename Grid>
   float depth = 0;
   // Whole steps from the start, so that where a ray comes in does not matter; the first may round to just outside.
   const float enter = std::max(1.0f, std::ceil(sight::entry(start, inverse, size)));
+  const float* brick = nullptr;
+  Vec3i low{-1, -1, -1};  // of `brick`
   for (float t = enter; t < distance;) {
     const Vec3f p = start + d * t;
-    if (!sight::inside(p, size)) break;  // the box is convex: what left it does not come back
     const Vec3i voxel = p.template cast<int>();
-    const float* brick = sigma.find_brick(voxel);
+    // Most steps stay in their brick, which lies in the box: what sticks out of that is empty.
+    if (((voxel.x ^ low.x) | (voxel.y ^ low.y) | (voxel.z ^ low.z)) & ~(kBrickSide - 1)) {
+      if (!sight::inside(p, size)) break;  // the box is convex: what left it does not come back
+      brick = sigma.find_brick(voxel);
+      low = {voxel.x & ~(kBrickSide - 1), voxel.y & ~(kBrickSide - 1), voxel.z & ~(kBrickSide - 1)};
+    }
     if (brick == nullptr) {
-      const Vec3i low{voxel.x & ~(kBrickSide - 1), voxel.y & ~(kBrickSide - 1), voxel.z & ~(kBrickSide - 1)};
       t += float(sight::steps_across_brick(low, p, inverse));
       continue;
     }

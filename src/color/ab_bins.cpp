@@ -1,6 +1,7 @@
 #include "src/color/ab_bins.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -86,6 +87,49 @@ const NearBins& near_bins() {
   return bins;
 }
 
+// The annealed mean is most of decoding a picture. It is written as eight sums side by side, which compilers turn into
+// vector instructions of every processor.
+constexpr std::size_t kPartials = 8, kPaddedBins = 320;
+using Partial = std::array<float, kPartials>;
+
+struct PaddedCentres {
+  std::array<float, kPaddedBins> a{}, b{};
+};
+
+const PaddedCentres& padded_centres() {
+  static const PaddedCentres centres = [] {
+    PaddedCentres padded;
+    for (std::size_t i = 0; i < kAbBinCount; ++i) {
+      padded.a[i] = ab_bin_centres()[i].a;
+      padded.b[i] = ab_bin_centres()[i].b;
+    }
+    return padded;
+  }();
+  return centres;
+}
+
+Partial first_of(const std::array<float, kPaddedBins>& values) {
+  Partial first;
+  std::copy_n(values.begin(), kPartials, first.begin());
+  return first;
+}
+
+double total_of(const Partial& sums) {
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
+/// exp(x) of x <= 0, to 3e-7 of it; below exp(-87) that.
+float exp_of_negative(float x) {
+  constexpr float kLog2E = 1.44269504f, kLn2High = 0.693359375f, kLn2Low = -2.12194440e-4f;
+  x = x < -87.0f ? -87.0f : x;
+  const int n = int(x * kLog2E - 0.5f);
+  const float r = (x - float(n) * kLn2High) - float(n) * kLn2Low;  // |r| <= ln(2) / 2
+  const float series =
+      1 +
+      r * (1 + r * (0.5f + r * (1.66666667e-1f + r * (4.16666667e-2f + r * (8.33333333e-3f + r * 1.38888889e-3f)))));
+  return series * std::bit_cast<float>((n + 127) << 23);
+}
+
 }  // namespace
 
 const std::array<Ab, kAbBinCount>& ab_bin_centres() {
@@ -139,16 +183,26 @@ Ab decode_arg_max(std::span<const float> logits) {
 Ab decode_annealed_mean(std::span<const float> logits, float temperature) {
   CNERF_CHECK_EQ(logits.size(), std::size_t(kAbBinCount));
   CNERF_CHECK(temperature > 0, "the annealed mean needs a positive temperature");
-  // In double: 313 terms of very different size.
-  const double largest = *std::max_element(logits.begin(), logits.end());
-  double sum = 0, a = 0, b = 0;
-  for (std::size_t i = 0; i < logits.size(); ++i) {
-    const double p = annealed_weight<double>(logits[i], largest, temperature);
-    sum += p;
-    a += p * double(ab_bin_centres()[i].a);
-    b += p * double(ab_bin_centres()[i].b);
+  std::array<float, kPaddedBins> padded;
+  padded.fill(-std::numeric_limits<float>::infinity());
+  std::ranges::copy(logits, padded.begin());
+  Partial largest = first_of(padded);
+  for (std::size_t first = kPartials; first < kPaddedBins; first += kPartials) {
+    for (std::size_t i = 0; i < kPartials; ++i) largest[i] = std::max(largest[i], padded[first + i]);
   }
-  return {float(a / sum), float(b / sum)};
+  const float most = *std::ranges::max_element(largest);
+  const PaddedCentres& centres = padded_centres();
+  Partial sum{}, a{}, b{};
+  for (std::size_t first = 0; first < kPaddedBins; first += kPartials) {
+    for (std::size_t i = 0; i < kPartials; ++i) {
+      const float p = exp_of_negative(annealed_exponent(padded[first + i], most, temperature));
+      sum[i] += p;
+      a[i] += p * centres.a[first + i];
+      b[i] += p * centres.b[first + i];
+    }
+  }
+  const double total = total_of(sum);
+  return {float(total_of(a) / total), float(total_of(b) / total)};
 }
 
 std::vector<float> rebalancing_weights(std::span<const float> prior, float lambda) {

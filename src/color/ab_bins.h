@@ -44,16 +44,20 @@ struct SoftLabel {
 /// Index of the nearest bin.
 [[nodiscard]] int nearest_bin(Ab color);
 
-/// Weight of a bin in the annealed mean: softmax(log p / temperature), up to a common factor.
+/// Weight of a bin in the annealed mean, as an exponent: softmax(log p / temperature), up to a common factor.
+template <typename Real>
+[[nodiscard]] CNERF_HD Real annealed_exponent(Real logit, Real largest, Real temperature) {
+  return (logit - largest) / temperature;
+}
 template <typename Real>
 [[nodiscard]] CNERF_HD Real annealed_weight(Real logit, Real largest, Real temperature) {
-  return std::exp((logit - largest) / temperature);
+  return std::exp(annealed_exponent(logit, largest, temperature));
 }
 /// Colour of the most probable bin, of several equally probable ones the first (paper, Eq. z to y).  @param logits
 /// [313], any scale or offset.
 [[nodiscard]] Ab decode_arg_max(std::span<const float> logits);
 /// Mean of the centres under softmax(log p / temperature) (Zhang et al. 2016, Eq. 5). Temperature 1 is the mean,
-/// towards 0 the mode.
+/// towards 0 the mode. Within 1e-3 ab units.
 [[nodiscard]] Ab decode_annealed_mean(std::span<const float> logits, float temperature);
 
 /// Class rebalancing (Zhang et al. 2016, Sec. 2.2): w = 1 / ((1 - lambda) p + lambda / Q), scaled so that sum p w = 1.

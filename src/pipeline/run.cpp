@@ -52,13 +52,13 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& observ
     take = take_to_write(context, "", job.existing);
     colorize_step(context, {take, job.existing, colorizer.get()}, engines, observer);
   }
-  if (!is_done(job, directory.metrics_file())) evaluate_step(context, {take, {}}, engines, observer);
-  const fs::path bake = directory.bakes(take);
+  const fs::path bake = directory.bakes(take);  // first of all outputs: it is what a user waits for
   if (is_done(job, last_file(bake, job.formats))) {
     end_bake(directory, bake, observer);
   } else {
     bake_step(context, {take, bake, job.formats}, engines, observer);
   }
+  if (!is_done(job, directory.metrics_file())) evaluate_step(context, {take, {}}, engines, observer);
   const fs::path renders = directory.renders(take);
   if (!is_done(job, renders / "turntable.mp4")) {
     const RenderOutput video{.folder = renders, .mp4 = true};

@@ -19,7 +19,7 @@ struct RunJob {
   std::vector<std::string> command_line;  ///< for records
 };
 
-/// A capture in, a coloured volume, metrics and a turntable out.
+/// A capture in, a coloured volume, metrics and a turntable out, in this order.
 /// @return  the folder of the bake
 /// @throws  as the steps; what cannot be read or made is found before the training.
 std::filesystem::path run(RunJob job, Config config, const Engines& engines, Observer& observer);

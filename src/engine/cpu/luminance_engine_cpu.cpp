@@ -74,6 +74,7 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   /// A step of a ray, and the weight that the density-first pass found.
   struct MarchedSample {
     float t = 0, dt = 0, weight = 0;
+    std::uint32_t lane = 0;  // of Block::marched
   };
   /// Samples of a block's rays that survive early termination, ray by ray.
   struct Block {
@@ -85,6 +86,8 @@ class LuminanceEngineCpu final : public LuminanceEngine {
     // Scratch of the density-first pass.
     std::vector<std::vector<MarchedSample>> of_ray;
     AlignedVector<float> wave_positions, wave_sigma;
+    DensityWorkspace marched;  // of all waves, one behind the other
+    std::vector<std::uint32_t> lanes;
   };
 
   /// A ray on its way through occupied space.
@@ -105,13 +108,16 @@ class LuminanceEngineCpu final : public LuminanceEngine {
   void collect(std::span<const Ray> rays, std::span<const float> jitter, const MarchSettings& march,
                float min_transmittance, Block& block) const;
   /// Returns the number of samples in the wave; their positions go to `block.wave_positions`.
-  static std::size_t march_wave(std::span<const Ray> rays, Walks& walks, Block& block);
+  /// @param first  group of `block.marched` that the wave begins at
+  static std::size_t march_wave(std::span<const Ray> rays, std::size_t first, Walks& walks, Block& block);
   /// Weights the wave's samples by the densities in `block.wave_sigma`; drops those behind the end of a ray.
   static void composite_wave(float min_transmittance, std::span<Walk> walks, Block& block);
   /// `collect` from the middle of each step, and of what it keeps the heaviest samples.
   void collect_for_picture(std::span<const Ray> rays, const MarchSettings& march, const RenderEffort& effort,
                            Block& block) const;
-  void shade(std::span<const Ray> rays, Block& block) const;
+  /// The light of a block's samples, from what the density-first pass computed.
+  /// @param for_training  as well what gradients want: positions and the density net's activations
+  void shade(std::span<const Ray> rays, bool for_training, Block& block) const;
   /// Samples, loss and gradients of a block's rays.
   void train_block(std::span<const ObservedRay> rays, float gradient_scale, Teaching teaching, Block& block,
                    StepChunk& chunk) const;
@@ -187,9 +193,11 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
   ensure_size(block.wave_positions, kBlockRays * kWaveSamples * 3);
   ensure_size(block.wave_sigma, kBlockRays * kWaveSamples);
 
-  while (const std::size_t count = march_wave(rays, walks, block)) {
+  std::size_t first = 0;
+  while (const std::size_t count = march_wave(rays, first, walks, block)) {
     pad_positions(block.wave_positions, count);
-    field_.density(block.wave_positions.data(), groups_of(count), block.work, block.wave_sigma.data());
+    field_.density(block.wave_positions.data(), groups_of(count), block.marched, first, block.wave_sigma.data());
+    first += groups_of(count);
     composite_wave(min_transmittance, std::span(walks).first(rays.size()), block);
   }
 
@@ -201,7 +209,7 @@ void LuminanceEngineCpu::collect(std::span<const Ray> rays, std::span<const floa
   }
 }
 
-std::size_t LuminanceEngineCpu::march_wave(std::span<const Ray> rays, Walks& walks, Block& block) {
+std::size_t LuminanceEngineCpu::march_wave(std::span<const Ray> rays, std::size_t first, Walks& walks, Block& block) {
   std::size_t count = 0;
   for (std::size_t r = 0; r < rays.size(); ++r) {
     Walk& walk = walks[r];
@@ -211,8 +219,9 @@ std::size_t LuminanceEngineCpu::march_wave(std::span<const Ray> rays, Walks& wal
         walk.is_open = false;
         break;
       }
-      set_position(block.wave_positions.data(), count++, rays[r].at(sample.t));
-      block.of_ray[r].push_back({sample.t, sample.dt, 0.0f});
+      set_position(block.wave_positions.data(), count, rays[r].at(sample.t));
+      block.of_ray[r].push_back({sample.t, sample.dt, 0.0f, std::uint32_t(first * kGroup + count)});
+      ++count;
     }
   }
   return count;
@@ -247,21 +256,28 @@ void LuminanceEngineCpu::collect_for_picture(std::span<const Ray> rays, const Ma
   keep_heaviest(effort, block.samples, block.offsets);
 }
 
-void LuminanceEngineCpu::shade(std::span<const Ray> rays, Block& block) const {
+void LuminanceEngineCpu::shade(std::span<const Ray> rays, bool for_training, Block& block) const {
   const std::size_t groups = groups_of(block.samples.size());
-  ensure_size(block.positions, groups * 3 * kGroup);
   block.work.resize(groups, field_.encoded_channels());
+  block.lanes.clear();
   for (std::size_t r = 0; r < rays.size(); ++r) {
     for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
-      set_position(block.positions.data(), s, rays[r].at(block.samples[s].t));
       LuminanceFieldCpu::set_direction(block.work, s, rays[r].direction);
+      block.lanes.push_back(block.samples[s].lane);
     }
   }
-  pad_positions(block.positions, block.samples.size());
   for (std::size_t s = block.samples.size(); s < groups * kGroup; ++s) {
     LuminanceFieldCpu::set_direction(block.work, s, {0, 0, 1});
   }
-  field_.forward(block.positions.data(), block.work);
+  field_.forward(block.marched, block.lanes, for_training, block.work);
+  if (!for_training) return;
+  ensure_size(block.positions, groups * 3 * kGroup);
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
+      set_position(block.positions.data(), s, rays[r].at(block.samples[s].t));
+    }
+  }
+  pad_positions(block.positions, block.samples.size());
 }
 
 void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gradient_scale, Teaching teaching,
@@ -274,7 +290,7 @@ void LuminanceEngineCpu::train_block(std::span<const ObservedRay> rays, float gr
   }
   const std::span<const Ray> block_rays(plain_rays.data(), rays.size());
   collect(block_rays, jitter, options_.march, kTrainingTransmittance, block);
-  shade(block_rays, block);
+  shade(block_rays, true, block);
 
   for (std::size_t r = 0; r < rays.size(); ++r) train_ray(rays[r], r, gradient_scale, block, chunk);
   for (std::size_t s = block.samples.size(); s < block.work.groups * kGroup; ++s) {
@@ -450,7 +466,7 @@ void LuminanceEngineCpu::render(std::span<const Ray> rays, const MarchSettings& 
     Block& block = blocks_.local();
     const std::span<const Ray> block_rays = rays.subspan(begin, end - begin);
     collect_for_picture(block_rays, march, effort, block);
-    shade(block_rays, block);
+    shade(block_rays, false, block);
     for (std::size_t r = 0; r < block_rays.size(); ++r) {
       RayResult seen;
       for (std::size_t s = block.offsets[r]; s < block.offsets[r + 1]; ++s) {
@@ -475,7 +491,7 @@ void LuminanceEngineCpu::trace(std::span<const Ray> rays, const MarchSettings& m
     const std::size_t first = b * kBlockRays;
     const std::span<const Ray> block_rays = rays.subspan(first, std::min(kBlockRays, rays.size() - first));
     collect_for_picture(block_rays, march, effort, block);
-    shade(block_rays, block);
+    shade(block_rays, false, block);
     of_block[b].reserve(block.samples.size());
     for (std::size_t s = 0; s < block.samples.size(); ++s) {
       of_block[b].push_back({block.samples[s].t, block.samples[s].weight, field_.luminance(block.work, s)});
@@ -502,7 +518,7 @@ void LuminanceEngineCpu::query_density(std::span<const Vec3f> positions, std::sp
     ensure_size(block.wave_sigma, groups_of(count) * kGroup);
     for (std::size_t i = 0; i < count; ++i) set_position(block.wave_positions.data(), i, positions[first + i]);
     pad_positions(block.wave_positions, count);
-    field_.density(block.wave_positions.data(), groups_of(count), block.work, block.wave_sigma.data());
+    field_.density(block.wave_positions.data(), groups_of(count), block.marched, 0, block.wave_sigma.data());
     std::copy_n(block.wave_sigma.begin(), count, sigma.begin() + std::ptrdiff_t(first));
   }
 }

@@ -1,11 +1,55 @@
 #include "src/field/cpu/luminance_field.h"
 
+#include <algorithm>
+#include <type_traits>
+
 #include "src/field/nets.h"
 
 namespace cnerf {
 namespace {
 
 constexpr int kFeatureChannels = kGeometryChannels + kSphericalHarmonics;
+
+/// Samples that lie side by side both where they come from and where they go to.
+struct Run {
+  std::size_t from, to, count;
+};
+
+/// @param lanes  where samples 0, 1, ... come from
+std::vector<Run> runs_of(std::span<const std::uint32_t> lanes) {
+  std::vector<Run> runs;
+  for (std::size_t s = 0; s < lanes.size(); ++s) {
+    const bool goes_on = s % kGroup != 0 && lanes[s] % kGroup != 0 && lanes[s] == lanes[s - 1] + 1;
+    if (goes_on) {
+      ++runs.back().count;
+    } else {
+      runs.push_back({lanes[s], s, 1});
+    }
+  }
+  return runs;
+}
+
+/// The first `wanted` of the channels of two grouped arrays; lanes behind the last sample are zeroed.
+void take(std::span<const Run> runs, const AlignedVector<float>& from, int channels, int wanted,
+          AlignedVector<float>& to) {
+  const std::size_t end = runs.empty() ? 0 : runs.back().to + runs.back().count;
+  for (const Run& run : runs) {
+    const float* source = &GroupedView<const float>(from, channels).at(run.from, 0);
+    float* target = &GroupedView<float>(to, channels).at(run.to, 0);
+    // Most are whole: eight samples of a ray, which a copy of fixed size moves at once.
+    const auto copy = [&](auto count) {
+      for (int c = 0; c < wanted; ++c) std::copy_n(source + c * kGroup, std::size_t(count), target + c * kGroup);
+    };
+    if (run.count == 8) {
+      copy(std::integral_constant<std::size_t, 8>());
+    } else {
+      copy(run.count);
+    }
+  }
+  for (std::size_t s = end; s < groups_of(end) * kGroup; ++s) {
+    for (int c = 0; c < wanted; ++c) GroupedView<float>(to, channels).at(s, c) = 0;
+  }
+}
 
 }  // namespace
 
@@ -28,10 +72,11 @@ LuminanceFieldCpu::LuminanceFieldCpu(const HashGridOptions& grid, float density_
       density_scale_(density_scale),
       luminance_activation_(LuminanceActivation<float>::up_to(max_luminance)) {}
 
-std::vector<Channels> LuminanceFieldCpu::density_layers(LuminanceWorkspace& work) const {
-  return {{work.encoded.data(), grid_.channels()},
-          {work.hidden.data(), kHiddenWidth},
-          {work.features.data(), kFeatureChannels}};
+std::vector<Channels> LuminanceFieldCpu::density_layers(DensityWorkspace& work, std::size_t first) const {
+  const auto at = [first](AlignedVector<float>& values, int channels) {
+    return Channels{values.data() + first * std::size_t(channels) * kGroup, channels};
+  };
+  return {at(work.encoded, grid_.channels()), at(work.hidden, kHiddenWidth), at(work.features, kFeatureChannels)};
 }
 
 std::vector<Channels> LuminanceFieldCpu::luminance_layers(LuminanceWorkspace& work) {
@@ -41,12 +86,16 @@ std::vector<Channels> LuminanceFieldCpu::luminance_layers(LuminanceWorkspace& wo
           {work.raw_luminance.data(), kLuminanceOutputs}};
 }
 
-void LuminanceFieldCpu::density(const float* positions, std::size_t groups, LuminanceWorkspace& work,
+void LuminanceFieldCpu::density(const float* positions, std::size_t groups, DensityWorkspace& work, std::size_t first,
                                 float* sigma) const {
-  work.resize(groups, grid_.channels());
-  grid_.encode(positions, groups, work.encoded.data());
-  density_net_.forward(density_layers(work), groups);
-  for (std::size_t s = 0; s < groups * kGroup; ++s) sigma[s] = this->sigma(work, s);
+  const std::size_t lanes = (first + groups) * kGroup;
+  ensure_size(work.encoded, lanes * std::size_t(grid_.channels()));
+  ensure_size(work.hidden, lanes * kHiddenWidth);
+  ensure_size(work.features, lanes * kFeatureChannels);
+  const std::vector<Channels> layers = density_layers(work, first);
+  grid_.encode(positions, groups, layers.front().data);
+  density_net_.forward(layers, groups);
+  for (std::size_t s = 0; s < groups * kGroup; ++s) sigma[s] = this->sigma(work, first * kGroup + s);
 }
 
 void LuminanceFieldCpu::set_direction(LuminanceWorkspace& work, std::size_t sample, Vec3f direction) {
@@ -61,7 +110,18 @@ void LuminanceFieldCpu::forward(const float* positions, LuminanceWorkspace& work
   luminance_net_.forward(luminance_layers(work), work.groups);
 }
 
-float LuminanceFieldCpu::sigma(const LuminanceWorkspace& work, std::size_t sample) const {
+void LuminanceFieldCpu::forward(const DensityWorkspace& from, std::span<const std::uint32_t> lanes, bool for_backward,
+                                LuminanceWorkspace& work) const {
+  const std::vector<Run> runs = runs_of(lanes);
+  take(runs, from.features, kFeatureChannels, kGeometryChannels, work.features);
+  if (for_backward) {
+    take(runs, from.encoded, grid_.channels(), grid_.channels(), work.encoded);
+    take(runs, from.hidden, kHiddenWidth, kHiddenWidth, work.hidden);
+  }
+  luminance_net_.forward(luminance_layers(work), work.groups);
+}
+
+float LuminanceFieldCpu::sigma(const DensityWorkspace& work, std::size_t sample) const {
   return density_from_raw(GroupedView<const float>(work.features, kFeatureChannels).at(sample, 0), density_scale_);
 }
 

@@ -3,6 +3,7 @@
 /// of the direction -> luminance net (paper, Eq. monochromenerf, with the hash grid in place of positional encoding).
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "encoding/spherical_harmonics_math.h"
@@ -13,10 +14,15 @@
 
 namespace cnerf {
 
-/// Buffers for a block of samples; grouped arrays [G, C, 16].
-struct LuminanceWorkspace {
+/// What the density net makes of samples; grouped arrays [G, C, 16].
+struct DensityWorkspace {
+  AlignedVector<float> encoded, hidden, features;
+};
+
+/// Buffers for a block of samples.
+struct LuminanceWorkspace : DensityWorkspace {
   std::size_t groups = 0;
-  AlignedVector<float> encoded, hidden, features, luminance_hidden, raw_luminance;
+  AlignedVector<float> luminance_hidden, raw_luminance;
   AlignedVector<float> d_log_density;  ///< [16 G]
   AlignedVector<float> d_hidden, d_features, d_luminance_hidden, d_raw_luminance;
 
@@ -27,14 +33,21 @@ class LuminanceFieldCpu {
  public:
   LuminanceFieldCpu(const HashGridOptions& grid, float density_scale, float max_luminance, std::uint64_t seed);
 
-  /// Density only.  @param positions [G, 3, 16]  @param sigma [16 G]
-  void density(const float* positions, std::size_t groups, LuminanceWorkspace& work, float* sigma) const;
+  /// Density only.  @param positions [G, 3, 16]  @param first  group of `work` that the first one goes to
+  /// @param sigma  [16 G]
+  void density(const float* positions, std::size_t groups, DensityWorkspace& work, std::size_t first,
+               float* sigma) const;
 
   /// Writes the encoded direction of one sample; to be called for all samples before `forward`.
   static void set_direction(LuminanceWorkspace& work, std::size_t sample, Vec3f direction);
   /// Fills the activations in `work`.
   void forward(const float* positions, LuminanceWorkspace& work) const;
-  [[nodiscard]] float sigma(const LuminanceWorkspace& work, std::size_t sample) const;
+  /// The same for samples whose density is known, without computing it again.
+  /// @param lanes         of the samples in `from`
+  /// @param for_backward  takes over what `backward` wants, too
+  void forward(const DensityWorkspace& from, std::span<const std::uint32_t> lanes, bool for_backward,
+               LuminanceWorkspace& work) const;
+  [[nodiscard]] float sigma(const DensityWorkspace& work, std::size_t sample) const;
   [[nodiscard]] float luminance(const LuminanceWorkspace& work, std::size_t sample) const;
 
   /// Sets the gradient of the loss by one sample's sigma and luminance; to be called for all samples before `backward`.
@@ -65,7 +78,7 @@ class LuminanceFieldCpu {
 
  private:
   /// Arrays of the nets' layers, input first.
-  [[nodiscard]] std::vector<Channels> density_layers(LuminanceWorkspace& work) const;
+  [[nodiscard]] std::vector<Channels> density_layers(DensityWorkspace& work, std::size_t first = 0) const;
   [[nodiscard]] static std::vector<Channels> luminance_layers(LuminanceWorkspace& work);
 
   HashGridCpu grid_;
