@@ -206,7 +206,8 @@ void append_pictures(const Scene& scene, const LuminanceEngine& engine, const Ba
     }
   }
   EXPECT_TRUE(in_order) << "traced samples";
-  EXPECT_LT(relative_distance(traced, luminance), 1e-4) << "traced samples add up to the picture";
+  // A ray may end one sample earlier, behind a surface that hides all but this share of what follows.
+  EXPECT_LT(relative_distance(traced, luminance), 1e-3) << "traced samples add up to the picture";
   append_traced_pixels(engine, rays, scene.options().march, backend, results);
   results.push_back({"rendered luminance", luminance});
   results.push_back({"rendered opacity", opacity});
@@ -341,7 +342,7 @@ Op stage1_shared(const Problem& problem) {
 /// Of views that take turns on the GPU, a step draws from those that are there: what it finds is what the processor
 /// finds of these alone.
 Op stage1_in_turns(const Problem& problem) {
-  constexpr long kResident = 3, kSteps = 40;
+  constexpr long kResident = 2, kSteps = 40;
   const auto scene = std::make_shared<Scene>(problem);
   Op op = stage1_shared(problem);  // for its bounds
   op.is_gpu_only = true;
@@ -359,7 +360,9 @@ Op stage1_in_turns(const Problem& problem) {
   op.run = [scene](const Backend& backend) {
     const auto engine = scene->trained(backend, kSteps);
     constexpr std::size_t kSlot = (48 * 40 + 255) / 256 * 256 + 4 * 256;
-    engine->limit_image_memory((kResident + 1) * kSlot);
+    constexpr std::size_t kMemory = (kResident + 1) * kSlot;
+    EXPECT_LT(kMemory, scene->views().size() * pixel_bytes(scene->views().front())) << "all views fit";
+    engine->limit_image_memory(kMemory);
     engine->set_views(scene->views());
     std::vector<Result> results;
     append_gradients(*engine, results);
