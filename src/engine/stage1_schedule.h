@@ -18,8 +18,10 @@ struct DepthLearning {
   float weight = 0;       ///< in the loss, of the first step; 0: depths are not looked at
   float half_life = 500;  ///< steps
 
+  /// 0 after ten halvings: what is left by then is not worth its time.
   [[nodiscard]] CNERF_HD float weight_at(std::int64_t step) const {
-    return weight <= 0 ? 0.0f : weight * std::exp2(-float(step) / half_life);
+    const float halvings = float(step) / half_life;
+    return weight <= 0 || halvings > 10 ? 0.0f : weight * std::exp2(-halvings);
   }
 };
 

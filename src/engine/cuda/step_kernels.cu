@@ -84,6 +84,7 @@ __global__ void draw(const DrawJob job) {
   record.jitter = observed.jitter;
   record.target = observed.target;
   record.view = views.number_of(observed.view);
+  if (job.depth.weight_at(job.state->step) <= 0) record.target.depth = {};  // so that no sample is compared
   clip(record);
   job.rays[ray] = record;
   job.directions[ray] = encode_direction(record.ray.direction);

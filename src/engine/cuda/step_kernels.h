@@ -65,6 +65,7 @@ struct DrawJob {
   std::uint32_t n_views;              ///< that pixels are drawn from
   const std::uint32_t* resident;      ///< [n_views], their numbers; null: the first ones
   std::uint64_t seed;
+  DepthLearning depth;
   RayRecord* rays;
   DirectionCode* directions;
 };
