@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "src/engine/stage1_schedule.h"
 #include "src/render/training_views.h"
 #include "tests/support/facing_views.h"
 
@@ -77,6 +78,15 @@ TEST_F(DepthHintsTest, AViewThatShowsNoPointIsGivenNone) {
   show_to(views, hints);
   EXPECT_NE(views[0].depths, nullptr);
   EXPECT_EQ(views[3].depths, nullptr);
+}
+
+TEST(DepthLearning, HalvesAndEnds) {
+  const DepthLearning depth{0.01f, 500};
+  EXPECT_FLOAT_EQ(depth.weight_at(0), 0.01f);
+  EXPECT_FLOAT_EQ(depth.weight_at(1000), 0.0025f);
+  EXPECT_GT(depth.weight_at(5000), 0);
+  EXPECT_EQ(depth.weight_at(5001), 0);
+  EXPECT_EQ(DepthLearning{}.weight_at(0), 0);
 }
 
 TEST(DepthMiss, IsNothingAtTheKnownDistanceAndBoundedElsewhere) {

@@ -156,7 +156,7 @@ void LuminanceStepCuda::draw_and_trace(const std::uint32_t* occupied) {
   begin_step(state_.data(), learning_rates_.on_device(), {share_.part, share_.parts}, stream_);
   const ViewCorrection* corrections = options_.learning.is_on() ? corrections_.data() : nullptr;
   draw_training_rays({state_.data(), views_.records(), corrections, views_.count(), views_.resident(), options_.seed,
-                      rays_.data(), directions_.data()},
+                      options_.depth, rays_.data(), directions_.data()},
                      stream_);
   trace_training_rays(trace_job(occupied), stream_);
   field_.nets_backward(samples(), stream_);
