@@ -95,6 +95,8 @@ export interface Stroke {
   readonly points: readonly StrokePoint[];
   /** Of a painted picture: what studio/painted?picture= calls it. */
   readonly picture?: string;
+  /** What is painted: a palette's colour of that word replaces `color` on the command line. */
+  readonly word?: string;
 }
 
 export const limits = { strokes: 2000, viewpoints: 50, points: 20000, bytes: 4e6, size: [0.0005, 0.5], reach: [0.1, 4] } as const;
