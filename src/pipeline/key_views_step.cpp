@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <iterator>
 
 #include "src/base/files.h"
@@ -25,8 +26,9 @@ const View& view_named(const Capture& capture, const std::string& name) {
   return *std::ranges::find(capture.views, name, &View::name);
 }
 
+/// Short, since it is cut at the width of a picture.
 std::string caption_of(const SuggestedView& one) {
-  return fmt::format("{}: {:.0f} % more", one.view, 100 * one.adds);
+  return fmt::format("{} +{:.0f}%", std::filesystem::path(one.view).stem().string(), 100 * one.adds);
 }
 
 }  // namespace
