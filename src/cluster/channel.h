@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "src/base/device_sums.h"
 #include "src/cluster/launch.h"
 
 namespace cnerf::cluster {
@@ -41,15 +42,6 @@ class Group {
   virtual void broadcast(std::span<std::byte> bytes, int from) = 0;
 };
 
-/// Sums of values in the memory of each process's GPU. All processes begin them in the same order.
-class DeviceGroup {
- public:
-  virtual ~DeviceGroup() = default;
-  /// Adds up over all processes, in place; all get the same bits. Work of the stream: the call does not wait for it.
-  /// @param stream  a cudaStream_t of the process's first GPU
-  virtual void sum(float* values, std::size_t count, void* stream) = 0;
-};
-
 /// What the plug-in offers: the result of its `cnerf_cluster_channel`.
 struct Channel {
   /// A connection of its own to the store. The first one of rank 0 opens it, unless the launcher has one.
@@ -59,7 +51,7 @@ struct Channel {
   std::unique_ptr<Group> (*group)(const Launch& launch, Seconds limit);
   const char* description;  ///< "LibTorch 1.13.1: Gloo"
   /// To be called by all processes that have a GPU each; null where this build cannot sum on them.
-  std::unique_ptr<DeviceGroup> (*device_group)(const Launch& launch, Seconds limit) = nullptr;
+  std::unique_ptr<DeviceSums> (*device_sums)(const Launch& launch, Seconds limit) = nullptr;
 };
 
 }  // namespace cnerf::cluster

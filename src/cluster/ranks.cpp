@@ -69,6 +69,45 @@ RanksWait::~RanksWait() noexcept(false) {
   if (std::uncaught_exceptions() == errors_) ranks_.barrier(what_);
 }
 
+template <typename Operation>
+auto JoinedRanks::guarded(const Operation& operation) {
+  watch_->check();
+  try {
+    return operation();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& problem) {
+    throw RankError(watch_->explained(problem.what()));
+  }
+}
+
+/// Those of the channel, once they are needed.
+class JoinedRanks::GuardedDeviceSums final : public DeviceSums {
+ public:
+  explicit GuardedDeviceSums(JoinedRanks& ranks) : ranks_(ranks) {}
+  void sum(std::span<float> values, void* stream) override {
+    ranks_.guarded([&] { sums().sum(values, stream); });
+  }
+  void sum(std::span<double> values, void* stream) override {
+    ranks_.guarded([&] { sums().sum(values, stream); });
+  }
+  void sum_own_piece(std::span<float> values, void* stream) override {
+    ranks_.guarded([&] { sums().sum_own_piece(values, stream); });
+  }
+  void hand_round(std::span<std::byte> values, void* stream) override {
+    ranks_.guarded([&] { sums().hand_round(values, stream); });
+  }
+
+ private:
+  DeviceSums& sums() {
+    const Meeting& meeting = ranks_.meeting_;
+    if (!sums_) sums_ = meeting.channel.device_sums(meeting.launch, meeting.limit);
+    return *sums_;
+  }
+  JoinedRanks& ranks_;
+  std::unique_ptr<DeviceSums> sums_;
+};
+
 JoinedRanks::JoinedRanks(Meeting meeting) : meeting_(std::move(meeting)) {
   const Launch& launch = meeting_.launch;
   try {
@@ -76,6 +115,7 @@ JoinedRanks::JoinedRanks(Meeting meeting) : meeting_(std::move(meeting)) {
     meet(*store_);
     watch_ = std::make_unique<Watch>(meeting_.channel.connect(launch, false, meeting_.limit), rank(), names_,
                                      meeting_.patience, meeting_.end);
+    if (meeting_.channel.device_sums != nullptr) device_sums_ = std::make_unique<GuardedDeviceSums>(*this);
   } catch (const Error&) {
     throw;
   } catch (const std::exception& problem) {
@@ -104,19 +144,6 @@ void JoinedRanks::meet(Store& store) {
   throw RankError(fmt::format("of {} processes by {}, these ranks did not come within {:.0f} s: {}", size(),
                               meeting_.launch.launcher, meeting_.limit.count(), missing));
 }
-
-template <typename Operation>
-auto JoinedRanks::guarded(const Operation& operation) {
-  watch_->check();
-  try {
-    return operation();
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception& problem) {
-    throw RankError(watch_->explained(problem.what()));
-  }
-}
-
 void JoinedRanks::wait_for(const std::function<bool()>& is_there, const std::string& what, Seconds limit) {
   const Clock::time_point start = Clock::now();
   while (!guarded(is_there)) {
@@ -144,13 +171,6 @@ void JoinedRanks::sum(std::span<float> values) {
 
 void JoinedRanks::sum(std::span<double> values) {
   guarded([&] { group().sum(values); });
-}
-
-void JoinedRanks::sum_on_device(float* values, std::size_t count, void* stream) {
-  guarded([&] {
-    if (!device_group_) device_group_ = meeting_.channel.device_group(meeting_.launch, meeting_.limit);
-    device_group_->sum(values, count, stream);
-  });
 }
 
 /// By the store: rank 0 may come hours later.

@@ -35,11 +35,9 @@ class Ranks {
   /// Adds up over all ranks, in place. All ranks get the same bits; the order of the sum is the back end's.
   virtual void sum(std::span<float> /*values*/) {}
   virtual void sum(std::span<double> /*values*/) {}
-  /// Whether `sum_on_device` is there: the same on all ranks of a build.
-  [[nodiscard]] virtual bool sums_on_devices() const { return false; }
-  /// Adds up values in the memory of each rank's GPU, in place, as work of a stream (a cudaStream_t); all ranks get the
-  /// same bits. Who is lost is found by others than the caller, which does not wait.
-  virtual void sum_on_device(float* /*values*/, std::size_t /*count*/, void* /*stream*/) {}
+  /// Sums between GPUs; null where the build has none, the same on all ranks. Who is lost is found by others than the
+  /// caller, which does not wait.
+  [[nodiscard]] virtual DeviceSums* device_sums() { return nullptr; }
   /// What rank 0 has, for all.
   [[nodiscard]] virtual Bytes broadcast(Bytes bytes) { return bytes; }
   /// What all have, by rank, for all.
@@ -107,8 +105,7 @@ class JoinedRanks final : public Ranks {
   [[nodiscard]] int threads() const override;
   void sum(std::span<float> values) override;
   void sum(std::span<double> values) override;
-  [[nodiscard]] bool sums_on_devices() const override { return meeting_.channel.device_group != nullptr; }
-  void sum_on_device(float* values, std::size_t count, void* stream) override;
+  [[nodiscard]] DeviceSums* device_sums() override { return device_sums_.get(); }
   [[nodiscard]] Bytes broadcast(Bytes bytes) override;
   [[nodiscard]] std::vector<Bytes> gather(Bytes bytes) override;
   void barrier(const std::string& what, Seconds limit = kNoLimit) override;
@@ -123,6 +120,7 @@ class JoinedRanks final : public Ranks {
   [[nodiscard]] std::string name_of(int rank) const { return names_.at(std::size_t(rank)); }
 
  private:
+  class GuardedDeviceSums;
   template <typename Operation>
   auto guarded(const Operation& operation);
   void wait_for(const std::function<bool()>& is_there, const std::string& what, Seconds limit);
@@ -133,7 +131,7 @@ class JoinedRanks final : public Ranks {
   std::vector<std::string> names_;
   std::unique_ptr<Store> store_;
   std::unique_ptr<Group> group_;  // once it is needed
-  std::unique_ptr<DeviceGroup> device_group_;
+  std::unique_ptr<DeviceSums> device_sums_;
   std::unique_ptr<Watch> watch_;
   std::int64_t works_ = 0, barriers_ = 0;
 };

@@ -66,6 +66,9 @@ class LuminanceEngine {
   /// Steps work on a share of their pixels from now on; their reports are of the whole.
   /// @throws DeviceError  an engine that cannot
   virtual void share_steps(const StepShare& share);
+  /// To be called by all processes that share steps before one asks for `state` or stops sharing them: each may have
+  /// updated a piece of the parameters only.
+  virtual void complete_state() {}
   /// One optimiser step. The same step number draws the same pixels.
   virtual StepReport step(float learning_rate) = 0;
   [[nodiscard]] virtual long step_count() const = 0;

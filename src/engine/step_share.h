@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "src/base/device_sums.h"
+#include "src/base/error.h"
 #include "src/optim/gradient_sum.h"
 
 namespace cnerf {
@@ -15,7 +17,7 @@ namespace cnerf {
 struct StepShare {
   int part = 0, parts = 1;  ///< of the processes
   GradientSum sum = {};
-  DeviceGradientSum sum_on_device = {};  ///< empty: a GPU's engine takes what it sums through the host's memory
+  DeviceSums* on_device = nullptr;  ///< for engines of a GPU, which share no steps without it
 
   [[nodiscard]] bool is_whole() const { return parts == 1; }
   /// This process's of so many items, in whole blocks: the first one and the one behind the last.
@@ -25,6 +27,13 @@ struct StepShare {
     return {bound(part), bound(part + 1)};
   }
 };
+
+/// @throws DeviceError  sums between GPUs that this build lacks
+inline void check_sums(const StepShare& share) {
+  if (!share.is_whole() && share.on_device == nullptr) {
+    throw DeviceError("this build has no sums between GPUs, which therefore share no steps");
+  }
+}
 
 /// Numbers beside the table's gradient that are summed as one.
 class SharedNumbers {

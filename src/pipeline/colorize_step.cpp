@@ -80,7 +80,7 @@ TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Eng
                          nullptr,
                          job.watch,
                          viewpoints,
-                         ranks_that_train(engines, /*samples_per_step=*/0)};
+                         ranks_that_train(engines, /*pays=*/true)};
   const Stage2Report report = is_needed(stage2.ranks) ? train_stage2(stage2, engines, observer) : Stage2Report();
   observer.report_progress({"stage 2", 1.0, {}});
   return {job.take, colorizer.name() + describe(known) + describe_viewpoints(viewpoints), report};

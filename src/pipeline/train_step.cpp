@@ -22,7 +22,7 @@ void train_step(const RunContext& context, const TrainJob& job, const Engines& e
                      .snapshot = directory.stage1_snapshot(),
                      .resume = world.agreed(goes_on),
                      .watch = job.watch,
-                     .ranks = ranks_that_train(engines, context.config.stage1.samples_per_step),
+                     .ranks = ranks_that_train(engines, context.config.stage1.samples_per_step >= kSamplesWorthSharing),
                      .image_memory = image_memory(context.config)};
     if (is_needed(stage1.ranks)) {
       stage1.points = prepare::points_for_training(stage1, observer);

@@ -48,13 +48,16 @@ TEST(Ranks, SumsBroadcastsAndGathers) {
 }
 
 /// Sums in memory that plays a GPU's.
-class FakeDeviceGroup final : public DeviceGroup {
+class FakeDeviceSums final : public DeviceSums {
  public:
-  FakeDeviceGroup(int rank, int size) : group_(rank, size) {}
-  void sum(float* values, std::size_t count, void* stream) override {
+  FakeDeviceSums(int rank, int size) : group_(rank, size) {}
+  void sum(std::span<float> values, void* stream) override {
     EXPECT_EQ(stream, nullptr);
-    group_.sum(std::span(values, count));
+    group_.sum(values);
   }
+  void sum(std::span<double> values, void*) override { group_.sum(values); }
+  void sum_own_piece(std::span<float>, void*) override { throw std::runtime_error("connection reset"); }
+  void hand_round(std::span<std::byte> values, void*) override { group_.broadcast(values, 1); }
 
  private:
   test::FakeGroup group_;
@@ -63,23 +66,28 @@ class FakeDeviceGroup final : public DeviceGroup {
 TEST(Ranks, SumOnDevicesWhereTheChannelCan) {
   static const Channel channel = [] {
     Channel with_devices = test::fake_channel();
-    with_devices.device_group = [](const Launch& launch, Seconds) -> std::unique_ptr<DeviceGroup> {
-      return std::make_unique<FakeDeviceGroup>(launch.rank, launch.size);
+    with_devices.device_sums = [](const Launch& launch, Seconds) -> std::unique_ptr<DeviceSums> {
+      return std::make_unique<FakeDeviceSums>(launch.rank, launch.size);
     };
     return with_devices;
   }();
-  on_ranks(2, [](Ranks& ranks) { EXPECT_FALSE(ranks.sums_on_devices()); });
-  EXPECT_FALSE(alone().sums_on_devices());
+  on_ranks(2, [](Ranks& ranks) { EXPECT_EQ(ranks.device_sums(), nullptr); });
+  EXPECT_EQ(alone().device_sums(), nullptr);
   exchange = std::make_shared<test::Exchange>();
   std::vector<std::jthread> threads;
   for (int rank = 0; rank < 2; ++rank) {
     threads.emplace_back([rank] {
       const Meeting plain = test::fake_meeting(rank, 2);
       JoinedRanks ranks({plain.launch, channel, plain.patience, plain.limit, plain.name, plain.end});
-      EXPECT_TRUE(ranks.sums_on_devices());
+      ASSERT_NE(ranks.device_sums(), nullptr);
+      DeviceSums& sums = *ranks.device_sums();
       std::vector<float> values = {float(rank), 2};
-      ranks.sum_on_device(values.data(), values.size(), nullptr);
+      sums.sum(values, nullptr);
       EXPECT_EQ(values, (std::vector<float>{1, 4}));
+      std::vector<std::byte> bytes = {std::byte(rank), std::byte(7)};
+      sums.hand_round(bytes, nullptr);
+      EXPECT_EQ(bytes, (std::vector<std::byte>{std::byte(1), std::byte(7)}));
+      EXPECT_THROW(sums.sum_own_piece(values, nullptr), RankError) << "what breaks is told in the ranks' words";
       ranks.leave({});
     });
   }

@@ -5,7 +5,8 @@
 // FOLDER is what pack_capture made; options are those of cnerf-cuda-check. Started alone it measures one GPU. Prints
 // how far the gradients of a step that is shared are from those of one that is not, whether all ranks hold the same
 // field, how long a step takes, and how good the field is. With `enlarge=N copies=M` training views are N times as wide
-// and high, and M times as many; `image_memory=MIB` bounds what of them lies on the GPU.
+// and high, and M times as many; `image_memory=MIB` bounds what of them lies on the GPU. `exchange=0` leaves out what the
+// GPUs exchange, which is how long a step would take if that took no time.
 
 #include <algorithm>
 #include <chrono>
@@ -48,6 +49,14 @@ void enlarge(Capture& capture, int times, int copies) {
   }
   capture.views = std::move(views);
 }
+
+class NoExchange final : public DeviceSums {
+ public:
+  void sum(std::span<float>, void*) override {}
+  void sum(std::span<double>, void*) override {}
+  void sum_own_piece(std::span<float>, void*) override {}
+  void hand_round(std::span<std::byte>, void*) override {}
+};
 
 double distance(const std::vector<float>& found, const std::vector<float>& expected) {
   double difference = 0, size = 0;
@@ -96,7 +105,10 @@ int check_shared(const Arguments& arguments) {
     engine->limit_image_memory(std::size_t(arguments.number("image_memory", 0)) << 20);
   }
   engine->set_views(views);
-  engine->share_steps(share_of(ranks));
+  StepShare share = share_of(ranks);
+  NoExchange none;
+  if (!ranks.is_alone() && arguments.number("exchange", 1) == 0) share.on_device = &none;
+  engine->share_steps(share);
   const int steps = int(arguments.number("steps", 1000));
   for (int i = 0; i < steps; ++i) engine->step(float(1e-2 * std::pow(0.05, std::max(0.0, 2.0 * i / steps - 1))));
   wait_for(*engine);
@@ -107,6 +119,7 @@ int check_shared(const Arguments& arguments) {
   for (int i = 0; i < kTimed; ++i) samples += double(engine->step(5e-4f).trained_samples);
   wait_for(*engine);
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  engine->complete_state();
   const std::uint64_t own = hash_of(*engine);
   double different = 0;
   if (!ranks.is_alone()) {
@@ -125,7 +138,7 @@ int check_shared(const Arguments& arguments) {
     std::printf("held out after %ld steps: %.2f dB\n", engine->step_count(), total / double(judged.size()));
     std::fflush(stdout);
   }
-  if (!ranks.is_alone()) {
+  if (!ranks.is_alone() && share.on_device != &none) {
     ranks.barrier("pictures");
     compare_gradients(*engine, ranks);
   }

@@ -4,9 +4,12 @@
 
 #include <memory>
 #include <numeric>
+#include <thread>
+#include <utility>
 
 #include "src/base/rng.h"
 #include "tests/engine/backend_ops.h"
+#include "tests/engine/threads_exchange.h"
 #include "tests/support/engine_state.h"
 #include "tests/support/random_pixels.h"
 
@@ -189,6 +192,70 @@ Op color_field(const FieldProblem& problem) {
   return op;
 }
 
+/// Engines that share steps learn what one learns that has them alone, and stay equal.
+/// @param trained  makes a trained engine of a back end
+/// @param step     (engine, learning rate) -> loss
+template <typename Trained, typename Step>
+Op shared(Op op, const char* name, const Trained& trained, const Step& step) {
+  op.name = name;
+  std::erase_if(op.bounds, [](const Bound& bound) {
+    return bound.result != "loss" && !bound.result.starts_with("gradient") && !bound.result.starts_with("after");
+  });
+  op.expected = [=] {
+    std::vector<Result> results;
+    append_steps([&] { return trained(reference_backend()); }, step, results);
+    return results;
+  };
+  op.run = [=](const Backend& backend) {
+    constexpr int kParts = 3;
+    ThreadsExchange exchange(kParts);
+    std::vector<decltype(trained(backend))> engines;  // made here: which kernels they use is a matter of the process
+    for (int i = 0; i < 2 * kParts; ++i) engines.push_back(trained(backend));
+    std::vector<std::vector<Result>> results{std::size_t(kParts), std::vector<Result>()};
+    std::vector<std::jthread> threads;
+    for (int part = 0; part < kParts; ++part) {
+      threads.emplace_back([&, part] {
+        std::size_t next = std::size_t(part);
+        const auto own = [&] {
+          auto engine = std::move(engines[std::exchange(next, next + kParts)]);
+          engine->share_steps(exchange.share(part));
+          return engine;
+        };
+        append_steps(own, step, results[std::size_t(part)]);
+      });
+    }
+    threads.clear();
+    for (std::size_t i = 0; i < results[0].size(); ++i) {
+      for (std::size_t part = 1; part < kParts; ++part) EXPECT_EQ(results[part][i].values, results[0][i].values);
+    }
+    return results[0];
+  };
+  return op;
+}
+
+Op shared_color_bins(const BinProblem& problem) {
+  const auto scene = std::make_shared<BinScene>(problem);
+  return shared(
+      color_bins(problem), problem.name, [=](const Backend& backend) { return scene->trained(backend); },
+      [=](ColorBinEngine& engine, float rate) { return scene->step(engine, rate); });
+}
+
+Op shared_color_field(const FieldProblem& problem) {
+  const PixelSamples pixels = random_pixels(problem.count, 24, 3);
+  const std::vector<Ab> targets = colors_of(pixels);
+  const std::vector<float> weights = random_weights(problem.count);
+  const auto trained = [=](const Backend& backend) {
+    auto engine = backend.make([&](const Engines& engines) { return engines.make_color_field(grid_of(problem.levels), 5); });
+    const auto trainer = reference_backend().engines().make_color_field(grid_of(problem.levels), 5);
+    for (int i = 0; i < 10; ++i) trainer->step(pixels, targets, weights, problem.loss, 1e-2f);
+    copy_state(*trainer, *engine);
+    return engine;
+  };
+  return shared(color_field(problem), problem.name, trained, [=](ColorFieldEngine& engine, float rate) {
+    return engine.step(pixels, targets, weights, problem.loss, rate);
+  });
+}
+
 /// Losses after training from the same start.
 Op color_learning() {
   const auto bins = std::make_shared<BinScene>(BinProblem{"", 8, 777, {}});
@@ -247,6 +314,8 @@ std::vector<Op> color_ops() {
           color_field({"ColorField", 8, 777, AbLoss::kHuber}),
           color_field({"ColorFieldOfOnePixel", 3, 1, AbLoss::kSquared}),
           color_field({"ColorFieldOfManyLevels", 13, 3000, AbLoss::kSquared}),
+          shared_color_bins({"ColorBinsShared", 8, 777, {0.3f, 0.1f}}),
+          shared_color_field({"ColorFieldShared", 8, 777, AbLoss::kHuber}),
           color_learning(),
           empty_pixels()};
 }

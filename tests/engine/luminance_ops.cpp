@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <barrier>
 #include <map>
 #include <memory>
 #include <thread>
@@ -11,6 +10,7 @@
 #include "src/base/error.h"
 #include "src/base/rng.h"
 #include "tests/engine/backend_ops.h"
+#include "tests/engine/threads_exchange.h"
 #include "tests/support/engine_state.h"
 #include "tests/support/toy_capture.h"
 
@@ -271,34 +271,9 @@ Op stage1(const Problem& problem) {
   return op;
 }
 
-/// Sums of threads that play processes, through the host's memory.
-class ThreadsSum {
- public:
-  explicit ThreadsSum(int parts) : values_(std::size_t(parts)), all_are_here_(parts) {}
-
-  [[nodiscard]] StepShare share(int part) {
-    return {part, int(values_.size()), [this, part](std::span<float> values) { sum(part, values); }};
-  }
-
- private:
-  void sum(int part, std::span<float> values) {
-    values_[std::size_t(part)] = values;
-    all_are_here_.arrive_and_wait();
-    std::vector<float> total(values.size(), 0.0f);
-    for (const std::span<float> of_part : values_) {
-      for (std::size_t i = 0; i < total.size(); ++i) total[i] += of_part[i];
-    }
-    all_are_here_.arrive_and_wait();
-    std::ranges::copy(total, values.begin());
-  }
-
-  std::vector<std::span<float>> values_;
-  std::barrier<> all_are_here_;
-};
-
-/// Three engines that share a step find the gradients of one that has it alone, and stay equal.
-Op stage1_shared(const Problem& problem) {
-  constexpr int kParts = 3;
+/// Engines that share a step find the gradients of one that has it alone, and stay equal.
+/// @param parts  that a grid's rows can be dealt out to, or not
+Op stage1_shared(const Problem& problem, int parts) {
   const auto scene = std::make_shared<Scene>(problem);
   Op op = stage1(problem);
   std::erase_if(op.bounds, [](const Bound& bound) {
@@ -311,23 +286,24 @@ Op stage1_shared(const Problem& problem) {
     append_gradients(*scene->trained(reference_backend(), 40), results);
     return results;
   };
-  op.run = [scene](const Backend& backend) {
+  op.run = [scene, parts](const Backend& backend) {
     std::vector<std::unique_ptr<LuminanceEngine>> engines;
-    for (int part = 0; part < kParts; ++part) engines.push_back(scene->trained(backend, 40));
-    ThreadsSum threads_sum(kParts);
-    std::vector<Result> results[kParts];
+    for (int part = 0; part < parts; ++part) engines.push_back(scene->trained(backend, 40));
+    ThreadsExchange exchange(parts);
+    std::vector<std::vector<Result>> results{std::size_t(parts), std::vector<Result>()};
     std::vector<std::jthread> threads;
-    for (int part = 0; part < kParts; ++part) {
+    for (int part = 0; part < parts; ++part) {
       threads.emplace_back([&, part] {
         LuminanceEngine& engine = *engines[std::size_t(part)];
-        engine.share_steps(threads_sum.share(part));
-        append_gradients(engine, results[part]);
+        engine.share_steps(exchange.share(part));
+        append_gradients(engine, results[std::size_t(part)]);
         for (int step = 0; step < 3; ++step) engine.step(1e-3f);
+        engine.complete_state();
       });
     }
     threads.clear();
     const std::vector<StatePiece> state = engines.front()->state();
-    for (int part = 1; part < kParts; ++part) {
+    for (int part = 1; part < parts; ++part) {
       const std::vector<StatePiece> others = engines[std::size_t(part)]->state();
       for (std::size_t i = 0; i < state.size(); ++i) {
         EXPECT_TRUE(std::ranges::equal(state[i].bytes, others[i].bytes)) << state[i].name << " of part " << part;
@@ -344,7 +320,7 @@ Op stage1_shared(const Problem& problem) {
 Op stage1_in_turns(const Problem& problem) {
   constexpr long kResident = 2, kSteps = 40;
   const auto scene = std::make_shared<Scene>(problem);
-  Op op = stage1_shared(problem);  // for its bounds
+  Op op = stage1_shared(problem, 3);  // for its bounds
   op.is_gpu_only = true;
   op.expected = [scene] {
     const auto engine = scene->trained(reference_backend(), kSteps);
@@ -425,7 +401,8 @@ std::vector<Op> luminance_ops() {
         stage1({"Stage1WithLearnedViews", 8, 14, 64, 2, false, true, true, 0, true}),
         stage1({"Stage1WithSky", 8, 14, 64, 2, false, false, true, 0.1f, true, true}),
         stage1({"Stage1WithDepth", 8, 14, 64, 2, false, false, false, 0.1f, false, false, 0.1f}),
-        stage1_shared({"Stage1Shared", 8, 14, 64, 2, false, true, true, 0.1f, true}),
+        stage1_shared({"Stage1Shared", 8, 14, 64, 2, false, true, true, 0.1f, true}, 3),
+        stage1_shared({"Stage1SharedInPieces", 8, 14, 64, 2, false, true, true, 0.1f, true}, 2),
         stage1_learning({"Stage1Learns", 8, 14, 64, 1, false, false, true}),
         stage1_learning({"Stage1LearnsWithCascades", 12, 14, 128, 3, false, true}),
 #if CNERF_CUDA_ENGINE

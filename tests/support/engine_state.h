@@ -78,11 +78,13 @@ struct Stage1Gradients {
 };
 /// Leaves the engine as it was. Not for a step that updates the occupancy grid first.
 [[nodiscard]] inline Stage1Gradients gradients_of_next_step(LuminanceEngine& engine) {
+  engine.complete_state();
   std::vector<std::vector<std::byte>> kept;
   for (const StatePiece& piece : engine.state()) kept.emplace_back(piece.bytes.begin(), piece.bytes.end());
   forget_moments(engine);
   Stage1Gradients found;
   found.report = engine.step(1e-9f);
+  engine.complete_state();
   const std::vector<StatePiece> state = engine.state();
   found.table = gradient_in(state, "grid.moments");
   for (const char* net : {"density_net", "luminance_net"}) {

@@ -119,9 +119,9 @@ class GlooGroup final : public Group {
 
 #if CNERF_NCCL
 /// NCCL has streams of its own, which wait for the caller's and which the caller's waits for.
-class NcclGroup final : public DeviceGroup {
+class NcclSums final : public DeviceSums {
  public:
-  NcclGroup(const Launch& launch, Seconds limit) {
+  NcclSums(const Launch& launch, Seconds limit) {
     // Kernels of a sum find room beside those that fill the GPU.
     const auto options = c10d::ProcessGroupNCCL::Options::create(/*is_high_priority_stream=*/true);
     options->timeout = kLongestOperation;
@@ -129,16 +129,40 @@ class NcclGroup final : public DeviceGroup {
     store->setTimeout(std::chrono::duration_cast<Milliseconds>(kLongestOperation));  // the first sum waits in it
     group_ = c10::make_intrusive<c10d::ProcessGroupNCCL>(store, launch.rank, launch.size, options);
   }
-  void sum(float* values, std::size_t count, void* stream) override {
-    const c10::Device own(c10::kCUDA, 0);  // the process sees one GPU, or takes the first one
-    const c10::cuda::CUDAStreamGuard guard(
-        c10::cuda::getStreamFromExternal(static_cast<cudaStream_t>(stream), own.index()));
-    std::vector<at::Tensor> tensors = {
-        at::from_blob(values, {std::int64_t(count)}, at::TensorOptions().dtype(at::kFloat).device(own))};
-    group_->allreduce(tensors)->wait();  // the stream waits, not the caller
+  void sum(std::span<float> values, void* stream) override { sum_of(values.data(), values.size(), at::kFloat, stream); }
+  void sum(std::span<double> values, void* stream) override {
+    sum_of(values.data(), values.size(), at::kDouble, stream);
+  }
+  void sum_own_piece(std::span<float> values, void* stream) override {
+    const c10::cuda::CUDAStreamGuard guard = on(stream);
+    at::Tensor all = tensor_of(values.data(), values.size(), at::kFloat), own = own_piece_of(all);
+    group_->_reduce_scatter_base(own, all)->wait();
+  }
+  void hand_round(std::span<std::byte> values, void* stream) override {
+    const c10::cuda::CUDAStreamGuard guard = on(stream);
+    at::Tensor all = tensor_of(values.data(), values.size(), at::kByte), own = own_piece_of(all);
+    group_->_allgather_base(all, own)->wait();
   }
 
  private:
+  void sum_of(void* values, std::size_t count, at::ScalarType type, void* stream) {
+    const c10::cuda::CUDAStreamGuard guard = on(stream);
+    std::vector<at::Tensor> tensors = {tensor_of(values, count, type)};
+    group_->allreduce(tensors)->wait();  // the stream waits, not the caller
+  }
+  static c10::Device own_device() { return {c10::kCUDA, 0}; }  // the process sees one GPU, or takes the first one
+  static c10::cuda::CUDAStreamGuard on(void* stream) {
+    return c10::cuda::CUDAStreamGuard(
+        c10::cuda::getStreamFromExternal(static_cast<cudaStream_t>(stream), own_device().index()));
+  }
+  static at::Tensor tensor_of(void* values, std::size_t count, at::ScalarType type) {
+    return at::from_blob(values, {std::int64_t(count)}, at::TensorOptions().dtype(type).device(own_device()));
+  }
+  [[nodiscard]] at::Tensor own_piece_of(const at::Tensor& all) const {
+    const std::int64_t size = all.numel() / group_->getSize();
+    return all.narrow(0, group_->getRank() * size, size);
+  }
+
   c10::intrusive_ptr<c10d::ProcessGroupNCCL> group_;
 };
 #endif
@@ -157,8 +181,8 @@ extern "C" __attribute__((visibility("default"))) const cnerf::cluster::Channel*
         },
 #if CNERF_NCCL
         "LibTorch " TORCH_VERSION ": Gloo, NCCL",
-        [](const Launch& launch, Seconds limit) -> std::unique_ptr<DeviceGroup> {
-          return std::make_unique<NcclGroup>(launch, limit);
+        [](const Launch& launch, Seconds limit) -> std::unique_ptr<DeviceSums> {
+          return std::make_unique<NcclSums>(launch, limit);
         }
   };
 #else

@@ -17,8 +17,9 @@ class ChromaStream {
     const ChromaStep input{{learning_rate, step}, samples, 0};
     step_.upload(&input, 1, stream_);
   }
-  /// The sum of the step's losses; waits for it.
-  [[nodiscard]] double end_step() const {
+  /// The sum of the step's losses; waits for it.  @param others  processes that share the step; null: none
+  [[nodiscard]] double end_step(DeviceSums* others) const {
+    if (others != nullptr) others->sum(std::span(&step_.data()->loss, 1), stream_);
     ChromaStep result;
     step_.download(&result, 1, stream_);
     wait();

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <mutex>
 
 #include "src/base/check.h"
@@ -12,6 +13,7 @@ namespace cnerf {
 namespace {
 
 constexpr std::size_t kPixelsAtATime = 1 << 14;  // that are asked about
+constexpr std::size_t kBlockPixels = 64;         // that processes deal out
 
 class ColorBinEngineCuda final : public ColorBinEngine {
  public:
@@ -22,31 +24,41 @@ class ColorBinEngineCuda final : public ColorBinEngine {
     state_loaded();
   }
 
+  void share_steps(const StepShare& share) override {
+    check_sums(share);
+    share_ = share;
+  }
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
     const std::lock_guard lock(mutex_);
-    const std::size_t n = pixels.pixels();
-    batch_.upload(pixels, 0, n, stream_);
+    const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
+    const std::size_t n = last - own;
+    batch_.upload(pixels, own, last, stream_);
     steps_.front() += 1;
     stream_.begin_step(learning_rate, steps_.front(), batch_.samples());
     labels_.reserve(n, "labels");
-    labels_.upload(labels.data(), n, stream_);
+    labels_.upload(labels.data() + own, n, stream_);
+    if (!pixel_weights.empty()) pixel_weights = pixel_weights.subspan(own, n);
     d_composited_.reserve(n * kChromaFeatures, "pixels");
-    const int parts = chroma_head_parts(batch_.arrays().pixels);
-    d_head_.reserve(std::size_t(parts) * std::size_t(chroma_head_weight_count()), "nets");
+    int parts = chroma_head_parts(batch_.arrays().pixels);
+    d_head_.reserve(std::size_t(std::max(1, parts)) * std::size_t(chroma_head_weight_count()), "nets");
 
     features_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/true, stream_);
-    const float scale = 1.0f / float(n);
+    const float scale = 1.0f / float(pixels.pixels());
     chroma_loss(head_job(),
                 {labels_.data(), batch_.upload_weights(pixel_weights, stream_), centres_.data(), scale, more.spread,
                  more.regression, d_composited_.data(), d_head_.data(), &stream_.step()->loss},
                 stream_);
     features_.backward(batch_.arrays().places, {&stream_.step()->samples, batch_.samples()},
                        {batch_.arrays().shares, d_composited_.data(), spread_slope(more.spread, scale)}, stream_);
+    if (!share_.is_whole()) {
+      sum_gradient_parts(d_head_.data(), parts, chroma_head_weight_count(), *share_.on_device, stream_);
+      parts = 1;
+    }
     update_head(d_head_.data(), parts);
-    features_.update(&stream_.step()->adam, stream_);
-    return stream_.end_step() * scale;
+    features_.update(&stream_.step()->adam, share_.on_device, stream_);
+    return stream_.end_step(share_.on_device) * scale;
   }
 
   void logits(const PixelSamples& pixels, std::span<float> logits) const override {
@@ -117,6 +129,7 @@ class ColorBinEngineCuda final : public ColorBinEngine {
                   stream_);
   }
 
+  StepShare share_;
   ChromaStream stream_;
   mutable PointNetCuda features_;
   TrainedNet head_;

@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t kPixelsAtATime = 1 << 16;
 constexpr std::size_t kPointsAtATime = 1 << 20;
+constexpr std::size_t kBlockPixels = 64;  // that processes deal out
 
 class ColorFieldEngineCuda final : public ColorFieldEngine {
  public:
@@ -18,29 +19,35 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
     state_loaded();
   }
 
+  void share_steps(const StepShare& share) override {
+    check_sums(share);
+    share_ = share;
+  }
   using ColorFieldEngine::step;
   double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
               AbLoss loss, float learning_rate) override {
     CNERF_CHECK_EQ(targets.size(), pixels.pixels());
     const std::lock_guard lock(mutex_);
-    const std::size_t n = pixels.pixels();
-    batch_.upload(pixels, 0, n, stream_);
+    const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
+    const std::size_t n = last - own;
+    batch_.upload(pixels, own, last, stream_);
     steps_.front() += 1;
     stream_.begin_step(learning_rate, steps_.front(), batch_.samples());
     colors_.reserve(n, "pixels");
-    colors_.upload(targets.data(), n, stream_);
+    colors_.upload(targets.data() + own, n, stream_);
+    if (!pixel_weights.empty()) pixel_weights = pixel_weights.subspan(own, n);
     d_logs_.reserve(batch_.samples(), "samples");
 
     field_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/true, stream_);
-    const float scale = 1.0f / float(n);
+    const float scale = 1.0f / float(pixels.pixels());
     chromaticity_loss(batch_.arrays(), field_.numbers(),
                       {colors_.data(), batch_.upload_weights(pixel_weights, stream_), loss, scale, d_logs_.data(),
                        &stream_.step()->loss},
                       stream_);
     field_.backward(batch_.arrays().places, {&stream_.step()->samples, batch_.samples()}, {.d_numbers = d_logs_.data()},
                     stream_);
-    field_.update(&stream_.step()->adam, stream_);
-    return stream_.end_step() * scale;
+    field_.update(&stream_.step()->adam, share_.on_device, stream_);
+    return stream_.end_step(share_.on_device) * scale;
   }
 
   void composite(const PixelSamples& pixels, std::span<Ab> colors) const override {
@@ -87,6 +94,7 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
   }
 
  private:
+  StepShare share_;
   ChromaStream stream_;
   mutable PointNetCuda field_;
   DeviceBuffer<float2> d_logs_;

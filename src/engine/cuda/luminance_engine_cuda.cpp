@@ -55,6 +55,10 @@ class LuminanceEngineCuda final : public LuminanceEngine {
     const std::lock_guard lock(mutex_);
     step_.share(share);
   }
+  void complete_state() override {
+    const std::lock_guard lock(mutex_);
+    step_.complete_state();
+  }
   StepReport step(float learning_rate) override {
     const std::lock_guard lock(mutex_);
     if (updates_occupancy(step_.steps())) {

@@ -23,23 +23,6 @@ std::size_t small_gradients(const ViewLearning& learning) {
   return std::size_t(kViewNumbers * learning.views + kLensNumbers * learning.lenses + kStepSums);
 }
 
-/// A hash grid's levels from the finest to the coarsest, in parts of some million rows: sums of less are slow for what
-/// they are, and of more nothing goes on beside them.
-std::vector<LevelRange> parts_of_grid(const std::vector<GridLevel>& levels) {
-  constexpr std::uint32_t kRowsOfPart = 1 << 21;
-  std::vector<LevelRange> parts;
-  std::uint32_t rows = kRowsOfPart;
-  for (std::size_t l = levels.size(); l-- > 0;) {
-    if (rows >= kRowsOfPart) {
-      parts.push_back({l, l + 1});
-      rows = 0;
-    }
-    parts.back().first = l;
-    rows += levels[l].rows;
-  }
-  return parts;
-}
-
 }  // namespace
 
 LuminanceStepCuda::LuminanceStepCuda(const LuminanceEngineOptions& options, const LuminanceFieldCuda& field,
@@ -127,13 +110,22 @@ FieldSamples LuminanceStepCuda::samples() const {
 }
 
 void LuminanceStepCuda::share(const StepShare& share) {
+  check_sums(share);
   forget_graph();  // it knows where the gradients lie
   share_ = share;
+  shared_grid_.reset();
   if (share.is_whole()) return;
   const std::size_t nets = std::size_t(field_weight_count(field_.levels()));
   small_gradients_ = DeviceBuffer<float>(small_gradients(options_.learning) + nets, "nets");
-  grid_parts_ = parts_of_grid(field_.grid_levels());
+  shared_grid_.emplace(field_.grid(), share);
   if (!sums_) sums_.emplace();
+}
+
+void LuminanceStepCuda::complete_state() {
+  if (!shared_grid_) return;
+  CNERF_CUDA(cudaStreamSynchronize(stream_));
+  shared_grid_->complete(*sums_);
+  sums_->wait();
 }
 
 /// The nets' optimiser, the hash grid's backward pass and the views need the same gradients and nothing of each other.
@@ -170,7 +162,7 @@ void LuminanceStepCuda::teach_cameras(cudaStream_t stream) {
       {learned(), views_.records(), {&state_.data()->samples, capacity_}, places_.data(), rays_.data()}, stream);
 }
 
-/// Three queues: the hash grid's backward pass part by part, the sums of its parts, and what follows these.
+/// Three queues: the hash grid's backward pass part by part, what processes exchange of the parts, and their updates.
 void LuminanceStepCuda::launch_shared(const std::uint32_t* occupied) {
   const AdamStep* adam = &state_.data()->adam;
   draw_and_trace(occupied);
@@ -181,39 +173,39 @@ void LuminanceStepCuda::launch_shared(const std::uint32_t* occupied) {
   teach_cameras(side_);  // before any row changes: it reads the table
   field_.write_nets_gradient(of_nets, side_);
   pack_step_sums(state_.data(), of_step, side_);
-  for (const LevelRange& part : grid_parts_) {
+  follow(side_, *sums_);
+  share_.on_device->sum({small_gradients_.data(), small_gradients_.size()}, *sums_);
+  follow(*sums_, side_);
+  field_.update_nets(of_nets, adam, side_);
+  if (options_.learning.is_on()) update_corrections(learned(), views_.records(), state_.data(), side_);
+  const LevelRange* updated = nullptr;
+  for (const LevelRange& part : shared_grid_->parts()) {
     field_.grid_backward(part, samples(), stream_);
-    sum_after(stream_, field_.grid().gradient(part));
-    summed_.hold(side_);
-    if (&part == &grid_parts_.front()) {
-      sum_after(side_, {small_gradients_.data(), small_gradients_.size()});
-      summed_.hold(side_);
-      field_.update_nets(of_nets, adam, side_);
-      if (options_.learning.is_on()) update_corrections(learned(), views_.records(), state_.data(), side_);
-    }
-    field_.grid().update(part, adam, side_);
+    follow(stream_, *sums_);
+    shared_grid_->sum(part, *sums_);
+    if (updated != nullptr) hand_round(*updated);  // while the next part, which is summed by then, is updated
+    follow(*sums_, side_);
+    shared_grid_->update(part, adam, side_);
+    updated_.record(side_);
+    updated = &part;
   }
-  join_.record(side_);
-  join_.hold(stream_);
+  hand_round(*updated);
+  follow(*sums_, stream_);
   unpack_step_sums(of_step, state_.data(), stream_);  // not earlier: the backward passes count samples by the state
   end_step(state_.data(), std::uint32_t(options_.samples_per_step), capacity_ * std::uint32_t(share_.parts),
            reports_.on_device(), stream_);
 }
 
-/// Sums values in the queue of sums, once what is queued elsewhere by now is done.
-void LuminanceStepCuda::sum_after(cudaStream_t queue, std::span<float> values) {
-  ready_.record(queue);
-  ready_.hold(*sums_);
-  if (share_.sum_on_device) {
-    share_.sum_on_device(values.data(), values.size(), *sums_);
-  } else {
-    on_host_.resize(std::max(on_host_.size(), values.size()));
-    CNERF_CUDA(cudaMemcpyAsync(on_host_.data(), values.data(), values.size_bytes(), cudaMemcpyDeviceToHost, *sums_));
-    sums_->wait();
-    share_.sum({on_host_.data(), values.size()});
-    CNERF_CUDA(cudaMemcpyAsync(values.data(), on_host_.data(), values.size_bytes(), cudaMemcpyHostToDevice, *sums_));
-  }
-  summed_.record(*sums_);
+/// Of the part that was updated last.
+void LuminanceStepCuda::hand_round(const LevelRange& part) {
+  updated_.hold(*sums_);
+  shared_grid_->hand_round(part, *sums_);
+}
+
+/// What a queue holds by now comes before what is added to another.
+void LuminanceStepCuda::follow(cudaStream_t first, cudaStream_t then) {
+  ready_.record(first);
+  ready_.hold(then);
 }
 
 void LuminanceStepCuda::capture(const std::uint32_t* occupied) {

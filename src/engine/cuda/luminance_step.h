@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "src/base/cuda/stream.h"
+#include "src/engine/cuda/shared_grid.h"
 #include "src/engine/cuda/trace_kernel.h"
 #include "src/engine/cuda/view_images.h"
 #include "src/engine/luminance_engine.h"
@@ -38,6 +39,8 @@ class LuminanceStepCuda {
   void set_views(const std::vector<TrainingView>& views);
   /// See LuminanceEngine::share_steps.
   void share(const StepShare& share);
+  /// See LuminanceEngine::complete_state.
+  void complete_state();
   /// Goes on from here.  @param rays  of the next step
   void restart(long step, std::int64_t rays);
   [[nodiscard]] long steps() const { return steps_; }
@@ -61,7 +64,8 @@ class LuminanceStepCuda {
   void launch_shared(const std::uint32_t* occupied);
   void draw_and_trace(const std::uint32_t* occupied);
   void teach_cameras(cudaStream_t stream);
-  void sum_after(cudaStream_t queue, std::span<float> values);
+  void hand_round(const LevelRange& part);
+  void follow(cudaStream_t first, cudaStream_t then);
   void capture(const std::uint32_t* occupied);
   void forget_graph();
   [[nodiscard]] TraceJob trace_job(const std::uint32_t* occupied) const;
@@ -92,10 +96,9 @@ class LuminanceStepCuda {
   MappedBuffer<float> learning_rates_{kStepRing};
   MappedBuffer<StepRecord> reports_{kStepRing};
   StepShare share_;
-  std::vector<LevelRange> grid_parts_;  // in the order of their sums
-  std::vector<float> on_host_;          // what is summed through the host's memory
-  std::optional<CudaStream> sums_;      // that processes share
-  CudaEvent ready_, summed_;
+  std::optional<SharedGrid> shared_grid_;
+  std::optional<CudaStream> sums_;  // what processes exchange
+  CudaEvent ready_, updated_;
   CudaStream side_;
   CudaEvent done_[kStepRing], fork_, join_;
   cudaGraphExec_t graph_ = nullptr;

@@ -97,4 +97,9 @@ void sum_gradient_parts(const float* d_weights, int parts, int weights, float* s
   CNERF_CUDA(cudaGetLastError());
 }
 
+void sum_gradient_parts(float* d_weights, int parts, int weights, DeviceSums& sums, cudaStream_t stream) {
+  sum_gradient_parts(d_weights, parts, weights, d_weights, stream);  // who writes a number has read its parts
+  sums.sum(std::span(d_weights, std::size_t(weights)), stream);
+}
+
 }  // namespace cnerf

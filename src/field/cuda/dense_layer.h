@@ -6,6 +6,7 @@
 
 #include <vector>
 
+#include "src/base/device_sums.h"
 #include "src/base/host_device.h"
 #include "src/optim/adam.h"
 
@@ -54,5 +55,7 @@ void update_layers(const std::vector<DenseLayer>& layers, const float* d_weights
 /// @param weights  of all layers, padded
 /// @param sum      [weights], written
 void sum_gradient_parts(const float* d_weights, int parts, int weights, float* sum, cudaStream_t stream);
+/// The same over several processes as well, in place of the first part.
+void sum_gradient_parts(float* d_weights, int parts, int weights, DeviceSums& sums, cudaStream_t stream);
 
 }  // namespace cnerf

@@ -49,14 +49,19 @@ void PointNetCuda::backward(const float4* places, SampleCount samples, const Poi
   if (samples.most > 0) grid_.backward(places, samples, d_encoded_.data(), stream);
 }
 
-void PointNetCuda::update_net(const AdamStep* adam, const float* d_weights, cudaStream_t stream) const {
-  update_layers(point_layers(outputs_, levels(), net_.weights(), packed_.weights()), d_weights, point_backward_blocks(),
-                adam, stream);
+void PointNetCuda::update_net(const AdamStep* adam, const float* d_weights, int parts, cudaStream_t stream) const {
+  update_layers(point_layers(outputs_, levels(), net_.weights(), packed_.weights()), d_weights, parts, adam, stream);
 }
 
-void PointNetCuda::update(const AdamStep* adam, cudaStream_t stream) const {
+void PointNetCuda::update(const AdamStep* adam, DeviceSums* others, cudaStream_t stream) const {
+  int parts = point_backward_blocks();
+  if (others != nullptr) {
+    others->sum(grid_.gradient(), stream);
+    sum_gradient_parts(d_weights_.data(), parts, point_weight_count(outputs_, levels()), *others, stream);
+    parts = 1;
+  }
   grid_.update(adam, stream);
-  update_net(adam, d_weights_.data(), stream);
+  update_net(adam, d_weights_.data(), parts, stream);
 }
 
 void PointNetCuda::append_state(const std::string& prefix, std::vector<StatePiece>& state) {
@@ -67,7 +72,7 @@ void PointNetCuda::append_state(const std::string& prefix, std::vector<StatePiec
 void PointNetCuda::upload(cudaStream_t stream) const {
   grid_.upload(stream);
   net_.upload();
-  update_net(nullptr, nullptr, stream);
+  update_net(nullptr, nullptr, 0, stream);
 }
 
 }  // namespace cnerf

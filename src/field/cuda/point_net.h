@@ -22,15 +22,17 @@ class PointNetCuda {
 
   /// @param samples  those of the latest `forward`
   void backward(const float4* places, SampleCount samples, const PointGradient& gradient, cudaStream_t stream);
-  /// Adam, after `backward`.  @param adam  device memory
-  void update(const AdamStep* adam, cudaStream_t stream) const;
+  /// Adam, after `backward`.
+  /// @param adam    device memory
+  /// @param others  processes to sum the gradient with; null: none
+  void update(const AdamStep* adam, DeviceSums* others, cudaStream_t stream) const;
 
   void append_state(const std::string& prefix, std::vector<StatePiece>& state);
   void upload(cudaStream_t stream) const;
 
  private:
   [[nodiscard]] int levels() const { return int(grid_.levels().size()); }
-  void update_net(const AdamStep* adam, const float* d_weights, cudaStream_t stream) const;
+  void update_net(const AdamStep* adam, const float* d_weights, int parts, cudaStream_t stream) const;
 
   PointOutputs outputs_;
   TrainedGrid grid_;

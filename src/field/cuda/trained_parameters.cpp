@@ -25,9 +25,9 @@ TrainedGrid::TrainedGrid(const HashGridOptions& options, std::uint64_t seed, con
     : levels_(hash_grid_levels(options)),
       decay_(float(options.decay)),
       table_(initial_table(levels_, seed), use),
-      moments_(std::vector<float>(rows() * std::size_t(8), 0.0f), use),
-      d_table_(rows(), use),
-      halves_(rows(), use) {}
+      moments_(std::vector<float>(total_rows(levels_) * std::size_t(8), 0.0f), use),
+      d_table_(total_rows(levels_), use),
+      halves_(total_rows(levels_), use) {}
 
 void TrainedGrid::backward(const LevelRange& range, const float4* places, SampleCount samples, const void* d_encoded,
                            cudaStream_t stream) const {
@@ -36,20 +36,12 @@ void TrainedGrid::backward(const LevelRange& range, const float4* places, Sample
   encode_backward_cuda(some, places, samples, d_some, d_table_.data(), stream);
 }
 
-std::span<float> TrainedGrid::gradient(const LevelRange& range) const {
-  const TableRowsCuda rows = table_rows(range);
-  return {reinterpret_cast<float*>(rows.gradient), 4 * std::size_t(rows.count)};
-}
-
-void TrainedGrid::update(const LevelRange& range, const AdamStep* adam, cudaStream_t stream) const {
-  update_rows(table_rows(range), adam, decay_, stream);
-}
-
-TableRowsCuda TrainedGrid::table_rows(const LevelRange& range) const {
+TableRowsCuda TrainedGrid::rows(const LevelRange& range) const {
   const std::uint32_t first = levels_[range.first].first_row;
-  const std::uint32_t last = range.last < levels_.size() ? levels_[range.last].first_row : rows();
-  return {reinterpret_cast<float4*>(table_.data()) + first, d_table_.data() + first,
-          reinterpret_cast<float4*>(moments_.data()) + 2 * std::size_t(first), halves_.data() + first, last - first};
+  const std::uint32_t last = range.last < levels_.size() ? levels_[range.last].first_row : total_rows(levels_);
+  const TableRowsCuda all = {reinterpret_cast<float4*>(table_.data()), d_table_.data(),
+                             reinterpret_cast<float4*>(moments_.data()), halves_.data(), total_rows(levels_)};
+  return all.some(first, last - first);
 }
 
 void TrainedGrid::append_state(const std::string& prefix, std::vector<StatePiece>& state) {
@@ -60,7 +52,7 @@ void TrainedGrid::append_state(const std::string& prefix, std::vector<StatePiece
 void TrainedGrid::upload(cudaStream_t stream) const {
   table_.upload();
   moments_.upload();
-  round_rows(table_rows(all()), stream);
+  round_rows(rows(all()), stream);
 }
 
 }  // namespace cnerf

@@ -84,21 +84,23 @@ class TrainedGrid {
     backward(all(), places, samples, d_encoded, stream);
   }
   /// Adam on what has a gradient.  @param adam  device memory
-  void update(const AdamStep* adam, cudaStream_t stream) const { update(all(), adam, stream); }
+  void update(const AdamStep* adam, cudaStream_t stream) const { update(rows(all()), adam, stream); }
 
   // The same of some levels, whose gradient is then summed with that of other processes.
   [[nodiscard]] LevelRange all() const { return {0, levels_.size()}; }
   void backward(const LevelRange& range, const float4* places, SampleCount samples, const void* d_encoded,
                 cudaStream_t stream) const;
-  [[nodiscard]] std::span<float> gradient(const LevelRange& range) const;  ///< device memory
-  void update(const LevelRange& range, const AdamStep* adam, cudaStream_t stream) const;
+  [[nodiscard]] TableRowsCuda rows(const LevelRange& range) const;
+  [[nodiscard]] std::span<float> gradient() const {  ///< device memory
+    return {reinterpret_cast<float*>(d_table_.data()), 4 * std::size_t(total_rows(levels_))};
+  }
+  void update(const TableRowsCuda& some, const AdamStep* adam, cudaStream_t stream) const {
+    update_rows(some, adam, decay_, stream);
+  }
   void append_state(const std::string& prefix, std::vector<StatePiece>& state);
   void upload(cudaStream_t stream) const;
 
  private:
-  [[nodiscard]] std::uint32_t rows() const { return total_rows(levels_); }
-  [[nodiscard]] TableRowsCuda table_rows(const LevelRange& range) const;
-
   std::vector<GridLevel> levels_;
   float decay_ = 0;
   StateBuffer table_, moments_;  // [rows, 4], [rows, 8]

@@ -16,6 +16,10 @@ struct TableRowsCuda {
   float4* moments = nullptr;   ///< [count, 2]: first moments, then second ones
   uint2* halves = nullptr;     ///< [count], the values rounded to four halves
   std::uint32_t count = 0;
+
+  [[nodiscard]] TableRowsCuda some(std::uint32_t first, std::uint32_t rows) const {
+    return {values + first, gradient + first, moments + 2 * std::size_t(first), halves + first, rows};
+  }
 };
 
 /// Updates the rows whose gradient is not zero, clears the gradient and rounds the values again.

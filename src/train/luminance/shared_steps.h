@@ -11,13 +11,7 @@ namespace cnerf {
 /// A rank's share of each step.
 [[nodiscard]] inline StepShare share_of(cluster::Ranks& ranks) {
   if (ranks.is_alone()) return {};
-  StepShare share{ranks.rank(), ranks.size(), [&ranks](std::span<float> values) { ranks.sum(values); }};
-  if (ranks.sums_on_devices()) {
-    share.sum_on_device = [&ranks](float* values, std::size_t count, void* stream) {
-      ranks.sum_on_device(values, count, stream);
-    };
-  }
-  return share;
+  return {ranks.rank(), ranks.size(), [&ranks](std::span<float> values) { ranks.sum(values); }, ranks.device_sums()};
 }
 
 /// What ranks have to be of one mind about between two steps.

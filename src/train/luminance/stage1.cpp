@@ -131,29 +131,42 @@ float brightest_pixel(const View& view) {
       loss, step, suspect->name, brightest_pixel(*suspect)));
 }
 
-constexpr long kStepsOfOneMind = 16;  // between two questions whether a rank wants to stop
+/// When ranks ask each other the time and whether one wants to stop: often enough for a person, and seldom enough not to
+/// hold steps up. The same on all ranks.
+long steps_to_next_question(const LuminanceModel& model) {
+  constexpr double kSecondsBetween = 0.25;
+  constexpr double kMostSteps = 64;
+  const double seconds_of_step = model.seconds / double(std::max(1L, model.engine->step_count()));
+  return long(std::clamp(kSecondsBetween / std::max(seconds_of_step, 1e-9), 1.0, kMostSteps));
+}
 
 /// What rank 0 saves, and all wait for.
 void save_snapshot_of(const LuminanceModel& model, const Stage1Job& job) {
+  model.engine->complete_state();
   if (job.ranks.is_first()) model.save(job.snapshot);
   job.ranks.barrier("snapshot of stage 1");
 }
 
-/// @param is_cancelled  by this rank's user
-/// @throws Interrupted  after saving, where any rank's user cancelled
-void stop_where_cancelled(LuminanceModel& model, const Stage1Job& job, bool is_cancelled) {
-  const long done = model.engine->step_count();
-  if (!job.ranks.is_alone()) {
-    if (job.options.max_seconds <= 0 && done % kStepsOfOneMind != 0) return;
-    const CommonMind mind = CommonMind{model.seconds, is_cancelled}.among(job.ranks);
+/// What a step that is done leaves to be agreed upon.
+class AgreedTime {
+ public:
+  /// @param own  the time by this rank's clock, and whether its user cancelled
+  /// @throws Interrupted  after saving, where any rank's user cancelled
+  void after_step(LuminanceModel& model, const Stage1Job& job, const CommonMind& own) {
+    const long done = model.engine->step_count();
+    if (!job.ranks.is_alone() && done < next_question_) return;
+    const CommonMind mind = job.ranks.is_alone() ? own : own.among(job.ranks);
     model.seconds = mind.seconds;
-    is_cancelled = mind.is_cancelled;
+    next_question_ = done + steps_to_next_question(model);
+    if (!mind.is_cancelled) return;
+    save_snapshot_of(model, job);
+    throw Interrupted("stopped at step " + std::to_string(done) + "; saved " + job.snapshot.string() +
+                      ", continue with --resume");
   }
-  if (!is_cancelled) return;
-  save_snapshot_of(model, job);
-  throw Interrupted("stopped at step " + std::to_string(done) + "; saved " + job.snapshot.string() +
-                    ", continue with --resume");
-}
+
+ private:
+  long next_question_ = 0;  // the step
+};
 
 /// Done so far, of the steps or of the time, whichever is nearer to its end.
 double fraction_done(const LuminanceModel& model, const Stage1Options& options) {
@@ -182,6 +195,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   model.engine->share_steps(share_of(job.ranks));
 
   TrainingClock clock;
+  AgreedTime agreed;
   const double seconds_before = model.seconds;
   const std::vector<const View*> shown = preview_views(job.capture);
   const DrawPreview preview = [&](std::size_t index) { return preview_of(model, *shown[index % shown.size()]); };
@@ -193,7 +207,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
     const StepReport step =
         model.engine->step(decayed_rate(options.learning_rate, options.final_learning_rate, fraction));
     model.trained_samples += double(step.trained_samples);
-    model.seconds = seconds_before + clock.seconds();
+    const double seconds = seconds_before + clock.seconds();
     rays += double(step.rays);
     psnr.add(step.squared_error);
     if (!std::isfinite(step.loss + step.squared_error)) {
@@ -210,7 +224,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
       if (job.watch) job.watch(model);
     });
 
-    stop_where_cancelled(model, job, observer.is_cancelled());
+    agreed.after_step(model, job, {seconds, observer.is_cancelled()});
     if (options.checkpoint_every > 0 && model.engine->step_count() % options.checkpoint_every == 0) {
       save_snapshot_of(model, job);
     }

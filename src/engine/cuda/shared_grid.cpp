@@ -1,0 +1,77 @@
+#include "src/engine/cuda/shared_grid.h"
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace cnerf {
+namespace {
+
+/// From the finest level to the coarsest, in parts of some million rows: sums of less are slow for what they are, and of
+/// more nothing goes on beside them.
+std::vector<LevelRange> parts_of(const std::vector<GridLevel>& levels) {
+  const std::uint32_t kRowsOfPart = std::getenv("CNERF_PART") ? std::uint32_t(std::atoi(std::getenv("CNERF_PART"))) : 1 << 21;
+  std::vector<LevelRange> parts;
+  std::uint32_t rows = kRowsOfPart;
+  for (std::size_t l = levels.size(); l-- > 0;) {
+    if (rows >= kRowsOfPart) {
+      parts.push_back({l, l + 1});
+      rows = 0;
+    }
+    parts.back().first = l;
+    rows += levels[l].rows;
+  }
+  return parts;
+}
+
+template <typename Value>
+std::span<std::byte> bytes_of(Value* first, std::size_t count) {
+  return std::as_writable_bytes(std::span(first, count));
+}
+
+}  // namespace
+
+SharedGrid::SharedGrid(const TrainedGrid& grid, const StepShare& share)
+    : grid_(grid), sums_(*share.on_device), piece_(share.part), pieces_(share.parts), parts_(parts_of(grid.levels())) {
+  // Levels have rows in eights: 2, 4 and 8 processes get equal pieces. Of other numbers each updates everything.
+  const auto divides = [&](const LevelRange& part) { return grid.rows(part).count % std::uint32_t(pieces_) == 0; };
+  if (!std::ranges::all_of(parts_, divides)) piece_ = 0, pieces_ = 1;
+}
+
+TableRowsCuda SharedGrid::own(const LevelRange& part) const {
+  const TableRowsCuda rows = grid_.rows(part);
+  const std::uint32_t count = rows.count / std::uint32_t(pieces_);
+  return rows.some(std::uint32_t(piece_) * count, count);
+}
+
+void SharedGrid::sum(const LevelRange& part, cudaStream_t stream) const {
+  const TableRowsCuda rows = grid_.rows(part);
+  const std::span<float> gradient(reinterpret_cast<float*>(rows.gradient), 4 * std::size_t(rows.count));
+  pieces_ > 1 ? sums_.sum_own_piece(gradient, stream) : sums_.sum(gradient, stream);
+}
+
+void SharedGrid::update(const LevelRange& part, const AdamStep* adam, cudaStream_t stream) const {
+  const TableRowsCuda rows = grid_.rows(part), own_rows = own(part);
+  grid_.update(own_rows, adam, stream);
+  // Others' pieces: what is there adds to no later gradient.
+  float4* const own_end = own_rows.gradient + own_rows.count;
+  for (const auto& [first, last] :
+       {std::pair(rows.gradient, own_rows.gradient), std::pair(own_end, rows.gradient + rows.count)}) {
+    if (first != last) CNERF_CUDA(cudaMemsetAsync(first, 0, std::size_t(last - first) * sizeof(float4), stream));
+  }
+}
+
+void SharedGrid::hand_round(const LevelRange& part, cudaStream_t stream) const {
+  const TableRowsCuda rows = grid_.rows(part);
+  if (pieces_ > 1) sums_.hand_round(bytes_of(rows.halves, rows.count), stream);
+}
+
+void SharedGrid::complete(cudaStream_t stream) const {
+  if (pieces_ == 1) return;
+  for (const LevelRange& part : parts_) {
+    const TableRowsCuda rows = grid_.rows(part);
+    sums_.hand_round(bytes_of(rows.values, rows.count), stream);
+    sums_.hand_round(bytes_of(rows.moments, 2 * std::size_t(rows.count)), stream);
+  }
+}
+
+}  // namespace cnerf
