@@ -91,7 +91,7 @@ class JoinedRanks::GuardedDeviceSums final : public DeviceSums {
   void sum(std::span<double> values, void* stream) override {
     ranks_.guarded([&] { sums().sum(values, stream); });
   }
-  void sum_own_piece(std::span<float> values, void* stream) override {
+  void sum_own_piece(std::span<Bfloat16> values, void* stream) override {
     ranks_.guarded([&] { sums().sum_own_piece(values, stream); });
   }
   void hand_round(std::span<std::byte> values, void* stream) override {

@@ -56,7 +56,7 @@ class FakeDeviceSums final : public DeviceSums {
     group_.sum(values);
   }
   void sum(std::span<double> values, void*) override { group_.sum(values); }
-  void sum_own_piece(std::span<float>, void*) override { throw std::runtime_error("connection reset"); }
+  void sum_own_piece(std::span<Bfloat16>, void*) override { throw std::runtime_error("connection reset"); }
   void hand_round(std::span<std::byte> values, void*) override { group_.broadcast(values, 1); }
 
  private:
@@ -87,7 +87,7 @@ TEST(Ranks, SumOnDevicesWhereTheChannelCan) {
       std::vector<std::byte> bytes = {std::byte(rank), std::byte(7)};
       sums.hand_round(bytes, nullptr);
       EXPECT_EQ(bytes, (std::vector<std::byte>{std::byte(1), std::byte(7)}));
-      EXPECT_THROW(sums.sum_own_piece(values, nullptr), RankError) << "what breaks is told in the ranks' words";
+      EXPECT_THROW(sums.sum_own_piece({}, nullptr), RankError) << "what breaks is told in the ranks' words";
       ranks.leave({});
     });
   }

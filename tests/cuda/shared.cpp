@@ -5,8 +5,8 @@
 // FOLDER is what pack_capture made; options are those of cnerf-cuda-check. Started alone it measures one GPU. Prints
 // how far the gradients of a step that is shared are from those of one that is not, whether all ranks hold the same
 // field, how long a step takes, and how good the field is. With `enlarge=N copies=M` training views are N times as wide
-// and high, and M times as many; `image_memory=MIB` bounds what of them lies on the GPU. `exchange=0` leaves out what the
-// GPUs exchange, which is how long a step would take if that took no time.
+// and high, and M times as many; `image_memory=MIB` bounds what of them lies on the GPU. `exchange=0` leaves out what
+// the GPUs exchange, which is how long a step would take if that took no time; started alone, it plays one of two.
 
 #include <algorithm>
 #include <chrono>
@@ -54,7 +54,7 @@ class NoExchange final : public DeviceSums {
  public:
   void sum(std::span<float>, void*) override {}
   void sum(std::span<double>, void*) override {}
-  void sum_own_piece(std::span<float>, void*) override {}
+  void sum_own_piece(std::span<Bfloat16>, void*) override {}
   void hand_round(std::span<std::byte>, void*) override {}
 };
 
@@ -107,7 +107,9 @@ int check_shared(const Arguments& arguments) {
   engine->set_views(views);
   StepShare share = share_of(ranks);
   NoExchange none;
-  if (!ranks.is_alone() && arguments.number("exchange", 1) == 0) share.on_device = &none;
+  if (arguments.number("exchange", 1) == 0) {
+    share = {ranks.rank(), std::max(2, ranks.size()), [](std::span<float>) {}, &none};
+  }
   engine->share_steps(share);
   const int steps = int(arguments.number("steps", 1000));
   for (int i = 0; i < steps; ++i) engine->step(float(1e-2 * std::pow(0.05, std::max(0.0, 2.0 * i / steps - 1))));
@@ -115,8 +117,12 @@ int check_shared(const Arguments& arguments) {
 
   constexpr int kTimed = 320;
   const auto start = Clock::now();
-  double samples = 0;
-  for (int i = 0; i < kTimed; ++i) samples += double(engine->step(5e-4f).trained_samples);
+  double samples = 0, rays = 0;
+  for (int i = 0; i < kTimed; ++i) {
+    const StepReport report = engine->step(5e-4f);
+    samples += double(report.trained_samples);
+    rays += double(report.rays);
+  }
   wait_for(*engine);
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   engine->complete_state();
@@ -128,9 +134,11 @@ int check_shared(const Arguments& arguments) {
     }
   }
   if (ranks.is_first()) {
-    std::printf("%d ranks: step %.3f ms = %.0f steps/s, %.0f samples a step, %.1f M samples/s; %.0f ranks differ\n",
-                ranks.size(), 1e3 * seconds / kTimed, kTimed / seconds, samples / kTimed, 1e-6 * samples / seconds,
-                different);
+    std::printf(
+        "%d ranks: step %.3f ms = %.0f steps/s, %.0f samples of %.0f rays a step, %.1f M samples/s; %.0f ranks "
+        "differ\n",
+        ranks.size(), 1e3 * seconds / kTimed, kTimed / seconds, samples / kTimed, rays / kTimed,
+        1e-6 * samples / seconds, different);
     double total = 0;
     const std::vector<HeldOutView> judged =
         Judge{packed.capture, packed.frame, *engine, options.march, {1e-3f}}.judge();

@@ -106,7 +106,7 @@ void gpu_update_rows(RowProblem& problem) {
   const DeviceBuffer<std::uint16_t> halves(problem.values.size(), "test");
   update_rows({as<float4>(values), as<float4>(gradient), as<float4>(moments), as<uint2>(halves),
                std::uint32_t(problem.values.size() / 4)},
-              step.data(), problem.decay, nullptr);
+              nullptr, step.data(), problem.decay, nullptr);
   CNERF_CUDA(cudaDeviceSynchronize());
   problem.values = values.downloaded();
   problem.moments = moments.downloaded();

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <barrier>
-#include <limits>
+#include <bit>
 #include <memory>
 #include <span>
 #include <vector>
@@ -46,13 +46,16 @@ class ThreadsExchange {
     OnDevice(ThreadsExchange& exchange, int part) : exchange_(exchange), part_(part) {}
     void sum(std::span<float> values, void* stream) override { sum_of(values, stream); }
     void sum(std::span<double> values, void* stream) override { sum_of(values, stream); }
-    void sum_own_piece(std::span<float> values, void* stream) override {
-      on_host(values, stream, [&](std::span<float> copy) {
-        exchange_.sum(part_, copy);
+    void sum_own_piece(std::span<Bfloat16> values, void* stream) override {
+      on_host(values, stream, [&](std::span<Bfloat16> copy) {
+        std::vector<float> sums(copy.size());
+        for (std::size_t i = 0; i < sums.size(); ++i) sums[i] = std::bit_cast<float>(std::uint32_t(copy[i].bits) << 16);
+        exchange_.sum(part_, std::span(sums));
         // What the others' pieces hold is not defined, so it is made worthless.
-        const std::span<float> own = piece_of(copy);
-        std::fill(copy.data(), own.data(), std::numeric_limits<float>::quiet_NaN());
-        std::fill(own.data() + own.size(), copy.data() + copy.size(), std::numeric_limits<float>::quiet_NaN());
+        std::ranges::fill(copy, Bfloat16{0x7fc0});
+        for (const float& sum : piece_of(std::span(sums))) {
+          copy[std::size_t(&sum - sums.data())].bits = std::uint16_t(std::bit_cast<std::uint32_t>(sum) >> 16);
+        }
       });
     }
     void hand_round(std::span<std::byte> values, void* stream) override {
@@ -91,9 +94,13 @@ class ThreadsExchange {
     ThreadsExchange& exchange_;
     int part_;
   };
-  std::unique_ptr<DeviceSums> device_sums(int part) { return std::make_unique<OnDevice>(*this, part); }
+  std::unique_ptr<DeviceSums> device_sums(int part) {
+    return std::make_unique<OnDevice>(*this, part);
+  }
 #else
-  static std::unique_ptr<DeviceSums> device_sums(int) { return nullptr; }
+  static std::unique_ptr<DeviceSums> device_sums(int) {
+    return nullptr;
+  }
 #endif
 
   std::vector<std::span<std::byte>> values_;

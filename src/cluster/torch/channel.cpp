@@ -133,9 +133,9 @@ class NcclSums final : public DeviceSums {
   void sum(std::span<double> values, void* stream) override {
     sum_of(values.data(), values.size(), at::kDouble, stream);
   }
-  void sum_own_piece(std::span<float> values, void* stream) override {
+  void sum_own_piece(std::span<Bfloat16> values, void* stream) override {
     const c10::cuda::CUDAStreamGuard guard = on(stream);
-    at::Tensor all = tensor_of(values.data(), values.size(), at::kFloat), own = own_piece_of(all);
+    at::Tensor all = tensor_of(values.data(), values.size(), at::kBFloat16), own = own_piece_of(all);
     group_->_reduce_scatter_base(own, all)->wait();
   }
   void hand_round(std::span<std::byte> values, void* stream) override {
@@ -181,7 +181,7 @@ extern "C" __attribute__((visibility("default"))) const cnerf::cluster::Channel*
         },
 #if CNERF_NCCL
         "LibTorch " TORCH_VERSION ": Gloo, NCCL",
-        [](const Launch& launch, Seconds limit) -> std::unique_ptr<DeviceSums> {
+        [](const Launch& launch, Seconds limit) -> std::unique_ptr<cnerf::DeviceSums> {
           return std::make_unique<NcclSums>(launch, limit);
         }
   };

@@ -181,6 +181,7 @@ void LuminanceStepCuda::launch_shared(const std::uint32_t* occupied) {
   const LevelRange* updated = nullptr;
   for (const LevelRange& part : shared_grid_->parts()) {
     field_.grid_backward(part, samples(), stream_);
+    shared_grid_->pack(part, stream_);
     follow(stream_, *sums_);
     shared_grid_->sum(part, *sums_);
     if (updated != nullptr) hand_round(*updated);  // while the next part, which is summed by then, is updated

@@ -1,15 +1,14 @@
 #include "src/engine/cuda/shared_grid.h"
 
 #include <algorithm>
-#include <cstdlib>
 
 namespace cnerf {
 namespace {
 
-/// From the finest level to the coarsest, in parts of some million rows: sums of less are slow for what they are, and of
-/// more nothing goes on beside them.
+/// From the finest level to the coarsest, in parts of some million rows: exchanges of less are slow for what they are,
+/// and of more nothing goes on beside them.
 std::vector<LevelRange> parts_of(const std::vector<GridLevel>& levels) {
-  const std::uint32_t kRowsOfPart = std::getenv("CNERF_PART") ? std::uint32_t(std::atoi(std::getenv("CNERF_PART"))) : 1 << 21;
+  constexpr std::uint32_t kRowsOfPart = 1 << 23;  // 2^21 and 2^22 are slower (docs/scale.md)
   std::vector<LevelRange> parts;
   std::uint32_t rows = kRowsOfPart;
   for (std::size_t l = levels.size(); l-- > 0;) {
@@ -35,6 +34,11 @@ SharedGrid::SharedGrid(const TrainedGrid& grid, const StepShare& share)
   // Levels have rows in eights: 2, 4 and 8 processes get equal pieces. Of other numbers each updates everything.
   const auto divides = [&](const LevelRange& part) { return grid.rows(part).count % std::uint32_t(pieces_) == 0; };
   if (!std::ranges::all_of(parts_, divides)) piece_ = 0, pieces_ = 1;
+  if (pieces_ > 1) packed_ = DeviceBuffer<uint2>(grid.rows(grid.all()).count, "what GPUs exchange of the hash grid");
+}
+
+uint2* SharedGrid::packed(const LevelRange& part) const {
+  return packed_.data() + grid_.levels()[part.first].first_row;
 }
 
 TableRowsCuda SharedGrid::own(const LevelRange& part) const {
@@ -43,21 +47,23 @@ TableRowsCuda SharedGrid::own(const LevelRange& part) const {
   return rows.some(std::uint32_t(piece_) * count, count);
 }
 
+void SharedGrid::pack(const LevelRange& part, cudaStream_t stream) const {
+  if (pieces_ > 1) pack_gradient(grid_.rows(part), packed(part), stream);
+}
+
 void SharedGrid::sum(const LevelRange& part, cudaStream_t stream) const {
   const TableRowsCuda rows = grid_.rows(part);
-  const std::span<float> gradient(reinterpret_cast<float*>(rows.gradient), 4 * std::size_t(rows.count));
-  pieces_ > 1 ? sums_.sum_own_piece(gradient, stream) : sums_.sum(gradient, stream);
+  const std::size_t numbers = 4 * std::size_t(rows.count);
+  if (pieces_ > 1) {
+    sums_.sum_own_piece({reinterpret_cast<Bfloat16*>(packed(part)), numbers}, stream);
+  } else {
+    sums_.sum(std::span(reinterpret_cast<float*>(rows.gradient), numbers), stream);
+  }
 }
 
 void SharedGrid::update(const LevelRange& part, const AdamStep* adam, cudaStream_t stream) const {
   const TableRowsCuda rows = grid_.rows(part), own_rows = own(part);
-  grid_.update(own_rows, adam, stream);
-  // Others' pieces: what is there adds to no later gradient.
-  float4* const own_end = own_rows.gradient + own_rows.count;
-  for (const auto& [first, last] :
-       {std::pair(rows.gradient, own_rows.gradient), std::pair(own_end, rows.gradient + rows.count)}) {
-    if (first != last) CNERF_CUDA(cudaMemsetAsync(first, 0, std::size_t(last - first) * sizeof(float4), stream));
-  }
+  grid_.update(own_rows, pieces_ > 1 ? packed(part) + (own_rows.values - rows.values) : nullptr, adam, stream);
 }
 
 void SharedGrid::hand_round(const LevelRange& part, cudaStream_t stream) const {

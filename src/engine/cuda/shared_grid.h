@@ -19,6 +19,8 @@ class SharedGrid {
   /// Levels whose gradient is found and summed at once, from the finest ones to the coarsest.
   [[nodiscard]] const std::vector<LevelRange>& parts() const { return parts_; }
   // In this order, each by all processes, of one part after another.
+  /// Rounds the gradient to bfloat16, since it takes longer to exchange than to find.
+  void pack(const LevelRange& part, cudaStream_t stream) const;
   void sum(const LevelRange& part, cudaStream_t stream) const;
   /// @param adam  device memory
   void update(const LevelRange& part, const AdamStep* adam, cudaStream_t stream) const;
@@ -29,11 +31,13 @@ class SharedGrid {
 
  private:
   [[nodiscard]] TableRowsCuda own(const LevelRange& part) const;
+  [[nodiscard]] uint2* packed(const LevelRange& part) const;
 
   const TrainedGrid& grid_;
   DeviceSums& sums_;
   int piece_, pieces_;
   std::vector<LevelRange> parts_;
+  DeviceBuffer<uint2> packed_;  // [rows] gradients, where each process updates a piece
 };
 
 }  // namespace cnerf

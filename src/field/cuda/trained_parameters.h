@@ -84,7 +84,7 @@ class TrainedGrid {
     backward(all(), places, samples, d_encoded, stream);
   }
   /// Adam on what has a gradient.  @param adam  device memory
-  void update(const AdamStep* adam, cudaStream_t stream) const { update(rows(all()), adam, stream); }
+  void update(const AdamStep* adam, cudaStream_t stream) const { update(rows(all()), nullptr, adam, stream); }
 
   // The same of some levels, whose gradient is then summed with that of other processes.
   [[nodiscard]] LevelRange all() const { return {0, levels_.size()}; }
@@ -94,8 +94,9 @@ class TrainedGrid {
   [[nodiscard]] std::span<float> gradient() const {  ///< device memory
     return {reinterpret_cast<float*>(d_table_.data()), 4 * std::size_t(total_rows(levels_))};
   }
-  void update(const TableRowsCuda& some, const AdamStep* adam, cudaStream_t stream) const {
-    update_rows(some, adam, decay_, stream);
+  /// @param packed  null: the rows' own gradient; else see `pack_gradient`
+  void update(const TableRowsCuda& some, const uint2* packed, const AdamStep* adam, cudaStream_t stream) const {
+    update_rows(some, packed, adam, decay_, stream);
   }
   void append_state(const std::string& prefix, std::vector<StatePiece>& state);
   void upload(cudaStream_t stream) const;

@@ -1,5 +1,7 @@
+#include <cuda_bf16.h>
 #include "encoding/cuda/hash_grid_device.cuh"
 #include "src/base/cuda/launch.h"
+
 #include "src/optim/cuda/row_adam_cuda.h"
 
 namespace cnerf {
@@ -7,11 +9,34 @@ namespace {
 
 constexpr unsigned kThreads = 128;
 
-__global__ void update(const TableRowsCuda rows, const AdamStep* adam, float decay) {
+__device__ bool is_zero(const float4& d) {
+  return d.x == 0 && d.y == 0 && d.z == 0 && d.w == 0;
+}
+
+/// A bfloat16 in the upper half of a word is the float.
+__device__ float4 unpacked(const uint2& packed) {
+  return make_float4(__uint_as_float(packed.x << 16), __uint_as_float(packed.x & 0xffff0000u),
+                     __uint_as_float(packed.y << 16), __uint_as_float(packed.y & 0xffff0000u));
+}
+__device__ std::uint32_t packed_pair(float low, float high) {
+  const __nv_bfloat162 pair = __floats2bfloat162_rn(low, high);
+  return std::uint32_t(__bfloat16_as_ushort(pair.x)) | std::uint32_t(__bfloat16_as_ushort(pair.y)) << 16;
+}
+
+__global__ void pack(const TableRowsCuda rows, uint2* packed) {
   const std::uint32_t row = blockIdx.x * kThreads + threadIdx.x;
   if (row >= rows.count) return;
   const float4 d = rows.gradient[row];
-  if (d.x == 0 && d.y == 0 && d.z == 0 && d.w == 0) return;
+  packed[row] = make_uint2(packed_pair(d.x, d.y), packed_pair(d.z, d.w));
+  if (!is_zero(d)) rows.gradient[row] = make_float4(0, 0, 0, 0);
+}
+
+/// @param packed  null: the rows' own gradient, which is cleared
+__global__ void update(const TableRowsCuda rows, const uint2* packed, const AdamStep* adam, float decay) {
+  const std::uint32_t row = blockIdx.x * kThreads + threadIdx.x;
+  if (row >= rows.count) return;
+  const float4 d = packed == nullptr ? rows.gradient[row] : unpacked(packed[row]);
+  if (is_zero(d)) return;
   const AdamStep step = *adam;
   const float kept = step.kept(decay);
   float4* moments = rows.moments + 2 * std::size_t(row);
@@ -23,7 +48,7 @@ __global__ void update(const TableRowsCuda rows, const AdamStep* adam, float dec
   rows.values[row] = value;
   moments[0] = first;
   moments[1] = second;
-  rows.gradient[row] = make_float4(0, 0, 0, 0);
+  if (packed == nullptr) rows.gradient[row] = make_float4(0, 0, 0, 0);
   rows.halves[row] = halves_of(value);
 }
 
@@ -34,8 +59,14 @@ __global__ void round(const TableRowsCuda rows) {
 
 }  // namespace
 
-void update_rows(const TableRowsCuda& rows, const AdamStep* adam, float decay, cudaStream_t stream) {
-  update<<<blocks_for(rows.count, kThreads), kThreads, 0, stream>>>(rows, adam, decay);
+void update_rows(const TableRowsCuda& rows, const uint2* packed, const AdamStep* adam, float decay,
+                 cudaStream_t stream) {
+  update<<<blocks_for(rows.count, kThreads), kThreads, 0, stream>>>(rows, packed, adam, decay);
+  CNERF_CUDA(cudaGetLastError());
+}
+
+void pack_gradient(const TableRowsCuda& rows, uint2* packed, cudaStream_t stream) {
+  pack<<<blocks_for(rows.count, kThreads), kThreads, 0, stream>>>(rows, packed);
   CNERF_CUDA(cudaGetLastError());
 }
 

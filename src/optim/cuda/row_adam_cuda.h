@@ -22,10 +22,14 @@ struct TableRowsCuda {
   }
 };
 
-/// Updates the rows whose gradient is not zero, clears the gradient and rounds the values again.
-/// @param adam   device memory
-/// @param decay  weight decay, in units of the learning rate
-void update_rows(const TableRowsCuda& rows, const AdamStep* adam, float decay, cudaStream_t stream);
+/// Updates the rows whose gradient is not zero and rounds the values again.
+/// @param packed  null: the rows' own gradient, which is cleared; else one that `pack_gradient` made, [rows.count]
+/// @param adam    device memory
+/// @param decay   weight decay, in units of the learning rate
+void update_rows(const TableRowsCuda& rows, const uint2* packed, const AdamStep* adam, float decay,
+                 cudaStream_t stream);
+/// Rounds the gradient to four bfloat16 per row, written to `packed`, and clears it.
+void pack_gradient(const TableRowsCuda& rows, uint2* packed, cudaStream_t stream);
 /// Only rounds the values.
 void round_rows(const TableRowsCuda& rows, cudaStream_t stream);
 

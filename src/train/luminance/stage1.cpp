@@ -131,8 +131,8 @@ float brightest_pixel(const View& view) {
       loss, step, suspect->name, brightest_pixel(*suspect)));
 }
 
-/// When ranks ask each other the time and whether one wants to stop: often enough for a person, and seldom enough not to
-/// hold steps up. The same on all ranks.
+/// When ranks ask each other the time and whether one wants to stop: often enough for a person, and seldom enough not
+/// to hold steps up. The same on all ranks.
 long steps_to_next_question(const LuminanceModel& model) {
   constexpr double kSecondsBetween = 0.25;
   constexpr double kMostSteps = 64;
