@@ -159,7 +159,9 @@ TEST(SharedStage1, GoesOnBitForBit) {
     EXPECT_THROW(train_stage1(job, cpu_engines(), observer), Interrupted);
   };
   on_ranks(2, stopped);
-  EXPECT_EQ(LuminanceModel::load(snapshot, cpu_engines()).engine->step_count(), 32);
+  const long stopped_at = LuminanceModel::load(snapshot, cpu_engines()).engine->step_count();
+  EXPECT_GE(stopped_at, 21);
+  EXPECT_LE(stopped_at, 21 + 16) << "ranks ask each other at least every 16 steps";
   on_ranks(2, [&](cluster::Ranks& ranks) { train(capture, snapshot, ranks, few_steps(), /*resume=*/true); });
   EXPECT_EQ(sha256_of_file(snapshot), whole);
 }

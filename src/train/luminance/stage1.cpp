@@ -135,7 +135,7 @@ float brightest_pixel(const View& view) {
 /// to hold steps up. The same on all ranks.
 long steps_to_next_question(const LuminanceModel& model) {
   constexpr double kSecondsBetween = 0.25;
-  constexpr double kMostSteps = 64;
+  constexpr double kMostSteps = 16;
   const double seconds_of_step = model.seconds / double(std::max(1L, model.engine->step_count()));
   return long(std::clamp(kSecondsBetween / std::max(seconds_of_step, 1e-9), 1.0, kMostSteps));
 }
