@@ -144,6 +144,7 @@ void JoinedRanks::meet(Store& store) {
   throw RankError(fmt::format("of {} processes by {}, these ranks did not come within {:.0f} s: {}", size(),
                               meeting_.launch.launcher, meeting_.limit.count(), missing));
 }
+
 void JoinedRanks::wait_for(const std::function<bool()>& is_there, const std::string& what, Seconds limit) {
   const Clock::time_point start = Clock::now();
   while (!guarded(is_there)) {

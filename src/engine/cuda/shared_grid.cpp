@@ -8,7 +8,7 @@ namespace {
 /// From the finest level to the coarsest, in parts of some million rows: exchanges of less are slow for what they are,
 /// and of more nothing goes on beside them.
 std::vector<LevelRange> parts_of(const std::vector<GridLevel>& levels) {
-  constexpr std::uint32_t kRowsOfPart = 1 << 23;  // 2^21 and 2^22 are slower (docs/scale.md)
+  constexpr std::uint32_t kRowsOfPart = 1 << 23;
   std::vector<LevelRange> parts;
   std::uint32_t rows = kRowsOfPart;
   for (std::size_t l = levels.size(); l-- > 0;) {
