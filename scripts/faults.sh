@@ -2,11 +2,12 @@
 # Disturbs the built program: failing, short and cut-off writes, power cuts, kills, two programs in one folder, no memory.
 #   bash scripts/faults.sh [--full]     about 3 minutes; in full, hours
 # Prints a table per campaign and fails where anything was violated; what was is kept in $FOLDER.
-# PROGRAM=path disturbs another cnerf, FOLDER=path works elsewhere, SEED=n draws otherwise.
+# PROGRAM=path disturbs another cnerf, FOLDER=path works elsewhere, SEED=n draws otherwise. PATIENCE=s is how long a
+# program may take [180]; a busy machine needs more.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 campaign=build/release/cnerf-fault-campaign
-options=(--folder "${FOLDER:-build/faults}" --seed "${SEED:-1}" -j 2)
+options=(--folder "${FOLDER:-build/faults}" --seed "${SEED:-1}" --patience "${PATIENCE:-180}" -j 2)
 if [ -n "${PROGRAM:-}" ]; then options+=(--program "$PROGRAM"); fi
 failures=0
 run() { "$campaign" "$@" "${options[@]}" || failures=$((failures + 1)); }

@@ -26,13 +26,16 @@ max_len() {
   case $1 in
     colorizer_weights | exr | image | stage1_snapshot | take_snapshot | vdb_file) echo 16384 ;;
     http) echo 4096 ;;
-    exif | gzip | network_contract | tensor_file | vdb_answer | bake_journal | spike_stream) echo 2048 ;;
+    exif | gzip | network_contract | tensor_file | vdb_answer | cluster_message | known_colors | bake_journal | spike_stream) echo 2048 ;;
     *) echo 8192 ;;
   esac
 }
 dictionary() {
   case $1 in
     transforms | run_record | take_record | bake_manifest | path_file | stage1_snapshot | take_snapshot | shown_bundle | vdb_answer) echo json ;;
+    strokes | known_colors | studio_message | layers_model) echo json ;;
+    photogrammetry) echo cameras ;;
+    cluster_message) echo launch ;;
     config | network_contract) echo toml ;;
     poses_bounds) echo npy ;;
     http) echo http ;;

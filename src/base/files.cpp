@@ -23,7 +23,9 @@ namespace {
 std::ifstream opened(const fs::path& file) {
   std::error_code failure;
   if (!fs::exists(file, failure)) throw MissingInputError(file.string() + ": no such file");
-  if (fs::is_directory(file, failure)) throw InputError(file.string() + ": is a folder, expected a file");
+  if (!fs::is_regular_file(file, failure)) {
+    throw InputError(file, "", "expected a file, found a folder, pipe or device");  // a pipe might never end
+  }
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(file.string() + ": cannot be opened");
   return in;

@@ -42,12 +42,15 @@ std::size_t held_pages_of_files() {
 class PhotographStore::File {
  public:
   File(const fs::path& folder, std::size_t most) : most_(most), others_(held_pages_of_files()) {
-    const fs::path place = (folder.empty() ? fs::temp_directory_path() : folder) / "photographs.XXXXXX";
-    std::string name = place.string();
-    number_.reset(::mkostemp(name.data(), O_CLOEXEC));
-    if (number_.number() < 0) throw OutputError(name + ": " + std::strerror(errno) + kAdvice);
-    ::unlink(name.c_str());
-    name_ = name;
+    const fs::path place = folder.empty() ? fs::temp_directory_path() : folder;
+    name_ = place.string() + ": a file for photographs";
+    number_.reset(::open(place.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600));  // a kill leaves nothing
+    if (number_.number() < 0 && errno == EOPNOTSUPP) {                           // on some network shares
+      std::string name = (place / "photographs.XXXXXX").string();
+      number_.reset(::mkostemp(name.data(), O_CLOEXEC));
+      if (number_.number() >= 0) ::unlink(name.c_str());
+    }
+    if (number_.number() < 0) throw OutputError(name_ + ": " + std::strerror(errno) + kAdvice);
     guard_ = std::thread([this] { guard(); });
   }
   ~File() {

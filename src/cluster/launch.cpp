@@ -10,12 +10,13 @@ namespace cnerf::cluster {
 namespace {
 
 constexpr int kFirstPort = 20000, kPorts = 10000;  // below those that systems give away themselves
+constexpr int kLastPort = 65535, kMostProcesses = 1 << 20;
 
 int parsed(const std::string& name, const std::string& text) {
   int value = 0;
   const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (problem != std::errc() || end != text.data() + text.size() || value < 0) {
-    throw UsageError("$" + name + ": expected a whole number, found '" + text + "'");
+  if (problem != std::errc() || end != text.data() + text.size() || value < 0 || value > kMostProcesses) {
+    throw UsageError("$" + name + ": expected a whole number up to 2^20, found '" + text + "'");
   }
   return value;
 }
@@ -112,9 +113,13 @@ std::optional<Launch> find_launch(const GetVariable& variable) {
   if (!launch) launch = by_open_mpi(variable);
   if (!launch) launch = by_slurm(variable);
   if (!launch || launch->size == 1) return std::nullopt;
-  if (launch->size < 1 || launch->rank >= launch->size) {
+  if (launch->size < 1 || launch->local_size < 1 || launch->rank >= launch->size) {
     throw UsageError(launch->launcher + ": rank " + std::to_string(launch->rank) + " of " +
-                     std::to_string(launch->size) + " processes is none");
+                     std::to_string(launch->size) + " processes, " + std::to_string(launch->local_size) +
+                     " on its machine, is none");
+  }
+  if (launch->port < 1 || launch->port > kLastPort) {
+    throw UsageError("$MASTER_PORT: expected 1 to 65535, found " + std::to_string(launch->port));
   }
   if (launch->host.empty()) {
     throw UsageError(launch->launcher +

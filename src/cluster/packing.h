@@ -44,7 +44,7 @@ class Unpacker {
   template <typename Value>
   Unpacker& get(std::vector<Value>& values) {
     static_assert(std::is_trivially_copyable_v<Value>);
-    values.resize(size());
+    values.resize(size(sizeof(Value)));
     return get_bytes(values.data(), values.size() * sizeof(Value));
   }
   Unpacker& get(std::string& text) {
@@ -53,10 +53,10 @@ class Unpacker {
   }
 
  private:
-  std::size_t size() {
+  std::size_t size(std::size_t of_each = 1) {
     std::size_t size = 0;
     get(size);
-    CNERF_CHECK(size <= rest_.size(), "packed by the same program");
+    CNERF_CHECK(size <= rest_.size() / of_each, "packed by the same program");
     return size;
   }
   Unpacker& get_bytes(void* to, std::size_t size) {

@@ -69,7 +69,8 @@ void read_shards(const Json& group, LayersModel& model, std::string& hashes) {
       throw InputError(model.file, "paths", "expected the name of a file beside it, found " + excerpt(path));
     }
     const fs::path shard = model.file.parent_path() / name;
-    if (!fs::is_regular_file(shard))
+    std::error_code failure;  // a name too long for the file system is of no file
+    if (!fs::is_regular_file(shard, failure))
       throw MissingInputError(shard.string() + ": missing; " + model.file.string() + " names it");
     if (fs::file_size(shard) > kMostBytes - model.bytes.size()) {
       throw InputError(shard, "", "expected at most 1 GiB in all shards");

@@ -16,7 +16,7 @@ Picture curve_picture(std::span<const double> values, std::optional<double> leve
   cv::Mat paper(height, width, CV_8UC3, picture.rgb.data());
   paper.setTo(kPaper);
   if (values.empty()) return picture;
-  auto [least, most] = std::ranges::minmax(values);
+  double least = std::ranges::min(values), most = std::ranges::max(values);
   if (level) least = std::min(least, *level), most = std::max(most, *level);
   const double span = most > least ? most - least : 1;
   const auto row = [&](double value) {

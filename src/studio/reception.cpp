@@ -16,6 +16,7 @@
 #include "src/base/error.h"
 #include "src/base/file_descriptor.h"
 #include "src/base/files.h"
+#include "src/base/text.h"
 #include "src/pipeline/prepare_step.h"
 #include "src/prepare/prepare.h"
 #include "src/studio/board_observer.h"
@@ -56,7 +57,7 @@ fs::path checked_name(const std::string& name) {
   const bool is_plain = std::ranges::all_of(name, [](unsigned char c) {
     return std::isalnum(c) != 0 || c >= 0x80 || std::string_view(" ._-()+,/").find(char(c)) != std::string_view::npos;
   });
-  if (!is_plain) refuse("expected letters, digits and ._-()+, only");
+  if (!is_plain || !is_utf8(name)) refuse("expected letters, digits and ._-()+, only, in UTF-8");
   if (name.find("//") != std::string::npos) refuse("a part of it is empty");
   const fs::path path(name);
   std::size_t parts = 0;

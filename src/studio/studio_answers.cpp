@@ -403,16 +403,16 @@ PageAnswer Studio::add_painted(const PageRequest& request, std::optional<int> vi
   }
   const std::lock_guard lock(mutex_);
   if (auto why = board_.become_writer(request.client)) return *why;
-  write_file(painted_.file(name), request.body);
   StrokeList list = strokes_;
+  if (list.strokes.size() >= kMostStrokes) throw InputError("strokes", "", "there are too many strokes already");
   if (of.view == nullptr && std::ranges::find(list.viewpoints, of.viewpoint) == list.viewpoints.end()) {
     throw MissingInputError("view: it is gone");
   }
+  write_file(painted_.file(name), request.body);
   Stroke stroke{.id = "p" + name + std::to_string(list.revision), .view = of.name(), .kind = "picture"};
   stroke.picture = name;
   stroke.painted = painted_.find(name);
   list.strokes.push_back(std::move(stroke));
-  if (list.strokes.size() > kMostStrokes) throw InputError("strokes", "", "there are too many strokes already");
   save(std::move(list));
   return {.status = 202, .body = board_.text()};
 }

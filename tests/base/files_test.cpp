@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <stdexcept>
@@ -139,6 +140,14 @@ TEST(Files, MissingFileAndFolderAreNamed) {
     EXPECT_EQ(error.exit_code(), ExitCode::kMissingInput);
   }
   EXPECT_THROW((void)read_binary_file(folder.path()), InputError);
+}
+
+TEST(Files, WhatMayNeverEndIsNotRead) {
+  const test::TempDir folder;
+  EXPECT_THROW((void)read_binary_file("/dev/null"), InputError);
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  EXPECT_THROW((void)read_text_file(folder / "pipe"), InputError);
+  EXPECT_THROW((void)sha256_of_file(folder / "pipe"), InputError);
 }
 
 TEST(Files, Sha256OfKnownVectors) {  // FIPS 180-4, examples

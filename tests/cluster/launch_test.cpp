@@ -103,6 +103,9 @@ TEST(Launch, NonsenseIsRefused) {
   EXPECT_THROW(launch_of(with(kTorchrun, "RANK", "first")), UsageError);
   EXPECT_THROW(launch_of(with(kTorchrun, "MASTER_ADDR", "")), UsageError);
   EXPECT_THROW(launch_of(with(kTorchrun, "MASTER_PORT", "")), UsageError);
+  EXPECT_THROW(launch_of(with(kTorchrun, "MASTER_PORT", "65536")), UsageError);
+  EXPECT_THROW(launch_of(with(kTorchrun, "LOCAL_WORLD_SIZE", "0")), UsageError) << "threads are divided by it";
+  EXPECT_THROW(launch_of(with(kSlurm, "SLURM_LOCALID", "2147483647")), UsageError);
 }
 
 TEST(Launch, FirstHostOfAList) {

@@ -93,6 +93,18 @@ TEST(Ranks, SumOnDevicesWhereTheChannelCan) {
   }
 }
 
+/// A message is of the same program, or of nobody; it never takes more memory than it has bytes.
+TEST(Ranks, AMessageOfAnotherProgramIsRefused) {
+  struct Terabytes {
+    std::byte values[std::size_t(1) << 44];
+  };
+  const Bytes message = Packer().add(std::size_t(8)).add(std::uint64_t(0)).packed();
+  std::vector<Terabytes> values;
+  EXPECT_THROW(Unpacker(message).get(values), ContractError);
+  std::vector<double> numbers;
+  EXPECT_THROW(Unpacker(message).get(numbers), ContractError);
+}
+
 TEST(Ranks, AloneNothingIsShared) {
   std::vector<std::size_t> taken;
   share_out(

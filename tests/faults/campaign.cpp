@@ -30,9 +30,13 @@ int main(int argc, char** argv) {
   app.add_option("--kinds", options.kinds, "Of operations: only eio, enospc, edquot, short, kill, power, power-names")
       ->delimiter(',');
   app.add_option("--memory-code", options.out_of_memory, "Exit codes that mean out of memory [69,71]")->delimiter(',');
+  int patience = int(options.subject.patience.count());
+  app.add_option("--patience", patience, "Seconds after which a program hangs; more on a busy machine")
+      ->capture_default_str();
   app.add_option("-j,--jobs", options.jobs, "Trials at a time")->check(CLI::Range(1, 7));
   CLI11_PARSE(app, argc, argv);
   const std::string campaign = app.get_option("CAMPAIGN")->as<std::string>();
+  options.subject.patience = std::chrono::seconds(patience);
   if (options.count == 0) options.count = campaign == "kills" ? 500 : 200;
   try {
     options.subject.program = std::filesystem::absolute(options.subject.program);

@@ -115,6 +115,8 @@ std::vector<Command> Fixtures::commands() const {
         (folder_ / "model").string(), "--threads", "1"},
        {"capture"}},
       {"train", "", joined({"train", capture, "-o", "@/run"}, tiny()), {"run"}},
+      // Photographs that are too much for the memory they may take lie in a file of no name.
+      {"train-in-file", "", joined({"train", capture, "-o", "@/run", "--image-memory", "4k"}, tiny()), {"run"}},
       {"colorize", "run", joined({"colorize", "@/run", "--take", "t", "--colorizer", kColorizer}, kOneThread), {"run"}},
       {"bake", "take", joined(bake("vdb"), {"--nvdb"}), {"run", "bake/volume.vdb"}},
       {"web", "take", joined(bake("web"), {"--web-resolution", "24"}), {"run"}},

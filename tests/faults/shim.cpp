@@ -394,12 +394,13 @@ bool changes_files(int flags) {
 
 template <typename Real>
 int counted_open(int folder, const char* name, int flags, const Real& real) {
-  if (!changes_files(flags) || (flags & O_TMPFILE) == O_TMPFILE || (flags & O_DIRECTORY) != 0) return real();
+  const bool is_nameless = (flags & O_TMPFILE) == O_TMPFILE;  // a new file in the folder `name`, of no name
+  if (!changes_files(flags) || (!is_nameless && (flags & O_DIRECTORY) != 0)) return real();
   const auto path = counted_path(folder, name);
   if (!path) return real();
   const Turn turn;
   struct stat before {};
-  const bool was_there = ::lstat(path->c_str(), &before) == 0;
+  const bool was_there = !is_nameless && ::lstat(path->c_str(), &before) == 0;
   const Decision decision = decide(What::kCreate, 0, *path);
   if (decision.error != 0 &&
       !(was_there && decision.error != EIO)) {  // a file that is there can be opened on a full disk
@@ -408,7 +409,7 @@ int counted_open(int folder, const char* name, int flags, const Real& real) {
   }
   const int file = real();
   if (file >= 0 && keeps_record()) {
-    if (!was_there) unsynced().created(*path);
+    if (!was_there && !is_nameless) unsynced().created(*path);
     if (!was_there || (flags & O_TRUNC) != 0) unsynced().file_changes(file, true);
   }
   return file;

@@ -13,6 +13,7 @@
 #include "src/base/files.h"
 #include "src/capture/exr_io.h"
 #include "tests/capture/fixtures.h"
+#include "tests/mutants/program_captures.h"
 #include "tests/support/onnx_model.h"
 
 namespace cnerf::mutants {
@@ -138,6 +139,19 @@ void sign_volume(const fs::path& bake) {
   write_file(manifest, json.dump(2));
 }
 
+/// What somebody painted on a view, and at a viewpoint.
+constexpr const char* kStrokes = R"({
+ "revision": 3, "everywhere": true,
+ "strokes": [
+  {"id": "s1", "view": "view_000", "kind": "paint", "color": "#c08040", "word": "jacket", "size": 0.2,
+   "softness": 0.5, "reach": 1, "points": [[0.1, 0.2, 1], [0.6, 0.7, 0.5]]},
+  {"id": "s2", "view": "door", "kind": "exact", "size": 0.1, "points": [[0.5, 0.5, 1]]},
+  {"id": "s3", "view": "view_000", "kind": "erase", "size": 0.05, "hidden": false, "points": [[0.3, 0.4, 1]]}],
+ "viewpoints": [
+  {"name": "door", "position": [0, -3, 1], "rotation": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+   "lens": {"width": 24, "height": 16, "fx": 20, "fy": 20, "cx": 12, "cy": 8}}]
+})";
+
 Words reading(const char* command, const Words& options) {
   return joined({command}, joined(options, quiet()));
 }
@@ -169,6 +183,7 @@ void add_captures(const Workshop& workshop, std::vector<Kind>& kinds) {
                    Format::kPlain, steps});
   kinds.push_back({"EXR image", capture_with_image(folder / "exr", "exr", write_exr), "images/0.exr", false,
                    Format::kPlain, steps});
+  add_program_captures(folder / "programs", steps, kinds);
 }
 
 void add_runs(const Workshop& workshop, std::vector<Kind>& kinds) {
@@ -180,6 +195,7 @@ void add_runs(const Workshop& workshop, std::vector<Kind>& kinds) {
                         least_options()));
   fs::copy_file(capture / "transforms.json", stage / "path.json");
   fs::copy_file(run / "config.toml", stage / "options.toml");
+  write_file(stage / "strokes.json", kStrokes);
 
   const Step info{reading("info", {"{}/run"}), ""};
   const auto info_of = [](const std::string& file) { return Step{reading("info", {"{}/" + file}), ""}; };
@@ -197,6 +213,11 @@ void add_runs(const Workshop& workshop, std::vector<Kind>& kinds) {
   const auto add = [&](const char* name, const char* file, bool is_text, Format format, std::vector<Step> steps) {
     kinds.push_back({name, stage, file, is_text, format, std::move(steps)});
   };
+  const Step painting{joined(reading("colorize", {"{}/run", "--take", "new", "--colorizer", "grey", "--device", "cpu",
+                                                  "--strokes", "{}/strokes.json"}),
+                             least_options()),
+                      ""};
+  add("strokes.json", "strokes.json", true, Format::kPlain, {painting});
   add("stage1.snapshot", "run/stage1.snapshot", false, Format::kSnapshot,
       {info_of("run/stage1.snapshot"), rendering({})});
   add("take.snapshot", "run/takes/grey/take.snapshot", false, Format::kSnapshot,

@@ -487,6 +487,25 @@ TEST_F(StudioTest, APaintedPictureBecomesAStroke) {
   }
 }
 
+TEST_F(StudioTest, WhereThereAreTooManyStrokesNoPictureIsKept) {
+  open();
+  std::vector<json> many(kMostStrokes, stroke("a", 0.5, 0.5));
+  for (std::size_t i = 0; i < many.size(); ++i) many[i]["id"] = "s" + std::to_string(i);
+  ASSERT_EQ(put(many, json::parse(get("strokes").body)["revision"]).status, 200);
+  const View& view = context_.capture.views[1];
+  cv::Mat painted(view.image.height, view.image.width, CV_8UC4, cv::Scalar(0, 0, 0, 0));
+  painted(cv::Rect(0, 0, 7, 5)).setTo(cv::Scalar(30, 200, 20, 255));
+  std::vector<std::uint8_t> png;
+  cv::imencode(".png", painted, png);
+  const std::string bytes(png.begin(), png.end());
+  const std::string name = sha256(std::as_bytes(std::span(bytes))).substr(0, 12) + ".png";
+  const PageAnswer refused =
+      studio_->answer({"POST", "/studio/pictures", {{"kind", "stroke"}, {"view", "1"}}, kPainter, {}, bytes});
+  EXPECT_EQ(refused.status, 400) << refused.body;
+  EXPECT_THAT(refused.body, HasSubstr("too many"));
+  EXPECT_FALSE(fs::exists(context_.directory.root() / "strokes/painted" / name));
+}
+
 TEST_F(StudioTest, ViewpointsHavePicturesOfTheFieldAndNumbersAfterTheViews) {
   open();
   EXPECT_EQ(json::parse(get("strokes").body)["viewpoints"], json::array());

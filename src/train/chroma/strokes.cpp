@@ -141,12 +141,13 @@ PaintedPicture painted_picture(const LinearImage& image, const fs::path& name) {
 
 std::shared_ptr<const PaintedPicture> PaintedPictures::find(const std::string& picture) {
   const std::lock_guard lock(mutex_);
-  std::shared_ptr<const PaintedPicture>& found = read_[picture];
-  if (!found) {
+  auto found = read_.find(picture);
+  if (found == read_.end()) {
     const fs::path from = file(picture);
-    found = std::make_shared<PaintedPicture>(painted_picture(read_linear_image(from, Transfer::kSrgb), from));
+    auto painted = std::make_shared<PaintedPicture>(painted_picture(read_linear_image(from, Transfer::kSrgb), from));
+    found = read_.emplace(picture, std::move(painted)).first;
   }
-  return found;
+  return found->second;
 }
 
 StrokeList strokes_of_json(std::string_view text, const fs::path& file, const PaintableViews& views,
