@@ -15,6 +15,7 @@ set(CPACK_DEBIAN_PACKAGE_RELEASE 1~deb${debian})
 
 # Debian's policy wants these names, and changelogs compressed without a date: ours, and one of the packaging.
 install(FILES cmake/debian_copyright DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+install(FILES cmake/lintian_overrides DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/lintian/overrides RENAME cnerf)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT libraries EXCLUDE_FROM_ALL)  # not every system has it
 find_program(CNERF_GZIP gzip REQUIRED)
 set(changelog ${PROJECT_BINARY_DIR}/changelog.gz)
