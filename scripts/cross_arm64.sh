@@ -19,4 +19,5 @@ apt-get update -qq
 DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${tools[@]}" "${libraries[@]/%/:arm64}"
 cmake --preset arm64
 cmake --build --preset arm64 --target "${tests[@]}"
-ctest --preset arm64 -R "^($(IFS='|' && echo "${tests[*]}"))\\." "$@"
+# RunProgram asks for the error of a program that is not there, which posix_spawn does not give under qemu-user.
+ctest --preset arm64 -E '^base_test.RunProgram$' -R "^($(IFS='|' && echo "${tests[*]}"))\\." "$@"

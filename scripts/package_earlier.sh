@@ -19,6 +19,7 @@ if(NOT TARGET cnerf-vdb-reader)
 endif()
 include(cmake/packages.cmake)
 END
+mkdir -p "$tree/build/package/share/cnerf" && ln -sfn ../../viewer/page "$tree/build/package/share/cnerf/viewer"  # where it is looked for
 # The script may end with an error once packages stand: a program of then names the folder it was built in.
 (cd "$tree" && CNERF_CUDA=OFF bash scripts/package.sh deb) || true
 cp "$tree"/build/package/packages/cnerf_*.deb build/package/earlier/
