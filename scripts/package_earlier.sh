@@ -10,7 +10,7 @@ mkdir -p "$tree" build/package/earlier
 git archive "$commit" | tar -x -C "$tree"
 
 today=(CHANGELOG.md CMakePresets.json scripts/package.sh scripts/bill_of_materials.pl scripts/install_dependencies.sh
-  cmake/packages.cmake cmake/package_kinds.cmake cmake/debian_copyright)
+  cmake/packages.cmake cmake/package_kinds.cmake cmake/debian_copyright cmake/lintian_overrides)
 tar -c "${today[@]}" | tar -x -C "$tree"
 sed -i 's/^include(cmake\/toolchain.cmake)/set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME program)\n&/' "$tree/CMakeLists.txt"
 cat >> "$tree/CMakeLists.txt" << 'END'
