@@ -100,7 +100,7 @@ for stage in "${stages[@]}"; do
     blender) command=(env TARGETS=blender_test bash scripts/test.sh -L blender) ;;
     arm64) command=(bash scripts/cross_arm64.sh) ;;
     package | archive) command=(bash scripts/try_package.sh "$(basename "$built")") ;;
-    upgrade) command=(bash -c "scripts/try_package.sh '$(basename "$built")' earlier/*.deb") ;;
+    upgrade) command=(bash -c "bash scripts/try_package.sh '$(basename "$built")' earlier/*.deb") ;;
     *) echo "$0: no stage '$stage'" >&2; exit 64 ;;
   esac
   begin=$SECONDS
