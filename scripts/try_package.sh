@@ -48,7 +48,8 @@ upgrade() {
 }
 
 remove() {
-  quietly purge --autoremove cnerf
+  # Also what apt keeps because something that was there before merely suggests it.
+  quietly purge --autoremove -o APT::AutoRemove::SuggestsImportant=false -o APT::AutoRemove::RecommendsImportant=false cnerf
   list_files > "$work/files_after"
   packages > "$work/packages_after"
   diff "$work/packages_before" "$work/packages_after" && echo "purged: the same packages as before"
