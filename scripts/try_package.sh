@@ -44,7 +44,6 @@ upgrade() {
   cnerf bake "$work/old-run" -o "$work/new-bake" --progress quiet
   cnerf colorize "$work/old-run" --take new --colorizer builtin --progress quiet
   ls -l "$work"/old-run/bakes/*/volume.vdb "$work/new-bake/volume.vdb"
-  cnerf info "$work"/old-run/bakes/*
 }
 
 remove() {
