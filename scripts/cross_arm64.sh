@@ -13,11 +13,12 @@ libraries=(libopenvdb-dev libboost-iostreams-dev libnanovdb-dev libopencv-dev li
   zlib1g-dev libcpp-httplib-dev libgtest-dev libgmock-dev libbenchmark-dev)
 tests=(base_test color_test picture_test capture_test sample_test encoding_test optim_test field_test render_test engine_test
   cnerf-backend-ops bake_test export_test config_test viewer_test)
+programs=(cnerf-vdb-reader)  # which tests start
 
 dpkg --add-architecture arm64
 apt-get update -qq
 DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${tools[@]}" "${libraries[@]/%/:arm64}"
 cmake --preset arm64
-cmake --build --preset arm64 --target "${tests[@]}"
+cmake --build --preset arm64 --target "${tests[@]}" "${programs[@]}"
 # RunProgram asks for the error of a program that is not there, which posix_spawn does not give under qemu-user.
 ctest --preset arm64 -E '^base_test.RunProgram$' -R "^($(IFS='|' && echo "${tests[*]}"))\\." "$@"
