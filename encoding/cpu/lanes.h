@@ -1,7 +1,7 @@
 #pragma once
-/// SIMD lanes. Included by per-ISA files only, which define CNERF_ISA (generic, neon, avx2, avx512) as the namespace that
-/// everything here lives in: an inline function shared between files of different instruction sets would be one symbol
-/// for the linker, compiled twice, and the baseline program could end up with the AVX-512 copy.
+/// SIMD lanes. Included by per-ISA files only, which define CNERF_ISA (generic, neon, avx2, avx512) as the namespace
+/// that everything here lives in: an inline function shared between files of different instruction sets would be one
+/// symbol for the linker, compiled twice, and the baseline program could end up with the AVX-512 copy.
 ///
 /// Lane types are classes, not vector typedefs: typedefs of different namespaces mangle alike and are not found by
 /// argument-dependent lookup.
