@@ -15,7 +15,9 @@ set(CPACK_DEBIAN_PACKAGE_RELEASE 1~deb${debian})
 
 # Debian's policy wants these names, and changelogs compressed without a date: ours, and one of the packaging.
 install(FILES cmake/debian_copyright DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+install(FILES cmake/lintian_overrides DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/lintian/overrides RENAME cnerf)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT libraries EXCLUDE_FROM_ALL)  # not every system has it
+find_program(CNERF_GZIP gzip REQUIRED)
 set(changelog ${PROJECT_BINARY_DIR}/changelog.gz)
 set(changelog_of_packaging ${PROJECT_BINARY_DIR}/changelog.Debian.gz)
 add_custom_command(OUTPUT ${changelog} COMMAND ${CNERF_GZIP} -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md > ${changelog}
@@ -74,16 +76,12 @@ endif()
 
 # What the archive holds beside the program: the shared libraries it links, without the C library and a GPU's driver.
 # Programs have an RPATH rather than a RUNPATH, so that these libraries find each other too.
-set(plugins cnerf_images cnerf_videos cnerf_torch)
-if(CNERF_COMPARE)
-  list(APPEND plugins cnerf_compare_torch)
-endif()
-if(TARGET cnerf_onnxruntime)
-  list(APPEND plugins cnerf_onnxruntime)
-endif()
-if(TARGET cnerf_cluster_plugin)
-  list(APPEND plugins cnerf_cluster_plugin)
-endif()
+set(plugins "")
+foreach(name cnerf_images cnerf_videos cnerf_torch cnerf_compare_torch cnerf_onnxruntime cnerf_cluster_plugin)
+  if(TARGET ${name})
+    list(APPEND plugins ${name})
+  endif()
+endforeach()
 list(TRANSFORM plugins REPLACE "(.+)" "$<TARGET_FILE:\\1>")
 list(JOIN plugins " " plugins)
 install(CODE "

@@ -176,14 +176,23 @@ function(cnerf_precompile_torch name)
   target_precompile_headers(${name} REUSE_FROM cnerf_torch_header)
 endfunction()
 
-# cnerf_compile_per_isa(GENERIC AVX2 AVX512): instruction sets of three files that include one kernel text.
+# cnerf_compile_per_isa(NAME PREFIX): adds to a library the files PREFIX_ISA.cpp, which include one kernel text, for the
+# instruction sets of the processor's family.
 # No contraction: an fma stands where the source says fma, so that back ends can be compared bit by bit.
-function(cnerf_compile_per_isa generic avx2 avx512)
-  set(common -O3 -fno-math-errno -fno-trapping-math -ffp-contract=off)
-  set_source_files_properties(${generic} PROPERTIES COMPILE_OPTIONS "${common}")
-  set_source_files_properties(${avx2} PROPERTIES COMPILE_OPTIONS "${common};-mavx2;-mfma;-mtune=haswell")
-  set_source_files_properties(${avx512} PROPERTIES
-    COMPILE_OPTIONS "${common};-mavx512f;-mavx512dq;-mavx512vl;-mavx512bw;-mfma;-mtune=haswell;-Wno-uninitialized")  # GCC 105593
+function(cnerf_compile_per_isa name prefix)
+  set(options_generic "")
+  set(options_neon "")
+  set(options_avx2 -mavx2 -mfma -mtune=haswell)
+  set(options_avx512 -mavx512f -mavx512dq -mavx512vl -mavx512bw -mfma -mtune=haswell -Wno-uninitialized)  # GCC 105593
+  set(sets generic avx2 avx512)
+  if(CMAKE_SYSTEM_PROCESSOR STREQUAL "aarch64")
+    set(sets generic neon)
+  endif()
+  foreach(set ${sets})
+    target_sources(${name} PRIVATE ${prefix}_${set}.cpp)
+    set_source_files_properties(${prefix}_${set}.cpp PROPERTIES
+      COMPILE_OPTIONS "-O3;-fno-math-errno;-fno-trapping-math;-ffp-contract=off;${options_${set}}")
+  endforeach()
 endfunction()
 
 # cnerf_add_cuda_library(NAME SOURCES … [PUBLIC …]): like cnerf_add_library, of kernels and their launchers.

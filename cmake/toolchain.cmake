@@ -26,6 +26,9 @@ target_compile_options(cnerf_options INTERFACE
 if(CNERF_WARNINGS_AS_ERRORS)
   target_compile_options(cnerf_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Werror>)
 endif()
+if(CNERF_PACKAGE)  # checks name their source file, without the folder it was compiled in
+  target_compile_options(cnerf_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=>)
+endif()
 if(CNERF_SANITIZE)
   # GCC takes what a sanitizer adds for uninitialised (GCC 105562).
   target_compile_options(cnerf_options INTERFACE

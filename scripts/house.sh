@@ -71,6 +71,7 @@ row "definitions of is_forward_facing" "$(code 'bool is_forward_facing\(.*\{' "$
 row "files that encode pictures" "$(files_with '\bim(encode|write)\(' "${product[@]}" | wc -l)" 1
 row "files that read JSON records field by field" \
   "$(sources "${product[@]}" | xargs grep -cE '\.at\("[a-z_0-9]+"\)\.get|\.value\("[a-z_0-9]+",' | awk -F: '$2 > 3 { n++ } END { print n + 0 }')" 1
+row "records of decisions" "$(find docs/decisions -name '*.md' ! -name README.md | wc -l)" 12
 sizes=$(sources "${product[@]}" | grep -vE 'kernels\.inl$' | xargs perl scripts/functions.pl)
 row "functions of more than 60 lines, kernels excepted" "$(awk '$1 > 60' <<< "$sizes" | wc -l)" 0
 row "functions of more than 6 parameters, kernels excepted" "$(awk '$2 > 6' <<< "$sizes" | wc -l)" 0

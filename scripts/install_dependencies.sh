@@ -16,7 +16,7 @@ packages=(
   libtbb-dev libssl-dev zlib1g-dev libcpp-httplib-dev
   pybind11-dev python3-dev python3-numpy  # the Python module
   libgtest-dev libgmock-dev libbenchmark-dev
-  dpkg-dev binutils perl  # packages: which libraries a program needs
+  dpkg-dev binutils file perl  # packages: which libraries a program needs
 )
 if [[ "$(. /etc/os-release && echo "${VERSION_ID%%.*}")" -ge 13 ]]; then
   packages+=(libonnxruntime-dev)  # runs onnx: networks; Debian 12 has none, and OpenCV does

@@ -2,7 +2,7 @@
 # Builds everything with warnings as errors and runs every test.
 #   bash scripts/test.sh [ctest options]     e.g. -L smoke, -L unit, -R Config
 # Ends with CTest's summary, where a test is a suite; the number of cases and why some were skipped stand before it.
-# BUILD=no runs the tests of what is built.
+# BUILD=no runs the tests of what is built; TARGETS="one two" builds these alone, for tests of them.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 build=build/release
@@ -13,7 +13,8 @@ if [ "${BUILD:-yes}" = yes ]; then
   if command -v nvcc > /dev/null; then cuda=ON; fi  # compiled wherever it can be; running it needs a GPU
   cmake --preset release -DCNERF_TESTS=ON -DCNERF_WARNINGS_AS_ERRORS=ON -DCNERF_CUDA=$cuda -DCNERF_VIEWER=ON \
         -DCMAKE_CUDA_ARCHITECTURES="80-virtual;90"
-  cmake --build --preset release
+  read -ra targets <<< "${TARGETS:-all}"
+  cmake --build --preset release --target "${targets[@]}"
 fi
 
 # The counts that tests/support/gtest_main.cpp leaves, in a file per suite.

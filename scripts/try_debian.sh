@@ -4,8 +4,13 @@
 #   scripts/try_debian.sh 12|13 [packages|demo|tests]...      stages to run; demo and tests if not given
 # Each stage begins with scripts/install_dependencies.sh, apt included. $CNERF_DATA, if set, is mounted read-only for the
 # tests. The root stays, so that a later call goes on in it; FRESH=1 makes it anew.
+#   scripts/try_debian.sh 12|13 build      builds the packages in the root, by scripts/package.sh, into build/package/packages
+#   scripts/try_debian.sh 12|13 blender    the tests with Blender alone
+# These have roots of their own:
 #   scripts/try_debian.sh 12|13 package|archive      takes what scripts/package.sh built for that Debian to a root that has
 #                                                    nothing else, runs the sample to a volume and removes it
+#   scripts/try_debian.sh 12|13 upgrade    the same from the package in build/package/earlier (scripts/package_earlier.sh)
+#   scripts/try_debian.sh 12|13 arm64      cross-builds for arm64 and tests under qemu-user, by scripts/cross_arm64.sh
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -13,7 +18,7 @@ release=${1:-}
 case $release in
   12) suite=bookworm ;;
   13) suite=trixie ;;
-  *) sed -n '2,9p' "$0" >&2; exit 64 ;;
+  *) sed -n '2,14p' "$0" >&2; exit 64 ;;
 esac
 shift
 stages=("$@")
@@ -21,7 +26,10 @@ if [ ${#stages[@]} -eq 0 ]; then stages=(demo tests); fi
 [ "$EUID" -eq 0 ] || { echo "$0: needs root for chroot and mount" >&2; exit 77; }
 
 root=${ROOTS:-/var/tmp}/cnerf-debian-$release
-case ${stages[*]} in package | archive) root+=-package ;; esac  # where nothing is installed that building needs
+case ${stages[*]} in
+  package | archive | upgrade) root+=-package ;;  # where nothing is installed that building needs
+  arm64) root+=-arm64 ;;                          # where libraries are another machine's
+esac
 tree=/home/cnerf
 mounts=()
 release_mounts() {
@@ -71,13 +79,14 @@ mkdir -p "$root$tree"
 git archive HEAD | tar -x -C "$root$tree"
 
 case ${stages[*]} in
-  package) built=$(ls build/package/packages/cnerf_*~deb"$release"_*.deb 2> /dev/null || true) ;;
+  package | upgrade) built=$(ls build/package/packages/cnerf_*~deb"$release"_*.deb 2> /dev/null || true) ;;
   archive) built=$(ls build/package/packages/cnerf-*.tar.gz 2> /dev/null || true) ;;
   *) built= ;;
 esac
 if [[ $root == *-package ]]; then
   [ -e "$built" ] || { echo "$0: nothing built for Debian $release; run scripts/package.sh on it" >&2; exit 66; }
   cp "$built" "$root$tree/"
+  case ${stages[*]} in upgrade) mkdir "$root$tree/earlier" && cp build/package/earlier/cnerf_*~deb"$release"_*.deb "$root$tree/earlier/" ;; esac
 fi
 
 declare -A outcome=([packages]=- [demo]=- [tests]=-)
@@ -87,7 +96,11 @@ for stage in "${stages[@]}"; do
     packages) command=(bash scripts/install_dependencies.sh) ;;
     demo) command=(bash scripts/demo.sh) ;;
     tests) command=(bash scripts/test.sh) ;;
+    build) command=(bash scripts/package.sh deb) ;;
+    blender) command=(env TARGETS=blender_test bash scripts/test.sh -L blender) ;;
+    arm64) command=(bash scripts/cross_arm64.sh) ;;
     package | archive) command=(bash scripts/try_package.sh "$(basename "$built")") ;;
+    upgrade) command=(bash -c "bash scripts/try_package.sh '$(basename "$built")' earlier/*.deb") ;;
     *) echo "$0: no stage '$stage'" >&2; exit 64 ;;
   esac
   begin=$SECONDS
@@ -96,8 +109,12 @@ for stage in "${stages[@]}"; do
   outcome[$stage]="$verdict, $(as_minutes $((SECONDS - begin)))"
   echo "Debian $release: $stage ${outcome[$stage]}; $root-$stage.log" >&2
   tail -n 4 "$root-$stage.log" >&2
+  if [ "$stage" = build ] && [ "$verdict" = passes ]; then
+    mkdir -p build/package/packages
+    cp "$root$tree"/build/package/packages/*.deb build/package/packages/
+  fi
 done
-if [[ $root == *-package ]]; then exit $failures; fi
+if [[ $root == *-@(package|arm64) ]]; then exit $failures; fi
 
 version_of() { chroot "$root" dpkg-query -W -f '${Version}' "$1" 2> /dev/null | sed 's/^[0-9]*://; s/[-+~].*//' || true; }
 echo "| Debian | g++ | CMake | LibTorch | OpenCV | COLMAP | Blender | node | packages | demo | tests |"

@@ -61,6 +61,9 @@ struct TileKernels {
 namespace generic {
 extern const TileKernels kTileKernels;
 }
+namespace neon {
+extern const TileKernels kTileKernels;
+}
 namespace avx2 {
 extern const TileKernels kTileKernels;
 }
@@ -70,7 +73,11 @@ extern const TileKernels kTileKernels;
 
 /// The kernels of `active_isa()`.
 [[nodiscard]] inline const TileKernels& tile_kernels() {
-  return kernels_of_isa(generic::kTileKernels, avx2::kTileKernels, avx512::kTileKernels);
+  if constexpr (kHasNeon) {
+    return kernels_of_isa(generic::kTileKernels, neon::kTileKernels);
+  } else {
+    return kernels_of_isa(generic::kTileKernels, avx2::kTileKernels, avx512::kTileKernels);
+  }
 }
 
 }  // namespace cnerf::bake

@@ -34,6 +34,9 @@ struct HashGridKernels {
 namespace generic {
 extern const HashGridKernels kHashGridKernels;
 }
+namespace neon {
+extern const HashGridKernels kHashGridKernels;
+}
 namespace avx2 {
 extern const HashGridKernels kHashGridKernels;
 }
@@ -43,7 +46,11 @@ extern const HashGridKernels kHashGridKernels;
 
 /// The kernels of `active_isa()`.
 [[nodiscard]] inline const HashGridKernels& hash_grid_kernels() {
-  return kernels_of_isa(generic::kHashGridKernels, avx2::kHashGridKernels, avx512::kHashGridKernels);
+  if constexpr (kHasNeon) {
+    return kernels_of_isa(generic::kHashGridKernels, neon::kHashGridKernels);
+  } else {
+    return kernels_of_isa(generic::kHashGridKernels, avx2::kHashGridKernels, avx512::kHashGridKernels);
+  }
 }
 
 }  // namespace cnerf

@@ -1,7 +1,7 @@
 #pragma once
-/// SIMD lanes. Included by per-ISA files only, which define CNERF_ISA (generic, avx2, avx512) as the namespace that
-/// everything here lives in: an inline function shared between files of different instruction sets would be one symbol
-/// for the linker, compiled twice, and the baseline program could end up with the AVX-512 copy.
+/// SIMD lanes. Included by per-ISA files only, which define CNERF_ISA (generic, neon, avx2, avx512) as the namespace
+/// that everything here lives in: an inline function shared between files of different instruction sets would be one
+/// symbol for the linker, compiled twice, and the baseline program could end up with the AVX-512 copy.
 ///
 /// Lane types are classes, not vector typedefs: typedefs of different namespaces mangle alike and are not found by
 /// argument-dependent lookup.
@@ -11,6 +11,8 @@
 
 #if defined(__AVX512F__) || defined(__FMA__)
 #include <immintrin.h>
+#elif defined(CNERF_NEON)  // arm64 has it without a compiler's option, in the generic file too
+#include <arm_neon.h>
 #endif
 
 #ifndef CNERF_ISA
@@ -80,6 +82,8 @@ inline Lanes fma(Lanes a, Lanes b, Lanes c) {
   return Lanes(Lanes::Raw(_mm512_fmadd_ps(__m512(a.raw), __m512(b.raw), __m512(c.raw))));
 #elif defined(__FMA__)
   return Lanes(Lanes::Raw(_mm256_fmadd_ps(__m256(a.raw), __m256(b.raw), __m256(c.raw))));
+#elif defined(CNERF_NEON)
+  return Lanes(Lanes::Raw(vfmaq_f32(float32x4_t(c.raw), float32x4_t(a.raw), float32x4_t(b.raw))));
 #else
   return a * b + c;
 #endif
@@ -115,6 +119,8 @@ struct Row4 {
 inline Row4 fma(float weight, Row4 row, Row4 sum) {
 #if defined(__FMA__) || defined(__AVX512F__)
   return {Row4::Raw(_mm_fmadd_ps(_mm_set1_ps(weight), __m128(row.raw), __m128(sum.raw)))};
+#elif defined(CNERF_NEON)
+  return {Row4::Raw(vfmaq_n_f32(float32x4_t(sum.raw), float32x4_t(row.raw), weight))};
 #else
   return {row.raw * weight + sum.raw};
 #endif

@@ -10,7 +10,7 @@ namespace cnerf::app {
 
 /// What the pages say of their making.
 struct ManualEdition {
-  std::string version;  ///< "0.1.0"
+  std::string version;  ///< "1.0.0"
   std::string date;     ///< "2024-05-31"
 };
 

@@ -2,22 +2,20 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <string_view>
 
 namespace cnerf {
 namespace {
 
 IsaLevel level_from_environment() {
   const char* value = std::getenv("CNERF_ISA");
-  if (value == nullptr) return IsaLevel::kAvx512;
-  if (std::string_view(value) == "generic") return IsaLevel::kGeneric;
-  if (std::string_view(value) == "avx2") return IsaLevel::kAvx2;
-  return IsaLevel::kAvx512;
+  const auto* named = std::ranges::find(kIsaLevels, std::string(value != nullptr ? value : ""), to_string);
+  return named != kIsaLevels.end() ? *named : kIsaLevels.back();
 }
 
 }  // namespace
 
 IsaLevel detected_isa() {
+  if (kHasNeon) return IsaLevel::kNeon;  // as all of its family
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
       __builtin_cpu_supports("avx512bw")) {
@@ -39,6 +37,8 @@ std::string to_string(IsaLevel level) {
       return "avx512";
     case IsaLevel::kAvx2:
       return "avx2";
+    case IsaLevel::kNeon:
+      return "neon";
     case IsaLevel::kGeneric:
       break;
   }

@@ -44,7 +44,7 @@ bool is_utf8(std::string_view text) {
 std::string printable(std::string text) {
   for (char& c : text) {
     if (c == '\r') c = '\n';
-    const bool is_control = (c >= 0 && c < ' ') || c == 0x7F;
+    const bool is_control = static_cast<unsigned char>(c) < ' ' || c == 0x7F;
     if (is_control && c != '\n' && c != '\t') c = '?';
   }
   return text;

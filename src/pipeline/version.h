@@ -5,7 +5,7 @@
 
 namespace cnerf::pipeline {
 
-/// "0.1.0", by semantic versioning.
+/// "1.0.0", by semantic versioning.
 [[nodiscard]] std::string version_text();
 
 }  // namespace cnerf::pipeline

@@ -12,7 +12,7 @@ namespace cnerf::test {
 
 inline std::vector<IsaLevel> available_isas() {
   std::vector<IsaLevel> levels;
-  for (const IsaLevel level : {IsaLevel::kGeneric, IsaLevel::kAvx2, IsaLevel::kAvx512}) {
+  for (const IsaLevel level : kIsaLevels) {
     if (level <= detected_isa()) levels.push_back(level);
   }
   return levels;

@@ -28,6 +28,9 @@ struct MlpKernels {
 namespace generic {
 extern const MlpKernels kMlpKernels;
 }
+namespace neon {
+extern const MlpKernels kMlpKernels;
+}
 namespace avx2 {
 extern const MlpKernels kMlpKernels;
 }
@@ -37,7 +40,11 @@ extern const MlpKernels kMlpKernels;
 
 /// The kernels of `active_isa()`.
 [[nodiscard]] inline const MlpKernels& mlp_kernels() {
-  return kernels_of_isa(generic::kMlpKernels, avx2::kMlpKernels, avx512::kMlpKernels);
+  if constexpr (kHasNeon) {
+    return kernels_of_isa(generic::kMlpKernels, neon::kMlpKernels);
+  } else {
+    return kernels_of_isa(generic::kMlpKernels, avx2::kMlpKernels, avx512::kMlpKernels);
+  }
 }
 
 }  // namespace cnerf

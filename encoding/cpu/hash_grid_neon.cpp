@@ -1,0 +1,3 @@
+#define CNERF_ISA neon
+#define CNERF_NEON
+#include "encoding/cpu/hash_grid_kernels.inl"

@@ -1,0 +1,3 @@
+#define CNERF_ISA neon
+#define CNERF_NEON
+#include "src/field/cpu/mlp_kernels.inl"
