@@ -76,6 +76,41 @@ TEST(Evaluate, AColouredSceneIsComparedWithTruthAndBake) {
   EXPECT_NEAR(metrics.colorfulness_difference.value(), 0, 1e-9);
 }
 
+TEST(Evaluate, FeaturesOfAllViewsMakeOneDistance) {
+  /// The mean of each channel, in each region alike but for a little that tells regions apart.
+  struct Means final : PictureEncoder {
+    [[nodiscard]] std::vector<float> regions(std::span<const std::uint8_t> rgb, int width, int height) const override {
+      std::vector<float> all;
+      for (int region = 0; region < kRegions * kRegions; ++region) {
+        for (std::size_t c = 0; c < 3; ++c) all.push_back(float(rgb[c]) + float(region % 2));
+      }
+      EXPECT_EQ(rgb.size(), std::size_t(width) * std::size_t(height) * 3);
+      return all;
+    }
+  };
+  const PaintedScene scene(linear_from_srgb(0.3f), true);
+  const Capture capture = grey_capture(3, 2);
+  const Means encoder;
+  EvaluateOptions options;
+  options.encoder = &encoder;
+  EXPECT_FALSE(evaluate(scene, capture, options).feature_distance) << "no view has a truth";
+
+  Metrics metrics;
+  for (const int view : {0, 1}) {
+    ViewMetrics one;
+    one.features_ours = encoder.regions(std::vector<std::uint8_t>{10, 20, 30}, 1, 1);
+    one.features_truth = encoder.regions(std::vector<std::uint8_t>{13, 20, 26}, 1, 1);
+    one.view = std::to_string(view);
+    metrics.views.push_back(one);
+  }
+  summarise(metrics);
+  ASSERT_TRUE(metrics.feature_distance);
+  EXPECT_NEAR(*metrics.feature_distance, 9 + 16, 1e-6) << "the means differ alone";
+  EXPECT_TRUE(metrics.views[0].features_ours.empty());
+  EXPECT_EQ(record_of<Metrics>(nlohmann::ordered_json::parse(json_of(metrics).dump()), "m").feature_distance,
+            metrics.feature_distance);
+}
+
 TEST(Evaluate, MaskedPixelsDoNotCount) {
   Capture capture = grey_capture(2, 1);
   View& view = capture.views[0];
