@@ -7,7 +7,9 @@
 #include "src/base/check.h"
 #include "src/base/json_record.h"
 #include "src/color/colorspace_math.h"
+#include "src/picture/encode.h"
 #include "tests/evaluate/painted_scene.h"
+#include "tests/support/data.h"
 
 namespace cnerf {
 namespace {
@@ -89,11 +91,21 @@ TEST(Evaluate, FeaturesOfAllViewsMakeOneDistance) {
     }
   };
   const PaintedScene scene(linear_from_srgb(0.3f), true);
-  const Capture capture = grey_capture(3, 2);
+  const test::TempDir folder;
+  Capture capture = grey_capture(3, 2);
+  for (View& view : capture.views) {
+    view.image_file = folder / (view.name + ".png");
+    Picture truth{kWidth, kHeight, {}};
+    for (int i = 0; i < kWidth * kHeight; ++i) truth.rgb.insert(truth.rgb.end(), {90, 140, 60});
+    write_png(view.image_file, truth);
+  }
   const Means encoder;
   EvaluateOptions options;
+  EXPECT_FALSE(evaluate(scene, capture, options).feature_distance);
   options.encoder = &encoder;
-  EXPECT_FALSE(evaluate(scene, capture, options).feature_distance) << "no view has a truth";
+  const Metrics measured = evaluate(scene, capture, options);
+  ASSERT_TRUE(measured.feature_distance);
+  EXPECT_GT(*measured.feature_distance, 100) << "it is painted red";
 
   Metrics metrics;
   for (const int view : {0, 1}) {
