@@ -207,7 +207,7 @@ TEST(TextLoss, IsARowOfAComparison) {
   plan.seeds = {1};
   plan.text = SmallPair(folder.path()).guide;
   Observer observer;
-  Run run(plan, config, observer);
+  compare::Run run(plan, config, observer);
   run.run();
   run.write_report();
   const auto row = nlohmann::json::parse(read_text_file(folder / "report/table.json"))["tables"][0]["rows"][0];
