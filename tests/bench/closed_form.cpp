@@ -104,7 +104,8 @@ class VoxelColors final : public ColorBinEngine {
                                            std::size_t voxels) const {
     std::vector<double> sums(voxels, 0.0);
     for (std::size_t p = 0; p < pixels.size(); ++p) {
-      for (std::size_t s = offsets_[p]; s < offsets_[p + 1]; ++s) sums[cells[s]] += weights_[p] * shares_[s] * pixels[p];
+      for (std::size_t s = offsets_[p]; s < offsets_[p + 1]; ++s)
+        sums[cells[s]] += weights_[p] * shares_[s] * pixels[p];
     }
     return sums;
   }
@@ -238,7 +239,8 @@ int bench(int argc, char** argv) {
   compare::HeldOutPixels pixels(views_to_evaluate(context.capture, {}), luminance.frame, 20000);
   pixels.trace(*luminance.engine, luminance.march());
   ViewCache views;
-  const Bench rows{context, engines, luminance, pixels, views, spec, directory.root() / "closed-form" / "take.snapshot"};
+  const Bench rows{
+      context, engines, luminance, pixels, views, spec, directory.root() / "closed-form" / "take.snapshot"};
   fmt::print("held-out ab error; grey has {:.2f}\n", pixels.ab_error(VoxelColors(), 0));
   fmt::print("| answers | gradient descent | least squares |\n|---|---|---|\n");
   for (const std::string& count : split(counts, ',')) rows.row(std::stoi(count));
