@@ -18,7 +18,7 @@ captures=("$data/scenes/fox@4" "$data/scenes/flower@8" "$data/scenes/lego")
 settings=(--config "$root/configs/compare.toml" --lpips-weights "$data/lpips/lpips_alex_f32.bin" --resume --progress plain)
 if [ "$colorizer" = builtin ]; then settings+=(--colorizer builtin); fi
 colors=colornerf,colornerf-paper,without-purification,without-classification,colorize-then-fuse,video-then-fuse
-colors+=,style-transfer,grey,oracle
+colors+=,multi-scale-teacher,key-view-distilled,style-transfer,grey,oracle
 mkdir -p "$report/runs" "$report/logs"
 # The GPUs that may be used, one a line.
 if [ -n "${CUDA_VISIBLE_DEVICES+set}" ]; then

@@ -8,16 +8,8 @@ set -euo pipefail
 
 out=$1
 shift
-root=$(cd "$(dirname "$0")/.." && pwd)
-scenes=${CNERF_DATA:-$root/../shared/data}/scenes
-cnerf=${CNERF:-$root/build/release/cnerf}
 if [ $# -eq 0 ]; then set -- sample lego fox flower fruit; fi
-mkdir -p "$out"
-
-# Folder and options of a capture. The sample's own split holds out views of one side alone.
-declare -A folder=([sample]=$out/sample-capture [lego]=$scenes/lego [fox]=$scenes/fox [flower]=$scenes/flower [fruit]=$scenes/fruit)
-declare -A options=([sample]='--holdout 5' [lego]='--downscale 2' [fox]='--downscale 4 --holdout 8'
-  [flower]='--downscale 8 --holdout 8' [fruit]='--downscale 2 --holdout 8')
+source "$(dirname "$0")/small_captures.sh"
 
 # The photograph of a view, in colour.
 photograph() {  # photograph CAPTURE VIEW
@@ -37,11 +29,7 @@ judge() {  # judge CAPTURE TAKE VIEW
 }
 
 for name in "$@"; do
-  if [ "$name" = sample ] && [ ! -e "${folder[sample]}" ]; then "$cnerf" sample -o "${folder[sample]}" --progress quiet; fi
-  if ! grep -qs '"finished": true' "$out/$name/run.json"; then
-    # shellcheck disable=SC2086  # options are words
-    "$cnerf" train "${folder[$name]}" -o "$out/$name" --preset quick ${options[$name]} --overwrite --progress quiet
-  fi
+  train_small "$name"
   # Of the uncoloured scene: no take's doubts.
   "$cnerf" colorize "$out/$name" --suggest-keyframes 1 --take grey --progress quiet
   read -r middle suggested < <(python3 -c '

@@ -1,5 +1,8 @@
 /// cnerf compare: the paper's table, its baselines and ablations.
 
+#include <algorithm>
+#include <functional>
+
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
 #include "src/base/error.h"
@@ -19,10 +22,25 @@ namespace {
 struct CompareArguments {
   ConfigArguments config;
   std::vector<std::string> captures, ratings;
-  std::string out, methods = "all", lpips_weights, style_reference;
+  std::string out, methods = "all", lpips_weights, style_reference, clip, clip_text;
   int seeds = 1, first_seed = 1;
   bool rating_sheet = false, resume = false, overwrite = false, only_report = false;
 };
+
+/// @throws UsageError  only a part of it was given
+TextGuide text_guide_of(const CompareArguments& arguments) {
+  if (arguments.clip.empty() && arguments.clip_text.empty()) return {};
+  const std::size_t comma = arguments.clip.find(',');
+  if (comma == std::string::npos || arguments.clip_text.empty()) {
+    throw UsageError("--clip: expected IMAGE.pt,TEXT.pt, and a text by --clip-text; got \"" + arguments.clip +
+                     "\" and \"" + arguments.clip_text + "\"");
+  }
+  TextGuide guide{arguments.clip.substr(0, comma), arguments.clip.substr(comma + 1), arguments.clip_text};
+  for (const fs::path& file : {guide.image_encoder, guide.text_encoder}) {
+    if (!fs::exists(file)) throw MissingInputError("--clip: " + file.string() + ": no such file");
+  }
+  return guide;
+}
 
 void run_comparison(CompareArguments arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
@@ -45,6 +63,10 @@ void run_comparison(CompareArguments arguments, const std::vector<std::string>& 
   for (int i = 0; i < arguments.seeds; ++i) plan.seeds.push_back(arguments.first_seed + i);
   plan.lpips_weights = arguments.lpips_weights;
   plan.style_reference = arguments.style_reference;
+  plan.text = text_guide_of(arguments);
+  // Nobody has its networks but who names them.
+  if (arguments.methods == "all" && plan.text.text.empty())
+    std::erase_if(plan.methods, std::mem_fn(&Method::follows_text));
   plan.command_line = joined(command_line);
   // Parts with other seeds may run side by side.
   const auto mode = arguments.overwrite ? FolderLock::Mode::kAlone : FolderLock::Mode::kShared;
@@ -80,6 +102,8 @@ Work declare_compare(CLI::App& app) {
   add_colorizer_options(app, arguments->config);
   app.add_option("--style-reference", arguments->style_reference,
                  "Image whose style is transferred [the middle training view, coloured by the colorizer]");
+  app.add_option("--clip", arguments->clip, "Encoders of images and of texts as TorchScript, IMAGE.pt,TEXT.pt");
+  app.add_option("--clip-text", arguments->clip_text, "What the method clip-nerf makes pictures look like");
   add_short_form(app, arguments->config, "--downscale", "capture.downscale");
   add_short_form(app, arguments->config, "--holdout", "capture.holdout");
   app.add_flag("--resume", arguments->resume, "Go on with a comparison; what is finished and unchanged stays");

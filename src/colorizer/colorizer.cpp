@@ -3,6 +3,7 @@
 #include "src/base/error.h"
 #include "src/base/plugin.h"
 #include "src/colorizer/kinds.h"
+#include "src/colorizer/layers_model.h"
 
 namespace cnerf {
 namespace {
@@ -95,6 +96,10 @@ std::unique_ptr<Colorizer> make_colorizer(const ColorizerOptions& options, const
     return kind.make({argument, options, context});
   }
   refuse_spec(options.spec);
+}
+
+std::unique_ptr<PictureEncoder> make_picture_encoder() {
+  return is_encoder_installed() ? torch_colorizers().encoder() : nullptr;
 }
 
 std::string torch_version() {

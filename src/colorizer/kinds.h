@@ -5,6 +5,7 @@
 #include <string>
 
 #include "src/colorizer/colorizer.h"
+#include "src/colorizer/picture_encoder.h"
 
 namespace cnerf {
 
@@ -25,12 +26,13 @@ MakeColorizer make_caffe_colorizer;        ///< `PROTO,MODEL`: a Caffe network, 
 /// `COMMAND`: any program that speaks the pipe protocol of docs/colorizers.md. `{prompt}` in it becomes the prompt.
 MakeColorizer make_exec_colorizer;
 
-/// What libcnerf_torch.so offers: the colorizers that need LibTorch.
+/// What libcnerf_torch.so offers: the colorizers that need LibTorch, and the encoder.
 struct TorchColorizers {
   MakeColorizer* builtin;
   MakeColorizer* reference;
   MakeColorizer* torchscript;
-  const char* version;  ///< of LibTorch
+  decltype(make_picture_encoder)* encoder;  ///< where it is installed
+  const char* version;                      ///< of LibTorch
 };
 
 /// What libcnerf_onnxruntime.so offers; builds without ONNX Runtime have no such plug-in.

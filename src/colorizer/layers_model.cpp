@@ -1,6 +1,7 @@
 #include "src/colorizer/layers_model.h"
 
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 
 #include "src/base/error.h"
@@ -187,6 +188,20 @@ LayersModel read_layers_model(const fs::path& folder) {
   }
   model.sha256 = sha256(std::as_bytes(std::span(hashes)));
   return model;
+}
+
+fs::path encoder_folder() {
+  if (const char* named = std::getenv("CNERF_ENCODER")) return named;
+  if (const char* data = std::getenv("XDG_DATA_HOME"); data != nullptr && *data != '\0') {
+    return fs::path(data) / "cnerf" / "encoder";
+  }
+  const char* home = std::getenv("HOME");
+  return home == nullptr ? fs::path() : fs::path(home) / ".local" / "share" / "cnerf" / "encoder";
+}
+
+bool is_encoder_installed() {
+  const fs::path folder = encoder_folder();
+  return !folder.empty() && fs::exists(folder / "model.json");
 }
 
 }  // namespace cnerf

@@ -38,6 +38,10 @@ struct LayersModel {
 ///                            the weights; naming file, field and value.
 [[nodiscard]] LayersModel read_layers_model(const std::filesystem::path& folder);
 
+/// Where the optional encoder, ResNet-50, is looked for: $CNERF_ENCODER, else the user's data folder.
+[[nodiscard]] std::filesystem::path encoder_folder();
+[[nodiscard]] bool is_encoder_installed();
+
 /// "[3, 3, 64, 64]"
 [[nodiscard]] std::string shape_text(const std::vector<std::int64_t>& shape);
 

@@ -39,6 +39,7 @@ void begin_report(const fs::path& folder, ExistingReport existing) {
 
 Run::Run(Plan plan, Config config, Observer& observer)
     : plan_(std::move(plan)), config_(std::move(config)), observer_(observer), engines_(engines_for(config_.device)) {
+  if (!plan_.only_report) encoder_ = make_picture_encoder();
   if (!plan_.lpips_weights.empty()) lpips_ = std::make_unique<Lpips>(plan_.lpips_weights);
   if (config_.colorizer.spec.starts_with(std::string(kSimulated) + ":")) {
     throw UsageError("colorizer \"" + config_.colorizer.spec + "\": simulated takes nothing after it");
@@ -75,7 +76,7 @@ fs::path Run::folder_of(const Subject& subject, int seed) const {
 std::vector<Cell> Run::make_cells(const Subject& subject, int seed) const {
   const FolderLock lock(folder_of(subject, seed));
   remove_leftovers(folder_of(subject, seed), kDeepestCell);
-  const Bench bench{plan_, config_, engines_, lpips_.get(), observer_};
+  const Bench bench{plan_, config_, engines_, lpips_.get(), encoder_.get(), observer_};
   SeedRun seed_run(bench, subject, seed, folder_of(subject, seed));
   seed_run.train();
   std::vector<Cell> cells;

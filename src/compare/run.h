@@ -56,6 +56,7 @@ class Run {
   Observer& observer_;
   const Engines& engines_;
   std::unique_ptr<Lpips> lpips_;
+  std::unique_ptr<PictureEncoder> encoder_;
   std::vector<std::unique_ptr<const Subject>> subjects_;
   std::vector<Cell> cells_;
 };

@@ -55,6 +55,13 @@ void begin_folder(const fs::path& folder, const std::string& settings) {
   write_file(folder / "settings.txt", settings);
 }
 
+/// What decides a text's loss.
+std::string text_of(const TextGuide& guide) {
+  return guide.text.empty()
+             ? ""
+             : guide.text + " " + sha256_of_file(guide.image_encoder) + sha256_of_file(guide.text_encoder);
+}
+
 void write_jpeg(const fs::path& file, const RenderedImage& image, int quality) {
   const Picture picture = scaled_down(pipeline::picture_of(image, pipeline::ShownColor::kDecoded), kPictureWidth);
   write_file(file, std::span<const std::byte>(jpeg_bytes(picture, quality)));
@@ -141,8 +148,9 @@ std::string SeedRun::settings_of(const Method& method) const {
   const Config& run = bench_.config;
   return digest(stage1_settings_ + method.name + options_to_json(stage2_of(method, run.stage2)).dump() +
                 (method.matches_features ? bench_.plan.style_reference.string() : "") +
-                options_to_json(run.colorizer).dump() + options_to_json(run.render).dump() +
-                (bench_.lpips != nullptr ? bench_.lpips->network() : ""));
+                (method.follows_text ? text_of(bench_.plan.text) : "") + options_to_json(run.colorizer).dump() +
+                options_to_json(run.render).dump() + (bench_.lpips != nullptr ? bench_.lpips->network() : "") +
+                (bench_.encoder != nullptr ? "encoder" : ""));
 }
 
 Cell SeedRun::make(const Method& method) {
@@ -206,33 +214,59 @@ void SeedRun::train_own_field(const Engines& engines, Cell& cell) const {
   cell.stage1_curve = read_curve(snapshot);
 }
 
-/// ARF in place of stage 2.
-double SeedRun::transfer(const Stage2Options& options, Colorizer& colorizer, const fs::path& take) const {
+/// Color3D's personalised colorizer: fitted to the view that tells most of the others, as `colorizer` colours it.
+std::unique_ptr<Colorizer> SeedRun::distilled(const Method& method, Colorizer& colorizer) {
+  Config config = bench_.config;
+  const LuminanceModel luminance = LuminanceModel::load(stage1_, bench_.engines);
+  training_views_.fill(luminance.seen(), subject_.capture, luminance.frame, config.stage2.working_resolution,
+                       [&](double fraction) {
+                         bench_.observer.report_progress({"looking at views", fraction, {}});
+                       });
+  const LightnessBatch question = key_view(training_views_);
+  const ChromaBatch answer = colorizer.colorize(question);
+  check_answer(colorizer.name(), question, answer);
+  const fs::path file = folder_ / method.name / "key_view.png";
+  write_png(file, picture_from_linear(question.width, question.height,
+                                      linear_rgb_from_lab(question.lightness, ab_of(answer, 0))));
+  config.colorizer.spec = "reference:" + fs::absolute(file).string();
+  config.colorizer.prompt.clear();
+  config.stage2.seed = seed_;
+  return make_colorizer(config.colorizer, pipeline::colorizer_context(config, {}, {}, bench_.observer));
+}
+
+/// ARF or CLIP-NeRF in place of stage 2.
+void SeedRun::follow_picture_loss(const Method& method, Colorizer& colorizer, Cell& cell) const {
   const Plan& plan = bench_.plan;
-  if (plan.lpips_weights.empty()) {
+  Stage2Options options = stage2_of(method, bench_.config.stage2);
+  options.seed = seed_;
+  if (method.matches_features && plan.lpips_weights.empty()) {
     throw UsageError("style-transfer: needs a network of features: --lpips-weights of AlexNet");
   }
-  const LabPicture reference = plan.style_reference.empty()
-                                   ? colorized_view(subject_.capture, stage1_, colorizer, bench_.engines)
-                                   : reference_image(plan.style_reference);
-  const auto loss = make_style_loss(plan.lpips_weights, reference);
+  if (method.follows_text && plan.text.text.empty()) {
+    throw UsageError("clip-nerf: needs a text and encoders: --clip IMAGE.pt,TEXT.pt --clip-text TEXT");
+  }
+  LabPicture reference;
+  if (method.matches_features) {
+    reference = plan.style_reference.empty() ? colorized_view(subject_.capture, stage1_, colorizer, bench_.engines)
+                                             : reference_image(plan.style_reference);
+  }
+  const auto loss = method.follows_text ? make_text_loss(plan.text) : make_style_loss(plan.lpips_weights, reference);
+  cell.metrics.colorizer = method.follows_text ? "text:" + plan.text.text : colorizer.name();
+  const std::string taken = method.follows_text ? cell.metrics.colorizer : "style:AlexNet";
   const int steps = std::max(kFewestStyleSteps, int(kStyleStepsPerPatch * options.patches));
-  return transfer_style({subject_.capture, stage1_, *loss, reference, options, steps, take}, bench_.engines,
-                        bench_.observer);
+  cell.seconds = transfer_style({subject_.capture, stage1_, *loss, method.follows_text ? nullptr : &reference, options,
+                                 steps, folder_ / method.name / "take.snapshot", taken},
+                                bench_.engines, bench_.observer);
 }
 
 void SeedRun::colorize(const Method& method, Cell& cell) {
   const Field field = field_of(method);
   if (field.own) train_own_field(*field.own, cell);
   if (is_own(method)) cell.stage1_curve = read_curve(stage1_);
-  const auto colorizer = colorizer_for(method);
-  if (method.matches_features) {
-    Stage2Options options = stage2_of(method, bench_.config.stage2);
-    options.seed = seed_;
-    cell.seconds = transfer(options, *colorizer, folder_ / method.name / "take.snapshot");
-  } else {
-    train_colors(method, field, *colorizer, cell);
-  }
+  auto colorizer = colorizer_for(method);
+  if (method.matches_features || method.follows_text) return follow_picture_loss(method, *colorizer, cell);
+  if (method.distills_key_view) colorizer = distilled(method, *colorizer);
+  train_colors(method, field, *colorizer, cell);
   cell.metrics.colorizer = colorizer->name();
 }
 
@@ -252,7 +286,7 @@ void SeedRun::train_colors(const Method& method, const Field& field, Colorizer& 
     fs::remove(take);  // a curve is of one training from its beginning
   }
   const Photometric photometric;
-  ViewQuestions whole_views;
+  ViewQuestions whole_views(std::max(method.view_sizes, 1));
   const Stage2Job job{.capture = subject_.capture,
                       .stage1 = stage1_,
                       .options = options,
@@ -261,7 +295,7 @@ void SeedRun::train_colors(const Method& method, const Field& field, Colorizer& 
                       .take = take,
                       .resume = true,
                       .views = &training_views_,
-                      .questions = method.asks_about_views ? &whole_views : nullptr,
+                      .questions = method.view_sizes > 0 ? &whole_views : nullptr,
                       .injection = method.is_photometric ? &photometric : nullptr};
   const Stage2Report report = train_stage2(job, engines, pixels ? static_cast<Observer&>(curve) : bench_.observer);
   if (pixels && !curve.points().empty()) {
@@ -278,6 +312,7 @@ void SeedRun::evaluate_views(const Method& method, const Scene& scene, Cell& cel
   EvaluateOptions options;
   options.render = pipeline::render_options(bench_.config);
   options.lpips = bench_.lpips;
+  options.encoder = bench_.encoder;
   options.with_baked = false;
   options.grey_as_color = true;
   const std::vector<std::size_t> shown = subject_.shown();

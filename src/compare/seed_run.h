@@ -24,6 +24,7 @@ struct Plan {
   std::vector<int> seeds;
   std::filesystem::path lpips_weights;    ///< empty = LPIPS is not measured
   std::filesystem::path style_reference;  ///< empty = the middle training view, coloured by the colorizer
+  TextGuide text;                         ///< of `clip-nerf`; empty = that method fails
   std::string command_line;
   bool only_report = false;  ///< nothing is trained: the report is made of the cells that are there
 };
@@ -33,7 +34,8 @@ struct Bench {
   const Plan& plan;
   const Config& config;
   const Engines& engines;
-  const Lpips* lpips;  ///< null = LPIPS is not measured
+  const Lpips* lpips;             ///< null = LPIPS is not measured
+  const PictureEncoder* encoder;  ///< null = none is installed
   Observer& observer;
 };
 
@@ -58,8 +60,8 @@ class SeedRun {
   [[nodiscard]] Field field_of(const Method& method) const;
   [[nodiscard]] std::string settings_of(const Method& method) const;
   [[nodiscard]] std::unique_ptr<Colorizer> colorizer_for(const Method& method) const;
-  [[nodiscard]] double transfer(const Stage2Options& options, Colorizer& colorizer,
-                                const std::filesystem::path& take) const;
+  [[nodiscard]] std::unique_ptr<Colorizer> distilled(const Method& method, Colorizer& colorizer);
+  void follow_picture_loss(const Method& method, Colorizer& colorizer, Cell& cell) const;
   void train_own_field(const Engines& engines, Cell& cell) const;
   void colorize(const Method& method, Cell& cell);
   void train_colors(const Method& method, const Field& field, Colorizer& colorizer, Cell& cell);

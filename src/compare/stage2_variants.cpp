@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/usage.h"
+#include "src/train/chroma/key_views.h"
 
 namespace cnerf::compare {
 namespace {
@@ -20,24 +21,28 @@ double Photometric::step(ColorModel& model, const ColoredPixels& pixels, float l
 
 void ViewQuestions::prepare(Session& session) {
   const auto views = session.views();
-  answers_.assign(views.size(), {});
+  answers_.assign(views.size() * sizes_, {});
   double asked = 0;
   for (const std::size_t v : along_the_path(views)) {
-    const Stopwatch watch;
-    const int side = kWholeViewPatches * session.options.patch_size;
-    const LightnessBatch question = whole_view(views[v], session.names()[v], v, side);
-    const ChromaBatch answer = session.colorizer.colorize(question);
-    check_answer(session.colorizer.name(), question, answer);
-    answers_[v] = at_view_size(views[v], question, ab_of(answer, 0));
-    session.model.report.colorizer_seconds += watch.seconds();
-    session.report("stage 2: colouring views", ++asked / double(views.size()));
+    for (std::size_t size = 0; size < sizes_; ++size) {
+      const Stopwatch watch;
+      const int side = (kWholeViewPatches * session.options.patch_size) >> size;
+      const std::size_t place = v * sizes_ + size;
+      const LightnessBatch question = whole_view(views[v], session.names()[v], place, side);
+      const ChromaBatch answer = session.colorizer.colorize(question);
+      check_answer(session.colorizer.name(), question, answer);
+      answers_[place] = at_view_size(views[v], question, ab_of(answer, 0));
+      session.model.report.colorizer_seconds += watch.seconds();
+      session.report("stage 2: colouring views", ++asked / double(answers_.size()));
+    }
   }
 }
 
 void ViewQuestions::answer(const Session& session, std::span<AnsweredPatch> patches) {
   for (AnsweredPatch& patch : patches) {
     const std::size_t v = patch.place.view;
-    patch.ab = patch_colors(session.views()[v], patch.place, patch.side, answers_[v]);
+    const std::size_t size = patch.place.index % sizes_;
+    patch.ab = patch_colors(session.views()[v], patch.place, patch.side, answers_[v * sizes_ + size]);
   }
 }
 
@@ -52,6 +57,13 @@ LightnessBatch whole_view(const CachedView& view, const std::string& name, std::
   for (float& value : question.lightness) value = std::clamp(lightness_from_luminance(value), 0.0f, 100.0f);
   question.origins.push_back({name, 0, 0, 1, 1, query});
   return question;
+}
+
+LightnessBatch key_view(const ViewCache& views) {
+  const SeenSurfaces seen(views.views(), views.names());
+  const std::vector<KeyView> chosen = choose_key_views(seen, scene_points(seen), {}, 1).chosen;
+  const std::size_t v = chosen.empty() ? 0 : chosen.front().view;
+  return whole_view(views.views()[v], views.names()[v], v, views.views()[v].short_side());
 }
 
 std::vector<float> at_view_size(const CachedView& view, const LightnessBatch& question, const std::vector<float>& ab) {

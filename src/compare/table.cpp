@@ -41,6 +41,10 @@ constexpr Column kColumns[] = {
     {"ssim_rgb", "SSIM", 1, 3, "Wang et al. 2004: Gaussian window 11 x 11, sigma 1.5; mean of the encoded channels",
      [](const Cell& c) { return c.metrics.mean.ssim_rgb; }},
     {"lpips", "LPIPS", -1, 3, "Zhang et al. 2018, version 0.1", [](const Cell& c) { return c.metrics.mean.lpips; }},
+    {"feature_distance", "FID-like", -1, 1,
+     "squared Fréchet distance of the optional encoder's features, ours to the truth's; empty where it is not "
+     "installed",
+     [](const Cell& c) { return c.metrics.feature_distance; }},
     {"colourfulness", "Colourful", 0, 2, "Hasler and Suesstrunk 2003",
      [](const Cell& c) { return c.metrics.mean.colorfulness; }},
     {"colourfulness_gap", "Δ Colourful", -1, 2, "mean over views of the absolute difference to the truth's",

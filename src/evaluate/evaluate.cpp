@@ -79,10 +79,15 @@ void measure_colour(const EvaluatedView& pictures, ViewMetrics& metrics) {
 }
 
 /// Networks have one memory for what passes through them: not for several threads.
-void measure_by_network(const EvaluatedView& pictures, const Lpips& lpips, ViewMetrics& metrics) {
+void measure_by_networks(const EvaluatedView& pictures, const EvaluateOptions& options, ViewMetrics& metrics) {
   if (pictures.ours.rgb.empty() || !pictures.truth) return;
-  metrics.lpips = lpips.distance(srgb8_from_linear(pictures.ours.rgb), srgb8_from_linear(pictures.truth->rgb),
-                                 pictures.ours.width, pictures.ours.height);
+  const int width = pictures.ours.width, height = pictures.ours.height;
+  const std::vector<std::uint8_t> ours = srgb8_from_linear(pictures.ours.rgb);
+  const std::vector<std::uint8_t> truth = srgb8_from_linear(pictures.truth->rgb);
+  if (options.lpips != nullptr) metrics.lpips = options.lpips->distance(ours, truth, width, height);
+  if (options.encoder == nullptr) return;
+  metrics.features_ours = options.encoder->regions(ours, width, height);
+  metrics.features_truth = options.encoder->regions(truth, width, height);
 }
 
 /// Engines share their threads among rays: not for several views at once.
@@ -169,6 +174,21 @@ std::map<std::string, Spread> spread_of(const std::vector<ViewMetrics>& views) {
   return spread;
 }
 
+void summarise(Metrics& metrics) {
+  metrics.mean = mean_of(metrics.views);
+  metrics.spread = spread_of(metrics.views);
+  constexpr std::size_t kSamples = std::size_t(PictureEncoder::kRegions) * PictureEncoder::kRegions;  // of a view
+  std::vector<float> ours, truth;
+  std::size_t dimensions = 0;
+  for (ViewMetrics& view : metrics.views) {
+    dimensions = std::max(dimensions, view.features_ours.size() / kSamples);
+    ours.insert(ours.end(), view.features_ours.begin(), view.features_ours.end());
+    truth.insert(truth.end(), view.features_truth.begin(), view.features_truth.end());
+    view.features_ours = view.features_truth = {};
+  }
+  if (!ours.empty()) metrics.feature_distance = frechet_distance(ours, truth, dimensions);
+}
+
 std::string split_of(const std::vector<const View*>& views) {
   return views.front()->held_out ? "held-out" : "train";
 }
@@ -228,7 +248,7 @@ std::vector<ViewMetrics> evaluate_views(const Scene& scene, std::span<const View
   for (std::size_t i = 0; i < views.size(); ++i) {
     const EvaluatedView pictures{*views[i], ours[i], truth[i]};
     measure_camera(scene, *views[i], options, measured[i]);
-    if (options.lpips != nullptr) measure_by_network(pictures, *options.lpips, measured[i]);
+    if (options.lpips != nullptr || options.encoder != nullptr) measure_by_networks(pictures, options, measured[i]);
     if (watch) watch(pictures);
   }
   return measured;
@@ -247,8 +267,7 @@ Metrics evaluate(const Scene& scene, const Capture& capture, const EvaluateOptio
       if (progress) progress(progress_of(metrics, views.size()));
     }
   }
-  metrics.mean = mean_of(metrics.views);
-  metrics.spread = spread_of(metrics.views);
+  summarise(metrics);
   return metrics;
 }
 

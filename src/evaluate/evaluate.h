@@ -13,6 +13,7 @@
 #include "src/base/record.h"
 #include "src/capture/capture.h"
 #include "src/capture/color_truth.h"
+#include "src/colorizer/picture_encoder.h"
 #include "src/evaluate/lpips.h"
 #include "src/evaluate/metrics.h"
 #include "src/evaluate/pose_alignment.h"
@@ -25,7 +26,8 @@ inline constexpr int kMetricsSchemaVersion = 1;
 /// What one view measures. A number that has no meaning for the view (no colour truth, not colorized) is absent.
 struct ViewMetrics {
   std::string view;
-  std::optional<double> psnr_luminance;  ///< dB; sRGB-encoded Rec.709 Y, clamped to [0, 1]
+  std::vector<float> features_ours, features_truth;  ///< as PictureEncoder has them, until they are summarised
+  std::optional<double> psnr_luminance;              ///< dB; sRGB-encoded Rec.709 Y, clamped to [0, 1]
   /// The same with the one gain of linear light that fits the view best: of a picture whose exposure nobody knows.
   std::optional<double> psnr_luminance_exposure_fitted;
   /// Of the right half of the picture, pose and gain fitted on the left half: of a held-out view whose pose nobody
@@ -92,9 +94,11 @@ struct Spread {
 
 struct Metrics {
   int schema_version = kMetricsSchemaVersion;
-  std::string split;                     ///< "held-out", or "train" when nothing was held out
-  std::string take, colorizer;           ///< filled in by the caller; empty = not colorized
-  ViewMetrics mean;                      ///< mean over the views that have the number; of dB for PSNR
+  std::string split;            ///< "held-out", or "train" when nothing was held out
+  std::string take, colorizer;  ///< filled in by the caller; empty = not colorized
+  ViewMetrics mean;             ///< mean over the views that have the number; of dB for PSNR
+  /// `frechet_distance` of the optional encoder's features of all views, ours and the truth's; where it is installed.
+  std::optional<double> feature_distance;
   std::map<std::string, Spread> spread;  ///< of the numbers of luminance that were measured, by name
   std::vector<ViewMetrics> views;
 
@@ -106,6 +110,7 @@ struct Metrics {
     visitor("take", self.take);
     visitor("colorizer", self.colorizer);
     visitor("mean", self.mean);
+    visitor("feature_distance", self.feature_distance, kOptional);
     visitor("spread", self.spread, kOptional);
     visitor("views", self.views);
   }
@@ -120,10 +125,11 @@ struct EvaluatedView {
 
 struct EvaluateOptions {
   RenderOptions render;
-  int training_views = 8;        ///< at most so many, evenly spread, when nothing was held out
-  const Lpips* lpips = nullptr;  ///< measures LPIPS too; the networks run one view at a time
-  bool with_baked = true;        ///< also compares the bake's colours with the per-pixel decode
-  bool grey_as_color = false;    ///< an uncoloured scene counts as one that was coloured grey
+  int training_views = 8;                   ///< at most so many, evenly spread, when nothing was held out
+  const Lpips* lpips = nullptr;             ///< measures LPIPS too; the networks run one view at a time
+  const PictureEncoder* encoder = nullptr;  ///< measures the distance of features too
+  bool with_baked = true;                   ///< also compares the bake's colours with the per-pixel decode
+  bool grey_as_color = false;               ///< an uncoloured scene counts as one that was coloured grey
   /// From the file's frame to that of the learned cameras: held-out views are judged aligned as well, which takes as
   /// long as rendering them a few times. None: they are not.
   std::optional<PoseAlignment> alignment = {};
@@ -153,6 +159,8 @@ struct EvaluateOptions {
 
 /// The mean over the views that have a number, for each number.
 [[nodiscard]] ViewMetrics mean_of(const std::vector<ViewMetrics>& views);
+/// Fills in what is said of all views: mean, spread and distance of features.
+void summarise(Metrics& metrics);
 [[nodiscard]] std::map<std::string, Spread> spread_of(const std::vector<ViewMetrics>& views);
 
 }  // namespace cnerf

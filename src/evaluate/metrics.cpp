@@ -111,6 +111,26 @@ double color_diversity(std::span<const float> rgb, std::span<const std::uint8_t>
   return std::exp(entropy);
 }
 
+double frechet_distance(std::span<const float> a, std::span<const float> b, std::size_t dimensions) {
+  const auto centred = [&](std::span<const float> vectors, cv::Mat& mean) {
+    CNERF_CHECK(vectors.size() % dimensions == 0 && vectors.size() >= 2 * dimensions, "at least two vectors");
+    cv::Mat rows;
+    const int n = int(vectors.size() / dimensions), d = int(dimensions);
+    cv::Mat(n, d, CV_32F, const_cast<float*>(vectors.data())).convertTo(rows, CV_64F);
+    cv::reduce(rows, mean, 0, cv::REDUCE_AVG);
+    rows -= cv::repeat(mean, n, 1);
+    return cv::Mat(rows / std::sqrt(n - 1.0));  // its rows' products sum up to the covariance
+  };
+  cv::Mat mean_a, mean_b, eigenvalues;
+  const cv::Mat x = centred(a, mean_a), y = centred(b, mean_b);
+  const cv::Mat product = x.rows < y.rows ? x * y.t() : y * x.t();
+  cv::eigen(product * product.t(), eigenvalues);  // squares of its singular values
+  double root = 0;
+  for (int i = 0; i < eigenvalues.rows; ++i) root += std::sqrt(std::max(0.0, eigenvalues.at<double>(i)));
+  const double apart = cv::norm(mean_a - mean_b);
+  return apart * apart + x.dot(x) + y.dot(y) - 2 * root;
+}
+
 double mean_ab_distance(std::span<const float> ours, std::span<const float> truth,
                         std::span<const std::uint8_t> valid) {
   if (!truth.empty()) CNERF_CHECK_EQ(truth.size(), ours.size());

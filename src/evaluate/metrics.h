@@ -32,6 +32,17 @@ struct Colorfulness {
 /// @param rgb  [N, 3] linear Rec.709  @return  NaN where no pixel counts
 [[nodiscard]] double color_diversity(std::span<const float> rgb, std::span<const std::uint8_t> valid = {});
 
+/// Fréchet distance, squared, of the Gaussians that have the means and covariances of two sets of vectors (Dowson and
+/// Landau, Journal of Multivariate Analysis 12, 1982):
+///
+///   d² = |m₁ - m₂|² + Tr(C₁ + C₂ - 2 (C₁ C₂)^½),
+///
+/// which is FID where the vectors are a network's features of pictures (Heusel et al. 2017). Covariances divide by one
+/// less than there are vectors. No matrix of D x D is needed: with X and Y the centred vectors as rows, Tr (C₁ C₂)^½ is
+/// the sum of the singular values of X Yᵀ over √((n - 1)(m - 1)).
+/// @param a, b  [N, D] and [M, D], at least two each
+[[nodiscard]] double frechet_distance(std::span<const float> a, std::span<const float> b, std::size_t dimensions);
+
 /// Mean Euclidean distance of Lab a and b.
 /// @param ours, truth  [N, 3] linear Rec.709; `truth` empty compares with grey, i.e. gives the mean chroma of `ours`.
 [[nodiscard]] double mean_ab_distance(std::span<const float> ours, std::span<const float> truth,

@@ -42,6 +42,7 @@ void say_metrics(const Metrics& metrics, Observer& observer) {
   if (mean.lpips) text += fmt::format(", LPIPS {:.3f}", *mean.lpips);
   if (mean.ab_error) text += fmt::format(", ab error {:.2f} (all grey {:.2f})", *mean.ab_error, *mean.ab_error_grey);
   if (mean.bake_ab_distance) text += fmt::format(", baked colour {:.2f} ab from per-pixel", *mean.bake_ab_distance);
+  if (metrics.feature_distance) text += fmt::format(", features {:.1f} apart", *metrics.feature_distance);
   observer.say(text);
 }
 
@@ -84,7 +85,7 @@ struct SeenView {
 
 cluster::Bytes packed(const SeenView& seen) {
   cluster::Packer packer;
-  packer.add(seen.metrics.view);
+  packer.add(seen.metrics.view).add(seen.metrics.features_ours).add(seen.metrics.features_truth);
   ViewMetrics::visit_numbers(seen.metrics, [&](const char*, const auto& value) { packer.add(value); });
   packer.add(seen.row.size());
   for (const Picture& picture : seen.row) packer.add(picture.width).add(picture.height).add(picture.rgb);
@@ -95,7 +96,7 @@ SeenView unpacked(const cluster::Bytes& bytes) {
   SeenView seen;
   cluster::Unpacker unpacker(bytes);
   std::size_t pictures = 0;
-  unpacker.get(seen.metrics.view);
+  unpacker.get(seen.metrics.view).get(seen.metrics.features_ours).get(seen.metrics.features_truth);
   ViewMetrics::visit_numbers(seen.metrics, [&](const char*, auto& value) { unpacker.get(value); });
   unpacker.get(pictures);
   seen.row.resize(pictures);
@@ -123,8 +124,7 @@ Metrics evaluate_together(const Scene& scene, const Capture& capture, const Eval
     progress(progress_of(metrics, views.size()));
   };
   cluster::share_out(cluster::world(), views.size(), see, take, packed, unpacked);
-  metrics.mean = mean_of(metrics.views);
-  metrics.spread = spread_of(metrics.views);
+  summarise(metrics);
   return metrics;
 }
 
@@ -139,6 +139,8 @@ void evaluate_step(const RunContext& context, const EvaluateJob& job, const Engi
   const auto scene = load_scene(directory, job.take, {}, engines);
   EvaluateOptions options;
   options.lpips = lpips ? &*lpips : nullptr;
+  const auto encoder = job.take.empty() ? nullptr : make_picture_encoder();
+  options.encoder = encoder.get();
   options.render = render_options(context.config);
   const LearnedViews learned = LuminanceModel::learned_views_in(directory.stage1_snapshot());
   options.alignment = alignment_of(context.capture, learned);

@@ -39,6 +39,7 @@ KeyViews suggested_key_views(const RunContext& context, const KeyViewsJob& job, 
   KeyViews result;
   result.take = job.take;
   result.given = key_frame_views(context.capture, context.config.colorizer);
+  result.given.insert(result.given.end(), job.given.begin(), job.given.end());
   ViewCache own;
   ViewCache& cache = job.views != nullptr ? *job.views : own;
   if (job.views == nullptr) {

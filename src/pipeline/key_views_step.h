@@ -42,12 +42,13 @@ struct KeyViews {
 };
 
 struct KeyViewsJob {
-  int count = 1;               ///< of views, at most
-  std::string take;            ///< whose doubts count; empty = none
-  ViewCache* views = nullptr;  ///< of the run's stage 1; null = traced anew, small
+  int count = 1;                        ///< of views, at most
+  std::string take;                     ///< whose doubts count; empty = none
+  ViewCache* views = nullptr;           ///< of the run's stage 1; null = traced anew, small
+  std::vector<std::string> given = {};  ///< views that have colours already, beside key frames of the configuration
 };
 
-/// The views that tell most, see src/train/chroma/key_views.h. Key frames of the configuration are given.
+/// The views that tell most, see src/train/chroma/key_views.h.
 /// @throws UsageError, SnapshotError, Interrupted
 [[nodiscard]] KeyViews suggested_key_views(const RunContext& context, const KeyViewsJob& job, const Engines& engines,
                                            Observer& observer);

@@ -84,6 +84,10 @@ const std::vector<Column>& further_columns() {
       worst("worst", "psnr_luminance_aligned"),
       mean("fog before cameras %", &ViewMetrics::near_opacity, 100, 2),
       mean("diversity of colours", &ViewMetrics::color_diversity, 1, 1),
+      {"distance of features",
+       [](const Metrics& metrics) {
+         return metrics.feature_distance ? fmt::format("{:.1f}", *metrics.feature_distance) : "";
+       }},
   };
   return columns;
 }

@@ -102,6 +102,18 @@ struct CardMessage {
   }
 };
 
+/// A view that is worth painting on.
+struct KeyViewMessage {
+  int view = 0;     ///< number of the capture's view
+  double adds = 0;  ///< share of the scene that it tells of, beside those before it
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("view", self.view);
+    v("adds", self.adds);
+  }
+};
+
 /// What a page has sent to begin with.
 struct ArrivedMessage {
   int files = 0;
@@ -131,6 +143,7 @@ struct StateMessage {
   ArrivedMessage arrived;
   Finish finish;
   std::vector<CardMessage> cards;
+  std::vector<KeyViewMessage> key_views;  ///< the one to begin with first
   std::map<std::string, double> figures;
   std::string message;
   bool failed = false, ready = false;
@@ -156,6 +169,7 @@ struct StateMessage {
     v("arrived", self.arrived);
     v("finish", self.finish);
     v("cards", self.cards);
+    v("key_views", self.key_views);
     v("figures", self.figures);
     v("message", self.message);
     v("failed", self.failed);

@@ -127,6 +127,7 @@ class Studio final : public web::PageApi {
   void duplicate_take(const Order& order);
   void delete_take(const Order& order);
   void suggest(const Order& order);
+  void suggest_views(const Order& order);
   void color_by_reference(const Order& order);
   void color_by_network(const Order& order);
   void bake(const Order& order);

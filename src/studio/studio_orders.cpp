@@ -10,6 +10,7 @@
 #include "src/picture/encode.h"
 #include "src/pipeline/bake_step.h"
 #include "src/pipeline/colorize_step.h"
+#include "src/pipeline/key_views_step.h"
 #include "src/pipeline/photographs_step.h"
 #include "src/studio/paint_files.h"
 #include "src/studio/studio.h"
@@ -21,6 +22,8 @@ namespace {
 constexpr double kBetweenColors = 1.0;  // seconds: pages draw what changed
 constexpr int kCardQuality = 88;
 constexpr const char* kBuiltin = "builtin";
+constexpr const char* kKeyViews = "key-views";
+constexpr int kSuggestedViews = 3;
 
 /// Sides of pictures have names too.
 void check_new_name(const std::string& name) {
@@ -77,6 +80,7 @@ std::span<const Studio::OrderKind> Studio::order_kinds() {
       {"duplicate", &Studio::duplicate_take},
       {"delete", &Studio::delete_take},
       {"suggest", &Studio::suggest},
+      {kKeyViews, &Studio::suggest_views},
       {kBuiltin, &Studio::color_by_network},
       {"reference", &Studio::color_by_reference, false},
       {"bake", &Studio::bake},
@@ -202,6 +206,30 @@ void Studio::suggest(const Order& /*order*/) {
   board_.change([&](StateMessage& state) {
     state.cards = std::move(messages);
     state.message = "choose those that you like";
+  });
+}
+
+/// What is painted counts as coloured, and the doubts of a take where that is what is shown.
+void Studio::suggest_views(const Order& /*order*/) {
+  coloring_->cache_views([this](double fraction) { breathe(kKeyViews, fraction); });
+  const std::vector<View>& views = context_.capture.views;
+  pipeline::KeyViewsJob job{kSuggestedViews, coloring_->kept_as(), &coloring_->cached_views()};
+  for (const Stroke& stroke : saved_strokes().strokes) {
+    const bool is_photograph = std::ranges::find(views, stroke.view, &View::name) != views.end();
+    if (!stroke.hidden && is_photograph) job.given.push_back(stroke.view);
+  }
+  BoardObserver observer = observer_of(kKeyViews);
+  const pipeline::KeyViews found = suggested_key_views(context_, job, engines_, observer);
+  std::vector<KeyViewMessage> messages;
+  for (const pipeline::SuggestedView& one : found.suggested) {
+    messages.push_back({int(std::ranges::find(views, one.view, &View::name) - views.begin()), one.adds});
+  }
+  add_command(
+      fmt::format("cnerf colorize {} --suggest-keyframes {}", context_.directory.root().string(), kSuggestedViews));
+  const std::lock_guard lock(mutex_);
+  board_.change([&](StateMessage& state) {
+    state.message = messages.empty() ? "every view is painted on" : "begin with the photographs that are marked";
+    state.key_views = std::move(messages);
   });
 }
 

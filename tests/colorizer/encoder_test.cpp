@@ -208,6 +208,29 @@ TEST(Encoder, IsTheNetworkOfItsModel) {
   }
 }
 
+TEST(Encoder, LooksAtPicturesInColourByTheirRegions) {
+  const test::TempDir folder;
+  small_resnet().write(folder.path());
+  const Encoder encoder(read_layers_model(folder.path()));
+  // Of its own size and one colour: blue first, as the training had it.
+  const int width = 288, height = 224;
+  std::vector<std::uint8_t> rgb;
+  for (int i = 0; i < width * height; ++i) rgb.insert(rgb.end(), {118, 118, 118});
+  const std::vector<float> regions = encoder.regions(rgb, width, height);
+  ASSERT_EQ(regions.size(), 16U * 64);
+  const float lightness = lightness_from_luminance(linear_from_srgb(118 / 255.0f));
+  const Tensor last = encoder.features(torch::full({1, 1, height, width}, lightness)).back();
+  const Tensor expected = torch::adaptive_avg_pool2d(last, {4, 4})[0].flatten(1).t();
+  const Tensor found = torch::tensor(regions).view({16, 64});
+  EXPECT_LT((found - expected).abs().max().item<float>(), 1e-3 * expected.abs().max().item<float>());
+
+  std::vector<std::uint8_t> red = rgb, blue = rgb;
+  for (std::size_t i = 0; i < rgb.size(); i += 3) red[i] = blue[i + 2] = 200;
+  EXPECT_NE(encoder.regions(red, width, height), regions) << "colours are seen";
+  EXPECT_NE(encoder.regions(red, width, height), encoder.regions(blue, width, height));
+  EXPECT_EQ(encoder.regions(std::vector<std::uint8_t>(3 * 40 * 8, 90), 8, 40).size(), 16U * 64) << "of any size";
+}
+
 ReferenceRecipe short_recipe(std::shared_ptr<const Encoder> encoder) {
   ReferenceRecipe recipe;
   recipe.steps = 6;

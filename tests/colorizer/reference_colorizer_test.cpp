@@ -188,6 +188,28 @@ TEST(ReferenceImages, PatchesKeepColoursAndHoldThePlaceTheyShow) {
   EXPECT_LT(flipped, 32);
 }
 
+TEST(ReferenceColorizer, LearnsFromEachPatchTwice) {
+  const test::TempDir folder;
+  save_png(toy_scene(1), folder / "toy.png");
+  ColorizerOptions options;
+  options.spec = "reference:" + (folder / "toy.png").string();
+  options.reference_steps = 6;
+  options.reference_encoder = "off";
+  const auto asked = [&](Colorizer& colorizer) { return colorizer.colorize(test::some_question(1, 64, 64)).ab; };
+  const std::vector<float> answer = asked(*make_colorizer(options));
+  const auto fitted = [&](int uses) {
+    ReferenceRecipe recipe;
+    recipe.steps = options.reference_steps;
+    recipe.builtin = builtin_weights_file();
+    recipe.patch_uses = uses;
+    recipe.patches_held = 16;
+    const ColorizerContext context;
+    return asked(*fit_reference_colorizer({(folder / "toy.png").string(), options, context}, recipe));
+  };
+  EXPECT_EQ(answer, fitted(2));
+  EXPECT_NE(answer, fitted(1)) << "patches that are learned from once are others";
+}
+
 TEST(ReferenceColorizer, RefusesWhatIsNoColourPhotograph) {
   const test::TempDir folder;
   save_png(toy_scene(1), folder / "grey.png", true);

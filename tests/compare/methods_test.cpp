@@ -26,8 +26,12 @@ TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
   EXPECT_FALSE(method("without-purification").is_photometric);
   EXPECT_TRUE(method("without-classification").is_photometric);
   EXPECT_TRUE(of("without-classification").purify.enabled);
-  EXPECT_FALSE(method("without-classification").asks_about_views);
-  EXPECT_TRUE(method("colorize-then-fuse").asks_about_views && method("colorize-then-fuse").is_photometric);
+  EXPECT_EQ(method("without-classification").view_sizes, 0);
+  EXPECT_EQ(method("colorize-then-fuse").view_sizes, 1);
+  EXPECT_TRUE(method("colorize-then-fuse").is_photometric);
+  EXPECT_EQ(method("multi-scale-teacher").view_sizes, 3);
+  EXPECT_TRUE(method("key-view-distilled").distills_key_view);
+  EXPECT_FALSE(of("key-view-distilled").purify.enabled) << "its colorizer does not contradict itself";
   EXPECT_EQ(of("colornerf-paper").decode_temperature, 0);
   EXPECT_EQ(of("colornerf-paper").purify.opinions, 1);
   Stage2Options smooth;

@@ -3,17 +3,24 @@
 #include "src/compare/baselines/style_transfer.h"
 
 #include <gtest/gtest.h>
+#include <torch/script.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/color/colorspace_math.h"
+#include "src/compare/baselines/simulated.h"
 #include "src/compare/baselines/torch/style_math.h"
+#include "src/compare/run.h"
+#include "src/sample/sample_scene.h"
 #include "src/train/luminance/stage1.h"
 #include "src/train/scene.h"
 #include "tests/support/data.h"
 #include "tests/support/finite_difference.h"
+#include "tests/support/tiny_config.h"
 #include "tests/support/toy_capture.h"
 
 namespace cnerf::compare {
@@ -76,6 +83,139 @@ LabPicture plain(Ab color) {
   return picture;
 }
 
+/// A trained toy, whose colours follow a loss.
+struct ToyScene {
+  explicit ToyScene(const fs::path& at) : folder(at) {
+    stage1.steps = 30;
+    stage1.samples_per_step = 2048;
+    stage1.steps_per_box = 64;
+    stage1.grid = {.levels = 3, .log2_rows = 10, .coarsest_resolution = 4, .finest_resolution = 32};
+    stage1.occupancy.resolution = 32;
+    Observer observer;
+    (void)train_stage1({capture, stage1, folder / "stage1.snapshot"}, cpu_engines(), observer);
+  }
+
+  /// Mean ab of a view's bright pixels once its colours followed the loss.
+  [[nodiscard]] Ab learnt(const PictureLoss& loss, const LabPicture* reference) const {
+    Stage2Options options;
+    options.grid = stage1.grid;
+    Observer observer;
+    const fs::path take = folder / "take.snapshot";
+    const StyleJob job{capture, folder / "stage1.snapshot", loss, reference, options, 40, take, "loss"};
+    EXPECT_GT(transfer_style(job, cpu_engines(), observer), 0);
+    const auto scene = Scene::load(folder / "stage1.snapshot", take, cpu_engines());
+    const View& view = capture.views[1];
+    const RenderedImage image = scene->render(view.intrinsics, view.world_from_camera);
+    Ab sum;
+    int count = 0;
+    for (std::size_t p = 0; p < image.opacity.size(); ++p) {
+      if (image.opacity[p] < 0.5f || image.luminance[p] < 0.1f) continue;
+      const Lab<float> lab = lab_from_linear_rgb(Vec3f{image.rgb[3 * p], image.rgb[3 * p + 1], image.rgb[3 * p + 2]});
+      sum = {sum.a + lab.a, sum.b + lab.b};
+      ++count;
+    }
+    EXPECT_GT(count, 100);
+    return {sum.a / float(count), sum.b / float(count)};
+  }
+
+  fs::path folder;
+  Capture capture = test::toy_capture(4, 64, 56);
+  Stage1Options stage1;
+};
+
+/// Encoders of a picture's mean colours: [1, 3] of the picture, and of the words red, green and blue what they are.
+struct SmallPair {
+  explicit SmallPair(const fs::path& folder, const std::string& image = "return x.mean([2, 3])") {
+    torch::jit::Module images("images");
+    images.define("def forward(self, x):\n  " + image + "\n");
+    images.save((folder / "image.pt").string());
+    torch::jit::Module texts("texts");
+    texts.define(R"(
+def forward(self, text: str):
+  known = [[1.0, -0.5, -0.5], [-0.5, 1.0, -0.5], [-0.5, -0.5, 1.0]]
+  return torch.tensor([known[["red", "green", "blue"].index(text)]])
+)");
+    texts.save((folder / "text.pt").string());
+    guide = {folder / "image.pt", folder / "text.pt", "red"};
+  }
+  TextGuide guide;
+};
+
+TEST(TextLoss, ItsGradientIsThatOfTheCosineBetweenTheEncodersAnswers) {
+  const test::TempDir folder;
+  const auto loss = make_text_loss(SmallPair(folder.path()).guide);
+  const LabPicture red = plain({50, 30}), green = plain({-40, 30});
+  std::vector<float> gradient(red.ab.size()), unused(red.ab.size());
+  EXPECT_LT((*loss)(red, unused), (*loss)(green, gradient));
+  // All pixels moved along a or along b: the gradient's sum is the derivative.
+  const auto moved = [&](Ab by) { return (*loss)(plain({-40 + by.a, 30 + by.b}), unused); };
+  const double a = (moved({0.5f, 0}) - moved({-0.5f, 0})), b = (moved({0, 0.5f}) - moved({0, -0.5f}));
+  const std::size_t half = gradient.size() / 2;
+  EXPECT_NEAR(std::accumulate(gradient.begin(), gradient.begin() + std::ptrdiff_t(half), 0.0), a, 0.02 * std::abs(a));
+  EXPECT_NEAR(std::accumulate(gradient.begin() + std::ptrdiff_t(half), gradient.end(), 0.0), b, 0.02 * std::abs(b));
+}
+
+TEST(TextLoss, WhatIsNoSuchPairIsRefusedByTheNameOfTheFile) {
+  const test::TempDir folder;
+  TextGuide guide = SmallPair(folder.path()).guide;
+  const auto refusal = [](const TextGuide& given) {
+    try {
+      (void)make_text_loss(given);
+    } catch (const InputError& problem) {
+      return std::string(problem.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal(guide), "");
+  guide.text = "mauve";
+  EXPECT_NE(refusal(guide).find("text.pt"), std::string::npos);
+  guide.text = "red";
+  write_file(folder / "other.pt", "no network");
+  guide.image_encoder = folder / "other.pt";
+  EXPECT_NE(refusal(guide).find("other.pt"), std::string::npos);
+  const test::TempDir second;
+  EXPECT_NE(refusal(SmallPair(second.path(), "return x.mean([3])").guide).find("expected 3 numbers"),
+            std::string::npos);
+  guide.image_encoder = folder / "missing.pt";
+  EXPECT_THROW((void)make_text_loss(guide), MissingInputError);
+}
+
+TEST(TextLoss, BringsAFieldToTheColourThatTheTextNames) {
+  const test::TempDir folder;
+  const ToyScene scene(folder.path());
+  for (const auto& [text, sign] : {std::pair{"red", 1.0f}, std::pair{"green", -1.0f}}) {
+    TextGuide guide = SmallPair(folder.path()).guide;
+    guide.text = text;
+    const auto loss = make_text_loss(guide);
+    const Ab mean = scene.learnt(*loss, nullptr);
+    EXPECT_GT(sign * mean.a, 10) << text;
+  }
+}
+
+TEST(TextLoss, IsARowOfAComparison) {
+  const test::TempDir folder;
+  write_sample_scene(folder / "capture", {.views = 6, .width = 96, .height = 72, .samples_per_pixel = 1});
+  Config config = test::tiny_config();
+  config.capture.holdout = 3;
+  config.render.frames = 4;
+  config.render.short_side = 24;
+  config.colorizer.spec = kSimulated;
+  Plan plan;
+  plan.captures = {{folder / "capture"}};
+  plan.report = folder / "report";
+  plan.methods = parse_methods("clip-nerf,grey");
+  plan.seeds = {1};
+  plan.text = SmallPair(folder.path()).guide;
+  Observer observer;
+  compare::Run run(plan, config, observer);
+  run.run();
+  run.write_report();
+  const auto row = nlohmann::json::parse(read_text_file(folder / "report/table.json"))["tables"][0]["rows"][0];
+  EXPECT_EQ(row["method"], "clip-nerf");
+  EXPECT_FALSE(row.contains("error")) << row.dump();
+  EXPECT_GT(row["colourfulness"]["mean"], 2);
+}
+
 class StyleTransfer : public testing::Test {
  protected:
   void SetUp() override {
@@ -87,7 +227,7 @@ class StyleTransfer : public testing::Test {
 
 TEST_F(StyleTransfer, TheGradientPointsAwayFromTheReference) {
   const auto made = make_style_loss(weights_, plain({40, 30}));
-  const StyleLoss& loss = *made;
+  const PictureLoss& loss = *made;
   std::vector<float> gradient(2 * 64 * 56);
   EXPECT_NEAR(loss(plain({40, 30}), gradient), 0, 1e-4);
   const double grey = loss(plain({0, 0}), gradient);
@@ -108,39 +248,10 @@ TEST_F(StyleTransfer, TheGradientPointsAwayFromTheReference) {
 
 TEST_F(StyleTransfer, BringsAFieldNearerToItsReference) {
   const test::TempDir folder;
-  Capture capture = test::toy_capture(4, 64, 56);
-  Stage1Options stage1;
-  stage1.steps = 30;
-  stage1.samples_per_step = 2048;
-  stage1.steps_per_box = 64;
-  stage1.grid = {.levels = 3, .log2_rows = 10, .coarsest_resolution = 4, .finest_resolution = 32};
-  stage1.occupancy.resolution = 32;
-  Observer observer;
-  (void)train_stage1({capture, stage1, folder / "stage1.snapshot"}, cpu_engines(), observer);
-
   const LabPicture reference = plain({40, 30});
-  const auto loss = make_style_loss(weights_, reference);
-  Stage2Options options;
-  options.grid = stage1.grid;
-  const double seconds =
-      transfer_style({capture, folder / "stage1.snapshot", *loss, reference, options, 40, folder / "take.snapshot"},
-                     cpu_engines(), observer);
-  EXPECT_GT(seconds, 0);
-
-  const auto scene = Scene::load(folder / "stage1.snapshot", folder / "take.snapshot", cpu_engines());
-  const View& view = capture.views[1];
-  const RenderedImage image = scene->render(view.intrinsics, view.world_from_camera);
-  double a = 0, b = 0, n = 0;
-  for (std::size_t p = 0; p < image.opacity.size(); ++p) {
-    if (image.opacity[p] < 0.5f || image.luminance[p] < 0.1f) continue;
-    const Lab<float> lab = lab_from_linear_rgb(Vec3f{image.rgb[3 * p], image.rgb[3 * p + 1], image.rgb[3 * p + 2]});
-    a += lab.a;
-    b += lab.b;
-    n += 1;
-  }
-  ASSERT_GT(n, 100);
-  EXPECT_GT(a / n, 15);
-  EXPECT_GT(b / n, 10);
+  const Ab mean = ToyScene(folder.path()).learnt(*make_style_loss(weights_, reference), &reference);
+  EXPECT_GT(mean.a, 15);
+  EXPECT_GT(mean.b, 10);
 }
 
 /// What the plug-in throws is caught here by its type: both sides have the same types of errors.

@@ -72,7 +72,7 @@ TEST_F(Compare, EveryMethodLeavesARowAndTheReportStandsAlone) {
     EXPECT_FALSE(row.contains("error")) << row.dump();
     EXPECT_TRUE(row.contains("psnr_rgb")) << row.dump();
   }
-  EXPECT_EQ(table["tables"][0]["rows"].size(), 10u);
+  EXPECT_EQ(table["tables"][0]["rows"].size(), 12u);
   EXPECT_THAT(row_of(table, "style-transfer")["error"], HasSubstr("--lpips-weights")) << "it needs a network";
   ASSERT_EQ(table["training_times"].size(), 2u);
   for (const auto& race : table["training_times"]) {

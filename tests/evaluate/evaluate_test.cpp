@@ -7,7 +7,9 @@
 #include "src/base/check.h"
 #include "src/base/json_record.h"
 #include "src/color/colorspace_math.h"
+#include "src/picture/encode.h"
 #include "tests/evaluate/painted_scene.h"
+#include "tests/support/data.h"
 
 namespace cnerf {
 namespace {
@@ -74,6 +76,51 @@ TEST(Evaluate, AColouredSceneIsComparedWithTruthAndBake) {
   EXPECT_GT(metrics.ab_error_grey.value(), 20) << "red is far from grey";
   EXPECT_NEAR(metrics.bake_ab_distance.value(), metrics.ab_error_grey.value(), 1e-3) << "the bake is grey";
   EXPECT_NEAR(metrics.colorfulness_difference.value(), 0, 1e-9);
+}
+
+TEST(Evaluate, FeaturesOfAllViewsMakeOneDistance) {
+  /// The mean of each channel, in each region alike but for a little that tells regions apart.
+  struct Means final : PictureEncoder {
+    [[nodiscard]] std::vector<float> regions(std::span<const std::uint8_t> rgb, int width, int height) const override {
+      std::vector<float> all;
+      for (int region = 0; region < kRegions * kRegions; ++region) {
+        for (std::size_t c = 0; c < 3; ++c) all.push_back(float(rgb[c]) + float(region % 2));
+      }
+      EXPECT_EQ(rgb.size(), std::size_t(width) * std::size_t(height) * 3);
+      return all;
+    }
+  };
+  const PaintedScene scene(linear_from_srgb(0.3f), true);
+  const test::TempDir folder;
+  Capture capture = grey_capture(3, 2);
+  for (View& view : capture.views) {
+    view.image_file = folder / (view.name + ".png");
+    Picture truth{kWidth, kHeight, {}};
+    for (int i = 0; i < kWidth * kHeight; ++i) truth.rgb.insert(truth.rgb.end(), {90, 140, 60});
+    write_png(view.image_file, truth);
+  }
+  const Means encoder;
+  EvaluateOptions options;
+  EXPECT_FALSE(evaluate(scene, capture, options).feature_distance);
+  options.encoder = &encoder;
+  const Metrics measured = evaluate(scene, capture, options);
+  ASSERT_TRUE(measured.feature_distance);
+  EXPECT_GT(*measured.feature_distance, 100) << "it is painted red";
+
+  Metrics metrics;
+  for (const int view : {0, 1}) {
+    ViewMetrics one;
+    one.features_ours = encoder.regions(std::vector<std::uint8_t>{10, 20, 30}, 1, 1);
+    one.features_truth = encoder.regions(std::vector<std::uint8_t>{13, 20, 26}, 1, 1);
+    one.view = std::to_string(view);
+    metrics.views.push_back(one);
+  }
+  summarise(metrics);
+  ASSERT_TRUE(metrics.feature_distance);
+  EXPECT_NEAR(*metrics.feature_distance, 9 + 16, 1e-6) << "the means differ alone";
+  EXPECT_TRUE(metrics.views[0].features_ours.empty());
+  EXPECT_EQ(record_of<Metrics>(nlohmann::ordered_json::parse(json_of(metrics).dump()), "m").feature_distance,
+            metrics.feature_distance);
 }
 
 TEST(Evaluate, MaskedPixelsDoNotCount) {

@@ -11,6 +11,53 @@
 namespace cnerf {
 namespace {
 
+/// Vectors with the mean and exactly the covariance diag(variances), turned by an angle in the first two axes.
+std::vector<float> gaussian(const std::vector<double>& mean, const std::vector<double>& variances, double angle = 0) {
+  const std::size_t d = mean.size(), n = 2 * d;
+  std::vector<float> vectors;
+  for (std::size_t i = 0; i < d; ++i) {
+    for (const double sign : {-1.0, 1.0}) {
+      std::vector<double> v(d, 0.0);
+      v[i] = sign * std::sqrt(variances[i] * double(n - 1) / 2);
+      const double x = v[0], y = v[1];
+      v[0] = std::cos(angle) * x - std::sin(angle) * y;
+      v[1] = std::sin(angle) * x + std::cos(angle) * y;
+      for (std::size_t k = 0; k < d; ++k) vectors.push_back(float(mean[k] + v[k]));
+    }
+  }
+  return vectors;
+}
+
+TEST(FrechetDistance, IsThatOfTwoGaussians) {
+  const std::vector<double> zero = {0, 0, 0}, mean = {1, -2, 3}, one = {4, 1, 9}, other = {1, 16, 9};
+  EXPECT_NEAR(frechet_distance(gaussian(mean, one), gaussian(mean, one), 3), 0, 1e-5);
+  EXPECT_NEAR(frechet_distance(gaussian(zero, one), gaussian(mean, one), 3), 1 + 4 + 9, 1e-4) << "means alone";
+  // Covariances that commute: the squared distance of the deviations.
+  EXPECT_NEAR(frechet_distance(gaussian(zero, one), gaussian(mean, other), 3),
+              14 + (2 - 1) * (2 - 1) + (1 - 4) * (1 - 4), 1e-4);
+  // Those that do not, in two dimensions: the root of a matrix has the trace √(Tr + 2 √det).
+  for (const double angle : {0.3, 1.1}) {
+    const double c = std::cos(angle) * std::cos(angle), s = std::sin(angle) * std::sin(angle);
+    const double trace = 4 * (1 * c + 16 * s) + 1 * (1 * s + 16 * c), determinant = 4.0 * 16.0;
+    const double expected = 5 + 17 - 2 * std::sqrt(trace + 2 * std::sqrt(determinant));
+    EXPECT_NEAR(frechet_distance(gaussian({0, 0}, {4, 1}), gaussian({0, 0}, {1, 16}, angle), 2), expected, 1e-4);
+  }
+}
+
+TEST(FrechetDistance, TakesSetsOfDifferentSizesAndMoreDimensionsThanVectors) {
+  const std::vector<float> a = gaussian({0, 0, 0}, {4, 1, 9});
+  std::vector<float> twice = a;
+  twice.insert(twice.end(), a.begin(), a.end());
+  // The same points twice: the covariance shrinks by (n - 1) 2 / (2 n - 1), n = 6.
+  const double shrunk = std::sqrt(10.0 / 11);
+  EXPECT_NEAR(frechet_distance(a, twice, 3), 14 * (1 - shrunk) * (1 - shrunk), 1e-5);
+  EXPECT_DOUBLE_EQ(frechet_distance(a, twice, 3), frechet_distance(twice, a, 3));
+  // Two vectors each of five dimensions: two lines, at right angles.
+  const std::vector<float> x = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0}, y = {0, 1, 0, 0, 0, 0, -1, 0, 0, 0};
+  EXPECT_NEAR(frechet_distance(x, y, 5), 2 + 2, 1e-6);
+  EXPECT_NEAR(frechet_distance(x, x, 5), 0, 1e-6);
+}
+
 TEST(Psnr, ClosedForms) {
   EXPECT_NEAR(psnr_from_mse(0.01), 20, 1e-12);
   EXPECT_NEAR(psnr_from_mse(1e-3), 30, 1e-12);

@@ -439,6 +439,27 @@ TEST_F(StudioTest, SuggestionsAreCardsThatCanBeBegunFrom) {
   EXPECT_EQ(ordered({{"order", "builtin"}, {"bases", {12}}})["failed"], true) << "no such card";
 }
 
+TEST_F(StudioTest, ViewsWorthPaintingAreNumberedAndThoseThatArePaintedAreNone) {
+  open();
+  const json state = ordered({{"order", "key-views"}});
+  const json& found = state["key_views"];
+  ASSERT_EQ(found.size(), 3u) << state.dump();
+  const auto& views = context_.capture.views;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_FALSE(views.at(found[i]["view"].get<std::size_t>()).held_out);
+    if (i > 0) EXPECT_LE(found[i]["adds"], found[i - 1]["adds"]);
+  }
+  EXPECT_THAT(state["commands"].dump(), HasSubstr("--suggest-keyframes 3"));
+
+  const int first = found[0]["view"];
+  json hidden = stroke_on(views[std::size_t(found[1]["view"])].name, "h");
+  hidden["hidden"] = true;
+  ASSERT_EQ(put({stroke_on(views[std::size_t(first)].name), hidden}, 0).status, 200);
+  const json again = ordered({{"order", "key-views"}})["key_views"];
+  for (const json& one : again) EXPECT_NE(one["view"], first) << "it is painted";
+  EXPECT_EQ(again[0]["view"], found[1]["view"]) << "what is hidden is not";
+}
+
 TEST_F(StudioTest, APaintedPictureBecomesAStroke) {
   open();
   const View& view = context_.capture.views[1];

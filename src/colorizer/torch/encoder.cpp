@@ -1,7 +1,8 @@
 #include "src/colorizer/torch/encoder.h"
 
+#include <algorithm>
 #include <array>
-#include <cstdlib>
+#include <cmath>
 #include <cstring>
 
 #include "src/base/check.h"
@@ -20,16 +21,22 @@ constexpr std::int64_t kExpansion = 4;
 /// What the training subtracted, of 0..255: blue, green, red.
 constexpr std::array<float, 3> kMeans{103.939f, 116.779f, 123.68f};
 
-/// A grey picture as the encoder's training had pictures.  [B, 3, H, W]
+constexpr int kShownSide = 224;  // pixels of the shorter side of a picture in colour, as the training's
+
+/// Planes of blue, green and red, 0..255, as the encoder's training had pictures.  [B, 3, H, W]
+Tensor normalised(std::vector<Tensor> planes) {
+  for (std::size_t i = 0; i < planes.size(); ++i) planes[i] = planes[i] - kMeans[i];
+  return torch::cat(planes, 1).contiguous(at::MemoryFormat::ChannelsLast);
+}
+
+/// A grey picture as such.
 Tensor input_of(const Tensor& lightness) {
   const Tensor source = lightness.contiguous();
   Tensor grey = torch::empty_like(source);
   const float* from = source.data_ptr<float>();
   float* to = grey.data_ptr<float>();
   for (std::int64_t i = 0; i < source.numel(); ++i) to[i] = 255 * srgb_from_linear(luminance_from_lightness(from[i]));
-  std::vector<Tensor> planes;
-  for (const float mean : kMeans) planes.push_back(grey - mean);
-  return torch::cat(planes, 1).contiguous(at::MemoryFormat::ChannelsLast);
+  return normalised({grey, grey, grey});
 }
 
 }  // namespace
@@ -104,8 +111,12 @@ Encoder::Encoder(const LayersModel& model) : sha256_(model.sha256) {
 std::vector<Tensor> Encoder::features(const Tensor& lightness) const {
   CNERF_CHECK(lightness.size(2) % kInputMultiple == 0 && lightness.size(3) % kInputMultiple == 0,
               "sides are multiples of the encoder's");
+  return stages_of(input_of(lightness));
+}
+
+std::vector<Tensor> Encoder::stages_of(const Tensor& picture) const {
   const torch::NoGradGuard no_grad;
-  Tensor x = torch::max_pool2d(stem_(input_of(lightness)).relu_(), 3, 2, 1);
+  Tensor x = torch::max_pool2d(stem_(picture).relu_(), 3, 2, 1);
   std::vector<Tensor> all;
   for (const std::vector<Block>& blocks : stages_) {
     for (const Block& block : blocks) x = block(x);
@@ -114,22 +125,33 @@ std::vector<Tensor> Encoder::features(const Tensor& lightness) const {
   return all;
 }
 
+std::vector<float> Encoder::regions(std::span<const std::uint8_t> rgb, int width, int height) const {
+  CNERF_CHECK_EQ(rgb.size(), std::size_t(width) * std::size_t(height) * 3);
+  namespace F = torch::nn::functional;
+  const auto bytes = const_cast<std::uint8_t*>(rgb.data());
+  Tensor picture =
+      torch::from_blob(bytes, {1, height, width, 3}, torch::kUInt8).to(torch::kFloat).permute({0, 3, 1, 2});
+  const auto shown = [&](int side) {
+    const double scaled = double(side) * kShownSide / std::min(width, height);
+    return kInputMultiple * std::max<std::int64_t>(1, std::llround(scaled / kInputMultiple));
+  };
+  picture = F::interpolate(picture, F::InterpolateFuncOptions()
+                                        .size(std::vector<std::int64_t>{shown(height), shown(width)})
+                                        .mode(torch::kBilinear)
+                                        .align_corners(false)
+                                        .antialias(true));
+  const auto plane = [&](std::int64_t channel) { return picture.slice(1, channel, channel + 1); };
+  const Tensor last = stages_of(normalised({plane(2), plane(1), plane(0)})).back();
+  const Tensor pooled = torch::adaptive_avg_pool2d(last, {kRegions, kRegions})[0].flatten(1).t().contiguous();
+  return {pooled.data_ptr<float>(), pooled.data_ptr<float>() + pooled.numel()};
+}
+
+std::unique_ptr<PictureEncoder> make_torch_picture_encoder() {
+  return std::make_unique<Encoder>(read_layers_model(encoder_folder()));
+}
+
 std::shared_ptr<const Encoder> load_encoder(const fs::path& folder) {
   return std::make_shared<const Encoder>(read_layers_model(folder));
-}
-
-fs::path encoder_folder() {
-  if (const char* named = std::getenv("CNERF_ENCODER")) return named;
-  if (const char* data = std::getenv("XDG_DATA_HOME"); data != nullptr && *data != '\0') {
-    return fs::path(data) / "cnerf" / "encoder";
-  }
-  const char* home = std::getenv("HOME");
-  return home == nullptr ? fs::path() : fs::path(home) / ".local" / "share" / "cnerf" / "encoder";
-}
-
-bool is_encoder_installed() {
-  const fs::path folder = encoder_folder();
-  return !folder.empty() && fs::exists(folder / "model.json");
 }
 
 }  // namespace cnerf

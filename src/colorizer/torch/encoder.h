@@ -1,7 +1,7 @@
 #pragma once
 /// A frozen encoder that was trained to name what photographs show: ResNet-50 (He et al. 2016) as Keras has it, read
-/// from files that the user installs (scripts/install_dependencies.sh --encoder). It is asked for what a grey picture
-/// shows, never for colours.
+/// from files that the user installs (scripts/install_dependencies.sh --encoder). Colorizers ask it what a grey picture
+/// shows, evaluation how pictures in colour look.
 
 #include <torch/torch.h>
 
@@ -9,10 +9,12 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "src/colorizer/layers_model.h"
+#include "src/colorizer/picture_encoder.h"
 
 namespace cnerf {
 
@@ -36,7 +38,7 @@ struct FoldedConv {
 [[nodiscard]] FoldedConv folded_conv(const LayersModel& model, const std::string& conv, const std::string& norm,
                                      const std::vector<std::int64_t>& shape);
 
-class Encoder {
+class Encoder final : public PictureEncoder {
  public:
   static constexpr std::int64_t kInputMultiple = 32;  ///< of both sides, pixels: the grids of stages then cover them
   static constexpr std::size_t kStages = 4;
@@ -49,10 +51,13 @@ class Encoder {
   /// @param lightness  [B, 1, H, W] L* 0..100, multiples of kInputMultiple.
   /// @return           of each stage [B, channels()[i], H / 4 / 2^i, W / 4 / 2^i], not negative.
   [[nodiscard]] std::vector<torch::Tensor> features(const torch::Tensor& lightness) const;
+  /// Of the last stage.
+  [[nodiscard]] std::vector<float> regions(std::span<const std::uint8_t> rgb, int width, int height) const override;
   [[nodiscard]] const std::vector<std::int64_t>& channels() const { return channels_; }
   [[nodiscard]] const std::string& sha256() const { return sha256_; }
 
  private:
+  [[nodiscard]] std::vector<torch::Tensor> stages_of(const torch::Tensor& picture) const;
   struct Block {
     FoldedConv reduce, middle, expand;
     std::optional<FoldedConv> shortcut;  ///< of the first block of a stage
@@ -66,5 +71,8 @@ class Encoder {
   std::vector<std::int64_t> channels_;
   std::string sha256_;
 };
+
+/// `make_picture_encoder` inside the plug-in: it is installed.
+[[nodiscard]] std::unique_ptr<PictureEncoder> make_torch_picture_encoder();
 
 }  // namespace cnerf

@@ -3,9 +3,11 @@
 #include <torch/version.h>
 
 #include "src/colorizer/kinds.h"
+#include "src/colorizer/torch/encoder.h"
 
 extern "C" __attribute__((visibility("default"))) const cnerf::TorchColorizers* cnerf_torch_colorizers() {
   static const cnerf::TorchColorizers colorizers{cnerf::make_builtin_colorizer, cnerf::make_reference_colorizer,
-                                                 cnerf::make_torchscript_colorizer, TORCH_VERSION};
+                                                 cnerf::make_torchscript_colorizer, cnerf::make_torch_picture_encoder,
+                                                 TORCH_VERSION};
   return &colorizers;
 }

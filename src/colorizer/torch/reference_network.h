@@ -68,9 +68,6 @@ class ReferenceNetwork {
 
 /// The encoder in `folder`.  @throws MissingInputError, InputError  see read_layers_model and Encoder.
 [[nodiscard]] std::shared_ptr<const Encoder> load_encoder(const std::filesystem::path& folder);
-/// Where it is looked for: $CNERF_ENCODER, else the user's data folder.
-[[nodiscard]] std::filesystem::path encoder_folder();
-[[nodiscard]] bool is_encoder_installed();
 
 /// The recipe with the encoder, at about the same cost.
 void use_encoder(ReferenceRecipe& recipe, std::shared_ptr<const Encoder> encoder);

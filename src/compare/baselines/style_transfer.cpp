@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -131,18 +132,18 @@ double transfer_style(const StyleJob& job, const Engines& engines, Observer& obs
   std::vector<StyledView> views = styled_views(job.capture, LuminanceModel::load(job.stage1, engines), observer);
   ColorModel model = ColorModel::create(job.options, engines);
   model.pixel_colors = PixelColors::kField;
-  model.colorizer = "style:AlexNet";
+  model.colorizer = job.colorizer;
   model.stage1_sha256 = sha256(read_binary_file(job.stage1));
 
-  const MatchedColors matched(job.reference);
-  const int matching = int(kMatchingShare * job.steps);
+  const auto matched = job.reference == nullptr ? std::nullopt : std::optional<MatchedColors>(*job.reference);
+  const int matching = matched ? int(kMatchingShare * job.steps) : 0;
   double loss = 0;
   for (int step = 0; step < job.steps; ++step) {
     if (observer.is_cancelled()) throw Interrupted("style transfer stopped; nothing was written");
     StyledView& view = views[std::size_t(step) % views.size()];
     std::vector<Ab> targets;
     if (step < matching) {
-      targets = matched.of(view.picture);
+      targets = matched->of(view.picture);
     } else {
       show(model, view);
       std::vector<float> gradient(view.picture.ab.size());

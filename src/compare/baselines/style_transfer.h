@@ -1,6 +1,7 @@
 #pragma once
-/// ARF (Zhang et al. 2022) for fields whose luminance is given: colours are changed until pictures' features are those
-/// of a reference image.
+/// Colours that are changed until pictures are as a loss wants them, of fields whose luminance is given. With the
+/// features of a reference image it is ARF (Zhang et al. 2022), with a text CLIP-NeRF's editing of appearance (Wang et
+/// al. 2022).
 ///
 /// As in ARF: colours are first matched to the reference's (there: mean and covariance; here, where luminance stays, by
 /// the regression of its ab on its L*), then nearest-neighbour feature matching follows, with deferred
@@ -11,7 +12,7 @@
 
 #include "src/base/progress.h"
 #include "src/capture/capture.h"
-#include "src/compare/baselines/style_loss.h"
+#include "src/compare/baselines/picture_loss.h"
 #include "src/train/chroma/stage2.h"
 
 namespace cnerf::compare {
@@ -20,13 +21,14 @@ namespace cnerf::compare {
 struct StyleJob {
   const Capture& capture;
   std::filesystem::path stage1;  ///< snapshot
-  const StyleLoss& loss;
-  const LabPicture& reference;
+  const PictureLoss& loss;
+  const LabPicture* reference;   ///< whose colours are matched first; null = none are
   const Stage2Options& options;  ///< the field's size, learning rates and seed are used
   int steps = 0;                 ///< pictures, of training views in turn
   std::filesystem::path take;    ///< snapshot that the result goes to
+  std::string colorizer;         ///< that the take names
 };
-/// Trains a photometric colour field on the style loss.
+/// Trains a photometric colour field on the loss.
 /// @return  seconds
 /// @throws Interrupted  without leaving anything; SnapshotError; UsageError for views that are too small.
 double transfer_style(const StyleJob& job, const Engines& engines, Observer& observer);

@@ -23,8 +23,12 @@ std::unique_ptr<Engines> positional_engines(const PositionalRays& rays, const En
   return torch_baselines().positional(rays, others);
 }
 
-std::unique_ptr<StyleLoss> make_style_loss(const std::filesystem::path& weights, const LabPicture& reference) {
+std::unique_ptr<PictureLoss> make_style_loss(const std::filesystem::path& weights, const LabPicture& reference) {
   return torch_baselines().style(weights, reference);
+}
+
+std::unique_ptr<PictureLoss> make_text_loss(const TextGuide& guide) {
+  return torch_baselines().text(guide);
 }
 
 }  // namespace cnerf::compare

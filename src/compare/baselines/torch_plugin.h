@@ -1,18 +1,20 @@
 #pragma once
 /// What libcnerf_compare_torch.so offers: the baselines that need LibTorch.
 
+#include "src/compare/baselines/picture_loss.h"
 #include "src/compare/baselines/positional_field.h"
-#include "src/compare/baselines/style_loss.h"
 
 namespace cnerf::compare {
 
 struct TorchBaselines {
   decltype(positional_engines)* positional;
   decltype(make_style_loss)* style;
+  decltype(make_text_loss)* text;
 };
 
-/// ARF's loss, inside the plug-in.
-[[nodiscard]] std::unique_ptr<StyleLoss> make_torch_style_loss(const std::filesystem::path& weights,
-                                                               const LabPicture& reference);
+// Inside the plug-in.
+[[nodiscard]] std::unique_ptr<PictureLoss> make_torch_style_loss(const std::filesystem::path& weights,
+                                                                 const LabPicture& reference);
+[[nodiscard]] std::unique_ptr<PictureLoss> make_torch_text_loss(const TextGuide& guide);
 
 }  // namespace cnerf::compare

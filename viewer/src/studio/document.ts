@@ -151,6 +151,10 @@ export class StrokeDocument {
   edit(id: string, changes: Partial<Stroke>): void {
     this.change(this.list.map((s) => (s.id === id ? { ...s, ...changes } : s)));
   }
+  /** Strokes of one word have one colour, as a palette gives it. */
+  recolour({ id, word }: Stroke, color: string): void {
+    this.change(this.list.map((s) => (s.id === id || (word && s.word === word) ? { ...s, color } : s)));
+  }
   remove(id: string): void {
     this.change(this.list.filter((s) => s.id !== id));
   }

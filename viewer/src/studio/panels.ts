@@ -1,13 +1,14 @@
 /** The panel's sections beside the palette: strokes, takes, ideas, finish, commands. */
 
-import { button, copyText, el, icon, section, segments, slider, toggle } from "../ui/dom";
+import { button, copyText, el, icon, section, segments, slider, toast, toggle } from "../ui/dom";
+import type { StrokeDocument } from "./document";
 import type { FieldView } from "./field";
 import type { Finish, Stroke, Take } from "./protocol";
 import { Latest } from "./reach";
 import type { Session } from "./session";
 import { words } from "./words";
 
-/** Asks for a name, or (without a value) for a yes. */
+/** Asks for a name, which may be empty, or (without a value) for a yes. */
 export function ask(question: string, value?: string, yes = value === undefined ? words.leave : words.ok): Promise<string | null> {
   const input = el("input", { type: "text", class: "hex", value: value ?? "", maxlength: 60, "aria-label": question, hidden: value === undefined });
   const dialog = el("dialog", { class: "card" }, el("form", { method: "dialog" }, el("h1", {}, question), input,
@@ -18,7 +19,7 @@ export function ask(question: string, value?: string, yes = value === undefined 
   return new Promise((done) => dialog.addEventListener("close", () => {
     dialog.remove();
     const text = value === undefined ? "yes" : input.value.trim();
-    done(dialog.returnValue === "yes" && text ? text : null);
+    done(dialog.returnValue === "yes" ? text : null);
   }));
 }
 
@@ -53,6 +54,14 @@ function paintedDot(picture: string): HTMLElement {
   return el("img", { class: "dot picture", src: `./studio/painted?picture=${picture}`, alt: "", draggable: "false" });
 }
 
+/** What is painted, for a palette of words. */
+async function nameStroke(strokes: StrokeDocument, stroke: Stroke): Promise<void> {
+  const word = await ask(words.whatIsIt, stroke.word ?? "");
+  if (word === null) return;
+  if (/[,;=#]/.test(word)) return toast(words.badWord);
+  strokes.edit(stroke.id, { word: word || undefined });
+}
+
 export function strokesPanel(session: Session): HTMLElement {
   const { strokes } = session;
   let all = false;
@@ -67,25 +76,28 @@ export function strokesPanel(session: Session): HTMLElement {
   const paintedPicture = button(words.paintedPicture, () => file.click());
   const row = (stroke: Stroke) => {
     const kind = stroke.kind === "paint" && stroke.points.length === 1 ? words.dot : words.kinds[stroke.kind];
-    const name = el("button", { type: "button", class: "name-button", "aria-label": words.selected(kind), onclick: () => ((session.selected = stroke.id), update()) }, stroke.picture ? paintedDot(stroke.picture) : el("span", { class: `dot ${stroke.kind}` }), el("span", {}, kind), el("small", {}, all ? words.view(stroke.view) : ""));
+    const name = el("button", { type: "button", class: "name-button", "aria-label": words.selected(stroke.word ?? kind), onclick: () => ((session.selected = stroke.id), update()) }, stroke.picture ? paintedDot(stroke.picture) : el("span", { class: `dot ${stroke.kind}` }), el("span", {}, stroke.word ?? kind), el("small", {}, all ? words.view(stroke.view) : ""));
     (name.firstChild as HTMLElement).style.setProperty("--color", stroke.color);
     const hide = small(stroke.hidden ? "hidden" : "shown", stroke.hidden ? words.show : words.hide, () => strokes.edit(stroke.id, { hidden: !stroke.hidden }));
-    const recolour = small("drop", words.recolour, () => strokes.edit(stroke.id, { color: session.brush.settings.color }));
-    recolour.hidden = stroke.kind !== "paint" && stroke.kind !== "exact";
-    return el("li", { class: stroke.hidden ? "off" : "" }, name, hide, recolour, small("close", words.remove, () => strokes.remove(stroke.id)));
+    const recolour = small("drop", words.recolour, () => strokes.recolour(stroke, session.brush.settings.color));
+    const naming = small("pencil", words.nameIt, () => void nameStroke(strokes, stroke));
+    recolour.hidden = naming.hidden = stroke.kind !== "paint" && stroke.kind !== "exact";
+    return el("li", { class: stroke.hidden ? "off" : "" }, name, naming, hide, recolour, small("close", words.remove, () => strokes.remove(stroke.id)));
   };
   const everywhere = toggle("everywhere", words.everywhere, strokes.everywhere, (value) => strokes.setEverywhere(value));
   everywhere.node.title = words.everywhereTitle;
   const update = () => {
     everywhere.set(strokes.everywhere);
     const shown = all || session.open === "" ? strokes.list : strokes.of(session.open);
-    keyed(list, [...shown].reverse(), (s) => `${s.id} ${s.color} ${s.hidden} ${all}`, row);
+    keyed(list, [...shown].reverse(), (s) => `${s.id} ${s.color} ${s.hidden} ${all} ${s.word ?? ""}`, row);
     for (const node of list.children) (node as HTMLElement).setAttribute("aria-current", String((node as HTMLElement).dataset.key!.startsWith(`${session.selected} `)));
     none.hidden = shown.length > 0;
     paintedPicture.hidden = !session.view;
+    whichView.disabled = session.isBusy || session.isLost || !session.state.ready;
     node.classList.toggle("read-only", session.isReadOnly);
   };
-  const node = section(words.strokes, true, everywhere.node, which.node, list, none, el("div", { class: "buttons" }, paintedPicture), file);
+  const whichView = button(words.whichView, () => void session.order({ order: "key-views" }), { id: "which-view", title: words.whichViewTitle });
+  const node = section(words.strokes, true, everywhere.node, which.node, list, none, el("div", { class: "buttons" }, whichView, paintedPicture), file);
   strokes.onChange(update);
   session.onState(update);
   update();

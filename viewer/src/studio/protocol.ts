@@ -63,6 +63,8 @@ export interface State {
   downloads: { name: string; address: string; bytes: number }[];
   blender: string;
   cards: { number: number; address: string }[];
+  /** Photographs that tell most of the others once they are painted, the one to begin with first. */
+  key_views: { view: number; adds: number }[];
   finish: Finish;
   /** What the work said lately, oldest first. */
   notes: string[];

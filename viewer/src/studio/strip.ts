@@ -1,6 +1,7 @@
 /** The photographs of the capture, then the viewpoints, as thumbnails in the colours of now, with what strokes will reach. */
 
 import { el } from "../ui/dom";
+import type { State } from "./protocol";
 import type { Session } from "./session";
 import { words } from "./words";
 
@@ -13,6 +14,7 @@ interface Item {
   image: HTMLImageElement;
   reach: HTMLImageElement;
   count: HTMLElement;
+  rank: HTMLElement;
   isSeen: boolean;
 }
 
@@ -27,8 +29,10 @@ export class Strip {
 
   private observer: IntersectionObserver;
   private marked = -1;
+  private ledTo: string;
 
   constructor(private readonly session: Session, private readonly choose: (index: number, fly: boolean) => void) {
+    this.ledTo = JSON.stringify(session.state.key_views ?? []);
     this.observer = new IntersectionObserver((entries) => {
       const items = new Map(this.items.map((item) => [item.node as Element, item]));
       for (const { target, isIntersecting } of entries) {
@@ -47,13 +51,14 @@ export class Strip {
     const image = el("img", { alt: "", draggable: "false" });
     const reach = el("img", { alt: "", class: "reach", draggable: "false" });
     const count = el("span", { class: "count", hidden: true });
+    const rank = el("span", { class: "rank", hidden: true });
     const own = this.session.isViewpoint(index);
-    const node = el("button", { type: "button", class: "thumbnail", title: own ? words.view(name) : name }, image, reach, count, own ? el("span", { class: "caption" }, words.view(name)) : null);
+    const node = el("button", { type: "button", class: "thumbnail", title: own ? words.view(name) : name }, image, reach, count, rank, own ? el("span", { class: "caption" }, words.view(name)) : null);
     node.addEventListener("click", (e) => this.choose(this.items.findIndex((item) => item.node === node), e.shiftKey || held_out));
     node.classList.toggle("held-out", held_out);
     node.classList.toggle("viewpoint", own);
     this.observer.observe(node);
-    return { name, node, image, reach, count, isSeen: false };
+    return { name, node, image, reach, count, rank, isSeen: false };
   }
   /** One thumbnail a view; those that stay are left as they are. */
   private follow(): void {
@@ -93,14 +98,32 @@ export class Strip {
     this.follow();
     const counts = new Map<string, number>();
     for (const { view } of this.session.strokes.list) counts.set(view, (counts.get(view) ?? 0) + 1);
+    const { key_views: keyViews = [] } = this.session.state;
     this.session.views.forEach((view, i) => {
       const count = counts.get(view.name) ?? 0;
       const item = this.items[i];
       item.count.textContent = String(count);
       item.count.hidden = count === 0;
-      item.node.setAttribute("aria-label", view.held_out ? words.heldOut(view.name) : words.photograph(view.name, count));
+      const rank = keyViews.findIndex((one) => one.view === i);
+      item.rank.textContent = String(rank + 1);
+      item.rank.hidden = rank < 0;
+      const label = view.held_out ? words.heldOut(view.name) : words.photograph(view.name, count);
+      item.node.setAttribute("aria-label", rank < 0 ? label : `${label}, ${words.keyView(rank + 1, keyViews[rank].adds)}`);
     });
+    this.lead(keyViews);
     this.pump();
+  }
+
+  /** To the first of new suggestions, with the keyboard too where it asked for them. */
+  private lead(keyViews: State["key_views"]): void {
+    const text = JSON.stringify(keyViews);
+    if (text === this.ledTo) return;
+    this.ledTo = text;
+    const first = this.items[keyViews[0]?.view];
+    first?.node.scrollIntoView({ inline: "center", block: "nearest" });
+    // The button that asked cannot keep the focus while the answer is found.
+    const focused = document.activeElement;
+    if (focused === document.body || focused?.id === "which-view") first?.node.focus();
   }
 
   private addresses(i: number): { image: string; reach: string } {

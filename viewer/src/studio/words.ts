@@ -10,7 +10,7 @@ export const words = {
   now: "now",
   unkept: "not kept yet",
   of: (take: string) => (take ? `begun from ${take}` : "begun from grey"),
-  tasks: { prepare: "Finding the cameras", train: "Training", cache: "Tracing the views", colour: "Colouring", bake: "Baking", photographs: "Writing photographs", suggest: "Making suggestions" } as Record<string, string>,
+  tasks: { prepare: "Finding the cameras", train: "Training", cache: "Tracing the views", colour: "Colouring", bake: "Baking", photographs: "Writing photographs", suggest: "Making suggestions", "key-views": "Comparing the views" } as Record<string, string>,
   percent: (fraction: number) => `${Math.round(100 * fraction)} %`,
 
   reception: {
@@ -47,6 +47,7 @@ export const words = {
   wipe: (left: string, right: string) => `Wipe between ${left} and ${right}`,
   strip: "Photographs of the capture: choose one to paint on it",
   photograph: (name: string, strokes: number) => `Paint on ${words.view(name)}${strokes ? `, ${many(strokes, "stroke", "strokes")}` : ""}`,
+  keyView: (rank: number, adds: number) => `suggestion ${rank}, tells of ${Math.round(100 * adds)} % of the scene`,
   heldOut: (name: string) => `${name} is held out: it can be looked at, not painted on`,
   freeView: "free view",
   /** A photograph's file, or a viewpoint. */
@@ -125,6 +126,11 @@ export const words = {
   everywhere: "Colour everything",
   everywhereTitle: "Each place takes the colours of the strokes that it is most like; otherwise colours stay within their reach",
   noStrokes: "No strokes yet. Choose a photograph below and paint.",
+  whichView: "Which view to paint?",
+  whichViewTitle: "Marks the photographs below that, once painted, tell most of the others",
+  nameIt: "Say what it is",
+  whatIsIt: "What is painted here? Strokes of one word change colour together, as --palette does it",
+  badWord: "A word has no , ; = or #",
   hide: "Hide",
   show: "Show",
   recolour: "Give it the brush's colour",

@@ -239,6 +239,76 @@ describe("painting", () => {
   });
 });
 
+describe("what to paint", () => {
+  it("is marked on the photographs below, in reach of the keyboard", async () => {
+    await clear(page);
+    await page.keyboard.press("Escape");
+    await page.focus("#which-view");
+    await page.keyboard.press("Enter");
+    await until(page, () => window.cnerf.session.state.key_views.length > 0 && window.cnerf.session.state.task === "");
+    const views = await page.evaluate(() => window.cnerf.session.state.key_views.map((one) => one.view));
+    const marked = await page.evaluate(() => [...document.querySelectorAll("#strip .rank:not([hidden])")].map((node) => [node.parentElement.dataset.view, node.textContent]).sort((a, b) => a[1] - b[1]));
+    assert.deepEqual(marked, views.map((view, i) => [String(view), String(i + 1)]));
+    const first = page.locator(`#strip .thumbnail[data-view="${views[0]}"]`);
+    assert.match(await first.getAttribute("aria-label"), /suggestion 1, tells of \d+ % of the scene/);
+    assert.equal(await page.evaluate(() => document.activeElement.dataset.view), String(views[0]), "the keyboard is there");
+    await page.keyboard.press("Enter");
+    await page.waitForSelector(`[data-photo="${views[0]}"]`);
+  });
+  it("leaves out what is painted", async () => {
+    const { photo } = await page.evaluate(() => ({ photo: window.cnerf.session.photo }));
+    await page.keyboard.press("b");
+    await draw(page, [[0.4, 0.5], [0.5, 0.55]]);
+    await saved(page);
+    const version = await page.evaluate(() => window.cnerf.session.state.version);
+    await page.click("#which-view");
+    await until(page, (before) => window.cnerf.session.state.version > before + 1 && window.cnerf.session.state.task === "", version);
+    await until(page, (painted) => !window.cnerf.session.state.key_views.some((one) => one.view === painted), photo);
+  });
+});
+
+describe("a stroke's word", () => {
+  const answer = async (text) => {
+    await page.fill("dialog[open] input", text);
+    await page.click("dialog[open] .primary");
+    await page.waitForSelector("dialog form", { state: "detached" });  // its answer is taken then
+  };
+  const row = (index) => page.locator("#strokes li").nth(index);
+  const naming = (index) => row(index).getByRole("button", { name: "Say what it is" });
+  it("is said in the list, and kept with the stroke whatever is done to it", async () => {
+    await clear(page);
+    await paintOn(page, 1);
+    await brush(page, { tool: "brush", color: "#c03020", size: 0.05, exact: false });
+    for (const y of [0.3, 0.5, 0.7]) await draw(page, [[0.3, y], [0.4, y]]);
+    for (const index of [0, 2]) {
+      await naming(index).click();
+      await answer("jacket");
+    }
+    await row(2).getByRole("button", { name: "Hide" }).click();
+    await saved(page);
+    assert.deepEqual((await strokesOf(page)).map((s) => [s.word, s.hidden]), [["jacket", true], [undefined, false], ["jacket", false]]);
+    assert.match(await row(0).textContent(), /jacket/);
+    await page.reload({ timeout: patience });
+    await page.waitForSelector("body[data-ready]", { timeout: patience });
+    await until(page, () => window.cnerf.session.strokes.list.length === 3);
+    assert.deepEqual((await shownStrokes(page)).map((s) => s.word), ["jacket", undefined, "jacket"]);
+  });
+  it("gives all of that word the brush's colour at once, and can be taken back", async () => {
+    await paintOn(page, 1);
+    await brush(page, { color: "#2040a0" });
+    await row(0).getByRole("button", { name: "Give it the brush's colour" }).click();
+    await saved(page);
+    assert.deepEqual((await strokesOf(page)).map((s) => s.color), ["#2040a0", "#c03020", "#2040a0"]);
+    await naming(0).click();
+    await answer("a, b");
+    assert.equal((await shownStrokes(page))[2].word, "jacket", "no word has a comma");
+    await naming(0).click();
+    await answer("");
+    await saved(page);
+    assert.deepEqual((await strokesOf(page)).map((s) => s.word), ["jacket", undefined, undefined]);
+  });
+});
+
 describe("work", () => {
   it("is there after a reload, and the page may still paint", async () => {
     await saved(page);

@@ -83,7 +83,7 @@ export class StudioMock {
     };
     this.state = {
       version: 1, stage, scene: 1, notes: [], arrived: { files: 0, bytes: 0 }, finish: { saturation: 1, hue: 0, exposure: 0 }, colors: 1, task: "", fraction: 0, figures: {}, message: "", failed: false, ready: stage === "field", writer: "", strokes: 0, take: "",
-      unkept: false, takes: [], commands: [], downloads: [], blender: "", cards: [],
+      unkept: false, takes: [], commands: [], downloads: [], blender: "", cards: [], key_views: [],
     };
     this.strokes = [];
     this.viewpoints = [];
@@ -341,7 +341,7 @@ export class StudioMock {
     const take = state.takes.find((t) => t.name === order.take);
     const colored = (amount, change) => ((this.amount = amount), this.change({ colors: state.colors + 1, ...change }));
     const command = (line) => (state.commands = [...state.commands, line]);
-    if (["colour", "bake", "suggest", "photographs", "builtin", "prepare", "train"].includes(order.order) && state.task) return this.refuse(response, 409, "Something runs already.");
+    if (["colour", "bake", "suggest", "key-views", "photographs", "builtin", "prepare", "train"].includes(order.order) && state.task) return this.refuse(response, 409, "Something runs already.");
     if (["begin", "rename", "duplicate", "delete"].includes(order.order) && !take && order.take !== "") return this.refuse(response, 404, `There is no take ${order.take}.`);
     if (["keep", "rename", "duplicate"].includes(order.order) && state.takes.some((t) => t.name === order.name)) return this.refuse(response, 409, `There is a take ${order.name} already.`);
     const orders = {
@@ -366,6 +366,13 @@ export class StudioMock {
       duplicate: () => ((this.amounts[order.name] = this.amounts[order.take]), this.change({ takes: [...state.takes, { ...take, name: order.name }] })),
       delete: () => this.change({ takes: state.takes.filter((t) => t !== take), take: state.take === order.take ? "" : state.take }),
       suggest: () => this.run("suggest", () => this.change({ cards: [0, 1].map((number) => ({ number, address: `./studio/photos/${number}?side=96` })) })),
+      // The views that nobody painted on, from the middle outwards.
+      "key-views": () => this.run("key-views", () => {
+        const painted = new Set(this.strokes.map((s) => s.view));
+        const left = this.scene.views.map((v, view) => ({ ...v, view })).filter((v) => !v.held_out && !painted.has(v.name));
+        const middle = this.scene.views.length / 2;
+        this.change({ key_views: left.sort((a, b) => Math.abs(a.view - middle) - Math.abs(b.view - middle)).slice(0, 3).map(({ view }, i) => ({ view, adds: 0.5 / (i + 1) })) });
+      }),
       finish: () => colored(this.amount, { unkept: state.unkept, finish: { saturation: order.saturation, hue: order.hue, exposure: order.exposure } }),
       bake: () => this.run("bake", () => (command(`cnerf bake RUN --format ${order.formats.join(",")}`), this.change({ downloads: order.formats.map((f) => ({ name: `ball.${f}`, address: `./studio/files/ball.${f}`, bytes: 3e6 })), blender: "blender --python blender_setup.py" }))),
       photographs: () => this.run("photographs", () => this.change({ message: "Written." })),

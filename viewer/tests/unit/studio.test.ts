@@ -72,6 +72,21 @@ describe("strokes", () => {
     store.everywhere = true;
     expect((await opened(store, kept)).document.everywhere).toBe(true);
   });
+  it("keep their words, and those of one word change colour together", async () => {
+    const { document, store, kept } = await opened();
+    document.add(stroke("a", { word: "jacket" }));
+    document.add(stroke("b"));
+    document.add(stroke("c", { word: "jacket" }));
+    document.edit("a", { hidden: true });
+    document.recolour(document.list[2], "#204080");
+    document.recolour(document.list[1], "#10a020");
+    await document.save();
+    const later = (await opened(store, kept)).document.list;
+    expect(later.map((s) => [s.word, s.color])).toEqual([["jacket", "#204080"], [undefined, "#10a020"], ["jacket", "#204080"]]);
+    document.undo();
+    document.undo();
+    expect(document.list.map((s) => s.color)).toEqual(["#c08040", "#c08040", "#c08040"]);
+  });
   it("are undone and redone, whatever was done to them", async () => {
     const { document, store } = await opened();
     const states: string[] = [];

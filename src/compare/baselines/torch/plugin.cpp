@@ -37,6 +37,7 @@ std::unique_ptr<Engines> make_positional_engines(const PositionalRays& rays, con
 
 extern "C" __attribute__((visibility("default"))) const cnerf::compare::TorchBaselines* cnerf_torch_baselines() {
   static const cnerf::compare::TorchBaselines baselines{cnerf::compare::make_positional_engines,
-                                                        cnerf::compare::make_torch_style_loss};
+                                                        cnerf::compare::make_torch_style_loss,
+                                                        cnerf::compare::make_torch_text_loss};
   return &baselines;
 }
