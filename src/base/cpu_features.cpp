@@ -2,17 +2,21 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <string_view>
+#include <iterator>
 
 namespace cnerf {
 namespace {
 
+constexpr IsaLevel kLevels[] = {IsaLevel::kGeneric, IsaLevel::kAvx2, IsaLevel::kAvx512, IsaLevel::kAvx512Bf16};
+
+constexpr const char* kVariable = "CNERF_ISA";
+
 IsaLevel level_from_environment() {
-  const char* value = std::getenv("CNERF_ISA");
-  if (value == nullptr) return IsaLevel::kAvx512;
-  if (std::string_view(value) == "generic") return IsaLevel::kGeneric;
-  if (std::string_view(value) == "avx2") return IsaLevel::kAvx2;
-  return IsaLevel::kAvx512;
+  const char* value = std::getenv(kVariable);
+  for (const IsaLevel level : kLevels) {
+    if (value != nullptr && to_string(level) == value) return level;
+  }
+  return kLevels[std::size(kLevels) - 1];
 }
 
 }  // namespace
@@ -21,7 +25,7 @@ IsaLevel detected_isa() {
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
       __builtin_cpu_supports("avx512bw")) {
-    return IsaLevel::kAvx512;
+    return __builtin_cpu_supports("avx512bf16") ? IsaLevel::kAvx512Bf16 : IsaLevel::kAvx512;
   }
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return IsaLevel::kAvx2;
 #endif
@@ -33,8 +37,14 @@ IsaLevel active_isa() {
   return std::min(detected, level_from_environment());
 }
 
+void choose_isa(const std::string& name) {
+  if (name != "auto") ::setenv(kVariable, name.c_str(), 1);
+}
+
 std::string to_string(IsaLevel level) {
   switch (level) {
+    case IsaLevel::kAvx512Bf16:
+      return "avx512bf16";
     case IsaLevel::kAvx512:
       return "avx512";
     case IsaLevel::kAvx2:

@@ -16,6 +16,7 @@
 #include "src/color/ab_bins.h"
 #include "src/colorizer/torch/encoder.h"
 #include "src/colorizer/torch/network_weights.h"
+#include "src/colorizer/torch/products.h"
 #include "src/colorizer/torch/single_threaded_ops.h"
 
 namespace cnerf {
@@ -27,13 +28,21 @@ using torch::Tensor;
 constexpr float kAbScale = 40.0f;  // network units of ab: keeps outputs near 1
 constexpr double kStageScale = 4;  // of the encoder's features
 
+/// A convolution in the type of `x`, whatever the type of the weights that are learned.
+Tensor convolved(const nn::Conv2d& conv, const Tensor& x) {
+  const auto& options = conv->options;
+  const Tensor bias = conv->bias.defined() ? conv->bias.to(x.scalar_type()) : Tensor();
+  return torch::conv2d(x, conv->weight.to(x.scalar_type()), bias, options.stride(),
+                       c10::get<torch::ExpandingArray<2>>(options.padding()), options.dilation());
+}
+
 /// Convolution, SiLU. No normalisation: with it, the same time of fitting ends at colours a tenth further from the
 /// truth.
 struct BlockImpl : nn::Module {
   BlockImpl(int in, int out, int stride, int dilation = 1)
       : conv(register_module(
             "conv", nn::Conv2d(nn::Conv2dOptions(in, out, 3).stride(stride).padding(dilation).dilation(dilation)))) {}
-  Tensor forward(const Tensor& x) { return torch::silu(conv(x)); }
+  Tensor forward(const Tensor& x) { return torch::silu(convolved(conv, x)); }
 
   nn::Conv2d conv;
 };
@@ -95,31 +104,30 @@ struct UNetImpl : nn::Module {
     }
   }
 
-  /// @param lightness  [B, 1, H, W] L*, H and W multiples of 2^levels.   @return [B, outputs, H/2, W/2]
-  Tensor forward(const Tensor& lightness, const Guidance& guidance) {
-    Tensor x = features(lightness);
-    x = x.contiguous(at::MemoryFormat::ChannelsLast);
+  /// @param features  of lightness [B, 1, H, W], H and W multiples of 2^levels.   @return [B, outputs, H/2, W/2] f32
+  Tensor forward(const Tensor& features, const Guidance& guidance) {
+    Tensor x = features;
     std::vector<Tensor> skips;
     for (std::size_t level = 0; level < down.size(); ++level) {
       x = down[level](x);
-      if (guide_semantic && level == Guidance::kSemanticLevel) x = x + guide_semantic(guidance.semantic);
-      if (guide_ab && level == Guidance::kAbLevel) x = x + guide_ab(guidance.ab);
+      if (guide_semantic && level == Guidance::kSemanticLevel) x = x + convolved(guide_semantic, guidance.semantic);
+      if (guide_ab && level == Guidance::kAbLevel) x = x + convolved(guide_ab, guidance.ab);
       const std::size_t stage = level - Guidance::kFirstStageLevel;  // huge before the first
-      if (stage < guide_stages.size()) x = x + guide_stages[stage](guidance.stages[stage]);
+      if (stage < guide_stages.size()) x = x + convolved(guide_stages[stage], guidance.stages[stage]);
       x = x + encode[level](x);
       skips.push_back(x);
     }
     x = x + wide(x);
-    x = x + global(x.mean({2, 3}, true));
+    x = x + convolved(global, x.mean({2, 3}, true));
     for (std::size_t i = 0; i < decode.size(); ++i) {
       const Tensor& skip = skips[skips.size() - 2 - i];
-      x = torch::upsample_nearest2d(lateral[i](x), {skip.size(2), skip.size(3)}) + skip;
+      x = torch::upsample_nearest2d(convolved(lateral[i], x), {skip.size(2), skip.size(3)}) + skip;
       x = x + decode[i](x);
     }
-    return head(x);
+    return convolved(head, x).to(torch::kFloat32);
   }
 
-  /// Lightness, what stands out of its surroundings at two scales, and how busy those are.
+  /// Lightness, what stands out of its surroundings at two scales, and how busy those are: as convolutions read it.
   [[nodiscard]] static Tensor features(const Tensor& lightness) {
     const Tensor level = (lightness - 50) / 50;
     std::vector<Tensor> all{level};
@@ -134,7 +142,7 @@ struct UNetImpl : nn::Module {
       all.push_back((level - mean) / (deviation + 0.05));
       all.push_back(deviation.log() * 0.5 + 1);
     }
-    return torch::cat(all, 1);
+    return torch::cat(all, 1).to(product_type()).contiguous(at::MemoryFormat::ChannelsLast);
   }
 
   std::vector<Block> down, encode, decode;
@@ -232,13 +240,14 @@ std::string ReferenceRecipe::text() const {
        << distortion.blur << "; noise " << distortion.noise;
   if (!builtin.empty()) text << "; on " << sha256(read_binary_file(builtin));
   if (encoder) text << "; encoder " << encoder->sha256() << ", scale " << kStageScale;
+  if (product_type() != torch::kFloat32) text << "; bf16";
   if (patch_uses > 1) text << "; each patch " << patch_uses << " times of " << patches_held;
   return text.str();
 }
 
 /// Part of a batch that is learned from.
 struct Patches {
-  Tensor lightness, ab;  ///< [n, 1, H, W], [n, 2, H, W]
+  Tensor features, ab;  ///< [n, 5, H, W], [n, 2, H, W]
   Guidance guidance;
 };
 
@@ -256,10 +265,12 @@ struct ReferenceNetwork::Parts {
     if (builtin) {
       const ColorizerFeatures features = ColorizerNet(builtin->network)->features(lightness);
       guidance.semantic = features.semantic;
-      guidance.ab = decode_ab(features.logits, builtin->decoding) / kAbScale;
+      guidance.ab = (decode_ab(features.logits, builtin->decoding) / kAbScale).to(product_type());
     }
     if (recipe.encoder) {
-      for (const Tensor& stage : recipe.encoder->features(lightness)) guidance.stages.push_back(scaled_stage(stage));
+      for (const Tensor& stage : recipe.encoder->features(lightness)) {
+        guidance.stages.push_back(scaled_stage(stage).to(product_type()));
+      }
     }
     return guidance;
   }
@@ -297,14 +308,16 @@ Tensor ReferenceNetwork::Parts::loss(const Tensor& out, const Tensor& ab) const 
 Patches ReferenceNetwork::Parts::drawn(std::span<const ReferenceImage> images, int step, int shard) const {
   const int count = recipe.batch / recipe.shards, size = recipe.patch_size;
   const std::size_t pixels = std::size_t(size) * std::size_t(size);
-  Patches patches{torch::empty({count, 1, size, size}), torch::empty({count, 2, size, size}), {}};
+  const Tensor lightness = torch::empty({count, 1, size, size});
+  Patches patches{{}, torch::empty({count, 2, size, size}), {}};
   for (int i = 0; i < count; ++i) {
     SequentialRng rng(seed, (std::uint64_t(step) << 16) + std::uint64_t(shard * count + i) + 1);
     sample_reference_patch(images, recipe.distortion, size, rng,
-                           {patches.lightness.data_ptr<float>() + std::size_t(i) * pixels, pixels},
+                           {lightness.data_ptr<float>() + std::size_t(i) * pixels, pixels},
                            {patches.ab.data_ptr<float>() + std::size_t(i) * 2 * pixels, 2 * pixels});
   }
-  patches.guidance = guidance(patches.lightness);
+  patches.features = UNetImpl::features(lightness);
+  patches.guidance = guidance(lightness);
   return patches;
 }
 
@@ -323,7 +336,7 @@ const Patches& ReferenceNetwork::Parts::patches_of(std::span<const ReferenceImag
 }
 
 std::vector<Tensor> ReferenceNetwork::Parts::gradients(const Patches& patches, double* loss_value) const {
-  const Tensor out = UNet(net)->forward(patches.lightness, patches.guidance);
+  const Tensor out = UNet(net)->forward(patches.features, patches.guidance);
   const Tensor value = loss(out, torch::avg_pool2d(patches.ab, {2, 2}));
   *loss_value = value.item<double>();
   return torch::autograd::grad({value}, net->parameters());
@@ -353,11 +366,7 @@ ReferenceNetwork::ReferenceNetwork(const ReferenceRecipe& recipe, std::span<cons
   parts_->labels = std::make_unique<LabelTable>(class_of);
   if (!recipe.builtin.empty()) {
     parts_->builtin = load_colorizer_weights(recipe.builtin);
-    // Once here, instead of in every convolution of every step.
-    for (Tensor& parameter : parts_->builtin->network->parameters()) {
-      parameter.set_requires_grad(false);
-      if (parameter.dim() == 4) parameter.set_data(parameter.contiguous(at::MemoryFormat::ChannelsLast));
-    }
+    prepare_for_answers(*parts_->builtin->network);
   }
   parts_->net = UNet(recipe, int(bins.size()));
   initialise(parts_->net, seed);
@@ -420,7 +429,7 @@ std::vector<float> ReferenceNetwork::colorize(const LightnessBatch& patches) con
     lightness = torch::replication_pad2d(lightness, {0, rounded(width) - width, 0, rounded(height) - height});
     lightness = torch::cat({lightness, lightness.flip({3})});
     UNet net(parts_->net);
-    Tensor ab = parts_->decode(net->forward(lightness, parts_->guidance(lightness)));
+    Tensor ab = parts_->decode(net->forward(UNetImpl::features(lightness), parts_->guidance(lightness)));
     ab = (ab.slice(0, 0, 1) + ab.slice(0, 1, 2).flip({3})) / 2;
     ab = torch::upsample_bilinear2d(ab, {rounded(height), rounded(width)}, false);
     ab = ab.slice(2, 0, height).slice(3, 0, width).contiguous();

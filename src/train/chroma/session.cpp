@@ -52,6 +52,8 @@ void Session::begin_model(const Engines& engines, PixelColors pixel_colors) {
                         ": was made with another colorizer or other stage2 options; run with the "
                         "same ones, or without --resume");
   }
+  const std::string note = note_of_kernels(file, model.kernels_before, model.kernels);
+  if (!note.empty()) observer_.say(note);
   seconds_before_ = model.report.seconds;
 }
 

@@ -43,6 +43,11 @@ class Snapshot {
   nlohmann::json header_;
 };
 
+/// What to say to somebody who goes on with a snapshot: the rest is not bit for bit what it would have been. Empty
+/// where the kernels are the same, or the snapshot does not name its own.
+[[nodiscard]] std::string note_of_kernels(const std::filesystem::path& file, const std::string& before,
+                                          const std::string& now);
+
 /// Seconds that went into a snapshot, by name, in a file beside it: a snapshot depends on its input alone, bit for bit,
 /// which no clock does. Nothing is read where the file is missing or damaged.
 using SnapshotTimes = std::map<std::string, double>;
