@@ -28,21 +28,13 @@ using torch::Tensor;
 constexpr float kAbScale = 40.0f;  // network units of ab: keeps outputs near 1
 constexpr double kStageScale = 4;  // of the encoder's features
 
-/// A convolution in the type of `x`, whatever the type of the weights that are learned.
-Tensor convolved(const nn::Conv2d& conv, const Tensor& x) {
-  const auto& options = conv->options;
-  const Tensor bias = conv->bias.defined() ? conv->bias.to(x.scalar_type()) : Tensor();
-  return torch::conv2d(x, conv->weight.to(x.scalar_type()), bias, options.stride(),
-                       c10::get<torch::ExpandingArray<2>>(options.padding()), options.dilation());
-}
-
 /// Convolution, SiLU. No normalisation: with it, the same time of fitting ends at colours a tenth further from the
 /// truth.
 struct BlockImpl : nn::Module {
   BlockImpl(int in, int out, int stride, int dilation = 1)
       : conv(register_module(
             "conv", nn::Conv2d(nn::Conv2dOptions(in, out, 3).stride(stride).padding(dilation).dilation(dilation)))) {}
-  Tensor forward(const Tensor& x) { return torch::silu(convolved(conv, x)); }
+  Tensor forward(const Tensor& x) { return torch::silu(conv(x)); }
 
   nn::Conv2d conv;
 };
@@ -110,21 +102,21 @@ struct UNetImpl : nn::Module {
     std::vector<Tensor> skips;
     for (std::size_t level = 0; level < down.size(); ++level) {
       x = down[level](x);
-      if (guide_semantic && level == Guidance::kSemanticLevel) x = x + convolved(guide_semantic, guidance.semantic);
-      if (guide_ab && level == Guidance::kAbLevel) x = x + convolved(guide_ab, guidance.ab);
+      if (guide_semantic && level == Guidance::kSemanticLevel) x = x + guide_semantic(guidance.semantic);
+      if (guide_ab && level == Guidance::kAbLevel) x = x + guide_ab(guidance.ab);
       const std::size_t stage = level - Guidance::kFirstStageLevel;  // huge before the first
-      if (stage < guide_stages.size()) x = x + convolved(guide_stages[stage], guidance.stages[stage]);
+      if (stage < guide_stages.size()) x = x + guide_stages[stage](guidance.stages[stage]);
       x = x + encode[level](x);
       skips.push_back(x);
     }
     x = x + wide(x);
-    x = x + convolved(global, x.mean({2, 3}, true));
+    x = x + global(x.mean({2, 3}, true));
     for (std::size_t i = 0; i < decode.size(); ++i) {
       const Tensor& skip = skips[skips.size() - 2 - i];
-      x = torch::upsample_nearest2d(convolved(lateral[i], x), {skip.size(2), skip.size(3)}) + skip;
+      x = torch::upsample_nearest2d(lateral[i](x), {skip.size(2), skip.size(3)}) + skip;
       x = x + decode[i](x);
     }
-    return convolved(head, x).to(torch::kFloat32);
+    return head(x);
   }
 
   /// Lightness, what stands out of its surroundings at two scales, and how busy those are: as convolutions read it.
@@ -142,7 +134,7 @@ struct UNetImpl : nn::Module {
       all.push_back((level - mean) / (deviation + 0.05));
       all.push_back(deviation.log() * 0.5 + 1);
     }
-    return torch::cat(all, 1).to(product_type()).contiguous(at::MemoryFormat::ChannelsLast);
+    return torch::cat(all, 1).contiguous(at::MemoryFormat::ChannelsLast);
   }
 
   std::vector<Block> down, encode, decode;
@@ -240,7 +232,7 @@ std::string ReferenceRecipe::text() const {
        << distortion.blur << "; noise " << distortion.noise;
   if (!builtin.empty()) text << "; on " << sha256(read_binary_file(builtin));
   if (encoder) text << "; encoder " << encoder->sha256() << ", scale " << kStageScale;
-  if (product_type() != torch::kFloat32) text << "; bf16";
+  if (!builtin.empty() && product_type() != torch::kFloat32) text << "; asked by bf16";
   if (patch_uses > 1) text << "; each patch " << patch_uses << " times of " << patches_held;
   return text.str();
 }
@@ -264,12 +256,12 @@ struct ReferenceNetwork::Parts {
     Guidance guidance;
     if (builtin) {
       const ColorizerFeatures features = ColorizerNet(builtin->network)->features(lightness);
-      guidance.semantic = features.semantic;
-      guidance.ab = (decode_ab(features.logits, builtin->decoding) / kAbScale).to(product_type());
+      guidance.semantic = features.semantic.to(torch::kFloat32);
+      guidance.ab = decode_ab(features.logits, builtin->decoding) / kAbScale;
     }
     if (recipe.encoder) {
       for (const Tensor& stage : recipe.encoder->features(lightness)) {
-        guidance.stages.push_back(scaled_stage(stage).to(product_type()));
+        guidance.stages.push_back(scaled_stage(stage));
       }
     }
     return guidance;

@@ -131,8 +131,8 @@ float brightest_pixel(const View& view) {
       loss, step, suspect->name, brightest_pixel(*suspect)));
 }
 
-/// When ranks ask each other the time and whether one wants to stop: often enough for a person, and seldom enough not to
-/// hold steps up. The same on all ranks.
+/// When ranks ask each other the time and whether one wants to stop: often enough for a person, and seldom enough not
+/// to hold steps up. The same on all ranks.
 long steps_to_next_question(const LuminanceModel& model) {
   constexpr double kSecondsBetween = 0.25;
   constexpr double kMostSteps = 64;
@@ -184,8 +184,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   const Stage1Options& options = job.options;
   const SeenSky sky = sky_of(job);
   LuminanceModel model = start_or_resume(job, engines, sky);
-  const std::string note = note_of_kernels(job.snapshot, model.kernels_before, model.kernels);
-  if (!note.empty()) observer.say(note);
+  say_kernels(job.snapshot, model.kernels_before, model.kernels, observer);
   std::vector<TrainingView> views = training_views(job.capture, model.frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
   sky.show_to(views);
