@@ -177,14 +177,15 @@ function(cnerf_precompile_torch name)
 endfunction()
 
 # cnerf_compile_per_isa(NAME PREFIX): adds to a library the files PREFIX_ISA.cpp, which include one kernel text, for the
-# instruction sets of the processor's family.
+# instruction sets of the processor's family. Of x86-64 further sets can be named.
 # No contraction: an fma stands where the source says fma, so that back ends can be compared bit by bit.
 function(cnerf_compile_per_isa name prefix)
   set(options_generic "")
   set(options_neon "")
   set(options_avx2 -mavx2 -mfma -mtune=haswell)
   set(options_avx512 -mavx512f -mavx512dq -mavx512vl -mavx512bw -mfma -mtune=haswell -Wno-uninitialized)  # GCC 105593
-  set(sets generic avx2 avx512)
+  set(options_avx512bf16 ${options_avx512} -mavx512bf16)
+  set(sets generic avx2 avx512 ${ARGN})
   if(CMAKE_SYSTEM_PROCESSOR STREQUAL "aarch64")
     set(sets generic neon)
   endif()

@@ -42,7 +42,7 @@ table=$(
     }' "$results"/*.csv
 )
 processor=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -1)
-isa=$(grep -o '"avx512"\|"avx2"\|"generic"' "$results/1.csv" | head -1 | tr -d '"')
+isa=$(grep -o '"avx512bf16"\|"avx512"\|"avx2"\|"generic"' "$results/1.csv" | head -1 | tr -d '"')
 {
   sed '/<!-- bench.sh -->/q' "$document"
   printf '\n%s, %s, kernels for %s; %s of `%s`.\n\n%s\n\n' "$processor" "$threads threads" "$isa" \

@@ -81,6 +81,8 @@ class BrickGrid {
     const auto& brick = bricks_[brick_at(brick_part(relative))];
     return brick ? brick->data() : nullptr;
   }
+  /// As ClearGrid says it; this one does not know.
+  [[nodiscard]] static int clear_bricks(Vec3i /*relative*/) { return 0; }
   void set(Vec3i voxel, const T& value) {
     CNERF_CHECK(contains(voxel), "voxel outside the brick grid");
     const Vec3i v = voxel - min_;

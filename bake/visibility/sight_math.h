@@ -1,6 +1,6 @@
 #pragma once
 /// Which cameras see a point through baked density: the arithmetic that processor and kernels share. `Grid` is what
-/// find_brick, min and size of BrickGrid<float> say.
+/// find_brick, clear_bricks, min and size of BrickGrid<float> say.
 
 #include <algorithm>
 #include <cmath>
@@ -62,12 +62,12 @@ inline constexpr float kSeenTransmittance = 1e-3f;  ///< below which a camera do
 inline constexpr float kGoodTransmittance = 0.5f;   ///< a view with less is replaced when a better one is found
 inline constexpr int kTriesPerView = 3;  ///< cameras tried for each view wanted, once there are enough dim ones
 
-/// Steps until the ray leaves the brick that starts at `low`, at least one. Rays stay on the lattice of whole steps, so
+/// Steps until the ray leaves the cube that starts at `low`, at least one. Rays stay on the lattice of whole steps, so
 /// that skipping changes nothing.
-CNERF_HD inline int steps_across_brick(Vec3i low, Vec3f p, Vec3f inverse_direction) {
+CNERF_HD inline int steps_across(Vec3i low, int side, Vec3f p, Vec3f inverse_direction) {
   float exit = std::numeric_limits<float>::max();
   for (int axis = 0; axis < 3; ++axis) {
-    const float face = float(low[axis] + (inverse_direction[axis] > 0 ? kBrickSide : 0));
+    const float face = float(low[axis] + (inverse_direction[axis] > 0 ? side : 0));
     const float distance = (face - p[axis]) * inverse_direction[axis];
     if (distance >= 0) exit = std::min(exit, distance);  // not for NaN: parallel to the face and on it
   }
@@ -122,7 +122,9 @@ template <typename Grid>
       low = {voxel.x & ~(kBrickSide - 1), voxel.y & ~(kBrickSide - 1), voxel.z & ~(kBrickSide - 1)};
     }
     if (brick == nullptr) {
-      t += float(sight::steps_across_brick(low, p, inverse));
+      const int clear = kBrickSide * sigma.clear_bricks(voxel);
+      t +=
+          float(sight::steps_across({low.x - clear, low.y - clear, low.z - clear}, kBrickSide + 2 * clear, p, inverse));
       continue;
     }
     depth += brick[brick_offset(local_part(voxel))] * h;

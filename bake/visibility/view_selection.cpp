@@ -60,23 +60,33 @@ std::vector<DensityLevel> density_levels(std::span<const Level> levels) {
 
 ViewSelection::ViewSelection(const std::vector<Camera>& cameras, std::vector<DensityLevel> levels,
                              const Options& options)
-    : eyes_(eyes_of(cameras)), levels_(std::move(levels)), views_per_voxel_(options.views_per_voxel) {}
+    : eyes_(eyes_of(cameras)), levels_(std::move(levels)), views_per_voxel_(options.views_per_voxel) {
+  grids_.reserve(levels_.size());
+  for (const DensityLevel& level : levels_) {
+    grids_.emplace_back(*level.sigma);
+    clear_levels_.push_back({&grids_.back(), level.origin, level.voxel_size});
+  }
+}
 
 SightScene<BrickGrid<float>> ViewSelection::scene() const {
   return {eyes_.data(), int(eyes_.size()), levels_.data(), int(levels_.size()), views_per_voxel_};
 }
 
+SightScene<ClearGrid> ViewSelection::clear_scene() const {
+  return {eyes_.data(), int(eyes_.size()), clear_levels_.data(), int(clear_levels_.size()), views_per_voxel_};
+}
+
 std::vector<SeenBy> ViewSelection::seen_by(std::size_t level, Vec3d world, std::span<const std::int32_t> order,
                                            float least) const {
   std::vector<SeenBy> seen(views_per_voxel_);
-  seen.resize(find_seeing(scene(), int(level), world, order.data(), least, seen.data()));
+  seen.resize(find_seeing(clear_scene(), int(level), world, order.data(), least, seen.data()));
   return seen;
 }
 
 void ViewSelection::find(std::size_t level, const SightBatch& batch, SeenBatch& answer) const {
   answer.seen.resize(batch.sights.size() * views_per_voxel_);
   answer.counts.resize(batch.sights.size());
-  const SightScene<BrickGrid<float>> all = scene();
+  const SightScene<ClearGrid> all = clear_scene();
   parallel_ranges(batch.sights.size(), kSightsAtATime, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Sight& sight = batch.sights[i];

@@ -7,6 +7,7 @@
 
 #include "bake/camera.h"
 #include "bake/density/levels.h"
+#include "bake/visibility/clear_grid.h"
 #include "bake/visibility/sight_math.h"
 #include "src/base/observer.h"
 #include "src/engine/engines.h"
@@ -67,8 +68,12 @@ class ViewSelection {
   [[nodiscard]] SightScene<BrickGrid<float>> scene() const;
 
  private:
+  [[nodiscard]] SightScene<ClearGrid> clear_scene() const;
+
   std::vector<Eye> eyes_;
   std::vector<DensityLevel> levels_;
+  std::vector<ClearGrid> grids_;  // of the levels
+  std::vector<SightLevel<ClearGrid>> clear_levels_;
   int views_per_voxel_;
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "src/base/check.h"
+#include "src/base/cpu_features.h"
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/base/text.h"
@@ -146,6 +147,7 @@ Config resolve_config(const ConfigArguments& arguments, Config base) {
   read_settings(arguments, fields_of(base), retired_keys());
   check_consistency(base);
   (void)engines_for(base.device);  // refuses a device that is not there
+  choose_isa(base.kernels);
   set_thread_count(base.threads > 0 ? base.threads : cluster::world().threads());
   if (!base.max_memory.empty()) limit_memory(base.max_memory);
   return base;

@@ -6,8 +6,10 @@
 namespace cnerf {
 namespace {
 
+constexpr const char* kVariable = "CNERF_ISA";
+
 IsaLevel level_from_environment() {
-  const char* value = std::getenv("CNERF_ISA");
+  const char* value = std::getenv(kVariable);
   const auto* named = std::ranges::find(kIsaLevels, std::string(value != nullptr ? value : ""), to_string);
   return named != kIsaLevels.end() ? *named : kIsaLevels.back();
 }
@@ -19,7 +21,7 @@ IsaLevel detected_isa() {
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
       __builtin_cpu_supports("avx512bw")) {
-    return IsaLevel::kAvx512;
+    return __builtin_cpu_supports("avx512bf16") ? IsaLevel::kAvx512Bf16 : IsaLevel::kAvx512;
   }
   if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return IsaLevel::kAvx2;
 #endif
@@ -31,8 +33,14 @@ IsaLevel active_isa() {
   return std::min(detected, level_from_environment());
 }
 
+void choose_isa(const std::string& name) {
+  if (name != "auto") ::setenv(kVariable, name.c_str(), 1);
+}
+
 std::string to_string(IsaLevel level) {
   switch (level) {
+    case IsaLevel::kAvx512Bf16:
+      return "avx512bf16";
     case IsaLevel::kAvx512:
       return "avx512";
     case IsaLevel::kAvx2:

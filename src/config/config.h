@@ -21,6 +21,7 @@ namespace cnerf {
 
 struct Config {
   std::string device = "auto";
+  std::string kernels = "auto";
   int threads = 0;
   std::string max_memory, image_memory;
   CaptureOptions capture;
@@ -39,6 +40,8 @@ struct Config {
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("device", device, Choice{"auto", "cpu", "cuda"}, "where fields are trained, rendered and baked");
+    v("kernels", kernels, Choice{"auto", "generic", "avx2", "avx512", "avx512bf16"},
+      "instructions of the processor at most; avx512bf16 rounds what nets multiply to 8 bits");
     v("threads", threads, Range{0, 4096}, "threads to use; 0 = all cores");
     v("max_memory", max_memory, "memory the program may take, as 8G; needing more ends it with exit code 71");
     v("image_memory", image_memory,

@@ -35,6 +35,8 @@ class Engines {
 [[nodiscard]] const Engines& cpu_engines();
 /// The GPU's; null in builds without CUDA and on machines without a usable GPU.
 [[nodiscard]] const Engines* cuda_engines();
+/// What they compute with, as snapshots name it: "cuda", or the instruction set of the processor's kernels.
+[[nodiscard]] std::string kernels_of(const Engines& engines);
 /// @param device  "auto" (a GPU where build and machine have one), "cpu" or "cuda"
 /// @throws DeviceError  for "cuda" where this build or this machine has none
 [[nodiscard]] const Engines& engines_for(const std::string& device);

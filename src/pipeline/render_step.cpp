@@ -1,5 +1,7 @@
 #include "src/pipeline/render_step.h"
 
+#include <map>
+
 #include "bake/color/view_average.h"
 #include "bake/provenance.h"
 #include "src/base/error.h"
@@ -22,6 +24,9 @@ Picture unpacked(const cluster::Bytes& bytes) {
   return picture;
 }
 
+/// Names of frames that look the same.
+using FrameNames = std::vector<std::string>;
+
 /// The files of one render, opened as pictures come.
 class RenderFiles {
  public:
@@ -36,17 +41,22 @@ class RenderFiles {
         observer_(observer) {}
 
   /// The files of one picture, by whichever rank renders it.  @return  its frame of the video
-  [[nodiscard]] Picture write(const std::string& name, const RenderedImage& image) const {
+  [[nodiscard]] Picture write(const FrameNames& names, const RenderedImage& image) const {
     const Picture picture = picture_of(image, output_.color);
-    if (output_.png) write_png(frames_ / (name + ".png"), picture);
-    if (output_.exr) write_exr(frames_ / (name + ".exr"), image, output_.color, color_origin_);
+    for (const std::string& name : names) {
+      if (output_.png) write_png(frames_ / (name + ".png"), picture);
+      if (output_.exr) write_exr(frames_ / (name + ".exr"), image, output_.color, color_origin_);
+    }
     return output_.mp4 ? picture : Picture();
   }
-  /// All frames in order, on rank 0.
-  void add_to_video(const std::string& name, const Picture& picture) {
+  /// Frames of the video on rank 0, of which a later one may come before an earlier one.
+  void add_to_video(const std::vector<std::size_t>& frames, const CameraPath& path, const Picture& picture) {
     if (!output_.mp4) return;
-    if (with_video_ && !video_.add(picture)) give_video_up();
-    if (!with_video_ && !output_.png) write_png(frames_ / (name + ".png"), picture);
+    for (const std::size_t frame : frames) waiting_[frame] = picture;
+    for (auto next = waiting_.find(added_); next != waiting_.end(); next = waiting_.find(added_)) {
+      add_to_video(path.cameras[added_++].name, next->second);
+      waiting_.erase(next);
+    }
   }
 
   void finish() {
@@ -58,6 +68,10 @@ class RenderFiles {
   }
 
  private:
+  void add_to_video(const std::string& name, const Picture& picture) {
+    if (with_video_ && !video_.add(picture)) give_video_up();
+    if (!with_video_ && !output_.png) write_png(frames_ / (name + ".png"), picture);
+  }
   void give_video_up() {
     observer_.say("note: this OpenCV has no MPEG-4 encoder; writing PNG pictures instead of a video");
     with_video_ = false;
@@ -68,6 +82,8 @@ class RenderFiles {
   fs::path frames_, video_path_;
   VideoFile video_;
   bool with_video_;
+  std::map<std::size_t, Picture> waiting_;  ///< for frames before them
+  std::size_t added_ = 0;                   ///< frames to the video
   Observer& observer_;
 };
 
@@ -90,16 +106,19 @@ void render_step(const RunContext& context, const RenderJob& job, const Engines&
   RenderFiles files(output, job.path.name, color_origin, context.config.render.fps, observer);
   const ProgressSink progress = observer.progress_sink();
   const std::vector<PathCamera>& cameras = job.path.cameras;
+  const std::vector<std::vector<std::size_t>> frames = frames_of_equal_cameras(job.path);
   const auto make = [&](std::size_t i) {
     if (observer.is_cancelled()) throw Interrupted("rendering stopped; the video was not written");
-    const PathCamera& camera = cameras[i];
-    return files.write(camera.name, scene->render(camera.intrinsics, camera.world_from_camera, options));
+    FrameNames names;
+    for (const std::size_t frame : frames[i]) names.push_back(cameras[frame].name);
+    const PathCamera& camera = cameras[frames[i].front()];
+    return files.write(names, scene->render(camera.intrinsics, camera.world_from_camera, options));
   };
   const auto take = [&](std::size_t i, const Picture& picture) {
-    files.add_to_video(cameras[i].name, picture);
-    progress({"render " + job.path.name, double(i + 1) / double(cameras.size()), {}});
+    files.add_to_video(frames[i], job.path, picture);
+    progress({"render " + job.path.name, double(i + 1) / double(frames.size()), {}});
   };
-  cluster::share_out(cluster::world(), cameras.size(), make, take, packed, unpacked);
+  cluster::share_out(cluster::world(), frames.size(), make, take, packed, unpacked);
   if (!cluster::world().is_first()) return;
   files.finish();
   note_time(context.directory, "render", watch);

@@ -1,5 +1,9 @@
 #include "src/pipeline/run.h"
 
+#include <chrono>
+#include <future>
+
+#include "src/base/shared_observer.h"
 #include "src/cluster/ranks.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/default_colorizer.h"
@@ -30,9 +34,38 @@ bool needs_colorizer(const RunJob& job, const RunDirectory& directory) {
   return cluster::world().agreed(!(job.existing.resume && is_colorized));
 }
 
+/// The colorizer, made beside stage 1 where a GPU trains and the processor is free. What cannot be made ends the
+/// training when it is known.
+class ColorizerBesideTraining {
+ public:
+  ColorizerBesideTraining(const RunContext& context, bool is_wanted, const Engines& engines, Observer& observer) {
+    if (!is_wanted) return;
+    const bool is_free = engines.device() == Device::kCuda && cluster::world().is_alone();
+    making_ = std::async(is_free ? std::launch::async : std::launch::deferred,
+                         [&context, &observer] { return colorizer_of(context, observer); });
+    // Before the training: what cannot be made or read should not cost an hour.
+    if (!is_free) take();
+  }
+  /// To be called between steps.  @throws  as colorizer_of
+  void look() {
+    if (interruption_requested()) return;  // the training saves first
+    if (making_.valid() && making_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) take();
+  }
+  [[nodiscard]] Colorizer* get() {
+    if (making_.valid()) take();
+    return colorizer_.get();
+  }
+
+ private:
+  void take() { colorizer_ = making_.get(); }
+  std::future<std::unique_ptr<Colorizer>> making_;
+  std::unique_ptr<Colorizer> colorizer_;
+};
+
 }  // namespace
 
-fs::path run(RunJob job, Config config, const Engines& engines, Observer& observer) {
+fs::path run(RunJob job, Config config, const Engines& engines, Observer& one_observer) {
+  SharedObserver observer(one_observer);
   const RunDirectory directory(job.out);
   const FolderLock lock = claim_run_folder(directory, job.existing, observer);
   if (!job.grey) choose_colorizer(job.capture, config, observer);
@@ -40,17 +73,17 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& observ
 
   RunContext context{directory, config, read_capture(job.capture, config, observer, directory.root()),
                      job.command_line};
-  // Made before the training: what cannot be made or read should not cost an hour.
   if (!job.grey) (void)load_known_colors(context.capture, context.config.colorizer);
-  const auto colorizer = needs_colorizer(job, directory) ? colorizer_of(context, observer) : nullptr;
+  ColorizerBesideTraining colorizer(context, needs_colorizer(job, directory), engines, observer);
   begin_run(context, job.capture, job.existing);
-  train_step(context, {job.existing.resume}, engines, observer);
+  train_step(context, {job.existing.resume, [&](const LuminanceModel&) { colorizer.look(); }}, engines, observer);
+  Colorizer* const made = colorizer.get();  // which reads the context
   use_learned_views(context, observer);
 
   std::string take;
   if (!job.grey) {
     take = take_to_write(context, "", job.existing);
-    colorize_step(context, {take, job.existing, colorizer.get()}, engines, observer);
+    colorize_step(context, {take, job.existing, made}, engines, observer);
   }
   const fs::path bake = directory.bakes(take);  // first of all outputs: it is what a user waits for
   if (is_done(job, last_file(bake, job.formats))) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bake/camera.h"
+#include "src/base/cpu_features.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/parallel.h"
@@ -60,6 +61,7 @@ struct Settings {
     for (const std::string& text : texts) apply_setting(text, fields, retired_keys());
     check_consistency(config);
     (void)engines_for(config.device);  // refuses a device that is not there
+    choose_isa(config.kernels);
     if (config.threads > 0) set_thread_count(config.threads);
   }
 

@@ -72,10 +72,11 @@ Arc covered_arc(std::vector<double> angles) {
   return arc;
 }
 
-/// Angle of frame `share` of the way: once around, or to and fro, slowest at the ends.
-double angle_on(const Arc& arc, double share) {
-  if (arc.is_closed()) return arc.begin + kTwoPi * share;
-  return arc.begin + arc.length * 0.5 * (1 - std::cos(kTwoPi * share));
+/// Angle of frame `index` of `count`: once around, or to and fro, slowest at the ends.
+double angle_on(const Arc& arc, int index, int count) {
+  if (arc.is_closed()) return arc.begin + kTwoPi * index / count;
+  const int there = std::min(index, count - index);  // the way back to the last bit
+  return arc.begin + arc.length * 0.5 * (1 - std::cos(kTwoPi * there / count));
 }
 
 std::string frame_name(int index) {
@@ -88,6 +89,23 @@ Affined look_at(Vec3d position, Vec3d target, Vec3d up) {
   const Vec3d forward = normalized(target - position);
   const Vec3d right = normalized(cross(forward, up));
   return {Mat3d::from_columns(right, cross(forward, right), forward), position};
+}
+
+std::vector<std::vector<std::size_t>> frames_of_equal_cameras(const CameraPath& path) {
+  std::vector<std::vector<std::size_t>> frames;
+  for (std::size_t i = 0; i < path.cameras.size(); ++i) {
+    const PathCamera& camera = path.cameras[i];
+    const auto same = std::ranges::find_if(frames, [&](const std::vector<std::size_t>& seen) {
+      const PathCamera& other = path.cameras[seen.front()];
+      return other.world_from_camera == camera.world_from_camera && other.intrinsics == camera.intrinsics;
+    });
+    if (same == frames.end()) {
+      frames.push_back({i});
+    } else {
+      same->push_back(i);
+    }
+  }
+  return frames;
 }
 
 CameraPath spiral_path(const Capture& capture, const PictureOptions& config) {
@@ -124,7 +142,7 @@ CameraPath orbit_path(const Capture& capture, const PictureOptions& config) {
   const Intrinsics intrinsics = path_intrinsics(capture, config);
   for (int i = 0; i < config.frames; ++i) {
     const Vec3d position =
-        cylinder.point(angle_on(arc, double(i) / config.frames), quantile(radii, 0.5), quantile(heights, 0.5));
+        cylinder.point(angle_on(arc, i, config.frames), quantile(radii, 0.5), quantile(heights, 0.5));
     path.cameras.push_back({frame_name(i), intrinsics, look_at(position, cameras.focus, cameras.up)});
   }
   return path;

@@ -21,10 +21,14 @@ struct CameraPath {
   std::vector<PathCamera> cameras;
 };
 
+/// The frames of a path that have the same camera, in the order of their first ones: what goes to and fro sees nearly
+/// all of it twice.
+[[nodiscard]] std::vector<std::vector<std::size_t>> frames_of_equal_cameras(const CameraPath& path);
+
 /// A closed ellipse in the plane of the cameras, looking at the focus (Mildenhall et al. 2019).
 [[nodiscard]] CameraPath spiral_path(const Capture& capture, const PictureOptions& config);
 /// A circle about the focus at the cameras' median distance and height. Where the cameras leave more than a third of
-/// the circle unseen, the path swings to and fro over the part they cover.
+/// the circle unseen, the path swings to and fro over the part they cover, by the same cameras.
 [[nodiscard]] CameraPath orbit_path(const Capture& capture, const PictureOptions& config);
 /// Spiral or orbit, whichever suits the capture.
 [[nodiscard]] CameraPath turntable_path(const Capture& capture, const PictureOptions& config);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "src/base/rng.h"
 #include "tests/bake/analytic_field.h"
 
 namespace cnerf::bake::test {
@@ -42,6 +43,73 @@ TEST(Transmittance, SkippingEmptyBricksChangesNothing) {
     EXPECT_NEAR(transmittance_between(sparse, 1, from, to, 1e-6f), transmittance_between(full, 1, from, to, 1e-6f),
                 1e-6f);
   }
+}
+
+/// A few bricks of noise in a box whose sides are no multiples of a brick's. None at its lower faces: a ray that leaves
+/// there may count the last voxel twice.
+BrickGrid<float> scattered(const Vec3i& min, int bricks, CounterRng rng) {
+  BrickGrid<float> grid(min, {101, 77, 90}, 0.0f);
+  for (int i = 0; i < bricks; ++i) {
+    const Vec3i low = grid.brick_min(rng.below(std::uint64_t(i), std::uint32_t(grid.brick_count())));
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const Vec3i voxel = low + brick_local(v);
+      const Vec3i inner = voxel - Vec3i{1, 1, 1};
+      if (grid.contains(voxel) && grid.contains(inner))
+        grid.set(voxel, 0.05f * rng.uniform(1000 * std::uint64_t(i + 1) + std::uint64_t(v)));
+    }
+  }
+  return grid;
+}
+
+/// Every whole step, none skipped.
+float transmittance_by_all_steps(const BrickGrid<float>& grid, Vec3f from, Vec3f to, float stop_below) {
+  const float distance = length(to - from);
+  const Vec3f d = (to - from) / distance, start = from - grid.min().cast<float>();
+  float depth = 0;
+  for (float t = 1; t < distance; t += 1) {
+    const Vec3f p = start + d * t;
+    if (sight::inside(p, grid.size().cast<float>())) depth += grid.at(grid.min() + p.cast<int>());
+    if (depth > -std::log(stop_below)) return 0;
+  }
+  return std::exp(-depth);
+}
+
+TEST(Transmittance, ClearSpaceIsLeftInFewStepsAndToTheSameBits) {
+  const CounterRng rng(4, 1);
+  for (const int bricks : {0, 1, 5, 40, 400}) {
+    const BrickGrid<float> grid = scattered({-7, 3, 11}, bricks, rng);
+    const ClearGrid clear(grid);
+    int dimmed = 0;
+    for (std::uint64_t i = 0; i < 2000; ++i) {
+      const auto point = [&](std::uint64_t at, float reach) {
+        const Vec3f share{rng.uniform(at), rng.uniform(at + 1), rng.uniform(at + 2)};
+        return Vec3f{40, 40, 55} + (share - Vec3f{0.5f, 0.5f, 0.5f}) * reach;
+      };
+      const Vec3f from = point(9000000 + 6 * i, 90), to = point(9000003 + 6 * i, i % 2 == 0 ? 90 : 2000);
+      const float exact = transmittance_by_all_steps(grid, from, to, 1e-3f);
+      ASSERT_EQ(transmittance_between(clear, 1, from, to, 1e-3f), exact) << bricks << " bricks, ray " << i;
+      ASSERT_EQ(transmittance_between(grid, 1, from, to, 1e-3f), exact) << bricks << " bricks, ray " << i;
+      dimmed += exact < 1 ? 1 : 0;
+    }
+    EXPECT_EQ(dimmed > 0, bricks > 0);
+  }
+}
+
+TEST(ClearGrid, KnowsHowFarTheNextBrickIs) {
+  const BrickGrid<float> grid = scattered({0, 0, 0}, 3, CounterRng(8, 1));
+  const ClearGrid clear(grid);
+  const Vec3i counts = grid.brick_counts();
+  for (std::size_t b = 0; b < grid.brick_count(); ++b) {
+    const Vec3i at = grid.brick_coordinates(b);
+    int nearest = 1000;
+    for (std::size_t other = 0; other < grid.brick_count(); ++other) {
+      const Vec3i way = grid.brick_coordinates(other) - at;
+      if (!grid.has_brick(other)) continue;
+      nearest = std::min(nearest, std::max({std::abs(way.x), std::abs(way.y), std::abs(way.z)}));
+    }
+    EXPECT_EQ(clear.clear_bricks(at * kBrickSide), std::max(0, nearest - 1)) << at.x << ' ' << at.y << ' ' << at.z;
+  }
+  EXPECT_GT(counts.x * counts.y * counts.z, 1000);
 }
 
 struct Ring {

@@ -99,6 +99,16 @@ TEST(CameraPathTest, AnOrbitDoesNotEnterAnArcWithoutCameras) {
   }
 }
 
+TEST(CameraPathTest, ASwingComesBackByTheSameCameras) {
+  const CameraPath path = orbit_path(ring(0.5, 2.0, 24), config_of(50));
+  const std::vector<std::vector<std::size_t>> frames = frames_of_equal_cameras(path);
+  ASSERT_EQ(frames.size(), 26u) << "both ends are seen once";
+  EXPECT_EQ(frames.front(), std::vector<std::size_t>{0});
+  EXPECT_EQ(frames[1], (std::vector<std::size_t>{1, 49}));
+  EXPECT_EQ(frames.back(), std::vector<std::size_t>{25});
+  EXPECT_EQ(frames_of_equal_cameras(orbit_path(ring(0, kTwoPi, 24), config_of(50))).size(), 50u);
+}
+
 TEST(CameraPathTest, ASpiralStaysAmongTheCamerasAndLooksAtTheFocus) {
   const Capture capture = wall();
   const CameraPath path = spiral_path(capture, config_of(20));

@@ -20,6 +20,7 @@ struct DeviceBricks {
     const std::int32_t number = numbers[(std::size_t(c.x) * counts.y + c.y) * counts.z + c.z];
     return number < 0 ? nullptr : values + std::size_t(number) * kBrickVoxels;
   }
+  [[nodiscard]] CNERF_HD static int clear_bricks(Vec3i /*relative*/) { return 0; }  // not known here
 };
 
 /// All pointers are to device memory; those of the scene as well.

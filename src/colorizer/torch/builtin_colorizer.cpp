@@ -15,6 +15,7 @@
 #include "src/base/rng.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/torch/network_weights.h"
+#include "src/colorizer/torch/products.h"
 #include "src/colorizer/torch/single_threaded_ops.h"
 
 namespace cnerf {
@@ -53,6 +54,7 @@ class BuiltinColorizer final : public Colorizer {
       : weights_(load_colorizer_weights(file)), name_("builtin:" + weights_.sha256.substr(0, 12)) {
     weights_.network->to(device_);
     for (Tensor& parameter : weights_.network->parameters()) parameter.set_requires_grad(false);
+    if (device_.is_cpu()) prepare_for_answers(*weights_.network);
   }
 
   ChromaBatch colorize(const LightnessBatch& patches) override {

@@ -144,7 +144,8 @@ ColorizerFeatures ColorizerNetImpl::features(const Tensor& lightness) {
   CNERF_CHECK(lightness.dim() == 4 && lightness.size(1) == 1, "lightness is [B, 1, H, W]");
   CNERF_CHECK(lightness.size(2) % kInputMultiple == 0 && lightness.size(3) % kInputMultiple == 0,
               "sides are multiples of the network's");
-  const Tensor input = (lightness / 50 - 1).contiguous(torch::MemoryFormat::ChannelsLast);
+  const Tensor input =
+      (lightness / 50 - 1).to(classify_->weight.scalar_type()).contiguous(torch::MemoryFormat::ChannelsLast);
 
   const Tensor at2 = encode2_->forward(stem_->forward(input));
   const Tensor at4 = encode4_->forward(down4_->forward(at2));

@@ -73,7 +73,7 @@ class ColorizerNetImpl : public torch::nn::Module {
   explicit ColorizerNetImpl(Normalisation normalisation = Normalisation::kBatch);
 
   /// @param lightness  [B, 1, H, W] f32, L* 0..100; H and W are multiples of kInputMultiple.
-  /// @return           [B, 313, H/4, W/4] logits.
+  /// @return           [B, 313, H/4, W/4] logits, in the type of the weights.
   torch::Tensor forward(const torch::Tensor& lightness);
   ColorizerFeatures features(const torch::Tensor& lightness);
 

@@ -16,6 +16,7 @@
 #include "src/color/ab_bins.h"
 #include "src/colorizer/torch/encoder.h"
 #include "src/colorizer/torch/network_weights.h"
+#include "src/colorizer/torch/products.h"
 #include "src/colorizer/torch/single_threaded_ops.h"
 
 namespace cnerf {
@@ -95,10 +96,9 @@ struct UNetImpl : nn::Module {
     }
   }
 
-  /// @param lightness  [B, 1, H, W] L*, H and W multiples of 2^levels.   @return [B, outputs, H/2, W/2]
-  Tensor forward(const Tensor& lightness, const Guidance& guidance) {
-    Tensor x = features(lightness);
-    x = x.contiguous(at::MemoryFormat::ChannelsLast);
+  /// @param features  of lightness [B, 1, H, W], H and W multiples of 2^levels.   @return [B, outputs, H/2, W/2] f32
+  Tensor forward(const Tensor& features, const Guidance& guidance) {
+    Tensor x = features;
     std::vector<Tensor> skips;
     for (std::size_t level = 0; level < down.size(); ++level) {
       x = down[level](x);
@@ -119,7 +119,7 @@ struct UNetImpl : nn::Module {
     return head(x);
   }
 
-  /// Lightness, what stands out of its surroundings at two scales, and how busy those are.
+  /// Lightness, what stands out of its surroundings at two scales, and how busy those are: as convolutions read it.
   [[nodiscard]] static Tensor features(const Tensor& lightness) {
     const Tensor level = (lightness - 50) / 50;
     std::vector<Tensor> all{level};
@@ -134,7 +134,7 @@ struct UNetImpl : nn::Module {
       all.push_back((level - mean) / (deviation + 0.05));
       all.push_back(deviation.log() * 0.5 + 1);
     }
-    return torch::cat(all, 1);
+    return torch::cat(all, 1).contiguous(at::MemoryFormat::ChannelsLast);
   }
 
   std::vector<Block> down, encode, decode;
@@ -232,13 +232,14 @@ std::string ReferenceRecipe::text() const {
        << distortion.blur << "; noise " << distortion.noise;
   if (!builtin.empty()) text << "; on " << sha256(read_binary_file(builtin));
   if (encoder) text << "; encoder " << encoder->sha256() << ", scale " << kStageScale;
+  if (!builtin.empty() && product_type() != torch::kFloat32) text << "; asked by bf16";
   if (patch_uses > 1) text << "; each patch " << patch_uses << " times of " << patches_held;
   return text.str();
 }
 
 /// Part of a batch that is learned from.
 struct Patches {
-  Tensor lightness, ab;  ///< [n, 1, H, W], [n, 2, H, W]
+  Tensor features, ab;  ///< [n, 5, H, W], [n, 2, H, W]
   Guidance guidance;
 };
 
@@ -255,11 +256,13 @@ struct ReferenceNetwork::Parts {
     Guidance guidance;
     if (builtin) {
       const ColorizerFeatures features = ColorizerNet(builtin->network)->features(lightness);
-      guidance.semantic = features.semantic;
+      guidance.semantic = features.semantic.to(torch::kFloat32);
       guidance.ab = decode_ab(features.logits, builtin->decoding) / kAbScale;
     }
     if (recipe.encoder) {
-      for (const Tensor& stage : recipe.encoder->features(lightness)) guidance.stages.push_back(scaled_stage(stage));
+      for (const Tensor& stage : recipe.encoder->features(lightness)) {
+        guidance.stages.push_back(scaled_stage(stage));
+      }
     }
     return guidance;
   }
@@ -297,14 +300,16 @@ Tensor ReferenceNetwork::Parts::loss(const Tensor& out, const Tensor& ab) const 
 Patches ReferenceNetwork::Parts::drawn(std::span<const ReferenceImage> images, int step, int shard) const {
   const int count = recipe.batch / recipe.shards, size = recipe.patch_size;
   const std::size_t pixels = std::size_t(size) * std::size_t(size);
-  Patches patches{torch::empty({count, 1, size, size}), torch::empty({count, 2, size, size}), {}};
+  const Tensor lightness = torch::empty({count, 1, size, size});
+  Patches patches{{}, torch::empty({count, 2, size, size}), {}};
   for (int i = 0; i < count; ++i) {
     SequentialRng rng(seed, (std::uint64_t(step) << 16) + std::uint64_t(shard * count + i) + 1);
     sample_reference_patch(images, recipe.distortion, size, rng,
-                           {patches.lightness.data_ptr<float>() + std::size_t(i) * pixels, pixels},
+                           {lightness.data_ptr<float>() + std::size_t(i) * pixels, pixels},
                            {patches.ab.data_ptr<float>() + std::size_t(i) * 2 * pixels, 2 * pixels});
   }
-  patches.guidance = guidance(patches.lightness);
+  patches.features = UNetImpl::features(lightness);
+  patches.guidance = guidance(lightness);
   return patches;
 }
 
@@ -323,7 +328,7 @@ const Patches& ReferenceNetwork::Parts::patches_of(std::span<const ReferenceImag
 }
 
 std::vector<Tensor> ReferenceNetwork::Parts::gradients(const Patches& patches, double* loss_value) const {
-  const Tensor out = UNet(net)->forward(patches.lightness, patches.guidance);
+  const Tensor out = UNet(net)->forward(patches.features, patches.guidance);
   const Tensor value = loss(out, torch::avg_pool2d(patches.ab, {2, 2}));
   *loss_value = value.item<double>();
   return torch::autograd::grad({value}, net->parameters());
@@ -353,11 +358,7 @@ ReferenceNetwork::ReferenceNetwork(const ReferenceRecipe& recipe, std::span<cons
   parts_->labels = std::make_unique<LabelTable>(class_of);
   if (!recipe.builtin.empty()) {
     parts_->builtin = load_colorizer_weights(recipe.builtin);
-    // Once here, instead of in every convolution of every step.
-    for (Tensor& parameter : parts_->builtin->network->parameters()) {
-      parameter.set_requires_grad(false);
-      if (parameter.dim() == 4) parameter.set_data(parameter.contiguous(at::MemoryFormat::ChannelsLast));
-    }
+    prepare_for_answers(*parts_->builtin->network);
   }
   parts_->net = UNet(recipe, int(bins.size()));
   initialise(parts_->net, seed);
@@ -420,7 +421,7 @@ std::vector<float> ReferenceNetwork::colorize(const LightnessBatch& patches) con
     lightness = torch::replication_pad2d(lightness, {0, rounded(width) - width, 0, rounded(height) - height});
     lightness = torch::cat({lightness, lightness.flip({3})});
     UNet net(parts_->net);
-    Tensor ab = parts_->decode(net->forward(lightness, parts_->guidance(lightness)));
+    Tensor ab = parts_->decode(net->forward(UNetImpl::features(lightness), parts_->guidance(lightness)));
     ab = (ab.slice(0, 0, 1) + ab.slice(0, 1, 2).flip({3})) / 2;
     ab = torch::upsample_bilinear2d(ab, {rounded(height), rounded(width)}, false);
     ab = ab.slice(2, 0, height).slice(3, 0, width).contiguous();

@@ -37,12 +37,17 @@ extern const MlpKernels kMlpKernels;
 namespace avx512 {
 extern const MlpKernels kMlpKernels;
 }
+/// Products of numbers rounded to bf16, which have 8 bits; sums of floats.
+namespace avx512bf16 {
+extern const MlpKernels kMlpKernels;
+}
 
 /// The kernels of `active_isa()`.
 [[nodiscard]] inline const MlpKernels& mlp_kernels() {
   if constexpr (kHasNeon) {
     return kernels_of_isa(generic::kMlpKernels, neon::kMlpKernels);
   } else {
+    if (active_isa() == IsaLevel::kAvx512Bf16) return avx512bf16::kMlpKernels;
     return kernels_of_isa(generic::kMlpKernels, avx2::kMlpKernels, avx512::kMlpKernels);
   }
 }

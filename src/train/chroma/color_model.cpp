@@ -69,6 +69,7 @@ std::vector<float> pixel_luminance(const PixelSamples& pixels) {
 ColorModel ColorModel::create(const Stage2Options& options, const Engines& engines) {
   ColorModel model;
   model.options = options;
+  model.kernels = kernels_of(engines);
   const auto seed = std::uint64_t(options.seed);
   model.chroma = engines.make_color_bins(options.grid, seed ^ named_stream("chr"));
   model.chromaticity = engines.make_color_field(options.grid, seed ^ named_stream("xyz"));
@@ -90,6 +91,7 @@ ColorModel ColorModel::load(const std::filesystem::path& file, const Engines& en
     const auto options = options_from_json<Stage2Options>(snapshot.header().at("options"));
     check_stored_grid(snapshot, options.grid);
     model = create(options, engines);
+    model.kernels_before = snapshot.header().value("kernels", "");
     model.pixel_colors = pixel_colors_of(snapshot.header());
     const nlohmann::json& report = snapshot.header().at("report");
     SnapshotTimes times = load_times(file);
@@ -115,6 +117,7 @@ void ColorModel::save(const std::filesystem::path& file) {
       file, kKind,
       {{"options", options_to_json(options)},
        {"pixel_colors", pixel_colors == PixelColors::kField ? kFieldColors : "distribution"},
+       {"kernels", kernels},
        {"colorizer", colorizer},
        {"stage1_sha256", stage1_sha256},
        {"sky_width", sky.width()},

@@ -22,6 +22,7 @@ enum class PixelColors {
 struct ColorModel {
   Stage2Options options;
   PixelColors pixel_colors = PixelColors::kDistribution;
+  std::string kernels, kernels_before;  ///< as LuminanceModel has them
   std::string colorizer;
   std::string stage1_sha256;  ///< of the stage 1 snapshot it belongs to
   Stage2Report report;

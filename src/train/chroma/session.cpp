@@ -52,6 +52,7 @@ void Session::begin_model(const Engines& engines, PixelColors pixel_colors) {
                         ": was made with another colorizer or other stage2 options; run with the "
                         "same ones, or without --resume");
   }
+  say_kernels(file, model.kernels_before, model.kernels, observer_);
   seconds_before_ = model.report.seconds;
 }
 

@@ -158,6 +158,7 @@ LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Option
   if (options.exposures || options.poses || options.lenses) {
     model.learned_views = int(std::ranges::count_if(capture.views, [](const View& view) { return !view.held_out; }));
   }
+  model.kernels = kernels_of(engines);
   model.engine = make_engine(model, engines);
   exclude_empty(capture, model.frame, free_space, *model.engine);
   return model;
@@ -194,6 +195,7 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   try {
     model.frame = frame_from_json(snapshot.header().at("frame"));
     model.options = stored_options(snapshot);
+    model.kernels_before = snapshot.header().value("kernels", "");
   } catch (const nlohmann::json::exception& problem) {
     throw SnapshotError(file.string() + ": header: " + problem.what());
   }
@@ -203,6 +205,7 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   model.learned_views = learned_count(snapshot, "learned_views");
   model.learned_lenses = learned_count(snapshot, "learned_lenses");
   check_stored(snapshot, model);
+  model.kernels = kernels_of(engines);
   model.engine = make_engine(model, engines);
   model.sky = stored_sky(snapshot);
   std::vector<StatePiece> pieces = model.engine->state();
@@ -221,6 +224,7 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
                 {{"frame", frame_to_json(frame)},
                  {"options", options_to_json(options)},
                  {"occupancy", occupancy_to_json(options.occupancy)},
+                 {"kernels", kernels},
                  {"max_luminance", max_luminance},
                  {"learned_views", learned_views},
                  {"learned_lenses", learned_lenses},

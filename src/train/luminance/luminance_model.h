@@ -30,6 +30,8 @@ struct LuminanceModel {
   int learned_lenses = 0;      ///< lenses that are learned
   double seconds = 0;          ///< training time so far
   double trained_samples = 0;  ///< so far
+  std::string kernels;         ///< that its engine computes with, see kernels_of
+  std::string kernels_before;  ///< of the snapshot it was read from; empty where that does not say
   std::unique_ptr<LuminanceEngine> engine;
   DirectionMap sky;  ///< linear Y beyond the box, at the median view's exposure; none where no view sees one
 

@@ -135,6 +135,14 @@ std::filesystem::path times_file(const std::filesystem::path& snapshot) {
 
 }  // namespace
 
+void say_kernels(const std::filesystem::path& file, const std::string& before, const std::string& now,
+                 Observer& observer) {
+  if (before.empty() || before == now) return;
+  observer.say("note: " + file.string() + " was trained with kernels " + before + " and goes on with " + now +
+               (before == "cuda" ? "; --device cuda" : "; --device cpu --set kernels=" + before) +
+               " goes on as it began");
+}
+
 void save_times(const std::filesystem::path& snapshot, const SnapshotTimes& times) {
   write_file(times_file(snapshot), nlohmann::json(times).dump(2) + "\n");
 }

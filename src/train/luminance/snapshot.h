@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "src/base/error.h"
+#include "src/base/observer.h"
 #include "src/field/state.h"
 
 namespace cnerf {
@@ -42,6 +43,11 @@ class Snapshot {
   std::size_t pieces_begin_ = 0;
   nlohmann::json header_;
 };
+
+/// Says to somebody who goes on with a snapshot that the rest is not bit for bit what it would have been: unless the
+/// kernels are the same, or the snapshot does not name its own.
+void say_kernels(const std::filesystem::path& file, const std::string& before, const std::string& now,
+                 Observer& observer);
 
 /// Seconds that went into a snapshot, by name, in a file beside it: a snapshot depends on its input alone, bit for bit,
 /// which no clock does. Nothing is read where the file is missing or damaged.

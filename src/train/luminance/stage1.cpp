@@ -184,6 +184,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   const Stage1Options& options = job.options;
   const SeenSky sky = sky_of(job);
   LuminanceModel model = start_or_resume(job, engines, sky);
+  say_kernels(job.snapshot, model.kernels_before, model.kernels, observer);
   std::vector<TrainingView> views = training_views(job.capture, model.frame);
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
   sky.show_to(views);

@@ -1,0 +1,1 @@
+#include "src/field/cpu/mlp_bf16_kernels.inl"
