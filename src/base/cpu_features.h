@@ -6,8 +6,8 @@
 
 namespace cnerf {
 
-/// The last one has the float kernels of the one before it, but for the products of nets: those round what they multiply
-/// to bf16 and add up floats.
+/// The last one has the float kernels of the one before it, but for the products of nets: those round what they
+/// multiply to bf16 and add up floats.
 enum class IsaLevel { kGeneric, kNeon, kAvx2, kAvx512, kAvx512Bf16 };
 
 /// The levels that this program has kernels of, the lowest first.

@@ -41,7 +41,7 @@ struct Config {
   void visit(Visitor&& v) {
     v("device", device, Choice{"auto", "cpu", "cuda"}, "where fields are trained, rendered and baked");
     v("kernels", kernels, Choice{"auto", "generic", "avx2", "avx512", "avx512bf16"},
-      "instructions of the processor at most; avx512bf16 rounds what nets multiply to 8 bits");
+      "instructions of the processor at most; avx512bf16 rounds what nets multiply to bf16");
     v("threads", threads, Range{0, 4096}, "threads to use; 0 = all cores");
     v("max_memory", max_memory, "memory the program may take, as 8G; needing more ends it with exit code 71");
     v("image_memory", image_memory,

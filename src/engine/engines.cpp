@@ -65,10 +65,6 @@ bool has_cuda_engines() {
   return CNERF_CUDA_ENGINE != 0;
 }
 
-std::string kernels_of(const Engines& engines) {
-  return engines.device() == Device::kCuda ? "cuda" : to_string(active_isa());
-}
-
 const Engines& engines_for(const std::string& device) {
   const Engines* cuda = device == "cpu" ? nullptr : cuda_engines();
   if (cuda != nullptr) return *cuda;

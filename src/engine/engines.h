@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "src/base/cpu_features.h"
 #include "src/engine/color_engines.h"
 #include "src/engine/luminance_engine.h"
 
@@ -36,7 +37,9 @@ class Engines {
 /// The GPU's; null in builds without CUDA and on machines without a usable GPU.
 [[nodiscard]] const Engines* cuda_engines();
 /// What they compute with, as snapshots name it: "cuda", or the instruction set of the processor's kernels.
-[[nodiscard]] std::string kernels_of(const Engines& engines);
+[[nodiscard]] inline std::string kernels_of(const Engines& engines) {
+  return engines.device() == Device::kCuda ? "cuda" : to_string(active_isa());
+}
 /// @param device  "auto" (a GPU where build and machine have one), "cpu" or "cuda"
 /// @throws DeviceError  for "cuda" where this build or this machine has none
 [[nodiscard]] const Engines& engines_for(const std::string& device);

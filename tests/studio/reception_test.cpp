@@ -97,9 +97,10 @@ TEST_F(ReceptionTest, AFullDiskIsToldAndThePieceCanBeSentAgain) {
 TEST_F(ReceptionTest, NamesThatLeadElsewhereAreRefusedByName) {
   open();
   const std::string nul("a\0.png", 6);
-  for (const std::string& name : std::vector<std::string>{
-           "", "../a.png", "a/../../b.png", "/etc/a.png", "a//b.png", "a/./b.png", ".a.png", "a/.hidden/b.png", "a.exe",
-           "png", "a\\b.png", "a\xff.png", "a\nb.png", nul, std::string(201, 'a') + ".png", "1/2/3/4/5/6/a.png", "a.png/"}) {
+  for (const std::string& name :
+       std::vector<std::string>{"", "../a.png", "a/../../b.png", "/etc/a.png", "a//b.png", "a/./b.png", ".a.png",
+                                "a/.hidden/b.png", "a.exe", "png", "a\\b.png", "a\xff.png", "a\nb.png", nul,
+                                std::string(201, 'a') + ".png", "1/2/3/4/5/6/a.png", "a.png/"}) {
     EXPECT_EQ(put(name, "0", "x").status, 400) << name;
   }
   EXPECT_THAT(put("virus.exe", "0", "x").body, HasSubstr("virus.exe"));

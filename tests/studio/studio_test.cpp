@@ -447,7 +447,9 @@ TEST_F(StudioTest, ViewsWorthPaintingAreNumberedAndThoseThatArePaintedAreNone) {
   const auto& views = context_.capture.views;
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_FALSE(views.at(found[i]["view"].get<std::size_t>()).held_out);
-    if (i > 0) EXPECT_LE(found[i]["adds"], found[i - 1]["adds"]);
+    if (i > 0) {
+      EXPECT_LE(found[i]["adds"], found[i - 1]["adds"]);
+    }
   }
   EXPECT_THAT(state["commands"].dump(), HasSubstr("--suggest-keyframes 3"));
 

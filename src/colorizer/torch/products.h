@@ -7,8 +7,8 @@
 
 namespace cnerf {
 
-/// Numbers of 8 bits where the processor multiplies them at twice the rate, as the nets of fields do: see IsaLevel.
-/// Sums are floats.
+/// Products of bf16 numbers where the processor multiplies them at twice the rate, as the nets of fields do: see
+/// IsaLevel. Sums are floats.
 [[nodiscard]] inline torch::ScalarType product_type() {
   return active_isa() == IsaLevel::kAvx512Bf16 ? torch::kBFloat16 : torch::kFloat32;
 }

@@ -184,8 +184,8 @@ void LuminanceStepCuda::launch_shared(const std::uint32_t* occupied) {
     shared_grid_->pack(part, stream_);
     follow(stream_, *sums_);
     shared_grid_->sum(part, *sums_);
-    if (updated != nullptr) hand_round(*updated);  // after this part's sum, which need not wait for the update
     follow(*sums_, side_);
+    if (updated != nullptr) hand_round(*updated);  // beside this part's update
     shared_grid_->update(part, adam, side_);
     updated_.record(side_);
     updated = &part;

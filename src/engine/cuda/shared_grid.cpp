@@ -6,13 +6,16 @@ namespace cnerf {
 namespace {
 
 /// From the finest level to the coarsest, in parts of some million rows: exchanges of less are slow for what they are,
-/// and of more nothing goes on beside them.
+/// and of more nothing goes on beside them. Smaller grids have two parts, so that one is exchanged while the other is
+/// found.
 std::vector<LevelRange> parts_of(const std::vector<GridLevel>& levels) {
-  constexpr std::uint32_t kRowsOfPart = 1 << 23;
+  std::uint32_t rows_of_part = 0;
+  for (const GridLevel& level : levels) rows_of_part += level.rows;
+  rows_of_part = std::min(rows_of_part / 2, 1u << 23);
   std::vector<LevelRange> parts;
-  std::uint32_t rows = kRowsOfPart;
+  std::uint32_t rows = rows_of_part;
   for (std::size_t l = levels.size(); l-- > 0;) {
-    if (rows >= kRowsOfPart) {
+    if (rows >= rows_of_part) {
       parts.push_back({l, l + 1});
       rows = 0;
     }

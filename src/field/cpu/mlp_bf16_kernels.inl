@@ -1,6 +1,6 @@
-// The layer kernels by dot products of bf16 pairs, for processors with AVX512_BF16: a lane adds two products of numbers
-// of 8 bits to a float, at the price of one float multiply-add. What is read is rounded to the nearest bf16; sums stay
-// floats. See mlp_kernels.h.
+// The layer kernels by dot products of bf16 pairs, for processors with AVX512_BF16: a lane adds two products to a
+// float, at the price of one float multiply-add. What is read is rounded to the nearest bf16; sums stay floats. See
+// mlp_kernels.h.
 
 #include <immintrin.h>
 

@@ -37,7 +37,7 @@ extern const MlpKernels kMlpKernels;
 namespace avx512 {
 extern const MlpKernels kMlpKernels;
 }
-/// Products of numbers rounded to bf16, which have 8 bits; sums of floats.
+/// Products of numbers rounded to bf16; sums of floats.
 namespace avx512bf16 {
 extern const MlpKernels kMlpKernels;
 }
