@@ -326,6 +326,21 @@ nanovdb::GridHandle<> nano_grid(const openvdb::GridBase::Ptr& grid) {
   return nanovdb::openToNanoVDB(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid));
 }
 
+/// @throws OutputError  naming `path` for what streams and OpenVDB throw
+void write_volume(const std::filesystem::path& path,
+                  const std::function<void(const std::filesystem::path& temporary)>& write) {
+  write_atomically(path, [&](const std::filesystem::path& temporary) {
+    errno = 0;
+    try {
+      write(temporary);
+    } catch (const std::ios::failure& failure) {
+      throw OutputError(path.string() + ": cannot be written: " + (errno != 0 ? std::strerror(errno) : failure.what()));
+    } catch (const openvdb::Exception& failure) {
+      throw OutputError(path.string() + ": cannot be written: " + failure.what());
+    }
+  });
+}
+
 }  // namespace
 
 Affined file_from_world(const VdbOptions& options, const WorldConvention& world) {
@@ -343,28 +358,22 @@ bool density_fits_half(const bake::VolumeStatistics& volume) {
 void write_vdb(const bake::VolumePlanes& volume, const std::filesystem::path& path, const VdbOptions& options,
                const Label& label) {
   const VdbGrids grids(volume, options, label);
-  write_atomically(path, [&](const std::filesystem::path& temporary) {
-    try {
-      CheckedArchive(compression_flags(options.compression)).save(temporary, grids);
-    } catch (const std::ios::failure& failure) {
-      throw OutputError(path.string() + ": cannot be written: " + (errno != 0 ? std::strerror(errno) : failure.what()));
-    } catch (const openvdb::Exception& failure) {
-      throw OutputError(path.string() + ": cannot be written: " + failure.what());
-    }
+  write_volume(path, [&](const std::filesystem::path& temporary) {
+    CheckedArchive(compression_flags(options.compression)).save(temporary, grids);
   });
 }
 
 void write_nvdb(const bake::VolumePlanes& volume, const std::filesystem::path& path, const VdbOptions& options,
                 const Label& label) {
   const VdbGrids grids(volume, options, label);
-  write_atomically(path, [&](const std::filesystem::path& temporary) {
-    errno = 0;
-    std::ofstream out(temporary, std::ios::binary | std::ios::trunc);
-    for (std::size_t number = 0; out && number < grids.count(); ++number) {
+  write_volume(path, [&](const std::filesystem::path& temporary) {
+    std::ofstream out;
+    out.exceptions(std::ios::failbit | std::ios::badbit);  // before the library finds out and says less
+    out.open(temporary, std::ios::binary | std::ios::trunc);
+    for (std::size_t number = 0; number < grids.count(); ++number) {
       nanovdb::io::writeGrid(out, nano_grid(grids.make(number)));
     }
     out.close();
-    if (!out) throw OutputError(path.string() + ": cannot be written: " + std::strerror(errno));
   });
 }
 

@@ -5,6 +5,7 @@
 # CNERF  the program [build/release/cnerf]     SEED  of the random choices [1]
 # FOLDER of everything, emptied before [build/soak]     MEMORY  MiB a program may hold [1500]
 set -uo pipefail
+shopt -s extglob
 cd "$(dirname "$0")/.."
 hours=${1:?HOURS}
 cnerf=$(realpath "${CNERF:-build/release/cnerf}")
@@ -24,6 +25,8 @@ declare -A calls ends peak
 failures=() kills=0 resumes=0 pairs=0 rounds=0 results=0
 count() { ends[$1]=$((${ends[$1]:-0} + 1)); }
 fail() {
+  local words=${*//--set [a-z]*([^ ])/}  # options are told by the seed
+  set -- "$(tr -s ' ' <<< "$words")"
   failures+=("round $rounds: $*")
   echo "FAILED round $rounds: $*" >&2
 }
@@ -98,14 +101,14 @@ between() { echo $(($1 + RANDOM % ($2 - $1 + 1))); }
 random_options() {
   options=(--threads 1 --progress "$(pick quiet plain json line)" --device cpu)
   local setting
-  for setting in "stage1.steps=$(between 4 400)" "stage1.samples_per_step=$(pick 1024 2048 4096)" \
+  for setting in "stage1.steps=$(between 60 400)" "stage1.samples_per_step=$(pick 1024 2048 4096)" \
     "stage1.checkpoint_every=$(between 1 50)" stage1.steps_per_box=32 "stage1.grid.levels=$(between 1 4)" \
     "stage1.grid.log2_rows=$(between 8 12)" stage1.grid.finest_resolution=32 colorizer.reference_steps=2 \
     "stage2.patches=$(between 1 12)" stage2.patch_size=16 stage2.rays_per_patch=64 stage2.working_resolution=32 \
     "stage2.distill_steps=$(between 1 20)" "stage2.colorizer_batch=$(between 1 4)" stage2.grid.levels=2 \
     stage2.grid.log2_rows=10 stage2.grid.finest_resolution=32 "stage2.purify.enabled=$(pick true false false)" \
     stage2.purify.base_images=2 web.resolution=16 "render.frames=$(between 1 4)" render.short_side=16 \
-    render.steps_per_box=32 "bake.resolution=$(between 16 48)" "stage1.seed=$(between 1 99999)" mesh.texture_size=64 mesh.faces=500; do
+    render.steps_per_box=32 "bake.resolution=$(between 16 48)" "stage1.seed=$(between 1 99999)" mesh.texture_size=64 mesh.faces=500 mesh.surface_depth=64; do
     options+=(--set "$setting")
   done
 }
@@ -160,7 +163,7 @@ round() {
   local views
   views=$(between 4 8)
   local sample=(sample -o "$capture" --views "$views" --width "$(between 16 40)" --height "$(between 16 32)"
-    --samples-per-pixel 1 --seed "$(between 1 9999)" --threads 1)
+    --samples-per-pixel 1 --threads 1)
   until_done "${sample[@]}" -- "${sample[@]}" --overwrite
   if [ $((RANDOM % 4)) -eq 0 ]; then
     until_done run "$capture" -o "$run" --grey "${options[@]}" -- run "$capture" -o "$run" --grey --resume "${options[@]}"

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -119,6 +121,7 @@ TEST(Ranks, AloneNothingIsShared) {
 TEST(Ranks, EveryPieceIsMadeOnceAndTakenInOrder) {
   constexpr std::size_t kPieces = 500;  // more than may wait for rank 0
   std::mutex mutex;
+  std::condition_variable came;
   std::multiset<std::size_t> made;
   std::vector<std::size_t> taken;
   std::set<int> makers;
@@ -127,9 +130,11 @@ TEST(Ranks, EveryPieceIsMadeOnceAndTakenInOrder) {
       share_out(
           ranks, kPieces,
           [&](std::size_t piece) {
-            const std::lock_guard lock(mutex);
+            std::unique_lock lock(mutex);
             made.insert(piece);
             makers.insert(ranks.rank());
+            came.notify_all();  // one alone could make everything before the others begin
+            came.wait_for(lock, std::chrono::seconds(10), [&] { return makers.size() == 3; });
             return piece * piece;
           },
           [&](std::size_t piece, std::size_t result) {

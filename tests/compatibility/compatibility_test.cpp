@@ -89,7 +89,8 @@ TEST_F(Compatibility, ARunIsBakedToTheSameVolume) {
   EXPECT_EQ(now.at("resolution"), before.at("resolution"));
   EXPECT_NEAR(now.at("voxels").get<double>(), before.at("voxels").get<double>(), 5);  // at a threshold
   const double densest = before.at("max_density").get<double>();
-  EXPECT_NEAR(now.at("max_density").get<double>(), densest, 1e-3 * densest);
+  // Its products were of floats; those of bf16 are off by 2^-8.
+  EXPECT_NEAR(now.at("max_density").get<double>(), densest, 4e-3 * densest);
 }
 
 TEST_F(Compatibility, AnOldRunTakesNewColours) {

@@ -8,6 +8,7 @@
 #include "src/base/error.h"
 #include "tests/export/test_volumes.h"
 #include "tests/support/data.h"
+#include "tests/support/full_disk.h"
 
 namespace cnerf::exporting::test {
 using namespace cnerf::test;
@@ -61,6 +62,18 @@ TEST(NanoVdb, AFolderThatCannotBeWrittenIsAnOutputError) {
   std::ofstream(folder / "file") << "not a folder";
   const bake::Volume volume = varied_block();
   EXPECT_THROW(write_nvdb(planes_of(volume), folder / "file" / "a.nvdb"), OutputError);
+}
+
+TEST(NanoVdb, ADiskThatIsFullOnTheWayIsAnOutputError) {
+  const TempDir folder;
+  const bake::Volume volume = varied_block();
+  write_nvdb(planes_of(volume), folder / "whole.nvdb");
+  const std::uintmax_t size = std::filesystem::file_size(folder / "whole.nvdb");
+  for (const std::uintmax_t room : {std::uintmax_t(0), size / 2, size - 1}) {
+    const FullDisk disk(room);
+    EXPECT_THROW(write_nvdb(planes_of(volume), folder / "a.nvdb"), OutputError) << room;
+    EXPECT_FALSE(std::filesystem::exists(folder / "a.nvdb"));
+  }
 }
 
 }  // namespace
