@@ -104,7 +104,7 @@ std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const Capture& capture
     }
   }
   std::ranges::sort(pairs);
-  pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   return pairs;
 }
 

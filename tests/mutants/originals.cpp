@@ -143,10 +143,10 @@ void sign_volume(const fs::path& bake) {
 constexpr const char* kStrokes = R"({
  "revision": 3, "everywhere": true,
  "strokes": [
-  {"id": "s1", "view": "view_000", "kind": "paint", "color": "#c08040", "word": "jacket", "size": 0.2,
+  {"id": "s1", "view": "images/view_001.png", "kind": "paint", "color": "#c08040", "word": "jacket", "size": 0.2,
    "softness": 0.5, "reach": 1, "points": [[0.1, 0.2, 1], [0.6, 0.7, 0.5]]},
   {"id": "s2", "view": "door", "kind": "exact", "size": 0.1, "points": [[0.5, 0.5, 1]]},
-  {"id": "s3", "view": "view_000", "kind": "erase", "size": 0.05, "hidden": false, "points": [[0.3, 0.4, 1]]}],
+  {"id": "s3", "view": "images/view_001.png", "kind": "erase", "size": 0.05, "hidden": false, "points": [[0.3, 0.4, 1]]}],
  "viewpoints": [
   {"name": "door", "position": [0, -3, 1], "rotation": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
    "lens": {"width": 24, "height": 16, "fx": 20, "fy": 20, "cx": 12, "cy": 8}}]
