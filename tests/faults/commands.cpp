@@ -120,8 +120,9 @@ std::vector<Command> Fixtures::commands() const {
       {"colorize", "run", joined({"colorize", "@/run", "--take", "t", "--colorizer", kColorizer}, kOneThread), {"run"}},
       {"bake", "take", joined(bake("vdb"), {"--nvdb"}), {"run", "bake/volume.vdb"}},
       {"web", "take", joined(bake("web"), {"--web-resolution", "24"}), {"run"}},
-      {"gltf", "take", bake("gltf"), {"run"}},
-      {"exr", "take", bake("exr"), {"run"}},
+      // A field of 30 steps is thin.
+      {"gltf", "take", joined(bake("gltf"), {"--set", "mesh.surface_depth=64"}), {"run"}},
+      {"exr", "take", joined(bake("exr"), {"--set", "mesh.surface_depth=64"}), {"run"}},
       {"eval", "take", joined({"eval", "@/run", "--take", "t"}, kOneThread), {"run"}},
       {"render", "take", joined({"render", "@/run", "--take", "t", "--format", "png,exr,mp4"}, kOneThread), {"run"}},
       {"run",
