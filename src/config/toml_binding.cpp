@@ -77,7 +77,9 @@ void assign(const Field& field, int& target, const toml::node& node, const Origi
 template <std::floating_point Number>
 void assign(const Field& field, Number& target, const toml::node& node, const Origin& origin) {
   if (!node.is_number()) origin.refuse("expected a number" + in_range(field) + ", got " + text_of(node));
-  const double value = node.value<double>().value();
+  // The library converts no integers that a double cannot hold.
+  const auto* whole = node.as_integer();
+  const double value = whole != nullptr ? double(whole->get()) : node.as_floating_point()->get();
   check_range(field, value, origin);
   target = static_cast<Number>(value);
 }

@@ -95,10 +95,21 @@ std::string digest(const std::string& text) {
   return std::to_string(text.size()) + " bytes, hash " + std::to_string(std::hash<std::string>()(text));
 }
 
+/// How a report of times ends when it is whole; the times themselves differ. Empty for what is no such report.
+std::string ending_of_times(const fs::path& file) {
+  if (file.extension() == ".curve" || file.filename() == "table.md") return "\n";
+  if (file.filename() == "stage1.txt") return " training pixels\n";
+  if (file.filename() == "report.html") return "</html>\n";
+  return "";
+}
+
 /// What has to be the same in every run that did the same.
 std::string lasting(const fs::path& file, std::string text) {
   const std::string extension = file.extension().string();
   if (file.filename() == "accepted.png" || file.filename() == "rejected.png") return "gallery";
+  if (const std::string ending = ending_of_times(file); !ending.empty()) {
+    return text.ends_with(ending) ? "whole" : "cut short, " + digest(text);
+  }
   constexpr std::size_t kIdentifier = 8 + 4 + 8 + 1, kIdentifierBytes = 36;
   if (extension == ".vdb" && text.size() > kIdentifier + kIdentifierBytes) {
     text.replace(kIdentifier, kIdentifierBytes, kIdentifierBytes, '-');
@@ -178,7 +189,7 @@ fs::path Slot::keep(const std::string& name, const std::string& text) const {
 const std::vector<std::string>& varying_keys() {
   static const std::vector<std::string> keys = {"seconds",        "seconds_of_steps", "colorizer_seconds",
                                                 "waited_seconds", "command_line",     "peak_memory_bytes",
-                                                "train_psnr"};
+                                                "train_psnr",     "stage1_curve",     "stage2_curve"};
   return keys;
 }
 

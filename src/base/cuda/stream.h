@@ -11,12 +11,6 @@ namespace cnerf {
 class CudaStream {
  public:
   CudaStream() { CNERF_CUDA(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking)); }
-  /// Its work goes before that of others which waits as well.
-  static CudaStream urgent() {
-    int lowest = 0, highest = 0;
-    CNERF_CUDA(cudaDeviceGetStreamPriorityRange(&lowest, &highest));
-    return CudaStream(highest);
-  }
   CudaStream(const CudaStream&) = delete;
   CudaStream& operator=(const CudaStream&) = delete;
   ~CudaStream() {
@@ -27,10 +21,6 @@ class CudaStream {
   void wait() const { CNERF_CUDA(cudaStreamSynchronize(stream_)); }
 
  private:
-  explicit CudaStream(int priority) {
-    CNERF_CUDA(cudaStreamCreateWithPriority(&stream_, cudaStreamNonBlocking, priority));
-  }
-
   cudaStream_t stream_ = nullptr;
 };
 

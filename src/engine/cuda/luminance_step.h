@@ -99,7 +99,7 @@ class LuminanceStepCuda {
   std::optional<SharedGrid> shared_grid_;
   std::optional<CudaStream> sums_;  // what processes exchange
   CudaEvent ready_, updated_;
-  CudaStream side_ = CudaStream::urgent();  // what others wait for
+  CudaStream side_;
   CudaEvent done_[kStepRing], fork_, join_;
   cudaGraphExec_t graph_ = nullptr;
   bool is_warm_ = false;  // every kernel of a step has run once

@@ -167,7 +167,11 @@ StrokeList strokes_of_json(std::string_view text, const fs::path& file, const Pa
     const StrokeCheck of_stroke(file, i);
     check(list.strokes[i], of_stroke, names);
     of_stroke.require(ids.insert(list.strokes[i].id).second, "id", "another stroke has it: " + list.strokes[i].id);
-    if (!list.strokes[i].picture.empty()) list.strokes[i].painted = pictures.find(list.strokes[i].picture);
+    if (const std::string& picture = list.strokes[i].picture; !picture.empty()) {
+      const fs::path painted = pictures.file(picture);
+      of_stroke.require(fs::exists(painted), "picture", "there is no " + painted.string());
+      list.strokes[i].painted = pictures.find(picture);
+    }
   }
   return list;
 }
