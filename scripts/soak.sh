@@ -82,6 +82,8 @@ killed() {
   child=$(pgrep -P "$begun" || true)
   if [ -n "$child" ] && kill -s "$signal" "$child" 2> /dev/null; then
     kills=$((kills + 1))
+    # A signal that comes before the program listens is lost, and a server does not end by itself.
+    while [ "$1" = view ] && sleep 0.5 && kill -s "$signal" "$child" 2> /dev/null; do :; done
   else
     signal=0  # it was faster
   fi
@@ -108,7 +110,7 @@ random_options() {
     "stage2.distill_steps=$(between 1 20)" "stage2.colorizer_batch=$(between 1 4)" stage2.grid.levels=2 \
     stage2.grid.log2_rows=10 stage2.grid.finest_resolution=32 "stage2.purify.enabled=$(pick true false false)" \
     stage2.purify.base_images=2 web.resolution=16 "render.frames=$(between 1 4)" render.short_side=16 \
-    render.steps_per_box=32 "bake.resolution=$(between 16 48)" "stage1.seed=$(between 1 99999)" mesh.texture_size=64 mesh.faces=500 mesh.surface_depth=64; do
+    render.steps_per_box=32 "bake.resolution=$(between 16 48)" "stage1.seed=$(between 1 99999)" mesh.texture_size=512 mesh.faces=500 mesh.surface_depth=64; do
     options+=(--set "$setting")
   done
 }

@@ -11,6 +11,7 @@
 #include <torch/version.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
 #include <torch/csrc/distributed/c10d/PrefixStore.hpp>
@@ -122,6 +123,8 @@ class GlooGroup final : public Group {
 class NcclSums final : public DeviceSums {
  public:
   NcclSums(const Launch& launch, Seconds limit) {
+    // More blocks than NCCL takes by itself: much of a step waits for what is exchanged.
+    for (const char* variable : {"NCCL_MIN_CTAS", "NCCL_MAX_CTAS"}) ::setenv(variable, "32", /*overwrite=*/0);
     // Kernels of a sum find room beside those that fill the GPU.
     const auto options = c10d::ProcessGroupNCCL::Options::create(/*is_high_priority_stream=*/true);
     options->timeout = kLongestOperation;
