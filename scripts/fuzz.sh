@@ -63,7 +63,7 @@ mkdir -p "$build/logs"
 rm -f "$build/logs"/*
 for name in "${names[@]}"; do
   # One of an earlier build is not run for what does not build any more.
-  ninja -C "$build" -n "fuzz_$name" 2> /dev/null | grep -q 'no work to do' || continue
+  ninja -C "$build" "fuzz_$name" > /dev/null 2>&1 || continue
   while [ "$(jobs -rp | wc -l)" -ge "$jobs" ]; do wait -n || true; done
   run "$name" &
 done
