@@ -11,6 +11,7 @@
 #include "src/color/colorspace_math.h"
 #include "src/engine/color_engines.h"
 #include "tests/support/engine_state.h"
+#include "tests/support/isa.h"
 
 namespace cnerf {
 namespace {
@@ -101,6 +102,7 @@ std::vector<Parameters> parameters_of(ColorBinEngine& engine) {
 }
 
 TEST(ColorBinEngine, GradientIsTheLossesDerivativeAndThatOfWhatIsAdded) {
+  const test::ScopedIsa floats(test::best_float_isa());
   const PixelSamples pixels = row_of_pixels(48);
   for (const ChromaLossWeights more : {ChromaLossWeights{}, {.spread = 30}, {.regression = 1}, {3, 0.1f}}) {
     const auto engine = make_cpu_color_bin_engine(small_grid(), 5);

@@ -11,6 +11,7 @@
 #include "tests/support/engine_state.h"
 #include "tests/support/finite_difference.h"
 #include "tests/support/grouped.h"
+#include "tests/support/isa.h"
 #include "tests/support/torch_oracle.h"
 #include "tests/support/toy_capture.h"
 
@@ -55,6 +56,7 @@ TEST(TorchOracle, HashGridForwardAndBackward) {
 }
 
 TEST(TorchOracle, GradientOfAWholeStep) {
+  const test::ScopedIsa floats(test::best_float_isa());
   const Capture capture = test::toy_capture(4, 24, 20, /*with_alpha=*/true);
   SceneFrame frame;
   frame.unit_per_world = 0.4;

@@ -19,6 +19,11 @@ inline std::vector<IsaLevel> available_isas() {
   return levels;
 }
 
+/// The best of them.
+inline IsaLevel best_float_isa() {
+  return available_isas().back();
+}
+
 /// Engines that are made in this scope use this instruction set.
 class ScopedIsa {
  public:
