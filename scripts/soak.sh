@@ -179,12 +179,12 @@ round() {
   if [ $((RANDOM % 2)) -eq 0 ]; then two_at_once "$run"; fi
   local bake=(bake "$run" --take a --format "$(pick vdb vdb,web vdb,gltf web,vdb,gltf)" "${options[@]}")
   until_done "${bake[@]}" --overwrite -- "${bake[@]}" --overwrite
+  killed view "$run" --take a --no-browser  # what it leaves is cleared by the next step
   call eval "$run" --take a "${options[@]}"
   call render "$run" --take a --path "$(pick turntable orbit spiral held-out)" --format "$(pick png exr png,exr)" \
     -o "$folder/round/pictures" "$(pick --baked --overwrite)" "${options[@]}"
   call render "$run/bakes/a" --path cameras -o "$folder/round/voxels"
   opens "$capture" "$run" "$run/stage1.snapshot" "$run/takes/a/take.snapshot" "$run/bakes/a/volume.vdb"
-  killed view "$run" --take a --no-browser
   visit
   left=$(find "$folder/round" -name '*.partial-*' | wc -l)
   if [ "$left" -gt 0 ]; then

@@ -15,6 +15,7 @@
 #include <system_error>
 
 #include "src/base/error.h"
+#include "src/base/folder_lock.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -128,12 +129,22 @@ bool is_temporary(const fs::path& file) {
   return name.starts_with('.') && name.find(kMark) != std::string::npos;
 }
 
+namespace {
+
+/// Of a lock that names its holder, who may be gone. Who is about to take one has not written its name yet.
+bool is_taken_lock(const fs::path& file) {
+  std::error_code failure;
+  return file.filename() == FolderLock::kFile && fs::file_size(file, failure) > 0 && !failure;
+}
+
+}  // namespace
+
 void remove_leftovers(const fs::path& folder, int depth) {
   std::error_code failure;
   for (fs::directory_iterator entry(folder, failure), end; !failure && entry != end; entry.increment(failure)) {
     const fs::path& path = entry->path();
     if (depth > 0 && entry->is_directory(failure) && !entry->is_symlink(failure)) remove_leftovers(path, depth - 1);
-    if (!is_temporary(path)) continue;
+    if (!is_temporary(path) && !is_taken_lock(path)) continue;
     const FileDescriptor file(::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
     if (file.lock(LOCK_EX | LOCK_NB) && file.is_still_at(path)) ::unlink(path.c_str());
   }

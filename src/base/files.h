@@ -44,7 +44,7 @@ void write_atomically(const std::filesystem::path& target,
 [[nodiscard]] bool is_temporary(const std::filesystem::path& file);
 
 /// Removes what writers that were killed left in a folder and, at most `depth` levels, below it: temporary files of
-/// NewFile that nobody writes to any more.
+/// NewFile that nobody writes to any more, and locks that nobody holds.
 void remove_leftovers(const std::filesystem::path& folder, int depth = 0);
 
 /// Makes a folder and those above it; their names are on the disk when it returns.

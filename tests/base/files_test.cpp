@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "src/base/error.h"
+#include "src/base/folder_lock.h"
 #include "tests/support/data.h"
 
 namespace cnerf {
@@ -99,6 +100,18 @@ TEST(Files, WhatAKilledWriterLeftGoesAndWhatIsBeingWrittenStays) {
   alive.commit();
   EXPECT_EQ(read_text_file(folder / "a/b/y.exr"), "whole");
   EXPECT_EQ(entries(folder / "a/b"), 2u);
+}
+
+TEST(Files, AKilledHoldersLockGoesAndAHeldOneStays) {
+  const test::TempDir folder;
+  write_file(folder / "killed/.cnerf.lock", "pid 4194304, `cnerf render ...`");
+  write_file(folder / "beginning/.cnerf.lock", "");
+  const FolderLock own(folder.path(), FolderLock::Mode::kShared), other(folder / "held");
+  remove_leftovers(folder.path(), 1);
+  EXPECT_FALSE(fs::exists(folder / "killed/.cnerf.lock"));
+  EXPECT_TRUE(fs::exists(folder / "beginning/.cnerf.lock")) << "somebody is about to take it";
+  EXPECT_TRUE(fs::exists(folder / "held/.cnerf.lock"));
+  EXPECT_TRUE(fs::exists(folder / ".cnerf.lock"));
 }
 
 TEST(Files, WhatIsAnotherFilesIsNoLeftover) {
