@@ -101,6 +101,23 @@ TEST(Manifest, RefusesNewerSchemasAndBrokenFiles) {
   EXPECT_THROW((void)read_manifest(folder / "none.json"), MissingInputError);
 }
 
+TEST(Manifest, CamerasThatCannotBeAreRefused) {
+  const TempDir folder;
+  const nlohmann::json good = exported(folder);
+  for (const auto& [column, value] : {std::pair{0, 1e308}, {1, -2.5}, {3, 1e308}, {3, -1e10}}) {
+    nlohmann::json bad = good;
+    bad["cameras"][0]["world_from_camera"][1][column] = value;
+    std::ofstream(folder / "bad.json") << bad;
+    try {
+      (void)read_manifest(folder / "bad.json");
+      ADD_FAILURE() << column << ' ' << value;
+    } catch (const InputError& refusal) {
+      EXPECT_NE(std::string(refusal.what()).find("bad.json: cameras[0].world_from_camera"), std::string::npos)
+          << refusal.what();
+    }
+  }
+}
+
 TEST(Manifest, AMissingFileIsNotListed) {
   const TempDir folder;
   BakeManifest manifest;
