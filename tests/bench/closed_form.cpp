@@ -18,6 +18,7 @@
 #include "src/evaluate/evaluate.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/train/chroma/injection.h"
+#include "tests/bench/bench_main.h"
 
 namespace cnerf {
 namespace {
@@ -252,10 +253,5 @@ int bench(int argc, char** argv) {
 }  // namespace cnerf
 
 int main(int argc, char** argv) {
-  try {
-    return cnerf::bench(argc, argv);
-  } catch (const std::exception& problem) {
-    fmt::print(stderr, "cnerf-closed-form: {}\n", problem.what());
-    return 1;
-  }
+  return cnerf::bench_main("cnerf-closed-form", cnerf::bench, argc, argv);
 }

@@ -20,6 +20,7 @@
 #include "src/pipeline/render_step.h"
 #include "src/studio/coloring.h"
 #include "src/studio/paint_files.h"
+#include "tests/bench/bench_main.h"
 
 namespace cnerf {
 namespace {
@@ -130,10 +131,5 @@ int bench(int argc, char** argv) {
 }  // namespace cnerf
 
 int main(int argc, char** argv) {
-  try {
-    return cnerf::bench(argc, argv);
-  } catch (const std::exception& problem) {
-    fmt::print(stderr, "cnerf-stroke-error: {}\n", problem.what());
-    return 1;
-  }
+  return cnerf::bench_main("cnerf-stroke-error", cnerf::bench, argc, argv);
 }

@@ -14,6 +14,7 @@
 #include "tests/support/data.h"
 #include "tests/support/engine_state.h"
 #include "tests/support/toy_capture.h"
+#include "tests/train/few_steps.h"
 
 namespace cnerf {
 namespace {
@@ -21,11 +22,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 
 Stage1Options few_steps() {
-  Stage1Options options;
-  options.grid.levels = 4;
-  options.grid.log2_rows = 12;
-  options.steps = 30;
-  options.samples_per_step = 1 << 12;
+  Stage1Options options = test::few_steps(30);
   options.checkpoint_every = 10;
   return options;
 }

@@ -9,6 +9,7 @@
 #include "tests/support/data.h"
 #include "tests/support/isa.h"
 #include "tests/support/toy_capture.h"
+#include "tests/train/few_steps.h"
 
 namespace cnerf {
 namespace {
@@ -20,19 +21,10 @@ struct Listening final : Observer {
   std::string said;
 };
 
-Stage1Options few_steps() {
-  Stage1Options options;
-  options.grid.levels = 4;
-  options.grid.log2_rows = 12;
-  options.steps = 10;
-  options.samples_per_step = 1 << 12;
-  return options;
-}
-
 TEST(Kernels, GoingOnWithOthersIsSaid) {
   const test::TempDir folder;
   const Capture capture = test::toy_capture();
-  const Stage1Options options = few_steps();
+  const Stage1Options options = test::few_steps(10);
   const auto file = folder / "stage1.snapshot";
   const auto heard = [&](IsaLevel isa, bool resume) {
     const test::ScopedIsa scope(isa);
