@@ -27,7 +27,8 @@ std::string default_text(const Field& field) {
 /// "triangles of the mesh, about [60000; 16 to 1e+08]"
 std::string described(const Field& field) {
   std::string legal = joined(field.choices, ", ");
-  if (field.range) legal = fmt::format("{:g} to {:g}", field.range->min, field.range->max);
+  const char* zero = field.range && field.range->or_zero ? "0, " : "";
+  if (field.range) legal = fmt::format("{}{:g} to {:g}", zero, field.range->min, field.range->max);
   if (std::holds_alternative<bool*>(field.value)) return field.help;
   return field.help + " [" + default_text(field) + (legal.empty() ? "" : "; " + legal) + "]";
 }

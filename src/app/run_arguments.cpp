@@ -27,13 +27,17 @@ pipeline::RunContext open_begun_run(const RunFolderArguments& arguments, const s
   pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.run);
   const pipeline::RunRecord record = directory.record();
   Config config = resolve_config(arguments.config, directory.config(take, reporter));
-  std::error_code failure;
-  if (arguments.capture.empty() && !fs::exists(record.capture, failure)) {
-    throw MissingInputError(directory.record_file().string() + ": capture: " + record.capture.string() +
-                            ": no such file or folder; --capture says where it lies now");
-  }
-  Capture capture = pipeline::read_capture(arguments.capture.empty() ? record.capture : fs::path(arguments.capture),
-                                           config, reporter, directory.root());
+  const bool is_told = !arguments.capture.empty();
+  Capture capture = [&] {
+    try {
+      return pipeline::read_capture(is_told ? fs::path(arguments.capture) : record.capture, config, reporter,
+                                    directory.root());
+    } catch (const MissingInputError& error) {
+      if (is_told) throw;
+      throw MissingInputError(directory.record_file().string() + ": capture: " + error.what() +
+                              "; --capture says where it lies now");
+    }
+  }();
   pipeline::RunContext context{std::move(directory), std::move(config), std::move(capture), std::move(command_line)};
   if (record.stage1.finished) pipeline::use_learned_views(context, reporter);
   return context;

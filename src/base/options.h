@@ -20,6 +20,7 @@ namespace cnerf {
 /// Closed range of a numeric option.
 struct Range {
   double min, max;
+  bool or_zero = false;  ///< 0 is legal as well, below `min`
 };
 
 /// The values a string option may take.

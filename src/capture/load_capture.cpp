@@ -86,15 +86,23 @@ std::vector<Source> sources_in_folder(const fs::path& root) {
   return sources;
 }
 
+/// What is in the folder of a capture and might have been meant as its poses.
+std::string stands_there(const fs::path& root) {
+  if (fs::is_empty(root)) return ": the folder is empty; ";
+  std::vector<fs::path> files = files_with_extension(root, ".csv");
+  if (files.empty()) files = files_with_extension(root, ".xmp");
+  if (files.empty()) files = files_with_extension(root / "images", ".xmp");
+  const std::string last = files.empty() ? "" : ", nor does " + files[0].filename().string() + " state any";
+  return ": no poses found" + last + "; ";
+}
+
 [[noreturn]] void refuse_without_poses(const fs::path& root) {
-  const std::string state = fs::is_empty(root) ? ": the folder is empty; " : ": no poses found; ";
   throw MissingInputError(
-      root.string() + state +
+      root.string() + stands_there(root) +
       "looked for transforms.json, transforms_train.json, a COLMAP model (cameras.bin or cameras.txt "
       "here, in sparse/, sparse/*/ or colmap/sparse/*/), poses_bounds.npy, Metashape's cameras.xml, RealityCapture's "
       "table (*.csv that begins with #name) or sidecars (*.xmp here or in images/), Polycam's keyframes/ and "
-      "Record3D's "
-      "metadata.json beside rgb/; cnerf prepare makes a capture of photographs or a film clip");
+      "Record3D's metadata.json beside rgb/; cnerf prepare makes a capture of photographs or a film clip");
 }
 
 std::vector<Source> recognise(const fs::path& path) {
@@ -183,10 +191,11 @@ void choose_held_out(std::vector<ListedView>& views, int holdout) {
   }
   const auto training = std::count_if(views.begin(), views.end(), [](const ListedView& v) { return !v.held_out; });
   if (training >= 2) return;
-  const std::string left = "leaves " + std::to_string(training) + " of " + std::to_string(views.size()) +
-                           " views for training; at least 2 are needed";
-  if (holdout > 0) throw UsageError("holdout " + std::to_string(holdout) + " " + left);
-  throw InputError(views.front().poses_file, "split", left);
+  const fs::path& file = views.front().poses_file;
+  const std::string left =
+      fmt::format("leaves {} of {} views for training; at least 2 are needed", training, views.size());
+  if (holdout > 0) throw UsageError(fmt::format("capture.holdout: {} {} ({})", holdout, left, file.string()));
+  throw InputError(file, "split", left);
 }
 
 /// The first source with at least two usable views, and a note where that is not the preferred one.

@@ -21,7 +21,7 @@ struct CaptureOptions {
     v("downscale", downscale, Range{1, 64}, "divide image sizes by this");
     v("transfer", transfer, Choice{"srgb", "linear", "gamma22"}, "how grey values encode luminance");
     v("cut_out_of_black", cut_out_of_black, "where all views show an object before black, take the black as empty");
-    v("holdout", holdout, Range{0, 1000},
+    v("holdout", holdout, Range{2, 1000, true},
       "hold out every N-th view; 0 follows the data set's own split, if it has one");
   }
 };

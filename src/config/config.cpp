@@ -71,13 +71,10 @@ std::string to_toml(const Config& config) {
 }
 
 void check_consistency(const Config& config) {
-  const auto require = [](bool holds, const std::string& message) {
-    if (!holds) throw UsageError(message);
-  };
-  const auto check_grid = [&](const std::string& section, const HashGridOptions& grid) {
-    require(grid.coarsest_resolution <= grid.finest_resolution,
-            section + ".coarsest_resolution: expected at most " + section + ".finest_resolution, got " +
-                std::to_string(grid.coarsest_resolution) + " against " + std::to_string(grid.finest_resolution));
+  const auto check_grid = [](const std::string& section, const HashGridOptions& grid) {
+    if (grid.coarsest_resolution <= grid.finest_resolution) return;
+    throw UsageError(section + ".coarsest_resolution: expected at most " + section + ".finest_resolution, got " +
+                     std::to_string(grid.coarsest_resolution) + " against " + std::to_string(grid.finest_resolution));
   };
   check_grid("stage1.grid", config.stage1.grid);
   check_grid("stage2.grid", config.stage2.grid);

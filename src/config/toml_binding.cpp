@@ -32,7 +32,8 @@ std::string shortest_text(Number value) {
 }
 
 std::string text_of(const Range& range) {
-  return "[" + shortest_text(range.min) + ", " + shortest_text(range.max) + "]";
+  const std::string zero = range.or_zero ? "0 or " : "";
+  return zero + "[" + shortest_text(range.min) + ", " + shortest_text(range.max) + "]";
 }
 
 template <std::floating_point Number>
@@ -55,7 +56,8 @@ std::string in_range(const Field& field) {
 void check_range(const Field& field, double value, const Origin& origin) {
   if (!std::isfinite(value))
     origin.refuse("expected a finite number" + in_range(field) + ", got " + shortest_text(value));
-  if (field.range && (value < field.range->min || value > field.range->max)) {
+  if (!field.range || (field.range->or_zero && value == 0)) return;
+  if (value < field.range->min || value > field.range->max) {
     origin.refuse("expected a number" + in_range(field) + ", got " + shortest_text(value));
   }
 }

@@ -137,7 +137,8 @@ std::string RunDirectory::choose_take(const std::string& wanted) const {
     const std::string name = entry.path().filename().string();
     if (take_record(name)) finished += (finished.empty() ? "" : ", ") + name;
   }
-  throw MissingInputError(root_.string() + ": no finished take '" + take + "' (there are: " +
+  const std::string asked = wanted.empty() ? record_file().string() + ": current_take" : root_.string();
+  throw MissingInputError(asked + ": no finished take '" + take + "' (there are: " +
                           (finished.empty() ? "none; make one with cnerf colorize" : finished) + ")");
 }
 

@@ -202,6 +202,12 @@ TEST(RealityCaptureTable, BadLinesAreRefused) {
   refuse("0.png,", ",", {"line 2.name", "expected a file name"});
   refuse("heading", "yaw", {"a.csv", "line 1", "expected a column heading"});
   refuse("#name", "name", {"a.csv", "line 1", "expected #name"});
+  try {
+    (void)load_capture(folder.path());
+    FAIL() << "a folder without a table was taken";
+  } catch (const MissingInputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("nor does a.csv state any"));
+  }
 }
 
 // ---- sidecars -------------------------------------------------------------------------------------------------------

@@ -143,5 +143,17 @@ TEST_F(TorchScriptColorizer, AWrongContractFileIsNamedWithItsKey) {
   }
 }
 
+/// With one letter of `__parameters__` changed LibTorch 1.13 reads at address 0.
+TEST_F(TorchScriptColorizer, AFileThatLibTorchDoesNotStandIsRefused) {
+  const std::string spec = module_of(kShift);
+  const std::string file = spec.substr(spec.find(':') + 1);
+  std::string bytes = read_text_file(file);
+  const std::size_t at = bytes.find("__parameters__");
+  ASSERT_NE(at, std::string::npos);
+  bytes[at + 3] = 'A';
+  write_file(file, bytes);
+  EXPECT_THAT(failure_of(spec), testing::AnyOf(HasSubstr("is damaged"), HasSubstr("not a TorchScript module")));
+}
+
 }  // namespace
 }  // namespace cnerf

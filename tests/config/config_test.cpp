@@ -91,7 +91,7 @@ std::string option_table(const std::vector<Field>& fields) {
     const auto begin = line.find(" = ") + 3;
     const std::string value = line.substr(begin, line.find("  # ") - begin);
     std::ostringstream legal;
-    if (field.range) legal << field.range->min << " to " << field.range->max;
+    if (field.range) legal << (field.range->or_zero ? "0, " : "") << field.range->min << " to " << field.range->max;
     for (const std::string& choice : field.choices) legal << (choice == field.choices.front() ? "" : ", ") << choice;
     text += "| `" + field.key + "` | `" + value + "` | " + legal.str() + " | " + field.help + " |\n";
   }

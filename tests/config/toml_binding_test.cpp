@@ -23,6 +23,7 @@ struct InnerOptions {
 
 struct TestOptions {
   int steps = 10;
+  int every = 0;
   float weight = 0.25f;
   bool enabled = true;
   std::string mode = "fast";
@@ -33,6 +34,7 @@ struct TestOptions {
   void visit(Visitor&& v) {
     v.section("inner", inner);  // before plain keys: writing has to reorder
     v("steps", steps, Range{1, 1e8}, "steps");
+    v("every", every, Range{2, 9, true}, "every");
     v("weight", weight, Range{-1, 1}, "weight");
     v("enabled", enabled, "enabled");
     v("mode", mode, Choice{"fast", "slow"}, "mode");
@@ -97,6 +99,8 @@ TEST(TomlBinding, RangesAreClosedAndNamed) {
   EXPECT_THAT(reading("steps = 0"), HasSubstr("in [1, 1e+08], got 0"));
   EXPECT_THAT(reading("weight = 1.5"), HasSubstr("in [-1, 1], got 1.5"));
   EXPECT_THAT(reading("weight = 9223372036854775807"), HasSubstr("in [-1, 1], got")) << "no double is as large";
+  EXPECT_THAT(reading("every = 1"), HasSubstr("in 0 or [2, 9], got 1"));
+  EXPECT_THAT(reading("every = 0"), HasSubstr("nothing was thrown"));
   EXPECT_THAT(reading("weight = nan"), HasSubstr("finite"));
   EXPECT_THAT(reading("weight = inf"), HasSubstr("finite"));
   EXPECT_THAT(reading("mode = 'medium'"), HasSubstr("one of fast, slow, got"));

@@ -103,6 +103,8 @@ std::vector<Command> Fixtures::commands() const {
   const auto bake = [](const char* format) {
     return Words{"bake", "@/run", "--take", "t", "--format", format, "-o", "@/bake", "--threads", "1"};
   };
+  // A field of 30 steps is thin; small textures make a trial a matter of seconds.
+  const Words mesh = {"--set", "mesh.surface_depth=64", "--set", "mesh.faces=500", "--set", "mesh.texture_size=256"};
   return {
       {"sample",
        "",
@@ -120,9 +122,8 @@ std::vector<Command> Fixtures::commands() const {
       {"colorize", "run", joined({"colorize", "@/run", "--take", "t", "--colorizer", kColorizer}, kOneThread), {"run"}},
       {"bake", "take", joined(bake("vdb"), {"--nvdb"}), {"run", "bake/volume.vdb"}},
       {"web", "take", joined(bake("web"), {"--web-resolution", "24"}), {"run"}},
-      // A field of 30 steps is thin.
-      {"gltf", "take", joined(bake("gltf"), {"--set", "mesh.surface_depth=64"}), {"run"}},
-      {"exr", "take", joined(bake("exr"), {"--set", "mesh.surface_depth=64"}), {"run"}},
+      {"gltf", "take", joined(bake("gltf"), mesh), {"run"}},
+      {"exr", "take", joined(bake("exr"), mesh), {"run"}},
       {"eval", "take", joined({"eval", "@/run", "--take", "t"}, kOneThread), {"run"}},
       {"render", "take", joined({"render", "@/run", "--take", "t", "--format", "png,exr,mp4"}, kOneThread), {"run"}},
       {"run",

@@ -93,6 +93,14 @@ TEST(RunDirectoryTest, TakesStandSideBySide) {
   } catch (const MissingInputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("there are: exec"));
   }
+  record.current_take = "gone";
+  run.save(record);
+  try {
+    (void)run.choose_take("");
+    FAIL() << "a take that does not exist was chosen";
+  } catch (const MissingInputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("run.json: current_take: no finished take 'gone'"));
+  }
 }
 
 TEST(RunDirectoryTest, TakeNamesAreFolderNames) {

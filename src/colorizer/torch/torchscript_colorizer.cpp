@@ -2,10 +2,14 @@
 
 #include <ATen/Parallel.h>
 #include <fmt/format.h>
+#include <sys/wait.h>
 #include <torch/script.h>
 #include <torch/version.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <future>
 #include <thread>
 
@@ -31,10 +35,32 @@ std::string shape_text(const Tensor& tensor) {
   return text + "]";
 }
 
+/// Whether LibTorch outlives reading the file, which it does not for every damaged one: a child tries it first. What is
+/// merely refused there is refused here as well, in words.
+bool outlives_loading(const fs::path& file, double timeout_seconds) {
+  const pid_t child = ::fork();
+  if (child < 0) return true;
+  if (child == 0) {
+    ::close(STDERR_FILENO);
+    ::alarm(unsigned(std::ceil(timeout_seconds)));
+    try {
+      (void)torch::jit::load(file.string(), torch::kCPU);
+    } catch (...) {
+    }
+    ::_exit(0);
+  }
+  int status = 0;
+  const pid_t ended = TEMP_FAILURE_RETRY(::waitpid(child, &status, 0));
+  return ended != child || status == 0;
+}
+
 class TorchScriptColorizer final : public NetworkColorizer {
  public:
   TorchScriptColorizer(const fs::path& file, const std::string& shown, double timeout_seconds)
       : NetworkColorizer("torchscript:" + shown, contract_beside(file)), timeout_(timeout_seconds) {
+    if (!outlives_loading(file, timeout_seconds)) {
+      throw ColorizerError(name_ + ": is damaged: LibTorch " TORCH_VERSION " cannot stand or end reading it");
+    }
     try {
       module_ = torch::jit::load(file.string(), torch::kCPU);
       module_.eval();
