@@ -8,6 +8,7 @@
 
 #include "src/base/check.h"
 #include "src/base/files.h"
+#include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
 
 namespace cnerf {
@@ -25,21 +26,20 @@ cv::Mat read_linear_rgb(const std::filesystem::path& file) {
     image = cv::imdecode(raw, cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH);
   }
   if (image.empty()) throw InputError(file, "", "not an image this program can read");
-  const bool linear = image.depth() == CV_32F;
   const double scale = image.depth() == CV_8U ? 1 / 255.0 : image.depth() == CV_16U ? 1 / 65535.0 : 1.0;
   cv::Mat rgb;
   image.convertTo(rgb, CV_32F, scale);
   cv::cvtColor(rgb, rgb, cv::COLOR_BGR2RGB);
-  if (linear) return rgb;
-  rgb.forEach<cv::Vec3f>([](cv::Vec3f& pixel, const int*) {
-    for (int c = 0; c < 3; ++c) pixel[c] = linear_from_srgb(pixel[c]);
+  if (image.depth() == CV_32F) return rgb;  // linear already
+  parallel_tasks(std::size_t(rgb.rows), [&](std::size_t y) {
+    auto* row = rgb.ptr<float>(int(y));
+    std::transform(row, row + 3 * rgb.cols, row, linear_from_srgb<float>);
   });
   return rgb;
 }
 
 LabImage lab_of(const cv::Mat& linear_rgb) {
-  LabImage image{linear_rgb.cols, linear_rgb.rows, {}};
-  image.lab.resize(std::size_t(image.width) * std::size_t(image.height) * 3);
+  LabImage image{linear_rgb.cols, linear_rgb.rows, std::vector<float>(linear_rgb.total() * 3)};
   float* out = image.lab.data();
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x, out += 3) {
