@@ -494,7 +494,7 @@ std::vector<std::string> endless_training(const fs::path& capture, const fs::pat
 }  // namespace
 
 std::vector<ServerRow> run_server_campaign(const ServerOptions& options) {
-  const Workshop workshop{options.program, options.folder / "served", {}};
+  const Workshop workshop{options.program, options.folder / "served", options.limits};
   fs::remove_all(options.folder);
   fs::create_directories(options.folder);
   write_file(options.folder / "page/index.html", "<!doctype html><title>page</title>");

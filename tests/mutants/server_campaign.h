@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/mutants/limited_run.h"
+
 namespace cnerf::mutants {
 
 struct ServerOptions {
@@ -22,6 +24,7 @@ struct ServerOptions {
   int seconds = 20;                                 ///< that slow and silent ones and followers stay
   double patience = 1;                              ///< seconds in which the page has to come
   std::size_t most_growth = std::size_t(50) << 20;  ///< bytes, resident
+  Limits limits;                                    ///< of the commands that make what is served
   std::function<void(const std::string&)> say = [](const std::string&) {};
 };
 

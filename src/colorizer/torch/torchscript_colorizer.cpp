@@ -35,12 +35,12 @@ std::string shape_text(const Tensor& tensor) {
   return text + "]";
 }
 
-/// Whether LibTorch outlives reading the file, which it does not for every damaged one: a child tries it first. What is
-/// merely refused there is refused here as well, in words.
+/// Whether LibTorch outlives reading the file or refuses it in words: a child tries it, since some damaged ones end it.
 bool outlives_loading(const fs::path& file, double timeout_seconds) {
   const pid_t child = ::fork();
   if (child < 0) return true;
   if (child == 0) {
+    at::set_num_threads(1);  // a pool of threads does not survive a fork
     ::close(STDERR_FILENO);
     ::alarm(unsigned(std::ceil(timeout_seconds)));
     try {
