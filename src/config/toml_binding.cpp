@@ -32,8 +32,7 @@ std::string shortest_text(Number value) {
 }
 
 std::string text_of(const Range& range) {
-  const std::string zero = range.or_zero ? "0 or " : "";
-  return zero + "[" + shortest_text(range.min) + ", " + shortest_text(range.max) + "]";
+  return "[" + shortest_text(range.min) + ", " + shortest_text(range.max) + "]" + (range.or_zero ? " or 0" : "");
 }
 
 template <std::floating_point Number>

@@ -174,5 +174,21 @@ TEST(BadOutput, UnknownCommandsAndRunsAreRefused) {
   EXPECT_EQ(cnerf({"eval", tiny_capture().string()}).exit_code, 66);
 }
 
+TEST(BadRun, ACaptureWithoutPosesIsNamedByTheRecordThatNamesIt) {
+  const TempDir folder;
+  const fs::path run = copied(tiny_run(), folder / "run");
+  nlohmann::json record = nlohmann::json::parse(read_text_file(run / "run.json"));
+  for (const fs::path& capture : {folder.path(), folder / "gone"}) {
+    record["capture"] = capture.string();
+    write_file(run / "run.json", record.dump());
+    const ProgramResult result = cnerf({"eval", run.string()});
+    EXPECT_EQ(result.exit_code, 66);
+    EXPECT_THAT(result.err, HasSubstr("run.json: capture: " + capture.string() + ":"));
+    EXPECT_THAT(result.err, HasSubstr("--capture says where it lies now"));
+    EXPECT_THAT(cnerf({"eval", run.string(), "--capture", capture.string()}).err,
+                testing::Not(HasSubstr("run.json: capture")));
+  }
+}
+
 }  // namespace
 }  // namespace cnerf::test
