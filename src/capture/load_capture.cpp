@@ -106,7 +106,8 @@ std::string stands_there(const fs::path& root) {
 }
 
 std::vector<Source> recognise(const fs::path& path) {
-  if (!fs::exists(path)) throw MissingInputError(path.string() + ": no such file or folder");
+  std::error_code failure;  // a name too long for the file system is of nothing
+  if (!fs::exists(path, failure)) throw MissingInputError(path.string() + ": no such file or folder");
   if (fs::is_directory(path)) {
     std::vector<Source> sources = sources_in_folder(path);
     if (sources.empty()) refuse_without_poses(path);

@@ -178,7 +178,7 @@ TEST(BadRun, ACaptureWithoutPosesIsNamedByTheRecordThatNamesIt) {
   const TempDir folder;
   const fs::path run = copied(tiny_run(), folder / "run");
   nlohmann::json record = nlohmann::json::parse(read_text_file(run / "run.json"));
-  for (const fs::path& capture : {folder.path(), folder / "gone"}) {
+  for (const fs::path& capture : {folder.path(), folder / "gone", folder / std::string(5000, '9')}) {
     record["capture"] = capture.string();
     write_file(run / "run.json", record.dump());
     const ProgramResult result = cnerf({"eval", run.string()});
