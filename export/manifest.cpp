@@ -1,7 +1,6 @@
 #include "export/manifest.h"
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "export/splat_writer.h"
@@ -9,6 +8,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/json_record.h"
+#include "src/capture/pose.h"
 
 namespace nlohmann {
 
@@ -181,7 +181,8 @@ struct ManifestRecord {
 /// @throws InputError  for a camera that no picture can be rendered for
 void check_camera(const fs::path& file, std::size_t number, const bake::Camera& camera) {
   constexpr int kLargestSide = 1 << 15;
-  constexpr double kMostPixels = 1 << 28, kLargest = 1e9;
+  constexpr double kMostPixels = 1 << 28;
+  constexpr std::size_t kLongestName = 200;
   const auto refuse = [&](const std::string& field, const std::string& problem) {
     throw InputError(file, "cameras[" + std::to_string(number) + "]." + field, problem);
   };
@@ -191,19 +192,11 @@ void check_camera(const fs::path& file, std::size_t number, const bake::Camera& 
     refuse("width, height", "expected 1 to 32768 pixels each and at most 2^28, found " + std::to_string(lens.width) +
                                 " x " + std::to_string(lens.height));
   }
-  const auto is_small = [](double value) { return std::abs(value) <= kLargest; };  // nor NaN
-  if (!is_small(lens.fx) || !is_small(lens.fy) || lens.fx < 1 / kLargest || lens.fy < 1 / kLargest) {
-    refuse("fx, fy", "expected focal lengths of 1e-9 to 1e9 pixels");
-  }
-  if (!is_small(lens.cx) || !is_small(lens.cy)) refuse("cx, cy", "expected at most 1e9 pixels");
-  if (!std::ranges::all_of(lens.distortion, is_small)) refuse("distortion", "expected at most 1e9");
-  const auto& [linear, centre] = camera.world_from_camera;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!is_small(centre[axis])) refuse("world_from_camera", "expected a position within 1e9");
-    for (const Vec3d& row : linear.rows) {
-      if (!(std::abs(row[axis]) <= 2)) refuse("world_from_camera", "expected a rotation");  // nor NaN
-    }
-  }
+  const Affined& pose = camera.world_from_camera;
+  if (const auto found = implausible_number(lens, pose.translation)) refuse(found->field, found->problem);
+  (void)rigid_pose(pose, file, "cameras[" + std::to_string(number) + "].world_from_camera");
+  // Pictures are named by it.
+  if (camera.name.size() > kLongestName) refuse("name", "expected at most " + std::to_string(kLongestName) + " bytes");
 }
 
 }  // namespace
@@ -397,11 +390,12 @@ void check_listed_file(const BakeManifest& manifest, const fs::path& folder, con
   const std::uintmax_t bytes = fs::file_size(*file, failure);
   if (bytes != state->second.bytes) {
     throw InputError(*file, "size",
-                     "expected " + std::to_string(state->second.bytes) + " bytes as the manifest says, found " +
-                         std::to_string(bytes));
+                     "expected " + std::to_string(state->second.bytes) + " bytes as " + manifest_file.string() +
+                         " says, found " + std::to_string(bytes));
   }
   if (sha256_of_file(*file) != state->second.sha256) {
-    throw InputError(*file, "SHA-256", "is not the manifest's: the file was changed after the bake");
+    throw InputError(*file, "SHA-256",
+                     "is not that of " + manifest_file.string() + ": the file was changed after the bake");
   }
 }
 

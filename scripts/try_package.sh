@@ -14,9 +14,11 @@ TIMEFORMAT='%lR by the clock, %lU of processor time and %lS in the system'
 # Everything but what apt and dpkg keep of their own work, what is made anew, and what systemd and adduser leave behind,
 # which libraries bring along.
 list_files() {
+  local others='/etc/((passwd|group|shadow|gshadow)-|machine-id|mtab)|/root/\.ssh'
+  others+='|/var/lib/(private|systemd(/(coredump|pstore))?)'
   find / -xdev \( -path /proc -o -path /sys -o -path /dev -o -path /run -o -path /tmp -o -path /var/tmp -o -path /var/cache \
     -o -path /var/log -o -path /var/lib/apt -o -path /var/lib/dpkg -o -path "$PWD" -o -path "$work" \) -prune -o -print |
-    grep -vxE '/etc/((passwd|group|shadow|gshadow)-|machine-id|mtab)|/root/\.ssh' | sort
+    grep -vxE "$others" | sort
 }
 packages() { dpkg-query -W -f '${Package} ${db:Status-Abbrev}\n' | sort; }
 

@@ -32,10 +32,11 @@ pipeline::RunContext open_begun_run(const RunFolderArguments& arguments, const s
     try {
       return pipeline::read_capture(is_told ? fs::path(arguments.capture) : record.capture, config, reporter,
                                     directory.root());
-    } catch (const MissingInputError& error) {
-      if (is_told) throw;
-      throw MissingInputError(directory.record_file().string() + ": capture: " + error.what() +
-                              "; --capture says where it lies now");
+    } catch (const Error& error) {
+      const ExitCode code = error.exit_code();
+      if (is_told || (code != ExitCode::kMissingInput && code != ExitCode::kInput)) throw;
+      throw Error(
+          code, directory.record_file().string() + ": capture: " + error.what() + "; --capture says where it lies now");
     }
   }();
   pipeline::RunContext context{std::move(directory), std::move(config), std::move(capture), std::move(command_line)};

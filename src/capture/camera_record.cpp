@@ -2,18 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "src/base/error.h"
+#include "src/capture/pose.h"
 
 namespace cnerf {
-namespace {
-
-constexpr double kFarthest = 1e9;  // world units
-constexpr double kRotationError = 1e-3;
-
-}  // namespace
 
 Triple triple(Vec3d v) {
   return {v.x, v.y, v.z};
@@ -38,31 +30,19 @@ CameraRecord camera_record(const Intrinsics& lens, const Affined& world_from_cam
 
 void check_camera(const CameraRecord& camera, int largest_side, const std::filesystem::path& file,
                   const std::string& where) {
-  const auto require = [&](bool holds, const char* field, const std::string& problem) {
-    if (!holds) throw InputError(file, where + field, problem);
+  const auto refuse = [&](const std::string& field, const std::string& problem) {
+    throw InputError(file, where + field, problem);
   };
-  const LensRecord& lens = camera.lens;
   const auto check_side = [&](int side, const char* field) {
-    require(side >= 1 && side <= largest_side, field,
-            fmt::format("expected 1 to {} pixels, got {}", largest_side, side));
+    if (side < 1 || side > largest_side)
+      refuse(field, fmt::format("expected 1 to {} pixels, got {}", largest_side, side));
   };
-  check_side(lens.width, "lens.width");
-  check_side(lens.height, "lens.height");
-  const double side = std::max(lens.width, lens.height);
-  const auto check_focal = [&](double f, const char* field) {
-    require(f > 0.01 * side && f < 1000 * side, field, fmt::format("no focal length of such a picture: {}", f));
-  };
-  check_focal(lens.fx, "lens.fx");
-  check_focal(lens.fy, "lens.fy");
-  require(std::abs(lens.cx) < 10 * side, "lens.cx", "lies far off the picture");
-  require(std::abs(lens.cy) < 10 * side, "lens.cy", "lies far off the picture");
-  for (const double along : camera.position) require(std::abs(along) < kFarthest, "position", "is too far away");
-  const Mat3d axes = camera.world_from_camera().linear;
-  for (int c = 0; c < 3; ++c) {
-    require(std::abs(length(axes.column(c)) - 1) < kRotationError, "rotation", "is no rotation");
-  }
-  require(length(cross(axes.column(0), axes.column(1)) - axes.column(2)) < 2 * kRotationError, "rotation",
-          "is no rotation");
+  check_side(camera.lens.width, "lens.width");
+  check_side(camera.lens.height, "lens.height");
+  const Affined pose = camera.world_from_camera();
+  if (const auto found = implausible_number(camera.intrinsics(), pose.translation))
+    refuse(found->field, found->problem);
+  (void)rigid_pose(pose, file, where + "rotation");
 }
 
 }  // namespace cnerf

@@ -13,6 +13,7 @@
 #include "src/capture/black_background.h"
 #include "src/capture/image_io.h"
 #include "src/capture/listing.h"
+#include "src/capture/pose.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -227,23 +228,15 @@ CaptureListing first_whole(const std::vector<Source>& sources, int downscale) {
 
 // Images and intrinsics.
 
-/// What no camera has is a mistake in the file: with it, training would run into an empty field, or numbers that are
-/// none.
 void check_plausible(const ListedView& view, const Intrinsics& lens) {
-  const fs::path* file = &view.file_of_lens();
-  const auto expect = [&](const char* field, double value, double least, double most) {
-    if (value >= least && value <= most) return;  // false for NaN
-    throw InputError(*file, view.field + "." + field,
-                     fmt::format("expected a number from {:g} to {:g}, found {:g}", least, most, value));
-  };
-  const double side = std::max(lens.width, lens.height);
-  for (const double focal : {lens.fx, lens.fy}) expect("focal length", focal, 0.01 * side, 1000 * side);
-  // A crop of a larger picture has its axis outside.
-  for (const double centre : {lens.cx, lens.cy}) expect("principal point", centre, -10 * side, 11 * side);
-  for (const double coefficient : lens.distortion) expect("distortion", coefficient, -1000, 1000);
-  file = &view.poses_file;
-  for (int axis = 0; axis < 3; ++axis) expect("position", view.world_from_camera.translation[axis], -1e9, 1e9);
-  expect("exposure", view.exposure, 1e-4, 1e4);
+  const auto found = implausible_number(lens, view.world_from_camera.translation);
+  if (found) {
+    const fs::path& file = found->field == "position" ? view.poses_file : view.file_of_lens();
+    throw InputError(file, view.field + "." + found->field, found->problem);
+  }
+  if (view.exposure >= 1e-4 && view.exposure <= 1e4) return;
+  throw InputError(view.poses_file, view.field + ".exposure",
+                   fmt::format("expected a number from 0.0001 to 10000, found {:g}", view.exposure));
 }
 
 /// Intrinsics for the image as stored: what the file leaves out follows from the size, and the numbers are checked.

@@ -1,5 +1,7 @@
 #include "src/capture/pose.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -69,6 +71,21 @@ Affined rigid_pose(const Affined& pose, const fs::path& file, const std::string&
 Affined opencv_from_opengl_camera(const Affined& world_from_camera) {
   const Mat3d& m = world_from_camera.linear;
   return {Mat3d::from_columns(m.column(0), -m.column(1), -m.column(2)), world_from_camera.translation};
+}
+
+std::optional<ImplausibleNumber> implausible_number(const Intrinsics& lens, Vec3d centre) {
+  std::optional<ImplausibleNumber> found;
+  const auto expect = [&](const char* field, double value, double least, double most) {
+    if (found || (value >= least && value <= most)) return;  // false for NaN
+    found = {field, fmt::format("expected a number from {:g} to {:g}, found {:g}", least, most, value)};
+  };
+  const double side = std::max(lens.width, lens.height);
+  for (const double focal : {lens.fx, lens.fy}) expect("focal length", focal, 0.01 * side, 1000 * side);
+  // A crop of a larger picture has its axis outside.
+  for (const double middle : {lens.cx, lens.cy}) expect("principal point", middle, -10 * side, 11 * side);
+  for (const double coefficient : lens.distortion) expect("distortion", coefficient, -1000, 1000);
+  for (int axis = 0; axis < 3; ++axis) expect("position", centre[axis], -1e9, 1e9);
+  return found;
 }
 
 Mat3d rotation_from_quaternion(double w, double x, double y, double z, const fs::path& file, const std::string& field) {

@@ -1,10 +1,11 @@
 #pragma once
-/// Rigid poses out of matrices that were rounded, printed or estimated.
+/// Rigid poses out of matrices that were rounded, printed or estimated, and cameras that none can be.
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
-#include "src/base/vec3.h"
+#include "src/capture/camera.h"
 
 namespace cnerf {
 
@@ -24,6 +25,15 @@ inline constexpr double kNotedPoseError = 1e-4;
 
 /// Turns the axes of a camera that looks along -Z with +Y up (OpenGL, Blender, NeRF) into those of camera.h.
 [[nodiscard]] Affined opencv_from_opengl_camera(const Affined& world_from_camera);
+
+struct ImplausibleNumber {
+  std::string field, problem;  ///< "focal length", "principal point", "distortion" or "position"
+};
+
+/// The first number that no camera has. It is a mistake in the file it came from: with it, training would run into an
+/// empty field, and a picture take forever.
+/// @param centre  of the camera, world units
+[[nodiscard]] std::optional<ImplausibleNumber> implausible_number(const Intrinsics& lens, Vec3d centre);
 
 /// Rotation of a Hamilton quaternion.  @throws InputError  when its length is not 1 within kLargestPoseError.
 [[nodiscard]] Mat3d rotation_from_quaternion(double w, double x, double y, double z, const std::filesystem::path& file,

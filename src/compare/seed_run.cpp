@@ -175,6 +175,8 @@ Cell SeedRun::make(const Method& method) {
     evaluate_turntable(method, *scene, cell);
   } catch (const Interrupted&) {
     throw;
+  } catch (const OutputError&) {  // says nothing of the method
+    throw;
   } catch (const std::exception& problem) {
     cell.error = problem.what();
     bench_.observer.say(fmt::format("{} failed: {}", method.name, problem.what()));

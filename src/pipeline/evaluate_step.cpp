@@ -158,10 +158,10 @@ void evaluate_step(const RunContext& context, const EvaluateJob& job, const Engi
 
   add_estimates(learned, *scene, sheet);
 
+  write_png(directory.contact_sheet(), sheet.compose());
   const std::string json = json_of(metrics).dump(2) + "\n";
   if (!job.take.empty()) write_file(directory.take_folder(job.take) / "metrics.json", json);
-  write_file(directory.metrics_file(), json);
-  write_png(directory.contact_sheet(), sheet.compose());
+  write_file(directory.metrics_file(), json);  // last: where it is, `cnerf run --resume` does not evaluate
   say_metrics(metrics, observer);
   observer.wrote("metrics", directory.metrics_file());
   observer.wrote("before and after", directory.contact_sheet());

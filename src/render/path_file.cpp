@@ -89,7 +89,10 @@ CameraPath path_from_file(const std::filesystem::path& file) {
   CameraPath path{file.stem().string(), {}};
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Frame frame(file, json, frames[i], i);
-    path.cameras.push_back({fmt::format("frame_{:04}", i), frame.intrinsics(), frame.world_from_camera()});
+    const PathCamera camera{fmt::format("frame_{:04}", i), frame.intrinsics(), frame.world_from_camera()};
+    const auto found = implausible_number(camera.intrinsics, camera.world_from_camera.translation);
+    if (found) frame.refuse(found->field, found->problem);
+    path.cameras.push_back(camera);
   }
   return path;
 }

@@ -157,6 +157,16 @@ TEST(BadOutput, AnUnwritableFolderIsAnOutputError) {
   EXPECT_EQ(cnerf(arguments).exit_code, 73);
 }
 
+TEST(BadOutput, MetricsAreWrittenOnceAllElseOfAnEvaluationIs) {
+  const TempDir folder;
+  const fs::path run = copied(tiny_run(), folder / "run");
+  fs::remove(run / "metrics.json");
+  fs::remove(run / "contact_sheet.png");
+  fs::create_directories(run / "contact_sheet.png/taken");
+  EXPECT_EQ(cnerf({"eval", run.string()}).exit_code, 73);
+  EXPECT_FALSE(fs::exists(run / "metrics.json")) << "cnerf run --resume evaluates where it is missing";
+}
+
 TEST(BadOutput, ASomeoneElsesFolderIsLeftAlone) {
   const TempDir folder;
   write_file(folder / "thesis.txt", std::string_view("x"));
@@ -174,15 +184,17 @@ TEST(BadOutput, UnknownCommandsAndRunsAreRefused) {
   EXPECT_EQ(cnerf({"eval", tiny_capture().string()}).exit_code, 66);
 }
 
-TEST(BadRun, ACaptureWithoutPosesIsNamedByTheRecordThatNamesIt) {
+TEST(BadRun, ACaptureThatIsNoneIsNamedByTheRecordThatNamesIt) {
   const TempDir folder;
   const fs::path run = copied(tiny_run(), folder / "run");
   nlohmann::json record = nlohmann::json::parse(read_text_file(run / "run.json"));
-  for (const fs::path& capture : {folder.path(), folder / "gone", folder / std::string(5000, '9')}) {
+  write_file(folder / "text.txt", std::string_view("no capture"));
+  for (const fs::path& capture :
+       {folder.path(), folder / "gone", folder / std::string(5000, '9'), folder / "text.txt"}) {
     record["capture"] = capture.string();
     write_file(run / "run.json", record.dump());
     const ProgramResult result = cnerf({"eval", run.string()});
-    EXPECT_EQ(result.exit_code, 66);
+    EXPECT_EQ(result.exit_code, capture.extension() == ".txt" ? 65 : 66);
     EXPECT_THAT(result.err, HasSubstr("run.json: capture: " + capture.string() + ":"));
     EXPECT_THAT(result.err, HasSubstr("--capture says where it lies now"));
     EXPECT_THAT(cnerf({"eval", run.string(), "--capture", capture.string()}).err,

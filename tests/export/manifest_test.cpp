@@ -101,6 +101,17 @@ TEST(Manifest, RefusesNewerSchemasAndBrokenFiles) {
   EXPECT_THROW((void)read_manifest(folder / "none.json"), MissingInputError);
 }
 
+void expect_refusal(const TempDir& folder, const nlohmann::json& bad, const std::string& field) {
+  std::ofstream(folder / "bad.json") << bad;
+  try {
+    (void)read_manifest(folder / "bad.json");
+    ADD_FAILURE() << field;
+  } catch (const InputError& refusal) {
+    EXPECT_NE(std::string(refusal.what()).find("bad.json: cameras[0]." + field + ":"), std::string::npos)
+        << refusal.what();
+  }
+}
+
 TEST(Manifest, CamerasThatCannotBeAreRefused) {
   const TempDir folder;
   const nlohmann::json good = exported(folder);
@@ -108,14 +119,16 @@ TEST(Manifest, CamerasThatCannotBeAreRefused) {
     nlohmann::json bad = good;
     bad["cameras"][0]["world_from_camera"][1][column] = value;
     std::ofstream(folder / "bad.json") << bad;
-    try {
-      (void)read_manifest(folder / "bad.json");
-      ADD_FAILURE() << column << ' ' << value;
-    } catch (const InputError& refusal) {
-      EXPECT_NE(std::string(refusal.what()).find("bad.json: cameras[0].world_from_camera"), std::string::npos)
-          << refusal.what();
-    }
+    expect_refusal(folder, bad, column == 3 ? "position" : "world_from_camera");
   }
+  const auto with = [&](const char* key, const nlohmann::json& value) {
+    nlohmann::json bad = good;
+    bad["cameras"][0][key] = value;
+    return bad;
+  };
+  expect_refusal(folder, with("fx", 1e308), "focal length");
+  expect_refusal(folder, with("cx", -1e308), "principal point");
+  expect_refusal(folder, with("name", std::string(256, 'a')), "name");
 }
 
 TEST(Manifest, AMissingFileIsNotListed) {

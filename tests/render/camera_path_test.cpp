@@ -177,6 +177,11 @@ TEST(PathFile, ErrorsNameFileAndField) {
   EXPECT_THAT(message_for("{\"frames\": []}"), HasSubstr("frames"));
   EXPECT_THAT(message_for(R"({"frames": [{}]})"), HasSubstr("frames[0].w, h"));
   EXPECT_THAT(message_for(R"({"w": 9, "h": 9, "frames": [{}]})"), HasSubstr("frames[0].fl_x"));
+  const std::string there = "[[1,0,0,0],[0,1,0,0],[0,0,1,0]]";
+  EXPECT_EQ(message_for(start + there + "}]}"), "(accepted)");
+  EXPECT_THAT(message_for(start + there + R"(, "cx": -1e308}]})"), HasSubstr("frames[0].principal point"));
+  EXPECT_THAT(message_for(start + there + R"(, "fl_y": 1e-9}]})"), HasSubstr("frames[0].focal length"));
+  EXPECT_THAT(message_for(start + "[[1,0,0,1e10],[0,1,0,0],[0,0,1,0]]}]}"), HasSubstr("frames[0].position"));
   EXPECT_THAT(message_for(start + "[[1,0,0],[0,1,0],[0,0,1]]}]}"), HasSubstr("frames[0].transform_matrix"));
   EXPECT_THAT(message_for(start + "[[2,0,0,0],[0,1,0,0],[0,0,1,0]]}]}"), HasSubstr("not orthonormal"));
   EXPECT_THAT(message_for(start + "[[-1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}"), HasSubstr("mirrored"));

@@ -127,9 +127,9 @@ TEST(Strokes, BadViewpointsAreRefusedByTheirField) {
     EXPECT_THAT(refused([&](List v) { v[0].name = name; }), HasSubstr("].name")) << name;
   }
   EXPECT_THAT(refused([](List v) { v[2].name.assign(41, 'x'); }), HasSubstr("viewpoints[2].name"));
-  EXPECT_THAT(refused([](List v) { v[2].camera.lens.fx = 0; }), HasSubstr("viewpoints[2].lens.fx"));
-  EXPECT_THAT(refused([](List v) { v[0].camera.lens.fy = 1e9; }), HasSubstr("viewpoints[0].lens.fy"));
-  EXPECT_THAT(refused([](List v) { v[0].camera.lens.cy = -1e9; }), HasSubstr("viewpoints[0].lens.cy"));
+  EXPECT_THAT(refused([](List v) { v[2].camera.lens.fx = 0; }), HasSubstr("viewpoints[2].focal length"));
+  EXPECT_THAT(refused([](List v) { v[0].camera.lens.fy = 1e9; }), HasSubstr("viewpoints[0].focal length"));
+  EXPECT_THAT(refused([](List v) { v[0].camera.lens.cy = -1e9; }), HasSubstr("viewpoints[0].principal point"));
   EXPECT_THAT(refused([](List v) { v[0].camera.lens.width = 2049; }), HasSubstr("viewpoints[0].lens.width"));
   EXPECT_THAT(refused([](List v) { v[0].camera.lens.height = 0; }), HasSubstr("viewpoints[0].lens.height"));
   EXPECT_THAT(refused([](List v) { v[1].camera.position[2] = 1e30; }), HasSubstr("viewpoints[1].position"));
