@@ -244,11 +244,10 @@ void judge_refusal(const Slot::Operation& operation, const Ending& ending, Verdi
   }
   if (fs::path(operation.path).filename() == ".cnerf.lock") return;  // what it says is for messages only
   const fs::path file = final_name(operation.path);
-  // Where a video cannot be begun, its pictures are written instead.
-  const bool is_named =
-      ending.said.find(file.string()) != std::string::npos ||
-      (file.extension() == ".mp4" && ending.said.find(file.stem().string() + ":") != std::string::npos) ||
-      ending.said.find(fs::path(operation.path).parent_path().string() + ":") != std::string::npos;
+  // Where a video cannot be begun, its pictures are written instead, into a folder of its name.
+  const std::string name = file.extension() == ".mp4" ? file.stem().string() : file.string();
+  const bool is_named = ending.said.find(name) != std::string::npos ||
+                        ending.said.find(fs::path(operation.path).parent_path().string() + ":") != std::string::npos;
   if (!is_named) verdict.violated("unnamed", operation.path + ": " + last_line(ending.said));
 }
 
