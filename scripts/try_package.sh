@@ -51,7 +51,6 @@ upgrade() {
 remove() {
   # Also what apt keeps because something that was there before merely suggests it.
   quietly purge --autoremove -o APT::AutoRemove::SuggestsImportant=false -o APT::AutoRemove::RecommendsImportant=false cnerf
-  list_files > "$work/files_after"
   # Debian 13's apt keeps adduser, since one of its own needs is "base-passwd | adduser".
   local kept
   kept=$(packages | comm -13 "$work/packages_before" - | cut -d ' ' -f 1)
@@ -60,6 +59,7 @@ remove() {
     # shellcheck disable=SC2086
     quietly purge $kept
   fi
+  list_files > "$work/files_after"
   packages > "$work/packages_after"
   diff "$work/packages_before" "$work/packages_after" && echo "purged: the same packages as before"
   comm -13 "$work/files_before" "$work/files_after" > "$work/left"
