@@ -52,12 +52,9 @@ remove() {
   # Also what apt keeps because something that was there before merely suggests it.
   quietly purge --autoremove -o APT::AutoRemove::SuggestsImportant=false -o APT::AutoRemove::RecommendsImportant=false cnerf
   # Debian 13's apt keeps adduser, since one of its own needs is "base-passwd | adduser".
-  local kept
-  kept=$(packages | comm -13 "$work/packages_before" - | cut -d ' ' -f 1)
-  if [ -n "$kept" ]; then
-    echo "kept by apt as an alternative of what was there before:" $kept
-    # shellcheck disable=SC2086
-    quietly purge $kept
+  if [ "$(packages | comm -13 "$work/packages_before" - | cut -d ' ' -f 1)" = adduser ]; then
+    echo "kept by apt as an alternative of what was there before: adduser"
+    quietly purge adduser
   fi
   list_files > "$work/files_after"
   packages > "$work/packages_after"
