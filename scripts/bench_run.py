@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """Times `cnerf run` as a whole and prints where the time goes: a row per part, medians over the runs.
 
-    scripts/bench.sh run CAPTURE [--runs 5] [--cnerf build/release/cnerf] [--json FILE] [-- options of cnerf run]
+    scripts/bench.sh run CAPTURE [--runs 5] [--cnerf build/release/cnerf] [--before CNERF] [--json FILE]
+                         [-- options of cnerf run]
 
+--before names an earlier program, which runs in turn with the other: what else the machine does then weighs on both.
 Seconds between two lines of the program's JSON progress belong to the part that the later line names; what a line
 without a part took belongs to the part before. User time, which other work on the machine changes less, is the whole
 process's.
@@ -65,26 +67,51 @@ def processor():
     return names[0] if names else platform.machine()
 
 
-def measured(arguments, options):
-    runs = []
-    for _ in range(arguments.runs):
-        folder = tempfile.mkdtemp()
-        out = os.path.join(folder, "run")
-        try:
-            runs.append(run_once([arguments.cnerf, "run", arguments.capture, "-o", out, "--progress", "json", *options]))
-            with open(os.path.join(out, "metrics.json"), encoding="utf-8") as file:
-                mean = json.load(file)["mean"]
-        finally:
-            shutil.rmtree(folder)
-    parts = list(dict.fromkeys(part for run in runs for part in run["parts"]))
-    figures = {part: spread([run["parts"].get(part, 0.0) for run in runs]) for part in parts}
-    volumes = [run["volume"] for run in runs if run["volume"] is not None]
+def measured(program, capture, options):
+    """Seconds as run_once has them, and the means of metrics.json."""
+    folder = tempfile.mkdtemp()
+    out = os.path.join(folder, "run")
+    try:
+        seconds = run_once([program, "run", capture, "-o", out, "--progress", "json", *options])
+        with open(os.path.join(out, "metrics.json"), encoding="utf-8") as file:
+            return seconds, json.load(file)["mean"]
+    finally:
+        shutil.rmtree(folder)
+
+
+def summary(runs):
+    """Spreads over the runs of a program: of each part, and of the whole."""
+    parts = list(dict.fromkeys(part for run, _ in runs for part in run["parts"]))
+    figures = {part: spread([run["parts"].get(part, 0.0) for run, _ in runs]) for part in parts}
+    volumes = [run["volume"] for run, _ in runs if run["volume"] is not None]
     if volumes:
         figures["to the volume on disk"] = spread(volumes)
-    figures["whole run"] = spread([run["whole"] for run in runs])
-    figures["user time of all cores"] = spread([run["user"] for run in runs])
-    return {"machine": processor(), "cores": len(os.sched_getaffinity(0)), "capture": os.path.basename(arguments.capture),
-            "options": options, "runs": arguments.runs, "seconds": figures, "metrics": mean}
+    figures["whole run"] = spread([run["whole"] for run, _ in runs])
+    figures["user time of all cores"] = spread([run["user"] for run, _ in runs])
+    metrics = {name: statistics.median([mean[name] for _, mean in runs])
+               for name, value in runs[0][1].items() if isinstance(value, (int, float))}
+    return {"seconds": figures, "metrics": metrics}
+
+
+def print_table(found):
+    """Medians with least and most; of two programs also the second's share of the first."""
+    names = list(found)
+    rows = list(dict.fromkeys(row for name in names for row in found[name]["seconds"]))
+    heads = [f"{name}: median, least, most, s" for name in names] if len(names) > 1 else ["median, least, most, s"]
+    print("| " + " | ".join(["part", *heads, *(["share"] if len(names) > 1 else [])]) + " |")
+    print("|---" * (1 + len(heads) + (len(names) > 1)) + "|")
+    for row in rows:
+        cells = [row]
+        figures = [found[name]["seconds"].get(row) for name in names]
+        cells += [f"{f['median']:.2f}, {f['least']:.2f}, {f['most']:.2f}" if f else "" for f in figures]
+        if len(names) > 1:
+            both = all(figures) and figures[0]["median"] > 0
+            cells.append(f"{figures[1]['median'] / figures[0]['median']:.2f}" if both else "")
+        print("| " + " | ".join(cells) + " |")
+    print()
+    for metric in found[names[0]]["metrics"]:
+        values = [found[name]["metrics"].get(metric) for name in names]
+        print(f"{metric}: {', '.join('-' if value is None else f'{value:.4g}' for value in values)}")
 
 
 def main():
@@ -95,16 +122,23 @@ def main():
     parser.add_argument("capture")
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--cnerf", default="build/release/cnerf")
+    parser.add_argument("--before", help="an earlier cnerf to compare with")
     parser.add_argument("--json", help="also write all figures there")
     arguments = parser.parse_args(own)
-    result = measured(arguments, options)
-    print(f"{result['machine']}, {result['cores']} cores; `cnerf run {' '.join([result['capture'], *options])}`, "
-          f"{result['runs']} runs.\n\n| part | seconds, median | least | most |\n|---|---|---|---|")
-    for name, figure in result["seconds"].items():
-        print(f"| {name} | {figure['median']:.1f} | {figure['least']:.1f} | {figure['most']:.1f} |")
+    programs = {"before": arguments.before, "now": arguments.cnerf} if arguments.before else {"now": arguments.cnerf}
+    runs = {name: [] for name in programs}
+    for _ in range(arguments.runs):
+        for name, program in programs.items():
+            runs[name].append(measured(program, arguments.capture, options))
+    found = {name: summary(of_one) for name, of_one in runs.items()}
+    capture = os.path.basename(arguments.capture)
+    cores = len(os.sched_getaffinity(0))
+    print(f"{processor()}, {cores} cores; `cnerf run {' '.join([capture, *options])}`, {arguments.runs} runs.\n")
+    print_table(found)
     if arguments.json:
         with open(arguments.json, "w", encoding="utf-8") as file:
-            json.dump(result, file, indent=2)
+            json.dump({"machine": processor(), "cores": cores, "capture": capture, "options": options,
+                       "runs": arguments.runs, **found}, file, indent=2)
             file.write("\n")
 
 

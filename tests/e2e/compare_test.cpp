@@ -171,6 +171,25 @@ TEST_F(Compare, AMethodThatFailsLeavesARowThatSaysSo) {
   EXPECT_TRUE(row_of(table, "grey").contains("psnr_rgb"));
 }
 
+// A row would be of the method; a disk that fails says nothing of it.
+TEST_F(Compare, AFileThatCannotBeWrittenEndsTheComparison) {
+  const fs::path out = comparison_of({"colornerf", "grey"});
+  const fs::path grey = out / "runs" / tiny_capture().filename() / "seed-1/grey";
+  fs::remove(grey / "cell.json");
+  fs::remove(grey / "views/0000.jpg");
+  fs::create_directories(grey / "views/0000.jpg/in the way");
+
+  const ProgramResult result = compare(out, "colornerf,grey", {"--resume"});
+  EXPECT_EQ(result.exit_code, 73);
+  EXPECT_THAT(result.err, HasSubstr("0000.jpg"));
+  EXPECT_FALSE(fs::exists(grey / "cell.json"));
+
+  fs::remove_all(grey / "views/0000.jpg");
+  const ProgramResult mended = compare(out, "colornerf,grey", {"--resume"});
+  EXPECT_EQ(mended.exit_code, 0) << mended.err;
+  EXPECT_TRUE(fs::exists(grey / "cell.json"));
+}
+
 TEST_F(Compare, ACaptureMayHaveASizeOfItsOwn) {
   const std::string small = tiny_capture().string() + "@2";
   const ProgramResult result = cnerf(
