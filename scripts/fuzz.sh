@@ -26,7 +26,7 @@ max_len() {
   case $1 in
     colorizer_weights | exr | image | stage1_snapshot | take_snapshot | vdb_file) echo 16384 ;;
     http) echo 4096 ;;
-    exif | gzip | network_contract | tensor_file | vdb_answer | cluster_message | known_colors | bake_journal | spike_stream) echo 2048 ;;
+    exif | gzip | network_contract | tensor_file | vdb_answer | cluster_message | known_colors | bake_journal | spike_stream | onnx) echo 2048 ;;
     *) echo 8192 ;;
   esac
 }

@@ -9,6 +9,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/text.h"
 
 namespace cnerf {
 
@@ -31,7 +32,8 @@ template <typename Problem = InputError, typename Json = nlohmann::ordered_json>
     Json json = Json::parse(text, is_kept, /*allow_exceptions=*/true, /*ignore_comments=*/true);
     if (!too_deep) return json;
   } catch (const nlohmann::json::exception& failure) {
-    throw Problem(file.string() + ": expected JSON, found " + failure.what());
+    constexpr std::size_t kLongest = 400;  // it quotes what it read last, however long
+    throw Problem(file.string() + ": expected JSON, found " + shortened(failure.what(), kLongest));
   }
   throw Problem(file.string() + ": expected JSON of at most " + std::to_string(kDeepestJson) +
                 " levels, found deeper lists or objects");
@@ -51,11 +53,7 @@ template <typename Problem = InputError, typename Json = nlohmann::ordered_json>
 template <typename Json>
 [[nodiscard]] std::string excerpt(const Json& value) {
   constexpr std::size_t kLongest = 120;
-  std::string text = value.dump(-1, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace);
-  if (text.size() <= kLongest) return text;
-  std::size_t end = kLongest;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;  // within a character
-  return text.substr(0, end) + "…";
+  return shortened(value.dump(-1, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace), kLongest);
 }
 
 }  // namespace cnerf

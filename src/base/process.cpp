@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
@@ -96,6 +97,25 @@ std::string shell_word(const std::string& text) {
 }
 
 // ---- a started program --------------------------------------------------------------------------------------------
+
+bool outlives(const std::function<void()>& attempt, double seconds) {
+  const pid_t child = ::fork();
+  if (child < 0) return true;
+  if (child == 0) {
+    // Its end is nobody's business: not that of a debugger's or a fuzzer's handlers either.
+    for (const int end : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM}) ::signal(end, SIG_DFL);
+    ::close(STDERR_FILENO);
+    ::alarm(unsigned(std::ceil(seconds)));
+    try {
+      attempt();
+    } catch (...) {  // which is no crash
+    }
+    ::_exit(0);
+  }
+  int status = 0;
+  const pid_t ended = TEMP_FAILURE_RETRY(::waitpid(child, &status, 0));
+  return ended != child || status == 0;
+}
 
 Process::Process(std::vector<std::string> words, const Streams& streams, const std::vector<std::string>& variables) {
   std::vector<std::string> environment = environment_with(variables);

@@ -27,6 +27,12 @@ namespace cnerf {
 int run_program(const std::vector<std::string>& words, const std::filesystem::path& log,
                 const std::function<void()>& watch = {});
 
+/// Whether this process would outlive `attempt`, and in that time: a child tries it first. Libraries that read what
+/// others made may crash. What the child throws, or writes to standard error, is lost; true where there can be no
+/// child.
+/// @param attempt  must not need threads, which a child does not have
+[[nodiscard]] bool outlives(const std::function<void()>& attempt, double seconds);
+
 /// A running program in a process group of its own: Ctrl-C reaches it through us only.
 class Process {
  public:

@@ -50,6 +50,12 @@ std::string printable(std::string text) {
   return text;
 }
 
+std::string shortened(std::string text, std::size_t longest) {
+  if (text.size() <= longest) return text;
+  while (longest > 0 && (static_cast<unsigned char>(text[longest]) & 0xC0) == 0x80) --longest;  // within a character
+  return text.substr(0, longest) + "…";
+}
+
 std::string duration_text(double seconds) {
   const auto whole = std::lround(seconds);
   if (whole >= 3600) return std::to_string(whole / 3600) + " h " + two_digits(whole % 3600 / 60) + " min";

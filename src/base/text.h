@@ -24,6 +24,9 @@ namespace cnerf {
 /// program, become `?`, and carriage returns ends of lines.
 [[nodiscard]] std::string printable(std::string text);
 
+/// A text of any length as a message quotes it: its beginning and "…" where it has more bytes than that.
+[[nodiscard]] std::string shortened(std::string text, std::size_t longest);
+
 /// "1 h 02 min", "3 min 20 s", "12 s".
 [[nodiscard]] std::string duration_text(double seconds);
 

@@ -2,15 +2,30 @@
 
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/dnn.hpp>
+#include <stdexcept>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
+#include "src/base/process.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/network_contract.h"
+#include "src/colorizer/onnx_tensors.h"
 
 namespace cnerf {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// What OpenCV, or the standard library below it, has just thrown; a lack of memory goes on.
+std::string complaint() {
+  try {
+    throw;
+  } catch (const cv::Exception& error) {
+    return first_line(error.err);
+  } catch (const std::logic_error& error) {  // of vectors that a damaged file makes too long
+    return first_line(error.what());
+  }
+}
 
 class DnnColorizer final : public NetworkColorizer {
  public:
@@ -27,8 +42,8 @@ class DnnColorizer final : public NetworkColorizer {
     try {
       network_.setInput(cv::Mat(4, shape, CV_32F, const_cast<float*>(input.values.data())));
       answer = contract_.layer.empty() ? network_.forward() : network_.forward(contract_.layer);
-    } catch (const cv::Exception& error) {
-      throw ColorizerError(name_ + ": failed on an input of " + input.shape_text() + ": " + first_line(error.err));
+    } catch (...) {
+      throw ColorizerError(name_ + ": failed on an input of " + input.shape_text() + ": " + complaint());
     }
     if (answer.dims != 4 || answer.type() != CV_32F) {
       throw ColorizerError(name_ + ": expected four dimensions, [B, C, H, W], got " + std::to_string(answer.dims));
@@ -42,14 +57,19 @@ class DnnColorizer final : public NetworkColorizer {
 
 /// @param advice  what helps most users whose file is refused
 template <typename Read>
-std::unique_ptr<Colorizer> read_network(const std::string& name, const fs::path& file, const std::string& advice,
-                                        const Read& read) {
+std::unique_ptr<Colorizer> read_network(const ColorizerRequest& request, const std::string& name, const fs::path& file,
+                                        const std::string& advice, const Read& read) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // its errors are told as ours, once
+  if (!outlives([&] { (void)read(); }, request.options.timeout_seconds)) {
+    throw ColorizerError(name + ": is damaged: OpenCV " CV_VERSION " cannot stand or end reading it; " + advice);
+  }
   try {
     return std::make_unique<DnnColorizer>(name, contract_beside(file), read());
-  } catch (const cv::Exception& error) {
-    throw ColorizerError(name + ": OpenCV " CV_VERSION " cannot read it, or it is cut short: " + first_line(error.err) +
-                         "; " + advice);
+  } catch (const Error&) {
+    throw;
+  } catch (...) {
+    throw ColorizerError(name + ": OpenCV " CV_VERSION " cannot read it, or it is cut short: " + complaint() + "; " +
+                         advice);
   }
 }
 
@@ -57,8 +77,12 @@ std::unique_ptr<Colorizer> read_network(const std::string& name, const fs::path&
 
 std::unique_ptr<Colorizer> make_onnx_colorizer(const ColorizerRequest& request) {
   const fs::path file = find_spec_file(request.argument, request);
-  return read_network("onnx:" + request.argument, file, "export it with opset 11 to 13 and fixed kernel shapes",
-                      [&] { return cv::dnn::readNetFromONNX(file.string()); });
+  const std::string name = "onnx:" + request.argument, advice = "export it with opset 11 to 13 and fixed kernel shapes";
+  return read_network(request, name, file, advice, [&] {
+    const std::string model = read_text_file(file), fault = fault_of_onnx(model);
+    if (!fault.empty()) throw ColorizerError(name + ": cannot be read: " + fault + "; " + advice);
+    return cv::dnn::readNetFromONNX(model.data(), model.size());
+  });
 }
 
 std::unique_ptr<Colorizer> make_caffe_colorizer(const ColorizerRequest& request) {
@@ -68,7 +92,8 @@ std::unique_ptr<Colorizer> make_caffe_colorizer(const ColorizerRequest& request)
     throw UsageError("colorizer \"" + request.options.spec + "\": expected caffe:PROTO,MODEL");
   const fs::path description = find_spec_file(argument.substr(0, comma), request);
   const fs::path weights = find_spec_file(argument.substr(comma + 1), request);
-  return read_network("caffe:" + argument, weights, "expected a text description and its binary weights, in this order",
+  return read_network(request, "caffe:" + argument, weights,
+                      "expected a text description and its binary weights, in this order",
                       [&] { return cv::dnn::readNetFromCaffe(description.string(), weights.string()); });
 }
 

@@ -10,6 +10,8 @@ namespace cnerf::test {
 namespace {
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Lt;
+using testing::ResultOf;
 using testing::ThrowsMessage;
 
 std::string nested(int depth) {
@@ -32,6 +34,12 @@ TEST(Json, DepthOfAMegabyteIsRefused) {
 TEST(Json, OtherTextIsRefusedNamingTheFile) {
   EXPECT_THAT([] { (void)parse_json<SnapshotError>("{\"a\": nul}", "a.json"); },
               ThrowsMessage<SnapshotError>(AllOf(HasSubstr("a.json: expected JSON"), HasSubstr("line 1"))));
+}
+
+TEST(Json, ARefusalIsShortWhateverWasRead) {
+  const std::string long_token = "{\"a\": /*" + std::string(100'000, '\1');
+  EXPECT_THAT([&] { (void)parse_json(long_token, "a.json"); },
+              ThrowsMessage<InputError>(ResultOf([](const std::string& text) { return text.size(); }, Lt(500u))));
 }
 
 TEST(Json, CommentsAreAllowed) {

@@ -1,8 +1,12 @@
 #include "src/base/process.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <stdexcept>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -25,6 +29,14 @@ TEST(RunProgram, ReturnsTheStatusAndAppendsBothOutputs) {
   EXPECT_EQ(run_program({"/bin/sh", "-c", "echo \"three $1\"", "sh", "a b"}, folder / "log"), 0);
   EXPECT_EQ(read_text_file(folder / "log"), "one\ntwo\nthree a b\n");
   EXPECT_EQ(run_program({"/bin/sh", "-c", "kill -9 $$"}, folder / "log"), 128 + 9);
+}
+
+TEST(Outlives, WhatReturnsOrThrowsInTime) {
+  EXPECT_TRUE(outlives([] {}, 10));
+  EXPECT_TRUE(outlives([] { throw std::runtime_error("refused"); }, 10));
+  EXPECT_FALSE(outlives([] { std::abort(); }, 10));
+  EXPECT_FALSE(outlives([] { ::raise(SIGSEGV); }, 10));
+  EXPECT_FALSE(outlives([] { ::pause(); }, 0.5));
 }
 
 TEST(RunProgram, GivesNoInputAndSaysThatThereIsNoScreen) {

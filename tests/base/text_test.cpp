@@ -35,5 +35,12 @@ TEST(Text, NothingPrintableMovesTheCursor) {
   EXPECT_EQ(printable("gr\xC3\xBCn"), "gr\xC3\xBCn");
 }
 
+TEST(Text, WhatIsTooLongEndsBetweenCharacters) {
+  EXPECT_EQ(shortened("gr\xC3\xBCn", 5), "gr\xC3\xBCn");
+  EXPECT_EQ(shortened("gr\xC3\xBCn", 4), "gr\xC3\xBC…");
+  EXPECT_EQ(shortened("gr\xC3\xBCn", 3), "gr…");
+  EXPECT_EQ(shortened("abc", 0), "…");
+}
+
 }  // namespace
 }  // namespace cnerf

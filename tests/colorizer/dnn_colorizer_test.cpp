@@ -65,6 +65,61 @@ TEST_F(DnnColorizer, AnOnnxFileThatIsCutShortOrOfAnotherShapeIsRefused) {
       HasSubstr("inputs"));
 }
 
+// OpenCV would read on behind the file's numbers.
+TEST_F(DnnColorizer, AnOnnxTensorOfFewerNumbersThanItsShapeIsRefused) {
+  const auto refusal = [&](const std::string& content) {
+    return message_of<ColorizerError>([&] { (void)test::colorizer_of("onnx:" + file("short.onnx", content)); });
+  };
+  using Message = test::ProtobufMessage;
+  const auto model = [](const Message& tensor) {
+    return Message().message(7, Message().message(5, tensor).bytes(2, "g")).text();
+  };
+  const auto bytes = [](std::size_t count) { return std::string(count, '\1'); };
+  const auto shape = [](std::uint64_t type) {
+    return Message().number(1, 3).number(1, 2).number(2, type).bytes(8, "w");
+  };
+  EXPECT_THAT(refusal(model(shape(1).bytes(9, bytes(23)))), HasSubstr("\"w\" states 6 numbers and holds 5"));
+  EXPECT_THAT(refusal(model(shape(1).bytes(4, bytes(20)))), HasSubstr("holds 5"));    // floats
+  EXPECT_THAT(refusal(model(shape(7).bytes(7, bytes(5)))), HasSubstr("holds 5"));     // 64 bits, a byte each
+  EXPECT_THAT(refusal(model(shape(11).bytes(10, bytes(47)))), HasSubstr("holds 5"));  // doubles
+  EXPECT_THAT(refusal(model(shape(10).bytes(9, bytes(11)))), HasSubstr("holds 5"));   // halves
+  // Numbers of another type are not read, and a list of sides may be one field.
+  EXPECT_THAT(refusal(model(shape(1).bytes(7, bytes(6)))), HasSubstr("holds 0"));
+  EXPECT_THAT(refusal(model(Message().bytes(1, "\x03\x02").number(2, 1).bytes(9, bytes(20)))), HasSubstr("holds 5"));
+  EXPECT_THAT(refusal(model(Message().number(1, ~std::uint64_t(0)).number(2, 1).bytes(9, bytes(4)))),
+              HasSubstr("side"));
+
+  // In an attribute of a node of a graph of an attribute, and where two halves would be put together.
+  const Message deep = Message().message(
+      5, Message().message(
+             6, Message().message(1, Message().message(5, Message().message(5, shape(1).bytes(9, "1234"))))));
+  EXPECT_THAT(refusal(Message().message(7, Message().message(1, deep)).text()), HasSubstr("holds 1"));
+  const Message whole = Message().number(1, 1).number(2, 1).bytes(9, "1234");
+  const Message twice = Message().message(5, Message().message(5, whole).message(5, whole));
+  EXPECT_THAT(refusal(Message().message(7, Message().message(1, twice)).text()), HasSubstr("damaged"));
+
+  std::string nested;
+  for (int i = 0; i < 100; ++i) {
+    nested = Message().bytes(1, Message().bytes(5, Message().bytes(6, nested).text()).text()).text();
+  }
+  EXPECT_THAT(refusal(Message().bytes(7, nested).text()), HasSubstr("nest deeper"));
+}
+
+TEST_F(DnnColorizer, AnOnnxFileWithAnyByteChangedIsTakenOrRefused) {
+  const std::string good = convolution({1, 1}, {0, 0});
+  int refused = 0;
+  for (std::size_t at = 0; at < good.size(); ++at) {
+    std::string changed = good;
+    changed[at] = "\x00\x7F\xFF"[at % 3];
+    try {
+      (void)test::colorizer_of("onnx:" + file("changed.onnx", changed));
+    } catch (const ColorizerError&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, int(good.size()) / 4);
+}
+
 constexpr const char* kCaffe = R"(
 name: "shift"
 input: "data"

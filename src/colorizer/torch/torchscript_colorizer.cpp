@@ -2,18 +2,15 @@
 
 #include <ATen/Parallel.h>
 #include <fmt/format.h>
-#include <sys/wait.h>
 #include <torch/script.h>
 #include <torch/version.h>
-#include <unistd.h>
 
-#include <cerrno>
 #include <chrono>
-#include <cmath>
 #include <future>
 #include <thread>
 
 #include "src/base/error.h"
+#include "src/base/process.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/network_contract.h"
 
@@ -35,30 +32,15 @@ std::string shape_text(const Tensor& tensor) {
   return text + "]";
 }
 
-/// Whether LibTorch outlives reading the file or refuses it in words: a child tries it, since some damaged ones end it.
-bool outlives_loading(const fs::path& file, double timeout_seconds) {
-  const pid_t child = ::fork();
-  if (child < 0) return true;
-  if (child == 0) {
-    at::set_num_threads(1);  // a pool of threads does not survive a fork
-    ::close(STDERR_FILENO);
-    ::alarm(unsigned(std::ceil(timeout_seconds)));
-    try {
-      (void)torch::jit::load(file.string(), torch::kCPU);
-    } catch (...) {
-    }
-    ::_exit(0);
-  }
-  int status = 0;
-  const pid_t ended = TEMP_FAILURE_RETRY(::waitpid(child, &status, 0));
-  return ended != child || status == 0;
-}
-
 class TorchScriptColorizer final : public NetworkColorizer {
  public:
   TorchScriptColorizer(const fs::path& file, const std::string& shown, double timeout_seconds)
       : NetworkColorizer("torchscript:" + shown, contract_beside(file)), timeout_(timeout_seconds) {
-    if (!outlives_loading(file, timeout_seconds)) {
+    const auto load = [&] {
+      at::set_num_threads(1);  // a pool of threads does not survive a fork
+      (void)torch::jit::load(file.string(), torch::kCPU);
+    };
+    if (!outlives(load, timeout_seconds)) {  // some damaged ones end LibTorch
       throw ColorizerError(name_ + ": is damaged: LibTorch " TORCH_VERSION " cannot stand or end reading it");
     }
     try {

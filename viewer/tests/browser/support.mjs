@@ -82,8 +82,8 @@ export async function open(context, url, script) {
   return page;
 }
 
-/** The page's picture of what it shows: { width, height, data: RGBA bytes }. */
-export async function picture(page, width = 160, height = 120, background = "#000000", rays = 16) {
+/** The page's picture of what it shows: { width, height, data: RGBA bytes }. Software draws each of the rays per pixel. */
+export async function picture(page, width = 160, height = 120, background = "#000000", rays = 4) {
   const list = await page.evaluate(
     async ([w, h, b, r]) => {
       const image = await window.cnerf.renderer.picture(w, h, b, r);
