@@ -4,6 +4,7 @@
 #   bash scripts/soak.sh HOURS        0.1 is six minutes
 # CNERF  the program [build/release/cnerf]     SEED  of the random choices [1]
 # FOLDER of everything, emptied before [build/soak]     MEMORY  MiB a program may hold [1500]
+# What fails is kept in $FOLDER/failed-ROUND.
 set -uo pipefail
 shopt -s extglob
 cd "$(dirname "$0")/.."
@@ -29,6 +30,11 @@ fail() {
   set -- "$(tr -s ' ' <<< "$words")"
   failures+=("round $rounds: $*")
   echo "FAILED round $rounds: $*" >&2
+  if [ -d "$folder/round" ] && [ ! -e "$folder/failed-$rounds" ]; then
+    mkdir "$folder/failed-$rounds"
+    cp -r "$folder/round" "$folder"/said.* "$folder/failed-$rounds"
+    printf '%q ' "${options[@]}" > "$folder/failed-$rounds/options"
+  fi
 }
 
 # documented COMMAND CODE SIGNAL: whether an end is one the program may have; SIGNAL is what was sent to it, or 0.

@@ -37,11 +37,16 @@ class Fields {
   Field next() {
     const std::uint64_t tag = number();
     switch (tag & 7) {
-      case 0: return {tag >> 3, number(), true};
-      case 1: return {tag >> 3, 0, true, take(8)};
-      case 2: return {tag >> 3, 0, false, take(number())};
-      case 5: return {tag >> 3, 0, true, take(4)};
-      default: throw Fault("it is no ONNX, or damaged");
+      case 0:
+        return {tag >> 3, number(), true};
+      case 1:
+        return {tag >> 3, 0, true, take(8)};
+      case 2:
+        return {tag >> 3, 0, false, take(number())};
+      case 5:
+        return {tag >> 3, 0, true, take(4)};
+      default:
+        throw Fault("it is no ONNX, or damaged");
     }
   }
 
@@ -131,8 +136,8 @@ void check(Message kind, std::string_view message, int depth) {
   std::set<std::uint64_t> seen;
   for (Fields fields(message); fields.any();) {
     const Fields::Field field = fields.next();
-    const auto child = std::ranges::find_if(
-        kChildren, [&](const Child& one) { return one.of == kind && one.field == field.number; });
+    const auto child =
+        std::ranges::find_if(kChildren, [&](const Child& one) { return one.of == kind && one.field == field.number; });
     if (child == kChildren.end()) continue;
     // Two of what is no list would be merged: each may be whole, and their sum is not.
     if (field.is_number || (!child->is_list && !seen.insert(field.number).second)) {

@@ -31,7 +31,7 @@ class ColorBinEngine {
   virtual ~ColorBinEngine() = default;
   /// As LuminanceEngine::share_steps. All processes are to call `step` with the same pixels.
   virtual void share_steps(const StepShare& share);
-  /// One optimiser step; returns the mean loss.
+  /// One optimiser step; returns the mean loss. One of no pixels only counts, and costs 0.
   /// @param labels         [R] soft labels of the pixels
   /// @param pixel_weights  [R] factors of the pixels' losses (class rebalancing, opacity); may be empty = all 1
   virtual double step(const PixelSamples& pixels, std::span<const SoftLabel> labels,
@@ -57,6 +57,7 @@ class ColorFieldEngine {
   /// As ColorBinEngine::share_steps.
   virtual void share_steps(const StepShare& share);
   /// One optimiser step towards target ab values at the pixels' own luminance; returns the mean ab distance.
+  /// One of no pixels only counts.
   /// @param pixel_weights  [R] factors of the pixels' losses; may be empty = all 1
   virtual double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
                       AbLoss loss, float learning_rate) = 0;

@@ -285,7 +285,8 @@ Op color_learning() {
   return op;
 }
 
-/// Pixels without samples, or none that count, are no error and change nothing of the hash grid.
+/// Pixels without samples, or none that count, are no error and change nothing of the hash grid; nor is a step of no
+/// pixels at all.
 Op empty_pixels() {
   Op op;
   op.name = "PixelsWithoutSamples";
@@ -297,10 +298,16 @@ Op empty_pixels() {
     const auto field = backend.make([&](const Engines& engines) { return engines.make_color_field(grid_of(3), 5); });
     std::vector<Ab> colors(17);
     field->composite(pixels, colors);
-    return {{"loss", {loss}}, {"colour", {1 + colors[3].a, 1 + colors[3].b}}};
+    const PixelSamples none;
+    const double idle = engine->step(none, {}, {}, {}, 1e-2f) + field->step(none, {}, 1e-2f);
+    return {{"loss", {loss}},
+            {"colour", {1 + colors[3].a, 1 + colors[3].b}},
+            {"of no pixels", {idle, double(engine->step_count()), double(field->step_count())}}};
   };
-  op.expected = []() -> std::vector<Result> { return {{"loss", {std::log(313.0)}}, {"colour", {1, 1}}}; };
-  op.bounds = {{"loss", 0.3, 0.3}, {"colour", 1e-6, 1e-6}};
+  op.expected = []() -> std::vector<Result> {
+    return {{"loss", {std::log(313.0)}}, {"colour", {1, 1}}, {"of no pixels", {0, 2, 1}}};
+  };
+  op.bounds = {{"loss", 0.3, 0.3}, {"colour", 1e-6, 1e-6}, {"of no pixels", 0, 0}};
   return op;
 }
 

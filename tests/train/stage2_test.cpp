@@ -51,6 +51,21 @@ TEST_F(Stage2, LearnsTheAnswer) {
   EXPECT_LT(distance_to_answer("a"), 5) << "grey is " << std::hypot(kAnswer.a, kAnswer.b);
 }
 
+// As the corners of a picture of an object before nothing: what is asked there teaches nothing, and ends nothing.
+TEST_F(Stage2, PatchesThatShowNothingOfTheSceneAreSteps) {
+  Affined& away = capture_.views[1].world_from_camera;
+  away.translation = away.translation * 10.0;
+  away.linear = Mat3d::from_columns(-away.linear.column(0), away.linear.column(1), -away.linear.column(2));
+  Stage2Options options = small_options();
+  options.colorizer_batch = 1;  // each step is looked at
+  options.purify.enabled = false;
+  Listening colorizer;
+  const Stage2Report report = colorize(options, colorizer, take("a"));
+  EXPECT_TRUE(std::ranges::any_of(colorizer.origins, [](const auto& origin) { return origin.view == "toy1"; }));
+  EXPECT_EQ(report.accepted, 60);
+  EXPECT_LT(distance_to_answer("a"), 5);
+}
+
 TEST_F(Stage2, BasesAreWhatTheAnswersAboutAllPlacesAgreeOn) {
   Stage2Options options = small_options();
   options.purify.opinions = 8;

@@ -29,6 +29,10 @@ class ColorBinEngineCpu final : public ColorBinEngine {
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
+    if (pixels.pixels() == 0) {
+      steps_.front() += 1;
+      return 0;
+    }
     const float scale = 1.0f / float(pixels.pixels());
     const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
     chunks_.run(last - own, kBlockPixels, features_.weight_count() + head_.layout().weight_count(),

@@ -23,6 +23,10 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
   double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
               AbLoss loss, float learning_rate) override {
     CNERF_CHECK_EQ(targets.size(), pixels.pixels());
+    if (pixels.pixels() == 0) {
+      steps_.front() += 1;
+      return 0;
+    }
     const float scale = 1.0f / float(pixels.pixels());
     const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
     chunks_.run(last - own, kBlockPixels, field_.weight_count(),

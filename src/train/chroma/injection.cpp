@@ -43,7 +43,9 @@ void PatchTraining::run() {
       if (!judge(patch, is_accepted) || steps() >= options.patches) continue;
       const float rate =
           decayed_rate(options.learning_rate, options.final_learning_rate, double(steps()) / options.patches);
-      session_.loss = injection_.step(model, pixels_of(patch, is_accepted), rate);
+      const ColoredPixels pixels = pixels_of(patch, is_accepted);
+      const double loss = injection_.step(model, pixels, rate);
+      if (!pixels.colors.empty()) session_.loss = loss;  // a patch may show nothing of the scene
       if (model.sky.exists() && is_accepted) learn_sky(patch);
     }
     session_.after_step("stage 2", "loss", steps(), options.patches);
