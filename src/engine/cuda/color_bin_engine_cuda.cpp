@@ -31,11 +31,11 @@ class ColorBinEngineCuda final : public ColorBinEngine {
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate) override {
     CNERF_CHECK_EQ(labels.size(), pixels.pixels());
+    const std::lock_guard lock(mutex_);
     if (pixels.pixels() == 0) {
       steps_.front() += 1;
       return 0;
     }
-    const std::lock_guard lock(mutex_);
     const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
     const std::size_t n = last - own;
     batch_.upload(pixels, own, last, stream_);

@@ -27,11 +27,11 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
   double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
               AbLoss loss, float learning_rate) override {
     CNERF_CHECK_EQ(targets.size(), pixels.pixels());
+    const std::lock_guard lock(mutex_);
     if (pixels.pixels() == 0) {
       steps_.front() += 1;
       return 0;
     }
-    const std::lock_guard lock(mutex_);
     const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
     const std::size_t n = last - own;
     batch_.upload(pixels, own, last, stream_);
