@@ -66,8 +66,8 @@ struct FolderLock::Held {
     } while (is_locked && !file.is_still_at(path));
     if (!is_locked) return;
     const std::string holder = this_process().substr(0, kLongestHolder);
-    // Only for messages: a full disk must not keep anybody from working. An empty lock is one that somebody is about to
-    // take, so that one which a power cut emptied would stay for ever.
+    // Only for messages: a full disk must not keep anybody from working. An empty lock belongs to somebody who is
+    // about to take it: one that a power cut emptied would stay for ever.
     if (::ftruncate(file.number(), 0) == 0) (void)!::pwrite(file.number(), holder.data(), holder.size(), 0);
     (void)!::fdatasync(file.number());
   }

@@ -17,6 +17,7 @@ namespace {
 
 constexpr int kDeepest = 100;  // messages within each other, as in the library of protocol buffers
 constexpr std::size_t kLongestName = 60;
+constexpr const char* kDamaged = "it is no ONNX, or damaged";
 
 struct Fault : std::runtime_error {
   using std::runtime_error::runtime_error;
@@ -46,7 +47,7 @@ class Fields {
       case 5:
         return {tag >> 3, 0, true, take(4)};
       default:
-        throw Fault("it is no ONNX, or damaged");
+        throw Fault(kDamaged);
     }
   }
 
@@ -57,12 +58,12 @@ class Fields {
       value |= std::uint64_t(byte & 0x7F) << shift;
       if (byte < 0x80) return value;
     }
-    throw Fault("it is no ONNX, or damaged");
+    throw Fault(kDamaged);
   }
 
  private:
   std::string_view take(std::uint64_t count) {
-    if (count > rest_.size()) throw Fault("it is no ONNX, or cut short");
+    if (count > rest_.size()) throw Fault(kDamaged);
     const std::string_view taken = rest_.substr(0, count);
     rest_.remove_prefix(count);
     return taken;
@@ -70,19 +71,41 @@ class Fields {
   std::string_view rest_;
 };
 
-/// Numbers of a field of a TensorProto: floats, halves and integers up to 32 bits, 64 bits, doubles.
-std::uint64_t numbers_in(const Fields::Field& field) {
-  if (field.is_number) return 1;
-  if (field.number == 4) return field.bytes.size() / sizeof(float);
-  if (field.number == 10) return field.bytes.size() / sizeof(double);
-  return std::uint64_t(std::ranges::count_if(field.bytes, [](char byte) { return (byte & 0x80) == 0; }));
+/// Fields of a TensorProto. Numbers are in the list of their type, or all in kRaw.
+enum TensorField : std::uint64_t {
+  kSides = 1,
+  kType = 2,
+  kFloats = 4,
+  kIntegers = 5,  ///< up to 32 bits, and halves
+  kLongIntegers = 7,
+  kName = 8,
+  kRaw = 9,
+  kDoubles = 10,
+  kTensorFields
+};
+
+bool is_list(std::uint64_t field) {
+  return field == kFloats || field == kIntegers || field == kLongIntegers || field == kDoubles;
+}
+
+/// Where numbers of a TensorProto.DataType are listed.
+TensorField list_of(std::uint64_t type) {
+  constexpr std::uint64_t kFloat = 1, kInt64 = 7, kDouble = 11;
+  return type == kFloat ? kFloats : type == kInt64 ? kLongIntegers : type == kDouble ? kDoubles : kIntegers;
+}
+
+std::uint64_t numbers_in(const Fields::Field& list) {
+  if (list.is_number) return 1;
+  if (list.number == kFloats) return list.bytes.size() / sizeof(float);
+  if (list.number == kDoubles) return list.bytes.size() / sizeof(double);
+  return std::uint64_t(std::ranges::count_if(list.bytes, [](char byte) { return (byte & 0x80) == 0; }));
 }
 
 void check_tensor(std::string_view message) {
   // By TensorProto.DataType, 0 = none that is read here.
   constexpr std::array<std::uint64_t, 17> kBytesOf = {0, 4, 1, 1, 2, 2, 4, 8, 0, 1, 2, 8, 4, 8, 8, 16, 2};
   std::uint64_t type = 0, raw = 0, stated = 1;
-  std::array<std::uint64_t, 11> numbers{};  // by field
+  std::array<std::uint64_t, kTensorFields> listed{};
   std::string_view name;
   const auto multiply = [&](std::uint64_t size) {
     constexpr std::uint64_t kMost = std::numeric_limits<std::int32_t>::max();
@@ -91,21 +114,18 @@ void check_tensor(std::string_view message) {
   };
   for (Fields fields(message); fields.any();) {
     const Fields::Field field = fields.next();
-    if (field.number == 1 && field.is_number) multiply(field.value);
-    if (field.number == 1 && !field.is_number) {
+    if (field.number == kSides && field.is_number) multiply(field.value);
+    if (field.number == kSides && !field.is_number) {
       for (Fields sides(field.bytes); sides.any();) multiply(sides.number());
     }
-    if (field.number == 2) type = field.value;
-    if (field.number == 8) name = field.bytes;
-    if (field.number == 9) raw = field.bytes.size();
-    if (field.number == 4 || field.number == 5 || field.number == 7 || field.number == 10) {
-      numbers[field.number] += numbers_in(field);
-    }
+    if (field.number == kType) type = field.value;
+    if (field.number == kName) name = field.bytes;
+    if (field.number == kRaw) raw = field.bytes.size();
+    if (is_list(field.number)) listed[field.number] += numbers_in(field);
   }
-  const bool is_empty = raw == 0 && std::ranges::all_of(numbers, [](std::uint64_t count) { return count == 0; });
+  const bool is_empty = raw == 0 && std::ranges::all_of(listed, [](std::uint64_t count) { return count == 0; });
   if (is_empty || type >= kBytesOf.size() || kBytesOf[type] == 0) return;  // which OpenCV takes, or refuses itself
-  const std::uint64_t listed = numbers[type == 1 ? 4 : type == 7 ? 7 : type == 11 ? 10 : 5];
-  const std::uint64_t held = listed > 0 ? listed : raw / kBytesOf[type];
+  const std::uint64_t in_list = listed[list_of(type)], held = in_list > 0 ? in_list : raw / kBytesOf[type];
   if (held < stated) {
     throw Fault(fmt::format("the tensor \"{}\" states {} numbers and holds {}",
                             printable(std::string(name.substr(0, kLongestName))), stated, held));
@@ -141,7 +161,7 @@ void check(Message kind, std::string_view message, int depth) {
     if (child == kChildren.end()) continue;
     // Two of what is no list would be merged: each may be whole, and their sum is not.
     if (field.is_number || (!child->is_list && !seen.insert(field.number).second)) {
-      throw Fault("it is no ONNX, or damaged");
+      throw Fault(kDamaged);
     }
     check(child->kind, field.bytes, depth + 1);
   }
