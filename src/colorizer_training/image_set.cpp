@@ -13,7 +13,7 @@
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/base/rng.h"
-#include "src/colorizer/torch/single_threaded_ops.h"
+#include "src/colorizer/torch/torch_threads.h"
 #include "src/picture/codecs.h"
 
 namespace cnerf::colorizer_training {

@@ -1,22 +1,26 @@
 #include "src/engine/color_engines.h"
 
+#include "src/base/check.h"
 #include "src/base/error.h"
 
 namespace cnerf {
-namespace {
 
-void refuse_share(const StepShare& share) {
+void ColorEngine::share_steps(const StepShare& share) {
   if (!share.is_whole()) throw DeviceError("this device's engines do not share a step with other processes");
 }
 
-}  // namespace
-
-void ColorBinEngine::share_steps(const StepShare& share) {
-  refuse_share(share);
+double ColorBinEngine::step(const PixelSamples& pixels, std::span<const SoftLabel> labels,
+                            std::span<const float> pixel_weights, const ChromaLossWeights& more, float learning_rate) {
+  CNERF_CHECK_EQ(labels.size(), pixels.pixels());
+  count_step();
+  return labels.empty() ? 0 : fit(pixels, labels, pixel_weights, more, learning_rate);
 }
 
-void ColorFieldEngine::share_steps(const StepShare& share) {
-  refuse_share(share);
+double ColorFieldEngine::step(const PixelSamples& pixels, std::span<const Ab> targets,
+                              std::span<const float> pixel_weights, AbLoss loss, float learning_rate) {
+  CNERF_CHECK_EQ(targets.size(), pixels.pixels());
+  count_step();
+  return targets.empty() ? 0 : fit(pixels, targets, pixel_weights, loss, learning_rate);
 }
 
 }  // namespace cnerf

@@ -36,7 +36,8 @@ class VideoFile {
   VideoFile(const VideoFile&) = delete;
   VideoFile& operator=(const VideoFile&) = delete;
 
-  /// All pictures have the size of the first. @return false where OpenCV has no encoder: the video is then given up.
+  /// All pictures have the size of the first. @return false where OpenCV has no encoder or cannot open the file:
+  /// the video is then given up.
   [[nodiscard]] bool add(const Picture& picture);
   /// @throws OutputError  when the file did not get whole.
   void finish();

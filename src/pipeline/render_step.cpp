@@ -73,7 +73,7 @@ class RenderFiles {
     if (!with_video_ && !output_.png) write_png(frames_ / (name + ".png"), picture);
   }
   void give_video_up() {
-    observer_.say("note: this OpenCV has no MPEG-4 encoder; writing PNG pictures instead of a video");
+    observer_.say("note: OpenCV cannot begin an MPEG-4 video; writing PNG pictures instead of a video");
     with_video_ = false;
   }
 

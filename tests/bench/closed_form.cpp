@@ -72,12 +72,11 @@ class VoxelColors final : public ColorBinEngine {
       }
     }
   }
-  double step(const PixelSamples&, std::span<const SoftLabel>, std::span<const float>, const ChromaLossWeights&,
-              float) override {
+  double fit(const PixelSamples&, std::span<const SoftLabel>, std::span<const float>, const ChromaLossWeights&,
+             float) override {
     return 0;
   }
   void logits(const PixelSamples&, std::span<float>) const override {}
-  [[nodiscard]] long step_count() const override { return 0; }
   [[nodiscard]] std::vector<StatePiece> state() override { return {}; }
   void state_loaded() override {}
 

@@ -1,11 +1,13 @@
 // torchscript: colorizers compiled here: every contract, and every way of being bad.
 
+#include <ATen/Parallel.h>
 #include <caffe2/serialize/inline_container.h>
 #include <torch/script.h>
 
 #include <filesystem>
 
 #include "src/base/files.h"
+#include "src/base/parallel.h"
 #include "tests/colorizer/questions.h"
 #include "tests/support/data.h"
 
@@ -45,6 +47,18 @@ TEST_F(TorchScriptColorizer, AsksInLightnessAndAnswersAb) {
   const std::vector<float> second = ab_of(answer, 1);
   EXPECT_FLOAT_EQ(second[3], question.lightness[33] - 50);
   EXPECT_FLOAT_EQ(second[33], -question.lightness[33]);
+}
+
+TEST_F(TorchScriptColorizer, LibTorchHasNoMoreThreadsThanTheProgram) {
+  const std::string spec = module_of(kShift);
+  (void)test::colorizer_of(spec);
+  const int on_all_cores = at::get_num_threads();
+  set_thread_count(1);
+  (void)test::colorizer_of(spec);
+  EXPECT_EQ(at::get_num_threads(), 1);
+  set_thread_count(0);
+  (void)test::colorizer_of(spec);
+  EXPECT_EQ(at::get_num_threads(), on_all_cores);
 }
 
 TEST_F(TorchScriptColorizer, InputUnitsAsDeclared) {

@@ -56,8 +56,9 @@ void time_engines(const char* device, const PixelSamples& patch, const PixelSamp
   std::vector<Chromaticity> ratios(distilled.positions.size());
   std::printf("%s: step on %zu pixels %.3f ms", device, patch.pixels(),
               median_milliseconds(repetitions, [&] { chroma.step(patch, labels, {}, {}, 1e-3f); }));
-  std::printf("  distillation step on %zu pixels %.3f ms", distilled.pixels(),
-              median_milliseconds(repetitions, [&] { chromaticity.step(distilled, targets, 1e-3f); }));
+  std::printf("  distillation step on %zu pixels %.3f ms", distilled.pixels(), median_milliseconds(repetitions, [&] {
+                chromaticity.step(distilled, targets, {}, AbLoss::kHuber, 1e-3f);
+              }));
   std::printf("  decoding them %.3f ms",
               median_milliseconds(repetitions, [&] { chroma.decode(distilled, 0.38f, colors); }));
   std::printf("  query of %zu points %.3f ms\n", ratios.size(),
@@ -82,7 +83,7 @@ void time_stage2(const std::vector<CachedView>& views, const HashGridOptions& gr
       const PixelSamples pixels = visible_pixels(views, 2 * rays, std::uint64_t(i) << 32);
       std::vector<Ab> decoded(pixels.pixels());
       chroma->decode(pixels, 0.38f, decoded);
-      distance = chromaticity->step(pixels, decoded, 1e-2f);
+      distance = chromaticity->step(pixels, decoded, {}, AbLoss::kHuber, 1e-2f);
     }
   });
   std::printf("%d patches of %d pixels %.2f s (loss %.3f)  %d distillation steps %.2f s (ab distance %.3f)\n", patches,

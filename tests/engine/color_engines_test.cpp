@@ -206,7 +206,7 @@ TEST(ColorFieldEngine, StartsGreyAndReachesTheTargets) {
 
   for (int p = 0; p < 64; ++p) targets.push_back({40.0f - float(p), float(p % 8)});
   double distance = 0;
-  for (int i = 0; i < 600; ++i) distance = engine->step(pixels, targets, i < 300 ? 1e-2f : 1e-3f);
+  for (int i = 0; i < 600; ++i) distance = engine->step(pixels, targets, {}, AbLoss::kHuber, i < 300 ? 1e-2f : 1e-3f);
   EXPECT_LT(distance, 1.0);
   engine->composite(pixels, seen);
   for (int p = 0; p < 64; ++p) EXPECT_NEAR(std::hypot(seen[p].a - targets[p].a, seen[p].b - targets[p].b), 0, 4.0);
@@ -257,7 +257,7 @@ TEST(ColorFieldEngine, PixelColourIsTheCompositeOfTheSamplesLight) {
   const auto engine = make_cpu_color_field_engine(small_grid(), 3);
   const PixelSamples pixels = row_of_pixels(16);
   const std::vector<Ab> targets(16, Ab{30, -25});
-  for (int i = 0; i < 100; ++i) engine->step(pixels, targets, 1e-2f);
+  for (int i = 0; i < 100; ++i) engine->step(pixels, targets, {}, AbLoss::kHuber, 1e-2f);
   std::vector<Chromaticity> chromaticity(pixels.positions.size());
   engine->query(pixels.positions, chromaticity);
   std::vector<Ab> seen(16);

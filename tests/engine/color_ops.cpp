@@ -272,7 +272,7 @@ Op color_learning() {
     for (int i = 0; i < 150; ++i) last = bins->step(*engine, 1e-2f);
     EXPECT_LT(last, 0.5 * first);
     const auto field = backend.engines().make_color_field(grid_of(8), 6);
-    for (int i = 0; i < 300; ++i) distance = field->step(pixels, targets, i < 200 ? 1e-2f : 1e-3f);
+    for (int i = 0; i < 300; ++i) distance = field->step(pixels, targets, {}, AbLoss::kHuber, i < 200 ? 1e-2f : 1e-3f);
     const auto processor = bins->fresh(reference_backend());  // reads what the back end trained
     copy_state(*engine, *processor);
     return {{"loss after 150 steps", {last}},
@@ -299,7 +299,7 @@ Op empty_pixels() {
     std::vector<Ab> colors(17);
     field->composite(pixels, colors);
     const PixelSamples none;
-    const double idle = engine->step(none, {}, {}, {}, 1e-2f) + field->step(none, {}, 1e-2f);
+    const double idle = engine->step(none, {}, {}, {}, 1e-2f) + field->step(none, {}, {}, AbLoss::kHuber, 1e-2f);
     return {{"loss", {loss}},
             {"colour", {1 + colors[3].a, 1 + colors[3].b}},
             {"of no pixels", {idle, double(engine->step_count()), double(field->step_count())}}};

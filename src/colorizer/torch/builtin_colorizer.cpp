@@ -16,7 +16,7 @@
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer/torch/products.h"
-#include "src/colorizer/torch/single_threaded_ops.h"
+#include "src/colorizer/torch/torch_threads.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;

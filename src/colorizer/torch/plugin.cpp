@@ -4,8 +4,10 @@
 
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/torch/encoder.h"
+#include "src/colorizer/torch/torch_threads.h"
 
 extern "C" __attribute__((visibility("default"))) const cnerf::TorchColorizers* cnerf_torch_colorizers() {
+  cnerf::limit_torch_threads();
   static const cnerf::TorchColorizers colorizers{cnerf::make_builtin_colorizer, cnerf::make_reference_colorizer,
                                                  cnerf::make_torchscript_colorizer, cnerf::make_torch_picture_encoder,
                                                  TORCH_VERSION};

@@ -26,13 +26,8 @@ class ColorBinEngineCpu final : public ColorBinEngine {
   }
 
   void share_steps(const StepShare& share) override { share_ = share; }
-  double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
-              const ChromaLossWeights& more, float learning_rate) override {
-    CNERF_CHECK_EQ(labels.size(), pixels.pixels());
-    if (pixels.pixels() == 0) {
-      steps_.front() += 1;
-      return 0;
-    }
+  double fit(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
+             const ChromaLossWeights& more, float learning_rate) override {
     const float scale = 1.0f / float(pixels.pixels());
     const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
     chunks_.run(last - own, kBlockPixels, features_.weight_count() + head_.layout().weight_count(),
@@ -48,12 +43,11 @@ class ColorBinEngineCpu final : public ColorBinEngine {
                   const double spread = backward(pixels, begin, end, spread_slope(more.spread, scale), work, chunk);
                   chunk.loss += more.spread * spread;
                 });
-    steps_.front() += 1;
     const auto [d_weights, total] = chunks_.sums(share_);
     const auto split = std::ptrdiff_t(features_.weight_count());
-    features_.update(chunks_.runs(), {d_weights.begin(), d_weights.begin() + split}, learning_rate, steps_.front(),
+    features_.update(chunks_.runs(), {d_weights.begin(), d_weights.begin() + split}, learning_rate, step_count(),
                      share_.sum);
-    head_.update({d_weights.begin() + split, d_weights.end()}, AdamStep(learning_rate, steps_.front()));
+    head_.update({d_weights.begin() + split, d_weights.end()}, AdamStep(learning_rate, step_count()));
     return total * scale;
   }
 
@@ -83,12 +77,11 @@ class ColorBinEngineCpu final : public ColorBinEngine {
     });
   }
 
-  [[nodiscard]] long step_count() const override { return steps_.front(); }
   [[nodiscard]] std::vector<StatePiece> state() override {
     std::vector<StatePiece> state;
     features_.append_state("features", state);
     head_.append_state("head", state);
-    state.push_back(state_piece("chroma_steps", steps_));
+    state.push_back(steps_piece("chroma_steps"));
     return state;
   }
   void state_loaded() override {
@@ -215,7 +208,6 @@ class ColorBinEngineCpu final : public ColorBinEngine {
   MlpCpu head_;
   StepShare share_;
   StepChunks chunks_;
-  std::vector<std::int64_t> steps_ = {0};
   mutable tbb::enumerable_thread_specific<Work> works_;
 };
 

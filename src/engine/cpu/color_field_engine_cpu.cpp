@@ -19,14 +19,8 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
       : field_(grid, kChromaticityOutputs, /*relu_output=*/false, seed) {}
 
   void share_steps(const StepShare& share) override { share_ = share; }
-  using ColorFieldEngine::step;
-  double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
-              AbLoss loss, float learning_rate) override {
-    CNERF_CHECK_EQ(targets.size(), pixels.pixels());
-    if (pixels.pixels() == 0) {
-      steps_.front() += 1;
-      return 0;
-    }
+  double fit(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights, AbLoss loss,
+             float learning_rate) override {
     const float scale = 1.0f / float(pixels.pixels());
     const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
     chunks_.run(last - own, kBlockPixels, field_.weight_count(),
@@ -44,9 +38,8 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
                   float* d_encoded = chunk.append(work.positions, work.groups, field_.encoded_channels());
                   field_.backward(work, d_encoded, chunk.d_weights.data());
                 });
-    steps_.front() += 1;
     const auto [d_weights, total] = chunks_.sums(share_);
-    field_.update(chunks_.runs(), d_weights, learning_rate, steps_.front(), share_.sum);
+    field_.update(chunks_.runs(), d_weights, learning_rate, step_count(), share_.sum);
     return total * scale;
   }
 
@@ -74,11 +67,10 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
     }
   }
 
-  [[nodiscard]] long step_count() const override { return steps_.front(); }
   [[nodiscard]] std::vector<StatePiece> state() override {
     std::vector<StatePiece> state;
     field_.append_state("chromaticity", state);
-    state.push_back(state_piece("chromaticity_steps", steps_));
+    state.push_back(steps_piece("chromaticity_steps"));
     return state;
   }
   void state_loaded() override { field_.state_loaded(); }
@@ -119,7 +111,6 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
   PointNetCpu field_;
   StepShare share_;
   StepChunks chunks_;
-  std::vector<std::int64_t> steps_ = {0};
   mutable tbb::enumerable_thread_specific<PointWorkspace> works_;
 };
 

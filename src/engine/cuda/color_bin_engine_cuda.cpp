@@ -28,19 +28,13 @@ class ColorBinEngineCuda final : public ColorBinEngine {
     check_sums(share);
     share_ = share;
   }
-  double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
-              const ChromaLossWeights& more, float learning_rate) override {
-    CNERF_CHECK_EQ(labels.size(), pixels.pixels());
+  double fit(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
+             const ChromaLossWeights& more, float learning_rate) override {
     const std::lock_guard lock(mutex_);
-    if (pixels.pixels() == 0) {
-      steps_.front() += 1;
-      return 0;
-    }
     const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
     const std::size_t n = last - own;
     batch_.upload(pixels, own, last, stream_);
-    steps_.front() += 1;
-    stream_.begin_step(learning_rate, steps_.front(), batch_.samples());
+    stream_.begin_step(learning_rate, step_count(), batch_.samples());
     labels_.reserve(n, "labels");
     labels_.upload(labels.data() + own, n, stream_);
     if (!pixel_weights.empty()) pixel_weights = pixel_weights.subspan(own, n);
@@ -94,13 +88,12 @@ class ColorBinEngineCuda final : public ColorBinEngine {
     stream_.wait();
   }
 
-  [[nodiscard]] long step_count() const override { return steps_.front(); }
   [[nodiscard]] std::vector<StatePiece> state() override {
     const std::lock_guard lock(mutex_);
     std::vector<StatePiece> state;
     features_.append_state("features", state);
     head_.append_state("head", state);
-    state.push_back(state_piece("chroma_steps", steps_));
+    state.push_back(steps_piece("chroma_steps"));
     return state;
   }
   void state_loaded() override {
@@ -140,7 +133,6 @@ class ColorBinEngineCuda final : public ColorBinEngine {
   PackedBuffers packed_head_;
   DeviceBuffer<float> d_head_, d_composited_;
   DeviceBuffer<SoftLabel> labels_;
-  std::vector<std::int64_t> steps_ = {0};
   mutable PixelBatch batch_;
   DeviceBuffer<Ab> centres_ = uploaded(std::vector<Ab>(ab_bin_centres().begin(), ab_bin_centres().end()), "bins");
   mutable DeviceBuffer<float> logits_;

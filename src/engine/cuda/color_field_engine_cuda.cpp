@@ -23,20 +23,13 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
     check_sums(share);
     share_ = share;
   }
-  using ColorFieldEngine::step;
-  double step(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights,
-              AbLoss loss, float learning_rate) override {
-    CNERF_CHECK_EQ(targets.size(), pixels.pixels());
+  double fit(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights, AbLoss loss,
+             float learning_rate) override {
     const std::lock_guard lock(mutex_);
-    if (pixels.pixels() == 0) {
-      steps_.front() += 1;
-      return 0;
-    }
     const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
     const std::size_t n = last - own;
     batch_.upload(pixels, own, last, stream_);
-    steps_.front() += 1;
-    stream_.begin_step(learning_rate, steps_.front(), batch_.samples());
+    stream_.begin_step(learning_rate, step_count(), batch_.samples());
     colors_.reserve(n, "pixels");
     colors_.upload(targets.data() + own, n, stream_);
     if (!pixel_weights.empty()) pixel_weights = pixel_weights.subspan(own, n);
@@ -83,12 +76,11 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
     }
   }
 
-  [[nodiscard]] long step_count() const override { return steps_.front(); }
   [[nodiscard]] std::vector<StatePiece> state() override {
     const std::lock_guard lock(mutex_);
     std::vector<StatePiece> state;
     field_.append_state("chromaticity", state);
-    state.push_back(state_piece("chromaticity_steps", steps_));
+    state.push_back(steps_piece("chromaticity_steps"));
     return state;
   }
   void state_loaded() override {
@@ -102,7 +94,6 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
   ChromaStream stream_;
   mutable PointNetCuda field_;
   DeviceBuffer<float2> d_logs_;
-  std::vector<std::int64_t> steps_ = {0};
   mutable PixelBatch batch_;
   mutable DeviceBuffer<Ab> colors_;
   mutable DeviceBuffer<Vec3f> points_;

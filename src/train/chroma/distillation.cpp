@@ -71,7 +71,7 @@ void distill(Session& session) {
     const long step = field.step_count();
     const std::vector<ViewPixel> pixels = random_pixels(session, kPixels, std::uint64_t(step));
     if (pixels.empty()) break;
-    session.loss = field.step(pixel_samples(session.views(), pixels), colors.of(pixels),
+    session.loss = field.step(pixel_samples(session.views(), pixels), colors.of(pixels), {}, AbLoss::kHuber,
                               decayed_rate(kRate, kFinalRate, double(step) / steps));
     session.after_step("stage 2: colour for baking", "ab distance", step + 1, steps);
   }

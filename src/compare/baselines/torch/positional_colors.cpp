@@ -29,9 +29,8 @@ class PositionalColorBinEngine final : public ColorBinEngine {
     trained_ = std::make_unique<Trained>(joined(net_->parameters(), trunk_->parameters()));
   }
 
-  double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
-              const ChromaLossWeights& more, float learning_rate) override {
-    CNERF_CHECK_EQ(labels.size(), pixels.pixels());
+  double fit(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
+             const ChromaLossWeights& more, float learning_rate) override {
     const FastProducts fast;
     const auto n = std::int64_t(labels.size());
     std::vector<std::int64_t> bins;
@@ -59,8 +58,7 @@ class PositionalColorBinEngine final : public ColorBinEngine {
       loss = loss + more.regression * (cost.sum(1) * pixel_weight).mean();
     }
     loss.backward();
-    steps_.front() += 1;
-    trained_->follow(double(learning_rate), steps_.front());
+    trained_->follow(double(learning_rate), step_count());
     return loss.item<double>();
   }
 
@@ -82,11 +80,10 @@ class PositionalColorBinEngine final : public ColorBinEngine {
     });
   }
 
-  [[nodiscard]] long step_count() const override { return steps_.front(); }
   [[nodiscard]] std::vector<StatePiece> state() override {
     std::vector<StatePiece> state;
     trained_->append_state("positional_chroma", state);
-    state.push_back(state_piece("chroma_steps", steps_));
+    state.push_back(steps_piece("chroma_steps"));
     return state;
   }
   void state_loaded() override { trained_->state_loaded(); }
@@ -146,7 +143,6 @@ class PositionalColorBinEngine final : public ColorBinEngine {
   mutable Trunk trunk_;  // modules know no const
   mutable ChromaNet net_;
   std::unique_ptr<Trained> trained_;
-  std::vector<std::int64_t> steps_ = {0};
 };
 
 }  // namespace
