@@ -62,6 +62,7 @@ const std::vector<RetiredKey>& retired_keys() {
 }
 
 std::vector<std::string> read_run_config(const fs::path& file, Config& config) {
+  config.file = file;
   return read_toml(read_text_file(file), file.string(), fields_of(config), retired_keys(), Retired::kLeftOut);
 }
 
@@ -71,10 +72,12 @@ std::string to_toml(const Config& config) {
 }
 
 void check_consistency(const Config& config) {
-  const auto check_grid = [](const std::string& section, const HashGridOptions& grid) {
+  const std::string where = config.file.empty() ? "" : config.file.string() + ", with what is set besides: ";
+  const auto check_grid = [&where](const std::string& section, const HashGridOptions& grid) {
     if (grid.coarsest_resolution <= grid.finest_resolution) return;
-    throw UsageError(section + ".coarsest_resolution: expected at most " + section + ".finest_resolution, got " +
-                     std::to_string(grid.coarsest_resolution) + " against " + std::to_string(grid.finest_resolution));
+    throw UsageError(where + section + ".coarsest_resolution: expected at most " + section +
+                     ".finest_resolution, got " + std::to_string(grid.coarsest_resolution) + " against " +
+                     std::to_string(grid.finest_resolution));
   };
   check_grid("stage1.grid", config.stage1.grid);
   check_grid("stage2.grid", config.stage2.grid);

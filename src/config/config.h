@@ -36,6 +36,7 @@ struct Config {
   exporting::WebOptions web;
   PictureOptions render;
   Finish finish;
+  std::filesystem::path file;  ///< of the run or take that it was read from; no option
 
   template <typename Visitor>
   void visit(Visitor&& v) {
@@ -74,7 +75,8 @@ std::vector<std::string> read_run_config(const std::filesystem::path& file, Conf
 /// The whole configuration as TOML. Reading it back gives an equal Config, bit for bit.
 [[nodiscard]] std::string to_toml(const Config& config);
 
-/// Checks what ranges of single options cannot say, such as a minimum above its maximum.  @throws UsageError.
+/// Checks what ranges of single options cannot say, such as a minimum above its maximum.
+/// @throws UsageError  naming the file that it was read from, and the options.
 void check_consistency(const Config& config);
 
 /// The folders presets are looked for in: `../share/cnerf/configs` beside the executable, then the source tree.

@@ -196,6 +196,17 @@ TEST(Config, RelationsBetweenOptionsAreChecked) {
   EXPECT_NO_THROW(check_consistency(config));
   config.stage1.grid.finest_resolution = config.stage1.grid.coarsest_resolution - 1;
   EXPECT_THROW(check_consistency(config), UsageError);
+  const test::TempDir folder;
+  write_file(folder / "run.toml", "stage2.grid.coarsest_resolution = 640\n");
+  (void)read_run_config(folder / "run.toml", config = {});
+  EXPECT_NO_THROW(check_consistency(config));
+  apply_setting("stage2.grid.finest_resolution=32", config);
+  try {
+    check_consistency(config);
+    FAIL() << "a coarsest level finer than the finest";
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(HasSubstr((folder / "run.toml").string()), HasSubstr("640")));
+  }
 }
 
 TEST(Config, PresetsAreFoundByName) {

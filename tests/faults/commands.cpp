@@ -24,9 +24,10 @@ const Words kOneThread = {"--threads", "1"};
 constexpr const char* kColorizer = "reference:references";
 
 Words tiny() {
-  return joined(test::tiny_options({"stage1.steps=30", "stage1.samples_per_step=2048", "stage1.checkpoint_every=10",
-                                    "stage1.grid.log2_rows=10", "stage2.grid.log2_rows=10"}),
-                kOneThread);
+  return joined(
+      test::tiny_options({"stage1.steps=30", "stage1.samples_per_step=2048", "stage1.checkpoint_every=10",
+                          "stage1.grid.log2_rows=10", "stage2.grid.log2_rows=10", "colorizer.reference_steps=2"}),
+      kOneThread);
 }
 
 /// w x y z of a rotation; good for half turns too.
