@@ -12,6 +12,7 @@
 #include "src/capture/byte_reader.h"
 #include "src/capture/listing.h"
 #include "src/capture/pose.h"
+#include "src/capture/stated_values.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -72,8 +73,8 @@ Intrinsics read_parameters(const ModelLayout& layout, std::uint64_t width, std::
   out.width = int(width);
   out.height = int(height);
   out.model = layout.lens;
-  out.fx = next();
-  out.fy = layout.one_focal_length ? out.fx : next();
+  out.fx = above_zero(next(), file, field + ": focal length");
+  out.fy = layout.one_focal_length ? out.fx : above_zero(next(), file, field + ": focal length");
   out.cx = next();
   out.cy = next();
   for (const std::size_t place : layout.coefficients) out.distortion[place] = next();
