@@ -338,7 +338,7 @@ fs::path write_manifest(const BakeManifest& manifest, const fs::path& folder) {
 BakeManifest read_manifest(const fs::path& file) {
   const Json json = read_json(file);
   const Json schema = json.is_object() ? json.value("schema", Json()) : Json();
-  if (schema.is_number_integer() && schema.get<int>() > kManifestSchema) {
+  if (schema.is_number_integer() && schema.get<std::int64_t>() > kManifestSchema) {
     throw InputError(file, "schema",
                      "expected at most " + std::to_string(kManifestSchema) + ", found " + excerpt(schema) +
                          ": written by a newer cnerf");

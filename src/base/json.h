@@ -1,11 +1,16 @@
 #pragma once
 /// JSON that others wrote: files of any content are read without harm, and quoted in messages without flooding them.
 
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <type_traits>
+#include <utility>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -49,11 +54,34 @@ template <typename Problem = InputError, typename Json = nlohmann::ordered_json>
   return parse_json<Problem, Json>(read_text_file(file), file);
 }
 
+/// Whether a T can be what a JSON value is: a number is no truth value, 1.5 no count, and none may be too large for T.
+template <typename T, typename Json>
+[[nodiscard]] bool holds(const Json& json) {
+  if constexpr (std::is_same_v<T, bool>) {
+    return json.is_boolean();
+  } else if constexpr (std::is_integral_v<T>) {
+    if (json.is_number_unsigned()) return std::in_range<T>(json.template get<std::uint64_t>());
+    return json.is_number_integer() && std::in_range<T>(json.template get<std::int64_t>());
+  } else if constexpr (std::is_floating_point_v<T>) {
+    return json.is_number() && std::abs(json.template get<double>()) <= double(std::numeric_limits<T>::max());
+  } else {
+    return true;
+  }
+}
+
 /// A value as a message quotes it: its beginning where it is long.
 template <typename Json>
 [[nodiscard]] std::string excerpt(const Json& value) {
   constexpr std::size_t kLongest = 120;
   return shortened(value.dump(-1, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace), kLongest);
+}
+
+/// Reads a value, which `get` would also make of a fraction, or of a number that the type does not hold.
+/// @throws nlohmann::json::exception
+template <typename Json, typename T>
+void read_exactly(const Json& json, T& value) {
+  if (!holds<T>(json)) throw Json::type_error::create(302, "not such a number: " + excerpt(json), &json);
+  json.get_to(value);
 }
 
 }  // namespace cnerf

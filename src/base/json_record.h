@@ -142,11 +142,8 @@ void read(const Json& json, const std::string& where, T& value) {
     if (text.find('\0') != std::string::npos) throw FieldError(where, "expected a path, got " + excerpt(json));
     value = text;
   } else {
-    // A number is not a truth value, and 1.5 no count.
-    const bool is_other_type = std::is_same_v<T, bool> != json.is_boolean() ||
-                               (std::is_integral_v<T> && !std::is_same_v<T, bool> && !json.is_number_integer());
+    if (!holds<T>(json)) throw FieldError(where, "got " + excerpt(json));
     try {
-      if (std::is_arithmetic_v<T> && is_other_type) throw FieldError(where, "got " + excerpt(json));
       json.get_to(value);
     } catch (const nlohmann::json::exception&) {
       throw FieldError(where, "got " + excerpt(json));

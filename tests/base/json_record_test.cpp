@@ -87,6 +87,10 @@ TEST(JsonRecord, ErrorsNameFileAndField) {
   EXPECT_EQ(refusal([](Json& json) { json["seconds"]["train"] = "long"; }), "cell.json: seconds.train: got \"long\"");
   EXPECT_EQ(refusal([](Json& json) { json["seed"] = 1.5; }), "cell.json: seed: got 1.5");
   EXPECT_EQ(refusal([](Json& json) { json["is_done"] = 1; }), "cell.json: is_done: got 1");
+  EXPECT_EQ(refusal([](Json& json) { json["seed"] = 4294967297; }), "cell.json: seed: got 4294967297");
+  EXPECT_EQ(refusal([](Json& json) { json["seed"] = std::uint64_t(1) << 63; }),
+            "cell.json: seed: got 9223372036854775808");
+  EXPECT_EQ(refusal([](Json& json) { json["size"][0] = 1e39; }), "cell.json: size[0]: got 1e+39");
   EXPECT_EQ(refusal([](Json& json) { json = Json::array(); }), "cell.json: expected an object, got []");
   EXPECT_EQ(refusal([](Json& json) { json["later"] = 1; }), "(nothing was thrown)") << "of a later version";
 }

@@ -180,11 +180,25 @@ TEST_F(StoredViews, TellWhatTheyAreAndNameCamerasThatMustBeWrong) {
               testing::Contains(HasSubstr("wrong, by the look of it: toy4")));
 }
 
+TEST_F(StoredViews, LieBesideOptionsThatHoldTheirNumbers) {
+  auto model = LuminanceModel::load(job_.snapshot, cpu_engines());
+  const nlohmann::json good = Snapshot(job_.snapshot, "stage1").header();
+  for (const auto& [option, number] :
+       std::map<std::string, nlohmann::json>{{"samples_per_step", (std::int64_t(1) << 32) + 1024}, {"steps", 0.5}}) {
+    nlohmann::json header = good;
+    ASSERT_TRUE(header["options"].contains(option));
+    header["options"][option] = number;
+    save_snapshot(folder_ / "forged.snapshot", "stage1", header, model.engine->state());
+    EXPECT_THROW((void)LuminanceModel::load(folder_ / "forged.snapshot", cpu_engines()), SnapshotError) << option;
+  }
+}
+
 TEST_F(StoredViews, ThatAreForgedAreRefused) {
   const Snapshot good(job_.snapshot, "stage1");
   auto model = LuminanceModel::load(job_.snapshot, cpu_engines());
   for (const nlohmann::json& forged :
-       {nlohmann::json(-1), nlohmann::json(1 << 30), nlohmann::json(5), nlohmann::json("6"), nlohmann::json(0)}) {
+       {nlohmann::json(-1), nlohmann::json(1 << 30), nlohmann::json(5), nlohmann::json("6"), nlohmann::json(0),
+        nlohmann::json((std::int64_t(1) << 32) + 6)}) {
     nlohmann::json header = good.header();
     header["learned_views"] = forged;
     save_snapshot(folder_ / "forged.snapshot", "stage1", header, model.engine->state());

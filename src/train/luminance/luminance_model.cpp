@@ -52,7 +52,9 @@ nlohmann::json occupancy_to_json(const OccupancyOptions& options) {
 OccupancyOptions occupancy_of(const nlohmann::json& header) {
   const nlohmann::json& json =
       header.contains("occupancy") ? header.at("occupancy") : header.at("options").at("occupancy");
-  OccupancyOptions options{0, json.at("decay").get<float>(), json.at("optical_thickness").get<float>()};
+  OccupancyOptions options;
+  read_exactly(json.at("decay"), options.decay);
+  read_exactly(json.at("optical_thickness"), options.optical_thickness);
   read_exactly(json.at("resolution"), options.resolution);
   return options;
 }

@@ -2,20 +2,10 @@
 /// Option structs to and from JSON, for snapshot headers. Users' TOML goes through src/config instead.
 
 #include <nlohmann/json.hpp>
-#include <string>
-#include <type_traits>
+
+#include "src/base/json.h"
 
 namespace cnerf {
-
-/// Reads a value, which `get` would also make of a fraction, or of a number that the type does not hold.
-/// @throws nlohmann::json::exception
-template <typename T>
-void read_exactly(const nlohmann::json& json, T& value) {
-  if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>) {
-    (void)json.get_ref<const nlohmann::json::number_integer_t&>();  // throws for any other
-  }
-  json.get_to(value);
-}
 
 class OptionsToJson {
  public:

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "src/base/error.h"
+#include "src/base/json.h"
 #include "src/base/observer.h"
 #include "src/field/state.h"
 
@@ -59,7 +60,9 @@ void save_times(const std::filesystem::path& snapshot, const SnapshotTimes& time
 template <typename T>
 T header_field(const Snapshot& snapshot, const std::string& field) {
   try {
-    return snapshot.header().at(field).get<T>();
+    T value;
+    read_exactly(snapshot.header().at(field), value);
+    return value;
   } catch (const nlohmann::json::exception& problem) {
     throw SnapshotError(snapshot.file().string() + ": header field '" + field + "': " + problem.what());
   }
