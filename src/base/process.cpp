@@ -13,12 +13,15 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <new>
 #include <sstream>
 #include <thread>
 
 #include "src/base/error.h"
+#include "src/base/file_descriptor.h"
 #include "src/base/pointers_to.h"
 #include "src/base/text.h"
+#include "src/base/usage.h"
 
 extern char** environ;  // NOLINT: POSIX
 
@@ -98,23 +101,38 @@ std::string shell_word(const std::string& text) {
 
 // ---- a started program --------------------------------------------------------------------------------------------
 
-bool outlives(const std::function<void()>& attempt, double seconds) {
+std::optional<std::string> failure_in_child(const std::function<void()>& attempt, double seconds, std::size_t memory) {
+  constexpr std::size_t kLongest = 4000;  // a pipe holds it
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0) return std::nullopt;
+  const FileDescriptor reads(ends[0]);
+  FileDescriptor writes(ends[1]);
   const pid_t child = ::fork();
-  if (child < 0) return true;
+  if (child < 0) return std::nullopt;
   if (child == 0) {
     // Its end is nobody's business: not that of a debugger's or a fuzzer's handlers either.
     for (const int end : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM}) ::signal(end, SIG_DFL);
     ::close(STDERR_FILENO);
     ::alarm(unsigned(std::ceil(seconds)));
+    limit_growth(memory);
     try {
       attempt();
-    } catch (...) {  // which is no crash
+      ::_exit(0);
+    } catch (const std::bad_alloc&) {
+    } catch (const std::exception& failure) {
+      const std::string said = shortened(failure.what(), kLongest);
+      (void)!::write(writes.number(), said.data(), said.size());
+    } catch (...) {
     }
-    ::_exit(0);
+    ::_exit(1);
   }
   int status = 0;
-  const pid_t ended = TEMP_FAILURE_RETRY(::waitpid(child, &status, 0));
-  return ended != child || status == 0;
+  if (TEMP_FAILURE_RETRY(::waitpid(child, &status, 0)) != child || status == 0) return std::nullopt;
+  writes.reset();
+  std::string said(kLongest, ' ');
+  const ssize_t size = TEMP_FAILURE_RETRY(::read(reads.number(), said.data(), said.size()));
+  said.resize(std::size_t(std::max<ssize_t>(size, 0)));
+  return said;
 }
 
 Process::Process(std::vector<std::string> words, const Streams& streams, const std::vector<std::string>& variables) {

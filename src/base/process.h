@@ -27,11 +27,14 @@ namespace cnerf {
 int run_program(const std::vector<std::string>& words, const std::filesystem::path& log,
                 const std::function<void()>& watch = {});
 
-/// Whether this process would outlive `attempt`, and in that time: a child tries it first. Libraries that read what
-/// others made may crash. What the child throws, or writes to standard error, is lost; true where there can be no
-/// child.
-/// @param attempt  must not need threads, which a child does not have
-[[nodiscard]] bool outlives(const std::function<void()>& attempt, double seconds);
+/// What `attempt` fails with in a child of this process, so that it need not be made in this one: libraries that read
+/// what others made may crash, hang or swell.
+/// @param attempt  must not need threads, which a child does not have; what it writes to standard error is lost
+/// @param memory   bytes that the child may take besides what this process holds
+/// @return  what it threw; "" where it crashed, or time or memory did not suffice; nullopt where it returned, and where
+///          there can be no child
+[[nodiscard]] std::optional<std::string> failure_in_child(const std::function<void()>& attempt, double seconds,
+                                                          std::size_t memory);
 
 /// A running program in a process group of its own: Ctrl-C reaches it through us only.
 class Process {

@@ -48,4 +48,11 @@ void limit_memory(const std::string& amount) {
   (void)::setrlimit(RLIMIT_DATA, &limit);
 }
 
+void limit_growth(std::size_t bytes) {
+  rlimit limit{};
+  (void)::getrlimit(RLIMIT_DATA, &limit);
+  limit.rlim_cur = std::min<rlim_t>(limit.rlim_cur, memory_now().reserved + bytes);
+  (void)::setrlimit(RLIMIT_DATA, &limit);
+}
+
 }  // namespace cnerf

@@ -18,6 +18,9 @@ namespace cnerf {
 /// @throws UsageError  naming `max_memory`, when the process holds more than that already
 void limit_memory(const std::string& amount);
 
+/// From now on the process may take so many bytes more than it has; an earlier limit stays where it is lower.
+void limit_growth(std::size_t bytes);
+
 /// Measures seconds since its construction.
 class Stopwatch {
  public:

@@ -6,7 +6,6 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/base/process.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/network_contract.h"
 #include "src/colorizer/onnx_tensors.h"
@@ -60,17 +59,19 @@ template <typename Read>
 std::unique_ptr<Colorizer> read_network(const ColorizerRequest& request, const std::string& name, const fs::path& file,
                                         const std::string& advice, const Read& read) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // its errors are told as ours, once
-  if (!outlives([&] { (void)read(); }, request.options.timeout_seconds)) {
-    throw ColorizerError(name + ": is damaged: OpenCV " CV_VERSION " cannot stand or end reading it; " + advice);
-  }
-  try {
-    return std::make_unique<DnnColorizer>(name, contract_beside(file), read());
-  } catch (const Error&) {
-    throw;
-  } catch (...) {
-    throw ColorizerError(name + ": OpenCV " CV_VERSION " cannot read it, or it is cut short: " + complaint() + "; " +
-                         advice);
-  }
+  const auto network = [&] {
+    try {
+      return read();
+    } catch (const Error&) {
+      throw;
+    } catch (...) {
+      throw ColorizerError(name + ": OpenCV " CV_VERSION " cannot read it, or it is cut short: " + complaint() + "; " +
+                           advice);
+    }
+  };
+  read_in_child([&] { (void)network(); }, request.options.timeout_seconds, file,
+                name + ": is damaged: OpenCV " CV_VERSION " cannot stand or end reading it; " + advice);
+  return std::make_unique<DnnColorizer>(name, contract_beside(file), network());
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "src/base/error.h"
+#include "src/base/process.h"
 #include "src/color/ab_bins.h"
 #include "src/color/colorspace_math.h"
 #include "src/colorizer/kinds.h"
@@ -101,6 +102,15 @@ int rounded_up(int value, int multiple) {
 
 int NetworkContract::output_channels() const {
   return output == "logits313" ? kAbBinCount : output == "rgb01" ? 3 : 2;
+}
+
+void read_in_child(const std::function<void()>& read, double seconds, const fs::path& file,
+                   const std::string& damaged) {
+  constexpr std::size_t kLeast = std::size_t(512) << 20, kPerByte = 8;
+  std::error_code unknown;
+  const std::uintmax_t size = fs::file_size(file, unknown);
+  const auto failure = failure_in_child(read, seconds, kLeast + (unknown ? 0 : size * kPerByte));
+  if (failure) throw ColorizerError(failure->empty() ? damaged : *failure);
 }
 
 NetworkContract contract_beside(const fs::path& network) {

@@ -3,6 +3,7 @@
 /// Shared by the back ends that run such networks. docs/colorizers.md describes the file.
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,14 @@ struct NetworkContract {
 
 /// `network`.toml, or what holds without it.  @throws InputError  naming the key.
 [[nodiscard]] NetworkContract contract_beside(const std::filesystem::path& network);
+
+/// Lets a child of this process read a network before this one does: libraries trust the files that they read.
+/// @param read     throws what a user is to be told
+/// @param damaged  what a user is told where the child crashes, takes too long, or half a gigabyte and eight times the
+///                 file's size
+/// @throws ColorizerError
+void read_in_child(const std::function<void()>& read, double seconds, const std::filesystem::path& file,
+                   const std::string& damaged);
 
 /// A float tensor [batch, channels, height, width].
 struct Planes {

@@ -31,12 +31,24 @@ TEST(RunProgram, ReturnsTheStatusAndAppendsBothOutputs) {
   EXPECT_EQ(run_program({"/bin/sh", "-c", "kill -9 $$"}, folder / "log"), 128 + 9);
 }
 
-TEST(Outlives, WhatReturnsOrThrowsInTime) {
-  EXPECT_TRUE(outlives([] {}, 10));
-  EXPECT_TRUE(outlives([] { throw std::runtime_error("refused"); }, 10));
-  EXPECT_FALSE(outlives([] { std::abort(); }, 10));
-  EXPECT_FALSE(outlives([] { ::raise(SIGSEGV); }, 10));
-  EXPECT_FALSE(outlives([] { ::pause(); }, 0.5));
+TEST(FailureInChild, IsWhatItThrewOrThatItDidNotEnd) {
+  constexpr std::size_t kMemory = std::size_t(64) << 20;
+  EXPECT_EQ(failure_in_child([] {}, 10, kMemory), std::nullopt);
+  EXPECT_EQ(failure_in_child([] { throw std::runtime_error("refused"); }, 10, kMemory), "refused");
+  EXPECT_EQ(failure_in_child([] { throw 1; }, 10, kMemory), "");
+  EXPECT_EQ(failure_in_child([] { std::abort(); }, 10, kMemory), "");
+  EXPECT_EQ(failure_in_child([] { ::raise(SIGSEGV); }, 10, kMemory), "");
+  EXPECT_EQ(failure_in_child([] { ::pause(); }, 0.5, kMemory), "");
+  const auto said = failure_in_child([] { throw std::runtime_error(std::string(100'000, 'x')); }, 10, kMemory);
+  EXPECT_LE(said.value_or(std::string(9999, 'x')).size(), 4096u);
+}
+
+TEST(FailureInChild, IsALackOfMemoryBeyondWhatItMayTake) {
+  std::vector<char> taken;
+  EXPECT_EQ(failure_in_child([&] { taken.assign(std::size_t(32) << 20, 'x'); }, 10, std::size_t(64) << 20),
+            std::nullopt);
+  EXPECT_EQ(failure_in_child([&] { taken.assign(std::size_t(128) << 20, 'x'); }, 10, std::size_t(64) << 20), "");
+  EXPECT_TRUE(taken.empty());
 }
 
 TEST(RunProgram, GivesNoInputAndSaysThatThereIsNoScreen) {

@@ -2,6 +2,7 @@
 
 #include <ATen/Parallel.h>
 #include <caffe2/serialize/inline_container.h>
+#include <sys/resource.h>
 #include <torch/script.h>
 
 #include <filesystem>
@@ -29,6 +30,22 @@ class TorchScriptColorizer : public ::testing::Test {
     module.save(file.string());
     if (!toml.empty()) write_file(file.string() + ".toml", toml);
     return "torchscript:" + file.string();
+  }
+  /// A module whose records `change(name, bytes)` had.
+  template <typename Change>
+  std::string changed_module(const Change& change) {
+    const std::string good = module_of("    return torch.cat([x - 50, -x], 1)\n"), bad = folder_ / "changed.pt";
+    caffe2::serialize::PyTorchStreamReader reader(good.substr(good.find(':') + 1));
+    caffe2::serialize::PyTorchStreamWriter writer(bad);
+    for (const std::string& name : reader.getAllRecords()) {
+      if (name == "version") continue;  // is written by itself
+      const auto [data, size] = reader.getRecord(name);
+      std::string bytes(static_cast<const char*>(data.get()), size);
+      change(name, bytes);
+      writer.writeRecord(name, bytes.data(), bytes.size());
+    }
+    writer.writeEndOfFile();
+    return "torchscript:" + bad;
   }
   std::string failure_of(const std::string& spec) {
     return message_of<ColorizerError>([&] { (void)test::colorizer_of(spec)->colorize(some_question()); });
@@ -160,20 +177,22 @@ TEST_F(TorchScriptColorizer, AWrongContractFileIsNamedWithItsKey) {
 
 /// Its parser calls itself for each bracket, until there is no stack left.
 TEST_F(TorchScriptColorizer, AFileThatEndsLibTorchIsRefused) {
-  const std::string good = module_of(kShift), bad = folder_ / "deep.pt";
-  caffe2::serialize::PyTorchStreamReader reader(good.substr(good.find(':') + 1));
-  caffe2::serialize::PyTorchStreamWriter writer(bad);
-  for (const std::string& name : reader.getAllRecords()) {
-    if (name == "version") continue;  // is written by itself
-    const auto [data, size] = reader.getRecord(name);
-    std::string bytes(static_cast<const char*>(data.get()), size);
-    if (const std::size_t at = bytes.find("return "); name == "code/__torch__.py" && at != std::string::npos) {
-      bytes.insert(at + 7, std::string(1'000'000, '('));
-    }
-    writer.writeRecord(name, bytes.data(), bytes.size());
-  }
-  writer.writeEndOfFile();
-  EXPECT_THAT(failure_of("torchscript:" + bad), HasSubstr("is damaged"));
+  const auto deep = [](const std::string& name, std::string& bytes) {
+    if (name == "code/__torch__.py") bytes.insert(bytes.find("return ") + 7, std::string(1'000'000, '('));
+  };
+  EXPECT_THAT(failure_of(changed_module(deep)), HasSubstr("is damaged"));
+}
+
+/// A pickle may say at which place of a table a value lies, and LibTorch makes the table that long.
+TEST_F(TorchScriptColorizer, AFileOfWhichLibTorchMakesGigabytesIsRefused) {
+  const auto far_place = [](const std::string& name, std::string& bytes) {
+    if (name == "data.pkl") bytes = std::string("\x80\x02]r\xff\xff\xff\x07.");
+  };
+  EXPECT_THAT(failure_of(changed_module(far_place)), HasSubstr("is damaged"));
+  rusage own{}, children{};
+  ::getrusage(RUSAGE_SELF, &own);
+  ::getrusage(RUSAGE_CHILDREN, &children);
+  EXPECT_LT(std::max(own.ru_maxrss, children.ru_maxrss), 1L << 20) << "KiB";
 }
 
 }  // namespace

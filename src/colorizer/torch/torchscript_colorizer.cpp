@@ -7,10 +7,10 @@
 
 #include <chrono>
 #include <future>
+#include <new>
 #include <thread>
 
 #include "src/base/error.h"
-#include "src/base/process.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/network_contract.h"
 
@@ -37,19 +37,23 @@ class TorchScriptColorizer final : public NetworkColorizer {
   TorchScriptColorizer(const fs::path& file, const std::string& shown, double timeout_seconds)
       : NetworkColorizer("torchscript:" + shown, contract_beside(file)), timeout_(timeout_seconds) {
     const auto load = [&] {
-      at::set_num_threads(1);  // a pool of threads does not survive a fork
-      (void)torch::jit::load(file.string(), torch::kCPU);
+      try {
+        return torch::jit::load(file.string(), torch::kCPU);
+      } catch (const std::bad_alloc&) {
+        throw;
+      } catch (const std::exception& error) {
+        throw ColorizerError(name_ + ": not a TorchScript module LibTorch " TORCH_VERSION " can load, or cut short: " +
+                             first_line(error.what()));
+      }
     };
-    if (!outlives(load, timeout_seconds)) {  // some damaged ones end LibTorch
-      throw ColorizerError(name_ + ": is damaged: LibTorch " TORCH_VERSION " cannot stand or end reading it");
-    }
-    try {
-      module_ = torch::jit::load(file.string(), torch::kCPU);
-      module_.eval();
-    } catch (const std::exception& error) {
-      throw ColorizerError(name_ + ": not a TorchScript module LibTorch " TORCH_VERSION " can load, or cut short: " +
-                           first_line(error.what()));
-    }
+    const auto load_alone = [&] {
+      at::set_num_threads(1);  // a pool of threads does not survive a fork
+      (void)load();
+    };
+    read_in_child(load_alone, timeout_seconds, file,
+                  name_ + ": is damaged: LibTorch " TORCH_VERSION " cannot stand or end reading it");
+    module_ = load();
+    module_.eval();
   }
 
  private:
