@@ -28,6 +28,7 @@ struct adl_serializer<cnerf::Affined> {
   static void from_json(const Json& json, cnerf::Affined& map) {
     for (std::size_t i = 0; i < 3; ++i) {
       const Json& row = json.at(i);
+      if (row.size() != 4) throw Json::type_error::create(302, "expected four numbers", &row);
       for (std::size_t column = 0; column < 3; ++column) row.at(column).get_to(map.linear.rows[i][int(column)]);
       row.at(3).get_to(map.translation[int(i)]);
     }

@@ -17,6 +17,7 @@ struct adl_serializer<cnerf::Vec3<Number>> {
   }
   template <typename Json>
   static void from_json(const Json& json, cnerf::Vec3<Number>& v) {
+    if (json.size() != 3) throw Json::type_error::create(302, "expected three numbers", &json);
     for (int axis = 0; axis < 3; ++axis) json.at(std::size_t(axis)).get_to(v[axis]);
   }
 };

@@ -92,6 +92,9 @@ TEST(Manifest, RefusesNewerSchemasAndBrokenFiles) {
   j["schema"] = kManifestSchema + 1;
   std::ofstream(folder / "newer.json") << j;
   EXPECT_THROW((void)read_manifest(folder / "newer.json"), InputError);
+  j["schema"] = std::int64_t(1) << 32;
+  std::ofstream(folder / "newer.json") << j;
+  EXPECT_THROW((void)read_manifest(folder / "newer.json"), InputError);
   j["schema"] = kManifestSchema;
   j.erase("cameras");
   std::ofstream(folder / "short.json") << j;
@@ -126,6 +129,10 @@ TEST(Manifest, CamerasThatCannotBeAreRefused) {
     bad["cameras"][0][key] = value;
     return bad;
   };
+  nlohmann::json five = good["cameras"][0]["world_from_camera"];
+  five[1].push_back(0.0);
+  expect_refusal(folder, with("world_from_camera", five), "world_from_camera");
+  expect_refusal(folder, with("width", (std::int64_t(1) << 32) + 8), "width");
   expect_refusal(folder, with("fx", 1e308), "focal length");
   expect_refusal(folder, with("cx", -1e308), "principal point");
   expect_refusal(folder, with("name", std::string(256, 'a')), "name");
