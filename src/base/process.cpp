@@ -103,6 +103,7 @@ std::string shell_word(const std::string& text) {
 
 std::optional<std::string> failure_in_child(const std::function<void()>& attempt, double seconds, std::size_t memory) {
   constexpr std::size_t kLongest = 4000;  // a pipe holds it
+  constexpr int kFailed = 1, kShortOfOurMemory = 2;
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) return std::nullopt;
   const FileDescriptor reads(ends[0]);
@@ -114,20 +115,22 @@ std::optional<std::string> failure_in_child(const std::function<void()>& attempt
     for (const int end : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM}) ::signal(end, SIG_DFL);
     ::close(STDERR_FILENO);
     ::alarm(unsigned(std::ceil(seconds)));
-    limit_growth(memory);
+    const bool is_limited_here = limit_growth(memory);
     try {
       attempt();
       ::_exit(0);
     } catch (const std::bad_alloc&) {
+      if (!is_limited_here) ::_exit(kShortOfOurMemory);
     } catch (const std::exception& failure) {
       const std::string said = shortened(failure.what(), kLongest);
       (void)!::write(writes.number(), said.data(), said.size());
     } catch (...) {
     }
-    ::_exit(1);
+    ::_exit(kFailed);
   }
   int status = 0;
   if (TEMP_FAILURE_RETRY(::waitpid(child, &status, 0)) != child || status == 0) return std::nullopt;
+  if (WIFEXITED(status) && WEXITSTATUS(status) == kShortOfOurMemory) throw std::bad_alloc();
   writes.reset();
   std::string said(kLongest, ' ');
   const ssize_t size = TEMP_FAILURE_RETRY(::read(reads.number(), said.data(), said.size()));

@@ -33,6 +33,7 @@ int run_program(const std::vector<std::string>& words, const std::filesystem::pa
 /// @param memory   bytes that the child may take besides what this process holds
 /// @return  what it threw; "" where it crashed, or time or memory did not suffice; nullopt where it returned, and where
 ///          there can be no child
+/// @throws std::bad_alloc  where the limit of this process's own memory did not suffice (limit_memory)
 [[nodiscard]] std::optional<std::string> failure_in_child(const std::function<void()>& attempt, double seconds,
                                                           std::size_t memory);
 

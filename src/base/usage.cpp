@@ -48,11 +48,13 @@ void limit_memory(const std::string& amount) {
   (void)::setrlimit(RLIMIT_DATA, &limit);
 }
 
-void limit_growth(std::size_t bytes) {
+bool limit_growth(std::size_t bytes) {
+  const rlim_t wanted = memory_now().reserved + bytes;
   rlimit limit{};
   (void)::getrlimit(RLIMIT_DATA, &limit);
-  limit.rlim_cur = std::min<rlim_t>(limit.rlim_cur, memory_now().reserved + bytes);
-  (void)::setrlimit(RLIMIT_DATA, &limit);
+  if (limit.rlim_cur <= wanted) return false;
+  limit.rlim_cur = wanted;
+  return ::setrlimit(RLIMIT_DATA, &limit) == 0;
 }
 
 }  // namespace cnerf

@@ -19,7 +19,8 @@ namespace cnerf {
 void limit_memory(const std::string& amount);
 
 /// From now on the process may take so many bytes more than it has; an earlier limit stays where it is lower.
-void limit_growth(std::size_t bytes);
+/// @return  whether this limit is the lower one
+bool limit_growth(std::size_t bytes);
 
 /// Measures seconds since its construction.
 class Stopwatch {

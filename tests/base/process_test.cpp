@@ -6,10 +6,13 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <new>
 #include <stdexcept>
+#include <vector>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/usage.h"
 #include "tests/support/data.h"
 
 namespace cnerf {
@@ -49,6 +52,19 @@ TEST(FailureInChild, IsALackOfMemoryBeyondWhatItMayTake) {
             std::nullopt);
   EXPECT_EQ(failure_in_child([&] { taken.assign(std::size_t(128) << 20, 'x'); }, 10, std::size_t(64) << 20), "");
   EXPECT_TRUE(taken.empty());
+}
+
+TEST(FailureInChild, ALackOfThisProcesssOwnMemoryIsNotTheFiles) {
+  const auto under_own_limit = [] {
+    (void)limit_growth(std::size_t(32) << 20);
+    std::vector<char> taken;
+    try {
+      (void)failure_in_child([&] { taken.assign(std::size_t(128) << 20, 'x'); }, 10, std::size_t(256) << 20);
+    } catch (const std::bad_alloc&) {
+      throw std::runtime_error("its own");
+    }
+  };
+  EXPECT_EQ(failure_in_child(under_own_limit, 20, std::size_t(1) << 30), "its own");
 }
 
 TEST(RunProgram, GivesNoInputAndSaysThatThereIsNoScreen) {
