@@ -4,8 +4,10 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <exception>
 #include <filesystem>
 #include <new>
+#include <system_error>
 
 #include "src/app/command.h"
 #include "src/base/error.h"
@@ -37,8 +39,29 @@ void check_words(int argc, char** argv) {
 bool is_shortage_of_memory(const std::exception& error) {
   const std::string text = error.what();
   const auto has = [&](const char* words) { return text.find(words) != std::string::npos; };
-  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr || has("can't allocate memory") ||
-         has("not enough memory") || has("Insufficient memory") || has("Failed to allocate");
+  const auto* system = dynamic_cast<const std::system_error*>(&error);
+  const bool has_no_thread = system != nullptr && system->code() == std::errc::resource_unavailable_try_again;
+  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr || has_no_thread || has("can't allocate memory") ||
+         has("not enough memory") || has("Insufficient memory") || has("Failed to allocate") ||
+         has("pthread_create has failed");
+}
+
+constexpr const char* kOutOfMemory = "error: out of memory; a larger --downscale or a smaller preset needs less";
+
+/// Threads and initialisers of libraries have nobody to pass a shortage of memory on to. What else ends here is a
+/// crash.
+[[noreturn]] void end_without_handler() {
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+  } catch (const std::exception& error) {
+    if (is_shortage_of_memory(error)) {
+      std::fprintf(stderr, "\ncnerf: %s\n", kOutOfMemory);
+      std::_Exit(int(ExitCode::kMemory));
+    }
+    std::fprintf(stderr, "\ncnerf: internal error, please report it: %s\n", error.what());
+  } catch (...) {
+  }
+  std::abort();
 }
 
 void run_program(CLI::App& program, int argc, char** argv) {
@@ -80,6 +103,7 @@ int failed(ExitCode code, const std::string& message) {
 }
 
 int guarded_main(int argc, char** argv) {
+  std::set_terminate(end_without_handler);
   CLI::App program{"Colour volumes from monochrome photographs with known camera poses", "cnerf"};
   try {
     run_program(program, argc, argv);
@@ -97,9 +121,7 @@ int guarded_main(int argc, char** argv) {
     return failed(is_missing ? ExitCode::kMissingInput : ExitCode::kOutput,
                   "error: " + error.path1().string() + ": " + error.code().message());
   } catch (const std::exception& error) {
-    if (is_shortage_of_memory(error)) {
-      return failed(ExitCode::kMemory, "error: out of memory; a larger --downscale or a smaller preset needs less");
-    }
+    if (is_shortage_of_memory(error)) return failed(ExitCode::kMemory, kOutOfMemory);
     return failed(ExitCode::kInternal, std::string("internal error, please report it: ") + error.what());
   }
 }

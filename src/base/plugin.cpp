@@ -2,6 +2,11 @@
 
 #include <dlfcn.h>
 #include <link.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstring>
+#include <new>
 
 #include "src/base/error.h"
 #include "src/base/progress.h"
@@ -39,6 +44,37 @@ std::vector<fs::path> plugin_folders() {
   return folders;
 }
 
+/// While it lives, abort() ends the program as a shortage of memory does: libraries that cannot have what they begin
+/// with abort (GDAL, which OpenCV loads).
+class AbortIsShortageOfMemory {
+ public:
+  AbortIsShortageOfMemory() : before_(std::signal(SIGABRT, end)) {}
+  ~AbortIsShortageOfMemory() { std::signal(SIGABRT, before_); }
+  AbortIsShortageOfMemory(const AbortIsShortageOfMemory&) = delete;
+  AbortIsShortageOfMemory& operator=(const AbortIsShortageOfMemory&) = delete;
+
+ private:
+  static void end(int) {
+    constexpr char kMessage[] = "\ncnerf: error: out of memory while a library was loaded\n";
+    (void)!::write(STDERR_FILENO, kMessage, std::strlen(kMessage));
+    ::_exit(int(ExitCode::kMemory));
+  }
+
+  void (*before_)(int);
+};
+
+/// The library of a plug-in; a second time gives the first one's handle.
+void* loaded(const fs::path& file) {
+  const AbortIsShortageOfMemory guard;
+  void* library = ::dlopen(file.c_str(), RTLD_LAZY | RTLD_LOCAL);
+  if (library != nullptr) return library;
+  const std::string reason = ::dlerror();
+  for (const char* shortage : {"segment from shared object", "zero-fill pages", "allocate memory"}) {
+    if (reason.ends_with(shortage)) throw std::bad_alloc();
+  }
+  throw DeviceError(file.string() + " cannot be loaded: " + reason);
+}
+
 }  // namespace
 
 fs::path program_part(const std::string& name) {
@@ -60,8 +96,7 @@ std::vector<fs::path> data_places(const std::string& name) {
 
 void* plugin_symbol(const std::string& plugin, const std::string& symbol) {
   const fs::path file = program_part("libcnerf_" + plugin + ".so");
-  void* library = ::dlopen(file.c_str(), RTLD_LAZY | RTLD_LOCAL);  // a second time gives the first one's handle
-  if (library == nullptr) throw DeviceError(file.string() + " cannot be loaded: " + ::dlerror());
+  void* library = loaded(file);
   if (void* follow = ::dlsym(library, "cnerf_follow_interruption"); follow != nullptr) {
     reinterpret_cast<void (*)(volatile std::sig_atomic_t*)>(follow)(interruption_flag());
   }

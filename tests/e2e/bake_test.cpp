@@ -67,6 +67,21 @@ TEST(Bake, TooLittleMemoryIsRefusedBeforeAnythingIsBaked) {
   EXPECT_EQ(cnerf(concatenated(bake_into(folder / "bake"), {"--max-memory", "4G"})).exit_code, 0);
 }
 
+/// Where it runs out is chance: as a library is loaded, a thread begins, or in our own hands.
+TEST(Bake, ALimitOfMemoryEndsWithAnAnswer) {
+  const TempDir folder;
+  int shortages = 0;
+  for (int mebibytes = 44; mebibytes <= 88; mebibytes += 4) {
+    const std::string limit = std::to_string(mebibytes) + "M";
+    const ProgramResult result = cnerf(concatenated(bake_into(folder / limit), {"--max-memory", limit}));
+    EXPECT_THAT(result.exit_code, testing::AnyOf(0, 64, 71)) << limit << ": " << result.err;
+    if (result.exit_code == 71) ++shortages;
+  }
+#ifdef NDEBUG  // a build with sanitizers takes more before it begins
+  EXPECT_GT(shortages, 0);
+#endif
+}
+
 TEST(Bake, ColorReachesAsFarAsAskedFor) {
   const TempDir folder;
   const auto size_of_volume = [&](const std::string& dilation) {
