@@ -65,7 +65,6 @@ class AbortIsShortageOfMemory {
 
 /// The library of a plug-in; a second time gives the first one's handle.
 void* loaded(const fs::path& file) {
-  const AbortIsShortageOfMemory guard;
   void* library = ::dlopen(file.c_str(), RTLD_LAZY | RTLD_LOCAL);
   if (library != nullptr) return library;
   const std::string reason = ::dlerror();
@@ -94,15 +93,16 @@ std::vector<fs::path> data_places(const std::string& name) {
   return places;
 }
 
-void* plugin_symbol(const std::string& plugin, const std::string& symbol) {
+const void* begun_plugin(const std::string& plugin, const std::string& entry) {
+  const AbortIsShortageOfMemory guard;
   const fs::path file = program_part("libcnerf_" + plugin + ".so");
   void* library = loaded(file);
   if (void* follow = ::dlsym(library, "cnerf_follow_interruption"); follow != nullptr) {
     reinterpret_cast<void (*)(volatile std::sig_atomic_t*)>(follow)(interruption_flag());
   }
-  void* address = ::dlsym(library, symbol.c_str());
-  if (address == nullptr) throw DeviceError(file.string() + " is of another version: it has no " + symbol);
-  return address;
+  void* address = ::dlsym(library, entry.c_str());
+  if (address == nullptr) throw DeviceError(file.string() + " is of another version: it has no " + entry);
+  return reinterpret_cast<const void* (*)()>(address)();
 }
 
 }  // namespace cnerf

@@ -23,14 +23,16 @@ namespace cnerf {
 /// where this build keeps or installs it.
 [[nodiscard]] std::vector<std::filesystem::path> data_places(const std::string& name);
 
-/// The address of a symbol of libcnerf_`plugin`.so, which stays loaded.
-/// @throws DeviceError  no such file, it cannot be loaded, or it lacks the symbol.
-[[nodiscard]] void* plugin_symbol(const std::string& plugin, const std::string& symbol);
+/// What the `extern "C"` function `entry` of libcnerf_`plugin`.so returns; the library stays loaded.
+/// @throws DeviceError     no such file, it cannot be loaded, or it lacks the function
+/// @throws std::bad_alloc  memory did not suffice to load it. Where it aborts for that reason as it begins, the program
+///                         ends with ExitCode::kMemory.
+[[nodiscard]] const void* begun_plugin(const std::string& plugin, const std::string& entry);
 
 /// The table of functions that a plug-in offers: the result of its `extern "C"` function `entry`.
 template <typename Table>
 const Table& plugin_table(const std::string& plugin, const std::string& entry) {
-  return *reinterpret_cast<const Table* (*)()>(plugin_symbol(plugin, entry))();
+  return *static_cast<const Table*>(begun_plugin(plugin, entry));
 }
 
 }  // namespace cnerf
