@@ -84,7 +84,7 @@ std::optional<ImplausibleNumber> implausible_number(const Intrinsics& lens, Vec3
   // A crop of a larger picture has its axis outside.
   for (const double middle : {lens.cx, lens.cy}) expect("principal point", middle, -10 * side, 11 * side);
   for (const double coefficient : lens.distortion) expect("distortion", coefficient, -1000, 1000);
-  for (int axis = 0; axis < 3; ++axis) expect("position", centre[axis], -1e9, 1e9);
+  for (int axis = 0; axis < 3; ++axis) expect("position", centre[axis], -kFarthest, kFarthest);
   return found;
 }
 

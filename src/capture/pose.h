@@ -9,6 +9,8 @@
 
 namespace cnerf {
 
+/// Largest size of a coordinate, world units.
+inline constexpr double kFarthest = 1e9;
 /// Largest deviation of R^T R from the identity that counts as rounding and is repaired.
 inline constexpr double kLargestPoseError = 1e-2;
 /// Deviation from which a repair is worth a note to the user.

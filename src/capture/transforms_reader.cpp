@@ -1,5 +1,7 @@
 /// transforms.json of NeRF (Blender synthetic), instant-ngp and nerfstudio.
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -230,8 +232,10 @@ std::optional<Aabbd> read_bounds(const fs::path& file, const Json& top) {
   for (int axis = 0; axis < 3; ++axis) {
     bounds.min[axis] = entry((*box)[0][std::size_t(axis)], file, "aabb");
     bounds.max[axis] = entry((*box)[1][std::size_t(axis)], file, "aabb");
-    if (!(bounds.min[axis] < bounds.max[axis]))
-      throw InputError(file, "aabb", "expected min < max, found " + excerpt(*box));
+    if (!(-kFarthest <= bounds.min[axis] && bounds.min[axis] < bounds.max[axis] && bounds.max[axis] <= kFarthest)) {
+      throw InputError(file, "aabb",
+                       fmt::format("expected min < max within +-{:g}, found {}", kFarthest, excerpt(*box)));
+    }
   }
   return bounds;
 }
@@ -244,8 +248,9 @@ std::optional<DepthRange> read_depth_range(const fs::path& file, const Json& top
     throw InputError(file, "depth_range", "expected [near, far], found " + excerpt(*range));
   }
   const DepthRange out = {entry((*range)[0], file, "depth_range"), entry((*range)[1], file, "depth_range")};
-  if (!(out.near > 0 && out.near < out.far)) {
-    throw InputError(file, "depth_range", "expected 0 < near < far, found " + excerpt(*range));
+  if (!(out.near > 0 && out.near < out.far && out.far <= kFarthest)) {
+    throw InputError(file, "depth_range",
+                     fmt::format("expected 0 < near < far <= {:g}, found {}", kFarthest, excerpt(*range)));
   }
   return out;
 }

@@ -236,6 +236,18 @@ std::vector<BadCapture> bad_captures() {
        }),
        kInput,
        {"aabb"}},
+      {"endless_box",
+       spoiled_json([](json& top) {
+         top["aabb"] = {{-1, -1, -1}, {1, 2147483647, 1}};
+       }),
+       kInput,
+       {"aabb", "2147483647"}},
+      {"endless_depth",
+       spoiled_json([](json& top) {
+         top["depth_range"] = {0.5, 1e10};
+       }),
+       kInput,
+       {"depth_range"}},
 
       {"truncated_png", transforms_then(truncated("images/1.png", 0.6)), kInput, {"images/1.png"}},
       {"truncated_jpeg",
