@@ -16,11 +16,11 @@ if [ "${1:-}" = --full ]; then
   run operations
   run kills --count 500
   run pairs --count 200
-  run allocations
+  run allocations --every 10
 else
   run operations --commands sample,train,colorize,bake,web,eval --every 12
   run kills --count 18 --commands train,colorize,bake
   run pairs --count 12 --commands colorize,bake,bake-smaller,web,info
-  run allocations --commands info,bake --every 25
+  run allocations --commands info,bake,train --every 40
 fi
 exit $((failures > 0))

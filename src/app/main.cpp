@@ -43,7 +43,7 @@ bool is_shortage_of_memory(const std::exception& error) {
   const bool has_no_thread = system != nullptr && system->code() == std::errc::resource_unavailable_try_again;
   return dynamic_cast<const std::bad_alloc*>(&error) != nullptr || has_no_thread || has("can't allocate memory") ||
          has("not enough memory") || has("Insufficient memory") || has("Failed to allocate") ||
-         has("pthread_create has failed");
+         has("pthread_create has failed") || has("malloc failed");
 }
 
 constexpr const char* kOutOfMemory = "error: out of memory; a larger --downscale or a smaller preset needs less";

@@ -1,6 +1,7 @@
 #include "src/picture/encode.h"
 
 #include <array>
+#include <new>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -25,7 +26,8 @@ std::vector<std::uint8_t> encoded(const std::string& format, const cv::Mat& pict
   bool done = false;
   try {
     done = encode_image(format, picture, bytes, options);
-  } catch (const cv::Exception&) {  // a size or type that the format has not
+  } catch (const cv::Exception& error) {  // a size or type that the format has not
+    if (error.code == cv::Error::StsNoMem) throw std::bad_alloc();
   }
   if (!done) {
     throw OutputError((who.empty() ? "" : who + ": ") + "a picture of " + std::to_string(picture.cols) + " x " +

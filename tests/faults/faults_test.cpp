@@ -44,10 +44,11 @@ TEST_F(Faults, TwoProgramsInOneFolder) {
   EXPECT_TRUE(report.violations.empty()) << report.text();
 }
 
-TEST_F(Faults, LargeAllocationsOfABake) {
-  CampaignOptions some = options({"bake"});
-  some.every = 2400;
+TEST_F(Faults, LargeAllocationsOfABakeAndATraining) {
+  CampaignOptions some = options({"bake", "train"});
+  some.every = 300;
   const Report report = starve(some);
+  EXPECT_EQ(report.rows.size(), 2U) << "trials of both";
   EXPECT_TRUE(report.violations.empty()) << report.text();
 }
 

@@ -5,7 +5,7 @@
 #include <immintrin.h>
 
 #include <cstdint>
-#include <cstdlib>
+#include <new>
 #include <type_traits>
 
 #include "encoding/cpu/grouped.h"
@@ -22,17 +22,14 @@ static_assert(kGroup == 16);
 /// program's (see lanes.h).
 class Pairs {
  public:
-  explicit Pairs(std::size_t words) : words_(static_cast<std::uint32_t*>(std::aligned_alloc(kLine, bytes_of(words)))) {
-    if (words_ == nullptr) std::abort();
-  }
-  ~Pairs() { std::free(words_); }
+  explicit Pairs(std::size_t words) : words_(static_cast<std::uint32_t*>(::operator new(words * 4, kLine))) {}
+  ~Pairs() { ::operator delete(words_, kLine); }
   Pairs(Pairs&& other) noexcept : words_(other.words_) { other.words_ = nullptr; }
   Pairs& operator=(Pairs&&) = delete;
   [[nodiscard]] std::uint32_t* data() const { return words_; }
 
  private:
-  static constexpr std::size_t kLine = 64;
-  static std::size_t bytes_of(std::size_t words) { return (words * 4 + kLine - 1) / kLine * kLine; }
+  static constexpr std::align_val_t kLine{64};
   std::uint32_t* words_;
 };
 
