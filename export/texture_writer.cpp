@@ -4,13 +4,16 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfIO.h>
+#include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStandardAttributes.h>
+#include <ImfStdIO.h>
 #include <ImfStringAttribute.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <new>
 
 #include "src/base/check.h"
 #include "src/base/error.h"
@@ -78,6 +81,13 @@ std::vector<float> lightness_of(const std::vector<float>& luminance) {
   return lightness;
 }
 
+/// OpenEXR 3.1 says nothing where memory does not suffice to compress the last lines: the file lacks them.
+void expect_all_lines(std::span<const std::byte> bytes) {
+  Imf::StdISStream stream;
+  stream.str({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  if (!Imf::InputFile(stream).isComplete()) throw std::bad_alloc();
+}
+
 }  // namespace
 
 void write_exr(const std::filesystem::path& file, const ExrImage& image) {
@@ -104,6 +114,7 @@ void write_exr(const std::filesystem::path& file, const ExrImage& image) {
   } catch (const Iex::BaseExc& failure) {
     throw OutputError(file.string() + ": cannot be written: " + failure.what());
   }
+  expect_all_lines(stream.bytes());
   write_file(file, stream.bytes());
 }
 

@@ -21,6 +21,6 @@ else
   run operations --commands sample,train,colorize,bake,web,eval --every 12
   run kills --count 18 --commands train,colorize,bake
   run pairs --count 12 --commands colorize,bake,bake-smaller,web,info
-  run allocations --commands info,bake,train --every 40
+  run allocations --commands info,bake,train,render --every 40
 fi
 exit $((failures > 0))
