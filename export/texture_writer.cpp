@@ -108,13 +108,15 @@ void write_exr(const std::filesystem::path& file, const ExrImage& image) {
   }
   MemoryStream stream;
   try {
-    Imf::OutputFile out(stream, header_of(image));
-    out.setFrameBuffer(frame);
-    out.writePixels(image.height);
+    {
+      Imf::OutputFile out(stream, header_of(image));
+      out.setFrameBuffer(frame);
+      out.writePixels(image.height);
+    }
+    expect_all_lines(stream.bytes());
   } catch (const Iex::BaseExc& failure) {
     throw OutputError(file.string() + ": cannot be written: " + failure.what());
   }
-  expect_all_lines(stream.bytes());
   write_file(file, stream.bytes());
 }
 

@@ -6,6 +6,7 @@
 
 #include <csignal>
 #include <cstring>
+#include <mutex>
 #include <new>
 
 #include "src/base/error.h"
@@ -45,21 +46,26 @@ std::vector<fs::path> plugin_folders() {
 }
 
 /// While it lives, abort() ends the program as a shortage of memory does: libraries that cannot have what they begin
-/// with abort (GDAL, which OpenCV loads).
+/// with abort (GDAL, which OpenCV loads). One thread at a time: the last one would leave the other's handler behind.
 class AbortIsShortageOfMemory {
  public:
-  AbortIsShortageOfMemory() : before_(std::signal(SIGABRT, end)) {}
+  AbortIsShortageOfMemory() : lock_(one_at_a_time()), before_(std::signal(SIGABRT, end)) {}
   ~AbortIsShortageOfMemory() { std::signal(SIGABRT, before_); }
   AbortIsShortageOfMemory(const AbortIsShortageOfMemory&) = delete;
   AbortIsShortageOfMemory& operator=(const AbortIsShortageOfMemory&) = delete;
 
  private:
+  static std::recursive_mutex& one_at_a_time() {
+    static std::recursive_mutex mutex;  // a plug-in may begin another
+    return mutex;
+  }
   static void end(int) {
     constexpr char kMessage[] = "\ncnerf: error: out of memory while a library was loaded\n";
     (void)!::write(STDERR_FILENO, kMessage, std::strlen(kMessage));
     ::_exit(int(ExitCode::kMemory));
   }
 
+  std::lock_guard<std::recursive_mutex> lock_;
   void (*before_)(int);
 };
 

@@ -10,6 +10,6 @@ extern "C" __attribute__((visibility("default"))) const cnerf::ImageCodecs* cner
       [](const std::string& extension, const cv::Mat& image, std::vector<std::uint8_t>& bytes,
          const std::vector<int>& options) { return cv::imencode(extension, image, bytes, options); }};
   // The first look at any picture begins all codecs; here a shortage of memory has an answer.
-  static const cv::Mat nothing = cv::imdecode(cv::Mat1b(1, 16, std::uint8_t(0)), cv::IMREAD_UNCHANGED);
+  (void)cv::imdecode(cv::Mat1b(1, 16, std::uint8_t(0)), cv::IMREAD_UNCHANGED);
   return &codecs;
 }
