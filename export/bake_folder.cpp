@@ -12,6 +12,7 @@
 #include "export/vdb_writer.h"
 #include "src/base/check.h"
 #include "src/base/files.h"
+#include "src/picture/exr_writer.h"
 
 namespace cnerf::exporting {
 namespace fs = std::filesystem;

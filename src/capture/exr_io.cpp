@@ -5,7 +5,6 @@
 #include <ImfHeader.h>
 #include <ImfIO.h>
 #include <ImfInputFile.h>
-#include <ImfOutputFile.h>
 #include <ImfStdIO.h>
 #include <ImfVersion.h>
 #include <ImfXdr.h>
@@ -16,7 +15,6 @@
 #include <optional>
 #include <string>
 
-#include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 
@@ -182,32 +180,6 @@ LinearImage read_exr(const fs::path& file) {
     Imf::InputFile input(file.c_str());
     return read_picture(input, header);
   });
-}
-
-void write_exr_channel(const fs::path& file, const char* channel, int width, int height,
-                       std::span<const float> values) {
-  CNERF_CHECK_EQ(values.size(), std::size_t(width) * std::size_t(height));
-  try {
-    Imf::Header header(width, height);
-    header.compression() = Imf::ZIP_COMPRESSION;
-    header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
-    Imf::FrameBuffer frame;
-    // The library wants a mutable pointer for both directions; it only reads here.
-    frame.insert(channel, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(values.data())),
-                                     sizeof(float), sizeof(float) * std::size_t(width)));
-    // In memory first: the library writes its table of lines in a destructor, which tells nobody of a full disk.
-    Imf::StdOSStream stream;
-    {
-      Imf::OutputFile output(stream, header);
-      output.setFrameBuffer(frame);
-      output.writePixels(height);
-    }
-    write_file(file, stream.str());
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception& failure) {
-    throw OutputError(file.string() + ": cannot be written: " + failure.what());
-  }
 }
 
 }  // namespace cnerf

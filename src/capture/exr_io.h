@@ -1,8 +1,7 @@
 #pragma once
-/// OpenEXR files: captures in scene-linear light, and depth maps.
+/// OpenEXR files of captures, in scene-linear light.
 
 #include <filesystem>
-#include <span>
 
 #include "src/capture/image_io.h"
 
@@ -18,10 +17,5 @@ namespace cnerf {
 /// Reads channel Y, or R G B, and A where it is there. EXR colours are premultiplied by convention.
 /// @throws MissingInputError, InputError.
 [[nodiscard]] LinearImage read_exr(const std::filesystem::path& file);
-
-/// Writes one float channel, ZIP compressed, whole or not at all.  @param values  [height, width].
-/// @throws OutputError.
-void write_exr_channel(const std::filesystem::path& file, const char* channel, int width, int height,
-                       std::span<const float> values);
 
 }  // namespace cnerf

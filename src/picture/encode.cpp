@@ -29,6 +29,8 @@ std::vector<std::uint8_t> encoded(const std::string& format, const cv::Mat& pict
   } catch (const cv::Exception& error) {  // a size or type that the format has not
     if (error.code == cv::Error::StsNoMem) throw std::bad_alloc();
   }
+  // A picture in memory has all that a PNG needs; libpng ends without memory, and does not say so.
+  if (!done && format == ".png" && !picture.empty()) throw std::bad_alloc();
   if (!done) {
     throw OutputError((who.empty() ? "" : who + ": ") + "a picture of " + std::to_string(picture.cols) + " x " +
                       std::to_string(picture.rows) + " pixels cannot be encoded as " + format.substr(1));

@@ -4,12 +4,12 @@
 #include <optional>
 #include <span>
 
-#include "export/texture_writer.h"
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/picture/codecs.h"
 #include "src/picture/encode.h"
+#include "src/picture/exr_writer.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
@@ -34,7 +34,7 @@ Picture picture_of(const RenderedImage& image, ShownColor color) {
 void write_exr(const fs::path& file, const RenderedImage& image, ShownColor color, const std::string& color_origin) {
   const std::vector<float> values = shown_rgb(image, color);
   const std::span<const float> rgb(values);
-  exporting::write_exr(
+  cnerf::write_exr(
       file, {image.width,
              image.height,
              {{"R", rgb, 3, true},

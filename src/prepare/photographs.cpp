@@ -9,10 +9,10 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/parallel.h"
-#include "src/capture/exr_io.h"
 #include "src/capture/image_io.h"
 #include "src/capture/listing.h"
 #include "src/picture/encode.h"
+#include "src/picture/exr_writer.h"
 #include "src/prepare/grey_image.h"
 
 namespace cnerf::prepare {
@@ -106,7 +106,7 @@ bool stays_eight_bit(const LinearImage& image, const SensorOptions& sensor) {
 
 void write_image(const fs::path& file, const LinearImage& image, bool eight_bit) {
   if (image.depth == PixelDepth::kF32) {
-    write_exr_channel(file, "Y", image.width, image.height, image.values);
+    write_exr(file, {image.width, image.height, {{"Y", image.values}}, {}});
   } else {
     write_png(file,
               eight_bit ? encoded<std::uint8_t>(image, CV_8U, 255) : encoded<std::uint16_t>(image, CV_16U, 65535));

@@ -11,8 +11,8 @@
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/base/rng.h"
-#include "src/capture/exr_io.h"
 #include "src/picture/encode.h"
+#include "src/picture/exr_writer.h"
 #include "src/sample/scene.h"
 
 namespace cnerf {
@@ -188,7 +188,7 @@ void write_view(const fs::path& folder, const SampleSceneOptions& options, int i
     for (int i = 0; i < options.width * options.height; ++i) sky(i) = view.sky[std::size_t(i)] != 0 ? 255 : 0;
     write_png(folder / "sky" / file_name(index, "png"), sky);
   }
-  write_exr_channel(folder / "depth" / file_name(index, "exr"), "Z", options.width, options.height, view.depth);
+  write_exr(folder / "depth" / file_name(index, "exr"), {options.width, options.height, {{"Z", view.depth}}, {}});
 }
 
 /// Rows of the 4x4 matrix in the convention of transforms.json: the camera looks along -Z, +Y is up.

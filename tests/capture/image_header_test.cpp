@@ -15,6 +15,7 @@
 #include "src/base/files.h"
 #include "src/capture/exr_io.h"
 #include "src/capture/load_capture.h"
+#include "src/picture/exr_writer.h"
 #include "tests/capture/fixtures.h"
 #include "tests/support/data.h"
 
@@ -74,7 +75,7 @@ TEST_F(Headers, TellWhatDecodingTells) {
   expect_header(write("c.png", CV_8UC4), PixelDepth::kU8, true, true);
   expect_header(write("a.jpg", CV_8UC1), PixelDepth::kU8, false, false);
   expect_header(write("b.jpg", CV_8UC3), PixelDepth::kU8, true, false);
-  write_exr_channel(folder_ / "a.exr", "Y", 7, 5, std::vector<float>(35, 1.0f));
+  write_exr(folder_ / "a.exr", {7, 5, {{"Y", std::vector<float>(35, 1.0f)}}, {}});
   expect_header(folder_ / "a.exr", PixelDepth::kF32, false, false);
 }
 

@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <opencv2/imgcodecs.hpp>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/capture/exr_io.h"
 #include "src/color/colorspace_math.h"
+#include "src/picture/exr_writer.h"
 #include "tests/capture/fixtures.h"
 #include "tests/support/data.h"
 
@@ -119,7 +120,7 @@ TEST_F(ImageIo, LuminanceDecodesTheTransfer) {
 }
 
 TEST_F(ImageIo, ExrLuminanceIsLinearWhateverTheTransfer) {
-  write_exr_channel(folder_ / "a.exr", "Y", 2, 1, std::vector<float>{0.25f, 7.5f});
+  write_exr(folder_ / "a.exr", {2, 1, {{"Y", std::vector<float>{0.25f, 7.5f}}}, {}});
   const MonoImage image = read_mono(folder_ / "a.exr");
   EXPECT_EQ(image.depth, PixelDepth::kF32);
   EXPECT_EQ(image.luminance(0), 0.25f);
@@ -127,7 +128,7 @@ TEST_F(ImageIo, ExrLuminanceIsLinearWhateverTheTransfer) {
 }
 
 TEST_F(ImageIo, ExrOfOtherChannelsNamesThem) {
-  write_exr_channel(folder_ / "a.exr", "depth", 1, 1, std::vector<float>{1});
+  write_exr(folder_ / "a.exr", {1, 1, {{"depth", std::vector<float>{1}}}, {}});
   try {
     (void)read_linear_image(folder_ / "a.exr", Transfer::kSrgb);
     FAIL() << "no error";
@@ -137,8 +138,18 @@ TEST_F(ImageIo, ExrOfOtherChannelsNamesThem) {
 }
 
 TEST_F(ImageIo, ExrWithNaNIsRefused) {
-  write_exr_channel(folder_ / "a.exr", "Y", 1, 1, std::vector<float>{NAN});
-  EXPECT_THROW((void)read_linear_image(folder_ / "a.exr", Transfer::kSrgb), InputError);
+  const fs::path file = folder_ / "a.exr";
+  write_exr(file, {1, 1, {{"Y", std::vector<float>{1}}}, {}});
+  // A single pixel is stored as it is, at the end.
+  const auto patch = [&, bytes = read_text_file(file)](float value) {
+    std::string patched = bytes;
+    std::memcpy(patched.data() + patched.size() - sizeof value, &value, sizeof value);
+    write_file(file, patched);
+  };
+  patch(7.5f);
+  EXPECT_EQ(read_mono(file).luminance(0), 7.5f);
+  patch(NAN);
+  EXPECT_THROW((void)read_linear_image(file, Transfer::kSrgb), InputError);
 }
 
 TEST_F(ImageIo, TruncatedImagesAreRefused) {
@@ -150,7 +161,7 @@ TEST_F(ImageIo, TruncatedImagesAreRefused) {
     test::truncate_file(file, 0.6);
     EXPECT_THROW((void)read_linear_image(file, Transfer::kSrgb), InputError) << name;
   }
-  write_exr_channel(folder_ / "a.exr", "Y", 64, 64, std::vector<float>(4096, 0.5f));
+  write_exr(folder_ / "a.exr", {64, 64, {{"Y", std::vector<float>(4096, 0.5f)}}, {}});
   test::truncate_file(folder_ / "a.exr", 0.8);
   EXPECT_THROW((void)read_linear_image(folder_ / "a.exr", Transfer::kSrgb), InputError);
 }

@@ -13,6 +13,7 @@
 
 #include "bake/provenance.h"
 #include "src/base/error.h"
+#include "src/picture/exr_writer.h"
 #include "tests/export/test_meshes.h"
 #include "tests/support/data.h"
 

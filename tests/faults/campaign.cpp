@@ -26,6 +26,15 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "Of all that is drawn");
   app.add_option("--count", options.count, "Trials of kills (500) and pairs (200)");
   app.add_option("--every", options.every, "Only every K-th operation or allocation")->check(CLI::PositiveNumber);
+  app.add_option_function<std::string>(
+      "--part",
+      [&options](const std::string& text) {
+        if (std::sscanf(text.c_str(), "%d/%d", &options.part, &options.parts) != 2 || options.part < 1 ||
+            options.part > options.parts) {
+          throw CLI::ValidationError("--part", "expected I/N with I from 1 to N, found " + text);
+        }
+      },
+      "I/N: of all trials only the I-th of each N, to share them out");
   app.add_option("--commands", options.commands, "Only these, comma-separated")->delimiter(',');
   app.add_option("--kinds", options.kinds, "Of operations: only eio, enospc, edquot, short, kill, power, power-names")
       ->delimiter(',');

@@ -38,8 +38,12 @@ std::string first_word(const std::string& text) {
   return text.substr(0, text.find(':'));
 }
 
-/// Runs all trials, `jobs` at a time, and collects what they say.
-Report judged(const CampaignOptions& options, const std::vector<Trial>& trials) {
+/// Runs the trials of this part, `jobs` at a time, and collects what they say.
+Report judged(const CampaignOptions& options, const std::vector<Trial>& all) {
+  std::vector<Trial> trials;
+  for (std::size_t i = std::size_t(options.part) - 1; i < all.size(); i += std::size_t(options.parts)) {
+    trials.push_back(all[i]);
+  }
   Report report;
   std::mutex mutex;
   std::atomic<std::size_t> next{0};

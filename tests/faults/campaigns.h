@@ -22,6 +22,7 @@ struct CampaignOptions {
   std::vector<std::string> commands;  ///< none = all
   std::vector<std::string> kinds;     ///< of faults; none = all
   std::set<int> out_of_memory = {69, 71};
+  int part = 1, parts = 1;  ///< of all trials, for many machines: the `part`-th of each `parts`
   int jobs = 2;
   bool is_quiet = false;
 };

@@ -11,7 +11,7 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/capture/exr_io.h"
+#include "src/picture/exr_writer.h"
 #include "tests/capture/fixtures.h"
 #include "tests/mutants/program_captures.h"
 #include "tests/support/onnx_model.h"
@@ -66,7 +66,7 @@ void write_jpeg(const fs::path& file) {
 void write_exr(const fs::path& file) {
   std::vector<float> values;
   for (int i = 0; i < test::kWidth * test::kHeight; ++i) values.push_back(float(i % 97) / 97);
-  write_exr_channel(file, "Y", test::kWidth, test::kHeight, values);
+  cnerf::write_exr(file, {test::kWidth, test::kHeight, {{"Y", values}}, {}});
 }
 
 fs::path colmap_capture(const fs::path& folder, bool is_text) {

@@ -10,6 +10,7 @@
 #include "src/base/files.h"
 #include "src/capture/exr_io.h"
 #include "src/color/colorspace_math.h"
+#include "src/picture/exr_writer.h"
 #include "tests/support/data.h"
 
 namespace cnerf::prepare {
@@ -89,7 +90,7 @@ TEST(Photographs, SixteenBitsAndFloatsKeepTheirDepth) {
   for (int i = 0; i < 72; ++i) deep(i / 9, i % 9) = std::uint16_t(900 * i + 3);
   write(folder / "in/deep.png", deep);
   const std::vector<float> light = {0, 0.25f, 0.5f, 1.5f, 2, 3, 4, 5, 6, 7, 8, 9};
-  write_exr_channel(folder / "in/float.exr", "Y", 4, 3, light);
+  write_exr(folder / "in/float.exr", {4, 3, {{"Y", light}}, {}});
   const PhotographSet set = import_all(folder / "in", folder / "out");
   const cv::Mat back = stored(folder / "out/images/deep.png");
   ASSERT_EQ(back.type(), CV_16UC1);
