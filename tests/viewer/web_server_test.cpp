@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 #include <httplib.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <filesystem>
@@ -418,6 +422,40 @@ TEST(WebServer, SlowClientsKeepNobodyOut) {
     EXPECT_LT(seconds_of([&] { EXPECT_EQ(status_of(raw_answer(server.port(), request("GET /"))), 200); }), 2) << says;
   }
   EXPECT_LT(seconds_of([&] { server.stop(); }), 2);
+}
+
+TEST(Connections, WhoseWordLiesThereUnreadStays) {
+  ConnectionLimits limits;
+  limits.connections_of_address = 2;
+  Connections all(limits);
+  struct Pair {
+    std::array<int, 2> ends{};
+    Pair() { ::socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()); }
+    ~Pair() { std::ranges::for_each(ends, ::close); }
+  };
+  const std::array<Pair, 3> pairs;
+  const auto is_dropped = [&](std::size_t i) {
+    char byte;
+    return ::recv(pairs[i].ends[1], &byte, 1, MSG_DONTWAIT) == 0;
+  };
+  const auto begin = Connections::Clock::now();
+  std::vector<Connections::Handle> handles;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    all.expect();
+    handles.push_back(all.add(pairs[i].ends[0], "somebody"));
+    if (i < 2) all.set_waiting(handles[i], Connections::Wait{begin + std::chrono::seconds(i), POLLIN});
+  }
+  ASSERT_EQ(::send(pairs[0].ends[1], "G", 1, 0), 1);  // of the one that is waited for longer
+  EXPECT_TRUE(all.admit(handles[2]));
+  EXPECT_FALSE(is_dropped(0));
+  EXPECT_TRUE(is_dropped(1));
+
+  all.set_waiting(handles[2], Connections::Wait{begin + std::chrono::seconds(2), POLLIN});
+  ASSERT_EQ(::send(pairs[2].ends[1], "G", 1, 0), 1);
+  all.expect();
+  EXPECT_TRUE(all.admit(all.add(-1, "somebody"))) << "where all have said something, the first one goes";
+  EXPECT_TRUE(is_dropped(0));
+  EXPECT_FALSE(is_dropped(2));
 }
 
 TEST(WebServer, TabsThatFollowKeepNobodyOut) {

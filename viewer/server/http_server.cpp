@@ -50,6 +50,12 @@ std::pair<std::string, int> peer_of(socket_t socket) {
                                                                                   : std::pair<std::string, int>{};
 }
 
+/// Whether what was waited for has come: the connection's thread has yet to wake up.
+bool has_come(socket_t socket, const Connections::Wait& waiting) {
+  pollfd now{socket, waiting.events, 0};
+  return ::poll(&now, 1, 0) > 0;
+}
+
 /// Whether the answer that this thread gave is its connection's last.
 thread_local bool is_last_answer = false;
 
@@ -60,9 +66,13 @@ thread_local bool is_last_answer = false;
 template <typename Belongs>
 bool Connections::drop_slowest(const Belongs& belongs) {
   Entry* slowest = nullptr;
+  std::pair<bool, Clock::time_point> rank_of_slowest;
   for (Entry& entry : entries_) {
     if (entry.is_leaving || !entry.waiting || !belongs(entry)) continue;
-    if (slowest == nullptr || *entry.waiting < *slowest->waiting) slowest = &entry;
+    const std::pair rank(has_come(entry.socket, *entry.waiting), entry.waiting->since);
+    if (slowest != nullptr && rank_of_slowest <= rank) continue;
+    slowest = &entry;
+    rank_of_slowest = rank;
   }
   if (slowest == nullptr) return false;
   slowest->is_leaving = true;
@@ -96,10 +106,10 @@ void Connections::remove(Handle handle) {
   entries_.erase(handle);
 }
 
-void Connections::set_waiting(Handle handle, std::optional<Clock::time_point> since) {
+void Connections::set_waiting(Handle handle, std::optional<Wait> waiting) {
   const std::lock_guard guard(mutex_);
-  handle->waiting = since;
-  if (has_ended_ && since) ::shutdown(handle->socket, SHUT_RDWR);
+  handle->waiting = waiting;
+  if (has_ended_ && waiting) ::shutdown(handle->socket, SHUT_RDWR);
 }
 
 void Connections::end() {
@@ -173,7 +183,7 @@ class HttpServer::Connection final : public httplib::Stream {
  private:
   /// @param since  how long the client has kept us waiting, where there are too many
   bool wait(short events, Clock::time_point since, Clock::time_point deadline) const {
-    all_.set_waiting(handle_, since);
+    all_.set_waiting(handle_, Connections::Wait{since, events});
     int ready = 0;
     do {
       const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();

@@ -22,15 +22,20 @@ struct ConnectionLimits {
   std::size_t request_bytes = 65536;  ///< of a request, head and body
 };
 
-/// The open connections. When there are too many, the one goes whose client has kept us waiting longest: slow ones
-/// cannot keep others out.
+/// The open connections. When there are too many, the one goes whose client keeps us waiting longest: slow ones cannot
+/// keep others out. Those whose word lies there unread go last.
 class Connections {
  public:
   using Clock = std::chrono::steady_clock;
+  /// For a client, as poll() names it.
+  struct Wait {
+    Clock::time_point since;
+    short events;
+  };
   struct Entry {
     socket_t socket;
     std::string address;
-    std::optional<Clock::time_point> waiting;  ///< for the client, since then
+    std::optional<Wait> waiting;
     bool is_leaving = false;
   };
   using Handle = std::list<Entry>::iterator;
@@ -43,7 +48,7 @@ class Connections {
   bool admit(Handle handle);
   Handle add(socket_t socket, std::string address);
   void remove(Handle handle);
-  void set_waiting(Handle handle, std::optional<Clock::time_point> since);
+  void set_waiting(Handle handle, std::optional<Wait> waiting);
   /// No client is waited for any more.
   void end();
 
