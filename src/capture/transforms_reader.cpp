@@ -190,8 +190,9 @@ std::string comparable(const std::string& name) {
   return fs::path(name).lexically_normal().generic_string();
 }
 
-/// Names of `train_filenames` and its kin; empty when the list is not there.
-std::set<std::string> filename_list(const fs::path& file, const Json& top, const char* key) {
+/// Names of `train_filenames` and its kin, all of which are frames; empty when the list is not there.
+std::set<std::string> filename_list(const fs::path& file, const Json& top, const char* key,
+                                    const std::set<std::string>& frames) {
   std::set<std::string> names;
   const auto list = top.find(key);
   if (list == top.end() || list->is_null()) return names;
@@ -199,6 +200,10 @@ std::set<std::string> filename_list(const fs::path& file, const Json& top, const
   for (const Json& name : *list) {
     if (!name.is_string()) throw InputError(file, key, "expected file names, found " + excerpt(name));
     names.insert(comparable(name.get<std::string>()));
+    // A held-out view under another name would be learned from.
+    if (!frames.contains(comparable(name.get<std::string>()))) {
+      throw InputError(file, key, "expected file names of frames, found " + excerpt(name));
+    }
   }
   return names;
 }
@@ -206,9 +211,12 @@ std::set<std::string> filename_list(const fs::path& file, const Json& top, const
 /// nerfstudio's split. Test views (validation views where no test is named) are held out; with an explicit training
 /// list, views of no list are left out.
 void apply_split_lists(const fs::path& file, const Json& top, CaptureListing& listing) {
-  const std::set<std::string> train = filename_list(file, top, "train_filenames");
-  std::set<std::string> held_out = filename_list(file, top, "test_filenames");
-  if (held_out.empty()) held_out = filename_list(file, top, "val_filenames");
+  std::set<std::string> frames;
+  for (const ListedView& view : listing.views) frames.insert(comparable(view.name));
+  const auto list = [&](const char* key) { return filename_list(file, top, key, frames); };
+  const std::set<std::string> train = list("train_filenames");
+  std::set<std::string> held_out = list("test_filenames");
+  if (held_out.empty()) held_out = list("val_filenames");
   const auto is_unused = [&](ListedView& view) {
     const std::string name = comparable(view.name);
     view.held_out = held_out.contains(name);

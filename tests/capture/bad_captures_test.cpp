@@ -101,6 +101,12 @@ std::vector<BadCapture> bad_captures() {
        }),
        kInput,
        {"split", "leaves 1 of 4"}},
+      {"split_of_no_frame",
+       spoiled_json([](json& top) {
+         top["test_filenames"] = {"./images/0.png", "images/00.png"};
+       }),
+       kInput,
+       {"transforms.json", "test_filenames", "names of frames", "images/00.png"}},
 
       {"json_syntax",
        transforms_then([](const fs::path& folder) { truncated("transforms.json", 0.7)(folder); }),
