@@ -505,7 +505,8 @@ Report starve(const CampaignOptions& options) {
   const Fixtures fixtures(options.subject, options.scratch);
   std::mt19937_64 random(options.seed);
   std::vector<Command> commands;
-  const std::vector<std::string> working = {"bake", "train", "colorize", "web", "eval", "render", "sample", "prepare"};
+  const std::vector<std::string> working = {"bake", "train",  "colorize", "web",    "gltf",
+                                            "exr",  "render", "eval",     "sample", "prepare"};
   for (const Command& command : fixtures.readers()) {
     if (options.commands.empty() || std::ranges::find(options.commands, "info") != options.commands.end()) {
       commands.push_back(command);

@@ -129,6 +129,7 @@ class Visitor {
   void tell(ServerRow& row) const {
     row.visits = visits_;
     row.failed_visits = failed_;
+    row.first_failure = first_failure_;
     row.slowest_visit = slowest_;
   }
 
@@ -139,7 +140,12 @@ class Visitor {
       const std::string answer = ask(port, get("/"), milliseconds(int(4000 * patience)));
       const double seconds = seconds_since(begin);
       ++visits_;
-      failed_ += status_of(answer) != 200 || seconds > patience ? 1 : 0;
+      if (status_of(answer) != 200 || seconds > patience) {
+        if (++failed_ == 1) {
+          first_failure_ = fmt::format("visit {} took {:.3f} s and got {}", visits_, seconds,
+                                       answer.empty() ? "nothing" : answer.substr(0, answer.find('\r')));
+        }
+      }
       slowest_ = std::max(slowest_, seconds);
       std::this_thread::sleep_for(milliseconds(20));
     }
@@ -148,6 +154,7 @@ class Visitor {
   std::atomic<bool> is_stopped_ = false;
   std::size_t visits_ = 0, failed_ = 0;
   double slowest_ = 0;
+  std::string first_failure_;
   std::thread thread_;
 };
 
@@ -232,8 +239,8 @@ class Server {
     violated(row.leaks > 0, fmt::format("{} answers hold what lies outside", row.leaks));
     violated(row.wrong > 0, fmt::format("{} answers should not have been given", row.wrong));
     violated(row.failed_visits > 0,
-             fmt::format("{} of {} visits of the page failed or took more than {} s, the slowest {:.2f} s",
-                         row.failed_visits, row.visits, options_.patience, row.slowest_visit));
+             fmt::format("{} of {} visits of the page failed or took more than {} s, the slowest {:.2f} s: {}",
+                         row.failed_visits, row.visits, options_.patience, row.slowest_visit, row.first_failure));
     violated(row.growth > options_.most_growth, fmt::format("the server grew by {} MiB", row.growth >> 20));
     violated(row.descriptors_after > row.descriptors_before,
              fmt::format("{} descriptors were open before, {} after", row.descriptors_before, row.descriptors_after));

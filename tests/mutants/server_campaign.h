@@ -36,6 +36,7 @@ struct ServerRow {
   std::size_t wrong = 0;   ///< answers that should not have been given
   std::size_t visits = 0;  ///< of the page meanwhile
   std::size_t failed_visits = 0;
+  std::string first_failure;
   double slowest_visit = 0;  ///< seconds
   std::size_t growth = 0;    ///< bytes beyond what the server held before, at most
   std::size_t descriptors_before = 0, descriptors_after = 0;

@@ -90,7 +90,7 @@ void Connections::expect() {
 Connections::Handle Connections::add(socket_t socket, std::string address) {
   const std::lock_guard guard(mutex_);
   --expected_;
-  return entries_.insert(entries_.end(), {socket, std::move(address), std::nullopt});
+  return entries_.insert(entries_.end(), {socket, std::move(address), Wait{Clock::now(), POLLIN}});
 }
 
 bool Connections::admit(Handle handle) {

@@ -46,6 +46,7 @@ class Connections {
   void expect();
   /// Of one that has got its thread.  @return  false where its address has too many, all of them at work
   bool admit(Handle handle);
+  /// It is waited for at once: a busy machine's threads are slow to ask for its request.
   Handle add(socket_t socket, std::string address);
   void remove(Handle handle);
   void set_waiting(Handle handle, std::optional<Wait> waiting);
