@@ -99,7 +99,7 @@ std::vector<fs::path> data_places(const std::string& name) {
   return places;
 }
 
-const void* begun_plugin(const std::string& plugin, const std::string& entry) {
+const void* begun_plugin(const std::string& plugin, const std::string& entry, const void* (*call)(void* entry)) {
   const AbortIsShortageOfMemory guard;
   const fs::path file = program_part("libcnerf_" + plugin + ".so");
   void* library = loaded(file);
@@ -108,7 +108,7 @@ const void* begun_plugin(const std::string& plugin, const std::string& entry) {
   }
   void* address = ::dlsym(library, entry.c_str());
   if (address == nullptr) throw DeviceError(file.string() + " is of another version: it has no " + entry);
-  return reinterpret_cast<const void* (*)()>(address)();
+  return call(address);
 }
 
 }  // namespace cnerf

@@ -23,16 +23,18 @@ namespace cnerf {
 /// where this build keeps or installs it.
 [[nodiscard]] std::vector<std::filesystem::path> data_places(const std::string& name);
 
-/// What the `extern "C"` function `entry` of libcnerf_`plugin`.so returns; the library stays loaded.
+/// What `call` returns, given the `extern "C"` function `entry` of libcnerf_`plugin`.so; the library stays loaded.
 /// @throws DeviceError     no such file, it cannot be loaded, or it lacks the function
 /// @throws std::bad_alloc  memory did not suffice to load it. Where it aborts for that reason as it begins, the program
 ///                         ends with ExitCode::kMemory.
-[[nodiscard]] const void* begun_plugin(const std::string& plugin, const std::string& entry);
+[[nodiscard]] const void* begun_plugin(const std::string& plugin, const std::string& entry,
+                                       const void* (*call)(void* entry));
 
 /// The table of functions that a plug-in offers: the result of its `extern "C"` function `entry`.
 template <typename Table>
 const Table& plugin_table(const std::string& plugin, const std::string& entry) {
-  return *static_cast<const Table*>(begun_plugin(plugin, entry));
+  const auto call = [](void* function) -> const void* { return reinterpret_cast<const Table* (*)()>(function)(); };
+  return *static_cast<const Table*>(begun_plugin(plugin, entry, call));
 }
 
 }  // namespace cnerf
