@@ -199,11 +199,10 @@ std::set<std::string> filename_list(const fs::path& file, const Json& top, const
   if (!list->is_array()) throw InputError(file, key, std::string("expected a list, found ") + list->type_name());
   for (const Json& name : *list) {
     if (!name.is_string()) throw InputError(file, key, "expected file names, found " + excerpt(name));
-    names.insert(comparable(name.get<std::string>()));
+    const std::string frame = comparable(name.get<std::string>());
     // A held-out view under another name would be learned from.
-    if (!frames.contains(comparable(name.get<std::string>()))) {
-      throw InputError(file, key, "expected file names of frames, found " + excerpt(name));
-    }
+    if (!frames.contains(frame)) throw InputError(file, key, "expected file names of frames, found " + excerpt(name));
+    names.insert(frame);
   }
   return names;
 }

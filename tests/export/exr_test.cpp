@@ -7,13 +7,7 @@
 #include <ImfStringAttribute.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <fstream>
-#include <limits>
-
 #include "bake/provenance.h"
-#include "src/base/error.h"
-#include "src/picture/exr_writer.h"
 #include "tests/export/test_meshes.h"
 #include "tests/support/data.h"
 
@@ -76,19 +70,6 @@ TEST(ExrTextures, SayWhatTheyAre) {
     EXPECT_EQ(text_attribute(header, "colorOrigin"), "colour is inferred, by colorizer builtin, take first");
     EXPECT_NE(text_attribute(header, "colorSpace"), "missing");
   }
-}
-
-TEST(ExrWriter, LargeValuesFitIntoHalfAndBrokenOnesAreRefused) {
-  const TempDir folder;
-  const std::vector<float> bright{1e6f, 0.5f, -1e6f, 2};
-  write_exr(folder / "a.exr", {2, 2, {{"Y", bright, 1, true}}, {}});
-  EXPECT_EQ(read_channel(folder / "a.exr", "Y"), (std::vector<float>{65504, 0.5f, -65504, 2}));
-  const std::vector<float> broken{0, std::numeric_limits<float>::quiet_NaN(), 0, 0};
-  EXPECT_THROW(write_exr(folder / "b.exr", {2, 2, {{"Y", broken}}, {}}), ContractError);
-  EXPECT_THROW(write_exr(folder / "b.exr", {3, 3, {{"Y", bright}}, {}}), ContractError) << "too few values";
-  EXPECT_FALSE(fs::exists(folder / "b.exr"));
-  std::ofstream(folder / "file") << "not a folder";
-  EXPECT_THROW(write_exr(folder / "file" / "a.exr", {2, 2, {{"Y", bright}}, {}}), OutputError);
 }
 
 }  // namespace

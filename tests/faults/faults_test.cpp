@@ -44,6 +44,14 @@ TEST_F(Faults, TwoProgramsInOneFolder) {
   EXPECT_TRUE(report.violations.empty()) << report.text();
 }
 
+TEST_F(Faults, LargeAllocationsOfASample) {
+  CampaignOptions some = options({"sample"});
+  some.every = 5;
+  const Report report = starve(some);
+  EXPECT_EQ(report.rows.size(), 1U);
+  EXPECT_TRUE(report.violations.empty()) << report.text();
+}
+
 TEST_F(Faults, LargeAllocationsOfABakeAndATraining) {
   CampaignOptions some = options({"bake", "train"});
   some.every = 300;
