@@ -69,19 +69,19 @@ function(cnerf_add_plugin name)
   install(TARGETS ${name} LIBRARY DESTINATION lib/cnerf)
 endfunction()
 
-# cnerf_add_test(NAME SOURCES … LINK … [LABELS …] [TIMEOUT seconds] [PROCESSORS n])
+# cnerf_add_test(NAME SOURCES … LINK … [LABELS …] [TIMEOUT seconds] [COST seconds])
 # One executable of GoogleTest cases; every suite of it is a CTest test of its own, NAME.SUITE. A suite that CTest would
 # not run fails the others: tests/support/gtest_main.cpp knows the list.
 function(cnerf_add_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT;PROCESSORS" "SOURCES;LINK;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "" "TIMEOUT;COST" "SOURCES;LINK;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 900)
   endif()
   if(NOT arg_LABELS)
     set(arg_LABELS unit)
   endif()
-  if(NOT arg_PROCESSORS)
-    set(arg_PROCESSORS 1)
+  if(NOT arg_COST)
+    set(arg_COST 0)
   endif()
   if(name IN_LIST CNERF_SMOKE_TESTS)
     list(APPEND arg_LABELS smoke)
@@ -100,7 +100,7 @@ function(cnerf_add_test name)
   foreach(suite ${suites})
     add_test(NAME ${name}.${suite} COMMAND ${name} --gtest_filter=${suite}.*:*/${suite}.*:${suite}/*.*)
     set_tests_properties(${name}.${suite} PROPERTIES
-      LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT} PROCESSORS ${arg_PROCESSORS} SKIP_RETURN_CODE 77
+      LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT} COST ${arg_COST} SKIP_RETURN_CODE 77
       ENVIRONMENT "CNERF_SUITES=${all};CNERF_CASES=${PROJECT_BINARY_DIR}/Testing/cases/${name}.${suite}")
   endforeach()
 endfunction()

@@ -651,7 +651,7 @@ def parse_options(arguments):
 
 
 def main():
-    arguments = sys.argv[sys.argv.index("--") + 1:] if bpy.app.background and "--" in sys.argv else []
+    arguments = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
     options = parse_options(arguments)
     scene = set_up(options)
     if options.save:

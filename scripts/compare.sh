@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The table of docs/evaluation.md: fox, flower and lego, three seeds, every method.
+# The table of docs/evaluation.md: fox, flower and lego; eleven methods, three seeds.
 #   bash scripts/compare.sh REPORT [simulated|builtin] [further options of `cnerf compare`]
 # Captures and LPIPS weights are looked for in $CNERF_DATA (else ../shared/data), the program in $CNERF (else the
 # release build). Trains on the GPUs there are. Parts run side by side, each on a capture and a seed; what is

@@ -9,7 +9,7 @@ cd "$(dirname "$0")/.."
 per_kind=20 preset=release options=()
 while [ $# -gt 0 ]; do
   case $1 in
-    --full) per_kind=300 ;;
+    --full) per_kind=240 ;;
     --sanitized) preset=dev ;;
     *) options+=("$1") ;;
   esac

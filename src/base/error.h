@@ -1,6 +1,6 @@
 #pragma once
-/// The types of errors and their exit codes. Only `main` catches them and turns them into messages; nothing else exits
-/// the program.
+/// The types of errors and their exit codes. `main`, the Python module and the studio turn them into messages;
+/// only `main` exits the program.
 
 #include <filesystem>
 #include <stdexcept>

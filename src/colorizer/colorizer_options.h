@@ -26,11 +26,12 @@ struct ColorizerOptions {
     v("strokes", strokes, "what was painted in the studio: the file RUN/strokes/strokes.json");
     v("prompt", prompt, "a text for colorizers that take one: exec: commands with {prompt} in them");
     v("timeout_seconds", timeout_seconds, Range{0.1, 1e6},
-      "an exec: or torchscript: colorizer that takes longer for a batch failed");
+      "a colorizer by exec:, torchscript: or ONNX Runtime that takes longer for a batch failed; so did reading a "
+      "network");
     v("reference_steps", reference_steps, Range{1, 1e6}, "optimiser steps of the fit to a reference: photograph");
-    v("reference_on_builtin", reference_on_builtin, "that fit builds on what the built-in network makes of a picture");
+    v("reference_on_builtin", reference_on_builtin, "a reference: fit builds on the built-in network's answer");
     v("reference_encoder", reference_encoder, Choice{"auto", "on", "off"},
-      "and on what an encoder makes of it that is installed by itself; auto: where it is installed");
+      "a reference: fit builds on an image encoder too, which is installed apart; auto: where it is there");
   }
 };
 

@@ -14,6 +14,8 @@
 #include "src/capture/load_capture.h"
 #include "src/color/colorspace_math.h"
 #include "src/pipeline/run_directory.h"
+#include "src/prepare/photographs.h"
+#include "src/prepare/prepare.h"
 #include "src/train/luminance/learned_views.h"
 
 namespace cnerf::pipeline {
@@ -97,6 +99,16 @@ void add_capture(Report& report, const Capture& capture) {
   if (const auto& range = capture.depth_range) report.line("depth range", "{:.4g} to {:.4g}", range->near, range->far);
   if (capture.bounds) report.line("bounds", "{}", text_of(*capture.bounds));
   for (const std::string& note : capture.notes) report.line("note", "{}", note);
+}
+
+/// Photographs that have no poses yet.
+void add_photographs(Report& report, const fs::path& folder) {
+  const std::vector<fs::path> files = prepare::list_photographs(folder);
+  report.line("photographs", "{} in {}", files.size(), files.front().parent_path().string());
+  if (const auto header = stated_header(files.front())) {
+    report.line("images", "{}, {} (first one)", size_text(header->width, header->height), depth_text(header->depth));
+  }
+  report.line("cameras", "not known yet; `cnerf run` and `cnerf prepare` find them");
 }
 
 void add_scene(Report& report, const fs::path& stage1, const fs::path& take) {
@@ -206,6 +218,8 @@ std::vector<Fact> facts_of(const fs::path& what, const CaptureOptions& options) 
     add_vdb(report, what);
   } else if (is_snapshot(what)) {
     add_snapshot(report, what);
+  } else if (fs::is_directory(what) && prepare::needs_preparing(what)) {
+    add_photographs(report, what);
   } else {
     add_capture(report, survey_capture(what, options));
   }

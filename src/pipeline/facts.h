@@ -13,7 +13,8 @@ struct Fact {
   std::string name, value;
 };
 
-/// What a capture, a run, a .snapshot or a .vdb holds; pictures are described by their headers.
+/// What a capture, a folder of photographs, a run, a .snapshot or a .vdb holds; pictures are described by their
+/// headers.
 /// @param options  how a capture is read
 /// @throws MissingInputError, InputError, SnapshotError
 [[nodiscard]] std::vector<Fact> facts_of(const std::filesystem::path& what, const CaptureOptions& options);

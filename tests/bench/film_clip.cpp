@@ -5,6 +5,7 @@
 //   film_clip CAPTURE STREAM.dat [ticks=64] [seed=1]
 //   film_clip CAPTURE FOLDER [frames=60] [x=0 y=0 width=0 height=0]
 //
+// views       of the capture that are taken, from the first on; 0: all
 // flicker     each frame's light is multiplied by 1 +- up to this many percent
 // grain       standard deviation of the noise, codes
 // letterbox   rows of black above and below
@@ -157,14 +158,17 @@ int main(int argc, char** argv) {
                                                                {"y", 0},
                                                                {"width", 0},
                                                                {"height", 0},
+                                                               {"views", 0},
                                                                {"seed", 1}});
   if (files.size() != 2) {
     std::puts(
         "film_clip CAPTURE OUT.mp4|OUT.dat|FOLDER [fps=24] [flicker=%] [grain=codes] [letterbox=rows] "
-        "[duplicates=N] [pan=frames] [ticks=64] [frames=60] [x= y= width= height=] [seed=1]");
+        "[duplicates=N] [pan=frames] [ticks=64] [frames=60] [x= y= width= height=] [views=0] [seed=1]");
     return 64;
   }
-  const Capture capture = cnerf::load_capture(files[0]);
+  Capture capture = cnerf::load_capture(files[0]);
+  const auto wanted = std::size_t(options.at("views"));
+  if (wanted > 0 && wanted < capture.views.size()) capture.views.resize(wanted);
   const fs::path out = files[1];
   if (out.extension() == ".dat") {
     write_stream(capture, out, options);

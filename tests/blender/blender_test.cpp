@@ -469,6 +469,21 @@ TEST(Blender, PastedIntoTheTextEditorItMakesASceneOfItsOwn) {
   EXPECT_EQ(run_blender(folder / "paste.py", ""), 0) << read_text_file(folder / "blender.log");
 }
 
+TEST(Blender, OptionsAreTakenWhereThereIsAWindow) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
+  std::ofstream(folder / "windowed.py")
+      << "import bpy\n"
+         "file = r'" +
+             bake.blender_setup.string() +
+             "'\n"
+             "text = open(file, encoding='utf-8').read().replace('bpy.app.background', 'False')\n"
+             "exec(compile(text, file, 'exec'), {'__name__': '__main__', '__file__': file})\n"
+             "assert bpy.data.scenes['cnerf'].cycles.samples == 7\n";
+  EXPECT_EQ(run_blender(folder / "windowed.py", "--samples 7"), 0) << read_text_file(folder / "blender.log");
+}
+
 TEST(Blender, FailuresEndWithAnExitStatus) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;

@@ -80,7 +80,8 @@ TEST(Ranks, SumOnDevicesWhereTheChannelCan) {
   for (int rank = 0; rank < 2; ++rank) {
     threads.emplace_back([rank] {
       const Meeting plain = test::fake_meeting(rank, 2);
-      JoinedRanks ranks({plain.launch, channel, plain.patience, plain.limit, plain.name, plain.end});
+      const Patience short_one{Seconds(0.05), Seconds(2), Seconds(5)};  // what breaks is waited for
+      JoinedRanks ranks({plain.launch, channel, short_one, plain.limit, plain.name, plain.end});
       ASSERT_NE(ranks.device_sums(), nullptr);
       DeviceSums& sums = *ranks.device_sums();
       std::vector<float> values = {float(rank), 2};

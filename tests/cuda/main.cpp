@@ -5,7 +5,7 @@
 //   cnerf-cuda-check bench-stage2 capture=FOLDER [steps=3000] [rays=4096] [option=value ...]
 //   cnerf-cuda-check train  capture=FOLDER [seconds=10] [seeds=1] [option=value ...]
 //
-// FOLDER is what pack_capture made. Options: levels, log2_rows, coarsest, finest, samples, steps_per_box, cone_angle,
+// FOLDER is what pack_capture made. Options: levels, log2_rows, coarsest, finest, samples, steps_per_box, cone,
 // rate, final_rate.
 
 #include <cstdio>

@@ -180,7 +180,8 @@ class Server {
 
   /// Calls `trouble` while somebody visits.
   ServerRow run(const std::string& part, const std::function<void(int port, ServerRow&)>& trouble) {
-    ServerRow row{part};
+    ServerRow row;
+    row.part = part;
     const std::size_t held = program_.resident_bytes();
     row.descriptors_before = program_.open_descriptors();
     Visitor visitor(port_, options_.patience);

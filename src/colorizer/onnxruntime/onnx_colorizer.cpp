@@ -65,11 +65,18 @@ Ort::Session open_session(const std::string& name, const fs::path& file) {
   }
 }
 
+/// Opened by a child first, since the library trusts the files that it reads.
+Ort::Session checked_session(const std::string& name, const fs::path& file, double seconds) {
+  read_in_child([&] { (void)open_session(name, file); }, seconds, file,
+                name + ": is damaged: " + version() + " cannot stand or end reading it");
+  return open_session(name, file);
+}
+
 class OnnxColorizer final : public NetworkColorizer {
  public:
   OnnxColorizer(const fs::path& file, const std::string& shown, double timeout_seconds)
       : NetworkColorizer("onnx:" + shown, contract_beside(file)),
-        session_(open_session(name_, file)),
+        session_(checked_session(name_, file, timeout_seconds)),
         timeout_(timeout_seconds) {
     Ort::AllocatorWithDefaultOptions allocator;
     if (session_.GetInputCount() != 1) {

@@ -23,7 +23,7 @@ struct Stage2Options {
 
   template <typename Visitor>
   void visit(Visitor&& v) {
-    v("patches", patches, Range{1, 1e7}, "accepted patches to train on");
+    v("patches", patches, Range{1, 1e7}, "updates: one per accepted patch; with known colours one per patch");
     v("patch_size", patch_size, Range{16, 512}, "K: pixels along a side of a patch");
     v("rays_per_patch", rays_per_patch, Range{64, 1 << 20},
       "pixels of a patch that are trained on, and as many of key frames and hints");

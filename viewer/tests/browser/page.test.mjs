@@ -12,8 +12,8 @@ let browser, context, server, page;
 
 before(async () => {
   browser = await launch();
-  // Half the pixels across: software draws them, and what is compared are pictures of a size of their own.
-  context = await browser.newContext({ viewport: { width: 640, height: 420 }, deviceScaleFactor: 0.5, acceptDownloads: true });
+  // A quarter of the pixels across: software draws them, and what is compared are pictures of a size of their own.
+  context = await browser.newContext({ viewport: { width: 640, height: 420 }, deviceScaleFactor: 0.25, acceptDownloads: true });
   server = await serve(folders);
   page = await open(context, `${server.url}?still`);
 });
@@ -382,7 +382,7 @@ describe("what leaves the page", () => {
     await set(page, { background: "none" });
     const [download] = await Promise.all([page.waitForEvent("download"), click("screenshot")]);
     const image = await decoded(page, readFileSync(await download.path()));
-    assert.deepEqual([image.width, image.height], [320, 210]);
+    assert.deepEqual([image.width, image.height], [160, 105]);
     assert.equal(image.data[3], 0);
     assert.ok(meanAlpha(image) > 10);
   });

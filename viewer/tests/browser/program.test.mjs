@@ -11,7 +11,7 @@ const folder = mkdtempSync(join(tmpdir(), "cnerf-viewer-"));
 const capture = join(folder, "capture");
 const trained = join(folder, "run");
 const bake = join(folder, "bake");
-const quick = ["--preset", "quick", "--set", "stage1.steps=250", "--set", "stage2.patches=20", "--set", "stage2.distill_steps=40", "--set", "colorizer.reference_steps=20", "--set", "stage1.samples_per_step=16384"];
+const quick = ["--preset", "quick", "--set", "stage1.steps=250", "--set", "stage2.patches=20", "--set", "stage2.distill_steps=40", "--set", "colorizer.reference_steps=20", "--set", "stage1.samples_per_step=16384", "--set", "stage1.steps_per_box=64", "--set", "stage2.patch_size=32", "--set", "stage2.rays_per_patch=256", "--set", "stage2.working_resolution=32", "--set", "stage2.purify.opinions=1"];
 let browser, context;
 
 async function ok(args) {
@@ -92,7 +92,7 @@ describe("cnerf view", () => {
 describe("live", () => {
   it("training is followed, paused, resumed, and stopped with everything saved", async () => {
     const out = join(folder, "live");
-    const serving = await startServing(["train", capture, "-o", out, "--view", "--holdout", "6", "--preset", "quick", "--set", "stage1.steps=100000", "--set", "stage1.samples_per_step=16384"]);
+    const serving = await startServing(["train", capture, "-o", out, "--view", "--holdout", "6", "--preset", "quick", "--set", "stage1.steps=100000", "--set", "stage1.samples_per_step=4096"]);
     const page = await open(context, serving.url);
     await page.waitForSelector('.chart[data-curve="stage 1: psnr"] path[d*="L"]', { state: "attached" });
     await page.waitForFunction(() => [...document.querySelectorAll(".previews img")].some((image) => image.naturalWidth > 0));

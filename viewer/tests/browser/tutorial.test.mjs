@@ -9,7 +9,7 @@ import { launch, open, patience, program, run, startServing } from "./support.mj
 
 const folder = mkdtempSync(join(tmpdir(), "cnerf-tutorial-"));
 const [capture, trained] = [join(folder, "capture"), join(folder, "run")];
-const long = process.env.CNERF_PICTURES ? [] : ["--set", "stage1.steps=250", "--set", "stage1.samples_per_step=16384"];
+const long = process.env.CNERF_PICTURES ? [] : ["--set", "stage1.steps=250", "--set", "stage1.samples_per_step=16384", "--set", "stage1.steps_per_box=64", "--set", "render.steps_per_box=128", "--set", "bake.resolution=48"];
 const size = process.env.CNERF_PICTURES ? ["--views", "24"] : ["--views", "10", "--width", "120", "--height", "90", "--samples-per-pixel", "1"];
 let browser, page, serving;
 

@@ -1,0 +1,41 @@
+#include "src/pipeline/facts.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+
+#include "src/base/error.h"
+#include "src/base/files.h"
+#include "tests/support/data.h"
+
+namespace cnerf::pipeline {
+namespace {
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+std::string text_of(const std::vector<Fact>& facts) {
+  std::string text;
+  for (const auto& [name, value] : facts) text += name + ": " + value + "\n";
+  return text;
+}
+
+TEST(Facts, PhotographsWithoutPosesAreCountedAndMeasured) {
+  const test::TempDir folder;
+  for (const char* name : {"a.png", "b.png", "c.png"}) cv::imwrite(folder / name, cv::Mat1w(30, 40, std::uint16_t(9)));
+  const std::string text = text_of(facts_of(folder.path(), {}));
+  EXPECT_THAT(text, HasSubstr("photographs: 3 in " + folder.path().string()));
+  EXPECT_THAT(text, HasSubstr("images: 40x30, 16-bit"));
+  EXPECT_THAT(text, HasSubstr("cameras: not known yet"));
+}
+
+TEST(Facts, AFolderOfNothingIsRefused) {
+  const test::TempDir folder;
+  write_file(folder / "notes.txt", "nothing");
+  EXPECT_THAT([&] { (void)facts_of(folder.path(), {}); },
+              ThrowsMessage<MissingInputError>(HasSubstr(folder.path().string())));
+}
+
+}  // namespace
+}  // namespace cnerf::pipeline
