@@ -1,5 +1,8 @@
 // onnx: colorizers by ONNX Runtime; dnn_colorizer_test.cpp asks whichever engine the build has.
 
+#include <sys/resource.h>
+
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <vector>
@@ -57,6 +60,32 @@ TEST_F(OnnxRuntimeColorizer, OpeningANetworkPrintsNothing) {
   (void)test::colorizer_of(spec);
   std::fputs("after", stderr);
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "after");
+}
+
+/// The library makes constants as it opens a network: four gigabytes of a few bytes.
+TEST_F(OnnxRuntimeColorizer, ANetworkThatSwellsAsItIsOpenedIsRefused) {
+  using Message = test::ProtobufMessage;
+  const auto node = [](const char* type, const std::vector<const char*>& inputs, const char* output) {
+    Message message;
+    for (const char* input : inputs) message.bytes(1, input);
+    return message.bytes(2, output).bytes(4, type);
+  };
+  const auto value = [](const char* name) {
+    Message sides;
+    for (const int side : {2, 1, 6, 5}) sides.message(1, Message().number(1, std::uint64_t(side)));
+    return Message().bytes(1, name).message(2, Message().message(1, Message().number(1, 1).message(2, sides)));
+  };
+  const Message sides = Message().number(1, 2).number(2, 7).bytes(8, "sides").number(7, 32768).number(7, 32768);
+  Message graph;
+  graph.message(1, node("ConstantOfShape", {"sides"}, "zeros")).message(1, node("ReduceMax", {"zeros"}, "zero"));
+  graph.message(1, node("Add", {"x", "zero"}, "y")).bytes(2, "g").message(5, sides);
+  graph.message(11, value("x")).message(12, value("y"));
+  write_file(folder_ / "net.onnx", Message().number(1, 7).message(7, graph).message(8, Message().number(2, 13)).text());
+  EXPECT_THROW((void)test::colorizer_of("onnx:" + (folder_ / "net.onnx").string()), ColorizerError);
+  rusage own{}, children{};
+  ::getrusage(RUSAGE_SELF, &own);
+  ::getrusage(RUSAGE_CHILDREN, &children);
+  EXPECT_LT(std::max(own.ru_maxrss, children.ru_maxrss), 1L << 20) << "KiB";
 }
 
 TEST_F(OnnxRuntimeColorizer, OutputsAreChosenByName) {
