@@ -72,6 +72,8 @@ if [ ! -e "$root/usr/sbin/policy-rc.d" ]; then make_root; fi
 cp /etc/resolv.conf "$root/etc/resolv.conf"
 mount_in /proc -t proc proc
 mount_in /dev --bind /dev
+mount_in /dev/pts --bind /dev/pts
+mount_in /sys --bind -o ro /sys
 mount_in /dev/shm -t tmpfs tmpfs  # for Chromium
 if [ -n "${CNERF_DATA:-}" ]; then mount_in /data --bind -o ro "$CNERF_DATA"; fi
 rm -rf "${root:?}$tree"

@@ -36,6 +36,12 @@ using Milliseconds = std::chrono::milliseconds;
 /// For ranks that are late at an operation: rank 0 may save, or draw for a page. Who is lost is found by the Watch.
 constexpr std::chrono::minutes kLongestOperation{30};
 
+/// LibTorch from 2.4 on asks for libuv, which Debian builds it without.
+template <typename Options>
+void do_without_libuv(Options& options) {
+  if constexpr (requires { options.useLibUV; }) options.useLibUV = false;
+}
+
 /// @param topic  of what is told through it; others have names of their own
 c10::intrusive_ptr<c10d::Store> connected(const Launch& launch, bool opens, Seconds limit,
                                           const std::string& topic = "") {
@@ -43,6 +49,7 @@ c10::intrusive_ptr<c10d::Store> connected(const Launch& launch, bool opens, Seco
   options.port = std::uint16_t(launch.port);
   options.isServer = opens && launch.rank == 0 && !launch.has_store;
   options.waitWorkers = false;
+  do_without_libuv(options);
   options.timeout = std::chrono::duration_cast<Milliseconds>(limit);
   auto store = c10::make_intrusive<c10d::TCPStore>(launch.host, options);
   return c10::make_intrusive<c10d::PrefixStore>("cnerf/" + topic + launch.attempt, store);
