@@ -51,6 +51,9 @@ NodeName=n1 NodeHostname=$host NodeAddr=127.0.0.1 Port=$(free_port) CPUs=2 State
 NodeName=n2 NodeHostname=$host NodeAddr=127.0.0.1 Port=$(free_port) CPUs=2 State=UNKNOWN
 PartitionName=all Nodes=n1,n2 Default=YES MaxTime=INFINITE State=UP
 END
+# From 23.11 on slurmd wants cgroups although nothing is to be tracked by them, and a container may have none.
+version=$(slurmd -V | grep -oE '[0-9]+' | head -1)
+if [ "$version" -ge 24 ]; then echo "CgroupPlugin=disabled" > "$slurm/cgroup.conf"; fi
 mkdir "$slurm/state"
 export SLURM_CONF="$slurm/slurm.conf"
 slurmctld -f "$SLURM_CONF"
