@@ -447,25 +447,31 @@ TEST(Blender, TheAddOnIsInstalledByBlendersOwnInstaller) {
   ::unsetenv("BLENDER_USER_SCRIPTS");
 }
 
+/// Python that runs a set-up as Blender does where it has a window.
+std::string in_a_window(const std::filesystem::path& setup, const std::string& globals) {
+  return "import bpy, sys\nfile = r'" + setup.string() +
+         "'\n"
+         "text = open(file, encoding='utf-8').read().replace('bpy.app.background', 'False')\n"
+         "before = [o.name for o in bpy.data.scenes['Scene'].objects]\n"
+         "exec(compile(text, file, 'exec'), {'__name__': '__main__'" +
+         globals +
+         "})\n"
+         "scene = bpy.data.scenes['cnerf']\n";
+}
+
 TEST(Blender, PastedIntoTheTextEditorItMakesASceneOfItsOwn) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
   const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
   // As the text editor runs it: no __file__, and a scene that must not be touched.
   std::ofstream(folder / "paste.py")
-      << "import bpy, sys\n"
-         "before = [o.name for o in bpy.data.scenes['Scene'].objects]\n"
-         "text = open(r'" +
-             bake.blender_setup.string() +
-             "', encoding='utf-8').read().replace('bpy.app.background', 'False')\n"
-             "exec(compile(text, 'Text', 'exec'), {'__name__': '__main__'})\n"
-             "assert before and before == [o.name for o in bpy.data.scenes['Scene'].objects]\n"
-             "scene = bpy.data.scenes['cnerf']\n"
-             "assert bpy.context.window.scene == scene\n"
-             "assert sorted(o.type for o in scene.objects) == ['CAMERA', 'EMPTY', 'VOLUME']\n"
-             "volume = [o.data for o in scene.objects if o.type == 'VOLUME'][0]\n"
-             "volume.grids.load()\n"
-             "assert 'density' in [g.name for g in volume.grids]\n";
+      << in_a_window(bake.blender_setup, "")
+      << "assert before and before == [o.name for o in bpy.data.scenes['Scene'].objects]\n"
+         "assert bpy.context.window.scene == scene\n"
+         "assert sorted(o.type for o in scene.objects) == ['CAMERA', 'EMPTY', 'VOLUME']\n"
+         "volume = [o.data for o in scene.objects if o.type == 'VOLUME'][0]\n"
+         "volume.grids.load()\n"
+         "assert 'density' in [g.name for g in volume.grids]\n";
   EXPECT_EQ(run_blender(folder / "paste.py", ""), 0) << read_text_file(folder / "blender.log");
 }
 
@@ -473,14 +479,8 @@ TEST(Blender, OptionsAreTakenWhereThereIsAWindow) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
   const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
-  std::ofstream(folder / "windowed.py")
-      << "import bpy\n"
-         "file = r'" +
-             bake.blender_setup.string() +
-             "'\n"
-             "text = open(file, encoding='utf-8').read().replace('bpy.app.background', 'False')\n"
-             "exec(compile(text, file, 'exec'), {'__name__': '__main__', '__file__': file})\n"
-             "assert bpy.data.scenes['cnerf'].cycles.samples == 7\n";
+  std::ofstream(folder / "windowed.py") << in_a_window(bake.blender_setup, ", '__file__': file")
+                                        << "assert scene.cycles.samples == 7\n";
   EXPECT_EQ(run_blender(folder / "windowed.py", "--samples 7"), 0) << read_text_file(folder / "blender.log");
 }
 
