@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -82,11 +83,13 @@ void fill(LinearImage& image, const cv::Mat& pixels, Linear&& linear, Coverage&&
   }
 }
 
-void refuse_non_finite(const LinearImage& image, const fs::path& file) {
-  const auto finite = [](float v) { return std::isfinite(v); };
-  if (!std::all_of(image.values.begin(), image.values.end(), finite) ||
-      !std::all_of(image.alpha.begin(), image.alpha.end(), finite)) {
-    throw InputError(file, "pixels", "expected finite values, found NaN or infinity");
+/// The sun is 10^5 times as bright as white paper under it; far beyond that a training only diverges.
+constexpr float kMostLight = 1e6f;
+
+void refuse_implausible(const std::vector<float>& pixels, const fs::path& file) {
+  for (const float v : pixels) {
+    if (std::abs(v) <= kMostLight) continue;
+    throw InputError(file, "pixels", fmt::format("expected values within +-10^6 (1 is white), found {}", v));
   }
 }
 
@@ -167,7 +170,10 @@ class ByteEncoder {
 
 LinearImage read_linear_image(const fs::path& file, Transfer transfer) {
   LinearImage image = is_exr(file) ? read_exr(file) : read_with_opencv(file, transfer);
-  if (image.depth == PixelDepth::kF32) refuse_non_finite(image, file);
+  if (image.depth == PixelDepth::kF32) {
+    refuse_implausible(image.values, file);
+    refuse_implausible(image.alpha, file);
+  }
   return image;
 }
 

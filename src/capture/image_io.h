@@ -23,7 +23,8 @@ struct LinearImage {
 
 /// Reads stored pixels: an EXIF orientation is ignored, because poses refer to the pixels as they are stored.
 /// `transfer` decodes integer files; float files are linear.
-/// @throws MissingInputError, InputError  unreadable, cut short, not finite, or of a type no capture has.
+/// @throws MissingInputError, InputError  unreadable, cut short, of a type no capture has, or a float is not
+///     within +-10^6.
 [[nodiscard]] LinearImage read_linear_image(const std::filesystem::path& file, Transfer transfer);
 
 /// What a header would say of the image.

@@ -137,7 +137,7 @@ TEST_F(ImageIo, ExrOfOtherChannelsNamesThem) {
   }
 }
 
-TEST_F(ImageIo, ExrWithNaNIsRefused) {
+TEST_F(ImageIo, ExrOfImplausibleLightIsRefused) {
   const fs::path file = folder_ / "a.exr";
   write_exr(file, {1, 1, {{"Y", std::vector<float>{1}}}, {}});
   // A single pixel is stored as it is, at the end.
@@ -148,8 +148,17 @@ TEST_F(ImageIo, ExrWithNaNIsRefused) {
   };
   patch(7.5f);
   EXPECT_EQ(read_mono(file).luminance(0), 7.5f);
-  patch(NAN);
-  EXPECT_THROW((void)read_linear_image(file, Transfer::kSrgb), InputError);
+  patch(1e6f);
+  EXPECT_EQ(read_mono(file).luminance(0), 1e6f);
+  for (const auto& [value, found] : {std::pair{NAN, "found nan"}, {-INFINITY, "found -inf"}, {2e6f, "found 2000000"}}) {
+    patch(value);
+    try {
+      (void)read_linear_image(file, Transfer::kSrgb);
+      ADD_FAILURE() << value << " was taken";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(found), std::string::npos) << error.what();
+    }
+  }
 }
 
 TEST_F(ImageIo, TruncatedImagesAreRefused) {
