@@ -160,14 +160,13 @@ function(cnerf_precompile_torch name)
   foreach(source ${sources})
     get_filename_component(file ${source} ABSOLUTE)
     cnerf_includes_torch(is_torch ${file})
-    if(is_torch)
-      # GCC 12 forgets that what it inlines from a precompiled header is the system's (GCC 105329, 105651).
-      set_source_files_properties(${source} PROPERTIES COMPILE_OPTIONS
-        "${CNERF_PRECOMPILED_OPTIONS};$<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow;-Wno-stringop-overread;-Wno-array-bounds;-Wno-maybe-uninitialized>")
-    else()
-      set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+    if(NOT is_torch)
+      set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON SKIP_UNITY_BUILD_INCLUSION ON)
     endif()
   endforeach()
+  # GCC 12 forgets that what it inlines from a precompiled header is the system's (GCC 105329, 105651).
+  target_compile_options(${name} PRIVATE ${CNERF_PRECOMPILED_OPTIONS}
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow;-Wno-stringop-overread;-Wno-array-bounds;-Wno-maybe-uninitialized>)
   get_target_property(type ${name} TYPE)
   if(type STREQUAL EXECUTABLE)  # -fPIE would not fit the header
     set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)

@@ -16,9 +16,7 @@
 namespace cnerf::exporting {
 namespace {
 
-using Json = nlohmann::json;
-
-tinygltf::Value value_from(const Json& json) {
+tinygltf::Value value_from(const nlohmann::json& json) {
   if (json.is_object()) {
     tinygltf::Value::Object object;
     for (const auto& [key, member] : json.items()) object[key] = value_from(member);
@@ -26,7 +24,7 @@ tinygltf::Value value_from(const Json& json) {
   }
   if (json.is_array()) {
     tinygltf::Value::Array array;
-    for (const Json& element : json) array.push_back(value_from(element));
+    for (const nlohmann::json& element : json) array.push_back(value_from(element));
     return tinygltf::Value(std::move(array));
   }
   if (json.is_boolean()) return tinygltf::Value(json.get<bool>());
@@ -35,8 +33,8 @@ tinygltf::Value value_from(const Json& json) {
   return tinygltf::Value(json.get<std::string>());
 }
 
-/// Extras are objects with one member of ours, so that others can add theirs.
-tinygltf::Value extras(const Json& ours) {
+/// nlohmann::json are objects with one member of ours, so that others can add theirs.
+tinygltf::Value extras(const nlohmann::json& ours) {
   return value_from({{"cnerf", ours}});
 }
 
@@ -112,8 +110,8 @@ void add_mesh(const bake::Mesh& mesh, const Mat3d& rotation, BufferBuilder& buff
 }
 
 /// Names of files that exist, by what they are.
-Json named_files(const GltfScene& scene) {
-  Json files = Json::object();
+nlohmann::json named_files(const GltfScene& scene) {
+  nlohmann::json files = nlohmann::json::object();
   if (!scene.rgb_exr.empty()) files["rgb_exr"] = scene.rgb_exr;
   if (!scene.luminance_exr.empty()) files["luminance_exr"] = scene.luminance_exr;
   if (!scene.lab_exr.empty()) files["lab_exr"] = scene.lab_exr;
@@ -127,7 +125,7 @@ void add_material(const GltfScene& scene, tinygltf::Model& model) {
   material.pbrMetallicRoughness.metallicFactor = 0;  // for readers that do not know unlit
   material.pbrMetallicRoughness.roughnessFactor = 1;
   material.pbrMetallicRoughness.baseColorTexture.index = 0;
-  Json ours = named_files(scene);
+  nlohmann::json ours = named_files(scene);
   ours["color"] = color_origin_text(scene.label.provenance);
   material.extras = extras(ours);
   model.extensionsUsed = {"KHR_materials_unlit"};
@@ -166,7 +164,7 @@ int camera_index(const Intrinsics& lens, double near, double far, tinygltf::Mode
   camera.perspective.yfov = 2 * std::atan(0.5 * lens.height / lens.fy);
   camera.perspective.znear = near;
   camera.perspective.zfar = far;
-  const Json intrinsics{
+  const nlohmann::json intrinsics{
       {"width", lens.width}, {"height", lens.height},        {"fx", lens.fx}, {"fy", lens.fy}, {"cx", lens.cx},
       {"cy", lens.cy},       {"distortion", lens.distortion}};
   camera.extras = extras(intrinsics);
@@ -253,8 +251,8 @@ std::string gltf_of(tinygltf::Model model, const std::string& buffer_name, const
   tinygltf::Image image;
   image.uri = image_name;
   model.images = {image};
-  Json json = Json::parse(serialized(model, false));
-  json["buffers"] = Json::array({{{"uri", buffer_name}, {"byteLength", bytes}}});
+  nlohmann::json json = nlohmann::json::parse(serialized(model, false));
+  json["buffers"] = nlohmann::json::array({{{"uri", buffer_name}, {"byteLength", bytes}}});
   return json.dump(2) + "\n";
 }
 

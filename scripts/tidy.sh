@@ -1,14 +1,16 @@
 #!/usr/bin/env bash
-# clang-tidy with the checks of .clang-tidy, every warning an error, on sources that build/release compiles.
+# clang-tidy with the checks of .clang-tidy, every warning an error.
 #   scripts/tidy.sh                 all of them, some hours of a core
 #   scripts/tidy.sh FILE...         these
 #   scripts/tidy.sh --changed       those changed since origin/main, or since the last commit where HEAD is origin/main
 # LIMIT=seconds ends it early; the files that were not reached are named and do not count as failures.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-database=build/release/compile_commands.json
+database=build/tidy/compile_commands.json
 command -v clang-tidy > /dev/null || { echo "tidy: not checked, for want of clang-tidy"; exit 0; }
-[ -f "$database" ] || { echo "tidy: $database is missing; configure with 'cmake --preset release'" >&2; exit 66; }
+cuda=OFF
+if command -v nvcc > /dev/null; then cuda=ON; fi
+cmake --preset tidy -DCNERF_CUDA=$cuda > /dev/null
 
 compiled() { sed -n "s|^ *\"file\": \"$PWD/\(.*\.cpp\)\".*|\1|p" "$database" | sort -u; }
 # Sources that changed, and those beside a header that changed.

@@ -12,7 +12,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kMostContent = std::size_t(1) << 26;  // a file that unpacks to more is none of ours
-constexpr std::uint32_t kMostDimensions = 8;
+constexpr std::uint32_t kMostTensorDimensions = 8;
 
 /// Reads values in order and refuses to run past the end.
 class Reader {
@@ -63,7 +63,7 @@ WeightsContent::Parameter next_parameter(Reader& reader) {
   constexpr std::size_t kHalf = 2;  // bytes
   WeightsContent::Parameter parameter;
   parameter.name = reader.text(reader.value<std::uint32_t>());
-  parameter.shape.resize(std::min(reader.value<std::uint32_t>(), kMostDimensions));
+  parameter.shape.resize(std::min(reader.value<std::uint32_t>(), kMostTensorDimensions));
   std::size_t bytes = kHalf;
   for (auto& size : parameter.shape) {
     size = reader.value<std::uint32_t>();

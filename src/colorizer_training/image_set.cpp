@@ -21,7 +21,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kPhotoCanvas = 176;  // side of a training photograph's square canvas, pixels
-constexpr const char* kTileSet = "objects";
 constexpr const char* kUnlabelled[] = {"-", "BACKGROUND_Google"};
 
 bool is_held_out(const std::string& name, int parts) {

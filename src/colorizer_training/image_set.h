@@ -12,8 +12,9 @@
 
 namespace cnerf::colorizer_training {
 
-inline constexpr int kEvaluationSide = 160;  ///< short side of images that are judged, pixels
-inline constexpr int kHeldOutParts = 20;     ///< of every set; some of them, chosen by name, are for validation
+inline constexpr int kEvaluationSide = 160;         ///< short side of images that are judged, pixels
+inline constexpr int kHeldOutParts = 20;            ///< of every set; some of them, chosen by name, are for validation
+inline constexpr const char* kTileSet = "objects";  ///< the set of small pictures
 
 /// What images are known to be. Classes of different sets are never compared with each other.
 struct ClassList {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "src/colorizer_training/batch.h"
+#include "src/colorizer_training/image_set.h"
 #include "src/picture/contact_sheet.h"
 #include "src/picture/encode.h"
 
@@ -14,7 +15,6 @@ using torch::Tensor;
 
 namespace {
 
-constexpr const char* kTileSet = "objects";
 constexpr const char* kSceneSets[] = {"bsds500", "cid22", "imagenet1000"};  // whole scenes, not single things
 constexpr std::size_t kMostTiles = 1000;  // enlarged 64-pixel images; more would only take time
 

@@ -14,6 +14,9 @@
 
 namespace cnerf {
 
+/// Pixels of a step of chroma that processes and threads deal out as one: their logits stay in L2.
+inline constexpr std::size_t kPixelsPerBlock = 64;
+
 struct StepShare {
   int part = 0, parts = 1;  ///< of the processes
   GradientSum sum = {};

@@ -31,8 +31,8 @@ constexpr int kExhaustiveImages = 100;    ///< up to which all pairs are matched
 constexpr int kExhaustiveFrames = 40;     ///< of a clip: where neighbours are known, all pairs are soon a waste
 constexpr int kNeighbours = 10;           ///< matched on each side, where not all pairs are
 constexpr int kAlike = 20;                ///< matched by look, where not all pairs are
-constexpr int kFeatures = 8192;           ///< of an image, at most
-constexpr int kLongestSide = 1600;        ///< pixels at which features are looked for
+constexpr int kColmapFeatures = 8192;     ///< of an image, at most
+constexpr int kColmapSide = 1600;         ///< pixels at which features are looked for
 constexpr int kViewsForLens = 6;          ///< of a camera, from which more than one number of its lens can be told
 constexpr int kViewsForCentre = 15;       ///< the same, from which its principal point can be told from its turns
 constexpr double kFarthestCentre = 0.05;  ///< of the longer side, by which a principal point may be off the middle
@@ -245,8 +245,8 @@ void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, 
     };
     add({"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"}, "0");
     add({"SiftExtraction.num_threads", "FeatureExtraction.num_threads"}, std::to_string(thread_count()));
-    add({"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"}, std::to_string(kLongestSide));
-    add({"SiftExtraction.max_num_features"}, std::to_string(kFeatures));
+    add({"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"}, std::to_string(kColmapSide));
+    add({"SiftExtraction.max_num_features"}, std::to_string(kColmapFeatures));
     const auto scaled = [&, count = members.size()](const Progress& part) {
       if (!progress) return;
       const double done = double(before) + part.fraction * double(count);

@@ -15,8 +15,8 @@ namespace cnerf::prepare {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kLongestSide = 800, kFeatures = 1500;
-constexpr float kRatio = 0.8f;  ///< Lowe's: of the best distance to the second best
+constexpr int kMatchedSide = 800, kMatchedFeatures = 1500;
+constexpr float kMatchRatio = 0.8f;  ///< Lowe's: of the best distance to the second best
 constexpr std::size_t kFewestMatches = 40;
 constexpr double kAgreement = 2;     ///< pixels
 constexpr double kLeastMove = 0.05;  ///< of the diagonal, from which a pair is judged
@@ -32,10 +32,10 @@ struct Features {
 
 Features features_of(const fs::path& file) {
   const LinearImage image = luminance_image(read_linear_image(file, Transfer::kSrgb));
-  const cv::Mat1b picture = reduced_to(grey_codes(image), kLongestSide);
+  const cv::Mat1b picture = reduced_to(grey_codes(image), kMatchedSide);
   Features out;
   out.picture = picture.size();
-  cv::SIFT::create(kFeatures)->detectAndCompute(picture, cv::noArray(), out.points, out.descriptors);
+  cv::SIFT::create(kMatchedFeatures)->detectAndCompute(picture, cv::noArray(), out.points, out.descriptors);
   return out;
 }
 
@@ -68,7 +68,7 @@ Matches match(const Features& a, const Features& b) {
   matcher.knnMatch(a.descriptors, b.descriptors, best, 2);
   matcher.match(b.descriptors, a.descriptors, back);
   for (const auto& two : best) {
-    if (two[0].distance > kRatio * two[1].distance) continue;
+    if (two[0].distance > kMatchRatio * two[1].distance) continue;
     if (back[std::size_t(two[0].trainIdx)].trainIdx != two[0].queryIdx) continue;
     out.from.push_back(a.points[std::size_t(two[0].queryIdx)].pt);
     out.to.push_back(b.points[std::size_t(two[0].trainIdx)].pt);

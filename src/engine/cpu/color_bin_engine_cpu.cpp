@@ -15,7 +15,6 @@ namespace {
 constexpr int kFeatures = kChromaFeatures;
 constexpr int kHeadInputs = kChromaHeadInputs;
 constexpr int kHeadOutputs = kChromaHeadOutputs;
-constexpr std::size_t kBlockPixels = 64;  // four groups: their logits stay in L2
 
 class ColorBinEngineCpu final : public ColorBinEngine {
  public:
@@ -29,8 +28,8 @@ class ColorBinEngineCpu final : public ColorBinEngine {
   double fit(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
              const ChromaLossWeights& more, float learning_rate) override {
     const float scale = 1.0f / float(pixels.pixels());
-    const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
-    chunks_.run(last - own, kBlockPixels, features_.weight_count() + head_.layout().weight_count(),
+    const auto [own, last] = share_.range(pixels.pixels(), kPixelsPerBlock);
+    chunks_.run(last - own, kPixelsPerBlock, features_.weight_count() + head_.layout().weight_count(),
                 [&, shift = own](StepChunk& chunk, std::size_t from, std::size_t to) {
                   const std::size_t begin = shift + from, end = shift + to;
                   Work& work = works_.local();
@@ -53,7 +52,7 @@ class ColorBinEngineCpu final : public ColorBinEngine {
 
   void logits(const PixelSamples& pixels, std::span<float> logits) const override {
     CNERF_CHECK_EQ(logits.size(), pixels.pixels() * kAbBinCount);
-    parallel_ranges(pixels.pixels(), kBlockPixels, [&](std::size_t begin, std::size_t end) {
+    parallel_ranges(pixels.pixels(), kPixelsPerBlock, [&](std::size_t begin, std::size_t end) {
       Work& work = works_.local();
       forward(pixels, begin, end, work);
       const GroupedView<const float> of_block(work.logits, kHeadOutputs);
@@ -65,7 +64,7 @@ class ColorBinEngineCpu final : public ColorBinEngine {
 
   void decode(const PixelSamples& pixels, float temperature, std::span<Ab> colors) const override {
     CNERF_CHECK_EQ(colors.size(), pixels.pixels());
-    parallel_ranges(pixels.pixels(), kBlockPixels, [&](std::size_t begin, std::size_t end) {
+    parallel_ranges(pixels.pixels(), kPixelsPerBlock, [&](std::size_t begin, std::size_t end) {
       Work& work = works_.local();
       forward(pixels, begin, end, work);
       const GroupedView<const float> logits(work.logits, kHeadOutputs);

@@ -11,8 +11,6 @@
 namespace cnerf {
 namespace {
 
-constexpr std::size_t kBlockPixels = 64;
-
 class ColorFieldEngineCpu final : public ColorFieldEngine {
  public:
   ColorFieldEngineCpu(const HashGridOptions& grid, std::uint64_t seed)
@@ -22,8 +20,8 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
   double fit(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights, AbLoss loss,
              float learning_rate) override {
     const float scale = 1.0f / float(pixels.pixels());
-    const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
-    chunks_.run(last - own, kBlockPixels, field_.weight_count(),
+    const auto [own, last] = share_.range(pixels.pixels(), kPixelsPerBlock);
+    chunks_.run(last - own, kPixelsPerBlock, field_.weight_count(),
                 [&, shift = own](StepChunk& chunk, std::size_t from, std::size_t to) {
                   const std::size_t begin = shift + from, end = shift + to;
                   PointWorkspace& work = works_.local();
@@ -45,7 +43,7 @@ class ColorFieldEngineCpu final : public ColorFieldEngine {
 
   void composite(const PixelSamples& pixels, std::span<Ab> colors) const override {
     CNERF_CHECK_EQ(colors.size(), pixels.pixels());
-    parallel_ranges(pixels.pixels(), kBlockPixels, [&](std::size_t begin, std::size_t end) {
+    parallel_ranges(pixels.pixels(), kPixelsPerBlock, [&](std::size_t begin, std::size_t end) {
       PointWorkspace& work = works_.local();
       const std::size_t first = forward(pixels, begin, end, work);
       for (std::size_t p = begin; p < end; ++p) colors[p] = ab_of(xyz_of(pixels, p, first, work));

@@ -13,7 +13,6 @@ namespace cnerf {
 namespace {
 
 constexpr std::size_t kPixelsAtATime = 1 << 14;  // that are asked about
-constexpr std::size_t kBlockPixels = 64;         // that processes deal out
 
 class ColorBinEngineCuda final : public ColorBinEngine {
  public:
@@ -31,7 +30,7 @@ class ColorBinEngineCuda final : public ColorBinEngine {
   double fit(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
              const ChromaLossWeights& more, float learning_rate) override {
     const std::lock_guard lock(mutex_);
-    const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
+    const auto [own, last] = share_.range(pixels.pixels(), kPixelsPerBlock);
     const std::size_t n = last - own;
     batch_.upload(pixels, own, last, stream_);
     stream_.begin_step(learning_rate, step_count(), batch_.samples());

@@ -9,9 +9,8 @@
 namespace cnerf {
 namespace {
 
-constexpr std::size_t kPixelsAtATime = 1 << 16;
+constexpr std::size_t kFieldPixelsAtATime = 1 << 16;
 constexpr std::size_t kPointsAtATime = 1 << 20;
-constexpr std::size_t kBlockPixels = 64;  // that processes deal out
 
 class ColorFieldEngineCuda final : public ColorFieldEngine {
  public:
@@ -26,7 +25,7 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
   double fit(const PixelSamples& pixels, std::span<const Ab> targets, std::span<const float> pixel_weights, AbLoss loss,
              float learning_rate) override {
     const std::lock_guard lock(mutex_);
-    const auto [own, last] = share_.range(pixels.pixels(), kBlockPixels);
+    const auto [own, last] = share_.range(pixels.pixels(), kPixelsPerBlock);
     const std::size_t n = last - own;
     batch_.upload(pixels, own, last, stream_);
     stream_.begin_step(learning_rate, step_count(), batch_.samples());
@@ -50,8 +49,8 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
   void composite(const PixelSamples& pixels, std::span<Ab> colors) const override {
     CNERF_CHECK_EQ(colors.size(), pixels.pixels());
     const std::lock_guard lock(mutex_);
-    for (std::size_t begin = 0; begin < pixels.pixels(); begin += kPixelsAtATime) {
-      const std::size_t end = std::min(begin + kPixelsAtATime, pixels.pixels());
+    for (std::size_t begin = 0; begin < pixels.pixels(); begin += kFieldPixelsAtATime) {
+      const std::size_t end = std::min(begin + kFieldPixelsAtATime, pixels.pixels());
       batch_.upload(pixels, begin, end, stream_);
       field_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/false, stream_);
       colors_.reserve(end - begin, "pixels");

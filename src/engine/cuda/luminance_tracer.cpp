@@ -13,15 +13,15 @@ constexpr std::size_t kTracedAtATime = LuminanceTracerCuda::kTracedAtATime;
 constexpr std::size_t kUsualSamples = 16;  // that are kept of a ray
 constexpr std::size_t kGrain = 1 << 14;    // samples of a parallel piece of work
 
-const char* const kRayAdvice = "rays";
+const char* const kTracedAdvice = "rays";
 
 }  // namespace
 
 TraceJob LuminanceTracerCuda::job(const FieldView& field, std::uint32_t rays, const MarchSettings& march,
                                   const RenderEffort& effort) {
-  state_.reserve(1, kRayAdvice);
-  rays_.reserve(rays, kRayAdvice);
-  directions_.reserve(rays, kRayAdvice);
+  state_.reserve(1, kTracedAdvice);
+  rays_.reserve(rays, kTracedAdvice);
+  directions_.reserve(rays, kTracedAdvice);
   StepState state;
   state.rays = state.end_ray = rays;
   state_.upload(&state, 1, stream_);
@@ -41,7 +41,7 @@ TraceJob LuminanceTracerCuda::job_of_rays(const FieldView& field, std::span<cons
                                           const RenderEffort& effort) {
   const auto count = std::uint32_t(rays.size());
   const TraceJob trace = job(field, count, march, effort);
-  plain_rays_.reserve(count, kRayAdvice);
+  plain_rays_.reserve(count, kTracedAdvice);
   plain_rays_.upload(rays.data(), count, stream_);
   prepare_rays(plain_rays_.data(), count, rays_.data(), directions_.data(), stream_);
   return trace;
@@ -51,7 +51,7 @@ void LuminanceTracerCuda::render(const FieldView& field, std::span<const Ray> ra
                                  const RenderEffort& effort, std::span<RayResult> results) {
   for (std::size_t first = 0; first < rays.size(); first += kRaysAtATime) {
     const std::size_t count = std::min<std::size_t>(kRaysAtATime, rays.size() - first);
-    results_.reserve(count, kRayAdvice);
+    results_.reserve(count, kTracedAdvice);
     TraceJob trace = job_of_rays(field, rays.subspan(first, count), march, effort);
     trace.results = results_.data();
     render_rays(trace, stream_);
@@ -63,7 +63,7 @@ void LuminanceTracerCuda::render(const FieldView& field, std::span<const Ray> ra
 void LuminanceTracerCuda::render_view(const FieldView& field, const UnitCamera& camera, const MarchSettings& march,
                                       const RenderEffort& effort, std::span<RayResult> results) {
   const auto count = std::uint32_t(camera.intrinsics.width) * std::uint32_t(camera.intrinsics.height);
-  results_.reserve(count, kRayAdvice);
+  results_.reserve(count, kTracedAdvice);
   TraceJob trace = job(field, count, march, effort);
   camera_rays(camera, count, rays_.data(), directions_.data(), stream_);
   trace.results = results_.data();
@@ -74,15 +74,15 @@ void LuminanceTracerCuda::render_view(const FieldView& field, const UnitCamera& 
 
 void LuminanceTracerCuda::trace_to(const FieldView& field, std::span<const Ray> rays, const MarchSettings& march,
                                    const RenderEffort& effort, TracedBuffers& to) {
-  scratch_.reserve(tracing_warps(field.n_levels) * kMostSamplesOfRay, kRayAdvice);
-  to.begins.reserve(rays.size(), kRayAdvice);
-  to.ends.reserve(rays.size(), kRayAdvice);
-  to.results.reserve(rays.size(), kRayAdvice);
+  scratch_.reserve(tracing_warps(field.n_levels) * kMostSamplesOfRay, kTracedAdvice);
+  to.begins.reserve(rays.size(), kTracedAdvice);
+  to.ends.reserve(rays.size(), kTracedAdvice);
+  to.results.reserve(rays.size(), kTracedAdvice);
   to.rays = std::uint32_t(rays.size());
   std::size_t room = kUsualSamples * rays.size();
   while (true) {
-    to.positions.reserve(room, kRayAdvice);
-    for (auto* buffer : {&to.t, &to.weights, &to.luminance}) buffer->reserve(room, kRayAdvice);
+    to.positions.reserve(room, kTracedAdvice);
+    for (auto* buffer : {&to.t, &to.weights, &to.luminance}) buffer->reserve(room, kTracedAdvice);
     TraceJob trace = job_of_rays(field, rays, march, effort);
     trace.kept = {
         scratch_.data(),     effort.shaded_share, std::uint32_t(std::min<std::size_t>(to.t.size(), ~std::uint32_t(0))),

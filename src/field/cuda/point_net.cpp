@@ -8,14 +8,14 @@ namespace {
 
 static_assert(kPointFeatures == kChromaFeatures && kPointNumbers == kChromaticityOutputs);
 
-const char* const kGridAdvice = "the hash grid of colours; lower stage2.grid.log2_rows or stage2.grid.levels";
-const char* const kSampleAdvice = "the samples of a step; lower stage2.rays_per_patch";
+const char* const kColorGridAdvice = "the hash grid of colours; lower stage2.grid.log2_rows or stage2.grid.levels";
+const char* const kPatchAdvice = "the samples of a step; lower stage2.rays_per_patch";
 
 }  // namespace
 
 PointNetCuda::PointNetCuda(const HashGridOptions& grid, PointOutputs outputs, std::uint64_t seed)
     : outputs_(outputs),
-      grid_(grid, seed, kGridAdvice),
+      grid_(grid, seed, kColorGridAdvice),
       net_(initial_weights(
           point_net_layout(levels(), outputs == PointOutputs::kFeatures ? kPointFeatures : kPointNumbers), seed,
           kPointNetStream)),
@@ -26,15 +26,15 @@ void PointNetCuda::forward(const Vec3f* positions, std::uint32_t count, bool for
   const std::size_t points = count;
   PointForwardJob job{&grid_.levels(), grid_.table(), packed_.weights().forward, positions, count};
   if (for_training) {
-    encoded_.reserve(points * std::size_t(2 * channel_tiles(levels())), kSampleAdvice);
-    d_encoded_.reserve(points * std::size_t(4 * levels()), kSampleAdvice);
+    encoded_.reserve(points * std::size_t(2 * channel_tiles(levels())), kPatchAdvice);
+    d_encoded_.reserve(points * std::size_t(4 * levels()), kPatchAdvice);
     job.encoded = encoded_.data();
   }
   if (outputs_ == PointOutputs::kFeatures) {
-    features_.reserve(points * (kPointFeatures / 2), kSampleAdvice);
+    features_.reserve(points * (kPointFeatures / 2), kPatchAdvice);
     job.features = features_.data();
   } else {
-    numbers_.reserve(points, kSampleAdvice);
+    numbers_.reserve(points, kPatchAdvice);
     job.numbers = numbers_.data();
   }
   point_forward(outputs_, job, stream);

@@ -21,8 +21,8 @@ constexpr float kAlike = 0.5f;      // and to be like it costs so much more than
 constexpr float kNoSurface = 0.5f;  // between what shows a surface and what does not
 constexpr float kSoft = 0.2f;       // of two colours whose costs differ by this, the dearer counts e times less
 constexpr float kBlack = 16;  // L* where chroma has gone to nothing below black: in Lab, shade scales a, b and L* + 16
-constexpr std::size_t kMostSamples = 400;  // of all colours of a view, each as many
-constexpr std::size_t kGrain = 1024;       // pixels of a parallel piece of work
+constexpr std::size_t kMostSamples = 400;      // of all colours of a view, each as many
+constexpr std::size_t kPixelsPerPiece = 1024;  // pixels of a parallel piece of work
 
 bool same(Ab x, Ab y) {
   return x.a == y.a && x.b == y.b;
@@ -189,7 +189,7 @@ void StrokesEverywhere::run(const RunningColors& strokes, const PixelLooks& look
   using Entry = std::tuple<float, std::uint32_t, std::uint32_t>;  // cost, pixel, colour: ties have an order
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
   std::vector<Claims> alike(claims_.size());
-  parallel_ranges(claims_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+  parallel_ranges(claims_.size(), kPixelsPerPiece, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       if (!strokes.is_known(p)) claim_alike(view_, looks, p, alike[p]);
     }

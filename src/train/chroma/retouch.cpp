@@ -12,7 +12,7 @@
 namespace cnerf {
 namespace {
 
-constexpr std::size_t kGrain = 128;  // labels of a parallel piece of work
+constexpr std::size_t kLabelsPerPiece = 128;  // labels of a parallel piece of work
 
 /// What the bins of a label decode to.
 Ab annealed_mean(const SoftLabel& label, float temperature) {
@@ -70,7 +70,7 @@ double Retouch::step() {
   std::vector<float> weights;
   for (const ViewPixel& place : places) weights.push_back(views_[place.view].opacity[place.pixel]);
   std::vector<SoftLabel> labels(colors.size());
-  parallel_ranges(colors.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+  parallel_ranges(colors.size(), kLabelsPerPiece, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       labels[i] = label_decoded_to(colors[i], float(model_.options.decode_temperature));
     }

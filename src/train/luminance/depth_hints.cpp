@@ -9,7 +9,7 @@
 namespace cnerf {
 namespace {
 
-constexpr int kAcross = 64;             // cells along the longer side of a picture
+constexpr int kHintsAcross = 64;        // cells along the longer side of a picture
 constexpr double kReach = 6;            // cells, from a point to where it tells anything
 constexpr std::size_t kNeighbours = 4;  // points that tell of a cell
 constexpr double kExactness = 0.05;     // of the logarithm of distances, at a point: a cell is not one pixel
@@ -26,7 +26,7 @@ class HintedView {
  public:
   HintedView(const View& view, const SceneFrame& frame, const std::vector<Vec3d>& points) {
     const Intrinsics& lens = view.intrinsics;
-    const double cells_per_pixel = double(kAcross) / std::max(lens.width, lens.height);
+    const double cells_per_pixel = double(kHintsAcross) / std::max(lens.width, lens.height);
     hints_.columns = std::max(1, int(std::ceil(lens.width * cells_per_pixel)));
     hints_.rows = std::max(1, int(std::ceil(lens.height * cells_per_pixel)));
     const double across = double(hints_.columns) / lens.width, down = double(hints_.rows) / lens.height;

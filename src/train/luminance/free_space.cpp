@@ -10,10 +10,10 @@ namespace cnerf {
 namespace {
 
 constexpr int kVotes = 2;               // that make a place free: a way to a point is one, all points of a view are two
-constexpr int kAcross = 64;             // cells of a sight along the longer side of its picture
+constexpr int kSightsAcross = 64;       // cells of a sight along the longer side of its picture
 constexpr double kWayRadius = 2.5;      // cells around a point that its view sees through as well
 constexpr double kWayShare = 0.9;       // of the way to a point: points are not exact, surfaces between them bend
-constexpr double kNearShare = 0.8;      // of the distance to the nearest of what a view shows
+constexpr double kNearestShare = 0.8;   // of the distance to the nearest of what a view shows
 constexpr double kNearQuantile = 0.02;  // of its points, which counts as the nearest: some points are wrong
 constexpr std::size_t kFewestPoints = 20;  // of a view that knows what is nearest
 
@@ -35,7 +35,7 @@ bool is_in_picture(const Intrinsics& lens, PixelPosition at) {
 FreeSpace::Sight::Sight(const View& view, const std::vector<Vec3d>& shown, const std::vector<SkyLabel>& sky)
     : camera_from_world_(view.world_from_camera.inverse()),
       lens_(&view.intrinsics),
-      cells_per_pixel_(double(kAcross) / std::max(lens_->width, lens_->height)),
+      cells_per_pixel_(double(kSightsAcross) / std::max(lens_->width, lens_->height)),
       width_(std::max(1, int(std::ceil(lens_->width * cells_per_pixel_)))),
       height_(std::max(1, int(std::ceil(lens_->height * cells_per_pixel_)))),
       clear_depth_(std::size_t(width_) * std::size_t(height_), 0.0f),
@@ -84,7 +84,7 @@ void FreeSpace::Sight::clear_way_to_sky(const std::vector<SkyLabel>& sky) {
 void FreeSpace::Sight::clear_the_near(std::vector<double> depths) {
   const auto nearest = depths.begin() + std::ptrdiff_t(kNearQuantile * double(depths.size()));
   std::ranges::nth_element(depths, nearest);
-  near_ = kNearShare * *nearest;
+  near_ = kNearestShare * *nearest;
   for (float& known : clear_depth_) known = known == 0 ? float(near_) : known;
 }
 
