@@ -10,7 +10,7 @@ database=build/tidy/compile_commands.json
 command -v clang-tidy > /dev/null || { echo "tidy: not checked, for want of clang-tidy"; exit 0; }
 cuda=OFF
 if command -v nvcc > /dev/null; then cuda=ON; fi
-cmake --preset tidy -DCNERF_CUDA=$cuda > /dev/null
+cmake --log-level=WARNING --preset tidy -DCNERF_CUDA=$cuda > /dev/null
 
 compiled() { sed -n "s|^ *\"file\": \"$PWD/\(.*\.cpp\)\".*|\1|p" "$database" | sort -u; }
 # Sources that changed, and those beside a header that changed.
