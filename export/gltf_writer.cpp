@@ -33,7 +33,7 @@ tinygltf::Value value_from(const nlohmann::json& json) {
   return tinygltf::Value(json.get<std::string>());
 }
 
-/// nlohmann::json are objects with one member of ours, so that others can add theirs.
+/// Extras are objects with one member of ours, so that others can add theirs.
 tinygltf::Value extras(const nlohmann::json& ours) {
   return value_from({{"cnerf", ours}});
 }

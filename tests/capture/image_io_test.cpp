@@ -161,6 +161,14 @@ TEST_F(ImageIo, ExrOfImplausibleLightIsRefused) {
   }
 }
 
+TEST_F(ImageIo, ExrOfImplausibleCoverageIsRefused) {
+  const fs::path file = folder_ / "a.exr";
+  write_exr(file, {1, 1, {{"Y", std::vector<float>{1}}, {"A", std::vector<float>{0.5f}}}, {}});
+  EXPECT_NO_THROW((void)read_linear_image(file, Transfer::kSrgb));
+  write_exr(file, {1, 1, {{"Y", std::vector<float>{1}}, {"A", std::vector<float>{2e6f}}}, {}});
+  EXPECT_THROW((void)read_linear_image(file, Transfer::kSrgb), InputError);
+}
+
 TEST_F(ImageIo, TruncatedImagesAreRefused) {
   cv::Mat noise(64, 64, CV_8UC3);
   cv::randu(noise, 0, 256);
