@@ -30,6 +30,11 @@ Words tiny() {
       kOneThread);
 }
 
+/// A page that shows the take.
+Words page() {
+  return {"bake", "@/run", "--take", "t", "--threads", "1", "--format", "web", "--web-resolution", "24"};
+}
+
 /// w x y z of a rotation; good for half turns too.
 std::array<double, 4> quaternion_of(const std::array<std::array<double, 3>, 3>& m) {
   const auto part = [](double square) { return std::sqrt(std::max(square, 0.0)) / 2; };
@@ -77,7 +82,7 @@ void make_photographs(const fs::path& capture, const fs::path& photographs, cons
 }  // namespace
 
 Fixtures::Fixtures(const Subject& subject, const fs::path& scratch) : folder_(fs::absolute(scratch) / "fixtures") {
-  if (fs::exists(folder_ / "bake")) return;
+  if (fs::exists(folder_ / "shown")) return;
   fs::remove_all(folder_);
   const Slot slot(scratch, 9);
   const auto make = [&](const Words& words) {
@@ -97,6 +102,8 @@ Fixtures::Fixtures(const Subject& subject, const fs::path& scratch) : folder_(fs
   fs::copy(slot.root() / "run", folder_ / "take", fs::copy_options::recursive);
   make({"bake", "@/run", "--take", "t", "-o", "@/bake"});
   move("bake");
+  make(page());
+  fs::copy(slot.root() / "run", folder_ / "shown", fs::copy_options::recursive);
 }
 
 std::vector<Command> Fixtures::commands() const {
@@ -148,14 +155,14 @@ std::vector<Command> Fixtures::commands(const std::vector<std::string>& names) c
 
 std::vector<Command> Fixtures::neighbours() const {
   const std::string capture = (folder_ / "capture").string();
-  const auto command = [](const char* name, const Words& words) { return Command{name, "take", words, {}}; };
+  const auto command = [](const char* name, const Words& words) { return Command{name, "shown", words, {}}; };
   return {
       command("train", joined({"train", capture, "-o", "@/run", "--overwrite"}, tiny())),
       command("colorize", joined({"colorize", "@/run", "--take", "u", "--colorizer", kColorizer}, kOneThread)),
       command("colorize-other", joined({"colorize", "@/run", "--take", "v", "--colorizer", "grey"}, kOneThread)),
       command("bake", {"bake", "@/run", "--take", "t", "--threads", "1"}),
       command("bake-smaller", {"bake", "@/run", "--take", "t", "--threads", "1", "--resolution", "24"}),
-      command("web", {"bake", "@/run", "--take", "t", "--threads", "1", "--format", "web", "--web-resolution", "24"}),
+      command("web", joined(page(), {"--overwrite"})),
       command("eval", joined({"eval", "@/run", "--take", "t"}, kOneThread)),
       command("render", joined({"render", "@/run", "--take", "t"}, kOneThread)),
       command("info", {"info", "@/run"}),

@@ -17,8 +17,8 @@ struct Command {
   std::vector<std::string> info;   ///< what `cnerf info` is asked about afterwards; below the root
 };
 
-/// What commands begin with, made once in SCRATCH/fixtures: a capture, photographs and a model of it, a run, a take "t"
-/// and its bake.
+/// What commands begin with, made once in SCRATCH/fixtures: a capture, photographs and a model of it, a run, a take
+/// "t", its bake, and the same with a page.
 class Fixtures {
  public:
   /// @throws std::runtime_error  when the program cannot make them.
@@ -27,7 +27,7 @@ class Fixtures {
   [[nodiscard]] std::vector<Command> commands() const;
   /// Those named; all when none is.  @throws std::runtime_error  on an unknown name.
   [[nodiscard]] std::vector<Command> commands(const std::vector<std::string>& names) const;
-  /// What pairs are made of; all of them work on a run with a take "t" at @/run.
+  /// What pairs are made of; all of them work on a run at @/run with a take "t" and its page.
   [[nodiscard]] std::vector<Command> neighbours() const;
   /// Files that `cnerf info` reads, one of each kind.
   [[nodiscard]] std::vector<Command> readers() const;

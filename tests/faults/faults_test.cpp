@@ -38,7 +38,7 @@ TEST_F(Faults, KillsAtRandomMoments) {
 }
 
 TEST_F(Faults, TwoProgramsInOneFolder) {
-  CampaignOptions some = options({"bake", "bake-smaller", "colorize", "info"});
+  CampaignOptions some = options({"bake", "bake-smaller", "colorize", "info", "view"});
   some.count = 2;
   const Report report = run_pairs(some);
   EXPECT_TRUE(report.violations.empty()) << report.text();
