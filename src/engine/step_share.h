@@ -45,8 +45,7 @@ class SharedNumbers {
   void add(std::span<const float> values) { values_.insert(values_.end(), values.begin(), values.end()); }
   /// In two floats, so that sums below 2^36 are exact.
   void add_count(std::size_t count) {
-    add(float(count / kHalf));
-    add(float(count % kHalf));
+    for (const std::size_t half : {count / kHalf, count % kHalf}) add(float(half));
   }
   void sum(const GradientSum& sum) { sum(values_); }
 

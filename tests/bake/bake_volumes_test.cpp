@@ -18,11 +18,11 @@
 namespace cnerf::bake::test {
 namespace {
 
-const SceneFrame kFrame{{1, 2, 3}, 0.5, 1};  // world box: 2 units around (1, 2, 3)
+const SceneFrame kBoxFrame{{1, 2, 3}, 0.5, 1};  // world box: 2 units around (1, 2, 3)
 
 /// A box of 1 x 0.5 x 0.5 world units, 40 x 20 x 20 voxels of 0.025.
 AnalyticField slab(float sigma_unit, Chromaticity chromaticity = {}) {
-  return {kFrame, box_density({0.25f, 0.375f, 0.375f}, {0.75f, 0.625f, 0.625f}, sigma_unit), 0.5f, chromaticity};
+  return {kBoxFrame, box_density({0.25f, 0.375f, 0.375f}, {0.75f, 0.625f, 0.625f}, sigma_unit), 0.5f, chromaticity};
 }
 
 Options slab_options() {
@@ -51,7 +51,7 @@ TEST(BakeVolume, OpticalDepthOfASlabIsExactInWorldUnits) {
 
 TEST(BakeVolume, HalfCoveredVoxelsLetHalfOfTheLightThrough) {
   // The slab's faces towards y and z cut voxels in the middle.
-  AnalyticField field(kFrame, box_density({0.25f, 0.375f, 0.375f}, {0.75f, 0.63125f, 0.625f}, 400), 0.5f);
+  AnalyticField field(kBoxFrame, box_density({0.25f, 0.375f, 0.375f}, {0.75f, 0.63125f, 0.625f}, 400), 0.5f);
   Options options = slab_options();
   options.subsamples = 4;
   options.sharpening = 0;
@@ -188,7 +188,7 @@ TEST(BakeVolume, VoxelsThatNoCameraSeesAreDropped) {
 
 TEST(BakeVolume, VoxelsThatHardlyReachAnyPixelAreDropped) {
   // Fog in front of the camera and a wall: behind the wall fog is seen by nobody, in front each voxel takes 2.5 %.
-  AnalyticField field(kFrame, box_density({0.25f, 0.375f, 0.375f}, {0.75f, 0.625f, 0.625f}, 2));
+  AnalyticField field(kBoxFrame, box_density({0.25f, 0.375f, 0.375f}, {0.75f, 0.625f, 0.625f}, 2));
   const auto dense = [&](double threshold) {
     Options options = slab_options();
     options.weight_threshold = threshold;
@@ -208,7 +208,7 @@ TEST(BakeVolume, NothingSeenIsAnInputError) {
 }
 
 TEST(BakeVolume, DoesNotDependOnTheNumberOfThreads) {
-  AnalyticField field(kFrame, sphere_density({0.5f, 0.45f, 0.55f}, 0.2f, 30));
+  AnalyticField field(kBoxFrame, sphere_density({0.5f, 0.45f, 0.55f}, 0.2f, 30));
   field.with_luminance([](Vec3f p, Vec3f d) { return p.x + 0.3f * d.y + 0.4f; });
   field.with_chromaticity([](Vec3f p) { return Chromaticity{0.9f + 0.2f * p.y, 1.1f - 0.2f * p.z}; });
   const std::vector<Camera> cameras{camera_at_positive_x(), camera_at("top", {1, 2, 8}, {1, 2, 3}, 64, 64, 100)};

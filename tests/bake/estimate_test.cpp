@@ -14,10 +14,10 @@
 namespace cnerf::bake::test {
 namespace {
 
-const SceneFrame kFrame{{10, 20, 30}, 0.25, 1};  // world box: 4 units around (10, 20, 30)
+const SceneFrame kSphereFrame{{10, 20, 30}, 0.25, 1};  // world box: 4 units around (10, 20, 30)
 
 AnalyticField ball() {
-  return {kFrame, sphere_density({0.5f, 0.5f, 0.5f}, 0.25f, 400), 0.5f};
+  return {kSphereFrame, sphere_density({0.5f, 0.5f, 0.5f}, 0.25f, 400), 0.5f};
 }
 
 Estimate estimate_at(int resolution) {

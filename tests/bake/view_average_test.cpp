@@ -19,12 +19,12 @@ std::unique_ptr<ViewAverage> view_average(const ColorField& field, const std::ve
   return make_view_average(field, cameras, options, ProcessorAlone(), nobody);
 }
 
-const SceneFrame kFrame{{0, 0, 0}, 0.25, 1};  // world box: 4 units around the origin
+const SceneFrame kCentredFrame{{0, 0, 0}, 0.25, 1};  // world box: 4 units around the origin
 constexpr Vec3f kMiddle{0.5f, 0.5f, 0.5f};
 
 /// An opaque ball of world radius 1 that shines 0.2 towards +x, 0.6 towards +y and 0.4 elsewhere.
 AnalyticField shining_ball() {
-  AnalyticField field(kFrame, sphere_density(kMiddle, 0.25f, 400));
+  AnalyticField field(kCentredFrame, sphere_density(kMiddle, 0.25f, 400));
   field.with_luminance([](Vec3f, Vec3f d) { return d.x < -0.9f ? 0.2f : d.y < -0.9f ? 0.6f : 0.4f; });
   return field;
 }
@@ -33,7 +33,7 @@ std::vector<Camera> two_cameras() {
   return {camera_at("x", {8, 0, 0}, {0, 0, 0}, 64, 64, 100), camera_at("y", {0, 8, 0}, {0, 0, 0}, 64, 64, 100)};
 }
 
-Options coarse() {
+Options few_voxels() {
   Options options;
   options.resolution = 48;
   return options;
@@ -47,7 +47,7 @@ std::vector<float> averages(const ViewAverage& average, const std::vector<Vec3f>
 
 TEST(ViewAverage, IsTheMeanOfTheViewsThatSeeAPoint) {
   const AnalyticField field = shining_ball();
-  const auto average = view_average(field, two_cameras(), coarse());
+  const auto average = view_average(field, two_cameras(), few_voxels());
   const auto on_ball = [](Vec3f direction) { return kMiddle + normalized(direction) * 0.25f; };
   const auto luminance =
       averages(*average, {on_ball({1, 0, 0}), on_ball({0, 1, 0}), on_ball({1, 1, 0}), on_ball({-1, -1, 0})});
@@ -59,14 +59,14 @@ TEST(ViewAverage, IsTheMeanOfTheViewsThatSeeAPoint) {
 
 TEST(ViewAverage, IsWhatABakePutsIntoItsVoxels) {
   const AnalyticField field = shining_ball();
-  const Volume volume = bake_volume(field, two_cameras(), coarse());
-  const auto average = view_average(field, two_cameras(), coarse());
+  const Volume volume = bake_volume(field, two_cameras(), few_voxels());
+  const auto average = view_average(field, two_cameras(), few_voxels());
   std::vector<Vec3f> centres;
   std::vector<float> baked;
   for (const Voxel& voxel : volume.voxels) {
-    if (voxel.sigma < 0.999f * 400 * float(kFrame.unit_per_world)) continue;  // full: colour of its middle
+    if (voxel.sigma < 0.999f * 400 * float(kCentredFrame.unit_per_world)) continue;  // full: colour of its middle
     const Vec3d world = volume.origin + Vec3d{voxel.i + 0.5, voxel.j + 0.5, voxel.k + 0.5} * volume.voxel_size;
-    centres.push_back(kFrame.unit_from_world(world).cast<float>());
+    centres.push_back(kCentredFrame.unit_from_world(world).cast<float>());
     baked.push_back(voxel.luminance);
   }
   ASSERT_GT(baked.size(), 200u);
@@ -82,7 +82,7 @@ TEST(ViewAverage, IsWhatABakePutsIntoItsVoxels) {
 
 TEST(ViewAverage, DoesNotDependOnThreadsOrOnWhatElseIsAsked) {
   const AnalyticField field = shining_ball();
-  const auto average = view_average(field, two_cameras(), coarse());
+  const auto average = view_average(field, two_cameras(), few_voxels());
   std::vector<Vec3f> positions;
   for (int i = 0; i < 200; ++i) {
     const float turn = 0.1f * float(i);

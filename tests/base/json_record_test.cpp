@@ -50,7 +50,7 @@ Outer filled() {
   return {3, true, "", {"a", 20.5}, {{"b", {}}, {"c", 1}}, {1.5f, 2}, {{"train", 1.25}}, "x/y"};
 }
 
-std::string refusal(const std::function<void(Json&)>& change) {
+std::string refusal_of_change(const std::function<void(Json&)>& change) {
   Json json = json_of(filled());
   change(json);
   try {
@@ -68,7 +68,7 @@ TEST(JsonRecord, WritesFieldsInOrderAndLeavesOutWhatIsEmpty) {
 }
 
 TEST(JsonRecord, APathEndsWhereItsTextDoes) {
-  EXPECT_THAT(refusal([](Json& json) { json["file"] = std::string("a\0b", 3); }),
+  EXPECT_THAT(refusal_of_change([](Json& json) { json["file"] = std::string("a\0b", 3); }),
               testing::HasSubstr("cell.json: file"));
 }
 
@@ -79,20 +79,22 @@ TEST(JsonRecord, ReadsWhatItWrote) {
 }
 
 TEST(JsonRecord, ErrorsNameFileAndField) {
-  EXPECT_EQ(refusal([](Json& json) { json.erase("seed"); }), "cell.json: seed: is missing");
-  EXPECT_EQ(refusal([](Json& json) { json["all"][1]["name"] = 4; }), "cell.json: all[1].name: got 4");
-  EXPECT_EQ(refusal([](Json& json) { json["best"] = "a"; }), "cell.json: best: expected an object, got \"a\"");
-  EXPECT_EQ(refusal([](Json& json) { json["size"].push_back(3); }),
+  EXPECT_EQ(refusal_of_change([](Json& json) { json.erase("seed"); }), "cell.json: seed: is missing");
+  EXPECT_EQ(refusal_of_change([](Json& json) { json["all"][1]["name"] = 4; }), "cell.json: all[1].name: got 4");
+  EXPECT_EQ(refusal_of_change([](Json& json) { json["best"] = "a"; }),
+            "cell.json: best: expected an object, got \"a\"");
+  EXPECT_EQ(refusal_of_change([](Json& json) { json["size"].push_back(3); }),
             "cell.json: size: expected 2 values, got [1.5,2.0,3]");
-  EXPECT_EQ(refusal([](Json& json) { json["seconds"]["train"] = "long"; }), "cell.json: seconds.train: got \"long\"");
-  EXPECT_EQ(refusal([](Json& json) { json["seed"] = 1.5; }), "cell.json: seed: got 1.5");
-  EXPECT_EQ(refusal([](Json& json) { json["is_done"] = 1; }), "cell.json: is_done: got 1");
-  EXPECT_EQ(refusal([](Json& json) { json["seed"] = 4294967297; }), "cell.json: seed: got 4294967297");
-  EXPECT_EQ(refusal([](Json& json) { json["seed"] = std::uint64_t(1) << 63; }),
+  EXPECT_EQ(refusal_of_change([](Json& json) { json["seconds"]["train"] = "long"; }),
+            "cell.json: seconds.train: got \"long\"");
+  EXPECT_EQ(refusal_of_change([](Json& json) { json["seed"] = 1.5; }), "cell.json: seed: got 1.5");
+  EXPECT_EQ(refusal_of_change([](Json& json) { json["is_done"] = 1; }), "cell.json: is_done: got 1");
+  EXPECT_EQ(refusal_of_change([](Json& json) { json["seed"] = 4294967297; }), "cell.json: seed: got 4294967297");
+  EXPECT_EQ(refusal_of_change([](Json& json) { json["seed"] = std::uint64_t(1) << 63; }),
             "cell.json: seed: got 9223372036854775808");
-  EXPECT_EQ(refusal([](Json& json) { json["size"][0] = 1e39; }), "cell.json: size[0]: got 1e+39");
-  EXPECT_EQ(refusal([](Json& json) { json = Json::array(); }), "cell.json: expected an object, got []");
-  EXPECT_EQ(refusal([](Json& json) { json["later"] = 1; }), "(nothing was thrown)") << "of a later version";
+  EXPECT_EQ(refusal_of_change([](Json& json) { json["size"][0] = 1e39; }), "cell.json: size[0]: got 1e+39");
+  EXPECT_EQ(refusal_of_change([](Json& json) { json = Json::array(); }), "cell.json: expected an object, got []");
+  EXPECT_EQ(refusal_of_change([](Json& json) { json["later"] = 1; }), "(nothing was thrown)") << "of a later version";
 }
 
 TEST(JsonRecord, AFileThatIsNoJsonIsRefusedAsTheCallerWants) {

@@ -37,7 +37,7 @@ struct Silhouettes {
   std::size_t pixels = 0;
 };
 
-Silhouettes compare(const RenderedExr& volume, const RenderedExr& mesh) {
+Silhouettes compare_silhouettes(const RenderedExr& volume, const RenderedExr& mesh) {
   std::size_t both = 0, either = 0;
   double squared = 0;
   for (int y = 0; y < volume.height; ++y) {
@@ -79,7 +79,7 @@ TEST_P(MeshBesideVolume, SilhouettesAndColoursAgree) {
     const std::string look = std::string("--samples 16 --camera ") + camera;
     const RenderedExr volume = render_exact(bake.blender_setup(), look);
     const RenderedExr mesh = render_exact(bake.blender_setup(), look + " --mesh only");
-    const Silhouettes equal = compare(volume, mesh);
+    const Silhouettes equal = compare_silhouettes(volume, mesh);
     std::printf("volume against mesh, camera %s: IoU %.4f, colours differ by %.4f\n", camera, equal.iou,
                 equal.difference);
     EXPECT_GT(equal.pixels, 1500u);

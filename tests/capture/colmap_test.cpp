@@ -10,7 +10,7 @@ namespace {
 
 using testing::ElementsAre;
 
-void expect_ring(const Capture& capture, int count) {
+void expect_named_ring(const Capture& capture, int count) {
   ASSERT_EQ(capture.views.size(), std::size_t(count));
   for (int i = 0; i < count; ++i) {
     const View& view = capture.views[std::size_t(i)];
@@ -33,7 +33,7 @@ TEST_F(Colmap, ReadsBinaryModels) {
   test::write_colmap_binary(folder_ / "sparse/0");
   const Capture capture = load_capture(folder_.path());
   EXPECT_EQ(capture.format, "colmap");
-  expect_ring(capture, 4);
+  expect_named_ring(capture, 4);
   EXPECT_EQ(capture.views[0].intrinsics.fy, 21);
   ASSERT_EQ(capture.points.size(), 2u);
   EXPECT_EQ(capture.points[1], (SparsePoint{{1.5, -1, 2}, 0.7, {0}}));
@@ -45,7 +45,7 @@ TEST_F(Colmap, TextSaysTheSame) {
   std::filesystem::remove_all(folder_ / "sparse");
   test::write_colmap_text(folder_ / "sparse");
   const Capture text = load_capture(folder_.path());
-  expect_ring(text, 4);
+  expect_named_ring(text, 4);
   EXPECT_EQ(text.points, binary.points);
   EXPECT_EQ(text.views[3].intrinsics, binary.views[3].intrinsics);
 }
@@ -55,13 +55,13 @@ TEST_F(Colmap, RigsAndFramesOfNewerVersionsChangeNothing) {
   const Capture before = load_capture(folder_.path());
   test::write_colmap_rigs_binary(folder_ / "sparse/0");
   const Capture binary = load_capture(folder_.path());
-  expect_ring(binary, 4);
+  expect_named_ring(binary, 4);
   EXPECT_EQ(binary.points, before.points);
   std::filesystem::remove_all(folder_ / "sparse");
   test::write_colmap_text(folder_ / "sparse/0");
   test::write_colmap_rigs_text(folder_ / "sparse/0");
   const Capture text = load_capture(folder_.path());
-  expect_ring(text, 4);
+  expect_named_ring(text, 4);
   EXPECT_EQ(text.points, before.points);
   EXPECT_EQ(load_capture(folder_ / "sparse/0/rigs.txt").views.size(), 4u) << "each of its files names the model";
 }
@@ -95,7 +95,7 @@ TEST_F(Colmap, LargestModelWins) {
   test::write_colmap_binary(folder_ / "sparse/1", model);
   model.images = 5;
   test::write_colmap_text(folder_ / "sparse/2", model);
-  expect_ring(load_capture(folder_.path()), 7);
+  expect_named_ring(load_capture(folder_.path()), 7);
 }
 
 TEST_F(Colmap, DownscaleTakesReducedCopies) {

@@ -7,6 +7,7 @@
 
 #include "src/base/error.h"
 #include "src/capture/load_capture.h"
+#include "tests/capture/fixtures.h"
 
 namespace cnerf::test {
 namespace fs = std::filesystem;
@@ -14,6 +15,13 @@ namespace fs = std::filesystem;
 void expect_same_pose(const Affined& found, const Affined& wanted) {
   EXPECT_LT(length(found.translation - wanted.translation), 1e-6 * std::max(1.0, length(wanted.translation)));
   for (int row = 0; row < 3; ++row) EXPECT_LT(length(found.linear.rows[row] - wanted.linear.rows[row]), 1e-6);
+}
+
+void expect_ring(const Capture& capture, int turned_by) {
+  ASSERT_EQ(capture.views.size(), 4u);
+  for (int i = 0; i < 4; ++i) {
+    expect_same_pose(capture.views[std::size_t(i)].world_from_camera, ring_pose(i + turned_by, 4));
+  }
 }
 
 void expect_same_lens(const Intrinsics& found, const Intrinsics& wanted) {

@@ -5,12 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "src/capture/camera.h"
+#include "src/capture/capture.h"
 
 namespace cnerf::test {
 
 /// Expects poses that agree to 1e-6, relative to the length of the translation.
 void expect_same_pose(const Affined& found, const Affined& wanted);
+/// Expects the ring of four cameras of fixtures.h, begun at another of them.
+void expect_ring(const Capture& capture, int turned_by = 0);
 /// Expects lenses that agree to 1e-6.
 void expect_same_lens(const Intrinsics& found, const Intrinsics& wanted);
 /// Expects an InputError whose message has all of these parts.

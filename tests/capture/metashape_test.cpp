@@ -89,13 +89,6 @@ void write(const fs::path& folder, const Document& document) {
   write_file(folder / "cameras.xml", document.xml());
 }
 
-void expect_ring(const Capture& capture) {
-  ASSERT_EQ(capture.views.size(), 4u);
-  for (int i = 0; i < 4; ++i) {
-    test::expect_same_pose(capture.views[std::size_t(i)].world_from_camera, test::ring_pose(i, 4));
-  }
-}
-
 TEST(Metashape, PosesLeadThroughTheTransformOfTheChunk) {
   const test::TempDir folder;
   Document document = ring_document(folder.path(), some_similarity());
@@ -103,7 +96,7 @@ TEST(Metashape, PosesLeadThroughTheTransformOfTheChunk) {
   write(folder.path(), document);
   const Capture capture = load_capture(folder.path());
   EXPECT_EQ(capture.format, "metashape");
-  expect_ring(capture);
+  test::expect_ring(capture);
   EXPECT_EQ(capture.views[2].name, "2");
   EXPECT_EQ(capture.views[2].image_file, folder / "images" / "2.png");
 }
@@ -111,7 +104,7 @@ TEST(Metashape, PosesLeadThroughTheTransformOfTheChunk) {
 TEST(Metashape, WithoutATransformTheChunkIsTheWorld) {
   const test::TempDir folder;
   write(folder.path(), ring_document(folder.path()));
-  expect_ring(load_capture(folder / "cameras.xml"));
+  test::expect_ring(load_capture(folder / "cameras.xml"));
 }
 
 TEST(Metashape, TransformsOfComponentsComeBeforeThatOfTheChunk) {
@@ -128,7 +121,7 @@ TEST(Metashape, TransformsOfComponentsComeBeforeThatOfTheChunk) {
                         "</component><component id=\"1\" label=\"B\">" + some_similarity().xml() +
                         "</component></components>";
   write(folder.path(), document);
-  expect_ring(load_capture(folder.path()));
+  test::expect_ring(load_capture(folder.path()));
 }
 
 TEST(Metashape, ComponentsWithoutACommonFrameAreRefused) {

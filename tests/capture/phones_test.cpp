@@ -18,13 +18,6 @@ using nlohmann::json;
 using testing::Contains;
 using testing::HasSubstr;
 
-void expect_ring(const Capture& capture, int turned_by = 0) {
-  ASSERT_EQ(capture.views.size(), 4u);
-  for (int i = 0; i < 4; ++i) {
-    test::expect_same_pose(capture.views[std::size_t(i)].world_from_camera, test::ring_pose(i + turned_by, 4));
-  }
-}
-
 // ---- Polycam --------------------------------------------------------------------------------------------------------
 
 json polycam_camera(const Affined& pose) {
@@ -52,7 +45,7 @@ TEST(Polycam, PosesAndLensesAreRead) {
   write_polycam(folder.path(), "");
   const Capture capture = load_capture(folder.path());
   EXPECT_EQ(capture.format, "polycam");
-  expect_ring(capture);
+  test::expect_ring(capture);
   test::expect_same_lens(capture.views[0].intrinsics, {LensModel::kPinhole, 16, 12, 20, 21, 8.5, 5.5, {}});
   EXPECT_EQ(capture.views[0].image_file, folder / "keyframes/images/1442008525600.jpg");
 }
@@ -62,7 +55,7 @@ TEST(Polycam, CorrectedCamerasComeFirst) {
   write_polycam(folder.path(), "");
   write_polycam(folder.path(), "corrected_", 1);
   const Capture capture = load_capture(folder.path());
-  expect_ring(capture, 1);
+  test::expect_ring(capture, 1);
   EXPECT_EQ(capture.views[0].image_file, folder / "keyframes/corrected_images/1442008525600.jpg");
 }
 
@@ -115,7 +108,7 @@ TEST(Record3d, PosesAndLensAreRead) {
   for (const fs::path& path : {folder.path(), folder / "metadata.json"}) {
     const Capture capture = load_capture(path);
     EXPECT_EQ(capture.format, "record3d");
-    expect_ring(capture);
+    test::expect_ring(capture);
     test::expect_same_lens(capture.views[0].intrinsics, {LensModel::kPinhole, 16, 12, 20, 21, 8.5, 5.5, {}});
   }
 }
@@ -126,7 +119,7 @@ TEST(Record3d, EachPictureMayHaveItsLens) {
   metadata["perFrameIntrinsicCoeffs"] = {{20, 21, 8, 6}, {22, 23, 7, 5}, {24, 25, 6, 4}, {26, 27, 5, 3}};
   test::write_json(folder / "EXR_RGBD/metadata.json", metadata);
   const Capture capture = load_capture(folder.path());
-  expect_ring(capture);
+  test::expect_ring(capture);
   test::expect_same_lens(capture.views[2].intrinsics, {LensModel::kPinhole, 16, 12, 24, 25, 6, 4, {}});
 }
 

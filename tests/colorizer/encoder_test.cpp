@@ -231,7 +231,7 @@ TEST(Encoder, LooksAtPicturesInColourByTheirRegions) {
   EXPECT_EQ(encoder.regions(std::vector<std::uint8_t>(3 * 40 * 8, 90), 8, 40).size(), 16U * 64) << "of any size";
 }
 
-ReferenceRecipe short_recipe(std::shared_ptr<const Encoder> encoder) {
+ReferenceRecipe six_steps(std::shared_ptr<const Encoder> encoder) {
   ReferenceRecipe recipe;
   recipe.steps = 6;
   recipe.channels = {16, 24, 32, 32};
@@ -247,7 +247,7 @@ TEST(Encoder, AFitStartsAsItWouldWithoutItAndDoesNotDependOnThreads) {
   cv::circle(picture, {60, 60}, 40, cv::Scalar(180, 60, 30), -1);
   cv::imwrite((folder / "picture.png").string(), picture);
   const std::vector<ReferenceImage> images{load_reference_image(folder / "picture.png")};
-  const ReferenceRecipe alone = short_recipe(nullptr), guided = short_recipe(load_encoder(folder.path()));
+  const ReferenceRecipe alone = six_steps(nullptr), guided = six_steps(load_encoder(folder.path()));
   EXPECT_NE(alone.text(), guided.text()) << "a cached fit would be taken for another";
   const LightnessBatch question = test::some_question(2, 64, 96);
   EXPECT_EQ(ReferenceNetwork(guided, images, 3).colorize(question),

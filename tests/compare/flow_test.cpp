@@ -12,7 +12,7 @@ namespace cnerf::test {
 namespace {
 using namespace compare;
 
-constexpr int kWidth = 128, kHeight = 96;
+constexpr int kFlowWidth = 128, kFlowHeight = 96;
 
 /// Answers one colour a call: 30, then -30, then 30, …
 class Flickering final : public Colorizer {
@@ -30,13 +30,13 @@ class Flickering final : public Colorizer {
 
 /// Smooth noise, moved to the left by `shift` pixels.
 LightnessBatch textured(int shift, std::uint64_t seed = 1) {
-  cv::Mat noise(kHeight, kWidth + 32, CV_32F);
+  cv::Mat noise(kFlowHeight, kFlowWidth + 32, CV_32F);
   const CounterRng rng(seed, 0);
   for (int i = 0; i < int(noise.total()); ++i) noise.ptr<float>()[i] = rng.uniform(std::uint64_t(i));
   cv::GaussianBlur(noise, noise, {}, 3);
   cv::normalize(noise, noise, 10, 90, cv::NORM_MINMAX);
-  const cv::Mat part = noise(cv::Rect(shift, 0, kWidth, kHeight)).clone();
-  LightnessBatch batch{1, kHeight, kWidth, {part.ptr<float>(), part.ptr<float>() + part.total()}};
+  const cv::Mat part = noise(cv::Rect(shift, 0, kFlowWidth, kFlowHeight)).clone();
+  LightnessBatch batch{1, kFlowHeight, kFlowWidth, {part.ptr<float>(), part.ptr<float>() + part.total()}};
   return batch;
 }
 

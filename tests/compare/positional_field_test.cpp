@@ -16,23 +16,18 @@
 #include "src/compare/derived_engines.h"
 #include "src/field/luminance_activation.h"
 #include "src/render/composite_math.h"
+#include "tests/compare/double_tensors.h"
 #include "tests/support/finite_difference.h"
 #include "tests/support/toy_capture.h"
 
 namespace cnerf::compare {
 namespace {
 
-const auto kDouble = torch::TensorOptions().dtype(torch::kFloat64);
-
-std::vector<double> doubles(const torch::Tensor& values) {
-  const torch::Tensor flat = values.detach().contiguous().view({-1});
-  return {flat.data_ptr<double>(), flat.data_ptr<double>() + flat.numel()};
-}
 torch::Tensor tensor(const std::vector<double>& values, torch::IntArrayRef shape) {
-  return torch::tensor(values, kDouble).view(shape);
+  return torch::tensor(values, test::kDouble).view(shape);
 }
 torch::Tensor noise(torch::IntArrayRef shape, std::uint64_t seed) {
-  return torch::rand(shape, torch::make_generator<torch::CPUGeneratorImpl>(seed), kDouble);
+  return torch::rand(shape, torch::make_generator<torch::CPUGeneratorImpl>(seed), test::kDouble);
 }
 
 /// Worst relative error of autograd's gradient of a scalar function at `at`.
@@ -42,12 +37,13 @@ double gradient_error(const torch::Tensor& at, const std::function<torch::Tensor
   std::vector<std::size_t> all(std::size_t(at.numel()));
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
   const auto scalar = [&](const std::vector<double>& values) { return f(tensor(values, at.sizes())).item<double>(); };
-  return test::worst_relative_error(doubles(leaf.grad()), test::central_difference(doubles(at), all, 1e-6, scalar));
+  return test::worst_relative_error(test::doubles(leaf.grad()),
+                                    test::central_difference(test::doubles(at), all, 1e-6, scalar));
 }
 
 TEST(PositionalMath, EncodingIsSinesAndCosinesOfOctaves) {
   const std::vector<double> x = {-0.7, 0.1, 0.93};
-  const std::vector<double> encoded = doubles(positional::encoding(tensor(x, {1, 3}), 4));
+  const std::vector<double> encoded = test::doubles(positional::encoding(tensor(x, {1, 3}), 4));
   ASSERT_EQ(encoded.size(), 27u);
   for (std::size_t c = 0; c < 3; ++c) {
     EXPECT_DOUBLE_EQ(encoded[c], x[c]);
@@ -66,11 +62,12 @@ TEST(PositionalMath, EncodingIsSinesAndCosinesOfOctaves) {
 TEST(PositionalMath, CompositingIsTheEngines) {
   constexpr std::int64_t kRays = 3, kSamples = 7;
   const torch::Tensor sigma = 4 * noise({kRays, kSamples}, 1), dt = 0.3 * noise({kRays, kSamples}, 2);
-  const std::vector<double> s = doubles(sigma), d = doubles(dt), v = doubles(noise({kRays, kSamples}, 5));
-  const std::vector<double> ours = doubles(positional::weights(sigma, dt));
+  const std::vector<double> s = test::doubles(sigma), d = test::doubles(dt),
+                            v = test::doubles(noise({kRays, kSamples}, 5));
+  const std::vector<double> ours = test::doubles(positional::weights(sigma, dt));
   torch::Tensor leaf = sigma.clone().requires_grad_(true);
   (positional::weights(leaf, dt) * tensor(v, {kRays, kSamples})).sum().backward();
-  const std::vector<double> gradient = doubles(leaf.grad());
+  const std::vector<double> gradient = test::doubles(leaf.grad());
   for (std::size_t r = 0; r < kRays; ++r) {
     Compositor<double> all;
     for (std::size_t i = r * kSamples; i < (r + 1) * kSamples; ++i) {
@@ -93,14 +90,15 @@ TEST(PositionalMath, ImportanceSamplesFollowTheWeights) {
   // Even weights: the identity, whatever the edges.
   const torch::Tensor edges = tensor({0, 1, 3, 4}, {1, 4});
   const torch::Tensor u = tensor({0, 1.0 / 6, 0.5, 1}, {1, 4});
-  const std::vector<double> even = doubles(positional::inverse_transform(edges, torch::ones({1, 3}, kDouble), u));
+  const std::vector<double> even =
+      test::doubles(positional::inverse_transform(edges, torch::ones({1, 3}, test::kDouble), u));
   const double expected[] = {0, 0.5, 2, 4};
   for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(even[i], expected[i], 1e-9);
 
   // As many samples in a bin as its weight says, spread evenly; nothing outside.
   const std::vector<double> weights = {0.1, 0, 0.6, 0.3};
-  const torch::Tensor many = (torch::arange(10000, kDouble) + 0.5) / 10000;
-  const std::vector<double> t = doubles(
+  const torch::Tensor many = (torch::arange(10000, test::kDouble) + 0.5) / 10000;
+  const std::vector<double> t = test::doubles(
       positional::inverse_transform(tensor({2, 3, 4, 4.5, 6}, {1, 5}), tensor(weights, {1, 4}), many.unsqueeze(0)));
   EXPECT_TRUE(std::ranges::is_sorted(t));
   const auto share = [&](double from, double to) {
@@ -113,15 +111,16 @@ TEST(PositionalMath, ImportanceSamplesFollowTheWeights) {
   EXPECT_NEAR(share(4.5, 6), 0.3, 2e-4);
 
   // An empty ray is sampled evenly instead of dividing by nothing.
-  const std::vector<double> nothing = doubles(positional::inverse_transform(edges, torch::zeros({1, 3}, kDouble), u));
+  const std::vector<double> nothing =
+      test::doubles(positional::inverse_transform(edges, torch::zeros({1, 3}, test::kDouble), u));
   EXPECT_NEAR(nothing[2], 2, 1e-9);
 }
 
 TEST(PositionalMath, ActivationsAreTheEngines) {
   const std::vector<double> y = {0, 1e-4, 0.008, 0.01, 0.18, 1, 1.7};
-  const std::vector<double> light = doubles(positional::lightness(tensor(y, {7})));
+  const std::vector<double> light = test::doubles(positional::lightness(tensor(y, {7})));
   for (std::size_t i = 0; i < y.size(); ++i) EXPECT_NEAR(light[i], lightness_from_luminance(y[i]), 1e-10);
-  const std::vector<double> back = doubles(positional::luminance_of(tensor(light, {7})));
+  const std::vector<double> back = test::doubles(positional::luminance_of(tensor(light, {7})));
   for (std::size_t i = 0; i < y.size(); ++i) EXPECT_NEAR(back[i], y[i], 1e-12);
   const auto activation = LuminanceActivation<double>::up_to(1.0);
   for (const double raw : {-6.0, -1.0, 0.0, 2.5}) {
@@ -139,7 +138,7 @@ TEST(PositionalMath, ClassificationLossIsTheDivergence) {
   const torch::Tensor bins = torch::tensor({0, 2, 3, 1, 4, 5, 4, 3, 2, 0}, torch::kInt64).view({2, 5});
   const torch::Tensor shares = tensor({0.4, 0.3, 0.2, 0.1, 0, 0.6, 0.4, 0, 0, 0}, {2, 5});
   const torch::Tensor weights = tensor({1, 0.5}, {2});
-  const std::vector<double> p = doubles(torch::softmax(logits, 1)), z = doubles(shares);
+  const std::vector<double> p = test::doubles(torch::softmax(logits, 1)), z = test::doubles(shares);
   double expected = 0;
   for (std::size_t r = 0; r < 2; ++r) {
     for (std::size_t i = 0; i < 5; ++i) {

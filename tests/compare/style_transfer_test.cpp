@@ -18,6 +18,7 @@
 #include "src/sample/sample_scene.h"
 #include "src/train/luminance/stage1.h"
 #include "src/train/scene.h"
+#include "tests/compare/double_tensors.h"
 #include "tests/support/data.h"
 #include "tests/support/finite_difference.h"
 #include "tests/support/tiny_config.h"
@@ -27,18 +28,12 @@ namespace cnerf::compare {
 namespace {
 namespace fs = std::filesystem;
 
-const auto kDouble = torch::TensorOptions().dtype(torch::kFloat64);
-
-std::vector<double> doubles(const torch::Tensor& values) {
-  const torch::Tensor flat = values.detach().contiguous().view({-1});
-  return {flat.data_ptr<double>(), flat.data_ptr<double>() + flat.numel()};
-}
-
 TEST(StyleMath, ColoursAreOurs) {
   const std::vector<double> l = {30, 55, 80, 8}, a = {10, -25, 4, 1}, b = {-15, 30, 20, -2};
-  const torch::Tensor lightness = torch::tensor(l, kDouble).view({2, 2});
-  const torch::Tensor ab = torch::stack({torch::tensor(a, kDouble), torch::tensor(b, kDouble)}).view({2, 2, 2});
-  const std::vector<double> ours = doubles(style::srgb(lightness, ab));
+  const torch::Tensor lightness = torch::tensor(l, test::kDouble).view({2, 2});
+  const torch::Tensor ab =
+      torch::stack({torch::tensor(a, test::kDouble), torch::tensor(b, test::kDouble)}).view({2, 2, 2});
+  const std::vector<double> ours = test::doubles(style::srgb(lightness, ab));
   for (std::size_t i = 0; i < 4; ++i) {
     const Vec3d rgb = linear_rgb_from_lab<double>({l[i], a[i], b[i]});
     for (std::size_t c = 0; c < 3; ++c) {
@@ -48,17 +43,17 @@ TEST(StyleMath, ColoursAreOurs) {
   torch::Tensor leaf = ab.clone().requires_grad_(true);
   style::srgb(lightness, leaf).square().sum().backward();
   const auto f = [&](const std::vector<double>& values) {
-    return style::srgb(lightness, torch::tensor(values, kDouble).view({2, 2, 2})).square().sum().item<double>();
+    return style::srgb(lightness, torch::tensor(values, test::kDouble).view({2, 2, 2})).square().sum().item<double>();
   };
-  const auto numeric = test::central_difference(doubles(ab), {0, 1, 2, 3, 4, 5, 6, 7}, 1e-5, f);
-  EXPECT_LT(test::worst_relative_error(doubles(leaf.grad()), numeric), 1e-6);
+  const auto numeric = test::central_difference(test::doubles(ab), {0, 1, 2, 3, 4, 5, 6, 7}, 1e-5, f);
+  EXPECT_LT(test::worst_relative_error(test::doubles(leaf.grad()), numeric), 1e-6);
 }
 
 TEST(StyleMath, TheNearestFeatureIsMatched) {
   // Three directions of a plane; the reference has two.
-  const torch::Tensor features = torch::tensor({1.0, 0.0, 3.0, 0.0, 2.0, 3.0}, kDouble).view({1, 2, 1, 3});
+  const torch::Tensor features = torch::tensor({1.0, 0.0, 3.0, 0.0, 2.0, 3.0}, test::kDouble).view({1, 2, 1, 3});
   const torch::Tensor ours = style::unit_vectors(features);
-  const torch::Tensor reference = torch::tensor({1.0, 0.0, 0.6, 0.8}, kDouble).view({2, 2});
+  const torch::Tensor reference = torch::tensor({1.0, 0.0, 0.6, 0.8}, test::kDouble).view({2, 2});
   // (1, 0) is there; (0, 1) is nearest to (0.6, 0.8); (1, 1) / sqrt 2 too, at 1.4 / sqrt 2.
   const double expected = (0 + (1 - 0.8) + (1 - 1.4 / std::sqrt(2.0))) / 3;
   EXPECT_NEAR(style::nearest_neighbour_loss(ours, reference).item<double>(), expected, 1e-7);
@@ -67,11 +62,11 @@ TEST(StyleMath, TheNearestFeatureIsMatched) {
   torch::Tensor leaf = features.clone().requires_grad_(true);
   style::nearest_neighbour_loss(style::unit_vectors(leaf), reference).backward();
   const auto f = [&](const std::vector<double>& values) {
-    const torch::Tensor at = torch::tensor(values, kDouble).view({1, 2, 1, 3});
+    const torch::Tensor at = torch::tensor(values, test::kDouble).view({1, 2, 1, 3});
     return style::nearest_neighbour_loss(style::unit_vectors(at), reference).item<double>();
   };
-  const auto numeric = test::central_difference(doubles(features), {0, 1, 2, 3, 4, 5}, 1e-6, f);
-  EXPECT_LT(test::worst_relative_error(doubles(leaf.grad()), numeric), 1e-5);
+  const auto numeric = test::central_difference(test::doubles(features), {0, 1, 2, 3, 4, 5}, 1e-6, f);
+  EXPECT_LT(test::worst_relative_error(test::doubles(leaf.grad()), numeric), 1e-5);
 }
 
 /// A picture of one colour.

@@ -13,7 +13,7 @@ namespace cnerf::test {
 namespace {
 using namespace compare;
 
-Cell cell(const std::string& capture, const std::string& method, int seed, double psnr, double lpips) {
+Cell scored_cell(const std::string& capture, const std::string& method, int seed, double psnr, double lpips) {
   Cell made;
   made.capture = capture;
   made.method = method;
@@ -57,7 +57,7 @@ TEST(Comparison, EstimatesAreMeansWithStudentsInterval) {
 
 TEST(Comparison, ACellSurvivesItsFile) {
   const TempDir folder;
-  Cell written = cell("flower", "colornerf", 2, 20.5, 0.25);
+  Cell written = scored_cell("flower", "colornerf", 2, 20.5, 0.25);
   written.error = "a \"quoted\" reason";
   written.stage1_curve = {{0.5, 20}, {1, 21}};
   write_file(folder / "cell.json", json_of(written).dump(2));
@@ -86,8 +86,9 @@ TEST(Comparison, ACellOfAnEarlierVersionIsRead) {
 }
 
 TEST(Comparison, RowsAreMeansOverSeedsAndOfAllCaptures) {
-  const std::vector<Cell> cells = {cell("a", "colornerf", 1, 20, 0.2), cell("a", "colornerf", 2, 22, 0.2),
-                                   cell("b", "colornerf", 1, 30, 0.4), cell("b", "colornerf", 2, 32, 0.4)};
+  const std::vector<Cell> cells = {scored_cell("a", "colornerf", 1, 20, 0.2), scored_cell("a", "colornerf", 2, 22, 0.2),
+                                   scored_cell("b", "colornerf", 1, 30, 0.4),
+                                   scored_cell("b", "colornerf", 2, 32, 0.4)};
   const auto of_a = table_rows(cells, "a"), of_all = table_rows(cells, "");
   ASSERT_EQ(of_a.size(), 1u);
   EXPECT_DOUBLE_EQ(of_a[0].columns[column("psnr_rgb")]->mean, 21);
@@ -102,9 +103,10 @@ TEST(Comparison, RowsAreMeansOverSeedsAndOfAllCaptures) {
 }
 
 TEST(Comparison, ADuelIsWonByWhatTheColumnCallsBetter) {
-  const std::vector<Cell> cells = {cell("a", "colornerf", 1, 20, 0.2), cell("a", "colornerf", 2, 22, 0.2),
-                                   cell("a", "grey", 1, 1, 1), cell("a", "without-purification", 1, 19, 0.1),
-                                   cell("a", "without-purification", 2, 23, 0.4)};
+  const std::vector<Cell> cells = {scored_cell("a", "colornerf", 1, 20, 0.2), scored_cell("a", "colornerf", 2, 22, 0.2),
+                                   scored_cell("a", "grey", 1, 1, 1),
+                                   scored_cell("a", "without-purification", 1, 19, 0.1),
+                                   scored_cell("a", "without-purification", 2, 23, 0.4)};
   for (const Duel& duel : duels(cells)) {
     EXPECT_EQ(duel.method, "without-purification");  // grey does not compete
     EXPECT_EQ(duel.pairs, 2);
@@ -120,7 +122,7 @@ TEST(Comparison, ADuelIsWonByWhatTheColumnCallsBetter) {
 }
 
 TEST(Comparison, AMethodThatFailedLeavesARowThatSaysSo) {
-  std::vector<Cell> cells = {cell("a", "colornerf", 1, 20, 0.2), cell("a", "video-then-fuse", 1, 0, 0)};
+  std::vector<Cell> cells = {scored_cell("a", "colornerf", 1, 20, 0.2), scored_cell("a", "video-then-fuse", 1, 0, 0)};
   cells[1].error = "no <memory>";
   const auto rows = table_rows(cells, "a");
   ASSERT_EQ(rows.size(), 2u);

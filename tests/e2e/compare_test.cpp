@@ -10,16 +10,13 @@
 #include "src/base/files.h"
 #include "tests/e2e/program.h"
 #include "tests/support/data.h"
+#include "tests/support/json_file.h"
 
 namespace cnerf::test {
 namespace {
 namespace fs = std::filesystem;
 using testing::Contains;
 using testing::HasSubstr;
-
-nlohmann::json json_of(const fs::path& file) {
-  return nlohmann::json::parse(read_text_file(file));
-}
 
 ProgramResult compare(const fs::path& out, const std::string& methods, const std::vector<std::string>& more = {}) {
   return cnerf(concatenated(

@@ -160,7 +160,7 @@ std::vector<std::size_t> telling_indices(const std::vector<double>& gradient, st
 }
 
 /// As LossInDouble takes them.
-std::vector<double> parameters_of(LuminanceEngine& engine) {
+std::vector<double> trained_numbers(LuminanceEngine& engine) {
   std::vector<double> parameters;
   for (const StatePiece& piece : engine.state()) {
     const auto is_one_of = [&](const std::vector<std::string>& names) {
@@ -203,7 +203,7 @@ TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
     const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);
     ASSERT_GT(analytic.report.trained_samples, 200u);
 
-    const std::vector<double> parameters = parameters_of(*engine);
+    const std::vector<double> parameters = trained_numbers(*engine);
     std::vector<double> gradient(analytic.table.begin(), analytic.table.end());
     gradient.insert(gradient.end(), analytic.weights.begin(), analytic.weights.end());
     ASSERT_EQ(gradient.size(), parameters.size());
@@ -260,7 +260,7 @@ TEST_P(ViewLearningWithLens, GradientsMatchFiniteDifferencesOfTheLoss) {
     engine->state_loaded();
     const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);
 
-    const std::vector<double> parameters = parameters_of(*engine);
+    const std::vector<double> parameters = trained_numbers(*engine);
     ASSERT_EQ(analytic.views.size(), 4u * kViewNumbers);
     ASSERT_EQ(analytic.lenses.size(), std::size_t(kLensNumbers));
     const LossInDouble loss(*engine, options, views, analytic.report.rays);

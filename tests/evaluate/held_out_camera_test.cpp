@@ -17,13 +17,13 @@
 namespace cnerf {
 namespace {
 
-constexpr int kWidth = 96, kHeight = 72;
+constexpr int kViewWidth = 96, kViewHeight = 72;
 const RenderEffort kAll = {0, 1};
 
 /// Looks at the wall from 0.6 sides before it, from somewhat aside.
 UnitCamera camera() {
   UnitCamera camera;
-  camera.intrinsics = {LensModel::kPinhole, kWidth, kHeight, 90, 90, 0.5 * kWidth, 0.5 * kHeight, {}};
+  camera.intrinsics = {LensModel::kPinhole, kViewWidth, kViewHeight, 90, 90, 0.5 * kViewWidth, 0.5 * kViewHeight, {}};
   const Affined pose = test::look_at({0.45, 0.62, -0.1}, {0.5, 0.5, 0.5});
   camera.unit_from_camera = pose.linear;
   camera.origin = pose.translation;
@@ -33,12 +33,12 @@ UnitCamera camera() {
 /// What the engine shows from where the camera really stands, at another exposure.
 MonoImage picture_from(const UnitCamera& start, const ViewCorrection& truth) {
   std::vector<Ray> rays;
-  for (std::size_t p = 0; p < kWidth * kHeight; ++p) rays.push_back(truth.applied_to(start.ray_of_pixel(p)));
+  for (std::size_t p = 0; p < kViewWidth * kViewHeight; ++p) rays.push_back(truth.applied_to(start.ray_of_pixel(p)));
   std::vector<RayResult> seen(rays.size());
   test::AnalyticEngine().render(rays, {}, kAll, seen);
   MonoImage image;
-  image.width = kWidth;
-  image.height = kHeight;
+  image.width = kViewWidth;
+  image.height = kViewHeight;
   for (const RayResult& result : seen) {
     const float encoded = srgb_from_linear(result.luminance * truth.gain());
     image.u8.push_back(std::uint8_t(std::lround(255 * encoded)));
@@ -63,8 +63,8 @@ TEST(HeldOutCamera, WhatTheRightHalfShowsIsNotFittedTo) {
   const test::AnalyticEngine engine;
   const UnitCamera start = camera();
   MonoImage image = picture_from(start, kTruth);
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = kWidth / 2; x < kWidth; ++x) image.u8[std::size_t(y * kWidth + x)] = 255;
+  for (int y = 0; y < kViewHeight; ++y) {
+    for (int x = kViewWidth / 2; x < kViewWidth; ++x) image.u8[std::size_t(y * kViewWidth + x)] = 255;
   }
   const auto found = fit_camera({engine, {}}, kAll, start, image);
   ASSERT_TRUE(found);
@@ -77,10 +77,10 @@ TEST(HeldOutCamera, MaskedPixelsDoNotCount) {
   const UnitCamera start = camera();
   MonoImage image = picture_from(start, kTruth);
   image.mask.assign(image.pixel_count(), 255);
-  for (int y = 0; y < kHeight / 3; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      image.u8[std::size_t(y * kWidth + x)] = 0;
-      image.mask[std::size_t(y * kWidth + x)] = 0;
+  for (int y = 0; y < kViewHeight / 3; ++y) {
+    for (int x = 0; x < kViewWidth; ++x) {
+      image.u8[std::size_t(y * kViewWidth + x)] = 0;
+      image.mask[std::size_t(y * kViewWidth + x)] = 0;
     }
   }
   const auto found = fit_camera({engine, {}}, kAll, start, image);
@@ -145,7 +145,7 @@ TEST(HeldOutCamera, ColumnsAppearWhereTheyWereAskedFor) {
   const UnitCamera start = camera();
   const test::TempDir folder;
   const std::filesystem::path file = folder / "grey.png";
-  write_png(file, Picture{kWidth, kHeight, std::vector<std::uint8_t>(3 * kWidth * kHeight, 90)});
+  write_png(file, Picture{kViewWidth, kViewHeight, std::vector<std::uint8_t>(3 * kViewWidth * kViewHeight, 90)});
   Capture capture;
   for (const bool held_out : {true, false}) {
     View view;

@@ -81,13 +81,13 @@ TEST(Psnr, InvalidPixelsDoNotCount) {
   EXPECT_THROW((void)encoded_mse(ours, std::vector<float>{1}, 1), ContractError);
 }
 
-constexpr int kWidth = 23, kHeight = 19;
+constexpr int kOddWidth = 23, kOddHeight = 19;
 
 /// A deterministic texture and a disturbed copy of it.
 std::pair<std::vector<float>, std::vector<float>> textures() {
   std::vector<float> a, b;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  for (int y = 0; y < kOddHeight; ++y) {
+    for (int x = 0; x < kOddWidth; ++x) {
       const double value = ((x * 7 + y * 13) % 32) / 31.0;
       a.push_back(float(value));
       b.push_back(float(std::clamp(value + ((x * x + 3 * y) % 11 - 5) / 40.0, 0.0, 1.0)));
@@ -99,23 +99,23 @@ std::pair<std::vector<float>, std::vector<float>> textures() {
 /// The value is from a direct evaluation, window by window in double, of the paper's formula in another language.
 TEST(Ssim, EqualsAnIndependentEvaluation) {
   const auto [a, b] = textures();
-  EXPECT_NEAR(ssim(a, b, kWidth, kHeight).value(), 0.9691785373846896, 1e-9);
-  EXPECT_NEAR(ssim(b, a, kWidth, kHeight).value(), 0.9691785373846896, 1e-9) << "symmetric";
+  EXPECT_NEAR(ssim(a, b, kOddWidth, kOddHeight).value(), 0.9691785373846896, 1e-9);
+  EXPECT_NEAR(ssim(b, a, kOddWidth, kOddHeight).value(), 0.9691785373846896, 1e-9) << "symmetric";
 }
 
 TEST(Ssim, EqualPicturesGiveOneAndUniformOnesTheClosedForm) {
   const auto [a, b] = textures();
-  EXPECT_NEAR(ssim(a, a, kWidth, kHeight).value(), 1, 1e-12);
+  EXPECT_NEAR(ssim(a, a, kOddWidth, kOddHeight).value(), 1, 1e-12);
   const std::vector<float> dark(a.size(), 0.25f), light(a.size(), 0.75f);
   const double c1 = 1e-4;
-  EXPECT_NEAR(ssim(dark, light, kWidth, kHeight).value(), (2 * 0.25 * 0.75 + c1) / (0.25 * 0.25 + 0.75 * 0.75 + c1),
-              1e-9);
+  EXPECT_NEAR(ssim(dark, light, kOddWidth, kOddHeight).value(),
+              (2 * 0.25 * 0.75 + c1) / (0.25 * 0.25 + 0.75 * 0.75 + c1), 1e-9);
 }
 
 TEST(Ssim, NeedsAWindowThatFitsAndCounts) {
   const auto [a, b] = textures();
   const std::vector<std::uint8_t> none(a.size(), 0);
-  EXPECT_FALSE(ssim(a, b, kWidth, kHeight, none).has_value());
+  EXPECT_FALSE(ssim(a, b, kOddWidth, kOddHeight, none).has_value());
   const std::vector<float> small(10 * 40, 0.5f);
   EXPECT_FALSE(ssim(small, small, 10, 40).has_value());
 }
@@ -132,8 +132,8 @@ TEST(ColorfulnessMetric, ClosedForms) {
 
 TEST(ColorfulnessMetric, EqualsAnIndependentEvaluation) {
   std::vector<std::uint8_t> rgb;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  for (int y = 0; y < kOddHeight; ++y) {
+    for (int x = 0; x < kOddWidth; ++x) {
       for (const int value : {x * 11, y * 13, x * y}) rgb.push_back(std::uint8_t(value % 256));
     }
   }

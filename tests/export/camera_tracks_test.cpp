@@ -23,7 +23,7 @@ using namespace cnerf::test;
 using bake::test::camera_at;
 namespace {
 
-constexpr double kTolerance = 1e-4;  // pixels
+constexpr double kTrackTolerance = 1e-4;  // pixels
 const std::vector<Vec3d> kPoints{{0, 0, 0}, {0.3, 0.1, -0.2}, {-0.2, 0.4, 0.3}};
 
 /// A shot with zoom, roll and a principal point off the middle.
@@ -106,8 +106,8 @@ UsdCamera frame_in(const std::string& usd, int frame) {
 void expect_on_pixel(const PixelPosition& seen, const bake::Camera& camera, Vec3d p) {
   const auto truth = project(camera.intrinsics, camera.world_from_camera.inverse().point(p));
   ASSERT_TRUE(truth);
-  EXPECT_NEAR(seen.x, truth->x, kTolerance) << camera.name;
-  EXPECT_NEAR(seen.y, truth->y, kTolerance) << camera.name;
+  EXPECT_NEAR(seen.x, truth->x, kTrackTolerance) << camera.name;
+  EXPECT_NEAR(seen.y, truth->y, kTrackTolerance) << camera.name;
 }
 
 class CameraTracksUp : public testing::TestWithParam<std::pair<const char*, const char*>> {};

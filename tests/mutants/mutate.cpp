@@ -27,7 +27,7 @@ Block some_block(const std::string& text, Random& random) {
 }
 
 template <typename T>
-std::string bytes_of(T value) {
+std::string native_bytes(T value) {
   return {reinterpret_cast<const char*>(&value), sizeof value};
 }
 
@@ -57,25 +57,25 @@ Mutant with_other_bytes(const std::string& original, Random& random) {
 }
 
 Mutant with_extreme_number(const std::string& original, Random& random) {
-  static const std::vector<std::string> numbers = {bytes_of(std::uint32_t(0)),
-                                                   bytes_of(std::uint32_t(1)),
-                                                   bytes_of(~std::uint32_t(0)),
-                                                   bytes_of(std::uint32_t(1) << 31),
-                                                   bytes_of(~std::uint32_t(0) / 2),
-                                                   bytes_of(std::uint64_t(0)),
-                                                   bytes_of(~std::uint64_t(0)),
-                                                   bytes_of(std::uint64_t(1) << 63),
-                                                   bytes_of(std::uint64_t(1) << 40),
-                                                   bytes_of(std::uint64_t(1) << 32),
-                                                   bytes_of(std::uint16_t(0xFFFF)),
-                                                   bytes_of(1e308),
-                                                   bytes_of(-1.0),
-                                                   bytes_of(1e-308),
-                                                   bytes_of(std::numeric_limits<double>::quiet_NaN()),
-                                                   bytes_of(std::numeric_limits<double>::infinity()),
-                                                   bytes_of(1e30F),
-                                                   bytes_of(std::numeric_limits<float>::quiet_NaN()),
-                                                   bytes_of(-std::numeric_limits<float>::infinity())};
+  static const std::vector<std::string> numbers = {native_bytes(std::uint32_t(0)),
+                                                   native_bytes(std::uint32_t(1)),
+                                                   native_bytes(~std::uint32_t(0)),
+                                                   native_bytes(std::uint32_t(1) << 31),
+                                                   native_bytes(~std::uint32_t(0) / 2),
+                                                   native_bytes(std::uint64_t(0)),
+                                                   native_bytes(~std::uint64_t(0)),
+                                                   native_bytes(std::uint64_t(1) << 63),
+                                                   native_bytes(std::uint64_t(1) << 40),
+                                                   native_bytes(std::uint64_t(1) << 32),
+                                                   native_bytes(std::uint16_t(0xFFFF)),
+                                                   native_bytes(1e308),
+                                                   native_bytes(-1.0),
+                                                   native_bytes(1e-308),
+                                                   native_bytes(std::numeric_limits<double>::quiet_NaN()),
+                                                   native_bytes(std::numeric_limits<double>::infinity()),
+                                                   native_bytes(1e30F),
+                                                   native_bytes(std::numeric_limits<float>::quiet_NaN()),
+                                                   native_bytes(-std::numeric_limits<float>::infinity())};
   const std::size_t which = random.below(numbers.size());
   const std::string& number = numbers[which];
   const std::size_t align = random.chance(2) ? number.size() : 1;

@@ -6,6 +6,7 @@
 
 #include "src/base/error.h"
 #include "src/base/rng.h"
+#include "tests/prepare/random_similarity.h"
 #include "tests/support/pose_comparison.h"
 
 namespace cnerf::prepare {
@@ -13,22 +14,9 @@ namespace {
 
 constexpr double kExact = 1e-9;  // measured 1e-14; doubles, numbers of order 1 to 100
 
-Vec3d random_vector(SequentialRng& rng) {
-  return {double(rng.normal()), double(rng.normal()), double(rng.normal())};
-}
-
-Mat3d random_rotation(SequentialRng& rng) {
-  return rotation_between(normalized(random_vector(rng)), normalized(random_vector(rng))) *
-         rotation_between(normalized(random_vector(rng)), normalized(random_vector(rng)));
-}
-
-Similarity random_similarity(SequentialRng& rng) {
-  return {std::exp(double(rng.normal())), random_rotation(rng), random_vector(rng) * 10.0};
-}
-
 std::vector<Vec3d> random_points(SequentialRng& rng, int count) {
   std::vector<Vec3d> points;
-  for (int i = 0; i < count; ++i) points.push_back(random_vector(rng));
+  for (int i = 0; i < count; ++i) points.push_back(test::random_vector(rng));
   return points;
 }
 
@@ -41,7 +29,7 @@ double distance(const Similarity& a, const Similarity& b) {
 TEST(Similarity, InverseAndProductCancel) {
   SequentialRng rng(1, 0);
   for (int trial = 0; trial < 50; ++trial) {
-    const Similarity s = random_similarity(rng);
+    const Similarity s = test::random_similarity(rng);
     EXPECT_LT(distance(s * s.inverse(), Similarity{}), kExact);
     EXPECT_LT(distance(s.inverse() * s, Similarity{}), kExact);
   }
@@ -49,9 +37,9 @@ TEST(Similarity, InverseAndProductCancel) {
 
 TEST(Similarity, PosesMoveAsTheirPointsDo) {
   SequentialRng rng(2, 0);
-  const Similarity s = random_similarity(rng);
-  const Affined pose = {random_rotation(rng), random_vector(rng)};
-  const Vec3d in_camera = random_vector(rng);
+  const Similarity s = test::random_similarity(rng);
+  const Affined pose = {test::random_rotation(rng), test::random_vector(rng)};
+  const Vec3d in_camera = test::random_vector(rng);
   // A point the camera sees at `in_camera` is seen at `scale * in_camera` once both have moved.
   EXPECT_LT(length(s.pose(pose).point(s.scale * in_camera) - s.point(pose.point(in_camera))), kExact);
 }
@@ -59,7 +47,7 @@ TEST(Similarity, PosesMoveAsTheirPointsDo) {
 TEST(FitSimilarity, FindsWhatMadeThePoints) {
   SequentialRng rng(3, 0);
   for (int trial = 0; trial < 100; ++trial) {
-    const Similarity truth = random_similarity(rng);
+    const Similarity truth = test::random_similarity(rng);
     const std::vector<Vec3d> source = random_points(rng, 3 + trial % 8);
     std::vector<Vec3d> target;
     for (const Vec3d& p : source) target.push_back(truth.point(p));
@@ -72,7 +60,7 @@ TEST(FitSimilarity, PlanarPointsGiveARotationNotAMirror) {
   SequentialRng rng(4, 0);
   std::vector<Vec3d> source = random_points(rng, 12);
   for (Vec3d& p : source) p.z = 0;
-  const Similarity truth = random_similarity(rng);
+  const Similarity truth = test::random_similarity(rng);
   std::vector<Vec3d> target;
   for (const Vec3d& p : source) target.push_back(truth.point(p));
   const Similarity found = test::fit_similarity(source, target);
@@ -83,9 +71,9 @@ TEST(FitSimilarity, PlanarPointsGiveARotationNotAMirror) {
 TEST(FitSimilarity, NoNearbySimilarityFitsNoisyPointsBetter) {
   SequentialRng rng(5, 0);
   const std::vector<Vec3d> source = random_points(rng, 20);
-  const Similarity truth = random_similarity(rng);
+  const Similarity truth = test::random_similarity(rng);
   std::vector<Vec3d> target;
-  for (const Vec3d& p : source) target.push_back(truth.point(p) + random_vector(rng) * 0.3);
+  for (const Vec3d& p : source) target.push_back(truth.point(p) + test::random_vector(rng) * 0.3);
   const auto cost = [&](const Similarity& s) {
     double sum = 0;
     for (std::size_t i = 0; i < source.size(); ++i) {
@@ -97,10 +85,10 @@ TEST(FitSimilarity, NoNearbySimilarityFitsNoisyPointsBetter) {
   const Similarity best = test::fit_similarity(source, target);
   for (int trial = 0; trial < 200; ++trial) {
     Similarity other = best;
-    const Vec3d axis = normalized(Vec3d{0, 0, 1} + random_vector(rng) * 0.01);
+    const Vec3d axis = normalized(Vec3d{0, 0, 1} + test::random_vector(rng) * 0.01);
     other.rotation = rotation_between({0, 0, 1}, axis) * best.rotation;
     other.scale *= std::exp(0.01 * double(rng.normal()));
-    other.translation += random_vector(rng) * 0.01;
+    other.translation += test::random_vector(rng) * 0.01;
     EXPECT_GE(cost(other), cost(best));
   }
 }
@@ -131,7 +119,7 @@ TEST(SymmetricEigen, VectorsSolveTheEquation) {
 TEST(RotationBetween, TurnsOneIntoTheOtherBySmallestAngle) {
   SequentialRng rng(7, 0);
   for (int trial = 0; trial < 50; ++trial) {
-    const Vec3d a = normalized(random_vector(rng)), b = normalized(random_vector(rng));
+    const Vec3d a = normalized(test::random_vector(rng)), b = normalized(test::random_vector(rng));
     const Mat3d r = rotation_between(a, b);
     EXPECT_LT(length(r * a - b), kExact);
     EXPECT_NEAR(test::rotation_angle(r), std::acos(dot(a, b)), 1e-6);
@@ -144,8 +132,8 @@ TEST(RotationBetween, TurnsOneIntoTheOtherBySmallestAngle) {
 TEST(ComparePoses, SeesATurnAndAShiftOfOneCamera) {
   SequentialRng rng(8, 0);
   std::vector<Affined> truth;
-  for (int i = 0; i < 40; ++i) truth.push_back({random_rotation(rng), random_vector(rng)});
-  const Similarity s = random_similarity(rng);
+  for (int i = 0; i < 40; ++i) truth.push_back({test::random_rotation(rng), test::random_vector(rng)});
+  const Similarity s = test::random_similarity(rng);
   std::vector<Affined> poses;
   for (const Affined& pose : truth) poses.push_back(s.pose(pose));
   const test::PoseComparison same = test::compare_poses(poses, truth);

@@ -31,14 +31,14 @@ std::vector<std::byte> stream_of(const std::vector<double>& light, int ticks) {
   return out;
 }
 
-std::vector<double> ramp(int pixels) {
+std::vector<double> ramp_of_light(int pixels) {
   std::vector<double> light;
   for (int i = 0; i < pixels; ++i) light.push_back(0.02 + 0.96 * i / pixels);
   return light;
 }
 
 TEST(Spikes, RateIsTheLight) {
-  const std::vector<double> light = ramp(13 * 7);  // no multiple of 8
+  const std::vector<double> light = ramp_of_light(13 * 7);  // no multiple of 8
   const LinearImage picture = integrate_spikes(stream_of(light, 256), 13, 7, 256);
   for (std::size_t i = 0; i < light.size(); ++i) {
     // n intervals are whole within one tick of 256; near-dark pixels have few intervals.
@@ -53,7 +53,7 @@ TEST(Spikes, DarkPixelsStayDark) {
 
 TEST(Spikes, AStreamBecomesPictures) {
   const test::TempDir folder;
-  const std::vector<double> light = ramp(16 * 8);
+  const std::vector<double> light = ramp_of_light(16 * 8);
   const std::vector<std::byte> bytes = stream_of(light, 400);
   write_file(folder / "s.dat", bytes);
   SpikeOptions options;

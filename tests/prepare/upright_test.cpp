@@ -7,15 +7,12 @@
 
 #include "src/base/error.h"
 #include "src/base/rng.h"
+#include "tests/prepare/random_similarity.h"
 
 namespace cnerf::prepare {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-
-Vec3d random_vector(SequentialRng& rng) {
-  return {double(rng.normal()), double(rng.normal()), double(rng.normal())};
-}
 
 /// A camera at `eye` that looks at `target`, held level about `up`.
 Affined level_camera(Vec3d eye, Vec3d target, Vec3d up) {
@@ -58,11 +55,6 @@ double degrees_between(Vec3d a, Vec3d b) {
   return std::acos(std::min(1.0, dot(normalized(a), normalized(b)))) / kDegree;
 }
 
-Similarity random_similarity(SequentialRng& rng) {
-  return {std::exp(double(rng.normal())),
-          rotation_between(normalized(random_vector(rng)), normalized(random_vector(rng))), random_vector(rng)};
-}
-
 void move(const Similarity& s, std::vector<View>& views, std::vector<Vec3d>& points) {
   for (View& view : views) view.world_from_camera = s.pose(view.world_from_camera);
   for (Vec3d& point : points) point = s.point(point);
@@ -70,11 +62,11 @@ void move(const Similarity& s, std::vector<View>& views, std::vector<Vec3d>& poi
 
 TEST(UpFromCameras, LevelCamerasTellUpExactlyWhateverTheyLookAt) {
   SequentialRng rng(1, 0);
-  const Vec3d up = normalized(random_vector(rng));
+  const Vec3d up = normalized(test::random_vector(rng));
   std::vector<Affined> poses;
   for (int i = 0; i < 20; ++i) {
     // Looking down by different angles: the mean of the pictures' tops would be off by degrees.
-    poses.push_back(level_camera(random_vector(rng) * 3.0 + up * 4.0, random_vector(rng), up));
+    poses.push_back(level_camera(test::random_vector(rng) * 3.0 + up * 4.0, test::random_vector(rng), up));
   }
   const UpFromCameras found = up_from_cameras(poses);
   EXPECT_TRUE(found.from_axes);
@@ -107,7 +99,7 @@ TEST(FindGround, ACeilingOrAWallIsNoGround) {
 TEST(FindGround, ACloudHasNone) {
   SequentialRng rng(4, 0);
   std::vector<Vec3d> cloud;
-  for (int i = 0; i < 600; ++i) cloud.push_back(random_vector(rng));
+  for (int i = 0; i < 600; ++i) cloud.push_back(test::random_vector(rng));
   EXPECT_FALSE(find_ground(cloud, {0, 0, 1}));
 }
 
@@ -116,7 +108,7 @@ TEST(ChooseFrame, SetsAnyTurnedSceneUpright) {
   for (int trial = 0; trial < 10; ++trial) {
     std::vector<View> views = orbit(24);
     std::vector<Vec3d> points = floor_and_object(rng);
-    const Similarity moved = random_similarity(rng);
+    const Similarity moved = test::random_similarity(rng);
     move(moved, views, points);
     const FrameChoice choice = choose_frame(views, points, {});
     EXPECT_EQ(choice.up_by, "ground");
@@ -154,10 +146,10 @@ TEST(ChooseFrame, TakesWhatTheUserSays) {
 TEST(Triangulate, MeetsWhereRaysMeet) {
   SequentialRng rng(7, 0);
   for (int trial = 0; trial < 50; ++trial) {
-    const Vec3d truth = random_vector(rng);
+    const Vec3d truth = test::random_vector(rng);
     std::vector<WorldRay> rays;
     for (int i = 0; i < 2 + trial % 4; ++i) {
-      const Vec3d origin = random_vector(rng) * 5.0;
+      const Vec3d origin = test::random_vector(rng) * 5.0;
       rays.push_back({origin, normalized(truth - origin)});
     }
     const Triangulated found = triangulate(rays);
@@ -206,7 +198,7 @@ TEST(Measure, MakesTheSceneMetric) {
   std::vector<View> views = orbit(24);
   std::vector<Vec3d> points = floor_and_object(rng);
   Vec3d a = {0.2, 0.1, 0}, b = {-0.3, 0.2, 0.3};
-  const Similarity moved = random_similarity(rng);
+  const Similarity moved = test::random_similarity(rng);
   move(moved, views, points);
   a = moved.point(a), b = moved.point(b);
   FrameOptions options;
@@ -229,7 +221,7 @@ TEST(Measure, RefusesWhatItCannotUse) {
 TEST(FindSubject, BoxHoldsTheObjectAndNotTheOutliers) {
   SequentialRng rng(10, 0);
   std::vector<Vec3d> points = floor_and_object(rng);
-  for (int i = 0; i < 20; ++i) points.push_back(random_vector(rng) * 100.0);
+  for (int i = 0; i < 20; ++i) points.push_back(test::random_vector(rng) * 100.0);
   const auto subject = find_subject(orbit(24), points);
   ASSERT_TRUE(subject);
   EXPECT_FALSE(subject->forward_facing);

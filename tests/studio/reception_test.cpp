@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
 using web::PageAnswer;
-constexpr const char* kPainter = "painter123";
+constexpr const char* kSender = "painter123";
 
 class ReceptionTest : public testing::Test {
  protected:
@@ -33,7 +33,7 @@ class ReceptionTest : public testing::Test {
       return context;
     };
     reception_ = std::make_unique<Reception>(source, folder_ / "run", begin, observer_);
-    reception_->joined(kPainter);
+    reception_->joined(kSender);
     worker_ = std::thread([this] { context_ = reception_->run(); });
   }
   void TearDown() override {
@@ -42,13 +42,13 @@ class ReceptionTest : public testing::Test {
     if (worker_.joinable()) worker_.join();
   }
   PageAnswer put(const std::string& name, const std::string& offset, const std::string& body,
-                 const std::string& client = kPainter) {
+                 const std::string& client = kSender) {
     return reception_->answer({"PUT", "/studio/arrivals", {{"name", name}, {"offset", offset}}, client, {}, body});
   }
   PageAnswer order(const std::string& name) {
-    return reception_->answer({"POST", "/studio/orders", {}, kPainter, {}, json{{"order", name}}.dump()});
+    return reception_->answer({"POST", "/studio/orders", {}, kSender, {}, json{{"order", name}}.dump()});
   }
-  json state() { return json::parse(reception_->answer({"GET", "/studio/state", {}, kPainter, {}, {}}).body); }
+  json state() { return json::parse(reception_->answer({"GET", "/studio/state", {}, kSender, {}, {}}).body); }
   json wait_until(const std::function<bool(const json&)>& holds) {
     std::uint64_t seen = 0;
     for (;;) {
@@ -79,7 +79,7 @@ TEST_F(ReceptionTest, FilesArriveInPieces) {
   EXPECT_EQ(order("clear").status, 202);
   EXPECT_FALSE(fs::exists(folder_ / "run-photographs"));
   EXPECT_EQ(state()["arrived"]["files"], 0);
-  EXPECT_EQ(json::parse(reception_->answer({"GET", "/studio/scene", {}, kPainter, {}, {}}).body)["views"].size(), 0u);
+  EXPECT_EQ(json::parse(reception_->answer({"GET", "/studio/scene", {}, kSender, {}, {}}).body)["views"].size(), 0u);
 }
 
 TEST_F(ReceptionTest, AFullDiskIsToldAndThePieceCanBeSentAgain) {

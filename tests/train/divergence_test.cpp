@@ -21,7 +21,7 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-Stage1Options few_steps() {
+Stage1Options steps_with_checkpoints() {
   Stage1Options options = test::few_steps(30);
   options.checkpoint_every = 10;
   return options;
@@ -41,7 +41,7 @@ std::string message_of(const std::function<void()>& body) {
 TEST(Divergence, TrainingNamesStepAndViewAndKeepsTheLastSnapshot) {
   const test::TempDir folder;
   Capture capture = test::toy_capture();
-  Stage1Options options = few_steps();
+  Stage1Options options = steps_with_checkpoints();
   Observer silent;
   const Stage1Job good{capture, options, folder / "stage1.snapshot"};
   (void)train_stage1(good, cpu_engines(), silent);
@@ -59,7 +59,7 @@ TEST(Divergence, TrainingNamesStepAndViewAndKeepsTheLastSnapshot) {
 
 TEST(Divergence, ParametersThatAreNotFiniteAreNotSavedOverGoodOnes) {
   const test::TempDir folder;
-  LuminanceModel model = LuminanceModel::create(test::toy_capture(), few_steps(), cpu_engines());
+  LuminanceModel model = LuminanceModel::create(test::toy_capture(), steps_with_checkpoints(), cpu_engines());
   const auto file = folder / "stage1.snapshot";
   model.save(file);
   const std::string before = sha256_of_file(file);

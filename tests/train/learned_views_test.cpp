@@ -87,7 +87,7 @@ TEST(LearnedViews, HeldOutViewsGetTheLensTheyShare) {
   EXPECT_EQ(capture.views[6].intrinsics, lone);
 }
 
-Stage1Options few_steps() {
+Stage1Options learning_steps() {
   Stage1Options options;
   options.steps = 24;
   options.samples_per_step = 1024;
@@ -108,7 +108,7 @@ class StoredViews : public testing::Test {
 
   test::TempDir folder_;
   Capture capture_ = clip();
-  Stage1Options options_ = few_steps();
+  Stage1Options options_ = learning_steps();
   Stage1Job job_;
 };
 

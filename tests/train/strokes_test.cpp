@@ -175,16 +175,16 @@ TEST(Strokes, ADotCoversADiscOfItsSizeAndPressure) {
 }
 
 TEST(Strokes, ALineCoversWhatLiesWithinItsRadius) {
-  constexpr int kWidth = 80, kHeight = 60;
+  constexpr int width = 80, height = 60;
   Stroke stroke = dot("k1", 0.25f, 0.5f);
   stroke.points.push_back({0.75f, 0.5f, 1});
-  std::vector<float> coverage(kWidth * kHeight);
-  cover(stroke, kWidth, kHeight, coverage);
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  std::vector<float> coverage(width * height);
+  cover(stroke, width, height, coverage);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
       const double dx = std::max({20 - (x + 0.5), (x + 0.5) - 60, 0.0}), dy = y + 0.5 - 30;
-      const double distance = std::hypot(dx, dy), radius = 0.1 * kHeight;
-      const float value = coverage[std::size_t(y * kWidth + x)];
+      const double distance = std::hypot(dx, dy), radius = 0.1 * height;
+      const float value = coverage[std::size_t(y * width + x)];
       EXPECT_TRUE(distance > radius - 1 || value == 1) << x << ' ' << y;
       EXPECT_TRUE(distance < radius + 1 || value == 0) << x << ' ' << y;
     }

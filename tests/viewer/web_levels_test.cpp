@@ -16,7 +16,7 @@ constexpr double kCoarse = 0.1, kFine = 0.05;
 constexpr float kSigmaCoarse = 5, kSigmaFine = 9;
 
 /// A fine block of 16^3 voxels, and a coarse one that goes on along x where it ends.
-std::vector<bake::Volume> two_grids() {
+std::vector<bake::Volume> lit_grids() {
   bake::Volume coarse = exporting::test::block_volume({0, 0, 0}, {16, 8, 8}, kSigmaCoarse, kCoarse);
   std::erase_if(coarse.voxels, [](const bake::Voxel& voxel) { return voxel.i < 8; });
   return {exporting::test::block_volume({0, 0, 0}, {16, 16, 16}, kSigmaFine, kFine, {0.7f, 0.3f, 0.1f}), coarse};
@@ -46,7 +46,7 @@ double tolerance(const WebBricks& bricks, double sigma) {
 }
 
 TEST(WebLevels, ACoarserLevelHoldsWhatFinerOnesHold) {
-  const auto levels = make_web_levels(two_grids(), 256);
+  const auto levels = make_web_levels(lit_grids(), 256);
   ASSERT_EQ(levels.size(), 2u);
   const WebBricks& coarse = levels[0];
   EXPECT_NEAR(coarse.voxel_size, kCoarse, 1e-12);
@@ -56,7 +56,7 @@ TEST(WebLevels, ACoarserLevelHoldsWhatFinerOnesHold) {
 }
 
 TEST(WebLevels, AFinerLevelAnswersForItsPlaceAndTheEmptyVoxelsAroundIt) {
-  const Aabbd cover = make_web_levels(two_grids(), 256)[1].cover;
+  const Aabbd cover = make_web_levels(lit_grids(), 256)[1].cover;
   const Vec3d low = coarse_point(-1, -1, -1), high = coarse_point(8, 9, 9);  // matter goes on at x = 8 only
   for (int axis = 0; axis < 3; ++axis) {
     EXPECT_NEAR(cover.min[axis], low[axis], 1e-9);
@@ -66,7 +66,7 @@ TEST(WebLevels, AFinerLevelAnswersForItsPlaceAndTheEmptyVoxelsAroundIt) {
 
 /// Trilinear interpolation between the coarse voxels at x = 7.5, with the mean of the finer ones, and at 8.5.
 TEST(WebLevels, BeyondItsBorderAFinerLevelGoesOnAsTheCoarserDoes) {
-  const auto levels = make_web_levels(two_grids(), 256);
+  const auto levels = make_web_levels(lit_grids(), 256);
   const WebBricks& fine = levels[1];
   const double expected = 0.25 * kSigmaFine + 0.75 * kSigmaCoarse;
   EXPECT_NEAR(*sigma_at(fine, coarse_point(8.25, 3.5, 3.5)), expected, tolerance(fine, expected));
@@ -77,7 +77,7 @@ TEST(WebLevels, BeyondItsBorderAFinerLevelGoesOnAsTheCoarserDoes) {
 }
 
 TEST(WebLevels, WhereACoarserLevelHasNoBrickFinerOnesHaveNothing) {
-  std::vector<bake::Volume> grids = two_grids();
+  std::vector<bake::Volume> grids = lit_grids();
   std::erase_if(grids[0].voxels, [](const bake::Voxel& v) { return v.i % 16 > 2 || v.j > 1; });
   grids[0].voxels.push_back({39, 39, 39, 4, 0.4f, {1, 1, 1}, 0, 0});
   const auto levels = make_web_levels(grids, 256);
@@ -89,7 +89,7 @@ TEST(WebLevels, WhereACoarserLevelHasNoBrickFinerOnesHaveNothing) {
 }
 
 TEST(WebLevels, LargerVoxelsAreFullUpToTheBorder) {
-  const auto levels = make_web_levels(two_grids(), 12);  // of 20 each: 5/3 as large, so that no face is on a face
+  const auto levels = make_web_levels(lit_grids(), 12);  // of 20 each: 5/3 as large, so that no face is on a face
   const WebBricks& fine = levels[1];
   EXPECT_NEAR(fine.voxel_size, kFine * 20 / 12, 1e-9);
   EXPECT_NEAR(fine.cover.max.x, coarse_point(8, 0, 0).x, 1e-9) << "the border stays where it is";
@@ -103,14 +103,14 @@ TEST(WebLevels, LargerVoxelsAreFullUpToTheBorder) {
 }
 
 TEST(WebLevels, OneGridIsOneLevelThatCoversItself) {
-  const auto levels = make_web_levels({two_grids()[0]}, 256);
+  const auto levels = make_web_levels({lit_grids()[0]}, 256);
   ASSERT_EQ(levels.size(), 1u);
   EXPECT_EQ(levels[0].cover.min, levels[0].origin);
   EXPECT_NEAR(levels[0].cover.max.x, levels[0].origin.x + levels[0].counts.x * 8 * kFine, 1e-9);
 }
 
 TEST(WebLevels, GridsWithoutDensityAreLeftOut) {
-  std::vector<bake::Volume> grids = two_grids();
+  std::vector<bake::Volume> grids = lit_grids();
   for (bake::Voxel& voxel : grids[0].voxels) voxel.sigma = 0;
   EXPECT_EQ(make_web_levels(grids, 256).size(), 1u);
   for (bake::Voxel& voxel : grids[1].voxels) voxel.sigma = 0;

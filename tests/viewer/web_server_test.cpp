@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 
 /// A folder to serve, with a secret beside it.
 struct Site {
-  test::TempDir folder;
+  cnerf::test::TempDir folder;
   fs::path root = folder / "site";
 
   Site() {
@@ -89,7 +89,7 @@ TEST(WebServer, ServesFilesWithTheirTypes) {
 
 TEST(WebServer, TheFirstFolderWins) {
   const Site site;
-  const test::TempDir page;
+  const cnerf::test::TempDir page;
   write_file(page / "index.html", std::string_view("newer"));
   WebServer server({page.path(), site.root}, {});
   server.start();

@@ -14,17 +14,17 @@
 namespace cnerf::bake::test {
 namespace {
 
-const SceneFrame kFrame{{1, 2, 3}, 0.5, 1};  // world box: 2 units around (1, 2, 3)
-constexpr Vec3f kMiddle{0.5f, 0.5f, 0.5f};
+const SceneFrame kMeshFrame{{1, 2, 3}, 0.5, 1};  // world box: 2 units around (1, 2, 3)
+constexpr Vec3f kMeshMiddle{0.5f, 0.5f, 0.5f};
 
 /// Colour that changes with the direction from the middle.
 Vec3f sphere_color(Vec3f unit) {
-  const Vec3f d = normalized(unit - kMiddle);
+  const Vec3f d = normalized(unit - kMeshMiddle);
   return {0.4f + 0.25f * d.x, 0.4f + 0.2f * d.y, 0.4f + 0.2f * d.z};
 }
 
 AnalyticField coloured_sphere() {
-  AnalyticField field(kFrame, sphere_density(kMiddle, 0.3f, 600));
+  AnalyticField field(kMeshFrame, sphere_density(kMeshMiddle, 0.3f, 600));
   field.with_luminance([](Vec3f p, Vec3f) { return relative_xyz_from_linear_rgb(sphere_color(p)).y; });
   field.with_chromaticity([](Vec3f p) {
     const Vec3f xyz = relative_xyz_from_linear_rgb(sphere_color(p));
@@ -67,7 +67,7 @@ TEST(MeshBake, ASphereWearsItsColours) {
       EXPECT_NEAR(length(mesh.positions[v] - Vec3f{1, 2, 3}), 0.6, 0.02) << "world units";
       const int x = int(mesh.uvs[v].u * texture.size), y = int(mesh.uvs[v].v * texture.size);
       const Vec3f color = texture.rgb[std::size_t(y) * texture.size + x];
-      const Vec3f expected = sphere_color(kFrame.unit_from_world(mesh.positions[v].cast<double>()).cast<float>());
+      const Vec3f expected = sphere_color(kMeshFrame.unit_from_world(mesh.positions[v].cast<double>()).cast<float>());
       for (int c = 0; c < 3; ++c) worst = std::max<double>(worst, std::abs(color[c] - expected[c]));
     }
     EXPECT_LT(worst, 0.03) << "within a texel's way";
@@ -92,7 +92,7 @@ TEST(MeshBake, DoesNotDependOnThreads) {
 }
 
 TEST(MeshBake, GreyHasNoColourAtAll) {
-  const AnalyticField field(kFrame, sphere_density(kMiddle, 0.3f, 600), 0.37f);
+  const AnalyticField field(kMeshFrame, sphere_density(kMeshMiddle, 0.3f, 600), 0.37f);
   const Mesh mesh = bake_mesh(field, cameras_around(), coarse(), small_texture());
   for (std::size_t i = 0; i < mesh.texture.rgb.size(); ++i) {
     ASSERT_EQ(mesh.texture.a[i], 0);
@@ -102,7 +102,7 @@ TEST(MeshBake, GreyHasNoColourAtAll) {
 }
 
 TEST(MeshBake, NothingOpaqueIsAnInputError) {
-  const AnalyticField fog(kFrame, sphere_density(kMiddle, 0.3f, 1));
+  const AnalyticField fog(kMeshFrame, sphere_density(kMeshMiddle, 0.3f, 1));
   EXPECT_THROW((void)bake_mesh(fog, {}, coarse(), small_texture()), InputError);
 }
 
@@ -119,11 +119,11 @@ TEST(TexelShader, FindsTheSurfaceFromALittleOff) {
   const Stage stage(field);
   const TexelShader shader(field, {}, stage.plan, coarse(), stage.sigma);
   const Vec3f direction = normalized(Vec3f{1, -2, 0.5f});
-  const Vec3f expected = sphere_color(kMiddle + direction * 0.3f);
+  const Vec3f expected = sphere_color(kMeshMiddle + direction * 0.3f);
   std::vector<SurfacePoint> points;
   for (const float off :
        {-1.5f, -0.5f, 0.0f, 0.5f, 1.5f}) {  // voxels; one sample at the point would miss three of them
-    const Vec3d world = kFrame.world_from_unit((kMiddle + direction * 0.3f).cast<double>());
+    const Vec3d world = kMeshFrame.world_from_unit((kMeshMiddle + direction * 0.3f).cast<double>());
     const Vec3f voxel = ((world - stage.plan.origin) / stage.plan.voxel_size).cast<float>();
     points.push_back({voxel + direction * off, direction});
   }
@@ -136,7 +136,7 @@ TEST(TexelShader, FindsTheSurfaceFromALittleOff) {
 }
 
 TEST(TexelShader, AveragesOverTheViewsThatSeeThePoint) {
-  AnalyticField field(kFrame, sphere_density(kMiddle, 0.3f, 600));
+  AnalyticField field(kMeshFrame, sphere_density(kMeshMiddle, 0.3f, 600));
   field.with_luminance([](Vec3f, Vec3f d) { return d.x < -0.5f ? 0.2f : d.y < -0.5f ? 0.6f : 9.0f; });
   const Stage stage(field);
   const std::vector<Camera> cameras{camera_at("x", {6, 2, 3}, {1, 2, 3}, 64, 64, 100),
@@ -144,7 +144,7 @@ TEST(TexelShader, AveragesOverTheViewsThatSeeThePoint) {
                                     camera_at("hidden", {1, -3, 3}, {1, 2, 3}, 64, 64, 100)};
   const TexelShader shader(field, cameras, stage.plan, coarse(), stage.sigma);
   const auto at = [&](Vec3f direction) {
-    const Vec3d world = kFrame.world_from_unit((kMiddle + direction * 0.3f).cast<double>());
+    const Vec3d world = kMeshFrame.world_from_unit((kMeshMiddle + direction * 0.3f).cast<double>());
     return SurfacePoint{((world - stage.plan.origin) / stage.plan.voxel_size).cast<float>(), direction};
   };
   const auto colors =
