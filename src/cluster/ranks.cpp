@@ -211,7 +211,7 @@ std::int64_t JoinedRanks::next(std::int64_t work) {
   return guarded([&] { return store_->add(work_key(work, "next"), 1); }) - 1;
 }
 
-void JoinedRanks::put(std::int64_t work, std::int64_t piece, Bytes result) {
+void JoinedRanks::put(std::int64_t work, std::int64_t piece, const Bytes& result) {
   wait_for([&] { return piece - store_->add(work_key(work, "taken"), 0) < kMostAhead; }, "result", kNoLimit);
   guarded([&] { store_->set(result_key(work, piece), result); });
 }

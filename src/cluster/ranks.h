@@ -50,7 +50,7 @@ class Ranks {
   /// The next piece of a work, from 0; each number goes to one rank.
   [[nodiscard]] virtual std::int64_t next(std::int64_t /*work*/) { return 0; }
   /// A result for rank 0. Waits while that is many pieces behind.
-  virtual void put(std::int64_t /*work*/, std::int64_t /*piece*/, Bytes /*result*/) {}
+  virtual void put(std::int64_t /*work*/, std::int64_t /*piece*/, const Bytes& /*result*/) {}
   /// For rank 0, once: a result, if it is there. If asked, waits until it is.
   [[nodiscard]] virtual std::optional<Bytes> take(std::int64_t /*work*/, std::int64_t /*piece*/, bool /*waits*/) {
     return std::nullopt;
@@ -111,7 +111,7 @@ class JoinedRanks final : public Ranks {
   void barrier(const std::string& what, Seconds limit = kNoLimit) override;
   [[nodiscard]] std::int64_t begin_work() override { return works_++; }
   [[nodiscard]] std::int64_t next(std::int64_t work) override;
-  void put(std::int64_t work, std::int64_t piece, Bytes result) override;
+  void put(std::int64_t work, std::int64_t piece, const Bytes& result) override;
   [[nodiscard]] std::optional<Bytes> take(std::int64_t work, std::int64_t piece, bool waits) override;
   void took(std::int64_t work) override;
 
