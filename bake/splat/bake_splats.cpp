@@ -19,11 +19,11 @@ void report(Observer& observer, double fraction, std::vector<std::pair<std::stri
   observer.report_progress({"splats", fraction, std::move(figures)});
 }
 
-std::vector<Splat> fitted(const std::vector<SplatTarget>& targets, std::vector<PlacedSplat> placed, const SplatJob& job,
-                          Observer& observer) {
+std::vector<Splat> fitted(const std::vector<SplatTarget>& targets, const std::vector<PlacedSplat>& placed,
+                          const SplatJob& job, Observer& observer) {
   SplatOptions options = job.options;
   options.count = splats_in_all(options, placed.size());
-  SplatFit fit(targets, std::move(placed), options, nearest_splat(job.frame));
+  SplatFit fit(targets, placed, options, nearest_splat(job.frame));
   double psnr = 0;
   while (fit.steps_done() < job.options.steps) {
     const double of_picture = fit.step();

@@ -53,8 +53,8 @@ int splats_in_all(const SplatOptions& options, std::size_t placed) {
   return int(std::min(double(options.count), std::ceil(double(placed) / kFirstShare)));
 }
 
-SplatFit::SplatFit(std::span<const SplatTarget> targets, std::vector<PlacedSplat> placed, const SplatOptions& options,
-                   double near)
+SplatFit::SplatFit(std::span<const SplatTarget> targets, const std::vector<PlacedSplat>& placed,
+                   const SplatOptions& options, double near)
     : targets_(targets), options_(options), near_(near) {
   CNERF_CHECK(!targets.empty(), "splats are fitted to pictures");
   for (const PlacedSplat& one : placed) {

@@ -21,7 +21,7 @@ namespace cnerf::bake {
 class SplatFit {
  public:
   /// @param targets  must outlive this object.  @param near  of the cameras, world units
-  SplatFit(std::span<const SplatTarget> targets, std::vector<PlacedSplat> placed, const SplatOptions& options,
+  SplatFit(std::span<const SplatTarget> targets, const std::vector<PlacedSplat>& placed, const SplatOptions& options,
            double near);
 
   /// The next of `options.steps`.

@@ -202,7 +202,7 @@ class Chunk {
 CaptureListing read_metashape(const fs::path& xml_file) {
   pugi::xml_document document;
   read_xml(xml_file, document);
-  const XmlElement top = {document, &xml_file, ""};
+  const XmlElement top = {document.root(), &xml_file, ""};
   Chunk chunk(top.child("document").child("chunk"));
   const XmlElement cameras = top.child("document").child("chunk").child("cameras");
 

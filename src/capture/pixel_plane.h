@@ -26,7 +26,7 @@ class PixelPlane {
       : owner_(std::move(owner)), values_(const_cast<T*>(values)), size_(size) {}
   PixelPlane(const PixelPlane& other) : own_(other.own_), owner_(other.owner_) { refer_as(other); }
   PixelPlane(PixelPlane&& other) noexcept { *this = std::move(other); }
-  PixelPlane& operator=(const PixelPlane& other) { return *this = PixelPlane(other); }
+  PixelPlane& operator=(const PixelPlane& other) { return *this = PixelPlane(other); }  // NOLINT: its own copy too
   PixelPlane& operator=(PixelPlane&& other) noexcept {
     own_ = std::move(other.own_);
     owner_ = std::move(other.owner_);

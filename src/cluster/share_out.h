@@ -47,7 +47,7 @@ void share_out(Ranks& ranks, std::size_t count, const Make& make, const Take& ta
     own.emplace(piece, make(piece));
     while (taken < count && take_next(own.size() > std::size_t(kMostAhead))) continue;
   }
-  while (taken < count) take_next(/*waits=*/true);
+  for (std::size_t left = count - taken; left > 0; --left) take_next(/*waits=*/true);
 }
 
 /// The same of pieces that leave files, and nothing to be handed on.

@@ -66,7 +66,7 @@ void bind_errors(py::module_& module) {
   py::register_local_exception_translator([](std::exception_ptr thrown) {
     if (!thrown) return;
     try {
-      std::rethrow_exception(thrown);
+      std::rethrow_exception(std::move(thrown));
     } catch (const Interrupted& interruption) {
       PyErr_SetString(PyExc_KeyboardInterrupt, interruption.what());
     } catch (const Error& error) {

@@ -77,7 +77,7 @@ void duplicate(const pipeline::RunDirectory& directory, const std::string& take,
   if (!is_vacant(to)) throw UsageError("a take of this name exists: " + name);
   std::error_code failure;
   for (const auto& entry : fs::directory_iterator(directory.take_folder(take), failure)) {
-    const fs::path file = entry.path();
+    const fs::path& file = entry.path();
     // The record comes last: without it there is no take.
     const bool is_record = file == directory.take_record_file(take);
     if (is_record || !entry.is_regular_file() || file.filename() == FolderLock::kFile || is_temporary(file)) continue;

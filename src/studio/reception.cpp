@@ -103,7 +103,7 @@ std::optional<std::uint64_t> append(const fs::path& file, std::uint64_t offset, 
 
 }  // namespace
 
-Reception::Reception(fs::path source, fs::path run, Open open, Observer& observer)
+Reception::Reception(fs::path source, const fs::path& run, Open open, Observer& observer)
     : source_(std::move(source)),
       run_(fs::absolute(run).lexically_normal()),
       open_(std::move(open)),

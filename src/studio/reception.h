@@ -32,7 +32,7 @@ class Reception final : public web::PageApi {
   /// @param source  photographs, a clip or a capture to begin with at once; empty = what the page sends
   /// @param run     folder that the run will go to; what arrives is kept beside it
   /// @param observer  hears what is done; referred to
-  Reception(std::filesystem::path source, std::filesystem::path run, Open open, Observer& observer);
+  Reception(std::filesystem::path source, const std::filesystem::path& run, Open open, Observer& observer);
 
   /// Waits for a capture and begins the run.  @return  nothing when the user ended the program, or it was closed
   [[nodiscard]] std::optional<pipeline::RunContext> run();

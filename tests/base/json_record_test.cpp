@@ -9,7 +9,6 @@
 
 namespace cnerf::test {
 namespace {
-using testing::HasSubstr;
 using Json = nlohmann::ordered_json;
 
 struct Inner {

@@ -209,7 +209,7 @@ int bench(int argc, char** argv) {
   row("copying the model", seconds_of([&] { (void)model.copy(engines); }), "s");
   const auto number = [&](const std::string& name, double usual) {
     const auto given =
-        std::find_if(argv + 2, argv + argc, [&](std::string word) { return word.starts_with(name + "="); });
+        std::find_if(argv + 2, argv + argc, [&](const std::string& word) { return word.starts_with(name + "="); });
     return given == argv + argc ? usual : std::stod(std::string(*given).substr(name.size() + 1));
   };
   RetouchOptions options;

@@ -8,8 +8,6 @@
 namespace cnerf {
 namespace {
 
-using testing::ElementsAre;
-
 void expect_named_ring(const Capture& capture, int count) {
   ASSERT_EQ(capture.views.size(), std::size_t(count));
   for (int i = 0; i < count; ++i) {

@@ -19,7 +19,6 @@ using test::message_of;
 using test::some_question;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using ::testing::Not;
 
 bool has_python() {
   return std::system("python3 -c pass >/dev/null 2>&1") == 0;

@@ -114,7 +114,8 @@ TEST(GuidedUpsample, CellsNeedNotDivideThePicture) {
   torch::manual_seed(7);
   // A ramp over the cells' columns, where lightness says nothing: a spline repeats it.
   const Tensor ramp = torch::arange(7).to(torch::kFloat32).view({1, 1, 1, 7}).expand({1, 1, 5, 7}).contiguous();
-  for (const auto& [height, width] : {std::pair{33, 50}, {5, 7}, {3, 4}}) {
+  for (const auto& size : {std::pair{33, 50}, {5, 7}, {3, 4}}) {
+    const int height = size.first, width = size.second;  // no structured binding: clang 14 captures none
     const Tensor full = guided_upsample(ramp, torch::full({1, 1, height, width}, 50.0f));
     ASSERT_EQ(full.sizes(), (std::vector<std::int64_t>{1, 1, height, width}));
     const Tensor expected = (torch::arange(width) + 0.5) * 7 / width - 0.5;

@@ -18,7 +18,7 @@ namespace cnerf::faults {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kOutput = 73, kBusy = 75, kInternal = 70, kUsage = 64;
+constexpr int kOutput = 73, kBusy = 75, kInternal = 70;
 const std::set<int> kDocumented = {0, 64, 65, 66, 69, 71, 73, 75, 76, 77, 78, 79, 130};
 
 /// What one trial found out.

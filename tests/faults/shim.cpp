@@ -48,12 +48,15 @@
 #include <utility>
 #include <vector>
 
+// The C library names them.
+// NOLINTBEGIN(bugprone-reserved-identifier)
 extern "C" {
 void* __libc_malloc(size_t);
 void* __libc_calloc(size_t, size_t);
 void* __libc_realloc(void*, size_t);
 void* __libc_memalign(size_t, size_t);
 }
+// NOLINTEND(bugprone-reserved-identifier)
 
 namespace {
 
@@ -596,6 +599,7 @@ int main_with_memory_counted(int argc, char** argv, char** environment) {
 
 extern "C" {
 
+// NOLINTNEXTLINE(bugprone-reserved-identifier)
 int __libc_start_main(int (*main)(int, char**, char**), int argc, char** argv, void (*init)(), void (*fini)(),
                       void (*linker_fini)(), void* stack_end) {
   using Start = int(int (*)(int, char**, char**), int, char**, void (*)(), void (*)(), void (*)(), void*);
@@ -654,6 +658,7 @@ int creat(const char* name, mode_t mode) {
 int creat64(const char* name, mode_t mode) {
   return open64(name, O_WRONLY | O_CREAT | O_TRUNC, mode);
 }
+// NOLINTBEGIN(bugprone-reserved-identifier)
 int __open_2(const char* name, int flags) {
   return open(name, flags);
 }
@@ -663,6 +668,7 @@ int __open64_2(const char* name, int flags) {
 int __openat_2(int folder, const char* name, int flags) {
   return openat(folder, name, flags);
 }
+// NOLINTEND(bugprone-reserved-identifier)
 
 FILE* fopen(const char* name, const char* mode) {
   return counted_fopen(name, mode, [&] { return REAL(fopen)(name, mode); });

@@ -9,10 +9,18 @@
 
 namespace cnerf::mutants {
 
+/// Whether this build, and so the program beside it, is one of a sanitizer.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool kIsSanitized = true;
+#else
+inline constexpr bool kIsSanitized = false;
+#endif
+
 struct Limits {
-  std::chrono::seconds wall{30};  ///< without the time in which it was ready and others had the processors
-  std::size_t address_bytes = std::size_t(12) << 30;  ///< 0 = none, as the address sanitizer needs
-  bool sanitized = false;                             ///< the program is one of the address sanitizer
+  std::chrono::seconds wall{
+      kIsSanitized ? 300 : 30};  ///< without the time in which it was ready and others had the processors
+  std::size_t address_bytes = kIsSanitized ? 0 : std::size_t(12) << 30;  ///< 0 = none, as sanitizers need
+  bool sanitized = kIsSanitized;                                         ///< the program is one of a sanitizer
 };
 
 struct Outcome {

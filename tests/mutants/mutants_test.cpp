@@ -39,6 +39,7 @@ TEST(Mutants, DifferFromTheOriginal) {
 
 TEST(Mutants, EndsAreJudged) {
   CampaignOptions options;
+  options.limits.sanitized = false;
   const auto verdict = [&](int code, int signal, const std::string& err, std::size_t peak = 0, bool timed_out = false) {
     return verdict_of({code, signal, timed_out, peak, 0, "", err}, "poses.json", options);
   };

@@ -27,10 +27,7 @@ int main(int argc, char** argv) {
   app.add_option("--patience", options.patience, "Seconds in which the page has to come")->capture_default_str();
   app.add_flag("--sanitized", options.limits.sanitized, "The program is built with a sanitizer: memory is not judged");
   CLI11_PARSE(app, argc, argv);
-  if (options.limits.sanitized) {
-    options.limits.address_bytes = 0;
-    options.most_growth = std::size_t(1) << 40;
-  }
+  if (options.limits.sanitized) options.limits.address_bytes = 0;
   options.program = std::filesystem::absolute(options.program);
   options.folder = std::filesystem::absolute(options.folder);
   try {

@@ -31,4 +31,4 @@ class TempDir {
 #define CNERF_REQUIRE_DATA(variable, relative)                                        \
   const auto variable##_found = ::cnerf::test::shared_data(relative);                 \
   if (!variable##_found) GTEST_SKIP() << "needs " << (relative) << " in $CNERF_DATA"; \
-  const std::filesystem::path variable = *variable##_found
+  const std::filesystem::path& variable = *variable##_found

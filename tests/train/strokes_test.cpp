@@ -90,7 +90,7 @@ TEST(Strokes, ViewpointsAreWrittenAndRead) {
   ASSERT_EQ(read.viewpoints, list.viewpoints) << "to the last bit";
   ASSERT_EQ(painted_viewpoints(read).size(), 1u);
   EXPECT_EQ(painted_viewpoints(read)[0].name, "viewpoint-1");
-  EXPECT_EQ(read.viewpoints[0].camera.world_from_camera().linear * Vec3d(0, 0, 1), Vec3d(0, -1, 0)) << "rows";
+  EXPECT_EQ(read.viewpoints[0].camera.world_from_camera().linear * (Vec3d{0, 0, 1}), (Vec3d{0, -1, 0})) << "rows";
 }
 
 TEST(Strokes, ThatColorEverythingAreWrittenReadAndRefusedByName) {

@@ -351,7 +351,7 @@ std::size_t held_bytes() {
 TEST(WebServer, MemoryDoesNotGrowWithFiles) {
   const Site site;
   constexpr std::size_t kBytes = std::size_t(192) << 20;
-  std::ofstream(site.root / "large.bin");
+  write_file(site.root / "large.bin", std::string_view());
   fs::resize_file(site.root / "large.bin", kBytes);
   WebServer server({site.root}, {});
   server.start();

@@ -9,9 +9,8 @@ namespace cnerf {
 namespace {
 
 constexpr std::uint32_t kRaysAtATime = 1 << 18;  // of a rendering
-constexpr std::size_t kTracedAtATime = LuminanceTracerCuda::kTracedAtATime;
-constexpr std::size_t kUsualSamples = 16;  // that are kept of a ray
-constexpr std::size_t kGrain = 1 << 14;    // samples of a parallel piece of work
+constexpr std::size_t kUsualSamples = 16;        // that are kept of a ray
+constexpr std::size_t kGrain = 1 << 14;          // samples of a parallel piece of work
 
 const char* const kTracedAdvice = "rays";
 

@@ -138,7 +138,7 @@ std::size_t ViewCache::place_of(const Viewpoint& viewpoint) const {
   return of_capture() + std::size_t(std::ranges::find(viewpoints_, viewpoint) - viewpoints_.begin());
 }
 
-void ViewCache::add(std::vector<TracedViewpoint> traced) {
+void ViewCache::add(std::vector<TracedViewpoint>&& traced) {
   for (auto& [viewpoint, view] : traced) {
     if (holds(viewpoint) || viewpoints_.size() == kRoom) continue;
     const auto older = std::ranges::find(viewpoints_, viewpoint.name, &Viewpoint::name);

@@ -73,7 +73,7 @@ class ViewCache {
   [[nodiscard]] bool holds(const Viewpoint& viewpoint) const { return place_of(viewpoint) < names_.size(); }
   /// Holds them behind all others, which stay where they are: who goes through `views()` meanwhile is not disturbed.
   /// One of the same name and another camera loses its name. When there is no room for more, these are left out.
-  void add(std::vector<TracedViewpoint> traced);
+  void add(std::vector<TracedViewpoint>&& traced);
   /// Puts viewpoints that are held before the other ones, in their order. Views move.
   void put_first(std::span<const Viewpoint> viewpoints);
   /// Lets the viewpoints go that are none of these. Views move.

@@ -27,7 +27,7 @@ inline BrickGrid<float> covered_voxels(Vec3i size, const std::function<double(Ve
 
 /// Coverage of voxels by what a signed distance says is inside; exact for planes across an axis.
 inline std::function<double(Vec3d)> inside_of(std::function<double(Vec3d)> distance) {
-  return [distance](Vec3d p) { return std::clamp(0.5 - distance(p), 0.0, 1.0); };
+  return [distance = std::move(distance)](Vec3d p) { return std::clamp(0.5 - distance(p), 0.0, 1.0); };
 }
 
 inline SurfaceMesh sphere_surface(int side, double radius, double adaptivity = 0) {
