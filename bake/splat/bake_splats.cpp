@@ -64,10 +64,10 @@ SplatCloud bake_splats(const SplatJob& job, Observer& observer) {
   const std::vector<Camera> cameras = target_cameras(job.cameras);
   const std::vector<SplatTarget> targets = draw_targets(cameras, job.draw, job.options.picture_side,
                                                         [&](double share) { report(observer, kTargetShare * share); });
-  std::vector<PlacedSplat> placed = place_splats(targets, splats_at_first(job.options));
+  const std::vector<PlacedSplat> placed = place_splats(targets, splats_at_first(job.options));
   observer.say(fmt::format("splats: {} placed on what {} pictures of {} x {} show", placed.size(), targets.size(),
                            targets.front().intrinsics.width, targets.front().intrinsics.height));
-  SplatCloud cloud{fitted(targets, std::move(placed), job, observer), job.frame};
+  SplatCloud cloud{fitted(targets, placed, job, observer), job.frame};
   sort_in_space(cloud.splats, job.frame);
   return cloud;
 }

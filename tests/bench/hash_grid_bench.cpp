@@ -99,7 +99,7 @@ void report(benchmark::State& state, double seconds, double ceiling) {
 
 void HashGridForward(benchmark::State& state) {
   HashGridTrace trace(int(state.range(0)));
-  for ([[maybe_unused]] auto _ : state) {
+  while (state.KeepRunning()) {
     const double ceiling = bench::best_seconds(kRepeats, [&] { trace.replay_gather(); });
     report(state, bench::best_seconds(kRepeats, [&] { trace.encode(); }), ceiling);
   }
@@ -108,7 +108,7 @@ BENCHMARK(HashGridForward)->Arg(15)->Arg(17)->Iterations(1)->Unit(benchmark::kMi
 
 void HashGridBackward(benchmark::State& state) {
   HashGridTrace trace(int(state.range(0)));
-  for ([[maybe_unused]] auto _ : state) {
+  while (state.KeepRunning()) {
     const double ceiling = bench::best_seconds(kRepeats, [&] { trace.replay_scatter(); });
     report(state, bench::best_seconds(kRepeats, [&] { trace.scatter(); }), ceiling);
   }

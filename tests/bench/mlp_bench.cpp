@@ -108,7 +108,7 @@ void ForwardAndBackward(benchmark::State& state, const MlpLayout& layout, IsaLev
   NetAtWork work(layout);
   work.verify();
   const double samples = double(kGroups * kGroup);
-  for ([[maybe_unused]] auto _ : state) {
+  while (state.KeepRunning()) {
     const double peak = peak_rate();
     const double seconds = bench::best_seconds(kRepeats, [&] { work.step(); });
     const double operations =

@@ -210,7 +210,7 @@ void WholeStep(benchmark::State& state, const Capture& capture, IsaLevel isa, in
   torch::set_num_threads(threads);
   TorchStep torch_step(training);
   torch_step.verify();
-  for ([[maybe_unused]] auto _ : state) {
+  while (state.KeepRunning()) {
     double all = 1e30, one = 1e30, torch_best = 1e30;
     for (int i = 0; i < kRounds; ++i) {
       all = std::min(all, engine_seconds(training, threads));
@@ -232,7 +232,7 @@ void WholeStep(benchmark::State& state, const Capture& capture, IsaLevel isa, in
 /// As a training runs it.
 void DefaultStep(benchmark::State& state, const Capture& capture, int threads) {
   Training training(capture, {});
-  for ([[maybe_unused]] auto _ : state) {
+  while (state.KeepRunning()) {
     double best = 1e30;
     for (int i = 0; i < kRounds; ++i) best = std::min(best, engine_seconds(training, threads));
     report(state, best, threads);

@@ -445,6 +445,7 @@ void try_aborts(int port, ServerRow& row, int clients, const std::string& file) 
 }
 
 void send_garbage(int port, ServerRow& row, const ServerOptions& options) {
+  // NOLINTBEGIN(bugprone-suspicious-missing-comma): long ones go on in the next line
   const std::vector<std::string> requests = {
       get("/"),
       get("/bundle.json", "Range: bytes=0-9\r\nAccept-Encoding: gzip\r\n"),
@@ -457,6 +458,7 @@ void send_garbage(int port, ServerRow& row, const ServerOptions& options) {
       "HEAD /../secret.txt HTTP/1.0\r\nHost: 127.0.0.1\r\nCookie: cnerf_token=a\r\n\r\n",
       get("/live/events?token=abc&x=%41"),
       get("/photos/%2e%2e/secret.txt", "If-Range: a\r\nExpect: 100-continue\r\n")};
+  // NOLINTEND(bugprone-suspicious-missing-comma)
   std::mutex mutex;
   for_each_client(options.garbage, [&](int i) {
     Random random(options.seed, "garbage", std::size_t(i));

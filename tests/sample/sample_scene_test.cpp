@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr SampleSceneOptions kSmall = {.views = 10, .width = 64, .height = 48, .samples_per_pixel = 4, .seed = 1};
+const SampleSceneOptions kSmall = {.views = 10, .width = 64, .height = 48, .samples_per_pixel = 4, .seed = 1};
 
 /// One scene for all tests that only look at it.
 const fs::path& small_scene() {

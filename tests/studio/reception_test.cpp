@@ -10,6 +10,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/sample/sample_scene.h"
+#include "tests/studio/state.h"
 #include "tests/support/data.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/tiny_config.h"
@@ -119,7 +120,7 @@ TEST_F(ReceptionTest, WhatCannotBePreparedIsToldAndOthersCanBeSent) {
               HasSubstr("nothing has arrived"));
   EXPECT_EQ(put("a.jpg", "0", "no photograph").status, 200);
   EXPECT_EQ(order("prepare").status, 202);
-  const json state = wait_until([](const json& now) { return now["failed"] == true && now["task"] == ""; });
+  const json state = wait_until([](const json& now) { return now["failed"] == true && test::is_idle(now); });
   EXPECT_THAT(state["message"].get<std::string>(), HasSubstr("a.jpg"));
   EXPECT_EQ(put("b.jpg", "0", "another").status, 200);
 }

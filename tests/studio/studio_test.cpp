@@ -15,6 +15,7 @@
 #include "src/pipeline/train_step.h"
 #include "src/sample/sample_scene.h"
 #include "src/studio/paint_files.h"
+#include "tests/studio/state.h"
 #include "tests/support/data.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/tiny_config.h"
@@ -72,7 +73,7 @@ class StudioTest : public testing::Test {
     studio_ = std::make_unique<Studio>(context_, take, cpu_engines(), observer_, kQuick);
     worker_ = std::thread([this] { studio_->run(); });
     studio_->joined(kPainter);
-    (void)wait_until([](const json& state) { return state["ready"] == true && state["task"] == ""; });
+    (void)wait_until([](const json& state) { return state["ready"] == true && test::is_idle(state); });
   }
   void close() {
     if (!studio_) return;
@@ -105,7 +106,7 @@ class StudioTest : public testing::Test {
   /// Gives an order and waits for its end.
   json ordered(const json& order) {
     EXPECT_EQ(post("orders", order).status, 202);
-    return wait_until([](const json& state) { return state["task"] == ""; });
+    return wait_until(test::is_idle);
   }
   [[nodiscard]] json stroke(const std::string& id, double x, double y) const {
     return {{"id", id},        {"view", context_.capture.views[1].name},
@@ -662,7 +663,7 @@ TEST_F(StudioTest, ATrainingIsWatchedStoppedAndGoneOnWith) {
   EXPECT_GT(photo.cols, photo.rows) << "of the field as it is by now, as large as there is time for";
   EXPECT_EQ(get(address("reach/", 0)).status, 503);
   EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
-  const json stopped = wait_until([](const json& state) { return state["task"] == ""; });
+  const json stopped = wait_until(test::is_idle);
   EXPECT_EQ(stopped["stage"], "training");
   EXPECT_EQ(post("frame", frame({"grey"})).status, 200) << "what was learned is shown";
   EXPECT_EQ(ordered({{"order", "colour"}})["failed"], true);
@@ -684,7 +685,7 @@ TEST_F(StudioTest, StoppingKeepsWhatWasLearned) {
   (void)wait_until([](const json& state) { return state["task"] == "colour" && state["fraction"] > 0; });
   EXPECT_EQ(post("orders", {{"order", "begin"}, {"take", ""}}).status, 409);
   EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
-  const json stopped = wait_until([](const json& state) { return state["task"] == ""; });
+  const json stopped = wait_until(test::is_idle);
   EXPECT_EQ(stopped["unkept"], true);
 }
 

@@ -213,8 +213,7 @@ TEST_F(StoredViews, ThatAreForgedAreRefused) {
   std::vector<StatePiece> state = model.engine->state();
   test::floats_of(state, "views")[2] = std::numeric_limits<float>::infinity();
   for (StatePiece& piece : state) piece.holds_floats = false;  // as a program would write that does not look
-  nlohmann::json header = good.header();
-  save_snapshot(folder_ / "forged.snapshot", "stage1", header, state);
+  save_snapshot(folder_ / "forged.snapshot", "stage1", good.header(), state);
   EXPECT_THROW((void)LuminanceModel::learned_views_in(folder_ / "forged.snapshot"), SnapshotError);
   EXPECT_THROW((void)LuminanceModel::load(folder_ / "forged.snapshot", cpu_engines()), SnapshotError);
 }

@@ -20,7 +20,6 @@
 namespace cnerf {
 namespace {
 
-using test::floats_of;
 using test::on_ranks;
 
 Stage1Options few_steps() {

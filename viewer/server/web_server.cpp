@@ -329,7 +329,7 @@ struct WebServer::State {
           std::this_thread::sleep_for(pause);
           return sent;
         },
-        [this, end](bool) {
+        [this, end = std::move(end)](bool) {
           listeners.fetch_sub(1);
           end();
         });
@@ -386,7 +386,7 @@ struct WebServer::State {
       return check(request, response) ? httplib::Server::HandlerResponse::Handled
                                       : httplib::Server::HandlerResponse::Unhandled;
     });
-    server.set_exception_handler([](const httplib::Request&, httplib::Response& response, std::exception_ptr) {
+    server.set_exception_handler([](const httplib::Request&, httplib::Response& response, const std::exception_ptr&) {
       refuse(response, 500, "this cannot be read");
     });
     if (feed != nullptr) {
