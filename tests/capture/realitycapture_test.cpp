@@ -84,13 +84,18 @@ void write_ring_sidecars(const fs::path& folder, const std::string& attributes,
   }
 }
 
+void expect_read_ring(const Capture& capture) {
+  EXPECT_EQ(capture.format, "realitycapture");
+  test::expect_ring(capture);
+}
+
 // ---- table ----------------------------------------------------------------------------------------------------------
 
 TEST(RealityCaptureTable, PosesAndLensesAreRead) {
   const test::TempDir folder;
   write_file(folder / "cameras.csv", ring_table(folder.path(), "45,0.03125,-0.0625,-0.1,0.05,-0.02,0,0.004,-0.007"));
   const Capture capture = load_capture(folder.path());
-  test::expect_ring(capture);
+  expect_read_ring(capture);
   const Intrinsics wanted = {LensModel::kOpenCv, 16, 12, 20, 20, 8.5, 5, {-0.1, 0.05, -0.007, 0.004, -0.02}};
   test::expect_same_lens(capture.views[0].intrinsics, wanted);
 }
@@ -102,8 +107,8 @@ TEST(RealityCaptureTable, AByteOrderMarkCarriageReturnsAndOtherTablesAreNoHindra
   write_file(folder / "all.CSV", table);
   write_file(folder / "a.csv", "#name,x,y\n");
   write_file(folder / "b.csv", "time,place\n1,2\n");
-  test::expect_ring(load_capture(folder.path()));
-  test::expect_ring(load_capture(folder / "images" / ".." / "all.CSV"));
+  expect_read_ring(load_capture(folder.path()));
+  expect_read_ring(load_capture(folder / "images" / ".." / "all.CSV"));
 }
 
 /// As Epic describes it: without turns the camera looks down, the top of its picture to the north (+Y), its right side
@@ -212,7 +217,7 @@ TEST(RealityCaptureSidecars, PosesAndLensesAreRead) {
       "xcr:PrincipalPointU=\"0.03125\" xcr:PrincipalPointV=\"-0.0625\"",
       "-0.1 0.05 -0.02 0 0.004 -0.007");
   const Capture capture = load_capture(folder.path());
-  test::expect_ring(capture);
+  expect_read_ring(capture);
   EXPECT_EQ(capture.views[1].name, "1.png");
   const Intrinsics wanted = {LensModel::kOpenCv, 16, 12, 20, 21, 8.5, 5, {-0.1, 0.05, -0.007, 0.004, -0.02}};
   test::expect_same_lens(capture.views[0].intrinsics, wanted);
@@ -231,7 +236,7 @@ TEST(RealityCaptureSidecars, ValuesMayBeAttributes) {
         "xmlns:xcr=\"http://www.capturingreality.com/ns/xcr/1.1#\" xcr:Rotation=\"" +
             rotation + "\" xcr:Position=\"" + test::text_of({p.x, p.y, p.z}) + "\"/></rdf:RDF></x:xmpmeta>");
   }
-  test::expect_ring(load_capture(folder.path()));
+  expect_read_ring(load_capture(folder.path()));
 }
 
 TEST(RealityCaptureSidecars, ImagesWithoutAPoseAreLeftOut) {

@@ -17,8 +17,8 @@ inline constexpr bool kIsSanitized = false;
 #endif
 
 struct Limits {
-  std::chrono::seconds wall{
-      kIsSanitized ? 300 : 30};  ///< without the time in which it was ready and others had the processors
+  /// Without the time in which it was ready and others had the processors.
+  std::chrono::seconds wall{kIsSanitized ? 300 : 30};
   std::size_t address_bytes = kIsSanitized ? 0 : std::size_t(12) << 30;  ///< 0 = none, as sanitizers need
   bool sanitized = kIsSanitized;                                         ///< the program is one of a sanitizer
 };
