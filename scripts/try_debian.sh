@@ -48,6 +48,7 @@ make_root() {
   debootstrap --variant=minbase --include=ca-certificates "$suite" "$root" http://deb.debian.org/debian > "$root.log"
   # Security updates, where libraries that Debian rebuilds are kept.
   echo "deb http://deb.debian.org/debian-security $suite-security main" > "$root/etc/apt/sources.list.d/security.list"
+  printf '127.0.0.1 localhost\n127.0.1.1 %s\n' "$(hostname)" > "$root/etc/hosts"  # as an installer does
   printf '#!/bin/sh\nexit 101\n' > "$root/usr/sbin/policy-rc.d"  # no services are started in here
   chmod +x "$root/usr/sbin/policy-rc.d"
   # Certificates that this machine trusts beyond Debian's.
@@ -70,10 +71,11 @@ as_minutes() { printf '%d min %02d s' $(($1 / 60)) $(($1 % 60)); }
 if [ "${FRESH:-0}" = 1 ]; then rm -rf --one-file-system "$root"; fi
 if [ ! -e "$root/usr/sbin/policy-rc.d" ]; then make_root; fi
 cp /etc/resolv.conf "$root/etc/resolv.conf"
+mount_in "" --bind "$root"  # so that "/" in there is a mount point, as for network namespaces it has to be
 mount_in /proc -t proc proc
 mount_in /dev --bind /dev
 mount_in /dev/pts --bind /dev/pts
-mount_in /sys --bind -o ro /sys
+mount_in /sys --rbind --make-rslave /sys  # cgroups too, for slurmd
 mount_in /dev/shm -t tmpfs tmpfs  # for Chromium
 if [ -n "${CNERF_DATA:-}" ]; then mount_in /data --bind -o ro "$CNERF_DATA"; fi
 rm -rf "${root:?}$tree"

@@ -14,6 +14,7 @@
 #include "src/base/files.h"
 #include "src/base/usage.h"
 #include "tests/support/data.h"
+#include "tests/support/sanitizers.h"
 
 namespace cnerf {
 namespace {
@@ -55,9 +56,7 @@ TEST(FailureInChild, IsALackOfMemoryBeyondWhatItMayTake) {
 }
 
 TEST(FailureInChild, ALackOfThisProcesssOwnMemoryIsNotTheFiles) {
-#ifdef __SANITIZE_THREAD__
-  GTEST_SKIP() << "the thread sanitizer's memory is not counted as the process's";
-#endif
+  if (test::kIsSanitized) GTEST_SKIP() << "sanitizers end the process, or their memory is not counted as its own";
   const auto under_own_limit = [] {
     (void)limit_growth(std::size_t(32) << 20);
     std::vector<char> taken;

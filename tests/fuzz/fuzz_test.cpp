@@ -14,6 +14,7 @@
 
 #include "src/base/files.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/support/sanitizers.h"
 
 namespace cnerf::fuzz {
 namespace {
@@ -105,13 +106,12 @@ std::string quoted(Bytes input) {
 class FuzzTargets : public testing::TestWithParam<Target> {
  protected:
   static void SetUpTestSuite() {
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    if (test::kIsSanitized) return;
     constexpr rlim_t kMostMemory = rlim_t(8) << 30;  // address space: libraries map much of it
     rlimit now{};
     ::getrlimit(RLIMIT_AS, &now);
     now.rlim_cur = std::min(kMostMemory, now.rlim_max);
     ::setrlimit(RLIMIT_AS, &now);
-#endif
   }
 };
 

@@ -7,20 +7,15 @@
 #include <string>
 #include <vector>
 
-namespace cnerf::mutants {
+#include "tests/support/sanitizers.h"
 
-/// Whether this build, and so the program beside it, is one of a sanitizer.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-inline constexpr bool kIsSanitized = true;
-#else
-inline constexpr bool kIsSanitized = false;
-#endif
+namespace cnerf::mutants {
 
 struct Limits {
   /// Without the time in which it was ready and others had the processors.
-  std::chrono::seconds wall{kIsSanitized ? 300 : 30};
-  std::size_t address_bytes = kIsSanitized ? 0 : std::size_t(12) << 30;  ///< 0 = none, as sanitizers need
-  bool sanitized = kIsSanitized;                                         ///< the program is one of a sanitizer
+  std::chrono::seconds wall{test::kIsSanitized ? 300 : 30};
+  std::size_t address_bytes = test::kIsSanitized ? 0 : std::size_t(12) << 30;  ///< 0 = none, as sanitizers need
+  bool sanitized = test::kIsSanitized;                                         ///< the program is one of a sanitizer
 };
 
 struct Outcome {
