@@ -37,6 +37,7 @@ LuminanceStepCuda::LuminanceStepCuda(const LuminanceEngineOptions& options, cons
       encoded_(capacity_ * std::size_t(2 * channel_tiles(field.levels())), kSampleAdvice),
       rays_(std::size_t(kMostRays), kRayAdvice),
       directions_(std::size_t(kMostRays), kRayAdvice),
+      runs_(std::size_t(kMostRays), kRayAdvice),
       corrections_(std::size_t(options.learning.views), kViewAdvice),
       correction_moments_(std::size_t(options.learning.views), kViewAdvice),
       lenses_(std::size_t(options.learning.lenses), kViewAdvice),
@@ -99,9 +100,21 @@ TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
   job.directions = directions_.data();
   job.state = state_.data();
   job.samples = {capacity_, places_.data(), encoded_.data(), gradients_.data()};
-  job.distortion_weight = options_.distortion_weight;
+  job.runs = runs_.data();
+  return job;
+}
+
+RayGradientJob LuminanceStepCuda::gradient_job() const {
+  RayGradientJob job;
+  job.activation = field_.view().activation;
+  job.march = options_.march;
+  job.rays = rays_.data();
+  job.runs = runs_.data();
+  job.samples = {capacity_, places_.data(), encoded_.data(), gradients_.data()};
   job.depth = options_.depth;
+  job.distortion_weight = options_.distortion_weight;
   if (options_.learning.exposures) job.view_gradients = learned().gradients;
+  job.state = state_.data();
   return job;
 }
 
@@ -151,6 +164,7 @@ void LuminanceStepCuda::draw_and_trace(const std::uint32_t* occupied) {
                       options_.depth, rays_.data(), directions_.data()},
                      stream_);
   trace_training_rays(trace_job(occupied), stream_);
+  differentiate_rays(gradient_job(), stream_);
   field_.nets_backward(samples(), stream_);
 }
 

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "src/base/cuda/stream.h"
+#include "src/engine/cuda/ray_gradient_kernel.h"
 #include "src/engine/cuda/shared_grid.h"
-#include "src/engine/cuda/trace_kernel.h"
 #include "src/engine/cuda/view_images.h"
 #include "src/engine/luminance_engine.h"
 #include "src/field/cuda/luminance_field.h"
@@ -69,6 +69,7 @@ class LuminanceStepCuda {
   void capture(const std::uint32_t* occupied);
   void forget_graph();
   [[nodiscard]] TraceJob trace_job(const std::uint32_t* occupied) const;
+  [[nodiscard]] RayGradientJob gradient_job() const;
   [[nodiscard]] FieldSamples samples() const;
   [[nodiscard]] LearnedViews learned() const;
 
@@ -85,6 +86,7 @@ class LuminanceStepCuda {
   DeviceBuffer<uint4> encoded_;
   DeviceBuffer<RayRecord> rays_;
   DeviceBuffer<DirectionCode> directions_;
+  DeviceBuffer<RayRuns> runs_;
   DeviceBuffer<ViewCorrection> corrections_;  // of the views, where they are learned
   DeviceBuffer<ViewMoments> correction_moments_;
   DeviceBuffer<LensCorrection> lenses_;  // likewise

@@ -12,7 +12,7 @@ constexpr unsigned kThreads = 128;
 __global__ void begin(StepState* state, const float* learning_rates, const StepPart part) {
   const float rate = learning_rates[state->step % kStepRing];
   const auto [first, last] = part_of_rays(state->rays, part.part, part.parts);
-  state->next_ray = first;
+  state->first_ray = state->next_ray = first;
   state->end_ray = last;
   state->samples = 0;
   state->loss = state->squared_error = 0;
@@ -75,7 +75,7 @@ __device__ void clip(RayRecord& record) {
 }
 
 __global__ void draw(const DrawJob job) {
-  const std::uint32_t ray = job.state->next_ray + blockIdx.x * kThreads + threadIdx.x;
+  const std::uint32_t ray = job.state->first_ray + blockIdx.x * kThreads + threadIdx.x;
   if (ray >= job.state->end_ray) return;
   const DeviceViews views = {job.views, job.corrections, job.n_views, job.resident};
   const ObservedRay observed = observe_ray(views, job.seed, std::uint64_t(job.state->step), std::uint64_t(ray));

@@ -3,7 +3,6 @@
 #include "src/base/cuda/device_memory.h"
 #include "src/base/cuda/launch.h"
 #include "src/base/cuda/warp.cuh"
-#include "src/engine/stage1_loss.h"
 #include "src/field/cuda/channel_tiles.h"
 #include "src/field/cuda/field_forward.cuh"
 #include "src/render/cuda/run_optics.cuh"
@@ -23,33 +22,9 @@ struct TraceShared {
   MarchQueue queue[kWarps];
 };
 
-/// A ray's distortion, a run of samples at a time.
-struct RunDistortion {
-  Distortion<float> of_runs;  ///< weight and moment of the runs so far; of the value this lane's share
-
-  /// Adds a run, one sample per lane; returns the sums in front of this lane's sample.
-  __device__ Distortion<float> add(float w, const LogInterval<float>& at) {
-    const float own = w * at.place, weight = warp_prefix_sum(w), moment = warp_prefix_sum(own);
-    Distortion<float> before = {of_runs.weight + weight - w, of_runs.moment + moment - own, of_runs.value};
-    of_runs.weight += __shfl_sync(~0u, weight, 31);
-    of_runs.moment += __shfl_sync(~0u, moment, 31);
-    Distortion<float> through = before;
-    through.add(w, at);
-    of_runs.value = through.value;
-    return before;
-  }
-  [[nodiscard]] __device__ Distortion<float> total() const {
-    return {of_runs.weight, of_runs.moment, warp_sum(of_runs.value)};
-  }
-};
-
-/// What a ray has gathered so far. Runs of training rays lie in memory wherever there was room; lane r knows where run
-/// r begins.
+/// What a ray has gathered so far; of a training ray, lane r knows where run r begins.
 struct RayProgress {
-  float depth = 0;           ///< optical
-  float luminance = 0;       ///< this lane's share
-  RunDistortion distortion;  ///< of training rays
-  float depth_miss = 0;      ///< likewise, this lane's share
+  float depth = 0;  ///< optical
   int samples = 0;
   std::uint32_t run_begin = 0;
   bool has_room = true;
@@ -162,55 +137,12 @@ __device__ void keep_heaviest_of_ray(const TraceJob& job, const Ray& ray, std::u
   }
 }
 
-/// Loss of a finished training ray and its gradient by what its samples emit and absorb.
-__device__ void train_ray(const TraceJob& job, const RayRecord& record, const RayProgress& ray, std::uint32_t n_rays,
-                          StepState& sums) {
-  const unsigned lane = threadIdx.x % 32;
-  const SeenRay seen{warp_sum(ray.luminance), expf(-ray.depth)};
-  const RayError error(seen, record.target);
-  const ShapeWeights weights = {job.distortion_weight, job.depth.weight_at(job.state->step)};
-  const bool has_depth = weights.depth > 0 && record.target.depth.is_known();
-  const RayShape shape = {ray.distortion.total(), has_depth ? warp_sum(ray.depth_miss) + seen.transmittance : 0.0f};
-  if (lane == 0) {
-    sums.loss += ray_loss(error, shape, weights);
-    sums.squared_error += squared_error(seen, record.target);
-  }
-  const float scale = ray.has_room ? 1.0f / float(n_rays) : 0.0f;
-  const RayGradient gradient(error, record.target.gain, shape, weights, scale);
-  if (job.view_gradients != nullptr && lane == 0) {
-    atomicAdd(&job.view_gradients[record.view].by_log_gain, gradient.by_log_gain(seen, record.target));
-  }
-  float distortion_behind = gradient.distortion_of_all(), depth_behind = shape.depth_miss;
-  RunDistortion passed;
-  float depth = 0, composited = 0;
-  for (int first = 0; first < ray.samples; first += 32) {
-    const std::uint32_t at = __shfl_sync(~0u, ray.run_begin, first / 32) + lane;
-    const bool has_sample = first + int(lane) < ray.samples && at < job.samples.capacity;
-    const float2 stored = has_sample ? job.samples.gradients[at] : make_float2(0, 0);
-    const RunOptics<> optics(depth, stored.x);
-    LitSample sample{1.0f, job.field.activation.value(stored.y), optics.weight(), optics.transmittance_after()};
-    sample.composited = composited + warp_prefix_sum(sample.weight * sample.luminance);
-    float d_depth = gradient.by_density(sample);
-    const float4 place = has_sample ? job.samples.places[at] : make_float4(0, 0, 0, 0);
-    const float t = dot(Vec3f{place.x, place.y, place.z} - record.ray.origin, record.ray.direction);
-    if (weights.distortion > 0) {
-      const LogInterval<float> interval(t, march_step(job.march, t));
-      const Distortion<float> before = passed.add(sample.weight, interval);
-      const float slope = gradient.distortion_by_weight(sample.weight, interval, before);
-      const float taken = warp_prefix_sum(sample.weight * slope);
-      d_depth += gradient.by_density_of_distortion(sample, slope, distortion_behind - taken);
-      distortion_behind -= __shfl_sync(~0u, taken, 31);
-    }
-    if (has_depth) {
-      const float miss = depth_miss(t, record.target.depth), taken = warp_prefix_sum(sample.weight * miss);
-      d_depth += gradient.by_density_of_depth(sample, miss, depth_behind - taken);
-      depth_behind -= __shfl_sync(~0u, taken, 31);
-    }
-    const float d_raw = gradient.by_luminance(sample) * job.field.activation.derivative(stored.y);
-    if (has_sample) job.samples.gradients[at] = make_float2(d_raw, stored.x * d_depth);
-    depth = optics.depth_at(31);
-    composited = __shfl_sync(~0u, sample.composited, 31);
-  }
+__device__ void write_runs(const RayProgress& ray, RayRuns& runs) {
+  const int lane = int(threadIdx.x) % 32;
+  if (32 * lane < ray.samples) runs.begins[lane] = ray.run_begin;
+  if (lane != 0) return;
+  runs.samples = ray.samples;
+  runs.has_room = ray.has_room;
 }
 
 template <int KT, Keep kKeep>
@@ -241,20 +173,17 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
       count = __ffs(opaque);  // the sample at which the ray becomes opaque is the last one
       is_open = false;
     }
-    const float weight = int(lane) < count ? optics.weight() : 0.0f;
     const float raw_luminance = nets.luminance(warp, geometry, directions);
-    const float luminance = job.field.activation.value(raw_luminance);
-    ray.luminance += weight * luminance;
     ray.depth = optics.depth_at(count - 1);
 
     if constexpr (kKeep == Keep::kTraining) {
-      if (job.distortion_weight > 0) ray.distortion.add(weight, {sample.t, sample.dt});
-      if (record.target.depth.is_known()) ray.depth_miss += weight * depth_miss(sample.t, record.target.depth);
       keep_for_training(job, warp, ray_index, {place, depth, raw_luminance}, count, ray);
       is_open = is_open && ray.has_room;
     }
     if constexpr (kKeep == Keep::kSamples) {
-      if (int(lane) < count) scratch_of_warp(job.kept)[ray.samples + int(lane)] = {sample.t, weight, luminance};
+      const float luminance = job.field.activation.value(raw_luminance);
+      if (int(lane) < count)
+        scratch_of_warp(job.kept)[ray.samples + int(lane)] = {sample.t, optics.weight(), luminance};
     }
     ray.samples += count;
     __syncwarp();
@@ -269,9 +198,8 @@ __global__ void __launch_bounds__(kThreads, 2)
   auto& shared = *reinterpret_cast<TraceShared<KT>*>(memory);
   shared.field.load(job.field.nets);
   const unsigned lane = threadIdx.x % 32;
-  const std::uint32_t n_rays = job.state->rays, end_ray = job.state->end_ray;
+  const std::uint32_t end_ray = job.state->end_ray;
 
-  StepState sums;
   while (true) {
     std::uint32_t index = 0;
     if (lane == 0) index = atomicAdd(&job.state->next_ray, 1u);
@@ -279,16 +207,11 @@ __global__ void __launch_bounds__(kThreads, 2)
     if (index >= end_ray) break;
     const RayRecord record = job.rays[index];
     const RayProgress ray = follow_ray<KT, kKeep>(levels, job, shared, record, index);
-    if constexpr (kKeep == Keep::kTraining) train_ray(job, record, ray, n_rays, sums);
+    if constexpr (kKeep == Keep::kTraining) write_runs(ray, job.runs[index]);
     if constexpr (kKeep == Keep::kSamples) {
       keep_heaviest_of_ray(job, record.ray, index, ray.samples);
       __syncwarp();  // before the next ray's samples take their place
     }
-  }
-  if constexpr (kKeep == Keep::kTraining) {
-    if (lane != 0) return;
-    atomicAdd(&job.state->loss, sums.loss);
-    atomicAdd(&job.state->squared_error, sums.squared_error);
   }
 }
 

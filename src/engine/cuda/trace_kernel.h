@@ -28,6 +28,13 @@ struct SampleArrays {
 inline constexpr int kMostRuns = 32;
 inline constexpr int kMostSamplesOfRay = 32 * kMostRuns;
 
+/// Where the samples of a training ray lie: in runs of 32, wherever there was room.
+struct RayRuns {
+  std::int32_t samples = 0;
+  bool has_room = true;             ///< for all of them
+  std::uint32_t begins[kMostRuns];  ///< of the runs there are
+};
+
 /// What tracing keeps of rays: the heaviest of their samples (heaviest_samples.h).
 struct KeptSamples {
   WeightedSample* scratch = nullptr;  ///< [tracing_warps(), kMostSamplesOfRay]
@@ -49,12 +56,10 @@ struct TraceJob {
   float min_transmittance;
   const RayRecord* rays;
   const DirectionCode* directions;
-  StepState* state;  ///< rays, next_ray, end_ray, samples; training also sums up here
+  StepState* state;  ///< next_ray, end_ray, samples
   // Training:
-  SampleArrays samples;
-  DepthLearning depth;
-  float distortion_weight = 0;
-  ViewGradient* view_gradients = nullptr;  ///< by the views' gains; null: not asked for
+  SampleArrays samples;     ///< gradients: left as optical depth and the luminance net's raw output
+  RayRuns* runs = nullptr;  ///< [rays]
   // Rendering:
   RayResult* results = nullptr;
   // Tracing:
