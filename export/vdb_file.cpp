@@ -1,7 +1,5 @@
 #include "export/vdb_file.h"
 
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -10,6 +8,7 @@
 #include <new>
 #include <tuple>
 
+#include "bake/volume/openvdb_grids.h"
 #include "export/vdb_answer.h"
 #include "src/base/error.h"
 

@@ -2,7 +2,6 @@
 
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Prune.h>
 
 #include <algorithm>
@@ -16,6 +15,7 @@
 #include <sstream>
 #include <vector>
 
+#include "bake/volume/openvdb_grids.h"
 #include "export/up_axis.h"
 #include "src/base/check.h"
 #include "src/base/error.h"

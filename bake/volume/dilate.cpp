@@ -1,6 +1,5 @@
 #include "bake/volume/dilate.h"
 
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Morphology.h>
 
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include <tuple>
 
 #include "bake/lattice/brick_grid.h"
+#include "bake/volume/openvdb_grids.h"
 #include "src/base/parallel.h"
 
 namespace cnerf::bake {

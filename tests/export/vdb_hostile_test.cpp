@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <sys/resource.h>
 
 #include <limits>
@@ -10,6 +9,7 @@
 #include <optional>
 #include <random>
 
+#include "bake/volume/openvdb_grids.h"
 #include "export/bake_folder.h"
 #include "export/vdb_reader.h"
 #include "src/base/error.h"

@@ -1,11 +1,11 @@
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <cmath>
 #include <fstream>
 #include <map>
 #include <tuple>
 
+#include "bake/volume/openvdb_grids.h"
 #include "export/vdb_reader.h"
 #include "export/vdb_writer.h"
 #include "src/base/error.h"

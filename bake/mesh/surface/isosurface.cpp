@@ -1,6 +1,5 @@
 #include "bake/mesh/surface/isosurface.h"
 
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Morphology.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
@@ -9,6 +8,7 @@
 
 #include "bake/density/density_pass.h"
 #include "bake/visibility/view_selection.h"
+#include "bake/volume/openvdb_grids.h"
 #include "src/base/parallel.h"
 
 namespace cnerf::bake {
