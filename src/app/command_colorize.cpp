@@ -52,6 +52,12 @@ void suggest(const ColorizeArguments& arguments, const pipeline::RunContext& con
   reporter.next("cnerf colorize " + arguments.run.run + " --keyframe VIEW=PAINTED.png");
 }
 
+/// New key frames say what the colours are; the colorizer that the run was made with, perhaps as a guess, does not.
+void prefer_key_frames(const ColorizeArguments& arguments, Config& config) {
+  const ColorizerOptions named = named_on_command_line(arguments.run.config).colorizer;
+  if (!named.keyframes.empty() && named.spec.empty() && !arguments.existing.resume) config.colorizer.spec.clear();
+}
+
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
   // A take that is gone on with has its own configuration; a new one starts from the run's.
@@ -64,6 +70,7 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
   }
   if (!arguments.replay.empty()) return replay(arguments, context, reporter);
   if (is_suggestion) return suggest(arguments, context, reporter);
+  prefer_key_frames(arguments, context.config);
   refuse_colorizer_of_others(arguments.run.config, context.config);
   const Engines& engines = engines_for(context.config.device);
   pipeline::choose_colorizer(context.capture.root, context.config, reporter);
@@ -89,6 +96,8 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
 Work declare_colorize(CLI::App& app) {
   auto arguments = std::make_shared<ColorizeArguments>();
   add_run_folder_options(app, arguments->run);
+  app.get_option("--take")->description(
+      "Name of the take; without it a new one is named after its colorizer: reference, then reference-2");
   add_colorizer_options(app, arguments->run.config);
   app.add_option("--bases", arguments->bases,
                  "2,5,7: base images whose colours you like, by their numbers in bases.png");

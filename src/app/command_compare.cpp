@@ -100,6 +100,9 @@ Work declare_compare(CLI::App& app) {
   app.add_flag("--rating-sheet", arguments->rating_sheet, "Also write a page on which people judge unnamed pictures");
   app.add_option("--ratings", arguments->ratings, "Only make a table of these files of answers to the rating sheet");
   add_colorizer_options(app, arguments->config);
+  CLI::Option* colorizer = app.get_option("--colorizer");
+  colorizer->description(colorizer->get_description() +
+                         "; simulated if not given: the true colours, disturbed on purpose");
   app.add_option("--style-reference", arguments->style_reference,
                  "Image whose style is transferred [the middle training view, coloured by the colorizer]");
   app.add_option("--clip", arguments->clip, "Encoders of images and of texts as TorchScript, IMAGE.pt,TEXT.pt");

@@ -106,6 +106,7 @@ void render(const RenderArguments& arguments, const std::vector<std::string>& co
 Work declare_render(CLI::App& app) {
   auto arguments = std::make_shared<RenderArguments>();
   add_run_folder_options(app, arguments->run);
+  app.get_option("RUN")->description("Folder of a run, or of a bake");
   app.add_option("--path", arguments->path,
                  "turntable (whichever of the next two suits), spiral, orbit, held-out, or a camera file (JSON); of a "
                  "bake instead of a run: a camera file, or cameras for all of the capture's, as png");

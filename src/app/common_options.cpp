@@ -154,13 +154,17 @@ Config resolve_config(const ConfigArguments& arguments, Config base) {
   return base;
 }
 
+Config named_on_command_line(const ConfigArguments& arguments) {
+  Config named;
+  read_settings(arguments, fields_of(named), retired_keys());
+  return named;
+}
+
 void refuse_colorizer_of_others(const ConfigArguments& arguments, const Config& config) {
   const std::string& spec = config.colorizer.spec;
   const bool is_code = spec.starts_with("exec:") || spec.starts_with("torchscript:");
   if (!is_code || arguments.is_trusting) return;
-  Config named_by_user;
-  read_settings(arguments, fields_of(named_by_user), retired_keys());
-  if (named_by_user.colorizer.spec == spec) return;
+  if (named_on_command_line(arguments).colorizer.spec == spec) return;
   throw UsageError("the run's configuration names the colorizer " + printable(spec) +
                    ", which would run with your rights; pass --trust if you know who made the run, or --colorizer");
 }

@@ -50,6 +50,9 @@ void read_settings(const ConfigArguments& arguments, const std::vector<Field>& f
 /// @throws UsageError, MissingInputError, DeviceError.
 [[nodiscard]] Config resolve_config(const ConfigArguments& arguments, Config base = {});
 
+/// What the command line itself sets, presets and files that it names included.
+[[nodiscard]] Config named_on_command_line(const ConfigArguments& arguments);
+
 /// A run's folder is data, whoever made it, but for the colorizer that its configuration may name.
 /// @throws UsageError  where that one runs a program or a script, and the user neither named it nor passed --trust.
 void refuse_colorizer_of_others(const ConfigArguments& arguments, const Config& config);

@@ -18,7 +18,7 @@ inline constexpr std::array<ExitCodeMeaning, 15> kExitCodes = {{
     {ExitCode::kUsage, "unknown option or config key, value out of range"},
     {ExitCode::kInput, "a file's content is wrong"},
     {ExitCode::kMissingInput, "a file or folder that should exist does not"},
-    {ExitCode::kDevice, "a device that was asked for is missing, or failed"},
+    {ExitCode::kDevice, "a device or a program that is needed is missing, or failed"},
     {ExitCode::kInternal, "a bug in cnerf"},
     {ExitCode::kMemory, "memory did not suffice"},
     {ExitCode::kOutput, "the output cannot be written"},

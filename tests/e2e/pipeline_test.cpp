@@ -200,6 +200,23 @@ TEST(KeyFrames, AndHintsOverruleTheColorizer) {
   EXPECT_THAT(missing.err, HasSubstr("zebra"));
 }
 
+TEST(KeyFrames, ColorWhatTheyDoNotShowWhereTheCommandNamesNoColorizer) {
+  const TempDir folder;
+  const std::string out = (folder / "run").string();
+  ASSERT_EQ(train(tiny_capture(), out, {"--set", "colorizer.spec=builtin"}).exit_code, 0) << "as cnerf run chooses";
+  const std::string painted = "view_004=" + (tiny_capture() / "color/view_004.png").string();
+  const auto colorizer_of = [&](const std::string& take, const std::vector<std::string>& more) {
+    const ProgramResult result =
+        cnerf(concatenated({"colorize", out, "--take", take, "--keyframe", painted, "--set",
+                            "colorizer.reference_steps=10", "--set", "colorizer.reference_on_builtin=false"},
+                           more));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return json_of(folder / "run/takes" / take / "take.json").at("colorizer").get<std::string>();
+  };
+  EXPECT_THAT(colorizer_of("painted", {}), HasSubstr("reference:"));
+  EXPECT_THAT(colorizer_of("asked", {"--colorizer", "grey"}), HasSubstr("grey + key frame"));
+}
+
 TEST(Pipeline, BaseCandidatesAreShownWithoutMakingATake) {
   const TempDir folder;
   const std::string out = copied(tiny_run(), folder / "run").string();

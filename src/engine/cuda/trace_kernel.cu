@@ -181,9 +181,10 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
       is_open = is_open && ray.has_room;
     }
     if constexpr (kKeep == Keep::kSamples) {
-      const float luminance = job.field.activation.value(raw_luminance);
-      if (int(lane) < count)
+      if (int(lane) < count) {
+        const float luminance = job.field.activation.value(raw_luminance);
         scratch_of_warp(job.kept)[ray.samples + int(lane)] = {sample.t, optics.weight(), luminance};
+      }
     }
     ray.samples += count;
     __syncwarp();
