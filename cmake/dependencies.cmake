@@ -10,8 +10,8 @@ if(TARGET torch AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_link_options(torch INTERFACE "LINKER:--push-state,--no-as-needed,-lstdc++,--pop-state")
 endif()
 
-# OpenVDB's library holds the common grids. Where they can be linked they are not compiled again, but for sanitizers, which
-# look into what is compiled.
+# OpenVDB's library holds the common grids. Where they can be linked they are not compiled again. Sanitizers are the
+# exception: they look into what is compiled.
 if(NOT CNERF_SANITIZE AND NOT CNERF_FUZZ)
   set(CMAKE_TRY_COMPILE_CONFIGURATION ${CMAKE_BUILD_TYPE})
   try_compile(CNERF_OPENVDB_HAS_GRIDS ${PROJECT_BINARY_DIR}/openvdb_grids SOURCES ${PROJECT_SOURCE_DIR}/cmake/openvdb_grids.cpp

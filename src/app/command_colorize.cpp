@@ -55,7 +55,7 @@ void suggest(const ColorizeArguments& arguments, const pipeline::RunContext& con
 /// New key frames say what the colours are; the colorizer that the run was made with, perhaps as a guess, does not.
 void prefer_key_frames(const ColorizeArguments& arguments, Config& config) {
   const ColorizerOptions named = named_on_command_line(arguments.run.config).colorizer;
-  if (!named.keyframes.empty() && named.spec.empty() && !arguments.existing.resume) config.colorizer.spec.clear();
+  if (!named.keyframes.empty() && named.spec.empty()) config.colorizer.spec.clear();
 }
 
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
@@ -70,7 +70,7 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
   }
   if (!arguments.replay.empty()) return replay(arguments, context, reporter);
   if (is_suggestion) return suggest(arguments, context, reporter);
-  prefer_key_frames(arguments, context.config);
+  if (base.empty()) prefer_key_frames(arguments, context.config);
   refuse_colorizer_of_others(arguments.run.config, context.config);
   const Engines& engines = engines_for(context.config.device);
   pipeline::choose_colorizer(context.capture.root, context.config, reporter);

@@ -50,6 +50,28 @@ TEST(Resuming, AColorizationIsExact) {
   EXPECT_TRUE(read_binary_file(parts / "takes/t/take.snapshot") == read_binary_file(whole / "takes/t/take.snapshot"));
 }
 
+TEST(Resuming, KeyFramesInsteadOfTheRunsColorizerGoOnByTheSameCommand) {
+  const TempDir folder;
+  const fs::path run = copied(tiny_run(), folder / "run");
+  std::string config = read_text_file(run / "config.toml");
+  const std::string none = "spec = ''";
+  ASSERT_NE(config.find(none), std::string::npos);
+  write_file(run / "config.toml", config.replace(config.find(none), none.size(), "spec = 'builtin'"));
+  const std::vector<std::string> colorize = {
+      "colorize",   run.string(),
+      "--keyframe", "view_004=" + (tiny_capture() / "color/view_004.png").string(),
+      "--set",      "colorizer.reference_steps=10",
+      "--set",      "colorizer.reference_on_builtin=false",
+      "--set",      "stage2.patches=400",
+      "--progress", "json"};
+  const ProgramResult stopped = cnerf_interrupted_at(colorize, "\"stage 2\"");
+  if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
+  EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
+  const ProgramResult resumed = cnerf(concatenated(colorize, {"--resume"}));
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_TRUE(fs::exists(run / "takes/reference/take.json"));
+}
+
 TEST(Resuming, ACaptureThatWasMovedIsAskedFor) {
   const TempDir folder;
   const fs::path run = copied(tiny_run(), folder / "run");

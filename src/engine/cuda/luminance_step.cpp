@@ -89,6 +89,10 @@ LearnedViews LuminanceStepCuda::learned() const {
           reinterpret_cast<LensGradient*>(of_lenses)};
 }
 
+SampleArrays LuminanceStepCuda::sample_arrays() const {
+  return {capacity_, places_.data(), encoded_.data(), gradients_.data()};
+}
+
 TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
   TraceJob job{};
   job.field = field_.view();
@@ -99,7 +103,7 @@ TraceJob LuminanceStepCuda::trace_job(const std::uint32_t* occupied) const {
   job.rays = rays_.data();
   job.directions = directions_.data();
   job.state = state_.data();
-  job.samples = {capacity_, places_.data(), encoded_.data(), gradients_.data()};
+  job.samples = sample_arrays();
   job.runs = runs_.data();
   return job;
 }
@@ -110,7 +114,7 @@ RayGradientJob LuminanceStepCuda::gradient_job() const {
   job.march = options_.march;
   job.rays = rays_.data();
   job.runs = runs_.data();
-  job.samples = {capacity_, places_.data(), encoded_.data(), gradients_.data()};
+  job.samples = sample_arrays();
   job.depth = options_.depth;
   job.distortion_weight = options_.distortion_weight;
   if (options_.learning.exposures) job.view_gradients = learned().gradients;

@@ -68,6 +68,7 @@ class LuminanceStepCuda {
   void follow(cudaStream_t first, cudaStream_t then);
   void capture(const std::uint32_t* occupied);
   void forget_graph();
+  [[nodiscard]] SampleArrays sample_arrays() const;
   [[nodiscard]] TraceJob trace_job(const std::uint32_t* occupied) const;
   [[nodiscard]] RayGradientJob gradient_job() const;
   [[nodiscard]] FieldSamples samples() const;

@@ -16,13 +16,12 @@ namespace cnerf {
 
 /// What a training step knows about itself, on the GPU.
 struct StepState {
-  std::int64_t step = 0;   ///< steps done
-  std::uint32_t rays = 0;  ///< of this step, by all processes
-  // Rays of this process:
-  std::uint32_t first_ray = 0;
-  std::uint32_t end_ray = 0;   ///< behind the last one
-  std::uint32_t next_ray = 0;  ///< not yet taken by a warp
-  std::uint32_t samples = 0;   ///< allocated; may exceed the capacity
+  std::int64_t step = 0;        ///< steps done
+  std::uint32_t rays = 0;       ///< of this step, by all processes
+  std::uint32_t first_ray = 0;  ///< of this process
+  std::uint32_t end_ray = 0;    ///< behind the last ray of this process
+  std::uint32_t next_ray = 0;   ///< not yet taken by a warp
+  std::uint32_t samples = 0;    ///< allocated; may exceed the capacity
   double loss = 0, squared_error = 0;
   AdamStep adam;
 };
