@@ -184,6 +184,7 @@ void lose(int victim, int signal, const std::string& complaint) {
     const std::string pid = std::to_string(ranks.process(victim));
     const auto start = std::chrono::steady_clock::now();
     ASSERT_EQ(::kill(ranks.process(victim), signal), 0);
+    ::kill(ranks.process(survivor), SIGPIPE);  // as where it writes to the other at that moment
     EXPECT_EQ(ranks.exit_code(survivor), int(ExitCode::kRanks)) << ranks.said(survivor);
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     EXPECT_LT(took.count(), kLongestEnd);

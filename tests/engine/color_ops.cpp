@@ -245,9 +245,11 @@ Op shared_color_field(const FieldProblem& problem) {
   const std::vector<Ab> targets = colors_of(pixels);
   const std::vector<float> weights = random_weights(problem.count);
   const auto trained = [=](const Backend& backend) {
-    auto engine =
-        backend.make([&](const Engines& engines) { return engines.make_color_field(grid_of(problem.levels), 5); });
-    const auto trainer = reference_backend().engines().make_color_field(grid_of(problem.levels), 5);
+    const auto make_on = [&](const Backend& on) {
+      return on.make([&](const Engines& engines) { return engines.make_color_field(grid_of(problem.levels), 5); });
+    };
+    auto engine = make_on(backend);
+    const auto trainer = make_on(reference_backend());
     for (int i = 0; i < 10; ++i) trainer->step(pixels, targets, weights, problem.loss, 1e-2f);
     copy_state(*trainer, *engine);
     return engine;

@@ -11,6 +11,7 @@
 #include <torch/version.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <stdexcept>
@@ -100,6 +101,8 @@ std::string address_towards(const std::string& host) {
 class GlooGroup final : public Group {
  public:
   GlooGroup(const Launch& launch, Seconds limit) {
+    // Gloo writes to peers that may have died. That has to be an error of the operation, and not the process's end.
+    ::signal(SIGPIPE, SIG_IGN);
     const auto options = c10d::ProcessGroupGloo::Options::create(kLongestOperation);
     options->devices.push_back(c10d::ProcessGroupGloo::createDeviceForHostname(address_towards(launch.host)));
     options->threads = 2;
