@@ -74,9 +74,10 @@ RunningColors KnownColorSources::everywhere_in(std::size_t v) const {
   RunningColors colors{std::vector<Ab>(pixels), std::vector<float>(pixels), std::vector<float>(pixels, kUnreached)};
   std::vector<Sight> sights;
   for (const Source& source : sources_) sights.emplace_back(seen_.views()[source.view], seen_.surface(source.view));
+  std::vector<Claims> claims(pixels);
+  std::vector<const Ab*> of_key_frame(pixels, nullptr);
   for (std::size_t p = 0; p < pixels; ++p) {
     if (view.opacity[p] < kLeastColoredOpacity) continue;
-    Claims claims;
     for (std::size_t s = sources_.size(); s-- > 0;) {
       const Source& source = sources_[s];
       std::optional<std::size_t> from = p;
@@ -87,19 +88,21 @@ RunningColors KnownColorSources::everywhere_in(std::size_t v) const {
       }
       if (!from) continue;
       if (source.everywhere) {
-        for (const Claims::Claim& claim : source.everywhere->claims()[*from].list) {
-          claims.add(claim);
-        }
-      } else if (source.colors.is_known(*from)) {
-        claims.add({kKeyFrameCost, source.colors.ab[*from]});
+        for (const Claims::Claim& claim : source.everywhere->claims()[*from].list) claims[p].add(claim);
+      } else if (source.colors.is_known(*from) && of_key_frame[p] == nullptr) {
+        of_key_frame[p] = &source.colors.ab[*from];
       }
     }
-    const bool is_shown = claims.cost() < kUnreached;
+    const bool is_shown = claims[p].cost() < kUnreached || of_key_frame[p] != nullptr;
     for (std::size_t s = sources_.size(); s-- > 0 && !is_shown;) {
-      if (sources_[s].everywhere) sources_[s].everywhere->claim_alike(view, looks, p, claims);
+      if (sources_[s].everywhere) sources_[s].everywhere->claim_alike(view, looks, p, claims[p]);
     }
-    colors.cost[p] = claims.cost();
-    colors.ab[p] = claims.mixed(lightness_at(view, p));
+  }
+  smooth(claims, view, looks.surface);
+  for (std::size_t p = 0; p < pixels; ++p) {
+    if (of_key_frame[p] != nullptr) claims[p].add({kKeyFrameCost, *of_key_frame[p]});
+    colors.cost[p] = claims[p].cost();
+    colors.ab[p] = claims[p].mixed(lightness_at(view, p));
   }
   return colors;
 }

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <queue>
-#include <tuple>
+#include <opencv2/imgproc.hpp>
 
 #include "src/base/check.h"
 #include "src/base/parallel.h"
@@ -14,13 +13,20 @@ namespace {
 constexpr int kAround = 2;  // pixels on each side that looks are a mean of
 // What costs 1 from a stroke to a pixel that is like it, whatever lies between them. The error hardly depends on these:
 // docs/history/decisions.md, 59.
+constexpr float kPlane = 0.35f;     // of the short side, in the plane of the painted view
 constexpr float kLightness = 12;    // L* up and down
 constexpr float kTexture = 6;       // L*
 constexpr float kDepth = 0.2f;      // of the distance
-constexpr float kAlike = 0.5f;      // and to be like it costs so much more than to be joined to it
 constexpr float kNoSurface = 0.5f;  // between what shows a surface and what does not
+constexpr float kAlike = 0.5f;      // and to be like it costs so much more than to be joined to it
+constexpr float kSpread = 0.8f;     // a sample that costs this more counts e times less
 constexpr float kSoft = 0.2f;       // of two colours whose costs differ by this, the dearer counts e times less
+constexpr float kShare = 0.4f;      // the same, while shares of colours are smoothed
+constexpr float kLeastShare = 1e-4f;
+constexpr float kSmoothRadius = 0.04f;   // of the short side
+constexpr float kSmallContrast = 0.05f;  // of a guide, squared: what differs less is smoothed as one
 constexpr float kBlack = 16;  // L* where chroma has gone to nothing below black: in Lab, shade scales a, b and L* + 16
+constexpr std::size_t kMostColors = 64;        // that are smoothed: a painted picture has more, and few pixels of each
 constexpr std::size_t kMostSamples = 400;      // of all colours of a view, each as many
 constexpr std::size_t kPixelsPerPiece = 1024;  // pixels of a parallel piece of work
 
@@ -28,36 +34,48 @@ bool same(Ab x, Ab y) {
   return x.a == y.a && x.b == y.b;
 }
 
-template <typename Visit>
-void for_each_neighbour(const CachedView& view, std::uint32_t p, Visit&& visit) {
-  const int x = int(p) % view.width, y = int(p) / view.width;
-  for (int dy = -1; dy <= 1; ++dy) {
-    for (int dx = -1; dx <= 1; ++dx) {
-      const int nx = x + dx, ny = y + dy;
-      if ((dx == 0 && dy == 0) || nx < 0 || ny < 0 || nx >= view.width || ny >= view.height) continue;
-      visit(std::uint32_t(ny * view.width + nx), dx != 0 && dy != 0 ? std::sqrt(2.0f) : 1.0f);
-    }
+/// Smooths along what a guide shows as one: the guided filter (He et al. 2010, Eq. 5, 6 and 8).
+class GuidedFilter {
+ public:
+  GuidedFilter(cv::Mat guide, int radius) : guide_(std::move(guide)), size_(2 * radius + 1, 2 * radius + 1) {
+    mean_ = around(guide_);
+    variance_ = around(guide_.mul(guide_)) - mean_.mul(mean_) + kSmallContrast;
   }
+  [[nodiscard]] cv::Mat operator()(const cv::Mat& values) const {
+    const cv::Mat mean = around(values);
+    cv::Mat slope;
+    cv::divide(around(guide_.mul(values)) - mean_.mul(mean), variance_, slope);
+    const cv::Mat offset = mean - slope.mul(mean_);
+    return around(slope).mul(guide_) + around(offset);
+  }
+
+ private:
+  [[nodiscard]] cv::Mat around(const cv::Mat& values) const {
+    cv::Mat means;
+    cv::blur(values, means, size_, cv::Point(-1, -1), cv::BORDER_REFLECT);
+    return means;
+  }
+
+  cv::Mat guide_, mean_, variance_;
+  cv::Size size_;
+};
+
+/// The logarithm of distances, in units of kDepth. What shows no surface is far behind all that does.
+cv::Mat depth_guide(const CachedView& view, std::span<const float> surface) {
+  const float farthest = *std::ranges::max_element(surface);
+  cv::Mat guide(view.height, view.width, CV_32F);
+  std::ranges::transform(surface, guide.begin<float>(), [&](float distance) {
+    return std::log(distance > 0 ? distance : std::max(farthest, 1.0f) * 10) / kDepth;
+  });
+  return guide;
 }
 
-/// What a way costs from a pixel to one beside it; as `run` has it, but what shows no surface is passed too.
-struct StepCost {
-  const CachedView& view;
-  const PixelLooks& looks;
-  std::vector<float> lightness;
-  float one_pixel;
-  StepCost(const CachedView& of, const PixelLooks& l) : view(of), looks(l) {
-    const StrokeReach reach;
-    one_pixel = 1.0f / (reach.share_of_short_side * float(of.short_side()));
-    for (std::size_t p = 0; p < of.opacity.size(); ++p) lightness.push_back(lightness_at(of, p));
-  }
-  float operator()(std::uint32_t p, std::uint32_t q, float distance) const {
-    const StrokeReach reach;
-    const float a = looks.surface[p], b = looks.surface[q];
-    const float depth = a > 0 && b > 0 ? std::abs(std::log(a / b)) / reach.depth : (a > 0) != (b > 0) ? kNoSurface : 0;
-    return one_pixel * distance + std::abs(lightness[p] - lightness[q]) / reach.lightness + depth;
-  }
-};
+cv::Mat lightness_guide(const CachedView& view) {
+  cv::Mat guide(view.height, view.width, CV_32F);
+  float* lightness = guide.ptr<float>();
+  for (std::size_t p = 0; p < view.opacity.size(); ++p) lightness[p] = lightness_at(view, p) / kLightness;
+  return guide;
+}
 
 }  // namespace
 
@@ -100,8 +118,15 @@ void Claims::add(const Claim& claim) {
   list[at] = claim;
 }
 
-bool Claims::has(Ab color) const {
-  return std::ranges::any_of(list, [&](const Claim& c) { return c.cost < kUnreached && same(c.color, color); });
+float Claims::share(Ab color) const {
+  float own = 0, all = 0;
+  for (const Claim& claim : list) {
+    if (claim.cost >= kUnreached) break;
+    const float weight = std::exp((list[0].cost - claim.cost) / kShare);
+    if (same(claim.color, color)) own = weight;
+    all += weight;
+  }
+  return all > 0 ? own / all : 0;
 }
 
 Ab Claims::mixed(float lightness) const {
@@ -124,7 +149,17 @@ StrokesEverywhere::StrokesEverywhere(const RunningColors& strokes, const CachedV
   CNERF_CHECK(strokes.cost.size() == view.opacity.size(), "strokes of the view's size");
   const PixelLooks looks(view, surface);
   take_samples(strokes, looks);
-  run(strokes, looks);
+  RunningColors near = strokes;
+  run(near, view, surface);
+  parallel_ranges(claims_.size(), kPixelsPerPiece, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      if (near.is_known(p)) {
+        const std::uint32_t color = number_of(near.ab[p]);  // none of those that run, where it was painted exactly
+        claims_[p].add({near.cost[p], near.ab[p], color < lightness_.size() ? lightness_[color] : looks.lightness[p]});
+      }
+      if (!strokes.is_known(p)) claim_alike(view_, looks, p, claims_[p]);
+    }
+  });
 }
 
 void StrokesEverywhere::take_samples(const RunningColors& strokes, const PixelLooks& looks) {
@@ -149,10 +184,12 @@ void StrokesEverywhere::take_samples(const RunningColors& strokes, const PixelLo
   for (std::size_t c = 0; c < colors_.size(); ++c) lightness_[c] /= float(count[c]);
   const std::size_t each = std::max<std::size_t>(kMostSamples / colors_.size(), 1);
   std::vector<std::size_t> passed(colors_.size());
+  sampled_.resize(colors_.size());
   for (std::size_t i = 0; i < painted.size(); ++i) {
     const std::uint32_t color = color_of[i], p = painted[i];
     const std::size_t every = (count[color] + each - 1) / each;
     if (passed[color]++ % every != every / 2) continue;
+    ++sampled_[color];
     samples_.push_back({view_.camera.ray_of_pixel(p).direction, looks.surface[p] > 0 ? std::log(looks.surface[p]) : 0,
                         looks.lightness[p], looks.texture[p], color});
   }
@@ -164,18 +201,20 @@ void StrokesEverywhere::claim_alike(const CachedView& view, const PixelLooks& lo
   const Vec3f from = ray.at(is_solid ? looks.surface[p] : 1e3f) - view_.camera.origin.cast<float>();
   const float distance = length(from), log_distance = std::log(distance);
   const Vec3f direction = from / distance;
-  const StrokeReach reach;
-  const float one_angle = reach.share_of_short_side * float(view_.short_side()) / float(view_.camera.intrinsics.fx);
-  std::vector<float> least(colors_.size(), kUnreached);
+  const float one_angle = kPlane * float(view_.short_side()) / float(view_.camera.intrinsics.fx);
+  std::vector<float> likeness(colors_.size(), 0);
   for (const Sample& sample : samples_) {
     const float angle = std::sqrt(std::max(2 - 2 * dot(direction, sample.direction), 0.0f));
     const float depth =
         is_solid && sample.log_distance != 0 ? std::abs(log_distance - sample.log_distance) / kDepth : kNoSurface;
     const float cost = angle / one_angle + depth + std::abs(looks.lightness[p] - sample.lightness) / kLightness +
                        std::abs(looks.texture[p] - sample.texture) / kTexture;
-    least[sample.color] = std::min(least[sample.color], (kAlike + cost) / reach_[sample.color]);
+    likeness[sample.color] += std::exp(-cost / kSpread);
   }
-  for (std::size_t c = 0; c < least.size(); ++c) to.add({least[c], colors_[c], lightness_[c]});
+  for (std::size_t c = 0; c < likeness.size(); ++c) {
+    const float cost = likeness[c] > 0 ? -kSpread * std::log(likeness[c] / float(sampled_[c])) : kUnreached;
+    to.add({(kAlike + std::max(cost, 0.0f)) / reach_[c], colors_[c], lightness_[c]});
+  }
 }
 
 /// Of a number that no colour has where it is none of them.
@@ -184,40 +223,32 @@ std::uint32_t StrokesEverywhere::number_of(Ab color) const {
   return std::uint32_t(std::ranges::find_if(colors_, is_it) - colors_.begin());
 }
 
-/// As `run`, but of each pixel the cheapest ways of several colours are kept, and ways begin at likeness too.
-void StrokesEverywhere::run(const RunningColors& strokes, const PixelLooks& looks) {
-  using Entry = std::tuple<float, std::uint32_t, std::uint32_t>;  // cost, pixel, colour: ties have an order
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
-  std::vector<Claims> alike(claims_.size());
-  parallel_ranges(claims_.size(), kPixelsPerPiece, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      if (!strokes.is_known(p)) claim_alike(view_, looks, p, alike[p]);
-    }
-  });
-  for (std::uint32_t p = 0; p < claims_.size(); ++p) {
-    for (const Claims::Claim& claim : alike[p].list) {
-      if (claim.cost < kUnreached) open.emplace(claim.cost, p, number_of(claim.color));
-    }
-    if (!strokes.is_known(p)) continue;
-    if (strokes.reach[p] > 0) {
-      open.emplace(0.0f, p, number_of(strokes.ab[p]));
-    } else {
-      claims_[p].add({0, strokes.ab[p]});
+void smooth(std::span<Claims> claims, const CachedView& view, std::span<const float> surface) {
+  std::vector<Claims::Claim> colors;  // of all pixels
+  for (const Claims& pixel : claims) {
+    for (const Claims::Claim& claim : pixel.list) {
+      const auto is_it = [&](const Claims::Claim& other) { return same(other.color, claim.color); };
+      const bool is_running = claim.cost > 0 && claim.cost < kUnreached;
+      if (is_running && std::ranges::none_of(colors, is_it)) colors.push_back(claim);
     }
   }
-  const StepCost step(view_, looks);
-  // What is painted has its colour alone, and lets nothing else through.
-  const auto is_closed = [&](std::uint32_t p, std::uint32_t color) {
-    return claims_[p].cost() <= 0 || claims_[p].is_full() || claims_[p].has(colors_[color]);
-  };
-  while (!open.empty()) {
-    const auto [cost, p, color] = open.top();
-    open.pop();
-    if (is_closed(p, color)) continue;
-    claims_[p].add({cost, colors_[color], lightness_[color]});
-    for_each_neighbour(view_, p, [&, cost = cost, p = p, color = color](std::uint32_t q, float distance) {
-      if (!is_closed(q, color)) open.emplace(cost + step(p, q, distance) / reach_[color], q, color);
-    });
+  if (colors.size() > kMostColors) return;
+  const int radius = std::max(1, int(std::lround(kSmoothRadius * float(view.short_side()))));
+  const GuidedFilter along_surfaces(depth_guide(view, surface), radius);
+  const GuidedFilter along_lightness(lightness_guide(view), radius);
+  std::vector<Claims> smoothed(claims.size());
+  cv::Mat shares(view.height, view.width, CV_32F);
+  for (const Claims::Claim& one : colors) {
+    std::ranges::transform(claims, shares.begin<float>(), [&](const Claims& pixel) { return pixel.share(one.color); });
+    const cv::Mat smooth_shares = along_lightness(along_surfaces(shares));
+    const float* share = smooth_shares.ptr<float>();
+    for (std::size_t p = 0; p < claims.size(); ++p) {
+      const float cost = -kShare * std::log(std::clamp(share[p], kLeastShare, 1.0f));
+      smoothed[p].add({claims[p].cost() + cost, one.color, one.lightness});
+    }
+  }
+  for (std::size_t p = 0; p < claims.size(); ++p) {
+    if (claims[p].cost() > 0) claims[p] = smoothed[p];
   }
 }
 

@@ -32,14 +32,18 @@ struct Claims {
 
   /// Of a colour the least cost counts. Of equal costs what came first is first.
   void add(const Claim& claim);
-  [[nodiscard]] bool has(Ab color) const;
-  [[nodiscard]] bool is_full() const { return list.back().cost < kUnreached; }
+  /// What part a colour has among those that are kept, 0..1.
+  [[nodiscard]] float share(Ab color) const;
   [[nodiscard]] float cost() const { return list[0].cost; }
   /// The first, and of others those that cost hardly more: a border between strokes is no edge where the scene has
   /// none. Darker than where it was painted a colour has less chroma. What was painted (cost 0) stays as it is.
   /// @param lightness  L* of the pixel
   [[nodiscard]] Ab mixed(float lightness) const;
 };
+
+/// Shares that colours have in a view's pixels are smoothed along surfaces and along what is equally light: a pixel is
+/// judged together with those that it belongs to. What was painted stays as it is.  @param claims  [H, W]
+void smooth(std::span<Claims> claims, const CachedView& view, std::span<const float> surface);
 
 /// Strokes of one view that everything is coloured by. They have at least one colour that runs, or nothing is claimed
 /// but what they paint.
@@ -62,13 +66,13 @@ class StrokesEverywhere {
     std::uint32_t color = 0;
   };
   void take_samples(const RunningColors& strokes, const PixelLooks& looks);
-  void run(const RunningColors& strokes, const PixelLooks& looks);
   [[nodiscard]] std::uint32_t number_of(Ab color) const;
 
   const CachedView& view_;
   std::vector<Ab> colors_;
   std::vector<float> lightness_, reach_;  // [colours] L* where they were painted, mean; and how far they run, times
   std::vector<Sample> samples_;
+  std::vector<std::size_t> sampled_;  // [colours] samples of it
   std::vector<Claims> claims_;
 };
 
