@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "src/base/error.h"
+#include "src/train/chroma/likeness.h"
 #include "tests/train/wall_views.h"
 
 namespace cnerf {
@@ -265,6 +266,37 @@ TEST(ColorsEverywhere, OfStrokesInTwoViewsEachHasWhatIsMostLikeIt) {
     EXPECT_GT(map.find(v, 20 * kWidth + 3)->a, 40) << "view " << v;
     EXPECT_LT(map.find(v, 20 * kWidth + kWidth - 4)->a, -40) << "view " << v;
   }
+}
+
+TEST(ColorsEverywhere, APixelIsJudgedWithThoseOfItsSurface) {
+  const CachedView view = look(0.45f, true);
+  const Ab red{50, 0}, green{-50, 0}, painted{0, 30};
+  const auto is_board = [&](std::uint32_t p) { return point_at(view, p).z < kWall - 0.1f; };
+  std::vector<float> surface;
+  std::vector<Claims> claims(view.samples.size());
+  for (std::uint32_t p = 0; p < claims.size(); ++p) {
+    surface.push_back(view.samples[p].t);
+    const bool is_red = is_board(p) != (p % 11 == 0);  // some look otherwise than what is around them
+    claims[p].add({is_red ? 1.0f : 1.5f, red});
+    claims[p].add({is_red ? 1.5f : 1.0f, green});
+  }
+  claims[5] = {};
+  claims[5].add({0, painted});
+  smooth(claims, view, surface);
+  for (std::uint32_t p = 0; p < claims.size(); ++p) {
+    const Ab expected = p == 5 ? painted : is_board(p) ? red : green;
+    EXPECT_EQ(claims[p].list[0].color.a, expected.a) << "pixel " << p;
+    EXPECT_EQ(claims[p].cost() <= 0, p == 5) << "pixel " << p;
+  }
+}
+
+/// A painted picture may have more colours than there is time to smooth.
+TEST(ColorsEverywhere, ManyColorsStayAsTheyAre) {
+  const CachedView view = look(0.45f, false);
+  std::vector<Claims> claims(view.samples.size());
+  for (std::uint32_t p = 0; p < claims.size(); ++p) claims[p].add({1, {float(p % 500), 0}});
+  smooth(claims, view, std::vector<float>(claims.size(), 1.0f));
+  for (std::uint32_t p = 0; p < claims.size(); ++p) EXPECT_EQ(claims[p].list[0].color.a, float(p % 500));
 }
 
 TEST(KnownColors, HintsCorrectKeyFrames) {
