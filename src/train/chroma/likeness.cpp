@@ -226,13 +226,13 @@ std::uint32_t StrokesEverywhere::number_of(Ab color) const {
 void smooth(std::span<Claims> claims, const CachedView& view, std::span<const float> surface) {
   std::vector<Claims::Claim> colors;  // of all pixels
   for (const Claims& pixel : claims) {
+    if (colors.size() > kMostColors) return;
     for (const Claims::Claim& claim : pixel.list) {
       const auto is_it = [&](const Claims::Claim& other) { return same(other.color, claim.color); };
       const bool is_running = claim.cost > 0 && claim.cost < kUnreached;
       if (is_running && std::ranges::none_of(colors, is_it)) colors.push_back(claim);
     }
   }
-  if (colors.size() > kMostColors) return;
   const int radius = std::max(1, int(std::lround(kSmoothRadius * float(view.short_side()))));
   const GuidedFilter along_surfaces(depth_guide(view, surface), radius);
   const GuidedFilter along_lightness(lightness_guide(view), radius);
