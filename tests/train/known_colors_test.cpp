@@ -268,6 +268,20 @@ TEST(ColorsEverywhere, OfStrokesInTwoViewsEachHasWhatIsMostLikeIt) {
   }
 }
 
+TEST(ColorsEverywhere, AStrokeThatSlipsClaimsLittleThere) {
+  const CachedView view = look(0.45f, false);
+  KnownColors strokes = stroke_at(8, 20, {50, 0});
+  for (int x = 6; x < 15; ++x) put(strokes, x, 20, {50, 0});
+  for (int x = 48; x < 57; ++x) put(strokes, x, 20, {-50, 0});
+  put(strokes, 22, 20, {-50, 0});
+  std::vector<float> surface;
+  for (const auto& sample : view.samples) surface.push_back(sample.t);
+  const StrokesEverywhere everywhere(running_colors(strokes), view, surface);
+  Claims claims;
+  everywhere.claim_alike(view, PixelLooks(view, surface), 20 * kWidth + 20, claims);
+  EXPECT_EQ(claims.list[0].color.a, 50) << "nearer to most of the other stroke";
+}
+
 TEST(ColorsEverywhere, APixelIsJudgedWithThoseOfItsSurface) {
   const CachedView view = look(0.45f, true);
   const Ab red{50, 0}, green{-50, 0}, painted{0, 30};

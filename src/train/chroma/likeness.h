@@ -42,7 +42,8 @@ struct Claims {
 };
 
 /// Shares that colours have in a view's pixels are smoothed along surfaces and along what is equally light: a pixel is
-/// judged together with those that it belongs to. What was painted stays as it is.  @param claims  [H, W]
+/// judged together with those that it belongs to. What was painted stays as it is, and everything does where there are
+/// too many colours, as of a painted picture.  @param claims  [H, W]
 void smooth(std::span<Claims> claims, const CachedView& view, std::span<const float> surface);
 
 /// Strokes of one view that everything is coloured by. They have at least one colour that runs, or nothing is claimed
