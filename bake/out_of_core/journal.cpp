@@ -52,9 +52,9 @@ struct Journal::File {
   void append(std::span<const std::byte> bytes) {
     const PartHeader header{bytes.size(), checksum_at(parts.size(), bytes)};
     errno = 0;
-    const bool written = std::fseek(stream, end, SEEK_SET) == 0 &&
-                         std::fwrite(&header, sizeof header, 1, stream) == 1 &&
-                         std::fwrite(bytes.data(), 1, bytes.size(), stream) == bytes.size() && std::fflush(stream) == 0;
+    const bool written =
+        std::fseek(stream, end, SEEK_SET) == 0 && std::fwrite(&header, sizeof header, 1, stream) == 1 &&
+        (bytes.empty() || std::fwrite(bytes.data(), bytes.size(), 1, stream) == 1) && std::fflush(stream) == 0;
     if (!written) fail("cannot be written");
     parts.push_back({end + long(sizeof header), bytes.size(), header.checksum});
     end = parts.back().begin + long(bytes.size());

@@ -130,7 +130,8 @@ std::string payload_hash(const fs::path& file) {
 TEST(Processes, ARunOfTwoIsARunAndRepeatsBitForBit) {
   const TempDir folder;
   const fs::path alone = folder / "alone";
-  ASSERT_EQ(cnerf(run_to(alone)).exit_code, 0);
+  const ProgramResult one = cnerf(run_to(alone));
+  ASSERT_EQ(one.exit_code, 0) << one.err;
   for (const char* name : {"a", "b"}) {
     Launched ranks(2, run_to(folder / name));
     expect_success(ranks, 2);

@@ -1,6 +1,8 @@
 /// What the program that reads VDB files answers, as its parent reads it.
 
 #include <algorithm>
+#include <cstddef>
+#include <span>
 
 #include "export/vdb_answer.h"
 #include "export/vdb_answer_reader.h"
@@ -24,7 +26,8 @@ class Answer final : public cnerf::exporting::VdbAnswerSource {
 /// Whether it is an error in the words of the program, which may say anything.
 bool is_error(cnerf::fuzz::Bytes answer) {
   cnerf::exporting::VdbAnswerHeader header;
-  std::memcpy(&header, answer.data(), std::min(answer.size(), sizeof header));
+  std::ranges::copy(answer.first(std::min(answer.size(), sizeof header)),
+                    std::as_writable_bytes(std::span(&header, 1)).begin());
   return header.status != 0;
 }
 

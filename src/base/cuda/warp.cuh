@@ -2,6 +2,8 @@
 /// Sums and ballots over a warp, or over groups of its lanes that work on separate problems. All 32 lanes must call
 /// them together.
 
+#include <cstdint>
+
 namespace cnerf {
 
 /// @tparam kLanes  of a group, a power of two
@@ -29,5 +31,31 @@ __device__ inline unsigned warp_ballot(bool yes) {
   if constexpr (kLanes == 32) return all;
   return (all >> (threadIdx.x % 32 / kLanes * kLanes)) & ((1u << kLanes % 32) - 1u);
 }
+
+/// The lanes about this one that follow one another with the same key. Others may have that key too.
+class WarpSegment {
+ public:
+  __device__ explicit WarpSegment(std::uint32_t key) {
+    const unsigned lane = threadIdx.x % 32;
+    const std::uint32_t before = __shfl_up_sync(~0u, key, 1);
+    is_first_ = lane == 0 || before != key;
+    const unsigned later = __ballot_sync(~0u, is_first_) >> lane >> 1;
+    left_ = later == 0 ? 32 - lane : unsigned(__ffs(int(later)));
+  }
+  [[nodiscard]] __device__ bool is_first() const { return is_first_; }
+  /// Over this lane and those behind it; the first has the sum of all.
+  [[nodiscard]] __device__ float sum(float value) const {
+#pragma unroll
+    for (unsigned offset = 1; offset < 32; offset *= 2) {
+      const float behind = __shfl_down_sync(~0u, value, offset);
+      if (offset < left_) value += behind;
+    }
+    return value;
+  }
+
+ private:
+  bool is_first_;
+  unsigned left_;  // lanes, this one included
+};
 
 }  // namespace cnerf

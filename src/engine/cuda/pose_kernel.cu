@@ -4,6 +4,7 @@
 
 #include "encoding/cuda/hash_grid_device.cuh"
 #include "src/base/cuda/launch.h"
+#include "src/base/cuda/warp.cuh"
 
 namespace cnerf {
 namespace {
@@ -24,24 +25,12 @@ __device__ Vec3f by_position(const GridLevels& levels, const uint2* table, const
   return {gradient[0], gradient[1], gradient[2]};
 }
 
-/// Sums over lanes that follow one another with the same key; the first of them gets the sum.
-__device__ float sum_of_segment(float value, std::uint32_t key) {
-#pragma unroll
-  for (unsigned offset = 1; offset < 32; offset *= 2) {
-    const float behind = __shfl_down_sync(~0u, value, offset);
-    const std::uint32_t their_key = __shfl_down_sync(~0u, key, offset);
-    if (threadIdx.x % 32 + offset < 32 && their_key == key) value += behind;
-  }
-  return value;
-}
-
 /// All lanes together; those of a ray follow one another.
 /// @param key  the ray's number; kNobody where it is not asked
 __device__ void teach_lens(const PoseJob& job, std::uint32_t key, std::uint32_t view, const Vec3f& by_direction) {
-  const Vec3f sum = {sum_of_segment(by_direction.x, key), sum_of_segment(by_direction.y, key),
-                     sum_of_segment(by_direction.z, key)};
-  const std::uint32_t before = __shfl_up_sync(~0u, key, 1);
-  if (key == kNobody || (threadIdx.x % 32 != 0 && before == key)) return;
+  const WarpSegment segment(key);
+  const Vec3f sum = {segment.sum(by_direction.x), segment.sum(by_direction.y), segment.sum(by_direction.z)};
+  if (key == kNobody || !segment.is_first()) return;
   const ViewRecord& record = job.views[view];
   LensGradient gradient;
   add_lens_gradient(record.camera, record.given, job.learned.corrections[view].turn, job.rays[key].ray.direction, sum,
@@ -74,13 +63,12 @@ __global__ void __launch_bounds__(kThreads)
       gradient.add(arm, by_point);
       by_direction = length(arm) * by_point;
     }
-    const std::uint32_t before = __shfl_up_sync(~0u, view, 1);
-    const bool is_first = view != kNobody && (lane == 0 || before != view);
+    const WarpSegment segment(view);
 #pragma unroll
     for (int axis = 0; axis < 3; ++axis) {
-      const float turn = sum_of_segment(gradient.by_rotation[axis], view);
-      const float shift = sum_of_segment(gradient.by_shift[axis], view);
-      if (!is_first) continue;
+      const float turn = segment.sum(gradient.by_rotation[axis]);
+      const float shift = segment.sum(gradient.by_shift[axis]);
+      if (view == kNobody || !segment.is_first()) continue;
       atomicAdd(&job.learned.gradients[view].by_rotation[axis], turn);
       atomicAdd(&job.learned.gradients[view].by_shift[axis], shift);
     }
