@@ -50,8 +50,8 @@ TEST(Warp, ASegmentIsOfNeighboursOnly) {
   for (std::size_t warp = 0; warp < kLanes; warp += 32) {
     for (std::size_t first = warp; first < warp + 32;) {
       const auto rest = keys.begin() + std::ptrdiff_t(first);
-      const auto end = std::find_if(rest, keys.begin() + std::ptrdiff_t(warp + 32),
-                                    [&](std::uint32_t key) { return key != *rest; });
+      const auto end =
+          std::find_if(rest, keys.begin() + std::ptrdiff_t(warp + 32), [&](std::uint32_t key) { return key != *rest; });
       float sum = 0;
       for (std::size_t i = first; i < std::size_t(end - keys.begin()); ++i) {
         sum += values[i];

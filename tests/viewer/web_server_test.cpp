@@ -351,7 +351,7 @@ std::size_t held_bytes() {
 }
 
 TEST(WebServer, MemoryDoesNotGrowWithFiles) {
-  if (kIsSanitized) GTEST_SKIP() << "sanitizers hold memory for what is touched";
+  if (cnerf::test::kIsSanitized) GTEST_SKIP() << "sanitizers hold memory for what is touched";
   const Site site;
   constexpr std::size_t kBytes = std::size_t(192) << 20;
   write_file(site.root / "large.bin", std::string_view());
