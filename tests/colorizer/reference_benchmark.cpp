@@ -58,7 +58,7 @@ Settings parse(int argc, char** argv) {
       {"size", [&](auto& v) { r.patch_size = std::stoi(v); }},
       {"rate", [&](auto& v) { r.learning_rate = std::stod(v); }},
       {"decay", [&](auto& v) { r.weight_decay = std::stod(v); }},
-      {"builtin", [&](auto& v) { r.builtin = v; }},
+      {"builtin", [&](auto& v) { use_builtin(r, v); }},
       {"encoder", [&](auto& v) { use_encoder(r, load_encoder(v)); }},
       {"uses", [&](auto& v) { r.patch_uses = std::stoi(v); }},
       {"held_patches", [&](auto& v) { r.patches_held = std::stoi(v); }},

@@ -128,7 +128,7 @@ TEST(ReferenceNetwork, StartsAsItWouldWithoutTheBuiltinNetworkAndLearnsToUseIt) 
   const std::vector<ReferenceImage> images{photograph_of(toy)};
   const ReferenceRecipe alone = short_recipe(4);
   ReferenceRecipe guided = alone;
-  guided.builtin = builtin_weights_file();
+  use_builtin(guided, builtin_weights_file());
   ReferenceNetwork plain(alone, images, 3), on_builtin(guided, images, 3);
   EXPECT_GT(on_builtin.weights().size(), plain.weights().size());
   const LightnessBatch question = test::some_question(2, 64, 96);

@@ -120,11 +120,7 @@ bool wants_encoder(const ColorizerRequest& request) {
 std::unique_ptr<Colorizer> make_reference_colorizer(const ColorizerRequest& request) {
   ReferenceRecipe recipe;
   recipe.steps = request.options.reference_steps;
-  if (request.options.reference_on_builtin) {
-    recipe.builtin = builtin_weights_file();
-    recipe.patch_uses = 2;  // what the frozen network makes of a patch is a large part of a step's work
-    recipe.patches_held = 16;
-  }
+  if (request.options.reference_on_builtin) use_builtin(recipe, builtin_weights_file());
   if (wants_encoder(request)) use_encoder(recipe, load_encoder(encoder_folder()));
   return fit_reference_colorizer(request, recipe);
 }

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "src/base/check.h"
 #include "src/base/error.h"
@@ -40,6 +43,25 @@ struct BlockImpl : nn::Module {
 };
 TORCH_MODULE(Block);
 
+/// Pixels of [B, C, H, W] with their channels beside each other: [B, H, W, C], and back. Neither copies where channels
+/// lie last.
+Tensor channels_last(const Tensor& x) {
+  return x.permute({0, 2, 3, 1});
+}
+Tensor channels_first(const Tensor& x) {
+  return x.permute({0, 3, 1, 2});
+}
+
+/// A 1x1 convolution as one product over all pixels: LibTorch's own would copy its input to rearrange it.
+struct PointwiseImpl : nn::Module {
+  PointwiseImpl(int in, int out, bool has_bias = true)
+      : linear(register_module("linear", nn::Linear(nn::LinearOptions(in, out).bias(has_bias)))) {}
+  Tensor forward(const Tensor& x) { return channels_first(linear(channels_last(x))); }
+
+  nn::Linear linear;
+};
+TORCH_MODULE(Pointwise);
+
 /// What the frozen networks make of a picture; empty without them.
 struct Guidance {
   // Levels of the U-Net at the same resolution.
@@ -53,8 +75,20 @@ struct Guidance {
 /// more channels there are, since each of them moves as far in a step.
 Tensor scaled_stage(const Tensor& stage) {
   const int64_t channels = stage.size(1);
-  const Tensor pixels = torch::layer_norm(stage.permute({0, 2, 3, 1}), {channels});
-  return pixels.permute({0, 3, 1, 2}) * (kStageScale / std::sqrt(double(channels)));
+  return channels_first(torch::layer_norm(channels_last(stage), {channels})) *
+         (kStageScale / std::sqrt(double(channels)));
+}
+
+/// The mean about every pixel of [B, 1, H, W], contiguous, as far as `reach`; edges are repeated.
+Tensor box_mean(const Tensor& pictures, int reach) {
+  Tensor means = torch::empty_like(pictures);
+  const auto height = int(pictures.size(2)), width = int(pictures.size(3)), side = 2 * reach + 1;
+  for (int64_t b = 0; b < pictures.size(0); ++b) {
+    const cv::Mat picture(height, width, CV_32F, pictures[b].data_ptr<float>());
+    cv::Mat mean(height, width, CV_32F, means[b].data_ptr<float>());
+    cv::blur(picture, mean, {side, side}, {-1, -1}, cv::BORDER_REPLICATE);
+  }
+  return means;
 }
 
 /// U-Net from lightness at full size to `outputs` channels at half size.
@@ -68,20 +102,19 @@ struct UNetImpl : nn::Module {
       in = c[level];
     }
     wide = register_module("wide", Block(in, in, 1, 2));
-    global = register_module("global", nn::Conv2d(nn::Conv2dOptions(in, in, 1)));
+    global = register_module("global", Pointwise(in, in));
     for (std::size_t level = c.size() - 1; level-- > 0;) {
       const std::string name = std::to_string(level);
-      lateral.push_back(
-          register_module("lateral" + name, nn::Conv2d(nn::Conv2dOptions(c[level + 1], c[level], 1).bias(false))));
+      lateral.push_back(register_module("lateral" + name, Pointwise(c[level + 1], c[level], false)));
       decode.push_back(register_module("decode" + name, Block(c[level], c[level], 1)));
     }
-    head = register_module("head", nn::Conv2d(nn::Conv2dOptions(c[0], outputs, 1)));
+    head = register_module("head", Pointwise(c[0], outputs));
     if (recipe.encoder) read_encoder(recipe);
     if (recipe.builtin.empty()) return;
     CNERF_CHECK(c.size() > Guidance::kSemanticLevel, "as many levels as the built-in network's features need");
     CNERF_CHECK_EQ(recipe.patch_size % ColorizerNetImpl::kInputMultiple, 0);
-    guide_semantic = register_module("guide_semantic", nn::Conv2d(nn::Conv2dOptions(ColorizerNetImpl::kSemanticChannels,
-                                                                                    c[Guidance::kSemanticLevel], 1)));
+    guide_semantic =
+        register_module("guide_semantic", Pointwise(ColorizerNetImpl::kSemanticChannels, c[Guidance::kSemanticLevel]));
     guide_ab = register_module("guide_ab", nn::Conv2d(nn::Conv2dOptions(2, c[Guidance::kAbLevel], 3).padding(1)));
   }
 
@@ -91,8 +124,8 @@ struct UNetImpl : nn::Module {
     for (std::size_t stage = 0; stage < Encoder::kStages; ++stage) {
       const std::size_t level = stage + Guidance::kFirstStageLevel;
       if (level >= recipe.channels.size()) break;
-      const nn::Conv2dOptions options(recipe.encoder->channels()[stage], recipe.channels[level], 1);
-      guide_stages.push_back(register_module("guide_stage" + std::to_string(stage), nn::Conv2d(options)));
+      guide_stages.push_back(register_module("guide_stage" + std::to_string(stage),
+                                             Pointwise(recipe.encoder->channels()[stage], recipe.channels[level])));
     }
   }
 
@@ -121,16 +154,11 @@ struct UNetImpl : nn::Module {
 
   /// Lightness, what stands out of its surroundings at two scales, and how busy those are: as convolutions read it.
   [[nodiscard]] static Tensor features(const Tensor& lightness) {
-    const Tensor level = (lightness - 50) / 50;
+    const Tensor level = (lightness - 50) / 50, squares = level * level;
     std::vector<Tensor> all{level};
     for (const int reach : {3, 10}) {
-      const auto box = [reach = reach](const Tensor& x) {
-        // One axis after the other: the pooling itself is a plain loop over the window.
-        const Tensor padded = torch::replication_pad2d(x, {reach, reach, reach, reach});
-        return torch::avg_pool2d(torch::avg_pool2d(padded, {1, 2 * reach + 1}, {1, 1}), {2 * reach + 1, 1}, {1, 1});
-      };
-      const Tensor mean = box(level);
-      const Tensor deviation = (box(level * level) - mean * mean).clamp_min(0).add(1e-4).sqrt();
+      const Tensor mean = box_mean(level, reach);
+      const Tensor deviation = (box_mean(squares, reach) - mean * mean).clamp_min(0).add(1e-4).sqrt();
       all.push_back((level - mean) / (deviation + 0.05));
       all.push_back(deviation.log() * 0.5 + 1);
     }
@@ -138,12 +166,12 @@ struct UNetImpl : nn::Module {
   }
 
   std::vector<Block> down, encode, decode;
-  std::vector<nn::Conv2d> lateral;
+  std::vector<Pointwise> lateral;
   Block wide{nullptr};
-  nn::Conv2d global{nullptr};
-  nn::Conv2d head{nullptr};
-  nn::Conv2d guide_semantic{nullptr}, guide_ab{nullptr};  // empty without guidance
-  std::vector<nn::Conv2d> guide_stages;
+  Pointwise global{nullptr}, head{nullptr};
+  Pointwise guide_semantic{nullptr};  // this and the next are empty without guidance
+  nn::Conv2d guide_ab{nullptr};
+  std::vector<Pointwise> guide_stages;
 };
 TORCH_MODULE(UNet);
 
@@ -223,7 +251,7 @@ class LabelTable {
 
 std::string ReferenceRecipe::text() const {
   std::ostringstream text;
-  text << "reference network 4; channels";
+  text << "reference network 5; channels";
   for (int c : channels) text << ' ' << c;
   text << "; patch " << patch_size << "; steps " << steps << "; batch " << batch << '/' << shards << "; rate "
        << learning_rate << "; decay " << weight_decay << "; share " << distortion.share_min << ' '
@@ -241,13 +269,20 @@ std::string ReferenceRecipe::text() const {
 struct Patches {
   Tensor features, ab;  ///< [n, 5, H, W], [n, 2, H, W]
   Guidance guidance;
+
+  [[nodiscard]] Patches slice(int64_t begin, int64_t end) const {
+    const auto part = [&](const Tensor& all) { return all.defined() ? all.slice(0, begin, end) : all; };
+    Patches patches{part(features), part(ab), {part(guidance.semantic), part(guidance.ab), {}}};
+    for (const Tensor& stage : guidance.stages) patches.guidance.stages.push_back(part(stage));
+    return patches;
+  }
 };
 
 struct ReferenceNetwork::Parts {
   ReferenceRecipe recipe;
   std::uint64_t seed = 0;
   std::unique_ptr<LabelTable> labels;
-  Tensor centres;  // [2, classes, 1, 1]
+  Tensor centres;  // [classes, 2]
   UNet net{nullptr};
   std::optional<ColorizerWeights> builtin;
 
@@ -266,44 +301,49 @@ struct ReferenceNetwork::Parts {
     }
     return guidance;
   }
-  [[nodiscard]] Tensor decode(const Tensor& out) const { return torch::conv2d(torch::softmax(out, 1), centres); }
-  [[nodiscard]] Tensor loss(const Tensor& out, const Tensor& ab) const;
-  /// New patches of the photographs.
-  [[nodiscard]] Patches drawn(std::span<const ReferenceImage> images, int step, int shard) const;
-  /// Those of a step, of which `held` are kept from step to step.
+  [[nodiscard]] Tensor decode(const Tensor& out) const {
+    return channels_first(torch::softmax(channels_last(out), -1).matmul(centres));
+  }
+  /// The mean cross entropy of what the network says of ab, and its gradient by that.
+  [[nodiscard]] std::pair<double, Tensor> loss(const Tensor& out, const Tensor& ab) const;
+  /// New patches of the photographs, those of `times` draws.
+  [[nodiscard]] Patches drawn(std::span<const ReferenceImage> images, int first_draw, int times, int shard) const;
+  /// Those of a step, of which `held` are kept from step to step. Some are drawn before their turn: the frozen networks
+  /// take half of the time over pictures together.
   [[nodiscard]] const Patches& patches_of(std::span<const ReferenceImage> images, int step, int shard,
                                           std::vector<Patches>& held) const;
   [[nodiscard]] std::vector<Tensor> gradients(const Patches& patches, double* loss) const;
 };
 
-Tensor ReferenceNetwork::Parts::loss(const Tensor& out, const Tensor& ab) const {
-  const int64_t pixels = ab.size(2) * ab.size(3), batch = ab.size(0);
-  Tensor index = torch::empty({batch, kSoftLabelBins, ab.size(2), ab.size(3)}, torch::kInt64);
-  Tensor weight = torch::empty({batch, kSoftLabelBins, ab.size(2), ab.size(3)});
-  const Tensor source = ab.contiguous();
-  for (int64_t n = 0; n < batch; ++n) {
-    const float* color = source.data_ptr<float>() + n * 2 * pixels;
-    int64_t* to_index = index.data_ptr<int64_t>() + n * kSoftLabelBins * pixels;
-    float* to_weight = weight.data_ptr<float>() + n * kSoftLabelBins * pixels;
-    for (int64_t i = 0; i < pixels; ++i) {
-      const LabelTable::Entry& label = labels->at(color[i], color[pixels + i]);
-      for (std::size_t k = 0; k < kSoftLabelBins; ++k) {
-        to_index[int64_t(k) * pixels + i] = label.index[k];
-        to_weight[int64_t(k) * pixels + i] = label.weight[k];
-      }
-    }
+std::pair<double, Tensor> ReferenceNetwork::Parts::loss(const Tensor& out, const Tensor& ab) const {
+  const torch::NoGradGuard no_grad;
+  const Tensor p = torch::softmax(channels_last(out), -1), colors = channels_last(ab).contiguous();
+  const int64_t pixels = colors.numel() / 2;
+  Tensor index = torch::empty({pixels, kSoftLabelBins}, torch::kInt64);
+  Tensor weight = torch::empty({pixels, kSoftLabelBins});
+  const float* color = colors.data_ptr<float>();
+  for (int64_t i = 0; i < pixels; ++i) {
+    const LabelTable::Entry& label = labels->at(color[2 * i], color[2 * i + 1]);
+    std::ranges::copy(label.index, index.data_ptr<int64_t>() + i * kSoftLabelBins);
+    std::ranges::copy(label.weight, weight.data_ptr<float>() + i * kSoftLabelBins);
   }
-  const Tensor log_p = torch::log_softmax(out, 1);
-  return -(log_p.gather(1, index) * weight).sum(1).mean();
+  const Tensor by_pixel = p.view({pixels, -1});
+  const Tensor log_p = by_pixel.gather(1, index).clamp_min(std::numeric_limits<float>::min()).log();
+  const double value = -(log_p * weight).sum().item<double>() / double(pixels);
+  weight /= float(pixels);
+  by_pixel.mul_(weight.sum(1, /*keepdim=*/true)).scatter_add_(1, index, -weight);
+  return {value, channels_first(p)};
 }
 
-Patches ReferenceNetwork::Parts::drawn(std::span<const ReferenceImage> images, int step, int shard) const {
-  const int count = recipe.batch / recipe.shards, size = recipe.patch_size;
+Patches ReferenceNetwork::Parts::drawn(std::span<const ReferenceImage> images, int first_draw, int times,
+                                       int shard) const {
+  const int each = recipe.batch / recipe.shards, count = times * each, size = recipe.patch_size;
   const std::size_t pixels = std::size_t(size) * std::size_t(size);
   const Tensor lightness = torch::empty({count, 1, size, size});
   Patches patches{{}, torch::empty({count, 2, size, size}), {}};
   for (int i = 0; i < count; ++i) {
-    SequentialRng rng(seed, (std::uint64_t(step) << 16) + std::uint64_t(shard * count + i) + 1);
+    const int draw = first_draw + i / each, in_draw = shard * each + i % each;
+    SequentialRng rng(seed, (std::uint64_t(draw) << 16) + std::uint64_t(in_draw) + 1);
     sample_reference_patch(images, recipe.distortion, size, rng,
                            {lightness.data_ptr<float>() + std::size_t(i) * pixels, pixels},
                            {patches.ab.data_ptr<float>() + std::size_t(i) * 2 * pixels, 2 * pixels});
@@ -315,12 +355,15 @@ Patches ReferenceNetwork::Parts::drawn(std::span<const ReferenceImage> images, i
 
 const Patches& ReferenceNetwork::Parts::patches_of(std::span<const ReferenceImage> images, int step, int shard,
                                                    std::vector<Patches>& held) const {
-  if (step % recipe.patch_uses == 0) {
-    Patches fresh = drawn(images, step, shard);
-    if (int(held.size()) < recipe.patches_held) {
-      held.push_back(std::move(fresh));
-    } else {
-      held[std::size_t(step / recipe.patch_uses) % held.size()] = std::move(fresh);
+  constexpr int kMostAtOnce = 4;
+  const int at_once = std::min(kMostAtOnce, recipe.patches_held), each = recipe.batch / recipe.shards;
+  if (step % (recipe.patch_uses * at_once) == 0) {
+    const int first_draw = step / recipe.patch_uses;
+    const Patches fresh = drawn(images, first_draw, at_once, shard);
+    for (int i = 0; i < at_once; ++i) {
+      const auto place = std::size_t((first_draw + i) % recipe.patches_held);
+      held.resize(std::max(held.size(), place + 1));
+      held[place] = fresh.slice(i * each, (i + 1) * each);
     }
   }
   SequentialRng rng(seed, named_stream("held") + (std::uint64_t(step) << 16) + std::uint64_t(shard));
@@ -329,9 +372,15 @@ const Patches& ReferenceNetwork::Parts::patches_of(std::span<const ReferenceImag
 
 std::vector<Tensor> ReferenceNetwork::Parts::gradients(const Patches& patches, double* loss_value) const {
   const Tensor out = UNet(net)->forward(patches.features, patches.guidance);
-  const Tensor value = loss(out, torch::avg_pool2d(patches.ab, {2, 2}));
-  *loss_value = value.item<double>();
-  return torch::autograd::grad({value}, net->parameters());
+  const auto [value, by_out] = loss(out, torch::avg_pool2d(patches.ab, {2, 2}));
+  *loss_value = value;
+  return torch::autograd::grad({out}, net->parameters(), {by_out});
+}
+
+void use_builtin(ReferenceRecipe& recipe, const std::filesystem::path& weights) {
+  recipe.builtin = weights;
+  recipe.patch_uses = 2;
+  recipe.patches_held = 16;
 }
 
 void use_encoder(ReferenceRecipe& recipe, std::shared_ptr<const Encoder> encoder) {
@@ -348,12 +397,12 @@ ReferenceNetwork::ReferenceNetwork(const ReferenceRecipe& recipe, std::span<cons
   parts_->seed = seed;
   const std::vector<int> bins = bins_in(images);
   std::vector<int> class_of(kAbBinCount, -1);
-  parts_->centres = torch::empty({2, int64_t(bins.size()), 1, 1});
+  parts_->centres = torch::empty({int64_t(bins.size()), 2});
   for (std::size_t i = 0; i < bins.size(); ++i) {
     const Ab centre = ab_bin_centres()[std::size_t(bins[i])];
     class_of[std::size_t(bins[i])] = int(i);
-    parts_->centres[0][int64_t(i)] = centre.a;
-    parts_->centres[1][int64_t(i)] = centre.b;
+    parts_->centres[int64_t(i)][0] = centre.a;
+    parts_->centres[int64_t(i)][1] = centre.b;
   }
   parts_->labels = std::make_unique<LabelTable>(class_of);
   if (!recipe.builtin.empty()) {

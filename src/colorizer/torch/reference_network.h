@@ -69,7 +69,9 @@ class ReferenceNetwork {
 /// The encoder in `folder`.  @throws MissingInputError, InputError  see read_layers_model and Encoder.
 [[nodiscard]] std::shared_ptr<const Encoder> load_encoder(const std::filesystem::path& folder);
 
-/// The recipe with the encoder, at about the same cost.
+/// The recipe with the built-in network, and with an encoder, at about the same cost: what a frozen network makes of a
+/// patch is a large part of a step's work, so that each patch is learned from several times.
+void use_builtin(ReferenceRecipe& recipe, const std::filesystem::path& weights);
 void use_encoder(ReferenceRecipe& recipe, std::shared_ptr<const Encoder> encoder);
 
 /// The colorizer of a network fitted to the images of the request's argument, or of the weights that an earlier fit to

@@ -96,6 +96,22 @@ export async function picture(page, width = 160, height = 120, background = "#00
   return { width, height, data: Buffer.from(list, "base64") };
 }
 
+/** Draws on the photograph that is open, as a hand does: places are shares of its width and height. */
+export async function drawStroke(page, points, steps = 6) {
+  const places = [];
+  for (const [u, v] of points) {
+    places.push(await page.evaluate(([x, y]) => {
+      const { easel } = window.cnerf.studio;
+      const box = easel.canvas.getBoundingClientRect();
+      return { x: box.left + easel.corner.x + x * easel.photo.width * easel.scale, y: box.top + easel.corner.y + y * easel.photo.height * easel.scale };
+    }, [u, v]));
+  }
+  await page.mouse.move(places[0].x, places[0].y);
+  await page.mouse.down();
+  for (const { x, y } of places) await page.mouse.move(x, y, { steps });
+  await page.mouse.up();
+}
+
 export const set = (page, settings) => page.evaluate((s) => window.cnerf.app.set(s), settings);
 export const get = (page, name) => page.evaluate((n) => window.cnerf.app.settings[n], name);
 

@@ -5,7 +5,7 @@ import { existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, describe, it } from "node:test";
-import { launch, open, patience, program, run, startServing } from "./support.mjs";
+import { drawStroke, launch, open, patience, program, run, startServing } from "./support.mjs";
 
 const folder = mkdtempSync(join(tmpdir(), "cnerf-tutorial-"));
 const [capture, trained] = [join(folder, "capture"), join(folder, "run")];
@@ -42,20 +42,7 @@ const colorfulness = () =>
     return sum / (data.length / 4);
   });
 
-async function draw(points) {
-  const places = [];
-  for (const [u, v] of points) {
-    places.push(await page.evaluate(([x, y]) => {
-      const { easel } = window.cnerf.studio;
-      const box = easel.canvas.getBoundingClientRect();
-      return { x: box.left + easel.corner.x + x * easel.photo.width * easel.scale, y: box.top + easel.corner.y + y * easel.photo.height * easel.scale };
-    }, [u, v]));
-  }
-  await page.mouse.move(places[0].x, places[0].y);
-  await page.mouse.down();
-  for (const { x, y } of places) await page.mouse.move(x, y, { steps: 6 });
-  await page.mouse.up();
-}
+const draw = (points) => drawStroke(page, points);
 
 before(async () => {
   assert.ok(existsSync(program), "CNERF_PROGRAM names the program");

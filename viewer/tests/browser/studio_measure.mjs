@@ -1,0 +1,141 @@
+/**
+ * What the studio is like to use, with the real program (CNERF_PROGRAM) and Chromium. The run is copied, not changed.
+ *
+ *   node viewer/tests/browser/studio_measure.mjs RUN [--take TAKE] [--rounds 3]
+ *       milliseconds of a frame of 1280 x 720 and of a coarse one at an HTTP client, encoding included, before a browser
+ *       runs; then, in the page, from a key that turns the camera to the first new frame and to the last
+ *   node viewer/tests/browser/studio_measure.mjs RUN --strokes FILE
+ *       paints the strokes of a stroke file of one photograph by pointer events, without colours to begin with, colours,
+ *       keeps the take and prints the seconds until colours change and settle, and the held-out ab error
+ */
+
+import { cpSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { drawStroke, launch, open, patience, run, startServing } from "./support.mjs";
+
+const argument = (name, usual) => (process.argv.includes(name) ? process.argv.splice(process.argv.indexOf(name), 2)[1] : usual);
+const [take, strokes, rounds] = [argument("--take", ""), argument("--strokes", ""), Number(argument("--rounds", "3"))];
+const folder = mkdtempSync(join(tmpdir(), "cnerf-measure-"));
+const copy = join(folder, "run");
+cpSync(process.argv[2], copy, { recursive: true });
+const serving = await startServing(["studio", copy, ...(take ? ["--take", take] : [])]);
+const get = async (path) => (await fetch(`${serving.url}studio/${path}`)).json();
+const median = (values) => values.sort((a, b) => a - b)[values.length >> 1];
+const row = (what, value, unit) => console.log(`${what.padEnd(62)} ${value.toFixed(value < 10 ? 2 : 0).padStart(8)} ${unit}`);
+let browser = null;
+
+/** The page, once it shows the last frame of where it begins. */
+async function openPage() {
+  browser = await launch();
+  const context = await browser.newContext({ viewport: { width: 1280, height: 720 } });
+  const page = await open(context, serving.url);
+  await page.waitForFunction(() => window.cnerf.studio?.field.settled, null, { timeout: patience });
+  return page;
+}
+
+/** Milliseconds until a frame is there as a whole. */
+async function frame(view, width, height) {
+  const f = (view.lens.fy * height) / view.height;
+  const lens = { model: "PINHOLE", width, height, fx: f, fy: f, cx: width / 2, cy: height / 2 };
+  const begin = performance.now();
+  const answer = await fetch(`${serving.url}studio/frame`, {
+    method: "POST",
+    headers: { "X-Cnerf": "1", "X-Cnerf-Client": "measure1" },
+    body: JSON.stringify({ position: view.position, rotation: view.rotation, lens, sides: ["grey", "now"] }),
+  });
+  if (!answer.ok) throw new Error(`a frame: ${answer.status} ${await answer.text()}`);
+  await answer.arrayBuffer();
+  return performance.now() - begin;
+}
+
+async function measureFrames() {
+  const { views } = await get("scene");
+  const seen = [0.5, 0.1, 0.8].map((place) => views[Math.floor(place * views.length)]);
+  await frame(seen[0], 160, 90);
+  for (const [width, height] of [[160, 90], [1280, 720]]) {
+    for (const view of seen) {
+      const times = [];
+      for (let i = 0; i < rounds; ++i) times.push(await frame(view, width, height));
+      row(`HTTP, grey and colour, ${width} x ${height} as ${view.name}`, median(times), "ms");
+    }
+  }
+}
+
+async function measurePage() {
+  const page = await openPage();
+  await page.focus("#field");
+  const [first, last] = [[], []];
+  for (let i = 0; i < rounds; ++i) {
+    await page.evaluate(() => {
+      const { field } = window.cnerf.studio;
+      window.shown = { first: 0, last: 0 };
+      const before = field.canvas.toDataURL();
+      const begin = performance.now();
+      const look = () => {
+        const { shown } = window;
+        if (shown.first === 0 && field.canvas.toDataURL() !== before) shown.first = performance.now() - begin;
+        if (shown.first > 0 && field.settled) shown.last = performance.now() - begin;
+        else requestAnimationFrame(look);
+      };
+      field.canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft", code: "ArrowLeft", bubbles: true }));
+      setTimeout(() => field.canvas.dispatchEvent(new KeyboardEvent("keyup", { key: "ArrowLeft", code: "ArrowLeft", bubbles: true })), 50);
+      requestAnimationFrame(look);
+    });
+    await page.waitForFunction(() => window.shown.last > 0, null, { timeout: patience });
+    const shown = await page.evaluate(() => window.shown);
+    first.push(shown.first);
+    last.push(shown.last);
+  }
+  row("Chromium, from a key to the first new frame", median(first), "ms");
+  row("Chromium, from a key to the last frame", median(last), "ms");
+}
+
+async function measureStrokes() {
+  const list = JSON.parse(readFileSync(strokes, "utf8"));
+  const page = await openPage();
+  const until = (what, value) => page.waitForFunction(what, value, { timeout: patience });
+  const photo = await page.evaluate((name) => window.cnerf.session.views.findIndex((view) => view.name === name), list.strokes[0].view);
+  await until(() => window.cnerf.session.state.ready);
+  await page.evaluate((i) => window.cnerf.studio.paint(i), photo);
+  await page.waitForSelector(`[data-photo="${photo}"]`, { timeout: patience });
+  await page.evaluate((everywhere) => window.cnerf.session.strokes.setEverywhere(everywhere), list.everywhere ?? false);
+  for (const { kind, color, size, softness = 0, reach = 1, points } of list.strokes) {
+    await page.evaluate((brush) => window.cnerf.session.brush.set(brush), { tool: kind === "grey" ? "grey" : "brush", color, size, softness, reach, exact: kind === "exact" });
+    await drawStroke(page, points, 1);
+  }
+  await until(() => window.cnerf.session.strokes.isSaved);
+  const colors = await page.evaluate(() => window.cnerf.session.state.colors);
+  const begin = performance.now();
+  await page.keyboard.press("c");
+  await until((before) => window.cnerf.session.state.colors !== before, colors);
+  const changed = performance.now();
+  await until(() => window.cnerf.session.state.unkept && window.cnerf.session.state.task === "");
+  const done = performance.now();
+  await page.evaluate(() => window.cnerf.session.order({ order: "keep", name: "painted" }));
+  await until(() => window.cnerf.session.state.takes.some((take) => take.name === "painted"));
+  await until(() => window.cnerf.session.state.task === "");
+  serving.child.kill("SIGINT");
+  await serving.ended;
+  const evaluated = await run(["eval", copy, "--take", "painted"]);
+  if (evaluated.code !== 0) throw new Error(evaluated.out);
+  const { mean } = JSON.parse(readFileSync(join(copy, "metrics.json"), "utf8"));
+  row("colour: until colours change", (changed - begin) / 1000, "s");
+  row("colour: until they are settled", (done - begin) / 1000, "s");
+  row("held-out ab error", mean.ab_error, "");
+  row("  share of grey's", (100 * mean.ab_error) / mean.ab_error_grey, "%");
+}
+
+try {
+  if (strokes) {
+    await measureStrokes();
+  } else {
+    await measureFrames();
+    await measurePage();
+  }
+} finally {
+  await browser?.close();
+  serving.child.kill("SIGINT");
+  await serving.ended;
+  rmSync(folder, { recursive: true });
+}
