@@ -6,7 +6,9 @@
  *
  * Prints the bytes until the poster and until the volume is seen, and the milliseconds of a frame while moving; or dB
  * between the page's pictures and those of `cnerf render RUN --path held-out --format png`, named as they are, which
- * --save keeps; with fewer rays a pixel than the page takes at rest it is quicker. The page is CNERF_BUILT_PAGE, or viewer/dist.
+ * --save keeps; with fewer rays per pixel than the page takes at rest it is quicker. Those pictures have the lens of
+ * their camera, the page's have none: they are compared where the lens shows what the page does. The page is
+ * CNERF_BUILT_PAGE, or viewer/dist.
  */
 
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
@@ -72,6 +74,40 @@ console.log(`graphics:             ${statistics.renderer}`);
 await browser.close();
 await server.close();
 
+/** Where a camera's lens shows a place of the picture without one, pixels. */
+function throughLens({ model, fx, fy, cx, cy, distortion: k }, px, py) {
+  const [x, y] = [(px - cx) / fx, (py - cy) / fy];
+  const r2 = x * x + y * y;
+  if (model === "opencv_fisheye") {
+    const [r, a] = [Math.sqrt(r2), Math.atan(Math.sqrt(r2))];
+    const bent = a * (1 + a ** 2 * (k[0] + a ** 2 * (k[1] + a ** 2 * (k[2] + a ** 2 * k[3]))));
+    const scale = r > 0 ? bent / r : 1;
+    return [fx * scale * x + cx, fy * scale * y + cy];
+  }
+  const radial = (1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])));
+  return [
+    fx * (x * radial + 2 * k[2] * x * y + k[3] * (r2 + 2 * x * x)) + cx,
+    fy * (y * radial + k[2] * (r2 + 2 * y * y) + 2 * k[3] * x * y) + cy,
+  ];
+}
+
+/** The picture without the lens; its alpha is 0 where the camera saw nothing. */
+function withoutLens(camera, { width, height, data }) {
+  const straight = Buffer.alloc(4 * width * height);
+  for (let p = 0; p < width * height; ++p) {
+    const [u, v] = throughLens(camera, (p % width) + 0.5, Math.floor(p / width) + 0.5).map((place) => place - 0.5);
+    const [x, y] = [Math.floor(u), Math.floor(v)];
+    if (x < 0 || y < 0 || x + 1 >= width || y + 1 >= height) continue;
+    const at = (i, j, c) => data[4 * ((y + j) * width + x + i) + c];
+    for (let c = 0; c < 3; ++c) {
+      const row = (j) => at(0, j, c) + (u - x) * (at(1, j, c) - at(0, j, c));
+      straight[4 * p + c] = Math.round(row(0) + (v - y) * (row(1) - row(0)));
+    }
+    straight[4 * p + 3] = 255;
+  }
+  return { width, height, data: straight };
+}
+
 /** dB between two pictures where `weight` is not 0. */
 function decibel(a, b, weight = () => 1) {
   let [total, pixels] = [0, 0];
@@ -94,10 +130,12 @@ async function compare() {
   for (const [i, camera] of cameras.entries()) {
     const name = camera.name.replaceAll("/", "_").replace(/\.[^.]*$/, ".png");
     if (!existsSync(join(against, name))) continue;
-    const reference = await decoded(page, readFileSync(join(against, name)));
+    const rendered = await decoded(page, readFileSync(join(against, name)));
+    const reference = camera.model === "pinhole" ? rendered : withoutLens(camera, rendered);
+    const isSeen = (p) => reference.data[4 * p + 3] > 0;
     await page.evaluate((c) => window.cnerf.app.goToCamera(c), i);
     const shown = await picture(page, reference.width, reference.height, "#000000", rays);
-    const all = decibel(shown, reference);
+    const all = decibel(shown, reference, isSeen);
     means.all.push(all.value);
     let line = `${camera.name}: ${all.value.toFixed(2)} dB`;
     if (levels.length > 1) {
@@ -105,7 +143,7 @@ async function compare() {
       await page.evaluate((clip) => window.cnerf.app.set({ clip }), { low, high });
       const alone = await picture(page, reference.width, reference.height, "none", rays);
       await page.evaluate(() => window.cnerf.app.set({ clip: null }));
-      const isFinest = (p) => alone.data[4 * p + 3] >= 250 && [0, 1, 2].every((c) => Math.abs(alone.data[4 * p + c] - shown.data[4 * p + c]) <= 8);
+      const isFinest = (p) => isSeen(p) && alone.data[4 * p + 3] >= 250 && [0, 1, 2].every((c) => Math.abs(alone.data[4 * p + c] - shown.data[4 * p + c]) <= 8);
       const finest = decibel(shown, reference, isFinest);
       means.finest.push(finest.value);
       line += `; in the finest grid ${finest.value.toFixed(2)} dB of ${(100 * finest.share).toFixed(0)} % of the pixels`;

@@ -3,10 +3,10 @@
  *
  *   node viewer/tests/browser/studio_measure.mjs RUN [--take TAKE] [--rounds 3]
  *       milliseconds of a frame of 1280 x 720 and of a coarse one at an HTTP client, encoding included, before a browser
- *       runs; then, in the page, from a key that turns the camera to the first new frame and to the last
+ *       runs; then, in the page, from a drag that turns the camera to the first new frame and to the last
  *   node viewer/tests/browser/studio_measure.mjs RUN --strokes FILE
- *       paints the strokes of a stroke file of one photograph by pointer events, without colours to begin with, colours,
- *       keeps the take and prints the seconds until colours change and settle, and the held-out ab error
+ *       paints the strokes of a stroke file of one photograph by pointer events on a grey take, colours, keeps the take
+ *       and prints the seconds until colours change and settle, and the held-out ab error
  */
 
 import { cpSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -19,11 +19,19 @@ const [take, strokes, rounds] = [argument("--take", ""), argument("--strokes", "
 const folder = mkdtempSync(join(tmpdir(), "cnerf-measure-"));
 const copy = join(folder, "run");
 cpSync(process.argv[2], copy, { recursive: true });
-const serving = await startServing(["studio", copy, ...(take ? ["--take", take] : [])]);
+if (strokes) await ok(["colorize", copy, "--colorizer", "grey", "--take", "measured-grey"]);
+const begins = strokes ? "measured-grey" : take;
+const serving = await startServing(["studio", copy, ...(begins ? ["--take", begins] : [])]);
 const get = async (path) => (await fetch(`${serving.url}studio/${path}`)).json();
 const median = (values) => values.sort((a, b) => a - b)[values.length >> 1];
-const row = (what, value, unit) => console.log(`${what.padEnd(62)} ${value.toFixed(value < 10 ? 2 : 0).padStart(8)} ${unit}`);
+const row = (what, value, unit) => console.log(`${what.padEnd(62)} ${value.toFixed(value < 100 ? 2 : 0).padStart(8)} ${unit}`);
 let browser = null;
+
+/** Runs the program, which must succeed. */
+async function ok(args) {
+  const { code, out } = await run(args);
+  if (code !== 0) throw new Error(`${args.join(" ")}: ${out}`);
+}
 
 /** The page, once it shows the last frame of where it begins. */
 async function openPage() {
@@ -64,31 +72,32 @@ async function measureFrames() {
 
 async function measurePage() {
   const page = await openPage();
-  await page.focus("#field");
   const [first, last] = [[], []];
   for (let i = 0; i < rounds; ++i) {
+    await page.mouse.move(640, 360);
+    await page.mouse.down();
     await page.evaluate(() => {
       const { field } = window.cnerf.studio;
-      window.shown = { first: 0, last: 0 };
-      const before = field.canvas.toDataURL();
-      const begin = performance.now();
+      const shown = (window.shown = { begin: 0, first: 0, last: 0 });
+      const before = field.frameShown;
+      field.canvas.addEventListener("pointermove", () => (shown.begin = performance.now()), { once: true, capture: true });
       const look = () => {
-        const { shown } = window;
-        if (shown.first === 0 && field.canvas.toDataURL() !== before) shown.first = performance.now() - begin;
-        if (shown.first > 0 && field.settled) shown.last = performance.now() - begin;
+        const now = performance.now() - shown.begin;
+        if (field.frameShown !== before) shown.first ||= now;
+        if (shown.first > 0 && field.settled) shown.last = now;
         else requestAnimationFrame(look);
       };
-      field.canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft", code: "ArrowLeft", bubbles: true }));
-      setTimeout(() => field.canvas.dispatchEvent(new KeyboardEvent("keyup", { key: "ArrowLeft", code: "ArrowLeft", bubbles: true })), 50);
       requestAnimationFrame(look);
     });
+    await page.mouse.move(680 + 10 * i, 370);
+    await page.mouse.up();
     await page.waitForFunction(() => window.shown.last > 0, null, { timeout: patience });
     const shown = await page.evaluate(() => window.shown);
     first.push(shown.first);
     last.push(shown.last);
   }
-  row("Chromium, from a key to the first new frame", median(first), "ms");
-  row("Chromium, from a key to the last frame", median(last), "ms");
+  row("Chromium, from a drag to the first new frame", median(first), "ms");
+  row("Chromium, from a drag to the last frame", median(last), "ms");
 }
 
 async function measureStrokes() {
@@ -117,8 +126,7 @@ async function measureStrokes() {
   await until(() => window.cnerf.session.state.task === "");
   serving.child.kill("SIGINT");
   await serving.ended;
-  const evaluated = await run(["eval", copy, "--take", "painted"]);
-  if (evaluated.code !== 0) throw new Error(evaluated.out);
+  await ok(["eval", copy, "--take", "painted"]);
   const { mean } = JSON.parse(readFileSync(join(copy, "metrics.json"), "utf8"));
   row("colour: until colours change", (changed - begin) / 1000, "s");
   row("colour: until they are settled", (done - begin) / 1000, "s");
