@@ -45,14 +45,19 @@ std::vector<fs::path> plugin_folders() {
   return folders;
 }
 
-/// While it lives, abort() ends the program as a shortage of memory does: libraries that cannot have what they begin
-/// with abort (GDAL, which OpenCV loads). One thread at a time: the last one would leave the other's handler behind.
-class AbortIsShortageOfMemory {
+/// While it lives, a crash ends the program as a shortage of memory does: libraries that cannot have what they begin
+/// with abort, or use what they did not get (GDAL, which OpenCV loads). One thread at a time: the last one would leave
+/// the other's handlers behind.
+class CrashIsShortageOfMemory {
  public:
-  AbortIsShortageOfMemory() : lock_(one_at_a_time()), before_(std::signal(SIGABRT, end)) {}
-  ~AbortIsShortageOfMemory() { std::signal(SIGABRT, before_); }
-  AbortIsShortageOfMemory(const AbortIsShortageOfMemory&) = delete;
-  AbortIsShortageOfMemory& operator=(const AbortIsShortageOfMemory&) = delete;
+  CrashIsShortageOfMemory()
+      : lock_(one_at_a_time()), before_abort_(std::signal(SIGABRT, end)), before_fault_(std::signal(SIGSEGV, end)) {}
+  ~CrashIsShortageOfMemory() {
+    std::signal(SIGABRT, before_abort_);
+    std::signal(SIGSEGV, before_fault_);
+  }
+  CrashIsShortageOfMemory(const CrashIsShortageOfMemory&) = delete;
+  CrashIsShortageOfMemory& operator=(const CrashIsShortageOfMemory&) = delete;
 
  private:
   static std::recursive_mutex& one_at_a_time() {
@@ -66,7 +71,8 @@ class AbortIsShortageOfMemory {
   }
 
   std::lock_guard<std::recursive_mutex> lock_;
-  void (*before_)(int);
+  void (*before_abort_)(int);
+  void (*before_fault_)(int);
 };
 
 /// The library of a plug-in; a second time gives the first one's handle.
@@ -100,7 +106,7 @@ std::vector<fs::path> data_places(const std::string& name) {
 }
 
 const void* begun_plugin(const std::string& plugin, const std::string& entry, const void* (*call)(void* entry)) {
-  const AbortIsShortageOfMemory guard;
+  const CrashIsShortageOfMemory guard;
   const fs::path file = program_part("libcnerf_" + plugin + ".so");
   void* library = loaded(file);
   if (void* follow = ::dlsym(library, "cnerf_follow_interruption"); follow != nullptr) {
