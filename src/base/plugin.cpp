@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 #include <link.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -45,13 +46,23 @@ std::vector<fs::path> plugin_folders() {
   return folders;
 }
 
+bool is_memory_limited() {
+  const auto is_limited = [](auto what) {
+    rlimit limit{};
+    return ::getrlimit(what, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+  };
+  return is_limited(RLIMIT_DATA) || is_limited(RLIMIT_AS);
+}
+
 /// While it lives, a crash ends the program as a shortage of memory does: libraries that cannot have what they begin
-/// with abort, or use what they did not get (GDAL, which OpenCV loads). One thread at a time: the last one would leave
-/// the other's handlers behind.
+/// with abort, or, under a limit, use what they did not get (GDAL, which OpenCV loads). One thread at a time: the last
+/// one would leave the other's handlers behind.
 class CrashIsShortageOfMemory {
  public:
   CrashIsShortageOfMemory()
-      : lock_(one_at_a_time()), before_abort_(std::signal(SIGABRT, end)), before_fault_(std::signal(SIGSEGV, end)) {}
+      : lock_(one_at_a_time()), before_abort_(std::signal(SIGABRT, end)), before_fault_(std::signal(SIGSEGV, end)) {
+    if (!is_memory_limited()) std::signal(SIGSEGV, before_fault_);  // a fault of another kind
+  }
   ~CrashIsShortageOfMemory() {
     std::signal(SIGABRT, before_abort_);
     std::signal(SIGSEGV, before_fault_);

@@ -32,7 +32,7 @@ __device__ inline unsigned warp_ballot(bool yes) {
   return (all >> (threadIdx.x % 32 / kLanes * kLanes)) & ((1u << kLanes % 32) - 1u);
 }
 
-/// The lanes about this one that follow one another with the same key. Others may have that key too.
+/// The lanes around this one that follow one another with the same key. Others may have that key too.
 class WarpSegment {
  public:
   __device__ explicit WarpSegment(std::uint32_t key) {
