@@ -24,8 +24,13 @@ void run_tasks(std::size_t tasks, const Body& body) {
 #ifdef __SANITIZE_THREAD__
   // TBB's library is not instrumented: the thread sanitizer would find races inside it, and could not see ours.
   std::atomic<std::size_t> next = 0;
+  // A thread may have the identity of one that has ended, and with it what TBB keeps per thread: the C library makes
+  // one wait for the other, which the sanitizer cannot see either.
+  static std::atomic<std::size_t> ended = 0;
   const auto work = [&] {
+    (void)ended.load(std::memory_order_acquire);
     for (std::size_t i = next++; i < tasks; i = next++) body(i);
+    ended.fetch_add(1, std::memory_order_release);
   };
   std::vector<std::jthread> others;
   for (int t = 1; t < thread_count(); ++t) others.emplace_back(work);

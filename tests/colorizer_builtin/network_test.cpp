@@ -1,8 +1,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <torch/torch.h>
+#include <torch/version.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -12,6 +14,7 @@
 #include "src/base/process.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/torch/network_weights.h"
+#include "src/colorizer/torch/products.h"
 #include "src/colorizer_training/score.h"
 #include "tests/support/data.h"
 
@@ -282,6 +285,12 @@ TEST(BuiltinColorizer, AMirroredPictureGetsMirroredColors) {
   for (int row = 0; row < 128; ++row) {
     for (int x = 0; x < 64; ++x) ASSERT_NEAR(ab[64 * row + x], mirrored[64 * row + 63 - x], 1e-2);
   }
+}
+
+TEST(BuiltinColorizer, OneDnn2NeverWritesCodeForAmx) {
+  if (TORCH_VERSION_MAJOR >= 2) GTEST_SKIP() << "LibTorch has a later oneDNN";
+  (void)product_type();
+  EXPECT_STREQ(std::getenv("ONEDNN_MAX_CPU_ISA"), "AVX512_CORE_BF16");
 }
 
 TEST(BuiltinColorizer, FlatGreyGetsNearlyNoColor) {
