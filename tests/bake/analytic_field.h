@@ -1,17 +1,58 @@
 #pragma once
 /// A field given by formulas, and cameras to look at it with.
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
+#include <mutex>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "bake/camera.h"
 #include "src/field/color_field.h"
 
 namespace cnerf::bake::test {
 
-/// Everything in unit space. Occupied where density is positive anywhere within `occupancy_margin` along an axis.
+/// Which cells of the unit box lie at places where a density is not zero, NaN included: looked up once, as a trained field
+/// has it.
+class Occupancy {
+ public:
+  [[nodiscard]] bool at(const std::function<float(Vec3f)>& density, Vec3f position) {
+    std::call_once(once_, [&] { look(density); });
+    const auto cell = [](float x) { return std::clamp(int(x * kCells), 0, kCells - 1); };
+    return is_occupied_[std::size_t((cell(position.z) * kCells + cell(position.y)) * kCells + cell(position.x))];
+  }
+
+ private:
+  static constexpr int kCells = 128, kCorners = kCells + 1;
+
+  void look(const std::function<float(Vec3f)>& density) {
+    is_occupied_.assign(std::size_t(kCells) * kCells * kCells, false);
+    for (int z = 0; z < kCorners; ++z) {
+      for (int y = 0; y < kCorners; ++y) {
+        for (int x = 0; x < kCorners; ++x) {
+          if (density(Vec3f{float(x), float(y), float(z)} / float(kCells)) != 0) mark_around(x, y, z);
+        }
+      }
+    }
+  }
+  void mark_around(int x, int y, int z) {
+    for (int k = std::max(z - 2, 0); k < std::min(z + 2, kCells); ++k) {
+      for (int j = std::max(y - 2, 0); j < std::min(y + 2, kCells); ++j) {
+        for (int i = std::max(x - 2, 0); i < std::min(x + 2, kCells); ++i) {
+          is_occupied_[std::size_t((k * kCells + j) * kCells + i)] = true;
+        }
+      }
+    }
+  }
+
+  std::once_flag once_;
+  std::vector<bool> is_occupied_;
+};
+
+/// Everything in unit space. Occupied wherever density may be positive within 1/128.
 class AnalyticField : public ColorField {
  public:
   using Density = std::function<float(Vec3f)>;
@@ -34,12 +75,7 @@ class AnalyticField : public ColorField {
 
   [[nodiscard]] const SceneFrame& frame() const override { return frame_; }
   [[nodiscard]] bool may_be_occupied(Vec3f position) const override {
-    constexpr float kMargin = 1.0f / 128;
-    for (int corner = 0; corner < 27; ++corner) {
-      const Vec3f offset{float(corner / 9 - 1), float(corner / 3 % 3 - 1), float(corner % 3 - 1)};
-      if (density_(position + offset * kMargin) != 0) return true;  // also for NaN
-    }
-    return false;
+    return occupancy_->at(density_, position);
   }
   void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override {
     for (std::size_t i = 0; i < positions.size(); ++i) sigma[i] = density_(positions[i]);
@@ -55,6 +91,7 @@ class AnalyticField : public ColorField {
  private:
   SceneFrame frame_;
   Density density_;
+  std::shared_ptr<Occupancy> occupancy_ = std::make_shared<Occupancy>();
   Luminance luminance_;
   std::function<Chromaticity(Vec3f)> chromaticity_;
 };
