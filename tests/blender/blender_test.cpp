@@ -134,7 +134,7 @@ TEST_P(VoxelOrigin, EdgesAreWithinATenthOfAVoxel) {
     EXPECT_NEAR(edges.bottom, far_face, tenth) << camera;
   }
 }
-INSTANTIATE_TEST_SUITE_P(Blender, VoxelOrigin, testing::Values("center", "corner"));
+INSTANTIATE_TEST_SUITE_P(Rule, VoxelOrigin, testing::Values("center", "corner"));
 
 /// Three soft balls of different colours and densities.
 bake::Volume soft_scene() {

@@ -87,7 +87,7 @@ TEST_P(MeshBesideVolume, SilhouettesAndColoursAgree) {
     EXPECT_LT(equal.difference, 0.03);
   }
 }
-INSTANTIATE_TEST_SUITE_P(Blender, MeshBesideVolume, testing::Values("z", "y"));
+INSTANTIATE_TEST_SUITE_P(UpAxis, MeshBesideVolume, testing::Values("z", "y"));
 
 TEST(BlenderMesh, UsesOfTheMesh) {
   CNERF_REQUIRE_BLENDER();

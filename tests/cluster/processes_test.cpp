@@ -199,16 +199,14 @@ void lose(int victim, int signal, const std::string& complaint) {
   expect_success(ranks, 2);
 }
 
-TEST(Processes, OneThatDiesIsNamed) {
+/// Both at once, since each takes as long as the survivors are patient.
+TEST(Processes, OneThatDiesAndOneThatStopsAreNamed) {
+  const std::jthread stops([] { lose(1, SIGSTOP, "has shown no sign of life"); });
   lose(1, SIGKILL, "has shown no sign of life");
 }
 
 TEST(Processes, RankZeroThatDiesIsNamed) {
   lose(0, SIGKILL, "is gone");
-}
-
-TEST(Processes, OneThatStopsIsNamed) {
-  lose(1, SIGSTOP, "has shown no sign of life");
 }
 
 /// torchrun's agent keeps a store itself; another job's rank 0 stands in for it, and its words are told apart.

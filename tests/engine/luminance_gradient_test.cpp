@@ -1,5 +1,6 @@
 // The whole step of stage 1, from parameters to the loss, against finite differences of a forward pass in double that
-// shares only the header-only maths with the engine.
+// shares only the header-only maths with the engine. By one instruction set: backend_ops_test.cpp proves the others, and the
+// GPU, equal to it.
 
 #include <gtest/gtest.h>
 
@@ -195,33 +196,31 @@ TEST_P(LuminanceGradient, MatchesFiniteDifferencesOfTheLoss) {
   options.depth.weight = GetParam().depth_weight;
   const test::ToyDepths depths(views.size());
   if (options.depth.weight > 0) depths.show_to(views);
-  for (const IsaLevel isa : test::available_isas()) {
-    const test::ScopedIsa scope(isa);
-    const auto engine = make_cpu_luminance_engine(options);
-    engine->set_views(views);
-    for (int i = 0; i < 12; ++i) engine->step(1e-2f);  // away from the symmetric start
-    const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);
-    ASSERT_GT(analytic.report.trained_samples, 200u);
+  const test::ScopedIsa scope(IsaLevel::kGeneric);
+  const auto engine = make_cpu_luminance_engine(options);
+  engine->set_views(views);
+  for (int i = 0; i < 12; ++i) engine->step(1e-2f);  // away from the symmetric start
+  const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);
+  ASSERT_GT(analytic.report.trained_samples, 200u);
 
-    const std::vector<double> parameters = trained_numbers(*engine);
-    std::vector<double> gradient(analytic.table.begin(), analytic.table.end());
-    gradient.insert(gradient.end(), analytic.weights.begin(), analytic.weights.end());
-    ASSERT_EQ(gradient.size(), parameters.size());
+  const std::vector<double> parameters = trained_numbers(*engine);
+  std::vector<double> gradient(analytic.table.begin(), analytic.table.end());
+  gradient.insert(gradient.end(), analytic.weights.begin(), analytic.weights.end());
+  ASSERT_EQ(gradient.size(), parameters.size());
 
-    const LossInDouble loss(*engine, options, views, analytic.report.rays);
-    // The engine drops samples behind transmittance 1e-4: their part of the loss is below its square root.
-    EXPECT_NEAR(loss(parameters), analytic.report.loss, 1e-4 * analytic.report.loss + 1e-6);
+  const LossInDouble loss(*engine, options, views, analytic.report.rays);
+  // The engine drops samples behind transmittance 1e-4: their part of the loss is below its square root.
+  EXPECT_NEAR(loss(parameters), analytic.report.loss, 1e-4 * analytic.report.loss + 1e-6);
 
-    const std::vector<std::size_t> indices = telling_indices(gradient, 40);
-    const std::vector<double> numeric = test::central_difference(parameters, indices, 1e-5, loss);
-    std::vector<double> chosen;
-    for (const std::size_t i : indices) chosen.push_back(gradient[i]);
-    // Float against double through exp and cube: measured below 1e-3.
-    EXPECT_LT(test::relative_distance(chosen, numeric), 5e-3) << to_string(isa);
-    std::vector<double> flipped = chosen;
-    for (double& value : flipped) value = -value;
-    EXPECT_GT(test::relative_distance(flipped, numeric), 1.0);
-  }
+  const std::vector<std::size_t> indices = telling_indices(gradient, 40);
+  const std::vector<double> numeric = test::central_difference(parameters, indices, 1e-5, loss);
+  std::vector<double> chosen;
+  for (const std::size_t i : indices) chosen.push_back(gradient[i]);
+  // Float against double through exp and cube: measured below 1e-3.
+  EXPECT_LT(test::relative_distance(chosen, numeric), 5e-3);
+  std::vector<double> flipped = chosen;
+  for (double& value : flipped) value = -value;
+  EXPECT_GT(test::relative_distance(flipped, numeric), 1.0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, LuminanceGradient,
@@ -248,42 +247,40 @@ TEST_P(ViewLearningWithLens, GradientsMatchFiniteDifferencesOfTheLoss) {
   std::vector<TrainingView> views = training_views(capture, frame);
   const test::ToySky sky(views.size(), 24 * 20);
   sky.show_to(views);
-  for (const IsaLevel isa : test::available_isas()) {
-    const test::ScopedIsa scope(isa);
-    const auto engine = make_cpu_luminance_engine(options);
-    engine->set_views(views);
-    for (int i = 0; i < 12; ++i) engine->step(1e-2f);
-    // The double reference bends rays as they are given: corrections start from nothing.
-    for (const StatePiece& piece : engine->state()) {
-      if (piece.name == "views" || piece.name == "lenses") std::ranges::fill(piece.bytes, std::byte{0});
-    }
-    engine->state_loaded();
-    const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);
+  const test::ScopedIsa scope(IsaLevel::kGeneric);
+  const auto engine = make_cpu_luminance_engine(options);
+  engine->set_views(views);
+  for (int i = 0; i < 12; ++i) engine->step(1e-2f);
+  // The double reference bends rays as they are given: corrections start from nothing.
+  for (const StatePiece& piece : engine->state()) {
+    if (piece.name == "views" || piece.name == "lenses") std::ranges::fill(piece.bytes, std::byte{0});
+  }
+  engine->state_loaded();
+  const test::Stage1Gradients analytic = test::gradients_of_next_step(*engine);
 
-    const std::vector<double> parameters = trained_numbers(*engine);
-    ASSERT_EQ(analytic.views.size(), 4u * kViewNumbers);
-    ASSERT_EQ(analytic.lenses.size(), std::size_t(kLensNumbers));
-    const LossInDouble loss(*engine, options, views, analytic.report.rays);
-    EXPECT_NEAR(loss(parameters), analytic.report.loss, 1e-4 * analytic.report.loss + 1e-6);
-    std::vector<std::size_t> indices(analytic.views.size());
-    std::iota(indices.begin(), indices.end(), parameters.size() - kLensNumbers - indices.size());
-    const std::vector<double> numeric = test::central_difference(parameters, indices, 1e-7, loss);
-    for (const int first : {0, 1, 4}) {  // gains, turns, shifts: each on its own scale
-      std::vector<double> found, expected;
-      for (std::size_t i = 0; i < indices.size(); ++i) {
-        const int number = int(i % kViewNumbers);
-        if ((number == 0) != (first == 0) || (number >= 4) != (first == 4)) continue;
-        found.push_back(analytic.views[i]);
-        expected.push_back(numeric[i]);
-      }
-      EXPECT_LT(test::relative_distance(found, expected), 1e-2) << to_string(isa) << ", numbers from " << first;
+  const std::vector<double> parameters = trained_numbers(*engine);
+  ASSERT_EQ(analytic.views.size(), 4u * kViewNumbers);
+  ASSERT_EQ(analytic.lenses.size(), std::size_t(kLensNumbers));
+  const LossInDouble loss(*engine, options, views, analytic.report.rays);
+  EXPECT_NEAR(loss(parameters), analytic.report.loss, 1e-4 * analytic.report.loss + 1e-6);
+  std::vector<std::size_t> indices(analytic.views.size());
+  std::iota(indices.begin(), indices.end(), parameters.size() - kLensNumbers - indices.size());
+  const std::vector<double> numeric = test::central_difference(parameters, indices, 1e-7, loss);
+  for (const int first : {0, 1, 4}) {  // gains, turns, shifts: each on its own scale
+    std::vector<double> found, expected;
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+      const int number = int(i % kViewNumbers);
+      if ((number == 0) != (first == 0) || (number >= 4) != (first == 4)) continue;
+      found.push_back(analytic.views[i]);
+      expected.push_back(numeric[i]);
     }
-    std::vector<std::size_t> of_lens(kLensNumbers);
-    std::iota(of_lens.begin(), of_lens.end(), parameters.size() - kLensNumbers);
-    const std::vector<double> lens = test::central_difference(parameters, of_lens, 1e-7, loss);
-    for (std::size_t i = 0; i < lens.size(); ++i) {
-      EXPECT_NEAR(analytic.lenses[i], lens[i], 0.02 * std::abs(lens[i]) + 1e-5) << to_string(isa) << ", number " << i;
-    }
+    EXPECT_LT(test::relative_distance(found, expected), 1e-2) << "numbers from " << first;
+  }
+  std::vector<std::size_t> of_lens(kLensNumbers);
+  std::iota(of_lens.begin(), of_lens.end(), parameters.size() - kLensNumbers);
+  const std::vector<double> lens = test::central_difference(parameters, of_lens, 1e-7, loss);
+  for (std::size_t i = 0; i < lens.size(); ++i) {
+    EXPECT_NEAR(analytic.lenses[i], lens[i], 0.02 * std::abs(lens[i]) + 1e-5) << "number " << i;
   }
 }
 

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <vector>
 
+#include "src/base/files.h"
 #include "src/color/colorspace_math.h"
 #include "src/train/chroma/injection.h"
 #include "src/train/chroma/questioner.h"
@@ -42,18 +44,25 @@ class Listening final : public Colorizer {
 class Stage2Fixture : public testing::Test {
  protected:
   void SetUp() override {
+    capture_.views.back().held_out = true;
+    static const std::vector<std::byte> trained = trained_stage1(capture_);  // the same for all tests of a process
+    write_file(stage1(), trained);
+  }
+
+  static HashGridOptions small_grid() {
+    return {.levels = 3, .log2_rows = 10, .coarsest_resolution = 4, .finest_resolution = 32};
+  }
+  static std::vector<std::byte> trained_stage1(const Capture& capture) {
     Stage1Options options;
     options.steps = 40;
     options.samples_per_step = 2048;
     options.steps_per_box = 64;
     options.grid = small_grid();
     options.occupancy.resolution = 32;
-    capture_.views.back().held_out = true;
-    (void)train_stage1({capture_, options, stage1()}, cpu_engines(), observer_);
-  }
-
-  static HashGridOptions small_grid() {
-    return {.levels = 3, .log2_rows = 10, .coarsest_resolution = 4, .finest_resolution = 32};
+    const TempDir folder;
+    Observer observer;
+    (void)train_stage1({capture, options, folder / "stage1.snapshot"}, cpu_engines(), observer);
+    return read_binary_file(folder / "stage1.snapshot");
   }
   static Stage2Options small_options() {
     Stage2Options options;
