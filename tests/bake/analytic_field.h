@@ -15,8 +15,8 @@
 
 namespace cnerf::bake::test {
 
-/// Which cells of the unit box lie at places where a density is not zero, NaN included: looked up once, as a trained field
-/// has it.
+/// Which cells of the unit box lie at places where a density is not zero, NaN included: looked up once, as a trained
+/// field has it.
 class Occupancy {
  public:
   [[nodiscard]] bool at(const std::function<float(Vec3f)>& density, Vec3f position) {
@@ -74,9 +74,7 @@ class AnalyticField : public ColorField {
   }
 
   [[nodiscard]] const SceneFrame& frame() const override { return frame_; }
-  [[nodiscard]] bool may_be_occupied(Vec3f position) const override {
-    return occupancy_->at(density_, position);
-  }
+  [[nodiscard]] bool may_be_occupied(Vec3f position) const override { return occupancy_->at(density_, position); }
   void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override {
     for (std::size_t i = 0; i < positions.size(); ++i) sigma[i] = density_(positions[i]);
   }

@@ -1,6 +1,6 @@
 // The whole step of stage 1, from parameters to the loss, against finite differences of a forward pass in double that
-// shares only the header-only maths with the engine. By one instruction set: backend_ops_test.cpp proves the others, and the
-// GPU, equal to it.
+// shares only the header-only maths with the engine. By one instruction set: backend_ops_test.cpp proves the others,
+// and the GPU, equal to it.
 
 #include <gtest/gtest.h>
 
