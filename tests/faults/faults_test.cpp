@@ -25,7 +25,7 @@ class Faults : public testing::Test {
 
 TEST_F(Faults, OperationsOfABakeAndAColorization) {
   CampaignOptions some = options({"bake", "colorize"});
-  some.every = 260;
+  some.every = 360;
   const Report report = disturb_operations(some);
   EXPECT_TRUE(report.violations.empty()) << report.text();
 }
