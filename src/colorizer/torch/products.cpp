@@ -9,8 +9,8 @@
 namespace cnerf {
 namespace {
 
-// The oneDNN of LibTorch 1.13 (2.6) reads beyond a table of its own as it writes bf16 convolutions for AMX: an answer
-// differs each time, or the program crashes. oneDNN reads the variable once, at its first operation.
+// With the oneDNN of LibTorch 1.13 (2.6), bf16 convolutions by AMX answered differently each time, and it crashed in
+// its generator of their code. oneDNN reads the variable once, at its first operation.
 [[maybe_unused]] const bool kWithoutAmx =
     TORCH_VERSION_MAJOR < 2 && ::setenv("ONEDNN_MAX_CPU_ISA", "AVX512_CORE_BF16", /*overwrite=*/0) == 0;
 
