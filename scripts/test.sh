@@ -21,7 +21,7 @@ fi
 # The counts that tests/support/gtest_main.cpp leaves, in a file per suite.
 rm -rf "$build/Testing/cases"
 mkdir -p "$build/Testing/cases"
-# One more at a time than there are cores: tests of several processes and of the page wait much of their time.
+# One more at a time than there are cores: tests of several processes and of the studio wait much of their time.
 ctest --preset release --parallel "$(($(nproc) + 1))" "$@" | awk -v folder="$build/Testing/cases" '
   /^[0-9]+% tests passed/ {
     while ((("cat " folder "/* 2>/dev/null") | getline line) > 0) {

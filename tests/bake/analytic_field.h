@@ -19,8 +19,10 @@ namespace cnerf::bake::test {
 /// field has it.
 class Occupancy {
  public:
-  [[nodiscard]] bool at(const std::function<float(Vec3f)>& density, Vec3f position) {
-    std::call_once(once_, [&] { look(density); });
+  explicit Occupancy(std::function<float(Vec3f)> density) : density_(std::move(density)) {}
+
+  [[nodiscard]] bool at(Vec3f position) {
+    std::call_once(once_, [&] { look(); });
     const auto cell = [](float x) { return std::clamp(int(x * kCells), 0, kCells - 1); };
     return is_occupied_[std::size_t((cell(position.z) * kCells + cell(position.y)) * kCells + cell(position.x))];
   }
@@ -28,12 +30,12 @@ class Occupancy {
  private:
   static constexpr int kCells = 128, kCorners = kCells + 1;
 
-  void look(const std::function<float(Vec3f)>& density) {
+  void look() {
     is_occupied_.assign(std::size_t(kCells) * kCells * kCells, false);
     for (int z = 0; z < kCorners; ++z) {
       for (int y = 0; y < kCorners; ++y) {
         for (int x = 0; x < kCorners; ++x) {
-          if (density(Vec3f{float(x), float(y), float(z)} / float(kCells)) != 0) mark_around(x, y, z);
+          if (density_(Vec3f{float(x), float(y), float(z)} / float(kCells)) != 0) mark_around(x, y, z);
         }
       }
     }
@@ -48,6 +50,7 @@ class Occupancy {
     }
   }
 
+  std::function<float(Vec3f)> density_;
   std::once_flag once_;
   std::vector<bool> is_occupied_;
 };
@@ -74,7 +77,7 @@ class AnalyticField : public ColorField {
   }
 
   [[nodiscard]] const SceneFrame& frame() const override { return frame_; }
-  [[nodiscard]] bool may_be_occupied(Vec3f position) const override { return occupancy_->at(density_, position); }
+  [[nodiscard]] bool may_be_occupied(Vec3f position) const override { return occupancy_->at(position); }
   void query_density(std::span<const Vec3f> positions, std::span<float> sigma) const override {
     for (std::size_t i = 0; i < positions.size(); ++i) sigma[i] = density_(positions[i]);
   }
@@ -89,7 +92,7 @@ class AnalyticField : public ColorField {
  private:
   SceneFrame frame_;
   Density density_;
-  std::shared_ptr<Occupancy> occupancy_ = std::make_shared<Occupancy>();
+  std::shared_ptr<Occupancy> occupancy_ = std::make_shared<Occupancy>(density_);
   Luminance luminance_;
   std::function<Chromaticity(Vec3f)> chromaticity_;
 };

@@ -287,7 +287,7 @@ TEST(BuiltinColorizer, AMirroredPictureGetsMirroredColors) {
   }
 }
 
-TEST(BuiltinColorizer, OneDnn2NeverWritesCodeForAmx) {
+TEST(BuiltinColorizer, OneDnn2IsAskedToLeaveAmx) {
   if (TORCH_VERSION_MAJOR >= 2) GTEST_SKIP() << "LibTorch has a later oneDNN";
   (void)product_type();
   EXPECT_STREQ(std::getenv("ONEDNN_MAX_CPU_ISA"), "AVX512_CORE_BF16");
