@@ -1,0 +1,154 @@
+#!/usr/bin/env python3
+"""What training makes of captures as they are: luminance of held-out views, five seeds a row, on a GPU.
+
+    scripts/real_captures.py pack OUT [--captures FOLDER]      packs the captures; wants no GPU
+    scripts/real_captures.py train OUT [--part I/N] [--check CNERF-CUDA-CHECK] [--only ROW...]
+    scripts/real_captures.py table OUT
+
+FOLDER has flower, fox, fruit, lego and robovision; it is $CNERF_DATA/scenes if not given. `train` needs the packed
+captures and cnerf-cuda-check alone, so that it runs where nothing else is installed; parts run side by side, each on
+a GPU of its own. What is there already stays. `table` prints medians over seeds of the mean and of the worst view.
+"""
+import argparse
+import os
+import re
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+SEEDS = 5
+BASE = "log2_rows=17 cone=128 distortion=1e-4 table_decay=0.1 marks=0 views=1 aligned=1"  # as configs/gpu.toml
+LEARN = {"nothing": "", "default": "depth=0.01 exposures=1", "poses": "depth=0.01 exposures=1 poses=1",
+         "all": "depth=0.01 exposures=1 poses=1 lenses=1"}
+
+# Packed capture: folder of it, options of pack_capture, options of `cnerf sample` or None where it is brought.
+PACKED = {
+    "flower": ("flower", "downscale=8 points=1"),
+    "fox": ("fox", "downscale=2 points=1"),
+    "fruit": ("fruit", "points=1"),
+    "lego": ("lego", ""),
+    "robovision": ("robovision", "points=1"),
+    "fox-few": ("fox", "downscale=2 few=5 points=1"),
+    "flower-few": ("flower", "downscale=8 few=6 points=1"),
+    "cloth": ("sample --cloth", "points=1"),
+    "shadow": ("sample --cloth --moving-shadow --exposures", "points=1"),
+    "flower-prepared": ("prepare flower/images_4", "downscale=2 points=1"),
+}
+
+
+def rows():
+    """Name of a row: packed capture, seconds, options."""
+    table = {}
+
+    def row(capture, seconds, learn, more="", name=None):
+        table[f"{name or capture} {seconds} s {learn}"] = (capture, seconds, f"{LEARN[learn]} {more}")
+
+    for seconds in (10, 5, 2, 1):
+        for learn in LEARN if seconds == 10 else ("nothing", "default", "poses"):
+            row("flower", seconds, learn)
+    for learn in LEARN:
+        row("fox", 10, learn)
+        row("fruit", 10, learn)
+    for learn in ("nothing", "default", "poses"):
+        row("fruit", 30, learn)
+        row("lego", 10, learn)
+        row("robovision", 5, learn)
+    for learn in ("default", "poses"):
+        row("cloth", 5, learn)
+        row("shadow", 5, learn)
+        row("fox-few", 5, learn)
+        row("flower-few", 5, learn)
+        for seconds in (10, 30):
+            row("flower-prepared", seconds, learn)
+    row("fox", 10, "default", "gain=0.3", "fox, light of views +-30 %")
+    row("fox", 10, "nothing", "gain=0.3", "fox, light of views +-30 %")
+    for capture in ("fox", "lego"):
+        for learn in ("default", "poses"):
+            row(capture, 10, learn, "degrees=0.5 shift=0.005", f"{capture}, poses disturbed")
+    for learn in ("default", "all"):
+        row("fox", 10, learn, "focal=0.03", "fox, focal length 3 % too long")
+    return table
+
+
+def pack(options):
+    program = ROOT / "build/release"
+    for name, (source, more) in PACKED.items():
+        target = options.out / "packed" / name
+        if target.exists():
+            continue
+        folder = Path(options.captures) / source
+        if source.startswith("sample"):
+            folder = options.out / name
+            subprocess.run([program / "cnerf", *source.split(), "-o", folder, "--overwrite"], check=True)
+        elif source.startswith("prepare"):
+            folder = options.out / name
+            subprocess.run([program / "cnerf", "prepare", Path(options.captures) / source.split()[1], "-o", folder,
+                            "--overwrite"], check=True)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        subprocess.run([program / "tests/cuda/pack_capture", folder, target, *more.split()], check=True)
+
+
+def file_of(out, name):
+    return out / "rows" / (re.sub(r"[^a-z0-9]+", "-", name) + ".txt")
+
+
+def train(options):
+    part, parts = map(int, options.part.split("/"))
+    chosen = {name: row for name, row in rows().items() if not options.only or name in options.only}
+    # The long ones first, dealt out in turns.
+    order = sorted(chosen.items(), key=lambda item: -item[1][1])
+    (options.out / "rows").mkdir(parents=True, exist_ok=True)
+    for name, (capture, seconds, more) in order[part - 1::parts]:
+        file = file_of(options.out, name)
+        if file.exists():
+            continue
+        command = [options.check, "train", f"capture={options.out / 'packed' / capture}", f"seconds={seconds}",
+                   f"seeds={SEEDS}", *BASE.split(), *more.split()]
+        done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
+        if done.returncode != 0:
+            print(f"real_captures: {name}: exit code {done.returncode}", file=sys.stderr)
+            continue
+        file.with_suffix(".part").write_text(done.stdout)
+        file.with_suffix(".part").rename(file)
+        print(name, flush=True)
+
+
+NUMBER = r"(-?[0-9.]+|-?nan|-?inf)"
+MEANS = re.compile(rf"mean / worst: as given {NUMBER} / {NUMBER} dB, exposure fitted {NUMBER} / {NUMBER} dB, "
+                   rf"aligned {NUMBER} / {NUMBER} dB, near opacity {NUMBER}")
+
+
+def table(options):
+    print("| capture, training | as given | exposure fitted | aligned | near opacity | steps/s | cameras |\n"
+          "|---|---|---|---|---|---|---|")
+    for name in rows():
+        file = file_of(options.out, name)
+        if not file.exists():
+            continue
+        text = file.read_text()
+        seeds = [tuple(map(float, found)) for found in MEANS.findall(text)]
+        columns = [statistics.median(column) for column in zip(*seeds)]
+        cells = [f"{columns[i]:.2f}, {columns[i + 1]:.2f}" for i in (0, 2, 4)]
+        spread = max(seed[2] for seed in seeds) - min(seed[2] for seed in seeds)
+        speed = statistics.median(float(found) for found in re.findall(r"\| ([0-9]+) steps/s", text))
+        angles = [float(found) for found in re.findall(r"([0-9.]+) learned", text)]
+        cameras = f"{statistics.median(angles):.3f} degrees" if angles else ""
+        print(f"| {name} | {cells[0]} | {cells[1]} (+-{spread / 2:.2f}) | {cells[2]} | {columns[6]:.3f} | {speed:.0f} "
+              f"| {cameras} |")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=["pack", "train", "table"])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--captures", default=os.path.join(os.environ.get("CNERF_DATA", ""), "scenes"))
+    parser.add_argument("--check", default=str(ROOT / "build/release/tests/cuda/cnerf-cuda-check"))
+    parser.add_argument("--part", default="1/1")
+    parser.add_argument("--only", nargs="*")
+    options = parser.parse_args()
+    {"pack": pack, "train": train, "table": table}[options.what](options)
+
+
+main()
