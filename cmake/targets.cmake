@@ -69,6 +69,15 @@ function(cnerf_add_plugin name)
   install(TARGETS ${name} LIBRARY DESTINATION lib/cnerf)
 endfunction()
 
+# cnerf_time_limit(VARIABLE SECONDS)
+# How long a test may take: sanitizers make it many times as slow.
+function(cnerf_time_limit variable seconds)
+  if(CNERF_SANITIZE)
+    math(EXPR seconds "4 * ${seconds}")
+  endif()
+  set(${variable} ${seconds} PARENT_SCOPE)
+endfunction()
+
 # cnerf_add_test(NAME SOURCES … LINK … [LABELS …] [TIMEOUT seconds] [COST seconds])
 # One executable of GoogleTest cases; every suite of it is a CTest test of its own, NAME.SUITE. A suite that CTest would
 # not run fails the others: tests/support/gtest_main.cpp knows the list.
@@ -77,9 +86,7 @@ function(cnerf_add_test name)
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 900)
   endif()
-  if(CNERF_SANITIZE)  # many times as slow
-    math(EXPR arg_TIMEOUT "4 * ${arg_TIMEOUT}")
-  endif()
+  cnerf_time_limit(arg_TIMEOUT ${arg_TIMEOUT})
   if(NOT arg_LABELS)
     set(arg_LABELS unit)
   endif()

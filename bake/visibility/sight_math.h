@@ -61,6 +61,7 @@ namespace sight {
 inline constexpr float kSeenTransmittance = 1e-3f;  ///< below which a camera does not see a point
 inline constexpr float kGoodTransmittance = 0.5f;   ///< a view with less is replaced when a better one is found
 inline constexpr int kTriesPerView = 3;  ///< cameras tried for each view wanted, once there are enough dim ones
+inline constexpr int kTriesInVain = 16;  ///< cameras tried before a point that none of them sees is given up
 
 /// Steps until the ray leaves the cube that starts at `low`, at least one. Rays stay on the lattice of whole steps, so
 /// that skipping changes nothing.
@@ -169,8 +170,11 @@ CNERF_HD int find_seeing(const SightScene<Grid>& scene, int own, Vec3d world, co
   for (int turn = 0; turn < scene.eye_count; ++turn) {
     const Eye& eye = scene.eyes[order[turn]];
     if (!has_in_picture(eye, world)) continue;
-    // Matter just below a surface is seen dimly by many: the cameras tried so far surround it already.
-    if (++tried > sight::kTriesPerView * scene.views && count == scene.views) break;
+    // The cameras tried so far surround the point already. Just below a surface matter is seen dimly by many, deeper
+    // inside by none.
+    ++tried;
+    if (count == scene.views && tried > sight::kTriesPerView * scene.views) break;
+    if (count == 0 && tried > sight::kTriesInVain) break;
     const float transmittance = transmittance_to(scene, own, eye, world, least);
     if (transmittance < least) continue;
     int place = count;  // behind all that are as good

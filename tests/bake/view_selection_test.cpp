@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "src/base/rng.h"
 #include "tests/bake/analytic_field.h"
 
@@ -176,6 +178,25 @@ TEST(ViewSelection, KeepsTheBestOfMoreThanItWants) {
   EXPECT_GT(of_all.front().transmittance, 2 * of_all.back().transmittance) << "the fog is no test";
   EXPECT_EQ(of_best[1].camera, of_all[1].camera) << "found after dimmer ones, and before them in the answer";
   EXPECT_EQ(of_best[0].camera, of_all[0].camera);
+}
+
+TEST(ViewSelection, GivesUpAPointThatSixteenDoNotSee) {
+  Ring r = ring();
+  const Camera seeing = r.cameras[4], blind = r.cameras[0];
+  r.cameras.assign(20, blind);
+  r.cameras[7] = seeing;
+  const BrickGrid<float> sigma = wall(8, 50);
+  const ViewSelection views = onlookers(r, sigma, 3);
+  const Vec3d at{32.5, 32.5, 32.5};  // the wall's face towards -x
+  std::vector<std::int32_t> order(20);
+  std::iota(order.begin(), order.end(), 0);
+  const auto seen_from = [&](std::size_t place) {
+    std::vector<std::int32_t> tried = order;
+    std::swap(tried[7], tried[place]);
+    return views.seen_by(0, at, tried).size();
+  };
+  EXPECT_EQ(seen_from(15), 1u);
+  EXPECT_EQ(seen_from(16), 0u);
 }
 
 TEST(ViewSelection, ManyPointsAreAnsweredLikeOneByOne) {

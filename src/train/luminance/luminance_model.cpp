@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/base/json_record.h"
 #include "src/train/luminance/exclusion.h"
 #include "src/train/luminance/options_json.h"
 #include "src/train/luminance/placement.h"
@@ -97,6 +98,19 @@ DirectionMap stored_sky(const Snapshot& snapshot) {
   return {width, width / 2, {stored_piece<float>(snapshot, kSky, width * (width / 2))}};
 }
 
+/// Earlier versions kept none.
+TrainingPace stored_pace(const Snapshot& snapshot, const Stage1Options& options) {
+  PaceState state;
+  if (snapshot.header().contains("pace")) {
+    const nlohmann::ordered_json json = snapshot.header().at("pace");
+    state = record_of<PaceState, SnapshotError>(json, snapshot.file().string() + ": header: pace");
+    if (state.falls_from < 0 || state.falls_from > options.steps) {
+      throw SnapshotError(snapshot.file().string() + ": header: pace.falls_from: expected one of the steps");
+    }
+  }
+  return {options.steps, options.least_gain, std::move(state)};
+}
+
 /// Of what decides how much memory an engine takes, and of what it divides by.
 void check_stored(const Snapshot& snapshot, const LuminanceModel& model) {
   constexpr int kMostCascades = 8, kBlock = 16, kMostResolution = 1 << 10, kMostSamples = 1 << 24, kMostSteps = 1 << 16;
@@ -160,6 +174,7 @@ LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Option
   if (options.exposures || options.poses || options.lenses) {
     model.learned_views = int(std::ranges::count_if(capture.views, [](const View& view) { return !view.held_out; }));
   }
+  model.pace = TrainingPace(options.steps, options.least_gain);
   model.kernels = kernels_of(engines);
   model.engine = make_engine(model, engines);
   exclude_empty(capture, model.frame, free_space, *model.engine);
@@ -204,6 +219,7 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   model.max_luminance = header_field<float>(snapshot, "max_luminance");
   model.seconds = load_times(file)["seconds"];
   model.trained_samples = header_field<double>(snapshot, "trained_samples");
+  model.pace = stored_pace(snapshot, model.options);
   model.learned_views = learned_count(snapshot, "learned_views");
   model.learned_lenses = learned_count(snapshot, "learned_lenses");
   check_stored(snapshot, model);
@@ -231,6 +247,7 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
                  {"learned_views", learned_views},
                  {"learned_lenses", learned_lenses},
                  {"trained_samples", trained_samples},
+                 {"pace", json_of(pace.state())},
                  {"sky_width", sky.width},
                  {"step", engine->step_count()}},
                 pieces);

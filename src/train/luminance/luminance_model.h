@@ -12,6 +12,7 @@
 #include "src/train/luminance/seen_scene.h"
 #include "src/train/luminance/snapshot.h"
 #include "src/train/luminance/stage1_options.h"
+#include "src/train/luminance/training_pace.h"
 
 namespace cnerf {
 
@@ -30,6 +31,7 @@ struct LuminanceModel {
   int learned_lenses = 0;      ///< lenses that are learned
   double seconds = 0;          ///< training time so far
   double trained_samples = 0;  ///< so far
+  TrainingPace pace;
   std::string kernels;         ///< that its engine computes with, see kernels_of
   std::string kernels_before;  ///< of the snapshot it was read from; empty where that does not say
   std::unique_ptr<LuminanceEngine> engine;

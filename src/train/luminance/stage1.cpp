@@ -21,7 +21,7 @@ namespace {
 /// Options that may differ between a run and its continuation: they say how long, not what.
 nlohmann::json comparable(const Stage1Options& options) {
   nlohmann::json json = options_to_json(options);
-  for (const char* duration : {"max_seconds", "checkpoint_every"}) json.erase(duration);
+  for (const char* duration : {"max_seconds", "least_gain", "checkpoint_every"}) json.erase(duration);
   return json;
 }
 
@@ -106,6 +106,7 @@ LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines, con
   LuminanceModel model = LuminanceModel::load(job.snapshot, engines);
   refuse_others(job.snapshot, model.options, job.options);
   model.options = job.options;
+  model.pace = TrainingPace(job.options.steps, job.options.least_gain, model.pace.state());
   return model;
 }
 
@@ -168,9 +169,17 @@ class AgreedTime {
   long next_question_ = 0;  // the step
 };
 
+/// Ranks decide by the mean of what they saw.
+void pace_after_step(LuminanceModel& model, const StepReport& step, cluster::Ranks& ranks) {
+  model.pace.after_step(model.engine->step_count(), step.squared_error, [&](double own) {
+    ranks.sum(std::span<double>(&own, 1));
+    return own / ranks.size();
+  });
+}
+
 /// Done so far, of the steps or of the time, whichever is nearer to its end.
 double fraction_done(const LuminanceModel& model, const Stage1Options& options) {
-  const double of_steps = double(model.engine->step_count()) / options.steps;
+  const double of_steps = double(model.engine->step_count()) / double(model.pace.steps());
   return options.max_seconds > 0 ? std::max(of_steps, model.seconds / options.max_seconds) : of_steps;
 }
 
@@ -202,7 +211,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   const DrawPreview preview = [&](std::size_t index) { return preview_of(model, *shown[index % shown.size()]); };
   double rays = 0;
   RunningPsnr psnr;
-  while (model.engine->step_count() < options.steps) {
+  while (model.engine->step_count() < model.pace.steps()) {
     if (options.max_seconds > 0 && model.seconds >= options.max_seconds) break;
     const double fraction = fraction_done(model, options);
     const StepReport step =
@@ -215,16 +224,16 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
       stop_diverged(job.capture, model.engine->step_count(), step.loss);
     }
     clock.pause_for([&] {
-      observer.report_progress({"stage 1",
-                                fraction,
-                                {{"psnr", psnr.value()},
-                                 {"loss", step.loss},
-                                 {"rays/s", rays / clock.seconds()},
-                                 {"samples", model.trained_samples}}});
+      const double samples = model.trained_samples, rays_per_second = rays / clock.seconds();
+      observer.report_progress(
+          {"stage 1",
+           fraction,
+           {{"psnr", psnr.value()}, {"loss", step.loss}, {"rays/s", rays_per_second}, {"samples", samples}}});
       observer.offer_preview(preview);
       if (job.watch) job.watch(model);
     });
 
+    pace_after_step(model, step, job.ranks);
     agreed.after_step(model, job, {seconds, observer.is_cancelled()});
     if (options.checkpoint_every > 0 && model.engine->step_count() % options.checkpoint_every == 0) {
       save_snapshot_of(model, job);

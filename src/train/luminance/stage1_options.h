@@ -24,6 +24,7 @@ struct PlacementOptions {
 struct Stage1Options {
   int steps = 5000;
   double max_seconds = 0;
+  double least_gain = 0.5;
   int samples_per_step = 65536;
   double learning_rate = 1e-2, final_learning_rate = 5e-4;
   double distortion_weight = 3e-4;
@@ -43,6 +44,9 @@ struct Stage1Options {
   void visit(Visitor&& v) {
     v("steps", steps, Range{1, 1e8}, "optimiser steps");
     v("max_seconds", max_seconds, Range{0, 1e9}, "stop after this much training time; 0 = no limit");
+    v("least_gain", least_gain, Range{0, 10},
+      "dB that a tenth of the steps has to bring on pixels not yet learned from; else the rest is cut short; 0 = "
+      "never");
     v("samples_per_step", samples_per_step, Range{1024, 1 << 24},
       "trained samples a step aims at; its number of rays follows from it");
     v("learning_rate", learning_rate, Range{1e-8, 1}, "Adam's step size at the start");
