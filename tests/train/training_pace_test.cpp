@@ -2,11 +2,13 @@
 
 #include "src/train/luminance/training_pace.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/engine/engines.h"
+#include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/stage1.h"
 #include "tests/support/data.h"
 #include "tests/support/toy_capture.h"
@@ -114,6 +116,24 @@ TEST(TrainingPace, ATrainingCutShortGoesOnBitForBit) {
   EXPECT_THROW(train("parts.snapshot", whole.steps - 20, true), Interrupted);
   EXPECT_EQ(train("parts.snapshot", 0, true).steps, whole.steps);
   EXPECT_EQ(sha256_of_file(folder / "parts.snapshot"), sha256_of_file(folder / "whole.snapshot"));
+}
+
+TEST(TrainingPace, AForgedOneIsRefusedByName) {
+  const test::TempDir folder;
+  const Capture capture = test::toy_capture();
+  const Stage1Options options = test::few_steps(1000);
+  LuminanceModel model = LuminanceModel::create(capture, options, cpu_engines());
+  PaceState beyond;
+  beyond.falls_from = options.steps + 1;
+  model.pace = TrainingPace(options.steps, options.least_gain, beyond);
+  model.save(folder / "forged.snapshot");
+  try {
+    (void)LuminanceModel::load(folder / "forged.snapshot", cpu_engines());
+    FAIL() << "taken";
+  } catch (const SnapshotError& error) {
+    EXPECT_THAT(error.what(),
+                testing::AllOf(testing::HasSubstr("forged.snapshot"), testing::HasSubstr("pace.falls_from")));
+  }
 }
 
 }  // namespace
