@@ -5,9 +5,10 @@
     scripts/real_captures.py train OUT [--part I/N] [--check CNERF-CUDA-CHECK] [--only ROW...]
     scripts/real_captures.py table OUT
 
-FOLDER has flower, fox, fruit, lego and robovision; it is $CNERF_DATA/scenes if not given. `train` needs the packed
-captures and cnerf-cuda-check alone, so that it runs where nothing else is installed; parts run side by side, each on
-a GPU of its own. What is there already stays. `table` prints medians over seeds of the mean and of the worst view.
+FOLDER has flower, fox, fruit, lego and robovision. If not given, it is scenes in $CNERF_DATA, else in ../shared/data.
+`train` needs the packed captures and cnerf-cuda-check alone, so that it runs where nothing else is installed; parts run
+side by side, each on a GPU of its own. What is there already stays. `table` prints medians over seeds of the mean and
+of the worst view.
 """
 import argparse
 import os
@@ -23,7 +24,7 @@ BASE = "log2_rows=17 cone=128 distortion=1e-4 table_decay=0.1 marks=0 views=1 al
 LEARN = {"nothing": "", "default": "depth=0.01 exposures=1", "poses": "depth=0.01 exposures=1 poses=1",
          "all": "depth=0.01 exposures=1 poses=1 lenses=1"}
 
-# Packed capture: folder of it, options of pack_capture, options of `cnerf sample` or None where it is brought.
+# Packed capture: its folder, or the command that makes it; options of pack_capture.
 PACKED = {
     "flower": ("flower", "downscale=8 points=1"),
     "fox": ("fox", "downscale=2 points=1"),
@@ -143,7 +144,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=["pack", "train", "table"])
     parser.add_argument("out", type=Path)
-    parser.add_argument("--captures", default=os.path.join(os.environ.get("CNERF_DATA", ""), "scenes"))
+    data = os.environ.get("CNERF_DATA", ROOT.parent / "shared/data")
+    parser.add_argument("--captures", default=os.path.join(data, "scenes"))
     parser.add_argument("--check", default=str(ROOT / "build/release/tests/cuda/cnerf-cuda-check"))
     parser.add_argument("--part", default="1/1")
     parser.add_argument("--only", nargs="*")

@@ -26,6 +26,7 @@ struct Sight {
   Vec3d world{};            ///< world units
   float least = 0;          ///< transmittance below which a camera does not count, if above kSeenTransmittance
   std::uint32_t order = 0;  ///< which order of cameras is tried
+  int most_in_vain = std::numeric_limits<int>::max();  ///< cameras tried before it is given up, where none sees it
 };
 
 /// A camera and how much of a point's light reaches it.
@@ -61,7 +62,7 @@ namespace sight {
 inline constexpr float kSeenTransmittance = 1e-3f;  ///< below which a camera does not see a point
 inline constexpr float kGoodTransmittance = 0.5f;   ///< a view with less is replaced when a better one is found
 inline constexpr int kTriesPerView = 3;  ///< cameras tried for each view wanted, once there are enough dim ones
-inline constexpr int kTriesInVain = 16;  ///< cameras tried before a point that none of them sees is given up
+inline constexpr int kMostInVain = 16;   ///< for voxels, nearly all of which lie within something
 
 /// Steps until the ray leaves the cube that starts at `low`, at least one. Rays stay on the lattice of whole steps, so
 /// that skipping changes nothing.
@@ -160,22 +161,21 @@ template <typename Grid>
 
 /// At most `scene.views` cameras that have the point in their picture and see it, best first.
 /// @param order  [scene.eye_count] cameras as they are worth trying
-/// @param least  transmittance below which a camera does not count, if above kSeenTransmittance
 /// @param seen   [scene.views] the answer.  @return how many there are.
 template <typename Grid>
-CNERF_HD int find_seeing(const SightScene<Grid>& scene, int own, Vec3d world, const std::int32_t* order, float least,
+CNERF_HD int find_seeing(const SightScene<Grid>& scene, int own, const Sight& point, const std::int32_t* order,
                          SeenBy* seen) {
-  if (least < sight::kSeenTransmittance) least = sight::kSeenTransmittance;
+  const float least = point.least < sight::kSeenTransmittance ? sight::kSeenTransmittance : point.least;
   int count = 0, good = 0, tried = 0;
   for (int turn = 0; turn < scene.eye_count; ++turn) {
     const Eye& eye = scene.eyes[order[turn]];
-    if (!has_in_picture(eye, world)) continue;
+    if (!has_in_picture(eye, point.world)) continue;
     // The cameras tried so far surround the point already. Just below a surface matter is seen dimly by many, deeper
     // inside by none.
     ++tried;
     if (count == scene.views && tried > sight::kTriesPerView * scene.views) break;
-    if (count == 0 && tried > sight::kTriesInVain) break;
-    const float transmittance = transmittance_to(scene, own, eye, world, least);
+    if (count == 0 && tried > point.most_in_vain) break;
+    const float transmittance = transmittance_to(scene, own, eye, point.world, least);
     if (transmittance < least) continue;
     int place = count;  // behind all that are as good
     while (place > 0 && seen[place - 1].transmittance < transmittance) --place;

@@ -79,7 +79,7 @@ SightScene<ClearGrid> ViewSelection::clear_scene() const {
 std::vector<SeenBy> ViewSelection::seen_by(std::size_t level, Vec3d world, std::span<const std::int32_t> order,
                                            float least) const {
   std::vector<SeenBy> seen(views_per_voxel_);
-  seen.resize(find_seeing(clear_scene(), int(level), world, order.data(), least, seen.data()));
+  seen.resize(find_seeing(clear_scene(), int(level), {world, least}, order.data(), seen.data()));
   return seen;
 }
 
@@ -90,8 +90,8 @@ void ViewSelection::find(std::size_t level, const SightBatch& batch, SeenBatch& 
   parallel_ranges(batch.sights.size(), kSightsAtATime, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Sight& sight = batch.sights[i];
-      answer.counts[i] = find_seeing(all, int(level), sight.world, batch.orders.data() + sight.order * eyes_.size(),
-                                     sight.least, answer.seen.data() + i * views_per_voxel_);
+      answer.counts[i] = find_seeing(all, int(level), sight, batch.orders.data() + sight.order * eyes_.size(),
+                                     answer.seen.data() + i * views_per_voxel_);
     }
   });
 }

@@ -156,7 +156,7 @@ Candidates RadiancePass::candidates_of(std::span<const DenseVoxel> brick, int pl
     const Vec3d world = plan.world_from_voxel(at.cast<double>() + voxel.centroid_in_voxel());
     candidates.voxels.push_back(at);
     candidates.sigma.push_back(voxel.sigma);
-    candidates.sights.push_back({world, keep_unseen_ ? 0 : least});
+    candidates.sights.push_back({world, keep_unseen_ ? 0 : least, 0, sight::kMostInVain});
   }
   return candidates;
 }

@@ -180,23 +180,26 @@ TEST(ViewSelection, KeepsTheBestOfMoreThanItWants) {
   EXPECT_EQ(of_best[0].camera, of_all[0].camera);
 }
 
-TEST(ViewSelection, GivesUpAPointThatSixteenDoNotSee) {
+TEST(ViewSelection, GivesUpAPointThatTooManyDoNotSee) {
   Ring r = ring();
   const Camera seeing = r.cameras[4], blind = r.cameras[0];
   r.cameras.assign(20, blind);
   r.cameras[7] = seeing;
   const BrickGrid<float> sigma = wall(8, 50);
   const ViewSelection views = onlookers(r, sigma, 3);
-  const Vec3d at{32.5, 32.5, 32.5};  // the wall's face towards -x
-  std::vector<std::int32_t> order(20);
-  std::iota(order.begin(), order.end(), 0);
-  const auto seen_from = [&](std::size_t place) {
-    std::vector<std::int32_t> tried = order;
-    std::swap(tried[7], tried[place]);
-    return views.seen_by(0, at, tried).size();
+  const auto seen_from = [&](std::size_t place, int most_in_vain) {
+    SightBatch batch;
+    batch.sights.push_back({{32.5, 32.5, 32.5}, 0, 0, most_in_vain});  // the wall's face towards -x
+    batch.orders.resize(20);
+    std::iota(batch.orders.begin(), batch.orders.end(), 0);
+    std::swap(batch.orders[7], batch.orders[place]);
+    SeenBatch answer;
+    views.find(0, batch, answer);
+    return answer.counts[0];
   };
-  EXPECT_EQ(seen_from(15), 1u);
-  EXPECT_EQ(seen_from(16), 0u);
+  EXPECT_EQ(seen_from(15, 16), 1);
+  EXPECT_EQ(seen_from(16, 16), 0);
+  EXPECT_EQ(seen_from(19, Sight().most_in_vain), 1);
 }
 
 TEST(ViewSelection, ManyPointsAreAnsweredLikeOneByOne) {

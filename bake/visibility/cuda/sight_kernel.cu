@@ -11,9 +11,8 @@ __global__ void find_seeing_kernel(SightJob job) {
   const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
   if (i >= job.count) return;
   const Sight sight = job.sights[i];
-  job.counts[i] =
-      find_seeing(job.scene, job.level, sight.world, job.orders + std::size_t(sight.order) * job.scene.eye_count,
-                  sight.least, job.seen + std::size_t(i) * job.scene.views);
+  job.counts[i] = find_seeing(job.scene, job.level, sight, job.orders + std::size_t(sight.order) * job.scene.eye_count,
+                              job.seen + std::size_t(i) * job.scene.views);
 }
 
 }  // namespace
