@@ -63,8 +63,8 @@ def rows():
         row("flower-few", 5, learn)
         for seconds in (10, 30):
             row("flower-prepared", seconds, learn)
-    row("fox", 10, "default", "gain=0.3", "fox, light of views +-30 %")
-    row("fox", 10, "nothing", "gain=0.3", "fox, light of views +-30 %")
+    row("fox", 10, "default", "gain=0.3", "fox, light of views ±30 %")
+    row("fox", 10, "nothing", "gain=0.3", "fox, light of views ±30 %")
     for capture in ("fox", "lego"):
         for learn in ("default", "poses"):
             row(capture, 10, learn, "degrees=0.5 shift=0.005", f"{capture}, poses disturbed")
@@ -124,7 +124,7 @@ MEANS = re.compile(rf"mean / worst: as given {NUMBER} / {NUMBER} dB, exposure fi
 def table(options):
     print("| capture, training | as given | exposure fitted | aligned | near opacity | steps/s | cameras |\n"
           "|---|---|---|---|---|---|---|")
-    for name in rows():
+    for name in sorted(rows(), key=lambda name: re.split("[ ,]", name)[0]):
         file = file_of(options.out, name)
         if not file.exists():
             continue
@@ -135,8 +135,8 @@ def table(options):
         spread = max(seed[2] for seed in seeds) - min(seed[2] for seed in seeds)
         speed = statistics.median(float(found) for found in re.findall(r"\| ([0-9]+) steps/s", text))
         angles = [float(found) for found in re.findall(r"([0-9.]+) learned", text)]
-        cameras = f"{statistics.median(angles):.3f} degrees" if angles else ""
-        print(f"| {name} | {cells[0]} | {cells[1]} (+-{spread / 2:.2f}) | {cells[2]} | {columns[6]:.3f} | {speed:.0f} "
+        cameras = f"{statistics.median(angles):.3f} degrees" if any(angles) else ""
+        print(f"| {name} | {cells[0]} | {cells[1]} (±{spread / 2:.2f}) | {cells[2]} | {columns[6]:.3f} | {speed:.0f} "
               f"| {cameras} |")
 
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -55,6 +56,20 @@ TEST(SharedStage1, EqualNumbersOfRanksGiveEqualBits) {
   const test::TempDir folder;
   EXPECT_EQ(trained_by(2, folder / "a"), trained_by(2, folder / "b"));
   EXPECT_EQ(trained_by(3, folder / "c"), trained_by(3, folder / "d"));
+}
+
+TEST(SharedStage1, AllRanksEndAtTheStepThatTheyAgreeOn) {
+  const test::TempDir folder;
+  const Capture capture = test::toy_capture();
+  Stage1Options options = few_steps();
+  options.steps = 1000;
+  options.least_gain = 10;  // which no training brings for long
+  std::array<int, 2> steps{};
+  on_ranks(2, [&](cluster::Ranks& ranks) {
+    steps[std::size_t(ranks.rank())] = train(capture, folder / "stage1.snapshot", ranks, options).steps;
+  });
+  EXPECT_LT(steps[0], options.steps);
+  EXPECT_EQ(steps[0], steps[1]);
 }
 
 /// Every rank has the whole field: no rank's state differs, though one alone writes.

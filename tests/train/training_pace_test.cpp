@@ -78,6 +78,15 @@ TEST(TrainingPace, GoesOnFromItsStateAsIfItHadNotStopped) {
   EXPECT_EQ(second.state().windows, whole.state().windows);
 }
 
+/// As a snapshot of an earlier version, which kept nothing of it.
+TEST(TrainingPace, BegunWithinAWindowItCountsWhatItSaw) {
+  TrainingPace pace(1000, 0.1);
+  for (long step = 41; step <= 150; ++step) pace.after_step(step, 1e-2 * std::pow(10, -0.02 * double(step) / 50), same);
+  ASSERT_EQ(pace.state().windows.size(), 3u);
+  EXPECT_NEAR(pace.state().windows.front(), 1e-2 * std::pow(10, -0.02 * 45.5 / 50), 1e-5);
+  EXPECT_EQ(pace.steps(), 1000) << "0.2 dB per window are gained";
+}
+
 TEST(TrainingPace, RanksDecideByTheirMean) {
   TrainingPace pace(1000, 0.1);
   int asked = 0;

@@ -13,12 +13,14 @@ struct PaceState {
   long falls_from = 0;          ///< the step from which the rate falls early; 0: it does not
   std::vector<double> windows;  ///< mean squared error of each that is over
   double sum = 0;               ///< of the errors since
+  long count = 0;               ///< of steps since
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
     v("falls_from", self.falls_from);
     v("windows", self.windows);
     v("sum", self.sum);
+    v("count", self.count);
   }
 };
 
@@ -48,9 +50,11 @@ class TrainingPace {
   void after_step(long step, double squared_error, const std::function<double(double)>& mean) {
     if (least_gain_ <= 0 || most_ < kFewest || state_.falls_from > 0 || 2 * step >= most_) return;
     state_.sum += squared_error;
+    ++state_.count;
     if (step % window_ != 0) return;
-    state_.windows.push_back(mean(state_.sum / double(window_)));
+    state_.windows.push_back(mean(state_.sum / double(state_.count)));
     state_.sum = 0;
+    state_.count = 0;
     const std::size_t n = state_.windows.size();
     if (n < 3) return;
     const double gain = 10 * std::log10(state_.windows[n - 3] / std::max(state_.windows[n - 1], 1e-12));
