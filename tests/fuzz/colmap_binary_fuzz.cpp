@@ -9,7 +9,7 @@
 CNERF_FUZZ_TARGET(colmap_binary) {
   using namespace cnerf::fuzz;
   std::uint16_t sizes[2] = {};
-  std::memcpy(sizes, input.data(), std::min(input.size(), sizeof sizes));
+  if (!input.empty()) std::memcpy(sizes, input.data(), std::min(input.size(), sizeof sizes));
   Bytes rest = input.subspan(std::min(input.size(), sizeof sizes));
   const char* names[] = {"binary/cameras.bin", "binary/images.bin", "binary/points3D.bin"};
   for (int i = 0; i < 3; ++i) {

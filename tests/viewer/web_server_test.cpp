@@ -427,37 +427,54 @@ TEST(WebServer, SlowClientsKeepNobodyOut) {
   EXPECT_LT(seconds_of([&] { server.stop(); }), 2);
 }
 
-TEST(Connections, WhoseWordLiesThereUnreadStays) {
+/// A client's end and the server's.
+struct Pair {
+  std::array<int, 2> ends{};
+  Pair() { ::socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()); }
+  ~Pair() { std::ranges::for_each(ends, ::close); }
+  [[nodiscard]] bool say() const { return ::send(ends[1], "G", 1, 0) == 1; }
+  [[nodiscard]] bool is_dropped() const {
+    char byte;
+    return ::recv(ends[1], &byte, 1, MSG_DONTWAIT) == 0;
+  }
+};
+
+ConnectionLimits two_of_an_address() {
   ConnectionLimits limits;
   limits.connections_of_address = 2;
-  Connections all(limits);
-  struct Pair {
-    std::array<int, 2> ends{};
-    Pair() { ::socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()); }
-    ~Pair() { std::ranges::for_each(ends, ::close); }
-  };
+  return limits;
+}
+
+TEST(Connections, WhoseWordLiesThereUnreadStays) {
+  Connections all(two_of_an_address());
   const std::array<Pair, 3> pairs;
-  const auto is_dropped = [&](std::size_t i) {
-    char byte;
-    return ::recv(pairs[i].ends[1], &byte, 1, MSG_DONTWAIT) == 0;
-  };
   const auto begin = Connections::Clock::now();
   std::vector<Connections::Handle> handles;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    all.expect();
-    handles.push_back(all.add(pairs[i].ends[0], "somebody"));
-  }
+  for (const Pair& pair : pairs) handles.push_back(all.add(pair.ends[0], "somebody", all.expect()));
   all.set_waiting(handles[0], Connections::Wait{begin, POLLIN});  // the thread of the other has not begun
-  ASSERT_EQ(::send(pairs[0].ends[1], "G", 1, 0), 1);
+  ASSERT_TRUE(pairs[0].say());
   EXPECT_TRUE(all.admit(handles[2]));
-  EXPECT_FALSE(is_dropped(0));
-  EXPECT_TRUE(is_dropped(1));
+  EXPECT_FALSE(pairs[0].is_dropped());
+  EXPECT_TRUE(pairs[1].is_dropped());
 
-  ASSERT_EQ(::send(pairs[2].ends[1], "G", 1, 0), 1);
-  all.expect();
-  EXPECT_TRUE(all.admit(all.add(-1, "somebody"))) << "where all have said something, the first one goes";
-  EXPECT_TRUE(is_dropped(0));
-  EXPECT_FALSE(is_dropped(2));
+  ASSERT_TRUE(pairs[2].say());
+  EXPECT_TRUE(all.admit(all.add(-1, "somebody", all.expect()))) << "where all have said something, the first one goes";
+  EXPECT_TRUE(pairs[0].is_dropped());
+  EXPECT_FALSE(pairs[2].is_dropped());
+}
+
+TEST(Connections, WhoSaidSomethingDoesNotGoForOneThatCameBefore) {
+  Connections all(two_of_an_address());
+  const std::array<Pair, 3> pairs;
+  std::array<Connections::Clock::time_point, 3> arrivals;
+  for (auto& arrival : arrivals) arrival = all.expect();
+  for (const int i : {1, 2}) {  // their threads began first
+    (void)all.add(pairs[i].ends[0], "somebody", arrivals[i]);
+    ASSERT_TRUE(pairs[i].say());
+  }
+  EXPECT_FALSE(all.admit(all.add(pairs[0].ends[0], "somebody", arrivals[0])));
+  EXPECT_FALSE(pairs[1].is_dropped());
+  EXPECT_FALSE(pairs[2].is_dropped());
 }
 
 TEST(WebServer, TabsThatFollowKeepNobodyOut) {

@@ -18,6 +18,9 @@ namespace {
 
 using Clock = Connections::Clock;
 
+/// When the connection of this thread was accepted.
+thread_local Clock::time_point arrival;
+
 /// Whether a task was taken, or nothing in earlier versions of the library.
 using Accepted = decltype(std::declval<httplib::TaskQueue&>().enqueue({}));
 
@@ -26,8 +29,10 @@ class Workers final : public httplib::TaskQueue {
  public:
   Workers(Connections& connections, int threads) : connections_(connections), pool_(std::size_t(threads)) {}
   Accepted enqueue(std::function<void()> work) override {
-    connections_.expect();
-    return pool_.enqueue(std::move(work));
+    return pool_.enqueue([arrived = connections_.expect(), work = std::move(work)] {
+      arrival = arrived;
+      work();
+    });
   }
   void shutdown() override { pool_.shutdown(); }
 
@@ -64,12 +69,13 @@ thread_local bool is_last_answer = false;
 // ---- which connections there are ----------------------------------------------------------------------------------
 
 template <typename Belongs>
-bool Connections::drop_slowest(const Belongs& belongs) {
+bool Connections::drop_slowest(Clock::time_point arrival_of_next, const Belongs& belongs) {
   Entry* slowest = nullptr;
   std::pair<bool, Clock::time_point> rank_of_slowest;
   for (Entry& entry : entries_) {
     if (entry.is_leaving || !entry.waiting || !belongs(entry)) continue;
     const std::pair rank(has_come(entry.socket, *entry.waiting), entry.waiting->since);
+    if (rank.first && rank.second >= arrival_of_next) continue;  // it is our threads that are late
     if (slowest != nullptr && rank_of_slowest <= rank) continue;
     slowest = &entry;
     rank_of_slowest = rank;
@@ -80,17 +86,19 @@ bool Connections::drop_slowest(const Belongs& belongs) {
   return true;
 }
 
-void Connections::expect() {
+Clock::time_point Connections::expect() {
   const std::lock_guard guard(mutex_);
+  const auto now = Clock::now();
   ++expected_;
   const auto staying = std::ranges::count(entries_, false, &Entry::is_leaving);
-  if (staying + expected_ > limits_.connections) (void)drop_slowest([](const Entry&) { return true; });
+  if (staying + expected_ > limits_.connections) (void)drop_slowest(now, [](const Entry&) { return true; });
+  return now;
 }
 
-Connections::Handle Connections::add(socket_t socket, std::string address) {
+Connections::Handle Connections::add(socket_t socket, std::string address, Clock::time_point arrived) {
   const std::lock_guard guard(mutex_);
   --expected_;
-  return entries_.insert(entries_.end(), {socket, std::move(address), Wait{Clock::now(), POLLIN}});
+  return entries_.insert(entries_.end(), {socket, std::move(address), arrived, Wait{arrived, POLLIN}});
 }
 
 bool Connections::admit(Handle handle) {
@@ -98,7 +106,7 @@ bool Connections::admit(Handle handle) {
   const auto is_neighbour = [&](const Entry& entry) { return entry.address == handle->address && &entry != &*handle; };
   const auto neighbours =
       std::ranges::count_if(entries_, [&](const Entry& e) { return is_neighbour(e) && !e.is_leaving; });
-  return neighbours < limits_.connections_of_address || drop_slowest(is_neighbour);
+  return neighbours < limits_.connections_of_address || drop_slowest(handle->arrived, is_neighbour);
 }
 
 void Connections::remove(Handle handle) {
@@ -115,7 +123,7 @@ void Connections::set_waiting(Handle handle, std::optional<Wait> waiting) {
 void Connections::end() {
   const std::lock_guard guard(mutex_);
   has_ended_ = true;
-  while (drop_slowest([](const Entry&) { return true; })) {
+  while (drop_slowest(Clock::time_point::max(), [](const Entry&) { return true; })) {
   }
 }
 
@@ -125,7 +133,11 @@ void Connections::end() {
 class HttpServer::Connection final : public httplib::Stream {
  public:
   Connection(socket_t socket, Connections& all, const ConnectionLimits& limits)
-      : socket_(socket), all_(all), limits_(limits), peer_(peer_of(socket)), handle_(all.add(socket, peer_.first)) {}
+      : socket_(socket),
+        all_(all),
+        limits_(limits),
+        peer_(peer_of(socket)),
+        handle_(all.add(socket, peer_.first, arrival)) {}
   ~Connection() override {
     all_.remove(handle_);  // first: the number may be another connection's once it is closed
     ::shutdown(socket_, SHUT_RDWR);

@@ -23,7 +23,7 @@ struct ConnectionLimits {
 };
 
 /// The open connections. When there are too many, the one goes whose client keeps us waiting longest: slow ones cannot
-/// keep others out. Those whose word lies there unread go last.
+/// keep others out. Those whose word lies there unread go last, and only for one that came after it.
 class Connections {
  public:
   using Clock = std::chrono::steady_clock;
@@ -35,6 +35,7 @@ class Connections {
   struct Entry {
     socket_t socket;
     std::string address;
+    Clock::time_point arrived;
     std::optional<Wait> waiting;
     bool is_leaving = false;
   };
@@ -43,11 +44,12 @@ class Connections {
   explicit Connections(const ConnectionLimits& limits) : limits_(limits) {}
 
   /// Of a connection that waits for a thread: makes one free if need be.
-  void expect();
+  /// @return  when it arrived, which is now
+  Clock::time_point expect();
   /// Of one that has got its thread.  @return  false where its address has too many, all of them at work
   bool admit(Handle handle);
   /// It is waited for at once: a busy machine's threads are slow to ask for its request.
-  Handle add(socket_t socket, std::string address);
+  Handle add(socket_t socket, std::string address, Clock::time_point arrived);
   void remove(Handle handle);
   void set_waiting(Handle handle, std::optional<Wait> waiting);
   /// No client is waited for any more.
@@ -55,7 +57,7 @@ class Connections {
 
  private:
   template <typename Belongs>
-  bool drop_slowest(const Belongs& belongs);
+  bool drop_slowest(Clock::time_point arrival_of_next, const Belongs& belongs);
 
   ConnectionLimits limits_;
   std::mutex mutex_;
