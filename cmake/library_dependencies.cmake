@@ -2,6 +2,10 @@
 find_package(Threads REQUIRED)
 find_package(TBB REQUIRED)
 find_package(OpenSSL REQUIRED COMPONENTS Crypto)
+find_package(Eigen3 REQUIRED)
+# Ceres as shared libraries, with what its headers log by: its package for CMake names the static one.
+find_library(CERES_LIBRARY ceres REQUIRED)
+find_library(GLOG_LIBRARY glog REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(fmt REQUIRED)
 find_package(spdlog REQUIRED)

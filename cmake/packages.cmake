@@ -61,7 +61,7 @@ set(CPACK_DEBIAN_DEV_PACKAGE_NAME libcnerf-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-    "cnerf (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}), libtbb-dev, libssl-dev, zlib1g-dev, libfmt-dev, libspdlog-dev, nlohmann-json3-dev, libtomlplusplus-dev, libcli11-dev, libpugixml-dev, libopencv-dev, libopenexr-dev, libmeshoptimizer-dev, libtinygltf-dev, libcpp-httplib-dev, libexif-dev, libboost-iostreams-dev, libopenvdb-dev, pkg-config")
+    "cnerf (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}), libtbb-dev, libceres-dev, libssl-dev, zlib1g-dev, libfmt-dev, libspdlog-dev, nlohmann-json3-dev, libtomlplusplus-dev, libcli11-dev, libpugixml-dev, libopencv-dev, libopenexr-dev, libmeshoptimizer-dev, libtinygltf-dev, libcpp-httplib-dev, libexif-dev, libboost-iostreams-dev, libopenvdb-dev, pkg-config")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "Library of cnerf\nStatic libraries, headers and the CMake package cnerf.")
 
 if(CNERF_PYTHON)

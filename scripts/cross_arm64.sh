@@ -9,7 +9,7 @@ cd "$(dirname "$0")/.."
 tools=(cmake ninja-build ccache pkg-config g++ crossbuild-essential-arm64 qemu-user gzip
   libcli11-dev nlohmann-json3-dev)
 libraries=(libopenvdb-dev libboost-iostreams-dev libnanovdb-dev libopencv-dev libopenexr-dev libtinygltf-dev
-  libmeshoptimizer-dev libexif-dev libpugixml-dev libtomlplusplus-dev libfmt-dev libspdlog-dev libtbb-dev libssl-dev
+  libmeshoptimizer-dev libceres-dev libexif-dev libpugixml-dev libtomlplusplus-dev libfmt-dev libspdlog-dev libtbb-dev libssl-dev
   zlib1g-dev libcpp-httplib-dev libgtest-dev libgmock-dev libbenchmark-dev)
 tests=(base_test color_test picture_test capture_test sample_test encoding_test optim_test field_test render_test engine_test
   cnerf-backend-ops bake_test export_test config_test viewer_test)

@@ -11,7 +11,7 @@ packages=(
   libopenblas0-pthread  # without it LibTorch falls back to the reference BLAS, which is many times slower
   libopenvdb-dev libboost-iostreams-dev libopenvdb-tools libnanovdb-dev
   libopencv-dev libopenexr-dev libtinygltf-dev libmeshoptimizer-dev
-  libexif-dev colmap
+  libexif-dev libceres-dev colmap
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libpugixml-dev libfmt-dev libspdlog-dev
   libtbb-dev libssl-dev zlib1g-dev libcpp-httplib-dev
   pybind11-dev python3-dev python3-numpy  # the Python module

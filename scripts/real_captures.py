@@ -24,8 +24,8 @@ BASE = "log2_rows=17 cone=128 distortion=1e-4 table_decay=0.1 marks=0 views=1 al
 LEARN = {"nothing": "", "default": "depth=0.01 exposures=1", "poses": "depth=0.01 exposures=1 poses=1",
          "all": "depth=0.01 exposures=1 poses=1 lenses=1"}
 
-# Packed capture: its folder, or the command that makes it; options of pack_capture.
-PACKED = {
+# Captures as they are packed: the folder, or the command that makes it; options of pack_capture.
+CAPTURES = {
     "flower": ("flower", "downscale=8 points=1"),
     "fox": ("fox", "downscale=2 points=1"),
     "fruit": ("fruit", "points=1"),
@@ -37,23 +37,25 @@ PACKED = {
     "shadow": ("sample --cloth --moving-shadow --exposures", "points=1"),
     "flower-prepared": ("prepare flower/images_4", "downscale=2 points=1"),
 }
+# Cameras that a training learns are adjusted to features first, which a packed capture holds.
+ADJUSTED = {"poses": " poses=1", "all": " poses=1 lenses=1"}
 
 
 def rows():
-    """Name of a row: packed capture, seconds, options."""
+    """Name of a row: capture, what makes its cameras worse, seconds, what is learned, options."""
     table = {}
 
-    def row(capture, seconds, learn, more="", name=None):
-        table[f"{name or capture} {seconds} s {learn}"] = (capture, seconds, f"{LEARN[learn]} {more}")
+    def row(capture, seconds, learn, more="", worse="", name=None):
+        table[f"{name or capture} {seconds} s {learn}"] = (capture, worse, seconds, learn, more)
 
     for seconds in (10, 5, 2, 1):
-        for learn in LEARN if seconds == 10 else ("nothing", "default", "poses"):
+        for learn in LEARN:
             row("flower", seconds, learn)
     for learn in LEARN:
         row("fox", 10, learn)
         row("fruit", 10, learn)
-    for learn in ("nothing", "default", "poses"):
         row("fruit", 30, learn)
+    for learn in ("nothing", "default", "poses"):
         row("lego", 10, learn)
         row("robovision", 5, learn)
     for learn in ("default", "poses"):
@@ -63,32 +65,46 @@ def rows():
         row("flower-few", 5, learn)
         for seconds in (10, 30):
             row("flower-prepared", seconds, learn)
-    row("fox", 10, "default", "gain=0.3", "fox, light of views ±30 %")
-    row("fox", 10, "nothing", "gain=0.3", "fox, light of views ±30 %")
+    row("fox", 10, "default", "gain=0.3", name="fox, light of views ±30 %")
+    row("fox", 10, "nothing", "gain=0.3", name="fox, light of views ±30 %")
     for capture in ("fox", "lego"):
         for learn in ("default", "poses"):
-            row(capture, 10, learn, "degrees=0.5 shift=0.005", f"{capture}, poses disturbed")
+            row(capture, 10, learn, worse="degrees=0.5 shift=0.005", name=f"{capture}, poses disturbed")
     for learn in ("default", "all"):
-        row("fox", 10, learn, "focal=0.03", "fox, focal length 3 % too long")
+        row("fox", 10, learn, worse="focal=0.03", name="fox, focal length 3 % too long")
     return table
 
 
+def packed_as(capture, worse, learn):
+    """Name and options of a packed capture."""
+    options = CAPTURES[capture][1] + (f" {worse}" if worse else "") + ADJUSTED.get(learn, "")
+    return re.sub(r"[^a-z0-9.]+", "-", f"{capture} {worse} {ADJUSTED.get(learn, '')}").strip("-"), options
+
+
+def source_of(options, name):
+    """The folder of a capture, made where a command makes it."""
+    source = CAPTURES[name][0]
+    folder = options.out / name
+    if source.startswith("sample"):
+        command = [*source.split(), "-o", folder]
+    elif source.startswith("prepare"):
+        command = ["prepare", Path(options.captures) / source.split()[1], "-o", folder]
+    else:
+        return Path(options.captures) / source
+    if not folder.exists():
+        subprocess.run([ROOT / "build/release/cnerf", *command, "--overwrite"], check=True)
+    return folder
+
+
 def pack(options):
-    program = ROOT / "build/release"
-    for name, (source, more) in PACKED.items():
+    for capture, worse, _, learn, _ in rows().values():
+        name, more = packed_as(capture, worse, learn)
         target = options.out / "packed" / name
         if target.exists():
             continue
-        folder = Path(options.captures) / source
-        if source.startswith("sample"):
-            folder = options.out / name
-            subprocess.run([program / "cnerf", *source.split(), "-o", folder, "--overwrite"], check=True)
-        elif source.startswith("prepare"):
-            folder = options.out / name
-            subprocess.run([program / "cnerf", "prepare", Path(options.captures) / source.split()[1], "-o", folder,
-                            "--overwrite"], check=True)
         target.parent.mkdir(parents=True, exist_ok=True)
-        subprocess.run([program / "tests/cuda/pack_capture", folder, target, *more.split()], check=True)
+        subprocess.run([ROOT / "build/release/tests/cuda/pack_capture", source_of(options, capture), target,
+                        *more.split()], check=True)
 
 
 def file_of(out, name):
@@ -97,16 +113,20 @@ def file_of(out, name):
 
 def train(options):
     part, parts = map(int, options.part.split("/"))
-    chosen = {name: row for name, row in rows().items() if not options.only or name in options.only}
+    known = rows()
+    if unknown := set(options.only or []) - set(known):
+        sys.exit(f"real_captures: no such row: {', '.join(sorted(unknown))}; there are: {', '.join(known)}")
+    chosen = {name: row for name, row in known.items() if not options.only or name in options.only}
     # The long ones first, dealt out in turns.
-    order = sorted(chosen.items(), key=lambda item: -item[1][1])
+    order = sorted(chosen.items(), key=lambda item: -item[1][2])
     (options.out / "rows").mkdir(parents=True, exist_ok=True)
-    for name, (capture, seconds, more) in order[part - 1::parts]:
+    for name, (capture, worse, seconds, learn, more) in order[part - 1::parts]:
         file = file_of(options.out, name)
         if file.exists():
             continue
-        command = [options.check, "train", f"capture={options.out / 'packed' / capture}", f"seconds={seconds}",
-                   f"seeds={SEEDS}", *BASE.split(), *more.split()]
+        packed = options.out / "packed" / packed_as(capture, worse, learn)[0]
+        command = [options.check, "train", f"capture={packed}", f"seconds={seconds}", f"seeds={SEEDS}", *BASE.split(),
+                   *LEARN[learn].split(), *more.split()]
         done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
         if done.returncode != 0:
             print(f"real_captures: {name}: exit code {done.returncode}", file=sys.stderr)

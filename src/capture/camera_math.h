@@ -16,9 +16,11 @@ inline constexpr int kNewtonSteps = 30;
 inline constexpr double kNewtonTolerance = 1e-13;
 
 /// A position on the plane z = 1, in camera axes.
-struct PlanePoint {
-  double x = 0, y = 0;
+template <typename Real>
+struct PlanePointOf {
+  Real x{}, y{};
 };
+using PlanePoint = PlanePointOf<double>;
 
 /// A distorted point and its derivatives with respect to the undistorted one.
 struct Distorted {
@@ -27,18 +29,29 @@ struct Distorted {
   double radial_slope = 1;  ///< derivative of the distorted radius by the radius, radial part only
 };
 
-/// Brown-Conrady with OpenCV's rational denominator.
+/// Brown-Conrady with OpenCV's rational denominator: the radial factor at s = r^2.
+template <typename Real>
+CNERF_HD Real radial_factor(const std::array<Real, 8>& c, Real s) {
+  return (1.0 + s * (c[0] + s * (c[1] + s * c[4]))) / (1.0 + s * (c[5] + s * (c[6] + s * c[7])));
+}
+/// Where the lens shows a position, whose radial factor is given.
+template <typename Real>
+CNERF_HD PlanePointOf<Real> distorted(const std::array<Real, 8>& c, PlanePointOf<Real> p, Real radial) {
+  const Real s = p.x * p.x + p.y * p.y, p1 = c[2], p2 = c[3];
+  return {p.x * radial + 2.0 * p1 * p.x * p.y + p2 * (s + 2.0 * p.x * p.x),
+          p.y * radial + p1 * (s + 2.0 * p.y * p.y) + 2.0 * p2 * p.x * p.y};
+}
+
+/// The same with its derivatives.
 CNERF_HD inline Distorted distort(const std::array<double, 8>& c, PlanePoint p) {
   const double k1 = c[0], k2 = c[1], p1 = c[2], p2 = c[3], k3 = c[4], k4 = c[5], k5 = c[6], k6 = c[7];
   const double s = p.x * p.x + p.y * p.y;
-  const double upper = 1 + s * (k1 + s * (k2 + s * k3));
   const double lower = 1 + s * (k4 + s * (k5 + s * k6));
-  const double radial = upper / lower;
+  const double radial = radial_factor(c, s);
   // Derivative by s = r^2.
   const double slope = ((k1 + s * (2 * k2 + 3 * s * k3)) - radial * (k4 + s * (2 * k5 + 3 * s * k6))) / lower;
   Distorted out;
-  out.value = {p.x * radial + 2 * p1 * p.x * p.y + p2 * (s + 2 * p.x * p.x),
-               p.y * radial + p1 * (s + 2 * p.y * p.y) + 2 * p2 * p.x * p.y};
+  out.value = distorted(c, p, radial);
   out.dx_dx = radial + 2 * p.x * p.x * slope + 2 * p1 * p.y + 6 * p2 * p.x;
   out.dx_dy = 2 * p.x * p.y * slope + 2 * p1 * p.x + 2 * p2 * p.y;
   out.dy_dx = out.dx_dy;
@@ -63,14 +76,19 @@ CNERF_HD inline PlanePoint undistort(const std::array<double, 8>& c, PlanePoint 
   return p;
 }
 
-/// Distance from the principal point, in focal lengths, of a ray at angle `theta` to the axis; and its derivative.
+/// Distance from the principal point, in focal lengths, of a ray at angle `theta` to the axis.
+template <typename Real>
+CNERF_HD Real fisheye_distance(const std::array<Real, 8>& k, Real theta) {
+  const Real s = theta * theta;
+  return theta * (1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3]))));
+}
+/// The same, and its derivative.
 struct FisheyeRadius {
   double value = 0, slope = 0;
 };
 CNERF_HD inline FisheyeRadius fisheye_radius(const std::array<double, 8>& k, double theta) {
   const double s = theta * theta;
-  return {theta * (1 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])))),
-          1 + s * (3 * k[0] + s * (5 * k[1] + s * (7 * k[2] + s * 9 * k[3])))};
+  return {fisheye_distance(k, theta), 1 + s * (3 * k[0] + s * (5 * k[1] + s * (7 * k[2] + s * 9 * k[3])))};
 }
 
 CNERF_HD inline double fisheye_angle(const std::array<double, 8>& k, double radius) {

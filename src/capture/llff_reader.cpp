@@ -131,7 +131,8 @@ CaptureListing read_llff(const fs::path& npy_file, int downscale) {
   }
   listing.notes.push_back(
       npy_file.filename().string() +
-      " knows no lens: unless the pictures were undistorted, cameras that cnerf prepare estimates may be better");
+      " knows no lens: unless the pictures were undistorted, --set stage1.lenses=true may be better, or cameras "
+      "that cnerf prepare estimates");
   make_poses_rigid(listing, "");
   listing.depth_range = depth_range_of(array, npy_file);
   return listing;

@@ -12,13 +12,6 @@
 
 namespace cnerf {
 
-/// The rotation vector of a rotation by less than half a turn.
-inline Vec3d rotation_vector(const Mat3d& r) {
-  const Vec3d twice = {r.rows[2].y - r.rows[1].z, r.rows[0].z - r.rows[2].x, r.rows[1].x - r.rows[0].y};
-  const double sine = 0.5 * length(twice), cosine = 0.5 * (r.rows[0].x + r.rows[1].y + r.rows[2].z - 1);
-  return sine < 1e-12 ? 0.5 * twice : twice * (0.5 * std::atan2(sine, cosine) / sine);
-}
-
 struct PoseAlignment {
   Vec3d turn, move, centre;
   double growth = 0;

@@ -2,13 +2,55 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+#include <utility>
+
 #include "src/base/text.h"
+#include "src/base/usage.h"
 #include "src/pipeline/shared_training.h"
+#include "src/prepare/bundle_adjustment.h"
 #include "src/prepare/sparse_points.h"
 #include "src/train/luminance/stage1.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
+namespace {
+
+/// The capture with cameras adjusted to what its views show, and says how far they were off.
+prepare::AdjustedCameras adjust(Capture& capture, const Stage1Options& options, Observer& observer) {
+  const Stopwatch watch;
+  prepare::AdjustedCameras cameras = prepare::adjust_cameras(capture, options.lenses, observer);
+  observer.say(cameras.moved.corrections.empty()
+                   ? "cameras stay where they were given: views show too few points in common"
+                   : fmt::format("cameras adjusted to {} points: {:.2f} pixels off, {:.2f} before, in {}",
+                                 cameras.points.size(), cameras.error_after, cameras.error_before,
+                                 duration_text(watch.seconds())));
+  return cameras;
+}
+
+Stage1Report train(const RunContext& context, const TrainJob& job, bool goes_on, cluster::Ranks& ranks,
+                   const Engines& engines, Observer& observer) {
+  const Stage1Options& options = context.config.stage1;
+  std::optional<Capture> adjusted;
+  prepare::AdjustedCameras cameras;
+  if (prepare::adjusts_cameras(context.capture, options)) {
+    adjusted = context.capture;
+    cameras = adjust(*adjusted, options, observer);
+  }
+  Stage1Job stage1{.capture = adjusted ? *adjusted : context.capture,
+                   .options = options,
+                   .snapshot = context.directory.stage1_snapshot(),
+                   .resume = goes_on,
+                   .points = std::move(cameras.points),
+                   .moved = std::move(cameras.moved),
+                   .watch = job.watch,
+                   .ranks = ranks,
+                   .image_memory = image_memory(context.config)};
+  if (stage1.points.empty()) stage1.points = prepare::points_for_training(stage1, observer);
+  return train_stage1(stage1, engines, observer);
+}
+
+}  // namespace
 
 void train_step(const RunContext& context, const TrainJob& job, const Engines& engines, Observer& observer) {
   const RunDirectory& directory = context.directory;
@@ -17,17 +59,9 @@ void train_step(const RunContext& context, const TrainJob& job, const Engines& e
   RunRecord record = directory.record();
   if (world.agreed(!record.stage1.finished || !job.resume)) {
     const bool goes_on = job.resume && fs::exists(directory.stage1_snapshot());
-    Stage1Job stage1{.capture = context.capture,
-                     .options = context.config.stage1,
-                     .snapshot = directory.stage1_snapshot(),
-                     .resume = world.agreed(goes_on),
-                     .watch = job.watch,
-                     .ranks = ranks_that_train(engines, context.config.stage1.samples_per_step >= kSamplesWorthSharing),
-                     .image_memory = image_memory(context.config)};
-    if (is_needed(stage1.ranks)) {
-      stage1.points = prepare::points_for_training(stage1, observer);
-      record.stage1 = {train_stage1(stage1, engines, observer), true};
-    }
+    cluster::Ranks& ranks = ranks_that_train(engines, context.config.stage1.samples_per_step >= kSamplesWorthSharing);
+    const bool all_go_on = world.agreed(goes_on);
+    if (is_needed(ranks)) record.stage1 = {train(context, job, all_go_on, ranks, engines, observer), true};
     if (world.is_first()) directory.save(record);
     world.barrier("end of stage 1");
   }

@@ -15,6 +15,9 @@ namespace cnerf::prepare {
 /// @throws Interrupted  when the observer cancels; after a few views or pairs at most
 [[nodiscard]] std::vector<SparsePoint> find_sparse_points(const Capture& capture, Observer& observer);
 
+/// Whether the capture has points of which it is known who sees them.
+[[nodiscard]] bool has_seen_points(const Capture& capture);
+
 /// What a stage 1 is to know besides the capture: points, if the job asks for free space or depths, the capture has
 /// none of its own whose views it knows, and outlines do not bound its space. Says how many were found.
 [[nodiscard]] std::vector<SparsePoint> points_for_training(const Stage1Job& job, Observer& observer);

@@ -29,6 +29,17 @@ struct LensCorrection {
     lens.distortion[3] += double(p2);
     return lens;
   }
+  /// Both: this, and then one of the lens that it leaves.
+  [[nodiscard]] CNERF_HD LensCorrection followed_by(const LensCorrection& next) const {
+    const float focal = std::exp(log_focal);  // in which the next one counts
+    return {log_focal + next.log_focal,
+            x + focal * next.x,
+            y + focal * next.y,
+            k1 + next.k1,
+            k2 + next.k2,
+            p1 + next.p1,
+            p2 + next.p2};
+  }
 };
 inline constexpr int kLensNumbers = 7;  ///< of a lens's correction
 

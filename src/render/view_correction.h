@@ -30,6 +30,13 @@ template <typename Real>
   return v + across * (std::sin(angle) / angle) + cross(turn, across) * (2 * half * half / squared);
 }
 
+/// The way back: the rotation vector of a rotation by less than half a turn.
+inline Vec3d rotation_vector(const Mat3d& r) {
+  const Vec3d twice = {r.rows[2].y - r.rows[1].z, r.rows[0].z - r.rows[2].x, r.rows[1].x - r.rows[0].y};
+  const double sine = 0.5 * length(twice), cosine = 0.5 * (r.rows[0].x + r.rows[1].y + r.rows[2].z - 1);
+  return sine < 1e-12 ? 0.5 * twice : twice * (0.5 * std::atan2(sine, cosine) / sine);
+}
+
 CNERF_HD inline Ray ViewCorrection::applied_to(const Ray& ray) const {
   return {ray.origin + shift, turned(turn, ray.direction)};
 }

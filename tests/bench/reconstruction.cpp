@@ -6,9 +6,10 @@
 //   reconstruction CAPTURE [downscale=1] [holdout=8] samples=70,140,340 [pictures=FOLDER] [option=value ...]
 //
 // `gain`, `degrees`, `shift` and `focal` make the capture worse first (Disturbance); `aligned=1` fits the poses of
-// held-out views. With `points=1` sparse points are triangulated first. With `validation=N` every N-th of the views to
-// be trained on is judged instead of the held-out ones; `few=N` trains on every N-th view alone. Options are stage 1's
-// by their short names, e.g. grid.log2_rows=16 steps_per_box=512 samples_per_step=65536.
+// held-out views; `adjust=1` adjusts cameras to features first, `adjust=2` lenses too. With `points=1` sparse points
+// are triangulated first. With `validation=N` every N-th of the views to be trained on is judged instead of the
+// held-out ones; `few=N` trains on every N-th view alone. Options are stage 1's by their short names, e.g.
+// grid.log2_rows=16 steps_per_box=512 samples_per_step=65536.
 
 #include <algorithm>
 #include <chrono>
@@ -21,6 +22,7 @@
 #include <vector>
 
 #include "src/capture/load_capture.h"
+#include "src/prepare/bundle_adjustment.h"
 #include "src/prepare/sparse_points.h"
 #include "src/train/luminance/depth_hints.h"
 #include "src/train/luminance/luminance_model.h"
@@ -97,6 +99,16 @@ void print_points(cnerf::Capture& capture) {
               capture.points.size(), of_three, double(sightings) / all, error / all, seconds_since(start));
 }
 
+/// Adjusts its cameras, with lenses if asked; its points become those that the adjusted cameras show.
+void print_adjustment(cnerf::Capture& capture, bool lenses) {
+  const Clock::time_point start = Clock::now();
+  cnerf::Observer silent;
+  cnerf::prepare::AdjustedCameras cameras = cnerf::prepare::adjust_cameras(capture, lenses, silent);
+  capture.points = std::move(cameras.points);
+  std::printf("cameras adjusted to %zu points: %.3f pixels off, %.3f before, in %.1f s\n", capture.points.size(),
+              cameras.error_after, cameras.error_before, seconds_since(start));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -107,7 +119,7 @@ int main(int argc, char** argv) {
   std::map<std::string, double> own = {{"downscale", 1}, {"holdout", 8}, {"seconds", 60}, {"eval_every", 1},
                                        {"verbose", 0},   {"points", 0},  {"first", 0.25}, {"validation", 0},
                                        {"gain", 0},      {"degrees", 0}, {"shift", 0},    {"aligned", 0},
-                                       {"focal", 0},     {"few", 0}};
+                                       {"focal", 0},     {"few", 0},     {"adjust", 0},   {"repoint", 0}};
   std::string pictures;       // a folder for what is seen of the held-out views
   std::vector<double> marks;  // of the training's length: million samples if given, else seconds
   nlohmann::json json = cnerf::options_to_json(cnerf::Stage1Options{});
@@ -141,6 +153,7 @@ int main(int argc, char** argv) {
   if (own["points"] > 0) print_points(capture);
   const std::vector<cnerf::Affined> truth = cnerf::test::training_poses(capture);
   cnerf::test::disturb(capture, {own["gain"], own["degrees"], own["shift"], own["focal"]});
+  if (own["adjust"] > 0) print_adjustment(capture, own["adjust"] > 1);
   cnerf::LuminanceModel model = cnerf::LuminanceModel::create(capture, options, cnerf::cpu_engines());
   auto views = cnerf::training_views(capture, model.frame);
   const std::vector<cnerf::DepthHints> depths = cnerf::depth_hints(capture, model.frame, capture.points);

@@ -9,7 +9,7 @@ namespace cnerf::test {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::uint32_t kMagic = 0x32504e43;  // CNP2
+constexpr std::uint32_t kMagic = 0x33504e43;  // CNP3
 
 template <typename T>
 void put(std::ofstream& file, const T& value) {
@@ -46,6 +46,8 @@ void write_packed(const PackedCapture& packed, const fs::path& folder) {
   put(file, packed.occupancy_resolution);
   put(file, std::uint64_t(packed.excluded.size()));
   file.write(reinterpret_cast<const char*>(packed.excluded.data()), long(packed.excluded.size()));
+  put(file, std::uint64_t(packed.truth.size()));
+  for (const Affined& pose : packed.truth) put(file, pose);
   put(file, std::uint64_t(packed.capture.points.size()));
   for (const SparsePoint& point : packed.capture.points) {
     put(file, point.position);
@@ -81,7 +83,9 @@ PackedCapture read_packed(const fs::path& folder) {
   get(file, cells);
   packed.excluded.resize(cells);
   file.read(reinterpret_cast<char*>(packed.excluded.data()), long(cells));
-  std::uint64_t points = 0;
+  std::uint64_t poses = 0, points = 0;
+  get(file, poses);
+  for (std::uint64_t p = 0; p < poses && file; ++p) get(file, packed.truth.emplace_back());
   get(file, points);
   for (std::uint64_t p = 0; p < points && file; ++p) {
     SparsePoint point;

@@ -17,6 +17,7 @@ struct PackedCapture {
   SceneFrame frame;
   int occupancy_resolution = 128;
   std::vector<std::uint8_t> excluded;  ///< [cells of the occupancy grid], 1 = empty for good
+  std::vector<Affined> truth;          ///< of the training views, before cameras were disturbed or adjusted
 };
 
 void write_packed(const PackedCapture& packed, const std::filesystem::path& folder);

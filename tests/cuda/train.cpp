@@ -76,7 +76,7 @@ void set_learning(LuminanceEngineOptions& options, const Arguments& arguments, c
 
 int train(const Arguments& arguments) {
   PackedCapture packed = read_packed(arguments.text("capture", "."));
-  const std::vector<Affined> truth = training_poses(packed.capture);
+  const std::vector<Affined>& truth = packed.truth;
   disturb(packed.capture, {arguments.number("gain", 0), arguments.number("degrees", 0), arguments.number("shift", 0),
                            arguments.number("focal", 0)});
   std::vector<TrainingView> views = training_views(packed.capture, packed.frame);

@@ -9,30 +9,12 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/base/rng.h"
 #include "src/capture/load_capture.h"
 #include "tests/support/data.h"
+#include "tests/support/smooth_noise.h"
 
 namespace cnerf::prepare {
 namespace {
-
-/// Smooth noise: blobs of every size from a tenth of a unit on.
-double texture_at(double x, double y) {
-  double value = 0;
-  for (int octave = 0; octave < 4; ++octave) {
-    const double scale = 3 << octave;
-    const CounterRng rng(1, std::uint64_t(octave));
-    const auto corner = [&](int i, int j) {
-      return rng.uniform(std::uint64_t(i + 4096) * 8192 + std::uint64_t(j + 4096));
-    };
-    const int i = int(std::floor(x * scale)), j = int(std::floor(y * scale));
-    const double u = x * scale - i, v = y * scale - j;
-    value += ((1 - u) * (1 - v) * corner(i, j) + u * (1 - v) * corner(i + 1, j) + (1 - u) * v * corner(i, j + 1) +
-              u * v * corner(i + 1, j + 1)) /
-             4;
-  }
-  return value;
-}
 
 /// Cameras in a row that look down on the plane z = 0 from two units above.
 Capture plane_capture(int views) {
@@ -51,7 +33,7 @@ Capture plane_capture(int views) {
       const PixelPosition pixel{double(p % 200) + 0.5, std::floor(double(p) / 200) + 0.5};
       const Vec3d d = view.world_from_camera.direction(ray_direction(view.intrinsics, pixel));
       const Vec3d at = view.world_from_camera.translation + d * (2 / -d.z);
-      view.image.u8.push_back(std::uint8_t(std::lround(255 * texture_at(at.x, at.y))));
+      view.image.u8.push_back(std::uint8_t(std::lround(255 * test::smooth_noise(at.x, at.y))));
     }
     capture.views.push_back(std::move(view));
   }

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "src/base/files.h"
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/stage1.h"
 #include "tests/support/data.h"
@@ -216,6 +217,71 @@ TEST_F(StoredViews, ThatAreForgedAreRefused) {
   save_snapshot(folder_ / "forged.snapshot", "stage1", good.header(), state);
   EXPECT_THROW((void)LuminanceModel::learned_views_in(folder_ / "forged.snapshot"), SnapshotError);
   EXPECT_THROW((void)LuminanceModel::load(folder_ / "forged.snapshot", cpu_engines()), SnapshotError);
+}
+
+/// Cameras moved before the training, in world units.
+LearnedViews moves() {
+  LearnedViews moved{{{}, 1, 1}, std::vector<ViewCorrection>(6), std::vector<LensCorrection>(1)};
+  for (std::size_t v = 0; v < 6; ++v) {
+    moved.corrections[v].turn = {0.01f * float(v), -0.02f, 0.03f};
+    moved.corrections[v].shift = {0.05f, 0.01f * float(v), -0.02f};
+  }
+  moved.lenses[0] = {.log_focal = 0.04f, .x = 0.01f, .k1 = 0.02f};
+  return moved;
+}
+
+TEST_F(StoredViews, FollowWhatWasMovedBefore) {
+  Capture adjusted = clip();
+  apply_learned_views(adjusted, moves());
+  const Stage1Job job{
+      .capture = adjusted, .options = options_, .snapshot = folder_ / "moved.snapshot", .moved = moves()};
+  Observer silent;
+  train_stage1(job, cpu_engines(), silent);
+  const auto model = LuminanceModel::load(job.snapshot, cpu_engines());
+  // Moved first, then as the engine learned: what the snapshot says leads from what was given to the same cameras.
+  apply_learned_views(adjusted, {model.frame, model.engine->view_corrections(), model.engine->lens_corrections()});
+  (void)apply_learned_views(capture_, job.snapshot);
+  for (std::size_t v = 0; v < capture_.views.size(); ++v) {
+    const View &expected = adjusted.views[v], &found = capture_.views[v];
+    if (!found.held_out) {
+      EXPECT_LT(length(found.world_from_camera.translation - expected.world_from_camera.translation), 1e-6);
+      for (int axis = 0; axis < 3; ++axis) {
+        const Vec3d off = found.world_from_camera.linear.column(axis) - expected.world_from_camera.linear.column(axis);
+        EXPECT_LT(length(off), 1e-6);
+      }
+    }
+    EXPECT_NEAR(found.intrinsics.fx, expected.intrinsics.fx, 1e-4);
+    EXPECT_NEAR(found.intrinsics.cx, expected.intrinsics.cx, 1e-4);
+    EXPECT_NEAR(found.intrinsics.distortion[0], expected.intrinsics.distortion[0], 1e-7);
+    EXPECT_NEAR(found.image.exposure, expected.image.exposure, 1e-6f);
+  }
+  model.save(folder_ / "again.snapshot");
+  EXPECT_EQ(read_binary_file(folder_ / "again.snapshot"), read_binary_file(job.snapshot));
+}
+
+TEST_F(StoredViews, ThatWereMovedAndAreForgedAreRefused) {
+  auto model = LuminanceModel::load(job_.snapshot, cpu_engines());
+  model.moved = moves();
+  model.save(job_.snapshot);
+  EXPECT_NO_THROW((void)LuminanceModel::learned_views_in(job_.snapshot));
+  const Snapshot good(job_.snapshot, "stage1");
+  std::vector<StatePiece> state = model.engine->state();
+  state.push_back(state_piece("moved.views", model.moved.corrections));
+  state.push_back(state_piece("moved.lenses", model.moved.lenses));
+  for (const char* field : {"moved_views", "moved_lenses"}) {
+    for (const nlohmann::json& forged : {nlohmann::json(-1), nlohmann::json(1 << 30), nlohmann::json(2)}) {
+      nlohmann::json header = good.header();
+      header[field] = forged;
+      save_snapshot(folder_ / "forged.snapshot", "stage1", header, state);
+      EXPECT_THROW((void)LuminanceModel::load(folder_ / "forged.snapshot", cpu_engines()), SnapshotError)
+          << field << forged;
+      EXPECT_THROW((void)LuminanceModel::learned_views_in(folder_ / "forged.snapshot"), SnapshotError)
+          << field << forged;
+    }
+  }
+  model.moved.corrections.pop_back();
+  model.save(job_.snapshot);
+  EXPECT_THROW((void)LuminanceModel::learned_views_in(job_.snapshot), SnapshotError) << "of fewer than are trained on";
 }
 
 TEST(LearnedViews, SayHowFarTheyAreFromWhatWasGiven) {

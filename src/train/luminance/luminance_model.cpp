@@ -86,6 +86,20 @@ std::vector<Numbers> stored_piece(const Snapshot& snapshot, const char* name, in
   return values;
 }
 
+constexpr const char *kMovedViews = "moved.views", *kMovedLenses = "moved.lenses";
+
+/// Earlier versions moved none. Its unit is the world's.
+LearnedViews stored_moves(const Snapshot& snapshot) {
+  return {{{}, 1, 1},
+          stored_piece<ViewCorrection>(snapshot, kMovedViews, learned_count(snapshot, "moved_views")),
+          stored_piece<LensCorrection>(snapshot, kMovedLenses, learned_count(snapshot, "moved_lenses"))};
+}
+
+void add_moves(LearnedViews& moved, std::vector<StatePiece>& pieces) {
+  if (!moved.corrections.empty()) pieces.push_back(state_piece(kMovedViews, moved.corrections));
+  if (!moved.lenses.empty()) pieces.push_back(state_piece(kMovedLenses, moved.lenses));
+}
+
 constexpr const char* kSky = "sky";
 constexpr int kWidestSky = 4096;
 
@@ -159,6 +173,23 @@ SceneFrame frame_from_json(const nlohmann::json& json) {
   return frame;
 }
 
+LearnedViews LearnedViews::followed_by(const LearnedViews& next) const {
+  LearnedViews both = next;
+  const double to_next = next.frame.unit_per_world / frame.unit_per_world;
+  for (std::size_t v = 0; v < both.corrections.size(); ++v) {
+    ViewCorrection& of_both = both.corrections[v];
+    of_both.log_gain += corrections[v].log_gain;
+    of_both.shift += (to_next * corrections[v].shift.cast<double>()).cast<float>();
+    Vec3d axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    for (Vec3d& axis : axes) {
+      axis = turned(of_both.turn.cast<double>(), turned(corrections[v].turn.cast<double>(), axis));
+    }
+    of_both.turn = rotation_vector(Mat3d::from_columns(axes[0], axes[1], axes[2])).cast<float>();
+  }
+  for (std::size_t l = 0; l < lenses.size(); ++l) both.lenses[l] = lenses[l].followed_by(both.lenses[l]);
+  return both;
+}
+
 LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options, const Engines& engines) {
   const std::vector<SparsePoint> unknown;
   return create(capture, options, engines, FreeSpace(capture.views, options.free_space ? capture.points : unknown));
@@ -203,7 +234,13 @@ LearnedViews LuminanceModel::learned_views_in(const std::filesystem::path& file)
   if (!(learned.frame.unit_per_world > 0)) {
     throw SnapshotError(file.string() + ": header: frame: expected a positive scale");
   }
-  return learned;
+  const LearnedViews moved = stored_moves(snapshot);
+  if (moved.corrections.empty()) return learned;
+  if (moved.corrections.size() != learned.corrections.size() ||
+      (!moved.lenses.empty() && moved.lenses.size() != learned.lenses.size())) {
+    throw SnapshotError(file.string() + ": header: moved_views, moved_lenses: expected as many as were learned of");
+  }
+  return moved.followed_by(learned);
 }
 
 LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Engines& engines) {
@@ -225,9 +262,11 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   check_stored(snapshot, model);
   model.kernels = kernels_of(engines);
   model.engine = make_engine(model, engines);
+  model.moved = stored_moves(snapshot);
   model.sky = stored_sky(snapshot);
   std::vector<StatePiece> pieces = model.engine->state();
   if (model.sky.exists()) pieces.push_back(state_piece(kSky, model.sky.planes.front()));
+  add_moves(model.moved, pieces);
   snapshot.restore(pieces);
   model.engine->state_loaded();
   return model;
@@ -238,6 +277,8 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
   std::vector<float> light;
   if (sky.exists()) light = sky.planes.front();
   if (sky.exists()) pieces.push_back(state_piece(kSky, light));
+  LearnedViews moves = moved;
+  add_moves(moves, pieces);
   save_snapshot(file, kKind,
                 {{"frame", frame_to_json(frame)},
                  {"options", options_to_json(options)},
@@ -246,6 +287,8 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
                  {"max_luminance", max_luminance},
                  {"learned_views", learned_views},
                  {"learned_lenses", learned_lenses},
+                 {"moved_views", moved.corrections.size()},
+                 {"moved_lenses", moved.lenses.size()},
                  {"trained_samples", trained_samples},
                  {"pace", json_of(pace.state())},
                  {"sky_width", sky.width},

@@ -16,11 +16,14 @@
 
 namespace cnerf {
 
-/// What a training learned of its views.
+/// What was learned of a training's views.
 struct LearnedViews {
   SceneFrame frame;
   std::vector<ViewCorrection> corrections;  ///< of the training views in their order; empty where nothing was learned
   std::vector<LensCorrection> lenses;       ///< as `lenses_of` lists them; likewise
+
+  /// This, and what was learned after it of the views as this left them: in the units of the latter.
+  [[nodiscard]] LearnedViews followed_by(const LearnedViews& next) const;
 };
 
 struct LuminanceModel {
@@ -35,7 +38,8 @@ struct LuminanceModel {
   std::string kernels;         ///< that its engine computes with, see kernels_of
   std::string kernels_before;  ///< of the snapshot it was read from; empty where that does not say
   std::unique_ptr<LuminanceEngine> engine;
-  DirectionMap sky;  ///< linear Y beyond the box, at the median view's exposure; none where no view sees one
+  LearnedViews moved;  ///< how cameras were moved before the training, which learns from there; empty: not at all
+  DirectionMap sky;    ///< linear Y beyond the box, at the median view's exposure; none where no view sees one
 
   /// A fresh model for a capture. The first form knows of free space what the capture's own points say.
   static LuminanceModel create(const Capture& capture, const Stage1Options& options, const Engines& engines);
@@ -45,7 +49,7 @@ struct LuminanceModel {
   static LuminanceModel load(const std::filesystem::path& snapshot, const Engines& engines);
   /// Only what it was trained with.  @throws MissingInputError, SnapshotError
   static Stage1Options options_in(const std::filesystem::path& snapshot);
-  /// Only what it learned of its views.  @throws MissingInputError, SnapshotError
+  /// Only what was learned of its views, before it and by it.  @throws MissingInputError, SnapshotError
   static LearnedViews learned_views_in(const std::filesystem::path& snapshot);
   void save(const std::filesystem::path& snapshot) const;
 

@@ -101,7 +101,9 @@ FreeSpace free_space_of(const Stage1Job& job, const SeenSky& sky) {
 
 LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines, const SeenSky& sky) {
   if (!job.goes_on()) {
-    return LuminanceModel::create(job.capture, job.options, engines, free_space_of(job, sky));
+    LuminanceModel model = LuminanceModel::create(job.capture, job.options, engines, free_space_of(job, sky));
+    model.moved = job.moved;
+    return model;
   }
   LuminanceModel model = LuminanceModel::load(job.snapshot, engines);
   refuse_others(job.snapshot, model.options, job.options);

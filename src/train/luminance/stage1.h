@@ -10,11 +10,10 @@
 #include "src/capture/capture.h"
 #include "src/cluster/ranks.h"
 #include "src/engine/engines.h"
+#include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/stage1_options.h"
 
 namespace cnerf {
-
-struct LuminanceModel;
 
 struct Stage1Report {
   int steps = 0;
@@ -36,6 +35,7 @@ struct Stage1Job {
   std::filesystem::path snapshot;                         ///< that the result goes to
   bool resume = false;                                    ///< go on with the snapshot, if there is one
   std::vector<SparsePoint> points = {};                   ///< in place of the capture's, which has none
+  LearnedViews moved = {};                                ///< how the capture's cameras were moved before
   std::function<void(const LuminanceModel&)> watch = {};  ///< sees the model between steps, in no training time
   cluster::Ranks& ranks = cluster::alone();               ///< that share the steps; rank 0 saves
   /// See LuminanceEngine::limit_image_memory.

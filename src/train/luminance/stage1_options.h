@@ -61,8 +61,8 @@ struct Stage1Options {
     v("free_space", free_space,
       "space before sparse points is empty; they are found first where a capture has none and nothing else bounds it");
     v("exposures", exposures, "the light of each training view is learned, over that of the median view");
-    v("poses", poses, "where cameras stood and looked is learned");
-    v("lenses", lenses, "focal lengths, principal points and distortion of the views' lenses are learned");
+    v("poses", poses, "where cameras stood and looked is learned, from features first, then while training");
+    v("lenses", lenses, "focal lengths, principal points and distortion are learned likewise");
     v("sky", sky, "where views see a sky, its light comes from beyond the scene and the way there is empty");
     v("checkpoint_every", checkpoint_every, Range{0, 1e8}, "steps between snapshots; 0 = only at the end");
     v("seed", seed, Range{0, 1e9}, "of weights, rays and jitter");
