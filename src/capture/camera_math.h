@@ -37,7 +37,7 @@ CNERF_HD Real radial_factor(const std::array<Real, 8>& c, Real s) {
 /// Where the lens shows a position, whose radial factor is given.
 template <typename Real>
 CNERF_HD PlanePointOf<Real> distorted(const std::array<Real, 8>& c, PlanePointOf<Real> p, Real radial) {
-  const Real s = p.x * p.x + p.y * p.y, p1 = c[2], p2 = c[3];
+  const Real &p1 = c[2], &p2 = c[3], s = p.x * p.x + p.y * p.y;
   return {p.x * radial + 2.0 * p1 * p.x * p.y + p2 * (s + 2.0 * p.x * p.x),
           p.y * radial + p1 * (s + 2.0 * p.y * p.y) + 2.0 * p2 * p.x * p.y};
 }

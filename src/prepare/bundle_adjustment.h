@@ -11,8 +11,8 @@
 namespace cnerf::prepare {
 
 struct AdjustedCameras {
-  LearnedViews moved;               ///< from where they were given; its unit is the world's; empty: left alone
-  std::vector<SparsePoint> points;  ///< that they show; none where outlines bound the space
+  LearnedViews moved;                        ///< from where they were given; its unit is the world's; empty: left alone
+  std::vector<SparsePoint> points;           ///< that they show; none where outlines bound the space
   double error_before = 0, error_after = 0;  ///< median distance of points from their features, pixels
 };
 

@@ -20,7 +20,6 @@ constexpr std::size_t kPartners = 16;  // that a view is matched with
 constexpr double kSeesAlike = 0.5;     // cosine of optical axes, below which views are not matched
 constexpr float kRatio = 0.85f;        // of the best and second-best distance of descriptors
 constexpr double kLeastAngle = 1.5 * std::numbers::pi / 180;  // between two of a point's rays
-constexpr std::size_t kFewestViews = 3;                       // of a point: of two, one in many is a coincidence
 
 /// RootSIFT (Arandjelovic and Zisserman 2012): roots of shares, whose products are similarities.
 void take_roots(cv::Mat1f& descriptors) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <deque>
 
+#include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/usage.h"
 #include "src/optim/adam.h"
@@ -128,6 +129,7 @@ float brightest_pixel(const View& view) {
     if (view.held_out || (suspect != nullptr && !std::isfinite(brightest_pixel(*suspect)))) continue;
     if (suspect == nullptr || !(brightest_pixel(view) <= brightest_pixel(*suspect))) suspect = &view;
   }
+  CNERF_CHECK(suspect != nullptr, "there are views to train on");
   throw DivergedError(fmt::format(
       "stage 1: the loss is {} at step {}; the brightest view is {} with a luminance of {:g} (white is 1). The last "
       "snapshot is kept; a lower stage1.learning_rate may help",
