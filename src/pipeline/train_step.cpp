@@ -19,7 +19,7 @@ namespace {
 /// The capture with cameras adjusted to what its views show, and says how far they were off.
 prepare::AdjustedCameras adjust(Capture& capture, const Stage1Options& options, Observer& observer) {
   const Stopwatch watch;
-  prepare::AdjustedCameras cameras = prepare::adjust_cameras(capture, options.lenses, observer);
+  prepare::AdjustedCameras cameras = prepare::adjust_cameras(capture, options, observer);
   observer.say(cameras.moved.corrections.empty()
                    ? "cameras stay where they were given: views show too few points in common"
                    : fmt::format("cameras adjusted to {} points: {:.2f} pixels off, {:.2f} before, in {}",

@@ -2,6 +2,7 @@
 
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
+#include <glog/logging.h>
 
 #include <algorithm>
 #include <array>
@@ -95,10 +96,14 @@ struct Expectation {
   }
 };
 
+/// Of a camera or lens that the problem knows.
 template <std::size_t N>
-void expect(ceres::Problem& problem, const std::array<double, N>& spread, std::array<double, N>& numbers) {
+void expect(ceres::Problem& problem, const std::array<double, N>& spread, std::array<double, N>& numbers,
+            bool is_adjusted) {
   using Cost = ceres::AutoDiffCostFunction<Expectation<N>, int(N), int(N)>;
+  if (!problem.HasParameterBlock(numbers.data())) return;
   problem.AddResidualBlock(new Cost(new Expectation<N>{spread}), nullptr, numbers.data());
+  if (!is_adjusted) problem.SetParameterBlockConstant(numbers.data());
 }
 
 /// Cancels when the observer does.
@@ -128,9 +133,10 @@ double median_error(const std::vector<Track>& tracks) {
 /// The numbers of all cameras, and how they were given.
 class Adjuster {
  public:
-  Adjuster(const Capture& capture, const FeatureTracks& features, bool lenses)
+  Adjuster(const Capture& capture, const FeatureTracks& features, const Stage1Options& options)
       : features_(features),
-        adjusts_lenses_(lenses),
+        adjusts_poses_(options.poses),
+        adjusts_lenses_(options.lenses),
         size_(size_of(capture)),
         given_lenses_(lenses_of(capture)),
         pose_numbers_(capture.views.size()),
@@ -146,14 +152,8 @@ class Adjuster {
     for (std::size_t t = 0; t < tracks.size(); ++t) {
       for (const Track::Sighting& sighting : tracks[t].sightings) add(sighting, points[t], problem);
     }
-    for (PoseNumbers& numbers : pose_numbers_) {
-      if (problem.HasParameterBlock(numbers.data())) expect(problem, kPoseSpread, numbers);
-    }
-    for (LensNumbers& numbers : lens_numbers_) {
-      if (!problem.HasParameterBlock(numbers.data())) continue;
-      expect(problem, kLensSpread, numbers);
-      if (!adjusts_lenses_) problem.SetParameterBlockConstant(numbers.data());
-    }
+    for (PoseNumbers& numbers : pose_numbers_) expect(problem, kPoseSpread, numbers, adjusts_poses_);
+    for (LensNumbers& numbers : lens_numbers_) expect(problem, kLensSpread, numbers, adjusts_lenses_);
     solve(problem, observer);
     for (std::size_t t = 0; t < tracks.size(); ++t) tracks[t].position = {points[t][0], points[t][1], points[t][2]};
   }
@@ -173,11 +173,15 @@ class Adjuster {
     return moved;
   }
 
-  /// Puts the capture's cameras where they are by now.
-  void apply_to(Capture& capture) const {
+  /// Puts the capture's cameras where they were given.
+  void restore(Capture& capture) const {
     for (std::size_t v = 0; v < given_.size(); ++v) {
       std::tie(capture.views[v].intrinsics, capture.views[v].world_from_camera) = given_[v];
     }
+  }
+  /// Puts them where they are by now.
+  void apply_to(Capture& capture) const {
+    restore(capture);
     apply_learned_views(capture, moves(capture));
   }
 
@@ -196,18 +200,20 @@ class Adjuster {
     Listener listener(observer);
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_SCHUR;
+    options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // whose sums no other threads share
     options.max_num_iterations = 30;
     options.function_tolerance = 1e-4;
     options.num_threads = 1;  // sums of several come out differently each time
     options.logging_type = ceres::SILENT;
     options.callbacks.push_back(&listener);
+    FLAGS_minloglevel = google::GLOG_FATAL;  // it would write to the terminal
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);
     if (observer.is_cancelled()) throw Interrupted("stopped while adjusting cameras");
   }
 
   const FeatureTracks& features_;
-  bool adjusts_lenses_;
+  bool adjusts_poses_, adjusts_lenses_;
   double size_;
   std::vector<Intrinsics> given_lenses_;
   std::vector<std::pair<Intrinsics, Affined>> given_;  // of all views
@@ -221,14 +227,17 @@ bool adjusts_cameras(const Capture& capture, const Stage1Options& options) {
   return (options.poses || options.lenses) && !has_seen_points(capture);
 }
 
-AdjustedCameras adjust_cameras(Capture& capture, bool lenses, Observer& observer) {
+AdjustedCameras adjust_cameras(Capture& capture, const Stage1Options& options, Observer& observer) {
   const FeatureTracks features(capture, observer);
-  Adjuster adjuster(capture, features, lenses);
+  Adjuster adjuster(capture, features, options);
   AdjustedCameras found;
   std::vector<Track> tracks;
   for (const double tolerance : kTolerances) {
     tracks = features.triangulated(capture, tolerance, observer);
-    if (tracks.size() < kFewestPoints) return found;
+    if (tracks.size() < kFewestPoints) {
+      adjuster.restore(capture);
+      return {};
+    }
     if (tolerance == kTolerances.front()) found.error_before = median_error(tracks);
     adjuster.fit_to(tracks, observer);
     adjuster.apply_to(capture);

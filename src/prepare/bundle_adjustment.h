@@ -20,11 +20,12 @@ struct AdjustedCameras {
 /// the capture has no points of its own, whose maker adjusted the cameras to them.
 [[nodiscard]] bool adjusts_cameras(const Capture& capture, const Stage1Options& options);
 
-/// Moves the cameras of training views until points appear where views show them, and with `lenses` changes focal
-/// lengths, k1 and k2. Held-out views are not looked at: they keep their poses, and get the lens that they share with
-/// training views. The same capture gives the same cameras. Captures that show too few points keep theirs.
+/// Moves the cameras of training views, or changes focal lengths, k1 and k2, until points appear where views show them:
+/// what the options say is to be learned. Held-out views are not looked at: they keep their poses, and get the lens
+/// that they share with training views. The same capture gives the same cameras. Captures that show too few points keep
+/// theirs.
 /// @param capture  changed in place, as `apply_learned_views` does by what is returned
 /// @throws Interrupted  when the observer cancels; the capture may be changed
-AdjustedCameras adjust_cameras(Capture& capture, bool lenses, Observer& observer);
+AdjustedCameras adjust_cameras(Capture& capture, const Stage1Options& options, Observer& observer);
 
 }  // namespace cnerf::prepare

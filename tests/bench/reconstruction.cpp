@@ -102,8 +102,11 @@ void print_points(cnerf::Capture& capture) {
 /// Adjusts its cameras, with lenses if asked; its points become those that the adjusted cameras show.
 void print_adjustment(cnerf::Capture& capture, bool lenses) {
   const Clock::time_point start = Clock::now();
+  cnerf::Stage1Options asked;
+  asked.poses = true;
+  asked.lenses = lenses;
   cnerf::Observer silent;
-  cnerf::prepare::AdjustedCameras cameras = cnerf::prepare::adjust_cameras(capture, lenses, silent);
+  cnerf::prepare::AdjustedCameras cameras = cnerf::prepare::adjust_cameras(capture, asked, silent);
   capture.points = std::move(cameras.points);
   std::printf("cameras adjusted to %zu points: %.3f pixels off, %.3f before, in %.1f s\n", capture.points.size(),
               cameras.error_after, cameras.error_before, seconds_since(start));

@@ -38,7 +38,7 @@ cnerf::Capture capture_of(const char* folder, Arguments& own) {
 void prepare(cnerf::Capture& capture, const cnerf::Stage1Options& options) {
   cnerf::Observer silent;
   if (cnerf::prepare::adjusts_cameras(capture, options)) {
-    auto cameras = cnerf::prepare::adjust_cameras(capture, options.lenses, silent);
+    auto cameras = cnerf::prepare::adjust_cameras(capture, options, silent);
     capture.points = std::move(cameras.points);
     std::printf("cameras adjusted: %.3f pixels off, %.3f before\n", cameras.error_after, cameras.error_before);
   }

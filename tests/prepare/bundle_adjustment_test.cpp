@@ -56,6 +56,13 @@ double degrees_off(const Capture& capture, const std::vector<Affined>& truth) {
   return align_poses(test::training_poses(capture), truth, 1).median_degrees;
 }
 
+Stage1Options learning(bool poses, bool lenses) {
+  Stage1Options options;
+  options.poses = poses;
+  options.lenses = lenses;
+  return options;
+}
+
 TEST(BundleAdjustment, FindsCamerasThatStandElsewhere) {
   Observer silent;
   Capture capture = corner_capture();
@@ -64,7 +71,7 @@ TEST(BundleAdjustment, FindsCamerasThatStandElsewhere) {
   test::disturb(capture, {.degrees = 0.4, .shift = 0.004});
   Capture again = capture;
   const double before = degrees_off(capture, truth);
-  const AdjustedCameras found = adjust_cameras(capture, false, silent);
+  const AdjustedCameras found = adjust_cameras(capture, learning(true, false), silent);
   EXPECT_GT(before, 0.2);
   EXPECT_LT(degrees_off(capture, truth), 0.25 * before);
   EXPECT_LT(found.error_after, 0.5 * found.error_before);
@@ -73,7 +80,7 @@ TEST(BundleAdjustment, FindsCamerasThatStandElsewhere) {
   EXPECT_EQ(capture.views[0].intrinsics, again.views[0].intrinsics) << "lenses were not asked for";
   for (const SparsePoint& point : found.points) EXPECT_THAT(point.views, testing::Not(testing::Contains(2u)));
 
-  const AdjustedCameras second = adjust_cameras(again, false, silent);
+  const AdjustedCameras second = adjust_cameras(again, learning(true, false), silent);
   EXPECT_EQ(second.points, found.points) << "the same each time";
   for (std::size_t v = 0; v < capture.views.size(); ++v) {
     EXPECT_EQ(again.views[v].world_from_camera, capture.views[v].world_from_camera);
@@ -85,10 +92,20 @@ TEST(BundleAdjustment, FindsTheFocalLength) {
   Capture capture = corner_capture();
   const std::vector<Affined> truth = test::training_poses(capture);
   test::disturb(capture, {.focal = 0.04});
-  const AdjustedCameras found = adjust_cameras(capture, true, silent);
+  const AdjustedCameras found = adjust_cameras(capture, learning(true, true), silent);
   for (const View& view : capture.views) EXPECT_NEAR(view.intrinsics.fx, 210, 0.6) << "held out or not";
   EXPECT_NEAR(std::exp(found.moved.lenses.at(0).log_focal), 1 / 1.04, 0.003);
   EXPECT_LT(degrees_off(capture, truth), 0.1);
+}
+
+TEST(BundleAdjustment, LeavesPosesAloneWhereLensesAloneAreAskedFor) {
+  Observer silent;
+  Capture capture = corner_capture();
+  const std::vector<Affined> truth = test::training_poses(capture);
+  test::disturb(capture, {.focal = 0.04});
+  (void)adjust_cameras(capture, learning(false, true), silent);
+  EXPECT_NEAR(capture.views[0].intrinsics.fx, 210, 0.6);
+  EXPECT_EQ(test::training_poses(capture), truth);
 }
 
 TEST(BundleAdjustment, WhatItReturnsIsWhatItDid) {
@@ -96,7 +113,7 @@ TEST(BundleAdjustment, WhatItReturnsIsWhatItDid) {
   Capture capture = corner_capture();
   test::disturb(capture, {.degrees = 0.4, .focal = 0.02});
   Capture given = capture;
-  const AdjustedCameras found = adjust_cameras(capture, true, silent);
+  const AdjustedCameras found = adjust_cameras(capture, learning(true, true), silent);
   apply_learned_views(given, found.moved);
   for (std::size_t v = 0; v < capture.views.size(); ++v) {
     EXPECT_EQ(given.views[v].world_from_camera, capture.views[v].world_from_camera);
@@ -109,7 +126,7 @@ TEST(BundleAdjustment, LeavesBareWallsAlone) {
   Capture capture = corner_capture();
   for (View& view : capture.views) std::ranges::fill(view.image.u8, std::uint8_t(99));
   const Affined before = capture.views[0].world_from_camera;
-  const AdjustedCameras found = adjust_cameras(capture, true, silent);
+  const AdjustedCameras found = adjust_cameras(capture, learning(true, true), silent);
   EXPECT_TRUE(found.moved.corrections.empty());
   EXPECT_TRUE(found.points.empty());
   EXPECT_EQ(capture.views[0].world_from_camera, before);
@@ -117,15 +134,11 @@ TEST(BundleAdjustment, LeavesBareWallsAlone) {
 
 TEST(BundleAdjustment, IsForThoseWhoLearnCamerasThatNobodyAdjusted) {
   Capture capture = corner_capture();
-  Stage1Options options;
-  EXPECT_FALSE(adjusts_cameras(capture, options));
-  options.poses = true;
-  EXPECT_TRUE(adjusts_cameras(capture, options));
-  options = {};
-  options.lenses = true;
-  EXPECT_TRUE(adjusts_cameras(capture, options));
+  EXPECT_FALSE(adjusts_cameras(capture, learning(false, false)));
+  EXPECT_TRUE(adjusts_cameras(capture, learning(true, false)));
+  EXPECT_TRUE(adjusts_cameras(capture, learning(false, true)));
   capture.points = {{{0, 0, 0}, 1, {0, 1, 2}}};
-  EXPECT_FALSE(adjusts_cameras(capture, options)) << "who made the points has adjusted the cameras";
+  EXPECT_FALSE(adjusts_cameras(capture, learning(true, true))) << "who made the points has adjusted the cameras";
 }
 
 TEST(BundleAdjustment, EndsWhereTheObserverCancels) {
@@ -135,7 +148,7 @@ TEST(BundleAdjustment, EndsWhereTheObserverCancels) {
     bool is_matching = false;
   } observer;
   Capture capture = corner_capture();
-  EXPECT_THROW((void)adjust_cameras(capture, true, observer), Interrupted);
+  EXPECT_THROW((void)adjust_cameras(capture, learning(true, true), observer), Interrupted);
 }
 
 }  // namespace
