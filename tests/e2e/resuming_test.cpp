@@ -33,6 +33,31 @@ TEST(Resuming, TrainingIsExact) {
   EXPECT_TRUE(read_binary_file(folder / "parts/stage1.snapshot") == read_binary_file(tiny_run() / "stage1.snapshot"));
 }
 
+TEST(Resuming, ATrainingThatAdjustsCamerasIsExact) {
+  const TempDir folder;
+  const std::string capture = (folder / "capture").string();
+  ASSERT_EQ(cnerf({"sample", "-o", capture, "--cloth", "--path", "orbit", "--views", "24", "--width", "240", "--height",
+                   "180", "--samples-per-pixel", "4"})
+                .exit_code,
+            0);
+  const auto training = [&](const std::string& run) {
+    return concatenated({"train", capture, "-o", (folder / run).string(), "--progress", "json", "--set",
+                         "stage1.poses=true", "--set", "stage1.lenses=true"},
+                        tiny_options());
+  };
+  const ProgramResult whole = cnerf(training("whole"));
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  EXPECT_THAT(whole.out + whole.err, HasSubstr("cameras adjusted to "));
+  const ProgramResult stopped = cnerf_interrupted_at(training("parts"), "\"stage 1\"");
+  if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
+  EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
+  const ProgramResult resumed = cnerf(concatenated(training("parts"), {"--resume"}));
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_TRUE(read_binary_file(folder / "parts/stage1.snapshot") == read_binary_file(folder / "whole/stage1.snapshot"));
+  EXPECT_THAT(cnerf({"info", (folder / "whole").string()}).out,
+              testing::AllOf(HasSubstr("cameras:"), HasSubstr("lens:"), HasSubstr("focal length times")));
+}
+
 TEST(Resuming, AColorizationIsExact) {
   const TempDir folder;
   const fs::path whole = copied(tiny_run(), folder / "whole"), parts = copied(tiny_run(), folder / "parts");
