@@ -16,7 +16,7 @@ namespace cnerf::pipeline {
 namespace fs = std::filesystem;
 namespace {
 
-/// The capture with cameras adjusted to what its views show, and says how far they were off.
+/// Adjusts the capture's cameras to what its views show, and says how far they were off.
 prepare::AdjustedCameras adjust(Capture& capture, const Stage1Options& options, Observer& observer) {
   const Stopwatch watch;
   prepare::AdjustedCameras cameras = prepare::adjust_cameras(capture, options, observer);
@@ -58,10 +58,9 @@ void train_step(const RunContext& context, const TrainJob& job, const Engines& e
   cluster::Ranks& world = cluster::world();
   RunRecord record = directory.record();
   if (world.agreed(!record.stage1.finished || !job.resume)) {
-    const bool goes_on = job.resume && fs::exists(directory.stage1_snapshot());
+    const bool goes_on = world.agreed(job.resume && fs::exists(directory.stage1_snapshot()));
     cluster::Ranks& ranks = ranks_that_train(engines, context.config.stage1.samples_per_step >= kSamplesWorthSharing);
-    const bool all_go_on = world.agreed(goes_on);
-    if (is_needed(ranks)) record.stage1 = {train(context, job, all_go_on, ranks, engines, observer), true};
+    if (is_needed(ranks)) record.stage1 = {train(context, job, goes_on, ranks, engines, observer), true};
     if (world.is_first()) directory.save(record);
     world.barrier("end of stage 1");
   }

@@ -120,7 +120,9 @@ class Listener final : public ceres::IterationCallback {
 
 double size_of(const Capture& capture) {
   Aabbd box = Aabbd::empty();
-  for (const View& view : capture.views) box.grow(view.world_from_camera.translation);
+  for (const View& view : capture.views) {
+    if (!view.held_out) box.grow(view.world_from_camera.translation);
+  }
   return length(box.size());
 }
 
@@ -206,7 +208,7 @@ class Adjuster {
     options.num_threads = 1;  // sums of several come out differently each time
     options.logging_type = ceres::SILENT;
     options.callbacks.push_back(&listener);
-    FLAGS_minloglevel = google::GLOG_FATAL;  // it would write to the terminal
+    FLAGS_minloglevel = google::GLOG_FATAL;  // steps that fail are no news for the terminal
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);
     if (observer.is_cancelled()) throw Interrupted("stopped while adjusting cameras");

@@ -33,7 +33,7 @@ class FeatureTracks {
   struct ViewFeatures {
     std::vector<PixelPosition> pixels;  ///< of the view's own picture
     cv::Mat1f descriptors;              ///< [features, 128], unit length
-    double pixel_per_own = 1;           ///< share that a pixel of `kLongestSide` has of one of the view's own
+    double pixel_per_own = 1;           ///< pixels of `kLongestSide` per one of the view's own
   };
 
   /// Finds the features. The observer is told how far it is.

@@ -26,13 +26,15 @@ Vec3d seen_by(Vec3d origin, Vec3d direction) {
   return origin + direction * std::min(to_floor, to_wall);
 }
 
+constexpr Intrinsics kPinhole = {LensModel::kPinhole, 240, 180, 210, 210, 120, 90, {}};
+
 /// Twelve cameras on an arc that look into the corner between a floor and a wall, the third one held out.
-Capture corner_capture() {
+Capture corner_capture(const Intrinsics& lens = kPinhole) {
   Capture capture;
   for (int i = 0; i < 12; ++i) {
     View view;
     view.name = std::to_string(i);
-    view.intrinsics = {LensModel::kPinhole, 240, 180, 210, 210, 120, 90, {}};
+    view.intrinsics = lens;
     view.image.width = 240;
     view.image.height = 180;
     const double angle = (i - 5.5) * 9 * kDegree;
@@ -96,6 +98,33 @@ TEST(BundleAdjustment, FindsTheFocalLength) {
   for (const View& view : capture.views) EXPECT_NEAR(view.intrinsics.fx, 210, 0.6) << "held out or not";
   EXPECT_NEAR(std::exp(found.moved.lenses.at(0).log_focal), 1 / 1.04, 0.003);
   EXPECT_LT(degrees_off(capture, truth), 0.1);
+}
+
+TEST(BundleAdjustment, FindsAForgottenDistortion) {
+  Observer silent;
+  Intrinsics lens = kPinhole;
+  lens.model = LensModel::kOpenCv;
+  lens.distortion[0] = -0.15;
+  Capture capture = corner_capture(lens);
+  test::disturb(capture, {.focal = 0.04});  // which makes it a pinhole
+  (void)adjust_cameras(capture, learning(true, true), silent);
+  const Intrinsics& found = capture.views[0].intrinsics;
+  EXPECT_NEAR(found.fx, 210, 2);
+  const auto at = [](const Intrinsics& of) { return ray_direction(of, {10, 10}); };  // a corner of the picture
+  EXPECT_LT(length(at(found) - at(lens)), 0.004);
+  EXPECT_GT(length(at(kPinhole) - at(lens)), 0.02);
+}
+
+TEST(BundleAdjustment, FindsTheFocalLengthOfAFisheye) {
+  Observer silent;
+  Intrinsics lens = kPinhole;
+  lens.model = LensModel::kOpenCvFisheye;
+  lens.distortion[0] = 0.03;
+  Capture capture = corner_capture(lens);
+  test::disturb(capture, {.focal = 0.04});
+  (void)adjust_cameras(capture, learning(true, true), silent);
+  EXPECT_NEAR(capture.views[0].intrinsics.fx, 210, 1);
+  EXPECT_EQ(capture.views[0].intrinsics.distortion, lens.distortion);
 }
 
 TEST(BundleAdjustment, LeavesPosesAloneWhereLensesAloneAreAskedFor) {
