@@ -50,15 +50,7 @@ class ReceptionTest : public testing::Test {
     return reception_->answer({"POST", "/studio/orders", {}, kSender, {}, json{{"order", name}}.dump()});
   }
   json state() { return json::parse(reception_->answer({"GET", "/studio/state", {}, kSender, {}, {}}).body); }
-  json wait_until(const std::function<bool(const json&)>& holds) {
-    std::uint64_t seen = 0;
-    for (;;) {
-      const auto news = reception_->wait_for_news(seen, 60);
-      if (!news) throw std::runtime_error("no news for a minute");
-      seen = news->first;
-      if (json state = json::parse(news->second); holds(state)) return state;
-    }
-  }
+  json wait_until(const std::function<bool(const json&)>& holds) { return test::wait_until(*reception_, holds); }
 
   test::TempDir folder_;
   Observer observer_;

@@ -93,16 +93,7 @@ class StudioTest : public testing::Test {
     const json body = {{"strokes", strokes}, {"viewpoints", viewpoints}};
     return studio_->answer({"PUT", "/studio/strokes", {}, kPainter, revision, body.dump()});
   }
-  json wait_until(const std::function<bool(const json&)>& holds) {
-    std::uint64_t seen = 0;
-    for (;;) {
-      const auto news = studio_->wait_for_news(seen, 60);
-      if (!news) throw std::runtime_error("no news for a minute");
-      seen = news->first;
-      json state = json::parse(news->second);
-      if (holds(state)) return state;
-    }
-  }
+  json wait_until(const std::function<bool(const json&)>& holds) { return test::wait_until(*studio_, holds); }
   /// Gives an order and waits for its end.
   json ordered(const json& order) {
     EXPECT_EQ(post("orders", order).status, 202);
