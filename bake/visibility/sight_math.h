@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "bake/lattice/brick_grid.h"
 #include "src/base/host_device.h"
@@ -14,11 +15,26 @@
 
 namespace cnerf::bake {
 
+/// How far a camera sees, in cells of its picture.
+struct DepthMap {
+  const float* values = nullptr;  ///< [height][width] distances, world units; none: as far as there is light
+  int width = 0, height = 0;
+  float cells_per_pixel = 0;
+
+  [[nodiscard]] CNERF_HD bool hides(PixelPosition pixel, double distance) const {
+    if (values == nullptr) return false;
+    const int x = std::min(int(float(pixel.x) * cells_per_pixel), width - 1);
+    const int y = std::min(int(float(pixel.y) * cells_per_pixel), height - 1);
+    return distance > double(values[std::size_t(y) * std::size_t(width) + std::size_t(x)]);
+  }
+};
+
 /// A camera of a bake.
 struct Eye {
   Intrinsics intrinsics;
   Affined camera_from_world;
   Vec3d centre{};  ///< world
+  DepthMap depths;
 };
 
 /// A point, and what makes a camera see it.
@@ -26,7 +42,6 @@ struct Sight {
   Vec3d world{};            ///< world units
   float least = 0;          ///< transmittance below which a camera does not count, if above kSeenTransmittance
   std::uint32_t order = 0;  ///< which order of cameras is tried
-  int most_in_vain = std::numeric_limits<int>::max();  ///< cameras tried before it is given up, where none sees it
 };
 
 /// A camera and how much of a point's light reaches it.
@@ -62,7 +77,6 @@ namespace sight {
 inline constexpr float kSeenTransmittance = 1e-3f;  ///< below which a camera does not see a point
 inline constexpr float kGoodTransmittance = 0.5f;   ///< a view with less is replaced when a better one is found
 inline constexpr int kTriesPerView = 3;  ///< cameras tried for each view wanted, once there are enough dim ones
-inline constexpr int kMostInVain = 16;   ///< for voxels, nearly all of which lie within something
 
 /// Steps until the ray leaves the cube that starts at `low`, at least one. Rays stay on the lattice of whole steps, so
 /// that skipping changes nothing.
@@ -94,21 +108,24 @@ CNERF_HD inline bool inside(Vec3f p, Vec3f size) {
 
 }  // namespace sight
 
-/// Transmittance between two points in voxel coordinates, by steps of one voxel with nearest-neighbour densities. The
-/// first voxel's length after `from` is left out: a surface must not hide itself.
-/// @param voxel_size  world units.  @return in [0, 1]; 0 once it falls below `stop_below`.
+/// What a ray comes through: by steps of one voxel with nearest-neighbour densities, from the first one on.
+struct Passed {
+  float depth = 0;  ///< optical
+  float steps = 0;  ///< where `depth` came to exceed what was allowed; else infinite
+};
+
+/// @param from, to  voxel coordinates.  @param voxel_size  world units
 template <typename Grid>
-[[nodiscard]] CNERF_HD float transmittance_between(const Grid& sigma, double voxel_size, Vec3f from, Vec3f to,
-                                                   float stop_below) {
+[[nodiscard]] CNERF_HD Passed pass_through(const Grid& sigma, double voxel_size, Vec3f from, Vec3f to, float deepest) {
+  constexpr float kNever = std::numeric_limits<float>::infinity();
   const Vec3f path = to - from;
   const float distance = length(path);
-  if (!(distance > 1.0f)) return 1.0f;
+  if (!(distance > 1.0f)) return {0, kNever};
   const Vec3f d = path / distance;
   const Vec3f inverse{1 / d.x, 1 / d.y, 1 / d.z};
   const Vec3f start = from - sigma.min().template cast<float>();
   const Vec3f size = sigma.size().template cast<float>();
   const auto h = float(voxel_size);
-  const float deepest = -std::log(stop_below);
   float depth = 0;
   // Whole steps from the start, so that where a ray comes in does not matter; the first may round to just outside.
   const float enter = std::max(1.0f, std::ceil(sight::entry(start, inverse, size)));
@@ -130,10 +147,35 @@ template <typename Grid>
       continue;
     }
     depth += brick[brick_offset(local_part(voxel))] * h;
-    if (depth > deepest) return 0;
+    if (depth > deepest) return {depth, t};
     t += 1;
   }
-  return std::exp(-depth);
+  return {depth, kNever};
+}
+
+/// Transmittance between two points in voxel coordinates. The first voxel's length after `from` is left out: a surface
+/// must not hide itself.
+/// @param voxel_size  world units.  @return in [0, 1]; 0 once it falls below `stop_below`.
+template <typename Grid>
+[[nodiscard]] CNERF_HD float transmittance_between(const Grid& sigma, double voxel_size, Vec3f from, Vec3f to,
+                                                   float stop_below) {
+  const float deepest = -std::log(stop_below);
+  const float depth = pass_through(sigma, voxel_size, from, to, deepest).depth;
+  return depth > deepest ? 0 : std::exp(-depth);
+}
+
+/// How far along a ray there may be light: what lies farther from `from` than this and than its own voxel's size is not
+/// seen from there.
+/// @param from  voxel coordinates.  @param direction  of length 1.  @param most  what matters, world units
+/// @return world units; infinite where nothing ends it before `most`
+template <typename Grid>
+[[nodiscard]] CNERF_HD float sight_end(const Grid& sigma, double voxel_size, Vec3f from, Vec3f direction, float most) {
+  const Vec3f size = sigma.size().template cast<float>();
+  const Vec3f middle = sigma.min().template cast<float>() + size * 0.5f;
+  const float far = std::min(length(middle - from) + length(size), most / float(voxel_size));
+  const float deepest = -std::log(sight::kSeenTransmittance);
+  // Steps of other rays fall elsewhere within the voxel.
+  return (pass_through(sigma, voxel_size, from, from + direction * far, deepest).steps + 1) * float(voxel_size);
 }
 
 /// From a point of level `own` to a camera, through all levels; anything below `least` once it falls below that.
@@ -153,28 +195,33 @@ template <typename Grid>
   return transmittance;
 }
 
-[[nodiscard]] CNERF_HD inline bool has_in_picture(const Eye& eye, Vec3d world) {
+/// Where a camera has a point in its picture.
+[[nodiscard]] CNERF_HD inline std::optional<PixelPosition> pixel_of(const Eye& eye, Vec3d world) {
   const auto pixel = lens::project(eye.intrinsics, eye.camera_from_world.point(world));
-  return pixel && pixel->x >= 0 && pixel->y >= 0 && pixel->x <= eye.intrinsics.width &&
-         pixel->y <= eye.intrinsics.height;
+  const bool is_inside =
+      pixel && pixel->x >= 0 && pixel->y >= 0 && pixel->x <= eye.intrinsics.width && pixel->y <= eye.intrinsics.height;
+  return is_inside ? pixel : std::nullopt;
 }
 
 /// At most `scene.views` cameras that have the point in their picture and see it, best first.
-/// @param order  [scene.eye_count] cameras as they are worth trying
+/// @param order  [scene.eye_count] cameras as they are worth trying; what follows a -1 is not
 /// @param seen   [scene.views] the answer.  @return how many there are.
 template <typename Grid>
 CNERF_HD int find_seeing(const SightScene<Grid>& scene, int own, const Sight& point, const std::int32_t* order,
                          SeenBy* seen) {
   const float least = point.least < sight::kSeenTransmittance ? sight::kSeenTransmittance : point.least;
+  const double voxel_size = scene.levels[own].voxel_size;
   int count = 0, good = 0, tried = 0;
   for (int turn = 0; turn < scene.eye_count; ++turn) {
+    if (order[turn] < 0) break;
     const Eye& eye = scene.eyes[order[turn]];
-    if (!has_in_picture(eye, point.world)) continue;
+    const std::optional<PixelPosition> pixel = pixel_of(eye, point.world);
+    if (!pixel) continue;
     // The cameras tried so far surround the point already. Just below a surface matter is seen dimly by many, deeper
     // inside by none.
     ++tried;
     if (count == scene.views && tried > sight::kTriesPerView * scene.views) break;
-    if (count == 0 && tried > point.most_in_vain) break;
+    if (eye.depths.hides(*pixel, length(point.world - eye.centre) - voxel_size)) continue;
     const float transmittance = transmittance_to(scene, own, eye, point.world, least);
     if (transmittance < least) continue;
     int place = count;  // behind all that are as good

@@ -18,7 +18,7 @@ constexpr std::size_t kSightsAtATime = 256;
 std::vector<Eye> eyes_of(const std::vector<Camera>& cameras) {
   std::vector<Eye> eyes;
   for (const Camera& camera : cameras) {
-    eyes.push_back({camera.intrinsics, camera.world_from_camera.inverse(), camera.world_from_camera.translation});
+    eyes.push_back({camera.intrinsics, camera.world_from_camera.inverse(), camera.world_from_camera.translation, {}});
   }
   return eyes;
 }
@@ -68,6 +68,20 @@ ViewSelection::ViewSelection(const std::vector<Camera>& cameras, std::vector<Den
   }
 }
 
+void ViewSelection::map_depths() {
+  depth_maps_ = DepthMaps(eyes_, clear_levels_);
+  for (std::size_t e = 0; e < eyes_.size(); ++e) eyes_[e].depths = depth_maps_.map(e, depth_maps_.values().data());
+}
+
+std::vector<std::int32_t> ViewSelection::order_for(Vec3d centre, double radius) const {
+  std::vector<std::int32_t> order = try_order(eyes_, centre);
+  if (depth_maps_.is_empty()) return order;
+  const auto end = std::ranges::stable_partition(
+      order, [&](std::int32_t eye) { return depth_maps_.may_see(std::size_t(eye), eyes_[eye], centre, radius); });
+  std::ranges::fill(end, -1);
+  return order;
+}
+
 SightScene<BrickGrid<float>> ViewSelection::scene() const {
   return {eyes_.data(), int(eyes_.size()), levels_.data(), int(levels_.size()), views_per_voxel_};
 }
@@ -109,7 +123,9 @@ std::unique_ptr<ViewSelection> select_views(const std::vector<Camera>& cameras, 
     }
   }
 #endif
-  return std::make_unique<ViewSelection>(cameras, levels, options);
+  auto views = std::make_unique<ViewSelection>(cameras, levels, options);
+  views->map_depths();
+  return views;
 }
 
 }  // namespace cnerf::bake

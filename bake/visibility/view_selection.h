@@ -8,6 +8,7 @@
 #include "bake/camera.h"
 #include "bake/density/levels.h"
 #include "bake/visibility/clear_grid.h"
+#include "bake/visibility/depth_maps.h"
 #include "bake/visibility/sight_math.h"
 #include "src/base/observer.h"
 #include "src/engine/engines.h"
@@ -30,7 +31,7 @@ inline constexpr std::size_t kViewsAtATime = std::size_t(1) << 20;
 /// A question about points of one level.
 struct SightBatch {
   std::vector<Sight> sights;
-  std::vector<std::int32_t> orders;  ///< [orders][cameras], each as try_order gives it
+  std::vector<std::int32_t> orders;  ///< [orders][cameras], each as try_order or order_for gives it
 };
 
 /// The answer.
@@ -53,8 +54,15 @@ class ViewSelection {
   ViewSelection(const ViewSelection&) = delete;
   ViewSelection& operator=(const ViewSelection&) = delete;
 
+  /// Prepares for many more points than pictures have pixels, most of which nothing sees. Before the first question.
+  void map_depths();
+
   [[nodiscard]] const std::vector<Eye>& eyes() const { return eyes_; }
   [[nodiscard]] int views_per_voxel() const { return views_per_voxel_; }
+
+  /// try_order for points of a ball, without the cameras of which map_depths says that they see nothing of it; -1
+  /// stands for each of these at the end.
+  [[nodiscard]] std::vector<std::int32_t> order_for(Vec3d centre, double radius) const;
 
   /// At most `views_per_voxel` cameras that have the point in their picture and see it, best first.
   /// @param level  that the point belongs to.  @param order, least  as try_order and Sight have them
@@ -66,6 +74,7 @@ class ViewSelection {
 
  protected:
   [[nodiscard]] SightScene<BrickGrid<float>> scene() const;
+  [[nodiscard]] const DepthMaps& depth_maps() const { return depth_maps_; }
 
  private:
   [[nodiscard]] SightScene<ClearGrid> clear_scene() const;
@@ -74,6 +83,7 @@ class ViewSelection {
   std::vector<DensityLevel> levels_;
   std::vector<ClearGrid> grids_;  // of the levels
   std::vector<SightLevel<ClearGrid>> clear_levels_;
+  DepthMaps depth_maps_;
   int views_per_voxel_;
 };
 

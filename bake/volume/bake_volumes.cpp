@@ -147,7 +147,9 @@ Candidates RadiancePass::candidates_of(std::span<const DenseVoxel> brick, int pl
   const Vec3i brick_min = brick_min_of(plan, plane, brick.front().brick);
   const Vec3d centre = plan.world_from_voxel(brick_min.cast<double>() + Vec3d{kHalf, kHalf, kHalf});
   Candidates candidates;
-  candidates.order = try_order(views_.eyes(), centre);
+  candidates.order = views_.order_for(centre, std::sqrt(3) * kHalf * plan.voxel_size);
+  const bool is_hidden = candidates.order.empty() || candidates.order.front() < 0;
+  if (is_hidden && !keep_unseen_) return candidates;
   for (const DenseVoxel& voxel : brick) {
     const double opacity = -std::expm1(-voxel.sigma * plan.voxel_size);
     const auto least = float(weight_threshold_ / opacity);
@@ -156,7 +158,7 @@ Candidates RadiancePass::candidates_of(std::span<const DenseVoxel> brick, int pl
     const Vec3d world = plan.world_from_voxel(at.cast<double>() + voxel.centroid_in_voxel());
     candidates.voxels.push_back(at);
     candidates.sigma.push_back(voxel.sigma);
-    candidates.sights.push_back({world, keep_unseen_ ? 0 : least, 0, sight::kMostInVain});
+    candidates.sights.push_back({world, keep_unseen_ ? 0 : least, 0});
   }
   return candidates;
 }

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <numeric>
+#include <utility>
 
 #include "src/base/rng.h"
 #include "tests/bake/analytic_field.h"
@@ -120,15 +122,15 @@ struct Ring {
 };
 
 /// Eight cameras around the middle of a lattice of 64^3 voxels of size 1.
-Ring ring() {
+Ring ring(int pixels = 64) {
   Ring r;
   r.plan.voxel_size = 1;
   r.plan.resolution = {64, 64, 64};
   const Vec3d middle{32, 32, 32};
   for (int c = 0; c < 8; ++c) {
     const double angle = c * 3.14159265358979 / 4;
-    r.cameras.push_back(
-        camera_at("ring", middle + Vec3d{std::cos(angle), std::sin(angle), 0} * 200.0, middle, 64, 64, 128));
+    r.cameras.push_back(camera_at("ring", middle + Vec3d{std::cos(angle), std::sin(angle), 0} * 200.0, middle, pixels,
+                                  pixels, 2 * pixels));
   }
   return r;
 }
@@ -180,26 +182,126 @@ TEST(ViewSelection, KeepsTheBestOfMoreThanItWants) {
   EXPECT_EQ(of_best[0].camera, of_all[0].camera);
 }
 
-TEST(ViewSelection, GivesUpAPointThatTooManyDoNotSee) {
+/// Of points, with maps of depth and without.
+struct WithMaps {
+  int seen = 0;       ///< without maps
+  int lost = 0;       ///< of these, with them
+  int differing = 0;  ///< by other cameras, or more or less dimly, or not at all
+};
+
+WithMaps asked_with_maps(const Ring& r, const BrickGrid<float>& sigma, const std::vector<Vec3d>& points) {
+  const ViewSelection plain = onlookers(r, sigma, 3);
+  ViewSelection mapped = onlookers(r, sigma, 3);
+  mapped.map_depths();
+  SightBatch batch;
+  batch.orders = try_order(plain.eyes(), {32, 32, 32});
+  for (const Vec3d& point : points) batch.sights.push_back({point, 0, 0});
+  SeenBatch expected, found;
+  plain.find(0, batch, expected);
+  mapped.find(0, batch, found);
+  WithMaps result;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    bool is_same = expected.counts[i] == found.counts[i];
+    for (std::size_t s = 3 * i; is_same && s < 3 * i + std::size_t(expected.counts[i]); ++s) {
+      is_same = expected.seen[s].camera == found.seen[s].camera &&
+                expected.seen[s].transmittance == found.seen[s].transmittance;
+    }
+    result.differing += is_same ? 0 : 1;
+    result.seen += expected.counts[i] > 0 ? 1 : 0;
+    result.lost += expected.counts[i] > 0 && found.counts[i] == 0 ? 1 : 0;
+  }
+  return result;
+}
+
+std::vector<Vec3d> voxel_centres() {
+  std::vector<Vec3d> centres;
+  for (int i = 0; i < 64; ++i)
+    for (int j = 0; j < 64; ++j)
+      for (int k = 0; k < 64; ++k) centres.push_back({i + 0.5, j + 0.5, k + 0.5});
+  return centres;
+}
+
+TEST(DepthMaps, OfAWallEndWithinIt) {
+  const Ring r = ring();
+  const BrickGrid<float> sigma = wall(20, 50);
+  ViewSelection views = onlookers(r, sigma, 3);
+  views.map_depths();
+  const Eye& eye = views.eyes()[4];  // 200 from the middle, towards -x
+  for (const double inside : {0.5, 1.5}) EXPECT_FALSE(eye.depths.hides({32, 32}, 200 + inside)) << inside;
+  for (const double inside : {3.5, 10.0, 100.0}) EXPECT_TRUE(eye.depths.hides({32, 32}, 200 + inside)) << inside;
+  EXPECT_FALSE(views.eyes()[2].depths.hides({60, 32}, 1e6)) << "beside the wall";
+}
+
+TEST(DepthMaps, ChangeNothingOfAWall) {
+  const WithMaps asked = asked_with_maps(ring(), wall(20, 50), voxel_centres());
+  EXPECT_EQ(asked.differing, 0);
+  EXPECT_GT(asked.seen, 100000);
+}
+
+TEST(DepthMaps, ChangeNothingInFog) {
+  BrickGrid<float> fog({0, 0, 0}, {64, 64, 64}, 0.0f);
+  for (std::size_t b = 0; b < fog.brick_count(); ++b) fog.make_brick(b).fill(0.3f);
+  const WithMaps asked = asked_with_maps(ring(), fog, voxel_centres());
+  EXPECT_EQ(asked.differing, 0);
+  EXPECT_GT(asked.seen, 50000);
+  EXPECT_LT(asked.seen, 64 * 64 * 64);
+}
+
+TEST(DepthMaps, OfSpecksLoseFewPoints) {
+  const CounterRng rng(6, 1);
+  BrickGrid<float> sigma({0, 0, 0}, {64, 64, 64}, 0.0f);
+  for (int i = 0; i < 64; ++i)
+    for (int j = 0; j < 64; ++j)
+      for (int k = 0; k < 64; ++k) {
+        const auto at = std::uint64_t(64 * (64 * i + j) + k);
+        if (rng.uniform(at) < 0.1) sigma.set({i, j, k}, 20);
+      }
+  const WithMaps asked = asked_with_maps(ring(256), sigma, voxel_centres());
+  EXPECT_LT(asked.lost, asked.seen / 30) << "gaps between specks are finer than cells";
+  EXPECT_LT(asked.differing, asked.seen / 10);
+  EXPECT_GT(asked.seen, 20000);
+}
+
+TEST(DepthMaps, LeaveOutNoCameraThatSeesAPointOfABall) {
+  const Ring r = ring(256);
+  BrickGrid<float> blocks({0, 0, 0}, {64, 64, 64}, 0.0f);
+  for (std::size_t b = 0; b < blocks.brick_count(); ++b) {
+    if (CounterRng(5, 1).uniform(b) < 0.5) blocks.make_brick(b).fill(50);
+  }
+  const BrickGrid<float> thick = wall(20, 50);
+  for (const BrickGrid<float>* sigma : std::array{&std::as_const(thick), &std::as_const(blocks)}) {
+    ViewSelection views = onlookers(r, *sigma, 8);
+    views.map_depths();
+    const std::vector<std::int32_t> all = try_order(views.eyes(), {32, 32, 32});
+    int left_out = 0;
+    for (int i = 0; i < 64; i += kBrickSide)
+      for (int j = 0; j < 64; j += kBrickSide)
+        for (int k = 0; k < 64; k += kBrickSide) {
+          const Vec3d low{double(i), double(j), double(k)}, half{4, 4, 4};
+          const std::vector<std::int32_t> order = views.order_for(low + half, length(half));
+          left_out += int(std::ranges::count(order, -1));
+          for (int p = 0; p < kBrickVoxels; p += 7) {
+            const Vec3d at = low + brick_local(p).cast<double>() + half / 8.0;
+            const auto expected = views.seen_by(0, at, all), found = views.seen_by(0, at, order);
+            ASSERT_EQ(found.size(), expected.size()) << at.x << ' ' << at.y << ' ' << at.z;
+          }
+        }
+    EXPECT_GT(left_out, 100);
+  }
+}
+
+TEST(ViewSelection, FindsTheOneCameraOfManyThatSeesAPoint) {
   Ring r = ring();
-  const Camera seeing = r.cameras[4], blind = r.cameras[0];
-  r.cameras.assign(20, blind);
-  r.cameras[7] = seeing;
+  r.cameras.assign(40, r.cameras[0]);
+  r.cameras[39] = ring().cameras[4];
   const BrickGrid<float> sigma = wall(8, 50);
-  const ViewSelection views = onlookers(r, sigma, 3);
-  const auto seen_from = [&](std::size_t place, int most_in_vain) {
-    SightBatch batch;
-    batch.sights.push_back({{32.5, 32.5, 32.5}, 0, 0, most_in_vain});  // the wall's face towards -x
-    batch.orders.resize(20);
-    std::iota(batch.orders.begin(), batch.orders.end(), 0);
-    std::swap(batch.orders[7], batch.orders[place]);
-    SeenBatch answer;
-    views.find(0, batch, answer);
-    return answer.counts[0];
-  };
-  EXPECT_EQ(seen_from(15, 16), 1);
-  EXPECT_EQ(seen_from(16, 16), 0);
-  EXPECT_EQ(seen_from(19, Sight().most_in_vain), 1);
+  ViewSelection views = onlookers(r, sigma, 3);
+  views.map_depths();
+  std::vector<std::int32_t> order(40);
+  std::iota(order.begin(), order.end(), 0);
+  const std::vector<SeenBy> seen = views.seen_by(0, {32.5, 32.5, 32.5}, order);  // the wall's face towards -x
+  ASSERT_EQ(seen.size(), 1u);
+  EXPECT_EQ(seen[0].camera, 39);
 }
 
 TEST(ViewSelection, ManyPointsAreAnsweredLikeOneByOne) {

@@ -46,7 +46,8 @@ TEST(Sights, AreThoseOfTheProcessor) {
   bake::Options options;
   options.views_per_voxel = 5;
   const std::vector<bake::Camera> cameras = cameras_around({16, 16, 16}, 45);
-  const bake::ViewSelection cpu(cameras, levels, options);
+  bake::ViewSelection cpu(cameras, levels, options);
+  cpu.map_depths();
   const auto cuda = make_view_selection_cuda(cameras, levels, options);
 
   bake::SightBatch batch;

@@ -53,6 +53,7 @@ class ViewSelectionCuda final : public ViewSelection {
   std::vector<LevelMemory> bricks_;
   DeviceBuffer<DeviceBricks> grids_;
   DeviceBuffer<SightLevel<DeviceBricks>> levels_;
+  DeviceBuffer<float> depths_;
   DeviceBuffer<Eye> eyes_;
   SightScene<DeviceBricks> scene_;
   // Of a question.
@@ -79,7 +80,11 @@ ViewSelectionCuda::ViewSelectionCuda(const std::vector<Camera>& cameras, std::ve
     on_device.push_back({grids_.data() + i, host.levels[i].origin, host.levels[i].voxel_size});
   }
   levels_ = uploaded(on_device, kAdvice);
-  eyes_ = uploaded(eyes(), kAdvice);
+  map_depths();
+  depths_ = uploaded(depth_maps().values(), kAdvice);
+  std::vector<Eye> on_its_maps = eyes();
+  for (std::size_t e = 0; e < on_its_maps.size(); ++e) on_its_maps[e].depths = depth_maps().map(e, depths_.data());
+  eyes_ = uploaded(on_its_maps, kAdvice);
   scene_ = {eyes_.data(), host.eye_count, levels_.data(), host.level_count, host.views};
 }
 
