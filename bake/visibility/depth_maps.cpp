@@ -64,8 +64,7 @@ DepthMaps::DepthMaps(std::span<const Eye> eyes, std::span<const SightLevel<Clear
   std::size_t end = 0;
   for (const Eye& eye : eyes) {
     const auto cells = [&](int length) { return int(std::ceil(length / pixels_per_cell_)); };
-    const Place& place =
-        places_.emplace_back(Place{end, cells(eye.intrinsics.width), cells(eye.intrinsics.height)});
+    const Place& place = places_.emplace_back(Place{end, cells(eye.intrinsics.width), cells(eye.intrinsics.height)});
     for (int level = 0; level < kLevels; ++level) end += square_count(place.width, place.height, level);
   }
   values_.resize(end);
@@ -120,8 +119,7 @@ bool DepthMaps::may_see(std::size_t number, const Eye& eye, Vec3d centre, double
   const auto square = [&](double position, int cells) {
     return std::clamp(int(position / pixels_per_cell_) >> level, 0, squares(cells, level) - 1);
   };
-  const std::size_t at =
-      std::size_t(square(pixel->y, height)) * squares(width, level) + square(pixel->x, width);
+  const std::size_t at = std::size_t(square(pixel->y, height)) * squares(width, level) + square(pixel->x, width);
   return length(centre - eye.centre) - radius <= double(squares_of_level[at]);
 }
 
