@@ -76,9 +76,10 @@ void ViewSelection::map_depths() {
 std::vector<std::int32_t> ViewSelection::order_for(Vec3d centre, double radius) const {
   std::vector<std::int32_t> order = try_order(eyes_, centre);
   if (depth_maps_.is_empty()) return order;
-  const auto end = std::ranges::stable_partition(
-      order, [&](std::int32_t eye) { return depth_maps_.may_see(std::size_t(eye), eyes_[eye], centre, radius); });
-  std::ranges::fill(end, -1);
+  const auto may_see = [&](std::int32_t eye) {
+    return depth_maps_.may_see(std::size_t(eye), eyes_[eye], centre, radius);
+  };
+  std::fill(std::stable_partition(order.begin(), order.end(), may_see), order.end(), -1);
   return order;
 }
 
