@@ -10,9 +10,9 @@ namespace cnerf::bake {
 namespace {
 
 constexpr double kCellsAcross = 256;    // of the longer side of a picture, at most
-constexpr double kMostCells = 1 << 24;  // of all pictures: 64 MiB
+constexpr double kMostCells = 1 << 24;  // of all pictures: 64 MiB, and a third of that for squares
 constexpr int kLevels = 7;              // squares of 1 to 64 cells
-constexpr double kStretch = 1.25;       // of a lens, beside a straight picture
+constexpr double kStretch = 2;          // of a lens that distorts, beside a straight picture, at most
 constexpr float kNever = std::numeric_limits<float>::infinity();
 
 /// Squares of 2^level cells along a side of `cells`.
@@ -105,7 +105,8 @@ bool DepthMaps::may_see(std::size_t number, const Eye& eye, Vec3d centre, double
   if (front < radius || !pixel) return true;
   // How far from that the ball's points may be, in pixels.
   const double slant = length(in_camera) / in_camera.z;
-  const double around = kStretch * std::max(eye.intrinsics.fx, eye.intrinsics.fy) * slant * radius / front;
+  const double stretch = eye.intrinsics.model == LensModel::kPinhole ? 1 : kStretch;
+  const double around = stretch * std::max(eye.intrinsics.fx, eye.intrinsics.fy) * slant * radius / front;
   const double right = eye.intrinsics.width + around, bottom = eye.intrinsics.height + around;
   if (pixel->x < -around || pixel->y < -around || pixel->x > right || pixel->y > bottom) return false;
 

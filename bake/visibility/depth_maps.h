@@ -11,8 +11,8 @@
 namespace cnerf::bake {
 
 /// Of each camera, a cell per few pixels: the largest distance at which matter ends the rays of the cell and of those
-/// around it, as `sight_end` has it. Between the rays of two cells lies at most about what a voxel covers, so that what
-/// is called hidden is, but for single points behind the finest gaps. Then the same of squares of 2, 4, 8… cells.
+/// around it, as `sight_end` has it. A gap that lies between the rays of cells is overlooked: single points that are
+/// seen through it alone are called hidden. Then the same of squares of 2, 4, 8… cells.
 class DepthMaps {
  public:
   DepthMaps() = default;

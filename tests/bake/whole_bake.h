@@ -12,7 +12,8 @@ namespace cnerf::bake::test {
 inline std::vector<VolumePlanes> bake_volumes(const ColorField& field, const std::vector<Camera>& cameras,
                                               const std::vector<Level>& levels, const Options& options,
                                               Journal& journal, const ProgressSink& progress = {}) {
-  const ViewSelection views(cameras, density_levels(levels), options);
+  ViewSelection views(cameras, density_levels(levels), options);
+  views.map_depths();
   return bake::bake_volumes(field, views, levels, options, journal, progress);
 }
 
