@@ -2,6 +2,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <new>
+
+#include "src/base/error.h"
 
 namespace cnerf::studio {
 namespace {
@@ -14,6 +17,28 @@ std::uint64_t next_version() {
 }
 
 }  // namespace
+
+std::optional<Setback> setback_of(const std::function<void()>& work, const std::string& stopped) {
+  try {
+    work();
+    return std::nullopt;
+  } catch (const Interrupted&) {
+    return Setback{stopped, false};
+  } catch (const Error& problem) {
+    return Setback{problem.what(), true};
+  } catch (const std::bad_alloc&) {
+    return Setback{"the memory does not suffice for this", true};
+  }
+}
+
+void end_task(StateMessage& state, const std::optional<Setback>& setback) {
+  state.task.clear();
+  state.step.clear();
+  state.fraction = 0;
+  if (!setback) return;
+  state.message = setback->message;
+  state.failed = setback->failed;
+}
 
 Board::Board() {
   state_.version = next_version();
@@ -31,10 +56,10 @@ void Board::change(const std::function<void(StateMessage&)>& change) {
   changed();
 }
 
-void Board::say(const std::string& text, bool failed) {
+void Board::say(const std::string& text) {
   change([&](StateMessage& state) {
     state.message = text;
-    state.failed = failed;
+    state.failed = false;
   });
 }
 

@@ -16,6 +16,18 @@
 
 namespace cnerf::studio {
 
+/// Why a task was not done to its end.
+struct Setback {
+  std::string message;
+  bool failed;  ///< or stopped by somebody
+};
+
+/// Does the work; an error of it is told, and the studio stays.
+[[nodiscard]] std::optional<Setback> setback_of(const std::function<void()>& work, const std::string& stopped);
+
+/// Nothing is being done any more. A setback is told in the same change: whoever hears of it may order at once.
+void end_task(StateMessage& state, const std::optional<Setback>& setback);
+
 /// Versions grow from one board to the next of a process, so that a page hears of the change.
 class Board {
  public:
@@ -23,7 +35,7 @@ class Board {
 
   /// Changes the state under the lock, and tells everybody.
   void change(const std::function<void(StateMessage&)>& change);
-  void say(const std::string& text, bool failed = false);
+  void say(const std::string& text);
   /// Adds a line to what the work said lately.
   void note(const std::string& line);
 

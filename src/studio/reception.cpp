@@ -125,43 +125,31 @@ std::optional<pipeline::RunContext> Reception::run() {
       stop_requested_ = false;
       if (!is_working_) continue;
     }
-    std::optional<pipeline::RunContext> context = prepared(std::exchange(is_new, true));
+    std::optional<pipeline::RunContext> context;
+    const auto setback = setback_of([&] { context = prepared(std::exchange(is_new, true)); }, "stopped");
     const std::lock_guard lock(mutex_);
     is_working_ = false;
-    board_.change([](StateMessage& state) {
-      state.task.clear();
-      state.step.clear();
-      state.fraction = 0;
-    });
+    board_.change([&](StateMessage& state) { end_task(state, setback); });
     if (context) return context;
   }
   return std::nullopt;
 }
 
 /// @param is_new  what was prepared before is made again
-std::optional<pipeline::RunContext> Reception::prepared(bool is_new) {
+pipeline::RunContext Reception::prepared(bool is_new) {
   const auto between = [this] {
     if (should_stop()) throw Interrupted("stopped");
   };
   BoardObserver observer(board_, observer_, "prepare", between, [this] { return should_stop(); });
-  try {
-    const fs::path source = fs::exists(arrivals_) ? arrived_source() : source_;
-    if (source.empty()) throw UsageError("nothing has arrived yet");
-    fs::path capture = source;
-    if (prepare::needs_preparing(source)) {
-      capture = run_.parent_path() / (run_.filename().string() + "-capture");
-      const pipeline::ExistingOutput existing{.resume = !is_new, .overwrite = is_new};
-      pipeline::prepare_step({source, capture, {}, existing}, cpu_engines(), observer);
-    }
-    return open_(capture, observer);
-  } catch (const Interrupted&) {
-    board_.say("stopped");
-  } catch (const Error& problem) {
-    board_.say(problem.what(), true);
-  } catch (const std::bad_alloc&) {
-    board_.say("the memory does not suffice for this", true);
+  const fs::path source = fs::exists(arrivals_) ? arrived_source() : source_;
+  if (source.empty()) throw UsageError("nothing has arrived yet");
+  fs::path capture = source;
+  if (prepare::needs_preparing(source)) {
+    capture = run_.parent_path() / (run_.filename().string() + "-capture");
+    const pipeline::ExistingOutput existing{.resume = !is_new, .overwrite = is_new};
+    pipeline::prepare_step({source, capture, {}, existing}, cpu_engines(), observer);
   }
-  return std::nullopt;
+  return open_(capture, observer);
 }
 
 fs::path Reception::arrived_source() const {

@@ -61,7 +61,7 @@ class Reception final : public web::PageApi {
   web::PageAnswer put_arrival(const web::PageRequest& request);
   web::PageAnswer post_order(const web::PageRequest& request);
 
-  [[nodiscard]] std::optional<pipeline::RunContext> prepared(bool is_new);
+  [[nodiscard]] pipeline::RunContext prepared(bool is_new);
   /// What has arrived, as `prepare` wants it: a folder, or the one clip.
   [[nodiscard]] std::filesystem::path arrived_source() const;
   void count_arrivals();

@@ -98,24 +98,13 @@ void Studio::forget_viewpoints() {
   coloring_->forget_others(kept);
 }
 
-/// An order that cannot be carried out is told; the studio stays.
 void Studio::work_on(const Order& order) {
-  try {
-    carry_out(order);
-  } catch (const Interrupted&) {
-    board_.say("stopped; what was done by then stays");
-  } catch (const Error& problem) {
-    board_.say(problem.what(), true);
-  } catch (const std::bad_alloc&) {
-    board_.say("the memory does not suffice for this", true);
-  }
+  const auto setback = setback_of([&] { carry_out(order); }, "stopped; what was done by then stays");
   std::vector<TakeMessage> takes = list_takes();
   const std::lock_guard lock(mutex_);
   is_working_ = false;
   board_.change([&](StateMessage& state) {
-    state.task.clear();
-    state.step.clear();
-    state.fraction = 0;
+    end_task(state, setback);
     state.takes = std::move(takes);
     if (!coloring_) return;
     state.take = coloring_->base_name();
