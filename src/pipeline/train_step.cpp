@@ -20,11 +20,17 @@ namespace {
 prepare::AdjustedCameras adjust(Capture& capture, const Stage1Options& options, Observer& observer) {
   const Stopwatch watch;
   prepare::AdjustedCameras cameras = prepare::adjust_cameras(capture, options, observer);
-  observer.say(cameras.moved.corrections.empty()
-                   ? "cameras stay where they were given: views show too few points in common"
-                   : fmt::format("cameras adjusted to {} points: {:.2f} pixels off, {:.2f} before, in {}",
-                                 cameras.points.size(), cameras.error_after, cameras.error_before,
-                                 duration_text(watch.seconds())));
+  const std::string time = duration_text(watch.seconds());
+  if (cameras.evidence == 0) {
+    observer.say("cameras stay where they were given: views show too few points in common");
+  } else if (cameras.moved.corrections.empty()) {
+    observer.say(
+        fmt::format("cameras stay where they were given: points are {:.2f} pixels off, {:.2f} were they moved, in {}",
+                    cameras.error_before, cameras.error_after, time));
+  } else {
+    observer.say(fmt::format("cameras adjusted: points are {:.2f} pixels off, {:.2f} before, in {}",
+                             cameras.error_after, cameras.error_before, time));
+  }
   return cameras;
 }
 

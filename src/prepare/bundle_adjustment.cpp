@@ -28,6 +28,9 @@ namespace {
 constexpr std::array kTolerances = {16.0, 4.0};  // pixels
 constexpr double kOutlier = 1;                   // pixels: what is further off pulls less and less
 constexpr std::size_t kFewestPoints = 100;       // of a capture
+// Of the F statistic. Cameras that are right have 1 to 5, more than 1 where features say the same twice; half a degree
+// or a focal length 3 % off has hundreds (docs/evaluation.md).
+constexpr double kLeastEvidence = 8;
 
 // How far things are expected to be off. Next to thousands of features this says nothing, but for what features do not
 // say: where all cameras together stand, and the focal length of views that look alike.
@@ -126,10 +129,11 @@ double size_of(const Capture& capture) {
   return length(box.size());
 }
 
-double median_error(const std::vector<Track>& tracks) {
+/// Measures the tracks' errors anew.  @return  their median
+double measure(std::vector<Track>& tracks, const FeatureTracks& features, const Capture& capture) {
   std::vector<double> errors;
-  for (const Track& track : tracks) errors.push_back(track.error);
-  return errors.empty() ? 0 : median(errors);
+  for (Track& track : tracks) errors.push_back(track.error = features.error_of(track, capture));
+  return median(errors);
 }
 
 /// The numbers of all cameras, and how they were given.
@@ -146,8 +150,12 @@ class Adjuster {
     for (const View& view : capture.views) given_.push_back({view.intrinsics, view.world_from_camera});
   }
 
+  struct Fit {
+    double cost = 0, residuals = 0, parameters = 0;
+  };
+
   /// Fits the numbers to the tracks, whose points it moves.
-  void fit_to(std::vector<Track>& tracks, Observer& observer) {
+  Fit fit_to(std::vector<Track>& tracks, Observer& observer) {
     std::vector<std::array<double, 3>> points;
     for (const Track& track : tracks) points.push_back({track.position.x, track.position.y, track.position.z});
     ceres::Problem problem;
@@ -156,8 +164,10 @@ class Adjuster {
     }
     for (PoseNumbers& numbers : pose_numbers_) expect(problem, kPoseSpread, numbers, adjusts_poses_);
     for (LensNumbers& numbers : lens_numbers_) expect(problem, kLensSpread, numbers, adjusts_lenses_);
-    solve(problem, observer);
+    const ceres::Solver::Summary summary = solve(problem, observer);
     for (std::size_t t = 0; t < tracks.size(); ++t) tracks[t].position = {points[t][0], points[t][1], points[t][2]};
+    return {summary.final_cost, double(summary.num_residuals_reduced),
+            double(summary.num_effective_parameters_reduced)};
   }
 
   /// The numbers as stage 1 has them.
@@ -175,15 +185,11 @@ class Adjuster {
     return moved;
   }
 
-  /// Puts the capture's cameras where they were given.
-  void restore(Capture& capture) const {
+  /// Puts the capture's cameras where they are by now.
+  void apply_to(Capture& capture) const {
     for (std::size_t v = 0; v < given_.size(); ++v) {
       std::tie(capture.views[v].intrinsics, capture.views[v].world_from_camera) = given_[v];
     }
-  }
-  /// Puts them where they are by now.
-  void apply_to(Capture& capture) const {
-    restore(capture);
     apply_learned_views(capture, moves(capture));
   }
 
@@ -198,7 +204,7 @@ class Adjuster {
                              lens_numbers_[lens].data(), point.data());
   }
 
-  static void solve(ceres::Problem& problem, Observer& observer) {
+  static ceres::Solver::Summary solve(ceres::Problem& problem, Observer& observer) {
     Listener listener(observer);
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_SCHUR;
@@ -212,6 +218,7 @@ class Adjuster {
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem, &summary);
     if (observer.is_cancelled()) throw Interrupted("stopped while adjusting cameras");
+    return summary;
   }
 
   const FeatureTracks& features_;
@@ -232,24 +239,35 @@ bool adjusts_cameras(const Capture& capture, const Stage1Options& options) {
 AdjustedCameras adjust_cameras(Capture& capture, const Stage1Options& options, Observer& observer) {
   const FeatureTracks features(capture, observer);
   Adjuster adjuster(capture, features, options);
-  AdjustedCameras found;
+  Adjuster still(capture, features, Stage1Options{});  // moves points alone
   std::vector<Track> tracks;
+  Adjuster::Fit moved;
   for (const double tolerance : kTolerances) {
     tracks = features.triangulated(capture, tolerance, observer);
     if (tracks.size() < kFewestPoints) {
-      adjuster.restore(capture);
+      still.apply_to(capture);
       return {};
     }
-    if (tolerance == kTolerances.front()) found.error_before = median_error(tracks);
-    adjuster.fit_to(tracks, observer);
+    moved = adjuster.fit_to(tracks, observer);
     adjuster.apply_to(capture);
   }
-  found.moved = adjuster.moves(capture);
-  for (Track& track : tracks) {
-    track.error = features.error_of(track, capture);
+  AdjustedCameras found;
+  found.error_after = measure(tracks, features, capture);
+  std::vector<Track> as_given = tracks;
+  const Adjuster::Fit given = still.fit_to(as_given, observer);
+  still.apply_to(capture);
+  found.error_before = measure(as_given, features, capture);
+  found.evidence = (given.cost - moved.cost) / (moved.parameters - given.parameters) /
+                   (moved.cost / (moved.residuals - moved.parameters));
+  if (found.evidence >= kLeastEvidence) {
+    adjuster.apply_to(capture);
+    found.moved = adjuster.moves(capture);
+  } else {
+    tracks = std::move(as_given);
+  }
+  for (const Track& track : tracks) {
     if (!capture.is_bounded_object) found.points.push_back(point_of(track));
   }
-  found.error_after = median_error(tracks);
   return found;
 }
 

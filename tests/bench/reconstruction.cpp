@@ -108,7 +108,8 @@ void print_adjustment(cnerf::Capture& capture, bool lenses) {
   cnerf::Observer silent;
   cnerf::prepare::AdjustedCameras cameras = cnerf::prepare::adjust_cameras(capture, asked, silent);
   capture.points = std::move(cameras.points);
-  std::printf("cameras adjusted to %zu points: %.3f pixels off, %.3f before, in %.1f s\n", capture.points.size(),
+  std::printf("cameras %s: evidence %.1f; %zu points, %.3f pixels off, %.3f before, in %.1f s\n",
+              cameras.moved.corrections.empty() ? "left alone" : "adjusted", cameras.evidence, capture.points.size(),
               cameras.error_after, cameras.error_before, seconds_since(start));
 }
 

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "src/base/error.h"
+#include "src/base/statistics.h"
 #include "src/evaluate/pose_alignment.h"
 #include "src/train/luminance/learned_views.h"
 #include "tests/support/disturbed_capture.h"
@@ -148,6 +149,24 @@ TEST(BundleAdjustment, WhatItReturnsIsWhatItDid) {
     EXPECT_EQ(given.views[v].world_from_camera, capture.views[v].world_from_camera);
     EXPECT_EQ(given.views[v].intrinsics, capture.views[v].intrinsics);
   }
+}
+
+TEST(BundleAdjustment, LeavesCamerasAloneThatAreRight) {
+  Observer silent;
+  Capture capture = corner_capture();
+  const std::vector<Affined> truth = test::training_poses(capture);
+  const AdjustedCameras found = adjust_cameras(capture, learning(true, true), silent);
+  EXPECT_TRUE(found.moved.corrections.empty());
+  EXPECT_GT(found.evidence, 0);
+  EXPECT_EQ(test::training_poses(capture), truth);
+  EXPECT_EQ(capture.views[0].intrinsics, kPinhole);
+  ASSERT_GT(found.points.size(), 100u) << "which the given cameras show";
+  std::vector<double> off;
+  for (const SparsePoint& point : found.points) {
+    const double to_wall = std::abs(point.position.y - 1.5), to_floor = std::abs(point.position.z);
+    off.push_back(std::min(to_wall, to_floor));
+  }
+  EXPECT_LT(median(off), 0.02);
 }
 
 TEST(BundleAdjustment, LeavesBareWallsAlone) {

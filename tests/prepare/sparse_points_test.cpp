@@ -2,6 +2,7 @@
 
 #include "src/prepare/sparse_points.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -112,6 +113,20 @@ TEST(SparsePoints, AreNotLookedForWhereOutlinesBoundSpaceOrThereAreSome) {
   EXPECT_TRUE(points_for_training(job, observer).empty()) << "it has its own";
   capture.points = {{{0, 0, 0}, 0.5, {}}};
   EXPECT_FALSE(points_for_training(job, observer).empty()) << "of which nobody says who sees them";
+}
+
+TEST(SparsePoints, ThatFitBadlySayThatCamerasMayBeInexact) {
+  struct Listener : Observer {
+    void say(const std::string& text) override { said += text; }
+    std::string said;
+  } exact, inexact;
+  Capture capture = plane_capture(8);
+  const Stage1Options options;
+  EXPECT_FALSE(points_for_training({capture, options, "no.snapshot"}, exact).empty());
+  EXPECT_THAT(exact.said, testing::Not(testing::HasSubstr("inexact")));
+  for (int i = 0; i < 8; ++i) capture.views[std::size_t(i)].world_from_camera.translation.y += 0.012 * (i * 5 % 7 - 3);
+  EXPECT_FALSE(points_for_training({capture, options, "no.snapshot"}, inexact).empty());
+  EXPECT_THAT(inexact.said, testing::HasSubstr("stage1.poses=true"));
 }
 
 TEST(SparsePoints, AreLookedForAgainByATrainingThatGoesOnAndNotByOneThatDoesNotWantThem) {
