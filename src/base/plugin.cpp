@@ -121,7 +121,7 @@ const void* begun_plugin(const std::string& plugin, const std::string& entry, co
   const fs::path file = program_part("libcnerf_" + plugin + ".so");
   void* library = loaded(file);
   if (void* follow = ::dlsym(library, "cnerf_follow_interruption"); follow != nullptr) {
-    reinterpret_cast<void (*)(volatile std::sig_atomic_t*)>(follow)(interruption_flag());
+    reinterpret_cast<void (*)(std::atomic<int>*)>(follow)(interruption_flag());
   }
   void* address = ::dlsym(library, entry.c_str());
   if (address == nullptr) throw DeviceError(file.string() + " is of another version: it has no " + entry);

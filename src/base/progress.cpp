@@ -1,13 +1,15 @@
 #include "src/base/progress.h"
 
+#include <atomic>
 #include <csignal>
 #include <cstdlib>
 
 namespace cnerf {
 namespace {
 
-volatile std::sig_atomic_t own_interruption = 0;
-volatile std::sig_atomic_t* interruption = &own_interruption;  // in a plug-in's copy: that of who loaded it
+std::atomic<int> own_interruption = 0;
+static_assert(std::atomic<int>::is_always_lock_free, "a signal handler may wait for nothing");
+std::atomic<int>* interruption = &own_interruption;  // in a plug-in's copy: that of who loaded it
 
 void handle_signal(int) {
   if (*interruption != 0) std::_Exit(130);
@@ -31,13 +33,13 @@ void request_interruption() {
 void forget_interruption() {
   *interruption = 0;
 }
-volatile std::sig_atomic_t* interruption_flag() {
+std::atomic<int>* interruption_flag() {
   return interruption;
 }
 
 }  // namespace cnerf
 
 /// Called by name in a plug-in that was loaded, so that its copy of this file sees the same Ctrl-C.
-extern "C" void cnerf_follow_interruption(volatile std::sig_atomic_t* flag) {
+extern "C" void cnerf_follow_interruption(std::atomic<int>* flag) {
   cnerf::interruption = flag;
 }

@@ -1,7 +1,7 @@
 #pragma once
 /// Progress of long work, and requests to stop it.
 
-#include <csignal>
+#include <atomic>
 #include <functional>
 #include <string>
 #include <utility>
@@ -28,6 +28,6 @@ void request_interruption();
 void forget_interruption();
 
 /// What `interruption_requested` reads. Whoever loads a plug-in hands it over (src/base/plugin.h).
-[[nodiscard]] volatile std::sig_atomic_t* interruption_flag();
+[[nodiscard]] std::atomic<int>* interruption_flag();
 
 }  // namespace cnerf

@@ -4,6 +4,7 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
+#include <fmt/format.h>
 #include <sys/wait.h>
 
 #include <array>
@@ -15,6 +16,20 @@
 
 namespace cnerf::test {
 namespace fs = std::filesystem;
+
+namespace {
+
+RenderedExr render(const fs::path& setup, const std::string& arguments, const fs::path& after = {}) {
+  const fs::path picture = setup.parent_path() / "render.exr";
+  fs::remove(picture);
+  const int status = run_blender(setup, "--render '" + picture.string() + "' " + arguments, after);
+  if (status != 0 || !fs::exists(picture)) {
+    throw std::runtime_error("blender failed:\n" + read_text_file(setup.parent_path() / "blender.log"));
+  }
+  return read_exr(picture);
+}
+
+}  // namespace
 
 std::optional<fs::path> find_blender() {
   const char* path = std::getenv("PATH");
@@ -34,13 +49,23 @@ int run_blender(const fs::path& setup, const std::string& arguments, const fs::p
 }
 
 RenderedExr render_exact(const fs::path& setup, const std::string& arguments) {
-  const fs::path picture = setup.parent_path() / "render.exr";
-  fs::remove(picture);
-  const int status = run_blender(setup, "--exact --render '" + picture.string() + "' " + arguments);
-  if (status != 0 || !fs::exists(picture)) {
-    throw std::runtime_error("blender failed:\n" + read_text_file(setup.parent_path() / "blender.log"));
+  return render(setup, "--exact " + arguments);
+}
+
+std::vector<RenderedExr> render_cameras(const fs::path& setup, const std::string& arguments,
+                                        const std::vector<std::string>& cameras) {
+  const fs::path folder = setup.parent_path(), script = folder / "cameras.py";
+  const auto picture_of = [&](std::size_t camera) { return (folder / fmt::format("{}.exr", camera)).string(); };
+  std::string rest = "import bpy\nscene = bpy.context.scene\n";  // the first picture has set up how they are written
+  for (std::size_t i = 1; i < cameras.size(); ++i) {
+    rest += fmt::format("scene.camera = bpy.data.objects['{}']\nscene.render.filepath = r'{}'\n", cameras[i],
+                        picture_of(i)) +
+            "bpy.ops.render.render(write_still=True)\n";
   }
-  return read_exr(picture);
+  write_file(script, rest);
+  std::vector<RenderedExr> pictures = {render(setup, "--camera " + cameras.front() + " " + arguments, script)};
+  for (std::size_t i = 1; i < cameras.size(); ++i) pictures.push_back(read_exr(picture_of(i)));
+  return pictures;
 }
 
 RenderedExr read_exr(const fs::path& file) {

@@ -27,6 +27,10 @@ int run_blender(const std::filesystem::path& setup, const std::string& arguments
 /// A picture rendered with `--exact` and these further arguments.  @throws std::runtime_error with Blender's log.
 [[nodiscard]] RenderedExr render_exact(const std::filesystem::path& setup, const std::string& arguments);
 
+/// Pictures by these cameras of equal size, in their order, from one start of Blender.  @throws likewise
+[[nodiscard]] std::vector<RenderedExr> render_cameras(const std::filesystem::path& setup, const std::string& arguments,
+                                                      const std::vector<std::string>& cameras);
+
 /// Reads an EXR with channels R, G, B, A of 32 bits; opaque where A is missing.
 [[nodiscard]] RenderedExr read_exr(const std::filesystem::path& file);
 

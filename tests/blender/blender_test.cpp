@@ -124,10 +124,11 @@ TEST_P(VoxelOrigin, EdgesAreWithinATenthOfAVoxel) {
   const double inside = 2.0 * 12 * volume.voxel_size;
   const double near_face = 36 - 6 * pixels_per_voxel, far_face = 36 + 6 * pixels_per_voxel;
   const double tenth = 0.1 * pixels_per_voxel;
-  for (const char* camera : {"z", "x"}) {
-    const RenderedExr image =
-        render_exact(bake.blender_setup, std::string("--step-rate 0.25 --samples 128 --camera ") + camera);
-    const Edges edges = find_edges(image, inside);
+  const std::vector<std::string> names = {"z", "x"};
+  const auto images = render_cameras(bake.blender_setup, "--exact --step-rate 0.25 --samples 128", names);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string& camera = names[i];
+    const Edges edges = find_edges(images[i], inside);
     EXPECT_NEAR(edges.left, near_face, tenth) << camera;
     EXPECT_NEAR(edges.right, far_face, tenth) << camera;
     EXPECT_NEAR(edges.top, near_face, tenth) << camera;

@@ -75,12 +75,12 @@ TEST_P(MeshBesideVolume, SilhouettesAndColoursAgree) {
   bake.add_volumes({planes_of(baked)}, "volume", {});
   bake.add_mesh(bake_mesh(field, cameras, options, mesh_options), "mesh", true);
   bake.finish();
-  for (const char* camera : {"a", "b"}) {
-    const std::string look = std::string("--samples 16 --camera ") + camera;
-    const RenderedExr volume = render_exact(bake.blender_setup(), look);
-    const RenderedExr mesh = render_exact(bake.blender_setup(), look + " --mesh only");
-    const Silhouettes equal = compare_silhouettes(volume, mesh);
-    std::printf("volume against mesh, camera %s: IoU %.4f, colours differ by %.4f\n", camera, equal.iou,
+  const std::vector<std::string> names = {"a", "b"};
+  const auto volumes = render_cameras(bake.blender_setup(), "--exact --samples 16", names);
+  const auto meshes = render_cameras(bake.blender_setup(), "--exact --samples 16 --mesh only", names);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const Silhouettes equal = compare_silhouettes(volumes[i], meshes[i]);
+    std::printf("volume against mesh, camera %s: IoU %.4f, colours differ by %.4f\n", names[i].c_str(), equal.iou,
                 equal.difference);
     EXPECT_GT(equal.pixels, 1500u);
     EXPECT_GE(equal.iou, 0.95);

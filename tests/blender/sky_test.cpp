@@ -52,13 +52,10 @@ TEST_P(BlenderSky, StandsWhereTheFieldHasIt) {
   bake.finish();
   EXPECT_EQ(read_manifest(bake.manifest()).sky.value().file, "sky.exr");
 
+  const auto images =
+      render_cameras(bake.blender_setup(), "--samples 16", {"camera0", "camera1", "camera2", "camera3"});
   for (std::size_t c = 0; c < cameras.size(); ++c) {
-    const std::filesystem::path file = folder / ("out" + std::to_string(c) + ".exr");
-    ASSERT_EQ(
-        run_blender(bake.blender_setup(), "--samples 16 --camera " + std::to_string(c) + " --render " + file.string()),
-        0)
-        << read_text_file(folder / "blender.log");
-    const RenderedExr image = read_exr(file);
+    const RenderedExr& image = images[c];
     for (const auto& [x, y] : {std::pair{16, 12}, {2, 2}, {30, 3}, {3, 22}}) {
       const Vec3d ray = ray_direction(cameras[c].intrinsics, {x + 0.5, y + 0.5});
       const Vec3f wanted = color_along(normalized(cameras[c].world_from_camera.direction(ray)).cast<float>());
