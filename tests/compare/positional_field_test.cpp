@@ -164,7 +164,7 @@ class PositionalField : public testing::Test {
  protected:
   static LuminanceEngineOptions options() {
     LuminanceEngineOptions options;
-    options.samples_per_step = 192 * 16;
+    options.samples_per_step = 192 * 8;
     options.occupancy.resolution = 16;
     options.seed = 5;
     return options;

@@ -13,7 +13,7 @@ namespace {
 /// A fit of fewer steps than a user's tells as much of so small a capture.
 MotionMaskOptions quick() {
   MotionMaskOptions options;
-  options.motion_steps = 250;
+  options.motion_steps = 150;
   return options;
 }
 
