@@ -22,7 +22,8 @@ struct Setback {
   bool failed;  ///< or stopped by somebody
 };
 
-/// Does the work; an error of it is told, and the studio stays.
+/// Does the work.  @return  what kept it from its end, if anything did
+/// @param stopped  the message where somebody stopped it
 [[nodiscard]] std::optional<Setback> setback_of(const std::function<void()>& work, const std::string& stopped);
 
 /// Nothing is being done any more. A setback is told in the same change: whoever hears of it may order at once.
