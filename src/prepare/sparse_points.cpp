@@ -38,6 +38,7 @@ std::vector<SparsePoint> points_for_training(const Stage1Job& job, Observer& obs
   const Stopwatch watch;
   std::vector<SparsePoint> points = find_sparse_points(capture, observer);
   observer.say(fmt::format("{} sparse points found in {}", points.size(), duration_text(watch.seconds())));
+  if (job.options.poses || job.options.lenses) return points;
   std::vector<double> errors;
   for (const SparsePoint& point : points) errors.push_back(point.error);
   if (const double off = errors.empty() ? 0 : median(std::move(errors)); off > kInexact) {

@@ -20,7 +20,7 @@ namespace cnerf::prepare {
 
 /// What a stage 1 is to know besides the capture: points, if the job asks for free space or depths, the capture has
 /// none of its own whose views it knows, and outlines do not bound its space. Says how many were found, and whether
-/// they fit so badly that cameras may be inexact.
+/// they fit so badly that cameras may be inexact, where these are not to be learned.
 [[nodiscard]] std::vector<SparsePoint> points_for_training(const Stage1Job& job, Observer& observer);
 
 }  // namespace cnerf::prepare

@@ -127,6 +127,11 @@ TEST(SparsePoints, ThatFitBadlySayThatCamerasMayBeInexact) {
   for (int i = 0; i < 8; ++i) capture.views[std::size_t(i)].world_from_camera.translation.y += 0.012 * (i * 5 % 7 - 3);
   EXPECT_FALSE(points_for_training({capture, options, "no.snapshot"}, inexact).empty());
   EXPECT_THAT(inexact.said, testing::HasSubstr("stage1.poses=true"));
+  inexact.said.clear();
+  Stage1Options asked;
+  asked.poses = true;
+  EXPECT_FALSE(points_for_training({capture, asked, "no.snapshot"}, inexact).empty());
+  EXPECT_THAT(inexact.said, testing::Not(testing::HasSubstr("inexact"))) << "they will be learned anyway";
 }
 
 TEST(SparsePoints, AreLookedForAgainByATrainingThatGoesOnAndNotByOneThatDoesNotWantThem) {
