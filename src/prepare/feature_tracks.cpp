@@ -1,11 +1,13 @@
 #include "src/prepare/feature_tracks.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 #include <opencv2/features2d.hpp>
 #include <optional>
+#include <span>
 
 #include "src/base/error.h"
 #include "src/base/parallel.h"
@@ -86,30 +88,6 @@ std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const Capture& capture
   return pairs;
 }
 
-using Match = std::pair<int, int>;
-
-/// The best partner of each row of `similarity` among those allowed, where it is clearly the best; else -1.
-std::vector<int> best_of_rows(const cv::Mat1f& similarity) {
-  std::vector<int> best(std::size_t(similarity.rows), -1);
-  for (int row = 0; row < similarity.rows; ++row) {
-    const float* values = similarity.ptr<float>(row);
-    float first = -1, second = -1;
-    for (int i = 0; i < similarity.cols; ++i) {
-      if (values[i] > first) {
-        second = first;
-        first = values[i];
-        best[std::size_t(row)] = i;
-      } else {
-        second = std::max(second, values[i]);
-      }
-    }
-    // Distances of unit vectors: |a - b|^2 = 2 - 2 a b.
-    const bool is_clear = first > 0 && 2 - 2 * first < kRatio * kRatio * (2 - 2 * std::max(second, 0.0f));
-    if (!is_clear) best[std::size_t(row)] = -1;
-  }
-  return best;
-}
-
 /// The features of a view as rays of its camera.
 struct ViewRays {
   std::vector<Vec3d> directions;  ///< world, unit length
@@ -125,27 +103,82 @@ ViewRays rays_of(const View& view, const FeatureTracks::ViewFeatures& features) 
   return rays;
 }
 
-/// Makes the similarity of features that lie off each other's epipolar lines -1.
-/// @param tolerance  radians
-void keep_near_epipolar_lines(const ViewRays& a, const ViewRays& b, Vec3d baseline, double tolerance,
-                              cv::Mat1f& similarity) {
-  for (int i = 0; i < similarity.rows; ++i) {
-    const Vec3d across = cross(baseline, a.directions[std::size_t(i)]);
-    const Vec3d normal = across / std::max(length(across), 1e-12);
-    float* values = similarity.ptr<float>(i);
-    for (int j = 0; j < similarity.cols; ++j) {
-      if (std::abs(dot(normal, b.directions[std::size_t(j)])) > tolerance) values[j] = -1;
-    }
+using Match = std::pair<int, int>;
+
+/// Similarity of descriptors of unit length, of a multiple of 16 values. Sums of lanes, which compilers turn into
+/// vector instructions.
+float similarity_of(const float* a, const float* b, int values) {
+  std::array<float, 16> sums{};
+  for (int i = 0; i < values; i += int(sums.size())) {
+    for (std::size_t lane = 0; lane < sums.size(); ++lane) sums[lane] += a[i + int(lane)] * b[i + int(lane)];
   }
+  return std::accumulate(sums.begin(), sums.end(), 0.0f);
 }
 
-/// Each the other's best of those allowed.
-std::vector<Match> matches_of(const cv::Mat1f& similarity) {
-  const std::vector<int> forward = best_of_rows(similarity), back = best_of_rows(similarity.t());
+/// The likest of the features that a feature was compared with.
+class Likest {
+ public:
+  void compare(int feature, float similarity) {
+    if (similarity > first_) {
+      second_ = first_;
+      first_ = similarity;
+      feature_ = feature;
+    } else {
+      second_ = std::max(second_, similarity);
+    }
+  }
+  /// -1: none is clearly the likest.
+  [[nodiscard]] int feature() const {
+    // Distances of unit vectors: |a - b|^2 = 2 - 2 a b.
+    const bool is_clear = first_ > 0 && 2 - 2 * first_ < kRatio * kRatio * (2 - 2 * std::max(second_, 0.0f));
+    return is_clear ? feature_ : -1;
+  }
+
+ private:
+  int feature_ = -1;
+  float first_ = -1, second_ = -1;
+};
+
+/// Directions by coordinates, so that a plane is compared with all of them in one sweep.
+struct DirectionPlanes {
+  explicit DirectionPlanes(const ViewRays& rays) {
+    for (const Vec3d& each : rays.directions) {
+      x.push_back(float(each.x));
+      y.push_back(float(each.y));
+      z.push_back(float(each.z));
+    }
+  }
+  /// Sines of the angles between the directions and the plane of this normal.
+  void angles_to(Vec3d normal, std::span<float> angles) const {
+    const float nx = float(normal.x), ny = float(normal.y), nz = float(normal.z);
+    for (std::size_t i = 0; i < angles.size(); ++i) angles[i] = std::abs(nx * x[i] + ny * y[i] + nz * z[i]);
+  }
+
+  std::vector<float> x, y, z;
+};
+
+/// Each the other's likest of those that lie near its epipolar line. Most pairs do not, and are not compared.
+/// @param tolerance  radians
+std::vector<Match> matches_of(const FeatureTracks::ViewFeatures& a, const ViewRays& rays_a,
+                              const FeatureTracks::ViewFeatures& b, const ViewRays& rays_b, Vec3d baseline,
+                              double tolerance) {
+  const DirectionPlanes directions(rays_b);
+  std::vector<Likest> likest_of_a(rays_a.directions.size()), likest_of_b(rays_b.directions.size());
+  std::vector<float> angles(rays_b.directions.size());
+  for (std::size_t i = 0; i < likest_of_a.size(); ++i) {
+    const Vec3d across = cross(baseline, rays_a.directions[i]);
+    directions.angles_to(across / std::max(length(across), 1e-12), angles);
+    for (std::size_t j = 0; j < likest_of_b.size(); ++j) {
+      if (angles[j] > float(tolerance)) continue;
+      const float similarity = similarity_of(a.descriptors[int(i)], b.descriptors[int(j)], a.descriptors.cols);
+      likest_of_a[i].compare(int(j), similarity);
+      likest_of_b[j].compare(int(i), similarity);
+    }
+  }
   std::vector<Match> matches;
-  for (int i = 0; i < int(forward.size()); ++i) {
-    const int j = forward[std::size_t(i)];
-    if (j >= 0 && back[std::size_t(j)] == i) matches.emplace_back(i, j);
+  for (std::size_t i = 0; i < likest_of_a.size(); ++i) {
+    const int j = likest_of_a[i].feature();
+    if (j >= 0 && likest_of_b[std::size_t(j)].feature() == int(i)) matches.emplace_back(int(i), j);
   }
   return matches;
 }
@@ -298,10 +331,8 @@ std::vector<Track> FeatureTracks::triangulated(const Capture& capture, double to
     const auto [a, b] = pairs[k];
     const Vec3d baseline = centre_of(capture.views[b]) - centre_of(capture.views[a]);
     if (features_[a].pixels.empty() || features_[b].pixels.empty() || !(length(baseline) > 0)) return;
-    cv::Mat1f similarity = features_[a].descriptors * features_[b].descriptors.t();
     const double angle = tolerance * std::max(rays[a].pixel_angle, rays[b].pixel_angle);
-    keep_near_epipolar_lines(rays[a], rays[b], baseline, angle, similarity);
-    matches[k] = matches_of(similarity);
+    matches[k] = matches_of(features_[a], rays[a], features_[b], rays[b], baseline, angle);
   });
   Triangulator triangulator(capture, features_, rays, tolerance);
   for (std::size_t k = 0; k < pairs.size(); ++k) {

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <functional>
 #include <numeric>
 #include <span>
 #include <vector>
@@ -25,26 +24,46 @@ using torch::Tensor;
 namespace {
 
 constexpr const char* kWeightsName = "colorizer.weights";
-constexpr std::size_t kPatchesPerPass = 8;  // on a GPU
+// Patches per pass on a GPU. There are few sizes, since cuDNN makes a plan for each, which takes longer than a pass.
+constexpr std::size_t kSmallPass = 4, kLargePass = 8;
 
 /// One way to show the network a picture. What it says of a place changes with the way, where it does not know: the
 /// mean of several ways keeps what they agree on, and is near neutral elsewhere.
 struct Way {
-  double side;  ///< times the side that suits the network best
+  std::size_t side;  ///< of kSides
   bool is_mirrored;
 };
-constexpr std::array<Way, 8> kWays = {
-    {{0.75, false}, {0.75, true}, {0.875, false}, {0.875, true}, {1, false}, {1, true}, {1.25, false}, {1.25, true}}};
+constexpr std::array<double, 4> kSides = {0.75, 0.875, 1, 1.25};  // times the side that suits the network best
+constexpr std::size_t kWays = 2 * kSides.size();
+
+Way way_of(std::size_t number) {
+  return {number / 2, number % 2 == 1};
+}
 
 /// Numbers of the ways in which a picture is shown. A field averages answers about every place anyway, so a question of
 /// stage 2 is asked in one way, which depends on its number.
 std::vector<std::size_t> ways_of(const LightnessBatch& patches, std::size_t picture) {
   if (!patches.origins.empty()) {
-    return {CounterRng(named_stream("way"), patches.origins[picture].query).below(0, kWays.size())};
+    return {CounterRng(named_stream("way"), patches.origins[picture].query).below(0, kWays)};
   }
-  std::vector<std::size_t> all(kWays.size());
+  std::vector<std::size_t> all(kWays);
   std::iota(all.begin(), all.end(), std::size_t(0));
   return all;
+}
+
+/// A picture in one way.
+struct Showing {
+  std::size_t picture;
+  bool is_mirrored;
+};
+
+/// Adds rows of so many values, each from behind if they are mirrored.
+void add_rows(std::span<const float> from, int width, bool is_mirrored, float factor, float* to) {
+  for (std::size_t row = 0; row < from.size(); row += std::size_t(width)) {
+    for (std::size_t x = 0; x < std::size_t(width); ++x) {
+      to[row + x] += factor * from[row + (is_mirrored ? std::size_t(width) - 1 - x : x)];
+    }
+  }
 }
 
 /// Runs on CUDA where LibTorch has it, else on the CPU. The same question gets the same answer.
@@ -81,40 +100,50 @@ class BuiltinColorizer final : public Colorizer {
   [[nodiscard]] std::string name() const override { return name_; }
 
  private:
-  /// Pictures that are shown in the same way share a pass.
+  /// Pictures that are shown at the same size share a pass.
   void add_answers(const LightnessBatch& patches, std::span<const std::size_t> pictures, ChromaBatch& answer) {
-    std::array<std::vector<std::size_t>, kWays.size()> shown;
+    std::array<std::vector<Showing>, kSides.size()> shown;
     for (const std::size_t picture : pictures) {
-      for (const std::size_t way : ways_of(patches, picture)) shown[way].push_back(picture);
+      for (const std::size_t number : ways_of(patches, picture)) {
+        const Way way = way_of(number);
+        shown[way.side].push_back({picture, way.is_mirrored});
+      }
     }
-    for (std::size_t way = 0; way < shown.size(); ++way) {
-      for (std::size_t first = 0; first < shown[way].size(); first += kPatchesPerPass) {
-        const std::size_t count = std::min(kPatchesPerPass, shown[way].size() - first);
-        add_pass(patches, std::span(shown[way]).subspan(first, count), kWays[way], answer);
+    for (std::size_t side = 0; side < shown.size(); ++side) {
+      const std::span<const Showing> all = shown[side];
+      for (std::size_t first = 0; first < all.size();) {
+        const std::size_t left = all.size() - first, rows = rows_of_pass(patches, left);
+        add_pass(patches, all.subspan(first, std::min(rows, left)), side, rows, answer);
+        first += rows;
       }
     }
   }
 
-  void add_pass(const LightnessBatch& patches, std::span<const std::size_t> pictures, const Way& way,
+  /// Whole pictures are shown alone: several would need several times the memory.
+  [[nodiscard]] std::size_t rows_of_pass(const LightnessBatch& patches, std::size_t left) const {
+    if (device_.is_cpu() || patches.origins.empty()) return 1;
+    return left > kSmallPass ? kLargePass : kSmallPass;
+  }
+
+  /// @param rows  of the pass: those behind the pictures stay black
+  void add_pass(const LightnessBatch& patches, std::span<const Showing> shown, std::size_t side, std::size_t rows,
                 ChromaBatch& answer) {
     const torch::NoGradGuard no_grad;
     const std::size_t pixels = std::size_t(patches.height) * std::size_t(patches.width);
-    Tensor lightness = torch::empty({std::int64_t(pictures.size()), 1, patches.height, patches.width});
-    for (std::size_t i = 0; i < pictures.size(); ++i) {
-      std::copy_n(&patches.lightness[pictures[i] * pixels], pixels, lightness.data_ptr<float>() + i * pixels);
+    Tensor lightness = torch::zeros({std::int64_t(rows), 1, patches.height, patches.width});
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+      add_rows({&patches.lightness[shown[i].picture * pixels], pixels}, patches.width, shown[i].is_mirrored, 1,
+               lightness.data_ptr<float>() + i * pixels);
     }
-    if (way.is_mirrored) lightness = lightness.flip({3});
     const bool is_one_of_many = !patches.origins.empty();
     AbDecoding decoding = weights_.decoding;
-    decoding.short_side = int(std::lround(way.side * decoding.short_side));
+    decoding.short_side = int(std::lround(kSides[side] * decoding.short_side));
     if (is_one_of_many) decoding.gain = 1;  // the gain is for a picture that nobody averages with others
-    Tensor ab = colorize_lightness(weights_.network, lightness.to(device_), decoding).cpu();
-    if (way.is_mirrored) ab = ab.flip({3});
-    ab = (ab / double(is_one_of_many ? 1 : kWays.size())).contiguous();
-    for (std::size_t i = 0; i < pictures.size(); ++i) {
-      const float* from = ab.data_ptr<float>() + 2 * i * pixels;
-      float* to = &answer.ab[2 * pictures[i] * pixels];
-      std::transform(from, from + 2 * pixels, to, to, std::plus<>());
+    const Tensor ab = colorize_lightness(weights_.network, lightness.to(device_), decoding).cpu().contiguous();
+    const float share = is_one_of_many ? 1 : 1 / float(kWays);
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+      add_rows({ab.data_ptr<float>() + 2 * i * pixels, 2 * pixels}, patches.width, shown[i].is_mirrored, share,
+               &answer.ab[2 * shown[i].picture * pixels]);
     }
   }
 

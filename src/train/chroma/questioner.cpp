@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "src/base/parallel.h"
 #include "src/base/rng.h"
 #include "src/base/usage.h"
 #include "src/cluster/packing.h"
@@ -41,9 +42,10 @@ Answers Questioner::ask(std::span<const PatchPlace> places) const {
   const Stopwatch watch;
   Answers answers;
   const int k = session_.options.patch_size;
-  for (const PatchPlace& place : places) {
-    answers.patches.push_back({place, k, render_patch(session_.views()[place.view], place, k), {}});
-  }
+  answers.patches.resize(places.size());
+  parallel_tasks(places.size(), [&](std::size_t i) {
+    answers.patches[i] = {places[i], k, render_patch(session_.views()[places[i].view], places[i], k), {}};
+  });
   const auto [first, last] = part_of(places.size(), session_.ranks().rank());
   if (first < last) questions_.answer(session_, std::span(answers.patches).subspan(first, last - first));
   answers.seconds = watch.seconds();
@@ -79,7 +81,8 @@ std::vector<AnsweredPatch> Questioner::ask_all(const std::vector<PatchPlace>& pl
   const auto batch = std::size_t(session_.options.colorizer_batch);
   std::vector<AnsweredPatch> answered;
   for (std::size_t first = 0; first < places.size(); first += batch) {
-    Answers answers = ask(std::span(places).subspan(first, std::min(batch, places.size() - first)));
+    const auto query = std::span(places).subspan(first, std::min(batch, places.size() - first));
+    Answers answers = worker_.submit([&] { return ask(query); }).get();
     exchange(answers.patches);
     session_.model.report.colorizer_seconds += answers.seconds;
     std::ranges::move(answers.patches, std::back_inserter(answered));
@@ -88,7 +91,7 @@ std::vector<AnsweredPatch> Questioner::ask_all(const std::vector<PatchPlace>& pl
 }
 
 void Questioner::ask_ahead(std::int64_t first) {
-  coming_ = std::async(std::launch::async, [this, first] {
+  coming_ = worker_.submit([this, first] {
     const auto seed = std::uint64_t(session_.options.seed);
     std::vector<PatchPlace> places;
     for (int i = 0; i < session_.options.colorizer_batch; ++i) {

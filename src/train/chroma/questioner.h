@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "src/base/worker.h"
 #include "src/train/chroma/patches.h"
 #include "src/train/chroma/session.h"
 
@@ -17,7 +18,7 @@ class Questions {
   virtual ~Questions() = default;
   /// Is called once, before the first question, with the views that there are to ask about.
   virtual void prepare(Session& /*session*/) {}
-  /// One query. Is called from one thread at a time, but not always the same.
+  /// One query. Is always called from the same thread.
   /// @param patches  have no colours yet
   virtual void answer(const Session& session, std::span<AnsweredPatch> patches) = 0;
 };
@@ -59,6 +60,7 @@ class Questioner {
   Session& session_;
   Questions& questions_;
   std::future<Answers> coming_;
+  Worker worker_;  // last: its job refers to what is above
 };
 
 }  // namespace cnerf
