@@ -18,7 +18,7 @@ namespace cnerf {
 /// thread, as cuDNN its plans for a convolution: with a thread for each job they would prepare it anew.
 class Worker {
  public:
-  /// What the job returns or throws arrives by the future. Jobs that did not begin before the worker's end are dropped.
+  /// What the job returns or throws arrives by the future. A worker ends once all its jobs are done.
   template <typename Job>
   [[nodiscard]] std::future<std::invoke_result_t<Job>> submit(Job job) {
     const auto task = std::make_shared<std::packaged_task<std::invoke_result_t<Job>()>>(std::move(job));
@@ -36,7 +36,7 @@ class Worker {
       std::function<void()> job;
       {
         std::unique_lock lock(mutex_);
-        if (!waiting_.wait(lock, stop, [this] { return !jobs_.empty(); }) || stop.stop_requested()) return;
+        if (!waiting_.wait(lock, stop, [this] { return !jobs_.empty(); })) return;
         job = std::move(jobs_.front());
         jobs_.pop_front();
       }

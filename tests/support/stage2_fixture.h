@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "src/base/files.h"
@@ -23,10 +25,11 @@ namespace cnerf::test {
 
 inline constexpr Ab kAnswer = {12, -9};
 
-/// Answers one colour and keeps the questions' origins.
+/// Answers one colour and keeps the questions' origins, and from which threads they came.
 class Listening final : public Colorizer {
  public:
   ChromaBatch colorize(const LightnessBatch& patches) override {
+    threads.insert(std::this_thread::get_id());
     origins.insert(origins.end(), patches.origins.begin(), patches.origins.end());
     const std::size_t pixels = patches.lightness.size() / std::size_t(patches.batch);
     ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
@@ -39,6 +42,7 @@ class Listening final : public Colorizer {
   [[nodiscard]] std::string name() const override { return "listening"; }
 
   std::vector<PatchOrigin> origins;
+  std::set<std::thread::id> threads;
 };
 
 class Stage2Fixture : public testing::Test {

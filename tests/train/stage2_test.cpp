@@ -45,6 +45,13 @@ TEST_F(Stage2, PatchesSayWhereTheyComeFrom) {
   EXPECT_GE(queries.size(), 60u);
 }
 
+// Networks on a GPU prepare themselves anew for each thread that asks.
+TEST_F(Stage2, AsksFromOneThread) {
+  Listening colorizer;
+  (void)colorize(small_options(), colorizer, take("a"));
+  EXPECT_EQ(colorizer.threads.size(), 1u);
+}
+
 TEST_F(Stage2, LearnsTheAnswer) {
   Listening colorizer;
   (void)colorize(small_options(), colorizer, take("a"));
