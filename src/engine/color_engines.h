@@ -79,6 +79,10 @@ class ColorFieldEngine : public ColorEngine {
               AbLoss loss, float learning_rate);
   /// ab of the composited XYZ of each pixel.
   virtual void composite(const PixelSamples& pixels, std::span<Ab> colors) const = 0;
+  /// As ColorBinEngine::decode_traced.
+  virtual void composite_traced(const TracedPixels& pixels, std::span<Ab> colors) const {
+    composite(pixels.samples(), colors);
+  }
   virtual void query(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const = 0;
 
  protected:

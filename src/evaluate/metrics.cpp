@@ -3,19 +3,22 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/check.h"
+#include "src/base/parallel.h"
 #include "src/color/ab_bins.h"
 #include "src/color/colorspace_math.h"
+#include "src/evaluate/pixel_sums.h"
 
 namespace cnerf {
 namespace {
 
-bool counts(std::span<const std::uint8_t> valid, std::size_t pixel) {
-  return valid.empty() || valid[pixel] != 0;
-}
+constexpr int kWindow = 11;
+constexpr double kWindowSigma = 1.5;
 
 /// Mean and standard deviation of a stream of values.
 struct Moments {
@@ -27,16 +30,25 @@ struct Moments {
     sum_of_squares += value * value;
     ++count;
   }
+  void add(const Moments& other) {
+    sum += other.sum;
+    sum_of_squares += other.sum_of_squares;
+    count += other.count;
+  }
   [[nodiscard]] double mean() const { return sum / double(count); }
   [[nodiscard]] double variance() const { return std::max(0.0, sum_of_squares / double(count) - mean() * mean()); }
+};
+
+/// How many pixels are nearest to each bin.
+struct BinCounts {
+  std::array<double, kAbBinCount> bins{};
+
+  void add(const BinCounts& other) { std::ranges::transform(bins, other.bins, bins.begin(), std::plus<>()); }
 };
 
 double colorfulness_of(const Moments& rg, const Moments& yb) {
   return std::sqrt(rg.variance() + yb.variance()) + 0.3 * std::hypot(rg.mean(), yb.mean());
 }
-
-constexpr int kWindow = 11;
-constexpr double kWindowSigma = 1.5;
 
 cv::Mat plane_of(std::span<const float> values, int width, int height) {
   cv::Mat plane;
@@ -97,17 +109,15 @@ Colorfulness colorfulness(std::span<const std::uint8_t> rgb, std::span<const std
 }
 
 double color_diversity(std::span<const float> rgb, std::span<const std::uint8_t> valid) {
-  std::array<double, kAbBinCount> pixels{};
-  double all = 0;
-  for (std::size_t pixel = 0; pixel < rgb.size() / 3; ++pixel) {
-    if (!counts(valid, pixel)) continue;
+  const BinCounts pixels = summed<BinCounts>(rgb.size() / 3, [&](std::size_t pixel, BinCounts& counted) {
+    if (!counts(valid, pixel)) return;
     const Lab<double> lab = lab_at(rgb, pixel);
-    ++pixels[std::size_t(nearest_bin({float(lab.a), float(lab.b)}))];
-    ++all;
-  }
+    ++counted.bins[std::size_t(nearest_bin({float(lab.a), float(lab.b)}))];
+  });
+  const double all = std::accumulate(pixels.bins.begin(), pixels.bins.end(), 0.0);
   if (all == 0) return std::numeric_limits<double>::quiet_NaN();
   double entropy = 0;
-  for (const double count : pixels) entropy -= count > 0 ? count / all * std::log(count / all) : 0;
+  for (const double count : pixels.bins) entropy -= count > 0 ? count / all * std::log(count / all) : 0;
   return std::exp(entropy);
 }
 
@@ -134,19 +144,20 @@ double frechet_distance(std::span<const float> a, std::span<const float> b, std:
 double mean_ab_distance(std::span<const float> ours, std::span<const float> truth,
                         std::span<const std::uint8_t> valid) {
   if (!truth.empty()) CNERF_CHECK_EQ(truth.size(), ours.size());
-  Moments distance;
-  for (std::size_t pixel = 0; pixel < ours.size() / 3; ++pixel) {
-    if (!counts(valid, pixel)) continue;
+  const auto distance = summed<Moments>(ours.size() / 3, [&](std::size_t pixel, Moments& distances) {
+    if (!counts(valid, pixel)) return;
     const Lab<double> a = lab_at(ours, pixel);
     const Lab<double> b = truth.empty() ? Lab<double>{} : lab_at(truth, pixel);
-    distance.add(std::hypot(a.a - b.a, a.b - b.b));
-  }
+    distances.add(std::hypot(a.a - b.a, a.b - b.b));
+  });
   return distance.mean();
 }
 
 std::vector<float> encoded(std::span<const float> linear) {
   std::vector<float> out(linear.size());
-  std::ranges::transform(linear, out.begin(), encoded_value);
+  parallel_ranges(linear.size(), kPixelsPerTask, [&](std::size_t begin, std::size_t end) {
+    std::transform(linear.begin() + begin, linear.begin() + end, out.begin() + begin, encoded_value);
+  });
   return out;
 }
 

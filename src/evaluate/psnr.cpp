@@ -6,11 +6,22 @@
 #include "src/base/check.h"
 #include "src/base/statistics.h"
 #include "src/color/colorspace_math.h"
+#include "src/evaluate/pixel_sums.h"
 
 namespace cnerf {
 namespace {
 
 constexpr double kHighestPsnr = 100;
+
+struct SquaredError {
+  double sum = 0;
+  std::size_t count = 0;
+
+  void add(const SquaredError& other) {
+    sum += other.sum;
+    count += other.count;
+  }
+};
 
 }  // namespace
 
@@ -26,22 +37,20 @@ double psnr_from_mse(double mean_squared_error) {
 double encoded_mse(std::span<const float> ours, std::span<const float> truth, int channels,
                    std::span<const std::uint8_t> valid) {
   CNERF_CHECK_EQ(ours.size(), truth.size());
-  double sum = 0;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < ours.size(); ++i) {
-    if (!valid.empty() && valid[i / std::size_t(channels)] == 0) continue;
+  const auto error = summed<SquaredError>(ours.size(), [&](std::size_t i, SquaredError& errors) {
+    if (!counts(valid, i / std::size_t(channels))) return;
     const double difference = double(encoded_value(ours[i])) - double(encoded_value(truth[i]));
-    sum += difference * difference;
-    ++count;
-  }
-  return sum / double(count);
+    errors.sum += difference * difference;
+    ++errors.count;
+  });
+  return error.sum / double(error.count);
 }
 
 double fitted_gain(std::span<const float> ours, std::span<const float> truth, std::span<const std::uint8_t> valid) {
   CNERF_CHECK_EQ(ours.size(), truth.size());
   GainFit fit;
   for (std::size_t p = 0; p < truth.size(); ++p) {
-    if (valid.empty() || valid[p] != 0) fit.add(ours[p], truth[p]);
+    if (counts(valid, p)) fit.add(ours[p], truth[p]);
   }
   return fit.gain();
 }

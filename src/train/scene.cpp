@@ -140,7 +140,11 @@ class TrainedScene final : public Scene {
     }
     if (!image.baked_rgb.empty()) {
       std::vector<Ab> colors(rays.size());
-      color_->chromaticity->composite(pixels ? *pixels : traced->samples(), colors);
+      if (pixels) {
+        color_->chromaticity->composite(*pixels, colors);
+      } else {
+        color_->chromaticity->composite_traced(*traced, colors);
+      }
       put_colors(finished(std::move(colors)), image.luminance, first, image.baked_rgb);
     }
     if (sky_.exists() && options.sky) put_sky_behind(rays, first, image);
@@ -162,6 +166,7 @@ class TrainedScene final : public Scene {
   }
 
   [[nodiscard]] std::vector<Ab> finished(std::vector<Ab> colors) const {
+    if (finish_.is_plain()) return colors;
     for (Ab& color : colors) color = finish_.of(color);
     return colors;
   }

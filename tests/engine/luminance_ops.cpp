@@ -126,6 +126,33 @@ void append_queries(const LuminanceEngine& engine, std::vector<Result>& results)
   results.push_back({"luminance of points", doubles(answers)});
 }
 
+/// Colour engines read pixels that were traced as they read them from the host's memory.
+void expect_colors_of_traced_pixels(const TracedPixels& traced, const PixelSamples& expected, const Backend& backend) {
+  constexpr HashGridOptions kGrid = {.levels = 8, .log2_rows = 12, .coarsest_resolution = 4, .finest_resolution = 64};
+  std::vector<Ab> colors(expected.pixels()), expected_colors(expected.pixels());
+  const auto farthest = [&] {
+    float most = 0;
+    for (std::size_t r = 0; r < colors.size(); ++r) {
+      if (traced.results()[r].opacity < kLeastColoredOpacity) continue;
+      most =
+          std::max({most, std::abs(colors[r].a - expected_colors[r].a), std::abs(colors[r].b - expected_colors[r].b)});
+    }
+    return most;
+  };
+  const auto bins = backend.make([&](const Engines& engines) { return engines.make_color_bins(kGrid, 5); });
+  bins->decode_traced(traced, 0.38f, colors);
+  bins->decode(expected, 0.38f, expected_colors);
+  EXPECT_LT(farthest(), 1e-3f) << "decoded colours of traced pixels";
+
+  const auto field = backend.make([&](const Engines& engines) { return engines.make_color_field(kGrid, 6); });
+  const std::vector<Ab> orange(expected.pixels(), {30, 50});
+  for (int i = 0; i < 20; ++i) field->step(expected, orange, {}, AbLoss::kHuber, 1e-2f);
+  field->composite_traced(traced, colors);
+  field->composite(expected, expected_colors);
+  EXPECT_LT(farthest(), 1e-2f) << "composited colours of traced pixels";
+  EXPECT_GT(std::ranges::max(expected_colors, {}, &Ab::b).b, 10) << "which are not grey";
+}
+
 /// The heaviest samples of rays, in the engine's own memory and as `trace` hands them out.
 void append_traced_pixels(const LuminanceEngine& engine, std::span<const Ray> rays, const MarchSettings& march,
                           const Backend& backend, std::vector<Result>& results) {
@@ -155,19 +182,7 @@ void append_traced_pixels(const LuminanceEngine& engine, std::span<const Ray> ra
     depth.push_back(seen.depth * seen.opacity);
     EXPECT_NEAR(seen.opacity, expected.opacity(r), 1e-5f);
   }
-  const auto colorist = backend.make([](const Engines& engines) {
-    return engines.make_color_bins({.levels = 8, .log2_rows = 12, .coarsest_resolution = 4, .finest_resolution = 64},
-                                   5);
-  });
-  std::vector<Ab> colors(rays.size()), expected_colors(rays.size());
-  colorist->decode_traced(*traced, 0.38f, colors);
-  colorist->decode(expected, 0.38f, expected_colors);
-  float most = 0;
-  for (std::size_t r = 0; r < rays.size(); ++r) {
-    if (traced->results()[r].opacity < kLeastColoredOpacity) continue;
-    most = std::max({most, std::abs(colors[r].a - expected_colors[r].a), std::abs(colors[r].b - expected_colors[r].b)});
-  }
-  EXPECT_LT(most, 1e-3f) << "colours of traced pixels";
+  expect_colors_of_traced_pixels(*traced, expected, backend);
   results.push_back({"luminance of the heaviest samples", luminance});
   results.push_back({"opacity of the heaviest samples", opacity});
   results.push_back({"depth of the heaviest samples", depth});

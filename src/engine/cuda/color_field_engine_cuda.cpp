@@ -52,12 +52,16 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
     for (std::size_t begin = 0; begin < pixels.pixels(); begin += kFieldPixelsAtATime) {
       const std::size_t end = std::min(begin + kFieldPixelsAtATime, pixels.pixels());
       batch_.upload(pixels, begin, end, stream_);
-      field_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/false, stream_);
-      colors_.reserve(end - begin, "pixels");
-      composite_chromaticity(batch_.arrays(), field_.numbers(), colors_.data(), stream_);
-      colors_.download(colors.data() + begin, end - begin, stream_);
-      stream_.wait();
+      composite_batch(colors.subspan(begin, end - begin));
     }
+  }
+  void composite_traced(const TracedPixels& pixels, std::span<Ab> colors) const override {
+    const auto* here = dynamic_cast<const TracedPixelsCuda*>(&pixels);
+    if (here == nullptr) return composite(pixels.samples(), colors);
+    CNERF_CHECK_EQ(colors.size(), pixels.results().size());
+    const std::lock_guard lock(mutex_);
+    batch_.refer_to(here->buffers(), stream_);
+    composite_batch(colors);
   }
 
   void query(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const override {
@@ -89,6 +93,14 @@ class ColorFieldEngineCuda final : public ColorFieldEngine {
   }
 
  private:
+  void composite_batch(std::span<Ab> colors) const {
+    field_.forward(batch_.arrays().positions, batch_.samples(), /*for_training=*/false, stream_);
+    colors_.reserve(colors.size(), "pixels");
+    composite_chromaticity(batch_.arrays(), field_.numbers(), colors_.data(), stream_);
+    colors_.download(colors.data(), colors.size(), stream_);
+    stream_.wait();
+  }
+
   StepShare share_;
   ChromaStream stream_;
   mutable PointNetCuda field_;
