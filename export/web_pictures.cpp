@@ -9,6 +9,7 @@
 #include "src/base/parallel.h"
 #include "src/capture/mono_image.h"
 #include "src/picture/encode.h"
+#include "src/picture/picture.h"
 
 namespace cnerf::exporting {
 namespace {
@@ -22,17 +23,41 @@ Intrinsics fitted(const Intrinsics& intrinsics, int side) {
                  std::max(1, int(std::lround(intrinsics.height * scale))));
 }
 
-/// For every pixel of the pinhole picture, where the lens put it; -1 where it did not.
-void undistortion(const Intrinsics& lens, const Intrinsics& pinhole, cv::Mat& x, cv::Mat& y) {
-  x.create(pinhole.height, pinhole.width, CV_32F);
-  y.create(pinhole.height, pinhole.width, CV_32F);
-  for (int row = 0; row < pinhole.height; ++row) {
+/// How photographs of a lens become pictures of a pinhole camera: views mostly share it.
+struct PhotoLens {
+  Intrinsics lens;
+  Intrinsics shown;  ///< the lens at the picture's size
+  cv::Mat x, y;      ///< of every pixel of the picture, where the lens put it; -1 where it did not; empty of a pinhole
+};
+
+PhotoLens photo_lens(const Intrinsics& lens, int side) {
+  PhotoLens photo{lens, fitted(lens, side), {}, {}};
+  if (lens.model == LensModel::kPinhole) return photo;
+  const Intrinsics pinhole = without_distortion(photo.shown);
+  photo.x.create(pinhole.height, pinhole.width, CV_32F);
+  photo.y.create(pinhole.height, pinhole.width, CV_32F);
+  parallel_tasks(std::size_t(pinhole.height), [&](std::size_t row) {
     for (int column = 0; column < pinhole.width; ++column) {
-      const auto seen = project(lens, ray_direction(pinhole, {column + 0.5, row + 0.5}));
-      x.at<float>(row, column) = seen ? float(seen->x - 0.5) : -1.0f;  // OpenCV's pixel centres are whole
-      y.at<float>(row, column) = seen ? float(seen->y - 0.5) : -1.0f;
+      const auto seen = project(photo.shown, ray_direction(pinhole, {column + 0.5, double(row) + 0.5}));
+      photo.x.at<float>(int(row), column) = seen ? float(seen->x - 0.5) : -1.0f;  // OpenCV's pixel centres are whole
+      photo.y.at<float>(int(row), column) = seen ? float(seen->y - 0.5) : -1.0f;
     }
+  });
+  return photo;
+}
+
+WebPhoto web_photo(const PhotoLens& lens, const std::vector<float>& luminance, int quality) {
+  CNERF_CHECK_EQ(luminance.size(), std::size_t(lens.lens.width) * std::size_t(lens.lens.height));
+  const cv::Mat linear(lens.lens.height, lens.lens.width, CV_32F, const_cast<float*>(luminance.data()));
+  cv::Mat shown;
+  cv::resize(linear, shown, {lens.shown.width, lens.shown.height}, 0, 0, cv::INTER_AREA);  // in linear light
+  if (!lens.x.empty()) {
+    cv::Mat undistorted;
+    cv::remap(shown, undistorted, lens.x, lens.y, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
+    shown = undistorted;
   }
+  std::vector<std::uint8_t> codes = srgb8_from_linear({shown.ptr<float>(), shown.total()});
+  return {jpeg_bytes(cv::Mat(shown.rows, shown.cols, CV_8U, codes.data()), quality), shown.cols, shown.rows};
 }
 
 }  // namespace
@@ -45,31 +70,23 @@ Intrinsics without_distortion(const Intrinsics& intrinsics) {
 }
 
 WebPhoto make_web_photo(const Intrinsics& intrinsics, const std::vector<float>& luminance, int side, int quality) {
-  CNERF_CHECK_EQ(luminance.size(), std::size_t(intrinsics.width) * intrinsics.height);
-  const cv::Mat linear(intrinsics.height, intrinsics.width, CV_32F, const_cast<float*>(luminance.data()));
-  const Intrinsics small = fitted(intrinsics, side);
-  cv::Mat scaled, shown;
-  cv::resize(linear, scaled, {small.width, small.height}, 0, 0, cv::INTER_AREA);  // in linear light
-  if (intrinsics.model == LensModel::kPinhole) {
-    shown = scaled;
-  } else {
-    cv::Mat x, y;
-    undistortion(small, without_distortion(small), x, y);
-    cv::remap(scaled, shown, x, y, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
-  }
-  cv::Mat grey(shown.rows, shown.cols, CV_8U);
-  for (int row = 0; row < shown.rows; ++row) {
-    for (int column = 0; column < shown.cols; ++column) {
-      grey.at<std::uint8_t>(row, column) = srgb8_from_linear(shown.at<float>(row, column));
-    }
-  }
-  return {jpeg_bytes(grey, quality), grey.cols, grey.rows};
+  return web_photo(photo_lens(intrinsics, side), luminance, quality);
 }
 
 std::vector<WebPhoto> make_web_photos(std::span<const View> views, int side, int quality) {
+  std::vector<std::pair<Intrinsics, std::vector<std::size_t>>> lenses;  // and the views of each
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    auto known = std::ranges::find(lenses, views[i].intrinsics, [](const auto& lens) { return lens.first; });
+    if (known == lenses.end()) known = lenses.insert(known, {views[i].intrinsics, {}});
+    known->second.push_back(i);
+  }
   std::vector<WebPhoto> photos(views.size());
-  parallel_tasks(views.size(), [&](std::size_t i) {
-    photos[i] = make_web_photo(views[i].intrinsics, luminance_plane(views[i].image), side, quality);
+  parallel_tasks(lenses.size(), [&](std::size_t l) {
+    const PhotoLens lens = photo_lens(lenses[l].first, side);
+    const std::vector<std::size_t>& of_lens = lenses[l].second;
+    parallel_tasks(of_lens.size(), [&](std::size_t i) {
+      photos[of_lens[i]] = web_photo(lens, luminance_plane(views[of_lens[i]].image), quality);
+    });
   });
   return photos;
 }

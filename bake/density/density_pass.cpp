@@ -22,15 +22,16 @@ std::vector<Vec3d> places_in_voxel(int subsamples) {
 
 /// Sub-samples of a brick that may hold matter.
 struct BrickSamples {
-  std::vector<Vec3f> positions;        ///< unit space
-  std::vector<std::int16_t> offsets;   ///< of the voxel each belongs to
-  std::vector<std::int16_t> in_voxel;  ///< which of the voxel's sub-samples each is
+  std::vector<Vec3f> positions;       ///< unit space
+  std::vector<std::uint32_t> places;  ///< of each: sub-sample of its voxel * kBrickVoxels + the voxel's offset
 };
 
 /// The sub-samples of a brick along one axis: coordinates of world and unit space go by axis.
 struct AxisSamples {
   std::vector<float> unit;      ///< [kBrickSide * subsamples]
   std::vector<char> is_inside;  ///< of the plan's box
+  std::vector<int> voxel;       ///< which of the brick's it is in
+  std::vector<int> part;        ///< which of that voxel's it is
 };
 
 AxisSamples axis_samples(const SceneFrame& frame, const Plan& plan, int subsamples, Vec3i brick_min, int axis) {
@@ -40,6 +41,8 @@ AxisSamples axis_samples(const SceneFrame& frame, const Plan& plan, int subsampl
     const int whole = i / subsamples, part = i % subsamples;
     voxel[axis] = brick_min[axis] + whole + (part + 0.5) / subsamples;
     const Vec3d world = plan.world_from_voxel(voxel);
+    samples.voxel.push_back(whole);
+    samples.part.push_back(part);
     samples.is_inside.push_back(world[axis] >= plan.box.min[axis] && world[axis] <= plan.box.max[axis]);
     // Rounding may carry a point of the box's face just outside the field's domain.
     samples.unit.push_back(std::clamp(float(frame.unit_from_world(world)[axis]), 0.0f, 1.0f));
@@ -56,22 +59,22 @@ BrickSamples gather_samples(const ColorField& field, const Plan& plan, int subsa
   std::vector<std::uint8_t> is_occupied(most);
   field.mark_occupied(x.unit, y.unit, z.unit, is_occupied);
   BrickSamples samples;
-  if (std::ranges::find(is_occupied, 1) == is_occupied.end()) return samples;
-  samples.positions.reserve(most);
-  samples.offsets.reserve(most);
-  samples.in_voxel.reserve(most);
-  for (int offset = 0; offset < kBrickVoxels; ++offset) {
-    const Vec3i local = brick_local(offset);
-    if (plan.in_hole(brick_min + local)) continue;
-    const Vec3i first = local * subsamples;
-    for (int s = 0; s < subsamples * subsamples * subsamples; ++s) {
-      const Vec3i at = first + Vec3i{s / (subsamples * subsamples), s / subsamples % subsamples, s % subsamples};
-      if (!x.is_inside[at.x] || !y.is_inside[at.y] || !z.is_inside[at.z]) continue;
-      const std::size_t in_lattice = (std::size_t(at.x) * y.unit.size() + at.y) * z.unit.size() + at.z;
-      if (is_occupied[in_lattice] == 0) continue;
-      samples.positions.push_back({x.unit[at.x], y.unit[at.y], z.unit[at.z]});
-      samples.offsets.push_back(std::int16_t(offset));
-      samples.in_voxel.push_back(std::int16_t(s));
+  const auto count = std::size_t(std::ranges::count(is_occupied, 1));
+  if (count == 0) return samples;
+  samples.positions.reserve(count);
+  samples.places.reserve(count);
+  for (std::size_t i = 0; i < x.unit.size(); ++i) {
+    for (std::size_t j = 0; j < y.unit.size(); ++j) {
+      if (!x.is_inside[i] || !y.is_inside[j]) continue;
+      const std::uint8_t* occupied = &is_occupied[(i * y.unit.size() + j) * z.unit.size()];
+      for (std::size_t k = 0; k < z.unit.size(); ++k) {
+        if (occupied[k] == 0 || !z.is_inside[k]) continue;
+        const Vec3i local{x.voxel[i], y.voxel[j], z.voxel[k]};
+        if (plan.in_hole(brick_min + local)) continue;
+        samples.positions.push_back({x.unit[i], y.unit[j], z.unit[k]});
+        const int part = (x.part[i] * subsamples + y.part[j]) * subsamples + z.part[k];
+        samples.places.push_back(std::uint32_t(part * kBrickVoxels + brick_offset(local)));
+      }
     }
   }
   return samples;
@@ -100,9 +103,9 @@ std::vector<DenseVoxel> voxels_of(const BrickSamples& samples, std::span<const f
   for (std::size_t s = 0; s < sigma.size(); ++s) {
     check_density(sigma[s]);
     const double alpha = -std::expm1(-sigma[s] * frame.unit_per_world * h);
-    Accumulated& sum = sums[samples.offsets[s]];
+    Accumulated& sum = sums[samples.places[s] % kBrickVoxels];
     sum.alpha += alpha;
-    sum.alpha_inside += places[samples.in_voxel[s]] * alpha;
+    sum.alpha_inside += places[samples.places[s] / kBrickVoxels] * alpha;
   }
 
   std::vector<DenseVoxel> kept;

@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <mutex>
 
 #include "bake/out_of_core/journal_checksum.h"
 #include "src/base/check.h"
@@ -32,6 +33,7 @@ struct Journal::File {
     std::size_t bytes = 0;
     std::uint64_t checksum = 0;
   };
+  std::mutex mutex;  ///< of `parts`, between who writes and who reads
   std::vector<Place> parts;
   std::string identity;
   long end = 0;  ///< where the next part goes
@@ -56,8 +58,14 @@ struct Journal::File {
         std::fseek(stream, end, SEEK_SET) == 0 && std::fwrite(&header, sizeof header, 1, stream) == 1 &&
         (bytes.empty() || std::fwrite(bytes.data(), bytes.size(), 1, stream) == 1) && std::fflush(stream) == 0;
     if (!written) fail("cannot be written");
+    const std::lock_guard lock(mutex);
     parts.push_back({end + long(sizeof header), bytes.size(), header.checksum});
     end = parts.back().begin + long(bytes.size());
+  }
+
+  [[nodiscard]] Place place(std::size_t number) {
+    const std::lock_guard lock(mutex);
+    return parts[number];
   }
 
   /// At a place of its own, so that several threads may read.
@@ -140,6 +148,7 @@ Journal::Journal(Journal&&) noexcept = default;
 Journal& Journal::operator=(Journal&&) noexcept = default;
 
 std::size_t Journal::size() const {
+  const std::lock_guard lock(file_->mutex);
   return file_->parts.size();
 }
 std::size_t Journal::found() const {
@@ -152,6 +161,15 @@ std::size_t Journal::finished_of_rank_0() const {
   const cluster::Bytes said = ranks_->broadcast(cluster::Packer().add(size()).packed());
   cluster::Unpacker(said).get(finished);
   return finished;
+}
+
+std::exception_ptr Journal::failure_of(std::future<void>& work) {
+  try {
+    if (work.valid()) work.get();
+  } catch (...) {
+    return std::current_exception();
+  }
+  return nullptr;
 }
 
 void Journal::hear_of_refusals(std::exception_ptr& failure) const {
@@ -180,7 +198,7 @@ void Journal::append(std::size_t number, std::span<const std::byte> bytes) {
 std::vector<std::byte> Journal::read_bytes(std::size_t number) const {
   CNERF_CHECK(number < size(), "this part of the bake is not finished");
   std::vector<std::byte> bytes;
-  const File::Place& place = file_->parts[number];
+  const File::Place place = file_->place(number);
   if (!file_->read(place, bytes) || file_->checksum_at(number, bytes) != place.checksum) {
     throw JournalError(file_->name + ": part " + std::to_string(number) + " was changed since it was written");
   }

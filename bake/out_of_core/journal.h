@@ -8,6 +8,7 @@
 #include <exception>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <span>
@@ -29,8 +30,8 @@ struct JournalError : InputError {
 
 /// A list of byte strings in a file that only grows. A process may be killed at any time: what is cut off or damaged is
 /// dropped when the file is opened again, and everything before it is still there. Several threads may read finished
-/// parts while none is written. Checksums find accidents and another bake's parts; against who forges a file, parts are
-/// checked before they are used.
+/// parts, also while one is written. Checksums find accidents and another bake's parts; against who forges a file,
+/// parts are checked before they are used.
 class Journal {
  public:
   /// In a file without a name, gone with the object.  @throws OutputError.
@@ -55,7 +56,7 @@ class Journal {
 
   /// Calls `use(i, part first + i)` for each i below `count`, in order. A part is read if it is finished, else made and
   /// written, which has to happen in order and without gaps. `at_a_time` parts are made at the same time: `make(i)` is
-  /// called by several threads.
+  /// called by several threads, and `use` by one, while the next parts are made.
   /// @param is_sound  asked of each part that was read, before it is used: whether this bake can have made it; no
   ///                  answer needed where none is given
   /// @throws JournalError  when a part was not sound.
@@ -65,40 +66,17 @@ class Journal {
              const std::function<std::vector<T>(std::size_t)>& make,
              const std::function<void(std::size_t, const std::vector<T>&)>& use,
              const std::function<bool(std::size_t, const std::vector<T>&)>& is_sound = {}) {
-    const auto ranks = std::size_t(ranks_->size()), rank = std::size_t(ranks_->rank());
-    at_a_time *= ranks;
+    at_a_time *= std::size_t(ranks_->size());
+    std::future<void> keeping;  // of the parts before, while others are made
     for (std::size_t begin = 0; begin < count; begin += at_a_time) {
-      std::vector<std::optional<std::vector<T>>> some(std::min(at_a_time, count - begin));
-      const std::size_t own = size(), finished = finished_of_rank_0();
-      std::exception_ptr failure;
-      try {
-        parallel_tasks(some.size(), [&](std::size_t i) {
-          const std::size_t number = first + begin + i;
-          if (number >= finished) {
-            if (i % ranks == rank) some[i] = make(begin + i);
-            return;
-          }
-          if (rank > 0) return;
-          std::vector<T> part = read<T>(number);
-          if (is_sound && !is_sound(begin + i, part)) refuse(number);
-          some[i] = std::move(part);
-        });
-      } catch (...) {
-        failure = std::current_exception();
-      }
-      if (ranks > 1) hear_of_refusals(failure);
-      if (ranks > 1 && !failure) exchange(finished - std::min(finished, first + begin), some);
-      // What is made is kept, whoever stops the bake.
-      for (std::size_t i = 0; i < some.size() && some[i]; ++i) {
-        const std::size_t number = first + begin + i;
-        if (number >= own) append(number, std::as_bytes(std::span<const T>(*some[i])));
-      }
-      if (failure) std::rethrow_exception(failure);
-      for (std::size_t i = 0; i < some.size(); ++i) {
-        use(begin + i, *some[i]);
-        some[i].reset();
-      }
+      auto some = made<T>({first, begin, std::min(at_a_time, count - begin)}, make, is_sound);
+      if (std::exception_ptr before = failure_of(keeping)) some.failure = std::move(before);
+      const bool waits = some.failure || !ranks_->is_alone();
+      keeping = std::async(waits ? std::launch::deferred : std::launch::async,
+                           [this, &use, some = std::move(some)]() mutable { keep(std::move(some), use); });
+      if (waits) keeping.get();
     }
+    if (keeping.valid()) keeping.get();
   }
   /// A finished part.  @throws JournalError  when it cannot be read any more, or is no list of T.
   template <typename T>
@@ -113,6 +91,57 @@ class Journal {
 
  private:
   struct File;
+  struct Range {
+    std::size_t first, begin, count;  ///< the number of part 0, and which of those behind it
+  };
+  template <typename T>
+  struct Batch {
+    Range range;
+    std::vector<std::optional<std::vector<T>>> parts;
+    std::exception_ptr failure;  ///< why some are not there
+  };
+
+  template <typename T>
+  [[nodiscard]] Batch<T> made(const Range& range, const std::function<std::vector<T>(std::size_t)>& make,
+                              const std::function<bool(std::size_t, const std::vector<T>&)>& is_sound) const {
+    const auto ranks = std::size_t(ranks_->size()), rank = std::size_t(ranks_->rank());
+    Batch<T> batch{range, std::vector<std::optional<std::vector<T>>>(range.count), nullptr};
+    const std::size_t begin = range.begin, first = range.first + begin, finished = finished_of_rank_0();
+    try {
+      parallel_tasks(batch.parts.size(), [&](std::size_t i) {
+        if (first + i >= finished) {
+          if (i % ranks == rank) batch.parts[i] = make(begin + i);
+          return;
+        }
+        if (rank > 0) return;
+        std::vector<T> part = read<T>(first + i);
+        if (is_sound && !is_sound(begin + i, part)) refuse(first + i);
+        batch.parts[i] = std::move(part);
+      });
+    } catch (...) {
+      batch.failure = std::current_exception();
+    }
+    if (ranks > 1) hear_of_refusals(batch.failure);
+    if (ranks > 1 && !batch.failure) exchange(finished - std::min(finished, first), batch.parts);
+    return batch;
+  }
+  /// Waits.
+  [[nodiscard]] static std::exception_ptr failure_of(std::future<void>& work);
+  /// What is made is kept, whoever stops the bake.
+  template <typename T>
+  void keep(Batch<T> batch, const std::function<void(std::size_t, const std::vector<T>&)>& use) {
+    const std::size_t begin = batch.range.begin, first = batch.range.first + begin;
+    for (std::size_t i = 0; i < batch.parts.size() && batch.parts[i]; ++i) {
+      if (first + i < size()) continue;
+      if (batch.failure && first + i > size()) break;  // it was those before that could not be kept
+      append(first + i, std::as_bytes(std::span<const T>(*batch.parts[i])));
+    }
+    if (batch.failure) std::rethrow_exception(batch.failure);
+    for (std::size_t i = 0; i < batch.parts.size(); ++i) {
+      use(begin + i, *batch.parts[i]);
+      batch.parts[i].reset();
+    }
+  }
   [[nodiscard]] std::size_t finished_of_rank_0() const;
   /// Parts that are not sound are found by rank 0, which reads them; all refuse them.
   void hear_of_refusals(std::exception_ptr& failure) const;

@@ -1,7 +1,9 @@
 #include "src/evaluate/evaluate.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <future>
 
 #include "src/base/check.h"
 #include "src/base/error.h"
@@ -26,9 +28,12 @@ std::vector<float> channel(std::span<const float> rgb, int index) {
 
 std::optional<double> ssim_of_channels(const std::vector<float>& ours, const std::vector<float>& truth, int width,
                                        int height, std::span<const std::uint8_t> valid) {
+  std::array<std::optional<double>, 3> of_channel;
+  parallel_tasks(of_channel.size(), [&](std::size_t c) {
+    of_channel[c] = ssim(channel(ours, int(c)), channel(truth, int(c)), width, height, valid);
+  });
   double sum = 0;
-  for (int c = 0; c < 3; ++c) {
-    const auto one = ssim(channel(ours, c), channel(truth, c), width, height, valid);
+  for (const std::optional<double>& one : of_channel) {
     if (!one) return std::nullopt;
     sum += *one / 3;
   }
@@ -56,6 +61,7 @@ void measure_luminance(const EvaluatedView& pictures, ViewMetrics& metrics) {
 }
 
 void measure_colour(const EvaluatedView& pictures, ViewMetrics& metrics) {
+  if (pictures.ours.rgb.empty()) return;
   const std::span<const std::uint8_t> valid = pictures.view.image.mask;
   const std::vector<float>& ours = pictures.ours.rgb;
   const Colorfulness colorful = colorfulness(srgb8_from_linear(ours), valid);
@@ -76,6 +82,13 @@ void measure_colour(const EvaluatedView& pictures, ViewMetrics& metrics) {
   metrics.ssim_rgb = ssim_of_channels(encoded(ours), encoded(truth), pictures.ours.width, pictures.ours.height, valid);
   metrics.ab_error = mean_ab_distance(ours, truth, valid);
   metrics.ab_error_grey = mean_ab_distance(truth, {}, valid);
+}
+
+void measure_baked(const EvaluatedView& pictures, ViewMetrics& metrics) {
+  const RenderedImage& ours = pictures.ours;
+  if (ours.rgb.empty() || ours.baked_rgb.empty()) return;
+  metrics.bake_ab_distance =
+      mean_ab_distance(ours.baked_rgb, ours.rgb, coloured_pixels(ours, pictures.view.image.mask));
 }
 
 /// Networks have one memory for what passes through them: not for several threads.
@@ -217,12 +230,9 @@ ViewMetrics measure(const EvaluatedView& pictures) {
   CNERF_CHECK_EQ(pictures.ours.height, pictures.view.image.height);
   ViewMetrics metrics;
   metrics.view = pictures.view.name;
-  measure_luminance(pictures, metrics);
-  if (!pictures.ours.rgb.empty()) measure_colour(pictures, metrics);
-  if (!pictures.ours.rgb.empty() && !pictures.ours.baked_rgb.empty()) {
-    metrics.bake_ab_distance = mean_ab_distance(pictures.ours.baked_rgb, pictures.ours.rgb,
-                                                coloured_pixels(pictures.ours, pictures.view.image.mask));
-  }
+  const std::array<void (*)(const EvaluatedView&, ViewMetrics&), 3> parts = {&measure_luminance, &measure_colour,
+                                                                             &measure_baked};
+  parallel_tasks(parts.size(), [&](std::size_t part) { parts[part](pictures, metrics); });
   drop_nan(metrics);
   return metrics;
 }
@@ -233,22 +243,24 @@ std::vector<ViewMetrics> evaluate_views(const Scene& scene, std::span<const View
   RenderOptions render = options.render;
   render.color = scene.is_colorized();
   render.baked_color = scene.is_colorized() && options.with_baked;
-  std::vector<RenderedImage> ours;
-  for (const View* view : views) {
-    if (interruption_requested()) throw Interrupted("evaluation stopped; nothing was written");
-    ours.push_back(scene.render(view->intrinsics, view->world_from_camera, render));
-    if (ours.back().rgb.empty() && options.grey_as_color) paint_grey(ours.back());
-  }
+  std::vector<RenderedImage> ours(views.size());
   std::vector<std::optional<ColorImage>> truth(views.size());
-  std::vector<ViewMetrics> measured(views.size());
-  parallel_tasks(views.size(), [&](std::size_t i) {
-    truth[i] = load_color_truth(*views[i]);
-    measured[i] = measure({*views[i], ours[i], truth[i]});
-  });
+  std::vector<std::future<ViewMetrics>> measuring;  // beside the engine's work on the next views
   for (std::size_t i = 0; i < views.size(); ++i) {
+    if (interruption_requested()) throw Interrupted("evaluation stopped; nothing was written");
+    ours[i] = scene.render(views[i]->intrinsics, views[i]->world_from_camera, render);
+    if (ours[i].rgb.empty() && options.grey_as_color) paint_grey(ours[i]);
+    measuring.push_back(std::async(std::launch::async, [&view = *views[i], &own = ours[i], &given = truth[i]] {
+      given = load_color_truth(view);
+      return measure({view, own, given});
+    }));
+  }
+  std::vector<ViewMetrics> measured;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    measured.push_back(measuring[i].get());
     const EvaluatedView pictures{*views[i], ours[i], truth[i]};
-    measure_camera(scene, *views[i], options, measured[i]);
-    if (options.lpips != nullptr || options.encoder != nullptr) measure_by_networks(pictures, options, measured[i]);
+    measure_camera(scene, *views[i], options, measured.back());
+    if (options.lpips != nullptr || options.encoder != nullptr) measure_by_networks(pictures, options, measured.back());
     if (watch) watch(pictures);
   }
   return measured;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 
 #include "src/base/aabb.h"
+#include "src/base/parallel.h"
 #include "src/base/rng.h"
 #include "src/evaluate/psnr.h"
 
@@ -163,30 +165,32 @@ std::optional<FittedCamera> fit_camera(const SeenScene& scene, const RenderEffor
 }
 
 double near_opacity(const SeenScene& scene, const RenderEffort& effort, const UnitCamera& camera) {
+  constexpr std::size_t kGrain = 1024;  // rays of a parallel piece of work
   const std::size_t pixels = std::size_t(camera.intrinsics.width) * std::size_t(camera.intrinsics.height);
-  const std::size_t at_a_time = scene.engine.rays_at_a_time();
+  const std::size_t all = (pixels + kTracedEvery - 1) / kTracedEvery, at_a_time = scene.engine.rays_at_a_time();
   double opacity = 0;
-  std::size_t traced = 0;
-  for (std::size_t pixel = 0; pixel < pixels;) {
-    std::vector<Ray> rays;
-    std::vector<float> near_ends;
-    for (; pixel < pixels && rays.size() < at_a_time; pixel += kTracedEvery) {
-      rays.push_back(camera.ray_of_pixel(pixel));
-      const auto inside = intersect(Aabbf{{0, 0, 0}, {1, 1, 1}}, rays.back().origin, rays.back().direction);
-      const float begin = inside ? std::max(inside->begin, 0.0f) : 0;
-      near_ends.push_back(inside ? begin + kNearShare * (inside->end - begin) : 0);
-    }
+  for (std::size_t first = 0; first < all; first += at_a_time) {
+    std::vector<Ray> rays(std::min(at_a_time, all - first));
+    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) rays[r] = camera.ray_of_pixel((first + r) * kTracedEvery);
+    });
     std::vector<WeightedSample> samples;
     std::vector<std::size_t> offsets;
     scene.engine.trace(rays, scene.march, effort, samples, offsets);
-    for (std::size_t r = 0; r < rays.size(); ++r) {
-      for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
-        if (samples[s].t < near_ends[r]) opacity += double(samples[s].weight);
+    std::vector<float> near(rays.size());
+    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) {
+        const auto inside = intersect(Aabbf{{0, 0, 0}, {1, 1, 1}}, rays[r].origin, rays[r].direction);
+        if (!inside) continue;
+        const float start = std::max(inside->begin, 0.0f), near_end = start + kNearShare * (inside->end - start);
+        for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
+          if (samples[s].t < near_end) near[r] += samples[s].weight;
+        }
       }
-    }
-    traced += rays.size();
+    });
+    opacity += std::accumulate(near.begin(), near.end(), 0.0);
   }
-  return opacity / double(std::max<std::size_t>(1, traced));
+  return opacity / double(std::max<std::size_t>(1, all));
 }
 
 }  // namespace cnerf

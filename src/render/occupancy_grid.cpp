@@ -40,17 +40,32 @@ void OccupancyGrid::mark_occupied(std::span<const float> x, std::span<const floa
     return axis;
   };
   const Axis of_x = axis_of(x), of_y = axis_of(y), of_z = axis_of(z);
-  const auto n = std::size_t(layout_.cascades);
-  std::size_t at = 0;
+  const auto n = std::size_t(layout_.cascades), rows = y.size(), plane = rows * z.size();
+  // Coordinates are closer than cells, mostly: what lies in the same cells as its neighbour has its marks.
+  const auto is_as_before = [n](const Axis& axis, std::size_t i) {
+    const auto cells = axis.cells.begin() + std::ptrdiff_t(i * n);
+    return i > 0 && axis.cascades[i] == axis.cascades[i - 1] &&
+           std::equal(cells, cells + std::ptrdiff_t(n), cells - std::ptrdiff_t(n));
+  };
   for (std::size_t i = 0; i < x.size(); ++i) {
-    for (std::size_t j = 0; j < y.size(); ++j) {
-      const int of_row = std::max(of_x.cascades[i], of_y.cascades[j]);
+    std::uint8_t* const of_plane = marks.data() + i * plane;
+    if (is_as_before(of_x, i)) {
+      std::copy_n(of_plane - plane, plane, of_plane);
+      continue;
+    }
+    for (std::size_t j = 0; j < rows; ++j) {
+      std::uint8_t* const of_row = of_plane + j * z.size();
+      if (is_as_before(of_y, j)) {
+        std::copy_n(of_row - z.size(), z.size(), of_row);
+        continue;
+      }
+      const int cascade_of_row = std::max(of_x.cascades[i], of_y.cascades[j]);
       for (std::size_t k = 0; k < z.size(); ++k) {
-        const int cascade = std::max(of_row, of_z.cascades[k]);
+        const int cascade = std::max(cascade_of_row, of_z.cascades[k]);
         const auto c = std::size_t(cascade);
         const std::size_t cell =
             layout_.cell_at(cascade, of_x.cells[i * n + c], of_y.cells[j * n + c], of_z.cells[k * n + c]);
-        marks[at++] = (bits_[cell / 64] >> (cell % 64)) & 1u;
+        of_row[k] = (bits_[cell / 64] >> (cell % 64)) & 1u;
       }
     }
   }

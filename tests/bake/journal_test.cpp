@@ -5,7 +5,9 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <fstream>
+#include <future>
 #include <numeric>
 
 #include "src/base/error.h"
@@ -93,6 +95,26 @@ TEST(Journal, APartThatFailsKeepsThoseBeforeIt) {
     EXPECT_THROW(journal.parts<int>(0, 8, 3, make, [](std::size_t, const std::vector<int>&) {}), InputError);
   }
   EXPECT_EQ(Journal(folder / "j", "one bake").found(), 5u);
+}
+
+/// While `use` of a part is still at work, the next ones are made; what is made then is kept, should `use` fail.
+TEST(Journal, PartsAreMadeWhileThoseBeforeAreUsed) {
+  const cnerf::test::TempDir folder;
+  {
+    Journal journal(folder / "j", "one bake");
+    std::promise<void> next_is_made;
+    const auto make = [&](std::size_t i) {
+      if (i == 1) next_is_made.set_value();
+      return numbers(int(i));
+    };
+    const auto use = [&](std::size_t i, const std::vector<int>&) {
+      if (i > 0) return;
+      EXPECT_EQ(next_is_made.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);
+      throw Interrupted("stopped");
+    };
+    EXPECT_THROW(journal.parts<int>(0, 8, 1, make, use), Interrupted);
+  }
+  EXPECT_EQ(Journal(folder / "j", "one bake").found(), 2u);
 }
 
 TEST(Journal, SeveralThreadsReadAtTheSameTime) {

@@ -127,8 +127,9 @@ TEST(Resuming, AShortageOfMemoryIsNoCrash) {
       {"train", tiny_capture().string(), "-o", (folder / "run").string(), "--max-memory", "300M"}, tiny_options());
   const ProgramResult small = cnerf(arguments);
   EXPECT_EQ(small.exit_code, 0) << small.err;
-  const ProgramResult large = cnerf(
-      concatenated(arguments, {"--overwrite", "--set", "stage1.grid.log2_rows=23", "--set", "stage1.grid.levels=16"}));
+  const ProgramResult large =
+      cnerf(concatenated(arguments, {"--overwrite", "--set", "stage1.grid.log2_rows=23", "--set",
+                                     "stage1.grid.levels=16", "--set", "stage1.grid.finest_resolution=2048"}));
   EXPECT_EQ(large.exit_code, 71) << large.err;
   EXPECT_THAT(large.err, HasSubstr("out of memory"));
   EXPECT_THAT(files_below(folder / "run"), testing::Each(testing::Not(HasSubstr("partial"))));

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
+#include <future>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,6 +15,7 @@
 #include "src/base/parallel.h"
 #include "src/base/plugin.h"
 #include "src/base/rng.h"
+#include "src/base/worker.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer/torch/products.h"
@@ -25,7 +29,8 @@ namespace {
 
 constexpr const char* kWeightsName = "colorizer.weights";
 // Patches per pass on a GPU. There are few sizes, since cuDNN makes a plan for each, which takes longer than a pass.
-constexpr std::size_t kSmallPass = 4, kLargePass = 8;
+constexpr std::array<std::size_t, 3> kPasses = {4, 8, 16};
+constexpr int kWarmUpSide = 64;  // pixels
 
 /// One way to show the network a picture. What it says of a place changes with the way, where it does not know: the
 /// mean of several ways keeps what they agree on, and is near neutral elsewhere.
@@ -73,7 +78,12 @@ class BuiltinColorizer final : public Colorizer {
       : weights_(load_colorizer_weights(file)), name_("builtin:" + weights_.sha256.substr(0, 12)) {
     weights_.network->to(device_);
     for (Tensor& parameter : weights_.network->parameters()) parameter.set_requires_grad(false);
-    if (device_.is_cpu()) prepare_for_answers(*weights_.network);
+    if (device_.is_cpu()) {
+      prepare_for_answers(*weights_.network);
+    } else {
+      thread_.emplace();
+      warming_up_ = thread_->submit([this] { warm_up(); });
+    }
   }
 
   ChromaBatch colorize(const LightnessBatch& patches) override {
@@ -91,8 +101,11 @@ class BuiltinColorizer final : public Colorizer {
         at::init_num_threads();
         add_answers(patches, std::span(all).subspan(i, 1), answer);
       });
-    } else {
+    } else if (device_.is_cpu()) {
       add_answers(patches, all, answer);
+    } else {
+      is_asked_ = true;
+      thread_->submit([&] { add_answers(patches, all, answer); }).get();
     }
     return answer;
   }
@@ -100,6 +113,20 @@ class BuiltinColorizer final : public Colorizer {
   [[nodiscard]] std::string name() const override { return name_; }
 
  private:
+  /// Passes of the sizes that stage 2 asks for, as long as nobody asks: a GPU's first ones take a second, in which
+  /// stage 1 trains.
+  void warm_up() {
+    for (const std::size_t rows : kPasses) {
+      for (std::size_t side = 0; side < kSides.size() && !is_asked_; ++side) {
+        const LightnessBatch patch{1, kWarmUpSide, kWarmUpSide, std::vector<float>(kWarmUpSide * kWarmUpSide),
+                                   std::vector<PatchOrigin>(1)};
+        ChromaBatch answer{1, kWarmUpSide, kWarmUpSide, std::vector<float>(2 * kWarmUpSide * kWarmUpSide), {}};
+        const Showing shown{0, false};
+        add_pass(patch, {&shown, 1}, side, rows, answer);
+      }
+    }
+  }
+
   /// Pictures that are shown at the same size share a pass.
   void add_answers(const LightnessBatch& patches, std::span<const std::size_t> pictures, ChromaBatch& answer) {
     std::array<std::vector<Showing>, kSides.size()> shown;
@@ -122,7 +149,8 @@ class BuiltinColorizer final : public Colorizer {
   /// Whole pictures are shown alone: several would need several times the memory.
   [[nodiscard]] std::size_t rows_of_pass(const LightnessBatch& patches, std::size_t left) const {
     if (device_.is_cpu() || patches.origins.empty()) return 1;
-    return left > kSmallPass ? kLargePass : kSmallPass;
+    const auto fits = std::ranges::find_if(kPasses, [left](std::size_t rows) { return rows >= left; });
+    return fits == kPasses.end() ? kPasses.back() : *fits;
   }
 
   /// @param rows  of the pass: those behind the pictures stay black
@@ -150,6 +178,9 @@ class BuiltinColorizer final : public Colorizer {
   ColorizerWeights weights_;
   std::string name_;
   torch::Device device_ = torch::cuda::is_available() ? torch::kCUDA : torch::kCPU;
+  std::atomic<bool> is_asked_ = false;
+  std::future<void> warming_up_;  // whose failure nobody needs to know: the question fails as well
+  std::optional<Worker> thread_;  // of all passes on a GPU; last: its jobs refer to what is above
 };
 
 std::vector<fs::path> candidate_weights() {

@@ -3,14 +3,12 @@
 #include <algorithm>
 
 #include "src/base/check.h"
-#include "src/base/parallel.h"
 
 namespace cnerf {
 namespace {
 
 constexpr std::uint32_t kRaysAtATime = 1 << 18;  // of a rendering
 constexpr std::size_t kUsualSamples = 16;        // that are kept of a ray
-constexpr std::size_t kGrain = 1 << 14;          // samples of a parallel piece of work
 
 const char* const kTracedAdvice = "rays";
 
@@ -105,12 +103,14 @@ void LuminanceTracerCuda::trace(const FieldView& field, std::span<const Ray> ray
     const std::size_t count = std::min<std::size_t>(kTracedAtATime, rays.size() - first), before = samples.size();
     trace_to(field, rays.subspan(first, count), march, effort, to_host_);
     const RayOrder order(to_host_);
-    const std::vector<float> t = order.downloaded(to_host_.t), weights = order.downloaded(to_host_.weights),
-                             luminance = order.downloaded(to_host_.luminance);
+    const std::vector<float> t = order.unordered(to_host_.t), weights = order.unordered(to_host_.weights),
+                             luminance = order.unordered(to_host_.luminance);
     for (std::size_t r = 0; r < count; ++r) offsets.push_back(before + order.offsets()[r + 1]);
     samples.resize(offsets.back());
-    parallel_ranges(t.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t s = begin; s < end; ++s) samples[before + s] = {t[s], weights[s], luminance[s]};
+    order.for_rays([&](std::size_t from, std::size_t to, std::size_t of_ray) {
+      for (std::size_t s = 0; s < of_ray; ++s) {
+        samples[before + to + s] = {t[from + s], weights[from + s], luminance[from + s]};
+      }
     });
   }
 }

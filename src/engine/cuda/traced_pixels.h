@@ -29,15 +29,27 @@ class RayOrder {
   explicit RayOrder(const TracedBuffers& traced);
 
   [[nodiscard]] const std::vector<std::size_t>& offsets() const { return offsets_; }  ///< [rays + 1]
+  /// As they lie in the GPU's memory.
+  template <typename T>
+  [[nodiscard]] std::vector<T> unordered(const DeviceBuffer<T>& of_samples) const {
+    std::vector<T> found(offsets_.back());
+    of_samples.download(found.data(), found.size());
+    return found;
+  }
+  /// Calls `move(from, to, count)` for the samples of each ray: where the first of them lies unordered, and in order.
+  template <typename Move>
+  void for_rays(const Move& move) const {
+    constexpr std::size_t kGrain = 512;  // rays of a parallel piece of work
+    parallel_ranges(begins_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) move(begins_[r], offsets_[r], offsets_[r + 1] - offsets_[r]);
+    });
+  }
   template <typename T>
   [[nodiscard]] std::vector<T> downloaded(const DeviceBuffer<T>& of_samples) const {
-    constexpr std::size_t kGrain = 512;  // rays of a parallel piece of work
-    std::vector<T> found(offsets_.back()), ordered(offsets_.back());
-    of_samples.download(found.data(), found.size());
-    parallel_ranges(begins_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) {
-        std::copy_n(&found[0] + begins_[r], offsets_[r + 1] - offsets_[r], &ordered[0] + offsets_[r]);
-      }
+    const std::vector<T> found = unordered(of_samples);
+    std::vector<T> ordered(found.size());
+    for_rays([&](std::size_t from, std::size_t to, std::size_t count) {
+      std::copy_n(found.data() + from, count, ordered.data() + to);
     });
     return ordered;
   }

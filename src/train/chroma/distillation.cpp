@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <future>
 
+#include "src/base/parallel.h"
 #include "src/base/rng.h"
+#include "src/base/worker.h"
 #include "src/optim/adam.h"
 
 namespace cnerf {
@@ -12,6 +14,7 @@ namespace {
 
 constexpr int kPixels = 8192;  // per step
 constexpr int kMeasuredPixels = 4 * kPixels;
+constexpr int kStepsAhead = 8;                     // whose pixels are found at the same time
 constexpr double kRate = 1e-2, kFinalRate = 1e-3;  // of its own: distances want smaller steps than classes
 constexpr std::uint64_t kMeasuredStream = std::uint64_t(1) << 40;  // apart from the steps'
 
@@ -29,51 +32,97 @@ std::vector<ViewPixel> random_pixels(const Session& session, int count, std::uin
   return wanted;
 }
 
+/// What some steps learn from, but for its colours.
+struct Draft {
+  std::vector<std::vector<ViewPixel>> pixels;  ///< [steps]
+  std::vector<PixelSamples> samples;           ///< [steps]
+  std::vector<ViewPixel> fresh;                ///< drawn for the first time
+  PixelSamples samples_of_fresh;
+};
+
+/// Drafts the next steps while the engine does those before.
+class Drafts {
+ public:
+  Drafts(const Session& session, long first_step, long steps) : session_(session), next_(first_step), steps_(steps) {
+    for (const CachedView& view : session.views()) is_known_.emplace_back(view.luminance.size(), false);
+    begin_next();
+  }
+  /// Of the steps after those of the call before.
+  [[nodiscard]] Draft next() {
+    Draft draft = coming_.get();
+    next_ += long(draft.pixels.size());
+    begin_next();
+    return draft;
+  }
+
+ private:
+  void begin_next() {
+    if (next_ < steps_) coming_ = worker_.submit([this, first = next_] { return drafted(first); });
+  }
+  [[nodiscard]] Draft drafted(long first) {
+    Draft draft;
+    draft.pixels.resize(std::size_t(std::min<long>(kStepsAhead, steps_ - first)));
+    draft.samples.resize(draft.pixels.size());
+    parallel_tasks(draft.pixels.size(), [&](std::size_t i) {
+      draft.pixels[i] = random_pixels(session_, kPixels, std::uint64_t(first) + i);
+      draft.samples[i] = pixel_samples(session_.views(), draft.pixels[i]);
+    });
+    for (const std::vector<ViewPixel>& of_step : draft.pixels) {
+      for (const ViewPixel& pixel : of_step) {
+        auto is_known = is_known_[pixel.view][pixel.pixel];
+        if (!is_known) draft.fresh.push_back(pixel);
+        is_known = true;
+      }
+    }
+    draft.samples_of_fresh = pixel_samples(session_.views(), draft.fresh);
+    return draft;
+  }
+
+  const Session& session_;
+  long next_, steps_;
+  std::vector<std::vector<bool>> is_known_;  // [views][pixels]
+  std::future<Draft> coming_;
+  Worker worker_;  // last: its jobs refer to what is above
+};
+
 /// Decoded colours of pixels. They stay the same all the time, and steps draw most pixels several times.
 class DecodedColors {
  public:
   explicit DecodedColors(const Session& session) : session_(session) {
-    for (const CachedView& view : session.views()) colors_.emplace_back(view.luminance.size(), kUnknown);
+    for (const CachedView& view : session.views()) colors_.emplace_back(view.luminance.size());
   }
-  [[nodiscard]] std::vector<Ab> of(std::span<const ViewPixel> pixels) {
-    std::vector<ViewPixel> unknown;
-    for (const ViewPixel& pixel : pixels) {
-      Ab& color = at(pixel);
-      if (!std::isnan(color.a)) continue;
-      color = {};  // once, should it be drawn twice
-      unknown.push_back(pixel);
-    }
-    if (!unknown.empty()) decode(unknown);
-    std::vector<Ab> colors;
-    for (const ViewPixel& pixel : pixels) colors.push_back(at(pixel));
+  /// What each step learns.  [steps][pixels]
+  [[nodiscard]] std::vector<std::vector<Ab>> of(const Draft& draft) {
+    std::vector<Ab> decoded;
+    if (!draft.fresh.empty()) decoded = session_.model.decode(draft.samples_of_fresh);
+    for (std::size_t i = 0; i < decoded.size(); ++i) colors_[draft.fresh[i].view][draft.fresh[i].pixel] = decoded[i];
+    std::vector<std::vector<Ab>> colors(draft.pixels.size());
+    parallel_tasks(colors.size(), [&](std::size_t step) {
+      for (const ViewPixel& pixel : draft.pixels[step]) colors[step].push_back(colors_[pixel.view][pixel.pixel]);
+    });
     return colors;
   }
 
  private:
-  static constexpr Ab kUnknown{std::numeric_limits<float>::quiet_NaN(), 0};
-  void decode(std::span<const ViewPixel> pixels) {
-    const std::vector<Ab> decoded = session_.model.decode(pixel_samples(session_.views(), pixels));
-    for (std::size_t i = 0; i < pixels.size(); ++i) at(pixels[i]) = decoded[i];
-  }
-  Ab& at(const ViewPixel& pixel) { return colors_[pixel.view][pixel.pixel]; }
-
   const Session& session_;
-  std::vector<std::vector<Ab>> colors_;
+  std::vector<std::vector<Ab>> colors_;  // [views][pixels]; zero where no step has looked yet
 };
 
 }  // namespace
 
 void distill(Session& session) {
-  const int steps = session.options.distill_steps;
+  const long steps = session.options.distill_steps;
   ColorFieldEngine& field = *session.model.chromaticity;
   DecodedColors colors(session);
+  Drafts drafts(session, field.step_count(), steps);
   while (field.step_count() < steps) {
-    const long step = field.step_count();
-    const std::vector<ViewPixel> pixels = random_pixels(session, kPixels, std::uint64_t(step));
-    if (pixels.empty()) break;
-    session.loss = field.step(pixel_samples(session.views(), pixels), colors.of(pixels), {}, AbLoss::kHuber,
-                              decayed_rate(kRate, kFinalRate, double(step) / steps));
-    session.after_step("stage 2: colour for baking", "ab distance", step + 1, steps);
+    const Draft draft = drafts.next();
+    const std::vector<std::vector<Ab>> wanted = colors.of(draft);
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      const float rate = decayed_rate(kRate, kFinalRate, double(field.step_count()) / double(steps));
+      session.loss = field.step(draft.samples[i], wanted[i], {}, AbLoss::kHuber, rate);
+      session.after_step("stage 2: colour for baking", "ab distance", field.step_count(), int(steps));
+    }
   }
 }
 

@@ -1,9 +1,9 @@
 #include "src/train/chroma/injection.h"
 
 #include <algorithm>
-#include <iterator>
 
 #include "src/base/error.h"
+#include "src/base/parallel.h"
 #include "src/base/rng.h"
 #include "src/base/usage.h"
 #include "src/optim/adam.h"
@@ -12,13 +12,16 @@ namespace cnerf {
 namespace {
 
 constexpr int kMostRejectedInARow = 400;
-constexpr int kSkyStep = 4;  // of the pixels of an answer, one of so many along both axes tells of the sky
+constexpr std::size_t kGrain = 256;  // pixels of a parallel piece of work
+constexpr int kSkyStep = 4;          // of the pixels of an answer, one of so many along both axes tells of the sky
 
 }  // namespace
 
 double Classification::step(ColorModel& model, const ColoredPixels& pixels, float learning_rate) const {
-  std::vector<SoftLabel> labels;
-  std::ranges::transform(pixels.colors, std::back_inserter(labels), soft_label);
+  std::vector<SoftLabel> labels(pixels.colors.size());
+  parallel_ranges(labels.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) labels[i] = soft_label(pixels.colors[i]);
+  });
   return model.chroma->step(pixels.samples, labels, pixels.weights, weights_, learning_rate);
 }
 
@@ -30,23 +33,22 @@ void PatchTraining::run() {
   const Stage2Options& options = session_.options;
   ColorModel& model = session_.model;
   if (model.sky.exists() && model.sky.is_grey()) model.sky.add(session_.views(), known_);
-  questioner_.ask_ahead(model.queries.front());
+  ask_ahead(0);
   while (steps() < options.patches) {
     const Stopwatch waiting;
     const Answers answers = questioner_.next();
     model.report.waited_seconds += waiting.seconds();
     model.report.colorizer_seconds += answers.seconds;
-    model.queries.front() += options.colorizer_batch;
-    questioner_.ask_ahead(model.queries.front());
-    for (const AnsweredPatch& patch : answers.patches) {
-      const bool is_accepted = purifier_.accepts(patch.view());
-      if (!judge(patch, is_accepted) || steps() >= options.patches) continue;
+    model.queries.front() += std::int64_t(answers.patches.size());
+    std::vector<Lesson> lessons = lessons_of(answers.patches);
+    ask_ahead(long(lessons.size()));
+    parallel_tasks(lessons.size(), [&](std::size_t i) { lessons[i].pixels = pixels_of(lessons[i]); });
+    for (const Lesson& lesson : lessons) {
       const float rate =
           decayed_rate(options.learning_rate, options.final_learning_rate, double(steps()) / options.patches);
-      const ColoredPixels pixels = pixels_of(patch, is_accepted);
-      const double loss = injection_.step(model, pixels, rate);
-      if (!pixels.colors.empty()) session_.loss = loss;  // a patch may show nothing of the scene
-      if (model.sky.exists() && is_accepted) learn_sky(patch);
+      const double loss = injection_.step(model, lesson.pixels, rate);
+      if (!lesson.pixels.colors.empty()) session_.loss = loss;  // a patch may show nothing of the scene
+      if (model.sky.exists() && lesson.is_accepted) learn_sky(*lesson.patch);
     }
     session_.after_step("stage 2", "loss", steps(), options.patches);
   }
@@ -56,6 +58,24 @@ void PatchTraining::run() {
 
 long PatchTraining::steps() const {
   return injection_.step_count(session_.model);
+}
+
+std::vector<PatchTraining::Lesson> PatchTraining::lessons_of(std::span<const AnsweredPatch> patches) {
+  std::vector<char> is_accepted(patches.size());
+  parallel_tasks(patches.size(), [&](std::size_t i) { is_accepted[i] = purifier_.accepts(patches[i].view()); });
+  std::vector<Lesson> lessons;
+  long step = steps();
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    if (!judge(patches[i], is_accepted[i]) || step >= session_.options.patches) continue;
+    lessons.push_back({&patches[i], bool(is_accepted[i]), step++, {}});
+  }
+  return lessons;
+}
+
+void PatchTraining::ask_ahead(long steps_to_do) {
+  const long left = session_.options.patches - steps() - steps_to_do;
+  if (left <= 0) return;
+  questioner_.ask_ahead(session_.model.queries.front(), int(std::min<long>(left, session_.options.colorizer_batch)));
 }
 
 bool PatchTraining::judge(const AnsweredPatch& patch, bool is_accepted) {
@@ -87,29 +107,30 @@ void PatchTraining::learn_sky(const AnsweredPatch& patch) {
 
 /// Pixels of the patch with the answer's colours, or known ones; of a rejected patch only those; and known pixels of
 /// all views.
-ColoredPixels PatchTraining::pixels_of(const AnsweredPatch& patch, bool is_accepted) const {
+ColoredPixels PatchTraining::pixels_of(const Lesson& lesson) const {
+  const AnsweredPatch& patch = *lesson.patch;
   const Stage2Options& options = session_.options;
   const auto views = session_.views();
   const PatchPixels picked = pick_pixels(views[patch.place.view], patch, options.rays_per_patch,
-                                         std::uint64_t(options.seed), std::uint64_t(steps()));
+                                         std::uint64_t(options.seed), std::uint64_t(lesson.step));
   std::vector<ViewPixel> places;
   ColoredPixels pixels;
   for (std::size_t i = 0; i < picked.pixels.size(); ++i) {
     const Ab* known = known_.find(patch.place.view, picked.pixels[i]);
-    if (known == nullptr && !is_accepted) continue;
+    if (known == nullptr && !lesson.is_accepted) continue;
     places.push_back({std::uint32_t(patch.place.view), picked.pixels[i]});
     pixels.colors.push_back(known != nullptr ? *known : picked.colors[i]);
   }
-  add_known(places, pixels.colors);
+  add_known(lesson.step, places, pixels.colors);
   for (const ViewPixel& place : places) pixels.weights.push_back(views[place.view].opacity[place.pixel]);
   pixels.samples = pixel_samples(views, places);
   return pixels;
 }
 
-void PatchTraining::add_known(std::vector<ViewPixel>& places, std::vector<Ab>& colors) const {
+void PatchTraining::add_known(long step, std::vector<ViewPixel>& places, std::vector<Ab>& colors) const {
   const auto known = known_.places();
   if (known.empty()) return;
-  const CounterRng rng(std::uint64_t(session_.options.seed) ^ named_stream("known"), std::uint64_t(steps()));
+  const CounterRng rng(std::uint64_t(session_.options.seed) ^ named_stream("known"), std::uint64_t(step));
   for (std::uint64_t i = 0; i < std::uint64_t(session_.options.rays_per_patch); ++i) {
     const ViewPixel place = known[rng.below(i, std::uint32_t(known.size()))];
     places.push_back(place);

@@ -54,13 +54,25 @@ class PatchTraining {
   void run();
 
  private:
+  /// What a step learns from an answer.
+  struct Lesson {
+    const AnsweredPatch* patch = nullptr;
+    bool is_accepted = false;
+    long step = 0;  ///< its number
+    ColoredPixels pixels;
+  };
+
   [[nodiscard]] long steps() const;
+  /// The colorizer answers about the next patches, while the model has the steps that it still has to do.
+  void ask_ahead(long steps_to_do);
+  /// Of the answers to one query, in their order, without pixels yet.
+  [[nodiscard]] std::vector<Lesson> lessons_of(std::span<const AnsweredPatch> patches);
   /// @return  whether anything is to be learnt with it
   bool judge(const AnsweredPatch& patch, bool is_accepted);
   /// What an answer says of the sky.
   void learn_sky(const AnsweredPatch& patch);
-  [[nodiscard]] ColoredPixels pixels_of(const AnsweredPatch& patch, bool is_accepted) const;
-  void add_known(std::vector<ViewPixel>& places, std::vector<Ab>& colors) const;
+  [[nodiscard]] ColoredPixels pixels_of(const Lesson& lesson) const;
+  void add_known(long step, std::vector<ViewPixel>& places, std::vector<Ab>& colors) const;
 
   Session& session_;
   const Injection& injection_;

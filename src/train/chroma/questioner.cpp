@@ -90,11 +90,11 @@ std::vector<AnsweredPatch> Questioner::ask_all(const std::vector<PatchPlace>& pl
   return answered;
 }
 
-void Questioner::ask_ahead(std::int64_t first) {
-  coming_ = worker_.submit([this, first] {
+void Questioner::ask_ahead(std::int64_t first, int count) {
+  coming_ = worker_.submit([this, first, count] {
     const auto seed = std::uint64_t(session_.options.seed);
     std::vector<PatchPlace> places;
-    for (int i = 0; i < session_.options.colorizer_batch; ++i) {
+    for (int i = 0; i < count; ++i) {
       const auto index = std::uint64_t(first + i);
       const CounterRng rng(seed, index);
       const std::size_t view = rng.below(0, std::uint32_t(session_.views().size()));

@@ -43,9 +43,9 @@ class Questioner {
   /// Asks about places in queries of the options' size, one after another.
   [[nodiscard]] std::vector<AnsweredPatch> ask_all(const std::vector<PatchPlace>& places);
 
-  /// The colorizer answers about the patches of numbers `first`, `first` + 1, … while others are trained on. One query
-  /// is under way at a time; which patches it shows depends on their numbers alone.
-  void ask_ahead(std::int64_t first);
+  /// The colorizer answers about `count` patches of numbers `first`, `first` + 1, … while others are trained on. One
+  /// query is under way at a time; which patches it shows depends on their numbers alone.
+  void ask_ahead(std::int64_t first, int count);
   /// Waits for what was asked ahead.
   [[nodiscard]] Answers next();
 

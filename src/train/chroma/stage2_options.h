@@ -16,7 +16,7 @@ struct Stage2Options {
   double spread_weight = 0.1, regression_weight = 1;
   double decode_temperature = 0.6;
   int distill_steps = 1000;
-  int colorizer_batch = 4;
+  int colorizer_batch = 16;
   int seed = 1;
   HashGridOptions grid = {.decay = 0.1};
   PurifyOptions purify;

@@ -236,16 +236,19 @@ SkyFit fit_of(const TrainingView& view, const std::vector<SkyLabel>& labels, con
 /// Pixels that may show the sky, or what is far, do where they and those around them look like it.
 void settle_either(const TrainingView& view, const DirectionMap& light, float gain, std::vector<SkyLabel>& labels) {
   const int width = view.image->width, height = view.image->height;
-  std::vector<bool> looks_like_it(labels.size());
-  for (std::size_t p = 0; p < labels.size(); ++p) {
-    const float expected = light.plane(0).along(view.camera.ray_of_pixel(p).direction);
-    const float miss = lightness_from_luminance(view.image->luminance(p) / gain) - lightness_from_luminance(expected);
-    looks_like_it[p] = std::abs(miss) < kSame;
-  }
+  std::vector<signed char> looks(labels.size());  // 1: like it, -1: unlike, 0: not known yet, as of most
+  const auto looks_like_it = [&](std::size_t p) {
+    if (looks[p] == 0) {
+      const float expected = light.plane(0).along(view.camera.ray_of_pixel(p).direction);
+      const float miss = lightness_from_luminance(view.image->luminance(p) / gain) - lightness_from_luminance(expected);
+      looks[p] = std::abs(miss) < kSame ? 1 : -1;
+    }
+    return looks[p] > 0;
+  };
   const auto all_around = [&](int x, int y) {
     for (int v = std::max(0, y - 1); v <= std::min(height - 1, y + 1); ++v) {
       for (int u = std::max(0, x - 1); u <= std::min(width - 1, x + 1); ++u) {
-        if (!looks_like_it[std::size_t(v) * std::size_t(width) + std::size_t(u)]) return false;
+        if (!looks_like_it(std::size_t(v) * std::size_t(width) + std::size_t(u))) return false;
       }
     }
     return true;

@@ -46,6 +46,9 @@ void save_snapshot(const std::filesystem::path& file, const std::string& kind, n
   }
   const std::string text = header.dump();
   std::vector<std::byte> content;
+  std::size_t bytes = kFixedSize + text.size() + kDigestSize;
+  for (const StatePiece& piece : pieces) bytes += piece.bytes.size();
+  content.reserve(bytes);
   append_text(content, kMagic);
   append_value(content, kSnapshotVersion);
   append_value(content, std::uint64_t(text.size()));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <utility>
 
 #include "src/base/check.h"
@@ -16,18 +17,92 @@ constexpr float kFullScale = 65535.0f;
 constexpr float kCacheTransmittance = 2e-3f;        // what lies behind is not worth a sample
 constexpr std::size_t kRaysAtATime = 1 << 15;       // a tenth of a second of two cores; a GPU wants many
 constexpr std::size_t kGrain = 512;                 // pixels of a parallel piece of work
+constexpr std::size_t kPackedAtOnce = 3;            // views: what was traced of one takes 60 MB
 constexpr std::size_t kRoom = 2 * kMostViewpoints;  // for a list of viewpoints, and for the next one beside it
 
-void pack(const std::vector<WeightedSample>& samples, CachedView& view) {
-  view.brightest = 1e-6f;
-  for (const WeightedSample& sample : samples) view.brightest = std::max(view.brightest, sample.luminance);
-  view.samples.resize(samples.size());
-  parallel_ranges(samples.size(), 16 * kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s) {
-      view.samples[s] = {samples[s].t, std::uint16_t(std::lround(std::min(samples[s].weight, 1.0f) * kFullScale)),
-                         std::uint16_t(std::lround(samples[s].luminance / view.brightest * kFullScale))};
-    }
+/// Rays of a view as the engine traced them.
+struct TracedRays {
+  std::vector<WeightedSample> samples;
+  std::vector<std::size_t> offsets;  ///< [rays + 1]
+};
+
+/// A view of which all rays are traced: what is left to do needs no engine.
+struct TracedView {
+  CachedView view;  ///< without its arrays
+  DirectionView sky;
+  std::vector<TracedRays> pieces;  ///< of kRaysAtATime pixels each
+};
+
+CachedView resized_view(const UnitCamera& full_size_camera, int short_side) {
+  CachedView view;
+  view.camera = full_size_camera;
+  const Intrinsics& lens = full_size_camera.intrinsics;
+  const double factor = std::min(1.0, double(short_side) / std::min(lens.width, lens.height));
+  view.width = std::max(1, int(std::lround(lens.width * factor)));
+  view.height = std::max(1, int(std::lround(lens.height * factor)));
+  view.camera.intrinsics = resized(lens, view.width, view.height);
+  return view;
+}
+
+/// The engine's part of cache_view.
+TracedView trace_view(const SeenScene& scene, const UnitCamera& full_size_camera, int short_side, double share,
+                      const std::function<void(double fraction)>& report) {
+  TracedView traced{resized_view(full_size_camera, short_side), scene.sky, {}};
+  const CachedView& view = traced.view;
+  const std::size_t pixels = std::size_t(view.width) * std::size_t(view.height);
+  for (std::size_t first = 0; first < pixels; first += kRaysAtATime) {
+    std::vector<Ray> rays(std::min(kRaysAtATime, pixels - first));
+    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) rays[r] = view.camera.ray_of_pixel(first + r);
+    });
+    auto& [samples, offsets] = traced.pieces.emplace_back();
+    scene.engine.trace(rays, scene.march, {kCacheTransmittance, float(share)}, samples, offsets);
+    if (report) report(double(first + rays.size()) / double(pixels));
+  }
+  return traced;
+}
+
+float brightest_of(const std::vector<TracedRays>& pieces) {
+  std::vector<float> brightest(pieces.size(), 1e-6f);
+  parallel_tasks(pieces.size(), [&](std::size_t i) {
+    for (const WeightedSample& sample : pieces[i].samples) brightest[i] = std::max(brightest[i], sample.luminance);
   });
+  return brightest.empty() ? 1 : *std::ranges::max_element(brightest);
+}
+
+/// Fills in the pixels and samples of a view that begin there.
+void take_rays(const TracedRays& rays, std::size_t first_pixel, std::size_t first_sample, const DirectionView& sky,
+               CachedView& view) {
+  for (std::size_t r = 0; r + 1 < rays.offsets.size(); ++r) {
+    const std::size_t p = first_pixel + r;
+    for (std::size_t s = rays.offsets[r]; s < rays.offsets[r + 1]; ++s) {
+      const WeightedSample& sample = rays.samples[s];
+      view.luminance[p] += sample.weight * sample.luminance;
+      view.opacity[p] += sample.weight;
+      view.samples[first_sample + s] = {sample.t,
+                                        std::uint16_t(std::lround(std::min(sample.weight, 1.0f) * kFullScale)),
+                                        std::uint16_t(std::lround(sample.luminance / view.brightest * kFullScale))};
+    }
+    view.offsets[p + 1] = first_sample + rays.offsets[r + 1];
+    if (sky.values != nullptr) view.luminance[p] += light_behind(sky, view.camera.ray_of_pixel(p), view.opacity[p]);
+  }
+}
+
+/// The processor's part of cache_view.
+CachedView packed_view(TracedView traced) {
+  CachedView view = std::move(traced.view);
+  const std::size_t pixels = std::size_t(view.width) * std::size_t(view.height);
+  std::vector<std::size_t> first_samples = {0};
+  for (const TracedRays& piece : traced.pieces) first_samples.push_back(first_samples.back() + piece.samples.size());
+  view.luminance.resize(pixels);
+  view.opacity.resize(pixels);
+  view.offsets.resize(pixels + 1);
+  view.samples.resize(first_samples.back());
+  view.brightest = brightest_of(traced.pieces);
+  parallel_tasks(traced.pieces.size(), [&](std::size_t i) {
+    take_rays(traced.pieces[i], i * kRaysAtATime, first_samples[i], traced.sky, view);
+  });
+  return view;
 }
 
 cluster::Bytes packed(const CachedView& view) {
@@ -48,43 +123,7 @@ CachedView unpacked(const cluster::Bytes& bytes) {
 
 CachedView cache_view(const SeenScene& scene, const UnitCamera& full_size_camera, int short_side, double share,
                       const std::function<void(double fraction)>& report) {
-  CachedView view;
-  view.camera = full_size_camera;
-  const Intrinsics& lens = full_size_camera.intrinsics;
-  const double factor = std::min(1.0, double(short_side) / std::min(lens.width, lens.height));
-  view.width = std::max(1, int(std::lround(lens.width * factor)));
-  view.height = std::max(1, int(std::lround(lens.height * factor)));
-  view.camera.intrinsics = resized(lens, view.width, view.height);
-
-  const std::size_t pixels = std::size_t(view.width) * std::size_t(view.height);
-  std::vector<WeightedSample> samples, some;
-  std::vector<std::size_t> offsets;
-  view.offsets = {0};
-  for (std::size_t first = 0; first < pixels; first += kRaysAtATime) {
-    std::vector<Ray> rays(std::min(kRaysAtATime, pixels - first));
-    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) rays[r] = view.camera.ray_of_pixel(first + r);
-    });
-    scene.engine.trace(rays, scene.march, {kCacheTransmittance, float(share)}, some, offsets);
-    for (std::size_t r = 0; r < rays.size(); ++r) view.offsets.push_back(samples.size() + offsets[r + 1]);
-    samples.insert(samples.end(), some.begin(), some.end());
-    if (report) report(double(first + rays.size()) / double(pixels));
-  }
-  view.luminance.resize(pixels);
-  view.opacity.resize(pixels);
-  parallel_ranges(pixels, kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s) {
-        view.luminance[p] += samples[s].weight * samples[s].luminance;
-        view.opacity[p] += samples[s].weight;
-      }
-      if (scene.sky.values != nullptr) {
-        view.luminance[p] += light_behind(scene.sky, view.camera.ray_of_pixel(p), view.opacity[p]);
-      }
-    }
-  });
-  pack(samples, view);
-  return view;
+  return packed_view(trace_view(scene, full_size_camera, short_side, share, report));
 }
 
 void ViewCache::fill(const SeenScene& scene, const Capture& capture, const SceneFrame& frame, int short_side,
@@ -103,20 +142,39 @@ void ViewCache::fill(const SeenScene& scene, const Capture& capture, const Scene
     }
   }
   const auto traced = [&](std::size_t v) {
-    return cache_view(scene, views[v].camera, short_side, kCachedWeight,
+    return trace_view(scene, views[v].camera, short_side, kCachedWeight,
                       [&](double fraction) { report((double(v) + fraction) / double(views.size())); });
   };
+  const auto packed_without_masked = [](TracedView&& one, const MonoImage& image) {
+    CachedView view = packed_view(std::move(one));
+    ignore_masked(view, image);
+    return view;
+  };
+  if (ranks.is_alone())
+    return fill_alone(views.size(), [&](std::size_t v) {
+      return std::async(std::launch::async, packed_without_masked, traced(v), std::cref(*views[v].image));
+    });
   while (views_.size() < views.size()) {  // one by each rank, until all have all
     const std::size_t first = views_.size(), own = first + std::size_t(ranks.rank());
     const std::size_t count = std::min(views.size() - first, std::size_t(ranks.size()));
-    if (ranks.is_alone()) {
-      views_.push_back(traced(own));
-    } else {
-      const std::vector<cluster::Bytes> all = ranks.gather(own < views.size() ? packed(traced(own)) : cluster::Bytes());
-      for (std::size_t i = 0; i < count; ++i) views_.push_back(unpacked(all[i]));
-    }
-    for (std::size_t v = first; v < first + count; ++v) ignore_masked(views_[v], *views[v].image);
+    const std::vector<cluster::Bytes> all = ranks.gather(
+        own < views.size() ? packed(packed_without_masked(traced(own), *views[own].image)) : cluster::Bytes());
+    for (std::size_t i = 0; i < count; ++i) views_.push_back(unpacked(all[i]));
   }
+}
+
+/// Views are packed beside the engine's work on the next ones.
+void ViewCache::fill_alone(std::size_t count, const std::function<std::future<CachedView>(std::size_t)>& begin_view) {
+  std::deque<std::future<CachedView>> packing;
+  const auto take_first = [&] {
+    views_.push_back(packing.front().get());
+    packing.pop_front();
+  };
+  for (std::size_t v = views_.size(); v < count; ++v) {
+    packing.push_back(begin_view(v));
+    if (packing.size() == kPackedAtOnce) take_first();
+  }
+  while (!packing.empty()) take_first();
 }
 
 std::vector<ViewCache::TracedViewpoint> ViewCache::traced(const SeenScene& scene, const SceneFrame& frame,

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <span>
 #include <string>
 #include <vector>
@@ -80,6 +81,7 @@ class ViewCache {
   void keep_only(std::span<const Viewpoint> viewpoints);
 
  private:
+  void fill_alone(std::size_t count, const std::function<std::future<CachedView>(std::size_t)>& begin_view);
   [[nodiscard]] std::size_t place_of(const Viewpoint& viewpoint) const;
 
   cluster::Ranks* ranks_ = &cluster::alone();
