@@ -69,13 +69,13 @@ class NoOutput final : public bake::Output {
 }  // namespace
 
 void bake_step(const RunContext& context, const BakeJob& job, const Engines& engines, Observer& observer) {
-  const auto& [take, folder, formats] = job;
+  const auto& [take, folder, formats, loaded] = job;
   const StepLocks locks(context.directory, folder, observer);
   cluster::Ranks& world = cluster::world();
   const cluster::RanksWait others_wait(world, "bake");
   if (formats.has_only_splats() && !world.is_first()) return;
   const Stopwatch watch;
-  const auto scene = load_scene(context.directory, take, context.config.finish, engines);
+  const StepScene scene(loaded, context.directory, take, context.config.finish, engines);
   const Config& config = context.config;
   bake::Job bake{*scene, engines, bake::cameras_of(context.capture), volume_options(config, formats), world};
   bake.volumes = formats.volumes();

@@ -14,6 +14,7 @@ struct BakeJob {
   std::string take;  ///< empty = grey
   std::filesystem::path folder;
   exporting::Formats formats;
+  const Scene* scene = nullptr;  ///< the take's, with the configured finish; null = the step loads it
 };
 
 /// Bakes a take and writes the set-up script and the manifest beside it.

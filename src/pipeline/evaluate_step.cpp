@@ -136,7 +136,7 @@ void evaluate_step(const RunContext& context, const EvaluateJob& job, const Engi
   const Stopwatch watch;
   std::optional<Lpips> lpips;
   if (!job.lpips_weights.empty()) lpips.emplace(job.lpips_weights);  // read first: what is missing costs no rendering
-  const auto scene = load_scene(directory, job.take, {}, engines);
+  const StepScene scene(job.scene, directory, job.take, {}, engines);
   EvaluateOptions options;
   options.lpips = lpips ? &*lpips : nullptr;
   const auto encoder = job.take.empty() ? nullptr : make_picture_encoder();

@@ -93,7 +93,7 @@ void render_step(const RunContext& context, const RenderJob& job, const Engines&
   const RenderOutput& output = job.output;
   const StepLocks locks(context.directory, output.folder, observer);
   const Stopwatch watch;
-  const auto scene = load_scene(context.directory, job.take, context.config.finish, engines);
+  const StepScene scene(job.scene, context.directory, job.take, context.config.finish, engines);
   RenderOptions options = render_options(context.config);
   options.color = scene->is_colorized() && output.color == ShownColor::kDecoded;
   options.baked_color = scene->is_colorized() && output.color == ShownColor::kBaked;

@@ -23,6 +23,7 @@ struct RenderJob {
   std::string take;  ///< empty = luminance only
   CameraPath path;
   RenderOutput output;
+  const Scene* scene = nullptr;  ///< the take's, with the configured finish; null = the step loads it
 };
 
 /// Renders a take along a path.

@@ -85,17 +85,23 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& one_ob
     take = take_to_write(context, "", job.existing);
     colorize_step(context, {take, job.existing, made}, engines, observer);
   }
-  const fs::path bake = directory.bakes(take);  // first of all outputs: it is what a user waits for
-  if (is_done(job, last_file(bake, job.formats))) {
+  const fs::path bake = directory.bakes(take), renders = directory.renders(take);
+  const bool is_baked = is_done(job, last_file(bake, job.formats)),
+             is_rendered = is_done(job, renders / "turntable.mp4");
+  const bool is_evaluated = is_done(job, directory.metrics_file());
+  const Finish& finish = context.config.finish;
+  std::unique_ptr<Scene> scene;  // of all steps that are left
+  if (!is_baked || !is_evaluated || !is_rendered) scene = load_scene(directory, take, finish, engines);
+  if (is_baked) {
     end_bake(directory, bake, observer);
-  } else {
-    bake_step(context, {take, bake, job.formats}, engines, observer);
+  } else {  // first of all outputs: it is what a user waits for
+    bake_step(context, {take, bake, job.formats, scene.get()}, engines, observer);
   }
-  if (!is_done(job, directory.metrics_file())) evaluate_step(context, {take, {}}, engines, observer);
-  const fs::path renders = directory.renders(take);
-  if (!is_done(job, renders / "turntable.mp4")) {
+  const Scene* const as_trained = finish.is_plain() ? scene.get() : nullptr;
+  if (!is_evaluated) evaluate_step(context, {take, {}, false, as_trained}, engines, observer);
+  if (!is_rendered) {
     const RenderOutput video{.folder = renders, .mp4 = true};
-    render_step(context, {take, turntable_path(context.capture, config.render), video}, engines, observer);
+    render_step(context, {take, turntable_path(context.capture, config.render), video, scene.get()}, engines, observer);
   }
   return bake;
 }

@@ -146,6 +146,22 @@ class RunDirectory {
 [[nodiscard]] std::unique_ptr<Scene> load_scene(const RunDirectory& directory, const std::string& take,
                                                 const Finish& finish, const Engines& engines);
 
+/// The scene that a step works on: one that is loaded already, or its own.
+class StepScene {
+ public:
+  /// @param loaded  may be null  @throws as load_scene
+  StepScene(const Scene* loaded, const RunDirectory& directory, const std::string& take, const Finish& finish,
+            const Engines& engines)
+      : own_(loaded != nullptr ? nullptr : load_scene(directory, take, finish, engines)),
+        scene_(loaded != nullptr ? loaded : own_.get()) {}
+  [[nodiscard]] const Scene& operator*() const { return *scene_; }
+  [[nodiscard]] const Scene* operator->() const { return scene_; }
+
+ private:
+  std::unique_ptr<Scene> own_;
+  const Scene* scene_;
+};
+
 /// Who coloured a take; empty when nobody did.
 [[nodiscard]] std::string colorizer_name(const RunDirectory& directory, const std::string& take);
 
