@@ -14,6 +14,7 @@
 #include "src/color/colorspace_math.h"
 #include "tests/export/test_volumes.h"
 #include "tests/support/data.h"
+#include "tests/support/toy_capture.h"
 
 namespace cnerf {
 using namespace exporting;
@@ -140,6 +141,19 @@ TEST(WebBundle, APhotographLosesItsDistortionAndKeepsItsTone) {
   EXPECT_NEAR(brightest.y, 50 + 0.2 * 150, 4);
   EXPECT_NEAR(grey.at<std::uint8_t>(20, 40), 255 * srgb_from_linear(0.2f), 2);
   EXPECT_GT(std::abs(seen->x - (100 + 0.4 * 150)), 2) << "the lens must bend, or this shows nothing";
+}
+
+TEST(WebBundle, ViewsOfSeveralLensesAreEachShownByTheirOwn) {
+  Capture capture = cnerf::test::toy_capture(5, 48, 40);
+  for (const std::size_t v : {1, 3}) {
+    capture.views[v].intrinsics.model = LensModel::kOpenCv;
+    capture.views[v].intrinsics.distortion = {-0.1 * double(v), 0, 0, 0, 0, 0, 0, 0};
+  }
+  const std::vector<WebPhoto> photos = make_web_photos(capture.views, 40, 90);
+  for (std::size_t v = 0; v < photos.size(); ++v) {
+    const View& view = capture.views[v];
+    EXPECT_EQ(photos[v].jpeg, make_web_photo(view.intrinsics, luminance_plane(view.image), 40, 90).jpeg) << v;
+  }
 }
 
 TEST(WebBundle, CopiesThePage) {

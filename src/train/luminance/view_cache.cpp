@@ -17,7 +17,8 @@ constexpr float kFullScale = 65535.0f;
 constexpr float kCacheTransmittance = 2e-3f;        // what lies behind is not worth a sample
 constexpr std::size_t kRaysAtATime = 1 << 15;       // a tenth of a second of two cores; a GPU wants many
 constexpr std::size_t kGrain = 512;                 // pixels of a parallel piece of work
-constexpr std::size_t kPackedAtOnce = 3;            // views: what was traced of one takes 60 MB
+constexpr std::size_t kPackedAtOnce = 3;            // views
+constexpr std::size_t kPackedPixels = 1 << 21;      // of them: what was traced of a pixel takes some 150 bytes
 constexpr std::size_t kRoom = 2 * kMostViewpoints;  // for a list of viewpoints, and for the next one beside it
 
 /// Rays of a view as the engine traced them.
@@ -165,6 +166,8 @@ void ViewCache::fill(const SeenScene& scene, const Capture& capture, const Scene
 
 /// Views are packed beside the engine's work on the next ones.
 void ViewCache::fill_alone(std::size_t count, const std::function<std::future<CachedView>(std::size_t)>& begin_view) {
+  const double side = short_side_;
+  const auto at_once = std::clamp<std::size_t>(std::size_t(double(kPackedPixels) / (side * side)), 1, kPackedAtOnce);
   std::deque<std::future<CachedView>> packing;
   const auto take_first = [&] {
     views_.push_back(packing.front().get());
@@ -172,7 +175,7 @@ void ViewCache::fill_alone(std::size_t count, const std::function<std::future<Ca
   };
   for (std::size_t v = views_.size(); v < count; ++v) {
     packing.push_back(begin_view(v));
-    if (packing.size() == kPackedAtOnce) take_first();
+    if (packing.size() >= at_once) take_first();
   }
   while (!packing.empty()) take_first();
 }
