@@ -138,6 +138,26 @@ TEST_F(Stage2, ViewpointsAreViewsOfTheirJobAlone) {
       << "what is painted there is learned for all views";
 }
 
+TEST_F(Stage2, ViewsThatSomebodyStopsAreGoneOnWith) {
+  const LuminanceModel luminance = LuminanceModel::load(stage1(), cpu_engines());
+  const auto fill = [&](ViewCache& views, double until) {
+    views.fill(luminance.seen(), capture_, luminance.frame, 40, [&](double fraction) {
+      if (fraction > until) throw Interrupted("stopped");
+    });
+  };
+  ViewCache whole, stopped;
+  fill(whole, 1);
+  EXPECT_THROW(fill(stopped, 0.9), Interrupted);
+  EXPECT_LT(stopped.views().size(), whole.views().size());
+  EXPECT_FALSE(stopped.views().empty());
+  fill(stopped, 1);
+  ASSERT_EQ(stopped.views().size(), whole.views().size());
+  for (std::size_t v = 0; v < whole.views().size(); ++v) {
+    EXPECT_EQ(stopped.views()[v].luminance, whole.views()[v].luminance) << v;
+    EXPECT_EQ(stopped.views()[v].offsets, whole.views()[v].offsets) << v;
+  }
+}
+
 TEST_F(Stage2, KeptViewsChangeNothing) {
   ViewCache views;
   for (const char* name : {"alone", "first", "second"}) {

@@ -166,8 +166,8 @@ void ViewCache::fill(const SeenScene& scene, const Capture& capture, const Scene
 
 /// Views are packed beside the engine's work on the next ones.
 void ViewCache::fill_alone(std::size_t count, const std::function<std::future<CachedView>(std::size_t)>& begin_view) {
-  const double side = short_side_;
-  const auto at_once = std::clamp<std::size_t>(std::size_t(double(kPackedPixels) / (side * side)), 1, kPackedAtOnce);
+  const auto side = std::size_t(short_side_);
+  const std::size_t at_once = std::clamp<std::size_t>(kPackedPixels / (side * side), 1, kPackedAtOnce);
   std::deque<std::future<CachedView>> packing;
   const auto take_first = [&] {
     views_.push_back(packing.front().get());
