@@ -1,12 +1,12 @@
 // cnerf-cuda-check: benchmarks of the CUDA engine for a machine that has a GPU and a driver, and nothing else. Whether
 // the engine is right is for cnerf-backend-ops to say.
 //
-//   cnerf-cuda-check bench  capture=FOLDER [steps=1000] [option=value ...]
+//   cnerf-cuda-check bench  capture=FOLDER [steps=1000] [magnified=1] [option=value ...]
 //   cnerf-cuda-check bench-stage2 capture=FOLDER [steps=3000] [rays=4096] [option=value ...]
 //   cnerf-cuda-check train  capture=FOLDER [seconds=10] [seeds=1] [option=value ...]
 //
-// FOLDER is what pack_capture made. Options: levels, log2_rows, coarsest, finest, samples, steps_per_box, cone,
-// rate, final_rate.
+// FOLDER is what pack_capture made; the frame that is timed has `magnified` times a view's width and height. Options:
+// levels, log2_rows, coarsest, finest, samples, steps_per_box, cone, rate, final_rate.
 
 #include <cstdio>
 #include <exception>

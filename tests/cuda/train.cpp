@@ -166,8 +166,10 @@ int bench(const Arguments& arguments) {
                 held_out_psnr(packed, engine, options.march, min_transmittance));
   }
   const View& view = packed.capture.views.front();
-  const UnitCamera camera(view.intrinsics, view.world_from_camera, packed.frame);
-  std::vector<RayResult> results(view.image.pixel_count());
+  const int magnified = int(arguments.number("magnified", 1));
+  const Intrinsics lens = resized(view.intrinsics, magnified * view.image.width, magnified * view.image.height);
+  const UnitCamera camera(lens, view.world_from_camera, packed.frame);
+  std::vector<RayResult> results(std::size_t(lens.width) * std::size_t(lens.height));
   for (const double min_transmittance : {1e-4, 1e-3, 1e-2, 3e-2}) {
     double times[2] = {1e9, 1e9};
     for (int i = 0; i < 10; ++i) {
@@ -178,8 +180,8 @@ int bench(const Arguments& arguments) {
       engine.render_view(camera, options.march, {float(min_transmittance)}, results);
       times[1] = std::min(times[1], 1e3 * seconds_since(before));
     }
-    std::printf("render %dx%d to transmittance %.0e: %.2f ms on the GPU, %.2f ms with the download\n", view.image.width,
-                view.image.height, min_transmittance, times[0], times[1]);
+    std::printf("render %dx%d to transmittance %.0e: %.2f ms on the GPU, %.2f ms with the download\n", lens.width,
+                lens.height, min_transmittance, times[0], times[1]);
   }
   return 0;
 }
