@@ -2,6 +2,7 @@
 /// What a page of the studio is told, and who may change things. The thread that works writes, the server's threads
 /// read.
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -15,6 +16,9 @@
 #include "viewer/server/page_api.h"
 
 namespace cnerf::studio {
+
+/// How often a thread that waits for orders looks whether the user ends the program: Ctrl-C only sets a flag.
+inline constexpr auto kPoll = std::chrono::milliseconds(50);
 
 /// Why a task was not done to its end.
 struct Setback {

@@ -10,12 +10,6 @@
 namespace cnerf::studio {
 namespace fs = std::filesystem;
 
-std::vector<KnownColors> known_of(const StrokeList& list, const SeenSurfaces& seen) {
-  std::vector<Intrinsics> lenses;
-  for (const CachedView& view : seen.views()) lenses.push_back(view.camera.intrinsics);
-  return painted(list, seen.names(), lenses);
-}
-
 Journal read_journal(const fs::path& file, const PaintableViews& views) {
   PaintedPictures pictures(file.parent_path());
   auto journal = read_record<Journal>(file);
@@ -48,6 +42,7 @@ void Coloring::cache_views(const Breathe& breathe) {
 /// What the capture's views see stays as it is.
 void Coloring::change_seen(const std::function<void()>& change) {
   const std::unique_lock lock(seen_mutex_);
+  known_.reset();
   change();
   seen_ = SeenSurfaces(cache_.views(), cache_.names(), seen_->surfaces().first(cache_.of_capture()));
 }
@@ -61,6 +56,12 @@ void Coloring::see(std::span<const Viewpoint> viewpoints, const Breathe& breathe
 void Coloring::forget_others(std::span<const Viewpoint> viewpoints) {
   const auto is_other = [&](const Viewpoint& one) { return std::ranges::find(viewpoints, one) == viewpoints.end(); };
   if (std::ranges::any_of(cache_.viewpoints(), is_other)) change_seen([&] { cache_.keep_only(viewpoints); });
+}
+
+std::shared_ptr<const KnownStrokes> Coloring::known(const StrokeList& list) const {
+  const std::lock_guard lock(known_mutex_);
+  if (!known_ || !known_->is_of(list)) known_ = std::make_shared<const KnownStrokes>(list, *seen_);
+  return known_;
 }
 
 bool Coloring::has_seen(std::span<const Viewpoint> viewpoints) const {
@@ -100,15 +101,15 @@ void Coloring::colour(const StrokeList& list, const RetouchOptions& options, con
   if (!has_seen(viewpoints)) throw UsageError("viewpoints came and went too fast; once more, please");
   if (!viewpoints.empty()) change_seen([&] { cache_.put_first(viewpoints); });
   // What comes later, for others to look at, has no part in this: it repeats bit for bit.
-  const SeenSurfaces seen = seen_->first(cache_.of_capture() + viewpoints.size());
-  const std::vector<KnownColors> known = known_of(list, seen);
-  const KnownColorMap map(seen, KnownColorSources(seen, known));
-  Retouch retouch(seen.views(), map, base_.get(), *now_, options);
+  const std::size_t views = cache_.of_capture() + viewpoints.size();
+  const auto strokes = known(list);
+  const KnownColorMap map = strokes->map(views);
+  Retouch retouch(seen_->views().first(views), map, base_.get(), *now_, options);
   is_grey_ = false;
   is_unkept_ = true;
   kept_as_.clear();
-  now_->colorizer =
-      (base_ ? base_->colorizer : std::string(pipeline::kGreyTake)) + describe(known) + describe_viewpoints(viewpoints);
+  now_->colorizer = (base_ ? base_->colorizer : std::string(pipeline::kGreyTake)) + describe(strokes->painted()) +
+                    describe_viewpoints(viewpoints);
   journal_.deeds.push_back({"", list.strokes, 0, viewpoints, list.everywhere});
   while (!retouch.is_settled() && retouch.steps_done() < most_steps) {
     retouch.step();

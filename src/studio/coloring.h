@@ -4,15 +4,15 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <shared_mutex>
 #include <string>
 #include <vector>
 
 #include "src/pipeline/run_context.h"
-#include "src/train/chroma/known_color_map.h"
+#include "src/studio/known_strokes.h"
 #include "src/train/chroma/retouch.h"
-#include "src/train/chroma/strokes.h"
 #include "src/train/luminance/luminance_model.h"
 
 namespace cnerf::studio {
@@ -90,6 +90,8 @@ class Coloring {
   /// Of the views, then of viewpoints. Null until they are traced.
   [[nodiscard]] const SeenSurfaces* seen() const { return seen_ ? &*seen_ : nullptr; }
   [[nodiscard]] bool has_seen(std::span<const Viewpoint> viewpoints) const;
+  /// What a list makes known of them. It is kept for whoever asks for that list again, until something moves.
+  [[nodiscard]] std::shared_ptr<const KnownStrokes> known(const StrokeList& list) const;
 
   /// "Now" becomes what a take has; empty = grey.  @throws as ColorModel::load
   void begin(const std::string& take);
@@ -112,13 +114,12 @@ class Coloring {
   mutable std::shared_mutex seen_mutex_;  // of the two that follow
   ViewCache cache_;
   std::optional<SeenSurfaces> seen_;
-  std::unique_ptr<ColorModel> base_, now_;  // no base: grey
+  mutable std::mutex known_mutex_;
+  mutable std::shared_ptr<const KnownStrokes> known_;  // of the list that was asked for last
+  std::unique_ptr<ColorModel> base_, now_;             // no base: grey
   std::string base_name_, kept_as_;
   bool is_grey_ = true, is_unkept_ = false;
   Journal journal_;
 };
-
-/// What strokes make known, at the sizes of cached views.
-[[nodiscard]] std::vector<KnownColors> known_of(const StrokeList& list, const SeenSurfaces& seen);
 
 }  // namespace cnerf::studio

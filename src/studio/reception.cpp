@@ -29,8 +29,6 @@ using web::refusal;
 
 namespace {
 
-constexpr auto kPoll = std::chrono::milliseconds(50);  // Ctrl-C only sets a flag
-constexpr std::size_t kSmallBody = 65536;
 constexpr std::size_t kMostFiles = 20000, kLongestName = 200, kDeepestName = 6;
 constexpr std::uint64_t kLargestFile = std::uint64_t(16) << 30, kMostBytes = std::uint64_t(64) << 30;
 constexpr std::array kPhotographKinds = {"jpg", "jpeg", "png", "tif", "tiff", "webp", "exr"};

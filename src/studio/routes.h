@@ -14,6 +14,8 @@
 
 namespace cnerf::studio {
 
+inline constexpr std::size_t kSmallBody = 65536;  ///< bytes of a request that is no file
+
 /// A whole number; nothing where the text is none.
 [[nodiscard]] inline std::optional<int> number_in(std::string_view text) {
   int value = 0;

@@ -16,7 +16,6 @@ namespace cnerf::studio {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr auto kPoll = std::chrono::milliseconds(50);  // Ctrl-C only sets a flag
 constexpr std::size_t kMostTakesInMemory = 3;
 constexpr int kJpegQuality = 88;
 /// Seconds of training per second of drawing, so that a page that moves slows it by less than half on a processor and a

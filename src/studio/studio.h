@@ -89,7 +89,7 @@ class Studio final : public web::PageApi {
   web::PageAnswer get_painted(const web::PageRequest& request);
   web::PageAnswer get_card(const web::PageRequest& request);
   web::PageAnswer get_file(const web::PageRequest& request);
-  web::PageAnswer reach_of(int view, const StrokeList& list);
+  web::PageAnswer reach_of(int view, const StrokeList& list, bool is_saved);
   /// What can be painted on, by its number: a view of the capture, else a viewpoint.
   struct Paintable {
     const View* view = nullptr;

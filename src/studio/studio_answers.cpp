@@ -25,7 +25,6 @@ using web::refusal;
 
 namespace {
 
-constexpr std::size_t kSmallBody = 65536;
 constexpr std::size_t kLargestPicture = std::size_t(32) << 20;
 constexpr std::size_t kMostSides = 2;
 constexpr int kThumbnailWidth = 160, kReferenceWidth = 1600;
@@ -275,7 +274,7 @@ void Studio::save(StrokeList list) {
 }
 
 PageAnswer Studio::get_reach(const PageRequest& request) {
-  return reach_of(number_at_end(request), saved_strokes());
+  return reach_of(number_at_end(request), saved_strokes(), true);
 }
 
 PageAnswer Studio::post_reach(const PageRequest& request) {
@@ -290,7 +289,7 @@ PageAnswer Studio::post_reach(const PageRequest& request) {
     list.strokes.push_back(stroke);
   }
   list.everywhere = message.everywhere;
-  return reach_of(message.view, list);
+  return reach_of(message.view, list, checked.strokes.empty());
 }
 
 /// Each in a turn of its own, so that frames need not wait for all.
@@ -304,7 +303,7 @@ void Studio::see(const std::vector<Viewpoint>& viewpoints) {
   }
 }
 
-PageAnswer Studio::reach_of(int view, const StrokeList& list) {
+PageAnswer Studio::reach_of(int view, const StrokeList& list, bool is_saved) {
   const Paintable wanted = numbered(view, list);
   if (!is_ready()) return refusal(503, "the views are being looked at; in a moment");
   if (wanted.is_held_out()) throw MissingInputError(wanted.name() + " is held out for evaluation");
@@ -316,9 +315,10 @@ PageAnswer Studio::reach_of(int view, const StrokeList& list) {
   if (!coloring_->has_seen(viewpoints)) return refusal(503, "the viewpoints are being looked at; in a moment");
   const SeenSurfaces& seen = *coloring_->seen();
   const std::size_t cached = seen.view_named(wanted.name());
-  const KnownColorSources sources(seen, known_of(list, seen));
+  // A stroke that is being drawn is another one next time.
+  const auto strokes = is_saved ? coloring_->known(list) : std::make_shared<const KnownStrokes>(list, seen);
   const CachedView& shown = seen.views()[cached];
-  const cv::Mat overlay = colors_at_luminance(sources.seen_in(cached), {shown.width, shown.height}, kReachAlpha,
+  const cv::Mat overlay = colors_at_luminance(*strokes->in(cached), {shown.width, shown.height}, kReachAlpha,
                                               [&](std::size_t p) { return shown.luminance[p]; });
   return {.type = "image/png", .body = text_of(png_bytes(overlay))};
 }

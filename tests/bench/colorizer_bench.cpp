@@ -47,8 +47,8 @@ int bench(int argc, char** argv) {
     if (number >= 3) milliseconds.push_back(1000 * watch.seconds() / patches);
     check_answer(colorizer->name(), asked, answer);
   }
-  fmt::print("{}, {} patches of {}x{} per question: {:.2f} ms per patch, median {:.2f} ms\n", colorizer->name(), patches,
-             side, side, quantile(milliseconds, 0), median(milliseconds));
+  fmt::print("{}, {} patches of {}x{} per question: {:.2f} ms per patch, median {:.2f} ms\n", colorizer->name(),
+             patches, side, side, quantile(milliseconds, 0), median(milliseconds));
   return 0;
 }
 

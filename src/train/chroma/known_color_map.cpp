@@ -141,7 +141,12 @@ KnownColorMap::KnownColorMap(const SeenSurfaces& seen, const KnownColorSources& 
     if (source.kind == KnownColorKind::kKeyFrame) add_key_frame(source);
   }
   colors_.resize(seen.views().size());
-  parallel_tasks(colors_.size(), [&](std::size_t v) { colors_[v] = sources.seen_in(v); });
+  parallel_tasks(colors_.size(),
+                 [&](std::size_t v) { colors_[v] = std::make_shared<const RunningColors>(sources.seen_in(v)); });
+  list_places();
+}
+
+KnownColorMap::KnownColorMap(std::vector<OfView> colors) : colors_(std::move(colors)) {
   list_places();
 }
 
@@ -154,15 +159,16 @@ void KnownColorMap::add_key_frame(const KnownColorSources::Source& source) {
 
 void KnownColorMap::list_places() {
   for (std::uint32_t v = 0; v < colors_.size(); ++v) {
-    for (std::uint32_t p = 0; p < colors_[v].cost.size(); ++p) {
-      if (colors_[v].is_known(p)) places_.push_back({v, p});
+    const RunningColors& of_view = *colors_[v];
+    for (std::uint32_t p = 0; p < of_view.cost.size(); ++p) {
+      if (of_view.is_known(p)) places_.push_back({v, p});
     }
   }
 }
 
 const Ab* KnownColorMap::find(std::size_t view, std::uint32_t pixel) const {
-  if (colors_.empty() || !colors_[view].is_known(pixel)) return nullptr;
-  return &colors_[view].ab[pixel];
+  if (colors_.empty() || !colors_[view]->is_known(pixel)) return nullptr;
+  return &colors_[view]->ab[pixel];
 }
 
 KnownColorMap known_color_map(std::span<const CachedView> views, std::span<const std::string> names,

@@ -88,9 +88,13 @@ class KnownColorSources {
 
 class KnownColorMap {
  public:
+  using OfView = std::shared_ptr<const RunningColors>;
+
   /// Nothing is known.
   KnownColorMap() = default;
   KnownColorMap(const SeenSurfaces& seen, const KnownColorSources& sources);
+  /// @param colors  `seen_in` of each view, of sources without key frames
+  explicit KnownColorMap(std::vector<OfView> colors);
 
   /// Null where nothing is known.
   [[nodiscard]] const Ab* find(std::size_t view, std::uint32_t pixel) const;
@@ -108,7 +112,7 @@ class KnownColorMap {
   void add_key_frame(const KnownColorSources::Source& source);
   void list_places();
 
-  std::vector<RunningColors> colors_;  // [views]; empty where nothing is known at all
+  std::vector<OfView> colors_;  // [views]; empty where nothing is known at all
   std::vector<ViewPixel> places_;
   std::vector<KeyFrame> key_frames_;
 };

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 
 #include "src/base/check.h"
+#include "src/base/exp_of_negative.h"
 #include "src/base/parallel.h"
 
 namespace cnerf {
@@ -29,6 +31,8 @@ constexpr float kBlack = 16;  // L* where chroma has gone to nothing below black
 constexpr std::size_t kMostColors = 64;        // that are smoothed: a painted picture has more, and few pixels of each
 constexpr std::size_t kMostSamples = 400;      // of all colours of a view, each as many
 constexpr std::size_t kPixelsPerPiece = 1024;  // pixels of a parallel piece of work
+constexpr std::size_t kSamplesAtOnce = 4;      // that become vector instructions
+constexpr float kLikeNothing = 1e6f;           // L*
 
 bool same(Ab x, Ab y) {
   return x.a == y.a && x.b == y.b;
@@ -183,36 +187,65 @@ void StrokesEverywhere::take_samples(const RunningColors& strokes, const PixelLo
   if (painted.empty()) return;
   for (std::size_t c = 0; c < colors_.size(); ++c) lightness_[c] /= float(count[c]);
   const std::size_t each = std::max<std::size_t>(kMostSamples / colors_.size(), 1);
+  room_ = (each + kSamplesAtOnce - 1) / kSamplesAtOnce * kSamplesAtOnce;
+  for (auto* list : {&samples_.x, &samples_.y, &samples_.z, &samples_.log_distance, &samples_.texture}) {
+    list->resize(colors_.size() * room_);
+  }
+  samples_.lightness.resize(colors_.size() * room_, kLikeNothing);
   std::vector<std::size_t> passed(colors_.size());
   sampled_.resize(colors_.size());
   for (std::size_t i = 0; i < painted.size(); ++i) {
     const std::uint32_t color = color_of[i], p = painted[i];
     const std::size_t every = (count[color] + each - 1) / each;
     if (passed[color]++ % every != every / 2) continue;
-    ++sampled_[color];
-    samples_.push_back({view_.camera.ray_of_pixel(p).direction, looks.surface[p] > 0 ? std::log(looks.surface[p]) : 0,
-                        looks.lightness[p], looks.texture[p], color});
+    const std::size_t to = color * room_ + sampled_[color]++;
+    const Vec3f direction = view_.camera.ray_of_pixel(p).direction;
+    samples_.x[to] = direction.x;
+    samples_.y[to] = direction.y;
+    samples_.z[to] = direction.z;
+    samples_.log_distance[to] = looks.surface[p] > 0 ? std::log(looks.surface[p]) : 0;
+    samples_.lightness[to] = looks.lightness[p];
+    samples_.texture[to] = looks.texture[p];
   }
+}
+
+/// A pixel of any view, as the painted view would see it.
+struct StrokesEverywhere::Looked {
+  Vec3f direction;
+  float log_distance = 0;
+  bool is_solid = false;
+  float lightness = 0, texture = 0;
+};
+
+/// Sum over a colour's samples; one that is in every way like the pixel counts 1.
+float StrokesEverywhere::likeness(const Looked& pixel, std::size_t color) const {
+  const float per_angle = float(view_.camera.intrinsics.fx) / (kPlane * float(view_.short_side()));
+  std::array<float, kSamplesAtOnce> sums{};
+  for (std::size_t first = color * room_; first < (color + 1) * room_; first += kSamplesAtOnce) {
+    const float *x = &samples_.x[first], *y = &samples_.y[first], *z = &samples_.z[first];
+    const float* log_distance = &samples_.log_distance[first];
+    const float *lightness = &samples_.lightness[first], *texture = &samples_.texture[first];
+    for (std::size_t i = 0; i < kSamplesAtOnce; ++i) {
+      const float cosine = pixel.direction.x * x[i] + pixel.direction.y * y[i] + pixel.direction.z * z[i];
+      const float angle = std::sqrt(std::max(2 - 2 * cosine, 0.0f));
+      const float apart = std::abs(pixel.log_distance - log_distance[i]) * (1 / kDepth);
+      const float depth = pixel.is_solid && log_distance[i] != 0 ? apart : kNoSurface;
+      const float cost = angle * per_angle + depth + std::abs(pixel.lightness - lightness[i]) * (1 / kLightness) +
+                         std::abs(pixel.texture - texture[i]) * (1 / kTexture);
+      sums[i] += exp_of_negative(cost * (-1 / kSpread));
+    }
+  }
+  return std::accumulate(sums.begin(), sums.end(), 0.0f);
 }
 
 void StrokesEverywhere::claim_alike(const CachedView& view, const PixelLooks& looks, std::size_t p, Claims& to) const {
   const Ray ray = view.camera.ray_of_pixel(p);
   const bool is_solid = looks.surface[p] > 0;
   const Vec3f from = ray.at(is_solid ? looks.surface[p] : 1e3f) - view_.camera.origin.cast<float>();
-  const float distance = length(from), log_distance = std::log(distance);
-  const Vec3f direction = from / distance;
-  const float one_angle = kPlane * float(view_.short_side()) / float(view_.camera.intrinsics.fx);
-  std::vector<float> likeness(colors_.size(), 0);
-  for (const Sample& sample : samples_) {
-    const float angle = std::sqrt(std::max(2 - 2 * dot(direction, sample.direction), 0.0f));
-    const float depth =
-        is_solid && sample.log_distance != 0 ? std::abs(log_distance - sample.log_distance) / kDepth : kNoSurface;
-    const float cost = angle / one_angle + depth + std::abs(looks.lightness[p] - sample.lightness) / kLightness +
-                       std::abs(looks.texture[p] - sample.texture) / kTexture;
-    likeness[sample.color] += std::exp(-cost / kSpread);
-  }
-  for (std::size_t c = 0; c < likeness.size(); ++c) {
-    const float cost = likeness[c] > 0 ? -kSpread * std::log(likeness[c] / float(sampled_[c])) : kUnreached;
+  const float distance = length(from);
+  const Looked pixel{from / distance, std::log(distance), is_solid, looks.lightness[p], looks.texture[p]};
+  for (std::size_t c = 0; c < colors_.size(); ++c) {
+    const float cost = -kSpread * std::log(likeness(pixel, c) / float(sampled_[c]));
     to.add({(kAlike + std::max(cost, 0.0f)) / reach_[c], colors_[c], lightness_[c]});
   }
 }

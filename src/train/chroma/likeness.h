@@ -60,20 +60,24 @@ class StrokesEverywhere {
   void claim_alike(const CachedView& view, const PixelLooks& looks, std::size_t pixel, Claims& to) const;
 
  private:
-  struct Sample {
-    Vec3f direction;         ///< from the camera
-    float log_distance = 0;  ///< 0: none
-    float lightness = 0, texture = 0;
-    std::uint32_t color = 0;
+  /// What pixels look like that a stroke paints, each in its place of the lists: as many of every colour, one colour
+  /// after another. What is missing of a colour is like no pixel.
+  struct Samples {
+    std::vector<float> x, y, z;       ///< direction from the camera
+    std::vector<float> log_distance;  ///< 0: there is no surface
+    std::vector<float> lightness, texture;
   };
+  struct Looked;
   void take_samples(const RunningColors& strokes, const PixelLooks& looks);
+  [[nodiscard]] float likeness(const Looked& pixel, std::size_t color) const;
   [[nodiscard]] std::uint32_t number_of(Ab color) const;
 
   const CachedView& view_;
   std::vector<Ab> colors_;
   std::vector<float> lightness_, reach_;  // [colours] L* where they were painted, mean; and how far they run, times
-  std::vector<Sample> samples_;
+  Samples samples_;
   std::vector<std::size_t> sampled_;  // [colours] samples of it
+  std::size_t room_ = 0;              // of each colour in the samples' lists
   std::vector<Claims> claims_;
 };
 
