@@ -2,7 +2,6 @@
 /// An exponential that compilers turn into vector instructions.
 
 #include <bit>
-#include <cstdint>
 
 namespace cnerf {
 

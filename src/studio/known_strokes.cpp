@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "src/base/check.h"
 #include "src/base/parallel.h"
 
 namespace cnerf::studio {
@@ -29,6 +30,7 @@ bool KnownStrokes::is_of(const StrokeList& list) const {
 }
 
 KnownColorMap::OfView KnownStrokes::in(std::size_t view) const {
+  CNERF_CHECK(view < views_.size(), "a view that was seen when the strokes were");
   std::call_once(are_spread_, [&] { sources_.emplace(seen_, painted_); });
   View& wanted = views_[view];
   std::call_once(wanted.is_seen,

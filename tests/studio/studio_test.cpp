@@ -581,6 +581,13 @@ TEST_F(StudioTest, StrokesOnViewpointsReachViewsAndColorThem) {
   EXPECT_EQ(ordered({{"order", "colour"}})["failed"], false);
 }
 
+TEST_F(StudioTest, ViewpointsThatAreSeenLaterAreReachedByTheSameStrokes) {
+  open();
+  ASSERT_EQ(put_with({stroke("a", 0.5, 0.5)}, {viewpoint("first"), viewpoint("second", 0.8)}, 0).status, 200);
+  EXPECT_GT(colored_pixels(get("reach/1")), 5);
+  for (const std::size_t i : {0, 1}) EXPECT_GT(colored_pixels(get(address("reach/", i))), 5) << i;
+}
+
 TEST_F(StudioTest, TakesOfViewpointsAreKeptAndReplayedBitForBit) {
   open();
   const json first = viewpoint("viewpoint-1"), moved = viewpoint("viewpoint-1", 0.8), other = viewpoint("other", 0.9);
