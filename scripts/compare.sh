@@ -2,9 +2,10 @@
 # The table of docs/evaluation.md: fox, flower and lego; eleven methods, three seeds.
 #   bash scripts/compare.sh REPORT [simulated|builtin] [further options of `cnerf compare`]
 # Captures and LPIPS weights are looked for in $CNERF_DATA (else ../shared/data), the program in $CNERF (else the
-# release build). Trains on the GPUs there are. Parts run side by side, each on a capture and a seed; what is
-# finished stays, so that the same command goes on after a stop. SEEDS=n for other than three, TIMES=no to leave out the
-# table of training times.
+# release build). Where there are GPUs, mpirun starts as many processes as there are cells, which take the GPUs in turns:
+# one cell alone does not keep a GPU busy. RANKS=n for another number of processes, LAUNCH="srun -n 9" for another way to
+# start them. What is finished stays, so that the same command goes on after a stop. SEEDS=n for other than three,
+# TIMES=no to leave out the table of training times.
 set -euo pipefail
 
 report=$1
@@ -19,52 +20,31 @@ settings=(--config "$root/configs/compare.toml" --lpips-weights "$data/lpips/lpi
 if [ "$colorizer" = builtin ]; then settings+=(--colorizer builtin); fi
 colors=colornerf,colornerf-paper,without-purification,without-classification,colorize-then-fuse,video-then-fuse
 colors+=,multi-scale-teacher,key-view-distilled,style-transfer,grey,oracle
-mkdir -p "$report/runs" "$report/logs"
-# The GPUs that may be used, one a line.
-if [ -n "${CUDA_VISIBLE_DEVICES+set}" ]; then
-  mapfile -t gpus < <(tr ',' '\n' <<< "$CUDA_VISIBLE_DEVICES")
-else
-  mapfile -t gpus < <(nvidia-smi --query-gpu=index --format=csv,noheader 2> /dev/null || true)
+if [ -z "${CUDA_VISIBLE_DEVICES+set}" ]; then
+  gpus=$(nvidia-smi --query-gpu=index --format=csv,noheader 2> /dev/null | paste -sd, || true)
+  if [ -n "$gpus" ]; then export CUDA_VISIBLE_DEVICES=$gpus; fi
+fi
+ranks=${RANKS:-1}
+if [ -n "${CUDA_VISIBLE_DEVICES:-}" ] && command -v mpirun > /dev/null; then
+  ranks=${RANKS:-$((${#captures[@]} * seeds))}
 fi
 
-# Runs `cnerf compare` on one capture in the background; its words go to a file.  part NAME CAPTURE options
-# Parts take the GPUs in turns.
-parts=()
-part() {
-  local name=$1 capture=$2
-  shift 2
-  local device=()
-  if [ ${#gpus[@]} -gt 1 ]; then device=("CUDA_VISIBLE_DEVICES=${gpus[$((${#parts[@]} % ${#gpus[@]}))]}"); fi
-  env "${device[@]}" "$cnerf" compare "$capture" -o "$report" "${settings[@]}" "$@" > "$report/logs/$name.log" 2>&1 &
-  parts+=($!)
-}
-# Waits for all parts; says which of them failed.
-join() {
-  local status=0
-  for pid in "${parts[@]}"; do wait "$pid" || status=$?; done
-  parts=()
-  if [ $status -ne 0 ]; then
-    tail -n 3 "$report"/logs/*.log >&2
-    exit $status
+# compare RANKS options: `cnerf compare` on all captures.
+compare() {
+  local launch=() count=$1
+  shift
+  if [ -n "${LAUNCH:-}" ]; then
+    read -ra launch <<< "$LAUNCH"
+  elif [ "$count" -gt 1 ]; then
+    launch=(mpirun -np "$count" --bind-to none)
   fi
+  "${launch[@]}" "$cnerf" compare "${captures[@]}" -o "$report" "${settings[@]}" "$@"
 }
 
-# Training times are taken while little else runs: two methods, one seed.
+# Training times are taken while nothing else runs: two methods, one seed.
 if [ "$colorizer" = simulated ] && [ "${TIMES:-yes}" = yes ]; then
-  for capture in "${captures[@]}"; do
-    name=$(basename "${capture%@*}")
-    part "times-$name" "$capture" --methods colornerf,positional-encoding "$@"
-  done
-  join
+  LAUNCH='' compare 1 --methods colornerf,positional-encoding "$@"
 fi
-# Threads are shared out among the parts.
-share=$(($(nproc) / (${#captures[@]} * seeds)))
-for capture in "${captures[@]}"; do
-  for ((seed = 1; seed <= seeds; ++seed)); do
-    part "$(basename "${capture%@*}")-$seed" "$capture" --methods $colors --first-seed "$seed" \
-      --threads $((share > 1 ? share : 2)) "$@"
-  done
-done
-join
+compare "$ranks" --methods $colors --seeds "$seeds" "$@"
 "$cnerf" compare "${captures[@]}" -o "$report" "${settings[@]}" --methods all --seeds "$seeds" --only-report \
   --rating-sheet "$@"

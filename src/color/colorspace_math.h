@@ -126,6 +126,10 @@ CNERF_HD Vec3<Real> linear_rgb_from_lab(Lab<Real> lab) {
 template <typename Real>
 CNERF_HD Vec3<Real> gamut_mapped_linear_rgb_from_lab(Lab<Real> lab) {
   lab.lightness = lab.lightness > Real(0) ? lab.lightness : Real(0);
+  if (lab.a == Real(0) && lab.b == Real(0)) {
+    const Real grey = luminance_from_lightness(lab.lightness);
+    return {grey, grey, grey};
+  }
   const auto with_chroma = [&](Real scale) {
     return linear_rgb_from_lab<Real>({lab.lightness, lab.a * scale, lab.b * scale});
   };

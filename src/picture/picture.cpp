@@ -7,6 +7,24 @@
 
 namespace cnerf {
 
+SrgbCodes::SrgbCodes() {
+  for (std::size_t code = 1; code < 256; ++code) {
+    const double border = linear_from_srgb((double(code) - 0.5) / 255);
+    begins_[code] = std::nextafter(float(border), 0.0f);
+    while (double(begins_[code]) < border) begins_[code] = std::nextafter(begins_[code], 1.0f);
+  }
+  begins_[256] = 2;
+  for (std::size_t cell = 0, code = 0; cell < kCells; ++cell) {
+    while (float(cell) / kCells >= begins_[code + 1]) ++code;
+    first_[cell] = std::uint8_t(code);
+  }
+}
+
+const SrgbCodes& SrgbCodes::table() {
+  static const SrgbCodes codes;
+  return codes;
+}
+
 std::vector<std::uint8_t> srgb8_from_linear(std::span<const float> linear) {
   constexpr std::size_t kGrain = 1 << 14;  // values of a parallel piece of work
   std::vector<std::uint8_t> codes(linear.size());

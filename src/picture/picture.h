@@ -2,6 +2,7 @@
 /// Pictures of 8-bit sRGB, and the ways there from linear light and from CIELAB.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <concepts>
 #include <cstdint>
@@ -25,6 +26,31 @@ template <std::floating_point Real>
   return std::uint8_t(std::lround(Real(255) * srgb_from_linear(std::clamp(linear, Real(0), Real(1)))));
 }
 [[nodiscard]] std::vector<std::uint8_t> srgb8_from_linear(std::span<const float> linear);
+
+/// Where the codes of 8-bit sRGB begin, in linear light.
+class SrgbCodes {
+ public:
+  static const SrgbCodes& table();
+
+  [[nodiscard]] std::uint8_t of(float linear) const {
+    if (!(linear > 0)) return 0;
+    if (linear >= 1) return 255;
+    const std::size_t code = first_[std::size_t(linear * kCells)];
+    return std::uint8_t(code + (linear >= begins_[code + 1] ? 1 : 0));
+  }
+
+ private:
+  static constexpr std::size_t kCells = 4096;  // so many that none has two borders, not even near black
+  SrgbCodes();
+
+  std::array<float, 257> begins_{};           // the least light of each code, and more than there is
+  std::array<std::uint8_t, kCells> first_{};  // code of the least light of each cell
+};
+
+/// The same without a power. Not a number counts as black.
+[[nodiscard]] inline std::uint8_t srgb8_from_linear(float linear) {
+  return SrgbCodes::table().of(linear);
+}
 
 /// @param linear  [H, W] luminance or [H, W, 3] Rec.709, told apart by size.
 [[nodiscard]] Picture picture_from_linear(int width, int height, std::span<const float> linear);

@@ -90,10 +90,12 @@ class Drawing {
     }
   }
   void set_light(std::span<const std::size_t> wanted, std::span<const Ray> rays, std::span<const RayResult> results) {
-    std::vector<float> light;
-    for (std::size_t r = 0; r < results.size(); ++r) {
-      light.push_back(results[r].luminance + light_behind(sky_, rays[r], results[r].opacity));
-    }
+    std::vector<float> light(results.size());
+    parallel_ranges(light.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t r = begin; r < end; ++r) {
+        light[r] = results[r].luminance + light_behind(sky_, rays[r], results[r].opacity);
+      }
+    });
     pixels_.set_light(wanted, light);
   }
   void put_sky_behind(const SkyColors& sky, std::span<const Ray> rays, std::span<const RayResult> seen,

@@ -149,7 +149,9 @@ bool SparsePixels::foretell_colors(std::size_t pixel, const std::array<std::ptrd
 
 void SparsePixels::set_light(std::span<const std::size_t> pixels, std::span<const float> luminance) {
   CNERF_CHECK_EQ(pixels.size(), luminance.size());
-  for (std::size_t i = 0; i < pixels.size(); ++i) lightness_[pixels[i]] = lightness_from_luminance(luminance[i]);
+  parallel_ranges(pixels.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) lightness_[pixels[i]] = lightness_from_luminance(luminance[i]);
+  });
 }
 
 void SparsePixels::set_colors(std::size_t side, std::span<const std::size_t> pixels, std::span<const Ab> colors) {

@@ -19,7 +19,8 @@ namespace cnerf::studio {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kBetweenColors = 1.0;  // seconds: pages draw what changed
+// Seconds, between which pages draw what changed. The first change is waited for.
+constexpr double kBetweenColors = 1.0, kBeforeFirstColors = 0.25;
 constexpr int kCardQuality = 88;
 constexpr const char* kBuiltin = "builtin";
 constexpr const char* kKeyViews = "key-views";
@@ -114,7 +115,7 @@ void Studio::colour(const Order& /*order*/) {
   const Stopwatch watch;
   double shown_at = 0;
   coloring_->colour(list, retouch_, [&](double fraction) {
-    if (watch.seconds() - shown_at > kBetweenColors) {
+    if (watch.seconds() - shown_at > (shown_at == 0 ? kBeforeFirstColors : kBetweenColors)) {
       shown_at = watch.seconds();
       colors_changed();
     }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <opencv2/imgcodecs.hpp>
 
 #include "src/base/error.h"
@@ -24,6 +25,22 @@ TEST(Picture, CodesAreRoundedAndClamped) {
   EXPECT_EQ(srgb8_from_linear(std::vector<float>{-1, 0, 0.318547f, 1, 9}),
             (std::vector<std::uint8_t>{0, 0, 153, 255, 255}));
   EXPECT_EQ(srgb8_from_linear(0.318547), 153);
+}
+
+TEST(Picture, CodesOfFloatsAreThoseOfTheCurve) {
+  const auto agrees = [](float light) {
+    const double encoded = 255 * srgb_from_linear(double(light));
+    return std::abs(double(srgb8_from_linear(light)) - encoded) <= 0.5 + 1e-9;
+  };
+  for (int i = 0; i <= 1 << 20; ++i) ASSERT_TRUE(agrees(float(i) / float(1 << 20))) << i;
+  for (int code = 1; code < 256; ++code) {  // and beside every border, where one float decides
+    const auto border = float(linear_from_srgb((code - 0.5) / 255));
+    for (float light = std::nextafter(border, 0.0f); light <= std::nextafter(border, 1.0f);
+         light = std::nextafter(light, 1.0f)) {
+      ASSERT_TRUE(agrees(light)) << code;
+    }
+  }
+  EXPECT_EQ(srgb8_from_linear(std::nanf("")), 0);
 }
 
 TEST(Picture, GreyAndColourComeFromLinearLight) {

@@ -61,7 +61,8 @@ void Session::cache_views(const Engines& engines) {
   if (luminance.sky.exists() && !model.sky.exists()) model.sky = SkyColors::grey();
   if (observer_.wants_previews() && model.chroma) cache_previews(luminance);
   const auto told = [this](double fraction) { report("stage 2: caching views", fraction); };
-  cache_.trace_with(ranks());
+  // A GPU traces all views in half the time that they take to be handed round.
+  if (ranks().any(engines.device() == Device::kCpu)) cache_.trace_with(ranks());
   cache_.fill(luminance.seen(), job_.capture, luminance.frame, options.working_resolution, told);
   cache_.add(cache_.traced(luminance.seen(), luminance.frame, job_.viewpoints, told));
   cache_.put_first(job_.viewpoints);

@@ -7,6 +7,7 @@
  *   node viewer/tests/browser/studio_measure.mjs RUN --strokes FILE
  *       paints the strokes of a stroke file of one photograph by pointer events on a grey take, colours, keeps the take
  *       and prints the seconds until colours change and settle, and the held-out ab error
+ *   --no-browser   what an HTTP client can tell alone: frames, and strokes that it sends
  */
 
 import { cpSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -15,6 +16,7 @@ import { join } from "node:path";
 import { drawStroke, launch, open, patience, run, startServing } from "./support.mjs";
 
 const argument = (name, usual) => (process.argv.includes(name) ? process.argv.splice(process.argv.indexOf(name), 2)[1] : usual);
+const withBrowser = !process.argv.includes("--no-browser");
 const [take, strokes, rounds] = [argument("--take", ""), argument("--strokes", ""), Number(argument("--rounds", "3"))];
 const folder = mkdtempSync(join(tmpdir(), "cnerf-measure-"));
 const copy = join(folder, "run");
@@ -100,8 +102,8 @@ async function measurePage() {
   row("Chromium, from a drag to the last frame", median(last), "ms");
 }
 
-async function measureStrokes() {
-  const list = JSON.parse(readFileSync(strokes, "utf8"));
+/** Milliseconds from an order to colour until colours change, until they are settled, and to keep them: by pointer events. */
+async function colourInPage(list) {
   const page = await openPage();
   const until = (what, value) => page.waitForFunction(what, value, { timeout: patience });
   const photo = await page.evaluate((name) => window.cnerf.session.views.findIndex((view) => view.name === name), list.strokes[0].view);
@@ -120,16 +122,64 @@ async function measureStrokes() {
   await until((before) => window.cnerf.session.state.colors !== before, colors);
   const changed = performance.now();
   await until(() => window.cnerf.session.state.unkept && window.cnerf.session.state.task === "");
-  const done = performance.now();
+  const settled = performance.now();
   await page.evaluate(() => window.cnerf.session.order({ order: "keep", name: "painted" }));
   await until(() => window.cnerf.session.state.takes.some((take) => take.name === "painted"));
   await until(() => window.cnerf.session.state.task === "");
+  return [changed - begin, settled - begin];
+}
+
+/** The studio's news: what it said last, and waiting until it says something. */
+async function follow(client) {
+  const news = { state: await get("state"), hear: () => {} };
+  news.until = async (what) => {
+    while (!what(news.state)) await new Promise((heard) => (news.hear = heard));
+    return performance.now();
+  };
+  const events = await fetch(`${serving.url}studio/events?client=${client}`);
+  const listen = async () => {
+    let text = "";
+    for await (const part of events.body.pipeThrough(new TextDecoderStream())) {
+      const messages = (text + part).split("\n\n");
+      text = messages.pop();
+      for (const message of messages.filter((one) => one.startsWith("data: "))) news.state = JSON.parse(message.slice("data: ".length));
+      news.hear();
+    }
+  };
+  listen().catch(() => {}); // the studio ends first
+  return news;
+}
+
+/** The same by a client that sends the strokes. */
+async function colourByClient({ strokes: painted, viewpoints = [], everywhere = false }) {
+  const client = "measure1";
+  const news = await follow(client);
+  const send = async (method, path, body, revision = news.state.strokes) => {
+    const headers = { "X-Cnerf": "1", "X-Cnerf-Client": client, "X-Cnerf-Revision": String(revision) };
+    const answer = await fetch(`${serving.url}studio/${path}`, { method, headers, body: JSON.stringify(body) });
+    if (!answer.ok) throw new Error(`${path}: ${answer.status} ${await answer.text()}`);
+  };
+  await news.until((state) => state.ready);
+  await send("PUT", "strokes", { strokes: painted, viewpoints, everywhere });
+  const { colors } = news.state;
+  const begin = performance.now();
+  await send("POST", "orders", { order: "colour" });
+  const changed = await news.until((state) => state.colors !== colors);
+  const settled = await news.until((state) => state.unkept && state.task === "");
+  await send("POST", "orders", { order: "keep", name: "painted" });
+  await news.until((state) => state.takes.some((one) => one.name === "painted") && state.task === "");
+  return [changed - begin, settled - begin];
+}
+
+async function measureStrokes() {
+  const list = JSON.parse(readFileSync(strokes, "utf8"));
+  const [changed, settled] = await (withBrowser ? colourInPage : colourByClient)(list);
   serving.child.kill("SIGINT");
   await serving.ended;
   await ok(["eval", copy, "--take", "painted"]);
   const { mean } = JSON.parse(readFileSync(join(copy, "metrics.json"), "utf8"));
-  row("colour: until colours change", (changed - begin) / 1000, "s");
-  row("colour: until they are settled", (done - begin) / 1000, "s");
+  row("colour: until colours change", changed / 1000, "s");
+  row("colour: until they are settled", settled / 1000, "s");
   row("held-out ab error", mean.ab_error, "");
   row("  share of grey's", (100 * mean.ab_error) / mean.ab_error_grey, "%");
 }
@@ -139,7 +189,7 @@ try {
     await measureStrokes();
   } else {
     await measureFrames();
-    await measurePage();
+    if (withBrowser) await measurePage();
   }
 } finally {
   await browser?.close();

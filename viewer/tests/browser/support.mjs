@@ -4,7 +4,6 @@ import { spawn } from "node:child_process";
 import { createServer } from "node:http";
 import { existsSync, readFileSync, statSync } from "node:fs";
 import { extname, join } from "node:path";
-import { chromium } from "playwright-core";
 
 export const fixture = process.env.CNERF_FIXTURE;
 export const builtPage = process.env.CNERF_BUILT_PAGE ?? new URL("../../dist", import.meta.url).pathname;
@@ -14,7 +13,8 @@ export const patience = 600_000;
 
 const types = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".json": "application/json", ".svg": "image/svg+xml", ".webp": "image/webp", ".jpg": "image/jpeg" };
 
-export function launch(extra = []) {
+export async function launch(extra = []) {
+  const { chromium } = await import("playwright-core"); // not every measure needs a browser
   return chromium.launch({
     executablePath: process.env.CNERF_CHROMIUM ?? "/usr/bin/chromium",
     args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", ...extra],
