@@ -15,7 +15,8 @@
 
 namespace cnerf::studio {
 
-/// POST frame: a camera, and what is shown of it, one picture above the other.
+/// POST frame: a camera, and what is shown of it: a JPEG per side, one behind the other. X-Cnerf-Sizes tells their
+/// bytes.
 struct FrameMessage {
   CameraRecord camera;
   std::vector<std::string> sides;  ///< "grey", "now", or a take

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "src/base/error.h"
+#include "src/base/parallel.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/train_step.h"
 #include "src/studio/paint_files.h"
@@ -199,7 +200,7 @@ FieldCamera Studio::affordable(FieldCamera camera) const {
   return camera;
 }
 
-std::string Studio::drawn(const FrameMessage& message, const std::function<bool()>& keep_going) {
+std::vector<std::string> Studio::drawn(const FrameMessage& message, const std::function<bool()>& keep_going) {
   std::vector<Side> sides;
   for (const std::string& name : message.sides) sides.push_back(side_named(name));
   const bool is_training = !coloring_ && !halted_;
@@ -212,13 +213,12 @@ std::string Studio::drawn(const FrameMessage& message, const std::function<bool(
     const double rays = double(camera.lens.width) * camera.lens.height;
     affordable_rays_ = std::min(rays * kFrameOfTraining / watch.seconds(), kMostGrowth * rays);
   }
-  Picture all = pictures.front();
-  for (std::size_t s = 1; s < pictures.size(); ++s) {
-    all.rgb.insert(all.rgb.end(), pictures[s].rgb.begin(), pictures[s].rgb.end());
-    all.height += pictures[s].height;
-  }
-  const std::vector<std::byte> bytes = jpeg_bytes(all, kJpegQuality);
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  std::vector<std::string> jpegs(pictures.size());
+  parallel_tasks(jpegs.size(), [&](std::size_t s) {
+    const std::vector<std::byte> bytes = jpeg_bytes(pictures[s], kJpegQuality);
+    jpegs[s].assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  });
+  return jpegs;
 }
 
 // ---- state --------------------------------------------------------------------------------------------------------

@@ -143,7 +143,8 @@ class Studio final : public web::PageApi {
   void draw_frames();
   [[nodiscard]] BoardObserver observer_of(const std::string& task);
   [[nodiscard]] FieldCamera affordable(FieldCamera camera) const;
-  std::string drawn(const FrameMessage& message, const std::function<bool()>& keep_going);
+  /// A JPEG of each side; none where it was told to stop.
+  std::vector<std::string> drawn(const FrameMessage& message, const std::function<bool()>& keep_going);
   /// Viewpoints that are not in the list any more are no longer kept as they were traced.
   void forget_viewpoints();
   [[nodiscard]] const ColorModel* side_named(const std::string& name);

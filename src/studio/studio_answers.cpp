@@ -228,20 +228,26 @@ PageAnswer Studio::post_frame(const PageRequest& request) {
   struct Seen {
     std::uint64_t colors = 0;
     double seconds = 0;
+    std::vector<std::size_t> sizes;  // of the pictures, bytes
   };
   const auto seen = std::make_shared<Seen>();
   auto drawn =
       frames_.ask(request.client, message.moving, [this, message, seen](const std::function<bool()>& keep_going) {
         seen->colors = board_.read([](const StateMessage& state) { return state.colors; });
         const Stopwatch watch;
-        std::string jpeg = this->drawn(message, keep_going);
+        std::string all;
+        for (const std::string& jpeg : this->drawn(message, keep_going)) {
+          seen->sizes.push_back(jpeg.size());
+          all += jpeg;
+        }
         seen->seconds = watch.seconds();
-        return jpeg.empty() ? std::nullopt : std::optional(std::move(jpeg));
+        return all.empty() ? std::nullopt : std::optional(std::move(all));
       });
   if (!drawn) return {.status = 204};
   return {.type = "image/jpeg",
           .body = std::move(*drawn),
           .headers = {{"X-Cnerf-Colors", std::to_string(seen->colors)},
+                      {"X-Cnerf-Sizes", fmt::format("{}", fmt::join(seen->sizes, ","))},
                       {"X-Cnerf-Milliseconds", fmt::format("{:.1f}", 1000 * seen->seconds)}}};
 }
 

@@ -157,15 +157,21 @@ class StudioTest : public testing::Test {
   std::thread worker_;
 };
 
-TEST_F(StudioTest, FramesAreOfTheSizeThatIsAskedForOneAboveTheOther) {
+TEST_F(StudioTest, FramesAreOfTheSizeThatIsAskedForOneBehindTheOther) {
   open();
   const PageAnswer one = post("frame", frame({"grey"}));
   ASSERT_EQ(one.status, 200) << one.body;
   const Intrinsics& lens = context_.capture.views[1].intrinsics;
   EXPECT_EQ(decoded(one).size(), cv::Size(lens.width, lens.height));
   const PageAnswer two = post("frame", frame({"grey", "now"}));
-  EXPECT_EQ(decoded(two).size(), cv::Size(lens.width, 2 * lens.height));
   EXPECT_EQ(one.headers.at(0).first, "X-Cnerf-Colors");
+  ASSERT_EQ(two.headers.at(1).first, "X-Cnerf-Sizes");
+  const json sizes = json::parse("[" + two.headers.at(1).second + "]");
+  ASSERT_EQ(sizes.size(), 2U);
+  const std::size_t first = sizes[0];
+  EXPECT_EQ(two.body.size(), first + std::size_t(sizes[1]));
+  EXPECT_EQ(two.body.substr(0, first), one.body);
+  EXPECT_EQ(decoded({.body = two.body.substr(first)}).size(), cv::Size(lens.width, lens.height));
 }
 
 TEST_F(StudioTest, FramesOfNoCameraAreRefusedByTheField) {

@@ -17,7 +17,7 @@ namespace cnerf {
 class LuminanceTracerCuda {
  public:
   static constexpr std::uint32_t kPointsAtATime = 1 << 20;
-  static constexpr std::size_t kTracedAtATime = 1 << 16;  ///< rays whose samples are kept
+  static constexpr std::size_t kTracedAtATime = 1 << 17;  ///< rays whose samples are kept
 
   /// @param layout, occupied  the occupancy grid and its bits
   LuminanceTracerCuda(const OccupancyLayout& layout, const std::uint32_t* occupied, cudaStream_t stream)

@@ -58,11 +58,14 @@ export class Api {
     return answer.state ?? (answer.version ? answer : undefined);
   }
   /** null: a newer frame was asked for meanwhile. */
-  async frame(request: FrameRequest): Promise<{ picture: ImageBitmap; colors: number; milliseconds: number } | null> {
+  async frame(request: FrameRequest): Promise<{ pictures: ImageBitmap[]; colors: number; milliseconds: number } | null> {
     const answer = await this.post("frame", request);
     if (answer.status === 204) return null;
-    const picture = await createImageBitmap(await answer.blob());
-    return { picture, colors: Number(answer.headers.get("X-Cnerf-Colors") ?? -1), milliseconds: Number(answer.headers.get("X-Cnerf-Milliseconds") ?? 0) };
+    const all = await answer.blob();
+    let end = 0;
+    const parts = (answer.headers.get("X-Cnerf-Sizes") ?? String(all.size)).split(",").map((size) => all.slice(end, (end += Number(size)), all.type));
+    const pictures = await Promise.all(parts.map((part) => createImageBitmap(part)));
+    return { pictures, colors: Number(answer.headers.get("X-Cnerf-Colors") ?? -1), milliseconds: Number(answer.headers.get("X-Cnerf-Milliseconds") ?? 0) };
   }
 
   async strokes(): Promise<{ revision: number; strokes: Stroke[]; viewpoints: Viewpoint[]; everywhere: boolean }> {

@@ -9,7 +9,7 @@ import { FrameScheduler } from "./scheduler";
 import type { Session } from "./session";
 import { words } from "./words";
 
-type Frame = { picture: ImageBitmap; colors: number; milliseconds: number; sides: string[] };
+type Frame = { pictures: ImageBitmap[]; colors: number; milliseconds: number; sides: string[] };
 const largest = 4096;
 
 export class FieldView extends Navigator {
@@ -154,7 +154,7 @@ export class FieldView extends Navigator {
     return frame && { ...frame, sides };
   }
   private show(frame: Frame): void {
-    this.frameShown?.picture.close();
+    for (const picture of this.frameShown?.pictures ?? []) picture.close();
     this.frameShown = frame;
     document.body.classList.remove("loading");
     document.body.dataset.ready = "yes";
@@ -165,17 +165,16 @@ export class FieldView extends Navigator {
     if (!frame) return;
     const { width, height } = this.canvas;
     const context = this.canvas.getContext("2d")!;
-    const { picture, sides } = frame;
-    const part = picture.height / sides.length;
-    const cut = sides.length === 2 ? Math.round(width * this.wipe) : 0;
+    const { pictures } = frame;
+    const cut = pictures.length === 2 ? Math.round(width * this.wipe) : 0;
     context.imageSmoothingQuality = "high";
-    const put = (row: number, from: number, to: number) => {
+    const put = (picture: ImageBitmap, from: number, to: number) => {
       if (to <= from) return;
       const scale = picture.width / width;
-      context.drawImage(picture, from * scale, row * part, (to - from) * scale, part, from, 0, to - from, height);
+      context.drawImage(picture, from * scale, 0, (to - from) * scale, picture.height, from, 0, to - from, height);
     };
-    if (sides.length === 2) put(0, 0, cut);
-    put(sides.length - 1, cut, width);
+    if (pictures.length === 2) put(pictures[0], 0, cut);
+    put(pictures[pictures.length - 1], cut, width);
   }
   private layout(): void {
     const ratio = Math.min(devicePixelRatio || 1, 2);

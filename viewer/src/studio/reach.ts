@@ -70,6 +70,6 @@ export class TintFeed {
     const scale = Math.min(1, 384 / Math.min(lens.width, lens.height));
     const small = fitted(lens, Math.round(lens.width * scale), Math.round(lens.height * scale));
     const frame = await this.session.api.frame({ position, rotation, lens: small, sides: ["now"] });
-    return frame && tintOfPicture(frame.picture);
+    return frame && tintOfPicture(frame.pictures[0]);
   }
 }

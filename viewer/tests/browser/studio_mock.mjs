@@ -220,7 +220,10 @@ export class StudioMock {
     const { width, height } = lens;
     if (!(width > 0 && height > 0 && width <= 4096 && height <= 4096)) return this.refuse(response, 400, "lens: a picture has 1 to 4096 pixels a side.");
     const amounts = sides.map((side) => (side === "grey" ? 0 : side === "now" ? this.amount : (this.amounts[side] ?? 0)));
-    this.picture(response, this.seen(position, lens, amounts), { "X-Cnerf-Colors": String(this.state.colors), "X-Cnerf-Milliseconds": "20" });
+    const pictures = amounts.map((amount) => this.seen(position, lens, [amount])).map(({ width: w, height: h, channels, data }) => png(w, h, channels, data));
+    const sizes = pictures.map((one) => one.length).join();
+    response.writeHead(200, { "Content-Type": "image/png", "X-Cnerf-Colors": String(this.state.colors), "X-Cnerf-Sizes": sizes, "X-Cnerf-Milliseconds": "20" });
+    response.end(Buffer.concat(pictures));
   }
   seen(position, lens, amounts) {
     const { width, height } = lens;
