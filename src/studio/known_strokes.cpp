@@ -31,14 +31,19 @@ bool KnownStrokes::is_of(const StrokeList& list) const {
 
 KnownColorMap::OfView KnownStrokes::in(std::size_t view) const {
   CNERF_CHECK(view < views_.size(), "a view that was seen when the strokes were");
-  std::call_once(are_spread_, [&] { sources_.emplace(seen_, painted_); });
+  spread();
   View& wanted = views_[view];
   std::call_once(wanted.is_seen,
                  [&] { wanted.colors = std::make_shared<const RunningColors>(sources_->seen_in(view)); });
   return wanted.colors;
 }
 
+void KnownStrokes::spread() const {
+  std::call_once(are_spread_, [&] { sources_.emplace(seen_, painted_); });
+}
+
 KnownColorMap KnownStrokes::map(std::size_t views) const {
+  spread();  // by all threads: in the loop, all but one would wait for it
   std::vector<KnownColorMap::OfView> colors(painted_.empty() ? 0 : views);
   parallel_tasks(colors.size(), [&](std::size_t v) { colors[v] = in(v); });
   return KnownColorMap(std::move(colors));

@@ -35,6 +35,7 @@ class KnownStrokes {
     std::once_flag is_seen;
     KnownColorMap::OfView colors;
   };
+  void spread() const;  ///< the colours in the views that were painted on
 
   SeenSurfaces seen_;
   std::string list_;

@@ -9,9 +9,10 @@
 namespace cnerf {
 namespace {
 
-constexpr float kSameDistance = 0.03f;   // of the distance: two views see the same surface
-constexpr float kKeyFrameCost = 1;       // a stroke corrects one as far as it reaches
-constexpr float kSameLightness = 15.0f;  // L*: and it looks the same
+constexpr float kSameDistance = 0.03f;         // of the distance: two views see the same surface
+constexpr float kKeyFrameCost = 1;             // a stroke corrects one as far as it reaches
+constexpr float kSameLightness = 15.0f;        // L*: and it looks the same
+constexpr std::size_t kPixelsPerPiece = 4096;  // of a parallel piece of work
 
 }  // namespace
 
@@ -76,8 +77,8 @@ RunningColors KnownColorSources::everywhere_in(std::size_t v) const {
   for (const Source& source : sources_) sights.emplace_back(seen_.views()[source.view], seen_.surface(source.view));
   std::vector<Claims> claims(pixels);
   std::vector<const Ab*> of_key_frame(pixels, nullptr);
-  for (std::size_t p = 0; p < pixels; ++p) {
-    if (view.opacity[p] < kLeastColoredOpacity) continue;
+  const auto ask = [&](std::size_t p) {
+    if (view.opacity[p] < kLeastColoredOpacity) return;
     for (std::size_t s = sources_.size(); s-- > 0;) {
       const Source& source = sources_[s];
       std::optional<std::size_t> from = p;
@@ -97,13 +98,21 @@ RunningColors KnownColorSources::everywhere_in(std::size_t v) const {
     for (std::size_t s = sources_.size(); s-- > 0 && !is_shown;) {
       if (sources_[s].everywhere) sources_[s].everywhere->claim_alike(view, looks, p, claims[p]);
     }
-  }
-  smooth(claims, view, looks.surface);
-  for (std::size_t p = 0; p < pixels; ++p) {
+  };
+  const auto take = [&](std::size_t p) {
     if (of_key_frame[p] != nullptr) claims[p].add({kKeyFrameCost, *of_key_frame[p]});
     colors.cost[p] = claims[p].cost();
     colors.ab[p] = claims[p].mixed(lightness_at(view, p));
-  }
+  };
+  // There are not always more views than threads.
+  const auto each_pixel = [&](const auto& work) {
+    parallel_ranges(pixels, kPixelsPerPiece, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t p = begin; p < end; ++p) work(p);
+    });
+  };
+  each_pixel(ask);
+  smooth(claims, view, looks.surface);
+  each_pixel(take);
   return colors;
 }
 
@@ -158,12 +167,14 @@ void KnownColorMap::add_key_frame(const KnownColorSources::Source& source) {
 }
 
 void KnownColorMap::list_places() {
-  for (std::uint32_t v = 0; v < colors_.size(); ++v) {
+  std::vector<std::vector<ViewPixel>> of_views(colors_.size());
+  parallel_tasks(colors_.size(), [&](std::size_t v) {
     const RunningColors& of_view = *colors_[v];
     for (std::uint32_t p = 0; p < of_view.cost.size(); ++p) {
-      if (of_view.is_known(p)) places_.push_back({v, p});
+      if (of_view.is_known(p)) of_views[v].push_back({std::uint32_t(v), p});
     }
-  }
+  });
+  for (const auto& places : of_views) places_.insert(places_.end(), places.begin(), places.end());
 }
 
 const Ab* KnownColorMap::find(std::size_t view, std::uint32_t pixel) const {
