@@ -221,8 +221,8 @@ class HttpServer::Connection final : public httplib::Stream {
 
 HttpServer::HttpServer(const ConnectionLimits& limits) : limits_(limits), connections_(limits) {
   new_task_queue = [this] { return new Workers(connections_, limits_.connections); };
-  set_tcp_nodelay(
-      true);  // an answer's head and body are sent apart: the second would wait 40 ms for the first's receipt
+  // An answer's head and body are sent apart: the body would wait 40 ms for the head's receipt.
+  set_tcp_nodelay(true);
   set_logger([](const httplib::Request&, const httplib::Response& response) {
     is_last_answer = is_last_answer || response.status >= 400;
   });

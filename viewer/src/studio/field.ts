@@ -9,7 +9,7 @@ import { FrameScheduler } from "./scheduler";
 import type { Session } from "./session";
 import { words } from "./words";
 
-type Frame = { pictures: ImageBitmap[]; colors: number; milliseconds: number; sides: string[] };
+type Frame = { pictures: ImageBitmap[]; colors: number; milliseconds: number };
 const largest = 4096;
 
 export class FieldView extends Navigator {
@@ -146,12 +146,11 @@ export class FieldView extends Navigator {
     if (this.wipe < 0.004 || this.left === this.right) return [this.right];
     return this.wipe > 0.996 ? [this.left] : [this.left, this.right];
   }
-  private async ask({ view, sides }: { view: View; sides: string[] }, share: number, moving: boolean): Promise<Frame | null> {
+  private ask({ view, sides }: { view: View; sides: string[] }, share: number, moving: boolean): Promise<Frame | null> {
     const scale = share * Math.min(1, largest / Math.max(this.canvas.width, this.canvas.height));
     const width = Math.max(16, Math.round(this.canvas.width * scale));
     const height = Math.max(16, Math.round(this.canvas.height * scale));
-    const frame = await this.session.api.frame({ position: view.position, rotation: view.rotation, lens: fitted(view.lens, width, height), sides, moving });
-    return frame && { ...frame, sides };
+    return this.session.api.frame({ position: view.position, rotation: view.rotation, lens: fitted(view.lens, width, height), sides, moving });
   }
   private show(frame: Frame): void {
     for (const picture of this.frameShown?.pictures ?? []) picture.close();
