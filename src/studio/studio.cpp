@@ -176,7 +176,10 @@ void Studio::open_field() {
 // ---- pictures -----------------------------------------------------------------------------------------------------
 
 void Studio::draw_frames() {
-  if (field_ != nullptr) frames_.draw_waiting();
+  if (field_ == nullptr) return;
+  const Stopwatch watch;
+  frames_.draw_waiting();
+  pace_.drew(watch.seconds());
 }
 
 const ColorModel* Studio::side_named(const std::string& name) {

@@ -19,6 +19,7 @@
 #include "src/studio/board_observer.h"
 #include "src/studio/coloring.h"
 #include "src/studio/frame_desk.h"
+#include "src/studio/refresh_pace.h"
 #include "src/studio/routes.h"
 #include "viewer/server/page_api.h"
 
@@ -141,6 +142,7 @@ class Studio final : public web::PageApi {
   /// Between two pieces of work: pages want frames, and users may have had enough.
   void breathe(const std::string& task, double fraction);
   void draw_frames();
+  void begin_pace();
   [[nodiscard]] BoardObserver observer_of(const std::string& task);
   [[nodiscard]] FieldCamera affordable(FieldCamera camera) const;
   /// A JPEG of each side; none where it was told to stop.
@@ -174,7 +176,8 @@ class Studio final : public web::PageApi {
   const ColorModel* learning_ = nullptr;                            // of a take that a colorizer makes
   std::map<std::string, std::unique_ptr<ColorModel>> shown_takes_;  // that sides name
   int forgotten_at_ = 0;                                            // revision of the strokes
-  Stopwatch since_drawn_, since_refresh_;
+  Stopwatch since_drawn_, since_refresh_, since_begun_;
+  RefreshPace pace_;            // of the colouring that began then
   double affordable_rays_ = 0;  // of a frame while it trains
   double drawing_seconds_ = 0;  // that the last frame of a training took
 

@@ -19,8 +19,6 @@ namespace cnerf::studio {
 namespace fs = std::filesystem;
 namespace {
 
-// Seconds, between which pages draw what changed. The first change is waited for.
-constexpr double kBetweenColors = 1.0, kBeforeFirstColors = 0.25;
 constexpr int kCardQuality = 88;
 constexpr const char* kBuiltin = "builtin";
 constexpr const char* kKeyViews = "key-views";
@@ -109,20 +107,21 @@ void Studio::cache_views(const Order& /*order*/) {
   board_.change([](StateMessage& state) { state.ready = true; });
 }
 
+void Studio::begin_pace() {
+  since_begun_ = {};
+  pace_ = {};
+}
+
 void Studio::colour(const Order& /*order*/) {
   const StrokeList list = saved_strokes();
   write_paint_pictures(stroke_folder(context_), context_.capture, list.strokes);
-  const Stopwatch watch;
-  double shown_at = 0;
+  begin_pace();
   coloring_->colour(list, retouch_, [&](double fraction) {
-    if (watch.seconds() - shown_at > (shown_at == 0 ? kBeforeFirstColors : kBetweenColors)) {
-      shown_at = watch.seconds();
-      colors_changed();
-    }
+    if (pace_.is_due(since_begun_.seconds())) colors_changed();
     breathe("colour", fraction);
   });
   colors_changed();
-  board_.say(fmt::format("settled in {:.0f} s", watch.seconds()));
+  board_.say(fmt::format("settled in {:.0f} s", since_begun_.seconds()));
   add_command(fmt::format("cnerf colorize {}{} --strokes {}", context_.directory.root().string(),
                           coloring_->base_name().empty() ? " --colorizer grey" : "",
                           (stroke_folder(context_) / kStrokeFile).string()));
@@ -154,7 +153,7 @@ std::string Studio::colorize(const ColorizerOptions& colorizer, const std::vecto
   BoardObserver observer(
       board_, observer_, "colour", [] {}, [this] { return should_stop(); });
   const auto watch = [this](const ColorModel& model) { watch_colors(model); };
-  since_refresh_ = {};
+  begin_pace();
   pipeline::colorize_step(context_, {take, {}, nullptr, &coloring_->cached_views(), watch}, engines_, observer);
   coloring_->begin(take);
   colors_changed();
@@ -165,9 +164,7 @@ void Studio::watch_colors(const ColorModel& model) {
   learning_ = &model;
   draw_frames();
   learning_ = nullptr;
-  if (since_refresh_.seconds() < kBetweenColors) return;
-  since_refresh_ = {};
-  colors_changed();
+  if (pace_.is_due(since_begun_.seconds())) colors_changed();
 }
 
 void Studio::color_by_reference(const Order& order) {
