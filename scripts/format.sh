@@ -10,9 +10,9 @@ if [ -z "$format" ] || ! "$format" --version | grep -q 'version 14\.'; then
   echo "format: not checked, for want of clang-format 14"
   exit 0
 fi
-# Git's list, or in an unpacked archive what lies there.
+# What git tracks or would, or in an unpacked archive what lies there.
 sources() {
-  git ls-files -z -- '*.h' '*.cpp' '*.inl' '*.cu' '*.cuh' 2> /dev/null ||
+  git ls-files -z --cached --others --exclude-standard -- '*.h' '*.cpp' '*.inl' '*.cu' '*.cuh' 2> /dev/null ||
     find src encoding bake export viewer/server tests -regex '.*\.\(h\|cpp\|inl\|cu\|cuh\)' -print0
 }
 if [ "${1:-}" = --fix ]; then

@@ -1,5 +1,6 @@
 #pragma once
-/// When pages should draw what a work has changed so far: soon, and then not so often that drawing takes most of the time.
+/// When pages should draw what a work has changed so far: soon, and then not so often that drawing takes most of the
+/// time.
 
 #include <algorithm>
 #include <optional>
