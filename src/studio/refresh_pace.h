@@ -1,6 +1,5 @@
 #pragma once
-/// When pages should draw what a work has changed so far: soon, and then not so often that drawing takes most of the
-/// time.
+/// When pages should draw what a work has changed so far: soon, and then a quarter of the time at most.
 
 #include <algorithm>
 #include <optional>
