@@ -11,6 +11,11 @@ namespace {
 
 constexpr std::size_t kMostNotes = 12;
 
+/// Names of files need not be in UTF-8.
+std::string text_of(const StateMessage& state) {
+  return json_of(state).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
 std::uint64_t next_version() {
   static std::atomic<std::uint64_t> version = 0;
   return ++version;
@@ -71,7 +76,7 @@ void Board::note(const std::string& line) {
 }
 
 std::string Board::text() const {
-  return read([](const StateMessage& state) { return json_of(state).dump(); });
+  return read(text_of);
 }
 
 std::optional<std::pair<std::uint64_t, std::string>> Board::wait_for_news(std::uint64_t after, double seconds) {
@@ -80,7 +85,7 @@ std::optional<std::pair<std::uint64_t, std::string>> Board::wait_for_news(std::u
   if (!news_.wait_for(lock, std::chrono::duration<double>(seconds), has_news) || state_.version == after) {
     return std::nullopt;
   }
-  return std::pair{state_.version, json_of(state_).dump()};
+  return std::pair{state_.version, text_of(state_)};
 }
 
 void Board::joined(const std::string& client) {

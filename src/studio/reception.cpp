@@ -114,17 +114,15 @@ Reception::Reception(fs::path source, const fs::path& run, Open open, Observer& 
 }
 
 std::optional<pipeline::RunContext> Reception::run() {
-  bool is_new = false;  // what was prepared by an earlier call is taken, unless somebody asks again
   while (!interruption_requested() && !closed()) {
     {
       std::unique_lock lock(mutex_);
       work_.wait_for(lock, kPoll, [&] { return is_ordered_ || board_.closed(); });
       is_working_ = std::exchange(is_ordered_, false);
-      stop_requested_ = false;
       if (!is_working_) continue;
     }
     std::optional<pipeline::RunContext> context;
-    const auto setback = setback_of([&] { context = prepared(std::exchange(is_new, true)); }, "stopped");
+    const auto setback = setback_of([&] { context = prepared(); }, "stopped");
     const std::lock_guard lock(mutex_);
     is_working_ = false;
     board_.change([&](StateMessage& state) { end_task(state, setback); });
@@ -133,19 +131,26 @@ std::optional<pipeline::RunContext> Reception::run() {
   return std::nullopt;
 }
 
-/// @param is_new  what was prepared before is made again
-pipeline::RunContext Reception::prepared(bool is_new) {
+/// What was prepared by an earlier call is taken, unless somebody sent something or asks again.
+pipeline::RunContext Reception::prepared() {
+  fs::path source = source_;
+  bool is_new = false;
+  {
+    const std::lock_guard lock(mutex_);
+    if (has_arrived_ || (source_.empty() && fs::exists(arrivals_))) source = arrived_source();
+    is_new = std::exchange(is_new_, true);
+  }
   const auto between = [this] {
     if (should_stop()) throw Interrupted("stopped");
   };
   BoardObserver observer(board_, observer_, "prepare", between, [this] { return should_stop(); });
-  const fs::path source = fs::exists(arrivals_) ? arrived_source() : source_;
   if (source.empty()) throw UsageError("nothing has arrived yet");
   fs::path capture = source;
   if (prepare::needs_preparing(source)) {
     capture = run_.parent_path() / (run_.filename().string() + "-capture");
-    const pipeline::ExistingOutput existing{.resume = !is_new, .overwrite = is_new};
-    pipeline::prepare_step({source, capture, {}, existing}, cpu_engines(), observer);
+    pipeline::PrepareJob job{source, capture, {}, {.resume = true}};
+    if (is_new || pipeline::was_begun_for_another(job)) job.existing = {.overwrite = true};
+    pipeline::prepare_step(job, cpu_engines(), observer);
   }
   return open_(capture, observer);
 }
@@ -230,6 +235,7 @@ PageAnswer Reception::put_arrival(const PageRequest& request) {
   }
   const auto size = append(file, *offset, request.body);
   if (!size) return refusal(409, name->second + ": begins anew at 0");
+  has_arrived_ = is_new_ = true;
   board_.change([&](StateMessage& state) {
     state.arrived.files += is_new ? 1 : 0;
     state.arrived.bytes += request.body.size() - (*offset > 0 || is_new ? 0 : std::uint64_t(replaced));
@@ -247,9 +253,12 @@ PageAnswer Reception::post_order(const PageRequest& request) {
     return refusal(409, "wait until it is done: prepare");
   } else if (order.order == "clear") {
     fs::remove_all(arrivals_);
+    has_arrived_ = false;
+    is_new_ = true;
     count_arrivals();
   } else if (order.order == "prepare") {
     is_ordered_ = true;
+    stop_requested_ = false;
     board_.change([](StateMessage& state) {
       state.task = "prepare";
       state.message.clear();

@@ -61,7 +61,7 @@ class Reception final : public web::PageApi {
   web::PageAnswer put_arrival(const web::PageRequest& request);
   web::PageAnswer post_order(const web::PageRequest& request);
 
-  [[nodiscard]] pipeline::RunContext prepared(bool is_new);
+  [[nodiscard]] pipeline::RunContext prepared();
   /// What has arrived, as `prepare` wants it: a folder, or the one clip.
   [[nodiscard]] std::filesystem::path arrived_source() const;
   void count_arrivals();
@@ -75,6 +75,8 @@ class Reception final : public web::PageApi {
   mutable std::mutex mutex_;  // of what follows; taken before the board's
   std::condition_variable work_;
   bool is_ordered_ = false, is_working_ = false, stop_requested_ = false;
+  bool has_arrived_ = false;  // something, from the page
+  bool is_new_ = false;       // what was prepared by an earlier call is not what is wanted
 };
 
 }  // namespace cnerf::studio

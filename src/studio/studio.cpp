@@ -17,7 +17,7 @@ namespace cnerf::studio {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::size_t kMostTakesInMemory = 3;
+constexpr std::size_t kMostTakesInMemory = 4;
 constexpr int kJpegQuality = 88;
 /// Seconds of training per second of drawing, so that a page that moves slows it by less than half on a processor and a
 /// tenth on a GPU, and one that rests by 2 %. A GPU also loses the steps that it had begun.
@@ -80,7 +80,6 @@ void Studio::run() {
                      [&] { return order_ || (field_ != nullptr && frames_.has_waiting()) || board_.closed(); });
       std::swap(order, order_);
       is_working_ = order.has_value();
-      stop_requested_ = false;
     }
     forget_viewpoints();
     if (order) work_on(*order);
@@ -109,6 +108,7 @@ void Studio::work_on(const Order& order) {
     if (!coloring_) return;
     state.take = coloring_->base_name();
     state.unkept = coloring_->is_unkept();
+    state.ready = coloring_->seen() != nullptr;
   });
 }
 
@@ -177,7 +177,8 @@ void Studio::open_field() {
 
 void Studio::draw_frames() {
   if (field_ == nullptr) return;
-  const Stopwatch watch;
+  frames_.draw_waiting(FrameDesk::Which::kUrgent);
+  const Stopwatch watch;  // of what refreshes made pages ask for
   frames_.draw_waiting();
   pace_.drew(watch.seconds());
 }
@@ -189,7 +190,6 @@ const ColorModel* Studio::side_named(const std::string& name) {
   if (found != shown_takes_.end()) return found->second.get();
   pipeline::check_take_name(name);
   if (!context_.directory.take_record(name)) throw MissingInputError("there is no take " + name);
-  if (shown_takes_.size() >= kMostTakesInMemory) shown_takes_.clear();
   auto model = std::make_unique<ColorModel>(ColorModel::load(context_.directory.take_snapshot(name), engines_));
   return (shown_takes_[name] = std::move(model)).get();
 }
@@ -204,6 +204,11 @@ FieldCamera Studio::affordable(FieldCamera camera) const {
 }
 
 std::vector<std::string> Studio::drawn(const FrameMessage& message, const std::function<bool()>& keep_going) {
+  if (shown_takes_.size() + message.sides.size() > kMostTakesInMemory) {
+    std::erase_if(shown_takes_, [&](const auto& take) {
+      return std::ranges::find(message.sides, take.first) == message.sides.end();
+    });
+  }
   std::vector<Side> sides;
   for (const std::string& name : message.sides) sides.push_back(side_named(name));
   const bool is_training = !coloring_ && !halted_;

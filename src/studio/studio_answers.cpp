@@ -363,6 +363,7 @@ PageAnswer Studio::take_order(const PageRequest& request, const Order& order) {
     return refusal(409, "wait until it is done: " + board_.read([](const StateMessage& state) { return state.task; }));
   }
   order_ = order;
+  stop_requested_ = false;
   board_.change([&](StateMessage& state) {
     state.task = order.message.order;
     state.message.clear();

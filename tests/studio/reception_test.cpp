@@ -141,5 +141,43 @@ TEST_F(ReceptionTest, ASourceOfTheCommandLineIsBegunWithAtOnce) {
   EXPECT_EQ(context_->capture.root, folder_ / "capture");
 }
 
+TEST_F(ReceptionTest, ASourceOfTheCommandLineComesBeforeWhatArrivedLongAgo) {
+  write_sample_scene(folder_ / "capture", {.views = 4, .width = 48, .height = 36, .samples_per_pixel = 1});
+  write_sample_scene(folder_ / "run-photographs/old", {.views = 5, .width = 48, .height = 36, .samples_per_pixel = 1});
+  open(folder_ / "capture");
+  worker_.join();
+  ASSERT_TRUE(context_);
+  EXPECT_EQ(context_->capture.root, folder_ / "capture");
+}
+
+TEST_F(ReceptionTest, AStopThatComesBeforeTheWorkBeginsStopsIt) {
+  write_sample_scene(folder_ / "sent", {.views = 4, .width = 48, .height = 36, .samples_per_pixel = 1});
+  open();
+  for (const auto& entry : fs::directory_iterator(folder_ / "sent/images")) {
+    EXPECT_EQ(put(entry.path().filename().string(), "0", read_text_file(entry.path())).status, 200);
+  }
+  EXPECT_EQ(order("prepare").status, 202);
+  EXPECT_EQ(order("stop").status, 202);
+  const json state = wait_until([](const json& now) { return test::is_idle(now) && now["message"] != ""; });
+  EXPECT_EQ(state["message"], "stopped");
+}
+
+TEST_F(ReceptionTest, WhatWasPreparedOfOthersIsMadeAnew) {
+  write_file(folder_ / "run-capture/work/source.txt", "/of/another\n");
+  write_file(folder_ / "run-capture/transforms.json", "{}");
+  fs::create_directories(folder_ / "photos");
+  for (const char* name : {"a.jpg", "b.jpg"}) write_file(folder_ / "photos" / name, "no photograph");
+  open(folder_ / "photos");
+  const json state = wait_until([](const json& now) { return now["failed"] == true; });
+  EXPECT_THAT(state["message"].get<std::string>(), HasSubstr("at least 2 that can be read"));
+}
+
+TEST(Board, NamesThatAreNoTextAreToldAsFarAsTheyAre) {
+  Board board;
+  board.note("left out: caf\xe9.jpg");
+  EXPECT_THAT(json::parse(board.text())["notes"].dump(), HasSubstr("left out: caf"));
+  EXPECT_TRUE(board.wait_for_news(0, 1));
+}
+
 }  // namespace
 }  // namespace cnerf::studio

@@ -363,6 +363,21 @@ TEST_F(StudioTest, TakesAreDuplicatedRenamedAndDeleted) {
   EXPECT_EQ(json::parse(get("state").body)["takes"].size(), 1u);
 }
 
+TEST_F(StudioTest, AnyTwoOfManyTakesAreShownBesideEachOther) {
+  open();
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  (void)ordered({{"order", "colour"}});
+  (void)ordered({{"order", "keep"}, {"name", "a"}});
+  const std::vector<std::string> names = {"a", "b", "c", "d", "e"};
+  for (std::size_t i = 1; i < names.size(); ++i) {
+    (void)ordered({{"order", "duplicate"}, {"take", "a"}, {"name", names[i]}});
+  }
+  const std::string one = post("frame", frame({"a"})).body;
+  for (const std::string& left : names) {
+    for (const std::string& right : names) EXPECT_EQ(post("frame", frame({left, right})).body, one + one);
+  }
+}
+
 TEST_F(StudioTest, BakesAreOfferedForDownload) {
   open();
   EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
@@ -680,6 +695,26 @@ TEST_F(StudioTest, ATrainingIsWatchedStoppedAndGoneOnWith) {
   EXPECT_EQ(ordered({{"order", "colour"}})["unkept"], true);
   EXPECT_EQ(ordered({{"order", "train"}})["failed"], true) << "it is";
   close();
+}
+
+TEST_F(StudioTest, ViewsWhoseTracingWasStoppedAreTracedByTheNextOrder) {
+  studio_ = std::make_unique<Studio>(context_, "", cpu_engines(), observer_, kQuick);
+  studio_->joined(kPainter);
+  EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
+  worker_ = std::thread([this] { studio_->run(); });
+  const json stopped = wait_until([](const json& state) { return state["message"] != "" && test::is_idle(state); });
+  EXPECT_EQ(stopped["ready"], false);
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  EXPECT_EQ(ordered({{"order", "colour"}})["ready"], true);
+  EXPECT_EQ(get("reach/1").status, 200);
+}
+
+TEST_F(StudioTest, AStopThatComesBeforeTheWorkBeginsStopsIt) {
+  open();
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  EXPECT_EQ(post("orders", {{"order", "colour"}}).status, 202);
+  EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
+  EXPECT_THAT(wait_until(test::is_idle)["message"].get<std::string>(), HasSubstr("stopped"));
 }
 
 TEST_F(StudioTest, StoppingKeepsWhatWasLearned) {

@@ -254,6 +254,7 @@ TEST(WebServer, APageApiIsAskedByItsOwnPageOnlyAndWithinItsLimits) {
   EXPECT_EQ(status_of(order("POST /echo/order", "X-Cnerf: 1\r\nContent-Length: 99999999999\r\n", "")), 413);
   EXPECT_EQ(status_of(order("POST /echo/order", "X-Cnerf: 1\r\nTransfer-Encoding: chunked\r\n", "1\r\nx\r\n0\r\n\r\n")),
             411);
+  EXPECT_EQ(status_of(order("POST /echo/order", own + "Content-Encoding: gzip\r\n", "body")), 415) << "of what size?";
   EXPECT_EQ(status_of(order("POST /echo/other", own, "body")), 405);
   EXPECT_EQ(status_of(order("DELETE /echo/order", own, "body")), 405);
   EXPECT_NE(order("GET /echo/x", "X-Cnerf-Client: ../../etc\r\n", "").find("GET  -1"), std::string::npos);

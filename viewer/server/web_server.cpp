@@ -239,6 +239,10 @@ struct WebServer::State {
       refuse(response, 411, "the length of the body is not stated");
       return true;
     }
+    if (is_order && request.has_header("Content-Encoding")) {  // it would be unpacked to any size
+      refuse(response, 415, "the body is packed; send it as it is");
+      return true;
+    }
     const std::size_t largest = of_api ? *of_api : kLargestBody;
     if (length.value_or(0) > largest) {
       refuse(response, 413, fmt::format("at most {} bytes are taken here", largest));

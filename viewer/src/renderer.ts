@@ -434,15 +434,24 @@ export class Renderer {
     const { gl } = this;
     const light = this.target(null, width, height);
     const rows = clamp(Math.floor((4 * stripMilliseconds * 1e6) / (this.nanosecondsAPixel * width)), 4, height);
+    const { levels } = this;
+    const view = structuredClone(this.view), settings = structuredClone(this.settings);
+    // The page goes on meanwhile: each piece is of what was to be seen at the beginning.
+    const asItWas = (draw: () => void) => {
+      const now = { view: this.view, settings: this.settings, levels: this.levels };
+      Object.assign(this, { view, settings, levels });
+      draw();
+      Object.assign(this, now);
+    };
     for (let pass = 0; pass < (this.floatTargets ? rays : 1); ++pass) {
       for (let row = 0; row < height; row += rows) {
-        this.marchRows(light, pass, row, Math.min(rows, height - row));
+        asItWas(() => this.marchRows(light, pass, row, Math.min(rows, height - row)));
         await this.drained();
       }
     }
     const bytes = this.target(null, width, height, true);
     gl.bindFramebuffer(gl.FRAMEBUFFER, bytes.framebuffer);
-    this.displayTo(light, width, height, background);
+    asItWas(() => this.displayTo(light, width, height, background));
     const flipped = new Uint8Array(4 * width * height);
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, flipped);
     for (const target of [light, bytes]) this.free(target);

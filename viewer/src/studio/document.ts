@@ -68,6 +68,8 @@ export class StrokeDocument {
   private done: [StrokeList, StrokeList][] = [];
   private changed = new Set<() => void>();
   private busy: Promise<void> | null = null;
+  /** Strokes were promised to be sent, and another tab paints: they stay until it leaves. */
+  isWaiting = false;
 
   constructor(private readonly store: StrokeStore, private readonly shelf: Shelf, private readonly shelfKey: string) {}
 
@@ -191,6 +193,7 @@ export class StrokeDocument {
     this.keep();
     this.tell();
     if (unsent) this.told("unsent");
+    this.isWaiting = unsent;
     if (!this.isSaved) await this.save();
   }
   /** Another tab wrote: its list is taken, with what is unsaved here on top. */
@@ -198,7 +201,7 @@ export class StrokeDocument {
     await this.busy;
     if (revision <= this.revision) return;
     await this.fetched();
-    if (!this.isSaved) await this.save();
+    if (!this.isSaved && !this.isWaiting) await this.save();
   }
   private async fetched(): Promise<void> {
     const answer = await this.store.strokes();
@@ -237,6 +240,7 @@ export class StrokeDocument {
       this.saved = list;
       this.savedViewpoints = viewpoints;
       this.savedWish = wish;
+      this.isWaiting = false;
       this.tell();
     } catch (problem) {
       if (!(problem instanceof Refusal && problem.status === 409)) throw problem;
@@ -246,6 +250,8 @@ export class StrokeDocument {
   /** What the server will never take is not asked again and again: its own list stands. */
   private async refused(problem: Refusal): Promise<void> {
     this.told(problem);
+    if (this.isWaiting && problem.status === 423) return;
+    this.isWaiting = false;
     this.done = [];
     this.undone = [];
     this.saved = this.list;

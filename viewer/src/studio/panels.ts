@@ -93,7 +93,7 @@ export function strokesPanel(session: Session): HTMLElement {
     for (const node of list.children) (node as HTMLElement).setAttribute("aria-current", String((node as HTMLElement).dataset.key!.startsWith(`${session.selected} `)));
     none.hidden = shown.length > 0;
     paintedPicture.hidden = !session.view;
-    whichView.disabled = session.isBusy || session.isLost || !session.state.ready;
+    whichView.disabled = session.isBusy || session.isLost;
     node.classList.toggle("read-only", session.isReadOnly);
   };
   const whichView = button(words.whichView, () => void session.order({ order: "key-views" }), { id: "which-view", title: words.whichViewTitle });

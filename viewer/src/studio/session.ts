@@ -112,10 +112,16 @@ export class Session {
       toast(words.back);
       void this.strokes.load().catch((problem) => this.explain(problem));
     } else if (state.strokes > this.strokes.revision) {
-      void this.strokes.follow(state.strokes).catch((problem) => this.explain(problem));
+      void this.strokes.follow(state.strokes).then(() => this.sendWaiting()).catch((problem) => this.explain(problem));
+    } else {
+      void this.sendWaiting().catch((problem) => this.explain(problem));
     }
     if (state.scene !== this.sceneSeen && this.scene.views.length > 0) void this.refining.run(() => this.refine());
     this.tell();
+  }
+  /** What was painted while the server was away, and another tab painted. */
+  private async sendWaiting(): Promise<void> {
+    if (this.strokes.isWaiting && !this.isReadOnly) await this.strokes.save();
   }
   /** Training made the cameras better: the same ones are given their new places. */
   private async refine(): Promise<void> {

@@ -154,7 +154,7 @@ class Studio {
       colour.textContent = state.task ? words.stop : isTraining ? words.train : words.colour;
       colour.title = state.task ? words.stopTitle : isTraining ? words.trainTitle : words.colourTitle;
       colour.classList.toggle("stop", state.task !== "");
-      colour.disabled = isReadOnly || session.isLost || (!state.task && !isTraining && !state.ready);
+      colour.disabled = isReadOnly || session.isLost;
       undo.disabled = isReadOnly || !strokes.canUndo;
       redo.disabled = isReadOnly || !strokes.canRedo;
       progress.hidden = state.task === "";

@@ -174,6 +174,27 @@ describe("strokes", () => {
     expect((told[0] as Refusal).message).toBe("Another tab paints here.");
     expect(document.isSaved).toBe(true);
   });
+  it("that were promised to be sent wait while another tab paints", async () => {
+    const { document, store, told, kept } = await opened();
+    store.fail = new Lost("away");
+    document.add(stroke("a"));
+    await document.save();
+    store.fail = new Refusal(423, "Another tab paints here.");
+    await document.load();
+    expect(ids(document.list)).toBe("a");
+    expect(document.isWaiting).toBe(true);
+    expect(kept.kept.size).toBe(1);
+    const words = told.length;
+    store.list = [stroke("x")];
+    store.revision = 3;
+    await document.follow(3);
+    expect(told.length, "not said at each stroke of the other").toBe(words + 1);
+    store.fail = null;
+    await document.save();
+    expect(ids(store.list)).toBe("xa");
+    expect(document.isWaiting).toBe(false);
+    expect(kept.kept.size).toBe(0);
+  });
   it("survive a shelf with nonsense on it", async () => {
     for (const text of ["", "{", "[]", '{"base":1}']) {
       const kept = shelf();
