@@ -1,7 +1,7 @@
 #pragma once
 /// The losses of stage 2 and their gradients, once for every device.
 ///
-///   bins:   L = w (KL(label || softmax(logits)) + regression_weight R + spread_weight S)
+///   bins:   L = w (KL(label || softmax(logits)) + regression_weight R) + spread_weight S
 ///   field:  L = w |ab(composited XYZ) - target|, as Huber's loss or squared
 ///
 /// Both are means over the pixels of a step.

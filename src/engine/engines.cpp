@@ -72,7 +72,9 @@ const Engines& engines_for(const std::string& device) {
     throw DeviceError("--device cuda: this build has no CUDA engine; pass --device cpu (or auto)");
   }
   if (device == "cuda") {
-    throw DeviceError("--device cuda: no GPU that can be used was found; pass --device cpu (or auto)");
+    throw DeviceError(
+        "--device cuda: no GPU that can be used was found, one of NVIDIA's with 150 kB of shared memory per block, as "
+        "A100 and H100 have; pass --device cpu (or auto)");
   }
   return cpu_engines();
 }

@@ -31,7 +31,7 @@ float encoded_value(float linear) {
 
 double psnr_from_mse(double mean_squared_error) {
   if (mean_squared_error <= 0) return kHighestPsnr;
-  return std::min(kHighestPsnr, -10 * std::log10(mean_squared_error));
+  return std::min(-10 * std::log10(mean_squared_error), kHighestPsnr);  // in this order NaN stays NaN
 }
 
 double encoded_mse(std::span<const float> ours, std::span<const float> truth, int channels,

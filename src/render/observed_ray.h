@@ -43,12 +43,15 @@ struct PickedPixel {
   int x = 0, y = 0;
 };
 
+/// A pixel that is masked out is drawn again, but not for ever.
+inline constexpr int kFirstPicks = 16, kMorePicks = 4096;
+
 /// A random pixel of a random view.
 /// @param views    see `observe_ray`
-/// @param attempt  draws again when the first pick was masked out
+/// @param attempt  of `of`: draws again when the first pick was masked out
 template <typename Views>
-CNERF_HD PickedPixel pick_pixel(const Views& views, const CounterRng& rng, std::uint64_t ray, int attempt) {
-  const std::uint64_t at = (ray * 16 + std::uint64_t(attempt)) * 4;
+CNERF_HD PickedPixel pick_pixel(const Views& views, const CounterRng& rng, std::uint64_t ray, int attempt, int of) {
+  const std::uint64_t at = (ray * std::uint64_t(of) + std::uint64_t(attempt)) * 4;
   const std::uint32_t v = rng.below(at, views.count());
   const ImageSize image = views.size_of(v);
   return {v, int(rng.below(at + 1, std::uint32_t(image.width))), int(rng.below(at + 2, std::uint32_t(image.height)))};
@@ -59,13 +62,12 @@ CNERF_HD PickedPixel pick_pixel(const Views& views, const CounterRng& rng, std::
 template <typename Views>
 [[nodiscard]] CNERF_HD ObservedRay observe_ray(const Views& views, std::uint64_t seed, std::uint64_t step,
                                                std::uint64_t ray) {
-  // A pixel that is masked out is drawn again, but not for ever.
-  constexpr int kAttempts = 16;
-  const CounterRng picks(seed ^ named_stream("rays\0"), step);
+  const CounterRng picks(seed ^ named_stream("rays\0"), step), more(seed ^ named_stream("more"), step);
   PickedPixel picked;
   std::size_t pixel = 0;
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    picked = pick_pixel(views, picks, ray, attempt);
+  for (int attempt = 0; attempt < kFirstPicks + kMorePicks; ++attempt) {
+    picked = attempt < kFirstPicks ? pick_pixel(views, picks, ray, attempt, kFirstPicks)
+                                   : pick_pixel(views, more, ray, attempt - kFirstPicks, kMorePicks);
     pixel = std::size_t(picked.y) * std::size_t(views.size_of(picked.view).width) + std::size_t(picked.x);
     if (views.is_valid(picked.view, pixel)) break;
   }

@@ -62,6 +62,7 @@ TEST(Psnr, ClosedForms) {
   EXPECT_NEAR(psnr_from_mse(0.01), 20, 1e-12);
   EXPECT_NEAR(psnr_from_mse(1e-3), 30, 1e-12);
   EXPECT_EQ(psnr_from_mse(0), 100);
+  EXPECT_TRUE(std::isnan(psnr_from_mse(std::nan("")))) << "of no pixels";
 }
 
 TEST(Psnr, ComparesEncodedClampedValues) {

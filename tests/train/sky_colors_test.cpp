@@ -63,6 +63,43 @@ TEST(SkyColors, WhatIsKnownOverrulesAnswers) {
   EXPECT_LT(distance(sky.along(normalized(Vec3f{1, 0, 0.2f})), kRed), 0.5);
 }
 
+/// A picture of one colour for one of those views.
+KnownColors painted(KnownColorKind kind, const std::string& view, Ab color) {
+  KnownColors known{kind, view, 32, 24, std::vector<Ab>(32 * 24, color), std::vector<std::uint8_t>(32 * 24, 1)};
+  if (kind == KnownColorKind::kStrokes) known.reach.assign(32 * 24, 0.0f);
+  return known;
+}
+
+TEST(SkyColors, EachOfTwoPaintedViewsTellsOfItsPart) {
+  std::vector<CachedView> views{half_sky(), half_sky()};
+  views[1].camera.unit_from_camera = Mat3d::from_columns({0, 1, 0}, {0, 0, -1}, {-1, 0, 0});
+  const std::vector<std::string> names{"east", "west"};
+  for (const KnownColorKind kind : {KnownColorKind::kKeyFrame, KnownColorKind::kStrokes}) {
+    for (const bool everywhere : {false, true}) {
+      std::vector<KnownColors> known{painted(kind, "east", kRed), painted(kind, "west", kBlue)};
+      for (KnownColors& one : known) one.everywhere = everywhere && kind == KnownColorKind::kStrokes;
+      SkyColors sky = SkyColors::grey();
+      sky.add(views, known_color_map(views, names, known));
+      sky.refresh();
+      EXPECT_LT(distance(sky.along(normalized(Vec3f{1, 0, 0.2f})), kRed), 0.5) << everywhere;
+      EXPECT_LT(distance(sky.along(normalized(Vec3f{-1, 0, 0.2f})), kBlue), 0.5) << everywhere;
+    }
+  }
+}
+
+TEST(SkyColors, WhatAMaskIgnoresIsNoSky) {
+  CachedView view = half_sky();
+  MonoImage image;
+  image.width = view.width;
+  image.height = view.height;
+  image.mask.assign(view.opacity.size(), 255);
+  std::fill_n(image.mask.begin(), view.opacity.size() / 2, std::uint8_t(0));
+  ignore_masked(view, image);
+  SkyColors sky = SkyColors::grey();
+  for (std::size_t p = 0; p < view.opacity.size(); ++p) sky.add(view, p, kRed);
+  EXPECT_TRUE(sky.is_grey());
+}
+
 TEST(SkyColors, LieBehindWhatTheFieldLetsThrough) {
   CachedView view = half_sky();
   SkyColors sky = SkyColors::grey();

@@ -207,10 +207,14 @@ class LuminanceEngineCuda final : public LuminanceEngine {
 }  // namespace
 
 bool has_cuda_device() {
-  int devices = 0;
-  const bool found = cudaGetDeviceCount(&devices) == cudaSuccess && devices > 0;
+  constexpr int kSharedMemory = 150'000;  // bytes that a block of the largest kernels takes
+  int devices = 0, device = 0, major = 0, shared = 0;
+  const bool found = cudaGetDeviceCount(&devices) == cudaSuccess && devices > 0 &&
+                     cudaGetDevice(&device) == cudaSuccess &&
+                     cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device) == cudaSuccess &&
+                     cudaDeviceGetAttribute(&shared, cudaDevAttrMaxSharedMemoryPerBlockOptin, device) == cudaSuccess;
   cudaGetLastError();
-  return found;
+  return found && major >= 8 && shared >= kSharedMemory;
 }
 
 std::string cuda_device_text() {

@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::uint32_t kRaysAtATime = 1 << 18;  // of a rendering
 constexpr std::size_t kUsualSamples = 16;        // that are kept of a ray
+constexpr std::size_t kMostSamples = ~std::uint32_t(0);
 
 const char* const kTracedAdvice = "rays";
 
@@ -80,12 +81,13 @@ void LuminanceTracerCuda::trace_to(const FieldView& field, std::span<const Ray> 
   while (true) {
     to.positions.reserve(room, kTracedAdvice);
     for (auto* buffer : {&to.t, &to.weights, &to.luminance}) buffer->reserve(room, kTracedAdvice);
+    // An earlier call may have had memory for some of them only.
+    const std::size_t capacity =
+        std::min({to.positions.size(), to.t.size(), to.weights.size(), to.luminance.size(), kMostSamples});
     TraceJob trace = job_of_rays(field, rays, march, effort);
-    trace.kept = {
-        scratch_.data(),     effort.shaded_share, std::uint32_t(std::min<std::size_t>(to.t.size(), ~std::uint32_t(0))),
-        to.positions.data(), to.t.data(),         to.weights.data(),
-        to.luminance.data(), to.begins.data(),    to.ends.data(),
-        to.results.data()};
+    trace.kept = {scratch_.data(), effort.shaded_share, std::uint32_t(capacity), to.positions.data(),
+                  to.t.data(),     to.weights.data(),   to.luminance.data(),     to.begins.data(),
+                  to.ends.data(),  to.results.data()};
     trace_to_samples(trace, stream_);
     wait();
     to.samples = state_.downloaded().front().samples;

@@ -68,6 +68,7 @@ bool KnownColorSources::is_everywhere() const {
 }
 
 /// What a painted view shows of a pixel, it claims; of what none shows, those claim by likeness that have samples.
+/// Where there is only a sky, what was painted on it.
 RunningColors KnownColorSources::everywhere_in(std::size_t v) const {
   const CachedView& view = seen_.views()[v];
   const PixelLooks looks(view, seen_.surface(v));
@@ -76,33 +77,34 @@ RunningColors KnownColorSources::everywhere_in(std::size_t v) const {
   std::vector<Sight> sights;
   for (const Source& source : sources_) sights.emplace_back(seen_.views()[source.view], seen_.surface(source.view));
   std::vector<Claims> claims(pixels);
-  std::vector<const Ab*> of_key_frame(pixels, nullptr);
+  std::vector<const Ab*> given(pixels, nullptr);
   const auto ask = [&](std::size_t p) {
-    if (view.opacity[p] < kLeastColoredOpacity) return;
+    const bool is_sky = view.opacity[p] < kLeastColoredOpacity;
     for (std::size_t s = sources_.size(); s-- > 0;) {
       const Source& source = sources_[s];
       std::optional<std::size_t> from = p;
       if (source.view != v) {
-        if (looks.surface[p] <= 0) break;
+        if (looks.surface[p] <= 0) continue;
         const Vec3f point = view.camera.ray_of_pixel(p).at(looks.surface[p]);
         from = sights[s].pixel_of(point.cast<double>(), lightness_at(view, p));
       }
       if (!from) continue;
-      if (source.everywhere) {
+      if (source.everywhere && !is_sky) {
         for (const Claims::Claim& claim : source.everywhere->claims()[*from].list) claims[p].add(claim);
-      } else if (source.colors.is_known(*from) && of_key_frame[p] == nullptr) {
-        of_key_frame[p] = &source.colors.ab[*from];
+      } else if (source.colors.is_known(*from) && given[p] == nullptr) {
+        given[p] = &source.colors.ab[*from];
       }
     }
-    const bool is_shown = claims[p].cost() < kUnreached || of_key_frame[p] != nullptr;
+    const bool is_shown = is_sky || claims[p].cost() < kUnreached || given[p] != nullptr;
     for (std::size_t s = sources_.size(); s-- > 0 && !is_shown;) {
       if (sources_[s].everywhere) sources_[s].everywhere->claim_alike(view, looks, p, claims[p]);
     }
   };
   const auto take = [&](std::size_t p) {
-    if (of_key_frame[p] != nullptr) claims[p].add({kKeyFrameCost, *of_key_frame[p]});
+    const float lightness = lightness_at(view, p);
+    if (given[p] != nullptr) claims[p].add({kKeyFrameCost, *given[p], lightness});
     colors.cost[p] = claims[p].cost();
-    colors.ab[p] = claims[p].mixed(lightness_at(view, p));
+    colors.ab[p] = claims[p].mixed(lightness);
   };
   // There are not always more views than threads.
   const auto each_pixel = [&](const auto& work) {
@@ -130,7 +132,7 @@ RunningColors KnownColorSources::seen_in(std::size_t v) const {
       const RunningColors& given = sources_[s].colors;
       std::optional<std::size_t> from = p;
       if (sources_[s].view != v) {
-        if (surface[p] <= 0) break;
+        if (surface[p] <= 0) continue;
         const Vec3f point = view.camera.ray_of_pixel(p).at(surface[p]);
         from = sights[s].pixel_of(point.cast<double>(), lightness_at(view, p));
       }

@@ -21,7 +21,7 @@ Ab mixed(Ab one, float light_of_one, Ab other, float light_of_other) {
 }
 
 void SkyColors::add(const CachedView& view, std::size_t pixel, Ab color, float weight) {
-  if (view.opacity[pixel] > kMostOpacity) return;
+  if (view.opacity[pixel] > kMostOpacity || (!view.ignored.empty() && view.ignored[pixel] != 0)) return;
   const std::array<float, 2> ab = {color.a, color.b};
   sums_.add(view.camera.ray_of_pixel(pixel).direction, ab, weight * (1 - view.opacity[pixel]));
 }

@@ -33,12 +33,16 @@ std::unique_ptr<LuminanceEngine> make_engine(const LuminanceModel& model, const 
   return engines.make_luminance(engine);
 }
 
-/// White of integer images; floating point ones may be brighter.
+/// White of integer images. Floating point ones may be brighter, and what was taken darker than the others.
 float brightest(const Capture& capture) {
   float brightest = 1.0f;
   for (const View& view : capture.views) {
-    if (view.held_out || view.image.depth != PixelDepth::kF32) continue;
-    for (const float value : view.image.f32) brightest = std::max(brightest, value);
+    const MonoImage& image = view.image;
+    const bool is_as_stored = image.exposure == 1 && image.haze == 0;
+    if (view.held_out || (is_as_stored && image.depth != PixelDepth::kF32)) continue;
+    for (std::size_t p = 0; p < image.pixel_count(); ++p) {
+      if (image.valid(p)) brightest = std::max(brightest, image.luminance(p));
+    }
   }
   return brightest;
 }

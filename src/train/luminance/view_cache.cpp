@@ -109,14 +109,15 @@ CachedView packed_view(TracedView traced) {
 cluster::Bytes packed(const CachedView& view) {
   cluster::Packer packer;
   packer.add(view.camera).add(view.width).add(view.height).add(view.brightest);
-  return packer.add(view.luminance).add(view.opacity).add(view.samples).add(view.offsets).packed();
+  packer.add(view.luminance).add(view.opacity).add(view.ignored);
+  return packer.add(view.samples).add(view.offsets).packed();
 }
 
 CachedView unpacked(const cluster::Bytes& bytes) {
   CachedView view;
   cluster::Unpacker unpacker(bytes);
   unpacker.get(view.camera).get(view.width).get(view.height).get(view.brightest);
-  unpacker.get(view.luminance).get(view.opacity).get(view.samples).get(view.offsets);
+  unpacker.get(view.luminance).get(view.opacity).get(view.ignored).get(view.samples).get(view.offsets);
   return view;
 }
 
@@ -236,11 +237,14 @@ void ViewCache::keep_only(std::span<const Viewpoint> viewpoints) {
 
 void ignore_masked(CachedView& view, const MonoImage& image) {
   if (image.mask.empty()) return;
+  view.ignored.resize(view.opacity.size());
   for (std::size_t i = 0; i < image.pixel_count(); ++i) {
     if (image.valid(i)) continue;
     const auto x = std::int64_t(i) % image.width, y = std::int64_t(i) / image.width;
     const auto column = std::size_t(x * view.width / image.width), row = std::size_t(y * view.height / image.height);
-    view.opacity[row * std::size_t(view.width) + column] = 0;
+    const std::size_t pixel = row * std::size_t(view.width) + column;
+    view.opacity[pixel] = 0;
+    view.ignored[pixel] = 1;
   }
 }
 

@@ -31,6 +31,7 @@ struct CachedView {
   int width = 0, height = 0;
   std::vector<float> luminance;       ///< linear Y over the sky, or over black
   std::vector<float> opacity;         ///< of the field
+  std::vector<std::uint8_t> ignored;  ///< where a mask says so; empty without one
   float brightest = 1;                ///< luminance of the brightest sample
   std::vector<CachedSample> samples;  ///< pixel by pixel, front to back
   std::vector<std::size_t> offsets;   ///< [H W + 1]
@@ -91,8 +92,8 @@ class ViewCache {
   std::vector<Viewpoint> viewpoints_;
 };
 
-/// Makes pixels transparent that the view's mask says to ignore, wholly or in part: nothing there is learnt from, and
-/// no histogram counts it. What a colorizer is shown stays.
+/// Makes pixels transparent that the view's mask says to ignore, wholly or in part, and marks them: nothing there is
+/// learnt from, and no histogram counts it. What a colorizer is shown stays.
 void ignore_masked(CachedView& view, const MonoImage& image);
 
 /// A pixel of one of several views.
