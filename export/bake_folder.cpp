@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "export/camera_tracks.h"
 #include "export/texture_writer.h"
@@ -80,8 +81,15 @@ BakeFolder::BakeFolder(fs::path folder, std::vector<bake::Camera> cameras, Label
   manifest_.label = std::move(label);
 }
 
+/// To be called before a file is replaced that a former manifest may list.
+void BakeFolder::begin() {
+  if (std::exchange(has_begun_, true) || !fs::exists(manifest())) return;
+  fs::rename(manifest(), former_manifest());
+}
+
 ManifestVolume BakeFolder::write_grids(const bake::VolumePlanes& volume, const std::string& name,
                                        const VdbOptions& options) {
+  begin();
   const fs::path vdb = folder_ / (name + ".vdb");
   write_vdb(volume, vdb, options, manifest_.label);
   list(vdb);
@@ -115,6 +123,7 @@ std::vector<fs::path> BakeFolder::add_volumes(const std::vector<bake::VolumePlan
   return files;
 }
 
+/// Written before anything is known to be replaced: a former manifest may go on naming it.
 void BakeFolder::add_sky(const SkyPicture& sky) {
   const fs::path file = folder_ / "sky.exr";
   const std::span<const float> rgb(sky.rgb);
@@ -129,6 +138,7 @@ void BakeFolder::add_sky(const SkyPicture& sky) {
 }
 
 void BakeFolder::add_camera_tracks(const VdbOptions& options) {
+  begin();
   const fs::path usd = folder_ / "cameras.usda", chan = folder_ / "cameras.chan";
   write_cameras_usd(manifest_.cameras, options, manifest_.label, usd);
   write_chan(manifest_.cameras, manifest_.label.world, chan);
@@ -137,16 +147,15 @@ void BakeFolder::add_camera_tracks(const VdbOptions& options) {
 }
 
 void BakeFolder::add_plate(const std::string& camera, const std::vector<std::byte>& jpeg) {
-  std::string stem = fs::path(camera).replace_extension().string();
-  std::ranges::replace_if(
-      stem, [](char c) { return c == '/' || c == '\\'; }, '_');
-  const std::string file = "plates/" + stem + ".jpg";
+  begin();
+  const std::string file = "plates/" + plate_names_.name_for(camera) + ".jpg";
   write_file(folder_ / file, jpeg);
   manifest_.files.push_back(file);
   manifest_.plates[camera] = file;
 }
 
 GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, bool exr) {
+  begin();
   GltfScene scene;
   scene.cameras = manifest_.cameras;
   scene.basecolor_png = basecolor_png(mesh.texture);
@@ -178,6 +187,7 @@ GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, 
 }
 
 SplatFiles BakeFolder::add_splats(const bake::SplatCloud& cloud, const std::string& name) {
+  begin();
   SplatFiles files = write_splats(cloud, folder_, name, manifest_.label);
   for (const fs::path& file : {files.ply, files.spz, files.usd}) list(file);
   manifest_.frame = cloud.frame;
@@ -189,11 +199,12 @@ SplatFiles BakeFolder::add_splats(const bake::SplatCloud& cloud, const std::stri
 }
 
 void BakeFolder::finish() {
+  begin();
   if (manifest_.volume || manifest_.mesh) list(write_blender_setup(folder_));
   std::vector<std::string> former;
-  if (fs::exists(manifest())) {
+  if (fs::exists(former_manifest())) {
     try {
-      former = read_manifest(manifest()).files;
+      former = read_manifest(former_manifest()).files;
     } catch (const std::exception&) {
       // Not a manifest of ours, so nothing here is known to be of a former bake.
     }
@@ -203,6 +214,7 @@ void BakeFolder::finish() {
     if (std::ranges::find(manifest_.files, file) != manifest_.files.end()) continue;
     if (const auto ours = file_below(folder_, file)) fs::remove(*ours);  // a manifest may come from anybody
   }
+  fs::remove(former_manifest());
 }
 
 }  // namespace cnerf::exporting

@@ -11,6 +11,7 @@
 #include "export/manifest.h"
 #include "export/options.h"
 #include "export/splat_writer.h"
+#include "src/capture/picture_names.h"
 #include "src/picture/sky_picture.h"
 
 namespace cnerf::exporting {
@@ -22,7 +23,8 @@ namespace cnerf::exporting {
 std::filesystem::path write_blender_setup(const std::filesystem::path& folder);
 
 /// Takes one result after another, so that the caller need not hold them together. Files appear whole; the manifest,
-/// by which others find them, comes last and lists exactly what this object wrote.
+/// by which others find them, comes last and lists exactly what this object wrote. A former one goes as soon as one of
+/// its files may be replaced.
 class BakeFolder {
  public:
   BakeFolder(std::filesystem::path folder, std::vector<bake::Camera> cameras, Label label);
@@ -41,7 +43,7 @@ class BakeFolder {
   /// Writes sky.exr: Blender's world, behind volume and mesh. To be called before add_mesh, which names it.
   /// @throws OutputError.
   void add_sky(const SkyPicture& sky);
-  /// A camera's photograph without lens distortion, as plates/`stem`.jpg: what Blender shows behind its view.
+  /// A camera's photograph without lens distortion, in a folder `plates`: what Blender shows behind its view.
   /// @throws OutputError.
   void add_plate(const std::string& camera, const std::vector<std::byte>& jpeg);
   /// The cameras as cameras.usda, where the .usda of the volumes lies, and cameras.chan: see camera_tracks.h.
@@ -56,10 +58,14 @@ class BakeFolder {
 
  private:
   ManifestVolume write_grids(const bake::VolumePlanes& volume, const std::string& name, const VdbOptions& options);
+  void begin();
+  [[nodiscard]] std::filesystem::path former_manifest() const { return folder_ / ".former-manifest.json"; }
   void list(const std::filesystem::path& file) { manifest_.files.push_back(file.filename().string()); }
 
   std::filesystem::path folder_;
   BakeManifest manifest_;
+  PictureNames plate_names_;
+  bool has_begun_ = false;
 };
 
 }  // namespace cnerf::exporting

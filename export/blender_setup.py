@@ -346,6 +346,8 @@ def lay_over_plate(scene, data, opacity):
     """Lays renders over the photograph of their camera."""
     if not data.background_images:
         raise ValueError("%s has no photograph to render over" % data.name)
+    if bpy.app.version >= (5, 0, 0):
+        raise ValueError("renders are laid over photographs by Blender 3.4 to 4; lay them over in your compositor")
     scene.render.film_transparent = True
     scene.use_nodes = True
     tree = scene.node_tree
@@ -368,8 +370,9 @@ def lay_over_plate(scene, data, opacity):
 
 def frame_number(name):
     """The number that a picture's name ends with, as frames of a film do; None without one."""
-    found = re.search(r"(\d+)$", os.path.splitext(name)[0])
-    return int(found.group(1)) if found else None
+    found = re.search(r"(\d+)$", re.sub(r"\.(png|jpe?g|exr|tiff?|webp)$", "", name, flags=re.IGNORECASE))
+    # Longer numbers are dates and times, and beyond Blender's last frame.
+    return int(found.group(1)) if found and len(found.group(1)) <= 6 else None
 
 
 def numbered_frames(cameras):

@@ -14,6 +14,7 @@
 #include "export/usd_text.h"
 #include "export/vdb_writer.h"
 #include "src/base/files.h"
+#include "src/capture/picture_names.h"
 
 namespace cnerf::exporting {
 namespace {
@@ -23,7 +24,7 @@ constexpr int kMostDigits = 6;  // what is longer is a date rather than the numb
 
 /// The number that a picture's name ends with.
 std::optional<int> number_at_end(const std::string& name) {
-  const std::string stem = std::filesystem::path(name).stem().string();
+  const std::string stem = without_image_extension(name);
   std::size_t begin = stem.size();
   while (begin > 0 && std::isdigit(static_cast<unsigned char>(stem[begin - 1])) != 0) --begin;
   if (begin == stem.size() || stem.size() - begin > kMostDigits) return std::nullopt;

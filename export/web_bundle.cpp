@@ -134,6 +134,17 @@ Json cameras_json(const WebScene& scene) {
   return cameras;
 }
 
+/// What the page takes: viewer/src/bundle.ts.
+constexpr std::size_t kMostStoredBricks = std::size_t(1) << 18;
+
+void refuse_too_many_bricks(const std::vector<WebBricks>& levels) {
+  std::size_t stored = 0;
+  for (const WebBricks& level : levels) stored += level.stored();
+  if (stored <= kMostStoredBricks) return;
+  throw UsageError(fmt::format("web.resolution: {} bricks of 8^3 voxels hold something, and a page takes {}; lower it",
+                               stored, kMostStoredBricks));
+}
+
 /// Of the page's textures.
 std::size_t graphics_bytes(const WebBricks& bricks) {
   constexpr std::size_t kTexels = (kWebBrickSide + 2) * (kWebBrickSide + 2) * (kWebBrickSide + 2);  // with neighbours
@@ -145,6 +156,7 @@ std::size_t graphics_bytes(const WebBricks& bricks) {
 WebReport write_web_bundle(const WebVolume& volume, const WebScene& scene, const fs::path& folder,
                            const fs::path& page) {
   CNERF_CHECK(!volume.levels.empty(), "a bundle has a level");
+  refuse_too_many_bricks(volume.levels);
   CNERF_CHECK(scene.photos.empty() || scene.photos.size() == scene.cameras.size(), "one photograph per camera");
   std::error_code ignored;
   fs::remove(folder / kWebManifest, ignored);  // a manifest never names files of another bundle

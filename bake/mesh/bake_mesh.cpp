@@ -1,5 +1,7 @@
 #include "bake/mesh/bake_mesh.h"
 
+#include <algorithm>
+
 #include "bake/density/density_pass.h"
 #include "bake/lattice/plan.h"
 #include "bake/mesh/surface/isosurface.h"
@@ -16,12 +18,25 @@ constexpr int kGutter = 2;                  ///< texels around a chart that belo
 constexpr double kDensityShare = 0.25;      ///< of the progress line, when density is baked before
 constexpr double kSurfaceShare = 2.0 / 15;  ///< of the rest
 
-SurfaceMesh make_surface(const BrickGrid<float>& sigma, const Plan& plan, const MeshOptions& options) {
+constexpr std::size_t kMostSeenFrom = 16;  // cameras that tell what is an inside
+
+/// Centres of cameras all over the capture, voxel coordinates.
+std::vector<Vec3f> centres_of(const std::vector<Camera>& cameras, const Plan& plan) {
+  std::vector<Vec3f> centres;
+  const std::size_t step = std::max<std::size_t>(1, cameras.size() / kMostSeenFrom);
+  for (std::size_t i = 0; i < cameras.size(); i += step) {
+    centres.push_back(plan.voxel_from_world(cameras[i].world_from_camera.translation).cast<float>());
+  }
+  return centres;
+}
+
+SurfaceMesh make_surface(const BrickGrid<float>& sigma, const Plan& plan, const std::vector<Camera>& cameras,
+                         const MeshOptions& options) {
   SurfaceMesh surface = extract_surface(sigma, plan.voxel_size, options.surface_depth, kAdaptivity);
   if (surface.triangles.empty()) {
     throw InputError("mesh: nothing is opaque enough to have a surface; raise mesh.surface_depth, or check --aabb");
   }
-  surface = without_loose_parts(surface, options.smallest_part);
+  surface = without_loose_parts(surface, options.smallest_part, centres_of(cameras, plan));
   smooth(surface, options.smoothing);
   return decimated(surface, options.faces);
 }
@@ -42,7 +57,7 @@ Mesh bake_mesh(const ColorField& field, const std::vector<Camera>& cameras, cons
                const MeshOptions& options, const ProgressSink& sink) {
   const PassProgress progress(sink, "mesh", kDensityShare, 1, "bake stopped: the mesh was not written, run it again");
   const auto& [plan, sigma] = level;
-  const SurfaceMesh surface = make_surface(solidified(sigma, cameras, plan, bake), plan, options);
+  const SurfaceMesh surface = make_surface(solidified(sigma, cameras, plan, bake), plan, cameras, options);
   const UnwrappedMesh unwrapped = unwrap(surface, options.texture_size, kGutter);
   progress.report(kSurfaceShare);
 

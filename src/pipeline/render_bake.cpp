@@ -9,6 +9,7 @@
 #include "export/vdb_reader.h"
 #include "export/web_pictures.h"
 #include "src/base/error.h"
+#include "src/capture/picture_names.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/run_context.h"
 
@@ -21,10 +22,10 @@ CameraPath cameras_of_bake(const fs::path& bake) {
     throw InputError(bake / "manifest.json", "volume", "this bake has none; bake with --format vdb");
   }
   CameraPath path{"cameras", {}};
+  PictureNames names;
   for (const bake::Camera& camera : manifest.cameras) {
-    std::string name = fs::path(camera.name).replace_extension().string();
-    std::ranges::replace(name, '/', '_');
-    path.cameras.push_back({name, exporting::without_distortion(camera.intrinsics), camera.world_from_camera});
+    path.cameras.push_back(
+        {names.name_for(camera.name), exporting::without_distortion(camera.intrinsics), camera.world_from_camera});
   }
   return path;
 }

@@ -9,6 +9,7 @@
 #include "src/base/error.h"
 #include "src/base/statistics.h"
 #include "src/capture/arrangement.h"
+#include "src/capture/picture_names.h"
 
 namespace cnerf {
 namespace {
@@ -156,11 +157,10 @@ CameraPath turntable_path(const Capture& capture, const PictureOptions& config) 
 
 CameraPath held_out_path(const Capture& capture) {
   CameraPath path{"held-out", {}};
+  PictureNames names;
   for (const View& view : capture.views) {
     if (!view.held_out) continue;
-    std::string name = std::filesystem::path(view.name).replace_extension().string();
-    std::ranges::replace(name, '/', '_');
-    path.cameras.push_back({name, view.intrinsics, view.world_from_camera});
+    path.cameras.push_back({names.name_for(view.name), view.intrinsics, view.world_from_camera});
   }
   if (path.cameras.empty()) {
     throw InputError(capture.root.string() + ": no view is held out; train with --holdout N to keep some");

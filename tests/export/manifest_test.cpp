@@ -168,6 +168,32 @@ TEST(BakeFolder, NestedGridsAreListedAndReadBackFinestFirst) {
   }
 }
 
+TEST(BakeFolder, PlatesOfNamesThatAreAlikeAreFilesOfTheirOwn) {
+  const TempDir folder;
+  BakeFolder bake(folder.path(), {}, {});
+  for (const char* name : {"shot.0001", "shot.0002", "a/b.jpg", "a_b.jpg", "a_b.png"}) {
+    bake.add_plate(name, std::vector<std::byte>(7));
+  }
+  for (const char* file : {"shot.0001", "shot.0002", "a_b", "a_b_", "a_b__"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder / "plates" / (std::string(file) + ".jpg"))) << file;
+  }
+}
+
+TEST(BakeFolder, AStoppedSecondBakeLeavesNoManifestThatNamesItsFiles) {
+  const TempDir folder;
+  const bake::Volume volume = block_volume({0, 0, 0}, {4, 4, 4}, 2);
+  const auto begun = [&](std::size_t grids) {
+    auto bake = std::make_unique<BakeFolder>(folder.path(), std::vector<bake::Camera>(), Label());
+    bake->add_volumes(std::vector<bake::VolumePlanes>(grids, planes_of(volume)), "volume", {});
+    return bake;
+  };
+  begun(2)->finish();
+  EXPECT_FALSE(std::filesystem::exists(begun(1)->manifest()));
+  begun(1)->finish();
+  EXPECT_FALSE(std::filesystem::exists(folder / "volume_fine1.vdb")) << "of the first";
+  EXPECT_FALSE(std::filesystem::exists(folder / ".former-manifest.json"));
+}
+
 TEST(BakeFolder, ASecondBakeLeavesNothingOfTheFirst) {
   const TempDir folder;
   const bake::Volume volume = block_volume({0, 0, 0}, {4, 4, 4}, 2);

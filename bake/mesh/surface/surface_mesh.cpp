@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 
 #include "src/base/aabb.h"
@@ -41,6 +42,19 @@ float diagonal(const SurfaceMesh& mesh) {
   Aabbf box = Aabbf::empty();
   for (const Vec3f& p : mesh.positions) box.grow(p);
   return mesh.positions.empty() ? 0.0f : length(box.size());
+}
+
+/// Whether a closed surface has the point inside, whichever way it faces: by its winding number, from the solid angles
+/// of its triangles (van Oosterom and Strackee 1983).
+bool surrounds(const SurfaceMesh& mesh, Vec3f point) {
+  double angle = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const auto corner = [&](int c) { return (mesh.positions[t[c]] - point).cast<double>(); };
+    const Vec3d a = corner(0), b = corner(1), c = corner(2);
+    const double la = length(a), lb = length(b), lc = length(c);
+    angle += 2 * std::atan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+  }
+  return std::abs(angle) > 2 * std::numbers::pi;  // half a turn around it
 }
 
 void append(SurfaceMesh& to, const SurfaceMesh& part) {
@@ -137,17 +151,24 @@ std::vector<SurfaceMesh> connected_parts(const SurfaceMesh& mesh) {
   return parts;
 }
 
-SurfaceMesh without_loose_parts(const SurfaceMesh& mesh, double smallest) {
+SurfaceMesh without_loose_parts(const SurfaceMesh& mesh, double smallest, std::span<const Vec3f> seen_from) {
   const std::vector<SurfaceMesh> parts = connected_parts(mesh);
   const auto least = float(smallest * diagonal(mesh));
   const auto largest = std::max_element(
       parts.begin(), parts.end(), [](const SurfaceMesh& a, const SurfaceMesh& b) { return diagonal(a) < diagonal(b); });
-  SurfaceMesh kept;
+  SurfaceMesh solids, rooms, around;
   for (auto part = parts.begin(); part != parts.end(); ++part) {
     const bool is_cavity = signed_volume(*part) < 0;
-    if (part == largest || (!is_cavity && diagonal(*part) >= least)) append(kept, *part);
+    if (part != largest && diagonal(*part) < least) continue;
+    const auto is_around = [&](Vec3f camera) { return surrounds(*part, camera); };
+    if (is_cavity && part != largest) {
+      if (std::ranges::any_of(seen_from, is_around)) append(rooms, *part);
+    } else {
+      append(!seen_from.empty() && std::ranges::all_of(seen_from, is_around) ? around : solids, *part);
+    }
   }
-  return kept;
+  append(solids, rooms.triangles.empty() ? around : rooms);
+  return solids;
 }
 
 void smooth(SurfaceMesh& mesh, int rounds) {

@@ -3,6 +3,7 @@
 /// density one worth texturing.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "bake/mesh.h"
@@ -41,9 +42,12 @@ void compact(SurfaceMesh& mesh);
 [[nodiscard]] std::vector<SurfaceMesh> connected_parts(const SurfaceMesh& mesh);
 
 /// Drops parts that share no vertex with the rest and whose bounding box is small, and the walls of closed cavities,
-/// which nobody outside can see.
-/// @param smallest  diagonal of a part's box, as a share of the diagonal of the whole mesh's. The largest part stays.
-[[nodiscard]] SurfaceMesh without_loose_parts(const SurfaceMesh& mesh, double smallest);
+/// which nobody outside can see. Where cameras are in a cavity, as those of a room, it stays, and what is around all of
+/// them goes: the room's outside.
+/// @param smallest   diagonal of a part's box, as a share of the diagonal of the whole mesh's. The largest part stays.
+/// @param seen_from  centres of cameras, voxel coordinates
+[[nodiscard]] SurfaceMesh without_loose_parts(const SurfaceMesh& mesh, double smallest,
+                                              std::span<const Vec3f> seen_from = {});
 
 /// Taubin 1995: a shrinking and a growing step of Laplacian smoothing each round, so that steps between voxels go and
 /// the volume stays.

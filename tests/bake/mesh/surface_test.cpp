@@ -67,6 +67,24 @@ TEST(Refine, LoosePartsAndCavitiesGo) {
   EXPECT_EQ(connected_parts(without_loose_parts(mesh, 0)).size(), 3u) << "the cavity goes whatever the size";
 }
 
+TEST(Refine, OfARoomTheInsideStaysWhereCamerasAre) {
+  const auto ball = [](Vec3d p, Vec3d centre, double radius) { return length(p - centre) - radius; };
+  const auto shape = inside_of([=](Vec3d p) {
+    const double walls = std::max(ball(p, {24, 24, 24}, 20), -ball(p, {24, 24, 24}, 15));
+    return std::min(walls, ball(p, {24, 24, 24}, 4));
+  });
+  const SurfaceMesh mesh = extract_surface(covered_voxels({48, 48, 48}, shape), 1, 1, 0);
+  EXPECT_EQ(connected_parts(mesh).size(), 3u) << "outside, inside, and what stands there";
+  const std::vector<Vec3f> within{{24, 24, 34}, {14, 24, 24}}, outside{{24, 24, 90}}, both{within[0], outside[0]};
+  const auto volume_seen_from = [&](const std::vector<Vec3f>& cameras) {
+    return signed_volume(without_loose_parts(mesh, 0.1, cameras));
+  };
+  const double room = -ball_volume(15), hull = ball_volume(20), thing = ball_volume(4);
+  EXPECT_NEAR(volume_seen_from(within), room + thing, 0.01 * ball_volume(15));
+  EXPECT_NEAR(volume_seen_from(outside), hull + thing, 0.01 * hull);
+  EXPECT_NEAR(volume_seen_from(both), hull + room + thing, 0.02 * hull);
+}
+
 TEST(Refine, SmoothingKeepsTheVolumeAndDecimationTheShape) {
   SurfaceMesh mesh = sphere_surface(64, 24);
   smooth(mesh, 10);
