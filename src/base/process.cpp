@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <csignal>
@@ -36,7 +37,9 @@ constexpr milliseconds kBetweenLooks{50};
 constexpr milliseconds kTimeToEnd{1000};       // of a program whose input was closed
 constexpr milliseconds kTimeToDie{200};        // of a program that closed its output: its status is worth a moment
 constexpr std::size_t kKeptErrorBytes = 8192;  // of stderr
+constexpr std::size_t kMostEarlyBytes = std::size_t(512) << 20;  // of an answer before all was asked
 constexpr int kShownErrorLines = 12;
+constexpr int kUnknownStatus = W_EXITCODE(127, 0);  // of children whose end a host that ignores SIGCHLD loses
 
 bool is_executable(const fs::path& file) {
   std::error_code failure;
@@ -129,7 +132,9 @@ std::optional<std::string> failure_in_child(const std::function<void()>& attempt
     ::_exit(kFailed);
   }
   int status = 0;
-  if (TEMP_FAILURE_RETRY(::waitpid(child, &status, 0)) != child || status == 0) return std::nullopt;
+  // A host that ignores SIGCHLD loses how its children end: nothing speaks for the attempt then.
+  if (TEMP_FAILURE_RETRY(::waitpid(child, &status, 0)) != child) return "";
+  if (status == 0) return std::nullopt;
   if (WIFEXITED(status) && WEXITSTATUS(status) == kShortOfOurMemory) throw std::bad_alloc();
   writes.reset();
   std::string said(kLongest, ' ');
@@ -169,6 +174,7 @@ bool Process::has_ended(int options) {
     found = ::waitpid(pid_, &status_, options);
   } while (found == -1 && errno == EINTR);
   ended_ = found != 0;
+  if (found < 0) status_ = kUnknownStatus;
   return ended_;
 }
 
@@ -254,15 +260,26 @@ void PipedProcess::drain_errors() {
   }
 }
 
+/// What is not heard keeps a program from reading on, once the pipe is full.
+void PipedProcess::hear_early_answer() {
+  std::array<std::byte, 1 << 16> buffer;
+  const ssize_t got = ::read(output_.number(), buffer.data(), buffer.size());
+  if (got > 0) early_.insert(early_.end(), buffer.begin(), buffer.begin() + got);
+  if (got == 0 || early_.size() > kMostEarlyBytes) may_answer_early_ = false;
+}
+
 /// Waits until the descriptor is ready; false at the deadline.
 bool PipedProcess::wait_for(int descriptor, short events, Deadline deadline) {
   while (true) {
     const auto left = std::chrono::ceil<milliseconds>(deadline - Clock::now()).count();
     if (left <= 0) return false;
-    pollfd waiting[2] = {{descriptor, events, 0}, {errors_.number(), POLLIN, 0}};  // poll ignores a negative one
-    const int ready = ::poll(waiting, 2, int(std::min<long long>(left, 1 << 30)));
+    const bool listens = may_answer_early_ && descriptor == input_.number();
+    const int answer = listens ? output_.number() : -1;  // poll ignores a negative one
+    pollfd waiting[3] = {{descriptor, events, 0}, {errors_.number(), POLLIN, 0}, {answer, POLLIN, 0}};
+    const int ready = ::poll(waiting, 3, int(std::min<long long>(left, 1 << 30)));
     if (ready == -1 && errno != EINTR) return false;
     if (waiting[1].revents != 0) drain_errors();
+    if (waiting[2].revents != 0) hear_early_answer();
     if (ready > 0 && waiting[0].revents != 0) return true;
   }
 }
@@ -280,6 +297,10 @@ PipeTrouble PipedProcess::write_all(std::span<const std::byte> bytes, Deadline d
 }
 
 PipeTrouble PipedProcess::read_all(std::span<std::byte> bytes, Deadline deadline) {
+  const std::size_t heard = std::min(early_.size(), bytes.size());
+  std::copy_n(early_.begin(), heard, bytes.begin());
+  early_.erase(early_.begin(), early_.begin() + std::ptrdiff_t(heard));
+  bytes = bytes.subspan(heard);
   while (!bytes.empty()) {
     if (!wait_for(output_.number(), POLLIN, deadline)) return PipeTrouble::kTimedOut;
     const ssize_t got = ::read(output_.number(), bytes.data(), bytes.size());
@@ -292,7 +313,7 @@ PipeTrouble PipedProcess::read_all(std::span<std::byte> bytes, Deadline deadline
 
 bool PipedProcess::has_unread_output() const {
   pollfd waiting{output_.number(), POLLIN, 0};
-  return ::poll(&waiting, 1, 0) > 0 && (waiting.revents & POLLIN) != 0;
+  return !early_.empty() || (::poll(&waiting, 1, 0) > 0 && (waiting.revents & POLLIN) != 0);
 }
 
 std::string PipedProcess::last_words() {

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -31,8 +32,8 @@ int run_program(const std::vector<std::string>& words, const std::filesystem::pa
 /// what others made may crash, hang or swell.
 /// @param attempt  must not need threads, which a child does not have; what it writes to standard error is lost
 /// @param memory   bytes that the child may take besides what this process holds
-/// @return  what it threw; "" where it crashed, or time or memory did not suffice; nullopt where it returned, and where
-///          there can be no child
+/// @return  what it threw; "" where it crashed, time or memory did not suffice, or how it ended was lost; nullopt where
+///          it returned, and where there can be no child
 /// @throws std::bad_alloc  where the limit of this process's own memory did not suffice (limit_memory)
 [[nodiscard]] std::optional<std::string> failure_in_child(const std::function<void()>& attempt, double seconds,
                                                           std::size_t memory);
@@ -84,7 +85,7 @@ class PipedProcess {
   ~PipedProcess();
 
   /// Both transfer every byte or report trouble; the program's stderr is passed through meanwhile. A program that stops
-  /// reading gives kEnded, never SIGPIPE.
+  /// reading gives kEnded, never SIGPIPE; one that answers before it has read all is listened to.
   PipeTrouble write_all(std::span<const std::byte> bytes, Deadline deadline);
   PipeTrouble read_all(std::span<std::byte> bytes, Deadline deadline);
 
@@ -96,11 +97,14 @@ class PipedProcess {
 
  private:
   void drain_errors();
+  void hear_early_answer();
   bool wait_for(int descriptor, short events, Deadline deadline);
 
   FileDescriptor input_, output_, errors_;  // our ends
   std::optional<Process> process_;
   std::string stderr_tail_;
+  std::deque<std::byte> early_;   // of its output, heard while it was written to
+  bool may_answer_early_ = true;  // until it closes its output, or floods us
 };
 
 /// Quotes a text as one word of the shell.

@@ -16,6 +16,11 @@ void handle_signal(int) {
   *interruption = 1;
 }
 
+/// A terminal that goes away says so twice, so that a second time is no impatience.
+void handle_hangup(int) {
+  *interruption = 1;
+}
+
 }  // namespace
 
 bool interruption_requested() {
@@ -25,6 +30,9 @@ bool interruption_requested() {
 void install_interruption_handler() {
   std::signal(SIGINT, handle_signal);
   std::signal(SIGTERM, handle_signal);
+  // A terminal that goes away, unless `nohup` had it ignored.
+  if (std::signal(SIGHUP, handle_hangup) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
+  std::signal(SIGCHLD, SIG_DFL);  // ignored, which is inherited, how a child ends would be lost
 }
 
 void request_interruption() {

@@ -67,7 +67,10 @@ class Colmap {
   /// @return  false when it failed with `excuse` among its last words; every other failure throws.
   bool run(const std::vector<std::string>& words, const std::string& task, std::size_t images,
            const ProgressSink& progress, const std::string& excuse = "") {
-    std::vector<std::string> line = {program_.string()};
+    std::vector<std::string> line;
+    // Killed with this process, however that ends: two at work in one folder would mix their models.
+    if (find_program("setpriv")) line = {"setpriv", "--pdeathsig", "KILL"};
+    line.push_back(program_.string());
     line.insert(line.end(), words.begin(), words.end());
     const std::uintmax_t begin = fs::exists(log_) ? fs::file_size(log_) : 0;
     double shown = 0;
@@ -129,7 +132,9 @@ std::string fingerprint(const std::vector<PreparedImage>& images, const fs::path
   std::ostringstream text;
   for (const PreparedImage& image : images) {
     text << image.name << ' ' << image.camera << ' ' << image.focal << ' ' << image.mask.string() << ' '
-         << sha256(read_binary_file(capture / "images" / image.name)) << '\n';
+         << sha256(read_binary_file(capture / "images" / image.name));
+    if (!image.mask.empty()) text << ' ' << sha256(read_binary_file(capture / image.mask));
+    text << '\n';
   }
   return text.str();
 }

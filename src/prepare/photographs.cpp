@@ -9,6 +9,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/parallel.h"
+#include "src/base/text.h"
 #include "src/capture/image_io.h"
 #include "src/capture/listing.h"
 #include "src/picture/encode.h"
@@ -155,12 +156,16 @@ Imported import_one(const fs::path& file, const std::string& name, const fs::pat
                     const std::map<std::string, fs::path>& masks, const SensorOptions& sensor) {
   Imported out;
   try {
+    if (!is_utf8(name)) throw InputError(printable(file.string()), "name", "expected UTF-8");
     const ExifFacts exif = read_exif(read_binary_file(file));
     LinearImage stored = read_linear_image(file, Transfer::kLinear);
     apply_levels(stored, sensor);
     const bool eight_bit = stays_eight_bit(stored, sensor);
     stored = luminance_image(std::move(stored));
-    const Upright grid = {exif.orientation, stored.width, stored.height};
+    // OpenCV turns TIFF files upright by itself.
+    const std::string kind = lower_extension(file);
+    const int orientation = kind == ".tif" || kind == ".tiff" ? 1 : exif.orientation;
+    const Upright grid = {orientation, stored.width, stored.height};
     const LinearImage upright = turned_upright(stored, grid);
     PreparedImage& image = out.image;
     image.name = name + (upright.depth == PixelDepth::kF32 ? ".exr" : ".png");

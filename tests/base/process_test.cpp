@@ -69,6 +69,14 @@ TEST(FailureInChild, ALackOfThisProcesssOwnMemoryIsNotTheFiles) {
   EXPECT_EQ(failure_in_child(under_own_limit, 20, std::size_t(1) << 30), "its own");
 }
 
+TEST(RunProgram, WhereAHostLosesHowChildrenEndNoneHasSucceeded) {
+  const test::TempDir folder;
+  const auto before = std::signal(SIGCHLD, SIG_IGN);
+  EXPECT_NE(run_program({"/bin/sh", "-c", "exit 3"}, folder / "log"), 0);
+  EXPECT_EQ(failure_in_child([] { std::abort(); }, 10, std::size_t(64) << 20), "");
+  std::signal(SIGCHLD, before);
+}
+
 TEST(RunProgram, GivesNoInputAndSaysThatThereIsNoScreen) {
   const test::TempDir folder;
   EXPECT_EQ(run_program({"/bin/sh", "-c", "cat; echo $QT_QPA_PLATFORM"}, folder / "log"), 0);

@@ -4,8 +4,12 @@
 need ip
 a="cnerf-a-$$" b="cnerf-b-$$"
 ip netns add "$a" 2> "$work/ip.log" || skip "no network namespaces: $(cat "$work/ip.log")"
-trap 'ip netns del "$a"; ip netns del "$b" 2> /dev/null || true' EXIT
+trap 'ip netns del "$a"; ip netns del "$b" 2> /dev/null || true; rm -rf "/etc/netns/$a" "/etc/netns/$b"' EXIT
 ip netns add "$b"
+# As Debian has it: the first machine's name is its loopback to itself.
+mkdir -p "/etc/netns/$a" "/etc/netns/$b"
+echo "127.0.1.1 first-machine" > "/etc/netns/$a/hosts"
+echo "10.77.0.1 first-machine" > "/etc/netns/$b/hosts"
 ip -n "$a" link add cable type veth peer name cable netns "$b" || skip "no virtual network devices"
 for end in "$a 10.77.0.1" "$b 10.77.0.2"; do
   read -r space address <<< "$end"
@@ -17,7 +21,7 @@ done
 on() {
   local space=$1 rank=$2
   shift 2
-  as_rank "$rank" 10.77.0.1 29511 ip netns exec "$space" "$@"
+  as_rank "$rank" first-machine 29511 env LOCAL_RANK=0 LOCAL_WORLD_SIZE=1 ip netns exec "$space" "$@"
 }
 
 mapfile -d '' -t words < <(run_words "$work/two")

@@ -102,6 +102,23 @@ TEST_F(ExecColorizer, SpeaksTheProtocolForManyQuestions) {
   }
 }
 
+TEST_F(ExecColorizer, MayAnswerEachPatchBeforeItHasReadTheNext) {
+  const std::string answers_as_it_reads = R"(import struct, sys
+source, sink = sys.stdin.buffer, sys.stdout.buffer
+magic, version, B, H, W = struct.unpack('<4s4I', source.read(20))
+sink.write(struct.pack('<4s5I', b'CNA1', 0, B, 2, H, W))
+for patch in range(B):
+    L = source.read(4 * H * W)
+    sink.write(L + L)
+    sink.flush()
+)";
+  write_file(folder_ / "program.py", answers_as_it_reads);
+  const auto colorizer = test::colorizer_of("exec:python3 " + (folder_ / "program.py").string(), 20);
+  const LightnessBatch question = some_question(16, 128, 128);  // 1 MB, 16 times what a pipe holds
+  const ChromaBatch answer = colorizer->colorize(question);
+  EXPECT_EQ(answer.ab.back(), question.lightness.back());
+}
+
 TEST_F(ExecColorizer, MayAnswerDistributions) {
   const auto colorizer =
       test::colorizer_of(command("    put(1, (B, 313, H, W), [float(i % 7) for i in range(B * 313 * H * W)])\n"));

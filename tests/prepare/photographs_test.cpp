@@ -134,6 +134,54 @@ TEST(Photographs, ExifTurnsUprightAndTellsTheLens) {
   }
 }
 
+/// An uncompressed grey TIFF whose only directory says how it is turned.
+std::string tiff(const cv::Mat1b& image, int orientation) {
+  std::string file = "II*";
+  const auto put = [&](std::uint32_t value, int bytes) {
+    for (int i = 0; i < bytes; ++i) file += char(value >> (8 * i));
+  };
+  const auto entry = [&](int tag, int type, std::uint32_t value) {
+    put(std::uint32_t(tag), 2);
+    put(std::uint32_t(type), 2);
+    put(1, 4);
+    put(value, 4);
+  };
+  constexpr int kShort = 3, kLong = 4;
+  constexpr std::uint32_t kEntries = 10, kData = 8 + 2 + 12 * kEntries + 4;
+  put(0, 1);
+  put(8, 4);
+  put(kEntries, 2);
+  entry(256, kLong, std::uint32_t(image.cols));
+  entry(257, kLong, std::uint32_t(image.rows));
+  entry(258, kShort, 8);
+  entry(259, kShort, 1);  // no compression
+  entry(262, kShort, 1);  // black is 0
+  entry(273, kLong, kData);
+  entry(274, kShort, std::uint32_t(orientation));
+  entry(277, kShort, 1);  // samples per pixel
+  entry(278, kLong, std::uint32_t(image.rows));
+  entry(279, kLong, std::uint32_t(image.total()));
+  put(0, 4);
+  return file.append(reinterpret_cast<const char*>(image.data), image.total());
+}
+
+TEST(Photographs, TiffsAreTurnedUprightOnce) {
+  for (const int orientation : {1, 3, 6, 8}) {
+    const Upright grid = {orientation, 64, 32};
+    cv::Mat1b image(32, 64, std::uint8_t(30));
+    for (int y = 0; y < 8; ++y) {
+      for (int x = 0; x < 8; ++x) image(int(grid.stored_index(x, y)) / 64, int(grid.stored_index(x, y)) % 64) = 220;
+    }
+    const test::TempDir folder;
+    write_file(folder / "in/a.tif", tiff(image, orientation));
+    write_file(folder / "in/b.tif", tiff(image, 1));
+    (void)import_all(folder / "in", folder / "out");
+    const cv::Mat upright = stored(folder / "out/images/a.png");
+    EXPECT_EQ(upright.cols, orientation < 5 ? 64 : 32) << orientation;
+    EXPECT_GT(upright.at<std::uint8_t>(3, 3), 180) << orientation;
+  }
+}
+
 TEST(Photographs, EveryOrientationIsABijection) {
   for (int orientation = 1; orientation <= 8; ++orientation) {
     const Upright grid = {orientation, 5, 3};

@@ -6,6 +6,8 @@
 #endif
 
 #include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
 #include <netdb.h>
 #include <sys/socket.h>
 #include <torch/version.h>
@@ -98,13 +100,39 @@ std::string address_towards(const std::string& host) {
   return text;
 }
 
+/// An address of this machine at one of its networks; empty where it is at none.
+std::string network_address() {
+  ifaddrs* all = nullptr;
+  if (::getifaddrs(&all) != 0) return "";
+  char text[INET_ADDRSTRLEN] = "";
+  for (const ifaddrs* one = all; one != nullptr && *text == 0; one = one->ifa_next) {
+    const bool is_of_network = (one->ifa_flags & (IFF_UP | IFF_LOOPBACK)) == IFF_UP;
+    if (!is_of_network || one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET) continue;
+    ::inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(one->ifa_addr)->sin_addr, text, sizeof text);
+  }
+  ::freeifaddrs(all);
+  return text;
+}
+
+/// What other ranks reach this one at. Debian has a machine call itself 127.0.1.1, which others cannot use.
+std::shared_ptr<::gloo::transport::Device> device_of(const Launch& launch) {
+  if (const char* const name = std::getenv("GLOO_SOCKET_IFNAME"); name != nullptr && *name != 0) {
+    return c10d::ProcessGroupGloo::createDeviceForInterface(std::string(name).substr(0, std::strcspn(name, ",")));
+  }
+  std::string address = address_towards(launch.host);
+  if (launch.local_size < launch.size && address.starts_with("127.")) {
+    if (std::string outside = network_address(); !outside.empty()) address = std::move(outside);
+  }
+  return c10d::ProcessGroupGloo::createDeviceForHostname(address);
+}
+
 class GlooGroup final : public Group {
  public:
   GlooGroup(const Launch& launch, Seconds limit) {
     // Gloo writes to peers that may have died. That has to be an error of the operation, and not the process's end.
     ::signal(SIGPIPE, SIG_IGN);
     const auto options = c10d::ProcessGroupGloo::Options::create(kLongestOperation);
-    options->devices.push_back(c10d::ProcessGroupGloo::createDeviceForHostname(address_towards(launch.host)));
+    options->devices.push_back(device_of(launch));
     options->threads = 2;
     group_ =
         c10::make_intrusive<c10d::ProcessGroupGloo>(connected(launch, false, limit), launch.rank, launch.size, options);

@@ -52,11 +52,11 @@ class WithoutStandardError {
   int kept_;
 };
 
-Ort::Session open_session(const std::string& name, const fs::path& file) {
+Ort::Session open_session(const std::string& name, const fs::path& file, int threads) {
   const WithoutStandardError quiet;
   try {
     Ort::SessionOptions options;
-    options.SetIntraOpNumThreads(thread_count());
+    options.SetIntraOpNumThreads(threads);
     options.SetGraphOptimizationLevel(GraphOptimizationLevel::ORT_ENABLE_ALL);
     return {environment(), file.c_str(), options};
   } catch (const Ort::Exception& error) {
@@ -67,9 +67,10 @@ Ort::Session open_session(const std::string& name, const fs::path& file) {
 
 /// Opened by a child first, since the library trusts the files that it reads.
 Ort::Session checked_session(const std::string& name, const fs::path& file, double seconds) {
-  read_in_child([&] { (void)open_session(name, file); }, seconds, file,
+  // Stacks of many threads would count as memory of the child's.
+  read_in_child([&] { (void)open_session(name, file, 1); }, seconds, file,
                 name + ": is damaged: " + version() + " cannot stand or end reading it");
-  return open_session(name, file);
+  return open_session(name, file, thread_count());
 }
 
 class OnnxColorizer final : public NetworkColorizer {
