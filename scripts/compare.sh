@@ -41,10 +41,20 @@ compare() {
   "${launch[@]}" "$cnerf" compare "${captures[@]}" -o "$report" "${settings[@]}" "$@"
 }
 
+# What is made is not to be made again by the next call: the first one overwrites.
+options=("$@")
+keep() {
+  local option all=("${options[@]}")
+  options=()
+  for option in "${all[@]}"; do [ "$option" = --overwrite ] || options+=("$option"); done
+}
+
 # Training times are taken while nothing else runs: two methods, one seed.
 if [ "$colorizer" = simulated ] && [ "${TIMES:-yes}" = yes ]; then
-  LAUNCH='' compare 1 --methods colornerf,positional-encoding "$@"
+  LAUNCH='' compare 1 --methods colornerf,positional-encoding "${options[@]}"
+  keep
 fi
-compare "$ranks" --methods $colors --seeds "$seeds" "$@"
+compare "$ranks" --methods $colors --seeds "$seeds" "${options[@]}"
+keep
 "$cnerf" compare "${captures[@]}" -o "$report" "${settings[@]}" --methods all --seeds "$seeds" --only-report \
-  --rating-sheet "$@"
+  --rating-sheet "${options[@]}"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # From a bare Debian 12 or 13 to a colour volume: installs what is missing, builds, makes the sample capture and runs it.
-#   bash scripts/demo.sh [FOLDER]    results go to FOLDER, else to out/demo
+#   bash scripts/demo.sh [FOLDER]    results go to FOLDER/capture and FOLDER/run, else to those of out/demo
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out="${1:-out/demo}"
@@ -11,7 +11,7 @@ cmake --build --preset release --target cnerf
 cmake --build --preset release --target cnerf_viewer_page || echo "demo: the viewer's page could not be built; the rest goes on"
 cnerf=build/release/cnerf
 
-rm -rf "$out"
+rm -rf "$out/capture" "$out/run"
 "$cnerf" sample -o "$out/capture"
 "$cnerf" run "$out/capture" -o "$out/run" --preset quick
 

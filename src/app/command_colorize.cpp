@@ -52,12 +52,6 @@ void suggest(const ColorizeArguments& arguments, const pipeline::RunContext& con
   reporter.next("cnerf colorize " + arguments.run.run + " --keyframe VIEW=PAINTED.png");
 }
 
-/// New key frames say what the colours are; the colorizer that the run was made with, perhaps as a guess, does not.
-void prefer_key_frames(const ColorizeArguments& arguments, Config& config) {
-  const ColorizerOptions named = named_on_command_line(arguments.run.config).colorizer;
-  if (!named.keyframes.empty() && named.spec.empty()) config.colorizer.spec.clear();
-}
-
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
   // A take that is gone on with has its own configuration; a new one starts from the run's.
@@ -70,7 +64,9 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
   }
   if (!arguments.replay.empty()) return replay(arguments, context, reporter);
   if (is_suggestion) return suggest(arguments, context, reporter);
-  if (base.empty()) prefer_key_frames(arguments, context.config);
+  if (base.empty()) {
+    pipeline::prefer_key_frames(named_on_command_line(arguments.run.config).colorizer, context.config.colorizer);
+  }
   refuse_colorizer_of_others(arguments.run.config, context.config);
   const Engines& engines = engines_for(context.config.device);
   pipeline::choose_colorizer(context.capture.root, context.config, reporter);

@@ -50,6 +50,9 @@ void run_comparison(CompareArguments arguments, const std::vector<std::string>& 
     return write_ratings(arguments.out, {arguments.ratings.begin(), arguments.ratings.end()}, reporter);
   }
   if (arguments.captures.empty()) throw UsageError("CAPTURE: at least one is needed");
+  if (arguments.only_report && arguments.overwrite) {
+    throw UsageError("--overwrite: there would be nothing left for --only-report");
+  }
   Config config = resolve_config(arguments.config);
   if (config.colorizer.spec.empty()) {
     config.colorizer.spec = kSimulated;
@@ -72,9 +75,11 @@ void run_comparison(CompareArguments arguments, const std::vector<std::string>& 
   const auto mode = arguments.overwrite ? FolderLock::Mode::kAlone : FolderLock::Mode::kShared;
   const FolderLock lock = pipeline::lock_folder(plan.report, mode, reporter);
   cluster::Ranks& world = cluster::world();
-  if (world.is_first()) begin_report(plan.report, {arguments.resume || arguments.only_report, arguments.overwrite});
+  Run comparison(std::move(plan), config, reporter);  // before anything is cleared: it may refuse
+  if (world.is_first()) {
+    begin_report(arguments.out, {arguments.resume || arguments.only_report, arguments.overwrite});
+  }
   world.barrier("begin of the comparison");
-  Run comparison(std::move(plan), config, reporter);
   if (world.is_first()) write_file(fs::path(arguments.out) / "config.toml", to_toml(config));
   comparison.run();
   if (!world.is_first()) return;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <map>
 #include <utility>
 
 #include "src/base/error.h"
@@ -180,6 +181,18 @@ void drop_missing_images(CaptureListing& listing) {
                           " listed images do not exist and were skipped, the first: " + first);
 }
 
+/// Names that cameras share, as those of two flights do, find one file for both.
+void refuse_one_image_of_two_views(const CaptureListing& listing) {
+  std::map<fs::path, const ListedView*> of_image;
+  for (const ListedView& view : listing.views) {
+    const auto [other, is_first] = of_image.try_emplace(view.image_file, &view);
+    if (is_first) continue;
+    throw InputError(view.poses_file, printable(view.field),
+                     fmt::format("is of the same image as {}, {}; give them different names", other->second->field,
+                                 view.image_file.string()));
+  }
+}
+
 void refuse_too_few(const CaptureListing& listing) {
   if (listing.views.size() >= 2) return;
   throw InputError(listing.source, "views",
@@ -215,6 +228,7 @@ CaptureListing first_whole(const std::vector<Source>& sources, int downscale) {
         }
       }
       drop_missing_images(listing);
+      if (source.format != Format::kTransforms) refuse_one_image_of_two_views(listing);
       refuse_too_few(listing);
       if (!aside.empty()) listing.notes.push_back("poses: " + listing.source.string() + " is taken" + aside);
       return listing;
@@ -242,9 +256,12 @@ void check_plausible(const ListedView& view, const Intrinsics& lens) {
 /// Intrinsics for the image as stored: what the file leaves out follows from the size, and the numbers are checked.
 Intrinsics complete_intrinsics(const ListedView& view, int width, int height) {
   Intrinsics out = view.intrinsics;
-  if (out.width == 0) {
-    out.width = width;
-    out.height = height;
+  if (out.width == 0) {  // its numbers are of the full size
+    std::error_code failure;
+    const bool is_copy = !view.full_file.empty() && fs::is_regular_file(view.full_file, failure);
+    const ImageHeader full = is_copy ? image_header(view.full_file) : ImageHeader{width, height};
+    out.width = full.width;
+    out.height = full.height;
   }
   if (!same_shape(width, height, out.width, out.height)) {
     throw InputError(view.image_file, "size",

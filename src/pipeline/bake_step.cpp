@@ -1,5 +1,7 @@
 #include "src/pipeline/bake_step.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "bake/job/job.h"
@@ -16,11 +18,11 @@ namespace {
 
 constexpr const char* kJournal = "unfinished.bake";
 
-/// Of which field a bake is.
-std::string field_identity(const RunDirectory& directory, const std::string& take) {
+/// Of which field a bake is, and what is made of its colours and light.
+std::string field_identity(const RunDirectory& directory, const std::string& take, const Finish& finish) {
   std::string identity = "cnerf " + version_text() + "\n" + sha256_of_file(directory.stage1_snapshot()) + "\n";
   if (!take.empty()) identity += sha256_of_file(directory.take_snapshot(take)) + "\n";
-  return identity;
+  return identity + fmt::format("finish {} {} {}\n", finish.saturation, finish.hue, finish.exposure);
 }
 
 bake::Options volume_options(const Config& config, const exporting::Formats& formats) {
@@ -81,7 +83,7 @@ void bake_step(const RunContext& context, const BakeJob& job, const Engines& eng
   bake.volumes = formats.volumes();
   if (formats.gltf) bake.mesh = config.mesh;
   bake.journal = folder / kJournal;
-  bake.identity = field_identity(context.directory, take);
+  bake.identity = field_identity(context.directory, take, config.finish);
   if (!world.is_first()) {
     NoOutput none;
     return bake::run(bake, none, observer);

@@ -23,12 +23,14 @@ std::string kind_of(const std::string& spec) {
 }
 
 /// The last by name of the takes that are finished, or of those that were begun; empty when there is none.
-std::string last_take(const RunDirectory& directory, bool is_finished) {
+/// @param kind  of the colorizer that they are named after; empty: any
+std::string last_take(const RunDirectory& directory, bool is_finished, const std::string& kind = "") {
   std::vector<std::string> names;
   std::error_code failure;
   for (const auto& entry : fs::directory_iterator(directory.root() / "takes", failure)) {
     const std::string name = entry.path().filename().string();
-    if (directory.take_record(name).has_value() == is_finished) names.push_back(name);
+    const bool is_of_kind = kind.empty() || name == kind || name.starts_with(kind + "-");
+    if (is_of_kind && directory.take_record(name).has_value() == is_finished) names.push_back(name);
   }
   std::ranges::sort(names);
   return names.empty() ? "" : names.back();
@@ -108,6 +110,21 @@ std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& obs
 std::string take_to_write(const RunContext& context, const std::string& named, const ExistingOutput& existing) {
   cluster::Ranks& world = cluster::world();
   return world.agreed(world.is_first() ? chosen_take(context, named, existing) : "");
+}
+
+std::string take_of_run(const RunContext& context, const ExistingOutput& existing) {
+  const RunDirectory& directory = context.directory;
+  const std::string kind = kind_of(context.config.colorizer.spec);
+  const auto chosen = [&] {
+    std::string take;
+    if (existing.resume) take = directory.record().current_take;
+    for (const bool is_finished : {false, true}) {
+      if (existing.resume && take.empty()) take = last_take(directory, is_finished, kind);
+    }
+    return take.empty() ? directory.free_take_name(kind) : take;
+  };
+  cluster::Ranks& world = cluster::world();
+  return world.agreed(world.is_first() ? chosen() : "");
 }
 
 std::vector<Tile> base_candidates(const RunContext& context, ViewCache* views, const Engines& engines,

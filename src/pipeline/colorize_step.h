@@ -24,6 +24,9 @@ namespace cnerf::pipeline {
 /// that was not finished. Rank 0 says which.  @throws UsageError  when the named take is finished and neither is set.
 [[nodiscard]] std::string take_to_write(const RunContext& context, const std::string& named,
                                         const ExistingOutput& existing);
+/// The take of a whole run: with `resume` the current one, else one that the run's own colorizer began. Takes that
+/// other commands began are theirs. Rank 0 says which.
+[[nodiscard]] std::string take_of_run(const RunContext& context, const ExistingOutput& existing);
 
 /// Base candidates as pictures.
 /// @param views  of the run's stage 1; null = traced anew

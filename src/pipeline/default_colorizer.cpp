@@ -27,4 +27,8 @@ void choose_colorizer(const fs::path& capture, Config& config, Observer& observe
       "photograph");
 }
 
+void prefer_key_frames(const ColorizerOptions& named, ColorizerOptions& of_run) {
+  if (!named.keyframes.empty() && named.spec.empty()) of_run.spec.clear();
+}
+
 }  // namespace cnerf::pipeline

@@ -13,4 +13,8 @@ namespace cnerf::pipeline {
 /// it chose.
 void choose_colorizer(const std::filesystem::path& capture, Config& config, Observer& observer);
 
+/// New key frames say what the colours are; the colorizer that a run was made with, perhaps as a guess, does not.
+/// @param named  what was asked for in this call
+void prefer_key_frames(const ColorizerOptions& named, ColorizerOptions& of_run);
+
 }  // namespace cnerf::pipeline

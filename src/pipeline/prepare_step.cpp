@@ -67,14 +67,18 @@ void mask_motion(const fs::path& capture, const prepare::MotionMaskOptions& opti
   if (!left_alone.empty()) observer.say("motion: fitted too badly to tell, not masked: " + left_alone);
 }
 
+std::string origin_of(const PrepareJob& job) {
+  return fs::absolute(job.source).lexically_normal().string() + "\n";
+}
+
 /// Whether a folder may take the capture; clears what is to be made again.
 /// @return  false where the capture is finished and stays
 bool begin_folder(const PrepareJob& job) {
   const auto& [source, out, options, existing] = job;
   const bool finished = fs::exists(out / "transforms.json");
   const bool ours = fs::exists(out / kMark);
-  const std::string origin = fs::absolute(source).lexically_normal().string() + "\n";
-  if (ours && existing.resume && read_text_file(out / kMark) != origin) {
+  const std::string origin = origin_of(job);
+  if (existing.resume && was_begun_for_another(job)) {
     throw UsageError(out.string() + ": was begun for another source, " + read_text_file(out / kMark) +
                      "pass --overwrite, or choose another folder");
   }
@@ -99,6 +103,11 @@ bool begin_folder(const PrepareJob& job) {
 }
 
 }  // namespace
+
+bool was_begun_for_another(const PrepareJob& job) {
+  const fs::path mark = job.out / kMark;
+  return fs::exists(mark) && read_text_file(mark) != origin_of(job);
+}
 
 void prepare_step(const PrepareJob& job, const Engines& engines, Observer& observer) {
   const PrepareStepOptions& options = job.options;

@@ -30,6 +30,9 @@ struct PrepareJob {
   ExistingOutput existing;
 };
 
+/// Whether the folder holds what was made, or begun, of another source.
+[[nodiscard]] bool was_begun_for_another(const PrepareJob& job);
+
 /// Makes a capture, unless it is there and `existing.resume` is set, and says what it wrote.
 /// @throws UsageError  when there is a capture, or anything else, and neither choice is made; when `existing.resume` is
 ///                     set and the folder was begun for another source; and as `prepare_capture`.

@@ -24,6 +24,19 @@ Picture unpacked(const cluster::Bytes& bytes) {
   return picture;
 }
 
+constexpr double kMostWaitingBytes = 1 << 30;  // of pictures that a video shows again later
+
+/// What to render: numbers of frames that are one picture. Where keeping pictures takes too much memory, each frame is
+/// rendered.
+std::vector<std::vector<std::size_t>> pictures_of(const CameraPath& path, bool is_video) {
+  double bytes = 0;
+  for (const PathCamera& camera : path.cameras) bytes += 3.0 * camera.intrinsics.width * camera.intrinsics.height;
+  if (!is_video || bytes / 2 <= kMostWaitingBytes) return frames_of_equal_cameras(path);
+  std::vector<std::vector<std::size_t>> each;
+  for (std::size_t i = 0; i < path.cameras.size(); ++i) each.push_back({i});
+  return each;
+}
+
 /// Names of frames that look the same.
 using FrameNames = std::vector<std::string>;
 
@@ -106,7 +119,7 @@ void render_step(const RunContext& context, const RenderJob& job, const Engines&
   RenderFiles files(output, job.path.name, color_origin, context.config.render.fps, observer);
   const ProgressSink progress = observer.progress_sink();
   const std::vector<PathCamera>& cameras = job.path.cameras;
-  const std::vector<std::vector<std::size_t>> frames = frames_of_equal_cameras(job.path);
+  const std::vector<std::vector<std::size_t>> frames = pictures_of(job.path, output.mp4);
   const auto make = [&](std::size_t i) {
     if (observer.is_cancelled()) throw Interrupted("rendering stopped; the video was not written");
     FrameNames names;

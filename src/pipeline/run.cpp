@@ -82,7 +82,7 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& one_ob
 
   std::string take;
   if (!job.grey) {
-    take = take_to_write(context, "", job.existing);
+    take = take_of_run(context, job.existing);
     colorize_step(context, {take, job.existing, made}, engines, observer);
   }
   const fs::path bake = directory.bakes(take), renders = directory.renders(take);

@@ -65,6 +65,13 @@ struct Settings {
     if (config.threads > 0) set_thread_count(config.threads);
   }
 
+  /// Without what they are applied to.
+  [[nodiscard]] Config alone() const {
+    Config named;
+    for (const std::string& text : texts) apply_setting(text, fields_of(named), retired_keys());
+    return named;
+  }
+
   /// The same on the command line, for records.
   [[nodiscard]] Words command_line(Words words) const {
     if (!preset.empty()) words.insert(words.end(), {"--preset", preset});
@@ -164,6 +171,7 @@ std::string colorize(const OpenRun& run, const ColorizeCall& call, Observer& obs
   const Words words = call.settings.command_line({"cnerf", "colorize", run.directory().root().string()});
   pipeline::RunContext context = run.context(base, call.settings, words, observer);
   std::string& spec = context.config.colorizer.spec;
+  if (base.empty()) pipeline::prefer_key_frames(call.settings.alone().colorizer, context.config.colorizer);
   if (!call.colorizer.empty()) spec = call.colorizer;
   refuse_code(spec, call.colorizer, call.trust);
   const Engines& engines = engines_for(context.config.device);

@@ -164,6 +164,15 @@ TEST(Metashape, CamerasWithoutPoseOrDisabledAreLeftOutAndGroupsAreOpened) {
   EXPECT_THAT(capture.notes, Contains(HasSubstr("2 of 4 cameras have no pose")));
 }
 
+TEST(Metashape, CamerasOfOneNameAreRefused) {
+  const test::TempDir folder;
+  Document document = ring_document(folder.path());
+  document.cameras += camera_xml(2, test::ring_pose(3, 4));
+  write(folder.path(), document);
+  EXPECT_THAT([&] { (void)load_capture(folder.path()); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr("camera 2"), HasSubstr("images/2.png"))));
+}
+
 TEST(Metashape, MissingImagesAreLeftOut) {
   const test::TempDir folder;
   write(folder.path(), ring_document(folder.path()));

@@ -231,6 +231,20 @@ TEST_F(Transforms, DownscaleTakesReducedCopiesWhereThereAreSome) {
   EXPECT_EQ(full.file.parent_path().filename(), "images");
 }
 
+TEST_F(Transforms, NumbersAreOfTheFullSizeWhereNoneIsStatedAndCopiesAreTaken) {
+  for (int i = 0; i < 4; ++i) {
+    test::write_grey_image(folder_ / ("images_2/" + std::to_string(i) + ".png"), test::kWidth / 2, test::kHeight / 2,
+                           50 + i);
+  }
+  top_.erase("w");
+  top_.erase("h");
+  CaptureOptions options;
+  options.downscale = 2;
+  const View view = load(options).views[1];
+  EXPECT_EQ(view.image.width, test::kWidth / 2);
+  EXPECT_EQ(view.intrinsics.fx, 10);
+}
+
 TEST_F(Transforms, SmallerImagesThanStatedScaleTheCamera) {
   top_.update({{"w", 2 * test::kWidth}, {"h", 2 * test::kHeight}, {"fl_x", 40.0}});
   EXPECT_EQ(load().views[0].intrinsics.fx, 20);

@@ -40,13 +40,14 @@ TEST(Bake, InterruptedOnesGoOnToTheSameBytes) {
 }
 
 TEST(Bake, OtherOptionsBeginAnew) {
-  const TempDir folder;
-  const ProgramResult stopped = cnerf_interrupted_at(bake_into(folder / "parts"), "\"bake\"");
-  if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
-  const ProgramResult other =
-      cnerf(concatenated(bake_into(folder / "parts"), {"--set", "bake.opacity_threshold=0.02"}));
-  ASSERT_EQ(other.exit_code, 0) << other.err;
-  EXPECT_THAT(other.out, testing::Not(HasSubstr("going on where it was stopped")));
+  for (const char* option : {"bake.opacity_threshold=0.02", "finish.exposure=1"}) {
+    const TempDir folder;
+    const ProgramResult stopped = cnerf_with_file_limit(bake_into(folder / "parts"), 40'000);
+    ASSERT_THAT(files_below(folder / "parts"), testing::ElementsAre("unfinished.bake")) << stopped.err;
+    const ProgramResult other = cnerf(concatenated(bake_into(folder / "parts"), {"--set", option}));
+    ASSERT_EQ(other.exit_code, 0) << other.err;
+    EXPECT_THAT(other.out, testing::Not(HasSubstr("going on where it was stopped"))) << option;
+  }
 }
 
 TEST(Bake, AFullDiskIsNamedAndLosesNothing) {

@@ -106,6 +106,25 @@ TEST(Resuming, KeyFramesInsteadOfTheRunsColorizerGoOnByTheSameCommand) {
   EXPECT_TRUE(fs::exists(run / "takes/reference/take.json"));
 }
 
+TEST(Resuming, ARunLeavesTakesAloneThatOtherCommandsBegan) {
+  const TempDir folder;
+  const fs::path run = folder / "run";
+  const auto arguments =
+      concatenated({"run", tiny_capture().string(), "-o", run.string(), "--colorizer", "reference:references"},
+                   concatenated(tiny_options(), {"--set", "render.frames=2"}));
+  const ProgramResult first = cnerf(arguments);
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  write_file(run / "takes/zz/config.toml", read_text_file(run / "config.toml"));
+  fs::remove(run / "takes/reference/take.json");  // as if it had been stopped
+  auto record = nlohmann::json::parse(read_text_file(run / "run.json"));
+  record["current_take"] = "";
+  write_file(run / "run.json", std::string_view(record.dump()));
+  const ProgramResult resumed = cnerf(concatenated(arguments, {"--resume"}));
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_THAT(files_below(run / "takes/zz"), testing::ElementsAre("config.toml"));
+  EXPECT_EQ(nlohmann::json::parse(read_text_file(run / "run.json"))["current_take"], "reference");
+}
+
 TEST(Resuming, ACaptureThatWasMovedIsAskedFor) {
   const TempDir folder;
   const fs::path run = copied(tiny_run(), folder / "run");
