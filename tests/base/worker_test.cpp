@@ -36,10 +36,10 @@ TEST(Worker, ErrorsArriveAndTheNextJobIsDone) {
 
 TEST(Worker, EndsOnceAllItsJobsAreDone) {
   int done = 0;
+  std::promise<void> all_came;
   std::future<void> last;
   {
     Worker worker;
-    std::promise<void> all_came;
     std::future<void> first = worker.submit([&] {
       all_came.get_future().wait();
       ++done;
