@@ -158,7 +158,8 @@ TEST_F(ReceptionTest, AStopThatComesBeforeTheWorkBeginsStopsIt) {
   }
   EXPECT_EQ(order("prepare").status, 202);
   EXPECT_EQ(order("stop").status, 202);
-  const json state = wait_until([](const json& now) { return test::is_idle(now) && now["message"] != ""; });
+  const json state =
+      wait_until([](const json& now) { return test::is_idle(now) && !now["message"].get<std::string>().empty(); });
   EXPECT_EQ(state["message"], "stopped");
 }
 

@@ -702,7 +702,8 @@ TEST_F(StudioTest, ViewsWhoseTracingWasStoppedAreTracedByTheNextOrder) {
   studio_->joined(kPainter);
   EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
   worker_ = std::thread([this] { studio_->run(); });
-  const json stopped = wait_until([](const json& state) { return state["message"] != "" && test::is_idle(state); });
+  const json stopped = wait_until(
+      [](const json& state) { return test::is_idle(state) && !state["message"].get<std::string>().empty(); });
   EXPECT_EQ(stopped["ready"], false);
   EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
   EXPECT_EQ(ordered({{"order", "colour"}})["ready"], true);
