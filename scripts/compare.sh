@@ -41,9 +41,9 @@ compare() {
   "${launch[@]}" "$cnerf" compare "${captures[@]}" -o "$report" "${settings[@]}" "$@"
 }
 
-# What is made is not to be made again by the next call: the first one overwrites.
+# The first call overwrites; the next ones leave what it made.
 options=("$@")
-keep() {
+drop_overwrite() {
   local option all=("${options[@]}")
   options=()
   for option in "${all[@]}"; do [ "$option" = --overwrite ] || options+=("$option"); done
@@ -52,9 +52,9 @@ keep() {
 # Training times are taken while nothing else runs: two methods, one seed.
 if [ "$colorizer" = simulated ] && [ "${TIMES:-yes}" = yes ]; then
   LAUNCH='' compare 1 --methods colornerf,positional-encoding "${options[@]}"
-  keep
+  drop_overwrite
 fi
 compare "$ranks" --methods $colors --seeds "$seeds" "${options[@]}"
-keep
+drop_overwrite
 "$cnerf" compare "${captures[@]}" -o "$report" "${settings[@]}" --methods all --seeds "$seeds" --only-report \
   --rating-sheet "${options[@]}"

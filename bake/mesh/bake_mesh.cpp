@@ -23,7 +23,7 @@ constexpr std::size_t kMostSeenFrom = 16;  // cameras that tell what is an insid
 /// Centres of cameras all over the capture, voxel coordinates.
 std::vector<Vec3f> centres_of(const std::vector<Camera>& cameras, const Plan& plan) {
   std::vector<Vec3f> centres;
-  const std::size_t step = std::max<std::size_t>(1, cameras.size() / kMostSeenFrom);
+  const std::size_t step = std::max<std::size_t>(1, (cameras.size() + kMostSeenFrom - 1) / kMostSeenFrom);
   for (std::size_t i = 0; i < cameras.size(); i += step) {
     centres.push_back(plan.voxel_from_world(cameras[i].world_from_camera.translation).cast<float>());
   }

@@ -11,6 +11,7 @@
 #include "src/base/usage.h"
 #include "src/capture/image_io.h"
 #include "src/capture/load_capture.h"
+#include "src/capture/picture_names.h"
 #include "src/cluster/share_out.h"
 #include "src/color/colorspace_math.h"
 #include "src/picture/colored_photograph.h"
@@ -35,16 +36,11 @@ struct Photograph {
 std::vector<std::string> names_of(const std::vector<FullSizeImage>& images) {
   std::set<std::string> stems;
   for (const FullSizeImage& image : images) stems.insert(image.file.stem().string());
+  const bool are_shared = stems.size() < images.size();
   std::vector<std::string> names;
-  std::set<std::string> taken;
+  PictureNames free_names;
   for (const FullSizeImage& image : images) {
-    std::string name = image.file.stem().string();
-    if (stems.size() < images.size()) {
-      name = fs::path(image.view).replace_extension().string();
-      std::ranges::replace(name, '/', '_');
-    }
-    while (!taken.insert(name).second) name += "_";
-    names.push_back(name);
+    names.push_back(free_names.name_for(are_shared ? image.view : image.file.filename().string()));
   }
   return names;
 }

@@ -6,12 +6,13 @@ a="cnerf-a-$$" b="cnerf-b-$$"
 ip netns add "$a" 2> "$work/ip.log" || skip "no network namespaces: $(cat "$work/ip.log")"
 trap 'ip netns del "$a"; ip netns del "$b" 2> /dev/null || true; rm -rf "/etc/netns/$a" "/etc/netns/$b"' EXIT
 ip netns add "$b"
-# As Debian has it: the first machine's name is its loopback to itself.
+# As Debian has it: the first machine's name is its loopback to itself. Gloo lets the lower address listen, so that theirs
+# have to be above 127.
 mkdir -p "/etc/netns/$a" "/etc/netns/$b"
 echo "127.0.1.1 first-machine" > "/etc/netns/$a/hosts"
-echo "10.77.0.1 first-machine" > "/etc/netns/$b/hosts"
+echo "192.168.77.1 first-machine" > "/etc/netns/$b/hosts"
 ip -n "$a" link add cable type veth peer name cable netns "$b" || skip "no virtual network devices"
-for end in "$a 10.77.0.1" "$b 10.77.0.2"; do
+for end in "$a 192.168.77.1" "$b 192.168.77.2"; do
   read -r space address <<< "$end"
   ip -n "$space" address add "$address/24" dev cable
   ip -n "$space" link set cable up

@@ -198,6 +198,15 @@ TEST_F(Compare, ACaptureMayHaveASizeOfItsOwn) {
   EXPECT_EQ(cnerf({"compare", tiny_capture().string() + "@0", "-o", (folder_ / "no").string()}).exit_code, 64);
 }
 
+TEST_F(Compare, NothingIsClearedThatIsOnlyReportedOrForACaptureThatIsNotThere) {
+  const TempDir folder;
+  const fs::path report = copied(*shared_ / "out", folder / "out");
+  const std::vector<std::string> before = files_below(report / "runs");
+  EXPECT_EQ(compare(report, "grey", {"--only-report", "--overwrite"}).exit_code, 64);
+  EXPECT_NE(cnerf({"compare", "/no/such/capture", "-o", report.string(), "--overwrite"}).exit_code, 0);
+  EXPECT_EQ(files_below(report / "runs"), before);
+}
+
 TEST_F(Compare, WhatCannotBeComparedIsRefusedBeforeTraining) {
   EXPECT_EQ(compare(folder_ / "out", "colornef").exit_code, 64);
   EXPECT_EQ(compare(folder_ / "out", "grey", {"--colorizer", "simulated:hue=3"}).exit_code, 64);

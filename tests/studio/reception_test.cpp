@@ -164,7 +164,7 @@ TEST_F(ReceptionTest, AStopThatComesBeforeTheWorkBeginsStopsIt) {
 }
 
 TEST_F(ReceptionTest, WhatWasPreparedOfOthersIsMadeAnew) {
-  write_file(folder_ / "run-capture/work/source.txt", "/of/another\n");
+  write_file(folder_ / "run-capture" / "work/source.txt", "/of/another\n");
   write_file(folder_ / "run-capture/transforms.json", "{}");
   fs::create_directories(folder_ / "photos");
   for (const char* name : {"a.jpg", "b.jpg"}) write_file(folder_ / "photos" / name, "no photograph");

@@ -40,6 +40,22 @@ std::vector<ViewCorrection> gains(const std::vector<float>& logarithms) {
   return corrections;
 }
 
+TEST(LuminanceModel, CanBeAsBrightAsPicturesAreAtOneExposureButForWhatIsMasked) {
+  const auto most_of = [](const Capture& capture) {
+    return LuminanceModel::create(capture, {}, cpu_engines()).max_luminance;
+  };
+  Capture capture = clip();
+  EXPECT_EQ(most_of(capture), 1.0f);
+  MonoImage& dark = capture.views[1].image;
+  dark.exposure = 0.25f;
+  dark.u8[7] = 255;
+  EXPECT_NEAR(most_of(capture), 4, 1e-3f);
+  dark.mask.assign(dark.pixel_count(), 255);
+  dark.mask[7] = 0;
+  EXPECT_LT(most_of(capture), 3);
+  EXPECT_GT(most_of(capture), 1);
+}
+
 TEST(LearnedViews, NeighboursTellTheExposureOfAViewThatWasHeldOut) {
   Capture capture = clip();
   const std::vector<float> before = {0, 0.1f, 0.2f, 0.4f, 0.5f, 0.6f};

@@ -38,15 +38,20 @@ class DisjointSets {
   std::vector<std::uint32_t> parent_;
 };
 
-float diagonal(const SurfaceMesh& mesh) {
+Aabbf box_of(const SurfaceMesh& mesh) {
   Aabbf box = Aabbf::empty();
   for (const Vec3f& p : mesh.positions) box.grow(p);
-  return mesh.positions.empty() ? 0.0f : length(box.size());
+  return box;
+}
+
+float diagonal(const SurfaceMesh& mesh) {
+  return mesh.positions.empty() ? 0.0f : length(box_of(mesh).size());
 }
 
 /// Whether a closed surface has the point inside, whichever way it faces: by its winding number, from the solid angles
 /// of its triangles (van Oosterom and Strackee 1983).
 bool surrounds(const SurfaceMesh& mesh, Vec3f point) {
+  if (!box_of(mesh).contains(point)) return false;
   double angle = 0;
   for (const Triangle& t : mesh.triangles) {
     const auto corner = [&](int c) { return (mesh.positions[t[c]] - point).cast<double>(); };
