@@ -75,23 +75,24 @@ if(CNERF_PYTHON)
 endif()
 
 # What the archive holds beside the program: the shared libraries it links, without the C library and a GPU's driver.
-# Programs have an RPATH rather than a RUNPATH, so that these libraries find each other too.
+# Programs, plug-ins and the Python module have an RPATH rather than a RUNPATH, so that these libraries find each other too.
 set(plugins "")
 foreach(name cnerf_images cnerf_videos cnerf_torch cnerf_compare_torch cnerf_onnxruntime cnerf_cluster_plugin)
   if(TARGET ${name})
     list(APPEND plugins ${name})
   endif()
 endforeach()
-list(TRANSFORM plugins REPLACE "(.+)" "$<TARGET_FILE:\\1>")
+list(TRANSFORM plugins REPLACE "(.+)" "\"$<TARGET_FILE:\\1>\"")
 list(JOIN plugins " " plugins)
 install(CODE "
   file(GET_RUNTIME_DEPENDENCIES RESOLVED_DEPENDENCIES_VAR found
-    EXECUTABLES $<TARGET_FILE:cnerf> $<TARGET_FILE:cnerf-vdb-reader>
+    EXECUTABLES \"$<TARGET_FILE:cnerf>\" \"$<TARGET_FILE:cnerf-vdb-reader>\"
     MODULES ${plugins}
     POST_EXCLUDE_REGEXES [[/(ld-linux-x86-64|libc|libm|libmvec|libdl|librt|libpthread|libresolv|libutil|libcuda|libnvidia-[-a-z]+)\\.so]])
   file(INSTALL \${found} DESTINATION \${CMAKE_INSTALL_PREFIX}/lib/cnerf FOLLOW_SYMLINK_CHAIN)
   # Whose they are, and under which licence.
-  execute_process(COMMAND perl ${PROJECT_SOURCE_DIR}/scripts/bill_of_materials.pl $<TARGET_FILE:cnerf> $<TARGET_FILE:cnerf-vdb-reader> ${plugins}
+  execute_process(COMMAND perl \"${PROJECT_SOURCE_DIR}/scripts/bill_of_materials.pl\"
+      \"$<TARGET_FILE:cnerf>\" \"$<TARGET_FILE:cnerf-vdb-reader>\" ${plugins}
     OUTPUT_VARIABLE bill COMMAND_ERROR_IS_FATAL ANY)
   string(JSON last LENGTH \"\${bill}\" packages)
   math(EXPR last \"\${last} - 1\")

@@ -64,6 +64,7 @@ function(cnerf_add_plugin name)
   if(NOT CNERF_FUZZ)  # clang leaves the sanitizers to the program
     target_link_options(${name} PRIVATE LINKER:-z,defs)  # what the program lacks must not be missed at run time
   endif()
+  target_link_options(${name} PRIVATE LINKER:--disable-new-dtags)  # as of programs: cmake/packages.cmake
   set_target_properties(${name} PROPERTIES
     LIBRARY_OUTPUT_DIRECTORY ${CNERF_PLUGIN_FOLDER} INSTALL_RPATH $ORIGIN INSTALL_RPATH_USE_LINK_PATH ON)
   install(TARGETS ${name} LIBRARY DESTINATION lib/cnerf)

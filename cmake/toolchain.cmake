@@ -55,6 +55,9 @@ endif()
 
 if(CNERF_CUDA)
   enable_language(CUDA)
+  if(CMAKE_CUDA_COMPILER_VERSION VERSION_LESS 12)
+    message(FATAL_ERROR "CNERF_CUDA needs nvcc 12 or later, which knows C++20: found ${CMAKE_CUDA_COMPILER_VERSION}")
+  endif()
   if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)  # CMake before 3.26 does not know nvcc's C++20
     set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION "-std=c++20")
   endif()

@@ -21,8 +21,11 @@ if [ "$colorizer" = builtin ]; then settings+=(--colorizer builtin); fi
 colors=colornerf,colornerf-paper,without-purification,without-classification,colorize-then-fuse,video-then-fuse
 colors+=,multi-scale-teacher,key-view-distilled,style-transfer,grey,oracle
 if [ -z "${CUDA_VISIBLE_DEVICES+set}" ]; then
-  gpus=$(nvidia-smi --query-gpu=index --format=csv,noheader 2> /dev/null | paste -sd, || true)
-  if [ -n "$gpus" ]; then export CUDA_VISIBLE_DEVICES=$gpus; fi
+  # Without a GPU it prints why, where its answer would stand.
+  if gpus=$(nvidia-smi --query-gpu=index --format=csv,noheader 2> /dev/null); then
+    CUDA_VISIBLE_DEVICES=$(paste -sd, <<< "$gpus")
+    export CUDA_VISIBLE_DEVICES
+  fi
 fi
 ranks=${RANKS:-1}
 if [ -n "${CUDA_VISIBLE_DEVICES:-}" ] && command -v mpirun > /dev/null; then

@@ -1,9 +1,20 @@
 #!/usr/bin/env bash
 # From a bare Debian 12 or 13 to a colour volume: installs what is missing, builds, makes the sample capture and runs it.
-#   bash scripts/demo.sh [FOLDER]    results go to FOLDER/capture and FOLDER/run, else to those of out/demo
+#   bash scripts/demo.sh [FOLDER]    results go to FOLDER/capture and FOLDER/run, else to those of out/demo; those of an
+#                                    earlier demo are replaced
 set -euo pipefail
+out=${1:+$(realpath -m -- "$1")}
 cd "$(dirname "$0")/.."
-out="${1:-out/demo}"
+mark=.cnerf-demo  # in folders whose capture and run are a demo's
+if [ -n "$out" ] && [ ! -e "$out/$mark" ]; then
+  for made in "$out/capture" "$out/run"; do
+    if [ -e "$made" ]; then
+      echo "demo: $made is there and not a demo's; name another FOLDER" >&2
+      exit 73
+    fi
+  done
+fi
+out=${out:-out/demo}
 
 bash scripts/install_dependencies.sh
 cmake --preset release -DCNERF_TESTS=OFF -DCNERF_VIEWER=ON > /dev/null
@@ -11,6 +22,8 @@ cmake --build --preset release --target cnerf
 cmake --build --preset release --target cnerf_viewer_page || echo "demo: the viewer's page could not be built; the rest goes on"
 cnerf=build/release/cnerf
 
+mkdir -p "$out"
+touch "$out/$mark"
 rm -rf "$out/capture" "$out/run"
 "$cnerf" sample -o "$out/capture"
 "$cnerf" run "$out/capture" -o "$out/run" --preset quick

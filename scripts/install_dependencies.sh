@@ -29,11 +29,11 @@ fi
 
 # Installs those of "${packages[@]}" that are missing.
 install_packages() {
-  local missing=() as_root=() package
+  local missing=() as_root=() package own
+  own=$(dpkg --print-architecture)  # a package may be there for another one, too
   for package in "${packages[@]}"; do
-    if [[ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2> /dev/null)" != installed ]]; then
+    dpkg-query -W -f='${Architecture} ${db:Status-Status}\n' "$package" 2> /dev/null | grep -xE "($own|all) installed" > /dev/null ||
       missing+=("$package")
-    fi
   done
   if [[ ${#missing[@]} -eq 0 ]]; then
     echo "dependencies: all there"

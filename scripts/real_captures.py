@@ -91,7 +91,7 @@ def source_of(options, name):
         command = ["prepare", Path(options.captures) / source.split()[1], "-o", folder]
     else:
         return Path(options.captures) / source
-    if not folder.exists():
+    if not (folder / "transforms.json").exists():  # written last
         subprocess.run([ROOT / "build/release/cnerf", *command, "--overwrite"], check=True)
     return folder
 
@@ -103,8 +103,10 @@ def pack(options):
         if target.exists():
             continue
         target.parent.mkdir(parents=True, exist_ok=True)
-        subprocess.run([ROOT / "build/release/tests/cuda/pack_capture", source_of(options, capture), target,
+        unfinished = target.with_name(name + "~")
+        subprocess.run([ROOT / "build/release/tests/cuda/pack_capture", source_of(options, capture), unfinished,
                         *more.split()], check=True)
+        unfinished.rename(target)
 
 
 def file_of(out, name):

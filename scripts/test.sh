@@ -11,9 +11,10 @@ build=build/release
 if [ "${BUILD:-yes}" = yes ]; then
   bash scripts/install_dependencies.sh --tests
   cuda=OFF
-  if command -v nvcc > /dev/null; then cuda=ON; fi  # compiled wherever it can be; running it needs a GPU
-  cmake --preset release -DCNERF_TESTS=ON -DCNERF_WARNINGS_AS_ERRORS="${WERROR:-OFF}" -DCNERF_CUDA=$cuda -DCNERF_VIEWER=ON \
-        -DCMAKE_CUDA_ARCHITECTURES="80-virtual;90"
+  # Compiled wherever it can be, by an nvcc that knows C++20; running it needs a GPU.
+  if nvcc --version 2> /dev/null | grep -E 'release (1[2-9]|[2-9][0-9])\.' > /dev/null; then cuda=ON; fi
+  cmake --preset release -DCNERF_TESTS=ON -DCNERF_WARNINGS_AS_ERRORS="${WERROR:-OFF}" -DCNERF_CUDA="${CNERF_CUDA:-$cuda}" \
+        -DCNERF_VIEWER=ON -DCMAKE_CUDA_ARCHITECTURES="80-virtual;90"
   read -ra targets <<< "${TARGETS:-all}"
   cmake --build --preset release --target "${targets[@]}"
 fi

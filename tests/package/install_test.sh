@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# install_test.sh BUILD FOLDER: installs BUILD below FOLDER, moves it, and uses it there.
+# install_test.sh BUILD FOLDER PYTHON: installs BUILD below FOLDER, moves it, and uses it there.
 set -euo pipefail
 here="$(cd "$(dirname "$0")" && pwd)"
 build=$1
 folder=$2/installed
+interpreter=$3  # that the module is built for
 fail() { echo "$1" >&2; exit 1; }
 
 rm -rf "$folder" "$folder-moved"
@@ -20,10 +21,15 @@ for file in share/man/man1/cnerf.1.gz share/man/man1/cnerf-bake.1.gz share/bash-
   share/cnerf/colorizer.weights share/doc/cnerf/copyright lib/cnerf/cnerf-vdb-reader; do
   [ -s "$folder/$file" ] || fail "$file is not installed"
 done
+# What a library with a RUNPATH loads does not look there, and the archive brings libraries that load others.
+for file in "$folder"/lib/cnerf/libcnerf_*.so "$folder"/lib/python3/dist-packages/cnerf/*.so; do
+  [ -e "$file" ] || continue
+  if readelf -d "$file" | grep -F '(RUNPATH)' > /dev/null; then fail "$file has a RUNPATH"; fi
+done
 # The module finds the installation that it is part of.
 python=$folder/lib/python3/dist-packages
 if [ -d "$python/cnerf" ]; then
-  PYTHONPATH=$python python3 - "$folder" << 'END' || fail "the Python module does not work where it is installed"
+  PYTHONPATH=$python "$interpreter" - "$folder" << 'END' || fail "the Python module does not work where it is installed"
 import pathlib, sys
 import cnerf
 assert pathlib.Path(cnerf.__file__).is_relative_to(sys.argv[1]), cnerf.__file__

@@ -1,0 +1,80 @@
+#!/usr/bin/env bash
+# scripts_test.sh: what scripts do with things as users have them, beside stand-ins for the programs they call.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/../.." && pwd)
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+fail() { echo "$1" >&2; exit 1; }
+# stand_in NAME TEXT: a program of that name, first in PATH.
+stand_in() {
+  mkdir -p "$scratch/bin"
+  printf '#!/bin/bash\n%s\n' "$2" > "$scratch/bin/$1"
+  chmod +x "$scratch/bin/$1"
+}
+# copy_of SCRIPT: a tree of its own with that script, and nothing to install.
+copy_of() {
+  mkdir -p "$scratch/tree/scripts"
+  cp "$root/scripts/$1" "$scratch/tree/scripts"
+  printf 'exit 0\n' > "$scratch/tree/scripts/install_dependencies.sh"
+}
+export PATH="$scratch/bin:$PATH"
+unset BUILD TARGETS WERROR CNERF_CUDA LAUNCH RANKS SEEDS CUDA_VISIBLE_DEVICES  # which whoever runs this may have set
+
+# demo.sh replaces what an earlier demo made, and nothing else.
+copy_of demo.sh
+stand_in cmake 'exit 0'
+mkdir -p "$scratch/tree/build/release" "$scratch/shoot/capture"
+cat > "$scratch/tree/build/release/cnerf" << 'END'
+#!/bin/bash
+while [ "$1" != -o ]; do shift; done
+mkdir -p "$2/bakes/a" "$2/renders/a"
+touch "$2/made" "$2/bakes/a/volume.vdb" "$2/renders/a/turntable.mp4"
+END
+chmod +x "$scratch/tree/build/release/cnerf"
+touch "$scratch/shoot/capture/mine"
+status=0
+bash "$scratch/tree/scripts/demo.sh" "$scratch/shoot" > /dev/null 2>&1 || status=$?
+[ "$status" -eq 73 ] && [ -e "$scratch/shoot/capture/mine" ] || fail "demo.sh does not spare a folder that holds a capture: $status"
+for _ in 1 2; do (cd "$scratch" && bash tree/scripts/demo.sh own > /dev/null); done
+[ -e "$scratch/own/run/made" ] || fail "demo.sh takes its folder from elsewhere than where it is called"
+
+# test.sh compiles for GPUs where nvcc knows C++20, unless told otherwise.
+copy_of test.sh
+stand_in cmake 'echo "$*" >> "'"$scratch"'/words"'
+stand_in ctest 'exit 0'
+for case in '11.8 OFF' '12.4 ON' '13.0 ON'; do
+  read -r version wanted <<< "$case"
+  stand_in nvcc "echo 'Cuda compilation tools, release $version, V$version.1'"
+  rm -f "$scratch/words"
+  bash "$scratch/tree/scripts/test.sh" > /dev/null
+  grep -q -- "-DCNERF_CUDA=$wanted" "$scratch/words" || fail "test.sh with nvcc $version: $(cat "$scratch/words")"
+done
+CNERF_CUDA=OFF bash "$scratch/tree/scripts/test.sh" > /dev/null
+tail -n 2 "$scratch/words" | grep -q -- '-DCNERF_CUDA=OFF' || fail "test.sh does not honour CNERF_CUDA"
+
+# captures.sbatch gives each capture a run of its own.
+status=0
+SLURM_ARRAY_TASK_ID=1 CNERF=/bin/true OUT=$scratch/runs bash "$root/scripts/captures.sbatch" day1/photos day2/photos \
+  > "$scratch/said" 2>&1 || status=$?
+[ "$status" -eq 64 ] && grep -q photos "$scratch/said" || fail "captures of one name share a run: $status"
+SLURM_ARRAY_TASK_ID=1 CNERF=/bin/true OUT=$scratch/runs bash "$root/scripts/captures.sbatch" day1 day2 > /dev/null
+
+# install_dependencies.sh takes what is there for two architectures for being there.
+stand_in dpkg 'echo amd64'
+stand_in dpkg-query 'shift; format=${1#-f=}
+for architecture in i386 amd64; do
+  line=${format/"\${Architecture}"/$architecture}
+  printf "${line/"\${db:Status-Status}"/installed}"
+done'
+stand_in apt-get 'echo "apt-get $*" >&2; exit 1'
+stand_in sudo 'exec "$@"'
+stand_in npm 'exit 0'
+bash "$root/scripts/install_dependencies.sh" > "$scratch/said" 2>&1 || fail "install_dependencies.sh: $(cat "$scratch/said")"
+grep -q 'dependencies: all there' "$scratch/said" || fail "install_dependencies.sh: $(cat "$scratch/said")"
+
+# compare.sh does not take for a GPU what nvidia-smi says where there is none.
+stand_in nvidia-smi 'echo "No devices were found"; exit 6'
+stand_in mpirun 'echo "mpirun $*" > "'"$scratch"'/launched"; exit 1'
+CNERF=/bin/true TIMES=no bash "$root/scripts/compare.sh" "$scratch/report" > /dev/null
+[ ! -e "$scratch/launched" ] || fail "compare.sh starts processes for GPUs that are not there: $(cat "$scratch/launched")"
+echo "scripts: as they should be"
