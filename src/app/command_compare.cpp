@@ -1,7 +1,9 @@
 /// cnerf compare: the paper's table, its baselines and ablations.
 
 #include <algorithm>
+#include <array>
 #include <functional>
+#include <utility>
 
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
@@ -42,6 +44,18 @@ TextGuide text_guide_of(const CompareArguments& arguments) {
   return guide;
 }
 
+/// Methods are compared by what they make of a colorizer's answers.  @throws UsageError  colours are known
+void refuse_known_colors(const ColorizerOptions& colorizer) {
+  const std::array<std::pair<const char*, const std::string*>, 5> known = {{{"keyframes", &colorizer.keyframes},
+                                                                            {"hints", &colorizer.hints},
+                                                                            {"hint_images", &colorizer.hint_images},
+                                                                            {"palette", &colorizer.palette},
+                                                                            {"strokes", &colorizer.strokes}}};
+  for (const auto& [key, value] : known) {
+    if (!value->empty()) throw UsageError(std::string("colorizer.") + key + ": no method of a comparison is shown it");
+  }
+}
+
 void run_comparison(CompareArguments arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.config);
   const fs::path first = arguments.captures.empty() ? "cnerf" : parse_compared_capture(arguments.captures.front()).path;
@@ -54,6 +68,7 @@ void run_comparison(CompareArguments arguments, const std::vector<std::string>& 
     throw UsageError("--overwrite: there would be nothing left for --only-report");
   }
   Config config = resolve_config(arguments.config);
+  refuse_known_colors(config.colorizer);
   if (config.colorizer.spec.empty()) {
     config.colorizer.spec = kSimulated;
     reporter.say("no --colorizer given: a simulated one disturbs the true colours (docs/evaluation.md)");
@@ -104,7 +119,8 @@ Work declare_compare(CLI::App& app) {
   app.add_option("--lpips-weights", arguments->lpips_weights, "LPIPS weights (X_f32.bin beside X_manifest.txt)");
   app.add_flag("--rating-sheet", arguments->rating_sheet, "Also write a page on which people judge unnamed pictures");
   app.add_option("--ratings", arguments->ratings, "Only make a table of these files of answers to the rating sheet");
-  add_colorizer_options(app, arguments->config);
+  add_short_form(app, arguments->config, "--colorizer", "colorizer.spec");
+  add_short_form(app, arguments->config, "--prompt", "colorizer.prompt");
   CLI::Option* colorizer = app.get_option("--colorizer");
   colorizer->description(colorizer->get_description() +
                          "; simulated if not given: the true colours, disturbed on purpose");

@@ -26,7 +26,8 @@ void info(const InfoArguments& arguments) {
 
 Work declare_info(CLI::App& app) {
   auto arguments = std::make_shared<InfoArguments>();
-  app.add_option("WHAT", arguments->what, "A capture, a folder of photographs, a run, a .snapshot or a .vdb")
+  app.add_option("WHAT", arguments->what,
+                 "A capture, a folder of photographs, a film clip, a run, a .snapshot or a .vdb")
       ->required();
   add_short_form(app, arguments->config, "--downscale", "capture.downscale");
   add_short_form(app, arguments->config, "--holdout", "capture.holdout");

@@ -28,7 +28,7 @@ inline constexpr std::array<ExitCodeMeaning, 15> kExitCodes = {{
     {ExitCode::kPoses, "no camera poses can be found"},
     {ExitCode::kSnapshot, "a snapshot of another version, or cut short"},
     {ExitCode::kDiverged, "training diverged; the last good snapshot is kept"},
-    {ExitCode::kInterrupted, "stopped by Ctrl-C; progress was saved"},
+    {ExitCode::kInterrupted, "stopped by Ctrl-C; what can go on goes on with --resume"},
 }};
 
 /// The footer of `cnerf --help`.

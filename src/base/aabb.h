@@ -54,6 +54,7 @@ CNERF_HD std::optional<Interval<Real>> intersect(const Aabb<Real>& box, Vec3<Rea
     const Real inverse = Real(1) / direction[axis];
     const Real a = (box.min[axis] - origin[axis]) * inverse;
     const Real b = (box.max[axis] - origin[axis]) * inverse;
+    if (!(a <= b || b <= a)) return std::nullopt;  // the ray is of no numbers
     begin = std::max(begin, std::min(a, b));
     end = std::min(end, std::max(a, b));
   }

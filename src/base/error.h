@@ -24,7 +24,7 @@ enum class ExitCode : int {
   kPoses = 77,         ///< no camera poses can be found: no overlap, no parallax, too few views placed
   kSnapshot = 78,      ///< a snapshot of another version, or cut short
   kDiverged = 79,      ///< training ran into numbers that are not finite; the last good snapshot is kept
-  kInterrupted = 130,  ///< Ctrl-C; progress was saved
+  kInterrupted = 130,  ///< Ctrl-C; what can go on was saved
 };
 
 /// Base of every error the user should read.

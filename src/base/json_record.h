@@ -6,6 +6,7 @@
 /// ignored.
 
 #include <array>
+#include <charconv>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -58,6 +59,15 @@ inline constexpr bool is_map<std::map<std::string, T>> = true;
 template <typename Mark, typename... Marks>
 inline constexpr bool has_mark = (std::is_same_v<Mark, Marks> || ...);
 
+/// The number that is written with the fewest digits and read as `value`: as a double, 0.4 would have 16.
+inline double with_fewest_digits(float value) {
+  std::array<char, 32> text;
+  const char* end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  double read = value;
+  std::from_chars(text.data(), end, read);
+  return float(read) == value ? read : double(value);
+}
+
 template <typename T>
 Json written(const T& value) {
   if constexpr (Record<const T>) {
@@ -86,6 +96,8 @@ Json written(const T& value) {
     return json;
   } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
     return value.string();
+  } else if constexpr (std::is_same_v<T, float>) {
+    return with_fewest_digits(value);
   } else {
     return value;
   }

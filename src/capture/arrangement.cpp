@@ -73,6 +73,10 @@ CameraArrangement arrangement_of(const std::vector<View>& views, const std::vect
   out.forward_facing = std::ranges::all_of(
       axes, [&](const WorldRay& axis) { return dot(axis.direction, out.forward) > std::cos(kForwardWithin); });
   out.meeting_point = nearest_point(axes, kLeastSpread).value_or(out.eye + unit_axis);
+  const auto looks_away = [&](const WorldRay& axis) {
+    return dot(out.meeting_point - axis.origin, axis.direction) <= 0;
+  };
+  out.outward_looking = !out.forward_facing && 2 * std::ranges::count_if(axes, looks_away) > std::ssize(axes);
   out.focus =
       out.forward_facing ? out.eye + out.forward * typical_depth(out, views, points, depth_range) : out.meeting_point;
   return out;

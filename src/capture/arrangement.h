@@ -18,6 +18,7 @@ struct WorldRay {
 [[nodiscard]] std::optional<Vec3d> nearest_point(const std::vector<WorldRay>& rays, double least_spread);
 
 struct CameraArrangement {
+  bool outward_looking = false;  ///< most look away from where their axes meet: from within, not at something
   bool forward_facing = false;  ///< every optical axis is within 30 degrees of their mean: before the scene, not around
   Vec3d eye;                    ///< the cameras' mean position
   Vec3d forward;                ///< the mean of the optical axes, unit length

@@ -83,13 +83,13 @@ std::vector<LearningPoint> read_curve(const fs::path& snapshot) {
 /// Trains stage 1, and leaves the curve of its PSNR beside the snapshot.
 Stage1Report train_measured(const Subject& subject, const Stage1Options& options, const fs::path& snapshot,
                             const Engines& engines, Observer& observer) {
-  const SceneFrame frame = place_scene(subject.capture, options.placement);
+  Stage1Job job{subject.capture, options, snapshot, true};
+  job.points = prepare::points_for_training(job, observer);
+  const SceneFrame frame = place_scene(subject.capture, options.placement, job.known_points());
   const HeldOutPixels pixels(subject.evaluated, frame, kMeasuredPixels);
   const MarchSettings march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
   const WatchedEngines watched(engines);
   LearningCurve curve("stage 1", observer, [&] { return pixels.psnr(watched.luminance(), march); });
-  Stage1Job job{subject.capture, options, snapshot, true};
-  job.points = prepare::points_for_training(job, observer);
   const Stage1Report report = train_stage1(job, watched, curve);
   // The engine is gone; what it came to is in the snapshot. What an earlier part of the training took comes first.
   const double before = curve.points().empty() ? report.seconds : report.seconds - curve.seconds();
@@ -122,7 +122,7 @@ SeedRun::SeedRun(const Bench& bench, const Subject& subject, int seed, fs::path 
 
 SeedRun::Field SeedRun::field_of(const Method& method) const {
   if (!method.has_own_field) return {nullptr, nullptr, &bench_.engines};
-  const SceneFrame frame = place_scene(subject_.capture, bench_.config.stage1.placement);
+  const SceneFrame frame = LuminanceModel::frame_in(stage1_);
   Field field{positional_engines(positional_rays(subject_.capture, frame), bench_.engines), nullptr, nullptr};
   field.mixed = std::make_unique<MixedEngines>(bench_.engines, *field.own);
   field.engines = field.mixed.get();

@@ -26,7 +26,7 @@ void ViewQuestions::prepare(Session& session) {
   for (const std::size_t v : along_the_path(views)) {
     for (std::size_t size = 0; size < sizes_; ++size) {
       const Stopwatch watch;
-      const int side = (kWholeViewPatches * session.options.patch_size) >> size;
+      const int side = std::min(kWholeViewPatches * session.options.patch_size, views[v].short_side()) >> size;
       const std::size_t place = v * sizes_ + size;
       const LightnessBatch question = whole_view(views[v], session.names()[v], place, side);
       const ChromaBatch answer = session.colorizer.colorize(question);

@@ -24,7 +24,7 @@ class Photometric final : public Injection {
 /// several sizes it is shown each view at each of them, and patches take these answers in turns.
 class ViewQuestions final : public Questions {
  public:
-  /// @param sizes  the view's own, half of it, a quarter of it, ...
+  /// @param sizes  the view's own, at most two sides of a patch; half of it, a quarter of it, ...
   explicit ViewQuestions(int sizes = 1) : sizes_(std::size_t(sizes)) {}
   void prepare(Session& session) override;
   void answer(const Session& session, std::span<AnsweredPatch> patches) override;

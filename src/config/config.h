@@ -44,7 +44,8 @@ struct Config {
     v("kernels", kernels, Choice{"auto", "generic", "avx2", "avx512", "avx512bf16"},
       "instructions of the processor at most; avx512bf16 rounds what nets multiply to bf16");
     v("threads", threads, Range{0, 4096}, "threads to use; 0 = all cores");
-    v("max_memory", max_memory, "memory the program may take, as 8G; needing more ends it with exit code 71");
+    v("max_memory", max_memory,
+      "memory the program may take, as 8G; needing more ends it with exit code 71, or 64 where that is known before");
     v("image_memory", image_memory,
       "memory for photographs, as 4G, and as much on a GPU; the rest lies in a file of the run's folder, which is read "
       "as "

@@ -111,6 +111,12 @@ void add_photographs(Report& report, const fs::path& folder) {
   report.line("cameras", "not known yet; `cnerf run` and `cnerf prepare` find them");
 }
 
+/// A film clip, whose frames have no poses yet.
+void add_clip(Report& report, const fs::path& file) {
+  report.line("clip", "{}", file.string());
+  report.line("cameras", "not known yet; `cnerf run` and `cnerf prepare` choose frames and find them");
+}
+
 void add_scene(Report& report, const fs::path& stage1, const fs::path& take) {
   const auto scene = Scene::load(stage1, take, cpu_engines());
   add_frame(report, scene->frame());
@@ -218,8 +224,8 @@ std::vector<Fact> facts_of(const fs::path& what, const CaptureOptions& options) 
     add_vdb(report, what);
   } else if (is_snapshot(what)) {
     add_snapshot(report, what);
-  } else if (fs::is_directory(what) && prepare::needs_preparing(what)) {
-    add_photographs(report, what);
+  } else if (prepare::needs_preparing(what)) {
+    fs::is_directory(what) ? add_photographs(report, what) : add_clip(report, what);
   } else {
     add_capture(report, survey_capture(what, options));
   }

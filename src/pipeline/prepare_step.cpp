@@ -4,6 +4,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -19,6 +20,8 @@ namespace {
 
 /// The mark of a folder that preparing began, so that nothing else is ever cleared.
 constexpr const char* kMark = "work/source.txt";
+/// What says the same once the capture is finished: work/ may be deleted then.
+constexpr const char* kRecord = "prepare.json";
 
 /// What moved in a view, together with what was masked already, at the size of the view.
 cv::Mat1b still_part(const prepare::MotionMask& mask, const MonoImage& image) {
@@ -43,7 +46,7 @@ void mask_motion(const fs::path& capture, const prepare::MotionMaskOptions& opti
   const auto masks = prepare::find_motion(load_capture(capture, reading), options, capture / "work", engines, observer);
 
   auto transforms = read_json(capture / "transforms.json");
-  auto record = read_json(capture / "prepare.json");
+  auto record = read_json(capture / kRecord);
   double share = 0;
   std::string left_alone;
   for (std::size_t v = 0; v < masks.size(); ++v) {
@@ -61,7 +64,7 @@ void mask_motion(const fs::path& capture, const prepare::MotionMaskOptions& opti
   }
   record["motion"]["difference"] = options.motion_difference;
   record["motion"]["steps"] = options.motion_steps;
-  write_file(capture / "prepare.json", record.dump(1) + "\n");
+  write_file(capture / kRecord, record.dump(1) + "\n");
   write_file(capture / "transforms.json", transforms.dump(1) + "\n");
   observer.say(fmt::format("motion: {:.1f} % of the pictures is masked (masks/still_*.png)", 100 * share));
   if (!left_alone.empty()) observer.say("motion: fitted too badly to tell, not masked: " + left_alone);
@@ -71,15 +74,25 @@ std::string origin_of(const PrepareJob& job) {
   return fs::absolute(job.source).lexically_normal().string() + "\n";
 }
 
+/// What a folder was begun of, as `origin_of` says it; nothing where preparing did not begin it.
+std::optional<std::string> origin_in(const fs::path& out) {
+  if (fs::exists(out / kMark)) return read_text_file(out / kMark);
+  if (!fs::exists(out / kRecord)) return {};
+  const auto record = read_json(out / kRecord);
+  const auto source = record.find("source");
+  if (source == record.end() || !source->is_string()) return {};
+  return source->get<std::string>() + "\n";
+}
+
 /// Whether a folder may take the capture; clears what is to be made again.
 /// @return  false where the capture is finished and stays
 bool begin_folder(const PrepareJob& job) {
   const auto& [source, out, options, existing] = job;
   const bool finished = fs::exists(out / "transforms.json");
-  const bool ours = fs::exists(out / kMark);
-  const std::string origin = origin_of(job);
+  const std::optional<std::string> begun = origin_in(out);
+  const bool ours = begun.has_value();
   if (existing.resume && was_begun_for_another(job)) {
-    throw UsageError(out.string() + ": was begun for another source, " + read_text_file(out / kMark) +
+    throw UsageError(out.string() + ": was begun for another source, " + *begun +
                      "pass --overwrite, or choose another folder");
   }
   if (finished && ours && existing.resume) return false;
@@ -93,20 +106,20 @@ bool begin_folder(const PrepareJob& job) {
     }
     if (existing.overwrite) {
       for (const char* made :
-           {"images", "masks", "work", "transforms.json", prepare::kPointsFile, "prepare.json", "contact_sheet.png"}) {
+           {"images", "masks", "work", "transforms.json", prepare::kPointsFile, kRecord, "contact_sheet.png"}) {
         fs::remove_all(out / made);
       }
     }
   }
-  write_file(out / kMark, origin);
+  write_file(out / kMark, origin_of(job));
   return true;
 }
 
 }  // namespace
 
 bool was_begun_for_another(const PrepareJob& job) {
-  const fs::path mark = job.out / kMark;
-  return fs::exists(mark) && read_text_file(mark) != origin_of(job);
+  const std::optional<std::string> begun = origin_in(job.out);
+  return begun && *begun != origin_of(job);
 }
 
 void prepare_step(const PrepareJob& job, const Engines& engines, Observer& observer) {
@@ -115,7 +128,7 @@ void prepare_step(const PrepareJob& job, const Engines& engines, Observer& obser
   const FolderLock lock = lock_folder(job.out, FolderLock::Mode::kAlone, observer);
   if (!begin_folder(job)) {
     observer.say("capture: " + job.out.string() + " was prepared before");
-    const auto record = read_json(job.out / "prepare.json");
+    const auto record = read_json(job.out / kRecord);
     if (options.motion_masks && !record.contains("motion")) mask_motion(job.out, options.motion, engines, observer);
     return;
   }

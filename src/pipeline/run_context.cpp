@@ -117,6 +117,7 @@ void begin_records(const RunContext& context, const fs::path& capture_path, cons
   if (goes_on && !directory.record().stage1.finished) {
     check_continues(directory.stage1_snapshot(), context.config.stage1);
   }
+  if (goes_on) check_views(directory.stage1_snapshot(), context.capture);
   write_file(directory.config_file(), to_toml(context.config));
   if (goes_on) return;
   RunRecord record;

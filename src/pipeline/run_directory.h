@@ -11,6 +11,7 @@
 ///   metrics.json, contact_sheet.png   of the take evaluated last
 ///   bases.png            base candidates, when only those were asked for
 ///   key_views.png, key_views.json     suggested key frames, when those were asked for
+///   strokes/             what was painted in the studio
 
 #include <filesystem>
 #include <functional>
@@ -134,7 +135,7 @@ class RunDirectory {
   [[nodiscard]] std::string choose_take(const std::string& wanted) const;
   /// `base`, or `base-2`, `base-3`, … where no take of that name exists.
   [[nodiscard]] std::string free_take_name(const std::string& base) const;
-  /// Removes everything a run writes but the cache, and nothing else.
+  /// Removes what a run writes, but for the cache and strokes, which are a person's work; and nothing else.
   void clear() const;
 
  private:

@@ -40,6 +40,12 @@ TEST(Aabb, ZeroComponentOnAPlaneIsNotNaN) {
   EXPECT_FLOAT_EQ(hit->end, 2);
 }
 
+TEST(Aabb, ARayOfNoNumbersMisses) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(intersect(kBox, Vec3d{kNone, 0, 0}, Vec3d{1, 0, 0}));
+  EXPECT_FALSE(intersect(kBox, Vec3d{0, 0, 0}, Vec3d{kNone, 1, 0}));
+}
+
 TEST(Aabb, DiagonalRayPassesACornerOrNot) {
   EXPECT_TRUE(intersect<double>(kBox, {-2, -3, 0}, {1, 1.2, 0}));
   EXPECT_FALSE(intersect<double>(kBox, {-2, -3, 0}, {1, 6, 0}));

@@ -211,6 +211,9 @@ TEST_F(Compare, WhatCannotBeComparedIsRefusedBeforeTraining) {
   EXPECT_EQ(compare(folder_ / "out", "colornef").exit_code, 64);
   EXPECT_EQ(compare(folder_ / "out", "grey", {"--colorizer", "simulated:hue=3"}).exit_code, 64);
   EXPECT_EQ(compare(folder_ / "out", "grey", {"--lpips-weights", "missing.bin"}).exit_code, 66);
+  const ProgramResult known = compare(folder_ / "out", "grey", {"--set", "colorizer.keyframes=a.png=b.png"});
+  EXPECT_EQ(known.exit_code, 64);
+  EXPECT_THAT(known.err, HasSubstr("colorizer.keyframes"));
   EXPECT_EQ(cnerf({"compare", "-o", (folder_ / "out").string()}).exit_code, 64);
   EXPECT_FALSE(fs::exists(folder_ / "out"));
 

@@ -125,6 +125,18 @@ TEST(Resuming, ARunLeavesTakesAloneThatOtherCommandsBegan) {
   EXPECT_EQ(nlohmann::json::parse(read_text_file(run / "run.json"))["current_take"], "reference");
 }
 
+TEST(Resuming, OnOtherViewsIsRefusedAndChangesNothing) {
+  const TempDir folder;
+  const fs::path run = copied(tiny_run(), folder / "run");
+  const std::string before = read_text_file(run / "config.toml");
+  const auto again = concatenated({"train", tiny_capture().string(), "-o", run.string(), "--resume"}, tiny_options());
+  EXPECT_EQ(cnerf(again).exit_code, 0);
+  const ProgramResult refused = cnerf(concatenated(again, {"--holdout", "2"}));
+  EXPECT_EQ(refused.exit_code, 78) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("capture.holdout"));
+  EXPECT_EQ(read_text_file(run / "config.toml"), before);
+}
+
 TEST(Resuming, ACaptureThatWasMovedIsAskedFor) {
   const TempDir folder;
   const fs::path run = copied(tiny_run(), folder / "run");

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -27,6 +28,18 @@ TEST(Facts, PhotographsWithoutPosesAreCountedAndMeasured) {
   const std::string text = text_of(facts_of(folder.path(), {}));
   EXPECT_THAT(text, HasSubstr("photographs: 3 in " + folder.path().string()));
   EXPECT_THAT(text, HasSubstr("images: 40x30, 16-bit"));
+  EXPECT_THAT(text, HasSubstr("cameras: not known yet"));
+}
+
+TEST(Facts, AClipIsNamedAsSuch) {
+  const test::TempDir folder;
+  const std::string clip = (folder / "clip.avi").string();
+  cv::VideoWriter writer(clip, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, {64, 48});
+  if (!writer.isOpened()) GTEST_SKIP() << "OpenCV cannot write clips here";
+  for (int i = 0; i < 5; ++i) writer.write(cv::Mat3b(48, 64, cv::Vec3b(9, 9, 9)));
+  writer.release();
+  const std::string text = text_of(facts_of(clip, {}));
+  EXPECT_THAT(text, HasSubstr("clip: " + clip));
   EXPECT_THAT(text, HasSubstr("cameras: not known yet"));
 }
 

@@ -235,6 +235,56 @@ TEST_F(StoredViews, ThatAreForgedAreRefused) {
   EXPECT_THROW((void)LuminanceModel::load(folder_ / "forged.snapshot", cpu_engines()), SnapshotError);
 }
 
+TEST_F(StoredViews, OfOtherCountersAreRefused) {
+  const Snapshot good(job_.snapshot, "stage1");
+  auto model = LuminanceModel::load(job_.snapshot, cpu_engines());
+  using Counters = std::vector<std::int64_t>;  // steps, rays of the next one
+  const std::int64_t many = std::int64_t(1) << 40;
+  for (Counters forged : {Counters{5, many}, Counters{5, 0}, Counters{-1, 64}, Counters{many, 64}, Counters{5}}) {
+    std::vector<StatePiece> state = model.engine->state();
+    for (StatePiece& piece : state) {
+      if (piece.name == "counters") piece = state_piece("counters", forged);
+    }
+    save_snapshot(folder_ / "forged.snapshot", "stage1", good.header(), state);
+    EXPECT_THROW((void)LuminanceModel::load(folder_ / "forged.snapshot", cpu_engines()), SnapshotError) << forged[0];
+  }
+}
+
+TEST_F(StoredViews, AreNotGoneOnWithByOthers) {
+  Observer observer;
+  job_.resume = true;
+  EXPECT_NO_THROW((void)train_stage1(job_, cpu_engines(), observer));
+  check_views(job_.snapshot, capture_);
+  check_views(folder_ / "nowhere.snapshot", capture_);
+  const auto is_refused = [&] {
+    EXPECT_THROW((void)train_stage1(job_, cpu_engines(), observer), SnapshotError);
+    EXPECT_THROW(check_views(job_.snapshot, capture_), SnapshotError);
+  };
+  // As many views as before, but others.
+  capture_.views[3].held_out = false;
+  capture_.views[2].held_out = true;
+  is_refused();
+  capture_ = clip();
+  capture_.views[2].image.transfer = Transfer::kLinear;
+  is_refused();
+}
+
+/// Options say nothing of it, but the engine that goes on has it.
+TEST_F(StoredViews, GoOnWithTheOccupancyTheyHave) {
+  options_.steps = 48;
+  Observer observer;
+  {
+    auto model = LuminanceModel::load(job_.snapshot, cpu_engines());
+    model.options.steps = 48;
+    model.save(job_.snapshot);
+  }
+  options_.occupancy = {};
+  job_.resume = true;
+  EXPECT_NE(options_.occupancy.resolution, 32);
+  train_stage1(job_, cpu_engines(), observer);
+  EXPECT_EQ(LuminanceModel::load(job_.snapshot, cpu_engines()).engine->step_count(), 48);
+}
+
 /// Cameras moved before the training, in world units.
 LearnedViews moves() {
   LearnedViews moved{{{}, 1, 1}, std::vector<ViewCorrection>(6), std::vector<LensCorrection>(1)};

@@ -4,6 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+#include <vector>
+
 #include "src/base/error.h"
 #include "tests/support/toy_capture.h"
 
@@ -21,6 +25,84 @@ TEST(Placement, TakesTheCentreThatIsGiven) {
   EXPECT_EQ(given.unit_per_world, chosen.unit_per_world);
   for (const char* text : {"1,2", "1,2,x", "1,2,3,4", "1 2 3"}) {
     EXPECT_THROW((void)place_scene(capture, {.cascades = 0, .centre = text}), UsageError) << text;
+  }
+}
+
+View view_at(Vec3d eye, Vec3d target) {
+  View view;
+  view.intrinsics = {LensModel::kPinhole, 24, 20, 29, 29, 12, 10, {}};
+  view.world_from_camera = test::look_at(eye, target);
+  return view;
+}
+
+/// Cameras side by side, whose axes diverge a little.
+Capture wall() {
+  Capture capture;
+  for (int i = -3; i <= 3; ++i) capture.views.push_back(view_at({0, 0.1 * i, 0}, {3, 0.12 * i, 0.01 * i}));
+  return capture;
+}
+
+/// Cameras on a circle that look outward, as from the middle of a room.
+Capture outward_ring() {
+  Capture capture;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3d outward = {std::cos(0.25 * i * std::numbers::pi), std::sin(0.25 * i * std::numbers::pi), 0};
+    capture.views.push_back(view_at(0.5 * outward, 3.0 * outward));
+  }
+  return capture;
+}
+
+double reach_of(const SceneFrame& frame, Vec3d from, Vec3d towards) {
+  return double(intersect(frame.world_box(), from, towards).value_or(Interval<double>{}).end);
+}
+
+TEST(Placement, HoldsWhatPointsShowBeforeTheCameras) {
+  Capture capture = wall();
+  for (int i = 0; i < 100; ++i) capture.points.push_back({{3 + 0.06 * i, 1 - 0.02 * i, 0.3}, 0.5, {}});
+  capture.points.push_back({{500, 0, 0}, 0.5, {}});  // an outlier
+  const SceneFrame frame = place_scene(capture, {});
+  for (int i = 0; i < 98; ++i) EXPECT_TRUE(frame.world_box().contains(capture.points[i].position)) << i;
+  EXPECT_TRUE(frame.world_box().contains({0, 0, 0})) << "and the cameras";
+  EXPECT_LT(reach_of(frame, {0, 0, 0}, {1, 0, 0}), 14);
+  capture.points.clear();
+  EXPECT_GT(reach_of(place_scene(capture, {}), {0, 0, 0}, {1, 0, 0}), 2) << "nothing tells: some times their spread";
+}
+
+TEST(Placement, OfPointsThatAreFoundLaterIsThatOfTheCaptureWithThem) {
+  Capture capture = wall();
+  std::vector<SparsePoint> points;
+  for (int i = 0; i < 100; ++i) points.push_back({{3 + 0.06 * i, 0, 0}, 0.5, {}});
+  const SceneFrame later = place_scene(capture, {}, points);
+  capture.points = points;
+  EXPECT_EQ(later, place_scene(capture, {}));
+}
+
+TEST(Placement, OfCamerasBeforeAnObjectStaysAroundItWhereNoPointTellsMore) {
+  Capture capture;
+  for (int i = -3; i <= 3; ++i) capture.views.push_back(view_at({0, 0.3 * i, 0}, {3, 0, 0}));
+  EXPECT_NEAR(length(place_scene(capture, {}).world_centre - Vec3d{3, 0, 0}), 0, 1e-6);
+}
+
+TEST(Placement, HoldsTheWallsOfARoomThatIsSeenFromWithin) {
+  Capture capture = outward_ring();
+  EXPECT_GT(reach_of(place_scene(capture, {}), {0, 0, 0}, {1, 0, 0}), 3) << "nothing tells: some times their spread";
+  for (int i = 0; i < 64; ++i) {
+    const double angle = 0.1 * i;
+    capture.points.push_back({{3 * std::cos(angle), 3 * std::sin(angle), 0.1 * (i % 5)}, 0.5, {}});
+  }
+  const SceneFrame frame = place_scene(capture, {});
+  for (const SparsePoint& point : capture.points) EXPECT_TRUE(frame.world_box().contains(point.position));
+  EXPECT_LT(reach_of(frame, {0, 0, 0}, {1, 0, 0}), 4);
+}
+
+TEST(Placement, RefusesCamerasThatStandInOnePlace) {
+  for (const Vec3d place : {Vec3d{0, 0, 0}, Vec3d{0.3, 0.7, 0.7}}) {
+    Capture capture;
+    for (int i = 0; i < 8; ++i) {
+      const Vec3d towards = {std::cos(double(i)), std::sin(double(i)), 0.2};
+      capture.views.push_back(view_at(place, place + towards));
+    }
+    EXPECT_THROW((void)place_scene(capture, {}), InputError);
   }
 }
 

@@ -158,6 +158,16 @@ TEST_F(Stage2, ViewsThatSomebodyStopsAreGoneOnWith) {
   }
 }
 
+TEST_F(Stage2, ATakeThatGoesOnWithoutQuestionsKeepsItsGalleries) {
+  Listening colorizer;
+  const Stage2Job job{capture_, stage1(), small_options(), colorizer, {}, take("a"), true};
+  (void)train_stage2(job, cpu_engines(), observer_);
+  const auto gallery = job.take.parent_path() / "accepted.png";
+  const std::string before = read_text_file(gallery);
+  (void)train_stage2(job, cpu_engines(), observer_);
+  EXPECT_EQ(read_text_file(gallery), before);
+}
+
 TEST_F(Stage2, KeptViewsChangeNothing) {
   ViewCache views;
   for (const char* name : {"alone", "first", "second"}) {

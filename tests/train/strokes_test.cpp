@@ -2,6 +2,7 @@
 
 #include "src/train/chroma/strokes.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -155,6 +156,28 @@ TEST(Strokes, ListsOfAnyContentAreRefusedOrRead) {
   EXPECT_TRUE(old.strokes.empty());
   EXPECT_TRUE(old.viewpoints.empty()) << "files of earlier versions have none";
   EXPECT_FALSE(old.everywhere);
+}
+
+TEST(Strokes, AreWrittenInNoMoreThanWhatTheyWereSentIn) {
+  std::string text = R"({"revision":0,"strokes":[{"id":"k1","view":"a.png","kind":"paint","size":0.02,"points":[)";
+  for (int i = 0; i < 1000; ++i) {
+    text += fmt::format("{}[{:.5g},{:.5g},{:.3g}]", i == 0 ? "" : ",", 0.1 + 0.00073 * i, 0.9 - 0.00031 * i, 0.001 * i);
+  }
+  text += R"(]}],"viewpoints":[]})";
+  const StrokeList list = strokes_of_json(text, "strokes.json", kViews, pictures());
+  EXPECT_LE(json_of(list).dump().size(), text.size() + 80);
+}
+
+TEST(Strokes, ThatCouldNotBeReadAgainAreNotWritten) {
+  const test::TempDir folder;
+  write_strokes(folder / "strokes.json", {3, {dot("k1", 0.5f, 0.5f)}});
+  StrokeList large{4, {}};
+  for (int i = 0; i < 50; ++i) {
+    large.strokes.push_back(dot("k" + std::to_string(i), 0.5f, 0.5f));
+    large.strokes.back().points.assign(kMostStrokePoints, {0.123456789f, 0.987654321f, 0.333333333f});
+  }
+  EXPECT_THROW(write_strokes(folder / "strokes.json", large), InputError);
+  EXPECT_EQ(read_strokes(folder / "strokes.json", kViews).revision, 3);
 }
 
 TEST(Strokes, ADotCoversADiscOfItsSizeAndPressure) {

@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -69,6 +70,14 @@ int status_of(const std::string& answer) {
 
 std::string request(const std::string& line, const std::string& more = "Host: 127.0.0.1\r\n") {
   return line + " HTTP/1.1\r\n" + more + "Connection: close\r\n\r\n";
+}
+
+/// What a browser keeps of an answer's cookie: "name=value".
+std::string cookie_in(const std::string& answer) {
+  const std::string key = "Set-Cookie: ";
+  const std::size_t begin = answer.find(key);
+  if (begin == std::string::npos) return "";
+  return answer.substr(begin + key.size(), answer.find(';', begin) - begin - key.size());
 }
 
 TEST(WebServer, ServesFilesWithTheirTypes) {
@@ -164,9 +173,30 @@ TEST(WebServer, AnotherHostNeedsATokenAndVisitorsToo) {
   const std::string welcome = raw_answer(port, request("GET /?token=" + token));
   EXPECT_EQ(status_of(welcome), 303);
   EXPECT_NE(welcome.find("HttpOnly; SameSite=Strict"), std::string::npos);
-  EXPECT_EQ(status_of(raw_answer(port, request("GET /", "Host: a\r\nCookie: x=1; cnerf_token=" + token + "\r\n"))),
+  EXPECT_EQ(status_of(raw_answer(port, request("GET /", "Host: a\r\nCookie: x=1; " + cookie_in(welcome) + "\r\n"))),
             200);
   EXPECT_NE(server.address().find("?token=" + token), std::string::npos);
+}
+
+TEST(WebServer, WhoVisitsTwoServersOfAHostStaysWelcomeAtBoth) {
+  const Site site;
+  const std::array<std::string, 2> tokens = {random_token(), random_token()};
+  WebServer one({site.root}, {"127.0.0.1", 0, tokens[0]}), other({site.root}, {"127.0.0.1", 0, tokens[1]});
+  one.start();
+  other.start();
+  std::map<std::string, std::string> jar;  // a browser's, which does not ask for the port
+  const auto visit = [&](const WebServer& server, const std::string& token) {
+    const std::string cookie = cookie_in(raw_answer(server.port(), request("GET /?token=" + token)));
+    jar[cookie.substr(0, cookie.find('='))] = cookie;
+  };
+  visit(one, tokens[0]);
+  visit(other, tokens[1]);
+  std::string cookies;
+  for (const auto& [name, cookie] : jar) cookies.append(cookies.empty() ? "" : "; ").append(cookie);
+  for (const WebServer* server : {&one, &other}) {
+    const std::string head = "Host: 127.0.0.1\r\nCookie: " + cookies + "\r\n";
+    EXPECT_EQ(status_of(raw_answer(server->port(), request("GET /", head))), 200) << cookies;
+  }
 }
 
 TEST(WebServer, NamesThatBeginLikeAnAddressAreNames) {
@@ -506,6 +536,29 @@ TEST(WebServer, ARequestHasATimeAsAWhole) {
             }),
             3);
   EXPECT_TRUE(client.is_closed());
+  server.end();
+  thread.join();
+}
+
+TEST(WebServer, ARequestThatComesSteadilyHasTheTimeItNeeds) {
+  ConnectionLimits limits;
+  limits.request = std::chrono::seconds(1);
+  limits.least_rate = 2000;
+  limits.request_bytes = 1 << 20;
+  HttpServer server(limits);
+  std::size_t got = 0;
+  server.Put("/", [&](const httplib::Request& put, httplib::Response&) { got = put.body.size(); });
+  const int port = server.bind_to_any_port("127.0.0.1");
+  std::thread thread([&] { server.listen_after_bind(); });
+  // 20 kB in two seconds and more.
+  constexpr std::size_t kPieces = 20;
+  Slow client(port, "PUT / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 20000\r\nConnection: close\r\n\r\n");
+  for (std::size_t i = 0; i < kPieces; ++i) {
+    EXPECT_TRUE(client.say(std::string(20000 / kPieces, 'x'))) << i;
+    std::this_thread::sleep_for(std::chrono::milliseconds(110));
+  }
+  for (int i = 0; i < 100 && !client.is_closed(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(got, 20000);
   server.end();
   thread.join();
 }

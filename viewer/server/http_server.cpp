@@ -158,7 +158,8 @@ class HttpServer::Connection final : public httplib::Stream {
 
   ssize_t read(char* to, std::size_t size) override {
     if (unread_.empty()) {
-      if (!wait(POLLIN, request_begin_, request_begin_ + limits_.request)) return -1;
+      const std::chrono::seconds of_bytes(request_bytes_ / limits_.least_rate);
+      if (!wait(POLLIN, request_begin_, request_begin_ + limits_.request + of_bytes)) return -1;
       const ssize_t got = ::recv(socket_, buffer_.data(), buffer_.size(), MSG_DONTWAIT);
       if (got <= 0) return got;
       unread_ = std::string_view(buffer_.data(), std::size_t(got));

@@ -19,9 +19,11 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <thread>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/base/process.h"
 #include "viewer/server/http_server.h"
 
@@ -33,7 +35,6 @@ constexpr std::size_t kLargestBody = 4096;                     ///< of the live 
 constexpr std::size_t kLargestUpload = std::size_t(64) << 20;  ///< of a page API, whatever it says
 constexpr std::size_t kLeastToken = 16;
 constexpr int kMostListeners = 8;  ///< tabs that follow a feed; each holds a thread
-constexpr const char* kCookie = "cnerf_token";
 
 /// By the address, not by how it begins: 127.example.org is a name like any other.
 bool is_loopback(const std::string& host) {
@@ -109,9 +110,14 @@ bool equal_in_constant_time(const std::string& a, const std::string& b) {
   return a.size() == b.size() && CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
 }
 
-std::string cookie_of(const httplib::Request& request) {
+/// Servers on other ports of the host get the same cookies, so that each needs a name of its own.
+std::string cookie_name(const std::string& token) {
+  return "cnerf_token_" + sha256(std::as_bytes(std::span(token))).substr(0, 8);
+}
+
+std::string cookie_of(const httplib::Request& request, const std::string& name) {
   const std::string header = request.get_header_value("Cookie");
-  const std::string key = std::string(kCookie) + "=";
+  const std::string key = name + "=";
   for (std::size_t at = 0; at < header.size();) {
     std::size_t end = header.find(';', at);
     if (end == std::string::npos) end = header.size();
@@ -261,11 +267,11 @@ struct WebServer::State {
     if (options.token.empty()) return false;
     if (equal_in_constant_time(request.get_param_value("token"), options.token)) {
       response.set_header("Set-Cookie",
-                          std::string(kCookie) + "=" + options.token + "; HttpOnly; SameSite=Strict; Path=/");
+                          cookie_name(options.token) + "=" + options.token + "; HttpOnly; SameSite=Strict; Path=/");
       response.set_redirect(own_path(request.path), 303);
       return true;
     }
-    if (equal_in_constant_time(cookie_of(request), options.token)) return false;
+    if (equal_in_constant_time(cookie_of(request, cookie_name(options.token)), options.token)) return false;
     refuse(response, 401, "open the address with its ?token=");
     return true;
   }

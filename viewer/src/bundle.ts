@@ -272,7 +272,8 @@ async function filled(stream: ReadableStream<Uint8Array>, size: number, onBytes:
 async function fetched(url: string, { name, bytes }: BundleFile, onBytes: (count: number) => void): Promise<Uint8Array<ArrayBuffer> | null> {
   let response: Response;
   try {
-    response = await fetch(url);
+    // A bundle that was written again has other content under the same names.
+    response = await fetch(url, { cache: "no-cache" });
   } catch {
     throw new BundleError(`${name}: cannot be loaded: the server does not answer`);
   }

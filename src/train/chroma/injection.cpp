@@ -34,6 +34,7 @@ void PatchTraining::run() {
   ColorModel& model = session_.model;
   if (model.sky.exists() && model.sky.is_grey()) model.sky.add(session_.views(), known_);
   ask_ahead(0);
+  const bool asks = steps() < options.patches;  // otherwise galleries show what was asked before
   while (steps() < options.patches) {
     const Stopwatch waiting;
     const Answers answers = questioner_.next();
@@ -53,7 +54,7 @@ void PatchTraining::run() {
     session_.after_step("stage 2", "loss", steps(), options.patches);
   }
   if (model.sky.exists()) model.sky.refresh();
-  if (session_.ranks().is_first()) galleries_.write(session_.folder());
+  if (asks && session_.ranks().is_first()) galleries_.write(session_.folder());
 }
 
 long PatchTraining::steps() const {

@@ -24,6 +24,12 @@ constexpr float kPaintedAlpha = 0.5f;
 constexpr std::size_t kLongestId = 32, kLongestViewpointName = 40, kLongestWord = 64;
 constexpr float kCovered = 0.5f;  // of a pixel: it is painted
 
+void check_size(std::string_view text, const fs::path& file) {
+  if (text.size() > kLargestStrokeFile) {
+    throw InputError(file, "", fmt::format("expected at most {} bytes, got {}", kLargestStrokeFile, text.size()));
+  }
+}
+
 /// Refuses a stroke of a file by the name of its field.
 class StrokeCheck {
  public:
@@ -152,9 +158,7 @@ std::shared_ptr<const PaintedPicture> PaintedPictures::find(const std::string& p
 
 StrokeList strokes_of_json(std::string_view text, const fs::path& file, const PaintableViews& views,
                            PaintedPictures& pictures) {
-  if (text.size() > kLargestStrokeFile) {
-    throw InputError(file, "", fmt::format("expected at most {} bytes, got {}", kLargestStrokeFile, text.size()));
-  }
+  check_size(text, file);
   auto list = record_of<StrokeList>(parse_json(text, file), file);
   if (list.strokes.size() > kMostStrokes) {
     throw InputError(file, "strokes", fmt::format("expected at most {}, got {}", kMostStrokes, list.strokes.size()));
@@ -182,7 +186,9 @@ StrokeList read_strokes(const fs::path& file, const PaintableViews& views) {
 }
 
 void write_strokes(const fs::path& file, const StrokeList& list) {
-  write_file(file, json_of(list).dump() + "\n");
+  const std::string text = json_of(list).dump() + "\n";
+  check_size(text, file);
+  write_file(file, text);
 }
 
 std::optional<Ab> ab_of_hex(const std::string& color) {

@@ -24,7 +24,7 @@ namespace cnerf {
 
 inline constexpr std::size_t kMostStrokes = 2000;
 inline constexpr std::size_t kMostStrokePoints = 20000;  ///< of one stroke
-inline constexpr std::size_t kLargestStrokeFile = std::size_t(4) << 20;
+inline constexpr std::size_t kLargestStrokeFile = std::size_t(16) << 20;
 inline constexpr int kLargestViewpoint = 2048;  ///< pixels a side
 
 /// A place of a stroke: x and y as shares of the picture's width and height, pressure 0..1.

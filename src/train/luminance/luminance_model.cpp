@@ -1,9 +1,16 @@
 #include "src/train/luminance/luminance_model.h"
 
-#include <algorithm>
-#include <cmath>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <span>
+
+#include "src/base/files.h"
 #include "src/base/json_record.h"
+#include "src/engine/stage1_schedule.h"
 #include "src/train/luminance/exclusion.h"
 #include "src/train/luminance/options_json.h"
 #include "src/train/luminance/placement.h"
@@ -71,6 +78,15 @@ Stage1Options stored_options(const Snapshot& snapshot) {
   return options;
 }
 
+/// @throws SnapshotError
+SceneFrame stored_frame(const Snapshot& snapshot) {
+  try {
+    return frame_from_json(snapshot.header().at("frame"));
+  } catch (const nlohmann::json::exception& problem) {
+    throw SnapshotError(snapshot.file().string() + ": header: " + problem.what());
+  }
+}
+
 /// How many views or lenses a training learned of; earlier versions learned nothing of them.
 int learned_count(const Snapshot& snapshot, const char* field) {
   return snapshot.header().contains(field) ? header_field<int>(snapshot, field) : 0;
@@ -129,6 +145,19 @@ TrainingPace stored_pace(const Snapshot& snapshot, const Stage1Options& options)
   return {options.steps, options.least_gain, std::move(state)};
 }
 
+/// Of how far a training came, where the engine counts it so.
+void check_counters(const Snapshot& snapshot, std::span<const StatePiece> pieces, const Stage1Options& options) {
+  const auto found = std::ranges::find(pieces, "counters", &StatePiece::name);
+  if (found == pieces.end()) return;
+  std::array<std::int64_t, 2> counters{};  // steps done, rays of the next one
+  if (found->bytes.size() == sizeof counters) std::memcpy(counters.data(), found->bytes.data(), sizeof counters);
+  const auto [steps, rays] = counters;
+  if (steps >= 0 && steps <= options.steps && rays >= kFewestRays && rays <= kMostRays) return;
+  throw SnapshotError(snapshot.file().string() +
+                      fmt::format(": piece 'counters': expected at most {} steps and {} to {} rays, got {} and {}",
+                                  options.steps, kFewestRays, kMostRays, steps, rays));
+}
+
 /// Of what decides how much memory an engine takes, and of what it divides by.
 void check_stored(const Snapshot& snapshot, const LuminanceModel& model) {
   constexpr int kMostCascades = 8, kBlock = 16, kMostResolution = 1 << 10, kMostSamples = 1 << 24, kMostSteps = 1 << 16;
@@ -161,6 +190,17 @@ void check_stored(const Snapshot& snapshot, const LuminanceModel& model) {
 }
 
 }  // namespace
+
+std::string digest_of_training(const Capture& capture) {
+  std::string views;
+  for (const View& view : capture.views) {
+    if (view.held_out) continue;
+    const MonoImage& image = view.image;
+    views +=
+        fmt::format("{} {} {} {} {}\n", view.name, image.width, image.height, int(image.depth), int(image.transfer));
+  }
+  return sha256(std::as_bytes(std::span(views)));
+}
 
 nlohmann::json frame_to_json(const SceneFrame& frame) {
   return {{"world_centre", {frame.world_centre.x, frame.world_centre.y, frame.world_centre.z}},
@@ -196,13 +236,15 @@ LearnedViews LearnedViews::followed_by(const LearnedViews& next) const {
 
 LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options, const Engines& engines) {
   const std::vector<SparsePoint> unknown;
-  return create(capture, options, engines, FreeSpace(capture.views, options.free_space ? capture.points : unknown));
+  const FreeSpace free_space(capture.views, options.free_space ? capture.points : unknown);
+  return create(capture, options, engines, free_space, capture.points);
 }
 
 LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Options& options, const Engines& engines,
-                                      const FreeSpace& free_space) {
+                                      const FreeSpace& free_space, const std::vector<SparsePoint>& points) {
   LuminanceModel model;
-  model.frame = place_scene(capture, options.placement);
+  model.frame = place_scene(capture, options.placement, points);
+  model.trained_on = digest_of_training(capture);
   model.options = options;
   model.max_luminance = brightest(capture);
   if (options.lenses) model.learned_lenses = int(lenses_of(capture).size());
@@ -225,14 +267,19 @@ Stage1Options LuminanceModel::options_in(const std::filesystem::path& file) {
   }
 }
 
+SceneFrame LuminanceModel::frame_in(const std::filesystem::path& file) {
+  return stored_frame(Snapshot(file, kKind));
+}
+
+std::string LuminanceModel::trained_on_in(const std::filesystem::path& file) {
+  const Snapshot snapshot(file, kKind);
+  return snapshot.header().contains("trained_on") ? header_field<std::string>(snapshot, "trained_on") : "";
+}
+
 LearnedViews LuminanceModel::learned_views_in(const std::filesystem::path& file) {
   const Snapshot snapshot(file, kKind);
   LearnedViews learned;
-  try {
-    learned.frame = frame_from_json(snapshot.header().at("frame"));
-  } catch (const nlohmann::json::exception& problem) {
-    throw SnapshotError(file.string() + ": header: " + problem.what());
-  }
+  learned.frame = stored_frame(snapshot);
   learned.corrections = stored_piece<ViewCorrection>(snapshot, "views", learned_count(snapshot, "learned_views"));
   learned.lenses = stored_piece<LensCorrection>(snapshot, "lenses", learned_count(snapshot, "learned_lenses"));
   if (!(learned.frame.unit_per_world > 0)) {
@@ -250,10 +297,11 @@ LearnedViews LuminanceModel::learned_views_in(const std::filesystem::path& file)
 LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Engines& engines) {
   const Snapshot snapshot(file, kKind);
   LuminanceModel model;
+  model.frame = stored_frame(snapshot);
   try {
-    model.frame = frame_from_json(snapshot.header().at("frame"));
     model.options = stored_options(snapshot);
     model.kernels_before = snapshot.header().value("kernels", "");
+    model.trained_on = snapshot.header().value("trained_on", "");
   } catch (const nlohmann::json::exception& problem) {
     throw SnapshotError(file.string() + ": header: " + problem.what());
   }
@@ -272,6 +320,7 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   if (model.sky.exists()) pieces.push_back(state_piece(kSky, model.sky.planes.front()));
   add_moves(model.moved, pieces);
   snapshot.restore(pieces);
+  check_counters(snapshot, pieces, model.options);
   model.engine->state_loaded();
   return model;
 }
@@ -288,6 +337,7 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
                  {"options", options_to_json(options)},
                  {"occupancy", occupancy_to_json(options.occupancy)},
                  {"kernels", kernels},
+                 {"trained_on", trained_on},
                  {"max_luminance", max_luminance},
                  {"learned_views", learned_views},
                  {"learned_lenses", learned_lenses},

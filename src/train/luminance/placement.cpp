@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <optional>
+#include <vector>
 
 #include "src/base/error.h"
 #include "src/base/parallel.h"
@@ -15,11 +17,62 @@ SceneFrame cube(Vec3d centre, double side, int cascades) {
   return {centre, 1.0 / side, cascades};
 }
 
+constexpr double kLeastSpread = 1e-6;       // of the cameras, in terms of how far from the origin they are
+constexpr std::size_t kFewestThatTell = 8;  // that say how far a scene reaches
+constexpr double kOutliers = 0.02;          // share of the points that lie behind what was taken
+constexpr double kBehindPoints = 1.1;       // surfaces go on behind the last point
+constexpr double kUnknownReach = 8;         // of a scene that no point tells of, times the cameras' spread
+
+/// Distance within which nearly all of the scene lies.
+/// @param distances  of its points
+std::optional<double> reach_of(std::vector<double> distances) {
+  if (distances.size() < kFewestThatTell) return {};
+  const auto last = distances.begin() + std::ptrdiff_t(double(distances.size() - 1) * (1 - kOutliers));
+  std::nth_element(distances.begin(), last, distances.end());
+  return kBehindPoints * *last;
+}
+
+/// The cameras' greatest distance from their middle.
+double spread_of(const Capture& capture, const CameraArrangement& cameras) {
+  double spread = 0;
+  for (const View& view : capture.views) {
+    spread = std::max(spread, length(view.world_from_camera.translation - cameras.eye));
+  }
+  return spread;
+}
+
 /// Forward-facing captures: the box reaches from the cameras to behind the far plane. 1.21 times the far distance,
 /// centred half-way, holds what a lens of 60 to 70 degrees sees there.
-SceneFrame place_forward_facing(const Capture& capture, const CameraArrangement& cameras) {
-  const double far = capture.depth_range->far;
+SceneFrame place_before(const CameraArrangement& cameras, double far) {
   return cube(cameras.eye + cameras.forward * (0.5 * far), 1.21 * far, 2);
+}
+
+/// The far plane of forward-facing captures: as their source says, else behind the points. Nothing where neither tells,
+/// and the cameras look at something before them.
+std::optional<double> far_of(const Capture& capture, const CameraArrangement& cameras,
+                             const std::vector<SparsePoint>& points) {
+  if (capture.depth_range) return capture.depth_range->far;
+  std::vector<double> depths;
+  for (const SparsePoint& point : points) {
+    const double depth = dot(point.position - cameras.eye, cameras.forward);
+    if (depth > 0) depths.push_back(depth);
+  }
+  if (const auto far = reach_of(std::move(depths))) return far;
+  if (dot(cameras.meeting_point - cameras.eye, cameras.forward) > 0) return {};
+  return kUnknownReach * spread_of(capture, cameras);
+}
+
+/// Cameras that look outward, as from the middle of a room: boxes around them that reach behind its walls.
+SceneFrame place_around_cameras(const Capture& capture, const CameraArrangement& cameras,
+                                const std::vector<SparsePoint>& points) {
+  std::vector<double> distances;
+  for (const SparsePoint& point : points) {
+    const Vec3d from_eye = point.position - cameras.eye;
+    distances.push_back(std::max({std::abs(from_eye.x), std::abs(from_eye.y), std::abs(from_eye.z)}));
+  }
+  const double spread = spread_of(capture, cameras);
+  const double reach = std::max(reach_of(std::move(distances)).value_or(kUnknownReach * spread), 1.5 * spread);
+  return cube(cameras.eye, 2 * reach, 3);
 }
 
 /// Bounds of what no view sees as fully transparent (the visual hull), on a coarse grid over `box`.
@@ -94,11 +147,17 @@ Vec3d centre_of(const std::string& text) {
 
 }  // namespace
 
-SceneFrame place_scene(const Capture& capture, const PlacementOptions& options) {
-  const CameraArrangement cameras = arrangement_of(capture);
-  const bool is_before_the_scene = cameras.forward_facing && capture.depth_range;
-  SceneFrame frame = is_before_the_scene         ? place_forward_facing(capture, cameras)
+SceneFrame place_scene(const Capture& capture, const PlacementOptions& options,
+                       const std::vector<SparsePoint>& points) {
+  const CameraArrangement cameras = arrangement_of(capture.views, positions_of(points), capture.depth_range);
+  if (!(spread_of(capture, cameras) > kLeastSpread * length(cameras.eye))) {
+    throw InputError(capture.root, "cameras", "all stand in one place, which tells no depth");
+  }
+  const bool is_before = cameras.forward_facing && (capture.depth_range || !capture.is_bounded_object);
+  const std::optional<double> far = is_before ? far_of(capture, cameras, points) : std::nullopt;
+  SceneFrame frame = far                         ? place_before(cameras, *far)
                      : capture.is_bounded_object ? place_object(capture, cameras.meeting_point)
+                     : cameras.outward_looking   ? place_around_cameras(capture, cameras, points)
                                                  : place_surroundings(capture, cameras.meeting_point);
   if (!options.centre.empty()) frame.world_centre = centre_of(options.centre);
   if (options.cascades > 0) frame.cascades = options.cascades;

@@ -8,7 +8,13 @@
 namespace cnerf {
 
 /// Chooses the field's box for a capture. Deterministic.
+/// @param points       of the scene: they tell how far it reaches where nothing else does
 /// @throws UsageError  when the options' centre is not three numbers.
-[[nodiscard]] SceneFrame place_scene(const Capture& capture, const PlacementOptions& options);
+/// @throws InputError  the cameras all stand in one place, which tells no depth
+[[nodiscard]] SceneFrame place_scene(const Capture& capture, const PlacementOptions& options,
+                                     const std::vector<SparsePoint>& points);
+[[nodiscard]] inline SceneFrame place_scene(const Capture& capture, const PlacementOptions& options) {
+  return place_scene(capture, options, capture.points);
+}
 
 }  // namespace cnerf

@@ -86,29 +86,37 @@ void refuse_others(const std::filesystem::path& snapshot, const Stage1Options& s
                       ": was trained with other stage1 options; run with the same ones, or without --resume");
 }
 
-const std::vector<SparsePoint>& points_of(const Stage1Job& job) {
-  return job.points.empty() ? job.capture.points : job.points;
+/// Earlier versions did not say.
+void refuse_other_views(const std::filesystem::path& snapshot, const std::string& stored, const Capture& capture) {
+  if (stored.empty() || stored == digest_of_training(capture)) return;
+  throw SnapshotError(snapshot.string() +
+                      ": was trained on other views; capture.holdout, capture.downscale, capture.transfer and the "
+                      "photographs have to be as they were, or start again without --resume");
 }
 
 SeenSky sky_of(const Stage1Job& job) {
   if (!job.options.sky) return {};
-  return find_sky(job.capture, training_views(job.capture, {}), points_of(job));  // directions know no frame
+  return find_sky(job.capture, training_views(job.capture, {}), job.known_points());  // directions know no frame
 }
 
 FreeSpace free_space_of(const Stage1Job& job, const SeenSky& sky) {
   if (!job.options.free_space) return FreeSpace(job.capture.views, {});
-  return FreeSpace(job.capture.views, points_of(job), sky.labels);
+  return FreeSpace(job.capture.views, job.known_points(), sky.labels);
 }
 
 LuminanceModel start_or_resume(const Stage1Job& job, const Engines& engines, const SeenSky& sky) {
   if (!job.goes_on()) {
-    LuminanceModel model = LuminanceModel::create(job.capture, job.options, engines, free_space_of(job, sky));
+    LuminanceModel model =
+        LuminanceModel::create(job.capture, job.options, engines, free_space_of(job, sky), job.known_points());
     model.moved = job.moved;
     return model;
   }
   LuminanceModel model = LuminanceModel::load(job.snapshot, engines);
   refuse_others(job.snapshot, model.options, job.options);
+  refuse_other_views(job.snapshot, model.trained_on, job.capture);
+  const OccupancyOptions occupancy = model.options.occupancy;  // of what the engine has
   model.options = job.options;
+  model.options.occupancy = occupancy;
   model.pace = TrainingPace(job.options.steps, job.options.least_gain, model.pace.state());
   return model;
 }
@@ -181,6 +189,15 @@ void pace_after_step(LuminanceModel& model, const StepReport& step, cluster::Ran
   });
 }
 
+/// Its light by the views' exposures, poses and lenses as they were learned.
+DirectionMap learned_sky(const LuminanceEngine& engine, const SeenSky& sky, std::vector<TrainingView> views) {
+  const std::vector<LensCorrection> lenses = engine.lens_corrections();
+  for (TrainingView& view : views) {
+    if (!lenses.empty()) view.camera.intrinsics = lenses[std::size_t(view.lens)].applied_to(view.camera.intrinsics);
+  }
+  return sky_light(views, sky.labels, engine.view_corrections());
+}
+
 /// Done so far, of the steps or of the time, whichever is nearer to its end.
 double fraction_done(const LuminanceModel& model, const Stage1Options& options) {
   const double of_steps = double(model.engine->step_count()) / double(model.pace.steps());
@@ -188,6 +205,10 @@ double fraction_done(const LuminanceModel& model, const Stage1Options& options) 
 }
 
 }  // namespace
+
+void check_views(const std::filesystem::path& snapshot, const Capture& capture) {
+  if (std::filesystem::exists(snapshot)) refuse_other_views(snapshot, LuminanceModel::trained_on_in(snapshot), capture);
+}
 
 void check_continues(const std::filesystem::path& snapshot, const Stage1Options& options) {
   if (std::filesystem::exists(snapshot)) refuse_others(snapshot, LuminanceModel::options_in(snapshot), options);
@@ -202,7 +223,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   if (views.empty()) throw UsageError("capture.holdout: holds out every view; none is left to train on");
   sky.show_to(views);
   model.sky = sky.light;
-  const std::vector<DepthHints> depths = depth_hints(job.capture, model.frame, points_of(job));
+  const std::vector<DepthHints> depths = depth_hints(job.capture, model.frame, job.known_points());
   show_to(views, depths);
   model.engine->limit_image_memory(job.image_memory);
   model.engine->set_views(views);
@@ -243,7 +264,7 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
       save_snapshot_of(model, job);
     }
   }
-  if (model.sky.exists()) model.sky = sky_light(views, sky.labels, model.engine->view_corrections());
+  if (model.sky.exists()) model.sky = learned_sky(*model.engine, sky, views);
   save_snapshot_of(model, job);
   observer.report_progress({"stage 1", 1.0, {{"psnr", psnr.value()}}});
   return {int(model.engine->step_count()),

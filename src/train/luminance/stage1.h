@@ -27,6 +27,9 @@ struct Stage1Report {
 /// Whether a training with these options may go on from `snapshot`, if there is one.
 /// @throws SnapshotError  it is of another version, damaged, or of a training with other options.
 void check_continues(const std::filesystem::path& snapshot, const Stage1Options& options);
+/// Whether `snapshot`, if there is one, was trained on these views: what is held out says nothing otherwise.
+/// @throws SnapshotError  it is of another version, damaged, or of a training on other views.
+void check_views(const std::filesystem::path& snapshot, const Capture& capture);
 
 /// What stage 1 works on.
 struct Stage1Job {
@@ -42,6 +45,9 @@ struct Stage1Job {
   std::size_t image_memory = std::numeric_limits<std::size_t>::max();
 
   [[nodiscard]] bool goes_on() const { return resume && std::filesystem::exists(snapshot); }
+  [[nodiscard]] const std::vector<SparsePoint>& known_points() const {
+    return points.empty() ? capture.points : points;
+  }
 };
 
 /// Trains and leaves the result in the job's snapshot. What the observer takes is no training time; previews show

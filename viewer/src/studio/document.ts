@@ -43,6 +43,9 @@ interface Kept {
   viewpoints?: Viewpoint[];
 }
 
+/** Answers that say what is wrong with the strokes, or who paints. Others say that this is not the server that was there. */
+const refusesStrokes = new Set([400, 413, 423]);
+
 const numberOf = (viewpoint: Viewpoint) => Number(/\d+$/.exec(viewpoint.name)?.[0] ?? 0);
 
 export class StrokeDocument {
@@ -92,6 +95,10 @@ export class StrokeDocument {
   get unsaved(): Stroke[] {
     const there = new Set(this.saved);
     return this.list === this.saved ? [] : this.list.filter((s) => !there.has(s));
+  }
+  /** About how long the list is as it is sent. */
+  get bytes(): number {
+    return this.list.reduce((sum, s) => sum + 200 + 26 * s.points.length, 0);
   }
   of(view: string): Stroke[] {
     return this.list.filter((s) => s.view === view);
@@ -150,15 +157,18 @@ export class StrokeDocument {
   add(stroke: Stroke): void {
     this.change([...this.list, stroke]);
   }
+  private has(id: string): boolean {
+    return this.list.some((s) => s.id === id);
+  }
   edit(id: string, changes: Partial<Stroke>): void {
-    this.change(this.list.map((s) => (s.id === id ? { ...s, ...changes } : s)));
+    if (this.has(id)) this.change(this.list.map((s) => (s.id === id ? { ...s, ...changes } : s)));
   }
   /** Strokes of one word have one colour, as a palette gives it. */
   recolour({ id, word }: Stroke, color: string): void {
     this.change(this.list.map((s) => (s.id === id || (word && s.word === word) ? { ...s, color } : s)));
   }
   remove(id: string): void {
-    this.change(this.list.filter((s) => s.id !== id));
+    if (this.has(id)) this.change(this.list.filter((s) => s.id !== id));
   }
   undo(): void {
     const step = this.done.pop();
@@ -227,7 +237,7 @@ export class StrokeDocument {
     try {
       while (!this.isSaved) await this.saveOnce(this.list);
     } catch (problem) {
-      if (problem instanceof Refusal && problem.status < 500) await this.refused(problem);
+      if (problem instanceof Refusal && refusesStrokes.has(problem.status)) await this.refused(problem);
       else if (problem instanceof Lost || problem instanceof Refusal) this.told("lost");
       else throw problem;
     }
@@ -252,11 +262,17 @@ export class StrokeDocument {
     this.told(problem);
     if (this.isWaiting && problem.status === 423) return;
     this.isWaiting = false;
-    this.done = [];
-    this.undone = [];
+    const { saved, savedWish } = this;
     this.saved = this.list;
     this.savedWish = this.wish;
-    await this.fetched().catch(() => this.told("lost"));
+    try {
+      await this.fetched();
+      this.done = [];
+      this.undone = [];
+    } catch {
+      Object.assign(this, { saved, savedWish });
+      this.told("lost");
+    }
   }
 
   private keep(): void {

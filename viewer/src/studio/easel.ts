@@ -52,6 +52,7 @@ export class Easel {
       [colors, ready] = [state.colors, state.ready];
     });
     new ResizeObserver(() => this.layout()).observe(this.node);
+    this.followPixels();
     const { canvas } = this;
     canvas.addEventListener("pointerdown", (e) => this.down(e));
     canvas.addEventListener("pointermove", (e) => this.move(e));
@@ -185,13 +186,19 @@ export class Easel {
   // What is seen.
 
   layout(): void {
-    const ratio = devicePixelRatio || 1;
-    const { clientWidth, clientHeight } = this.node;
-    if (clientWidth === 0) return;
-    this.canvas.width = Math.round(clientWidth * ratio);
-    this.canvas.height = Math.round(clientHeight * ratio);
+    if (this.node.clientWidth === 0) return;
     if (this.fits) this.fit();
     this.redraw();
+  }
+  /** A window that moves to another screen keeps its size and gets other pixels. */
+  private followPixels(): void {
+    matchMedia(`(resolution: ${devicePixelRatio || 1}dppx)`).addEventListener("change", () => (this.redraw(), this.followPixels()), { once: true });
+  }
+  private sizeCanvas(ratio: number): void {
+    const width = Math.round(this.node.clientWidth * ratio);
+    const height = Math.round(this.node.clientHeight * ratio);
+    if (this.canvas.width !== width) this.canvas.width = width;
+    if (this.canvas.height !== height) this.canvas.height = height;
   }
   /** What covers the stage around the photograph, CSS pixels. */
   private get margin() {
@@ -238,6 +245,7 @@ export class Easel {
   private draw(): void {
     const ratio = devicePixelRatio || 1;
     const context = this.canvas.getContext("2d")!;
+    this.sizeCanvas(ratio);
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, this.canvas.width, this.canvas.height);
     if (!this.photo) return;
@@ -380,6 +388,7 @@ export class Easel {
     if (!this.layer || !session.view) return;
     if (session.isReadOnly) return toast(words.readOnly);
     if (session.strokes.list.length >= limits.strokes) return toast(words.tooMany(limits.strokes));
+    if (session.strokes.bytes > limits.bytes) return toast(words.tooMuch);
     const point = this.pointOf(place, pressure);
     const points = joins && this.lastEnd ? [this.lastEnd, point] : [point];
     this.growing = session.brush.stroke(session.view.name, points);

@@ -30,12 +30,16 @@ function small(name: string, title: string, onclick: () => void): HTMLButtonElem
 /** A list whose rows are made anew only where their text changed, so that the keyboard's focus stays. */
 export function keyed<T>(list: HTMLElement, items: readonly T[], keyOf: (item: T) => string, make: (item: T) => HTMLElement): void {
   const there = new Map([...list.children].map((node) => [(node as HTMLElement).dataset.key!, node]));
-  list.replaceChildren(...items.map((item) => {
+  const nodes = items.map((item) => {
     const key = keyOf(item);
     const node = there.get(key) ?? make(item);
     (node as HTMLElement).dataset.key = key;
     return node;
-  }));
+  });
+  // A row that leaves the page and returns loses the focus, and the click that was begun on it.
+  const kept = new Set<Element>(nodes);
+  for (const node of [...list.children]) if (!kept.has(node)) node.remove();
+  nodes.forEach((node, i) => list.children[i] !== node && list.insertBefore(node, list.children[i] ?? null));
 }
 
 /** What everybody must know: the server is away, or another tab paints. */

@@ -101,7 +101,7 @@ export interface Stroke {
   readonly word?: string;
 }
 
-export const limits = { strokes: 2000, viewpoints: 50, points: 20000, bytes: 4e6, size: [0.0005, 0.5], reach: [0.1, 4] } as const;
+export const limits = { strokes: 2000, viewpoints: 50, points: 20000, bytes: 15e6, size: [0.0005, 0.5], reach: [0.1, 4] } as const;
 
 export interface FrameRequest extends View {
   /** "grey", "now" or the name of a take; a picture each, one behind the other. */

@@ -61,6 +61,10 @@ export class Session {
     const { name, position, rotation } = this.views[index];
     return this.isViewpoint(index) ? `&at=${name}.${[...position, ...rotation[2]].map((v) => v.toFixed(3)).join(".")}` : "";
   }
+  /** Removes the selected stroke, if it is seen. */
+  removeSelected(): void {
+    if (this.strokes.of(this.open).some((s) => s.id === this.selected)) this.strokes.remove(this.selected);
+  }
   get isTraining(): boolean {
     return this.state.stage === "training";
   }
@@ -110,7 +114,7 @@ export class Session {
       if (wasLost) toast(words.back);
     } else if (wasLost) {
       toast(words.back);
-      void this.strokes.load().catch((problem) => this.explain(problem));
+      void this.returned().catch((problem) => this.explain(problem));
     } else if (state.strokes > this.strokes.revision) {
       void this.strokes.follow(state.strokes).then(() => this.sendWaiting()).catch((problem) => this.explain(problem));
     } else {
@@ -118,6 +122,16 @@ export class Session {
     }
     if (state.scene !== this.sceneSeen && this.scene.views.length > 0) void this.refining.run(() => this.refine());
     this.tell();
+  }
+  /** A server answers again: this run's, or that of another one on the same port. */
+  private async returned(): Promise<void> {
+    if ((await this.api.scene()).run !== this.scene.run) return this.reload();
+    await this.strokes.load();
+  }
+  /** Nothing of this page fits the server any more. Unsent strokes stay on the shelf of their run. */
+  private reload(): void {
+    this.isLost = true;
+    location.reload();
   }
   /** What was painted while the server was away, and another tab painted. */
   private async sendWaiting(): Promise<void> {
@@ -131,9 +145,7 @@ export class Session {
       const next = await this.api.scene();
       const { views } = this.scene;
       if (next.views.length !== views.length || next.views.some((v, i) => v.name !== views[i].name)) {
-        // Another capture: nothing of this page fits it.
-        await this.strokes.save();
-        return location.reload();
+        return this.reload();
       }
       next.views.forEach((view, i) => Object.assign(views[i], view));
       Object.assign(this.scene, next, { views });

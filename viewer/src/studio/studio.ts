@@ -262,7 +262,7 @@ class Studio {
       ",": () => this.step(-1), ".": () => this.step(1),
       " ": () => easel.hold("hand"),
       Escape: () => (easel.isDrawing ? easel.cancel() : this.leave()),
-      Delete: () => this.session.strokes.remove(this.session.selected),
+      Delete: () => this.session.removeSelected(),
     };
   }
   private listen(): void {

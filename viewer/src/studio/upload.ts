@@ -9,7 +9,7 @@ export interface Incoming {
 }
 
 const kinds = new Set("jpg jpeg png tif tiff webp mp4 mov mkv avi webm m4v json bin txt npy npz xml csv xmp exr ply".split(" "));
-export const pieceBytes = 8 * 2 ** 20;
+export const pieceBytes = 2 * 2 ** 20;
 const atOnce = 3;
 /** Silences that are waited for before a server counts as gone, milliseconds. */
 const waits = [500, 1000, 2000, 4000, 8000];

@@ -196,6 +196,17 @@ describe("painting", () => {
     await saved(page);
     assert.deepEqual((await strokesOf(page)).map((s) => [s.color, s.hidden]), [["#204080", true], ["#c03020", false]]);
   });
+  it("loses no stroke of another photograph to the Delete key", async () => {
+    const selected = await page.evaluate(() => window.cnerf.session.selected = window.cnerf.session.strokes.list[0].id);
+    const before = (await shownStrokes(page)).length;
+    await paintOn(page, 3);
+    await page.keyboard.press("Delete");
+    assert.equal((await shownStrokes(page)).length, before);
+    await paintOn(page, 1);
+    await page.keyboard.press("Delete");
+    assert.ok((await shownStrokes(page)).every((stroke) => stroke.id !== selected));
+    assert.equal((await shownStrokes(page)).length, before - 1);
+  });
   it("works by keyboard alone", async () => {
     await clear(page);
     await page.keyboard.press("Escape");
@@ -513,7 +524,7 @@ describe("a studio without photographs", { skip: standIn }, () => {
     assert.match(await text(shown, "#arrived"), /3 files are here/);
   });
   it("sends a clip in pieces, anew where the server lost it", async () => {
-    const clip = jpeg(20 * 2 ** 20);
+    const clip = jpeg(5 * 2 ** 20);
     const offsets = [];
     const listen = (request) => /arrivals\?name=clip.mp4/.test(request.url()) && offsets.push(Number(new URL(request.url()).searchParams.get("offset")) / 2 ** 20);
     shown.on("request", listen);
@@ -528,7 +539,7 @@ describe("a studio without photographs", { skip: standIn }, () => {
     await sending;
     await until(shown, () => !window.cnerf.reception.isSending);
     shown.off("request", listen);
-    assert.deepEqual(offsets, [0, 8, 0, 8, 16]);
+    assert.deepEqual(offsets, [0, 2, 0, 2, 4]);
     assert.ok(server.arrived.get("clip.mp4").equals(clip));
   });
   it("takes what is dropped anywhere on the page", async () => {
@@ -637,6 +648,25 @@ describe("training", { skip: standIn }, () => {
     server.advance(3);
     await until(shown, (position) => window.cnerf.studio.field.view.position[2] === position[2], server.scene.views[2].position);
   });
+  it("leaves lists alone while it tells how far it is: a button that is pressed meanwhile does its work", async () => {
+    await paintOn(shown, 2);
+    const hide = shown.locator("#strokes li").getByRole("button", { name: "Hide" });
+    await hide.hover();
+    await shown.mouse.down();
+    const { version } = server.state;
+    server.advance();
+    await until(shown, (before) => window.cnerf.session.state.version > before, version);
+    await shown.mouse.up();
+    await until(shown, () => window.cnerf.session.strokes.list[0].hidden);
+    const show = shown.locator("#strokes li").getByRole("button", { name: "Show" });
+    await show.focus();
+    server.advance();
+    await until(shown, (before) => window.cnerf.session.state.version > before, version + 1);
+    assert.equal(await shown.evaluate(() => document.activeElement.getAttribute("aria-label")), "Show");
+    await show.click();
+    await saved(shown);
+    await shown.click("#leave");
+  });
   it("stops, goes on, and ends with a field that can be coloured", async () => {
     await shown.click("#colour");
     await until(shown, () => document.getElementById("colour").textContent === "Train");
@@ -655,6 +685,41 @@ describe("training", { skip: standIn }, () => {
     await full;
     assert.equal((await shownStrokes(shown)).length, 1);
     assert.deepEqual(shown.problems, []);
+  });
+});
+
+describe("a window that moves to a screen of finer pixels", { skip: standIn }, () => {
+  it("has its photograph drawn in those", async () => {
+    const { own, shown, close } = await opened({});
+    await paintOn(shown, 1);
+    const cdp = await own.newCDPSession(shown);
+    await cdp.send("Emulation.setDeviceMetricsOverride", { width: 1280, height: 720, deviceScaleFactor: 2, mobile: false });
+    await until(shown, () => {
+      const { canvas, node } = window.cnerf.studio.easel;
+      return devicePixelRatio === 2 && canvas.width === 2 * node.clientWidth && canvas.height === 2 * node.clientHeight;
+    });
+    await close();
+  });
+});
+
+describe("a port that another run's server takes over", { skip: standIn }, () => {
+  it("gets none of the strokes that were painted before", async () => {
+    const { server, own, shown, close } = await opened({});
+    const { port } = server;
+    await paintOn(shown, 1);
+    await server.close();
+    await shown.waitForSelector("#notice:not([hidden])", { timeout: patience });
+    await draw(shown, [[0.4, 0.5], [0.6, 0.5]]);
+    const other = new StudioMock(builtPage, {});
+    other.scene.run = "/runs/other";
+    await other.start(port);
+    await until(shown, () => window.cnerf?.session.scene.run === "/runs/other" && window.cnerf.session.state.ready);
+    assert.deepEqual([await shownStrokes(shown), other.strokes], [[], []]);
+    assert.ok(!other.requests.includes("PUT strokes"));
+    const kept = await shown.evaluate(() => Object.keys(localStorage).filter((key) => key.startsWith("cnerf-studio-strokes")));
+    assert.deepEqual(kept, ["cnerf-studio-strokes /runs/ball"]);
+    await close();
+    await other.close();
   });
 });
 

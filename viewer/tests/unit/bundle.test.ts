@@ -37,8 +37,10 @@ const parsed = (change: (json: any) => void) => {
   return () => parseBundle(JSON.stringify(json));
 };
 const serve = (files: Record<string, Uint8Array>) =>
-  vi.stubGlobal("fetch", async (url: string) => {
+  vi.stubGlobal("fetch", async (url: string, init?: RequestInit) => {
     const name = url.split("/").pop()!;
+    // A browser answers from what it kept of an earlier bundle, unless it is to ask.
+    if (init?.cache !== "no-cache") return new Response("of an earlier bundle");
     return files[name] ? new Response(files[name] as BodyInit) : new Response("", { status: 404, statusText: "Not Found" });
   });
 afterEach(() => vi.unstubAllGlobals());

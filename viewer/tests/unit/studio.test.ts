@@ -174,6 +174,40 @@ describe("strokes", () => {
     expect((told[0] as Refusal).message).toBe("Another tab paints here.");
     expect(document.isSaved).toBe(true);
   });
+  it("stay unsaved where another server answers in place of theirs", async () => {
+    const { document, store, told, kept } = await opened();
+    document.add(stroke("a"));
+    await document.save();
+    for (const status of [401, 404, 405]) {
+      store.fail = new Refusal(status, "open the address with its ?token=");
+      document.add(stroke(`b${status}`));
+      await document.save();
+      expect([document.isSaved, document.canUndo, kept.kept.size]).toEqual([false, true, 1]);
+    }
+    expect(told).toEqual(["lost", "lost", "lost"]);
+    store.fail = null;
+    await document.load();
+    expect(ids(store.list)).toBe("ab401b404b405");
+  });
+  it("that are refused stay where the server's own list cannot be had", async () => {
+    const { document, store, told } = await opened();
+    store.fail = new Refusal(413, "too large");
+    store.strokes = () => Promise.reject(new Lost("away"));
+    document.add(stroke("a"));
+    await document.save();
+    expect([ids(document.list), document.isSaved, document.canUndo]).toEqual(["a", false, true]);
+    expect(told).toContain("lost");
+  });
+  it("that are not there are neither changed nor removed, and no step is added", async () => {
+    const { document, store } = await opened();
+    document.add(stroke("a"));
+    document.undo();
+    await document.save();
+    const { puts } = store;
+    document.remove("a");
+    document.edit("a", { hidden: true });
+    expect([document.canUndo, document.canRedo, store.puts]).toEqual([false, true, puts]);
+  });
   it("that were promised to be sent wait while another tab paints", async () => {
     const { document, store, told, kept } = await opened();
     store.fail = new Lost("away");
