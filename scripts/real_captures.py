@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""What training makes of captures as they are: luminance of held-out views, five seeds a row, on a GPU.
+"""What training makes of captures as they are: luminance of held-out views, some seeds a row, on a GPU.
 
     scripts/real_captures.py pack OUT [--captures FOLDER]      packs the captures; wants no GPU
-    scripts/real_captures.py train OUT [--part I/N] [--check CNERF-CUDA-CHECK] [--only ROW...]
+    scripts/real_captures.py train OUT [--part I/N] [--check CNERF-CUDA-CHECK] [--seeds N] [--only ROW...]
     scripts/real_captures.py table OUT
 
 FOLDER has flower, fox, fruit, lego and robovision. If not given, it is scenes in $CNERF_DATA, else in ../shared/data.
@@ -19,7 +19,6 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-SEEDS = 5
 BASE = "log2_rows=17 cone=128 distortion=1e-4 table_decay=0.1 marks=0 views=1 aligned=1"  # as configs/gpu.toml
 LEARN = {"nothing": "", "default": "depth=0.01 exposures=1", "poses": "depth=0.01 exposures=1 poses=1",
          "all": "depth=0.01 exposures=1 poses=1 lenses=1"}
@@ -127,7 +126,7 @@ def train(options):
         if file.exists():
             continue
         packed = options.out / "packed" / packed_as(capture, worse, learn)[0]
-        command = [options.check, "train", f"capture={packed}", f"seconds={seconds}", f"seeds={SEEDS}", *BASE.split(),
+        command = [options.check, "train", f"capture={packed}", f"seconds={seconds}", f"seeds={options.seeds}", *BASE.split(),
                    *LEARN[learn].split(), *more.split()]
         done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
         if done.returncode != 0:
@@ -170,6 +169,7 @@ def main():
     parser.add_argument("--captures", default=os.path.join(data, "scenes"))
     parser.add_argument("--check", default=str(ROOT / "build/release/tests/cuda/cnerf-cuda-check"))
     parser.add_argument("--part", default="1/1")
+    parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--only", nargs="*")
     options = parser.parse_args()
     {"pack": pack, "train": train, "table": table}[options.what](options)
