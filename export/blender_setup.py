@@ -320,7 +320,7 @@ def add_camera(scene, root, camera, volume):
     distance = (world_from_camera.to_translation() - centre).length
     scale = root.matrix_basis.median_scale  # of the Empty; clipping is in metres
     data.clip_start = scale * 1e-4 * radius
-    data.clip_end = scale * 2.0 * (distance + radius)
+    data.clip_end = scale * 1e3 * (distance + radius)  # the Empty may be scaled, and paths lead away
     data.display_size = 0.05 * radius
 
     placed = bpy.data.objects.new(camera["name"], data)
@@ -370,9 +370,12 @@ def lay_over_plate(scene, data, opacity):
 
 def frame_number(name):
     """The number that a picture's name ends with, as frames of a film do; None without one."""
-    found = re.search(r"(\d+)$", re.sub(r"\.(png|jpe?g|exr|tiff?|webp)$", "", name, flags=re.IGNORECASE))
-    # Longer numbers are dates and times, and beyond Blender's last frame.
-    return int(found.group(1)) if found and len(found.group(1)) <= 6 else None
+    stem = re.sub(r"\.(png|jpe?g|exr|tiff?|webp)$", "", name, flags=re.IGNORECASE)
+    found = re.search(r"(\d+)$", stem)
+    # Longer numbers are dates and times, and beyond Blender's last frame. Telephones put the time behind the date.
+    if not found or len(found.group(1)) > 6 or re.search(r"(^|\D)(19|20)\d{6}[_-]\d{6}$", stem):
+        return None
+    return int(found.group(1))
 
 
 def numbered_frames(cameras):

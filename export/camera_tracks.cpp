@@ -9,6 +9,7 @@
 #include <numbers>
 #include <optional>
 #include <set>
+#include <string_view>
 
 #include "export/up_axis.h"
 #include "export/usd_text.h"
@@ -22,11 +23,26 @@ namespace {
 constexpr double kApertureMm = 36;
 constexpr int kMostDigits = 6;  // what is longer is a date rather than the number of a frame
 
+bool is_digit(char c) {
+  return std::isdigit(static_cast<unsigned char>(c)) != 0;
+}
+
+/// Whether a name ends with a date and a time, as telephones name pictures: "20240501_142233".
+bool ends_with_time(std::string_view stem) {
+  constexpr std::size_t kDate = 8, kAll = 15;
+  if (stem.size() < kAll || (stem.size() > kAll && is_digit(stem[stem.size() - kAll - 1]))) return false;
+  const std::string_view end = stem.substr(stem.size() - kAll);
+  const bool are_digits =
+      std::ranges::all_of(end.substr(0, kDate), is_digit) && std::ranges::all_of(end.substr(kDate + 1), is_digit);
+  return are_digits && (end[kDate] == '_' || end[kDate] == '-') && (end.starts_with("19") || end.starts_with("20"));
+}
+
 /// The number that a picture's name ends with.
 std::optional<int> number_at_end(const std::string& name) {
   const std::string stem = without_image_extension(name);
+  if (ends_with_time(stem)) return std::nullopt;
   std::size_t begin = stem.size();
-  while (begin > 0 && std::isdigit(static_cast<unsigned char>(stem[begin - 1])) != 0) --begin;
+  while (begin > 0 && is_digit(stem[begin - 1])) --begin;
   if (begin == stem.size() || stem.size() - begin > kMostDigits) return std::nullopt;
   return std::stoi(stem.substr(begin));
 }

@@ -40,14 +40,16 @@ void make_poses_rigid(CaptureListing& listing, const std::string& matrix_name) {
 }
 
 void bring_near_origin(CaptureListing& listing) {
-  constexpr double kFar = 1e5;  // units of the poses
+  constexpr double kFar = 1e5, kNowhere = 1e8;  // units of the poses; beyond that it is no place at all
   if (listing.views.empty()) return;
   const Vec3d first = listing.views.front().world_from_camera.translation;
-  if (length(first) < kFar) return;
+  if (!(length(first) >= kFar && length(first) < kNowhere)) return;
   const Vec3d origin = {std::round(first.x), std::round(first.y), std::round(first.z)};
   for (ListedView& view : listing.views) {
     view.world_from_camera.translation = view.world_from_camera.translation - origin;
   }
+  for (SparsePoint& point : listing.points) point.position = point.position - origin;
+  if (listing.bounds) listing.bounds = Aabbd{listing.bounds->min - origin, listing.bounds->max - origin};
   listing.notes.push_back(
       fmt::format("the poses are far from their origin: positions are relative to {:.0f} {:.0f} {:.0f}", origin.x,
                   origin.y, origin.z));
@@ -95,8 +97,8 @@ std::vector<fs::path> files_with_extension(const fs::path& folder, const std::st
 }
 
 const std::vector<std::string>& image_extensions() {
-  static const std::vector<std::string> extensions = {".png", ".jpg", ".jpeg", ".JPG",  ".JPEG",
-                                                      ".PNG", ".exr", ".tif",  ".tiff", ".webp"};
+  static const std::vector<std::string> extensions = {".png", ".jpg",  ".jpeg", ".JPG", ".JPEG", ".PNG", ".exr",
+                                                      ".tif", ".tiff", ".webp", ".TIF", ".TIFF", ".EXR", ".WEBP"};
   return extensions;
 }
 

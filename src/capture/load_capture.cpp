@@ -161,6 +161,10 @@ CaptureListing read_listing(const Source& source, int downscale) {
     throw ContractError("a format without a reader");
   };
   CaptureListing listing = read();
+  bring_near_origin(listing);
+  if (source.format == Format::kPolycam || source.format == Format::kRecord3d) {
+    listing.notes.emplace_back("Y is up in these poses: bake with --set vdb.up_axis=y");
+  }
   if (source.format != Format::kLlff) apply_downscale(listing, downscale);  // which has chosen by itself
   return listing;
 }

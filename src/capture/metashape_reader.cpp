@@ -197,6 +197,27 @@ class Chunk {
   std::size_t cameras_ = 0;
 };
 
+/// Poses of a project that knows where on the Earth it is are geocentric: they are turned so that X is east, Y north
+/// and Z up.
+void turn_upright(CaptureListing& listing) {
+  constexpr double kLeastRadius = 6.34e6,
+                   kGreatestRadius = 6.40e6;  // of the Earth, from the deepest to the highest place
+  constexpr double kFlattening = 1.0067395;   // of WGS 84: a squared over b squared, which leads from radii to normals
+  if (listing.views.empty()) return;
+  const Vec3d first = listing.views.front().world_from_camera.translation;
+  if (length(first) < kLeastRadius || length(first) > kGreatestRadius) return;
+  const Vec3d up = normalized(Vec3d{first.x, first.y, kFlattening * first.z});
+  if (std::hypot(up.x, up.y) < 1e-6) return;  // at a pole nothing is east
+  const Vec3d east = normalized(cross(Vec3d{0, 0, 1}, up));
+  const Mat3d from_geocentric = {{east, cross(up, east), up}};
+  for (ListedView& view : listing.views) {
+    Affined& pose = view.world_from_camera;
+    pose = {from_geocentric * pose.linear, from_geocentric * (pose.translation - first)};
+  }
+  listing.notes.push_back(fmt::format("the poses are geocentric: X is east, Y north and Z up of {:.0f} {:.0f} {:.0f}",
+                                      first.x, first.y, first.z));
+}
+
 }  // namespace
 
 CaptureListing read_metashape(const fs::path& xml_file) {
@@ -217,7 +238,7 @@ CaptureListing read_metashape(const fs::path& xml_file) {
   }
   chunk.finish(listing);
   make_poses_rigid(listing, "transform");
-  bring_near_origin(listing);
+  turn_upright(listing);
   return listing;
 }
 

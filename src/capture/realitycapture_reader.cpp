@@ -257,7 +257,6 @@ CaptureListing read_realitycapture_table(const fs::path& csv_file) {
     listing.views.push_back(list_row(Row(names, split_at_commas(line), csv_file, field), csv_file, field));
   }
   make_poses_rigid(listing, "");
-  bring_near_origin(listing);
   return listing;
 }
 
@@ -275,7 +274,6 @@ CaptureListing read_realitycapture_sidecars(const fs::path& folder) {
                                         files.size() - listing.views.size(), files.size()));
   }
   make_poses_rigid(listing, "Rotation");
-  bring_near_origin(listing);
   return listing;
 }
 

@@ -85,7 +85,8 @@ Stage1Report train_measured(const Subject& subject, const Stage1Options& options
                             const Engines& engines, Observer& observer) {
   Stage1Job job{subject.capture, options, snapshot, true};
   job.points = prepare::points_for_training(job, observer);
-  const SceneFrame frame = place_scene(subject.capture, options.placement, job.known_points());
+  const SceneFrame frame = job.goes_on() ? LuminanceModel::frame_in(snapshot)
+                                         : place_scene(subject.capture, options.placement, job.known_points());
   const HeldOutPixels pixels(subject.evaluated, frame, kMeasuredPixels);
   const MarchSettings march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
   const WatchedEngines watched(engines);

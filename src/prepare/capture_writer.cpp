@@ -34,8 +34,13 @@ Json matrix_of(const Affined& world_from_camera) {
 
 Json lens_of(const View& view) {
   const Intrinsics& lens = view.intrinsics;
-  Json out = {{"w", lens.width}, {"h", lens.height}, {"fl_x", lens.fx},
-              {"fl_y", lens.fy}, {"cx", lens.cx},    {"cy", lens.cy}};
+  Json out = {{"camera_model", lens.model == LensModel::kOpenCvFisheye ? "OPENCV_FISHEYE" : "OPENCV"},
+              {"w", lens.width},
+              {"h", lens.height},
+              {"fl_x", lens.fx},
+              {"fl_y", lens.fy},
+              {"cx", lens.cx},
+              {"cy", lens.cy}};
   const auto& k = lens.distortion;
   switch (lens.model) {
     case LensModel::kPinhole:
@@ -156,7 +161,6 @@ Json transforms_json(const std::vector<View>& views, const std::vector<PreparedI
   const bool one_lens =
       std::ranges::all_of(views, [&](const View& v) { return v.intrinsics == views.front().intrinsics; });
   Json out;
-  out["camera_model"] = views.front().intrinsics.model == LensModel::kOpenCvFisheye ? "OPENCV_FISHEYE" : "OPENCV";
   if (one_lens) out.update(lens_of(views.front()));
   if (subject) {
     const Aabbd& box = subject->box;

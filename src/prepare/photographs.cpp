@@ -107,7 +107,9 @@ bool stays_eight_bit(const LinearImage& image, const SensorOptions& sensor) {
 
 void write_image(const fs::path& file, const LinearImage& image, bool eight_bit) {
   if (image.depth == PixelDepth::kF32) {
-    write_exr(file, {image.width, image.height, {{"Y", image.values}}, {}});
+    std::vector<ExrChannel> channels = {{"Y", image.values}};
+    if (!image.alpha.empty()) channels.push_back({"A", image.alpha});
+    write_exr(file, {image.width, image.height, std::move(channels), {}});
   } else {
     write_png(file,
               eight_bit ? encoded<std::uint8_t>(image, CV_8U, 255) : encoded<std::uint16_t>(image, CV_16U, 65535));
@@ -172,6 +174,7 @@ Imported import_one(const fs::path& file, const std::string& name, const fs::pat
     image.source = file;
     image.width = upright.width;
     image.height = upright.height;
+    image.orientation = exif.orientation;
     image.focal = focal_pixels(exif, std::max(image.width, image.height));
     image.sharpness = sharpness(grey_codes(upright));
     out.lens = exif.camera + " " + std::to_string(std::lround(exif.focal_mm * 10)) + " " +

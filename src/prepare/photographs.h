@@ -34,6 +34,7 @@ struct PreparedImage {
   std::filesystem::path source;       ///< photograph, or clip
   std::filesystem::path mask;         ///< below the capture, "masks/NAME.png"; empty: none
   int width = 0, height = 0;          ///< pixels, upright
+  int orientation = 1;                ///< of the stored pixels, as EXIF numbers it; 1: upright
   int camera = 0;                     ///< number of its camera: same size, same lens
   double focal = 0;                   ///< pixels, as the notes of the file tell; 0: unknown
   double pixel_aspect = 1;            ///< width of a pixel over its height

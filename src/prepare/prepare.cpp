@@ -91,6 +91,12 @@ Poses poses_of_model(const fs::path& model, const fs::path& capture, const std::
   for (const ListedView& listed : listing.views) {
     const auto found = by_name.find(fs::path(listed.name).stem().string());
     if (found == by_name.end()) continue;
+    // COLMAP looks at pixels as they are stored, and our images were turned upright.
+    if (found->second->orientation != 1 && listed.name != found->second->name) {
+      throw InputError(model, "image " + listed.name,
+                       "its photograph is turned by an EXIF note, which the model does not know; without the notes "
+                       "(exiftool -Orientation= -overwrite_original FILES) both agree");
+    }
     View view;
     view.name = found->second->name;
     view.image_file = capture / "images" / view.name;

@@ -36,6 +36,11 @@ FieldCamera camera_of(const FrameMessage& message) {
   return camera_of(message.camera);
 }
 
+std::string name_of_run(const std::filesystem::path& root) {
+  const std::filesystem::path folder = std::filesystem::absolute(root).lexically_normal();
+  return (folder.filename().empty() ? folder.parent_path() : folder).string();
+}
+
 SceneMessage scene_of(const Capture& capture, const std::string& run) {
   const CameraArrangement cameras = arrangement_of(capture);
   SceneMessage scene{capture.root.filename().string(), run, axis_name(cameras.up), triple(cameras.focus), 1, {}, 0};

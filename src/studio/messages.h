@@ -3,6 +3,7 @@
 /// pictures; cameras as src/capture/camera_record.h has them.
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -211,5 +212,7 @@ struct OrderMessage {
 /// The camera of a frame that somebody asks for.  @throws InputError  as check_camera
 [[nodiscard]] FieldCamera camera_of(const FrameMessage& message);
 [[nodiscard]] SceneMessage scene_of(const Capture& capture, const std::string& run);
+/// What tells runs apart, however their folders were named when the program was called.
+[[nodiscard]] std::string name_of_run(const std::filesystem::path& root);
 
 }  // namespace cnerf::studio

@@ -149,7 +149,9 @@ pipeline::RunContext Reception::prepared() {
   if (prepare::needs_preparing(source)) {
     capture = run_.parent_path() / (run_.filename().string() + "-capture");
     pipeline::PrepareJob job{source, capture, {}, {.resume = true}};
-    if (is_new || pipeline::was_begun_for_another(job)) job.existing = {.overwrite = true};
+    // What was prepared of another folder, whose place may have changed, is left to its owner.
+    const bool is_ours = fs::exists(capture / "work");
+    if (is_new || (is_ours && pipeline::was_begun_for_another(job))) job.existing = {.overwrite = true};
     pipeline::prepare_step(job, cpu_engines(), observer);
   }
   return open_(capture, observer);
@@ -205,7 +207,7 @@ std::span<const Route<Reception>> Reception::routes() {
 
 PageAnswer Reception::get_scene(const PageRequest& /*request*/) {
   SceneMessage scene;
-  scene.run = run_.string();
+  scene.run = name_of_run(run_);
   scene.up = "+y";
   return {.body = json_of(scene).dump()};
 }

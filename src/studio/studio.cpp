@@ -43,7 +43,7 @@ Studio::Studio(pipeline::RunContext& context, std::string take, const Engines& e
           context.directory.record().stage1.finished ? FolderLock::Mode::kShared : FolderLock::Mode::kAlone, observer)),
       lock_(pipeline::lock_folder(stroke_folder(context), FolderLock::Mode::kAlone, observer)),
       first_take_(std::move(take)),
-      scene_(json_of(scene_of(context.capture, context.directory.root().string())).dump()),
+      scene_(json_of(scene_of(context.capture, name_of_run(context.directory.root()))).dump()),
       frames_([this] { work_.notify_all(); }) {
   const fs::path file = stroke_folder(context_) / kStrokeFile;
   if (fs::exists(file)) strokes_ = read_strokes(file, paintable_views(context_.capture));
@@ -163,7 +163,7 @@ void Studio::open_field() {
   pipeline::use_learned_views(context_, observer_);
   coloring_.emplace(context_, engines_);
   field_ = &coloring_->luminance();
-  std::string scene = json_of(scene_of(context_.capture, context_.directory.root().string())).dump();
+  std::string scene = json_of(scene_of(context_.capture, name_of_run(context_.directory.root()))).dump();
   const std::lock_guard lock(mutex_);
   scene_ = std::move(scene);
   board_.change([&](StateMessage& state) {

@@ -147,8 +147,26 @@ TEST(Metashape, GeoreferencedPosesComeToTheOrigin) {
   EXPECT_LT(length(first), 1);
   const Vec3d between =
       geocentric.rotation * (test::ring_pose(3, 4).translation - test::ring_pose(0, 4).translation) * 12.0;
-  EXPECT_LT(length(capture.views[3].world_from_camera.translation - first - between), 1e-6);
-  EXPECT_THAT(capture.notes, Contains(HasSubstr("relative to -24")));
+  const Vec3d found = capture.views[3].world_from_camera.translation - first;
+  EXPECT_NEAR(length(found), length(between), 1e-6);
+  // The height is that over the ellipsoid, and the north is towards the pole.
+  const Vec3d place = {-2499366.5, -4256836.25, 4029217.75};
+  const Vec3d up = normalized(Vec3d{place.x, place.y, place.z * std::pow(6378137.0 / 6356752.314245, 2)});
+  EXPECT_NEAR(found.z, dot(between, up), 1e-3);
+  EXPECT_NEAR(found.x, dot(between, normalized(cross(Vec3d{0, 0, 1}, up))), 1e-3);
+  EXPECT_THAT(capture.notes, Contains(HasSubstr("Z up of -24")));
+}
+
+TEST(Metashape, LabelsWithoutExtensionFindFilesOfCapitalOnes) {
+  const test::TempDir folder;
+  write(folder.path(), ring_document(folder.path()));
+  for (int i = 0; i < 4; ++i) {
+    const std::string name = "images/" + std::to_string(i);
+    test::write_grey_image(folder / (name + ".tif"));
+    fs::rename(folder / (name + ".tif"), folder / (name + ".TIF"));
+    fs::remove(folder / (name + ".png"));
+  }
+  EXPECT_EQ(load_capture(folder.path()).views.size(), 4u);
 }
 
 TEST(Metashape, CamerasWithoutPoseOrDisabledAreLeftOutAndGroupsAreOpened) {

@@ -229,7 +229,15 @@ TEST(CameraTracks, FramesAreNumbersOfPicturesOrTheirOrder) {
   EXPECT_EQ(numbers(), "3a_3.png 520260101123456_5.png 7a_7.png ");
   shot[0].name = "20260101123456.png";
   EXPECT_EQ(numbers(), "120260101123456.png 2a_7.png 3a_3.png ");
-  shot[0].name = "b_7.png";
+  const auto name = [&](const std::vector<std::string>& names) {
+    shot.assign(names.size(), {});
+    for (std::size_t i = 0; i < names.size(); ++i) shot[i].name = names[i];
+  };
+  name({"IMG_20240501_142301.jpg", "IMG_20240501_142233.jpg"});
+  EXPECT_EQ(numbers(), "1IMG_20240501_142301.jpg 2IMG_20240501_142233.jpg ") << "the time of day";
+  name({"frame_000123.png", "frame_000007.png"});
+  EXPECT_EQ(numbers(), "7frame_000007.png 123frame_000123.png ");
+  name({"b_7.png", "a_7.png", "a_3.png"});
   EXPECT_EQ(numbers(), "1b_7.png 2a_7.png 3a_3.png ");
   EXPECT_TRUE(frames_of_shot({}).empty());
 }

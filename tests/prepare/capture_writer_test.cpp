@@ -80,6 +80,18 @@ TEST(CaptureWriter, WhatIsWrittenReadsBack) {
   }
 }
 
+TEST(CaptureWriter, ALensOfAnotherKindIsReadBackAsSuch) {
+  for (const std::size_t fisheye : {0u, 3u}) {
+    const test::TempDir folder;
+    std::vector<View> views = views_of(LensModel::kOpenCv, false);
+    views[fisheye].intrinsics = views_of(LensModel::kOpenCvFisheye, false)[fisheye].intrinsics;
+    const auto images = write_images(folder.path(), views, false);
+    write_file(folder / "transforms.json", transforms_json(views, images, std::nullopt).dump());
+    const Capture capture = load_capture(folder.path());
+    for (std::size_t i = 0; i < views.size(); ++i) EXPECT_EQ(capture.views[i].intrinsics, views[i].intrinsics) << i;
+  }
+}
+
 TEST(CaptureWriter, PointsKeepTheirErrorsAndTheViewsThatShowThem) {
   const test::TempDir folder;
   std::vector<View> views = views_of(LensModel::kPinhole, false);

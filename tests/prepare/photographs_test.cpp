@@ -99,6 +99,17 @@ TEST(Photographs, SixteenBitsAndFloatsKeepTheirDepth) {
   EXPECT_NE(set.images[0].camera, set.images[1].camera) << "sizes differ";
 }
 
+TEST(Photographs, FloatsKeepTheirAlpha) {
+  const test::TempDir folder;
+  const std::vector<float> light = {0, 0.25f, 0.5f, 1.5f}, alpha = {0, 0.5f, 1, 1};
+  for (const char* name : {"in/float.exr", "in/other.exr"}) {
+    write_exr(folder / name, {2, 2, {{"Y", light}, {"A", alpha}}, {}});
+  }
+  (void)import_all(folder / "in", folder / "out");
+  EXPECT_EQ(read_exr(folder / "out/images/float.exr").alpha, alpha);
+  EXPECT_EQ(read_exr(folder / "out/images/float.exr").values, light);
+}
+
 TEST(Photographs, ColoursBecomeTheirLuminance) {
   const test::TempDir folder;
   write(folder / "in/a.png", cv::Mat(6, 8, CV_8UC3, cv::Scalar(10, 200, 90)));

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -66,6 +67,22 @@ TEST(Placement, HoldsWhatPointsShowBeforeTheCameras) {
   EXPECT_LT(reach_of(frame, {0, 0, 0}, {1, 0, 0}), 14);
   capture.points.clear();
   EXPECT_GT(reach_of(place_scene(capture, {}), {0, 0, 0}, {1, 0, 0}), 2) << "nothing tells: some times their spread";
+}
+
+TEST(Placement, HoldsAllThatManyCamerasPassBy) {
+  // A front that cameras pass along, a field that is flown over, and a corridor that is walked through.
+  for (const Vec3d along : {Vec3d{0, 1, 0}, Vec3d{0, 0.7, 0.7}, Vec3d{1, 0.05, 0}}) {
+    Capture capture;
+    for (int i = 0; i <= 30; ++i) {
+      const Vec3d eye = along * double(i);
+      capture.views.push_back(view_at(eye, eye + Vec3d{5, 0.02 * (i % 5), 0.01 * (i % 3)}));
+      for (const double side : {-1.0, 1.0}) capture.points.push_back({eye + Vec3d{5, side, 0.5}, 0.5, {}});
+    }
+    const Aabbd box = place_scene(capture, {}).world_box();
+    const auto held = std::ranges::count_if(capture.points, [&](const auto& p) { return box.contains(p.position); });
+    EXPECT_GE(held, std::ssize(capture.points) * 95 / 100);
+    for (const View& view : capture.views) EXPECT_TRUE(box.contains(view.world_from_camera.translation));
+  }
 }
 
 TEST(Placement, OfPointsThatAreFoundLaterIsThatOfTheCaptureWithThem) {

@@ -41,25 +41,37 @@ double spread_of(const Capture& capture, const CameraArrangement& cameras) {
   return spread;
 }
 
+/// Forward-facing captures whose points alone tell how far the scene reaches: boxes around these and the cameras.
+std::optional<SceneFrame> place_by_points(const Capture& capture, const std::vector<SparsePoint>& points) {
+  if (points.size() < kFewestThatTell) return {};
+  Aabbd bounds = Aabbd::empty();
+  const auto last = std::size_t(double(points.size() - 1) * (1 - kOutliers));
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> along;
+    for (const SparsePoint& point : points) along.push_back(point.position[axis]);
+    std::ranges::sort(along);
+    bounds.min[axis] = along[along.size() - 1 - last];
+    bounds.max[axis] = along[last];
+  }
+  for (const View& view : capture.views) bounds.grow(view.world_from_camera.translation);
+  const Vec3d size = bounds.size();
+  return cube(bounds.centre(), kBehindPoints * std::max({size.x, size.y, size.z}), 2);
+}
+
 /// Forward-facing captures: the box reaches from the cameras to behind the far plane. 1.21 times the far distance,
 /// centred half-way, holds what a lens of 60 to 70 degrees sees there.
 SceneFrame place_before(const CameraArrangement& cameras, double far) {
   return cube(cameras.eye + cameras.forward * (0.5 * far), 1.21 * far, 2);
 }
 
-/// The far plane of forward-facing captures: as their source says, else behind the points. Nothing where neither tells,
-/// and the cameras look at something before them.
-std::optional<double> far_of(const Capture& capture, const CameraArrangement& cameras,
-                             const std::vector<SparsePoint>& points) {
-  if (capture.depth_range) return capture.depth_range->far;
-  std::vector<double> depths;
-  for (const SparsePoint& point : points) {
-    const double depth = dot(point.position - cameras.eye, cameras.forward);
-    if (depth > 0) depths.push_back(depth);
-  }
-  if (const auto far = reach_of(std::move(depths))) return far;
+/// Nothing where the cameras look at something before them, and neither source nor points tell more.
+std::optional<SceneFrame> place_facing(const Capture& capture, const CameraArrangement& cameras,
+                                       const std::vector<SparsePoint>& points) {
+  if (capture.depth_range) return place_before(cameras, capture.depth_range->far);
+  if (capture.is_bounded_object) return {};
+  if (const auto frame = place_by_points(capture, points)) return frame;
   if (dot(cameras.meeting_point - cameras.eye, cameras.forward) > 0) return {};
-  return kUnknownReach * spread_of(capture, cameras);
+  return place_before(cameras, kUnknownReach * spread_of(capture, cameras));
 }
 
 /// Cameras that look outward, as from the middle of a room: boxes around them that reach behind its walls.
@@ -153,9 +165,9 @@ SceneFrame place_scene(const Capture& capture, const PlacementOptions& options,
   if (!(spread_of(capture, cameras) > kLeastSpread * length(cameras.eye))) {
     throw InputError(capture.root, "cameras", "all stand in one place, which tells no depth");
   }
-  const bool is_before = cameras.forward_facing && (capture.depth_range || !capture.is_bounded_object);
-  const std::optional<double> far = is_before ? far_of(capture, cameras, points) : std::nullopt;
-  SceneFrame frame = far                         ? place_before(cameras, *far)
+  const std::optional<SceneFrame> facing =
+      cameras.forward_facing ? place_facing(capture, cameras, points) : std::nullopt;
+  SceneFrame frame = facing                      ? *facing
                      : capture.is_bounded_object ? place_object(capture, cameras.meeting_point)
                      : cameras.outward_looking   ? place_around_cameras(capture, cameras, points)
                                                  : place_surroundings(capture, cameras.meeting_point);

@@ -91,7 +91,7 @@ void refuse_other_views(const std::filesystem::path& snapshot, const std::string
   if (stored.empty() || stored == digest_of_training(capture)) return;
   throw SnapshotError(snapshot.string() +
                       ": was trained on other views; capture.holdout, capture.downscale, capture.transfer and the "
-                      "photographs have to be as they were, or start again without --resume");
+                      "photographs' names and sizes have to be as they were, or start again without --resume");
 }
 
 SeenSky sky_of(const Stage1Job& job) {

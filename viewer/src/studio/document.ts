@@ -71,6 +71,10 @@ export class StrokeDocument {
   private done: [StrokeList, StrokeList][] = [];
   private changed = new Set<() => void>();
   private busy: Promise<void> | null = null;
+  /** The browser keeps what is unsent. */
+  isKept = true;
+  /** Nobody knows whose server answers, if one does: nothing is sent. */
+  isAway = false;
   /** Strokes were promised to be sent, and another tab paints: they stay until it leaves. */
   isWaiting = false;
 
@@ -245,6 +249,7 @@ export class StrokeDocument {
   }
   private async saveOnce(list: StrokeList): Promise<void> {
     const { wish, viewpoints, everywhere } = this;
+    if (this.isAway) throw new Lost("away");
     try {
       this.revision = await this.store.putStrokes(list, this.revision, viewpoints, everywhere);
       this.saved = list;
@@ -276,12 +281,14 @@ export class StrokeDocument {
   }
 
   private keep(): void {
+    this.isKept = true;
     try {
       // A viewpoint alone, without strokes, is not worth keeping.
       if (this.list === this.saved) this.shelf.removeItem(this.shelfKey);
       else this.shelf.setItem(this.shelfKey, JSON.stringify({ base: this.saved, list: this.list, viewpoints: this.known } satisfies Kept));
     } catch {
       // A full or forbidden store: the strokes are still in the page.
+      this.isKept = false;
     }
   }
   private taken(): Kept | null {

@@ -21,6 +21,7 @@ export class Session {
   private refined = new Set<() => void>();
   private sceneSeen: number;
   private refining = new Latest();
+  private returning: Promise<void> | null = null;
   private all: { viewpoints: readonly Viewpoint[]; views: readonly SceneView[] } | null = null;
   private stopListening = () => {};
 
@@ -112,9 +113,9 @@ export class Session {
     if (state.stage === "photographs") {
       // There is nothing yet that strokes could be on.
       if (wasLost) toast(words.back);
-    } else if (wasLost) {
-      toast(words.back);
-      void this.returned().catch((problem) => this.explain(problem));
+    } else if (wasLost || this.strokes.isAway) {
+      if (wasLost) toast(words.back);
+      void (this.returning ??= this.returned().finally(() => (this.returning = null))).catch((problem) => this.explain(problem));
     } else if (state.strokes > this.strokes.revision) {
       void this.strokes.follow(state.strokes).then(() => this.sendWaiting()).catch((problem) => this.explain(problem));
     } else {
@@ -126,10 +127,13 @@ export class Session {
   /** A server answers again: this run's, or that of another one on the same port. */
   private async returned(): Promise<void> {
     if ((await this.api.scene()).run !== this.scene.run) return this.reload();
+    this.strokes.isAway = false;
     await this.strokes.load();
   }
   /** Nothing of this page fits the server any more. Unsent strokes stay on the shelf of their run. */
   private reload(): void {
+    // The shelf may be too small for a long painting.
+    if (!this.strokes.isSaved && !this.strokes.isKept) return toast(words.otherRun);
     this.isLost = true;
     location.reload();
   }
@@ -144,7 +148,7 @@ export class Session {
     try {
       const next = await this.api.scene();
       const { views } = this.scene;
-      if (next.views.length !== views.length || next.views.some((v, i) => v.name !== views[i].name)) {
+      if (next.run !== this.scene.run || next.views.length !== views.length || next.views.some((v, i) => v.name !== views[i].name)) {
         return this.reload();
       }
       next.views.forEach((view, i) => Object.assign(views[i], view));
@@ -157,6 +161,7 @@ export class Session {
     }
   }
   lose(): void {
+    this.strokes.isAway = true;
     if (this.isLost) return;
     this.isLost = true;
     this.tell();

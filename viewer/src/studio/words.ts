@@ -136,6 +136,7 @@ export const words = {
   recolour: "Give it the brush's colour",
   remove: "Delete",
   selected: (kind: string) => `Select ${kind}`,
+  otherRun: "Another run is open at this address, and this browser could not keep your unsent strokes. Leave this tab open, and open its own run again.",
   tooMuch: "These strokes are as many bytes as there can be; delete some first.",
   tooMany: (count: number) => `${count} strokes are the most there can be; delete some first.`,
   paintedPicture: "Add a painted PNG…",

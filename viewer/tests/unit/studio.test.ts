@@ -198,6 +198,16 @@ describe("strokes", () => {
     expect([ids(document.list), document.isSaved, document.canUndo]).toEqual(["a", false, true]);
     expect(told).toContain("lost");
   });
+  it("are not sent as long as nobody knows whose server answers", async () => {
+    const { document, store, told } = await opened();
+    document.isAway = true;
+    document.add(stroke("a"));
+    await document.save();
+    expect([store.puts, document.isSaved, told]).toEqual([0, false, ["lost"]]);
+    document.isAway = false;
+    await document.load();
+    expect(ids(store.list)).toBe("a");
+  });
   it("that are not there are neither changed nor removed, and no step is added", async () => {
     const { document, store } = await opened();
     document.add(stroke("a"));
