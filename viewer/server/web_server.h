@@ -26,8 +26,8 @@ void check_web_server_options(const WebServerOptions& options);
 /// Serves GET and HEAD of the files below its folders; the first folder that has a file wins. A path, or a link, that
 /// leads out of the folders does not exist. Other methods, bodies beyond 4 KiB, addresses beyond 8 KiB and names of
 /// other hosts (DNS rebinding) are refused. Files are sent piece by piece, one part of each at most. A request has to
-/// be whole within 10 seconds, and a client that keeps us waiting goes when others want its place. With a token, a
-/// visitor comes with `?token=…`, which becomes a cookie.
+/// be whole within 10 seconds and one for every 16 KiB, and a client that keeps us waiting goes when others want its
+/// place. With a token, a visitor comes with `?token=…`, which becomes a cookie of a name of its own.
 ///
 /// With a feed also: GET /live/state, GET /live/events (server-sent events, at most 8 at a time),
 /// GET /live/pictures/NAME, and POST /live/control with the header `X-Cnerf: 1`, which no other site can send, and no
