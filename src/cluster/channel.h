@@ -18,11 +18,15 @@ namespace cnerf::cluster {
 using Bytes = std::vector<std::byte>;
 using Seconds = std::chrono::duration<double>;
 
+/// What a store takes as one value, bytes. The one of torchrun closes the connection to whoever sends more than 8 MiB.
+inline constexpr std::size_t kLargestValue = std::size_t(4) << 20;
+
 /// Named values that all processes share. For one thread at a time; every call may throw std::exception when the
 /// connection breaks, and may take forever when the network is silent.
 class Store {
  public:
   virtual ~Store() = default;
+  /// Of at most kLargestValue. What one process sets comes to all in the order of setting.
   virtual void set(const std::string& key, const Bytes& value) = 0;
   /// Nothing where there is no such value yet.
   [[nodiscard]] virtual std::optional<Bytes> get(const std::string& key) = 0;

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "src/base/error.h"
+#include "src/cluster/packing.h"
 
 namespace cnerf::cluster {
 namespace {
@@ -33,6 +34,42 @@ std::string work_key(std::int64_t work, const std::string& what) {
 }
 std::string result_key(std::int64_t work, std::int64_t piece) {
   return work_key(work, "result/" + std::to_string(piece));
+}
+
+// Values of any size: how many bytes there are, and as many of them as fit beside that; the others as values of their
+// own.
+constexpr std::size_t kFirstPart = kLargestValue - 2 * sizeof(std::size_t);
+
+std::string part_key(const std::string& key, std::size_t begin) {
+  return key + "/from " + std::to_string(begin);
+}
+
+void set_large(Store& store, const std::string& key, std::span<const std::byte> value) {
+  for (std::size_t begin = kFirstPart; begin < value.size(); begin += kLargestValue) {
+    const auto part = value.subspan(begin, std::min(kLargestValue, value.size() - begin));
+    store.set(part_key(key, begin), Bytes(part.begin(), part.end()));
+  }
+  const auto first = value.first(std::min(kFirstPart, value.size()));
+  // Last: whoever finds it finds all.
+  store.set(key, Packer().add(value.size()).add(Bytes(first.begin(), first.end())).packed());
+}
+
+std::optional<Bytes> get_large(Store& store, const std::string& key) {
+  const std::optional<Bytes> first = store.get(key);
+  if (!first) return std::nullopt;
+  std::size_t size = 0;
+  Bytes value;
+  Unpacker(*first).get(size).get(value);
+  while (value.size() < size) {
+    const Bytes part = store.get(part_key(key, value.size())).value();
+    value.insert(value.end(), part.begin(), part.end());
+  }
+  return value;
+}
+
+void remove_large(Store& store, const std::string& key, std::size_t size) {
+  for (std::size_t begin = kFirstPart; begin < size; begin += kLargestValue) store.remove(part_key(key, begin));
+  store.remove(key);
 }
 
 }  // namespace
@@ -178,11 +215,11 @@ void JoinedRanks::sum(std::span<double> values) {
 Bytes JoinedRanks::broadcast(Bytes bytes) {
   const std::string key = work_key(begin_work(), "said");
   if (is_first()) {
-    guarded([&] { store_->set(key, bytes); });
+    guarded([&] { set_large(*store_, key, bytes); });
     return bytes;
   }
   std::optional<Bytes> said;
-  wait_for([&] { return (said = store_->get(key)).has_value(); }, "broadcast", kNoLimit);
+  wait_for([&] { return (said = get_large(*store_, key)).has_value(); }, "broadcast", kNoLimit);
   return std::move(*said);
 }
 
@@ -213,16 +250,16 @@ std::int64_t JoinedRanks::next(std::int64_t work) {
 
 void JoinedRanks::put(std::int64_t work, std::int64_t piece, const Bytes& result) {
   wait_for([&] { return piece - store_->add(work_key(work, "taken"), 0) < kMostAhead; }, "result", kNoLimit);
-  guarded([&] { store_->set(result_key(work, piece), result); });
+  guarded([&] { set_large(*store_, result_key(work, piece), result); });
 }
 
 std::optional<Bytes> JoinedRanks::take(std::int64_t work, std::int64_t piece, bool waits) {
   const std::string key = result_key(work, piece);
-  std::optional<Bytes> result = guarded([&] { return store_->get(key); });
+  std::optional<Bytes> result = guarded([&] { return get_large(*store_, key); });
   if (!result && waits) {
-    wait_for([&] { return (result = store_->get(key)).has_value(); }, "result", kNoLimit);
+    wait_for([&] { return (result = get_large(*store_, key)).has_value(); }, "result", kNoLimit);
   }
-  if (result) guarded([&] { store_->remove(key); });
+  if (result) guarded([&] { remove_large(*store_, key, result->size()); });
   return result;
 }
 

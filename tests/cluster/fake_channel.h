@@ -50,6 +50,7 @@ class FakeStore final : public cluster::Store {
  public:
   void set(const std::string& key, const cluster::Bytes& value) override {
     const auto lock = shared_->entered_lock();
+    if (value.size() > cluster::kLargestValue) throw std::runtime_error("connection reset");
     shared_->values[key] = value;
   }
   std::optional<cluster::Bytes> get(const std::string& key) override {

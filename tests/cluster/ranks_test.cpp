@@ -49,6 +49,34 @@ TEST(Ranks, SumsBroadcastsAndGathers) {
   });
 }
 
+/// A photograph's row of a contact sheet can have 18 MB, of which torchrun's store takes no message.
+TEST(Ranks, ValuesOfAnySizeArriveAndLeaveNothing) {
+  const auto value_of = [](std::size_t size) {
+    Bytes value(size);
+    for (std::size_t i = 0; i < size; ++i) value[i] = std::byte(i % 251);
+    return value;
+  };
+  const std::size_t sizes[] = {
+      0, 1, kLargestValue - 17, kLargestValue - 16, kLargestValue - 15, 2 * kLargestValue, 5 * kLargestValue / 2};
+  on_ranks(2, [&](Ranks& ranks) {
+    for (const std::size_t size : sizes) {
+      EXPECT_TRUE(ranks.broadcast(ranks.is_first() ? value_of(size) : Bytes()) == value_of(size)) << size;
+      const std::int64_t work = ranks.begin_work();
+      if (!ranks.is_first()) {
+        ranks.put(work, 0, value_of(size));
+      } else {
+        const std::optional<Bytes> taken = ranks.take(work, 0, /*waits=*/true);
+        ASSERT_TRUE(taken.has_value());
+        EXPECT_TRUE(*taken == value_of(size)) << size;
+        ranks.took(work);
+      }
+    }
+  });
+  for (const auto& [key, value] : exchange->values) {
+    EXPECT_EQ(key.find("result"), std::string::npos) << key << " was taken and is still there";
+  }
+}
+
 /// Sums in memory that plays a GPU's.
 class FakeDeviceSums final : public DeviceSums {
  public:
