@@ -41,6 +41,19 @@ fs::path last_file(const fs::path& folder, const Formats& formats) {
   return formats.has_manifest() ? folder / "manifest.json" : web_folder(folder) / kWebManifest;
 }
 
+Formats formats_in(const fs::path& folder) {
+  Formats made;
+  made.web = fs::exists(last_file(folder, {.web = true}));
+  const fs::path file = last_file(folder, {.vdb = true});
+  if (!fs::exists(file)) return made;
+  const BakeManifest manifest = read_manifest(file);
+  made.vdb = manifest.volume.has_value();
+  made.gltf = manifest.mesh.has_value();
+  made.exr = made.gltf && !manifest.mesh->rgb_exr.empty();
+  made.splat = manifest.splats.has_value();
+  return made;
+}
+
 BakeOutput::BakeOutput(fs::path folder, const Formats& formats, OutputOptions options, const Capture& capture,
                        const Label& label, Observer& observer)
     : folder_(std::move(folder)),

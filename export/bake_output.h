@@ -26,6 +26,10 @@ struct Formats {
   [[nodiscard]] bool has_manifest() const { return is_for_blender() || splat; }
   /// Whether there is what the set-up script shows.
   [[nodiscard]] bool is_for_blender() const { return vdb || gltf; }
+  [[nodiscard]] Formats operator|(const Formats& other) const {
+    return {vdb || other.vdb, gltf || other.gltf, exr || other.exr, web || other.web, splat || other.splat};
+  }
+  bool operator==(const Formats&) const = default;
   [[nodiscard]] bool has_only_splats() const { return splat && !vdb && !gltf && !web; }
   [[nodiscard]] bake::VolumeUse volumes() const {
     return vdb ? bake::VolumeUse::kGrids : web ? bake::VolumeUse::kRead : bake::VolumeUse::kNone;
@@ -36,6 +40,8 @@ struct Formats {
 
 /// The file that a bake of these formats writes last: once it is there, all of it is.
 [[nodiscard]] std::filesystem::path last_file(const std::filesystem::path& folder, const Formats& formats);
+/// What a folder has of a bake that ended; nothing where none did.  @throws InputError  as read_manifest
+[[nodiscard]] Formats formats_in(const std::filesystem::path& folder);
 /// The folder of the web bundle of a bake.
 [[nodiscard]] std::filesystem::path web_folder(const std::filesystem::path& bake);
 

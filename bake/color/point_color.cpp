@@ -23,14 +23,15 @@ bool in_gamut(Vec3f rgb, float luminance) {
 
 }  // namespace
 
-VoxelColor voxel_color(float luminance, Chromaticity chromaticity) {
+VoxelColor voxel_color(float luminance, Chromaticity chromaticity, float gain) {
   if (chromaticity.x == 1 && chromaticity.z == 1) return {{luminance, luminance, luminance}, 0, 0};
-  const Vec3f xyz{luminance * chromaticity.x, luminance, luminance * chromaticity.z};
+  const float light = luminance / gain;
   VoxelColor color;
-  color.rgb = linear_rgb_from_relative_xyz(xyz);
-  if (!in_gamut(color.rgb, luminance)) {
+  color.rgb = linear_rgb_from_relative_xyz(Vec3f{light * chromaticity.x, light, light * chromaticity.z});
+  if (!in_gamut(color.rgb, light)) {
     color.rgb = gamut_mapped_linear_rgb_from_lab(lab_from_linear_rgb(color.rgb));
   }
+  color.rgb *= gain;
   const Lab<float> lab = lab_from_linear_rgb(color.rgb);
   color.a = lab.a;
   color.b = lab.b;

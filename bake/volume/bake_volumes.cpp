@@ -107,7 +107,7 @@ void RadiancePass::bake_bricks(std::span<const std::span<const DenseVoxel>> bric
   const std::vector<Chromaticity> chromaticity = chromaticity_of(field_, kept.centroids);
   parallel_ranges(kept.voxels.size(), kBrickVoxels, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
-      const VoxelColor color = voxel_color(luminance[v], chromaticity[v]);
+      const VoxelColor color = voxel_color(luminance[v], chromaticity[v], field_.gain());
       Voxel& voxel = kept.voxels[v];
       voxel.luminance = luminance_of(color.rgb);
       voxel.rgb = color.rgb;

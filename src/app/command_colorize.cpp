@@ -33,15 +33,17 @@ void replay(const ColorizeArguments& arguments, const pipeline::RunContext& cont
       studio::read_journal(directory.take_folder(of) / studio::kJournalFile, paintable_views(context.capture));
   const std::string take = pipeline::take_to_write(
       context, arguments.run.take.empty() ? of + "-again" : arguments.run.take, arguments.existing);
+  if (take == journal.deeds.front().base) {
+    throw UsageError("--take " + take + ": " + of + " was painted on this take; choose another name");
+  }
   const FolderLock lock = pipeline::lock_folder(directory.root(), FolderLock::Mode::kShared, reporter);
-  if (arguments.existing.overwrite) clear_folder(directory.take_folder(take));
   const Stopwatch watch;
   studio::Coloring coloring(context, engines_for(context.config.device));
   coloring.replay(journal, {}, [&](double fraction) {
     reporter.report_progress({"replay " + of, fraction, {}});
     if (reporter.is_cancelled()) throw Interrupted("stopped; nothing was written");
   });
-  coloring.keep(take, watch.seconds(), reporter);
+  coloring.keep(take, watch.seconds(), reporter, arguments.existing.overwrite);
   reporter.wrote("take", directory.take_folder(take));
 }
 
@@ -55,7 +57,9 @@ void suggest(const ColorizeArguments& arguments, const pipeline::RunContext& con
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
   // A take that is gone on with has its own configuration; a new one starts from the run's.
-  const std::string base = arguments.existing.resume ? arguments.run.take : "";
+  std::string base = arguments.existing.resume ? arguments.run.take : "";
+  if (arguments.existing.resume && base.empty())
+    base = pipeline::take_to_go_on_with(pipeline::RunDirectory::open(arguments.run.run));
   pipeline::RunContext context = open_run(arguments.run, base, command_line, reporter);
   const bool is_suggestion = arguments.suggested_keyframes > 0;
   if (!cluster::world().is_alone() && (arguments.bases_only || is_suggestion || !arguments.replay.empty())) {

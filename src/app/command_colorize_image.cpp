@@ -8,9 +8,11 @@
 
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
+#include "src/base/files.h"
 #include "src/capture/image_io.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/colorize_step.h"
+#include "src/prepare/photographs.h"
 
 namespace cnerf::app {
 namespace fs = std::filesystem;
@@ -53,7 +55,9 @@ Picture colored(const LinearImage& luminance, const ChromaBatch& answer) {
 void colorize_image(const ColorizeImageArguments& arguments) {
   Reporter reporter = make_reporter(arguments.config);
   refuse_existing(arguments.out, arguments.overwrite);
-  const LinearImage luminance = luminance_image(read_linear_image(arguments.in, Transfer::kSrgb));
+  LinearImage stored = luminance_image(read_linear_image(arguments.in, Transfer::kSrgb));
+  const int orientation = prepare::orientation_of(read_binary_file(arguments.in));
+  const LinearImage luminance = prepare::turned_upright(std::move(stored), orientation);
   Config config = resolve_config(arguments.config);
   if (config.colorizer.spec.empty()) config.colorizer.spec = "builtin";
   const auto colorizer = make_colorizer(config.colorizer, pipeline::colorizer_context(config, {}, {}, reporter));

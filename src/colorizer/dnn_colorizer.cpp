@@ -28,8 +28,8 @@ std::string complaint() {
 
 class DnnColorizer final : public NetworkColorizer {
  public:
-  DnnColorizer(std::string name, NetworkContract contract, const cv::dnn::Net& network)
-      : NetworkColorizer(std::move(name), std::move(contract)), network_(network) {
+  DnnColorizer(std::string name, const std::vector<fs::path>& files, const cv::dnn::Net& network)
+      : NetworkColorizer(std::move(name), files), network_(network) {
     network_.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
     network_.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
   }
@@ -54,10 +54,12 @@ class DnnColorizer final : public NetworkColorizer {
   cv::dnn::Net network_;
 };
 
+/// @param files   of the network; the last one has its weights
 /// @param advice  what helps most users whose file is refused
 template <typename Read>
-std::unique_ptr<Colorizer> read_network(const ColorizerRequest& request, const std::string& name, const fs::path& file,
-                                        const std::string& advice, const Read& read) {
+std::unique_ptr<Colorizer> read_network(const ColorizerRequest& request, const std::string& name,
+                                        const std::vector<fs::path>& files, const std::string& advice,
+                                        const Read& read) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // its errors are told as ours, once
   const auto network = [&] {
     try {
@@ -69,9 +71,9 @@ std::unique_ptr<Colorizer> read_network(const ColorizerRequest& request, const s
                            advice);
     }
   };
-  read_in_child([&] { (void)network(); }, request.options.timeout_seconds, file,
+  read_in_child([&] { (void)network(); }, request.options.timeout_seconds, files.back(),
                 name + ": is damaged: OpenCV " CV_VERSION " cannot stand or end reading it; " + advice);
-  return std::make_unique<DnnColorizer>(name, contract_beside(file), network());
+  return std::make_unique<DnnColorizer>(name, files, network());
 }
 
 }  // namespace
@@ -79,7 +81,7 @@ std::unique_ptr<Colorizer> read_network(const ColorizerRequest& request, const s
 std::unique_ptr<Colorizer> make_onnx_colorizer(const ColorizerRequest& request) {
   const fs::path file = find_spec_file(request.argument, request);
   const std::string name = "onnx:" + request.argument, advice = "export it with opset 11 to 13 and fixed kernel shapes";
-  return read_network(request, name, file, advice, [&] {
+  return read_network(request, name, {file}, advice, [&] {
     const std::string model = read_text_file(file), fault = fault_of_onnx(model);
     if (!fault.empty()) throw ColorizerError(name + ": cannot be read: " + fault + "; " + advice);
     return cv::dnn::readNetFromONNX(model.data(), model.size());
@@ -93,7 +95,7 @@ std::unique_ptr<Colorizer> make_caffe_colorizer(const ColorizerRequest& request)
     throw UsageError("colorizer \"" + request.options.spec + "\": expected caffe:PROTO,MODEL");
   const fs::path description = find_spec_file(argument.substr(0, comma), request);
   const fs::path weights = find_spec_file(argument.substr(comma + 1), request);
-  return read_network(request, "caffe:" + argument, weights,
+  return read_network(request, "caffe:" + argument, {description, weights},
                       "expected a text description and its binary weights, in this order",
                       [&] { return cv::dnn::readNetFromCaffe(description.string(), weights.string()); });
 }

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 #include <set>
+#include <span>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/base/process.h"
 #include "src/color/ab_bins.h"
 #include "src/color/colorspace_math.h"
@@ -98,6 +100,10 @@ int rounded_up(int value, int multiple) {
   return (value + multiple - 1) / multiple * multiple;
 }
 
+fs::path contract_file(const fs::path& network) {
+  return network.string() + ".toml";
+}
+
 }  // namespace
 
 int NetworkContract::output_channels() const {
@@ -114,7 +120,7 @@ void read_in_child(const std::function<void()>& read, double seconds, const fs::
 }
 
 NetworkContract contract_beside(const fs::path& network) {
-  const fs::path file = network.string() + ".toml";
+  const fs::path file = contract_file(network);
   NetworkContract contract;
   if (!fs::exists(file)) return contract;
   toml::table table;
@@ -183,6 +189,15 @@ ChromaBatch chroma_of(const NetworkContract& contract, const Planes& raw, const 
   (contract.output == "logits313" ? chroma.logits : chroma.ab) = std::move(answer.values);
   check_answer(colorizer, question, chroma);
   return chroma;
+}
+
+NetworkColorizer::NetworkColorizer(std::string name, const std::vector<fs::path>& files)
+    : name_(std::move(name)), contract_(contract_beside(files.back())) {
+  std::string hashes;
+  for (const fs::path& file : files) hashes += sha256_of_file(file);
+  const fs::path contract = contract_file(files.back());
+  if (fs::exists(contract)) hashes += sha256_of_file(contract);
+  hash_ = sha256(std::as_bytes(std::span(hashes))).substr(0, 8);
 }
 
 fs::path find_spec_file(const std::string& name, const ColorizerRequest& request) {

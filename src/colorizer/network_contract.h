@@ -55,21 +55,25 @@ struct Planes {
 /// A colorizer that asks such a network; its back end says how the network is run.
 class NetworkColorizer : public Colorizer {
  public:
-  NetworkColorizer(std::string name, NetworkContract contract)
-      : name_(std::move(name)), contract_(std::move(contract)) {}
+  /// @param files  that the network is read from; the contract lies beside the last one
+  NetworkColorizer(std::string name, const std::vector<std::filesystem::path>& files);
 
   ChromaBatch colorize(const LightnessBatch& patches) final {
     const Planes input = network_input(contract_, patches);
     return chroma_of(contract_, run(input), input, patches, name_);
   }
-  [[nodiscard]] std::string name() const final { return name_; }
+  /// With a hash of what the files hold: another network under their names is another colorizer.
+  [[nodiscard]] std::string name() const final { return name_ + " (" + hash_ + ")"; }
 
  protected:
   /// @throws ColorizerError  naming the colorizer.
   [[nodiscard]] virtual Planes run(const Planes& input) = 0;
 
-  std::string name_;
+  std::string name_;  ///< as the user wrote it
   NetworkContract contract_;
+
+ private:
+  std::string hash_;
 };
 
 /// The first line of a library's message: the rest is its stack.

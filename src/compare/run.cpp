@@ -44,7 +44,7 @@ Run::Run(Plan plan, Config config, Observer& observer)
   if (config_.colorizer.spec.starts_with(std::string(kSimulated) + ":")) {
     throw UsageError("colorizer \"" + config_.colorizer.spec + "\": simulated takes nothing after it");
   }
-  subjects_ = read_subjects(plan_.captures, config_, observer_);
+  subjects_ = read_subjects(plan_.captures, config_, observer_, plan_.report);
 }
 
 void Run::run() {
@@ -60,6 +60,10 @@ void Run::run() {
     }
   }
   if (cells_.empty()) throw UsageError(plan_.report.string() + ": no finished method of these captures and seeds");
+  // A capture without a cell has no table, and the report nothing to show of it.
+  std::erase_if(subjects_, [&](const auto& subject) {
+    return std::ranges::find(cells_, subject->name, &Cell::capture) == cells_.end();
+  });
 }
 
 void Run::make_cells_together() {

@@ -39,9 +39,9 @@ class Run {
   /// All cells, each capture and seed by one of the ranks; a method that fails leaves one that says why.  @throws
   /// Interrupted  what is finished stays.
   void run();
-  /// Writes the tables and the report.
+  /// Writes the tables and the report, of the captures that have a cell.
   void write_report() const;
-  /// Writes the rating sheet and its key.
+  /// Writes the rating sheet and its key, likewise.
   void write_rating_sheet() const;
 
  private:

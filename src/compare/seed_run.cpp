@@ -7,6 +7,7 @@
 
 #include "src/base/error.h"
 #include "src/base/json_record.h"
+#include "src/base/text.h"
 #include "src/compare/baselines/flow.h"
 #include "src/compare/baselines/positional_field.h"
 #include "src/compare/baselines/simulated.h"
@@ -53,6 +54,22 @@ void begin_folder(const fs::path& folder, const std::string& settings) {
   if (settings_in(folder) == settings) return;
   fs::remove_all(folder);
   write_file(folder / "settings.txt", settings);
+}
+
+/// Tells a file's content from another's; nothing where there is no file, which who reads it says.
+std::string content_of(const fs::path& file) {
+  std::error_code failure;
+  return fs::is_regular_file(file, failure) ? sha256_of_file(file) : "";
+}
+
+/// The same of the files that a colorizer's spec names, which are looked up in `folder`, then as given.
+std::string contents_of(const std::string& spec, const fs::path& folder) {
+  std::string contents;
+  for (const std::string& name : split(spec.substr(spec.find(':') + 1), ',')) {
+    const std::string beside = content_of(folder / name);
+    contents += beside.empty() ? content_of(name) : beside;
+  }
+  return contents;
 }
 
 /// What decides a text's loss.
@@ -134,7 +151,10 @@ void SeedRun::train() {
   Stage1Options options = bench_.config.stage1;
   options.seed = seed_;
   options.exposures = options.poses = options.lenses = false;  // methods are compared on the views as given
-  stage1_settings_ = digest(fs::absolute(subject_.capture.root).string() + options_to_json(options).dump() +
+  // Photographs may come or go between a comparison and its going on.
+  std::string views = digest_of_training(subject_.capture);
+  for (const View* view : subject_.evaluated) views += "\n" + view->name;
+  stage1_settings_ = digest(fs::absolute(subject_.capture.root).string() + views + options_to_json(options).dump() +
                             options_to_json(subject_.options).dump());
   const fs::path done = folder_ / "stage1.txt";
   if (settings_in(folder_) == stage1_settings_ && fs::exists(done)) return;
@@ -147,10 +167,12 @@ void SeedRun::train() {
 
 std::string SeedRun::settings_of(const Method& method) const {
   const Config& run = bench_.config;
+  const fs::path& style = bench_.plan.style_reference;
   return digest(stage1_settings_ + method.name + options_to_json(stage2_of(method, run.stage2)).dump() +
-                (method.matches_features ? bench_.plan.style_reference.string() : "") +
+                (method.matches_features ? style.string() + content_of(style) : "") +
                 (method.follows_text ? text_of(bench_.plan.text) : "") + options_to_json(run.colorizer).dump() +
-                options_to_json(run.render).dump() + (bench_.lpips != nullptr ? bench_.lpips->network() : "") +
+                contents_of(run.colorizer.spec, subject_.capture.root) + options_to_json(run.render).dump() +
+                (bench_.lpips != nullptr ? bench_.lpips->network() : "") +
                 (bench_.encoder != nullptr ? "encoder" : ""));
 }
 

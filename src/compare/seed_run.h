@@ -48,7 +48,7 @@ class SeedRun {
   /// @param folder  REPORT/runs/CAPTURE/seed-N
   SeedRun(const Bench& bench, const Subject& subject, int seed, std::filesystem::path folder);
 
-  /// Stage 1, unless it is there with these settings.
+  /// Stage 1, unless it is there with these settings and of these views.
   void train();
   /// A method's cell, after `train`; read where it is there with these settings and did not fail. A method that fails
   /// leaves one that says why.  @throws Interrupted

@@ -16,16 +16,16 @@ namespace {
 constexpr int kUsualHoldout = 8;  // where neither the capture nor the user says
 constexpr std::size_t kShownViews = 4;
 
-std::unique_ptr<Subject> read_subject(const ComparedCapture& compared, Config config, Observer& observer) {
+std::unique_ptr<Subject> read_subject(const ComparedCapture& compared, Config config, Observer& observer,
+                                      const fs::path& report) {
   if (compared.downscale > 0) config.capture.downscale = compared.downscale;
   auto subject = std::make_unique<Subject>();
-  subject->capture = pipeline::read_capture(compared.path, config, observer);
-  const bool any_held_out = std::ranges::any_of(subject->capture.views, &View::held_out);
-  if (!any_held_out && config.capture.holdout == 0) {
+  if (config.capture.holdout == 0 &&
+      std::ranges::none_of(survey_capture(compared.path, config.capture).views, &View::held_out)) {
     config.capture.holdout = kUsualHoldout;
     observer.say(fmt::format("nothing is held out by the capture: every {}th view is", kUsualHoldout));
-    subject->capture = load_capture(compared.path, config.capture);
   }
+  subject->capture = pipeline::read_capture(compared.path, config, observer, report);
   subject->options = config.capture;
   subject->evaluated = views_to_evaluate(subject->capture, {});
   const View& first = *subject->evaluated.front();
@@ -57,10 +57,11 @@ std::vector<std::size_t> Subject::shown() const {
 }
 
 std::vector<std::unique_ptr<const Subject>> read_subjects(const std::vector<ComparedCapture>& captures,
-                                                          const Config& config, Observer& observer) {
+                                                          const Config& config, Observer& observer,
+                                                          const fs::path& report) {
   std::vector<std::unique_ptr<const Subject>> subjects;
   for (const ComparedCapture& compared : captures) {
-    auto subject = read_subject(compared, config, observer);
+    auto subject = read_subject(compared, config, observer, report);
     const std::string name = fs::absolute(compared.path / "").lexically_normal().parent_path().filename().string();
     const auto is_taken = [&] {
       return std::ranges::any_of(subjects, [&](const auto& other) { return other->name == subject->name; });

@@ -34,9 +34,11 @@ struct Subject {
 };
 
 /// Reads the captures; where one holds nothing out, every eighth view is.
+/// @param report  folder; what of the photographs does not fit into memory lies on its disk
 /// @return  at places that stay
 /// @throws UsageError, MissingInputError, InputError  also for a capture without any colour.
 [[nodiscard]] std::vector<std::unique_ptr<const Subject>> read_subjects(const std::vector<ComparedCapture>& captures,
-                                                                        const Config& config, Observer& observer);
+                                                                        const Config& config, Observer& observer,
+                                                                        const std::filesystem::path& report);
 
 }  // namespace cnerf::compare

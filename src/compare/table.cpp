@@ -92,7 +92,8 @@ std::vector<std::string> methods_of(std::span<const Cell> cells) {
   return present;
 }
 
-/// One value per seed: of the capture, or the mean over the captures that have one of that seed.
+/// One value per seed: of the capture, or the mean over all captures. A seed without a value of each of them has none:
+/// a method that failed on the hardest capture would be the best.
 std::vector<double> values_by_seed(std::span<const Cell> cells, const std::string& method, const std::string& capture,
                                    const Column& column) {
   std::vector<std::pair<int, std::vector<double>>> seeds;
@@ -104,8 +105,11 @@ std::vector<double> values_by_seed(std::span<const Cell> cells, const std::strin
     if (seed == seeds.end()) seed = seeds.insert(seeds.end(), {cell.seed, {}});
     seed->second.push_back(*value);
   }
+  const std::size_t expected = capture.empty() ? captures_of(cells).size() : 1;
   std::vector<double> means;
-  for (const auto& [seed, values] : seeds) means.push_back(mean_of(values));
+  for (const auto& [seed, values] : seeds) {
+    if (values.size() == expected) means.push_back(mean_of(values));
+  }
   return means;
 }
 

@@ -41,7 +41,8 @@ struct Estimate {
 /// "20.50 ± 0.12"; empty where there is nothing.
 [[nodiscard]] std::string text_of(const std::optional<Estimate>& value, int digits);
 
-/// A method's row, of one capture or of all together (then a value is the mean over captures of one seed).
+/// A method's row, of one capture or of all together (then a value is the mean over captures of one seed, where each
+/// capture has one).
 struct Row {
   std::string method;
   std::string error;                             ///< of the first cell that failed

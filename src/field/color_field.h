@@ -41,6 +41,8 @@ class ColorField {
   /// luminance: linear Y seen when looking along `directions` (unit length, away from the camera).
   virtual void query_luminance(std::span<const Vec3f> positions, std::span<const Vec3f> directions,
                                std::span<float> luminance) const = 0;
+  /// What `query_luminance` answers more of than the field was trained on: colours are those of that light, brighter.
+  [[nodiscard]] virtual float gain() const { return 1; }
   /// Grey (1, 1) everywhere when the scene has not been colorized.
   virtual void query_chromaticity(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const = 0;
 };

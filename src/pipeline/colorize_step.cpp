@@ -48,10 +48,7 @@ std::string chosen_take(const RunContext& context, const std::string& named, con
     return named;
   }
   if (existing.resume) {
-    if (const std::string begun = last_take(directory, false); !begun.empty()) return begun;
-    if (const std::string current = directory.record().current_take; !current.empty()) return current;
-    // Killed when the take was finished and the run's record did not name it yet.
-    if (const std::string finished = last_take(directory, true); !finished.empty()) return finished;
+    if (const std::string take = take_to_go_on_with(directory); !take.empty()) return take;
   }
   return directory.free_take_name(kind_of(context.config.colorizer.spec));
 }
@@ -61,15 +58,17 @@ TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Eng
   const RunDirectory& directory = context.directory;
   // Before anything is written: they may refuse.
   const auto [known, viewpoints] = load_known_colors(context.capture, context.config.colorizer);
+  check_bases(context.config.stage2.purify, known);
   std::unique_ptr<Colorizer> made;
   if (job.colorizer == nullptr) made = colorizer_of(context, observer);
   Colorizer& colorizer = job.colorizer != nullptr ? *job.colorizer : *made;
   cluster::Ranks& world = cluster::world();
-  if (world.is_first()) {
-    if (job.existing.overwrite) clear_folder(directory.take_folder(job.take));
-    write_file(directory.take_config_file(job.take), to_toml(context.config));
-  }
   const bool resume = world.agreed(job.existing.resume && fs::exists(directory.take_snapshot(job.take)));
+  const auto keep_config = [&] { write_file(directory.take_config_file(job.take), to_toml(context.config)); };
+  if (world.is_first() && !resume) {
+    if (job.existing.overwrite) clear_folder(directory.take_folder(job.take));
+    keep_config();
+  }
   const Stage2Job stage2{context.capture,
                          directory.stage1_snapshot(),
                          context.config.stage2,
@@ -84,6 +83,7 @@ TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Eng
                          viewpoints,
                          ranks_that_train(engines, /*pays=*/true)};
   const Stage2Report report = is_needed(stage2.ranks) ? train_stage2(stage2, engines, observer) : Stage2Report();
+  if (world.is_first() && resume) keep_config();  // now that it was not refused
   observer.report_progress({"stage 2", 1.0, {}});
   return {job.take, colorizer.name() + describe(known) + describe_viewpoints(viewpoints), report};
 }
@@ -105,6 +105,13 @@ std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& obs
       colorizer_context(context.config, context.capture.root, context.directory.colorizer_cache(), observer));
   if (world.is_first()) world.barrier("colorizer");
   return colorizer;
+}
+
+std::string take_to_go_on_with(const RunDirectory& directory) {
+  if (const std::string begun = last_take(directory, false); !begun.empty()) return begun;
+  if (const std::string current = directory.record().current_take; !current.empty()) return current;
+  // Killed when the take was finished and the run's record did not name it yet.
+  return last_take(directory, true);
 }
 
 std::string take_to_write(const RunContext& context, const std::string& named, const ExistingOutput& existing) {

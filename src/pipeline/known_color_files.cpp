@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/base/text.h"
 #include "src/capture/image_io.h"
 #include "src/color/colorspace_math.h"
 #include "src/pipeline/palette.h"
+#include "src/prepare/photographs.h"
 #include "src/train/chroma/strokes.h"
 
 namespace cnerf::pipeline {
@@ -61,9 +64,18 @@ Ab ab_of_linear(Vec3f rgb) {
   return {lab.a, lab.b};
 }
 
+/// Pixels as the view's file has them: `prepare` turns photographs upright, and other captures hold them as they are
+/// stored.
+LinearImage picture_of_view(const fs::path& file, const View& view) {
+  LinearImage image = read_linear_image(file, Transfer::kSrgb);
+  const int orientation = prepare::orientation_of(read_binary_file(file));
+  if (orientation == 1 || orientation == prepare::orientation_of(read_binary_file(view.image_file))) return image;
+  return prepare::turned_upright(std::move(image), orientation);
+}
+
 /// @param kind  strokes: only what is painted on counts
 KnownColors load_colors(const NamedFile& named, KnownColorKind kind, const View& view) {
-  const LinearImage image = read_linear_image(named.file, Transfer::kSrgb);
+  const LinearImage image = picture_of_view(named.file, view);
   const Intrinsics& lens = view.intrinsics;
   const double ratio = double(image.width) * lens.height / (double(image.height) * lens.width);
   if (std::abs(ratio - 1) > 0.02) {
@@ -110,8 +122,9 @@ Ab color_of(const std::string& text, const std::string& entry, Palette& palette)
                    text);
 }
 
-/// "x,y,VIEW,#rrggbb", or with a word of the palette: a dot, in pixels of the view's image file.
-KnownColors dot_of(const std::string& hint, const Capture& capture, Palette& palette) {
+/// "x,y,VIEW,#rrggbb", or with a word of the palette: a dot, in pixels of the view's image file. Dots of one view are
+/// one source, or each would run over those before it.
+void add_dot(const std::string& hint, const Capture& capture, Palette& palette, std::vector<KnownColors>& dots) {
   const std::string entry = "--hint " + hint;
   const std::vector<std::string> parts = split(hint, ',');
   if (parts.size() != 4) throw UsageError(entry + ": expected x,y,VIEW,#rrggbb or x,y,VIEW,WORD");
@@ -122,19 +135,26 @@ KnownColors dot_of(const std::string& hint, const Capture& capture, Palette& pal
     throw UsageError(fmt::format("{}: the picture has {} x {} pixels", entry, file.width, file.height));
   }
   const Intrinsics& lens = view.intrinsics;
-  KnownColors known{KnownColorKind::kStrokes, view.name, lens.width, lens.height, {}, {}};
-  const auto pixels = std::size_t(lens.width) * std::size_t(lens.height);
-  known.ab.assign(pixels, color_of(parts[3], entry, palette));
-  known.is_known.assign(pixels, 0);
+  const Ab color = color_of(parts[3], entry, palette);
+  const auto of_view = std::ranges::find(dots, view.name, &KnownColors::view);
+  if (of_view == dots.end()) {
+    const auto pixels = std::size_t(lens.width) * std::size_t(lens.height);
+    dots.push_back({KnownColorKind::kStrokes, view.name, lens.width, lens.height, std::vector<Ab>(pixels, color),
+                    std::vector<std::uint8_t>(pixels)});
+  } else {
+    std::rotate(of_view, of_view + 1, dots.end());  // what was said last corrects other views' dots too
+  }
+  KnownColors& known = dots.back();
   const double cx = x * lens.width / file.width, cy = y * lens.height / file.height;
   const double radius = std::max(1.5, kHintRadius * std::min(lens.width, lens.height));
   for (int py = 0; py < lens.height; ++py) {
     for (int px = 0; px < lens.width; ++px) {
-      const bool is_near = std::hypot(px + 0.5 - cx, py + 0.5 - cy) <= radius;
-      known.is_known[std::size_t(py) * std::size_t(lens.width) + std::size_t(px)] = is_near ? 1 : 0;
+      if (std::hypot(px + 0.5 - cx, py + 0.5 - cy) > radius) continue;
+      const std::size_t p = std::size_t(py) * std::size_t(lens.width) + std::size_t(px);
+      known.is_known[p] = 1;
+      known.ab[p] = color;
     }
   }
-  return known;
 }
 
 /// What a stroke file paints on the capture's training views, and at viewpoints.
@@ -168,7 +188,9 @@ GivenColors load_known_colors(const Capture& capture, const ColorizerOptions& co
   };
   load(config.keyframes, "--keyframe", KnownColorKind::kKeyFrame);
   load(config.hint_images, "--hint-image", KnownColorKind::kStrokes);
-  for (const std::string& hint : split(config.hints, ';')) known.push_back(dot_of(hint, capture, palette));
+  std::vector<KnownColors> dots;
+  for (const std::string& hint : split(config.hints, ';')) add_dot(hint, capture, palette, dots);
+  std::ranges::move(dots, std::back_inserter(known));
   if (!config.strokes.empty()) add_painted(config.strokes, capture, palette, given);
   palette.refuse_unnamed();
   return given;

@@ -15,8 +15,8 @@ struct GivenColors {
 };
 
 /// What `config.colorizer.keyframes`, `hint_images`, `hints` and `strokes` name, in the colours of `palette`; key
-/// frames come first, since hints correct them. Views are named as the capture names them, or by their file's name with
-/// or without extension.
+/// frames come first, since hints correct them; hints of one view are one source. Views are named as the capture names
+/// them, or by their file's name with or without extension.
 /// @throws UsageError         an entry that cannot be read, a view that is not there, or is held out.
 /// @throws MissingInputError, InputError  a file that is not there, not a picture, of another shape, or without colour.
 [[nodiscard]] GivenColors load_known_colors(const Capture& capture, const ColorizerOptions& config);

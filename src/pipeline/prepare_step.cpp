@@ -115,6 +115,17 @@ bool begin_folder(const PrepareJob& job) {
   return true;
 }
 
+/// Whether files came, went or were written in a source after its capture was finished.
+bool has_changed_since(const fs::path& source, const fs::path& capture) {
+  std::error_code failure;  // what cannot be read is not newer
+  const fs::file_time_type finished = fs::last_write_time(capture / "transforms.json", failure);
+  if (fs::last_write_time(source, failure) > finished) return true;  // of a folder: its list
+  const fs::directory_iterator files(source, failure);
+  return std::any_of(begin(files), end(files), [&](const auto& file) {
+    return file.is_regular_file(failure) && file.last_write_time(failure) > finished;
+  });
+}
+
 }  // namespace
 
 bool was_begun_for_another(const PrepareJob& job) {
@@ -128,6 +139,10 @@ void prepare_step(const PrepareJob& job, const Engines& engines, Observer& obser
   const FolderLock lock = lock_folder(job.out, FolderLock::Mode::kAlone, observer);
   if (!begin_folder(job)) {
     observer.say("capture: " + job.out.string() + " was prepared before");
+    if (has_changed_since(job.source, job.out)) {
+      observer.say("note: " + job.source.string() + " has changed since; cnerf prepare " + job.source.string() +
+                   " -o " + job.out.string() + " --overwrite takes what is there now");
+    }
     const auto record = read_json(job.out / kRecord);
     if (options.motion_masks && !record.contains("motion")) mask_motion(job.out, options.motion, engines, observer);
     return;

@@ -3,8 +3,10 @@
 #include <chrono>
 #include <future>
 
+#include "src/base/json_record.h"
 #include "src/base/shared_observer.h"
 #include "src/cluster/ranks.h"
+#include "src/evaluate/evaluate.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/default_colorizer.h"
 #include "src/pipeline/evaluate_step.h"
@@ -26,6 +28,20 @@ bool is_done(const RunJob& job, const fs::path& output) {
 fs::path common_capture(const RunJob& job, Observer& observer) {
   cluster::Ranks& world = cluster::world();
   return world.agreed(world.is_first() ? capture_of(job.capture, job.out, observer).string() : "");
+}
+
+/// Whether the folder has what is asked for; else also what it has is to be made again, since a bake replaces another.
+bool is_baked(const RunJob& job, const fs::path& folder, exporting::Formats& formats) {
+  if (!job.existing.resume) return false;
+  const exporting::Formats made = exporting::formats_in(folder);
+  formats = formats | made;
+  return cluster::world().agreed(made == formats);
+}
+
+/// Whether the run's metrics are of this take; those of another one are replaced.
+bool is_evaluated(const RunJob& job, const RunDirectory& directory, const std::string& take) {
+  const fs::path file = directory.metrics_file();
+  return is_done(job, file) && cluster::world().agreed(read_record<Metrics>(file).take == take);
 }
 
 bool needs_colorizer(const RunJob& job, const RunDirectory& directory) {
@@ -86,20 +102,19 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& one_ob
     colorize_step(context, {take, job.existing, made}, engines, observer);
   }
   const fs::path bake = directory.bakes(take), renders = directory.renders(take);
-  const bool is_baked = is_done(job, last_file(bake, job.formats)),
-             is_rendered = is_done(job, renders / "turntable.mp4");
-  const bool is_evaluated = is_done(job, directory.metrics_file());
+  const bool was_baked = is_baked(job, bake, job.formats), was_evaluated = is_evaluated(job, directory, take),
+             was_rendered = is_done(job, renders / "turntable.mp4");
   const Finish& finish = context.config.finish;
   std::unique_ptr<Scene> scene;  // of all steps that are left
-  if (!is_baked || !is_evaluated || !is_rendered) scene = load_scene(directory, take, finish, engines);
-  if (is_baked) {
+  if (!was_baked || !was_evaluated || !was_rendered) scene = load_scene(directory, take, finish, engines);
+  if (was_baked) {
     end_bake(directory, bake, observer);
   } else {  // first of all outputs: it is what a user waits for
     bake_step(context, {take, bake, job.formats, scene.get()}, engines, observer);
   }
   const Scene* const as_trained = finish.is_plain() ? scene.get() : nullptr;
-  if (!is_evaluated) evaluate_step(context, {take, {}, false, as_trained}, engines, observer);
-  if (!is_rendered) {
+  if (!was_evaluated) evaluate_step(context, {take, {}, false, as_trained}, engines, observer);
+  if (!was_rendered) {
     const RenderOutput video{.folder = renders, .mp4 = true};
     render_step(context, {take, turntable_path(context.capture, config.render), video, scene.get()}, engines, observer);
   }

@@ -114,10 +114,10 @@ void begin_records(const RunContext& context, const fs::path& capture_path, cons
   const bool goes_on = directory.exists() && existing.resume;
   if (directory.exists() && !goes_on) directory.clear();
   // Before the configuration is written: what is refused must not take the place of what the run was made with.
-  if (goes_on && !directory.record().stage1.finished) {
+  if (goes_on) {
     check_continues(directory.stage1_snapshot(), context.config.stage1);
+    check_views(directory.stage1_snapshot(), context.capture);
   }
-  if (goes_on) check_views(directory.stage1_snapshot(), context.capture);
   write_file(directory.config_file(), to_toml(context.config));
   if (goes_on) return;
   RunRecord record;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <set>
 #include <tuple>
@@ -62,22 +63,6 @@ void apply_levels(LinearImage& image, const SensorOptions& sensor) {
     const float alpha = image.alpha.empty() ? 1.0f : image.alpha[i / channels];
     image.values[i] = alpha > 0 ? decoded(image.values[i] / alpha) * alpha : 0;
   }
-}
-
-LinearImage turned_upright(const LinearImage& stored, const Upright& grid) {
-  if (grid.orientation == 1) return stored;
-  LinearImage out = stored;
-  out.width = grid.width();
-  out.height = grid.height();
-  std::size_t at = 0;
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x, ++at) {
-      const std::size_t from = grid.stored_index(x, y);
-      out.values[at] = stored.values[from];
-      if (!stored.alpha.empty()) out.alpha[at] = stored.alpha[from];
-    }
-  }
-  return out;
 }
 
 /// The luminance image as codes of `T`, with alpha as a colour image where there is some: OpenCV writes no grey +
@@ -159,16 +144,14 @@ Imported import_one(const fs::path& file, const std::string& name, const fs::pat
   Imported out;
   try {
     if (!is_utf8(name)) throw InputError(printable(file.string()), "name", "expected UTF-8");
-    const ExifFacts exif = read_exif(read_binary_file(file));
+    const std::vector<std::byte> content = read_binary_file(file);
+    const ExifFacts exif = read_exif(content);
     LinearImage stored = read_linear_image(file, Transfer::kLinear);
     apply_levels(stored, sensor);
     const bool eight_bit = stays_eight_bit(stored, sensor);
     stored = luminance_image(std::move(stored));
-    // OpenCV turns TIFF files upright by itself.
-    const std::string kind = lower_extension(file);
-    const int orientation = kind == ".tif" || kind == ".tiff" ? 1 : exif.orientation;
-    const Upright grid = {orientation, stored.width, stored.height};
-    const LinearImage upright = turned_upright(stored, grid);
+    const Upright grid = {orientation_of(content), stored.width, stored.height};
+    const LinearImage upright = turned_upright(std::move(stored), grid.orientation);
     PreparedImage& image = out.image;
     image.name = name + (upright.depth == PixelDepth::kF32 ? ".exr" : ".png");
     image.source = file;
@@ -248,6 +231,30 @@ std::size_t Upright::stored_index(int x, int y) const {
       break;
   }
   return std::size_t(row) * std::size_t(stored_width) + std::size_t(column);
+}
+
+int orientation_of(std::span<const std::byte> file) {
+  const auto begins_with = [&](const char* mark) { return file.size() >= 4 && std::memcmp(file.data(), mark, 4) == 0; };
+  const bool is_tiff = begins_with("II*\0") || begins_with("MM\0*");
+  return is_tiff ? 1 : read_exif(file).orientation;  // OpenCV turns TIFF files upright by itself
+}
+
+LinearImage turned_upright(LinearImage stored, int orientation) {
+  if (orientation == 1) return stored;
+  const Upright grid = {orientation, stored.width, stored.height};
+  LinearImage out = stored;
+  out.width = grid.width();
+  out.height = grid.height();
+  const auto channels = std::size_t(stored.channels);
+  std::size_t at = 0;
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x, ++at) {
+      const std::size_t from = grid.stored_index(x, y);
+      std::copy_n(&stored.values[channels * from], channels, &out.values[channels * at]);
+      if (!stored.alpha.empty()) out.alpha[at] = stored.alpha[from];
+    }
+  }
+  return out;
 }
 
 bool holds_photographs(const fs::path& folder) {

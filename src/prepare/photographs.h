@@ -2,13 +2,16 @@
 /// Photographs as a user has them, on their way to images of a capture: upright, one channel, at the depth they came
 /// in.
 
+#include <cstddef>
 #include <filesystem>
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "src/base/options.h"
 #include "src/base/progress.h"
+#include "src/capture/image_io.h"
 #include "src/prepare/exif.h"
 
 namespace cnerf::prepare {
@@ -83,5 +86,12 @@ struct Upright {
   [[nodiscard]] int height() const { return orientation < 5 ? stored_height : stored_width; }
   [[nodiscard]] std::size_t stored_index(int x, int y) const;
 };
+
+/// How pixels that `read_linear_image` gives of a photograph have to be turned to stand upright, as EXIF numbers it.
+/// @param file  its content
+[[nodiscard]] int orientation_of(std::span<const std::byte> file);
+
+/// The whole image of such pixels.
+[[nodiscard]] LinearImage turned_upright(LinearImage stored, int orientation);
 
 }  // namespace cnerf::prepare

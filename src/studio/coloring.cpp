@@ -118,12 +118,13 @@ void Coloring::colour(const StrokeList& list, const RetouchOptions& options, con
   }
 }
 
-void Coloring::keep(const std::string& take, double seconds, Observer& observer) {
+void Coloring::keep(const std::string& take, double seconds, Observer& observer, bool overwrite) {
   if (is_grey_) throw UsageError("nothing is coloured yet, so there is nothing to keep");
   const pipeline::RunDirectory& directory = context_.directory;
   const fs::path folder = directory.take_folder(take);
   const FolderLock lock = pipeline::lock_folder(folder, FolderLock::Mode::kAlone, observer);
-  if (directory.take_record(take)) throw UsageError("a take of this name exists: " + take);
+  if (directory.take_record(take) && !overwrite) throw UsageError("a take of this name exists: " + take);
+  if (overwrite) clear_folder(folder);
   write_file(directory.take_config_file(take), to_toml(context_.config));
   now_->report.seconds += seconds;
   now_->save(directory.take_snapshot(take));

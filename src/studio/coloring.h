@@ -99,8 +99,8 @@ class Coloring {
   /// @param most_steps  to stop after
   void colour(const StrokeList& list, const RetouchOptions& options, const Breathe& breathe,
               int most_steps = std::numeric_limits<int>::max());
-  /// Writes "now" as a take.  @throws OutputError, BusyError
-  void keep(const std::string& take, double seconds, Observer& observer);
+  /// Writes "now" as a take.  @throws OutputError, BusyError, UsageError  there is one and it is not to be overwritten
+  void keep(const std::string& take, double seconds, Observer& observer, bool overwrite = false);
   /// Does what a journal says, from its base on.
   void replay(const Journal& journal, const RetouchOptions& options, const Breathe& breathe);
 

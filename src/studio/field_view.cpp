@@ -12,14 +12,15 @@ namespace {
 constexpr std::size_t kGrain = 256;  // rays or pixels of a parallel piece of work
 constexpr int kSparseLattice = 4;    // coarser ones save no rays, and lose what is thin
 
-Lab<float> finished(const Lab<float>& color, const Finish& finish) {
-  if (finish.is_plain()) return color;
+/// Linear Rec.709. Exposed last: Lab's a and b are another chromaticity in any light but that of the training.
+Vec3f finished(const Lab<float>& color, const Finish& finish) {
+  if (finish.is_plain()) return gamut_mapped_linear_rgb_from_lab(color);
   const Ab ab = finish.of(Ab{color.a, color.b});
-  return {lightness_from_luminance(finish.gain() * luminance_from_lightness(color.lightness)), ab.a, ab.b};
+  return finish.gain() * gamut_mapped_linear_rgb_from_lab<float>({color.lightness, ab.a, ab.b});
 }
 
 void put(const Lab<float>& color, const Finish& finish, std::size_t pixel, Picture& picture) {
-  const Vec3f rgb = gamut_mapped_linear_rgb_from_lab(finished(color, finish));
+  const Vec3f rgb = finished(color, finish);
   for (int c = 0; c < 3; ++c) picture.rgb[3 * pixel + std::size_t(c)] = srgb8_from_linear(rgb[c]);
 }
 

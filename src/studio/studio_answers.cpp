@@ -14,6 +14,7 @@
 #include "src/base/usage.h"
 #include "src/capture/image_io.h"
 #include "src/picture/encode.h"
+#include "src/prepare/photographs.h"
 #include "src/studio/paint_files.h"
 #include "src/studio/studio.h"
 
@@ -385,7 +386,8 @@ PageAnswer Studio::post_picture(const PageRequest& request) {
   if (kind == "stroke") return add_painted(request, number_in(parameter("view")), name, shown);
   if (kind != "reference") return refusal(400, "kind: this studio takes pictures as reference or stroke");
   const fs::path folder = stroke_folder(context_) / "references";
-  const LinearImage image = decoded_image(request.body, folder, shown);
+  const int orientation = prepare::orientation_of(std::as_bytes(std::span(request.body)));
+  const LinearImage image = prepare::turned_upright(decoded_image(request.body, folder, shown), orientation);
   if (is_monochrome(image)) throw InputError("picture", "colour", "a reference must be in colour; this one is grey");
   const Picture picture = scaled_down(picture_from_linear(image.width, image.height, image.values), kReferenceWidth);
   const fs::path file = folder / (name + ".png");

@@ -52,6 +52,7 @@ class TrainedScene final : public Scene {
     luminance_.engine->query_luminance(positions, directions, luminance);
     for (float& light : luminance) light *= finish_.gain();
   }
+  [[nodiscard]] float gain() const override { return finish_.gain(); }
   void query_chromaticity(std::span<const Vec3f> positions, std::span<Chromaticity> chromaticity) const override {
     if (color_) {
       color_->chromaticity->query(positions, chromaticity);
@@ -101,15 +102,12 @@ class TrainedScene final : public Scene {
   }
 
  private:
-  /// The light of pixels where it is not just what was traced. Empty: it is.
+  /// The light of pixels where it is not what was traced, before the exposure. Empty: it is.
   [[nodiscard]] std::optional<PixelSamples> relit(const TracedPixels& traced, const RenderOptions& options) const {
-    if (!options.luminance && finish_.gain() == 1) return std::nullopt;
+    if (!options.luminance) return std::nullopt;
     PixelSamples pixels = traced.samples();
-    if (options.luminance) {
-      options.luminance(pixels.positions, pixels.luminance);
-    } else {
-      for (float& light : pixels.luminance) light *= finish_.gain();
-    }
+    options.luminance(pixels.positions, pixels.luminance);
+    for (float& light : pixels.luminance) light /= finish_.gain();
     return pixels;
   }
 
@@ -147,7 +145,18 @@ class TrainedScene final : public Scene {
       }
       put_colors(finished(std::move(colors)), image.luminance, first, image.baked_rgb);
     }
+    if (finish_.gain() != 1) expose(first, last, image);
     if (sky_.exists() && options.sky) put_sky_behind(rays, first, image);
+  }
+
+  /// Of pixels whose colours are finished: Lab's a and b are another chromaticity in any light but the training's.
+  void expose(std::size_t first, std::size_t last, RenderedImage& image) const {
+    const auto brighten = [&, gain = finish_.gain()](std::size_t channels, std::vector<float>& values) {
+      for (std::size_t i = channels * first; i < std::min(channels * last, values.size()); ++i) values[i] *= gain;
+    };
+    brighten(1, image.luminance);
+    brighten(3, image.rgb);
+    brighten(3, image.baked_rgb);
   }
 
   /// Of pixels that show the field alone so far.

@@ -35,7 +35,8 @@ struct RenderOptions {
   bool color = true;                ///< also rgb, when the scene is colorized
   bool baked_color = false;         ///< also baked_rgb
   bool sky = true;                  ///< is behind what is seen, where there is one; else black
-  /// Linear Y of samples at positions in unit space, in place of the field's own, which depends on the view.
+  /// Linear Y of samples at positions in unit space, exposed as `query_luminance` has it, in place of the field's own,
+  /// which depends on the view.
   std::function<void(std::span<const Vec3f> positions, std::span<float> luminance)> luminance = {};
 
   /// What samples are left out could change less than a grey level of an 8-bit picture.

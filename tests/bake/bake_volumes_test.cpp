@@ -116,6 +116,13 @@ TEST(VoxelColor, OutOfGamutLosesChromaNotHueOrLightness) {
   EXPECT_NEAR(std::atan2(color.b, color.a), std::atan2(asked.b, asked.a), 2e-2f);
 }
 
+TEST(VoxelColor, GainMultipliesTheColorOfTheLightBelow) {
+  const Chromaticity chromaticity{1.6f, 0.4f};
+  const VoxelColor plain = voxel_color(0.3f, chromaticity), bright = voxel_color(1.2f, chromaticity, 4.0f);
+  for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(bright.rgb[c], 4 * plain.rgb[c]);
+  EXPECT_GT(bright.a, plain.a) << "Lab is that of the brighter light";
+}
+
 TEST(BakeVolume, ColorReachesTwoVoxelsBeyondDensity) {
   const Volume volume = bake_volume(slab(3), {}, slab_options());
   std::map<std::tuple<int, int, int>, float> sigma;

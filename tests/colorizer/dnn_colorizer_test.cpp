@@ -43,6 +43,17 @@ TEST_F(DnnColorizer, OnnxAnswersAbInItsDeclaredUnits) {
   EXPECT_NEAR(ab_of(scaled->colorize(question), 0)[7], 0.5f * question.lightness[7] / 100 * 110, 1e-4);
 }
 
+TEST_F(DnnColorizer, NamesTellNetworksAndTheirContractsApart) {
+  const auto name_of = [&](float weight, const std::string& toml) {
+    return test::colorizer_of("onnx:" + file("net.onnx", convolution({weight, 1}, {0, 0}), toml))->name();
+  };
+  const std::string name = name_of(1, "");
+  EXPECT_THAT(name, ::testing::MatchesRegex("onnx:.*/net\\.onnx \\([0-9a-f]{8}\\)"));
+  EXPECT_EQ(name_of(1, ""), name);
+  EXPECT_NE(name_of(2, ""), name);
+  EXPECT_NE(name_of(1, "input = \"L01\"\n"), name);
+}
+
 TEST_F(DnnColorizer, AnOnnxFileThatIsCutShortOrOfAnotherShapeIsRefused) {
   const std::string good = convolution({1, 1}, {0, 0});
   EXPECT_THAT(message_of<ColorizerError>(

@@ -12,6 +12,7 @@
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer/torch/reference_images.h"
 #include "src/colorizer/torch/reference_network.h"
+#include "src/picture/exr_writer.h"
 #include "tests/colorizer/questions.h"
 #include "tests/support/data.h"
 
@@ -21,6 +22,7 @@ namespace {
 using test::message_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
 
 /// Discs of fine stripes are red, discs of coarse stripes are blue, the smooth ground is green; mean lightness is the
 /// same everywhere, so nothing but texture tells. `seed` places the discs.
@@ -188,6 +190,53 @@ TEST(ReferenceImages, PatchesKeepColoursAndHoldThePlaceTheyShow) {
   EXPECT_LT(flipped, 32);
 }
 
+/// A dull red square on a fiftieth of a picture, the rest of which is transparent.
+TEST(ReferenceImages, WhatIsTransparentIsNotLearned) {
+  const test::TempDir folder;
+  const std::string file = (folder / "painted.png").string();
+  for (const cv::Vec4b& hidden : {cv::Vec4b(0, 0, 0, 0), cv::Vec4b(0, 255, 0, 0)}) {  // B G R A: black, green
+    cv::Mat4b picture(192, 192, hidden);
+    picture(cv::Rect(80, 80, 27, 27)).setTo(cv::Scalar(90, 90, 160, 255));
+    ASSERT_TRUE(cv::imwrite(file, picture));
+    const std::vector<ReferenceImage> images{load_reference_image(file)};
+
+    const PatchDistortion none{0.9, 1.0, 0, 0, false, 0, 0, 0, 0};
+    std::vector<float> lightness(64 * 64), ab(2 * 64 * 64);
+    SequentialRng rng(1, 1);
+    sample_reference_patch(images, none, 64, rng, lightness, ab);
+    int known = 0;
+    for (std::size_t i = 0; i < lightness.size(); ++i) {
+      if (std::isnan(ab[i])) continue;
+      ++known;
+      EXPECT_GT(ab[i], 10) << "red";
+      EXPECT_GT(lightness[i], 20);
+    }
+    EXPECT_NEAR(known, 27 * 27 / 9.0, 40);
+    EXPECT_NEAR(lightness[0], 0, 1e-3) << "over black";
+
+    ReferenceNetwork network(short_recipe(3), images, 1);
+    network.fit(images, {});
+    const LightnessBatch question = test::some_question(1, 64, 64);
+    const std::vector<float> answer = network.colorize(question);
+    for (std::size_t i = 0; i < question.lightness.size(); ++i) ASSERT_GT(answer[i], 10) << "red";
+    for (const float weight : network.weights()) ASSERT_TRUE(std::isfinite(weight));
+  }
+  ASSERT_TRUE(cv::imwrite(file, cv::Mat4b(192, 192, cv::Vec4b(0, 255, 0, 0))));
+  EXPECT_THAT(message_of<InputError>([&] { (void)load_reference_image(file); }), HasSubstr("transparent"));
+}
+
+TEST(ReferenceImages, OpenExrIsReadAsPngIs) {
+  const Toy toy = toy_scene(1);
+  const std::span<const float> rgb = toy.linear_rgb;
+  const test::TempDir folder;
+  write_exr(folder / "toy.exr",
+            {toy.side, toy.side, {{"R", rgb, 3}, {"G", rgb.subspan(1), 3}, {"B", rgb.subspan(2), 3}}, {}});
+  const ReferenceImage exr = load_reference_image(folder / "toy.exr"), png = photograph_of(toy);
+  const std::vector<float>&found = exr.levels[0].lab, &expected = png.levels[0].lab;
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) ASSERT_NEAR(found[i], expected[i], 1.5);  // 8 bits of the other
+}
+
 TEST(ReferenceColorizer, LearnsFromEachPatchTwice) {
   const test::TempDir folder;
   save_png(toy_scene(1), folder / "toy.png");
@@ -221,6 +270,24 @@ TEST(ReferenceColorizer, RefusesWhatIsNoColourPhotograph) {
   write_file(folder / "empty.png", "");
   EXPECT_THROW(test::colorizer_of("reference:" + (folder / "empty.png").string()), InputError);
   EXPECT_THROW(test::colorizer_of("reference:,"), UsageError);
+}
+
+TEST(ReferenceColorizer, NamesTellFitsApart) {
+  const test::TempDir folder;
+  ColorizerOptions options;
+  options.spec = "reference:a.png";
+  const auto name_of = [&](int steps, std::uint64_t seed) {
+    const ColorizerContext context{folder.path(), {}, seed, {}};
+    return fit_reference_colorizer({"a.png", options, context}, short_recipe(steps))->name();
+  };
+  save_png(toy_scene(1), folder / "a.png");
+  const std::string name = name_of(1, 1);
+  EXPECT_THAT(name, MatchesRegex("reference:a\\.png \\([0-9a-f]{8}\\)"));
+  EXPECT_EQ(name_of(1, 1), name);
+  EXPECT_NE(name_of(2, 1), name);
+  EXPECT_NE(name_of(1, 2), name);
+  save_png(toy_scene(2), folder / "a.png");
+  EXPECT_NE(name_of(1, 1), name) << "another photograph";
 }
 
 TEST(ReferenceColorizer, KeepsWhatItFittedAndFitsAgainWhenThatIsDamaged) {

@@ -60,9 +60,9 @@ TEST(Comparison, ACellSurvivesItsFile) {
   Cell written = scored_cell("flower", "colornerf", 2, 20.5, 0.25);
   written.error = "a \"quoted\" reason";
   written.stage1_curve = {{0.5, 20}, {1, 21}};
-  write_file(folder / "cell.json", json_of(written).dump(2));
+  write_file(folder / "cell.json", cnerf::json_of(written).dump(2));
   const auto read = read_record<Cell>(folder / "cell.json");
-  EXPECT_EQ(json_of(read), json_of(written));
+  EXPECT_EQ(cnerf::json_of(read), cnerf::json_of(written));
   EXPECT_EQ(read.long_range.pixels, 0u);
   EXPECT_EQ(read.stage1_curve[1].value, 21);
   write_file(folder / "cell.json", std::string("{\"capture\": \"flower\"}"));
@@ -100,6 +100,23 @@ TEST(Comparison, RowsAreMeansOverSeedsAndOfAllCaptures) {
   EXPECT_DOUBLE_EQ(of_all[0].columns[column("short_relative")]->mean, 15);
   EXPECT_FALSE(of_all[0].columns[column("long_range")]);
   EXPECT_FALSE(of_all[0].columns[column("long_relative")]);
+}
+
+TEST(Comparison, WhatLacksACaptureHasNoMeanOfAll) {
+  std::vector<Cell> cells = {scored_cell("a", "colornerf", 1, 20, 0.2), scored_cell("b", "colornerf", 1, 30, 0.4),
+                             scored_cell("b", "colornerf", 2, 40, 0.4), scored_cell("a", "x", 1, 0, 0),
+                             scored_cell("b", "x", 1, 30, 0.4),         scored_cell("b", "y", 1, 30, 0.4)};
+  cells[3].error = "no memory";
+  const std::size_t psnr = column("psnr_rgb");
+  const auto of_b = table_rows(cells, "b"), of_all = table_rows(cells, "");
+  ASSERT_EQ(of_all.size(), 3u);
+  EXPECT_DOUBLE_EQ(of_all[0].columns[psnr]->mean, 25);
+  EXPECT_EQ(of_all[0].columns[psnr]->n, 1) << "of seed 2 one capture is missing";
+  for (const std::size_t row : {1u, 2u}) {
+    EXPECT_FALSE(of_all[row].columns[psnr]) << of_all[row].method;
+    EXPECT_DOUBLE_EQ(of_b[row].columns[psnr]->mean, 30);
+    EXPECT_FALSE(table_json(cells, {})["tables"][2]["rows"][row].contains("psnr_rgb"));
+  }
 }
 
 TEST(Comparison, ADuelIsWonByWhatTheColumnCallsBetter) {

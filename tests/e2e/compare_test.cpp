@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
 
 #include "src/base/files.h"
 #include "tests/e2e/program.h"
@@ -30,6 +32,13 @@ nlohmann::json row_of(const nlohmann::json& table, const std::string& method) {
   }
   ADD_FAILURE() << "no row " << method;
   return {};
+}
+
+/// What a page's script shows.
+nlohmann::json data_of(const fs::path& page) {
+  const std::string html = read_text_file(page), opening = "<script type=\"application/json\" id=\"data\">";
+  const std::size_t begin = html.find(opening) + opening.size();
+  return nlohmann::json::parse(html.substr(begin, html.find("</script>", begin) - begin));
 }
 
 /// A comparison of every method, which the cases begin with.
@@ -131,6 +140,20 @@ TEST_F(Compare, SeedsOfSeveralRunsAreJoined) {
   EXPECT_EQ(compare(folder_ / "empty", "colornerf", {"--only-report"}).exit_code, 64);
 }
 
+// A page that looked for its table would show nothing at all.
+TEST_F(Compare, ACaptureWithoutAnyCellIsLeftOutOfTheReport) {
+  const fs::path out = comparison_of({"grey"});
+  const std::string other = tiny_capture().string() + "@2";
+  const ProgramResult result = cnerf(concatenated(
+      {"compare", tiny_capture().string(), other, "-o", out.string(), "--methods", "grey", "--only-report"},
+      tiny_options()));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto data = data_of(out / "report.html");
+  ASSERT_EQ(data["captures"].size(), 1u);
+  EXPECT_EQ(data["captures"][0]["name"], tiny_capture().filename().string());
+  EXPECT_EQ(data["table"]["tables"][0]["capture"], data["captures"][0]["name"]);
+}
+
 TEST_F(Compare, ResumingMakesOnlyWhatIsMissing) {
   const fs::path out = comparison_of({"colornerf", "grey"});
   EXPECT_EQ(compare(out, "colornerf,grey").exit_code, 64) << "neither --resume nor --overwrite";
@@ -148,6 +171,42 @@ TEST_F(Compare, ResumingMakesOnlyWhatIsMissing) {
   ASSERT_EQ(changed.exit_code, 0) << changed.err;
   EXPECT_NE(fs::last_write_time(cell), before);
   EXPECT_NE(read_text_file(cell), content);
+}
+
+TEST_F(Compare, ACaptureOfOtherViewsIsTrainedAnew) {
+  const fs::path capture = copied(tiny_capture(), folder_ / "capture"), out = folder_ / "out";
+  const std::vector<std::string> resume = {"compare",   capture.string(), "-o",      out.string(),
+                                           "--methods", "grey",           "--resume"};
+  ASSERT_EQ(cnerf(concatenated(resume, tiny_options())).exit_code, 0);
+  const fs::path stage1 = out / "runs/capture/seed-1/stage1.snapshot", cell = stage1.parent_path() / "grey/cell.json";
+  for (const char* list : {"train_filenames", "test_filenames"}) {
+    const auto trained = fs::last_write_time(stage1), judged = fs::last_write_time(cell);
+    auto poses = json_of(capture / "transforms.json");
+    poses[list].erase(poses[list].size() - 1);
+    write_file(capture / "transforms.json", poses.dump());
+    const ProgramResult result = cnerf(concatenated(resume, tiny_options()));
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_NE(fs::last_write_time(stage1), trained) << list;
+    EXPECT_NE(fs::last_write_time(cell), judged) << list;
+  }
+}
+
+// A file of the same name may hold another picture by now.
+TEST_F(Compare, AFileOfAnotherContentMakesItsCellsAnew) {
+  const fs::path out = comparison_of({}), picture = folder_ / "picture.png";
+  const std::vector<std::pair<std::string, std::vector<std::string>>> cases = {
+      {"style-transfer", {"--resume", "--style-reference", picture.string()}},
+      {"grey", {"--resume", "--colorizer", "reference:" + picture.string()}}};  // concerns all cells; grey is quickest
+  for (const auto& [method, options] : cases) {
+    std::set<std::string> settings;
+    for (const char* content : {"one", "other"}) {
+      write_file(picture, std::string(content));
+      const ProgramResult result = compare(out, method, options);
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+      settings.insert(read_text_file(out / "runs" / tiny_capture().filename() / "seed-1" / method / "settings.txt"));
+    }
+    EXPECT_EQ(settings.size(), 2u) << method;
+  }
 }
 
 TEST_F(Compare, SeedsGiveConfidenceAndTheSameSeedTheSameNumbers) {

@@ -10,6 +10,7 @@
 #include "src/base/files.h"
 #include "tests/e2e/program.h"
 #include "tests/support/data.h"
+#include "tests/support/exif_jpeg.h"
 #include "tests/support/json_file.h"
 
 namespace cnerf::test {
@@ -56,12 +57,29 @@ TEST(Pipeline, RunLeavesEverythingItSays) {
   const ProgramResult again = cnerf(concatenated(arguments, {"--resume"}));
   EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_EQ(files_below(out), files) << "nothing is left to do";
+  const ProgramResult mesh = cnerf(concatenated(arguments, {"--resume", "--format", "gltf"}));
+  EXPECT_EQ(mesh.exit_code, 0) << mesh.err;
+  EXPECT_THAT(files_below(out), testing::IsSupersetOf({"bakes/reference/mesh.gltf", "bakes/reference/volume.vdb"}))
+      << "what is asked for comes to what is there";
 
   for (const fs::path& thing : {out, out / "stage1.snapshot", out / "bakes/reference/volume.vdb"}) {
     const ProgramResult info = cnerf({"info", thing.string()});
     EXPECT_EQ(info.exit_code, 0) << thing << info.err;
     EXPECT_GT(info.out.size(), 50u);
   }
+}
+
+TEST(Pipeline, ARunThatIsColouredLaterIsEvaluatedAgain) {
+  const TempDir folder;
+  const fs::path out = copied(tiny_run(), folder / "run");
+  const auto run = concatenated({"run", tiny_capture().string(), "-o", out.string(), "--resume"},
+                                concatenated(tiny_options(), {"--set", "render.frames=2"}));
+  ASSERT_EQ(cnerf(concatenated(run, {"--grey"})).exit_code, 0);
+  EXPECT_EQ(json_of(out / "metrics.json").at("take"), "");
+  const ProgramResult colored = cnerf(concatenated(run, {"--colorizer", "reference:references"}));
+  ASSERT_EQ(colored.exit_code, 0) << colored.err;
+  EXPECT_EQ(json_of(out / "metrics.json").at("take"), "reference");
+  EXPECT_TRUE(fs::exists(out / "takes/reference/metrics.json"));
 }
 
 TEST(Pipeline, StepsOneByOneWithoutColour) {
@@ -260,6 +278,17 @@ while True:
   EXPECT_EQ(
       cnerf({"colorize-image", in, (folder / "p.png").string(), "--prompt", "red", "--colorizer", "grey"}).exit_code,
       64);
+}
+
+TEST(ColorizeImage, TurnsAPhotographUpright) {
+  const TempDir folder;
+  write_file(folder / "photo.jpg", turned_photograph(6));
+  const std::string out = (folder / "out.png").string();
+  const ProgramResult result = cnerf({"colorize-image", (folder / "photo.jpg").string(), out, "--colorizer", "grey"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const cv::Mat3b picture = cv::imread(out);
+  ASSERT_EQ(picture.size(), cv::Size(40, 20));
+  EXPECT_GT(picture(10, 5)[1], picture(10, 35)[1]) << "red is lighter than blue";
 }
 
 TEST(Pipeline, ProgressAsJson) {

@@ -79,7 +79,12 @@ TEST(Resuming, AColorizationIsExact) {
   if (stopped.exit_code == 0) GTEST_SKIP() << "the program was done before the signal arrived";
   EXPECT_EQ(stopped.exit_code, 130) << stopped.err;
   EXPECT_FALSE(fs::exists(parts / "takes/t/take.json")) << "only a finished take has one";
-  const ProgramResult resumed = cnerf(concatenated(colorize(parts), {"--resume"}));
+  const std::string config = read_text_file(parts / "takes/t/config.toml");
+  const ProgramResult refused = cnerf(concatenated(colorize(parts), {"--resume", "--set", "stage2.patches=999"}));
+  EXPECT_EQ(refused.exit_code, 78) << refused.err;
+  EXPECT_EQ(read_text_file(parts / "takes/t/config.toml"), config) << "what is refused changes nothing";
+  // The take that was begun, with its own colorizer and not the run's.
+  const ProgramResult resumed = cnerf({"colorize", parts.string(), "--resume"});
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
   EXPECT_TRUE(read_binary_file(parts / "takes/t/take.snapshot") == read_binary_file(whole / "takes/t/take.snapshot"));
 }
@@ -134,6 +139,9 @@ TEST(Resuming, OnOtherViewsIsRefusedAndChangesNothing) {
   const ProgramResult refused = cnerf(concatenated(again, {"--holdout", "2"}));
   EXPECT_EQ(refused.exit_code, 78) << refused.err;
   EXPECT_THAT(refused.err, HasSubstr("capture.holdout"));
+  // Of a finished run too: its configuration says what it was made with.
+  const ProgramResult another_seed = cnerf(concatenated(again, {"--set", "stage1.seed=99"}));
+  EXPECT_EQ(another_seed.exit_code, 78) << another_seed.err;
   EXPECT_EQ(read_text_file(run / "config.toml"), before);
 }
 

@@ -10,9 +10,11 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/picture/encode.h"
 #include "src/train/chroma/strokes.h"
 #include "tests/support/data.h"
+#include "tests/support/exif_jpeg.h"
 
 namespace cnerf::pipeline {
 namespace {
@@ -75,6 +77,37 @@ TEST_F(KnownColorFiles, KeyFramesComeFirstThenHints) {
   EXPECT_EQ(known[3].is_known[19], 1) << "the corner";
 }
 
+TEST_F(KnownColorFiles, APhotographIsTurnedAsTheViewIs) {
+  ColorizerOptions config;
+  config.keyframes = "a=" + at("photo.jpg");
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    write_file(folder_ / "photo.jpg", test::turned_photograph(orientation));
+    const KnownColors known = load_known_colors(capture_, config).known.at(0);
+    ASSERT_EQ(known.width, 40) << orientation;
+    EXPECT_GT(known.ab[10 * 40 + 5].b, 20) << "red, orientation " << orientation;
+    EXPECT_LT(known.ab[10 * 40 + 35].b, -40) << "blue, orientation " << orientation;
+  }
+  write_file(folder_ / "photo.jpg", test::turned_photograph(3));
+  capture_.views[0].image_file = folder_ / "photo.jpg";
+  const KnownColors known = load_known_colors(capture_, config).known.at(0);
+  EXPECT_LT(known.ab[10 * 40 + 5].b, -40) << "the view itself is read as it is stored";
+}
+
+/// Else each would run over those before it.
+TEST_F(KnownColorFiles, DotsOfOneViewAreOneSource) {
+  ColorizerOptions config;
+  config.hints = "10,10,a,#00ff00;30,10,b,#0000ff;14,10,a,#ff0000;12,10,images/a.png,#0000ff";
+  const std::vector<KnownColors> known = load_known_colors(capture_, config).known;
+  ASSERT_EQ(known.size(), 2u);
+  EXPECT_EQ(known[0].view, "images/b.png");
+  EXPECT_EQ(known[1].view, "images/a.png") << "which was hinted at last";
+  const auto color_at = [&](int x) { return known[1].ab[std::size_t(5 * 20 + x)].a; };
+  for (int x = 4; x < 8; ++x) EXPECT_EQ(known[1].is_known[std::size_t(5 * 20 + x)], 1) << x;
+  EXPECT_EQ(color_at(4), ab_of_hex("#00ff00")->a) << "half of its dot is left";
+  EXPECT_EQ(color_at(6), ab_of_hex("#0000ff")->a) << "the last lies on top";
+  EXPECT_EQ(color_at(7), ab_of_hex("#ff0000")->a);
+}
+
 TEST_F(KnownColorFiles, OfAHintPictureOnlyTheStrokesCount) {
   cv::Mat4b strokes(20, 40, cv::Vec4b(0, 0, 0, 0));
   strokes.at<cv::Vec4b>(6, 31) = {30, 30, 200, 255};  // B G R A
@@ -124,18 +157,18 @@ TEST_F(KnownColorFiles, APaletteColorsTheHintsThatNameItsWords) {
   ColorizerOptions config;
   config.hints = "10,10,a,jacket;30,10,a,jacket;10,10,b,#0000ff;30,10,b,the wall";
   config.palette = "jacket=#00ff00, the wall=#ff0000";
-  const auto dot = [&](std::size_t index, int x) {
-    return load_known_colors(capture_, config).known.at(index).ab[5 * 20 + std::size_t(x)];
+  const auto dot = [&](std::size_t view, int x) {
+    return load_known_colors(capture_, config).known.at(view).ab[5 * 20 + std::size_t(x)];
   };
   const Ab green = *ab_of_hex("#00ff00"), red = *ab_of_hex("#ff0000"), blue = *ab_of_hex("#0000ff");
   EXPECT_EQ(dot(0, 5).a, green.a);
-  EXPECT_EQ(dot(1, 15).a, green.a);
-  EXPECT_EQ(dot(2, 5).a, blue.a);
-  EXPECT_EQ(dot(3, 15).a, red.a);
+  EXPECT_EQ(dot(0, 15).a, green.a);
+  EXPECT_EQ(dot(1, 5).a, blue.a);
+  EXPECT_EQ(dot(1, 15).a, red.a);
   config.palette = "jacket=#ff0000;the wall=#ff0000";
   EXPECT_EQ(dot(0, 5).a, red.a) << "one word, all its hints";
-  EXPECT_EQ(dot(1, 15).a, red.a);
-  EXPECT_EQ(dot(2, 5).a, blue.a);
+  EXPECT_EQ(dot(0, 15).a, red.a);
+  EXPECT_EQ(dot(1, 5).a, blue.a);
 }
 
 TEST_F(KnownColorFiles, APaletteColorsTheStrokesThatHaveItsWords) {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
+
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/observer.h"
@@ -28,6 +30,16 @@ class PreparedCapture : public testing::Test {
     Observer silent;
     prepare_step({source, capture_, {}, existing}, cpu_engines(), silent);
   }
+  /// What going on says.
+  std::string notes_of() {
+    class Notes final : public Observer {
+     public:
+      void say(const std::string& line) override { text += line + "\n"; }
+      std::string text;
+    } notes;
+    prepare_step({photos_, capture_, {}, {.resume = true}}, cpu_engines(), notes);
+    return notes.text;
+  }
 
   test::TempDir folder_;
   fs::path photos_ = folder_ / "photos", capture_ = folder_ / "capture";
@@ -43,6 +55,20 @@ TEST_F(PreparedCapture, OfOtherPhotographsIsRefused) {
   EXPECT_TRUE(was_begun_for_another({folder_ / "others", capture_, {}, {}}));
   EXPECT_THAT([&] { prepare(folder_ / "others", {.resume = true}); },
               ThrowsMessage<UsageError>(HasSubstr("another source, " + photos_.string())));
+}
+
+TEST_F(PreparedCapture, SaysWherePhotographsCameSince) {
+  write_file(photos_ / "a.jpg", std::string_view("picture"));
+  const auto now = fs::last_write_time(photos_ / "a.jpg");
+  const auto is_told = [&](int seconds_of_photograph, int seconds_of_folder) {
+    fs::last_write_time(capture_ / "transforms.json", now);
+    fs::last_write_time(photos_ / "a.jpg", now + std::chrono::seconds(seconds_of_photograph));
+    fs::last_write_time(photos_, now + std::chrono::seconds(seconds_of_folder));
+    return testing::Value(notes_of(), HasSubstr("has changed since; cnerf prepare"));
+  };
+  EXPECT_FALSE(is_told(-1, -1));
+  EXPECT_TRUE(is_told(1, -1)) << "written again";
+  EXPECT_TRUE(is_told(-1, 1)) << "came or went";
 }
 
 TEST_F(PreparedCapture, IsMadeAgainIfAsked) {

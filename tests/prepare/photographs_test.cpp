@@ -12,10 +12,12 @@
 #include "src/color/colorspace_math.h"
 #include "src/picture/exr_writer.h"
 #include "tests/support/data.h"
+#include "tests/support/exif_jpeg.h"
 
 namespace cnerf::prepare {
 namespace {
 namespace fs = std::filesystem;
+using test::exif_block;
 using testing::HasSubstr;
 
 cv::Mat1b ramp(int width, int height, int seed = 0) {
@@ -31,34 +33,8 @@ void write(const fs::path& file, const cv::Mat& image) {
   ASSERT_TRUE(cv::imwrite(file.string(), image));
 }
 
-/// A big-endian EXIF block with orientation, focal length and its 35 mm equivalent.
-std::string exif_block(int orientation, int focal_mm, int focal_35mm) {
-  std::string tiff("MM\0*\0\0\0\x08", 8);
-  const auto u16 = [&](int v) { tiff += {char(v >> 8), char(v)}; };
-  const auto u32 = [&](int v) { tiff += {char(v >> 24), char(v >> 16), char(v >> 8), char(v)}; };
-  u16(2);  // entries of the first directory, at 8
-  u16(0x0112), u16(3), u32(1), u16(orientation), u16(0);
-  u16(0x8769), u16(4), u32(1), u32(38);  // the EXIF directory follows
-  u32(0);
-  u16(2);                                // at 38
-  u16(0x920A), u16(5), u32(1), u32(68);  // focal length, a rational at 68
-  u16(0xA405), u16(3), u32(1), u16(focal_35mm), u16(0);
-  u32(0);
-  u32(focal_mm), u32(1);
-  return std::string("Exif\0\0", 6) + tiff;
-}
-
-/// A JPEG with the block inserted behind its first marker.
 void write_jpeg(const fs::path& file, const cv::Mat& image, const std::string& exif) {
-  std::vector<std::uint8_t> bytes;
-  ASSERT_TRUE(cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, 100}));
-  const std::size_t size = exif.size() + 2;
-  std::string text(bytes.begin(), bytes.begin() + 2);
-  text += {char(0xFF), char(0xE1), char(size >> 8), char(size)};
-  text += exif;
-  text.append(bytes.begin() + 2, bytes.end());
-  fs::create_directories(file.parent_path());
-  write_file(file, text);
+  write_file(file, test::jpeg_with(exif, image));
 }
 
 PhotographSet import_all(const fs::path& folder, const fs::path& capture, const SensorOptions& sensor = {},
@@ -191,6 +167,16 @@ TEST(Photographs, TiffsAreTurnedUprightOnce) {
     EXPECT_EQ(upright.cols, orientation < 5 ? 64 : 32) << orientation;
     EXPECT_GT(upright.at<std::uint8_t>(3, 3), 180) << orientation;
   }
+}
+
+/// What a file is, its content says: OpenCV turns TIFF files, whatever they are called, and no JPEG.
+TEST(Photographs, TheContentSaysWhoTurnsAPhotograph) {
+  const auto orientation = [](const std::string& file) { return orientation_of(std::as_bytes(std::span(file))); };
+  EXPECT_EQ(orientation(test::turned_photograph(6)), 6);
+  EXPECT_EQ(orientation(tiff(ramp(20, 10), 6)), 1);
+  const test::TempDir folder;
+  for (const char* name : {"in/a.tif", "in/b.tif"}) write_file(folder / name, test::turned_photograph(6));
+  EXPECT_EQ(import_all(folder / "in", folder / "out").images.at(0).width, 40);
 }
 
 TEST(Photographs, EveryOrientationIsABijection) {

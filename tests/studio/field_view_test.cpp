@@ -3,6 +3,7 @@
 #include "src/studio/field_view.h"
 
 #include <cmath>
+#include <cstdlib>
 
 #include "tests/support/stage2_fixture.h"
 
@@ -93,6 +94,22 @@ TEST_F(FieldView, SmallFramesAreTracedWhole) {
   (void)draw(small, count, at);
   EXPECT_EQ(below.rays, count);
   EXPECT_LT(at.rays, count);
+}
+
+TEST_F(FieldView, ExposureMultipliesLight) {
+  const auto drawn = [&](double exposure) {
+    const DrawingEffort effort = sharp_effort(64, {.exposure = exposure});
+    const std::vector<Side> sides = {&colors_};
+    return draw_field(luminance_, camera(0), sides, effort, [] { return true; }).front();
+  };
+  const Picture plain = drawn(0), darker = drawn(-1);
+  int worst = 0;
+  for (std::size_t i = 0; i < plain.rgb.size(); ++i) {
+    if (plain.rgb[i] == 255) continue;  // perhaps clipped
+    const float half = 0.5f * linear_from_srgb(float(plain.rgb[i]) / 255);
+    worst = std::max(worst, std::abs(int(darker.rgb[i]) - int(srgb8_from_linear(half))));
+  }
+  EXPECT_LE(worst, 1) << "both pictures are rounded";
 }
 
 TEST_F(FieldView, DrawingStopsBetweenParts) {

@@ -17,6 +17,7 @@
 #include "src/studio/paint_files.h"
 #include "tests/studio/state.h"
 #include "tests/support/data.h"
+#include "tests/support/exif_jpeg.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/tiny_config.h"
 
@@ -300,6 +301,11 @@ TEST_F(StudioTest, AJournalIsReplayedBitForBit) {
   again.keep("red-2", 0, observer_);
   EXPECT_EQ(read_binary_file(context_.directory.take_snapshot("red")),
             read_binary_file(context_.directory.take_snapshot("red-2")));
+  EXPECT_THROW(again.keep("red", 0, observer_), UsageError);
+  write_file(context_.directory.take_folder("red") / "metrics.json", std::string_view("{}"));
+  again.keep("red", 0, observer_, /*overwrite=*/true);
+  EXPECT_FALSE(fs::exists(context_.directory.take_folder("red") / "metrics.json")) << "of the take before";
+  EXPECT_TRUE(context_.directory.take_record("red").has_value());
 }
 
 TEST_F(StudioTest, StrokesThatColorEverythingReachAllAndAreReplayedBitForBit) {
@@ -412,6 +418,23 @@ TEST_F(StudioTest, PicturesOfAnyContentAreRefusedByName) {
   const std::vector<std::byte> grey = png_bytes(Picture{8, 8, std::vector<std::uint8_t>(192, 90)});
   EXPECT_THAT(sent("reference", {reinterpret_cast<const char*>(grey.data()), grey.size()}).body, HasSubstr("grey"));
   EXPECT_TRUE(fs::is_empty(context_.directory.root() / "strokes/references")) << "nothing was kept";
+}
+
+TEST_F(StudioTest, AReferenceIsTurnedUpright) {
+  Studio studio(context_, "", cpu_engines(), observer_, kQuick);  // which does not work: nothing is fitted
+  const PageAnswer answer = studio.answer({"POST",
+                                           "/studio/pictures",
+                                           {{"kind", "reference"}, {"name", "photo.jpg"}},
+                                           kPainter,
+                                           {},
+                                           test::turned_photograph(6)});
+  EXPECT_EQ(answer.status, 409) << answer.body;
+  const fs::directory_iterator files(context_.directory.root() / "strokes/references");
+  ASSERT_TRUE(files != fs::directory_iterator());
+  const cv::Mat3b kept = cv::imread(files->path().string());
+  ASSERT_EQ(kept.size(), cv::Size(40, 20));
+  EXPECT_GT(kept(10, 5)[2], 150) << "red";
+  EXPECT_GT(kept(10, 35)[0], 150) << "blue";
 }
 
 TEST_F(StudioTest, TheFinishIsShownAtOnceAndBakedButNotTrained) {

@@ -100,6 +100,27 @@ KnownColors stroke_at(int x, int y, Ab color) {
   return strokes;
 }
 
+TEST(KnownColors, AThinLineOnALargePictureIsAStroke) {
+  const std::vector<CachedView> views = {look(0.5f, false), look(0.5f, false)};
+  KnownColors line{KnownColorKind::kStrokes, kNames[0], 4 * kWidth, 4 * kHeight, {}, {}};
+  line.ab.resize(std::size_t(line.width) * std::size_t(line.height));
+  line.is_known.assign(line.ab.size(), 0);
+  for (int x = 0; x < line.width; ++x) {
+    const auto p = std::size_t((4 * 20 + 1) * line.width + x);
+    line.ab[p] = {50, 0};
+    line.is_known[p] = 1;
+  }
+  const KnownColors small = resized_to(line, views[0]);
+  for (std::size_t p = 0; p < small.ab.size(); ++p) {
+    EXPECT_EQ(small.is_known[p] != 0, p / kWidth == 20) << "pixel " << p;
+    EXPECT_EQ(small.ab[p].a, p / kWidth == 20 ? 50 : 0) << "pixel " << p;
+  }
+  EXPECT_FALSE(known_color_map(views, kNames, std::span(&line, 1)).places().empty());
+  line.kind = KnownColorKind::kKeyFrame;
+  const KnownColors frame = resized_to(line, views[0]);
+  EXPECT_EQ(std::ranges::count(frame.is_known, 1), 0) << "of a picture most of a pixel";
+}
+
 RunningColors grown_from(const KnownColors& strokes, const CachedView& view) {
   RunningColors colors = running_colors(strokes);
   run(colors, view, surface_distance(view));

@@ -136,5 +136,21 @@ TEST(ColoredSky, HasItsLightAndTheFinishOfTheScene) {
   EXPECT_NEAR(luminance_of(sky.along({0, 1, 0})), 0.2f, 1e-5f);
 }
 
+TEST(ColoredSky, ExposureMultipliesItsColors) {
+  const CachedView view = half_sky();
+  SkyColors colors = SkyColors::grey();
+  for (std::size_t p = 0; p < view.opacity.size(); ++p) colors.add(view, p, kRed);
+  colors.refresh();
+  const std::vector<float> light(16 * 8, 0.3f);
+  for (const Finish& finish : {Finish{}, Finish{.saturation = 1.5, .hue = 20}}) {
+    const ColoredSky sky{{light.data(), 16, 8}, &colors, finish};
+    ColoredSky exposed = sky;
+    exposed.finish.exposure = 1;
+    const Vec3f before = sky.along({1, 0, 0.2f}), after = exposed.along({1, 0, 0.2f});
+    EXPECT_GT(before.x - before.z, 0.1f) << "it is red";
+    for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(after[c], 2 * before[c]);
+  }
+}
+
 }  // namespace
 }  // namespace cnerf

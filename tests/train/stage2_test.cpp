@@ -2,6 +2,8 @@
 
 #include <set>
 
+#include "src/base/error.h"
+#include "src/train/chroma/base_chooser.h"
 #include "tests/support/stage2_fixture.h"
 
 namespace cnerf {
@@ -99,6 +101,31 @@ TEST_F(Stage2, BasesAreWhatTheAnswersAboutAllPlacesAgreeOn) {
   options.purify.opinions = 1;
   (void)colorize(options, colorizer, take("first"));
   EXPECT_GT(distance_to_answer("first"), 30) << "the first answers are wrong, and so is what is like them";
+}
+
+TEST_F(Stage2, EachKeyFrameIsABaseAndNoneIsPicked) {
+  std::vector<KnownColors> known;
+  for (const View& view : std::span(capture_.views).first(2)) {
+    const int width = view.intrinsics.width, height = view.intrinsics.height;
+    const std::vector<Ab> ab(std::size_t(width * height), Ab{20, 10});
+    known.push_back({KnownColorKind::kKeyFrame, view.name, width, height, ab, std::vector<std::uint8_t>(ab.size(), 1)});
+  }
+  Stage2Options options = small_options();
+  options.purify.base_images = 1;
+  Listening colorizer;
+  const Stage2Job job{capture_, stage1(), options, colorizer, known, take("a")};
+  PatchQuestions questions;
+  Session session(job, observer_);
+  session.cache_views(cpu_engines());
+  Questioner questioner(session, questions);
+  BaseChooser chooser(session, questioner);
+  const KnownColorMap map = known_color_map(session.views(), session.names(), known);
+  std::set<std::size_t> views;
+  for (const AnsweredPatch& base : chooser.choose(map)) views.insert(base.place.view);
+  EXPECT_EQ(views, (std::set<std::size_t>{0, 1}));
+  options.purify.picked_bases = "2,5";
+  EXPECT_THROW(check_bases(options.purify, known), UsageError);
+  EXPECT_NO_THROW(check_bases(options.purify, {}));
 }
 
 TEST_F(Stage2, SpreadWeightReachesTheField) {

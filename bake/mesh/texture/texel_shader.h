@@ -34,6 +34,7 @@ class TexelShader {
   /// Thread-safe. Points that lie close together are answered faster in one call.
   /// @throws ContractError  when the field answers something that is not finite.
   [[nodiscard]] std::vector<SurfaceColor> shade(std::span<const SurfacePoint> points) const;
+  [[nodiscard]] float gain() const { return field_.gain(); }
 
  private:
   struct Sample;

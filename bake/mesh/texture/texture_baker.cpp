@@ -150,7 +150,7 @@ void shade_tile(const std::vector<SurfaceTexel>& texels, const TexelShader& shad
   const std::vector<SurfaceColor> colors = shader.shade(points);
   for (std::size_t t = 0; t < texels.size(); ++t) {
     if (colors[t].opacity < kLeastOpacity) continue;
-    const VoxelColor color = voxel_color(colors[t].luminance, colors[t].chromaticity);
+    const VoxelColor color = voxel_color(colors[t].luminance, colors[t].chromaticity, shader.gain());
     const std::size_t at = std::size_t(texels[t].row) * texture.size + texels[t].column;
     put(texture, at, color);
     texture.coverage[at] = 1;

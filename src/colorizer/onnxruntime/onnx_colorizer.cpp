@@ -76,7 +76,7 @@ Ort::Session checked_session(const std::string& name, const fs::path& file, doub
 class OnnxColorizer final : public NetworkColorizer {
  public:
   OnnxColorizer(const fs::path& file, const std::string& shown, double timeout_seconds)
-      : NetworkColorizer("onnx:" + shown, contract_beside(file)),
+      : NetworkColorizer("onnx:" + shown, {file}),
         session_(checked_session(name_, file, timeout_seconds)),
         timeout_(timeout_seconds) {
     Ort::AllocatorWithDefaultOptions allocator;

@@ -10,6 +10,7 @@
 #include "src/base/files.h"
 #include "src/colorizer/torch/encoder.h"
 #include "src/colorizer/torch/network_weights.h"
+#include "src/colorizer/torch/products.h"
 #include "src/colorizer/torch/reference_images.h"
 #include "src/colorizer/torch/reference_network.h"
 
@@ -48,11 +49,17 @@ std::vector<fs::path> reference_files(const ColorizerRequest& request) {
   return files;
 }
 
-/// All that decides the weights: the photographs' bytes, in their order, the recipe and the seed.
-std::string cache_key(const std::vector<fs::path>& files, const ReferenceRecipe& recipe, std::uint64_t seed) {
+/// Of all that a user decides of the weights: the photographs' bytes, in their order, the recipe and the seed.
+std::string fit_hash(const std::vector<fs::path>& files, const ReferenceRecipe& recipe, std::uint64_t seed) {
   std::string text = recipe.text() + "; seed " + std::to_string(seed);
   for (const fs::path& file : files) text += "; " + sha256(read_binary_file(file));
-  return sha256(std::as_bytes(std::span(text))).substr(0, 16);
+  return sha256(std::as_bytes(std::span(text)));
+}
+
+/// Processors that multiply in bf16 come to other weights, which a take may be gone on with all the same.
+std::string cache_name(const std::string& hash, const ReferenceRecipe& recipe) {
+  const bool is_bf16 = !recipe.builtin.empty() && product_type() != torch::kFloat32;
+  return "reference-" + hash.substr(0, 16) + (is_bf16 ? "-bf16" : "") + ".weights";
 }
 
 constexpr std::array<char, 8> kWeightsMagic{'C', 'N', 'R', 'E', 'F', 'N', 'E', '1'};
@@ -132,12 +139,10 @@ std::unique_ptr<Colorizer> fit_reference_colorizer(const ColorizerRequest& reque
 
   const ColorizerContext& context = request.context;
   const std::string with = recipe.encoder ? " with encoder " + recipe.encoder->sha256().substr(0, 8) : "";
-  const std::string name = "reference:" + request.argument + with;
+  const std::string hash = fit_hash(files, recipe, context.seed);
+  const std::string name = "reference:" + request.argument + with + " (" + hash.substr(0, 8) + ")";
   ReferenceNetwork network(recipe, images, context.seed);
-  const fs::path cache =
-      context.cache_folder.empty()
-          ? fs::path()
-          : context.cache_folder / ("reference-" + cache_key(files, recipe, context.seed) + ".weights");
+  const fs::path cache = context.cache_folder.empty() ? fs::path() : context.cache_folder / cache_name(hash, recipe);
   if (!cache.empty()) {
     if (const auto weights = load_weights(cache, network.weights().size())) {
       network.set_weights(*weights);

@@ -2,29 +2,33 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "src/base/check.h"
 #include "src/base/files.h"
 #include "src/base/parallel.h"
+#include "src/capture/exr_io.h"
+#include "src/capture/image_io.h"
 #include "src/color/colorspace_math.h"
 
 namespace cnerf {
 namespace {
 
-constexpr double kLeastChroma = 1.0;  // mean |ab|; a scanned grey photograph has less
-constexpr int kSmallestLevel = 64;    // short side, pixels
+constexpr double kLeastChroma = 1.0;      // mean |ab|; a scanned grey photograph has less
+constexpr int kSmallestLevel = 64;        // short side, pixels
+constexpr float kMostTransparent = 0.5f;  // alpha of what no colour is taken from, as of key frames
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
-/// Linear RGB [H, W, 3] of any 8- or 16-bit or float image OpenCV reads.
+/// Linear RGB [H, W, 3] of any 8- or 16-bit or float image OpenCV reads, turned as its EXIF says. Without alpha:
+/// OpenCV gives the one or the other.
 cv::Mat read_linear_rgb(const std::filesystem::path& file) {
   const std::vector<std::byte> bytes = read_binary_file(file);
-  cv::Mat image;
-  if (!bytes.empty()) {
-    const cv::Mat raw(1, int(bytes.size()), CV_8U, const_cast<std::byte*>(bytes.data()));
-    image = cv::imdecode(raw, cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH);
-  }
+  const cv::Mat raw(1, int(bytes.size()), CV_8U, const_cast<std::byte*>(bytes.data()));
+  const cv::Mat image = cv::imdecode(raw, cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH);
   if (image.empty()) throw InputError(file, "", "not an image this program can read");
   const double scale = image.depth() == CV_8U ? 1 / 255.0 : image.depth() == CV_16U ? 1 / 65535.0 : 1.0;
   cv::Mat rgb;
@@ -38,31 +42,48 @@ cv::Mat read_linear_rgb(const std::filesystem::path& file) {
   return rgb;
 }
 
-LabImage lab_of(const cv::Mat& linear_rgb) {
-  LabImage image{linear_rgb.cols, linear_rgb.rows, std::vector<float>(linear_rgb.total() * 3)};
+/// Linear RGB over black, and alpha.  [H, W, 4]
+cv::Mat read_linear_rgba(const std::filesystem::path& file) {
+  LinearImage stored = read_linear_image(file, Transfer::kSrgb);
+  cv::Mat rgba;
+  if (stored.alpha.empty() && !is_exr(file)) {
+    stored = {};  // the memory is needed again
+    cv::cvtColor(read_linear_rgb(file), rgba, cv::COLOR_RGB2RGBA);
+    return rgba;
+  }
+  const cv::Size size(stored.width, stored.height);
+  const cv::Mat pixels(size, CV_32FC(stored.channels), stored.values.data());
+  cv::cvtColor(pixels, rgba, stored.channels == 1 ? cv::COLOR_GRAY2RGBA : cv::COLOR_RGB2RGBA);
+  if (!stored.alpha.empty()) cv::insertChannel(cv::Mat(size, CV_32F, stored.alpha.data()), rgba, 3);
+  return rgba;
+}
+
+LabImage lab_of(const cv::Mat& linear_rgba) {
+  LabImage image{linear_rgba.cols, linear_rgba.rows, std::vector<float>(linear_rgba.total() * 3)};
   float* out = image.lab.data();
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x, out += 3) {
-      const auto& pixel = linear_rgb.at<cv::Vec3f>(y, x);
+      const auto& pixel = linear_rgba.at<cv::Vec4f>(y, x);
       const Lab<float> lab = lab_from_linear_rgb(Vec3<float>{pixel[0], pixel[1], pixel[2]});
       out[0] = lab.lightness;
-      out[1] = lab.a;
-      out[2] = lab.b;
+      const bool is_known = pixel[3] > kMostTransparent;
+      out[1] = is_known ? lab.a : kUnknown;
+      out[2] = is_known ? lab.b : kUnknown;
     }
   }
   return image;
 }
 
-ReferenceImage pyramid_of(cv::Mat linear_rgb) {
-  const double shrink = double(kReferenceShortSide) / std::min(linear_rgb.cols, linear_rgb.rows);
-  if (shrink < 1) cv::resize(linear_rgb, linear_rgb, {}, shrink, shrink, cv::INTER_AREA);
+ReferenceImage pyramid_of(cv::Mat linear_rgba) {
+  const double shrink = double(kReferenceShortSide) / std::min(linear_rgba.cols, linear_rgba.rows);
+  if (shrink < 1) cv::resize(linear_rgba, linear_rgba, {}, shrink, shrink, cv::INTER_AREA);
   ReferenceImage image;
-  image.levels.push_back(lab_of(linear_rgb));
-  while (std::min(linear_rgb.cols, linear_rgb.rows) >= 2 * kSmallestLevel) {
+  image.levels.push_back(lab_of(linear_rgba));
+  while (std::min(linear_rgba.cols, linear_rgba.rows) >= 2 * kSmallestLevel) {
     cv::Mat half;
-    cv::resize(linear_rgb, half, {linear_rgb.cols / 2, linear_rgb.rows / 2}, 0, 0, cv::INTER_AREA);
-    linear_rgb = half;
-    image.levels.push_back(lab_of(linear_rgb));
+    cv::resize(linear_rgba, half, {linear_rgba.cols / 2, linear_rgba.rows / 2}, 0, 0, cv::INTER_AREA);
+    linear_rgba = half;
+    image.levels.push_back(lab_of(linear_rgba));
   }
   return image;
 }
@@ -111,19 +132,25 @@ void distort_lightness(cv::Mat& lightness, const PatchDistortion& distortion, Se
   }
 }
 
-/// Mean |ab|: how far grey is from it.
-double mean_chroma(const LabImage& image) {
+/// Mean |ab| of what is known: how far grey is from it. Nothing where nothing is.
+std::optional<double> mean_chroma(const LabImage& image) {
   double sum = 0;
-  const std::size_t pixels = image.lab.size() / 3;
-  for (std::size_t i = 0; i < pixels; ++i) sum += std::hypot(image.lab[3 * i + 1], image.lab[3 * i + 2]);
-  return sum / double(std::max<std::size_t>(pixels, 1));
+  std::size_t pixels = 0;
+  for (std::size_t i = 0; i < image.lab.size(); i += 3) {
+    if (std::isnan(image.lab[i + 1])) continue;
+    sum += std::hypot(image.lab[i + 1], image.lab[i + 2]);
+    ++pixels;
+  }
+  return pixels > 0 ? std::optional(sum / double(pixels)) : std::nullopt;
 }
 
 }  // namespace
 
 ReferenceImage load_reference_image(const std::filesystem::path& file) {
-  ReferenceImage image = pyramid_of(read_linear_rgb(file));
-  if (mean_chroma(image.levels.front()) < kLeastChroma) {
+  ReferenceImage image = pyramid_of(read_linear_rgba(file));
+  const std::optional<double> chroma = mean_chroma(image.counted());
+  if (!chroma) throw InputError(file, "alpha", "a reference must show something; this one is transparent");
+  if (*chroma < kLeastChroma) {
     throw InputError(file, "", "a reference must be a colour photograph; this one is grey");
   }
   return image;

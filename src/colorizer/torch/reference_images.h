@@ -1,6 +1,7 @@
 #pragma once
 /// Colour photographs a reference network is fitted to, and the randomly distorted patches it sees of them.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -11,7 +12,7 @@
 
 namespace cnerf {
 
-/// Lab, interleaved [H, W, 3].
+/// Lab over black, interleaved [H, W, 3]; a and b are no numbers where half of a pixel is transparent.
 struct LabImage {
   int width = 0, height = 0;
   std::vector<float> lab;
@@ -21,10 +22,13 @@ struct LabImage {
 /// `kReferenceShortSide` pixels.
 struct ReferenceImage {
   std::vector<LabImage> levels;
+
+  /// Whose pixels are counted.
+  [[nodiscard]] const LabImage& counted() const { return levels[std::min<std::size_t>(1, levels.size() - 1)]; }
 };
 inline constexpr int kReferenceShortSide = 640;
 
-/// @throws MissingInputError, InputError  also when the photograph is monochrome.
+/// @throws MissingInputError, InputError  also when the photograph is monochrome or transparent.
 [[nodiscard]] ReferenceImage load_reference_image(const std::filesystem::path& file);
 
 /// How far a training patch may be from the photograph.
@@ -39,7 +43,8 @@ struct PatchDistortion {
   double noise = 1.0;                       ///< largest standard deviation on lightness, L* units
 };
 
-/// Writes one patch of a random photograph: `lightness` [size, size] in L*, `ab` [2, size, size].
+/// Writes one patch of a random photograph: `lightness` [size, size] in L*, `ab` [2, size, size], no numbers
+/// where nothing is known.
 void sample_reference_patch(std::span<const ReferenceImage> images, const PatchDistortion& distortion, int size,
                             SequentialRng& rng, std::span<float> lightness, std::span<float> ab);
 

@@ -202,8 +202,9 @@ std::vector<int> bins_in(std::span<const ReferenceImage> images) {
   std::vector<std::size_t> count(kAbBinCount, 0);
   std::size_t pixels = 0;
   for (const ReferenceImage& image : images) {
-    const LabImage& level = image.levels[std::min<std::size_t>(1, image.levels.size() - 1)];
+    const LabImage& level = image.counted();
     for (std::size_t i = 0; i < level.lab.size(); i += 3) {
+      if (std::isnan(level.lab[i + 1])) continue;
       ++count[std::size_t(nearest_bin({level.lab[i + 1], level.lab[i + 2]}))];
       ++pixels;
     }
@@ -238,6 +239,7 @@ class LabelTable {
     }
   }
   [[nodiscard]] const Entry& at(float a, float b) const {
+    if (std::isnan(a)) return unknown_;
     const auto cell = [](float v) { return std::size_t(std::clamp(int(std::lround(v)) + kReach, 0, kSide - 1)); };
     return entries_[cell(a) * kSide + cell(b)];
   }
@@ -245,13 +247,14 @@ class LabelTable {
  private:
   static constexpr int kReach = 115, kSide = 2 * kReach + 1;
   std::vector<Entry> entries_;
+  Entry unknown_;  // weighs nothing
 };
 
 }  // namespace
 
 std::string ReferenceRecipe::text() const {
   std::ostringstream text;
-  text << "reference network 5; channels";
+  text << "reference network 6; channels";
   for (int c : channels) text << ' ' << c;
   text << "; patch " << patch_size << "; steps " << steps << "; batch " << batch << '/' << shards << "; rate "
        << learning_rate << "; decay " << weight_decay << "; share " << distortion.share_min << ' '
@@ -260,7 +263,6 @@ std::string ReferenceRecipe::text() const {
        << distortion.blur << "; noise " << distortion.noise;
   if (!builtin.empty()) text << "; on " << sha256(read_binary_file(builtin));
   if (encoder) text << "; encoder " << encoder->sha256() << ", scale " << kStageScale;
-  if (!builtin.empty() && product_type() != torch::kFloat32) text << "; asked by bf16";
   if (patch_uses > 1) text << "; each patch " << patch_uses << " times of " << patches_held;
   return text.str();
 }

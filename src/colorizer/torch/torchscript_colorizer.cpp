@@ -35,7 +35,7 @@ std::string shape_text(const Tensor& tensor) {
 class TorchScriptColorizer final : public NetworkColorizer {
  public:
   TorchScriptColorizer(const fs::path& file, const std::string& shown, double timeout_seconds)
-      : NetworkColorizer("torchscript:" + shown, contract_beside(file)), timeout_(timeout_seconds) {
+      : NetworkColorizer("torchscript:" + shown, {file}), timeout_(timeout_seconds) {
     const auto load = [&] {
       try {
         return torch::jit::load(file.string(), torch::kCPU);

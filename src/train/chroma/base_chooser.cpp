@@ -20,9 +20,8 @@ constexpr std::uint64_t kFirstBaseIndex = std::uint64_t(1) << 32, kFirstOpinionI
 
 std::vector<AnsweredPatch> BaseChooser::choose(const KnownColorMap& known) {
   const PurifyOptions& purify = session_.options.purify;
-  const bool is_picked = !purify.picked_bases.empty();
-  if (known.key_frames().empty() && purify.enabled && !is_picked && purify.opinions > 1) return typical_bases();
-  const bool has_key_frames = !known.key_frames().empty();
+  const bool is_picked = !purify.picked_bases.empty(), has_key_frames = !known.key_frames().empty();
+  if (!has_key_frames && purify.enabled && !is_picked && purify.opinions > 1) return typical_bases();
   const std::vector<AnsweredPatch> candidates = has_key_frames ? bases_of_key_frames(known) : ask_candidates();
   if (session_.ranks().is_first()) write_png(session_.folder() / "bases.png", tiled(candidate_tiles(candidates)));
   if (has_key_frames) return candidates;
@@ -41,7 +40,8 @@ std::vector<AnsweredPatch> BaseChooser::bases_of_key_frames(const KnownColorMap&
   std::vector<AnsweredPatch> bases;
   const auto frames = known.key_frames();
   const int k = session_.options.patch_size;
-  for (int i = 0; i < session_.options.purify.base_images; ++i) {
+  const int count = std::max(session_.options.purify.base_images, int(frames.size()));
+  for (int i = 0; i < count; ++i) {
     const KnownColorMap::KeyFrame& frame = frames[std::size_t(i) % frames.size()];
     const PatchPlace place = base_patch(frame.view, i);
     const CachedView& view = session_.views()[frame.view];

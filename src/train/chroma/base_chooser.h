@@ -14,8 +14,9 @@ class BaseChooser {
   /// Both are referred to.
   BaseChooser(Session& session, Questioner& questioner) : session_(session), questioner_(questioner) {}
 
-  /// Parts of the key frames, whose colours are known; without any, answers of the colorizer, those that a user picked
-  /// or the most typical ones. Writes bases.png.
+  /// Parts of the key frames, at least one of each, whose colours are known; without any, answers of the colorizer,
+  /// those that a user picked or the most typical ones. Writes bases.png.
+  /// @throws UsageError  see picked
   [[nodiscard]] std::vector<AnsweredPatch> choose(const KnownColorMap& known);
 
   /// One answer about each place that may become a base.

@@ -46,8 +46,9 @@ KnownColors resized_to(const KnownColors& known, const CachedView& view) {
           shrinks_x ? of(x, known.width, view.width) : x, shrinks_y ? of(y, known.height, view.height) : y);
     }
   }
+  const double least = known.kind == KnownColorKind::kStrokes ? 0 : 0.5;  // of what a pixel covers
   for (std::size_t p = 0; p < pixels; ++p) {
-    out.is_known.push_back(count[p] > 0 && 2 * count[p] >= all[p] ? 1 : 0);
+    out.is_known.push_back(count[p] > 0 && count[p] >= least * all[p] ? 1 : 0);
     out.ab.push_back(out.is_known[p] != 0 ? Ab{float(sum[2 * p] / count[p]), float(sum[2 * p + 1] / count[p])} : Ab{});
   }
   return out;

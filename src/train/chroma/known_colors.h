@@ -67,8 +67,8 @@ void run(RunningColors& colors, const CachedView& view, std::span<const float> s
 /// Distance to where half of a pixel's weight lies, unit space; 0 for a pixel that is hardly opaque.  [H, W]
 [[nodiscard]] std::vector<float> surface_distance(const CachedView& view);
 
-/// The colours at the size of a cached view; a pixel is known where most of what it covers is, and has the mean of
-/// that.
+/// The colours at the size of a cached view. A pixel of a key frame is known where most of what it covers is, one of
+/// strokes, which may be thin, where anything is; it has the mean of what is known.
 [[nodiscard]] KnownColors resized_to(const KnownColors& known, const CachedView& view);
 
 }  // namespace cnerf

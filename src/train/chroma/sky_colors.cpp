@@ -49,7 +49,7 @@ Ab SkyColors::behind(const CachedView& view, std::size_t pixel, float field_lumi
 
 Vec3f ColoredSky::along(Vec3f direction) const {
   const Ab color = colors != nullptr && colors->exists() ? colors->along(direction) : Ab{};
-  return linear_rgb_at(finish.gain() * light.along(direction), finish.of(color));
+  return finish.gain() * linear_rgb_at(light.along(direction), finish.of(color));
 }
 
 }  // namespace cnerf

@@ -1,5 +1,8 @@
 #include "src/train/chroma/stage2.h"
 
+#include <algorithm>
+
+#include "src/base/error.h"
 #include "src/colorizer/purify.h"
 #include "src/train/chroma/base_chooser.h"
 #include "src/train/chroma/distillation.h"
@@ -26,6 +29,14 @@ Stage2Report colorize(Session& session, const KnownColorMap& known, Questions& q
 }
 
 }  // namespace
+
+void check_bases(const PurifyOptions& options, std::span<const KnownColors> known) {
+  const bool has_key_frame =
+      std::ranges::any_of(known, [](const KnownColors& of_view) { return of_view.kind == KnownColorKind::kKeyFrame; });
+  if (options.picked_bases.empty() || !has_key_frame) return;
+  throw UsageError(
+      "stage2.purify.picked_bases (--bases): key frames are the bases where there are any; give one or the other");
+}
 
 Stage2Report train_stage2(const Stage2Job& job, const Engines& engines, Observer& observer) {
   PatchQuestions patches;

@@ -48,6 +48,9 @@ struct Stage2Job {
   cluster::Ranks& ranks = cluster::alone();           ///< that share questions and steps; rank 0 writes
 };
 
+/// @throws UsageError  bases are picked, and key frames known, which are bases themselves
+void check_bases(const PurifyOptions& options, std::span<const KnownColors> known);
+
 /// Colorizes a trained scene. Several ranks share it as they share stage 1, each with a colorizer of its own. The
 /// observer is offered pictures of held-out views, where there are any.
 /// @throws ColorizerError, Interrupted, SnapshotError, UsageError.
