@@ -3,6 +3,7 @@
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/base/usage.h"
 #include "src/cluster/ranks.h"
 #include "src/pipeline/colorize_step.h"
@@ -33,8 +34,8 @@ void replay(const ColorizeArguments& arguments, const pipeline::RunContext& cont
       studio::read_journal(directory.take_folder(of) / studio::kJournalFile, paintable_views(context.capture));
   const std::string take = pipeline::take_to_write(
       context, arguments.run.take.empty() ? of + "-again" : arguments.run.take, arguments.existing);
-  if (take == journal.deeds.front().base) {
-    throw UsageError("--take " + take + ": " + of + " was painted on this take; choose another name");
+  if (take == of || take == journal.deeds.front().base) {
+    throw UsageError("--take " + take + ": is what is replayed, or was painted on; choose another name");
   }
   const FolderLock lock = pipeline::lock_folder(directory.root(), FolderLock::Mode::kShared, reporter);
   const Stopwatch watch;
@@ -44,6 +45,12 @@ void replay(const ColorizeArguments& arguments, const pipeline::RunContext& cont
     if (reporter.is_cancelled()) throw Interrupted("stopped; nothing was written");
   });
   coloring.keep(take, watch.seconds(), reporter, arguments.existing.overwrite);
+  const PaintedPictures from(directory.take_folder(of)), to(directory.take_folder(take));
+  for (const studio::Deed& deed : journal.deeds) {
+    for (const Stroke& stroke : deed.strokes) {
+      if (!stroke.picture.empty()) write_file(to.file(stroke.picture), read_binary_file(from.file(stroke.picture)));
+    }
+  }
   reporter.wrote("take", directory.take_folder(take));
 }
 
@@ -56,10 +63,8 @@ void suggest(const ColorizeArguments& arguments, const pipeline::RunContext& con
 
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
-  // A take that is gone on with has its own configuration; a new one starts from the run's.
-  std::string base = arguments.existing.resume ? arguments.run.take : "";
-  if (arguments.existing.resume && base.empty())
-    base = pipeline::take_to_go_on_with(pipeline::RunDirectory::open(arguments.run.run));
+  const std::string base = pipeline::configured_take(pipeline::RunDirectory::open(arguments.run.run),
+                                                     arguments.run.take, arguments.existing.resume);
   pipeline::RunContext context = open_run(arguments.run, base, command_line, reporter);
   const bool is_suggestion = arguments.suggested_keyframes > 0;
   if (!cluster::world().is_alone() && (arguments.bases_only || is_suggestion || !arguments.replay.empty())) {

@@ -182,6 +182,7 @@ Cell SeedRun::make(const Method& method) {
   if (fs::exists(file) && settings_in(folder) == settings) {
     const auto finished = read_record<Cell>(file);
     if (finished.error.empty()) return finished;
+    fs::remove_all(folder);  // what is left may be why it failed
   }
   begin_folder(folder, settings);
   bench_.observer.say(fmt::format("{}, seed {}: {}", subject_.name, seed_, method.name));

@@ -36,6 +36,14 @@ std::string last_take(const RunDirectory& directory, bool is_finished, const std
   return names.empty() ? "" : names.back();
 }
 
+/// Where none is named: one that was not finished, else the current one; empty where there is none.
+std::string take_to_go_on_with(const RunDirectory& directory) {
+  if (const std::string begun = last_take(directory, false); !begun.empty()) return begun;
+  if (const std::string current = directory.record().current_take; !current.empty()) return current;
+  // Killed when the take was finished and the run's record did not name it yet.
+  return last_take(directory, true);
+}
+
 /// See take_to_write.
 std::string chosen_take(const RunContext& context, const std::string& named, const ExistingOutput& existing) {
   const RunDirectory& directory = context.directory;
@@ -107,11 +115,10 @@ std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& obs
   return colorizer;
 }
 
-std::string take_to_go_on_with(const RunDirectory& directory) {
-  if (const std::string begun = last_take(directory, false); !begun.empty()) return begun;
-  if (const std::string current = directory.record().current_take; !current.empty()) return current;
-  // Killed when the take was finished and the run's record did not name it yet.
-  return last_take(directory, true);
+std::string configured_take(const RunDirectory& directory, const std::string& named, bool resume) {
+  if (!resume) return "";
+  const std::string take = named.empty() ? take_to_go_on_with(directory) : named;
+  return fs::exists(directory.take_config_file(take)) ? take : "";  // none: killed before anything was written
 }
 
 std::string take_to_write(const RunContext& context, const std::string& named, const ExistingOutput& existing) {

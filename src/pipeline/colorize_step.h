@@ -20,9 +20,8 @@ namespace cnerf::pipeline {
 /// @throws UsageError, MissingInputError, ColorizerError.
 [[nodiscard]] std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& observer);
 
-/// The take that `--resume` goes on with where none is named: one that was not finished, else the current one, else the
-/// last one that is finished; empty where there is none.
-[[nodiscard]] std::string take_to_go_on_with(const RunDirectory& directory);
+/// The take whose configuration a colorization starts from: one that is gone on with has its own. Empty: the run's.
+[[nodiscard]] std::string configured_take(const RunDirectory& directory, const std::string& named, bool resume);
 /// The take a colorization goes to: the named one, else a free name after the colorizer's kind; with `resume` the take
 /// that was not finished. Rank 0 says which.  @throws UsageError  when the named take is finished and neither is set.
 [[nodiscard]] std::string take_to_write(const RunContext& context, const std::string& named,

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -119,10 +121,12 @@ bool begin_folder(const PrepareJob& job) {
 bool has_changed_since(const fs::path& source, const fs::path& capture) {
   std::error_code failure;  // what cannot be read is not newer
   const fs::file_time_type finished = fs::last_write_time(capture / "transforms.json", failure);
-  if (fs::last_write_time(source, failure) > finished) return true;  // of a folder: its list
-  const fs::directory_iterator files(source, failure);
-  return std::any_of(begin(files), end(files), [&](const auto& file) {
-    return file.is_regular_file(failure) && file.last_write_time(failure) > finished;
+  return std::ranges::any_of(std::array{source, source / "images"}, [&](const fs::path& place) {
+    if (fs::last_write_time(place, failure) > finished) return true;  // of a folder: its list
+    const fs::directory_iterator files(place, failure);
+    return std::any_of(begin(files), end(files), [&](const auto& file) {
+      return file.is_regular_file(failure) && file.last_write_time(failure) > finished;
+    });
   });
 }
 

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <future>
 
+#include "src/base/error.h"
 #include "src/base/json_record.h"
 #include "src/base/shared_observer.h"
 #include "src/cluster/ranks.h"
@@ -14,6 +15,7 @@
 #include "src/pipeline/prepare_step.h"
 #include "src/pipeline/render_step.h"
 #include "src/pipeline/train_step.h"
+#include "src/train/chroma/stage2.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
@@ -30,18 +32,31 @@ fs::path common_capture(const RunJob& job, Observer& observer) {
   return world.agreed(world.is_first() ? capture_of(job.capture, job.out, observer).string() : "");
 }
 
+/// A damaged manifest is none.
+exporting::Formats whole_formats_in(const fs::path& folder) {
+  try {
+    return exporting::formats_in(folder);
+  } catch (const InputError&) {
+    return {};
+  }
+}
+
 /// Whether the folder has what is asked for; else also what it has is to be made again, since a bake replaces another.
 bool is_baked(const RunJob& job, const fs::path& folder, exporting::Formats& formats) {
   if (!job.existing.resume) return false;
-  const exporting::Formats made = exporting::formats_in(folder);
+  const exporting::Formats made = whole_formats_in(folder);
   formats = formats | made;
   return cluster::world().agreed(made == formats);
 }
 
 /// Whether the run's metrics are of this take; those of another one are replaced.
 bool is_evaluated(const RunJob& job, const RunDirectory& directory, const std::string& take) {
-  const fs::path file = directory.metrics_file();
-  return is_done(job, file) && cluster::world().agreed(read_record<Metrics>(file).take == take);
+  bool are_of_take = false;
+  try {
+    are_of_take = job.existing.resume && read_record<Metrics>(directory.metrics_file()).take == take;
+  } catch (const Error&) {  // there are none, or they are damaged
+  }
+  return cluster::world().agreed(are_of_take);
 }
 
 bool needs_colorizer(const RunJob& job, const RunDirectory& directory) {
@@ -89,7 +104,9 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& one_ob
 
   RunContext context{directory, config, read_capture(job.capture, config, observer, directory.root()),
                      job.command_line};
-  if (!job.grey) (void)load_known_colors(context.capture, context.config.colorizer);
+  if (!job.grey) {
+    check_bases(config.stage2.purify, load_known_colors(context.capture, context.config.colorizer).known);
+  }
   ColorizerBesideTraining colorizer(context, needs_colorizer(job, directory), engines, observer);
   begin_run(context, job.capture, job.existing);
   train_step(context, {job.existing.resume, [&](const LuminanceModel&) { colorizer.look(); }}, engines, observer);

@@ -1,7 +1,9 @@
 #include "src/prepare/photographs.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <map>
 #include <set>
@@ -234,8 +236,11 @@ std::size_t Upright::stored_index(int x, int y) const {
 }
 
 int orientation_of(std::span<const std::byte> file) {
-  const auto begins_with = [&](const char* mark) { return file.size() >= 4 && std::memcmp(file.data(), mark, 4) == 0; };
-  const bool is_tiff = begins_with("II*\0") || begins_with("MM\0*");
+  constexpr std::array<std::uint8_t, 4> kLittleEndian{'I', 'I', 42, 0}, kBigEndian{'M', 'M', 0, 42};
+  const auto begins_with = [&](const auto& mark) {
+    return file.size() >= 4 && std::memcmp(file.data(), mark.data(), 4) == 0;
+  };
+  const bool is_tiff = begins_with(kLittleEndian) || begins_with(kBigEndian);
   return is_tiff ? 1 : read_exif(file).orientation;  // OpenCV turns TIFF files upright by itself
 }
 

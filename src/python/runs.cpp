@@ -167,8 +167,7 @@ struct ColorizeCall {
 };
 
 std::string colorize(const OpenRun& run, const ColorizeCall& call, Observer& observer) {
-  std::string base = call.existing.resume ? call.take : "";
-  if (call.existing.resume && base.empty()) base = pipeline::take_to_go_on_with(run.directory());
+  const std::string base = pipeline::configured_take(run.directory(), call.take, call.existing.resume);
   const Words words = call.settings.command_line({"cnerf", "colorize", run.directory().root().string()});
   pipeline::RunContext context = run.context(base, call.settings, words, observer);
   std::string& spec = context.config.colorizer.spec;

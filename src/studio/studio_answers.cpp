@@ -391,7 +391,11 @@ PageAnswer Studio::post_picture(const PageRequest& request) {
   if (is_monochrome(image)) throw InputError("picture", "colour", "a reference must be in colour; this one is grey");
   const Picture picture = scaled_down(picture_from_linear(image.width, image.height, image.values), kReferenceWidth);
   const fs::path file = folder / (name + ".png");
-  write_file(file, png_bytes(picture));
+  if (image.alpha.empty()) {
+    write_file(file, png_bytes(picture));
+  } else {
+    write_file(file, request.body);  // a fit leaves out what is transparent
+  }
   Order order{{}, file};
   order.message.order = "reference";
   return take_order(request, order);

@@ -82,6 +82,32 @@ TEST(Pipeline, ARunThatIsColouredLaterIsEvaluatedAgain) {
   EXPECT_TRUE(fs::exists(out / "takes/reference/metrics.json"));
 }
 
+TEST(Pipeline, AJournalIsReplayedIntoATakeOfItsOwn) {
+  const TempDir folder;
+  const fs::path run = copied(tiny_run(), folder / "run");
+  for (const char* take : {"first", "painted"}) {
+    ASSERT_EQ(cnerf({"colorize", run.string(), "--colorizer", "grey", "--take", take}).exit_code, 0);
+  }
+  const nlohmann::json stroke = {{"id", "s"},       {"view", "images/view_004.png"},
+                                 {"kind", "paint"}, {"color", "#c03020"},
+                                 {"size", 0.2},     {"points", {{0.5, 0.5, 1.0}}}};
+  const nlohmann::json journal = {{"deeds", {{{"base", "first"}}, {{"strokes", {stroke}}, {"steps", 3}}}}};
+  write_file(run / "takes/painted/journal.json", journal.dump());
+  const auto replay = [&](const std::string& take) {
+    return cnerf({"colorize", run.string(), "--replay", "painted", "--take", take, "--overwrite"});
+  };
+  for (const char* needed : {"first", "painted"}) {
+    const ProgramResult refused = replay(needed);
+    EXPECT_EQ(refused.exit_code, 64) << refused.err;
+    EXPECT_TRUE(fs::exists(run / "takes" / needed / "take.snapshot"));
+  }
+  for (int again = 0; again < 2; ++again) {
+    const ProgramResult replayed = replay("again");
+    EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
+    EXPECT_TRUE(fs::exists(run / "takes/again/take.json"));
+  }
+}
+
 TEST(Pipeline, StepsOneByOneWithoutColour) {
   const TempDir folder;
   const std::string out = copied(tiny_run(), folder / "run").string();

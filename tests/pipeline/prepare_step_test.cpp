@@ -69,6 +69,9 @@ TEST_F(PreparedCapture, SaysWherePhotographsCameSince) {
   EXPECT_FALSE(is_told(-1, -1));
   EXPECT_TRUE(is_told(1, -1)) << "written again";
   EXPECT_TRUE(is_told(-1, 1)) << "came or went";
+  fs::create_directories(photos_ / "images");
+  fs::last_write_time(photos_ / "images", now + std::chrono::seconds(1));
+  EXPECT_TRUE(is_told(-1, -1)) << "in images/";
 }
 
 TEST_F(PreparedCapture, IsMadeAgainIfAsked) {

@@ -48,9 +48,10 @@ void Session::begin_model(const Engines& engines, PixelColors pixel_colors) {
   }
   if (model.colorizer != source || model.pixel_colors != pixel_colors ||
       options_to_json(model.options) != options_to_json(options)) {
-    throw SnapshotError(file.string() +
-                        ": was made with another colorizer or other stage2 options; run with the "
-                        "same ones, or without --resume");
+    throw SnapshotError(
+        file.string() +
+        ": was made with another colorizer or other stage2 options; run with the same ones, or begin this "
+        "take again: cnerf colorize --take NAME --overwrite");
   }
   say_kernels(file, model.kernels_before, model.kernels, observer_);
   seconds_before_ = model.report.seconds;
