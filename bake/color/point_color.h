@@ -11,11 +11,11 @@ namespace cnerf::bake {
 
 /// Linear Rec.709 and its Lab a, b for a luminance and a chromaticity. In gamut: chroma gives way at constant lightness
 /// and hue. Grey gives three equal numbers and a = b = 0 exactly.
-/// @param gain  of the field: the gamut is that of the light without it
 struct VoxelColor {
   Vec3f rgb{};
   float a = 0, b = 0;
 };
+/// @param gain  of the field: the gamut is that of the light without it
 [[nodiscard]] VoxelColor voxel_color(float luminance, Chromaticity chromaticity, float gain = 1);
 
 /// Chromaticity of points in unit space, by as many threads as are free.

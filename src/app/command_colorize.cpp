@@ -3,13 +3,13 @@
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
 #include "src/base/error.h"
-#include "src/base/files.h"
 #include "src/base/usage.h"
 #include "src/cluster/ranks.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/default_colorizer.h"
 #include "src/pipeline/key_views_step.h"
 #include "src/studio/coloring.h"
+#include "src/studio/paint_files.h"
 #include "viewer/server/live_session.h"
 
 namespace cnerf::app {
@@ -46,11 +46,7 @@ void replay(const ColorizeArguments& arguments, const pipeline::RunContext& cont
   });
   coloring.keep(take, watch.seconds(), reporter, arguments.existing.overwrite);
   const PaintedPictures from(directory.take_folder(of)), to(directory.take_folder(take));
-  for (const studio::Deed& deed : journal.deeds) {
-    for (const Stroke& stroke : deed.strokes) {
-      if (!stroke.picture.empty()) write_file(to.file(stroke.picture), read_binary_file(from.file(stroke.picture)));
-    }
-  }
+  for (const studio::Deed& deed : journal.deeds) studio::copy_pictures(deed.strokes, from, to);
   reporter.wrote("take", directory.take_folder(take));
 }
 

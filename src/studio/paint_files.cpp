@@ -44,11 +44,14 @@ fs::path stroke_folder(const pipeline::RunContext& context) {
   return context.directory.root() / "strokes";
 }
 
-void write_strokes_whole(const fs::path& folder, const StrokeList& list, const PaintedPictures& from) {
-  const PaintedPictures to(folder);
-  for (const Stroke& stroke : list.strokes) {
+void copy_pictures(std::span<const Stroke> strokes, const PaintedPictures& from, const PaintedPictures& to) {
+  for (const Stroke& stroke : strokes) {
     if (!stroke.picture.empty()) write_file(to.file(stroke.picture), read_text_file(from.file(stroke.picture)));
   }
+}
+
+void write_strokes_whole(const fs::path& folder, const StrokeList& list, const PaintedPictures& from) {
+  copy_pictures(list.strokes, from, PaintedPictures(folder));
   write_strokes(folder / kStrokeFile, list);
 }
 

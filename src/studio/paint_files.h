@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <opencv2/core.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,8 @@ inline constexpr const char* kNow = "now";  ///< what a picture shows: no take's
 
 /// Where a run keeps what is painted.
 [[nodiscard]] std::filesystem::path stroke_folder(const pipeline::RunContext& context);
+/// The painted pictures that strokes name.
+void copy_pictures(std::span<const Stroke> strokes, const PaintedPictures& from, const PaintedPictures& to);
 /// Writes a list with the painted pictures that it names.
 /// @param from  where these lie
 void write_strokes_whole(const std::filesystem::path& folder, const StrokeList& list, const PaintedPictures& from);

@@ -91,7 +91,11 @@ TEST(Pipeline, AJournalIsReplayedIntoATakeOfItsOwn) {
   const nlohmann::json stroke = {{"id", "s"},       {"view", "images/view_004.png"},
                                  {"kind", "paint"}, {"color", "#c03020"},
                                  {"size", 0.2},     {"points", {{0.5, 0.5, 1.0}}}};
-  const nlohmann::json journal = {{"deeds", {{{"base", "first"}}, {{"strokes", {stroke}}, {"steps", 3}}}}};
+  nlohmann::json picture = stroke;
+  picture.update({{"id", "p"}, {"kind", "picture"}, {"picture", "0123456789ab"}, {"points", nlohmann::json::array()}});
+  fs::create_directories(run / "takes/painted/painted");
+  fs::copy_file(tiny_capture() / "color/view_004.png", run / "takes/painted/painted/0123456789ab.png");
+  const nlohmann::json journal = {{"deeds", {{{"base", "first"}}, {{"strokes", {stroke, picture}}, {"steps", 3}}}}};
   write_file(run / "takes/painted/journal.json", journal.dump());
   const auto replay = [&](const std::string& take) {
     return cnerf({"colorize", run.string(), "--replay", "painted", "--take", take, "--overwrite"});
@@ -105,6 +109,7 @@ TEST(Pipeline, AJournalIsReplayedIntoATakeOfItsOwn) {
     const ProgramResult replayed = replay("again");
     EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
     EXPECT_TRUE(fs::exists(run / "takes/again/take.json"));
+    EXPECT_TRUE(fs::exists(run / "takes/again/painted/0123456789ab.png")) << "its journal names it";
   }
 }
 
