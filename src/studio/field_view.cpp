@@ -128,15 +128,17 @@ std::vector<Picture> draw_field(const LuminanceModel& luminance, const FieldCame
   Drawing drawing(luminance, camera, colored, effort);
   DrawingCosts unwanted;
   if (!drawing.trace(keep_going, costs != nullptr ? *costs : unwanted)) return {};
-  std::vector<Picture> pictures;
-  std::size_t next_colored = 0;
-  for (const Side side : sides) {
-    Picture& picture = pictures.emplace_back(blank(camera.lens.width, camera.lens.height));
-    const std::size_t color = side != nullptr ? next_colored++ : SparsePixels::kGrey;
-    parallel_ranges(picture.rgb.size() / 3, kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t p = begin; p < end; ++p) put(drawing.pixels().lab(color, p), effort.finish, p, picture);
-    });
+  std::vector<Picture> pictures(sides.size());
+  std::vector<std::size_t> colors;  // of each side
+  for (std::size_t next_colored = 0; const Side side : sides) {
+    colors.push_back(side != nullptr ? next_colored++ : SparsePixels::kGrey);
   }
+  parallel_tasks(sides.size(), [&](std::size_t s) {
+    pictures[s] = blank(camera.lens.width, camera.lens.height);
+    parallel_ranges(pictures[s].rgb.size() / 3, kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t p = begin; p < end; ++p) put(drawing.pixels().lab(colors[s], p), effort.finish, p, pictures[s]);
+    });
+  });
   return pictures;
 }
 

@@ -156,7 +156,9 @@ void SparsePixels::set_light(std::span<const std::size_t> pixels, std::span<cons
 
 void SparsePixels::set_colors(std::size_t side, std::span<const std::size_t> pixels, std::span<const Ab> colors) {
   CNERF_CHECK_EQ(pixels.size(), colors.size());
-  for (std::size_t i = 0; i < pixels.size(); ++i) colors_[side][pixels[i]] = colors[i];
+  parallel_ranges(pixels.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) colors_[side][pixels[i]] = colors[i];
+  });
 }
 
 void SparsePixels::spread_colors() {

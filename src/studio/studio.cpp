@@ -20,11 +20,11 @@ namespace {
 constexpr std::size_t kMostTakesInMemory = 4;
 constexpr int kJpegQuality = 88;
 /// Seconds of training per second of drawing, so that a page that moves slows it by less than half on a processor and a
-/// tenth on a GPU, and one that rests by 2 %. A GPU also loses the steps that it had begun.
+/// tenth on a GPU, and one that rests by less than 2 %. A GPU also loses the steps that it had begun.
 struct Pace {
   double while_turning, while_resting;
 };
-constexpr Pace kPace = {1.3, 50}, kPaceOfGpu = {14, 120};
+constexpr Pace kPace = {1.3, 70}, kPaceOfGpu = {14, 120};
 constexpr double kFrameOfTraining = 0.25;  // seconds, at most: what is half learned is fog, and dear
 constexpr double kFirstRays = 600, kMostGrowth = 4;
 constexpr double kLeastBetweenRefreshes = 1, kMostBetweenRefreshes = 60;  // seconds

@@ -122,15 +122,15 @@ void Claims::add(const Claim& claim) {
   list[at] = claim;
 }
 
-float Claims::share(Ab color) const {
-  float own = 0, all = 0;
-  for (const Claim& claim : list) {
-    if (claim.cost >= kUnreached) break;
-    const float weight = std::exp((list[0].cost - claim.cost) / kShare);
-    if (same(claim.color, color)) own = weight;
-    all += weight;
+std::array<float, Claims::kMost> Claims::shares() const {
+  std::array<float, kMost> weights{};
+  float all = 0;
+  for (std::size_t i = 0; i < kMost && list[i].cost < kUnreached; ++i) {
+    weights[i] = std::exp((list[0].cost - list[i].cost) / kShare);
+    all += weights[i];
   }
-  return all > 0 ? own / all : 0;
+  for (float& weight : weights) weight = all > 0 ? weight / all : 0;
+  return weights;
 }
 
 Ab Claims::mixed(float lightness) const {
@@ -269,20 +269,33 @@ void smooth(std::span<Claims> claims, const CachedView& view, std::span<const fl
   const int radius = std::max(1, int(std::lround(kSmoothRadius * float(view.short_side()))));
   const GuidedFilter along_surfaces(depth_guide(view, surface), radius);
   const GuidedFilter along_lightness(lightness_guide(view), radius);
+  // There are not always more views than threads.
+  const auto each_pixel = [&](const auto& work) {
+    parallel_ranges(claims.size(), kPixelsPerPiece, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t p = begin; p < end; ++p) work(p);
+    });
+  };
+  std::vector<std::array<float, Claims::kMost>> kept(claims.size());
+  each_pixel([&](std::size_t p) { kept[p] = claims[p].shares(); });
   std::vector<Claims> smoothed(claims.size());
   cv::Mat shares(view.height, view.width, CV_32F);
   for (const Claims::Claim& one : colors) {
-    std::ranges::transform(claims, shares.begin<float>(), [&](const Claims& pixel) { return pixel.share(one.color); });
+    auto* const share = shares.ptr<float>();
+    each_pixel([&](std::size_t p) {
+      const auto of_color = std::ranges::find_if(
+          claims[p].list, [&](const Claims::Claim& claim) { return same(claim.color, one.color); });
+      share[p] = of_color != claims[p].list.end() ? kept[p][std::size_t(of_color - claims[p].list.begin())] : 0;
+    });
     const cv::Mat smooth_shares = along_lightness(along_surfaces(shares));
-    const float* share = smooth_shares.ptr<float>();
-    for (std::size_t p = 0; p < claims.size(); ++p) {
-      const float cost = -kShare * std::log(std::clamp(share[p], kLeastShare, 1.0f));
+    const auto* const smooth_share = smooth_shares.ptr<float>();
+    each_pixel([&](std::size_t p) {
+      const float cost = -kShare * std::log(std::clamp(smooth_share[p], kLeastShare, 1.0f));
       smoothed[p].add({claims[p].cost() + cost, one.color, one.lightness});
-    }
+    });
   }
-  for (std::size_t p = 0; p < claims.size(); ++p) {
+  each_pixel([&](std::size_t p) {
     if (claims[p].cost() > 0) claims[p] = smoothed[p];
-  }
+  });
 }
 
 }  // namespace cnerf

@@ -32,8 +32,8 @@ struct Claims {
 
   /// Of a colour the least cost counts. Of equal costs what came first is first.
   void add(const Claim& claim);
-  /// What part a colour has among those that are kept, 0..1.
-  [[nodiscard]] float share(Ab color) const;
+  /// What part each has among those that are kept, 0..1.
+  [[nodiscard]] std::array<float, kMost> shares() const;
   [[nodiscard]] float cost() const { return list[0].cost; }
   /// The first, and of others those that cost hardly more: a border between strokes is no edge where the scene has
   /// none. Darker than where it was painted a colour has less chroma. What was painted (cost 0) stays as it is.
