@@ -62,7 +62,7 @@ SparsePixels::SparsePixels(int width, int height, int lattice, std::size_t sides
   CNERF_CHECK(lattice > 0 && (lattice & (lattice - 1)) == 0, "a lattice's step is a power of two");
   const std::size_t count = std::size_t(width) * std::size_t(height);
   lightness_.resize(count);
-  colors_.assign(sides, std::vector<Ab>(count));
+  for (std::size_t s = 0; s < sides; ++s) colors_.emplace_back(count);
   passes_.push_back({});
   for (int reach = lattice / 2; reach > 0; reach /= 2) {
     // The lattice has the middles of its squares, so that upright lines cannot slip through it.

@@ -78,7 +78,7 @@ struct Parts {
   int rounds = 0;
 };
 
-/// Seconds of each round, with each of `kPages`.
+/// Seconds that `Parts::each` took in each round, with each of `kPages`.
 using Times = std::array<std::vector<double>, kPages.size()>;
 
 Times timed(Studio& studio, const Capture& capture, const Parts& parts) {
@@ -97,11 +97,14 @@ Times timed(Studio& studio, const Capture& capture, const Parts& parts) {
   for (int round = 0; round < parts.rounds; ++round) {
     for (std::size_t i = 0; i < kPages.size(); ++i) {
       const std::size_t p = (i + std::size_t(round)) % kPages.size();
-      const double begin = samples();
       looking.page = kPages[p];
+      // From one change of the figures to another: they change ten times a second.
+      const double before = samples();
+      wait_for(before + 1);
+      const double begin = samples();
       const Stopwatch watch;
       wait_for(begin + parts.each);
-      times[p].push_back(watch.seconds());
+      times[p].push_back(watch.seconds() * parts.each / (samples() - begin));
       looking.page = Page::kNobody;
       while (looking.waits_for_frame) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
