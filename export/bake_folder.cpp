@@ -68,8 +68,10 @@ fs::path write_blender_setup(const fs::path& folder) {
   std::string text = blender_setup_text();
   const std::size_t at = text.find(marker);
   CNERF_CHECK(at != std::string::npos, "blender_setup.py lost its BAKE_FOLDER line");
-  // An ASCII JSON string is a Python string literal as well.
-  const std::string literal = nlohmann::json(fs::absolute(folder).lexically_normal().string()).dump(-1, ' ', true);
+  // A JSON string in UTF-8 is a Python string literal as well. In ASCII it is not: beyond U+FFFF JSON escapes two
+  // surrogates, and Python keeps both. What is not UTF-8 is replaced: only a script that is pasted misses its folder.
+  const std::string literal = nlohmann::json(fs::absolute(folder).lexically_normal().string())
+                                  .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   text.replace(at, marker.size(), "BAKE_FOLDER = " + literal);
   fs::path target = folder / "blender_setup.py";
   write_file(target, text);
@@ -83,8 +85,9 @@ BakeFolder::BakeFolder(fs::path folder, std::vector<bake::Camera> cameras, Label
 
 /// To be called before a file is replaced that a former manifest may list.
 void BakeFolder::begin() {
-  if (std::exchange(has_begun_, true) || !fs::exists(manifest())) return;
-  fs::rename(manifest(), former_manifest());
+  if (std::exchange(has_begun_, true)) return;
+  if (fs::exists(manifest())) fs::rename(manifest(), former_manifest());
+  if (sky_) write_sky();
 }
 
 ManifestVolume BakeFolder::write_grids(const bake::VolumePlanes& volume, const std::string& name,
@@ -123,18 +126,21 @@ std::vector<fs::path> BakeFolder::add_volumes(const std::vector<bake::VolumePlan
   return files;
 }
 
-/// Written before anything is known to be replaced: a former manifest may go on naming it.
 void BakeFolder::add_sky(const SkyPicture& sky) {
-  const fs::path file = folder_ / "sky.exr";
-  const std::span<const float> rgb(sky.rgb);
-  write_exr(file, {sky.width,
-                   sky.height,
-                   {{"R", rgb, 3, true}, {"G", rgb.subspan(1), 3, true}, {"B", rgb.subspan(2), 3, true}},
-                   {{"software", "cnerf " CNERF_VERSION},
-                    {"colorOrigin", color_origin_text(manifest_.label.provenance)},
-                    {"colorSpace", "lin_rec709"}}});
-  list(file);
-  manifest_.sky = ManifestSky{file.filename().string()};
+  sky_ = sky;
+  manifest_.sky = ManifestSky{"sky.exr"};
+  list(manifest_.sky->file);
+}
+
+void BakeFolder::write_sky() const {
+  const std::span<const float> rgb(sky_->rgb);
+  write_exr(folder_ / manifest_.sky->file,
+            {sky_->width,
+             sky_->height,
+             {{"R", rgb, 3, true}, {"G", rgb.subspan(1), 3, true}, {"B", rgb.subspan(2), 3, true}},
+             {{"software", "cnerf " CNERF_VERSION},
+              {"colorOrigin", color_origin_text(manifest_.label.provenance)},
+              {"colorSpace", "lin_rec709"}}});
 }
 
 void BakeFolder::add_camera_tracks(const VdbOptions& options) {
@@ -190,7 +196,7 @@ SplatFiles BakeFolder::add_splats(const bake::SplatCloud& cloud, const std::stri
   begin();
   SplatFiles files = write_splats(cloud, folder_, name, manifest_.label);
   for (const fs::path& file : {files.ply, files.spz, files.usd}) list(file);
-  manifest_.frame = cloud.frame;
+  if (!manifest_.volume && !manifest_.mesh) manifest_.frame = cloud.frame;
   manifest_.splats = describe_splats(cloud);
   manifest_.splats->ply = files.ply.filename().string();
   manifest_.splats->spz = files.spz.filename().string();

@@ -2,6 +2,7 @@
 /// A whole bake on disk: volume, mesh, textures, the manifest that names them and the set-up script for Blender.
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,8 +41,8 @@ class BakeFolder {
   GltfFiles add_mesh(const bake::Mesh& mesh, const std::string& name, bool exr);
   /// Writes `name`.ply, .spz and .usda.  @throws OutputError.
   SplatFiles add_splats(const bake::SplatCloud& cloud, const std::string& name);
-  /// Writes sky.exr: Blender's world, behind volume and mesh. To be called before add_mesh, which names it.
-  /// @throws OutputError.
+  /// sky.exr, Blender's world, behind volume and mesh: it is written before the first of the other files. To be called
+  /// before add_mesh, which names it.
   void add_sky(const SkyPicture& sky);
   /// A camera's photograph without lens distortion, in a folder `plates`: what Blender shows behind its view.
   /// @throws OutputError.
@@ -59,12 +60,14 @@ class BakeFolder {
  private:
   ManifestVolume write_grids(const bake::VolumePlanes& volume, const std::string& name, const VdbOptions& options);
   void begin();
+  void write_sky() const;
   [[nodiscard]] std::filesystem::path former_manifest() const { return folder_ / ".former-manifest.json"; }
   void list(const std::filesystem::path& file) { manifest_.files.push_back(file.filename().string()); }
 
   std::filesystem::path folder_;
   BakeManifest manifest_;
   PictureNames plate_names_;
+  std::optional<SkyPicture> sky_;
   bool has_begun_ = false;
 };
 

@@ -63,9 +63,7 @@ BakeOutput::BakeOutput(fs::path folder, const Formats& formats, OutputOptions op
       label_(label),
       bake_(folder_, bake::cameras_of(capture), label),
       observer_(observer) {
-  if (!options_.sky || !formats_.has_manifest()) return;
-  bake_.add_sky(*options_.sky);
-  observer_.wrote("sky", folder_ / "sky.exr");
+  if (options_.sky && formats_.has_manifest()) bake_.add_sky(*options_.sky);
 }
 
 void BakeOutput::take_volumes(const std::vector<bake::VolumePlanes>& volumes) {
@@ -95,8 +93,8 @@ void BakeOutput::take_mesh(const bake::Mesh& mesh) {
   observer_.wrote("mesh", files.gltf);
 }
 
-void BakeOutput::take_splats(const bake::SplatCloud& cloud) {
-  const SplatFiles files = bake_.add_splats(cloud, "splats");
+void BakeOutput::add_splats() {
+  const SplatFiles files = bake_.add_splats(make_splats_(), "splats");
   for (const fs::path& file : {files.ply, files.spz, files.usd}) observer_.wrote("splats", file);
 }
 
@@ -113,9 +111,13 @@ void BakeOutput::add_plates() {
 
 void BakeOutput::finish() {
   if (!formats_.has_manifest()) return;
+  if (make_splats_) add_splats();
   if (options_.vdb.plates && formats_.is_for_blender()) add_plates();
   bake_.add_camera_tracks(options_.vdb);
   bake_.finish();
+  if (options_.sky) observer_.wrote("sky", folder_ / "sky.exr");
+  // As old as what it was baked with, or it would count as one of a former bake.
+  if (formats_.web) fs::last_write_time(last_file(folder_, {.web = true}), fs::last_write_time(bake_.manifest()));
   if (formats_.is_for_blender()) observer_.wrote("Blender set-up", bake_.blender_setup());
 }
 

@@ -2,8 +2,10 @@
 /// A bake job's results as the files of a folder: volumes, mesh and textures, web bundle, and what names them.
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bake/job/job.h"
@@ -61,12 +63,14 @@ class BakeOutput final : public bake::Output {
 
   void take_volumes(const std::vector<bake::VolumePlanes>& volumes) override;
   void take_mesh(const bake::Mesh& mesh) override;
-  void take_splats(const bake::SplatCloud& cloud);
+  /// Splats that are made once all else is there: nothing is replaced before it is known that all can be baked.
+  void take_splats(std::function<bake::SplatCloud()> make) { make_splats_ = std::move(make); }
   void finish() override;
 
  private:
   void write_bundle(const std::vector<bake::VolumePlanes>& volumes);
   void add_plates();
+  void add_splats();
 
   std::filesystem::path folder_;
   Formats formats_;
@@ -74,6 +78,7 @@ class BakeOutput final : public bake::Output {
   const Capture& capture_;
   Label label_;
   BakeFolder bake_;
+  std::function<bake::SplatCloud()> make_splats_;
   Observer& observer_;
 };
 

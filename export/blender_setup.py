@@ -39,9 +39,15 @@ SENSOR_MM = 36.0
 MAX_STEPS_OF_BLENDER = 65536
 
 
+def folder_of_open_text():
+    """Of the text that the text editor runs, which gives no usable __file__; empty where the text has no file."""
+    text = getattr(getattr(bpy.context, "space_data", None), "text", None)
+    return os.path.dirname(bpy.path.abspath(text.filepath)) if text else ""
+
+
 def find_manifest(given):
-    """The manifest given, else the one beside this file, else the one of the folder the bake was written to."""
-    folders = [BAKE_FOLDER]
+    """The manifest given, else the one beside this file or the open text, else the one where the bake was written."""
+    folders = [folder_of_open_text(), BAKE_FOLDER]
     if "__file__" in globals():
         folders.insert(0, os.path.dirname(os.path.abspath(__file__)))
     candidates = [given] if given else [os.path.join(folder, "manifest.json") for folder in folders if folder]
@@ -232,7 +238,9 @@ def make_material(density_scale):
 
 def add_volume(scene, root, volume, folder, material):
     data = bpy.data.volumes.new("cnerf volume")
-    data.filepath = os.path.join(folder, volume["file"])
+    data.filepath = file = os.path.join(folder, volume["file"])
+    if not data.grids.load():  # renders would go on without it
+        raise ValueError("%s: %s" % (file, data.grids.error_message))
     data.render.space = "OBJECT"
     data.render.step_size = 0.0  # automatic: one voxel times the scene's step rate
     data.render.clipping = 0.0  # the default cuts densities below 0.001 per unit, which large scenes have
@@ -305,15 +313,20 @@ def scene_radius(bounded):
     return 0.5 * (high - low).length, 0.5 * (high + low)
 
 
-def add_camera(scene, root, camera, volume):
-    data = bpy.data.cameras.new(camera["name"])
+def set_lens(data, camera):
+    """Focal length and principal point."""
     aspect_x, aspect_y = pixel_aspect(camera)
     width = camera["width"] * aspect_x
-    data.sensor_fit = "HORIZONTAL"
-    data.sensor_width = SENSOR_MM
     data.lens = SENSOR_MM * camera["fx"] / camera["width"]
     data.shift_x = (0.5 * camera["width"] - camera["cx"]) * aspect_x / width
     data.shift_y = (camera["cy"] - 0.5 * camera["height"]) * aspect_y / width
+
+
+def add_camera(scene, root, camera, volume):
+    data = bpy.data.cameras.new(camera["name"])
+    data.sensor_fit = "HORIZONTAL"
+    data.sensor_width = SENSOR_MM
+    set_lens(data, camera)
 
     world_from_camera = Matrix(camera["world_from_camera"])
     radius, centre = scene_radius(volume)
@@ -420,7 +433,7 @@ def add_path(scene, root, file, volume):
 
 
 def add_moving_camera(scene, root, frames, volume):
-    """One camera that is where each frame's camera is."""
+    """One camera that is where each frame's camera is, with its lens."""
     moving = add_camera(scene, root, frames[0][1], volume)
     moving.rotation_mode = "QUATERNION"
     before = None
@@ -432,10 +445,11 @@ def add_moving_camera(scene, root, frames, volume):
         before = turn
         moving.location = at.to_translation()
         moving.rotation_quaternion = turn
-        moving.data.lens = SENSOR_MM * camera["fx"] / camera["width"]
+        set_lens(moving.data, camera)
         moving.keyframe_insert("location", frame=number)
         moving.keyframe_insert("rotation_quaternion", frame=number)
-        moving.data.keyframe_insert("lens", frame=number)
+        for name in ("lens", "shift_x", "shift_y"):
+            moving.data.keyframe_insert(name, frame=number)
     return moving
 
 

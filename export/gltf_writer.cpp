@@ -176,17 +176,20 @@ int camera_index(const Intrinsics& lens, double near, double far, tinygltf::Mode
 }
 
 /// Node of a camera: glTF's look along -Z with +Y up, ours along +Z with +Y down.
-void add_cameras(const std::vector<bake::Camera>& cameras, const Affined& from_world, double size,
+/// @param shown  the mesh's box, world
+void add_cameras(const std::vector<bake::Camera>& cameras, const Affined& from_world, const Aabbd& shown,
                  tinygltf::Model& model) {
   const Affined opencv_from_gltf{{{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}}, {}};
+  const double size = length(shown.size());
   double farthest = size;
-  for (const bake::Camera& camera : cameras)
-    farthest = std::max(farthest, length(camera.world_from_camera.translation));
+  for (const bake::Camera& camera : cameras) {
+    farthest = std::max(farthest, length(camera.world_from_camera.translation - shown.centre()) + size);
+  }
   for (const bake::Camera& camera : cameras) {
     const Affined placed = from_world * camera.world_from_camera * opencv_from_gltf;
     tinygltf::Node node;
     node.name = camera.name;
-    node.camera = camera_index(camera.intrinsics, 1e-3 * size, 4 * farthest + size, model);
+    node.camera = camera_index(camera.intrinsics, 1e-3 * size, 4 * farthest, model);
     node.rotation = quaternion_of(placed.linear);
     node.translation = {placed.translation.x, placed.translation.y, placed.translation.z};
     model.scenes[0].nodes.push_back(int(model.nodes.size()));
@@ -194,10 +197,10 @@ void add_cameras(const std::vector<bake::Camera>& cameras, const Affined& from_w
   }
 }
 
-double diagonal(const bake::Mesh& mesh) {
-  Aabbf box = Aabbf::empty();
-  for (const Vec3f& p : mesh.positions) box.grow(p);
-  return length(box.size());
+Aabbd box_of(const bake::Mesh& mesh) {
+  Aabbd box = Aabbd::empty();
+  for (const Vec3f& p : mesh.positions) box.grow(p.cast<double>());
+  return box;
 }
 
 /// Everything but the image.
@@ -223,7 +226,7 @@ tinygltf::Model model_of(const bake::Mesh& mesh, const GltfScene& scene) {
   model.scenes[0].nodes = {0};
   if (!scene.sky.empty()) model.scenes[0].extras = extras({{"sky", scene.sky}});
   model.defaultScene = 0;
-  add_cameras(scene.cameras, from_world, diagonal(mesh), model);
+  add_cameras(scene.cameras, from_world, box_of(mesh), model);
   return model;
 }
 

@@ -183,7 +183,7 @@ struct ManifestRecord {
 void check_camera(const fs::path& file, std::size_t number, const bake::Camera& camera) {
   constexpr int kLargestSide = 1 << 15;
   constexpr double kMostPixels = 1 << 28;
-  constexpr std::size_t kLongestName = 200;
+  constexpr std::size_t kLongestName = 4096;
   const auto refuse = [&](const std::string& field, const std::string& problem) {
     throw InputError(file, "cameras[" + std::to_string(number) + "]." + field, problem);
   };

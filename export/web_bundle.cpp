@@ -44,6 +44,11 @@ class BundleFiles {
     return add(name, gzip(bytes), bytes.size());
   }
   [[nodiscard]] const Json& list() const { return list_; }
+  /// Removes a file that another bundle had here, unless this one has it too.
+  void remove_other(const std::string& name) const {
+    const bool is_ours = std::ranges::any_of(list_, [&](const Json& entry) { return entry["name"] == name; });
+    if (!is_ours) fs::remove(folder_ / name);
+  }
 
  private:
   fs::path folder_;
@@ -123,6 +128,19 @@ void remove_levels_from(std::size_t level, const fs::path& folder) {
   }
 }
 
+/// A folder that is uploaded shows nothing that was left out of the bundle.
+void remove_other_pictures(const fs::path& folder, const BundleFiles& files) {
+  for (const char* name : {"poster.webp", "sky.jpg"}) files.remove_other(name);
+  std::vector<std::string> photos;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder / "photos", none)) {
+    const std::string number = entry.path().stem().string();
+    const bool is_numbered = number.find_first_not_of("0123456789") == std::string::npos;
+    if (is_numbered && entry.path().extension() == ".jpg") photos.push_back("photos/" + number + ".jpg");
+  }
+  for (const std::string& photo : photos) files.remove_other(photo);
+}
+
 Json cameras_json(const WebScene& scene) {
   Json cameras = Json::array();
   for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
@@ -182,6 +200,7 @@ WebReport write_web_bundle(const WebVolume& volume, const WebScene& scene, const
     if (scene.photos[i].jpeg.empty()) continue;
     report.photo_bytes += files.add(fmt::format("photos/{:03}.jpg", i), scene.photos[i].jpeg);
   }
+  remove_other_pictures(folder, files);
   if (!page.empty()) report.page_bytes = copy_page(page, folder);
 
   const Json json{{"schema", kWebSchema},

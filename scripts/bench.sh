@@ -5,13 +5,17 @@
 #   scripts/bench.sh CAPTURE [threads]        CAPTURE: a real one, as fox with 1080x1920 images; threads: all
 #   scripts/bench.sh run CAPTURE [...]        cnerf run as a whole: scripts/bench_run.py says the rest
 set -euo pipefail
-cd "$(dirname "$0")/.."
 if [ $# -lt 1 ]; then
   sed -n '2,6p' "$0" >&2
   exit 64
 fi
-if [ "$1" = run ]; then exec python3 scripts/bench_run.py "${@:2}"; fi
+root=$(cd "$(dirname "$0")/.." && pwd)
+if [ "$1" = run ]; then  # where it was called: what follows may name files from there
+  exec python3 "$root/scripts/bench_run.py" --cnerf "$root/build/release/cnerf" "${@:2}"
+fi
 capture=$1
+[ ! -e "$capture" ] || capture=$(realpath -- "$capture")
+cd "$root"
 threads=${2:-$(nproc)}
 build=build/release/tests/bench
 document=docs/performance.md

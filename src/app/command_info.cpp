@@ -15,8 +15,7 @@ struct InfoArguments {
 };
 
 void info(const InfoArguments& arguments) {
-  Config config;
-  read_settings(arguments.config, fields_of(config), retired_keys());
+  const Config config = resolve_config(arguments.config);
   for (const auto& [name, value] : pipeline::facts_of(arguments.what, config.capture)) {
     fmt::print("{:<18} {}\n", name + ":", value);
   }

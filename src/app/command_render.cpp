@@ -1,6 +1,7 @@
 /// cnerf render: pictures and videos of a take.
 
 #include <sstream>
+#include <utility>
 
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
@@ -15,7 +16,7 @@ namespace {
 
 struct RenderArguments {
   RunFolderArguments run;
-  std::string path = "turntable", format, out;
+  std::string path, format, out;  ///< empty path: turntable; of a bake: cameras
   std::vector<std::string> views;
   bool photographs = false, baked = false, view_averaged = false, overwrite = false;
 };
@@ -36,20 +37,36 @@ pipeline::RenderOutput output_of(const RenderArguments& arguments) {
   output.color =
       arguments.baked || arguments.view_averaged ? pipeline::ShownColor::kBaked : pipeline::ShownColor::kDecoded;
   output.view_averaged = arguments.view_averaged;
+  output.overwrite = arguments.overwrite;
   return output;
+}
+
+/// A bake has no takes and no other colours than its own, and knows none of the paths that a run makes.
+void refuse_what_runs_have(const RenderArguments& arguments) {
+  for (const auto& [option, is_given] :
+       {std::pair("--take", !arguments.run.take.empty()), std::pair("--capture", !arguments.run.capture.empty()),
+        std::pair("--baked", arguments.baked), std::pair("--view-averaged", arguments.view_averaged)}) {
+    if (is_given) throw UsageError(std::string(option) + ": is for a run; " + arguments.run.run + " is a bake");
+  }
+  for (const char* path : {"turntable", "spiral", "orbit", "held-out"}) {
+    if (arguments.path == path) {
+      throw UsageError("--path: of a bake expected cameras or a camera file, got '" + arguments.path + "'");
+    }
+  }
 }
 
 void render_bake(const RenderArguments& arguments, Reporter& reporter) {
   const fs::path bake = arguments.run.run;
+  (void)resolve_config(arguments.run.config);
+  refuse_what_runs_have(arguments);
   if (!arguments.format.empty() && arguments.format != "png") {
     throw UsageError("--format: expected png, as all that is rendered of a bake, got '" + arguments.format + "'");
   }
   CameraPath path = pipeline::cameras_of_bake(bake);
-  const bool is_default = arguments.path == "cameras" || arguments.path == RenderArguments{}.path;
-  if (!is_default) path = path_from_file(arguments.path);
+  if (!arguments.path.empty() && arguments.path != "cameras") path = path_from_file(arguments.path);
   const fs::path folder = (arguments.out.empty() ? bake / "renders" : fs::path(arguments.out)) / path.name;
   refuse_existing(folder, arguments.overwrite);
-  pipeline::render_bake(bake, path, folder, reporter);
+  pipeline::render_bake(bake, path, folder, arguments.overwrite, reporter);
 }
 
 /// What is said of photographs and of a path, but not of both.
@@ -77,8 +94,8 @@ void render_photographs(const RenderArguments& arguments, const std::vector<std:
       arguments.out.empty() ? pipeline::photographs_folder(directory, take) : fs::path(arguments.out) / "photographs";
   refuse_existing(folder, arguments.overwrite);
   const pipeline::RunContext context = open_run(arguments.run, take, command_line, reporter);
-  pipeline::photographs_step(context, {take, arguments.views, folder, format, arguments.run.capture},
-                             engines_for(context.config.device), reporter);
+  const pipeline::PhotographsJob job{take, arguments.views, folder, format, arguments.run.capture, arguments.overwrite};
+  pipeline::photographs_step(context, job, engines_for(context.config.device), reporter);
 }
 
 void render(const RenderArguments& arguments, const std::vector<std::string>& command_line) {
@@ -94,7 +111,8 @@ void render(const RenderArguments& arguments, const std::vector<std::string>& co
   const std::string take = directory.choose_take(arguments.run.take);
   output.folder = arguments.out.empty() ? directory.renders(take) : fs::path(arguments.out);
   const pipeline::RunContext context = open_run(arguments.run, take, command_line, reporter);
-  const CameraPath path = make_path(arguments.path, context.capture, context.config.render);
+  const CameraPath path =
+      make_path(arguments.path.empty() ? "turntable" : arguments.path, context.capture, context.config.render);
   if (output.mp4) refuse_existing(output.folder / (path.name + ".mp4"), arguments.overwrite);
   if (output.png || output.exr) refuse_existing(output.folder / path.name, arguments.overwrite);
   pipeline::render_step(context, {take, path, output}, engines_for(context.config.device), reporter);

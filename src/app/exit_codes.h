@@ -16,7 +16,7 @@ struct ExitCodeMeaning {
 inline constexpr std::array<ExitCodeMeaning, 15> kExitCodes = {{
     {ExitCode::kSuccess, "success"},
     {ExitCode::kUsage, "unknown option or config key, value out of range"},
-    {ExitCode::kInput, "a file's content is wrong"},
+    {ExitCode::kInput, "a file's content is wrong, or it cannot be read"},
     {ExitCode::kMissingInput, "a file or folder that should exist does not"},
     {ExitCode::kDevice, "a device or a program that is needed is missing, or failed"},
     {ExitCode::kInternal, "a bug in cnerf"},

@@ -76,8 +76,10 @@ void run_program(CLI::App& program, int argc, char** argv) {
   try {
     chosen.work(without_token({argv, argv + argc}));
   } catch (const Interrupted& interruption) {
-    const std::string hint = chosen.command->resumable ? "; the same command with --resume goes on" : "";
-    throw Interrupted(interruption.what() + hint);
+    if (!chosen.command->resumable) throw;
+    const bool overwrites = chosen.app->count("--overwrite") > 0;  // which --resume contradicts
+    throw Interrupted(std::string(interruption.what()) + "; the same command with --resume" +
+                      (overwrites ? " instead of --overwrite" : "") + " goes on");
   }
 }
 
@@ -117,9 +119,7 @@ int guarded_main(int argc, char** argv) {
   } catch (const Error& error) {
     return failed(error.exit_code(), std::string("error: ") + error.what());
   } catch (const std::filesystem::filesystem_error& error) {
-    const bool is_missing = error.code() == std::errc::no_such_file_or_directory;
-    return failed(is_missing ? ExitCode::kMissingInput : ExitCode::kOutput,
-                  "error: " + error.path1().string() + ": " + error.code().message());
+    return failed(exit_code_of(error), "error: " + error.path1().string() + ": " + error.code().message());
   } catch (const std::exception& error) {
     if (is_shortage_of_memory(error)) return failed(ExitCode::kMemory, kOutOfMemory);
     return failed(ExitCode::kInternal, std::string("internal error, please report it: ") + error.what());

@@ -60,7 +60,8 @@ fs::path chosen_output(const fs::path& given, const fs::path& fallback, Reporter
 }
 
 void refuse_existing(const fs::path& output, bool overwrite) {
-  if (overwrite || !fs::exists(output)) return;
+  std::error_code failure;  // what cannot be looked at is refused where it is written
+  if (overwrite || !fs::exists(output, failure)) return;
   throw UsageError(output.string() + ": exists already; pass --overwrite to replace it, or another folder with -o");
 }
 

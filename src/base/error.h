@@ -12,7 +12,7 @@ namespace cnerf {
 enum class ExitCode : int {
   kSuccess = 0,
   kUsage = 64,         ///< unknown option or config key, value out of range
-  kInput = 65,         ///< a file's content is wrong: poses, images, models
+  kInput = 65,         ///< a file's content is wrong (poses, images, models), or it cannot be read
   kMissingInput = 66,  ///< a file or folder that should exist does not
   kDevice = 69,        ///< a device that was asked for is not there, or failed
   kInternal = 70,      ///< our own contract was broken: a bug
@@ -97,6 +97,10 @@ struct DivergedError : Error {
 struct Interrupted : Error {
   explicit Interrupted(const std::string& message) : Error(ExitCode::kInterrupted, message) {}
 };
+
+/// What the standard library's own error of a file means. Outputs fail by OutputError, so one without permission is an
+/// input.
+[[nodiscard]] ExitCode exit_code_of(const std::filesystem::filesystem_error& error);
 
 /// A violated precondition inside this program: always a bug.
 class ContractError : public std::logic_error {

@@ -161,6 +161,12 @@ bool make_folders(const fs::path& folder) {
   return true;
 }
 
+void remove_output(const fs::path& path) {
+  std::error_code failure;
+  fs::remove_all(path, failure);
+  if (failure) throw OutputError(path.string() + ": cannot be removed: " + failure.message());
+}
+
 void write_file(const fs::path& target, std::span<const std::byte> content) {
   write_atomically(target, [&](const fs::path& temporary) {
     errno = 0;

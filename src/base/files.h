@@ -51,6 +51,9 @@ void remove_leftovers(const std::filesystem::path& folder, int depth = 0);
 /// @return  whether it is new  @throws OutputError
 bool make_folders(const std::filesystem::path& folder);
 
+/// Removes a file, or a folder with all that it holds, if it is there.  @throws OutputError
+void remove_output(const std::filesystem::path& path);
+
 /// Writes `content` by `write_atomically`.  @throws OutputError  naming the file, e.g. on a full disk.
 void write_file(const std::filesystem::path& target, std::span<const std::byte> content);
 void write_file(const std::filesystem::path& target, std::string_view content);

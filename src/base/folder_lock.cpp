@@ -116,9 +116,7 @@ bool FolderLock::is_held() const {
 void clear_folder(const fs::path& folder) {
   std::error_code failure;
   for (const auto& entry : fs::directory_iterator(folder, failure)) {
-    if (entry.path().filename() == FolderLock::kFile) continue;
-    fs::remove_all(entry.path(), failure);
-    if (failure) throw OutputError(entry.path().string() + ": cannot be removed: " + failure.message());
+    if (entry.path().filename() != FolderLock::kFile) remove_output(entry.path());
   }
 }
 

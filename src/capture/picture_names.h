@@ -22,11 +22,19 @@ class PictureNames {
     std::string name = without_image_extension(view);
     std::ranges::replace_if(
         name, [](char c) { return c == '/' || c == '\\'; }, '_');
+    constexpr std::size_t kMostBytes = 150;  // of a view's path; file systems take 255, with all that is added
+    if (name.size() > kMostBytes) {
+      name.erase(0, name.size() - kMostBytes);
+      name.erase(name.begin(), std::ranges::find_if_not(name, is_inside_letter));
+    }
     while (!taken_.insert(name).second) name += "_";
     return name;
   }
 
  private:
+  /// Of UTF-8.
+  static bool is_inside_letter(char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; }
+
   std::set<std::string> taken_;
 };
 

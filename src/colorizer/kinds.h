@@ -48,4 +48,7 @@ struct OnnxRuntimeColorizers {
 /// @throws MissingInputError  naming both places.
 [[nodiscard]] std::filesystem::path find_spec_file(const std::string& name, const ColorizerRequest& request);
 
+/// The same of `FILE,FILE…`, or of the one file or folder that the whole argument names. Names may hold commas.
+[[nodiscard]] std::vector<std::filesystem::path> find_spec_files(const ColorizerRequest& request);
+
 }  // namespace cnerf

@@ -200,14 +200,46 @@ NetworkColorizer::NetworkColorizer(std::string name, const std::vector<fs::path>
   hash_ = sha256(std::as_bytes(std::span(hashes))).substr(0, 8);
 }
 
+namespace {
+
+/// Where a name of a spec leads to; empty where there is nothing.
+fs::path place_of(const std::string& name, const fs::path& folder) {
+  std::error_code failure;  // a list is longer than a name may be
+  for (const fs::path& place : {folder / name, fs::path(name)}) {
+    if (fs::exists(place, failure)) return place;
+  }
+  return {};
+}
+
+}  // namespace
+
 fs::path find_spec_file(const std::string& name, const ColorizerRequest& request) {
   const fs::path& folder = request.context.working_folder;
-  fs::path beside = folder / name;
-  if (!folder.empty() && fs::exists(beside)) return beside;
-  if (fs::exists(name)) return name;
+  if (fs::path place = place_of(name, folder); !place.empty()) return place;
   std::string message = "colorizer \"" + request.options.spec + "\": no file " + name;
-  if (!folder.empty() && beside != name) message += ", nor " + beside.string();
+  if (!folder.empty() && folder / name != name) message += ", nor " + (folder / name).string();
   throw MissingInputError(message);
+}
+
+std::vector<fs::path> find_spec_files(const ColorizerRequest& request) {
+  const std::string& list = request.argument;
+  const fs::path& folder = request.context.working_folder;
+  if (const fs::path whole = place_of(list, folder); !whole.empty()) return {whole};
+  const auto comma_from = [&](std::size_t at) { return std::min(list.find(',', at), list.size()); };
+  std::vector<fs::path> files;
+  for (std::size_t begin = 0; begin < list.size();) {
+    const std::size_t first = comma_from(begin);
+    std::size_t end = first;
+    const auto is_file = [&] {
+      std::error_code failure;
+      return fs::is_regular_file(place_of(list.substr(begin, end - begin), folder), failure);
+    };
+    while (!is_file() && end < list.size()) end = comma_from(end + 1);
+    if (!is_file()) end = first;  // which is refused by that name
+    if (end > begin) files.push_back(find_spec_file(list.substr(begin, end - begin), request));
+    begin = end + 1;
+  }
+  return files;
 }
 
 std::string first_line(const std::string& text) {

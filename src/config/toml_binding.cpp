@@ -279,7 +279,9 @@ void apply_setting(std::string_view setting, const std::vector<Field>& fields, c
     if (table.size() != 1) origin.refuse("expected one value, got '" + value + "'");
     assign(*field, *table.get("value"), origin);
   } catch (const toml::parse_error&) {
-    origin.refuse("cannot read the value '" + value + "'");
+    const bool is_text = std::holds_alternative<std::string*>(field->value);
+    if (!is_text) origin.refuse("cannot read the value '" + value + "'");
+    assign(*field, toml::value<std::string>(value), origin);  // words that only begin as TOML does: '60s kitchen
   }
 }
 

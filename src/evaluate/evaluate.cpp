@@ -97,7 +97,8 @@ void measure_by_networks(const EvaluatedView& pictures, const EvaluateOptions& o
   const int width = pictures.ours.width, height = pictures.ours.height;
   const std::vector<std::uint8_t> ours = srgb8_from_linear(pictures.ours.rgb);
   const std::vector<std::uint8_t> truth = srgb8_from_linear(pictures.truth->rgb);
-  if (options.lpips != nullptr) metrics.lpips = options.lpips->distance(ours, truth, width, height);
+  const bool is_large = std::min(width, height) >= Lpips::kLeastSide;
+  if (options.lpips != nullptr && is_large) metrics.lpips = options.lpips->distance(ours, truth, width, height);
   if (options.encoder == nullptr) return;
   metrics.features_ours = options.encoder->regions(ours, width, height);
   metrics.features_truth = options.encoder->regions(truth, width, height);

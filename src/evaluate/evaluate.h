@@ -37,7 +37,7 @@ struct ViewMetrics {
   std::optional<double> psnr_rgb;      ///< dB; sRGB-encoded values of all three channels
   std::optional<double> ssim;          ///< of encoded luminance
   std::optional<double> ssim_rgb;      ///< mean of the three encoded channels
-  std::optional<double> lpips;         ///< of 8-bit sRGB, where weights were given
+  std::optional<double> lpips;         ///< of 8-bit sRGB, where weights were given, from Lpips::kLeastSide on
   std::optional<double> colorfulness, colorfulness_truth, colorfulness_difference;  ///< difference: ours - truth
   std::optional<double> colorfulness_magnitude, colorfulness_magnitude_truth, colorfulness_magnitude_difference;
   std::optional<double> color_diversity, color_diversity_truth, color_diversity_difference;  ///< likewise

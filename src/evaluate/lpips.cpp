@@ -19,7 +19,6 @@ using cv::dnn::LayerParams;
 // Of LPIPS's scaling layer; inputs are in [-1, 1].
 constexpr float kShift[3] = {-0.030f, -0.088f, -0.188f}, kScale[3] = {0.458f, 0.448f, 0.450f};
 constexpr float kTiny = 1e-10f;  // added to norms
-constexpr int kLeastSide = 32;
 
 /// What OpenCV wants: a matrix of its own.
 cv::Mat matrix(const TensorFile::Tensor& tensor) {

@@ -14,6 +14,8 @@ namespace cnerf {
 /// papers report) or SqueezeNet 1.1, whichever the weights are of. Not for several threads.
 class Lpips {
  public:
+  static constexpr int kLeastSide = 32;  ///< pixels of a picture's shorter side
+
   /// @param weights  float32 tensors, little-endian; beside it a text with a line `name shape offset` a tensor, offsets
   ///                 in floats: `X_manifest.txt` for `X_f32.bin`, or `X.txt` for `X.bin`.
   /// @throws MissingInputError, InputError  naming the file and the tensor.
@@ -25,7 +27,7 @@ class Lpips {
   [[nodiscard]] const std::string& network() const;  ///< "AlexNet" or "SqueezeNet"
 
   /// 0 for equal pictures.
-  /// @param ours, truth  [H, W, 3] 8-bit sRGB of at least 32 x 32 pixels
+  /// @param ours, truth  [H, W, 3] 8-bit sRGB, of kLeastSide or more
   [[nodiscard]] double distance(std::span<const std::uint8_t> ours, std::span<const std::uint8_t> truth, int width,
                                 int height) const;
 

@@ -91,7 +91,9 @@ void bake_step(const RunContext& context, const BakeJob& job, const Engines& eng
   const exporting::Label label{{colorizer_name(context.directory, take), take, context.command_line}, config.world};
   exporting::BakeOutput output(folder, formats, {config.vdb, config.web, web::find_page(), scene->sky()},
                                context.capture, label, observer);
-  if (formats.splat) output.take_splats(make_splats(*scene, context.capture, config.splat, observer));
+  if (formats.splat) {
+    output.take_splats([&] { return make_splats(*scene, context.capture, config.splat, observer); });
+  }
   if (formats.has_only_splats()) {
     output.finish();
   } else {

@@ -46,6 +46,7 @@ std::string take_to_go_on_with(const RunDirectory& directory) {
 
 /// See take_to_write.
 std::string chosen_take(const RunContext& context, const std::string& named, const ExistingOutput& existing) {
+  check_choice(existing);
   const RunDirectory& directory = context.directory;
   if (!named.empty()) {
     check_take_name(named);
@@ -118,7 +119,8 @@ std::unique_ptr<Colorizer> colorizer_of(const RunContext& context, Observer& obs
 std::string configured_take(const RunDirectory& directory, const std::string& named, bool resume) {
   if (!resume) return "";
   const std::string take = named.empty() ? take_to_go_on_with(directory) : named;
-  return fs::exists(directory.take_config_file(take)) ? take : "";  // none: killed before anything was written
+  std::error_code failure;  // a name that is too long is refused where it is written
+  return fs::exists(directory.take_config_file(take), failure) ? take : "";  // none: killed before any was written
 }
 
 std::string take_to_write(const RunContext& context, const std::string& named, const ExistingOutput& existing) {

@@ -23,7 +23,8 @@ namespace cnerf::pipeline {
 /// The take whose configuration a colorization starts from: one that is gone on with has its own. Empty: the run's.
 [[nodiscard]] std::string configured_take(const RunDirectory& directory, const std::string& named, bool resume);
 /// The take a colorization goes to: the named one, else a free name after the colorizer's kind; with `resume` the take
-/// that was not finished. Rank 0 says which.  @throws UsageError  when the named take is finished and neither is set.
+/// that was not finished. Rank 0 says which.
+/// @throws UsageError  when the named take is finished and neither is set, or both are.
 [[nodiscard]] std::string take_to_write(const RunContext& context, const std::string& named,
                                         const ExistingOutput& existing);
 /// The take of a whole run: with `resume` the current one, else one that the run's own colorizer began. Takes that

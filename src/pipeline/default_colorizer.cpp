@@ -6,6 +6,7 @@ namespace cnerf::pipeline {
 namespace fs = std::filesystem;
 
 void choose_colorizer(const fs::path& capture, Config& config, Observer& observer) {
+  make_files_absolute(config.colorizer);
   if (!config.colorizer.spec.empty()) return;
   if (!config.colorizer.keyframes.empty()) {
     for (const fs::path& file : key_frame_files(config.colorizer)) {

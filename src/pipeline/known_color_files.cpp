@@ -196,6 +196,21 @@ GivenColors load_known_colors(const Capture& capture, const ColorizerOptions& co
   return given;
 }
 
+void make_files_absolute(ColorizerOptions& config) {
+  const auto make_absolute = [](std::string& list, const char* option) {
+    std::vector<std::string> items;
+    for (const NamedFile& named : named_files(list, option)) {
+      const std::string file = fs::absolute(named.file).string();
+      const bool is_one = file.find(';') == std::string::npos;  // else the folder's name would part the list
+      items.push_back(named.view + "=" + (is_one ? file : named.file.string()));
+    }
+    list = joined(items, ";");
+  };
+  make_absolute(config.keyframes, "--keyframe");
+  make_absolute(config.hint_images, "--hint-image");
+  if (!config.strokes.empty()) config.strokes = fs::absolute(config.strokes).string();
+}
+
 std::vector<fs::path> key_frame_files(const ColorizerOptions& config) {
   std::vector<fs::path> files;
   for (const NamedFile& named : named_files(config.keyframes, "--keyframe")) files.push_back(named.file);

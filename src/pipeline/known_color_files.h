@@ -21,6 +21,10 @@ struct GivenColors {
 /// @throws MissingInputError, InputError  a file that is not there, not a picture, of another shape, or without colour.
 [[nodiscard]] GivenColors load_known_colors(const Capture& capture, const ColorizerOptions& config);
 
+/// Makes the names of files in `config.keyframes`, `hint_images` and `strokes` absolute: a stored configuration is read
+/// from any folder.  @throws UsageError.
+void make_files_absolute(ColorizerOptions& config);
+
 /// The files `config.keyframes` names.  @throws UsageError.
 [[nodiscard]] std::vector<std::filesystem::path> key_frame_files(const ColorizerOptions& config);
 

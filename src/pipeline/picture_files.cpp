@@ -7,6 +7,7 @@
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/cluster/ranks.h"
 #include "src/picture/codecs.h"
 #include "src/picture/encode.h"
 #include "src/picture/exr_writer.h"
@@ -43,6 +44,16 @@ void write_exr(const fs::path& file, const RenderedImage& image, ShownColor colo
               {"A", image.opacity, 1, true},
               {"Z", image.depth}},
              {{"software", "cnerf " CNERF_VERSION}, {"colorOrigin", color_origin}, {"colorSpace", "lin_rec709"}}});
+}
+
+void remove_pictures(const fs::path& folder, const char* extension) {
+  std::error_code failure;
+  if (cluster::world().is_first()) {
+    for (const auto& entry : fs::directory_iterator(folder, failure)) {
+      if (entry.path().extension() == extension && !entry.is_directory(failure)) remove_output(entry.path());
+    }
+  }
+  cluster::world().barrier("removal of former pictures");  // before somebody writes new ones
 }
 
 struct VideoFile::Encoder {

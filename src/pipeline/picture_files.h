@@ -28,6 +28,10 @@ enum class ShownColor {
 void write_exr(const std::filesystem::path& file, const RenderedImage& image, ShownColor color,
                const std::string& color_origin = {});
 
+/// Removes the pictures of one kind that lie in a folder, not below it. To be called by all ranks.
+/// @param extension  ".png"  @throws OutputError
+void remove_pictures(const std::filesystem::path& folder, const char* extension);
+
 /// An MPEG-4 video. The file appears under its name when `finish` succeeds.
 class VideoFile {
  public:

@@ -90,6 +90,7 @@ std::optional<std::string> origin_in(const fs::path& out) {
 /// @return  false where the capture is finished and stays
 bool begin_folder(const PrepareJob& job) {
   const auto& [source, out, options, existing] = job;
+  check_choice(existing);
   const bool finished = fs::exists(out / "transforms.json");
   const std::optional<std::string> begun = origin_in(out);
   const bool ours = begun.has_value();
@@ -109,7 +110,7 @@ bool begin_folder(const PrepareJob& job) {
     if (existing.overwrite) {
       for (const char* made :
            {"images", "masks", "work", "transforms.json", prepare::kPointsFile, kRecord, "contact_sheet.png"}) {
-        fs::remove_all(out / made);
+        remove_output(out / made);
       }
     }
   }

@@ -34,8 +34,8 @@ struct PrepareJob {
 [[nodiscard]] bool was_begun_for_another(const PrepareJob& job);
 
 /// Makes a capture, unless it is there and `existing.resume` is set, and says what it wrote.
-/// @throws UsageError  when there is a capture, or anything else, and neither choice is made; when `existing.resume` is
-///                     set and the folder was begun for another source; and as `prepare_capture`.
+/// @throws UsageError  when there is a capture, or anything else, and neither choice is made; when both are; when
+///                     `existing.resume` is set and the folder was begun for another source; and as `prepare_capture`.
 void prepare_step(const PrepareJob& job, const Engines& engines, Observer& observer);
 
 /// What a run works on: `source` itself if it is a capture; else the capture that is made of it beside the run's

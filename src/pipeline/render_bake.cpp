@@ -11,6 +11,7 @@
 #include "src/base/error.h"
 #include "src/capture/picture_names.h"
 #include "src/picture/encode.h"
+#include "src/pipeline/picture_files.h"
 #include "src/pipeline/run_context.h"
 
 namespace cnerf::pipeline {
@@ -30,10 +31,12 @@ CameraPath cameras_of_bake(const fs::path& bake) {
   return path;
 }
 
-void render_bake(const fs::path& bake, const CameraPath& path, const fs::path& folder, Observer& observer) {
+void render_bake(const fs::path& bake, const CameraPath& path, const fs::path& folder, bool overwrite,
+                 Observer& observer) {
   const FolderLock lock = lock_folder(folder.parent_path(), FolderLock::Mode::kAlone, observer);
   cluster::world().barrier("begin of a step");
   const std::vector<bake::Volume> volumes = exporting::read_volumes(bake);
+  if (overwrite) remove_pictures(folder, ".png");
   const auto write = [&](std::size_t i) {
     const PathCamera& camera = path.cameras[i];
     const bake::VolumeImage image = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);

@@ -13,8 +13,9 @@ namespace cnerf::pipeline {
 [[nodiscard]] CameraPath cameras_of_bake(const std::filesystem::path& bake);
 
 /// Writes a PNG for each camera.
+/// @param overwrite  pictures that a former render left go
 /// @throws Interrupted  between two pictures
 void render_bake(const std::filesystem::path& bake, const CameraPath& path, const std::filesystem::path& folder,
-                 Observer& observer);
+                 bool overwrite, Observer& observer);
 
 }  // namespace cnerf::pipeline

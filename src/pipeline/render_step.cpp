@@ -1,6 +1,9 @@
 #include "src/pipeline/render_step.h"
 
+#include <algorithm>
+#include <functional>
 #include <map>
+#include <utility>
 
 #include "bake/color/view_average.h"
 #include "bake/provenance.h"
@@ -22,6 +25,14 @@ Picture unpacked(const cluster::Bytes& bytes) {
   Picture picture;
   cluster::Unpacker(bytes).get(picture.width).get(picture.height).get(picture.rgb);
   return picture;
+}
+
+void refuse_video_of_several_sizes(const CameraPath& path) {
+  const auto size = [](const PathCamera& camera) {
+    return std::pair(camera.intrinsics.width, camera.intrinsics.height);
+  };
+  if (std::ranges::adjacent_find(path.cameras, std::not_equal_to(), size) == path.cameras.end()) return;
+  throw UsageError("--format mp4: the cameras of " + path.name + " have several sizes; use png");
 }
 
 constexpr double kMostWaitingBytes = 1 << 30;  // of pictures that a video shows again later
@@ -104,6 +115,7 @@ class RenderFiles {
 
 void render_step(const RunContext& context, const RenderJob& job, const Engines& engines, Observer& observer) {
   const RenderOutput& output = job.output;
+  if (output.mp4) refuse_video_of_several_sizes(job.path);
   const StepLocks locks(context.directory, output.folder, observer);
   const Stopwatch watch;
   const StepScene scene(job.scene, context.directory, job.take, context.config.finish, engines);
@@ -117,6 +129,9 @@ void render_step(const RunContext& context, const RenderJob& job, const Engines&
   }
   const std::string color_origin = bake::color_origin_text(colorizer_name(context.directory, job.take), job.take);
   RenderFiles files(output, job.path.name, color_origin, context.config.render.fps, observer);
+  // Last, so that what fails before leaves them.
+  if (output.overwrite && output.png) remove_pictures(output.folder / job.path.name, ".png");
+  if (output.overwrite && output.exr) remove_pictures(output.folder / job.path.name, ".exr");
   const ProgressSink progress = observer.progress_sink();
   const std::vector<PathCamera>& cameras = job.path.cameras;
   const std::vector<std::vector<std::size_t>> frames = pictures_of(job.path, output.mp4);

@@ -17,6 +17,7 @@ struct RenderOutput {
   bool png = false, exr = false, mp4 = false;
   ShownColor color = ShownColor::kDecoded;
   bool view_averaged = false;  ///< luminance as a bake averages it over the views that see a point
+  bool overwrite = false;      ///< pictures of these kinds that a former render left go
 };
 
 struct RenderJob {
@@ -27,6 +28,7 @@ struct RenderJob {
 };
 
 /// Renders a take along a path.
+/// @throws UsageError  for a video of cameras of several sizes
 void render_step(const RunContext& context, const RenderJob& job, const Engines& engines, Observer& observer);
 
 [[nodiscard]] RenderOptions render_options(const Config& config);

@@ -35,7 +35,9 @@ FolderLock lock_folder(const fs::path& folder, FolderLock::Mode mode, Observer& 
 
 StepLocks::StepLocks(const RunDirectory& directory, const fs::path& folder, Observer& observer)
     : run(lock_folder(directory.root(), FolderLock::Mode::kShared, observer)) {
-  if (folder != directory.root()) own = lock_folder(folder, FolderLock::Mode::kAlone, observer);
+  std::error_code failure;  // where one of them is missing, they are two
+  const bool is_run = fs::equivalent(folder, directory.root(), failure);
+  if (!is_run) own = lock_folder(folder, FolderLock::Mode::kAlone, observer);
   cluster::world().barrier("begin of a step");
 }
 
@@ -49,8 +51,9 @@ namespace {
 
 /// The folder itself, or the one that it will be made in; empty where there is none of them.
 fs::path nearest_folder(fs::path folder) {
-  if (!folder.empty()) folder = fs::absolute(folder);
-  while (!folder.empty() && !fs::is_directory(folder)) folder = folder.parent_path();
+  std::error_code failure;  // what cannot be looked at is refused where it is written
+  if (!folder.empty()) folder = fs::absolute(folder, failure);
+  while (!folder.empty() && !fs::is_directory(folder, failure)) folder = folder.parent_path();
   return folder;
 }
 
@@ -86,7 +89,13 @@ void use_learned_views(RunContext& context, Observer& observer) {
   }
 }
 
+void check_choice(const ExistingOutput& existing) {
+  if (!existing.resume || !existing.overwrite) return;
+  throw UsageError("--resume goes on with what is there, --overwrite replaces it: give one of them");
+}
+
 void check_run_folder(const RunDirectory& directory, const ExistingOutput& existing) {
+  check_choice(existing);
   const fs::path& root = directory.root();
   if (directory.exists()) {
     if (existing.resume || existing.overwrite) return;

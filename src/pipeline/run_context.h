@@ -27,6 +27,8 @@ struct ExistingOutput {
   bool resume = false;     ///< go on where it stopped; what is finished stays
   bool overwrite = false;  ///< start again
 };
+/// @throws UsageError  where both are set
+void check_choice(const ExistingOutput& existing);
 
 /// Puts what a finished stage 1 learned of its views into the context's capture, and says it. Not for going on with
 /// stage 1, which learns from the capture as it is.  @throws SnapshotError
@@ -51,7 +53,7 @@ struct StepLocks {
 };
 
 /// Whether a run may go to the folder; nothing is changed yet.
-/// @throws UsageError  when there is a run and neither is set, or the folder holds something else.
+/// @throws UsageError  when there is a run and neither is set, when both are, or the folder holds something else.
 void check_run_folder(const RunDirectory& directory, const ExistingOutput& existing);
 /// Holds a folder that a run may go to.  @throws UsageError as check_run_folder, BusyError, OutputError
 [[nodiscard]] FolderLock claim_run_folder(const RunDirectory& directory, const ExistingOutput& existing,

@@ -152,9 +152,7 @@ std::string RunDirectory::free_take_name(const std::string& base) const {
 void RunDirectory::clear() const {
   for (const char* name : {"config.toml", "run.json", "stage1.snapshot", "takes", "renders", "bakes", "metrics.json",
                            "contact_sheet.png", "bases.png", "key_views.png", "key_views.json"}) {
-    std::error_code failure;
-    fs::remove_all(root_ / name, failure);
-    if (failure) throw OutputError((root_ / name).string() + ": cannot be removed: " + failure.message());
+    remove_output(root_ / name);
   }
 }
 

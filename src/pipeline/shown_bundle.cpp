@@ -39,6 +39,7 @@ fs::path bundle_of_bake(const fs::path& bake, const ShowJob& job, const exportin
   }
   const FolderLock lock = lock_folder(bake, FolderLock::Mode::kAlone, observer);
   const exporting::BakeManifest manifest = exporting::read_manifest(manifest_file);
+  if (!manifest.volume && is_bundle(folder)) return folder;
   if (!manifest.volume) {
     throw InputError(manifest_file, "volume", "this bake has none; bake with --format vdb or --format web");
   }

@@ -5,13 +5,14 @@
 #include <optional>
 
 #include "bake/camera.h"
+#include "src/capture/pose.h"
 #include "src/python/arrays.h"
 #include "src/python/bindings.h"
 
 namespace cnerf::python {
 namespace {
 
-/// Of three or four rows of four.
+/// Of three or four rows of four.  @throws UsageError  another shape, or no pose
 Affined affine_of(const Numbers& matrix) {
   const bool fits = matrix.ndim() == 2 && (matrix.shape(0) == 3 || matrix.shape(0) == 4) && matrix.shape(1) == 4;
   if (!fits) throw UsageError("world_from_camera: expected an array of shape [4, 4] or [3, 4]");
@@ -20,7 +21,11 @@ Affined affine_of(const Numbers& matrix) {
     map.linear.rows[row] = {matrix.at(row, 0), matrix.at(row, 1), matrix.at(row, 2)};
     map.translation[row] = matrix.at(row, 3);
   }
-  return map;
+  try {
+    return rigid_pose(map, "world_from_camera", "");
+  } catch (const InputError& error) {  // of no file here
+    throw UsageError(error.what());
+  }
 }
 
 py::array_t<double> matrix_of(const Affined& map) {
@@ -41,7 +46,6 @@ struct Lens {
 
 bake::Camera make_camera(const Numbers& world_from_camera, const Lens& lens, const std::string& name) {
   if (lens.width < 1 || lens.height < 1) throw UsageError("width, height: expected at least 1 pixel");
-  if (!(lens.fx > 0) || !(lens.fy.value_or(lens.fx) > 0)) throw UsageError("fx, fy: expected focal lengths above 0");
   bake::Camera camera{name, {}, affine_of(world_from_camera)};
   camera.intrinsics.width = lens.width;
   camera.intrinsics.height = lens.height;
@@ -49,6 +53,8 @@ bake::Camera make_camera(const Numbers& world_from_camera, const Lens& lens, con
   camera.intrinsics.fy = lens.fy.value_or(lens.fx);
   camera.intrinsics.cx = lens.cx.value_or(lens.width / 2.0);
   camera.intrinsics.cy = lens.cy.value_or(lens.height / 2.0);
+  const auto found = implausible_number(camera.intrinsics, camera.world_from_camera.translation);
+  if (found) throw UsageError(found->field + ": " + found->problem);
   return camera;
 }
 

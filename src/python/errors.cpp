@@ -38,8 +38,9 @@ void raise(const Error& error) {
   PyErr_SetString(type, error.what());
 }
 
-/// As Python's own functions do for the same failure.
+/// As Python's own functions do for the same failure, unless an input cannot be read.
 void raise(const std::filesystem::filesystem_error& error) {
+  if (exit_code_of(error) == ExitCode::kInput) return raise(InputError(error.path1(), "", error.code().message()));
   const py::tuple arguments = py::make_tuple(error.code().value(), error.code().message(), error.path1().string());
   PyErr_SetObject(PyExc_OSError, arguments.ptr());
 }

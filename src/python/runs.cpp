@@ -129,7 +129,9 @@ class OpenRun {
 
 /// What exists already, and may not be replaced unless that is said.
 void refuse_existing(const fs::path& file, bool overwrite) {
-  if (!overwrite && fs::exists(file)) throw UsageError(file.string() + ": exists already; overwrite=True replaces it");
+  std::error_code failure;  // what cannot be looked at is refused where it is written
+  if (overwrite || !fs::exists(file, failure)) return;
+  throw UsageError(file.string() + ": exists already; overwrite=True replaces it");
 }
 
 /// A run's folder is data, whoever made it, but for a colorizer of its configuration that is code.
@@ -173,7 +175,7 @@ std::string colorize(const OpenRun& run, const ColorizeCall& call, Observer& obs
   std::string& spec = context.config.colorizer.spec;
   if (base.empty()) pipeline::prefer_key_frames(call.settings.alone().colorizer, context.config.colorizer);
   if (!call.colorizer.empty()) spec = call.colorizer;
-  refuse_code(spec, call.colorizer, call.trust);
+  refuse_code(spec, call.colorizer.empty() ? call.settings.alone().colorizer.spec : call.colorizer, call.trust);
   const Engines& engines = engines_for(context.config.device);
   pipeline::choose_colorizer(context.capture.root, context.config, observer);
   std::string take = pipeline::take_to_write(context, call.take, call.existing);
@@ -193,6 +195,7 @@ fs::path bake(const OpenRun& run, const BakeCall& call, Observer& observer) {
   const std::string take = run.directory().choose_take(call.take);
   fs::path folder = call.folder.empty() ? run.directory().bakes(take) : call.folder;
   refuse_existing(exporting::last_file(folder, formats), call.overwrite);
+  if (formats.web) refuse_existing(exporting::last_file(folder, {.web = true}), call.overwrite);
   const Words words = call.settings.command_line({"cnerf", "bake", run.directory().root().string()});
   const pipeline::RunContext context = run.context(take, call.settings, words, observer);
   pipeline::bake_step(context, {take, folder, formats}, engines_for(context.config.device), observer);

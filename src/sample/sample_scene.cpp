@@ -152,6 +152,7 @@ RenderedView render_view(const SampleSceneOptions& options, int view) {
   out.color.resize(std::size_t(options.width) * std::size_t(options.height));
   out.depth.resize(out.color.size());
   parallel_tasks(std::size_t(options.height), [&](std::size_t y) {
+    if (interruption_requested()) return;
     for (std::size_t x = 0; x < std::size_t(options.width); ++x) {
       const std::size_t pixel = y * std::size_t(options.width) + x;
       out.color[pixel] = sample::render_pixel(intrinsics, pose, int(x), int(y), side, seeds.bits(pixel));
@@ -236,6 +237,7 @@ void write_sample_scene(const fs::path& folder, const SampleSceneOptions& option
   check_options(options);
   for (int view = 0; view < options.views; ++view) {
     const RenderedView rendered = render_view(options, view);
+    if (interruption_requested()) throw Interrupted("stopped; the capture is not finished");
     write_view(folder, options, view, rendered);
     if (view >= kFirstReference && view < kFirstReference + kReferences) {
       write_picture(folder / "references" / file_name(view, "png"), options, rendered, /*grey=*/false);

@@ -38,6 +38,7 @@ struct SampleSceneOptions {
 /// serve as `reference:`. Shadow and exposures are in the grey pictures and in the ground truth. With a sky there are
 /// no bounds, and beside the rest lie `sky/*.png`: white where a pixel shows nothing but the sky. Same options, same
 /// bytes, on any number of threads.
+/// @throws Interrupted  when the user asked to stop; views that were written stay
 void write_sample_scene(const std::filesystem::path& folder, const SampleSceneOptions& options,
                         const ProgressSink& progress = {});
 

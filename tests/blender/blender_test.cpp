@@ -325,6 +325,8 @@ TEST(Blender, NumberedPicturesBecomeAFilmWithPlatesUnderAnUprightEmpty) {
   for (const int frame : {3, 4, 7}) {
     cameras.push_back(
         camera_at("images/frame_" + std::to_string(frame) + ".png", {double(frame), 2, 9}, {1, 2, 3}, 8, 8, 9));
+    cameras.back().intrinsics.cx = 1 + 0.5 * frame;
+    cameras.back().intrinsics.cy = 8 - 0.5 * frame;
   }
   Label label = label_of_first("y", "cm");
   label.world.metres_per_unit = 0.01;
@@ -343,6 +345,8 @@ TEST(Blender, NumberedPicturesBecomeAFilmWithPlatesUnderAnUprightEmpty) {
          "    scene.frame_set(frame)\n"
          "    at = film.matrix_world.to_translation()\n"  // (x, y, z) stands up as (x, -z, y), in metres
          "    assert max(abs(a - b) for a, b in zip(at, (0.01 * frame, -0.09, 0.02))) < 1e-6, at\n"
+         "    shift, right = (film.data.shift_x, film.data.shift_y), {3: (3, 5), 4: (2, 4), 7: (-1, 1)}[frame]\n"
+         "    assert max(abs(a - b / 16) for a, b in zip(shift, right)) < 1e-6, (frame, shift)\n"  // in widths
          "plates = [len(o.data.background_images) for o in scene.objects if o.type == 'CAMERA']\n"
          "assert sum(plates) == 1, plates\n";
   EXPECT_EQ(run_blender(bake.blender_setup(), "--film", folder / "check.py"), 0)
@@ -463,8 +467,8 @@ std::string in_a_window(const std::filesystem::path& setup, const std::string& g
 TEST(Blender, PastedIntoTheTextEditorItMakesASceneOfItsOwn) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
-  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
-  // As the text editor runs it: no __file__, and a scene that must not be touched.
+  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder / "ü and 😀", "block");
+  // No __file__ and no file of the text: only the folder in the script is left. A scene that must not be touched.
   std::ofstream(folder / "paste.py")
       << in_a_window(bake.blender_setup, "")
       << "assert before and before == [o.name for o in bpy.data.scenes['Scene'].objects]\n"
@@ -474,6 +478,29 @@ TEST(Blender, PastedIntoTheTextEditorItMakesASceneOfItsOwn) {
          "volume.grids.load()\n"
          "assert 'density' in [g.name for g in volume.grids]\n";
   EXPECT_EQ(run_blender(folder / "paste.py", ""), 0) << read_text_file(folder / "blender.log");
+}
+
+TEST(Blender, TheTextEditorShowsTheBakeBesideTheOpenText) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder / "original", "block");
+  std::filesystem::copy(folder / "original", folder / "copy", std::filesystem::copy_options::recursive);
+  const std::filesystem::path setup = folder / "copy" / "blender_setup.py";
+  // Without a window there is no text editor: a stand-in has its text open. Its __file__ is the name of the text.
+  std::ofstream(folder / "editor.py") << "import bpy, os, types\n"
+                                         "class Editor:\n"
+                                         "    real = bpy.context\n"
+                                         "    space_data = types.SimpleNamespace(text=bpy.data.texts.load(r'" +
+                                             setup.string() +
+                                             "'))\n"
+                                             "    def __getattr__(self, name):\n"
+                                             "        return getattr(self.real, name)\n"
+                                             "bpy.context = Editor()\n" +
+                                             in_a_window(setup, ", '__file__': '/blender_setup.py'") +
+                                             "volume = [o.data for o in scene.objects if o.type == 'VOLUME'][0]\n"
+                                             "assert os.path.samefile(os.path.dirname(volume.filepath), r'" +
+                                             (folder / "copy").string() + "'), volume.filepath\n";
+  EXPECT_EQ(run_blender(folder / "editor.py", ""), 0) << read_text_file(folder / "blender.log");
 }
 
 TEST(Blender, OptionsAreTakenWhereThereIsAWindow) {
@@ -495,6 +522,24 @@ TEST(Blender, FailuresEndWithAnExitStatus) {
   EXPECT_EQ(run_blender(bake.blender_setup, "--save '" + (folder / "scene.blend").string() + "'"), 0)
       << read_text_file(folder / "blender.log");
   EXPECT_TRUE(std::filesystem::exists(folder / "scene.blend"));
+}
+
+TEST(Blender, AVolumeThatCannotBeReadIsRefusedByName) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const bake::Volume coarse = block_volume({0, 0, 0}, {6, 6, 6}, 1, 0.1), fine = block_volume({0, 0, 0}, {4, 4, 4}, 2);
+  BakeFolder bake(folder.path(), {}, label_of_first());
+  bake.add_volumes({planes_of(fine), planes_of(coarse)}, "volume", {});
+  bake.finish();
+  const auto expect_refusal_of = [&](const std::string& file) {
+    EXPECT_EQ(run_blender(bake.blender_setup(), ""), 1) << file;
+    const std::string log = read_text_file(folder / "blender.log");
+    EXPECT_NE(log.find("/" + file + ": "), std::string::npos) << log;
+  };
+  write_file(folder / "volume.vdb", "not a VDB");
+  expect_refusal_of("volume.vdb");
+  std::filesystem::remove(folder / "volume_fine1.vdb");
+  expect_refusal_of("volume_fine1.vdb");
 }
 
 }  // namespace

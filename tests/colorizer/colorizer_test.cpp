@@ -3,7 +3,9 @@
 #include <cmath>
 #include <limits>
 
+#include "src/base/files.h"
 #include "src/color/ab_bins.h"
+#include "src/colorizer/kinds.h"
 #include "tests/colorizer/questions.h"
 #include "tests/support/data.h"
 
@@ -49,6 +51,27 @@ TEST(Colorizer, MissingFilesAreNamed) {
                 }),
                 AllOf(HasSubstr("no_such"), HasSubstr("/no/such/folder")));
   }
+}
+
+TEST(Colorizer, NamesInAListOfFilesMayHoldCommas) {
+  using Files = std::vector<std::filesystem::path>;
+  const test::TempDir folder;
+  const Files three = {folder / "Paris, 1910/a.png", folder / "c.png", folder / "Paris, 1910/b.png"};
+  for (const auto& file : three) write_file(file, "");
+  std::filesystem::create_directory(folder / "Paris");
+  const auto found = [&](const std::string& list) {
+    ColorizerOptions options;
+    options.spec = "reference:" + list;
+    const ColorizerContext context{folder.path(), {}, 1, {}};
+    return find_spec_files({list, options, context});
+  };
+  EXPECT_EQ(found("Paris, 1910/a.png,c.png,,Paris, 1910/b.png"), three);
+  EXPECT_EQ(found(three[0].string() + "," + three[1].string() + "," + three[2].string()), three);
+  EXPECT_EQ(found("Paris, 1910"), Files{folder / "Paris, 1910"});
+  EXPECT_THAT(message_of<MissingInputError>([&] { (void)found("none, 1.png,c.png"); }), HasSubstr("no file none, nor"));
+  std::string many;
+  for (int i = 0; i < 60; ++i) many += "c.png,";
+  EXPECT_EQ(found(many).size(), 60u) << "longer than a file's name may be";
 }
 
 ChromaBatch good_answer(const LightnessBatch& question) {

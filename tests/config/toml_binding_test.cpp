@@ -130,6 +130,17 @@ TEST(TomlBinding, SettingsOfTheCommandLine) {
   EXPECT_THAT(setting("inner=3"), HasSubstr("is a section"));
 }
 
+TEST(TomlBinding, TextsMayBeginAsTomlDoes) {
+  TestOptions options;
+  const auto fields = fields_of(options);
+  for (const char* text : {"'60s kitchen", "\"Rosebud", "'a' or 'b'", "[001].jpg=p.png", "[warm] light"}) {
+    apply_setting(std::string("note=") + text, fields);
+    EXPECT_EQ(options.note, text);
+  }
+  EXPECT_THAT(setting("mode='slow"), HasSubstr("one of fast, slow, got"));
+  EXPECT_THAT(setting("files=[a.png"), HasSubstr("cannot read the value '[a.png'"));
+}
+
 TEST(TomlBinding, RoundTripIsExact) {
   TestOptions written;
   written.steps = 100000000;

@@ -157,6 +157,19 @@ TEST(BadOutput, AnUnwritableFolderIsAnOutputError) {
   EXPECT_EQ(cnerf(arguments).exit_code, 73);
 }
 
+TEST(BadOutput, ANameThatIsTooLongIsAnOutputErrorAndOfAnInputAnInputError) {
+  const TempDir folder;
+  const std::string run = copied(tiny_run(), folder / "run").string(), name = (folder / std::string(300, 'n')).string();
+  for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
+           {"train", tiny_capture().string()}, {"bake", run}, {"render", run, "--path", "held-out"}}) {
+    const ProgramResult result = cnerf(concatenated(words, {"-o", name}));
+    EXPECT_EQ(result.exit_code, 73) << words.front() << ": " << result.err;
+  }
+  const ProgramResult input = cnerf({"info", name});
+  EXPECT_EQ(input.exit_code, 65);
+  EXPECT_THAT(input.err, HasSubstr(name + ": "));
+}
+
 TEST(BadOutput, MetricsAreWrittenOnceAllElseOfAnEvaluationIs) {
   const TempDir folder;
   const fs::path run = copied(tiny_run(), folder / "run");

@@ -68,6 +68,9 @@ TEST(Bake, TooLittleMemoryIsRefusedBeforeAnythingIsBaked) {
   EXPECT_THAT(cnerf(concatenated(bake_into(folder / "bake"), {"--max-memory", "lots"})).err, HasSubstr("\"lots\""));
   EXPECT_TRUE(files_below(folder / "bake").empty());
   EXPECT_EQ(cnerf(concatenated(bake_into(folder / "bake"), {"--max-memory", "4G"})).exit_code, 0);
+  const std::vector<std::string> splats{"--format", "vdb,splat", "--overwrite", "--max-memory", "10M"};
+  EXPECT_EQ(cnerf(concatenated(bake_into(folder / "bake"), splats)).exit_code, 64);
+  EXPECT_TRUE(fs::exists(folder / "bake" / "manifest.json")) << "and nothing of what was there is replaced";
 }
 
 /// Where it runs out is chance: as a library is loaded, a thread begins, or in our own hands.

@@ -132,6 +132,10 @@ TEST(Pipeline, StepsOneByOneWithoutColour) {
   const ProgramResult render = cnerf({"render", out, "--path", "held-out", "--format", "png,exr"});
   EXPECT_EQ(render.exit_code, 0) << render.err;
   EXPECT_EQ(files_below(folder / "run/renders/grey/held-out").size(), 4u) << "two views, two formats";
+  write_file(folder / "run/renders/grey/held-out/former.png", std::string_view("a picture"));
+  EXPECT_EQ(cnerf({"render", out, "--path", "held-out", "--overwrite"}).exit_code, 0);
+  EXPECT_EQ(files_below(folder / "run/renders/grey/held-out").size(), 4u) << "what a former render left goes";
+  EXPECT_EQ(cnerf({"render", out, "--path", "held-out", "-o", out + "/"}).exit_code, 0) << "the run's own folder";
   const fs::path averaged = folder / "averaged";
   EXPECT_EQ(cnerf({"render", out, "--path", "held-out", "--view-averaged", "-o", averaged.string()}).exit_code, 0);
   const std::string picture = files_below(averaged / "held-out").at(0);
@@ -202,6 +206,7 @@ TEST(Pipeline, PhotographsInColour) {
   EXPECT_EQ(cv::imread(picture.string(), cv::IMREAD_UNCHANGED).depth(), CV_16U);
   EXPECT_EQ(render({}).exit_code, 64) << "they are not overwritten";
   EXPECT_EQ(render({"--overwrite", "--views", "view_000"}).exit_code, 0);
+  EXPECT_EQ(files_below(folder / "run/renders/grey/photographs").size(), 9u) << "the others stay";
 
   const std::string elsewhere = (folder / "elsewhere").string();
   EXPECT_EQ(render({"--format", "tiff", "--views", "view_001,view_004", "-o", elsewhere}).exit_code, 0);

@@ -63,6 +63,7 @@ TEST(Program, InfoDescribesACapture) {
   const ProgramResult result = cnerf({"info", tiny_capture().string()});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, AllOf(HasSubstr("transforms"), HasSubstr("48 x 36"), HasSubstr("9 of 9")));
+  EXPECT_EQ(cnerf({"info", tiny_capture().string(), "--max-memory", "much"}).exit_code, 64) << "options count";
 }
 
 TEST(Program, SampleRefusesToOverwrite) {

@@ -36,6 +36,7 @@ TEST(Web, ABakeForBrowsersIsABundleWithPhotographs) {
   EXPECT_LE(*std::ranges::max_element(bricks), 5) << "24 voxels, their margin, and a voxel around";
   EXPECT_FALSE(fs::exists(bake / "manifest.json")) << "no volume for Blender was asked for";
   EXPECT_EQ(cnerf(arguments).exit_code, 64) << "it is not overwritten";
+  EXPECT_EQ(cnerf({"bake", tiny_run().string(), "--format", "vdb,web", "-o", bake.string()}).exit_code, 64);
 }
 
 TEST(Web, ViewMakesTheBundleOfABakeAndEndsWithCtrlC) {
@@ -47,6 +48,19 @@ TEST(Web, ViewMakesTheBundleOfABakeAndEndsWithCtrlC) {
   EXPECT_EQ(shown.exit_code, 0) << shown.err;
   EXPECT_THAT(shown.out, HasSubstr("view: http://127.0.0.1:"));
   EXPECT_TRUE(fs::exists(bake / "web" / "bundle.json"));
+}
+
+TEST(Web, ViewShowsTheBundleThatABakeOfSeveralFormatsMade) {
+  const TempDir folder;
+  const fs::path bake = folder / "bake";
+  const ProgramResult baked = cnerf({"bake", tiny_run().string(), "--format", "gltf,vdb,web", "--resolution", "24",
+                                     "--web-resolution", "24", "-o", bake.string()});
+  ASSERT_EQ(baked.exit_code, 0) << baked.err;
+  const std::string bundle = read_text_file(bake / "web" / "bundle.json");
+  const ProgramResult shown = cnerf_interrupted_at({"view", bake.string(), "--no-browser"}, "Ctrl-C ends it");
+  if (shown.err.find("page was not built") != std::string::npos) GTEST_SKIP() << "the page is not built";
+  EXPECT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_EQ(read_text_file(bake / "web" / "bundle.json"), bundle) << "it is not made anew, without photographs";
 }
 
 TEST(Web, WhatCannotBeShownIsSaidByName) {
@@ -79,6 +93,25 @@ TEST(Web, ABakeIsRenderedFromItsVoxels) {
   EXPECT_EQ(picture.cols, 48);
   EXPECT_GT(cv::mean(picture)[0], 1) << "something is seen";
   EXPECT_EQ(cnerf({"render", bake.string(), "--format", "mp4"}).exit_code, 64);
+}
+
+TEST(Web, ABakeIsNotRenderedByWhatOnlyARunHas) {
+  const TempDir folder;
+  const std::vector<std::string> render = {"render", tiny_bake().string(), "-o", (folder / "out").string()};
+  for (const std::vector<std::string>& words :
+       std::vector<std::vector<std::string>>{{"--take", "grey"},
+                                             {"--capture", tiny_capture().string()},
+                                             {"--baked"},
+                                             {"--view-averaged"},
+                                             {"--path", "turntable"},
+                                             {"--path", "orbit"},
+                                             {"--set", "render.framse=2"}}) {
+    const ProgramResult refused = cnerf(concatenated(render, words));
+    EXPECT_EQ(refused.exit_code, 64) << words.back() << ": " << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr(words.front()));
+  }
+  EXPECT_EQ(cnerf(concatenated(render, {"--max-memory", "much"})).exit_code, 64);
+  EXPECT_THAT(files_below(folder.path()), testing::IsEmpty());
 }
 
 }  // namespace

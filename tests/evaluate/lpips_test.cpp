@@ -30,13 +30,26 @@ Rgb8 read_rgb(const fs::path& file) {
 constexpr int kSide = 48;
 
 /// Stripes of colours, other ones for each number.
-Picture stripes(int number) {
-  Picture picture{kSide, kSide, {}};
-  for (int i = 0; i < kSide * kSide; ++i) {
-    const bool is_light = i % kSide / (2 + number) % 2 == 0;
+Picture stripes(int number, int side) {
+  Picture picture{side, side, {}};
+  for (int i = 0; i < side * side; ++i) {
+    const bool is_light = i % side / (2 + number) % 2 == 0;
     picture.rgb.insert(picture.rgb.end(), {std::uint8_t(is_light ? 200 : 30), std::uint8_t(10 * number), 90});
   }
   return picture;
+}
+
+/// A view of them that is held out.
+View striped_view(const TempDir& folder, int number, int side = kSide) {
+  View view;
+  view.name = "view" + std::to_string(number);
+  view.image_file = folder / (view.name + ".png");
+  view.intrinsics.width = view.image.width = side;
+  view.intrinsics.height = view.image.height = side;
+  view.image.u8.assign(std::size_t(side) * std::size_t(side), 90);
+  view.held_out = true;
+  write_png(view.image_file, stripes(number, side));
+  return view;
 }
 
 double distance(const Lpips& lpips, const Rgb8& a, const Rgb8& b) {
@@ -78,17 +91,7 @@ TEST(Lpips, OfViewsMeasuredSideBySideIsThatOfEachAlone) {
   const Lpips lpips(data / "lpips_alex_f32.bin");
   const TempDir folder;
   Capture capture;
-  for (int i = 0; i < 12; ++i) {
-    View view;
-    view.name = "view" + std::to_string(i);
-    view.image_file = folder / (view.name + ".png");
-    view.intrinsics.width = view.image.width = kSide;
-    view.intrinsics.height = view.image.height = kSide;
-    view.image.u8.assign(kSide * kSide, 90);
-    view.held_out = true;
-    write_png(view.image_file, stripes(i));
-    capture.views.push_back(view);
-  }
+  for (int i = 0; i < 12; ++i) capture.views.push_back(striped_view(folder, i));
   EvaluateOptions options;
   options.lpips = &lpips;
   const PaintedScene scene(0.2f, true);
@@ -100,6 +103,20 @@ TEST(Lpips, OfViewsMeasuredSideBySideIsThatOfEachAlone) {
     EXPECT_EQ(together.views[std::size_t(i)].lpips, evaluate(scene, alone, options).views[0].lpips) << i;
     EXPECT_TRUE(i == 0 || together.views[std::size_t(i)].lpips != together.views[0].lpips) << "all are the same";
   }
+}
+
+TEST(Lpips, OfViewsThatAreTooSmallForItIsLeftOut) {
+  CNERF_REQUIRE_DATA(data, "lpips");
+  const Lpips lpips(data / "lpips_alex_f32.bin");
+  const TempDir folder;
+  Capture capture;
+  capture.views = {striped_view(folder, 0), striped_view(folder, 1, Lpips::kLeastSide - 1)};
+  EvaluateOptions options;
+  options.lpips = &lpips;
+  const Metrics metrics = evaluate(PaintedScene(0.2f, true), capture, options);
+  EXPECT_TRUE(metrics.views[0].lpips);
+  EXPECT_FALSE(metrics.views[1].lpips);
+  EXPECT_EQ(metrics.mean.lpips, metrics.views[0].lpips);
 }
 
 TEST(Lpips, RefusesWeightsThatAreNone) {

@@ -117,6 +117,14 @@ TEST(Gltf, CamerasLookWhereTheCaptureDid) {
   }
 }
 
+TEST(Gltf, CamerasSeeTheWholeOfAMeshFarFromThem) {
+  const TempDir folder;
+  bake::Mesh mesh = tetrahedron();
+  for (Vec3f& position : mesh.positions) position.z += 100;
+  const tinygltf::Model model = load(write_gltf(mesh, scene_for(mesh), folder.path(), "mesh").glb);
+  EXPECT_GT(model.cameras[0].perspective.zfar, 110);
+}
+
 TEST(Gltf, UpTurnsToYByARotation) {
   const Vec3d axes[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   const char* names[3] = {"x", "y", "z"};

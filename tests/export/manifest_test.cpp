@@ -135,7 +135,7 @@ TEST(Manifest, CamerasThatCannotBeAreRefused) {
   expect_refusal(folder, with("width", (std::int64_t(1) << 32) + 8), "width");
   expect_refusal(folder, with("fx", 1e308), "focal length");
   expect_refusal(folder, with("cx", -1e308), "principal point");
-  expect_refusal(folder, with("name", std::string(256, 'a')), "name");
+  expect_refusal(folder, with("name", std::string(5000, 'a')), "name");
 }
 
 TEST(Manifest, AMissingFileIsNotListed) {
@@ -177,6 +177,32 @@ TEST(BakeFolder, PlatesOfNamesThatAreAlikeAreFilesOfTheirOwn) {
   for (const char* file : {"shot.0001", "shot.0002", "a_b", "a_b_", "a_b__"}) {
     EXPECT_TRUE(std::filesystem::exists(folder / "plates" / (std::string(file) + ".jpg"))) << file;
   }
+}
+
+TEST(BakeFolder, APlateOfALongNameHasItsLastWholeLetters) {
+  const TempDir folder;
+  std::string letters;
+  for (int i = 0; i < 150; ++i) letters += "ä";
+  BakeFolder(folder.path(), {}, {}).add_plate(letters + "x", std::vector<std::byte>(7));
+  EXPECT_TRUE(std::filesystem::exists(folder / "plates" / (letters.substr(letters.size() - 2 * 74) + "x.jpg")));
+}
+
+TEST(BakeFolder, ASkyIsReplacedWithTheFirstOfTheOtherFiles) {
+  const TempDir folder;
+  const bake::Volume volume = block_volume({0, 0, 0}, {4, 4, 4}, 2);
+  const auto begun = [&](float light) {
+    auto bake = std::make_unique<BakeFolder>(folder.path(), std::vector<bake::Camera>(), Label());
+    bake->add_sky({2, 1, std::vector<float>(6, light)});
+    return bake;
+  };
+  const auto first = begun(0.5f);
+  first->add_volumes({planes_of(volume)}, "volume", {});
+  first->finish();
+  const auto second = begun(0.25f);
+  EXPECT_NO_THROW(check_listed_file(read_manifest(first->manifest()), folder.path(), "sky.exr"));
+  second->add_volumes({planes_of(volume)}, "volume", {});
+  second->finish();
+  EXPECT_NO_THROW(check_listed_file(read_manifest(first->manifest()), folder.path(), "sky.exr"));
 }
 
 TEST(BakeFolder, AStoppedSecondBakeLeavesNoManifestThatNamesItsFiles) {

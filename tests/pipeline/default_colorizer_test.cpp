@@ -34,5 +34,23 @@ TEST_F(DefaultColorizer, WhatIsGivenStays) {
   EXPECT_EQ(chosen("exec:paint"), "exec:paint");
 }
 
+TEST_F(DefaultColorizer, FilesOfKnownColorsAreFoundFromAnyFolder) {
+  const std::string here = std::filesystem::current_path().string() + "/";
+  for (const char* spec : {"grey", ""}) {
+    Config config;
+    config.colorizer.spec = spec;
+    config.colorizer.keyframes = "a=a.png; b.png=/b=1.png";
+    config.colorizer.hint_images = "a=hints/a.png";
+    config.colorizer.strokes = "strokes.json";
+    choose_colorizer(capture_.path(), config, observer_);
+    EXPECT_EQ(config.colorizer.keyframes, "a=" + here + "a.png;b.png=/b=1.png");
+    EXPECT_EQ(config.colorizer.hint_images, "a=" + here + "hints/a.png");
+    EXPECT_EQ(config.colorizer.strokes, here + "strokes.json");
+  }
+  Config config;
+  choose_colorizer(capture_.path(), config, observer_);
+  EXPECT_EQ(config.colorizer.keyframes + config.colorizer.hint_images + config.colorizer.strokes, "");
+}
+
 }  // namespace
 }  // namespace cnerf::pipeline

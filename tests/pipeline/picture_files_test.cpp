@@ -10,6 +10,8 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/pipeline/render_step.h"
+#include "tests/evaluate/painted_scene.h"
 #include "tests/support/data.h"
 
 namespace cnerf::pipeline {
@@ -60,6 +62,45 @@ TEST(PictureFiles, AnUnwritableExrIsAnOutputError) {
   const test::TempDir folder;
   write_file(folder / "file", std::string_view("x"));
   EXPECT_THROW(write_exr(folder / "file" / "a.exr", small_image(), ShownColor::kDecoded), OutputError);
+}
+
+/// Frames of such widths, of a scene that nobody trained, below out/path.
+void render_frames(const fs::path& folder, const std::vector<int>& widths, const RenderOutput& output) {
+  const RunContext context{RunDirectory(folder / "run"), {}, {}, {}};
+  context.directory.save(RunRecord{});
+  CameraPath path{"path", {}};
+  for (const int width : widths) {
+    PathCamera camera{"frame_" + std::to_string(path.cameras.size()), {}, {}};
+    camera.intrinsics.width = width;
+    camera.intrinsics.height = 8;
+    path.cameras.push_back(camera);
+  }
+  const test::PaintedScene scene(0.5f, false);
+  Observer silent;
+  render_step(context, {"", path, output, &scene}, cpu_engines(), silent);
+}
+
+TEST(PictureFiles, OfAFormerRenderGoWhereItIsOverwritten) {
+  const test::TempDir folder;
+  const fs::path out = folder / "out", frames = out / "path";
+  render_frames(folder.path(), {8, 8, 8}, {.folder = out, .png = true, .exr = true});
+  for (const char* others : {"notes.txt", "below/frame_2.png"}) write_file(frames / others, "a person's");
+  render_frames(folder.path(), {8}, {.folder = out, .png = true});
+  EXPECT_TRUE(fs::exists(frames / "frame_2.png")) << "not asked for";
+  render_frames(folder.path(), {8}, {.folder = out, .png = true, .overwrite = true});
+  for (const char* gone : {"frame_1.png", "frame_2.png"}) EXPECT_FALSE(fs::exists(frames / gone)) << gone;
+  for (const char* left : {"frame_0.png", "frame_2.exr", "notes.txt", "below/frame_2.png"}) {
+    EXPECT_TRUE(fs::exists(frames / left)) << left;
+  }
+}
+
+TEST(PictureFiles, AVideoOfSeveralSizesIsRefusedBeforeItIsRendered) {
+  const test::TempDir folder;
+  const RenderOutput both{.folder = folder / "out", .png = true, .mp4 = true};
+  EXPECT_THROW(render_frames(folder.path(), {8, 8, 6}, both), UsageError);
+  EXPECT_FALSE(fs::exists(folder / "out"));
+  render_frames(folder.path(), {8, 6}, {.folder = folder / "out", .png = true});
+  EXPECT_TRUE(fs::exists(folder / "out/path/frame_1.png")) << "pictures may have several";
 }
 
 TEST(PictureFiles, AVideoAppearsWhenItIsWholeAndHoldsEveryPicture) {

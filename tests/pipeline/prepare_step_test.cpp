@@ -80,6 +80,12 @@ TEST_F(PreparedCapture, IsMadeAgainIfAsked) {
   EXPECT_FALSE(fs::exists(capture_ / "images/a.png"));
 }
 
+TEST_F(PreparedCapture, StaysWhereGoingOnAndOverwritingAreAskedAtOnce) {
+  EXPECT_THAT([&] { prepare(photos_, {.resume = true, .overwrite = true}); },
+              ThrowsMessage<UsageError>(HasSubstr("give one of them")));
+  EXPECT_TRUE(fs::exists(capture_ / "images/a.png"));
+}
+
 TEST_F(PreparedCapture, IsNotTakenForOneWhereTheRecordNamesNoSource) {
   write_file(capture_ / "prepare.json", std::string_view("{\"source\": 3}"));
   EXPECT_THAT([&] { prepare(photos_, {.overwrite = true}); },

@@ -5,6 +5,8 @@
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/pipeline/colorize_step.h"
+#include "src/pipeline/run_context.h"
 #include "tests/support/data.h"
 
 namespace cnerf::pipeline {
@@ -107,6 +109,29 @@ TEST(RunDirectoryTest, TakeNamesAreFolderNames) {
   EXPECT_NO_THROW(check_take_name("warm-2_a.b"));
   for (const char* bad : {"", "..", ".x", "a/b", "a b", "\xc3\xa9"})
     EXPECT_THROW(check_take_name(bad), UsageError) << bad;
+}
+
+TEST(RunDirectoryTest, AStepHoldsTheRunsOwnFolderOnceHoweverItIsSpelt) {
+  const test::TempDir folder;
+  const RunDirectory run(folder / "run");
+  run.save(RunRecord{});
+  fs::create_directory_symlink(run.root(), folder / "link");
+  Observer silent;
+  for (const fs::path& spelt : {folder / "run/", folder / "./run", folder / "link"}) {
+    EXPECT_FALSE(StepLocks(run, spelt, silent).own) << spelt;
+  }
+  EXPECT_TRUE(StepLocks(run, folder / "run/renders", silent).own);
+  EXPECT_TRUE(StepLocks(run, folder / "elsewhere", silent).own);
+}
+
+TEST(RunDirectoryTest, GoingOnAndOverwritingAtOnceAreRefused) {
+  const test::TempDir folder;
+  const RunDirectory run(folder / "run");
+  const RunContext context{run, {}, {}, {}};
+  const ExistingOutput both{.resume = true, .overwrite = true};
+  EXPECT_THROW(check_run_folder(run, both), UsageError);
+  EXPECT_THROW((void)take_to_write(context, "warm", both), UsageError);
+  EXPECT_EQ(take_to_write(context, "warm", {.resume = true}), "warm");
 }
 
 TEST(RunDirectoryTest, ClearingRemovesARunAndNothingElse) {

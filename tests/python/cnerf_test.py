@@ -260,6 +260,17 @@ class Errors(Folder):
         self.refused(cnerf.UsageError, cnerf.train, CAPTURE, self.folder / "run", settings={"stage1.steps": "many"})
         self.refused(cnerf.UsageError, cnerf.train, CAPTURE, self.folder / "run", preset="nothing")
 
+    def test_input_that_cannot_be_read_is_an_input_error(self):
+        (self.folder / "transforms.json").symlink_to("transforms.json")
+        error = self.refused(cnerf.InputError, cnerf.train, self.folder, self.folder / "run", settings=TINY)
+        self.assertIn("transforms.json: ", str(error))
+        bake = cnerf.open_run(FOLDER / "run").bake
+        self.refused(cnerf.OutputError, bake, self.folder / ("n" * 300))
+
+    def test_going_on_and_overwriting_at_once_are_refused(self):
+        arguments = {"settings": TINY, "resume": True, "overwrite": True}
+        self.refused(cnerf.UsageError, cnerf.train, CAPTURE, self.folder / "run", **arguments)
+
     def test_damaged_bakes_are_refused(self):
         shutil.copytree(FOLDER / "bake", self.folder / "bake")
         volume = self.folder / "bake/volume.vdb"
@@ -273,6 +284,9 @@ class Errors(Folder):
         run = cnerf.open_run(self.folder / "run")
         self.assertIn("trust=True", str(self.refused(cnerf.UsageError, run.colorize)))
         self.assertFalse((self.folder / "ran").exists())
+        named = {"colorizer.spec": "exec:touch " + str(self.folder / "named")}
+        self.refused(cnerf.ColorizerError, run.colorize, settings=named)  # it answers nothing
+        self.assertTrue((self.folder / "named").exists())
 
     def test_nothing_is_replaced_unasked(self):
         run = cnerf.open_run(FOLDER / "run")
@@ -288,6 +302,16 @@ class Errors(Folder):
         self.refused((TypeError, ValueError), scene.density, ["a", "b", "c"])
         self.refused(cnerf.UsageError, cnerf.Camera, np.eye(4), 0, 10, 1)
         self.refused(cnerf.UsageError, cnerf.Camera, np.eye(3), 10, 10, 1)
+
+    def test_cameras_are_checked(self):
+        cnerf.Camera(np.eye(4), 10, 10, 8, cx=-3)  # of a crop
+        for matrix in (np.full((4, 4), np.nan), np.zeros((4, 4)), 2 * np.eye(4), np.diag([1.0, 1, -1, 1])):
+            self.refused(cnerf.UsageError, cnerf.Camera, matrix, 10, 10, 8)
+        for lens in ({"fx": np.inf}, {"fx": 0}, {"fy": np.nan}, {"cx": np.inf}, {"cy": 1e300}):
+            self.refused(cnerf.UsageError, cnerf.Camera, np.eye(4), 10, 10, **{"fx": 8, **lens})
+        far = np.eye(4)
+        far[0, 3] = 1e300  # no number in single precision
+        self.refused(cnerf.UsageError, cnerf.Camera, far, 10, 10, 8)
 
 
 class Stubs(unittest.TestCase):

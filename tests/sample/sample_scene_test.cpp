@@ -183,6 +183,10 @@ TEST(SampleScene, ReportsProgressAndCanBeStopped) {
   EXPECT_DOUBLE_EQ(fractions.back(), 1);
   EXPECT_THROW(write_sample_scene(folder.path(), tiny, [](const Progress&) { throw Interrupted("stop"); }),
                Interrupted);
+  request_interruption();
+  EXPECT_THROW(write_sample_scene(folder / "stopped", tiny), Interrupted);
+  forget_interruption();
+  EXPECT_FALSE(fs::exists(folder / "stopped"));
 }
 
 TEST(SampleScene, OptionsAreChecked) {

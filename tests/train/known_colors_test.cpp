@@ -299,7 +299,8 @@ TEST(ColorsEverywhere, AStrokeThatSlipsClaimsLittleThere) {
   for (const auto& sample : view.samples) surface.push_back(sample.t);
   const StrokesEverywhere everywhere(running_colors(strokes), view, surface);
   Claims claims;
-  everywhere.claim_alike(view, PixelLooks(view, surface), 20 * kWidth + 20, claims);
+  everywhere.claim_alike(view.camera.ray_of_pixel(20 * kWidth + 20), PixelLooks(view, surface), 20 * kWidth + 20,
+                         claims);
   EXPECT_EQ(claims.list[0].color.a, 50) << "nearer to most of the other stroke";
 }
 

@@ -111,6 +111,24 @@ TEST(WebBundle, HasALevelForEachGridCoarsestFirst) {
   EXPECT_FALSE(fs::exists(folder / "density_fine1.bin")) << "no part of another bundle stays";
 }
 
+TEST(WebBundle, HasNoPicturesOfAnother) {
+  const cnerf::test::TempDir folder;
+  WebScene scene{"two", {camera()}, {}, {}};
+  Observer observer;
+  scene.photos = {{.jpeg = std::vector<std::byte>(7)}};
+  scene.sky = SkyPicture{2, 1, std::vector<float>(6, 0.5f)};
+  write_web({two_grids().front()}, scene, folder.path(), {}, {}, observer);
+  EXPECT_TRUE(fs::exists(folder / "photos" / "000.jpg"));
+  write_file(folder / "photos" / "mine.jpg", std::string_view("mine"));
+  scene.photos = {};
+  scene.sky = {};
+  write_web({two_grids().front()}, scene, folder.path(), {}, {}, observer);
+  EXPECT_FALSE(fs::exists(folder / "photos" / "000.jpg"));
+  EXPECT_FALSE(fs::exists(folder / "sky.jpg"));
+  EXPECT_TRUE(fs::exists(folder / "poster.webp"));
+  EXPECT_TRUE(fs::exists(folder / "photos" / "mine.jpg"));
+}
+
 TEST(WebBundle, PosterIsThePictureWithAlpha) {
   const Written written;
   const cv::Mat poster = cv::imread((written.folder / "poster.webp").string(), cv::IMREAD_UNCHANGED);

@@ -32,21 +32,11 @@ std::vector<fs::path> files_of(const fs::path& place) {
   return files;
 }
 
-/// `a.jpg,b.jpg` or a folder; a file whose own name holds commas is found before the text is split.
+/// `a.jpg,b.jpg` or a folder.
 std::vector<fs::path> reference_files(const ColorizerRequest& request) {
-  const std::string& argument = request.argument;
-  const fs::path& folder = request.context.working_folder;
-  if (fs::exists(argument) || (!folder.empty() && fs::exists(folder / argument))) {
-    return files_of(find_spec_file(argument, request));
-  }
-  std::vector<fs::path> files;
-  for (std::size_t begin = 0; begin <= argument.size();) {
-    const std::size_t end = std::min(argument.find(',', begin), argument.size());
-    if (end > begin) files.push_back(find_spec_file(argument.substr(begin, end - begin), request));
-    begin = end + 1;
-  }
+  std::vector<fs::path> files = find_spec_files(request);
   if (files.empty()) throw UsageError("colorizer \"" + request.options.spec + "\": names no image");
-  return files;
+  return files.size() == 1 ? files_of(files.front()) : files;
 }
 
 /// Of all that a user decides of the weights: the photographs' bytes, in their order, the recipe and the seed.

@@ -79,13 +79,14 @@ RunningColors KnownColorSources::everywhere_in(std::size_t v) const {
   std::vector<Claims> claims(pixels);
   std::vector<const Ab*> given(pixels, nullptr);
   const auto ask = [&](std::size_t p) {
+    const Ray ray = view.camera.ray_of_pixel(p);
     const bool is_sky = view.opacity[p] < kLeastColoredOpacity;
     for (std::size_t s = sources_.size(); s-- > 0;) {
       const Source& source = sources_[s];
       std::optional<std::size_t> from = p;
       if (source.view != v) {
         if (looks.surface[p] <= 0) continue;
-        const Vec3f point = view.camera.ray_of_pixel(p).at(looks.surface[p]);
+        const Vec3f point = ray.at(looks.surface[p]);
         from = sights[s].pixel_of(point.cast<double>(), lightness_at(view, p));
       }
       if (!from) continue;
@@ -97,7 +98,7 @@ RunningColors KnownColorSources::everywhere_in(std::size_t v) const {
     }
     const bool is_shown = is_sky || claims[p].cost() < kUnreached || given[p] != nullptr;
     for (std::size_t s = sources_.size(); s-- > 0 && !is_shown;) {
-      if (sources_[s].everywhere) sources_[s].everywhere->claim_alike(view, looks, p, claims[p]);
+      if (sources_[s].everywhere) sources_[s].everywhere->claim_alike(ray, looks, p, claims[p]);
     }
   };
   const auto take = [&](std::size_t p) {

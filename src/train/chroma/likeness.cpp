@@ -161,7 +161,7 @@ StrokesEverywhere::StrokesEverywhere(const RunningColors& strokes, const CachedV
         const std::uint32_t color = number_of(near.ab[p]);  // none of those that run, where it was painted exactly
         claims_[p].add({near.cost[p], near.ab[p], color < lightness_.size() ? lightness_[color] : looks.lightness[p]});
       }
-      if (!strokes.is_known(p)) claim_alike(view_, looks, p, claims_[p]);
+      if (!strokes.is_known(p)) claim_alike(view_.camera.ray_of_pixel(p), looks, p, claims_[p]);
     }
   });
 }
@@ -238,8 +238,7 @@ float StrokesEverywhere::likeness(const Looked& pixel, std::size_t color) const 
   return std::accumulate(sums.begin(), sums.end(), 0.0f);
 }
 
-void StrokesEverywhere::claim_alike(const CachedView& view, const PixelLooks& looks, std::size_t p, Claims& to) const {
-  const Ray ray = view.camera.ray_of_pixel(p);
+void StrokesEverywhere::claim_alike(const Ray& ray, const PixelLooks& looks, std::size_t p, Claims& to) const {
   const bool is_solid = looks.surface[p] > 0;
   const Vec3f from = ray.at(is_solid ? looks.surface[p] : 1e3f) - view_.camera.origin.cast<float>();
   const float distance = length(from);
@@ -278,6 +277,7 @@ void smooth(std::span<Claims> claims, const CachedView& view, std::span<const fl
   std::vector<std::array<float, Claims::kMost>> kept(claims.size());
   each_pixel([&](std::size_t p) { kept[p] = claims[p].shares(); });
   std::vector<Claims> smoothed(claims.size());
+  const float most_cost = -kShare * std::log(kLeastShare);
   cv::Mat shares(view.height, view.width, CV_32F);
   for (const Claims::Claim& one : colors) {
     auto* const share = shares.ptr<float>();
@@ -289,7 +289,8 @@ void smooth(std::span<Claims> claims, const CachedView& view, std::span<const fl
     const cv::Mat smooth_shares = along_lightness(along_surfaces(shares));
     const auto* const smooth_share = smooth_shares.ptr<float>();
     each_pixel([&](std::size_t p) {
-      const float cost = -kShare * std::log(std::clamp(smooth_share[p], kLeastShare, 1.0f));
+      const float share_now = std::min(smooth_share[p], 1.0f);
+      const float cost = share_now > kLeastShare ? -kShare * std::log(share_now) : most_cost;  // most have none
       smoothed[p].add({claims[p].cost() + cost, one.color, one.lightness});
     });
   }

@@ -57,7 +57,8 @@ class StrokesEverywhere {
   /// Of the pixels of the painted view; of those without a surface too.  [H, W]
   [[nodiscard]] std::span<const Claims> claims() const { return claims_; }
   /// What a pixel of any view may have by its looks and its place in space.
-  void claim_alike(const CachedView& view, const PixelLooks& looks, std::size_t pixel, Claims& to) const;
+  /// @param ray  of the pixel
+  void claim_alike(const Ray& ray, const PixelLooks& looks, std::size_t pixel, Claims& to) const;
 
  private:
   /// What pixels look like that a stroke paints, each in its place of the lists: as many of every colour, one colour
