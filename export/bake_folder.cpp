@@ -218,9 +218,9 @@ void BakeFolder::finish() {
   write_manifest(manifest_, folder_);
   for (const std::string& file : former) {
     if (std::ranges::find(manifest_.files, file) != manifest_.files.end()) continue;
-    if (const auto ours = file_below(folder_, file)) fs::remove(*ours);  // a manifest may come from anybody
+    if (const auto ours = file_below(folder_, file)) remove_output(*ours);  // a manifest may come from anybody
   }
-  fs::remove(former_manifest());
+  remove_output(former_manifest());
 }
 
 }  // namespace cnerf::exporting

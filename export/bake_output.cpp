@@ -67,6 +67,7 @@ BakeOutput::BakeOutput(fs::path folder, const Formats& formats, OutputOptions op
 }
 
 void BakeOutput::take_volumes(const std::vector<bake::VolumePlanes>& volumes) {
+  make_splats();
   if (formats_.vdb) {
     for (const fs::path& file : bake_.add_volumes(volumes, "volume", options_.vdb)) observer_.wrote("volume", file);
   }
@@ -86,6 +87,7 @@ void BakeOutput::write_bundle(const std::vector<bake::VolumePlanes>& volumes) {
 }
 
 void BakeOutput::take_mesh(const bake::Mesh& mesh) {
+  make_splats();
   const GltfFiles files = bake_.add_mesh(mesh, "mesh", formats_.exr);
   observer_.say(fmt::format("mesh: {} faces, {} charts in {} x {} texels", mesh.triangles.size(), mesh.charts,
                             mesh.texture.size, mesh.texture.size));
@@ -93,8 +95,12 @@ void BakeOutput::take_mesh(const bake::Mesh& mesh) {
   observer_.wrote("mesh", files.gltf);
 }
 
+void BakeOutput::make_splats() {
+  if (make_splats_ && !splats_) splats_ = make_splats_();
+}
+
 void BakeOutput::add_splats() {
-  const SplatFiles files = bake_.add_splats(make_splats_(), "splats");
+  const SplatFiles files = bake_.add_splats(*splats_, "splats");
   for (const fs::path& file : {files.ply, files.spz, files.usd}) observer_.wrote("splats", file);
 }
 
@@ -111,13 +117,12 @@ void BakeOutput::add_plates() {
 
 void BakeOutput::finish() {
   if (!formats_.has_manifest()) return;
-  if (make_splats_) add_splats();
+  make_splats();
+  if (splats_) add_splats();
   if (options_.vdb.plates && formats_.is_for_blender()) add_plates();
   bake_.add_camera_tracks(options_.vdb);
   bake_.finish();
   if (options_.sky) observer_.wrote("sky", folder_ / "sky.exr");
-  // As old as what it was baked with, or it would count as one of a former bake.
-  if (formats_.web) fs::last_write_time(last_file(folder_, {.web = true}), fs::last_write_time(bake_.manifest()));
   if (formats_.is_for_blender()) observer_.wrote("Blender set-up", bake_.blender_setup());
 }
 

@@ -63,13 +63,14 @@ class BakeOutput final : public bake::Output {
 
   void take_volumes(const std::vector<bake::VolumePlanes>& volumes) override;
   void take_mesh(const bake::Mesh& mesh) override;
-  /// Splats that are made once all else is there: nothing is replaced before it is known that all can be baked.
+  /// They are made before the first file is: a stop meanwhile replaces nothing. What they take comes on top of volumes.
   void take_splats(std::function<bake::SplatCloud()> make) { make_splats_ = std::move(make); }
   void finish() override;
 
  private:
   void write_bundle(const std::vector<bake::VolumePlanes>& volumes);
   void add_plates();
+  void make_splats();
   void add_splats();
 
   std::filesystem::path folder_;
@@ -79,6 +80,7 @@ class BakeOutput final : public bake::Output {
   Label label_;
   BakeFolder bake_;
   std::function<bake::SplatCloud()> make_splats_;
+  std::optional<bake::SplatCloud> splats_;
   Observer& observer_;
 };
 

@@ -13,6 +13,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/gzip.h"
+#include "src/base/json.h"
 #include "src/picture/encode.h"
 
 namespace cnerf::exporting {
@@ -44,10 +45,13 @@ class BundleFiles {
     return add(name, gzip(bytes), bytes.size());
   }
   [[nodiscard]] const Json& list() const { return list_; }
-  /// Removes a file that another bundle had here, unless this one has it too.
-  void remove_other(const std::string& name) const {
-    const bool is_ours = std::ranges::any_of(list_, [&](const Json& entry) { return entry["name"] == name; });
-    if (!is_ours) fs::remove(folder_ / name);
+  /// Removes those of another bundle that this one does not have.
+  void remove_others(const std::vector<std::string>& former) const {
+    for (const std::string& name : former) {
+      const bool is_ours = std::ranges::any_of(list_, [&](const Json& entry) { return entry["name"] == name; });
+      const auto other = file_below(folder_, name);  // a bundle may come from anybody
+      if (!is_ours && other) remove_output(*other);
+    }
   }
 
  private:
@@ -124,21 +128,23 @@ std::size_t add_level(const WebBricks& bricks, std::size_t level, BundleFiles& f
 void remove_levels_from(std::size_t level, const fs::path& folder) {
   for (bool any = true; any; ++level) {
     any = false;
-    for (const char* part : kParts) any = fs::remove(folder / part_name(part, level)) || any;
+    for (const char* part : kParts) {
+      const fs::path file = folder / part_name(part, level);
+      any = fs::exists(file) || any;
+      remove_output(file);
+    }
   }
 }
 
-/// A folder that is uploaded shows nothing that was left out of the bundle.
-void remove_other_pictures(const fs::path& folder, const BundleFiles& files) {
-  for (const char* name : {"poster.webp", "sky.jpg"}) files.remove_other(name);
-  std::vector<std::string> photos;
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(folder / "photos", none)) {
-    const std::string number = entry.path().stem().string();
-    const bool is_numbered = number.find_first_not_of("0123456789") == std::string::npos;
-    if (is_numbered && entry.path().extension() == ".jpg") photos.push_back("photos/" + number + ".jpg");
+/// Files that a bundle lists; none where it is not there or not a bundle.
+std::vector<std::string> files_of_bundle(const fs::path& manifest) {
+  std::vector<std::string> files;
+  try {
+    const Json bundle = read_json(manifest);
+    for (const Json& file : bundle.at("files")) files.push_back(file.at("name").get<std::string>());
+  } catch (const std::exception&) {
   }
-  for (const std::string& photo : photos) files.remove_other(photo);
+  return files;
 }
 
 Json cameras_json(const WebScene& scene) {
@@ -176,6 +182,7 @@ WebReport write_web_bundle(const WebVolume& volume, const WebScene& scene, const
   CNERF_CHECK(!volume.levels.empty(), "a bundle has a level");
   refuse_too_many_bricks(volume.levels);
   CNERF_CHECK(scene.photos.empty() || scene.photos.size() == scene.cameras.size(), "one photograph per camera");
+  const std::vector<std::string> former = files_of_bundle(folder / kWebManifest);
   std::error_code ignored;
   fs::remove(folder / kWebManifest, ignored);  // a manifest never names files of another bundle
   BundleFiles files(folder);
@@ -200,7 +207,7 @@ WebReport write_web_bundle(const WebVolume& volume, const WebScene& scene, const
     if (scene.photos[i].jpeg.empty()) continue;
     report.photo_bytes += files.add(fmt::format("photos/{:03}.jpg", i), scene.photos[i].jpeg);
   }
-  remove_other_pictures(folder, files);
+  files.remove_others(former);  // a folder that is uploaded shows nothing that was left out
   if (!page.empty()) report.page_bytes = copy_page(page, folder);
 
   const Json json{{"schema", kWebSchema},

@@ -4,7 +4,8 @@
 # Captures and LPIPS weights are looked for in $CNERF_DATA (else ../shared/data), the program in $CNERF (else the
 # release build). Where there are GPUs, mpirun starts as many processes as there are cells, which take the GPUs in turns:
 # one cell alone does not keep a GPU busy. RANKS=n for another number of processes, LAUNCH="srun -n 9" for another way to
-# start them. What is finished stays, so that the same command goes on after a stop. SEEDS=n for other than three,
+# start them. What is finished stays, so that the same command goes on after a stop; with --overwrite it begins again,
+# always. SEEDS=n for other than three,
 # TIMES=no to leave out the table of training times.
 set -euo pipefail
 
@@ -24,7 +25,7 @@ data=${CNERF_DATA:-$root/../shared/data}
 cnerf=${CNERF:-$root/build/release/cnerf}
 seeds=${SEEDS:-3}
 captures=("$data/scenes/fox@4" "$data/scenes/flower@8" "$data/scenes/lego")
-settings=(--config "$root/configs/compare.toml" --lpips-weights "$data/lpips/lpips_alex_f32.bin" --resume --progress plain)
+settings=(--config "$root/configs/compare.toml" --lpips-weights "$data/lpips/lpips_alex_f32.bin" --progress plain)
 if [ "$colorizer" = builtin ]; then settings+=(--colorizer builtin); fi
 colors=colornerf,colornerf-paper,without-purification,without-classification,colorize-then-fuse,video-then-fuse
 colors+=,multi-scale-teacher,key-view-distilled,style-transfer,grey,oracle
@@ -40,6 +41,17 @@ if [ -n "${CUDA_VISIBLE_DEVICES:-}" ] && command -v mpirun > /dev/null; then
   ranks=${RANKS:-$((${#captures[@]} * seeds))}
 fi
 
+# The first call overwrites, if that is wanted; the next ones go on with what it made.
+options=("$@")
+going_on=(--resume)
+case " $* " in *" --overwrite "*) going_on=() ;; esac
+drop_overwrite() {
+  local option all=("${options[@]}")
+  options=()
+  going_on=(--resume)
+  for option in "${all[@]}"; do [ "$option" = --overwrite ] || options+=("$option"); done
+}
+
 # compare RANKS options: `cnerf compare` on all captures.
 compare() {
   local launch=() count=$1
@@ -49,15 +61,7 @@ compare() {
   elif [ "$count" -gt 1 ]; then
     launch=(mpirun -np "$count" --bind-to none)
   fi
-  "${launch[@]}" "$cnerf" compare "${captures[@]}" -o "$report" "${settings[@]}" "$@"
-}
-
-# The first call overwrites; the next ones leave what it made.
-options=("$@")
-drop_overwrite() {
-  local option all=("${options[@]}")
-  options=()
-  for option in "${all[@]}"; do [ "$option" = --overwrite ] || options+=("$option"); done
+  "${launch[@]}" "$cnerf" compare "${captures[@]}" -o "$report" "${settings[@]}" "${going_on[@]}" "$@"
 }
 
 # Training times are taken while nothing else runs: two methods, one seed.
@@ -68,4 +72,4 @@ fi
 compare "$ranks" --methods $colors --seeds "$seeds" "${options[@]}"
 drop_overwrite
 "$cnerf" compare "${captures[@]}" -o "$report" "${settings[@]}" --methods all --seeds "$seeds" --only-report \
-  --rating-sheet "${options[@]}"
+  --rating-sheet "${going_on[@]}" "${options[@]}"

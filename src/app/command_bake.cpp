@@ -20,8 +20,7 @@ void bake_take(const BakeArguments& arguments, const std::vector<std::string>& c
   const pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.run.run);
   const std::string take = directory.choose_take(arguments.run.take);
   const fs::path folder = arguments.out.empty() ? directory.bakes(take) : fs::path(arguments.out);
-  refuse_existing(last_file(folder, formats), arguments.overwrite);
-  if (formats.web) refuse_existing(exporting::last_file(folder, {.web = true}), arguments.overwrite);
+  for (const fs::path& file : pipeline::whole_bakes(folder, formats)) refuse_existing(file, arguments.overwrite);
   const pipeline::RunContext context = open_run(arguments.run, take, command_line, reporter);
   pipeline::bake_step(context, {take, folder, formats}, engines_for(context.config.device), reporter);
   if (formats.web) reporter.next("cnerf view " + exporting::web_folder(folder).string());

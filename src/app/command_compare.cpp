@@ -86,6 +86,7 @@ void run_comparison(CompareArguments arguments, const std::vector<std::string>& 
   if (arguments.methods == "all" && plan.text.text.empty())
     std::erase_if(plan.methods, std::mem_fn(&Method::follows_text));
   plan.command_line = joined(command_line);
+  pipeline::check_choice({.resume = arguments.resume, .overwrite = arguments.overwrite});
   // Parts with other seeds may run side by side.
   const auto mode = arguments.overwrite ? FolderLock::Mode::kAlone : FolderLock::Mode::kShared;
   const FolderLock lock = pipeline::lock_folder(plan.report, mode, reporter);

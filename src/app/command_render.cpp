@@ -94,7 +94,7 @@ void render_photographs(const RenderArguments& arguments, const std::vector<std:
       arguments.out.empty() ? pipeline::photographs_folder(directory, take) : fs::path(arguments.out) / "photographs";
   refuse_existing(folder, arguments.overwrite);
   const pipeline::RunContext context = open_run(arguments.run, take, command_line, reporter);
-  const pipeline::PhotographsJob job{take, arguments.views, folder, format, arguments.run.capture, arguments.overwrite};
+  const pipeline::PhotographsJob job{take, arguments.views, folder, format, arguments.run.capture};
   pipeline::photographs_step(context, job, engines_for(context.config.device), reporter);
 }
 

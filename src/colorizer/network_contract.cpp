@@ -204,9 +204,11 @@ namespace {
 
 /// Where a name of a spec leads to; empty where there is nothing.
 fs::path place_of(const std::string& name, const fs::path& folder) {
-  std::error_code failure;  // a list is longer than a name may be
   for (const fs::path& place : {folder / name, fs::path(name)}) {
+    std::error_code failure;
     if (fs::exists(place, failure)) return place;
+    const bool is_list = failure == std::errc::filename_too_long;  // of files, none of which has so long a name
+    if (failure && !is_list) throw fs::filesystem_error("", place, failure);
   }
   return {};
 }

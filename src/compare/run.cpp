@@ -30,7 +30,7 @@ void begin_report(const fs::path& folder, ExistingReport existing) {
     throw UsageError(folder.string() + ": is not empty and holds no comparison; choose another folder");
   }
   if (existing.is_cleared) {
-    fs::remove_all(folder / "runs");
+    remove_output(folder / "runs");
   } else if (!existing.is_kept) {
     throw UsageError(folder.string() +
                      ": holds a comparison already; pass --resume to go on with it or --overwrite to start again");

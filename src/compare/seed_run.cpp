@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/base/json_record.h"
 #include "src/base/text.h"
 #include "src/compare/baselines/flow.h"
@@ -52,7 +53,7 @@ std::string settings_in(const fs::path& folder) {
 /// An empty folder unless it was made with these settings.
 void begin_folder(const fs::path& folder, const std::string& settings) {
   if (settings_in(folder) == settings) return;
-  fs::remove_all(folder);
+  remove_output(folder);
   write_file(folder / "settings.txt", settings);
 }
 
@@ -182,7 +183,7 @@ Cell SeedRun::make(const Method& method) {
   if (fs::exists(file) && settings_in(folder) == settings) {
     const auto finished = read_record<Cell>(file);
     if (finished.error.empty()) return finished;
-    fs::remove_all(folder);  // what is left may be why it failed
+    remove_output(folder);  // what is left may be why it failed
   }
   begin_folder(folder, settings);
   bench_.observer.say(fmt::format("{}, seed {}: {}", subject_.name, seed_, method.name));
@@ -309,7 +310,7 @@ void SeedRun::train_colors(const Method& method, const Field& field, Colorizer& 
     const LuminanceModel model = LuminanceModel::load(stage1_, bench_.engines);
     pixels.emplace(subject_.evaluated, model.frame, kMeasuredPixels);
     pixels->trace(*model.engine, model.march());
-    fs::remove(take);  // a curve is of one training from its beginning
+    remove_output(take);  // a curve is of one training from its beginning
   }
   const Photometric photometric;
   ViewQuestions whole_views(std::max(method.view_sizes, 1));

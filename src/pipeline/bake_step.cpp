@@ -70,6 +70,12 @@ class NoOutput final : public bake::Output {
 
 }  // namespace
 
+std::vector<fs::path> whole_bakes(const fs::path& folder, const exporting::Formats& formats) {
+  std::vector<fs::path> files = {last_file(folder, formats)};
+  if (formats.web && !fs::exists(folder / kJournal)) files.push_back(exporting::last_file(folder, {.web = true}));
+  return files;
+}
+
 void bake_step(const RunContext& context, const BakeJob& job, const Engines& engines, Observer& observer) {
   const auto& [take, folder, formats, loaded] = job;
   const StepLocks locks(context.directory, folder, observer);
@@ -104,7 +110,7 @@ void bake_step(const RunContext& context, const BakeJob& job, const Engines& eng
 
 void end_bake(const RunDirectory& directory, const fs::path& folder, Observer& observer) {
   const StepLocks locks(directory, folder, observer);
-  if (cluster::world().is_first()) fs::remove(folder / kJournal);
+  if (cluster::world().is_first()) remove_output(folder / kJournal);
 }
 
 }  // namespace cnerf::pipeline

@@ -17,6 +17,9 @@ struct BakeJob {
   const Scene* scene = nullptr;  ///< the take's, with the configured finish; null = the step loads it
 };
 
+/// What says that a bake of these formats is whole already, as far as nothing goes on with a stopped one.
+[[nodiscard]] std::vector<std::filesystem::path> whole_bakes(const std::filesystem::path& folder,
+                                                             const exporting::Formats& formats);
 /// Bakes a take and writes the set-up script and the manifest beside it.
 void bake_step(const RunContext& context, const BakeJob& job, const Engines& engines, Observer& observer);
 

@@ -182,7 +182,6 @@ std::vector<fs::path> photographs_step(const RunContext& context, const Photogra
     written = i + 1;
     progress({"photographs", double(written) / double(photographs.size()), {}});
   };
-  if (job.overwrite && job.views.empty()) remove_pictures(job.folder, is_tiff ? ".tiff" : ".png");
   cluster::share_out(cluster::world(), photographs.size(), write, done);
   if (!cluster::world().is_first()) return files;
   observer.wrote("photographs", job.folder);

@@ -22,7 +22,6 @@ struct PhotographsJob {
   std::filesystem::path folder;  ///< for the files, which are called as the photographs
   PhotographFormat format = PhotographFormat::kPng;
   std::filesystem::path capture = {};  ///< where it lies now; empty = where the run's record says
-  bool overwrite = false;              ///< where all are made, others of this format go
 };
 
 /// Where they go if nothing else is said.

@@ -1,13 +1,15 @@
 #include "src/pipeline/picture_files.h"
 
+#include <algorithm>
 #include <opencv2/videoio.hpp>
 #include <optional>
 #include <span>
+#include <string_view>
+#include <vector>
 
 #include "src/base/check.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
-#include "src/cluster/ranks.h"
 #include "src/picture/codecs.h"
 #include "src/picture/encode.h"
 #include "src/picture/exr_writer.h"
@@ -46,14 +48,23 @@ void write_exr(const fs::path& file, const RenderedImage& image, ShownColor colo
              {{"software", "cnerf " CNERF_VERSION}, {"colorOrigin", color_origin}, {"colorSpace", "lin_rec709"}}});
 }
 
-void remove_pictures(const fs::path& folder, const char* extension) {
+namespace {
+constexpr std::string_view kFrameName = "frame_";  // and a number: camera_path.cpp
+}  // namespace
+
+void remove_other_frames(const fs::path& folder, const char* extension, const CameraPath& path) {
+  const auto is_other = [&](const fs::path& file) {
+    const std::string name = file.stem().string();
+    return file.extension() == extension && name.starts_with(kFrameName) &&
+           name.find_first_not_of("0123456789", kFrameName.size()) == std::string::npos &&
+           std::ranges::find(path.cameras, name, &PathCamera::name) == path.cameras.end();
+  };
+  std::vector<fs::path> others;
   std::error_code failure;
-  if (cluster::world().is_first()) {
-    for (const auto& entry : fs::directory_iterator(folder, failure)) {
-      if (entry.path().extension() == extension && !entry.is_directory(failure)) remove_output(entry.path());
-    }
+  for (const auto& entry : fs::directory_iterator(folder, failure)) {
+    if (entry.is_regular_file(failure) && is_other(entry.path())) others.push_back(entry.path());
   }
-  cluster::world().barrier("removal of former pictures");  // before somebody writes new ones
+  for (const fs::path& other : others) remove_output(other);
 }
 
 struct VideoFile::Encoder {

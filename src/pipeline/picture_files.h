@@ -6,6 +6,7 @@
 
 #include "src/capture/mono_image.h"
 #include "src/picture/picture.h"
+#include "src/render/camera_path.h"
 #include "src/train/scene.h"
 
 namespace cnerf::pipeline {
@@ -28,9 +29,9 @@ enum class ShownColor {
 void write_exr(const std::filesystem::path& file, const RenderedImage& image, ShownColor color,
                const std::string& color_origin = {});
 
-/// Removes the pictures of one kind that lie in a folder, not below it. To be called by all ranks.
+/// Removes the numbered frames of a longer render: those of one kind that the path does not have.
 /// @param extension  ".png"  @throws OutputError
-void remove_pictures(const std::filesystem::path& folder, const char* extension);
+void remove_other_frames(const std::filesystem::path& folder, const char* extension, const CameraPath& path);
 
 /// An MPEG-4 video. The file appears under its name when `finish` succeeds.
 class VideoFile {

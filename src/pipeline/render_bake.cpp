@@ -36,7 +36,6 @@ void render_bake(const fs::path& bake, const CameraPath& path, const fs::path& f
   const FolderLock lock = lock_folder(folder.parent_path(), FolderLock::Mode::kAlone, observer);
   cluster::world().barrier("begin of a step");
   const std::vector<bake::Volume> volumes = exporting::read_volumes(bake);
-  if (overwrite) remove_pictures(folder, ".png");
   const auto write = [&](std::size_t i) {
     const PathCamera& camera = path.cameras[i];
     const bake::VolumeImage image = integrate_volumes(volumes, camera.intrinsics, camera.world_from_camera);
@@ -47,6 +46,7 @@ void render_bake(const fs::path& bake, const CameraPath& path, const fs::path& f
     if (observer.is_cancelled()) throw Interrupted("stopped");
   };
   cluster::share_out(cluster::world(), path.cameras.size(), write, done);
+  if (overwrite && cluster::world().is_first()) remove_other_frames(folder, ".png", path);
   observer.wrote("pictures", folder);
 }
 

@@ -13,7 +13,7 @@ namespace cnerf::pipeline {
 [[nodiscard]] CameraPath cameras_of_bake(const std::filesystem::path& bake);
 
 /// Writes a PNG for each camera.
-/// @param overwrite  pictures that a former render left go
+/// @param overwrite  frames that a longer render left go
 /// @throws Interrupted  between two pictures
 void render_bake(const std::filesystem::path& bake, const CameraPath& path, const std::filesystem::path& folder,
                  bool overwrite, Observer& observer);

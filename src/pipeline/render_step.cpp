@@ -129,9 +129,6 @@ void render_step(const RunContext& context, const RenderJob& job, const Engines&
   }
   const std::string color_origin = bake::color_origin_text(colorizer_name(context.directory, job.take), job.take);
   RenderFiles files(output, job.path.name, color_origin, context.config.render.fps, observer);
-  // Last, so that what fails before leaves them.
-  if (output.overwrite && output.png) remove_pictures(output.folder / job.path.name, ".png");
-  if (output.overwrite && output.exr) remove_pictures(output.folder / job.path.name, ".exr");
   const ProgressSink progress = observer.progress_sink();
   const std::vector<PathCamera>& cameras = job.path.cameras;
   const std::vector<std::vector<std::size_t>> frames = pictures_of(job.path, output.mp4);
@@ -149,6 +146,8 @@ void render_step(const RunContext& context, const RenderJob& job, const Engines&
   cluster::share_out(cluster::world(), frames.size(), make, take, packed, unpacked);
   if (!cluster::world().is_first()) return;
   files.finish();
+  if (output.overwrite && output.png) remove_other_frames(output.folder / job.path.name, ".png", job.path);
+  if (output.overwrite && output.exr) remove_other_frames(output.folder / job.path.name, ".exr", job.path);
   note_time(context.directory, "render", watch);
 }
 

@@ -17,7 +17,7 @@ struct RenderOutput {
   bool png = false, exr = false, mp4 = false;
   ShownColor color = ShownColor::kDecoded;
   bool view_averaged = false;  ///< luminance as a bake averages it over the views that see a point
-  bool overwrite = false;      ///< pictures of these kinds that a former render left go
+  bool overwrite = false;      ///< frames that a longer render left go
 };
 
 struct RenderJob {

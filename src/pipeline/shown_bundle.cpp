@@ -5,6 +5,7 @@
 #include "export/vdb_reader.h"
 #include "export/web_bundle.h"
 #include "src/base/error.h"
+#include "src/base/json.h"
 #include "src/capture/exr_io.h"
 #include "src/pipeline/run_context.h"
 #include "viewer/server/page_folder.h"
@@ -28,18 +29,24 @@ std::optional<SkyPicture> sky_of(const exporting::BakeManifest& manifest, const 
   return SkyPicture{image.width, image.height, image.values};
 }
 
+/// Made with it, by one command, or later.
+bool is_of_bake(const fs::path& bundle, const exporting::BakeManifest& manifest, const fs::path& manifest_file) {
+  if (fs::last_write_time(bundle) >= fs::last_write_time(manifest_file)) return true;
+  try {
+    return read_json(bundle).at("command_line") == manifest.label.provenance.command_line;
+  } catch (const std::exception&) {
+    return false;  // it is damaged, and made anew
+  }
+}
+
 /// The bundle of a bake: the one beside it, made anew where there is none or it is older than the bake.
 fs::path bundle_of_bake(const fs::path& bake, const ShowJob& job, const exporting::WebOptions& options,
                         Observer& observer) {
   const fs::path folder = exporting::web_folder(bake);
   const fs::path manifest_file = bake / "manifest.json";
-  if (is_bundle(folder) &&
-      fs::last_write_time(folder / exporting::kWebManifest) >= fs::last_write_time(manifest_file)) {
-    return folder;
-  }
-  const FolderLock lock = lock_folder(bake, FolderLock::Mode::kAlone, observer);
   const exporting::BakeManifest manifest = exporting::read_manifest(manifest_file);
-  if (!manifest.volume && is_bundle(folder)) return folder;
+  if (is_bundle(folder) && is_of_bake(folder / exporting::kWebManifest, manifest, manifest_file)) return folder;
+  const FolderLock lock = lock_folder(bake, FolderLock::Mode::kAlone, observer);
   if (!manifest.volume) {
     throw InputError(manifest_file, "volume", "this bake has none; bake with --format vdb or --format web");
   }

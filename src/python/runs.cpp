@@ -194,8 +194,7 @@ fs::path bake(const OpenRun& run, const BakeCall& call, Observer& observer) {
   const exporting::Formats formats = exporting::parse_formats(call.format);
   const std::string take = run.directory().choose_take(call.take);
   fs::path folder = call.folder.empty() ? run.directory().bakes(take) : call.folder;
-  refuse_existing(exporting::last_file(folder, formats), call.overwrite);
-  if (formats.web) refuse_existing(exporting::last_file(folder, {.web = true}), call.overwrite);
+  for (const fs::path& file : pipeline::whole_bakes(folder, formats)) refuse_existing(file, call.overwrite);
   const Words words = call.settings.command_line({"cnerf", "bake", run.directory().root().string()});
   const pipeline::RunContext context = run.context(take, call.settings, words, observer);
   pipeline::bake_step(context, {take, folder, formats}, engines_for(context.config.device), observer);

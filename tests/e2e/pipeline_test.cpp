@@ -132,9 +132,6 @@ TEST(Pipeline, StepsOneByOneWithoutColour) {
   const ProgramResult render = cnerf({"render", out, "--path", "held-out", "--format", "png,exr"});
   EXPECT_EQ(render.exit_code, 0) << render.err;
   EXPECT_EQ(files_below(folder / "run/renders/grey/held-out").size(), 4u) << "two views, two formats";
-  write_file(folder / "run/renders/grey/held-out/former.png", std::string_view("a picture"));
-  EXPECT_EQ(cnerf({"render", out, "--path", "held-out", "--overwrite"}).exit_code, 0);
-  EXPECT_EQ(files_below(folder / "run/renders/grey/held-out").size(), 4u) << "what a former render left goes";
   EXPECT_EQ(cnerf({"render", out, "--path", "held-out", "-o", out + "/"}).exit_code, 0) << "the run's own folder";
   const fs::path averaged = folder / "averaged";
   EXPECT_EQ(cnerf({"render", out, "--path", "held-out", "--view-averaged", "-o", averaged.string()}).exit_code, 0);

@@ -58,6 +58,17 @@ SLURM_ARRAY_TASK_ID=1 CNERF=/bin/true OUT=$scratch/runs bash "$root/scripts/capt
   > "$scratch/said" 2>&1 || status=$?
 [ "$status" -eq 64 ] && grep -q photos "$scratch/said" || fail "captures of one name share a run: $status"
 SLURM_ARRAY_TASK_ID=1 CNERF=/bin/true OUT=$scratch/runs bash "$root/scripts/captures.sbatch" day1 day2 > /dev/null
+# Started again it goes on, and does not overwrite what it goes on with.
+stand_in cnerf 'echo "$*" > "'"$scratch"'/started"'
+for start in first second; do
+  SLURM_ARRAY_TASK_ID=0 CNERF=$scratch/bin/cnerf OUT=$scratch/runs bash "$root/scripts/captures.sbatch" day3 -- \
+    --overwrite --holdout 4 > /dev/null
+  resumes=$(grep -c -- --resume "$scratch/started" || true) overwrites=$(grep -c -- --overwrite "$scratch/started" || true)
+  [ "$start $resumes $overwrites" = 'first 0 1' ] || [ "$start $resumes $overwrites" = 'second 1 0' ] ||
+    fail "captures.sbatch, $start start: $(cat "$scratch/started")"
+  mkdir -p "$scratch/runs/day3"
+  touch "$scratch/runs/day3/run.json"
+done
 
 # install_dependencies.sh takes what is there for two architectures for being there.
 stand_in dpkg 'echo amd64'
@@ -90,7 +101,8 @@ export CNERF=$scratch/bin/cnerf TIMES=no
 for colorizer in '' simulated builtin; do
   rm -f "$scratch/compared"
   bash "$root/scripts/compare.sh" "$scratch/report" ${colorizer:+"$colorizer"} --overwrite --holdout 4
-  [ "$(grep -c -- '--holdout 4$' "$scratch/compared") $(grep -c -- --overwrite "$scratch/compared")" = '2 1' ] ||
+  [ "$(grep -c -- '--holdout 4$' "$scratch/compared") $(grep -c -- --overwrite "$scratch/compared")" = '2 1' ] &&
+    [ "$(grep -c -- --resume "$scratch/compared")" -eq 1 ] ||
     fail "compare.sh REPORT $colorizer loses options: $(cat "$scratch/compared")"
 done
 grep -q -- '--colorizer builtin' "$scratch/compared" || fail "compare.sh REPORT builtin: $(cat "$scratch/compared")"

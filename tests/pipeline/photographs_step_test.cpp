@@ -154,17 +154,6 @@ TEST_F(Photographs, OfSomeViewsAndAsTiff) {
   EXPECT_EQ(cv::norm(tiff, cv::imread(again.at(0).string(), cv::IMREAD_UNCHANGED), cv::NORM_INF), 0);
 }
 
-TEST_F(Photographs, OfAFormerCallGoWhereAllAreOverwritten) {
-  for (const char* former : {"p/former.png", "p/former.tiff"}) write_file(out_ / former, "picture");
-  PhotographsJob job{"vivid", {"view_001"}, out_ / "p", PhotographFormat::kPng, {}, true};
-  (void)written(job);
-  EXPECT_TRUE(fs::exists(out_ / "p/former.png")) << "one was asked for";
-  job.views.clear();
-  EXPECT_EQ(written(job).size(), 6u);
-  EXPECT_FALSE(fs::exists(out_ / "p/former.png"));
-  EXPECT_TRUE(fs::exists(out_ / "p/former.tiff")) << "of another format";
-}
-
 TEST_F(Photographs, OfTheSameNameGetThatOfTheirView) {
   const fs::path moved = out_ / "capture";
   fs::copy(capture(), moved, fs::copy_options::recursive);

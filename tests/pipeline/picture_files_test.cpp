@@ -84,12 +84,12 @@ TEST(PictureFiles, OfAFormerRenderGoWhereItIsOverwritten) {
   const test::TempDir folder;
   const fs::path out = folder / "out", frames = out / "path";
   render_frames(folder.path(), {8, 8, 8}, {.folder = out, .png = true, .exr = true});
-  for (const char* others : {"notes.txt", "below/frame_2.png"}) write_file(frames / others, "a person's");
+  for (const char* others : {"notes.txt", "mine_3.png", "below/frame_2.png"}) write_file(frames / others, "a person's");
   render_frames(folder.path(), {8}, {.folder = out, .png = true});
   EXPECT_TRUE(fs::exists(frames / "frame_2.png")) << "not asked for";
   render_frames(folder.path(), {8}, {.folder = out, .png = true, .overwrite = true});
   for (const char* gone : {"frame_1.png", "frame_2.png"}) EXPECT_FALSE(fs::exists(frames / gone)) << gone;
-  for (const char* left : {"frame_0.png", "frame_2.exr", "notes.txt", "below/frame_2.png"}) {
+  for (const char* left : {"frame_0.png", "frame_2.exr", "notes.txt", "mine_3.png", "below/frame_2.png"}) {
     EXPECT_TRUE(fs::exists(frames / left)) << left;
   }
 }

@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/pipeline/bake_step.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/run_context.h"
 #include "tests/support/data.h"
@@ -109,6 +112,19 @@ TEST(RunDirectoryTest, TakeNamesAreFolderNames) {
   EXPECT_NO_THROW(check_take_name("warm-2_a.b"));
   for (const char* bad : {"", "..", ".x", "a/b", "a b", "\xc3\xa9"})
     EXPECT_THROW(check_take_name(bad), UsageError) << bad;
+}
+
+TEST(RunDirectoryTest, ABundleIsAWholeBakeUnlessItsBakeStopped) {
+  const test::TempDir folder;
+  const exporting::Formats formats{.gltf = true, .web = true};
+  write_file(folder / "web" / "bundle.json", std::string_view("{}"));
+  const auto are_there = [&] {
+    return std::ranges::any_of(whole_bakes(folder.path(), formats),
+                               [](const fs::path& file) { return fs::exists(file); });
+  };
+  EXPECT_TRUE(are_there());
+  write_file(folder / "unfinished.bake", std::string_view("planes"));
+  EXPECT_FALSE(are_there()) << "the same command goes on";
 }
 
 TEST(RunDirectoryTest, AStepHoldsTheRunsOwnFolderOnceHoweverItIsSpelt) {

@@ -119,14 +119,14 @@ TEST(WebBundle, HasNoPicturesOfAnother) {
   scene.sky = SkyPicture{2, 1, std::vector<float>(6, 0.5f)};
   write_web({two_grids().front()}, scene, folder.path(), {}, {}, observer);
   EXPECT_TRUE(fs::exists(folder / "photos" / "000.jpg"));
-  write_file(folder / "photos" / "mine.jpg", std::string_view("mine"));
+  write_file(folder / "photos" / "20240512.jpg", std::string_view("mine"));
   scene.photos = {};
   scene.sky = {};
   write_web({two_grids().front()}, scene, folder.path(), {}, {}, observer);
   EXPECT_FALSE(fs::exists(folder / "photos" / "000.jpg"));
   EXPECT_FALSE(fs::exists(folder / "sky.jpg"));
   EXPECT_TRUE(fs::exists(folder / "poster.webp"));
-  EXPECT_TRUE(fs::exists(folder / "photos" / "mine.jpg"));
+  EXPECT_TRUE(fs::exists(folder / "photos" / "20240512.jpg"));
 }
 
 TEST(WebBundle, PosterIsThePictureWithAlpha) {
