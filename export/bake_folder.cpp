@@ -12,6 +12,7 @@
 #include "export/usd_text.h"
 #include "export/vdb_writer.h"
 #include "src/base/check.h"
+#include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/picture/exr_writer.h"
 
@@ -86,7 +87,11 @@ BakeFolder::BakeFolder(fs::path folder, std::vector<bake::Camera> cameras, Label
 /// To be called before a file is replaced that a former manifest may list.
 void BakeFolder::begin() {
   if (std::exchange(has_begun_, true)) return;
-  if (fs::exists(manifest())) fs::rename(manifest(), former_manifest());
+  std::error_code failure;
+  fs::rename(manifest(), former_manifest(), failure);
+  if (failure && failure != std::errc::no_such_file_or_directory) {
+    throw OutputError(manifest().string() + ": cannot be moved: " + failure.message());
+  }
   if (sky_) write_sky();
 }
 

@@ -67,7 +67,7 @@ BakeOutput::BakeOutput(fs::path folder, const Formats& formats, OutputOptions op
 }
 
 void BakeOutput::take_volumes(const std::vector<bake::VolumePlanes>& volumes) {
-  make_splats();
+  fit_splats();
   if (formats_.vdb) {
     for (const fs::path& file : bake_.add_volumes(volumes, "volume", options_.vdb)) observer_.wrote("volume", file);
   }
@@ -87,7 +87,7 @@ void BakeOutput::write_bundle(const std::vector<bake::VolumePlanes>& volumes) {
 }
 
 void BakeOutput::take_mesh(const bake::Mesh& mesh) {
-  make_splats();
+  fit_splats();
   const GltfFiles files = bake_.add_mesh(mesh, "mesh", formats_.exr);
   observer_.say(fmt::format("mesh: {} faces, {} charts in {} x {} texels", mesh.triangles.size(), mesh.charts,
                             mesh.texture.size, mesh.texture.size));
@@ -95,8 +95,8 @@ void BakeOutput::take_mesh(const bake::Mesh& mesh) {
   observer_.wrote("mesh", files.gltf);
 }
 
-void BakeOutput::make_splats() {
-  if (make_splats_ && !splats_) splats_ = make_splats_();
+void BakeOutput::fit_splats() {
+  if (fit_ && !splats_) splats_ = fit_();
 }
 
 void BakeOutput::add_splats() {
@@ -117,7 +117,7 @@ void BakeOutput::add_plates() {
 
 void BakeOutput::finish() {
   if (!formats_.has_manifest()) return;
-  make_splats();
+  fit_splats();
   if (splats_) add_splats();
   if (options_.vdb.plates && formats_.is_for_blender()) add_plates();
   bake_.add_camera_tracks(options_.vdb);

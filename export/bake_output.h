@@ -63,14 +63,16 @@ class BakeOutput final : public bake::Output {
 
   void take_volumes(const std::vector<bake::VolumePlanes>& volumes) override;
   void take_mesh(const bake::Mesh& mesh) override;
-  /// They are made before the first file is: a stop meanwhile replaces nothing. What they take comes on top of volumes.
-  void take_splats(std::function<bake::SplatCloud()> make) { make_splats_ = std::move(make); }
+  /// @param fit  is called before the first file is written, so that a stop meanwhile replaces nothing; its memory
+  /// comes
+  ///             on top of the volumes'
+  void take_splats(std::function<bake::SplatCloud()> fit) { fit_ = std::move(fit); }
   void finish() override;
 
  private:
   void write_bundle(const std::vector<bake::VolumePlanes>& volumes);
   void add_plates();
-  void make_splats();
+  void fit_splats();
   void add_splats();
 
   std::filesystem::path folder_;
@@ -79,7 +81,7 @@ class BakeOutput final : public bake::Output {
   const Capture& capture_;
   Label label_;
   BakeFolder bake_;
-  std::function<bake::SplatCloud()> make_splats_;
+  std::function<bake::SplatCloud()> fit_;  // of splats
   std::optional<bake::SplatCloud> splats_;
   Observer& observer_;
 };

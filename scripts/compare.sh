@@ -4,9 +4,8 @@
 # Captures and LPIPS weights are looked for in $CNERF_DATA (else ../shared/data), the program in $CNERF (else the
 # release build). Where there are GPUs, mpirun starts as many processes as there are cells, which take the GPUs in turns:
 # one cell alone does not keep a GPU busy. RANKS=n for another number of processes, LAUNCH="srun -n 9" for another way to
-# start them. What is finished stays, so that the same command goes on after a stop; with --overwrite it begins again,
-# always. SEEDS=n for other than three,
-# TIMES=no to leave out the table of training times.
+# start them. What is finished stays, so that the same command goes on after a stop; with --overwrite it begins again.
+# SEEDS=n for other than three, TIMES=no to leave out the table of training times.
 set -euo pipefail
 
 usage() {

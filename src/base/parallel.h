@@ -18,4 +18,12 @@ void parallel_tasks(std::size_t tasks, const std::function<void(std::size_t)>& t
 /// Calls `body(begin, end)` over consecutive pieces of [0, count) of at most `grain` elements each.
 void parallel_ranges(std::size_t count, std::size_t grain, const std::function<void(std::size_t, std::size_t)>& body);
 
+/// Calls `body(i)` for each i in [0, count), in such pieces.
+template <typename Body>
+void parallel_each(std::size_t count, std::size_t grain, const Body& body) {
+  parallel_ranges(count, grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) body(i);
+  });
+}
+
 }  // namespace cnerf

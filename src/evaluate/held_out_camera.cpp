@@ -171,9 +171,8 @@ double near_opacity(const SeenScene& scene, const RenderEffort& effort, const Un
   double opacity = 0;
   for (std::size_t first = 0; first < all; first += at_a_time) {
     std::vector<Ray> rays(std::min(at_a_time, all - first));
-    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) rays[r] = camera.ray_of_pixel((first + r) * kTracedEvery);
-    });
+    parallel_each(rays.size(), kGrain,
+                  [&](std::size_t r) { rays[r] = camera.ray_of_pixel((first + r) * kTracedEvery); });
     std::vector<WeightedSample> samples;
     std::vector<std::size_t> offsets;
     scene.engine.trace(rays, scene.march, effort, samples, offsets);

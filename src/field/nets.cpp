@@ -13,9 +13,8 @@ constexpr float kInitialReach = 1e-4f;
 std::vector<float> initial_table(const std::vector<GridLevel>& levels, std::uint64_t seed) {
   std::vector<float> table(std::size_t(total_rows(levels)) * 4);
   const CounterRng rng(seed, kTableStream);
-  parallel_ranges(table.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) table[i] = (2.0f * rng.uniform(i) - 1.0f) * kInitialReach;
-  });
+  parallel_each(table.size(), 1 << 16,
+                [&](std::size_t i) { table[i] = (2.0f * rng.uniform(i) - 1.0f) * kInitialReach; });
   return table;
 }
 

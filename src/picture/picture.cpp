@@ -28,9 +28,7 @@ const SrgbCodes& SrgbCodes::table() {
 std::vector<std::uint8_t> srgb8_from_linear(std::span<const float> linear) {
   constexpr std::size_t kGrain = 1 << 14;  // values of a parallel piece of work
   std::vector<std::uint8_t> codes(linear.size());
-  parallel_ranges(codes.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) codes[i] = srgb8_from_linear(linear[i]);
-  });
+  parallel_each(codes.size(), kGrain, [&](std::size_t i) { codes[i] = srgb8_from_linear(linear[i]); });
   return codes;
 }
 

@@ -17,7 +17,8 @@ struct BakeJob {
   const Scene* scene = nullptr;  ///< the take's, with the configured finish; null = the step loads it
 };
 
-/// What says that a bake of these formats is whole already, as far as nothing goes on with a stopped one.
+/// Files that would say that a bake of these formats is whole already. The bundle of a stopped one does not: the same
+/// command goes on.
 [[nodiscard]] std::vector<std::filesystem::path> whole_bakes(const std::filesystem::path& folder,
                                                              const exporting::Formats& formats);
 /// Bakes a take and writes the set-up script and the manifest beside it.

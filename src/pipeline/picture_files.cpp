@@ -4,7 +4,6 @@
 #include <opencv2/videoio.hpp>
 #include <optional>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "src/base/check.h"
@@ -48,15 +47,10 @@ void write_exr(const fs::path& file, const RenderedImage& image, ShownColor colo
              {{"software", "cnerf " CNERF_VERSION}, {"colorOrigin", color_origin}, {"colorSpace", "lin_rec709"}}});
 }
 
-namespace {
-constexpr std::string_view kFrameName = "frame_";  // and a number: camera_path.cpp
-}  // namespace
-
 void remove_other_frames(const fs::path& folder, const char* extension, const CameraPath& path) {
   const auto is_other = [&](const fs::path& file) {
     const std::string name = file.stem().string();
-    return file.extension() == extension && name.starts_with(kFrameName) &&
-           name.find_first_not_of("0123456789", kFrameName.size()) == std::string::npos &&
+    return file.extension() == extension && is_frame_name(name) &&
            std::ranges::find(path.cameras, name, &PathCamera::name) == path.cameras.end();
   };
   std::vector<fs::path> others;

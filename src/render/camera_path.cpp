@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string_view>
 
 #include "src/base/error.h"
 #include "src/base/statistics.h"
@@ -80,8 +81,10 @@ double angle_on(const Arc& arc, int index, int count) {
   return arc.begin + arc.length * 0.5 * (1 - std::cos(kTwoPi * there / count));
 }
 
+constexpr std::string_view kFrame = "frame_";
+
 std::string frame_name(int index) {
-  return fmt::format("frame_{:04}", index);
+  return fmt::format("{}{:04}", kFrame, index);
 }
 
 }  // namespace
@@ -90,6 +93,10 @@ Affined look_at(Vec3d position, Vec3d target, Vec3d up) {
   const Vec3d forward = normalized(target - position);
   const Vec3d right = normalized(cross(forward, up));
   return {Mat3d::from_columns(right, cross(forward, right), forward), position};
+}
+
+bool is_frame_name(const std::string& name) {
+  return name.starts_with(kFrame) && name.find_first_not_of("0123456789", kFrame.size()) == std::string::npos;
 }
 
 std::vector<std::vector<std::size_t>> frames_of_equal_cameras(const CameraPath& path) {

@@ -25,6 +25,9 @@ struct CameraPath {
 /// all of it twice.
 [[nodiscard]] std::vector<std::vector<std::size_t>> frames_of_equal_cameras(const CameraPath& path);
 
+/// Whether a picture is called as the numbered ones of a path are: "frame_0012".
+[[nodiscard]] bool is_frame_name(const std::string& name);
+
 /// A closed ellipse in the plane of the cameras, looking at the focus (Mildenhall et al. 2019).
 [[nodiscard]] CameraPath spiral_path(const Capture& capture, const PictureOptions& config);
 /// A circle about the focus at the cameras' median distance and height. Where the cameras leave more than a third of

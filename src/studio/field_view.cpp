@@ -67,9 +67,7 @@ class Drawing {
   }
   [[nodiscard]] std::vector<Ray> rays_of(std::span<const std::size_t> wanted) const {
     std::vector<Ray> rays(wanted.size());
-    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) rays[r] = unit_.ray_of_pixel(wanted[r]);
-    });
+    parallel_each(rays.size(), kGrain, [&](std::size_t r) { rays[r] = unit_.ray_of_pixel(wanted[r]); });
     return rays;
   }
   void trace_light(std::span<const std::size_t> wanted) {
@@ -92,20 +90,16 @@ class Drawing {
   }
   void set_light(std::span<const std::size_t> wanted, std::span<const Ray> rays, std::span<const RayResult> results) {
     std::vector<float> light(results.size());
-    parallel_ranges(light.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) {
-        light[r] = results[r].luminance + light_behind(sky_, rays[r], results[r].opacity);
-      }
+    parallel_each(light.size(), kGrain, [&](std::size_t r) {
+      light[r] = results[r].luminance + light_behind(sky_, rays[r], results[r].opacity);
     });
     pixels_.set_light(wanted, light);
   }
   void put_sky_behind(const SkyColors& sky, std::span<const Ray> rays, std::span<const RayResult> seen,
                       std::vector<Ab>& colors) const {
-    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) {
-        const float behind = light_behind(sky_, rays[r], seen[r].opacity);
-        if (behind > 0) colors[r] = mixed(colors[r], seen[r].luminance, sky.along(rays[r].direction), behind);
-      }
+    parallel_each(rays.size(), kGrain, [&](std::size_t r) {
+      const float behind = light_behind(sky_, rays[r], seen[r].opacity);
+      if (behind > 0) colors[r] = mixed(colors[r], seen[r].luminance, sky.along(rays[r].direction), behind);
     });
   }
 
@@ -135,9 +129,8 @@ std::vector<Picture> draw_field(const LuminanceModel& luminance, const FieldCame
   }
   parallel_tasks(sides.size(), [&](std::size_t s) {
     pictures[s] = blank(camera.lens.width, camera.lens.height);
-    parallel_ranges(pictures[s].rgb.size() / 3, kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t p = begin; p < end; ++p) put(drawing.pixels().lab(colors[s], p), effort.finish, p, pictures[s]);
-    });
+    parallel_each(pictures[s].rgb.size() / 3, kGrain,
+                  [&](std::size_t p) { put(drawing.pixels().lab(colors[s], p), effort.finish, p, pictures[s]); });
   });
   return pictures;
 }
@@ -162,11 +155,9 @@ Picture draw_cached(const CachedView& view, Side side, int width, const Finish& 
       colors[p] = side->sky.behind(view, places[p].pixel, field[p], colors[p]);
     }
   }
-  parallel_ranges(places.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      const float lightness = lightness_from_luminance(view.luminance[places[p].pixel]);
-      put({lightness, colors[p].a, colors[p].b}, finish, p, picture);
-    }
+  parallel_each(places.size(), kGrain, [&](std::size_t p) {
+    const float lightness = lightness_from_luminance(view.luminance[places[p].pixel]);
+    put({lightness, colors[p].a, colors[p].b}, finish, p, picture);
   });
   return picture;
 }

@@ -87,12 +87,10 @@ std::vector<std::size_t> SparsePixels::foretell(std::size_t pass) {
   const Pass& of = passes_[pass];
   std::vector<std::vector<std::size_t>> of_rows(static_cast<std::size_t>(height_));
   const std::size_t rows = std::max<std::size_t>(1, kGrain / std::size_t(width_));
-  parallel_ranges(of_rows.size(), rows, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t y = begin; y < end; ++y) {
-      const Columns columns = columns_of(of, int(y));
-      for (int x = columns.first; x < width_; x += columns.step) {
-        if (!foretell_pixel(of, x, int(y))) of_rows[y].push_back(y * std::size_t(width_) + std::size_t(x));
-      }
+  parallel_each(of_rows.size(), rows, [&](std::size_t y) {
+    const Columns columns = columns_of(of, int(y));
+    for (int x = columns.first; x < width_; x += columns.step) {
+      if (!foretell_pixel(of, x, int(y))) of_rows[y].push_back(y * std::size_t(width_) + std::size_t(x));
     }
   });
   std::vector<std::size_t> wanted;
@@ -149,16 +147,13 @@ bool SparsePixels::foretell_colors(std::size_t pixel, const std::array<std::ptrd
 
 void SparsePixels::set_light(std::span<const std::size_t> pixels, std::span<const float> luminance) {
   CNERF_CHECK_EQ(pixels.size(), luminance.size());
-  parallel_ranges(pixels.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) lightness_[pixels[i]] = lightness_from_luminance(luminance[i]);
-  });
+  parallel_each(pixels.size(), kGrain,
+                [&](std::size_t i) { lightness_[pixels[i]] = lightness_from_luminance(luminance[i]); });
 }
 
 void SparsePixels::set_colors(std::size_t side, std::span<const std::size_t> pixels, std::span<const Ab> colors) {
   CNERF_CHECK_EQ(pixels.size(), colors.size());
-  parallel_ranges(pixels.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) colors_[side][pixels[i]] = colors[i];
-  });
+  parallel_each(pixels.size(), kGrain, [&](std::size_t i) { colors_[side][pixels[i]] = colors[i]; });
 }
 
 void SparsePixels::spread_colors() {

@@ -114,9 +114,7 @@ class TrainedScene final : public Scene {
   void render_part(const UnitCamera& camera, const RenderOptions& options, std::size_t first, std::size_t last,
                    RenderedImage& image) const {
     std::vector<Ray> rays(last - first);
-    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) rays[r] = camera.ray_of_pixel(first + r);
-    });
+    parallel_each(rays.size(), kGrain, [&](std::size_t r) { rays[r] = camera.ray_of_pixel(first + r); });
     const auto traced =
         luminance_.engine->trace_pixels(rays, luminance_.march(options.steps_per_box), options.effort());
     const std::optional<PixelSamples> pixels = relit(*traced, options);

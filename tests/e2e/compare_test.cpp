@@ -157,6 +157,7 @@ TEST_F(Compare, ACaptureWithoutAnyCellIsLeftOutOfTheReport) {
 TEST_F(Compare, ResumingMakesOnlyWhatIsMissing) {
   const fs::path out = comparison_of({"colornerf", "grey"});
   EXPECT_EQ(compare(out, "colornerf,grey").exit_code, 64) << "neither --resume nor --overwrite";
+  EXPECT_EQ(compare(out, "colornerf,grey", {"--resume", "--overwrite"}).exit_code, 64) << "both";
   const fs::path cell = out / "runs" / tiny_capture().filename() / "seed-1/colornerf/cell.json";
   const auto before = fs::last_write_time(cell);
   const std::string content = read_text_file(cell);

@@ -19,9 +19,7 @@ constexpr int kSkyStep = 4;          // of the pixels of an answer, one of so ma
 
 double Classification::step(ColorModel& model, const ColoredPixels& pixels, float learning_rate) const {
   std::vector<SoftLabel> labels(pixels.colors.size());
-  parallel_ranges(labels.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) labels[i] = soft_label(pixels.colors[i]);
-  });
+  parallel_each(labels.size(), kGrain, [&](std::size_t i) { labels[i] = soft_label(pixels.colors[i]); });
   return model.chroma->step(pixels.samples, labels, pixels.weights, weights_, learning_rate);
 }
 

@@ -108,14 +108,9 @@ RunningColors KnownColorSources::everywhere_in(std::size_t v) const {
     colors.ab[p] = claims[p].mixed(lightness);
   };
   // There are not always more views than threads.
-  const auto each_pixel = [&](const auto& work) {
-    parallel_ranges(pixels, kPixelsPerPiece, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t p = begin; p < end; ++p) work(p);
-    });
-  };
-  each_pixel(ask);
+  parallel_each(pixels, kPixelsPerPiece, ask);
   smooth(claims, view, looks.surface);
-  each_pixel(take);
+  parallel_each(pixels, kPixelsPerPiece, take);
   return colors;
 }
 

@@ -155,14 +155,12 @@ StrokesEverywhere::StrokesEverywhere(const RunningColors& strokes, const CachedV
   take_samples(strokes, looks);
   RunningColors near = strokes;
   run(near, view, surface);
-  parallel_ranges(claims_.size(), kPixelsPerPiece, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      if (near.is_known(p)) {
-        const std::uint32_t color = number_of(near.ab[p]);  // none of those that run, where it was painted exactly
-        claims_[p].add({near.cost[p], near.ab[p], color < lightness_.size() ? lightness_[color] : looks.lightness[p]});
-      }
-      if (!strokes.is_known(p)) claim_alike(view_.camera.ray_of_pixel(p), looks, p, claims_[p]);
+  parallel_each(claims_.size(), kPixelsPerPiece, [&](std::size_t p) {
+    if (near.is_known(p)) {
+      const std::uint32_t color = number_of(near.ab[p]);  // none of those that run, where it was painted exactly
+      claims_[p].add({near.cost[p], near.ab[p], color < lightness_.size() ? lightness_[color] : looks.lightness[p]});
     }
+    if (!strokes.is_known(p)) claim_alike(view_.camera.ray_of_pixel(p), looks, p, claims_[p]);
   });
 }
 
@@ -269,11 +267,7 @@ void smooth(std::span<Claims> claims, const CachedView& view, std::span<const fl
   const GuidedFilter along_surfaces(depth_guide(view, surface), radius);
   const GuidedFilter along_lightness(lightness_guide(view), radius);
   // There are not always more views than threads.
-  const auto each_pixel = [&](const auto& work) {
-    parallel_ranges(claims.size(), kPixelsPerPiece, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t p = begin; p < end; ++p) work(p);
-    });
-  };
+  const auto each_pixel = [&](const auto& work) { parallel_each(claims.size(), kPixelsPerPiece, work); };
   std::vector<std::array<float, Claims::kMost>> kept(claims.size());
   each_pixel([&](std::size_t p) { kept[p] = claims[p].shares(); });
   std::vector<Claims> smoothed(claims.size());
@@ -289,8 +283,8 @@ void smooth(std::span<Claims> claims, const CachedView& view, std::span<const fl
     const cv::Mat smooth_shares = along_lightness(along_surfaces(shares));
     const auto* const smooth_share = smooth_shares.ptr<float>();
     each_pixel([&](std::size_t p) {
-      const float share_now = std::min(smooth_share[p], 1.0f);
-      const float cost = share_now > kLeastShare ? -kShare * std::log(share_now) : most_cost;  // most have none
+      const float own = std::min(smooth_share[p], 1.0f);
+      const float cost = own > kLeastShare ? -kShare * std::log(own) : most_cost;  // most have none
       smoothed[p].add({claims[p].cost() + cost, one.color, one.lightness});
     });
   }

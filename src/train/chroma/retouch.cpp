@@ -70,10 +70,8 @@ double Retouch::step() {
   std::vector<float> weights;
   for (const ViewPixel& place : places) weights.push_back(views_[place.view].opacity[place.pixel]);
   std::vector<SoftLabel> labels(colors.size());
-  parallel_ranges(colors.size(), kLabelsPerPiece, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      labels[i] = label_decoded_to(colors[i], float(model_.options.decode_temperature));
-    }
+  parallel_each(colors.size(), kLabelsPerPiece, [&](std::size_t i) {
+    labels[i] = label_decoded_to(colors[i], float(model_.options.decode_temperature));
   });
 
   const double share = double(done_) / options_.steps;

@@ -53,9 +53,7 @@ TracedView trace_view(const SeenScene& scene, const UnitCamera& full_size_camera
   const std::size_t pixels = std::size_t(view.width) * std::size_t(view.height);
   for (std::size_t first = 0; first < pixels; first += kRaysAtATime) {
     std::vector<Ray> rays(std::min(kRaysAtATime, pixels - first));
-    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) rays[r] = view.camera.ray_of_pixel(first + r);
-    });
+    parallel_each(rays.size(), kGrain, [&](std::size_t r) { rays[r] = view.camera.ray_of_pixel(first + r); });
     auto& [samples, offsets] = traced.pieces.emplace_back();
     scene.engine.trace(rays, scene.march, {kCacheTransmittance, float(share)}, samples, offsets);
     if (report) report(double(first + rays.size()) / double(pixels));
