@@ -68,7 +68,7 @@ TEST(Bake, TooLittleMemoryIsRefusedBeforeAnythingIsBaked) {
   EXPECT_THAT(cnerf(concatenated(bake_into(folder / "bake"), {"--max-memory", "lots"})).err, HasSubstr("\"lots\""));
   EXPECT_TRUE(files_below(folder / "bake").empty());
   EXPECT_EQ(cnerf(concatenated(bake_into(folder / "bake"), {"--max-memory", "4G"})).exit_code, 0);
-  const std::vector<std::string> splats{"--format", "vdb,splat", "--overwrite", "--max-memory", "10M"};
+  const std::vector<std::string> splats{"--format", "vdb,splat", "--overwrite", "--aabb", "0,0,0,1,1,-1"};
   EXPECT_EQ(cnerf(concatenated(bake_into(folder / "bake"), splats)).exit_code, 64);
   EXPECT_TRUE(fs::exists(folder / "bake" / "manifest.json")) << "and nothing of what was there is replaced";
 }

@@ -304,6 +304,18 @@ TEST(ColorsEverywhere, AStrokeThatSlipsClaimsLittleThere) {
   EXPECT_EQ(claims.list[0].color.a, 50) << "nearer to most of the other stroke";
 }
 
+TEST(ColorsEverywhere, SharesOfWhatIsKeptSumToOne) {
+  Claims claims;
+  EXPECT_EQ(claims.shares(), (std::array<float, Claims::kMost>{}));
+  claims.add({0.5f, {50, 0}});
+  claims.add({0.5f, {-50, 0}});
+  EXPECT_EQ(claims.shares(), (std::array<float, Claims::kMost>{0.5f, 0.5f, 0}));
+  claims.add({0.9f, {0, 50}});
+  const auto [first, second, third] = claims.shares();
+  EXPECT_NEAR(first + second + third, 1, 1e-6f);
+  EXPECT_NEAR(third, std::exp(-1.0f) * first, 1e-6f) << "0.4 dearer";
+}
+
 TEST(ColorsEverywhere, APixelIsJudgedWithThoseOfItsSurface) {
   const CachedView view = look(0.45f, true);
   const Ab red{50, 0}, green{-50, 0}, painted{0, 30};
