@@ -19,6 +19,8 @@ endif()
 # Every target of ours links this one; packages' headers are SYSTEM and stay out of it.
 add_library(cnerf_options INTERFACE)
 target_compile_options(cnerf_options INTERFACE
+                       # Nobody looks at errno or at traps of numbers: the same numbers, from vector instructions.
+                       $<$<COMPILE_LANGUAGE:CXX>:-fno-math-errno;-fno-trapping-math>
                        $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wshadow;-Wnon-virtual-dtor;-Woverloaded-virtual>
                        $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-restrict>  # GCC 105329
                        # Of sources that are compiled as one none is the main file.

@@ -22,7 +22,7 @@ enum class ExitCode : int {
   kBusy = 75,          ///< another cnerf works in the same folder; later it may go
   kColorizer = 76,     ///< a colorizer failed, timed out or answered nonsense
   kPoses = 77,         ///< no camera poses can be found: no overlap, no parallax, too few views placed
-  kSnapshot = 78,      ///< a snapshot of another version, or cut short
+  kSnapshot = 78,      ///< a snapshot of another version or training, or cut short
   kDiverged = 79,      ///< training ran into numbers that are not finite; the last good snapshot is kept
   kInterrupted = 130,  ///< Ctrl-C; what can go on was saved
 };

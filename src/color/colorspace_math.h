@@ -47,8 +47,9 @@ CNERF_HD Real lab_f_derivative(Real t) {
 }
 template <typename Real>
 CNERF_HD Real lab_f_inverse(Real f) {
-  const Real cube = f * f * f;
-  return cube > LabConstants<Real>::epsilon ? cube : (Real(116) * f - Real(16)) / LabConstants<Real>::kappa;
+  // Both are computed, so that many of them become vector instructions.
+  const Real cube = f * f * f, line = (Real(116) * f - Real(16)) / LabConstants<Real>::kappa;
+  return cube > LabConstants<Real>::epsilon ? cube : line;
 }
 /// The derivative of `lab_f_inverse`.
 template <typename Real>
@@ -115,7 +116,7 @@ CNERF_HD Lab<Real> lab_from_linear_rgb(Vec3<Real> rgb) {
 }
 /// May leave the gamut: components below 0 or above 1.
 template <typename Real>
-CNERF_HD Vec3<Real> linear_rgb_from_lab(Lab<Real> lab) {
+CNERF_HD inline Vec3<Real> linear_rgb_from_lab(Lab<Real> lab) {
   const Real fy = (lab.lightness + Real(16)) / Real(116);
   return linear_rgb_from_relative_xyz<Real>(
       {lab_f_inverse(fy + lab.a / Real(500)), lab_f_inverse(fy), lab_f_inverse(fy - lab.b / Real(200))});
@@ -123,8 +124,9 @@ CNERF_HD Vec3<Real> linear_rgb_from_lab(Lab<Real> lab) {
 
 /// Like `linear_rgb_from_lab`, but chroma is scaled down at constant lightness and hue until every component is in
 /// [0, max(1, Y)]; channels are never clipped (that would change the hue). A lightness below 0 counts as 0.
+/// @param steps  that halve what is unknown of the scale; as many as a chroma of 128 needs in this precision
 template <typename Real>
-CNERF_HD Vec3<Real> gamut_mapped_linear_rgb_from_lab(Lab<Real> lab) {
+CNERF_HD Vec3<Real> gamut_mapped_linear_rgb_from_lab(Lab<Real> lab, int steps = sizeof(Real) == 4 ? 22 : 50) {
   lab.lightness = lab.lightness > Real(0) ? lab.lightness : Real(0);
   if (lab.a == Real(0) && lab.b == Real(0)) {
     const Real grey = luminance_from_lightness(lab.lightness);
@@ -140,11 +142,11 @@ CNERF_HD Vec3<Real> gamut_mapped_linear_rgb_from_lab(Lab<Real> lab) {
   };
   const Vec3<Real> wanted = with_chroma(Real(1));
   if (in_gamut(wanted)) return wanted;
-  // Bisection keeps `inside` in gamut; the steps exhaust the precision that a chroma of 128 needs.
+  // Bisection keeps `inside` in gamut.
   Vec3<Real> inside = grey;
   Real low = 0;
   Real high = 1;
-  for (int step = 0; step < (sizeof(Real) == 4 ? 22 : 50); ++step) {
+  for (int step = 0; step < steps; ++step) {
     const Real middle = (low + high) / Real(2);
     const Vec3<Real> color = with_chroma(middle);
     if (in_gamut(color)) {

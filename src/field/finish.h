@@ -33,11 +33,18 @@ struct Finish {
   /// Of linear light.
   [[nodiscard]] float gain() const { return float(std::exp2(exposure)); }
 
-  [[nodiscard]] Ab of(Ab color) const {
-    const double turn = hue * std::numbers::pi / 180;
-    const auto cosine = float(saturation * std::cos(turn)), sine = float(saturation * std::sin(turn));
-    return {cosine * color.a - sine * color.b, sine * color.a + cosine * color.b};
+  /// What it does to a and b, for many of them.
+  struct Turn {
+    float cosine, sine;  ///< times the saturation
+    [[nodiscard]] Ab of(Ab color) const {
+      return {cosine * color.a - sine * color.b, sine * color.a + cosine * color.b};
+    }
+  };
+  [[nodiscard]] Turn turn() const {
+    const double angle = hue * std::numbers::pi / 180;
+    return {float(saturation * std::cos(angle)), float(saturation * std::sin(angle))};
   }
+  [[nodiscard]] Ab of(Ab color) const { return turn().of(color); }
   /// The same without a luminance: above Lab's linear part a and b are cbrt(Y) times what the chromaticity says, so
   /// scaling and turning them is the same at every luminance.
   [[nodiscard]] Chromaticity of(Chromaticity color) const {

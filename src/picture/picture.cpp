@@ -6,6 +6,36 @@
 #include "src/base/parallel.h"
 
 namespace cnerf {
+namespace {
+
+constexpr std::size_t kAtOnce = 64;  // pixels that become vector instructions
+constexpr int kChromaSteps = 12;     // chroma to 1 of 4096: no more is seen in 8 bits
+
+using Channel = std::array<float, kAtOnce>;
+
+/// As `gamut_mapped_linear_rgb_from_lab`, to the bit where nothing leaves the gamut, of the first `count` pixels.
+void linear_from_lab(std::size_t count, const Channel& lightness, const Channel& a, const Channel& b,
+                     std::array<Channel, 3>& linear) {
+  Channel excess;  // beyond the gamut; 0 or less: inside
+  for (std::size_t i = 0; i < kAtOnce; ++i) {
+    const float l = lightness[i] > 0 ? lightness[i] : 0;
+    const Vec3f rgb = linear_rgb_from_lab<float>({l, a[i], b[i]});
+    const float grey = luminance_from_lightness(l), limit = grey > 1 ? grey : 1;
+    linear[0][i] = rgb.x;
+    linear[1][i] = rgb.y;
+    linear[2][i] = rgb.z;
+    const float below = -std::min(std::min(rgb.x, rgb.y), rgb.z),
+                above = std::max(std::max(rgb.x, rgb.y), rgb.z) - limit;
+    excess[i] = std::max(below, above);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (excess[i] <= 0) continue;
+    const Vec3f rgb = gamut_mapped_linear_rgb_from_lab<float>({lightness[i], a[i], b[i]}, kChromaSteps);
+    for (std::size_t c = 0; c < 3; ++c) linear[c][i] = rgb[int(c)];
+  }
+}
+
+}  // namespace
 
 SrgbCodes::SrgbCodes() {
   for (std::size_t code = 1; code < 256; ++code) {
@@ -14,7 +44,7 @@ SrgbCodes::SrgbCodes() {
     while (double(begins_[code]) < border) begins_[code] = std::nextafter(begins_[code], 1.0f);
   }
   begins_[256] = 2;
-  for (std::size_t cell = 0, code = 0; cell < kCells; ++cell) {
+  for (std::size_t cell = 0, code = 0; cell <= kCells; ++cell) {
     while (float(cell) / kCells >= begins_[code + 1]) ++code;
     first_[cell] = std::uint8_t(code);
   }
@@ -53,6 +83,30 @@ std::vector<float> linear_rgb_from_lab(std::span<const float> lightness, std::sp
     linear.insert(linear.end(), {rgb.x, rgb.y, rgb.z});
   }
   return linear;
+}
+
+void srgb8_from_lab(std::span<const float> lightness, std::span<const float> a, std::span<const float> b, float gain,
+                    std::span<std::uint8_t> rgb) {
+  const bool is_grey = a.empty();
+  CNERF_CHECK_EQ(rgb.size(), 3 * lightness.size());
+  CNERF_CHECK(a.size() == b.size() && (is_grey || a.size() == lightness.size()), "as many a and b as pixels, or none");
+  const SrgbCodes& codes = SrgbCodes::table();
+  Channel l{}, of_a{}, of_b{};
+  std::array<Channel, 3> linear;
+  for (std::size_t first = 0; first < lightness.size(); first += kAtOnce) {
+    const std::size_t count = std::min(kAtOnce, lightness.size() - first);
+    std::uint8_t* const to = &rgb[3 * first];
+    std::copy_n(&lightness[first], count, l.begin());
+    if (is_grey) {
+      for (std::size_t i = 0; i < kAtOnce; ++i) linear[0][i] = luminance_from_lightness(l[i] > 0 ? l[i] : 0);
+      for (std::size_t i = 0; i < count; ++i) std::fill_n(to + 3 * i, 3, codes.of(gain * linear[0][i]));
+    } else {
+      std::copy_n(&a[first], count, of_a.begin());
+      std::copy_n(&b[first], count, of_b.begin());
+      linear_from_lab(count, l, of_a, of_b, linear);
+      for (std::size_t i = 0; i < 3 * count; ++i) to[i] = codes.of(gain * linear[i % 3][i / 3]);
+    }
+  }
 }
 
 Picture scaled_down(const Picture& picture, int width) {

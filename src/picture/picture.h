@@ -33,18 +33,17 @@ class SrgbCodes {
   static const SrgbCodes& table();
 
   [[nodiscard]] std::uint8_t of(float linear) const {
-    if (!(linear > 0)) return 0;
-    if (linear >= 1) return 255;
-    const std::size_t code = first_[std::size_t(linear * kCells)];
-    return std::uint8_t(code + (linear >= begins_[code + 1] ? 1 : 0));
+    const float light = linear > 0 ? std::min(linear, 1.0f) : 0;
+    const std::size_t code = first_[std::size_t(light * kCells)];
+    return std::uint8_t(code + (light >= begins_[code + 1] ? 1 : 0));
   }
 
  private:
   static constexpr std::size_t kCells = 4096;  // so many that none has two borders, not even near black
   SrgbCodes();
 
-  std::array<float, 257> begins_{};           // the least light of each code, and more than there is
-  std::array<std::uint8_t, kCells> first_{};  // code of the least light of each cell
+  std::array<float, 257> begins_{};               // the least light of each code, and more than there is
+  std::array<std::uint8_t, kCells + 1> first_{};  // code of the least light of each cell, and of white
 };
 
 /// The same without a power. Not a number counts as black.
@@ -63,6 +62,13 @@ class SrgbCodes {
 /// @param lightness  [N] L* 0..100
 /// @param ab         [2, N]; empty = grey
 [[nodiscard]] std::vector<float> linear_rgb_from_lab(std::span<const float> lightness, std::span<const float> ab);
+
+/// 8-bit sRGB, [N, 3], of CIELAB, on the calling thread; chroma that leaves the gamut is reduced.
+/// @param lightness  [N] L* 0..100
+/// @param a, b       [N]; empty = grey
+/// @param gain       of the linear light
+void srgb8_from_lab(std::span<const float> lightness, std::span<const float> a, std::span<const float> b, float gain,
+                    std::span<std::uint8_t> rgb);
 
 /// The picture, scaled down to `width` where it is wider.
 [[nodiscard]] Picture scaled_down(const Picture& picture, int width);

@@ -1,6 +1,7 @@
 #include "src/studio/field_view.h"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 
 #include "src/base/parallel.h"
@@ -9,23 +10,36 @@
 namespace cnerf::studio {
 namespace {
 
-constexpr std::size_t kGrain = 256;  // rays or pixels of a parallel piece of work
-constexpr int kSparseLattice = 4;    // coarser ones save no rays, and lose what is thin
+constexpr std::size_t kGrain = 256;         // rays or pixels of a parallel piece of work
+constexpr std::size_t kPutGrain = 1 << 13;  // pixels of one that only makes sRGB of them
+constexpr int kSparseLattice = 4;           // coarser ones save no rays, and lose what is thin
 
-/// Linear Rec.709. Exposed last: Lab's a and b are another chromaticity in any light but that of the training.
-Vec3f finished(const Lab<float>& color, const Finish& finish) {
-  if (finish.is_plain()) return gamut_mapped_linear_rgb_from_lab(color);
-  const Ab ab = finish.of(Ab{color.a, color.b});
-  return finish.gain() * gamut_mapped_linear_rgb_from_lab<float>({color.lightness, ab.a, ab.b});
-}
+/// a and b of pixels, [H, W] each; none: grey.
+using AbPlanes = std::array<std::span<const float>, 2>;
 
-void put(const Lab<float>& color, const Finish& finish, std::size_t pixel, Picture& picture) {
-  const Vec3f rgb = finished(color, finish);
-  for (int c = 0; c < 3; ++c) picture.rgb[3 * pixel + std::size_t(c)] = srgb8_from_linear(rgb[c]);
-}
-
-Picture blank(int width, int height) {
-  return {width, height, std::vector<std::uint8_t>(3 * std::size_t(width) * std::size_t(height))};
+/// Exposed last: Lab's a and b are another chromaticity in any light but that of the training.
+/// @param lightness  [H, W]
+Picture finished(int width, int height, std::span<const float> lightness, const AbPlanes& colors,
+                 const Finish& finish) {
+  Picture picture{width, height, std::vector<std::uint8_t>(3 * lightness.size())};
+  const Finish::Turn turn = finish.turn();
+  parallel_ranges(lightness.size(), kPutGrain, [&](std::size_t begin, std::size_t end) {
+    const std::size_t count = end - begin;
+    AbPlanes of_piece = colors;
+    std::vector<float> a, b;
+    if (!colors[0].empty()) of_piece = {colors[0].subspan(begin, count), colors[1].subspan(begin, count)};
+    if (!colors[0].empty() && !finish.is_plain()) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const Ab turned = turn.of(Ab{of_piece[0][i], of_piece[1][i]});
+        a.push_back(turned.a);
+        b.push_back(turned.b);
+      }
+      of_piece = {a, b};
+    }
+    srgb8_from_lab(lightness.subspan(begin, count), of_piece[0], of_piece[1], finish.gain(),
+                   std::span(picture.rgb).subspan(3 * begin, 3 * count));
+  });
+  return picture;
 }
 
 /// One drawing: which pixels are traced, and what is seen there.
@@ -65,19 +79,21 @@ class Drawing {
     const std::size_t count = std::size_t(lens.width) * std::size_t(lens.height);
     return effort.least_sparse_pixels > 0 && count >= effort.least_sparse_pixels ? kSparseLattice : 1;
   }
-  [[nodiscard]] std::vector<Ray> rays_of(std::span<const std::size_t> wanted) const {
-    std::vector<Ray> rays(wanted.size());
-    parallel_each(rays.size(), kGrain, [&](std::size_t r) { rays[r] = unit_.ray_of_pixel(wanted[r]); });
-    return rays;
+  /// Until the next.
+  [[nodiscard]] std::span<const Ray> rays_of(std::span<const std::size_t> wanted) {
+    rays_.resize(std::max(rays_.size(), wanted.size()));
+    parallel_each(wanted.size(), kGrain, [&](std::size_t r) { rays_[r] = unit_.ray_of_pixel(wanted[r]); });
+    return std::span(rays_).first(wanted.size());
   }
   void trace_light(std::span<const std::size_t> wanted) {
-    const std::vector<Ray> rays = rays_of(wanted);
-    std::vector<RayResult> results(wanted.size());
+    const std::span<const Ray> rays = rays_of(wanted);
+    results_.resize(std::max(results_.size(), wanted.size()));
+    const auto results = std::span(results_).first(wanted.size());
     engine_.render(rays, march_, effort_, results);
     set_light(wanted, rays, results);
   }
   void trace_colors(std::span<const std::size_t> wanted) {
-    const std::vector<Ray> rays = rays_of(wanted);
+    const std::span<const Ray> rays = rays_of(wanted);
     const auto seen = engine_.trace_pixels(rays, march_, effort_);
     set_light(wanted, rays, seen->results());
     for (std::size_t s = 0; s < colored_.size(); ++s) {
@@ -89,11 +105,11 @@ class Drawing {
     }
   }
   void set_light(std::span<const std::size_t> wanted, std::span<const Ray> rays, std::span<const RayResult> results) {
-    std::vector<float> light(results.size());
-    parallel_each(light.size(), kGrain, [&](std::size_t r) {
-      light[r] = results[r].luminance + light_behind(sky_, rays[r], results[r].opacity);
+    light_.resize(std::max(light_.size(), results.size()));
+    parallel_each(results.size(), kGrain, [&](std::size_t r) {
+      light_[r] = results[r].luminance + light_behind(sky_, rays[r], results[r].opacity);
     });
-    pixels_.set_light(wanted, light);
+    pixels_.set_light(wanted, std::span(light_).first(results.size()));
   }
   void put_sky_behind(const SkyColors& sky, std::span<const Ray> rays, std::span<const RayResult> seen,
                       std::vector<Ab>& colors) const {
@@ -110,6 +126,9 @@ class Drawing {
   std::span<const Side> colored_;
   DirectionView sky_;
   SparsePixels pixels_;
+  std::vector<Ray> rays_;  // of the pixels that are traced now
+  std::vector<RayResult> results_;
+  std::vector<float> light_;
 };
 
 }  // namespace
@@ -122,25 +141,24 @@ std::vector<Picture> draw_field(const LuminanceModel& luminance, const FieldCame
   Drawing drawing(luminance, camera, colored, effort);
   DrawingCosts unwanted;
   if (!drawing.trace(keep_going, costs != nullptr ? *costs : unwanted)) return {};
-  std::vector<Picture> pictures(sides.size());
-  std::vector<std::size_t> colors;  // of each side
+  const SparsePixels& pixels = drawing.pixels();
+  std::vector<AbPlanes> colors;  // of each side
   for (std::size_t next_colored = 0; const Side side : sides) {
-    colors.push_back(side != nullptr ? next_colored++ : SparsePixels::kGrey);
+    colors.push_back(side != nullptr ? pixels.colors(next_colored++) : AbPlanes());
   }
+  std::vector<Picture> pictures(sides.size());
   parallel_tasks(sides.size(), [&](std::size_t s) {
-    pictures[s] = blank(camera.lens.width, camera.lens.height);
-    parallel_each(pictures[s].rgb.size() / 3, kGrain,
-                  [&](std::size_t p) { put(drawing.pixels().lab(colors[s], p), effort.finish, p, pictures[s]); });
+    pictures[s] = finished(camera.lens.width, camera.lens.height, pixels.lightness(), colors[s], effort.finish);
   });
   return pictures;
 }
 
 Picture draw_cached(const CachedView& view, Side side, int width, const Finish& finish) {
   const int step = std::max(1, (view.width + width - 1) / width);
-  Picture picture = blank(std::max(view.width / step, 1), std::max(view.height / step, 1));
+  const int rows = std::max(view.height / step, 1), columns = std::max(view.width / step, 1);
   std::vector<ViewPixel> places;
-  for (int y = 0; y < picture.height; ++y) {
-    for (int x = 0; x < picture.width; ++x) {
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
       const int column = std::min(x * step + step / 2, view.width - 1);
       const int row = std::min(y * step + step / 2, view.height - 1);
       places.push_back({0, std::uint32_t(row * view.width + column)});
@@ -155,11 +173,13 @@ Picture draw_cached(const CachedView& view, Side side, int width, const Finish& 
       colors[p] = side->sky.behind(view, places[p].pixel, field[p], colors[p]);
     }
   }
-  parallel_each(places.size(), kGrain, [&](std::size_t p) {
-    const float lightness = lightness_from_luminance(view.luminance[places[p].pixel]);
-    put({lightness, colors[p].a, colors[p].b}, finish, p, picture);
-  });
-  return picture;
+  std::vector<float> lightness, a, b;
+  for (std::size_t p = 0; p < places.size(); ++p) {
+    lightness.push_back(lightness_from_luminance(view.luminance[places[p].pixel]));
+    a.push_back(colors[p].a);
+    b.push_back(colors[p].b);
+  }
+  return finished(columns, rows, lightness, {a, b}, finish);
 }
 
 }  // namespace cnerf::studio

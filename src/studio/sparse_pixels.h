@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -36,10 +37,11 @@ class SparsePixels {
   /// After all passes: gives the pixels that have none a colour.
   void spread_colors();
 
-  static constexpr auto kGrey = std::size_t(-1);  ///< a side without colours
-  [[nodiscard]] Lab<float> lab(std::size_t side, std::size_t pixel) const {
-    const Ab color = side == kGrey ? Ab{} : colors_[side][pixel];
-    return {lightness_[pixel], color.a, color.b};
+  /// L*, [H, W].
+  [[nodiscard]] std::span<const float> lightness() const { return lightness_.values(); }
+  /// a and b of a side, [H, W] each.
+  [[nodiscard]] std::array<std::span<const float>, 2> colors(std::size_t side) const {
+    return {colors_[side][0].values(), colors_[side][1].values()};
   }
 
  private:
@@ -49,6 +51,18 @@ class SparsePixels {
     bool is_diagonal = false;
     bool has_colors = true;
   };
+  /// [H, W]. Nothing is written before it is known: to touch all of the memory once more takes longer than a pass.
+  class Plane {
+   public:
+    explicit Plane(std::size_t size) : size_(size), values_(std::make_unique_for_overwrite<float[]>(size)) {}
+    [[nodiscard]] float* at(std::size_t pixel) { return &values_[pixel]; }
+    [[nodiscard]] std::span<const float> values() const { return {values_.get(), size_}; }
+
+   private:
+    std::size_t size_;
+    std::unique_ptr<float[]> values_;
+  };
+  using Colors = std::array<Plane, 2>;
   /// Columns of a row that belong to a pass: first, first + step, ...
   struct Columns {
     int first = 0, step = 1;
@@ -62,8 +76,8 @@ class SparsePixels {
 
   int width_, height_, lattice_;
   std::vector<Pass> passes_;
-  std::vector<float> lightness_;         // [H, W]
-  std::vector<std::vector<Ab>> colors_;  // [sides][H, W]
+  Plane lightness_;
+  std::vector<Colors> colors_;  // [sides] a and b
 };
 
 }  // namespace cnerf::studio

@@ -64,6 +64,35 @@ TEST(Picture, PlanesOfLabBecomeInterleavedLight) {
   EXPECT_THROW((void)linear_rgb_from_lab(std::vector{50.0f}, std::vector{1.0f}), ContractError);
 }
 
+TEST(Picture, ManyColorsOfLabAreThoseOfEach) {
+  std::vector<float> lightness, a, b;
+  for (int i = 0; i < 4099; ++i) {  // no multiple of what is converted at once
+    lightness.push_back(float(i % 113) - 4);
+    a.push_back(i == 7 ? 0 : float(i % 37) * 5 - 90);
+    b.push_back(i == 7 ? 0 : float(i % 41) * 5 - 100);
+  }
+  for (const float gain : {1.0f, 0.25f}) {
+    std::vector<std::uint8_t> many(3 * a.size()), grey(many.size());
+    srgb8_from_lab(lightness, a, b, gain, many);
+    srgb8_from_lab(lightness, {}, {}, gain, grey);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      const float l = std::max(lightness[i], 0.0f);
+      const Vec3f one = gamut_mapped_linear_rgb_from_lab<float>({lightness[i], a[i], b[i]});
+      const Vec3f wanted = linear_rgb_from_lab<float>({l, a[i], b[i]});
+      const auto [least, most] = std::minmax({wanted.x, wanted.y, wanted.z});
+      for (int c = 0; c < 3; ++c) {
+        // Chroma that leaves the gamut is found less exactly than floats could have it.
+        EXPECT_NEAR(many[3 * i + std::size_t(c)], srgb8_from_linear(gain * one[c]), least >= 0 && most <= 1 ? 0 : 1);
+        EXPECT_EQ(grey[3 * i + std::size_t(c)], srgb8_from_linear(gain * luminance_from_lightness(l)));
+      }
+    }
+    EXPECT_EQ(many[21], many[23]) << "no chroma";
+  }
+  EXPECT_THROW(srgb8_from_lab(lightness, a, b, 1, std::span<std::uint8_t>()), ContractError);
+  std::vector<std::uint8_t> rgb(3 * a.size());
+  EXPECT_THROW(srgb8_from_lab(lightness, a, std::span(b).first(9), 1, rgb), ContractError);
+}
+
 TEST(Encode, KeepsTheOrderOfChannels) {
   for (const auto& bytes : {png_bytes(red_and_blue()), png_bytes(red_and_blue(), PngEffort::kBytes)}) {
     EXPECT_EQ(decoded(bytes).at<cv::Vec3b>(0, 0), cv::Vec3b(10, 30, 200));

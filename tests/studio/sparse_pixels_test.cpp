@@ -22,7 +22,9 @@ struct Drawn {
   SparsePixels pixels;
   std::size_t traced = 0, colored = 0;
   [[nodiscard]] Lab<float> at(int column, int row) const {
-    return pixels.lab(0, std::size_t(row) * kWidth + std::size_t(column));
+    const std::size_t pixel = std::size_t(row) * kWidth + std::size_t(column);
+    const auto [a, b] = pixels.colors(0);
+    return {pixels.lightness()[pixel], a[pixel], b[pixel]};
   }
   [[nodiscard]] double share() const { return double(traced) / (kWidth * kHeight); }
 };
@@ -168,7 +170,8 @@ TEST(SparsePixels, PicturesOfAPixelOrALineAreDrawnToo) {
     }
     pixels.spread_colors();
     EXPECT_EQ(traced, std::size_t(width * height)) << "each is at the border";
-    for (std::size_t p = 0; p < traced; ++p) EXPECT_FLOAT_EQ(pixels.lab(0, p).a, kRed.a) << width << " x " << height;
+    for (std::size_t p = 0; p < traced; ++p)
+      EXPECT_FLOAT_EQ(pixels.colors(0)[0][p], kRed.a) << width << " x " << height;
   }
 }
 

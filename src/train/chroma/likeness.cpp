@@ -8,6 +8,7 @@
 #include "src/base/check.h"
 #include "src/base/exp_of_negative.h"
 #include "src/base/parallel.h"
+#include "src/base/vector_clones.h"
 
 namespace cnerf {
 namespace {
@@ -26,42 +27,58 @@ constexpr float kSoft = 0.2f;       // of two colours whose costs differ by this
 constexpr float kShare = 0.4f;      // the same, while shares of colours are smoothed
 constexpr float kLeastShare = 1e-4f;
 constexpr float kSmoothRadius = 0.04f;   // of the short side
+constexpr int kFilterRadius = 7;         // pixels, at least, of the smaller images that slopes come from
 constexpr float kSmallContrast = 0.05f;  // of a guide, squared: what differs less is smoothed as one
 constexpr float kBlack = 16;  // L* where chroma has gone to nothing below black: in Lab, shade scales a, b and L* + 16
 constexpr std::size_t kMostColors = 64;        // that are smoothed: a painted picture has more, and few pixels of each
 constexpr std::size_t kMostSamples = 400;      // of all colours of a view, each as many
 constexpr std::size_t kPixelsPerPiece = 1024;  // pixels of a parallel piece of work
-constexpr std::size_t kSamplesAtOnce = 4;      // that become vector instructions
+constexpr std::size_t kSamplesAtOnce = 16;     // that become vector instructions
 constexpr float kLikeNothing = 1e6f;           // L*
 
 bool same(Ab x, Ab y) {
   return x.a == y.a && x.b == y.b;
 }
 
-/// Smooths along what a guide shows as one: the guided filter (He et al. 2010, Eq. 5, 6 and 8).
+/// Smooths along what a guide shows as one: the guided filter (He et al. 2010, Eq. 5, 6 and 8), whose slopes and
+/// offsets come from smaller images (He and Sun 2015, algorithm 2).
 class GuidedFilter {
  public:
-  GuidedFilter(cv::Mat guide, int radius) : guide_(std::move(guide)), size_(2 * radius + 1, 2 * radius + 1) {
-    mean_ = around(guide_);
-    variance_ = around(guide_.mul(guide_)) - mean_.mul(mean_) + kSmallContrast;
+  GuidedFilter(cv::Mat guide, int radius) : guide_(std::move(guide)) {
+    const int shrink = std::max(1, radius / kFilterRadius), side = 2 * (radius / shrink) + 1;
+    size_ = {side, side};
+    small_ = {std::max(1, guide_.cols / shrink), std::max(1, guide_.rows / shrink)};
+    small_guide_ = shrunk(guide_);
+    mean_ = around(small_guide_);
+    variance_ = around(small_guide_.mul(small_guide_)) - mean_.mul(mean_) + kSmallContrast;
   }
   [[nodiscard]] cv::Mat operator()(const cv::Mat& values) const {
-    const cv::Mat mean = around(values);
+    const cv::Mat small = shrunk(values), mean = around(small);
     cv::Mat slope;
-    cv::divide(around(guide_.mul(values)) - mean_.mul(mean), variance_, slope);
+    cv::divide(around(small_guide_.mul(small)) - mean_.mul(mean), variance_, slope);
     const cv::Mat offset = mean - slope.mul(mean_);
-    return around(slope).mul(guide_) + around(offset);
+    return enlarged(around(slope)).mul(guide_) + enlarged(around(offset));
   }
 
  private:
+  [[nodiscard]] cv::Mat shrunk(const cv::Mat& values) const {
+    cv::Mat small;
+    cv::resize(values, small, small_, 0, 0, cv::INTER_AREA);
+    return small;
+  }
+  [[nodiscard]] cv::Mat enlarged(const cv::Mat& small) const {
+    cv::Mat values;
+    cv::resize(small, values, guide_.size(), 0, 0, cv::INTER_LINEAR);
+    return values;
+  }
   [[nodiscard]] cv::Mat around(const cv::Mat& values) const {
     cv::Mat means;
     cv::blur(values, means, size_, cv::Point(-1, -1), cv::BORDER_REFLECT);
     return means;
   }
 
-  cv::Mat guide_, mean_, variance_;
-  cv::Size size_;
+  cv::Size size_, small_;
+  cv::Mat guide_, small_guide_, mean_, variance_;
 };
 
 /// The logarithm of distances, in units of kDepth. What shows no surface is far behind all that does.
@@ -84,26 +101,22 @@ cv::Mat lightness_guide(const CachedView& view) {
 }  // namespace
 
 PixelLooks::PixelLooks(const CachedView& view, std::span<const float> of_view) : surface(of_view) {
-  const int r = kAround;
   const std::size_t n = view.opacity.size();
-  std::vector<float> own(n);
-  for (std::size_t p = 0; p < n; ++p) own[p] = lightness_at(view, p);
+  cv::Mat own(view.height, view.width, CV_32F), sums, squares;
+  parallel_each(n, kPixelsPerPiece, [&](std::size_t p) { own.ptr<float>()[p] = lightness_at(view, p); });
+  const cv::Size around(2 * kAround + 1, 2 * kAround + 1);
+  const cv::Point middle(-1, -1);
+  cv::boxFilter(own, sums, CV_32F, around, middle, false, cv::BORDER_CONSTANT);
+  cv::sqrBoxFilter(own, squares, CV_32F, around, middle, false, cv::BORDER_CONSTANT);
   lightness.resize(n);
   texture.resize(n);
+  const auto within = [](int at, int size) { return std::min(at + kAround, size - 1) - std::max(at - kAround, 0) + 1; };
   for (int y = 0; y < view.height; ++y) {
     for (int x = 0; x < view.width; ++x) {
-      float sum = 0, squares = 0, count = 0;
-      for (int j = std::max(y - r, 0); j <= std::min(y + r, view.height - 1); ++j) {
-        for (int i = std::max(x - r, 0); i <= std::min(x + r, view.width - 1); ++i) {
-          const float l = own[std::size_t(j) * std::size_t(view.width) + std::size_t(i)];
-          sum += l;
-          squares += l * l;
-          count += 1;
-        }
-      }
       const auto p = std::size_t(y) * std::size_t(view.width) + std::size_t(x);
-      lightness[p] = sum / count;
-      texture[p] = std::sqrt(std::max(squares / count - lightness[p] * lightness[p], 0.0f));
+      const auto count = float(within(x, view.width) * within(y, view.height));
+      lightness[p] = sums.ptr<float>()[p] / count;
+      texture[p] = std::sqrt(std::max(squares.ptr<float>()[p] / count - lightness[p] * lightness[p], 0.0f));
     }
   }
 }
@@ -154,13 +167,20 @@ StrokesEverywhere::StrokesEverywhere(const RunningColors& strokes, const CachedV
   const PixelLooks looks(view, surface);
   take_samples(strokes, looks);
   RunningColors near = strokes;
-  run(near, view, surface);
+  std::vector<Claims> alike(claims_.size());
+  const auto claim_by_likeness = [&](std::size_t p) {
+    if (!strokes.is_known(p)) claim_alike(view_.camera.ray_of_pixel(p), looks, p, alike[p]);
+  };
+  // What runs does so on one thread: beside it, the others.
+  parallel_tasks(2, [&](std::size_t task) {
+    task == 0 ? run(near, view, surface) : parallel_each(alike.size(), kPixelsPerPiece, claim_by_likeness);
+  });
   parallel_each(claims_.size(), kPixelsPerPiece, [&](std::size_t p) {
     if (near.is_known(p)) {
       const std::uint32_t color = number_of(near.ab[p]);  // none of those that run, where it was painted exactly
       claims_[p].add({near.cost[p], near.ab[p], color < lightness_.size() ? lightness_[color] : looks.lightness[p]});
     }
-    if (!strokes.is_known(p)) claim_alike(view_.camera.ray_of_pixel(p), looks, p, claims_[p]);
+    for (const Claims::Claim& claim : alike[p].list) claims_[p].add(claim);
   });
 }
 
@@ -215,14 +235,15 @@ struct StrokesEverywhere::Looked {
   float lightness = 0, texture = 0;
 };
 
-/// Sum over a colour's samples; one that is in every way like the pixel counts 1.
-float StrokesEverywhere::likeness(const Looked& pixel, std::size_t color) const {
-  const float per_angle = float(view_.camera.intrinsics.fx) / (kPlane * float(view_.short_side()));
+/// Sum over samples; one that is in every way like the pixel counts 1.
+/// @param per_angle  what an angle of 1 costs
+CNERF_VECTOR_CLONES float StrokesEverywhere::likeness(const Samples& samples, std::size_t begin, std::size_t end,
+                                                      const Looked& pixel, float per_angle) {
   std::array<float, kSamplesAtOnce> sums{};
-  for (std::size_t first = color * room_; first < (color + 1) * room_; first += kSamplesAtOnce) {
-    const float *x = &samples_.x[first], *y = &samples_.y[first], *z = &samples_.z[first];
-    const float* log_distance = &samples_.log_distance[first];
-    const float *lightness = &samples_.lightness[first], *texture = &samples_.texture[first];
+  for (std::size_t first = begin; first < end; first += kSamplesAtOnce) {
+    const float *x = &samples.x[first], *y = &samples.y[first], *z = &samples.z[first];
+    const float* log_distance = &samples.log_distance[first];
+    const float *lightness = &samples.lightness[first], *texture = &samples.texture[first];
     for (std::size_t i = 0; i < kSamplesAtOnce; ++i) {
       const float cosine = pixel.direction.x * x[i] + pixel.direction.y * y[i] + pixel.direction.z * z[i];
       const float angle = std::sqrt(std::max(2 - 2 * cosine, 0.0f));
@@ -241,8 +262,10 @@ void StrokesEverywhere::claim_alike(const Ray& ray, const PixelLooks& looks, std
   const Vec3f from = ray.at(is_solid ? looks.surface[p] : 1e3f) - view_.camera.origin.cast<float>();
   const float distance = length(from);
   const Looked pixel{from / distance, std::log(distance), is_solid, looks.lightness[p], looks.texture[p]};
+  const float per_angle = float(view_.camera.intrinsics.fx) / (kPlane * float(view_.short_side()));
   for (std::size_t c = 0; c < colors_.size(); ++c) {
-    const float cost = -kSpread * std::log(likeness(pixel, c) / float(sampled_[c]));
+    const float alike = likeness(samples_, c * room_, (c + 1) * room_, pixel, per_angle);
+    const float cost = -kSpread * std::log(alike / float(sampled_[c]));
     to.add({(kAlike + std::max(cost, 0.0f)) / reach_[c], colors_[c], lightness_[c]});
   }
 }

@@ -70,7 +70,8 @@ class StrokesEverywhere {
   };
   struct Looked;
   void take_samples(const RunningColors& strokes, const PixelLooks& looks);
-  [[nodiscard]] float likeness(const Looked& pixel, std::size_t color) const;
+  [[nodiscard]] static float likeness(const Samples& samples, std::size_t begin, std::size_t end, const Looked& pixel,
+                                      float per_angle);
   [[nodiscard]] std::uint32_t number_of(Ab color) const;
 
   const CachedView& view_;
