@@ -9,7 +9,6 @@
 #include "src/pipeline/default_colorizer.h"
 #include "src/pipeline/key_views_step.h"
 #include "src/studio/coloring.h"
-#include "src/studio/paint_files.h"
 #include "viewer/server/live_session.h"
 
 namespace cnerf::app {
@@ -45,8 +44,6 @@ void replay(const ColorizeArguments& arguments, const pipeline::RunContext& cont
     if (reporter.is_cancelled()) throw Interrupted("stopped; nothing was written");
   });
   coloring.keep(take, watch.seconds(), reporter, arguments.existing.overwrite);
-  const PaintedPictures from(directory.take_folder(of)), to(directory.take_folder(take));
-  for (const studio::Deed& deed : journal.deeds) studio::copy_pictures(deed.strokes, from, to);
   reporter.wrote("take", directory.take_folder(take));
 }
 
@@ -59,8 +56,10 @@ void suggest(const ColorizeArguments& arguments, const pipeline::RunContext& con
 
 void colorize(const ColorizeArguments& arguments, const std::vector<std::string>& command_line) {
   Reporter reporter = make_reporter(arguments.run.config);
-  const std::string base = pipeline::configured_take(pipeline::RunDirectory::open(arguments.run.run),
-                                                     arguments.run.take, arguments.existing.resume);
+  const pipeline::RunDirectory directory = pipeline::RunDirectory::open(arguments.run.run);
+  const std::string base = arguments.replay.empty()
+                               ? pipeline::configured_take(directory, arguments.run.take, arguments.existing.resume)
+                               : directory.choose_take(arguments.replay);
   pipeline::RunContext context = open_run(arguments.run, base, command_line, reporter);
   const bool is_suggestion = arguments.suggested_keyframes > 0;
   if (!cluster::world().is_alone() && (arguments.bases_only || is_suggestion || !arguments.replay.empty())) {

@@ -5,6 +5,7 @@
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
 #include "src/base/error.h"
+#include "src/prepare/prepare.h"
 #include "src/studio/reception.h"
 #include "src/studio/studio.h"
 #include "viewer/server/live_session.h"
@@ -62,7 +63,8 @@ void open_studio(StudioArguments arguments, const std::vector<std::string>& comm
   std::shared_ptr<studio::Reception> reception;
   std::shared_ptr<studio::Studio> studio;
   const auto open = [&] {
-    const std::string take = directory.choose_take(arguments.run.take);
+    std::optional<std::string> take;
+    if (!arguments.run.take.empty()) take = directory.choose_take(arguments.run.take);
     studio = std::make_shared<studio::Studio>(*context, take, engines_for(context->config.device), reporter);
     stages.enter(studio);
   };
@@ -71,7 +73,12 @@ void open_studio(StudioArguments arguments, const std::vector<std::string>& comm
     context = open_begun_run(arguments.run, "", command_line, reporter);
     open();
   } else {
-    (void)resolve_config(arguments.run.config);  // refuses now what it would refuse after an upload
+    // Refuses now what it would refuse after an upload.
+    const bool prepares = arguments.run.run.empty() || prepare::needs_preparing(arguments.run.run);
+    if (resolve_config(arguments.run.config).capture.transfer != "srgb" && prepares) {
+      throw UsageError(
+          "capture.transfer: cnerf studio takes photographs as sRGB; make a capture of others by cnerf prepare");
+    }
     pipeline::check_run_folder(directory, {});
     const auto begin = [&](const fs::path& capture, Observer& observer) {
       return begin_run(arguments, command_line, capture, observer);
@@ -100,7 +107,8 @@ Work declare_studio(CLI::App& app) {
                  "Folder of a run; or photographs, a clip or a capture to make one of; without it the page takes them");
   app.add_option("-o,--out", arguments->out, "Folder of a new run; beside what it is made of if not given");
   app.add_option("--capture", arguments->run.capture, "Where the capture lies now, if it was moved");
-  app.add_option("--take", arguments->run.take, "Name of a colorization; the last one if not given");
+  app.add_option("--take", arguments->run.take,
+                 "Name of a colorization; if not given, what was shown last and is in none yet, else the last one");
   add_config_options(app, arguments->run.config);
   add_browser_options(app, arguments->browser);
   return [arguments](const auto& command_line) { open_studio(*arguments, command_line); };

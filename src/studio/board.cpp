@@ -2,6 +2,8 @@
 
 #include <atomic>
 #include <chrono>
+#include <exception>
+#include <filesystem>
 #include <new>
 
 #include "src/base/error.h"
@@ -33,6 +35,10 @@ std::optional<Setback> setback_of(const std::function<void()>& work, const std::
     return Setback{problem.what(), true};
   } catch (const std::bad_alloc&) {
     return Setback{"the memory does not suffice for this", true};
+  } catch (const std::filesystem::filesystem_error& problem) {
+    return Setback{problem.path1().string() + ": " + problem.code().message(), true};
+  } catch (const std::exception& problem) {
+    return Setback{std::string("internal error, please report it: ") + problem.what(), true};
   }
 }
 

@@ -26,7 +26,8 @@ struct Setback {
   bool failed;  ///< or stopped by somebody
 };
 
-/// Does the work.  @return  what kept it from its end, if anything did
+/// Does the work. An error of any kind ends the work alone: the program may hold colours that are in no file.
+/// @return  what kept it from its end, if anything did
 /// @param stopped  the message where somebody stopped it
 [[nodiscard]] std::optional<Setback> setback_of(const std::function<void()>& work, const std::string& stopped);
 

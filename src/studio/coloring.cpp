@@ -5,6 +5,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/pipeline/run_directory.h"
+#include "src/studio/paint_files.h"
 #include "src/train/chroma/stage2.h"
 
 namespace cnerf::studio {
@@ -13,6 +14,7 @@ namespace fs = std::filesystem;
 Journal read_journal(const fs::path& file, const PaintableViews& views) {
   PaintedPictures pictures(file.parent_path());
   auto journal = read_record<Journal>(file);
+  journal.folder = file.parent_path();
   if (journal.deeds.empty()) throw InputError(file, "deeds", "expected at least one");
   if (const std::string& base = journal.deeds.front().base; !base.empty()) pipeline::check_take_name(base);
   for (std::size_t i = 0; i < journal.deeds.size(); ++i) {
@@ -22,6 +24,10 @@ Journal read_journal(const fs::path& file, const PaintableViews& views) {
     deed.strokes = strokes_of_json(json_of(list).dump(), of_deed, views, pictures).strokes;
   }
   return journal;
+}
+
+void write_journal(const fs::path& file, const Journal& journal) {
+  write_file(file, json_of(journal).dump() + "\n");
 }
 
 Coloring::Coloring(const pipeline::RunContext& context, const Engines& engines)
@@ -70,8 +76,11 @@ bool Coloring::has_seen(std::span<const Viewpoint> viewpoints) const {
 
 void Coloring::begin(const std::string& take) {
   std::unique_ptr<ColorModel> base;
+  Deed first{take, {}, 0};
   if (!take.empty()) {
-    base = std::make_unique<ColorModel>(ColorModel::load(context_.directory.take_snapshot(take), engines_));
+    const fs::path snapshot = context_.directory.take_snapshot(take);
+    base = std::make_unique<ColorModel>(ColorModel::load(snapshot, engines_));
+    first.base_sha256 = sha256_of_file(snapshot);
   }
   auto now =
       std::make_unique<ColorModel>(base ? base->copy(engines_) : ColorModel::create(context_.config.stage2, engines_));
@@ -82,7 +91,7 @@ void Coloring::begin(const std::string& take) {
   base_name_ = kept_as_ = take;
   is_grey_ = take.empty();
   is_unkept_ = false;
-  journal_.deeds = {{take, {}, 0}};
+  journal_ = {{first}, stroke_folder(context_)};
 }
 
 void Coloring::take_is_called(const std::string& take, const std::string& name) {
@@ -128,7 +137,9 @@ void Coloring::keep(const std::string& take, double seconds, Observer& observer,
   write_file(directory.take_config_file(take), to_toml(context_.config));
   now_->report.seconds += seconds;
   now_->save(directory.take_snapshot(take));
-  write_file(folder / kJournalFile, json_of(journal_).dump() + "\n");
+  const PaintedPictures from(journal_.folder), to(folder);
+  for (const Deed& deed : journal_.deeds) copy_pictures(deed.strokes, from, to);
+  write_journal(folder / kJournalFile, journal_);
   directory.save(pipeline::TakeRecord{take, now_->colorizer, now_->report});
   directory.update([&](pipeline::RunRecord& record) { record.current_take = take; });
   kept_as_ = take;
@@ -136,7 +147,13 @@ void Coloring::keep(const std::string& take, double seconds, Observer& observer,
 }
 
 void Coloring::replay(const Journal& journal, const RetouchOptions& options, const Breathe& breathe) {
-  begin(journal.deeds.front().base);
+  const Deed& first = journal.deeds.front();
+  const fs::path base = context_.directory.take_snapshot(first.base);
+  if (!first.base_sha256.empty() && fs::exists(base) && sha256_of_file(base) != first.base_sha256) {
+    throw SnapshotError(base.string() + ": is another take than the one of that name that the journal begins from");
+  }
+  begin(first.base);
+  journal_.folder = journal.folder;
   const auto count = double(journal.deeds.size() - 1);
   for (std::size_t i = 1; i < journal.deeds.size(); ++i) {
     const Deed& deed = journal.deeds[i];

@@ -1,6 +1,7 @@
 #pragma once
 /// The colours that a studio shows as "now": those of a take, and what strokes made of them.
 
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -24,10 +25,12 @@ struct Deed {
   int steps = 0;                           ///< and the steps that were run with it
   std::vector<Viewpoint> viewpoints = {};  ///< that the strokes name
   bool everywhere = false;                 ///< as StrokeList has it
+  std::string base_sha256 = {};            ///< the first: of that take's snapshot; earlier versions wrote none
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
     v("base", self.base, kOptional);
+    v("base_sha256", self.base_sha256, kOptional);
     v("strokes", self.strokes, kOptional);
     v("steps", self.steps, kOptional);
     v("viewpoints", self.viewpoints, kOptional);
@@ -38,6 +41,7 @@ struct Deed {
 /// Content of takes/NAME/journal.json: the deeds from a base to the take.
 struct Journal {
   std::vector<Deed> deeds;
+  std::filesystem::path folder = {};  ///< that it lies in, with the pictures of its strokes; not written
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
@@ -46,10 +50,13 @@ struct Journal {
 };
 
 inline constexpr const char* kJournalFile = "journal.json";
+inline constexpr const char* kNowFile = "now.json";  ///< of a run's strokes: the journal of what no take holds
 /// A take's journal of any content.
 /// @param views  that strokes may name
 /// @throws MissingInputError, InputError  "file: deeds[2].strokes…"
 [[nodiscard]] Journal read_journal(const std::filesystem::path& file, const PaintableViews& views);
+/// @throws OutputError
+void write_journal(const std::filesystem::path& file, const Journal& journal);
 
 /// Called between pieces of work, with the share that is done; may throw Interrupted.
 using Breathe = std::function<void(double fraction)>;
@@ -69,6 +76,8 @@ class Coloring {
   /// A take was given another name; an empty one: it is gone.
   void take_is_called(const std::string& take, const std::string& name);
   [[nodiscard]] bool is_unkept() const { return is_unkept_; }
+  /// What made "now".
+  [[nodiscard]] const Journal& journal() const { return journal_; }
 
   /// Traces the training views, once.
   void cache_views(const Breathe& breathe);
@@ -99,9 +108,11 @@ class Coloring {
   /// @param most_steps  to stop after
   void colour(const StrokeList& list, const RetouchOptions& options, const Breathe& breathe,
               int most_steps = std::numeric_limits<int>::max());
-  /// Writes "now" as a take.  @throws OutputError, BusyError, UsageError  there is one and it is not to be overwritten
+  /// Writes "now" as a take, with all that its journal needs.
+  /// @throws OutputError, BusyError, UsageError  there is one and it is not to be overwritten
   void keep(const std::string& take, double seconds, Observer& observer, bool overwrite = false);
   /// Does what a journal says, from its base on.
+  /// @throws SnapshotError  another take has its base's name by now; and as `begin` and `colour`
   void replay(const Journal& journal, const RetouchOptions& options, const Breathe& breathe);
 
  private:

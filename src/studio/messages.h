@@ -20,7 +20,7 @@ namespace cnerf::studio {
 /// bytes.
 struct FrameMessage {
   CameraRecord camera;
-  std::vector<std::string> sides;  ///< "grey", "now", or a take
+  std::vector<std::string> sides;  ///< "" = uncoloured, "now", or a take; "grey" too where no take is called so
   bool moving = false;             ///< somebody moves the camera; else a better or newer picture of where it rests
 
   template <typename Self, typename Visitor>
@@ -116,15 +116,17 @@ struct KeyViewMessage {
   }
 };
 
-/// What a page has sent to begin with.
+/// What there is to begin with: files that a page has sent, else what the program was called with.
 struct ArrivedMessage {
   int files = 0;
   std::uint64_t bytes = 0;
+  std::string source;  ///< that the program was called with; empty = none
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
     v("files", self.files);
     v("bytes", self.bytes);
+    v("source", self.source);
   }
 };
 

@@ -1,29 +1,51 @@
 #include "src/studio/paint_files.h"
 
 #include <algorithm>
-#include <cctype>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/capture/picture_names.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/run_context.h"
+#include "src/studio/coloring.h"
 
 namespace cnerf::studio {
 namespace fs = std::filesystem;
 namespace {
 
-/// "images/view 1.png" -> "images_view_1.png"
-std::string picture_name(const std::string& view) {
-  std::string name = view.substr(0, view.rfind('.'));
-  for (char& c : name) {
-    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-') c = '_';
-  }
-  return name + ".png";
-}
-
 void require_take(const pipeline::RunDirectory& directory, const std::string& take) {
   pipeline::check_take_name(take);
   if (!directory.take_record(take)) throw UsageError("there is no finished take " + take);
+}
+
+bool is_readable(const pipeline::RunDirectory& directory, const std::string& take) {
+  try {
+    return directory.take_record(take).has_value();
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+/// The take that a journal begins from; empty = none, or it cannot be read, and repeats nothing.
+std::string base_of(const fs::path& journal) {
+  try {
+    const auto content = read_record<Journal>(journal);
+    return content.deeds.empty() ? "" : content.deeds.front().base;
+  } catch (const Error&) {
+    return "";
+  }
+}
+
+/// Journals that begin from a take: those of finished takes, and that of what no take holds.
+std::vector<fs::path> journals_begun_from(const pipeline::RunDirectory& directory, const std::string& take) {
+  std::vector<fs::path> files = {directory.root() / "strokes" / kNowFile};
+  std::error_code failure;
+  for (const auto& entry : fs::directory_iterator(directory.root() / "takes", failure)) {
+    const std::string name = entry.path().filename().string();
+    if (fs::exists(directory.take_record_file(name))) files.push_back(directory.take_folder(name) / kJournalFile);
+  }
+  std::erase_if(files, [&](const fs::path& file) { return base_of(file) != take; });
+  return files;
 }
 
 }  // namespace
@@ -46,7 +68,9 @@ fs::path stroke_folder(const pipeline::RunContext& context) {
 
 void copy_pictures(std::span<const Stroke> strokes, const PaintedPictures& from, const PaintedPictures& to) {
   for (const Stroke& stroke : strokes) {
-    if (!stroke.picture.empty()) write_file(to.file(stroke.picture), read_text_file(from.file(stroke.picture)));
+    // Its name tells its content.
+    if (stroke.picture.empty() || fs::exists(to.file(stroke.picture))) continue;
+    write_file(to.file(stroke.picture), read_text_file(from.file(stroke.picture)));
   }
 }
 
@@ -56,8 +80,9 @@ void write_strokes_whole(const fs::path& folder, const StrokeList& list, const P
 }
 
 void write_paint_pictures(const fs::path& folder, const Capture& capture, const std::vector<Stroke>& strokes) {
+  PictureNames names;
   for (const View& view : capture.views) {
-    const fs::path file = folder / picture_name(view.name);
+    const fs::path file = folder / (names.name_for(view.name) + ".png");
     const bool is_touched = std::ranges::find(strokes, view.name, &Stroke::view) != strokes.end();
     const KnownColors paint =
         is_touched ? painted_on(view.name, strokes, view.image.width, view.image.height) : KnownColors{};
@@ -78,13 +103,14 @@ void duplicate(const pipeline::RunDirectory& directory, const std::string& take,
   const fs::path to = directory.take_folder(name);
   const FolderLock lock = pipeline::lock_folder(to, FolderLock::Mode::kAlone, observer);
   if (!is_vacant(to)) throw UsageError("a take of this name exists: " + name);
+  const fs::path from = directory.take_folder(take);
   std::error_code failure;
-  for (const auto& entry : fs::directory_iterator(directory.take_folder(take), failure)) {
+  for (const auto& entry : fs::recursive_directory_iterator(from, failure)) {
     const fs::path& file = entry.path();
     // The record comes last: without it there is no take.
     const bool is_record = file == directory.take_record_file(take);
     if (is_record || !entry.is_regular_file() || file.filename() == FolderLock::kFile || is_temporary(file)) continue;
-    write_atomically(to / file.filename(), [&](const fs::path& temporary) {
+    write_atomically(to / file.lexically_relative(from), [&](const fs::path& temporary) {
       std::error_code problem;
       if (!fs::copy_file(file, temporary, fs::copy_options::overwrite_existing, problem)) {
         throw OutputError(file.string() + ": cannot be copied: " + problem.message());
@@ -96,9 +122,28 @@ void duplicate(const pipeline::RunDirectory& directory, const std::string& take,
   directory.save(record);
 }
 
+void rename(const pipeline::RunDirectory& directory, const std::string& take, const std::string& name,
+            Observer& observer) {
+  const std::vector<fs::path> journals = journals_begun_from(directory, take);
+  std::vector<FolderLock> locks;  // before anything changes: all or nothing
+  for (const fs::path& file : journals) {
+    locks.push_back(pipeline::lock_folder(file.parent_path(), FolderLock::Mode::kAlone, observer));
+  }
+  duplicate(directory, take, name, observer);
+  for (const fs::path& file : journals) {
+    auto journal = read_record<Journal>(file);
+    journal.deeds.front().base = name;
+    write_journal(file, journal);
+  }
+  remove(directory, take, name, observer);
+}
+
 void remove(const pipeline::RunDirectory& directory, const std::string& take, const std::string& successor,
             Observer& observer) {
   require_take(directory, take);
+  if (const auto journals = journals_begun_from(directory, take); !journals.empty()) {
+    throw UsageError("take " + take + " is needed: " + journals.front().string() + " begins from it");
+  }
   const fs::path folder = directory.take_folder(take);
   {
     const FolderLock lock = pipeline::lock_folder(folder, FolderLock::Mode::kAlone, observer);
@@ -111,7 +156,7 @@ void remove(const pipeline::RunDirectory& directory, const std::string& take, co
   std::string other = successor;
   for (const auto& entry : fs::directory_iterator(directory.root() / "takes", failure)) {
     const std::string name = entry.path().filename().string();
-    if (other.empty() && directory.take_record(name)) other = name;
+    if (other.empty() && is_readable(directory, name)) other = name;
   }
   directory.update([&](pipeline::RunRecord& record) {
     if (record.current_take == take) record.current_take = other;

@@ -16,6 +16,7 @@
 #include "src/base/error.h"
 #include "src/base/file_descriptor.h"
 #include "src/base/files.h"
+#include "src/base/folder_lock.h"
 #include "src/base/text.h"
 #include "src/pipeline/prepare_step.h"
 #include "src/prepare/prepare.h"
@@ -29,6 +30,8 @@ using web::refusal;
 
 namespace {
 
+/// The mark of a folder that was made for what arrives, so that nothing else is ever replaced or removed.
+constexpr const char* kArrivalsMark = ".cnerf-arrivals";
 constexpr std::size_t kMostFiles = 20000, kLongestName = 200, kDeepestName = 6;
 constexpr std::uint64_t kLargestFile = std::uint64_t(16) << 30, kMostBytes = std::uint64_t(64) << 30;
 constexpr std::array kPhotographKinds = {"jpg", "jpeg", "png", "tif", "tiff", "webp", "exr"};
@@ -44,6 +47,27 @@ std::string kind_of(const fs::path& file) {
 template <std::size_t N>
 bool is_one_of(const std::string& kind, const std::array<const char*, N>& kinds) {
   return std::ranges::find(kinds, kind) != kinds.end();
+}
+
+bool is_marked(const fs::path& arrivals) {
+  std::error_code failure;
+  return fs::exists(arrivals / kArrivalsMark, failure);
+}
+
+/// @throws UsageError  somebody else put files there
+void check_arrivals(const fs::path& arrivals) {
+  if (is_marked(arrivals) || is_vacant(arrivals)) return;
+  throw UsageError(arrivals.string() +
+                   ": is where the page's files would go, but holds others; choose another folder for the run");
+}
+
+/// Whether no arrival has such a name: `checked_name` refuses it.
+bool is_hidden(const fs::path& file) {
+  return file.filename().string().starts_with('.');
+}
+
+std::string note_instead_of(const fs::path& source) {
+  return "note: what has arrived is taken instead of " + source.string();
 }
 
 /// A file's place below the folder of arrivals.  @throws InputError  the name leads out of it, or is no such file's
@@ -71,13 +95,14 @@ fs::path checked_name(const std::string& name) {
   return path;
 }
 
-/// Writes a piece where the file ends, and nowhere else.  @return  the size then; nothing where it does not end there
-/// @throws OutputError
+/// Writes a piece where the file ends, and nowhere else; at 0 it begins the file.
+/// @return  the size then; nothing where the file does not end there
+/// @throws OutputError  of a file that it began nothing is left
 std::optional<std::uint64_t> append(const fs::path& file, std::uint64_t offset, const std::string& piece) {
   std::error_code failure;
   fs::create_directories(file.parent_path(), failure);
   if (failure) throw OutputError(file.string() + ": cannot be written: " + failure.message());
-  const int flags = O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | (offset == 0 ? O_TRUNC : 0);
+  const int flags = O_WRONLY | O_CLOEXEC | O_NOFOLLOW | (offset == 0 ? O_CREAT | O_TRUNC : 0);
   const FileDescriptor opened(::open(file.c_str(), flags, 0644));
   struct stat state {};
   const auto fail = [&]() -> std::optional<std::uint64_t> {
@@ -90,7 +115,7 @@ std::optional<std::uint64_t> append(const fs::path& file, std::uint64_t offset, 
     if (put < 0 && errno == EINTR) continue;
     if (put < 0) {
       const int problem = errno;
-      (void)!::ftruncate(opened.number(), off_t(offset));
+      (void)!(offset == 0 ? ::unlink(file.c_str()) : ::ftruncate(opened.number(), off_t(offset)));
       errno = problem;
       return fail();
     }
@@ -109,6 +134,7 @@ Reception::Reception(fs::path source, const fs::path& run, Open open, Observer& 
       is_ordered_(!source_.empty()) {
   if (run_.filename().empty()) run_ = run_.parent_path();
   arrivals_ = run_.parent_path() / (run_.filename().string() + "-photographs");
+  if (source_.empty()) check_arrivals(arrivals_);
   board_.change([](StateMessage& state) { state.stage = kPhotographs; });
   count_arrivals();
 }
@@ -137,7 +163,7 @@ pipeline::RunContext Reception::prepared() {
   bool is_new = false;
   {
     const std::lock_guard lock(mutex_);
-    if (has_arrived_ || (source_.empty() && fs::exists(arrivals_))) source = arrived_source();
+    if (board_.read([](const StateMessage& state) { return state.arrived.files > 0; })) source = arrived_source();
     is_new = std::exchange(is_new_, true);
   }
   const auto between = [this] {
@@ -145,6 +171,7 @@ pipeline::RunContext Reception::prepared() {
   };
   BoardObserver observer(board_, observer_, "prepare", between, [this] { return should_stop(); });
   if (source.empty()) throw UsageError("nothing has arrived yet");
+  if (!source_.empty() && source != source_) observer.say(note_instead_of(source_));
   fs::path capture = source;
   if (prepare::needs_preparing(source)) {
     capture = run_.parent_path() / (run_.filename().string() + "-capture");
@@ -161,7 +188,9 @@ fs::path Reception::arrived_source() const {
   fs::path folder = arrivals_;
   for (;;) {
     std::vector<fs::path> entries;
-    for (const auto& entry : fs::directory_iterator(folder)) entries.push_back(entry.path());
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      if (!is_hidden(entry.path())) entries.push_back(entry.path());
+    }
     if (entries.size() != 1) return folder;
     // A folder that was dropped comes as itself; a clip alone is no folder of photographs.
     if (!fs::is_directory(entries.front()))
@@ -170,11 +199,14 @@ fs::path Reception::arrived_source() const {
   }
 }
 
+/// Beside a source of the command line, what came in an earlier call waits until something comes in this one.
 void Reception::count_arrivals() {
   ArrivedMessage arrived;
+  arrived.source = source_.string();
   std::error_code failure;
   for (const auto& entry : fs::recursive_directory_iterator(arrivals_, failure)) {
-    if (!entry.is_regular_file(failure)) continue;
+    const bool is_taken = has_arrived_ || source_.empty();
+    if (!is_taken || is_hidden(entry.path()) || !entry.is_regular_file(failure)) continue;
     ++arrived.files;
     arrived.bytes += entry.file_size(failure);
   }
@@ -221,7 +253,7 @@ PageAnswer Reception::put_arrival(const PageRequest& request) {
   if (name == request.parameters.end()) throw InputError("arrivals", "name", "is missing");
   const fs::path path = checked_name(name->second);
   const auto offset = place == request.parameters.end() ? std::nullopt : size_in(place->second);
-  if (!offset || *offset + request.body.size() > kLargestFile) {
+  if (!offset || *offset > kLargestFile || request.body.size() > kLargestFile - *offset) {
     throw InputError(name->second, "offset", fmt::format("expected 0 to {}", kLargestFile));
   }
   const std::lock_guard lock(mutex_);
@@ -235,13 +267,31 @@ PageAnswer Reception::put_arrival(const PageRequest& request) {
   if (arrived.bytes + request.body.size() > kMostBytes || (is_new && std::size_t(arrived.files) >= kMostFiles)) {
     return refusal(413, fmt::format("at most {} files of {} bytes in all", kMostFiles, kMostBytes));
   }
-  const auto size = append(file, *offset, request.body);
-  if (!size) return refusal(409, name->second + ": begins anew at 0");
-  has_arrived_ = is_new_ = true;
-  board_.change([&](StateMessage& state) {
-    state.arrived.files += is_new ? 1 : 0;
-    state.arrived.bytes += request.body.size() - (*offset > 0 || is_new ? 0 : std::uint64_t(replaced));
-  });
+  const auto begin_anew = [&] { return refusal(409, name->second + ": begins anew at 0"); };
+  if (is_new && *offset > 0) return begin_anew();
+  check_arrivals(arrivals_);
+  if (!is_marked(arrivals_)) {
+    write_file(arrivals_ / kArrivalsMark, "The page of cnerf studio sent these files.\n");
+    has_arrived_ = false;  // what had is gone
+  }
+  std::optional<std::uint64_t> size;
+  try {
+    size = append(file, *offset, request.body);
+  } catch (const OutputError&) {
+    count_arrivals();
+    throw;
+  }
+  if (!size) return begin_anew();
+  is_new_ = true;
+  if (!std::exchange(has_arrived_, true)) {
+    count_arrivals();
+    if (!source_.empty()) board_.note(note_instead_of(source_));
+  } else {
+    board_.change([&](StateMessage& state) {
+      state.arrived.files += is_new ? 1 : 0;
+      state.arrived.bytes += request.body.size() - (*offset > 0 || is_new ? 0 : std::uint64_t(replaced));
+    });
+  }
   return {.body = nlohmann::json{{"bytes", *size}}.dump()};
 }
 
@@ -254,10 +304,16 @@ PageAnswer Reception::post_order(const PageRequest& request) {
   } else if (is_working_ || is_ordered_) {
     return refusal(409, "wait until it is done: prepare");
   } else if (order.order == "clear") {
-    fs::remove_all(arrivals_);
+    check_arrivals(arrivals_);
+    remove_output(arrivals_);
     has_arrived_ = false;
     is_new_ = true;
     count_arrivals();
+    board_.change([](StateMessage& state) {
+      state.message.clear();
+      state.failed = false;
+      state.notes.clear();
+    });
   } else if (order.order == "prepare") {
     is_ordered_ = true;
     stop_requested_ = false;

@@ -29,9 +29,11 @@ class Reception final : public web::PageApi {
   /// Begins a run on what was prepared.  @throws Error  it cannot be begun with this capture
   using Open = std::function<pipeline::RunContext(const std::filesystem::path& capture, Observer& observer)>;
 
-  /// @param source  photographs, a clip or a capture to begin with at once; empty = what the page sends
+  /// @param source  photographs, a clip or a capture to begin with at once; what the page sends takes its place.
+  ///                Empty = wait for the page
   /// @param run     folder that the run will go to; what arrives is kept beside it
   /// @param observer  hears what is done; referred to
+  /// @throws UsageError  the folder for what arrives holds files of somebody else
   Reception(std::filesystem::path source, const std::filesystem::path& run, Open open, Observer& observer);
 
   /// Waits for a capture and begins the run.  @return  nothing when the user ended the program, or it was closed
@@ -64,6 +66,7 @@ class Reception final : public web::PageApi {
   [[nodiscard]] pipeline::RunContext prepared();
   /// What has arrived, as `prepare` wants it: a folder, or the one clip.
   [[nodiscard]] std::filesystem::path arrived_source() const;
+  /// Counts what `prepare` would take.
   void count_arrivals();
   [[nodiscard]] bool should_stop() const;
 
@@ -75,7 +78,7 @@ class Reception final : public web::PageApi {
   mutable std::mutex mutex_;  // of what follows; taken before the board's
   std::condition_variable work_;
   bool is_ordered_ = false, is_working_ = false, stop_requested_ = false;
-  bool has_arrived_ = false;  // something, from the page
+  bool has_arrived_ = false;  // something, from the page, in this call
   bool is_new_ = false;       // what was prepared by an earlier call is not what is wanted
 };
 

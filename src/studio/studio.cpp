@@ -29,10 +29,20 @@ constexpr double kFrameOfTraining = 0.25;  // seconds, at most: what is half lea
 constexpr double kFirstRays = 600, kMostGrowth = 4;
 constexpr double kLeastBetweenRefreshes = 1, kMostBetweenRefreshes = 60;  // seconds
 
+/// The take that a run shows; grey where it is gone, or its record cannot be read.
+std::string current_take(const pipeline::RunDirectory& directory, Observer& observer) {
+  try {
+    return directory.choose_take("");
+  } catch (const Error& problem) {
+    observer.say(std::string("note: begun in grey: ") + problem.what());
+    return "";
+  }
+}
+
 }  // namespace
 
-Studio::Studio(pipeline::RunContext& context, std::string take, const Engines& engines, Observer& observer,
-               const RetouchOptions& retouch)
+Studio::Studio(pipeline::RunContext& context, std::optional<std::string> take, const Engines& engines,
+               Observer& observer, const RetouchOptions& retouch)
     : context_(context),
       painted_(stroke_folder(context)),
       engines_(engines),
@@ -42,7 +52,8 @@ Studio::Studio(pipeline::RunContext& context, std::string take, const Engines& e
           context.directory.root(),
           context.directory.record().stage1.finished ? FolderLock::Mode::kShared : FolderLock::Mode::kAlone, observer)),
       lock_(pipeline::lock_folder(stroke_folder(context), FolderLock::Mode::kAlone, observer)),
-      first_take_(std::move(take)),
+      goes_on_(!take),
+      first_take_(take ? std::move(*take) : current_take(context.directory, observer)),
       scene_(json_of(scene_of(context.capture, name_of_run(context.directory.root()))).dump()),
       frames_([this] { work_.notify_all(); }) {
   const fs::path file = stroke_folder(context_) / kStrokeFile;
@@ -53,7 +64,7 @@ Studio::Studio(pipeline::RunContext& context, std::string take, const Engines& e
     coloring_->begin(first_take_);
     field_ = &coloring_->luminance();
   }
-  std::vector<TakeMessage> takes = list_takes();
+  std::vector<TakeMessage> takes = readable_takes();
   board_.change([&](StateMessage& state) {
     state.stage = is_trained ? kField : kTraining;
     state.strokes = strokes_.revision;
@@ -97,9 +108,30 @@ void Studio::forget_viewpoints() {
   coloring_->forget_others(kept);
 }
 
+/// The takes whose records can be read; of each other one the user is told once.
+std::vector<TakeMessage> Studio::readable_takes() {
+  std::vector<TakeMessage> takes;
+  std::error_code failure;
+  for (const auto& entry : fs::directory_iterator(context_.directory.root() / "takes", failure)) {
+    const std::string name = entry.path().filename().string();
+    try {
+      if (const auto record = context_.directory.take_record(name)) {
+        takes.push_back({name, record->colorizer, record->stage2.seconds});
+      }
+    } catch (const Error& problem) {
+      if (!left_out_.insert(name).second) continue;
+      const std::string note = "note: take " + name + " is left out: " + problem.what();
+      observer_.say(note);
+      board_.note(note);
+    }
+  }
+  std::ranges::sort(takes, {}, &TakeMessage::name);
+  return takes;
+}
+
 void Studio::work_on(const Order& order) {
   const auto setback = setback_of([&] { carry_out(order); }, "stopped; what was done by then stays");
-  std::vector<TakeMessage> takes = list_takes();
+  std::vector<TakeMessage> takes = readable_takes();
   const std::lock_guard lock(mutex_);
   is_working_ = false;
   board_.change([&](StateMessage& state) {
@@ -134,6 +166,7 @@ void Studio::train(const Order& order) {
     throw;
   }
   open_field();
+  add_lines_of_training();
   cache_views(order);
 }
 
@@ -184,12 +217,12 @@ void Studio::draw_frames() {
 }
 
 const ColorModel* Studio::side_named(const std::string& name) {
-  if (name == pipeline::kGreyTake || !coloring_) return nullptr;
+  if (name.empty() || !coloring_) return nullptr;
   if (name == kNow) return learning_ != nullptr ? learning_ : coloring_->now();
   const auto found = shown_takes_.find(name);
   if (found != shown_takes_.end()) return found->second.get();
   pipeline::check_take_name(name);
-  if (!context_.directory.take_record(name)) throw MissingInputError("there is no take " + name);
+  if (context_.directory.choose_take(name).empty()) return nullptr;  // "grey", where no take is called so
   auto model = std::make_unique<ColorModel>(ColorModel::load(context_.directory.take_snapshot(name), engines_));
   return (shown_takes_[name] = std::move(model)).get();
 }
@@ -268,10 +301,6 @@ void Studio::colors_changed() {
 
 bool Studio::is_ready() const {
   return board_.read([](const StateMessage& state) { return state.ready; });
-}
-
-void Studio::add_command(const std::string& command) {
-  board_.change([&](StateMessage& state) { state.commands.push_back(command); });
 }
 
 void Studio::close() {

@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -36,9 +37,9 @@ class Studio final : public web::PageApi {
   /// Loads what there is of the run, and what was painted before. Holds its folder `strokes`, and the whole of it until
   /// stage 1 is trained. All are referred to.
   /// @param context  of a run that was begun; its capture gets what training learns of views
-  /// @param take     to begin with; empty = grey
+  /// @param take     to begin with, empty = grey; none: what the last studio ended with, else the current one
   /// @throws BusyError  another studio works on this run; SnapshotError, InputError of a stroke file
-  Studio(pipeline::RunContext& context, std::string take, const Engines& engines, Observer& observer,
+  Studio(pipeline::RunContext& context, std::optional<std::string> take, const Engines& engines, Observer& observer,
          const RetouchOptions& retouch = {});
   ~Studio() override;
 
@@ -111,6 +112,8 @@ class Studio final : public web::PageApi {
   std::optional<std::string> asked_alone(bool is_urgent, FrameDesk::Drawing drawing);
   web::PageAnswer change_at_once(const web::PageRequest& request, const OrderMessage& order);
   web::PageAnswer take_order(const web::PageRequest& request, const Order& order);
+  /// Why no order of this client is taken now; nothing where one is.
+  [[nodiscard]] std::optional<web::PageAnswer> refused_order(const std::string& client);
   void save(StrokeList list);
   [[nodiscard]] bool is_ready() const;
 
@@ -121,9 +124,17 @@ class Studio final : public web::PageApi {
   void watch_training(const LuminanceModel& model);
   void open_field();
   void cache_views(const Order& order);
+  void color_again();
   void colour(const Order& order);
+  void breathe_in_color(const char* task, double fraction);
+  [[nodiscard]] std::vector<TakeMessage> readable_takes();
+  void save_now();
+  void set_now_aside(const std::string& why);
+  void forget_now();
   void keep(const Order& order);
+  void keep_as(const std::string& take);
   void begin(const Order& order);
+  void begin_from(const std::string& take);
   void rename_take(const Order& order);
   void duplicate_take(const Order& order);
   void delete_take(const Order& order);
@@ -152,13 +163,15 @@ class Studio final : public web::PageApi {
   [[nodiscard]] const ColorModel* side_named(const std::string& name);
   void offer_downloads(const std::vector<std::filesystem::path>& files);
   void colors_changed();
-  [[nodiscard]] std::vector<TakeMessage> list_takes() const;
 
   [[nodiscard]] StrokeList saved_strokes() const;
   [[nodiscard]] Finish finish() const;
   [[nodiscard]] bool should_stop() const;
-  /// What repeats a thing that was done, in a terminal.
-  void add_command(const std::string& command);
+  /// "cnerf COMMAND RUN WORDS": what repeats a thing that was done, in a terminal.
+  void add_command(const std::string& command, std::vector<std::string> words,
+                   const std::vector<std::string>& more = {});
+  void add_line(const std::vector<std::string>& words);
+  void add_lines_of_training();
 
   pipeline::RunContext& context_;
   PaintedPictures painted_;
@@ -167,6 +180,8 @@ class Studio final : public web::PageApi {
   RetouchOptions retouch_;
   std::optional<FolderLock> run_lock_;
   FolderLock lock_;
+  bool goes_on_;           // with what no take held when the last studio ended
+  bool owns_now_ = false;  // the file of what no take holds is of the colours that are shown
   std::string first_take_;
 
   // Of the working thread; what server threads see of them does not change once the state is `ready`.
@@ -175,6 +190,7 @@ class Studio final : public web::PageApi {
   const LuminanceModel* field_ = nullptr;
   const ColorModel* learning_ = nullptr;                            // of a take that a colorizer makes
   std::map<std::string, std::unique_ptr<ColorModel>> shown_takes_;  // that sides name
+  std::set<std::string> left_out_;                                  // takes that cannot be read, as the user was told
   int forgotten_at_ = 0;                                            // revision of the strokes
   Stopwatch since_drawn_, since_refresh_, since_begun_;
   RefreshPace pace_;            // of the colouring that began then

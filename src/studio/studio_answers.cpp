@@ -208,9 +208,8 @@ PageAnswer Studio::get_thumbnail(const PageRequest& request) {
     const Picture grey = scaled_down(grey_of(wanted.view->image), kThumbnailWidth);
     return {.type = "image/jpeg", .body = text_of(jpeg_bytes(grey, kThumbnailQuality))};
   }
-  // Each thumbnail is a client of its own, so that none makes another stale.
   const std::string& name = wanted.name();
-  auto drawn = frames_.ask(request.client + " thumbnail " + name, false, [this, name](const auto&) {
+  auto drawn = asked_alone(false, [this, name](const auto&) {
     const SeenSurfaces& seen = *coloring_->seen();
     const Picture picture =
         draw_cached(seen.views()[seen.view_named(name)], side_named(kNow), kThumbnailWidth, finish());
@@ -357,12 +356,16 @@ PageAnswer Studio::change_at_once(const PageRequest& request, const OrderMessage
   return {.status = 202, .body = board_.text()};
 }
 
+/// Under the lock.
+std::optional<PageAnswer> Studio::refused_order(const std::string& client) {
+  if (auto why = board_.become_writer(client)) return why;
+  if (!is_working_ && !order_) return std::nullopt;
+  return refusal(409, "wait until it is done: " + board_.read([](const StateMessage& state) { return state.task; }));
+}
+
 PageAnswer Studio::take_order(const PageRequest& request, const Order& order) {
   const std::lock_guard lock(mutex_);
-  if (auto why = board_.become_writer(request.client)) return *why;
-  if (is_working_ || order_) {
-    return refusal(409, "wait until it is done: " + board_.read([](const StateMessage& state) { return state.task; }));
-  }
+  if (auto why = refused_order(request.client)) return *why;
   order_ = order;
   stop_requested_ = false;
   board_.change([&](StateMessage& state) {
@@ -385,6 +388,10 @@ PageAnswer Studio::post_picture(const PageRequest& request) {
   const std::string shown = parameter("name").substr(0, 80), kind = parameter("kind");
   if (kind == "stroke") return add_painted(request, number_in(parameter("view")), name, shown);
   if (kind != "reference") return refusal(400, "kind: this studio takes pictures as reference or stroke");
+  {
+    const std::lock_guard lock(mutex_);
+    if (auto why = refused_order(request.client)) return *why;  // before anything is written
+  }
   const fs::path folder = stroke_folder(context_) / "references";
   const int orientation = prepare::orientation_of(std::as_bytes(std::span(request.body)));
   const LinearImage image = prepare::turned_upright(decoded_image(request.body, folder, shown), orientation);

@@ -3,9 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
+#include <future>
+#include <string_view>
 
+#include "export/manifest.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
+#include "src/base/process.h"
 #include "src/base/text.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/bake_step.h"
@@ -22,6 +27,7 @@ namespace {
 constexpr int kCardQuality = 88;
 constexpr const char* kBuiltin = "builtin";
 constexpr const char* kKeyViews = "key-views";
+constexpr const char* kRecolor = "recolour";
 constexpr int kSuggestedViews = 3;
 
 /// Sides of pictures have names too.
@@ -37,12 +43,41 @@ std::string numbers_text(const std::vector<int>& numbers) {
 }
 
 /// As settings of a command.
-std::string finish_text(const Finish& finish) {
-  return finish.is_plain()
-             ? ""
-             : fmt::format(" --set finish.saturation={:g} --set finish.hue={:g} --set finish.exposure={:g}",
-                           finish.saturation, finish.hue, finish.exposure);
+std::vector<std::string> finish_words(const Finish& finish) {
+  if (finish.is_plain()) return {};
+  return {"--set", fmt::format("finish.saturation={:g}", finish.saturation),
+          "--set", fmt::format("finish.hue={:g}", finish.hue),
+          "--set", fmt::format("finish.exposure={:g}", finish.exposure)};
 }
+
+/// A line for a shell, quoted only where that is needed.
+std::string shell_line(const std::vector<std::string>& words) {
+  const auto is_plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+           std::string_view("-_./,:=+@%").find(c) != std::string_view::npos;
+  };
+  std::vector<std::string> typed;
+  for (const std::string& word : words) {
+    typed.push_back(!word.empty() && std::ranges::all_of(word, is_plain) ? word : shell_word(word));
+  }
+  return cnerf::joined(typed);
+}
+
+/// What --take calls a take; nothing where that would be grey, and another is called so.
+std::optional<std::string> name_for_commands(const pipeline::RunDirectory& directory, const std::string& take) {
+  const std::string name = take.empty() ? pipeline::kGreyTake : take;
+  return directory.choose_take(name) == take ? std::optional(name) : std::nullopt;
+}
+
+/// What a capture's prepare.json says of where it came from.
+struct PreparedOf {
+  std::string source;
+
+  template <typename Self, typename Visitor>
+  static void visit(Self& self, Visitor&& v) {
+    v("source", self.source, kOptional);
+  }
+};
 
 }  // namespace
 
@@ -103,8 +138,65 @@ bool Studio::is_order_of_pages(const std::string& name) {
 
 void Studio::cache_views(const Order& /*order*/) {
   coloring_->cache_views([this](double fraction) { breathe("cache", fraction); });
-  const std::lock_guard lock(mutex_);
-  board_.change([](StateMessage& state) { state.ready = true; });
+  {
+    const std::lock_guard lock(mutex_);
+    board_.change([](StateMessage& state) { state.ready = true; });
+  }
+  color_again();
+}
+
+/// What no take held when the last studio ended.
+void Studio::color_again() {
+  const fs::path file = stroke_folder(context_) / kNowFile;
+  if (!fs::exists(file)) return;
+  if (!goes_on_) {
+    return observer_.say("note: " + file.string() + ": colours that no take holds; without --take they are made again");
+  }
+  observer_.say("colours that no take holds are made again");
+  begin_pace();
+  try {
+    coloring_->replay(read_journal(file, paintable_views(context_.capture)), retouch_,
+                      [this](double fraction) { breathe_in_color(kRecolor, fraction); });
+  } catch (const Interrupted&) {
+    throw;  // they can still be made
+  } catch (const Error& problem) {
+    return set_now_aside(problem.what());
+  }
+  owns_now_ = true;
+  colors_changed();
+  board_.say("what no take holds was coloured again");
+}
+
+/// So that it is in nobody's way, and lost to nobody.
+void Studio::set_now_aside(const std::string& why) {
+  const fs::path file = stroke_folder(context_) / kNowFile;
+  fs::path aside;
+  for (int i = 1; fs::exists(aside = file.parent_path() / fmt::format("now-{}.json", i));) ++i;
+  std::error_code failure;
+  fs::rename(file, aside, failure);
+  if (failure) throw OutputError(file.string() + ": cannot be renamed: " + failure.message());
+  const std::string note = "note: colours that no take holds are left aside as " + aside.string() + ": " + why;
+  observer_.say(note);
+  board_.note(note);
+}
+
+/// A kill, or the end of the program, does not lose it then.
+void Studio::save_now() {
+  if (!coloring_->is_unkept()) return;
+  const fs::path file = stroke_folder(context_) / kNowFile;
+  if (!owns_now_ && fs::exists(file)) set_now_aside("others were painted, and these were not made again");
+  write_journal(file, coloring_->journal());
+  owns_now_ = true;
+}
+
+/// Colours that a take holds by now, or that were left.
+void Studio::forget_now() {
+  if (std::exchange(owns_now_, false)) remove_output(stroke_folder(context_) / kNowFile);
+}
+
+void Studio::breathe_in_color(const char* task, double fraction) {
+  if (pace_.is_due(since_begun_.seconds())) colors_changed();
+  breathe(task, fraction);
 }
 
 void Studio::begin_pace() {
@@ -114,31 +206,50 @@ void Studio::begin_pace() {
 
 void Studio::colour(const Order& /*order*/) {
   const StrokeList list = saved_strokes();
-  write_paint_pictures(stroke_folder(context_), context_.capture, list.strokes);
+  // Colours do not wait for them.
+  std::future<void> pictures = std::async(
+      std::launch::async, [&] { write_paint_pictures(stroke_folder(context_), context_.capture, list.strokes); });
   begin_pace();
-  coloring_->colour(list, retouch_, [&](double fraction) {
-    if (pace_.is_due(since_begun_.seconds())) colors_changed();
-    breathe("colour", fraction);
-  });
+  try {
+    coloring_->colour(list, retouch_, [this](double fraction) { breathe_in_color("colour", fraction); });
+  } catch (...) {
+    save_now();
+    throw;
+  }
+  save_now();
   colors_changed();
+  pictures.get();
   board_.say(fmt::format("settled in {:.0f} s", since_begun_.seconds()));
-  add_command(fmt::format("cnerf colorize {}{} --strokes {}", context_.directory.root().string(),
-                          coloring_->base_name().empty() ? " --colorizer grey" : "",
-                          (stroke_folder(context_) / kStrokeFile).string()));
+  // What began from a take is repeated once it is kept, by its journal.
+  if (!coloring_->base_name().empty()) return;
+  add_command("colorize", {"--take", context_.directory.free_take_name("painted"), "--colorizer", "grey", "--strokes",
+                           stroke_folder(context_) / kStrokeFile});
 }
 
 void Studio::keep(const Order& order) {
-  const std::string& name = order.message.name;
-  check_new_name(name);
-  coloring_->keep(name, 0, observer_);
-  write_strokes_whole(context_.directory.take_folder(name), saved_strokes(), painted_);
-  board_.say("kept as take " + name);
+  check_new_name(order.message.name);
+  keep_as(order.message.name);
+  board_.say("kept as take " + order.message.name);
+}
+
+/// "Now" as a take.
+void Studio::keep_as(const std::string& take) {
+  coloring_->keep(take, 0, observer_);
+  forget_now();
+  write_strokes_whole(context_.directory.take_folder(take), saved_strokes(), painted_);
+  add_command("colorize", {"--replay", take});
 }
 
 void Studio::begin(const Order& order) {
   const std::string& take = order.message.take;
-  coloring_->begin(context_.directory.choose_take(take.empty() ? pipeline::kGreyTake : take));
+  begin_from(take.empty() ? "" : context_.directory.choose_take(take));
   board_.say(take.empty() ? "grey again" : "begun from take " + take);
+}
+
+/// What no take holds is left.
+void Studio::begin_from(const std::string& take) {
+  coloring_->begin(take);
+  forget_now();
   colors_changed();
 }
 
@@ -155,8 +266,7 @@ std::string Studio::colorize(const ColorizerOptions& colorizer, const std::vecto
   const auto watch = [this](const ColorModel& model) { watch_colors(model); };
   begin_pace();
   pipeline::colorize_step(context_, {take, {}, nullptr, &coloring_->cached_views(), watch}, engines_, observer);
-  coloring_->begin(take);
-  colors_changed();
+  begin_from(take);
   return take;
 }
 
@@ -172,7 +282,7 @@ void Studio::color_by_reference(const Order& order) {
   colorizer.spec = "reference:" + order.picture.string();
   const std::string take = colorize(colorizer, {});
   board_.say("coloured like " + order.picture.filename().string() + ", take " + take);
-  add_command("cnerf colorize " + context_.directory.root().string() + " --colorizer " + colorizer.spec);
+  add_command("colorize", {"--colorizer", colorizer.spec});
 }
 
 void Studio::color_by_network(const Order& order) {
@@ -180,9 +290,9 @@ void Studio::color_by_network(const Order& order) {
   colorizer.spec = kBuiltin;
   const std::string take = colorize(colorizer, order.message.bases);
   board_.say("coloured by the built-in network, take " + take);
-  const std::string bases = numbers_text(order.message.bases);
-  add_command("cnerf colorize " + context_.directory.root().string() + " --colorizer " + colorizer.spec +
-              (bases.empty() ? "" : " --bases " + bases));
+  std::vector<std::string> words = {"--colorizer", colorizer.spec};
+  if (!order.message.bases.empty()) words.insert(words.end(), {"--bases", numbers_text(order.message.bases)});
+  add_command("colorize", words);
 }
 
 void Studio::suggest(const Order& /*order*/) {
@@ -198,7 +308,7 @@ void Studio::suggest(const Order& /*order*/) {
     messages.push_back({int(cards.size()), fmt::format("./studio/cards/{}", cards.size())});
     cards.emplace_back(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   }
-  add_command("cnerf colorize " + context_.directory.root().string() + " --colorizer builtin --bases-only");
+  add_command("colorize", {"--colorizer", kBuiltin, "--bases-only"});
   const std::lock_guard lock(mutex_);
   cards_ = std::move(cards);
   board_.change([&](StateMessage& state) {
@@ -222,8 +332,9 @@ void Studio::suggest_views(const Order& /*order*/) {
   for (const pipeline::SuggestedView& one : found.suggested) {
     messages.push_back({int(std::ranges::find(views, one.view, &View::name) - views.begin()), one.adds});
   }
-  add_command(
-      fmt::format("cnerf colorize {} --suggest-keyframes {}", context_.directory.root().string(), kSuggestedViews));
+  if (const auto name = name_for_commands(context_.directory, job.take)) {
+    add_command("colorize", {"--take", *name, "--suggest-keyframes", std::to_string(kSuggestedViews)});
+  }
   const std::lock_guard lock(mutex_);
   board_.change([&](StateMessage& state) {
     state.message = messages.empty() ? "every view is painted on" : "begin with the photographs that are marked";
@@ -235,33 +346,37 @@ std::string Studio::take_of_now() {
   if (coloring_->now() == nullptr) return "";
   if (!coloring_->is_unkept()) return coloring_->kept_as();
   const std::string take = context_.directory.free_take_name("studio");
-  coloring_->keep(take, 0, observer_);
+  keep_as(take);
   return take;
 }
 
 // ---- what is written ----------------------------------------------------------------------------------------------
 
 void Studio::bake(const Order& order) {
-  const std::vector<std::string>& formats = order.message.formats;
-  const exporting::Formats wanted = exporting::parse_formats(cnerf::joined(formats, ","));
+  const std::string formats = cnerf::joined(order.message.formats, ",");
+  const exporting::Formats wanted = exporting::parse_formats(formats);
   const std::string take = take_of_now();
   const fs::path folder = context_.directory.bakes(take);
   const ConfigInstead config(*this, [this](Config& changed) { changed.finish = finish(); });
   BoardObserver observer = observer_of("bake");
   pipeline::bake_step(context_, {take, folder, wanted}, engines_, observer);
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string kind = entry.path().extension();
-    if (kind == ".vdb" || kind == ".glb" || kind == ".exr") files.push_back(entry.path());
+  if (wanted.has_manifest()) {  // a web bundle alone has none, and leaves that of an earlier bake
+    const exporting::BakeManifest manifest = exporting::read_manifest(exporting::last_file(folder, wanted));
+    for (const std::string& file : manifest.files) {
+      const std::string kind = fs::path(file).extension();
+      if (kind == ".vdb" || kind == ".glb" || kind == ".exr") files.push_back(folder / file);
+    }
   }
   std::ranges::sort(files);
   offer_downloads(files);
   board_.change([&](StateMessage& state) {
     state.message = "baked to " + folder.string();
-    if (wanted.is_for_blender()) state.blender = "blender --python " + (folder / "blender_setup.py").string();
+    if (wanted.is_for_blender()) state.blender = shell_line({"blender", "--python", folder / "blender_setup.py"});
   });
-  add_command("cnerf bake " + context_.directory.root().string() + (take.empty() ? "" : " --take " + take) +
-              " --format " + cnerf::joined(formats, ",") + finish_text(context_.config.finish));
+  if (const auto name = name_for_commands(context_.directory, take)) {
+    add_command("bake", {"--take", *name, "--format", formats}, finish_words(context_.config.finish));
+  }
 }
 
 void Studio::write_photographs(const Order& order) {
@@ -274,8 +389,7 @@ void Studio::write_photographs(const Order& order) {
   offer_downloads(pipeline::photographs_step(context_, {take, {}, folder, pipeline::photograph_format_named(format)},
                                              engines_, observer));
   board_.say("photographs in " + folder.string());
-  add_command("cnerf render " + context_.directory.root().string() + " --take " + take + " --photographs --format " +
-              format + finish_text(context_.config.finish));
+  add_command("render", {"--take", take, "--photographs", "--format", format}, finish_words(context_.config.finish));
 }
 
 /// Those of earlier work go: their files may have been replaced.
@@ -292,20 +406,30 @@ void Studio::offer_downloads(const std::vector<fs::path>& files) {
   board_.change([&](StateMessage& state) { state.downloads = std::move(downloads); });
 }
 
-// ---- takes --------------------------------------------------------------------------------------------------------
+// ---- commands -----------------------------------------------------------------------------------------------------
 
-std::vector<TakeMessage> Studio::list_takes() const {
-  std::vector<TakeMessage> takes;
-  std::error_code failure;
-  for (const auto& entry : fs::directory_iterator(context_.directory.root() / "takes", failure)) {
-    const std::string name = entry.path().filename().string();
-    if (const auto record = context_.directory.take_record(name)) {
-      takes.push_back({name, record->colorizer, record->stage2.seconds});
+void Studio::add_command(const std::string& command, std::vector<std::string> words,
+                         const std::vector<std::string>& more) {
+  words.insert(words.begin(), {"cnerf", command, context_.directory.root()});
+  words.insert(words.end(), more.begin(), more.end());
+  add_line(words);
+}
+
+void Studio::add_line(const std::vector<std::string>& words) {
+  board_.change([line = shell_line(words)](StateMessage& state) { state.commands.push_back(line); });
+}
+
+void Studio::add_lines_of_training() {
+  const fs::path capture = context_.directory.record().capture, origin = capture / "prepare.json";
+  if (fs::exists(origin)) {
+    if (const auto prepared = read_record<PreparedOf>(origin); !prepared.source.empty()) {
+      add_line({"cnerf", "prepare", prepared.source, "-o", capture});
     }
   }
-  std::ranges::sort(takes, {}, &TakeMessage::name);
-  return takes;
+  add_line({"cnerf", "train", capture, "-o", context_.directory.root(), "--config", context_.directory.config_file()});
 }
+
+// ---- takes --------------------------------------------------------------------------------------------------------
 
 void Studio::duplicate_take(const Order& order) {
   const auto& [take, name] = std::tie(order.message.take, order.message.name);
@@ -317,8 +441,7 @@ void Studio::duplicate_take(const Order& order) {
 void Studio::rename_take(const Order& order) {
   const auto& [take, name] = std::tie(order.message.take, order.message.name);
   check_new_name(name);
-  duplicate(context_.directory, take, name, observer_);
-  remove(context_.directory, take, name, observer_);
+  rename(context_.directory, take, name, observer_);
   shown_takes_.erase(take);
   coloring_->take_is_called(take, name);
   board_.say("take " + take + " is called " + name + " now");
@@ -327,9 +450,11 @@ void Studio::rename_take(const Order& order) {
 void Studio::delete_take(const Order& order) {
   const std::string& take = order.message.take;
   if (take == coloring_->base_name()) throw UsageError("what is shown now was begun from take " + take);
+  const bool held_now = take == coloring_->kept_as();
   remove(context_.directory, take, "", observer_);
   shown_takes_.erase(take);
   coloring_->take_is_called(take, "");
+  if (held_now) save_now();
   board_.say("take " + take + " is gone");
 }
 

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <stdexcept>
 #include <thread>
 
 #include "src/base/error.h"
@@ -65,9 +66,9 @@ TEST_F(ReceptionTest, FilesArriveInPieces) {
   EXPECT_EQ(json::parse(put("trip/a b.JPG", "4", "56").body)["bytes"], 6);
   EXPECT_EQ(put("trip/a b.JPG", "4", "56").status, 409) << "the file does not end there";
   EXPECT_EQ(read_text_file(folder_ / "run-photographs/trip/a b.JPG"), "123456");
-  EXPECT_EQ(state()["arrived"], (json{{"files", 1}, {"bytes", 6}}));
+  EXPECT_EQ(state()["arrived"], (json{{"files", 1}, {"bytes", 6}, {"source", ""}}));
   EXPECT_EQ(put("trip/a b.JPG", "0", "9").status, 200) << "begins anew";
-  EXPECT_EQ(state()["arrived"], (json{{"files", 1}, {"bytes", 1}}));
+  EXPECT_EQ(state()["arrived"], (json{{"files", 1}, {"bytes", 1}, {"source", ""}}));
   EXPECT_EQ(put("b.png", "0", "x", "another1").status, 423);
   EXPECT_EQ(order("clear").status, 202);
   EXPECT_FALSE(fs::exists(folder_ / "run-photographs"));
@@ -82,9 +83,14 @@ TEST_F(ReceptionTest, AFullDiskIsToldAndThePieceCanBeSentAgain) {
     const test::FullDisk full(6);
     EXPECT_EQ(put("a.jpg", "4", "5678").status, 507);
     EXPECT_EQ(state()["arrived"]["bytes"], 4);
+    EXPECT_EQ(put("b.jpg", "0", "12345678").status, 507);
+    EXPECT_EQ(state()["arrived"]["files"], 1);
   }
   EXPECT_EQ(read_text_file(folder_ / "run-photographs/a.jpg"), "1234");
+  EXPECT_FALSE(fs::exists(folder_ / "run-photographs/b.jpg"));
   EXPECT_EQ(put("a.jpg", "4", "5678").status, 200);
+  EXPECT_EQ(put("b.jpg", "0", "12345678").status, 200);
+  EXPECT_EQ(state()["arrived"], (json{{"files", 2}, {"bytes", 16}, {"source", ""}}));
 }
 
 TEST_F(ReceptionTest, NamesThatLeadElsewhereAreRefusedByName) {
@@ -97,12 +103,67 @@ TEST_F(ReceptionTest, NamesThatLeadElsewhereAreRefusedByName) {
     EXPECT_EQ(put(name, "0", "x").status, 400) << name;
   }
   EXPECT_THAT(put("virus.exe", "0", "x").body, HasSubstr("virus.exe"));
-  for (const char* offset : {"", "-1", "x", "99999999999999999999", "17179869185"}) {
+  for (const char* offset : {"", "-1", "x", "99999999999999999999", "17179869185", "18446744073709551615"}) {
     EXPECT_EQ(put("a.png", offset, "x").status, 400) << offset;
   }
   EXPECT_FALSE(fs::exists(folder_ / "run-photographs")) << "nothing was written";
   EXPECT_EQ(reception_->largest_body("PUT", "/studio/arrivals"), kLargestPiece);
   EXPECT_EQ(order("colour").status, 400);
+}
+
+TEST_F(ReceptionTest, APieceOfAFileThatWasNotBegunWritesNothing) {
+  open();
+  EXPECT_EQ(put("trip/a.jpg", "5", "x").status, 409);
+  EXPECT_FALSE(fs::exists(folder_ / "run-photographs"));
+  EXPECT_EQ(put("trip/a.jpg", "0", "x").status, 200);
+  EXPECT_EQ(state()["arrived"], (json{{"files", 1}, {"bytes", 1}, {"source", ""}}));
+}
+
+TEST_F(ReceptionTest, FilesThatNoPageSentAreNeitherReplacedNorRemoved) {
+  const fs::path own = folder_ / "run-photographs/mine.jpg";
+  write_file(own, "mine");
+  EXPECT_THROW(open(), UsageError);
+  EXPECT_EQ(read_text_file(own), "mine");
+  fs::remove(own);
+  open();
+  write_file(own, "mine");
+  EXPECT_THAT(put("mine.jpg", "0", "sent").body, HasSubstr("run-photographs"));
+  EXPECT_EQ(order("clear").status, 400);
+  EXPECT_EQ(read_text_file(own), "mine");
+}
+
+TEST_F(ReceptionTest, FilesThatNoPageSentAreNoHindranceWhereASourceIsNamed) {
+  const fs::path own = folder_ / "run-photographs/mine.jpg";
+  write_file(own, "mine");
+  fs::create_directories(folder_ / "empty");
+  open(folder_ / "empty");
+  (void)wait_until([](const json& now) { return now["failed"] == true; });
+  EXPECT_THAT(put("mine.jpg", "0", "sent").body, HasSubstr("run-photographs"));
+  EXPECT_EQ(read_text_file(own), "mine");
+}
+
+TEST_F(ReceptionTest, WhatArrivedInAnEarlierCallIsThereAndCanBeForgotten) {
+  open();
+  EXPECT_EQ(put("a.jpg", "0", "1234").status, 200);
+  reception_->close();
+  worker_.join();
+  open();
+  EXPECT_EQ(state()["arrived"], (json{{"files", 1}, {"bytes", 4}, {"source", ""}}));
+  EXPECT_EQ(order("clear").status, 202);
+  EXPECT_FALSE(fs::exists(folder_ / "run-photographs"));
+}
+
+TEST_F(ReceptionTest, WhatIsGoneWhenItIsPreparedIsToldAndOthersCanBeSent) {
+  open();
+  EXPECT_EQ(put("a.jpg", "0", "1234").status, 200);
+  fs::remove_all(folder_ / "run-photographs");
+  EXPECT_EQ(order("prepare").status, 202);
+  const json state = wait_until([](const json& now) { return now["failed"] == true; });
+  EXPECT_THAT(state["message"].get<std::string>(), HasSubstr("run-photographs: No such file"));
+  EXPECT_EQ(put("b.jpg", "0", "1234").status, 200);
+  EXPECT_EQ(this->state()["arrived"], (json{{"files", 1}, {"bytes", 4}, {"source", ""}})) << "the other one is gone";
+  EXPECT_EQ(order("clear").status, 202);
+  EXPECT_EQ(this->state()["failed"], false) << "nothing has failed yet";
 }
 
 TEST_F(ReceptionTest, WhatCannotBePreparedIsToldAndOthersCanBeSent) {
@@ -143,11 +204,39 @@ TEST_F(ReceptionTest, ASourceOfTheCommandLineIsBegunWithAtOnce) {
 
 TEST_F(ReceptionTest, ASourceOfTheCommandLineComesBeforeWhatArrivedLongAgo) {
   write_sample_scene(folder_ / "capture", {.views = 4, .width = 48, .height = 36, .samples_per_pixel = 1});
+  write_file(folder_ / "run-photographs/.cnerf-arrivals", "");
   write_sample_scene(folder_ / "run-photographs/old", {.views = 5, .width = 48, .height = 36, .samples_per_pixel = 1});
   open(folder_ / "capture");
   worker_.join();
   ASSERT_TRUE(context_);
   EXPECT_EQ(context_->capture.root, folder_ / "capture");
+}
+
+TEST_F(ReceptionTest, WhatArrivesTakesThePlaceOfASourceOfTheCommandLine) {
+  for (const char* name : {"a.jpg", "b.jpg"}) write_file(folder_ / "photos" / name, "no photograph");
+  write_file(folder_ / "run-photographs/.cnerf-arrivals", "");
+  write_file(folder_ / "run-photographs/old.jpg", "of an earlier call");
+  const std::string source = folder_ / "photos", sent = folder_ / "run-photographs";
+  const auto failed = [](const json& now) { return now["failed"] == true; };
+  open(source);
+  const json first = wait_until(failed);
+  EXPECT_THAT(first["message"].get<std::string>(), HasSubstr(source));
+  EXPECT_EQ(first["arrived"], (json{{"files", 0}, {"bytes", 0}, {"source", source}}));
+
+  EXPECT_EQ(put("c.jpg", "0", "no photograph").status, 200);
+  EXPECT_EQ(state()["arrived"]["files"], 2) << "what came earlier is prepared too";
+  EXPECT_THAT(state()["notes"].dump(), HasSubstr("instead of " + source));
+  EXPECT_EQ(order("prepare").status, 202);
+  const json second = wait_until(failed);
+  EXPECT_THAT(second["message"].get<std::string>(), HasSubstr(sent));
+  EXPECT_THAT(second["notes"].dump(), HasSubstr("instead of " + source));
+
+  EXPECT_EQ(order("clear").status, 202);
+  EXPECT_EQ(state()["notes"].size(), 0u);
+  EXPECT_EQ(order("prepare").status, 202);
+  const json third = wait_until(failed);
+  EXPECT_THAT(third["message"].get<std::string>(), HasSubstr(source));
+  EXPECT_THAT(third["notes"].dump(), testing::Not(HasSubstr("instead")));
 }
 
 TEST_F(ReceptionTest, AStopThatComesBeforeTheWorkBeginsStopsIt) {
@@ -171,6 +260,17 @@ TEST_F(ReceptionTest, WhatWasPreparedOfOthersIsMadeAnew) {
   open(folder_ / "photos");
   const json state = wait_until([](const json& now) { return now["failed"] == true; });
   EXPECT_THAT(state["message"].get<std::string>(), HasSubstr("at least 2 that can be read"));
+}
+
+TEST(Board, ErrorsOfEveryKindAreSetbacks) {
+  const auto gone = setback_of([] { (void)fs::file_size("/nowhere/at all"); }, "stopped");
+  ASSERT_TRUE(gone);
+  EXPECT_TRUE(gone->failed);
+  EXPECT_EQ(gone->message, "/nowhere/at all: No such file or directory");
+  const auto broken = setback_of([] { throw std::runtime_error("of a library"); }, "stopped");
+  ASSERT_TRUE(broken);
+  EXPECT_TRUE(broken->failed);
+  EXPECT_THAT(broken->message, HasSubstr("of a library"));
 }
 
 TEST(Board, NamesThatAreNoTextAreToldAsFarAsTheyAre) {

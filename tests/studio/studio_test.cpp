@@ -76,6 +76,13 @@ class StudioTest : public testing::Test {
     studio_->joined(kPainter);
     (void)wait_until([](const json& state) { return state["ready"] == true && test::is_idle(state); });
   }
+  /// With what was shown last.
+  void go_on(bool waits = true) {
+    studio_ = std::make_unique<Studio>(context_, std::nullopt, cpu_engines(), observer_, kQuick);
+    worker_ = std::thread([this] { studio_->run(); });
+    studio_->joined(kPainter);
+    if (waits) (void)wait_until([](const json& state) { return state["ready"] == true && test::is_idle(state); });
+  }
   void close() {
     if (!studio_) return;
     studio_->close();
@@ -421,14 +428,14 @@ TEST_F(StudioTest, PicturesOfAnyContentAreRefusedByName) {
 }
 
 TEST_F(StudioTest, AReferenceIsTurnedUpright) {
-  Studio studio(context_, "", cpu_engines(), observer_, kQuick);  // which does not work: nothing is fitted
-  const PageAnswer answer = studio.answer({"POST",
-                                           "/studio/pictures",
-                                           {{"kind", "reference"}, {"name", "photo.jpg"}},
-                                           kPainter,
-                                           {},
-                                           test::turned_photograph(6)});
-  EXPECT_EQ(answer.status, 409) << answer.body;
+  open();
+  const PageAnswer answer = studio_->answer({"POST",
+                                             "/studio/pictures",
+                                             {{"kind", "reference"}, {"name", "photo.jpg"}},
+                                             kPainter,
+                                             {},
+                                             test::turned_photograph(6)});
+  EXPECT_EQ(answer.status, 202) << answer.body;
   const fs::directory_iterator files(context_.directory.root() / "strokes/references");
   ASSERT_TRUE(files != fs::directory_iterator());
   const cv::Mat3b kept = cv::imread(files->path().string());
@@ -750,6 +757,291 @@ TEST_F(StudioTest, StoppingKeepsWhatWasLearned) {
   EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
   const json stopped = wait_until(test::is_idle);
   EXPECT_EQ(stopped["unkept"], true);
+}
+
+// ---- requests ----
+
+TEST_F(StudioTest, ThumbnailsOfManyTabsAreAllDrawn) {
+  open();
+  std::vector<int> drawn(8, 0);
+  std::vector<std::thread> tabs;
+  for (int& count : drawn) {
+    tabs.emplace_back([this, &count] {
+      // As pictures of a page are asked for: without a client.
+      for (int i = 0; i < 20; ++i) {
+        count += studio_->answer({"GET", "/studio/thumbnails/1", {}, {}, {}, {}}).status == 200 ? 1 : 0;
+      }
+    });
+  }
+  for (std::thread& tab : tabs) tab.join();
+  EXPECT_THAT(drawn, testing::Each(20));
+}
+
+TEST_F(StudioTest, ReferencesThatAreRefusedAreNotWritten) {
+  Studio studio(context_, "", cpu_engines(), observer_, kQuick);  // its first work has not begun
+  studio.joined(kPainter);
+  const auto sent = [&](const std::string& client) {
+    return studio.answer({"POST", "/studio/pictures", {{"kind", "reference"}}, client, {}, test::turned_photograph(6)});
+  };
+  EXPECT_EQ(sent(kPainter).status, 409);
+  EXPECT_EQ(sent("another123").status, 423);
+  EXPECT_FALSE(fs::exists(stroke_folder(context_) / "references"));
+}
+
+TEST_F(StudioTest, TakesThatCannotBeReadAreLeftOutAndTold) {
+  write_file(context_.directory.take_record_file("later"), R"({"schema_version": 99})");
+  open();
+  const json opened = json::parse(get("state").body);
+  EXPECT_EQ(opened["takes"].size(), 0u);
+  EXPECT_THAT(opened["notes"].dump(), HasSubstr("later"));
+  write_file(context_.directory.take_record_file("damaged"), "{");
+  const json next = ordered({{"order", "begin"}, {"take", ""}});
+  EXPECT_EQ(next["failed"], false) << next;
+  EXPECT_EQ(next["takes"].size(), 0u);
+  EXPECT_EQ(next["notes"].size(), 2u) << "each once: " << next;
+  close();
+  context_.directory.update([](pipeline::RunRecord& record) { record.current_take = "damaged"; });
+  go_on();
+  EXPECT_EQ(json::parse(get("state").body)["take"], "") << "the run can be opened still";
+}
+
+// ---- takes ----
+
+std::vector<std::byte> colors_in_take(const pipeline::RunContext& context, const std::string& take) {
+  return read_binary_file(context.directory.take_snapshot(take));
+}
+
+Journal journal_in_take(const pipeline::RunContext& context, const std::string& take) {
+  return read_journal(context.directory.take_folder(take) / kJournalFile, paintable_views(context.capture));
+}
+
+/// What a replay makes of a take, in one of its own.
+std::vector<std::byte> replayed_colors(const pipeline::RunContext& context, const std::string& take) {
+  Observer observer;
+  Coloring again(context, cpu_engines());
+  again.replay(journal_in_take(context, take), kQuick, [](double) {});
+  again.keep(take + "-again", 0, observer);
+  return colors_in_take(context, take + "-again");
+}
+
+/// A view as it comes from a paint program: its left half is painted.
+std::string half_painted_png(const View& view) {
+  cv::Mat painted(view.image.height, view.image.width, CV_8UC4, cv::Scalar(0, 0, 0, 0));
+  painted(cv::Rect(0, 0, painted.cols / 2, painted.rows)).setTo(cv::Scalar(20, 30, 200, 255));
+  std::vector<std::uint8_t> png;
+  cv::imencode(".png", painted, png);
+  return {png.begin(), png.end()};
+}
+
+TEST_F(StudioTest, TakesOfPaintedPicturesAreReplayedWhateverWasDoneWithThem) {
+  open();
+  const PageAnswer sent = studio_->answer({"POST",
+                                           "/studio/pictures",
+                                           {{"kind", "stroke"}, {"view", "1"}},
+                                           kPainter,
+                                           {},
+                                           half_painted_png(context_.capture.views[1])});
+  ASSERT_EQ(sent.status, 202) << sent.body;
+  (void)ordered({{"order", "colour"}});
+  ASSERT_EQ(put({stroke("a", 0.5, 0.5)}, 1).status, 200) << "without the picture";
+  (void)ordered({{"order", "colour"}});
+  (void)ordered({{"order", "keep"}, {"name", "red"}});
+  (void)ordered({{"order", "duplicate"}, {"take", "red"}, {"name", "copy"}});
+  (void)ordered({{"order", "rename"}, {"take", "red"}, {"name", "evening"}});
+  ASSERT_EQ(put({stroke("a", 0.5, 0.5), stroke("b", 0.3, 0.6)}, 2).status, 200);
+  (void)ordered({{"order", "colour"}});
+  const json written = ordered({{"order", "photographs"}, {"format", "png"}});
+  EXPECT_EQ(written["failed"], false) << written;
+  close();
+  for (const char* take : {"copy", "evening", "studio"}) {
+    EXPECT_TRUE(fs::exists(context_.directory.take_folder(take) / kStrokeFile)) << take;
+    EXPECT_TRUE(replayed_colors(context_, take) == colors_in_take(context_, take)) << take;
+  }
+  fs::remove_all(context_.directory.root() / "renders");
+}
+
+TEST_F(StudioTest, ATakeThatAnotherWasBegunFromIsRenamedForBothAndNotDeleted) {
+  open();
+  ASSERT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  (void)ordered({{"order", "colour"}});
+  (void)ordered({{"order", "keep"}, {"name", "red"}});
+  (void)ordered({{"order", "begin"}, {"take", "red"}});
+  ASSERT_EQ(put({stroke("a", 0.5, 0.5), stroke("b", 0.3, 0.6)}, 1).status, 200);
+  (void)ordered({{"order", "colour"}});
+  (void)ordered({{"order", "keep"}, {"name", "blue"}});
+  (void)ordered({{"order", "begin"}, {"take", ""}});
+  const json refused = ordered({{"order", "delete"}, {"take", "red"}});
+  EXPECT_EQ(refused["failed"], true);
+  EXPECT_THAT(refused["message"].get<std::string>(), HasSubstr("blue"));
+  EXPECT_EQ(refused["takes"].size(), 2u);
+  EXPECT_EQ(ordered({{"order", "rename"}, {"take", "red"}, {"name", "evening"}})["failed"], false);
+  close();
+  EXPECT_EQ(journal_in_take(context_, "blue").deeds.front().base, "evening");
+  EXPECT_TRUE(replayed_colors(context_, "blue") == colors_in_take(context_, "blue"));
+  fs::copy_file(context_.directory.take_snapshot("blue"), context_.directory.take_snapshot("evening"),
+                fs::copy_options::overwrite_existing);
+  EXPECT_THROW((void)replayed_colors(context_, "blue"), SnapshotError) << "another take is called so now";
+}
+
+TEST_F(StudioTest, DeletingTheCurrentTakePassesTakesThatCannotBeRead) {
+  open();
+  ASSERT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  (void)ordered({{"order", "colour"}});
+  (void)ordered({{"order", "keep"}, {"name", "red"}});
+  write_file(context_.directory.take_record_file("damaged"), "{");
+  EXPECT_EQ(ordered({{"order", "delete"}, {"take", "red"}})["failed"], false);
+  EXPECT_EQ(context_.directory.record().current_take, "");
+}
+
+TEST_F(StudioTest, ATakeThatIsCalledGreyIsNotGrey) {
+  open();
+  ASSERT_EQ(put({stroke_on(context_.capture.views[1].name)}, 0).status, 200);
+  (void)ordered({{"order", "colour"}});
+  (void)ordered({{"order", "keep"}, {"name", "red"}});
+  close();
+  fs::rename(context_.directory.take_folder("red"), context_.directory.take_folder("grey"));  // as commands name it
+  open();
+  const auto shown = [&](const std::string& side) { return colorfulness(decoded(post("frame", frame({side})))); };
+  EXPECT_LT(shown(""), 2);
+  EXPECT_GT(shown("grey"), 10);
+  EXPECT_EQ(ordered({{"order", "begin"}, {"take", "grey"}})["take"], "grey");
+  EXPECT_GT(shown("now"), 10);
+  EXPECT_EQ(ordered({{"order", "begin"}, {"take", ""}})["take"], "");
+  EXPECT_LT(shown("now"), 2);
+}
+
+TEST_F(StudioTest, CommandsAreQuotedAndSayWhatIsDoneAgain) {
+  const test::TempDir folder;
+  pipeline::RunContext context{pipeline::RunDirectory(folder / "my run"), context_.config, context_.capture, {}};
+  context.config.bake.resolution = 32;
+  const std::string run = folder / "my run", capture = folder / "capture";
+  write_file(folder / "capture/prepare.json", R"({"source": "/my photos"})");
+  pipeline::begin_run(context, capture, {});
+  studio_ = std::make_unique<Studio>(context, "", cpu_engines(), observer_, kQuick);
+  worker_ = std::thread([this] { studio_->run(); });
+  studio_->joined(kPainter);
+  const json trained = wait_until([](const json& state) { return state["ready"] == true && test::is_idle(state); });
+  EXPECT_EQ(trained["commands"],
+            json({"cnerf prepare '/my photos' -o " + capture,
+                  "cnerf train " + capture + " -o '" + run + "' --config '" + run + "/config.toml'"}));
+
+  const auto line_of = [&](const json& order) { return ordered(order)["commands"].back().get<std::string>(); };
+  const std::string colorize = "cnerf colorize '" + run + "' ";
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  EXPECT_EQ(line_of({{"order", "colour"}}),
+            colorize + "--take painted --colorizer grey --strokes '" + run + "/strokes/strokes.json'");
+  EXPECT_EQ(line_of({{"order", "keep"}, {"name", "red"}}), colorize + "--replay red");
+  (void)ordered({{"order", "begin"}, {"take", "red"}});
+  EXPECT_EQ(line_of({{"order", "colour"}}), colorize + "--replay red") << "its own line comes when it is kept";
+  (void)ordered({{"order", "begin"}, {"take", ""}});
+  const json baked = ordered({{"order", "bake"}, {"formats", {"vdb"}}});
+  EXPECT_EQ(baked["commands"].back(), "cnerf bake '" + run + "' --take grey --format vdb");
+  EXPECT_EQ(baked["blender"], "blender --python '" + run + "/bakes/grey/blender_setup.py'");
+  close();
+}
+
+TEST_F(StudioTest, ColorsThatNoTakeHoldsAreMadeAgainWhenTheRunIsOpened) {
+  const fs::path file = stroke_folder(context_) / kNowFile;
+  const auto color_twice = [&] {
+    open();
+    const int revision = json::parse(get("strokes").body)["revision"];
+    EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, revision).status, 200);
+    (void)ordered({{"order", "colour"}});
+    EXPECT_EQ(put({stroke("a", 0.5, 0.5), stroke("b", 0.3, 0.6)}, revision + 1).status, 200);
+    EXPECT_EQ(ordered({{"order", "colour"}})["unkept"], true);
+    EXPECT_TRUE(fs::exists(file));
+  };
+  color_twice();
+  (void)ordered({{"order", "keep"}, {"name", "red"}});
+  EXPECT_FALSE(fs::exists(file)) << "a take holds them";
+  close();
+  color_twice();
+  close();
+
+  go_on(false);
+  (void)wait_until([](const json& state) { return state["task"] == "recolour" && state["fraction"] > 0; });
+  EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
+  (void)wait_until(test::is_idle);
+  close();
+  EXPECT_TRUE(fs::exists(file)) << "they can still be made";
+  open("red");
+  EXPECT_EQ(json::parse(get("state").body)["unkept"], false) << "something else was asked for";
+  (void)ordered({{"order", "begin"}, {"take", ""}});
+  close();
+  EXPECT_TRUE(fs::exists(file)) << "nobody saw them, so nobody left them";
+
+  go_on(false);
+  const json again = wait_until([](const json& state) { return state["unkept"] == true && test::is_idle(state); });
+  EXPECT_EQ(again["take"], "") << "and not the current one, red";
+  (void)ordered({{"order", "keep"}, {"name", "blue"}});
+  EXPECT_FALSE(fs::exists(file));
+  EXPECT_TRUE(colors_in_take(context_, "blue") == colors_in_take(context_, "red"));
+}
+
+TEST_F(StudioTest, ColorsThatNoTakeHoldsAreSetAsideBeforeOthersTakeTheirPlace) {
+  const fs::path file = stroke_folder(context_) / kNowFile, aside = stroke_folder(context_) / "now-1.json";
+  write_file(file, R"({"deeds": [{"base": "gone"}, {"steps": 1}]})");
+  go_on();
+  EXPECT_THAT(json::parse(get("state").body)["notes"].dump(), HasSubstr("now-1.json"));
+  EXPECT_FALSE(fs::exists(file));
+  EXPECT_TRUE(fs::exists(aside)) << "they cannot be made again";
+  close();
+
+  const std::string unseen = R"({"deeds": [{}, {"steps": 1}]})";
+  write_file(file, unseen);
+  open("");
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  EXPECT_EQ(ordered({{"order", "colour"}})["failed"], false);
+  EXPECT_EQ(read_text_file(stroke_folder(context_) / "now-2.json"), unseen) << "nobody saw them";
+  EXPECT_EQ(read_journal(file, paintable_views(context_.capture)).deeds.size(), 2u);
+}
+
+TEST_F(StudioTest, ColorsOfAStopAndOfADeletedTakeAreMadeAgainToo) {
+  const fs::path file = stroke_folder(context_) / kNowFile;
+  const PaintableViews views = paintable_views(context_.capture);
+  context_.directory.update([](pipeline::RunRecord& record) { record.current_take.clear(); });
+  open();
+  EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
+  EXPECT_EQ(post("orders", {{"order", "colour"}}).status, 202);
+  (void)wait_until([](const json& state) { return state["task"] == "colour" && state["fraction"] > 0; });
+  EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
+  EXPECT_EQ(wait_until(test::is_idle)["unkept"], true);
+  const int steps = read_journal(file, views).deeds.back().steps;
+  close();
+
+  go_on(false);
+  (void)wait_until([](const json& state) { return state["unkept"] == true && test::is_idle(state); });
+  (void)ordered({{"order", "keep"}, {"name", "red"}});
+  EXPECT_EQ(journal_in_take(context_, "red").deeds.back().steps, steps);
+  EXPECT_EQ(ordered({{"order", "delete"}, {"take", "red"}})["unkept"], true);
+  EXPECT_EQ(read_journal(file, views).deeds.back().steps, steps);
+  (void)ordered({{"order", "begin"}, {"take", ""}});
+  EXPECT_FALSE(fs::exists(file)) << "they were left";
+}
+
+TEST_F(StudioTest, OnlyWhatABakeWroteIsOffered) {
+  pipeline::RunContext context = context_;
+  context.config.bake.resolution = context.config.web.resolution = 32;
+  studio_ = std::make_unique<Studio>(context, "", cpu_engines(), observer_, kQuick);
+  worker_ = std::thread([this] { studio_->run(); });
+  studio_->joined(kPainter);
+  (void)wait_until([](const json& state) { return state["ready"] == true && test::is_idle(state); });
+  EXPECT_EQ(ordered({{"order", "bake"}, {"formats", {"vdb"}}})["downloads"].size(), 1u);
+  const json web = ordered({{"order", "bake"}, {"formats", {"web"}}});
+  EXPECT_EQ(web["failed"], false) << web;
+  EXPECT_EQ(web["downloads"].size(), 0u) << "the volume is of the bake before";
+  close();
+  fs::remove_all(context_.directory.root() / "bakes");
+}
+
+TEST_F(StudioTest, PaintOnViewsOfLikeNamesHasPicturesOfItsOwn) {
+  const test::TempDir folder;
+  Capture capture = context_.capture;
+  capture.views[1].name = "left/1.png";
+  capture.views[2].name = "left_1.png";
+  const json painted = stroke_on("left/1.png");
+  write_paint_pictures(folder.path(), capture, {record_of<Stroke>(parse_json(painted.dump(), "test"), "test")});
+  EXPECT_TRUE(fs::exists(folder / "left_1.png")) << "the other view is unpainted";
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ import { GraphicsError, Renderer } from "./renderer";
 import { showStudio } from "./studio/studio";
 import { copyText, download, el, iconButton, slider, slidesAcross, toast } from "./ui/dom";
 import { Overlay } from "./ui/overlay";
-import { Panel } from "./ui/panel";
+import { Panel, resets } from "./ui/panel";
 
 const root = document.getElementById("app")!;
 const base = new URL("./", location.href).href.split(/[?#]/)[0];
@@ -112,7 +112,7 @@ function buildInterface(app: App, levels: Levels, stage: HTMLElement, canvas: HT
     el("span", { class: "side left" }, "luminance"), el("span", { class: "grip" }), el("span", { class: "side right" }, "colour"));
   slidesAcross(wipe, () => stage, () => app.settings.wipe, (share) => app.set({ wipe: Math.min(1, Math.max(0, share)) }), () => stopReveal());
 
-  const fade = slider({ id: "photo", label: "Photograph", min: 0, max: 1, step: 0.01, value: 0, reset: 0, show: (v) => `${Math.round(100 * v)} %`, change: (v) => app.set({ photo: v }) });
+  const fade = slider({ id: "photo", label: "Photograph", title: resets, min: 0, max: 1, step: 0.01, value: 0, reset: 0, show: (v) => `${Math.round(100 * v)} %`, change: (v) => app.set({ photo: v }) });
   const cameraName = el("span", { class: "camera-name", id: "camera-name" });
   const current = () => Math.max(app.captureCamera, -1);
   const cameraBar = el("div", { class: "camera-bar" },
@@ -141,7 +141,7 @@ function buildInterface(app: App, levels: Levels, stage: HTMLElement, canvas: HT
   };
   const share = () => {
     history.replaceState(null, "", app.hash);
-    return copyText(location.href, "Address");
+    return copyText(location.href, "Address copied", "Address:");
   };
   const head = el("header", { class: "head" },
     el("div", { class: "title" },

@@ -43,6 +43,10 @@ export class Api {
     throw new Refusal(answer.status, reason && reason.length < 500 ? reason : `${answer.status} ${answer.statusText}`);
   }
 
+  private async stateIn(answer: Response): Promise<State | undefined> {
+    const said = (await answer.json().catch(() => ({}))) as State & { state?: State };
+    return said.state ?? (said.version ? said : undefined);
+  }
   private post(path: string, value: unknown): Promise<Response> {
     return this.send("POST", path, JSON.stringify(value), { "Content-Type": "application/json" });
   }
@@ -54,8 +58,7 @@ export class Api {
     return (await this.send("GET", "state")).json();
   }
   async order(order: Record<string, unknown>): Promise<State | undefined> {
-    const answer = (await (await this.post("orders", order)).json().catch(() => ({}))) as State & { state?: State };
-    return answer.state ?? (answer.version ? answer : undefined);
+    return this.stateIn(await this.post("orders", order));
   }
   /** null: a newer frame was asked for meanwhile. */
   async frame(request: FrameRequest): Promise<{ pictures: ImageBitmap[]; colors: number; milliseconds: number } | null> {
@@ -79,8 +82,8 @@ export class Api {
   async reach(view: number, strokes: readonly Stroke[], revision: number, everywhere = false): Promise<Blob> {
     return (await (strokes.length > 0 ? this.post("reach", { view, strokes, everywhere }) : this.send("GET", `reach/${view}?revision=${revision}`))).blob();
   }
-  async picture(query: Record<string, string>, file: Blob): Promise<void> {
-    await this.send("POST", `pictures?${new URLSearchParams(query)}`, file, { "Content-Type": file.type || "application/octet-stream" });
+  async picture(query: Record<string, string>, file: Blob): Promise<State | undefined> {
+    return this.stateIn(await this.send("POST", `pictures?${new URLSearchParams(query)}`, file, { "Content-Type": file.type || "application/octet-stream" }));
   }
   /** The next piece of a file that is sent. @return how much of it the server has now, bytes */
   async arrive(name: string, offset: number, piece: Blob): Promise<number> {

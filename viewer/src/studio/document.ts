@@ -7,6 +7,11 @@ import { Lost, Refusal } from "./api";
 import type { Stroke, Viewpoint } from "./protocol";
 
 export type StrokeList = readonly Stroke[];
+/** What undo and redo go between. */
+interface Edition {
+  list: StrokeList;
+  everywhere: boolean;
+}
 
 /**
  * What `mine` changed since `base`, done to `theirs`: strokes are told apart by id. Where `theirs` is `base` this is
@@ -14,6 +19,7 @@ export type StrokeList = readonly Stroke[];
  */
 export function merged(base: StrokeList, mine: StrokeList, theirs: StrokeList): StrokeList {
   if (theirs === base) return mine;
+  if (mine === base) return theirs;
   const before = new Map(base.map((s) => [s.id, s]));
   const wanted = new Map(mine.map((s) => [s.id, s]));
   const there = new Set(theirs.map((s) => s.id));
@@ -34,6 +40,7 @@ export interface StrokeStore {
   /** @return the new revision */
   putStrokes(strokes: StrokeList, revision: number, viewpoints: readonly Viewpoint[], everywhere: boolean): Promise<number>;
 }
+type Answer = Awaited<ReturnType<StrokeStore["strokes"]>>;
 /** What keeps strokes that the server does not have: the browser's own store. */
 export type Shelf = Pick<Storage, "getItem" | "setItem" | "removeItem">;
 
@@ -67,8 +74,8 @@ export class StrokeDocument {
   private savedWish = 0;
   /** The page tells: strokes of another tab came in; something could not be saved; unsent strokes were put back. */
   told: (what: "merged" | "unsent" | "lost" | Refusal) => void = () => {};
-  private undone: [StrokeList, StrokeList][] = [];
-  private done: [StrokeList, StrokeList][] = [];
+  private undone: [Edition, Edition][] = [];
+  private done: [Edition, Edition][] = [];
   private changed = new Set<() => void>();
   private busy: Promise<void> | null = null;
   /** The browser keeps what is unsent. */
@@ -137,11 +144,7 @@ export class StrokeDocument {
   /** By the user. */
   setEverywhere(everywhere: boolean): void {
     this.isChosen = true;
-    if (everywhere === this.everywhere) return;
-    this.everywhere = everywhere;
-    this.wish += 1;
-    this.tell();
-    void this.save();
+    if (everywhere !== this.everywhere) this.step({ list: this.list, everywhere });
   }
   /** What suits the colours that strokes go on, as long as there are none and the user did not choose. */
   suggestEverywhere(everywhere: boolean): void {
@@ -152,11 +155,25 @@ export class StrokeDocument {
 
   /** A change by the user: can be undone, and is saved. */
   change(next: StrokeList): void {
-    if (next === this.list) return;
-    this.done.push([this.list, next]);
+    if (next !== this.list) this.step({ list: next, everywhere: this.everywhere });
+  }
+  private step(next: Edition): void {
+    this.remember({ list: this.list, everywhere: this.everywhere }, next);
+    this.put(next);
+  }
+  private remember(before: Edition, after: Edition): void {
+    this.done.push([before, after]);
     if (this.done.length > 500) this.done.shift();
     this.undone = [];
-    this.put(next);
+  }
+  /** The server made strokes of pictures that this page sent, since the list was `before`: they can be undone too. */
+  adopt(before: StrokeList): void {
+    const { list, everywhere } = this;
+    const known = new Set(before.map((s) => s.id));
+    const without = list.filter((s) => s.kind !== "picture" || known.has(s.id));
+    if (without.length === list.length) return;
+    this.remember({ list: without, everywhere }, { list, everywhere });
+    this.tell();
   }
   add(stroke: Stroke): void {
     this.change([...this.list, stroke]);
@@ -178,16 +195,22 @@ export class StrokeDocument {
     const step = this.done.pop();
     if (!step) return;
     this.undone.push(step);
-    this.put(merged(step[1], step[0], this.list));
+    this.go(step[1], step[0]);
   }
   redo(): void {
     const step = this.undone.pop();
     if (!step) return;
     this.done.push(step);
-    this.put(merged(step[0], step[1], this.list));
+    this.go(step[0], step[1]);
   }
-  private put(next: StrokeList): void {
-    this.list = next;
+  /** What others changed meanwhile stays. */
+  private go(from: Edition, to: Edition): void {
+    this.put({ list: merged(from.list, to.list, this.list), everywhere: from.everywhere === to.everywhere ? this.everywhere : to.everywhere });
+  }
+  private put({ list, everywhere }: Edition): void {
+    if (everywhere !== this.everywhere) this.wish += 1;
+    this.everywhere = everywhere;
+    this.list = list;
     this.keep();
     this.tell();
     void this.save();
@@ -214,18 +237,22 @@ export class StrokeDocument {
   async follow(revision: number): Promise<void> {
     await this.busy;
     if (revision <= this.revision) return;
-    await this.fetched();
+    const answer = await this.store.strokes();
+    // A save, or another call of this, may have been faster.
+    if (answer.revision > this.revision) this.receive(answer);
     if (!this.isSaved && !this.isWaiting) await this.save();
   }
   private async fetched(): Promise<void> {
-    const answer = await this.store.strokes();
+    this.receive(await this.store.strokes());
+  }
+  private receive(answer: Answer): void {
     const unsaved = this.list !== this.saved;
     this.list = unsaved ? merged(this.saved, this.list, answer.strokes) : answer.strokes;
     this.take(answer);
     this.tell();
     if (unsaved) this.told("merged");
   }
-  private take({ revision, strokes, viewpoints, everywhere }: Awaited<ReturnType<StrokeStore["strokes"]>>): void {
+  private take({ revision, strokes, viewpoints, everywhere }: Answer): void {
     if (strokes.length > 0 && this.wish === this.savedWish) this.everywhere = everywhere;
     this.saved = strokes;
     this.savedViewpoints = viewpoints;

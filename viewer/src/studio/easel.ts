@@ -228,6 +228,12 @@ export class Easel {
     this.corner = { x: at.x - (at.x - this.corner.x) * f, y: at.y - (at.y - this.corner.y) * f };
     this.redraw();
   }
+  /** Moves the photograph. */
+  private moveBy(x: number, y: number): void {
+    this.corner = { x: this.corner.x + x, y: this.corner.y + y };
+    if (this.lineFrom) this.lineFrom = { x: this.lineFrom.x + x, y: this.lineFrom.y + y };
+    this.redraw();
+  }
   actualSize(): void {
     this.zoomBy(1 / (devicePixelRatio || 1) / this.scale, this.cursor ?? undefined);
   }
@@ -348,10 +354,7 @@ export class Easel {
     if (!before) return;
     if (this.pointers.size === 2) return this.pinch(e.pointerId, before, place);
     this.pointers.set(e.pointerId, place);
-    if (this.dragging) {
-      this.corner = { x: this.corner.x + place.x - before.x, y: this.corner.y + place.y - before.y };
-      return this.redraw();
-    }
+    if (this.dragging) return this.moveBy(place.x - before.x, place.y - before.y);
     if (!this.growing || this.tool === "line") return;
     const events = e.getCoalescedEvents?.() ?? [];
     this.grow((events.length > 0 ? events : [e]).map((event) => this.pointOf(this.placeOf(event), this.pressureOf(event))));
@@ -361,9 +364,8 @@ export class Easel {
     const was = Math.hypot(before.x - other.x, before.y - other.y);
     const is = Math.hypot(place.x - other.x, place.y - other.y);
     this.pointers.set(id, place);
-    this.corner = { x: this.corner.x + (place.x - before.x) / 2, y: this.corner.y + (place.y - before.y) / 2 };
+    this.moveBy((place.x - before.x) / 2, (place.y - before.y) / 2);
     if (was > 10 && is > 10) this.zoomBy(is / was, { x: (place.x + other.x) / 2, y: (place.y + other.y) / 2 });
-    this.redraw();
   }
   private up(e: PointerEvent, cancelled = false): void {
     this.pointers.delete(e.pointerId);
@@ -451,7 +453,19 @@ export class Easel {
     session.brush.set({ color: hexOf(color ?? [grey, grey, grey]) });
   }
 
-  /** The keyboard's brush: arrows move it, Enter begins and ends. */
+  /** Moves the keyboard's brush over the photograph, and that below the brush where it would leave what is seen. */
+  private moveCursor(from: Place, x: number, y: number): void {
+    const { photo, node, corner, scale, margin } = this;
+    if (!photo) return;
+    const within = (v: number, low: number, high: number) => Math.max(low, Math.min(high, v));
+    const wanted = {
+      x: within(from.x + x, corner.x + scale / 2, corner.x + (photo.width - 0.5) * scale),
+      y: within(from.y + y, corner.y + scale / 2, corner.y + (photo.height - 0.5) * scale),
+    };
+    this.cursor = { x: within(wanted.x, margin.left, node.clientWidth - margin.right), y: within(wanted.y, margin.top, node.clientHeight - margin.bottom) };
+    this.moveBy(this.cursor.x - wanted.x, this.cursor.y - wanted.y);
+  }
+  /** The keyboard's brush: arrows move it, Enter begins and ends. With the hand, arrows move the photograph. */
   private key(e: KeyboardEvent): void {
     const steps: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
     const step = steps[e.key];
@@ -459,9 +473,12 @@ export class Easel {
     e.preventDefault();
     e.stopPropagation();
     this.cursor ??= { x: this.node.clientWidth / 2, y: this.node.clientHeight / 2 };
-    if (step) {
+    if (step && this.tool === "hand") {
+      const length = e.shiftKey ? 200 : 40;
+      this.moveBy(step[0] * length, step[1] * length);
+    } else if (step) {
       const length = e.shiftKey ? 40 : Math.max(2, Math.min(this.radius / 2, 12));
-      this.cursor = { x: this.cursor.x + step[0] * length, y: this.cursor.y + step[1] * length };
+      this.moveCursor(this.cursor, step[0] * length, step[1] * length);
       if (this.growing && !this.lineFrom) this.grow([this.pointOf(this.cursor)]);
     } else if (this.growing) {
       if (this.lineFrom) this.grow([this.pointOf(this.cursor)]);

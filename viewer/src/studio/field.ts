@@ -18,7 +18,7 @@ export class FieldView extends Navigator {
   fly = false;
   /** Share of the picture, from the left, that shows the left side. */
   wipe = 0;
-  left = "grey";
+  left = "";
   right = "now";
   private readonly scheduler: FrameScheduler<{ view: View; sides: string[] }, Frame>;
   private readonly handle: HTMLElement;
@@ -84,8 +84,8 @@ export class FieldView extends Navigator {
     requestAnimationFrame(step);
     new ResizeObserver(() => this.layout()).observe(this.node);
     this.session.onState((state) => {
-      const names = new Set(["grey", "now", ...state.takes.map((take) => take.name)]);
-      if (!names.has(this.left) || !names.has(this.right)) this.compare(names.has(this.left) ? this.left : "grey", names.has(this.right) ? this.right : "now");
+      const names = new Set(["", "now", ...state.takes.map((take) => take.name)]);
+      if (!names.has(this.left) || !names.has(this.right)) this.compare(names.has(this.left) ? this.left : "", names.has(this.right) ? this.right : "now");
       // Frames in passing do not hold up a training.
       const inPassing = this.session.isTraining && state.task !== "";
       if (inPassing !== this.scheduler.inPassing) this.scheduler.inPassing = inPassing;
@@ -202,12 +202,11 @@ export class FieldView extends Navigator {
     this.refresh();
   }
   private showWipe(): void {
-    const name = (side: string) => (side === "grey" ? words.grey : side === "now" ? words.now : side);
-    this.labels[0].textContent = name(this.left);
-    this.labels[1].textContent = name(this.right);
+    this.labels[0].textContent = words.side(this.left);
+    this.labels[1].textContent = words.side(this.right);
     this.handle.style.left = `${100 * this.wipe}%`;
     this.handle.setAttribute("aria-valuenow", String(Math.round(100 * this.wipe)));
-    this.handle.setAttribute("aria-label", words.wipe(name(this.left), name(this.right)));
+    this.handle.setAttribute("aria-label", words.wipe(words.side(this.left), words.side(this.right)));
     this.handle.classList.toggle("parked", this.wipe < 0.004 || this.wipe > 0.996);
     // While it is trained the field has one look only.
     this.handle.hidden = this.left === this.right || this.session.isTraining;

@@ -17,7 +17,10 @@ function extentAt(lightness: number): number {
 
 export class Palette {
   readonly node: HTMLElement;
-  readonly picture = el("canvas", { class: "picker-picture", hidden: true, tabindex: "-1", role: "img", "aria-label": words.pickerPictureAlt });
+  readonly picture = el("canvas", { class: "picker-picture", hidden: true, tabindex: "0", role: "application", "aria-label": words.pickerPictureAlt });
+  private spot = el("span", { class: "marker" });
+  /** Where the picture's colour is taken, as shares of it. */
+  private aimed = { x: 0.5, y: 0.5 };
   private disc = el("canvas", { class: "disc", width: pixels, height: pixels, tabindex: "0", role: "slider", "aria-label": words.disc });
   private marker = el("span", { class: "marker" });
   private swatch = el("span", { class: "current" });
@@ -35,7 +38,7 @@ export class Palette {
     const file = el("input", { type: "file", accept: "image/*", hidden: true });
     file.addEventListener("change", () => (file.files?.[0] && void this.showPicture(file.files[0]), (file.value = "")));
     this.remove = button(words.removePicture, () => this.clearPicture(), { hidden: true });
-    this.drop = el("div", { class: "stack", "data-drop": "picker" }, this.picture, el("p", { class: "note" }, words.pickerPictureNote),
+    this.drop = el("div", { class: "stack", "data-drop": "picker" }, el("div", { class: "picker" }, this.picture, this.spot), el("p", { class: "note" }, words.pickerPictureNote),
       el("div", { class: "buttons" }, button(words.choosePicture, () => file.click(), { id: "choose-picture" }), this.remove), file);
     const wheel = el("div", { class: "wheel" }, this.disc, this.marker);
     this.node = section(words.palette, true,
@@ -51,9 +54,9 @@ export class Palette {
     const { brush } = this;
     const { settings } = brush;
     // Sizes and reaches go over decades.
-    const size = slider({ id: "size", label: words.size, min: -3.3, max: -0.301, step: 0.01, value: Math.log10(settings.size), reset: Math.log10(0.04), show: (v) => `${(100 * 10 ** v).toPrecision(2)} %`, change: (v) => brush.set({ size: 10 ** v }) });
-    const softness = slider({ id: "softness", label: words.softness, min: 0, max: 1, step: 0.01, value: settings.softness, reset: 0.25, show: words.percent, change: (v) => brush.set({ softness: v }) });
-    const reach = slider({ id: "reach", label: words.reach, min: -1, max: 0.602, step: 0.01, value: Math.log10(settings.reach), reset: 0, show: (v) => `× ${(10 ** v).toPrecision(2)}`, change: (v) => brush.set({ reach: 10 ** v }) });
+    const size = slider({ id: "size", label: words.size, title: words.resets, min: -3.3, max: -0.301, step: 0.01, value: Math.log10(settings.size), reset: Math.log10(0.04), show: (v) => `${(100 * 10 ** v).toPrecision(2)} %`, change: (v) => brush.set({ size: 10 ** v }) });
+    const softness = slider({ id: "softness", label: words.softness, title: words.resets, min: 0, max: 1, step: 0.01, value: settings.softness, reset: 0.25, show: words.percent, change: (v) => brush.set({ softness: v }) });
+    const reach = slider({ id: "reach", label: words.reach, title: words.resets, min: -1, max: 0.602, step: 0.01, value: Math.log10(settings.reach), reset: 0, show: (v) => `× ${(10 ** v).toPrecision(2)}`, change: (v) => brush.set({ reach: 10 ** v }) });
     const exact = toggle("exact", words.exact, settings.exact, (value) => brush.set({ exact: value }));
     brush.onChange(() => {
       size.set(Math.log10(brush.settings.size));
@@ -90,11 +93,30 @@ export class Palette {
       else toast(words.badHex);
       this.update();
     });
-    this.picture.addEventListener("pointerdown", (e) => {
-      this.picture.setPointerCapture(e.pointerId);
-      this.pickFromPicture(e);
+    this.listenToPicture();
+  }
+  private listenToPicture(): void {
+    const { picture } = this;
+    const pick = (e: PointerEvent) => {
+      const box = picture.getBoundingClientRect();
+      this.aim((e.clientX - box.left) / box.width, (e.clientY - box.top) / box.height);
+      this.pickFromPicture();
+    };
+    picture.addEventListener("pointerdown", (e) => {
+      picture.setPointerCapture(e.pointerId);
+      pick(e);
     });
-    this.picture.addEventListener("pointermove", (e) => this.picture.hasPointerCapture(e.pointerId) && this.pickFromPicture(e));
+    picture.addEventListener("pointermove", (e) => picture.hasPointerCapture(e.pointerId) && pick(e));
+    picture.addEventListener("keydown", (e) => {
+      const steps: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+      const step = steps[e.key];
+      if (!step && e.key !== "Enter") return;
+      e.preventDefault();
+      e.stopPropagation();
+      const pixels = e.shiftKey ? 24 : 2;
+      if (step) this.aim(this.aimed.x + (step[0] * pixels) / picture.width, this.aimed.y + (step[1] * pixels) / picture.height);
+      else this.pickFromPicture();
+    });
   }
   private choose(a: number, b: number): void {
     this.brush.set({ color: hexOf(rgbFromLab({ lightness: this.lightness, a, b })) });
@@ -153,6 +175,7 @@ export class Palette {
       Object.assign(this.picture, { width: Math.round(bitmap.width * scale), height: Math.round(bitmap.height * scale) });
       this.picture.getContext("2d", { willReadFrequently: true })!.drawImage(bitmap, 0, 0, this.picture.width, this.picture.height);
       this.picture.hidden = this.remove.hidden = false;
+      this.aim(0.5, 0.5);
       this.drop.closest("details")!.open = true;
     } catch {
       toast(words.notAPicture);
@@ -161,11 +184,15 @@ export class Palette {
   private clearPicture(): void {
     this.picture.hidden = this.remove.hidden = true;
   }
-  private pickFromPicture(e: PointerEvent): void {
-    const box = this.picture.getBoundingClientRect();
-    const x = Math.floor(((e.clientX - box.left) * this.picture.width) / box.width);
-    const y = Math.floor(((e.clientY - box.top) * this.picture.height) / box.height);
-    if (x < 0 || y < 0 || x >= this.picture.width || y >= this.picture.height) return;
+  private aim(x: number, y: number): void {
+    const inside = (share: number) => Math.min(1, Math.max(0, share));
+    this.aimed = { x: inside(x), y: inside(y) };
+    Object.assign(this.spot.style, { left: `${100 * this.aimed.x}%`, top: `${100 * this.aimed.y}%` });
+  }
+  private pickFromPicture(): void {
+    const { width, height } = this.picture;
+    const x = Math.min(width - 1, Math.floor(this.aimed.x * width));
+    const y = Math.min(height - 1, Math.floor(this.aimed.y * height));
     const [r, g, b] = this.picture.getContext("2d")!.getImageData(x, y, 1, 1).data;
     this.brush.set({ color: hexOf([r, g, b] as Rgb) });
   }

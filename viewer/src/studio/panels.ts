@@ -23,6 +23,11 @@ export function ask(question: string, value?: string, yes = value === undefined 
   }));
 }
 
+/** Whether what no take has may go. */
+export async function mayLeaveNow(session: Session): Promise<boolean> {
+  return !session.state.unkept || (await ask(words.loseNow)) !== null;
+}
+
 function small(name: string, title: string, onclick: () => void): HTMLButtonElement {
   return el("button", { type: "button", class: "small", title, "aria-label": title, onclick }, icon(name));
 }
@@ -134,11 +139,11 @@ export class TakesPanel {
     const { state, isReadOnly } = this.session;
     const grey: Take = { name: "", colorizer: "", seconds: 0 };
     keyed(this.list, [grey, ...state.takes], (take) => `${take.name} ${take.colorizer} ${take.name === state.take} ${state.unkept}`, (take) => this.row(take));
-    const choices = ["grey", "now", ...state.takes.map((take) => take.name)];
+    const choices = ["", "now", ...state.takes.map((take) => take.name)];
     for (const select of this.sides) {
       if (select.dataset.choices === choices.join("\n")) continue;
       select.dataset.choices = choices.join("\n");
-      select.replaceChildren(...choices.map((name) => el("option", { value: name }, name === "grey" ? words.grey : name === "now" ? words.now : name)));
+      select.replaceChildren(...choices.map((name) => el("option", { value: name }, words.side(name))));
     }
     this.showSides();
     this.keepButton.disabled = !state.unkept || isReadOnly || state.task !== "";
@@ -152,7 +157,7 @@ export class TakesPanel {
     const { state } = this.session;
     const isNow = name === state.take;
     const begin = el("button", { type: "button", class: "name-button", title: words.begin, onclick: () => void this.begin(name) },
-      el("span", {}, name || words.grey), el("small", {}, isNow && state.unkept ? words.unkept : name ? colorizer : ""));
+      el("span", {}, words.take(name)), el("small", {}, isNow && state.unkept ? words.unkept : name ? colorizer : ""));
     const row = el("li", { "aria-current": String(isNow), "data-take": name }, begin);
     if (name) {
       row.append(
@@ -176,7 +181,7 @@ export class TakesPanel {
   }
   private async askName(question: string, value: string): Promise<string | null> {
     const name = await ask(question, value);
-    if (name !== "grey" && name !== "now") return name;
+    if (name === value || (name !== "grey" && name !== "now")) return name;
     return this.askName(words.reserved(name), value);
   }
   private async named(order: "rename" | "duplicate", question: string, take: string): Promise<void> {
@@ -184,7 +189,7 @@ export class TakesPanel {
     if (name && name !== take) await this.session.order({ order, take, name });
   }
   private async begin(take: string): Promise<void> {
-    if (!this.session.state.unkept || (await ask(words.loseNow))) await this.session.order({ order: "begin", take });
+    if (await mayLeaveNow(this.session)) await this.session.order({ order: "begin", take });
   }
   private async remove(take: string): Promise<void> {
     if (await ask(words.removeTake(take), undefined, words.remove)) await this.session.order({ order: "delete", take });
@@ -202,9 +207,15 @@ export function ideasPanel(session: Session, reference: (file: File) => void): H
   };
   const ofItself = async () => {
     const bases = session.state.cards.map((card) => card.number).filter((number) => liked.has(number));
-    if (!session.state.unkept || (await ask(words.loseNow))) await session.order({ order: "builtin", bases });
+    if (await mayLeaveNow(session)) await session.order({ order: "builtin", bases });
   };
-  const suggest = button(words.suggest, () => (liked.clear(), void session.order({ order: "suggest" })), { id: "suggest" });
+  const suggestAnew = () => {
+    liked.clear();
+    // New cards at the same addresses are the same nodes.
+    for (const card of cards.children) card.setAttribute("aria-pressed", "false");
+    void session.order({ order: "suggest" });
+  };
+  const suggest = button(words.suggest, suggestAnew, { id: "suggest" });
   const builtin = button(words.builtin, () => void ofItself(), { id: "builtin", title: words.builtinTitle });
   const node = section(words.ideas, true,
     el("div", { class: "buttons" }, suggest, builtin, button(words.reference, () => file.click())),
@@ -236,11 +247,10 @@ export function finishPanel(session: Session): HTMLElement {
       await new Promise((done) => setTimeout(done, finishRest));
     });
   };
-  const signed = (v: number) => `${v >= 0 ? "+" : ""}${v.toFixed(2)} EV`;
   const sliders = [
-    slider({ id: "saturation", label: words.saturation, min: 0, max: 2, step: 0.01, value: values.saturation, reset: 1, change: (v) => put({ saturation: v }) }),
-    slider({ id: "hue", label: words.hue, min: -180, max: 180, step: 1, value: values.hue, reset: 0, show: (v) => `${v.toFixed(0)}°`, change: (v) => put({ hue: v }) }),
-    slider({ id: "exposure", label: words.exposure, min: -3, max: 3, step: 0.05, value: values.exposure, reset: 0, show: signed, change: (v) => put({ exposure: v }) }),
+    slider({ id: "saturation", label: words.saturation, title: words.resets, min: 0, max: 2, step: 0.01, value: values.saturation, reset: 1, change: (v) => put({ saturation: v }) }),
+    slider({ id: "hue", label: words.hue, title: words.resets, min: -180, max: 180, step: 1, value: values.hue, reset: 0, show: (v) => `${v.toFixed(0)}°`, change: (v) => put({ hue: v }) }),
+    slider({ id: "exposure", label: words.exposure, title: words.resets, min: -3, max: 3, step: 0.05, value: values.exposure, reset: 0, show: words.stops, change: (v) => put({ exposure: v }) }),
   ];
   const formats = Object.entries(words.formats).map(([value, label], i) => {
     const input = el("input", { type: "checkbox", value, checked: i < 2 });
@@ -253,7 +263,7 @@ export function finishPanel(session: Session): HTMLElement {
   const blender = el("div", { class: "commands" });
   const node = section(words.finish, true, ...sliders.map((s) => s.node), el("div", { class: "buttons checks" }, ...formats.map((f) => f.node), bake), el("div", { class: "row" }, photographs, write), downloads, blender);
   session.onState((state) => {
-    keyed(downloads, state.downloads, (d) => `${d.address} ${d.bytes}`, (d) => el("li", {}, el("a", { class: "name-button", href: d.address, download: d.name }, el("span", {}, d.name), el("small", {}, `${(d.bytes / 2 ** 20).toFixed(1)} MiB`))));
+    keyed(downloads, state.downloads, (d) => `${d.address} ${d.bytes}`, (d) => el("li", {}, el("a", { class: "name-button", href: d.address, download: d.name }, el("span", {}, d.name), el("small", {}, words.mebibytes(d.bytes)))));
     showLines(blender, state.blender ? [state.blender] : [], words.blender);
     bake.disabled = write.disabled = session.isBusy || session.isLost;
     node.classList.toggle("read-only", session.isReadOnly);
@@ -270,7 +280,7 @@ export function finishPanel(session: Session): HTMLElement {
 function showLines(box: HTMLElement, lines: string[], title: string): void {
   box.hidden = lines.length === 0;
   keyed(box, lines.length ? [title, ...lines] : [], (line) => line, (line) =>
-    line === title ? el("span", { class: "name" }, title) : el("div", { class: "command" }, el("code", {}, line), small("copy", words.copy, () => void copyText(line, words.copyLine))));
+    line === title ? el("span", { class: "name" }, title) : el("div", { class: "command" }, el("code", {}, line), small("copy", words.copy, () => void copyText(line, words.copied, words.copyLine))));
 }
 
 export function commandsPanel(session: Session): HTMLElement {

@@ -68,8 +68,8 @@ export interface State {
   finish: Finish;
   /** What the work said lately, oldest first. */
   notes: string[];
-  /** Photographs, or a clip, that the server has. */
-  arrived: { files: number; bytes: number };
+  /** Photographs, or a clip, that the server has; `source` was named to it before, "" = nothing was. */
+  arrived: { files: number; bytes: number; source: string };
 }
 
 export interface Finish {
@@ -104,7 +104,7 @@ export interface Stroke {
 export const limits = { strokes: 2000, viewpoints: 50, points: 20000, bytes: 15e6, size: [0.0005, 0.5], reach: [0.1, 4] } as const;
 
 export interface FrameRequest extends View {
-  /** "grey", "now" or the name of a take; a picture each, one behind the other. */
+  /** "" (uncoloured), "now" or the name of a take; a picture each, one behind the other. */
   sides: string[];
   /** Somebody moves the camera; otherwise a training may let it wait. */
   moving?: boolean;

@@ -92,7 +92,8 @@ class Reception {
     const { state, isReadOnly, isBusy, isLost } = session;
     const { bytes: text } = words.reception;
     const totals = upload.totals;
-    const anything = state.arrived.files > 0 || upload.list.length > 0;
+    const { files, source, bytes } = state.arrived;
+    const anything = files > 0 || upload.list.length > 0;
     this.zone.hidden = isBusy;
     this.zone.inert = isReadOnly || isLost;
     this.zone.classList.toggle("compact", anything);
@@ -102,13 +103,13 @@ class Reception {
     const sending = upload.isBusy;
     this.count.textContent = sending
       ? words.reception.sending(totals.filesThere, totals.files, words.reception.bytesOf(text(totals.bytesThere), text(totals.bytes)))
-      : state.arrived.files > 0 ? words.reception.arrived(state.arrived.files, text(state.arrived.bytes)) : words.reception.nothing;
+      : files > 0 ? words.reception.arrived(files, text(bytes)) : source ? words.reception.named(source) : words.reception.nothing;
     const share = totals.bytes > 0 ? totals.bytesThere / totals.bytes : 0;
     this.progress.hidden = !sending;
     this.progress.setAttribute("aria-valuenow", String(Math.round(100 * share)));
     this.bar.style.width = `${100 * share}%`;
     this.showRefused();
-    this.build.disabled = sending || isBusy || isReadOnly || isLost || state.arrived.files === 0;
+    this.build.disabled = sending || isBusy || isReadOnly || isLost || (files === 0 && !source);
     this.clear.hidden = !anything;
     this.clear.disabled = isReadOnly || isLost;
 
@@ -125,7 +126,7 @@ class Reception {
       return `${seen.get(line)} ${line}`;
     });
     keyed(this.log, lines, (line) => line, (line) => el("li", {}, line.slice(line.indexOf(" ") + 1)));
-    this.log.hidden = lines.length === 0 || (!isBusy && !state.failed);
+    this.log.hidden = lines.length === 0;
     this.failed.hidden = isBusy || !state.failed;
     this.failure.textContent = state.message;
   }

@@ -22,6 +22,7 @@ export class Session {
   private sceneSeen: number;
   private refining = new Latest();
   private returning: Promise<void> | null = null;
+  private painting: Promise<void> = Promise.resolve();
   private all: { viewpoints: readonly Viewpoint[]; views: readonly SceneView[] } | null = null;
   private stopListening = () => {};
 
@@ -184,19 +185,34 @@ export class Session {
       return false;
     }
   }
-  async send(query: Record<string, string>, file: Blob): Promise<void> {
-    if (!/^image\/(png|jpeg|tiff|webp)$/.test(file.type)) return toast(words.notAPicture);
-    if (file.size > 64 * 2 ** 20) return toast(words.tooLarge);
+  /** @return what the server said; nothing where it did not take the picture */
+  async send(query: Record<string, string>, file: Blob): Promise<State | undefined> {
+    if (!/^image\/(png|jpeg|tiff|webp)$/.test(file.type)) return void toast(words.notAPicture);
+    if (file.size > 64 * 2 ** 20) return void toast(words.tooLarge);
     try {
-      await this.api.picture(query, file);
+      return await this.api.picture(query, file);
+    } catch (problem) {
+      return void this.explain(problem);
+    }
+  }
+  /** A painted PNG becomes a stroke on the view that is open. One at a time: each is known by what its list has more. */
+  sendPainted(file: File): Promise<void> {
+    const { open } = this;
+    return (this.painting = this.painting.catch(() => undefined).then(() => this.addPainted(open, file)));
+  }
+  private async addPainted(name: string, file: File): Promise<void> {
+    await this.strokes.save();
+    const view = this.views.findIndex((v) => v.name === name);
+    if (view < 0) return;
+    const before = this.strokes.list;
+    const state = await this.send({ kind: "stroke", view: String(view), name: file.name }, file);
+    if (!state) return;
+    try {
+      await this.strokes.follow(state.strokes);
+      this.strokes.adopt(before);
     } catch (problem) {
       this.explain(problem);
     }
-  }
-  /** A painted PNG becomes a stroke on the view that is open. */
-  async sendPainted(file: File): Promise<void> {
-    await this.strokes.save();
-    if (this.photo >= 0) await this.send({ kind: "stroke", view: String(this.photo), name: file.name }, file);
   }
   colour(): void {
     void this.order({ order: this.isBusy ? "stop" : this.isTraining ? "train" : "colour" });

@@ -7,7 +7,7 @@ import { tools } from "./brush";
 import { Easel } from "./easel";
 import { FieldView } from "./field";
 import { Palette } from "./palette";
-import { commandsPanel, finishPanel, ideasPanel, notice, strokesPanel, TakesPanel, trainingPanel } from "./panels";
+import { commandsPanel, finishPanel, ideasPanel, mayLeaveNow, notice, strokesPanel, TakesPanel, trainingPanel } from "./panels";
 import { limits, type State } from "./protocol";
 import { receive } from "./reception";
 import { Session } from "./session";
@@ -124,7 +124,7 @@ class Studio {
     const { session, field, easel } = this;
     this.stage.append(field.node, easel.node);
     const panel = el("aside", { class: "panel", id: "panel", "aria-label": words.panel }, el("div", { class: "only-painting" }, this.palette.node), trainingPanel(), this.strokes,
-      el("div", { class: "after-training" }, this.takes.node, ideasPanel(session, (file) => this.reference(file)), finishPanel(session)), commandsPanel(session));
+      el("div", { class: "after-training" }, this.takes.node, ideasPanel(session, (file) => void this.reference(file)), finishPanel(session)), commandsPanel(session));
     this.buildHelp();
     this.root.append(this.stage, this.toolbar.node, this.head(), panel, this.foot(), notice(session), this.help);
     session.onState(() => document.body.classList.toggle("training", session.isTraining));
@@ -296,9 +296,9 @@ class Studio {
     action();
   }
 
-  reference(file: File): void {
+  private async reference(file: File): Promise<void> {
     void this.palette.showPicture(file);
-    void this.session.send({ kind: "reference", name: file.name }, file);
+    if (await mayLeaveNow(this.session)) await this.session.send({ kind: "reference", name: file.name }, file);
   }
   private listenToDrops(): void {
     const veil = el("div", { class: "drop-veil", hidden: true });
@@ -320,9 +320,10 @@ class Studio {
       if (!file) return;
       if (place === "picker") void this.palette.showPicture(file);
       else if (this.session.isReadOnly) toast(words.readOnly);
-      else if (place === "easel" && file.type === "image/png") void this.session.sendPainted(file);
+      else if (place === "easel" && file.type !== "image/png") toast(words.notPainted);
+      else if (place === "easel") void this.session.sendPainted(file);
       else if (this.session.isTraining) toast(words.afterTraining);
-      else this.reference(file);
+      else void this.reference(file);
     });
   }
 }

@@ -9,8 +9,11 @@ export const words = {
   grey: "grey",
   now: "now",
   unkept: "not kept yet",
-  of: (take: string) => (take ? `begun from ${take}` : "begun from grey"),
-  tasks: { prepare: "Finding the cameras", train: "Training", cache: "Tracing the views", colour: "Colouring", bake: "Baking", photographs: "Writing photographs", suggest: "Making suggestions", "key-views": "Comparing the views" } as Record<string, string>,
+  of: (take: string) => `begun from ${words.take(take)}`,
+  /** A take, "" = none. One that is called like something else says what it is. */
+  take: (name: string): string => (name === "" ? words.grey : name === words.grey || name === words.now ? `take ${name}` : name),
+  side: (name: string): string => (name === "now" ? words.now : words.take(name)),
+  tasks: { prepare: "Finding the cameras", train: "Training", cache: "Tracing the views", colour: "Colouring", recolour: "Colouring again what no take holds", bake: "Baking", photographs: "Writing photographs", suggest: "Making suggestions", "key-views": "Comparing the views" } as Record<string, string>,
   percent: (fraction: number) => `${Math.round(100 * fraction)} %`,
 
   reception: {
@@ -29,6 +32,7 @@ export const words = {
     sending: (there: number, all: number, bytes: string) => `Sending: ${there} of ${many(all, "file", "files")}, ${bytes}`,
     arrived: (files: number, bytes: string) => `${many(files, "file is", "files are")} here, ${bytes}`,
     nothing: "Nothing has arrived yet.",
+    named: (source: string) => `Named when the studio was started: ${source}`,
     bytes: (bytes: number) => (bytes >= 1e9 ? `${(bytes / 1e9).toFixed(1)} GB` : bytes >= 1e6 ? `${(bytes / 1e6).toFixed(0)} MB` : `${Math.ceil(bytes / 1e3)} kB`),
     bytesOf: (there: string, all: string) => `${there} of ${all}`,
     progress: "How much has arrived",
@@ -83,7 +87,7 @@ export const words = {
   stopTitle: "Stop what runs; what is there stays",
   figure: (name: string, value: number) => `${name} ${Number(value.toPrecision(3))}`,
 
-  easel: "Photograph. Arrow keys move the brush, Enter paints a dot",
+  easel: "Photograph. Arrow keys move the brush, or with the hand the photograph; Enter paints a dot",
   toolbar: "Tools",
   tools: {
     brush: "Brush: its colour runs over what is alike  B",
@@ -108,14 +112,15 @@ export const words = {
   hex: "Colour as #rrggbb",
   badHex: "A colour is written #rrggbb",
   recent: "Recent colours",
+  resets: "Double click, or Delete, resets",
   size: "Size",
   softness: "Softness",
   reach: "Reach",
   exact: "Only where it is painted",
   pickerPicture: "Colours from a picture",
   choosePicture: "Choose a picture…",
-  pickerPictureNote: "Drop a picture here and pick its colours with a click.",
-  pickerPictureAlt: "Picture to pick colours from: click it",
+  pickerPictureNote: "Drop a picture here and pick its colours with a click, or with arrow keys and Enter.",
+  pickerPictureAlt: "Picture to pick colours from: arrow keys move, Enter picks",
   removePicture: "Remove the picture",
 
   strokes: "Strokes",
@@ -174,20 +179,24 @@ export const words = {
   saturation: "Saturation",
   hue: "Hue",
   exposure: "Exposure",
+  stops: (v: number) => `${v >= 0 ? "+" : ""}${v.toFixed(2)} EV`,
   bake: "Bake",
   photographs: "Photographs",
   formats: { vdb: "VDB", gltf: "GLB", exr: "EXR", web: "Web" },
   photographFormats: { png: "PNG 16 bit", tiff: "TIFF 16 bit" },
   downloads: "Downloads",
+  mebibytes: (bytes: number) => `${(bytes / 2 ** 20).toFixed(1)} MiB`,
   blender: "In Blender",
   repeat: "The same as commands",
   repeatNote: "These lines do the same without a browser.",
   copy: "Copy",
-  copyLine: "Line",
+  copied: "Line copied",
+  copyLine: "Line:",
 
   dropScene: "Drop: begin from this photograph",
   dropEasel: "Drop: a painted PNG becomes a stroke here",
   dropPicker: "Drop: pick colours from it",
+  notPainted: "Only a painted PNG becomes a stroke. To begin from a colour photograph, drop it on the scene.",
   notAPicture: "Drop a PNG, JPEG, TIFF or WebP picture.",
   tooLarge: "A picture may have 64 MB at most.",
 
@@ -200,7 +209,7 @@ export const words = {
   unsaved: "The strokes could not be saved: ",
 
   keysTitle: "Keys and gestures",
-  keysNote: "A double click on a slider resets it. Strokes are saved as they are made.",
+  keysNote: "A double click on a slider, or Delete, resets it. Strokes are saved as they are made.",
   keys: {
     scene: [
       ["Drag", "turn about the subject (in fly mode: look around)"],
@@ -218,6 +227,7 @@ export const words = {
       ["Alt", "picker while held; Shift + click: line from the last point"],
       ["Wheel, pinch, + − 0 1", "zoom; fit; 100 %"],
       ["Space, middle drag, two fingers", "move the picture"],
+      ["Arrows, Enter", "move the brush, paint a dot; with the hand: move the picture"],
       ["O", "what is shown: reach, now, grey"],
       [",  .", "previous, next photograph"],
       ["Esc", "back to the scene"],

@@ -72,11 +72,13 @@ export interface Slider {
 export interface SliderOptions {
   id: string;
   label: string;
+  /** Says how it is reset. */
+  title: string;
   min: number;
   max: number;
   step: number;
   value: number;
-  /** What a double click goes back to. */
+  /** What a double click, or the Delete key, goes back to. */
   reset: number;
   show?: (value: number) => string;
   change: (value: number) => void;
@@ -96,10 +98,18 @@ export function slider(options: SliderOptions): Slider {
     set(value);
     options.change(value);
   });
-  const node = el("label", { class: "slider", title: "Double click resets" }, el("span", { class: "name" }, options.label), output, input);
-  node.addEventListener("dblclick", () => {
+  const node = el("label", { class: "slider", title: options.title }, el("span", { class: "name" }, options.label), output, input);
+  const reset = () => {
     set(options.reset);
     options.change(options.reset);
+  };
+  node.addEventListener("dblclick", reset);
+  // Home is the smallest value, as the browser has it.
+  input.addEventListener("keydown", (e) => {
+    if (e.key !== "Delete" && e.key !== "Backspace") return;
+    e.preventDefault();
+    e.stopPropagation();
+    reset();
   });
   set(options.value);
   return { node, set };
@@ -170,12 +180,13 @@ export function toast(text: string): void {
   toastTimer = window.setTimeout(() => node!.classList.remove("shown"), 2400);
 }
 
-export async function copyText(text: string, what: string): Promise<void> {
+/** @param copied  says that it is done  @param question  above the text where the browser lets no page copy */
+export async function copyText(text: string, copied: string, question: string): Promise<void> {
   try {
     await navigator.clipboard.writeText(text);
-    toast(`${what} copied`);
+    toast(copied);
   } catch {
-    window.prompt(`${what}:`, text);
+    window.prompt(question, text);
   }
 }
 

@@ -12,6 +12,8 @@ const backgrounds: [string, string][] = [
   ["#101216", "Night"], ["#000000", "Black"], ["#767676", "Grey"], ["#ffffff", "White"], ["none", "None"],
 ];
 const axisNames = ["x", "y", "z"] as const;
+/** Of a slider. */
+export const resets = "Double click, or Delete, resets";
 
 export class Panel {
   readonly node: HTMLElement;
@@ -48,7 +50,7 @@ export class Panel {
 
   private setting(id: "wipe" | "saturation" | "hue" | "exposure" | "gain" | "threshold" | "photo", label: string, min: number, max: number, step: number, show?: (v: number) => string): HTMLElement {
     const { app } = this;
-    const made = slider({ id, label, min, max, step, value: app.settings[id], reset: app.defaults[id], show, change: (value) => app.set({ [id]: value }) });
+    const made = slider({ id, label, title: resets, min, max, step, value: app.settings[id], reset: app.defaults[id], show, change: (value) => app.set({ [id]: value }) });
     this.refreshers.push(() => made.set(app.settings[id]));
     return made.node;
   }
@@ -82,12 +84,12 @@ export class Panel {
     // Gain and threshold go over decades: the sliders are logarithmic.
     const { app } = this;
     const gain = slider({
-      id: "gain", label: "Gain", min: -2, max: 2, step: 0.01, value: Math.log10(app.settings.gain), reset: 0,
+      id: "gain", label: "Gain", title: resets, min: -2, max: 2, step: 0.01, value: Math.log10(app.settings.gain), reset: 0,
       show: (v) => `× ${(10 ** v).toPrecision(2)}`, change: (v) => app.set({ gain: 10 ** v }),
     });
     const ofThreshold = (t: number) => (t <= 0 ? 0 : (t / 10) ** 3 * 24);
     const threshold = slider({
-      id: "threshold", label: "Threshold", min: 0, max: 10, step: 0.02, value: 10 * Math.cbrt(app.settings.threshold / 24), reset: 0,
+      id: "threshold", label: "Threshold", title: resets, min: 0, max: 10, step: 0.02, value: 10 * Math.cbrt(app.settings.threshold / 24), reset: 0,
       show: (v) => `${(ofThreshold(v) / app.bundle.volume.voxelSize).toPrecision(3)}`, change: (v) => app.set({ threshold: ofThreshold(v) }),
     });
     this.refreshers.push(() => {
@@ -104,7 +106,7 @@ export class Panel {
       const span = app.high[i] - app.low[i];
       const make = (side: "low" | "high") => {
         const made = slider({
-          id: `clip-${axis}-${side}`, label: `${axis} ${side === "low" ? "from" : "to"}`, min: app.low[i], max: app.high[i], step: span / 500,
+          id: `clip-${axis}-${side}`, label: `${axis} ${side === "low" ? "from" : "to"}`, title: resets, min: app.low[i], max: app.high[i], step: span / 500,
           value: app[side][i], reset: app[side][i], show: (v) => v.toFixed(3),
           change: (v) => {
             const clip = app.settings.clip!;
@@ -120,7 +122,7 @@ export class Panel {
       return el("div", { class: "pair" }, make("low"), make("high"));
     });
     const text = el("code", { id: "aabb", title: "Copy" });
-    text.addEventListener("click", () => copyText(text.textContent ?? "", "--aabb"));
+    text.addEventListener("click", () => copyText(text.textContent ?? "", "--aabb copied", "--aabb:"));
     const body = el("div", { class: "stack" }, ...rows, text, el("p", { class: "note" }, "For cnerf bake; click to copy. The handles in the picture move the sides."));
     this.refreshers.push(() => {
       const { clip } = app.settings;
@@ -141,7 +143,7 @@ export class Panel {
     });
     const quantity = segments<Quantity>("slice-quantity", quantities.map((q) => [q, q === "L" ? "L*" : q]), "density", (value) => app.set({ slice: { ...app.settings.slice!, quantity: value } }));
     const at = slider({
-      id: "slice-at", label: "Position", min: 0, max: 1, step: 0.002, value: 0.5, reset: 0.5, show: () => (app.settings.slice ? app.settings.slice.at.toFixed(3) : ""),
+      id: "slice-at", label: "Position", title: resets, min: 0, max: 1, step: 0.002, value: 0.5, reset: 0.5, show: () => (app.settings.slice ? app.settings.slice.at.toFixed(3) : ""),
       change: (t) => {
         const slice = app.settings.slice!;
         app.set({ slice: { ...slice, at: app.low[slice.axis] + t * (app.high[slice.axis] - app.low[slice.axis]) } });
@@ -182,7 +184,7 @@ export class Panel {
 
   private keyFrames(): HTMLElement {
     const { app } = this;
-    const length = slider({ id: "path-seconds", label: "Length", min: 1, max: 30, step: 0.5, value: this.seconds, reset: 4, show: (v) => `${v} s`, change: (v) => (this.seconds = v) });
+    const length = slider({ id: "path-seconds", label: "Length", title: resets, min: 1, max: 30, step: 0.5, value: this.seconds, reset: 4, show: (v) => `${v} s`, change: (v) => (this.seconds = v) });
     const file = el("input", { type: "file", accept: ".json,application/json", hidden: true, id: "import-path" });
     file.addEventListener("change", async () => {
       try {

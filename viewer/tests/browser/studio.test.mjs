@@ -62,6 +62,19 @@ async function clear(shown) {
   await shown.evaluate(() => window.cnerf.session.strokes.change([]));
   await saved(shown);
 }
+/** Drops a file on what a selector finds. */
+const drop = (shown, selector, name, bytes, type = "image/png") =>
+  shown.evaluate(([at, file, list, kind]) => {
+    const transfer = new DataTransfer();
+    transfer.items.add(new File([new Uint8Array(list)], file, { type: kind }));
+    for (const what of ["dragover", "drop"]) document.querySelector(at).dispatchEvent(new DragEvent(what, { dataTransfer: transfer, bubbles: true, cancelable: true }));
+  }, [selector, name, [...bytes], type]);
+/** A PNG with a red field in its upper left. */
+function redPaint({ width, height }) {
+  const paint = Buffer.alloc(4 * width * height);
+  for (let y = 20; y < 80; ++y) for (let x = 20; x < 100; ++x) paint.set([200, 40, 30, 255], 4 * (y * width + x));
+  return png(width, height, 4, paint);
+}
 const luminance = ([r, g, b]) => {
   const [x, y, z] = [r, g, b].map((v) => (v <= 10.31475 ? v / 3294.6 : ((v / 255 + 0.055) / 1.055) ** 2.4));
   return 0.2126 * x + 0.7152 * y + 0.0722 * z;
@@ -106,7 +119,7 @@ describe("the scene", () => {
     await page.mouse.move(474, 300, { steps: 4 });
     await page.mouse.up();
     assert.ok(Math.abs((await page.evaluate(() => window.cnerf.studio.field.wipe)) - 0.5) < 0.02);
-    assert.deepEqual(JSON.parse((await request).postData()).sides, ["grey", "now"]);
+    assert.deepEqual(JSON.parse((await request).postData()).sides, ["", "now"]);
     await page.evaluate(() => window.cnerf.studio.field.setWipe(0));
   });
 });
@@ -138,9 +151,9 @@ describe("painting", () => {
     assert.equal(JSON.parse((await asked).postData()).everywhere, false);
     await saved(page);
     assert.deepEqual([await box.isChecked(), await everywhere()], [false, false]);
-    await box.click();
+    await page.keyboard.press("Control+z");
     await saved(page);
-    assert.equal(await everywhere(), true);
+    assert.deepEqual([await box.isChecked(), await everywhere(), (await shownStrokes(page)).length], [true, true, 1], "undone, and no stroke with it");
   });
   it("shows what strokes will reach in the thumbnails", () =>
     until(page, () => [...document.querySelectorAll("#strip .reach")].some((image) => image.naturalWidth > 0)));
@@ -420,20 +433,15 @@ describe("colour", () => {
     await take("dawn").getByRole("button", { name: "Delete" }).click();
     await answer();
     await until(page, () => !window.cnerf.session.state.takes.some((t) => t.name === "dawn"));
-    assert.deepEqual(await page.evaluate(() => [window.cnerf.studio.field.left, window.cnerf.studio.field.right]), ["grey", "now"], "a side that is gone is not asked for");
+    assert.deepEqual(await page.evaluate(() => [window.cnerf.studio.field.left, window.cnerf.studio.field.right]), ["", "now"], "a side that is gone is not asked for");
   });
   it("says why the server refuses", async () => {
     await page.evaluate(() => window.cnerf.session.order({ order: "begin", take: "nothing" }));
     await until(page, () => /nothing/.test(document.getElementById("toast")?.textContent ?? ""));
   });
   it("begins from a photograph that is dropped, whose colours can be picked too", async () => {
-    const bytes = [...png(8, 6, 3, Buffer.alloc(8 * 6 * 3, Buffer.from([40, 120, 200])))];
     const sent = page.waitForRequest((r) => r.url().includes("/studio/pictures?kind=reference&name=sea.png"), { timeout: patience });
-    await page.evaluate((list) => {
-      const transfer = new DataTransfer();
-      transfer.items.add(new File([new Uint8Array(list)], "sea.png", { type: "image/png" }));
-      for (const type of ["dragover", "drop"]) document.getElementById("field").dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
-    }, bytes);
+    await drop(page, "#field", "sea.png", png(8, 6, 3, Buffer.alloc(8 * 6 * 3, Buffer.from([40, 120, 200]))));
     assert.equal((await (await sent).response()).status() < 300, true);
     await until(page, () => window.cnerf.session.state.task === "");
     await paintOn(page, 1);
@@ -593,6 +601,30 @@ describe("a studio without photographs", { skip: standIn }, () => {
     assert.equal(await second.locator("#colour").isDisabled(), true, "it still follows only");
     assert.equal(await shown.locator("#colour").isDisabled(), false, "it may still paint");
     assert.deepEqual([shown.problems, second.problems], [[], []]);
+  });
+  it("goes on with photographs that it was started with, and says which are taken", async () => {
+    const named = await opened({ stage: "photographs", source: "/photos/house", steps: 5 });
+    const started = named.shown;
+    await started.waitForSelector("#drop-zone:not([hidden])");
+    assert.match(await text(started, "#arrived"), /\/photos\/house/);
+    const buildAndStop = async () => {
+      await started.click("#build");
+      await started.waitForSelector("#work:not([hidden])");
+      named.server.advance(1);
+      await until(started, () => /were read/.test(document.querySelector("#notes li:last-child")?.textContent ?? ""));
+      await started.click("#stop");
+      await started.waitForSelector("#work[hidden]", { state: "attached" });
+    };
+    await buildAndStop();
+    assert.equal(await started.locator("#build").isDisabled(), false);
+    await started.setInputFiles("#files", { name: "more.jpg", mimeType: "image/jpeg", buffer: jpeg(10) });
+    await until(started, () => window.cnerf.session.state.arrived.files === 1 && !document.getElementById("build").disabled);
+    assert.match(await text(started, "#notes"), /instead of \/photos\/house/);
+    assert.equal(await started.locator("#notes").isVisible(), true, "also where nothing is being built");
+    await buildAndStop();
+    assert.match(await text(started, "#notes"), /instead of \/photos\/house/);
+    assert.deepEqual(started.problems, []);
+    await named.close();
   });
   it("is within reach on a phone", async () => {
     const phone = await opened({ stage: "photographs" }, { width: 390, height: 844 });
@@ -754,6 +786,14 @@ describe("ideas and finish", { skip: standIn }, () => {
     await until(shown, () => !window.cnerf.session.isBusy);
     await shown.evaluate(() => window.cnerf.session.order({ order: "begin", take: "builtin" }));
   });
+  it("shows new suggestions without a mark", async () => {
+    await shown.locator("#cards .idea").nth(0).click();
+    await shown.click("#suggest");
+    await until(shown, () => window.cnerf.session.isBusy);
+    server.advance(3);
+    await until(shown, () => !window.cnerf.session.isBusy);
+    assert.deepEqual(await shown.locator("#cards .idea").evaluateAll((cards) => cards.map((card) => card.getAttribute("aria-pressed"))), ["false", "false"]);
+  });
   it("follows the sliders with a few orders a second, also beside work, and keeps the take kept", async () => {
     await shown.evaluate(() => void window.cnerf.session.order({ order: "bake", formats: ["vdb"] }));
     await until(shown, () => window.cnerf.session.state.task === "bake");
@@ -790,14 +830,8 @@ describe("a painted PNG", { skip: standIn }, () => {
     await until(shown, () => window.cnerf?.studio.field.settled);
     await paintOn(shown, 1);
     const { width, height } = server.pictures[1];
-    const paint = Buffer.alloc(4 * width * height);
-    for (let y = 20; y < 80; ++y) for (let x = 20; x < 100; ++x) paint.set([200, 40, 30, 255], 4 * (y * width + x));
     const sent = shown.waitForRequest((r) => /pictures\?kind=stroke&view=1&name=roof\.png/.test(r.url()), { timeout: patience });
-    await shown.evaluate((list) => {
-      const transfer = new DataTransfer();
-      transfer.items.add(new File([new Uint8Array(list)], "roof.png", { type: "image/png" }));
-      for (const type of ["dragover", "drop"]) document.getElementById("easel").dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
-    }, [...png(width, height, 4, paint)]);
+    await drop(shown, "#easel", "roof.png", redPaint(server.pictures[1]));
     await sent;
     const spot = [60 / width, 50 / height];
     const isRed = ([u, v]) => {
@@ -821,6 +855,162 @@ describe("a painted PNG", { skip: standIn }, () => {
     assert.equal(server.strokes.length, 0);
     assert.deepEqual(shown.problems, []);
     await close();
+  });
+  it("is undone and redone by itself, not the stroke before it", async () => {
+    const { server, shown, close } = await opened({});
+    await until(shown, () => window.cnerf?.studio.field.settled);
+    await paintOn(shown, 1);
+    await draw(shown, [[0.7, 0.7], [0.8, 0.7]]);
+    await saved(shown);
+    await drop(shown, "#easel", "roof.png", redPaint(server.pictures[1]));
+    await until(shown, () => window.cnerf.session.strokes.done.length === 2);
+    const kinds = () => server.strokes.map((stroke) => stroke.kind);
+    assert.deepEqual(kinds(), ["paint", "picture"]);
+    await shown.keyboard.press("Control+z");
+    await saved(shown);
+    assert.deepEqual(kinds(), ["paint"]);
+    await shown.keyboard.press("Control+Shift+z");
+    await saved(shown);
+    assert.deepEqual(kinds(), ["paint", "picture"]);
+    assert.deepEqual(shown.problems, []);
+    await close();
+  });
+});
+
+describe("colours that no take has", { skip: standIn }, () => {
+  let server, shown, close;
+  const sent = () => server.requests.filter((request) => request === "POST pictures").length;
+  const sea = png(8, 6, 3, Buffer.alloc(8 * 6 * 3, Buffer.from([40, 120, 200])));
+  before(async () => {
+    ({ server, shown, close } = await opened({ steps: 2 }));
+    await until(shown, () => window.cnerf?.studio.field.settled);
+    await shown.click("#colour");
+    await until(shown, () => window.cnerf.session.isBusy);
+    server.advance(2);
+    await until(shown, () => window.cnerf.session.state.unkept && !window.cnerf.session.isBusy);
+  });
+  after(() => close?.());
+
+  it("are left for those of a photograph only where the user says so", async () => {
+    await drop(shown, "#field", "sea.png", sea);
+    await shown.locator("dialog[open]").getByRole("button", { name: "Cancel" }).click();
+    await shown.waitForSelector("dialog form", { state: "detached" });
+    assert.deepEqual([sent(), server.state.unkept, server.state.task], [0, true, ""]);
+    await drop(shown, "#field", "sea.png", sea);
+    await shown.click("dialog[open] .primary");
+    await until(shown, () => window.cnerf.session.state.task === "colour");
+    assert.equal(sent(), 1);
+    server.advance(2);
+    await until(shown, () => !window.cnerf.session.isBusy);
+  });
+  it("are not left for a picture that is dropped on a photograph and is no painted PNG", async () => {
+    await paintOn(shown, 1);
+    await drop(shown, "#easel", "roof.tif", sea, "image/tiff");
+    await until(shown, () => /Only a painted PNG/.test(document.getElementById("toast")?.textContent ?? ""));
+    assert.equal(await shown.locator("dialog[open]").count(), 0);
+    assert.equal(sent(), 1);
+    assert.deepEqual(shown.problems, []);
+  });
+});
+
+describe("a take called grey", { skip: standIn }, () => {
+  it("is begun from, and compared with the scene without colours, like any other", async () => {
+    const { server, shown, close } = await opened({});
+    server.amounts.grey = 0.8;
+    server.change({ takes: [{ name: "grey", colorizer: "strokes", seconds: 2 }] });
+    const row = (name) => shown.locator(`#takes [data-take="${name}"]`);
+    await row("grey").waitFor({ timeout: patience });
+    assert.deepEqual(await shown.locator("#side-left option").allTextContents(), ["grey", "now", "take grey"]);
+    await row("grey").locator(".name-button").click();
+    await until(shown, () => window.cnerf.session.state.take === "grey");
+    assert.equal(server.amount, 0.8);
+    const both = shown.waitForRequest((r) => r.url().endsWith("/studio/frame") && JSON.parse(r.postData()).sides.length === 2, { timeout: patience });
+    await shown.selectOption("#side-left", { value: "" });
+    await shown.selectOption("#side-right", { value: "grey" });
+    await until(shown, () => window.cnerf.studio.field.right === "grey");
+    await both;
+    const compared = shown.waitForRequest((r) => r.url().endsWith("/studio/frame") && JSON.parse(r.postData()).sides.join() === ",grey", { timeout: patience });
+    await shown.evaluate(() => window.cnerf.studio.field.goToCamera(3));
+    await compared;
+    await row("").locator(".name-button").click();
+    await until(shown, () => window.cnerf.session.state.take === "");
+    assert.equal(server.amount, 0);
+    assert.deepEqual(shown.problems, []);
+    await close();
+  });
+});
+
+describe("the keyboard", { skip: standIn }, () => {
+  let server, shown, close;
+  before(async () => {
+    ({ server, shown, close } = await opened({}));
+    await until(shown, () => window.cnerf?.studio.field.settled);
+    await paintOn(shown, 1);
+  });
+  after(() => close?.());
+  const press = async (key, times) => {
+    for (let i = 0; i < times; ++i) await shown.keyboard.press(key);
+  };
+  const easel = () => shown.evaluate(() => {
+    const { cursor, corner, margin, node, photo, scale } = window.cnerf.studio.easel;
+    const inSight = cursor !== null && cursor.x >= margin.left && cursor.x <= node.clientWidth - margin.right && cursor.y >= margin.top && cursor.y <= node.clientHeight - margin.bottom;
+    return { corner, inSight, at: cursor && [(cursor.x - corner.x) / scale / photo.width, (cursor.y - corner.y) / scale / photo.height] };
+  });
+
+  it("reaches all of a photograph that is larger than the window, with the brush in sight", async () => {
+    await press("+", 5);
+    const before = await easel();
+    await press("Shift+ArrowRight", 80);
+    await press("Shift+ArrowDown", 50);
+    const { corner, inSight, at } = await easel();
+    assert.ok(inSight);
+    assert.ok(corner.x < before.corner.x && corner.y < before.corner.y, "the photograph moves");
+    assert.ok(at.every((share) => share > 0.99 && share < 1), `the brush is in its corner: ${at}`);
+    await press("Enter", 1);
+    await saved(shown);
+    const [[x, y]] = server.strokes[0].points;
+    assert.ok(Math.abs(x - at[0]) < 0.001 && Math.abs(y - at[1]) < 0.001, `painted at ${x}, ${y}`);
+  });
+  it("moves the photograph with the hand", async () => {
+    await press("h", 1);
+    const before = await easel();
+    await press("ArrowRight", 2);
+    await press("ArrowUp", 1);
+    const { corner } = await easel();
+    assert.ok(Math.abs(corner.x - before.corner.x - 80) < 1e-6 && Math.abs(corner.y - before.corner.y + 40) < 1e-6);
+    await press("b", 1);
+    await press("0", 1);
+  });
+  it("resets a slider, and deletes no stroke with it", async () => {
+    const strokes = (await shownStrokes(shown)).length;
+    for (const key of ["Delete", "Backspace"]) {
+      await brush(shown, { softness: 0.9 });
+      await shown.focus("#softness");
+      await press(key, 1);
+      assert.equal(await shown.evaluate(() => window.cnerf.session.brush.settings.softness), 0.25);
+    }
+    assert.equal((await shownStrokes(shown)).length, strokes);
+    assert.equal(await shown.locator(".slider").first().getAttribute("title"), "Double click, or Delete, resets");
+  });
+  it("picks the colours of a picture", async () => {
+    // Blue on the left, red on the right.
+    const halves = Buffer.alloc(64 * 48 * 3);
+    for (let p = 0; p < 64 * 48; ++p) halves.set(p % 64 < 32 ? [40, 120, 200] : [200, 40, 30], 3 * p);
+    await drop(shown, "[data-drop=picker]", "halves.png", png(64, 48, 3, halves));
+    await shown.waitForSelector(".picker-picture:not([hidden])");
+    await shown.focus("#choose-picture");
+    await press("Shift+Tab", 1);
+    assert.ok(await shown.evaluate(() => document.activeElement.classList.contains("picker-picture")), "it is a stop of the Tab key");
+    const picked = () => shown.evaluate(() => window.cnerf.session.brush.settings.color);
+    await press("ArrowLeft", 3);
+    await press("Enter", 1);
+    assert.equal(await picked(), "#2878c8");
+    await press("Shift+ArrowRight", 1);
+    assert.equal(await picked(), "#2878c8", "moving picks nothing");
+    await press("Enter", 1);
+    assert.equal(await picked(), "#c8281e");
+    assert.equal(await shown.evaluate(() => window.cnerf.session.photo), 1, "the photograph is still open");
+    assert.deepEqual(shown.problems, []);
   });
 });
 

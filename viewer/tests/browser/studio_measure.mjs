@@ -62,7 +62,7 @@ async function frame(view, width, height, sides) {
 async function measureFrames() {
   const { views } = await get("scene");
   const seen = [0.5, 0.1, 0.8].map((place) => views[Math.floor(place * views.length)]);
-  const both = ["grey", "now"];
+  const both = ["", "now"];
   while (!(await get("state")).ready) await new Promise((soon) => setTimeout(soon, 50)); // it caches views first
   await frame(seen[0], 160, 90, both);
   for (const [width, height, sides] of [[160, 90, both], [1280, 720, ["now"]], [1280, 720, both]]) {

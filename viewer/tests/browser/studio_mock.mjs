@@ -69,10 +69,11 @@ const wantedKinds = /\.(jpe?g|png|tiff?|webp|mp4|mov|mkv|avi|webm|m4v|json|bin|t
 /**
  * @param pictures  [{ width, height, rgb }]: what the views show, in colour; left out, a ball
  * @param stage     what there is at first: "photographs", "training" or "field"
+ * @param source    photographs that the studio was started with, "" = none
  * @param slow      steps of work wait for advance() instead of a clock
  */
 export class StudioMock {
-  constructor(page, { pictures, count = 8, title = "ball", steps = 6, stage = "field", slow = false } = {}) {
+  constructor(page, { pictures, count = 8, title = "ball", steps = 6, stage = "field", source = "", slow = false } = {}) {
     this.page = page;
     this.steps = steps;
     this.slow = slow;
@@ -82,7 +83,7 @@ export class StudioMock {
       views: this.pictures.map((picture, i) => ({ name: `images/${String(i).padStart(4, "0")}.png`, held_out: i === this.pictures.length - 1, width: picture.width, height: picture.height, ...camera(i, this.pictures.length, picture) })),
     };
     this.state = {
-      version: 1, stage, scene: 1, notes: [], arrived: { files: 0, bytes: 0 }, finish: { saturation: 1, hue: 0, exposure: 0 }, colors: 1, task: "", fraction: 0, figures: {}, message: "", failed: false, ready: stage === "field", writer: "", strokes: 0, take: "",
+      version: 1, stage, scene: 1, notes: [], arrived: { files: 0, bytes: 0, source }, finish: { saturation: 1, hue: 0, exposure: 0 }, colors: 1, task: "", fraction: 0, figures: {}, message: "", failed: false, ready: stage === "field", writer: "", strokes: 0, take: "",
       unkept: false, takes: [], commands: [], downloads: [], blender: "", cards: [], key_views: [],
     };
     this.strokes = [];
@@ -219,7 +220,7 @@ export class StudioMock {
   frame(response, { position, lens, sides }) {
     const { width, height } = lens;
     if (!(width > 0 && height > 0 && width <= 4096 && height <= 4096)) return this.refuse(response, 400, "lens: a picture has 1 to 4096 pixels a side.");
-    const amounts = sides.map((side) => (side === "grey" ? 0 : side === "now" ? this.amount : (this.amounts[side] ?? 0)));
+    const amounts = sides.map((side) => (side === "" ? 0 : side === "now" ? this.amount : (this.amounts[side] ?? 0)));
     const pictures = amounts.map((amount) => this.seen(position, lens, [amount])).map(({ width: w, height: h, channels, data }) => png(w, h, channels, data));
     const sizes = pictures.map((one) => one.length).join();
     response.writeHead(200, { "Content-Type": "image/png", "X-Cnerf-Colors": String(this.state.colors), "X-Cnerf-Sizes": sizes, "X-Cnerf-Milliseconds": "20" });
@@ -287,6 +288,11 @@ export class StudioMock {
     this.change({ strokes: revision + 1 });
     this.json(response, 200, { revision: revision + 1 });
   }
+  /** What is said where something arrived beside what the studio was started with. */
+  insteadOf() {
+    const { source } = this.state.arrived;
+    return source ? [`note: what has arrived is taken instead of ${source}`] : [];
+  }
   arrive(response, name, offset, body) {
     const refusal = this.refusals.get(name);
     if (refusal && refusal.times-- > 0) return this.refuse(response, refusal.status, refusal.sentence);
@@ -296,8 +302,9 @@ export class StudioMock {
     if (body.length > 8 * 2 ** 20) return this.refuse(response, 413, `${name}: a piece has 8 MiB at most.`);
     const before = offset === 0 ? Buffer.alloc(0) : (this.arrived.get(name) ?? Buffer.alloc(0));
     if (before.length !== offset) return this.refuse(response, 409, `${name}: ${before.length} bytes are here.`);
+    const isFirst = this.arrived.size === 0;
     this.arrived.set(name, Buffer.concat([before, body]));
-    this.change({ arrived: { files: this.arrived.size, bytes: [...this.arrived.values()].reduce((sum, file) => sum + file.length, 0) } });
+    this.change({ notes: [...this.state.notes, ...(isFirst ? this.insteadOf() : [])], arrived: { ...this.state.arrived, files: this.arrived.size, bytes: [...this.arrived.values()].reduce((sum, file) => sum + file.length, 0) } });
     this.json(response, 200, { bytes: offset + body.length });
   }
   train() {
@@ -350,8 +357,9 @@ export class StudioMock {
     const orders = {
       colour: () => this.run("colour", () => (command("cnerf colorize RUN --strokes RUN/strokes.json"), this.change({ unkept: true, message: "The scene is coloured." }))),
       prepare: () => {
-        if (this.arrived.size === 0) return;
-        this.change({ notes: [] });
+        const { files, source } = state.arrived;
+        if (files === 0 && !source) return;
+        this.change({ notes: files > 0 ? this.insteadOf() : [] });
         const lines = [`${this.arrived.size} photographs were read.`, "COLMAP finds what the photographs have in common.", "5 640 points in common were found.", "Cameras are placed.", `${this.arrived.size} of ${this.arrived.size} photographs were placed.`];
         this.run("prepare", () => {
           if (this.prepareFails) return this.change({ failed: true, message: this.prepareFails });
@@ -359,7 +367,7 @@ export class StudioMock {
           this.train();
         }, () => ((this.state.notes = [...this.state.notes, ...lines.splice(0, 1)].slice(-12)), {}));
       },
-      clear: () => (this.arrived.clear(), this.change({ arrived: { files: 0, bytes: 0 }, notes: [], failed: false, message: "" })),
+      clear: () => (this.arrived.clear(), this.change({ arrived: { ...state.arrived, files: 0, bytes: 0 }, notes: [], failed: false, message: "" })),
       train: () => this.train(),
       builtin: () => this.run("colour", () => ((this.amounts.builtin = this.amount), this.change({ takes: [...state.takes, { name: "builtin", colorizer: "built-in", seconds: 2 }], take: "builtin", unkept: false }))),
       stop: () => this.end?.(),

@@ -115,6 +115,63 @@ describe("strokes", () => {
     await document.save();
     expect(store.list).toEqual(document.list);
   });
+  it("and what they colour are undone one after the other", async () => {
+    const { document, store } = await opened();
+    document.add(stroke("a"));
+    document.setEverywhere(true);
+    document.add(stroke("b"));
+    document.undo();
+    expect([ids(document.list), document.everywhere]).toEqual(["a", true]);
+    document.undo();
+    expect([ids(document.list), document.everywhere]).toEqual(["a", false]);
+    await document.save();
+    expect([ids(store.list), store.everywhere]).toEqual(["a", false]);
+    document.redo();
+    expect([ids(document.list), document.everywhere]).toEqual(["a", true]);
+    await document.save();
+    expect(store.everywhere).toBe(true);
+  });
+  it("that the server made of a sent picture are undone like the user's own", async () => {
+    const { document, store } = await opened();
+    document.add(stroke("a"));
+    await document.save();
+    const before = document.list;
+    store.list.push(stroke("p", { kind: "picture", picture: "abc", points: [] }));
+    store.revision += 1;
+    // The news and the answer tell of the same list.
+    await Promise.all([document.follow(2), document.follow(2)]);
+    document.adopt(before);
+    document.undo();
+    await document.save();
+    expect(ids(store.list)).toBe("a");
+    document.redo();
+    await document.save();
+    expect(ids(store.list)).toBe("ap");
+    document.adopt(document.list);
+    document.undo();
+    expect(ids(document.list), "nothing new is no step").toBe("a");
+  });
+  it("that were saved meanwhile are not lost to an older list", async () => {
+    const { document, store } = await opened();
+    store.list = [stroke("x")];
+    store.revision = 1;
+    const answers: (() => void)[] = [];
+    const { strokes } = store;
+    store.strokes = async () => {
+      const answer = await strokes.call(store);
+      await new Promise<void>((done) => answers.push(done));
+      return answer;
+    };
+    const following = document.follow(1);
+    while (answers.length === 0) await Promise.resolve();
+    store.strokes = strokes;
+    document.add(stroke("a"));
+    await document.save();
+    expect(ids(store.list)).toBe("xa");
+    answers[0]();
+    await following;
+    expect([ids(document.list), document.revision]).toEqual(["xa", 2]);
+  });
   it("of two tabs come together where the other one was faster, and undo takes back only one's own", async () => {
     const { document, store, told } = await opened();
     document.add(stroke("a"));
@@ -255,6 +312,7 @@ describe("strokes", () => {
     expect(both[1].color).toBe("#111111");
     expect(both[2].hidden).toBe(true);
     expect(merged(base, mine, base)).toBe(mine);
+    expect(merged(base, base, theirs)).toBe(theirs);
   });
 });
 
