@@ -26,7 +26,7 @@ inline constexpr std::array<ExitCodeMeaning, 15> kExitCodes = {{
     {ExitCode::kBusy, "another cnerf works in the same folder"},
     {ExitCode::kColorizer, "a colorizer failed, timed out or answered nonsense"},
     {ExitCode::kPoses, "no camera poses can be found"},
-    {ExitCode::kSnapshot, "a snapshot of another version, or cut short"},
+    {ExitCode::kSnapshot, "a snapshot of another version or training, or cut short"},
     {ExitCode::kDiverged, "training diverged; the last good snapshot is kept"},
     {ExitCode::kInterrupted, "stopped by Ctrl-C; what can go on goes on with --resume"},
 }};

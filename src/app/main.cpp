@@ -35,6 +35,15 @@ void check_words(int argc, char** argv) {
   }
 }
 
+/// The same of the folder that relative names are of.
+void check_working_folder() {
+  std::error_code failure;  // where it is gone, who uses it says so
+  const std::string folder = std::filesystem::current_path(failure).string();
+  if (is_utf8(folder)) return;
+  throw UsageError("expected a working folder whose name is in UTF-8, found '" + printable(folder) +
+                   "'; call cnerf from another one");
+}
+
 /// Libraries say by their own exceptions that memory did not suffice.
 bool is_shortage_of_memory(const std::exception& error) {
   const std::string text = error.what();
@@ -70,6 +79,7 @@ void run_program(CLI::App& program, int argc, char** argv) {
   program.set_version_flag("--version", "cnerf " + pipeline::version_text());
   const std::vector<ParsedCommand> commands = declare_commands(program);
   program.parse(argc, argv);
+  check_working_folder();
 
   const ParsedCommand& chosen = chosen_command(program, commands);
   if (chosen.command->shared) cluster::join_world();

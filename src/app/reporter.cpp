@@ -34,6 +34,11 @@ std::string figure_text(double value) {
   return fmt::format("{:.4g}", value);
 }
 
+/// Names of files need not be in UTF-8.
+std::string json_text(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 }  // namespace
 
 ProgressStyle progress_style(const std::string& name, std::FILE* out) {
@@ -75,7 +80,7 @@ void Reporter::print_progress(const Progress& progress, double remaining) {
       json["figures"][name] = std::isfinite(value) ? Json(value) : Json();
     }
     if (remaining >= 0) json["remaining_seconds"] = remaining;
-    return print_json(json.dump());
+    return print_json(json_text(json));
   }
   std::string text = fmt::format("{} {:3.0f} %", progress.task, 100 * progress.fraction);
   for (const auto& [name, value] : progress.figures) text += fmt::format("  {} {}", name, figure_text(value));
@@ -100,7 +105,7 @@ void Reporter::print_json(const std::string& json) {
 }
 
 void Reporter::say(const std::string& text) {
-  if (style_ == ProgressStyle::kJson) return print_json(Json{{"event", "message"}, {"text", text}}.dump());
+  if (style_ == ProgressStyle::kJson) return print_json(json_text({{"event", "message"}, {"text", text}}));
   if (style_ == ProgressStyle::kQuiet || style_ == ProgressStyle::kSilent) return;
   end_line();
   fmt::print(out_, "{}\n", text);
@@ -110,7 +115,7 @@ void Reporter::say(const std::string& text) {
 void Reporter::wrote(const std::string& what, const std::filesystem::path& path) {
   if (style_ == ProgressStyle::kSilent) return;
   if (style_ == ProgressStyle::kJson) {
-    return print_json(Json{{"event", "wrote"}, {"what", what}, {"path", path.string()}}.dump());
+    return print_json(json_text({{"event", "wrote"}, {"what", what}, {"path", path.string()}}));
   }
   end_line();
   fmt::print(out_, "{:<18} {}\n", what + ":", path.string());
@@ -118,7 +123,7 @@ void Reporter::wrote(const std::string& what, const std::filesystem::path& path)
 }
 
 void Reporter::next(const std::string& text) {
-  if (style_ == ProgressStyle::kJson) return print_json(Json{{"event", "next"}, {"text", text}}.dump());
+  if (style_ == ProgressStyle::kJson) return print_json(json_text({{"event", "next"}, {"text", text}}));
   if (style_ == ProgressStyle::kQuiet || style_ == ProgressStyle::kSilent) return;
   end_line();
   fmt::print(out_, "{:<18} {}\n", "next:", text);

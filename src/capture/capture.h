@@ -54,6 +54,9 @@ struct Capture {
   bool is_bounded_object = false;  ///< every view has alpha: nothing outside the object matters
   int listed_images = 0;           ///< images the poses file lists, of which `views.size()` exist
   std::vector<std::string> notes;  ///< what a user should know: missing images, conversions
+  /// Digest of poses and lenses of the views to train on, as the source has them: whatever the downscale, and wherever
+  /// the folder lies. Who moves cameras leaves it. Empty: unknown.
+  std::string cameras;
 };
 
 }  // namespace cnerf

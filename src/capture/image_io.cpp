@@ -132,6 +132,21 @@ std::vector<float> area_resized_plane(const std::vector<float>& values, int chan
   return out;
 }
 
+double white_of(const cv::Mat& mask) {
+  return mask.depth() == CV_8U ? 255 : mask.depth() == CV_16U ? 65535 : 1;
+}
+
+/// A mask of ones, or of bytes in 16 bits, would hide everything, though it is not black. A soft one without white is
+/// of a view that does not show what is masked for.
+void refuse_ones(const cv::Mat& mask, const fs::path& file) {
+  double lightest = 0;
+  cv::minMaxLoc(mask, nullptr, &lightest);
+  const double most_of_ones = mask.depth() == CV_8U ? 1 : mask.depth() == CV_16U ? 255 : 0;
+  if (lightest <= 0 || lightest > most_of_ones) return;
+  throw InputError(file, "values",
+                   fmt::format("expected black and white, the lightest is {:g} of {:g}", lightest, white_of(mask)));
+}
+
 template <typename T>
 T quantised(float value, float largest) {
   return T(std::lround(std::clamp(value, 0.0f, 1.0f) * largest));
@@ -257,9 +272,11 @@ std::vector<std::uint8_t> read_mask(const fs::path& file, int width, int height)
                          size_text(found_width, found_height));
   };
   if (const auto header = stated_header(file)) check_shape(header->width, header->height);
-  const cv::Mat stored = decode_file(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+  constexpr int kGrey = cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION;
+  const cv::Mat stored = decode_file(file, kGrey);
   check_shape(stored.cols, stored.rows);
-  cv::Mat binary = (stored >= 128) / 255;  // lossy masks are not exactly black and white
+  refuse_ones(stored, file);
+  cv::Mat binary = (stored > 0.5 * white_of(stored)) / 255;  // lossy masks are not exactly black and white
   cv::Mat counts;
   binary.convertTo(counts, CV_32F);
   if (stored.cols != width) cv::resize(counts, counts, {width, height}, 0, 0, cv::INTER_AREA);

@@ -6,9 +6,11 @@
 #include <cmath>
 #include <exception>
 #include <map>
+#include <span>
 #include <utility>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/base/text.h"
 #include "src/capture/black_background.h"
@@ -342,6 +344,45 @@ void mask_what_is_transparent(MonoImage& image) {
   image.alpha.clear();
 }
 
+/// Where all pixels are masked, training would learn from masked ones.
+void refuse_without_pixels(const Capture& capture) {
+  const auto shows_something = [](const View& view) {
+    if (view.held_out) return false;
+    const PixelPlane<std::uint8_t>& mask = view.image.mask;
+    return mask.empty() || std::any_of(mask.begin(), mask.end(), [](int code) { return code != 0; });
+  };
+  if (std::ranges::any_of(capture.views, shows_something)) return;
+  throw InputError(capture.root, "masks",
+                   "expected some pixels of the views to train on, found all masked or transparent");
+}
+
+/// See `Capture::cameras`. Numbers count in millionths, of the cameras' reach or of a picture's side, so that neither a
+/// downscale nor another processor rounds them differently. Round numbers are common, so borders lie beside them.
+std::string digest_of_cameras(const std::vector<View>& views) {
+  double reach = 0;
+  for (const View& view : views) {
+    const Vec3d at = view.world_from_camera.translation;
+    if (!view.held_out) reach = std::max({reach, std::abs(at.x), std::abs(at.y), std::abs(at.z)});
+  }
+  int exponent = 0;
+  (void)std::frexp(1.37 * reach, &exponent);
+  std::string text = fmt::format("{}\n", exponent);
+  const auto add = [&](double number) { text += fmt::format("{} ", std::floor(std::ldexp(number, 20) + 0.38)); };
+  for (const View& view : views) {
+    if (view.held_out) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int column = 0; column < 3; ++column) add(view.world_from_camera.linear.rows[axis][column]);
+      add(std::ldexp(view.world_from_camera.translation[axis], -exponent));
+    }
+    const Intrinsics& lens = view.intrinsics;
+    const double width = lens.width, height = lens.height;
+    text += fmt::format("{} ", int(lens.model));
+    for (const double number : {lens.fx / width, lens.fy / height, lens.cx / width, lens.cy / height}) add(number);
+    for (const double coefficient : lens.distortion) add(coefficient);
+  }
+  return sha256(std::as_bytes(std::span(text)));
+}
+
 /// What the pixels of all views will take, by the headers that say it.
 std::size_t stated_bytes(const std::vector<ListedView>& listed) {
   double bytes = 0;
@@ -452,6 +493,8 @@ Capture load_capture(const fs::path& path, const CaptureOptions& options, const 
       put(view.image);
     }
   }
+  refuse_without_pixels(capture);
+  capture.cameras = digest_of_cameras(capture.views);
   return capture;
 }
 

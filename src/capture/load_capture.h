@@ -34,7 +34,8 @@ struct CaptureOptions {
 /// name.
 /// @throws MissingInputError  no such folder, or no marker: the message lists what was looked for.
 /// @param memory  for its pixels; images are read one by one on each thread, whatever their number
-/// @throws InputError         fewer than 2 usable views, bad poses, truncated files; names file, field and value.
+/// @throws InputError         fewer than 2 usable views, bad poses, truncated files, masks that leave nothing to train
+///                            on; names file, field and value.
 /// @throws OutputError        pixels are more than their memory and cannot be written to a file.
 [[nodiscard]] Capture load_capture(const std::filesystem::path& path, const CaptureOptions& options = {},
                                    const ImageMemory& memory = {});

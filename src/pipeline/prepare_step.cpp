@@ -24,6 +24,9 @@ namespace {
 constexpr const char* kMark = "work/source.txt";
 /// What says the same once the capture is finished: work/ may be deleted then.
 constexpr const char* kRecord = "prepare.json";
+/// What preparing makes, and clears to make it again: first what says that it is finished, last what says whose it is.
+constexpr std::array kMade = {
+    "transforms.json", prepare::kPointsFile, "contact_sheet.png", "images", "masks", kRecord, "work"};
 
 /// What moved in a view, together with what was masked already, at the size of the view.
 cv::Mat1b still_part(const prepare::MotionMask& mask, const MonoImage& image) {
@@ -66,8 +69,8 @@ void mask_motion(const fs::path& capture, const prepare::MotionMaskOptions& opti
   }
   record["motion"]["difference"] = options.motion_difference;
   record["motion"]["steps"] = options.motion_steps;
-  write_file(capture / kRecord, record.dump(1) + "\n");
   write_file(capture / "transforms.json", transforms.dump(1) + "\n");
+  write_file(capture / kRecord, record.dump(1) + "\n");  // last: it says that all of this was done
   observer.say(fmt::format("motion: {:.1f} % of the pictures is masked (masks/still_*.png)", 100 * share));
   if (!left_alone.empty()) observer.say("motion: fitted too badly to tell, not masked: " + left_alone);
 }
@@ -84,6 +87,25 @@ std::optional<std::string> origin_in(const fs::path& out) {
   const auto source = record.find("source");
   if (source == record.end() || !source->is_string()) return {};
   return source->get<std::string>() + "\n";
+}
+
+bool is_within(const fs::path& path, const fs::path& folder) {
+  return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first == folder.end();
+}
+
+/// Clears a folder to make its capture again.  @throws UsageError  where that would remove what it is made of
+void clear_capture(const PrepareJob& job) {
+  const auto place_of = [](const fs::path& path) { return fs::weakly_canonical(fs::absolute(path)); };
+  const prepare::PrepareOptions& options = job.options.capture;
+  for (const fs::path& input :
+       {job.source, job.source / "images", fs::path(options.masks), fs::path(options.colmap_model)}) {
+    for (const char* made : kMade) {
+      if (input.empty() || !is_within(place_of(input), place_of(job.out / made))) continue;
+      throw UsageError(input.string() + ": --overwrite would remove it, with " + (job.out / made).string() +
+                       "; choose another folder for the capture");
+    }
+  }
+  for (const char* made : kMade) remove_output(job.out / made);
 }
 
 /// Whether a folder may take the capture; clears what is to be made again.
@@ -107,15 +129,20 @@ bool begin_folder(const PrepareJob& job) {
                        (finished ? ": holds a capture already; pass --overwrite to make it again"
                                  : ": was begun already; pass --resume to go on or --overwrite to start again"));
     }
-    if (existing.overwrite) {
-      for (const char* made :
-           {"images", "masks", "work", "transforms.json", prepare::kPointsFile, kRecord, "contact_sheet.png"}) {
-        remove_output(out / made);
-      }
-    }
+    if (existing.overwrite) clear_capture(job);
   }
   write_file(out / kMark, origin_of(job));
   return true;
+}
+
+/// A finished capture stays as it is, so its source has to have been read as is asked now.
+/// @throws UsageError
+void check_transfer(const PrepareJob& job, const nlohmann::ordered_json& record) {
+  const std::string& asked = job.options.capture.sensor.transfer;
+  const nlohmann::ordered_json::json_pointer place("/transfer/source");
+  if (asked == "srgb" || (record.contains(place) && record.at(place) == asked)) return;
+  throw UsageError(job.out.string() + ": was prepared with another transfer; cnerf prepare " + job.source.string() +
+                   " -o " + job.out.string() + " --transfer " + asked + " --overwrite makes it again");
 }
 
 /// Whether files came, went or were written in a source after its capture was finished.
@@ -140,15 +167,17 @@ bool was_begun_for_another(const PrepareJob& job) {
 
 void prepare_step(const PrepareJob& job, const Engines& engines, Observer& observer) {
   const PrepareStepOptions& options = job.options;
+  prepare::check_options(options.capture);
   if (!fs::exists(job.source)) throw MissingInputError(job.source.string() + ": no such file or folder");
   const FolderLock lock = lock_folder(job.out, FolderLock::Mode::kAlone, observer);
   if (!begin_folder(job)) {
+    const auto record = read_json(job.out / kRecord);
+    check_transfer(job, record);
     observer.say("capture: " + job.out.string() + " was prepared before");
     if (has_changed_since(job.source, job.out)) {
       observer.say("note: " + job.source.string() + " has changed since; cnerf prepare " + job.source.string() +
                    " -o " + job.out.string() + " --overwrite takes what is there now");
     }
-    const auto record = read_json(job.out / kRecord);
     if (options.motion_masks && !record.contains("motion")) mask_motion(job.out, options.motion, engines, observer);
     return;
   }
@@ -159,13 +188,15 @@ void prepare_step(const PrepareJob& job, const Engines& engines, Observer& obser
   observer.wrote("capture", job.out);
 }
 
-fs::path capture_of(const fs::path& source, const fs::path& run, Observer& observer) {
+fs::path capture_of(const fs::path& source, const fs::path& run, const std::string& transfer, Observer& observer) {
   if (!prepare::needs_preparing(source)) return source;
   fs::path folder = fs::absolute(run).lexically_normal();
   if (folder.filename().empty()) folder = folder.parent_path();
   const fs::path capture = folder.parent_path() / (folder.filename().string() + "-capture");
   observer.say("no camera poses in " + source.string() + ": preparing a capture (cnerf prepare has options for this)");
-  prepare_step({source, capture, {}, {.resume = true}}, cpu_engines(), observer);
+  PrepareJob job{source, capture, {}, {.resume = true}};
+  job.options.capture.sensor.transfer = transfer;
+  prepare_step(job, cpu_engines(), observer);
   return capture;
 }
 

@@ -2,6 +2,7 @@
 /// Preparing as a step of a run, or alone.
 
 #include <filesystem>
+#include <string>
 
 #include "src/engine/engines.h"
 #include "src/pipeline/run_context.h"
@@ -35,12 +36,15 @@ struct PrepareJob {
 
 /// Makes a capture, unless it is there and `existing.resume` is set, and says what it wrote.
 /// @throws UsageError  when there is a capture, or anything else, and neither choice is made; when both are; when
-///                     `existing.resume` is set and the folder was begun for another source; and as `prepare_capture`.
+///                     `existing.resume` is set and the folder was begun for another source, or finished with another
+///                     transfer; when an input lies in what `existing.overwrite` clears; and as `check_options` and
+///                     `prepare_capture`.
 void prepare_step(const PrepareJob& job, const Engines& engines, Observer& observer);
 
 /// What a run works on: `source` itself if it is a capture; else the capture that is made of it beside the run's
-/// folder, or was made by an earlier call.  @throws  as `prepare_step`.
+/// folder, or was made by an earlier call. That one is sRGB-encoded.
+/// @param transfer  of the source's grey values  @throws  as `prepare_step`.
 [[nodiscard]] std::filesystem::path capture_of(const std::filesystem::path& source, const std::filesystem::path& run,
-                                               Observer& observer);
+                                               const std::string& transfer, Observer& observer);
 
 }  // namespace cnerf::pipeline

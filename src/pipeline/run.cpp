@@ -27,9 +27,9 @@ bool is_done(const RunJob& job, const fs::path& output) {
 }
 
 /// Rank 0 makes the capture, if that is to be made; the others wait.
-fs::path common_capture(const RunJob& job, Observer& observer) {
+fs::path common_capture(const RunJob& job, const std::string& transfer, Observer& observer) {
   cluster::Ranks& world = cluster::world();
-  return world.agreed(world.is_first() ? capture_of(job.capture, job.out, observer).string() : "");
+  return world.agreed(world.is_first() ? capture_of(job.capture, job.out, transfer, observer).string() : "");
 }
 
 /// A damaged manifest is none.
@@ -100,7 +100,9 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& one_ob
   const RunDirectory directory(job.out);
   const FolderLock lock = claim_run_folder(directory, job.existing, observer);
   if (!job.grey) choose_colorizer(job.capture, config, observer);
-  job.capture = common_capture(job, observer);
+  const fs::path capture = common_capture(job, config.capture.transfer, observer);
+  if (capture != job.capture) config.capture.transfer = "srgb";  // it was prepared of what had another
+  job.capture = capture;
 
   RunContext context{directory, config, read_capture(job.capture, config, observer, directory.root()),
                      job.command_line};

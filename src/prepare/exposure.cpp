@@ -4,7 +4,9 @@
 #include <cmath>
 #include <map>
 #include <opencv2/imgproc.hpp>
+#include <sstream>
 
+#include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/base/statistics.h"
 #include "src/capture/byte_reader.h"
@@ -182,9 +184,12 @@ std::vector<ViewLight> solve_exposures_and_haze(int views, const std::vector<Sig
   return fit.light();
 }
 
-std::vector<Observation> read_observations(const fs::path& model) {
-  constexpr long long kNoPoint = -1;
-  ByteReader in(model / "images.bin");
+namespace {
+
+constexpr long long kNoPoint = -1;
+
+std::vector<Observation> read_binary_observations(const fs::path& file) {
+  ByteReader in(file);
   std::vector<Observation> out;
   const auto count = in.next<std::uint64_t>("number of images");
   for (std::uint64_t i = 0; i < count; ++i) {
@@ -204,27 +209,50 @@ std::vector<Observation> read_observations(const fs::path& model) {
   return out;
 }
 
+/// Two lines per image: pose and name, then its observations, which may be none.
+std::vector<Observation> read_text_observations(const fs::path& file) {
+  std::istringstream in(read_text_file(file));
+  const auto next = [&in](std::string& line) {
+    while (std::getline(in, line)) {
+      if (line.ends_with('\r')) line.pop_back();
+      if (!line.starts_with('#')) return true;
+    }
+    return false;
+  };
+  std::vector<Observation> out;
+  for (std::string pose, points; next(pose) && next(points);) {
+    Observation seen;
+    std::istringstream words(pose), numbers(points);
+    for (int word = 0; word < 9; ++word) words >> seen.image;  // its number, rotation, translation, camera
+    std::getline(words >> std::ws, seen.image);
+    while (numbers >> seen.x >> seen.y >> seen.point) {
+      if (seen.point != kNoPoint) out.push_back(seen);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<Observation> read_observations(const fs::path& model) {
+  if (fs::exists(model / "images.bin")) return read_binary_observations(model / "images.bin");
+  return read_text_observations(model / "images.txt");
+}
+
 std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, const fs::path& capture,
                                          const fs::path& model, bool with_haze) {
-  if (!fs::exists(model / "images.bin")) return std::nullopt;
-  std::map<std::string, int> number_of;
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    number_of[fs::path(images[i].name).stem().string()] = int(i);
-    number_of[images[i].source.stem().string()] = int(i);
-  }
+  const ImagePlaces places(images);
   std::vector<std::vector<Observation>> by_image(images.size());
   for (Observation& seen : read_observations(model)) {
-    const auto found = number_of.find(fs::path(seen.image).stem().string());
-    if (found != number_of.end()) by_image[std::size_t(found->second)].push_back(std::move(seen));
+    if (const auto found = places.of(seen.image)) by_image[*found].push_back(std::move(seen));
   }
   std::vector<std::vector<Sighting>> parts(images.size());
   parallel_tasks(images.size(), [&](std::size_t i) {
     if (by_image[i].empty()) return;
     const cv::Mat1f light = smoothed(capture / "images" / images[i].name);
     for (const Observation& seen : by_image[i]) {
-      const int x = int(seen.x), y = int(seen.y);
-      if (x < 0 || y < 0 || x >= light.cols || y >= light.rows) continue;
-      const float value = light(y, x);
+      if (!(seen.x >= 0 && seen.y >= 0 && seen.x < light.cols && seen.y < light.rows)) continue;
+      const float value = light(int(seen.y), int(seen.x));
       if (value > kDarkest && value < kLightest) parts[i].push_back({int(i), int(seen.point), double(value)});
     }
   });
@@ -236,6 +264,7 @@ std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, con
       sightings.push_back(seen);
     }
   }
+  if (sightings.empty()) return std::nullopt;
   const std::vector<double> exposures = solve_exposures(int(images.size()), sightings);
   double squared = 0;
   for (const double exposure : exposures) squared += std::log(exposure) * std::log(exposure) / double(exposures.size());

@@ -40,7 +40,7 @@ struct Observation {
   long long point = 0;
   double x = 0, y = 0;  ///< pixels
 };
-/// The observations of a binary COLMAP model's images.bin.  @throws MissingInputError, InputError.
+/// The observations of a COLMAP model: of its images.bin, else its images.txt.  @throws MissingInputError, InputError.
 [[nodiscard]] std::vector<Observation> read_observations(const std::filesystem::path& model);
 
 /// The spread of exposures from which they are kept: relative standard deviation. Below it, differences are as likely
@@ -49,7 +49,8 @@ inline constexpr double kNotedExposure = 0.02;
 
 /// Fills `exposure` of the images from what they show of the model's points, and `haze` if asked to; leaves 1 and 0
 /// where exposures spread less than kNotedExposure.
-/// @return  the spread found; nothing when the model does not say what it was made of (a text model).
+/// @return  the spread found; nothing when the model names no point in the images, or none that is neither dark nor
+///          clipped there
 std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, const std::filesystem::path& capture,
                                          const std::filesystem::path& model, bool with_haze);
 

@@ -1,5 +1,7 @@
 #include "src/prepare/photographs.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -51,11 +53,11 @@ void refuse_heic(const fs::path& folder, const std::vector<fs::path>& files) {
 }
 
 /// Stored codes, read as if they were linear, to luminance.
-void apply_levels(LinearImage& image, const SensorOptions& sensor) {
+void apply_levels(LinearImage& image, const SensorOptions& sensor, const fs::path& file) {
   if (image.depth == PixelDepth::kF32) return;
-  const double largest = image.depth == PixelDepth::kU8 ? 255 : 65535;
-  const double black = sensor.black_level / largest;
-  const double white = sensor.white_level > 0 ? sensor.white_level / largest : 1;
+  const int largest = image.depth == PixelDepth::kU8 ? 255 : 65535;
+  const Levels levels = levels_of(sensor, largest, file);
+  const double black = levels.black / largest, white = levels.white / largest;
   const Transfer transfer = transfer_named(sensor.transfer);
   const auto decoded = [&](float code) {
     return decode_transfer(transfer, std::clamp(float((code - black) / (white - black)), 0.0f, 1.0f));
@@ -103,11 +105,17 @@ void write_image(const fs::path& file, const LinearImage& image, bool eight_bit)
   }
 }
 
-void write_mask(const fs::path& mask, const PreparedImage& image, const Upright& grid, const fs::path& target) {
+void write_mask(const fs::path& mask, Upright grid, const fs::path& target) {
+  // Of a photograph on its side the shape tells whether the mask was made of what is stored or of what is shown.
+  if (grid.orientation > 4) {
+    const ImageHeader found = image_header(mask);
+    const bool is_as_stored = same_shape(grid.stored_width, grid.stored_height, found.width, found.height);
+    if (!is_as_stored) grid = {1, grid.width(), grid.height()};
+  }
   const std::vector<std::uint8_t> stored = read_mask(mask, grid.stored_width, grid.stored_height);
-  cv::Mat1b upright(image.height, image.width);
-  for (int y = 0; y < image.height; ++y) {
-    for (int x = 0; x < image.width; ++x) upright(y, x) = stored[grid.stored_index(x, y)];
+  cv::Mat1b upright(grid.height(), grid.width());
+  for (int y = 0; y < upright.rows; ++y) {
+    for (int x = 0; x < upright.cols; ++x) upright(y, x) = stored[grid.stored_index(x, y)];
   }
   write_png(target, upright);
 }
@@ -144,15 +152,16 @@ struct Imported {
 Imported import_one(const fs::path& file, const std::string& name, const fs::path& capture,
                     const std::map<std::string, fs::path>& masks, const SensorOptions& sensor) {
   Imported out;
+  Upright grid;
   try {
     if (!is_utf8(name)) throw InputError(printable(file.string()), "name", "expected UTF-8");
     const std::vector<std::byte> content = read_binary_file(file);
     const ExifFacts exif = read_exif(content);
     LinearImage stored = read_linear_image(file, Transfer::kLinear);
-    apply_levels(stored, sensor);
+    apply_levels(stored, sensor, file);
     const bool eight_bit = stays_eight_bit(stored, sensor);
     stored = luminance_image(std::move(stored));
-    const Upright grid = {orientation_of(content), stored.width, stored.height};
+    grid = {orientation_of(content), stored.width, stored.height};
     const LinearImage upright = turned_upright(std::move(stored), grid.orientation);
     PreparedImage& image = out.image;
     image.name = name + (upright.depth == PixelDepth::kF32 ? ".exr" : ".png");
@@ -165,12 +174,14 @@ Imported import_one(const fs::path& file, const std::string& name, const fs::pat
     out.lens = exif.camera + " " + std::to_string(std::lround(exif.focal_mm * 10)) + " " +
                std::to_string(std::lround(exif.focal_35mm));
     write_image(capture / "images" / image.name, upright, eight_bit);
-    if (const auto mask = masks.find(file.stem().string()); mask != masks.end()) {
-      image.mask = fs::path("masks") / (name + ".png");
-      write_mask(mask->second, image, grid, capture / image.mask);
-    }
   } catch (const InputError& failure) {
     out.problem = failure.what();
+    return out;
+  }
+  // A mask that does not fit is a mistake to mend: its photograph is neither left out nor shown unmasked.
+  if (const auto mask = masks.find(file.stem().string()); mask != masks.end()) {
+    out.image.mask = fs::path("masks") / (name + ".png");
+    write_mask(mask->second, grid, capture / out.image.mask);
   }
   return out;
 }
@@ -190,6 +201,35 @@ void group_into_cameras(std::vector<Imported>& imported, PhotographSet& set) {
 }
 
 }  // namespace
+
+Levels levels_of(const SensorOptions& sensor, int largest, const fs::path& source) {
+  const Levels out = {sensor.black_level, sensor.white_level > 0 ? sensor.white_level : double(largest)};
+  if (out.white > largest) {
+    throw UsageError(fmt::format("white_level: expected at most {}, the largest code of {}, found {:g}", largest,
+                                 source.string(), out.white));
+  }
+  if (out.black >= out.white) {
+    throw UsageError(fmt::format("black_level: expected less than {:g}, the white of {}, found {:g}", out.white,
+                                 source.string(), out.black));
+  }
+  return out;
+}
+
+ImagePlaces::ImagePlaces(const std::vector<PreparedImage>& images) {
+  const auto add = [&](const fs::path& name, std::size_t place) {
+    by_name_[name.filename().string()] = place;
+    by_stem_[name.stem().string()] = place;
+  };
+  for (std::size_t i = 0; i < images.size(); ++i) add(images[i].source, i);
+  for (std::size_t i = 0; i < images.size(); ++i) add(images[i].name, i);
+}
+
+std::optional<std::size_t> ImagePlaces::of(const std::string& name) const {
+  const fs::path path(name);
+  if (const auto found = by_name_.find(path.filename().string()); found != by_name_.end()) return found->second;
+  const auto found = by_stem_.find(path.stem().string());
+  return found != by_stem_.end() ? std::optional(found->second) : std::nullopt;
+}
 
 std::map<std::string, fs::path> masks_in(const fs::path& folder) {
   std::map<std::string, fs::path> masks;

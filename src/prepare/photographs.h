@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,6 +32,14 @@ struct SensorOptions {
   }
 };
 
+/// Codes of a source that mean no light and white.
+struct Levels {
+  double black = 0, white = 0;
+};
+/// @param largest  code of the source's depth
+/// @throws UsageError  unless black is below white, and white a code that the source can have; names the option
+[[nodiscard]] Levels levels_of(const SensorOptions& sensor, int largest, const std::filesystem::path& source);
+
 /// One image of the capture to be.
 struct PreparedImage {
   std::string name;                   ///< file name below `images/`
@@ -54,6 +63,18 @@ struct PhotographSet {
   std::vector<std::string> notes;
 };
 
+/// Places of images by what a COLMAP model calls them: their own names, which are all different and go first, those of
+/// their photographs, or the stems of either.
+class ImagePlaces {
+ public:
+  explicit ImagePlaces(const std::vector<PreparedImage>& images);
+  /// @param name  may have folders
+  [[nodiscard]] std::optional<std::size_t> of(const std::string& name) const;
+
+ private:
+  std::map<std::string, std::size_t> by_name_, by_stem_;
+};
+
 /// The photographs of a folder, sorted; if it holds none itself, those of its `images` folder.
 /// @throws MissingInputError  no such folder, or no photograph in it.
 /// @throws InputError  HEIC files, with the command that converts them.
@@ -65,9 +86,11 @@ struct PhotographSet {
 /// Writes every photograph to `capture/images`: turned upright as its EXIF note says, colours reduced to luminance,
 /// levels applied, never resampled. 8-bit photographs become 8-bit PNG files, deeper ones 16-bit PNG, floats EXR;
 /// integer codes are sRGB-encoded whatever the source was.
-/// @param masks  folder of masks named as the photographs (any image extension), black = ignore; empty: none.
+/// @param masks  folder of masks named as the photographs (any image extension), black = ignore; empty: none. They have
+///               the stored pixels of the photograph; of one on its side (EXIF 5 to 8) also those that are shown, and
+///               of a TIFF those that are shown.
 /// @throws MissingInputError  a mask folder without a mask.  @throws InputError  when fewer than 2 can be read, or a
-/// mask does not fit.  @throws Interrupted.
+/// mask does not fit.  @throws UsageError  levels that a photograph cannot have.  @throws Interrupted.
 [[nodiscard]] PhotographSet import_photographs(const std::vector<std::filesystem::path>& files,
                                                const std::filesystem::path& capture, const std::filesystem::path& masks,
                                                const SensorOptions& sensor, const ProgressSink& progress);

@@ -79,33 +79,36 @@ Material read_material(const fs::path& source, const fs::path& capture, const Pr
 
 /// Gives the views of a model the names of our images: those of COLMAP's own run, or those with the same stem.
 Poses poses_of_model(const fs::path& model, const fs::path& capture, const std::vector<PreparedImage>& images) {
-  std::map<std::string, const PreparedImage*> by_name;
-  for (const PreparedImage& image : images) {
-    by_name[fs::path(image.name).stem().string()] = &image;
-    by_name[image.source.stem().string()] = &image;
-  }
+  const ImagePlaces places(images);
+  std::map<std::size_t, std::string> listed_as;  // names in the model by the place
   Poses out;
   out.model = model;
   CaptureListing listing = read_colmap(capture, model);
   std::vector<ListedView> taken;
   for (const ListedView& listed : listing.views) {
-    const auto found = by_name.find(fs::path(listed.name).stem().string());
-    if (found == by_name.end()) continue;
+    const auto found = places.of(listed.name);
+    if (!found) continue;
+    const PreparedImage& image = images[*found];
+    const auto [other, is_first] = listed_as.try_emplace(*found, listed.name);
+    if (!is_first) {
+      throw InputError(model, "image " + listed.name,
+                       "is of the same photograph as image " + other->second + ", " + image.source.string());
+    }
     // COLMAP looks at pixels as they are stored, and our images were turned upright.
-    if (found->second->orientation != 1 && listed.name != found->second->name) {
+    if (image.orientation != 1 && listed.name != image.name) {
       throw InputError(model, "image " + listed.name,
                        "its photograph is turned by an EXIF note, which the model does not know; without the notes "
                        "(exiftool -Orientation= -overwrite_original FILES) both agree");
     }
     View view;
-    view.name = found->second->name;
+    view.name = image.name;
     view.image_file = capture / "images" / view.name;
     view.intrinsics = listed.intrinsics;
     view.world_from_camera = listed.world_from_camera;
-    if (view.intrinsics.width != found->second->width || view.intrinsics.height != found->second->height) {
+    if (view.intrinsics.width != image.width || view.intrinsics.height != image.height) {
       throw InputError(model, "image " + listed.name,
-                       fmt::format("expected the size of the photograph, {} x {}, found {} x {}", found->second->width,
-                                   found->second->height, view.intrinsics.width, view.intrinsics.height));
+                       fmt::format("expected the size of the photograph, {} x {}, found {} x {}", image.width,
+                                   image.height, view.intrinsics.width, view.intrinsics.height));
     }
     out.views.push_back(std::move(view));
     taken.push_back(listed);
@@ -167,6 +170,21 @@ void refuse_turns(const std::vector<PreparedImage>& images, const fs::path& capt
       survey.judged - survey.with_parallax, survey.judged));
 }
 
+/// Says how many images have poses, and which have none.
+/// @param hints  what may help the others, as sentences
+/// @throws PosesError  when they are too few to be worth a training
+void report_placed(const Poses& poses, const std::vector<PreparedImage>& images, const std::string& hints,
+                   const Say& say) {
+  const std::size_t placed = poses.views.size();
+  const double share = double(placed) / double(images.size());
+  const std::string found = fmt::format("poses: {} of {} images placed", placed, images.size());
+  const std::optional<PoseRecovery>& recovery = poses.recovery;
+  if (share < kLeastShare || (recovery && placed < 3)) throw PosesError(found + "." + hints);
+  say(recovery ? found + fmt::format(" ({} matching, {} pairs)", recovery->matching, recovery->pairs) : found);
+  if (placed < images.size()) say("not placed: " + missing_names(images, poses.views));
+  if (share < kGoodShare) say("advice:" + hints);
+}
+
 Poses find_poses(const Material& material, const fs::path& capture, const fs::path& work, const PrepareOptions& options,
                  const ProgressSink& progress, const Say& say) {
   const std::vector<PreparedImage>& images = material.set.images;
@@ -176,6 +194,8 @@ Poses find_poses(const Material& material, const fs::path& capture, const fs::pa
       throw InputError(options.colmap_model, "images",
                        fmt::format("expected the photographs' names, found {} of them", out.views.size()));
     }
+    report_placed(out, images, " The model does not hold the others; without --colmap-model COLMAP looks for them.",
+                  say);
     return out;
   }
   const bool is_clip = material.ordered;
@@ -184,16 +204,26 @@ Poses find_poses(const Material& material, const fs::path& capture, const fs::pa
   Poses out;
   if (!recovery.model.empty()) out = poses_of_model(recovery.model, capture, images);
   out.recovery = recovery;
-  const double share = double(out.views.size()) / double(images.size());
-  const std::string found = fmt::format("poses: {} of {} images placed", out.views.size(), images.size());
-  if (out.views.size() < 3 || share < kLeastShare) {
-    throw PosesError(found + "." + advice(images, recovery, is_clip) +
-                     " COLMAP's log: " + (work / "colmap.log").string());
-  }
-  say(found + fmt::format(" ({} matching, {} pairs)", recovery.matching, recovery.pairs));
-  if (out.views.size() < images.size()) say("not placed: " + missing_names(images, out.views));
-  if (share < kGoodShare) say("advice:" + advice(images, recovery, is_clip));
+  const std::string log = " COLMAP's log: " + (work / "colmap.log").string();
+  report_placed(out, images, advice(images, recovery, is_clip) + log, say);
   return out;
+}
+
+/// Finds exposures of the images, and haze if it is asked for, and says how they differ.
+/// @throws InputError  where haze is asked for and the model does not tell it
+void find_exposures(std::vector<PreparedImage>& images, const fs::path& capture, const fs::path& model, bool with_haze,
+                    const Say& say) {
+  const std::optional<double> spread = estimate_exposures(images, capture, model, with_haze);
+  if (!spread && with_haze) {
+    throw InputError(model, "images",
+                     "expected points that they show, neither dark nor clipped, by which --haze is found, found none");
+  }
+  if (!spread) {
+    say("exposures: taken as equal, since the model names no points that its images show, neither dark nor clipped");
+    return;
+  }
+  say(fmt::format("exposures: {:.1f} % apart{}", 100 * *spread,
+                  *spread >= kNotedExposure ? ", evened out when the capture is read" : ""));
 }
 
 /// The subject's box as it is found, or as it is given.
@@ -308,6 +338,18 @@ bool needs_preparing(const fs::path& source) {
   return !holds_poses(source) && holds_photographs(source);
 }
 
+void check_options(const PrepareOptions& options) {
+  if (options.haze && options.no_exposure) {
+    throw UsageError("haze, no_exposure: expected one of them, since haze is found together with exposures");
+  }
+  // What a file's own depth allows is known once it is read.
+  const auto [black, white] = std::pair(options.sensor.black_level, options.sensor.white_level);
+  if (white > 0 && black >= white) {
+    throw UsageError(fmt::format("black_level: expected less than white_level, {:g}, found {:g}", white, black));
+  }
+  check_texts(options.frame);
+}
+
 PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, const PrepareOptions& options,
                               const ProgressSink& progress, const Say& say) {
   Material material = read_material(source, capture, options, progress, say);
@@ -318,14 +360,11 @@ PrepareReport prepare_capture(const fs::path& source, const fs::path& capture, c
   const auto subject = subject_of(poses, options.frame);
   say(fmt::format("frame: Z is up by {}, {}", frame.up_by,
                   frame.metres ? "in metres" : "no known unit (--measure gives metres)"));
-  if (!options.no_exposure) {
-    if (const auto spread = estimate_exposures(material.set.images, capture, poses.model, options.haze)) {
-      say(fmt::format("exposures: {:.1f} % apart{}", 100 * *spread,
-                      *spread >= kNotedExposure ? ", evened out when the capture is read" : ""));
-    }
-  }
+  if (!options.no_exposure) find_exposures(material.set.images, capture, poses.model, options.haze, say);
   write_contact_sheet(capture / "contact_sheet.png", capture, poses.views, positions_of(poses.points), subject);
-  write_file(capture / "prepare.json", record_of(source, options, material, poses, frame, subject).dump(1) + "\n");
+  const Json record = record_of(source, options, material, poses, frame, subject);
+  // Names of files that were left out need not be in UTF-8.
+  write_file(capture / "prepare.json", record.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   const bool with_points = !poses.points.empty();
   if (with_points) write_file(capture / kPointsFile, points_text(poses.points));
   write_file(capture / "transforms.json",

@@ -39,6 +39,10 @@ struct PrepareOptions {
   }
 };
 
+/// Refuses what can be told to be wrong before a file is read or a folder is cleared.
+/// @throws UsageError  texts that cannot be read, options that exclude each other; names them
+void check_options(const PrepareOptions& options);
+
 /// What the user is told meanwhile.
 using Say = std::function<void(const std::string&)>;
 

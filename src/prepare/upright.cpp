@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <numbers>
 #include <regex>
@@ -52,16 +53,74 @@ std::optional<double> depth_in_view(const View& view, Vec3d point) {
   return in_camera.z;
 }
 
-std::optional<Vec3d> parse_direction(const std::string& text) {
+/// The direction that is given as up; nothing where it is to be found.  @throws UsageError  another text
+std::optional<Vec3d> given_up(const std::string& text) {
+  if (text == "auto" || text == "cameras" || text == "none") return std::nullopt;
   Vec3d v;
   char rest = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest) != 3 || !(length(v) > 1e-12)) {
-    return std::nullopt;
+  const int read = std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &v.x, &v.y, &v.z, &rest);
+  if (read != 3 || !(length(v) > 1e-12) || !std::isfinite(length(v))) {
+    throw UsageError("up: expected auto, cameras, none or x,y,z, found '" + text + "'");
   }
   return normalized(v);
 }
 
 // ---- measures -----------------------------------------------------------------------------------------------------
+
+/// A pixel of a view that is not looked up yet.
+struct NamedPixel {
+  double x = 0, y = 0;
+  std::string view;
+};
+
+/// A known length, and what shows each of its ends.
+struct Measure {
+  std::vector<NamedPixel> a, b;
+  double metres = 0;
+};
+
+double measured_number(const std::string& text) {
+  double value = 0;
+  const char* const end = text.data() + text.size();
+  const auto [read, failure] = std::from_chars(text.data(), end, value);
+  if (failure != std::errc() || read != end) throw UsageError("measure: expected a number, found '" + text + "'");
+  return value;
+}
+
+/// "x,y,view+x,y,view".
+std::vector<NamedPixel> parse_end(const std::string& text) {
+  static const std::regex sighting(R"(\s*([0-9.]+),([0-9.]+),([^+]+))");
+  std::vector<NamedPixel> out;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find('+', begin), text.size());
+    const std::string part = text.substr(begin, end - begin);
+    std::smatch match;
+    if (!std::regex_match(part, match, sighting)) {
+      throw UsageError("measure: expected x,y,view, found '" + part + "'");
+    }
+    out.push_back({measured_number(match[1]), measured_number(match[2]), match[3].str()});
+    begin = end + 1;
+  }
+  return out;
+}
+
+Measure parse_measure(const std::string& text) {
+  static const std::regex whole(R"(\s*(\S+)\s+(\S+)\s*=\s*([0-9.]+)\s*(mm|cm|m|km|in|ft)?\s*)");
+  std::smatch match;
+  if (!std::regex_match(text, match, whole)) {
+    throw UsageError("measure: expected 'x1,y1,view1 x2,y2,view2 = 1.2m', found '" + text + "'");
+  }
+  const std::string unit = match[4];
+  const double in_metres = unit == "mm"   ? 1e-3
+                           : unit == "cm" ? 1e-2
+                           : unit == "km" ? 1e3
+                           : unit == "in" ? 0.0254
+                           : unit == "ft" ? 0.3048
+                                          : 1.0;
+  Measure out = {parse_end(match[1]), parse_end(match[2]), measured_number(match[3]) * in_metres};
+  if (!(out.metres > 0)) throw UsageError("measure: expected a length above 0, found '" + match[3].str() + "'");
+  return out;
+}
 
 struct SeenAt {
   double x = 0, y = 0;
@@ -76,24 +135,15 @@ const View& view_named(const std::string& name, const std::vector<View>& views) 
   throw UsageError("measure: expected the name of a registered view, found '" + name + "'");
 }
 
-/// "x,y,view+x,y,view".
-std::vector<SeenAt> parse_end(const std::string& text, const std::vector<View>& views) {
-  static const std::regex sighting(R"(\s*([0-9.]+),([0-9.]+),([^+]+))");
+std::vector<SeenAt> looked_up(const std::vector<NamedPixel>& pixels, const std::vector<View>& views) {
   std::vector<SeenAt> out;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find('+', begin), text.size());
-    const std::string part = text.substr(begin, end - begin);
-    std::smatch match;
-    if (!std::regex_match(part, match, sighting)) {
-      throw UsageError("measure: expected x,y,view, found '" + part + "'");
-    }
-    const View& view = view_named(match[3], views);
-    out.push_back({std::stod(match[1]), std::stod(match[2]), &view});
-    if (out.back().x > view.intrinsics.width || out.back().y > view.intrinsics.height) {
+  for (const NamedPixel& pixel : pixels) {
+    const View& view = view_named(pixel.view, views);
+    if (pixel.x > view.intrinsics.width || pixel.y > view.intrinsics.height) {
       throw UsageError(fmt::format("measure: expected a pixel of {} ({} x {}), found {},{}", view.name,
-                                   view.intrinsics.width, view.intrinsics.height, out.back().x, out.back().y));
+                                   view.intrinsics.width, view.intrinsics.height, pixel.x, pixel.y));
     }
-    begin = end + 1;
+    out.push_back({pixel.x, pixel.y, &view});
   }
   return out;
 }
@@ -210,24 +260,17 @@ Triangulated triangulate(const std::vector<WorldRay>& rays) {
 }
 
 double units_per_metre(const std::string& measure, const std::vector<View>& views, const std::vector<Vec3d>& points) {
-  static const std::regex whole(R"(\s*(\S+)\s+(\S+)\s*=\s*([0-9.]+)\s*(mm|cm|m|km|in|ft)?\s*)");
-  std::smatch match;
-  if (!std::regex_match(measure, match, whole)) {
-    throw UsageError("measure: expected 'x1,y1,view1 x2,y2,view2 = 1.2m', found '" + measure + "'");
-  }
-  const std::string unit = match[4];
-  const double in_metres = unit == "mm"   ? 1e-3
-                           : unit == "cm" ? 1e-2
-                           : unit == "km" ? 1e3
-                           : unit == "in" ? 0.0254
-                           : unit == "ft" ? 0.3048
-                                          : 1.0;
-  const double metres = std::stod(match[3]) * in_metres;
-  if (!(metres > 0)) throw UsageError("measure: expected a length above 0, found '" + match[3].str() + "'");
-  const Vec3d a = place_of(parse_end(match[1], views), points), b = place_of(parse_end(match[2], views), points);
+  const Measure known = parse_measure(measure);
+  const Vec3d a = place_of(looked_up(known.a, views), points), b = place_of(looked_up(known.b, views), points);
   const double units = length(a - b);
   if (!(units > 1e-9 * mean_distance(views, a))) throw UsageError("measure: both ends are the same place");
-  return units / metres;
+  return units / known.metres;
+}
+
+void check_texts(const FrameOptions& options) {
+  (void)given_up(options.up);
+  if (!options.measure.empty()) (void)parse_measure(options.measure);
+  if (!options.box.empty()) (void)parse_box(options.box);
 }
 
 FrameChoice choose_frame(const std::vector<View>& views, const std::vector<Vec3d>& points,
@@ -252,9 +295,7 @@ FrameChoice choose_frame(const std::vector<View>& views, const std::vector<Vec3d
     std::optional<GroundPlane> ground;
     if (options.up == "auto") {
       ground = find_ground(near_points, up);
-    } else if (options.up != "cameras") {
-      const auto given = parse_direction(options.up);
-      if (!given) throw UsageError("up: expected auto, cameras, none or x,y,z, found '" + options.up + "'");
+    } else if (const auto given = given_up(options.up)) {
       up = *given;
       out.up_by = "given";
     }

@@ -28,6 +28,10 @@ struct FrameOptions {
   }
 };
 
+/// Whether the texts of the options can be read, which is known before there are poses.
+/// @throws UsageError  naming the option
+void check_texts(const FrameOptions& options);
+
 /// What the frame was chosen by, for prepare.json and the user.
 struct FrameChoice {
   Similarity capture_from_poses;

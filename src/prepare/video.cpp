@@ -221,9 +221,9 @@ std::size_t choose_shot(const std::vector<ShotReport>& shots, int wanted, const 
 }
 
 /// Codes of a decoded frame to sRGB codes.
-cv::Mat1b code_table(const VideoOptions& options, const SensorOptions& sensor) {
-  const double black = options.video_range == "limited" ? 16 : sensor.black_level;
-  const double white = options.video_range == "limited" ? 235 : sensor.white_level > 0 ? sensor.white_level : 255;
+cv::Mat1b code_table(const VideoOptions& options, const SensorOptions& sensor, const fs::path& file) {
+  const auto [black, white] =
+      options.video_range == "limited" ? Levels{.black = 16, .white = 235} : levels_of(sensor, 255, file);
   const Transfer transfer = transfer_named(sensor.transfer);
   cv::Mat1b table(1, 256);
   for (int code = 0; code < 256; ++code) {
@@ -352,6 +352,7 @@ ClipImport import_clip(const fs::path& file, const fs::path& capture, const fs::
                        const VideoOptions& options, const SensorOptions& sensor, const ProgressSink& progress) {
   ClipImport out;
   ClipReport& report = out.report;
+  const cv::Mat1b table = code_table(options, sensor, file);
   {
     const auto clip = open_clip(file);
     report.fps = clip->get(cv::CAP_PROP_FPS);
@@ -385,7 +386,7 @@ ClipImport import_clip(const fs::path& file, const fs::path& capture, const fs::
   }
   report.kept = choose_frames(clip.frames, shot.range, find_duplicates(clip.frames, shot.range), options.frames);
   FrameMasks frame_masks(masks, capture, report);
-  write_frames(file, capture, frame_masks, code_table(options, sensor), out, progress);
+  write_frames(file, capture, frame_masks, table, out, progress);
   for (PreparedImage& image : out.set.images) image.sharpness = clip.frames[std::size_t(image.frame)].sharpness;
   if (!out.set.images.empty()) frame_masks.check_used(masks, out.set.images.front().name);
   if (out.set.images.size() < 2) {

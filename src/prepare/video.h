@@ -23,8 +23,8 @@ struct VideoOptions {
     v("shot", shot, Range{0, 100000},
       "shot of a clip to use, 1 is the first; 0 = the longest in which the camera travels");
     v("frames", frames, Range{2, 10000}, "frames of a clip to keep, the sharpest of each window");
-    v("video_range", video_range, Choice{"auto", "full", "limited"},
-      "codes of black and white: as the clip says, 0 to 255, or 16 to 235 that the decoder did not expand");
+    v("video_range", video_range, Choice{"auto", "limited"},
+      "codes of black and white: as the clip says, or 16 to 235 that the decoder did not expand");
     v("allow_no_parallax", allow_no_parallax,
       "go on with a shot, or photographs, between which the camera seems only to turn");
   }
@@ -67,7 +67,8 @@ struct ClipImport {
 /// resampled.
 /// @param masks  a picture of the size of a frame, black = ignore in every frame (a logo, a time code), or a folder of
 ///               pictures named as the kept frames (frame_000123.png); empty: none.
-/// @throws InputError   no clip, too few frames, a mask of another size.  @throws UsageError  no such shot.
+/// @throws InputError   no clip, too few frames, a mask of another size.
+/// @throws UsageError   no such shot, levels that 8 bits cannot have.
 /// @throws PosesError   a shot without parallax or motion, with the reason.  @throws Interrupted.
 [[nodiscard]] ClipImport import_clip(const std::filesystem::path& clip, const std::filesystem::path& capture,
                                      const std::filesystem::path& masks, const VideoOptions& options,

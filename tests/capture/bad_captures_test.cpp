@@ -62,6 +62,15 @@ std::function<void(const fs::path&)> llff_then(std::function<void(const fs::path
 std::function<void(const fs::path&)> truncated(const std::string& file, double share) {
   return [=](const fs::path& folder) { test::truncate_file(folder / file, share); };
 }
+/// A good capture whose images all have one mask, which is of one code.
+std::function<void(const fs::path&)> masked_by(int code) {
+  return transforms_then([code](const fs::path& folder) {
+    json top = json::parse(read_text_file(folder / "transforms.json"));
+    cv::imwrite(folder / "mask.png", cv::Mat(test::kHeight, test::kWidth, CV_8UC1, cv::Scalar(code)));
+    for (json& frame : top["frames"]) frame["mask_path"] = "mask.png";
+    test::write_json(folder / "transforms.json", top);
+  });
+}
 void replace_in(const fs::path& file, const std::string& from, const std::string& to) {
   std::string text = read_text_file(file);
   const std::size_t at = text.find(from);
@@ -283,6 +292,8 @@ std::vector<BadCapture> bad_captures() {
        spoiled_json([](json& top) { top["frames"][0]["mask_path"] = "none.png"; }),
        kMissing,
        {"none.png"}},
+      {"mask_of_ones", masked_by(1), kInput, {"mask.png", "values", "the lightest is 1 of 255"}},
+      {"everything_masked", masked_by(0), kInput, {"masks", "found all masked"}},
 
       {"colmap_cameras_cut",
        colmap_then(truncated("cameras.bin", 0.8)),

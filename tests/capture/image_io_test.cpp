@@ -229,6 +229,26 @@ TEST_F(ImageIo, MasksIgnoreDarkPixels) {
   EXPECT_THROW((void)read_mask(file, 5, 2), InputError);
 }
 
+TEST_F(ImageIo, MasksOfOnesAreRefused) {
+  const auto read = [&](int type, int lightest) {
+    cv::Mat mask(2, 4, type, cv::Scalar(0));
+    mask.col(1).setTo(cv::Scalar(lightest));
+    return read_mask(write("m.png", mask), 4, 2);
+  };
+  for (const int code : {0, 2, 100, 128, 255}) EXPECT_NO_THROW((void)read(CV_8UC1, code)) << code;
+  EXPECT_THROW((void)read(CV_8UC1, 1), InputError);
+  EXPECT_EQ(read(CV_16UC1, 32768), (std::vector<std::uint8_t>{0, 255, 0, 0, 0, 255, 0, 0}));
+  for (const int code : {0, 256, 32767}) EXPECT_NO_THROW((void)read(CV_16UC1, code)) << code;
+  EXPECT_THROW((void)read(CV_16UC1, 1), InputError);
+  try {
+    (void)read(CV_16UC1, 255);
+    FAIL() << "no error";
+  } catch (const InputError& error) {
+    const std::string says = "m.png: values: expected black and white, the lightest is 255 of 65535";
+    EXPECT_NE(std::string(error.what()).find(says), std::string::npos) << error.what();
+  }
+}
+
 TEST(SameShape, AcceptsReducedCopiesAndNothingElse) {
   EXPECT_TRUE(same_shape(640, 480, 640, 480));
   EXPECT_TRUE(same_shape(320, 240, 640, 480));

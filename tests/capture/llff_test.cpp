@@ -53,6 +53,14 @@ TEST(Llff, ReducedFoldersAreChosenByDownscale) {
   EXPECT_EQ(view.name, "images_4/img0.png");
 }
 
+TEST(Llff, CamerasOfReducedFoldersAreTheSame) {
+  const test::TempDir folder;
+  test::write_llff(folder.path(), 4, "images_4", 4, 3);
+  test::write_llff(folder.path(), 4, "images_2", 8, 6);
+  EXPECT_EQ(load_capture(folder.path(), {.downscale = 4}).cameras,
+            load_capture(folder.path(), {.downscale = 2}).cameras);
+}
+
 TEST(Llff, WithoutFullSizeImagesTheLargestAreTaken) {
   const test::TempDir folder;
   test::write_llff(folder.path(), 4, "images_4", 4, 3);

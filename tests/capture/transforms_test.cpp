@@ -173,6 +173,39 @@ TEST_F(Transforms, SeparateFilesOfSyntheticSets) {
               ElementsAre("images/0.png", "images/1.png"));
 }
 
+TEST_F(Transforms, CamerasOfTrainingViewsAreToldFromOthers) {
+  const json original = top_;
+  const std::string given = load().cameras, of_two = load({.holdout = 3}).cameras;
+  EXPECT_FALSE(given.empty());
+  EXPECT_NE(of_two, given);
+  EXPECT_EQ(load({.downscale = 2}).cameras, given);
+  const test::TempDir elsewhere;
+  fs::copy(folder_.path(), elsewhere / "moved", fs::copy_options::recursive);
+  EXPECT_EQ(load_capture(elsewhere / "moved").cameras, given);
+
+  const auto scale_positions = [&](std::size_t begin, std::size_t end, double factor) {
+    for (std::size_t i = begin; i < end; ++i) {
+      for (json& row : top_["frames"][i]["transform_matrix"]) row[3] = factor * double(row[3]);
+      top_["frames"][i]["transform_matrix"][3][3] = 1;
+    }
+  };
+  scale_positions(0, 4, 1 + 1e-12);
+  EXPECT_EQ(load().cameras, given) << "rounding";
+  top_ = original;
+  scale_positions(0, 4, 2);
+  EXPECT_NE(load().cameras, given);
+  top_ = original;
+  scale_positions(0, 1, 1.001);
+  EXPECT_NE(load().cameras, given);
+  EXPECT_EQ(load({.holdout = 3}).cameras, of_two) << "the first is held out";
+  top_ = original;
+  top_["fl_x"] = 20.01;
+  EXPECT_NE(load().cameras, given);
+  top_ = original;
+  top_["k1"] = 0.001;
+  EXPECT_NE(load().cameras, given);
+}
+
 TEST_F(Transforms, MasksHideBlackPixels) {
   cv::Mat1b mask(test::kHeight, test::kWidth, std::uint8_t(255));
   mask(2, 3) = 0;

@@ -67,6 +67,14 @@ UserFolder without_poses(const fs::path& folder) {
   return out;
 }
 
+/// Leaves a model its first images.
+void shorten_model(const fs::path& model, int images) {
+  std::istringstream lines(read_text_file(model / "images.txt"));
+  std::string kept, line;
+  for (int i = 0; i < 2 * images && std::getline(lines, line); ++i) kept += line + "\n";
+  write_file(model / "images.txt", kept);
+}
+
 TEST(Prepare, TakesAReadyModelAndSetsItUpright) {
   const TempDir folder;
   const UserFolder user = without_poses(folder.path());
@@ -74,6 +82,7 @@ TEST(Prepare, TakesAReadyModelAndSetsItUpright) {
   const ProgramResult result =
       cnerf({"prepare", user.photos.string(), "-o", out.string(), "--colmap-model", user.model.string()});
   ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("exposures: taken as equal")) << "the model's images name no points";
   for (const char* file : {"transforms.json", "prepare.json", "contact_sheet.png"}) EXPECT_TRUE(fs::exists(out / file));
   std::vector<Affined> poses, truth;
   const Capture given = load_capture(tiny_capture()), prepared = load_capture(out);
@@ -109,6 +118,72 @@ TEST(Prepare, TakesAReadyModelAndSetsItUpright) {
   EXPECT_EQ(cnerf({"prepare", user.model.string(), "-o", out.string(), "--resume"}).exit_code, 64) << "another source";
 }
 
+TEST(Prepare, NamesPhotographsThatAReadyModelDoesNotHold) {
+  const TempDir folder;
+  const UserFolder user = without_poses(folder.path());
+  const std::string last = load_capture(tiny_capture()).views.back().image_file.stem().string();
+  const auto prepared = [&](int images) {
+    shorten_model(user.model, images);
+    return cnerf({"prepare", user.photos.string(), "-o", (folder / "capture").string(), "--overwrite", "--colmap-model",
+                  user.model.string()});
+  };
+  const ProgramResult most = prepared(8);
+  EXPECT_EQ(most.exit_code, 0) << most.err;
+  EXPECT_THAT(most.out,
+              testing::AllOf(HasSubstr("poses: 8 of 9 images placed"), HasSubstr("not placed: " + last + ".png")));
+  const ProgramResult few = prepared(2);
+  EXPECT_EQ(few.exit_code, 77);
+  EXPECT_THAT(few.err, HasSubstr("poses: 2 of 9 images placed"));
+}
+
+TEST(Prepare, RefusesAReadyModelThatItCannotUse) {
+  const TempDir folder;
+  const UserFolder user = without_poses(folder.path());
+  const auto refused = [&](const std::vector<std::string>& more, int code, const std::string& message) {
+    const std::vector<std::string> words = {
+        "prepare",        user.photos.string(), "-o", (folder / "capture").string(), "--overwrite",
+        "--colmap-model", user.model.string()};
+    const ProgramResult result = cnerf(concatenated(words, more));
+    EXPECT_EQ(result.exit_code, code) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(message));
+  };
+  refused({"--haze"}, 65, "by which --haze is found");
+  refused({"--haze", "--no-exposure"}, 64, "haze, no_exposure");
+  const std::string name = load_capture(tiny_capture()).views.front().image_file.filename().string();
+  write_file(user.model / "images.txt",
+             read_text_file(user.model / "images.txt") + "99 1 0 0 0 0 0 0 1 left/" + name + "\n\n");
+  refused({}, 65, "left/" + name + ": is of the same photograph as image " + name);
+}
+
+TEST(Prepare, LevelsThatAFileCannotHaveAreRefused) {
+  const TempDir folder;
+  const UserFolder user = without_poses(folder.path());
+  const auto refused = [&](const std::vector<std::string>& levels, const std::string& message) {
+    const std::vector<std::string> words = {"prepare", user.photos.string(), "-o", (folder / "capture").string(),
+                                            "--overwrite"};
+    const ProgramResult result = cnerf(concatenated(words, levels));
+    EXPECT_EQ(result.exit_code, 64) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(message));
+  };
+  refused({"--white-level", "4095"}, "white_level: expected at most 255");
+  refused({"--black-level", "4000", "--white-level", "4095"}, "white_level: expected at most 255");
+  refused({"--black-level", "255"}, "black_level: expected less than 255");
+  refused({"--black-level", "200", "--white-level", "100"}, "black_level: expected less than 100");
+}
+
+/// What a run prepares is sRGB-encoded, whatever it was made of.
+TEST(Prepare, ARunReadsTheCaptureOfLinearPhotographsAsItIsStored) {
+  const TempDir folder;
+  const UserFolder user = without_poses(folder.path());
+  const std::string run = (folder / "run").string();
+  const ProgramResult prepared = cnerf({"prepare", user.photos.string(), "-o", run + "-capture", "--transfer", "linear",
+                                        "--colmap-model", user.model.string()});
+  ASSERT_EQ(prepared.exit_code, 0) << prepared.err;
+  const ProgramResult result =
+      cnerf(concatenated({"run", user.photos.string(), "-o", run, "--grey", "--transfer", "linear"}, tiny_options()));
+  EXPECT_THAT(read_text_file(run + "/config.toml"), testing::ContainsRegex("transfer = .srgb.")) << result.err;
+}
+
 TEST(Prepare, LooksForMotionAlsoAfterwards) {
   const TempDir folder;
   const UserFolder user = without_poses(folder.path());
@@ -131,6 +206,26 @@ TEST(Prepare, LooksForMotionAlsoAfterwards) {
   for (const View& view : load_capture(out).views) {
     const double hidden = double(std::ranges::count(view.image.mask, 0)) / double(view.image.pixel_count());
     EXPECT_NEAR(hidden, shares.value(view.name, 0.0), 0.02) << view.name;
+  }
+}
+
+TEST(Prepare, APhotographWhoseNameIsNotUtf8IsLeftOut) {
+  const TempDir folder;
+  const UserFolder user = without_poses(folder.path());
+  fs::copy_file(load_capture(tiny_capture()).views.front().image_file, user.photos / "caf\xE9.png");
+  for (const std::string& progress : std::vector<std::string>{"plain", "json"}) {
+    const fs::path out = folder / progress;
+    const ProgramResult result = cnerf({"prepare", user.photos.string(), "-o", out.string(), "--colmap-model",
+                                        user.model.string(), "--progress", progress});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.out, HasSubstr("left out: "));
+    const auto record = nlohmann::json::parse(read_text_file(out / "prepare.json"));
+    ASSERT_EQ(record.at("unreadable").size(), 1u) << progress;
+    EXPECT_THAT(record.at("unreadable").at(0).get<std::string>(), HasSubstr("caf\uFFFD.png"));
+    std::istringstream lines(result.out);
+    for (std::string line; progress == "json" && std::getline(lines, line);) {
+      EXPECT_TRUE(nlohmann::json::accept(line)) << line;
+    }
   }
 }
 
@@ -165,6 +260,7 @@ TEST(Prepare, BadInputIsNamed) {
   refused({"prepare", (folder / "broken.mp4").string(), "-o", out}, 65, "broken.mp4");
   fs::remove_all(out);
   refused({"prepare", user.photos.string(), "-o", out, "--frames", "1"}, 64, "frames");
+  refused({"prepare", user.photos.string(), "-o", out, "--video-range", "full"}, 64, "video_range");
   refused({"prepare", user.photos.string(), "-o", folder.path().string()}, 64, "is not empty");
   write_file(user.photos / "x.heic", std::string_view("x"));
   refused({"prepare", user.photos.string(), "-o", out}, 65, "heif-convert");

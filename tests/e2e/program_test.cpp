@@ -59,6 +59,19 @@ TEST(Program, WordsThatSayNothingAreRefused) {
   EXPECT_THAT(files_below(folder.path()), testing::IsEmpty());
 }
 
+TEST(Program, AWorkingFolderWhoseNameIsNotUtf8IsRefused) {
+  const TempDir folder;
+  const fs::path before = fs::current_path(), named = folder / "caf\xE9";
+  fs::create_directory(named);
+  fs::current_path(named);
+  const ProgramResult refused = cnerf({"sample", "-o", "capture"}), help = cnerf({"--help"});
+  fs::current_path(before);
+  EXPECT_EQ(refused.exit_code, 64);
+  EXPECT_THAT(refused.err, HasSubstr("working folder whose name is in UTF-8"));
+  EXPECT_THAT(files_below(named), testing::IsEmpty());
+  EXPECT_EQ(help.exit_code, 0) << help.err;
+}
+
 TEST(Program, InfoDescribesACapture) {
   const ProgramResult result = cnerf({"info", tiny_capture().string()});
   EXPECT_EQ(result.exit_code, 0) << result.err;

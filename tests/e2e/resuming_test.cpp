@@ -159,6 +159,38 @@ TEST(Resuming, ACaptureThatWasMovedIsAskedFor) {
   EXPECT_EQ(cnerf({"eval", run.string(), "--capture", capture}).exit_code, 0);
 }
 
+TEST(Resuming, OtherCamerasAreRefusedAndChangeNothing) {
+  const TempDir folder;
+  const fs::path run = copied(tiny_run(), folder / "run"), capture = copied(tiny_capture(), folder / "capture");
+  const std::vector<std::string> eval = {"eval", run.string(), "--capture", capture.string()};
+  // The training views stay the same, their cameras too.
+  for (const char* same : {"capture.downscale=2", "capture.holdout=8", "capture.holdout=0"}) {
+    const ProgramResult taken = cnerf(concatenated(eval, {"--set", same}));
+    ASSERT_EQ(taken.exit_code, 0) << same << ": " << taken.err;
+  }
+  const std::string config = read_text_file(run / "config.toml"), metrics = read_text_file(run / "metrics.json");
+  const auto is_refused = [&](const std::vector<std::string>& words, const std::string& why) {
+    const ProgramResult refused = cnerf(words);
+    EXPECT_EQ(refused.exit_code, 78) << why << ": " << refused.err;
+    EXPECT_THAT(refused.err, testing::AllOf(HasSubstr("stage1.snapshot"), HasSubstr("cameras"), HasSubstr(why)));
+    EXPECT_EQ(read_text_file(run / "config.toml"), config) << why;
+    EXPECT_EQ(read_text_file(run / "metrics.json"), metrics) << why;
+  };
+  for (const char* others : {"capture.holdout=2", "capture.holdout=3"}) {
+    is_refused(concatenated(eval, {"--set", others}), "capture.holdout");
+  }
+  auto poses = nlohmann::json::parse(read_text_file(capture / "transforms.json"));
+  for (auto& frame : poses["frames"]) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      auto& at = frame["transform_matrix"][axis][3];
+      at = 2 * at.get<double>();
+    }
+  }
+  write_file(capture / "transforms.json", std::string_view(poses.dump()));
+  is_refused(eval, "poses");
+  is_refused(concatenated({"train", capture.string(), "-o", run.string(), "--resume"}, tiny_options()), "poses");
+}
+
 TEST(Resuming, AShortageOfMemoryIsNoCrash) {
   if (kIsSanitized) GTEST_SKIP() << "sanitizers take more before they begin, and end a process that has none";
   const TempDir folder;

@@ -2,14 +2,21 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <chrono>
+#include <cstdint>
+#include <opencv2/imgcodecs.hpp>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/observer.h"
+#include "src/color/colorspace_math.h"
 #include "src/engine/engines.h"
+#include "src/sample/sample_scene.h"
 #include "tests/support/data.h"
+#include "tests/support/json_file.h"
+#include "tests/support/no_programs.h"
 
 namespace cnerf::pipeline {
 namespace {
@@ -26,9 +33,9 @@ class PreparedCapture : public testing::Test {
     write_file(capture_ / "prepare.json", "{\"source\": \"" + photos_.string() + "\"}");
     write_file(capture_ / "images/a.png", std::string_view("picture"));
   }
-  void prepare(const fs::path& source, const ExistingOutput& existing) {
+  void prepare(const fs::path& source, const ExistingOutput& existing, const PrepareStepOptions& options = {}) {
     Observer silent;
-    prepare_step({source, capture_, {}, existing}, cpu_engines(), silent);
+    prepare_step({source, capture_, options, existing}, cpu_engines(), silent);
   }
   /// What going on says.
   std::string notes_of() {
@@ -86,11 +93,90 @@ TEST_F(PreparedCapture, StaysWhereGoingOnAndOverwritingAreAskedAtOnce) {
   EXPECT_TRUE(fs::exists(capture_ / "images/a.png"));
 }
 
+TEST_F(PreparedCapture, IsNotClearedOfWhatItIsMadeOf) {
+  write_file(capture_ / "masks/a.png", std::string_view("mask"));
+  write_file(capture_ / "work/sparse/0/images.bin", std::string_view("model"));
+  const auto refused = [&](const fs::path& source, const fs::path& masks, const fs::path& model) {
+    PrepareStepOptions options;
+    options.capture.masks = masks.string();
+    options.capture.colmap_model = model.string();
+    EXPECT_THAT([&] { prepare(source, {.overwrite = true}, options); },
+                ThrowsMessage<UsageError>(HasSubstr("--overwrite would remove it")));
+  };
+  refused(photos_, capture_ / "masks", {});
+  refused(photos_, {}, capture_ / "work/sparse/0");
+  refused(capture_ / "images", {}, {});
+  refused(capture_, {}, {});  // of which images/ would be read
+  for (const char* file : {"images/a.png", "masks/a.png", "work/sparse/0/images.bin", "transforms.json"}) {
+    EXPECT_TRUE(fs::exists(capture_ / file)) << file;
+  }
+}
+
+TEST_F(PreparedCapture, IsNotClearedForOptionsThatCannotBeMeant) {
+  PrepareStepOptions haze, measure, levels;
+  levels.capture.sensor.black_level = 200;
+  levels.capture.sensor.white_level = 100;
+  haze.capture.haze = haze.capture.no_exposure = true;
+  measure.capture.frame.measure = "10,10,a 20,20,b = .m";
+  EXPECT_THAT([&] { prepare(photos_, {.overwrite = true}, haze); },
+              ThrowsMessage<UsageError>(HasSubstr("haze, no_exposure")));
+  EXPECT_THAT([&] { prepare(photos_, {.overwrite = true}, measure); }, ThrowsMessage<UsageError>(HasSubstr("measure")));
+  EXPECT_THAT([&] { prepare(photos_, {.overwrite = true}, levels); },
+              ThrowsMessage<UsageError>(HasSubstr("black_level")));
+  EXPECT_TRUE(fs::exists(capture_ / "images/a.png"));
+}
+
+TEST_F(PreparedCapture, OfAnotherTransferIsRefused) {
+  PrepareStepOptions options;
+  options.capture.sensor.transfer = "linear";
+  EXPECT_THAT([&] { prepare(photos_, {.resume = true}, options); },
+              ThrowsMessage<UsageError>(HasSubstr("another transfer")));
+  write_file(capture_ / "prepare.json",
+             "{\"source\": \"" + photos_.string() + "\", \"transfer\": {\"source\": \"linear\"}}");
+  EXPECT_NO_THROW(prepare(photos_, {.resume = true}, options));
+}
+
+/// One file names the masks, another says that motion was looked for; a stop between them must not lose the masks.
+TEST_F(PreparedCapture, IsLookedAtForMotionUntilTheMasksAreNamed) {
+  SampleSceneOptions scene;
+  scene.views = 8;
+  scene.width = 48;
+  scene.height = 36;
+  scene.samples_per_pixel = 1;
+  write_sample_scene(capture_, scene);
+  PrepareStepOptions options;
+  options.motion_masks = true;
+  options.motion.motion_steps = 50;
+  // In the place of the temporary file that transforms.json would be made of.
+  const fs::path obstacle = capture_ / (".transforms.partial-" + std::to_string(::getpid()) + ".json");
+  fs::create_directories(obstacle);
+  EXPECT_THAT([&] { prepare(photos_, {.resume = true}, options); },
+              ThrowsMessage<OutputError>(HasSubstr("transforms.json")));
+  EXPECT_FALSE(test::json_of(capture_ / "prepare.json").contains("motion"));
+  fs::remove(obstacle);
+  prepare(photos_, {.resume = true}, options);
+  EXPECT_TRUE(test::json_of(capture_ / "prepare.json").contains("motion"));
+}
+
 TEST_F(PreparedCapture, IsNotTakenForOneWhereTheRecordNamesNoSource) {
   write_file(capture_ / "prepare.json", std::string_view("{\"source\": 3}"));
   EXPECT_THAT([&] { prepare(photos_, {.overwrite = true}); },
               ThrowsMessage<UsageError>(HasSubstr("holds no prepared capture")));
   EXPECT_TRUE(fs::exists(capture_ / "images/a.png"));
+}
+
+TEST(CaptureOf, PhotographsIsReadWithTheTransferOfTheRun) {
+  const test::TempDir folder;
+  fs::create_directories(folder / "photos");
+  for (const char* name : {"photos/a.png", "photos/b.png"}) {
+    ASSERT_TRUE(cv::imwrite((folder / name).string(), cv::Mat1b(40, 60, std::uint8_t(99))));
+  }
+  const test::NoPrograms none;
+  Observer silent;
+  EXPECT_THROW((void)capture_of(folder / "photos", folder / "run", "linear", silent), DeviceError) << "no COLMAP";
+  const cv::Mat image = cv::imread((folder / "run-capture/images/a.png").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(image.type(), CV_16UC1);
+  EXPECT_NEAR(linear_from_srgb(image.at<std::uint16_t>(0) / 65535.0), 99 / 255.0, 1e-4);
 }
 
 }  // namespace

@@ -4,8 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core.hpp>
 
+#include "src/base/files.h"
 #include "src/base/rng.h"
+#include "src/color/colorspace_math.h"
+#include "src/picture/encode.h"
+#include "tests/support/data.h"
 
 namespace cnerf::prepare {
 namespace {
@@ -86,6 +91,38 @@ TEST(Exposures, WithoutHazeNoneIsFound) {
 TEST(Exposures, ViewsThatShareNothingKeepOne) {
   const std::vector<double> found = solve_exposures(3, {{0, 0, 0.5}, {1, 0, 0.5}});
   EXPECT_DOUBLE_EQ(found[2], 1);
+}
+
+/// Two pictures of one light each, and a text model of them.
+class TextModel : public testing::Test {
+ protected:
+  TextModel() {
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      images_[i].name = std::to_string(i) + ".png";
+      images_[i].source = images_[i].name;
+      write_png(folder_ / "images" / images_[i].name, cv::Mat1b(30, 40, std::uint8_t(i == 0 ? 90 : 120)));
+    }
+  }
+  std::optional<double> exposures_by(const std::string& first_points, const std::string& second_points) {
+    const std::string pose = " 1 0 0 0 0 0 0 1 ";
+    write_file(folder_ / "model/images.txt", "# two lines each\n1" + pose + "0.png\n" + first_points + "\n2" + pose +
+                                                 "1.png\r\n" + second_points + "\n");
+    return estimate_exposures(images_, folder_.path(), folder_ / "model", false);
+  }
+  test::TempDir folder_;
+  std::vector<PreparedImage> images_ = std::vector<PreparedImage>(2);
+};
+
+TEST_F(TextModel, TellsExposures) {
+  EXPECT_TRUE(exposures_by("5.5 6.5 7 20.5 10.5 8 3.5 3.5 -1", "5.5 6.5 7 20.5 10.5 8"));
+  const auto light = [](int code) { return linear_from_srgb(code / 255.0); };
+  EXPECT_NEAR(images_[1].exposure / images_[0].exposure, light(120) / light(90), 1e-3);
+}
+
+TEST_F(TextModel, WithoutPointsTellsNone) {
+  EXPECT_FALSE(exposures_by("", ""));
+  EXPECT_FALSE(exposures_by("3.5 3.5 -1", ""));
+  EXPECT_FALSE(exposures_by("1e300 -1e300 7", "45 3 7")) << "beside the picture";
 }
 
 }  // namespace

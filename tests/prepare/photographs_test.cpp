@@ -224,6 +224,15 @@ TEST(Photographs, LevelsOfASensorAreApplied) {
   EXPECT_NEAR(light(1, 2), (1071 - 64) / 4031.0, 2e-4);
 }
 
+TEST(Photographs, LevelsThatTheirCodesCannotHaveAreRefused) {
+  EXPECT_EQ(levels_of({}, 255, "a.png").white, 255);
+  EXPECT_EQ(levels_of({"linear", 64, 4095}, 65535, "a.png").white, 4095);
+  EXPECT_THROW((void)levels_of({"linear", 64, 4095}, 255, "a.png"), UsageError);
+  EXPECT_THROW((void)levels_of({"linear", 256, 0}, 255, "a.png"), UsageError);
+  EXPECT_THROW((void)levels_of({"linear", 100, 100}, 255, "a.png"), UsageError);
+  EXPECT_THROW((void)levels_of({"linear", 200, 100}, 65535, "a.png"), UsageError);
+}
+
 TEST(Photographs, UnreadableOnesAreNamedAndLeftOut) {
   const test::TempDir folder;
   write(folder / "in/a.png", ramp(20, 10));
@@ -266,6 +275,54 @@ TEST(Photographs, MasksFollowTheirPhotograph) {
   fs::remove(folder / "masks/b.png.png");
   write(folder / "masks/other.png", mask);
   EXPECT_THROW((void)import_all(folder / "in", folder / "out", {}, folder / "masks"), InputError);
+}
+
+TEST(Photographs, MasksOfThoseOnTheirSideAreAsStoredOrAsShown) {
+  for (const int orientation : {5, 6, 7, 8}) {
+    const Upright grid = {orientation, 64, 32};
+    cv::Mat1b shown(64, 32, std::uint8_t(255)), as_stored(32, 64);
+    shown.rowRange(0, 10) = 0;
+    for (int y = 0; y < shown.rows; ++y) {
+      for (int x = 0; x < shown.cols; ++x) {
+        const int at = int(grid.stored_index(x, y));
+        as_stored(at / 64, at % 64) = shown(y, x);
+      }
+    }
+    const test::TempDir folder;
+    for (const char* name : {"in/a.jpg", "in/b.jpg"}) {
+      write_jpeg(folder / name, ramp(64, 32), exif_block(orientation, 26, 28));
+    }
+    write(folder / "masks/a.png", shown);
+    write(folder / "masks/b.png", as_stored);
+    ASSERT_EQ(import_all(folder / "in", folder / "out", {}, folder / "masks").images.size(), 2u) << orientation;
+    for (const char* mask : {"out/masks/a.png", "out/masks/b.png"}) {
+      EXPECT_EQ(cv::norm(stored(folder / mask), shown, cv::NORM_INF), 0) << orientation << " " << mask;
+    }
+  }
+}
+
+TEST(Photographs, AMaskThatDoesNotFitIsRefused) {
+  const test::TempDir folder;
+  for (const char* name : {"in/a.png", "in/b.png", "in/c.png"}) write(folder / name, ramp(20, 10));
+  write(folder / "masks/a.png", cv::Mat1b(10, 20, std::uint8_t(255)));
+  write(folder / "masks/b.png", cv::Mat1b(7, 7, std::uint8_t(255)));
+  EXPECT_THAT([&] { (void)import_all(folder / "in", folder / "out", {}, folder / "masks"); },
+              testing::ThrowsMessage<InputError>(HasSubstr("masks/b.png")));
+}
+
+TEST(Photographs, AreFoundByTheirOwnNamesFirst) {
+  std::vector<PreparedImage> images(3);
+  images[0].name = "a_jpg.png", images[0].source = "in/a.jpg";
+  images[1].name = "a_jpg_2.png", images[1].source = "in/a_jpg.tif";
+  images[2].name = "a_png.png", images[2].source = "in/a.png";
+  const ImagePlaces places(images);
+  EXPECT_EQ(places.of("a_jpg.png"), 0u);
+  EXPECT_EQ(places.of("other/a_jpg.jpg"), 0u) << "by the stem of its own name";
+  EXPECT_EQ(places.of("a_jpg.tif"), 1u);
+  EXPECT_EQ(places.of("a_jpg_2.jpg"), 1u);
+  EXPECT_EQ(places.of("cam/a.jpg"), 0u) << "two photographs of one stem";
+  EXPECT_EQ(places.of("cam/a.png"), 2u);
+  EXPECT_EQ(places.of("b.png"), std::nullopt);
 }
 
 TEST(Photographs, AFolderWithoutAnyIsRefused) {

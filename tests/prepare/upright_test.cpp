@@ -214,8 +214,30 @@ TEST(Measure, RefusesWhatItCannotUse) {
   EXPECT_THROW((void)units_per_metre("10,10 20,20 = 1m", views, {}), UsageError);
   EXPECT_THROW((void)units_per_metre("10,10,nobody 20,20,v1 = 1m", views, {}), UsageError);
   EXPECT_THROW((void)units_per_metre("10,10,v0 20,20,v1 = 0m", views, {}), UsageError);
+  EXPECT_THROW((void)units_per_metre("10,10,v0 20,20,v1 = .m", views, {}), UsageError);
+  EXPECT_THROW((void)units_per_metre("10,10,v0 20,20,v1 = 1.2.3m", views, {}), UsageError);
+  EXPECT_THROW((void)units_per_metre("10,.,v0 20,20,v1 = 1m", views, {}), UsageError);
   EXPECT_THROW((void)units_per_metre("9999,10,v0 20,20,v1 = 1m", views, {}), UsageError);
   EXPECT_THROW((void)units_per_metre("10,10,v0 20,20,v1 = 1m", views, {}), InputError) << "no points, no depth";
+}
+
+TEST(FrameTexts, AreReadBeforeThereAreViews) {
+  FrameOptions options;
+  EXPECT_NO_THROW(check_texts(options));
+  options.up = "0,0,1";
+  options.measure = "10,10,v0+11,12,v2 20,20,v1 = 1.2m";
+  options.box = "0,0,0 1,1,1";
+  EXPECT_NO_THROW(check_texts(options));
+  const auto refused = [&](std::string FrameOptions::*text, const char* bad) {
+    FrameOptions changed = options;
+    changed.*text = bad;
+    EXPECT_THROW(check_texts(changed), UsageError) << bad;
+  };
+  refused(&FrameOptions::up, "sideways");
+  refused(&FrameOptions::up, "0,0,inf");
+  refused(&FrameOptions::measure, "10,10,v0 20,20,v1 = .m");
+  refused(&FrameOptions::measure, "10,10 20,20 = 1m");
+  refused(&FrameOptions::box, "1,2,3");
 }
 
 TEST(FindSubject, BoxHoldsTheObjectAndNotTheOutliers) {

@@ -232,6 +232,13 @@ TEST_F(Clip, WovenFieldsAreTakenApart) {
   EXPECT_DOUBLE_EQ(clip.set.images.front().pixel_aspect, 0.5);
 }
 
+TEST_F(Clip, LevelsThatItsCodesCannotHaveAreRefused) {
+  if (!write_clip(folder_ / "clip.mp4", travelling(10))) throw MissingInputError("no MPEG-4 encoder");
+  for (const SensorOptions& sensor : {SensorOptions{"linear", 64, 1023}, SensorOptions{"linear", 200, 100}}) {
+    EXPECT_THROW((void)import_clip(folder_ / "clip.mp4", folder_ / "out", {}, {}, sensor, {}), UsageError);
+  }
+}
+
 TEST_F(Clip, OtherFilesAreRefused) {
   write_file(folder_ / "clip.mp4", std::string_view("no clip"));
   EXPECT_FALSE(is_clip(folder_ / "clip.mp4"));

@@ -269,6 +269,31 @@ TEST_F(StoredViews, AreNotGoneOnWithByOthers) {
   is_refused();
 }
 
+TEST_F(StoredViews, OfOtherCamerasAreRefused) {
+  Observer observer;
+  capture_.cameras = "moved";
+  Capture copy = capture_;
+  EXPECT_NO_THROW((void)apply_learned_views(copy, job_.snapshot)) << "a snapshot that does not say";
+  EXPECT_NO_THROW(check_views(job_.snapshot, capture_));
+
+  capture_.cameras = "given";
+  job_.snapshot = folder_ / "given.snapshot";
+  train_stage1(job_, cpu_engines(), observer);
+  job_.resume = true;
+  for (const char* known : {"given", ""}) {
+    capture_.cameras = known;
+    copy = capture_;
+    EXPECT_NO_THROW((void)apply_learned_views(copy, job_.snapshot)) << known;
+    EXPECT_NO_THROW(check_views(job_.snapshot, capture_)) << known;
+    EXPECT_NO_THROW((void)train_stage1(job_, cpu_engines(), observer)) << known;
+  }
+  capture_.cameras = "moved";
+  EXPECT_THAT([&] { check_views(job_.snapshot, capture_); },
+              testing::ThrowsMessage<SnapshotError>(HasSubstr("given.snapshot: was trained with other cameras")));
+  EXPECT_THROW((void)train_stage1(job_, cpu_engines(), observer), SnapshotError);
+  EXPECT_THROW((void)apply_learned_views(capture_, job_.snapshot), SnapshotError);
+}
+
 /// Options say nothing of it, but the engine that goes on has it.
 TEST_F(StoredViews, GoOnWithTheOccupancyTheyHave) {
   options_.steps = 48;

@@ -112,6 +112,25 @@ TEST(Placement, HoldsTheWallsOfARoomThatIsSeenFromWithin) {
   EXPECT_LT(reach_of(frame, {0, 0, 0}, {1, 0, 0}), 4);
 }
 
+TEST(Placement, OfAnObjectKnowsNoSilhouetteThatIsHeldOut) {
+  Capture capture;
+  capture.is_bounded_object = true;
+  for (int i = 0; i < 8; ++i) {
+    const double angle = 0.25 * i * std::numbers::pi;
+    View& view = capture.views.emplace_back(view_at({3 * std::cos(angle), 3 * std::sin(angle), 0}, {0, 0, 0}));
+    view.image.width = view.intrinsics.width, view.image.height = view.intrinsics.height;
+    view.image.alpha.assign(view.image.pixel_count(), 0);
+    for (const int row : {9, 10}) view.image.alpha[std::size_t(row) * 24 + 12] = 255;
+  }
+  View& view = capture.views[2];
+  view.held_out = true;
+  const SceneFrame frame = place_scene(capture, {});
+  view.image.alpha.assign(view.image.pixel_count(), 0);
+  EXPECT_EQ(place_scene(capture, {}), frame);
+  view.held_out = false;
+  EXPECT_FALSE(place_scene(capture, {}) == frame) << "the measure can fail";
+}
+
 TEST(Placement, RefusesCamerasThatStandInOnePlace) {
   for (const Vec3d place : {Vec3d{0, 0, 0}, Vec3d{0.3, 0.7, 0.7}}) {
     Capture capture;

@@ -153,6 +153,7 @@ void apply_learned_views(Capture& capture, const LearnedViews& learned) {
 
 std::vector<std::string> apply_learned_views(Capture& capture, const std::filesystem::path& stage1_snapshot) {
   const LearnedViews learned = LuminanceModel::learned_views_in(stage1_snapshot);
+  refuse_other_cameras(stage1_snapshot, LuminanceModel::trained_on_in(stage1_snapshot).cameras, capture);
   std::vector<std::string> names;
   for (const View& view : capture.views) {
     if (!view.held_out) names.push_back(view.name);

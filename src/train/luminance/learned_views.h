@@ -38,7 +38,7 @@ struct LearnedFact {
 void apply_learned_views(Capture& capture, const LearnedViews& learned);
 /// The same from a training's snapshot. Returns its facts in lines, and a note of cameras so far off that
 /// something else is wrong.
-/// @throws MissingInputError, SnapshotError  also when it learned of another number of views than are trained on
+/// @throws MissingInputError, SnapshotError  also when it was trained with other cameras than the capture was read with
 std::vector<std::string> apply_learned_views(Capture& capture, const std::filesystem::path& stage1_snapshot);
 
 }  // namespace cnerf

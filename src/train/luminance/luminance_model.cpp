@@ -92,6 +92,15 @@ int learned_count(const Snapshot& snapshot, const char* field) {
   return snapshot.header().contains(field) ? header_field<int>(snapshot, field) : 0;
 }
 
+/// Earlier versions did not say all that there is to say.
+std::string stored_text(const Snapshot& snapshot, const char* field) {
+  return snapshot.header().contains(field) ? header_field<std::string>(snapshot, field) : "";
+}
+
+TrainedOn stored_training(const Snapshot& snapshot) {
+  return {stored_text(snapshot, "trained_on"), stored_text(snapshot, "cameras")};
+}
+
 /// A piece of so many structs of floats; nothing is looked for where there are to be none.
 template <typename Numbers>
 std::vector<Numbers> stored_piece(const Snapshot& snapshot, const char* name, int count) {
@@ -202,6 +211,13 @@ std::string digest_of_training(const Capture& capture) {
   return sha256(std::as_bytes(std::span(views)));
 }
 
+void refuse_other_cameras(const std::filesystem::path& snapshot, const std::string& trained, const Capture& capture) {
+  if (trained.empty() || capture.cameras.empty() || trained == capture.cameras) return;
+  throw SnapshotError(snapshot.string() +
+                      ": was trained with other cameras; poses and lenses of the capture, and capture.holdout, have to "
+                      "be as they were, or train again");
+}
+
 nlohmann::json frame_to_json(const SceneFrame& frame) {
   return {{"world_centre", {frame.world_centre.x, frame.world_centre.y, frame.world_centre.z}},
           {"unit_per_world", frame.unit_per_world},
@@ -244,7 +260,7 @@ LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Option
                                       const FreeSpace& free_space, const std::vector<SparsePoint>& points) {
   LuminanceModel model;
   model.frame = place_scene(capture, options.placement, points);
-  model.trained_on = digest_of_training(capture);
+  model.trained_on = {digest_of_training(capture), capture.cameras};
   model.options = options;
   model.max_luminance = brightest(capture);
   if (options.lenses) model.learned_lenses = int(lenses_of(capture).size());
@@ -271,9 +287,8 @@ SceneFrame LuminanceModel::frame_in(const std::filesystem::path& file) {
   return stored_frame(Snapshot(file, kKind));
 }
 
-std::string LuminanceModel::trained_on_in(const std::filesystem::path& file) {
-  const Snapshot snapshot(file, kKind);
-  return snapshot.header().contains("trained_on") ? header_field<std::string>(snapshot, "trained_on") : "";
+TrainedOn LuminanceModel::trained_on_in(const std::filesystem::path& file) {
+  return stored_training(Snapshot(file, kKind));
 }
 
 LearnedViews LuminanceModel::learned_views_in(const std::filesystem::path& file) {
@@ -300,11 +315,11 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   model.frame = stored_frame(snapshot);
   try {
     model.options = stored_options(snapshot);
-    model.kernels_before = snapshot.header().value("kernels", "");
-    model.trained_on = snapshot.header().value("trained_on", "");
   } catch (const nlohmann::json::exception& problem) {
     throw SnapshotError(file.string() + ": header: " + problem.what());
   }
+  model.kernels_before = stored_text(snapshot, "kernels");
+  model.trained_on = stored_training(snapshot);
   model.max_luminance = header_field<float>(snapshot, "max_luminance");
   model.seconds = load_times(file)["seconds"];
   model.trained_samples = header_field<double>(snapshot, "trained_samples");
@@ -337,7 +352,8 @@ void LuminanceModel::save(const std::filesystem::path& file) const {
                  {"options", options_to_json(options)},
                  {"occupancy", occupancy_to_json(options.occupancy)},
                  {"kernels", kernels},
-                 {"trained_on", trained_on},
+                 {"trained_on", trained_on.views},
+                 {"cameras", trained_on.cameras},
                  {"max_luminance", max_luminance},
                  {"learned_views", learned_views},
                  {"learned_lenses", learned_lenses},

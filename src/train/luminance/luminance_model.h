@@ -29,6 +29,16 @@ struct LearnedViews {
 /// Which views of a capture are trained on, and how their pixels were read: the same for the same ones.
 [[nodiscard]] std::string digest_of_training(const Capture& capture);
 
+/// What a training was of; texts are empty where an earlier version did not say.
+struct TrainedOn {
+  std::string views;    ///< digest_of_training
+  std::string cameras;  ///< Capture::cameras
+};
+
+/// @param trained  Capture::cameras of the training
+/// @throws SnapshotError  where both are known and differ
+void refuse_other_cameras(const std::filesystem::path& snapshot, const std::string& trained, const Capture& capture);
+
 struct LuminanceModel {
   SceneFrame frame;
   Stage1Options options;
@@ -41,9 +51,9 @@ struct LuminanceModel {
   std::string kernels;         ///< that its engine computes with, see kernels_of
   std::string kernels_before;  ///< of the snapshot it was read from; empty where that does not say
   std::unique_ptr<LuminanceEngine> engine;
-  LearnedViews moved;      ///< how cameras were moved before the training, which learns from there; empty: not at all
-  std::string trained_on;  ///< digest_of_training of its capture; empty where an earlier version did not say
-  DirectionMap sky;        ///< linear Y beyond the box, at the median view's exposure; none where no view sees one
+  LearnedViews moved;  ///< how cameras were moved before the training, which learns from there; empty: not at all
+  TrainedOn trained_on;
+  DirectionMap sky;  ///< linear Y beyond the box, at the median view's exposure; none where no view sees one
 
   /// A fresh model for a capture. The first form knows of free space what the capture's own points say.
   static LuminanceModel create(const Capture& capture, const Stage1Options& options, const Engines& engines);
@@ -56,8 +66,8 @@ struct LuminanceModel {
   static Stage1Options options_in(const std::filesystem::path& snapshot);
   /// Only where its box lies.  @throws MissingInputError, SnapshotError
   static SceneFrame frame_in(const std::filesystem::path& snapshot);
-  /// Only which views it was trained on.  @throws MissingInputError, SnapshotError
-  static std::string trained_on_in(const std::filesystem::path& snapshot);
+  /// Only what it was trained on.  @throws MissingInputError, SnapshotError
+  static TrainedOn trained_on_in(const std::filesystem::path& snapshot);
   /// Only what was learned of its views, before it and by it.  @throws MissingInputError, SnapshotError
   static LearnedViews learned_views_in(const std::filesystem::path& snapshot);
   void save(const std::filesystem::path& snapshot) const;

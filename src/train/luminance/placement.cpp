@@ -87,7 +87,7 @@ SceneFrame place_around_cameras(const Capture& capture, const CameraArrangement&
   return cube(cameras.eye, 2 * reach, 3);
 }
 
-/// Bounds of what no view sees as fully transparent (the visual hull), on a coarse grid over `box`.
+/// Bounds of what no view to train on sees as fully transparent (the visual hull), on a coarse grid over `box`.
 Aabbd visual_hull_bounds(const Capture& capture, const Aabbd& box) {
   constexpr int kCells = 64;
   std::vector<Aabbd> of_slice(kCells, Aabbd::empty());
@@ -98,6 +98,7 @@ Aabbd visual_hull_bounds(const Capture& capture, const Aabbd& box) {
         const Vec3d corner = box.min + Vec3d{x * cell.x, y * cell.y, double(z) * cell.z};
         const Vec3d middle = corner + cell * 0.5;
         const bool inside = std::all_of(capture.views.begin(), capture.views.end(), [&](const View& view) {
+          if (view.held_out) return true;
           const auto pixel = project(view.intrinsics, view.world_from_camera.inverse().point(middle));
           if (!pixel) return true;
           const int radius =

@@ -87,11 +87,13 @@ void refuse_others(const std::filesystem::path& snapshot, const Stage1Options& s
 }
 
 /// Earlier versions did not say.
-void refuse_other_views(const std::filesystem::path& snapshot, const std::string& stored, const Capture& capture) {
-  if (stored.empty() || stored == digest_of_training(capture)) return;
-  throw SnapshotError(snapshot.string() +
-                      ": was trained on other views; capture.holdout, capture.downscale, capture.transfer and the "
-                      "photographs' names and sizes have to be as they were, or start again without --resume");
+void refuse_other_views(const std::filesystem::path& snapshot, const TrainedOn& stored, const Capture& capture) {
+  if (!stored.views.empty() && stored.views != digest_of_training(capture)) {
+    throw SnapshotError(snapshot.string() +
+                        ": was trained on other views; capture.holdout, capture.downscale, capture.transfer and the "
+                        "photographs' names and sizes have to be as they were, or start again without --resume");
+  }
+  refuse_other_cameras(snapshot, stored.cameras, capture);
 }
 
 SeenSky sky_of(const Stage1Job& job) {
