@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdlib>
+#include <vector>
 
 #include "src/base/error.h"
+#include "src/base/text.h"
 
 namespace cnerf::cluster {
 namespace {
@@ -72,16 +74,28 @@ std::optional<Launch> by_open_mpi(const GetVariable& variable) {
 }
 
 /// Of "2(x3),1": the tasks of this node, or of the first one where that is unknown.
-int tasks_per_node(const GetVariable& variable) {
-  const std::string text = variable("SLURM_STEP_TASKS_PER_NODE").value_or("1");
-  return parsed("SLURM_STEP_TASKS_PER_NODE", text.substr(0, text.find_first_of("(,")));
+int tasks_of_node(const GetVariable& variable) {
+  const std::string name = "SLURM_STEP_TASKS_PER_NODE";
+  const std::vector<std::string> parts = split(variable(name).value_or("1"), ',');
+  int nodes_before = number(variable, "SLURM_NODEID", 0);
+  std::optional<int> of_first;
+  for (const std::string& part : parts) {
+    const std::size_t times = part.find("(x"), end = part.find(')');
+    const int tasks = parsed(name, part.substr(0, times));
+    const int nodes = times == std::string::npos ? 1 : parsed(name, part.substr(times + 2, end - times - 2));
+    if (nodes_before < nodes) return tasks;
+    nodes_before -= nodes;
+    if (!of_first) of_first = tasks;
+  }
+  return of_first.value_or(1);
 }
 
 /// A script of sbatch has the variables of its job; only what srun started has those of a step.
 std::optional<Launch> by_slurm(const GetVariable& variable) {
   if (!variable("SLURM_PROCID") || !variable("SLURM_STEP_NUM_TASKS")) return std::nullopt;
   Launch launch = numbered(variable, "Slurm", {"SLURM_PROCID", "SLURM_STEP_NUM_TASKS", "SLURM_LOCALID"});
-  launch.local_size = std::max(tasks_per_node(variable), launch.local_rank + 1);
+  launch.local_size = std::max(tasks_of_node(variable), launch.local_rank + 1);
+  launch.has_own_gpus = variable("SLURM_GPUS_PER_TASK") || variable("SLURM_TRES_PER_TASK");
   launch.host =
       variable("MASTER_ADDR")
           .value_or(first_host(variable("SLURM_STEP_NODELIST").value_or(variable("SLURM_NODELIST").value_or(""))));
@@ -99,6 +113,15 @@ GetVariable environment() {
     if (value == nullptr || *value == '\0') return std::nullopt;
     return value;
   };
+}
+
+GpuChoice choose_gpu(const Launch& launch, const std::optional<std::string>& visible, int of_machine) {
+  std::vector<std::string> gpus = split(visible.value_or(""), ',');
+  const bool is_shared_out = gpus.size() == 1 || launch.has_own_gpus;
+  for (int gpu = 0; !visible && gpu < of_machine; ++gpu) gpus.push_back(std::to_string(gpu));
+  if (gpus.empty()) return {"", launch.local_size > 1};  // WSL has a GPU, and no device file
+  return {gpus[std::size_t(launch.local_rank) % gpus.size()],
+          !is_shared_out && gpus.size() < std::size_t(launch.local_size)};
 }
 
 std::string first_host(const std::string& nodes) {

@@ -195,7 +195,7 @@ void JoinedRanks::wait_for(const std::function<bool()>& is_there, const std::str
 int JoinedRanks::threads() const {
   // A launcher that binds processes to processors has shared these out itself.
   const int given = int(std::thread::hardware_concurrency()), allowed = allowed_processors();
-  return allowed < given ? 0 : std::max(1, given / meeting_.launch.local_size);
+  return allowed < given ? 0 : std::max(1, given / local_size());
 }
 
 Group& JoinedRanks::group() {

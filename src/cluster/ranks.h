@@ -29,14 +29,16 @@ class Ranks {
   [[nodiscard]] virtual int size() const { return 1; }
   [[nodiscard]] bool is_first() const { return rank() == 0; }
   [[nodiscard]] bool is_alone() const { return size() == 1; }
+  /// Ranks on this machine.
+  [[nodiscard]] virtual int local_size() const { return 1; }
   /// Of the machine's processors, those for this rank; 0 = as many as the system gives.
   [[nodiscard]] virtual int threads() const { return 0; }
 
   /// Adds up over all ranks, in place. All ranks get the same bits; the order of the sum is the back end's.
   virtual void sum(std::span<float> /*values*/) {}
   virtual void sum(std::span<double> /*values*/) {}
-  /// Sums between GPUs; null where the build has none, the same on all ranks. Who is lost is found by others than the
-  /// caller, which does not wait.
+  /// Sums between GPUs; null where the build has none, the same on all ranks, and where ranks of this machine have to
+  /// share a GPU. Who is lost is found by others than the caller, which does not wait.
   [[nodiscard]] virtual DeviceSums* device_sums() { return nullptr; }
   /// What rank 0 has, for all.
   [[nodiscard]] virtual Bytes broadcast(Bytes bytes) { return bytes; }
@@ -102,6 +104,7 @@ class JoinedRanks final : public Ranks {
 
   [[nodiscard]] int rank() const override { return meeting_.launch.rank; }
   [[nodiscard]] int size() const override { return meeting_.launch.size; }
+  [[nodiscard]] int local_size() const override { return meeting_.launch.local_size; }
   [[nodiscard]] int threads() const override;
   void sum(std::span<float> values) override;
   void sum(std::span<double> values) override;

@@ -1,8 +1,9 @@
 #include <unistd.h>
 
 #include <cstdlib>
-#include <iostream>
-#include <sstream>
+#include <filesystem>
+#include <string_view>
+#include <system_error>
 
 #include "src/base/error.h"
 #include "src/base/plugin.h"
@@ -22,15 +23,28 @@ std::string process_name() {
   return "pid " + std::to_string(::getpid()) + " on " + host;
 }
 
+/// By their devices: CUDA, once it is asked, keeps to the GPUs that it saw.
+int gpus_of_machine() {
+  constexpr std::string_view kDevice = "nvidia";
+  int count = 0;
+  std::error_code failure;
+  for (const auto& entry : std::filesystem::directory_iterator("/dev", failure)) {
+    const std::string name = entry.path().filename().string();
+    const std::string which = name.starts_with(kDevice) ? name.substr(kDevice.size()) : "";
+    if (!which.empty() && which.find_first_not_of("0123456789") == std::string::npos) ++count;
+  }
+  return count;
+}
+
 /// Each local rank sees one GPU alone. Without effect where the launcher has shared them out, one each.
-void choose_gpu(int local_rank) {
-  const auto visible = environment()("CUDA_VISIBLE_DEVICES");
-  if (!visible && std::getenv("CUDA_VISIBLE_DEVICES") != nullptr) return;  // empty: none
-  std::vector<std::string> gpus;
-  std::istringstream list(visible.value_or(""));
-  for (std::string gpu; std::getline(list, gpu, ',');) gpus.push_back(gpu);
-  const std::string own = gpus.empty() ? std::to_string(local_rank) : gpus[std::size_t(local_rank) % gpus.size()];
-  ::setenv("CUDA_VISIBLE_DEVICES", own.c_str(), 1);
+/// @return  whether others see the same one
+bool take_gpu(const Launch& launch) {
+  constexpr const char* kVariable = "CUDA_VISIBLE_DEVICES";
+  const auto visible = environment()(kVariable);
+  if (!visible && std::getenv(kVariable) != nullptr) return false;  // empty: none
+  const GpuChoice choice = choose_gpu(launch, visible, gpus_of_machine());
+  if (!choice.gpu.empty()) ::setenv(kVariable, choice.gpu.c_str(), 1);
+  return choice.is_shared;
 }
 
 /// Files are whole or not there, so that this can come at any time.
@@ -49,8 +63,9 @@ Ranks& world() {
 void join_world() {
   const std::optional<Launch> launch = find_launch(environment());
   if (!launch) return;
-  choose_gpu(launch->local_rank);
-  const auto& channel = plugin_table<Channel>("cluster", "cnerf_cluster_channel");
+  const bool shares_gpu = take_gpu(*launch);
+  static Channel channel = plugin_table<Channel>("cluster", "cnerf_cluster_channel");
+  if (shares_gpu) channel.device_sums = nullptr;  // NCCL wants a GPU for each
   joined = new JoinedRanks({*launch, channel, Patience(), kTimeToCome, process_name(), end_program});
 }
 

@@ -214,7 +214,9 @@ ImageSet load_image_set(const ImageSources& sources) {
   add_mosaics(sources, set);
   for (const fs::path& folder : sources.evaluation) {
     const std::string name = fs::absolute(folder / "").lexically_normal().parent_path().filename().string();
-    set.evaluation[name] = load_evaluation_images(folder);
+    const auto [place, is_new] = set.evaluation.try_emplace(name);
+    if (!is_new) throw UsageError("--evaluation: two folders are called " + name + ", and scores go by that name");
+    place->second = load_evaluation_images(folder);
   }
   return set;
 }

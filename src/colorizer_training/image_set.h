@@ -54,6 +54,7 @@ struct ImageSet {
 
 /// Decodes everything on all cores. Which images are held out depends on their names alone.
 /// @throws MissingInputError, InputError  naming the file; images that cannot be decoded are errors, too.
+/// @throws UsageError  evaluation folders of one name
 [[nodiscard]] ImageSet load_image_set(const ImageSources& sources);
 
 /// All images of a folder at evaluation size, in the order of their names.

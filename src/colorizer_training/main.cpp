@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdio>
 #include <iostream>
+#include <optional>
 #include <sstream>
 
 #include "src/base/error.h"
@@ -27,6 +28,7 @@ struct Options {
   std::string device = "auto";
   bool resume = false;
   TrainerOptions training;
+  bool names_steps = false;  ///< the user does
 };
 
 torch::Device choose_device(const std::string& name) {
@@ -150,7 +152,9 @@ void train(const Options& o, torch::Device device) {
   if (!o.teacher.empty()) teacher = std::make_unique<FeatureTeacher>(o.teacher, device);
   ColorizerTrainer trainer(images, std::move(teacher), o.training, device);
   std::printf("%lld parameters\n", static_cast<long long>(parameter_count(*trainer.averaged())));
-  if (o.resume) trainer.load(o.output / "checkpoint.pt");
+  if (o.resume) {
+    trainer.load(o.output / "checkpoint.pt", o.names_steps ? std::optional(o.training.steps) : std::nullopt);
+  }
   run_steps(trainer, images, o, device);
   export_weights(fold_batch_norm(trainer.averaged()), trainer.class_weights().log().cpu(), images, o, device);
 }
@@ -174,6 +178,7 @@ int run(int argc, char** argv) {
   CLI::App app("Trains and judges the built-in colorizer.");
   add_options(app, options);
   CLI11_PARSE(app, argc, argv);
+  options.names_steps = app.count("--steps") > 0;
   install_interruption_handler();
   const torch::Device device = choose_device(options.device);
   at::globalContext().setAllowTF32CuDNN(true);

@@ -159,7 +159,7 @@ void ColorizerTrainer::save(const fs::path& checkpoint) {
   write_atomically(checkpoint, [&](const fs::path& temporary) { torch::save(tensors, temporary.string()); });
 }
 
-void ColorizerTrainer::load(const fs::path& checkpoint) {
+void ColorizerTrainer::load(const fs::path& checkpoint, std::optional<int> wanted_steps) {
   if (!fs::exists(checkpoint)) throw MissingInputError(checkpoint.string() + ": no such checkpoint");
   const torch::NoGradGuard no_grad;
   std::vector<Tensor> tensors;
@@ -172,9 +172,14 @@ void ColorizerTrainer::load(const fs::path& checkpoint) {
   bool fits = tensors.size() == own.size() + 1;
   for (std::size_t i = 0; fits && i < own.size(); ++i) fits = tensors[i].sizes() == own[i].sizes();
   if (!fits) throw SnapshotError(checkpoint.string() + ": a checkpoint of another network or other classes");
+  const int steps = int(tensors.back()[1].item<std::int64_t>());  // where the cosine ends
+  if (wanted_steps && *wanted_steps != steps) {
+    throw UsageError("--steps " + std::to_string(*wanted_steps) + ": " + checkpoint.string() + " is of a training of " +
+                     std::to_string(steps) + " steps; give that number, or start again without --resume");
+  }
   for (std::size_t i = 0; i < own.size(); ++i) own[i].copy_(tensors[i]);
   step_ = tensors.back()[0].item<std::int64_t>();
-  options_.steps = int(tensors.back()[1].item<std::int64_t>());  // where the cosine ends
+  options_.steps = steps;
 }
 
 }  // namespace cnerf::colorizer_training

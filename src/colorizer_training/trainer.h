@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,8 +54,11 @@ class ColorizerTrainer {
   [[nodiscard]] const torch::Tensor& class_weights() const { return class_weights_; }
 
   void save(const std::filesystem::path& checkpoint);
+  /// Its number of steps takes the place of this one's.
+  /// @param wanted_steps  that it has to have in all, where somebody asked for a number
   /// @throws MissingInputError, SnapshotError  a checkpoint of another network or run.
-  void load(const std::filesystem::path& checkpoint);
+  /// @throws UsageError  it has another number of steps
+  void load(const std::filesystem::path& checkpoint, std::optional<int> wanted_steps = {});
 
  private:
   [[nodiscard]] Batch batch_of(std::uint64_t seed, std::int64_t step) const;

@@ -4,11 +4,13 @@
 #include <cmath>
 
 #include "src/base/check.h"
+#include "src/base/error.h"
 #include "src/base/rng.h"
 #include "src/capture/color_truth.h"
 #include "src/color/colorspace_math.h"
 #include "src/render/training_views.h"
 #include "src/train/chroma/color_model.h"
+#include "src/train/luminance/seen_scene.h"
 #include "src/train/luminance/view_cache.h"
 
 namespace cnerf::compare {
@@ -18,6 +20,7 @@ constexpr double kFirstMeasurement = 0.1;  // seconds of training
 constexpr double kNextMeasurement = 1.4;   // times the last one's
 constexpr RenderEffort kEffort = {1e-3f, 0.995f};
 constexpr std::uint64_t kPixelSeed = named_stream("held");
+constexpr float kMostlyField = 0.5f;  // opacity, of a pixel before a sky whose colour is the field's
 
 float encoded(float luminance) {
   return srgb_from_linear(std::clamp(luminance, 0.0f, 1.0f));
@@ -64,15 +67,16 @@ HeldOutPixels::HeldOutPixels(std::span<const View* const> views, const SceneFram
       const auto width = std::size_t(view.image.width);
       rays_.push_back(camera.ray({double(pixel % width) + 0.5, double(pixel / width) + 0.5}));
       luminance_.push_back(view.image.luminance(pixel));
-      if (truth) colors_.push_back(true_color(*truth, pixel));
+      colors_.push_back(truth ? std::optional(true_color(*truth, pixel)) : std::nullopt);
     }
   }
   CNERF_CHECK(!rays_.empty(), "no pixel to look at");
 }
 
-double HeldOutPixels::psnr(const LuminanceEngine& engine, const MarchSettings& march) const {
+double HeldOutPixels::psnr(const LuminanceEngine& engine, const MarchSettings& march, const DirectionView& sky) const {
   std::vector<RayResult> seen(rays_.size());
   engine.render(rays_, march, kEffort, seen);
+  add_sky(sky, rays_, seen);
   double sum = 0;
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const double error = double(encoded(seen[i].luminance)) - double(encoded(luminance_[i]));
@@ -81,27 +85,30 @@ double HeldOutPixels::psnr(const LuminanceEngine& engine, const MarchSettings& m
   return -10 * std::log10(std::max(sum / double(seen.size()), 1e-10));
 }
 
-void HeldOutPixels::trace(const LuminanceEngine& engine, const MarchSettings& march) {
+void HeldOutPixels::trace(const LuminanceEngine& engine, const MarchSettings& march, const DirectionView& sky) {
   std::vector<WeightedSample> samples;
   std::vector<std::size_t> offsets;
   engine.trace(rays_, march, kEffort, samples, offsets);
   samples_ = pixel_samples(rays_, samples, offsets);
+  has_sky_ = sky.values != nullptr;
 }
 
 double HeldOutPixels::ab_error(const ColorBinEngine& engine, float temperature) const {
   CNERF_CHECK_EQ(samples_.pixels(), rays_.size());
-  CNERF_CHECK_EQ(colors_.size(), rays_.size());
   std::vector<Ab> decoded(rays_.size());
   engine.decode(samples_, temperature, decoded);
   const std::vector<float> luminance = pixel_luminance(samples_);
   double sum = 0;
+  std::size_t count = 0;
   for (std::size_t i = 0; i < decoded.size(); ++i) {
-    float opacity = 0;
-    for (std::size_t s = samples_.offsets[i]; s < samples_.offsets[i + 1]; ++s) opacity += samples_.weights[s];
+    const float opacity = samples_.opacity(i);
+    if (!colors_[i] || (has_sky_ && opacity < kMostlyField)) continue;
     const Ab ours = opacity < kLeastColoredOpacity ? Ab{} : in_gamut(decoded[i], luminance[i]);
-    sum += std::hypot(double(ours.a - colors_[i].a), double(ours.b - colors_[i].b));
+    sum += std::hypot(double(ours.a - colors_[i]->a), double(ours.b - colors_[i]->b));
+    ++count;
   }
-  return sum / double(decoded.size());
+  if (count == 0) throw InputError("none of the held-out pixels that were drawn has a colour to compare with");
+  return sum / double(count);
 }
 
 void LearningCurve::report_progress(const Progress& progress) {

@@ -2,6 +2,7 @@
 /// How well a field does on pixels it is not trained on, while it trains: what "trains faster" means in numbers.
 
 #include <cstddef>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "src/engine/color_engines.h"
 #include "src/engine/engines.h"
 #include "src/field/scene_frame.h"
+#include "src/render/direction_map.h"
 
 namespace cnerf::compare {
 
@@ -46,18 +48,24 @@ class HeldOutPixels {
 
   /// PSNR of sRGB-encoded luminance over all the pixels at once, dB. A view's PSNR is the mean of its own dB, so this
   /// differs from a table's by some tenths.
-  [[nodiscard]] double psnr(const LuminanceEngine& engine, const MarchSettings& march) const;
+  /// @param sky  behind the field; without values there is none
+  [[nodiscard]] double psnr(const LuminanceEngine& engine, const MarchSettings& march,
+                            const DirectionView& sky = {}) const;
 
-  /// Keeps what the rays of the pixels meet, for `ab_error`.
-  void trace(const LuminanceEngine& engine, const MarchSettings& march);
-  /// Mean ab distance of the decoded colours to the true ones.  @param temperature  of the decoding
+  /// Keeps what the rays of the pixels meet, for `ab_error`.  @param sky  as in `psnr`
+  void trace(const LuminanceEngine& engine, const MarchSettings& march, const DirectionView& sky = {});
+  /// Mean ab distance of the decoded colours to the true ones, where these are known and more of the field is seen than
+  /// of a sky.
+  /// @param temperature  of the decoding
+  /// @throws InputError  there is no such pixel
   [[nodiscard]] double ab_error(const ColorBinEngine& engine, float temperature) const;
 
  private:
   std::vector<Ray> rays_;
-  std::vector<float> luminance_;  // linear, over black
-  std::vector<Ab> colors_;        // empty where a view has none
+  std::vector<float> luminance_;           // linear, over black
+  std::vector<std::optional<Ab>> colors_;  // none where a view has none
   PixelSamples samples_;
+  bool has_sky_ = false;  // behind them
 };
 
 /// Measures at times that grow by a factor, and for no longer than there is training.
@@ -68,6 +76,8 @@ class LearningCurve final : public Observer {
   LearningCurve(std::string task, Observer& inner, std::function<double()> measure)
       : task_(std::move(task)), inner_(inner), measure_(std::move(measure)) {}
   void report_progress(const Progress& progress) override;
+  void say(const std::string& text) override { inner_.say(text); }
+  void wrote(const std::string& what, const std::filesystem::path& path) override { inner_.wrote(what, path); }
   [[nodiscard]] bool is_cancelled() const override { return inner_.is_cancelled(); }
   /// Training time up to the last step.
   [[nodiscard]] double seconds() const { return last_; }

@@ -8,22 +8,25 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/json_record.h"
-#include "src/base/text.h"
+#include "src/colorizer/layers_model.h"
 #include "src/compare/baselines/flow.h"
 #include "src/compare/baselines/positional_field.h"
 #include "src/compare/baselines/simulated.h"
+#include "src/compare/contents.h"
 #include "src/compare/derived_engines.h"
 #include "src/compare/stage2_variants.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/picture_files.h"
 #include "src/pipeline/render_step.h"
+#include "src/pipeline/run_context.h"
 #include "src/prepare/sparse_points.h"
 #include "src/render/camera_path.h"
 #include "src/train/chroma/color_model.h"
 #include "src/train/luminance/luminance_model.h"
 #include "src/train/luminance/options_json.h"
 #include "src/train/luminance/placement.h"
+#include "src/train/luminance/seen_sky.h"
 #include "src/train/luminance/stage1.h"
 
 namespace cnerf::compare {
@@ -57,20 +60,10 @@ void begin_folder(const fs::path& folder, const std::string& settings) {
   write_file(folder / "settings.txt", settings);
 }
 
-/// Tells a file's content from another's; nothing where there is no file, which who reads it says.
-std::string content_of(const fs::path& file) {
-  std::error_code failure;
-  return fs::is_regular_file(file, failure) ? sha256_of_file(file) : "";
-}
-
-/// The same of the files that a colorizer's spec names, which are looked up in `folder`, then as given.
-std::string contents_of(const std::string& spec, const fs::path& folder) {
-  std::string contents;
-  for (const std::string& name : split(spec.substr(spec.find(':') + 1), ',')) {
-    const std::string beside = content_of(folder / name);
-    contents += beside.empty() ? content_of(name) : beside;
-  }
-  return contents;
+/// Whether answers are built on those of the network that comes with the program.
+bool asks_builtin(const Method& method, const ColorizerOptions& options) {
+  const bool fits_reference = method.distills_key_view || options.spec.starts_with("reference:");
+  return options.spec == "builtin" || (fits_reference && options.reference_on_builtin);
 }
 
 /// What decides a text's loss.
@@ -98,23 +91,34 @@ std::vector<LearningPoint> read_curve(const fs::path& snapshot) {
   return curve;
 }
 
+/// The light of the sky that stage 1 will find.
+DirectionMap expected_sky(const Stage1Job& job) {
+  if (!job.options.sky) return {};
+  return find_sky(job.capture, training_views(job.capture, {}), job.known_points()).light;  // directions know no frame
+}
+
 /// Trains stage 1, and leaves the curve of its PSNR beside the snapshot.
+/// @param image_memory  as Stage1Job has it
 Stage1Report train_measured(const Subject& subject, const Stage1Options& options, const fs::path& snapshot,
-                            const Engines& engines, Observer& observer) {
+                            std::size_t image_memory, const Engines& engines, Observer& observer) {
   Stage1Job job{subject.capture, options, snapshot, true};
   job.points = prepare::points_for_training(job, observer);
+  job.image_memory = image_memory;
   const SceneFrame frame = job.goes_on() ? LuminanceModel::frame_in(snapshot)
                                          : place_scene(subject.capture, options.placement, job.known_points());
   const HeldOutPixels pixels(subject.evaluated, frame, kMeasuredPixels);
   const MarchSettings march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
+  const DirectionMap sky = expected_sky(job);
+  const DirectionView light = sky.exists() ? sky.plane(0) : DirectionView();
   const WatchedEngines watched(engines);
-  LearningCurve curve("stage 1", observer, [&] { return pixels.psnr(watched.luminance(), march); });
+  LearningCurve curve("stage 1", observer, [&] { return pixels.psnr(watched.luminance(), march, light); });
   const Stage1Report report = train_stage1(job, watched, curve);
   // The engine is gone; what it came to is in the snapshot. What an earlier part of the training took comes first.
   const double before = curve.points().empty() ? report.seconds : report.seconds - curve.seconds();
   std::vector<LearningPoint> points = curve.points();
   for (LearningPoint& point : points) point.seconds += std::max(before, 0.0);
-  points.push_back({report.seconds, pixels.psnr(*LuminanceModel::load(snapshot, engines).engine, march)});
+  const LuminanceModel model = LuminanceModel::load(snapshot, engines);
+  points.push_back({report.seconds, pixels.psnr(*model.engine, march, model.sky_light())});
   write_file(fs::path(snapshot).replace_extension(".curve"), to_text(points));
   return report;
 }
@@ -152,16 +156,20 @@ void SeedRun::train() {
   Stage1Options options = bench_.config.stage1;
   options.seed = seed_;
   options.exposures = options.poses = options.lenses = false;  // methods are compared on the views as given
-  // Photographs may come or go between a comparison and its going on.
-  std::string views = digest_of_training(subject_.capture);
+  // Photographs may come or go between a comparison and its going on, and cameras may change.
+  std::string views = digest_of_training(subject_.capture) + subject_.capture.cameras;
   for (const View* view : subject_.evaluated) views += "\n" + view->name;
   stage1_settings_ = digest(fs::absolute(subject_.capture.root).string() + views + options_to_json(options).dump() +
                             options_to_json(subject_.options).dump());
+  files_ = content_of_spec(bench_.config.colorizer, subject_.capture.root) +
+           (bench_.lpips != nullptr ? content_of(bench_.plan.lpips_weights) : "") +
+           (bench_.encoder != nullptr ? content_of(encoder_folder()) : "");
   const fs::path done = folder_ / "stage1.txt";
   if (settings_in(folder_) == stage1_settings_ && fs::exists(done)) return;
   begin_folder(folder_, stage1_settings_);
   bench_.observer.say(fmt::format("{}, seed {}: stage 1", subject_.name, seed_));
-  const Stage1Report report = train_measured(subject_, options, stage1_, bench_.engines, bench_.observer);
+  const Stage1Report report = train_measured(subject_, options, stage1_, pipeline::image_memory(bench_.config),
+                                             bench_.engines, bench_.observer);
   write_file(done, fmt::format("{} steps, {:.1f} s, {:.2f} dB on training pixels\n", report.steps, report.seconds,
                                report.train_psnr));
 }
@@ -172,8 +180,8 @@ std::string SeedRun::settings_of(const Method& method) const {
   return digest(stage1_settings_ + method.name + options_to_json(stage2_of(method, run.stage2)).dump() +
                 (method.matches_features ? style.string() + content_of(style) : "") +
                 (method.follows_text ? text_of(bench_.plan.text) : "") + options_to_json(run.colorizer).dump() +
-                contents_of(run.colorizer.spec, subject_.capture.root) + options_to_json(run.render).dump() +
-                (bench_.lpips != nullptr ? bench_.lpips->network() : "") +
+                files_ + (asks_builtin(method, run.colorizer) ? content_of_builtin() : "") +
+                options_to_json(run.render).dump() + (bench_.lpips != nullptr ? bench_.lpips->network() : "") +
                 (bench_.encoder != nullptr ? "encoder" : ""));
 }
 
@@ -237,7 +245,7 @@ void SeedRun::train_own_field(const Engines& engines, Cell& cell) const {
   options.learning_rate = kPositionalLearningRate;
   options.final_learning_rate = kPositionalFinalLearningRate;
   const fs::path snapshot = folder_ / cell.method / "stage1.snapshot";
-  (void)train_measured(subject_, options, snapshot, engines, bench_.observer);
+  (void)train_measured(subject_, options, snapshot, pipeline::image_memory(bench_.config), engines, bench_.observer);
   cell.stage1_curve = read_curve(snapshot);
 }
 
@@ -309,7 +317,7 @@ void SeedRun::train_colors(const Method& method, const Field& field, Colorizer& 
   if (field.own || is_own(method)) {
     const LuminanceModel model = LuminanceModel::load(stage1_, bench_.engines);
     pixels.emplace(subject_.evaluated, model.frame, kMeasuredPixels);
-    pixels->trace(*model.engine, model.march());
+    pixels->trace(*model.engine, model.march(), model.sky_light());
     remove_output(take);  // a curve is of one training from its beginning
   }
   const Photometric photometric;

@@ -73,6 +73,7 @@ class SeedRun {
   int seed_;
   std::filesystem::path folder_, stage1_;  // the snapshot
   std::string stage1_settings_;
+  std::string files_;  // what the colorizer's and the judges' hold
   ViewCache training_views_;
 };
 

@@ -91,12 +91,21 @@ void measure_baked(const EvaluatedView& pictures, ViewMetrics& metrics) {
       mean_ab_distance(ours.baked_rgb, ours.rgb, coloured_pixels(ours, pictures.view.image.mask));
 }
 
+/// Networks know no masks: where the mask says to ignore a pixel, they see the truth in both pictures.
+void show_truth_where_masked(const MonoImage& image, const std::vector<std::uint8_t>& truth,
+                             std::vector<std::uint8_t>& ours) {
+  for (std::size_t i = 0; i < image.pixel_count(); ++i) {
+    if (!image.valid(i)) std::copy_n(truth.begin() + std::ptrdiff_t(3 * i), 3, ours.begin() + std::ptrdiff_t(3 * i));
+  }
+}
+
 /// Networks have one memory for what passes through them: not for several threads.
 void measure_by_networks(const EvaluatedView& pictures, const EvaluateOptions& options, ViewMetrics& metrics) {
   if (pictures.ours.rgb.empty() || !pictures.truth) return;
   const int width = pictures.ours.width, height = pictures.ours.height;
-  const std::vector<std::uint8_t> ours = srgb8_from_linear(pictures.ours.rgb);
+  std::vector<std::uint8_t> ours = srgb8_from_linear(pictures.ours.rgb);
   const std::vector<std::uint8_t> truth = srgb8_from_linear(pictures.truth->rgb);
+  show_truth_where_masked(pictures.view.image, truth, ours);
   const bool is_large = std::min(width, height) >= Lpips::kLeastSide;
   if (options.lpips != nullptr && is_large) metrics.lpips = options.lpips->distance(ours, truth, width, height);
   if (options.encoder == nullptr) return;

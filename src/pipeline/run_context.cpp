@@ -44,7 +44,7 @@ StepLocks::StepLocks(const RunDirectory& directory, const fs::path& folder, Obse
 std::size_t image_memory(const Config& config) {
   if (!config.image_memory.empty()) return bytes_from("image_memory", config.image_memory);
   const auto all = std::size_t(::sysconf(_SC_PHYS_PAGES)) * std::size_t(::sysconf(_SC_PAGESIZE));
-  return all / 4 / std::size_t(cluster::world().size());
+  return all / 4 / std::size_t(cluster::world().local_size());
 }
 
 namespace {

@@ -34,7 +34,8 @@ void check_choice(const ExistingOutput& existing);
 /// stage 1, which learns from the capture as it is.  @throws SnapshotError
 void use_learned_views(RunContext& context, Observer& observer);
 
-/// Bytes that photographs may take of the processor's memory, and again of a GPU's; of several ranks, each.
+/// Bytes that photographs may take of the processor's memory, and again of a GPU's; of several ranks, each. Where the
+/// user does not say, the ranks of a machine share a quarter of its memory.
 [[nodiscard]] std::size_t image_memory(const Config& config);
 /// Reads a capture and says what was found, with the reader's notes, and where large photographs lie.
 /// @param output  the folder that is worked in; what of the photographs does not fit into memory lies on its disk

@@ -237,7 +237,7 @@ int bench(int argc, char** argv) {
   const Engines& engines = engines_for("auto");
   const LuminanceModel luminance = LuminanceModel::load(directory.stage1_snapshot(), engines);
   compare::HeldOutPixels pixels(views_to_evaluate(context.capture, {}), luminance.frame, 20000);
-  pixels.trace(*luminance.engine, luminance.march());
+  pixels.trace(*luminance.engine, luminance.march(), luminance.sky_light());
   ViewCache views;
   const Bench rows{
       context, engines, luminance, pixels, views, spec, directory.root() / "closed-form" / "take.snapshot"};

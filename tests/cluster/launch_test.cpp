@@ -80,6 +80,21 @@ TEST(Launch, SlurmSaysWhoIsWho) {
   EXPECT_NE(launch_of(with(kSlurm, "SLURM_STEP_ID", "1"))->port, launch->port);
 }
 
+TEST(Launch, SlurmsNodesMayHaveDifferentNumbersOfTasks) {
+  const auto tasks_of = [](const std::string& list, const std::string& node) {
+    const auto first_of_node = with(with(kSlurm, "SLURM_LOCALID", "0"), "SLURM_NODEID", node);
+    return launch_of(with(first_of_node, "SLURM_STEP_TASKS_PER_NODE", list))->local_size;
+  };
+  EXPECT_EQ(tasks_of("4,2(x2)", "0"), 4);
+  EXPECT_EQ(tasks_of("4,2(x2)", "1"), 2);
+  EXPECT_EQ(tasks_of("4,2(x2)", "2"), 2);
+  EXPECT_EQ(tasks_of("2(x3),1,3", "3"), 1);
+  EXPECT_EQ(tasks_of("2(x3),1,3", "4"), 3);
+  EXPECT_EQ(tasks_of("2(x3),1", "4"), 2) << "the first node's, where the list does not say";
+  EXPECT_EQ(tasks_of("2(x3),1", ""), 2);
+  EXPECT_THROW((void)tasks_of("2(xthree)", "0"), UsageError);
+}
+
 /// sbatch gives its script the variables of the job: a program that the script calls without srun is alone.
 TEST(Launch, AScriptOfSbatchIsNoRank) {
   EXPECT_FALSE(launch_of({{"SLURM_PROCID", "0"}, {"SLURM_NTASKS", "4"}, {"SLURM_NODELIST", "n[1-4]"}}));
@@ -106,6 +121,25 @@ TEST(Launch, NonsenseIsRefused) {
   EXPECT_THROW(launch_of(with(kTorchrun, "MASTER_PORT", "65536")), UsageError);
   EXPECT_THROW(launch_of(with(kTorchrun, "LOCAL_WORLD_SIZE", "0")), UsageError) << "threads are divided by it";
   EXPECT_THROW(launch_of(with(kSlurm, "SLURM_LOCALID", "2147483647")), UsageError);
+}
+
+TEST(Launch, ProcessesOfAMachineTakeItsGpusInTurns) {
+  const auto gpu_of = [](int local_rank, int local_size, const std::optional<std::string>& visible, int of_machine) {
+    Launch launch;
+    launch.local_rank = local_rank;
+    launch.local_size = local_size;
+    const GpuChoice choice = choose_gpu(launch, visible, of_machine);
+    return choice.gpu + (choice.is_shared ? " shared" : "");
+  };
+  EXPECT_EQ(gpu_of(1, 2, std::nullopt, 8), "1");
+  EXPECT_EQ(gpu_of(2, 3, std::nullopt, 2), "0 shared") << "and not one that is not there";
+  EXPECT_EQ(gpu_of(1, 2, std::nullopt, 0), " shared") << "the variable stays as it is";
+  EXPECT_EQ(gpu_of(1, 2, "2,5", 8), "5");
+  EXPECT_EQ(gpu_of(2, 4, "2,5", 8), "2 shared");
+  EXPECT_EQ(gpu_of(1, 2, "5", 8), "5") << "the launcher gave the other one another";
+  Launch own;
+  own.local_rank = 2, own.local_size = 4, own.has_own_gpus = true;
+  EXPECT_FALSE(choose_gpu(own, "0,1", 8).is_shared) << "by --gpus-per-task";
 }
 
 TEST(Launch, FirstHostOfAList) {

@@ -49,6 +49,16 @@ TEST(Ranks, SumsBroadcastsAndGathers) {
   });
 }
 
+TEST(Ranks, SayHowManyShareTheirMachine) {
+  EXPECT_EQ(alone().local_size(), 1);
+  exchange = std::make_shared<test::Exchange>();
+  Meeting meeting = test::fake_meeting(0, 1);
+  meeting.launch.local_size = 4;
+  JoinedRanks ranks(meeting);
+  EXPECT_EQ(ranks.local_size(), 4);
+  ranks.leave({});
+}
+
 /// A photograph's row of a contact sheet can have 18 MB, of which torchrun's store takes no message.
 TEST(Ranks, ValuesOfAnySizeArriveAndLeaveNothing) {
   const auto value_of = [](std::size_t size) {

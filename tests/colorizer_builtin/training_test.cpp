@@ -91,6 +91,40 @@ TEST(ColorizerTrainer, RefusesOtherCheckpoints) {
   EXPECT_THROW(trainer.load(folder / "short.pt"), SnapshotError);
 }
 
+TEST(ColorizerTrainer, GoesOnForTheStepsThatItBeganWith) {
+  const test::TempDir folder;
+  const ImageSet set = tiny_set();
+  ColorizerTrainer trainer(set, nullptr, tiny_options(), torch::kCPU);
+  trainer.step();
+  trainer.save(folder / "checkpoint.pt");
+  TrainerOptions options = tiny_options();
+  options.steps = 60;
+  ColorizerTrainer other(set, nullptr, options, torch::kCPU);
+  try {
+    other.load(folder / "checkpoint.pt", 60);
+    FAIL() << "60 steps were asked for, and it would make 40";
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("--steps 60"), testing::HasSubstr("40 steps")));
+  }
+  EXPECT_EQ(other.steps_done(), 0);
+  other.load(folder / "checkpoint.pt", 40);
+  EXPECT_EQ(other.steps_done(), 1);
+  EXPECT_EQ(other.total_steps(), 40);
+}
+
+TEST(LoadImageSet, TellsEvaluationFoldersApartByTheirNames) {
+  const test::TempDir folder;
+  ImageSources sources;
+  for (const char* name : {"a/birds", "b/fish"}) {
+    write_png(folder / name / "1.png", {8, 8, std::vector<std::uint8_t>(192, 99)});
+    sources.evaluation.push_back(folder / name);
+  }
+  EXPECT_EQ(load_image_set(sources).evaluation.size(), 2u);
+  write_png(folder / "c/birds" / "1.png", {8, 8, std::vector<std::uint8_t>(192, 99)});
+  sources.evaluation.push_back(folder / "c/birds");
+  EXPECT_THROW((void)load_image_set(sources), UsageError);
+}
+
 TEST(LoadImageSet, HoldsOutMoreOnRequestAndNeverAnImageTwice) {
   const test::TempDir folder;
   constexpr std::size_t kImages = 60;

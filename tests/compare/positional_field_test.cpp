@@ -209,6 +209,26 @@ TEST_F(PositionalField, Learns) {
   }
 }
 
+TEST_F(PositionalField, TheSkyIsBehindWhatItSees) {
+  for (View& view : capture_.views) std::ranges::fill(view.image.u8, std::uint8_t(204));
+  const std::vector<SkyLabel> labels(capture_.views.front().image.pixel_count(), SkyLabel::kEither);
+  const auto first_step = [&](float light) {
+    const DirectionMap sky{2, 1, {std::vector<float>(2, light)}};
+    std::vector<TrainingView> outdoors = views();
+    for (TrainingView& view : outdoors) {
+      view.sky_labels = &labels;
+      view.sky = &sky;
+    }
+    const auto engine = engines_->make_luminance(options());
+    engine->set_views(outdoors);
+    return engine->step(1e-3f);
+  };
+  // The net that it begins with is nowhere opaque, and a sky of the photographs' light is what it lacks.
+  const StepReport black = first_step(0), alike = first_step(linear_from_srgb(0.8f));
+  EXPECT_LT(alike.loss, black.loss);
+  EXPECT_LT(alike.squared_error, black.squared_error);
+}
+
 TEST_F(PositionalField, ASnapshotContinuesAsIfNothingHadHappened) {
   const auto whole = make_luminance();
   for (int i = 0; i < 6; ++i) (void)whole->step(1e-3f);

@@ -86,7 +86,9 @@ TEST(Pipeline, AJournalIsReplayedIntoATakeOfItsOwn) {
   const TempDir folder;
   const fs::path run = copied(tiny_run(), folder / "run");
   for (const char* take : {"first", "painted"}) {
-    ASSERT_EQ(cnerf({"colorize", run.string(), "--colorizer", "grey", "--take", take}).exit_code, 0);
+    const ProgramResult made = cnerf(
+        {"colorize", run.string(), "--colorizer", "grey", "--take", take, "--set", "stage2.working_resolution=40"});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
   }
   const nlohmann::json stroke = {{"id", "s"},       {"view", "images/view_004.png"},
                                  {"kind", "paint"}, {"color", "#c03020"},
@@ -110,6 +112,7 @@ TEST(Pipeline, AJournalIsReplayedIntoATakeOfItsOwn) {
     EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
     EXPECT_TRUE(fs::exists(run / "takes/again/take.json"));
     EXPECT_TRUE(fs::exists(run / "takes/again/painted/0123456789ab.png")) << "its journal names it";
+    EXPECT_THAT(read_text_file(run / "takes/again/config.toml"), testing::HasSubstr("working_resolution = 40"));
   }
 }
 

@@ -8,7 +8,7 @@
 
 namespace cnerf::test {
 
-class AnalyticEngine final : public LuminanceEngine {
+class AnalyticEngine : public LuminanceEngine {
  public:
   /// @param fog  opacity of what hangs a twentieth of a side before each camera
   explicit AnalyticEngine(float fog = 0) : fog_(fog) {}

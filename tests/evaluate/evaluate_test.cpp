@@ -123,6 +123,33 @@ TEST(Evaluate, FeaturesOfAllViewsMakeOneDistance) {
             metrics.feature_distance);
 }
 
+TEST(Evaluate, NetworksSeeTheTruthWhereMasksAre) {
+  struct Keeping final : PictureEncoder {
+    [[nodiscard]] std::vector<float> regions(std::span<const std::uint8_t> rgb, int /*width*/,
+                                             int /*height*/) const override {
+      seen.emplace_back(rgb.begin(), rgb.end());
+      return {};
+    }
+    mutable std::vector<std::vector<std::uint8_t>> seen;
+  };
+  const test::TempDir folder;
+  Capture capture = grey_capture(1, 1);
+  View& view = capture.views[0];
+  view.image_file = folder / "view.png";
+  Picture photograph{kWidth, kHeight, {}};
+  for (int i = 0; i < kWidth * kHeight; ++i) photograph.rgb.insert(photograph.rgb.end(), {90, 140, 60});
+  write_png(view.image_file, photograph);
+  view.image.mask.assign(view.image.pixel_count(), 0);
+  view.image.mask[1] = 1;
+  const Keeping encoder;
+  EvaluateOptions options;
+  options.encoder = &encoder;
+  (void)evaluate_views(PaintedScene(linear_from_srgb(0.3f), true), std::vector<const View*>{&view}, options);
+  ASSERT_EQ(encoder.seen.size(), 2u) << "ours and the truth";
+  const auto &ours = encoder.seen[0], &truth = encoder.seen[1];
+  for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_EQ(ours[i] == truth[i], i / 3 != 1) << i;
+}
+
 TEST(Evaluate, MaskedPixelsDoNotCount) {
   Capture capture = grey_capture(2, 1);
   View& view = capture.views[0];

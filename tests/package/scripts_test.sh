@@ -58,14 +58,15 @@ SLURM_ARRAY_TASK_ID=1 CNERF=/bin/true OUT=$scratch/runs bash "$root/scripts/capt
   > "$scratch/said" 2>&1 || status=$?
 [ "$status" -eq 64 ] && grep -q photos "$scratch/said" || fail "captures of one name share a run: $status"
 SLURM_ARRAY_TASK_ID=1 CNERF=/bin/true OUT=$scratch/runs bash "$root/scripts/captures.sbatch" day1 day2 > /dev/null
-# Started again it goes on, and does not overwrite what it goes on with.
+# Started again by Slurm it goes on, and does not overwrite what it goes on with; submitted again it does as it is told.
 stand_in cnerf 'echo "$*" > "'"$scratch"'/started"'
-for start in first second; do
-  SLURM_ARRAY_TASK_ID=0 CNERF=$scratch/bin/cnerf OUT=$scratch/runs bash "$root/scripts/captures.sbatch" day3 -- \
-    --overwrite --holdout 4 > /dev/null
+for case in '0 --overwrite 0 1' '1 --overwrite 1 0' '0 --overwrite 0 1' '0 --holdout=4 1 0'; do
+  read -r restarts option resumed overwritten <<< "$case"
+  SLURM_RESTART_COUNT=$restarts SLURM_ARRAY_TASK_ID=0 CNERF=$scratch/bin/cnerf OUT=$scratch/runs \
+    bash "$root/scripts/captures.sbatch" day3 -- "$option" --threads 1 > /dev/null
   resumes=$(grep -c -- --resume "$scratch/started" || true) overwrites=$(grep -c -- --overwrite "$scratch/started" || true)
-  [ "$start $resumes $overwrites" = 'first 0 1' ] || [ "$start $resumes $overwrites" = 'second 1 0' ] ||
-    fail "captures.sbatch, $start start: $(cat "$scratch/started")"
+  [ "$resumes $overwrites" = "$resumed $overwritten" ] && grep -q -- '--threads 1' "$scratch/started" ||
+    fail "captures.sbatch, started again $restarts times with $option: $(cat "$scratch/started")"
   mkdir -p "$scratch/runs/day3"
   touch "$scratch/runs/day3/run.json"
 done

@@ -8,6 +8,7 @@
 #include "src/base/parallel.h"
 #include "src/compare/baselines/torch/positional_nets.h"
 #include "src/engine/heaviest_samples.h"
+#include "src/engine/stage1_loss.h"
 #include "src/field/luminance_activation.h"
 #include "src/render/observed_ray.h"
 
@@ -39,12 +40,13 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
     const std::size_t n = rays_a_step();
     // The same pixels and backgrounds as the hash grid's engines draw.
     std::vector<Ray> rays(n);
-    std::vector<float> backgrounds(n), targets(n), wanted_light(n);
+    std::vector<RayTarget> targets(n);
+    std::vector<float> backgrounds(n), wanted_light(n);
     parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
       for (std::size_t r = begin; r < end; ++r) {
         const ObservedRay observed = observe_ray(views_, options_.seed, std::uint64_t(counters_[0]), r);
-        rays[r] = observed.ray, backgrounds[r] = observed.target.background;
-        targets[r] = observed.target.luminance, wanted_light[r] = observed.target.wanted();
+        rays[r] = observed.ray, targets[r] = observed.target;
+        backgrounds[r] = observed.target.background + observed.target.sky, wanted_light[r] = observed.target.wanted();
       }
     });
     const torch::Tensor behind = tensor_of(backgrounds, {std::int64_t(n)}, torch::kFloat32);
@@ -67,11 +69,9 @@ class PositionalLuminanceEngine final : public LuminanceEngine {
 
     StepReport report;
     report.loss = fine_loss.item<double>();
-    const std::vector<float> seen = floats_of(fine.luminance_of_rays());
+    const std::vector<float> seen = floats_of(fine.luminance_of_rays()), opacity = floats_of(fine.weights.sum(1));
     for (std::size_t r = 0; r < n; ++r) {
-      const float error =
-          srgb_from_linear(std::clamp(seen[r], 0.0f, 1.0f)) - srgb_from_linear(std::clamp(targets[r], 0.0f, 1.0f));
-      report.squared_error += error * error / double(n);
+      report.squared_error += squared_error({seen[r], 1 - opacity[r]}, targets[r]) / double(n);
     }
     report.rays = n;
     report.trained_samples = n * (2 * kCoarseSamples + kFineSamples);
