@@ -168,7 +168,7 @@ TEST(Prepare, LevelsThatAFileCannotHaveAreRefused) {
   refused({"--white-level", "4095"}, "white_level: expected at most 255");
   refused({"--black-level", "4000", "--white-level", "4095"}, "white_level: expected at most 255");
   refused({"--black-level", "255"}, "black_level: expected less than 255");
-  refused({"--black-level", "200", "--white-level", "100"}, "black_level: expected less than 100");
+  refused({"--black-level", "200", "--white-level", "100"}, "black_level: expected less than white_level, 100");
 }
 
 /// What a run prepares is sRGB-encoded, whatever it was made of.
