@@ -161,7 +161,7 @@ void SparsePixels::set_light(std::span<const std::size_t> pixels, std::span<cons
 
 void SparsePixels::set_colors(std::size_t side, std::span<const std::size_t> pixels, std::span<const Ab> colors) {
   CNERF_CHECK_EQ(pixels.size(), colors.size());
-  auto& [a, b] = colors_[side];
+  Plane &a = colors_[side][0], &b = colors_[side][1];
   parallel_each(pixels.size(), kGrain, [&](std::size_t i) {
     *a.at(pixels[i]) = colors[i].a;
     *b.at(pixels[i]) = colors[i].b;
