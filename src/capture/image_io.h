@@ -48,7 +48,7 @@ struct LinearImage {
 
 /// A mask of `width` x `height`: 0 where the file is dark, "ignore this pixel", else 255. A file of another size is
 /// resized when the ratio is the same; a smaller pixel counts only if all it covers does.
-/// @throws MissingInputError, InputError  also where the lightest is neither white nor black, as in a mask of ones.
+/// @throws MissingInputError, InputError  also where it holds ones, or bytes in 16 bits, in place of white.
 [[nodiscard]] std::vector<std::uint8_t> read_mask(const std::filesystem::path& file, int width, int height);
 
 /// True when an image of `width` x `height` can be a resized copy of the stated size: the ratio of the sides is exactly

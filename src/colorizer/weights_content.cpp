@@ -1,11 +1,13 @@
 #include "src/colorizer/weights_content.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/gzip.h"
+#include "src/base/plugin.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -74,6 +76,12 @@ WeightsContent::Parameter next_parameter(Reader& reader) {
 }
 
 }  // namespace
+
+std::vector<fs::path> builtin_weights_places() {
+  std::vector<fs::path> places = data_places("colorizer.weights");
+  if (const char* named = std::getenv("CNERF_COLORIZER_WEIGHTS")) places.insert(places.begin(), named);
+  return places;
+}
 
 WeightsContent read_weights_content(const fs::path& file) {
   const std::vector<std::byte> whole = read_binary_file(file);

@@ -32,6 +32,9 @@ struct WeightsContent {
   std::vector<std::byte> bytes;
 };
 
+/// Where the weights may lie; the first that is there counts.
+[[nodiscard]] std::vector<std::filesystem::path> builtin_weights_places();
+
 /// @throws MissingInputError  no such file.
 /// @throws InputError         another format or version, a wrong checksum, parameters beyond the end of the file.
 [[nodiscard]] WeightsContent read_weights_content(const std::filesystem::path& file);

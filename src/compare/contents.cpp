@@ -1,14 +1,13 @@
 #include "src/compare/contents.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <stdexcept>
 #include <system_error>
 #include <vector>
 
 #include "src/base/files.h"
-#include "src/base/plugin.h"
 #include "src/colorizer/kinds.h"
+#include "src/colorizer/weights_content.h"
 
 namespace cnerf::compare {
 namespace fs = std::filesystem;
@@ -50,10 +49,8 @@ std::string content_of_spec(const ColorizerOptions& options, const fs::path& fol
   return contents;
 }
 
-// Found as builtin_weights_file finds them, which is in a plug-in: a hash is not worth the time to load LibTorch.
 std::string content_of_builtin() {
-  std::vector<fs::path> places = data_places("colorizer.weights");
-  if (const char* named = std::getenv("CNERF_COLORIZER_WEIGHTS")) places.insert(places.begin(), named);
+  const std::vector<fs::path> places = builtin_weights_places();
   std::error_code failure;
   const auto found = std::ranges::find_if(places, [&](const fs::path& place) { return fs::exists(place, failure); });
   return found == places.end() ? "" : content_of(*found);

@@ -4,6 +4,7 @@
 #include <array>
 #include <iterator>
 
+#include "src/base/aligned.h"
 #include "src/base/parallel.h"
 #include "src/studio/sparse_pixels.h"
 
@@ -17,6 +18,11 @@ constexpr int kSparseLattice = 4;           // coarser ones save no rays, and lo
 /// a and b of pixels, [H, W] each; none: grey.
 using AbPlanes = std::array<std::span<const float>, 2>;
 
+AbPlanes piece_of(const AbPlanes& planes, std::size_t begin, std::size_t count) {
+  if (planes[0].empty()) return {};
+  return {planes[0].subspan(begin, count), planes[1].subspan(begin, count)};
+}
+
 /// Exposed last: Lab's a and b are another chromaticity in any light but that of the training.
 /// @param lightness  [H, W]
 Picture finished(int width, int height, std::span<const float> lightness, const AbPlanes& colors,
@@ -25,11 +31,10 @@ Picture finished(int width, int height, std::span<const float> lightness, const 
   const Finish::Turn turn = finish.turn();
   parallel_ranges(lightness.size(), kPutGrain, [&](std::size_t begin, std::size_t end) {
     const std::size_t count = end - begin;
-    AbPlanes of_piece = colors;
+    AbPlanes of_piece = piece_of(colors, begin, count);
     std::vector<float> a, b;
-    if (!colors[0].empty()) of_piece = {colors[0].subspan(begin, count), colors[1].subspan(begin, count)};
-    if (!colors[0].empty() && !finish.is_plain()) {
-      for (std::size_t i = 0; i < count; ++i) {
+    if (!finish.is_plain()) {
+      for (std::size_t i = 0; i < of_piece[0].size(); ++i) {
         const Ab turned = turn.of(Ab{of_piece[0][i], of_piece[1][i]});
         a.push_back(turned.a);
         b.push_back(turned.b);
@@ -81,13 +86,13 @@ class Drawing {
   }
   /// Until the next.
   [[nodiscard]] std::span<const Ray> rays_of(std::span<const std::size_t> wanted) {
-    rays_.resize(std::max(rays_.size(), wanted.size()));
+    ensure_size(rays_, wanted.size());
     parallel_each(wanted.size(), kGrain, [&](std::size_t r) { rays_[r] = unit_.ray_of_pixel(wanted[r]); });
     return std::span(rays_).first(wanted.size());
   }
   void trace_light(std::span<const std::size_t> wanted) {
     const std::span<const Ray> rays = rays_of(wanted);
-    results_.resize(std::max(results_.size(), wanted.size()));
+    ensure_size(results_, wanted.size());
     const auto results = std::span(results_).first(wanted.size());
     engine_.render(rays, march_, effort_, results);
     set_light(wanted, rays, results);
@@ -105,7 +110,7 @@ class Drawing {
     }
   }
   void set_light(std::span<const std::size_t> wanted, std::span<const Ray> rays, std::span<const RayResult> results) {
-    light_.resize(std::max(light_.size(), results.size()));
+    ensure_size(light_, results.size());
     parallel_each(results.size(), kGrain, [&](std::size_t r) {
       light_[r] = results[r].luminance + light_behind(sky_, rays[r], results[r].opacity);
     });
@@ -126,9 +131,9 @@ class Drawing {
   std::span<const Side> colored_;
   DirectionView sky_;
   SparsePixels pixels_;
-  std::vector<Ray> rays_;  // of the pixels that are traced now
-  std::vector<RayResult> results_;
-  std::vector<float> light_;
+  AlignedVector<Ray> rays_;  // of the pixels that are traced now
+  AlignedVector<RayResult> results_;
+  AlignedVector<float> light_;
 };
 
 }  // namespace

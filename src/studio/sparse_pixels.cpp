@@ -170,13 +170,10 @@ void SparsePixels::set_colors(std::size_t side, std::span<const std::size_t> pix
 
 void SparsePixels::spread_colors() {
   if (lattice_ < kColorStep || colors_.empty()) return;
-  parallel_ranges(std::size_t(height_), std::max<std::size_t>(1, kGrain / std::size_t(width_)),
-                  [&](std::size_t begin, std::size_t end) {
-                    for (std::size_t y = begin; y < end; ++y) {
-                      const bool is_known = y % kColorStep == 0;
-                      for (int x = is_known ? 1 : 0; x < width_; x += is_known ? kColorStep : 1) spread_to(x, int(y));
-                    }
-                  });
+  parallel_each(std::size_t(height_), std::max<std::size_t>(1, kGrain / std::size_t(width_)), [&](std::size_t y) {
+    const bool is_known = y % kColorStep == 0;
+    for (int x = is_known ? 1 : 0; x < width_; x += is_known ? kColorStep : 1) spread_to(x, int(y));
+  });
 }
 
 void SparsePixels::spread_to(int column, int row) {

@@ -138,12 +138,7 @@ TEST_F(PreparedCapture, OfAnotherTransferIsRefused) {
 
 /// One file names the masks, another says that motion was looked for; a stop between them must not lose the masks.
 TEST_F(PreparedCapture, IsLookedAtForMotionUntilTheMasksAreNamed) {
-  SampleSceneOptions scene;
-  scene.views = 8;
-  scene.width = 48;
-  scene.height = 36;
-  scene.samples_per_pixel = 1;
-  write_sample_scene(capture_, scene);
+  write_sample_scene(capture_, {.views = 8, .width = 48, .height = 36, .samples_per_pixel = 1});
   PrepareStepOptions options;
   options.motion_masks = true;
   options.motion.motion_steps = 50;

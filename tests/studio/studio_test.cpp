@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
@@ -90,6 +91,9 @@ class StudioTest : public testing::Test {
     studio_.reset();
   }
 
+  PageAnswer send_picture(const std::map<std::string, std::string>& parameters, const std::string& bytes) {
+    return studio_->answer({"POST", "/studio/pictures", parameters, kPainter, {}, bytes});
+  }
   PageAnswer get(const std::string& path) { return studio_->answer({"GET", "/studio/" + path, {}, kPainter, {}, {}}); }
   PageAnswer post(const std::string& path, const json& body, const std::string& client = kPainter) {
     return studio_->answer({"POST", "/studio/" + path, {}, client, {}, body.dump()});
@@ -417,7 +421,7 @@ TEST_F(StudioTest, BakesAreOfferedForDownload) {
 TEST_F(StudioTest, PicturesOfAnyContentAreRefusedByName) {
   open();
   const auto sent = [&](const std::string& kind, const std::string& bytes) {
-    return studio_->answer({"POST", "/studio/pictures", {{"kind", kind}, {"name", "red.png"}}, kPainter, {}, bytes});
+    return send_picture({{"kind", kind}, {"name", "red.png"}}, bytes);
   };
   EXPECT_EQ(sent("reference", "").status, 400);
   EXPECT_THAT(sent("reference", "GIF89a?").body, HasSubstr("red.png"));
@@ -429,12 +433,7 @@ TEST_F(StudioTest, PicturesOfAnyContentAreRefusedByName) {
 
 TEST_F(StudioTest, AReferenceIsTurnedUpright) {
   open();
-  const PageAnswer answer = studio_->answer({"POST",
-                                             "/studio/pictures",
-                                             {{"kind", "reference"}, {"name", "photo.jpg"}},
-                                             kPainter,
-                                             {},
-                                             test::turned_photograph(6)});
+  const PageAnswer answer = send_picture({{"kind", "reference"}, {"name", "photo.jpg"}}, test::turned_photograph(6));
   EXPECT_EQ(answer.status, 202) << answer.body;
   const fs::directory_iterator files(context_.directory.root() / "strokes/references");
   ASSERT_TRUE(files != fs::directory_iterator());
@@ -511,12 +510,7 @@ TEST_F(StudioTest, APaintedPictureBecomesAStroke) {
   const auto sent = [&](const std::string& number, const cv::Mat& picture) {
     std::vector<std::uint8_t> png;
     cv::imencode(".png", picture, png);
-    return studio_->answer({"POST",
-                            "/studio/pictures",
-                            {{"kind", "stroke"}, {"view", number}, {"name", "red.png"}},
-                            kPainter,
-                            {},
-                            {png.begin(), png.end()}});
+    return send_picture({{"kind", "stroke"}, {"view", number}, {"name", "red.png"}}, {png.begin(), png.end()});
   };
   cv::Mat painted(2 * view.image.height, 2 * view.image.width, CV_8UC4, cv::Scalar(0, 0, 0, 0));
   painted(cv::Rect(0, 0, painted.cols / 2, painted.rows)).setTo(cv::Scalar(20, 30, 200, 255));
@@ -565,8 +559,7 @@ TEST_F(StudioTest, WhereThereAreTooManyStrokesNoPictureIsKept) {
   cv::imencode(".png", painted, png);
   const std::string bytes(png.begin(), png.end());
   const std::string name = sha256(std::as_bytes(std::span(bytes))).substr(0, 12) + ".png";
-  const PageAnswer refused =
-      studio_->answer({"POST", "/studio/pictures", {{"kind", "stroke"}, {"view", "1"}}, kPainter, {}, bytes});
+  const PageAnswer refused = send_picture({{"kind", "stroke"}, {"view", "1"}}, bytes);
   EXPECT_EQ(refused.status, 400) << refused.body;
   EXPECT_THAT(refused.body, HasSubstr("too many"));
   EXPECT_FALSE(fs::exists(context_.directory.root() / "strokes/painted" / name));
@@ -835,12 +828,8 @@ std::string half_painted_png(const View& view) {
 
 TEST_F(StudioTest, TakesOfPaintedPicturesAreReplayedWhateverWasDoneWithThem) {
   open();
-  const PageAnswer sent = studio_->answer({"POST",
-                                           "/studio/pictures",
-                                           {{"kind", "stroke"}, {"view", "1"}},
-                                           kPainter,
-                                           {},
-                                           half_painted_png(context_.capture.views[1])});
+  const PageAnswer sent =
+      send_picture({{"kind", "stroke"}, {"view", "1"}}, half_painted_png(context_.capture.views[1]));
   ASSERT_EQ(sent.status, 202) << sent.body;
   (void)ordered({{"order", "colour"}});
   ASSERT_EQ(put({stroke("a", 0.5, 0.5)}, 1).status, 200) << "without the picture";

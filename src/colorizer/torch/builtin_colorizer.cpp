@@ -4,7 +4,6 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <cstdlib>
 #include <future>
 #include <numeric>
 #include <optional>
@@ -13,13 +12,13 @@
 
 #include "src/base/error.h"
 #include "src/base/parallel.h"
-#include "src/base/plugin.h"
 #include "src/base/rng.h"
 #include "src/base/worker.h"
 #include "src/colorizer/kinds.h"
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer/torch/products.h"
 #include "src/colorizer/torch/torch_threads.h"
+#include "src/colorizer/weights_content.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -27,7 +26,6 @@ using torch::Tensor;
 
 namespace {
 
-constexpr const char* kWeightsName = "colorizer.weights";
 // Patches per pass on a GPU. There are few sizes, since cuDNN makes a plan for each, which takes longer than a pass.
 constexpr std::array<std::size_t, 3> kPasses = {4, 8, 16};
 constexpr int kWarmUpSide = 64;  // pixels
@@ -183,18 +181,11 @@ class BuiltinColorizer final : public Colorizer {
   std::optional<Worker> thread_;  // of all passes on a GPU; last: its jobs refer to what is above
 };
 
-std::vector<fs::path> candidate_weights() {
-  std::vector<fs::path> places = data_places(kWeightsName);
-  if (const char* named = std::getenv("CNERF_COLORIZER_WEIGHTS")) places.insert(places.begin(), named);
-  return places;
-}
-
 }  // namespace
 
 fs::path builtin_weights_file() {
-  const std::vector<fs::path> places = candidate_weights();
   std::string looked;
-  for (const fs::path& place : places) {
+  for (const fs::path& place : builtin_weights_places()) {
     if (fs::exists(place)) return place;
     looked += " " + place.string();
   }
