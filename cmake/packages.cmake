@@ -56,7 +56,7 @@ set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "libopenblas0-pthread")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "colmap, blender")
 set(CPACK_COMPONENT_PROGRAM_DESCRIPTION
-    "Colour volumes from black-and-white photographs with known camera poses\nThe program, its page for browsers, its presets\nand the weights of its colorizer.")
+    "Colour volumes from monochrome photographs or film clips\nThe program, its page for browsers, its presets\nand the weights of its colorizer.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libcnerf-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_SHLIBDEPS OFF)

@@ -8,7 +8,6 @@
 
 #include "export/camera_tracks.h"
 #include "export/texture_writer.h"
-#include "export/up_axis.h"
 #include "export/usd_text.h"
 #include "export/vdb_writer.h"
 #include "src/base/check.h"
@@ -192,7 +191,7 @@ GltfFiles BakeFolder::add_mesh(const bake::Mesh& mesh, const std::string& name, 
   described.rgb_exr = scene.rgb_exr;
   described.luminance_exr = scene.luminance_exr;
   described.lab_exr = scene.lab_exr;
-  described.gltf_from_world = turned_up(manifest_.label.world.up_axis, "y");
+  described.gltf_from_world = gltf_from_world(manifest_.label.world);
   manifest_.mesh = described;
   return files;
 }

@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <sstream>
+#include <utility>
 
 #include "export/web_bundle.h"
+#include "src/base/absolute_folder.h"
 #include "src/base/error.h"
 #include "src/base/parallel.h"
 
@@ -67,23 +70,27 @@ BakeOutput::BakeOutput(fs::path folder, const Formats& formats, OutputOptions op
 }
 
 void BakeOutput::take_volumes(const std::vector<bake::VolumePlanes>& volumes) {
+  std::optional<WebVolume> bundle;
+  if (formats_.web) {  // may be refused: before a file is replaced
+    std::vector<bake::Volume> whole;
+    for (const bake::VolumePlanes& volume : volumes) whole.push_back(whole_volume(volume));
+    bundle = make_web_volume(std::move(whole), bake::cameras_of(capture_), options_.web, observer_);
+  }
   fit_splats();
   if (formats_.vdb) {
     for (const fs::path& file : bake_.add_volumes(volumes, "volume", options_.vdb)) observer_.wrote("volume", file);
   }
-  if (formats_.web) write_bundle(volumes);
+  if (bundle) write_bundle(*bundle);
 }
 
-void BakeOutput::write_bundle(const std::vector<bake::VolumePlanes>& volumes) {
-  std::vector<bake::Volume> whole;
-  for (const bake::VolumePlanes& volume : volumes) whole.push_back(whole_volume(volume));
-  WebScene scene{capture_.root.filename().string(), bake::cameras_of(capture_), {}, label_, {}};
+void BakeOutput::write_bundle(const WebVolume& volume) const {
+  WebScene scene{absolute_folder(capture_.root).filename().string(), bake::cameras_of(capture_), {}, label_, {}};
   if (options_.web.photo_side > 0) {
     constexpr int kQuality = 82;  // of JPEG: photographs are laid over the volume, and loaded with it
     scene.photos = make_web_photos(capture_.views, options_.web.photo_side, kQuality);
   }
   scene.sky = options_.sky;
-  write_web(std::move(whole), scene, web_folder(folder_), options_.page, options_.web, observer_);
+  write_web(volume, scene, web_folder(folder_), options_.page, observer_);
 }
 
 void BakeOutput::take_mesh(const bake::Mesh& mesh) {

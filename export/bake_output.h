@@ -17,6 +17,8 @@
 
 namespace cnerf::exporting {
 
+struct WebVolume;
+
 /// What a bake writes.
 struct Formats {
   bool vdb = false;    ///< the volume
@@ -70,7 +72,7 @@ class BakeOutput final : public bake::Output {
   void finish() override;
 
  private:
-  void write_bundle(const std::vector<bake::VolumePlanes>& volumes);
+  void write_bundle(const WebVolume& volume) const;
   void add_plates();
   void fit_splats();
   void add_splats();

@@ -71,8 +71,13 @@ def set_if_known(settings, name, value):
         setattr(settings, name, value)
 
 
+def is_alone():
+    """Whether Blender was started for this script only, and ends with it."""
+    return bpy.app.background and __name__ == "__main__"
+
+
 def make_scene():
-    if bpy.app.background and __name__ == "__main__":
+    if is_alone():
         bpy.ops.wm.read_factory_settings(use_empty=True)
         scene = bpy.context.scene
         scene.name = "cnerf"
@@ -550,6 +555,23 @@ def set_engine(scene, name):
     raise ValueError("this Blender has none of " + ", ".join(wanted))
 
 
+def show_colors_as_they_are(scene):
+    """As far as Blender's configuration of colours goes: $OCIO may name a studio's own."""
+    view = scene.view_settings
+    missing = []
+    for settings, name, value in ((scene.display_settings, "display_device", "sRGB"),
+                                  (view, "view_transform", "Standard"), (view, "look", "None")):
+        try:
+            setattr(settings, name, value)
+        except TypeError:
+            missing.append("%s %s" % (name, value))
+    if missing:
+        print("cnerf: the colour configuration has no %s; colours are shown by %s, %s, look %s"
+              % (" and no ".join(missing), scene.display_settings.display_device, view.view_transform, view.look))
+    view.exposure = 0.0
+    view.gamma = 1.0
+
+
 def set_up_rendering(scene, volume, voxel_size, options):
     set_engine(scene, options.engine)
     cycles = scene.cycles
@@ -566,11 +588,7 @@ def set_up_rendering(scene, volume, voxel_size, options):
         cycles.filter_width = 1.0
         set_if_known(cycles, "volume_max_steps", max(4096, steps_needed(volume, voxel_size, options.step_rate)))
     scene.render.film_transparent = options.transparent or options.exact
-    scene.display_settings.display_device = "sRGB"
-    scene.view_settings.view_transform = "Standard"
-    scene.view_settings.look = "None"
-    scene.view_settings.exposure = 0.0
-    scene.view_settings.gamma = 1.0
+    show_colors_as_they_are(scene)
 
 
 def set_regrade(material, options):
@@ -581,21 +599,32 @@ def set_regrade(material, options):
 
 
 def set_up(options):
-    """Builds the scene and returns it."""
+    """Builds the scene and returns it. Where that fails, Blender shows what it did before."""
     manifest_file = find_manifest(options.manifest)
     with open(manifest_file, encoding="utf-8") as file:
         manifest = json.load(file)
     volume, mesh = manifest["volume"], manifest.get("mesh")
-    bounded = volume or mesh
-    if bounded is None:
+    if not (volume or mesh):
         raise ValueError(manifest_file + " lists neither a volume nor a mesh")
-    mesh_use = options.mesh or ("hidden" if volume else "shown")
-
+    former = None if is_alone() else bpy.context.window.scene
     scene = make_scene()
+    try:
+        fill_scene(scene, manifest, os.path.dirname(manifest_file), options)
+    except Exception:
+        if former:
+            bpy.context.window.scene = former
+            bpy.data.scenes.remove(scene)
+        raise
+    return scene
+
+
+def fill_scene(scene, manifest, folder, options):
+    volume, mesh = manifest["volume"], manifest.get("mesh")
+    bounded = volume or mesh
+    mesh_use = options.mesh or ("hidden" if volume else "shown")
     root = bpy.data.objects.new("cnerf", None)  # move, turn or scale this one: it carries everything
     root.empty_display_size = 0.1 * scene_radius(bounded)[0]
     scene.collection.objects.link(root)
-    folder = os.path.dirname(manifest_file)
     root.matrix_basis = upright(manifest)
     if volume:
         # Nested grids lie inside each other, the coarser ones empty where finer ones are.
@@ -627,7 +656,6 @@ def set_up(options):
         add_path(scene, root, options.path, bounded)
     if options.over_plate is not None:
         lay_over_plate(scene, scene.camera.data, options.over_plate)
-    return scene
 
 
 def render(scene, file):
@@ -695,7 +723,7 @@ class ImportCnerfBake(bpy.types.Operator):
     def execute(self, context):
         try:
             set_up(parse_options(["--manifest", self.filepath]))
-        except (OSError, ValueError, KeyError) as failure:
+        except (OSError, ValueError, LookupError, RuntimeError, TypeError) as failure:
             self.report({"ERROR"}, str(failure))
             return {"CANCELLED"}
         return {"FINISHED"}

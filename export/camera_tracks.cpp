@@ -64,14 +64,16 @@ std::string usd_matrix(const Affined& map) {
   return text + fmt::format(" ({}, {}, {}, 1) )", t.x, t.y, t.z);
 }
 
+/// UsdGeomCamera has all of them in tenths of a unit of the scene.
 struct UsdLens {
-  double focal_length, horizontal_aperture, vertical_aperture, horizontal_offset, vertical_offset;  ///< mm
+  double focal_length, horizontal_aperture, vertical_aperture, horizontal_offset, vertical_offset;
 };
 
-UsdLens usd_lens(const Intrinsics& lens) {
-  const double focal = kApertureMm * lens.fx / lens.width, vertical = focal * lens.height / lens.fy;
-  return {focal, kApertureMm, vertical, kApertureMm * (0.5 - lens.cx / lens.width),
-          vertical * (lens.cy / lens.height - 0.5)};
+UsdLens usd_lens(const Intrinsics& lens, double metres_per_unit) {
+  const double aperture = kApertureMm * 0.01 / metres_per_unit;
+  const double focal = aperture * lens.fx / lens.width, vertical = focal * lens.height / lens.fy;
+  const double right = 0.5 - lens.cx / lens.width, up = lens.cy / lens.height - 0.5;
+  return {focal, aperture, vertical, aperture * right, vertical * up};
 }
 
 struct LensAttribute {
@@ -104,17 +106,19 @@ std::string camera_begin(const std::string& name) {
       name);
 }
 
-std::string still_camera(const bake::Camera& camera, const Affined& file_from_world, std::set<std::string>& taken) {
+std::string still_camera(const bake::Camera& camera, const Affined& file_from_world, double metres_per_unit,
+                         std::set<std::string>& taken) {
   std::string text = camera_begin(prim_name(camera.name, taken));
   text += "        custom string userProperties:view = " + usd_quoted(camera.name) + "\n";
   text += "        matrix4d xformOp:transform = " +
           usd_matrix(file_from_world * looking_backwards(camera.world_from_camera)) + "\n";
-  const UsdLens lens = usd_lens(camera.intrinsics);
+  const UsdLens lens = usd_lens(camera.intrinsics, metres_per_unit);
   for (const auto& [name, value] : kLensAttributes) text += fmt::format("        float {} = {}\n", name, lens.*value);
   return text + "    }\n";
 }
 
-std::string moving_camera(const std::vector<ShotFrame>& frames, const Affined& file_from_world) {
+std::string moving_camera(const std::vector<ShotFrame>& frames, const Affined& file_from_world,
+                          double metres_per_unit) {
   std::string text = camera_begin("shot") + "        matrix4d xformOp:transform.timeSamples = {\n";
   for (const ShotFrame& frame : frames) {
     const Affined pose = file_from_world * looking_backwards(frame.camera->world_from_camera);
@@ -124,7 +128,7 @@ std::string moving_camera(const std::vector<ShotFrame>& frames, const Affined& f
   for (const auto& [name, value] : kLensAttributes) {
     text += fmt::format("        float {}.timeSamples = {{", name);
     for (const ShotFrame& frame : frames) {
-      text += fmt::format(" {}: {},", frame.number, usd_lens(frame.camera->intrinsics).*value);
+      text += fmt::format(" {}: {},", frame.number, usd_lens(frame.camera->intrinsics, metres_per_unit).*value);
     }
     text += " }\n";
   }
@@ -164,6 +168,7 @@ std::vector<ShotFrame> frames_of_shot(const std::vector<bake::Camera>& cameras) 
 void write_cameras_usd(const std::vector<bake::Camera>& cameras, const VdbOptions& up, const Label& label,
                        const std::filesystem::path& file) {
   const Affined turn = file_from_world(up, label.world);
+  const double metres_per_unit = label.world.metres_per_unit;
   const std::vector<ShotFrame> frames = frames_of_shot(cameras);
   std::string times;
   if (!frames.empty()) {
@@ -172,8 +177,8 @@ void write_cameras_usd(const std::vector<bake::Camera>& cameras, const VdbOption
   }
   std::string text = usd_begin(up_axis_of_file(up, label.world), label, times);
   std::set<std::string> taken;
-  for (const bake::Camera& camera : cameras) text += still_camera(camera, turn, taken);
-  if (!frames.empty()) text += moving_camera(frames, turn);
+  for (const bake::Camera& camera : cameras) text += still_camera(camera, turn, metres_per_unit, taken);
+  if (!frames.empty()) text += moving_camera(frames, turn, metres_per_unit);
   write_file(file, text + "}\n");
 }
 

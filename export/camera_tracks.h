@@ -21,8 +21,8 @@ struct ShotFrame {
 [[nodiscard]] std::vector<ShotFrame> frames_of_shot(const std::vector<bake::Camera>& cameras);
 
 /// A .usda with a Camera prim for each camera, and `shot`, an animated one that is each of them at its frame. It lies
-/// where the bake's .usda does. Apertures are in millimetres, the horizontal one 36, and offsets hold the principal
-/// point.
+/// where the bake's .usda does. The horizontal aperture is 36 mm: lenses are in tenths of a unit of the scene, as USD
+/// has them, and `metres_per_unit` says how long that is. Offsets hold the principal point.
 /// @param up  as VdbOptions::up, for a Y-up or Z-up file.  @throws OutputError
 void write_cameras_usd(const std::vector<bake::Camera>& cameras, const VdbOptions& up, const Label& label,
                        const std::filesystem::path& file);

@@ -73,26 +73,26 @@ class BufferBuilder {
   tinygltf::Model& model_;
 };
 
-std::vector<Vec3f> mapped(const std::vector<Vec3f>& values, const Mat3d& rotation) {
+std::vector<Vec3f> mapped(const std::vector<Vec3f>& values, const Mat3d& linear) {
   std::vector<Vec3f> result;
   for (const Vec3f& value : values) {
     CNERF_CHECK(std::isfinite(value.x) && std::isfinite(value.y) && std::isfinite(value.z),
                 "mesh with NaN or infinity");
-    result.push_back((rotation * value.cast<double>()).cast<float>());
+    result.push_back((linear * value.cast<double>()).cast<float>());
   }
   return result;
 }
 
-void add_mesh(const bake::Mesh& mesh, const Mat3d& rotation, BufferBuilder& buffer, tinygltf::Model& model) {
+void add_mesh(const bake::Mesh& mesh, const WorldConvention& world, BufferBuilder& buffer, tinygltf::Model& model) {
   tinygltf::Primitive primitive;
-  const std::vector<Vec3f> positions = mapped(mesh.positions, rotation);
+  const std::vector<Vec3f> positions = mapped(mesh.positions, gltf_from_world(world).linear);
   Aabbf box = Aabbf::empty();
   for (const Vec3f& p : positions) box.grow(p);
   const int position = buffer.add_vectors(positions);
   model.accessors[std::size_t(position)].minValues = {box.min.x, box.min.y, box.min.z};
   model.accessors[std::size_t(position)].maxValues = {box.max.x, box.max.y, box.max.z};
   primitive.attributes["POSITION"] = position;
-  primitive.attributes["NORMAL"] = buffer.add_vectors(mapped(mesh.normals, rotation));
+  primitive.attributes["NORMAL"] = buffer.add_vectors(mapped(mesh.normals, turned_up(world.up_axis, "y").linear));
   const int uv_view =
       buffer.add_view(mesh.uvs.data(), mesh.uvs.size() * sizeof(bake::TextureCoordinate), TINYGLTF_TARGET_ARRAY_BUFFER);
   primitive.attributes["TEXCOORD_0"] =
@@ -177,21 +177,23 @@ int camera_index(const Intrinsics& lens, double near, double far, tinygltf::Mode
 
 /// Node of a camera: glTF's look along -Z with +Y up, ours along +Z with +Y down.
 /// @param shown  the mesh's box, world
-void add_cameras(const std::vector<bake::Camera>& cameras, const Affined& from_world, const Aabbd& shown,
+void add_cameras(const std::vector<bake::Camera>& cameras, const WorldConvention& world, const Aabbd& shown,
                  tinygltf::Model& model) {
-  const Affined opencv_from_gltf{{{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}}, {}};
+  const Mat3d upright = turned_up(world.up_axis, "y").linear, opencv_from_gltf{{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}};
   const double size = length(shown.size());
   double farthest = size;
   for (const bake::Camera& camera : cameras) {
     farthest = std::max(farthest, length(camera.world_from_camera.translation - shown.centre()) + size);
   }
+  const double near = 1e-3 * size * world.metres_per_unit, far = 4 * farthest * world.metres_per_unit;
   for (const bake::Camera& camera : cameras) {
-    const Affined placed = from_world * camera.world_from_camera * opencv_from_gltf;
+    const auto& [linear, centre] = camera.world_from_camera;
+    const Vec3d place = gltf_from_world(world).point(centre);
     tinygltf::Node node;
     node.name = camera.name;
-    node.camera = camera_index(camera.intrinsics, 1e-3 * size, 4 * farthest, model);
-    node.rotation = quaternion_of(placed.linear);
-    node.translation = {placed.translation.x, placed.translation.y, placed.translation.z};
+    node.camera = camera_index(camera.intrinsics, near, far, model);
+    node.rotation = quaternion_of(upright * linear * opencv_from_gltf);
+    node.translation = {place.x, place.y, place.z};
     model.scenes[0].nodes.push_back(int(model.nodes.size()));
     model.nodes.push_back(node);
   }
@@ -205,17 +207,17 @@ Aabbd box_of(const bake::Mesh& mesh) {
 
 /// Everything but the image.
 tinygltf::Model model_of(const bake::Mesh& mesh, const GltfScene& scene) {
-  const Affined from_world = turned_up(scene.label.world.up_axis, "y");
+  const WorldConvention& world = scene.label.world;
   tinygltf::Model model;
   model.asset.version = "2.0";
   model.asset.generator = "cnerf " CNERF_VERSION;
   model.asset.extras = extras({{"color", color_origin_text(scene.label.provenance)},
-                               {"units", scene.label.world.units},
-                               {"up_axis_of_the_poses", scene.label.world.up_axis},
+                               {"units_of_the_poses", world.units},
+                               {"up_axis_of_the_poses", world.up_axis},
                                {"colorizer", scene.label.provenance.colorizer},
                                {"take", scene.label.provenance.take}});
   BufferBuilder buffer(model);
-  add_mesh(mesh, from_world.linear, buffer, model);
+  add_mesh(mesh, world, buffer, model);
   add_material(scene, model);
   tinygltf::Node shown;
   shown.name = "cnerf mesh";
@@ -226,7 +228,7 @@ tinygltf::Model model_of(const bake::Mesh& mesh, const GltfScene& scene) {
   model.scenes[0].nodes = {0};
   if (!scene.sky.empty()) model.scenes[0].extras = extras({{"sky", scene.sky}});
   model.defaultScene = 0;
-  add_cameras(scene.cameras, from_world, box_of(mesh), model);
+  add_cameras(scene.cameras, world, box_of(mesh), model);
   return model;
 }
 
@@ -260,6 +262,10 @@ std::string gltf_of(tinygltf::Model model, const std::string& buffer_name, const
 }
 
 }  // namespace
+
+Affined gltf_from_world(const WorldConvention& world) {
+  return {turned_up(world.up_axis, "y").linear * world.metres_per_unit, {}};
+}
 
 GltfFiles write_gltf(const bake::Mesh& mesh, const GltfScene& scene, const std::filesystem::path& folder,
                      const std::string& name) {

@@ -9,6 +9,7 @@
 #include "bake/camera.h"
 #include "bake/mesh.h"
 #include "export/options.h"
+#include "src/base/vec3.h"
 
 namespace cnerf::exporting {
 
@@ -25,10 +26,13 @@ struct GltfFiles {
   std::filesystem::path glb;                      ///< all in one
 };
 
+/// From the poses' frame: glTF is Y-up and in metres.
+[[nodiscard]] Affined gltf_from_world(const WorldConvention& world);
+
 /// Writes both forms into `folder`: an unlit material (KHR_materials_unlit; the light is in the texture), indexed
-/// triangles with normals and texture coordinates, and a node for every camera. glTF is Y-up: all of it is turned_up to
-/// "y". A camera's lens distortion and principal point, which glTF has no place for, stand in its `extras`. Every file
-/// is whole or not there, and a .gltf is written after what it refers to.
+/// triangles with normals and texture coordinates, and a node for every camera, all placed by gltf_from_world. A
+/// camera's lens distortion and principal point, which glTF has no place for, stand in its `extras`. Every file is
+/// whole or not there, and a .gltf is written after what it refers to.
 /// @throws ContractError  on an empty mesh or values that are not finite.  @throws OutputError.
 GltfFiles write_gltf(const bake::Mesh& mesh, const GltfScene& scene, const std::filesystem::path& folder,
                      const std::string& name);

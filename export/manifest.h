@@ -47,12 +47,12 @@ struct ManifestMesh {
   std::size_t vertices = 0, faces = 0;
   int texture_size = 0, gutter = 0, charts = 0;
   double voxel_size = 0;    ///< world units; of the density it was cut from
-  Affined gltf_from_world;  ///< a rotation: glTF is Y-up
+  Affined gltf_from_world;  ///< turned and scaled: glTF is Y-up and in metres
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v);
 };
-/// All but the names of files and the rotation.
+/// All but the names of files and `gltf_from_world`.
 [[nodiscard]] ManifestMesh describe_mesh(const bake::Mesh& mesh);
 
 /// The light from beyond the volume.

@@ -17,7 +17,7 @@ struct WorldConvention {
   template <typename Visitor>
   void visit(Visitor&& v) {
     v("metres_per_unit", metres_per_unit, Range{1e-9, 1e9},
-      "metres in a unit of the poses' frame: for USD and Blender");
+      "metres in a unit of the poses' frame: for glTF, USD and Blender");
     v("units", units, "what a world unit is called, for the metadata");
     v("up_axis", up_axis, Choice{"x", "y", "z"}, "axis that points up in the poses' frame");
   }

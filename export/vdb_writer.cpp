@@ -281,10 +281,26 @@ class CheckedArchive : public openvdb::io::Archive {
  private:
   using Descriptor = openvdb::io::GridDescriptor;
 
-  /// Returns where it went.
-  Descriptor write_grid(const openvdb::GridBase::ConstPtr& grid, std::ostream& out) const {
+  /// As Archive::writeGrid, which leaves zip out for fog volumes.  @return  where it went
+  Descriptor write_grid(const openvdb::GridBase::Ptr& grid, std::ostream& out) const {
     Descriptor descriptor(grid->getName(), grid->type(), grid->saveFloatAsHalf());
-    writeGrid(descriptor, grid, out, /*seekable=*/true);
+    descriptor.writeHeader(out);
+    const auto positions = out.tellp();
+    descriptor.writeStreamPos(out);  // room for them
+    descriptor.setGridPos(out.tellp());
+    const std::uint32_t flags = compression();
+    openvdb::io::setDataCompression(out, flags);
+    out.write(reinterpret_cast<const char*>(&flags), sizeof flags);
+    grid->addStatsMetadata();  // for readers that have no room for the grid
+    grid->writeMeta(out);
+    grid->writeTransform(out);
+    grid->writeTopology(out);
+    descriptor.setBlockPos(out.tellp());
+    grid->writeBuffers(out);
+    descriptor.setEndPos(out.tellp());
+    out.seekp(positions);
+    descriptor.writeStreamPos(out);
+    descriptor.seekToEnd(out);
     return descriptor;
   }
 

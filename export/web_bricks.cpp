@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <span>
 
-#include "bake/out_of_core/planes.h"
+#include "bake/visibility/clear_grid.h"
 #include "bake/volume/dilate.h"
 #include "src/base/check.h"
 #include "src/color/colorspace_math.h"
@@ -24,19 +24,6 @@ int floor_div(int value, int side) {
   return value >= 0 ? value / side : -((side - 1 - value) / side);
 }
 
-/// The voxels that interpolation finds anything in, from a box that is asked for.
-bake::VoxelBox reach_of(const bake::Volume& volume, const Aabbd& cover) {
-  constexpr double kRounding = 1e-4;  // of faces on faces
-  bake::VoxelBox box;
-  const Vec3d low = (cover.min - volume.origin) / volume.voxel_size;
-  const Vec3d high = (cover.max - volume.origin) / volume.voxel_size;
-  for (int axis = 0; axis < 3; ++axis) {
-    box.low[axis] = int(std::floor(low[axis] + kRounding));
-    box.high[axis] = int(std::ceil(high[axis] - kRounding));
-  }
-  return box.grown(1);
-}
-
 /// Fills in counts, origin, cover and distance == 0 of the bricks to store. @return the voxel the grid begins at.
 Vec3i lay_out(const bake::Volume& volume, const std::optional<Aabbd>& cover, WebBricks& bricks) {
   std::vector<bake::Voxel> dense;
@@ -46,7 +33,7 @@ Vec3i lay_out(const bake::Volume& volume, const std::optional<Aabbd>& cover, Web
   CNERF_CHECK(!dense.empty(), "no voxel has density");
   bricks.voxels = dense.size();
   // Interpolation reaches one voxel beyond.
-  const bake::VoxelBox box = cover ? reach_of(volume, *cover) : bounding_box(dense).grown(1);
+  const bake::VoxelBox box = (cover ? voxels_of(volume, *cover) : bounding_box(dense)).grown(1);
   const Vec3i first = box.low;
   const Vec3i size = box.size();
   for (int axis = 0; axis < 3; ++axis) bricks.counts[axis] = (size[axis] + kSide - 1) / kSide;
@@ -68,32 +55,6 @@ Vec3i lay_out(const bake::Volume& volume, const std::optional<Aabbd>& cover, Web
     }
   }
   return first;
-}
-
-/// Distances along one axis at a time: the Chebyshev distance is the largest of the three, found by sweeps in which a
-/// cell is at most one more than any of its 26 neighbours.
-void fill_distances(WebBricks& bricks) {
-  const Vec3i n = bricks.counts;
-  const auto at = [&](int x, int y, int z) -> std::uint8_t& {
-    return bricks.distance[(std::size_t(z) * n.y + y) * n.x + x];
-  };
-  const auto relax = [&](int x, int y, int z) {
-    int nearest = at(x, y, z);
-    for (int dz = -1; dz <= 1; ++dz)
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dx = -1; dx <= 1; ++dx) {
-          const int u = x + dx, v = y + dy, w = z + dz;
-          if (u < 0 || v < 0 || w < 0 || u >= n.x || v >= n.y || w >= n.z) continue;
-          nearest = std::min(nearest, at(u, v, w) + 1);
-        }
-    at(x, y, z) = std::uint8_t(std::min(nearest, int(at(x, y, z))));
-  };
-  for (int z = 0; z < n.z; ++z)
-    for (int y = 0; y < n.y; ++y)
-      for (int x = 0; x < n.x; ++x) relax(x, y, z);
-  for (int z = n.z - 1; z >= 0; --z)
-    for (int y = n.y - 1; y >= 0; --y)
-      for (int x = n.x - 1; x >= 0; --x) relax(x, y, z);
 }
 
 /// Number of a stored brick among the stored ones, -1 for others.
@@ -132,10 +93,23 @@ void simplify(std::span<std::uint8_t> plane, const std::vector<Tolerance>& toler
 
 }  // namespace
 
+bake::VoxelBox voxels_of(const bake::Volume& volume, const Aabbd& box) {
+  constexpr double kRounding = 1e-4;
+  const Vec3d low = (box.min - volume.origin) / volume.voxel_size;
+  const Vec3d high = (box.max - volume.origin) / volume.voxel_size;
+  bake::VoxelBox voxels;
+  for (int axis = 0; axis < 3; ++axis) {
+    voxels.low[axis] = int(std::floor(low[axis] + kRounding));
+    voxels.high[axis] = int(std::ceil(high[axis] - kRounding));
+  }
+  return voxels;
+}
+
 WebBricks make_web_bricks(const bake::Volume& volume, const std::optional<Aabbd>& cover) {
   WebBricks bricks;
   const Vec3i first = lay_out(volume, cover, bricks);
-  fill_distances(bricks);
+  const Vec3i n = bricks.counts;
+  bake::fill_distances({n.z, n.y, n.x}, bricks.distance);  // x runs fastest
   std::size_t stored = 0;
   const std::vector<std::int32_t> numbers = numbers_of(bricks, stored);
 
@@ -149,7 +123,6 @@ WebBricks make_web_bricks(const bake::Volume& volume, const std::optional<Aabbd>
   bake::Volume padded = volume;
   std::erase_if(padded.voxels, [](const bake::Voxel& voxel) { return !(voxel.sigma > 0); });
   dilate_colors(padded, 1);  // colour and density are interpolated apart: neighbours of density need colour too
-  const Vec3i n = bricks.counts;
   for (const bake::Voxel& voxel : padded.voxels) {
     const Vec3i v = Vec3i{voxel.i, voxel.j, voxel.k} - first;
     if (v.x < 0 || v.y < 0 || v.z < 0) continue;

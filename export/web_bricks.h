@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "bake/volume.h"
+#include "bake/out_of_core/planes.h"
 #include "src/base/aabb.h"
 
 namespace cnerf::exporting {
@@ -31,6 +31,9 @@ struct WebBricks {
 
   [[nodiscard]] std::size_t stored() const { return lab.size() / (3 * kWebBrickVoxels); }
 };
+
+/// Voxels of a volume that a box of the world touches; faces on faces do not.
+[[nodiscard]] bake::VoxelBox voxels_of(const bake::Volume& volume, const Aabbd& box);
 
 /// Values within a code or two of their neighbour's take it: L* changes by 0.6 at most, a and b by 2.5, where more than
 /// a fiftieth of a pixel's light can come from a voxel; its density by 1.5 codes, and 4.5 where it is opaque.

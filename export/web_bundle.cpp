@@ -8,6 +8,7 @@
 #include "bake/volume/dilate.h"
 #include "bake/volume/resample.h"
 #include "export/manifest.h"
+#include "export/vec3_json.h"
 #include "export/web_levels.h"
 #include "src/base/check.h"
 #include "src/base/error.h"
@@ -24,10 +25,6 @@ namespace fs = std::filesystem;
 
 constexpr int kPosterSide = 640;
 constexpr int kSkyQuality = 92;  // of JPEG
-
-Json to_json(Vec3d v) {
-  return {v.x, v.y, v.z};
-}
 
 /// Writes the files of a bundle and remembers what its manifest says of them.
 class BundleFiles {
@@ -80,10 +77,6 @@ std::string part_name(const std::string& part, std::size_t level) {
 
 constexpr const char* kParts[] = {"occupancy", "density", "color"};
 
-Json box_json(const Aabbd& box) {
-  return {{"min", to_json(box.min)}, {"max", to_json(box.max)}};
-}
-
 Json level_json(const WebBricks& bricks, std::size_t level) {
   const Json density{{"file", part_name("density", level)},
                      {"encoding", "r8"},
@@ -94,14 +87,14 @@ Json level_json(const WebBricks& bricks, std::size_t level) {
   const Vec3i n = bricks.counts;
   const Vec3d end = bricks.origin + (n * kWebBrickSide).cast<double>() * bricks.voxel_size;
   return {
-      {"origin", to_json(bricks.origin)},
+      {"origin", bricks.origin},
       {"voxel_size", bricks.voxel_size},
       {"brick_side", kWebBrickSide},
-      {"bricks", {n.x, n.y, n.z}},
+      {"bricks", n},
       {"stored_bricks", bricks.stored()},
       {"voxels", bricks.voxels},
-      {"bounds", box_json({bricks.origin, end})},
-      {"cover", box_json(bricks.cover)},
+      {"bounds", Aabbd{bricks.origin, end}},
+      {"cover", bricks.cover},
       {"filter", "differences"},
       {"occupancy",
        {{"file", part_name("occupancy", level)}, {"meaning", "bricks to the nearest stored one; 0 = stored"}}},
@@ -169,6 +162,10 @@ void refuse_too_many_bricks(const std::vector<WebBricks>& levels) {
                                stored, kMostStoredBricks));
 }
 
+double mib(std::size_t bytes) {
+  return double(bytes) / (1 << 20);
+}
+
 /// Of the page's textures.
 std::size_t graphics_bytes(const WebBricks& bricks) {
   constexpr std::size_t kTexels = (kWebBrickSide + 2) * (kWebBrickSide + 2) * (kWebBrickSide + 2);  // with neighbours
@@ -180,7 +177,6 @@ std::size_t graphics_bytes(const WebBricks& bricks) {
 WebReport write_web_bundle(const WebVolume& volume, const WebScene& scene, const fs::path& folder,
                            const fs::path& page) {
   CNERF_CHECK(!volume.levels.empty(), "a bundle has a level");
-  refuse_too_many_bricks(volume.levels);
   CNERF_CHECK(scene.photos.empty() || scene.photos.size() == scene.cameras.size(), "one photograph per camera");
   const std::vector<std::string> former = files_of_bundle(folder / kWebManifest);
   std::error_code ignored;
@@ -242,19 +238,24 @@ std::vector<std::byte> poster_of(const std::vector<bake::Volume>& volumes, const
   return make_poster(small, camera, kPosterSide);
 }
 
-void write_web(std::vector<bake::Volume> volumes, const WebScene& scene, const fs::path& folder, const fs::path& page,
-               const WebOptions& options, Observer& observer) {
+WebVolume make_web_volume(std::vector<bake::Volume> volumes, const std::vector<bake::Camera>& cameras,
+                          const WebOptions& options, Observer& observer) {
   WebVolume volume;
   CNERF_CHECK(!volumes.empty(), "a bake has a grid");
   volume.frame = volumes.back().frame;
-  if (!scene.cameras.empty()) volume.poster = poster_of(volumes, scene.cameras.front(), options.resolution);
+  if (!cameras.empty()) volume.poster = poster_of(volumes, cameras.front(), options.resolution);
   volume.levels = make_web_levels(std::move(volumes), options.resolution);
-  const auto mib = [](std::size_t bytes) { return double(bytes) / (1 << 20); };
+  refuse_too_many_bricks(volume.levels);
   for (const WebBricks& bricks : volume.levels) {
     observer.say(fmt::format("web: {:.1f} M voxels of {:.4g} in {} bricks; {:.0f} MiB of graphics memory",
                              1e-6 * double(bricks.voxels), bricks.voxel_size, bricks.stored(),
                              mib(graphics_bytes(bricks))));
   }
+  return volume;
+}
+
+void write_web(const WebVolume& volume, const WebScene& scene, const fs::path& folder, const fs::path& page,
+               Observer& observer) {
   if (page.empty()) {
     observer.say("note: this cnerf was built without the page (CNERF_VIEWER); the bundle holds data only");
   }
@@ -262,6 +263,11 @@ void write_web(std::vector<bake::Volume> volumes, const WebScene& scene, const f
   observer.say(fmt::format("web: {:.2f} MiB of volume, {:.2f} MiB of photographs, {:.0f} KiB of page",
                            mib(report.volume_bytes), mib(report.photo_bytes), double(report.page_bytes) / 1024));
   observer.wrote("web bundle", folder);
+}
+
+void write_web(std::vector<bake::Volume> volumes, const WebScene& scene, const fs::path& folder, const fs::path& page,
+               const WebOptions& options, Observer& observer) {
+  write_web(make_web_volume(std::move(volumes), scene.cameras, options, observer), scene, folder, page, observer);
 }
 
 }  // namespace cnerf::exporting

@@ -53,10 +53,18 @@ struct WebReport {
 WebReport write_web_bundle(const WebVolume& volume, const WebScene& scene, const std::filesystem::path& folder,
                            const std::filesystem::path& page);
 
-/// The bundle of the grids of a bake, each of which is averaged to `options.resolution` first. The observer hears
-/// sizes.
+/// The grids of a bake as the page shows them, each averaged to `options.resolution` first. The observer hears sizes.
 /// @param volumes  nested grids, finest first; colours are dilated.
-/// @throws as write_web_bundle.
+/// @param cameras  of the capture; the first one sees the poster
+/// @throws UsageError  when they have more bricks than a page takes.
+[[nodiscard]] WebVolume make_web_volume(std::vector<bake::Volume> volumes, const std::vector<bake::Camera>& cameras,
+                                        const WebOptions& options, Observer& observer);
+
+/// Writes their bundle, as write_web_bundle, and tells the observer of it.
+void write_web(const WebVolume& volume, const WebScene& scene, const std::filesystem::path& folder,
+               const std::filesystem::path& page, Observer& observer);
+
+/// Both in one.
 void write_web(std::vector<bake::Volume> volumes, const WebScene& scene, const std::filesystem::path& folder,
                const std::filesystem::path& page, const WebOptions& options, Observer& observer);
 

@@ -33,18 +33,6 @@ Aabbd world_box(const Volume& volume, const VoxelBox& box) {
           volume.origin + box.high.cast<double>() * volume.voxel_size};
 }
 
-/// Voxels of a volume that a box of the world touches; faces on faces do not.
-VoxelBox voxels_of(const Volume& volume, const Aabbd& box) {
-  constexpr double kRounding = 1e-4;
-  VoxelBox voxels;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto place = [&](double world) { return (world - volume.origin[axis]) / volume.voxel_size; };
-    voxels.low[axis] = int(std::floor(place(box.min[axis]) + kRounding));
-    voxels.high[axis] = int(std::ceil(place(box.max[axis]) - kRounding));
-  }
-  return voxels;
-}
-
 /// The voxels of the coarser volume that the finer one answers for: those it lies in, and one more at every side where
 /// nothing is, so that its rims end within. Where it is cut off, the coarser one goes on.
 VoxelBox cover_of(const Volume& finer, const Volume& coarser) {

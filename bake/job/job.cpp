@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <optional>
 #include <sstream>
+#include <utility>
 
 #include "bake/density/nested.h"
 #include "bake/job/estimate.h"
@@ -104,6 +106,19 @@ Passes go_on(const Job& job, const std::vector<Plan>& plans, Journal& journal, O
   }
 }
 
+/// Of a mesh, which is there while grids are written.
+std::size_t memory_of_textures(const Job& job) {
+  constexpr std::size_t kBytesPerTexel = 25;
+  return job.mesh ? kBytesPerTexel * std::size_t(job.mesh->texture_size) * std::size_t(job.mesh->texture_size) : 0;
+}
+
+/// Nothing where none is wanted. The levels' memory goes: grids of files need it.
+std::optional<Mesh> make_mesh(const Job& job, std::vector<Level> levels, Observer& observer) {
+  if (!job.mesh) return std::nullopt;
+  const Level level = merged_level(std::move(levels), job.options);  // a surface needs all of it on one lattice
+  return bake_mesh(job.field, job.cameras, level, job.options, *job.mesh, observer.progress_sink());
+}
+
 }  // namespace
 
 void run(const Job& job, Output& output, Observer& observer) {
@@ -118,17 +133,15 @@ void run(const Job& job, Output& output, Observer& observer) {
   journal.share_with(job.ranks);
   auto [levels, volumes] = drop_on_bad_input(job.journal, [&] { return go_on(job, plans, journal, observer); });
   if (!job.ranks.is_first()) return;
+  // Density that was given back is still the process's, and is what the grids will take.
+  if (job.volumes == VolumeUse::kGrids) check_writing_memory(volumes, held + memory_of_textures(job), options);
+  std::optional<Mesh> mesh = make_mesh(job, std::move(levels), observer);  // may be refused: before any output
   if (job.volumes != VolumeUse::kNone) {
-    if (!job.mesh) levels.clear();  // grids of files need the memory
-    // Density that was given back is still the process's, and is what the grids will take.
-    if (job.volumes == VolumeUse::kGrids) check_writing_memory(volumes, job.mesh ? held_memory_bytes() : held, options);
     for (VolumePlanes& volume : volumes) volume = dilated(volume, options.dilation);
     output.take_volumes(volumes);
   }
-  if (job.mesh) {
-    const Level level = merged_level(std::move(levels), options);  // a surface needs all of it on one lattice
-    output.take_mesh(bake_mesh(job.field, job.cameras, level, options, *job.mesh, observer.progress_sink()));
-  }
+  if (mesh) output.take_mesh(*mesh);
+  mesh.reset();
   output.finish();
   std::filesystem::remove(job.journal);
 }

@@ -37,7 +37,7 @@ struct Job {
   std::string identity = {};  ///< all that the voxels depend on beside what stands here: of which field they are
 };
 
-/// Takes what a job makes, as it is made.
+/// Takes what a job makes, once all of it is made: a job that is refused or stopped gives nothing.
 class Output {
  public:
   virtual ~Output() = default;

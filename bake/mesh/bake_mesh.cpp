@@ -55,7 +55,8 @@ void put_into_world(const UnwrappedMesh& unwrapped, const Plan& plan, Mesh& mesh
 
 Mesh bake_mesh(const ColorField& field, const std::vector<Camera>& cameras, const Level& level, const Options& bake,
                const MeshOptions& options, const ProgressSink& sink) {
-  const PassProgress progress(sink, "mesh", kDensityShare, 1, "bake stopped: the mesh was not written, run it again");
+  const PassProgress progress(sink, "mesh", kDensityShare, 1,
+                              "bake stopped: nothing was written, the same command goes on");
   const auto& [plan, sigma] = level;
   const SurfaceMesh surface = make_surface(solidified(sigma, cameras, plan, bake), plan, cameras, options);
   const UnwrappedMesh unwrapped = unwrap(surface, options.texture_size, kGutter);

@@ -9,6 +9,11 @@
 
 namespace cnerf::bake {
 
+/// Chessboard distances of cells, of whose three numbers the last runs fastest: how many cells away, along any axis,
+/// the nearest one with 0 is, at most 255.
+/// @param distance  [counts] 0, and 255 where it is looked for
+void fill_distances(Vec3i counts, std::vector<std::uint8_t>& distance);
+
 /// A BrickGrid<float> as rays read it (see sight_math.h), from which they leave empty space in few steps. The grid must
 /// outlive this, and not change.
 class ClearGrid {

@@ -229,7 +229,7 @@ std::vector<VolumePlanes> bake_volumes(const ColorField& field, const ViewSelect
         },
         [&](std::size_t plane, const std::vector<Voxel>& voxels) { return is_plane_of(plan, plane, voxels); });
     dense_first += planes;
-    if (volume.statistics.all.is_empty()) continue;
+    if (volume.statistics.dense.is_empty()) continue;  // colours of nothing are no volume
     volume.read = [&journal, first, end = volume.end](int plane) {
       if (plane < 0 || plane >= end) return std::vector<Voxel>();
       return journal.read<Voxel>(first + std::size_t(plane));

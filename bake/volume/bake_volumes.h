@@ -12,7 +12,7 @@
 namespace cnerf::bake {
 
 /// Second half: luminance and colour on lattices whose density is known (bake_levels), not dilated. One volume for each
-/// level that holds anything, finest first.
+/// level that has density, finest first.
 /// @param views    of the capture's cameras, in the light of these levels: a voxel's luminance is the mean of what they
 ///                 see, and voxels that none sees are dropped unless `keep_unseen`. Without cameras all are kept.
 /// @param journal  the same; it must outlive the results, whose voxels stay there. `levels` need not.

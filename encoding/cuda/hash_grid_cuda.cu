@@ -48,6 +48,7 @@ void encode_backward_cuda(const std::vector<GridLevel>& levels, const float4* pl
   const dim3 grid(blocks_for((samples.most + kRun - 1) / kRun * 8, kThreads), unsigned(levels.size()));
   scatter<<<grid, kThreads, 0, stream>>>(GridLevels(levels.data(), levels.size()), places, samples.count, samples.most,
                                          static_cast<const uint2*>(d_encoded), reinterpret_cast<float*>(d_table));
+  CNERF_CUDA(cudaGetLastError());
 }
 
 }  // namespace cnerf

@@ -32,7 +32,7 @@ void bake_take(const BakeArguments& arguments, const std::vector<std::string>& c
 Work declare_bake(CLI::App& app) {
   auto arguments = std::make_shared<BakeArguments>();
   add_run_folder_options(app, arguments->run);
-  app.add_option("--format", arguments->format, "vdb, gltf, exr, web, splat or several, comma-separated");
+  app.add_option("--format", arguments->format, "vdb, gltf, exr, web, splat or several, comma-separated [vdb]");
   app.add_option("-o,--out", arguments->out, "Folder to write to; RUN/bakes/TAKE if not given");
   add_short_form(app, arguments->run.config, "--resolution", "bake.resolution");
   add_short_form(app, arguments->run.config, "--aabb", "bake.aabb");

@@ -2,6 +2,7 @@
 
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
+#include "src/base/absolute_folder.h"
 #include "src/base/error.h"
 #include "src/base/usage.h"
 #include "src/cluster/ranks.h"
@@ -73,7 +74,7 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
   }
   refuse_colorizer_of_others(arguments.run.config, context.config);
   const Engines& engines = engines_for(context.config.device);
-  pipeline::choose_colorizer(context.capture.root, context.config, reporter);
+  pipeline::choose_colorizer(context.capture, context.config, reporter);
   if (!arguments.bases.empty()) context.config.stage2.purify.picked_bases = arguments.bases;
   if (arguments.bases_only) {
     pipeline::show_bases(context, engines, reporter);
@@ -83,8 +84,8 @@ void colorize(const ColorizeArguments& arguments, const std::vector<std::string>
   const std::string take = pipeline::take_to_write(context, arguments.run.take, arguments.existing);
   std::optional<web::LiveSession> live;
   if (arguments.view && cluster::world().is_first()) {
-    live.emplace("Colorizing " + context.capture.root.filename().string() + ", take " + take, arguments.browser,
-                 reporter);
+    live.emplace("Colorizing " + absolute_folder(context.capture.root).filename().string() + ", take " + take,
+                 arguments.browser, reporter);
   }
   Observer& observer = live ? static_cast<Observer&>(*live) : reporter;
   pipeline::colorize_step(context, {take, arguments.existing}, engines, observer);

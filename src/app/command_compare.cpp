@@ -111,7 +111,7 @@ Work declare_compare(CLI::App& app) {
   app.add_option("CAPTURE", arguments->captures,
                  "Folders of colour photographs and camera poses; FOLDER@4: image sizes divided by 4");
   app.add_option("-o,--out", arguments->out,
-                 "Folder of the report, made if needed; beside the first CAPTURE if not given");
+                 "Folder of the report, made if needed; CAPTURE-comparison of the first one if not given");
   app.add_option("--methods", arguments->methods, "Names of methods, comma-separated, or all [all]");
   app.add_option("--seeds", arguments->seeds, "How often everything is repeated, with seeds 1, 2, ... [1]")
       ->check(CLI::Range(1, 100));

@@ -131,8 +131,10 @@ Work declare_render(CLI::App& app) {
   app.add_flag("--photographs", arguments->photographs,
                "Write the photographs of the capture in colour instead: full size, 16 bits, their own grey");
   app.add_option("--views", arguments->views, "With --photographs: only these, comma-separated")->delimiter(',');
-  app.add_option("--format", arguments->format,
-                 "png, exr, mp4 or several, comma-separated; of --photographs: png or tiff");
+  app.add_option(
+      "--format", arguments->format,
+      "png, exr, mp4 or several, comma-separated [mp4; png for held-out and bakes]; of --photographs: png or "
+      "tiff [png]");
   app.add_option("-o,--out", arguments->out, "Folder to write to; RUN/renders/TAKE if not given");
   app.add_flag("--baked", arguments->baked, "Show the colours of the bake instead of the per-pixel ones");
   app.add_flag("--view-averaged", arguments->view_averaged,

@@ -29,7 +29,7 @@ Work declare_report(CLI::App& app) {
   auto arguments = std::make_shared<ReportArguments>();
   app.add_option("FOLDER", arguments->runs, "Folders of runs")->required();
   app.add_option("-o,--out", arguments->out,
-                 "Folder of the report, made if needed; beside the first FOLDER if not given");
+                 "Folder of the report, made if needed; FOLDER-report of the first one if not given");
   app.add_flag("--overwrite", arguments->overwrite, "Replace a report that is there");
   add_progress_options(app, arguments->progress);
   return [arguments](const auto&) { report(*arguments); };

@@ -41,7 +41,8 @@ Work declare_run(CLI::App& app) {
   app.add_option("-o,--out", job.out, "Folder of the run, made if needed; CAPTURE-run if not given");
   add_colorizer_options(app, arguments->config);
   app.add_flag("--grey", job.grey, "Stay grey: no colorizer");
-  app.add_option("--format", arguments->format, "What to bake: vdb, gltf, exr, web, splat or several, comma-separated");
+  app.add_option("--format", arguments->format,
+                 "What to bake: vdb, gltf, exr, web, splat or several, comma-separated [vdb]");
   add_short_form(app, arguments->config, "--downscale", "capture.downscale");
   add_short_form(app, arguments->config, "--holdout", "capture.holdout");
   add_short_form(app, arguments->config, "--transfer", "capture.transfer");

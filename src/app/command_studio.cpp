@@ -6,6 +6,7 @@
 #include "src/app/run_arguments.h"
 #include "src/base/error.h"
 #include "src/prepare/prepare.h"
+#include "src/studio/messages.h"
 #include "src/studio/reception.h"
 #include "src/studio/studio.h"
 #include "viewer/server/live_session.h"
@@ -56,6 +57,7 @@ pipeline::RunContext begin_run(const StudioArguments& arguments, const std::vect
 
 void open_studio(StudioArguments arguments, const std::vector<std::string>& command_line) {
   check(arguments);
+  arguments.browser.server.name = studio::name_of_run(arguments.folder());
   Reporter reporter = make_reporter(arguments.run.config);
   const pipeline::RunDirectory directory(arguments.folder());
   std::optional<pipeline::RunContext> context;

@@ -2,6 +2,7 @@
 
 #include "src/app/command.h"
 #include "src/app/run_arguments.h"
+#include "src/base/absolute_folder.h"
 #include "src/cluster/ranks.h"
 #include "src/pipeline/train_step.h"
 #include "viewer/server/live_session.h"
@@ -29,7 +30,7 @@ void train(TrainArguments arguments, const std::vector<std::string>& command_lin
   const FolderLock lock = pipeline::claim_run_folder(directory, arguments.existing, reporter);
   std::optional<web::LiveSession> live;
   if (arguments.view && cluster::world().is_first()) {
-    live.emplace("Training " + context.capture.root.filename().string(), arguments.browser, reporter);
+    live.emplace("Training " + absolute_folder(context.capture.root).filename().string(), arguments.browser, reporter);
   }
   pipeline::begin_run(context, arguments.capture, arguments.existing);
   Observer& observer = live ? static_cast<Observer&>(*live) : reporter;

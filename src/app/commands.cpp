@@ -8,7 +8,7 @@ namespace {
 
 constexpr Command kCommands[] = {
     {"run",
-     "All of the below: train, colorize, bake, evaluate, render",
+     "Everything in one go: train, colorize, bake, evaluate, render",
      declare_run,
      true,
      true,

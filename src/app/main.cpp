@@ -116,7 +116,7 @@ int failed(ExitCode code, const std::string& message) {
 
 int guarded_main(int argc, char** argv) {
   std::set_terminate(end_without_handler);
-  CLI::App program{"Colour volumes from monochrome photographs with known camera poses", "cnerf"};
+  CLI::App program{"Colour volumes from monochrome photographs or film clips", "cnerf"};
   try {
     run_program(program, argc, argv);
     cluster::leave_world({});

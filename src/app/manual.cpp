@@ -121,7 +121,7 @@ std::string fish_line(const std::string& command, const CLI::Option& option) {
 
 std::string program_page(const std::vector<ParsedCommand>& commands, const ManualEdition& edition) {
   std::string page = heading("cnerf", edition);
-  page += ".SH NAME\ncnerf \\- colour volumes from monochrome photographs with known camera poses\n";
+  page += ".SH NAME\ncnerf \\- colour volumes from monochrome photographs or film clips\n";
   page += ".SH SYNOPSIS\n" + bold("cnerf") + " " + italic("COMMAND") + " [" + italic("OPTIONS") + "]\n";
   page += ".SH COMMANDS\n";
   for (const ParsedCommand& each : commands) page += entry(bold(each.command->name), each.command->summary);

@@ -1,5 +1,6 @@
 #include "src/app/run_arguments.h"
 
+#include "src/base/absolute_folder.h"
 #include "src/base/error.h"
 
 namespace cnerf::app {
@@ -45,8 +46,7 @@ pipeline::RunContext open_begun_run(const RunFolderArguments& arguments, const s
 }
 
 fs::path output_beside(const fs::path& source, const std::string& kind) {
-  fs::path plain = fs::absolute(source).lexically_normal();
-  if (plain.filename().empty()) plain = plain.parent_path();
+  const fs::path plain = absolute_folder(source);
   std::error_code failure;  // what is missing is refused where it is read
   // A folder's name may have dots of its own.
   const fs::path name = fs::is_directory(plain, failure) ? plain.filename() : plain.stem();

@@ -1,6 +1,7 @@
 #pragma once
 /// Rigid poses out of matrices that were rounded, printed or estimated, and cameras that none can be.
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -27,6 +28,17 @@ inline constexpr double kNotedPoseError = 1e-4;
 
 /// Turns the axes of a camera that looks along -Z with +Y up (OpenGL, Blender, NeRF) into those of camera.h.
 [[nodiscard]] Affined opencv_from_opengl_camera(const Affined& world_from_camera);
+
+/// Rows of the 4x4 matrix in the convention of transforms.json: the camera looks along -Z, +Y is up.
+[[nodiscard]] inline std::array<std::array<double, 4>, 4> transforms_matrix(const Affined& world_from_camera) {
+  std::array<std::array<double, 4>, 4> matrix{};
+  for (int i = 0; i < 3; ++i) {
+    const Vec3d r = world_from_camera.linear.rows[i];
+    matrix[std::size_t(i)] = {r.x, -r.y, -r.z, world_from_camera.translation[i]};
+  }
+  matrix[3][3] = 1;
+  return matrix;
+}
 
 struct ImplausibleNumber {
   std::string field, problem;  ///< "focal length", "principal point", "distortion" or "position"

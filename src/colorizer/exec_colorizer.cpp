@@ -145,8 +145,10 @@ bool takes_prompt(const std::string& command) {
 
 std::unique_ptr<Colorizer> make_exec_colorizer(const ColorizerRequest& request) {
   std::string command = request.argument;
-  if (const auto place = command.find(kPromptPlace); place != std::string::npos) {
-    command.replace(place, kPromptPlace.size(), shell_word(request.options.prompt));
+  const std::string prompt = shell_word(request.options.prompt);
+  for (auto place = command.find(kPromptPlace); place != std::string::npos;
+       place = command.find(kPromptPlace, place + prompt.size())) {
+    command.replace(place, kPromptPlace.size(), prompt);
   }
   return std::make_unique<ExecColorizer>(command, request.options.timeout_seconds);
 }

@@ -12,16 +12,14 @@ class HostTracedPixels final : public TracedPixels {
   HostTracedPixels(std::span<const Ray> rays, std::span<const WeightedSample> samples,
                    std::span<const std::size_t> offsets)
       : samples_(pixel_samples(rays, samples, offsets)), results_(rays.size()) {
-    parallel_ranges(rays.size(), 256, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) {
-        RayResult& seen = results_[r];
-        for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
-          seen.luminance += samples[s].weight * samples[s].luminance;
-          seen.opacity += samples[s].weight;
-          seen.depth += samples[s].weight * samples[s].t;
-        }
-        if (seen.opacity > 0) seen.depth /= seen.opacity;
+    parallel_each(rays.size(), 256, [&](std::size_t r) {
+      RayResult& seen = results_[r];
+      for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
+        seen.luminance += samples[s].weight * samples[s].luminance;
+        seen.opacity += samples[s].weight;
+        seen.depth += samples[s].weight * samples[s].t;
       }
+      if (seen.opacity > 0) seen.depth /= seen.opacity;
     });
   }
   [[nodiscard]] std::span<const RayResult> results() const override { return results_; }

@@ -2,6 +2,8 @@
 /// The engine of stage 1, one implementation per device: march, hash grid, nets, compositing, loss, gradients, Adam,
 /// occupancy.
 
+#include <algorithm>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <span>
@@ -54,12 +56,19 @@ struct RenderEffort {
   [[nodiscard]] float opacity_of(float total) const { return total > 1 - min_transmittance ? 1 : total; }
 };
 
+/// Bytes of a device's memory for the views' pixels: what is allowed, but not all that is free, since pictures and
+/// samples need some of it later.
+[[nodiscard]] inline std::size_t image_memory_on_device(std::size_t allowed, std::size_t free) {
+  return std::min(allowed, free - free / 8);
+}
+
 class LuminanceEngine {
  public:
   virtual ~LuminanceEngine() = default;
 
-  /// Bytes of the device's memory that the views' pixels may take, where it is not the host's. What does not fit comes
-  /// and goes between steps, which draw from what is there. To be called before `set_views`.
+  /// Bytes of the device's memory that the views' pixels may take at most, where it is not the host's. What does not
+  /// fit, in them or in what the device has free, comes and goes between steps, which draw from what is there. To be
+  /// called before `set_views`.
   virtual void limit_image_memory(std::size_t /*bytes*/) {}
   /// What steps draw their pixels from. To be called before the first step; the images must outlive the steps.
   virtual void set_views(const std::vector<TrainingView>& views) = 0;

@@ -19,13 +19,11 @@ PixelSamples pixel_samples(std::span<const Ray> rays, std::span<const WeightedSa
                            std::span<const std::size_t> offsets) {
   constexpr std::size_t kGrain = 512;  // rays of a parallel piece of work
   PixelSamples pixels = with_room_for({offsets.begin(), offsets.end()});
-  parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t r = begin; r < end; ++r) {
-      for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
-        pixels.positions[s] = rays[r].at(samples[s].t);
-        pixels.weights[s] = samples[s].weight;
-        pixels.luminance[s] = samples[s].luminance;
-      }
+  parallel_each(rays.size(), kGrain, [&](std::size_t r) {
+    for (std::size_t s = offsets[r]; s < offsets[r + 1]; ++s) {
+      pixels.positions[s] = rays[r].at(samples[s].t);
+      pixels.weights[s] = samples[s].weight;
+      pixels.luminance[s] = samples[s].luminance;
     }
   });
   return pixels;

@@ -26,6 +26,7 @@ struct DepthLearning {
 };
 
 inline constexpr std::int64_t kFewestRays = 64, kMostRays = 1 << 16;  ///< of a step
+inline constexpr int kMostSamplesOfRay = 1024;                        ///< what is behind them is not looked at
 
 /// Rays of the first step: 256 samples each is a guess that later steps correct.
 [[nodiscard]] inline std::int64_t first_rays(int samples_per_step) {

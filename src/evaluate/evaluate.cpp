@@ -102,6 +102,8 @@ void show_truth_where_masked(const MonoImage& image, const std::vector<std::uint
 /// Networks have one memory for what passes through them: not for several threads.
 void measure_by_networks(const EvaluatedView& pictures, const EvaluateOptions& options, ViewMetrics& metrics) {
   if (pictures.ours.rgb.empty() || !pictures.truth) return;
+  const auto& mask = pictures.view.image.mask;
+  if (!mask.empty() && std::ranges::count(mask, 0) == std::ssize(mask)) return;  // they would find equal pictures
   const int width = pictures.ours.width, height = pictures.ours.height;
   std::vector<std::uint8_t> ours = srgb8_from_linear(pictures.ours.rgb);
   const std::vector<std::uint8_t> truth = srgb8_from_linear(pictures.truth->rgb);
@@ -149,24 +151,18 @@ void paint_grey(RenderedImage& image) {
 }  // namespace
 
 ViewMetrics mean_of(const std::vector<ViewMetrics>& views) {
-  struct Sum {
-    double sum = 0;
-    int count = 0;
-  };
-  std::vector<std::pair<std::string, Sum>> sums;
+  std::map<std::string, std::pair<double, int>> sums;  // and of how many
   for (const ViewMetrics& view : views) {
-    std::size_t index = 0;
     ViewMetrics::visit_numbers(view, [&](const char* name, const std::optional<double>& value) {
-      if (index == sums.size()) sums.emplace_back(name, Sum{});
-      if (value) sums[index].second = {sums[index].second.sum + *value, sums[index].second.count + 1};
-      ++index;
+      if (!value) return;
+      auto& [sum, count] = sums[name];
+      sum += *value;
+      ++count;
     });
   }
   ViewMetrics mean;
-  std::size_t index = 0;
-  ViewMetrics::visit_numbers(mean, [&](const char*, std::optional<double>& value) {
-    if (index < sums.size() && sums[index].second.count > 0) value = sums[index].second.sum / sums[index].second.count;
-    ++index;
+  ViewMetrics::visit_numbers(mean, [&](const char* name, std::optional<double>& value) {
+    if (const auto found = sums.find(name); found != sums.end()) value = found->second.first / found->second.second;
   });
   return mean;
 }

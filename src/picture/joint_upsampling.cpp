@@ -5,22 +5,6 @@
 #include "src/base/check.h"
 
 namespace cnerf {
-namespace {
-
-/// Differences of L* within a surface, grain included, are about this. Of 2 to 12, with a reach of 2 to 6 samples,
-/// these two gave the least error of chroma at full size for held-out and trained views of a capture whose colours are
-/// known.
-constexpr float kSameLightness = 6.0f;
-
-/// How much a sample counts by its difference in lightness. It never comes to nothing, as a Gaussian would: where no
-/// sample is alike, as on a thin twig, those that are least unlike decide.
-float likeness(float difference) {
-  const float relative = difference / kSameLightness;
-  const float half = 1 / (1 + relative * relative);
-  return half * half;
-}
-
-}  // namespace
 
 std::vector<JointUpsampler::Taps> JointUpsampler::taps_of(int samples, int pixels) {
   std::vector<Taps> all(static_cast<std::size_t>(pixels));
@@ -75,7 +59,7 @@ Ab JointUpsampler::at(int column, int row, float lightness) const {
     for (int x = 0; x < kTaps; ++x) {
       const std::size_t place = line + std::size_t(x);
       const float near = down.weights[std::size_t(y)] * across.weights[std::size_t(x)];
-      const float weight = near * likeness(lightness_[place] - lightness) * weight_[place];
+      const float weight = near * likeness_by_lightness(lightness_[place] - lightness) * weight_[place];
       total += weight;
       a += weight * a_[place];
       b += weight * b_[place];

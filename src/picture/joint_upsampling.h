@@ -21,6 +21,18 @@ struct ChromaSamples {
   std::vector<float> weight;     ///< how far a sample is to be trusted, 0..1; one of 0 is not used
 };
 
+/// How much a chroma counts for a pixel whose L* differs by this from its own. It never comes to nothing, as a Gaussian
+/// would: where nothing is alike, as on a thin twig, what is least unlike decides.
+[[nodiscard]] inline float likeness_by_lightness(float difference) {
+  // Differences within a surface, grain included, are about this. Of 2 to 12, with a reach of 2 to 6 samples of a
+  // JointUpsampler, these two gave the least error of chroma at full size for held-out and trained views of a capture
+  // whose colours are known.
+  constexpr float kWithinSurface = 6.0f;
+  const float relative = difference / kWithinSurface;
+  const float half = 1 / (1 + relative * relative);
+  return half * half;
+}
+
 class JointUpsampler {
  public:
   /// @param width, height  of the large picture; of the samples' own size, chroma is theirs to the bit

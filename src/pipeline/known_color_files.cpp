@@ -25,16 +25,7 @@ constexpr double kHintRadius = 0.01;      // of a hint's dot, as a share of the 
 constexpr float kLeastMeanChroma = 1.0f;  // a key frame of less is grey
 
 const View& training_view(const Capture& capture, const std::string& name, const std::string& entry) {
-  const auto is_named = [&](const View& view) {
-    const fs::path path(view.name);
-    return view.name == name || path.filename() == name || path.stem() == name;
-  };
-  const auto count = std::ranges::count_if(capture.views, is_named);
-  if (count != 1) {
-    throw UsageError(fmt::format("{}: {} views of the capture are called {}; they have names like {}", entry,
-                                 count == 0 ? "no" : std::to_string(count), name, capture.views.front().name));
-  }
-  const View& view = *std::ranges::find_if(capture.views, is_named);
+  const View& view = capture.views[view_called(capture, name, entry)];
   if (view.held_out) {
     throw UsageError(entry + ": " + view.name + " is held out for evaluation; name a view that is trained on");
   }
@@ -64,13 +55,23 @@ Ab ab_of_linear(Vec3f rgb) {
   return {lab.a, lab.b};
 }
 
+/// The orientation that turns back what stands upright.
+int turning_back(int orientation) {
+  return orientation == 6 ? 8 : orientation == 8 ? 6 : orientation;
+}
+
 /// Pixels as the view's file has them: `prepare` turns photographs upright, and other captures hold them as they are
 /// stored.
 LinearImage picture_of_view(const fs::path& file, const View& view) {
   LinearImage image = read_linear_image(file, Transfer::kSrgb);
-  const int orientation = prepare::orientation_of(read_binary_file(file));
-  if (orientation == 1 || orientation == prepare::orientation_of(read_binary_file(view.image_file))) return image;
-  return prepare::turned_upright(std::move(image), orientation);
+  const int own = prepare::orientation_of(read_binary_file(file));
+  const int of_view = prepare::orientation_of(read_binary_file(view.image_file));
+  if (own == of_view) return image;
+  image = prepare::turned_upright(std::move(image), own);
+  const bool lies_down =
+      image.width != image.height && (image.width > image.height) == (view.intrinsics.width > view.intrinsics.height);
+  if (of_view > 4 && lies_down) return image;  // painted on the stored pixels, in a file without the note
+  return prepare::turned_upright(std::move(image), turning_back(of_view));
 }
 
 /// @param kind  strokes: only what is painted on counts
@@ -109,7 +110,7 @@ KnownColors load_colors(const NamedFile& named, KnownColorKind kind, const View&
 double number_of(const std::string& text, const std::string& entry) {
   double value = 0;
   const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (failure != std::errc() || end != text.data() + text.size()) {
+  if (failure != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
     throw UsageError(entry + ": expected x,y,VIEW,#rrggbb, found " + text + " for a number");
   }
   return value;
@@ -176,6 +177,21 @@ void add_painted(const fs::path& file, const Capture& capture, Palette& palette,
 }
 
 }  // namespace
+
+std::size_t view_called(const Capture& capture, const std::string& name, const std::string& entry,
+                        const std::vector<std::string>& other_names) {
+  std::vector<std::size_t> places;
+  for (std::size_t i = 0; i < capture.views.size(); ++i) {
+    if (capture.views[i].name == name) return i;
+    const fs::path view(capture.views[i].name);
+    const bool is_other = i < other_names.size() && other_names[i] == name;
+    if (is_other || view.filename() == name || view.stem() == name) places.push_back(i);
+  }
+  if (places.size() == 1) return places.front();
+  throw UsageError(fmt::format("{}: {} views of the capture are called {}; they have names like {}", entry,
+                               places.empty() ? "no" : std::to_string(places.size()), name,
+                               capture.views.front().name));
+}
 
 GivenColors load_known_colors(const Capture& capture, const ColorizerOptions& config) {
   GivenColors given;

@@ -1,6 +1,9 @@
 #pragma once
 /// Key frames and hints as a user names them, made into colours of views.
 
+#include <cstddef>
+#include <filesystem>
+#include <string>
 #include <vector>
 
 #include "src/capture/capture.h"
@@ -13,6 +16,13 @@ struct GivenColors {
   std::vector<KnownColors> known;
   std::vector<Viewpoint> viewpoints;  ///< that some are painted at, beside the capture's views
 };
+
+/// Place of the view that a name means: the capture's own name for it, else that of its file with or without extension.
+/// @param entry        what errors begin with
+/// @param other_names  one more a view, which mean it too
+/// @throws UsageError  where no view is called so, or several are
+[[nodiscard]] std::size_t view_called(const Capture& capture, const std::string& name, const std::string& entry,
+                                      const std::vector<std::string>& other_names = {});
 
 /// What `config.colorizer.keyframes`, `hint_images`, `hints` and `strokes` name, in the colours of `palette`; key
 /// frames come first, since hints correct them; hints of one view are one source. Views are named as the capture names

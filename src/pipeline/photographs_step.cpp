@@ -7,6 +7,7 @@
 #include <set>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/base/statistics.h"
 #include "src/base/usage.h"
 #include "src/capture/image_io.h"
@@ -16,7 +17,9 @@
 #include "src/color/colorspace_math.h"
 #include "src/picture/colored_photograph.h"
 #include "src/picture/encode.h"
+#include "src/pipeline/known_color_files.h"
 #include "src/pipeline/render_step.h"
+#include "src/prepare/photographs.h"
 
 namespace cnerf::pipeline {
 namespace fs = std::filesystem;
@@ -59,24 +62,15 @@ std::vector<Photograph> all_photographs(const RunContext& context, const fs::pat
   return photographs;
 }
 
-bool is_called(const Photograph& photograph, const std::string& name) {
-  const fs::path view(photograph.view->name);
-  return photograph.view->name == name || view.filename() == name || view.stem() == name || photograph.name == name;
-}
-
 /// Those of some views.
-std::vector<Photograph> chosen(const std::vector<Photograph>& all, const std::vector<std::string>& views) {
+/// @param all  of the capture
+std::vector<Photograph> chosen(const std::vector<Photograph>& all, const Capture& capture,
+                               const std::vector<std::string>& views) {
   if (views.empty()) return all;
+  std::vector<std::string> file_names;
+  for (const Photograph& photograph : all) file_names.push_back(photograph.name);
   std::set<std::size_t> places;
-  for (const std::string& name : views) {
-    const auto is_it = [&](const Photograph& photograph) { return is_called(photograph, name); };
-    const auto count = std::ranges::count_if(all, is_it);
-    if (count != 1) {
-      throw UsageError(fmt::format("photographs: {} views of the capture are called {}; they have names like {}",
-                                   count == 0 ? "no" : std::to_string(count), name, all.front().view->name));
-    }
-    places.insert(std::size_t(std::ranges::find_if(all, is_it) - all.begin()));
-  }
+  for (const std::string& name : views) places.insert(view_called(capture, name, "photographs", file_names));
   std::vector<Photograph> some;
   for (const std::size_t place : places) some.push_back(all[place]);
   return some;
@@ -127,13 +121,28 @@ GreyPhotograph uncovered(LinearImage grey) {
   return {grey.width, grey.height, std::move(grey.values), std::move(grey.alpha)};
 }
 
+/// Turned as the file says that its pixels are to be shown: what is written has no such note.
+cv::Mat upright(const cv::Mat& stored, const fs::path& file) {
+  const prepare::Upright grid = {prepare::orientation_of(read_binary_file(file)), stored.cols, stored.rows};
+  if (grid.orientation == 1) return stored;
+  cv::Mat turned(grid.height(), grid.width(), stored.type());
+  const std::size_t bytes = stored.elemSize();
+  for (int y = 0; y < turned.rows; ++y) {
+    for (int x = 0; x < turned.cols; ++x) {
+      const int from = int(grid.stored_index(x, y));
+      std::copy_n(stored.ptr(from / stored.cols, from % stored.cols), bytes, turned.ptr(y, x));
+    }
+  }
+  return turned;
+}
+
 cv::Mat colored(const Photograph& photograph, const Scene& scene, const Config& config) {
   LinearImage grey = read_grey(photograph, transfer_named(config.capture.transfer));
   const View& view = *photograph.view;
   const Intrinsics lens = rendered_lens(view, grey.width, grey.height);
   const RenderedImage rendered = scene.render(lens, view.world_from_camera, render_options(config));
   const ChromaSamples chroma = chroma_of(rendered, area_resized(grey, lens.width, lens.height));
-  return colored_photograph(uncovered(std::move(grey)), chroma);
+  return upright(colored_photograph(uncovered(std::move(grey)), chroma), photograph.file);
 }
 
 }  // namespace
@@ -160,7 +169,7 @@ std::vector<fs::path> photographs_step(const RunContext& context, const Photogra
   const RunDirectory& directory = context.directory;
   check_photographs_take(directory, job.take);
   const fs::path capture = job.capture.empty() ? directory.record().capture : job.capture;
-  const std::vector<Photograph> photographs = chosen(all_photographs(context, capture), job.views);
+  const std::vector<Photograph> photographs = chosen(all_photographs(context, capture), context.capture, job.views);
   const StepLocks locks(directory, job.folder, observer);
   const Stopwatch watch;
   Finish finish = context.config.finish;

@@ -31,7 +31,8 @@ struct PhotographsJob {
 void check_photographs_take(const RunDirectory& directory, const std::string& take);
 
 /// Writes photographs at the full size of their files, held-out ones too: the lightness of the file, and chroma that
-/// the take has at the photograph's camera. Learned exposures do not touch the lightness. Coverage stays.
+/// the take has at the photograph's camera. Learned exposures do not touch the lightness. Coverage stays. Where the
+/// file has a note that turns it, the written one is turned.
 /// @return  the files, in the order of the capture's views; each is whole or not there
 /// @throws UsageError   no take, no such view
 /// @throws InputError   a photograph that is not that of the context's capture any more

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "src/base/absolute_folder.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/json.h"
@@ -190,8 +191,7 @@ void prepare_step(const PrepareJob& job, const Engines& engines, Observer& obser
 
 fs::path capture_of(const fs::path& source, const fs::path& run, const std::string& transfer, Observer& observer) {
   if (!prepare::needs_preparing(source)) return source;
-  fs::path folder = fs::absolute(run).lexically_normal();
-  if (folder.filename().empty()) folder = folder.parent_path();
+  const fs::path folder = absolute_folder(run);
   const fs::path capture = folder.parent_path() / (folder.filename().string() + "-capture");
   observer.say("no camera poses in " + source.string() + ": preparing a capture (cnerf prepare has options for this)");
   PrepareJob job{source, capture, {}, {.resume = true}};

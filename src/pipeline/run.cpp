@@ -1,12 +1,17 @@
 #include "src/pipeline/run.h"
 
+#include <algorithm>
 #include <chrono>
 #include <future>
+#include <set>
+#include <utility>
 
 #include "src/base/error.h"
 #include "src/base/json_record.h"
 #include "src/base/shared_observer.h"
 #include "src/cluster/ranks.h"
+#include "src/config/fields.h"
+#include "src/config/toml_binding.h"
 #include "src/evaluate/evaluate.h"
 #include "src/pipeline/colorize_step.h"
 #include "src/pipeline/default_colorizer.h"
@@ -93,6 +98,60 @@ class ColorizerBesideTraining {
   std::unique_ptr<Colorizer> colorizer_;
 };
 
+/// What --resume leaves as it is.
+struct MadeStep {
+  std::string what;
+  std::vector<std::string> sections;  ///< of its options
+  std::string command;                ///< that makes it with others
+};
+
+/// Files that may have been moved since are no other options.
+bool is_of(const MadeStep& step, const std::string& key) {
+  static const std::set<std::string> kFiles = {"colorizer.keyframes", "colorizer.hint_images", "colorizer.hints",
+                                               "colorizer.strokes"};
+  return !kFiles.contains(key) && std::ranges::count(step.sections, key.substr(0, key.find('.'))) > 0;
+}
+
+std::vector<MadeStep> made_steps(const RunContext& context, const RunJob& job) {
+  const RunDirectory& directory = context.directory;
+  const std::string take = job.grey ? "" : take_of_run(context, job.existing);
+  exporting::Formats formats = job.formats;
+  const std::string run = directory.root().string();
+  const std::string anew = run + " --take " + (take.empty() ? kGreyTake : take) + " --overwrite";
+  std::vector<MadeStep> steps;
+  if (!take.empty() && directory.take_record(take)) {
+    steps.push_back({"take " + take, {"colorizer", "stage2"}, "cnerf colorize " + run + " --take NAME"});
+  }
+  if (is_baked(job, directory.bakes(take), formats)) {
+    steps.push_back({"the bake", {"bake", "vdb", "mesh", "splat", "web", "finish"}, "cnerf bake " + anew});
+  }
+  if (is_done(job, directory.renders(take) / "turntable.mp4")) {
+    steps.push_back({"the video", {"render", "finish"}, "cnerf render " + anew});
+  }
+  return steps;
+}
+
+/// Before the run's configuration is written: it keeps what finished steps were made with, and who asks for something
+/// else is told.
+/// @param source  the capture as it was given
+void keep_made(RunContext& context, const RunJob& job, const fs::path& source, Observer& observer) {
+  cluster::Ranks& world = cluster::world();
+  if (!world.agreed(job.existing.resume && context.directory.exists())) return;
+  const std::vector<MadeStep> steps = made_steps(context, job);
+  std::vector<Field> kept;
+  Observer silent;
+  Config before = world.is_first() ? context.directory.config("", silent) : context.config;
+  if (!job.grey && world.is_first()) choose_colorizer(source, before, silent);  // as was done with what is asked for
+  const std::vector<Field> was = fields_of(before), asked = fields_of(context.config);
+  for (std::size_t i = 0; i < was.size(); ++i) {
+    const auto step = std::ranges::find_if(steps, [&](const MadeStep& made) { return is_of(made, was[i].key); });
+    if (step == steps.end() || write_toml({was[i]}) == write_toml({asked[i]})) continue;
+    observer.say("note: " + step->what + " is there and stays; " + was[i].key + " is for: " + step->command);
+    kept.push_back(was[i]);
+  }
+  read_toml(world.agreed(write_toml(kept)), context.directory.config_file().string(), asked);
+}
+
 }  // namespace
 
 fs::path run(RunJob job, Config config, const Engines& engines, Observer& one_observer) {
@@ -102,13 +161,14 @@ fs::path run(RunJob job, Config config, const Engines& engines, Observer& one_ob
   if (!job.grey) choose_colorizer(job.capture, config, observer);
   const fs::path capture = common_capture(job, config.capture.transfer, observer);
   if (capture != job.capture) config.capture.transfer = "srgb";  // it was prepared of what had another
-  job.capture = capture;
+  const fs::path source = std::exchange(job.capture, capture);
 
   RunContext context{directory, config, read_capture(job.capture, config, observer, directory.root()),
                      job.command_line};
   if (!job.grey) {
     check_bases(config.stage2.purify, load_known_colors(context.capture, context.config.colorizer).known);
   }
+  keep_made(context, job, source, observer);
   ColorizerBesideTraining colorizer(context, needs_colorizer(job, directory), engines, observer);
   begin_run(context, job.capture, job.existing);
   train_step(context, {job.existing.resume, [&](const LuminanceModel&) { colorizer.look(); }}, engines, observer);

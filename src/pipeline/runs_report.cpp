@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "src/base/absolute_folder.h"
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/json_record.h"
@@ -35,9 +36,8 @@ struct ReportedRun {
 };
 
 ReportedRun read_run(const fs::path& folder) {
-  const RunDirectory directory = RunDirectory::open(fs::absolute(folder).lexically_normal());
+  const RunDirectory directory = RunDirectory::open(absolute_folder(folder));
   ReportedRun run{directory.root(), directory.record(), {}, 0};
-  if (run.folder.filename().empty()) run.folder = run.folder.parent_path();
   if (fs::exists(directory.metrics_file())) run.metrics = read_record<Metrics>(directory.metrics_file());
   if (run.metrics && !run.metrics->take.empty()) {
     if (const auto take = directory.take_record(run.metrics->take)) run.colorize_seconds = take->stage2.seconds;

@@ -4,6 +4,7 @@
 #include "export/manifest.h"
 #include "export/vdb_reader.h"
 #include "export/web_bundle.h"
+#include "src/base/absolute_folder.h"
 #include "src/base/error.h"
 #include "src/base/json.h"
 #include "src/capture/exr_io.h"
@@ -50,7 +51,8 @@ fs::path bundle_of_bake(const fs::path& bake, const ShowJob& job, const exportin
   if (!manifest.volume) {
     throw InputError(manifest_file, "volume", "this bake has none; bake with --format vdb or --format web");
   }
-  exporting::WebScene scene{bake.filename().string(), manifest.cameras, {}, manifest.label, sky_of(manifest, bake)};
+  const std::string title = absolute_folder(bake).filename().string();
+  exporting::WebScene scene{title, manifest.cameras, {}, manifest.label, sky_of(manifest, bake)};
   scene.label.provenance.command_line = job.command_line;
   write_web(exporting::read_volumes(bake), scene, folder, web::find_page(), options, observer);
   observer.say("note: the photographs are with the capture; cnerf bake RUN --format web adds them");
@@ -74,6 +76,9 @@ fs::path bundle_to_show(const ShowJob& job, const exporting::WebOptions& options
   if (!fs::exists(what)) throw MissingInputError(what.string() + ": no such file or folder");
   if (what.extension() == ".vdb" || what.filename() == "manifest.json" || what.filename() == exporting::kWebManifest) {
     what = what.parent_path().empty() ? fs::path(".") : what.parent_path();
+  }
+  if (!job.take.empty() && !RunDirectory(what).exists()) {
+    throw UsageError("--take: is for a run; " + job.what.string() + " is none");
   }
   if (is_bundle(what)) return what;
   if (RunDirectory(what).exists()) what = bake_of_run(job.what, job.take);

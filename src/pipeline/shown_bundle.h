@@ -17,7 +17,7 @@ struct ShowJob {
 };
 
 /// The bundle to show: what is there, or one made of a bake that has none, or an older one.
-/// @throws MissingInputError, InputError.
+/// @throws MissingInputError, InputError; UsageError  a take of what is no run.
 [[nodiscard]] std::filesystem::path bundle_to_show(const ShowJob& job, const exporting::WebOptions& options,
                                                    Observer& observer);
 

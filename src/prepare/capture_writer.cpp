@@ -11,6 +11,7 @@
 #include "src/base/error.h"
 #include "src/base/parallel.h"
 #include "src/capture/image_io.h"
+#include "src/capture/pose.h"
 #include "src/picture/contact_sheet.h"
 #include "src/picture/encode.h"
 #include "src/prepare/grey_image.h"
@@ -20,17 +21,6 @@ namespace fs = std::filesystem;
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-/// Rows of the 4x4 matrix in the convention of transforms.json: the camera looks along -Z, +Y is up.
-Json matrix_of(const Affined& world_from_camera) {
-  Json rows = Json::array();
-  for (int i = 0; i < 3; ++i) {
-    const Vec3d r = world_from_camera.linear.rows[i];
-    rows.push_back({r.x, -r.y, -r.z, world_from_camera.translation[i]});
-  }
-  rows.push_back({0.0, 0.0, 0.0, 1.0});
-  return rows;
-}
 
 Json lens_of(const View& view) {
   const Intrinsics& lens = view.intrinsics;
@@ -178,7 +168,7 @@ Json transforms_json(const std::vector<View>& views, const std::vector<PreparedI
       if (image.haze != 0) frame["haze"] = image.haze;
     }
     if (!one_lens) frame.update(lens_of(view));
-    frame["transform_matrix"] = matrix_of(view.world_from_camera);
+    frame["transform_matrix"] = transforms_matrix(view.world_from_camera);
     out["frames"].push_back(std::move(frame));
   }
   return out;

@@ -100,8 +100,10 @@ std::pair<py::array_t<float>, py::array_t<float>> ask_bake(const OpenBake& self,
   py::array_t<float> sigma(at.shape()), rgb(at.vector_shape());
   const std::span<float> density = values_of(sigma);
   const std::span<Vec3f> color = vectors_of(rgb);
-  const py::gil_scoped_release release;
-  self.lookup.query(at.values(), density, color);
+  {
+    const py::gil_scoped_release release;  // copies of arrays count their references, which needs the GIL
+    self.lookup.query(at.values(), density, color);
+  }
   return {sigma, rgb};
 }
 

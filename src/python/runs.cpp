@@ -47,8 +47,11 @@ struct Settings {
   std::string preset;
   Words texts;
 
-  Settings(std::string preset_name, const py::dict& given) : preset(std::move(preset_name)) {
-    for (const auto& [key, value] : given) texts.push_back(std::string(py::str(key)) + "=" + setting_text(value));
+  /// @param given  any mapping
+  Settings(std::string preset_name, const py::object& given) : preset(std::move(preset_name)) {
+    for (const auto& [key, value] : py::dict(given)) {
+      texts.push_back(std::string(py::str(key)) + "=" + setting_text(value));
+    }
   }
 
   /// @throws UsageError, MissingInputError, DeviceError
@@ -177,7 +180,7 @@ std::string colorize(const OpenRun& run, const ColorizeCall& call, Observer& obs
   if (!call.colorizer.empty()) spec = call.colorizer;
   refuse_code(spec, call.colorizer.empty() ? call.settings.alone().colorizer.spec : call.colorizer, call.trust);
   const Engines& engines = engines_for(context.config.device);
-  pipeline::choose_colorizer(context.capture.root, context.config, observer);
+  pipeline::choose_colorizer(context.capture, context.config, observer);
   std::string take = pipeline::take_to_write(context, call.take, call.existing);
   pipeline::colorize_step(context, {take, call.existing}, engines, observer);
   return take;
@@ -214,7 +217,7 @@ std::unique_ptr<OpenScene> open_scene(const OpenRun& run, const std::string& wan
 void bind_steps(py::class_<OpenRun>& run) {
   run.def(
       "colorize",
-      [](const OpenRun& self, const std::string& colorizer, const std::string& take, const py::dict& settings,
+      [](const OpenRun& self, const std::string& colorizer, const std::string& take, const py::object& settings,
          bool trust, bool resume, const py::object& progress) {
         const ColorizeCall call{colorizer, take, Settings("", settings), trust, {.resume = resume}};
         std::string name;
@@ -227,7 +230,7 @@ void bind_steps(py::class_<OpenRun>& run) {
   run.def(
       "bake",
       [](const OpenRun& self, const fs::path& folder, const std::string& take, const std::string& format,
-         const py::dict& settings, bool overwrite, const py::object& progress) {
+         const py::object& settings, bool overwrite, const py::object& progress) {
         const BakeCall call{folder, take, format, Settings("", settings), overwrite};
         fs::path made;
         run_step(progress, [&](Observer& observer) { made = bake(self, call, observer); });
@@ -251,12 +254,12 @@ void bind_runs(py::module_& module) {
           "cameras",
           [](const OpenRun& self) {
             Silent observer;
-            return bake::cameras_of(self.context("", Settings("", {}), {}, observer).capture);
+            return bake::cameras_of(self.context("", Settings("", py::dict()), {}, observer).capture);
           },
           "The capture's cameras as the training left them. Reads the capture.")
       .def(
           "scene",
-          [](const OpenRun& self, const std::string& take, const py::dict& settings) {
+          [](const OpenRun& self, const std::string& take, const py::object& settings) {
             const Settings chosen("", settings);
             const py::gil_scoped_release release;
             return open_scene(self, take, chosen);
@@ -269,8 +272,8 @@ void bind_runs(py::module_& module) {
       py::arg("folder"), py::arg("capture") = "", "Opens a run; `capture` says where its capture lies now.");
   module.def(
       "train",
-      [](const fs::path& capture, const fs::path& out, const std::string& preset, const py::dict& settings, bool resume,
-         bool overwrite, const py::object& progress) {
+      [](const fs::path& capture, const fs::path& out, const std::string& preset, const py::object& settings,
+         bool resume, bool overwrite, const py::object& progress) {
         const TrainCall call{capture, out, Settings(preset, settings), {resume, overwrite}};
         run_step(progress, [&](Observer& observer) { train(call, observer); });
         return OpenRun(out, capture);

@@ -52,17 +52,18 @@ StepObserver::StepObserver(py::object progress)
 StepObserver::~StepObserver() = default;
 
 void StepObserver::guarded(const std::function<void()>& call) {
-  if (failure_) return;
+  if (has_failed_) return;
   const py::gil_scoped_acquire acquire;
   try {
     call();
   } catch (py::error_already_set& error) {
     failure_.emplace(std::move(error));
-    request_interruption();
+    has_failed_ = true;
   }
 }
 
 void StepObserver::report_progress(const Progress& progress) {
+  if (has_failed_) throw Interrupted("stopped by its progress function");
   if (progress_.is_none()) return;
   guarded([&] {
     py::dict figures;

@@ -5,6 +5,7 @@
 #include <pybind11/functional.h>
 #include <pybind11/pybind11.h>
 
+#include <atomic>
 #include <functional>
 #include <optional>
 
@@ -22,19 +23,22 @@ class StepObserver final : public Observer {
   StepObserver(const StepObserver&) = delete;
   StepObserver& operator=(const StepObserver&) = delete;
 
+  /// @throws Interrupted  where a call failed before: for steps that ask nobody whether to stop
   void report_progress(const Progress& progress) override;
   void say(const std::string& text) override;
   void wrote(const std::string& what, const std::filesystem::path& path) override;
+  [[nodiscard]] bool is_cancelled() const override { return has_failed_ || Observer::is_cancelled(); }
 
-  /// What the function raised: the step was then stopped as by Ctrl-C.
+  /// What the function raised: the step was then stopped as by Ctrl-C, and no other one.
   [[nodiscard]] std::optional<py::error_already_set>& failure() { return failure_; }
 
  private:
-  /// Calls Python; what it raises is kept, and the step asked to stop.
+  /// Calls Python, until that raises something: it is kept.
   void guarded(const std::function<void()>& call);
 
   py::object progress_, logger_;
   std::optional<py::error_already_set> failure_;
+  std::atomic<bool> has_failed_ = false;  // several threads ask
 };
 
 /// Runs a step without the GIL. While it runs Ctrl-C asks it to stop; it then saves what it can, and

@@ -11,6 +11,7 @@
 #include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/base/rng.h"
+#include "src/capture/pose.h"
 #include "src/picture/encode.h"
 #include "src/picture/exr_writer.h"
 #include "src/sample/scene.h"
@@ -192,17 +193,6 @@ void write_view(const fs::path& folder, const SampleSceneOptions& options, int i
   write_exr(folder / "depth" / file_name(index, "exr"), {options.width, options.height, {{"Z", view.depth}}, {}});
 }
 
-/// Rows of the 4x4 matrix in the convention of transforms.json: the camera looks along -Z, +Y is up.
-nlohmann::json matrix_of(const Affined& world_from_camera) {
-  nlohmann::json rows = nlohmann::json::array();
-  for (int i = 0; i < 3; ++i) {
-    const Vec3d r = world_from_camera.linear.rows[i];
-    rows.push_back({r.x, -r.y, -r.z, world_from_camera.translation[i]});
-  }
-  rows.push_back({0.0, 0.0, 0.0, 1.0});
-  return rows;
-}
-
 nlohmann::ordered_json transforms_of(const SampleSceneOptions& options) {
   const Intrinsics camera = camera_of(options);
   const Aabbd box = sample::bounds();
@@ -215,7 +205,7 @@ nlohmann::ordered_json transforms_of(const SampleSceneOptions& options) {
   for (int view = 0; view < options.views; ++view) {
     const std::string name = "images/" + file_name(view, "png");
     out[is_test_view(view, options.views) ? "test_filenames" : "train_filenames"].push_back(name);
-    out["frames"].push_back({{"file_path", name}, {"transform_matrix", matrix_of(pose_of(options, view))}});
+    out["frames"].push_back({{"file_path", name}, {"transform_matrix", transforms_matrix(pose_of(options, view))}});
   }
   return out;
 }

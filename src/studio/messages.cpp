@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/base/absolute_folder.h"
 #include "src/capture/arrangement.h"
 
 namespace cnerf::studio {
@@ -37,13 +38,13 @@ FieldCamera camera_of(const FrameMessage& message) {
 }
 
 std::string name_of_run(const std::filesystem::path& root) {
-  const std::filesystem::path folder = std::filesystem::absolute(root).lexically_normal();
-  return (folder.filename().empty() ? folder.parent_path() : folder).string();
+  return absolute_folder(root).string();
 }
 
 SceneMessage scene_of(const Capture& capture, const std::string& run) {
   const CameraArrangement cameras = arrangement_of(capture);
-  SceneMessage scene{capture.root.filename().string(), run, axis_name(cameras.up), triple(cameras.focus), 1, {}, 0};
+  const std::string name = absolute_folder(capture.root).filename().string();
+  SceneMessage scene{name, run, axis_name(cameras.up), triple(cameras.focus), 1, {}, 0};
   scene.radius = mean_distance(capture.views, cameras.focus);
   for (const View& view : capture.views) scene.views.push_back(message_of(view));
   const auto middle = capture.views.begin() + std::ptrdiff_t(capture.views.size() / 2);

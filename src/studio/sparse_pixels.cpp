@@ -9,6 +9,7 @@
 #include "src/base/check.h"
 #include "src/base/parallel.h"
 #include "src/color/colorspace_math.h"
+#include "src/picture/joint_upsampling.h"
 
 namespace cnerf::studio {
 namespace {
@@ -23,15 +24,6 @@ constexpr float kSameLightness = 8;  // most that L* of the pixels around may di
 constexpr float kSameColor = 8;      // likewise a and b
 constexpr float kDoubt = 1.4f;       // most that foretelling by other rules may change L* ...
 constexpr float kCoarseDoubt = 1;    // ... and of pixels that others are foretold from
-constexpr float kLikeLightness = 6;  // a colour spreads to pixels whose L* differs by about this
-
-/// How much a pixel's colour counts where L* differs by this. It never comes to nothing: where no pixel around is
-/// alike, those that are least unlike decide.
-float likeness(float difference) {
-  const float relative = difference / kLikeLightness;
-  const float half = 1 / (1 + relative * relative);
-  return half * half;
-}
 
 /// Smallest and largest of some numbers.
 struct Range {
@@ -185,7 +177,7 @@ void SparsePixels::spread_to(int column, int row) {
   for (int y = row - row % kColorStep; y <= row + row % kColorStep && y < height_; y += kColorStep) {
     for (int x = column - column % kColorStep; x <= column + column % kColorStep && x < width_; x += kColorStep) {
       from[count] = at(x, y);
-      weights[count] = likeness(*lightness_.at(from[count]) - *lightness_.at(at(column, row)));
+      weights[count] = likeness_by_lightness(*lightness_.at(from[count]) - *lightness_.at(at(column, row)));
       total += weights[count++];
     }
   }

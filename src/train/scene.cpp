@@ -17,11 +17,9 @@ constexpr std::size_t kGrain = 256;  // rays of a parallel piece of work
 /// Colours of the pixels from `first` on, at their luminance, to an image of three interleaved channels.
 void put_colors(const std::vector<Ab>& colors, const std::vector<float>& luminance, std::size_t first,
                 std::vector<float>& image) {
-  parallel_ranges(colors.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Vec3f rgb = linear_rgb_at(luminance[first + i], colors[i]);
-      for (int c = 0; c < 3; ++c) image[3 * (first + i) + std::size_t(c)] = rgb[c];
-    }
+  parallel_each(colors.size(), kGrain, [&](std::size_t i) {
+    const Vec3f rgb = linear_rgb_at(luminance[first + i], colors[i]);
+    for (int c = 0; c < 3; ++c) image[3 * (first + i) + std::size_t(c)] = rgb[c];
   });
 }
 
@@ -120,14 +118,12 @@ class TrainedScene final : public Scene {
     const std::optional<PixelSamples> pixels = relit(*traced, options);
     const std::vector<float> light = pixels ? pixel_luminance(*pixels) : std::vector<float>();
     const Vec3f axis = camera.unit_from_camera.column(2).cast<float>();
-    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) {
-        const RayResult& seen = traced->results()[r];
-        image.luminance[first + r] = pixels ? light[r] : seen.luminance;
-        image.opacity[first + r] = seen.opacity;
-        if (seen.opacity >= 0.5f) {
-          image.depth[first + r] = seen.depth * dot(rays[r].direction, axis) / float(frame().unit_per_world);
-        }
+    parallel_each(rays.size(), kGrain, [&](std::size_t r) {
+      const RayResult& seen = traced->results()[r];
+      image.luminance[first + r] = pixels ? light[r] : seen.luminance;
+      image.opacity[first + r] = seen.opacity;
+      if (seen.opacity >= 0.5f) {
+        image.depth[first + r] = seen.depth * dot(rays[r].direction, axis) / float(frame().unit_per_world);
       }
     });
     if (!image.rgb.empty()) {
@@ -159,15 +155,13 @@ class TrainedScene final : public Scene {
 
   /// Of pixels that show the field alone so far.
   void put_sky_behind(const std::vector<Ray>& rays, std::size_t first, RenderedImage& image) const {
-    parallel_ranges(rays.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) {
-        const std::size_t pixel = first + r;
-        const Vec3f behind = (1 - image.opacity[pixel]) * sky_.along(rays[r].direction);
-        image.opacity[pixel] = 1;
-        image.luminance[pixel] += luminance_of(behind);
-        for (auto* rgb : {&image.rgb, &image.baked_rgb}) {
-          for (int c = 0; c < 3 && !rgb->empty(); ++c) (*rgb)[3 * pixel + std::size_t(c)] += behind[c];
-        }
+    parallel_each(rays.size(), kGrain, [&](std::size_t r) {
+      const std::size_t pixel = first + r;
+      const Vec3f behind = (1 - image.opacity[pixel]) * sky_.along(rays[r].direction);
+      image.opacity[pixel] = 1;
+      image.luminance[pixel] += luminance_of(behind);
+      for (auto* rgb : {&image.rgb, &image.baked_rgb}) {
+        for (int c = 0; c < 3 && !rgb->empty(); ++c) (*rgb)[3 * pixel + std::size_t(c)] += behind[c];
       }
     });
   }

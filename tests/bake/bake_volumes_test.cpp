@@ -214,6 +214,21 @@ TEST(BakeVolume, NothingSeenIsAnInputError) {
   EXPECT_THROW((void)bake_volume(slab(3), {away}, slab_options()), InputError);
 }
 
+/// A camera that sees nothing but a faint layer on dense matter, whose density goes into what is beside it.
+TEST(BakeVolume, ColoursWithoutDensityAreNoVolume) {
+  const AnalyticField field(kBoxFrame, [](Vec3f p) {
+    const bool is_matter = Aabbf{{0.25f, 0.375f, 0.375f}, {0.75f, 0.625f, 0.625f}}.contains(p);
+    const bool is_layer = Aabbf{{0.25f, 0.375f, 0.625f}, {0.75f, 0.625f, 0.6375f}}.contains(p);
+    return is_matter ? 400.0f : is_layer ? 2.0f : 0.0f;  // the layer is a voxel thick
+  });
+  const Camera camera = camera_at("along", {5, 2.0125, 3.2625}, {1, 2.0125, 3.2625}, 64, 64, 12000);
+  Options options = slab_options();
+  options.sharpening = 0;
+  EXPECT_FALSE(bake_volume(field, {camera}, options).voxels.empty());
+  options.sharpening = 1;
+  EXPECT_THROW((void)bake_volume(field, {camera}, options), InputError);
+}
+
 TEST(BakeVolume, DoesNotDependOnTheNumberOfThreads) {
   AnalyticField field(kBoxFrame, sphere_density({0.5f, 0.45f, 0.55f}, 0.2f, 30));
   field.with_luminance([](Vec3f p, Vec3f d) { return p.x + 0.3f * d.y + 0.4f; });

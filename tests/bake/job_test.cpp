@@ -76,6 +76,16 @@ TEST_F(BakeJob, GivesVolumesAndAMeshAndLeavesNoJournal) {
   EXPECT_NE(listener.said.find("24 x 24 x 24 voxels"), std::string::npos) << listener.said;
 }
 
+TEST_F(BakeJob, AMeshThatIsRefusedGivesNoVolumesEither) {
+  Job both = job();
+  both.mesh = MeshOptions{.faces = 500, .texture_size = 8};  // holds one chart at most
+  Kept kept;
+  Listener listener;
+  EXPECT_THROW(run(both, kept, listener), UsageError);
+  EXPECT_TRUE(kept.voxels.empty()) << "they would replace those of a former bake";
+  EXPECT_TRUE(fs::exists(both.journal)) << "a larger texture goes on with it";
+}
+
 TEST_F(BakeJob, GoesOnWhereItWasStopped) {
   Kept whole, full, second;
   Listener listener;

@@ -432,6 +432,55 @@ TEST(Blender, TheAddOnImportsABakeIntoASceneOfItsOwn) {
   EXPECT_EQ(run_blender(folder / "import.py", ""), 0) << read_text_file(folder / "blender.log");
 }
 
+TEST(Blender, AFailedImportLeavesNoScene) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
+  write_file(bake.vdb, "not a VDB");
+  std::ofstream(folder / "import.py") << "import bpy, importlib.util\n"
+                                         "spec = importlib.util.spec_from_file_location('cnerf_bake', r'" +
+                                             bake.blender_setup.string() +
+                                             "')\n"
+                                             "module = importlib.util.module_from_spec(spec)\n"
+                                             "spec.loader.exec_module(module)\n"
+                                             "module.register()\n"
+                                             "try:\n"
+                                             "    bpy.ops.import_scene.cnerf_bake(filepath=r'" +
+                                             bake.manifest.string() +
+                                             "')\n"
+                                             "    assert False\n"
+                                             "except RuntimeError as refused:\n"  // what an operator reports
+                                             "    assert 'block.vdb' in str(refused), refused\n"
+                                             "assert [s.name for s in bpy.data.scenes] == ['Scene']\n"
+                                             "assert bpy.context.window.scene.name == 'Scene'\n";
+  EXPECT_EQ(run_blender(folder / "import.py", ""), 0) << read_text_file(folder / "blender.log");
+}
+
+TEST(Blender, AStudiosColourConfigurationIsNoFailure) {
+  CNERF_REQUIRE_BLENDER();
+  const TempDir folder;
+  const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
+  write_file(folder / "studio.ocio",
+             "ocio_profile_version: 1\n\n"
+             "roles:\n"
+             "  data: linear\n  default: linear\n  default_float: linear\n  reference: linear\n"
+             "  scene_linear: linear\n  color_picking: shown\n  default_byte: shown\n  default_sequencer: shown\n"
+             "  texture_paint: shown\n\n"
+             "displays:\n  studio:\n    - !<View> {name: graded, colorspace: shown}\n\n"
+             "active_displays: [studio]\nactive_views: [graded]\n\n"
+             "colorspaces:\n"
+             "  - !<ColorSpace>\n    name: linear\n    bitdepth: 32f\n\n"
+             "  - !<ColorSpace>\n    name: shown\n    bitdepth: 32f\n"
+             "    to_reference: !<ExponentTransform> {value: [2.2, 2.2, 2.2, 1]}\n");
+  ::setenv("OCIO", (folder / "studio.ocio").c_str(), 1);
+  const int status = run_blender(bake.blender_setup, "");
+  ::unsetenv("OCIO");
+  const std::string log = read_text_file(folder / "blender.log");
+  EXPECT_EQ(status, 0) << log;
+  EXPECT_NE(log.find("no display_device sRGB and no view_transform Standard"), std::string::npos) << log;
+  EXPECT_NE(log.find("shown by studio, graded"), std::string::npos) << log;
+}
+
 TEST(Blender, TheAddOnIsInstalledByBlendersOwnInstaller) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;

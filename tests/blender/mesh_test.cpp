@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <fstream>
+#include <tuple>
+#include <utility>
 
 #include "export/bake_folder.h"
 #include "src/base/files.h"
@@ -55,7 +57,8 @@ Silhouettes compare_silhouettes(const RenderedExr& volume, const RenderedExr& me
   return {double(both) / double(either), std::sqrt(squared / double(both)), either};
 }
 
-class MeshBesideVolume : public testing::TestWithParam<const char*> {};
+/// The axis that points up, metres in a unit.
+class MeshBesideVolume : public testing::TestWithParam<std::pair<const char*, double>> {};
 
 TEST_P(MeshBesideVolume, SilhouettesAndColoursAgree) {
   CNERF_REQUIRE_BLENDER();
@@ -69,7 +72,8 @@ TEST_P(MeshBesideVolume, SilhouettesAndColoursAgree) {
   mesh_options.faces = 12000;
   mesh_options.texture_size = 512;
   Label label;
-  label.world.up_axis = GetParam();  // turns the glTF, and must not turn what Blender shows
+  // Turn and scale the glTF, and must not part what Blender shows.
+  std::tie(label.world.up_axis, label.world.metres_per_unit) = GetParam();
   BakeFolder bake(folder.path(), cameras, label);
   const bake::Volume baked = bake_volume(field, cameras, options);
   bake.add_volumes({planes_of(baked)}, "volume", {});
@@ -87,7 +91,7 @@ TEST_P(MeshBesideVolume, SilhouettesAndColoursAgree) {
     EXPECT_LT(equal.difference, 0.03);
   }
 }
-INSTANTIATE_TEST_SUITE_P(UpAxis, MeshBesideVolume, testing::Values("z", "y"));
+INSTANTIATE_TEST_SUITE_P(UpAxis, MeshBesideVolume, testing::Values(std::pair("z", 1.0), std::pair("y", 0.5)));
 
 TEST(BlenderMesh, UsesOfTheMesh) {
   CNERF_REQUIRE_BLENDER();

@@ -81,6 +81,13 @@ TEST_F(ExecColorizer, APromptReachesTheProgramAsOneWordWhateverIsInIt) {
   options.prompt = prompt;
   EXPECT_EQ(make_colorizer(options)->colorize(some_question()).ab[0], 42);
 
+  options.prompt = "a {prompt} of a fox";
+  options.spec = command(R"(
+    same = sys.argv[1:] == ['a {prompt} of a fox'] * 2
+    put(0, (B, 2, H, W), [42.0 if same else -42.0] * (2 * B * H * W))
+)") + " {prompt} {prompt}";
+  EXPECT_EQ(make_colorizer(options)->colorize(some_question()).ab[0], 42) << "each place, and not what stands there";
+
   options.spec = command(kGoodAnswer);
   EXPECT_THAT(message_of<UsageError>([&] { (void)make_colorizer(options); }), HasSubstr("--prompt"));
 }

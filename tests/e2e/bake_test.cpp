@@ -39,6 +39,20 @@ TEST(Bake, InterruptedOnesGoOnToTheSameBytes) {
   EXPECT_EQ(files_below(folder / "parts"), files_below(folder / "whole"));
 }
 
+TEST(Bake, AMeshThatIsRefusedReplacesNothing) {
+  const TempDir folder;
+  ASSERT_EQ(cnerf(bake_into(folder / "bake")).exit_code, 0);
+  std::vector<std::string> files = files_below(folder / "bake");
+  const auto manifest = read_binary_file(folder / "bake/manifest.json");
+  const std::vector<std::string> refused_mesh{"--format", "vdb,gltf", "--texture-size", "64", "--overwrite"};
+  const ProgramResult refused = cnerf(concatenated(bake_into(folder / "bake"), refused_mesh));
+  EXPECT_EQ(refused.exit_code, 64) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("hold no atlas"));
+  EXPECT_TRUE(read_binary_file(folder / "bake/manifest.json") == manifest);
+  files.emplace_back("unfinished.bake");
+  EXPECT_THAT(files_below(folder / "bake"), testing::UnorderedElementsAreArray(files));
+}
+
 TEST(Bake, OtherOptionsBeginAnew) {
   for (const std::string option : {"bake.opacity_threshold=0.01", "bake.opacity_threshold=0.02", "finish.exposure=1"}) {
     const TempDir folder;

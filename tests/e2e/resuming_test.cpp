@@ -130,6 +130,38 @@ TEST(Resuming, ARunLeavesTakesAloneThatOtherCommandsBegan) {
   EXPECT_EQ(nlohmann::json::parse(read_text_file(run / "run.json"))["current_take"], "reference");
 }
 
+TEST(Resuming, OtherOptionsForAFinishedStepAreToldAndNotWrittenDown) {
+  const TempDir folder;
+  const fs::path run = folder / "run";
+  const auto arguments =
+      concatenated({"run", tiny_capture().string(), "-o", run.string(), "--colorizer", "reference:references"},
+                   concatenated(tiny_options(), {"--set", "render.frames=2"}));
+  const ProgramResult first = cnerf(arguments);
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  const auto resumed_with = [&](const std::vector<std::string>& settings) {
+    std::vector<std::string> all = concatenated(arguments, {"--resume"});
+    for (const std::string& setting : settings) all = concatenated(all, {"--set", setting});
+    return cnerf(all);
+  };
+  const std::string config = read_text_file(run / "config.toml");
+  const ProgramResult resumed =
+      resumed_with({"stage2.patches=7", "colorizer.reference_steps=21", "bake.resolution=24", "render.frames=3"});
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  const std::string said = resumed.out + resumed.err;
+  for (const std::string told :
+       {"take reference is there and stays; stage2.patches is for: cnerf colorize", "colorizer.reference_steps is for",
+        "the bake is there and stays; bake.resolution is for: cnerf bake",
+        "the video is there and stays; render.frames is for: cnerf render"}) {
+    EXPECT_THAT(said, HasSubstr(told));
+  }
+  EXPECT_EQ(read_text_file(run / "config.toml"), config) << "of what the run was made with";
+  EXPECT_THAT(resumed_with({}).out, testing::Not(HasSubstr("stays;")));
+
+  fs::remove_all(run / "bakes");
+  ASSERT_EQ(resumed_with({"bake.resolution=24"}).exit_code, 0);
+  EXPECT_THAT(read_text_file(run / "config.toml"), HasSubstr("resolution = 24")) << "what is not there is made so";
+}
+
 TEST(Resuming, OnOtherViewsIsRefusedAndChangesNothing) {
   const TempDir folder;
   const fs::path run = copied(tiny_run(), folder / "run");

@@ -19,13 +19,15 @@ using testing::HasSubstr;
 TEST(Web, ABakeForBrowsersIsABundleWithPhotographs) {
   const TempDir folder;
   const fs::path bake = folder / "bake";
-  const std::vector<std::string> arguments{"bake", tiny_run().string(), "--format",         "web",
-                                           "-o",   bake.string(),       "--web-resolution", "24"};
+  const std::vector<std::string> arguments{
+      "bake",        tiny_run().string(), "--format", "web",       "-o",
+      bake.string(), "--web-resolution",  "24",       "--capture", (tiny_capture() / "").string()};
   const ProgramResult result = cnerf(arguments);
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("graphics memory")) << "what the browser will need";
   EXPECT_THAT(result.out, HasSubstr("cnerf view")) << "and what to do is said";
   const auto json = nlohmann::json::parse(read_text_file(bake / "web" / "bundle.json"));
+  EXPECT_EQ(json.at("title"), tiny_capture().filename().string()) << "with a slash at the end of its path too";
   EXPECT_EQ(json.at("cameras").size(), 9u);
   for (const auto& file : json.at("files")) {
     const auto content = read_binary_file(bake / "web" / file.at("name").get<std::string>());
@@ -80,6 +82,9 @@ TEST(Web, WhatCannotBeShownIsSaidByName) {
   EXPECT_EQ(damaged.exit_code, 65);
   EXPECT_THAT(damaged.err, HasSubstr("manifest.json"));
   EXPECT_EQ(cnerf({"bake", tiny_run().string(), "--format", "web,webb"}).exit_code, 64);
+  const ProgramResult take = cnerf({"view", tiny_bake().string(), "--take", "warm"});
+  EXPECT_EQ(take.exit_code, 64);
+  EXPECT_THAT(take.err, HasSubstr("--take: is for a run"));
 }
 
 TEST(Web, ABakeIsRenderedFromItsVoxels) {

@@ -37,6 +37,14 @@ LuminanceEngineOptions small_engine() {
   return options;
 }
 
+TEST(ImageMemory, OfADeviceIsNoMoreThanItHasFree) {
+  constexpr std::size_t kGiB = std::size_t(1) << 30;
+  EXPECT_EQ(image_memory_on_device(2 * kGiB, 80 * kGiB), 2 * kGiB);
+  EXPECT_LT(image_memory_on_device(16 * kGiB, 8 * kGiB), 8 * kGiB);
+  EXPECT_GT(image_memory_on_device(16 * kGiB, 8 * kGiB), 4 * kGiB);
+  EXPECT_EQ(image_memory_on_device(kGiB, 0), 0u);
+}
+
 /// The loss of the engine's next step, as a function of its parameters, in double.
 class LossInDouble {
  public:

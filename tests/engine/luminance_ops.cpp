@@ -30,6 +30,7 @@ struct Problem {
   bool learns_views = false;
   bool with_sky = false;
   float depth_weight = 0;
+  int samples_per_step = 8192;
 };
 
 /// Views, options, and engines that share a state that the generic processor trained.
@@ -56,7 +57,7 @@ class Scene {
     options_.occupancy.resolution = 32;
     options_.cascades = problem.cascades;
     options_.march = march_settings(problem.cascades, 64, 1.0 / 64);
-    options_.samples_per_step = 8192;
+    options_.samples_per_step = problem.samples_per_step;
     options_.distortion_weight = problem.distortion_weight;
     if (problem.with_sky) sky_.show_to(views_);
     options_.depth.weight = problem.depth_weight;
@@ -286,6 +287,21 @@ Op stage1(const Problem& problem) {
   return op;
 }
 
+/// A step has some rays at least, with all of their samples, however few it aims at.
+Op stage1_of_few_samples(const Problem& problem) {
+  const auto scene = std::make_shared<Scene>(problem);
+  Op op;
+  op.name = problem.name;
+  op.run = [scene](const Backend& backend) -> std::vector<Result> {
+    const StepReport report = gradients_of_next_step(*scene->trained(backend, 40)).report;
+    return {{"rays", {double(report.rays)}},
+            {"trained samples", {double(report.trained_samples)}},
+            {"loss", {report.loss}}};
+  };
+  op.bounds = {{"rays", 0, 0}, {"trained samples", 1e-3, 1e-2}, {"loss", 1e-3, 1e-2}};
+  return op;
+}
+
 /// Engines that share a step find the gradients of one that has it alone, and stay equal.
 /// @param parts  that a grid's rows can be dealt out to, or not
 Op stage1_shared(const Problem& problem, int parts) {
@@ -416,6 +432,12 @@ std::vector<Op> luminance_ops() {
         stage1({"Stage1WithLearnedViews", 8, 14, 64, 2, false, true, true, 0, true}),
         stage1({"Stage1WithSky", 8, 14, 64, 2, false, false, true, 0.1f, true, true}),
         stage1({"Stage1WithDepth", 8, 14, 64, 2, false, false, false, 0.1f, false, false, 0.1f}),
+        stage1_of_few_samples({.name = "Stage1OfFewSamples",
+                               .levels = 8,
+                               .log2_rows = 14,
+                               .finest = 64,
+                               .cascades = 1,
+                               .samples_per_step = 512}),
         stage1_shared({"Stage1Shared", 8, 14, 64, 2, false, true, true, 0.1f, true}, 3),
         stage1_shared({"Stage1SharedInPieces", 8, 14, 64, 2, false, true, true, 0.1f, true}, 2),
         stage1_learning({"Stage1Learns", 8, 14, 64, 1, false, false, true}),

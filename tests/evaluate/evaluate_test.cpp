@@ -148,6 +148,9 @@ TEST(Evaluate, NetworksSeeTheTruthWhereMasksAre) {
   ASSERT_EQ(encoder.seen.size(), 2u) << "ours and the truth";
   const auto &ours = encoder.seen[0], &truth = encoder.seen[1];
   for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_EQ(ours[i] == truth[i], i / 3 != 1) << i;
+  view.image.mask[1] = 0;
+  (void)evaluate_views(PaintedScene(linear_from_srgb(0.3f), true), std::vector<const View*>{&view}, options);
+  EXPECT_EQ(encoder.seen.size(), 2u) << "where all is masked, there is nothing to be alike";
 }
 
 TEST(Evaluate, MaskedPixelsDoNotCount) {

@@ -139,6 +139,25 @@ INSTANTIATE_TEST_SUITE_P(Axes, CameraTracksUp,
                          testing::Values(std::pair("z", "poses"), std::pair("y", "poses"), std::pair("x", "poses"),
                                          std::pair("z", "y"), std::pair("y", "z"), std::pair("x", "y")));
 
+/// UsdGeomCamera: "in tenths of a world unit", so that they are millimetres where a unit is a centimetre.
+TEST(CameraTracks, LensesInUsdAreTenthsOfAUnit) {
+  const TempDir folder;
+  const bake::Camera camera = cameras().front();
+  const double focal_mm = 36 * camera.intrinsics.fx / camera.intrinsics.width;
+  for (const double metres_per_unit : {0.01, 1.0}) {
+    Label label = label_of_first();
+    label.world.metres_per_unit = metres_per_unit;
+    write_cameras_usd({camera}, {}, label, folder / "cameras.usda");
+    const std::string usd = read_text_file(folder / "cameras.usda");
+    const double millimetres = 100 * metres_per_unit;  // in a tenth of a unit
+    for (const UsdCamera& found : {still_in(usd, "camera_shot_12"), frame_in(usd, 12)}) {
+      EXPECT_NEAR(millimetres * found.lens.at("horizontalAperture"), 36, 1e-9) << metres_per_unit;
+      EXPECT_NEAR(millimetres * found.lens.at("focalLength"), focal_mm, 1e-9) << metres_per_unit;
+      EXPECT_NEAR(millimetres * found.lens.at("horizontalApertureOffset"), -36 * 3 / 64.0, 1e-9) << metres_per_unit;
+    }
+  }
+}
+
 /// R = Ry Rx Rz, as Nuke's order ZXY says.
 Mat3d rotation_zxy(Vec3d degrees) {
   const Vec3d r = degrees * (std::numbers::pi / 180);

@@ -117,6 +117,33 @@ TEST(Gltf, CamerasLookWhereTheCaptureDid) {
   }
 }
 
+TEST(Gltf, LengthsAreMetres) {
+  const TempDir folder;
+  const bake::Mesh mesh = tetrahedron();
+  GltfScene scene = scene_for(mesh);
+  const tinygltf::Model plain = load(write_gltf(mesh, scene, folder.path(), "mesh").glb);
+  scene.label.world.metres_per_unit = 0.5;
+  const tinygltf::Model model = load(write_gltf(mesh, scene, folder.path(), "mesh").glb);
+  const auto values = [](const tinygltf::Model& of, const char* name) {
+    return floats_of(of, of.meshes[0].primitives[0].attributes.at(name));
+  };
+  std::vector<float> halved = values(plain, "POSITION");
+  for (float& value : halved) value /= 2;
+  EXPECT_EQ(values(model, "POSITION"), halved);
+  EXPECT_EQ(values(model, "NORMAL"), values(plain, "NORMAL"));
+  const int positions = model.meshes[0].primitives[0].attributes.at("POSITION");
+  EXPECT_EQ(model.accessors[std::size_t(positions)].maxValues, (std::vector<double>{1, 3, -1}));
+  for (std::size_t node = 1; node < 3; ++node) {
+    EXPECT_EQ(model.nodes[node].rotation, plain.nodes[node].rotation);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_EQ(model.nodes[node].translation[axis], plain.nodes[node].translation[axis] / 2);
+    }
+  }
+  EXPECT_EQ(model.cameras[0].perspective.yfov, plain.cameras[0].perspective.yfov);
+  EXPECT_EQ(model.cameras[0].perspective.znear, plain.cameras[0].perspective.znear / 2);
+  EXPECT_EQ(model.cameras[0].perspective.zfar, plain.cameras[0].perspective.zfar / 2);
+}
+
 TEST(Gltf, CamerasSeeTheWholeOfAMeshFarFromThem) {
   const TempDir folder;
   bake::Mesh mesh = tetrahedron();
@@ -157,7 +184,9 @@ TEST(Gltf, ABrokenMeshIsRefusedAndLeavesNothing) {
 
 TEST(BakeFolder, TheManifestNamesEverythingThatWasWritten) {
   const TempDir folder;
-  BakeFolder bake(folder.path(), two_cameras(), label_of_first("y", "metres"));
+  Label label = label_of_first("y", "feet");
+  label.world.metres_per_unit = 0.3048;
+  BakeFolder bake(folder.path(), two_cameras(), label);
   const bake::Volume volume = block_volume({4, 5, 6}, {12, 13, 14}, 2);
   bake.add_volumes({planes_of(volume)}, "volume", {});
   bake.add_mesh(tetrahedron(), "mesh", true);
@@ -176,8 +205,8 @@ TEST(BakeFolder, TheManifestNamesEverythingThatWasWritten) {
   EXPECT_EQ(manifest.mesh->faces, 4u);
   EXPECT_EQ(manifest.mesh->bounds.min, (Vec3d{1, 2, 3}));
   EXPECT_EQ(manifest.mesh->bounds.max, (Vec3d{2, 4, 6}));
-  EXPECT_EQ(manifest.mesh->gltf_from_world, turned_up("y", "y"));
-  EXPECT_EQ(manifest.label.world.units, "metres");
+  EXPECT_EQ(manifest.mesh->gltf_from_world, (Affined{Mat3d::identity() * 0.3048, {}}));
+  EXPECT_EQ(manifest.label.world.units, "feet");
   const auto json = nlohmann::json::parse(read_text_file(bake.manifest()));
   EXPECT_EQ(json["mesh"]["textures"]["rgb"]["space"], "lin_rec709");
   EXPECT_TRUE(json["mesh"].contains("world_from_gltf"));

@@ -262,16 +262,26 @@ TEST(Vdb, SummaryDescribesEveryGrid) {
   ASSERT_EQ(color.max_value.size(), 3u);
   EXPECT_NEAR(color.max_value[1], 0.5, 1e-3);
   EXPECT_EQ(summary_named(summary, "lab_b").min_value.at(0), -31.25);
+  for (const VdbGridSummary& grid : summary.grids) {  // what is known of a grid without reading it
+    EXPECT_EQ(grid.metadata.at("file_voxel_count"), "1730") << grid.name;
+    EXPECT_EQ(grid.metadata.at("file_bbox_min"), "[1, 2, 3]") << grid.name;
+    EXPECT_EQ(grid.metadata.at("file_bbox_max"), "[14, 15, 16]") << grid.name;
+  }
 }
 
 TEST(Vdb, EveryCompressionReadsBack) {
   const TempDir folder;
+  std::map<std::string, std::uintmax_t> bytes;
   for (const char* compression : {"blosc", "zip", "none"}) {
     VdbOptions options;
     options.compression = compression;
     write_dilated(block(), folder / "a.vdb", options);
     EXPECT_EQ(read_vdb(folder / "a.vdb").voxels.size(), 12u * 12 * 12 + 2) << compression;
+    EXPECT_EQ(read_grids(folder / "a.vdb").size(), 5u) << "by OpenVDB's own reader";
+    bytes[compression] = fs::file_size(folder / "a.vdb");
   }
+  EXPECT_LT(bytes["zip"] + 10'000, bytes["none"]) << "of 24 kB of values; the rest is masks";
+  EXPECT_LT(bytes["blosc"], bytes["none"]);
 }
 
 TEST(Vdb, RefusesValuesThatAreNone) {

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+
 #include "src/base/rng.h"
 #include "src/field/cpu/mlp_kernels.h"
 #include "tests/support/finite_difference.h"
@@ -124,6 +127,22 @@ TEST_P(MlpBackends, EqualReference) {
   } else {
     EXPECT_LT(test::relative_distance(d_w, expected_d_w), 2e-6);
   }
+}
+
+/// A training that diverges is found by what its last layer says.
+TEST_P(MlpBackends, WhatIsNoNumberStaysSo) {
+  const auto [isa, n] = GetParam();
+  const test::ScopedIsa scope(isa);
+  constexpr int kIn = 12, kOut = 20, kLost = 7;
+  const std::vector<double> values = random_values(std::size_t(kIn) * kOut, 6);
+  std::vector<float> w_transposed(values.begin(), values.end());
+  w_transposed[3 * kOut + kLost] = std::numeric_limits<float>::quiet_NaN();
+  const AlignedVector<float> in_groups = to_groups(random_values(n * kIn, 7), kIn, 0.0f);
+  const std::size_t groups = groups_of(n);
+  AlignedVector<float> out(groups * kOut * kGroup);
+  mlp_kernels().forward(w_transposed.data(), kIn, kOut, in_groups.data(), kIn, out.data(), kOut, groups, false);
+  const std::vector<float> found = from_groups(out, kOut, n);
+  for (std::size_t i = 0; i < found.size(); ++i) ASSERT_EQ(std::isnan(found[i]), i % kOut == kLost) << i;
 }
 
 INSTANTIATE_TEST_SUITE_P(

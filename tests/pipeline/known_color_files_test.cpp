@@ -93,6 +93,47 @@ TEST_F(KnownColorFiles, APhotographIsTurnedAsTheViewIs) {
   EXPECT_LT(known.ab[10 * 40 + 5].b, -40) << "the view itself is read as it is stored";
 }
 
+TEST_F(KnownColorFiles, AnUprightPictureIsLaidAsTheViewsPixelsAre) {
+  View& view = capture_.views[0];
+  view.image_file = folder_ / "photo.jpg";
+  ColorizerOptions config;
+  config.keyframes = "a=" + at("upright.png");
+  cv::Mat3b upright(20, 40, cv::Vec3b(200, 30, 30));       // B G R
+  upright.colRange(0, 20).setTo(cv::Scalar(30, 30, 200));  // red on the left
+  ASSERT_TRUE(cv::imwrite(at("upright.png"), upright));
+  for (int orientation = 2; orientation <= 8; ++orientation) {
+    write_file(view.image_file, test::turned_photograph(orientation));
+    const prepare::Upright grid = {orientation, orientation > 4 ? 20 : 40, orientation > 4 ? 40 : 20};
+    view.intrinsics.width = grid.stored_width, view.intrinsics.height = grid.stored_height;
+    const KnownColors known = load_known_colors(capture_, config).known.at(0);
+    ASSERT_EQ(known.width, grid.stored_width) << orientation;
+    EXPECT_GT(known.ab[grid.stored_index(5, 10)].b, 20) << "red, orientation " << orientation;
+    EXPECT_LT(known.ab[grid.stored_index(35, 10)].b, -40) << "blue, orientation " << orientation;
+  }
+}
+
+TEST_F(KnownColorFiles, AViewsOwnNameMeansItBeforeTheNamesOfOthersFiles) {
+  capture_.views[0].name = "a.png";
+  capture_.views[1].name = "left/a.png";
+  EXPECT_EQ(view_called(capture_, "a.png", "--hint"), 0u);
+  EXPECT_EQ(view_called(capture_, "left/a.png", "--hint"), 1u);
+  EXPECT_EQ(view_called(capture_, "left_a", "--hint", {"a", "left_a", "held"}), 1u);
+  EXPECT_THAT([&] { (void)view_called(capture_, "a", "--hint"); },
+              ::testing::ThrowsMessage<UsageError>(HasSubstr("--hint: 2 views of the capture are called a;")));
+  EXPECT_THAT([&] { (void)view_called(capture_, "b", "--hint"); },
+              ::testing::ThrowsMessage<UsageError>(HasSubstr("no views of the capture are called b")));
+}
+
+TEST_F(KnownColorFiles, ADotHasAPlace) {
+  ColorizerOptions config;
+  for (const char* number : {"nan", "inf", "-inf"}) {
+    config.hints = std::string(number) + ",5,a,#ff0000";
+    EXPECT_THAT(refusal<UsageError>(config), HasSubstr(number)) << number;
+    config.hints = "5," + std::string(number) + ",a,#ff0000";
+    EXPECT_THAT(refusal<UsageError>(config), HasSubstr("for a number")) << number;
+  }
+}
+
 /// Else each would run over those before it.
 TEST_F(KnownColorFiles, DotsOfOneViewAreOneSource) {
   ColorizerOptions config;

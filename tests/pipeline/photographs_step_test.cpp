@@ -17,6 +17,7 @@
 #include "src/pipeline/train_step.h"
 #include "src/sample/sample_scene.h"
 #include "tests/support/data.h"
+#include "tests/support/exif_jpeg.h"
 #include "tests/support/tiny_config.h"
 
 namespace cnerf::pipeline {
@@ -174,6 +175,21 @@ TEST_F(Photographs, OfTheSameNameGetThatOfTheirView) {
               ThrowsMessage<UsageError>(HasSubstr("2 views of the capture are called view_001")));
   EXPECT_THAT([&] { (void)written(job); }, ThrowsMessage<InputError>(HasSubstr("other ones")))
       << "of another capture than the context's";
+}
+
+TEST_F(Photographs, StandUprightWhereTheCaptureHoldsThemAsTheyAreStored) {
+  const fs::path changed = out_ / "capture";
+  fs::copy(capture(), changed, fs::copy_options::recursive);
+  const RunContext context = run(changed);
+  cv::Mat3b stored(72, 96, cv::Vec3b(40, 40, 40));
+  stored.colRange(0, 48).setTo(cv::Scalar(200, 200, 200));  // bright on the left
+  write_file(changed / "images/view_001.png", test::jpeg_with(test::exif_block(6), stored));
+  const PhotographsJob job{"vivid", {"view_001"}, out_ / "p", {}, changed};
+  const std::vector<fs::path> files = photographs_step(context, job, cpu_engines(), silent());
+  const cv::Mat written = cv::imread(files.at(0).string(), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+  ASSERT_EQ(written.size(), cv::Size(72, 96));
+  const double top = cv::mean(written.rowRange(0, 40))[0], bottom = cv::mean(written.rowRange(56, 96))[0];
+  EXPECT_GT(top, 2 * bottom) << "orientation 6: the left of what is stored is the top";
 }
 
 /// Cancels once one photograph is written.

@@ -1,6 +1,7 @@
 """The Python module.  cnerf_test.py CLASS, with CNERF_PROGRAM, CNERF_CAPTURE and CNERF_FOLDER."""
 
 import ast
+import functools
 import json
 import logging
 import os
@@ -12,6 +13,7 @@ import sys
 import tempfile
 import threading
 import time
+import types
 import unittest
 
 import cnerf
@@ -229,6 +231,32 @@ class Stopping(Folder):
 
         with self.assertRaisesRegex(ZeroDivisionError, "of the callback"):
             cnerf.train(CAPTURE, self.folder / "run", settings=TINY, progress=progress)
+        shutil.copytree(FOLDER / "run", self.folder / "coloured")
+        with self.assertRaisesRegex(ZeroDivisionError, "of the callback"):
+            cnerf.open_run(self.folder / "coloured").bake(self.folder / "bake", progress=progress)
+        self.assertFalse((self.folder / "bake/volume.vdb").exists())
+
+    def test_what_a_callback_raises_stops_its_own_step_only(self):
+        raised = []
+
+        def failing(task, fraction, figures):
+            raise ZeroDivisionError("of the callback")
+
+        def train_and_fail():
+            try:
+                cnerf.train(CAPTURE, self.folder / "failing", settings=TINY, progress=failing)
+            except ZeroDivisionError as error:
+                raised.append(error)
+
+        def progress(task, fraction, figures):
+            if not other.ident:
+                other.start()
+            other.join()
+
+        other = threading.Thread(target=train_and_fail)
+        run = cnerf.train(CAPTURE, self.folder / "run", settings=TINY, progress=progress)
+        self.assertEqual(len(raised), 1)
+        self.assertEqual(len(run.cameras), 9)
 
     def test_ctrl_c_reaches_a_plug_in(self):
         """LibTorch's plug-in has a copy of its own of what remembers Ctrl-C."""
@@ -270,6 +298,13 @@ class Errors(Folder):
     def test_going_on_and_overwriting_at_once_are_refused(self):
         arguments = {"settings": TINY, "resume": True, "overwrite": True}
         self.refused(cnerf.UsageError, cnerf.train, CAPTURE, self.folder / "run", **arguments)
+
+    def test_settings_may_be_any_mapping(self):
+        run = cnerf.open_run(FOLDER / "run")
+        self.assertTrue(run.scene(settings=types.MappingProxyType(TINY)).colorizer)
+        wrong = types.MappingProxyType({"stage1.stepz": 5})
+        for call in (run.scene, run.colorize, run.bake, functools.partial(cnerf.train, CAPTURE, self.folder / "run")):
+            self.assertIn("stage1.steps", str(self.refused(cnerf.UsageError, call, settings=wrong)))
 
     def test_damaged_bakes_are_refused(self):
         shutil.copytree(FOLDER / "bake", self.folder / "bake")

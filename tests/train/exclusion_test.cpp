@@ -80,6 +80,30 @@ TEST_F(Exclusion, WhatNoViewSeesIsLeftOut) {
   EXPECT_TRUE(is_left_out({0, 0, 3.5}));
 }
 
+/// Side by side, before what they look at.
+class WideFisheyes : public Exclusion {
+ protected:
+  WideFisheyes() : Exclusion(wide_fisheyes()) {}
+
+  /// Each shows all that is up to 99 degrees from its axis, in the corners of its picture.
+  static Capture wide_fisheyes() {
+    Capture capture = test::toy_capture(7);
+    for (int i = 0; i < 7; ++i) {
+      View& view = capture.views[std::size_t(i)];
+      const double y = i - 3;
+      view.intrinsics.model = LensModel::kOpenCvFisheye;
+      view.intrinsics.fx = view.intrinsics.fy = 9;
+      view.world_from_camera = test::look_at({0, 0.1 * y, 0}, {3, 0.12 * y, 0.01 * y});
+    }
+    return capture;
+  }
+};
+TEST_F(WideFisheyes, WhatTheySeeBesideThemStays) {
+  EXPECT_FALSE(is_left_out({1, 0, 0}));
+  EXPECT_FALSE(is_left_out({-0.08, 1, 0})) << "in the rim of a picture";
+  EXPECT_TRUE(is_left_out({-0.2, 0, 0})) << "behind all of them";
+}
+
 /// With few views there is nobody to agree.
 class FewViews : public Exclusion {
  protected:

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "src/base/error.h"
 #include "src/train/chroma/likeness.h"
@@ -336,6 +338,32 @@ TEST(ColorsEverywhere, APixelIsJudgedWithThoseOfItsSurface) {
     EXPECT_EQ(claims[p].list[0].color.a, expected.a) << "pixel " << p;
     EXPECT_EQ(claims[p].cost() <= 0, p == 5) << "pixel " << p;
   }
+}
+
+/// Which would cost a painted picture as much time as it has colours.
+TEST(ColorsEverywhere, OfManyColorsThoseNearOneAnotherAreOne) {
+  const CachedView view = look(0.45f, false);
+  KnownColors strokes = stroke_at(0, 0, {0, 0});
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth / 2; ++x) put(strokes, x, y, {float(x), float(y)});
+  }
+  std::vector<float> surface;
+  for (const auto& sample : view.samples) surface.push_back(sample.t);
+  const StrokesEverywhere everywhere(running_colors(strokes), view, surface);
+  const PixelLooks looks(view, surface);
+  std::set<std::pair<float, float>> colors;
+  for (std::uint32_t p = 0; p < view.samples.size(); ++p) {
+    Claims claims;
+    everywhere.claim_alike(view.camera.ray_of_pixel(p), looks, p, claims);
+    for (const Claims::Claim& claim : claims.list) colors.emplace(claim.color.a, claim.color.b);
+    const int x = int(p % kWidth), y = int(p / kWidth);
+    if (x >= kWidth / 2) continue;
+    EXPECT_NEAR(claims.list[0].color.a, float(x), 12) << "pixel " << p;
+    EXPECT_NEAR(claims.list[0].color.b, float(y), 12) << "pixel " << p;
+    EXPECT_EQ(everywhere.claims()[p].mixed(50).a, float(x)) << "what is painted stays";
+  }
+  EXPECT_LE(colors.size(), 64u);
+  EXPECT_GE(colors.size(), 12u);
 }
 
 /// A painted picture may have more colours than there is time to smooth.

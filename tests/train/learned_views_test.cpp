@@ -56,6 +56,26 @@ TEST(LuminanceModel, CanBeAsBrightAsPicturesAreAtOneExposureButForWhatIsMasked) 
   EXPECT_GT(most_of(capture), 1);
 }
 
+TEST(LuminanceModel, RefusesMoreSamplesOfARayThanAreLookedAt) {
+  const Capture boxed = test::toy_capture(6, 24, 20, true), open = test::toy_capture(6);
+  const auto create = [](const Capture& capture, int steps_per_box, double cone_angle) {
+    Stage1Options options;
+    options.grid = {.levels = 2, .log2_rows = 8, .coarsest_resolution = 4, .finest_resolution = 16};
+    options.occupancy.resolution = 16;
+    options.steps_per_box = steps_per_box;
+    options.cone_angle = cone_angle;
+    return LuminanceModel::create(capture, options, cpu_engines()).frame.cascades;
+  };
+  constexpr double kUsual = 1.0 / 64;
+  EXPECT_EQ(create(boxed, 591, kUsual), 1);
+  EXPECT_THAT([&] { (void)create(boxed, 592, kUsual); },
+              testing::ThrowsMessage<UsageError>(testing::AllOf(HasSubstr("stage1.steps_per_box: "), HasSubstr("1024"),
+                                                                HasSubstr("592"), HasSubstr("1026"))));
+  EXPECT_EQ(create(open, 2048, kUsual), 3) << "whose steps grow";
+  EXPECT_THAT([&] { (void)create(open, 2048, 1e-3); },
+              testing::ThrowsMessage<UsageError>(HasSubstr("stage1.cone_angle")));
+}
+
 TEST(LearnedViews, NeighboursTellTheExposureOfAViewThatWasHeldOut) {
   Capture capture = clip();
   const std::vector<float> before = {0, 0.1f, 0.2f, 0.4f, 0.5f, 0.6f};
@@ -195,6 +215,22 @@ TEST_F(StoredViews, TellWhatTheyAreAndNameCamerasThatMustBeWrong) {
   model.save(job_.snapshot);
   EXPECT_THAT(apply_learned_views(capture_, job_.snapshot),
               testing::Contains(HasSubstr("wrong, by the look of it: toy4")));
+}
+
+/// It is not in proportion to all of the boxes around a scene.
+TEST_F(StoredViews, NameCamerasThatMovedFarInTheInnermostBox) {
+  const auto lines_of = [&](float share) {
+    auto model = LuminanceModel::load(job_.snapshot, cpu_engines());
+    EXPECT_EQ(model.frame.cascades, 3);
+    const float side = 0.25f;                                                              // of the innermost box
+    test::floats_of(model.engine->state(), "views")[kViewNumbers * 3 + 4] = share * side;  // of the fifth view
+    model.engine->state_loaded();
+    model.save(folder_ / "moved.snapshot");
+    Capture copy = capture_;
+    return apply_learned_views(copy, folder_ / "moved.snapshot");
+  };
+  EXPECT_THAT(lines_of(0.01f), testing::Not(testing::Contains(HasSubstr("wrong"))));
+  EXPECT_THAT(lines_of(0.03f), testing::Contains(HasSubstr("wrong, by the look of it: toy4")));
 }
 
 TEST_F(StoredViews, LieBesideOptionsThatHoldTheirNumbers) {

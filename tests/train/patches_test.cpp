@@ -97,6 +97,20 @@ TEST(NearPatch, LiesInTheViewAndShowsMostOfTheSamePlace) {
   EXPECT_GE(lefts.size(), 4u) << "they differ";
 }
 
+TEST(RandomPatch, OfAViewOfOneRowIsAPixel) {
+  const std::vector<CachedView> views = {some_view(80, 1)};
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    const PatchPlace place = random_patch(views, 0, {0.3, 0.7}, 7, i), other = near_patch(views, place, 7, i);
+    for (const PatchPlace& one : {place, other}) {
+      EXPECT_EQ(one.side, 1);
+      EXPECT_EQ(one.top, 0);
+      ASSERT_TRUE(one.left >= 0 && one.left < 80);
+    }
+  }
+  const PatchPlace place = random_patch(views, 0, {0.3, 0.7}, 7, 1);
+  EXPECT_EQ(render_patch(views[0], place, 4).lightness.size(), 16u);
+}
+
 TEST(RenderPatch, AveragesLightNotLightness) {
   CachedView view = some_view(8, 8);
   for (std::size_t i = 0; i < view.luminance.size(); ++i) view.luminance[i] = i % 2 == 0 ? 0.0f : 1.0f;

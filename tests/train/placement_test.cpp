@@ -24,7 +24,7 @@ TEST(Placement, TakesTheCentreThatIsGiven) {
   EXPECT_EQ(given.world_centre.z, 0.3);
   EXPECT_EQ(given.cascades, 2);
   EXPECT_EQ(given.unit_per_world, chosen.unit_per_world);
-  for (const char* text : {"1,2", "1,2,x", "1,2,3,4", "1 2 3"}) {
+  for (const char* text : {"1,2", "1,2,x", "1,2,3,4", "1 2 3", "nan,0,0", "0,inf,0", "0,0,1e999"}) {
     EXPECT_THROW((void)place_scene(capture, {.cascades = 0, .centre = text}), UsageError) << text;
   }
 }
@@ -41,6 +41,20 @@ Capture wall() {
   Capture capture;
   for (int i = -3; i <= 3; ++i) capture.views.push_back(view_at({0, 0.1 * i, 0}, {3, 0.12 * i, 0.01 * i}));
   return capture;
+}
+
+TEST(Placement, OfCamerasSideBySideKnowsNoUnitOfLength) {
+  const auto placed = [](double scale) {
+    Capture capture;
+    for (int i = -3; i <= 3; ++i) {
+      capture.views.push_back(view_at(Vec3d{0, 0.1 * i, 0} * scale, Vec3d{3, 0.1 * i, 0} * scale));
+    }
+    return place_scene(capture, {});
+  };
+  const SceneFrame small = placed(1), large = placed(100);
+  EXPECT_NEAR(100 * large.unit_per_world, small.unit_per_world, 1e-6 * small.unit_per_world);
+  EXPECT_NEAR(length(large.world_centre - 100.0 * small.world_centre), 0, 1e-6);
+  EXPECT_EQ(large.cascades, small.cascades);
 }
 
 /// Cameras on a circle that look outward, as from the middle of a room.
@@ -128,6 +142,51 @@ TEST(Placement, OfAnObjectKnowsNoSilhouetteThatIsHeldOut) {
   view.image.alpha.assign(view.image.pixel_count(), 0);
   EXPECT_EQ(place_scene(capture, {}), frame);
   view.held_out = false;
+  EXPECT_FALSE(place_scene(capture, {}) == frame) << "the measure can fail";
+}
+
+/// Eight cameras around a block that bears a pole, one pixel wide.
+Capture block_with_pole(Vec3d pole) {
+  constexpr int kSide = 400;
+  Capture capture;
+  capture.is_bounded_object = true;
+  for (int i = 0; i < 8; ++i) {
+    const double angle = 0.25 * i * std::numbers::pi;
+    View& view = capture.views.emplace_back(view_at({3 * std::cos(angle), 3 * std::sin(angle), 0}, {0, 0, 0}));
+    view.intrinsics = {LensModel::kPinhole, kSide, kSide, 480, 480, 0.5 * kSide, 0.5 * kSide, {}};
+    view.image.width = view.image.height = kSide;
+    view.image.alpha.assign(view.image.pixel_count(), 0);
+    for (int y = 180; y < 280; ++y) {
+      for (int x = 160; x < 240; ++x) view.image.alpha[std::size_t(y) * kSide + std::size_t(x)] = 255;
+    }
+    for (double z = 0; z < 0.9; z += 0.002) {
+      const auto pixel = project(view.intrinsics, view.world_from_camera.inverse().point({pole.x, pole.y, z}));
+      if (pixel) view.image.alpha[std::size_t(pixel->y) * kSide + std::size_t(pixel->x)] = 255;
+    }
+  }
+  return capture;
+}
+
+TEST(Placement, OfAnObjectHoldsWhatIsThin) {
+  for (int i = 0; i < 12; ++i) {
+    const Vec3d pole = {0.03 + 0.0071 * i, 0.012 - 0.0053 * i, 0.88};
+    const Aabbd box = place_scene(block_with_pole(pole), {}).world_box();
+    EXPECT_TRUE(box.contains(pole)) << i;
+    EXPECT_TRUE(box.contains({0, 0, -0.45}));
+    EXPECT_LT(box.size().z, 2) << "and little else";
+  }
+}
+
+TEST(Placement, OfAnObjectIsToldNothingByPixelsThatAreIgnored) {
+  Capture capture = block_with_pole({0.03, 0.012, 0});
+  MonoImage& image = capture.views[2].image;
+  image.alpha.assign(image.pixel_count(), 0);
+  image.mask.assign(image.pixel_count(), 0);
+  const SceneFrame frame = place_scene(capture, {});
+  capture.views[2].held_out = true;
+  EXPECT_EQ(place_scene(capture, {}), frame);
+  capture.views[2].held_out = false;
+  image.mask.assign(image.pixel_count(), 255);
   EXPECT_FALSE(place_scene(capture, {}) == frame) << "the measure can fail";
 }
 

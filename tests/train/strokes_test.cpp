@@ -70,6 +70,10 @@ TEST(Strokes, BadOnesAreRefusedByTheirField) {
   EXPECT_EQ(refused([](Stroke& s) { s.word = "the jacket"; }), "taken");
   EXPECT_THAT(refused([](Stroke& s) { s.word = "a=b"; }), HasSubstr("strokes[0].word"));
   EXPECT_THAT(refused([](Stroke& s) { s.word = std::string(65, 'a'); }), HasSubstr("strokes[0].word"));
+  EXPECT_THAT(refused([](Stroke& s) {
+                for (int letter = 0; letter < 33; ++letter) s.word += "ж";
+              }),
+              HasSubstr("at most 64 bytes"));
   EXPECT_THAT(refused([](Stroke& s) { s.size = 0.9f; }), HasSubstr("strokes[0].size"));
   EXPECT_THAT(refused([](Stroke& s) { s.reach = 9; }), HasSubstr("strokes[0].reach"));
   EXPECT_THAT(refused([](Stroke& s) { s.points.clear(); }), HasSubstr("strokes[0].points"));

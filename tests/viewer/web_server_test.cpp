@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 #include <httplib.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -172,7 +174,7 @@ TEST(WebServer, AnotherHostNeedsATokenAndVisitorsToo) {
   EXPECT_EQ(status_of(raw_answer(port, request("GET /?token=" + std::string(32, 'a')))), 401);
   const std::string welcome = raw_answer(port, request("GET /?token=" + token));
   EXPECT_EQ(status_of(welcome), 303);
-  EXPECT_NE(welcome.find("HttpOnly; SameSite=Strict"), std::string::npos);
+  EXPECT_NE(welcome.find("HttpOnly; SameSite=Lax"), std::string::npos) << "a link of another site brings it along";
   EXPECT_EQ(status_of(raw_answer(port, request("GET /", "Host: a\r\nCookie: x=1; " + cookie_in(welcome) + "\r\n"))),
             200);
   EXPECT_NE(server.address().find("?token=" + token), std::string::npos);
@@ -232,6 +234,22 @@ TEST(WebServer, OrdersComeFromItsOwnPage) {
   EXPECT_FALSE(feed.stop_requested());
   EXPECT_EQ(stop("Origin: http://127.0.0.1:80\r\n"), 200);
   EXPECT_TRUE(feed.stop_requested());
+}
+
+TEST(WebServer, OtherSitesMayLinkToItAndNoMore) {
+  const Site site;
+  LiveFeed feed("train");
+  WebServer server({site.root}, {}, &feed);
+  server.start();
+  const auto status = [&](const std::string& path, const std::string& from, const std::string& use) {
+    const std::string said = "Sec-Fetch-Site: " + from + "\r\nSec-Fetch-Dest: " + use + "\r\n";
+    return status_of(raw_answer(server.port(), request("GET " + path, "Host: 127.0.0.1\r\n" + said)));
+  };
+  EXPECT_EQ(status("/", "cross-site", "document"), 200);
+  EXPECT_EQ(status("/", "cross-site", "iframe"), 403);
+  EXPECT_EQ(status("/live/events", "cross-site", "empty"), 403) << "eight would keep its own page from following";
+  EXPECT_EQ(status("/photos/000.jpg", "cross-site", "image"), 403);
+  EXPECT_EQ(status("/photos/000.jpg", "same-origin", "image"), 200);
 }
 
 /// Answers with what it was asked.
@@ -429,6 +447,12 @@ class Slow {
   bool say(const std::string& text) {
     return ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL) == ssize_t(text.size());
   }
+  [[nodiscard]] in_port_t port() const {
+    sockaddr_in own{};
+    socklen_t size = sizeof own;
+    ::getsockname(socket_, reinterpret_cast<sockaddr*>(&own), &size);
+    return own.sin_port;
+  }
   /// Whether the server has closed it.
   [[nodiscard]] bool is_closed() const {
     char byte;
@@ -563,6 +587,35 @@ TEST(WebServer, ARequestThatComesSteadilyHasTheTimeItNeeds) {
   thread.join();
 }
 
+/// How long the server's end of a client's connection waits for receipts, milliseconds; 0 = as long as the system does.
+/// Both ends are files of this process.
+unsigned patience_with(const Slow& client) {
+  for (int file = 0; file < 1024; ++file) {
+    sockaddr_in peer{};
+    socklen_t size = sizeof peer;
+    if (::getpeername(file, reinterpret_cast<sockaddr*>(&peer), &size) != 0) continue;
+    if (peer.sin_family != AF_INET || peer.sin_port != client.port()) continue;
+    unsigned milliseconds = 0;
+    size = sizeof milliseconds;
+    ::getsockopt(file, IPPROTO_TCP, TCP_USER_TIMEOUT, &milliseconds, &size);
+    return milliseconds;
+  }
+  return 0;
+}
+
+TEST(WebServer, AClientThatVanishedIsGivenUp) {
+  const Site site;
+  WebServer server({site.root}, {});
+  server.start();
+  const Slow client(server.port(), "G");
+  unsigned milliseconds = 0;
+  for (int look = 0; look < 100 && milliseconds == 0; ++look) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    milliseconds = patience_with(client);
+  }
+  EXPECT_EQ(milliseconds, unsigned(1000 * ConnectionLimits().stalled.count()));
+}
+
 TEST(WebServer, WhoIsRefusedHoldsNoThread) {
   const Site site;
   WebServer server({site.root}, {});
@@ -597,6 +650,28 @@ TEST(WebServer, ATakenPortIsSaidToBe) {
   first.start();
   WebServer second({site.root}, {"127.0.0.1", first.port(), ""});
   EXPECT_THROW(second.start(), DeviceError);
+}
+
+TEST(WebServer, WhatHasANameIsFoundAtItsPortAgain) {
+  const Site site;
+  WebServerOptions options;
+  options.name = site.root.string();
+  const auto is_answered = [](const WebServer& server) {
+    return status_of(raw_answer(server.port(), request("GET /"))) == 200;
+  };
+  int port = 0;
+  {
+    WebServer server({site.root}, options), beside({site.root}, options);
+    server.start();
+    port = server.port();
+    beside.start();
+    EXPECT_NE(beside.port(), port) << "it is taken";
+    EXPECT_TRUE(is_answered(server) && is_answered(beside));
+  }
+  WebServer later({site.root}, options);
+  later.start();
+  EXPECT_EQ(later.port(), port);
+  EXPECT_TRUE(is_answered(later));
 }
 
 TEST(WebServer, TheFeedIsReadAndSteered) {

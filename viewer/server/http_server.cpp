@@ -1,6 +1,8 @@
 #include "viewer/server/http_server.h"
 
 #include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -137,7 +139,11 @@ class HttpServer::Connection final : public httplib::Stream {
         all_(all),
         limits_(limits),
         peer_(peer_of(socket)),
-        handle_(all.add(socket, peer_.first, arrival)) {}
+        handle_(all.add(socket, peer_.first, arrival)) {
+    // The system would wait a quarter of an hour for the receipts of a client that vanished without closing.
+    const auto milliseconds = unsigned(std::chrono::milliseconds(limits.stalled).count());
+    ::setsockopt(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, &milliseconds, sizeof milliseconds);
+  }
   ~Connection() override {
     all_.remove(handle_);  // first: the number may be another connection's once it is closed
     ::shutdown(socket_, SHUT_RDWR);

@@ -19,7 +19,7 @@ struct ConnectionLimits {
   std::chrono::seconds request{10};   ///< from the first byte of a request to its last, if it is small
   std::size_t least_rate = 16384;     ///< bytes per second that a large one comes in: it gets the time for them besides
   std::chrono::seconds idle{5};       ///< between two requests
-  std::chrono::seconds stalled{30};   ///< of an answer that nobody takes
+  std::chrono::seconds stalled{30};   ///< of an answer that nobody takes, or of news without a receipt
   std::size_t request_bytes = 65536;  ///< of a request, head and body
 };
 

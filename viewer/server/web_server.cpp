@@ -144,6 +144,19 @@ std::string client_of(const httplib::Request& request) {
   return is_plain && name.size() >= 8 && name.size() <= 32 ? name : "";
 }
 
+/// Whether a page of another site asks, and not a visitor who follows its link. Browsers would let any page open our
+/// event streams, but they say who asks.
+bool is_of_another_site(const httplib::Request& request) {
+  return request.get_header_value("Sec-Fetch-Site") == "cross-site" &&
+         request.get_header_value("Sec-Fetch-Dest") != "document";
+}
+
+/// The same for a name each time, and of those that Linux does not hand out by itself.
+int port_for(const std::string& name) {
+  constexpr unsigned long kFirst = 61000, kCount = 4000;
+  return int(kFirst + std::stoul(sha256(std::as_bytes(std::span(name))).substr(0, 8), nullptr, 16) % kCount);
+}
+
 void refuse(httplib::Response& response, int status, const std::string& why) {
   response.status = status;
   response.set_header("Connection", "close");  // a thread is not to wait for who was refused
@@ -184,13 +197,11 @@ ConnectionLimits limits_for(const PageApi* api) {
 }
 
 struct WebServer::State {
-  explicit State(PageApi* of_page) : api(of_page), server(limits_for(of_page)) {}
-
   std::vector<fs::path> folders;
   WebServerOptions options;
   LiveFeed* feed = nullptr;
-  PageApi* api;
-  HttpServer server;
+  PageApi* api = nullptr;
+  std::unique_ptr<HttpServer> http;
   std::thread thread;
   int port = 0;
   std::atomic<int> listeners{0};
@@ -258,6 +269,10 @@ struct WebServer::State {
       refuse(response, 421, "this server answers to its own name only");
       return true;
     }
+    if (is_of_another_site(request)) {
+      refuse(response, 403, "pages of other sites may link here, no more");
+      return true;
+    }
     // Browsers say where a request comes from, programs need not.
     if (is_order && request.has_header("Origin") &&
         request.get_header_value("Origin") != "http://" + request.get_header_value("Host")) {
@@ -266,8 +281,9 @@ struct WebServer::State {
     }
     if (options.token.empty()) return false;
     if (equal_in_constant_time(request.get_param_value("token"), options.token)) {
+      // Not Strict: who follows a link of another site would come without it.
       response.set_header("Set-Cookie",
-                          cookie_name(options.token) + "=" + options.token + "; HttpOnly; SameSite=Strict; Path=/");
+                          cookie_name(options.token) + "=" + options.token + "; HttpOnly; SameSite=Lax; Path=/");
       response.set_redirect(own_path(request.path), 303);
       return true;
     }
@@ -328,7 +344,7 @@ struct WebServer::State {
         "text/event-stream",
         [this, source, pause, version](std::size_t, httplib::DataSink& sink) {
           const auto news = source->wait_for_news(*version, 2.0);
-          if (!news && (source->closed() || !server.is_running())) {
+          if (!news && (source->closed() || !http->is_running())) {
             sink.done();
             return true;
           }
@@ -384,7 +400,7 @@ struct WebServer::State {
     response.set_content(feed->state(), "application/json");
   }
 
-  void route() {
+  void route(HttpServer& server) {
     // The library's default also allows a second server on the same port.
     server.set_socket_options([](socket_t socket) {
       const int yes = 1;
@@ -425,15 +441,27 @@ struct WebServer::State {
     server.Get(".*",
                [this](const httplib::Request& request, httplib::Response& response) { serve_file(request, response); });
   }
+
+  /// @param wanted  0 = any that is free.  @return  whether it could be had
+  bool bind(int wanted) {
+    http = std::make_unique<HttpServer>(limits_for(api));  // later versions of the library try once only
+    route(*http);
+    if (wanted == 0) {
+      port = http->bind_to_any_port(options.host);
+    } else {
+      port = http->bind_to_port(options.host, wanted) ? wanted : -1;
+    }
+    return port > 0;
+  }
 };
 
 WebServer::WebServer(std::vector<fs::path> folders, const WebServerOptions& options, LiveFeed* feed, PageApi* api)
-    : state_(std::make_unique<State>(api)) {
+    : state_(std::make_unique<State>()) {
   check_web_server_options(options);
   state_->folders = std::move(folders);
   state_->options = options;
   state_->feed = feed;
-  state_->route();
+  state_->api = api;
 }
 
 WebServer::~WebServer() {
@@ -442,26 +470,22 @@ WebServer::~WebServer() {
 
 void WebServer::start() {
   State& s = *state_;
-  const std::string& host = s.options.host;
-  if (s.options.port > 0) {
-    s.port = s.server.bind_to_port(host.c_str(), s.options.port) ? s.options.port : -1;
-  } else {
-    s.port = s.server.bind_to_any_port(host.c_str());
-  }
-  if (s.port <= 0) {
+  const WebServerOptions& options = s.options;
+  const bool is_named = options.port == 0 && !options.name.empty();
+  if (!(is_named && s.bind(port_for(options.name))) && !s.bind(options.port)) {
     throw DeviceError(fmt::format("{}:{}: cannot be listened on; is the port in use, or the address another machine's?",
-                                  host, s.options.port > 0 ? std::to_string(s.options.port) : "any"));
+                                  options.host, options.port > 0 ? std::to_string(options.port) : "any"));
   }
-  s.server.widen_queue();
-  s.thread = std::thread([&s] { s.server.listen_after_bind(); });
-  while (!s.server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  s.http->widen_queue();
+  s.thread = std::thread([&s] { s.http->listen_after_bind(); });
+  while (!s.http->is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
 void WebServer::stop() {
   if (!state_->thread.joinable()) return;
   if (state_->feed != nullptr) state_->feed->close();
   if (state_->api != nullptr) state_->api->close();
-  state_->server.end();
+  state_->http->end();
   state_->thread.join();
 }
 

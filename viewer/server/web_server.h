@@ -16,6 +16,9 @@ struct WebServerOptions {
   std::string host = "127.0.0.1";
   int port = 0;       ///< 0 = a free one
   std::string token;  ///< what a visitor must know; needed unless `host` is this machine's loopback
+  /// Of what is shown. Where `port` is 0, servers of one name have the same one if it is free: by the address, a
+  /// browser keeps what a page had not saved.
+  std::string name = {};
 };
 
 /// @throws UsageError  when a host other than the loopback has no token of at least 16 letters, digits, - or _.
@@ -24,10 +27,11 @@ void check_web_server_options(const WebServerOptions& options);
 [[nodiscard]] std::string random_token();
 
 /// Serves GET and HEAD of the files below its folders; the first folder that has a file wins. A path, or a link, that
-/// leads out of the folders does not exist. Other methods, bodies beyond 4 KiB, addresses beyond 8 KiB and names of
-/// other hosts (DNS rebinding) are refused. Files are sent piece by piece, one part of each at most. A request has to
-/// be whole within 10 seconds and one for every 16 KiB, and a client that keeps us waiting goes when others want its
-/// place. With a token, a visitor comes with `?token=…`, which becomes a cookie of a name of its own.
+/// leads out of the folders does not exist. Other methods, bodies beyond 4 KiB, addresses beyond 8 KiB, names of other
+/// hosts (DNS rebinding) and requests of other sites' pages, which may only link here, are refused. Files are sent
+/// piece by piece, one part of each at most. A request has to be whole within 10 seconds and one for every 16 KiB, and
+/// a client that keeps us waiting goes when others want its place. With a token, a visitor comes with `?token=…`, which
+/// becomes a cookie of a name of its own.
 ///
 /// With a feed also: GET /live/state, GET /live/events (server-sent events, at most 8 at a time),
 /// GET /live/pictures/NAME, and POST /live/control with the header `X-Cnerf: 1`, which no other site can send, and no

@@ -1,13 +1,33 @@
 /** Mouse, touch and keyboard -> camera. */
 
 import { dollied, looked, moved, orbited, zoomed } from "./camera";
-import { add, apply, norm, sub, type Vec3 } from "./math";
+import { add, apply, clamp, norm, sub, type Vec3 } from "./math";
 import type { Navigator } from "./navigator";
 
 const radiansAPixel = 0.006;
 
+/** Whether a key is the browser's, or that of the control it goes to. */
+export function isTaken(e: KeyboardEvent): boolean {
+  // Some keyboards have their brackets on Alt.
+  if (e.altKey && !/[[\]{}]/.test(e.key)) return true;
+  return (e.key === " " || e.key === "Enter") && (e.target as HTMLElement).matches?.("button, summary, a, input");
+}
+
+/** Of a wheel, pixels. */
+export const turnOf = (e: WheelEvent) => clamp(e.deltaY * (e.deltaMode === 1 ? 30 : 1), -120, 120);
+
+export type Place = { x: number; y: number };
+/** Of two fingers one goes to another place: how many times as far apart they are now, and the middle between them. */
+export function pinched(pointers: ReadonlyMap<number, Place>, id: number, to: Place): { factor: number; middle: Place } {
+  const from = pointers.get(id)!;
+  const [, other] = [...pointers].find(([key]) => key !== id)!;
+  const was = Math.hypot(from.x - other.x, from.y - other.y);
+  const is = Math.hypot(to.x - other.x, to.y - other.y);
+  return { factor: was > 10 && is > 10 ? is / was : 1, middle: { x: (to.x + other.x) / 2, y: (to.y + other.y) / 2 } };
+}
+
 export class Input {
-  private pointers = new Map<number, { x: number; y: number }>();
+  private pointers = new Map<number, Place>();
   private keys = new Set<string>();
   private last = 0;
 
@@ -35,24 +55,18 @@ export class Input {
   private move(e: PointerEvent): void {
     const before = this.pointers.get(e.pointerId);
     if (!before) return;
-    const dx = e.clientX - before.x;
-    const dy = e.clientY - before.y;
-    if (this.pointers.size === 2) return this.pinch(e, before, dx, dy);
-    this.pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
+    const place = { x: e.clientX, y: e.clientY };
+    const [dx, dy] = [place.x - before.x, place.y - before.y];
+    const fingers = this.pointers.size === 2 ? pinched(this.pointers, e.pointerId, place) : null;
+    this.pointers.set(e.pointerId, place);
+    if (fingers) {
+      this.pan(dx / 2, dy / 2);
+      return this.dolly(1 / fingers.factor);
+    }
     if (e.buttons & 6 || e.shiftKey) return this.pan(dx, dy);
     const { app } = this;
     if (app.fly) return app.setView(looked(app.view, app.up, dx * radiansAPixel * 0.6, -dy * radiansAPixel * 0.6));
     app.setView(orbited(app.view, app.target, app.up, -dx * radiansAPixel, -dy * radiansAPixel));
-  }
-
-  private pinch(e: PointerEvent, before: { x: number; y: number }, dx: number, dy: number): void {
-    const [otherId] = [...this.pointers.keys()].filter((id) => id !== e.pointerId);
-    const other = this.pointers.get(otherId)!;
-    const was = Math.hypot(before.x - other.x, before.y - other.y);
-    const is = Math.hypot(e.clientX - other.x, e.clientY - other.y);
-    this.pointers.set(e.pointerId, { x: e.clientX, y: e.clientY });
-    this.pan(dx / 2, dy / 2);
-    if (was > 10 && is > 10) this.dolly(was / is);
   }
 
   private pan(dx: number, dy: number): void {
@@ -71,7 +85,7 @@ export class Input {
 
   private wheel(e: WheelEvent): void {
     e.preventDefault();
-    const factor = Math.exp(Math.max(-120, Math.min(120, e.deltaY * (e.deltaMode === 1 ? 30 : 1))) * 0.0015);
+    const factor = Math.exp(turnOf(e) * 0.0015);
     if (e.altKey) return this.app.setView(zoomed(this.app.view, 1 / factor));
     if (this.app.fly) return this.walk(0, 0, (1 - factor) * this.app.reach);
     this.dolly(factor);
@@ -85,7 +99,7 @@ export class Input {
 
   private key(e: KeyboardEvent): void {
     const target = e.target as HTMLElement;
-    if (e.ctrlKey || e.metaKey || !this.active()) return;
+    if (e.ctrlKey || e.metaKey || !this.active() || isTaken(e)) return;
     if (target instanceof HTMLSelectElement || target.closest("dialog")) return;
     if (target instanceof HTMLInputElement && target.type !== "range" && target.type !== "checkbox") return;
     if (/^(Key[WASDQE]|Arrow(Up|Down|Left|Right))$/.test(e.code)) {

@@ -1,5 +1,6 @@
 /** The page of a running command: progress, curves, pictures, and buttons to pause and to stop. */
 
+import { follow } from "./follow";
 import { Curve, type CurvePoint } from "./ui/curve";
 import { button, el, toast } from "./ui/dom";
 
@@ -58,6 +59,7 @@ export function showLive(root: HTMLElement, first: State): void {
   document.title = `${first.title} · cnerf`;
   document.body.classList.add("live");
   const bar = el("div", { class: "bar" });
+  const progress = el("div", { class: "progress", role: "progressbar", "aria-label": "Progress", "aria-valuemin": "0", "aria-valuemax": "100" }, bar);
   const status = el("p", { class: "status", id: "live-status" });
   const figures = el("dl", { class: "statistics", id: "live-figures" });
   const charts = el("div", { class: "charts" });
@@ -80,13 +82,14 @@ export function showLive(root: HTMLElement, first: State): void {
   root.append(
     el("main", { class: "live-page" },
       el("header", { class: "head" }, el("div", { class: "title" }, el("img", { src: "./icon.svg", alt: "", width: 28, height: 28 }), el("div", {}, el("h1", {}, first.title), status)), el("div", { class: "buttons" }, pause, stop)),
-      el("div", { class: "progress", role: "progressbar" }, bar), figures, charts, pictures),
+      progress, figures, charts, pictures),
   );
 
   function update(next: State): void {
     state = next;
     const percent = Math.round(100 * next.fraction);
     bar.style.width = `${100 * next.fraction}%`;
+    progress.setAttribute("aria-valuenow", String(percent));
     document.title = `${next.finished ? "✓" : `${percent} %`} ${next.title} · cnerf`;
     status.textContent = next.finished
       ? next.message
@@ -121,13 +124,10 @@ export function showLive(root: HTMLElement, first: State): void {
   }
   update(first);
 
-  // The browser connects again by itself after a break.
-  const events = new EventSource("./live/events");
-  events.onmessage = (event) => {
-    update(JSON.parse(event.data as string) as State);
-    if (state.finished) events.close();
-  };
-  events.onerror = () => {
+  const end = follow<State>("./live/events", (news) => {
+    update(news);
+    if (state.finished) end();
+  }, () => {
     if (!state.finished) status.textContent = "The connection to cnerf is lost; waiting for it…";
-  };
+  });
 }

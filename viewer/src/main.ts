@@ -8,7 +8,7 @@ import { Levels, textureBudget, thisDevice } from "./levels";
 import { showLive } from "./live";
 import { GraphicsError, Renderer } from "./renderer";
 import { showStudio } from "./studio/studio";
-import { copyText, download, el, iconButton, slider, slidesAcross, toast } from "./ui/dom";
+import { copyText, download, el, iconButton, markCurrent, slider, slidesAcross, toast } from "./ui/dom";
 import { Overlay } from "./ui/overlay";
 import { Panel, resets } from "./ui/panel";
 
@@ -56,7 +56,7 @@ function helpCard(close: () => void): HTMLElement {
     ["X", "slice"],
     ["K", "add a key frame; Space plays them"],
     ["P", "save a picture"],
-    ["Tab", "settings"],
+    ["M", "settings"],
     ["?", "this help"],
   ];
   return el(
@@ -120,10 +120,10 @@ function buildInterface(app: App, levels: Levels, stage: HTMLElement, canvas: HT
     cameraName,
     el("button", { type: "button", class: "step", title: "Next camera  ]", "aria-label": "Next camera", onclick: () => app.goToCamera(current() + 1) }, "›"),
     fade.node);
-  const strip = el("nav", { class: "strip", "aria-label": "Cameras of the capture" },
-    ...bundle.cameras.map((camera, i) =>
-      el("button", { type: "button", class: "thumbnail", title: camera.name, "data-camera": i, onclick: () => app.goToCamera(i) },
-        camera.photo ? el("img", { src: camera.photo, alt: camera.name, loading: "lazy" }) : el("span", {}, String(i + 1)))));
+  const thumbnails = bundle.cameras.map((camera, i) =>
+    el("button", { type: "button", class: "thumbnail", title: camera.name, "data-camera": i, onclick: () => app.goToCamera(i) },
+      camera.photo ? el("img", { src: camera.photo, alt: camera.name, loading: "lazy" }) : el("span", {}, String(i + 1))));
+  const strip = el("nav", { class: "strip", "aria-label": "Cameras of the capture" }, ...thumbnails);
   const foot = el("footer", { class: "foot", hidden: bundle.cameras.length === 0 }, cameraBar, strip);
 
   const help = el("div", { class: "veil", hidden: true });
@@ -154,14 +154,14 @@ function buildInterface(app: App, levels: Levels, stage: HTMLElement, canvas: HT
       iconButton("camera", "Save a picture  P", () => void screenshot(), "screenshot"),
       iconButton("link", "Copy the address of this view", () => void share(), "share"),
       iconButton("help", "Keys  ?", toggleHelp, "help"),
-      iconButton("panel", "Settings  Tab", togglePanel, "settings")));
+      iconButton("panel", "Settings  M", togglePanel, "settings")));
 
   stage.append(overlay.svg, wipe);
   root.append(head, panel.node, foot, help);
   if (innerWidth > 900) document.body.classList.add("panel-open");
 
   const actions: Record<string, () => void> = {
-    r: () => app.reset(), f: () => app.frame(), p: () => void screenshot(), "?": toggleHelp, h: toggleHelp, Tab: togglePanel,
+    r: () => app.reset(), f: () => app.frame(), p: () => void screenshot(), "?": toggleHelp, h: toggleHelp, m: togglePanel,
     Escape: () => (help.hidden = true),
     "[": () => app.goToCamera(current() - 1), "]": () => app.goToCamera(current() + 1),
     g: () => app.set({ wipe: app.settings.wipe < 0.5 ? 1 : 0 }),
@@ -191,7 +191,7 @@ function buildInterface(app: App, levels: Levels, stage: HTMLElement, canvas: HT
     const camera = bundle.cameras[app.captureCamera];
     cameraName.textContent = camera ? camera.name.replace(/^.*\//, "") : "free view";
     fade.set(settings.photo);
-    fade.node.classList.toggle("off", !camera?.photo);
+    fade.node.inert = !camera?.photo;
     const shown = !!camera?.photo && settings.photo > 0;
     photo.hidden = !shown;
     if (shown) {
@@ -199,14 +199,7 @@ function buildInterface(app: App, levels: Levels, stage: HTMLElement, canvas: HT
       const box = pictureRectangle(app.view.lens, stage.clientWidth, stage.clientHeight);
       Object.assign(photo.style, { left: `${box.left}px`, top: `${box.top}px`, width: `${box.width}px`, height: `${box.height}px`, opacity: settings.photo });
     }
-    strip.querySelectorAll(".thumbnail").forEach((node, i) => {
-      const is = i === app.captureCamera;
-      if (is && node.getAttribute("aria-current") !== "true") {
-        const box = node as HTMLElement;
-        strip.scrollTo({ left: box.offsetLeft - strip.clientWidth / 2 + box.clientWidth / 2, behavior: "smooth" });
-      }
-      node.setAttribute("aria-current", String(is));
-    });
+    markCurrent(strip, thumbnails, app.captureCamera);
   };
 
   let revealing = !new URLSearchParams(location.search).has("still") && bundle.inferred && app.settings.wipe === 0 && !matchMedia("(prefers-reduced-motion: reduce)").matches;

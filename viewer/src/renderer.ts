@@ -8,6 +8,7 @@ import type { AtlasPlan, SlabTexels } from "./bricks";
 import { brickTexels } from "./bricks";
 import type { Bundle } from "./bundle";
 import { fitted, type View } from "./camera";
+import { linearOfHex } from "./color";
 import { clamp, column, scale, sub, type Vec3 } from "./math";
 import { defaultBackground, quantities, type Settings } from "./settings";
 import * as shaders from "./shaders";
@@ -73,14 +74,6 @@ export interface Statistics {
 /** Well spread points of the unit square (Roberts' R2 sequence). */
 function spread(i: number): [number, number] {
   return [(0.5 + i * 0.7548776662466927) % 1, (0.5 + i * 0.5698402909980532) % 1];
-}
-
-export function linearOf(hex: string): Vec3 {
-  const value = parseInt(hex.slice(1), 16);
-  return [16, 8, 0].map((shift) => {
-    const c = ((value >> shift) & 255) / 255;
-    return c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
-  }) as Vec3;
 }
 
 export class Renderer {
@@ -406,7 +399,7 @@ export class Renderer {
     this.bindSky(width, height, background === "sky" && !settings.slice);
     if (background === "sky") background = defaultBackground;
     if (background === "none") gl.uniform4f(display.at("u_background"), 0, 0, 0, 0);
-    else gl.uniform4f(display.at("u_background"), ...linearOf(background), 1);
+    else gl.uniform4f(display.at("u_background"), ...linearOfHex(background), 1);
     gl.uniform1i(display.at("u_plain"), settings.slice ? 1 : 0);
     this.draw();
   }

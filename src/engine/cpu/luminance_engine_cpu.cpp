@@ -20,7 +20,6 @@ namespace {
 
 constexpr std::size_t kBlockRays = 16;
 constexpr std::size_t kWaveSamples = 8;  // that a ray adds to a wave, see `collect`
-constexpr std::size_t kMostSamplesPerRay = 1024;
 
 /// Positions must lie in [0, 1]; rounding may carry the last sample of a ray just outside.
 void set_position(float* positions, std::size_t sample, Vec3f p) {
@@ -215,7 +214,7 @@ std::size_t LuminanceEngineCpu::march_wave(std::span<const Ray> rays, std::size_
     Walk& walk = walks[r];
     RaySample sample;
     for (walk.in_wave = 0; walk.is_open && walk.in_wave < kWaveSamples; ++walk.in_wave) {
-      if (block.of_ray[r].size() >= kMostSamplesPerRay || !walk.marcher.next(sample)) {
+      if (block.of_ray[r].size() >= std::size_t(kMostSamplesOfRay) || !walk.marcher.next(sample)) {
         walk.is_open = false;
         break;
       }

@@ -52,7 +52,10 @@ LuminanceStepCuda::~LuminanceStepCuda() {
 void LuminanceStepCuda::set_views(const std::vector<TrainingView>& views) {
   if (options_.learning.is_on()) CNERF_CHECK_EQ(views.size(), std::size_t(options_.learning.views));
   forget_graph();
-  views_ = ViewImages(views, image_memory_);
+  views_ = ViewImages();  // what these take is free as well
+  std::size_t free = 0, total = 0;
+  CNERF_CUDA(cudaMemGetInfo(&free, &total));
+  views_ = ViewImages(views, image_memory_on_device(image_memory_, free));
   use_lenses(learned(), views_.records(), stream_);
 }
 

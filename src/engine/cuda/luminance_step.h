@@ -6,6 +6,7 @@
 /// A step that processes share is no graph: a library's sums lie between its kernels. Those of the hash grid's levels
 /// are under way while the next levels' gradients are found and the last ones' rows take their step.
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -17,13 +18,14 @@
 #include "src/engine/cuda/shared_grid.h"
 #include "src/engine/cuda/view_images.h"
 #include "src/engine/luminance_engine.h"
+#include "src/engine/stage1_schedule.h"
 #include "src/field/cuda/luminance_field.h"
 
 namespace cnerf {
 
-/// Room for samples of a step: an average one may take twice as many as wanted.
+/// Room for samples of a step: an average one may take twice as many as wanted, and the fewest rays all that they have.
 [[nodiscard]] inline std::uint32_t sample_capacity(const LuminanceEngineOptions& options) {
-  return std::uint32_t(options.samples_per_step) * 2;
+  return std::max(std::uint32_t(options.samples_per_step) * 2, std::uint32_t(kFewestRays * kMostSamplesOfRay));
 }
 
 class LuminanceStepCuda {
@@ -34,7 +36,7 @@ class LuminanceStepCuda {
   LuminanceStepCuda(const LuminanceStepCuda&) = delete;
   LuminanceStepCuda& operator=(const LuminanceStepCuda&) = delete;
 
-  /// Of the views that are set next.
+  /// Of the views that are set next; less where the GPU has no more.
   void limit_image_memory(std::size_t bytes) { image_memory_ = bytes; }
   void set_views(const std::vector<TrainingView>& views);
   /// See LuminanceEngine::share_steps.

@@ -159,7 +159,7 @@ __device__ RayProgress follow_ray(const GridLevels& levels, const TraceJob& job,
   RayProgress ray;
   RaySample sample;
   bool is_open = true;
-  while (is_open && ray.samples < 32 * kMostRuns) {
+  while (is_open && ray.samples < kMostSamplesOfRay) {
     int count = marcher.next(sample, shared.queue[threadIdx.x / 32]);
     if (count == 0) break;
     const Vec3f place = in_box(record.ray.at(sample.t));

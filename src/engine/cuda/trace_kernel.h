@@ -9,6 +9,7 @@
 #include "encoding/hash_grid_levels.h"
 #include "src/engine/cuda/step_kernels.h"
 #include "src/engine/luminance_engine.h"
+#include "src/engine/stage1_schedule.h"
 #include "src/field/cuda/field_weights.h"
 #include "src/render/cuda/ray_record.h"
 #include "src/render/march.h"
@@ -25,8 +26,8 @@ struct SampleArrays {
 };
 
 /// Of one ray's samples, in runs of 32.
-inline constexpr int kMostRuns = 32;
-inline constexpr int kMostSamplesOfRay = 32 * kMostRuns;
+inline constexpr int kMostRuns = kMostSamplesOfRay / 32;
+static_assert(kMostRuns <= 32, "a lane knows of a run each");
 
 /// Where the samples of a training ray lie: in runs of 32, wherever there was room.
 struct RayRuns {

@@ -40,9 +40,8 @@ class RayOrder {
   template <typename Move>
   void for_rays(const Move& move) const {
     constexpr std::size_t kGrain = 512;  // rays of a parallel piece of work
-    parallel_ranges(begins_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r) move(begins_[r], offsets_[r], offsets_[r + 1] - offsets_[r]);
-    });
+    parallel_each(begins_.size(), kGrain,
+                  [&](std::size_t r) { move(begins_[r], offsets_[r], offsets_[r + 1] - offsets_[r]); });
   }
   template <typename T>
   [[nodiscard]] std::vector<T> downloaded(const DeviceBuffer<T>& of_samples) const {

@@ -3,7 +3,7 @@
 namespace cnerf {
 namespace {
 
-const char* const kImageAdvice = "the training images; raise capture.downscale";
+const char* const kImageAdvice = "the training images; lower image_memory or raise capture.downscale";
 
 bool is_evened(const MonoImage& image) {
   return image.exposure == 1 && image.haze == 0;

@@ -47,8 +47,9 @@ ViewRotation::ViewRotation(std::vector<TrainingView> views, std::size_t memory, 
       slots_(std::min(long(memory / slot_bytes_), long(views_.size()))) {
   constexpr long kFewest = 3;
   if (slots_ < kFewest) {
-    throw DeviceError("image_memory: " + in_words(memory) + " is too little for steps to choose from; at least " +
-                      in_words(kFewest * slot_bytes_) + " are needed, for " + std::to_string(kFewest) + " views");
+    throw DeviceError("image_memory, or what the GPU has free: " + in_words(memory) +
+                      " is too little for steps to choose from; at least " + in_words(kFewest * slot_bytes_) +
+                      " are needed, for " + std::to_string(kFewest) + " views");
   }
   memory_ = DeviceBuffer<std::uint8_t>(std::size_t(slots_) * slot_bytes_, kAdvice);
   resident_ = DeviceBuffer<std::uint32_t>(std::size_t(slots_ - 1), kAdvice);

@@ -74,11 +74,12 @@ void pair_channels(const float* in, std::size_t in_step, int inputs, int togethe
   }
 }
 
-/// Where a product goes to, and what becomes of it: zero where it is below `least` or the gate is not above zero.
+/// Where a product goes to, and what becomes of it: zero where it is to be rectified and not above zero, or the gate is
+/// not.
 struct Output {
   float* values;
   std::size_t step;  ///< floats between groups
-  float least = -__builtin_inff();
+  bool relu = false;
   const float* gate = nullptr;
   std::size_t gate_step = 0;
 };
@@ -95,12 +96,13 @@ void multiply_block(const std::uint32_t* w, int w_stride, int pairs, const std::
       for (int g = 0; g < together; ++g) sums[g][o] = add_products(sums[g][o], x[g], weight);
     }
   }
-  const __m512 least = _mm512_set1_ps(to.least);
+  const auto rectified = __mmask16(to.relu ? 0xffff : 0);
 #pragma GCC unroll 3  // these two, else the sums go through memory
   for (int g = 0; g < together; ++g) {
 #pragma GCC unroll 8
     for (int o = 0; o < block; ++o) {
-      __m512 value = _mm512_max_ps(sums[g][o], least);
+      const __m512 sum = sums[g][o];
+      __m512 value = _mm512_mask_max_ps(sum, rectified, sum, _mm512_setzero_ps());  // NaN stays, but for rectified ones
       if (to.gate != nullptr) {
         const __m512 gate = _mm512_loadu_ps(to.gate + std::size_t(g) * to.gate_step + o * kGroup);
         value = _mm512_maskz_mov_ps(_mm512_cmp_ps_mask(gate, _mm512_setzero_ps(), _CMP_GT_OQ), value);
@@ -136,7 +138,7 @@ void multiply(const float* w, int rows, int columns, const float* in, int in_str
 void forward(const float* w_transposed, int inputs, int outputs, const float* in, int in_stride, float* out,
              int out_stride, std::size_t groups, bool relu) {
   Output to{out, std::size_t(out_stride) * kGroup};
-  if (relu) to.least = 0;
+  to.relu = relu;
   multiply(w_transposed, inputs, outputs, in, in_stride, groups, to);
 }
 

@@ -27,11 +27,9 @@ PixelColors pixel_colors_of(const nlohmann::json& header) {
 /// @param seen  RayResult of a pixel
 template <typename Seen>
 void show(std::vector<Ab>& colors, const Seen& seen) {
-  parallel_ranges(colors.size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      const RayResult pixel = seen(p);
-      colors[p] = pixel.opacity >= kLeastColoredOpacity ? in_gamut(colors[p], pixel.luminance) : Ab{};
-    }
+  parallel_each(colors.size(), 256, [&](std::size_t p) {
+    const RayResult pixel = seen(p);
+    colors[p] = pixel.opacity >= kLeastColoredOpacity ? in_gamut(colors[p], pixel.luminance) : Ab{};
   });
 }
 
@@ -56,11 +54,9 @@ Ab in_gamut(Ab color, float luminance) {
 
 std::vector<float> pixel_luminance(const PixelSamples& pixels) {
   std::vector<float> luminance(pixels.pixels(), 0.0f);
-  parallel_ranges(pixels.pixels(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
-        luminance[p] += pixels.weights[s] * pixels.luminance[s];
-      }
+  parallel_each(pixels.pixels(), 256, [&](std::size_t p) {
+    for (std::size_t s = pixels.offsets[p]; s < pixels.offsets[p + 1]; ++s) {
+      luminance[p] += pixels.weights[s] * pixels.luminance[s];
     }
   });
   return luminance;

@@ -1,6 +1,7 @@
 #include "src/train/chroma/likeness.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
@@ -30,7 +31,8 @@ constexpr float kSmoothRadius = 0.04f;   // of the short side
 constexpr int kFilterRadius = 7;         // pixels, at least, of the smaller images that slopes come from
 constexpr float kSmallContrast = 0.05f;  // of a guide, squared: what differs less is smoothed as one
 constexpr float kBlack = 16;  // L* where chroma has gone to nothing below black: in Lab, shade scales a, b and L* + 16
-constexpr std::size_t kMostColors = 64;        // that are smoothed: a painted picture has more, and few pixels of each
+constexpr std::size_t kMostColors = 64;        // told apart: a painted picture has more, and few pixels of each
+constexpr float kSmallestCell = 1;             // of ab, where there are more
 constexpr std::size_t kMostSamples = 400;      // of all colours of a view, each as many
 constexpr std::size_t kPixelsPerPiece = 1024;  // pixels of a parallel piece of work
 constexpr std::size_t kSamplesAtOnce = 16;     // that become vector instructions
@@ -38,6 +40,15 @@ constexpr float kLikeNothing = 1e6f;           // L*
 
 bool same(Ab x, Ab y) {
   return x.a == y.a && x.b == y.b;
+}
+
+/// The cell of ab that a colour lies in: of the given side, or 0 for one of its own.
+std::uint64_t cell_of(Ab color, float side) {
+  const auto bits = [side](float value) {
+    const float place = (side > 0 ? std::floor(value / side) : value) + 0.0f;  // -0 becomes 0, which it equals
+    return std::uint64_t(std::bit_cast<std::uint32_t>(place));
+  };
+  return bits(color.a) << 32 | bits(color.b);
 }
 
 /// Smooths along what a guide shows as one: the guided filter (He et al. 2010, Eq. 5, 6 and 8), whose slopes and
@@ -184,26 +195,52 @@ StrokesEverywhere::StrokesEverywhere(const RunningColors& strokes, const CachedV
   });
 }
 
+/// Numbers them in the order in which they come. Each costs time at every pixel: where they are many, as in a painted
+/// picture, those that lie near one another count as one.
+void StrokesEverywhere::number_colors(std::span<const Ab> painted) {
+  do {
+    numbers_.clear();
+    for (std::size_t i = 0; i < painted.size() && numbers_.size() <= kMostColors; ++i) {
+      numbers_.try_emplace(cell_of(painted[i], cell_), std::uint32_t(numbers_.size()));
+    }
+    if (numbers_.size() > kMostColors) cell_ = std::max(2 * cell_, kSmallestCell);
+  } while (numbers_.size() > kMostColors);
+}
+
 void StrokesEverywhere::take_samples(const RunningColors& strokes, const PixelLooks& looks) {
   std::vector<std::uint32_t> painted, color_of;
-  std::vector<std::size_t> count;
+  std::vector<Ab> painted_colors;
   for (std::uint32_t p = 0; p < strokes.cost.size(); ++p) {
     if (!strokes.is_known(p) || strokes.reach[p] <= 0) continue;
-    const Ab color = strokes.ab[p];
-    color_of.push_back(number_of(color));
-    if (color_of.back() == count.size()) {
-      colors_.push_back(color);
-      count.push_back(0);
-      lightness_.push_back(0);
-      reach_.push_back(0);
-    }
-    ++count[color_of.back()];
-    lightness_[color_of.back()] += looks.lightness[p];
-    reach_[color_of.back()] = std::max(reach_[color_of.back()], strokes.reach[p]);
     painted.push_back(p);
+    painted_colors.push_back(strokes.ab[p]);
   }
   if (painted.empty()) return;
-  for (std::size_t c = 0; c < colors_.size(); ++c) lightness_[c] /= float(count[c]);
+  number_colors(painted_colors);
+  std::vector<std::size_t> count(numbers_.size());
+  colors_.resize(count.size());
+  lightness_.resize(count.size());
+  reach_.resize(count.size());
+  for (std::size_t i = 0; i < painted.size(); ++i) {
+    const Ab color = painted_colors[i];
+    const std::uint32_t c = color_of.emplace_back(number_of(color));
+    ++count[c];
+    colors_[c] = cell_ > 0 ? Ab{colors_[c].a + color.a, colors_[c].b + color.b} : color;
+    lightness_[c] += looks.lightness[painted[i]];
+    reach_[c] = std::max(reach_[c], strokes.reach[painted[i]]);
+  }
+  for (std::size_t c = 0; c < colors_.size(); ++c) {
+    lightness_[c] /= float(count[c]);
+    if (cell_ > 0) colors_[c] = {colors_[c].a / float(count[c]), colors_[c].b / float(count[c])};
+  }
+  take_samples_of(painted, color_of, count, looks);
+}
+
+/// @param painted   pixels
+/// @param color_of  [painted] numbers of their colours
+/// @param count     [colours] how many have it
+void StrokesEverywhere::take_samples_of(std::span<const std::uint32_t> painted, std::span<const std::uint32_t> color_of,
+                                        std::span<const std::size_t> count, const PixelLooks& looks) {
   const std::size_t each = std::max<std::size_t>(kMostSamples / colors_.size(), 1);
   room_ = (each + kSamplesAtOnce - 1) / kSamplesAtOnce * kSamplesAtOnce;
   for (auto* list : {&samples_.x, &samples_.y, &samples_.z, &samples_.log_distance, &samples_.texture}) {
@@ -272,8 +309,8 @@ void StrokesEverywhere::claim_alike(const Ray& ray, const PixelLooks& looks, std
 
 /// Of a number that no colour has where it is none of them.
 std::uint32_t StrokesEverywhere::number_of(Ab color) const {
-  const auto is_it = [&](Ab other) { return same(other, color); };
-  return std::uint32_t(std::ranges::find_if(colors_, is_it) - colors_.begin());
+  const auto found = numbers_.find(cell_of(color, cell_));
+  return found != numbers_.end() ? found->second : std::uint32_t(colors_.size());
 }
 
 void smooth(std::span<Claims> claims, const CachedView& view, std::span<const float> surface) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "src/train/chroma/known_colors.h"
@@ -69,12 +70,17 @@ class StrokesEverywhere {
     std::vector<float> lightness, texture;
   };
   struct Looked;
+  void number_colors(std::span<const Ab> painted);
   void take_samples(const RunningColors& strokes, const PixelLooks& looks);
+  void take_samples_of(std::span<const std::uint32_t> painted, std::span<const std::uint32_t> color_of,
+                       std::span<const std::size_t> count, const PixelLooks& looks);
   [[nodiscard]] static float likeness(const Samples& samples, std::size_t begin, std::size_t end, const Looked& pixel,
                                       float per_angle);
   [[nodiscard]] std::uint32_t number_of(Ab color) const;
 
   const CachedView& view_;
+  float cell_ = 0;  // side of the cells of ab whose colours count as one; 0: only equal ones do
+  std::unordered_map<std::uint64_t, std::uint32_t> numbers_;  // of colours, by cell
   std::vector<Ab> colors_;
   std::vector<float> lightness_, reach_;  // [colours] L* where they were painted, mean; and how far they run, times
   Samples samples_;

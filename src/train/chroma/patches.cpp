@@ -22,6 +22,11 @@ std::vector<float> resized_square(std::span<const float> image, const CachedView
   return values;
 }
 
+/// The nearest to `wanted` that a patch of the view may have: two pixels at least, where the view has two.
+int side_in(const CachedView& view, int wanted) {
+  return std::clamp(wanted, std::min(2, view.short_side()), view.short_side());
+}
+
 Ab bilinear(const std::vector<float>& ab, int k, float x, float y) {
   const float limit = float(k) - 1.0f;
   x = std::clamp(x, 0.0f, limit);
@@ -45,7 +50,7 @@ PatchPlace random_patch(std::span<const CachedView> views, std::size_t view, Pat
   PatchPlace place;
   place.view = view;
   place.index = index;
-  place.side = std::clamp(int(std::lround(share * cached.short_side())), 2, cached.short_side());
+  place.side = side_in(cached, int(std::lround(share * cached.short_side())));
   place.left = int(rng.below(1, std::uint32_t(cached.width - place.side + 1)));
   place.top = int(rng.below(2, std::uint32_t(cached.height - place.side + 1)));
   return place;
@@ -61,7 +66,7 @@ PatchPlace near_patch(std::span<const CachedView> views, const PatchPlace& place
   };
   PatchPlace moved = place;
   moved.index = index;
-  moved.side = std::clamp(place.side + off(0), 2, cached.short_side());
+  moved.side = side_in(cached, place.side + off(0));
   moved.left = std::clamp(place.left + off(1), 0, cached.width - moved.side);
   moved.top = std::clamp(place.top + off(2), 0, cached.height - moved.side);
   return moved;

@@ -58,7 +58,7 @@ void check(const Stroke& stroke, const StrokeCheck& check, std::span<const std::
   check.require(ab_of_hex(stroke.color).has_value(), "color",
                 "expected a colour like #c08040, got " + excerpt(nlohmann::ordered_json(stroke.color)));
   check.require(stroke.word.size() <= kLongestWord && stroke.word.find_first_of(",;=#") == std::string::npos, "word",
-                fmt::format("expected at most {} letters and none of , ; = #", kLongestWord));
+                fmt::format("expected at most {} bytes and none of , ; = #", kLongestWord));
   check.in_range(stroke.size, 0.0005f, 0.5f, "size");
   check.in_range(stroke.softness, 0, 1, "softness");
   check.in_range(stroke.reach, 0.1f, 4, "reach");

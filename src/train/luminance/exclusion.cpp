@@ -1,6 +1,7 @@
 #include "src/train/luminance/exclusion.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "src/capture/arrangement.h"
@@ -18,6 +19,7 @@ constexpr double kConeMargin = 1.2;           // on the ball's radius in the ima
 struct SeeingView {
   Affined camera_from_unit;
   const Intrinsics* lens;
+  double widest_cosine;   ///< of the picture's farthest corner; below 0 where it shows what is behind the lens
   double focus_distance;  ///< to what the views look at, world units
 };
 
@@ -28,8 +30,14 @@ struct Ball {
 };
 
 /// Whether what the lens sees reaches into the ball.
-bool cone_overlaps_ball(const Intrinsics& lens, const Ball& ball) {
-  if (length(ball.centre) < kSurroundedRadii * ball.radius) return true;
+bool cone_overlaps_ball(const SeeingView& view, const Ball& ball) {
+  const double distance = length(ball.centre);
+  if (distance < kSurroundedRadii * ball.radius) return true;
+  if (view.widest_cosine < 0 && ball.centre.z <= 0) {  // where `project` knows no pixel
+    const double off_axis = std::atan2(std::hypot(ball.centre.x, ball.centre.y), ball.centre.z);
+    return off_axis - std::asin(ball.radius / distance) < std::acos(view.widest_cosine);
+  }
+  const Intrinsics& lens = *view.lens;
   const auto pixel = project(lens, ball.centre);
   if (!pixel) return false;
   const double margin = kConeMargin * ball.radius / ball.centre.z * lens.fx;
@@ -44,7 +52,7 @@ std::vector<SeeingView> seeing_views(const Capture& capture, const SceneFrame& f
   for (const View& view : capture.views) {
     if (view.held_out) continue;
     views.push_back({view.world_from_camera.inverse() * world_from_unit, &view.intrinsics,
-                     length(view.world_from_camera.translation - focus)});
+                     least_cosine_of(view.intrinsics), length(view.world_from_camera.translation - focus)});
   }
   return views;
 }
@@ -62,7 +70,8 @@ void exclude_empty(const Capture& capture, const SceneFrame& frame, const FreeSp
     std::ptrdiff_t seeing_in_front = 0;
     for (const SeeingView& view : views) {
       const Ball ball{view.camera_from_unit.point(centre.cast<double>()), double(radius) * world_per_unit};
-      if (ball.centre.z + ball.radius < near || !cone_overlaps_ball(*view.lens, ball)) continue;
+      const double depth = view.widest_cosine < 0 ? length(ball.centre) : ball.centre.z;
+      if (depth + ball.radius < near || !cone_overlaps_ball(view, ball)) continue;
       const bool is_behind_focus = length(ball.centre) + ball.radius > view.focus_distance;
       if (is_behind_focus || ++seeing_in_front >= agreeing) return true;
     }

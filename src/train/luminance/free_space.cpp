@@ -17,7 +17,12 @@ constexpr double kNearestShare = 0.8;   // of the distance to the nearest of wha
 constexpr double kNearQuantile = 0.02;  // of its points, which counts as the nearest: some points are wrong
 constexpr std::size_t kFewestPoints = 20;  // of a view that knows what is nearest
 
-/// Of the picture's corner farthest from the axis.
+bool is_in_picture(const Intrinsics& lens, PixelPosition at) {
+  return at.x >= 0 && at.y >= 0 && at.x < lens.width && at.y < lens.height;
+}
+
+}  // namespace
+
 double least_cosine_of(const Intrinsics& lens) {
   double least = 1;
   for (const double x : {0.0, double(lens.width)}) {
@@ -25,12 +30,6 @@ double least_cosine_of(const Intrinsics& lens) {
   }
   return least;
 }
-
-bool is_in_picture(const Intrinsics& lens, PixelPosition at) {
-  return at.x >= 0 && at.y >= 0 && at.x < lens.width && at.y < lens.height;
-}
-
-}  // namespace
 
 FreeSpace::Sight::Sight(const View& view, const std::vector<Vec3d>& shown, const std::vector<SkyLabel>& sky)
     : camera_from_world_(view.world_from_camera.inverse()),

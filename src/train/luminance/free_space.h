@@ -8,6 +8,9 @@
 
 namespace cnerf {
 
+/// Cosine of the angle between a lens's axis and the corner of the picture that is farthest from it.
+[[nodiscard]] double least_cosine_of(const Intrinsics& lens);
+
 /// A view that shows a sparse point sees through all that lies between: space around the way to it is empty, and what
 /// is nearer to the lens than all that the view shows. Where it shows the sky it sees through everything. Two ways have
 /// to agree, or one view's points together. Held-out views say nothing. What has no features at all, such as a white

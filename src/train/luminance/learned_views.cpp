@@ -23,10 +23,11 @@ constexpr double kDegrees = 180 / std::numbers::pi;
 
 /// Names of the cameras that were moved further than a badly placed one would be.
 std::string stray_cameras(const LearnedViews& learned, const std::vector<std::string>& names) {
+  const double most_shift = kMostShift * std::ldexp(1.0, 1 - learned.frame.cascades);  // unit space
   std::string strays;
   for (std::size_t v = 0; v < learned.corrections.size(); ++v) {
     const ViewCorrection& correction = learned.corrections[v];
-    const bool is_near = kDegrees * length(correction.turn) < kMostDegrees && length(correction.shift) < kMostShift;
+    const bool is_near = kDegrees * length(correction.turn) < kMostDegrees && length(correction.shift) < most_shift;
     if (!is_near) strays += (strays.empty() ? "" : ", ") + names[v];
   }
   return strays;
@@ -99,7 +100,7 @@ std::vector<LearnedFact> facts_of(const LearnedViews& learned, std::span<const I
   for (const ViewCorrection& correction : learned.corrections) {
     gains.push_back(correction.gain());
     turns.push_back(kDegrees * length(correction.turn));
-    shifts.push_back(100 * length(correction.shift));
+    shifts.push_back(100 * std::ldexp(double(length(correction.shift)), learned.frame.cascades - 1));
   }
   std::vector<LearnedFact> facts;
   if (gains.empty()) return facts;
@@ -108,8 +109,8 @@ std::vector<LearnedFact> facts_of(const LearnedViews& learned, std::span<const I
   }
   if (std::ranges::max(turns) > 0) {
     facts.push_back(
-        {"cameras", fmt::format("turned by {:.2f} degrees, moved by {:.2f} % of the box (medians; at most "
-                                "{:.2f}, {:.2f})",
+        {"cameras", fmt::format("turned by {:.2f} degrees, moved by {:.2f} % of the innermost box (medians; "
+                                "at most {:.2f}, {:.2f})",
                                 median(turns), median(shifts), std::ranges::max(turns), std::ranges::max(shifts))});
   }
   const bool knows_given = given.size() == learned.lenses.size();

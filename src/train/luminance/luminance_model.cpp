@@ -8,6 +8,7 @@
 #include <cstring>
 #include <span>
 
+#include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/json_record.h"
 #include "src/engine/stage1_schedule.h"
@@ -20,6 +21,16 @@ namespace cnerf {
 namespace {
 
 constexpr const char* kKind = "stage1";
+
+/// @throws UsageError  a ray could have more samples than engines look at: what is far away would be lost unnoticed
+void check_samples_of_rays(const SceneFrame& frame, const Stage1Options& options) {
+  const MarchSettings march = march_settings(frame.cascades, options.steps_per_box, options.cone_angle);
+  const int most = MarchLattice(march, 0, 0).index_at(std::sqrt(3.0f));
+  if (most <= kMostSamplesOfRay) return;
+  throw UsageError(fmt::format("stage1.steps_per_box: expected at most {} samples along a ray, got {}, which make {}{}",
+                               kMostSamplesOfRay, options.steps_per_box, most,
+                               frame.cascades > 1 ? "; a greater stage1.cone_angle makes fewer" : ""));
+}
 
 std::unique_ptr<LuminanceEngine> make_engine(const LuminanceModel& model, const Engines& engines) {
   const SceneFrame& frame = model.frame;
@@ -260,6 +271,7 @@ LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Option
                                       const FreeSpace& free_space, const std::vector<SparsePoint>& points) {
   LuminanceModel model;
   model.frame = place_scene(capture, options.placement, points);
+  check_samples_of_rays(model.frame, options);
   model.trained_on = {digest_of_training(capture), capture.cameras};
   model.options = options;
   model.max_luminance = brightest(capture);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <optional>
 #include <vector>
@@ -22,6 +23,8 @@ constexpr std::size_t kFewestThatTell = 8;  // that say how far a scene reaches
 constexpr double kOutliers = 0.02;          // share of the points that lie behind what was taken
 constexpr double kBehindPoints = 1.1;       // surfaces go on behind the last point
 constexpr double kUnknownReach = 8;         // of a scene that no point tells of, times the cameras' spread
+constexpr double kMeetingSpread = 1e-4;     // of optical axes that meet, as in arrangement_of
+constexpr float kLeastCoverage = 0.02f;     // of a pixel that shows an object
 
 /// Distance within which nearly all of the scene lies.
 /// @param distances  of its points
@@ -64,13 +67,22 @@ SceneFrame place_before(const CameraArrangement& cameras, double far) {
   return cube(cameras.eye + cameras.forward * (0.5 * far), 1.21 * far, 2);
 }
 
+/// Whether the optical axes do, rather than lie beside one another.
+bool axes_meet(const Capture& capture) {
+  std::vector<WorldRay> axes;
+  for (const View& view : capture.views) {
+    axes.push_back({view.world_from_camera.translation, normalized(view.world_from_camera.linear.column(2))});
+  }
+  return nearest_point(axes, kMeetingSpread).has_value();
+}
+
 /// Nothing where the cameras look at something before them, and neither source nor points tell more.
 std::optional<SceneFrame> place_facing(const Capture& capture, const CameraArrangement& cameras,
                                        const std::vector<SparsePoint>& points) {
   if (capture.depth_range) return place_before(cameras, capture.depth_range->far);
-  if (capture.is_bounded_object) return {};
+  if (capture.is_bounded_object && axes_meet(capture)) return {};
   if (const auto frame = place_by_points(capture, points)) return frame;
-  if (dot(cameras.meeting_point - cameras.eye, cameras.forward) > 0) return {};
+  if (dot(cameras.meeting_point - cameras.eye, cameras.forward) > 0 && axes_meet(capture)) return {};
   return place_before(cameras, kUnknownReach * spread_of(capture, cameras));
 }
 
@@ -87,42 +99,81 @@ SceneFrame place_around_cameras(const Capture& capture, const CameraArrangement&
   return cube(cameras.eye, 2 * reach, 3);
 }
 
-/// Bounds of what no view to train on sees as fully transparent (the visual hull), on a coarse grid over `box`.
-Aabbd visual_hull_bounds(const Capture& capture, const Aabbd& box) {
-  constexpr int kCells = 64;
-  std::vector<Aabbd> of_slice(kCells, Aabbd::empty());
-  const Vec3d cell = box.size() / double(kCells);
-  parallel_tasks(kCells, [&](std::size_t z) {
-    for (int y = 0; y < kCells; ++y) {
-      for (int x = 0; x < kCells; ++x) {
-        const Vec3d corner = box.min + Vec3d{x * cell.x, y * cell.y, double(z) * cell.z};
-        const Vec3d middle = corner + cell * 0.5;
-        const bool inside = std::all_of(capture.views.begin(), capture.views.end(), [&](const View& view) {
-          if (view.held_out) return true;
-          const auto pixel = project(view.intrinsics, view.world_from_camera.inverse().point(middle));
-          if (!pixel) return true;
-          const int radius =
-              1 + int(0.5 * cell.x * view.intrinsics.fx / length(middle - view.world_from_camera.translation));
-          for (const int dy : {-radius, 0, radius}) {
-            for (const int dx : {-radius, 0, radius}) {
-              const int px = int(pixel->x) + dx, py = int(pixel->y) + dy;
-              if (px < 0 || py < 0 || px >= view.image.width || py >= view.image.height) return true;
-              if (view.image.coverage(std::size_t(py) * view.image.width + px) > 0.02f) return true;
-            }
-          }
-          return false;
-        });
-        if (!inside) continue;
-        of_slice[z].grow(corner);
-        of_slice[z].grow(corner + cell);
+/// The pixels of a picture that show an object, or that are ignored and so may.
+class ShownPixels {
+ public:
+  explicit ShownPixels(const MonoImage& image)
+      : width_(image.width), height_(image.height), sums_(std::size_t(width_ + 1) * std::size_t(height_ + 1)) {
+    parallel_each(std::size_t(height_), 16, [&](std::size_t row) {  // photographs may lie in a file
+      std::uint32_t of_row = 0;
+      std::size_t pixel = row * std::size_t(width_);
+      for (int x = 0; x < width_; ++x, ++pixel) {
+        of_row += image.coverage(pixel) > kLeastCoverage || !image.valid(pixel) ? 1 : 0;
+        sums_[index(x + 1, int(row) + 1)] = of_row;
+      }
+    });
+    for (int y = 1; y < height_; ++y) {
+      for (int x = 1; x <= width_; ++x) sums_[index(x, y + 1)] += sums_[index(x, y)];
+    }
+  }
+  /// Whether one of them lies in the square window, or the window leaves the picture.
+  [[nodiscard]] bool may_show(PixelPosition middle, double radius) const {
+    const double left = std::floor(middle.x) - radius, right = std::floor(middle.x) + radius + 1;
+    const double top = std::floor(middle.y) - radius, bottom = std::floor(middle.y) + radius + 1;
+    if (!(left >= 0 && top >= 0 && right <= width_ && bottom <= height_)) return true;
+    const int x0 = int(left), x1 = int(right), y0 = int(top), y1 = int(bottom);
+    return sums_[index(x1, y1)] - sums_[index(x0, y1)] != sums_[index(x1, y0)] - sums_[index(x0, y0)];
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(int x, int y) const {
+    return std::size_t(y) * std::size_t(width_ + 1) + std::size_t(x);
+  }
+
+  int width_, height_;
+  std::vector<std::uint32_t> sums_;  // [height + 1, width + 1] of the pixels above and left
+};
+
+constexpr int kHullCells = 64;  // along each axis of the box that a visual hull is looked for in
+
+/// Takes the cells away that a view sees nothing in.  @param kept  [z, y, x]
+void carve(const View& view, const Aabbd& box, std::vector<std::uint8_t>& kept) {
+  if (view.image.alpha.empty()) return;  // it shows something everywhere
+  const ShownPixels shown(view.image);
+  const Affined camera_from_world = view.world_from_camera.inverse();
+  const Vec3d cell = box.size() / double(kHullCells);
+  const double reach = 0.5 * length(cell) * std::max(view.intrinsics.fx, view.intrinsics.fy);  // of its corners
+  parallel_tasks(kHullCells, [&](std::size_t z) {
+    std::size_t at = z * kHullCells * kHullCells;
+    for (int y = 0; y < kHullCells; ++y) {
+      for (int x = 0; x < kHullCells; ++x, ++at) {
+        if (kept[at] == 0) continue;
+        const Vec3d middle = box.min + Vec3d{x * cell.x, y * cell.y, double(z) * cell.z} + cell * 0.5;
+        const auto pixel = project(view.intrinsics, camera_from_world.point(middle));
+        if (!pixel) continue;
+        const double distance = length(middle - view.world_from_camera.translation);
+        const double radius = 1 + std::floor(reach / distance);
+        if (!shown.may_show(*pixel, radius)) kept[at] = 0;
       }
     }
   });
+}
+
+/// Bounds of what no view to train on sees as fully transparent (the visual hull), on a coarse grid over `box`.
+Aabbd visual_hull_bounds(const Capture& capture, const Aabbd& box) {
+  std::vector<std::uint8_t> kept(std::size_t(kHullCells) * kHullCells * kHullCells, 1);
+  for (const View& view : capture.views) {
+    if (!view.held_out) carve(view, box, kept);
+  }
   Aabbd bounds = Aabbd::empty();
-  for (const Aabbd& slice : of_slice) {
-    if (slice.min.x > slice.max.x) continue;
-    bounds.grow(slice.min);
-    bounds.grow(slice.max);
+  const Vec3d cell = box.size() / double(kHullCells);
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    if (kept[i] == 0) continue;
+    const auto x = double(i % kHullCells), y = double(i / kHullCells % kHullCells);
+    const auto z = double(i / (kHullCells * kHullCells));
+    const Vec3d corner = box.min + Vec3d{x * cell.x, y * cell.y, z * cell.z};
+    bounds.grow(corner);
+    bounds.grow(corner + cell);
   }
   return bounds;
 }
@@ -152,7 +203,8 @@ Vec3d centre_of(const std::string& text) {
   Vec3d centre{};
   int used = 0;
   const int read = std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &centre.x, &centre.y, &centre.z, &used);
-  if (read != 3 || std::size_t(used) != text.size()) {
+  const bool is_finite = std::isfinite(centre.x) && std::isfinite(centre.y) && std::isfinite(centre.z);
+  if (read != 3 || std::size_t(used) != text.size() || !is_finite) {
     throw UsageError("stage1.placement.centre: expected x,y,z, got '" + text + "'");
   }
   return centre;

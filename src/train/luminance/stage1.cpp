@@ -228,8 +228,8 @@ Stage1Report train_stage1(const Stage1Job& job, const Engines& engines, Observer
   const std::vector<DepthHints> depths = depth_hints(job.capture, model.frame, job.known_points());
   show_to(views, depths);
   model.engine->limit_image_memory(job.image_memory);
+  model.engine->share_steps(share_of(job.ranks));  // takes its memory before the views take what is free
   model.engine->set_views(views);
-  model.engine->share_steps(share_of(job.ranks));
 
   TrainingClock clock;
   AgreedTime agreed;

@@ -252,18 +252,16 @@ PixelSamples pixel_samples(std::span<const CachedView> views, std::span<const Vi
     offsets.push_back(offsets.back() + views[v].offsets[p + 1] - views[v].offsets[p]);
   }
   PixelSamples pixels = with_room_for(std::move(offsets));
-  parallel_ranges(wanted.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const CachedView& view = views[wanted[i].view];
-      const std::uint32_t p = wanted[i].pixel;
-      const Ray ray = view.camera.ray_of_pixel(p);
-      std::size_t at = pixels.offsets[i];
-      for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s, ++at) {
-        const CachedSample& sample = view.samples[s];
-        pixels.positions[at] = ray.at(sample.t);
-        pixels.weights[at] = float(sample.weight) / kFullScale;
-        pixels.luminance[at] = float(sample.luminance) / kFullScale * view.brightest;
-      }
+  parallel_each(wanted.size(), kGrain, [&](std::size_t i) {
+    const CachedView& view = views[wanted[i].view];
+    const std::uint32_t p = wanted[i].pixel;
+    const Ray ray = view.camera.ray_of_pixel(p);
+    std::size_t at = pixels.offsets[i];
+    for (std::size_t s = view.offsets[p]; s < view.offsets[p + 1]; ++s, ++at) {
+      const CachedSample& sample = view.samples[s];
+      pixels.positions[at] = ray.at(sample.t);
+      pixels.weights[at] = float(sample.weight) / kFullScale;
+      pixels.luminance[at] = float(sample.luminance) / kFullScale * view.brightest;
     }
   });
   return pixels;

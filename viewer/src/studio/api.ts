@@ -1,7 +1,9 @@
 /** The server, as seen from the page. */
 
-import { words } from "./words";
+import { follow } from "../follow";
 import type { FrameRequest, Scene, State, Stroke, Viewpoint } from "./protocol";
+import { storage } from "./storage";
+import { words } from "./words";
 
 /** The server says no, with its reason. */
 export class Refusal extends Error {
@@ -16,9 +18,13 @@ export class Lost extends Error {}
 function clientId(): string {
   const key = "cnerf-studio-client";
   const [navigation] = performance.getEntriesByType("navigation") as PerformanceNavigationTiming[];
-  const kept = navigation?.type === "reload" ? sessionStorage.getItem(key) : null;
-  const id = kept ?? randomId(16);
-  sessionStorage.setItem(key, id);
+  const shelf = storage("sessionStorage");
+  const id = (navigation?.type === "reload" ? shelf.getItem(key) : null) ?? randomId(16);
+  try {
+    shelf.setItem(key, id);
+  } catch {
+    // After a reload it is another one, then.
+  }
   return id;
 }
 
@@ -30,11 +36,13 @@ export function randomId(length: number): string {
 export class Api {
   readonly client = clientId();
 
+  /** @return the answer with all of its body */
   async send(method: string, path: string, body?: BodyInit, headers: Record<string, string> = {}): Promise<Response> {
     const own: Record<string, string> = method === "GET" ? {} : { "X-Cnerf": "1", "X-Cnerf-Client": this.client };
     let answer: Response;
     try {
       answer = await fetch(`./studio/${path}`, { method, body, headers: { ...own, ...headers }, cache: method === "GET" ? "default" : "no-store" });
+      if (answer.ok && answer.status !== 204) answer = new Response(await answer.blob(), answer);
     } catch {
       throw new Lost(words.lostForGood);
     }
@@ -72,8 +80,9 @@ export class Api {
   }
 
   async strokes(): Promise<{ revision: number; strokes: Stroke[]; viewpoints: Viewpoint[]; everywhere: boolean }> {
-    const { viewpoints = [], everywhere = false, ...rest } = await (await this.send("GET", "strokes", undefined, { "Cache-Control": "no-cache" })).json();
-    return { ...rest, viewpoints, everywhere };
+    const { revision, strokes, viewpoints = [], everywhere = false } = await (await this.send("GET", "strokes", undefined, { "Cache-Control": "no-cache" })).json();
+    // The server leaves out what is 0, false or empty.
+    return { revision, strokes: strokes.map((stroke: Partial<Stroke>) => ({ softness: 0, hidden: false, points: [], ...stroke })), viewpoints, everywhere };
   }
   async putStrokes(strokes: readonly Stroke[], revision: number, viewpoints: readonly Viewpoint[] = [], everywhere = false): Promise<number> {
     const headers = { "Content-Type": "application/json", "X-Cnerf-Revision": String(revision) };
@@ -91,24 +100,9 @@ export class Api {
     const answer = await this.send("PUT", `arrivals?name=${encodeURIComponent(name)}&offset=${offset}`, piece, { "Content-Type": "application/octet-stream" });
     return (await answer.json()).bytes;
   }
-  /** Opens the stream of states. `lost` is called where it breaks; it connects again by itself. @return what ends it */
+  /** Follows the states. @return what ends it */
   listen(heard: (state: State) => void, lost: () => void): () => void {
-    let events: EventSource;
-    let ended = false;
-    const open = () => {
-      if (ended) return;
-      // A stream cannot carry headers: the client's name goes into its address.
-      events = new EventSource(`./studio/events?client=${this.client}`);
-      events.onmessage = (event) => heard(JSON.parse(event.data as string) as State);
-      events.onerror = () => {
-        lost();
-        if (events.readyState === EventSource.CLOSED) setTimeout(open, 2000);
-      };
-    };
-    open();
-    return () => {
-      ended = true;
-      events.close();
-    };
+    // A stream cannot carry headers: the client's name goes into its address.
+    return follow(`./studio/events?client=${this.client}`, heard, lost);
   }
 }

@@ -1,8 +1,9 @@
 /** What the next stroke is made with. */
 
-import { rgbOfHex } from "./color";
+import { rgbOfHex } from "../color";
 import { randomId } from "./api";
 import { limits, type Stroke, type StrokeKind, type StrokePoint } from "./protocol";
+import { storage, type Shelf } from "./storage";
 
 export type Tool = "brush" | "line" | "fill" | "grey" | "eraser" | "picker" | "hand";
 export const tools: [Tool, string][] = [["brush", "b"], ["line", "l"], ["fill", "g"], ["grey", "k"], ["eraser", "e"], ["picker", "i"], ["hand", "h"]];
@@ -24,7 +25,7 @@ export class Brush {
   recent: string[];
   private changed = new Set<() => void>();
 
-  constructor(private readonly shelf: Pick<Storage, "getItem" | "setItem"> = localStorage) {
+  constructor(private readonly shelf: Pick<Shelf, "getItem" | "setItem"> = storage("localStorage")) {
     const kept = this.kept();
     this.settings = { ...first, ...kept.settings, tool: "brush" };
     this.recent = kept.recent?.length ? kept.recent : firstRecent;

@@ -5,6 +5,7 @@
 
 import { Lost, Refusal } from "./api";
 import type { Stroke, Viewpoint } from "./protocol";
+import type { Shelf } from "./storage";
 
 export type StrokeList = readonly Stroke[];
 /** What undo and redo go between. */
@@ -41,8 +42,6 @@ export interface StrokeStore {
   putStrokes(strokes: StrokeList, revision: number, viewpoints: readonly Viewpoint[], everywhere: boolean): Promise<number>;
 }
 type Answer = Awaited<ReturnType<StrokeStore["strokes"]>>;
-/** What keeps strokes that the server does not have: the browser's own store. */
-export type Shelf = Pick<Storage, "getItem" | "setItem" | "removeItem">;
 
 interface Kept {
   base: StrokeList;

@@ -1,15 +1,15 @@
 /** A photograph to paint on: zoom, pan, and the tools. What is drawn is drawn here at once; the server hears of it after. */
 
+import { hexOf, lightnessOfCode, type Rgb } from "../color";
+import { pinched, turnOf, type Place } from "../input";
 import { el, toast } from "../ui/dom";
 import type { Tool } from "./brush";
-import { hexOf, lightnessOfCode, type Rgb } from "./color";
 import { PaintLayer, planesOf, strokeAt, type Box, type Planes } from "./paint";
 import { limits, type Stroke, type StrokePoint } from "./protocol";
 import { TintFeed, type TintKind } from "./reach";
 import type { Session } from "./session";
 import { words } from "./words";
 
-type Place = { x: number; y: number };
 /** Longer sides are painted on a smaller picture. */
 const longest = 2560;
 
@@ -27,6 +27,8 @@ export class Easel {
   private fits = true;
   private touchedLightness = 60;
   private pointers = new Map<number, Place>();
+  /** Id of the pen that was put down last. */
+  private pen = -1;
   private cursor: Place | null = null;
   private growing: Stroke | null = null;
   private lineFrom: Place | null = null;
@@ -119,6 +121,7 @@ export class Easel {
     this.photo?.close();
     this.photo = null;
     this.growing = null;
+    this.pointers.clear();
     this.tell();
   }
 
@@ -133,16 +136,14 @@ export class Easel {
 
   /** The strokes changed: by the user, by undo, or in another tab. */
   private follow(): void {
-    const { layer, session } = this;
-    if (!layer || !session.view) return;
+    const { session } = this;
+    if (!this.layer || !session.view) return;
     const strokes = session.strokes.of(session.view.name);
     const same = strokes.length === this.painted.length && strokes.every((s, i) => s === this.painted[i]);
-    if (!same) {
+    // A stroke that grows is not disturbed: what is painted is drawn anew after it.
+    if (!same && !this.growing) {
       this.painted = strokes;
-      if (!this.growing) {
-        layer.redraw(strokes, this.pictures);
-        this.flush(null);
-      }
+      this.redrawPaint();
     }
     for (const { picture } of strokes) if (picture) void this.fetchPicture(picture);
     if (!this.growing) this.askTint();
@@ -164,7 +165,7 @@ export class Easel {
     }
     if (this.layer !== layer) return;
     this.fetching.delete(name);
-    // A stroke that grows is not disturbed: what is painted is drawn anew after it.
+    // As in follow().
     if (this.growing) this.painted = [];
     else this.redrawPaint();
   }
@@ -327,7 +328,13 @@ export class Easel {
   // Pointers.
 
   private down(e: PointerEvent): void {
-    if (!this.layer) return;
+    if (!this.layer || this.isPalm(e)) return;
+    if (e.pointerType === "pen") {
+      this.pen = e.pointerId;
+      // The hand may have come to rest before its pen.
+      if (this.pointers.size > 0) this.cancel();
+      this.pointers.clear();
+    }
     this.canvas.setPointerCapture(e.pointerId);
     this.canvas.focus({ preventScroll: true });
     const place = this.placeOf(e);
@@ -342,10 +349,15 @@ export class Easel {
     if (tool === "picker") return this.pick(place);
     this.startStroke(place, this.pressureOf(e), e.shiftKey);
   }
+  /** A hand comes to rest where its pen draws. */
+  private isPalm(e: PointerEvent): boolean {
+    return e.pointerType === "touch" && this.pointers.has(this.pen);
+  }
   private pressureOf(e: PointerEvent): number {
     return e.pointerType === "pen" ? Math.max(0.02, e.pressure) : 1;
   }
   private move(e: PointerEvent): void {
+    if (this.isPalm(e)) return;
     const place = this.placeOf(e);
     const before = this.pointers.get(e.pointerId);
     this.cursor = place;
@@ -360,15 +372,13 @@ export class Easel {
     this.grow((events.length > 0 ? events : [e]).map((event) => this.pointOf(this.placeOf(event), this.pressureOf(event))));
   }
   private pinch(id: number, before: Place, place: Place): void {
-    const [other] = [...this.pointers].filter(([key]) => key !== id).map(([, value]) => value);
-    const was = Math.hypot(before.x - other.x, before.y - other.y);
-    const is = Math.hypot(place.x - other.x, place.y - other.y);
+    const { factor, middle } = pinched(this.pointers, id, place);
     this.pointers.set(id, place);
     this.moveBy((place.x - before.x) / 2, (place.y - before.y) / 2);
-    if (was > 10 && is > 10) this.zoomBy(is / was, { x: (place.x + other.x) / 2, y: (place.y + other.y) / 2 });
+    this.zoomBy(factor, middle);
   }
   private up(e: PointerEvent, cancelled = false): void {
-    this.pointers.delete(e.pointerId);
+    if (!this.pointers.delete(e.pointerId)) return;
     if (e.pointerType === "touch") this.cursor = this.pointers.size > 0 ? this.cursor : this.placeOf(e);
     this.dragging = false;
     if (cancelled) return this.cancel();
@@ -378,8 +388,7 @@ export class Easel {
   }
   private wheel(e: WheelEvent): void {
     e.preventDefault();
-    const delta = Math.max(-120, Math.min(120, e.deltaY * (e.deltaMode === 1 ? 30 : 1)));
-    this.zoomBy(Math.exp(-delta * (e.ctrlKey ? 0.01 : 0.0025)), this.placeOf(e));
+    this.zoomBy(Math.exp(-turnOf(e) * (e.ctrlKey ? 0.01 : 0.0025)), this.placeOf(e));
     this.tell();
   }
 

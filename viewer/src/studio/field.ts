@@ -11,6 +11,7 @@ import { words } from "./words";
 
 type Frame = { pictures: ImageBitmap[]; colors: number; milliseconds: number };
 const largest = 4096;
+const drop = ({ pictures }: Frame) => pictures.forEach((picture) => picture.close());
 
 export class FieldView extends Navigator {
   readonly canvas = el("canvas", { id: "field", tabindex: "0", "aria-label": words.stage, role: "img" });
@@ -38,6 +39,7 @@ export class FieldView extends Navigator {
       fetch: (wish) => this.ask(wish.camera, wish.share, wish.moving),
       cost: (frame) => frame.milliseconds,
       show: (frame) => this.show(frame),
+      drop,
       failed: (problem) => session.explain(problem),
       now: () => performance.now(),
       later: (callback, milliseconds) => void setTimeout(callback, milliseconds),
@@ -153,7 +155,7 @@ export class FieldView extends Navigator {
     return this.session.api.frame({ position: view.position, rotation: view.rotation, lens: fitted(view.lens, width, height), sides, moving });
   }
   private show(frame: Frame): void {
-    for (const picture of this.frameShown?.pictures ?? []) picture.close();
+    if (this.frameShown) drop(this.frameShown);
     this.frameShown = frame;
     document.body.classList.remove("loading");
     document.body.dataset.ready = "yes";

@@ -1,6 +1,6 @@
 /** What strokes paint on a grey photograph: chroma, at the light that is there. */
 
-import { coloredPixel, labFromRgb, labOfHex, type Rgb } from "./color";
+import { coloredPixel, labFromRgb, labOfHex, type Rgb } from "../color";
 import type { Stroke, StrokePoint } from "./protocol";
 
 export interface Box {

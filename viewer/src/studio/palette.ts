@@ -1,8 +1,8 @@
 /** The colours there are at the light under the brush, recent ones, and those of a picture. */
 
-import { button, el, section, slider, toast, toggle } from "../ui/dom";
+import { hexAt, hexOf, inGamut, labOfHex, mappedIntoGamut, rgbFromLab, rgbOfHex, type Rgb } from "../color";
+import { button, dragged, el, section, slider, toast, toggle } from "../ui/dom";
 import type { Brush } from "./brush";
-import { hexAt, hexOf, inGamut, labOfHex, mappedIntoGamut, rgbFromLab, rgbOfHex, type Rgb } from "./color";
 import { words } from "./words";
 
 const pixels = 128;
@@ -21,7 +21,7 @@ export class Palette {
   private spot = el("span", { class: "marker" });
   /** Where the picture's colour is taken, as shares of it. */
   private aimed = { x: 0.5, y: 0.5 };
-  private disc = el("canvas", { class: "disc", width: pixels, height: pixels, tabindex: "0", role: "slider", "aria-label": words.disc });
+  private disc = el("canvas", { class: "disc", width: pixels, height: pixels, tabindex: "0", role: "slider", "aria-label": words.disc, "aria-valuemin": "0", "aria-valuemax": "140" });
   private marker = el("span", { class: "marker" });
   private swatch = el("span", { class: "current" });
   private hex = el("input", { type: "text", id: "hex", class: "hex", maxlength: 7, spellcheck: "false", autocomplete: "off", "aria-label": words.hex });
@@ -58,26 +58,23 @@ export class Palette {
     const softness = slider({ id: "softness", label: words.softness, title: words.resets, min: 0, max: 1, step: 0.01, value: settings.softness, reset: 0.25, show: words.percent, change: (v) => brush.set({ softness: v }) });
     const reach = slider({ id: "reach", label: words.reach, title: words.resets, min: -1, max: 0.602, step: 0.01, value: Math.log10(settings.reach), reset: 0, show: (v) => `× ${(10 ** v).toPrecision(2)}`, change: (v) => brush.set({ reach: 10 ** v }) });
     const exact = toggle("exact", words.exact, settings.exact, (value) => brush.set({ exact: value }));
-    brush.onChange(() => {
+    const show = () => {
       size.set(Math.log10(brush.settings.size));
       softness.set(brush.settings.softness);
       reach.set(Math.log10(brush.settings.reach));
       exact.set(brush.settings.exact);
-      reach.node.classList.toggle("off", brush.kind === "exact" || brush.kind === "erase");
-    });
+      reach.node.inert = brush.kind === "exact" || brush.kind === "erase";
+    };
+    brush.onChange(show);
+    show();
     return [size.node, softness.node, reach.node, exact.node];
   }
 
   private listen(wheel: HTMLElement): void {
-    const put = (e: PointerEvent) => {
+    dragged(wheel, (e) => {
       const box = this.disc.getBoundingClientRect();
       this.choose((2 * (e.clientX - box.left) / box.width - 1) * this.extent, (1 - (2 * (e.clientY - box.top)) / box.height) * this.extent);
-    };
-    wheel.addEventListener("pointerdown", (e) => {
-      wheel.setPointerCapture(e.pointerId);
-      put(e);
     });
-    wheel.addEventListener("pointermove", (e) => wheel.hasPointerCapture(e.pointerId) && put(e));
     this.disc.addEventListener("keydown", (e) => {
       const steps: Record<string, [number, number]> = { ArrowLeft: [-2, 0], ArrowRight: [2, 0], ArrowUp: [0, 2], ArrowDown: [0, -2] };
       const step = steps[e.key];
@@ -97,16 +94,11 @@ export class Palette {
   }
   private listenToPicture(): void {
     const { picture } = this;
-    const pick = (e: PointerEvent) => {
+    dragged(picture, (e) => {
       const box = picture.getBoundingClientRect();
       this.aim((e.clientX - box.left) / box.width, (e.clientY - box.top) / box.height);
       this.pickFromPicture();
-    };
-    picture.addEventListener("pointerdown", (e) => {
-      picture.setPointerCapture(e.pointerId);
-      pick(e);
     });
-    picture.addEventListener("pointermove", (e) => picture.hasPointerCapture(e.pointerId) && pick(e));
     picture.addEventListener("keydown", (e) => {
       const steps: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
       const step = steps[e.key];
@@ -139,6 +131,7 @@ export class Palette {
     const { a, b } = this.shownColor();
     Object.assign(this.marker.style, { left: `${50 + (50 * a) / this.extent}%`, top: `${50 - (50 * b) / this.extent}%`, background: hexAt(color, this.lightness) });
     this.swatch.style.background = `linear-gradient(135deg, ${hexAt(color, this.lightness)} 50%, ${color} 50%)`;
+    this.disc.setAttribute("aria-valuenow", String(Math.round(Math.hypot(a, b))));
     this.disc.setAttribute("aria-valuetext", `a ${Math.round(a)}, b ${Math.round(b)}`);
     if (document.activeElement !== this.hex) this.hex.value = color;
     this.light.textContent = words.lightness(this.lightness);

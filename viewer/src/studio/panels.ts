@@ -3,7 +3,7 @@
 import { button, copyText, el, icon, section, segments, slider, toast, toggle } from "../ui/dom";
 import type { StrokeDocument } from "./document";
 import type { FieldView } from "./field";
-import type { Finish, Stroke, Take } from "./protocol";
+import { limits, type Finish, type Stroke, type Take } from "./protocol";
 import { Latest } from "./reach";
 import type { Session } from "./session";
 import { words } from "./words";
@@ -53,9 +53,13 @@ export function notice(session: Session): HTMLElement {
   session.onState(() => {
     node.textContent = session.isLost ? words.lost : words.readOnly;
     node.hidden = !session.isLost && !session.isReadOnly;
-    document.body.classList.toggle("is-read-only", session.isReadOnly);
   });
   return node;
+}
+
+/** A section is seen and cannot be used, by keyboard neither. */
+function lock(node: HTMLElement, locked: boolean): void {
+  (node.lastElementChild as HTMLElement).inert = locked;
 }
 
 /** A painted picture as a small one. */
@@ -68,6 +72,7 @@ async function nameStroke(strokes: StrokeDocument, stroke: Stroke): Promise<void
   const word = await ask(words.whatIsIt, stroke.word ?? "");
   if (word === null) return;
   if (/[,;=#]/.test(word)) return toast(words.badWord);
+  if (new TextEncoder().encode(word).length > limits.wordBytes) return toast(words.longWord(limits.wordBytes));
   strokes.edit(stroke.id, { word: word || undefined });
 }
 
@@ -103,7 +108,7 @@ export function strokesPanel(session: Session): HTMLElement {
     none.hidden = shown.length > 0;
     paintedPicture.hidden = !session.view;
     whichView.disabled = session.isBusy || session.isLost;
-    node.classList.toggle("read-only", session.isReadOnly);
+    lock(node, session.isReadOnly);
   };
   const whichView = button(words.whichView, () => void session.order({ order: "key-views" }), { id: "which-view", title: words.whichViewTitle });
   const node = section(words.strokes, true, everywhere.node, which.node, list, none, el("div", { class: "buttons" }, whichView, paintedPicture), file);
@@ -137,7 +142,7 @@ export class TakesPanel {
   }
   private update(): void {
     const { state, isReadOnly } = this.session;
-    const grey: Take = { name: "", colorizer: "", seconds: 0 };
+    const grey: Take = { name: "", colorizer: "" };
     keyed(this.list, [grey, ...state.takes], (take) => `${take.name} ${take.colorizer} ${take.name === state.take} ${state.unkept}`, (take) => this.row(take));
     const choices = ["", "now", ...state.takes.map((take) => take.name)];
     for (const select of this.sides) {
@@ -147,7 +152,7 @@ export class TakesPanel {
     }
     this.showSides();
     this.keepButton.disabled = !state.unkept || isReadOnly || state.task !== "";
-    this.node.classList.toggle("read-only", isReadOnly);
+    lock(this.node, isReadOnly);
   }
   private showSides(): void {
     this.sides[0].value = this.field.left;
@@ -227,7 +232,7 @@ export function ideasPanel(session: Session, reference: (file: File) => void): H
       card.addEventListener("click", () => choose(card, number));
       return card;
     });
-    node.classList.toggle("read-only", session.isReadOnly);
+    lock(node, session.isReadOnly);
   });
   return node;
 }
@@ -266,7 +271,7 @@ export function finishPanel(session: Session): HTMLElement {
     keyed(downloads, state.downloads, (d) => `${d.address} ${d.bytes}`, (d) => el("li", {}, el("a", { class: "name-button", href: d.address, download: d.name }, el("span", {}, d.name), el("small", {}, words.mebibytes(d.bytes)))));
     showLines(blender, state.blender ? [state.blender] : [], words.blender);
     bake.disabled = write.disabled = session.isBusy || session.isLost;
-    node.classList.toggle("read-only", session.isReadOnly);
+    lock(node, session.isReadOnly);
     const { finish } = state;
     // The server's finish is followed, but not while the sliders are under way.
     if (JSON.stringify(finish) === heard || latest.isBusy) return;

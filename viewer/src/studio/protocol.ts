@@ -30,7 +30,6 @@ export interface Scene {
 export interface Take {
   name: string;
   colorizer: string;
-  seconds: number;
 }
 
 /** What there is: nothing yet, a capture whose field is being trained, or a field that can be coloured. */
@@ -101,7 +100,7 @@ export interface Stroke {
   readonly word?: string;
 }
 
-export const limits = { strokes: 2000, viewpoints: 50, points: 20000, bytes: 15e6, size: [0.0005, 0.5], reach: [0.1, 4] } as const;
+export const limits = { strokes: 2000, viewpoints: 50, points: 20000, bytes: 15e6, pictureBytes: 32 * 2 ** 20, wordBytes: 64, size: [0.0005, 0.5], reach: [0.1, 4] } as const;
 
 export interface FrameRequest extends View {
   /** "" (uncoloured), "now" or the name of a take; a picture each, one behind the other. */

@@ -36,27 +36,33 @@ async function tintOfPicture(picture: ImageBitmap): Promise<Tint> {
   const canvas = new OffscreenCanvas(picture.width, picture.height);
   const context = canvas.getContext("2d", { willReadFrequently: true })!;
   context.drawImage(picture, 0, 0);
-  return tintOf(picture.width, picture.height, context.getImageData(0, 0, picture.width, picture.height).data);
+  const tint = tintOf(picture.width, picture.height, context.getImageData(0, 0, picture.width, picture.height).data);
+  picture.close();
+  return tint;
 }
 
 /** What a photograph is tinted with: the reach of its strokes, or the colours of the field. */
 export class TintFeed {
   private latest = new Latest();
+  private wanted: TintKind = "none";
 
   constructor(private readonly session: Session, private readonly put: (view: string, tint: Tint | null) => void) {}
 
   /** @param view  name of the view that is open */
   ask(kind: TintKind, view: string, growing: Stroke | null): void {
-    if (kind === "none") return this.put(view, null);
+    this.wanted = kind;
+    // What was asked for before another kind was wanted comes too late.
+    const put = (tint: Tint | null) => kind === this.wanted && this.put(view, tint);
+    if (kind === "none") return void put(null);
     void this.latest.run(async () => {
       const { photo } = this.session;
-      if (this.session.open !== view || photo < 0) return;
+      if (this.session.open !== view || photo < 0 || kind !== this.wanted) return;
       try {
-        this.put(view, kind === "now" ? await this.now(photo) : await this.reach(photo, growing));
+        put(kind === "now" ? await this.now(photo) : await this.reach(photo, growing));
       } catch (problem) {
         // While views are traced there is no reach, and strokes show all the same.
         if (problem instanceof Lost) this.session.lose();
-        else this.put(view, null);
+        else put(null);
       }
     });
   }

@@ -1,6 +1,6 @@
 /** Where there is no capture yet: photographs come in here, and become a scene. */
 
-import { button, el, icon, toast } from "../ui/dom";
+import { acceptsFiles, button, el, icon, toast } from "../ui/dom";
 import type { Api } from "./api";
 import { ask, keyed, notice } from "./panels";
 import type { State } from "./protocol";
@@ -153,21 +153,10 @@ export async function receive(root: HTMLElement, api: Api, state: State): Promis
   const session = new Session(api, { title: "", run: "", up: "+y", centre: [0, 0, 0], radius: 1, views: [], home: 0 }, state);
   const reception = new Reception(session);
   const ended = new AbortController();
-  const veil = el("div", { class: "drop-veil", hidden: true }, words.reception.veil);
-  const box = el("div", { class: "reception-box" }, reception.node, notice(session), veil);
-  const listen = <K extends keyof WindowEventMap>(type: K, heard: (e: WindowEventMap[K]) => void) => addEventListener(type, heard, { signal: ended.signal });
-  listen("dragover", (e) => {
-    if (!e.dataTransfer?.types.includes("Files")) return;
-    e.preventDefault();
-    veil.hidden = false;
-  });
-  listen("dragleave", (e) => (veil.hidden = e.relatedTarget === null || veil.hidden));
-  listen("drop", (e) => {
-    e.preventDefault();
-    veil.hidden = true;
-    if (e.dataTransfer) void reception.drop(e.dataTransfer);
-  });
-  listen("beforeunload", (e) => reception.isSending && e.preventDefault());
+  const { signal } = ended;
+  const box = el("div", { class: "reception-box" }, reception.node, notice(session));
+  acceptsFiles(box, () => words.reception.veil, (e) => e.dataTransfer && void reception.drop(e.dataTransfer), signal);
+  addEventListener("beforeunload", (e) => reception.isSending && e.preventDefault(), { signal });
   root.append(box);
   document.body.dataset.ready = "yes";
   // For scripts and tests.

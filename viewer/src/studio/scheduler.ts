@@ -12,6 +12,8 @@ export interface FrameHost<Camera, Frame> {
   /** null: the server had a newer wish. */
   fetch(wish: FrameWish<Camera>): Promise<Frame | null>;
   show(frame: Frame, wish: FrameWish<Camera>): void;
+  /** A frame that came too late to be shown. */
+  drop(frame: Frame): void;
   /** Milliseconds that the server drew at it; it may have waited for longer. */
   cost(frame: Frame): number;
   failed(problem: unknown): void;
@@ -119,8 +121,9 @@ export class FrameScheduler<Camera, Frame> {
       this.asked = 0;
       this.host.later(() => ((this.paused = false), this.next()), 1500);
       this.host.failed(problem);
+    } finally {
+      this.inFlight.delete(sent);
     }
-    this.inFlight.delete(sent);
     if (frame !== null) this.arrived(frame, camera, sent, this.passing ? this.host.cost(frame) : alone ? this.host.now() - begin : 0);
     else if (sent.version === this.version && !this.paused) this.asked = 0;
     this.next();
@@ -132,7 +135,7 @@ export class FrameScheduler<Camera, Frame> {
       this.coarse = Math.min(1, Math.max(coarsest, this.coarse * factor));
     }
     const { shown } = this;
-    if (sent.version < shown.version || (sent.version === shown.version && sent.share < shown.share)) return;
+    if (sent.version < shown.version || (sent.version === shown.version && sent.share < shown.share)) return this.host.drop(frame);
     this.shown = sent;
     this.host.show(frame, { camera, share: sent.share, moving: this.moving });
   }

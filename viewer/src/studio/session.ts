@@ -4,9 +4,13 @@ import { toast } from "../ui/dom";
 import { Api, Lost, Refusal } from "./api";
 import { Brush } from "./brush";
 import { StrokeDocument } from "./document";
-import type { Scene, SceneView, State, Viewpoint } from "./protocol";
+import { limits, type Scene, type SceneView, type State, type Viewpoint } from "./protocol";
 import { Latest } from "./reach";
+import { storage } from "./storage";
 import { words } from "./words";
+
+/** Between two questions whether the server is back, milliseconds. */
+const seekRest = 2000;
 
 export class Session {
   state: State;
@@ -25,12 +29,16 @@ export class Session {
   private painting: Promise<void> = Promise.resolve();
   private all: { viewpoints: readonly Viewpoint[]; views: readonly SceneView[] } | null = null;
   private stopListening = () => {};
+  private hasEnded = false;
+  /** Whether the server's news come in. */
+  private streams = true;
+  private seeking: Promise<void> | null = null;
 
   /** @param scene  what the server said after `state` */
   constructor(readonly api: Api, readonly scene: Scene, state: State) {
     this.sceneSeen = state.scene;
     this.state = state;
-    this.strokes = new StrokeDocument(api, localStorage, `cnerf-studio-strokes ${scene.run}`);
+    this.strokes = new StrokeDocument(api, storage("localStorage"), `cnerf-studio-strokes ${scene.run}`);
     this.strokes.told = (what) => {
       if (what === "lost") this.lose();
       else if (what === "merged") toast(words.merged);
@@ -76,9 +84,6 @@ export class Session {
   get isBusy(): boolean {
     return this.state.task !== "";
   }
-  get hasColors(): boolean {
-    return this.state.take !== "" || this.state.unkept;
-  }
 
   /** Calls back after every change of the server's state, and when it is lost or comes back. */
   onState(callback: (state: State) => void): void {
@@ -99,11 +104,20 @@ export class Session {
   /** Hears of the server's state, without strokes. @return when it heard first: the server knows of this page then */
   listen(): Promise<void> {
     return new Promise((first) => {
-      this.stopListening = this.api.listen((state) => (this.hear(state), first()), () => this.lose());
+      this.stopListening = this.api.listen((state) => {
+        this.streams = true;
+        this.hear(state);
+        first();
+      }, () => {
+        this.streams = false;
+        this.lose();
+      });
     });
   }
   end(): void {
     this.stopListening();
+    this.hasEnded = true;
+    this.isLost = false;
     this.changed.clear();
   }
   private hear(state: State): void {
@@ -162,10 +176,22 @@ export class Session {
     }
   }
   lose(): void {
+    if (this.hasEnded) return;
     this.strokes.isAway = true;
     if (this.isLost) return;
     this.isLost = true;
     this.tell();
+    void (this.seeking ??= this.seek().finally(() => (this.seeking = null)));
+  }
+  /** One request may fail while the stream lives, which says nothing as long as nothing changes. */
+  private async seek(): Promise<void> {
+    for (;;) {
+      await new Promise((done) => setTimeout(done, seekRest));
+      if (!this.isLost) return;
+      const state = await this.api.state().catch(() => null);
+      // A stream that broke says itself that it is back.
+      if (state && this.isLost && this.streams) this.hear(state);
+    }
   }
   explain(problem: unknown): void {
     if (problem instanceof Lost) this.lose();
@@ -188,7 +214,7 @@ export class Session {
   /** @return what the server said; nothing where it did not take the picture */
   async send(query: Record<string, string>, file: Blob): Promise<State | undefined> {
     if (!/^image\/(png|jpeg|tiff|webp)$/.test(file.type)) return void toast(words.notAPicture);
-    if (file.size > 64 * 2 ** 20) return void toast(words.tooLarge);
+    if (file.size > limits.pictureBytes) return void toast(words.tooLarge);
     try {
       return await this.api.picture(query, file);
     } catch (problem) {

@@ -1,6 +1,6 @@
 /** The photographs of the capture, then the viewpoints, as thumbnails in the colours of now, with what strokes will reach. */
 
-import { el } from "../ui/dom";
+import { el, markCurrent } from "../ui/dom";
 import type { State } from "./protocol";
 import type { Session } from "./session";
 import { words } from "./words";
@@ -87,11 +87,7 @@ export class Strip {
   /** Shows which view is open. */
   mark(index: number): void {
     this.marked = index;
-    this.items.forEach(({ node }, i) => {
-      const is = i === index;
-      if (is && node.getAttribute("aria-current") !== "true") this.node.scrollTo({ left: node.offsetLeft - this.node.clientWidth / 2 + node.clientWidth / 2, behavior: "smooth" });
-      node.setAttribute("aria-current", String(is));
-    });
+    markCurrent(this.node, this.items.map(({ node }) => node), index);
   }
 
   private update(): void {

@@ -1,7 +1,8 @@
 /** The studio: the scene from the field, photographs to paint on, and everything around them. */
 
+import { isTaken } from "../input";
 import { Curve, withPoint, type CurvePoint } from "../ui/curve";
-import { button, el, icon, iconButton, segments, toast } from "../ui/dom";
+import { acceptsFiles, button, el, icon, iconButton, segments, toast } from "../ui/dom";
 import { Api } from "./api";
 import { tools } from "./brush";
 import { Easel } from "./easel";
@@ -284,10 +285,8 @@ class Studio {
       if (key === "z") action = () => !this.session.isReadOnly && (e.shiftKey ? this.session.strokes.redo() : this.session.strokes.undo());
       if (key === "y") action = () => !this.session.isReadOnly && this.session.strokes.redo();
     } else {
-      // Buttons keep their own keys.
-      const isControl = target instanceof HTMLButtonElement || target instanceof HTMLInputElement || target.tagName === "SUMMARY";
-      if (isControl && (key === " " || key === "Enter")) return;
-      if (key === "Enter" && !this.isPainting && target.tagName !== "A") action = () => void this.paintHere();
+      if (isTaken(e)) return;
+      if (key === "Enter" && !this.isPainting) action = () => void this.paintHere();
       else action = both[key] ?? (this.isPainting ? painting[key] : undefined);
       if (this.isPainting && this.session.isReadOnly && key === "Delete") return;
     }
@@ -301,20 +300,9 @@ class Studio {
     if (await mayLeaveNow(this.session)) await this.session.send({ kind: "reference", name: file.name }, file);
   }
   private listenToDrops(): void {
-    const veil = el("div", { class: "drop-veil", hidden: true });
-    this.root.append(veil);
     const placeOf = (e: DragEvent) => ((e.target as HTMLElement).closest?.("[data-drop=picker]") ? "picker" : this.isPainting ? "easel" : "scene");
-    addEventListener("dragover", (e) => {
-      if (!e.dataTransfer?.types.includes("Files")) return;
-      e.preventDefault();
-      const place = placeOf(e);
-      veil.hidden = false;
-      veil.textContent = place === "picker" ? words.dropPicker : place === "easel" ? words.dropEasel : this.session.isTraining ? words.afterTraining : words.dropScene;
-    });
-    addEventListener("dragleave", (e) => (veil.hidden = e.relatedTarget === null || veil.hidden));
-    addEventListener("drop", (e) => {
-      e.preventDefault();
-      veil.hidden = true;
+    const textOf = (e: DragEvent) => ({ picker: words.dropPicker, easel: words.dropEasel, scene: this.session.isTraining ? words.afterTraining : words.dropScene })[placeOf(e)];
+    acceptsFiles(this.root, textOf, (e) => {
       const file = e.dataTransfer?.files[0];
       const place = placeOf(e);
       if (!file) return;

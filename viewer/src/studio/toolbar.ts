@@ -1,9 +1,9 @@
 /** The tools of painting, in a column beside the photograph. */
 
+import { hexAt } from "../color";
 import { el, icon, segments } from "../ui/dom";
 import { tools } from "./brush";
 import type { Easel } from "./easel";
-import { hexAt } from "./color";
 import type { TintKind } from "./reach";
 import type { Session } from "./session";
 import { words } from "./words";

@@ -1,6 +1,6 @@
 /** A line of figures over time. */
 
-const svgNs = "http://www.w3.org/2000/svg";
+import { svg } from "./dom";
 
 export type CurvePoint = [number, number];
 
@@ -18,13 +18,11 @@ export function curvePath(points: readonly CurvePoint[], width: number, height: 
 
 /** Such a line as a picture that fills its box. */
 export class Curve {
-  readonly node = document.createElementNS(svgNs, "svg");
-  private path = document.createElementNS(svgNs, "path");
+  readonly node: SVGSVGElement;
+  private path = svg("path");
 
   constructor(private readonly width: number, private readonly height: number) {
-    this.node.setAttribute("viewBox", `0 0 ${width} ${height}`);
-    this.node.setAttribute("preserveAspectRatio", "none");
-    this.node.append(this.path);
+    this.node = svg("svg", { viewBox: `0 0 ${width} ${height}`, preserveAspectRatio: "none" }, this.path);
   }
   draw(points: readonly CurvePoint[], logarithmic = false): void {
     this.path.setAttribute("d", curvePath(points, this.width, this.height, logarithmic));

@@ -14,6 +14,13 @@ export function el<K extends keyof HTMLElementTagNameMap>(tag: K, props: Props =
   return node;
 }
 
+export function svg<K extends keyof SVGElementTagNameMap>(tag: K, attributes: Record<string, string> = {}, ...children: Node[]): SVGElementTagNameMap[K] {
+  const node = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  node.append(...children);
+  return node;
+}
+
 const paths: Record<string, string> = {
   home: "M4 11 12 4l8 7M6 10v10h4v-6h4v6h4V10",
   frame: "M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5M12 9.500a2.500 2.500 0 1 0 0 5 2.500 2.500 0 0 0 0-5",
@@ -21,12 +28,7 @@ const paths: Record<string, string> = {
   link: "M10 14a4 4 0 0 0 6 .4l3-3a4 4 0 0 0-5.600-5.600l-1.500 1.500M14 10a4 4 0 0 0-6-.4l-3 3A4 4 0 0 0 10.600 18.200l1.500-1.500",
   help: "M9 9a3 3 0 1 1 4.500 2.600c-1 .6-1.500 1.200-1.500 2.400M12 17.500v.6M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18",
   panel: "M4 7h10M18 7h2M4 17h2M10 17h10M14 5v4M6 15v4",
-  play: "M7 5v14l12-7z",
-  stop: "M6 6h12v12H6z",
-  pause: "M8 5v14M16 5v14",
-  plus: "M12 5v14M5 12h14",
   close: "M6 6l12 12M18 6 6 18",
-  save: "M12 4v11M8 11l4 4 4-4M5 19h14",
   brush: "M20 4 9.500 13.500M9.500 13.500c-2.600-.3-4.300 1.300-4.500 3.500-.1 1.400-.7 2.300-1.800 3 4.200.9 8.600-.5 8.500-4.200-.1-1.200-.9-2.100-2.200-2.300",
   line: "M5 19 19 5M3.500 19a1.500 1.500 0 1 0 3 0 1.500 1.500 0 0 0-3 0M17.500 5a1.500 1.500 0 1 0 3 0 1.500 1.500 0 0 0-3 0",
   fill: "M11 3.500v3M4.500 12.500 11 6l7 7-5.500 5.500a2 2 0 0 1-2.800 0l-4.200-4.200a1.300 1.300 0 0 1 0-1.800zM5 13h12.500M20 16c1 1.600 1.500 2.500 1.500 3.200a1.500 1.500 0 0 1-3 0c0-.7.5-1.600 1.500-3.200",
@@ -43,18 +45,10 @@ const paths: Record<string, string> = {
   pencil: "M4 20l1-4.500L16 4.500l3.500 3.500-11 11zM14 6.500l3.500 3.500",
   copy: "M9 9h11v11H9zM15 9V4H4v11h5",
   photographs: "M3 7h14v11H3zM6.500 4h14.500v11M3 15.500l4-4 3.500 3.500 2-2 4.500 4.500M13 10.500v.1",
-  full: "M4 9V4h5M15 4h5v5M20 15v5h-5M9 20H4v-5",
 };
 
 export function icon(name: string): SVGSVGElement {
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  svg.setAttribute("viewBox", "0 0 24 24");
-  svg.setAttribute("class", "icon");
-  svg.setAttribute("aria-hidden", "true");
-  const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
-  path.setAttribute("d", paths[name]);
-  svg.append(path);
-  return svg;
+  return svg("svg", { viewBox: "0 0 24 24", class: "icon", "aria-hidden": "true" }, svg("path", { d: paths[name] }));
 }
 
 export function iconButton(name: string, title: string, onclick: () => void, id?: string): HTMLButtonElement {
@@ -130,6 +124,15 @@ export function segments<T extends string>(id: string, choices: [T, string][], v
   return { node, set };
 }
 
+/** Marks one of a list's nodes as the current one, and brings it into sight where it was not. */
+export function markCurrent(list: HTMLElement, nodes: readonly HTMLElement[], index: number): void {
+  nodes.forEach((node, i) => {
+    const is = i === index;
+    if (is && node.getAttribute("aria-current") !== "true") list.scrollTo({ left: node.offsetLeft - list.clientWidth / 2 + node.clientWidth / 2, behavior: "smooth" });
+    node.setAttribute("aria-current", String(is));
+  });
+}
+
 export interface Toggle {
   node: HTMLElement;
   set(value: boolean): void;
@@ -146,18 +149,28 @@ export function section(title: string, open: boolean, ...children: (Node | strin
   return el("details", { class: "section", open }, el("summary", {}, title), el("div", { class: "body" }, ...children));
 }
 
+/** Follows a pointer from where it is pressed on a node until it lets go. @param moved  takes its way since the last time too, pixels */
+export function dragged(node: GlobalEventHandlers & Element, moved: (e: PointerEvent, x: number, y: number) => void, begun = moved): void {
+  let last: PointerEvent | null = null;
+  node.addEventListener("pointerdown", (e) => {
+    last = e.button === 0 ? e : null;
+    if (!last) return;
+    node.setPointerCapture(e.pointerId);
+    begun(e, 0, 0);
+  });
+  node.addEventListener("pointermove", (e) => {
+    // The browser takes it back where it is let go, and for a gesture of its own.
+    if (!last || !node.hasPointerCapture(e.pointerId)) return;
+    const { clientX, clientY } = last;
+    moved((last = e), e.clientX - clientX, e.clientY - clientY);
+  });
+}
 /** Lets a handle be drawn across an area, or moved by its keys. @param put takes the share of the area's width */
 export function slidesAcross(handle: HTMLElement, area: () => HTMLElement, at: () => number, put: (share: number) => void, begin: () => void = () => {}): void {
-  handle.addEventListener("pointerdown", (e) => {
-    handle.setPointerCapture(e.pointerId);
-    begin();
-    const move = (m: PointerEvent) => {
-      const box = area().getBoundingClientRect();
-      put((m.clientX - box.left) / box.width);
-    };
-    handle.addEventListener("pointermove", move);
-    handle.addEventListener("pointerup", () => handle.removeEventListener("pointermove", move), { once: true });
-  });
+  dragged(handle, (e) => {
+    const box = area().getBoundingClientRect();
+    put((e.clientX - box.left) / box.width);
+  }, begin);
   handle.addEventListener("keydown", (e) => {
     const step = e.key === "ArrowRight" ? 0.02 : e.key === "ArrowLeft" ? -0.02 : 0;
     if (!step) return;
@@ -165,6 +178,24 @@ export function slidesAcross(handle: HTMLElement, area: () => HTMLElement, at: (
     e.stopPropagation();
     put(at() + step);
   });
+}
+
+/** Takes files that are dropped anywhere on the page, under a veil that says what becomes of them. */
+export function acceptsFiles(root: HTMLElement, textOf: (e: DragEvent) => string, dropped: (e: DragEvent) => void, signal?: AbortSignal): void {
+  const veil = el("div", { class: "drop-veil", hidden: true });
+  root.append(veil);
+  addEventListener("dragover", (e) => {
+    if (!e.dataTransfer?.types.includes("Files")) return;
+    e.preventDefault();
+    veil.hidden = false;
+    veil.textContent = textOf(e);
+  }, { signal });
+  addEventListener("dragleave", (e) => (veil.hidden = e.relatedTarget === null || veil.hidden), { signal });
+  addEventListener("drop", (e) => {
+    e.preventDefault();
+    veil.hidden = true;
+    dropped(e);
+  }, { signal });
 }
 
 let toastTimer = 0;

@@ -1,35 +1,27 @@
 /** Lines over the picture: the clip box with its handles, and the capture's cameras. */
 
 import type { App } from "../app";
-import { fitted, project, rayThrough, type View } from "../camera";
+import { fitted, project, rayThrough } from "../camera";
 import { add, norm, scale, sub, type Vec3 } from "../math";
-
-const svgNs = "http://www.w3.org/2000/svg";
-
-function node<K extends keyof SVGElementTagNameMap>(tag: K, attributes: Record<string, string>): SVGElementTagNameMap[K] {
-  const made = document.createElementNS(svgNs, tag);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
-}
+import { dragged, svg } from "./dom";
 
 const axisColor = ["#ff6b6b", "#7bd88f", "#6aa9ff"];
 
 export class Overlay {
-  readonly svg = node("svg", { class: "overlay" });
-  private box = node("path", { class: "box" });
-  private cameras = node("g", { class: "cameras" });
+  private box = svg("path", { class: "box" });
+  private cameras = svg("g", { class: "cameras" });
+  readonly svg = svg("svg", { class: "overlay" }, this.cameras, this.box);
   private handles: SVGCircleElement[] = [];
 
   constructor(private readonly app: App) {
-    this.svg.append(this.cameras, this.box);
     for (let i = 0; i < 6; ++i) {
-      const handle = node("circle", { r: "9", class: "handle", fill: axisColor[i % 3], "data-handle": String(i) });
-      handle.addEventListener("pointerdown", (e) => this.grab(e, i));
+      const handle = svg("circle", { r: "9", class: "handle", fill: axisColor[i % 3], "data-handle": String(i) });
+      dragged(handle, (_, x, y) => this.pull(i, x, y), (e) => e.preventDefault());
       this.handles.push(handle);
       this.svg.append(handle);
     }
-    bundleCameras(app).forEach((_, i) => {
-      const path = node("path", { class: "frustum", "data-camera": String(i) });
+    app.cameras.forEach((_, i) => {
+      const path = svg("path", { class: "frustum", "data-camera": String(i) });
       path.addEventListener("click", () => app.goToCamera(i));
       this.cameras.append(path);
     });
@@ -84,7 +76,7 @@ export class Overlay {
 
   private drawCameras(): void {
     const size = 0.06 * norm(sub(this.app.high, this.app.low));
-    bundleCameras(this.app).forEach((camera, i) => {
+    this.app.cameras.forEach((camera, i) => {
       const { lens } = camera;
       const corners = [[0, 0], [lens.width, 0], [lens.width, lens.height], [0, lens.height]].map(([x, y]) => {
         const ray = rayThrough(camera, lens, x, y);
@@ -98,43 +90,26 @@ export class Overlay {
     });
   }
 
-  private grab(e: PointerEvent, i: number): void {
-    e.stopPropagation();
-    e.preventDefault();
+  /** Moves a side along its axis, as far as the pointer went, pixels. */
+  private pull(i: number, x: number, y: number): void {
     const { app } = this;
+    const { clip } = app.settings;
+    if (!clip) return;
     const axis = i % 3;
-    const handle = this.handles[i];
-    handle.setPointerCapture(e.pointerId);
-    let last = { x: e.clientX, y: e.clientY };
-    const onMove = (m: PointerEvent) => {
-      const clip = app.settings.clip;
-      if (!clip) return;
-      const point = this.handlePoint(i);
-      const step = 0.01 * norm(sub(app.high, app.low));
-      const along: Vec3 = [0, 0, 0];
-      along[axis] = step;
-      const from = this.at(point);
-      const to = this.at(add(point, along));
-      const direction = { x: to.x - from.x, y: to.y - from.y };
-      const length2 = Math.max(direction.x ** 2 + direction.y ** 2, 1);
-      const shift = (step * ((m.clientX - last.x) * direction.x + (m.clientY - last.y) * direction.y)) / length2;
-      last = { x: m.clientX, y: m.clientY };
-      const low: Vec3 = [...clip.low];
-      const high: Vec3 = [...clip.high];
-      const least = app.bundle.levels.at(-1)!.voxelSize;
-      if (i < 3) low[axis] = Math.min(high[axis] - least, Math.max(app.low[axis], low[axis] + shift));
-      else high[axis] = Math.max(low[axis] + least, Math.min(app.high[axis], high[axis] + shift));
-      app.set({ clip: { low, high } });
-    };
-    const onUp = () => {
-      handle.removeEventListener("pointermove", onMove);
-      handle.removeEventListener("pointerup", onUp);
-    };
-    handle.addEventListener("pointermove", onMove);
-    handle.addEventListener("pointerup", onUp);
+    const point = this.handlePoint(i);
+    const step = 0.01 * norm(sub(app.high, app.low));
+    const along: Vec3 = [0, 0, 0];
+    along[axis] = step;
+    const from = this.at(point);
+    const to = this.at(add(point, along));
+    const direction = { x: to.x - from.x, y: to.y - from.y };
+    const length2 = Math.max(direction.x ** 2 + direction.y ** 2, 1);
+    const shift = (step * (x * direction.x + y * direction.y)) / length2;
+    const low: Vec3 = [...clip.low];
+    const high: Vec3 = [...clip.high];
+    const least = app.bundle.levels.at(-1)!.voxelSize;
+    if (i < 3) low[axis] = Math.min(high[axis] - least, Math.max(app.low[axis], low[axis] + shift));
+    else high[axis] = Math.max(low[axis] + least, Math.min(app.high[axis], high[axis] + shift));
+    app.set({ clip: { low, high } });
   }
-}
-
-function bundleCameras(app: App): View[] {
-  return app.bundle.cameras;
 }

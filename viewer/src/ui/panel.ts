@@ -121,9 +121,9 @@ export class Panel {
       };
       return el("div", { class: "pair" }, make("low"), make("high"));
     });
-    const text = el("code", { id: "aabb", title: "Copy" });
-    text.addEventListener("click", () => copyText(text.textContent ?? "", "--aabb copied", "--aabb:"));
-    const body = el("div", { class: "stack" }, ...rows, text, el("p", { class: "note" }, "For cnerf bake; click to copy. The handles in the picture move the sides."));
+    const text = el("code", { id: "aabb" });
+    const copy = button("Copy", () => void copyText(text.textContent ?? "", "--aabb copied", "--aabb:"), { id: "copy-aabb" });
+    const body = el("div", { class: "stack" }, ...rows, text, el("div", { class: "buttons" }, copy), el("p", { class: "note" }, "For cnerf bake. The handles in the picture move the sides."));
     this.refreshers.push(() => {
       const { clip } = app.settings;
       on.set(!!clip);
@@ -232,10 +232,13 @@ export class Panel {
     if (this.keys.length < 2) return toast("Two key frames make a path");
     const begin = performance.now();
     const step = (now: number) => {
+      this.playing = 0;
+      // Key frames can be removed meanwhile.
+      if (this.keys.length < 2) return;
       const t = Math.max(0, (now - begin) / 1000 / this.seconds);
       const view = viewAt(this.keys, Math.min(1, t) * (this.keys.length - 1));
       this.app.setView(view, this.app.pivot(view));
-      this.playing = t < 1 ? requestAnimationFrame(step) : 0;
+      if (t < 1) this.playing = requestAnimationFrame(step);
     };
     this.playing = requestAnimationFrame(step);
   }

@@ -1,7 +1,8 @@
 /** The page in a real browser, drawing with SwiftShader: `ctest -L viewer`. */
 
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, describe, it } from "node:test";
 import { brightness, builtPage, chroma, decoded, fixture, get, launch, meanAlpha, open, picture, psnr, psnrOfPictures, serve, set } from "./support.mjs";
@@ -76,6 +77,10 @@ describe("settings", () => {
     await page.mouse.move(160, 160, { steps: 4 });
     await page.mouse.up();
     assert.ok(Math.abs((await get(page, "wipe")) - 0.25) < 0.02);
+    await page.mouse.down({ button: "right" });
+    await page.mouse.move(400, 160, { steps: 4 });
+    await page.mouse.up({ button: "right" });
+    assert.ok(Math.abs((await get(page, "wipe")) - 0.25) < 0.02, "the right button has a menu of its own");
   });
   it("saturation 0 is grey at the same luminance, 2 more colourful", async () => {
     await reset();
@@ -264,6 +269,19 @@ describe("camera", () => {
     await page.evaluate(() => document.querySelector('.thumbnail[data-camera="2"]').click());
     assert.equal(await page.evaluate(() => window.cnerf.app.captureCamera), 2);
   });
+  it("plays key frames until they are removed", async () => {
+    await reset();
+    await click("add-key");
+    await page.evaluate(() => window.cnerf.app.goToCamera(1));
+    await click("add-key");
+    await click("play-path");
+    await page.evaluate(() => {
+      for (let i = 0; i < 2; ++i) document.querySelector("#key-frames .remove").click();
+    });
+    await drawn();
+    assert.equal(await page.evaluate(() => window.cnerf.panel.playing), 0);
+    assert.deepEqual(page.problems, []);
+  });
   it("is in the address, with the settings", async () => {
     await reset();
     await set(page, { saturation: 1.4, gain: 3 });
@@ -273,6 +291,47 @@ describe("camera", () => {
     assert.ok(psnrOfPictures(await picture(page), await picture(other)) > 60);
     assert.equal(await get(other, "gain"), 3);
     await other.close();
+  });
+});
+
+describe("keyboard", () => {
+  it("goes through the page with Tab, presses buttons, and has the settings on M", async () => {
+    await reset();
+    const isOpen = () => page.evaluate(() => document.body.classList.contains("panel-open"));
+    const before = await isOpen();
+    await page.keyboard.press("m");
+    assert.equal(await isOpen(), !before);
+    await page.keyboard.press("m");
+    await page.focus("#settings");
+    await page.keyboard.press("Shift+Tab");
+    assert.equal(await page.evaluate(() => document.activeElement.id), "help");
+    await page.keyboard.press("Space");
+    assert.equal(await page.evaluate(() => document.querySelector(".veil").hidden), false);
+    await page.keyboard.press("Escape");
+    assert.equal(await isOpen(), before);
+    const isLeft = await page.evaluate(() => document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft", code: "ArrowLeft", altKey: true, bubbles: true, cancelable: true })));
+    assert.equal(isLeft, true, "the browser goes back with it");
+  });
+});
+
+describe("a running command", () => {
+  it("is asked for again where its news were refused", async () => {
+    const folder = mkdtempSync(join(tmpdir(), "cnerf-live-"));
+    mkdirSync(join(folder, "live"));
+    const state = { version: 1, title: "room", task: "stage 1", fraction: 0.25, seconds: 3, paused: false, stopping: false, finished: false, message: "", figures: {}, curves: {}, pictures: [] };
+    writeFileSync(join(folder, "live/state"), JSON.stringify(state));
+    writeFileSync(join(folder, "live/events"), "");
+    let asked = 0;
+    const own = await serve([builtPage, folder], (path, bytes) => (path === "/live/events" ? ((asked += 1), null) : bytes));
+    const shown = await open(context, own.url);
+    for (let i = 0; i < 600 && asked < 2; ++i) await shown.waitForTimeout(100);
+    assert.ok(asked >= 2);
+    assert.match(await shown.locator("#live-status").textContent(), /waiting for it/);
+    assert.equal(await shown.locator("[role=progressbar]").getAttribute("aria-valuenow"), "25");
+    assert.deepEqual(shown.problems, []);
+    await shown.close();
+    await own.close();
+    rmSync(folder, { recursive: true });
   });
 });
 

@@ -28,8 +28,8 @@ after(async () => {
 
 const until = (shown, what, argument) => shown.waitForFunction(what, argument, { timeout: patience });
 const saved = (shown) => until(shown, () => window.cnerf.session.strokes.isSaved);
-/** What the server has. */
-const strokesOf = async (shown) => (await shown.evaluate(async () => (await fetch("./studio/strokes", { cache: "no-store" })).json())).strokes;
+/** What the server has; it leaves out what is 0, false or empty. */
+const strokesOf = async (shown) => (await shown.evaluate(async () => (await fetch("./studio/strokes", { cache: "no-store" })).json())).strokes.map((stroke) => ({ softness: 0, hidden: false, points: [], ...stroke }));
 const shownStrokes = (shown) => shown.evaluate(() => window.cnerf.session.strokes.list);
 async function paintOn(shown, view) {
   await shown.evaluate((i) => window.cnerf.studio.paint(i), view);
@@ -57,6 +57,7 @@ const seen = (shown, u, v) =>
     const [px, py] = [Math.floor(x * layer.width), Math.floor(y * layer.height)];
     return { color: layer.colorAt(px, py), grey: layer.grey[py * layer.width + px] };
   }, [u, v]);
+const tint = (shown, kind) => shown.evaluate((k) => window.cnerf.studio.easel.setTint(k), kind);
 const brush = (shown, settings) => shown.evaluate((s) => window.cnerf.session.brush.set(s), settings);
 async function clear(shown) {
   await shown.evaluate(() => window.cnerf.session.strokes.change([]));
@@ -261,6 +262,21 @@ describe("painting", () => {
     assert.equal((await shownStrokes(page)).length, before);
     assert.equal(await page.evaluate(() => window.cnerf.session.photo), 2);
   });
+  it("takes away what is undone while a stroke is under way", async () => {
+    await clear(page);
+    await tint(page, "none");
+    await draw(page, [[0.2, 0.2], [0.3, 0.2]]);
+    assert.ok((await seen(page, 0.25, 0.2)).color);
+    const { x, y } = await place(page, 0.6, 0.6);
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await page.evaluate(() => window.cnerf.session.strokes.undo());
+    await page.mouse.move(x + 30, y, { steps: 3 });
+    await page.mouse.up();
+    assert.equal((await seen(page, 0.25, 0.2)).color, null);
+    assert.ok((await seen(page, 0.6, 0.6)).color);
+    await tint(page, "reach");
+  });
 });
 
 describe("what to paint", () => {
@@ -302,7 +318,7 @@ describe("a stroke's word", () => {
   it("is said in the list, and kept with the stroke whatever is done to it", async () => {
     await clear(page);
     await paintOn(page, 1);
-    await brush(page, { tool: "brush", color: "#c03020", size: 0.05, exact: false });
+    await brush(page, { tool: "brush", color: "#c03020", size: 0.05, softness: 0, exact: false });
     for (const y of [0.3, 0.5, 0.7]) await draw(page, [[0.3, y], [0.4, y]]);
     for (const index of [0, 2]) {
       await naming(index).click();
@@ -327,6 +343,9 @@ describe("a stroke's word", () => {
     await answer("a, b");
     assert.equal((await shownStrokes(page))[2].word, "jacket", "no word has a comma");
     await naming(0).click();
+    await answer("ж".repeat(33));
+    assert.equal((await shownStrokes(page))[2].word, "jacket", "nor 66 bytes");
+    await naming(0).click();
     await answer("");
     await saved(page);
     assert.deepEqual((await strokesOf(page)).map((s) => s.word), ["jacket", undefined, undefined]);
@@ -342,7 +361,10 @@ describe("work", () => {
     await page.waitForSelector("body[data-ready]", { timeout: patience });
     await until(page, () => window.cnerf.session.strokes.list.length > 0);
     assert.deepEqual(await shownStrokes(page), before);
+    await tint(page, "none");
     await paintOn(page, 1);
+    assert.ok((await seen(page, 0.35, 0.5)).color, "a stroke without softness is drawn too");
+    await tint(page, "reach");
     await draw(page, [[0.3, 0.3], [0.35, 0.3]]);
     await saved(page);
     assert.equal((await strokesOf(page)).length, before.length + 1);
@@ -370,6 +392,7 @@ describe("work", () => {
     await paintOn(second, 1);
     await draw(second, [[0.5, 0.5], [0.6, 0.5]]);
     assert.equal((await shownStrokes(second)).length, 2, "it cannot paint");
+    assert.notEqual(await second.evaluate(() => (document.getElementById("saturation").focus(), document.activeElement.id)), "saturation", "nor change the finish by keyboard");
     await draw(page, [[0.5, 0.5], [0.6, 0.5]]);
     await until(second, () => window.cnerf.session.strokes.list.length === 3);
     await second.waitForFunction(() => {
@@ -388,6 +411,16 @@ describe("work", () => {
     await draw(page, [[0.7, 0.7], [0.75, 0.7]]);
     assert.equal(await page.evaluate(() => window.cnerf.session.strokes.isSaved), false);
     await mock.start(port);
+    await page.waitForSelector("#notice[hidden]", { state: "attached", timeout: patience });
+    await saved(page);
+    assert.equal((await strokesOf(page)).length, held.length + 1);
+  });
+  it("goes on after one request that failed, though nothing else happens", async () => {
+    const held = await strokesOf(page);
+    const noticed = page.waitForSelector("#notice:not([hidden])", { timeout: patience });
+    await page.route("**/studio/reach", (route) => route.abort(), { times: 1 });
+    await draw(page, [[0.2, 0.8], [0.25, 0.8]]);
+    await noticed;
     await page.waitForSelector("#notice[hidden]", { state: "attached", timeout: patience });
     await saved(page);
     assert.equal((await strokesOf(page)).length, held.length + 1);
@@ -872,6 +905,9 @@ describe("a painted PNG", { skip: standIn }, () => {
     await shown.keyboard.press("Control+Shift+z");
     await saved(shown);
     assert.deepEqual(kinds(), ["paint", "picture"]);
+    await draw(shown, [[0.7, 0.8], [0.8, 0.8]]);
+    await saved(shown);
+    assert.deepEqual(kinds(), ["paint", "picture", "paint"], "painting goes on");
     assert.deepEqual(shown.problems, []);
     await close();
   });
@@ -992,6 +1028,14 @@ describe("the keyboard", { skip: standIn }, () => {
     assert.equal((await shownStrokes(shown)).length, strokes);
     assert.equal(await shown.locator(".slider").first().getAttribute("title"), "Double click, or Delete, resets");
   });
+  it("leaves out a slider that is switched off, and hears what the disc has", async () => {
+    const focused = (id) => shown.evaluate((name) => (document.activeElement.blur(), document.getElementById(name).focus(), document.activeElement.id === name), id);
+    assert.equal(await focused("reach"), true);
+    await brush(shown, { exact: true });
+    assert.equal(await focused("reach"), false);
+    await brush(shown, { exact: false });
+    assert.match(await shown.locator(".disc").getAttribute("aria-valuenow"), /^\d+$/);
+  });
   it("picks the colours of a picture", async () => {
     // Blue on the left, red on the right.
     const halves = Buffer.alloc(64 * 48 * 3);
@@ -1011,6 +1055,31 @@ describe("the keyboard", { skip: standIn }, () => {
     assert.equal(await picked(), "#c8281e");
     assert.equal(await shown.evaluate(() => window.cnerf.session.photo), 1, "the photograph is still open");
     assert.deepEqual(shown.problems, []);
+  });
+});
+
+describe("a pen", { skip: standIn }, () => {
+  it("goes on drawing where the hand comes to rest", async () => {
+    const { shown, close } = await opened({});
+    await until(shown, () => window.cnerf?.studio.field.settled);
+    await paintOn(shown, 1);
+    const [from, to] = [await place(shown, 0.4, 0.5), await place(shown, 0.6, 0.5)];
+    await shown.evaluate(([first, last]) => {
+      const { canvas } = window.cnerf.studio.easel;
+      // Pointers that only events tell of cannot be captured.
+      canvas.setPointerCapture = () => {};
+      const at = (type, pointerType, pointerId, { x, y }) => canvas.dispatchEvent(new PointerEvent(type, { pointerType, pointerId, pressure: 0.5, clientX: x, clientY: y, bubbles: true }));
+      at("pointerdown", "pen", 21, first);
+      at("pointerdown", "touch", 22, { x: last.x + 40, y: last.y + 60 });
+      at("pointermove", "touch", 22, { x: last.x + 45, y: last.y + 60 });
+      at("pointermove", "pen", 21, last);
+      at("pointerup", "touch", 22, { x: last.x + 45, y: last.y + 60 });
+      at("pointermove", "pen", 21, { x: last.x, y: last.y + 20 });
+      at("pointerup", "pen", 21, { x: last.x, y: last.y + 20 });
+    }, [from, to]);
+    assert.deepEqual((await shownStrokes(shown)).map((stroke) => stroke.points.length), [3]);
+    assert.deepEqual(shown.problems, []);
+    await close();
   });
 });
 

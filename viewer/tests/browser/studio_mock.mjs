@@ -64,6 +64,9 @@ function camera(index, count, { width, height }) {
 }
 const luma = (rgb, p) => Math.round(0.2126 * rgb[p] + 0.7152 * rgb[p + 1] + 0.0722 * rgb[p + 2]);
 
+/** A stroke as the program writes it: without what is 0, false or empty. */
+const written = (stroke) => Object.fromEntries(Object.entries(stroke).filter(([, value]) => value && value.length !== 0));
+
 const wantedKinds = /\.(jpe?g|png|tiff?|webp|mp4|mov|mkv|avi|webm|m4v|json|bin|txt|npy|npz|xml|csv|xmp|exr|ply)$/i;
 
 /**
@@ -137,7 +140,7 @@ export class StudioMock {
       "GET scene": () => this.json(response, 200, this.state.stage === "photographs" ? { title: "", run: "/runs/ball", up: "+y", centre: [0, 0, 0], radius: 1, views: [], home: 0 } : this.scene),
       "GET state": () => this.json(response, 200, this.state),
       "GET events": () => this.events(url.searchParams.get("client") ?? "", response),
-      "GET strokes": () => this.json(response, 200, { revision: this.state.strokes, strokes: this.strokes, viewpoints: this.viewpoints, ...(this.everywhere ? { everywhere: true } : {}) }),
+      "GET strokes": () => this.json(response, 200, { revision: this.state.strokes, strokes: this.strokes.map(written), viewpoints: this.viewpoints, ...(this.everywhere ? { everywhere: true } : {}) }),
       "GET painted": () => {
         const bytes = this.painted.get(url.searchParams.get("picture"));
         return bytes ? response.writeHead(200, { "Content-Type": "image/png" }).end(bytes) : this.refuse(response, 404, "There is no such picture.");

@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { lookAt, orbited, type View } from "../../src/camera";
 import { aabbText, fromHash, toHash } from "../../src/hash";
+import { isTaken, pinched } from "../../src/input";
 import { keysFromJson, pathJson, viewAt } from "../../src/keyframes";
 import { durationText, figureText } from "../../src/live";
 import { curvePath, withPoint, type CurvePoint } from "../../src/ui/curve";
@@ -57,6 +58,20 @@ describe("key frames", () => {
     expect(keysFromJson(JSON.stringify(other))[0].lens.fx).toBeCloseTo(50 / Math.tan(0.45), 9);
     expect(() => keysFromJson("{}")).toThrow(/frames/);
     expect(() => keysFromJson('{"frames":[{"transform_matrix":[1]}]}')).toThrow(/frames\[0\].transform_matrix/);
+  });
+});
+
+describe("keys and fingers", () => {
+  it("leave to the browser and to buttons what is theirs", () => {
+    const taken = (key: string, target: string, altKey = false) => isTaken({ key, altKey, target: { matches: (list: string) => list.split(", ").includes(target) } } as unknown as KeyboardEvent);
+    for (const control of ["button", "summary", "a", "input"]) expect([" ", "Enter", "g"].map((key) => taken(key, control))).toEqual([true, true, false]);
+    expect([" ", "Enter"].map((key) => taken(key, "body"))).toEqual([false, false]);
+    expect(["ArrowLeft", "d", "["].map((key) => taken(key, "body", true))).toEqual([true, true, false]);
+  });
+  it("tell how far two fingers went apart", () => {
+    const fingers = new Map([[4, { x: 0, y: 0 }], [7, { x: 20, y: 0 }]]);
+    expect(pinched(fingers, 7, { x: 50, y: 0 })).toEqual({ factor: 2.5, middle: { x: 25, y: 0 } });
+    expect(pinched(fingers, 4, { x: 19, y: 0 }).factor, "as good as one").toBe(1);
   });
 });
 

@@ -1,10 +1,19 @@
-import { describe, expect, it } from "vitest";
-import { Lost, Refusal } from "../../src/studio/api";
+import { afterEach, describe, expect, it, vi } from "vitest";
+import { follow } from "../../src/follow";
+import { Api, Lost, Refusal } from "../../src/studio/api";
 import { Brush } from "../../src/studio/brush";
 import { merged, StrokeDocument, type StrokeList } from "../../src/studio/document";
-import type { Stroke, Viewpoint } from "../../src/studio/protocol";
-import { Latest } from "../../src/studio/reach";
+import type { Tint } from "../../src/studio/paint";
+import type { Scene, State, Stroke, Viewpoint } from "../../src/studio/protocol";
+import { Latest, TintFeed } from "../../src/studio/reach";
 import { FrameScheduler, type FrameWish } from "../../src/studio/scheduler";
+import { Session } from "../../src/studio/session";
+import { storage } from "../../src/studio/storage";
+
+afterEach(() => {
+  vi.unstubAllGlobals();
+  vi.useRealTimers();
+});
 
 const stroke = (id: string, more: Partial<Stroke> = {}): Stroke => ({ id, view: "v", kind: "paint", color: "#c08040", size: 0.02, softness: 0, reach: 1, hidden: false, points: [[0.5, 0.5, 1]], ...more });
 const ids = (list: StrokeList) => list.map((s) => s.id).join("");
@@ -420,13 +429,16 @@ class Bench {
   timers: { at: number; call: () => void }[] = [];
   sent: { wish: FrameWish<string>; answer: (frame: string | null) => void; fail: (e: Error) => void }[] = [];
   shown: string[] = [];
+  dropped: string[] = [];
   drawing = 0;
   problems: unknown[] = [];
+  failed = (problem: unknown) => void this.problems.push(problem);
   scheduler = new FrameScheduler<string, string>({
     fetch: (wish) => new Promise((answer, fail) => this.sent.push({ wish, answer, fail })),
     cost: () => this.drawing,
     show: (frame, wish) => this.shown.push(`${frame} ${wish.share.toFixed(2)}`),
-    failed: (problem) => this.problems.push(problem),
+    drop: (frame) => this.dropped.push(frame),
+    failed: (problem) => this.failed(problem),
     now: () => this.time,
     later: (call, milliseconds) => void this.timers.push({ at: this.time + milliseconds, call }),
   });
@@ -496,6 +508,7 @@ describe("frames", () => {
     old.answer("a");
     await bench.settle();
     expect(bench.shown.at(-1)![0]).toBe("b");
+    expect(bench.dropped, "it is let go").toEqual(["a"]);
   });
   it("get as fine as a tenth of a second allows", async () => {
     for (const [cost, share] of [[1000, Math.sqrt(0.1)], [40, 1], [8000, Math.sqrt(100 / 8000)]]) {
@@ -558,6 +571,161 @@ describe("frames", () => {
     expect(bench.sent).toHaveLength(0);
     await bench.pass(2000);
     expect(bench.sent.map((s) => s.wish.camera)).toEqual(["b"]);
+  });
+  it("go on after a failure that nobody expected", async () => {
+    const bench = new Bench();
+    bench.failed = (problem) => {
+      throw problem;
+    };
+    const asked = vi.spyOn(bench.scheduler as unknown as { ask(): Promise<void> }, "ask");
+    bench.scheduler.look("a");
+    const told = expect(asked.mock.results[0].value).rejects.toThrow("odd");
+    bench.sent.shift()!.fail(new Error("odd"));
+    await told;
+    await bench.pass(2000);
+    expect(bench.sent.map((s) => s.wish.camera)).toEqual(["a"]);
+  });
+});
+
+/** What the server answers next. */
+const answering = (body: BodyInit | null, status = 200) => vi.stubGlobal("fetch", async () => new Response(body, { status }));
+
+describe("the server's answers", () => {
+  it("leave out of strokes what has its default", async () => {
+    const [painted, hard] = [{ id: "p", view: "v", kind: "picture", color: "#808080", size: 0.02, reach: 1, picture: "0123456789ab" }, { ...stroke("h"), softness: undefined, hidden: undefined }];
+    answering(JSON.stringify({ revision: 3, strokes: [painted, hard], viewpoints: [] }));
+    const { strokes, everywhere } = await new Api().strokes();
+    expect(strokes[0]).toEqual({ ...painted, softness: 0, hidden: false, points: [] });
+    expect(strokes[1]).toEqual(stroke("h"));
+    expect(everywhere).toBe(false);
+  });
+  it("that break off are those of a server that is lost", async () => {
+    answering(new ReadableStream({ start: (body) => body.error(new TypeError("the connection was reset")) }));
+    await expect(new Api().state()).rejects.toBeInstanceOf(Lost);
+  });
+  it("may have no body", async () => {
+    answering(null, 204);
+    expect(await new Api().frame({ ...viewpoint("v"), sides: [""] })).toBe(null);
+  });
+});
+
+describe("a browser that keeps nothing", () => {
+  const kinds = ["localStorage", "sessionStorage"] as const;
+  it("has a studio all the same, which knows that it is not kept", async () => {
+    for (const kind of kinds) Object.defineProperty(globalThis, kind, { configurable: true, get: () => { throw new Error("SecurityError"); } });
+    expect(new Api().client).toMatch(/^[a-z0-9]{16}$/);
+    const brush = new Brush();
+    brush.set({ size: 0.1 });
+    expect(brush.settings.size).toBe(0.1);
+    const store = new Store();
+    const document = new StrokeDocument(store, storage("localStorage"), "key");
+    store.fail = new Lost("away");
+    document.add(stroke("a"));
+    await document.save();
+    expect(document.isKept).toBe(false);
+    for (const kind of kinds) delete (globalThis as Record<string, unknown>)[kind];
+  });
+});
+
+describe("a stream", () => {
+  it("is opened anew where it was refused, until it is ended", () => {
+    vi.useFakeTimers();
+    const made: { readyState: number; onmessage: (event: { data: string }) => void; onerror: () => void; close: () => void }[] = [];
+    class Stream {
+      static readonly CLOSED = 2;
+      readyState = 0;
+      close = vi.fn();
+      constructor(readonly url: string) {
+        made.push(this as never);
+      }
+    }
+    vi.stubGlobal("EventSource", Stream);
+    const heard: number[] = [];
+    const lost = vi.fn();
+    const end = follow<{ version: number }>("./events", ({ version }) => heard.push(version), lost);
+    made[0].onerror();
+    vi.advanceTimersByTime(5000);
+    expect(made, "the browser connects again by itself").toHaveLength(1);
+    made[0].readyState = Stream.CLOSED;
+    made[0].onerror();
+    vi.advanceTimersByTime(5000);
+    expect(made).toHaveLength(2);
+    made[1].onmessage({ data: '{"version":7}' });
+    end();
+    vi.advanceTimersByTime(5000);
+    expect([heard, lost.mock.calls.length, made.length]).toEqual([[7], 2, 2]);
+    expect(made[1].close).toHaveBeenCalled();
+  });
+});
+
+describe("a session", () => {
+  it("that lost the server asks until it answers, though its stream says nothing", async () => {
+    vi.useFakeTimers();
+    vi.stubGlobal("window", globalThis);
+    vi.stubGlobal("document", { getElementById: () => ({ classList: { add: () => {}, remove: () => {} } }) });
+    const store = new Store();
+    const state = { stage: "field", scene: 1, strokes: 0, take: "", writer: "", version: 1 } as State;
+    const answers = vi.fn(async () => state).mockRejectedValueOnce(new Lost("away"));
+    const api = Object.assign(store, { client: "me", state: answers, scene: async () => ({ run: "r" }) });
+    const session = new Session(api as unknown as Api, { run: "r", views: [] as Scene["views"] } as Scene, state);
+    session.explain(new Lost("one request"));
+    session.strokes.add(stroke("a"));
+    await vi.advanceTimersByTimeAsync(2000);
+    expect([session.isLost, store.list]).toEqual([true, []]);
+    await vi.advanceTimersByTimeAsync(2000);
+    expect([session.isLost, ids(store.list)]).toEqual([false, "a"]);
+    await vi.advanceTimersByTimeAsync(9000);
+    expect(answers).toHaveBeenCalledTimes(2);
+  });
+  it("whose stream broke waits for it, and one that ended asks for nothing", async () => {
+    vi.useFakeTimers();
+    const state = { stage: "field", scene: 1, strokes: 0, take: "", writer: "", version: 1 } as State;
+    const answers = vi.fn(async () => state);
+    let broken = () => {};
+    const listen = (_: unknown, lost: () => void) => ((broken = lost), () => {});
+    const api = Object.assign(new Store(), { client: "me", state: answers, listen });
+    const session = new Session(api as unknown as Api, { run: "r", views: [] as Scene["views"] } as Scene, state);
+    void session.listen();
+    broken();
+    await vi.advanceTimersByTimeAsync(5000);
+    expect(session.isLost).toBe(true);
+    session.end();
+    session.lose();
+    answers.mockClear();
+    await vi.advanceTimersByTimeAsync(9000);
+    expect([session.isLost, answers.mock.calls.length]).toEqual([false, 0]);
+  });
+});
+
+describe("a tint", () => {
+  it("that comes when another one is wanted is left out, and its picture let go", async () => {
+    const answers: (() => void)[] = [];
+    const close = vi.fn();
+    vi.stubGlobal("createImageBitmap", async () => ({ width: 1, height: 1, close }));
+    vi.stubGlobal("OffscreenCanvas", class {
+      getContext = () => ({ drawImage: () => {}, getImageData: () => ({ data: new Uint8ClampedArray([200, 40, 30, 255]) }) });
+    });
+    const session = { open: "v", photo: 0, strokes: { unsaved: [], revision: 1, everywhere: false }, api: { reach: () => new Promise<Blob>((done) => answers.push(() => done(new Blob()))) } };
+    const put: (Tint | null)[] = [];
+    const feed = new TintFeed(session as unknown as Session, (_, tint) => put.push(tint));
+    const answer = async () => {
+      answers.shift()!();
+      await new Promise((done) => setTimeout(done));
+    };
+    feed.ask("reach", "v", null);
+    feed.ask("reach", "v", null);
+    feed.ask("none", "v", null);
+    await answer();
+    expect(put).toEqual([null]);
+    expect(answers, "nor is it asked for").toHaveLength(0);
+    // While a stroke grows one wish follows the other: each answer is shown.
+    feed.ask("reach", "v", null);
+    feed.ask("reach", "v", null);
+    await answer();
+    expect(put).toHaveLength(2);
+    await answer();
+    expect(put[2]).toMatchObject({ width: 1, height: 1 });
+    expect(close).toHaveBeenCalledTimes(3);
   });
 });
 

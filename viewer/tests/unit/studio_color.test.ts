@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { coloredPixel, hexAt, hexOf, inGamut, labFromRgb, labOfHex, lightnessOfCode, linearFromSrgb, mappedIntoGamut, rgbFromLab, rgbOfHex, type Rgb } from "../../src/studio/color";
+import { coloredPixel, hexAt, hexOf, inGamut, labFromRgb, labOfHex, lightnessOfCode, linearFromSrgb, mappedIntoGamut, rgbFromLab, rgbOfHex, type Rgb } from "../../src/color";
 import { coverSegment, PaintLayer, planesOf, strokeAt, tintOf } from "../../src/studio/paint";
 import type { Stroke, StrokePoint } from "../../src/studio/protocol";
 

@@ -84,6 +84,8 @@ export function rgbOfHex(text: string): Rgb | null {
   if (!/^[0-9a-f]{6}$/i.test(digits)) return null;
   return [0, 2, 4].map((i) => parseInt(digits.slice(i, i + 2), 16)) as Rgb;
 }
+/** Linear Rec.709; black where the text is no colour. */
+export const linearOfHex = (text: string) => (rgbOfHex(text) ?? [0, 0, 0]).map((v) => linearOfCode[v]) as Rgb;
 export const labOfHex = (text: string): Lab => labFromRgb(rgbOfHex(text) ?? [128, 128, 128]);
 /** How a brush's colour looks at a lightness. */
 export const hexAt = (color: string, lightness: number) => hexOf(rgbFromLab({ ...labOfHex(color), lightness }));
