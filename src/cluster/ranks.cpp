@@ -35,6 +35,9 @@ std::string work_key(std::int64_t work, const std::string& what) {
 std::string result_key(std::int64_t work, std::int64_t piece) {
   return work_key(work, "result/" + std::to_string(piece));
 }
+std::string there_key(std::int64_t work, std::int64_t piece) {
+  return work_key(work, "there/" + std::to_string(piece));
+}
 
 // Values of any size: how many bytes there are, and as many of them as fit beside that; the others as values of their
 // own.
@@ -265,6 +268,14 @@ std::optional<Bytes> JoinedRanks::take(std::int64_t work, std::int64_t piece, bo
 
 void JoinedRanks::took(std::int64_t work) {
   guarded([&] { store_->add(work_key(work, "taken"), 1); });
+}
+
+void JoinedRanks::announce(std::int64_t work, std::int64_t piece) {
+  guarded([&] { store_->add(there_key(work, piece), 1); });
+}
+
+void JoinedRanks::await(std::int64_t work, std::int64_t piece) {
+  wait_for([&] { return store_->add(there_key(work, piece), 0) > 0; }, "a piece of work", kNoLimit);
 }
 
 void JoinedRanks::leave(const std::optional<std::string>& error) {

@@ -20,7 +20,8 @@ inline constexpr Seconds kNoLimit{1e9};
 
 inline constexpr std::int64_t kMostAhead = 64;  ///< pieces of a work whose results wait for rank 0
 
-/// All operations but `next`, `put`, `take` and `took` are to be called by all ranks in the same order. All of them
+/// All operations but `next`, `put`, `take`, `took`, `announce` and `await` are to be called by all ranks in the same
+/// order. All of them
 /// @throws RankError  when a rank died, stopped, failed or cannot be reached; the message names it.
 class Ranks {
  public:
@@ -59,6 +60,9 @@ class Ranks {
   }
   /// For rank 0: one more piece is dealt with.
   virtual void took(std::int64_t /*work*/) {}
+  /// Tells all ranks that a piece is there; `await` returns once it is.
+  virtual void announce(std::int64_t /*work*/, std::int64_t /*piece*/) {}
+  virtual void await(std::int64_t /*work*/, std::int64_t /*piece*/) {}
 
   // In terms of the above.
   /// What rank 0 says.
@@ -117,6 +121,8 @@ class JoinedRanks final : public Ranks {
   void put(std::int64_t work, std::int64_t piece, const Bytes& result) override;
   [[nodiscard]] std::optional<Bytes> take(std::int64_t work, std::int64_t piece, bool waits) override;
   void took(std::int64_t work) override;
+  void announce(std::int64_t work, std::int64_t piece) override;
+  void await(std::int64_t work, std::int64_t piece) override;
 
   /// Ends together with the others; with an error of this process, which they are told of.
   void leave(const std::optional<std::string>& error);

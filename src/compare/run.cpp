@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <iterator>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -38,9 +37,13 @@ void begin_report(const fs::path& folder, ExistingReport existing) {
 }
 
 Run::Run(Plan plan, Config config, Observer& observer)
-    : plan_(std::move(plan)), config_(std::move(config)), observer_(observer), engines_(engines_for(config_.device)) {
-  if (!plan_.only_report) encoder_ = make_picture_encoder();
-  if (!plan_.lpips_weights.empty()) lpips_ = std::make_unique<Lpips>(plan_.lpips_weights);
+    : plan_(std::move(plan)),
+      config_(std::move(config)),
+      observer_(observer),
+      engines_(engines_for(config_.device)),
+      lpips_(plan_.lpips_weights.empty() ? nullptr : std::make_unique<Lpips>(plan_.lpips_weights)),
+      encoder_(plan_.only_report ? nullptr : make_picture_encoder()),
+      bench_{plan_, config_, engines_, lpips_.get(), encoder_.get(), observer_} {
   if (config_.colorizer.spec.starts_with(std::string(kSimulated) + ":")) {
     throw UsageError("colorizer \"" + config_.colorizer.spec + "\": simulated takes nothing after it");
   }
@@ -48,15 +51,12 @@ Run::Run(Plan plan, Config config, Observer& observer)
 }
 
 void Run::run() {
-  const bool is_shared = !cluster::world().is_alone() && !plan_.only_report;
-  if (is_shared) make_cells_together();
+  const bool is_alone = cluster::world().is_alone();
+  if (!is_alone && !plan_.only_report) make_cells_together();
   for (const auto& subject : subjects_) {
     for (const int seed : plan_.seeds) {
-      if (plan_.only_report || is_shared) {
-        read_cells(*subject, seed);
-      } else {
-        std::ranges::move(make_cells(*subject, seed), std::back_inserter(cells_));
-      }
+      if (is_alone && !plan_.only_report) make_colors(*subject, seed, /*are_judged=*/true);
+      read_cells(*subject, seed);
     }
   }
   if (cells_.empty()) throw UsageError(plan_.report.string() + ": no finished method of these captures and seeds");
@@ -66,26 +66,51 @@ void Run::run() {
   });
 }
 
+/// Pieces are the trainings of all captures and seeds, then the judging of each cell. Those are short, so that all
+/// ranks are busy to the end.
 void Run::make_cells_together() {
-  const std::size_t seeds = plan_.seeds.size();
-  const auto make = [&](std::size_t i) { (void)make_cells(*subjects_[i / seeds], plan_.seeds[i % seeds]); };
-  cluster::share_out(cluster::world(), subjects_.size() * seeds, make, [](std::size_t) {});
-  cluster::world().barrier("cells of the comparison");
+  cluster::Ranks& ranks = cluster::world();
+  const std::size_t seeds = plan_.seeds.size(), methods = plan_.methods.size(), trainings = subjects_.size() * seeds;
+  const std::int64_t trained = ranks.begin_work();
+  const auto make = [&](std::size_t piece) {
+    const bool is_training = piece < trainings;
+    const std::size_t training = is_training ? piece : (piece - trainings) / methods;
+    const Subject& subject = *subjects_[training / seeds];
+    const int seed = plan_.seeds[training % seeds];
+    if (is_training) {
+      make_colors(subject, seed, /*are_judged=*/false);
+      ranks.announce(trained, std::int64_t(training));
+    } else {
+      ranks.await(trained, std::int64_t(training));
+      judge_cell(subject, seed, *plan_.methods[(piece - trainings) % methods]);
+    }
+  };
+  cluster::share_out(ranks, trainings * (1 + methods), make, [](std::size_t) {});
+  ranks.barrier("cells of the comparison");
 }
 
 fs::path Run::folder_of(const Subject& subject, int seed) const {
   return plan_.report / "runs" / subject.name / fmt::format("seed-{}", seed);
 }
 
-std::vector<Cell> Run::make_cells(const Subject& subject, int seed) const {
-  const FolderLock lock(folder_of(subject, seed));
-  remove_leftovers(folder_of(subject, seed), kDeepestCell);
-  const Bench bench{plan_, config_, engines_, lpips_.get(), encoder_.get(), observer_};
-  SeedRun seed_run(bench, subject, seed, folder_of(subject, seed));
+/// Stage 1 of a capture with a seed, and the colours of all methods; what is there stays.
+/// @param are_judged  each at once, so that a comparison which is stopped has finished cells
+void Run::make_colors(const Subject& subject, int seed, bool are_judged) {
+  const fs::path folder = folder_of(subject, seed);
+  const FolderLock lock(folder);
+  remove_leftovers(folder, kDeepestCell);
+  SeedRun seed_run(bench_, subject, seed, folder);
   seed_run.train();
-  std::vector<Cell> cells;
-  for (const Method* method : plan_.methods) cells.push_back(seed_run.make(*method));
-  return cells;
+  for (const Method* method : plan_.methods) {
+    seed_run.color(*method);
+    if (are_judged) (void)seed_run.judge(*method);
+  }
+}
+
+void Run::judge_cell(const Subject& subject, int seed, const Method& method) {
+  const fs::path folder = folder_of(subject, seed);
+  const FolderLock shared(folder, FolderLock::Mode::kShared), own(folder / method.name);
+  (void)SeedRun(bench_, subject, seed, folder).judge(method);
 }
 
 void Run::read_cells(const Subject& subject, int seed) {

@@ -35,9 +35,11 @@ class Run {
   /// Reads the captures, so that what is missing costs no training.
   /// @throws UsageError, MissingInputError, InputError  also for a capture without any colour.
   Run(Plan plan, Config config, Observer& observer);
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
 
-  /// All cells, each capture and seed by one of the ranks; a method that fails leaves one that says why.  @throws
-  /// Interrupted  what is finished stays.
+  /// All cells, shared by the ranks; a method that fails leaves one that says why.
+  /// @throws Interrupted  what is finished stays.
   void run();
   /// Writes the tables and the report, of the captures that have a cell.
   void write_report() const;
@@ -45,9 +47,9 @@ class Run {
   void write_rating_sheet() const;
 
  private:
-  /// Stage 1 and all methods of a capture and a seed; what is there stays.
-  [[nodiscard]] std::vector<Cell> make_cells(const Subject& subject, int seed) const;
   void make_cells_together();
+  void make_colors(const Subject& subject, int seed, bool are_judged);
+  void judge_cell(const Subject& subject, int seed, const Method& method);
   void read_cells(const Subject& subject, int seed);
   [[nodiscard]] std::filesystem::path folder_of(const Subject& subject, int seed) const;
 
@@ -57,6 +59,7 @@ class Run {
   const Engines& engines_;
   std::unique_ptr<Lpips> lpips_;
   std::unique_ptr<PictureEncoder> encoder_;
+  Bench bench_;
   std::vector<std::unique_ptr<const Subject>> subjects_;
   std::vector<Cell> cells_;
 };

@@ -43,6 +43,10 @@ constexpr double kStyleStepsPerPatch = 0.08;   // style transfer follows whole p
 constexpr int kFewestStyleSteps = 8;
 constexpr int kManySteps = 100'000'000;  // the time ends a training, not these
 
+// Records of a cell, in its folder.
+constexpr const char* kColored = "colored.json";  // until it is judged: what its training came to
+constexpr const char* kJudged = "cell.json";
+
 std::string digest(const std::string& text) {
   return sha256(std::as_bytes(std::span(text)));
 }
@@ -185,13 +189,30 @@ std::string SeedRun::settings_of(const Method& method) const {
                 (bench_.encoder != nullptr ? "encoder" : ""));
 }
 
-Cell SeedRun::make(const Method& method) {
-  const fs::path folder = folder_ / method.name, file = folder / "cell.json";
+/// Does a part of a cell's work. Where the method fails, the cell says why.
+template <typename Part>
+void SeedRun::attempt(Cell& cell, const Part& part) const {
+  try {
+    part();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const OutputError&) {  // says nothing of the method
+    throw;
+  } catch (const std::exception& problem) {
+    cell.error = problem.what();
+    bench_.observer.say(fmt::format("{} failed: {}", cell.method, problem.what()));
+  }
+}
+
+void SeedRun::color(const Method& method) {
+  const fs::path folder = folder_ / method.name;
   const std::string settings = settings_of(method);
-  if (fs::exists(file) && settings_in(folder) == settings) {
-    const auto finished = read_record<Cell>(file);
-    if (finished.error.empty()) return finished;
-    remove_output(folder);  // what is left may be why it failed
+  if (settings_in(folder) == settings) {
+    for (const char* file : {kJudged, kColored}) {
+      if (!fs::exists(folder / file)) continue;
+      if (read_record<Cell>(folder / file).error.empty()) return;
+      remove_output(folder);  // what is left may be why it failed
+    }
   }
   begin_folder(folder, settings);
   bench_.observer.say(fmt::format("{}, seed {}: {}", subject_.name, seed_, method.name));
@@ -200,21 +221,25 @@ Cell SeedRun::make(const Method& method) {
   cell.method = method.name;
   cell.seed = seed_;
   cell.settings = settings;
-  try {
-    if (method.is_colored) colorize(method, cell);
-    const Field field = field_of(method);
-    const auto scene = Scene::load(stage1_, method.is_colored ? folder / "take.snapshot" : fs::path(), *field.engines);
-    evaluate_views(method, *scene, cell);
-    evaluate_turntable(method, *scene, cell);
-  } catch (const Interrupted&) {
-    throw;
-  } catch (const OutputError&) {  // says nothing of the method
-    throw;
-  } catch (const std::exception& problem) {
-    cell.error = problem.what();
-    bench_.observer.say(fmt::format("{} failed: {}", method.name, problem.what()));
+  if (method.is_colored) attempt(cell, [&] { colorize(method, cell); });
+  write_file(folder / kColored, json_of(cell).dump(2) + "\n");
+}
+
+Cell SeedRun::judge(const Method& method) const {
+  const fs::path folder = folder_ / method.name;
+  if (fs::exists(folder / kJudged)) return read_record<Cell>(folder / kJudged);
+  auto cell = read_record<Cell>(folder / kColored);
+  if (cell.error.empty()) {
+    attempt(cell, [&] {
+      const Field field = field_of(method);
+      const fs::path take = method.is_colored ? folder / "take.snapshot" : fs::path();
+      const auto scene = Scene::load(stage1_, take, *field.engines);
+      evaluate_views(method, *scene, cell);
+      evaluate_turntable(method, *scene, cell);
+    });
   }
-  write_file(file, json_of(cell).dump(2) + "\n");
+  write_file(folder / kJudged, json_of(cell).dump(2) + "\n");
+  remove_output(folder / kColored);
   return cell;
 }
 

@@ -50,13 +50,17 @@ class SeedRun {
 
   /// Stage 1, unless it is there with these settings and of these views.
   void train();
-  /// A method's cell, after `train`; read where it is there with these settings and did not fail. A method that fails
-  /// leaves one that says why.  @throws Interrupted
-  [[nodiscard]] Cell make(const Method& method);
+  /// A method's colours, after `train`, unless they are there with these settings. A method that fails leaves a cell
+  /// that says why.  @throws Interrupted
+  void color(const Method& method);
+  /// Its cell, after `color`, also in another process; read where it is there.  @throws Interrupted
+  [[nodiscard]] Cell judge(const Method& method) const;
 
  private:
   struct Field;
 
+  template <typename Part>
+  void attempt(Cell& cell, const Part& part) const;
   [[nodiscard]] Field field_of(const Method& method) const;
   [[nodiscard]] std::string settings_of(const Method& method) const;
   [[nodiscard]] std::unique_ptr<Colorizer> colorizer_for(const Method& method) const;

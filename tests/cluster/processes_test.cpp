@@ -227,7 +227,7 @@ TEST(Processes, CellsOfAComparisonAreDealtOut) {
   const TempDir folder;
   const auto compare = [&](const std::string& out) {
     return concatenated(
-        {"compare", tiny_capture().string(), "-o", (folder / out).string(), "--methods", "grey,oracle", "--seeds", "2"},
+        {"compare", tiny_capture().string(), "-o", (folder / out).string(), "--methods", "grey,oracle", "--seeds", "3"},
         tiny_options());
   };
   ASSERT_EQ(cnerf(compare("alone")).exit_code, 0);

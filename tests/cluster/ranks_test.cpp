@@ -87,6 +87,20 @@ TEST(Ranks, ValuesOfAnySizeArriveAndLeaveNothing) {
   }
 }
 
+TEST(Ranks, AnAnnouncedPieceIsThereForAll) {
+  std::atomic<int> made = 0;
+  on_ranks(3, [&](Ranks& ranks) {
+    const std::int64_t work = ranks.begin_work();
+    if (ranks.rank() == 2) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      made = 1;
+      ranks.announce(work, 7);
+    }
+    ranks.await(work, 7);
+    EXPECT_EQ(made, 1);
+  });
+}
+
 /// Sums in memory that plays a GPU's.
 class FakeDeviceSums final : public DeviceSums {
  public:

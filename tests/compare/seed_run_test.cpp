@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <span>
@@ -23,6 +24,7 @@
 #include "tests/support/tiny_config.h"
 
 namespace cnerf::compare {
+namespace fs = std::filesystem;
 namespace {
 
 /// Engines whose fields keep how much memory photographs may take, and cannot train.
@@ -61,9 +63,11 @@ class SeedRunTest : public testing::Test {
   [[nodiscard]] std::string settings() const {
     SeedRun run = seed_run();
     EXPECT_THROW(run.train(), std::logic_error);
-    return run.make(*parse_methods("grey").front()).settings;
+    run.color(grey_);
+    return run.judge(grey_).settings;
   }
 
+  const Method& grey_ = *parse_methods("grey").front();
   test::TempDir folder_;
   Config config_ = test::tiny_config();
   Observer observer_;
@@ -77,6 +81,19 @@ class SeedRunTest : public testing::Test {
 TEST_F(SeedRunTest, PhotographsTakeTheMemoryThatTheUserGivesThem) {
   EXPECT_THROW(seed_run().train(), std::logic_error);
   EXPECT_EQ(engines_.memory, pipeline::image_memory(config_));
+}
+
+TEST_F(SeedRunTest, WhatWasTrainedIsJudgedLaterAndByOthers) {
+  SeedRun trains = seed_run();
+  EXPECT_THROW(trains.train(), std::logic_error);
+  trains.color(grey_);
+  EXPECT_TRUE(fs::exists(folder_ / "seed-1/grey/colored.json"));
+  const Cell cell = seed_run().judge(grey_);
+  EXPECT_NE(cell.error, "") << "there is no stage 1";
+  EXPECT_FALSE(fs::exists(folder_ / "seed-1/grey/colored.json"));
+  EXPECT_EQ(seed_run().judge(grey_).error, cell.error) << "read";
+  trains.color(grey_);
+  EXPECT_TRUE(fs::exists(folder_ / "seed-1/grey/colored.json")) << "what failed is made again";
 }
 
 TEST_F(SeedRunTest, AnotherEncoderMakesOtherCells) {

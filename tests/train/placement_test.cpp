@@ -153,7 +153,7 @@ Capture block_with_pole(Vec3d pole) {
   for (int i = 0; i < 8; ++i) {
     const double angle = 0.25 * i * std::numbers::pi;
     View& view = capture.views.emplace_back(view_at({3 * std::cos(angle), 3 * std::sin(angle), 0}, {0, 0, 0}));
-    view.intrinsics = {LensModel::kPinhole, kSide, kSide, 480, 480, 0.5 * kSide, 0.5 * kSide, {}};
+    view.intrinsics = {LensModel::kPinhole, kSide, kSide, 420, 420, 0.5 * kSide, 0.5 * kSide, {}};
     view.image.width = view.image.height = kSide;
     view.image.alpha.assign(view.image.pixel_count(), 0);
     for (int y = 180; y < 280; ++y) {
