@@ -101,7 +101,11 @@ TakeRecord colorize(const RunContext& context, const ColorizeJob& job, const Eng
 
 ColorizerContext colorizer_context(const Config& config, const fs::path& working_folder, const fs::path& cache_folder,
                                    Observer& observer) {
-  return {working_folder, cache_folder, std::uint64_t(config.stage2.seed), observer.progress_sink(),
+  const auto progress = [&observer](const Progress& fit) {
+    observer.report_progress(fit);
+    if (observer.is_cancelled()) throw Interrupted("stopped while the colorizer was fitted; nothing was kept");
+  };
+  return {working_folder, cache_folder, std::uint64_t(config.stage2.seed), progress,
           [&observer](const std::string& text) { observer.say(text); }};
 }
 

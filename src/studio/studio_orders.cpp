@@ -260,10 +260,16 @@ std::string Studio::colorize(const ColorizerOptions& colorizer, const std::vecto
   });
   const std::string take = context_.directory.free_take_name(colorizer.spec.substr(0, colorizer.spec.find(':')));
   coloring_->cache_views([this](double fraction) { breathe("cache", fraction); });
-  // It saves what it has before it stops, so nothing is thrown between its steps.
-  BoardObserver observer(
-      board_, observer_, "colour", [] {}, [this] { return should_stop(); });
-  const auto watch = [this](const ColorModel& model) { watch_colors(model); };
+  // It saves what it has before it stops, so nothing is thrown between its steps; before these a colorizer is fitted.
+  bool is_training = false;
+  const auto between = [&] {
+    if (!is_training) draw_frames();
+  };
+  BoardObserver observer(board_, observer_, "colour", between, [this] { return should_stop(); });
+  const auto watch = [&](const ColorModel& model) {
+    is_training = true;
+    watch_colors(model);
+  };
   begin_pace();
   pipeline::colorize_step(context_, {take, {}, nullptr, &coloring_->cached_views(), watch}, engines_, observer);
   begin_from(take);

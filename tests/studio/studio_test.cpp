@@ -443,6 +443,20 @@ TEST_F(StudioTest, AReferenceIsTurnedUpright) {
   EXPECT_GT(kept(10, 35)[0], 150) << "blue";
 }
 
+/// It takes a minute on two processor cores.
+TEST_F(StudioTest, AFitToAReferenceStopsAndFramesAreDrawnBesideIt) {
+  open();
+  const std::string photograph = test::turned_photograph(1);
+  EXPECT_EQ(send_picture({{"kind", "reference"}, {"name", "photo.jpg"}}, photograph).status, 202);
+  (void)wait_until([](const json& state) { return state["step"] == "reference colorizer"; });
+  EXPECT_FALSE(decoded(post("frame", frame({"now"}))).empty());
+  EXPECT_EQ(json::parse(get("state").body)["step"], "reference colorizer") << "still";
+  EXPECT_EQ(post("orders", {{"order", "stop"}}).status, 202);
+  const json stopped = wait_until(test::is_idle);
+  EXPECT_THAT(stopped["message"].get<std::string>(), HasSubstr("stopped"));
+  EXPECT_EQ(stopped["takes"].size(), 0u) << stopped["takes"];
+}
+
 TEST_F(StudioTest, TheFinishIsShownAtOnceAndBakedButNotTrained) {
   open();
   EXPECT_EQ(put({stroke("a", 0.5, 0.5)}, 0).status, 200);
