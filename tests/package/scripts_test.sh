@@ -129,4 +129,16 @@ done
 stand_in python3 'echo "$(pwd -P) $*" > "'"$scratch"'/words"'
 (cd "$scratch" && bash tree/scripts/bench.sh run photos --json figures.json)
 grep -q "^$(realpath "$scratch") .* photos --json figures.json$" "$scratch/words" || fail "bench.sh run: $(cat "$scratch/words")"
+rm -r "$scratch/bin"
+
+# sharded.py runs what CTest knows, names what fails, and does not run again what passed.
+mkdir -p "$scratch/suites"
+printf 'add_test(good "/bin/sh" "-c" "echo ran >> %s/ran")\nadd_test(bad "/bin/false")\n' "$scratch" \
+  > "$scratch/suites/CTestTestfile.cmake"
+for _ in 1 2; do
+  status=0
+  said=$(python3 "$root/scripts/sharded.py" "$scratch/suites" --slots 1) || status=$?
+  [ "$status" -eq 1 ] && grep -q '^bad$' <<< "$said" || fail "sharded.py does not name what failed: $status, $said"
+done
+[ "$(wc -l < "$scratch/ran")" -eq 1 ] || fail "sharded.py runs again what passed"
 echo "scripts: as they should be"
