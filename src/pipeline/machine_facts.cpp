@@ -1,11 +1,11 @@
 #include <ImfVersion.h>
 #include <OpenEXRConfig.h>
+#include <dlfcn.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <fstream>
 #include <opencv2/core/version.hpp>
-#include <set>
 
 #include "src/base/error.h"
 #include "src/base/process.h"
@@ -21,29 +21,17 @@ namespace cnerf::pipeline {
 namespace fs = std::filesystem;
 namespace {
 
-/// Shared libraries of this process whose file name contains `part`, links resolved.
-std::set<std::string> loaded_libraries(const std::string& part) {
-  std::set<std::string> found;
-  std::ifstream maps("/proc/self/maps");
-  for (std::string text; std::getline(maps, text);) {
-    const auto slash = text.find('/');
-    if (slash == std::string::npos) continue;
-    const fs::path file = text.substr(slash);
-    if (file.filename().string().find(part) != std::string::npos) found.insert(file.string());
-  }
-  return found;
-}
-
-/// The BLAS behind Torch decides how fast a colorizer is fitted: the reference one is an order slower.
+/// The BLAS that LibTorch calls decides how fast a colorizer is fitted. It is the first one that the program loaded,
+/// whatever LibTorch itself was linked to; LibTorch may hold one of its own instead.
 std::string blas_text() {
-  for (const char* kind : {"openblas", "mkl_rt", "libblis"}) {
-    if (const auto found = loaded_libraries(kind); !found.empty()) return *found.begin();
+  Dl_info source{};
+  const void* product = ::dlsym(RTLD_DEFAULT, "sgemm_");
+  if (product == nullptr || ::dladdr(product, &source) == 0) return "LibTorch's own";
+  const std::string library = fs::weakly_canonical(source.dli_fname).string();
+  for (const char* kind : {"openblas", "atlas", "mkl", "blis"}) {
+    if (library.find(kind) != std::string::npos) return library;
   }
-  for (const std::string& library : loaded_libraries("libblas")) {
-    const bool is_fast = library.find("openblas") != std::string::npos || library.find("atlas") != std::string::npos;
-    return library + (is_fast ? "" : "  (reference BLAS: slow; apt install libopenblas0-pthread)");
-  }
-  return "none found";
+  return library + "  (reference BLAS: slow; apt install libopenblas0-pthread)";
 }
 
 Fact program_fact(const std::string& name, const std::string& use) {

@@ -1,5 +1,6 @@
 #include "src/pipeline/facts.h"
 
+#include <dlfcn.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,6 +13,7 @@
 #include "tests/support/data.h"
 
 namespace cnerf::pipeline {
+namespace fs = std::filesystem;
 namespace {
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -41,6 +43,14 @@ TEST(Facts, AClipIsNamedAsSuch) {
   const std::string text = text_of(facts_of(clip, {}));
   EXPECT_THAT(text, HasSubstr("clip: " + clip));
   EXPECT_THAT(text, HasSubstr("cameras: not known yet"));
+}
+
+TEST(Facts, LibTorchCallsTheBlasThatTheSystemHasChosen) {
+  void* chosen = ::dlopen("libblas.so.3", RTLD_LAZY);
+  if (chosen == nullptr) GTEST_SKIP() << "no libblas.so.3 here";
+  Dl_info source{};
+  ASSERT_NE(::dladdr(::dlsym(chosen, "sgemm_"), &source), 0);
+  EXPECT_THAT(text_of(facts_of_machine()), HasSubstr("BLAS: " + fs::canonical(source.dli_fname).string()));
 }
 
 TEST(Facts, AFolderOfNothingIsRefused) {
