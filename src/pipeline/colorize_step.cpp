@@ -103,7 +103,7 @@ ColorizerContext colorizer_context(const Config& config, const fs::path& working
                                    Observer& observer) {
   const auto progress = [&observer](const Progress& fit) {
     observer.report_progress(fit);
-    if (observer.is_cancelled()) throw Interrupted("stopped while the colorizer was fitted; nothing was kept");
+    if (observer.is_cancelled()) throw Interrupted("stopped while fitting the reference network; nothing was kept");
   };
   return {working_folder, cache_folder, std::uint64_t(config.stage2.seed), progress,
           [&observer](const std::string& text) { observer.say(text); }};
