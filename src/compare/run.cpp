@@ -51,11 +51,11 @@ Run::Run(Plan plan, Config config, Observer& observer)
 }
 
 void Run::run() {
-  const bool is_alone = cluster::world().is_alone();
-  if (!is_alone && !plan_.only_report) make_cells_together();
+  const bool is_alone = cluster::world().is_alone(), trains = !plan_.only_report;
+  if (trains && !is_alone) make_cells_together();
   for (const auto& subject : subjects_) {
     for (const int seed : plan_.seeds) {
-      if (is_alone && !plan_.only_report) make_colors(*subject, seed, /*are_judged=*/true);
+      if (trains && is_alone) make_colors(*subject, seed, /*are_judged=*/true);
       read_cells(*subject, seed);
     }
   }

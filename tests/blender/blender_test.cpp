@@ -411,24 +411,29 @@ TEST(Blender, ThePhotographLiesUnderWhatItShows) {
   EXPECT_LT(overlap_of(camera, "as it is"), 0.9);    // the measure notices the lens
 }
 
+/// A script for Blender that has the add-on as `module`, and takes a bake by its operator as `import_bake`.
+void write_addon_script(const fs::path& file, const VolumeExport& bake, const std::string& text) {
+  std::ofstream(file) << "import bpy, importlib.util\n"
+                      << "spec = importlib.util.spec_from_file_location('cnerf_bake', r'" << bake.blender_setup.string()
+                      << "')\n"
+                      << "module = importlib.util.module_from_spec(spec)\n"
+                      << "spec.loader.exec_module(module)\n"
+                      << "import_bake = lambda: bpy.ops.import_scene.cnerf_bake(filepath=r'" << bake.manifest.string()
+                      << "')\n"
+                      << text;
+}
+
 TEST(Blender, TheAddOnImportsABakeIntoASceneOfItsOwn) {
   CNERF_REQUIRE_BLENDER();
   const TempDir folder;
   const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
-  std::ofstream(folder / "import.py") << "import bpy, importlib.util\n"
-                                         "spec = importlib.util.spec_from_file_location('cnerf_bake', r'" +
-                                             bake.blender_setup.string() +
-                                             "')\n"
-                                             "module = importlib.util.module_from_spec(spec)\n"
-                                             "spec.loader.exec_module(module)\n"
-                                             "assert module.bl_info['category'] == 'Import-Export'\n"
-                                             "module.register()\n"
-                                             "assert bpy.ops.import_scene.cnerf_bake(filepath=r'" +
-                                             bake.manifest.string() +
-                                             "') == {'FINISHED'}\n"
-                                             "assert 'VOLUME' in [o.type for o in bpy.data.scenes['cnerf'].objects]\n"
-                                             "assert bpy.data.scenes['Scene'].objects\n"
-                                             "module.unregister()\n";
+  write_addon_script(folder / "import.py", bake,
+                     "assert module.bl_info['category'] == 'Import-Export'\n"
+                     "module.register()\n"
+                     "assert import_bake() == {'FINISHED'}\n"
+                     "assert 'VOLUME' in [o.type for o in bpy.data.scenes['cnerf'].objects]\n"
+                     "assert bpy.data.scenes['Scene'].objects\n"
+                     "module.unregister()\n");
   EXPECT_EQ(run_blender(folder / "import.py", ""), 0) << read_text_file(folder / "blender.log");
 }
 
@@ -437,22 +442,15 @@ TEST(Blender, AFailedImportLeavesNoScene) {
   const TempDir folder;
   const VolumeExport bake = export_volume(block_volume({0, 0, 0}, {4, 4, 4}, 1), {}, folder.path(), "block");
   write_file(bake.vdb, "not a VDB");
-  std::ofstream(folder / "import.py") << "import bpy, importlib.util\n"
-                                         "spec = importlib.util.spec_from_file_location('cnerf_bake', r'" +
-                                             bake.blender_setup.string() +
-                                             "')\n"
-                                             "module = importlib.util.module_from_spec(spec)\n"
-                                             "spec.loader.exec_module(module)\n"
-                                             "module.register()\n"
-                                             "try:\n"
-                                             "    bpy.ops.import_scene.cnerf_bake(filepath=r'" +
-                                             bake.manifest.string() +
-                                             "')\n"
-                                             "    assert False\n"
-                                             "except RuntimeError as refused:\n"  // what an operator reports
-                                             "    assert 'block.vdb' in str(refused), refused\n"
-                                             "assert [s.name for s in bpy.data.scenes] == ['Scene']\n"
-                                             "assert bpy.context.window.scene.name == 'Scene'\n";
+  write_addon_script(folder / "import.py", bake,
+                     "module.register()\n"
+                     "try:\n"
+                     "    import_bake()\n"
+                     "    assert False\n"
+                     "except RuntimeError as refused:\n"  // what an operator reports
+                     "    assert 'block.vdb' in str(refused), refused\n"
+                     "assert [s.name for s in bpy.data.scenes] == ['Scene']\n"
+                     "assert bpy.context.window.scene.name == 'Scene'\n");
   EXPECT_EQ(run_blender(folder / "import.py", ""), 0) << read_text_file(folder / "blender.log");
 }
 

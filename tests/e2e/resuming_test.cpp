@@ -111,12 +111,16 @@ TEST(Resuming, KeyFramesInsteadOfTheRunsColorizerGoOnByTheSameCommand) {
   EXPECT_TRUE(fs::exists(run / "takes/reference/take.json"));
 }
 
+/// Arguments of a whole run by the capture's own references.
+std::vector<std::string> run_by_references(const fs::path& run) {
+  return concatenated({"run", tiny_capture().string(), "-o", run.string(), "--colorizer", "reference:references"},
+                      concatenated(tiny_options(), {"--set", "render.frames=2"}));
+}
+
 TEST(Resuming, ARunLeavesTakesAloneThatOtherCommandsBegan) {
   const TempDir folder;
   const fs::path run = folder / "run";
-  const auto arguments =
-      concatenated({"run", tiny_capture().string(), "-o", run.string(), "--colorizer", "reference:references"},
-                   concatenated(tiny_options(), {"--set", "render.frames=2"}));
+  const auto arguments = run_by_references(run);
   const ProgramResult first = cnerf(arguments);
   ASSERT_EQ(first.exit_code, 0) << first.err;
   write_file(run / "takes/zz/config.toml", read_text_file(run / "config.toml"));
@@ -133,9 +137,7 @@ TEST(Resuming, ARunLeavesTakesAloneThatOtherCommandsBegan) {
 TEST(Resuming, OtherOptionsForAFinishedStepAreToldAndNotWrittenDown) {
   const TempDir folder;
   const fs::path run = folder / "run";
-  const auto arguments =
-      concatenated({"run", tiny_capture().string(), "-o", run.string(), "--colorizer", "reference:references"},
-                   concatenated(tiny_options(), {"--set", "render.frames=2"}));
+  const auto arguments = run_by_references(run);
   const ProgramResult first = cnerf(arguments);
   ASSERT_EQ(first.exit_code, 0) << first.err;
   const auto resumed_with = [&](const std::vector<std::string>& settings) {
