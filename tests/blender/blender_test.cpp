@@ -412,7 +412,7 @@ TEST(Blender, ThePhotographLiesUnderWhatItShows) {
 }
 
 /// A script for Blender that has the add-on as `module`, and takes a bake by its operator as `import_bake`.
-void write_addon_script(const fs::path& file, const VolumeExport& bake, const std::string& text) {
+void write_addon_script(const std::filesystem::path& file, const VolumeExport& bake, const std::string& text) {
   std::ofstream(file) << "import bpy, importlib.util\n"
                       << "spec = importlib.util.spec_from_file_location('cnerf_bake', r'" << bake.blender_setup.string()
                       << "')\n"
