@@ -16,6 +16,7 @@
 #include "export/vdb_writer.h"
 #include "src/base/files.h"
 #include "src/capture/picture_names.h"
+#include "src/capture/pose.h"
 
 namespace cnerf::exporting {
 namespace {
@@ -49,8 +50,7 @@ std::optional<int> number_at_end(const std::string& name) {
 
 /// OpenCV's axes to those of USD and Nuke: +X right, +Y up, looking along -Z.
 Affined looking_backwards(const Affined& world_from_camera) {
-  const Mat3d& m = world_from_camera.linear;
-  return {Mat3d::from_columns(m.column(0), -m.column(1), -m.column(2)), world_from_camera.translation};
+  return opencv_from_opengl_camera(world_from_camera);  // which is its own inverse
 }
 
 /// USD applies matrices to row vectors.

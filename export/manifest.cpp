@@ -8,6 +8,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/json_record.h"
+#include "src/capture/camera_record.h"
 #include "src/capture/pose.h"
 
 namespace nlohmann {
@@ -63,12 +64,7 @@ struct CameraRecord {
   static void visit(Self& self, Visitor&& v) {
     auto& lens = self.camera.intrinsics;
     v("name", self.camera.name);
-    v("width", lens.width);
-    v("height", lens.height);
-    v("fx", lens.fx);
-    v("fy", lens.fy);
-    v("cx", lens.cx);
-    v("cy", lens.cy);
+    LensRecord::visit(lens, v);
     v("model", lens.model);
     v("distortion", lens.distortion);
     v("world_from_camera", self.camera.world_from_camera);

@@ -69,10 +69,6 @@ Intrinsics without_distortion(const Intrinsics& intrinsics) {
   return pinhole;
 }
 
-WebPhoto make_web_photo(const Intrinsics& intrinsics, const std::vector<float>& luminance, int side, int quality) {
-  return web_photo(photo_lens(intrinsics, side), luminance, quality);
-}
-
 std::vector<WebPhoto> make_web_photos(std::span<const View> views, int side, int quality) {
   std::vector<std::pair<Intrinsics, std::vector<std::size_t>>> lenses;  // and the views of each
   for (std::size_t i = 0; i < views.size(); ++i) {

@@ -20,12 +20,8 @@ struct WebPhoto {
 /// A pinhole camera with the focal lengths and the principal point of a lens.
 [[nodiscard]] Intrinsics without_distortion(const Intrinsics& intrinsics);
 
-/// @param luminance  [H, W] linear Y, 1 = white, as the camera saw it; the lens's distortion is undone.
-/// @param side       pixels of the longer side, at most.
-[[nodiscard]] WebPhoto make_web_photo(const Intrinsics& intrinsics, const std::vector<float>& luminance, int side,
-                                      int quality);
-
-/// Of views, as the program sees them; made by all threads.
+/// Of views, as the program sees them, without the distortion of their lenses; made by all threads.
+/// @param side  pixels of the longer side, at most
 [[nodiscard]] std::vector<WebPhoto> make_web_photos(std::span<const View> views, int side, int quality);
 
 /// WebP with alpha of what a camera sees of nested volumes, `side` pixels long at most: sRGB, not premultiplied.

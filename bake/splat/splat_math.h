@@ -102,14 +102,6 @@ template <typename Real>
   return sum;
 }
 
-/// The rotation of a quaternion w x y z of length 1.
-template <typename Real>
-[[nodiscard]] Mat3<Real> rotation_of(const std::array<Real, 4>& q) {
-  const auto [w, x, y, z] = q;
-  return {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
-}
 /// The gradient by the quaternion, of length 1, where that by the rotation is `d`.
 template <typename Real>
 [[nodiscard]] std::array<Real, 4> rotation_gradient(const std::array<Real, 4>& q, const Mat3<Real>& d) {

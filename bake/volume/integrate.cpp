@@ -208,11 +208,6 @@ VolumeImage integrate_volumes(std::span<const Volume> volumes, const Intrinsics&
   return image;
 }
 
-VolumeImage integrate_volume(const Volume& volume, const Intrinsics& intrinsics, const Affined& world_from_camera,
-                             const IntegratorOptions& options) {
-  return integrate_volumes({&volume, 1}, intrinsics, world_from_camera, options);
-}
-
 struct VolumeLookup::Media {
   std::vector<VoxelMedium> all;
 };

@@ -27,8 +27,6 @@ struct VolumeImage {
 /// Every step absorbs 1 - exp(-sigma dt) with the values at its middle.
 [[nodiscard]] VolumeImage integrate_volumes(std::span<const Volume> volumes, const Intrinsics& intrinsics,
                                             const Affined& world_from_camera, const IntegratorOptions& options = {});
-[[nodiscard]] VolumeImage integrate_volume(const Volume& volume, const Intrinsics& intrinsics,
-                                           const Affined& world_from_camera, const IntegratorOptions& options = {});
 
 /// What volumes hold at points, by the same rules. Thread-safe.
 class VolumeLookup {

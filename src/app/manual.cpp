@@ -6,6 +6,7 @@
 #include <cctype>
 
 #include "src/app/exit_codes.h"
+#include "src/base/process.h"
 #include "src/base/text.h"
 #include "src/config/config.h"
 
@@ -90,11 +91,6 @@ std::string option_entry(const CLI::Option& option) {
   return entry(term + (takes_value(option) ? " " + italic("VALUE") : ""), help_of(option));
 }
 
-/// In single quotes of a shell.
-std::string quoted(const std::string& text) {
-  return "'" + replaced(text, "'", "'\\''") + "'";
-}
-
 /// One argument of zsh's _arguments: '--out[Folder of the run]:value:_files'.
 std::string zsh_argument(const CLI::Option& option, const std::string& name) {
   std::string help = help_of(option);
@@ -102,19 +98,20 @@ std::string zsh_argument(const CLI::Option& option, const std::string& name) {
   std::string value = takes_value(option) ? ":value:_files" : "";
   if (name == "--preset") value = ":preset:(" + joined(preset_names(), " ") + ")";
   if (name == "--set") value = ":key:(" + joined(config_keys(), "= ") + "=)";
-  return quoted("*" + name + "[" + help + "]" + value);
+  return shell_word("*" + name + "[" + help + "]" + value);
 }
 
 /// One line of fish's completion of a command's options.
 std::string fish_line(const std::string& command, const CLI::Option& option) {
-  std::string line = "complete -c cnerf -n " + quoted("__fish_seen_subcommand_from " + command);
+  std::string line = "complete -c cnerf -n " + shell_word("__fish_seen_subcommand_from " + command);
   for (const std::string& name : option.get_snames()) line += " -s " + name;
   for (const std::string& name : option.get_lnames()) {
     line += " -l " + name;
-    if (name == "preset") line += " -a " + quoted(joined(preset_names(), " "));
-    if (name == "set") line += " -a " + quoted(joined(config_keys(), "= ") + "=");
+    if (name == "preset") line += " -a " + shell_word(joined(preset_names(), " "));
+    if (name == "set") line += " -a " + shell_word(joined(config_keys(), "= ") + "=");
   }
-  return line + (takes_value(option) ? " -r" : "") + " -d " + quoted(replaced(help_of(option), "\\", "\\\\")) + "\n";
+  return line + (takes_value(option) ? " -r" : "") + " -d " + shell_word(replaced(help_of(option), "\\", "\\\\")) +
+         "\n";
 }
 
 }  // namespace
@@ -194,7 +191,8 @@ std::string zsh_completion(const std::vector<ParsedCommand>& commands) {
   std::string script = "#compdef cnerf\n# Completion of cnerf for zsh, generated from the program's declarations.\n";
   script += "local -a commands=(\n";
   for (const ParsedCommand& each : commands) {
-    script += "  " + quoted(std::string(each.command->name) + ":" + replaced(each.command->summary, ":", "\\:")) + "\n";
+    script +=
+        "  " + shell_word(std::string(each.command->name) + ":" + replaced(each.command->summary, ":", "\\:")) + "\n";
   }
   script += ")\nif (( CURRENT == 2 )); then\n  _describe command commands\n  return\nfi\n";
   script += "local command=$words[2]\nshift words\n(( CURRENT-- ))\ncase $command in\n";
@@ -212,7 +210,7 @@ std::string fish_completion(const std::vector<ParsedCommand>& commands) {
   std::string script = "# Completion of cnerf for fish, generated from the program's declarations.\n";
   for (const ParsedCommand& each : commands) {
     script += fmt::format("complete -c cnerf -f -n __fish_use_subcommand -a {} -d {}\n", each.command->name,
-                          quoted(each.command->summary));
+                          shell_word(each.command->summary));
   }
   for (const ParsedCommand& each : commands) {
     for (const CLI::Option* option : options_of(*each.app, false)) script += fish_line(each.command->name, *option);

@@ -80,18 +80,15 @@ void Reporter::print_progress(const Progress& progress, double remaining) {
       json["figures"][name] = std::isfinite(value) ? Json(value) : Json();
     }
     if (remaining >= 0) json["remaining_seconds"] = remaining;
-    return print_json(json_text(json));
+    return print_line(json_text(json));
   }
   std::string text = fmt::format("{} {:3.0f} %", progress.task, 100 * progress.fraction);
   for (const auto& [name, value] : progress.figures) text += fmt::format("  {} {}", name, figure_text(value));
   if (remaining >= 0 && progress.fraction < 1) text += "  " + duration_text(remaining) + " left";
-  if (style_ == ProgressStyle::kLine) {
-    fmt::print(out_, "\r{}\x1b[K", text);  // K: erase what a longer line left
-    line_open_ = true;
-  } else {
-    fmt::print(out_, "{}\n", text);
-  }
+  if (style_ != ProgressStyle::kLine) return print_line(text);
+  fmt::print(out_, "\r{}\x1b[K", text);  // K: erase what a longer line left
   std::fflush(out_);
+  line_open_ = true;
 }
 
 void Reporter::end_line() {
@@ -99,35 +96,30 @@ void Reporter::end_line() {
   line_open_ = false;
 }
 
-void Reporter::print_json(const std::string& json) {
-  fmt::print(out_, "{}\n", json);
+void Reporter::print_line(const std::string& line) {
+  end_line();
+  fmt::print(out_, "{}\n", line);
   std::fflush(out_);
 }
 
 void Reporter::say(const std::string& text) {
-  if (style_ == ProgressStyle::kJson) return print_json(json_text({{"event", "message"}, {"text", text}}));
+  if (style_ == ProgressStyle::kJson) return print_line(json_text({{"event", "message"}, {"text", text}}));
   if (style_ == ProgressStyle::kQuiet || style_ == ProgressStyle::kSilent) return;
-  end_line();
-  fmt::print(out_, "{}\n", text);
-  std::fflush(out_);
+  print_line(text);
 }
 
 void Reporter::wrote(const std::string& what, const std::filesystem::path& path) {
   if (style_ == ProgressStyle::kSilent) return;
   if (style_ == ProgressStyle::kJson) {
-    return print_json(json_text({{"event", "wrote"}, {"what", what}, {"path", path.string()}}));
+    return print_line(json_text({{"event", "wrote"}, {"what", what}, {"path", path.string()}}));
   }
-  end_line();
-  fmt::print(out_, "{:<18} {}\n", what + ":", path.string());
-  std::fflush(out_);
+  print_line(fmt::format("{:<18} {}", what + ":", path.string()));
 }
 
 void Reporter::next(const std::string& text) {
-  if (style_ == ProgressStyle::kJson) return print_json(json_text({{"event", "next"}, {"text", text}}));
+  if (style_ == ProgressStyle::kJson) return print_line(json_text({{"event", "next"}, {"text", text}}));
   if (style_ == ProgressStyle::kQuiet || style_ == ProgressStyle::kSilent) return;
-  end_line();
-  fmt::print(out_, "{:<18} {}\n", "next:", text);
-  std::fflush(out_);
+  print_line(fmt::format("{:<18} {}", "next:", text));
 }
 
 }  // namespace cnerf::app

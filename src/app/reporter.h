@@ -37,7 +37,7 @@ class Reporter : public Observer {
 
   [[nodiscard]] double remaining_seconds(const Progress& progress) const;
   void print_progress(const Progress& progress, double remaining);
-  void print_json(const std::string& json);
+  void print_line(const std::string& line);
   void end_line();
 
   ProgressStyle style_;

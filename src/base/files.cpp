@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
@@ -150,6 +151,15 @@ void remove_leftovers(const fs::path& folder, int depth) {
   }
 }
 
+std::vector<fs::path> files_in(const fs::path& folder, const std::function<bool(const fs::path&)>& is_wanted) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file() && is_wanted(entry.path())) files.push_back(entry.path());
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
 bool make_folders(const fs::path& folder) {
   std::error_code failure;
   if (fs::is_directory(folder, failure)) return false;
@@ -192,8 +202,7 @@ std::vector<std::byte> read_binary_file(const fs::path& file) {
 }
 
 std::string read_text_file(const fs::path& file) {
-  const std::vector<std::byte> content = read_binary_file(file);
-  return {reinterpret_cast<const char*>(content.data()), content.size()};
+  return text_of(read_binary_file(file));
 }
 
 std::string sha256(std::span<const std::byte> content) {

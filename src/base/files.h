@@ -47,6 +47,10 @@ void write_atomically(const std::filesystem::path& target,
 /// NewFile that nobody writes to any more, and locks that nobody holds.
 void remove_leftovers(const std::filesystem::path& folder, int depth = 0);
 
+/// The regular files of a folder that are wanted, by name.  @throws std::filesystem::filesystem_error
+[[nodiscard]] std::vector<std::filesystem::path> files_in(
+    const std::filesystem::path& folder, const std::function<bool(const std::filesystem::path&)>& is_wanted);
+
 /// Makes a folder and those above it; their names are on the disk when it returns.
 /// @return  whether it is new  @throws OutputError
 bool make_folders(const std::filesystem::path& folder);
@@ -61,6 +65,11 @@ void write_file(const std::filesystem::path& target, std::string_view content);
 /// The whole file.  @throws MissingInputError, InputError.
 [[nodiscard]] std::vector<std::byte> read_binary_file(const std::filesystem::path& file);
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& file);
+
+/// Bytes as the text that they are.
+[[nodiscard]] inline std::string text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
 
 /// Hex SHA-256 of `content`, for manifests and weights.
 [[nodiscard]] std::string sha256(std::span<const std::byte> content);

@@ -1,11 +1,22 @@
 #pragma once
-/// Numbers and lists formatted for people.
+/// Numbers and lists formatted for people, and read from texts.
 
+#include <charconv>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace cnerf {
+
+/// The number that the whole text is; nothing where it is none.
+template <typename Number>
+[[nodiscard]] std::optional<Number> value_in(std::string_view text) {
+  Number value{};
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return failure == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
+}
 
 /// The words with a separator between them.
 [[nodiscard]] inline std::string joined(const std::vector<std::string>& words, const std::string& separator = " ") {

@@ -1,6 +1,7 @@
 #pragma once
 /// Three-vectors, 3x3 matrices and affine maps, for host code and kernels alike.
 
+#include <array>
 #include <cmath>
 
 #include "src/base/host_device.h"
@@ -72,6 +73,15 @@ CNERF_HD constexpr Mat3<R> operator*(const Mat3<R>& a, const Mat3<R>& b) {
 template <typename R>
 CNERF_HD constexpr Mat3<R> operator*(const Mat3<R>& a, R s) {
   return {{a.rows[0] * s, a.rows[1] * s, a.rows[2] * s}};
+}
+
+/// The rotation of a quaternion w x y z of length 1.
+template <typename Real>
+[[nodiscard]] Mat3<Real> rotation_of(const std::array<Real, 4>& q) {
+  const auto [w, x, y, z] = q;
+  return {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
 }
 
 using Mat3d = Mat3<double>;

@@ -91,6 +91,8 @@ struct Registered {
   std::string name;
 };
 
+constexpr std::int64_t kNoPoint = -1;  ///< number of what an observation without a point shows
+
 // ---- binary -------------------------------------------------------------------------------------------------------
 
 Cameras read_cameras_binary(const fs::path& file) {
@@ -108,7 +110,8 @@ Cameras read_cameras_binary(const fs::path& file) {
   return cameras;
 }
 
-std::vector<Registered> read_images_binary(const fs::path& file) {
+/// @param seen  gets the observations of points; null: nobody asks for them
+std::vector<Registered> read_images_binary(const fs::path& file, std::vector<ColmapObservation>* seen = nullptr) {
   ByteReader in(file);
   std::vector<Registered> images;
   const auto count = in.next<std::uint64_t>("number of images");
@@ -120,8 +123,14 @@ std::vector<Registered> read_images_binary(const fs::path& file) {
     for (int axis = 0; axis < 3; ++axis) image.translation[axis] = in.next<double>(field);
     image.camera = in.next<std::uint32_t>(field);
     image.name = in.next_text(field);
+    const auto observations = in.next<std::uint64_t>(field);
     constexpr std::size_t kObservation = 2 * sizeof(double) + sizeof(std::uint64_t);
-    in.skip(in.next<std::uint64_t>(field), kObservation, field);
+    if (seen == nullptr) in.skip(observations, kObservation, field);
+    for (std::uint64_t k = 0; seen != nullptr && k < observations; ++k) {
+      const auto x = in.next<double>(field), y = in.next<double>(field);
+      const auto point = in.next<std::int64_t>(field);
+      if (point != kNoPoint) seen->push_back({image.name, x, y, point});
+    }
     images.push_back(std::move(image));
   }
   return images;
@@ -193,8 +202,9 @@ Cameras read_cameras_text(const fs::path& file) {
   return cameras;
 }
 
-/// Two lines per image: pose and name, then its observations, which may be empty and are not needed.
-std::vector<Registered> read_images_text(const fs::path& file) {
+/// Two lines per image: pose and name, then its observations, which may be empty.
+/// @param seen  as of read_images_binary
+std::vector<Registered> read_images_text(const fs::path& file, std::vector<ColmapObservation>* seen = nullptr) {
   std::vector<Registered> images;
   const std::vector<Line> lines = read_lines(file);
   for (std::size_t i = 0; i < lines.size(); i += 2) {
@@ -210,6 +220,13 @@ std::vector<Registered> read_images_text(const fs::path& file) {
     image.camera = parse<std::uint32_t>(in, file, lines[i].field);
     std::getline(in >> std::ws, image.name);  // a name may hold spaces
     if (image.name.empty()) throw InputError(file, lines[i].field, "expected an image name, found nothing");
+    if (seen != nullptr && i + 1 < lines.size()) {
+      std::istringstream numbers(lines[i + 1].text);
+      ColmapObservation shown{image.name};
+      while (numbers >> shown.x >> shown.y >> shown.point) {
+        if (shown.point != kNoPoint) seen->push_back(shown);
+      }
+    }
     images.push_back(std::move(image));
   }
   return images;
@@ -250,8 +267,8 @@ fs::path required_model_file(const fs::path& folder, const std::string& stem) {
   return *file;
 }
 
-std::vector<Registered> read_images(const fs::path& file) {
-  return file.extension() == ".bin" ? read_images_binary(file) : read_images_text(file);
+std::vector<Registered> read_images(const fs::path& file, std::vector<ColmapObservation>* seen = nullptr) {
+  return file.extension() == ".bin" ? read_images_binary(file, seen) : read_images_text(file, seen);
 }
 
 /// The folder that image names are relative to: `images` or `input` beside the model or above it.
@@ -313,6 +330,12 @@ std::size_t colmap_image_count(const fs::path& model_folder) {
   const fs::path file = required_model_file(model_folder, "images");
   if (file.extension() == ".bin") return ByteReader(file).next<std::uint64_t>("number of images");
   return read_images_text(file).size();
+}
+
+std::vector<ColmapObservation> read_colmap_observations(const fs::path& model_folder) {
+  std::vector<ColmapObservation> seen;
+  (void)read_images(required_model_file(model_folder, "images"), &seen);
+  return seen;
 }
 
 CaptureListing read_colmap(const fs::path& root, const fs::path& model_folder) {

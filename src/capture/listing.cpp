@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "src/base/files.h"
 #include "src/capture/image_header.h"
 #include "src/capture/pose.h"
 
@@ -87,13 +88,8 @@ fs::path image_near_poses(const fs::path& folder, const std::string& name) {
 }
 
 std::vector<fs::path> files_with_extension(const fs::path& folder, const std::string& extension) {
-  std::vector<fs::path> files;
-  if (!fs::is_directory(folder)) return files;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.is_regular_file() && lower_extension(entry.path()) == extension) files.push_back(entry.path());
-  }
-  std::ranges::sort(files);
-  return files;
+  if (!fs::is_directory(folder)) return {};
+  return files_in(folder, [&](const fs::path& file) { return lower_extension(file) == extension; });
 }
 
 const std::vector<std::string>& image_extensions() {

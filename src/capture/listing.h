@@ -1,6 +1,7 @@
 #pragma once
 /// What a poses file says, before any image is opened: readers make listings, load_capture turns them into captures.
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -68,6 +69,14 @@ void bring_near_origin(CaptureListing& listing);
 [[nodiscard]] std::vector<SparsePoint> read_colmap_points(const std::filesystem::path& file);
 /// Registered images of a model, to choose between several.
 [[nodiscard]] std::size_t colmap_image_count(const std::filesystem::path& model_folder);
+/// Where an image shows a sparse point.
+struct ColmapObservation {
+  std::string image;
+  double x = 0, y = 0;  ///< pixels
+  std::int64_t point = 0;
+};
+/// Those of a model that show a point.  @throws InputError, MissingInputError.
+[[nodiscard]] std::vector<ColmapObservation> read_colmap_observations(const std::filesystem::path& model_folder);
 
 /// LLFF's poses_bounds.npy; `downscale` chooses among images, images_2, ….  @throws InputError, MissingInputError.
 [[nodiscard]] CaptureListing read_llff(const std::filesystem::path& npy_file, int downscale);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/capture/listing.h"
 #include "src/capture/npy_reader.h"
 
@@ -36,15 +37,6 @@ ImageFolder choose_image_folder(const std::vector<ImageFolder>& folders, int dow
     if (folder.reduced_by <= downscale) chosen = folder;
   }
   return chosen;
-}
-
-std::vector<fs::path> sorted_images(const fs::path& folder) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.is_regular_file() && is_image_file(entry.path())) files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  return files;
 }
 
 /// One row. Columns of the 3x3 part are the camera's down, right and back; the fifth column is height, width, focal.
@@ -103,7 +95,7 @@ CaptureListing read_llff(const fs::path& npy_file, int downscale) {
   if (folders.empty())
     throw MissingInputError((root / "images").string() + " (or images_4, images_8, …): no such folder");
   const ImageFolder folder = choose_image_folder(folders, downscale);
-  const std::vector<fs::path> files = sorted_images(folder.path);
+  const std::vector<fs::path> files = files_in(folder.path, is_image_file);
   if (files.size() != array.shape[0]) {
     throw InputError(npy_file, "shape",
                      "expected a row for each of the " + std::to_string(files.size()) + " images in " +
@@ -111,7 +103,7 @@ CaptureListing read_llff(const fs::path& npy_file, int downscale) {
   }
 
   std::vector<fs::path> full_files;  // in the same order; names may differ
-  if (folder.path != folders.front().path) full_files = sorted_images(folders.front().path);
+  if (folder.path != folders.front().path) full_files = files_in(folders.front().path, is_image_file);
   if (full_files.size() != files.size()) full_files.clear();
 
   CaptureListing listing;

@@ -11,6 +11,7 @@
 
 #include "src/base/error.h"
 #include "src/base/json_record.h"
+#include "src/capture/camera_record.h"
 #include "src/capture/listing.h"
 #include "src/capture/pose.h"
 #include "src/capture/stated_values.h"
@@ -27,12 +28,7 @@ struct PolycamCamera {
 
   template <typename Self, typename Visitor>
   static void visit(Self& self, Visitor&& v) {
-    v("width", self.width);
-    v("height", self.height);
-    v("fx", self.fx);
-    v("fy", self.fy);
-    v("cx", self.cx);
-    v("cy", self.cy);
+    LensRecord::visit(self, v);
     constexpr const char* kNames[3][4] = {
         {"t_00", "t_01", "t_02", "t_03"}, {"t_10", "t_11", "t_12", "t_13"}, {"t_20", "t_21", "t_22", "t_23"}};
     for (std::size_t row = 0; row < 3; ++row) {

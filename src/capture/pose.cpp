@@ -93,13 +93,7 @@ Mat3d rotation_from_quaternion(double w, double x, double y, double z, const fs:
   if (!(std::abs(norm - 1) <= kLargestPoseError)) {
     throw InputError(file, field, "expected a unit quaternion, found one of length " + number(norm));
   }
-  w /= norm;
-  x /= norm;
-  y /= norm;
-  z /= norm;
-  return {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
+  return rotation_of<double>({w / norm, x / norm, y / norm, z / norm});
 }
 
 }  // namespace cnerf

@@ -26,7 +26,8 @@ inline constexpr double kNotedPoseError = 1e-4;
 ///                     kLargestPoseError.
 [[nodiscard]] Affined rigid_pose(const Affined& pose, const std::filesystem::path& file, const std::string& field);
 
-/// Turns the axes of a camera that looks along -Z with +Y up (OpenGL, Blender, NeRF) into those of camera.h.
+/// Turns the axes of a camera that looks along -Z with +Y up (OpenGL, Blender, NeRF) into those of camera.h. Its own
+/// inverse.
 [[nodiscard]] Affined opencv_from_opengl_camera(const Affined& world_from_camera);
 
 /// Rows of the 4x4 matrix in the convention of transforms.json: the camera looks along -Z, +Y is up.

@@ -2,11 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
+#include <optional>
 
 #include "src/base/error.h"
 #include "src/base/json.h"
+#include "src/base/text.h"
 
 namespace cnerf {
 namespace fs = std::filesystem;
@@ -27,12 +28,11 @@ std::vector<double> numbers_of(std::string_view text, std::size_t count, const f
   std::vector<double> numbers;
   for (std::size_t at = text.find_first_not_of(kBlanks); at < text.size(); at = text.find_first_not_of(kBlanks, at)) {
     const std::string_view word = text.substr(at, text.find_first_of(kBlanks, at) - at);
-    double value = 0;
-    const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (failure != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) {
+    const std::optional<double> value = value_in<double>(word);
+    if (!value || !std::isfinite(*value)) {
       throw InputError(file, field, expected + (count == 1 ? "" : "found ") + quoted(word));
     }
-    numbers.push_back(value);
+    numbers.push_back(*value);
     at += word.size();
   }
   if (numbers.size() != count) {

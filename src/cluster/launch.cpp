@@ -1,7 +1,6 @@
 #include "src/cluster/launch.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <vector>
 
@@ -15,12 +14,9 @@ constexpr int kFirstPort = 20000, kPorts = 10000;  // below those that systems g
 constexpr int kLastPort = 65535, kMostProcesses = 1 << 20;
 
 int parsed(const std::string& name, const std::string& text) {
-  int value = 0;
-  const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (problem != std::errc() || end != text.data() + text.size() || value < 0 || value > kMostProcesses) {
-    throw UsageError("$" + name + ": expected a whole number up to 2^20, found '" + text + "'");
-  }
-  return value;
+  const std::optional<int> value = value_in<int>(text);
+  if (value && *value >= 0 && *value <= kMostProcesses) return *value;
+  throw UsageError("$" + name + ": expected a whole number up to 2^20, found '" + text + "'");
 }
 
 int number(const GetVariable& variable, const std::string& name, int fallback) {

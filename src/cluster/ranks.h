@@ -126,7 +126,6 @@ class JoinedRanks final : public Ranks {
 
   /// Ends together with the others; with an error of this process, which they are told of.
   void leave(const std::optional<std::string>& error);
-  [[nodiscard]] std::string name_of(int rank) const { return names_.at(std::size_t(rank)); }
 
  private:
   class GuardedDeviceSums;

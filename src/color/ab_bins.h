@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "src/base/host_device.h"
+#include "src/color/colorspace_math.h"
 
 namespace cnerf {
 
@@ -16,6 +17,10 @@ inline constexpr float kAbGridStep = 10.0f;  ///< distance of neighbouring bins,
 struct Ab {
   float a = 0, b = 0;
 };
+[[nodiscard]] inline Ab ab_of_linear_rgb(Vec3f rgb) {
+  const Lab<float> lab = lab_from_linear_rgb(rgb);
+  return {lab.a, lab.b};
+}
 
 /// Centres of the bins, ordered by a, then b.
 [[nodiscard]] const std::array<Ab, kAbBinCount>& ab_bin_centres();

@@ -74,12 +74,6 @@ class GreyColorizer final : public Colorizer {
 
 }  // namespace
 
-std::vector<std::string> colorizer_kinds() {
-  std::vector<std::string> names;
-  for (const Kind& kind : kKinds) names.emplace_back(kind.name);
-  return names;
-}
-
 std::unique_ptr<Colorizer> make_colorizer(const ColorizerOptions& options, const ColorizerContext& context) {
   const std::size_t colon = options.spec.find(':');
   const std::string name = options.spec.substr(0, colon);

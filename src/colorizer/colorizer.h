@@ -58,9 +58,6 @@ struct ColorizerContext {
   std::function<void(const std::string&)> say = {};  ///< hears what the user should know; may be empty
 };
 
-/// What may stand before the colon of a spec: "grey", "reference", …
-[[nodiscard]] std::vector<std::string> colorizer_kinds();
-
 /// @throws UsageError         an unknown kind or an empty spec; lists the kinds.
 /// @throws MissingInputError  a file the spec names does not exist.
 /// @throws InputError         a file the spec names cannot be used: not an image, no colour in it.

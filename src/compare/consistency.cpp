@@ -8,7 +8,6 @@
 #include "src/base/check.h"
 #include "src/base/statistics.h"
 #include "src/color/ab_bins.h"
-#include "src/color/colorspace_math.h"
 
 namespace cnerf::compare {
 namespace {
@@ -22,8 +21,7 @@ class AbMap {
     const std::vector<float>& rgb = view.image->rgb;
     ab_.reserve(rgb.size() / 3);
     for (std::size_t i = 0; i + 2 < rgb.size(); i += 3) {
-      const Lab<float> lab = lab_from_linear_rgb(Vec3f{rgb[i], rgb[i + 1], rgb[i + 2]});
-      ab_.push_back({lab.a, lab.b});
+      ab_.push_back(ab_of_linear_rgb({rgb[i], rgb[i + 1], rgb[i + 2]}));
     }
   }
 

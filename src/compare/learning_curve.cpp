@@ -28,8 +28,7 @@ float encoded(float luminance) {
 
 Ab true_color(const ColorImage& truth, std::size_t pixel) {
   const float* rgb = truth.rgb.data() + 3 * pixel;
-  const Lab<float> lab = lab_from_linear_rgb(Vec3f{rgb[0], rgb[1], rgb[2]});
-  return {lab.a, lab.b};
+  return ab_of_linear_rgb({rgb[0], rgb[1], rgb[2]});
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "src/base/error.h"
+#include "src/base/text.h"
 
 namespace cnerf::compare {
 
@@ -22,9 +23,7 @@ std::vector<const Method*> parse_methods(const std::string& list) {
   for (std::string word; list != "all" && std::getline(words, word, ',');) {
     const auto* found = std::ranges::find(kMethods, word, &Method::name);
     if (found == std::end(kMethods)) {
-      std::string known;
-      for (const std::string& name : method_names()) known += (known.empty() ? "" : ", ") + name;
-      throw UsageError("--methods: no method '" + word + "'; there are: " + known);
+      throw UsageError("--methods: no method '" + word + "'; there are: " + joined(method_names(), ", "));
     }
     if (std::ranges::find(methods, found) == methods.end()) methods.push_back(found);
   }

@@ -6,6 +6,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/plugin.h"
+#include "src/base/text.h"
 #include "src/config/toml_binding.h"
 
 namespace cnerf {
@@ -105,11 +106,9 @@ fs::path preset_file(const std::string& name) {
     if (fs::is_regular_file(file, failure)) return file;
   }
   const std::vector<std::string> names = preset_names();
-  std::string known;
-  for (const std::string& each : names) known += (known.empty() ? "" : ", ") + each;
   const std::string meant = nearest_name(name, names);
   throw UsageError("--preset: no preset '" + name + "'" + (meant.empty() ? "" : "; did you mean '" + meant + "'?") +
-                   " (there are: " + known + "; a file of your own goes to --config)");
+                   " (there are: " + joined(names, ", ") + "; a file of your own goes to --config)");
 }
 
 }  // namespace cnerf

@@ -7,42 +7,34 @@
 namespace cnerf {
 namespace {
 
-class CpuEngines final : public Engines {
+/// Engines of one device: each method calls the function that it is given.
+template <Device kDevice, auto Describe, auto MakeLuminance, auto MakeColorBins, auto MakeColorField>
+class EnginesOf final : public Engines {
  public:
-  [[nodiscard]] Device device() const override { return Device::kCpu; }
-  [[nodiscard]] std::string description() const override {
-    return std::to_string(thread_count()) + " threads, " + to_string(detected_isa());
-  }
+  [[nodiscard]] Device device() const override { return kDevice; }
+  [[nodiscard]] std::string description() const override { return Describe(); }
   [[nodiscard]] std::unique_ptr<LuminanceEngine> make_luminance(const LuminanceEngineOptions& options) const override {
-    return make_cpu_luminance_engine(options);
+    return MakeLuminance(options);
   }
   [[nodiscard]] std::unique_ptr<ColorBinEngine> make_color_bins(const HashGridOptions& grid,
                                                                 std::uint64_t seed) const override {
-    return make_cpu_color_bin_engine(grid, seed);
+    return MakeColorBins(grid, seed);
   }
   [[nodiscard]] std::unique_ptr<ColorFieldEngine> make_color_field(const HashGridOptions& grid,
                                                                    std::uint64_t seed) const override {
-    return make_cpu_color_field_engine(grid, seed);
+    return MakeColorField(grid, seed);
   }
 };
 
+std::string processor_text() {
+  return std::to_string(thread_count()) + " threads, " + to_string(detected_isa());
+}
+
+using CpuEngines = EnginesOf<Device::kCpu, processor_text, make_cpu_luminance_engine, make_cpu_color_bin_engine,
+                             make_cpu_color_field_engine>;
 #if CNERF_CUDA_ENGINE
-class CudaEngines final : public Engines {
- public:
-  [[nodiscard]] Device device() const override { return Device::kCuda; }
-  [[nodiscard]] std::string description() const override { return cuda_device_text(); }
-  [[nodiscard]] std::unique_ptr<LuminanceEngine> make_luminance(const LuminanceEngineOptions& options) const override {
-    return make_cuda_luminance_engine(options);
-  }
-  [[nodiscard]] std::unique_ptr<ColorBinEngine> make_color_bins(const HashGridOptions& grid,
-                                                                std::uint64_t seed) const override {
-    return make_cuda_color_bin_engine(grid, seed);
-  }
-  [[nodiscard]] std::unique_ptr<ColorFieldEngine> make_color_field(const HashGridOptions& grid,
-                                                                   std::uint64_t seed) const override {
-    return make_cuda_color_field_engine(grid, seed);
-  }
-};
+using CudaEngines = EnginesOf<Device::kCuda, cuda_device_text, make_cuda_luminance_engine, make_cuda_color_bin_engine,
+                              make_cuda_color_field_engine>;
 #endif
 
 }  // namespace

@@ -11,7 +11,6 @@
 #include "src/base/check.h"
 #include "src/base/parallel.h"
 #include "src/color/ab_bins.h"
-#include "src/color/colorspace_math.h"
 #include "src/evaluate/pixel_sums.h"
 
 namespace cnerf {
@@ -66,8 +65,7 @@ cv::Mat filtered(const cv::Mat& plane) {
 
 /// In single precision, whose error of 1e-4 is far below what sums are told to.
 Ab ab_at(std::span<const float> rgb, std::size_t pixel) {
-  const Lab<float> lab = lab_from_linear_rgb(Vec3f{rgb[3 * pixel], rgb[3 * pixel + 1], rgb[3 * pixel + 2]});
-  return {lab.a, lab.b};
+  return ab_of_linear_rgb({rgb[3 * pixel], rgb[3 * pixel + 1], rgb[3 * pixel + 2]});
 }
 
 }  // namespace

@@ -76,7 +76,7 @@ Imf::Slice slice_of(std::vector<Stored>& plane, int width) {
 /// OpenEXR 3.1 says nothing where memory does not suffice to compress the last lines: the file lacks them.
 void expect_all_lines(std::span<const std::byte> bytes) {
   Imf::StdISStream stream;
-  stream.str({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  stream.str(text_of(bytes));
   if (!Imf::InputFile(stream).isComplete()) throw std::bad_alloc();
 }
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <optional>
 
 #include "src/base/error.h"
@@ -25,15 +24,12 @@ std::string kind_of(const std::string& spec) {
 /// The last by name of the takes that are finished, or of those that were begun; empty when there is none.
 /// @param kind  of the colorizer that they are named after; empty: any
 std::string last_take(const RunDirectory& directory, bool is_finished, const std::string& kind = "") {
-  std::vector<std::string> names;
-  std::error_code failure;
-  for (const auto& entry : fs::directory_iterator(directory.root() / "takes", failure)) {
-    const std::string name = entry.path().filename().string();
+  std::string last;
+  for (const std::string& name : directory.take_names()) {
     const bool is_of_kind = kind.empty() || name == kind || name.starts_with(kind + "-");
-    if (is_of_kind && directory.take_record(name).has_value() == is_finished) names.push_back(name);
+    if (is_of_kind && directory.take_record(name).has_value() == is_finished) last = name;
   }
-  std::ranges::sort(names);
-  return names.empty() ? "" : names.back();
+  return last;
 }
 
 /// Where none is named: one that was not finished, else the current one; empty where there is none.

@@ -175,9 +175,7 @@ void add_run(Report& report, const RunDirectory& directory) {
               duration_text(record.stage1.seconds), record.stage1.train_psnr);
   add_scene(report, directory.stage1_snapshot(), {});
   add_learned(report, directory, record);
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(directory.root() / "takes", none)) {
-    const std::string name = entry.path().filename().string();
+  for (const std::string& name : directory.take_names()) {
     const auto take = directory.take_record(name);
     if (!take) {
       report.line("take", "{}: not finished", name);

@@ -3,15 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <iterator>
+#include <optional>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/text.h"
 #include "src/capture/image_io.h"
-#include "src/color/colorspace_math.h"
+#include "src/color/ab_bins.h"
 #include "src/pipeline/palette.h"
 #include "src/prepare/photographs.h"
 #include "src/train/chroma/strokes.h"
@@ -50,11 +50,6 @@ std::vector<NamedFile> named_files(const std::string& list, const char* option) 
   return files;
 }
 
-Ab ab_of_linear(Vec3f rgb) {
-  const Lab<float> lab = lab_from_linear_rgb(rgb);
-  return {lab.a, lab.b};
-}
-
 /// The orientation that turns back what stands upright.
 int turning_back(int orientation) {
   return orientation == 6 ? 8 : orientation == 8 ? 6 : orientation;
@@ -91,7 +86,7 @@ KnownColors load_colors(const NamedFile& named, KnownColorKind kind, const View&
     const float alpha = image.alpha.empty() ? 1.0f : image.alpha[p];
     const bool counts = alpha > kStrokeAlpha;
     const float* rgb = &image.values[3 * p];
-    const Ab color = counts ? ab_of_linear({rgb[0] / alpha, rgb[1] / alpha, rgb[2] / alpha}) : Ab{};
+    const Ab color = counts ? ab_of_linear_rgb({rgb[0] / alpha, rgb[1] / alpha, rgb[2] / alpha}) : Ab{};
     known.ab.push_back(color);
     known.is_known.push_back(counts ? 1 : 0);
     chroma += std::hypot(color.a, color.b);
@@ -108,12 +103,9 @@ KnownColors load_colors(const NamedFile& named, KnownColorKind kind, const View&
 }
 
 double number_of(const std::string& text, const std::string& entry) {
-  double value = 0;
-  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (failure != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
-    throw UsageError(entry + ": expected x,y,VIEW,#rrggbb, found " + text + " for a number");
-  }
-  return value;
+  const std::optional<double> value = value_in<double>(text);
+  if (value && std::isfinite(*value)) return *value;
+  throw UsageError(entry + ": expected x,y,VIEW,#rrggbb, found " + text + " for a number");
 }
 
 Ab color_of(const std::string& text, const std::string& entry, Palette& palette) {

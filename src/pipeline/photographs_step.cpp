@@ -105,8 +105,7 @@ ChromaSamples chroma_of(const RenderedImage& rendered, const LinearImage& grey) 
   for (std::size_t i = 0; i < grey.values.size(); ++i) {
     const float opacity = rendered.opacity[i];
     const float* rgb = &rendered.rgb[3 * i];
-    const Lab<float> lab = lab_from_linear_rgb<float>({rgb[0], rgb[1], rgb[2]});
-    samples.ab.push_back({lab.a, lab.b});
+    samples.ab.push_back(ab_of_linear_rgb({rgb[0], rgb[1], rgb[2]}));
     samples.lightness.push_back(opacity > 0 ? lightness_from_luminance(gain * rendered.luminance[i] / opacity) : 0.0f);
     samples.weight.push_back(opacity * (grey.alpha.empty() ? 1.0f : grey.alpha[i]));
   }
@@ -121,28 +120,15 @@ GreyPhotograph uncovered(LinearImage grey) {
   return {grey.width, grey.height, std::move(grey.values), std::move(grey.alpha)};
 }
 
-/// Turned as the file says that its pixels are to be shown: what is written has no such note.
-cv::Mat upright(const cv::Mat& stored, const fs::path& file) {
-  const prepare::Upright grid = {prepare::orientation_of(read_binary_file(file)), stored.cols, stored.rows};
-  if (grid.orientation == 1) return stored;
-  cv::Mat turned(grid.height(), grid.width(), stored.type());
-  const std::size_t bytes = stored.elemSize();
-  for (int y = 0; y < turned.rows; ++y) {
-    for (int x = 0; x < turned.cols; ++x) {
-      const int from = int(grid.stored_index(x, y));
-      std::copy_n(stored.ptr(from / stored.cols, from % stored.cols), bytes, turned.ptr(y, x));
-    }
-  }
-  return turned;
-}
-
+/// The photograph in colour, turned as its file says that it is to be shown: what is written has no such note.
 cv::Mat colored(const Photograph& photograph, const Scene& scene, const Config& config) {
   LinearImage grey = read_grey(photograph, transfer_named(config.capture.transfer));
   const View& view = *photograph.view;
   const Intrinsics lens = rendered_lens(view, grey.width, grey.height);
   const RenderedImage rendered = scene.render(lens, view.world_from_camera, render_options(config));
   const ChromaSamples chroma = chroma_of(rendered, area_resized(grey, lens.width, lens.height));
-  return upright(colored_photograph(uncovered(std::move(grey)), chroma), photograph.file);
+  return prepare::turned_upright(colored_photograph(uncovered(std::move(grey)), chroma),
+                                 prepare::orientation_of(read_binary_file(photograph.file)));
 }
 
 }  // namespace

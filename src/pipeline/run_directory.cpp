@@ -7,6 +7,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/folder_lock.h"
+#include "src/base/text.h"
 #include "src/base/usage.h"
 #include "src/pipeline/version.h"
 
@@ -102,6 +103,16 @@ void RunDirectory::update(const std::function<void(RunRecord&)>& change) const {
   save(std::move(changed));
 }
 
+std::vector<std::string> RunDirectory::take_names() const {
+  std::vector<std::string> names;
+  std::error_code failure;
+  for (const auto& entry : fs::directory_iterator(root_ / "takes", failure)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
 std::optional<TakeRecord> RunDirectory::take_record(const std::string& take) const {
   const fs::path file = take_record_file(take);
   std::error_code failure;
@@ -131,15 +142,11 @@ std::string RunDirectory::choose_take(const std::string& wanted) const {
   if (wanted == kGreyTake && !take_record(wanted)) return "";
   const std::string take = wanted.empty() ? record().current_take : wanted;
   if (take.empty() || take_record(take)) return take;
-  std::string finished;
-  std::error_code failure;
-  for (const auto& entry : fs::directory_iterator(root_ / "takes", failure)) {
-    const std::string name = entry.path().filename().string();
-    if (take_record(name)) finished += (finished.empty() ? "" : ", ") + name;
-  }
+  std::vector<std::string> finished = take_names();
+  std::erase_if(finished, [&](const std::string& name) { return !take_record(name); });
   const std::string asked = wanted.empty() ? record_file().string() + ": current_take" : root_.string();
   throw MissingInputError(asked + ": no finished take '" + take + "' (there are: " +
-                          (finished.empty() ? "none; make one with cnerf colorize" : finished) + ")");
+                          (finished.empty() ? "none; make one with cnerf colorize" : joined(finished, ", ")) + ")");
 }
 
 std::string RunDirectory::free_take_name(const std::string& base) const {

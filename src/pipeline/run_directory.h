@@ -19,6 +19,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "src/base/json_record.h"
 #include "src/base/observer.h"
@@ -124,6 +125,8 @@ class RunDirectory {
   void save(RunRecord record) const;
   /// Reads, changes and saves the record as one, whoever else does so at the same time.
   void update(const std::function<void(RunRecord&)>& change) const;
+  /// Of all takes, finished or not, in order.
+  [[nodiscard]] std::vector<std::string> take_names() const;
   [[nodiscard]] std::optional<TakeRecord> take_record(const std::string& take) const;
   void save(TakeRecord record) const;
 

@@ -63,6 +63,11 @@ class Colmap {
     return std::nullopt;
   }
 
+  /// Appends an option with its value to the words of a command that knows it.
+  void add(std::vector<std::string>& words, std::initializer_list<const char*> names, const std::string& value) {
+    if (const auto name = option(words.front(), names)) words.insert(words.end(), {*name, value});
+  }
+
   /// Runs one command, and reports the share its log tells as that of `task`.
   /// @return  false when it failed with `excuse` among its last words; every other failure throws.
   bool run(const std::vector<std::string>& words, const std::string& task, std::size_t images,
@@ -230,8 +235,7 @@ void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, 
     for (const PreparedImage* image : members) list += image->name + "\n";
     const fs::path list_file = work / fmt::format("camera_{}.txt", number);
     write_file(list_file, list);
-    const char* command = "feature_extractor";
-    std::vector<std::string> words = {command,
+    std::vector<std::string> words = {"feature_extractor",
                                       "--database_path",
                                       work / "database.db",
                                       "--image_path",
@@ -245,13 +249,11 @@ void extract_features(Colmap& colmap, const std::vector<PreparedImage>& images, 
                                       "--ImageReader.camera_params",
                                       first_parameters(*members.front())};
     if (fs::exists(work / "masks")) words.insert(words.end(), {"--ImageReader.mask_path", work / "masks"});
-    const auto add = [&](std::initializer_list<const char*> names, const std::string& value) {
-      if (const auto name = colmap.option(command, names)) words.insert(words.end(), {*name, value});
-    };
-    add({"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"}, "0");
-    add({"SiftExtraction.num_threads", "FeatureExtraction.num_threads"}, std::to_string(thread_count()));
-    add({"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"}, std::to_string(kColmapSide));
-    add({"SiftExtraction.max_num_features"}, std::to_string(kColmapFeatures));
+    colmap.add(words, {"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"}, "0");
+    colmap.add(words, {"SiftExtraction.num_threads", "FeatureExtraction.num_threads"}, std::to_string(thread_count()));
+    colmap.add(words, {"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"},
+               std::to_string(kColmapSide));
+    colmap.add(words, {"SiftExtraction.max_num_features"}, std::to_string(kColmapFeatures));
     const auto scaled = [&, count = members.size()](const Progress& part) {
       if (!progress) return;
       const double done = double(before) + part.fraction * double(count);
@@ -273,15 +275,15 @@ void match_features(Colmap& colmap, const std::vector<PreparedImage>& images,
       list += images[std::size_t(pairs[k].first)].name + " " + images[std::size_t(pairs[k].second)].name + "\n";
     }
     write_file(work / "pairs.txt", list);
-    const char* command = "matches_importer";
-    std::vector<std::string> words = {
-        command, "--database_path", work / "database.db", "--match_list_path", work / "pairs.txt", "--match_type",
-        "pairs"};
-    const auto add = [&](std::initializer_list<const char*> names, const std::string& value) {
-      if (const auto name = colmap.option(command, names)) words.insert(words.end(), {*name, value});
-    };
-    add({"SiftMatching.use_gpu", "FeatureMatching.use_gpu"}, "0");
-    add({"SiftMatching.num_threads", "FeatureMatching.num_threads"}, std::to_string(thread_count()));
+    std::vector<std::string> words = {"matches_importer",
+                                      "--database_path",
+                                      work / "database.db",
+                                      "--match_list_path",
+                                      work / "pairs.txt",
+                                      "--match_type",
+                                      "pairs"};
+    colmap.add(words, {"SiftMatching.use_gpu", "FeatureMatching.use_gpu"}, "0");
+    colmap.add(words, {"SiftMatching.num_threads", "FeatureMatching.num_threads"}, std::to_string(thread_count()));
     const auto scaled = [&](const Progress& part) {
       const double done = double(begin) + part.fraction * double(end - begin);
       if (progress) progress({part.task, done / double(pairs.size()), {}});
@@ -294,15 +296,12 @@ void map_images(Colmap& colmap, const std::vector<PreparedImage>& images, const 
                 const ProgressSink& progress) {
   fs::remove_all(work / "sparse");
   make_folders(work / "sparse");
-  const char* command = "mapper";
-  std::vector<std::string> words = {command,           "--database_path", work / "database.db", "--image_path",
+  std::vector<std::string> words = {"mapper",          "--database_path", work / "database.db", "--image_path",
                                     work / "pictures", "--output_path",   work / "sparse"};
-  const auto add = [&](const char* name, const std::string& value) {
-    if (const auto found = colmap.option(command, {name})) words.insert(words.end(), {*found, value});
-  };
-  add("Mapper.num_threads", std::to_string(thread_count()));
-  add("Mapper.extract_colors", "0");
-  add("Mapper.min_model_size", std::to_string(std::min<std::size_t>(10, std::max<std::size_t>(3, images.size() / 2))));
+  colmap.add(words, {"Mapper.num_threads"}, std::to_string(thread_count()));
+  colmap.add(words, {"Mapper.extract_colors"}, "0");
+  colmap.add(words, {"Mapper.min_model_size"},
+             std::to_string(std::min<std::size_t>(10, std::max<std::size_t>(3, images.size() / 2))));
   (void)colmap.run(words, "poses", images.size(), progress, "failed to create sparse model");  // then there is none
 }
 
@@ -360,12 +359,8 @@ fs::path free_lenses(Colmap& colmap, const fs::path& model, const std::vector<Pr
   (void)colmap.run({"model_converter", "--input_path", model, "--output_path", start, "--output_type", "TXT"}, "lenses",
                    images.size(), progress);
   write_file(start / "cameras.txt", with_full_lenses(read_text_file(start / "cameras.txt")));
-  const char* command = "bundle_adjuster";
-  std::vector<std::string> words = {command, "--input_path", start, "--output_path", adjusted};
-  if (const auto centre = colmap.option(command, {"BundleAdjustment.refine_principal_point"});
-      centre && fewest >= kViewsForCentre) {
-    words.insert(words.end(), {*centre, "1"});
-  }
+  std::vector<std::string> words = {"bundle_adjuster", "--input_path", start, "--output_path", adjusted};
+  if (fewest >= kViewsForCentre) colmap.add(words, {"BundleAdjustment.refine_principal_point"}, "1");
   (void)colmap.run(words, "lenses", images.size(), progress);
   const auto before = lenses_of(start, images), after = lenses_of(adjusted, images);
   const bool plausible = std::ranges::all_of(

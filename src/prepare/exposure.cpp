@@ -4,13 +4,11 @@
 #include <cmath>
 #include <map>
 #include <opencv2/imgproc.hpp>
-#include <sstream>
 
-#include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/base/statistics.h"
-#include "src/capture/byte_reader.h"
 #include "src/capture/image_io.h"
+#include "src/capture/listing.h"
 
 namespace cnerf::prepare {
 namespace fs = std::filesystem;
@@ -184,73 +182,18 @@ std::vector<ViewLight> solve_exposures_and_haze(int views, const std::vector<Sig
   return fit.light();
 }
 
-namespace {
-
-constexpr long long kNoPoint = -1;
-
-std::vector<Observation> read_binary_observations(const fs::path& file) {
-  ByteReader in(file);
-  std::vector<Observation> out;
-  const auto count = in.next<std::uint64_t>("number of images");
-  for (std::uint64_t i = 0; i < count; ++i) {
-    const std::string field = "image " + std::to_string(i + 1) + " of " + std::to_string(count);
-    in.skip(1, 4 + 7 * 8 + 4, field);  // its number, rotation, translation, camera
-    const std::string name = in.next_text(field);
-    const auto points = in.next<std::uint64_t>(field);
-    for (std::uint64_t k = 0; k < points; ++k) {
-      Observation seen;
-      seen.image = name;
-      seen.x = in.next<double>(field);
-      seen.y = in.next<double>(field);
-      seen.point = in.next<std::int64_t>(field);
-      if (seen.point != kNoPoint) out.push_back(std::move(seen));
-    }
-  }
-  return out;
-}
-
-/// Two lines per image: pose and name, then its observations, which may be none.
-std::vector<Observation> read_text_observations(const fs::path& file) {
-  std::istringstream in(read_text_file(file));
-  const auto next = [&in](std::string& line) {
-    while (std::getline(in, line)) {
-      if (line.ends_with('\r')) line.pop_back();
-      if (!line.starts_with('#')) return true;
-    }
-    return false;
-  };
-  std::vector<Observation> out;
-  for (std::string pose, points; next(pose) && next(points);) {
-    Observation seen;
-    std::istringstream words(pose), numbers(points);
-    for (int word = 0; word < 9; ++word) words >> seen.image;  // its number, rotation, translation, camera
-    std::getline(words >> std::ws, seen.image);
-    while (numbers >> seen.x >> seen.y >> seen.point) {
-      if (seen.point != kNoPoint) out.push_back(seen);
-    }
-  }
-  return out;
-}
-
-}  // namespace
-
-std::vector<Observation> read_observations(const fs::path& model) {
-  if (fs::exists(model / "images.bin")) return read_binary_observations(model / "images.bin");
-  return read_text_observations(model / "images.txt");
-}
-
 std::optional<double> estimate_exposures(std::vector<PreparedImage>& images, const fs::path& capture,
                                          const fs::path& model, bool with_haze) {
   const ImagePlaces places(images);
-  std::vector<std::vector<Observation>> by_image(images.size());
-  for (Observation& seen : read_observations(model)) {
+  std::vector<std::vector<ColmapObservation>> by_image(images.size());
+  for (ColmapObservation& seen : read_colmap_observations(model)) {
     if (const auto found = places.of(seen.image)) by_image[*found].push_back(std::move(seen));
   }
   std::vector<std::vector<Sighting>> parts(images.size());
   parallel_tasks(images.size(), [&](std::size_t i) {
     if (by_image[i].empty()) return;
     const cv::Mat1f light = smoothed(capture / "images" / images[i].name);
-    for (const Observation& seen : by_image[i]) {
+    for (const ColmapObservation& seen : by_image[i]) {
       if (!(seen.x >= 0 && seen.y >= 0 && seen.x < light.cols && seen.y < light.rows)) continue;
       const float value = light(int(seen.y), int(seen.x));
       if (value > kDarkest && value < kLightest) parts[i].push_back({int(i), int(seen.point), double(value)});

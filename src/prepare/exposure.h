@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "src/prepare/photographs.h"
@@ -33,15 +32,6 @@ struct ViewLight {
 /// than kSightingsForHaze sightings get their exposure alone.
 inline constexpr int kSightingsForHaze = 50;
 [[nodiscard]] std::vector<ViewLight> solve_exposures_and_haze(int views, const std::vector<Sighting>& sightings);
-
-/// Where an image shows a sparse point.
-struct Observation {
-  std::string image;
-  long long point = 0;
-  double x = 0, y = 0;  ///< pixels
-};
-/// The observations of a COLMAP model: of its images.bin, else its images.txt.  @throws MissingInputError, InputError.
-[[nodiscard]] std::vector<Observation> read_observations(const std::filesystem::path& model);
 
 /// The spread of exposures from which they are kept: relative standard deviation. Below it, differences are as likely
 /// shine and noise.

@@ -55,12 +55,8 @@ cv::Mat1f disagreement(const View& view, const std::vector<RayResult>& field) {
 /// What the fit shows where the view is.  [H, W]
 std::vector<RayResult> rendered(const LuminanceModel& fit, const View& view) {
   const UnitCamera camera(view.intrinsics, view.world_from_camera, fit.frame);
-  std::vector<Ray> rays;
-  for (int y = 0; y < view.intrinsics.height; ++y) {
-    for (int x = 0; x < view.intrinsics.width; ++x) rays.push_back(camera.ray({x + 0.5, y + 0.5}));
-  }
-  std::vector<RayResult> results(rays.size());
-  fit.engine->render(rays, fit.march(kStepsPerBox), {kLeastTransmittance, kShadedShare}, results);
+  std::vector<RayResult> results(std::size_t(view.intrinsics.width) * std::size_t(view.intrinsics.height));
+  fit.engine->render_view(camera, fit.march(kStepsPerBox), {kLeastTransmittance, kShadedShare}, results);
   return results;
 }
 

@@ -8,8 +8,10 @@
 #include <cstdint>
 #include <cstring>
 #include <map>
+#include <opencv2/core.hpp>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
@@ -31,14 +33,9 @@ bool is_heic(const fs::path& file) {
 }
 
 std::vector<fs::path> photographs_in(const fs::path& folder) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
-    if (!entry.is_regular_file() || name.starts_with('.')) continue;
-    if (is_image_file(entry.path()) || is_heic(entry.path())) files.push_back(entry.path());
-  }
-  std::ranges::sort(files);
-  return files;
+  return files_in(folder, [](const fs::path& file) {
+    return !file.filename().string().starts_with('.') && (is_image_file(file) || is_heic(file));
+  });
 }
 
 void refuse_heic(const fs::path& folder, const std::vector<fs::path>& files) {
@@ -105,19 +102,18 @@ void write_image(const fs::path& file, const LinearImage& image, bool eight_bit)
   }
 }
 
-void write_mask(const fs::path& mask, Upright grid, const fs::path& target) {
+void write_mask(const fs::path& mask, int orientation, cv::Size stored, const fs::path& target) {
   // Of a photograph on its side the shape tells whether the mask was made of what is stored or of what is shown.
-  if (grid.orientation > 4) {
+  if (orientation > 4) {
     const ImageHeader found = image_header(mask);
-    const bool is_as_stored = same_shape(grid.stored_width, grid.stored_height, found.width, found.height);
-    if (!is_as_stored) grid = {1, grid.width(), grid.height()};
+    const bool is_as_stored = same_shape(stored.width, stored.height, found.width, found.height);
+    if (!is_as_stored) {
+      orientation = 1;
+      std::swap(stored.width, stored.height);
+    }
   }
-  const std::vector<std::uint8_t> stored = read_mask(mask, grid.stored_width, grid.stored_height);
-  cv::Mat1b upright(grid.height(), grid.width());
-  for (int y = 0; y < upright.rows; ++y) {
-    for (int x = 0; x < upright.cols; ++x) upright(y, x) = stored[grid.stored_index(x, y)];
-  }
-  write_png(target, upright);
+  std::vector<std::uint8_t> codes = read_mask(mask, stored.width, stored.height);
+  write_png(target, turned_upright(cv::Mat(stored, CV_8U, codes.data()), orientation));
 }
 
 /// The stem without white space, which COLMAP's lists cannot hold.
@@ -152,7 +148,8 @@ struct Imported {
 Imported import_one(const fs::path& file, const std::string& name, const fs::path& capture,
                     const std::map<std::string, fs::path>& masks, const SensorOptions& sensor) {
   Imported out;
-  Upright grid;
+  int orientation = 1;
+  cv::Size stored_size;
   try {
     if (!is_utf8(name)) throw InputError(printable(file.string()), "name", "expected UTF-8");
     const std::vector<std::byte> content = read_binary_file(file);
@@ -161,8 +158,9 @@ Imported import_one(const fs::path& file, const std::string& name, const fs::pat
     apply_levels(stored, sensor, file);
     const bool eight_bit = stays_eight_bit(stored, sensor);
     stored = luminance_image(std::move(stored));
-    grid = {orientation_of(content), stored.width, stored.height};
-    const LinearImage upright = turned_upright(std::move(stored), grid.orientation);
+    orientation = orientation_of(content);
+    stored_size = {stored.width, stored.height};
+    const LinearImage upright = turned_upright(std::move(stored), orientation);
     PreparedImage& image = out.image;
     image.name = name + (upright.depth == PixelDepth::kF32 ? ".exr" : ".png");
     image.source = file;
@@ -181,7 +179,7 @@ Imported import_one(const fs::path& file, const std::string& name, const fs::pat
   // A mask that does not fit is a mistake to mend: its photograph is neither left out nor shown unmasked.
   if (const auto mask = masks.find(file.stem().string()); mask != masks.end()) {
     out.image.mask = fs::path("masks") / (name + ".png");
-    write_mask(mask->second, grid, capture / out.image.mask);
+    write_mask(mask->second, orientation, stored_size, capture / out.image.mask);
   }
   return out;
 }
@@ -244,37 +242,6 @@ std::map<std::string, fs::path> masks_in(const fs::path& folder) {
   return masks;
 }
 
-std::size_t Upright::stored_index(int x, int y) const {
-  const int right = width() - 1 - x, bottom = height() - 1 - y;
-  int column = x, row = y;
-  switch (orientation) {
-    case 2:
-      column = right;
-      break;
-    case 3:
-      column = right, row = bottom;
-      break;
-    case 4:
-      row = bottom;
-      break;
-    case 5:
-      column = y, row = x;
-      break;
-    case 6:
-      column = y, row = right;
-      break;
-    case 7:
-      column = bottom, row = right;
-      break;
-    case 8:
-      column = bottom, row = x;
-      break;
-    default:
-      break;
-  }
-  return std::size_t(row) * std::size_t(stored_width) + std::size_t(column);
-}
-
 int orientation_of(std::span<const std::byte> file) {
   constexpr std::array<std::uint8_t, 4> kLittleEndian{'I', 'I', 42, 0}, kBigEndian{'M', 'M', 0, 42};
   const auto begins_with = [&](const auto& mark) {
@@ -284,22 +251,27 @@ int orientation_of(std::span<const std::byte> file) {
   return is_tiff ? 1 : read_exif(file).orientation;  // OpenCV turns TIFF files upright by itself
 }
 
+// EXIF's numbers: from 5 on rows and columns change places; then it is flipped not at all, across, both ways or down.
+cv::Mat turned_upright(const cv::Mat& stored, int orientation) {
+  const cv::Mat lying = orientation > 4 ? cv::Mat(stored.t()) : stored;
+  const int way = (orientation - 1) % 4;
+  if (way == 0) return lying;
+  cv::Mat upright;  // never in place: `lying` may be the caller's
+  cv::flip(lying, upright, way == 1 ? 1 : way == 2 ? -1 : 0);
+  return upright;
+}
+
 LinearImage turned_upright(LinearImage stored, int orientation) {
   if (orientation == 1) return stored;
-  const Upright grid = {orientation, stored.width, stored.height};
-  LinearImage out = stored;
-  out.width = grid.width();
-  out.height = grid.height();
-  const auto channels = std::size_t(stored.channels);
-  std::size_t at = 0;
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x, ++at) {
-      const std::size_t from = grid.stored_index(x, y);
-      std::copy_n(&stored.values[channels * from], channels, &out.values[channels * at]);
-      if (!stored.alpha.empty()) out.alpha[at] = stored.alpha[from];
-    }
-  }
-  return out;
+  const auto turn = [&](std::vector<float>& values, int channels) {
+    const cv::Mat plane(stored.height, stored.width, CV_32FC(channels), values.data());
+    const cv::Mat upright = turned_upright(plane, orientation);
+    values.assign(upright.ptr<float>(), upright.ptr<float>() + values.size());
+  };
+  turn(stored.values, stored.channels);
+  if (!stored.alpha.empty()) turn(stored.alpha, 1);
+  if (orientation > 4) std::swap(stored.width, stored.height);
+  return stored;
 }
 
 bool holds_photographs(const fs::path& folder) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <map>
+#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -99,22 +100,12 @@ class ImagePlaces {
 /// "0001". None for an empty path.  @throws MissingInputError  no such folder, or no picture in it.
 [[nodiscard]] std::map<std::string, std::filesystem::path> masks_in(const std::filesystem::path& folder);
 
-/// Turns a pixel grid upright: the size of an image of `width` x `height` after `orientation`, and the stored pixel
-/// that upright pixel (x, y) shows.
-struct Upright {
-  int orientation = 1;
-  int stored_width = 0, stored_height = 0;
-
-  [[nodiscard]] int width() const { return orientation < 5 ? stored_width : stored_height; }
-  [[nodiscard]] int height() const { return orientation < 5 ? stored_height : stored_width; }
-  [[nodiscard]] std::size_t stored_index(int x, int y) const;
-};
-
 /// How pixels that `read_linear_image` gives of a photograph have to be turned to stand upright, as EXIF numbers it.
 /// @param file  its content
 [[nodiscard]] int orientation_of(std::span<const std::byte> file);
 
-/// The whole image of such pixels.
+/// The whole image of such pixels. A cv::Mat that stands upright already shares its own.
+[[nodiscard]] cv::Mat turned_upright(const cv::Mat& stored, int orientation);
 [[nodiscard]] LinearImage turned_upright(LinearImage stored, int orientation);
 
 }  // namespace cnerf::prepare

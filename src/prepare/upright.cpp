@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numbers>
 #include <regex>
@@ -12,6 +11,7 @@
 #include "src/base/error.h"
 #include "src/base/rng.h"
 #include "src/base/statistics.h"
+#include "src/base/text.h"
 
 namespace cnerf::prepare {
 namespace {
@@ -80,11 +80,8 @@ struct Measure {
 };
 
 double measured_number(const std::string& text) {
-  double value = 0;
-  const char* const end = text.data() + text.size();
-  const auto [read, failure] = std::from_chars(text.data(), end, value);
-  if (failure != std::errc() || read != end) throw UsageError("measure: expected a number, found '" + text + "'");
-  return value;
+  if (const auto value = value_in<double>(text)) return *value;
+  throw UsageError("measure: expected a number, found '" + text + "'");
 }
 
 /// "x,y,view+x,y,view".

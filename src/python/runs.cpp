@@ -4,7 +4,6 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
-#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/parallel.h"
+#include "src/base/text.h"
 #include "src/config/fields.h"
 #include "src/engine/engines.h"
 #include "src/pipeline/bake_step.h"
@@ -37,9 +37,7 @@ std::string setting_text(const py::handle& value) {
   if (!py::isinstance<py::list>(value) && !py::isinstance<py::tuple>(value)) return py::str(value);
   Words items;
   for (const py::handle& item : value) items.push_back(setting_text(item));
-  std::string text;
-  for (const std::string& item : items) text += (text.empty() ? "" : ",") + item;
-  return text;
+  return joined(items, ",");
 }
 
 /// What a call changes of a configuration; `key=value` each.
@@ -115,13 +113,8 @@ class OpenRun {
   }
 
   [[nodiscard]] Words takes() const {
-    Words names;
-    std::error_code failure;
-    for (const auto& entry : fs::directory_iterator(directory_.root() / "takes", failure)) {
-      const std::string name = entry.path().filename().string();
-      if (directory_.take_record(name)) names.push_back(name);
-    }
-    std::ranges::sort(names);
+    Words names = directory_.take_names();
+    std::erase_if(names, [&](const std::string& name) { return !directory_.take_record(name); });
     return names;
   }
 

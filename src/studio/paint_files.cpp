@@ -39,9 +39,7 @@ std::string base_of(const fs::path& journal) {
 /// Journals that begin from a take: those of finished takes, and that of what no take holds.
 std::vector<fs::path> journals_begun_from(const pipeline::RunDirectory& directory, const std::string& take) {
   std::vector<fs::path> files = {directory.root() / "strokes" / kNowFile};
-  std::error_code failure;
-  for (const auto& entry : fs::directory_iterator(directory.root() / "takes", failure)) {
-    const std::string name = entry.path().filename().string();
+  for (const std::string& name : directory.take_names()) {
     if (fs::exists(directory.take_record_file(name))) files.push_back(directory.take_folder(name) / kJournalFile);
   }
   std::erase_if(files, [&](const fs::path& file) { return base_of(file) != take; });
@@ -154,8 +152,7 @@ void remove(const pipeline::RunDirectory& directory, const std::string& take, co
   std::error_code failure;
   fs::remove_all(folder, failure);
   std::string other = successor;
-  for (const auto& entry : fs::directory_iterator(directory.root() / "takes", failure)) {
-    const std::string name = entry.path().filename().string();
+  for (const std::string& name : directory.take_names()) {
     if (other.empty() && is_readable(directory, name)) other = name;
   }
   directory.update([&](pipeline::RunRecord& record) {

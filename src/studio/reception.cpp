@@ -252,7 +252,7 @@ PageAnswer Reception::put_arrival(const PageRequest& request) {
   const auto name = request.parameters.find("name"), place = request.parameters.find("offset");
   if (name == request.parameters.end()) throw InputError("arrivals", "name", "is missing");
   const fs::path path = checked_name(name->second);
-  const auto offset = place == request.parameters.end() ? std::nullopt : size_in(place->second);
+  const auto offset = place == request.parameters.end() ? std::nullopt : value_in<std::uint64_t>(place->second);
   if (!offset || *offset > kLargestFile || request.body.size() > kLargestFile - *offset) {
     throw InputError(name->second, "offset", fmt::format("expected 0 to {}", kLargestFile));
   }

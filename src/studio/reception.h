@@ -12,9 +12,7 @@
 
 #include "src/base/observer.h"
 #include "src/pipeline/run_context.h"
-#include "src/studio/board.h"
-#include "src/studio/routes.h"
-#include "viewer/server/page_api.h"
+#include "src/studio/board_api.h"
 
 namespace cnerf::studio {
 
@@ -24,7 +22,7 @@ inline constexpr std::size_t kLargestPiece = std::size_t(8) << 20;
 /// GET  scene, state, events
 /// PUT  arrivals?name=PATH&offset=BYTES   a piece of a file; 0 begins it anew
 /// POST orders                            prepare, clear, stop
-class Reception final : public web::PageApi {
+class Reception final : public BoardApi<Reception> {
  public:
   /// Begins a run on what was prepared.  @throws Error  it cannot be begun with this capture
   using Open = std::function<pipeline::RunContext(const std::filesystem::path& capture, Observer& observer)>;
@@ -39,24 +37,10 @@ class Reception final : public web::PageApi {
   /// Waits for a capture and begins the run.  @return  nothing when the user ended the program, or it was closed
   [[nodiscard]] std::optional<pipeline::RunContext> run();
 
-  [[nodiscard]] std::string prefix() const override { return "/studio"; }
-  [[nodiscard]] std::optional<std::size_t> largest_body(const std::string& method,
-                                                        const std::string& path) const override {
-    return largest_body_of(routes(), method, path);
-  }
-  [[nodiscard]] web::PageAnswer answer(const web::PageRequest& request) override {
-    return answer_of(routes(), *this, request);
-  }
-  [[nodiscard]] std::optional<std::pair<std::uint64_t, std::string>> wait_for_news(std::uint64_t after,
-                                                                                   double seconds) override {
-    return board_.wait_for_news(after, seconds);
-  }
-  void joined(const std::string& client) override { board_.joined(client); }
-  void left(const std::string& client) override { board_.left(client); }
   void close() override;
-  [[nodiscard]] bool closed() const override { return board_.closed(); }
 
  private:
+  friend class BoardApi<Reception>;  // asks for the routes
   static std::span<const Route<Reception>> routes();
   web::PageAnswer get_scene(const web::PageRequest& request);
   web::PageAnswer get_state(const web::PageRequest& request);
@@ -74,7 +58,6 @@ class Reception final : public web::PageApi {
   Open open_;
   Observer& observer_;
 
-  Board board_;
   mutable std::mutex mutex_;  // of what follows; taken before the board's
   std::condition_variable work_;
   bool is_ordered_ = false, is_working_ = false, stop_requested_ = false;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "src/base/error.h"
+#include "src/base/files.h"
 #include "src/base/parallel.h"
 #include "src/picture/encode.h"
 #include "src/pipeline/train_step.h"
@@ -111,9 +112,7 @@ void Studio::forget_viewpoints() {
 /// The takes whose records can be read; of each other one the user is told once.
 std::vector<TakeMessage> Studio::readable_takes() {
   std::vector<TakeMessage> takes;
-  std::error_code failure;
-  for (const auto& entry : fs::directory_iterator(context_.directory.root() / "takes", failure)) {
-    const std::string name = entry.path().filename().string();
+  for (const std::string& name : context_.directory.take_names()) {
     try {
       if (const auto record = context_.directory.take_record(name)) {
         takes.push_back({name, record->colorizer, record->stage2.seconds});
@@ -125,7 +124,6 @@ std::vector<TakeMessage> Studio::readable_takes() {
       board_.note(note);
     }
   }
-  std::ranges::sort(takes, {}, &TakeMessage::name);
   return takes;
 }
 
@@ -255,10 +253,7 @@ std::vector<std::string> Studio::drawn(const FrameMessage& message, const std::f
     affordable_rays_ = std::min(rays * kFrameOfTraining / watch.seconds(), kMostGrowth * rays);
   }
   std::vector<std::string> jpegs(pictures.size());
-  parallel_tasks(jpegs.size(), [&](std::size_t s) {
-    const std::vector<std::byte> bytes = jpeg_bytes(pictures[s], kJpegQuality);
-    jpegs[s].assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  });
+  parallel_tasks(jpegs.size(), [&](std::size_t s) { jpegs[s] = text_of(jpeg_bytes(pictures[s], kJpegQuality)); });
   return jpegs;
 }
 

@@ -16,13 +16,11 @@
 #include "src/base/observer.h"
 #include "src/base/usage.h"
 #include "src/pipeline/run_context.h"
-#include "src/studio/board.h"
+#include "src/studio/board_api.h"
 #include "src/studio/board_observer.h"
 #include "src/studio/coloring.h"
 #include "src/studio/frame_desk.h"
 #include "src/studio/refresh_pace.h"
-#include "src/studio/routes.h"
-#include "viewer/server/page_api.h"
 
 namespace cnerf::studio {
 
@@ -32,7 +30,7 @@ namespace cnerf::studio {
 /// As src/studio/messages.h and src/train/chroma/strokes.h have the bodies. I numbers the capture's views, and after
 /// them the viewpoints of the strokes that are saved. Whoever orders or paints first is the writer until its stream of
 /// events ends; others follow.
-class Studio final : public web::PageApi {
+class Studio final : public BoardApi<Studio> {
  public:
   /// Loads what there is of the run, and what was painted before. Holds its folder `strokes`, and the whole of it until
   /// stage 1 is trained. All are referred to.
@@ -46,22 +44,7 @@ class Studio final : public web::PageApi {
   /// Trains what is not trained, draws and works until the user ends the program, or it is closed.
   void run();
 
-  [[nodiscard]] std::string prefix() const override { return "/studio"; }
-  [[nodiscard]] std::optional<std::size_t> largest_body(const std::string& method,
-                                                        const std::string& path) const override {
-    return largest_body_of(routes(), method, path);
-  }
-  [[nodiscard]] web::PageAnswer answer(const web::PageRequest& request) override {
-    return answer_of(routes(), *this, request);
-  }
-  [[nodiscard]] std::optional<std::pair<std::uint64_t, std::string>> wait_for_news(std::uint64_t after,
-                                                                                   double seconds) override {
-    return board_.wait_for_news(after, seconds);
-  }
-  void joined(const std::string& client) override { board_.joined(client); }
-  void left(const std::string& client) override { board_.left(client); }
   void close() override;
-  [[nodiscard]] bool closed() const override { return board_.closed(); }
 
  private:
   /// What a page orders, and the picture that it sent for it.
@@ -72,6 +55,7 @@ class Studio final : public web::PageApi {
   struct OrderKind;
   static std::span<const OrderKind> order_kinds();
   static bool is_order_of_pages(const std::string& name);
+  friend class BoardApi<Studio>;  // asks for the routes
   static std::span<const Route<Studio>> routes();
 
   // Answers, on the server's threads.
@@ -197,7 +181,6 @@ class Studio final : public web::PageApi {
   double affordable_rays_ = 0;  // of a frame while it trains
   double drawing_seconds_ = 0;  // that the last frame of a training took
 
-  Board board_;
   mutable std::mutex mutex_;  // of what follows; taken before the board's
   std::condition_variable work_;
   std::string scene_;

@@ -33,10 +33,6 @@ constexpr int kPhotoQuality = 92, kThumbnailQuality = 82;
 constexpr std::uint8_t kReachAlpha = 200;
 constexpr double kSameShape = 0.02;  // of a painted picture and its photograph
 
-std::string text_of(const std::vector<std::byte>& bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 /// Strokes that are not saved yet, and the number of what they are seen on.
 struct ReachMessage {
   int view = 0;

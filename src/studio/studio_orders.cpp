@@ -310,9 +310,8 @@ void Studio::suggest(const Order& /*order*/) {
   std::vector<std::string> cards;
   std::vector<CardMessage> messages;
   for (const Tile& tile : pipeline::base_candidates(context_, &coloring_->cached_views(), engines_, observer)) {
-    const std::vector<std::byte> bytes = jpeg_bytes(tile.picture, kCardQuality);
     messages.push_back({int(cards.size()), fmt::format("./studio/cards/{}", cards.size())});
-    cards.emplace_back(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    cards.push_back(text_of(jpeg_bytes(tile.picture, kCardQuality)));
   }
   add_command("colorize", {"--colorizer", kBuiltin, "--bases-only"});
   const std::lock_guard lock(mutex_);

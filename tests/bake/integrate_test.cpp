@@ -42,7 +42,7 @@ TEST(Integrator, SlabIsExactlyBeerAndLambert) {
   const float sigma = 2;
   const Volume volume = block({10, 10, 10}, {30, 30, 20}, sigma);
   const Camera camera = from_above(volume, {20, 20, 15}, 9, 1);
-  const VolumeImage image = integrate_volume(volume, camera.intrinsics, camera.world_from_camera);
+  const VolumeImage image = integrate_volumes({&volume, 1}, camera.intrinsics, camera.world_from_camera);
   const double opacity = 1 - std::exp(-sigma * 10 * kVoxel);
   const std::size_t middle = 4 * 9 + 4;
   EXPECT_NEAR(image.opacity[middle], opacity, 1e-4);
@@ -52,7 +52,7 @@ TEST(Integrator, SlabIsExactlyBeerAndLambert) {
 TEST(Integrator, ColorIsPureUpToTheRim) {
   const Volume volume = block({10, 10, 10}, {20, 20, 20}, 100);
   const Camera camera = from_above(volume, {15, 15, 15}, 48, 4);
-  const VolumeImage image = integrate_volume(volume, camera.intrinsics, camera.world_from_camera);
+  const VolumeImage image = integrate_volumes({&volume, 1}, camera.intrinsics, camera.world_from_camera);
   std::size_t rim = 0;
   for (std::size_t p = 0; p < image.opacity.size(); ++p) {
     if (image.opacity[p] < 1e-3) continue;
@@ -67,7 +67,7 @@ TEST(Integrator, HalfOpticalDepthLiesOnTheFaceOfTheBlock) {
   const Volume volume = block({10, 10, 10}, {20, 20, 20}, 4);
   const double zoom = 16;
   const Camera camera = from_above(volume, {10, 15, 15}, 32, zoom);  // x = voxel 10's corner in the middle
-  const VolumeImage image = integrate_volume(volume, camera.intrinsics, camera.world_from_camera, {0.25, 8});
+  const VolumeImage image = integrate_volumes({&volume, 1}, camera.intrinsics, camera.world_from_camera, {0.25, 8});
   const auto depth = [&](int x) { return -std::log(1 - image.opacity[16 * 32 + x]); };
   EXPECT_NEAR(depth(0), 0, 1e-6) << "one voxel outside";
   EXPECT_NEAR(depth(31), 4 * 10 * kVoxel, 0.01) << "one voxel inside";
@@ -85,8 +85,8 @@ TEST(Integrator, SkippingEmptySpaceChangesNothing) {
       for (int k = 10; k < 56; k += 4) filled.voxels.push_back({i, j, k, 1e-12f, 0, {}, 0, 0});
   const Camera camera =
       camera_at("diagonal", world_of(apart, {-60, -55, -52}), world_of(apart, {33, 33, 33}), 24, 24, 60);
-  const VolumeImage a = integrate_volume(apart, camera.intrinsics, camera.world_from_camera);
-  const VolumeImage b = integrate_volume(filled, camera.intrinsics, camera.world_from_camera);
+  const VolumeImage a = integrate_volumes({&apart, 1}, camera.intrinsics, camera.world_from_camera);
+  const VolumeImage b = integrate_volumes({&filled, 1}, camera.intrinsics, camera.world_from_camera);
   float largest = 0;
   for (std::size_t p = 0; p < a.opacity.size(); ++p) {
     EXPECT_NEAR(a.opacity[p], b.opacity[p], 1e-5);
@@ -122,7 +122,7 @@ TEST(Integrator, ABakedSphereShowsTheFieldsOpticalDepth) {
   options.resolution = 68;
   const Volume volume = bake_volume(field, {}, options);
   const Camera camera = camera_at("side", {0, -1000, 0}, {0, 0, 0}, 21, 21, 8000);  // 0.125 world units a pixel
-  const VolumeImage image = integrate_volume(volume, camera.intrinsics, camera.world_from_camera, {0.25, 1});
+  const VolumeImage image = integrate_volumes({&volume, 1}, camera.intrinsics, camera.world_from_camera, {0.25, 1});
   for (int x = 0; x < 21; ++x) {
     const double offset = (x - 10) * 0.125;
     if (std::abs(offset) == 1) continue;  // the rim, where a voxel's blur is as large as the chord

@@ -75,8 +75,8 @@ TEST(Sharpen, AnOpaqueBallKeepsItsSize) {
     Options options;
     options.voxel_size = 0.0127;
     options.sharpening = sharpening;
-    const VolumeImage image =
-        integrate_volume(bake_volume(ball, {}, options), camera.intrinsics, camera.world_from_camera);
+    const Volume volume = bake_volume(ball, {}, options);
+    const VolumeImage image = integrate_volumes({&volume, 1}, camera.intrinsics, camera.world_from_camera);
     double area = 0;
     for (const float opacity : image.opacity) area += opacity;
     const double pixel = kDistance * length(Vec3d{0.6, -0.7, 0.4}) / kFocal;

@@ -15,7 +15,6 @@ namespace {
 using test::message_of;
 using test::some_question;
 using ::testing::AllOf;
-using ::testing::Contains;
 using ::testing::Each;
 using ::testing::HasSubstr;
 
@@ -31,9 +30,10 @@ TEST(Colorizer, GreyAnswersNoChroma) {
 TEST(Colorizer, UnknownKindIsAUsageErrorThatListsTheKinds) {
   for (const char* spec : {"", "gray", "torch:x", ":x"}) {
     const std::string message = message_of<UsageError>([&] { test::colorizer_of(spec); });
-    for (const std::string& kind : colorizer_kinds()) EXPECT_THAT(message, HasSubstr(kind)) << spec;
+    for (const char* kind : {"builtin", "reference", "torchscript", "onnx", "caffe", "exec", "grey"}) {
+      EXPECT_THAT(message, HasSubstr(kind)) << spec;
+    }
   }
-  EXPECT_THAT(colorizer_kinds(), Contains("exec"));
 }
 
 TEST(Colorizer, KindsThatNeedAnArgumentSayWhich) {

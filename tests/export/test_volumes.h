@@ -1,9 +1,10 @@
 #pragma once
-/// Small baked volumes with known content.
+/// Small baked volumes and photographs with known content.
 
 #include "bake/volume.h"
 #include "bake/volume/dilate.h"
 #include "export/vdb_writer.h"
+#include "export/web_pictures.h"
 
 namespace cnerf::exporting::test {
 
@@ -19,6 +20,17 @@ inline bake::Volume block_volume(Vec3i min, Vec3i max, float sigma, double voxel
     for (int j = min.y; j < max.y; ++j)
       for (int k = min.z; k < max.z; ++k) volume.voxels.push_back({i, j, k, sigma, 0.457f, rgb, -3.5f, -31.25f});
   return volume;
+}
+
+/// @param luminance  [H, W] linear Y
+inline WebPhoto make_web_photo(const Intrinsics& lens, const std::vector<float>& luminance, int side, int quality) {
+  View view;
+  view.intrinsics = lens;
+  view.image.width = lens.width;
+  view.image.height = lens.height;
+  view.image.depth = PixelDepth::kF32;
+  view.image.f32 = luminance;
+  return make_web_photos({&view, 1}, side, quality).front();
 }
 
 /// Of a take "first" by the built-in colorizer.

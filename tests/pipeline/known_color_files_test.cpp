@@ -15,6 +15,7 @@
 #include "src/train/chroma/strokes.h"
 #include "tests/support/data.h"
 #include "tests/support/exif_jpeg.h"
+#include "tests/support/upright.h"
 
 namespace cnerf::pipeline {
 namespace {
@@ -103,7 +104,7 @@ TEST_F(KnownColorFiles, AnUprightPictureIsLaidAsTheViewsPixelsAre) {
   ASSERT_TRUE(cv::imwrite(at("upright.png"), upright));
   for (int orientation = 2; orientation <= 8; ++orientation) {
     write_file(view.image_file, test::turned_photograph(orientation));
-    const prepare::Upright grid = {orientation, orientation > 4 ? 20 : 40, orientation > 4 ? 40 : 20};
+    const test::Upright grid = {orientation, orientation > 4 ? 20 : 40, orientation > 4 ? 40 : 20};
     view.intrinsics.width = grid.stored_width, view.intrinsics.height = grid.stored_height;
     const KnownColors known = load_known_colors(capture_, config).known.at(0);
     ASSERT_EQ(known.width, grid.stored_width) << orientation;

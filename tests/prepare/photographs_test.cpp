@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <numeric>
 #include <opencv2/imgcodecs.hpp>
 
 #include "src/base/error.h"
@@ -13,11 +14,13 @@
 #include "src/picture/exr_writer.h"
 #include "tests/support/data.h"
 #include "tests/support/exif_jpeg.h"
+#include "tests/support/upright.h"
 
 namespace cnerf::prepare {
 namespace {
 namespace fs = std::filesystem;
 using test::exif_block;
+using test::Upright;
 using testing::HasSubstr;
 
 cv::Mat1b ramp(int width, int height, int seed = 0) {
@@ -179,14 +182,23 @@ TEST(Photographs, TheContentSaysWhoTurnsAPhotograph) {
   EXPECT_EQ(import_all(folder / "in", folder / "out").images.at(0).width, 40);
 }
 
-TEST(Photographs, EveryOrientationIsABijection) {
+TEST(Photographs, EveryOrientationIsTurnedUpright) {
+  LinearImage lying{5, 3, 3, PixelDepth::kU8, std::vector<float>(45), std::vector<float>(15)};
+  std::iota(lying.values.begin(), lying.values.end(), 1.0f);
+  std::iota(lying.alpha.begin(), lying.alpha.end(), 100.0f);
   for (int orientation = 1; orientation <= 8; ++orientation) {
     const Upright grid = {orientation, 5, 3};
-    std::vector<int> hits(15);
-    for (int y = 0; y < grid.height(); ++y) {
-      for (int x = 0; x < grid.width(); ++x) ++hits.at(grid.stored_index(x, y));
+    const LinearImage upright = turned_upright(lying, orientation);
+    ASSERT_EQ(upright.width, grid.width()) << orientation;
+    ASSERT_EQ(upright.height, grid.height()) << orientation;
+    std::size_t at = 0;
+    for (int y = 0; y < upright.height; ++y) {
+      for (int x = 0; x < upright.width; ++x, ++at) {
+        const std::size_t from = grid.stored_index(x, y);
+        EXPECT_EQ(upright.alpha.at(at), lying.alpha.at(from)) << orientation;
+        for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(upright.values.at(3 * at + c), lying.values.at(3 * from + c));
+      }
     }
-    EXPECT_THAT(hits, testing::Each(1)) << orientation;
   }
   // As EXIF numbers them: in 6 the stored image has to be turned clockwise, so its bottom left comes to the top left.
   EXPECT_EQ((Upright{6, 5, 3}.stored_index(0, 0)), 2u * 5);

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "src/prepare/photographs.h"
+#include "tests/support/upright.h"
 
 namespace cnerf::test {
 
@@ -43,7 +43,7 @@ inline std::string jpeg_with(const std::string& exif, const cv::Mat& image) {
 /// right.
 inline std::string turned_photograph(int orientation) {
   const bool is_sideways = orientation > 4;
-  const prepare::Upright grid = {orientation, is_sideways ? 20 : 40, is_sideways ? 40 : 20};
+  const Upright grid = {orientation, is_sideways ? 20 : 40, is_sideways ? 40 : 20};
   cv::Mat3b image(grid.stored_height, grid.stored_width);
   for (int y = 0; y < grid.height(); ++y) {
     for (int x = 0; x < grid.width(); ++x) {

@@ -20,6 +20,7 @@ namespace cnerf {
 using namespace exporting;
 namespace {
 namespace fs = std::filesystem;
+using exporting::test::make_web_photo;
 using Json = nlohmann::json;
 
 std::vector<std::uint8_t> unpacked(const std::vector<std::byte>& packed) {

@@ -5,6 +5,7 @@
 #include <exception>
 #include <thread>
 
+#include "src/base/files.h"
 #include "src/base/usage.h"
 #include "src/picture/encode.h"
 #include "viewer/server/page_folder.h"
@@ -18,8 +19,7 @@ constexpr int kQuality = 85;                   // of JPEG
 constexpr double kPictureShare = 0.02;         // of the time, at most; reports take next to none
 
 std::string jpeg_of(int width, int height, const std::vector<float>& linear) {
-  const std::vector<std::byte> bytes = jpeg_bytes(picture_from_linear(width, height, linear), kQuality);
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  return text_of(jpeg_bytes(picture_from_linear(width, height, linear), kQuality));
 }
 
 /// "images/view 1.png" -> "images_view_1"

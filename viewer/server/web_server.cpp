@@ -13,7 +13,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <charconv>
 #include <functional>
 #include <limits>
 #include <map>
@@ -25,6 +24,7 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/process.h"
+#include "src/base/text.h"
 #include "viewer/server/http_server.h"
 
 namespace cnerf::web {
@@ -85,13 +85,9 @@ std::optional<Part> part_of(const std::string& header, std::size_t size) {
   const Part whole{0, size};
   const std::size_t dash = header.find('-');
   if (!header.starts_with(kUnit) || dash == std::string::npos) return whole;
-  const auto number = [&](std::size_t begin, std::size_t end) -> std::optional<std::size_t> {
-    std::size_t value = 0;
-    const auto [stop, failure] = std::from_chars(header.data() + begin, header.data() + end, value);
-    return failure == std::errc() && stop == header.data() + end ? std::optional(value) : std::nullopt;
-  };
   const bool has_begin = dash > kUnit.size(), has_end = dash + 1 < header.size();
-  const auto first = number(kUnit.size(), dash), last = number(dash + 1, header.size());
+  const auto first = value_in<std::size_t>(header.substr(kUnit.size(), dash - kUnit.size()));
+  const auto last = value_in<std::size_t>(header.substr(dash + 1));
   if ((has_begin && !first) || (has_end && !last) || (!has_begin && !has_end)) return whole;
   if (!has_begin)
     return *last == 0 ? std::nullopt : std::optional(Part{size - std::min(size, *last), std::min(size, *last)});
@@ -126,14 +122,6 @@ std::string cookie_of(const httplib::Request& request, const std::string& name) 
     at = end + 1;
   }
   return {};
-}
-
-/// A decimal number; nothing where the text is none.
-std::optional<std::size_t> count_of(const std::string& text) {
-  std::size_t value = 0;
-  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool is_number = !text.empty() && failure == std::errc() && end == text.data() + text.size();
-  return is_number ? std::optional(value) : std::nullopt;
 }
 
 /// The name a page gave itself; empty where that is none. An event stream cannot send headers.
@@ -251,7 +239,7 @@ struct WebServer::State {
     }
     // Before the body is read: a client may promise gigabytes, or not say how many.
     const std::string stated = request.get_header_value("Content-Length");
-    const std::optional<std::size_t> length = count_of(stated);
+    const std::optional<std::size_t> length = value_in<std::size_t>(stated);
     if (is_order && !length) {
       refuse(response, 411, "the length of the body is not stated");
       return true;
@@ -368,7 +356,7 @@ struct WebServer::State {
     }
     for (const auto& [name, value] : request.params) asked.parameters[name] = value;
     asked.client = client_of(request);
-    if (const auto revision = count_of(request.get_header_value("X-Cnerf-Revision"))) {
+    if (const auto revision = value_in<std::size_t>(request.get_header_value("X-Cnerf-Revision"))) {
       asked.revision = int(std::min<std::size_t>(*revision, std::numeric_limits<int>::max()));
     }
     if (request.method == "GET" && request.path == api->prefix() + "/events") {

@@ -13,7 +13,6 @@ export class App extends Navigator {
   readonly low: Vec3;
   readonly high: Vec3;
   settings: Settings;
-  private changed = new Set<() => void>();
   private hashTimer = 0;
   readonly home: View;
 
@@ -58,12 +57,9 @@ export class App extends Navigator {
     return norm(sub(this.high, this.low)) / 2;
   }
 
-  /** Calls `callback` after every change of the view or the settings. */
-  onChange(callback: () => void): void {
-    this.changed.add(callback);
-  }
-  private tell(): void {
-    for (const callback of this.changed) callback();
+  /** After every change of the view or the settings. */
+  protected override tell(): void {
+    super.tell();
     window.clearTimeout(this.hashTimer);
     this.hashTimer = window.setTimeout(() => this.writeHash(), 250);
   }
@@ -108,7 +104,7 @@ export class App extends Navigator {
       this.target = read.target ?? this.pivot(read.view);
     }
     this.renderer.setView(this.view);
-    for (const callback of this.changed) callback();
+    super.tell();
   }
   private cameraAt(view: View): number {
     const near = (a: number, b: number) => Math.abs(a - b) < 1e-4 * (1 + Math.abs(a));

@@ -1,8 +1,19 @@
 /** The view and the settings in the address, short: what has its default is left out. */
 
 import type { View } from "./camera";
-import { matrixFromQuat, quatFromMatrix, type Quat, type Vec3 } from "./math";
+import { clamp, matrixFromQuat, quatFromMatrix, unit, type Quat, type Vec3 } from "./math";
 import { defaultSettings, quantities, type Settings } from "./settings";
+
+/** The settings that are numbers: keys, names, and what they may be. */
+const numbers = [
+  ["w", "wipe", 0, 1],
+  ["s", "saturation", 0, 2],
+  ["h", "hue", -180, 180],
+  ["e", "exposure", -5, 5],
+  ["g", "gain", 0, 100],
+  ["d", "threshold", 0, 24],
+  ["o", "photo", 0, 1],
+] as const;
 
 const short = (x: number) => String(Number(x.toPrecision(6)));
 const joined = (list: readonly number[]) => list.map(short).join(",");
@@ -15,8 +26,7 @@ export function toHash(view: View, target: Vec3, settings: Settings, defaults: S
   put("t", joined(target));
   const { lens } = view;
   put("l", joined([lens.width, lens.height, lens.fx, lens.fy, lens.cx, lens.cy]));
-  const numbers = { w: "wipe", s: "saturation", h: "hue", e: "exposure", g: "gain", d: "threshold", o: "photo" } as const;
-  for (const [key, name] of Object.entries(numbers) as [string, (typeof numbers)[keyof typeof numbers]][]) {
+  for (const [key, name] of numbers) {
     if (settings[name] !== defaults[name]) put(key, short(settings[name]));
   }
   if (settings.background !== defaults.background) put("b", settings.background.replace("#", ""));
@@ -38,17 +48,10 @@ function numbersOf(text: string | null, count: number): number[] | null {
 export function fromHash(hash: string, defaults: Settings): { view?: View; target?: Vec3; settings: Settings } {
   const values = new URLSearchParams(hash.replace(/^#/, "").replace(/\+/g, "%2B"));
   const settings: Settings = { ...defaultSettings(defaults.up), ...defaults };
-  const read = (key: string, low: number, high: number): number | null => {
+  for (const [key, name, low, high] of numbers) {
     const list = numbersOf(values.get(key), 1);
-    return list ? Math.min(high, Math.max(low, list[0])) : null;
-  };
-  settings.wipe = read("w", 0, 1) ?? settings.wipe;
-  settings.saturation = read("s", 0, 2) ?? settings.saturation;
-  settings.hue = read("h", -180, 180) ?? settings.hue;
-  settings.exposure = read("e", -5, 5) ?? settings.exposure;
-  settings.gain = read("g", 0, 100) ?? settings.gain;
-  settings.threshold = read("d", 0, 24) ?? settings.threshold;
-  settings.photo = read("o", 0, 1) ?? settings.photo;
+    if (list) settings[name] = clamp(list[0], low, high);
+  }
   const background = values.get("b");
   if (background && /^([0-9a-f]{6}|none|sky)$/i.test(background)) settings.background = background.length === 6 ? `#${background}` : background;
   const clip = numbersOf(values.get("c"), 6);
@@ -69,13 +72,12 @@ export function fromHash(hash: string, defaults: Settings): { view?: View; targe
   const l = numbersOf(values.get("l"), 6);
   const target = numbersOf(values.get("t"), 3);
   if (!p || !q || !l || Math.hypot(...q) < 0.5 || l.slice(0, 4).some((v) => v <= 0)) return { settings };
-  const norm = Math.hypot(...q);
   return {
     settings,
     target: (target as Vec3 | null) ?? undefined,
     view: {
       position: p as Vec3,
-      rotation: matrixFromQuat(q.map((v) => v / norm) as Quat),
+      rotation: matrixFromQuat(unit(q as Quat)),
       lens: { width: l[0], height: l[1], fx: l[2], fy: l[3], cx: l[4], cy: l[5] },
     },
   };

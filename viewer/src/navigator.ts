@@ -1,6 +1,7 @@
 /** A camera that people drive: it jumps or flies, and knows what it turns about. */
 
 import { interpolated, pivotOf, type View } from "./camera";
+import { Changing } from "./changing";
 import { mix, type Vec3 } from "./math";
 
 const ease = (t: number) => (t < 0.5 ? 4 * t * t * t : 1 - (2 - 2 * t) ** 3 / 2);
@@ -15,7 +16,7 @@ interface Flight {
   camera: number;
 }
 
-export abstract class Navigator {
+export abstract class Navigator extends Changing {
   view!: View;
   /** What the camera turns about. */
   target!: Vec3;

@@ -1,6 +1,5 @@
 // Fitted weights are kept in the cache folder, so that a resumed run asks the very network the first one fitted.
 
-#include <algorithm>
 #include <array>
 #include <cstring>
 #include <optional>
@@ -22,13 +21,9 @@ namespace fs = std::filesystem;
 /// The files of a folder in the order of their names, or the file itself.
 std::vector<fs::path> files_of(const fs::path& place) {
   if (!fs::is_directory(place)) return {place};
-  std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(place)) {
-    const bool hidden = entry.path().filename().string().front() == '.';
-    if (entry.is_regular_file() && !hidden) files.push_back(entry.path());
-  }
+  std::vector<fs::path> files =
+      files_in(place, [](const fs::path& file) { return !file.filename().string().starts_with('.'); });
   if (files.empty()) throw MissingInputError(place.string() + ": holds no reference photographs");
-  std::sort(files.begin(), files.end());
   return files;
 }
 

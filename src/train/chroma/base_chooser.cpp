@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "src/base/error.h"
+#include "src/base/text.h"
 #include "src/colorizer/purify.h"
 #include "src/picture/encode.h"
 #include "src/train/chroma/galleries.h"
@@ -107,13 +108,12 @@ std::vector<int> BaseChooser::picked() const {
   }
   std::stringstream list(purify.picked_bases);
   for (std::string item; std::getline(list, item, ',');) {
-    const bool digits = !item.empty() && item.find_first_not_of("0123456789") == std::string::npos;
-    const int index = digits && item.size() < 6 ? std::stoi(item) : -1;
-    if (index < 0 || index >= candidates) {
+    const auto index = item.size() < 6 ? value_in<unsigned>(item) : std::nullopt;
+    if (!index || int(*index) >= candidates) {
       throw UsageError("stage2.purify.picked_bases: '" + item + "' is not a candidate, 0 to " +
                        std::to_string(candidates - 1));
     }
-    picked.push_back(index);
+    picked.push_back(int(*index));
   }
   return picked;
 }

@@ -47,9 +47,7 @@ SkyColors stored_sky(const Snapshot& snapshot) {
 }  // namespace
 
 Ab in_gamut(Ab color, float luminance) {
-  const Vec3f rgb = linear_rgb_at(luminance, color);
-  const Lab<float> lab = lab_from_linear_rgb(rgb);
-  return {lab.a, lab.b};
+  return ab_of_linear_rgb(linear_rgb_at(luminance, color));
 }
 
 std::vector<float> pixel_luminance(const PixelSamples& pixels) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 
-#include "src/color/colorspace_math.h"
 #include "src/picture/picture.h"
 
 namespace cnerf {
@@ -15,9 +14,7 @@ constexpr float kKnownWeight = 1000;  // over that of an answer
 }  // namespace
 
 Ab mixed(Ab one, float light_of_one, Ab other, float light_of_other) {
-  const Vec3f rgb = linear_rgb_at(light_of_one, one) + linear_rgb_at(light_of_other, other);
-  const Lab<float> lab = lab_from_linear_rgb(rgb);
-  return {lab.a, lab.b};
+  return ab_of_linear_rgb(linear_rgb_at(light_of_one, one) + linear_rgb_at(light_of_other, other));
 }
 
 void SkyColors::add(const CachedView& view, std::size_t pixel, Ab color, float weight) {

@@ -133,8 +133,7 @@ PaintedPicture painted_picture(const LinearImage& image, const fs::path& name) {
     const bool counts = alpha > kPaintedAlpha;
     const float* pixel = &image.values[std::size_t(image.channels) * p];
     const Vec3f light = image.channels == 3 ? Vec3f{pixel[0], pixel[1], pixel[2]} : Vec3f{pixel[0], pixel[0], pixel[0]};
-    const Lab<float> lab = counts ? lab_from_linear_rgb(light / alpha) : Lab<float>{};
-    picture.ab.push_back({lab.a, lab.b});
+    picture.ab.push_back(counts ? ab_of_linear_rgb(light / alpha) : Ab{});
     picture.is_known.push_back(counts ? 1 : 0);
     painted += counts ? 1 : 0;
   }
@@ -197,8 +196,7 @@ std::optional<Ab> ab_of_hex(const std::string& color) {
   const bool is_hex = color.size() == 7 && color[0] == '#' && std::from_chars(begin, end, rgb, 16).ptr == end;
   if (!is_hex) return std::nullopt;
   const auto channel = [&](int shift) { return linear_from_srgb(float((rgb >> shift) & 255u) / 255.0f); };
-  const Lab<float> lab = lab_from_linear_rgb(Vec3f{channel(16), channel(8), channel(0)});
-  return Ab{lab.a, lab.b};
+  return ab_of_linear_rgb({channel(16), channel(8), channel(0)});
 }
 
 PaintableViews paintable_views(const Capture& capture) {

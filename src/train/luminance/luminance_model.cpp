@@ -82,20 +82,16 @@ OccupancyOptions occupancy_of(const nlohmann::json& header) {
   return options;
 }
 
-/// @throws nlohmann::json::exception
 Stage1Options stored_options(const Snapshot& snapshot) {
-  auto options = options_from_json<Stage1Options>(snapshot.header().at("options"));
-  options.occupancy = occupancy_of(snapshot.header());
-  return options;
+  return from_header(snapshot, [](const nlohmann::json& header) {
+    auto options = options_from_json<Stage1Options>(header.at("options"));
+    options.occupancy = occupancy_of(header);
+    return options;
+  });
 }
 
-/// @throws SnapshotError
 SceneFrame stored_frame(const Snapshot& snapshot) {
-  try {
-    return frame_from_json(snapshot.header().at("frame"));
-  } catch (const nlohmann::json::exception& problem) {
-    throw SnapshotError(snapshot.file().string() + ": header: " + problem.what());
-  }
+  return from_header(snapshot, [](const nlohmann::json& header) { return frame_from_json(header.at("frame")); });
 }
 
 /// How many views or lenses a training learned of; earlier versions learned nothing of them.
@@ -287,12 +283,7 @@ LuminanceModel LuminanceModel::create(const Capture& capture, const Stage1Option
 }
 
 Stage1Options LuminanceModel::options_in(const std::filesystem::path& file) {
-  const Snapshot snapshot(file, kKind);
-  try {
-    return stored_options(snapshot);
-  } catch (const nlohmann::json::exception& problem) {
-    throw SnapshotError(file.string() + ": header: " + problem.what());
-  }
+  return stored_options(Snapshot(file, kKind));
 }
 
 SceneFrame LuminanceModel::frame_in(const std::filesystem::path& file) {
@@ -325,11 +316,7 @@ LuminanceModel LuminanceModel::load(const std::filesystem::path& file, const Eng
   const Snapshot snapshot(file, kKind);
   LuminanceModel model;
   model.frame = stored_frame(snapshot);
-  try {
-    model.options = stored_options(snapshot);
-  } catch (const nlohmann::json::exception& problem) {
-    throw SnapshotError(file.string() + ": header: " + problem.what());
-  }
+  model.options = stored_options(snapshot);
   model.kernels_before = stored_text(snapshot, "kernels");
   model.trained_on = stored_training(snapshot);
   model.max_luminance = header_field<float>(snapshot, "max_luminance");

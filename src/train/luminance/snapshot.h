@@ -68,4 +68,14 @@ T header_field(const Snapshot& snapshot, const std::string& field) {
   }
 }
 
+/// What `read` makes of the header.  @throws SnapshotError  naming the file, in place of nlohmann::json::exception
+template <typename Read>
+auto from_header(const Snapshot& snapshot, const Read& read) {
+  try {
+    return read(snapshot.header());
+  } catch (const nlohmann::json::exception& problem) {
+    throw SnapshotError(snapshot.file().string() + ": header: " + problem.what());
+  }
+}
+
 }  // namespace cnerf

@@ -1,5 +1,6 @@
 /** What the next stroke is made with. */
 
+import { Changing } from "../changing";
 import { rgbOfHex } from "../color";
 import { randomId } from "./api";
 import { limits, type Stroke, type StrokeKind, type StrokePoint } from "./protocol";
@@ -20,12 +21,12 @@ const shelfKey = "cnerf-studio-brush";
 const first: BrushSettings = { tool: "brush", color: "#b4513c", size: 0.04, softness: 0.25, reach: 1, exact: false };
 const firstRecent = ["#b4513c", "#c9943f", "#6d8c3e", "#3d7f8c", "#4c66a8", "#8a5a92", "#c08b6a", "#7d6a55"];
 
-export class Brush {
+export class Brush extends Changing {
   settings: BrushSettings;
   recent: string[];
-  private changed = new Set<() => void>();
 
   constructor(private readonly shelf: Pick<Shelf, "getItem" | "setItem"> = storage("localStorage")) {
+    super();
     const kept = this.kept();
     this.settings = { ...first, ...kept.settings, tool: "brush" };
     this.recent = kept.recent?.length ? kept.recent : firstRecent;
@@ -38,9 +39,6 @@ export class Brush {
       return {};
     }
   }
-  onChange(callback: () => void): void {
-    this.changed.add(callback);
-  }
   set(partial: Partial<BrushSettings>): void {
     const next = { ...this.settings, ...partial };
     next.size = Math.min(limits.size[1], Math.max(limits.size[0], next.size));
@@ -48,13 +46,13 @@ export class Brush {
     this.settings = next;
     this.tell();
   }
-  private tell(): void {
+  protected override tell(): void {
     try {
       this.shelf.setItem(shelfKey, JSON.stringify({ settings: this.settings, recent: this.recent }));
     } catch {
       // It is forgotten with the page, then.
     }
-    for (const callback of this.changed) callback();
+    super.tell();
   }
   /** The colour was used. */
   remember(): void {

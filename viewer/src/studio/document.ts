@@ -3,6 +3,7 @@
  * made, merged where another tab was faster.
  */
 
+import { Changing } from "../changing";
 import { Lost, Refusal } from "./api";
 import type { Stroke, Viewpoint } from "./protocol";
 import type { Shelf } from "./storage";
@@ -54,7 +55,7 @@ const refusesStrokes = new Set([400, 413, 423]);
 
 const numberOf = (viewpoint: Viewpoint) => Number(/\d+$/.exec(viewpoint.name)?.[0] ?? 0);
 
-export class StrokeDocument {
+export class StrokeDocument extends Changing {
   list: StrokeList = [];
   /** The list that the server has. */
   saved: StrokeList = this.list;
@@ -75,7 +76,6 @@ export class StrokeDocument {
   told: (what: "merged" | "unsent" | "lost" | Refusal) => void = () => {};
   private undone: [Edition, Edition][] = [];
   private done: [Edition, Edition][] = [];
-  private changed = new Set<() => void>();
   private busy: Promise<void> | null = null;
   /** The browser keeps what is unsent. */
   isKept = true;
@@ -84,14 +84,10 @@ export class StrokeDocument {
   /** Strokes were promised to be sent, and another tab paints: they stay until it leaves. */
   isWaiting = false;
 
-  constructor(private readonly store: StrokeStore, private readonly shelf: Shelf, private readonly shelfKey: string) {}
+  constructor(private readonly store: StrokeStore, private readonly shelf: Shelf, private readonly shelfKey: string) {
+    super();
+  }
 
-  onChange(callback: () => void): void {
-    this.changed.add(callback);
-  }
-  private tell(): void {
-    for (const callback of this.changed) callback();
-  }
   get canUndo(): boolean {
     return this.done.length > 0;
   }

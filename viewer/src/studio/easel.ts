@@ -1,5 +1,6 @@
 /** A photograph to paint on: zoom, pan, and the tools. What is drawn is drawn here at once; the server hears of it after. */
 
+import { Changing } from "../changing";
 import { hexOf, lightnessOfCode, type Rgb } from "../color";
 import { pinched, turnOf, type Place } from "../input";
 import { el, toast } from "../ui/dom";
@@ -13,7 +14,8 @@ import { words } from "./words";
 /** Longer sides are painted on a smaller picture. */
 const longest = 2560;
 
-export class Easel {
+/** Tells when the place under the pointer, or what is shown, changed. */
+export class Easel extends Changing {
   readonly canvas = el("canvas", { id: "easel", tabindex: "0", "aria-label": words.easel, role: "application" });
   readonly node = el("div", { class: "easel", hidden: true }, this.canvas);
   layer: PaintLayer | null = null;
@@ -41,9 +43,9 @@ export class Easel {
   private dragging = false;
   private held: Tool | null = null;
   private readonly feed: TintFeed;
-  private listeners = new Set<() => void>();
 
   constructor(private readonly session: Session) {
+    super();
     this.feed = new TintFeed(session, (view, tint) => view === session.open && this.layer && (this.layer.setTint(tint), this.flush(null)));
     session.strokes.onChange(() => this.follow());
     session.brush.onChange(() => this.redraw());
@@ -64,14 +66,6 @@ export class Easel {
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("contextmenu", (e) => e.preventDefault());
     canvas.addEventListener("keydown", (e) => this.key(e));
-  }
-
-  /** Calls back when the place under the pointer, or what is shown, changed. */
-  onChange(callback: () => void): void {
-    this.listeners.add(callback);
-  }
-  private tell(): void {
-    for (const callback of this.listeners) callback();
   }
 
   async open(index: number): Promise<void> {

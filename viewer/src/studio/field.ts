@@ -13,6 +13,7 @@ type Frame = { pictures: ImageBitmap[]; colors: number; milliseconds: number };
 const largest = 4096;
 const drop = ({ pictures }: Frame) => pictures.forEach((picture) => picture.close());
 
+/** Tells when the camera or the sides changed. */
 export class FieldView extends Navigator {
   readonly canvas = el("canvas", { id: "field", tabindex: "0", "aria-label": words.stage, role: "img" });
   readonly node: HTMLElement;
@@ -27,7 +28,6 @@ export class FieldView extends Navigator {
   private frameShown: Frame | null = null;
   private colorsShown = -1;
   private input: Input | null = null;
-  private listeners = new Set<() => void>();
   hidden = false;
 
   constructor(private readonly session: Session) {
@@ -109,7 +109,7 @@ export class FieldView extends Navigator {
     const found = this.cameras.findIndex((camera, i) => this.session.isViewpoint(i) && here(camera) === wanted);
     if (found === this.captureCamera) return;
     this.captureCamera = found;
-    for (const callback of this.listeners) callback();
+    this.tell();
   }
   /** The camera as it stands, for a picture of what is seen, of `longest` pixels at most. */
   viewHere(longest: number): View {
@@ -120,18 +120,14 @@ export class FieldView extends Navigator {
     const { position, rotation, lens } = this.view;
     return { position, rotation, lens: fitted(lens, Math.max(16, Math.round(width * scale)), Math.max(16, Math.round(height * scale))) };
   }
-  /** Calls back when the camera or the sides changed. */
-  onChange(callback: () => void): void {
-    this.listeners.add(callback);
-  }
   protected moved(): void {
     if (!this.hidden) this.scheduler.look({ view: this.view, sides: this.sides });
-    for (const callback of this.listeners) callback();
+    this.tell();
   }
   /** The same camera anew: sides, colours or the canvas changed. */
   refresh(): void {
     if (!this.hidden && this.canvas.width > 16) this.scheduler.refresh({ view: this.view, sides: this.sides });
-    for (const callback of this.listeners) callback();
+    this.tell();
   }
   reset(): void {
     this.moveTo(this.home, this.pivot(this.home), this.session.scene.home);
