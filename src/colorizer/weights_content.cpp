@@ -61,6 +61,15 @@ bool are_finite(std::span<const std::byte> halves) {
   return true;
 }
 
+/// Its checksum, or nothing.
+std::string encoder_in(const fs::path& file, Reader& reader) {
+  const auto length = reader.value<std::uint32_t>();
+  if (length != 0 && length != kWeightsChecksumBytes) {
+    throw InputError(file, "encoder", "expected a SHA-256 of 64 characters or none, found " + std::to_string(length));
+  }
+  return reader.text(length);
+}
+
 WeightsContent::Parameter next_parameter(Reader& reader) {
   constexpr std::size_t kHalf = 2;  // bytes
   WeightsContent::Parameter parameter;
@@ -86,8 +95,9 @@ std::vector<fs::path> builtin_weights_places() {
 WeightsContent read_weights_content(const fs::path& file) {
   const std::vector<std::byte> whole = read_binary_file(file);
   Reader header(file, whole);
-  if (header.text(kWeightsMagic.size()) != kWeightsMagic) {
-    throw InputError(file, "header", "expected colorizer weights of version 3 (" + std::string(kWeightsMagic) + ")");
+  const std::string magic = header.text(kWeightsMagic.size());
+  if (magic != kWeightsMagic && magic != kWeightsMagicWithoutEncoder) {
+    throw InputError(file, "header", "expected colorizer weights, CNERFCW3 or CNERFCW4");
   }
   WeightsContent content;
   content.sha256 = header.text(kWeightsChecksumBytes);
@@ -106,6 +116,7 @@ WeightsContent read_weights_content(const fs::path& file) {
     }
   }
   content.short_side = reader.value<std::uint32_t>();
+  if (magic == kWeightsMagic) content.encoder = encoder_in(file, reader);
   const auto count = reader.value<std::uint32_t>();
   for (std::uint32_t i = 0; i < count; ++i) {
     content.parameters.push_back(next_parameter(reader));

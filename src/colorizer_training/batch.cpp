@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "src/base/rng.h"
-#include "src/color/colorspace_math.h"
+#include "src/colorizer/torch/lab_tensors.h"
 
 namespace cnerf::colorizer_training {
 namespace F = torch::nn::functional;
@@ -119,15 +119,6 @@ void cut_and_paste(Batch& batch, int first, int count, const Box& box) {
   target.copy_(target.roll(-1, 0));
 }
 
-Tensor linear_from_srgb_tensor(const Tensor& v) {
-  return torch::where(v <= 0.04045, v / 12.92, torch::pow((v.clamp_min(0.04045) + 0.055) / 1.055, 2.4));
-}
-
-Tensor lab_f_tensor(const Tensor& t) {
-  constexpr double epsilon = LabConstants<double>::epsilon, kappa = LabConstants<double>::kappa;
-  return torch::where(t > epsilon, torch::pow(t.clamp_min(epsilon), 1.0 / 3), (kappa * t + 16) / 116);
-}
-
 }  // namespace
 
 Tensor upload(const Tensor& host, torch::Device device) {
@@ -143,37 +134,6 @@ ResidentImages::ResidentImages(const TrainingImages& images, torch::Device devic
 
 Tensor ResidentImages::gather(const Tensor& index) const {
   return rgb_.index_select(0, index).permute({0, 3, 1, 2}).to(torch::kFloat32) / 255;
-}
-
-LabPlanes lab_from_srgb(const Tensor& srgb) {
-  const Tensor linear = linear_from_srgb_tensor(srgb);
-  const Tensor r = linear.slice(1, 0, 1), g = linear.slice(1, 1, 2), b = linear.slice(1, 2, 3);
-  const auto f_of = [&](const Vec3<double>& row) { return lab_f_tensor(r * row.x + g * row.y + b * row.z); };
-  // The columns of the conversion are what it makes of the three primaries.
-  const Vec3<double> red = relative_xyz_from_linear_rgb(Vec3<double>{1, 0, 0});
-  const Vec3<double> green = relative_xyz_from_linear_rgb(Vec3<double>{0, 1, 0});
-  const Vec3<double> blue = relative_xyz_from_linear_rgb(Vec3<double>{0, 0, 1});
-  const Tensor fx = f_of({red.x, green.x, blue.x}), fy = f_of({red.y, green.y, blue.y}),
-               fz = f_of({red.z, green.z, blue.z});
-  return {116 * fy - 16, torch::cat({500 * (fx - fy), 200 * (fy - fz)}, 1)};
-}
-
-Tensor srgb_from_lab(const Tensor& lightness, const Tensor& ab) {
-  constexpr double epsilon = LabConstants<double>::epsilon, kappa = LabConstants<double>::kappa;
-  const auto inverse = [](const Tensor& f) {
-    const Tensor cube = f * f * f;
-    return torch::where(cube > epsilon, cube, (116 * f - 16) / kappa);
-  };
-  const Tensor fy = (lightness + 16) / 116;
-  const Tensor x = inverse(fy + ab.slice(1, 0, 1) / 500), y = inverse(fy), z = inverse(fy - ab.slice(1, 1, 2) / 200);
-  std::vector<Tensor> channels;
-  for (int channel = 0; channel < 3; ++channel) {
-    const auto of = [&](const Vec3<double>& xyz) { return linear_rgb_from_relative_xyz(xyz)[channel]; };
-    channels.push_back(of({1, 0, 0}) * x + of({0, 1, 0}) * y + of({0, 0, 1}) * z);
-  }
-  const Tensor linear = torch::cat(channels, 1).clamp(0, 1);
-  return torch::where(linear <= 0.0031308, linear * 12.92,
-                      1.055 * torch::pow(linear.clamp_min(0.0031308), 1 / 2.4) - 0.055);
 }
 
 Picture picture_from_lab(const Tensor& lightness, const Tensor& ab) {

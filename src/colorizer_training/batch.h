@@ -38,13 +38,6 @@ struct Batch {
 /// Host values on the device without waiting for it: copies from pageable memory would drain its queue first.
 [[nodiscard]] torch::Tensor upload(const torch::Tensor& host, torch::Device device);
 
-/// Lab of sRGB in 0..1: L* [B, 1, H, W] and ab [B, 2, H, W], by the project's own matrix (grey gives a = b = 0).
-struct LabPlanes {
-  torch::Tensor lightness, ab;
-};
-[[nodiscard]] LabPlanes lab_from_srgb(const torch::Tensor& srgb);
-/// sRGB 0..1 of Lab planes [B, 1, H, W], [B, 2, H, W], clamped to the gamut by channel.  [B, 3, H, W]
-[[nodiscard]] torch::Tensor srgb_from_lab(const torch::Tensor& lightness, const torch::Tensor& ab);
 /// sRGB bytes of Lab planes [1, H, W], [2, H, W], clamped: for pictures to look at.
 [[nodiscard]] Picture picture_from_lab(const torch::Tensor& lightness, const torch::Tensor& ab);
 

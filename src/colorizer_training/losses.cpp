@@ -74,6 +74,10 @@ ColorLoss color_loss(const Tensor& logits, const Tensor& ab, const SoftLabelTabl
   return {(cross_entropy * weight).mean(), regression};
 }
 
+Tensor distillation_loss(const Tensor& logits, const Tensor& taught_logits) {
+  return -(log_probability_rows(taught_logits).exp() * log_probability_rows(logits)).sum(1).mean();
+}
+
 AuxiliaryHeadsImpl::AuxiliaryHeadsImpl(std::int64_t classes, std::int64_t feature_channels) {
   constexpr std::int64_t kHidden = 512;
   hidden_ = register_module("hidden", nn::Linear(ColorizerNetImpl::kGlobalChannels, kHidden));

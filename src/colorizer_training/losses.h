@@ -40,6 +40,11 @@ struct ColorLoss {
 [[nodiscard]] ColorLoss color_loss(const torch::Tensor& logits, const torch::Tensor& ab, const SoftLabelTable& table,
                                    const torch::Tensor& class_weights);
 
+/// What one network makes of a picture, learned by another (Hinton et al. 2015): KL(taught || learned) up to the taught
+/// distribution's entropy, mean over the blocks.
+/// @param logits, taught_logits  [B, 313, h, w] of the same pictures.
+[[nodiscard]] torch::Tensor distillation_loss(const torch::Tensor& logits, const torch::Tensor& taught_logits);
+
 /// Heads that only training has: the class of the picture, and a frozen classifier's features of its colours.
 class AuxiliaryHeadsImpl : public torch::nn::Module {
  public:

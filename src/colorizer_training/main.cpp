@@ -11,6 +11,7 @@
 #include "src/base/files.h"
 #include "src/base/progress.h"
 #include "src/color/ab_bins.h"
+#include "src/colorizer/torch/encoder.h"
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer_training/report.h"
 #include "src/colorizer_training/trainer.h"
@@ -23,8 +24,10 @@ namespace fs = std::filesystem;
 struct Options {
   ImageSources sources;
   fs::path teacher, output = "colorizer-training";
-  fs::path evaluate;  ///< weights to judge
-  fs::path finish;    ///< weights of a run to choose the decoding of
+  fs::path evaluate;   ///< weights to judge
+  fs::path finish;     ///< weights of a run to choose the decoding of
+  fs::path distilled;  ///< weights of a network whose answers are learned
+  bool is_large = false;
   std::string device = "auto";
   bool resume = false;
   TrainerOptions training;
@@ -47,6 +50,13 @@ void add_options(CLI::App& app, Options& o) {
       ->check(CLI::Range(1, kHeldOutParts - 1));
   app.add_option("--evaluation", o.sources.evaluation, "folders that are never trained on, only judged");
   app.add_option("--teacher", o.teacher, "LPIPS SqueezeNet weights: predict a classifier's features of the colours");
+  app.add_flag("--large", o.is_large, "the network that also sees what the installed encoder makes of a picture");
+  CLI::Option* distil =
+      app.add_option("--distil", o.distilled, "a run's latest.weights, whose answers are learned besides the truth");
+  app.add_option("--distilled-share", o.training.distilled_share,
+                 "their share of the classification loss; the rest is the truth's")
+      ->check(CLI::Range(0.0, 1.0))
+      ->needs(distil);
   app.add_option("-o,--output", o.output, "folder for checkpoint, pictures, scores and weights");
   app.add_option("--evaluate", o.evaluate, "only write the score table of these weights");
   app.add_option("--finish", o.finish, "only choose the decoding of a run's latest.weights; class-weights.txt beside");
@@ -68,10 +78,11 @@ void print_progress(const ColorizerTrainer& trainer, const StepLosses& losses, s
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const double rate = double(trainer.steps_done() - first_step) / seconds;
   const double left = double(trainer.total_steps() - trainer.steps_done()) / rate;
-  std::printf("step %lld/%lld class %.4f regression %.3f label %.3f feature %.3f | %.1f steps/s, %d:%02d left\n",
+  std::printf("step %lld/%lld class %.4f distilled %.4f regression %.3f label %.3f feature %.3f | ",
               static_cast<long long>(trainer.steps_done()), static_cast<long long>(trainer.total_steps()),
-              losses.classification.item<double>(), losses.regression.item<double>(), losses.label.item<double>(),
-              losses.feature.item<double>(), rate, int(left) / 60, int(left) % 60);
+              losses.classification.item<double>(), losses.distillation.item<double>(),
+              losses.regression.item<double>(), losses.label.item<double>(), losses.feature.item<double>());
+  std::printf("%.1f steps/s, %d:%02d left\n", rate, int(left) / 60, int(left) % 60);
   std::fflush(stdout);
 }
 
@@ -148,9 +159,11 @@ void train(const Options& o, torch::Device device) {
   const ImageSet images = load_image_set(o.sources);
   std::printf("%zu photographs, %zu tiles, %zu classes\n", images.photos.size(), images.tiles.size(),
               images.classes.names.size());
-  std::unique_ptr<FeatureTeacher> teacher;
-  if (!o.teacher.empty()) teacher = std::make_unique<FeatureTeacher>(o.teacher, device);
-  ColorizerTrainer trainer(images, std::move(teacher), o.training, device);
+  FrozenNetworks frozen;
+  if (!o.teacher.empty()) frozen.teacher = std::make_unique<FeatureTeacher>(o.teacher, device);
+  if (o.is_large) frozen.encoder = installed_encoder();
+  if (!o.distilled.empty()) frozen.distilled = load_colorizer_weights(o.distilled).network;
+  ColorizerTrainer trainer(images, std::move(frozen), o.training, device);
   std::printf("%lld parameters\n", static_cast<long long>(parameter_count(*trainer.averaged())));
   if (o.resume) {
     trainer.load(o.output / "checkpoint.pt", o.names_steps ? std::optional(o.training.steps) : std::nullopt);

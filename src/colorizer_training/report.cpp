@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "src/colorizer/torch/lab_tensors.h"
 #include "src/colorizer_training/batch.h"
 #include "src/colorizer_training/image_set.h"
 #include "src/picture/contact_sheet.h"

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "src/color/ab_bins.h"
-#include "src/colorizer_training/batch.h"
+#include "src/colorizer/torch/lab_tensors.h"
 
 namespace cnerf::colorizer_training {
 using torch::Tensor;

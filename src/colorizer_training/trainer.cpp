@@ -51,9 +51,9 @@ class MixedPrecision {
   bool active_;
 };
 
-ColorizerNet make_network(std::uint64_t seed, torch::Device device) {
+ColorizerNet make_network(const std::shared_ptr<const Encoder>& encoder, std::uint64_t seed, torch::Device device) {
   torch::manual_seed(std::int64_t(seed));
-  ColorizerNet network;
+  ColorizerNet network(Normalisation::kBatch, encoder);
   network->to(device);
   return network;
 }
@@ -66,18 +66,18 @@ AuxiliaryHeads make_heads(const ImageSet& images, bool teacher, torch::Device de
 
 }  // namespace
 
-ColorizerTrainer::ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher,
-                                   const TrainerOptions& options, torch::Device device)
+ColorizerTrainer::ColorizerTrainer(const ImageSet& images, FrozenNetworks frozen, const TrainerOptions& options,
+                                   torch::Device device)
     : options_(options),
       device_(device),
-      teacher_(std::move(teacher)),
+      frozen_(std::move(frozen)),
       photos_(images.photos, device),
       tiles_(images.tiles, device),
       table_(device),
       label_loss_(images.classes, device),
-      network_(make_network(options.seed, device)),
-      averaged_(make_network(options.seed, device)),
-      heads_(make_heads(images, teacher_ != nullptr, device)),
+      network_(make_network(frozen_.encoder, options.seed, device)),
+      averaged_(make_network(network_->encoder(), options.seed, device)),
+      heads_(make_heads(images, frozen_.teacher != nullptr, device)),
       parameters_({network_.get(), heads_.get()}),
       averaged_parameters_({averaged_.get()}),
       optimizer_(parameters_) {
@@ -85,6 +85,10 @@ ColorizerTrainer::ColorizerTrainer(const ImageSet& images, std::unique_ptr<Featu
   if (images.tiles.size() == 0) options_.tiles_per_step = 0;
   CNERF_CHECK(options_.photos_per_step + options_.tiles_per_step > 0, "there are images to train on");
   averaged_->eval();
+  if (frozen_.distilled) {
+    frozen_.distilled->to(device);
+    frozen_.distilled->eval();
+  }
   class_weights_ = measure_class_weights();
 }
 
@@ -116,26 +120,35 @@ StepLosses ColorizerTrainer::step() {
   // Also seeds the generators that dropout draws from.
   const Batch batch = batch_of(options_.seed, step_);
   ColorizerFeatures features;
-  Tensor labels, predicted, teacher;
+  Tensor labels, predicted, teacher, taught;
   {
     const MixedPrecision mixed(device_);
+    if (frozen_.distilled) {
+      const torch::NoGradGuard no_grad;
+      taught = frozen_.distilled->forward(batch.lightness);
+    }
     features = network_->features(batch.lightness);
     labels = heads_->classify(features.global);
-    if (teacher_) {
+    if (frozen_.teacher) {
       predicted = heads_->predict_features(features.semantic);
-      teacher = teacher_->features(batch.rgb, predicted.size(2), predicted.size(3));
+      teacher = frozen_.teacher->features(batch.rgb, predicted.size(2), predicted.size(3));
     }
   }
   const ColorLoss color = color_loss(features.logits, batch.ab, table_, class_weights_);
   const Tensor label = (1 - batch.mixed_share) * label_loss_(labels, batch.label) +
                        batch.mixed_share * label_loss_(labels, batch.mixed_label);
-  const Tensor feature = teacher_ ? feature_loss(predicted, teacher) : torch::zeros({}, batch.ab.options());
-  const Tensor total = color.classification + options_.regression_weight * color.regression + label + feature;
+  const Tensor none = torch::zeros({}, batch.ab.options());
+  const Tensor feature = teacher.defined() ? feature_loss(predicted, teacher) : none;
+  const Tensor distillation = taught.defined() ? distillation_loss(features.logits, taught) : none;
+  const double distilled = taught.defined() ? options_.distilled_share : 0;
+  const Tensor total = (1 - distilled) * color.classification + distilled * distillation +
+                       options_.regression_weight * color.regression + label + feature;
   total.backward();
   optimizer_.step(learning_rate(), step_ + 1);
   average_weights();
   ++step_;
-  return {color.classification.detach(), color.regression.detach(), label.detach(), feature.detach()};
+  return {color.classification.detach(), distillation.detach(), color.regression.detach(), label.detach(),
+          feature.detach()};
 }
 
 void ColorizerTrainer::average_weights() {

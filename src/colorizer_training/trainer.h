@@ -25,23 +25,29 @@ struct TrainerOptions {
   double learning_rate = 1e-3;                              ///< at the start of the cosine
   int warmup_steps = 500;
   double regression_weight = 0.01;
-  int epoch_steps = 2000;  ///< between checkpoints, scores and pictures
+  double distilled_share = 0.5;  ///< of the classification, where there is a network to distil: the rest is the truth's
+  int epoch_steps = 2000;        ///< between checkpoints, scores and pictures
   std::uint64_t seed = 1;
+};
+
+/// Networks that stay as they are and help to train another. Each may be null.
+struct FrozenNetworks {
+  std::unique_ptr<FeatureTeacher> teacher;  ///< whose features of the colour picture are predicted
+  std::shared_ptr<const Encoder> encoder;   ///< beside the trained network, which is the large one then
+  ColorizerNet distilled{nullptr};          ///< whose answers are learned besides the truth; folded
 };
 
 /// What one step cost, before weights.
 struct StepLosses {
-  torch::Tensor classification, regression, label, feature;  ///< scalars on the device, detached
+  torch::Tensor classification, distillation, regression, label, feature;  ///< scalars on the device, detached
 };
 
 /// The state of a training run. A step is a pure function of the state and its number, so a run continued from a
 /// checkpoint repeats the uninterrupted one bit for bit on the CPU.
 class ColorizerTrainer {
  public:
-  /// @param images   must outlive the trainer
-  /// @param teacher  may be null
-  ColorizerTrainer(const ImageSet& images, std::unique_ptr<FeatureTeacher> teacher, const TrainerOptions& options,
-                   torch::Device device);
+  /// @param images  must outlive the trainer
+  ColorizerTrainer(const ImageSet& images, FrozenNetworks frozen, const TrainerOptions& options, torch::Device device);
 
   StepLosses step();
   [[nodiscard]] std::int64_t steps_done() const { return step_; }
@@ -69,7 +75,7 @@ class ColorizerTrainer {
 
   TrainerOptions options_;
   torch::Device device_;
-  std::unique_ptr<FeatureTeacher> teacher_;
+  FrozenNetworks frozen_;
   ResidentImages photos_, tiles_;
   SoftLabelTable table_;
   LabelLoss label_loss_;

@@ -17,6 +17,7 @@
 #include "src/colorizer/torch/encoder.h"
 #include "src/colorizer/torch/reference_images.h"
 #include "src/colorizer/torch/reference_network.h"
+#include "tests/colorizer/made_model.h"
 #include "tests/colorizer/questions.h"
 #include "tests/support/data.h"
 
@@ -24,85 +25,22 @@ namespace cnerf {
 namespace {
 
 using nlohmann::json;
+using test::MadeModel;
 using test::message_of;
+using test::small_resnet;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using torch::Tensor;
 
-/// A model to be written: weights in an order, then shards of an odd size.
-struct Made {
-  std::vector<std::pair<std::string, Tensor>> weights;
-  json layers = json::array();
-  json changed = nullptr;  ///< applied to model.json: a JSON merge patch
-  std::size_t shard = 1000;
-
-  void conv(const std::string& name, const std::string& norm, std::vector<std::int64_t> shape) {
-    const auto out = shape[3];
-    const double gain = 1 / std::sqrt(double(shape[0] * shape[1] * shape[2]));
-    weights.emplace_back(name + "/kernel", torch::randn(shape) * gain);
-    weights.emplace_back(name + "/bias", torch::randn({out}) * 0.1);
-    weights.emplace_back(norm + "/gamma", torch::rand({out}) + 0.5);
-    weights.emplace_back(norm + "/beta", torch::randn({out}) * 0.1);
-    weights.emplace_back(norm + "/moving_mean", torch::randn({out}) * 0.1);
-    weights.emplace_back(norm + "/moving_variance", torch::rand({out}) + 0.01);
-    layers.push_back({{"class_name", "BatchNormalization"}, {"config", {{"name", norm}, {"epsilon", 0.001}}}});
-  }
-  [[nodiscard]] Tensor get(const std::string& name) const {
-    return std::ranges::find(weights, name, &std::pair<std::string, Tensor>::first)->second;
-  }
-  void write(const std::filesystem::path& folder) const {
-    std::string bytes;
-    json entries = json::array(), paths = json::array();
-    for (const auto& [name, value] : weights) {
-      entries.push_back({{"name", name}, {"shape", value.sizes().vec()}, {"dtype", "float32"}});
-      bytes.append(static_cast<const char*>(value.contiguous().data_ptr()), value.nbytes());
-    }
-    for (std::size_t begin = 0; begin < bytes.size(); begin += shard) {
-      paths.push_back("shard" + std::to_string(paths.size()) + ".bin");
-      write_file(folder / paths.back().get<std::string>(), bytes.substr(begin, shard));
-    }
-    json model{{"format", "layers-model"},
-               {"modelTopology", {{"model_config", {{"config", {{"layers", layers}}}}}}},
-               {"weightsManifest", json::array({{{"paths", paths}, {"weights", entries}}})}};
-    model.merge_patch(changed.is_null() ? json::object() : changed);
-    write_file(folder / "model.json", model.dump());
-  }
-};
-
-Made one_conv() {
+MadeModel one_conv() {
   torch::manual_seed(1);
-  Made made;
+  MadeModel made;
   made.conv("conv", "norm", {3, 3, 2, 5});
   return made;
 }
 
-/// A ResNet-50 of two filters in its first layer instead of 64.
-Made small_resnet() {
-  torch::manual_seed(2);
-  Made made;
-  made.shard = 4001;
-  made.conv("conv1", "bn_conv1", {7, 7, 3, 2});
-  std::int64_t in = 2, width = 2;
-  const std::vector<std::string> stages{"2abc", "3abcd", "4abcdef", "5abc"};
-  for (const std::string& stage : stages) {
-    for (const char letter : stage.substr(1)) {
-      const std::string name = std::string{stage[0], letter} + "_branch";
-      const auto add = [&](const std::string& branch, std::vector<std::int64_t> shape) {
-        made.conv("res" + name + branch, "bn" + name + branch, std::move(shape));
-      };
-      add("2a", {1, 1, in, width});
-      add("2b", {3, 3, width, width});
-      add("2c", {1, 1, width, 4 * width});
-      if (letter == 'a') add("1", {1, 1, in, 4 * width});
-      in = 4 * width;
-    }
-    width *= 2;
-  }
-  return made;
-}
-
 /// Convolution, then normalisation, as they stand in the model: nothing is folded.
-Tensor unfolded(const Made& made, const Tensor& x, const std::string& conv, const std::string& norm, int stride) {
+Tensor unfolded(const MadeModel& made, const Tensor& x, const std::string& conv, const std::string& norm, int stride) {
   const Tensor kernel = made.get(conv + "/kernel");
   const Tensor y =
       torch::conv2d(x, kernel.permute({3, 2, 0, 1}).contiguous(), made.get(conv + "/bias"), stride, kernel.size(0) / 2);
@@ -112,7 +50,7 @@ Tensor unfolded(const Made& made, const Tensor& x, const std::string& conv, cons
 
 TEST(LayersModel, ReadsWeightsAcrossShardsInTheirOrder) {
   const test::TempDir folder;
-  Made made = one_conv();
+  MadeModel made = one_conv();
   made.shard = 7;  // no shard ends where a weight does
   made.write(folder.path());
   const LayersModel model = read_layers_model(folder.path());
@@ -124,7 +62,7 @@ TEST(LayersModel, ReadsWeightsAcrossShardsInTheirOrder) {
 
 TEST(LayersModel, AFoldedConvolutionIsTheConvolutionAndItsNormalisation) {
   const test::TempDir folder;
-  const Made made = one_conv();
+  const MadeModel made = one_conv();
   made.write(folder.path());
   const FoldedConv folded = folded_conv(read_layers_model(folder.path()), "conv", "norm", {3, 3, 2, 5});
   const Tensor x = torch::randn({2, 2, 9, 12}), expected = unfolded(made, x, "conv", "norm", 1);
@@ -134,13 +72,13 @@ TEST(LayersModel, AFoldedConvolutionIsTheConvolutionAndItsNormalisation) {
 
 TEST(LayersModel, RefusesWhatIsDamagedByName) {
   const test::TempDir folder;
-  const auto refusal = [&](const Made& made) {
+  const auto refusal = [&](const MadeModel& made) {
     made.write(folder.path());
     return message_of<InputError>([&] {
       (void)folded_conv(read_layers_model(folder.path()), "conv", "norm", {3, 3, 2, 5});
     });
   };
-  Made made = one_conv();
+  MadeModel made = one_conv();
   made.changed = {{"format", "graph-model"}};
   EXPECT_THAT(refusal(made), AllOf(HasSubstr("model.json"), HasSubstr("format"), HasSubstr("graph-model")));
   made = one_conv();
@@ -180,7 +118,7 @@ TEST(LayersModel, RefusesShardsOfAnotherSize) {
 
 TEST(Encoder, IsTheNetworkOfItsModel) {
   const test::TempDir folder;
-  const Made made = small_resnet();
+  const MadeModel made = small_resnet();
   made.write(folder.path());
   const Encoder encoder(read_layers_model(folder.path()));
   EXPECT_EQ(encoder.channels(), (std::vector<std::int64_t>{8, 16, 32, 64}));

@@ -21,7 +21,8 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 bool has_python() {
-  return std::system("python3 -c pass >/dev/null 2>&1") == 0;
+  static const bool is_there = std::system("python3 -c pass >/dev/null 2>&1") == 0;
+  return is_there;
 }
 
 /// A program that reads every question into B, H, W and the list L, then does `answer_lines`.

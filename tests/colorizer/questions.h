@@ -8,6 +8,7 @@
 
 #include "src/base/error.h"
 #include "src/colorizer/colorizer.h"
+#include "tests/support/message_of.h"
 
 namespace cnerf::test {
 
@@ -24,21 +25,6 @@ inline std::unique_ptr<Colorizer> colorizer_of(const std::string& spec, double t
   options.spec = spec;
   options.timeout_seconds = timeout_seconds;
   return make_colorizer(options);
-}
-
-/// Runs `body`, which must throw `E`, and returns the message.
-template <typename E, typename Body>
-std::string message_of(Body&& body) {
-  try {
-    body();
-  } catch (const E& error) {
-    return error.what();
-  } catch (const std::exception& error) {
-    ADD_FAILURE() << "threw another type: " << error.what();
-    return "";
-  }
-  ADD_FAILURE() << "threw nothing";
-  return "";
 }
 
 }  // namespace cnerf::test

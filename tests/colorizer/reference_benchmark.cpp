@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "src/colorizer/torch/encoder.h"
 #include "src/colorizer/torch/reference_network.h"
 #include "src/picture/contact_sheet.h"
 #include "src/picture/encode.h"

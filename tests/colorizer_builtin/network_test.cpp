@@ -13,10 +13,13 @@
 #include "src/base/files.h"
 #include "src/base/process.h"
 #include "src/colorizer/kinds.h"
+#include "src/colorizer/torch/encoder.h"
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer/torch/products.h"
 #include "src/colorizer_training/score.h"
+#include "tests/colorizer/made_model.h"
 #include "tests/support/data.h"
+#include "tests/support/message_of.h"
 
 namespace cnerf {
 namespace {
@@ -38,9 +41,9 @@ Tensor random_lightness(std::int64_t batch, std::int64_t height, std::int64_t wi
 }
 
 /// Batch normalisation with statistics that are not the identity, so that folding has something to do.
-ColorizerNet trained_like_network() {
+ColorizerNet trained_like_network(const std::shared_ptr<const Encoder>& encoder = nullptr) {
   torch::manual_seed(5);
-  ColorizerNet network;
+  ColorizerNet network(Normalisation::kBatch, encoder);
   const torch::NoGradGuard no_grad;
   for (auto& item : network->named_buffers()) {
     if (item.key().ends_with("running_mean")) item.value().normal_(0, 0.1);
@@ -98,6 +101,80 @@ TEST(ColorizerNet, FoldingChangesNothing) {
   EXPECT_LT((expected - actual).abs().max().item<float>(), 1e-3f * expected.abs().max().item<float>());
   EXPECT_GT((expected - ColorizerNet(Normalisation::kFolded)->forward(input)).abs().max().item<float>(), 1e-2f)
       << "the comparison must be able to fail";
+}
+
+LightnessBatch ramp_batch(int batch, int height, int width) {
+  LightnessBatch patches{batch, height, width, {}};
+  for (int i = 0; i < batch * height * width; ++i) patches.lightness.push_back(float((i * 7 + i / width) % 101));
+  return patches;
+}
+
+/// A small encoder that is the installed one while this lives; afterwards none is.
+class InstalledEncoder {
+ public:
+  explicit InstalledEncoder(std::uint64_t seed = 2) {
+    test::small_resnet(seed).write(folder_.path());
+    ::setenv("CNERF_ENCODER", folder_.path().c_str(), 1);
+    encoder = installed_encoder();
+  }
+  ~InstalledEncoder() { ::setenv("CNERF_ENCODER", "/absent", 1); }  // not one that this machine may have
+  InstalledEncoder(const InstalledEncoder&) = delete;
+  InstalledEncoder& operator=(const InstalledEncoder&) = delete;
+
+  std::shared_ptr<const Encoder> encoder;
+
+ private:
+  test::TempDir folder_;
+};
+
+TEST(LargeColorizerNet, AnswersByWhatItsEncoderSees) {
+  const torch::NoGradGuard no_grad;
+  const test::TempDir folder;
+  test::small_resnet(9).write(folder.path());
+  const InstalledEncoder installed;
+  ColorizerNet large = fold_batch_norm(trained_like_network(installed.encoder));
+  ColorizerNet other = fold_batch_norm(trained_like_network(load_encoder(folder.path())));
+  const Tensor input = random_lightness(1, 64, 64), answer = large->forward(input);
+  EXPECT_EQ(answer.sizes(), ColorizerNet()->forward(input).sizes());
+  EXPECT_GT((answer - other->forward(input)).abs().max().item<float>(), 1e-2f);
+  for (const char* stage : {"see4", "see8", "see16", "see32"}) {
+    Tensor weight = large->named_parameters()[std::string(stage) + ".conv.weight"];
+    weight.neg_();
+    EXPECT_GT((answer - large->forward(input)).abs().max().item<float>(), 1e-2f) << stage;
+    weight.neg_();
+  }
+}
+
+TEST(LargeColorizerNet, FoldingChangesNothing) {
+  const torch::NoGradGuard no_grad;
+  const InstalledEncoder installed;
+  ColorizerNet trained = trained_like_network(installed.encoder);
+  const Tensor input = random_lightness(1, 64, 64), expected = trained->forward(input);
+  const Tensor actual = fold_batch_norm(trained)->forward(input);
+  EXPECT_LT((expected - actual).abs().max().item<float>(), 1e-3f * expected.abs().max().item<float>());
+}
+
+TEST(LargeColorizerNet, ComesBackOnlyBesideItsEncoder) {
+  const torch::NoGradGuard no_grad;
+  const test::TempDir folder;
+  const auto load = [&] { return load_colorizer_weights(folder / "large.weights"); };
+  {
+    const InstalledEncoder installed;
+    ColorizerNet folded = fold_batch_norm(trained_like_network(installed.encoder));
+    save_colorizer_weights(folder / "large.weights", folded, {1, 1, 64});
+    const Tensor input = random_lightness(1, 32, 32), expected = folded->forward(input);
+    EXPECT_LT((expected - load().network->forward(input)).abs().max().item<float>(),
+              0.02f * expected.abs().max().item<float>());
+    const auto colorizer =
+        make_builtin_colorizer({(folder / "large.weights").string(), ColorizerOptions{}, ColorizerContext{}});
+    const LightnessBatch patches = ramp_batch(2, 32, 48);
+    check_answer(colorizer->name(), patches, colorizer->colorize(patches));
+  }
+  EXPECT_THAT(test::message_of<MissingInputError>(load),
+              testing::AllOf(testing::HasSubstr("/absent"), testing::HasSubstr("--encoder")));
+  const InstalledEncoder another(9);
+  EXPECT_THAT(test::message_of<InputError>(load),
+              testing::AllOf(testing::HasSubstr("large.weights"), testing::HasSubstr(another.encoder->sha256())));
 }
 
 TEST(GuidedUpsample, KeepsConstantsAndStopsAtEdges) {
@@ -195,12 +272,6 @@ TEST(ColorizerWeights, ASideNoPictureHasIsRefused) {
   }
 }
 
-LightnessBatch ramp_batch(int batch, int height, int width) {
-  LightnessBatch patches{batch, height, width, {}};
-  for (int i = 0; i < batch * height * width; ++i) patches.lightness.push_back(float((i * 7 + i / width) % 101));
-  return patches;
-}
-
 TEST(BuiltinColorizer, AnswersFiniteColorsOfTheRightShape) {
   const auto colorizer = builtin_colorizer();
   EXPECT_THAT(colorizer->name(), testing::StartsWith("builtin"));
@@ -255,19 +326,27 @@ std::vector<float> asked_as(Colorizer& colorizer, std::uint64_t query) {
   return colorizer.colorize(patch).ab;
 }
 
+/// What is answered, in all ways of asking.
+const std::set<std::vector<float>>& all_answers() {
+  static const std::set<std::vector<float>> all = [] {
+    const auto colorizer = builtin_colorizer();
+    std::set<std::vector<float>> answers;
+    for (std::uint64_t query = 0; query < 64; ++query) answers.insert(asked_as(*colorizer, query));
+    return answers;
+  }();
+  return all;
+}
+
 TEST(BuiltinColorizer, AQuestionsNumberSaysHowItIsAsked) {
   const auto colorizer = builtin_colorizer();
   EXPECT_EQ(asked_as(*colorizer, 7), asked_as(*colorizer, 7));
-  std::set<std::vector<float>> answers;
-  for (std::uint64_t query = 0; query < 64; ++query) answers.insert(asked_as(*colorizer, query));
-  EXPECT_EQ(answers.size(), 8u) << "four sizes, each as it is and mirrored";
+  EXPECT_EQ(all_answers().size(), 8u) << "four sizes, each as it is and mirrored";
 }
 
 TEST(BuiltinColorizer, APictureGetsTheMeanOfAllWays) {
   const auto colorizer = builtin_colorizer();
   const double gain = load_colorizer_weights(builtin_weights_file()).decoding.gain;
-  std::set<std::vector<float>> answers;
-  for (std::uint64_t query = 0; query < 64; ++query) answers.insert(asked_as(*colorizer, query));
+  const std::set<std::vector<float>>& answers = all_answers();
   const std::vector<float> whole = colorizer->colorize(blobs(96)).ab;
   for (std::size_t i = 0; i < whole.size(); ++i) {
     double mean = 0;

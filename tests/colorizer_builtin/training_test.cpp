@@ -6,10 +6,13 @@
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/color/ab_bins.h"
+#include "src/colorizer/torch/encoder.h"
+#include "src/colorizer/torch/lab_tensors.h"
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer_training/score.h"
 #include "src/colorizer_training/trainer.h"
 #include "src/picture/encode.h"
+#include "tests/colorizer/made_model.h"
 #include "tests/support/data.h"
 
 namespace cnerf::colorizer_training {
@@ -55,7 +58,7 @@ TrainerOptions tiny_options() {
 
 TEST(ColorizerTrainer, LearnsATinySet) {
   const ImageSet set = tiny_set();
-  ColorizerTrainer trainer(set, nullptr, tiny_options(), torch::kCPU);
+  ColorizerTrainer trainer(set, {}, tiny_options(), torch::kCPU);
   const auto mean_loss = [&](int steps) {
     double sum = 0;
     for (int i = 0; i < steps; ++i) sum += trainer.step().classification.item<double>();
@@ -66,15 +69,74 @@ TEST(ColorizerTrainer, LearnsATinySet) {
   EXPECT_LT(mean_loss(4), 0.8 * before);
 }
 
+TEST(ColorizerTrainer, TheLargeNetworkLearnsByWhatItsEncoderSees) {
+  const test::TempDir folder;
+  test::small_resnet().write(folder.path());
+  const ImageSet set = tiny_set();
+  FrozenNetworks frozen;
+  frozen.encoder = load_encoder(folder.path());
+  ColorizerTrainer trainer(set, std::move(frozen), tiny_options(), torch::kCPU);
+  for (int i = 0; i < 3; ++i) trainer.step();
+  for (const char* stage : {"see4", "see8", "see16", "see32"}) {
+    // One at first, and without weight decay: nothing but a gradient changes it.
+    const torch::Tensor scale = trainer.averaged()->named_parameters()[std::string(stage) + ".norm.weight"];
+    EXPECT_TRUE((scale != 1).any().item<bool>()) << stage;
+  }
+}
+
+/// A network that answers `bin` everywhere.
+ColorizerNet one_bin_network(int bin) {
+  const torch::NoGradGuard no_grad;
+  ColorizerNet network(Normalisation::kFolded);
+  network->eval();
+  torch::Tensor offsets = torch::zeros({kAbBinCount});
+  offsets[bin] = 50;
+  network->shift_logits(offsets);
+  return network;
+}
+
+TEST(ColorizerTrainer, ADistilledNetworksAnswersAreLearnedByTheirShare) {
+  constexpr int kBin = 40;
+  const ImageSet set = tiny_set();
+  struct Learned {
+    double bin, truth;  ///< probability, and the last classification loss
+  };
+  const auto learned = [&](double distilled_share) -> Learned {
+    TrainerOptions options = tiny_options();
+    options.distilled_share = distilled_share;
+    FrozenNetworks frozen;
+    frozen.distilled = one_bin_network(kBin);
+    ColorizerTrainer trainer(set, std::move(frozen), options, torch::kCPU);
+    double truth = 0;
+    for (int i = 0; i < 20; ++i) truth = trainer.step().classification.item<double>();
+    const torch::NoGradGuard no_grad;
+    const torch::Tensor logits = trainer.averaged()->forward(torch::full({1, 1, 32, 32}, 50.0f));
+    return {torch::softmax(logits, 1).mean({0, 2, 3})[kBin].item<double>(), truth};
+  };
+  const Learned all = learned(1), none = learned(0);
+  EXPECT_GT(all.bin, 5 * none.bin);
+  EXPECT_GT(all.truth, 1.2 * none.truth) << "the truth is not learned";
+}
+
+TEST(DistillationLoss, IsLeastWhereTheAnswersAreTheSame) {
+  torch::manual_seed(4);
+  const torch::Tensor taught = torch::randn({2, kAbBinCount, 3, 5});
+  torch::Tensor logits = (taught + torch::randn({2, 1, 3, 5})).requires_grad_();  // the same distribution
+  distillation_loss(logits, taught).backward();
+  EXPECT_LT(logits.grad().abs().max().item<float>(), 1e-7f);
+  const torch::Tensor p = torch::softmax(taught, 1);
+  EXPECT_NEAR(distillation_loss(logits, taught).item<double>(), -(p * p.log()).sum(1).mean().item<double>(), 1e-4);
+}
+
 TEST(ColorizerTrainer, ContinuesBitForBit) {
   const test::TempDir folder;
   const ImageSet set = tiny_set();
-  ColorizerTrainer straight(set, nullptr, tiny_options(), torch::kCPU);
+  ColorizerTrainer straight(set, {}, tiny_options(), torch::kCPU);
   for (int i = 0; i < 3; ++i) straight.step();
   straight.save(folder / "checkpoint.pt");
   const double expected = (straight.step(), straight.step()).classification.item<double>();
 
-  ColorizerTrainer resumed(set, nullptr, tiny_options(), torch::kCPU);
+  ColorizerTrainer resumed(set, {}, tiny_options(), torch::kCPU);
   resumed.load(folder / "checkpoint.pt");
   EXPECT_EQ(resumed.steps_done(), 3);
   EXPECT_EQ((resumed.step(), resumed.step()).classification.item<double>(), expected);
@@ -85,7 +147,7 @@ TEST(ColorizerTrainer, ContinuesBitForBit) {
 TEST(ColorizerTrainer, RefusesOtherCheckpoints) {
   const test::TempDir folder;
   const ImageSet set = tiny_set();
-  ColorizerTrainer trainer(set, nullptr, tiny_options(), torch::kCPU);
+  ColorizerTrainer trainer(set, {}, tiny_options(), torch::kCPU);
   EXPECT_THROW(trainer.load(folder / "none.pt"), MissingInputError);
   write_file(folder / "short.pt", std::string_view("not a checkpoint"));
   EXPECT_THROW(trainer.load(folder / "short.pt"), SnapshotError);
@@ -94,12 +156,12 @@ TEST(ColorizerTrainer, RefusesOtherCheckpoints) {
 TEST(ColorizerTrainer, GoesOnForTheStepsThatItBeganWith) {
   const test::TempDir folder;
   const ImageSet set = tiny_set();
-  ColorizerTrainer trainer(set, nullptr, tiny_options(), torch::kCPU);
+  ColorizerTrainer trainer(set, {}, tiny_options(), torch::kCPU);
   trainer.step();
   trainer.save(folder / "checkpoint.pt");
   TrainerOptions options = tiny_options();
   options.steps = 60;
-  ColorizerTrainer other(set, nullptr, options, torch::kCPU);
+  ColorizerTrainer other(set, {}, options, torch::kCPU);
   try {
     other.load(folder / "checkpoint.pt", 60);
     FAIL() << "60 steps were asked for, and it would make 40";

@@ -7,13 +7,13 @@
 
 namespace {
 
-std::vector<std::byte> packed(cnerf::fuzz::Bytes content) {
+std::vector<std::byte> packed(std::string_view magic, cnerf::fuzz::Bytes content) {
   std::vector<std::uint8_t> sorted;
   for (const std::size_t first : {0, 1}) {
     for (std::size_t i = first; i < content.size(); i += 2) sorted.push_back(std::to_integer<std::uint8_t>(content[i]));
   }
   std::vector<std::byte> file;
-  cnerf::fuzz::append_bytes(file, cnerf::fuzz::bytes_of("CNERFCW3"));
+  cnerf::fuzz::append_bytes(file, cnerf::fuzz::bytes_of(magic));
   cnerf::fuzz::append_bytes(file, cnerf::fuzz::bytes_of(cnerf::sha256(content)));
   cnerf::fuzz::append_bytes(file, cnerf::gzip(sorted));
   return file;
@@ -22,8 +22,10 @@ std::vector<std::byte> packed(cnerf::fuzz::Bytes content) {
 }  // namespace
 
 CNERF_FUZZ_TARGET(colorizer_weights) {
-  const bool is_content = cnerf::fuzz::take_byte(input) % 2 == 1;
-  const auto file = is_content ? cnerf::fuzz::scratch_file("net.weights", packed(input))
-                               : cnerf::fuzz::scratch_file("net.weights", input);
+  const auto kind = cnerf::fuzz::take_byte(input) % 3;
+  std::vector<std::byte> content;
+  if (kind == 1) content = packed(cnerf::kWeightsMagicWithoutEncoder, input);
+  if (kind == 2) content = packed(cnerf::kWeightsMagic, input);
+  const auto file = cnerf::fuzz::scratch_file("net.weights", kind == 0 ? input : cnerf::fuzz::Bytes(content));
   cnerf::fuzz::read_or_refuse(file, [&] { return cnerf::read_weights_content(file); });
 }

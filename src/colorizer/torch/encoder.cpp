@@ -7,8 +7,7 @@
 
 #include "src/base/check.h"
 #include "src/base/error.h"
-#include "src/color/colorspace_math.h"
-#include "src/colorizer/torch/reference_network.h"
+#include "src/colorizer/torch/lab_tensors.h"
 
 namespace cnerf {
 namespace {
@@ -31,11 +30,7 @@ Tensor normalised(std::vector<Tensor> planes) {
 
 /// A grey picture as such.
 Tensor input_of(const Tensor& lightness) {
-  const Tensor source = lightness.contiguous();
-  Tensor grey = torch::empty_like(source);
-  const float* from = source.data_ptr<float>();
-  float* to = grey.data_ptr<float>();
-  for (std::int64_t i = 0; i < source.numel(); ++i) to[i] = 255 * srgb_from_linear(luminance_from_lightness(from[i]));
+  const Tensor grey = 255 * srgb_from_lightness(lightness);
   return normalised({grey, grey, grey});
 }
 
@@ -108,6 +103,22 @@ Encoder::Encoder(const LayersModel& model) : sha256_(model.sha256) {
   }
 }
 
+Encoder Encoder::on(torch::Device device) const {
+  Encoder moved = *this;
+  const auto move = [device](FoldedConv& conv) {
+    conv.weight = conv.weight.to(device);
+    conv.bias = conv.bias.to(device);
+  };
+  move(moved.stem_);
+  for (std::vector<Block>& blocks : moved.stages_) {
+    for (Block& block : blocks) {
+      for (FoldedConv* conv : {&block.reduce, &block.middle, &block.expand}) move(*conv);
+      if (block.shortcut) move(*block.shortcut);
+    }
+  }
+  return moved;
+}
+
 std::vector<Tensor> Encoder::features(const Tensor& lightness) const {
   CNERF_CHECK(lightness.size(2) % kInputMultiple == 0 && lightness.size(3) % kInputMultiple == 0,
               "sides are multiples of the encoder's");
@@ -152,6 +163,14 @@ std::unique_ptr<PictureEncoder> make_torch_picture_encoder() {
 
 std::shared_ptr<const Encoder> load_encoder(const fs::path& folder) {
   return std::make_shared<const Encoder>(read_layers_model(folder));
+}
+
+std::shared_ptr<const Encoder> installed_encoder() {
+  if (!is_encoder_installed()) {
+    throw MissingInputError("the encoder is not in " + encoder_folder().string() +
+                            "; scripts/install_dependencies.sh --encoder installs it");
+  }
+  return load_encoder(encoder_folder());
 }
 
 }  // namespace cnerf

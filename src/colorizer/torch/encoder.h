@@ -47,14 +47,18 @@ class Encoder final : public PictureEncoder {
   /// @throws InputError  naming the weight that is missing or has another shape than this network's.
   explicit Encoder(const LayersModel& model);
 
+  /// The same network on another device.
+  [[nodiscard]] Encoder on(torch::Device device) const;
+
   /// Calls are independent of each other; the caller chooses the number of threads.
-  /// @param lightness  [B, 1, H, W] L* 0..100, multiples of kInputMultiple.
+  /// @param lightness  [B, 1, H, W] L* 0..100, multiples of kInputMultiple, on the encoder's device.
   /// @return           of each stage [B, channels()[i], H / 4 / 2^i, W / 4 / 2^i], not negative.
   [[nodiscard]] std::vector<torch::Tensor> features(const torch::Tensor& lightness) const;
-  /// Of the last stage.
+  /// Of the last stage; of an encoder on the CPU.
   [[nodiscard]] std::vector<float> regions(std::span<const std::uint8_t> rgb, int width, int height) const override;
   [[nodiscard]] const std::vector<std::int64_t>& channels() const { return channels_; }
   [[nodiscard]] const std::string& sha256() const { return sha256_; }
+  [[nodiscard]] torch::Device device() const { return stem_.weight.device(); }
 
  private:
   [[nodiscard]] std::vector<torch::Tensor> stages_of(const torch::Tensor& picture) const;
@@ -71,6 +75,13 @@ class Encoder final : public PictureEncoder {
   std::vector<std::int64_t> channels_;
   std::string sha256_;
 };
+
+/// The encoder in `folder`.  @throws MissingInputError, InputError  see read_layers_model and Encoder.
+[[nodiscard]] std::shared_ptr<const Encoder> load_encoder(const std::filesystem::path& folder);
+
+/// The one that the user has installed.
+/// @throws MissingInputError  naming where it is looked for, and how it is installed.
+[[nodiscard]] std::shared_ptr<const Encoder> installed_encoder();
 
 /// `make_picture_encoder` inside the plug-in: it is installed.
 [[nodiscard]] std::unique_ptr<PictureEncoder> make_torch_picture_encoder();

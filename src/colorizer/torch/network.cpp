@@ -2,9 +2,11 @@
 
 #include <array>
 #include <string>
+#include <utility>
 
 #include "src/base/check.h"
 #include "src/color/ab_bins.h"
+#include "src/colorizer/torch/encoder.h"
 
 namespace cnerf {
 namespace nn = torch::nn;
@@ -106,7 +108,8 @@ Tensor AttentionUnitImpl::forward(const Tensor& x) {
   return tokens.transpose(1, 2).reshape(x.sizes()).contiguous(x.suggest_memory_format());
 }
 
-ColorizerNetImpl::ColorizerNetImpl(Normalisation n) {
+ColorizerNetImpl::ColorizerNetImpl(Normalisation n, std::shared_ptr<const Encoder> encoder)
+    : encoder_(std::move(encoder)) {
   const auto [c2, c4, c8, c16, c32] = kChannels;
   stem_ = register_module("stem", ConvUnit(1, c2, 3, 2, true, n));
   encode2_ = register_module("encode2", residual_units(1, c2, 0, n));
@@ -129,29 +132,43 @@ ColorizerNetImpl::ColorizerNetImpl(Normalisation n) {
   decode4_ = register_module("decode4", residual_units(1, kQuarterChannels, 0, n));
   dropout_ = register_module("dropout", nn::Dropout(kDropout));
   classify_ = register_module("classify", nn::Conv2d(nn::Conv2dOptions(kQuarterChannels, kAbBinCount, 1)));
+  if (encoder_ == nullptr) return;
+  const std::vector<std::int64_t>& seen = encoder_->channels();
+  see4_ = register_module("see4", ConvUnit(seen.at(0), c4, 1, 1, false, n));
+  see8_ = register_module("see8", ConvUnit(seen.at(1), c8, 1, 1, false, n));
+  see16_ = register_module("see16", ConvUnit(seen.at(2), c16, 1, 1, false, n));
+  see32_ = register_module("see32", ConvUnit(seen.at(3), c32, 1, 1, false, n));
+}
+
+void ColorizerNetImpl::to(torch::Device device, bool non_blocking) {
+  Module::to(device, non_blocking);
+  if (encoder_ && encoder_->device() != device) encoder_ = std::make_shared<const Encoder>(encoder_->on(device));
 }
 
 Tensor ColorizerNetImpl::forward(const Tensor& lightness) {
   return features(lightness).logits;
 }
 
-Tensor ColorizerNetImpl::bottleneck(Tensor x) {
-  x = encode32_->forward(down32_->forward(x));
-  return attention1_->forward(attention0_->forward(x));
+Tensor ColorizerNetImpl::bottleneck(const Tensor& at32) {
+  return attention1_->forward(attention0_->forward(encode32_->forward(at32)));
 }
 
 ColorizerFeatures ColorizerNetImpl::features(const Tensor& lightness) {
   CNERF_CHECK(lightness.dim() == 4 && lightness.size(1) == 1, "lightness is [B, 1, H, W]");
   CNERF_CHECK(lightness.size(2) % kInputMultiple == 0 && lightness.size(3) % kInputMultiple == 0,
               "sides are multiples of the network's");
-  const Tensor input =
-      (lightness / 50 - 1).to(classify_->weight.scalar_type()).contiguous(torch::MemoryFormat::ChannelsLast);
+  const torch::ScalarType type = classify_->weight.scalar_type();
+  const Tensor input = (lightness / 50 - 1).to(type).contiguous(torch::MemoryFormat::ChannelsLast);
+  const std::vector<Tensor> seen = encoder_ ? encoder_->features(lightness) : std::vector<Tensor>();
+  const auto with_seen = [&](const Tensor& x, ConvUnit& see, std::size_t stage) {
+    return encoder_ ? x + see->forward(type == torch::kFloat32 ? seen[stage] : seen[stage].to(type)) : x;
+  };
 
   const Tensor at2 = encode2_->forward(stem_->forward(input));
-  const Tensor at4 = encode4_->forward(down4_->forward(at2));
-  const Tensor at8 = encode8_->forward(down8_->forward(at4));
-  const Tensor at16 = encode16_->forward(down16_->forward(at8));
-  const Tensor at32 = bottleneck(at16);
+  const Tensor at4 = encode4_->forward(with_seen(down4_->forward(at2), see4_, 0));
+  const Tensor at8 = encode8_->forward(with_seen(down8_->forward(at4), see8_, 1));
+  const Tensor at16 = encode16_->forward(with_seen(down16_->forward(at8), see16_, 2));
+  const Tensor at32 = bottleneck(with_seen(down32_->forward(at16), see32_, 3));
 
   const Tensor global = at32.mean({2, 3});
   const Tensor informed = at32 + global_->forward(global).unsqueeze(-1).unsqueeze(-1);
@@ -168,7 +185,7 @@ void ColorizerNetImpl::shift_logits(const Tensor& offsets) {
 
 ColorizerNet fold_batch_norm(const ColorizerNet& trained) {
   const torch::NoGradGuard no_grad;
-  ColorizerNet folded(Normalisation::kFolded);
+  ColorizerNet folded(Normalisation::kFolded, trained->encoder());
   const auto parameters = trained->named_parameters();
   for (auto& item : folded->named_parameters()) {
     if (const Tensor* source = parameters.find(item.key())) item.value().copy_(*source);
@@ -177,6 +194,7 @@ ColorizerNet fold_batch_norm(const ColorizerNet& trained) {
   for (auto& item : folded->named_modules()) {
     if (auto* unit = item.value()->as<ConvUnitImpl>()) unit->fold_from(*modules[item.key()]->as<ConvUnitImpl>());
   }
+  folded->to(trained->parameters().front().device());
   folded->eval();
   return folded;
 }

@@ -4,8 +4,11 @@
 #include <torch/torch.h>
 
 #include <cstdint>
+#include <memory>
 
 namespace cnerf {
+
+class Encoder;  // encoder.h
 
 /// Training uses batch normalisation; exported networks carry it folded into the convolutions.
 enum class Normalisation { kBatch, kFolded };
@@ -64,25 +67,34 @@ struct ColorizerFeatures {
 
 /// Lightness in, logits over the 313 bins at quarter resolution out.
 /// Strides 2 to 1/32 with 32, 64, 128, 216, 256 channels; two attention units and a global average at the bottleneck.
+/// The large network has a frozen encoder beside it: what that sees at 1/4 to 1/32 is added on the way down.
 class ColorizerNetImpl : public torch::nn::Module {
  public:
   static constexpr std::int64_t kSemanticChannels = 216;
   static constexpr std::int64_t kGlobalChannels = 256;
   static constexpr std::int64_t kInputMultiple = 32;  ///< of both sides, pixels
 
-  explicit ColorizerNetImpl(Normalisation normalisation = Normalisation::kBatch);
+  /// @param encoder  of the large network; null = the small one
+  explicit ColorizerNetImpl(Normalisation normalisation = Normalisation::kBatch,
+                            std::shared_ptr<const Encoder> encoder = nullptr);
 
   /// @param lightness  [B, 1, H, W] f32, L* 0..100; H and W are multiples of kInputMultiple.
   /// @return           [B, 313, H/4, W/4] logits, in the type of the weights.
   torch::Tensor forward(const torch::Tensor& lightness);
   ColorizerFeatures features(const torch::Tensor& lightness);
 
+  [[nodiscard]] const std::shared_ptr<const Encoder>& encoder() const { return encoder_; }
+  using Module::to;
+  /// The encoder goes with it, as it does not in moves that also change the type.
+  void to(torch::Device device, bool non_blocking = false) override;
+
   /// Adds [313] to the logits' bias: a fixed change of the class prior costs nothing at run time.
   void shift_logits(const torch::Tensor& offsets);
 
  private:
-  torch::Tensor bottleneck(torch::Tensor x);
+  torch::Tensor bottleneck(const torch::Tensor& at32);
 
+  std::shared_ptr<const Encoder> encoder_;
   ConvUnit stem_{nullptr}, down4_{nullptr}, down8_{nullptr}, down16_{nullptr}, down32_{nullptr};
   ConvUnit join16_{nullptr}, join8_{nullptr}, join4_{nullptr};
   torch::nn::Sequential encode2_{nullptr}, encode4_{nullptr}, encode8_{nullptr}, encode16_{nullptr}, encode32_{nullptr};
@@ -91,6 +103,7 @@ class ColorizerNetImpl : public torch::nn::Module {
   torch::nn::Linear global_{nullptr};
   torch::nn::Dropout dropout_{nullptr};
   torch::nn::Conv2d classify_{nullptr};
+  ConvUnit see4_{nullptr}, see8_{nullptr}, see16_{nullptr}, see32_{nullptr};  ///< empty without an encoder
 };
 TORCH_MODULE(ColorizerNet);
 

@@ -1,12 +1,16 @@
 #include "src/colorizer/torch/network_weights.h"
 
 #include <cstring>
+#include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "src/base/error.h"
 #include "src/base/files.h"
 #include "src/base/gzip.h"
+#include "src/colorizer/layers_model.h"
+#include "src/colorizer/torch/encoder.h"
 #include "src/colorizer/weights_content.h"
 
 namespace cnerf {
@@ -46,6 +50,18 @@ int checked_short_side(const fs::path& file, std::uint32_t side) {
   return int(side);
 }
 
+/// The installed encoder, which has to be the one that the weights were trained beside; null where they need none.
+std::shared_ptr<const Encoder> encoder_of(const fs::path& file, const WeightsContent& content) {
+  if (content.encoder.empty()) return nullptr;
+  std::shared_ptr<const Encoder> encoder = installed_encoder();
+  if (encoder->sha256() != content.encoder) {
+    throw InputError(file, "encoder",
+                     "expected the one that the weights were trained beside, SHA-256 " + content.encoder + ", found " +
+                         encoder->sha256() + " in " + encoder_folder().string());
+  }
+  return encoder;
+}
+
 void copy_parameter(const fs::path& file, const WeightsContent::Parameter& stored,
                     torch::OrderedDict<std::string, Tensor>& parameters) {
   Tensor* parameter = parameters.find(stored.name);
@@ -65,6 +81,9 @@ void save_colorizer_weights(const fs::path& file, const ColorizerNet& network, c
   append(payload, decoding.temperature);
   append(payload, decoding.gain);
   append(payload, std::uint32_t(decoding.short_side));
+  const std::string encoder = network->encoder() ? network->encoder()->sha256() : "";
+  append(payload, std::uint32_t(encoder.size()));
+  append(payload, encoder.data(), encoder.size());
   const auto parameters = network->named_parameters();
   append(payload, std::uint32_t(parameters.size()));
   for (const auto& item : parameters) {
@@ -90,7 +109,7 @@ ColorizerWeights load_colorizer_weights(const fs::path& file) {
   weights.decoding.temperature = content.temperature;
   weights.decoding.gain = content.gain;
   weights.decoding.short_side = checked_short_side(file, content.short_side);
-  weights.network = ColorizerNet(Normalisation::kFolded);
+  weights.network = ColorizerNet(Normalisation::kFolded, encoder_of(file, content));
 
   const torch::NoGradGuard no_grad;
   auto parameters = weights.network->named_parameters();

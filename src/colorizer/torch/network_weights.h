@@ -19,8 +19,10 @@ struct ColorizerWeights {
 /// @param network  a folded network.
 void save_colorizer_weights(const std::filesystem::path& file, const ColorizerNet& network, const AbDecoding& decoding);
 
-/// @throws MissingInputError  no such file.
-/// @throws InputError         another format or version, a wrong checksum, parameters of another network.
+/// Weights of the large network need the encoder that they were trained beside.
+/// @throws MissingInputError  no such file, or no encoder where one is needed.
+/// @throws InputError         another format or version, a wrong checksum, parameters of another network, another
+/// encoder.
 [[nodiscard]] ColorizerWeights load_colorizer_weights(const std::filesystem::path& file);
 
 /// Where the program's own weights lie: $CNERF_COLORIZER_WEIGHTS, beside the installed program in `../share/cnerf/`, or

@@ -66,9 +66,6 @@ class ReferenceNetwork {
   std::unique_ptr<Parts> parts_;
 };
 
-/// The encoder in `folder`.  @throws MissingInputError, InputError  see read_layers_model and Encoder.
-[[nodiscard]] std::shared_ptr<const Encoder> load_encoder(const std::filesystem::path& folder);
-
 /// The recipe with the built-in network, and with an encoder, at about the same cost: what a frozen network makes of a
 /// patch is a large part of a step's work, so that each patch is learned from several times.
 void use_builtin(ReferenceRecipe& recipe, const std::filesystem::path& weights);
