@@ -14,14 +14,24 @@ sub libraries_of {
   return map { chomp(my $real = qx(readlink -f '$_')); $real } @found;
 }
 
-# The Debian package of a file: name, version, source package. Nothing where the file is not Debian's.
-sub package_of {
-  my ($file) = @_;
-  (my $before_merge = $file) =~ s{^/usr/}{/};  # /lib is /usr/lib, and packages may have either
-  my ($owner) = qx(dpkg-query -S '$file' '$before_merge' 2> /dev/null) =~ /^(\S+):\s/;
-  return if !$owner;
-  my ($name, $version, $source) = split /\t/, qx(dpkg-query -W -f '\${Package}\t\${Version}\t\${source:Package}' '$owner');
-  return {name => $name, version => $version, source => $source};
+# The Debian packages of files: file => {name, version, source}, undefined where a file is not Debian's. Asked for all of
+# them at once, since dpkg-query reads all that is installed each time.
+sub packages_of {
+  my @files = @_;
+  my %plain = map { ($_ => s{^/usr/}{/}r) } @files;  # /lib is /usr/lib, and packages may have either
+  my $both = join ' ', map { "'$_'" } %plain;
+  my (%owner, %package);
+  for (qx(dpkg-query -S $both 2> /dev/null)) {
+    my ($owner, $file) = m{^([^\s,]+)(?:, \S+)*: (/.*)$} or next;
+    $owner{$file =~ s{^/usr/}{/}r} //= $owner;
+  }
+  my $owners = join ' ', map { "'$_'" } values %owner;
+  for (qx(dpkg-query -W -f '\${binary:Package}\t\${Package}\t\${Version}\t\${source:Package}\n' $owners)) {
+    chomp;
+    my ($owner, $name, $version, $source) = split /\t/;
+    $package{$owner} = {name => $name, version => $version, source => $source};
+  }
+  return map { ($_ => $package{$owner{$plain{$_}} // ''}) } @files;
 }
 
 # A package as SPDX describes it.
@@ -41,8 +51,9 @@ sub entry_of {
 
 my %packages;
 my %libraries = map { $_ => 1 } map { libraries_of($_) } @ARGV;
+my %package_of = packages_of(sort keys %libraries);
 for my $library (sort keys %libraries) {
-  my $package = package_of($library) or die "$library is of no Debian package\n";
+  my $package = $package_of{$library} or die "$library is of no Debian package\n";
   $packages{$package->{name}} = $package;
 }
 my ($distribution) = qx(cat /etc/os-release) =~ /^VERSION_CODENAME=(\w+)/m;

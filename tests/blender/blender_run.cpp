@@ -52,6 +52,29 @@ RenderedExr render_exact(const fs::path& setup, const std::string& arguments) {
   return render(setup, "--exact " + arguments);
 }
 
+std::vector<RenderedExr> render_each_exact(const fs::path& setup, const std::vector<std::string>& arguments) {
+  const fs::path folder = setup.parent_path(), script = folder / "variants.py";
+  const auto picture_of = [&](std::size_t variant) { return folder / fmt::format("variant{}.exr", variant); };
+  // As the main program, which it must be to begin with Blender's factory settings: nothing is left of a scene before.
+  std::string text = "import runpy, shlex, sys\nfor arguments in [\n";
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    fs::remove(picture_of(i));
+    text += fmt::format("    r\"\"\"--render '{}' --exact {}\"\"\",\n", picture_of(i).string(), arguments[i]);
+  }
+  text += "]:\n    sys.argv = ['blender', '--'] + shlex.split(arguments)\n    runpy.run_path(r'" + setup.string() +
+          "', run_name='__main__')\n";
+  write_file(script, text);
+  const int status = run_blender(script, "");
+  std::vector<RenderedExr> pictures;
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    if (status != 0 || !fs::exists(picture_of(i))) {
+      throw std::runtime_error("blender failed:\n" + read_text_file(folder / "blender.log"));
+    }
+    pictures.push_back(read_exr(picture_of(i)));
+  }
+  return pictures;
+}
+
 std::vector<RenderedExr> render_cameras(const fs::path& setup, const std::string& arguments,
                                         const std::vector<std::string>& cameras) {
   const fs::path folder = setup.parent_path(), script = folder / "cameras.py";

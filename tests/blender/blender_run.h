@@ -27,6 +27,11 @@ int run_blender(const std::filesystem::path& setup, const std::string& arguments
 /// A picture rendered with `--exact` and these further arguments.  @throws std::runtime_error with Blender's log.
 [[nodiscard]] RenderedExr render_exact(const std::filesystem::path& setup, const std::string& arguments);
 
+/// A picture for each of these further arguments, as `render_exact` makes it of each, from one start of Blender.
+/// @throws likewise
+[[nodiscard]] std::vector<RenderedExr> render_each_exact(const std::filesystem::path& setup,
+                                                         const std::vector<std::string>& arguments);
+
 /// Pictures by these cameras of equal size, in their order, from one start of Blender.  @throws likewise
 [[nodiscard]] std::vector<RenderedExr> render_cameras(const std::filesystem::path& setup, const std::string& arguments,
                                                       const std::vector<std::string>& cameras);

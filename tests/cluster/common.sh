@@ -1,4 +1,5 @@
 # What the tests of launchers share.  source common.sh CNERF FOLDER
+#   $CNERF_HAND  folder of hand.sh, which has the capture and the run by hand; without it a test makes its own
 set -euo pipefail
 cnerf=$(realpath "$1")
 rm -rf "$2"
@@ -24,14 +25,18 @@ need() {
 settings=()
 for setting in stage1.steps=60 stage1.samples_per_step=4096 stage1.checkpoint_every=20 stage1.steps_per_box=64 \
   stage1.grid.levels=4 stage1.grid.log2_rows=12 stage1.grid.finest_resolution=64 stage2.patches=6 \
-  stage2.patch_size=32 stage2.rays_per_patch=256 stage2.working_resolution=32 stage2.distill_steps=10 \
+  stage2.patch_size=32 stage2.rays_per_patch=256 stage2.working_resolution=32 stage2.distill_steps=2 \
   stage2.colorizer_batch=2 stage2.grid.levels=4 stage2.grid.log2_rows=12 stage2.grid.finest_resolution=64 \
   stage2.purify.enabled=false stage2.purify.base_images=2 bake.resolution=32 render.frames=3 render.short_side=32 \
   render.steps_per_box=64; do
   settings+=(--set "$setting")
 done
-capture="$work/capture"
-"$cnerf" sample -o "$capture" --views 9 --width 48 --height 36 --samples-per-pixel 1 > "$work/sample.log"
+capture="${CNERF_HAND:-$work}/capture"
+if [ -z "${CNERF_HAND:-}" ]; then
+  "$cnerf" sample -o "$capture" --views 9 --width 48 --height 36 --samples-per-pixel 1 > "$work/sample.log"
+elif [ ! -d "$capture" ] || [ ! -d "$CNERF_HAND/hand" ]; then
+  fail "no capture and run by hand in $CNERF_HAND, where hand.sh makes them"
+fi
 # The words of a whole run to a folder.
 run_words() { printf '%s\0' "$cnerf" run "$capture" -o "$1" --colorizer builtin "${settings[@]}"; }
 
@@ -46,6 +51,10 @@ as_rank() {
 
 # Two ranks on this machine's loopback, without any launcher.  by_hand OUT
 by_hand() {
+  if [ -n "${CNERF_HAND:-}" ]; then
+    cp -r "$CNERF_HAND/hand" "$1"
+    return
+  fi
   local port words
   port=$(free_port)
   mapfile -d '' -t words < <(run_words "$1")

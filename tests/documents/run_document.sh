@@ -35,8 +35,8 @@ case \${1:-} in
   run | train) add stage1.steps=60 stage1.samples_per_step=4096 stage1.steps_per_box=64 stage1.grid.levels=4 \
                    stage1.grid.log2_rows=12 stage1.grid.finest_resolution=64 render.steps_per_box=64 ;;&
   run | colorize) add stage2.patches=4 stage2.patch_size=32 stage2.rays_per_patch=256 stage2.working_resolution=32 \
-                      stage2.purify.opinions=1 stage2.purify.base_images=2 stage2.distill_steps=10 stage2.grid.levels=4 \
-                      stage2.grid.log2_rows=12 stage2.grid.finest_resolution=64 colorizer.reference_steps=20 ;;&
+                      stage2.purify.opinions=1 stage2.purify.base_images=2 stage2.distill_steps=2 stage2.grid.levels=4 \
+                      stage2.grid.log2_rows=12 stage2.grid.finest_resolution=64 colorizer.reference_steps=2 ;;&
   run | bake) add bake.resolution=32 mesh.texture_size=64 mesh.faces=500 ;;&
   run | render) add render.frames=3 render.short_side=32 ;;
 esac

@@ -21,9 +21,10 @@ using testing::Contains;
 using testing::HasSubstr;
 
 ProgramResult compare(const fs::path& out, const std::string& methods, const std::vector<std::string>& more = {}) {
-  return cnerf(concatenated(
-      concatenated({"compare", tiny_capture().string(), "-o", out.string(), "--methods", methods}, tiny_options()),
-      more));
+  // The positional encoding's MLP is asked at every step along a ray, so that steps are what it takes its time for.
+  return cnerf(concatenated(concatenated({"compare", tiny_capture().string(), "-o", out.string(), "--methods", methods},
+                                         tiny_options({"stage1.steps_per_box=16"})),
+                            more));
 }
 
 nlohmann::json row_of(const nlohmann::json& table, const std::string& method) {

@@ -69,9 +69,13 @@ TEST(Resuming, ATrainingThatAdjustsCamerasIsExact) {
 TEST(Resuming, AColorizationIsExact) {
   const TempDir folder;
   const fs::path whole = copied(tiny_run(), folder / "whole"), parts = copied(tiny_run(), folder / "parts");
-  const auto colorize = [](const fs::path& run) {
-    return std::vector<std::string>{"colorize",    run.string(),           "--take",     "t",
-                                    "--colorizer", "reference:references", "--progress", "json"};
+  const auto colorize = [](const fs::path& run) {  // enough steps to be stopped between
+    return std::vector<std::string>{"colorize",    run.string(),
+                                    "--take",      "t",
+                                    "--colorizer", "reference:references",
+                                    "--progress",  "json",
+                                    "--set",       "colorizer.reference_steps=20",
+                                    "--set",       "stage2.distill_steps=10"};
   };
   ASSERT_EQ(cnerf(colorize(whole)).exit_code, 0);
   fs::copy(whole / "cache", parts / "cache");
@@ -117,12 +121,18 @@ std::vector<std::string> run_by_references(const fs::path& run) {
                       concatenated(tiny_options(), {"--set", "render.frames=2"}));
 }
 
+/// Such a run, finished, at `to`: a copy of one that a process makes once.
+fs::path finished_run(const fs::path& to) {
+  static const TempDir folder;
+  static const ProgramResult made = cnerf(run_by_references(folder / "run"));
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  return copied(folder / "run", to);
+}
+
 TEST(Resuming, ARunLeavesTakesAloneThatOtherCommandsBegan) {
   const TempDir folder;
-  const fs::path run = folder / "run";
+  const fs::path run = finished_run(folder / "run");
   const auto arguments = run_by_references(run);
-  const ProgramResult first = cnerf(arguments);
-  ASSERT_EQ(first.exit_code, 0) << first.err;
   write_file(run / "takes/zz/config.toml", read_text_file(run / "config.toml"));
   fs::remove(run / "takes/reference/take.json");  // as if it had been stopped
   auto record = nlohmann::json::parse(read_text_file(run / "run.json"));
@@ -136,10 +146,8 @@ TEST(Resuming, ARunLeavesTakesAloneThatOtherCommandsBegan) {
 
 TEST(Resuming, OtherOptionsForAFinishedStepAreToldAndNotWrittenDown) {
   const TempDir folder;
-  const fs::path run = folder / "run";
+  const fs::path run = finished_run(folder / "run");
   const auto arguments = run_by_references(run);
-  const ProgramResult first = cnerf(arguments);
-  ASSERT_EQ(first.exit_code, 0) << first.err;
   const auto resumed_with = [&](const std::vector<std::string>& settings) {
     std::vector<std::string> all = concatenated(arguments, {"--resume"});
     for (const std::string& setting : settings) all = concatenated(all, {"--set", setting});

@@ -43,8 +43,10 @@ TEST(Sky, IsTrainedColouredAndBaked) {
       cnerf({"info", run.string()}).out,
       testing::AllOf(HasSubstr("sky:"), testing::ContainsRegex("sky seen: +[0-9]+ % of the pixels, in [0-9]+ views"),
                      HasSubstr("exposure curve:")));
-  const ProgramResult colored = cnerf(
-      {"colorize", run.string(), "--take", "warm", "--colorizer", "reference:" + (outdoors() / "references").string()});
+  // Enough steps for a colour that is looked for below.
+  const ProgramResult colored = cnerf({"colorize", run.string(), "--take", "warm", "--colorizer",
+                                       "reference:" + (outdoors() / "references").string(), "--set",
+                                       "colorizer.reference_steps=20", "--set", "stage2.distill_steps=10"});
   ASSERT_EQ(colored.exit_code, 0) << colored.err;
   const fs::path bake = folder / "bake";
   const ProgramResult baked = cnerf({"bake", run.string(), "--take", "warm", "--format", "vdb,gltf,web", "-o",

@@ -244,14 +244,17 @@ Op shared_color_field(const FieldProblem& problem) {
   const PixelSamples pixels = random_pixels(problem.count, 24, 3);
   const std::vector<Ab> targets = colors_of(pixels);
   const std::vector<float> weights = random_weights(problem.count);
+  const auto trainer = std::make_shared<std::unique_ptr<ColorFieldEngine>>();
   const auto trained = [=](const Backend& backend) {
     const auto make_on = [&](const Backend& on) {
       return on.make([&](const Engines& engines) { return engines.make_color_field(grid_of(problem.levels), 5); });
     };
+    if (!*trainer) {
+      *trainer = make_on(reference_backend());
+      for (int i = 0; i < 10; ++i) (*trainer)->step(pixels, targets, weights, problem.loss, 1e-2f);
+    }
     auto engine = make_on(backend);
-    const auto trainer = make_on(reference_backend());
-    for (int i = 0; i < 10; ++i) trainer->step(pixels, targets, weights, problem.loss, 1e-2f);
-    copy_state(*trainer, *engine);
+    copy_state(**trainer, *engine);
     return engine;
   };
   return shared(color_field(problem), problem.name, trained, [=](ColorFieldEngine& engine, float rate) {

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdio>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <sstream>
@@ -446,14 +447,14 @@ Report run_pairs(const CampaignOptions& options) {
   const Fixtures fixtures(options.subject, options.scratch);
   std::mt19937_64 random(options.seed);
   std::vector<Command> commands;
-  std::vector<World> worlds;
+  std::map<std::size_t, World> worlds;  // of commands in pairs that are tried, by their places
   Report report;
   const Stop ctrl_c = {SIGINT, [](double seconds) { return seconds > 3; }};
   for (const Command& command : fixtures.neighbours()) {
     if (!options.commands.empty() && std::ranges::find(options.commands, command.name) == options.commands.end())
       continue;
     try {
-      worlds.push_back(world_of(options, fixtures, command, command.name == "view" ? ctrl_c : Stop{}));
+      if (command.name == "view") worlds.emplace(commands.size(), world_of(options, fixtures, command, ctrl_c));
     } catch (const std::runtime_error& failure) {
       // Without npm there is no page to be shown.
       if (std::string(failure.what()).find("page was not built") == std::string::npos) throw;
@@ -470,7 +471,10 @@ Report run_pairs(const CampaignOptions& options) {
   std::vector<Trial> trials;
   for (int i = 0; i < options.count; ++i) {
     const auto [a, b] = pairs[std::size_t(i) % pairs.size()];
-    const double offset = std::uniform_real_distribution<>(0, 1)(random) * worlds[a].seconds;
+    for (const std::size_t which : {a, b}) {
+      if (!worlds.contains(which)) worlds.emplace(which, world_of(options, fixtures, commands[which]));
+    }
+    const double offset = std::uniform_real_distribution<>(0, 1)(random) * worlds.at(a).seconds;
     const std::string row = commands[a].name + " + " + commands[b].name;
     trials.push_back(
         {row, std::to_string(offset) + " s later", [&, a = a, b = b, offset](const Slot& slot) {
@@ -493,7 +497,7 @@ Report run_pairs(const CampaignOptions& options) {
                                 ending.said.find(slot.root().string()) != std::string::npos;
              if (ending.code == kBusy && !names) verdict.violated("unnamed", last_line(ending.said));
            }
-           judge_pair(content_of(slot.root()), {&worlds[a], &worlds[b]}, endings, verdict);
+           judge_pair(content_of(slot.root()), {&worlds.at(a), &worlds.at(b)}, endings, verdict);
            return verdict;
          }});
   }

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <fstream>
 #include <mutex>
+#include <set>
 #include <thread>
 
 #include "src/base/error.h"
@@ -129,7 +130,14 @@ class Campaign {
   /// A campaign on files that are refused anyhow would prove nothing.
   void check_originals() {
     const fs::path folder = options_.folder / "work/original";
+    std::set<std::vector<std::string>> read_already;  // stages and commands, which files may have in common
     for (const Kind& kind : kinds_) {
+      std::vector<std::string> reading = {kind.stage.string()};
+      for (const Step& step : kind.steps) {
+        reading.insert(reading.end(), step.arguments.begin(), step.arguments.end());
+        reading.push_back(step.interrupt_at);
+      }
+      if (!read_already.insert(reading).second) continue;
       const Finding finding = read(kind, read_text_file(kind.stage / kind.file), false, folder);
       if (finding.verdict == Verdict::kAccepted) continue;
       throw InputError(kind.stage / kind.file, kind.name,

@@ -25,11 +25,11 @@ await new Promise((done) => server.listen(0, "127.0.0.1", done));
 
 const browser = await chromium.launch({
   executablePath,
-  args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"],
+  args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader-webgl", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"],
   timeout: patience,
 });
 const camera = JSON.parse(readFileSync(join(folder, "camera.json"), "utf8"));
-for (const name of ["splats.ply", "splats.spz"]) {
+async function open(name) {
   const page = await browser.newPage();
   page.setDefaultTimeout(patience);
   page.on("pageerror", (error) => {
@@ -52,5 +52,6 @@ for (const name of ["splats.ply", "splats.spz"]) {
   writeFileSync(join(folder, `${name}.rgb`), rgb);
   await page.close();
 }
+await Promise.all(["splats.ply", "splats.spz"].map(open));
 await browser.close();
 server.close();

@@ -39,10 +39,15 @@ class FieldView : public test::Stage2Fixture {
  protected:
   void SetUp() override {
     Stage2Fixture::SetUp();
-    ByLightness colorizer;
-    (void)colorize(small_options(), colorizer, take("two"));
+    static const std::vector<std::byte> colored = colored_take();  // the same for all tests of a process
+    write_file(take("two"), colored);
     luminance_ = LuminanceModel::load(stage1(), cpu_engines());
     colors_ = ColorModel::load(take("two"), cpu_engines());
+  }
+  std::vector<std::byte> colored_take() {
+    ByLightness colorizer;
+    (void)colorize(small_options(), colorizer, take("colored"));
+    return read_binary_file(take("colored"));
   }
   [[nodiscard]] FieldCamera camera(int view, int enlarged = 2) const {
     FieldCamera camera{capture_.views[std::size_t(view)].intrinsics,

@@ -16,12 +16,26 @@ class Retouching : public test::Stage2Fixture {
  protected:
   void SetUp() override {
     Stage2Fixture::SetUp();
+    static const Trained trained = train();  // the same for all tests of a process
+    write_file(take("a"), trained.take);
+    cache_ = trained.cache;
+    seen_.emplace(cache_.views(), cache_.names());
+  }
+
+  /// A take's snapshot, and the views that it was trained on.
+  struct Trained {
+    std::vector<std::byte> take;
+    ViewCache cache;
+  };
+  [[nodiscard]] Trained train() {
+    Trained trained;
     Listening colorizer;
     Stage2Options options = small_options();
     options.distill_steps = 40;
-    (void)train_stage2({capture_, stage1(), options, colorizer, {}, take("a"), false, &cache_}, cpu_engines(),
+    (void)train_stage2({capture_, stage1(), options, colorizer, {}, take("a"), false, &trained.cache}, cpu_engines(),
                        observer_);
-    seen_.emplace(cache_.views(), cache_.names());
+    trained.take = read_binary_file(take("a"));
+    return trained;
   }
 
   /// The left third of a view.

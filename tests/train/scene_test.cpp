@@ -16,7 +16,7 @@ class FinishedScene : public test::Stage2Fixture {
     luminance.sky = {8, 4, {std::vector<float>(std::size_t(8) * 4, 0.25f)}};
     luminance.save(stage1());
     Stage2Options options = small_options();
-    options.distill_steps = 20;
+    options.distill_steps = 2;
     test::Listening colorizer;
     (void)colorize(options, colorizer, take("a"));
   }

@@ -201,7 +201,7 @@ using SharedStage2 = test::Stage2Fixture;
 
 TEST_F(SharedStage2, RanksShareQuestionsAndSteps) {
   Stage2Options options = small_options();
-  options.distill_steps = 10;
+  options.distill_steps = 2;
   std::mutex mutex;
   std::multiset<std::uint64_t> asked;
   std::vector<test::Listening> colorizers(2);

@@ -58,7 +58,7 @@ TEST_F(Stage2, AsksFromOneThread) {
 TEST_F(Stage2, SizeOfQueriesChangesNothing) {
   Stage2Options options = small_options();
   options.patches = 20;
-  options.distill_steps = 10;
+  options.distill_steps = 1;
   options.purify.enabled = false;
   for (const int batch : {3, 16}) {
     options.colorizer_batch = batch;

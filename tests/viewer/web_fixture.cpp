@@ -17,6 +17,7 @@
 #include "export/web_levels.h"
 #include "src/base/files.h"
 #include "src/color/colorspace_math.h"
+#include "tests/export/test_volumes.h"
 
 namespace cnerf {
 using namespace exporting;
@@ -95,12 +96,6 @@ std::vector<bake::Volume> nested_stripes() {
           stripes(kCoarsest, corner, {kAlong, kAlong, kAlong}, hole)};
 }
 
-/// What one grid as fine as the finest of them shows: no border anywhere.
-bake::Volume fine_stripes() {
-  const Vec3d corner = Vec3d{-1, -1, -1} * (kAlong * kCoarsest / 2);
-  return stripes(kCoarsest / 4, corner, {4 * kAlong, 4 * kAlong, 4 * kAlong}, {});
-}
-
 Json rows_of(const std::vector<float>& values) {
   Json list = Json::array();
   for (const float v : values) list.push_back(std::round(v * 1e5) / 1e5);
@@ -114,7 +109,8 @@ void write_expected(const fs::path& file, const bake::Volume& volume, const std:
       const auto pixel = project(cameras[c].intrinsics, cameras[c].world_from_camera.inverse().point(p));
       projections.push_back({{"camera", c}, {"point", {p.x, p.y, p.z}}, {"pixel", {pixel->x, pixel->y}}});
     }
-    const bake::VolumeImage image = integrate_volume(volume, cameras[c].intrinsics, cameras[c].world_from_camera);
+    const bake::VolumeImage image =
+        bake::integrate_volumes({&volume, 1}, cameras[c].intrinsics, cameras[c].world_from_camera);
     images.push_back({{"width", image.width},
                       {"height", image.height},
                       {"rgb", rows_of(image.rgb)},
@@ -139,12 +135,13 @@ void write_small(const fs::path& folder) {
                                           camera("images/c.png", {5.5, 4.5, 2.9}, {1.9, 2.9, 3.8})};
   std::vector<WebPhoto> photos;
   for (const bake::Camera& each : cameras) {
-    const bake::VolumeImage seen = integrate_volume(volume, each.intrinsics, each.world_from_camera);
+    const bake::VolumeImage seen =
+        bake::integrate_volumes({&volume, 1}, each.intrinsics, each.world_from_camera, {0.5, 2});
     std::vector<float> luminance;
     for (std::size_t p = 0; p < seen.opacity.size(); ++p) {
       luminance.push_back(luminance_of(Vec3f{seen.rgb[3 * p], seen.rgb[3 * p + 1], seen.rgb[3 * p + 2]}));
     }
-    photos.push_back(make_web_photo(each.intrinsics, luminance, 160, 90));
+    photos.push_back(exporting::test::make_web_photo(each.intrinsics, luminance, 160, 90));
   }
   const WebScene scene{"ball", cameras, photos, {{"reference:a.png", "warm", {"cnerf", "bake"}}, {"metres"}}};
   write_web_bundle({{make_web_bricks(volume)}, volume.frame, make_poster({&volume, 1}, cameras[0], 160)}, scene,
@@ -166,17 +163,13 @@ void write_nested(const fs::path& folder) {
                                           camera("images/border.png", {-1.7, 0.9, -0.15}, {-0.8, 0.5, -0.15}),
                                           camera("images/all.png", {-2.4, 2.2, 1.6}, {0, 0, 0})};
   for (bake::Volume& volume : volumes) dilate_colors(volume, 2);
-  bake::Volume fine = fine_stripes();
-  dilate_colors(fine, 2);
-  Json images = Json::array(), truth = Json::array();
-  for (const bake::Camera& each : cameras) {
-    images.push_back(image_json(volumes, each));
-    truth.push_back(image_json({&fine, 1}, each));
-  }
-  write_file(folder / "nested.json", Json{{"images", images}, {"one_fine_grid", truth}}.dump());
-  Observer observer;
-  write_web(volumes, {"stripes", cameras, {}, {{"builtin", "", {"cnerf", "bake"}}, {"metres"}}}, folder / "nested", {},
-            {}, observer);
+  Json images = Json::array();
+  for (const bake::Camera& each : cameras) images.push_back(image_json(volumes, each));
+  write_file(folder / "nested.json", Json{{"images", images}}.dump());
+  const WebScene scene{"stripes", cameras, {}, {{"builtin", "", {"cnerf", "bake"}}, {"metres"}}};
+  WebVolume volume{{}, volumes.back().frame, make_poster(volumes, cameras[0], 160)};
+  volume.levels = make_web_levels(std::move(volumes), WebOptions{}.resolution);
+  write_web_bundle(volume, scene, folder / "nested", {});
 }
 
 void write_of_bake(const fs::path& folder, const fs::path& bake, int resolution) {

@@ -347,10 +347,9 @@ describe("nested grids", () => {
     assert.equal(await levelsThere(shown), 3);
     for (const [camera, image] of nested.images.entries()) {
       await shown.evaluate((i) => window.cnerf.app.goToCamera(i), camera);
-      const drawnPicture = await picture(shown, image.width, image.height);
-      const [ofGrids, ofOne] = [psnr(drawnPicture, image.rgb), psnr(drawnPicture, nested.one_fine_grid[camera].rgb)];
-      console.log(`# camera ${camera}: ${ofGrids.toFixed(2)} dB to the nested grids, ${ofOne.toFixed(2)} dB to one fine grid`);
-      assert.ok(ofGrids >= 32, `${ofGrids} dB`);
+      const decibel = psnr(await picture(shown, image.width, image.height), image.rgb);
+      console.log(`# camera ${camera}: ${decibel.toFixed(2)} dB`);
+      assert.ok(decibel >= 32, `${decibel} dB`);
     }
     assert.equal(await shown.evaluate(() => document.getElementById("missing").hidden), true, "nothing is left out");
     await shown.close();
@@ -525,6 +524,7 @@ describe("phone", () => {
   it("has everything within reach", async () => {
     const small = await browser.newContext({ viewport: { width: 390, height: 780 }, hasTouch: true, isMobile: true, deviceScaleFactor: 1 });
     const shown = await open(small, `${server.url}?still`);
+    await shown.evaluate(() => (window.cnerf.renderer.frame = () => false)); // the volume was drawn; what follows is about what is around it
     assert.equal(await shown.evaluate(() => document.documentElement.scrollWidth), 390);
     assert.equal(await shown.evaluate(() => document.body.classList.contains("panel-open")), false, "the picture comes first");
     await shown.tap("#settings");

@@ -28,7 +28,8 @@ before(async () => {
   const out = await ok(["bake", trained, "--format", "vdb,web", "-o", bake, "--resolution", "96", "--set", "bake.subsamples=1"]);
   assert.match(out, /web: .* bricks; .* of graphics memory/);
   browser = await launch();
-  context = await browser.newContext({ viewport: { width: 480, height: 360 }, acceptDownloads: true });
+  // A quarter of the pixels across, as in page.test.mjs.
+  context = await browser.newContext({ viewport: { width: 480, height: 360 }, deviceScaleFactor: 0.25, acceptDownloads: true });
 });
 after(async () => {
   await browser?.close();

@@ -23,7 +23,11 @@ const table = Uint32Array.from({ length: 256 }, (_, n) => {
   for (let k = 0; k < 8; ++k) n = n & 1 ? 0xedb88320 ^ (n >>> 1) : n >>> 1;
   return n >>> 0;
 });
-const crc = (bytes) => ~bytes.reduce((c, byte) => table[(c ^ byte) & 255] ^ (c >>> 8), ~0) >>> 0;
+function crc(bytes) {
+  let c = ~0;
+  for (let i = 0; i < bytes.length; ++i) c = table[(c ^ bytes[i]) & 255] ^ (c >>> 8);
+  return ~c >>> 0;
+}
 
 /** @param data  `channels` bytes a pixel, 3 or 4 */
 export function png(width, height, channels, data) {
@@ -63,6 +67,8 @@ function camera(index, count, { width, height }) {
   return { position, rotation, lens: { width, height, fx: 1.1 * width, fy: 1.1 * width, cx: width / 2, cy: height / 2 } };
 }
 const luma = (rgb, p) => Math.round(0.2126 * rgb[p] + 0.7152 * rgb[p + 1] + 0.0722 * rgb[p + 2]);
+/** Number of the pixel of `count` that a place lies in, or that is nearest to it. */
+const within = (place, count) => Math.min(count - 1, Math.max(0, Math.floor(place)));
 
 /** A stroke as the program writes it: without what is 0, false or empty. */
 const written = (stroke) => Object.fromEntries(Object.entries(stroke).filter(([, value]) => value && value.length !== 0));
@@ -81,6 +87,8 @@ export class StudioMock {
     this.steps = steps;
     this.slow = slow;
     this.pictures = pictures ?? Array.from({ length: count }, (_, i) => ballPicture(i));
+    /** Their bytes by what they are shown with. */
+    this.grades = new Map();
     this.scene = {
       title, run: "/runs/ball", up: "+y", centre: [0, 0, 0], radius: 1.6, home: 1,
       views: this.pictures.map((picture, i) => ({ name: `images/${String(i).padStart(4, "0")}.png`, held_out: i === this.pictures.length - 1, width: picture.width, height: picture.height, ...camera(i, this.pictures.length, picture) })),
@@ -190,14 +198,39 @@ export class StudioMock {
 
   // Pictures.
 
-  pixel(index, x, y, amount, out, at) {
+  /** A view's picture with an amount of its colours, and the finish. */
+  graded(index, amount) {
     const { saturation, exposure } = this.state.finish;
-    amount *= saturation;
-    const light = 2 ** (exposure / 2.2);
-    const { width, height, rgb } = this.pictures[index];
-    const p = 3 * (Math.min(height - 1, Math.max(0, Math.floor(y))) * width + Math.min(width - 1, Math.max(0, Math.floor(x))));
-    const grey = luma(rgb, p);
-    for (let k = 0; k < 3; ++k) out[at + k] = Math.max(0, Math.min(255, (grey + (rgb[p + k] - grey) * amount) * light));
+    const key = [index, amount, saturation, exposure].join();
+    if (!this.grades.has(key)) {
+      amount *= saturation;
+      const light = 2 ** (exposure / 2.2);
+      const { rgb } = this.pictures[index];
+      const bytes = Buffer.alloc(rgb.length);
+      for (let p = 0; p < rgb.length; p += 3) {
+        const grey = luma(rgb, p);
+        for (let k = p; k < p + 3; ++k) bytes[k] = Math.max(0, Math.min(255, (grey + (rgb[k] - grey) * amount) * light));
+      }
+      this.grades.set(key, bytes);
+    }
+    return this.grades.get(key);
+  }
+  /** @param across, down  a pixel's centre -> place in the view's picture */
+  resampled(index, amount, width, height, across, down) {
+    const own = this.pictures[index];
+    const from = this.graded(index, amount);
+    const columns = Int32Array.from({ length: width }, (_, x) => 3 * within(across(x + 0.5), own.width));
+    const data = Buffer.alloc(3 * width * height);
+    for (let y = 0, at = 0; y < height; ++y) {
+      const row = 3 * own.width * within(down(y + 0.5), own.height);
+      for (let x = 0; x < width; ++x, at += 3) {
+        const p = row + columns[x];
+        data[at] = from[p];
+        data[at + 1] = from[p + 1];
+        data[at + 2] = from[p + 2];
+      }
+    }
+    return { width, height, channels: 3, data };
   }
   /** What stands at a viewpoint is what the nearest view shows. */
   sampled(index, side, amount) {
@@ -205,14 +238,12 @@ export class StudioMock {
     if (viewpoint) {
       const { width, height } = viewpoint.lens;
       const scale = side > 0 ? Math.min(1, side / Math.max(width, height)) : 1;
-      return this.seen(viewpoint.position, this.scaled(viewpoint.lens, scale), [amount]);
+      return this.seen(viewpoint.position, this.scaled(viewpoint.lens, scale), amount);
     }
     const own = this.pictures[index];
     const scale = side > 0 ? Math.min(1, side / Math.max(own.width, own.height)) : 1;
     const [width, height] = [Math.round(own.width * scale), Math.round(own.height * scale)];
-    const data = Buffer.alloc(3 * width * height);
-    for (let y = 0; y < height; ++y) for (let x = 0; x < width; ++x) this.pixel(index, (x + 0.5) / scale, (y + 0.5) / scale, amount, data, 3 * (y * width + x));
-    return { width, height, channels: 3, data };
+    return this.resampled(index, amount, width, height, (x) => x / scale, (y) => y / scale);
   }
   picture(response, { width, height, channels, data }, headers = {}) {
     response.writeHead(200, { "Content-Type": "image/png", ...headers }).end(png(width, height, channels, data));
@@ -224,23 +255,16 @@ export class StudioMock {
     const { width, height } = lens;
     if (!(width > 0 && height > 0 && width <= 4096 && height <= 4096)) return this.refuse(response, 400, "lens: a picture has 1 to 4096 pixels a side.");
     const amounts = sides.map((side) => (side === "" ? 0 : side === "now" ? this.amount : (this.amounts[side] ?? 0)));
-    const pictures = amounts.map((amount) => this.seen(position, lens, [amount])).map(({ width: w, height: h, channels, data }) => png(w, h, channels, data));
+    const pictures = amounts.map((amount) => this.seen(position, lens, amount)).map(({ width: w, height: h, channels, data }) => png(w, h, channels, data));
     const sizes = pictures.map((one) => one.length).join();
     response.writeHead(200, { "Content-Type": "image/png", "X-Cnerf-Colors": String(this.state.colors), "X-Cnerf-Sizes": sizes, "X-Cnerf-Milliseconds": "20" });
     response.end(Buffer.concat(pictures));
   }
-  seen(position, lens, amounts) {
-    const { width, height } = lens;
+  seen(position, lens, amount) {
     const distance = ({ position: p }) => Math.hypot(...p.map((v, k) => v - position[k]));
     const index = this.scene.views.reduce((best, view, i, all) => (distance(view) < distance(all[best]) ? i : best), 0);
     const own = this.scene.views[index].lens;
-    const data = Buffer.alloc(3 * width * height * amounts.length);
-    amounts.forEach((amount, row) => {
-      for (let y = 0; y < height; ++y) {
-        for (let x = 0; x < width; ++x) this.pixel(index, own.cx + ((x + 0.5 - lens.cx) / lens.fx) * own.fx, own.cy + ((y + 0.5 - lens.cy) / lens.fy) * own.fy, amount, data, 3 * ((row * height + y) * width + x));
-      }
-    });
-    return { width, height: height * amounts.length, channels: 3, data };
+    return this.resampled(index, amount, lens.width, lens.height, (x) => own.cx + ((x - lens.cx) / lens.fx) * own.fx, (y) => own.cy + ((y - lens.cy) / lens.fy) * own.fy);
   }
   /** Pixels of like light near a stroke, in every view at the same place. */
   reach(response, index, strokes) {

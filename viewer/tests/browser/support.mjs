@@ -17,7 +17,8 @@ export async function launch(extra = []) {
   const { chromium } = await import("playwright-core"); // not every measure needs a browser
   return chromium.launch({
     executablePath: process.env.CNERF_CHROMIUM ?? "/usr/bin/chromium",
-    args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", ...extra],
+    // SwiftShader for WebGL alone: it would draw every frame of a page, ten times as slowly as Chromium itself.
+    args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader-webgl", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", ...extra],
     timeout: patience,
   });
 }

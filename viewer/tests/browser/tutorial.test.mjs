@@ -9,7 +9,7 @@ import { drawStroke, launch, open, patience, program, run, startServing } from "
 
 const folder = mkdtempSync(join(tmpdir(), "cnerf-tutorial-"));
 const [capture, trained] = [join(folder, "capture"), join(folder, "run")];
-const long = process.env.CNERF_PICTURES ? [] : ["--set", "stage1.steps=250", "--set", "stage1.samples_per_step=16384", "--set", "stage1.steps_per_box=64", "--set", "render.steps_per_box=128", "--set", "bake.resolution=48"];
+const long = process.env.CNERF_PICTURES ? [] : ["--set", "stage1.steps=250", "--set", "stage1.samples_per_step=16384", "--set", "stage1.steps_per_box=64", "--set", "stage2.grid.levels=4", "--set", "stage2.grid.log2_rows=12", "--set", "stage2.grid.finest_resolution=64", "--set", "render.steps_per_box=128", "--set", "bake.resolution=48"];
 const size = process.env.CNERF_PICTURES ? ["--views", "24"] : ["--views", "10", "--width", "120", "--height", "90", "--samples-per-pixel", "1"];
 let browser, page, serving;
 
@@ -49,7 +49,8 @@ before(async () => {
   await ok(["sample", "-o", capture, ...size]);
   browser = await launch();
   serving = await startServing(["studio", "-o", trained, "--preset", "quick", "--set", "capture.holdout=8", ...long]);
-  const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, acceptDownloads: true });
+  // A quarter of the pixels across, where nobody looks at them: frames are drawn from the field.
+  const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, deviceScaleFactor: process.env.CNERF_PICTURES ? 1 : 0.25, reducedMotion: "reduce", acceptDownloads: true });
   page = await open(context, `${serving.url}?still`);
 });
 after(async () => {
