@@ -51,12 +51,12 @@ void add_options(CLI::App& app, Options& o) {
   app.add_option("--evaluation", o.sources.evaluation, "folders that are never trained on, only judged");
   app.add_option("--teacher", o.teacher, "LPIPS SqueezeNet weights: predict a classifier's features of the colours");
   app.add_flag("--large", o.is_large, "the network that also sees what the installed encoder makes of a picture");
-  CLI::Option* distil =
-      app.add_option("--distil", o.distilled, "a run's latest.weights, whose answers are learned besides the truth");
+  CLI::Option* distill =
+      app.add_option("--distill", o.distilled, "a run's latest.weights, whose answers are learned besides the truth");
   app.add_option("--distilled-share", o.training.distilled_share,
                  "their share of the classification loss; the rest is the truth's")
       ->check(CLI::Range(0.0, 1.0))
-      ->needs(distil);
+      ->needs(distill);
   app.add_option("-o,--output", o.output, "folder for checkpoint, pictures, scores and weights");
   app.add_option("--evaluate", o.evaluate, "only write the score table of these weights");
   app.add_option("--finish", o.finish, "only choose the decoding of a run's latest.weights; class-weights.txt beside");
@@ -161,7 +161,7 @@ void train(const Options& o, torch::Device device) {
               images.classes.names.size());
   FrozenNetworks frozen;
   if (!o.teacher.empty()) frozen.teacher = std::make_unique<FeatureTeacher>(o.teacher, device);
-  if (o.is_large) frozen.encoder = installed_encoder();
+  if (o.is_large) frozen.encoder = installed_encoder("--large");
   if (!o.distilled.empty()) frozen.distilled = load_colorizer_weights(o.distilled).network;
   ColorizerTrainer trainer(images, std::move(frozen), o.training, device);
   std::printf("%lld parameters\n", static_cast<long long>(parameter_count(*trainer.averaged())));

@@ -115,7 +115,7 @@ class InstalledEncoder {
   explicit InstalledEncoder(std::uint64_t seed = 2) {
     test::small_resnet(seed).write(folder_.path());
     ::setenv("CNERF_ENCODER", folder_.path().c_str(), 1);
-    encoder = installed_encoder();
+    encoder = load_encoder(folder_.path());
   }
   ~InstalledEncoder() { ::setenv("CNERF_ENCODER", "/absent", 1); }  // not one that this machine may have
   InstalledEncoder(const InstalledEncoder&) = delete;
@@ -171,7 +171,8 @@ TEST(LargeColorizerNet, ComesBackOnlyBesideItsEncoder) {
     check_answer(colorizer->name(), patches, colorizer->colorize(patches));
   }
   EXPECT_THAT(test::message_of<MissingInputError>(load),
-              testing::AllOf(testing::HasSubstr("/absent"), testing::HasSubstr("--encoder")));
+              testing::AllOf(testing::HasSubstr("large.weights"), testing::HasSubstr("/absent"),
+                             testing::HasSubstr("--encoder")));
   const InstalledEncoder another(9);
   EXPECT_THAT(test::message_of<InputError>(load),
               testing::AllOf(testing::HasSubstr("large.weights"), testing::HasSubstr(another.encoder->sha256())));

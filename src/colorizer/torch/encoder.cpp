@@ -165,9 +165,9 @@ std::shared_ptr<const Encoder> load_encoder(const fs::path& folder) {
   return std::make_shared<const Encoder>(read_layers_model(folder));
 }
 
-std::shared_ptr<const Encoder> installed_encoder() {
+std::shared_ptr<const Encoder> installed_encoder(const std::string& what) {
   if (!is_encoder_installed()) {
-    throw MissingInputError("the encoder is not in " + encoder_folder().string() +
+    throw MissingInputError(what + ": needs the encoder, which is not in " + encoder_folder().string() +
                             "; scripts/install_dependencies.sh --encoder installs it");
   }
   return load_encoder(encoder_folder());

@@ -79,9 +79,9 @@ class Encoder final : public PictureEncoder {
 /// The encoder in `folder`.  @throws MissingInputError, InputError  see read_layers_model and Encoder.
 [[nodiscard]] std::shared_ptr<const Encoder> load_encoder(const std::filesystem::path& folder);
 
-/// The one that the user has installed.
+/// The one that the user has installed, which `what` needs.
 /// @throws MissingInputError  naming where it is looked for, and how it is installed.
-[[nodiscard]] std::shared_ptr<const Encoder> installed_encoder();
+[[nodiscard]] std::shared_ptr<const Encoder> installed_encoder(const std::string& what);
 
 /// `make_picture_encoder` inside the plug-in: it is installed.
 [[nodiscard]] std::unique_ptr<PictureEncoder> make_torch_picture_encoder();

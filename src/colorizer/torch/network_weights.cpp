@@ -53,7 +53,7 @@ int checked_short_side(const fs::path& file, std::uint32_t side) {
 /// The installed encoder, which has to be the one that the weights were trained beside; null where they need none.
 std::shared_ptr<const Encoder> encoder_of(const fs::path& file, const WeightsContent& content) {
   if (content.encoder.empty()) return nullptr;
-  std::shared_ptr<const Encoder> encoder = installed_encoder();
+  std::shared_ptr<const Encoder> encoder = installed_encoder(file.string());
   if (encoder->sha256() != content.encoder) {
     throw InputError(file, "encoder",
                      "expected the one that the weights were trained beside, SHA-256 " + content.encoder + ", found " +
