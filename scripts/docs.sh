@@ -28,7 +28,7 @@ check_spelling() {
   # What is meant: names, words misspelled on purpose by tests, "to and fro", and what one version or the other does not
   # know.
   files '*.md' '*.h' '*.cpp' '*.cu' '*.cuh' '*.inl' '*.py' '*.ts' '*.sh' '*.toml' |
-    xargs -0 codespell --ignore-words-list inflight,trian,siez,fro,halfs,fo,qick,lins,fillin,shepperd,regrading,regraded
+    xargs -0 codespell --ignore-words-list inflight,trian,siez,fro,halfs,fo,qick,lins,fillin,shepperd,regrading,regraded,caf
   echo "docs: spelling is clean"
 }
 check_links() {
