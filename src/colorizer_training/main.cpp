@@ -156,13 +156,13 @@ void finish(const Options& o, torch::Device device) {
 }
 
 void train(const Options& o, torch::Device device) {
-  const ImageSet images = load_image_set(o.sources);
-  std::printf("%zu photographs, %zu tiles, %zu classes\n", images.photos.size(), images.tiles.size(),
-              images.classes.names.size());
   FrozenNetworks frozen;
   if (!o.teacher.empty()) frozen.teacher = std::make_unique<FeatureTeacher>(o.teacher, device);
   if (o.is_large) frozen.encoder = installed_encoder("--large");
   if (!o.distilled.empty()) frozen.distilled = load_colorizer_weights(o.distilled).network;
+  const ImageSet images = load_image_set(o.sources);
+  std::printf("%zu photographs, %zu tiles, %zu classes\n", images.photos.size(), images.tiles.size(),
+              images.classes.names.size());
   ColorizerTrainer trainer(images, std::move(frozen), o.training, device);
   std::printf("%lld parameters\n", static_cast<long long>(parameter_count(*trainer.averaged())));
   if (o.resume) {
