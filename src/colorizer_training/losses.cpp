@@ -1,5 +1,6 @@
 #include "src/colorizer_training/losses.h"
 
+#include "src/base/check.h"
 #include "src/color/ab_bins.h"
 #include "src/colorizer/torch/network.h"
 #include "src/colorizer/torch/network_decode.h"
@@ -74,8 +75,11 @@ ColorLoss color_loss(const Tensor& logits, const Tensor& ab, const SoftLabelTabl
   return {(cross_entropy * weight).mean(), regression};
 }
 
-Tensor distillation_loss(const Tensor& logits, const Tensor& taught_logits) {
-  return -(log_probability_rows(taught_logits).exp() * log_probability_rows(logits)).sum(1).mean();
+Tensor distillation_loss(const Tensor& logits, const std::vector<Tensor>& taught_logits) {
+  CNERF_CHECK(!taught_logits.empty(), "there is a network to learn from");
+  Tensor taught = log_probability_rows(taught_logits[0]).exp();
+  for (std::size_t i = 1; i < taught_logits.size(); ++i) taught += log_probability_rows(taught_logits[i]).exp();
+  return -(taught * log_probability_rows(logits)).sum(1).mean() / double(taught_logits.size());
 }
 
 AuxiliaryHeadsImpl::AuxiliaryHeadsImpl(std::int64_t classes, std::int64_t feature_channels) {

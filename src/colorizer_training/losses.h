@@ -40,10 +40,12 @@ struct ColorLoss {
 [[nodiscard]] ColorLoss color_loss(const torch::Tensor& logits, const torch::Tensor& ab, const SoftLabelTable& table,
                                    const torch::Tensor& class_weights);
 
-/// What one network makes of a picture, learned by another (Hinton et al. 2015): KL(taught || learned) up to the taught
-/// distribution's entropy, mean over the blocks.
-/// @param logits, taught_logits  [B, 313, h, w] of the same pictures.
-[[nodiscard]] torch::Tensor distillation_loss(const torch::Tensor& logits, const torch::Tensor& taught_logits);
+/// What networks make of a picture, learned by another (Hinton et al. 2015): KL(taught || learned) up to the taught
+/// distribution's entropy, mean over the blocks. Taught is the mean of the networks' distributions.
+/// @param logits         [B, 313, h, w].
+/// @param taught_logits  [B, 313, h, w] of the same pictures, of one network or more.
+[[nodiscard]] torch::Tensor distillation_loss(const torch::Tensor& logits,
+                                              const std::vector<torch::Tensor>& taught_logits);
 
 /// Heads that only training has: the class of the picture, and a frozen classifier's features of its colours.
 class AuxiliaryHeadsImpl : public torch::nn::Module {

@@ -24,9 +24,10 @@ namespace fs = std::filesystem;
 struct Options {
   ImageSources sources;
   fs::path teacher, output = "colorizer-training";
-  fs::path evaluate;   ///< weights to judge
-  fs::path finish;     ///< weights of a run to choose the decoding of
-  fs::path distilled;  ///< weights of a network whose answers are learned
+  fs::path evaluate;                ///< weights to judge
+  fs::path finish;                  ///< weights of a run to choose the decoding of
+  fs::path start;                   ///< weights to begin with
+  std::vector<fs::path> distilled;  ///< weights of networks whose answers are learned
   bool is_large = false;
   std::string device = "auto";
   bool resume = false;
@@ -50,9 +51,11 @@ void add_options(CLI::App& app, Options& o) {
       ->check(CLI::Range(1, kHeldOutParts - 1));
   app.add_option("--evaluation", o.sources.evaluation, "folders that are never trained on, only judged");
   app.add_option("--teacher", o.teacher, "LPIPS SqueezeNet weights: predict a classifier's features of the colours");
-  app.add_flag("--large", o.is_large, "the network that also sees what the installed encoder makes of a picture");
-  CLI::Option* distill =
-      app.add_option("--distill", o.distilled, "a run's latest.weights, whose answers are learned besides the truth");
+  CLI::Option* large =
+      app.add_flag("--large", o.is_large, "the network that also sees what the installed encoder makes of a picture");
+  app.add_option("--from", o.start, "weights to begin with, of a network of either kind")->excludes(large);
+  CLI::Option* distill = app.add_option("--distill", o.distilled,
+                                        "latest.weights of runs, whose mean answer is learned besides the truth");
   app.add_option("--distilled-share", o.training.distilled_share,
                  "their share of the classification loss; the rest is the truth's")
       ->check(CLI::Range(0.0, 1.0))
@@ -159,7 +162,8 @@ void train(const Options& o, torch::Device device) {
   FrozenNetworks frozen;
   if (!o.teacher.empty()) frozen.teacher = std::make_unique<FeatureTeacher>(o.teacher, device);
   if (o.is_large) frozen.encoder = installed_encoder("--large");
-  if (!o.distilled.empty()) frozen.distilled = load_colorizer_weights(o.distilled).network;
+  if (!o.start.empty()) frozen.start = load_colorizer_weights(o.start).network;
+  for (const fs::path& file : o.distilled) frozen.distilled.push_back(load_colorizer_weights(file).network);
   const ImageSet images = load_image_set(o.sources);
   std::printf("%zu photographs, %zu tiles, %zu classes\n", images.photos.size(), images.tiles.size(),
               images.classes.names.size());

@@ -51,9 +51,11 @@ class MixedPrecision {
   bool active_;
 };
 
-ColorizerNet make_network(const std::shared_ptr<const Encoder>& encoder, std::uint64_t seed, torch::Device device) {
+ColorizerNet make_network(const FrozenNetworks& frozen, std::uint64_t seed, torch::Device device) {
   torch::manual_seed(std::int64_t(seed));
-  ColorizerNet network(Normalisation::kBatch, encoder);
+  // A copy of the start goes on without batch normalisation: its statistics are no longer known.
+  ColorizerNet network =
+      frozen.start ? fold_batch_norm(frozen.start) : ColorizerNet(Normalisation::kBatch, frozen.encoder);
   network->to(device);
   return network;
 }
@@ -71,12 +73,13 @@ ColorizerTrainer::ColorizerTrainer(const ImageSet& images, FrozenNetworks frozen
     : options_(options),
       device_(device),
       frozen_(std::move(frozen)),
+      askers_(frozen_.distilled.size()),
       photos_(images.photos, device),
       tiles_(images.tiles, device),
       table_(device),
       label_loss_(images.classes, device),
-      network_(make_network(frozen_.encoder, options.seed, device)),
-      averaged_(make_network(network_->encoder(), options.seed, device)),
+      network_(make_network(frozen_, options.seed, device)),
+      averaged_(make_network(frozen_, options.seed, device)),
       heads_(make_heads(images, frozen_.teacher != nullptr, device)),
       parameters_({network_.get(), heads_.get()}),
       averaged_parameters_({averaged_.get()}),
@@ -85,9 +88,9 @@ ColorizerTrainer::ColorizerTrainer(const ImageSet& images, FrozenNetworks frozen
   if (images.tiles.size() == 0) options_.tiles_per_step = 0;
   CNERF_CHECK(options_.photos_per_step + options_.tiles_per_step > 0, "there are images to train on");
   averaged_->eval();
-  if (frozen_.distilled) {
-    frozen_.distilled->to(device);
-    frozen_.distilled->eval();
+  for (ColorizerNet& network : frozen_.distilled) {
+    network->to(device);
+    network->eval();
   }
   class_weights_ = measure_class_weights();
 }
@@ -114,19 +117,30 @@ double ColorizerTrainer::learning_rate() const {
   return options_.learning_rate * warm * (kFinalShare + (1 - kFinalShare) * cosine);
 }
 
+/// Each network is asked on a thread of its own, beside the trained one: a step is bound by what the processor
+/// launches.
+std::vector<std::future<Tensor>> ColorizerTrainer::ask_distilled(const Tensor& lightness) {
+  std::vector<std::future<Tensor>> answers;
+  for (std::size_t i = 0; i < askers_.size(); ++i) {
+    answers.push_back(askers_[i].submit([this, i, lightness] {
+      const torch::NoGradGuard no_grad;
+      const MixedPrecision mixed(device_);
+      return frozen_.distilled[i]->forward(lightness);
+    }));
+  }
+  return answers;
+}
+
 StepLosses ColorizerTrainer::step() {
   network_->train();
   heads_->train();
   // Also seeds the generators that dropout draws from.
   const Batch batch = batch_of(options_.seed, step_);
   ColorizerFeatures features;
-  Tensor labels, predicted, teacher, taught;
+  std::vector<std::future<Tensor>> answers = ask_distilled(batch.lightness);
+  Tensor labels, predicted, teacher;
   {
     const MixedPrecision mixed(device_);
-    if (frozen_.distilled) {
-      const torch::NoGradGuard no_grad;
-      taught = frozen_.distilled->forward(batch.lightness);
-    }
     features = network_->features(batch.lightness);
     labels = heads_->classify(features.global);
     if (frozen_.teacher) {
@@ -139,8 +153,10 @@ StepLosses ColorizerTrainer::step() {
                        batch.mixed_share * label_loss_(labels, batch.mixed_label);
   const Tensor none = torch::zeros({}, batch.ab.options());
   const Tensor feature = teacher.defined() ? feature_loss(predicted, teacher) : none;
-  const Tensor distillation = taught.defined() ? distillation_loss(features.logits, taught) : none;
-  const double distilled = taught.defined() ? options_.distilled_share : 0;
+  std::vector<Tensor> taught;
+  for (std::future<Tensor>& answer : answers) taught.push_back(answer.get());
+  const Tensor distillation = taught.empty() ? none : distillation_loss(features.logits, taught);
+  const double distilled = taught.empty() ? 0 : options_.distilled_share;
   const Tensor total = (1 - distilled) * color.classification + distilled * distillation +
                        options_.regression_weight * color.regression + label + feature;
   total.backward();

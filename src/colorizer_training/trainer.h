@@ -4,12 +4,15 @@
 #include <torch/torch.h>
 
 #include <cstdint>
+#include <deque>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "src/base/worker.h"
 #include "src/colorizer/torch/network.h"
 #include "src/colorizer_training/batch.h"
 #include "src/colorizer_training/feature_teacher.h"
@@ -25,16 +28,17 @@ struct TrainerOptions {
   double learning_rate = 1e-3;                              ///< at the start of the cosine
   int warmup_steps = 500;
   double regression_weight = 0.01;
-  double distilled_share = 0.5;  ///< of the classification, where there is a network to distil: the rest is the truth's
+  double distilled_share = 0.5;  ///< of the classification, where networks are distilled: the rest is the truth's
   int epoch_steps = 2000;        ///< between checkpoints, scores and pictures
   std::uint64_t seed = 1;
 };
 
 /// Networks that stay as they are and help to train another. Each may be null.
 struct FrozenNetworks {
+  ColorizerNet start{nullptr};              ///< whose weights the trained one begins with; folded
   std::unique_ptr<FeatureTeacher> teacher;  ///< whose features of the colour picture are predicted
   std::shared_ptr<const Encoder> encoder;   ///< beside the trained network, which is the large one then
-  ColorizerNet distilled{nullptr};          ///< whose answers are learned besides the truth; folded
+  std::vector<ColorizerNet> distilled;      ///< whose answers, their mean, are learned besides the truth; folded
 };
 
 /// What one step cost, before weights.
@@ -70,12 +74,14 @@ class ColorizerTrainer {
   [[nodiscard]] Batch batch_of(std::uint64_t seed, std::int64_t step) const;
   [[nodiscard]] double learning_rate() const;
   [[nodiscard]] torch::Tensor measure_class_weights() const;
+  [[nodiscard]] std::vector<std::future<torch::Tensor>> ask_distilled(const torch::Tensor& lightness);
   void average_weights();
   [[nodiscard]] std::vector<torch::Tensor> state();
 
   TrainerOptions options_;
   torch::Device device_;
   FrozenNetworks frozen_;
+  std::deque<Worker> askers_;  ///< one for each distilled network
   ResidentImages photos_, tiles_;
   SoftLabelTable table_;
   LabelLoss label_loss_;

@@ -105,7 +105,7 @@ TEST(ColorizerTrainer, ADistilledNetworksAnswersAreLearnedByTheirShare) {
     TrainerOptions options = tiny_options();
     options.distilled_share = distilled_share;
     FrozenNetworks frozen;
-    frozen.distilled = one_bin_network(kBin);
+    frozen.distilled = {one_bin_network(kBin)};
     ColorizerTrainer trainer(set, std::move(frozen), options, torch::kCPU);
     double truth = 0;
     for (int i = 0; i < 20; ++i) truth = trainer.step().classification.item<double>();
@@ -118,14 +118,43 @@ TEST(ColorizerTrainer, ADistilledNetworksAnswersAreLearnedByTheirShare) {
   EXPECT_GT(all.truth, 1.2 * none.truth) << "the truth is not learned";
 }
 
+TEST(ColorizerTrainer, BeginsWithGivenWeights) {
+  constexpr int kBin = 40;
+  const ImageSet set = tiny_set();
+  FrozenNetworks frozen;
+  frozen.start = one_bin_network(kBin);
+  ColorizerTrainer trainer(set, std::move(frozen), tiny_options(), torch::kCPU);
+  const auto probability = [&] {
+    const torch::NoGradGuard no_grad;
+    const torch::Tensor logits = fold_batch_norm(trainer.averaged())->forward(torch::full({1, 1, 32, 32}, 50.0f));
+    return torch::softmax(logits, 1).mean({0, 2, 3})[kBin].item<double>();
+  };
+  EXPECT_GT(probability(), 0.999);
+  const double first = trainer.step().classification.item<double>();
+  double last = first;
+  for (int i = 0; i < 20; ++i) last = trainer.step().classification.item<double>();
+  EXPECT_LT(last, 0.8 * first);
+  EXPECT_LT(probability(), 0.999) << "the start is not changed";
+}
+
 TEST(DistillationLoss, IsLeastWhereTheAnswersAreTheSame) {
   torch::manual_seed(4);
   const torch::Tensor taught = torch::randn({2, kAbBinCount, 3, 5});
   torch::Tensor logits = (taught + torch::randn({2, 1, 3, 5})).requires_grad_();  // the same distribution
-  distillation_loss(logits, taught).backward();
+  distillation_loss(logits, {taught}).backward();
   EXPECT_LT(logits.grad().abs().max().item<float>(), 1e-7f);
   const torch::Tensor p = torch::softmax(taught, 1);
-  EXPECT_NEAR(distillation_loss(logits, taught).item<double>(), -(p * p.log()).sum(1).mean().item<double>(), 1e-4);
+  EXPECT_NEAR(distillation_loss(logits, {taught}).item<double>(), -(p * p.log()).sum(1).mean().item<double>(), 1e-4);
+}
+
+TEST(DistillationLoss, TeachesTheMeanOfSeveralNetworks) {
+  torch::manual_seed(5);
+  const std::vector<torch::Tensor> taught = {torch::randn({2, kAbBinCount, 3, 5}),
+                                             torch::randn({2, kAbBinCount, 3, 5})};
+  const torch::Tensor mean = (torch::softmax(taught[0], 1) + torch::softmax(taught[1], 1)) / 2;
+  torch::Tensor logits = mean.log().requires_grad_();
+  distillation_loss(logits, taught).backward();
+  EXPECT_LT(logits.grad().abs().max().item<float>(), 1e-7f);
 }
 
 TEST(ColorizerTrainer, ContinuesBitForBit) {

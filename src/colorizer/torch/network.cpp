@@ -192,7 +192,9 @@ ColorizerNet fold_batch_norm(const ColorizerNet& trained) {
   }
   const auto modules = trained->named_modules();
   for (auto& item : folded->named_modules()) {
-    if (auto* unit = item.value()->as<ConvUnitImpl>()) unit->fold_from(*modules[item.key()]->as<ConvUnitImpl>());
+    auto* unit = item.value()->as<ConvUnitImpl>();
+    const auto* source = modules[item.key()]->as<ConvUnitImpl>();
+    if (unit && source->is_normalised()) unit->fold_from(*source);
   }
   folded->to(trained->parameters().front().device());
   folded->eval();

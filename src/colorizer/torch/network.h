@@ -21,6 +21,7 @@ class ConvUnitImpl : public torch::nn::Module {
   torch::Tensor forward(const torch::Tensor& x);
   /// Takes over the convolution of `trained` with its batch normalisation multiplied in. Of a folded unit only.
   void fold_from(const ConvUnitImpl& trained);
+  [[nodiscard]] bool is_normalised() const { return !norm_.is_empty(); }
 
  private:
   torch::nn::Conv2d conv_{nullptr};
@@ -107,7 +108,7 @@ class ColorizerNetImpl : public torch::nn::Module {
 };
 TORCH_MODULE(ColorizerNet);
 
-/// The same function as `trained` in evaluation mode, without its batch normalisation layers.
+/// The same function as `trained` in evaluation mode, without its batch normalisation layers, if it has any.
 [[nodiscard]] ColorizerNet fold_batch_norm(const ColorizerNet& trained);
 
 [[nodiscard]] std::int64_t parameter_count(const torch::nn::Module& module);
