@@ -73,7 +73,6 @@ ColorizerTrainer::ColorizerTrainer(const ImageSet& images, FrozenNetworks frozen
     : options_(options),
       device_(device),
       frozen_(std::move(frozen)),
-      askers_(frozen_.distilled.size()),
       photos_(images.photos, device),
       tiles_(images.tiles, device),
       table_(device),
@@ -117,30 +116,20 @@ double ColorizerTrainer::learning_rate() const {
   return options_.learning_rate * warm * (kFinalShare + (1 - kFinalShare) * cosine);
 }
 
-/// Each network is asked on a thread of its own, beside the trained one: a step is bound by what the processor
-/// launches.
-std::vector<std::future<Tensor>> ColorizerTrainer::ask_distilled(const Tensor& lightness) {
-  std::vector<std::future<Tensor>> answers;
-  for (std::size_t i = 0; i < askers_.size(); ++i) {
-    answers.push_back(askers_[i].submit([this, i, lightness] {
-      const torch::NoGradGuard no_grad;
-      const MixedPrecision mixed(device_);
-      return frozen_.distilled[i]->forward(lightness);
-    }));
-  }
-  return answers;
-}
-
 StepLosses ColorizerTrainer::step() {
   network_->train();
   heads_->train();
   // Also seeds the generators that dropout draws from.
   const Batch batch = batch_of(options_.seed, step_);
   ColorizerFeatures features;
-  std::vector<std::future<Tensor>> answers = ask_distilled(batch.lightness);
+  std::vector<Tensor> taught;
   Tensor labels, predicted, teacher;
   {
     const MixedPrecision mixed(device_);
+    for (ColorizerNet& network : frozen_.distilled) {
+      const torch::NoGradGuard no_grad;
+      taught.push_back(network->forward(batch.lightness));
+    }
     features = network_->features(batch.lightness);
     labels = heads_->classify(features.global);
     if (frozen_.teacher) {
@@ -153,8 +142,6 @@ StepLosses ColorizerTrainer::step() {
                        batch.mixed_share * label_loss_(labels, batch.mixed_label);
   const Tensor none = torch::zeros({}, batch.ab.options());
   const Tensor feature = teacher.defined() ? feature_loss(predicted, teacher) : none;
-  std::vector<Tensor> taught;
-  for (std::future<Tensor>& answer : answers) taught.push_back(answer.get());
   const Tensor distillation = taught.empty() ? none : distillation_loss(features.logits, taught);
   const double distilled = taught.empty() ? 0 : options_.distilled_share;
   const Tensor total = (1 - distilled) * color.classification + distilled * distillation +

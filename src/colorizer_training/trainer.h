@@ -4,15 +4,12 @@
 #include <torch/torch.h>
 
 #include <cstdint>
-#include <deque>
 #include <filesystem>
-#include <future>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "src/base/worker.h"
 #include "src/colorizer/torch/network.h"
 #include "src/colorizer_training/batch.h"
 #include "src/colorizer_training/feature_teacher.h"
@@ -74,14 +71,12 @@ class ColorizerTrainer {
   [[nodiscard]] Batch batch_of(std::uint64_t seed, std::int64_t step) const;
   [[nodiscard]] double learning_rate() const;
   [[nodiscard]] torch::Tensor measure_class_weights() const;
-  [[nodiscard]] std::vector<std::future<torch::Tensor>> ask_distilled(const torch::Tensor& lightness);
   void average_weights();
   [[nodiscard]] std::vector<torch::Tensor> state();
 
   TrainerOptions options_;
   torch::Device device_;
   FrozenNetworks frozen_;
-  std::deque<Worker> askers_;  ///< one for each distilled network
   ResidentImages photos_, tiles_;
   SoftLabelTable table_;
   LabelLoss label_loss_;
