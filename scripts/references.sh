@@ -4,15 +4,14 @@
 # of GroceryStoreDataset, `flower` from five other flowers of Caltech-101, all 128 pixels high or wide.
 #   bash scripts/references.sh OUT [fruit|flower]...
 # Photographs are those of $CNERF_DATA/colorizer (else ../shared/data), the program is $CNERF (else the release build):
-# another OUT and another program compare two. SEEDS="1 2 3". What is finished stays, so that the same command goes on
-# after a stop. Needs Python 3. Prints a table.
+# another OUT and another program compare two. SEEDS="1 2 3", SET="--set ..." for other settings of stage 2. What is
+# finished stays, so that the same command goes on after a stop. Needs Python 3. Prints a table.
 set -euo pipefail
 
 out=$1
 shift
 if [ $# -eq 0 ]; then set -- fruit flower; fi
 source "$(dirname "$0")/small_captures.sh"
-read -ra seeds <<< "${SEEDS:-1 2 3}"
 
 declare -A photographs=(
   [fruit]="grocery/Royal-Gala/00000 grocery/Royal-Gala/00139 grocery/Royal-Gala/00141 grocery/Banana/00057 grocery/Banana/00074"
@@ -34,23 +33,6 @@ reference() {  # reference CAPTURE: the colorizer's name; photographs are unpack
 
 for name in "$@"; do
   train_small "$name"
-  for seed in "${seeds[@]}"; do
-    take=elsewhere-$seed
-    if [ -e "$out/$name/takes/$take/metrics.json" ]; then continue; fi
-    "$cnerf" colorize "$out/$name" --colorizer "$(reference "$name")" --take "$take" --overwrite --progress quiet \
-      --set stage2.seed="$seed"
-    "$cnerf" eval "$out/$name" --take "$take" --progress quiet
-  done
-done > "$out/log.txt"
-
-python3 - "$out" "${seeds[*]}" "$@" << 'PYTHON'
-import json, statistics, sys
-from pathlib import Path
-out, seeds, names = Path(sys.argv[1]), sys.argv[2].split(), sys.argv[3:]
-print("| capture | ab error, per seed | share of grey's, median |\n|---|---|---|")
-for name in names:
-    means = [json.loads((out / name / "takes" / f"elsewhere-{seed}" / "metrics.json").read_text())["mean"] for seed in seeds]
-    errors = [mean["ab_error"] for mean in means]
-    share = statistics.median(mean["ab_error"] / mean["ab_error_grey"] for mean in means)
-    print(f"| {name} | {', '.join(f'{error:.2f}' for error in errors)} | {share:.1%} |")
-PYTHON
+  colour_small "$name" elsewhere "$(reference "$name")"
+done > "$out/references-log.txt"
+print_colours elsewhere "$@"
