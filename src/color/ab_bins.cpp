@@ -194,6 +194,18 @@ Ab decode_annealed_mean(std::span<const float> logits, float temperature) {
   return {float(total_of(a) / total), float(total_of(b) / total)};
 }
 
+float inverse_perplexity(std::span<const float> logits) {
+  CNERF_CHECK_EQ(logits.size(), std::size_t(kAbBinCount));
+  const float most = *std::ranges::max_element(logits);
+  double sum = 0, weighted = 0;
+  for (const float logit : logits) {
+    const double exponent = double(logit) - most, p = std::exp(exponent);
+    sum += p;
+    weighted += p * exponent;
+  }
+  return float(std::exp(weighted / sum) / sum);
+}
+
 std::vector<float> rebalancing_weights(std::span<const float> prior, float lambda) {
   CNERF_CHECK_EQ(prior.size(), std::size_t(kAbBinCount));
   CNERF_CHECK(lambda >= 0 && lambda <= 1, "lambda mixes two distributions");

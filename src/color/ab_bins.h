@@ -64,6 +64,9 @@ template <typename Real>
 /// Mean of the centres under softmax(log p / temperature) (Zhang et al. 2016, Eq. 5). Temperature 1 is the mean,
 /// towards 0 the mode. Within 1e-3 ab units.
 [[nodiscard]] Ab decode_annealed_mean(std::span<const float> logits, float temperature);
+/// exp(sum p ln p) of p = softmax(logits): one over the perplexity, the number of equally likely bins that is as
+/// uncertain. From 1 / 313 to 1.  @param logits  [313], finite, any scale or offset.
+[[nodiscard]] float inverse_perplexity(std::span<const float> logits);
 
 /// Class rebalancing (Zhang et al. 2016, Sec. 2.2): w = 1 / ((1 - lambda) p + lambda / Q), scaled so that sum p w = 1.
 /// @param prior  [313], sums to 1.

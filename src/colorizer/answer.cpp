@@ -20,7 +20,7 @@ std::string size_text(int batch, int height, int width) {
 constexpr float kLargestAb = 160;
 constexpr float kLargestLogit = 1e6f;
 
-/// One of the two kinds of values that an answer may hold.
+/// One of the kinds of values that an answer may hold.
 struct Values {
   const char* what;
   const std::vector<float>& values;
@@ -56,6 +56,7 @@ void check_answer(const std::string& colorizer, const LightnessBatch& question, 
     throw ColorizerError(colorizer + ": expected either ab or a distribution over " + std::to_string(kAbBinCount) +
                          " bins, got " + (answer.ab.empty() ? "neither" : "both"));
   }
+  if (!answer.certainty.empty()) check_values(colorizer, {"certainty", answer.certainty, 1, 1}, answer);
   if (answer.has_distribution()) {
     check_values(colorizer, {"logits", answer.logits, kAbBinCount, kLargestLogit}, answer);
   } else {
@@ -80,6 +81,25 @@ std::vector<float> ab_of(const ChromaBatch& answer, int index) {
     ab[pixels + i] = color.b;
   }
   return ab;
+}
+
+std::vector<float> certainty_of(const ChromaBatch& answer, int index) {
+  CNERF_CHECK(index >= 0 && index < answer.batch, "entry " + std::to_string(index));
+  const std::size_t pixels = std::size_t(answer.height) * std::size_t(answer.width),
+                    first = std::size_t(index) * pixels;
+  if (!answer.certainty.empty()) {
+    const auto begin = answer.certainty.begin() + std::ptrdiff_t(first);
+    return {begin, begin + std::ptrdiff_t(pixels)};
+  }
+  if (!answer.has_distribution()) return {};
+  const float* logits = answer.logits.data() + first * kAbBinCount;
+  std::vector<float> certainty(pixels);
+  std::array<float, kAbBinCount> of_pixel{};
+  for (std::size_t i = 0; i < pixels; ++i) {
+    for (std::size_t bin = 0; bin < kAbBinCount; ++bin) of_pixel[bin] = logits[bin * pixels + i];
+    certainty[i] = inverse_perplexity(of_pixel);
+  }
+  return certainty;
 }
 
 }  // namespace cnerf

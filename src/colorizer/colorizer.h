@@ -28,11 +28,12 @@ struct LightnessBatch {
   std::vector<PatchOrigin> origins = {};  ///< [B]; empty where patches are of no capture
 };
 
-/// The colorizer's answer; exactly one of the two is filled.
+/// The colorizer's answer; exactly one of `ab` and `logits` is filled.
 struct ChromaBatch {
   int batch = 0, height = 0, width = 0;
-  std::vector<float> ab;      ///< [B, 2, H, W] Lab a and b
-  std::vector<float> logits;  ///< [B, 313, H, W] over the bins of ab_bins.h
+  std::vector<float> ab;              ///< [B, 2, H, W] Lab a and b
+  std::vector<float> logits;          ///< [B, 313, H, W] over the bins of ab_bins.h
+  std::vector<float> certainty = {};  ///< [B, H, W] as `certainty_of` has it; empty where the colorizer does not say
 
   [[nodiscard]] bool has_distribution() const { return !logits.empty(); }
 };
@@ -79,5 +80,9 @@ inline constexpr float kAnswerTemperature = 0.38f;
 
 /// The ab image of entry `index` of an answer; a distribution is decoded at kAnswerTemperature.  [2, H, W]
 [[nodiscard]] std::vector<float> ab_of(const ChromaBatch& answer, int index);
+
+/// How sure the colorizer is of entry `index`: exp(sum p ln p) of its distribution p, which is one over its perplexity,
+/// the number of equally likely colours; in (0, 1]. Empty where the answer does not say.  [H, W]
+[[nodiscard]] std::vector<float> certainty_of(const ChromaBatch& answer, int index);
 
 }  // namespace cnerf

@@ -124,6 +124,20 @@ TEST(AbBins, ContractsAreChecked) {
   EXPECT_THROW((void)rebalancing_weights(short_logits, 0.5f), ContractError);
 }
 
+TEST(AbBins, InversePerplexityCountsEquallyLikelyBins) {
+  std::vector<float> logits(kAbBinCount, 7.0f);
+  EXPECT_NEAR(inverse_perplexity(logits), 1.0 / kAbBinCount, 1e-7);
+  for (const std::size_t count : {1, 2, 20}) {
+    std::ranges::fill(logits, -1e6f);
+    std::fill_n(logits.begin() + 100, count, 3.0f);
+    EXPECT_NEAR(inverse_perplexity(logits), 1.0 / double(count), 1e-6) << count;
+  }
+  std::ranges::fill(logits, -1e6f);
+  logits[5] = std::log(0.9f);
+  logits[6] = std::log(0.1f);
+  EXPECT_NEAR(inverse_perplexity(logits), std::pow(0.9, 0.9) * std::pow(0.1, 0.1), 1e-6);
+}
+
 TEST(Rebalancing, UniformPriorGivesOnes) {
   for (const float w : rebalancing_weights(std::vector<float>(kAbBinCount, 1.0f / kAbBinCount), 0.5f)) {
     EXPECT_NEAR(w, 1, 1e-5);

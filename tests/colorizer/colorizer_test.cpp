@@ -106,6 +106,33 @@ TEST(CheckAnswer, RefusesWhatIsWrongAndNamesTheColorizer) {
   refused([](ChromaBatch& a) { a.ab.back() = std::numeric_limits<float>::infinity(); });
 }
 
+TEST(CheckAnswer, RefusesACertaintyThatIsNone) {
+  const LightnessBatch question = some_question();
+  ChromaBatch answer{
+      question.batch, question.height, question.width, std::vector<float>(2 * question.lightness.size()), {}};
+  answer.certainty.assign(question.lightness.size(), 0.5f);
+  EXPECT_NO_THROW(check_answer("here", question, answer));
+  answer.certainty.back() = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(message_of<ColorizerError>([&] { check_answer("here", question, answer); }), HasSubstr("certainty"));
+  answer.certainty.pop_back();
+  EXPECT_THAT(message_of<ColorizerError>([&] { check_answer("here", question, answer); }), HasSubstr("certainty"));
+}
+
+TEST(CertaintyOf, TakesTheEntryAsked) {
+  const ChromaBatch answer{2, 1, 2, std::vector<float>(8), {}, {0.1f, 0.2f, 0.3f, 0.4f}};
+  EXPECT_THAT(certainty_of(answer, 1), ::testing::ElementsAre(0.3f, 0.4f));
+  EXPECT_THAT(certainty_of({2, 1, 2, std::vector<float>(8), {}}, 1), ::testing::IsEmpty());
+}
+
+TEST(CertaintyOf, ReadsADistributionPerPixel) {
+  ChromaBatch answer{1, 1, 2, {}, std::vector<float>(2 * kAbBinCount, 0)};
+  answer.logits[2 * 7] = 1000;  // of the first pixel: bin 7 alone
+  const std::vector<float> certainty = certainty_of(answer, 0);
+  ASSERT_EQ(certainty.size(), 2u);
+  EXPECT_FLOAT_EQ(certainty[0], 1);
+  EXPECT_NEAR(certainty[1], 1.0 / kAbBinCount, 1e-7);
+}
+
 TEST(AbOf, TakesTheEntryAsked) {
   ChromaBatch answer{2, 1, 2, {1, 2, 3, 4, 5, 6, 7, 8}, {}};
   EXPECT_THAT(ab_of(answer, 1), ::testing::ElementsAre(5, 6, 7, 8));

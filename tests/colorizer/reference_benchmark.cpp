@@ -166,7 +166,7 @@ int main(int argc, char** argv) {
     const std::vector<ReferenceImage> view{load_reference_image(file)};
     std::vector<float> view_truth;
     const LightnessBatch question = whole_view(view[0].levels[0], view_truth);
-    const std::vector<float> answer = network.colorize(question);
+    const std::vector<float> answer = network.colorize(question).ab;
     whole.add(answer, view_truth);
     tiles.push_back({picture_of(question, view_truth), "truth"});
     tiles.push_back({picture_of(question, answer), "answer"});
@@ -174,7 +174,7 @@ int main(int argc, char** argv) {
       LightnessBatch patch{1, size, size, std::vector<float>(pixels)};
       sample_reference_patch(view, none, size, rng, patch.lightness, truth);
       const auto asked = Clock::now();
-      const std::vector<float> patch_answer = network.colorize(patch);
+      const std::vector<float> patch_answer = network.colorize(patch).ab;
       patch_seconds += seconds_since(asked);
       patches.add(patch_answer, truth);
     }

@@ -103,9 +103,9 @@ TEST(ReferenceNetwork, LearnsColourFromTextureAndCarriesItToAnotherView) {
   ReferenceNetwork network(recipe, images, 1);
   const std::vector<float> grey(unseen.ab.size(), 0.0f);
   const double of_grey = mean_distance(grey, unseen.ab);
-  EXPECT_GT(mean_distance(network.colorize(unseen.question), unseen.ab), 0.6 * of_grey) << "before the fit";
+  EXPECT_GT(mean_distance(network.colorize(unseen.question).ab, unseen.ab), 0.6 * of_grey) << "before the fit";
   network.fit(images, {});
-  EXPECT_LT(mean_distance(network.colorize(unseen.question), unseen.ab), 0.35 * of_grey);
+  EXPECT_LT(mean_distance(network.colorize(unseen.question).ab, unseen.ab), 0.35 * of_grey);
 }
 
 TEST(ReferenceNetwork, TheSameSeedGivesTheSameWeightsWithAnyNumberOfThreads) {
@@ -134,11 +134,11 @@ TEST(ReferenceNetwork, StartsAsItWouldWithoutTheBuiltinNetworkAndLearnsToUseIt) 
   ReferenceNetwork plain(alone, images, 3), on_builtin(guided, images, 3);
   EXPECT_GT(on_builtin.weights().size(), plain.weights().size());
   const LightnessBatch question = test::some_question(2, 64, 96);
-  EXPECT_EQ(on_builtin.colorize(question), plain.colorize(question));
+  EXPECT_EQ(on_builtin.colorize(question).ab, plain.colorize(question).ab);
 
   plain.fit(images, {});
   on_builtin.fit(images, {});
-  EXPECT_NE(on_builtin.colorize(question), plain.colorize(question));
+  EXPECT_NE(on_builtin.colorize(question).ab, plain.colorize(question).ab);
   EXPECT_NE(guided.text(), alone.text()) << "a cached fit would be taken for another";
 
   const auto fitted = [&](int threads) {
@@ -159,10 +159,10 @@ TEST(ReferenceNetwork, AnswersAnySizeAndWeightsComeBack) {
   ReferenceNetwork network(short_recipe(3), images, 1), other(short_recipe(3), images, 2);
   network.fit(images, {});
   for (const auto& question : {test::some_question(3, 64, 64), test::some_question(1, 37, 81)}) {
-    const std::vector<float> answer = network.colorize(question);
+    const std::vector<float> answer = network.colorize(question).ab;
     EXPECT_EQ(answer.size(), 2 * question.lightness.size());
     other.set_weights(network.weights());
-    EXPECT_EQ(other.colorize(question), answer);
+    EXPECT_EQ(other.colorize(question).ab, answer);
   }
 }
 
@@ -217,7 +217,7 @@ TEST(ReferenceImages, WhatIsTransparentIsNotLearned) {
     ReferenceNetwork network(short_recipe(3), images, 1);
     network.fit(images, {});
     const LightnessBatch question = test::some_question(1, 64, 64);
-    const std::vector<float> answer = network.colorize(question);
+    const std::vector<float> answer = network.colorize(question).ab;
     for (std::size_t i = 0; i < question.lightness.size(); ++i) ASSERT_GT(answer[i], 10) << "red";
     for (const float weight : network.weights()) ASSERT_TRUE(std::isfinite(weight));
   }

@@ -367,6 +367,30 @@ TEST(BuiltinColorizer, AMirroredPictureGetsMirroredColors) {
   }
 }
 
+// Settings of stage 2 are made for certainties of this meaning: one over the number of equally likely colours.
+TEST(BuiltinColorizer, SaysHowSureItIs) {
+  const auto colorizer = builtin_colorizer();
+  LightnessBatch picture = blobs(64);
+  const std::vector<float> certainty = colorizer->colorize(picture).certainty;
+  ASSERT_EQ(certainty.size(), 64u * 64);
+  const auto [least, most] = std::ranges::minmax(certainty);
+  EXPECT_GE(least, 1.0f / kAbBinCount);
+  EXPECT_LT(most, 0.5f) << "soft labels of five bins are taught";
+  EXPECT_GT(most, 1.05f * least) << "it is not everywhere as sure";
+  for (int y = 0; y < 64; ++y) std::reverse(&picture.lightness[64 * y], &picture.lightness[64 * y] + 64);
+  const std::vector<float> mirrored = colorizer->colorize(picture).certainty;
+  for (int i = 0; i < 64 * 64; ++i) ASSERT_NEAR(certainty[i], mirrored[i / 64 * 64 + 63 - i % 64], 1e-3);
+}
+
+TEST(CertaintyMap, IsOneOverTheNumberOfEquallyLikelyColors) {
+  torch::Tensor logits = torch::full({1, kAbBinCount, 1, 2}, 4.0);
+  logits.select(3, 1).slice(1, 3) = -1e6;  // three are left
+  const torch::Tensor certainty = certainty_map(logits);
+  EXPECT_EQ(certainty.sizes(), (std::vector<std::int64_t>{1, 1, 1, 2}));
+  EXPECT_NEAR(certainty[0][0][0][0].item<float>(), 1.0 / kAbBinCount, 1e-6);
+  EXPECT_NEAR(certainty[0][0][0][1].item<float>(), 1.0 / 3, 1e-6);
+}
+
 TEST(BuiltinColorizer, OneDnn2IsAskedToLeaveAmx) {
   if (TORCH_VERSION_MAJOR >= 2) GTEST_SKIP() << "LibTorch has a later oneDNN";
   (void)product_type();

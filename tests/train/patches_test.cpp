@@ -119,6 +119,26 @@ TEST(RenderPatch, AveragesLightNotLightness) {
   for (const float value : patch.lightness) EXPECT_NEAR(value, lightness_from_luminance(0.5f), 1e-4);
 }
 
+TEST(CertaintyWeight, FallsByTheSquareBeyondTheColorsThatAreSure) {
+  EXPECT_EQ(certainty_weight(1, 20), 1);
+  EXPECT_EQ(certainty_weight(1.0f / 20, 20), 1);
+  EXPECT_FLOAT_EQ(certainty_weight(1.0f / 40, 20), 0.25f);
+  EXPECT_FLOAT_EQ(certainty_weight(1.0f / 313, 20), 400.0f / (313 * 313));
+  EXPECT_EQ(certainty_weight(1.0f / 313, 0), 1) << "all weigh the same";
+}
+
+TEST(PickPixels, TakesTheCertaintyOfTheSamePlace) {
+  const CachedView view = some_view();
+  AnsweredPatch patch = {{0, 20, 0, 60}, 60, {}, std::vector<float>(2 * 60 * 60, 5.0f)};
+  for (const float certainty : pick_pixels(view, patch, 100, 1, 1).certainty) EXPECT_EQ(certainty, 1);
+  for (int i = 0; i < 60 * 60; ++i) patch.certainty.push_back(float(i % 60) / 60);
+  const PatchPixels picked = pick_pixels(view, patch, 100, 1, 1);
+  ASSERT_EQ(picked.certainty.size(), picked.pixels.size());
+  for (std::size_t i = 0; i < picked.pixels.size(); ++i) {
+    EXPECT_NEAR(picked.certainty[i], (float(picked.pixels[i] % 80) - 20) / 60, 1e-4);
+  }
+}
+
 TEST(PickPixels, TakesVisiblePixelsOfTheSquareWithTheirOwnColours) {
   const CachedView view = some_view();
   const PatchPlace place = {0, 10, 5, 32};

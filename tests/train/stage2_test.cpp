@@ -76,6 +76,36 @@ TEST_F(Stage2, LearnsTheAnswer) {
   EXPECT_LT(distance_to_answer("a"), 5) << "grey is " << std::hypot(kAnswer.a, kAnswer.b);
 }
 
+/// Answers one colour and is sure, or another one, torn between 300: the latter three times as often.
+class Wavering final : public Colorizer {
+ public:
+  ChromaBatch colorize(const LightnessBatch& patches) override {
+    const std::size_t pixels = patches.lightness.size() / std::size_t(patches.batch);
+    ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
+    for (const PatchOrigin& origin : patches.origins) {
+      const bool is_sure = origin.query % 4 == 0;
+      const Ab color = is_sure ? kAnswer : Ab{-40, 30};
+      answer.ab.insert(answer.ab.end(), pixels, color.a);
+      answer.ab.insert(answer.ab.end(), pixels, color.b);
+      answer.certainty.insert(answer.certainty.end(), pixels, is_sure ? 0.1f : 1.0f / 300);
+    }
+    return answer;
+  }
+  [[nodiscard]] std::string name() const override { return "wavering"; }
+};
+
+TEST_F(Stage2, WhatTheColorizerIsNotSureOfGivesWay) {
+  Stage2Options options = small_options();
+  options.purify.enabled = false;
+  options.sure_colors = 10;
+  Wavering colorizer;
+  (void)colorize(options, colorizer, take("weighed"));
+  EXPECT_LT(distance_to_answer("weighed"), 5);
+  options.sure_colors = 0;
+  (void)colorize(options, colorizer, take("alike"));
+  EXPECT_GT(distance_to_answer("alike"), 30) << "three of four say so";
+}
+
 // As the corners of a picture of an object before nothing: what is asked there teaches nothing, and ends nothing.
 TEST_F(Stage2, PatchesThatShowNothingOfTheSceneAreSteps) {
   Affined& away = capture_.views[1].world_from_camera;

@@ -69,6 +69,13 @@ void add_rows(std::span<const float> from, int width, bool is_mirrored, float fa
   }
 }
 
+ChromaBatch empty_answer(const LightnessBatch& patches) {
+  ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
+  answer.ab.resize(2 * patches.lightness.size());
+  answer.certainty.resize(patches.lightness.size());
+  return answer;
+}
+
 /// Runs on CUDA where LibTorch has it, else on the CPU. The same question gets the same answer.
 class BuiltinColorizer final : public Colorizer {
  public:
@@ -88,8 +95,7 @@ class BuiltinColorizer final : public Colorizer {
     if (patches.batch < 0 || patches.height < 1 || patches.width < 1) {
       throw ColorizerError(name_ + ": an empty patch cannot be coloured");
     }
-    ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
-    answer.ab.resize(2 * patches.lightness.size());
+    ChromaBatch answer = empty_answer(patches);
     std::vector<std::size_t> all(static_cast<std::size_t>(patches.batch));
     std::iota(all.begin(), all.end(), std::size_t(0));
     if (device_.is_cpu() && patches.batch > 1) {
@@ -118,7 +124,7 @@ class BuiltinColorizer final : public Colorizer {
       for (std::size_t side = 0; side < kSides.size() && !is_asked_; ++side) {
         const LightnessBatch patch{1, kWarmUpSide, kWarmUpSide, std::vector<float>(kWarmUpSide * kWarmUpSide),
                                    std::vector<PatchOrigin>(1)};
-        ChromaBatch answer{1, kWarmUpSide, kWarmUpSide, std::vector<float>(2 * kWarmUpSide * kWarmUpSide), {}};
+        ChromaBatch answer = empty_answer(patch);
         const Showing shown{0, false};
         add_pass(patch, {&shown, 1}, side, rows, answer);
       }
@@ -165,11 +171,19 @@ class BuiltinColorizer final : public Colorizer {
     AbDecoding decoding = weights_.decoding;
     decoding.short_side = int(std::lround(kSides[side] * decoding.short_side));
     if (is_one_of_many) decoding.gain = 1;  // the gain is for a picture that nobody averages with others
-    const Tensor ab = colorize_lightness(weights_.network, lightness.to(device_), decoding).cpu().contiguous();
+    const Tensor asked = lightness.to(device_);
+    const Tensor logits = ask_network(weights_.network, asked, decoding.short_side);
+    const Tensor cells = torch::cat({decode_ab(logits, decoding), certainty_map(logits)}, 1);
+    const Tensor all = guided_upsample(cells, asked).cpu().contiguous();
     const float share = is_one_of_many ? 1 : 1 / float(kWays);
     for (std::size_t i = 0; i < shown.size(); ++i) {
-      add_rows({ab.data_ptr<float>() + 2 * i * pixels, 2 * pixels}, patches.width, shown[i].is_mirrored, share,
-               &answer.ab[2 * shown[i].picture * pixels]);
+      const float* planes = all.data_ptr<float>() + 3 * i * pixels;
+      const auto add = [&](std::size_t first, std::size_t count, std::vector<float>& to) {
+        add_rows({planes + first * pixels, count * pixels}, patches.width, shown[i].is_mirrored, share,
+                 &to[count * shown[i].picture * pixels]);
+      };
+      add(0, 2, answer.ab);
+      add(2, 1, answer.certainty);
     }
   }
 

@@ -58,6 +58,11 @@ Tensor decode_ab(const Tensor& logits, const AbDecoding& decoding) {
   return ab.permute({0, 3, 1, 2}).contiguous();
 }
 
+Tensor certainty_map(const Tensor& logits) {
+  const Tensor log_p = torch::log_softmax(logits.to(torch::kFloat32), 1);
+  return (log_p.exp() * log_p).sum(1, true).exp();
+}
+
 Tensor guided_upsample(const Tensor& cells, const Tensor& lightness) {
   const std::int64_t height = lightness.size(2), width = lightness.size(3);
   const CellsOfPixels rows(cells.size(2), height, lightness.options());

@@ -22,6 +22,10 @@ struct AbDecoding {
 /// @return        [B, 2, h, w] f32 ab.
 [[nodiscard]] torch::Tensor decode_ab(const torch::Tensor& logits, const AbDecoding& decoding);
 
+/// @param logits  [B, bins, h, w], of any number of bins.
+/// @return        [B, 1, h, w] f32, exp(sum p ln p) of p = softmax(logits): `certainty_of` in colorizer.h.
+[[nodiscard]] torch::Tensor certainty_map(const torch::Tensor& logits);
+
 /// Brings features on a coarse grid over the picture to its pixels. A pixel averages the 3x3 cells around it, by
 /// distance and by how close their mean lightness is to its own (joint bilateral upsampling, Kopf et al. 2007): colours
 /// stop at edges.

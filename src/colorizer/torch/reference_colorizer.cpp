@@ -82,7 +82,7 @@ class ReferenceColorizer final : public Colorizer {
       : name_(std::move(name)), network_(std::move(network)) {}
 
   ChromaBatch colorize(const LightnessBatch& patches) override {
-    ChromaBatch answer{patches.batch, patches.height, patches.width, network_.colorize(patches), {}};
+    ChromaBatch answer = network_.colorize(patches);
     check_answer(name_, patches, answer);
     return answer;
   }

@@ -456,14 +456,16 @@ void ReferenceNetwork::fit(std::span<const ReferenceImage> images, const Progres
   }
 }
 
-std::vector<float> ReferenceNetwork::colorize(const LightnessBatch& patches) const {
+ChromaBatch ReferenceNetwork::colorize(const LightnessBatch& patches) const {
   static_assert(ColorizerNetImpl::kInputMultiple == Encoder::kInputMultiple);
   const SingleThreadedOps single;
   const int64_t height = patches.height, width = patches.width, pixels = height * width;
   const int64_t multiple = std::max(int64_t(1) << parts_->recipe.channels.size(),
                                     parts_->builtin || parts_->recipe.encoder ? ColorizerNetImpl::kInputMultiple : 1);
   const auto rounded = [&](int64_t n) { return (n + multiple - 1) / multiple * multiple; };
-  std::vector<float> answer(std::size_t(patches.batch) * 2 * std::size_t(pixels));
+  ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
+  answer.ab.resize(std::size_t(patches.batch) * 2 * std::size_t(pixels));
+  answer.certainty.resize(std::size_t(patches.batch) * std::size_t(pixels));
   parallel_tasks(std::size_t(patches.batch), [&](std::size_t i) {
     at::init_num_threads();
     torch::NoGradGuard no_grad;
@@ -472,11 +474,14 @@ std::vector<float> ReferenceNetwork::colorize(const LightnessBatch& patches) con
     lightness = torch::replication_pad2d(lightness, {0, rounded(width) - width, 0, rounded(height) - height});
     lightness = torch::cat({lightness, lightness.flip({3})});
     UNet net(parts_->net);
-    Tensor ab = parts_->decode(net->forward(UNetImpl::features(lightness), parts_->guidance(lightness)));
-    ab = (ab.slice(0, 0, 1) + ab.slice(0, 1, 2).flip({3})) / 2;
-    ab = torch::upsample_bilinear2d(ab, {rounded(height), rounded(width)}, false);
-    ab = ab.slice(2, 0, height).slice(3, 0, width).contiguous();
-    std::copy_n(ab.data_ptr<float>(), 2 * pixels, answer.data() + i * 2 * std::size_t(pixels));
+    const Tensor out = net->forward(UNetImpl::features(lightness), parts_->guidance(lightness));
+    Tensor said = torch::cat({parts_->decode(out), certainty_map(out)}, 1);
+    said = (said.slice(0, 0, 1) + said.slice(0, 1, 2).flip({3})) / 2;
+    said = torch::upsample_bilinear2d(said, {rounded(height), rounded(width)}, false);
+    said = said.slice(2, 0, height).slice(3, 0, width).contiguous();
+    const float* values = said.data_ptr<float>();
+    std::copy_n(values, 2 * pixels, answer.ab.data() + i * 2 * std::size_t(pixels));
+    std::copy_n(values + 2 * pixels, pixels, answer.certainty.data() + i * std::size_t(pixels));
   });
   return answer;
 }

@@ -54,8 +54,8 @@ class ReferenceNetwork {
   /// @throws Interrupted  on Ctrl-C.
   void fit(std::span<const ReferenceImage> images, const ProgressSink& progress);
 
-  /// ab [B, 2, H, W] of lightness patches of any size: the mean of the answers about a patch and its mirror image.
-  [[nodiscard]] std::vector<float> colorize(const LightnessBatch& patches) const;
+  /// Lightness patches of any size: ab and certainty are means of the answers about a patch and its mirror image.
+  [[nodiscard]] ChromaBatch colorize(const LightnessBatch& patches) const;
 
   /// All weights, in a fixed order, and back.  @throws ContractError  on another count.
   [[nodiscard]] std::vector<float> weights() const;

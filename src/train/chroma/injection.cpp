@@ -119,9 +119,13 @@ ColoredPixels PatchTraining::pixels_of(const Lesson& lesson) const {
     if (known == nullptr && !lesson.is_accepted) continue;
     places.push_back({std::uint32_t(patch.place.view), picked.pixels[i]});
     pixels.colors.push_back(known != nullptr ? *known : picked.colors[i]);
+    pixels.weights.push_back(known != nullptr ? 1 : certainty_weight(picked.certainty[i], options.sure_colors));
   }
   add_known(lesson.step, places, pixels.colors);
-  for (const ViewPixel& place : places) pixels.weights.push_back(views[place.view].opacity[place.pixel]);
+  pixels.weights.resize(places.size(), 1);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    pixels.weights[i] *= views[places[i].view].opacity[places[i].pixel];
+  }
   pixels.samples = pixel_samples(views, places);
   return pixels;
 }

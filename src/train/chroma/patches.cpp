@@ -27,18 +27,29 @@ int side_in(const CachedView& view, int wanted) {
   return std::clamp(wanted, std::min(2, view.short_side()), view.short_side());
 }
 
-Ab bilinear(const std::vector<float>& ab, int k, float x, float y) {
-  const float limit = float(k) - 1.0f;
-  x = std::clamp(x, 0.0f, limit);
-  y = std::clamp(y, 0.0f, limit);
-  const int x0 = std::min(int(x), k - 2), y0 = std::min(int(y), k - 2);
-  const float fx = x - float(x0), fy = y - float(y0);
-  const auto channel = [&](int c) {
-    const float* at = ab.data() + (std::size_t(c) * k + y0) * k + x0;
-    return (1 - fy) * ((1 - fx) * at[0] + fx * at[1]) + fy * ((1 - fx) * at[k] + fx * at[k + 1]);
-  };
-  return {channel(0), channel(1)};
-}
+/// A place between the pixels of a K x K plane.
+class PlanePoint {
+ public:
+  PlanePoint(int k, float x, float y) : k_(std::size_t(k)) {
+    const float limit = float(k) - 1.0f;
+    x = std::clamp(x, 0.0f, limit);
+    y = std::clamp(y, 0.0f, limit);
+    x_ = std::min(int(x), k - 2);
+    y_ = std::min(int(y), k - 2);
+    fx_ = x - float(x_);
+    fy_ = y - float(y_);
+  }
+  /// @param planes  [any, K, K]
+  [[nodiscard]] float value(const std::vector<float>& planes, std::size_t plane) const {
+    const float* at = planes.data() + (plane * k_ + std::size_t(y_)) * k_ + std::size_t(x_);
+    return (1 - fy_) * ((1 - fx_) * at[0] + fx_ * at[1]) + fy_ * ((1 - fx_) * at[k_] + fx_ * at[k_ + 1]);
+  }
+
+ private:
+  std::size_t k_;
+  int x_ = 0, y_ = 0;
+  float fx_ = 0, fy_ = 0;
+};
 
 }  // namespace
 
@@ -88,6 +99,12 @@ std::vector<float> patch_colors(const CachedView& view, const PatchPlace& place,
   return patch;
 }
 
+float certainty_weight(float certainty, double sure_colors) {
+  if (sure_colors == 0) return 1;
+  const float share = std::min(1.0f, float(sure_colors) * certainty);
+  return share * share;
+}
+
 PatchPixels pick_pixels(const CachedView& view, const AnsweredPatch& patch, int count, std::uint64_t seed,
                         std::uint64_t index) {
   const PatchPlace& place = patch.place;
@@ -101,7 +118,9 @@ PatchPixels pick_pixels(const CachedView& view, const AnsweredPatch& patch, int 
     const auto pixel = std::uint32_t((place.top + y) * view.width + place.left + x);
     if (view.opacity[pixel] < kLeastColoredOpacity) continue;
     picked.pixels.push_back(pixel);
-    picked.colors.push_back(bilinear(patch.ab, k, (float(x) + 0.5f) * scale - 0.5f, (float(y) + 0.5f) * scale - 0.5f));
+    const PlanePoint point(k, (float(x) + 0.5f) * scale - 0.5f, (float(y) + 0.5f) * scale - 0.5f);
+    picked.colors.push_back({point.value(patch.ab, 0), point.value(patch.ab, 1)});
+    picked.certainty.push_back(patch.certainty.empty() ? 1 : point.value(patch.certainty, 0));
   }
   return picked;
 }

@@ -49,15 +49,22 @@ struct AnsweredPatch {
   PatchPlace place;
   int side = 0;  ///< K
   RenderedPatch shown;
-  std::vector<float> ab;  ///< [2, K, K]
+  std::vector<float> ab;              ///< [2, K, K]
+  std::vector<float> certainty = {};  ///< [K, K] in (0, 1], `certainty_of`; empty where nothing is known of it
 
   [[nodiscard]] ColorPatchView view() const { return {side, side, ab, shown.opacity}; }
 };
 
-/// Some pixels of the square with the answer's colour at each (bilinear).
+/// What an answer of such a certainty weighs, from 0 to 1: as much as any up to `sure_colors` equally likely colours,
+/// and less by the square of their number beyond. What a colorizer guesses without knowing gives way to what it knows
+/// from another view or a larger patch.  @param sure_colors  0 = answers weigh the same
+[[nodiscard]] float certainty_weight(float certainty, double sure_colors);
+
+/// Some pixels of the square with the answer's colour and certainty at each (bilinear).
 struct PatchPixels {
   std::vector<std::uint32_t> pixels;  ///< y * width + x in the view; only those of some opacity
   std::vector<Ab> colors;
+  std::vector<float> certainty;  ///< 1 where the answer says nothing of it
 };
 [[nodiscard]] PatchPixels pick_pixels(const CachedView& view, const AnsweredPatch& patch, int count, std::uint64_t seed,
                                       std::uint64_t index);

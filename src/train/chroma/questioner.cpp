@@ -31,7 +31,10 @@ void PatchQuestions::answer(const Session& session, std::span<AnsweredPatch> pat
   }
   const ChromaBatch answer = session.colorizer.colorize(question);
   check_answer(session.colorizer.name(), question, answer);
-  for (std::size_t i = 0; i < patches.size(); ++i) patches[i].ab = ab_of(answer, int(i));
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    patches[i].ab = ab_of(answer, int(i));
+    patches[i].certainty = certainty_of(answer, int(i));
+  }
 }
 
 Questioner::Questioner(Session& session, Questions& questions) : session_(session), questions_(questions) {
@@ -62,12 +65,18 @@ void Questioner::exchange(std::vector<AnsweredPatch>& patches) const {
   if (ranks.is_alone()) return;
   cluster::Packer own;
   const auto [first, last] = part_of(patches.size(), ranks.rank());
-  for (std::size_t i = first; i < last; ++i) own.add(patches[i].ab);
+  for (std::size_t i = first; i < last; ++i) {
+    own.add(patches[i].ab);
+    own.add(patches[i].certainty);
+  }
   const std::vector<cluster::Bytes> all = ranks.gather(own.packed());
   for (int rank = 0; rank < ranks.size(); ++rank) {
     cluster::Unpacker answers(all[std::size_t(rank)]);
     const auto [begin, end] = part_of(patches.size(), rank);
-    for (std::size_t i = begin; i < end; ++i) answers.get(patches[i].ab);
+    for (std::size_t i = begin; i < end; ++i) {
+      answers.get(patches[i].ab);
+      answers.get(patches[i].certainty);
+    }
   }
 }
 

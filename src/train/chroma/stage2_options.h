@@ -14,6 +14,7 @@ struct Stage2Options {
   double learning_rate = 3e-2, final_learning_rate = 1e-3;
   int working_resolution = 384;
   double spread_weight = 0.1, regression_weight = 1;
+  double sure_colors = 40;
   double decode_temperature = 0.6;
   int distill_steps = 1000;
   int colorizer_batch = 16;
@@ -34,6 +35,8 @@ struct Stage2Options {
       "of a loss on how far apart the features of a ray's samples lie: for colours that agree from view to view");
     v("regression_weight", regression_weight, Range{0, 1000},
       "of a loss on how far the mean of a pixel's distribution is from the answer's colour");
+    v("sure_colors", sure_colors, Range{0, 313},
+      "n: an answer torn between m > n equally likely colours weighs (n / m)^2; 0 = all weigh the same");
     v("decode_temperature", decode_temperature, Range{0, 10}, "annealed-mean temperature; 0 = arg-max");
     v("distill_steps", distill_steps, Range{0, 1e6}, "steps of the fit of per-sample colour that baking uses");
     v("colorizer_batch", colorizer_batch, Range{1, 64}, "patches per query of the colorizer");
