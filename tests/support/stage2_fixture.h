@@ -45,6 +45,24 @@ class Listening final : public Colorizer {
   std::set<std::thread::id> threads;
 };
 
+/// Answers one colour and is sure, or another one, torn between 300: the latter three times as often.
+class Wavering final : public Colorizer {
+ public:
+  ChromaBatch colorize(const LightnessBatch& patches) override {
+    const std::size_t pixels = patches.lightness.size() / std::size_t(patches.batch);
+    ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
+    for (const PatchOrigin& origin : patches.origins) {
+      const bool is_sure = origin.query % 4 == 0;
+      const Ab color = is_sure ? kAnswer : Ab{-40, 30};
+      answer.ab.insert(answer.ab.end(), pixels, color.a);
+      answer.ab.insert(answer.ab.end(), pixels, color.b);
+      answer.certainty.insert(answer.certainty.end(), pixels, is_sure ? 0.1f : 1.0f / 300);
+    }
+    return answer;
+  }
+  [[nodiscard]] std::string name() const override { return "wavering"; }
+};
+
 class Stage2Fixture : public testing::Test {
  protected:
   void SetUp() override {

@@ -204,7 +204,6 @@ TEST_F(SharedStage2, RanksShareQuestionsAndSteps) {
   options.distill_steps = 2;
   std::mutex mutex;
   std::multiset<std::uint64_t> asked;
-  std::vector<test::Listening> colorizers(2);
   const auto colorized = [&](const std::string& name) {
     on_ranks(2, [&](cluster::Ranks& ranks) {
       Observer silent;
@@ -231,6 +230,25 @@ TEST_F(SharedStage2, RanksShareQuestionsAndSteps) {
   test::Listening colorizer;
   (void)colorize(options, colorizer, take("alone"));
   EXPECT_NEAR(distance_to_answer("a"), distance_to_answer("alone"), 0.5);
+}
+
+TEST_F(SharedStage2, RanksShareHowSureAnswersAre) {
+  Stage2Options options = small_options();
+  options.purify.enabled = false;
+  options.sure_colors = 10;
+  on_ranks(2, [&](cluster::Ranks& ranks) {
+    Observer silent;
+    test::Wavering colorizer;
+    (void)train_stage2({.capture = capture_,
+                        .stage1 = stage1(),
+                        .options = options,
+                        .colorizer = colorizer,
+                        .known = {},
+                        .take = take("a"),
+                        .ranks = ranks},
+                       cpu_engines(), silent);
+  });
+  EXPECT_LT(distance_to_answer("a"), 5);
 }
 
 /// The views' cache is traced by all and equal for all.

@@ -10,6 +10,7 @@ namespace cnerf {
 namespace {
 using test::kAnswer;
 using test::Listening;
+using test::Wavering;
 using Stage2 = test::Stage2Fixture;
 
 /// Answers another colour about the places of bases when first asked, about one of them mostly, and to every third
@@ -75,24 +76,6 @@ TEST_F(Stage2, LearnsTheAnswer) {
   (void)colorize(small_options(), colorizer, take("a"));
   EXPECT_LT(distance_to_answer("a"), 5) << "grey is " << std::hypot(kAnswer.a, kAnswer.b);
 }
-
-/// Answers one colour and is sure, or another one, torn between 300: the latter three times as often.
-class Wavering final : public Colorizer {
- public:
-  ChromaBatch colorize(const LightnessBatch& patches) override {
-    const std::size_t pixels = patches.lightness.size() / std::size_t(patches.batch);
-    ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
-    for (const PatchOrigin& origin : patches.origins) {
-      const bool is_sure = origin.query % 4 == 0;
-      const Ab color = is_sure ? kAnswer : Ab{-40, 30};
-      answer.ab.insert(answer.ab.end(), pixels, color.a);
-      answer.ab.insert(answer.ab.end(), pixels, color.b);
-      answer.certainty.insert(answer.certainty.end(), pixels, is_sure ? 0.1f : 1.0f / 300);
-    }
-    return answer;
-  }
-  [[nodiscard]] std::string name() const override { return "wavering"; }
-};
 
 TEST_F(Stage2, WhatTheColorizerIsNotSureOfGivesWay) {
   Stage2Options options = small_options();
