@@ -77,5 +77,5 @@ row "functions of more than 60 lines, kernels excepted" "$(awk '$1 > 60' <<< "$s
 row "functions of more than 6 parameters, kernels excepted" "$(awk '$2 > 6' <<< "$sizes" | wc -l)" 0
 awk '$1 > 60 || $2 > 6 { print "  " $3, $4 ": " $1 " lines, " $2 " parameters" }' <<< "$sizes"
 row "product lines" "$(find src encoding bake export viewer -type f -regex '.*\.\(h\|cpp\|inl\|cu\|cuh\|py\|ts\|css\|html\|js\)' \
-  ! -path '*/node_modules/*' ! -path '*/dist/*' ! -path 'viewer/tests/*' -print0 | xargs -0 cat | wc -l)" 80952  # a ratchet: who adds lines raises it in the same commit
+  ! -path '*/node_modules/*' ! -path '*/dist/*' ! -path 'viewer/tests/*' -print0 | xargs -0 cat | wc -l)" 80974  # a ratchet: who adds lines raises it in the same commit
 exit $((failures > 0))

@@ -2,7 +2,7 @@
 # Trains the built-in colorizer and writes its weights and score table. The run behind the shipped weights took 20
 # minutes on one H200; see docs/colorizer-model-card.md.
 #
-#   [HELD_OUT=SET] scripts/train_colorizer.sh DATA OUTPUT [options of cnerf-train-colorizer]
+#   [HELD_OUT=SET] [STEPS=59498] scripts/train_colorizer.sh DATA OUTPUT [options of cnerf-train-colorizer]
 #
 # DATA holds colorizer/ (archives of images, unpacked to OUTPUT/images) and lpips/ (SqueezeNet weights for the auxiliary
 # feature loss). With HELD_OUT, a set such as bsds500 has no part in training, and the network is judged on it. The
@@ -35,6 +35,10 @@ done
 photos=$images
 evaluation=("$images"/eval-kodak-384px)
 if [ -n "${HELD_OUT:-}" ]; then
+  if [ ! -d "$images/photos-128px-0/$HELD_OUT" ]; then
+    echo "HELD_OUT=$HELD_OUT: no such set; there are: $(ls "$images/photos-128px-0" | paste -sd ' ')" >&2
+    exit 64
+  fi
   photos=$images/without-$HELD_OUT
   unseen=$images/unseen-$HELD_OUT
   rm -rf "$photos" "$unseen"
@@ -53,4 +57,4 @@ exec "$(find "$build" -name cnerf-train-colorizer -type f -executable | head -1)
   --mosaic-labels "$data"/colorizer/objects-64px-labels.npy \
   --evaluation "${evaluation[@]}" \
   --teacher "$data"/lpips/lpips_sq_f32.bin \
-  --steps 59498 --epoch-steps 10000 --output "$output" "$@"
+  --steps "${STEPS:-59498}" --epoch-steps 10000 --output "$output" "$@"

@@ -115,6 +115,24 @@ Partial first_of(const std::array<float, kPaddedBins>& values) {
   return first;
 }
 
+struct PaddedLogits {
+  std::array<float, kPaddedBins> values;  ///< minus infinity behind the bins
+  float most;
+};
+
+PaddedLogits padded_logits(std::span<const float> logits) {
+  CNERF_CHECK_EQ(logits.size(), std::size_t(kAbBinCount));
+  PaddedLogits padded;
+  padded.values.fill(-std::numeric_limits<float>::infinity());
+  std::ranges::copy(logits, padded.values.begin());
+  Partial largest = first_of(padded.values);
+  for (std::size_t first = kPartials; first < kPaddedBins; first += kPartials) {
+    for (std::size_t i = 0; i < kPartials; ++i) largest[i] = std::max(largest[i], padded.values[first + i]);
+  }
+  padded.most = *std::ranges::max_element(largest);
+  return padded;
+}
+
 double total_of(const Partial& sums) {
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
@@ -170,16 +188,8 @@ Ab decode_arg_max(std::span<const float> logits) {
 }
 
 Ab decode_annealed_mean(std::span<const float> logits, float temperature) {
-  CNERF_CHECK_EQ(logits.size(), std::size_t(kAbBinCount));
   CNERF_CHECK(temperature > 0, "the annealed mean needs a positive temperature");
-  std::array<float, kPaddedBins> padded;
-  padded.fill(-std::numeric_limits<float>::infinity());
-  std::ranges::copy(logits, padded.begin());
-  Partial largest = first_of(padded);
-  for (std::size_t first = kPartials; first < kPaddedBins; first += kPartials) {
-    for (std::size_t i = 0; i < kPartials; ++i) largest[i] = std::max(largest[i], padded[first + i]);
-  }
-  const float most = *std::ranges::max_element(largest);
+  const auto [padded, most] = padded_logits(logits);
   const PaddedCentres& centres = padded_centres();
   Partial sum{}, a{}, b{};
   for (std::size_t first = 0; first < kPaddedBins; first += kPartials) {
@@ -195,15 +205,19 @@ Ab decode_annealed_mean(std::span<const float> logits, float temperature) {
 }
 
 float inverse_perplexity(std::span<const float> logits) {
-  CNERF_CHECK_EQ(logits.size(), std::size_t(kAbBinCount));
-  const float most = *std::ranges::max_element(logits);
-  double sum = 0, weighted = 0;
-  for (const float logit : logits) {
-    const double exponent = double(logit) - most, p = std::exp(exponent);
-    sum += p;
-    weighted += p * exponent;
+  constexpr float kLeastExponent = -1e4f;  // whose power is 0; 0 times minus infinity is not
+  const auto [padded, most] = padded_logits(logits);
+  Partial sum{}, weighted{};
+  for (std::size_t first = 0; first < kPaddedBins; first += kPartials) {
+    for (std::size_t i = 0; i < kPartials; ++i) {
+      const float exponent = std::max(annealed_exponent(padded[first + i], most, 1.0f), kLeastExponent);
+      const float p = exp_of_negative(exponent);
+      sum[i] += p;
+      weighted[i] += p * exponent;
+    }
   }
-  return float(std::exp(weighted / sum) / sum);
+  const double total = total_of(sum);
+  return float(std::exp(total_of(weighted) / total) / total);
 }
 
 std::vector<float> rebalancing_weights(std::span<const float> prior, float lambda) {

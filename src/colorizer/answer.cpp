@@ -1,5 +1,7 @@
 // What every answer is held to: its shape and values, and how it becomes one colour per pixel.
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,29 +21,30 @@ std::string size_text(int batch, int height, int width) {
 /// No colour of a screen is beyond +-110 in a or b, and files of Lab end at 128; networks overshoot a little.
 constexpr float kLargestAb = 160;
 constexpr float kLargestLogit = 1e6f;
+constexpr float kLeastCertainty = 1e-3f;  // 313 equally likely colours have 0.0032
 
 /// One of the kinds of values that an answer may hold.
 struct Values {
   const char* what;
   const std::vector<float>& values;
   int channels;
-  float largest;
+  float least, largest;
 };
 
 void check_values(const std::string& colorizer, const Values& given, const ChromaBatch& answer) {
-  const auto& [what, values, channels, most] = given;
-  const float largest = most;  // what a lambda holds has to be a variable
+  const auto& [what, values, channels, from, to] = given;
+  const float least = from, largest = to;  // what a lambda holds has to be a variable
   const std::size_t expected =
       std::size_t(answer.batch) * std::size_t(channels) * std::size_t(answer.height) * std::size_t(answer.width);
   if (values.size() != expected) {
     throw ColorizerError(colorizer + ": expected " + std::to_string(expected) + " values of " + what + ", got " +
                          std::to_string(values.size()));
   }
-  const auto bad = std::ranges::find_if_not(values, [&](float v) { return std::abs(v) <= largest; });  // nor NaN
+  const auto bad = std::ranges::find_if_not(values, [&](float v) { return v >= least && v <= largest; });  // nor NaN
   if (bad != values.end()) {
     throw ColorizerError(colorizer + ": " + what + " value " + std::to_string(bad - values.begin()) + ": expected a " +
-                         "number from " + std::to_string(-int(largest)) + " to " + std::to_string(int(largest)) +
-                         ", got " + std::to_string(*bad));
+                         "number from " + fmt::format("{:g} to {:g}", least, largest) + ", got " +
+                         std::to_string(*bad));
   }
 }
 
@@ -56,11 +59,13 @@ void check_answer(const std::string& colorizer, const LightnessBatch& question, 
     throw ColorizerError(colorizer + ": expected either ab or a distribution over " + std::to_string(kAbBinCount) +
                          " bins, got " + (answer.ab.empty() ? "neither" : "both"));
   }
-  if (!answer.certainty.empty()) check_values(colorizer, {"certainty", answer.certainty, 1, 1}, answer);
+  if (!answer.certainty.empty()) {
+    check_values(colorizer, {"certainty", answer.certainty, 1, kLeastCertainty, 1}, answer);
+  }
   if (answer.has_distribution()) {
-    check_values(colorizer, {"logits", answer.logits, kAbBinCount, kLargestLogit}, answer);
+    check_values(colorizer, {"logits", answer.logits, kAbBinCount, -kLargestLogit, kLargestLogit}, answer);
   } else {
-    check_values(colorizer, {"ab", answer.ab, 2, kLargestAb}, answer);
+    check_values(colorizer, {"ab", answer.ab, 2, -kLargestAb, kLargestAb}, answer);
   }
 }
 

@@ -34,7 +34,7 @@ std::vector<const Method*> parse_methods(const std::string& list) {
 Stage2Options stage2_of(const Method& method, Stage2Options configured) {
   Stage2Options options = std::move(configured);
   if (std::string_view(method.name) == "colornerf-paper") {
-    options.decode_temperature = options.spread_weight = options.regression_weight = 0;
+    options.decode_temperature = options.spread_weight = options.regression_weight = options.sure_colors = 0;
     options.purify.opinions = 1;
   }
   options.purify.enabled = options.purify.enabled && method.is_purified;

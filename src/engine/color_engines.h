@@ -50,7 +50,7 @@ class ColorBinEngine : public ColorEngine {
  public:
   /// One optimiser step; returns the mean loss. One of no pixels only counts, and costs 0.
   /// @param labels         [R] soft labels of the pixels
-  /// @param pixel_weights  [R] factors of the pixels' losses (class rebalancing, opacity); empty = all 1
+  /// @param pixel_weights  [R] factors of the pixels' losses (opacity, how sure answers are); empty = all 1
   double step(const PixelSamples& pixels, std::span<const SoftLabel> labels, std::span<const float> pixel_weights,
               const ChromaLossWeights& more, float learning_rate);
   /// @param logits  [R, 313]; of pixels below kLeastColoredOpacity they mean nothing

@@ -106,14 +106,17 @@ TEST(CheckAnswer, RefusesWhatIsWrongAndNamesTheColorizer) {
   refused([](ChromaBatch& a) { a.ab.back() = std::numeric_limits<float>::infinity(); });
 }
 
-TEST(CheckAnswer, RefusesACertaintyThatIsNone) {
+TEST(CheckAnswer, RefusesACertaintyOutsideZeroToOne) {
   const LightnessBatch question = some_question();
   ChromaBatch answer{
       question.batch, question.height, question.width, std::vector<float>(2 * question.lightness.size()), {}};
   answer.certainty.assign(question.lightness.size(), 0.5f);
   EXPECT_NO_THROW(check_answer("here", question, answer));
-  answer.certainty.back() = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THAT(message_of<ColorizerError>([&] { check_answer("here", question, answer); }), HasSubstr("certainty"));
+  for (const float wrong : {0.0f, -0.5f, 1.5f, std::numeric_limits<float>::quiet_NaN()}) {
+    answer.certainty.back() = wrong;
+    EXPECT_THAT(message_of<ColorizerError>([&] { check_answer("here", question, answer); }), HasSubstr("certainty"));
+  }
+  answer.certainty.back() = 0.5f;
   answer.certainty.pop_back();
   EXPECT_THAT(message_of<ColorizerError>([&] { check_answer("here", question, answer); }), HasSubstr("certainty"));
 }
@@ -125,12 +128,13 @@ TEST(CertaintyOf, TakesTheEntryAsked) {
 }
 
 TEST(CertaintyOf, ReadsADistributionPerPixel) {
-  ChromaBatch answer{1, 1, 2, {}, std::vector<float>(2 * kAbBinCount, 0)};
-  answer.logits[2 * 7] = 1000;  // of the first pixel: bin 7 alone
-  const std::vector<float> certainty = certainty_of(answer, 0);
+  ChromaBatch answer{2, 1, 2, {}, std::vector<float>(4 * kAbBinCount, 0)};
+  answer.logits[2 * kAbBinCount + 2 * 7] = 1000;  // of the second entry's first pixel: bin 7 alone
+  const std::vector<float> certainty = certainty_of(answer, 1);
   ASSERT_EQ(certainty.size(), 2u);
   EXPECT_FLOAT_EQ(certainty[0], 1);
   EXPECT_NEAR(certainty[1], 1.0 / kAbBinCount, 1e-7);
+  EXPECT_NEAR(certainty_of(answer, 0)[0], 1.0 / kAbBinCount, 1e-7);
 }
 
 TEST(AbOf, TakesTheEntryAsked) {

@@ -1,13 +1,16 @@
 // reference: colorizers fitted to a toy scene in which the texture of a thing decides its colour.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
 #include "src/base/files.h"
 #include "src/base/parallel.h"
+#include "src/color/ab_bins.h"
 #include "src/color/colorspace_math.h"
 #include "src/colorizer/torch/network_weights.h"
 #include "src/colorizer/torch/reference_images.h"
@@ -163,6 +166,20 @@ TEST(ReferenceNetwork, AnswersAnySizeAndWeightsComeBack) {
     EXPECT_EQ(answer.size(), 2 * question.lightness.size());
     other.set_weights(network.weights());
     EXPECT_EQ(other.colorize(question).ab, answer);
+    // Of a mirrored picture it is mirrored, and each patch has its own.
+    LightnessBatch mirrored = question;
+    const auto width = std::size_t(question.width);
+    for (auto row = mirrored.lightness.begin(); row != mirrored.lightness.end(); row += question.width) {
+      std::reverse(row, row + question.width);
+    }
+    const std::vector<float> certainty = network.colorize(question).certainty;
+    const std::vector<float> of_mirrored = network.colorize(mirrored).certainty;
+    ASSERT_EQ(certainty.size(), question.lightness.size());
+    EXPECT_THAT(certainty, testing::Each(testing::AllOf(testing::Gt(1.0f / kAbBinCount), testing::Le(1.0f))));
+    if (width % 64 != 0) continue;  // what a side is filled up with is not mirrored
+    for (std::size_t i = 0; i < certainty.size(); ++i) {
+      ASSERT_NEAR(certainty[i], of_mirrored[i / width * width + width - 1 - i % width], 1e-4);
+    }
   }
 }
 

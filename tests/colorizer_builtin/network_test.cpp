@@ -287,8 +287,11 @@ TEST(BuiltinColorizer, AnswerDoesNotDependOnTheRestOfTheBatch) {
   const auto colorizer = builtin_colorizer();
   const LightnessBatch all = ramp_batch(3, 32, 32);
   LightnessBatch last{1, 32, 32, {all.lightness.begin() + 2 * 32 * 32, all.lightness.end()}};
-  const std::vector<float> together = colorizer->colorize(all).ab, alone = colorizer->colorize(last).ab;
-  for (std::size_t i = 0; i < alone.size(); ++i) ASSERT_NEAR(alone[i], together[4 * 32 * 32 + i], 0.05f);
+  const ChromaBatch together = colorizer->colorize(all), alone = colorizer->colorize(last);
+  for (std::size_t i = 0; i < alone.ab.size(); ++i) ASSERT_NEAR(alone.ab[i], together.ab[4 * 32 * 32 + i], 0.05f);
+  for (std::size_t i = 0; i < alone.certainty.size(); ++i) {
+    ASSERT_NEAR(alone.certainty[i], together.certainty[2 * 32 * 32 + i], 1e-4f);
+  }
 }
 
 /// Soft blobs on [0, 1]^2, sampled at the pixels' centres.
@@ -379,7 +382,7 @@ TEST(BuiltinColorizer, SaysHowSureItIs) {
   EXPECT_GT(most, 1.05f * least) << "it is not everywhere as sure";
   for (int y = 0; y < 64; ++y) std::reverse(&picture.lightness[64 * y], &picture.lightness[64 * y] + 64);
   const std::vector<float> mirrored = colorizer->colorize(picture).certainty;
-  for (int i = 0; i < 64 * 64; ++i) ASSERT_NEAR(certainty[i], mirrored[i / 64 * 64 + 63 - i % 64], 1e-3);
+  for (int i = 0; i < 64 * 64; ++i) ASSERT_NEAR(certainty[i], mirrored[i / 64 * 64 + 63 - i % 64], 1e-5);
 }
 
 TEST(CertaintyMap, IsOneOverTheNumberOfEquallyLikelyColors) {

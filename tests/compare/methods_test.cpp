@@ -39,6 +39,7 @@ TEST(Methods, AblationsChangeWhatTheyAreNamedAfter) {
   smooth.regression_weight = 3;
   EXPECT_EQ(stage2_of(*parse_methods("colornerf-paper").front(), smooth).spread_weight, 0) << "not in the paper";
   EXPECT_EQ(stage2_of(*parse_methods("colornerf-paper").front(), smooth).regression_weight, 0);
+  EXPECT_EQ(of("colornerf-paper").sure_colors, 0);
   EXPECT_EQ(stage2_of(*parse_methods("without-purification").front(), smooth).spread_weight, 2);
   EXPECT_EQ(of("oracle").patches, full.patches);
   EXPECT_EQ(of("positional-encoding").patches, full.patches);

@@ -69,7 +69,8 @@ void add_rows(std::span<const float> from, int width, bool is_mirrored, float fa
   }
 }
 
-ChromaBatch empty_answer(const LightnessBatch& patches) {
+/// All 0, to which answers are added.
+ChromaBatch zero_answer(const LightnessBatch& patches) {
   ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
   answer.ab.resize(2 * patches.lightness.size());
   answer.certainty.resize(patches.lightness.size());
@@ -95,7 +96,7 @@ class BuiltinColorizer final : public Colorizer {
     if (patches.batch < 0 || patches.height < 1 || patches.width < 1) {
       throw ColorizerError(name_ + ": an empty patch cannot be coloured");
     }
-    ChromaBatch answer = empty_answer(patches);
+    ChromaBatch answer = zero_answer(patches);
     std::vector<std::size_t> all(static_cast<std::size_t>(patches.batch));
     std::iota(all.begin(), all.end(), std::size_t(0));
     if (device_.is_cpu() && patches.batch > 1) {
@@ -124,7 +125,7 @@ class BuiltinColorizer final : public Colorizer {
       for (std::size_t side = 0; side < kSides.size() && !is_asked_; ++side) {
         const LightnessBatch patch{1, kWarmUpSide, kWarmUpSide, std::vector<float>(kWarmUpSide * kWarmUpSide),
                                    std::vector<PatchOrigin>(1)};
-        ChromaBatch answer = empty_answer(patch);
+        ChromaBatch answer = zero_answer(patch);
         const Showing shown{0, false};
         add_pass(patch, {&shown, 1}, side, rows, answer);
       }

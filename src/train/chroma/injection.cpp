@@ -99,7 +99,9 @@ void PatchTraining::learn_sky(const AnsweredPatch& patch) {
     for (int x = 0; x < patch.side; x += kSkyStep) {
       const int column = place.left + x * place.side / patch.side, row = place.top + y * place.side / patch.side;
       const std::size_t at = std::size_t(y) * side + std::size_t(x);
-      session_.model.sky.add(view, std::size_t(row * view.width + column), {patch.ab[at], patch.ab[b + at]});
+      const float certainty = patch.certainty.empty() ? 1 : patch.certainty[at];
+      session_.model.sky.add(view, std::size_t(row * view.width + column), {patch.ab[at], patch.ab[b + at]},
+                             certainty_weight(certainty, session_.options.sure_colors));
     }
   }
 }

@@ -55,9 +55,9 @@ struct AnsweredPatch {
   [[nodiscard]] ColorPatchView view() const { return {side, side, ab, shown.opacity}; }
 };
 
-/// What an answer of such a certainty weighs, from 0 to 1: as much as any up to `sure_colors` equally likely colours,
-/// and less by the square of their number beyond. What a colorizer guesses without knowing gives way to what it knows
-/// from another view or a larger patch.  @param sure_colors  0 = answers weigh the same
+/// What an answer of such a certainty weighs: 1 up to `sure_colors` equally likely colours; beyond, it falls with the
+/// square of their number. So what a colorizer guesses gives way to what it knows from another view or a larger patch.
+/// @param sure_colors  0 = answers weigh the same
 [[nodiscard]] float certainty_weight(float certainty, double sure_colors);
 
 /// Some pixels of the square with the answer's colour and certainty at each (bilinear).

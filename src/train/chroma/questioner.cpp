@@ -31,10 +31,10 @@ void PatchQuestions::answer(const Session& session, std::span<AnsweredPatch> pat
   }
   const ChromaBatch answer = session.colorizer.colorize(question);
   check_answer(session.colorizer.name(), question, answer);
-  for (std::size_t i = 0; i < patches.size(); ++i) {
+  parallel_tasks(patches.size(), [&](std::size_t i) {
     patches[i].ab = ab_of(answer, int(i));
-    patches[i].certainty = certainty_of(answer, int(i));
-  }
+    if (session.options.sure_colors > 0) patches[i].certainty = certainty_of(answer, int(i));
+  });
 }
 
 Questioner::Questioner(Session& session, Questions& questions) : session_(session), questions_(questions) {

@@ -36,7 +36,7 @@ struct Stage2Options {
     v("regression_weight", regression_weight, Range{0, 1000},
       "of a loss on how far the mean of a pixel's distribution is from the answer's colour");
     v("sure_colors", sure_colors, Range{0, 313},
-      "n: an answer torn between m > n equally likely colours weighs (n / m)^2; 0 = all weigh the same");
+      "n0: an answer torn between n > n0 equally likely colours weighs (n0 / n)^2; 0 = all weigh the same");
     v("decode_temperature", decode_temperature, Range{0, 10}, "annealed-mean temperature; 0 = arg-max");
     v("distill_steps", distill_steps, Range{0, 1e6}, "steps of the fit of per-sample colour that baking uses");
     v("colorizer_batch", colorizer_batch, Range{1, 64}, "patches per query of the colorizer");
