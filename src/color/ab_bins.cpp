@@ -205,7 +205,7 @@ Ab decode_annealed_mean(std::span<const float> logits, float temperature) {
 }
 
 float inverse_perplexity(std::span<const float> logits) {
-  constexpr float kLeastExponent = -1e4f;  // whose power is 0; 0 times minus infinity is not
+  constexpr float kLeastExponent = -5000;  // whose power is 0; 0 times minus infinity is not
   const auto [padded, most] = padded_logits(logits);
   Partial sum{}, weighted{};
   for (std::size_t first = 0; first < kPaddedBins; first += kPartials) {
