@@ -1,6 +1,6 @@
-# Five captures in pictures of some 200 to 400 pixels, trained with the preset quick, and how well takes colour them: for
-# scripts that source this after they set `out`. Captures are looked for in $CNERF_DATA (else ../shared/data), the program is $CNERF
-# (else the release build).
+# Five captures in pictures of some 200 to 400 pixels, trained with the preset quick, and how well takes colour them:
+# for scripts that source this after they set `out`. Captures are looked for in $CNERF_DATA (else ../shared/data), the
+# program is $CNERF (else the release build).
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 scenes=${CNERF_DATA:-$root/../shared/data}/scenes
 cnerf=${CNERF:-$root/build/release/cnerf}

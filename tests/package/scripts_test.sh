@@ -52,6 +52,33 @@ done
 CNERF_CUDA=OFF bash "$scratch/tree/scripts/test.sh" > /dev/null
 tail -n 2 "$scratch/words" | grep -q -- '-DCNERF_CUDA=OFF' || fail "test.sh does not honour CNERF_CUDA"
 
+# train_colorizer.sh keeps a set out of training, and judges the network on it.
+stand_in ninja 'exit 0'
+mkdir -p "$scratch/trainer" "$scratch/data/colorizer"
+touch "$scratch/trainer/CMakeCache.txt"
+printf '#!/bin/bash\necho "$*"\n' > "$scratch/trainer/cnerf-train-colorizer"
+chmod +x "$scratch/trainer/cnerf-train-colorizer"
+for archive in 0 1; do
+  mkdir -p "$scratch/photos/kept/thing" "$scratch/photos/unseen/-"
+  touch "$scratch/photos/kept/thing/kept$archive.webp" "$scratch/photos/unseen/-/unseen$archive.webp"
+  tar -C "$scratch/photos" -cf "$scratch/data/colorizer/photos-128px-$archive.tar" .
+  rm -r "$scratch/photos"
+done
+# A second time, since it makes the folders anew.
+for _ in 1 2; do
+  HELD_OUT=unseen BUILD=$scratch/trainer bash "$root/scripts/train_colorizer.sh" "$scratch/data" "$scratch/trained" > "$scratch/said"
+done
+images=$scratch/trained/images
+grep -q -- "--photos $images/without-unseen/photos-128px-0 .* $images/unseen-unseen " "$scratch/said" \
+  || fail "train_colorizer.sh trains on what is held out: $(cat "$scratch/said")"
+[ "$(cd "$images" && find without-unseen unseen-unseen -type f -printf '%f ' | xargs -n 1 | sort | xargs)" \
+  = "kept0.webp kept1.webp unseen0.webp unseen1.webp" ] && [ ! -e "$images/without-unseen/photos-128px-1/unseen" ] \
+  || fail "train_colorizer.sh deals photographs wrongly: $(find "$images" -type f)"
+status=0
+HELD_OUT=unsen BUILD=$scratch/trainer bash "$root/scripts/train_colorizer.sh" "$scratch/data" "$scratch/trained" \
+  > /dev/null 2> "$scratch/said" || status=$?
+[ "$status" -eq 64 ] && grep -q 'kept unseen' "$scratch/said" || fail "an unknown HELD_OUT ends with $status"
+
 # captures.sbatch gives each capture a run of its own.
 status=0
 SLURM_ARRAY_TASK_ID=1 CNERF=/bin/true OUT=$scratch/runs bash "$root/scripts/captures.sbatch" day1/photos day2/photos \

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
@@ -23,7 +24,26 @@
 
 namespace cnerf::test {
 
-inline constexpr Ab kAnswer = {12, -9};
+inline constexpr Ab kAnswer = {12, -9}, kOtherAnswer = {-40, 30};
+
+/// One colour all over a patch.
+struct FlatAnswer {
+  Ab color;
+  std::optional<float> certainty = {};
+};
+/// @param answer_to  FlatAnswer(const PatchOrigin&)
+template <typename AnswerTo>
+ChromaBatch flat_answers(const LightnessBatch& patches, const AnswerTo& answer_to) {
+  const std::size_t pixels = std::size_t(patches.height) * std::size_t(patches.width);
+  ChromaBatch all{patches.batch, patches.height, patches.width, {}, {}};
+  for (const PatchOrigin& origin : patches.origins) {
+    const FlatAnswer answer = answer_to(origin);
+    all.ab.insert(all.ab.end(), pixels, answer.color.a);
+    all.ab.insert(all.ab.end(), pixels, answer.color.b);
+    if (answer.certainty) all.certainty.insert(all.certainty.end(), pixels, *answer.certainty);
+  }
+  return all;
+}
 
 /// Answers one colour and keeps the questions' origins, and from which threads they came.
 class Listening final : public Colorizer {
@@ -31,13 +51,7 @@ class Listening final : public Colorizer {
   ChromaBatch colorize(const LightnessBatch& patches) override {
     threads.insert(std::this_thread::get_id());
     origins.insert(origins.end(), patches.origins.begin(), patches.origins.end());
-    const std::size_t pixels = patches.lightness.size() / std::size_t(patches.batch);
-    ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
-    for (int i = 0; i < patches.batch; ++i) {
-      answer.ab.insert(answer.ab.end(), pixels, kAnswer.a);
-      answer.ab.insert(answer.ab.end(), pixels, kAnswer.b);
-    }
-    return answer;
+    return flat_answers(patches, [](const PatchOrigin&) { return FlatAnswer{kAnswer}; });
   }
   [[nodiscard]] std::string name() const override { return "listening"; }
 
@@ -49,16 +63,9 @@ class Listening final : public Colorizer {
 class Wavering final : public Colorizer {
  public:
   ChromaBatch colorize(const LightnessBatch& patches) override {
-    const std::size_t pixels = patches.lightness.size() / std::size_t(patches.batch);
-    ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
-    for (const PatchOrigin& origin : patches.origins) {
-      const bool is_sure = origin.query % 4 == 0;
-      const Ab color = is_sure ? kAnswer : Ab{-40, 30};
-      answer.ab.insert(answer.ab.end(), pixels, color.a);
-      answer.ab.insert(answer.ab.end(), pixels, color.b);
-      answer.certainty.insert(answer.certainty.end(), pixels, is_sure ? 0.1f : 1.0f / 300);
-    }
-    return answer;
+    return flat_answers(patches, [](const PatchOrigin& origin) {
+      return origin.query % 4 == 0 ? FlatAnswer{kAnswer, 0.1f} : FlatAnswer{kOtherAnswer, 1.0f / 300};
+    });
   }
   [[nodiscard]] std::string name() const override { return "wavering"; }
 };

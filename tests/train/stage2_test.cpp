@@ -4,6 +4,7 @@
 
 #include "src/base/error.h"
 #include "src/train/chroma/base_chooser.h"
+#include "src/train/luminance/luminance_model.h"
 #include "tests/support/stage2_fixture.h"
 
 namespace cnerf {
@@ -18,17 +19,12 @@ using Stage2 = test::Stage2Fixture;
 class Erring final : public Colorizer {
  public:
   ChromaBatch colorize(const LightnessBatch& patches) override {
-    const std::size_t pixels = patches.lightness.size() / std::size_t(patches.batch);
-    ChromaBatch answer{patches.batch, patches.height, patches.width, {}, {}};
-    for (const PatchOrigin& origin : patches.origins) {
+    return test::flat_answers(patches, [](const PatchOrigin& origin) {
       const bool is_base = origin.query >= std::uint64_t(1) << 32, is_first = is_base && origin.query >> 33 == 0;
       const bool is_wrong =
           is_first || (is_base && origin.view == "toy0" && origin.query % 8 < 5) || (!is_base && origin.query % 3 == 0);
-      const Ab color = is_wrong ? Ab{-40, 30} : kAnswer;
-      answer.ab.insert(answer.ab.end(), pixels, color.a);
-      answer.ab.insert(answer.ab.end(), pixels, color.b);
-    }
-    return answer;
+      return test::FlatAnswer{is_wrong ? test::kOtherAnswer : kAnswer};
+    });
   }
   [[nodiscard]] std::string name() const override { return "erring"; }
 };
@@ -87,6 +83,29 @@ TEST_F(Stage2, WhatTheColorizerIsNotSureOfGivesWay) {
   options.sure_colors = 0;
   (void)colorize(options, colorizer, take("alike"));
   EXPECT_GT(distance_to_answer("alike"), 30) << "three of four say so";
+}
+
+// One view looks away from the scene.
+TEST_F(Stage2, TheSkyFollowsWhatTheColorizerIsSureOf) {
+  Affined& away = capture_.views[1].world_from_camera;
+  away.linear = Mat3d::from_columns(-away.linear.column(0), away.linear.column(1), -away.linear.column(2));
+  away.translation = away.translation * 10.0;
+  LuminanceModel luminance = LuminanceModel::load(stage1(), cpu_engines());
+  luminance.sky = {8, 4, {std::vector<float>(std::size_t(8) * 4, 0.25f)}};
+  luminance.save(stage1());
+  Stage2Options options = small_options();
+  options.purify.enabled = false;
+  const auto distance_of_sky = [&](double sure_colors) {
+    options.sure_colors = sure_colors;
+    Wavering colorizer;
+    (void)colorize(options, colorizer, take(std::to_string(sure_colors)));
+    const Vec3d seen = away.linear.column(2);
+    const Ab color = ColorModel::load(take(std::to_string(sure_colors)), cpu_engines())
+                         .sky.along({float(seen.x), float(seen.y), float(seen.z)});
+    return std::hypot(color.a - kAnswer.a, color.b - kAnswer.b);
+  };
+  EXPECT_LT(distance_of_sky(10), 5);
+  EXPECT_GT(distance_of_sky(0), 20) << "most answers are of the other colour";
 }
 
 // As the corners of a picture of an object before nothing: what is asked there teaches nothing, and ends nothing.
